@@ -1,0 +1,11 @@
+# Writes OUTPUT, a C++ file that defines offstage::render::shader_source(name) over the files in INPUTS.
+set(text "// Made by cmake/embed_shaders.cmake from render/shaders.\n#include <stdexcept>\n#include <string>\n#include <string_view>\n\n")
+string(APPEND text "namespace offstage::render {\nstd::string_view shader_source(std::string_view name);\n")
+string(APPEND text "std::string_view shader_source(std::string_view name) {\n")
+foreach(file IN LISTS INPUTS)
+  get_filename_component(name "${file}" NAME)
+  file(READ "${file}" source)
+  string(APPEND text "  if (name == \"${name}\") return R\"GLSL(${source})GLSL\";\n")
+endforeach()
+string(APPEND text "  throw std::logic_error(\"no shader \" + std::string(name));\n}\n}  // namespace offstage::render\n")
+file(WRITE "${OUTPUT}" "${text}")

@@ -1,0 +1,47 @@
+#pragma once
+/// Pictures in memory. Rows run from the top down everywhere outside GL.
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace offstage::render {
+
+/// 8 bits per channel, RGBA, sRGB-encoded colour, straight alpha.
+struct Image {
+  int width_px = 0, height_px = 0;
+  std::vector<uint8_t> rgba;  ///< width * height * 4
+
+  std::size_t pixel_count() const { return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px); }
+};
+
+/// Linear light, RGBA float, premultiplied alpha.
+struct HdrImage {
+  int width_px = 0, height_px = 0;
+  std::vector<float> rgba;  ///< width * height * 4
+
+  std::size_t pixel_count() const { return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px); }
+};
+
+/// XXH3-128 of size and pixels as 32 hexadecimal digits; never of a file's bytes.
+std::string pixel_hash(const Image& image);
+
+/// How two images of one size differ. `max_delta` and `mean_delta` are over the RGBA channels in 8-bit steps.
+struct ImageDifference {
+  int max_delta = 0;
+  double mean_delta = 0;
+  std::size_t pixels_over = 0;  ///< pixels with a channel off by more than 2
+  double fraction_over = 0;     ///< the same as a share of all pixels
+  double total_delta = 0;       ///< sum of all absolute channel differences
+
+  /// The tolerance for goldens of another machine class: at most 0.05 % of the pixels off by more than 2 steps, and a
+  /// mean difference of at most 0.05 steps.
+  bool within_tolerance() const;
+};
+/// Throws std::invalid_argument if the sizes differ.
+ImageDifference difference(const Image& a, const Image& b);
+/// The absolute difference times `gain`, opaque.
+Image amplified_difference(const Image& a, const Image& b, int gain = 16);
+
+}  // namespace offstage::render

@@ -1,0 +1,66 @@
+#pragma once
+/// Drawable data on the CPU: meshes, materials, and models that combine them. All colours are linear.
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "render/image.h"
+
+namespace offstage::render {
+
+using Eigen::Vector2f;
+using Eigen::Vector3f;
+using Eigen::Vector4f;
+
+/// Indexed triangles. `normals` and `uvs` are empty or as long as `positions`; without normals the stage shades smooth.
+struct Mesh {
+  std::vector<Vector3f> positions;
+  std::vector<Vector3f> normals;
+  std::vector<Vector2f> uvs;
+  std::vector<uint32_t> indices;  ///< three per triangle, counter-clockwise seen from outside
+
+  Eigen::AlignedBox3f bounds() const;
+};
+
+/// Fills `normals` with area-weighted means, split at edges sharper than `crease_deg` (vertices are duplicated there).
+void compute_normals(Mesh& mesh, float crease_deg = 40);
+
+/// Procedural surface patterns, evaluated in object space so that they need no texture coordinates.
+enum class Pattern { none, checker, grid, noise, brick, wood, lawn, paving };
+
+/// Metallic/roughness material.
+struct Material {
+  std::string name;
+  Vector4f color = {0.8f, 0.8f, 0.8f, 1};  ///< base colour; alpha below 1 blends
+  float metallic = 0;                      ///< in [0, 1]
+  float roughness = 0.5f;                  ///< in [0, 1]
+  Vector3f emission = Vector3f::Zero();    ///< radiance [arbitrary units, 1 = sunlit white]
+  Pattern pattern = Pattern::none;
+  Vector3f pattern_color = {0.4f, 0.4f, 0.4f};  ///< second colour of the pattern
+  float pattern_scale = 1;                      ///< size of one cell [m], > 0
+  bool two_sided = false;
+  int base_color_texture = -1;  ///< index into Model::textures, -1: none
+  int metallic_roughness_texture = -1;
+  int emission_texture = -1;
+};
+
+/// What a model file holds, with the node hierarchy already applied.
+struct Model {
+  struct Part {
+    Mesh mesh;
+    int material = 0;  ///< index into `materials`
+  };
+  std::vector<Part> parts;
+  std::vector<Material> materials;
+  std::vector<Image> textures;
+  std::vector<std::string> warnings;  ///< what was repaired or ignored, one line each
+
+  Eigen::AlignedBox3f bounds() const;
+  std::size_t triangle_count() const;
+  std::size_t vertex_count() const;
+};
+
+}  // namespace offstage::render

@@ -1,0 +1,120 @@
+#pragma once
+/// The stage: what there is to see, and the passes that draw it. It knows handles, transforms, meshes, points and
+/// materials, and nothing of physics.
+///
+/// A frame is the mean of N sub-frames (Frame::samples), each drawn with its own offsets in the pixel, on the sun's disc, in
+/// the lens and, by the caller moving things in between, in time. That one mechanism gives anti-aliasing, soft shadows,
+/// depth of field and motion blur.
+
+#include <Eigen/Geometry>
+#include <memory>
+#include <span>
+
+#include "render/context.h"
+#include "render/handle.h"
+#include "render/image.h"
+#include "render/model.h"
+
+namespace offstage::render {
+
+struct Camera {
+  Vector3f eye = {0, 1.5f, 5};
+  Vector3f target = Vector3f::Zero();
+  Vector3f up = Vector3f::UnitY();
+  float fov_deg = 40;        ///< vertical, in (0, 180)
+  float near_m = 0.05f, far_m = 2000;
+  float aperture = 0;        ///< lens diameter [m]; 0: everything is sharp
+  float focus = 0;           ///< distance in focus [m]; 0: the target's
+};
+
+struct Sun {
+  Vector3f direction = Vector3f(0.45f, 0.75f, 0.5f).normalized();  ///< towards the sun, unit
+  Vector3f color = {1, 0.95f, 0.87f};
+  float intensity = 3;        ///< radiance of a white surface facing it, before exposure
+  float size_deg = 1.5f;      ///< diameter of the disc: the softness of shadows
+  bool shadows = true;
+};
+
+/// Sky, ambient light from it, and fog towards its horizon.
+struct Environment {
+  Vector3f zenith = {0.16f, 0.32f, 0.65f};
+  Vector3f horizon = {0.62f, 0.72f, 0.82f};
+  Vector3f ground = {0.28f, 0.26f, 0.22f};  ///< seen below the horizon, and light from below
+  float intensity = 1;                       ///< scales sky and ambient together
+  float fog = 0;                             ///< density [1/m]; transmittance exp(-fog * distance)
+  bool visible = true;                       ///< false: transparent background; it still lights the scene
+};
+
+/// One drawn particle.
+struct Point {
+  Vector3f position;
+  Vector3f velocity;  ///< [m/s], stretches streaks
+  float radius;       ///< [m]
+  Vector4f color;     ///< linear, straight alpha
+  uint64_t id;        ///< breaks ties when sorting
+};
+
+enum class PointStyle {
+  sprite,  ///< soft round billboard, sorted, depth-faded
+  streak,  ///< billboard stretched along its motion during the exposure: rain, sparks, water
+  sphere,  ///< opaque lit ball
+};
+
+struct PointsDef {
+  PointStyle style = PointStyle::sprite;
+  bool additive = false;        ///< add light instead of covering: fire, sparks
+  bool lit = true;              ///< by sun and sky; false: its colour is its light
+  bool casts_shadow = true;
+  float softness = 0.5f;        ///< width of the fade at the rim, as a share of the radius, in [0, 1]
+  float stretch_s = 1.0f / 60;  ///< streaks are velocity * stretch_s long [s]
+  float metallic = 0, roughness = 0.3f;  ///< of spheres
+};
+
+/// Offsets of one sub-frame, each in [-0.5, 0.5] (pixel, lens and light squares; mapped to discs inside).
+struct SampleOffsets {
+  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
+  Eigen::Vector2f lens = Eigen::Vector2f::Zero();
+  Eigen::Vector2f light = Eigen::Vector2f::Zero();
+};
+/// Offsets of sub-frame i of n: a fixed low-discrepancy set; all zero for n = 1.
+SampleOffsets sample_offsets(int i, int n);
+
+struct StageDef {
+  int width_px = 1280, height_px = 720;
+  int shadow_map_px = 2048;
+};
+
+class Stage {
+ public:
+  /// The context must be current, and outlive the stage.
+  Stage(Context& context, const StageDef& def);
+  ~Stage();
+  Stage(Stage&&) noexcept;
+
+  MeshHandle add_mesh(const Mesh& mesh);
+  /// `textures` are those the material's indices refer to; each is uploaded once per call, with mip maps.
+  MaterialHandle add_material(const Material& material, std::span<const Image> textures = {});
+  InstanceHandle add_instance(MeshHandle mesh, MaterialHandle material, bool casts_shadow = true);
+  PointsHandle add_points(const PointsDef& def);
+
+  void remove(InstanceHandle instance);
+  void remove(PointsHandle points);
+
+  void set_transform(InstanceHandle instance, const Eigen::Affine3f& world_from_mesh);
+  void set_visible(InstanceHandle instance, bool visible);
+  void set_points(PointsHandle points, std::span<const Point> values);
+
+  void set_camera(const Camera& camera);
+  void set_sun(const Sun& sun);
+  void set_environment(const Environment& environment);
+
+  /// Draws one sub-frame and adds it to `sum`, which is sized and cleared first if it does not have the stage's size.
+  /// Throws UnavailableError on a GL error.
+  void draw(const SampleOffsets& offsets, HdrImage& sum);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace offstage::render

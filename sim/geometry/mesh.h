@@ -1,0 +1,77 @@
+#pragma once
+/// Triangle meshes with the adjacency and the normals by feature that registration computes once (physics E2).
+/// Faces are counter-clockwise seen from outside.
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "sim/types.h"
+
+namespace offstage::sim {
+
+using Triangle = std::array<uint32_t, 3>;
+inline constexpr uint32_t kNoFace = 0xffffffff;
+
+/// Vertices and triangles as a user gives them.
+struct TriangleMesh {
+  std::vector<Vec3> vertices;       ///< [m]
+  std::vector<Triangle> triangles;  ///< indices into `vertices`
+};
+
+/// An undirected edge between two vertices. `faces[1]` is kNoFace on a border.
+struct Edge {
+  std::array<uint32_t, 2> vertices;
+  std::array<uint32_t, 2> faces;
+};
+
+/// What is wrong with a mesh as the surface of a solid; all zero for a closed, consistently wound one.
+struct MeshDefects {
+  uint32_t border_edges = 0;        ///< edges with one face: the mesh is open
+  uint32_t non_manifold_edges = 0;  ///< edges with three or more faces
+  uint32_t flipped_edges = 0;       ///< edges whose two faces run along them in the same direction
+  uint32_t degenerate_faces = 0;    ///< faces of zero area or with a repeated vertex
+  bool inverted = false;            ///< the enclosed volume is negative
+
+  bool closed() const { return border_edges == 0 && non_manifold_edges == 0 && flipped_edges == 0; }
+  /// One line that names every defect, empty if there is none.
+  std::string describe() const;
+};
+
+/// Merges vertices at the same position (bitwise) and drops faces that collapse. Importers split vertices along
+/// texture seams; physics needs them joined.
+TriangleMesh weld(const TriangleMesh& mesh);
+
+/// Connectivity and normals of a mesh. Every query is O(1).
+class MeshTopology {
+ public:
+  explicit MeshTopology(const TriangleMesh& mesh);
+
+  const std::vector<Edge>& edges() const { return edges_; }
+  /// The three faces across the edges (0,1), (1,2), (2,0) of a face; kNoFace on a border.
+  const std::array<uint32_t, 3>& face_neighbours(uint32_t face) const { return face_neighbours_[face]; }
+  /// The three edges (0,1), (1,2), (2,0) of a face as indices into edges().
+  const std::array<uint32_t, 3>& face_edges(uint32_t face) const { return face_edges_[face]; }
+  /// Faces around a vertex, in ascending order.
+  std::span<const uint32_t> vertex_faces(uint32_t vertex) const;
+  /// Vertices that share an edge with a vertex, in ascending order.
+  std::span<const uint32_t> vertex_neighbours(uint32_t vertex) const;
+
+  const Vec3& face_normal(uint32_t face) const { return face_normals_[face]; }        ///< unit; zero if degenerate
+  const Vec3& edge_normal(uint32_t edge) const { return edge_normals_[edge]; }        ///< mean of its faces', unit
+  const Vec3& vertex_normal(uint32_t vertex) const { return vertex_normals_[vertex]; }  ///< angle-weighted, unit
+
+  const MeshDefects& defects() const { return defects_; }
+
+ private:
+  std::vector<Edge> edges_;
+  std::vector<std::array<uint32_t, 3>> face_neighbours_, face_edges_;
+  std::vector<uint32_t> vertex_face_start_, vertex_faces_;
+  std::vector<uint32_t> vertex_neighbour_start_, vertex_neighbours_;
+  std::vector<Vec3> face_normals_, edge_normals_, vertex_normals_;
+  MeshDefects defects_;
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,198 @@
+#pragma once
+/// The simulation's front door: objects go in as plain definitions, step() advances them by a sampling time, and
+/// moved() says where they went. The world knows nothing of drawing (physics E1-E5, E8, E9).
+///
+/// Valid ranges: sizes 0.001-100 m, speeds under 300 m/s. The state after step() is the same bits for any number
+/// of threads.
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "sim/dynamics/integrator.h"
+#include "sim/dynamics/keyframes.h"
+#include "sim/dynamics/particles.h"
+#include "sim/geometry/mass_properties.h"
+#include "sim/geometry/mesh.h"
+#include "sim/handle.h"
+#include "sim/shape.h"
+#include "sim/types.h"
+
+namespace offstage::sim {
+
+struct BodyTag {};
+struct ParticleSystemTag {};
+struct SpringTag {};
+using BodyHandle = Handle<BodyTag>;
+using ParticleSystemHandle = Handle<ParticleSystemTag>;
+using SpringHandle = Handle<SpringTag>;
+
+enum class MotionType {
+  fixed,      ///< never moves, costs nothing per step
+  kinematic,  ///< follows its keyframes, pushes others with infinite mass
+  dynamic,    ///< moved by forces
+};
+
+struct BodyDef {
+  std::string name;
+  Shape shape = Sphere{};
+  MotionType motion = MotionType::dynamic;
+  Pose pose;                             ///< at time 0; kinematic bodies with keys take the keys' pose instead
+  Vec3 velocity = Vec3::Zero();          ///< of the centre of mass [m/s]
+  Vec3 angular_velocity = Vec3::Zero();  ///< world axes [rad/s]
+  Real density = 1000;                   ///< [kg/m^3], > 0; ignored if mass > 0
+  Real mass = 0;                         ///< [kg]; 0: from density and volume
+  Real linear_drag = 0;                  ///< k_v of F = -k_v v [kg/s]
+  Real angular_drag = 0;                 ///< k_w of tau = -k_w w [kg m^2/s]
+  Real restitution = 0.5;                ///< with particles: the larger of the two is used
+  Real friction = 0.5;                   ///< with particles: the geometric mean of the two is used
+  bool collides = true;                  ///< takes part in collisions with bodies and particles
+  KeyframeTrack track;                   ///< for kinematic bodies
+};
+
+/// Where a spring ends: a point of the world, a point of a body (body frame), or a particle by its id.
+struct WorldPoint {
+  Vec3 position = Vec3::Zero();
+};
+struct BodyPoint {
+  BodyHandle body;
+  Vec3 position = Vec3::Zero();
+};
+struct ParticlePoint {
+  ParticleSystemHandle system;
+  uint64_t id = 0;
+};
+using Attachment = std::variant<WorldPoint, BodyPoint, ParticlePoint>;
+
+/// Damped spring between two points (P2, R2): F = -[k (|d| - L) + c (d'.d)/|d|] d/|d|. A spring whose particle died
+/// is removed with it.
+struct SpringDef {
+  std::string name;
+  Attachment a, b;
+  Real stiffness = 100;   ///< k [N/m], >= 0
+  Real damping = 0;       ///< c [N s/m], >= 0
+  Real rest_length = -1;  ///< L [m]; negative: the distance at creation
+};
+
+struct WorldDef {
+  Vec3 gravity = {0, -9.81, 0};                                  ///< [m/s^2]
+  Vec3 wind = Vec3::Zero();                                      ///< air velocity felt by drag [m/s]
+  Real max_step = 1.0 / 240;                                     ///< longest internal step [s]
+  IntegratorKind integrator = IntegratorKind::rk4;               ///< of bodies and of everything joined by springs
+  Aabb bounds = Aabb(Vec3::Constant(-1000), Vec3::Constant(1000));  ///< what leaves is retired and reported (E3)
+};
+
+/// Two bodies that came into contact, which this version cannot resolve yet (see StepReport::unresolved).
+struct UnresolvedContact {
+  BodyHandle a, b;
+  Real time = 0;  ///< [s]
+};
+
+/// What a step did. Numerical trouble is data here, never an exception.
+struct StepReport {
+  uint32_t substeps = 0;
+  uint64_t particles_born = 0;
+  uint64_t particles_expired = 0;   ///< reached their lifespan or died on a hit
+  uint64_t particles_retired = 0;   ///< left the world's bounds
+  uint64_t particles_ejected = 0;   ///< found inside a body and projected out (P4)
+  uint64_t particles_removed = 0;   ///< found inside a body and could not be projected out (P4)
+  uint64_t particle_collisions = 0;
+  uint64_t truncated_sweeps = 0;    ///< particles that used up their bounded number of hits within one sub-step
+  std::vector<BodyHandle> bodies_retired;         ///< left the world's bounds: frozen from here on
+  std::vector<UnresolvedContact> unresolved;      ///< pairs of bodies in contact: the result is not valid physics
+  bool finite = true;                             ///< false: something became NaN or infinite
+  std::string non_finite_object;                  ///< the first such object's name
+};
+
+/// Mechanical energy [J]: kinetic, gravitational (zero at y = 0) and elastic.
+struct Energy {
+  Real kinetic = 0, potential = 0, elastic = 0;
+  Real total() const { return kinetic + potential + elastic; }
+};
+
+struct MovedBody {
+  BodyHandle body;
+  Pose pose;
+};
+
+/// Everything that can be asked of a body.
+struct BodyState {
+  Pose pose;               ///< of the body's own frame, as given at creation
+  Vec3 centre;             ///< of mass, world [m]
+  Vec3 velocity;           ///< of the centre of mass [m/s]
+  Vec3 angular_velocity;   ///< world [rad/s]
+  Vec3 angular_momentum;   ///< about the centre of mass, world [kg m^2/s]
+  Real mass = 0;           ///< [kg]; 0 unless dynamic
+};
+
+/// 128 bits over the whole state: equal states have equal hashes.
+struct StateHash {
+  uint64_t low = 0, high = 0;
+  friend bool operator==(const StateHash&, const StateHash&) = default;
+  std::string hex() const;  ///< 32 lower-case digits, high word first
+};
+
+class World {
+ public:
+  explicit World(const WorldDef& def = {});
+  ~World();
+  World(World&&) noexcept;
+  World& operator=(World&&) noexcept;
+
+  /// Registers a mesh: welds it, then computes topology, mass properties and bounding tree once (E2).
+  /// Throws std::invalid_argument for an index out of range, a non-finite vertex or no face at all.
+  MeshHandle add_mesh(const TriangleMesh& mesh);
+  const MeshTopology& topology(MeshHandle mesh) const;
+  const TriangleMesh& mesh(MeshHandle mesh) const;  ///< as registered (welded)
+
+  /// Throws std::invalid_argument, saying which field and what is allowed, for a size, mass or density out of range;
+  /// a dynamic body needs a solid: a plane or an open or inverted mesh is refused.
+  BodyHandle add_body(const BodyDef& def);
+  ParticleSystemHandle add_particle_system(const ParticleSystemDef& def);
+  SpringHandle add_spring(const SpringDef& def);
+
+  bool remove(BodyHandle body);  ///< springs attached to it go too; false if the handle is stale
+  bool remove(ParticleSystemHandle system);
+  bool remove(SpringHandle spring);
+
+  /// Adds a particle. `elapsed` is how long before the end of the coming sub-step it was born: it is integrated over
+  /// just that part of it. Negative: it exists now and is stepped in full. Returns its id.
+  uint64_t add_particle(ParticleSystemHandle system, const Particle& particle, Real elapsed = -1);
+
+  /// Called before each sub-step with its start and end time; emitters add their particles here.
+  using BeforeSubStep = std::function<void(Real start, Real end)>;
+
+  /// Advances by `sampling_time` in the fewest equal sub-steps not longer than WorldDef::max_step.
+  StepReport step(Real sampling_time, const BeforeSubStep& before = {});
+
+  /// Time since the start [s].
+  Real time() const;
+  const WorldDef& def() const;
+
+  /// Bodies whose pose changed during the last step (E5), in slot order.
+  std::span<const MovedBody> moved() const;
+  BodyState body(BodyHandle body) const;
+  const BodyDef& body_def(BodyHandle body) const;
+  /// Motion of a point of a body (world position at its current pose) at a time inside the current sub-step: exact
+  /// for kinematic bodies, extrapolated for dynamic ones.
+  Motion body_motion(BodyHandle body, Real time) const;
+  const ParticleArrays& particles(ParticleSystemHandle system) const;
+  const ParticleSystemDef& particle_system_def(ParticleSystemHandle system) const;
+  void for_each_body(const std::function<void(BodyHandle)>& f) const;
+  void for_each_particle_system(const std::function<void(ParticleSystemHandle)>& f) const;
+  std::size_t body_count() const;
+  std::size_t particle_count() const;
+
+  Energy energy() const;
+  StateHash state_hash() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace offstage::sim
