@@ -1,8 +1,9 @@
 #pragma once
 /// Colour and size keyed over age (F4).
 
-#include <Eigen/Core>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "effects/random.h"
 

@@ -1,7 +1,8 @@
 #pragma once
-/// Counter-based random numbers: Philox4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", 2011).
-/// A number depends only on (seed, stream, index, property), so a new property never reshuffles the others and the order
-/// of evaluation does not matter. No std:: distribution is used: their bits differ between libraries.
+/// Counter-based random numbers: Philox4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3",
+/// 2011). A number depends only on (seed, stream, index, property), so a new property never reshuffles the
+/// others and the order of evaluation does not matter. No std:: distribution is used: their bits differ
+/// between libraries.
 
 #include <array>
 #include <cstdint>
@@ -25,7 +26,8 @@ class RandomStream {
  public:
   RandomStream(uint64_t seed, uint64_t stream) : seed_(seed), stream_(stream) {}
 
-  /// Uniform in the open interval (0, 1), 52 bits. `index` counts particles or releases, `property` is what is drawn.
+  /// Uniform in the open interval (0, 1), 52 bits. `index` counts particles or releases, `property` is what
+  /// is drawn.
   Real uniform(uint64_t index, uint32_t property) const;
   /// Uniform integer in [0, n), n > 0.
   uint64_t below(uint64_t n, uint64_t index, uint32_t property) const;
@@ -34,7 +36,8 @@ class RandomStream {
   uint64_t seed_, stream_;
 };
 
-/// A pseudo-random permutation of [0, n) evaluated at one place in O(1), by a Feistel network with cycle walking.
+/// A pseudo-random permutation of [0, n) evaluated at one place in O(1), by a Feistel network with cycle
+/// walking.
 class Permutation {
  public:
   Permutation(uint64_t n, uint64_t key);
@@ -45,11 +48,12 @@ class Permutation {
   uint32_t half_bits_;
 };
 
-/// Inverse of the standard normal distribution function for p in (0, 1): Wichura's AS 241, relative error 1e-16. Uses
-/// only + - * / and sqrt, so its bits are the same everywhere.
+/// Inverse of the standard normal distribution function for p in (0, 1): Wichura's AS 241, relative error
+/// 1e-16. Uses only + - * / and sqrt, so its bits are the same everywhere.
 Real normal_quantile(Real p);
 
-/// sin and cos of x by range reduction and polynomials, error under 1e-15 for |x| < 1e6; same bits everywhere.
+/// sin and cos of x by range reduction and polynomials, error under 1e-15 for |x| < 1e6; same bits
+/// everywhere.
 struct SinCos {
   Real sin, cos;
 };

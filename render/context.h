@@ -1,6 +1,6 @@
 #pragma once
-/// An off-screen OpenGL 4.5 core context by OSMesa (llvmpipe), with Mesa's environment pinned first so that the same
-/// scene gives the same pixels.
+/// An off-screen OpenGL 4.5 core context by OSMesa (llvmpipe), with Mesa's environment pinned first so that
+/// the same scene gives the same pixels.
 
 #include <memory>
 #include <string>
@@ -14,11 +14,13 @@ struct ContextInfo {
   std::string glsl;
 };
 
-/// Sets and clears the environment variables that steer Mesa (LP_NUM_THREADS to `raster_threads`). Call once, in main,
-/// before any thread starts: it uses setenv. Mesa reads them at the first context.
+/// Sets and clears the environment variables that steer Mesa (LP_NUM_THREADS to `raster_threads`). Call once,
+/// in main, before any thread starts: it uses setenv. Mesa reads them at the first context.
 void pin_environment(int raster_threads);
 
-/// Owns the context, current on the thread that made it; use it from that thread only. Throws UnavailableError.
+/// Owns the context, current on the thread that made it; use it from that thread only, and make no
+/// second one there while it lives. Throws
+/// UnavailableError.
 class Context {
  public:
   Context();

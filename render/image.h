@@ -13,7 +13,9 @@ struct Image {
   int width_px = 0, height_px = 0;
   std::vector<uint8_t> rgba;  ///< width * height * 4
 
-  std::size_t pixel_count() const { return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px); }
+  std::size_t pixel_count() const {
+    return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
+  }
 };
 
 /// Linear light, RGBA float, premultiplied alpha.
@@ -21,7 +23,9 @@ struct HdrImage {
   int width_px = 0, height_px = 0;
   std::vector<float> rgba;  ///< width * height * 4
 
-  std::size_t pixel_count() const { return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px); }
+  std::size_t pixel_count() const {
+    return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
+  }
 };
 
 /// XXH3-128 of size and pixels as 32 hexadecimal digits; never of a file's bytes.
@@ -35,8 +39,8 @@ struct ImageDifference {
   double fraction_over = 0;     ///< the same as a share of all pixels
   double total_delta = 0;       ///< sum of all absolute channel differences
 
-  /// The tolerance for goldens of another machine class: at most 0.05 % of the pixels off by more than 2 steps, and a
-  /// mean difference of at most 0.05 steps.
+  /// The tolerance for goldens of another machine class: at most 0.05 % of the pixels off by more than 2
+  /// steps, and a mean difference of at most 0.05 steps.
   bool within_tolerance() const;
 };
 /// Throws std::invalid_argument if the sizes differ.

@@ -1,5 +1,6 @@
 #pragma once
-/// Image files. Reading by stb_image, writing PNG by libspng (level 1, filter UP: fast, and only a little larger).
+/// Image files. Reading by stb_image, writing PNG by libspng (level 1, filter UP: fast, and only a little
+/// larger).
 
 #include <filesystem>
 #include <span>

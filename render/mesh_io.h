@@ -7,9 +7,10 @@
 
 namespace offstage::render {
 
-/// Reads a model, applies its nodes' transforms, drops what cannot be drawn (points, lines, faces with bad indices or no
-/// area, non-finite vertices) with a warning, and reads its textures, embedded or beside it. Animation is ignored.
-/// Throws FileError with one line for a file that is missing, broken, or has no triangle left.
+/// Reads a model, applies its nodes' transforms, drops what cannot be drawn (points, lines, faces with bad
+/// indices or no area, non-finite vertices) with a warning, and reads its textures, embedded or beside it.
+/// Animation is ignored. Throws FileError with one line for a file that is missing, broken, or has no
+/// triangle left.
 Model read_model(const std::filesystem::path& path);
 
 }  // namespace offstage::render

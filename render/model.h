@@ -1,11 +1,12 @@
 #pragma once
 /// Drawable data on the CPU: meshes, materials, and models that combine them. All colours are linear.
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <cstdint>
 #include <string>
 #include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "render/image.h"
 
@@ -15,7 +16,8 @@ using Eigen::Vector2f;
 using Eigen::Vector3f;
 using Eigen::Vector4f;
 
-/// Indexed triangles. `normals` and `uvs` are empty or as long as `positions`; without normals the stage shades smooth.
+/// Indexed triangles. `normals` and `uvs` are empty or as long as `positions`; without normals the stage
+/// shades smooth.
 struct Mesh {
   std::vector<Vector3f> positions;
   std::vector<Vector3f> normals;
@@ -25,7 +27,8 @@ struct Mesh {
   Eigen::AlignedBox3f bounds() const;
 };
 
-/// Fills `normals` with area-weighted means, split at edges sharper than `crease_deg` (vertices are duplicated there).
+/// Fills `normals` with area-weighted means, split at edges sharper than `crease_deg` (vertices are
+/// duplicated there).
 void compute_normals(Mesh& mesh, float crease_deg = 40);
 
 /// Procedural surface patterns, evaluated in object space so that they need no texture coordinates.
@@ -33,7 +36,7 @@ enum class Pattern { none, checker, grid, noise, brick, wood, lawn, paving };
 
 /// Metallic/roughness material.
 struct Material {
-  std::string name;
+  std::string name = {};
   Vector4f color = {0.8f, 0.8f, 0.8f, 1};  ///< base colour; alpha below 1 blends
   float metallic = 0;                      ///< in [0, 1]
   float roughness = 0.5f;                  ///< in [0, 1]

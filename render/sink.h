@@ -15,7 +15,8 @@ class FrameSink {
   virtual ~FrameSink() = default;
   /// Throws FileError or UnavailableError (the encoder died: with its own last words).
   virtual void write(int frame, const Image& image) = 0;
-  /// Completes the output: only now a video appears under its name. Without it the destructor discards what is partial.
+  /// Completes the output: only now a video appears under its name. Without it the destructor discards what
+  /// is partial.
   virtual void close() = 0;
 };
 
@@ -26,19 +27,22 @@ std::filesystem::path frame_path(const std::filesystem::path& pattern, int frame
 std::unique_ptr<FrameSink> make_png_sink(const std::filesystem::path& pattern);
 
 struct VideoDef {
-  std::filesystem::path path;  ///< .mp4 .webm .mov .gif .webp .apng decide the encoder; .png is animated PNG here
+  std::filesystem::path
+      path;  ///< .mp4 .webm .mov .gif .webp .apng decide the encoder; .png is animated PNG here
   int width_px = 0, height_px = 0;
   double fps = 30;
   bool alpha = false;  ///< .webm, .mov, .webp, .apng, .png keep it; others are refused
 };
 
-/// Throws UnavailableError, before any frame is drawn, if ffmpeg or the encoder this file needs is missing (naming the
-/// package), or std::invalid_argument if the size or alpha is not possible with this format (with advice).
+/// Throws UnavailableError, before any frame is drawn, if ffmpeg or the encoder this file needs is missing
+/// (naming the package), or std::invalid_argument if the size or alpha is not possible with this format (with
+/// advice).
 void check_video(const VideoDef& def);
 /// ffmpeg as a child process in its own process group, fed raw frames, writing to a temporary name.
 std::unique_ptr<FrameSink> make_video_sink(const VideoDef& def);
 
-/// Raw top-down frames on standard output: rgba bytes, or yuv4mpeg (4:4:4) if `y4m`. A closed pipe throws FileError.
+/// Raw top-down frames on standard output: rgba bytes, or yuv4mpeg (4:4:4) if `y4m`. A closed pipe throws
+/// FileError.
 std::unique_ptr<FrameSink> make_pipe_sink(bool y4m, int width_px, int height_px, double fps);
 
 /// Encoders ffmpeg offers among those used here, for `doctor`; empty if there is no ffmpeg.

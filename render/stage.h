@@ -1,14 +1,15 @@
 #pragma once
-/// The stage: what there is to see, and the passes that draw it. It knows handles, transforms, meshes, points and
-/// materials, and nothing of physics.
+/// The stage: what there is to see, and the passes that draw it. It knows handles, transforms, meshes, points
+/// and materials, and nothing of physics.
 ///
-/// A frame is the mean of N sub-frames (Frame::samples), each drawn with its own offsets in the pixel, on the sun's disc, in
-/// the lens and, by the caller moving things in between, in time. That one mechanism gives anti-aliasing, soft shadows,
-/// depth of field and motion blur.
+/// A frame is the mean of N sub-frames (Frame::samples), each drawn with its own offsets in the pixel, on the
+/// sun's disc, in the lens and, by the caller moving things in between, in time. That one mechanism gives
+/// anti-aliasing, soft shadows, depth of field and motion blur.
 
-#include <Eigen/Geometry>
 #include <memory>
 #include <span>
+
+#include <Eigen/Geometry>
 
 #include "render/context.h"
 #include "render/handle.h"
@@ -21,28 +22,28 @@ struct Camera {
   Vector3f eye = {0, 1.5f, 5};
   Vector3f target = Vector3f::Zero();
   Vector3f up = Vector3f::UnitY();
-  float fov_deg = 40;        ///< vertical, in (0, 180)
+  float fov_deg = 40;  ///< vertical, in (0, 180)
   float near_m = 0.05f, far_m = 2000;
-  float aperture = 0;        ///< lens diameter [m]; 0: everything is sharp
-  float focus = 0;           ///< distance in focus [m]; 0: the target's
+  float aperture = 0;  ///< lens diameter [m]; 0: everything is sharp
+  float focus = 0;     ///< distance in focus [m]; 0: the target's
 };
 
 struct Sun {
   Vector3f direction = Vector3f(0.45f, 0.75f, 0.5f).normalized();  ///< towards the sun, unit
   Vector3f color = {1, 0.95f, 0.87f};
-  float intensity = 3;        ///< radiance of a white surface facing it, before exposure
-  float size_deg = 1.5f;      ///< diameter of the disc: the softness of shadows
+  float intensity = 3;    ///< radiance of a white surface facing it, before exposure
+  float size_deg = 1.5f;  ///< diameter of the disc: the softness of shadows
   bool shadows = true;
 };
 
 /// Sky, ambient light from it, and fog towards its horizon.
 struct Environment {
-  Vector3f zenith = {0.16f, 0.32f, 0.65f};
-  Vector3f horizon = {0.62f, 0.72f, 0.82f};
-  Vector3f ground = {0.28f, 0.26f, 0.22f};  ///< seen below the horizon, and light from below
-  float intensity = 1;                       ///< scales sky and ambient together
-  float fog = 0;                             ///< density [1/m]; transmittance exp(-fog * distance)
-  bool visible = true;                       ///< false: transparent background; it still lights the scene
+  Vector3f zenith = {0.20f, 0.42f, 0.88f};
+  Vector3f horizon = {0.95f, 1.05f, 1.15f};
+  Vector3f ground = {0.36f, 0.33f, 0.28f};  ///< seen below the horizon, and light from below
+  float intensity = 1;                      ///< scales sky and ambient together
+  float fog = 0;                            ///< density [1/m]; transmittance exp(-fog * distance)
+  bool visible = true;                      ///< false: transparent background; it still lights the scene
 };
 
 /// One drawn particle.
@@ -62,8 +63,8 @@ enum class PointStyle {
 
 struct PointsDef {
   PointStyle style = PointStyle::sprite;
-  bool additive = false;        ///< add light instead of covering: fire, sparks
-  bool lit = true;              ///< by sun and sky; false: its colour is its light
+  bool additive = false;  ///< add light instead of covering: fire, sparks
+  bool lit = true;        ///< by sun and sky; false: its colour is its light
   bool casts_shadow = true;
   float softness = 0.5f;        ///< width of the fade at the rim, as a share of the radius, in [0, 1]
   float stretch_s = 1.0f / 60;  ///< streaks are velocity * stretch_s long [s]
@@ -108,8 +109,8 @@ class Stage {
   void set_sun(const Sun& sun);
   void set_environment(const Environment& environment);
 
-  /// Draws one sub-frame and adds it to `sum`, which is sized and cleared first if it does not have the stage's size.
-  /// Throws UnavailableError on a GL error.
+  /// Draws one sub-frame and adds it to `sum`, which is sized and cleared first if it does not have the
+  /// stage's size. Throws UnavailableError on a GL error.
   void draw(const SampleOffsets& offsets, HdrImage& sum);
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
-/// From linear light to a displayable picture, on the CPU by tables, so that the bits do not depend on the GPU driver:
-/// exposure, filmic curve, sRGB encoding, a fixed dither against banding.
+/// From linear light to a displayable picture, on the CPU by tables, so that the bits do not depend on the
+/// GPU driver: exposure, filmic curve, sRGB encoding, a fixed dither against banding.
 
 #include "render/image.h"
 

@@ -1,6 +1,7 @@
 #pragma once
-/// Opaque generational handles and the slot map that resolves them in O(1) (physics E1). A handle is passed by
-/// value and is null by default; one whose object was removed is detected, because its slot's generation moved on.
+/// Opaque generational handles and the slot map that resolves them in O(1) (physics E1). A handle is passed
+/// by value and is null by default; one whose object was removed is detected, because its slot's generation
+/// moved on.
 
 #include <cassert>
 #include <compare>

@@ -1,7 +1,7 @@
 #pragma once
 /// Shapes a body can have. Primitives keep their exact implicit form; a mesh shape refers to a mesh that was
-/// registered with the World. All are given in the body's own frame, whose origin need not be the centre of mass
-/// for meshes (registration finds it); primitives are centred, axes of revolution along Y.
+/// registered with the World. All are given in the body's own frame, whose origin need not be the centre of
+/// mass for meshes (registration finds it); primitives are centred, axes of revolution along Y.
 
 #include <variant>
 

@@ -1,9 +1,9 @@
 #pragma once
-/// The simulation's front door: objects go in as plain definitions, step() advances them by a sampling time, and
-/// moved() says where they went. The world knows nothing of drawing (physics E1-E5, E8, E9).
+/// The simulation's front door: objects go in as plain definitions, step() advances them by a sampling time,
+/// and moved() says where they went. The world knows nothing of drawing (physics E1-E5, E8, E9).
 ///
-/// Valid ranges: sizes 0.001-100 m, speeds under 300 m/s. The state after step() is the same bits for any number
-/// of threads.
+/// Valid ranges: sizes 0.001-100 m, speeds under 300 m/s. The state after step() is the same bits for any
+/// number of threads.
 
 #include <cstdint>
 #include <functional>
@@ -41,8 +41,8 @@ struct BodyDef {
   std::string name;
   Shape shape = Sphere{};
   MotionType motion = MotionType::dynamic;
-  Pose pose;                             ///< at time 0; kinematic bodies with keys take the keys' pose instead
-  Vec3 velocity = Vec3::Zero();          ///< of the centre of mass [m/s]
+  Pose pose;                     ///< at time 0; kinematic bodies with keys take the keys' pose instead
+  Vec3 velocity = Vec3::Zero();  ///< of the centre of mass [m/s]
   Vec3 angular_velocity = Vec3::Zero();  ///< world axes [rad/s]
   Real density = 1000;                   ///< [kg/m^3], > 0; ignored if mass > 0
   Real mass = 0;                         ///< [kg]; 0: from density and volume
@@ -68,8 +68,8 @@ struct ParticlePoint {
 };
 using Attachment = std::variant<WorldPoint, BodyPoint, ParticlePoint>;
 
-/// Damped spring between two points (P2, R2): F = -[k (|d| - L) + c (d'.d)/|d|] d/|d|. A spring whose particle died
-/// is removed with it.
+/// Damped spring between two points (P2, R2): F = -[k (|d| - L) + c (d'.d)/|d|] d/|d|. A spring whose
+/// particle died is removed with it.
 struct SpringDef {
   std::string name;
   Attachment a, b;
@@ -79,11 +79,12 @@ struct SpringDef {
 };
 
 struct WorldDef {
-  Vec3 gravity = {0, -9.81, 0};                                  ///< [m/s^2]
-  Vec3 wind = Vec3::Zero();                                      ///< air velocity felt by drag [m/s]
-  Real max_step = 1.0 / 240;                                     ///< longest internal step [s]
-  IntegratorKind integrator = IntegratorKind::rk4;               ///< of bodies and of everything joined by springs
-  Aabb bounds = Aabb(Vec3::Constant(-1000), Vec3::Constant(1000));  ///< what leaves is retired and reported (E3)
+  Vec3 gravity = {0, -9.81, 0};                     ///< [m/s^2]
+  Vec3 wind = Vec3::Zero();                         ///< air velocity felt by drag [m/s]
+  Real max_step = 1.0 / 240;                        ///< longest internal step [s]
+  IntegratorKind integrator = IntegratorKind::rk4;  ///< of bodies and of everything joined by springs
+  Aabb bounds =
+      Aabb(Vec3::Constant(-1000), Vec3::Constant(1000));  ///< what leaves is retired and reported (E3)
 };
 
 /// Two bodies that came into contact, which this version cannot resolve yet (see StepReport::unresolved).
@@ -96,16 +97,16 @@ struct UnresolvedContact {
 struct StepReport {
   uint32_t substeps = 0;
   uint64_t particles_born = 0;
-  uint64_t particles_expired = 0;   ///< reached their lifespan or died on a hit
-  uint64_t particles_retired = 0;   ///< left the world's bounds
-  uint64_t particles_ejected = 0;   ///< found inside a body and projected out (P4)
-  uint64_t particles_removed = 0;   ///< found inside a body and could not be projected out (P4)
+  uint64_t particles_expired = 0;  ///< reached their lifespan or died on a hit
+  uint64_t particles_retired = 0;  ///< left the world's bounds
+  uint64_t particles_ejected = 0;  ///< found inside a body and projected out (P4)
+  uint64_t particles_removed = 0;  ///< found inside a body and could not be projected out (P4)
   uint64_t particle_collisions = 0;
-  uint64_t truncated_sweeps = 0;    ///< particles that used up their bounded number of hits within one sub-step
-  std::vector<BodyHandle> bodies_retired;         ///< left the world's bounds: frozen from here on
-  std::vector<UnresolvedContact> unresolved;      ///< pairs of bodies in contact: the result is not valid physics
-  bool finite = true;                             ///< false: something became NaN or infinite
-  std::string non_finite_object;                  ///< the first such object's name
+  uint64_t truncated_sweeps = 0;  ///< particles that used up their bounded number of hits within one sub-step
+  std::vector<BodyHandle> bodies_retired;     ///< left the world's bounds: frozen from here on
+  std::vector<UnresolvedContact> unresolved;  ///< pairs of bodies in contact: the result is not valid physics
+  bool finite = true;                         ///< false: something became NaN or infinite
+  std::string non_finite_object;              ///< the first such object's name
 };
 
 /// Mechanical energy [J]: kinetic, gravitational (zero at y = 0) and elastic.
@@ -121,12 +122,12 @@ struct MovedBody {
 
 /// Everything that can be asked of a body.
 struct BodyState {
-  Pose pose;               ///< of the body's own frame, as given at creation
-  Vec3 centre;             ///< of mass, world [m]
-  Vec3 velocity;           ///< of the centre of mass [m/s]
-  Vec3 angular_velocity;   ///< world [rad/s]
-  Vec3 angular_momentum;   ///< about the centre of mass, world [kg m^2/s]
-  Real mass = 0;           ///< [kg]; 0 unless dynamic
+  Pose pose;              ///< of the body's own frame, as given at creation
+  Vec3 centre;            ///< of mass, world [m]
+  Vec3 velocity;          ///< of the centre of mass [m/s]
+  Vec3 angular_velocity;  ///< world [rad/s]
+  Vec3 angular_momentum;  ///< about the centre of mass, world [kg m^2/s]
+  Real mass = 0;          ///< [kg]; 0 unless dynamic
 };
 
 /// 128 bits over the whole state: equal states have equal hashes.
@@ -149,8 +150,8 @@ class World {
   const MeshTopology& topology(MeshHandle mesh) const;
   const TriangleMesh& mesh(MeshHandle mesh) const;  ///< as registered (welded)
 
-  /// Throws std::invalid_argument, saying which field and what is allowed, for a size, mass or density out of range;
-  /// a dynamic body needs a solid: a plane or an open or inverted mesh is refused.
+  /// Throws std::invalid_argument, saying which field and what is allowed, for a size, mass or density out of
+  /// range; a dynamic body needs a solid: a plane or an open or inverted mesh is refused.
   BodyHandle add_body(const BodyDef& def);
   ParticleSystemHandle add_particle_system(const ParticleSystemDef& def);
   SpringHandle add_spring(const SpringDef& def);
@@ -159,8 +160,8 @@ class World {
   bool remove(ParticleSystemHandle system);
   bool remove(SpringHandle spring);
 
-  /// Adds a particle. `elapsed` is how long before the end of the coming sub-step it was born: it is integrated over
-  /// just that part of it. Negative: it exists now and is stepped in full. Returns its id.
+  /// Adds a particle. `elapsed` is how long before the end of the coming sub-step it was born: it is
+  /// integrated over just that part of it. Negative: it exists now and is stepped in full. Returns its id.
   uint64_t add_particle(ParticleSystemHandle system, const Particle& particle, Real elapsed = -1);
 
   /// Called before each sub-step with its start and end time; emitters add their particles here.
@@ -177,8 +178,8 @@ class World {
   std::span<const MovedBody> moved() const;
   BodyState body(BodyHandle body) const;
   const BodyDef& body_def(BodyHandle body) const;
-  /// Motion of a point of a body (world position at its current pose) at a time inside the current sub-step: exact
-  /// for kinematic bodies, extrapolated for dynamic ones.
+  /// Motion of a point of a body (world position at its current pose) at a time inside the current sub-step:
+  /// exact for kinematic bodies, extrapolated for dynamic ones.
   Motion body_motion(BodyHandle body, Real time) const;
   const ParticleArrays& particles(ParticleSystemHandle system) const;
   const ParticleSystemDef& particle_system_def(ParticleSystemHandle system) const;

@@ -1,6 +1,6 @@
 #pragma once
-/// Fixed-step integrators behind one seam (physics N1, N3, N4 and symplectic Euler). A system is described by two
-/// flat vectors: coordinates x and rates p (velocities or momenta), with dx/dt = velocity(t, x, p) and
+/// Fixed-step integrators behind one seam (physics N1, N3, N4 and symplectic Euler). A system is described by
+/// two flat vectors: coordinates x and rates p (velocities or momenta), with dx/dt = velocity(t, x, p) and
 /// dp/dt = force(t, x, p).
 
 #include <memory>
@@ -16,7 +16,8 @@ class DynamicSystem {
  public:
   virtual ~DynamicSystem() = default;
   /// dx = dx/dt at time t; sizes: x and dx equal, p as the state's.
-  virtual void velocity(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dx) const = 0;
+  virtual void velocity(Real t, std::span<const Real> x, std::span<const Real> p,
+                        std::span<Real> dx) const = 0;
   /// dp = dp/dt at time t.
   virtual void force(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const = 0;
 };

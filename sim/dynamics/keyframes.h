@@ -1,6 +1,6 @@
 #pragma once
-/// Keyframed motion of kinematic bodies (physics E8, N6): positions linear or smooth, orientations by slerp, and the
-/// velocities that belong to the interpolation.
+/// Keyframed motion of kinematic bodies (physics E8, N6): positions linear or smooth, orientations by slerp,
+/// and the velocities that belong to the interpolation.
 
 #include <vector>
 
@@ -25,12 +25,13 @@ struct Motion {
   Vec3 angular_velocity = Vec3::Zero();  ///< world [rad/s]
 };
 
-/// Key poses over time, plus an optional constant spin on top (for wheels and gears, where keys would be many).
+/// Key poses over time, plus an optional constant spin on top (for wheels and gears, where keys would be
+/// many).
 struct KeyframeTrack {
   std::vector<Keyframe> keys;  ///< strictly increasing times; empty: rests at the body's initial pose
   Interpolation interpolation = Interpolation::smooth;
-  bool loop = false;             ///< repeat with the period keys.back().time - keys.front().time; else hold the ends
-  Vec3 spin = Vec3::Zero();      ///< extra rotation about the body's origin, body axes [rad/s]
+  bool loop = false;  ///< repeat with the period keys.back().time - keys.front().time; else hold the ends
+  Vec3 spin = Vec3::Zero();  ///< extra rotation about the body's origin, body axes [rad/s]
 
   bool moves() const { return !keys.empty() || !spin.isZero(); }
   /// Pose and exact derivative at time t; `rest` is the pose where there are no keys.

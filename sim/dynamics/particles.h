@@ -23,11 +23,11 @@ struct Particle {
 
 struct ParticleSystemDef {
   std::string name;
-  Real linear_drag = 0;                    ///< k_d of F = -k_d (v - wind) [kg/s]
-  bool gravity = true;                     ///< feels the world's gravity
-  Vec3 force = Vec3::Zero();               ///< constant extra force per particle [N]
-  bool collides = true;                    ///< with bodies (the book's "complex" flag)
-  bool dies_on_hit = false;                ///< removed at its first collision
+  Real linear_drag = 0;       ///< k_d of F = -k_d (v - wind) [kg/s]
+  bool gravity = true;        ///< feels the world's gravity
+  Vec3 force = Vec3::Zero();  ///< constant extra force per particle [N]
+  bool collides = true;       ///< with bodies (the book's "complex" flag)
+  bool dies_on_hit = false;   ///< removed at its first collision
   IntegratorKind integrator = IntegratorKind::symplectic_euler;
 };
 
@@ -40,9 +40,9 @@ struct ParticleArrays {
   std::size_t size() const { return position.size(); }
 };
 
-/// The impulse on body 1 of a collision of two bodies of effective mass m12 with relative velocity u = v1 - v2 and unit
-/// normal n, u.n < 0 (P5): restitution e along n; sticks tangentially if the friction cone allows, else slides with
-/// |P_t| = mu P_n against the sliding direction.
+/// The impulse on body 1 of a collision of two bodies of effective mass m12 with relative velocity u = v1 -
+/// v2 and unit normal n, u.n < 0 (P5): restitution e along n; sticks tangentially if the friction cone
+/// allows, else slides with |P_t| = mu P_n against the sliding direction.
 Vec3 collision_impulse(Real m12, const Vec3& u, const Vec3& n, Real restitution, Real friction);
 
 }  // namespace offstage::sim

@@ -1,6 +1,7 @@
 #pragma once
-/// Volume, centre of mass and inertia of solids (physics N7). Meshes: exact surface integrals of a polyhedron,
-/// after Mirtich, "Fast and accurate computation of polyhedral mass properties" (1996).
+/// Volume, centre of mass and inertia of solids (physics N7). Meshes: exact integrals over the polyhedron, as
+/// the sum of the signed tetrahedra between its faces and a point; the same values as the surface integrals
+/// of Mirtich, "Fast and accurate computation of polyhedral mass properties" (1996).
 
 #include "sim/geometry/mesh.h"
 #include "sim/shape.h"
@@ -10,9 +11,9 @@ namespace offstage::sim {
 
 /// Mass properties of a uniform solid of density 1 kg/m^3.
 struct MassProperties {
-  Real volume = 0;                      ///< [m^3]; negative for an inverted mesh
-  Vec3 centre = Vec3::Zero();           ///< centre of mass in the shape's frame [m]
-  Mat3 inertia = Mat3::Zero();          ///< about the centre of mass, axes of the shape's frame [m^5]
+  Real volume = 0;              ///< [m^3]; negative for an inverted mesh
+  Vec3 centre = Vec3::Zero();   ///< centre of mass in the shape's frame [m]
+  Mat3 inertia = Mat3::Zero();  ///< about the centre of mass, axes of the shape's frame [m^5]
 };
 
 /// Inertia in its principal axes: inertia = R diag(moments) R^T, moments ascending.
@@ -21,7 +22,8 @@ struct PrincipalInertia {
   Quat orientation;  ///< shape frame from principal frame
 };
 
-/// Surface integrals over the triangles; the mesh should be closed (see MeshDefects), else the result means nothing.
+/// Surface integrals over the triangles; the mesh should be closed (see MeshDefects), else the result means
+/// nothing.
 MassProperties mass_properties(const TriangleMesh& mesh);
 
 /// Closed forms of the primitives. A Plane has none: volume 0. MeshShape is not accepted (it needs the mesh).

@@ -1,6 +1,6 @@
 #pragma once
-/// Triangle meshes with the adjacency and the normals by feature that registration computes once (physics E2).
-/// Faces are counter-clockwise seen from outside.
+/// Triangle meshes with the adjacency and the normals by feature that registration computes once (physics
+/// E2). Faces are counter-clockwise seen from outside.
 
 #include <array>
 #include <cstdint>
@@ -40,8 +40,8 @@ struct MeshDefects {
   std::string describe() const;
 };
 
-/// Merges vertices at the same position (bitwise) and drops faces that collapse. Importers split vertices along
-/// texture seams; physics needs them joined.
+/// Merges vertices at the same position (bitwise), drops faces that collapse, then unused vertices. Importers
+/// split vertices along texture seams; physics needs them joined.
 TriangleMesh weld(const TriangleMesh& mesh);
 
 /// Connectivity and normals of a mesh. Every query is O(1).
@@ -59,9 +59,11 @@ class MeshTopology {
   /// Vertices that share an edge with a vertex, in ascending order.
   std::span<const uint32_t> vertex_neighbours(uint32_t vertex) const;
 
-  const Vec3& face_normal(uint32_t face) const { return face_normals_[face]; }        ///< unit; zero if degenerate
-  const Vec3& edge_normal(uint32_t edge) const { return edge_normals_[edge]; }        ///< mean of its faces', unit
-  const Vec3& vertex_normal(uint32_t vertex) const { return vertex_normals_[vertex]; }  ///< angle-weighted, unit
+  const Vec3& face_normal(uint32_t face) const { return face_normals_[face]; }  ///< unit; zero if degenerate
+  const Vec3& edge_normal(uint32_t edge) const { return edge_normals_[edge]; }  ///< mean of its faces', unit
+  const Vec3& vertex_normal(uint32_t vertex) const {
+    return vertex_normals_[vertex];
+  }  ///< angle-weighted, unit
 
   const MeshDefects& defects() const { return defects_; }
 

@@ -1,0 +1,219 @@
+#include "producer/command_line.h"
+
+#include <filesystem>
+#include <map>
+#include <new>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "producer/commands.h"
+#include "producer/error.h"
+#include "producer/interrupt.h"
+#include "producer/output.h"
+#include "producer/simulation.h"
+#include "render/error.h"
+
+namespace offstage::producer {
+namespace {
+
+constexpr const char* kExitCodes =
+    "Exit codes: 0 ok, 1 run failed, 2 usage, 3 scene invalid, 4 GL or encoder unavailable, 5 simulation "
+    "diverged,\n"
+    "6 images differ, 130 interrupted (Ctrl-C), 143 terminated.";
+
+const std::map<std::string, ProgressStyle> kProgressStyles = {{"auto", ProgressStyle::automatic},
+                                                              {"plain", ProgressStyle::plain},
+                                                              {"json", ProgressStyle::json},
+                                                              {"none", ProgressStyle::none}};
+
+void add_overrides(CLI::App& command, SceneOptions& scene) {
+  command
+      .add_option("--set", scene.set,
+                  "Override a value of the scene: path=value, such as emitters.0.rate=200")
+      ->allow_extra_args(false);
+  command.add_option("--seed", scene.seed, "Seed of everything random");
+}
+
+void add_scene(CLI::App& command, SceneOptions& scene) {
+  command.add_option("scene", scene.file, "Scene file")->required();
+  add_overrides(command, scene);
+}
+
+void add_timing(CLI::App& command, SceneOptions& scene) {
+  command.add_option("--fps", scene.fps, "Frames per second");
+  command.add_option("--duration", scene.duration, "Length of the film in seconds");
+}
+
+void add_picture(CLI::App& command, SceneOptions& scene) {
+  command
+      .add_option("--quality", scene.quality,
+                  "Sub-frames per frame: draft 1, preview 4, final 16 (the physics stays)")
+      ->check(CLI::IsMember({"draft", "preview", "final"}));
+  command.add_option("--size", scene.size, "Picture size WxH, such as 1280x720");
+}
+
+void add_talk(CLI::App& command, TalkOptions& talk) {
+  command.add_option("--progress", talk.progress, "auto, plain, json or none")
+      ->transform(CLI::CheckedTransformer(kProgressStyles));
+  command.add_flag("-q,--quiet", talk.quiet, "Say nothing but errors");
+  command.add_flag("-v,--verbose", talk.verbose, "Say more: stage times, memory");
+}
+
+void add_threads(CLI::App& command, int& threads) {
+  command.add_option("--threads", threads, "Threads of the simulation (default: all available)")
+      ->check(CLI::Range(1, 256));
+}
+
+}  // namespace
+
+int run(int argc, char** argv) {
+  install_signal_handlers();
+
+  CLI::App app{"offstage turns a scene file into a physically simulated film, without a display or a GPU."};
+  app.set_version_flag("--version", OFFSTAGE_VERSION);
+  app.require_subcommand(1);
+  app.fallthrough(false);
+  app.footer(kExitCodes);
+
+  RenderOptions render;
+  auto* render_app = app.add_subcommand("render", "Simulate a scene and draw it: frames or a video");
+  add_scene(*render_app, render.scene);
+  render_app
+      ->add_option(
+          "-o,--output", render.out,
+          "frames/####.png or a folder; .mp4 .webm .mov .gif .webp .apng .png; - for standard output")
+      ->required();
+  add_picture(*render_app, render.scene);
+  add_timing(*render_app, render.scene);
+  render_app->add_option("--frames", render.frames, "Which frames: 1-30,40,50-90x2 (negative from the end)");
+  render_app->add_option("--chunk", render.chunk, "i/n: the i-th of n parts of the frames");
+  render_app->add_option("--cache", render.cache,
+                         "Draw from the snapshots of `simulate --cache` instead of simulating");
+  render_app->add_option("--format", render.format, "Of standard output: rgba or y4m")
+      ->check(CLI::IsMember({"rgba", "y4m"}));
+  add_threads(*render_app, render.threads);
+  render_app->add_option("--jobs", render.jobs, "Frames drawn at the same time (default: as --threads)")
+      ->check(CLI::Range(1, 64));
+  auto* resume =
+      render_app->add_flag("--resume", render.resume, "Keep finished frames that have the same settings");
+  render_app->add_flag("--force", render.force, "Replace existing output")->excludes(resume);
+  render_app->add_flag("--dry-run", render.dry_run, "Print the plan as JSON and write nothing");
+  render_app->add_option("--stats", render.stats, "Write figures of the run to this JSON file");
+  add_talk(*render_app, render.talk);
+
+  FrameOptions frame;
+  auto* frame_app = app.add_subcommand("frame", "Draw one frame to a PNG");
+  add_scene(*frame_app, frame.scene);
+  frame_app->add_option("-o,--output", frame.out, "PNG file")->required();
+  auto* number =
+      frame_app->add_option("-n,--frame", frame.frame, "Number of the frame (negative from the end)");
+  frame_app->add_option("--at", frame.at, "Time in seconds instead")->excludes(number);
+  add_picture(*frame_app, frame.scene);
+  add_timing(*frame_app, frame.scene);
+  add_threads(*frame_app, frame.threads);
+  frame_app->add_flag("--force", frame.force, "Replace an existing file");
+  add_talk(*frame_app, frame.talk);
+
+  SimulateOptions simulate;
+  auto* simulate_app = app.add_subcommand("simulate", "Run the physics alone; prints its figures as JSON");
+  add_scene(*simulate_app, simulate.scene);
+  add_timing(*simulate_app, simulate.scene);
+  simulate_app->add_option("--trace", simulate.trace,
+                           "CSV of position, orientation and velocities of what moves");
+  simulate_app->add_option("--trace-every", simulate.trace_every, "frame or step")
+      ->check(CLI::IsMember({"frame", "step"}));
+  simulate_app->add_option("--cache", simulate.cache,
+                           "Folder for one snapshot per frame, for `render --cache`");
+  simulate_app->add_option("--stats", simulate.stats, "Write the figures to this JSON file instead");
+  add_threads(*simulate_app, simulate.threads);
+  simulate_app->add_flag("--force", simulate.force, "Replace existing output");
+  add_talk(*simulate_app, simulate.talk);
+
+  SceneOptions validate;
+  bool validate_json = false;
+  auto* validate_app = app.add_subcommand("validate", "Check a scene and report every problem");
+  add_scene(*validate_app, validate);
+  validate_app->add_flag("--json", validate_json, "Print the result as JSON");
+
+  bool reference = false;
+  auto* schema_app = app.add_subcommand("schema", "Print the JSON Schema of the scene format");
+  schema_app->add_flag("--reference", reference, "Print the reference in Markdown instead");
+
+  SceneOptions info;
+  bool info_json = false;
+  auto* info_app = app.add_subcommand("info", "Describe a scene or a model file");
+  info_app->add_option("file", info.file, "Scene (.json) or model file")->required();
+  add_overrides(*info_app, info);
+  info_app->add_flag("--json", info_json, "Print as JSON");
+
+  CompareOptions compare;
+  compare.golden = "tests/golden";
+  auto* compare_app =
+      app.add_subcommand("compare", "Compare a scene with its golden, or two pictures or folders of frames");
+  compare_app->add_option("a", compare.scene.file, "Scene, picture or folder")->required();
+  compare_app->add_option("b", compare.other, "Second picture or folder");
+  compare_app->add_option("--golden", compare.golden, "Folder of the goldens")->capture_default_str();
+  compare_app->add_option("--report", compare.report,
+                          "Folder for expected, actual, difference and a page that shows them");
+  add_overrides(*compare_app, compare.scene);
+  add_threads(*compare_app, compare.threads);
+
+  BlessOptions bless;
+  bless.golden = "tests/golden";
+  auto* bless_app = app.add_subcommand("bless", "Renew the goldens of scenes");
+  bless_app->add_option("scenes", bless.scenes, "Scene files")->required();
+  bless_app->add_option("--golden", bless.golden, "Folder of the goldens")->capture_default_str();
+  bless_app->add_option("--reason", bless.reason, "Why the pictures changed")->required();
+  add_threads(*bless_app, bless.threads);
+
+  auto* doctor_app = app.add_subcommand("doctor", "Say what this machine has: GL, encoders, processor");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kOk : kUsage;
+  }
+
+  try {
+    if (*render_app) return render_command(render);
+    if (*frame_app) return frame_command(frame);
+    if (*simulate_app) return simulate_command(simulate);
+    if (*validate_app) return validate_command(validate, validate_json);
+    if (*schema_app) return schema_command(reference);
+    if (*info_app) return info_command(info, info_json);
+    if (*compare_app) return compare_command(compare);
+    if (*bless_app) return bless_command(bless);
+    return *doctor_app ? doctor_command() : kUsage;
+  } catch (const SceneError& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return kSceneInvalid;
+  } catch (const OutputError& error) {
+    fmt::print(stderr, "offstage: {}\n", error.what());
+    return kUsage;
+  } catch (const std::invalid_argument& error) {
+    fmt::print(stderr, "offstage: {}\n", error.what());
+    return kUsage;
+  } catch (const render::UnavailableError& error) {
+    fmt::print(stderr, "offstage: {}\n", error.what());
+    return kUnavailable;
+  } catch (const DivergedError& error) {
+    const std::string file = "offstage-diverged.json";
+    fmt::print(stderr, "offstage: {}\n", error.what());
+    try {
+      write_text_file(file, error.state());
+      fmt::print(stderr, "the state was saved to {}\n", file);
+    } catch (const render::FileError& unsaved) {
+      fmt::print(stderr, "the state could not be saved: {}\n", unsaved.what());
+    }
+    return kDiverged;
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr, "offstage: out of memory\n");
+    return kRunFailed;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "offstage: {}\n", error.what());
+    return kRunFailed;
+  }
+}
+
+}  // namespace offstage::producer

@@ -1,0 +1,225 @@
+// validate, schema, info and doctor, and what the commands share.
+
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <sys/utsname.h>
+
+#include "producer/command_line.h"
+#include "producer/commands.h"
+#include "producer/fingerprint.h"
+#include "producer/simulation.h"
+#include "render/context.h"
+#include "render/error.h"
+#include "render/image_io.h"
+#include "render/mesh_io.h"
+#include "render/primitives.h"
+#include "render/sink.h"
+#include "render/stage.h"
+#include "render/tone_map.h"
+#include "sim/geometry/mass_properties.h"
+#include "sim/geometry/mesh.h"
+
+namespace offstage::producer {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+template <class V>
+Json json_of(const V& v) {
+  Json array = Json::array();
+  for (Eigen::Index i = 0; i < v.size(); ++i) array.push_back(v[i]);
+  return array;
+}
+
+Json describe_model(const std::filesystem::path& path) {
+  const render::Model model = render::read_model(path);
+  const sim::TriangleMesh mesh = sim::weld(collision_mesh(model, 1));
+  const sim::MeshTopology topology(mesh);
+  const sim::MassProperties mass = sim::mass_properties(mesh);
+  const auto bounds = model.bounds();
+  const std::string defects = topology.defects().describe();
+  Json json = {{"file", path.string()},
+               {"parts", model.parts.size()},
+               {"triangles", model.triangle_count()},
+               {"vertices", model.vertex_count()},
+               {"welded_vertices", mesh.vertices.size()},
+               {"materials", model.materials.size()},
+               {"textures", model.textures.size()},
+               {"bounds", {json_of(bounds.min()), json_of(bounds.max())}},
+               {"closed", topology.defects().closed()},
+               {"defects", defects.empty() ? "none" : defects}};
+  if (topology.defects().closed()) {
+    json["volume"] = mass.volume;
+    json["centre"] = json_of(mass.centre);
+    const sim::PrincipalInertia principal = sim::diagonalise(mass.inertia);
+    json["principal_moments_per_density"] = json_of(principal.moments);
+  }
+  json["warnings"] = model.warnings;
+  return json;
+}
+
+Json describe_scene(const LoadedScene& loaded) {
+  const Scene& scene = loaded.scene;
+  std::vector<Problem> warnings;
+  const ModelLibrary models(scene, loaded.folder, warnings);
+  const Simulation simulation(scene, models);
+  std::size_t placed = 0;
+  for (const ParticleGroup& group : scene.particles) placed += group.places.size();
+  Json moving = Json::array();
+  for (const auto& [name, handle] : simulation.moving_bodies()) {
+    const sim::BodyState s = simulation.world().body(handle);
+    moving.push_back({{"name", name}, {"position", json_of(s.pose.position)}, {"mass", s.mass}});
+  }
+  return {{"scene", scene.name},
+          {"description", scene.description},
+          {"bodies", scene.bodies.size()},
+          {"moving", moving},
+          {"particles", placed},
+          {"emitters", scene.emitters.size()},
+          {"springs", scene.springs.size()},
+          {"materials", scene.materials.size()},
+          {"frames", scene.frame_count()},
+          {"fps", scene.output.fps},
+          {"duration", scene.output.duration},
+          {"size", {scene.render.size.x(), scene.render.size.y()}},
+          {"settings", settings_key(loaded, models)}};
+}
+
+/// JSON as indented "key: value" lines.
+void print_readable(const Json& json, int indent = 0) {
+  for (const auto& [key, value] : json.items()) {
+    const bool nested =
+        value.is_object() || (value.is_array() && !value.empty() && value.front().is_structured());
+    fmt::print("{:{}}{}:{}", "", indent, key, nested ? "\n" : " ");
+    if (nested)
+      print_readable(value, indent + 2);
+    else
+      fmt::print("{}\n", value.is_string() ? value.get<std::string>() : value.dump());
+  }
+}
+
+/// A lit ball on a plane, small: that it draws at all is most of the test, its hash the rest.
+std::string test_render_hash(render::Context& context) {
+  render::Stage stage(context, {.width_px = 128, .height_px = 72, .shadow_map_px = 512});
+  const auto material = stage.add_material({});
+  stage.add_instance(stage.add_mesh(render::make_sphere(1)), material);
+  const auto ground = stage.add_instance(stage.add_mesh(render::make_ground(100)), material, false);
+  stage.set_transform(ground, Eigen::Affine3f(Eigen::Translation3f(0, -1, 0)));
+  stage.set_camera({.eye = {0, 1.5f, 6}});
+  render::HdrImage sum;
+  stage.draw({}, sum);
+  return render::pixel_hash(render::tone_map(sum, {}));
+}
+
+}  // namespace
+
+std::vector<std::string> SceneOptions::overrides() const {
+  std::vector<std::string> all;
+  if (quality) all.push_back("/render/quality=" + *quality);
+  if (size) {
+    const std::size_t x = size->find('x');
+    if (x == std::string::npos)
+      throw std::invalid_argument("size: '" + *size + "' is not WxH, such as 1280x720");
+    all.push_back("/render/size=[" + size->substr(0, x) + "," + size->substr(x + 1) + "]");
+  }
+  if (fps) all.push_back(fmt::format("/output/fps={}", *fps));
+  if (duration) all.push_back(fmt::format("/output/duration={}", *duration));
+  if (seed) all.push_back(fmt::format("/world/seed={}", *seed));
+  all.insert(all.end(), set.begin(), set.end());
+  return all;
+}
+
+void print_warnings(const std::vector<Problem>& warnings) {
+  for (const Problem& warning : warnings) fmt::print(stderr, "warning: {}\n", warning.describe());
+}
+
+LoadedScene load(const SceneOptions& options, bool quiet, const std::vector<std::string>& more_overrides) {
+  std::vector<std::string> overrides = options.overrides();
+  overrides.insert(overrides.begin(), more_overrides.begin(), more_overrides.end());
+  LoadedScene loaded = load_scene(options.file, overrides);
+  if (!quiet) print_warnings(loaded.warnings);
+  return loaded;
+}
+
+void write_text_file(const std::string& path, const std::string& text) {
+  render::write_file_atomically(path, {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
+}
+
+int validate_command(const SceneOptions& options, bool json) {
+  Json result = {
+      {"file", options.file}, {"valid", true}, {"errors", Json::array()}, {"warnings", Json::array()}};
+  const auto list = [](const Problem& p) {
+    return Json{{"file", p.where.file},
+                {"line", p.where.line},
+                {"column", p.where.column},
+                {"path", p.where.path},
+                {"message", p.what}};
+  };
+  try {
+    LoadedScene loaded = load_scene(options.file, options.overrides());
+    const ModelLibrary models(loaded.scene, loaded.folder, loaded.warnings);
+    const Simulation simulation(loaded.scene, models);  // what only building shows
+    for (const Problem& warning : loaded.warnings) result["warnings"].push_back(list(warning));
+    if (!json) {
+      print_warnings(loaded.warnings);
+      fmt::print("{}: valid, {} frames, {} bodies, {} emitters\n", options.file, loaded.scene.frame_count(),
+                 loaded.scene.bodies.size(), loaded.scene.emitters.size());
+    }
+  } catch (const SceneError& error) {
+    if (!json) throw;
+    result["valid"] = false;
+    for (const Problem& problem : error.problems()) result["errors"].push_back(list(problem));
+  }
+  if (json) fmt::print("{}\n", result.dump(2));
+  return result["valid"].get<bool>() ? kOk : kSceneInvalid;
+}
+
+int schema_command(bool reference) {
+  fmt::print("{}", reference ? scene_reference() : scene_schema());
+  return kOk;
+}
+
+int info_command(const SceneOptions& options, bool json) {
+  const bool is_scene = std::filesystem::path(options.file).extension() == ".json";
+  const Json info = is_scene ? describe_scene(load(options, false)) : describe_model(options.file);
+  if (json)
+    fmt::print("{}\n", info.dump(2));
+  else
+    print_readable(info);
+  return kOk;
+}
+
+int doctor_command() {
+  render::pin_environment(0);
+  Json json = {{"offstage", OFFSTAGE_VERSION}};
+  int code = kOk;
+  try {
+    render::Context context;
+    json["gl_renderer"] = context.info().renderer;
+    json["gl_version"] = context.info().version;
+    json["glsl"] = context.info().glsl;
+    json["test_render"] = test_render_hash(context);
+    json["fingerprint"] = fingerprint(context.info());
+  } catch (const render::UnavailableError& error) {
+    json["gl_error"] = error.what();
+    code = kUnavailable;
+  }
+  json["cpu"] = cpu_class();
+  json["threads"] = available_processors();
+  utsname system{};
+  uname(&system);
+  json["system"] = fmt::format("{} {} {}", system.sysname, system.release, system.machine);
+  const std::vector<std::string> encoders = render::available_encoders();
+  json["ffmpeg_encoders"] = encoders;
+  if (encoders.empty()) {
+    json["ffmpeg_error"] =
+        "ffmpeg was not found or has none of the encoders used; install the package ffmpeg";
+    code = kUnavailable;
+  }
+  print_readable(json);
+  return code;
+}
+
+}  // namespace offstage::producer

@@ -1,0 +1,289 @@
+// render, frame and simulate.
+
+#include <cmath>
+#include <cstdio>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <tbb/global_control.h>
+
+#include "producer/command_line.h"
+#include "producer/commands.h"
+#include "producer/fingerprint.h"
+#include "producer/frame_list.h"
+#include "producer/interrupt.h"
+#include "producer/output.h"
+#include "producer/production.h"
+#include "render/context.h"
+#include "render/error.h"
+#include "render/image_io.h"
+#include "render/sink.h"
+
+namespace offstage::producer {
+namespace {
+
+namespace fs = std::filesystem;
+
+int threads_or_all(int threads) {
+  return threads > 0 ? threads : available_processors();
+}
+
+tbb::global_control simulation_threads(int threads) {
+  return {tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads_or_all(threads))};
+}
+
+/// With several drawing threads each context rasterises in its own thread: frames in parallel beat threads in
+/// a frame.
+void pin_environment_for(int drawing_threads, int threads) {
+  render::pin_environment(drawing_threads > 1 ? 0 : threads);
+}
+
+void report_run(const RunStats& stats, const TalkOptions& talk, const std::string& stats_file) {
+  if (!stats_file.empty()) write_text_file(stats_file, to_json(stats));
+  if (!stats.blank_frames.empty())
+    fmt::print(
+        stderr, "warning: frame {} is blank: all of its pixels are equal{}\n", stats.blank_frames.front(),
+        stats.blank_frames.size() > 1 ? fmt::format(" (and {} more)", stats.blank_frames.size() - 1) : "");
+  const SimulationTotals& t = stats.totals;
+  if (t.skipped)
+    fmt::print(stderr, "warning: {} particles were not released: max_alive was reached\n", t.skipped);
+  if (t.waiting) fmt::print(stderr, "note: {} particles had to wait for room on their emitter\n", t.waiting);
+  if (t.removed)
+    fmt::print(stderr, "warning: {} particles were inside a body and had to be removed\n", t.removed);
+  if (t.truncated)
+    fmt::print(stderr, "note: {} particles hit more often in one step than is followed\n", t.truncated);
+  if (!talk.verbose) return;
+  for (const auto& [name, times] : {std::pair("simulate", &stats.sim), std::pair("draw", &stats.render),
+                                    std::pair("encode", &stats.encode)}) {
+    const StageTimes::Summary s = times->summary();
+    fmt::print(stderr, "{:9} {:8.2f} ms mean  {:8.2f} p50  {:8.2f} p95  {:8.2f} max\n", name, s.mean, s.p50,
+               s.p95, s.max);
+  }
+  fmt::print(stderr, "{} frames in {:.2f} s, first after {:.2f} s, {:.0f} MB\n", stats.frames, stats.wall_s,
+             stats.startup_s, peak_rss_mb());
+}
+
+/// The exit code of a run that was interrupted, after saying how to go on.
+int interrupted(const RunStats& stats, int total, const std::string& advice) {
+  fmt::print(stderr, "interrupted: {} of {} frames done{}\n", stats.frames + stats.frames_kept, total,
+             advice);
+  return 128 + stats.interrupted_by;
+}
+
+struct Plan {
+  LoadedScene loaded;
+  OutputTarget target;
+  std::vector<int> frames;
+  std::string settings;
+  int threads = 1, jobs = 1;
+  bool through_frames = false;  // a video that can be resumed: frames first, then the video
+  fs::path frames_pattern;      // where frames go, if they do
+};
+
+render::VideoDef video_def(const Plan& plan) {
+  const Scene& scene = plan.loaded.scene;
+  return {.path = plan.target.path,
+          .width_px = scene.render.size.x(),
+          .height_px = scene.render.size.y(),
+          .fps = scene.output.fps,
+          .alpha = scene.environment.background == Background::transparent};
+}
+
+int print_plan(const Plan& plan) {
+  const Scene& scene = plan.loaded.scene;
+  const double pixels = double(scene.render.size.x()) * scene.render.size.y();
+  constexpr double kPngBytesPerPixel = 0.8;  // measured over the gallery
+  const nlohmann::ordered_json json = {
+      {"scene", scene.name},
+      {"output", plan.target.kind == OutputKind::pipe ? "-" : plan.target.path.string()},
+      {"frames", plan.frames.size()},
+      {"first_frame", plan.frames.empty() ? 0 : plan.frames.front()},
+      {"last_frame", plan.frames.empty() ? 0 : plan.frames.back()},
+      {"size", {scene.render.size.x(), scene.render.size.y()}},
+      {"fps", scene.output.fps},
+      {"subframes", subframes(scene.render.quality)},
+      {"threads", plan.threads},
+      {"jobs", plan.jobs},
+      {"png_mb_estimate",
+       std::round(pixels * kPngBytesPerPixel * static_cast<double>(plan.frames.size()) / 1e5) / 10},
+      {"settings", plan.settings}};
+  fmt::print("{}\n", json.dump(2));
+  return kOk;
+}
+
+Plan make_plan(const RenderOptions& options, const ModelLibrary& models, LoadedScene loaded) {
+  Plan plan{.loaded = std::move(loaded), .target = parse_output(options.out)};
+  plan.frames = parse_frames(options.frames, plan.loaded.scene.frame_count());
+  if (!options.chunk.empty()) plan.frames = chunk_of(plan.frames, options.chunk);
+  plan.settings = settings_key(plan.loaded, models);
+  plan.threads = threads_or_all(options.threads);
+  plan.jobs = options.jobs > 0 ? options.jobs : plan.threads;
+  plan.through_frames = plan.target.kind == OutputKind::video && options.resume;
+  plan.frames_pattern =
+      plan.through_frames ? fs::path(plan.target.path.string() + ".frames") / "####.png" : plan.target.path;
+  return plan;
+}
+
+/// Finished frames on disk become the video; the frames go when it is there.
+void assemble_video(const Plan& plan) {
+  auto video = render::make_video_sink(video_def(plan));
+  for (const int frame : plan.frames) {
+    if (interrupt_signal()) return;
+    video->write(frame, render::read_image(render::frame_path(plan.frames_pattern, frame)));
+  }
+  video->close();
+  fs::remove_all(plan.frames_pattern.parent_path());
+}
+
+RunStats draw(const Plan& plan, const ModelLibrary& models, const RenderOptions& options,
+              std::vector<int> frames, render::FrameSink& sink) {
+  ProgressPrinter printer(options.talk.quiet ? ProgressStyle::none : options.talk.progress);
+  RenderJob job{.frames = std::move(frames), .threads = plan.jobs, .cache = {}};
+  if (!options.cache.empty()) job.cache = options.cache;
+  RunStats stats = render_frames(plan.loaded, models, job, sink, std::ref(printer));
+  printer.finish();
+  return stats;
+}
+
+int render_to_frames(const Plan& plan, const ModelLibrary& models, const RenderOptions& options) {
+  const Scene& scene = plan.loaded.scene;
+  const Existing existing = options.force    ? Existing::replace
+                            : options.resume ? Existing::keep
+                                             : Existing::refuse;
+  const std::vector<int> missing = prepare_frames(plan.frames_pattern, plan.frames,
+                                                  {.scene = scene.name,
+                                                   .settings = plan.settings,
+                                                   .width_px = scene.render.size.x(),
+                                                   .height_px = scene.render.size.y(),
+                                                   .frames = scene.frame_count(),
+                                                   .fps = scene.output.fps},
+                                                  existing);
+  RunStats stats;
+  if (!missing.empty()) {
+    auto sink = render::make_png_sink(plan.frames_pattern);
+    stats = draw(plan, models, options, missing, *sink);
+  }
+  stats.frames_kept = static_cast<int>(plan.frames.size() - missing.size());
+  if (plan.through_frames && !stats.interrupted_by) {
+    assemble_video(plan);
+    stats.interrupted_by = interrupt_signal();
+  }
+  report_run(stats, options.talk, options.stats);
+  if (stats.interrupted_by)
+    return interrupted(stats, static_cast<int>(plan.frames.size()),
+                       "; go on with the same command and --resume");
+  fmt::print("{}\n", plan.target.path.string());
+  return kOk;
+}
+
+int render_to_video(const Plan& plan, const ModelLibrary& models, const RenderOptions& options) {
+  auto sink = render::make_video_sink(video_def(plan));
+  const RunStats stats = draw(plan, models, options, plan.frames, *sink);
+  report_run(stats, options.talk, options.stats);
+  if (!stats.interrupted_by) {
+    fmt::print("{}\n", plan.target.path.string());
+    return kOk;
+  }
+  // A part of a film must not look like the whole.
+  fs::path partial = plan.target.path;
+  partial.replace_extension(".partial" + plan.target.path.extension().string());
+  if (stats.frames > 0) fs::rename(plan.target.path, partial);
+  return interrupted(stats, static_cast<int>(plan.frames.size()),
+                     (stats.frames > 0 ? "; they are in " + partial.string() : std::string()) +
+                         "; to be able to go on, start a video with --resume");
+}
+
+int render_to_pipe(const Plan& plan, const ModelLibrary& models, const RenderOptions& options) {
+  const Scene& scene = plan.loaded.scene;
+  auto sink = render::make_pipe_sink(options.format == "y4m", scene.render.size.x(), scene.render.size.y(),
+                                     scene.output.fps);
+  const RunStats stats = draw(plan, models, options, plan.frames, *sink);
+  report_run(stats, options.talk, options.stats);
+  return stats.interrupted_by ? interrupted(stats, static_cast<int>(plan.frames.size()), "") : kOk;
+}
+
+}  // namespace
+
+int render_command(const RenderOptions& options) {
+  LoadedScene loaded = load(options.scene, options.talk.quiet);
+  std::vector<Problem> warnings;
+  const ModelLibrary models(loaded.scene, loaded.folder, warnings);
+  if (!options.talk.quiet) print_warnings(warnings);
+  const Plan plan = make_plan(options, models, std::move(loaded));
+  if (plan.target.kind == OutputKind::video) {
+    render::check_video(video_def(plan));
+    if (fs::exists(plan.target.path) && !options.force)
+      throw OutputError(plan.target.path.string() + ": exists already; replace it with --force");
+  }
+  if (options.dry_run) return print_plan(plan);
+  if (plan.frames.empty()) return kOk;  // an empty chunk
+
+  const auto threads = simulation_threads(options.threads);
+  pin_environment_for(plan.jobs, plan.threads);
+  if (plan.target.kind == OutputKind::pipe) return render_to_pipe(plan, models, options);
+  if (plan.target.kind == OutputKind::frames || plan.through_frames)
+    return render_to_frames(plan, models, options);
+  return render_to_video(plan, models, options);
+}
+
+int frame_command(const FrameOptions& options) {
+  const LoadedScene loaded = load(options.scene, options.talk.quiet);
+  const Scene& scene = loaded.scene;
+  int frame = options.frame.value_or(1);
+  if (options.at)
+    frame = 1 + static_cast<int>(std::lround((*options.at - scene.output.start) * scene.output.fps));
+  if (frame < 0) frame += scene.frame_count() + 1;
+  if (frame < 1 || frame > scene.frame_count())
+    throw std::invalid_argument(
+        fmt::format("frame {} is outside the film; it has frames 1-{} (times {:g} to {:g} s)", frame,
+                    scene.frame_count(), scene.output.start, scene.output.start + scene.output.duration));
+  if (fs::exists(options.out) && !options.force)
+    throw OutputError(options.out + ": exists already; replace it with --force");
+
+  class PictureSink : public render::FrameSink {
+   public:
+    explicit PictureSink(fs::path path) : path_(std::move(path)) {}
+    void write(int, const render::Image& image) override { render::write_png(path_, image); }
+    void close() override {}
+
+   private:
+    fs::path path_;
+  };
+  std::vector<Problem> warnings;
+  const ModelLibrary models(scene, loaded.folder, warnings);
+  if (!options.talk.quiet) print_warnings(warnings);
+  const auto threads = simulation_threads(options.threads);
+  pin_environment_for(1, threads_or_all(options.threads));
+  PictureSink sink(options.out);
+  const RunStats stats =
+      render_frames(loaded, models, {.frames = {frame}, .threads = 1, .cache = {}}, sink, {});
+  report_run(stats, options.talk, "");
+  if (stats.interrupted_by) return interrupted(stats, 1, "");
+  fmt::print("{}\n", options.out);
+  return kOk;
+}
+
+int simulate_command(const SimulateOptions& options) {
+  const LoadedScene loaded = load(options.scene, options.talk.quiet);
+  std::vector<Problem> warnings;
+  const ModelLibrary models(loaded.scene, loaded.folder, warnings);
+  if (!options.talk.quiet) print_warnings(warnings);
+  const auto threads = simulation_threads(options.threads);
+  SimulateJob job{
+      .cache = {}, .force = options.force, .trace = {}, .trace_every_step = options.trace_every == "step"};
+  if (!options.cache.empty()) job.cache = options.cache;
+  if (!options.trace.empty()) {
+    if (fs::exists(options.trace) && !options.force)
+      throw OutputError(options.trace + ": exists already; replace it with --force");
+    job.trace = options.trace;
+  }
+  ProgressPrinter printer(options.talk.quiet ? ProgressStyle::none : options.talk.progress);
+  const RunStats stats = simulate_frames(loaded, models, job, std::ref(printer));
+  printer.finish();
+  report_run(stats, options.talk, options.stats);
+  if (stats.interrupted_by) return interrupted(stats, loaded.scene.frame_count(), "");
+  if (options.stats.empty()) fmt::print("{}", to_json(stats));
+  return kOk;
+}
+
+}  // namespace offstage::producer

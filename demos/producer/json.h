@@ -1,0 +1,75 @@
+#pragma once
+/// JSON text as a tree in which every value and every key knows where it stands, so that a message can point
+/// at it (product spec, "Scene files"). Comments are allowed; repeated keys are not.
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace offstage::producer {
+
+/// A place in one of the texts a scene is read from.
+struct Position {
+  int file = -1;             ///< index into SceneSource::files; -1: not from a text
+  int line = 0, column = 0;  ///< from 1, in characters; 0: not from a file
+};
+
+struct Node;
+struct Member;
+using List = std::vector<Node>;
+using Object = std::vector<Member>;  ///< in the order of the file, keys unique
+
+/// A JSON value and where it starts.
+struct Node {
+  using Value = std::variant<std::nullptr_t, bool, int64_t, double, std::string, List, Object>;
+  Value value = nullptr;
+  Position at;
+
+  Node() = default;
+  template <class T>
+  requires(!std::is_same_v<std::remove_cvref_t<T>, Node> && std::is_constructible_v<Value, T>)
+      Node(T&& v, Position p = {})
+      : value(std::forward<T>(v)), at(p) {}
+
+  template <class T>
+  const T* as() const {
+    return std::get_if<T>(&value);
+  }
+  template <class T>
+  T* as() {
+    return std::get_if<T>(&value);
+  }
+  /// The value of a key; nullptr if there is none or this is not an object.
+  const Node* find(std::string_view key) const;
+  Node* find(std::string_view key) { return const_cast<Node*>(std::as_const(*this).find(key)); }
+};
+
+/// A key with its value; `at` is where the key starts.
+struct Member {
+  std::string key;
+  Node value;
+  Position at = {};
+};
+
+inline constexpr int kMaxDepth = 64;  ///< of nested lists and objects
+
+/// Reads one JSON text. `file` is its index in positions, `name` its name in messages. Throws SceneError with
+/// what is wrong and where: a syntax error, nesting over kMaxDepth, an integer that does not fit in 64 bits,
+/// or repeated keys.
+Node parse_json(std::string_view text, const std::string& name, int file = 0);
+
+/// Compact JSON, or with line breaks if `indent` > 0. Numbers are the shortest text that reads back to the
+/// same bits.
+std::string to_text(const Node& node, int indent = 0);
+
+/// What a message calls a value: `the string "abc"`, `-1`, `[0,0,0]`, `an object`.
+std::string describe(const Node& node);
+
+/// A key as a step of a JSON pointer ("/" and "~" escaped), with the slash in front.
+std::string pointer_step(std::string_view key);
+
+}  // namespace offstage::producer

@@ -1,0 +1,98 @@
+#include "producer/output.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <fstream>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "render/error.h"
+#include "render/image_io.h"
+
+namespace offstage::producer {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::array kVideoEndings = {".mp4", ".webm", ".mov", ".gif", ".webp", ".apng", ".png"};
+
+nlohmann::ordered_json to_json(const Manifest& m) {
+  return {{"scene", m.scene},      {"settings", m.settings}, {"width", m.width_px},
+          {"height", m.height_px}, {"frames", m.frames},     {"fps", m.fps}};
+}
+
+}  // namespace
+
+OutputTarget parse_output(const std::string& out) {
+  if (out == "-") return {OutputKind::pipe, {}};
+  const fs::path path = out;
+  if (out.ends_with('/') || fs::is_directory(path)) return {OutputKind::frames, path / "####.png"};
+  const std::string ending = path.extension().string();
+  if (path.filename().string().find('#') != std::string::npos) {
+    if (ending != ".png")
+      throw OutputError(out + ": frames are PNG files; give a pattern such as frames/####.png");
+    return {OutputKind::frames, path};
+  }
+  if (ending.empty()) return {OutputKind::frames, path / "####.png"};
+  if (std::ranges::find(kVideoEndings, ending) == kVideoEndings.end())
+    throw OutputError(out +
+                      ": unknown kind of output; give a folder, a pattern such as frames/####.png, one of " +
+                      fmt::format("{}", fmt::join(kVideoEndings, " ")) + ", or - for standard output");
+  return {OutputKind::video, path};
+}
+
+bool is_whole_png(const fs::path& path, int width_px, int height_px) {
+  std::ifstream in(path, std::ios::binary);
+  std::array<uint8_t, 24> head{};
+  std::array<uint8_t, 12> tail{};
+  if (!in.read(reinterpret_cast<char*>(head.data()), head.size())) return false;
+  if (!in.seekg(-static_cast<int>(tail.size()), std::ios::end)
+           .read(reinterpret_cast<char*>(tail.data()), tail.size()))
+    return false;
+  const auto number = [&](std::size_t at) {
+    return (head[at] << 24) | (head[at + 1] << 16) | (head[at + 2] << 8) | head[at + 3];
+  };
+  return std::memcmp(head.data(), "\x89PNG\r\n\x1a\n", 8) == 0 && number(16) == width_px &&
+         number(20) == height_px && std::memcmp(tail.data() + 4, "IEND", 4) == 0;
+}
+
+std::vector<int> prepare_frames(const fs::path& pattern, const std::vector<int>& frames,
+                                const Manifest& manifest, Existing existing) {
+  const fs::path folder = pattern.has_parent_path() ? pattern.parent_path() : ".";
+  const fs::path manifest_path = folder / "manifest.json";
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw render::FileError(folder.string() + ": cannot make the folder: " + error.message());
+
+  bool same_settings = false;  // without a manifest nobody knows what the frames there are
+  if (std::ifstream in(manifest_path); in) {
+    const auto old = nlohmann::json::parse(in, nullptr, false);
+    same_settings = old.is_object() && old.value("settings", std::string()) == manifest.settings;
+    if (!same_settings && existing != Existing::replace)
+      throw OutputError(
+          folder.string() +
+          ": holds frames of another scene or other settings; choose another folder, or replace them with "
+          "--force");
+    if (!same_settings && old.is_object())
+      for (int k = 1; k <= old.value("frames", 0); ++k) fs::remove(render::frame_path(pattern, k), error);
+  }
+
+  std::vector<int> missing;
+  for (const int frame : frames) {
+    const fs::path path = render::frame_path(pattern, frame);
+    const bool there = fs::exists(path);
+    if (there && existing == Existing::refuse)
+      throw OutputError(path.string() +
+                        ": exists already; keep finished frames with --resume, or replace them with --force");
+    const bool keep = there && same_settings && existing == Existing::keep &&
+                      is_whole_png(path, manifest.width_px, manifest.height_px);
+    if (!keep) missing.push_back(frame);
+  }
+  const std::string text = to_json(manifest).dump(2) + "\n";
+  render::write_file_atomically(manifest_path, {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
+  return missing;
+}
+
+}  // namespace offstage::producer

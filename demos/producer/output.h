@@ -1,0 +1,52 @@
+#pragma once
+/// Where a render goes: what OUT means, what is already there, and the manifest that lets a run be resumed.
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "producer/scene_io.h"
+#include "render/sink.h"
+
+namespace offstage::producer {
+
+/// Output exists and may not be overwritten, or OUT cannot be what it says.
+class OutputError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+enum class OutputKind {
+  frames,  ///< a pattern with #, or a folder: one PNG per frame
+  video,   ///< .mp4 .webm .mov .gif .webp .apng .png
+  pipe,    ///< "-": raw frames on standard output
+};
+
+struct OutputTarget {
+  OutputKind kind = OutputKind::frames;
+  std::filesystem::path path;  ///< the pattern of frames, or the video
+};
+
+/// Throws OutputError for an ending that is none of the known ones.
+OutputTarget parse_output(const std::string& out);
+
+/// What identifies the frames in a folder.
+struct Manifest {
+  std::string scene, settings;  ///< name; settings_key()
+  int width_px = 0, height_px = 0, frames = 0;
+  double fps = 30;
+};
+
+enum class Existing { refuse, keep, replace };
+
+/// Prepares a folder of frames: checks or writes the manifest and returns those of `frames` that have to be
+/// drawn. Frames of other settings are never mixed in: they are refused, or removed with Existing::replace.
+/// Throws OutputError or FileError.
+std::vector<int> prepare_frames(const std::filesystem::path& pattern, const std::vector<int>& frames,
+                                const Manifest& manifest, Existing existing);
+
+/// Whether a file is a complete PNG of this size.
+bool is_whole_png(const std::filesystem::path& path, int width_px, int height_px);
+
+}  // namespace offstage::producer

@@ -1,0 +1,313 @@
+#include "producer/picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "render/primitives.h"
+#include "render/tone_map.h"
+#include "sim/dynamics/keyframes.h"
+
+namespace offstage::producer {
+namespace {
+
+using Eigen::Affine3f;
+using Eigen::Vector3f;
+
+/// Half the edge of the square that stands for an infinite plane [m].
+constexpr float kGroundHalfSize = 1000;
+
+float f(Real value) {
+  return static_cast<float>(value);
+}
+
+Affine3f affine(const Vec3& position, const Quat& orientation, Real scale = 1) {
+  return Eigen::Translation3f(position.cast<float>()) * orientation.cast<float>() * Eigen::Scaling(f(scale));
+}
+
+Affine3f affine(const BodySample& s) {
+  return Eigen::Translation3f(s.position) * s.orientation;
+}
+
+/// The mesh of a primitive; boxes get a small bevel so that their edges catch light.
+render::Mesh mesh_of(const sim::Sphere& s) {
+  return render::make_sphere(f(s.radius));
+}
+render::Mesh mesh_of(const sim::Box& s) {
+  return render::make_box(s.size.cast<float>(), 0.04f * f(s.size.minCoeff()));
+}
+render::Mesh mesh_of(const sim::Capsule& s) {
+  return render::make_capsule(f(s.radius), f(s.height));
+}
+render::Mesh mesh_of(const sim::Cylinder& s) {
+  return render::make_cylinder(f(s.radius), f(s.height));
+}
+render::Mesh mesh_of(const sim::Cone& s) {
+  return render::make_cone(f(s.radius), f(s.height));
+}
+render::Mesh mesh_of(const sim::Plane&) {
+  return render::make_ground(kGroundHalfSize);
+}
+
+BodySample interpolate(const BodySample& a, const BodySample& b, float w) {
+  return {a.position + w * (b.position - a.position), a.orientation.slerp(w, b.orientation)};
+}
+
+/// Where a particle is at share w of the interval `dt` between two states: the cubic through both states
+/// while it flew freely; a straight line where a bounce came between, which a cubic would overshoot.
+Vector3f interpolate(const render::Point& a, const render::Point& b, float w, float dt) {
+  const Vector3f step = b.position - a.position;
+  const Vector3f mean_velocity = 0.5f * (a.velocity + b.velocity);
+  const bool free_flight = (step - mean_velocity * dt).norm() <= 0.1f * mean_velocity.norm() * dt;
+  if (!free_flight) return a.position + w * step;
+  const float w2 = w * w, w3 = w2 * w;
+  return a.position + (3 * w2 - 2 * w3) * step +
+         dt * ((w3 - 2 * w2 + w) * a.velocity + (w3 - w2) * b.velocity);
+}
+
+Vector3f follow_path(const std::vector<CameraKey>& keys, Vec3 CameraKey::*point, double time) {
+  sim::KeyframeTrack track;
+  for (const CameraKey& key : keys) track.keys.push_back({key.time, {key.*point, Quat::Identity()}});
+  return track.at(time, {}).pose.position.cast<float>();
+}
+
+}  // namespace
+
+Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context& context)
+    : scene_(scene),
+      stage_(context, {.width_px = scene.render.size.x(),
+                       .height_px = scene.render.size.y(),
+                       .shadow_map_px = scene.render.shadow_map}) {
+  std::size_t slot = 0;
+  for (const Body& body : scene.bodies) add_body(body, models, slot);
+  for (const Spring& spring : scene.springs) {
+    render::InstanceHandle rod;
+    if (spring.visible)
+      rod = stage_.add_instance(stage_.add_mesh(render::make_cylinder(f(spring.radius), 1)),
+                                material(spring.material, models));
+    springs_.push_back(rod);
+  }
+  for (const ParticleGroup& group : scene.particles) add_points(group.look);
+  for (const Emitter& emitter : scene.emitters) add_points(emitter.look);
+  add_light_and_air();
+}
+
+render::MaterialHandle Picture::material(const std::string& name, const ModelLibrary& models) {
+  if (const auto it = materials_.find(name); it != materials_.end()) return it->second;
+  render::Material m;
+  std::vector<render::Image> textures;
+  const auto it = std::ranges::find(scene_.materials, name, &Material::name);
+  if (it != scene_.materials.end()) {
+    m = {.name = it->name,
+         .color = it->color.rgba,
+         .metallic = f(it->metallic),
+         .roughness = f(it->roughness),
+         .emission = it->emission.rgb() * f(it->emission_strength),
+         .pattern = it->pattern,
+         .pattern_color = it->pattern_color.rgb(),
+         .pattern_scale = f(it->pattern_scale),
+         .two_sided = it->two_sided};
+    if (!it->texture.empty()) {
+      textures.push_back(models.texture(it->texture));
+      m.base_color_texture = 0;
+    }
+  }
+  return materials_[name] = stage_.add_material(m, textures);
+}
+
+void Picture::add_model(const std::string& file, const Affine3f& body_from_model, const Body& body,
+                        const ModelLibrary& models, std::vector<DrawnPart>& parts) {
+  const render::Model& model = models.model(file);
+  const auto [it, is_new] = models_.try_emplace(file);
+  auto& [meshes, own_materials] = it->second;
+  if (is_new) {
+    for (const render::Model::Part& part : model.parts) meshes.push_back(stage_.add_mesh(part.mesh));
+    for (const render::Material& m : model.materials)
+      own_materials.push_back(stage_.add_material(m, model.textures));
+  }
+  for (std::size_t i = 0; i < model.parts.size(); ++i) {
+    const auto look = body.material.empty() && !own_materials.empty()
+                          ? own_materials[static_cast<std::size_t>(model.parts[i].material)]
+                          : material(body.material, models);
+    parts.push_back({stage_.add_instance(meshes[i], look, body.casts_shadow), body_from_model});
+  }
+}
+
+void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t& slot) {
+  DrawnBody drawn{.slot = slot, .parts = {}};
+  if (body.visible) {
+    if (body.model) {
+      add_model(body.model->file, affine(body.model->position, body.model->orientation, body.model->scale),
+                body, models, drawn.parts);
+    } else {
+      std::visit(
+          [&](const auto& shape) {
+            using S = std::decay_t<decltype(shape)>;
+            if constexpr (std::is_same_v<S, MeshFile>) {
+              add_model(shape.file, affine(Vec3::Zero(), Quat::Identity(), shape.scale), body, models,
+                        drawn.parts);
+            } else {
+              // A plane is the ground: it takes shadows and throws none.
+              const bool casts = body.casts_shadow && !std::is_same_v<S, sim::Plane>;
+              drawn.parts.push_back({stage_.add_instance(stage_.add_mesh(mesh_of(shape)),
+                                                         material(body.material, models), casts),
+                                     Affine3f::Identity()});
+            }
+          },
+          body.shape);
+    }
+  }
+  if (body.motion == sim::MotionType::fixed) {
+    const Affine3f world_from_body = affine(body.position, body.orientation);
+    for (const DrawnPart& part : drawn.parts)
+      stage_.set_transform(part.instance, world_from_body * part.body_from_part);
+    fixed_positions_[body.name] = body.position.cast<float>();
+    return;
+  }
+  slot_of_[body.name] = slot++;
+  bodies_.push_back(std::move(drawn));
+}
+
+void Picture::add_points(const ParticleLook& look) {
+  points_.push_back(stage_.add_points({.style = look.style,
+                                       .additive = look.additive,
+                                       .lit = look.lit,
+                                       .casts_shadow = look.casts_shadow,
+                                       .softness = f(look.softness),
+                                       .stretch_s = f(look.stretch),
+                                       .metallic = f(look.metallic),
+                                       .roughness = f(look.roughness)}));
+}
+
+void Picture::add_light_and_air() {
+  render::Sun sun{.intensity = 0, .shadows = false};
+  for (const Light& light : scene_.lights) {
+    const auto& l = std::get<SunLight>(light);
+    sun = {.direction = l.direction.normalized().cast<float>(),
+           .color = l.color.rgb(),
+           .intensity = f(l.intensity),
+           .size_deg = f(l.size_deg),
+           .shadows = l.shadows};
+  }
+  stage_.set_sun(sun);
+  const EnvironmentSettings& e = scene_.environment;
+  stage_.set_environment({.zenith = e.zenith.rgb(),
+                          .horizon = e.horizon.rgb(),
+                          .ground = e.ground.rgb(),
+                          .intensity = f(e.intensity),
+                          .fog = f(e.fog),
+                          .visible = e.background == Background::sky});
+}
+
+render::Camera Picture::camera_at(double time, const std::vector<BodySample>& bodies) const {
+  render::Camera camera;
+  const auto lens = [&](const Lens& l) {
+    camera.fov_deg = f(l.fov_deg);
+    camera.aperture = f(l.aperture);
+    camera.focus = f(l.focus);
+  };
+  std::visit(
+      [&](const auto& c) {
+        using C = std::decay_t<decltype(c)>;
+        lens(c);
+        if constexpr (std::is_same_v<C, StaticCamera>) {
+          camera.eye = c.eye.template cast<float>();
+          camera.target = c.target.template cast<float>();
+        } else if constexpr (std::is_same_v<C, KeyframedCamera>) {
+          camera.eye = follow_path(c.keyframes, &CameraKey::eye, time);
+          camera.target = follow_path(c.keyframes, &CameraKey::target, time);
+        } else if constexpr (std::is_same_v<C, OrbitCamera>) {
+          const Real angle = (c.start_deg + c.turn_deg_per_s * time) * std::numbers::pi / 180;
+          camera.target = c.target.template cast<float>();
+          camera.eye = (c.target + Vec3(c.radius * std::sin(angle), c.height, c.radius * std::cos(angle)))
+                           .template cast<float>();
+        } else {
+          const auto moving = slot_of_.find(c.body);
+          const Vector3f at =
+              moving != slot_of_.end() ? bodies[moving->second].position : fixed_positions_.at(c.body);
+          camera.eye = at + c.offset.template cast<float>();
+          camera.target = at + c.look_offset.template cast<float>();
+        }
+      },
+      scene_.camera);
+  return camera;
+}
+
+void Picture::place_springs(const Snapshot& previous, const Snapshot& current, float w) {
+  for (std::size_t i = 0; i < springs_.size(); ++i) {
+    if (!springs_[i]) continue;
+    const SpringSample &s0 = previous.springs[i], &s1 = current.springs[i];
+    const Vector3f a = s0.a + w * (s1.a - s0.a), b = s0.b + w * (s1.b - s0.b), d = b - a;
+    const bool drawn = d.allFinite() && d.norm() > 1e-6f;
+    stage_.set_visible(springs_[i], drawn);
+    if (drawn)
+      stage_.set_transform(springs_[i], Eigen::Translation3f(0.5f * (a + b)) *
+                                            Eigen::Quaternionf::FromTwoVectors(Vector3f::UnitY(), d) *
+                                            Eigen::Scaling(1.f, d.norm(), 1.f));
+  }
+}
+
+void Picture::place_points(const Snapshot& previous, const Snapshot& current, float w, double frame_time) {
+  const auto dt = static_cast<float>(frame_time);
+  const float back = (1 - w) * dt;
+  for (std::size_t set = 0; set < points_.size(); ++set) {
+    const PointSet &before = previous.point_sets[set], &now = current.point_sets[set];
+    const ParticleLook& look = set < scene_.particles.size()
+                                   ? scene_.particles[set].look
+                                   : scene_.emitters[set - scene_.particles.size()].look;
+    // A streak is its own motion blur: it stays where the frame ends and is as long as its style says.
+    if (w == 1 || look.style == render::PointStyle::streak) {
+      stage_.set_points(points_[set], now.points);
+      continue;
+    }
+    scratch_.clear();
+    std::size_t j = 0;
+    for (std::size_t i = 0; i < now.points.size(); ++i) {
+      render::Point p = now.points[i];
+      while (j < before.points.size() && before.points[j].id < p.id) ++j;
+      if (j < before.points.size() && before.points[j].id == p.id)
+        p.position = interpolate(before.points[j], p, w, dt);
+      else if (now.ages[i] < back)
+        continue;  // not born yet
+      else
+        p.position -= back * p.velocity;
+      scratch_.push_back(p);
+    }
+    stage_.set_points(points_[set], scratch_);
+  }
+}
+
+void Picture::place(const Snapshot& previous, const Snapshot& current, float w, double frame_time) {
+  std::vector<BodySample> samples(current.bodies.size());
+  for (std::size_t i = 0; i < samples.size(); ++i)
+    samples[i] = w == 1 ? current.bodies[i] : interpolate(previous.bodies[i], current.bodies[i], w);
+  for (const DrawnBody& body : bodies_) {
+    const Affine3f world_from_body = affine(samples[body.slot]);
+    for (const DrawnPart& part : body.parts)
+      stage_.set_transform(part.instance, world_from_body * part.body_from_part);
+  }
+  place_springs(previous, current, w);
+  place_points(previous, current, w, frame_time);
+  stage_.set_camera(camera_at(current.time - (1 - w) * frame_time, samples));
+}
+
+render::Image Picture::draw(const Snapshot& previous, const Snapshot& current) {
+  const int n = subframes(scene_.render.quality);
+  const double frame_time = 1 / scene_.output.fps;
+  std::ranges::fill(sum_.rgba, 0.f);
+  for (int i = 0; i < n; ++i) {
+    // Sub-frames sit in the middle of equal parts of the time the shutter is open, which ends with the frame.
+    const float open =
+        f(scene_.render.shutter) * (1 - (static_cast<float>(i) + 0.5f) / static_cast<float>(n));
+    const float w = n == 1 || &previous == &current ? 1 : 1 - open;
+    place(previous, current, w, frame_time);
+    stage_.draw(render::sample_offsets(i, n), sum_);
+  }
+  render::Image image = render::tone_map(sum_, {.curve = scene_.render.tone_curve,
+                                                .exposure = f(scene_.render.exposure),
+                                                .sample_weight = 1 / static_cast<float>(n)});
+  if (n == 1) render::filter_edges(image);
+  return image;
+}
+
+}  // namespace offstage::producer

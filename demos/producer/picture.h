@@ -1,0 +1,62 @@
+#pragma once
+/// The drawing side of a scene: builds a stage and turns pairs of snapshots into finished frames. Between the
+/// two states of a pair it interpolates (slerp for bodies, cubic for particles), so that sub-frames at
+/// different times give motion blur.
+
+#include <string>
+#include <vector>
+
+#include "producer/models.h"
+#include "producer/scene.h"
+#include "producer/snapshot.h"
+#include "render/image.h"
+#include "render/stage.h"
+
+namespace offstage::producer {
+
+class Picture {
+ public:
+  /// The context must be current on this thread and outlive the picture.
+  Picture(const Scene& scene, const ModelLibrary& models, render::Context& context);
+
+  /// The frame at `current`; the shutter is open during the end of the interval from `previous`, the frame
+  /// before it (or the same snapshot for the first frame, which has no motion blur).
+  render::Image draw(const Snapshot& previous, const Snapshot& current);
+
+ private:
+  struct DrawnPart {
+    render::InstanceHandle instance;
+    Eigen::Affine3f body_from_part;
+  };
+  struct DrawnBody {
+    std::size_t slot;  // in Snapshot::bodies
+    std::vector<DrawnPart> parts;
+  };
+
+  render::MaterialHandle material(const std::string& name, const ModelLibrary& models);
+  void add_body(const Body& body, const ModelLibrary& models, std::size_t& slot);
+  void add_model(const std::string& file, const Eigen::Affine3f& body_from_model, const Body& body,
+                 const ModelLibrary& models, std::vector<DrawnPart>& parts);
+  void add_points(const ParticleLook& look);
+  void add_light_and_air();
+
+  void place(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
+  void place_springs(const Snapshot& previous, const Snapshot& current, float w);
+  void place_points(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
+  render::Camera camera_at(double time, const std::vector<BodySample>& bodies) const;
+
+  const Scene& scene_;
+  render::Stage stage_;
+  std::map<std::string, render::MaterialHandle> materials_;
+  std::map<std::string, std::pair<std::vector<render::MeshHandle>, std::vector<render::MaterialHandle>>>
+      models_;
+  std::map<std::string, std::size_t> slot_of_;  // body name -> slot, for the follow camera
+  std::map<std::string, Eigen::Vector3f> fixed_positions_;
+  std::vector<DrawnBody> bodies_;
+  std::vector<render::InstanceHandle> springs_;  // null where invisible
+  std::vector<render::PointsHandle> points_;
+  std::vector<render::Point> scratch_;
+  render::HdrImage sum_;
+};
+
+}  // namespace offstage::producer

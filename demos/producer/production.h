@@ -1,0 +1,103 @@
+#pragma once
+/// The frame loop: simulation (or a cache), several drawing threads with a GL context each, and the sink,
+/// overlapping through bounded queues. What comes out does not depend on how many threads draw.
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "producer/models.h"
+#include "producer/scene_io.h"
+#include "producer/simulation.h"
+#include "producer/snapshot.h"
+#include "render/sink.h"
+
+namespace offstage::producer {
+
+/// Durations of one stage of the pipeline over the frames of a run [ms].
+class StageTimes {
+ public:
+  void add(double ms) { ms_.push_back(ms); }
+  struct Summary {
+    double mean = 0, p50 = 0, p95 = 0, max = 0;
+  };
+  Summary summary() const;
+
+ private:
+  std::vector<double> ms_;
+};
+
+/// What a run did: the stats object of the command line.
+struct RunStats {
+  int frames = 0;       ///< written by this run
+  int frames_kept = 0;  ///< already there (resume)
+  double wall_s = 0;
+  double startup_s = 0;  ///< from the start of the process to the first written frame
+  StageTimes sim, render, encode;
+  std::size_t bodies = 0;
+  uint64_t particles = 0;  ///< alive at the end
+  uint64_t most_particles = 0;
+  SimulationTotals totals;
+  std::optional<sim::Energy> energy_start, energy_end;  ///< without a cache
+  std::string state_hash;                               ///< after the last frame
+  std::map<int, std::string> frame_states;              ///< state hash of every drawn frame
+  std::vector<int> blank_frames;                        ///< all pixels equal: something is probably wrong
+  int interrupted_by = 0;                               ///< signal, or 0
+};
+
+/// One JSON object.
+std::string to_json(const RunStats& stats);
+
+/// Told after every finished frame, from one thread.
+struct Progress {
+  int done = 0, total = 0;
+  double sim_ms = 0, render_ms = 0, encode_ms = 0;  ///< of the latest frames
+  uint64_t particles = 0;
+  double eta_s = 0;
+};
+using ProgressCallback = std::function<void(const Progress&)>;
+
+/// Where snapshots come from: the simulation or a cache.
+class SnapshotSource {
+ public:
+  virtual ~SnapshotSource() = default;
+  /// The state at a frame; frames are asked for in ascending order.
+  virtual Snapshot at(int frame) = 0;
+};
+
+struct RenderJob {
+  std::vector<int> frames;                     ///< to draw, ascending
+  int threads = 1;                             ///< that draw, each with a context of its own
+  std::optional<std::filesystem::path> cache;  ///< read states from here instead of simulating
+};
+
+/// Draws the frames into the sink and closes it. After an interrupt it finishes the frames in flight, closes
+/// the sink and says so in the result. Throws what the parts throw; then nothing is left half-written.
+RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, const RenderJob& job,
+                       render::FrameSink& sink, const ProgressCallback& progress);
+
+struct SimulateJob {
+  std::optional<std::filesystem::path> cache;  ///< write a snapshot per frame
+  bool force = false;
+  std::optional<std::filesystem::path> trace;  ///< CSV of every moving body and placed particle
+  bool trace_every_step = false;               ///< else once a frame
+};
+
+/// Runs the physics alone, over all frames.
+RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, const SimulateJob& job,
+                         const ProgressCallback& progress);
+
+/// What a cache of snapshots depends on: everything of the scene but camera, light, air and picture settings.
+std::string simulation_key(const LoadedScene& loaded, const ModelLibrary& models);
+/// What a frame's pixels depend on.
+std::string settings_key(const LoadedScene& loaded, const ModelLibrary& models);
+
+/// Time since the process started [s].
+double process_age_s();
+double peak_rss_mb();
+
+}  // namespace offstage::producer

@@ -1,0 +1,339 @@
+#pragma once
+/// The scene as plain structs, as a file describes it and before anything is built. Every field here is a key
+/// of the scene format with the same name; scene_table.cpp gives each its unit, range and line of help, once,
+/// for the loader, the schema and the reference. SI units; angles in degrees where a name says so.
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "effects/distribution.h"
+#include "producer/error.h"
+#include "render/model.h"
+#include "render/stage.h"
+#include "render/tone_map.h"
+#include "sim/dynamics/integrator.h"
+#include "sim/dynamics/keyframes.h"
+#include "sim/shape.h"
+#include "sim/types.h"
+#include "sim/world.h"
+
+namespace offstage::producer {
+
+using effects::Varying;
+using sim::Quat;
+using sim::Real;
+using sim::Vec3;
+
+/// Linear colour with straight alpha. In files "#rrggbb", "#rrggbbaa" (sRGB) or linear [r, g, b] or [r, g, b,
+/// a].
+struct Color {
+  Eigen::Vector4f rgba = {1, 1, 1, 1};
+  Eigen::Vector3f rgb() const { return rgba.head<3>(); }
+};
+
+struct WorldSettings {
+  Vec3 gravity = {0, -9.81, 0};
+  Vec3 wind = Vec3::Zero();
+  Real step = 1.0 / 240;
+  sim::IntegratorKind integrator = sim::IntegratorKind::rk4;
+  Real bounds = 1000;  ///< half the edge of the cube everything must stay in
+  uint64_t seed = 1;
+};
+
+/// Look and contact behaviour in one.
+struct Material {
+  Where where;
+  std::string name;
+  Color color{{0.8f, 0.8f, 0.8f, 1}};
+  Real metallic = 0;
+  Real roughness = 0.5;
+  Color emission{{0, 0, 0, 1}};
+  Real emission_strength = 1;
+  render::Pattern pattern = render::Pattern::none;
+  Color pattern_color{{0.4f, 0.4f, 0.4f, 1}};
+  Real pattern_scale = 1;
+  std::string texture;  ///< image file
+  bool two_sided = false;
+  Real restitution = 0.5;
+  Real friction = 0.5;
+};
+
+/// A model file as a shape: its triangles collide and give the mass.
+struct MeshFile {
+  std::string file;
+  Real scale = 1;
+};
+using Shape =
+    std::variant<sim::Sphere, sim::Box, sim::Capsule, sim::Cylinder, sim::Cone, sim::Plane, MeshFile>;
+
+/// A model file drawn instead of a body's shape.
+struct ModelLook {
+  std::string file;
+  Real scale = 1;
+  Vec3 position = Vec3::Zero();  ///< in the body's frame
+  Quat orientation = Quat::Identity();
+};
+
+/// Copies in a row or a ring: copy i is moved by i * offset and turned by i * turn_deg about the vertical
+/// through `pivot`.
+struct Repeat {
+  int count = 2;
+  Vec3 offset = Vec3::Zero();
+  Real turn_deg = 0;
+  Vec3 pivot = Vec3::Zero();
+};
+/// Copies on a grid centred on the original in x and z, upwards from it in y.
+struct Grid {
+  Eigen::Vector3i count = {1, 1, 1};
+  Vec3 spacing = Vec3::Ones();
+};
+/// Copies at random places of a rectangle centred on the original.
+struct Scatter {
+  int count = 10;
+  Eigen::Vector2d size = {10, 10};  ///< along x and z
+  Real min_distance = 0;            ///< between copies; those that find no place are left out with a warning
+  bool turn = true;                 ///< random turn about the vertical
+  Varying scale = 1.0;              ///< of a body's shape and model
+  uint64_t seed = 1;
+};
+struct Placement {
+  std::optional<Repeat> repeat;
+  std::optional<Grid> grid;
+  std::optional<Scatter> scatter;
+};
+
+struct BodyKey {
+  Real time = 0;
+  std::optional<Vec3> position;     ///< default: the body's
+  std::optional<Quat> orientation;  ///< default: the body's
+};
+
+struct Body {
+  Where where;
+  std::string name;
+  sim::MotionType motion = sim::MotionType::dynamic;  ///< "static", "kinematic", "dynamic"
+  Shape shape = sim::Box{};
+  std::optional<ModelLook> model;
+  std::string material;  ///< name; empty: the default material, or the model file's own
+  Vec3 position = Vec3::Zero();
+  Quat orientation = Quat::Identity();
+  Vec3 velocity = Vec3::Zero();
+  Vec3 angular_velocity = Vec3::Zero();
+  Real density = 1000;
+  Real mass = 0;
+  Real linear_drag = 0;
+  Real angular_drag = 0;
+  bool collides = true;
+  bool visible = true;
+  bool casts_shadow = true;
+  std::vector<BodyKey> keyframes;
+  sim::Interpolation interpolation = sim::Interpolation::smooth;
+  bool loop = false;
+  Vec3 spin = Vec3::Zero();
+  Placement placement;  ///< its three keys stand directly in the body
+};
+
+/// How particles are drawn.
+struct ParticleLook {
+  render::PointStyle style = render::PointStyle::sprite;
+  Color color;
+  std::vector<std::pair<Real, Color>> color_over_age;  ///< [age 0..1, colour]; multiplies `color`
+  std::vector<std::pair<Real, Real>> size_over_age;    ///< [age 0..1, factor]
+  Real color_deviation = 0;                            ///< of brightness, per particle
+  bool additive = false;
+  bool lit = true;
+  bool casts_shadow = true;
+  Real softness = 0.5;
+  Real stretch = 1.0 / 60;
+  Real metallic = 0;
+  Real roughness = 0.3;
+};
+
+/// What particles of a group or an emitter feel and do, other than their own parameters.
+struct ParticleBehaviour {
+  Real linear_drag = 0;
+  bool gravity = true;
+  Vec3 force = Vec3::Zero();
+  bool collides = true;
+  bool dies_on_hit = false;
+  sim::IntegratorKind integrator = sim::IntegratorKind::symplectic_euler;
+};
+
+struct ParticlePlace {
+  Vec3 position = Vec3::Zero();
+  Vec3 velocity = Vec3::Zero();
+  std::optional<Color> color;  ///< default: the look's
+};
+
+/// Particles placed one by one.
+struct ParticleGroup {
+  Where where;
+  std::string name;
+  std::vector<ParticlePlace> places;
+  Real radius = 0.05;
+  Real mass = 1;
+  Real restitution = 0.5;
+  Real friction = 0.5;
+  ParticleBehaviour behaviour;  ///< its keys stand directly in the group
+  ParticleLook look;
+};
+
+/// A rectangle that particles leave along `direction`.
+struct PlaneSurface {
+  Vec3 position = Vec3::Zero();
+  Vec3 direction = Vec3::UnitY();
+  Eigen::Vector2d size = {0.1, 0.1};
+};
+using EmitterSurface = std::variant<PlaneSurface>;
+
+struct EmitterBurst {
+  Real time = 0;
+  Varying count = 10.0;
+  int cycles = 1;
+  Real interval = 1;
+};
+
+struct Emitter {
+  Where where;
+  std::string name;
+  std::string body;  ///< name of the body it moves with; empty: fixed in the world
+  EmitterSurface surface = PlaneSurface{};
+  Varying rate = 100.0;
+  Varying count = 0.0;
+  Varying interval = 0.1;
+  std::vector<EmitterBurst> bursts;
+  Real start = 0;
+  Real end = 1e30;
+  Varying speed = 1.0;
+  Varying spread_deg = 0.0;
+  Varying radius = 0.01;
+  Varying density = 1000.0;
+  Varying mass = 0.0;
+  Varying lifespan = 5.0;
+  Varying restitution = 0.3;
+  Varying friction = 0.5;
+  int64_t max_alive = 1'000'000;
+  ParticleBehaviour behaviour;  ///< its keys stand directly in the emitter
+  ParticleLook look;
+  Placement placement;
+};
+
+/// One end of a spring: a point of the world, of a body (in its frame), or one particle of a group.
+struct SpringEnd {
+  std::string body;
+  std::string particles;
+  int index = 0;  ///< of the particle in its group
+  Vec3 position = Vec3::Zero();
+};
+
+struct Spring {
+  Where where;
+  std::string name;
+  SpringEnd a, b;
+  Real stiffness = 100;
+  Real damping = 0;
+  Real rest_length = -1;
+  bool visible = true;
+  Real radius = 0.01;  ///< of the drawn rod
+  std::string material;
+};
+
+/// What all cameras have.
+struct Lens {
+  Real fov_deg = 40;
+  Real aperture = 0;
+  Real focus = 0;
+};
+struct StaticCamera : Lens {
+  Vec3 eye = {4, 2.5, 6};
+  Vec3 target = Vec3::Zero();
+};
+struct CameraKey {
+  Real time = 0;
+  Vec3 eye = {4, 2.5, 6};
+  Vec3 target = Vec3::Zero();
+};
+struct KeyframedCamera : Lens {
+  std::vector<CameraKey> keyframes;
+};
+struct OrbitCamera : Lens {
+  Vec3 target = Vec3::Zero();
+  Real radius = 8;
+  Real height = 3;     ///< of the eye above the target
+  Real start_deg = 0;  ///< from +Z towards +X
+  Real turn_deg_per_s = 20;
+};
+struct FollowCamera : Lens {
+  std::string body;
+  Vec3 offset = {0, 2, 6};  ///< of the eye from the body, world axes
+  Vec3 look_offset = Vec3::Zero();
+};
+using Camera = std::variant<StaticCamera, KeyframedCamera, OrbitCamera, FollowCamera>;
+
+struct SunLight {
+  Vec3 direction = {0.45, 0.75, 0.5};  ///< towards the sun
+  Color color{{1, 0.95f, 0.87f, 1}};
+  Real intensity = 3;
+  Real size_deg = 1.5;
+  bool shadows = true;
+};
+using Light = std::variant<SunLight>;
+
+enum class Background { sky, transparent };
+
+struct EnvironmentSettings {
+  Color zenith{{0.16f, 0.32f, 0.65f, 1}};
+  Color horizon{{0.62f, 0.72f, 0.82f, 1}};
+  Color ground{{0.28f, 0.26f, 0.22f, 1}};
+  Real intensity = 1;
+  Real fog = 0;
+  Background background = Background::sky;
+};
+
+/// Sub-frames per frame: draft 1 and an edge filter, preview 4, final 16. Never changes the physics.
+enum class Quality { draft, preview, final };
+int subframes(Quality quality);
+
+struct RenderSettings {
+  Eigen::Vector2i size = {1280, 720};
+  Quality quality = Quality::preview;
+  Real shutter = 0.5;  ///< share of the frame time the shutter is open
+  Real exposure = 1;
+  render::ToneCurve tone_curve = render::ToneCurve::filmic;
+  int shadow_map = 2048;
+};
+
+struct OutputSettings {
+  Real fps = 30;
+  Real duration = 5;
+  Real start =
+      0;  ///< time of frame 1: what happens before is simulated and not shown (a fountain already running)
+};
+
+struct Scene {
+  int version = 1;
+  std::string name;  ///< default: the file's name
+  std::string description;
+  WorldSettings world;
+  std::vector<Material> materials;
+  std::vector<Body> bodies;
+  std::vector<ParticleGroup> particles;
+  std::vector<Emitter> emitters;
+  std::vector<Spring> springs;
+  Camera camera = StaticCamera{};
+  std::vector<Light> lights = {SunLight{}};
+  EnvironmentSettings environment;
+  RenderSettings render;
+  OutputSettings output;
+
+  /// Frames are numbered from 1; frame k shows the time start + (k - 1) / fps.
+  int frame_count() const;
+};
+
+}  // namespace offstage::producer

@@ -1,0 +1,330 @@
+#include "producer/scene_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "producer/placement.h"
+#include "producer/suggest.h"
+#include "sim/geometry/mass_properties.h"
+
+namespace offstage::producer {
+namespace {
+
+constexpr Real kMostParticles = 2e7;
+constexpr Real kUnlimited = std::numeric_limits<Real>::infinity();
+
+template <class T>
+std::vector<std::string> names_of(const std::vector<T>& objects) {
+  std::vector<std::string> names;
+  for (const T& object : objects) names.push_back(object.name);
+  return names;
+}
+
+template <class T>
+const T* find_named(const std::vector<T>& objects, const std::string& name) {
+  const auto it = std::find_if(objects.begin(), objects.end(), [&](const T& o) { return o.name == name; });
+  return it == objects.end() ? nullptr : &*it;
+}
+
+std::string step(std::size_t i) {
+  return "/" + std::to_string(i);
+}
+
+/// A usual value: the mean, or the height of a curve.
+Real usual(const Varying& v) {
+  return std::holds_alternative<effects::Curve>(v) ? effects::upper_bound(v) : effects::mean(v, 0);
+}
+
+/// The mass that resists a force; infinite for what does not move; nothing for a mesh, which is not read
+/// here.
+std::optional<Real> mass_of(const Body& body) {
+  if (body.motion != sim::MotionType::dynamic) return kUnlimited;
+  if (body.mass > 0) return body.mass;
+  return std::visit(
+      [&]<class T>(const T& shape) -> std::optional<Real> {
+        if constexpr (std::is_same_v<T, MeshFile>)
+          return std::nullopt;
+        else
+          return body.density * sim::mass_properties(sim::Shape(shape)).volume;
+      },
+      body.shape);
+}
+
+class Checker {
+ public:
+  Checker(const Scene& scene, const Scene& flat, const std::filesystem::path& folder)
+      : scene_(scene), flat_(flat), folder_(folder) {
+    for (const Body& body : flat.bodies) bodies_.emplace(body.name, &body);
+  }
+
+  Findings run() {
+    check_names();
+    check_materials();
+    for (const Body& body : scene_.bodies) check_body(body);
+    for (const ParticleGroup& group : scene_.particles) check_look(group.look, group.where.path + "/look");
+    for (const Emitter& emitter : scene_.emitters) check_emitter(emitter);
+    for (const Spring& spring : scene_.springs) check_spring(spring);
+    std::visit([&](const auto& camera) { check_camera(camera); }, scene_.camera);
+    check_lights();
+    check_film();
+    return std::move(findings_);
+  }
+
+ private:
+  void fail(std::string path, std::string what) {
+    findings_.errors.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
+  }
+  void warn(std::string path, std::string what) {
+    findings_.warnings.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
+  }
+
+  // --- Names and references ---
+
+  template <class T>
+  void check_unique(const std::vector<T>& objects) {
+    std::map<std::string, std::string> owners;
+    std::set<std::string> reported;
+    for (const T& object : objects) {
+      const auto [it, fresh] = owners.emplace(object.name, object.where.path);
+      if (fresh || !reported.insert(object.where.path).second) continue;
+      fail(object.where.path + "/name", "the name '" + object.name + "' is already that of " + it->second);
+    }
+  }
+  void check_names() {
+    check_unique(scene_.materials);
+    check_unique(flat_.bodies);
+    check_unique(scene_.particles);
+    check_unique(flat_.emitters);
+    check_unique(scene_.springs);
+  }
+
+  void check_body_name(const std::string& path, const std::string& name) {
+    if (bodies_.contains(name)) return;
+    if (find_named(scene_.bodies, name))
+      return fail(path, "the body '" + name + "' has copies; name one of them, such as '" + name + "_0'");
+    fail(path, "there is no body '" + name + "'" + suggestion(name, names_of(flat_.bodies)));
+  }
+  void check_material_name(const std::string& path, const std::string& name) {
+    used_materials_.insert(name);
+    if (!name.empty() && !find_named(scene_.materials, name))
+      fail(path, "there is no material '" + name + "'" + suggestion(name, names_of(scene_.materials)));
+  }
+  void check_file(const std::string& path, const std::string& file) {
+    std::error_code error;
+    if (!file.empty() && !std::filesystem::is_regular_file(folder_ / file, error))
+      fail(path, "there is no file '" + (folder_ / file).string() + "'");
+  }
+  void check_materials() {
+    for (const Material& material : scene_.materials)
+      check_file(material.where.path + "/texture", material.texture);
+    for (const Body& body : scene_.bodies) check_material_name(body.where.path + "/material", body.material);
+    for (const Spring& spring : scene_.springs)
+      check_material_name(spring.where.path + "/material", spring.material);
+    for (const Material& material : scene_.materials)
+      if (!used_materials_.contains(material.name))
+        warn(material.where.path, "the material '" + material.name + "' is not used");
+  }
+
+  template <class Key>
+  void check_times(const std::vector<Key>& keys, const std::string& path) {
+    for (std::size_t i = 1; i < keys.size(); ++i)
+      if (keys[i].time <= keys[i - 1].time)
+        fail(path + step(i) + "/time",
+             fmt::format("times must increase, got {} after {}", keys[i].time, keys[i - 1].time));
+  }
+
+  // --- Bodies ---
+
+  void check_body(const Body& body) {
+    const std::string& path = body.where.path;
+    const bool dynamic = body.motion == sim::MotionType::dynamic,
+               kinematic = body.motion == sim::MotionType::kinematic;
+    if (const MeshFile* mesh = std::get_if<MeshFile>(&body.shape))
+      check_file(path + "/shape/file", mesh->file);
+    if (body.model) check_file(path + "/model/file", body.model->file);
+    if (dynamic && std::holds_alternative<sim::Plane>(body.shape))
+      fail(path + "/shape", "a plane cannot be dynamic; give the body \"motion\": \"static\"");
+    if (!kinematic && !body.keyframes.empty())
+      fail(path + "/keyframes", "only a kinematic body follows keyframes; give it \"motion\": \"kinematic\"");
+    if (!kinematic && !body.spin.isZero(0))
+      fail(path + "/spin", "only a kinematic body spins by itself; give it \"motion\": \"kinematic\"");
+    check_times(body.keyframes, path + "/keyframes");
+    if (!dynamic && !body.velocity.isZero(0))
+      warn(path + "/velocity", "has no effect: the body is not dynamic");
+    if (!dynamic && !body.angular_velocity.isZero(0))
+      warn(path + "/angular_velocity", "has no effect: the body is not dynamic");
+    if (body.mass > 0 && body.density != Body{}.density)
+      warn(path + "/density", "has no effect: the mass is given");
+  }
+
+  // --- Particles and emitters ---
+
+  template <class V>
+  void check_ages(const std::vector<std::pair<Real, V>>& ramp, const std::string& path) {
+    for (std::size_t i = 1; i < ramp.size(); ++i)
+      if (ramp[i].first < ramp[i - 1].first) fail(path + step(i), "ages must not decrease");
+  }
+  void check_look(const ParticleLook& look, const std::string& path) {
+    check_ages(look.color_over_age, path + "/color_over_age");
+    check_ages(look.size_over_age, path + "/size_over_age");
+  }
+
+  void check_emitter(const Emitter& emitter) {
+    const std::string& path = emitter.where.path;
+    if (!emitter.body.empty()) check_body_name(path + "/body", emitter.body);
+    check_look(emitter.look, path + "/look");
+    if (emitter.end <= emitter.start)
+      fail(path + "/end", fmt::format("must be after the start, {} s", emitter.start));
+    const Real room = std::get<PlaneSurface>(emitter.surface).size.minCoeff();
+    if (2 * effects::lower_bound(emitter.radius) > room) {
+      fail(path + "/surface",
+           fmt::format(
+               "is too small for a single particle: it is {} m wide and the smallest particle {:.3g} m", room,
+               2 * effects::lower_bound(emitter.radius)));
+    } else if (2 * effects::upper_bound(emitter.radius) > room) {
+      warn(path + "/surface", fmt::format("is only {} m wide: too small for the largest particles", room));
+    }
+
+    const Real alive = expected_alive(emitter, scene_.output.start + scene_.output.duration);
+    const Real all = alive * copy_count(emitter.placement);
+    if (all > kMostParticles) {
+      fail(path,
+           fmt::format(
+               "would have about {:.3g} particles alive at once, more than {:.3g}; lower rate, count or "
+               "lifespan",
+               all, kMostParticles));
+    } else if (alive > static_cast<Real>(emitter.max_alive)) {
+      warn(path + "/max_alive",
+           fmt::format("will hold back particles: about {:.3g} would be alive at once, {} are "
+                       "allowed",
+                       alive, emitter.max_alive));
+    } else if (alive == 0) {
+      warn(path, "releases no particles: rate, count and bursts are zero");
+    }
+  }
+
+  // --- Springs ---
+
+  /// The mass at an end; nothing if it is not known or wrong.
+  std::optional<Real> check_end(const SpringEnd& end, const std::string& path) {
+    if (!end.body.empty() && !end.particles.empty()) {
+      fail(path, "must be on a body or a particle, not both");
+      return {};
+    }
+    if (end.particles.empty()) {
+      if (end.index != 0) warn(path + "/index", "has no effect: this end is not on a particle");
+      if (end.body.empty()) return kUnlimited;
+      check_body_name(path + "/body", end.body);
+      const auto body = bodies_.find(end.body);
+      return body == bodies_.end() ? std::nullopt : mass_of(*body->second);
+    }
+    if (!end.position.isZero(0)) warn(path + "/position", "has no effect: the particle has its own");
+    const ParticleGroup* group = find_named(scene_.particles, end.particles);
+    if (!group) {
+      fail(path + "/particles", "there are no particles '" + end.particles + "'" +
+                                    suggestion(end.particles, names_of(scene_.particles)));
+      return {};
+    }
+    if (static_cast<std::size_t>(end.index) < group->places.size()) return group->mass;
+    fail(path + "/index", fmt::format("must be less than {}, the number of particles of '{}', got {}",
+                                      group->places.size(), group->name, end.index));
+    return {};
+  }
+
+  void check_spring(const Spring& spring) {
+    const std::string& path = spring.where.path;
+    const auto a = check_end(spring.a, path + "/a"), b = check_end(spring.b, path + "/b");
+    if (!spring.a.particles.empty() && spring.a.particles == spring.b.particles &&
+        spring.a.index == spring.b.index)
+      fail(path, "has the same particle at both ends");
+    if (!a || !b || *a <= 0 || *b <= 0) return;
+    if (std::isinf(*a) && std::isinf(*b)) return warn(path, "has no effect: neither end can move");
+    // One spring alone on a point of each mass: further springs, and ends away from a centre of mass, only
+    // shorten the step it needs, so what fails here fails in the scene.
+    const Real reduced = 1 / (1 / *a + 1 / *b);
+    const Real largest =
+        largest_stable_step(scene_.world.integrator, spring.stiffness, spring.damping, reduced);
+    const Real used = std::min(scene_.world.step, 1 / scene_.output.fps);
+    if (used >= largest)
+      fail(path, fmt::format("the spring '{}' is too stiff for the step: /world/step must be less than "
+                             "{:.3g} s, is {:.3g} s",
+                             spring.name, 0.995 * largest, used));
+  }
+
+  // --- Camera, light, film ---
+
+  void check_view(const Vec3& eye, const Vec3& target, const std::string& path) {
+    if (eye == target) fail(path, "the camera is where it looks at");
+  }
+  void check_camera(const StaticCamera& camera) { check_view(camera.eye, camera.target, "/camera"); }
+  void check_camera(const KeyframedCamera& camera) {
+    if (camera.keyframes.empty()) fail("/camera", "needs at least one of \"keyframes\"");
+    check_times(camera.keyframes, "/camera/keyframes");
+    for (std::size_t i = 0; i < camera.keyframes.size(); ++i)
+      check_view(camera.keyframes[i].eye, camera.keyframes[i].target, "/camera/keyframes" + step(i));
+  }
+  void check_camera(const OrbitCamera&) {}
+  void check_camera(const FollowCamera& camera) {
+    if (!camera.body.empty()) check_body_name("/camera/body", camera.body);
+    check_view(camera.offset, camera.look_offset, "/camera");
+  }
+
+  void check_lights() {
+    for (std::size_t i = 0; i < scene_.lights.size(); ++i) {
+      const std::string path = "/lights" + step(i);
+      if (i > 0) fail(path, "there can be only one sun");
+      if (std::get<SunLight>(scene_.lights[i]).direction.y() <= 0)
+        fail(path + "/direction", "the sun must be above the horizon: y must be greater than 0");
+    }
+  }
+
+  void check_film() {
+    const auto& size = scene_.render.size;
+    if (size.x() % 2 != 0 || size.y() % 2 != 0)
+      warn("/render/size", "is odd: most video formats need even numbers");
+    if (scene_.frame_count() < 1)
+      fail("/output/duration",
+           fmt::format("is too short for a single frame at {} frames per second", scene_.output.fps));
+  }
+
+  const Scene& scene_;
+  const Scene& flat_;
+  std::filesystem::path folder_;
+  std::map<std::string, const Body*> bodies_;  // with their copies, by name
+  std::set<std::string> used_materials_;
+  Findings findings_;
+};
+
+}  // namespace
+
+Findings check_scene(const Scene& scene, const Scene& flat, const std::filesystem::path& folder) {
+  return Checker(scene, flat, folder).run();
+}
+
+Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real c, Real m) {
+  // x'' = -(k/m) x and v' = -(c/m) v: the ends of the stability region on the imaginary and on the negative
+  // real axis. The Euler methods and the midpoint rule share 2; Runge-Kutta 4 has 2 sqrt(2) and 2.785.
+  const bool rk4 = integrator == sim::IntegratorKind::rk4;
+  const Real by_stiffness = (rk4 ? 2 * std::sqrt(2.0) : 2) * std::sqrt(m / k),
+             by_damping = (rk4 ? 2.785 : 2) * m / c;
+  return std::min(by_stiffness, by_damping);
+}
+
+Real expected_alive(const Emitter& emitter, Real film_end) {
+  const Real window = std::max(0.0, std::min(emitter.end, film_end) - emitter.start);
+  const Real lifespan = usual(emitter.lifespan), span = std::min(lifespan, window);
+  Real alive =
+      usual(emitter.rate) * span + usual(emitter.count) * std::max(1.0, span / usual(emitter.interval));
+  for (const EmitterBurst& burst : emitter.bursts)
+    alive += usual(burst.count) * std::clamp(lifespan / burst.interval, 1.0, static_cast<Real>(burst.cycles));
+  return alive;
+}
+
+}  // namespace offstage::producer

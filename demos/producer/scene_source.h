@@ -1,0 +1,37 @@
+#pragma once
+/// The text of a scene: its file, the files it includes, and the overrides of the command line, joined into
+/// one tree that still knows where each value came from.
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "producer/error.h"
+#include "producer/json.h"
+
+namespace offstage::producer {
+
+struct SceneSource {
+  std::vector<std::string> files;  ///< what positions refer to
+  Node root;
+
+  /// Where the value at a JSON pointer stands; if it was not given, where what should hold it stands.
+  Where locate(const std::string& path) const;
+};
+
+/// The text of a file. Throws SceneError if it cannot be read.
+std::string read_text(const std::filesystem::path& file);
+
+/// Parses `text` and what it includes. Included files are sought beside the file that names them (`folder`
+/// for `text`). Objects are merged key by key and the including file wins; lists at the top are joined,
+/// included first. Throws SceneError for what is no JSON, cannot be read, or includes itself.
+SceneSource read_source(std::string_view text, const std::string& name, const std::filesystem::path& folder);
+
+/// Sets "path=value" in the tree; the value is JSON or else a string, the path as in /emitters/0/rate or
+/// emitters.rain.rate. What the tree lacks is made, lists with the content they have in `defaults`. Adds to
+/// `problems` if the path leads nowhere.
+void apply_override(SceneSource& source, const std::string& override, const Node& defaults,
+                    std::vector<Problem>& problems);
+
+}  // namespace offstage::producer

@@ -1,0 +1,49 @@
+#include "producer/scene_table.h"
+
+#include "producer/table_film.h"
+#include "producer/table_world.h"
+
+namespace offstage::producer {
+
+template <>
+struct Table<Scene> {
+  static constexpr const char* kName = "scene";
+  static constexpr const char* kHelp = "The whole file.";
+  static Fields<Scene> fields() {
+    using T = Scene;
+    return {
+        {"version", &T::version, "of this format", "", between(1, 1)},
+        {"name", &T::name, "empty: the file's name"},
+        {"description", &T::description, "what there is to see"},
+        {"world", &T::world, "what holds for everything that is simulated"},
+        {"materials", &T::materials, "looks and contact behaviours, used by name"},
+        {"bodies", &T::bodies, "rigid bodies"},
+        {"particles", &T::particles, "groups of particles placed one by one"},
+        {"emitters", &T::emitters, "sources of particles"},
+        {"springs", &T::springs, "damped springs"},
+        {"camera", &T::camera, "where the film is seen from"},
+        {"lights", &T::lights, "the sun"},
+        {"environment", &T::environment, "sky, ambient light, fog"},
+        {"render", &T::render, "the picture"},
+        {"output", &T::output, "the film's time"},
+    };
+  }
+};
+
+// --- The whole ---
+
+void read_scene(Reader& in, const Node& node, Scene& out) {
+  Codec<Scene>::read(in, node, {}, out);
+}
+
+Node write_scene(const Scene& scene) {
+  return Codec<Scene>::write(scene);
+}
+
+Catalogue scene_catalogue() {
+  Catalogue all;
+  Codec<Scene>::describe(all, {});
+  return all;
+}
+
+}  // namespace offstage::producer

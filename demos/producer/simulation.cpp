@@ -1,0 +1,333 @@
+#include "producer/simulation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "effects/color.h"
+
+namespace offstage::producer {
+namespace {
+
+/// Property number of the per-particle brightness; the emitter's own properties are small numbers.
+constexpr uint32_t kBrightness = 1000;
+
+const Material* find_material(const Scene& scene, const std::string& name) {
+  const auto it = std::ranges::find(scene.materials, name, &Material::name);
+  return it == scene.materials.end() ? nullptr : &*it;
+}
+
+sim::ParticleSystemDef system_def(const std::string& name, const ParticleBehaviour& b) {
+  return {.name = name,
+          .linear_drag = b.linear_drag,
+          .gravity = b.gravity,
+          .force = b.force,
+          .collides = b.collides,
+          .dies_on_hit = b.dies_on_hit,
+          .integrator = b.integrator};
+}
+
+sim::KeyframeTrack track_of(const Body& body) {
+  sim::KeyframeTrack track{
+      .keys = {}, .interpolation = body.interpolation, .loop = body.loop, .spin = body.spin};
+  for (const BodyKey& key : body.keyframes)
+    track.keys.push_back(
+        {key.time, {key.position.value_or(body.position), key.orientation.value_or(body.orientation)}});
+  return track;
+}
+
+/// Runs `add`, turning the simulation's refusal into a problem at the place in the scene.
+template <class F>
+auto at_place(const Where& where, F&& add) {
+  try {
+    return add();
+  } catch (const std::invalid_argument& error) {
+    throw SceneError(where, error.what());
+  }
+}
+
+std::size_t index_of(const sim::ParticleArrays& particles, uint64_t id) {
+  const auto it = std::ranges::lower_bound(particles.id, id);
+  return it != particles.id.end() && *it == id ? static_cast<std::size_t>(it - particles.id.begin())
+                                               : particles.size();
+}
+
+nlohmann::ordered_json json_of(const Vec3& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+}  // namespace
+
+Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
+    : scene_(scene),
+      world_({.gravity = scene.world.gravity,
+              .wind = scene.world.wind,
+              .max_step = scene.world.step,
+              .integrator = scene.world.integrator,
+              .bounds = sim::Aabb(Vec3::Constant(-scene.world.bounds), Vec3::Constant(scene.world.bounds))}) {
+  add_bodies(scene, models);
+  add_particle_groups(scene);
+  add_springs(scene);
+  add_emitters(scene);
+}
+
+void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
+  std::map<std::pair<std::string, Real>, sim::MeshHandle> meshes;
+  for (const Body& body : scene.bodies) {
+    sim::BodyDef def{.name = body.name,
+                     .motion = body.motion,
+                     .pose = {body.position, body.orientation},
+                     .velocity = body.velocity,
+                     .angular_velocity = body.angular_velocity,
+                     .density = body.density,
+                     .mass = body.mass,
+                     .linear_drag = body.linear_drag,
+                     .angular_drag = body.angular_drag,
+                     .collides = body.collides,
+                     .track = track_of(body)};
+    if (const Material* material = find_material(scene, body.material)) {
+      def.restitution = material->restitution;
+      def.friction = material->friction;
+    }
+    const sim::BodyHandle handle = at_place(body.where, [&] {
+      std::visit(
+          [&](const auto& shape) {
+            if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, MeshFile>) {
+              sim::MeshHandle& mesh = meshes[{shape.file, shape.scale}];
+              if (!mesh) mesh = world_.add_mesh(collision_mesh(models.model(shape.file), shape.scale));
+              def.shape = sim::MeshShape{mesh};
+            } else {
+              def.shape = shape;
+            }
+          },
+          body.shape);
+      return world_.add_body(def);
+    });
+    bodies_[body.name] = handle;
+    if (body.motion == sim::MotionType::fixed) continue;
+    slot_of_[handle] = moving_.size();
+    moving_.push_back({body.name, handle});
+    moving_poses_.push_back(world_.body(handle).pose);
+  }
+}
+
+void Simulation::add_particle_groups(const Scene& scene) {
+  for (const ParticleGroup& group : scene.particles) {
+    const auto system = world_.add_particle_system(system_def(group.name, group.behaviour));
+    for (const ParticlePlace& place : group.places)
+      world_.add_particle(system, {.position = place.position,
+                                   .velocity = place.velocity,
+                                   .mass = group.mass,
+                                   .radius = group.radius,
+                                   .restitution = group.restitution,
+                                   .friction = group.friction});
+    groups_.push_back({group.name, system});
+  }
+}
+
+void Simulation::add_emitters(const Scene& scene) {
+  for (const Emitter& emitter : scene.emitters) {
+    const auto system = world_.add_particle_system(system_def(emitter.name, emitter.behaviour));
+    const auto& plane = std::get<PlaneSurface>(emitter.surface);
+    effects::EmitterDef def{
+        .name = emitter.name,
+        .seed = scene.world.seed,
+        .surface = {.pose = {plane.position, Quat::FromTwoVectors(Vec3::UnitY(), plane.direction)},
+                    .size = plane.size},
+        .body = body_named(emitter.body),
+        .rate = emitter.rate,
+        .count = emitter.count,
+        .interval = emitter.interval,
+        .bursts = {},
+        .start = emitter.start,
+        .end = emitter.end,
+        .speed = emitter.speed,
+        .spread_deg = emitter.spread_deg,
+        .radius = emitter.radius,
+        .density = emitter.density,
+        .mass = emitter.mass,
+        .lifespan = emitter.lifespan,
+        .restitution = emitter.restitution,
+        .friction = emitter.friction,
+        .max_alive = static_cast<uint64_t>(emitter.max_alive)};
+    for (const EmitterBurst& b : emitter.bursts)
+      def.bursts.push_back({b.time, b.count, b.cycles, b.interval});
+    at_place(emitter.where, [&] { emitters_.emplace_back(def, system); });
+  }
+}
+
+void Simulation::add_springs(const Scene& scene) {
+  const auto attachment = [&](const SpringEnd& end) -> sim::Attachment {
+    if (!end.body.empty()) return sim::BodyPoint{body_named(end.body), end.position};
+    if (!end.particles.empty()) {
+      const auto group = std::ranges::find(groups_, end.particles, &NamedGroup::name);
+      return sim::ParticlePoint{group->handle,
+                                world_.particles(group->handle).id[static_cast<std::size_t>(end.index)]};
+    }
+    return sim::WorldPoint{end.position};
+  };
+  for (const Spring& spring : scene.springs) {
+    springs_.push_back({.name = spring.name,
+                        .a = attachment(spring.a),
+                        .b = attachment(spring.b),
+                        .stiffness = spring.stiffness,
+                        .damping = spring.damping,
+                        .rest_length = spring.rest_length});
+    at_place(spring.where, [&] { world_.add_spring(springs_.back()); });
+  }
+}
+
+sim::BodyHandle Simulation::body_named(const std::string& name) const {
+  const auto it = bodies_.find(name);
+  return it == bodies_.end() ? sim::BodyHandle{} : it->second;
+}
+
+void Simulation::step(double sampling_time) {
+  const sim::StepReport report = world_.step(sampling_time, [&](Real start, Real end) {
+    if (on_substep_) on_substep_(start);
+    for (effects::Emitter& emitter : emitters_) emitter.emit(world_, start, end);
+  });
+  totals_.substeps += report.substeps;
+  totals_.born += report.particles_born;
+  totals_.expired += report.particles_expired;
+  totals_.retired += report.particles_retired;
+  totals_.ejected += report.particles_ejected;
+  totals_.removed += report.particles_removed;
+  totals_.collisions += report.particle_collisions;
+  totals_.truncated += report.truncated_sweeps;
+  totals_.waiting = totals_.skipped = 0;
+  for (const effects::Emitter& emitter : emitters_) {
+    totals_.waiting += emitter.report().waited;
+    totals_.skipped += emitter.report().skipped;
+  }
+  for (const sim::MovedBody& moved : world_.moved()) moving_poses_[slot_of_.at(moved.body)] = moved.pose;
+
+  if (!report.finite)
+    throw DivergedError(
+        fmt::format("the simulation diverged at {:.4f} s: '{}' is no longer finite; use a smaller "
+                    "world.step or weaker forces",
+                    world_.time(), report.non_finite_object),
+        state_dump());
+  if (!report.unresolved.empty()) {
+    const sim::UnresolvedContact& contact = report.unresolved.front();
+    throw UnsupportedError(
+        fmt::format("bodies '{}' and '{}' touch at {:.4f} s, and contact between bodies is not available in "
+                    "this version; keep "
+                    "dynamic bodies apart, or give one of them \"collides\": false",
+                    world_.body_def(contact.a).name, world_.body_def(contact.b).name, contact.time));
+  }
+}
+
+void Simulation::advance() {
+  if (frame_ == 0) {
+    // What comes before frame 1 is stepped in frame-sized pieces too, so that reports stay timely.
+    const int pieces = static_cast<int>(std::ceil(scene_.output.start * scene_.output.fps));
+    for (int i = 0; i < pieces; ++i) step(scene_.output.start / pieces);
+  } else {
+    step(1 / scene_.output.fps);
+  }
+  ++frame_;
+}
+
+PointSet Simulation::point_set(sim::ParticleSystemHandle system, const ParticleLook& look,
+                               const std::vector<ParticlePlace>* places, uint64_t stream) const {
+  const sim::ParticleArrays& particles = world_.particles(system);
+  const effects::RandomStream random(scene_.world.seed, stream);
+  effects::ColorRamp colors;
+  for (const auto& [age, color] : look.color_over_age) colors.keys.push_back({age, color.rgba});
+  effects::SizeRamp sizes;
+  for (const auto& [age, size] : look.size_over_age) sizes.keys.push_back({age, static_cast<float>(size)});
+
+  PointSet set;
+  set.points.resize(particles.size());
+  set.ages.resize(particles.size());
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    const Real age = particles.age[i] / particles.lifespan[i];
+    render::Point& p = set.points[i];
+    p.position = particles.position[i].cast<float>();
+    p.velocity = particles.velocity[i].cast<float>();
+    p.radius = static_cast<float>(particles.radius[i]);
+    p.id = particles.id[i];
+    p.color = places && (*places)[p.id].color ? (*places)[p.id].color->rgba : look.color.rgba;
+    if (!colors.keys.empty()) p.color = p.color.cwiseProduct(colors.at(age));
+    if (!sizes.keys.empty()) p.radius *= sizes.at(age);
+    if (look.color_deviation > 0) {
+      const effects::Normal brightness{.mean = 1, .deviation = look.color_deviation, .min = 0};
+      p.color.head<3>() *=
+          static_cast<float>(effects::sample(brightness, random.uniform(p.id, kBrightness), 0));
+    }
+    set.ages[i] = static_cast<float>(particles.age[i]);
+  }
+  return set;
+}
+
+Snapshot Simulation::snapshot() const {
+  Snapshot snapshot;
+  snapshot.frame = frame_;
+  snapshot.time = scene_.output.start + (frame_ - 1) / scene_.output.fps;
+  for (const sim::Pose& pose : moving_poses_)
+    snapshot.bodies.push_back({pose.position.cast<float>(), pose.orientation.cast<float>()});
+
+  const auto end_point = [&](const sim::Attachment& attachment) -> Eigen::Vector3f {
+    if (const auto* body = std::get_if<sim::BodyPoint>(&attachment))
+      return world_.body(body->body).pose.point_to_world(body->position).cast<float>();
+    if (const auto* particle = std::get_if<sim::ParticlePoint>(&attachment)) {
+      const sim::ParticleArrays& particles = world_.particles(particle->system);
+      const std::size_t i = index_of(particles, particle->id);
+      return i < particles.size()
+                 ? Eigen::Vector3f(particles.position[i].cast<float>())
+                 : Eigen::Vector3f(Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
+    }
+    return std::get<sim::WorldPoint>(attachment).position.cast<float>();
+  };
+  for (const sim::SpringDef& spring : springs_)
+    snapshot.springs.push_back({end_point(spring.a), end_point(spring.b)});
+
+  for (std::size_t i = 0; i < groups_.size(); ++i) {
+    const ParticleGroup& group = scene_.particles[i];
+    snapshot.point_sets.push_back(
+        point_set(groups_[i].handle, group.look, &group.places, effects::stream_id(group.name)));
+  }
+  for (std::size_t i = 0; i < emitters_.size(); ++i) {
+    const Emitter& emitter = scene_.emitters[i];
+    snapshot.point_sets.push_back(
+        point_set(emitters_[i].target(), emitter.look, nullptr, effects::stream_id(emitter.name)));
+  }
+  snapshot.state_hash = world_.state_hash();
+  return snapshot;
+}
+
+std::string Simulation::state_dump() const {
+  nlohmann::ordered_json dump;
+  dump["time"] = world_.time();
+  dump["frame"] = frame_;
+  auto& bodies = dump["bodies"] = nlohmann::ordered_json::array();
+  for (const NamedBody& body : moving_) {
+    const sim::BodyState s = world_.body(body.handle);
+    bodies.push_back(
+        {{"name", body.name},
+         {"position", json_of(s.pose.position)},
+         {"orientation",
+          {s.pose.orientation.w(), s.pose.orientation.x(), s.pose.orientation.y(), s.pose.orientation.z()}},
+         {"velocity", json_of(s.velocity)},
+         {"angular_velocity", json_of(s.angular_velocity)}});
+  }
+  auto& systems = dump["particles"] = nlohmann::ordered_json::array();
+  world_.for_each_particle_system([&](sim::ParticleSystemHandle handle) {
+    const sim::ParticleArrays& p = world_.particles(handle);
+    nlohmann::ordered_json system = {{"name", world_.particle_system_def(handle).name}, {"count", p.size()}};
+    auto& bad = system["not_finite"] = nlohmann::ordered_json::array();
+    constexpr std::size_t kMostListed = 100;
+    for (std::size_t i = 0; i < p.size() && bad.size() < kMostListed; ++i)
+      if (!p.position[i].allFinite() || !p.velocity[i].allFinite())
+        bad.push_back(
+            {{"id", p.id[i]}, {"position", json_of(p.position[i])}, {"velocity", json_of(p.velocity[i])}});
+    systems.push_back(std::move(system));
+  });
+  return dump.dump(2) + "\n";
+}
+
+}  // namespace offstage::producer

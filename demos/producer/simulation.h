@@ -1,0 +1,103 @@
+#pragma once
+/// The simulation side of a scene: builds the world and its emitters, advances them frame by frame, and takes
+/// the snapshots that the drawing needs. The order of bodies, springs and point sets in a snapshot is that of
+/// the scene; picture.h relies on it.
+
+#include <functional>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "effects/emitter.h"
+#include "producer/models.h"
+#include "producer/scene.h"
+#include "producer/snapshot.h"
+#include "sim/world.h"
+
+namespace offstage::producer {
+
+/// The physics cannot go on: something became non-finite. Carries the state as JSON text, to be saved.
+class DivergedError : public std::runtime_error {
+ public:
+  DivergedError(const std::string& what, std::string state)
+      : std::runtime_error(what), state_(std::move(state)) {}
+  const std::string& state() const { return state_; }
+
+ private:
+  std::string state_;
+};
+/// The scene needs something of the physics that is not there, such as contact between bodies.
+class UnsupportedError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Sums of the step reports of a run.
+struct SimulationTotals {
+  uint64_t substeps = 0, born = 0, expired = 0, retired = 0, ejected = 0, removed = 0, collisions = 0,
+           truncated = 0;
+  uint64_t waiting = 0, skipped = 0;  ///< of the emitters
+};
+
+class Simulation {
+ public:
+  /// Throws SceneError for what only building shows: an open mesh as a dynamic body, an emitter that cannot
+  /// emit.
+  Simulation(const Scene& scene, const ModelLibrary& models);
+
+  /// Called at the start of every internal step, with its time, if set: for traces.
+  void on_substep(std::function<void(double time)> callback) { on_substep_ = std::move(callback); }
+
+  /// Advances from the frame it is at to the next; the first call goes to frame 1, through whatever
+  /// `output.start` skips. Throws DivergedError or UnsupportedError.
+  void advance();
+  int frame() const { return frame_; }
+
+  Snapshot snapshot() const;
+
+  const sim::World& world() const { return world_; }
+  const SimulationTotals& totals() const { return totals_; }
+  std::size_t body_count() const { return world_.body_count(); }
+
+  struct NamedBody {
+    std::string name;
+    sim::BodyHandle handle;
+  };
+  /// Bodies that can move, in scene order.
+  const std::vector<NamedBody>& moving_bodies() const { return moving_; }
+  struct NamedGroup {
+    std::string name;
+    sim::ParticleSystemHandle handle;
+  };
+  const std::vector<NamedGroup>& particle_groups() const { return groups_; }
+
+  /// The state as JSON text, with the objects that are not finite named first; what is saved when a run
+  /// diverges.
+  std::string state_dump() const;
+
+ private:
+  void add_bodies(const Scene& scene, const ModelLibrary& models);
+  void add_particle_groups(const Scene& scene);
+  void add_emitters(const Scene& scene);
+  void add_springs(const Scene& scene);
+  sim::BodyHandle body_named(const std::string& name) const;
+  void step(double sampling_time);
+  PointSet point_set(sim::ParticleSystemHandle system, const ParticleLook& look,
+                     const std::vector<ParticlePlace>* places, uint64_t stream) const;
+
+  const Scene& scene_;
+  sim::World world_;
+  std::vector<effects::Emitter> emitters_;
+  std::vector<NamedBody> moving_;
+  std::vector<NamedGroup> groups_;
+  std::map<std::string, sim::BodyHandle> bodies_;
+  std::vector<sim::Pose> moving_poses_;             // kept up to date from World::moved()
+  std::map<sim::BodyHandle, std::size_t> slot_of_;  // handle -> place in `moving_`
+  std::vector<sim::SpringDef> springs_;
+  std::function<void(double)> on_substep_;
+  SimulationTotals totals_;
+  int frame_ = 0;
+};
+
+}  // namespace offstage::producer

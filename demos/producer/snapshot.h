@@ -1,0 +1,72 @@
+#pragma once
+/// What one frame hands from the simulation to the drawing: an immutable picture of the state, cast to float
+/// once. It is also what `simulate --cache` writes, one compressed and checksummed file per frame.
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "render/stage.h"
+#include "sim/world.h"
+
+namespace offstage::producer {
+
+struct BodySample {
+  Eigen::Vector3f position;
+  Eigen::Quaternionf orientation;
+};
+
+/// Ends of a spring.
+struct SpringSample {
+  Eigen::Vector3f a, b;
+};
+
+/// Particles of one group or emitter. `ids` ascend; `ages` tell when a particle was born inside the frame.
+struct PointSet {
+  std::vector<render::Point> points;
+  std::vector<float> ages;  ///< [s]
+};
+
+struct Snapshot {
+  int frame = 1;
+  double time = 0;                    ///< [s]
+  std::vector<BodySample> bodies;     ///< moving bodies, in scene order
+  std::vector<SpringSample> springs;  ///< in scene order
+  std::vector<PointSet> point_sets;   ///< particle groups, then emitters, in scene order
+  sim::StateHash state_hash;
+
+  uint64_t point_count() const;
+};
+
+/// The bytes of a snapshot: magic, format version, checksum (XXH3-64), zstd payload.
+std::vector<uint8_t> serialize(const Snapshot& snapshot);
+/// Throws render::FileError, naming `source`, for bytes that are damaged, cut short or of another version.
+Snapshot deserialize(std::span<const uint8_t> bytes, const std::string& source);
+
+/// A folder of snapshots of one simulation.
+class SnapshotCache {
+ public:
+  explicit SnapshotCache(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+  /// Prepares the folder for a simulation identified by `key`, leaving another's files only if `force`.
+  /// Throws FileError.
+  void create(const std::string& key, int frames, bool force) const;
+  /// Throws FileError if the folder holds no cache, an unfinished one, or one of another simulation.
+  void check(const std::string& key, int frames) const;
+  /// Marks the cache as complete.
+  void finish(const std::string& key, int frames) const;
+
+  void write(const Snapshot& snapshot) const;
+  Snapshot read(int frame) const;
+
+ private:
+  std::filesystem::path file(int frame) const;
+  std::filesystem::path folder_;
+};
+
+}  // namespace offstage::producer

@@ -1,0 +1,21 @@
+#pragma once
+/// "Did you mean": the nearest of the words that would have been right.
+
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace offstage::producer {
+
+/// Fewest insertions, deletions, replacements and swaps of neighbours that turn one word into the other.
+std::size_t edit_distance(std::string_view a, std::string_view b);
+
+/// The candidate nearest to `word` (the first of equals) if it is near enough to be a slip, else empty.
+std::string nearest(std::string_view word, std::span<const std::string> candidates);
+
+/// "; did you mean 'x'?" if there is a near candidate, else "; known: 'a', 'b'", or `if_none` without any
+/// candidate.
+std::string suggestion(std::string_view word, std::span<const std::string> candidates,
+                       std::string_view if_none = "");
+
+}  // namespace offstage::producer

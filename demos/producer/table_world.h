@@ -1,0 +1,422 @@
+#pragma once
+/// The keys of what is simulated: the world, materials, bodies with their shapes and placement, particles,
+/// emitters, springs.
+
+#include <array>
+
+#include "producer/placement.h"
+#include "producer/values.h"
+
+namespace offstage::producer {
+
+// --- World and materials ---
+
+template <>
+struct Names<sim::IntegratorKind> {
+  static constexpr std::array kNames = {"explicit_euler", "symplectic_euler", "midpoint", "rk4"};
+};
+template <>
+struct Table<WorldSettings> {
+  static constexpr const char* kName = "world";
+  static constexpr const char* kHelp = "What holds for everything that is simulated.";
+  static Fields<WorldSettings> fields() {
+    using T = WorldSettings;
+    return {
+        {"gravity", &T::gravity, "acceleration of free fall", "m/s^2"},
+        {"wind", &T::wind, "velocity of the air, felt by drag", "m/s"},
+        {"step", &T::step, "longest step of the simulation; every frame takes the fewest equal ones", "s",
+         over(0, 1)},
+        {"integrator", &T::integrator, "method for bodies and everything joined by springs"},
+        {"bounds", &T::bounds, "half the edge of the cube that things must stay in", "m", kPositive},
+        {"seed", &T::seed, "changes every random number of the scene", "", kNotNegative},
+    };
+  }
+};
+
+template <>
+struct Names<render::Pattern> {
+  static constexpr std::array kNames = {"none",  "checker", "grid", "noise",
+                                        "brick", "wood",    "lawn", "paving"};
+};
+
+template <>
+struct Table<Material> {
+  static constexpr const char* kName = "material";
+  static constexpr const char* kHelp = "Look and contact behaviour in one.";
+  static Fields<Material> fields() {
+    using T = Material;
+    return {
+        {"name", &T::name, "what bodies and springs call it; empty: material_ and its index"},
+        {"color", &T::color, "base colour; with alpha below 1 it is translucent"},
+        {"metallic", &T::metallic, "0: dielectric, 1: metal", "", kShare},
+        {"roughness", &T::roughness, "0: mirror, 1: dull", "", kShare},
+        {"emission", &T::emission, "colour of the light it gives off"},
+        {"emission_strength", &T::emission_strength, "factor of the emission; 1: as bright as a sunlit white",
+         "", kNotNegative},
+        {"pattern", &T::pattern, "second colour laid over the first"},
+        {"pattern_color", &T::pattern_color, "the pattern's colour"},
+        {"pattern_scale", &T::pattern_scale, "size of one cell of the pattern", "m", kPositive},
+        {"texture", &T::texture, "image file, multiplies the base colour; empty: none"},
+        {"two_sided", &T::two_sided, "lit and drawn from behind too"},
+        {"restitution", &T::restitution, "bounciness against particles; the larger of the two counts", "",
+         kShare},
+        {"friction", &T::friction, "Coulomb's coefficient against particles; the geometric mean counts", "",
+         kNotNegative},
+    };
+  }
+};
+
+// --- Shapes ---
+
+template <>
+struct Table<sim::Sphere> {
+  static constexpr const char* kName = "sphere";
+  static constexpr const char* kHelp = "A ball centred on the body.";
+  static Fields<sim::Sphere> fields() { return {{"radius", &sim::Sphere::radius, "radius", "m", kPositive}}; }
+};
+template <>
+struct Table<sim::Box> {
+  static constexpr const char* kName = "box";
+  static constexpr const char* kHelp = "A cuboid centred on the body.";
+  static Fields<sim::Box> fields() {
+    return {{"size", &sim::Box::size, "full lengths of the edges along x, y and z", "m", kPositive}};
+  }
+};
+template <>
+struct Table<sim::Capsule> {
+  static constexpr const char* kName = "capsule";
+  static constexpr const char* kHelp = "A cylinder along y with half a sphere on each end.";
+  static Fields<sim::Capsule> fields() {
+    return {{"radius", &sim::Capsule::radius, "radius", "m", kPositive},
+            {"height", &sim::Capsule::height, "distance between the centres of the half spheres", "m",
+             kNotNegative}};
+  }
+};
+template <>
+struct Table<sim::Cylinder> {
+  static constexpr const char* kName = "cylinder";
+  static constexpr const char* kHelp = "A cylinder along y, centred on the body.";
+  static Fields<sim::Cylinder> fields() {
+    return {{"radius", &sim::Cylinder::radius, "radius", "m", kPositive},
+            {"height", &sim::Cylinder::height, "length along y", "m", kPositive}};
+  }
+};
+template <>
+struct Table<sim::Cone> {
+  static constexpr const char* kName = "cone";
+  static constexpr const char* kHelp = "A cone along y: its base at -height/2, its apex at +height/2.";
+  static Fields<sim::Cone> fields() {
+    return {{"radius", &sim::Cone::radius, "radius of the base", "m", kPositive},
+            {"height", &sim::Cone::height, "length along y", "m", kPositive}};
+  }
+};
+template <>
+struct Table<sim::Plane> {
+  static constexpr const char* kName = "plane";
+  static constexpr const char* kHelp = "Everything below y = 0 of the body's frame; not for dynamic bodies.";
+  static Fields<sim::Plane> fields() { return {}; }
+};
+template <>
+struct Table<MeshFile> {
+  static constexpr const char* kName = "mesh";
+  static constexpr const char* kHelp = "A model file as a shape: its triangles collide and give the mass.";
+  static Fields<MeshFile> fields() {
+    return {{"file", &MeshFile::file, "model file", kRequired},
+            {"scale", &MeshFile::scale, "factor of its size", "", kPositive}};
+  }
+};
+template <>
+struct Tags<Shape> {
+  static constexpr const char* kName = "shape";
+  static constexpr const char* kHelp =
+      "What a body is like to collide with, and to look at unless it has a `model`.";
+  static constexpr std::array kTags = {"sphere", "box", "capsule", "cylinder", "cone", "plane", "mesh"};
+  static constexpr bool kRequired = true;
+};
+
+// --- Placement ---
+
+template <>
+struct Table<Repeat> {
+  static constexpr const char* kName = "repeat";
+  static constexpr const char* kHelp =
+      "Copies in a row or a ring: copy i is turned by i * turn_deg about the vertical through `pivot`, then "
+      "moved by "
+      "i * offset.";
+  static Fields<Repeat> fields() {
+    return {{"count", &Repeat::count, "copies, the original included", "", between(1, kMaxCopies)},
+            {"offset", &Repeat::offset, "from one copy to the next", "m"},
+            {"turn_deg", &Repeat::turn_deg, "from one copy to the next", "degrees"},
+            {"pivot", &Repeat::pivot, "a point of the vertical that copies turn about", "m"}};
+  }
+};
+template <>
+struct Table<Grid> {
+  static constexpr const char* kName = "grid";
+  static constexpr const char* kHelp =
+      "Copies on a grid, centred on the original in x and z, upwards from it in y.";
+  static Fields<Grid> fields() {
+    return {{"count", &Grid::count, "copies along x, y and z", "", between(1, kMaxCopies)},
+            {"spacing", &Grid::spacing, "between neighbours along x, y and z", "m"}};
+  }
+};
+template <>
+struct Table<Scatter> {
+  static constexpr const char* kName = "scatter";
+  static constexpr const char* kHelp =
+      "Copies at random places of a level rectangle centred on the original.";
+  static Fields<Scatter> fields() {
+    return {{"count", &Scatter::count, "copies", "", between(1, kMaxCopies)},
+            {"size", &Scatter::size, "of the rectangle along x and z", "m", kNotNegative},
+            {"min_distance", &Scatter::min_distance, "between copies; those that find no place are left out",
+             "m", kNotNegative},
+            {"turn", &Scatter::turn, "turn each copy about its vertical at random"},
+            {"scale", &Scatter::scale, "factor of the size of a body's shape and model", "", kPositive},
+            {"seed", &Scatter::seed, "another seed, another arrangement", "", kNotNegative}};
+  }
+};
+template <>
+struct Table<Placement> {
+  static Fields<Placement> fields() {
+    return {{"repeat", &Placement::repeat, "copies in a row or a ring"},
+            {"grid", &Placement::grid, "copies on a grid"},
+            {"scatter", &Placement::scatter, "copies at random places"}};
+  }
+};
+
+// --- Bodies ---
+
+template <>
+struct Names<sim::MotionType> {
+  static constexpr std::array kNames = {"static", "kinematic", "dynamic"};
+};
+template <>
+struct Names<sim::Interpolation> {
+  static constexpr std::array kNames = {"linear", "smooth"};
+};
+template <>
+struct Table<ModelLook> {
+  static constexpr const char* kName = "model";
+  static constexpr const char* kHelp = "A model file drawn instead of the body's shape.";
+  static Fields<ModelLook> fields() {
+    return {{"file", &ModelLook::file, "model file", kRequired},
+            {"scale", &ModelLook::scale, "factor of its size", "", kPositive},
+            {"position", &ModelLook::position, "of the model's origin in the body's frame", "m"},
+            {"orientation", &ModelLook::orientation, "of the model in the body's frame"}};
+  }
+};
+template <>
+struct Table<BodyKey> {
+  static constexpr const char* kName = "body_key";
+  static constexpr const char* kHelp = "A pose of a kinematic body at a time.";
+  static Fields<BodyKey> fields() {
+    return {{"time", &BodyKey::time, "when; times must increase", "s"},
+            {"position", &BodyKey::position, "where; left out: the body's own", "m"},
+            {"orientation", &BodyKey::orientation, "how it is turned; left out: the body's own"}};
+  }
+};
+template <>
+struct Table<Body> {
+  static constexpr const char* kName = "body";
+  static constexpr const char* kHelp = "A rigid body.";
+  static Fields<Body> fields() {
+    using T = Body;
+    return Fields<T>{
+        {"name", &T::name, "unique; empty: body_ and its index"},
+        {"motion", &T::motion, "never moves, follows its keyframes and spin, or is moved by forces"},
+        {"shape", &T::shape, "what it collides with"},
+        {"model", &T::model, "model file drawn instead of the shape"},
+        {"material", &T::material, "name of a material; empty: grey, or the model file's own"},
+        {"position", &T::position, "of the body's origin at time 0", "m"},
+        {"orientation", &T::orientation, "of the body's axes at time 0"},
+        {"velocity", &T::velocity, "of the centre of mass at time 0; dynamic bodies only", "m/s"},
+        {"angular_velocity", &T::angular_velocity, "about the world's axes at time 0; dynamic bodies only",
+         "rad/s"},
+        {"density", &T::density, "gives the mass, unless `mass` does", "kg/m^3", kPositive},
+        {"mass", &T::mass, "of a dynamic body; 0: from density and volume", "kg", kNotNegative},
+        {"linear_drag", &T::linear_drag, "force against the air per speed", "kg/s", kNotNegative},
+        {"angular_drag", &T::angular_drag, "torque against rotation per angular speed", "kg m^2/s",
+         kNotNegative},
+        {"collides", &T::collides, "takes part in collisions"},
+        {"visible", &T::visible, "is drawn"},
+        {"casts_shadow", &T::casts_shadow, "throws a shadow"},
+        {"keyframes", &T::keyframes, "poses over time; kinematic bodies only"},
+        {"interpolation", &T::interpolation, "between keyframes"},
+        {"loop", &T::loop, "repeat the keyframes for ever; else hold the last"},
+        {"spin", &T::spin, "constant rotation about the body's own axes; kinematic bodies only", "rad/s"},
+    }
+        .with(&T::placement);
+  }
+};
+
+// --- Particles and emitters ---
+
+template <>
+struct Names<render::PointStyle> {
+  static constexpr std::array kNames = {"sprite", "streak", "sphere"};
+};
+template <>
+struct Table<ParticleLook> {
+  static constexpr const char* kName = "look";
+  static constexpr const char* kHelp = "How particles are drawn.";
+  static Fields<ParticleLook> fields() {
+    using T = ParticleLook;
+    return {
+        {"style", &T::style, "soft round billboard, billboard stretched along its motion, or lit ball"},
+        {"color", &T::color, "colour; alpha is opacity"},
+        {"color_over_age", &T::color_over_age, "multiplies `color`; age 0: birth, 1: end of life"},
+        {"size_over_age", &T::size_over_age, "multiplies the drawn radius", "", kNotNegative},
+        {"color_deviation", &T::color_deviation, "standard deviation of brightness between particles", "",
+         kShare},
+        {"additive", &T::additive, "adds light instead of covering: fire, sparks"},
+        {"lit", &T::lit, "by sun and sky; else its colour is its light"},
+        {"casts_shadow", &T::casts_shadow, "throws a shadow"},
+        {"softness", &T::softness, "width of the fade at the rim as a share of the radius", "", kShare},
+        {"stretch", &T::stretch, "a streak is as long as its particle moves in this time", "s", kNotNegative},
+        {"metallic", &T::metallic, "of balls; 0: dielectric, 1: metal", "", kShare},
+        {"roughness", &T::roughness, "of balls; 0: mirror, 1: dull", "", kShare},
+    };
+  }
+};
+template <>
+struct Table<ParticleBehaviour> {
+  static Fields<ParticleBehaviour> fields() {
+    using T = ParticleBehaviour;
+    return {
+        {"linear_drag", &T::linear_drag, "force against the air per speed", "kg/s", kNotNegative},
+        {"gravity", &T::gravity, "feels the world's gravity"},
+        {"force", &T::force, "constant force on each particle", "N"},
+        {"collides", &T::collides, "with bodies"},
+        {"dies_on_hit", &T::dies_on_hit, "is removed at its first collision"},
+        {"integrator", &T::integrator, "method, for particles without springs"},
+    };
+  }
+};
+template <>
+struct Table<ParticlePlace> {
+  static constexpr const char* kName = "particle";
+  static constexpr const char* kHelp = "One particle of a group.";
+  static Fields<ParticlePlace> fields() {
+    return {{"position", &ParticlePlace::position, "at time 0", "m"},
+            {"velocity", &ParticlePlace::velocity, "at time 0", "m/s"},
+            {"color", &ParticlePlace::color, "instead of the look's"}};
+  }
+};
+template <>
+struct Table<ParticleGroup> {
+  static constexpr const char* kName = "particle_group";
+  static constexpr const char* kHelp = "Particles placed one by one.";
+  static Fields<ParticleGroup> fields() {
+    using T = ParticleGroup;
+    return Fields<T>{
+        {"name", &T::name, "unique; empty: particles_ and its index"},
+        {"places", &T::places, "the particles"},
+        {"radius", &T::radius, "of each", "m", kPositive},
+        {"mass", &T::mass, "of each", "kg", kPositive},
+        {"restitution", &T::restitution, "bounciness; the larger of particle and body counts", "", kShare},
+        {"friction", &T::friction, "Coulomb's coefficient; the geometric mean of both counts", "",
+         kNotNegative},
+        {"look", &T::look, "how they are drawn"},
+    }
+        .with(&T::behaviour);
+  }
+};
+
+template <>
+struct Table<PlaneSurface> {
+  static constexpr const char* kName = "plane_surface";
+  static constexpr const char* kHelp = "A rectangle that particles leave along its normal.";
+  static Fields<PlaneSurface> fields() {
+    return {{"position", &PlaneSurface::position, "of its centre", "m"},
+            {"direction", &PlaneSurface::direction, "its normal", "", kDirection},
+            {"size", &PlaneSurface::size, "of its two edges", "m", kPositive}};
+  }
+};
+template <>
+struct Tags<EmitterSurface> {
+  static constexpr const char* kName = "surface";
+  static constexpr const char* kHelp =
+      "Where particles come from: in the world, or in the frame of the emitter's body.";
+  static constexpr std::array kTags = {"plane"};
+  static constexpr bool kRequired = false;
+};
+template <>
+struct Table<EmitterBurst> {
+  static constexpr const char* kName = "burst";
+  static constexpr const char* kHelp = "Many particles at once.";
+  static Fields<EmitterBurst> fields() {
+    return {{"time", &EmitterBurst::time, "of the first cycle", "s", kNotNegative},
+            {"count", &EmitterBurst::count, "particles in each cycle, rounded", "", between(0, 2e7)},
+            {"cycles", &EmitterBurst::cycles, "how many times", "", between(1, 1e6)},
+            {"interval", &EmitterBurst::interval, "between cycles", "s", kPositive}};
+  }
+};
+template <>
+struct Table<Emitter> {
+  static constexpr const char* kName = "emitter";
+  static constexpr const char* kHelp = "A source of particles.";
+  static Fields<Emitter> fields() {
+    using T = Emitter;
+    return Fields<T>{
+        {"name", &T::name, "unique; also names its random numbers; empty: emitter_ and its index"},
+        {"body", &T::body, "name of the body it moves with; empty: fixed in the world"},
+        {"surface", &T::surface, "where particles come from"},
+        {"rate", &T::rate, "particles released one by one", "1/s", between(0, 1e9)},
+        {"count", &T::count, "particles at once in every `interval`, rounded", "", between(0, 2e7)},
+        {"interval", &T::interval, "between releases of `count`", "s", kPositive},
+        {"bursts", &T::bursts, "many particles at given times"},
+        {"start", &T::start, "when it starts", "s", kNotNegative},
+        {"end", &T::end, "when it stops", "s", kNotNegative},
+        {"speed", &T::speed, "of a particle as it leaves", "m/s"},
+        {"spread_deg", &T::spread_deg, "angle between its path and the surface's normal", "degrees",
+         between(0, 180)},
+        {"radius", &T::radius, "of a particle", "m", kPositive},
+        {"density", &T::density, "gives the mass, unless `mass` does", "kg/m^3", kPositive},
+        {"mass", &T::mass, "of a particle; 0: from density and radius", "kg", kNotNegative},
+        {"lifespan", &T::lifespan, "of a particle", "s", kPositive},
+        {"restitution", &T::restitution, "bounciness; the larger of particle and body counts", "", kShare},
+        {"friction", &T::friction, "Coulomb's coefficient; the geometric mean of both counts", "",
+         kNotNegative},
+        {"max_alive", &T::max_alive, "no more than this many exist at once", "", between(1, 2e7)},
+        {"look", &T::look, "how particles are drawn"},
+    }
+        .with(&T::behaviour)
+        .with(&T::placement);
+  }
+};
+
+// --- Springs ---
+
+template <>
+struct Table<SpringEnd> {
+  static constexpr const char* kName = "spring_end";
+  static constexpr const char* kHelp = "A point of the world, of a body, or a particle of a group.";
+  static Fields<SpringEnd> fields() {
+    return {{"body", &SpringEnd::body, "name of a body; empty: none"},
+            {"particles", &SpringEnd::particles, "name of a particle group; empty: none"},
+            {"index", &SpringEnd::index, "of the particle in its group", "", between(0, 1e9)},
+            {"position", &SpringEnd::position, "in the body's frame, or in the world", "m"}};
+  }
+};
+template <>
+struct Table<Spring> {
+  static constexpr const char* kName = "spring";
+  static constexpr const char* kHelp = "A damped spring between two points.";
+  static Fields<Spring> fields() {
+    using T = Spring;
+    return {
+        {"name", &T::name, "unique; empty: spring_ and its index"},
+        {"a", &T::a, "one end"},
+        {"b", &T::b, "the other end"},
+        {"stiffness", &T::stiffness, "force per extension", "N/m", kNotNegative},
+        {"damping", &T::damping, "force per speed of extension", "N s/m", kNotNegative},
+        {"rest_length", &T::rest_length, "length without force; negative: the distance of the ends at time 0",
+         "m"},
+        {"visible", &T::visible, "is drawn as a rod"},
+        {"radius", &T::radius, "of the rod", "m", kPositive},
+        {"material", &T::material, "of the rod, by name; empty: grey"},
+    };
+  }
+};
+
+}  // namespace offstage::producer

@@ -1,0 +1,124 @@
+#pragma once
+/// How plain values stand in a scene file: numbers, text, vectors, orientations, colours, numbers that vary,
+/// keys over age.
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "producer/fields.h"
+#include "producer/scene.h"
+
+namespace offstage::producer {
+
+template <>
+struct Codec<bool> {
+  static void read(Reader& in, const Node& node, const Spec& spec, bool& out);
+  static Node write(const bool& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+template <>
+struct Codec<std::string> {
+  static void read(Reader& in, const Node& node, const Spec& spec, std::string& out);
+  static Node write(const std::string& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+template <>
+struct Codec<Real> {
+  static void read(Reader& in, const Node& node, const Spec& spec, Real& out);
+  static Node write(const Real& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+template <>
+struct Codec<int> {
+  static void read(Reader& in, const Node& node, const Spec& spec, int& out);
+  static Node write(const int& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+template <>
+struct Codec<int64_t> {
+  static void read(Reader& in, const Node& node, const Spec& spec, int64_t& out);
+  static Node write(const int64_t& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+template <>
+struct Codec<uint64_t> {
+  static void read(Reader& in, const Node& node, const Spec& spec, uint64_t& out);
+  static Node write(const uint64_t& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+/// [w, x, y, z], or {"axis": [x, y, z], "angle_deg": a}. Normalised; zero is refused.
+template <>
+struct Codec<Quat> {
+  static void read(Reader& in, const Node& node, const Spec& spec, Quat& out);
+  static Node write(const Quat& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+/// "#rrggbb" or "#rrggbbaa" in sRGB, or [r, g, b] or [r, g, b, a], linear.
+template <>
+struct Codec<Color> {
+  static void read(Reader& in, const Node& node, const Spec& spec, Color& out);
+  static Node write(const Color& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+/// A number, {"mean", "deviation", "min", "max", "clip"}, {"range": [a, b]} or {"curve": [[time, value],
+/// ...]}. All that it can be must lie within the limits; a closed limit also cuts off a normal distribution.
+template <>
+struct Codec<Varying> {
+  static void read(Reader& in, const Node& node, const Spec& spec, Varying& out);
+  static Node write(const Varying& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+
+Description describe_vector(Description item, int size, bool nonzero);
+
+/// [x, y, z]; limits hold for each component.
+template <class S, int N>
+struct Codec<Eigen::Matrix<S, N, 1>> {
+  using V = Eigen::Matrix<S, N, 1>;
+
+  static void read(Reader& in, const Node& node, const Spec& spec, V& out) {
+    const List* list = in.list(node, "a list of " + std::to_string(N) + " numbers", N, N);
+    if (!list) return;
+    V value = out;
+    for (int i = 0; i < N; ++i)
+      in.within(std::to_string(i),
+                [&] { Codec<S>::read(in, (*list)[static_cast<std::size_t>(i)], spec, value[i]); });
+    if (spec.limits.nonzero && value.isZero(0)) return in.refuse(node, "a vector that is not zero");
+    out = value;
+  }
+  static Node write(const V& value) {
+    List list;
+    for (const S& component : value) list.push_back(Codec<S>::write(component));
+    return list;
+  }
+  static Description describe(Catalogue& all, const Spec& spec) {
+    return describe_vector(Codec<S>::describe(all, spec), N, spec.limits.nonzero);
+  }
+};
+
+Description describe_age_key(const Description& age, const Description& value);
+
+/// [age, value] with age in [0, 1]; limits hold for the value.
+template <class V>
+struct Codec<std::pair<Real, V>> {
+  static void read(Reader& in, const Node& node, const Spec& spec, std::pair<Real, V>& out) {
+    const List* list = in.list(node, "a pair of age and value", 2, 2);
+    if (!list) return;
+    in.within("0", [&] { Codec<Real>::read(in, (*list)[0], kAge, out.first); });
+    in.within("1", [&] { Codec<V>::read(in, (*list)[1], spec, out.second); });
+  }
+  static Node write(const std::pair<Real, V>& value) {
+    return List{value.first, Codec<V>::write(value.second)};
+  }
+  static Description describe(Catalogue& all, const Spec& spec) {
+    return describe_age_key(Codec<Real>::describe(all, kAge), Codec<V>::describe(all, spec));
+  }
+
+ private:
+  static inline const Spec kAge{"", "", "", kShare};
+};
+
+}  // namespace offstage::producer

@@ -1,0 +1,172 @@
+#include "render/frame.h"
+
+#include <algorithm>
+#include <numbers>
+#include <utility>
+
+#include "render/sky.h"
+
+namespace offstage::render {
+namespace {
+
+constexpr float kRadians = std::numbers::pi_v<float> / 180;
+
+Vector4f vec4(const Vector3f& v, float w = 0) {
+  return {v.x(), v.y(), v.z(), w};
+}
+
+// A unit vector perpendicular to `direction`, continuous in it except at the vertical.
+Vector3f perpendicular(const Vector3f& direction) {
+  const Vector3f other = std::abs(direction.y()) < 0.99f ? Vector3f::UnitY() : Vector3f::UnitX();
+  return other.cross(direction).normalized();
+}
+
+}  // namespace
+
+Vector2f square_to_disc(const Vector2f& p) {
+  const float a = 2 * p.x(), b = 2 * p.y();
+  if (a == 0 && b == 0) return Vector2f::Zero();
+  constexpr float kQuarter = std::numbers::pi_v<float> / 4;
+  if (std::abs(a) > std::abs(b)) {
+    const float angle = kQuarter * b / a;
+    return a * Vector2f(std::cos(angle), std::sin(angle));
+  }
+  const float angle = kQuarter * a / b;
+  return b * Vector2f(std::sin(angle), std::cos(angle));
+}
+
+Vector3f jittered_sun(const Sun& sun, const Vector2f& offset) {
+  const Vector3f direction = sun.direction.normalized();
+  const Vector2f disc = square_to_disc(offset) * std::tan(0.5f * sun.size_deg * kRadians);
+  const Vector3f u = perpendicular(direction), v = direction.cross(u);
+  return (direction + disc.x() * u + disc.y() * v).normalized();
+}
+
+bool View::sees(const Vector3f& center, float radius) const {
+  const Vector3f relative = center - eye;
+  const float depth = forward.dot(relative);
+  if (depth < near_m - radius || depth > far_m + radius) return false;
+  for (int axis = 0; axis < 2; ++axis) {
+    const float across = (axis == 0 ? right : up).dot(relative);
+    const float middle = -shear[axis] * tan_half[axis] * depth;  // where the image's middle is at this depth
+    const float slope_high = (1 - shear[axis]) * tan_half[axis],
+                slope_low = (1 + shear[axis]) * tan_half[axis];
+    const float over = across - depth * slope_high, under = -across - depth * slope_low;
+    const float slope = across > middle ? slope_high : slope_low;
+    if (std::max(over, under) > radius * std::sqrt(1 + slope * slope)) return false;
+  }
+  return true;
+}
+
+std::array<Vector3f, 8> View::corners(float far_distance) const {
+  std::array<Vector3f, 8> result;
+  for (std::size_t k = 0; k < 8; ++k) {
+    const float depth = k < 4 ? near_m : std::clamp(far_distance, near_m, far_m);
+    const Vector2f ndc((k & 1) != 0 ? 1.0f : -1.0f, (k & 2) != 0 ? 1.0f : -1.0f);
+    const Vector2f place = (ndc - shear).cwiseProduct(tan_half) * depth;
+    result[k] = eye + forward * depth + right * place.x() + up * place.y();
+  }
+  return result;
+}
+
+View make_view(const Camera& camera, const SampleOffsets& offsets, int width_px, int height_px) {
+  View view;
+  const Vector3f sight = camera.target - camera.eye;
+  const float distance = sight.norm();
+  view.forward = distance > 0 ? Vector3f(sight / distance) : Vector3f(-Vector3f::UnitZ());
+  const Vector3f side = view.forward.cross(camera.up);
+  view.right = side.norm() > 1e-6f ? Vector3f(side.normalized()) : perpendicular(view.forward);
+  view.up = view.right.cross(view.forward);
+
+  const float tan_y = std::tan(0.5f * camera.fov_deg * kRadians);
+  view.tan_half = {tan_y * static_cast<float>(width_px) / static_cast<float>(height_px), tan_y};
+  view.near_m = camera.near_m;
+  view.far_m = camera.far_m;
+
+  // Thin lens: the eye moves in the lens and the image is sheared so that the plane in focus stays where it
+  // is.
+  const Vector2f lens = square_to_disc(offsets.lens) * (0.5f * camera.aperture);
+  const float focus = camera.focus > 0 ? camera.focus : std::max(distance, camera.near_m);
+  view.eye = camera.eye + lens.x() * view.right + lens.y() * view.up;
+  const Vector2f half_size_px(0.5f * static_cast<float>(width_px), 0.5f * static_cast<float>(height_px));
+  view.shear = lens.cwiseQuotient(view.tan_half) / focus + offsets.pixel.cwiseQuotient(half_size_px);
+
+  const float n = view.near_m, f = view.far_m;
+  Matrix4f clip_from_view = Matrix4f::Zero();
+  clip_from_view(0, 0) = 1 / view.tan_half.x();
+  clip_from_view(1, 1) = 1 / view.tan_half.y();
+  clip_from_view(0, 2) = -view.shear.x();
+  clip_from_view(1, 2) = -view.shear.y();
+  clip_from_view(2, 2) = n / (f - n);
+  clip_from_view(2, 3) = n * f / (f - n);
+  clip_from_view(3, 2) = -1;
+
+  Matrix4f view_from_world = Matrix4f::Identity();
+  view_from_world.block<1, 3>(0, 0) = view.right.transpose();
+  view_from_world.block<1, 3>(1, 0) = view.up.transpose();
+  view_from_world.block<1, 3>(2, 0) = -view.forward.transpose();
+  view_from_world.block<3, 1>(0, 3) = -view_from_world.block<3, 3>(0, 0) * view.eye;
+  view.clip_from_world = clip_from_view * view_from_world;
+  return view;
+}
+
+FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& environment,
+                         const SampleOffsets& offsets, int width_px, int height_px) {
+  const SkyModel sky = make_sky(sun, environment);
+  const float n = view.near_m, f = view.far_m;
+  const auto w = static_cast<float>(width_px), h = static_cast<float>(height_px);
+  const Vector3f x = view.right * view.tan_half.x(), y = view.up * view.tan_half.y();
+
+  FrameUniforms frame;
+  frame.clip_from_world = view.clip_from_world;
+  frame.shadow_from_world = Matrix4f::Identity();
+  frame.eye = vec4(view.eye, 2 * view.tan_half.y() / h);
+  frame.right = vec4(view.right);
+  frame.up = vec4(view.up);
+  frame.ray_center = vec4(view.forward - view.shear.x() * x - view.shear.y() * y);
+  frame.ray_x = vec4(x);
+  frame.ray_y = vec4(y);
+  frame.depth = {n * f / (f - n), n / (f - n), n, f};
+  frame.sun_direction = vec4(jittered_sun(sun, offsets.light), 0);
+  frame.sun_radiance = vec4(sun.color * sun.intensity, 0.5f * sun.size_deg * kRadians);
+  frame.zenith = vec4(sky.zenith, environment.fog);
+  frame.horizon = vec4(sky.horizon);
+  frame.ground = vec4(sky.ground);
+  frame.glow = vec4(sky.glow);
+  const std::array<Vector3f, 9> irradiance = sky_irradiance(sky);
+  for (std::size_t k = 0; k < irradiance.size(); ++k) frame.irradiance[k] = vec4(irradiance[k]);
+  frame.shadow = Vector4f::Zero();
+  frame.viewport = {w, h, 1 / w, 1 / h};
+  return frame;
+}
+
+SampleOffsets sample_offsets(int i, int n) {
+  if (n <= 1) return {};
+  // The Hammersley set, walked in three orders so that pixel, lens and light have nothing to do with each
+  // other or with time, which goes as i.
+  const auto hammersley = [n](int k) {
+    float inverse = 0, digit = 0.5f;
+    for (int bits = k; bits > 0; bits >>= 1, digit *= 0.5f) inverse += static_cast<float>(bits & 1) * digit;
+    const float half_cell = 0.5f / static_cast<float>(n);
+    return Vector2f(static_cast<float>(k) / static_cast<float>(n) + half_cell - 0.5f,
+                    std::min(inverse + half_cell, 1.0f) - 0.5f);
+  };
+  const auto coprime_near = [n](double share) {
+    const auto common_divisor_is_one = [n](int a) {
+      int b = n;
+      while (b != 0) a = std::exchange(b, a % b);
+      return a == 1;
+    };
+    int stride = std::max(1, static_cast<int>(share * n));
+    while (!common_divisor_is_one(stride)) ++stride;
+    return stride;
+  };
+  const auto permuted = [i, n, &coprime_near](double share, int shift) {
+    return static_cast<int>((static_cast<int64_t>(i) * coprime_near(share) + shift) % n);
+  };
+  return {.pixel = hammersley(permuted(0.618, 0)),
+          .lens = hammersley(permuted(0.414, n / 3)),
+          .light = hammersley(permuted(0.236, n / 2))};
+}
+
+}  // namespace offstage::render

@@ -1,0 +1,58 @@
+#pragma once
+/// Private: the numbers that every shader of one sub-frame shares, worked out on the CPU from camera, sun and
+/// sky.
+
+#include <array>
+#include <cmath>
+
+#include "render/stage.h"
+
+namespace offstage::render {
+
+using Eigen::Matrix4f;
+
+/// The uniform block of shaders/frame.glsl, in its std140 layout.
+struct FrameUniforms {
+  Matrix4f clip_from_world;
+  Matrix4f shadow_from_world;
+  Vector4f eye;
+  Vector4f right, up;
+  Vector4f ray_center, ray_x, ray_y;
+  Vector4f depth;
+  Vector4f sun_direction;
+  Vector4f sun_radiance;
+  Vector4f zenith, horizon, ground, glow;
+  std::array<Vector4f, 9> irradiance;
+  Vector4f shadow;
+  Vector4f viewport;
+};
+
+/// The eye of one sub-frame: moved in the lens, looking along `forward`.
+struct View {
+  Matrix4f clip_from_world;
+  Vector3f eye, right, up, forward;
+  Vector2f tan_half;  ///< half the width and height of the image plane at distance 1
+  Vector2f shear;     ///< shift of the image in half-sizes, by lens and pixel offsets
+  float near_m = 0, far_m = 0;
+
+  /// False only if the ball is outside one plane of the frustum.
+  bool sees(const Vector3f& center, float radius) const;
+  float depth_of(const Vector3f& point) const { return forward.dot(point - eye); }
+  /// The corners of the frustum cut at a distance; four near, then four far.
+  std::array<Vector3f, 8> corners(float far_distance) const;
+};
+
+/// Depth runs from 1 at the near plane to 0 at the far one: with floats that keeps precision far away.
+View make_view(const Camera& camera, const SampleOffsets& offsets, int width_px, int height_px);
+
+/// The square [-0.5, 0.5]^2 to the unit disc, keeping areas (Shirley and Chiu, 1997).
+Vector2f square_to_disc(const Vector2f& p);
+
+/// The direction towards a place of the sun's disc.
+Vector3f jittered_sun(const Sun& sun, const Vector2f& offset);
+
+/// Fills everything but the shadow map's fields.
+FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& environment,
+                         const SampleOffsets& offsets, int width_px, int height_px);
+
+}  // namespace offstage::render

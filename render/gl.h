@@ -1,0 +1,122 @@
+#pragma once
+/// Private: owning wrappers of GL names, and programs built from the embedded shaders. Nothing outside the
+/// .cpp files of render/ sees GL.
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <glad/gl.h>
+
+namespace offstage::render {
+
+/// The text of a file of shaders/ (see cmake/embed_shaders.cmake).
+std::string_view shader_source(std::string_view name);
+
+namespace gl {
+
+/// Owns one GL name, made and deleted by Traits; 0 when empty.
+template <class Traits>
+class Object {
+ public:
+  Object() = default;
+  explicit Object(GLuint name) : name_(name) {}
+  ~Object() {
+    if (name_ != 0) Traits::destroy(name_);
+  }
+  Object(Object&& other) noexcept : name_(std::exchange(other.name_, 0)) {}
+  Object& operator=(Object&& other) noexcept {
+    std::swap(name_, other.name_);
+    return *this;
+  }
+  operator GLuint() const { return name_; }
+
+ private:
+  GLuint name_ = 0;
+};
+
+struct BufferTraits {
+  static void destroy(GLuint name) { glDeleteBuffers(1, &name); }
+};
+struct TextureTraits {
+  static void destroy(GLuint name) { glDeleteTextures(1, &name); }
+};
+struct FramebufferTraits {
+  static void destroy(GLuint name) { glDeleteFramebuffers(1, &name); }
+};
+struct VertexArrayTraits {
+  static void destroy(GLuint name) { glDeleteVertexArrays(1, &name); }
+};
+struct ProgramTraits {
+  static void destroy(GLuint name) { glDeleteProgram(name); }
+};
+using Buffer = Object<BufferTraits>;
+using Texture = Object<TextureTraits>;
+using Framebuffer = Object<FramebufferTraits>;
+using VertexArray = Object<VertexArrayTraits>;
+using Program = Object<ProgramTraits>;
+
+Buffer make_buffer();
+VertexArray make_vertex_array();
+/// A buffer that never changes.
+template <class T>
+Buffer make_buffer(std::span<const T> values) {
+  Buffer buffer = make_buffer();
+  glNamedBufferStorage(buffer, static_cast<GLsizeiptr>(values.size_bytes()), values.data(), 0);
+  return buffer;
+}
+/// A 2D texture of one level, clamped to its edges.
+Texture make_target(GLenum format, int width_px, int height_px, GLenum filter);
+/// Throws UnavailableError if it is not complete. A texture of 0 leaves that attachment empty.
+Framebuffer make_framebuffer(GLuint color, GLuint depth);
+
+/// A buffer written anew each frame; it grows and is never shrunk.
+class StreamBuffer {
+ public:
+  template <class T>
+  void write(std::span<const T> values) {
+    write(values.data(), values.size_bytes());
+  }
+  operator GLuint() const { return buffer_; }
+
+ private:
+  void write(const void* data, std::size_t bytes);
+  Buffer buffer_;
+  std::size_t capacity_ = 0;
+};
+
+/// Sets one float attribute of a vertex array, read from `binding`.
+void set_attribute(GLuint vertex_array, GLuint attribute, GLuint binding, int components, std::size_t offset);
+
+/// Links a program. Each stage is a list of files of shaders/ joined in order behind #version and `defines`
+/// ("NAME value" each); an empty fragment list means depth only. Throws UnavailableError with the compiler's
+/// log.
+Program make_program(std::span<const std::string_view> vertex, std::span<const std::string_view> fragment,
+                     std::span<const std::string> defines = {});
+
+/// A program that is built when first used: start-up pays only for what a scene draws.
+class LazyProgram {
+ public:
+  LazyProgram(std::vector<std::string_view> vertex, std::vector<std::string_view> fragment,
+              std::vector<std::string> defines = {})
+      : vertex_(std::move(vertex)), fragment_(std::move(fragment)), defines_(std::move(defines)) {}
+  /// Makes it current.
+  void use() {
+    if (program_ == 0) program_ = make_program(vertex_, fragment_, defines_);
+    glUseProgram(program_);
+  }
+
+ private:
+  std::vector<std::string_view> vertex_, fragment_;
+  std::vector<std::string> defines_;
+  Program program_;
+};
+
+/// Throws UnavailableError if GL has an error pending; `where` is part of the message.
+void check_error(const char* where);
+
+}  // namespace gl
+}  // namespace offstage::render

@@ -1,0 +1,23 @@
+#pragma once
+/// The part of read_model that trusts nobody: assimp and what is made of its scene. It may crash or hang on a
+/// hostile file, which is why read_model runs it in a child process. Private to render.
+
+#include <filesystem>
+#include <vector>
+
+#include "render/model.h"
+
+struct aiScene;
+
+namespace offstage::render {
+
+/// One part per material; those whose file has no normals have none. Throws FileError.
+Model import_model(const std::filesystem::path& path);
+
+/// Fills `materials` and `textures`, with a warning for each texture that is not found. Textures are looked
+/// for as named, then by file name beside the model. Returns for each material the set of texture coordinates
+/// it uses.
+std::vector<unsigned> import_materials(const aiScene& scene, const std::filesystem::path& folder,
+                                       Model& model);
+
+}  // namespace offstage::render

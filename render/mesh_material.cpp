@@ -1,0 +1,217 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <assimp/GltfMaterial.h>
+#include <assimp/scene.h>
+
+#include "render/error.h"
+#include "render/file_io.h"
+#include "render/image_io.h"
+#include "render/mesh_import.h"
+#include "render/tone_map.h"
+
+namespace offstage::render {
+namespace {
+
+float clamped(float value, float high = 1) {
+  return std::isfinite(value) ? std::clamp(value, 0.0f, high) : 0;
+}
+
+bool equal_ignoring_case(const std::string& a, const std::string& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+}
+
+/// "a%20b" to "a b", as in the URIs of glTF and Collada.
+std::string percent_decoded(const std::string& text) {
+  std::string result;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool code = text[i] == '%' && i + 2 < text.size() &&
+                      std::isxdigit(static_cast<unsigned char>(text[i + 1])) &&
+                      std::isxdigit(static_cast<unsigned char>(text[i + 2]));
+    result += code ? static_cast<char>(std::stoi(text.substr(i + 1, 2), nullptr, 16)) : text[i];
+    if (code) i += 2;
+  }
+  return result;
+}
+
+/// Where a texture is: as named, then by its file name in the model's folder, then there in any letter case,
+/// for paths from other machines. Empty if nowhere.
+std::filesystem::path find_texture(const std::filesystem::path& folder, std::string name) {
+  std::replace(name.begin(), name.end(), '\\', '/');
+  if (name.starts_with("file://")) name.erase(0, 7);
+  std::error_code ignored;
+  for (const std::filesystem::path path : {name, percent_decoded(name)}) {
+    for (const std::filesystem::path& candidate : {folder / path, folder / path.filename()}) {
+      if (std::filesystem::is_regular_file(candidate, ignored)) return candidate;
+    }
+  }
+  const std::string file = std::filesystem::path(name).filename().string();
+  const std::filesystem::path here = folder.empty() ? "." : folder;
+  for (std::filesystem::directory_iterator entry(here, ignored), end; entry != end;
+       entry.increment(ignored)) {
+    if (equal_ignoring_case(entry->path().filename().string(), file)) return entry->path();
+  }
+  return {};
+}
+
+Image decode_embedded(const aiTexture& texture, const std::string& name) {
+  if (texture.mHeight == 0) {  // a compressed file of mWidth bytes
+    return decode_image({reinterpret_cast<const uint8_t*>(texture.pcData), texture.mWidth}, name);
+  }
+  Image image{static_cast<int>(texture.mWidth), static_cast<int>(texture.mHeight), {}};
+  image.rgba.reserve(image.pixel_count() * 4);
+  for (std::size_t i = 0; i < image.pixel_count(); ++i) {
+    const aiTexel& texel = texture.pcData[i];
+    image.rgba.insert(image.rgba.end(), {texel.r, texel.g, texel.b, texel.a});
+  }
+  return image;
+}
+
+class MaterialImporter {
+ public:
+  MaterialImporter(const aiScene& scene, const std::filesystem::path& folder, Model& model)
+      : scene_(scene), folder_(folder), model_(model) {}
+
+  /// Appends the material; returns its set of texture coordinates.
+  unsigned add(const aiMaterial& source) {
+    Material material;
+    aiString text;
+    if (source.Get(AI_MATKEY_NAME, text) == aiReturn_SUCCESS) material.name = text.C_Str();
+    const bool gltf = source.Get(AI_MATKEY_GLTF_ALPHAMODE, text) == aiReturn_SUCCESS;
+    const bool opaque = gltf && std::string(text.C_Str()) == "OPAQUE";
+
+    read_color(source, gltf, opaque, material);
+    read_surface(source, material);
+    read_emission(source, gltf, material);
+    int two_sided = 0;
+    if (source.Get(AI_MATKEY_TWOSIDED, two_sided) == aiReturn_SUCCESS) material.two_sided = two_sided != 0;
+
+    unsigned uv_set = 0;
+    material.base_color_texture =
+        texture(source, {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}, opaque, &uv_set);
+    material.emission_texture = texture(source, {aiTextureType_EMISSION_COLOR, aiTextureType_EMISSIVE}, true);
+    // glTF's combined image; formats with an image for each of the two are not supported.
+    if (gltf) material.metallic_roughness_texture = texture(source, {aiTextureType_UNKNOWN}, true);
+    if (material.name.empty() && material.base_color_texture < 0 && material.color == Vector4f::Ones()) {
+      give_default_look(material);
+    }
+    if (!gltf && material.color.w() < 1e-3f) {  // many writers mean transparency by it
+      material.color.w() = 1;
+      model_.warnings.push_back("material '" + material.name + "': opacity 0 taken as opaque");
+    }
+    model_.materials.push_back(std::move(material));
+    return uv_set;
+  }
+
+ private:
+  /// A file without materials comes with a nameless white one, which for glTF is rough metal.
+  static void give_default_look(Material& material) {
+    material.color = Material{}.color;
+    if (material.metallic == 1 && material.roughness == 1) {
+      material.metallic = 0;
+      material.roughness = Material{}.roughness;
+    }
+  }
+
+  /// Classic colours are meant for the screen, physically based ones are linear.
+  static void read_color(const aiMaterial& source, bool gltf, bool opaque, Material& material) {
+    aiColor4D color(0.8f, 0.8f, 0.8f, 1);
+    float opacity = 1, gloss = 0;
+    const bool has_gloss = source.Get(AI_MATKEY_GLOSSINESS_FACTOR, gloss) == aiReturn_SUCCESS;
+    const bool physical = !has_gloss && source.Get(AI_MATKEY_BASE_COLOR, color) == aiReturn_SUCCESS;
+    if (!physical) source.Get(AI_MATKEY_COLOR_DIFFUSE, color);
+    if (!gltf) {
+      source.Get(AI_MATKEY_OPACITY, opacity);
+      color.a = opacity;
+    }
+    const bool linear = physical || gltf;
+    material.color = {decoded(color.r, linear), decoded(color.g, linear), decoded(color.b, linear),
+                      opaque ? 1 : clamped(color.a)};
+  }
+
+  /// A Blinn-Phong lobe of exponent n is about as wide as a GGX one with alpha^2 = roughness^4 = 2 / (n + 2)
+  /// (Karis, "Specular BRDF reference", 2013); without a highlight the surface is matt.
+  static void read_surface(const aiMaterial& source, Material& material) {
+    float value = 0;
+    if (source.Get(AI_MATKEY_METALLIC_FACTOR, value) == aiReturn_SUCCESS) material.metallic = clamped(value);
+    if (source.Get(AI_MATKEY_ROUGHNESS_FACTOR, value) == aiReturn_SUCCESS) {
+      material.roughness = clamped(value);
+    } else if (source.Get(AI_MATKEY_GLOSSINESS_FACTOR, value) == aiReturn_SUCCESS) {
+      material.roughness = 1 - clamped(value);
+    } else if (source.Get(AI_MATKEY_SHININESS, value) == aiReturn_SUCCESS) {
+      aiColor3D highlight(0, 0, 0);
+      source.Get(AI_MATKEY_COLOR_SPECULAR, highlight);
+      const float exponent = highlight.IsBlack() ? 0 : clamped(value, 1e6f);
+      material.roughness = std::sqrt(std::sqrt(2 / (exponent + 2)));
+    }
+  }
+
+  static void read_emission(const aiMaterial& source, bool gltf, Material& material) {
+    aiColor3D color(0, 0, 0);
+    float strength = 1;
+    source.Get(AI_MATKEY_COLOR_EMISSIVE, color);
+    source.Get(AI_MATKEY_EMISSIVE_INTENSITY, strength);
+    material.emission = clamped(strength, 1e4f) *
+                        Vector3f(decoded(color.r, gltf), decoded(color.g, gltf), decoded(color.b, gltf));
+  }
+
+  static float decoded(float value, bool linear) {
+    return linear ? clamped(value) : srgb_decode(clamped(value));
+  }
+
+  /// Index of the first texture there is among `types`, or -1.
+  int texture(const aiMaterial& source, std::initializer_list<aiTextureType> types, bool opaque,
+              unsigned* uv_set = nullptr) {
+    for (const aiTextureType type : types) {
+      aiString name;
+      unsigned set = 0;
+      if (source.GetTexture(type, 0, &name, nullptr, &set) != aiReturn_SUCCESS || name.length == 0) continue;
+      if (uv_set && set < AI_MAX_NUMBER_OF_TEXTURECOORDS) *uv_set = set;
+      return load(name.C_Str(), opaque);
+    }
+    return -1;
+  }
+
+  /// Each image once; `opaque` ones lose an alpha channel that their material is not to use.
+  int load(const std::string& name, bool opaque) {
+    const auto [entry, is_new] = loaded_.try_emplace({name, opaque}, -1);
+    if (!is_new) return entry->second;
+    try {
+      Image image = read(name);
+      for (std::size_t i = 3; opaque && i < image.rgba.size(); i += 4) image.rgba[i] = 255;
+      entry->second = static_cast<int>(model_.textures.size());
+      model_.textures.push_back(std::move(image));
+    } catch (const FileError& error) {
+      model_.warnings.push_back(one_line(error.what()));
+    }
+    return entry->second;
+  }
+
+  Image read(const std::string& name) const {
+    if (const aiTexture* embedded = scene_.GetEmbeddedTexture(name.c_str())) {
+      return decode_embedded(*embedded, "embedded texture " + name);
+    }
+    const std::filesystem::path path = find_texture(folder_, name);
+    if (path.empty()) throw FileError("texture '" + name + "' is not there");
+    return read_image(path);
+  }
+
+  const aiScene& scene_;
+  std::filesystem::path folder_;
+  Model& model_;
+  std::map<std::pair<std::string, bool>, int> loaded_;
+};
+
+}  // namespace
+
+std::vector<unsigned> import_materials(const aiScene& scene, const std::filesystem::path& folder,
+                                       Model& model) {
+  MaterialImporter importer(scene, folder, model);
+  std::vector<unsigned> uv_sets;
+  for (unsigned i = 0; i < scene.mNumMaterials; ++i) uv_sets.push_back(importer.add(*scene.mMaterials[i]));
+  return uv_sets;
+}
+
+}  // namespace offstage::render

@@ -1,0 +1,242 @@
+#include "render/mesh_pass.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "render/texture.h"
+
+namespace offstage::render {
+namespace {
+
+struct Vertex {
+  Vector3f position, normal;
+  Vector2f uv;
+};
+static_assert(sizeof(Vertex) == 32);
+
+constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1;
+constexpr GLuint kMaterialBlock = 1, kFirstTextureUnit = 1;
+
+// The first three rows of a transform.
+using Rows = std::array<Vector4f, 3>;
+
+Rows rows_of(const Eigen::Affine3f& transform) {
+  const auto& m = transform.matrix();
+  return {Vector4f(m.row(0).transpose()), Vector4f(m.row(1).transpose()), Vector4f(m.row(2).transpose())};
+}
+
+const Image* texture_at(std::span<const Image> textures, int index) {
+  return index >= 0 && static_cast<std::size_t>(index) < textures.size()
+             ? &textures[static_cast<std::size_t>(index)]
+             : nullptr;
+}
+
+}  // namespace
+
+struct MeshPass::Item {
+  const Instance* instance;
+  float depth;     // of the ball's far end: large ground then comes last
+  uint32_t order;  // breaks ties
+  bool mirrored;
+};
+
+GpuMesh::GpuMesh(const Mesh& source) : vertex_array(gl::make_vertex_array()) {
+  const Mesh* mesh = &source;
+  Mesh smooth;
+  if (source.normals.size() != source.positions.size()) {
+    smooth = source;
+    compute_normals(smooth, 180);
+    mesh = &smooth;
+  }
+  std::vector<Vertex> packed(mesh->positions.size());
+  for (std::size_t i = 0; i < packed.size(); ++i) {
+    packed[i] = {mesh->positions[i], mesh->normals[i], mesh->uvs.empty() ? Vector2f(0, 0) : mesh->uvs[i]};
+  }
+  const Eigen::AlignedBox3f box = mesh->bounds();
+  center = box.isEmpty() ? Vector3f(0, 0, 0) : Vector3f(box.center());
+  for (const Vector3f& p : mesh->positions) radius = std::max(radius, (p - center).norm());
+  flat = !box.isEmpty() && box.sizes().minCoeff() <= 1e-4f * box.sizes().maxCoeff();
+
+  index_count = static_cast<GLsizei>(mesh->indices.size());
+  if (index_count == 0) return;
+  vertices = gl::make_buffer(std::span<const Vertex>(packed));
+  indices = gl::make_buffer(std::span<const uint32_t>(mesh->indices));
+  glVertexArrayVertexBuffer(vertex_array, kVertexBinding, vertices, 0, sizeof(Vertex));
+  glVertexArrayElementBuffer(vertex_array, indices);
+  gl::set_attribute(vertex_array, 0, kVertexBinding, 3, offsetof(Vertex, position));
+  gl::set_attribute(vertex_array, 1, kVertexBinding, 3, offsetof(Vertex, normal));
+  gl::set_attribute(vertex_array, 2, kVertexBinding, 2, offsetof(Vertex, uv));
+  for (GLuint row = 0; row < 3; ++row) {
+    gl::set_attribute(vertex_array, 3 + row, kInstanceBinding, 4, row * sizeof(Vector4f));
+  }
+  glVertexArrayBindingDivisor(vertex_array, kInstanceBinding, 1);
+}
+
+GpuMaterial make_gpu_material(const Material& material, std::span<const Image> textures) {
+  GpuMaterial result;
+  MaterialUniforms uniforms;
+  uniforms.color = material.color;
+  uniforms.pattern_color << material.pattern_color, std::max(material.pattern_scale, 1e-4f);
+  uniforms.emission << material.emission, 0;
+  uniforms.surface = {material.metallic, material.roughness, 0, 0};
+  result.uniforms = gl::make_buffer(std::span<const MaterialUniforms>(&uniforms, 1));
+
+  const std::array<int, 3> indices = {material.base_color_texture, material.metallic_roughness_texture,
+                                      material.emission_texture};
+  for (std::size_t k = 0; k < indices.size(); ++k) {
+    const Image* image = texture_at(textures, indices[k]);
+    if (image == nullptr) continue;
+    result.textures[k] = make_texture(*image, k == 1 ? TextureContent::data : TextureContent::color);
+    result.textured = true;
+  }
+  const Image* base = texture_at(textures, material.base_color_texture);
+  result.pattern = material.pattern;
+  result.two_sided = material.two_sided;
+  result.blended = material.color.w() < 1 || (base != nullptr && has_alpha(*base));
+  result.casts = material.color.w() > 0;
+  return result;
+}
+
+Caster Instance::ball() const {
+  const Eigen::Matrix3f linear = world_from_mesh.linear();
+  return {world_from_mesh * mesh->center, mesh->radius * linear.colwise().norm().maxCoeff()};
+}
+
+bool Instance::is_ground() const {
+  const float radius = ball().radius;
+  return radius > 150 || (mesh->flat && radius > 10);
+}
+
+MeshPass::MeshPass()
+    : opaque_shadow_({"frame.glsl", "mesh.vert"}, {}, {"SHADOW 1"}),
+      dithered_shadow_({"frame.glsl", "mesh.vert"}, {"frame.glsl", "material.glsl", "mesh_shadow.frag"},
+                       {"SHADOW 1"}),
+      textured_shadow_({"frame.glsl", "mesh.vert"}, {"frame.glsl", "material.glsl", "mesh_shadow.frag"},
+                       {"SHADOW 1", "TEXTURED 1"}),
+      white_(make_white_texture()) {}
+
+void MeshPass::prepare(std::span<const Instance* const> instances, const View& view) {
+  std::vector<Item> seen, casting;
+  for (uint32_t i = 0; i < instances.size(); ++i) {
+    const Instance& instance = *instances[i];
+    if (!instance.visible || instance.mesh->index_count == 0) continue;
+    const Caster ball = instance.ball();
+    const Item item{&instance, view.depth_of(ball.center) + ball.radius, i,
+                    instance.world_from_mesh.linear().determinant() < 0};
+    if (view.sees(ball.center, ball.radius)) seen.push_back(item);
+    if (instance.casts_shadow && instance.material->casts && !instance.is_ground()) casting.push_back(item);
+  }
+  const auto transparent = std::partition(seen.begin(), seen.end(),
+                                          [](const Item& item) { return !item.instance->material->blended; });
+  std::vector<Item> see_through(transparent, seen.end());
+  // What is cut out by its texture is opaque where the texture is, so it is drawn in both passes.
+  const auto by_batch = [](const Item& a, const Item& b) {
+    return std::tie(a.instance->batch_key, a.mirrored, a.depth, a.order) <
+           std::tie(b.instance->batch_key, b.mirrored, b.depth, b.order);
+  };
+  std::sort(seen.begin(), seen.end(), by_batch);
+  std::sort(casting.begin(), casting.end(), by_batch);
+  std::sort(see_through.begin(), see_through.end(), [](const Item& a, const Item& b) {
+    return std::tie(b.depth, a.order) < std::tie(a.depth, b.order);
+  });
+
+  std::vector<Rows> rows, shadow_rows;
+  const auto append = [](const std::vector<Item>& items, bool merge, std::vector<Rows>& out,
+                         std::vector<Batch>& batches) {
+    batches.clear();
+    for (const Item& item : items) {
+      const Instance& instance = *item.instance;
+      const bool joins = merge && !batches.empty() && batches.back().mesh == instance.mesh &&
+                         batches.back().material == instance.material &&
+                         batches.back().mirrored == item.mirrored;
+      if (!joins) {
+        batches.push_back({instance.mesh, instance.material, item.mirrored, item.depth,
+                           static_cast<GLuint>(out.size()), 0});
+      }
+      ++batches.back().count;
+      out.push_back(rows_of(instance.world_from_mesh));
+    }
+  };
+  append(seen, true, rows, opaque_);
+  append(see_through, false, rows, blended_);
+  append(casting, true, shadow_rows, casters_);
+  std::stable_sort(opaque_.begin(), opaque_.end(),
+                   [](const Batch& a, const Batch& b) { return a.depth < b.depth; });
+  rows_.write(std::span<const Rows>(rows));
+  shadow_rows_.write(std::span<const Rows>(shadow_rows));
+}
+
+void MeshPass::bind(const GpuMaterial& material) {
+  glBindBufferBase(GL_UNIFORM_BUFFER, kMaterialBlock, material.uniforms);
+  if (!material.textured) return;
+  for (GLuint k = 0; k < material.textures.size(); ++k) {
+    glBindTextureUnit(kFirstTextureUnit + k, material.textures[k] != 0 ? material.textures[k] : white_);
+  }
+}
+
+void MeshPass::draw(const Batch& batch, const gl::StreamBuffer& rows) {
+  glVertexArrayVertexBuffer(batch.mesh->vertex_array, kInstanceBinding, rows, 0, sizeof(Rows));
+  glBindVertexArray(batch.mesh->vertex_array);
+  glDrawElementsInstancedBaseInstance(GL_TRIANGLES, batch.mesh->index_count, GL_UNSIGNED_INT, nullptr,
+                                      batch.count, batch.first);
+}
+
+gl::LazyProgram& MeshPass::surface_program(const GpuMaterial& material) {
+  const auto key = std::make_pair(material.pattern, material.textured);
+  const auto found = surface_programs_.find(key);
+  if (found != surface_programs_.end()) return found->second;
+  std::vector<std::string> defines;
+  std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "light.glsl", "material.glsl"};
+  if (material.textured) defines.push_back("TEXTURED 1");
+  if (material.pattern != Pattern::none) {
+    defines.push_back("PATTERN " + std::to_string(static_cast<int>(material.pattern)));
+    fragment.push_back("pattern.glsl");
+  }
+  fragment.push_back("mesh.frag");
+  const std::vector<std::string_view> vertex = {"frame.glsl", "mesh.vert"};
+  return surface_programs_.emplace(key, gl::LazyProgram(vertex, fragment, defines)).first->second;
+}
+
+gl::LazyProgram& MeshPass::shadow_program(const GpuMaterial& material) {
+  if (!material.blended) return opaque_shadow_;
+  return material.textured ? textured_shadow_ : dithered_shadow_;
+}
+
+void MeshPass::draw_shadows(const Matrix4f& shadow_clip_from_world) {
+  for (const Batch& batch : casters_) {
+    shadow_program(*batch.material).use();
+    glUniformMatrix4fv(0, 1, GL_FALSE, shadow_clip_from_world.data());
+    bind(*batch.material);
+    draw(batch, shadow_rows_);
+  }
+}
+
+void MeshPass::draw_opaque() {
+  constexpr float kOpaqueAlpha = 0.99f;
+  const auto draw_batch = [this](const Batch& batch) {
+    surface_program(*batch.material).use();
+    glUniform1f(0, kOpaqueAlpha);
+    (batch.material->two_sided ? glDisable : glEnable)(GL_CULL_FACE);
+    glFrontFace(batch.mirrored ? GL_CW : GL_CCW);
+    bind(*batch.material);
+    draw(batch, rows_);
+  };
+  for (const Batch& batch : opaque_) draw_batch(batch);
+  for (const Batch& batch : blended_) {
+    if (batch.material->textured) draw_batch(batch);
+  }
+}
+
+void MeshPass::draw_blended() {
+  constexpr float kVisibleAlpha = 1.0f / 512;
+  for (const Batch& batch : blended_) {
+    surface_program(*batch.material).use();
+    glUniform1f(0, kVisibleAlpha);
+    (batch.material->two_sided ? glDisable : glEnable)(GL_CULL_FACE);
+    glFrontFace(batch.mirrored ? GL_CW : GL_CCW);
+    bind(*batch.material);
+    draw(batch, rows_);
+  }
+}
+
+}  // namespace offstage::render

@@ -1,0 +1,87 @@
+#pragma once
+/// Private: draws the instances of meshes: opaque ones in batches of one mesh and material, front to back;
+/// those that are not opaque one by one, back to front; and casters into the shadow map.
+
+#include <map>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "render/frame.h"
+#include "render/gl.h"
+#include "render/shadow_map.h"
+
+namespace offstage::render {
+
+struct GpuMesh {
+  explicit GpuMesh(const Mesh& mesh);
+  gl::Buffer vertices, indices;
+  gl::VertexArray vertex_array;
+  GLsizei index_count = 0;
+  Vector3f center;  ///< of the bounding ball
+  float radius = 0;
+  bool flat = false;  ///< lies in a plane along an axis
+};
+
+/// The uniform block of shaders/material.glsl.
+struct MaterialUniforms {
+  Vector4f color, pattern_color, emission, surface;
+};
+
+struct GpuMaterial {
+  gl::Buffer uniforms;
+  std::array<gl::Texture, 3> textures;  ///< base colour, metallic and roughness, emission
+  Pattern pattern = Pattern::none;
+  bool textured = false;
+  bool two_sided = false;
+  bool blended = false;
+  bool casts = true;  ///< false if fully transparent
+};
+
+GpuMaterial make_gpu_material(const Material& material, std::span<const Image> textures);
+
+struct Instance {
+  const GpuMesh* mesh = nullptr;
+  const GpuMaterial* material = nullptr;
+  std::pair<uint32_t, uint32_t> batch_key;  ///< of material and mesh, for sorting
+  Eigen::Affine3f world_from_mesh = Eigen::Affine3f::Identity();
+  bool casts_shadow = true;
+  bool visible = true;
+
+  Caster ball() const;
+  /// Ground shadows nothing that the film shows, and would stretch the shadow map over all of it.
+  bool is_ground() const;
+};
+
+class MeshPass {
+ public:
+  MeshPass();
+  /// Sorts what is visible for this view. The instances must stay where they are until it is drawn.
+  void prepare(std::span<const Instance* const> instances, const View& view);
+  void draw_shadows(const Matrix4f& shadow_clip_from_world);
+  void draw_opaque();
+  void draw_blended();
+
+ private:
+  struct Item;
+  struct Batch {
+    const GpuMesh* mesh;
+    const GpuMaterial* material;
+    bool mirrored;
+    float depth;
+    GLuint first;  ///< of its instances' rows
+    GLsizei count;
+  };
+  void draw(const Batch& batch, const gl::StreamBuffer& rows);
+  void bind(const GpuMaterial& material);
+  gl::LazyProgram& surface_program(const GpuMaterial& material);
+  gl::LazyProgram& shadow_program(const GpuMaterial& material);
+
+  std::map<std::pair<Pattern, bool>, gl::LazyProgram> surface_programs_;
+  gl::LazyProgram opaque_shadow_, dithered_shadow_, textured_shadow_;
+  gl::Texture white_;
+  gl::StreamBuffer rows_, shadow_rows_;
+  std::vector<Batch> opaque_, blended_, casters_;
+};
+
+}  // namespace offstage::render

@@ -1,0 +1,115 @@
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+
+#include <signal.h>
+#include <unistd.h>
+
+#include "render/error.h"
+#include "render/file_io.h"
+#include "render/sink.h"
+
+namespace offstage::render {
+namespace {
+
+/// Holds SIGPIPE back on this thread, so that a closed pipe is an error number, and swallows the one that
+/// came of it.
+class SigpipeBlock {
+ public:
+  SigpipeBlock() {
+    sigemptyset(&sigpipe_);
+    sigaddset(&sigpipe_, SIGPIPE);
+    sigset_t pending;
+    sigpending(&pending);
+    was_pending_ = sigismember(&pending, SIGPIPE) == 1;
+    pthread_sigmask(SIG_BLOCK, &sigpipe_, &before_);
+  }
+  ~SigpipeBlock() {
+    const timespec now{};
+    while (!was_pending_ && sigtimedwait(&sigpipe_, nullptr, &now) < 0 && errno == EINTR) {
+    }
+    pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+  }
+  SigpipeBlock(const SigpipeBlock&) = delete;
+  SigpipeBlock& operator=(const SigpipeBlock&) = delete;
+
+ private:
+  sigset_t sigpipe_{}, before_{};
+  bool was_pending_ = false;
+};
+
+void write_to_stdout(std::span<const uint8_t> bytes) {
+  const SigpipeBlock block;
+  const int error = write_all(STDOUT_FILENO, bytes);
+  if (error == EPIPE) throw FileError("standard output: the program that reads the frames has ended");
+  if (error != 0) throw_file_error("standard output", "cannot be written", error);
+}
+
+/// BT.709 luma and colour differences, limited range, in 16-bit fixed point, rounded.
+std::array<uint8_t, 3> yuv_from_rgb(const uint8_t* rgb) {
+  const int r = rgb[0], g = rgb[1], b = rgb[2];
+  const int half = 1 << 15;
+  const int y = 11966 * r + 40254 * g + 4064 * b;    // 219/255 * (0.2126, 0.7152, 0.0722)
+  const int cb = -6596 * r - 22189 * g + 28785 * b;  // 224/255 * (B - Y) / 1.8556
+  const int cr = 28785 * r - 26145 * g - 2640 * b;   // 224/255 * (R - Y) / 1.5748
+  return {static_cast<uint8_t>(16 + ((y + half) >> 16)), static_cast<uint8_t>(128 + ((cb + half) >> 16)),
+          static_cast<uint8_t>(128 + ((cr + half) >> 16))};
+}
+
+/// Frames per second as a fraction: whole numbers, 24000/1001 and its like exactly, others to a thousandth.
+std::string frame_rate(double fps) {
+  const auto whole = std::llround(fps), ntsc = std::llround(fps * 1.001);
+  if (std::abs(fps - static_cast<double>(whole)) < 1e-6) return std::to_string(whole) + ":1";
+  if (std::abs(fps * 1.001 - static_cast<double>(ntsc)) < 1e-3) return std::to_string(ntsc * 1000) + ":1001";
+  const auto thousandths = std::llround(fps * 1000), divisor = std::gcd(thousandths, 1000LL);
+  return std::to_string(thousandths / divisor) + ":" + std::to_string(1000 / divisor);
+}
+
+class PipeSink final : public FrameSink {
+ public:
+  PipeSink(bool y4m, int width_px, int height_px, double fps)
+      : y4m_(y4m), width_px_(width_px), height_px_(height_px) {
+    header_ = "YUV4MPEG2 W" + std::to_string(width_px) + " H" + std::to_string(height_px) + " F" +
+              frame_rate(fps) + " Ip A1:1 C444 XCOLORRANGE=LIMITED\n";
+  }
+
+  void write(int, const Image& image) override {
+    if (image.width_px != width_px_ || image.height_px != height_px_) {
+      throw std::invalid_argument("pipe sink: the frame's size is not the stream's");
+    }
+    if (!y4m_) return write_to_stdout(image.rgba);
+    const std::string mark = std::exchange(header_, "") + "FRAME\n";
+    const std::size_t pixels = image.pixel_count();
+    buffer_.resize(mark.size() + 3 * pixels);
+    std::copy(mark.begin(), mark.end(), buffer_.begin());
+    uint8_t* plane = buffer_.data() + mark.size();
+    for (std::size_t i = 0; i < pixels; ++i) {
+      const auto yuv = yuv_from_rgb(&image.rgba[4 * i]);
+      for (std::size_t c = 0; c < 3; ++c) plane[c * pixels + i] = yuv[c];
+    }
+    write_to_stdout(buffer_);
+  }
+  void close() override {}
+
+ private:
+  bool y4m_;
+  int width_px_, height_px_;
+  std::string header_;
+  std::vector<uint8_t> buffer_;
+};
+
+}  // namespace
+
+std::unique_ptr<FrameSink> make_pipe_sink(bool y4m, int width_px, int height_px, double fps) {
+  if (width_px <= 0 || height_px <= 0 || !(fps > 0 && fps <= 1000)) {
+    throw std::invalid_argument("pipe sink: needs a size, and a frame rate in (0, 1000]");
+  }
+  if (::isatty(STDOUT_FILENO)) {
+    throw std::invalid_argument("standard output is a terminal; send the frames to a program or a file");
+  }
+  return std::make_unique<PipeSink>(y4m, width_px, height_px, fps);
+}
+
+}  // namespace offstage::render

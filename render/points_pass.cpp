@@ -1,0 +1,104 @@
+#include "render/points_pass.h"
+
+#include <algorithm>
+
+namespace offstage::render {
+namespace {
+
+// splitmix64's finaliser, to a number in [0, 1).
+float number_of_its_own(uint64_t id) {
+  id = (id ^ (id >> 30)) * 0xBF58476D1CE4E5B9ull;
+  id = (id ^ (id >> 27)) * 0x94D049BB133111EBull;
+  return static_cast<float>((id ^ (id >> 31)) >> 40) * 0x1p-24f;
+}
+
+Vector4f style_of(const PointsDef& def) {
+  return {std::clamp(def.softness, 0.01f, 1.0f), def.stretch_s, def.lit ? 1.0f : 0.0f,
+          def.additive ? 1.0f : 0.0f};
+}
+
+}  // namespace
+
+void PointSet::assign(std::span<const Point> values) {
+  points.clear();
+  ids.clear();
+  box.setEmpty();
+  for (const Point& value : values) {
+    const bool drawable =
+        value.radius > 0 && value.color.w() > 0 && value.position.allFinite() && value.velocity.allFinite();
+    if (!drawable) continue;
+    GpuPoint point;
+    point.position << value.position, value.radius;
+    point.velocity << value.velocity, number_of_its_own(value.id);
+    point.color = value.color;
+    points.push_back(point);
+    ids.push_back(value.id);
+    Vector3f reach = Vector3f::Constant(value.radius);
+    if (def.style == PointStyle::streak) reach += value.velocity.cwiseAbs() * (0.5f * def.stretch_s);
+    box.extend(value.position - reach).extend(value.position + reach);
+  }
+}
+
+PointsPass::PointsPass() : vertex_array_(gl::make_vertex_array()) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::string style = "STYLE " + std::to_string(k);
+    const bool sphere = k == static_cast<std::size_t>(PointStyle::sphere);
+    const std::vector<std::string_view> vertex = {"frame.glsl", "sky.glsl", "light.glsl", "points.vert"};
+    std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl"};
+    if (sphere) {
+      fragment.insert(fragment.end(), {"light.glsl", "sphere.frag"});
+    } else {
+      fragment.insert(fragment.end(), {"points_shape.glsl", "points.frag"});
+    }
+    programs_[k].emplace(vertex, fragment, std::vector{style});
+    shadow_programs_[k].emplace(
+        std::vector<std::string_view>{"frame.glsl", "points.vert"},
+        std::vector<std::string_view>{"frame.glsl", "points_shape.glsl", "points_shadow.frag"},
+        std::vector{style, std::string("SHADOW 1")});
+  }
+  gl::set_attribute(vertex_array_, 0, 0, 4, offsetof(GpuPoint, position));
+  gl::set_attribute(vertex_array_, 1, 0, 4, offsetof(GpuPoint, velocity));
+  gl::set_attribute(vertex_array_, 2, 0, 4, offsetof(GpuPoint, color));
+  glVertexArrayBindingDivisor(vertex_array_, 0, 1);
+}
+
+void PointsPass::prepare(PointSet& set, const View& view) {
+  const bool front_first = set.def.style == PointStyle::sphere;
+  keys_.clear();
+  for (uint32_t i = 0; i < set.points.size(); ++i) {
+    const float depth = view.depth_of(set.points[i].position.head<3>());
+    keys_.emplace_back(front_first ? depth : -depth, i);
+  }
+  std::sort(keys_.begin(), keys_.end(), [&set](const auto& a, const auto& b) {
+    return a.first != b.first ? a.first < b.first : set.ids[a.second] < set.ids[b.second];
+  });
+  ordered_.clear();
+  for (const auto& [depth, i] : keys_) ordered_.push_back(set.points[i]);
+  set.buffer.write(std::span<const GpuPoint>(ordered_));
+}
+
+void PointsPass::draw(const PointSet& set) {
+  glVertexArrayVertexBuffer(vertex_array_, 0, set.buffer, 0, sizeof(GpuPoint));
+  glBindVertexArray(vertex_array_);
+  glUniform4fv(1, 1, style_of(set.def).data());
+  glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(set.points.size()));
+}
+
+void PointsPass::draw_shadow(const PointSet& set, const Matrix4f& shadow_clip_from_world) {
+  shadow_programs_[static_cast<std::size_t>(set.def.style)]->use();
+  glUniformMatrix4fv(0, 1, GL_FALSE, shadow_clip_from_world.data());
+  draw(set);
+}
+
+void PointsPass::draw_spheres(const PointSet& set) {
+  programs_[static_cast<std::size_t>(PointStyle::sphere)]->use();
+  glUniform2f(2, set.def.metallic, set.def.roughness);
+  draw(set);
+}
+
+void PointsPass::draw_blended(const PointSet& set) {
+  programs_[static_cast<std::size_t>(set.def.style)]->use();
+  draw(set);
+}
+
+}  // namespace offstage::render

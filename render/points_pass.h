@@ -1,0 +1,46 @@
+#pragma once
+/// Private: draws particles. Every particle is one quad, drawn instanced: sprites and streaks blended back to
+/// front over the opaque picture, balls ray-cast with depth among the opaque things.
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "render/frame.h"
+#include "render/gl.h"
+
+namespace offstage::render {
+
+struct GpuPoint {
+  Vector4f position, velocity, color;
+};
+
+struct PointSet {
+  PointsDef def;
+  std::vector<GpuPoint> points;  ///< w of position: radius; w of velocity: a number of its own in [0, 1)
+  std::vector<uint64_t> ids;
+  Eigen::AlignedBox3f box;  ///< of what can be seen of them, streaks at full length
+  gl::StreamBuffer buffer;  ///< in the order they are drawn
+
+  void assign(std::span<const Point> values);
+};
+
+class PointsPass {
+ public:
+  PointsPass();
+  /// Uploads in drawing order: back to front for this view where they are blended.
+  void prepare(PointSet& set, const View& view);
+  void draw_shadow(const PointSet& set, const Matrix4f& shadow_clip_from_world);
+  void draw_spheres(const PointSet& set);
+  void draw_blended(const PointSet& set);
+
+ private:
+  void draw(const PointSet& set);
+
+  std::array<std::optional<gl::LazyProgram>, 3> programs_, shadow_programs_;
+  gl::VertexArray vertex_array_;
+  std::vector<GpuPoint> ordered_;
+  std::vector<std::pair<float, uint32_t>> keys_;
+};
+
+}  // namespace offstage::render

@@ -1,0 +1,192 @@
+#include "render/primitives.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace offstage::render {
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+
+// A point of the half-section of a body of revolution. Two in a row at one place make a sharp edge.
+struct ProfilePoint {
+  float radius, y;
+  Vector2f normal;  // (outwards, up)
+};
+
+// Turns a profile, given from the bottom up, about the Y axis.
+Mesh revolve(const std::vector<ProfilePoint>& profile, int segments) {
+  float total = 0;
+  std::vector<float> along(profile.size(), 0.0f);
+  for (std::size_t i = 1; i < profile.size(); ++i) {
+    total += std::hypot(profile[i].radius - profile[i - 1].radius, profile[i].y - profile[i - 1].y);
+    along[i] = total;
+  }
+
+  Mesh mesh;
+  for (std::size_t i = 0; i < profile.size(); ++i) {
+    const ProfilePoint& point = profile[i];
+    for (int j = 0; j <= segments; ++j) {
+      // The seam's two columns are the same bits, so the surface is closed.
+      const float angle = 2 * kPi * static_cast<float>(j % segments) / static_cast<float>(segments);
+      const float c = std::cos(angle), s = std::sin(angle);
+      mesh.positions.emplace_back(point.radius * c, point.y, -point.radius * s);
+      mesh.normals.emplace_back(point.normal.x() * c, point.normal.y(), -point.normal.x() * s);
+      mesh.uvs.emplace_back(static_cast<float>(j) / static_cast<float>(segments), along[i] / total);
+    }
+  }
+  const auto columns = static_cast<uint32_t>(segments + 1);
+  for (uint32_t i = 0; i + 1 < profile.size(); ++i) {
+    if (along[i] == along[i + 1]) continue;
+    for (uint32_t j = 0; j + 1 < columns; ++j) {
+      const uint32_t a = i * columns + j, b = a + 1, c = b + columns, d = a + columns;
+      if (profile[i].radius > 0) mesh.indices.insert(mesh.indices.end(), {a, b, c});
+      if (profile[i + 1].radius > 0) mesh.indices.insert(mesh.indices.end(), {a, c, d});
+    }
+  }
+  return mesh;
+}
+
+// A quarter circle from the equator (sign 1: up to the top; sign -1: from the bottom up to the equator).
+void append_cap(std::vector<ProfilePoint>& profile, float radius, float center_y, int rings, int sign) {
+  for (int k = 0; k <= rings; ++k) {
+    const int step = sign > 0 ? k : rings - k;
+    const float angle = 0.5f * kPi * static_cast<float>(step) / static_cast<float>(rings);
+    const float up = static_cast<float>(sign) * std::sin(angle);
+    const float out = step == rings ? 0.0f : std::cos(angle);  // exactly zero at the pole
+    profile.push_back({radius * out, center_y + radius * up, {out, up}});
+  }
+}
+
+// Grid lines of a box's axis: the flat part, and the bevel's arc in equal angles when projected from its
+// centre.
+std::vector<float> box_lines(float half, float bevel) {
+  constexpr int kArcSteps = 3;
+  if (bevel <= 0) return {-half, half};
+  std::vector<float> lines;
+  for (int k = kArcSteps; k >= 0; --k) {
+    const float t = k == kArcSteps ? 1 : std::tan(0.25f * kPi * static_cast<float>(k) / kArcSteps);
+    lines.push_back(k == kArcSteps ? -half : -(half - bevel + bevel * t));
+  }
+  for (int k = kArcSteps; k >= 0; --k) lines.push_back(-lines[static_cast<std::size_t>(k)]);
+  return lines;
+}
+
+// The point of the rounded box that belongs to a point of the sharp one: it lies `bevel` from the inner box.
+void add_box_vertex(Mesh& mesh, const Vector3f& point, const Vector3f& half, float bevel,
+                    const Vector3f& face_normal) {
+  const Vector3f inner_half = half - Vector3f::Constant(bevel);
+  const Vector3f inner = point.cwiseMax(-inner_half).cwiseMin(inner_half);
+  const Vector3f offset = point - inner;
+  const bool flat = bevel <= 0 || (offset.array() != 0).count() == 1;
+  const Vector3f normal = flat ? face_normal : Vector3f(offset.normalized());
+  mesh.positions.push_back(flat ? point : Vector3f(inner + bevel * normal));
+  mesh.normals.push_back(normal);
+}
+
+}  // namespace
+
+Mesh make_sphere(float radius, int segments) {
+  std::vector<ProfilePoint> profile;
+  const int rings = std::max(segments / 4, 2);
+  append_cap(profile, radius, 0, rings, -1);
+  profile.pop_back();  // the equator comes with the upper half
+  append_cap(profile, radius, 0, rings, 1);
+  return revolve(profile, std::max(segments, 3));
+}
+
+Mesh make_capsule(float radius, float height, int segments) {
+  std::vector<ProfilePoint> profile;
+  const int rings = std::max(segments / 4, 2);
+  append_cap(profile, radius, -0.5f * height, rings, -1);
+  append_cap(profile, radius, 0.5f * height, rings, 1);
+  return revolve(profile, std::max(segments, 3));
+}
+
+Mesh make_cylinder(float radius, float height, int segments) {
+  const float h = 0.5f * height;
+  return revolve({{0, -h, {0, -1}},
+                  {radius, -h, {0, -1}},
+                  {radius, -h, {1, 0}},
+                  {radius, h, {1, 0}},
+                  {radius, h, {0, 1}},
+                  {0, h, {0, 1}}},
+                 std::max(segments, 3));
+}
+
+Mesh make_cone(float radius, float height, int segments) {
+  const float h = 0.5f * height;
+  const Vector2f side = Vector2f(height, radius).normalized();
+  return revolve({{0, -h, {0, -1}}, {radius, -h, {0, -1}}, {radius, -h, side}, {0, h, side}},
+                 std::max(segments, 3));
+}
+
+Mesh make_box(const Vector3f& size, float bevel) {
+  const Vector3f half = 0.5f * size;
+  bevel = std::clamp(bevel, 0.0f, half.minCoeff());
+  std::array<std::vector<float>, 3> lines;
+  for (int axis = 0; axis < 3; ++axis) lines[static_cast<std::size_t>(axis)] = box_lines(half[axis], bevel);
+
+  Mesh mesh;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    const auto& us = lines[static_cast<std::size_t>(u)];
+    const auto& vs = lines[static_cast<std::size_t>(v)];
+    for (const float sign : {-1.0f, 1.0f}) {
+      const Vector3f face_normal = sign * Vector3f::Unit(axis);
+      const auto first = static_cast<uint32_t>(mesh.positions.size());
+      for (const float pv : vs) {
+        for (const float pu : us) {
+          Vector3f point;
+          point[axis] = sign * half[axis];
+          point[u] = pu;
+          point[v] = pv;
+          add_box_vertex(mesh, point, half, bevel, face_normal);
+          mesh.uvs.emplace_back(0.5f + 0.5f * sign * pu / half[u], 0.5f + 0.5f * pv / half[v]);
+        }
+      }
+      const auto columns = static_cast<uint32_t>(us.size());
+      for (uint32_t j = 0; j + 1 < vs.size(); ++j) {
+        for (uint32_t i = 0; i + 1 < columns; ++i) {
+          const uint32_t a = first + j * columns + i, b = a + 1, c = b + columns, d = a + columns;
+          if (sign > 0) {
+            mesh.indices.insert(mesh.indices.end(), {a, b, c, a, c, d});
+          } else {
+            mesh.indices.insert(mesh.indices.end(), {a, c, b, a, d, c});
+          }
+        }
+      }
+    }
+  }
+  return mesh;
+}
+
+Mesh make_ground(float half_size) {
+  // Each ring of cells is twice as wide as the one inside it.
+  constexpr int kRings = 10;
+  std::vector<float> lines;
+  for (int k = 0; k <= kRings; ++k) lines.push_back(-std::ldexp(half_size, -k));
+  lines.push_back(0);
+  for (int k = kRings; k >= 0; --k) lines.push_back(-lines[static_cast<std::size_t>(k)]);
+
+  Mesh mesh;
+  for (const float z : lines) {
+    for (const float x : lines) {
+      mesh.positions.emplace_back(x, 0.0f, z);
+      mesh.normals.push_back(Vector3f::UnitY());
+      mesh.uvs.emplace_back(0.5f + 0.5f * x / half_size, 0.5f - 0.5f * z / half_size);
+    }
+  }
+  const auto columns = static_cast<uint32_t>(lines.size());
+  for (uint32_t j = 0; j + 1 < columns; ++j) {
+    for (uint32_t i = 0; i + 1 < columns; ++i) {
+      const uint32_t a = j * columns + i, b = a + 1, c = b + columns, d = a + columns;
+      mesh.indices.insert(mesh.indices.end(), {a, d, c, a, c, b});
+    }
+  }
+  return mesh;
+}
+
+}  // namespace offstage::render

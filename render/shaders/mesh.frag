@@ -1,0 +1,49 @@
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 normal;
+#ifdef TEXTURED
+layout(location = 2) in vec2 uv;
+#endif
+#ifdef PATTERN
+layout(location = 3) in vec3 object_position;
+layout(location = 4) in vec3 object_normal;
+layout(location = 5) flat in vec3 axis_x;
+layout(location = 6) flat in vec3 axis_y;
+layout(location = 7) flat in vec3 axis_z;
+#endif
+layout(location = 0) uniform float min_alpha;  // of what this pass draws
+layout(location = 0) out vec4 color;
+
+// Roughness raised where the normal turns within a pixel, so that highlights do not sparkle (Kaplanyan and Tokuyoshi,
+// "Stable Geometric Specular Antialiasing", 2019).
+float filtered_roughness(float roughness, vec3 normal) {
+  vec3 dx = dFdx(normal), dy = dFdy(normal);
+  float variance = 0.25 * (dot(dx, dx) + dot(dy, dy));
+  float a = roughness * roughness;
+  return sqrt(sqrt(saturate(a * a + min(2.0 * variance, 0.18))));
+}
+
+void main() {
+  vec3 view = normalize(frame.eye.xyz - position);
+  vec3 n = normalize(gl_FrontFacing ? normal : -normal);
+  float alpha = material.color.a;
+  Surface s = Surface(material.color.rgb, material.surface.y, material.surface.x, material.emission.rgb);
+#ifdef PATTERN
+  PatternSample pattern = pattern_sample(object_position, object_normal);
+  s.albedo = pattern.color;
+  s.roughness = saturate(s.roughness * pattern.roughness);
+  n = normalize(n - (axis_x * pattern.slope.x + axis_y * pattern.slope.y + axis_z * pattern.slope.z));
+#endif
+#ifdef TEXTURED
+  vec4 base = texture(base_color_texture, uv);
+  vec4 metallic_roughness = texture(metallic_roughness_texture, uv);
+  s.albedo *= base.rgb;
+  alpha *= base.a;
+  s.roughness *= metallic_roughness.g;
+  s.metallic *= metallic_roughness.b;
+  s.emission *= texture(emission_texture, uv).rgb;
+#endif
+  if (alpha < min_alpha) discard;
+  s.roughness = filtered_roughness(s.roughness, n);
+  vec3 radiance = apply_fog(shade(s, n, view, sun_visibility(position, n)), position);
+  color = vec4(radiance * alpha, alpha);
+}

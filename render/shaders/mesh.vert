@@ -1,0 +1,48 @@
+layout(location = 0) in vec3 in_position;
+layout(location = 1) in vec3 in_normal;
+layout(location = 2) in vec2 in_uv;
+layout(location = 3) in vec4 row_x;  // world_from_mesh by rows, one per instance
+layout(location = 4) in vec4 row_y;
+layout(location = 5) in vec4 row_z;
+
+#ifdef SHADOW
+layout(location = 0) uniform mat4 shadow_clip_from_world;
+#else
+layout(location = 0) out vec3 position;
+layout(location = 1) out vec3 normal;
+#endif
+#ifdef TEXTURED
+layout(location = 2) out vec2 uv;
+#endif
+#ifdef PATTERN
+layout(location = 3) out vec3 object_position;
+layout(location = 4) out vec3 object_normal;
+layout(location = 5) flat out vec3 axis_x;  // the object's axes in the world
+layout(location = 6) flat out vec3 axis_y;
+layout(location = 7) flat out vec3 axis_z;
+#endif
+
+void main() {
+  vec4 p = vec4(in_position, 1.0);
+  vec3 world = vec3(dot(row_x, p), dot(row_y, p), dot(row_z, p));
+#ifdef SHADOW
+  gl_Position = shadow_clip_from_world * vec4(world, 1.0);
+#else
+  // Normals go by the cofactors, which are the inverse transpose up to a factor.
+  vec3 cx = cross(row_y.xyz, row_z.xyz), cy = cross(row_z.xyz, row_x.xyz), cz = cross(row_x.xyz, row_y.xyz);
+  normal = normalize(vec3(dot(cx, in_normal), dot(cy, in_normal), dot(cz, in_normal)));
+  if (dot(row_x.xyz, cx) < 0.0) normal = -normal;
+  position = world;
+  gl_Position = frame.clip_from_world * vec4(world, 1.0);
+#endif
+#ifdef TEXTURED
+  uv = in_uv;
+#endif
+#ifdef PATTERN
+  object_position = in_position;
+  object_normal = in_normal;
+  axis_x = normalize(vec3(row_x.x, row_y.x, row_z.x));
+  axis_y = normalize(vec3(row_x.y, row_y.y, row_z.y));
+  axis_z = normalize(vec3(row_x.z, row_y.z, row_z.z));
+#endif
+}

@@ -1,0 +1,11 @@
+// Surfaces that are not opaque let through their share of the light, by a dither that sub-frames average out.
+#ifdef TEXTURED
+layout(location = 2) in vec2 uv;
+#endif
+void main() {
+  float alpha = material.color.a;
+#ifdef TEXTURED
+  alpha *= texture(base_color_texture, uv).a;
+#endif
+  if (alpha <= dither(gl_FragCoord.xy, frame.shadow.w)) discard;
+}

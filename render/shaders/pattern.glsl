@@ -1,0 +1,177 @@
+// Procedural surfaces in object space. PATTERN is the number of the enumerator. Every detail fades to its mean before it
+// gets smaller than a pixel, so nothing sparkles in the distance.
+struct PatternSample {
+  vec3 color;
+  float roughness;  // factor
+  vec3 slope;       // gradient of the surface's height, along the object's axes
+};
+
+uint mix_bits(uint h) {
+  h = (h ^ (h >> 15)) * 0x2C1B3C6Du;
+  h = (h ^ (h >> 12)) * 0x297A2D39u;
+  return h ^ (h >> 15);
+}
+
+// In [0, 1).
+float cell_random(vec2 cell, uint salt) {
+  uvec2 c = uvec2(ivec2(cell));
+  return float(mix_bits(c.x * 0x9E3779B1u ^ c.y * 0x85EBCA77u ^ salt) >> 8) * (1.0 / 16777216.0);
+}
+
+// Value noise in [0, 1] and its gradient.
+vec3 noise(vec2 p, uint salt) {
+  vec2 cell = floor(p), f = p - cell;
+  vec2 s = f * f * (3.0 - 2.0 * f), ds = 6.0 * f * (1.0 - f);
+  float a = cell_random(cell, salt), b = cell_random(cell + vec2(1.0, 0.0), salt);
+  float c = cell_random(cell + vec2(0.0, 1.0), salt), d = cell_random(cell + vec2(1.0, 1.0), salt);
+  float k = a - b - c + d;
+  return vec3(a + (b - a) * s.x + (c - a) * s.y + k * s.x * s.y, ds * vec2(b - a + k * s.y, c - a + k * s.x));
+}
+
+float noise(vec3 p) {
+  vec3 cell = floor(p), f = p - cell;
+  vec3 s = f * f * (3.0 - 2.0 * f);
+  uint z = uint(int(cell.z));
+  uint salt0 = z * 0xC2B2AE3Du, salt1 = (z + 1u) * 0xC2B2AE3Du;
+  vec2 x = vec2(1.0, 0.0);
+  vec4 low = vec4(cell_random(cell.xy, salt0), cell_random(cell.xy + x, salt0), cell_random(cell.xy + x.yx, salt0),
+                  cell_random(cell.xy + x.xx, salt0));
+  vec4 high = vec4(cell_random(cell.xy, salt1), cell_random(cell.xy + x, salt1), cell_random(cell.xy + x.yx, salt1),
+                   cell_random(cell.xy + x.xx, salt1));
+  vec4 c = mix(low, high, s.z);
+  return mix(mix(c.x, c.y, s.x), mix(c.z, c.w, s.x), s.y);
+}
+
+// 1 while a detail of this size is well above the pixel's footprint, 0 when it drowns in it.
+float visible(float footprint, float size) { return 1.0 - smoothstep(0.2, 0.7, footprint / size); }
+
+// The share of a box of width w around p in which a square wave of period 2 is up.
+vec2 square_wave(vec2 p, vec2 w) {
+  return 0.5 + (abs(fract((p - 0.5 * w) * 0.5) - 0.5) - abs(fract((p + 0.5 * w) * 0.5) - 0.5)) / w;
+}
+
+// Bricks or slabs in rows: `size` of one, `joint` half the joint's width, all in metres.
+struct Masonry {
+  vec2 cell;
+  float stone;  // 0 in the joint, 1 on the stone
+  vec2 slope;   // of the rounded edge
+};
+
+Masonry masonry(vec2 p, vec2 size, float joint, float shift_per_row, float rounding, float footprint) {
+  float row = floor(p.y / size.y);
+  float shift = shift_per_row == 0.0 ? cell_random(vec2(row, 7.0), 11u) : shift_per_row * mod(row, 2.0);
+  float column = p.x / size.x + shift;
+  Masonry m;
+  m.cell = vec2(floor(column), row);
+  vec2 f = vec2((fract(column) - 0.5) * size.x, p.y - (row + 0.5) * size.y);
+  vec2 inside = 0.5 * size - abs(f) - joint;  // distance to the joint
+  float d = min(inside.x, inside.y);
+  float soft = 0.5 * rounding + 0.5 * footprint;
+  float mean = (1.0 - 2.0 * joint / size.x) * (1.0 - 2.0 * joint / size.y);
+  float near = visible(footprint, size.y);
+  m.stone = mix(mean, smoothstep(-soft, soft, d), near);
+  float edge = saturate(1.0 - d / rounding) * smoothstep(-soft, soft, d) * visible(footprint, 2.0 * rounding);
+  m.slope = -0.6 * edge * sign(f) * (inside.x < inside.y ? vec2(1.0, 0.0) : vec2(0.0, 1.0));
+  return m;
+}
+
+PatternSample pattern_sample(vec3 p, vec3 n) {
+  vec3 a = material.color.rgb, b = material.pattern_color.rgb;
+  float scale = material.pattern_color.w;
+  vec3 dx = dFdx(p), dy = dFdy(p);
+  float footprint = 0.8 * sqrt(sqrt(dot(dx, dx) * dot(dy, dy)));  // a mean of its length and width
+  PatternSample result = PatternSample(a, 1.0, vec3(0.0));
+
+#if PATTERN == 3 || PATTERN == 5
+  vec3 q = p / scale;
+  float w = footprint / scale;
+#endif
+#if PATTERN == 3  // noise: four octaves
+  float sum = 0.5, amplitude = 0.5;
+  for (int octave = 0; octave < 4; ++octave) {
+    sum += amplitude * visible(w, 1.0) * (noise(q) - 0.5);
+    q = q.yzx * 2.03 + 17.3;
+    w *= 2.03;
+    amplitude *= 0.5;
+  }
+  result.color = mix(a, b, smoothstep(0.2, 0.8, sum));
+  result.roughness = 0.85 + 0.3 * sum;
+#elif PATTERN == 5  // wood: year rings about an axis along x, bent by noise, and fibres
+  float bend = mix(0.5, noise(q * vec3(0.35, 1.1, 1.1) + 5.0), visible(w, 0.9));
+  float radius = 9.0 * length(q.yz + vec2(0.9, 0.6)) + 2.6 * bend;
+  float ring = fract(radius);
+  float late = smoothstep(0.1, 0.8, ring) * (1.0 - smoothstep(0.88, 1.0, ring));
+  late = mix(0.45, late, visible(w, 0.2));
+  float fibre = mix(0.5, noise(q * vec3(3.0, 70.0, 70.0)), visible(w, 1.0 / 70.0));
+  float tone = 0.1 + 0.5 * late + 0.6 * (fibre - 0.5) + 0.3 * (bend - 0.5);
+  result.color = mix(a, b, saturate(tone));
+  result.roughness = 0.9 + 0.25 * late;
+#else
+  // The others lie in the plane that the surface is nearest to.
+  vec3 size = abs(n);
+  bool level = size.y >= max(size.x, size.z), facing_x = !level && size.x > size.z;
+  vec3 u = facing_x ? vec3(0.0, 0.0, 1.0) : vec3(1.0, 0.0, 0.0), v = level ? vec3(0.0, 0.0, 1.0) : vec3(0.0, 1.0, 0.0);
+  vec2 q = vec2(dot(p, u), dot(p, v));
+  vec2 w = max(abs(vec2(dot(dx, u), dot(dx, v))), abs(vec2(dot(dy, u), dot(dy, v)))) + 1e-5 * scale;
+  vec2 slope = vec2(0.0);
+
+#if PATTERN == 1 || PATTERN == 2  // checker, grid
+  float broad = (noise(q / scale * 0.63, 1u).x - 0.5) * visible(footprint, 1.6 * scale);
+  float fine = (noise(q / scale * 9.0, 2u).x - 0.5) * visible(footprint, scale / 9.0);
+#if PATTERN == 1
+  vec2 wave = square_wave(q / scale, w / scale);
+  result.color = mix(a, b, wave.x + wave.y - 2.0 * wave.x * wave.y);
+#else
+  const float kLine = 0.03;
+  vec2 k = q / scale + 0.5 * kLine, e0 = k - 0.5 * w / scale, e1 = k + 0.5 * w / scale;
+  vec2 line = ((floor(e1) * kLine + min(fract(e1), kLine)) - (floor(e0) * kLine + min(fract(e0), kLine))) / (e1 - e0);
+  result.color = mix(a, b, line.x + line.y - line.x * line.y);
+#endif
+  result.color *= 1.0 + 0.10 * broad + 0.07 * fine;
+  result.roughness = 1.0 + 0.35 * broad + 0.15 * fine;
+
+#elif PATTERN == 4  // brick
+  vec2 brick = vec2(scale, 0.3 * scale);
+  Masonry m = masonry(q, brick, 0.022 * scale, 0.5, 0.03 * scale, footprint);
+  float near = visible(footprint, brick.y);
+  float tint = (cell_random(m.cell, 3u) - 0.5) * near, hue = (cell_random(m.cell, 4u) - 0.5) * near;
+  vec3 mottle = (noise(q * (11.0 / scale), 5u) - vec3(0.5, 0.0, 0.0)) * visible(footprint, scale / 11.0);
+  vec3 grain = (noise(q * (41.0 / scale), 6u) - vec3(0.5, 0.0, 0.0)) * visible(footprint, scale / 41.0);
+  vec3 stone = a * (1.0 + 0.5 * tint + 0.35 * mottle.x + 0.25 * grain.x) * (1.0 + vec3(0.12, 0.0, -0.1) * hue);
+  result.color = mix(b * (1.0 + 0.25 * grain.x + 0.2 * mottle.x), stone, m.stone);
+  result.roughness = mix(1.25, 1.0 + 0.3 * mottle.x, m.stone);
+  slope = m.slope + 0.10 * mottle.yz + 0.12 * grain.yz;
+
+#elif PATTERN == 6  // lawn: patches, clumps, blades, and the mower's lanes
+  float broad = (noise(q / scale * 0.37, 7u).x - 0.5) * visible(footprint, 2.7 * scale);
+  vec3 clump = (noise(q / scale * 2.3, 8u) - vec3(0.5, 0.0, 0.0)) * visible(footprint, scale / 2.3);
+  vec2 turned = mat2(0.8, 0.6, -0.6, 0.8) * q;
+  vec3 blade = (noise(q / scale * vec2(90.0, 23.0), 9u) - vec3(0.5, 0.0, 0.0)) * visible(footprint, scale / 60.0);
+  vec3 blade2 = (noise(turned / scale * vec2(21.0, 110.0), 10u) - vec3(0.5, 0.0, 0.0)) * visible(footprint, scale / 60.0);
+  float tuft = (noise(turned / scale * vec2(9.0, 13.0), 18u).x - 0.5) * visible(footprint, scale / 11.0);
+  float lane = abs(fract(q.x / (6.0 * scale)) * 2.0 - 1.0);
+  lane = (smoothstep(0.42, 0.58, lane) - 0.5) * visible(footprint, 3.0 * scale);
+  float tone = 0.5 + 0.9 * broad + 0.7 * clump.x + 0.7 * tuft + 0.5 * (blade.x + blade2.x);
+  float shade = 1.0 + 0.14 * lane + 0.25 * clump.x + 0.45 * tuft + 0.7 * (blade.x + blade2.x);
+  result.color = mix(a, b, saturate(tone)) * max(shade, 0.25);
+  slope = 0.2 * clump.yz + 0.3 * (blade.yz + blade2.yz);
+
+#else  // paving
+  Masonry m = masonry(q, vec2(1.45 * scale, scale), 0.012 * scale, 0.0, 0.025 * scale, footprint);
+  float near = visible(footprint, scale);
+  float tint = (cell_random(m.cell, 12u) - 0.5) * near;
+  vec2 tilt = (vec2(cell_random(m.cell, 13u), cell_random(m.cell, 14u)) - 0.5) * near;
+  float broad = (noise(q / scale * 0.8, 15u).x - 0.5) * visible(footprint, scale / 0.8);
+  vec3 mottle = (noise(q / scale * 5.0, 16u) - vec3(0.5, 0.0, 0.0)) * visible(footprint, scale / 5.0);
+  vec3 grain = (noise(q / scale * 37.0, 17u) - vec3(0.5, 0.0, 0.0)) * visible(footprint, scale / 37.0);
+  vec3 stone = a * (1.0 + 0.34 * tint + 0.2 * broad + 0.2 * mottle.x + 0.22 * grain.x) *
+               (1.0 + vec3(0.06, 0.0, -0.06) * (tint + mottle.x));
+  result.color = mix(b * (1.0 + 0.4 * grain.x), stone, m.stone);
+  result.roughness = mix(1.6, 1.0 + 0.5 * broad + 0.35 * mottle.x + 0.3 * tint, m.stone);
+  float dry = mix(0.3, 1.0, material.surface.y);  // water lies smooth in the small hollows
+  slope = m.slope + dry * (0.02 * tilt + 0.02 * mottle.yz + 0.03 * grain.yz);
+#endif
+  result.slope = u * slope.x + v * slope.y;
+#endif
+  return result;
+}

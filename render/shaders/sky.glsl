@@ -1,0 +1,47 @@
+// The sky, the same as sky_radiance in sky.cpp.
+float glow_profile(vec3 direction) {
+  float x = max(dot(direction, frame.sun_direction.xyz), 0.0);
+  float x2 = x * x, x4 = x2 * x2, x8 = x4 * x4, x16 = x8 * x8, x64 = x16 * x16 * x16 * x16;
+  return 0.25 * x8 + 0.75 * x64;
+}
+
+vec3 sky_gradient(float y) {
+  float u = 1.0 - saturate(y), u2 = u * u, u4 = u2 * u2;
+  return mix(frame.zenith.rgb, frame.horizon.rgb, 0.3 * u2 + 0.7 * u4 * u4);
+}
+
+// Ambient light on a white surface, from order-2 spherical harmonics.
+vec3 ambient(vec3 n) {
+  return max(frame.irradiance[0].rgb + frame.irradiance[1].rgb * n.y + frame.irradiance[2].rgb * n.z +
+             frame.irradiance[3].rgb * n.x + frame.irradiance[4].rgb * (n.x * n.y) +
+             frame.irradiance[5].rgb * (n.y * n.z) + frame.irradiance[6].rgb * (3.0 * n.z * n.z - 1.0) +
+             frame.irradiance[7].rgb * (n.x * n.z) + frame.irradiance[8].rgb * (n.x * n.x - n.y * n.y), 0.0);
+}
+
+// What a surface of this roughness reflects from a direction: the sky, more and more blurred.
+vec3 sky_reflection(vec3 direction, float roughness) {
+  float blur = 0.02 + 0.5 * roughness;
+  vec3 sharp = mix(sky_gradient(direction.y) + frame.glow.rgb * glow_profile(direction), frame.ground.rgb,
+                   smoothstep(-blur, blur, -direction.y));
+  return mix(sharp, ambient(direction), roughness * roughness);
+}
+
+vec3 horizon_color(vec3 direction) {
+  vec3 level = normalize(vec3(direction.x, max(direction.y, 0.0), direction.z));
+  return sky_gradient(level.y) + frame.glow.rgb * glow_profile(level);
+}
+
+// Light added on the way from a place to the eye, and in w the share of its own light that arrives: fog, and a haze that
+// only matters beyond a hundred metres, where it hides the ground's edge.
+vec4 fog_to(vec3 position) {
+  vec3 ray = position - frame.eye.xyz;
+  float distance = length(ray);
+  float far = distance * (1.0 / 250.0);
+  float transmittance = exp(-(frame.zenith.w * distance + far * far));
+  return vec4(horizon_color(ray / max(distance, 1e-6)) * (1.0 - transmittance), transmittance);
+}
+
+vec3 apply_fog(vec3 color, vec3 position) {
+  vec4 fog = fog_to(position);
+  return color * fog.w + fog.rgb;
+}

@@ -1,0 +1,7 @@
+// A triangle that covers the screen, at the far plane.
+layout(location = 0) out vec3 ray;
+void main() {
+  vec2 ndc = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
+  ray = frame.ray_center.xyz + frame.ray_x.xyz * ndc.x + frame.ray_y.xyz * ndc.y;
+  gl_Position = vec4(ndc, 0.0, 1.0);
+}

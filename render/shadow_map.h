@@ -1,0 +1,43 @@
+#pragma once
+/// Private: the sun's shadow map. Its orthographic frame covers the part of the view in which a caster can
+/// shadow anything, so no texel is spent on the far horizon; it sits on a grid of whole texels and its size
+/// goes in steps, so that shadows do not swim when the camera or things move.
+
+#include <span>
+
+#include "render/frame.h"
+#include "render/gl.h"
+
+namespace offstage::render {
+
+/// A ball that bounds something that casts a shadow.
+struct Caster {
+  Vector3f center;
+  float radius;
+};
+
+struct ShadowFrame {
+  Matrix4f clip_from_world;
+  float texel_m = 0;  ///< 0: nothing in view can be in a shadow
+};
+
+/// `pixel_m`: width of a pixel of the picture at distance 1.
+ShadowFrame fit_shadow(std::span<const Caster> casters, const View& view, const Vector3f& sun_direction,
+                       float pixel_m, int size_px);
+
+class ShadowMap {
+ public:
+  explicit ShadowMap(int size_px);
+  int size_px() const { return size_px_; }
+  /// Binds and clears the map and sets the state for drawing casters into it.
+  void begin() const;
+  /// Ends drawing and leaves the map bound as texture unit 0.
+  void end() const;
+
+ private:
+  int size_px_;
+  gl::Texture depth_;
+  gl::Framebuffer framebuffer_;
+};
+
+}  // namespace offstage::render

@@ -1,0 +1,61 @@
+#include "render/sky.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace offstage::render {
+
+SkyModel make_sky(const Sun& sun, const Environment& environment) {
+  constexpr float kGlow = 0.12f;  // of the sun's radiance
+  const Vector3f direction = sun.direction.normalized();
+  const float risen = std::clamp(0.5f + 5 * direction.y(), 0.0f, 1.0f);
+  return {.sun_direction = direction,
+          .zenith = environment.intensity * environment.zenith,
+          .horizon = environment.intensity * environment.horizon,
+          .ground = environment.intensity * environment.ground,
+          .glow = environment.intensity * kGlow * risen * sun.intensity * sun.color};
+}
+
+Vector3f sky_radiance(const SkyModel& sky, const Vector3f& direction) {
+  if (direction.y() < 0) return sky.ground;
+  const float u = 1 - std::min(direction.y(), 1.0f), u2 = u * u, u4 = u2 * u2;
+  const float low = 0.3f * u2 + 0.7f * u4 * u4;
+  const float x = std::max(direction.dot(sky.sun_direction), 0.0f);
+  const float x2 = x * x, x4 = x2 * x2, x8 = x4 * x4, x16 = x8 * x8, x64 = x16 * x16 * x16 * x16;
+  return sky.zenith + low * (sky.horizon - sky.zenith) + (0.25f * x8 + 0.75f * x64) * sky.glow;
+}
+
+std::array<Vector3f, 9> sky_irradiance(const SkyModel& sky) {
+  // Squares of the constants of the real spherical harmonics times the cosine lobe's factors over pi (1, 2/3,
+  // 1/4).
+  constexpr float kPi = std::numbers::pi_v<float>;
+  constexpr std::array<float, 9> kWeights = {1 / (4 * kPi),     0.5f / kPi,      0.5f / kPi,
+                                             0.5f / kPi,        3.75f / kPi / 4, 3.75f / kPi / 4,
+                                             0.3125f / kPi / 4, 3.75f / kPi / 4, 0.9375f / kPi / 4};
+  constexpr int kBands = 32, kColumns = 48;
+  std::array<Vector3f, 9> sum;
+  sum.fill(Vector3f::Zero());
+  for (int band = 0; band < kBands; ++band) {
+    const float y = (static_cast<float>(band) + 0.5f) * 2 / kBands - 1;  // equal areas
+    const float r = std::sqrt(1 - y * y);
+    for (int column = 0; column < kColumns; ++column) {
+      const float angle = (static_cast<float>(column) + 0.5f) * 2 * kPi / kColumns;
+      const float x = r * std::cos(angle), z = r * std::sin(angle);
+      const Vector3f radiance = sky_radiance(sky, {x, y, z});
+      const std::array<float, 9> basis = {1, y, z, x, x * y, y * z, 3 * z * z - 1, x * z, x * x - y * y};
+      for (std::size_t k = 0; k < 9; ++k) sum[k] += basis[k] * radiance;
+    }
+  }
+  constexpr float kSolidAngle = 4 * kPi / (kBands * kColumns);
+  // Light that went from surface to surface has lost some of the sky's blue.
+  constexpr float kGrey = 0.35f;
+  const Vector3f luminance(0.2126f, 0.7152f, 0.0722f);
+  for (std::size_t k = 0; k < 9; ++k) {
+    sum[k] *= kWeights[k] * kSolidAngle;
+    sum[k] += kGrey * (Vector3f::Constant(luminance.dot(sum[k])) - sum[k]);
+  }
+  return sum;
+}
+
+}  // namespace offstage::render

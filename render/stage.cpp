@@ -1,0 +1,257 @@
+#include "render/stage.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "render/frame.h"
+#include "render/gl.h"
+#include "render/mesh_pass.h"
+#include "render/points_pass.h"
+#include "render/shadow_map.h"
+#include "render/slots.h"
+
+namespace offstage::render {
+namespace {
+
+constexpr GLuint kFrameBlock = 0, kSceneDepthUnit = 4;
+
+/// Colour and depth of the picture, and the copy of depth that particles read while they are drawn.
+struct Picture {
+  gl::Texture color, depth, depth_copy;
+  gl::Framebuffer framebuffer, depth_copy_framebuffer;
+
+  Picture(int width_px, int height_px)
+      : color(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)),
+        depth(gl::make_target(GL_DEPTH_COMPONENT32F, width_px, height_px, GL_NEAREST)),
+        depth_copy(gl::make_target(GL_DEPTH_COMPONENT32F, width_px, height_px, GL_NEAREST)),
+        framebuffer(gl::make_framebuffer(color, depth)),
+        depth_copy_framebuffer(gl::make_framebuffer(0, depth_copy)) {}
+};
+
+void add_bottom_up(const std::vector<float>& pixels, HdrImage& sum) {
+  const std::size_t row = static_cast<std::size_t>(sum.width_px) * 4;
+  const auto height = static_cast<std::size_t>(sum.height_px);
+  for (std::size_t y = 0; y < height; ++y) {
+    const float* in = pixels.data() + (height - 1 - y) * row;
+    float* out = sum.rgba.data() + y * row;
+    for (std::size_t i = 0; i < row; ++i) out[i] += in[i];
+  }
+}
+
+}  // namespace
+
+struct Stage::Impl {
+  StageDef def;
+  Camera camera;
+  Sun sun;
+  Environment environment;
+
+  Slots<std::unique_ptr<GpuMesh>, MeshTag> meshes{"mesh"};
+  Slots<std::unique_ptr<GpuMaterial>, MaterialTag> materials{"material"};
+  Slots<std::unique_ptr<Instance>, InstanceTag> instances{"instance"};
+  Slots<std::unique_ptr<PointSet>, PointsTag> point_sets{"point set"};
+
+  Picture picture;
+  ShadowMap shadow_map;
+  MeshPass mesh_pass;
+  PointsPass points_pass;
+  gl::LazyProgram sky_program{{"frame.glsl", "sky.vert"}, {"frame.glsl", "sky.glsl", "sky.frag"}};
+  gl::VertexArray no_attributes = gl::make_vertex_array();
+  gl::StreamBuffer frame_buffer;
+  std::vector<float> pixels;
+
+  explicit Impl(const StageDef& stage_def)
+      : def(stage_def),
+        picture(def.width_px, def.height_px),
+        shadow_map(def.shadow_map_px),
+        pixels(static_cast<std::size_t>(def.width_px) * static_cast<std::size_t>(def.height_px) * 4) {
+    glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+    gl::check_error("making the stage");
+  }
+
+  void upload(const FrameUniforms& frame) {
+    frame_buffer.write(std::span<const FrameUniforms>(&frame, 1));
+    glBindBufferBase(GL_UNIFORM_BUFFER, kFrameBlock, frame_buffer);
+  }
+  std::vector<PointSet*> prepare_points(const View& view);
+  void draw_shadows(std::span<const Instance* const> shown, std::span<PointSet* const> sets, const View& view,
+                    const SampleOffsets& offsets, FrameUniforms& frame);
+  void draw_opaque(std::span<PointSet* const> sets);
+  void draw_blended(std::span<PointSet* const> sets);
+};
+
+std::vector<PointSet*> Stage::Impl::prepare_points(const View& view) {
+  std::vector<PointSet*> result;
+  point_sets.for_each([&](const std::unique_ptr<PointSet>& set) {
+    if (set->points.empty()) return;
+    points_pass.prepare(*set, view);
+    result.push_back(set.get());
+  });
+  return result;
+}
+
+void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span<PointSet* const> sets,
+                               const View& view, const SampleOffsets& offsets, FrameUniforms& frame) {
+  std::vector<Caster> casters;
+  for (const Instance* instance : shown) {
+    if (instance->visible && instance->casts_shadow && instance->mesh->index_count > 0 &&
+        !instance->is_ground()) {
+      casters.push_back(instance->ball());
+    }
+  }
+  for (const PointSet* set : sets) {
+    if (!set->def.casts_shadow) continue;
+    for (int k = 0; k < 8; ++k) {
+      casters.push_back({set->box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k)), 1e-3f});
+    }
+  }
+  // Without a caster the map is empty, which is light everywhere.
+  ShadowFrame shadow;
+  if (sun.shadows)
+    shadow = fit_shadow(casters, view, frame.sun_direction.head<3>(), frame.eye.w(), def.shadow_map_px);
+  if (shadow.texel_m > 0) {
+    Matrix4f map_from_clip = Matrix4f::Identity();
+    map_from_clip.diagonal() << 0.5f, 0.5f, 1, 1;
+    map_from_clip.col(3) << 0.5f, 0.5f, 0, 1;
+    frame.shadow_from_world = map_from_clip * shadow.clip_from_world;
+    const auto size = static_cast<float>(def.shadow_map_px);
+    const float seed = 1 + offsets.light.x() + 2 * offsets.light.y();
+    frame.shadow = {shadow.texel_m, size, 1 / size, seed};
+    frame.sun_direction.w() = 1;
+  }
+  upload(frame);
+  if (shadow.texel_m == 0) return;
+
+  shadow_map.begin();
+  mesh_pass.draw_shadows(shadow.clip_from_world);
+  for (const PointSet* set : sets) {
+    if (set->def.casts_shadow) points_pass.draw_shadow(*set, shadow.clip_from_world);
+  }
+  shadow_map.end();
+}
+
+void Stage::Impl::draw_opaque(std::span<PointSet* const> sets) {
+  glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
+  glViewport(0, 0, def.width_px, def.height_px);
+  glEnable(GL_DEPTH_TEST);
+  glDepthMask(GL_TRUE);
+  glDepthFunc(GL_GREATER);
+  glDisable(GL_BLEND);
+  const float nothing[4] = {0, 0, 0, 0};
+  glClearNamedFramebufferfv(picture.framebuffer, GL_COLOR, 0, nothing);
+  glClearNamedFramebufferfv(picture.framebuffer, GL_DEPTH, 0, nothing);
+
+  mesh_pass.draw_opaque();
+  glDisable(GL_CULL_FACE);
+  for (const PointSet* set : sets) {
+    if (set->def.style == PointStyle::sphere) points_pass.draw_spheres(*set);
+  }
+  if (environment.visible) {
+    glDepthFunc(GL_EQUAL);  // only where nothing was drawn
+    sky_program.use();
+    glBindVertexArray(no_attributes);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+    glDepthFunc(GL_GREATER);
+  }
+}
+
+void Stage::Impl::draw_blended(std::span<PointSet* const> sets) {
+  // Premultiplied: what adds light has no alpha, so one blend function serves both.
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  glDepthMask(GL_FALSE);
+  mesh_pass.draw_blended();
+  glDisable(GL_CULL_FACE);
+
+  const auto blended = [](const PointSet* set) { return set->def.style != PointStyle::sphere; };
+  if (std::none_of(sets.begin(), sets.end(), blended)) return;
+  glBlitNamedFramebuffer(picture.framebuffer, picture.depth_copy_framebuffer, 0, 0, def.width_px,
+                         def.height_px, 0, 0, def.width_px, def.height_px, GL_DEPTH_BUFFER_BIT, GL_NEAREST);
+  glBindTextureUnit(kSceneDepthUnit, picture.depth_copy);
+  for (const PointSet* set : sets) {
+    if (blended(set)) points_pass.draw_blended(*set);
+  }
+}
+
+Stage::Stage(Context&, const StageDef& def) : impl_(std::make_unique<Impl>(def)) {}
+Stage::~Stage() = default;
+Stage::Stage(Stage&&) noexcept = default;
+
+MeshHandle Stage::add_mesh(const Mesh& mesh) {
+  const MeshHandle handle = impl_->meshes.add(std::make_unique<GpuMesh>(mesh));
+  gl::check_error("uploading a mesh");
+  return handle;
+}
+
+MaterialHandle Stage::add_material(const Material& material, std::span<const Image> textures) {
+  auto gpu = std::make_unique<GpuMaterial>(make_gpu_material(material, textures));
+  gl::check_error("uploading a material");
+  return impl_->materials.add(std::move(gpu));
+}
+
+InstanceHandle Stage::add_instance(MeshHandle mesh, MaterialHandle material, bool casts_shadow) {
+  auto instance = std::make_unique<Instance>();
+  instance->mesh = impl_->meshes[mesh].get();
+  instance->material = impl_->materials[material].get();
+  instance->batch_key = {material.index, mesh.index};
+  instance->casts_shadow = casts_shadow;
+  return impl_->instances.add(std::move(instance));
+}
+
+PointsHandle Stage::add_points(const PointsDef& def) {
+  auto set = std::make_unique<PointSet>();
+  set->def = def;
+  return impl_->point_sets.add(std::move(set));
+}
+
+void Stage::remove(InstanceHandle instance) {
+  impl_->instances.remove(instance);
+}
+void Stage::remove(PointsHandle points) {
+  impl_->point_sets.remove(points);
+}
+
+void Stage::set_transform(InstanceHandle instance, const Eigen::Affine3f& world_from_mesh) {
+  impl_->instances[instance]->world_from_mesh = world_from_mesh;
+}
+void Stage::set_visible(InstanceHandle instance, bool visible) {
+  impl_->instances[instance]->visible = visible;
+}
+void Stage::set_points(PointsHandle points, std::span<const Point> values) {
+  impl_->point_sets[points]->assign(values);
+}
+
+void Stage::set_camera(const Camera& camera) {
+  impl_->camera = camera;
+}
+void Stage::set_sun(const Sun& sun) {
+  impl_->sun = sun;
+}
+void Stage::set_environment(const Environment& environment) {
+  impl_->environment = environment;
+}
+
+void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
+  Impl& s = *impl_;
+  if (sum.width_px != s.def.width_px || sum.height_px != s.def.height_px ||
+      sum.rgba.size() != s.pixels.size()) {
+    sum = {s.def.width_px, s.def.height_px, std::vector<float>(s.pixels.size(), 0.0f)};
+  }
+  const View view = make_view(s.camera, offsets, s.def.width_px, s.def.height_px);
+  FrameUniforms frame = make_frame(view, s.sun, s.environment, offsets, s.def.width_px, s.def.height_px);
+
+  std::vector<const Instance*> shown;
+  s.instances.for_each([&](const std::unique_ptr<Instance>& instance) { shown.push_back(instance.get()); });
+  s.mesh_pass.prepare(shown, view);
+  const std::vector<PointSet*> sets = s.prepare_points(view);
+  s.draw_shadows(shown, sets, view, offsets, frame);
+  s.draw_opaque(sets);
+  s.draw_blended(sets);
+
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, s.picture.framebuffer);
+  glReadPixels(0, 0, s.def.width_px, s.def.height_px, GL_RGBA, GL_FLOAT, s.pixels.data());
+  gl::check_error("drawing a frame");
+  add_bottom_up(s.pixels, sum);
+}
+
+}  // namespace offstage::render

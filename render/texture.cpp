@@ -1,0 +1,98 @@
+#include "render/texture.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include "render/error.h"
+#include "render/tone_map.h"
+
+namespace offstage::render {
+namespace {
+
+constexpr int kMaxSize_px = 16384;
+
+using ChannelTable = std::array<float, 256>;
+
+ChannelTable decode_table(TextureContent content) {
+  ChannelTable table;
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    const float value = static_cast<float>(i) / 255;
+    table[i] = content == TextureContent::color ? srgb_decode(value) : value;
+  }
+  return table;
+}
+
+uint8_t encode(float value, TextureContent content) {
+  const float encoded = content == TextureContent::color ? srgb_encode(value) : value;
+  return static_cast<uint8_t>(std::clamp(encoded, 0.0f, 1.0f) * 255 + 0.5f);
+}
+
+// Half the size; colours weigh by their alpha, so that what is cut out leaves no fringe.
+Image half_size(const Image& image, TextureContent content, const ChannelTable& decode) {
+  Image half{std::max(image.width_px / 2, 1), std::max(image.height_px / 2, 1), {}};
+  half.rgba.reserve(half.pixel_count() * 4);
+  for (int y = 0; y < half.height_px; ++y) {
+    for (int x = 0; x < half.width_px; ++x) {
+      std::array<float, 3> weighted{}, plain{};
+      float alpha = 0;
+      for (int k = 0; k < 4; ++k) {
+        const int sx = std::min(2 * x + (k & 1), image.width_px - 1),
+                  sy = std::min(2 * y + k / 2, image.height_px - 1);
+        const uint8_t* pixel =
+            image.rgba.data() + 4 * (static_cast<std::ptrdiff_t>(sy) * image.width_px + sx);
+        const float a = static_cast<float>(pixel[3]) / 255;
+        alpha += a;
+        for (std::size_t c = 0; c < 3; ++c) {
+          weighted[c] += a * decode[pixel[c]];
+          plain[c] += decode[pixel[c]];
+        }
+      }
+      for (std::size_t c = 0; c < 3; ++c) {
+        half.rgba.push_back(encode(alpha > 0 ? weighted[c] / alpha : plain[c] / 4, content));
+      }
+      half.rgba.push_back(static_cast<uint8_t>(alpha / 4 * 255 + 0.5f));
+    }
+  }
+  return half;
+}
+
+}  // namespace
+
+gl::Texture make_texture(const Image& image, TextureContent content) {
+  if (image.width_px < 1 || image.height_px < 1 || std::max(image.width_px, image.height_px) > kMaxSize_px) {
+    throw UnavailableError("a texture of " + std::to_string(image.width_px) + "x" +
+                           std::to_string(image.height_px) + " pixels cannot be drawn; up to " +
+                           std::to_string(kMaxSize_px) + " each way are possible");
+  }
+  GLuint name = 0;
+  glCreateTextures(GL_TEXTURE_2D, 1, &name);
+  gl::Texture texture(name);
+  const int levels = std::bit_width(static_cast<unsigned>(std::max(image.width_px, image.height_px)));
+  glTextureStorage2D(texture, levels, content == TextureContent::color ? GL_SRGB8_ALPHA8 : GL_RGBA8,
+                     image.width_px, image.height_px);
+  glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
+
+  const ChannelTable decode = decode_table(content);
+  Image level = image;
+  for (int k = 0; k < levels; ++k) {
+    if (k > 0) level = half_size(level, content, decode);
+    glTextureSubImage2D(texture, k, 0, 0, level.width_px, level.height_px, GL_RGBA, GL_UNSIGNED_BYTE,
+                        level.rgba.data());
+  }
+  return texture;
+}
+
+gl::Texture make_white_texture() {
+  return make_texture({1, 1, {255, 255, 255, 255}}, TextureContent::data);
+}
+
+bool has_alpha(const Image& image) {
+  for (std::size_t i = 3; i < image.rgba.size(); i += 4) {
+    if (image.rgba[i] != 255) return true;
+  }
+  return false;
+}
+
+}  // namespace offstage::render

@@ -1,0 +1,108 @@
+#include "render/tone_map.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace offstage::render {
+namespace {
+
+// A display curve as a table over the upper bits of a float: the exponent and kMantissaBits of the mantissa,
+// each entry taken at its cell's centre. Entries are in 1/256 of an 8-bit step; the steepest place of the
+// sRGB curve is off by 0.11 steps. Below the first cell the display value is under 0.1 steps.
+constexpr int kMantissaBits = 9;
+constexpr int kShift = 23 - kMantissaBits;
+constexpr int kFirstExponent = -15, kLastExponent = 7;
+constexpr int kFirstCell = (127 + kFirstExponent) << kMantissaBits;
+constexpr int kCellCount = (kLastExponent - kFirstExponent) << kMantissaBits;
+constexpr int kStep = 256;
+
+using Table = std::vector<uint16_t>;
+
+// Rational fit of a film's response by K. Narkowicz, "ACES Filmic Tone Mapping Curve" (2015). The scale puts
+// a sunlit white at 0.91 and leaves its reflections room above.
+double filmic(double x) {
+  constexpr double kScale = 0.4;
+  x *= kScale;
+  return x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14);
+}
+
+double encode(double linear) {
+  return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
+}
+
+Table make_table(ToneCurve curve) {
+  Table table(kCellCount + 1, 0);
+  for (int cell = 0; cell < kCellCount; ++cell) {
+    const auto low = std::bit_cast<float>((cell + kFirstCell) << kShift);
+    const auto high = std::bit_cast<float>((cell + kFirstCell + 1) << kShift);
+    const double x = 0.5 * (static_cast<double>(low) + static_cast<double>(high));
+    const double display = encode(std::clamp(curve == ToneCurve::filmic ? filmic(x) : x, 0.0, 1.0));
+    table[static_cast<std::size_t>(cell) + 1] = static_cast<uint16_t>(std::lround(display * 255 * kStep));
+  }
+  return table;
+}
+
+const Table& table_of(ToneCurve curve) {
+  static const Table filmic_table = make_table(ToneCurve::filmic);
+  static const Table linear_table = make_table(ToneCurve::linear);
+  return curve == ToneCurve::filmic ? filmic_table : linear_table;
+}
+
+// Negative numbers have the sign bit, so they end in the table's first entry, which is black.
+inline uint32_t look_up(const uint16_t* table, float value) {
+  const int cell = (std::bit_cast<int32_t>(value) >> kShift) - kFirstCell + 1;
+  return table[std::clamp(cell, 0, kCellCount)];
+}
+
+// A threshold in [0, kStep) by the R2 sequence of M. Roberts folded to a triangle wave: close to blue noise,
+// no table.
+inline uint32_t dither_threshold(uint32_t x, uint32_t y) {
+  const uint32_t phase = x * 3242174889u + y * 2447445413u;
+  const uint32_t folded = phase ^ (phase & 0x80000000u ? 0xFFFFFFFFu : 0u);
+  return folded >> 23;
+}
+
+inline uint8_t quantize(uint32_t value, uint32_t threshold) {
+  return static_cast<uint8_t>((value + threshold) / kStep);
+}
+
+}  // namespace
+
+float srgb_encode(float linear) {
+  return static_cast<float>(encode(static_cast<double>(linear)));
+}
+
+float srgb_decode(float encoded) {
+  const double x = encoded;
+  return static_cast<float>(x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4));
+}
+
+Image tone_map(const HdrImage& sum, const ToneMap& options) {
+  constexpr float kOpaque = 0.9999f;  // of N summed ones times 1/N
+  Image image{sum.width_px, sum.height_px, std::vector<uint8_t>(sum.rgba.size())};
+  const uint16_t* table = table_of(options.curve).data();
+  const float weight = options.sample_weight;
+  const float gain = options.exposure * weight;
+  const float* in = sum.rgba.data();
+  uint8_t* out = image.rgba.data();
+  for (uint32_t y = 0; y < static_cast<uint32_t>(sum.height_px); ++y) {
+    for (uint32_t x = 0; x < static_cast<uint32_t>(sum.width_px); ++x, in += 4, out += 4) {
+      float alpha = in[3] * weight;
+      float scale = gain;
+      if (alpha < kOpaque) {
+        // Added light covers nothing, yet a picture with straight alpha can only show what it covers.
+        alpha = std::max(alpha, std::min(1.0f, gain * std::max({in[0], in[1], in[2]})));
+        scale = alpha > 0 ? gain / alpha : 0;
+      }
+      const uint32_t threshold = options.dither ? dither_threshold(x, y) : kStep / 2;
+      out[0] = quantize(look_up(table, in[0] * scale), threshold);
+      out[1] = quantize(look_up(table, in[1] * scale), threshold);
+      out[2] = quantize(look_up(table, in[2] * scale), threshold);
+      out[3] = static_cast<uint8_t>(std::clamp(alpha, 0.0f, 1.0f) * 255 + 0.5f);
+    }
+  }
+  return image;
+}
+
+}  // namespace offstage::render

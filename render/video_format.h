@@ -1,0 +1,32 @@
+#pragma once
+/// What each video file name means to ffmpeg: encoder, container and their options. Private to render.
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "render/sink.h"
+
+namespace offstage::render {
+
+struct VideoFormat {
+  const char* extension;
+  const char* encoder;
+  const char* container;
+  bool keeps_alpha;
+  bool needs_even_size;  ///< colour is stored at half size in both directions
+  double max_fps;
+  std::vector<std::string> opaque;       ///< encoder options
+  std::vector<std::string> transparent;  ///< encoder options with alpha
+};
+
+std::span<const VideoFormat> video_formats();
+
+/// The format of a definition that it can represent. Throws std::invalid_argument with advice.
+const VideoFormat& video_format(const VideoDef& def);
+
+/// The whole command; frames are read from its standard input.
+std::vector<std::string> encoder_command(const std::string& ffmpeg, const VideoDef& def,
+                                         const VideoFormat& format, const std::filesystem::path& output);
+
+}  // namespace offstage::render

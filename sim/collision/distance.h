@@ -1,0 +1,68 @@
+#pragma once
+/// Signed distance to solids, with the direction in which it grows. A solid is a shape together with its
+/// registered mesh if it has one; points and normals are in the shape's own frame. Distances to the
+/// primitives are exact, inside and outside, and therefore convex functions of the point, which
+/// sphere_sweep.h relies on.
+
+#include <array>
+#include <limits>
+
+#include "sim/collision/aabb_tree.h"
+#include "sim/geometry/mass_properties.h"
+#include "sim/geometry/mesh.h"
+#include "sim/shape.h"
+#include "sim/types.h"
+
+namespace offstage::sim {
+
+/// Distance of a point to a surface, negative inside, and its unit gradient there.
+struct SurfaceDistance {
+  Real distance = std::numeric_limits<Real>::infinity();
+  Vec3 normal = Vec3::UnitY();
+};
+
+/// A registered mesh with what registration computes once (E2).
+struct CollisionMesh {
+  explicit CollisionMesh(TriangleMesh welded);
+
+  TriangleMesh mesh;
+  MeshTopology topology;
+  MassProperties mass;
+  AabbTree tree;
+  bool solid;  ///< closed and not inverted: it has an inside; else it is a two-sided surface
+};
+
+struct Solid {
+  const Shape* shape = nullptr;
+  const CollisionMesh* mesh = nullptr;  ///< for a MeshShape
+};
+
+/// Where a point's projection on a triangle lies.
+struct TrianglePoint {
+  Vec3 point;
+  std::array<Real, 3> weights;  ///< barycentric; exactly 0 for the vertices that the closest feature excludes
+};
+TrianglePoint closest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);
+
+SurfaceDistance signed_distance(const Sphere& s, const Vec3& p);
+SurfaceDistance signed_distance(const Box& b, const Vec3& p);
+SurfaceDistance signed_distance(const Capsule& c, const Vec3& p);
+SurfaceDistance signed_distance(const Cylinder& c, const Vec3& p);
+SurfaceDistance signed_distance(const Cone& c, const Vec3& p);
+SurfaceDistance signed_distance(const Plane&, const Vec3& p);
+/// A mesh that is not solid has positive distances on both sides; inside or outside of a solid one is decided
+/// by the pseudonormal of the nearest feature.
+SurfaceDistance signed_distance(const CollisionMesh& m, const Vec3& p);
+SurfaceDistance signed_distance(const Solid& s, const Vec3& p);
+
+/// Support function: the largest n.x over the points x of a solid; infinite for a plane unless n is +Y.
+Real support(const Solid& s, const Vec3& n);
+
+/// Box of a solid in its own frame, tight; infinite for a plane.
+Aabb local_bounds(const Solid& s);
+/// Box of a placed solid in the world; tight for primitives, around the placed local box for meshes.
+Aabb bounds(const Solid& s, const Pose& pose);
+/// Distance of the farthest point from the frame's origin.
+Real reach(const Solid& s);
+
+}  // namespace offstage::sim

@@ -1,0 +1,65 @@
+#include "sim/collision/obstacles.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace offstage::sim {
+namespace {
+
+constexpr int kMaxPieces = 16;
+
+}  // namespace
+
+Obstacle::Obstacle(const Solid& shape, const Pose& from, const Pose& to, Real duration, Real e, Real mu)
+    : solid(shape), start(from), end(to), extent(reach(shape)), restitution(e), friction(mu) {
+  if (from.position != to.position) velocity = (to.position - from.position) / duration;
+  if (from.orientation.coeffs() == to.orientation.coeffs()) return;
+  Quat rotation = to.orientation * from.orientation.conjugate();
+  if (rotation.w() < 0) rotation.coeffs() = -rotation.coeffs();
+  const Eigen::AngleAxisd axis_angle(rotation);
+  angular_velocity = axis_angle.angle() / duration * axis_angle.axis();
+  if (std::holds_alternative<Sphere>(*shape.shape)) {
+    end.orientation = from.orientation;  // a turning sphere stays where it is
+  } else {
+    turn = axis_angle.angle();
+    if (from.orientation.dot(end.orientation) < 0) end.orientation.coeffs() = -end.orientation.coeffs();
+  }
+}
+
+Pose Obstacle::at(Real fraction) const {
+  Pose pose = start;
+  pose.position += fraction * (end.position - start.position);
+  if (turn > 0)
+    pose.orientation.coeffs() =
+        ((1 - fraction) * start.orientation.coeffs() + fraction * end.orientation.coeffs()).normalized();
+  return pose;
+}
+
+int Obstacle::pieces(Real particle_radius) const {
+  if (turn == 0) return 1;
+  // An arc of angle a and radius R leaves its chord by R a^2 / 8.
+  const Real count = turn * std::sqrt(extent / (8 * kChordError * particle_radius));
+  return count < kMaxPieces ? std::max(1, static_cast<int>(std::ceil(count))) : kMaxPieces;
+}
+
+Aabb Obstacle::swept_bounds() const {
+  if (turn == 0) return bounds(solid, start).merged(bounds(solid, end));
+  const Vec3 around = Vec3::Constant(extent);
+  return {start.position.cwiseMin(end.position) - around, start.position.cwiseMax(end.position) + around};
+}
+
+Obstacles::Obstacles(std::vector<Obstacle> obstacles) : obstacles_(std::move(obstacles)) {
+  for (uint32_t i = 0; i < obstacles_.size(); ++i) {
+    const Obstacle& o = obstacles_[i];
+    if (std::holds_alternative<Plane>(*o.solid.shape)) {
+      const Vec3 n0 = o.start.vector_to_world(Vec3::UnitY()), n1 = o.end.vector_to_world(Vec3::UnitY());
+      planes_.push_back({n0, n1, n0.dot(o.start.position), n1.dot(o.end.position), i});
+    } else {
+      boxed_.push_back(i);
+      boxes_.push_back(o.swept_bounds());
+    }
+  }
+  tree_ = AabbTree(boxes_);
+}
+
+}  // namespace offstage::sim

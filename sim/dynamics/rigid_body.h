@@ -1,0 +1,39 @@
+#pragma once
+/// State and equations of motion of a rigid body (physics R1). Integration works on (x, q) and the momenta
+/// (L, H): torque-free motion then keeps the angular momentum exactly.
+
+#include "sim/types.h"
+
+namespace offstage::sim {
+
+struct RigidBody {
+  Real mass = 1;
+  Vec3 centre = Vec3::Zero();       ///< of mass, in the shape's frame
+  Mat3 inertia = Mat3::Identity();  ///< about the centre of mass, axes of the shape's frame
+  Mat3 inverse_inertia = Mat3::Identity();
+  Real linear_drag = 0, angular_drag = 0;
+
+  Vec3 position = Vec3::Zero();  ///< of the centre of mass, world
+  Quat orientation = Quat::Identity();
+  Vec3 momentum = Vec3::Zero();          ///< L
+  Vec3 angular_momentum = Vec3::Zero();  ///< H, about the centre of mass, world
+
+  Vec3 velocity() const { return momentum / mass; }
+  /// w = R I^-1 R^T H.
+  Vec3 angular_velocity() const { return angular_velocity(orientation, angular_momentum); }
+  Vec3 angular_velocity(const Quat& q, const Vec3& H) const {
+    return q * (inverse_inertia * (q.conjugate() * H));
+  }
+  Pose pose() const { return {position - orientation * centre, orientation}; }
+
+  void place(const Pose& pose) {
+    orientation = pose.orientation.normalized();
+    position = pose.position + orientation * centre;
+  }
+  void set_velocity(const Vec3& v, const Vec3& w) {
+    momentum = mass * v;
+    angular_momentum = orientation * (inertia * (orientation.conjugate() * w));
+  }
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,327 @@
+#include "sim/world.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "sim/world_impl.h"
+
+namespace offstage::sim {
+namespace {
+
+[[noreturn]] void refuse(const std::string& object, const std::string& what) {
+  throw std::invalid_argument(object + ": " + what);
+}
+
+std::string quoted(const char* kind, const std::string& name) {
+  return name.empty() ? std::string(kind) : std::string(kind) + " \"" + name + '"';
+}
+
+void check_positive(const std::string& object, const char* field, Real value) {
+  if (!(value > 0) || !std::isfinite(value))
+    refuse(object, std::string(field) + " is " + std::to_string(value) + ", allowed is a finite number > 0");
+}
+
+void check_not_negative(const std::string& object, const char* field, Real value) {
+  if (!(value >= 0) || !std::isfinite(value))
+    refuse(object, std::string(field) + " is " + std::to_string(value) + ", allowed is a finite number >= 0");
+}
+
+void check_finite(const std::string& object, const char* field, const Vec3& value) {
+  if (!value.allFinite()) refuse(object, std::string(field) + " is not finite");
+}
+
+void check_pose(const std::string& object, const char* field, const Pose& pose) {
+  check_finite(object, field, pose.position);
+  const Real norm = pose.orientation.norm();
+  if (!(std::abs(norm - 1) < 1e-6))
+    refuse(object,
+           std::string(field) + " has a quaternion of length " + std::to_string(norm) + ", allowed is 1");
+}
+
+void check_size(const std::string& o, const Sphere& s) {
+  check_positive(o, "radius", s.radius);
+}
+void check_size(const std::string& o, const Box& b) {
+  for (int i = 0; i < 3; ++i) check_positive(o, "size", b.size[i]);
+}
+void check_size(const std::string& o, const Capsule& c) {
+  check_positive(o, "radius", c.radius);
+  check_not_negative(o, "height", c.height);
+}
+void check_size(const std::string& o, const Cylinder& c) {
+  check_positive(o, "radius", c.radius);
+  check_positive(o, "height", c.height);
+}
+void check_size(const std::string& o, const Cone& c) {
+  check_positive(o, "radius", c.radius);
+  check_positive(o, "height", c.height);
+}
+void check_size(const std::string&, const Plane&) {}
+void check_size(const std::string&, const MeshShape&) {}
+
+void check_track(const std::string& object, const KeyframeTrack& track) {
+  check_finite(object, "track.spin", track.spin);
+  for (std::size_t i = 0; i < track.keys.size(); ++i) {
+    check_pose(object, "track.keys", track.keys[i].pose);
+    if (!std::isfinite(track.keys[i].time) || (i > 0 && track.keys[i].time <= track.keys[i - 1].time))
+      refuse(object, "track.keys: times must be finite and strictly increasing");
+  }
+}
+
+void check_body(const std::string& object, const BodyDef& def) {
+  std::visit([&](const auto& shape) { check_size(object, shape); }, def.shape);
+  check_pose(object, "pose", def.pose);
+  check_finite(object, "velocity", def.velocity);
+  check_finite(object, "angular_velocity", def.angular_velocity);
+  check_not_negative(object, "mass", def.mass);
+  if (def.mass == 0) check_positive(object, "density", def.density);
+  check_not_negative(object, "linear_drag", def.linear_drag);
+  check_not_negative(object, "angular_drag", def.angular_drag);
+  check_not_negative(object, "friction", def.friction);
+  if (!(def.restitution >= 0 && def.restitution <= 1))
+    refuse(object, "restitution is " + std::to_string(def.restitution) + ", allowed is 0 to 1");
+  check_track(object, def.track);
+}
+
+RigidBody make_rigid_body(const std::string& object, const BodyDef& def, const Solid& solid) {
+  if (solid.mesh && !solid.mesh->solid)
+    refuse(object,
+           "a dynamic body needs a closed mesh, this one has: " + solid.mesh->topology.defects().describe());
+  const MassProperties unit = solid.mesh ? solid.mesh->mass : mass_properties(def.shape);
+  if (!(unit.volume > 0)) refuse(object, "a dynamic body needs a solid shape, this one has no volume");
+  RigidBody rigid;
+  rigid.mass = def.mass > 0 ? def.mass : def.density * unit.volume;
+  rigid.centre = unit.centre;
+  rigid.inertia = rigid.mass / unit.volume * unit.inertia;
+  rigid.inverse_inertia = rigid.inertia.inverse();
+  rigid.linear_drag = def.linear_drag;
+  rigid.angular_drag = def.angular_drag;
+  rigid.place(def.pose);
+  rigid.set_velocity(def.velocity, def.angular_velocity);
+  return rigid;
+}
+
+}  // namespace
+
+Motion Body::motion(Real now, Real time) const {
+  if (is_kinematic()) return def.track.at(time, def.pose);
+  if (!is_dynamic()) return {.pose = pose};
+  // Extrapolated along the present velocities.
+  const Real dt = time - now;
+  const Vec3 v = rigid.velocity(), w = rigid.angular_velocity();
+  const Real rate = w.norm();
+  RigidBody later = rigid;
+  later.position += dt * v;
+  if (rate > 0)
+    later.orientation = (Quat(Eigen::AngleAxisd(rate * dt, w / rate)) * rigid.orientation).normalized();
+  const Vec3 arm = -(later.orientation * rigid.centre);
+  return {later.pose(), v + w.cross(arm), w};
+}
+
+bool WorldState::is_alive(const Attachment& a) const {
+  if (const auto* b = std::get_if<BodyPoint>(&a)) return bodies.find(b->body) != nullptr;
+  if (const auto* p = std::get_if<ParticlePoint>(&a)) {
+    const ParticleSystem* system = systems.find(p->system);
+    return system && system->find(p->id);
+  }
+  return true;
+}
+
+Vec3 WorldState::position(const Attachment& a) const {
+  if (const auto* b = std::get_if<BodyPoint>(&a)) return bodies[b->body]->pose.point_to_world(b->position);
+  if (const auto* p = std::get_if<ParticlePoint>(&a)) {
+    const ParticleSystem& system = systems[p->system];
+    return system.arrays.position[*system.find(p->id)];
+  }
+  return std::get<WorldPoint>(a).position;
+}
+
+void WorldState::remove_dead_springs() {
+  std::vector<SpringHandle> dead;
+  springs.for_each([&](SpringHandle handle, const Spring& s) {
+    if (!is_alive(s.def.a) || !is_alive(s.def.b)) dead.push_back(handle);
+  });
+  for (SpringHandle handle : dead) springs.erase(handle);
+}
+
+World::World(const WorldDef& def) : impl_(std::make_unique<Impl>()) {
+  check_positive("world", "max_step", def.max_step);
+  check_finite("world", "gravity", def.gravity);
+  check_finite("world", "wind", def.wind);
+  if (def.bounds.isEmpty()) refuse("world", "bounds are empty");
+  impl_->def = def;
+}
+World::~World() = default;
+World::World(World&&) noexcept = default;
+World& World::operator=(World&&) noexcept = default;
+
+MeshHandle World::add_mesh(const TriangleMesh& mesh) {
+  for (const Vec3& v : mesh.vertices) check_finite("mesh", "a vertex", v);
+  for (const Triangle& t : mesh.triangles)
+    for (uint32_t v : t)
+      if (v >= mesh.vertices.size())
+        refuse("mesh", "vertex index " + std::to_string(v) + " of " + std::to_string(mesh.vertices.size()) +
+                           " vertices");
+  TriangleMesh welded = weld(mesh);
+  if (welded.triangles.empty()) refuse("mesh", "it has no face");
+  return impl_->meshes.insert(std::make_unique<CollisionMesh>(std::move(welded)));
+}
+
+const MeshTopology& World::topology(MeshHandle mesh) const {
+  return impl_->meshes[mesh]->topology;
+}
+const TriangleMesh& World::mesh(MeshHandle mesh) const {
+  return impl_->meshes[mesh]->mesh;
+}
+
+BodyHandle World::add_body(const BodyDef& def) {
+  const std::string object = quoted("body", def.name);
+  check_body(object, def);
+  auto body = std::make_unique<Body>();
+  body->def = def;
+  body->solid.shape = &body->def.shape;
+  if (const auto* shape = std::get_if<MeshShape>(&def.shape)) {
+    const auto* mesh = impl_->meshes.find(shape->mesh);
+    if (!mesh) refuse(object, "its mesh is not registered");
+    body->solid.mesh = mesh->get();
+  }
+  body->pose = {def.pose.position, def.pose.orientation.normalized()};
+  if (def.motion == MotionType::dynamic) body->rigid = make_rigid_body(object, def, body->solid);
+  if (def.motion == MotionType::kinematic) body->pose = def.track.at(impl_->now, def.pose).pose;
+  body->before_step = body->before_substep = body->pose;
+  impl_->fixed_changed = true;
+  return impl_->bodies.insert(std::move(body));
+}
+
+ParticleSystemHandle World::add_particle_system(const ParticleSystemDef& def) {
+  const std::string object = quoted("particle system", def.name);
+  check_not_negative(object, "linear_drag", def.linear_drag);
+  check_finite(object, "force", def.force);
+  ParticleSystem system;
+  system.def = def;
+  return impl_->systems.insert(std::move(system));
+}
+
+SpringHandle World::add_spring(const SpringDef& def) {
+  const std::string object = quoted("spring", def.name);
+  check_not_negative(object, "stiffness", def.stiffness);
+  check_not_negative(object, "damping", def.damping);
+  if (!impl_->is_alive(def.a) || !impl_->is_alive(def.b))
+    refuse(object, "an end is attached to nothing that exists");
+  const Real rest =
+      def.rest_length >= 0 ? def.rest_length : (impl_->position(def.a) - impl_->position(def.b)).norm();
+  return impl_->springs.insert({def, rest});
+}
+
+bool World::remove(BodyHandle body) {
+  if (!impl_->bodies.erase(body)) return false;
+  std::erase_if(impl_->moved, [&](const MovedBody& m) { return m.body == body; });
+  impl_->fixed_changed = true;
+  impl_->remove_dead_springs();
+  return true;
+}
+
+bool World::remove(ParticleSystemHandle system) {
+  if (!impl_->systems.erase(system)) return false;
+  impl_->remove_dead_springs();
+  return true;
+}
+
+bool World::remove(SpringHandle spring) {
+  return impl_->springs.erase(spring);
+}
+
+uint64_t World::add_particle(ParticleSystemHandle system, const Particle& particle, Real elapsed) {
+  assert(particle.mass > 0 && particle.radius > 0);
+  ++impl_->born;
+  return impl_->systems[system].add(particle, elapsed);
+}
+
+StepReport World::step(Real sampling_time, const BeforeSubStep& before) {
+  return impl_->step(sampling_time, before);
+}
+
+Real World::time() const {
+  return impl_->now;
+}
+const WorldDef& World::def() const {
+  return impl_->def;
+}
+std::span<const MovedBody> World::moved() const {
+  return impl_->moved;
+}
+const BodyDef& World::body_def(BodyHandle body) const {
+  return impl_->bodies[body]->def;
+}
+const ParticleArrays& World::particles(ParticleSystemHandle system) const {
+  return impl_->systems[system].arrays;
+}
+const ParticleSystemDef& World::particle_system_def(ParticleSystemHandle system) const {
+  return impl_->systems[system].def;
+}
+Motion World::body_motion(BodyHandle body, Real time) const {
+  return impl_->bodies[body]->motion(impl_->now, time);
+}
+
+BodyState World::body(BodyHandle handle) const {
+  const Body& body = *impl_->bodies[handle];
+  const RigidBody& rigid = body.rigid;
+  if (body.def.motion == MotionType::dynamic)
+    return {body.pose, rigid.position, rigid.velocity(), rigid.angular_velocity(), rigid.angular_momentum,
+            rigid.mass};
+  const Motion motion = body.motion(impl_->now, impl_->now);
+  const Vec3 centre = body.solid.mesh ? body.solid.mesh->mass.centre
+                      : std::holds_alternative<Plane>(body.def.shape)
+                          ? Vec3(Vec3::Zero())
+                          : mass_properties(body.def.shape).centre;
+  const Vec3 arm = body.pose.vector_to_world(centre);
+  return {body.pose,
+          body.pose.position + arm,
+          motion.velocity + motion.angular_velocity.cross(arm),
+          motion.angular_velocity,
+          Vec3::Zero(),
+          0};
+}
+
+void World::for_each_body(const std::function<void(BodyHandle)>& f) const {
+  impl_->bodies.for_each([&](BodyHandle handle, const auto&) { f(handle); });
+}
+
+void World::for_each_particle_system(const std::function<void(ParticleSystemHandle)>& f) const {
+  impl_->systems.for_each([&](ParticleSystemHandle handle, const auto&) { f(handle); });
+}
+
+std::size_t World::body_count() const {
+  return impl_->bodies.size();
+}
+
+std::size_t World::particle_count() const {
+  std::size_t count = 0;
+  impl_->systems.for_each([&](auto, const ParticleSystem& s) { count += s.arrays.size(); });
+  return count;
+}
+
+Energy World::energy() const {
+  Energy e;
+  const Vec3& g = impl_->def.gravity;
+  impl_->bodies.for_each([&](auto, const std::unique_ptr<Body>& body) {
+    if (!body->is_dynamic()) return;
+    const RigidBody& r = body->rigid;
+    e.kinetic += r.momentum.squaredNorm() / (2 * r.mass) + r.angular_velocity().dot(r.angular_momentum) / 2;
+    e.potential -= r.mass * g.dot(r.position);
+  });
+  impl_->systems.for_each([&](auto, const ParticleSystem& s) {
+    for (std::size_t i = 0; i < s.arrays.size(); ++i) {
+      e.kinetic += s.arrays.mass[i] * s.arrays.velocity[i].squaredNorm() / 2;
+      if (s.def.gravity) e.potential -= s.arrays.mass[i] * g.dot(s.arrays.position[i]);
+    }
+  });
+  impl_->springs.for_each([&](auto, const Spring& s) {
+    const Real stretch = (impl_->position(s.def.a) - impl_->position(s.def.b)).norm() - s.rest_length;
+    e.elastic += s.def.stiffness * stretch * stretch / 2;
+  });
+  return e;
+}
+
+}  // namespace offstage::sim

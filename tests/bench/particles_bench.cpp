@@ -1,0 +1,58 @@
+/// Particles under gravity and drag that bounce on a plane: sub-steps per second, with how many of them touch
+/// it.
+
+#include <benchmark/benchmark.h>
+
+#include "effects/random.h"
+#include "sim/world.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr Real kStep = 1.0 / 240;
+
+/// `count` particles above a plane; the drop height says how soon they come to lie on it.
+World rain(std::size_t count, Real height, ParticleSystemHandle& system) {
+  World world({.max_step = kStep});
+  world.add_body({.name = "ground", .shape = Plane{}, .motion = MotionType::fixed});
+  system = world.add_particle_system({.name = "rain", .linear_drag = 1e-5});
+  const effects::RandomStream random(1, 0);
+  for (std::size_t i = 0; i < count; ++i)
+    world.add_particle(system, {.position = {10 * random.uniform(i, 0), 0.02 + height * random.uniform(i, 1),
+                                             10 * random.uniform(i, 2)},
+                                .mass = 0.001,
+                                .radius = 0.005});
+  return world;
+}
+
+void run(benchmark::State& state, Real height, int warm_up) {
+  ParticleSystemHandle system;
+  World world = rain(static_cast<std::size_t>(state.range(0)), height, system);
+  for (int i = 0; i < warm_up; ++i) world.step(kStep);
+  uint64_t collisions = 0;
+  for (auto _ : state) collisions += world.step(kStep).particle_collisions;
+  state.SetItemsProcessed(state.iterations() * state.range(0));
+  state.counters["substeps/s"] =
+      benchmark::Counter(static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
+  state.counters["collisions"] =
+      benchmark::Counter(static_cast<double>(collisions), benchmark::Counter::kAvgIterations);
+}
+
+void falling(benchmark::State& state) {
+  run(state, 100, 0);
+}
+void bouncing(benchmark::State& state) {
+  run(state, 1, 60);
+}
+void at_rest(benchmark::State& state) {
+  run(state, 0, 480);
+}
+
+BENCHMARK(falling)->Arg(1'000'000)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(bouncing)->Arg(1'000'000)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(at_rest)->Arg(1'000'000)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+}  // namespace
+}  // namespace offstage::sim
+
+BENCHMARK_MAIN();

@@ -1,0 +1,198 @@
+// What a user sees of the commands: exit codes, messages, and what is and is not written.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "cli/program.h"
+
+namespace offstage::test {
+namespace {
+
+using nlohmann::json;
+
+TEST(Commands, ValidSceneIsCalledValid) {
+  const TemporaryFolder folder;
+  const Outcome run = offstage("validate " + tiny_scene(), folder.path());
+  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_NE(run.out.find("valid, 12 frames"), std::string::npos) << run.out;
+}
+
+TEST(Commands, EveryProblemOfASceneIsReportedWithItsPlaceAndExit3) {
+  const TemporaryFolder folder;
+  write_file(folder / "bad.json",
+             "{\n  \"version\": 1,\n  \"bodies\": [\n    {\"shape\": {\"type\": \"sphere\", \"radius\": -1}, \"masss\": 2}\n  ]\n}\n");
+  for (const std::string command : {"validate bad.json", "render bad.json -o out/####.png", "simulate bad.json"}) {
+    const Outcome run = offstage(command, folder.path());
+    EXPECT_EQ(run.code, 3) << command;
+    EXPECT_NE(run.err.find("bad.json:4:"), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find("/bodies/0/shape/radius"), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find("masss"), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find("mass"), std::string::npos) << run.err;
+  }
+  EXPECT_EQ(contents(folder.path()).size(), 1u) << "nothing is written for an invalid scene";
+}
+
+TEST(Commands, MissingSceneOrModelIsExit3) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(offstage("validate nowhere.json", folder.path()).code, 3);
+  write_file(folder / "s.json",
+             R"({"version": 1, "bodies": [{"motion": "static", "shape": {"type": "mesh", "file": "no.obj"}}]})");
+  const Outcome run = offstage("validate s.json", folder.path());
+  EXPECT_EQ(run.code, 3);
+  EXPECT_NE(run.err.find("no.obj"), std::string::npos) << run.err;
+}
+
+TEST(Commands, OpenMeshAsDynamicBodyIsRefusedByValidate) {
+  const TemporaryFolder folder;
+  write_file(folder / "open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  write_file(folder / "s.json", R"({"version": 1, "bodies": [{"name": "sail", "shape": {"type": "mesh", "file": "open.obj"}}]})");
+  const Outcome run = offstage("validate s.json", folder.path());
+  EXPECT_EQ(run.code, 3);
+  EXPECT_NE(run.err.find("/bodies/0"), std::string::npos) << run.err;
+}
+
+TEST(Commands, WrongUsageIsExit2) {
+  const TemporaryFolder folder;
+  for (const std::string& command :
+       {std::string(), std::string("rendr x"), "render " + tiny_scene(), "render " + tiny_scene() + " -o film.avi",
+        "render " + tiny_scene() + " -o out/ --frames 5-99", "render " + tiny_scene() + " -o out/ --chunk 3/2",
+        "render " + tiny_scene() + " -o out/ --quality best", "frame " + tiny_scene() + " -o a.png --at 99"})
+    EXPECT_EQ(offstage(command, folder.path()).code, 2) << command;
+  EXPECT_TRUE(contents(folder.path()).empty());
+}
+
+TEST(Commands, HelpListsTheExitCodes) {
+  const TemporaryFolder folder;
+  const Outcome run = offstage("--help", folder.path());
+  EXPECT_EQ(run.code, 0);
+  EXPECT_NE(run.out.find("5 simulation diverged"), std::string::npos);
+}
+
+TEST(Commands, MissingFfmpegIsExit4BeforeAnythingIsWritten) {
+  const TemporaryFolder folder;
+  const Outcome run =
+      offstage("render " + tiny_scene() + " -o film.mp4", folder.path(), "OFFSTAGE_FFMPEG=/nonexistent/ffmpeg");
+  EXPECT_EQ(run.code, 4);
+  EXPECT_NE(run.err.find("ffmpeg"), std::string::npos) << run.err;
+  EXPECT_TRUE(contents(folder.path()).empty());
+}
+
+TEST(Commands, DivergedSimulationIsExit5AndSavesTheState) {
+  const TemporaryFolder folder;
+  write_file(folder / "s.json",
+             R"({"version": 1, "particles": [{"name": "doomed", "force": [1e308, 0, 0], "mass": 1e-6,
+                 "places": [{"position": [0, 1, 0]}]}], "output": {"duration": 1}})");
+  const Outcome run = offstage("simulate s.json", folder.path());
+  EXPECT_EQ(run.code, 5) << run.err;
+  EXPECT_NE(run.err.find("'doomed'"), std::string::npos) << run.err;
+  EXPECT_NE(read_file(folder / "offstage-diverged.json").find("doomed"), std::string::npos);
+}
+
+TEST(Commands, ContactOfTwoBodiesIsAClearRefusalNotWrongPhysics) {
+  const TemporaryFolder folder;
+  write_file(folder / "s.json",
+             R"({"version": 1, "bodies": [{"name": "floor", "motion": "static", "shape": {"type": "plane"}},
+                 {"name": "crate", "position": [0, 1, 0]}], "output": {"duration": 2}})");
+  const Outcome run = offstage("simulate s.json", folder.path());
+  EXPECT_EQ(run.code, 1);
+  EXPECT_NE(run.err.find("'crate'"), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("'floor'"), std::string::npos) << run.err;
+}
+
+TEST(Commands, OverridesAreCheckedLikeTheFile) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(offstage("validate " + tiny_scene() + " --set emitters.0.rate=200", folder.path()).code, 0);
+  EXPECT_EQ(offstage("validate " + tiny_scene() + " --set emitters.0.rte=200", folder.path()).code, 3);
+  EXPECT_EQ(offstage("validate " + tiny_scene() + " --set emitters.0.radius=-1", folder.path()).code, 3);
+}
+
+TEST(Commands, DryRunPrintsAPlanAndWritesNothing) {
+  const TemporaryFolder folder;
+  const Outcome run = offstage("render " + tiny_scene() + " -o out/####.png --frames 2-9x3 --dry-run", folder.path());
+  ASSERT_EQ(run.code, 0) << run.err;
+  EXPECT_EQ(json::parse(run.out)["frames"], 3);
+  EXPECT_TRUE(contents(folder.path()).empty());
+}
+
+TEST(Commands, StatsAreOneJsonObject) {
+  const TemporaryFolder folder;
+  const Outcome run = offstage("render " + tiny_scene() + " -o out/ --frames 1-4 --stats stats.json -q", folder.path());
+  ASSERT_EQ(run.code, 0) << run.err;
+  EXPECT_EQ(run.err, "");
+  const json stats = json::parse(read_file(folder / "stats.json"));
+  EXPECT_EQ(stats["frames"], 4);
+  EXPECT_EQ(stats["bodies"], 3);
+  EXPECT_GT(stats["particles"], 20);
+  EXPECT_EQ(stats["state_hash"].get<std::string>().size(), 32u);
+  for (const char* stage : {"sim_ms", "render_ms", "encode_ms"}) EXPECT_GE(stats[stage]["max"], stats[stage]["p50"]);
+}
+
+/// Rows of one object in a trace.
+std::vector<std::vector<double>> rows_of(const std::string& trace, const std::string& object) {
+  std::vector<std::vector<double>> rows;
+  std::istringstream lines(trace);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream cells(line);
+    std::string time, name, cell;
+    std::getline(cells, time, ',');
+    std::getline(cells, name, ',');
+    if (name != object) continue;
+    rows.push_back({std::stod(time)});
+    while (std::getline(cells, cell, ',')) rows.back().push_back(std::stod(cell));
+  }
+  return rows;
+}
+
+TEST(Commands, TraceOfAFreeBodyIsTheClosedForm) {
+  const TemporaryFolder folder;
+  const Outcome run = offstage("simulate " + tiny_scene() + " --trace t.csv --trace-every step", folder.path());
+  ASSERT_EQ(run.code, 0) << run.err;
+  const auto rows = rows_of(read_file(folder / "t.csv"), "thrown");
+  ASSERT_EQ(rows.size(), 11u * 10 + 1) << "11 frame intervals of 10 steps, and the last state";
+  for (const auto& row : rows) {
+    const double t = row[0];
+    EXPECT_NEAR(row[1], -1 + t, 1e-12);
+    EXPECT_NEAR(row[2], 1 + 4 * t - 0.5 * 9.81 * t * t, 1e-12);
+    EXPECT_NEAR(row[9], 4 - 9.81 * t, 1e-12);
+  }
+}
+
+TEST(Commands, InfoDescribesScenesAndModels) {
+  const TemporaryFolder folder;
+  const Outcome scene = offstage("info " + tiny_scene() + " --json", folder.path());
+  ASSERT_EQ(scene.code, 0) << scene.err;
+  EXPECT_EQ(json::parse(scene.out)["frames"], 12);
+  // A unit cube as OBJ: closed, volume 1.
+  write_file(folder / "cube.obj",
+             "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
+             "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n");
+  const Outcome model = offstage("info cube.obj --json", folder.path());
+  ASSERT_EQ(model.code, 0) << model.err;
+  const json cube = json::parse(model.out);
+  EXPECT_EQ(cube["triangles"], 12);
+  EXPECT_EQ(cube["closed"], true);
+  EXPECT_NEAR(cube["volume"].get<double>(), 1, 1e-9);
+}
+
+TEST(Commands, DoctorFindsGlAndEncoders) {
+  const TemporaryFolder folder;
+  const Outcome run = offstage("doctor", folder.path());
+  EXPECT_EQ(run.code, 0) << run.out;
+  EXPECT_NE(run.out.find("llvmpipe"), std::string::npos);
+  EXPECT_NE(run.out.find("libx264"), std::string::npos);
+}
+
+TEST(Commands, SchemaIsJsonAndNamesEverySection) {
+  const TemporaryFolder folder;
+  const json schema = json::parse(offstage("schema", folder.path()).out);
+  for (const char* section : {"world", "materials", "bodies", "particles", "emitters", "springs", "camera", "lights",
+                              "environment", "render", "output"})
+    EXPECT_TRUE(schema["properties"].contains(section)) << section;
+}
+
+}  // namespace
+}  // namespace offstage::test

@@ -1,0 +1,42 @@
+#pragma once
+/// Runs the offstage program as a user would, and catches what it says.
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace offstage::test {
+
+struct Outcome {
+  int code = 0;  ///< exit code
+  std::string out, err;
+};
+
+/// Runs `build/offstage ARGS` in `folder`; `before` is shell text put in front ("ulimit -f 1;", "VAR=value").
+Outcome offstage(const std::string& args, const std::filesystem::path& folder, const std::string& before = {});
+
+std::string read_file(const std::filesystem::path& path);
+void write_file(const std::filesystem::path& path, const std::string& text);
+
+/// All regular files below a folder, by relative name, with their contents; hidden files too.
+std::map<std::string, std::string> contents(const std::filesystem::path& folder);
+
+/// A new empty folder that goes away with the object.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// The scene most tests use, tests/data/tiny.json.
+std::string tiny_scene();
+
+}  // namespace offstage::test

@@ -1,0 +1,196 @@
+// Rendering as a user runs it: the same bytes however the work is split, interrupted or resumed, and nothing half-written.
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/mount.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "cli/program.h"
+
+namespace offstage::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The frames of a render, without the manifest.
+std::map<std::string, std::string> frames(const fs::path& folder) {
+  auto files = contents(folder);
+  files.erase("manifest.json");
+  return files;
+}
+
+/// Frames of the undisturbed render that the others are compared with.
+const std::map<std::string, std::string>& reference() {
+  static const std::map<std::string, std::string> files = [] {
+    const TemporaryFolder folder;
+    EXPECT_EQ(offstage("render " + tiny_scene() + " -o out/ -q --threads 1 --jobs 1", folder.path()).code, 0);
+    return frames(folder / "out");
+  }();
+  return files;
+}
+
+TEST(Render, SameBytesForAnyNumberOfThreadsAndJobs) {
+  ASSERT_EQ(reference().size(), 12u);
+  for (const char* threads : {"--threads 2 --jobs 2", "--threads 4 --jobs 3", "--threads 2 --jobs 1"}) {
+    const TemporaryFolder folder;
+    ASSERT_EQ(offstage(std::string("render ") + tiny_scene() + " -o out/ -q " + threads, folder.path()).code, 0);
+    EXPECT_EQ(frames(folder / "out"), reference()) << threads;
+  }
+}
+
+TEST(Render, CacheAndChunksGiveTheSameFrames) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(offstage("simulate " + tiny_scene() + " --cache cache -q", folder.path()).code, 0);
+  for (const char* chunk : {"2/3", "1/3", "3/3"})
+    ASSERT_EQ(offstage(std::string("render ") + tiny_scene() + " --cache cache -o out/ -q --chunk " + chunk, folder.path()).code, 0);
+  EXPECT_EQ(frames(folder / "out"), reference());
+
+  // A cache of another scene, and a damaged one, are refused.
+  EXPECT_EQ(offstage("render " + tiny_scene() + " --cache cache -o b/ --seed 8", folder.path()).code, 1);
+  // The camera may change: that is what a cache is for.
+  EXPECT_EQ(offstage("render " + tiny_scene() + " --cache cache -o c/ -q --set camera.radius=6", folder.path()).code, 0);
+  std::string bytes = read_file(folder / "cache/000005.snap");
+  bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
+  write_file(folder / "cache/000005.snap", bytes);
+  const Outcome run = offstage("render " + tiny_scene() + " --cache cache -o d/", folder.path());
+  EXPECT_EQ(run.code, 1);
+  EXPECT_NE(run.err.find("000005.snap"), std::string::npos) << run.err;
+}
+
+TEST(Render, ExistingOutputIsKeptUnlessForced) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(offstage("render " + tiny_scene() + " -o out/ -q --frames 1-3", folder.path()).code, 0);
+  const auto before = contents(folder / "out");
+  EXPECT_EQ(offstage("render " + tiny_scene() + " -o out/ --frames 2", folder.path()).code, 2);
+  EXPECT_EQ(offstage("render " + tiny_scene() + " -o out/ --frames 4 --seed 3", folder.path()).code, 2)
+      << "frames of other settings do not mix";
+  EXPECT_EQ(contents(folder / "out"), before);
+  EXPECT_EQ(offstage("render " + tiny_scene() + " -o out/ -q --frames 2 --seed 3 --force", folder.path()).code, 0);
+  EXPECT_EQ(frames(folder / "out").size(), 1u) << "frames of the other settings are gone";
+}
+
+/// Runs a render in the background, sends it `signal` once `frames_before` frames are there, returns its exit code.
+int interrupt_render(const TemporaryFolder& folder, const std::string& out, int signal, const fs::path& watch,
+                     std::size_t frames_before) {
+  const pid_t child = fork();
+  if (child == 0) {
+    if (chdir(folder.path().c_str()) != 0) _exit(99);
+    execl(OFFSTAGE_BINARY_DIR "/offstage", "offstage", "render", tiny_scene().c_str(), "-o", out.c_str(), "-q", "--jobs", "1",
+          "--duration", "20", "--resume", nullptr);
+    _exit(99);
+  }
+  const auto count = [&] {
+    std::error_code ignored;
+    std::size_t n = 0;
+    for (const auto& entry : fs::directory_iterator(watch, ignored)) n += entry.path().extension() == ".png";
+    return n;
+  };
+  for (int i = 0; i < 3000 && count() < frames_before; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  kill(child, signal);
+  int status = 0;
+  waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+TEST(Render, InterruptedAndResumedGivesTheSameBytesAsOneRun) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(interrupt_render(folder, "out/", SIGINT, folder / "out", 5), 130);
+  EXPECT_EQ(interrupt_render(folder, "out/", SIGTERM, folder / "out", 12), 143);
+  const auto part = frames(folder / "out");
+  ASSERT_GE(part.size(), 12u);
+  ASSERT_LT(part.size(), 480u) << "the run was over before it could be interrupted";
+  for (const auto& [name, bytes] : part) EXPECT_TRUE(name.ends_with(".png")) << name;
+
+  // The rest of a shorter piece, then one undisturbed run of the same piece.
+  const std::string piece = "render " + tiny_scene() + " -q --duration 20 --frames 1-" + std::to_string(part.size() + 4);
+  ASSERT_EQ(offstage(piece + " -o out/ --resume", folder.path()).code, 0);
+  ASSERT_EQ(offstage(piece + " -o whole/", folder.path()).code, 0);
+  EXPECT_EQ(frames(folder / "out"), frames(folder / "whole"));
+}
+
+TEST(Render, InterruptedVideoNeverLooksWhole) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(interrupt_render(folder, "film.mp4", SIGINT, folder / "film.mp4.frames", 5), 130);
+  EXPECT_FALSE(fs::exists(folder / "film.mp4"));
+  // It goes on from its frames and ends as the same film as an undisturbed one.
+  const std::string piece = "render " + tiny_scene() + " -q --duration 20 --frames 1-12";
+  ASSERT_EQ(offstage(piece + " -o film.mp4 --resume", folder.path()).code, 0);
+  ASSERT_EQ(offstage(piece + " -o whole.mp4", folder.path()).code, 0);
+  EXPECT_EQ(read_file(folder / "film.mp4"), read_file(folder / "whole.mp4"));
+  EXPECT_FALSE(fs::exists(folder / "film.mp4.frames"));
+}
+
+TEST(Render, FullDiskIsAnErrorAndLeavesNoBrokenFile) {
+  const TemporaryFolder folder;
+  // A file size limit stands for the full disk: the write fails the same way.
+  const Outcome run = offstage("render " + tiny_scene() + " -o out/ --size 640x360", folder.path(), "ulimit -f 16;");
+  EXPECT_EQ(run.code, 1);
+  EXPECT_NE(run.err.find(".png"), std::string::npos) << run.err;
+  EXPECT_TRUE(frames(folder / "out").empty());
+
+  const Outcome video = offstage("render " + tiny_scene() + " -o film.mp4 --size 640x360", folder.path(), "ulimit -f 1;");
+  EXPECT_EQ(video.code, 1) << video.err;
+  EXPECT_FALSE(fs::exists(folder / "film.mp4"));
+}
+
+TEST(Render, UnwritablePlaceIsAnErrorThatNamesIt) {
+  const TemporaryFolder folder;
+  const Outcome run = offstage("render " + tiny_scene() + " -o /proc/offstage/####.png", folder.path());
+  EXPECT_EQ(run.code, 1);
+  EXPECT_NE(run.err.find("/proc/offstage"), std::string::npos) << run.err;
+}
+
+TEST(Render, PipeGivesRawFramesTopDown) {
+  const TemporaryFolder folder;
+  const Outcome run = offstage("render " + tiny_scene() + " -o - --frames 3-4 -q | cat", folder.path());
+  EXPECT_EQ(run.out.size(), 2u * 96 * 54 * 4);
+  const Outcome y4m = offstage("render " + tiny_scene() + " -o - --format y4m --frames 3-4 -q | cat", folder.path());
+  EXPECT_EQ(y4m.out.substr(0, 10), "YUV4MPEG2 ");
+}
+
+TEST(Render, FrameIsTheSamePictureAsInTheSequence) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(offstage("frame " + tiny_scene() + " -n 7 -o a.png -q", folder.path()).code, 0);
+  EXPECT_EQ(read_file(folder / "a.png"), reference().at("0007.png"));
+  ASSERT_EQ(offstage("frame " + tiny_scene() + " --at 0.25 -o b.png -q", folder.path()).code, 0);
+  EXPECT_EQ(read_file(folder / "b.png"), read_file(folder / "a.png"));
+}
+
+TEST(Render, QualityNeverChangesThePhysics) {
+  const TemporaryFolder folder;
+  std::map<std::string, std::string> hashes;
+  for (const std::string quality : {"draft", "preview", "final"}) {
+    ASSERT_EQ(offstage("render " + tiny_scene() + " -o " + quality + "/ -q --frames 12 --stats s.json --quality " + quality, folder.path()).code, 0);
+    const std::string stats = read_file(folder / "s.json");
+    const auto at = stats.find("\"state_hash\"");
+    hashes[stats.substr(at, 60)] = quality;
+  }
+  EXPECT_EQ(hashes.size(), 1u);
+}
+
+TEST(Render, TransparentBackgroundHasAlpha) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(offstage("render " + tiny_scene() + " -o - --frames 1 -q --set environment.background=transparent "
+                     "--set bodies.ground.visible=false", folder.path()).code, 0);
+  const std::string rgba =
+      offstage("render " + tiny_scene() + " -o - --frames 1 -q --set environment.background=transparent "
+               "--set bodies.ground.visible=false", folder.path()).out;
+  ASSERT_EQ(rgba.size(), 96u * 54 * 4);
+  std::size_t clear = 0, opaque = 0;
+  for (std::size_t i = 3; i < rgba.size(); i += 4) {
+    clear += rgba[i] == '\0';
+    opaque += rgba[i] == '\xff';
+  }
+  EXPECT_GT(clear, rgba.size() / 4 / 2);
+  EXPECT_GT(opaque, 50u);
+  EXPECT_EQ(offstage("render " + tiny_scene() + " -o a.mp4 --set environment.background=transparent", folder.path()).code, 2)
+      << "mp4 has no alpha";
+}
+
+}  // namespace
+}  // namespace offstage::test

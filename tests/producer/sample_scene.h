@@ -1,0 +1,52 @@
+#pragma once
+/// A valid scene that uses every section and every kind of value, for the tests of the format.
+
+namespace offstage::producer {
+
+/// Its model files are LICENSE, in the source folder: the format checks only that they are there.
+inline constexpr const char* kSampleScene = R"({
+  "$schema": "scene.schema.json",
+  "version": 1,
+  "description": "everything at once",
+  "world": {"gravity": [0, -9.81, 0], "wind": [1, 0, 0], "step": 0.002, "integrator": "midpoint", "seed": 42},
+  "materials": [
+    {"name": "red", "color": "#c03020", "roughness": 0.3, "restitution": 1},
+    {"name": "glass", "color": [0.9, 1, 1, 0.25], "metallic": 0, "pattern": "checker", "pattern_color": "#00000080"}
+  ],
+  "bodies": [
+    // primitives
+    {"name": "floor", "shape": {"type": "plane"}, "motion": "static", "material": "glass"},
+    {"name": "ball", "shape": {"type": "sphere", "radius": 0.25}, "position": [0, 2, 0], "mass": 2, "material": "red"},
+    {"name": "wheel", "shape": {"type": "cylinder", "radius": 1, "height": 0.2}, "motion": "kinematic",
+     "orientation": {"axis": [1, 0, 0], "angle_deg": 90}, "spin": [0, 3, 0],
+     "keyframes": [{"time": 0}, {"time": 2, "position": [1, 1, 0], "orientation": [1, 0, 0, 1]}], "loop": true},
+    {"name": "post", "shape": {"type": "capsule"}, "motion": "static",
+     "repeat": {"count": 3, "offset": [2, 0, 0]}, "grid": {"count": [2, 1, 2], "spacing": [5, 1, 5]}},
+    {"name": "rock", "shape": {"type": "mesh", "file": "LICENSE"}, "motion": "static",
+     "model": {"file": "LICENSE", "scale": 0.5},
+     "scatter": {"count": 5, "size": [20, 20], "min_distance": 1, "scale": {"range": [0.5, 1.5]}}}
+  ],
+  "particles": [
+    {"name": "chain", "places": [{"position": [0, 3, 0]}, {"position": [0, 2.5, 0], "color": [1, 0, 0]}], "mass": 0.5}
+  ],
+  "emitters": [
+    {"name": "rain", "surface": {"position": [0, 8, 0], "direction": [0, -1, 0], "size": [4, 4]},
+     "rate": {"mean": 200, "deviation": 20}, "speed": {"range": [1, 2]}, "radius": {"mean": 0.01, "deviation": 0.002},
+     "lifespan": {"curve": [[0, 1], [2, 1.5]]}, "spread_deg": 5, "dies_on_hit": true,
+     "look": {"style": "streak", "color": "#a0c0ff", "color_over_age": [[0, "#ffffff"], [1, [1, 1, 1, 0]]],
+              "size_over_age": [[0, 1], [1, 0.5]], "additive": true}},
+    {"name": "puff", "body": "ball", "rate": 0, "bursts": [{"time": 1, "count": 30, "cycles": 2}], "gravity": false}
+  ],
+  "springs": [
+    {"a": {"particles": "chain"}, "b": {"particles": "chain", "index": 1}, "stiffness": 50, "damping": 0.1},
+    {"name": "tie", "a": {"position": [0, 4, 0]}, "b": {"body": "ball", "position": [0, 0.25, 0]}, "material": "red"}
+  ],
+  "camera": {"type": "keyframes", "keyframes": [{"time": 0, "eye": [4, 2, 6]}, {"time": 3, "eye": [0, 2, 7]}]},
+  "lights": [{"type": "sun", "direction": [1, 2, 1], "color": [1, 0.9, 0.8]}],
+  "environment": {"fog": 0.01, "background": "sky"},
+  "render": {"size": [320, 180], "quality": "draft", "tone_curve": "linear"},
+  "output": {"fps": 24, "duration": 3, "start": 0.5}
+}
+)";
+
+}  // namespace offstage::producer

@@ -1,0 +1,90 @@
+// Every file of assimp's own test models, some of them broken on purpose, is read or refused with one line.
+
+#include <algorithm>
+#include <chrono>
+
+#include <gtest/gtest.h>
+
+#include "render/error.h"
+#include "render/mesh_io.h"
+#include "scratch.h"
+
+namespace offstage::render {
+namespace {
+
+std::filesystem::path corpus_folder() {
+  const char* chosen = std::getenv("OFFSTAGE_MODEL_CORPUS");
+  return chosen ? chosen : "/usr/share/assimp/models";
+}
+
+std::vector<std::filesystem::path> corpus_files() {
+  std::vector<std::filesystem::path> files;
+  std::error_code none;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(corpus_folder(), none)) {
+    if (entry.is_regular_file()) files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+bool is_sound(const Mesh& mesh) {
+  const std::size_t n = mesh.positions.size();
+  const auto finite = [](const auto& v) { return v.allFinite(); };
+  return !mesh.indices.empty() && mesh.indices.size() % 3 == 0 && mesh.normals.size() == n &&
+         (mesh.uvs.empty() || mesh.uvs.size() == n) &&
+         std::all_of(mesh.indices.begin(), mesh.indices.end(), [n](uint32_t i) { return i < n; }) &&
+         std::all_of(mesh.positions.begin(), mesh.positions.end(), finite) &&
+         std::all_of(mesh.normals.begin(), mesh.normals.end(), finite) &&
+         std::all_of(mesh.uvs.begin(), mesh.uvs.end(), finite);
+}
+
+/// What the files come to; a file's fault is an empty string if there is none.
+struct Tally {
+  int loaded = 0, refused = 0;
+  double slowest_s = 0;
+
+  std::string read(const std::filesystem::path& path) {
+    const auto start = std::chrono::steady_clock::now();
+    std::string fault;
+    try {
+      const Model model = read_model(path);
+      ++loaded;
+      const bool sound = std::all_of(model.parts.begin(), model.parts.end(), [&](const Model::Part& part) {
+        return is_sound(part.mesh) && part.material >= 0 &&
+               part.material < static_cast<int>(model.materials.size());
+      });
+      if (!sound || model.parts.empty() || model.bounds().isEmpty()) fault = "unsound model";
+    } catch (const FileError& error) {
+      ++refused;
+      const std::string message = error.what();
+      if (message.empty() || message.find('\n') != std::string::npos) fault = "not one line: " + message;
+      if (message.find("crashed") != std::string::npos) fault = message;
+    }
+    slowest_s =
+        std::max(slowest_s, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    return fault;
+  }
+};
+
+TEST(ModelCorpus, EveryFileLoadsOrIsRefusedInOneLine) {
+  const auto files = corpus_files();
+  ASSERT_GT(files.size(), 100u) << corpus_folder()
+                                << ": install the Debian package assimp-testmodels, or set "
+                                << "OFFSTAGE_MODEL_CORPUS to a folder of models";
+  Tally tally;
+  for (const auto& file : files) {
+#ifdef __SANITIZE_ADDRESS__
+    if (file.filename() == "OutOfMemory.off")
+      continue;  // the sanitizer's allocator ends the process by design
+#endif
+    EXPECT_EQ(tally.read(file), "") << file;
+  }
+  RecordProperty("loaded", tally.loaded);
+  RecordProperty("refused", tally.refused);
+  RecordProperty("slowest_ms", static_cast<int>(1000 * tally.slowest_s));
+  EXPECT_GE(tally.loaded, static_cast<int>(files.size()) * 2 / 5);
+  EXPECT_LT(tally.slowest_s, 10);
+}
+
+}  // namespace
+}  // namespace offstage::render

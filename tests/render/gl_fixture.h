@@ -1,0 +1,55 @@
+#pragma once
+/// What the tests that draw share: one context for all of them on the main thread, and small pictures read as
+/// numbers.
+
+#include <gtest/gtest.h>
+
+#include "render/primitives.h"
+#include "render/stage.h"
+
+namespace offstage::render {
+
+Context& shared_context();
+
+/// A stage with little going on: no haze to speak of, plain sky, the camera on the Z axis looking at the
+/// origin.
+struct SmallStage {
+  explicit SmallStage(int width_px = 96, int height_px = 64)
+      : stage(shared_context(), {.width_px = width_px, .height_px = height_px, .shadow_map_px = 512}) {
+    stage.set_camera({.eye = {0, 0, 5}, .target = {0, 0, 0}});
+    stage.set_environment({.visible = false});
+  }
+  InstanceHandle add(const Mesh& mesh, const Material& material, const Vector3f& position = {0, 0, 0}) {
+    const InstanceHandle instance = stage.add_instance(stage.add_mesh(mesh), stage.add_material(material));
+    stage.set_transform(instance, Eigen::Affine3f(Eigen::Translation3f(position)));
+    return instance;
+  }
+  HdrImage draw(const SampleOffsets& offsets = {}) {
+    HdrImage picture;
+    stage.draw(offsets, picture);
+    return picture;
+  }
+  Stage stage;
+};
+
+inline Vector4f pixel(const HdrImage& image, int x, int y) {
+  const std::size_t at = 4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width_px) +
+                              static_cast<std::size_t>(x));
+  return Vector4f(image.rgba[at], image.rgba[at + 1], image.rgba[at + 2], image.rgba[at + 3]);
+}
+inline Vector4f center_pixel(const HdrImage& image) {
+  return pixel(image, image.width_px / 2, image.height_px / 2);
+}
+
+/// Where a point of the world falls in the picture of a camera [px].
+inline Vector2f project(const Camera& camera, const Vector3f& point, int width_px, int height_px) {
+  const Vector3f forward = (camera.target - camera.eye).normalized();
+  const Vector3f right = forward.cross(camera.up).normalized(), up = right.cross(forward);
+  const Vector3f d = point - camera.eye;
+  const float scale =
+      0.5f * static_cast<float>(height_px) / std::tan(camera.fov_deg * 0.00872664626f) / d.dot(forward);
+  return {0.5f * static_cast<float>(width_px) + scale * d.dot(right),
+          0.5f * static_cast<float>(height_px) - scale * d.dot(up)};
+}
+
+}  // namespace offstage::render

@@ -1,0 +1,42 @@
+#!/usr/bin/env bash
+# Builds offstage and runs its tests:  tests/run.sh [--long] [--tsan] [CTEST OPTIONS...]
+#   --long  also the long cases (label "long")
+#   --tsan  also the threaded tests under ThreadSanitizer
+# The unit tests and the model importer run a second time under AddressSanitizer and UndefinedBehaviorSanitizer.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+. cmake/packages.sh
+
+long=(-LE long)
+tsan=no
+while [ $# -gt 0 ]; do
+  case $1 in
+    --long) long=() ;;
+    --tsan) tsan=yes ;;
+    *) break ;;
+  esac
+  shift
+done
+
+install_packages $build_packages $test_packages
+cores=$(nproc)
+failed=0
+
+cmake --preset release -DOFFSTAGE_WERROR=ON -DOFFSTAGE_TESTS=ON
+cmake --build build
+
+cmake --preset asan -DOFFSTAGE_WERROR=ON
+cmake --build build-asan --target sanitized_tests
+export LSAN_OPTIONS="suppressions=$PWD/tests/lsan.supp:print_suppressions=0"
+export UBSAN_OPTIONS=print_stacktrace=1:halt_on_error=1
+ctest --test-dir build-asan -L sanitized -j "$cores" --output-on-failure --progress "$@" || failed=1
+
+if [ "$tsan" = yes ]; then
+  cmake --preset tsan -DOFFSTAGE_WERROR=ON
+  cmake --build build-tsan --target sanitized_tests
+  TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp" \
+    ctest --test-dir build-tsan -L sanitized -R Threads -j "$cores" --output-on-failure "$@" || failed=1
+fi
+
+ctest --test-dir build "${long[@]}" -j "$cores" --output-on-failure "$@" || failed=1
+exit $failed

@@ -1,0 +1,91 @@
+#include "sim/dynamics/integrator.h"
+
+#include <array>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace offstage::sim {
+namespace {
+
+/// x'' = -x - 0.2 x', from x = 1 at rest.
+class Oscillator final : public DynamicSystem {
+ public:
+  static constexpr Real kDamping = 0.2;
+
+  void velocity(Real, std::span<const Real>, std::span<const Real> p, std::span<Real> dx) const override {
+    dx[0] = p[0];
+  }
+  void force(Real, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const override {
+    dp[0] = -x[0] - kDamping * p[0];
+  }
+  static Real exact(Real t) {
+    const Real a = kDamping / 2, w = std::sqrt(1 - a * a);
+    return std::exp(-a * t) * (std::cos(w * t) + a / w * std::sin(w * t));
+  }
+};
+
+Real error(IntegratorKind kind, int steps) {
+  constexpr Real kTime = 3;
+  std::array<Real, 1> x = {1}, p = {0};
+  IntegratorWorkspace work;
+  for (int i = 0; i < steps; ++i)
+    integrator(kind).step(Oscillator(), i * kTime / steps, kTime / steps, x, p, work);
+  return std::abs(x[0] - Oscillator::exact(kTime));
+}
+
+TEST(Integrator, ObservedOrderOnADampedOscillator) {
+  for (const auto& [kind, order] :
+       {std::pair(IntegratorKind::explicit_euler, 1.0), std::pair(IntegratorKind::symplectic_euler, 1.0),
+        std::pair(IntegratorKind::midpoint, 2.0), std::pair(IntegratorKind::rk4, 4.0)})
+    EXPECT_NEAR(std::log2(error(kind, 400) / error(kind, 800)), order, 0.1)
+        << "kind " << static_cast<int>(kind);
+}
+
+/// x' = 2 t, p' = 3 t^2: the stages must be evaluated at their own times.
+class TimeOnly final : public DynamicSystem {
+ public:
+  void velocity(Real t, std::span<const Real>, std::span<const Real>, std::span<Real> dx) const override {
+    dx[0] = 2 * t;
+  }
+  void force(Real t, std::span<const Real>, std::span<const Real>, std::span<Real> dp) const override {
+    dp[0] = 3 * t * t;
+  }
+};
+
+TEST(Integrator, MidpointAndRungeKuttaAreExactForPolynomialsInTimeOfTheirDegree) {
+  IntegratorWorkspace work;
+  std::array<Real, 1> x = {0}, p = {0};
+  integrator(IntegratorKind::midpoint).step(TimeOnly(), 1, 2, x, p, work);
+  EXPECT_NEAR(x[0], 9 - 1, 1e-14);
+  x = p = {0};
+  integrator(IntegratorKind::rk4).step(TimeOnly(), 1, 2, x, p, work);
+  EXPECT_NEAR(x[0], 9 - 1, 1e-14);
+  EXPECT_NEAR(p[0], 27 - 1, 1e-13);
+}
+
+/// Symplectic Euler on x'' = -x keeps p^2 + x^2 - h x p exactly; explicit Euler multiplies the energy by 1 +
+/// h^2 a step.
+TEST(Integrator, SymplecticEulerBoundsTheEnergyThatExplicitEulerPumps) {
+  class Harmonic final : public DynamicSystem {
+   public:
+    void velocity(Real, std::span<const Real>, std::span<const Real> p, std::span<Real> dx) const override {
+      dx[0] = p[0];
+    }
+    void force(Real, std::span<const Real> x, std::span<const Real>, std::span<Real> dp) const override {
+      dp[0] = -x[0];
+    }
+  };
+  constexpr Real kH = 0.1;
+  IntegratorWorkspace work;
+  std::array<Real, 1> x = {1}, p = {0}, y = {1}, q = {0};
+  for (int i = 0; i < 1000; ++i) {
+    integrator(IntegratorKind::symplectic_euler).step(Harmonic(), 0, kH, x, p, work);
+    integrator(IntegratorKind::explicit_euler).step(Harmonic(), 0, kH, y, q, work);
+  }
+  EXPECT_NEAR(p[0] * p[0] + x[0] * x[0] + kH * x[0] * p[0], 1, 1e-12);
+  EXPECT_NEAR((y[0] * y[0] + q[0] * q[0]) / std::pow(1 + kH * kH, 1000), 1, 1e-10);
+}
+
+}  // namespace
+}  // namespace offstage::sim
