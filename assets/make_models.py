@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
-"""Makes the gallery's models in models/: run it by hand, python3 assets/make_models.py [NAME ...]. Needs nothing but
-Python 3, and writes the same bytes every time. CREDITS.md lists sizes, axes and pivots."""
+"""Makes the gallery's models in models/. Run it by hand: python3 assets/make_models.py [NAME ...]. It needs
+nothing but Python 3 and writes the same bytes every time. CREDITS.md lists sizes, axes and pivots."""
 
 import math
 import pathlib
 import sys
 
-from modelling import (Material, Mesh, add, circle, cylinder, dot, ellipsoid, extrude, fractal_noise, grid_triangles,
-                       hashed, icosphere, lathe, mix, mul, noise, open_edges, ring, rod, rounded, shaded, smoothstep,
-                       surface_nets, sweep, turn, union, unit, welded, write_glb, write_mtl, write_obj, write_ply)
+from modelling import (Material, Mesh, add, circle, cylinder, dot, ellipsoid, extrude, fractal_noise,
+                       grid_triangles, hashed, icosphere, lathe, mix, mul, noise, open_edges, ring, rod,
+                       rounded, shaded, smoothstep, surface_nets, sweep, turn, union, unit, welded, write_glb,
+                       write_mtl, write_obj, write_ply)
 
 MODELS = pathlib.Path(__file__).resolve().parent / "models"
 
@@ -17,44 +18,49 @@ BRASS = Material("brass", "#d9b25f", 0.28, 1)
 RED = Material("red_paint", "#a3261d", 0.35)
 GREEN = Material("green_paint", "#1f5a44", 0.35)
 
-
-# --- duck ------------------------------------------------------------------------------------------------------------
+# --- duck -----------------------------------------------------------------------------------------
 
 
 def duck():
     flank = [ellipsoid((side * 0.3, 0.4, -0.06), (0.09, 0.15, 0.27)) for side in (-1, 1)]
-    hull = union(0.12, ellipsoid((0, 0.33, 0), (0.36, 0.33, 0.5)), ellipsoid((0, 0.53, -0.46), (0.15, 0.11, 0.15)))
+    hull = union(0.12, ellipsoid((0, 0.33, 0), (0.36, 0.33, 0.5)),
+                 ellipsoid((0, 0.53, -0.46), (0.15, 0.11, 0.15)))
     body = union(0.1, union(0.05, hull, *flank), ellipsoid((0, 0.755, 0.22), (0.245, 0.24, 0.245)))
-    beak = union(0.02, ellipsoid((0, 0.725, 0.475), (0.13, 0.034, 0.13)), ellipsoid((0, 0.675, 0.455), (0.1, 0.026, 0.1)),
+    beak = union(0.02, ellipsoid((0, 0.725, 0.475), (0.13, 0.034, 0.13)),
+                 ellipsoid((0, 0.675, 0.455), (0.1, 0.026, 0.1)),
                  ellipsoid((0, 0.71, 0.42), (0.1, 0.06, 0.06)))
-    eyes = Mesh().joined(*(shaded(icosphere(3).mapped(lambda p, s=s: add(mul(p, 0.04), (s * 0.1, 0.83, 0.415))))
-                           for s in (-1, 1)))
-    write_glb(MODELS / "duck.glb", [
-        (surface_nets(body, (-0.5, -0.08, -0.7), (0.5, 1.08, 0.6), 0.02), Material("rubber", "#f8c81c", 0.25)),
-        (surface_nets(beak, (-0.2, 0.6, 0.3), (0.2, 0.8, 0.65), 0.0105), Material("beak", "#f07a12", 0.3)),
-        (eyes, Material("eyes", "#0b0b0d", 0.1))])
+    rubber = surface_nets(body, (-0.5, -0.08, -0.7), (0.5, 1.08, 0.6), 0.02)
+    horn = surface_nets(beak, (-0.2, 0.6, 0.3), (0.2, 0.8, 0.65), 0.0105)
+    eye = shaded(icosphere(3).mapped(lambda p: mul(p, 0.04)))
+    eyes = Mesh().joined(*(eye.moved((side * 0.1, 0.83, 0.415)) for side in (-1, 1)))
+    write_glb(MODELS / "duck.glb", [(rubber, Material("rubber", "#f8c81c", 0.25)),
+                                    (horn, Material("beak", "#f07a12", 0.3)),
+                                    (eyes, Material("eyes", "#0b0b0d", 0.1))])
 
 
-# --- fountain --------------------------------------------------------------------------------------------------------
+# --- fountain -------------------------------------------------------------------------------------
 
 
 def fountain():
-    basin = [(0, 0), (1.44, 0), (1.48, 0.02), (1.48, 0.1), (1.42, 0.14), (1.38, 0.2), (1.4, 0.34), (1.47, 0.4), (1.5, 0.45),
-             (1.5, 0.5), (1.46, 0.54), (1.34, 0.54), (1.3, 0.5), (1.28, 0.2), (1.2, 0.14), (0.45, 0.14)]
-    column = [(0.36, 0.18), (0.36, 0.3), (0.28, 0.36), (0.2, 0.46), (0.16, 0.6), (0.15, 0.8), (0.19, 0.88), (0.19, 0.93),
-              (0.13, 0.97), (0.13, 1.02)]
-    bowl = [(0.3, 1.08), (0.55, 1.16), (0.7, 1.27), (0.76, 1.36), (0.78, 1.42), (0.74, 1.44), (0.7, 1.42), (0.64, 1.33),
-            (0.5, 1.25), (0.2, 1.22)]
-    finial = [(0.1, 1.26), (0.09, 1.42), (0.12, 1.48), (0.12, 1.51), (0.07, 1.55), (0.08, 1.6), (0.13, 1.67), (0.135, 1.74),
-              (0.1, 1.81), (0.045, 1.85), (0.03, 1.88), (0, 1.88)]
+    basin = [(0, 0), (1.44, 0), (1.48, 0.02), (1.48, 0.1), (1.42, 0.14), (1.38, 0.2), (1.4, 0.34),
+             (1.47, 0.4), (1.5, 0.45), (1.5, 0.5), (1.46, 0.54), (1.34, 0.54), (1.3, 0.5), (1.28, 0.2),
+             (1.2, 0.14), (0.45, 0.14)]
+    column = [(0.36, 0.18), (0.36, 0.3), (0.28, 0.36), (0.2, 0.46), (0.16, 0.6), (0.15, 0.8), (0.19, 0.88),
+              (0.19, 0.93), (0.13, 0.97), (0.13, 1.02)]
+    bowl = [(0.3, 1.08), (0.55, 1.16), (0.7, 1.27), (0.76, 1.36), (0.78, 1.42), (0.74, 1.44), (0.7, 1.42),
+            (0.64, 1.33), (0.5, 1.25), (0.2, 1.22)]
+    finial = [(0.1, 1.26), (0.09, 1.42), (0.12, 1.48), (0.12, 1.51), (0.07, 1.55), (0.08, 1.6), (0.13, 1.67),
+              (0.135, 1.74), (0.1, 1.81), (0.045, 1.85), (0.03, 1.88), (0, 1.88)]
     stone = shaded(lathe(rounded(basin + column + bowl + finial, 1), 80), 35)
-    water = [shaded(lathe([(outer, y), (inner, y)], 80)) for inner, outer, y in ((0.15, 1.295, 0.44), (0.06, 0.69, 1.38))]
+    water = [
+        shaded(lathe([(outer, y), (inner, y)], 80))
+        for inner, outer, y in ((0.15, 1.295, 0.44), (0.06, 0.69, 1.38))
+    ]
     write_glb(MODELS / "fountain.glb", [(stone, Material("stone", "#b9b1a2", 0.75)),
                                         (Mesh().joined(*water), Material("water", "#4c6b7d", 0.06))])
 
 
-# --- sprinkler -------------------------------------------------------------------------------------------------------
-
+# --- sprinkler ------------------------------------------------------------------------------------
 
 NOZZLE_TIP = (0.25, 0.1, 0.03)
 NOZZLE_DIRECTION = unit((math.cos(math.radians(25)), math.tan(math.radians(36)), math.sin(math.radians(25))))
@@ -64,27 +70,33 @@ def sprinkler():
     steel, brass = Material("zinc", "#9aa0a4", 0.35, 1), Material("brass", "#d9b25f", 0.3, 1)
     green = Material("lawn_green", "#2c6e3f", 0.45)
     spike = lathe(rounded([(0, -0.16), (0.012, -0.1), (0.02, 0), (0.02, 0.02), (0, 0.02)], 1), 24)
-    foot = lathe([(0, 0), (0.11, 0), (0.12, 0.008), (0.115, 0.02), (0.05, 0.032), (0.026, 0.05), (0.02, 0.09), (0.02, 0.17),
-                  (0.028, 0.175), (0.028, 0.19), (0.02, 0.195), (0, 0.195)], 40)
+    foot = lathe([(0, 0), (0.11, 0), (0.12, 0.008), (0.115, 0.02), (0.05, 0.032), (0.026, 0.05), (0.02, 0.09),
+                  (0.02, 0.17), (0.028, 0.175), (0.028, 0.19), (0.02, 0.195), (0, 0.195)], 40)
     write_obj(MODELS / "sprinkler_base.obj", [(shaded(spike), steel), (shaded(foot, 30), green)],
               pathlib.Path("sprinkler.mtl"))
 
-    hub = lathe(rounded([(0, -0.02), (0.026, -0.02), (0.034, -0.01), (0.034, 0.025), (0.026, 0.04), (0, 0.045)], 1), 32)
+    hub = lathe(
+        rounded([(0, -0.02), (0.026, -0.02), (0.034, -0.01), (0.034, 0.025), (0.026, 0.04), (0, 0.045)], 1),
+        32)
     start = add(NOZZLE_TIP, mul(NOZZLE_DIRECTION, -0.05))
     path = rounded([(0.02, 0.01, 0), (0.12, 0.012, 0), (0.19, 0.02, 0), start], 3)
     arm = sweep(path, [0.011] * len(path), 14)
-    nozzle = sweep([start, add(NOZZLE_TIP, mul(NOZZLE_DIRECTION, -0.012)), NOZZLE_TIP], [0.017, 0.016, 0.01], 18)
+    nozzle = sweep([start, add(NOZZLE_TIP, mul(NOZZLE_DIRECTION, -0.012)), NOZZLE_TIP], [0.017, 0.016, 0.01],
+                   18)
     both = [[shaded(m, 35), shaded(m, 35).turned("y", 180)] for m in (arm, nozzle)]
-    write_obj(MODELS / "sprinkler_head.obj", [(shaded(hub, 30), green), (both[0][0].joined(both[0][1]), steel),
-                                              (both[1][0].joined(both[1][1]), brass)], pathlib.Path("sprinkler.mtl"))
+    write_obj(MODELS / "sprinkler_head.obj", [(shaded(hub, 30), green),
+                                              (both[0][0].joined(both[0][1]), steel),
+                                              (both[1][0].joined(both[1][1]), brass)],
+              pathlib.Path("sprinkler.mtl"))
     write_mtl(MODELS / "sprinkler.mtl", [steel, green, brass])
 
 
-# --- solids for the physics --------------------------------------------------------------------------------------------
+# --- solids for the physics -----------------------------------------------------------------------
 
 
 def t_handle():
-    shape = union(0.06, rod((-0.4, 0, 0), (0.4, 0, 0), 0.09, 0.035), rod((0, -0.05, 0), (0, -0.52, 0), 0.08, 0.03))
+    shape = union(0.06, rod((-0.4, 0, 0), (0.4, 0, 0), 0.09, 0.035),
+                  rod((0, -0.05, 0), (0, -0.52, 0), 0.08, 0.03))
     mesh = surface_nets(shape, (-0.44, -0.56, -0.13), (0.44, 0.13, 0.13), 0.0145)
     assert open_edges(mesh) == 0
     write_glb(MODELS / "t_handle.glb", [(mesh, Material("steel", "#c3c7cc", 0.22, 1))])
@@ -94,7 +106,7 @@ def landscape():
     cells, half = 82, 12
 
     def height(x, z):
-        rim = smoothstep(6.5, 12, (x**4 + z**4) ** 0.25)
+        rim = smoothstep(6.5, 12, (x**4 + z**4)**0.25)
         hills = fractal_noise((x / 5, 0, z / 5), 3, seed=5)
         return 0.016 * (x * x + z * z) * (1 - rim) + hills * (0.75 - 0.4 * rim) + 4 * rim
 
@@ -103,8 +115,10 @@ def landscape():
     lowest = min(p[1] for p in top)
     top = [add(p, (0, -lowest, 0)) for p in top]
     side = cells + 1
-    border = [*range(cells), *(k * side + cells for k in range(cells)), *(side * side - 1 - k for k in range(cells)),
-              *((cells - k) * side for k in range(cells))]
+    border = [
+        *range(cells), *(k * side + cells for k in range(cells)),
+        *(side * side - 1 - k for k in range(cells)), *((cells - k) * side for k in range(cells))
+    ]
     foot = [(top[v][0], -1, top[v][2]) for v in border]
     triangles, n = grid_triangles(side, side), len(border)
     for k in range(n):
@@ -115,11 +129,11 @@ def landscape():
     write_ply(MODELS / "landscape.ply", shaded(mesh, 50))
 
 
-# --- machine -----------------------------------------------------------------------------------------------------------
+# --- machine --------------------------------------------------------------------------------------
 
 
 def gear_outline(teeth, module, phase=0.0):
-    """Involute teeth, pressure angle 20 degrees, a little thinner than half the pitch; root fillets are straight."""
+    """Involute teeth, pressure angle 20 degrees, a little thin for backlash, straight fillets."""
     pitch = teeth * module / 2
     base, tip, root = pitch * math.cos(math.radians(20)), pitch + module, pitch - 1.25 * module
 
@@ -133,7 +147,7 @@ def gear_outline(teeth, module, phase=0.0):
         return at_pitch + involute(pitch) - involute(max(radius, base)) + 0.25 * below_base
 
     start = max(base, root)
-    radii = [root] + [mix(start, tip, (k / 6) ** 1.5) for k in range(7)]
+    radii = [root] + [mix(start, tip, (k / 6)**1.5) for k in range(7)]
     flank = [(half_thickness(r), r) for r in radii]
     tooth = [(-a, r) for a, r in flank] + [(a, r) for a, r in reversed(flank)]
     return [(2 * math.pi * k / teeth + phase + a, r) for k in range(teeth) for a, r in tooth]
@@ -148,7 +162,8 @@ def spokes(count, inner, outer, width, half_depth):
 def gears():
     teeth = shaded(welded(ring(gear_outline(24, 0.1), 0.9, 0.1, 0.012)), 25)
     hub = shaded(ring(circle(0.3), 0.12, 0.14, 0.02), 30)
-    write_glb(MODELS / "gear_large.glb", [(teeth, STEEL), (hub.joined(spokes(5, 0.25, 0.95, 0.22, 0.06)), RED)])
+    write_glb(MODELS / "gear_large.glb", [(teeth, STEEL),
+                                          (hub.joined(spokes(5, 0.25, 0.95, 0.22, 0.06)), RED)])
 
     teeth = shaded(welded(ring(gear_outline(12, 0.1, math.pi / 12), 0.4, 0.1, 0.012)), 25)
     web = shaded(ring(circle(0.41), 0.2, 0.06, 0.01), 30)
@@ -172,13 +187,17 @@ def crank():
 
 
 def connecting_rod():
-    eyes = shaded(ring(circle(0.22), 0.125, 0.09, 0.015), 30).joined(
-        shaded(ring(circle(0.17), 0.095, 0.08, 0.015), 30).moved((0, 2, 0)))
-    flanges = [shaded(extrude([(x - 0.025, 0.19), (x + 0.025, 0.19), (0.75 * x + 0.02, 1.86), (0.75 * x - 0.02, 1.86)],
-                              -0.06, 0.06, 0.008), 30) for x in (-0.085, 0.085)]
-    web = shaded(extrude([(-0.09, 0.19), (0.09, 0.19), (0.07, 1.86), (-0.07, 1.86)], -0.022, 0.022, 0.005), 30)
-    bushes = shaded(ring(circle(0.127), 0.1, 0.1, 0.006), 30).joined(
-        shaded(ring(circle(0.097), 0.075, 0.09, 0.006), 30).moved((0, 2, 0)))
+    eyes = shaded(ring(circle(0.22), 0.125, 0.09, 0.015),
+                  30).joined(shaded(ring(circle(0.17), 0.095, 0.08, 0.015), 30).moved((0, 2, 0)))
+    flanges = [
+        shaded(
+            extrude([(x - 0.025, 0.19), (x + 0.025, 0.19), (0.75 * x + 0.02, 1.86), (0.75 * x - 0.02, 1.86)],
+                    -0.06, 0.06, 0.008), 30) for x in (-0.085, 0.085)
+    ]
+    web = shaded(extrude([(-0.09, 0.19), (0.09, 0.19), (0.07, 1.86), (-0.07, 1.86)], -0.022, 0.022, 0.005),
+                 30)
+    bushes = shaded(ring(circle(0.127), 0.1, 0.1, 0.006),
+                    30).joined(shaded(ring(circle(0.097), 0.075, 0.09, 0.006), 30).moved((0, 2, 0)))
     write_glb(MODELS / "rod.glb", [(eyes.joined(*flanges, web), STEEL), (bushes, BRASS)])
 
 
@@ -196,17 +215,18 @@ def flywheel():
     rim = shaded(ring(circle(1.5, 144), 1.24, 0.15, 0.025), 30)
     hub = shaded(ring(circle(0.3), 0.12, 0.2, 0.025), 30)
     band = shaded(ring(circle(1.506, 144), 1.45, 0.1, 0.004), 30)
-    write_glb(MODELS / "flywheel.glb", [(rim.joined(hub, spokes(6, 0.24, 1.3, 0.2, 0.06)), GREEN), (band, STEEL)])
+    write_glb(MODELS / "flywheel.glb", [(rim.joined(hub, spokes(6, 0.24, 1.3, 0.2, 0.06)), GREEN),
+                                        (band, STEEL)])
 
 
-# --- set dressing --------------------------------------------------------------------------------------------------------
+# --- set dressing ---------------------------------------------------------------------------------
 
 
 def blade(k):
-    """A bent, tapered leaf of three triangles. Its foot lies on a jittered grid that wraps, so that patches tile."""
+    """A bent, tapered leaf of three triangles. Its foot lies on a jittered grid that wraps: patches tile."""
     row, column = divmod(k, 19)
     x, z = ((i + 0.1 + 1.3 * hashed(k, j)) / 19 - 0.5 for i, j in ((column, 0), (row, 1)))
-    height, lean = mix(0.1, 0.26, hashed(k, 2) ** 1.4), mix(0.15, 0.7, hashed(k, 3))
+    height, lean = mix(0.1, 0.26, hashed(k, 2)**1.4), mix(0.15, 0.7, hashed(k, 3))
     width, heading = mix(0.006, 0.011, hashed(k, 4)), 360 * hashed(k, 5)
     rows = [(-width, 0, 0), (width, 0, 0), (-0.7 * width, 0.55 * height, 0.25 * lean * height),
             (0.7 * width, 0.55 * height, 0.25 * lean * height), (0, 0.97 * height, 0.9 * lean * height)]
@@ -222,12 +242,15 @@ def grass_patch():
     for k in range(19 * 19):
         group = 0 if hashed(k, 6) < 0.45 else 1 if hashed(k, 6) < 0.85 else 2
         groups[group] = groups[group].joined(blade(k))
-    write_glb(MODELS / "grass_patch.glb", [(mesh, Material(f"grass_{i}", greens[i], 0.7, two_sided=True))
-                                           for i, mesh in enumerate(groups)])
+    write_glb(
+        MODELS / "grass_patch.glb",
+        [(mesh, Material(f"grass_{i}", greens[i], 0.7, two_sided=True)) for i, mesh in enumerate(groups)])
 
 
 def rock():
-    faces = [unit(n) for n in ((0.8, 0.6, 0.1), (-0.5, 0.5, 0.7), (-0.3, 0.4, -0.9), (0.5, -0.2, 0.9), (0, -1, 0))]
+    faces = [
+        unit(n) for n in ((0.8, 0.6, 0.1), (-0.5, 0.5, 0.7), (-0.3, 0.4, -0.9), (0.5, -0.2, 0.9), (0, -1, 0))
+    ]
 
     def shape(p):
         r = 1 + 0.2 * noise(mul(p, 1.3), 3) + 0.07 * noise(mul(p, 3.1), 4)
@@ -237,7 +260,8 @@ def rock():
 
     mesh = icosphere(3).mapped(shape)
     foot = min(p[1] for p in mesh.positions)
-    write_glb(MODELS / "rock.glb", [(shaded(mesh.moved((0, -foot, 0)), 32), Material("rock", "#857f76", 0.9))])
+    write_glb(MODELS / "rock.glb", [(shaded(mesh.moved(
+        (0, -foot, 0)), 32), Material("rock", "#857f76", 0.9))])
 
 
 def leaf(height, reach, width, heading):
@@ -246,54 +270,62 @@ def leaf(height, reach, width, heading):
     for k in range(steps + 1):
         t = k / steps
         middle = (0, height * math.sin(t * 2.1) / math.sin(1.5708), reach * t * t)
-        w = width * math.sin(math.pi * (0.06 + 0.94 * t) ** 0.8)
-        rows += [(-w, middle[1] + 0.25 * w, middle[2]), (0, middle[1], middle[2]), (w, middle[1] + 0.25 * w, middle[2])]
+        w = width * math.sin(math.pi * (0.06 + 0.94 * t)**0.8)
+        rows += [(-w, middle[1] + 0.25 * w, middle[2]), (0, middle[1], middle[2]),
+                 (w, middle[1] + 0.25 * w, middle[2])]
     triangles = [(a, c, b) for a, b, c in grid_triangles(steps + 1, 3)]
     return shaded(Mesh(rows, triangles), 60).turned("y", heading)
 
 
 def pot():
-    profile = [(0, 0), (0.1, 0), (0.11, 0.01), (0.15, 0.22), (0.165, 0.222), (0.17, 0.23), (0.172, 0.275), (0.166, 0.282),
-               (0.15, 0.28), (0.146, 0.25), (0, 0.25)]
+    profile = [(0, 0), (0.1, 0), (0.11, 0.01), (0.15, 0.22), (0.165, 0.222), (0.17, 0.23), (0.172, 0.275),
+               (0.166, 0.282), (0.15, 0.28), (0.146, 0.25), (0, 0.25)]
     soil = lathe([(0.148, 0.252), (0.08, 0.262), (0, 0.266)], 32)
-    leaves = [leaf(mix(0.12, 0.3, hashed(k, 0)), mix(0.12, 0.3, hashed(k, 1)), mix(0.025, 0.04, hashed(k, 2)),
-                   137.5 * k).moved((0, 0.26, 0)) for k in range(16)]
+    leaves = [
+        leaf(mix(0.12, 0.3, hashed(k, 0)), mix(0.12, 0.3, hashed(k, 1)), mix(0.025, 0.04, hashed(k, 2)),
+             137.5 * k).moved((0, 0.26, 0)) for k in range(16)
+    ]
     stems, petals, hearts = [], [], []
-    for k in range(4):
-        top = (0.11 * math.cos(1.7 * k + 0.4), 0.55 + 0.05 * (k % 2), 0.11 * math.sin(1.7 * k + 0.4))
+    for k in range(3):
+        top = (0.1 * math.cos(2.2 * k + 0.4), 0.55 + 0.05 * (k % 2), 0.1 * math.sin(2.2 * k + 0.4))
         path = rounded([(0, 0.26, 0), (0, 0.45, 0), top], 2)
         stems.append(shaded(sweep(path, [0.005] * len(path), 6), 60))
         petal = shaded(icosphere(1).mapped(lambda p: (0.022 * p[0], 0.009 * p[1], 0.036 * p[2] + 0.036)), 70)
         petals += [petal.turned("x", -15).turned("y", 72 * i + 20 * k).moved(top) for i in range(5)]
         hearts.append(shaded(icosphere(1).mapped(lambda p: mul(p, 0.017)), 70).moved(add(top, (0, 0.006, 0))))
-    write_glb(MODELS / "pot.glb", [
-        (shaded(lathe(profile, 40), 30), Material("terracotta", "#b5603a", 0.8)),
-        (shaded(soil, 40), Material("soil", "#3a281c", 0.95)),
-        (Mesh().joined(*leaves, *stems), Material("leaves", "#3f7d34", 0.5, two_sided=True)),
-        (Mesh().joined(*petals), Material("petals", "#e05a8a", 0.5)),
-        (Mesh().joined(*hearts), Material("hearts", "#f2c230", 0.6))])
+    write_glb(MODELS / "pot.glb",
+              [(shaded(lathe(profile, 40), 30), Material("terracotta", "#b5603a", 0.8)),
+               (shaded(soil, 40), Material("soil", "#3a281c", 0.95)),
+               (Mesh().joined(*leaves, *stems), Material("leaves", "#3f7d34", 0.5, two_sided=True)),
+               (Mesh().joined(*petals), Material("petals", "#e05a8a", 0.5)),
+               (Mesh().joined(*hearts), Material("hearts", "#f2c230", 0.6))])
 
 
 def tree():
     trunk = rounded([(0, -0.05, 0), (0.05, 0.7, 0.02), (-0.04, 1.4, 0), (0.02, 2.3, 0.05)], 2)
-    taper = [mix(0.2, 0.06, (k / (len(trunk) - 1)) ** 0.7) for k in range(len(trunk))]
+    taper = [mix(0.2, 0.06, (k / (len(trunk) - 1))**0.7) for k in range(len(trunk))]
     bark = [shaded(sweep(trunk, taper, 14), 60)]
-    crowns = [(0.0, 2.65, 0.0, 0.85), (0.68, 2.2, 0.15, 0.58), (-0.62, 2.3, 0.3, 0.6), (0.1, 2.15, -0.68, 0.55),
-              (-0.25, 3.15, -0.15, 0.55), (0.25, 2.15, 0.6, 0.5)]
+    crowns = [(0.0, 2.65, 0.0, 0.85), (0.68, 2.2, 0.15, 0.58), (-0.62, 2.3, 0.3, 0.6),
+              (0.1, 2.15, -0.68, 0.55), (-0.25, 3.15, -0.15, 0.55), (0.25, 2.15, 0.6, 0.5)]
     groups = [Mesh(), Mesh()]
     for k, (x, y, z, r) in enumerate(crowns):
         if k > 0:
-            bark.append(shaded(sweep([(0, 1.25 + 0.1 * k, 0), (0.5 * x, 0.5 * (y + 1.4), 0.5 * z), (x, y, z)],
-                                     [0.07, 0.05, 0.03], 8), 60))
-        blob = icosphere(2).mapped(lambda p: add(mul(p, r * (1 + 0.2 * noise(mul(p, 2.2), 20 + k))), (x, y, z)))
+            bark.append(
+                shaded(
+                    sweep([(0, 1.25 + 0.1 * k, 0), (0.5 * x, 0.5 * (y + 1.4), 0.5 * z), (x, y, z)],
+                          [0.07, 0.05, 0.03], 8), 60))
+        blob = icosphere(2).mapped(lambda p: add(mul(p, r * (1 + 0.2 * noise(mul(p, 2.2), 20 + k))),
+                                                 (x, y, z)))
         groups[k % 2] = groups[k % 2].joined(shaded(blob, 75))
     write_glb(MODELS / "tree.glb", [(Mesh().joined(*bark), Material("bark", "#6b4a30", 0.9)),
                                     (groups[0], Material("foliage_dark", "#4d8a34", 0.8)),
                                     (groups[1], Material("foliage_light", "#6fa63f", 0.8))])
 
 
-ALL = [duck, fountain, sprinkler, t_handle, landscape, gears, crank, connecting_rod, piston, flywheel, grass_patch, rock,
-       pot, tree]
+ALL = [
+    duck, fountain, sprinkler, t_handle, landscape, gears, crank, connecting_rod, piston, flywheel,
+    grass_patch, rock, pot, tree
+]
 
 if __name__ == "__main__":
     MODELS.mkdir(exist_ok=True)

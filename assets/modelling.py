@@ -1,12 +1,13 @@
-"""A small modelling kit in plain Python: meshes, lathe, sweep, rings, signed distance functions, surface nets, noise,
-and writers of GLB, OBJ and PLY. Y is up, faces are counter-clockwise seen from outside, units are metres."""
+"""A small modelling kit in plain Python: meshes, lathe, sweep, rings, signed distance functions, surface
+nets, noise, and writers of GLB, OBJ and PLY. Y is up, faces are counter-clockwise seen from outside, units
+are metres."""
 
 import json
 import math
 import struct
 from dataclasses import dataclass, field
 
-# --- vectors -------------------------------------------------------------------------------------------------------
+# --- vectors --------------------------------------------------------------------------------------
 
 
 def add(a, b):
@@ -56,7 +57,7 @@ def turn(axis, degrees):
     }[axis]
 
 
-# --- repeatable noise ----------------------------------------------------------------------------------------------
+# --- repeatable noise -----------------------------------------------------------------------------
 
 
 def hashed(*keys):
@@ -73,7 +74,7 @@ def hashed(*keys):
 def noise(p, seed=0):
     """Smooth value noise in [-1, 1] with features one metre wide."""
     base = [math.floor(c) for c in p]
-    w = [(c - b) ** 3 * ((c - b) * ((c - b) * 6 - 15) + 10) for c, b in zip(p, base)]
+    w = [(c - b)**3 * ((c - b) * ((c - b) * 6 - 15) + 10) for c, b in zip(p, base)]
     total = 0
     for corner in range(8):
         bits = [corner >> k & 1 for k in range(3)]
@@ -86,7 +87,7 @@ def fractal_noise(p, octaves, seed=0):
     return sum(noise(mul(p, 2**k), seed + k) / 2**k for k in range(octaves))
 
 
-# --- meshes --------------------------------------------------------------------------------------------------------
+# --- meshes ---------------------------------------------------------------------------------------
 
 
 @dataclass
@@ -100,7 +101,8 @@ class Mesh:
 
     def turned(self, axis, degrees):
         rotation = turn(axis, degrees)
-        return Mesh([rotation(p) for p in self.positions], self.triangles, [rotation(n) for n in self.normals])
+        return Mesh([rotation(p) for p in self.positions], self.triangles,
+                    [rotation(n) for n in self.normals])
 
     def mapped(self, function):
         """Positions through a function that changes shapes little enough for the normals to stay."""
@@ -130,10 +132,12 @@ def welded(mesh):
 
 
 def shaded(mesh, crease=40):
-    """Adds normals: means over the faces around a vertex, weighted by area, that are within `crease` degrees."""
+    """Adds normals: area-weighted means over the faces around a vertex that are within `crease` degrees."""
     mesh = welded(mesh)
-    scaled = [cross(sub(mesh.positions[b], mesh.positions[a]), sub(mesh.positions[c], mesh.positions[a]))
-              for a, b, c in mesh.triangles]
+    scaled = [
+        cross(sub(mesh.positions[b], mesh.positions[a]), sub(mesh.positions[c], mesh.positions[a]))
+        for a, b, c in mesh.triangles
+    ]
     units = [unit(n) for n in scaled]
     around = [[] for _ in mesh.positions]
     for f, triangle in enumerate(mesh.triangles):
@@ -168,7 +172,8 @@ def open_edges(mesh):
 
 
 def volume(mesh):
-    return sum(dot(mesh.positions[a], cross(mesh.positions[b], mesh.positions[c])) for a, b, c in mesh.triangles) / 6
+    return sum(
+        dot(mesh.positions[a], cross(mesh.positions[b], mesh.positions[c])) for a, b, c in mesh.triangles) / 6
 
 
 def grid_triangles(rows, columns, wrap_rows=False, wrap_columns=False):
@@ -182,7 +187,7 @@ def grid_triangles(rows, columns, wrap_rows=False, wrap_columns=False):
     return triangles
 
 
-# --- shapes --------------------------------------------------------------------------------------------------------
+# --- shapes ---------------------------------------------------------------------------------------
 
 
 def rounded(points, times=2, closed=False):
@@ -195,16 +200,17 @@ def rounded(points, times=2, closed=False):
 
 
 def lathe(profile, segments):
-    """Turns a profile of (radius, y), followed with the surface's outside on its right hand, about the Y axis."""
+    """Turns a profile of (radius, y) about the Y axis; going along it, the outside is on the right."""
     angles = [2 * math.pi * k / segments for k in range(segments)]
     positions = [(r * math.sin(a), y, r * math.cos(a)) for r, y in profile for a in angles]
-    return welded(Mesh(positions, [(a, c, b) for a, b, c in grid_triangles(len(profile), segments, wrap_columns=True)]))
+    return welded(
+        Mesh(positions, [(a, c, b) for a, b, c in grid_triangles(len(profile), segments, wrap_columns=True)]))
 
 
 def cylinder(radius, z0, z1, chamfer=0.0, segments=48):
     """Along Z, with chamfered rims."""
-    profile = [(0, z0), (radius - chamfer, z0), (radius, z0 + chamfer), (radius, z1 - chamfer), (radius - chamfer, z1),
-               (0, z1)]
+    profile = [(0, z0), (radius - chamfer, z0), (radius, z0 + chamfer), (radius, z1 - chamfer),
+               (radius - chamfer, z1), (0, z1)]
     return lathe(profile, segments).turned("x", 90)
 
 
@@ -212,8 +218,9 @@ def ring(outline, inner_radius, half_width, chamfer):
     """A plate across Z, in the plane bounded by the polar `outline` of (angle, radius), with a round hole."""
     sections = []
     for angle, radius in outline:
-        profile = [(inner_radius + chamfer, -half_width), (radius - chamfer, -half_width), (radius, chamfer - half_width),
-                   (radius, half_width - chamfer), (radius - chamfer, half_width), (inner_radius + chamfer, half_width),
+        profile = [(inner_radius + chamfer, -half_width), (radius - chamfer, -half_width),
+                   (radius, chamfer - half_width), (radius, half_width - chamfer),
+                   (radius - chamfer, half_width), (inner_radius + chamfer, half_width),
                    (inner_radius, half_width - chamfer), (inner_radius, chamfer - half_width)]
         sections += [(r * math.cos(angle), r * math.sin(angle), z) for r, z in profile]
     triangles = grid_triangles(len(outline), 8, wrap_rows=True, wrap_columns=True)
@@ -231,7 +238,7 @@ def sweep(path, radii, segments=16):
         tangent = unit(sub(path[min(k + 1, len(path) - 1)], path[max(k - 1, 0)]))
         if side is None:
             side = cross(tangent, (0, 0, 1) if abs(tangent[2]) < 0.9 else (1, 0, 0))
-        side = unit(sub(side, mul(tangent, dot(side, tangent))))  # carried along, so that the tube does not twist
+        side = unit(sub(side, mul(tangent, dot(side, tangent))))  # no twist
         frames.append((p, side, cross(tangent, side)))
     positions = []
     for radius, (p, u, v) in zip([0, *radii, 0], [frames[0], *frames, frames[-1]]):
@@ -254,17 +261,28 @@ def extrude(outline, z0, z1, chamfer):
     rows = [[middle] * len(outline), inner, outline, outline, inner, [middle] * len(outline)]
     heights = [z0, z0, z0 + chamfer, z1 - chamfer, z1, z1]
     positions = [(x, y, z) for row, z in zip(rows, heights) for x, y in row]
-    return welded(Mesh(positions, [(a, c, b) for a, b, c in grid_triangles(6, len(outline), wrap_columns=True)]))
+    return welded(
+        Mesh(positions, [(a, c, b) for a, b, c in grid_triangles(6, len(outline), wrap_columns=True)]))
 
 
 def icosphere(times):
     """The unit sphere from an icosahedron divided `times` times: 20 * 4^times triangles."""
     g = (1 + math.sqrt(5)) / 2
-    positions = [unit(p) for p in [(-1, g, 0), (1, g, 0), (-1, -g, 0), (1, -g, 0), (0, -1, g), (0, 1, g), (0, -1, -g),
-                                   (0, 1, -g), (g, 0, -1), (g, 0, 1), (-g, 0, -1), (-g, 0, 1)]]
-    triangles = [(0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4), (11, 10, 2),
-                 (10, 7, 6), (7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5), (2, 4, 11),
-                 (6, 2, 10), (8, 6, 7), (9, 8, 1)]
+    positions = [
+        unit(p)
+        for p in [(-1, g,
+                   0), (1, g, 0), (-1, -g,
+                                   0), (1, -g,
+                                        0), (0, -1,
+                                             g), (0, 1, g), (0, -1,
+                                                             -g), (0, 1, -g), (g, 0, -1), (g, 0,
+                                                                                           1), (-g, 0,
+                                                                                                -1), (-g, 0,
+                                                                                                      1)]
+    ]
+    triangles = [(0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4),
+                 (11, 10, 2), (10, 7, 6), (7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9),
+                 (4, 9, 5), (2, 4, 11), (6, 2, 10), (8, 6, 7), (9, 8, 1)]
     for _ in range(times):
         middles, finer = {}, []
 
@@ -282,16 +300,15 @@ def icosphere(times):
     return Mesh(positions, triangles)
 
 
-# --- signed distance functions ---------------------------------------------------------------------------------------
+# --- signed distance functions --------------------------------------------------------------------
 
 
 def ellipsoid(centre, radii):
     """Close to a distance near the surface (Quilez)."""
-
     def distance(p):
         q = sub(p, centre)
-        k0 = math.sqrt(sum((c / r) ** 2 for c, r in zip(q, radii)))
-        k1 = math.sqrt(sum((c / (r * r)) ** 2 for c, r in zip(q, radii)))
+        k0 = math.sqrt(sum((c / r)**2 for c, r in zip(q, radii)))
+        k1 = math.sqrt(sum((c / (r * r))**2 for c, r in zip(q, radii)))
         return k0 * (k0 - 1) / k1 if k1 > 0 else -min(radii)
 
     return distance
@@ -320,7 +337,6 @@ def smooth_min(a, b, k):
 
 def union(k, *shapes):
     """The shapes blended over a width of about k."""
-
     def distance(p):
         result = shapes[0](p)
         for shape in shapes[1:]:
@@ -335,12 +351,15 @@ def gradient(distance, p, h=1e-4):
 
 
 def surface_nets(distance, low, high, cell):
-    """Meshes the zero level of a distance function (Gibson, "Constrained elastic surface nets", 1998): a vertex in each
-    cell the surface crosses, moved onto the surface, and a quadrangle across each grid edge it crosses."""
+    """Meshes the zero level of a distance function (Gibson, "Constrained elastic surface nets", 1998): a
+    vertex in each cell the surface crosses, moved onto the surface, and a quadrangle across each grid edge
+    it crosses."""
     n = [math.ceil((h - l) / cell) + 1 for l, h in zip(low, high)]
     stride = (1, n[0], n[0] * n[1])
-    values = [distance((low[0] + i * cell, low[1] + j * cell, low[2] + k * cell))
-              for k in range(n[2]) for j in range(n[1]) for i in range(n[0])]
+    values = [
+        distance((low[0] + i * cell, low[1] + j * cell, low[2] + k * cell)) for k in range(n[2])
+        for j in range(n[1]) for i in range(n[0])
+    ]
     corners = [(i, j, k) for k in (0, 1) for j in (0, 1) for i in (0, 1)]
     edges = [(a, a | 1 << d) for d in range(3) for a in range(8) if not a >> d & 1]
     mesh, vertex_of = Mesh(), {}
@@ -389,7 +408,7 @@ def add_quad(mesh, quad):
         mesh.triangles += [(a, b, d), (b, c, d)]
 
 
-# --- files -----------------------------------------------------------------------------------------------------------
+# --- files ----------------------------------------------------------------------------------------
 
 
 @dataclass
@@ -401,8 +420,8 @@ class Material:
     two_sided: bool = False
 
     def linear(self):
-        channels = [int(self.color[k : k + 2], 16) / 255 for k in (1, 3, 5)]
-        return [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
+        channels = [int(self.color[k:k + 2], 16) / 255 for k in (1, 3, 5)]
+        return [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055)**2.4 for c in channels]
 
 
 def write_glb(path, parts):
@@ -422,28 +441,55 @@ def write_glb(path, parts):
         flat = [i for t in mesh.triangles for i in t]
         code, kind = ("H", 5123) if len(p) < 65536 else ("I", 5125)
         attributes = {
-            "POSITION": store(b"".join(struct.pack("<3f", *v) for v in p), 34962, componentType=5126, count=len(p),
-                              type="VEC3", min=low, max=high),
-            "NORMAL": store(b"".join(struct.pack("<3f", *v) for v in mesh.normals), 34962, componentType=5126,
-                            count=len(p), type="VEC3"),
+            "POSITION":
+                store(b"".join(struct.pack("<3f", *v) for v in p), 34962, componentType=5126, count=len(p),
+                      type="VEC3", min=low, max=high),
+            "NORMAL":
+                store(b"".join(struct.pack("<3f", *v) for v in mesh.normals), 34962, componentType=5126,
+                      count=len(p), type="VEC3"),
         }
         indices = store(struct.pack(f"<{len(flat)}{code}", *flat), 34963, componentType=kind, count=len(flat),
                         type="SCALAR")
         primitives.append({"attributes": attributes, "indices": indices, "material": len(materials)})
-        materials.append({"name": material.name, "doubleSided": material.two_sided, "pbrMetallicRoughness": {
-            "baseColorFactor": [round(c, 4) for c in material.linear()] + [1], "metallicFactor": material.metallic,
-            "roughnessFactor": material.roughness}})
+        materials.append({
+            "name": material.name,
+            "doubleSided": material.two_sided,
+            "pbrMetallicRoughness": {
+                "baseColorFactor": [round(c, 4) for c in material.linear()] + [1],
+                "metallicFactor": material.metallic,
+                "roughnessFactor": material.roughness
+            }
+        })
     document = {
-        "asset": {"version": "2.0", "generator": "offstage assets/make_models.py"}, "scene": 0,
-        "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0, "name": path.stem}],
-        "meshes": [{"name": path.stem, "primitives": primitives}], "materials": materials, "accessors": accessors,
-        "bufferViews": views, "buffers": [{"byteLength": len(blob)}],
+        "asset": {
+            "version": "2.0",
+            "generator": "offstage assets/make_models.py"
+        },
+        "scene": 0,
+        "scenes": [{
+            "nodes": [0]
+        }],
+        "nodes": [{
+            "mesh": 0,
+            "name": path.stem
+        }],
+        "meshes": [{
+            "name": path.stem,
+            "primitives": primitives
+        }],
+        "materials": materials,
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{
+            "byteLength": len(blob)
+        }],
     }
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     size = 12 + 8 + len(text) + 8 + len(blob)
-    path.write_bytes(struct.pack("<4sII", b"glTF", 2, size) + struct.pack("<I4s", len(text), b"JSON") + text +
-                     struct.pack("<I4s", len(blob), b"BIN\0") + blob)
+    path.write_bytes(
+        struct.pack("<4sII", b"glTF", 2, size) + struct.pack("<I4s", len(text), b"JSON") + text +
+        struct.pack("<I4s", len(blob), b"BIN\0") + blob)
 
 
 def write_obj(path, parts, library):
@@ -462,15 +508,19 @@ def write_mtl(path, materials):
     lines = []
     for m in materials:
         channels = " ".join(f"{int(m.color[k : k + 2], 16) / 255:.4f}" for k in (1, 3, 5))
-        lines += [f"newmtl {m.name}", f"Kd {channels}", "Ks 0.5 0.5 0.5", f"Ns {2 / m.roughness**4 - 2:.2f}",
-                  f"Pr {m.roughness}", f"Pm {m.metallic}", ""]
+        lines += [
+            f"newmtl {m.name}", f"Kd {channels}", "Ks 0.5 0.5 0.5", f"Ns {2 / m.roughness**4 - 2:.2f}",
+            f"Pr {m.roughness}", f"Pm {m.metallic}", ""
+        ]
     path.write_text("\n".join(lines))
 
 
 def write_ply(path, mesh):
     header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(mesh.positions)}"]
     header += [f"property float {name}" for name in ("x", "y", "z", "nx", "ny", "nz")]
-    header += [f"element face {len(mesh.triangles)}", "property list uchar int vertex_indices", "end_header", ""]
+    header += [
+        f"element face {len(mesh.triangles)}", "property list uchar int vertex_indices", "end_header", ""
+    ]
     body = b"".join(struct.pack("<6f", *p, *n) for p, n in zip(mesh.positions, mesh.normals))
     body += b"".join(struct.pack("<B3i", 3, *t) for t in mesh.triangles)
     path.write_bytes("\n".join(header).encode() + body)

@@ -1,6 +1,7 @@
 #include "effects/distribution.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace offstage::effects {
@@ -12,6 +13,8 @@ struct Overloaded : Fs... {
 };
 
 constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
+/// Limits of this size are none.
+constexpr Real kUnbounded = 1e300;
 /// The normal distribution function at -1.
 constexpr Real kBelowOneDeviation = 0.15865525393145705;
 
@@ -32,6 +35,13 @@ Real value_at(const Normal& n, Real u) {
   return std::clamp(n.mean + n.deviation * normal_quantile(p), n.min, n.max);
 }
 
+/// The end of a normal distribution's range, on the side of `sign`.
+Real bound(const Normal& n, int sign) {
+  const Real reach = n.clip || n.deviation == 0 ? n.deviation : kInfinity;
+  const Real end = std::clamp(n.mean + sign * reach, n.min, n.max);
+  return std::abs(end) < kUnbounded ? end : sign * kInfinity;
+}
+
 bool by_value(const std::pair<Real, Real>& a, const std::pair<Real, Real>& b) {
   return a.second < b.second;
 }
@@ -46,11 +56,7 @@ Real sample(const Varying& v, Real u, Real t) {
 }
 
 Real lower_bound(const Varying& v) {
-  return std::visit(Overloaded{[](Real x) { return x; },
-                               [](const Normal& n) {
-                                 const Real reach = n.clip || n.deviation == 0 ? n.deviation : kInfinity;
-                                 return std::clamp(n.mean - reach, n.min, n.max);
-                               },
+  return std::visit(Overloaded{[](Real x) { return x; }, [](const Normal& n) { return bound(n, -1); },
                                [](const Uniform& r) { return r.low; },
                                [](const Curve& c) {
                                  return std::min_element(c.keys.begin(), c.keys.end(), by_value)->second;
@@ -59,11 +65,7 @@ Real lower_bound(const Varying& v) {
 }
 
 Real upper_bound(const Varying& v) {
-  return std::visit(Overloaded{[](Real x) { return x; },
-                               [](const Normal& n) {
-                                 const Real reach = n.clip || n.deviation == 0 ? n.deviation : kInfinity;
-                                 return std::clamp(n.mean + reach, n.min, n.max);
-                               },
+  return std::visit(Overloaded{[](Real x) { return x; }, [](const Normal& n) { return bound(n, 1); },
                                [](const Uniform& r) { return r.high; },
                                [](const Curve& c) {
                                  return std::max_element(c.keys.begin(), c.keys.end(), by_value)->second;

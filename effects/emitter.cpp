@@ -195,7 +195,7 @@ void Emitter::emit(sim::World& world, Real start, Real end) {
 
 Emitter::Grid Emitter::grid_of(const Release& r) const {
   Real radius = upper_bound(def_.radius);
-  if (!(radius < 1e100)) {
+  if (std::isinf(radius)) {
     radius = 0;
     for (uint64_t k = 0; k < r.count; ++k)
       radius = std::max(radius, draw(def_.radius, number_ + k, kRadius, r.time));

@@ -1,5 +1,7 @@
 #pragma once
-/// Model files through assimp: OBJ, PLY, STL, glTF/GLB, Collada, FBX and what else it reads.
+/// Model files through assimp: OBJ, PLY, STL, glTF/GLB, Collada, FBX and what else it reads. assimp runs in a forked
+/// child with limits of time (8 s of processor time and 1 s more for each MiB of the file) and memory (4 GiB), because
+/// it crashes or hangs on hostile files; the caller gets a message instead.
 
 #include <filesystem>
 

@@ -38,7 +38,10 @@ struct VideoDef {
 /// (naming the package), or std::invalid_argument if the size or alpha is not possible with this format (with
 /// advice).
 void check_video(const VideoDef& def);
-/// ffmpeg as a child process in its own process group, fed raw frames, writing to a temporary name.
+/// ffmpeg (or the program that OFFSTAGE_FFMPEG names) as a child process in its own process group, fed raw frames,
+/// writing to NAME.part.EXT. Colour is BT.709 with sRGB's curve, alpha straight; the same frames give the same bytes on
+/// any number of cores. GIF has a palette per frame, so that a long film needs no memory. Throws as check_video does,
+/// and FileError if the file cannot be made.
 std::unique_ptr<FrameSink> make_video_sink(const VideoDef& def);
 
 /// Raw top-down frames on standard output: rgba bytes, or yuv4mpeg (4:4:4) if `y4m`. A closed pipe throws

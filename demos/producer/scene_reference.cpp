@@ -71,7 +71,7 @@ objects refer to them by these names. One object has at most 100000 copies.
 
 `"include": ["stage.json"]` at the top reads other scene files first, sought beside the file that names them. Lists at the top
 (`materials`, `bodies` ...) are joined, the included ones first; other objects are merged key by key, and the including file
-wins. Objects of different `type` are not merged but replaced.
+wins. An object that names its `type` replaces one of another type.
 
 ## Overrides
 

@@ -81,13 +81,13 @@ fs::path identity_of(const fs::path& file) {
   return error ? file : identity;
 }
 
-/// Lays `top` over `base`. Objects of different "type" have nothing in common: `top` replaces the other.
+/// Lays `top` over `base`; an object that names its type replaces one of another.
 void merge(Node& base, Node top, bool at_root) {
   Object* below = base.as<Object>();
   Object* above = top.as<Object>();
-  const Node* type = base.find("type");
-  const Node* top_type = top.find("type");
-  if (!below || !above || (type && top_type && to_text(*type) != to_text(*top_type))) {
+  const Node* type = top.find("type");
+  const Node* old_type = base.find("type");
+  if (!below || !above || (type && (!old_type || to_text(*type) != to_text(*old_type)))) {
     base = std::move(top);
     return;
   }

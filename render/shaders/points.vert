@@ -7,100 +7,116 @@ layout(location = 0) uniform mat4 shadow_clip_from_world;
 #endif
 layout(location = 1) uniform vec4 style;  // softness, stretch [s], lit, additive
 
-layout(location = 0) out vec3 position;         // on the quad
-layout(location = 1) out vec2 across;           // place on it in radii, from the nearest place of the particle's axis
-layout(location = 2) flat out vec4 tint;
-layout(location = 3) flat out vec4 center;      // w: radius
+// The place on the quad in radii: across, up, and for a streak half the length of its axis, which up runs along.
+layout(location = 0) out vec3 place;
 #ifdef SHADOW
-layout(location = 4) flat out float shadow_seed;
+layout(location = 1) flat out vec2 dimming;  // alpha, shift of the dither
+#elif STYLE == 2
+layout(location = 1) flat out vec4 color;
+layout(location = 2) flat out vec4 ball;     // centre, radius
+layout(location = 3) out vec3 position;      // on the quad
 #else
-layout(location = 4) out vec3 radiance;         // of a sprite, fog included
-layout(location = 5) flat out vec3 side;
-layout(location = 6) flat out float visibility;
-layout(location = 9) flat out vec4 fog;
+layout(location = 1) out vec4 light;         // fog included; w: alpha
+layout(location = 2) out vec4 rim;           // what a streak mirrors at its sides; w: radius
 #endif
-#if STYLE == 1
-layout(location = 7) out float along;           // place along the axis in radii, 0 at its middle
-layout(location = 8) flat out float half_length;
+
+// The vector between viewer and particle, unit, and the width of a pixel or texel there.
+vec4 viewer_of(vec3 p) {
+#ifdef SHADOW
+  return vec4(frame.sun_direction.xyz, frame.shadow.x);
+#else
+  vec3 to_eye = frame.eye.xyz - p;
+  float distance = max(length(to_eye), 1e-6);
+  return vec4(to_eye / distance, frame.eye.w * distance);
+#endif
+}
+
+#ifndef SHADOW
+#if STYLE == 0
+// A puff is a soft ball: bright towards the light, and brighter still against it.
+vec3 puff_light(vec3 p, vec3 n, vec3 u, vec3 to_viewer, float radius) {
+  vec3 l = frame.sun_direction.xyz;
+  vec3 a = normalize(cross(l, u + 0.01)) * (0.6 * radius), b = cross(l, a), front = p + radius * l;
+  float visibility = 0.25 * (sun_visibility(front + a, l) + sun_visibility(front - a, l) +
+                             sun_visibility(front + b, l) + sun_visibility(front - b, l));
+  float forward = saturate(-dot(l, to_viewer)), forward2 = forward * forward;
+  float phase = max(0.45 + 0.35 * dot(n, l) + 0.8 * forward2 * forward2, 0.0);
+  // Some light gets into the shadow of a cloud from all around.
+  return ambient(n) + frame.sun_radiance.rgb * (phase * mix(0.2, 1.0, visibility));
+}
+#elif STYLE == 1
+// A drop drawn out by its motion: it refracts the sky behind it, and it is bright when the sun stands behind it.
+vec3 drop_light(vec3 p, vec3 to_viewer) {
+  vec3 through = mix(sky_reflection(-to_viewer, 0.25), ambient(vec3(0.0, 1.0, 0.0)), 0.5);
+  float forward = 0.5 - 0.5 * dot(frame.sun_direction.xyz, to_viewer);
+  float forward2 = forward * forward, forward8 = forward2 * forward2 * forward2 * forward2;
+  float visibility = sun_visibility(p, frame.sun_direction.xyz);
+  return through + frame.sun_radiance.rgb * (visibility * (0.12 + 0.9 * forward8));
+}
+#endif
 #endif
 
 void main() {
   vec2 corner = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0;
   vec3 p = in_position.xyz;
-  float radius = in_position.w;
-  tint = in_color;
-#ifdef SHADOW
-  vec3 to_viewer = frame.sun_direction.xyz;
-  float pixel = frame.shadow.x;
-#else
-  vec3 to_viewer = frame.eye.xyz - p;
-  float distance = max(length(to_viewer), 1e-6);
-  to_viewer /= distance;
-  float pixel = frame.eye.w * distance;
-#endif
-  vec3 u = normalize(cross(abs(to_viewer.y) < 0.99 ? vec3(0.0, 1.0, 0.0) : vec3(1.0, 0.0, 0.0), to_viewer));
+  float radius = in_position.w, alpha = in_color.a;
+  vec4 viewer = viewer_of(p);
+  vec3 u = normalize(cross(abs(viewer.y) < 0.99 ? vec3(0.0, 1.0, 0.0) : vec3(1.0, 0.0, 0.0), viewer.xyz));
 
+  // What would be thinner than a pixel stays about one wide and gets fainter instead.
+  float drawn = STYLE == 2 ? radius : max(radius, 0.6 * viewer.w);
+  float thinning = radius / drawn;
 #if STYLE == 1
   vec3 half_axis = in_velocity.xyz * (0.5 * style.y);
-  vec3 flat_axis = half_axis - to_viewer * dot(half_axis, to_viewer);
-  float flat_length = length(flat_axis);
-  vec3 w = flat_length > 1e-6 ? flat_axis / flat_length : cross(to_viewer, u);
-  u = cross(w, to_viewer);
-  // What would be thinner than a pixel stays one wide and gets fainter instead.
-  float drawn = max(radius, 0.75 * pixel);
-  tint.a *= radius / drawn;
-  half_length = max(flat_length - drawn, 0.0) / drawn;  // rounded ends included, it is as long as it moved
-  float reach = flat_length > drawn ? 1.0 - drawn / flat_length : 0.0;
-  position = p + half_axis * (reach * corner.y) + drawn * (w * corner.y + u * corner.x);
-  across = corner;
-  along = corner.y * (half_length + 1.0);
-  radius = drawn;
+  vec3 across_view = half_axis - viewer.xyz * dot(half_axis, viewer.xyz);
+  float half_length = length(across_view);
+  vec3 w = half_length > 1e-6 ? across_view / half_length : cross(viewer.xyz, u);
+  u = cross(w, viewer.xyz);
+  alpha *= thinning;
+  // With its rounded ends it is as long as it moved.
+  float straight = max(half_length - drawn, 0.0) / drawn;
+  vec3 at = p + half_axis * (half_length > drawn ? corner.y * (1.0 - drawn / half_length) : 0.0) +
+            drawn * (w * corner.y + u * corner.x);
+  place = vec3(corner.x, corner.y * (straight + 1.0), straight);
 #else
-  vec3 w = cross(to_viewer, u);
+  vec3 w = cross(viewer.xyz, u);
+  float reach = drawn;
 #if STYLE == 0
-  float drawn = max(radius, 0.75 * pixel);
-  tint.a *= (radius / drawn) * (radius / drawn);
-  radius = drawn;
-  float reach = radius;
-#elif defined(SHADOW)
-  float reach = radius;
-#else
+  alpha *= thinning * thinning;
+#elif !defined(SHADOW)
   // The silhouette is that of the cone from the eye that touches the ball.
-  float reach = radius * inversesqrt(max(1.0 - radius * radius / (distance * distance), 0.02));
+  float sine = radius * frame.eye.w / viewer.w;
+  reach *= inversesqrt(max(1.0 - sine * sine, 0.02));
 #endif
-  position = p + reach * (u * corner.x + w * corner.y);
-  across = corner;
+  vec3 at = p + reach * (u * corner.x + w * corner.y);
+  place = vec3(corner, 0.0);
 #endif
 
-  center = vec4(p, radius);
 #ifdef SHADOW
-  shadow_seed = in_velocity.w;
-  gl_Position = shadow_clip_from_world * vec4(position, 1.0);
+  dimming = vec2(alpha, in_velocity.w);
+  gl_Position = shadow_clip_from_world * vec4(at, 1.0);
 #else
-  side = u;
-  radiance = tint.rgb;
-  visibility = 1.0;
+  gl_Position = frame.clip_from_world * vec4(at, 1.0);
+#if STYLE == 2
+  color = in_color;
+  ball = in_position;
+  position = at;
+#else
   // Added light is dimmed by the fog but brings none of its colour.
-  fog = fog_to(p) * vec4(vec3(1.0 - style.w), 1.0);
-#if STYLE == 0
+  vec4 fog = fog_to(p) * vec4(vec3(1.0 - style.w), 1.0);
+  // What comes close to the lens fades out before it is cut.
+  light = vec4(in_color.rgb, alpha * saturate(0.5 * (gl_Position.w - frame.depth.z) / drawn));
+  rim = vec4(in_color.rgb, drawn);
   if (style.z != 0.0) {
-    vec3 l = frame.sun_direction.xyz;
-    vec3 spread = cross(l, u) * (0.6 * radius), spread2 = cross(l, w) * (0.6 * radius);
-    vec3 front = p + radius * l;
-    visibility = 0.25 * (sun_visibility(front + spread, l) + sun_visibility(front - spread, l) +
-                         sun_visibility(front + spread2, l) + sun_visibility(front - spread2, l));
-
-    // A puff is a soft ball: bright towards the light, brighter still against it.
-    vec3 n = normalize(u * corner.x + w * corner.y + 0.7 * to_viewer);
-    float forward = saturate(-dot(frame.sun_direction.xyz, to_viewer)), forward2 = forward * forward;
-    float phase = 0.45 + 0.35 * dot(n, frame.sun_direction.xyz) + 0.8 * forward2 * forward2;
-    float scattered = mix(0.2, 1.0, visibility);  // some light gets into the shadow of a cloud from all around
-    radiance *= ambient(n) + frame.sun_radiance.rgb * (scattered * max(phase, 0.0));
-  }
-  radiance = radiance * fog.w + fog.rgb;
-#elif STYLE == 1
-  if (style.z != 0.0) visibility = sun_visibility(p, frame.sun_direction.xyz);
+#if STYLE == 0
+    light.rgb *= puff_light(p, normalize(u * corner.x + w * corner.y + 0.7 * viewer.xyz), u, viewer.xyz, drawn);
+#else
+    light.rgb *= drop_light(p, viewer.xyz);
+    rim.rgb = sky_reflection(normalize(u * corner.x - 0.6 * viewer.xyz), 0.1);
 #endif
-  gl_Position = frame.clip_from_world * vec4(position, 1.0);
+  }
+  light.rgb = light.rgb * fog.w + fog.rgb;
+  rim.rgb = rim.rgb * fog.w + fog.rgb;
+#endif
 #endif
 }

@@ -1,28 +1,27 @@
 // A ball by ray casting on its quad.
-layout(location = 0) in vec3 position;
-layout(location = 1) in vec2 across;
-layout(location = 2) flat in vec4 tint;
-layout(location = 3) flat in vec4 center;
+layout(location = 1) flat in vec4 color;
+layout(location = 2) flat in vec4 ball;  // centre, radius
+layout(location = 3) in vec3 position;
 layout(location = 1) uniform vec4 style;
 layout(location = 2) uniform vec2 surface;  // metallic, roughness
-layout(location = 0) out vec4 color;
+layout(location = 0) out vec4 result;
 
 void main() {
   vec3 ray = normalize(position - frame.eye.xyz);
-  vec3 to_eye = frame.eye.xyz - center.xyz;
+  vec3 to_eye = frame.eye.xyz - ball.xyz;
   vec3 nearest = to_eye - ray * dot(to_eye, ray);  // of the ray to the centre
-  float h2 = center.w * center.w - dot(nearest, nearest);
+  float h2 = ball.w * ball.w - dot(nearest, nearest);
   if (h2 < 0.0) discard;
   vec3 offset = nearest - ray * sqrt(h2);
-  vec3 hit = center.xyz + offset;
-  vec3 n = offset / center.w;
+  vec3 hit = ball.xyz + offset;
+  vec3 n = offset / ball.w;
   vec4 clip = frame.clip_from_world * vec4(hit, 1.0);
   gl_FragDepth = clip.z / clip.w;
 
-  vec3 radiance = tint.rgb;
+  vec3 radiance = color.rgb;
   if (style.z != 0.0) {
-    Surface s = Surface(tint.rgb, surface.y, surface.x, vec3(0.0));
+    Surface s = Surface(color.rgb, surface.y, surface.x, vec3(0.0));
     radiance = shade(s, n, -ray, sun_visibility(hit, n));
   }
-  color = vec4(apply_fog(radiance, hit), 1.0);
+  result = vec4(apply_fog(radiance, hit), 1.0);
 }

@@ -3,9 +3,11 @@
 /// mean of the items' midpoints along the longest axis, at the median where the mean is unbalanced, along
 /// another axis where all midpoints coincide, and into a leaf of several items where no axis separates them.
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "sim/types.h"

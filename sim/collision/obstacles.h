@@ -3,6 +3,7 @@
 /// bodies are here like kinematic ones: a particle that hits one sees infinite mass and gives it no reaction
 /// (P8 is not in this version), while its velocity still carries the particle along.
 
+#include <algorithm>
 #include <span>
 #include <vector>
 

@@ -131,7 +131,7 @@ void ParticleSweep::respond(ParticlePath& path, const Hit& hit, Real from, const
       std::move(contacts_.begin() + 1, contacts_.end(), contacts_.begin());
       --contact_count_;
     }
-    contacts_[contact_count_++] = {hit.normal, body_velocity, friction};
+    contacts_[contact_count_++] = {hit.normal, &o, friction};
   }
   path.start = hit.position;
   path.start_velocity = v;
@@ -143,8 +143,9 @@ void ParticleSweep::respond(ParticlePath& path, const Hit& hit, Real from, const
 /// friction.
 void ParticleSweep::finish(ParticlePath& path, Real duration, const Vec3& extra) {
   Vec3 v = fly(path.start_velocity, path.mass, duration, extra);
+  const Vec3 predicted = path.start + duration * path.start_velocity;
   const auto press = [&](const Contact& c) {
-    const Vec3 u = v - c.velocity;
+    const Vec3 u = v - c.obstacle->velocity_at(predicted, 1);
     if (u.dot(c.normal) >= 0) return false;
     v += collision_impulse(path.mass, u, c.normal, 0, c.friction) / path.mass;
     return true;

@@ -48,7 +48,8 @@ class ParticleSweep {
   };
   /// A surface that presses on the particle until the end of the sub-step.
   struct Contact {
-    Vec3 normal, velocity;
+    Vec3 normal;
+    const Obstacle* obstacle;
     Real friction;
   };
 

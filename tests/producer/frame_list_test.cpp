@@ -1,8 +1,8 @@
 #include "producer/frame_list.h"
 
-#include <gtest/gtest.h>
-
 #include <stdexcept>
+
+#include <gtest/gtest.h>
 
 namespace offstage::producer {
 namespace {
@@ -19,7 +19,8 @@ TEST(FrameList, RangesStepsAndNumbersFromTheEnd) {
 }
 
 TEST(FrameList, WrongTextSaysWhatIsAllowed) {
-  for (const char* text : {"a", "1-", "1..5", "3-1", "0", "11", "1-11", "1-4x0", "1,,2", "-11", "1 2", "99999999999"})
+  for (const char* text :
+       {"a", "1-", "1..5", "3-1", "0", "11", "1-11", "1-4x0", "1,,2", "-11", "1 2", "99999999999"})
     EXPECT_THROW(parse_frames(text, 10), std::invalid_argument) << text;
 }
 
@@ -34,7 +35,8 @@ TEST(FrameList, ChunksCoverEveryFrameOnce) {
     }
     EXPECT_EQ(joined, all);
   }
-  for (const char* text : {"0/2", "3/2", "1", "1/0", "a/b", "1/2x"}) EXPECT_THROW(chunk_of(all, text), std::invalid_argument);
+  for (const char* text : {"0/2", "3/2", "1", "1/0", "a/b", "1/2x"})
+    EXPECT_THROW(chunk_of(all, text), std::invalid_argument);
 }
 
 }  // namespace

@@ -27,7 +27,8 @@ std::string error_of(const std::string& text) {
 }
 
 TEST(Json, EveryValueAndKeyKnowsWhereItStarts) {
-  const Node root = parse_json("// a scene\n{\"a\": /* why */ [1,\n  -2.5, \"x\"],\n\t\"b\" : {\"c\":null} }\n", "f");
+  const Node root =
+      parse_json("// a scene\n{\"a\": /* why */ [1,\n  -2.5, \"x\"],\n\t\"b\" : {\"c\":null} }\n", "f");
   EXPECT_EQ(at(root.at), "2:1");
   const Object& members = *root.as<Object>();
   EXPECT_EQ(at(members[0].at), "2:2");
@@ -76,7 +77,8 @@ TEST(Json, SyntaxErrorsSayWhatAndWhere) {
   EXPECT_EQ(error_of("{a: 1}"), "f:1:2: invalid literal; expected string literal");
   EXPECT_EQ(error_of("{\"a\" 1}"), "f:1:6: unexpected number literal; expected ':'");
   EXPECT_EQ(error_of("[NaN]"), "f:1:2: invalid literal");
-  EXPECT_EQ(error_of("[\"a\n\"]"), "f:1:2: invalid string: control character U+000A (LF) must be escaped to \\u000A or \\n");
+  EXPECT_EQ(error_of("[\"a\n\"]"),
+            "f:1:2: invalid string: control character U+000A (LF) must be escaped to \\u000A or \\n");
   EXPECT_EQ(error_of("[1] x"), "f:1:5: invalid literal; expected end of input");
 }
 
@@ -98,7 +100,9 @@ TEST(Json, NestingIsBounded) {
   EXPECT_NE(error_of(std::string(1'000'000, '[')), "accepted");
 }
 
-TEST(Json, ZeroBytesAreNoText) { EXPECT_EQ(error_of(std::string("{}\0{", 4)), "f: not a text: it has a zero byte"); }
+TEST(Json, ZeroBytesAreNoText) {
+  EXPECT_EQ(error_of(std::string("{}\0{", 4)), "f: not a text: it has a zero byte");
+}
 
 TEST(Json, NumbersAreWrittenSoThatTheyReadBackBitForBit) {
   const effects::RandomStream random(7, 1);

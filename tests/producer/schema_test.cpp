@@ -6,7 +6,6 @@
 #include <set>
 
 #include <gtest/gtest.h>
-
 #include <nlohmann/json.hpp>
 #include <valijson/adapters/nlohmann_json_adapter.hpp>
 #include <valijson/schema.hpp>
@@ -51,11 +50,13 @@ class SceneSchema : public testing::Test {
   };
 
   const json& resolve(const json& rule) const {
-    return rule.contains("$ref") ? schema_json.at(json::json_pointer(rule.at("$ref").get<std::string>().substr(1)))
-                                 : rule;
+    return rule.contains("$ref")
+               ? schema_json.at(json::json_pointer(rule.at("$ref").get<std::string>().substr(1)))
+               : rule;
   }
 
-  /// Calls `leaf` for every key whose value is no object, and `object` for every object, wherever they can stand.
+  /// Calls `leaf` for every key whose value is no object, and `object` for every object, wherever they can
+  /// stand.
   void walk(const Slot& slot, const std::function<void(const Slot&)>& leaf,
             const std::function<void(const Slot&, const json& minimal)>& object) const {
     const json& rule = resolve(slot.rule);
@@ -63,12 +64,14 @@ class SceneSchema : public testing::Test {
       walk_object(slot, rule, leaf, object);
     } else if (rule.contains("oneOf") && resolve(rule.at("oneOf")[0]).contains("properties") &&
                resolve(rule.at("oneOf")[0]).at("properties").contains("type")) {
-      for (const json& alternative : rule.at("oneOf")) walk({slot.path, slot.scene_with, alternative}, leaf, object);
+      for (const json& alternative : rule.at("oneOf"))
+        walk({slot.path, slot.scene_with, alternative}, leaf, object);
     } else {
       leaf({slot.path, slot.scene_with, rule});
       if (rule.contains("items") && resolve(rule.at("items")).is_object() && !rule.contains("minItems") &&
           (resolve(rule.at("items")).contains("properties") || resolve(rule.at("items")).contains("oneOf")))
-        walk({slot.path + "/0", [&](const json& v) { return slot.scene_with(json::array({v})); }, rule.at("items")},
+        walk({slot.path + "/0", [&](const json& v) { return slot.scene_with(json::array({v})); },
+              rule.at("items")},
              leaf, object);
     }
   }
@@ -145,7 +148,8 @@ TEST_F(SceneSchema, EveryRangeRefusesWhatLiesBeyondAsTheLoaderDoes) {
   int ranges = 0;
   walk_all(
       [&](const Slot& slot) {
-        const bool varying = slot.rule.contains("oneOf") && slot.rule.at("oneOf")[0].value("type", "") == "number";
+        const bool varying =
+            slot.rule.contains("oneOf") && slot.rule.at("oneOf")[0].value("type", "") == "number";
         const bool vector = slot.rule.contains("items") && slot.rule.contains("minItems");
         const json& number = varying ? slot.rule.at("oneOf")[0] : vector ? slot.rule.at("items") : slot.rule;
         for (const bool low : {true, false}) {
@@ -153,12 +157,14 @@ TEST_F(SceneSchema, EveryRangeRefusesWhatLiesBeyondAsTheLoaderDoes) {
           const std::optional<json> bad = beyond(number, low);
           if (!bad) continue;
           ++ranges;
-          const json value = vector ? json(std::vector<json>(slot.rule.at("minItems").get<std::size_t>(), *bad)) : *bad;
+          const json value =
+              vector ? json(std::vector<json>(slot.rule.at("minItems").get<std::size_t>(), *bad)) : *bad;
           const json scene = slot.scene_with(value);
           EXPECT_TRUE(refused(scene).contains(slot.path + (vector ? "/0" : ""))) << slot.path << " " << scene;
           EXPECT_FALSE(schema_accepts(scene)) << slot.path << " " << scene;
           if (!varying) continue;
-          for (const json& form : {json{{"mean", *bad}}, json{{"range", {*bad, *bad}}}, json{{"curve", {{0, *bad}}}}}) {
+          for (const json& form :
+               {json{{"mean", *bad}}, json{{"range", {*bad, *bad}}}, json{{"curve", {{0, *bad}}}}}) {
             EXPECT_FALSE(refused(slot.scene_with(form)).empty()) << slot.path << " " << form;
             EXPECT_FALSE(schema_accepts(slot.scene_with(form))) << slot.path << " " << form;
           }
@@ -197,9 +203,27 @@ TEST_F(SceneSchema, EveryDefaultItNamesIsTheLoaders) {
 
 /// Puts an odd value at a random place of a tree.
 void disturb(json& tree, const effects::RandomStream& random, uint64_t seed) {
-  static const std::vector<json> kOdd = {
-      nullptr, true, -1, 0,          2,          2.5,  -0.5, "", "red", "#ff0000", "static", json::array(), json::object(),
-      1e300,   7,    3,  {1, 2, 3}, {{"mean", 2}}, {{"range", {1, 2}}}, {{"type", "box"}}, {{"type", "orbit"}}};
+  static const std::vector<json> kOdd = {nullptr,
+                                         true,
+                                         -1,
+                                         0,
+                                         2,
+                                         2.5,
+                                         -0.5,
+                                         "",
+                                         "red",
+                                         "#ff0000",
+                                         "static",
+                                         json::array(),
+                                         json::object(),
+                                         1e300,
+                                         7,
+                                         3,
+                                         {1, 2, 3},
+                                         {{"mean", 2}},
+                                         {{"range", {1, 2}}},
+                                         {{"type", "box"}},
+                                         {{"type", "orbit"}}};
   const json flat = tree.flatten();
   auto place = flat.begin();
   std::advance(place, static_cast<std::ptrdiff_t>(random.below(flat.size(), seed, 0)));
@@ -237,8 +261,9 @@ TEST(SceneReference, EveryLinkLeadsToAHeading) {
     for (char& c : heading) c = c == '-' ? ' ' : c;
     heading[0] = static_cast<char>(std::toupper(heading[0]));
     forms.insert("\n## " + heading + "\n");
-    EXPECT_TRUE(std::any_of(forms.begin(), forms.end(), [&](const std::string& f) { return text.find(f) != text.npos; }))
-        << heading;
+    EXPECT_TRUE(std::any_of(forms.begin(), forms.end(), [&](const std::string& f) {
+      return text.find(f) != text.npos;
+    })) << heading;
   }
 }
 

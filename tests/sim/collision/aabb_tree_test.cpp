@@ -3,9 +3,9 @@
 #include <cmath>
 #include <set>
 
-#include "tests/random.h"
-
 #include <gtest/gtest.h>
+
+#include "tests/random.h"
 
 namespace offstage::sim {
 namespace {

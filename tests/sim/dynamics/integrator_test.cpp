@@ -26,7 +26,7 @@ class Oscillator final : public DynamicSystem {
 };
 
 Real error(IntegratorKind kind, int steps) {
-  constexpr Real kTime = 3;
+  constexpr Real kTime = 2;
   std::array<Real, 1> x = {1}, p = {0};
   IntegratorWorkspace work;
   for (int i = 0; i < steps; ++i)
@@ -38,7 +38,7 @@ TEST(Integrator, ObservedOrderOnADampedOscillator) {
   for (const auto& [kind, order] :
        {std::pair(IntegratorKind::explicit_euler, 1.0), std::pair(IntegratorKind::symplectic_euler, 1.0),
         std::pair(IntegratorKind::midpoint, 2.0), std::pair(IntegratorKind::rk4, 4.0)})
-    EXPECT_NEAR(std::log2(error(kind, 400) / error(kind, 800)), order, 0.1)
+    EXPECT_NEAR(std::log2(error(kind, 200) / error(kind, 400)), order, 0.1)
         << "kind " << static_cast<int>(kind);
 }
 
@@ -83,7 +83,7 @@ TEST(Integrator, SymplecticEulerBoundsTheEnergyThatExplicitEulerPumps) {
     integrator(IntegratorKind::symplectic_euler).step(Harmonic(), 0, kH, x, p, work);
     integrator(IntegratorKind::explicit_euler).step(Harmonic(), 0, kH, y, q, work);
   }
-  EXPECT_NEAR(p[0] * p[0] + x[0] * x[0] + kH * x[0] * p[0], 1, 1e-12);
+  EXPECT_NEAR(p[0] * p[0] + x[0] * x[0] - kH * x[0] * p[0], 1, 1e-12);
   EXPECT_NEAR((y[0] * y[0] + q[0] * q[0]) / std::pow(1 + kH * kH, 1000), 1, 1e-10);
 }
 

@@ -1,0 +1,215 @@
+#include "producer/scene_check.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "producer/scene_io.h"
+
+namespace offstage::producer {
+namespace {
+
+std::string lines(const std::vector<Problem>& problems) {
+  std::string text;
+  for (const Problem& problem : problems) text += problem.where.path + ": " + problem.what + "\n";
+  return text;
+}
+
+/// Paths and texts of all errors, one a line.
+std::string errors_of(const std::string& text) {
+  try {
+    parse_scene(text, "s", OFFSTAGE_SOURCE_DIR);
+  } catch (const SceneError& error) {
+    return lines(error.problems());
+  }
+  return "";
+}
+std::string warnings_of(const std::string& text) {
+  return lines(parse_scene(text, "s", OFFSTAGE_SOURCE_DIR).warnings);
+}
+
+TEST(SceneCheck, NamesAreUniqueWithinASection) {
+  EXPECT_EQ(errors_of(R"({"bodies": [{"name": "a"}, {"name": "a"}], "particles": [{"name": "a"}]})"),
+            "/bodies/1/name: the name 'a' is already that of /bodies/0\n");
+  EXPECT_EQ(errors_of(R"({"bodies": [{}, {"name": "body_0"}]})"),
+            "/bodies/1/name: the name 'body_0' is already that of /bodies/0\n");
+  EXPECT_EQ(errors_of(R"({"bodies": [{"name": "a", "repeat": {"count": 2}}, {"name": "a_1"}]})"),
+            "/bodies/1/name: the name 'a_1' is already that of /bodies/0\n");
+}
+
+TEST(SceneCheck, NamesLeadSomewhere) {
+  EXPECT_EQ(errors_of(R"({
+    "materials": [{"name": "steel"}],
+    "bodies": [{"name": "ball", "material": "stele"}, {"name": "rock", "repeat": {"count": 2}}],
+    "particles": [{"name": "chain", "places": [{}]}],
+    "emitters": [{"body": "bal"}, {"body": "rock"}, {"body": "rock_1"}],
+    "springs": [{"a": {"body": "ball"}, "b": {"particles": "chian"}, "material": "glass"},
+                {"a": {"body": "ball"}, "b": {"particles": "chain", "index": 1}}],
+    "camera": {"type": "follow", "body": "car"}})"),
+            "/bodies/0/material: there is no material 'stele'; did you mean 'steel'?\n"
+            "/emitters/0/body: there is no body 'bal'; did you mean 'ball'?\n"
+            "/emitters/1/body: the body 'rock' has copies; name one of them, such as 'rock_0'\n"
+            "/springs/0/b/particles: there are no particles 'chian'; did you mean 'chain'?\n"
+            "/springs/0/material: there is no material 'glass'; known: 'steel'\n"
+            "/springs/1/b/index: must be less than 1, the number of particles of 'chain', got 1\n"
+            "/camera/body: there is no body 'car'; known: 'ball', 'rock_0', 'rock_1'\n");
+}
+
+TEST(SceneCheck, FilesAreThere) {
+  EXPECT_EQ(errors_of(R"({"materials": [{"texture": "no.png"}],
+                          "bodies": [{"material": "material_0", "shape": {"type": "mesh", "file": "no.obj"}},
+                                     {"model": {"file": "LICENSE"}}]})"),
+            "/materials/0/texture: there is no file '" OFFSTAGE_SOURCE_DIR
+            "/no.png'\n"
+            "/bodies/0/shape/file: there is no file '" OFFSTAGE_SOURCE_DIR "/no.obj'\n");
+}
+
+TEST(SceneCheck, OnlyKinematicBodiesFollowKeysAndPlanesDoNotMove) {
+  EXPECT_EQ(
+      errors_of(
+          R"({"bodies": [{"keyframes": [{}]}, {"motion": "static", "spin": [0, 1, 0]}, {"shape": {"type": "plane"}},
+                                     {"motion": "kinematic", "keyframes": [{"time": 1}, {"time": 1}, {"time": 0}]}]})"),
+      "/bodies/0/keyframes: only a kinematic body follows keyframes; give it \"motion\": \"kinematic\"\n"
+      "/bodies/1/spin: only a kinematic body spins by itself; give it \"motion\": \"kinematic\"\n"
+      "/bodies/2/shape: a plane cannot be dynamic; give the body \"motion\": \"static\"\n"
+      "/bodies/3/keyframes/1/time: times must increase, got 1 after 1\n"
+      "/bodies/3/keyframes/2/time: times must increase, got 0 after 1\n");
+}
+
+TEST(SceneCheck, CameraAndSunCanBeUsed) {
+  EXPECT_EQ(
+      errors_of(
+          R"({"camera": {"eye": [1, 1, 1], "target": [1, 1, 1]}, "lights": [{"direction": [1, 0, 0]}, {}]})"),
+      "/camera: the camera is where it looks at\n"
+      "/lights/0/direction: the sun must be above the horizon: y must be greater than 0\n"
+      "/lights/1: there can be only one sun\n");
+  EXPECT_EQ(errors_of(R"({"camera": {"type": "keyframes"}})"),
+            "/camera: needs at least one of \"keyframes\"\n");
+}
+
+TEST(SceneCheck, AFilmHasAtLeastOneFrame) {
+  EXPECT_EQ(errors_of(R"({"output": {"fps": 10, "duration": 0.04}})"),
+            "/output/duration: is too short for a single frame at 10 frames per second\n");
+  EXPECT_EQ(errors_of(R"({"output": {"fps": 10, "duration": 0.06}})"), "");
+}
+
+TEST(SceneCheck, WhatHasNoEffectIsWarnedOf) {
+  EXPECT_EQ(warnings_of(R"({
+    "materials": [{"name": "lone"}],
+    "bodies": [{"name": "b", "motion": "static", "velocity": [1, 0, 0]}, {"mass": 2, "density": 7}],
+    "emitters": [{"rate": 0}],
+    "springs": [{"a": {"body": "b"}, "b": {"position": [0, 1, 0]}}],
+    "render": {"size": [321, 180]}})"),
+            "/materials/0: the material 'lone' is not used\n"
+            "/bodies/0/velocity: has no effect: the body is not dynamic\n"
+            "/bodies/1/density: has no effect: the mass is given\n"
+            "/emitters/0: releases no particles: rate, count and bursts are zero\n"
+            "/springs/0: has no effect: neither end can move\n"
+            "/render/size: is odd: most video formats need even numbers\n");
+}
+
+// --- Springs ---
+
+/// Steps x'' = -k x - c x' from rest at 1; whether it stays bounded.
+bool stays_bounded(sim::IntegratorKind kind, Real k, Real c, Real h) {
+  Real x = 1, v = 0;
+  const auto a = [&](Real x1, Real v1) { return -k * x1 - c * v1; };
+  for (int i = 0; i < 20000 && std::abs(x) < 1e6; ++i) {
+    if (kind == sim::IntegratorKind::symplectic_euler) {
+      v += h * a(x, v);
+      x += h * v;
+    } else {
+      const Real x2 = x + h / 2 * v, v2 = v + h / 2 * a(x, v), x3 = x + h / 2 * v2,
+                 v3 = v + h / 2 * a(x2, v2);
+      const Real x4 = x + h * v3, v4 = v + h * a(x3, v3);
+      const Real next = v + h / 6 * (a(x, v) + 2 * a(x2, v2) + 2 * a(x3, v3) + a(x4, v4));
+      x += h / 6 * (v + 2 * v2 + 2 * v3 + v4);
+      v = next;
+    }
+  }
+  return std::abs(x) < 1e6;
+}
+
+TEST(SceneCheck, TheLargestStableStepIsWhereTheIntegratorsBreakDown) {
+  using enum sim::IntegratorKind;
+  for (const auto kind : {symplectic_euler, rk4}) {
+    for (const auto& [k, c] : {std::pair(400.0, 0.0), std::pair(0.0, 30.0)}) {
+      const Real h = largest_stable_step(kind, k, c, 1);
+      EXPECT_TRUE(stays_bounded(kind, k, c, 0.99 * h)) << k;
+      // Damping alone only sends the speed to infinity.
+      EXPECT_TRUE(c > 0 || !stays_bounded(kind, k, c, 1.01 * h)) << k;
+    }
+  }
+  EXPECT_FALSE(
+      stays_bounded(symplectic_euler, 1, 30, 1.05 * largest_stable_step(symplectic_euler, 1, 30, 1)));
+  EXPECT_FALSE(stays_bounded(rk4, 1, 30, 1.05 * largest_stable_step(rk4, 1, 30, 1)));
+}
+
+TEST(SceneCheck, ASpringTooStiffForItsStepIsNamedWithTheStepItNeeds) {
+  const auto scene = [](Real stiffness, const std::string& integrator) {
+    return R"({"world": {"step": 0.01, "integrator": ")" + integrator + R"("},
+               "particles": [{"name": "p", "places": [{}, {"position": [1, 0, 0]}], "mass": 2}],
+               "springs": [{"name": "tie", "a": {"particles": "p"}, "b": {"particles": "p", "index": 1}, "stiffness": )" +
+           std::to_string(stiffness) + "}]}";
+  };
+  // Reduced mass 1 kg: 2 sqrt(1 / k) = 0.01 s at k = 40000 N/m, 2.83 sqrt(1 / k) at k = 80000.
+  EXPECT_EQ(errors_of(scene(39000, "symplectic_euler")), "");
+  EXPECT_EQ(errors_of(scene(41000, "symplectic_euler")),
+            "/springs/0: the spring 'tie' is too stiff for the step: /world/step must be less than 0.00983 "
+            "s, is 0.01 s\n");
+  EXPECT_EQ(errors_of(scene(79000, "rk4")), "");
+  EXPECT_NE(errors_of(scene(81000, "rk4")), "");
+}
+
+TEST(SceneCheck, ASpringEndMustBeOneThing) {
+  EXPECT_EQ(errors_of(R"({"bodies": [{"name": "b"}], "particles": [{"name": "p", "places": [{}]}],
+    "springs": [{"a": {"body": "b", "particles": "p"}}, {"a": {"particles": "p"}, "b": {"particles": "p"}}]})"),
+            "/springs/0/a: must be on a body or a particle, not both\n"
+            "/springs/1: has the same particle at both ends\n");
+}
+
+// --- Emitters ---
+
+TEST(SceneCheck, ExpectedParticlesAreRateTimesLifespan) {
+  Emitter emitter;
+  emitter.rate = 100.0;
+  emitter.lifespan = 2.0;
+  EXPECT_EQ(expected_alive(emitter, 10), 200);
+  EXPECT_EQ(expected_alive(emitter, 0.5), 50);
+  emitter.start = 9.5;
+  EXPECT_EQ(expected_alive(emitter, 10), 50);
+  emitter = {.rate = 0.0, .count = 30.0, .interval = 0.5, .lifespan = 2.0};
+  EXPECT_EQ(expected_alive(emitter, 10), 120);
+  emitter = {.rate = 0.0, .bursts = {{.count = 10.0, .cycles = 100, .interval = 0.5}}, .lifespan = 2.0};
+  EXPECT_EQ(expected_alive(emitter, 10), 40);
+}
+
+TEST(SceneCheck, TooManyParticlesAreAnErrorAndHeldBackOnesAWarning) {
+  EXPECT_EQ(warnings_of(R"({"emitters": [{"rate": 1000, "lifespan": 2, "max_alive": 1999}]})"),
+            "/emitters/0/max_alive: will hold back particles: about 2e+03 would be alive at once, 1999 are "
+            "allowed\n");
+  EXPECT_EQ(warnings_of(R"({"emitters": [{"rate": 1000, "lifespan": 2, "max_alive": 2000}]})"), "");
+  EXPECT_EQ(
+      errors_of(R"({"emitters": [{"rate": 1.1e7, "lifespan": 2}]})"),
+      "/emitters/0: would have about 2.2e+07 particles alive at once, more than 2e+07; lower rate, count or "
+      "lifespan\n");
+}
+
+TEST(SceneCheck, ASurfaceHasRoomForAParticle) {
+  EXPECT_EQ(errors_of(R"({"emitters": [{"radius": 0.06}]})"),
+            "/emitters/0/surface: is too small for a single particle: it is 0.1 m wide and the smallest "
+            "particle 0.12 m\n");
+  EXPECT_EQ(warnings_of(R"({"emitters": [{"radius": {"range": [0.04, 0.06]}}]})"),
+            "/emitters/0/surface: is only 0.1 m wide: too small for the largest particles\n");
+}
+
+TEST(SceneCheck, AgesDoNotDecreaseAndEmittersEndAfterTheyStart) {
+  EXPECT_EQ(
+      errors_of(
+          R"({"emitters": [{"start": 2, "end": 1, "look": {"size_over_age": [[0, 1], [0.5, 2], [0.4, 1]]}}]})"),
+      "/emitters/0/end: must be after the start, 2 s\n"
+      "/emitters/0/look/size_over_age/2: ages must not decrease\n");
+}
+
+}  // namespace
+}  // namespace offstage::producer
