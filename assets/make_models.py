@@ -187,18 +187,19 @@ def crank():
 
 
 def connecting_rod():
-    eyes = shaded(ring(circle(0.22), 0.125, 0.09, 0.015),
-                  30).joined(shaded(ring(circle(0.17), 0.095, 0.08, 0.015), 30).moved((0, 2, 0)))
-    flanges = [
-        shaded(
-            extrude([(x - 0.025, 0.19), (x + 0.025, 0.19), (0.75 * x + 0.02, 1.86), (0.75 * x - 0.02, 1.86)],
-                    -0.06, 0.06, 0.008), 30) for x in (-0.085, 0.085)
-    ]
-    web = shaded(extrude([(-0.09, 0.19), (0.09, 0.19), (0.07, 1.86), (-0.07, 1.86)], -0.022, 0.022, 0.005),
-                 30)
-    bushes = shaded(ring(circle(0.127), 0.1, 0.1, 0.006),
-                    30).joined(shaded(ring(circle(0.097), 0.075, 0.09, 0.006), 30).moved((0, 2, 0)))
-    write_glb(MODELS / "rod.glb", [(eyes.joined(*flanges, web), STEEL), (bushes, BRASS)])
+
+    def bar(x, low, high, half_depth, chamfer):
+        """Tapered between the eyes: half widths `low` and `high`, the middle line from x to 0.75 x."""
+        outline = [(x - low, 0.19), (x + low, 0.19), (0.75 * x + high, 1.86), (0.75 * x - high, 1.86)]
+        return shaded(extrude(outline, -half_depth, half_depth, chamfer), 30)
+
+    big, small = ring(circle(0.22), 0.125, 0.09, 0.015), ring(circle(0.17), 0.095, 0.08, 0.015)
+    beam = [bar(-0.085, 0.025, 0.02, 0.06, 0.008), bar(0.085, 0.025, 0.02, 0.06, 0.008),
+            bar(0, 0.09, 0.07, 0.022, 0.005)]
+    steel = shaded(big, 30).joined(shaded(small, 30).moved((0, 2, 0)), *beam)
+    big, small = ring(circle(0.127), 0.1, 0.1, 0.006), ring(circle(0.097), 0.075, 0.09, 0.006)
+    bushes = shaded(big, 30).joined(shaded(small, 30).moved((0, 2, 0)))
+    write_glb(MODELS / "rod.glb", [(steel, STEEL), (bushes, BRASS)])
 
 
 def piston():
@@ -233,11 +234,11 @@ def blade(k):
     rotate = turn("y", heading)
     # Rounded across; not turned to the sky, as a two-sided material flips them for the back.
     normals = [rotate(unit((side * 0.5, 0.3, -1))) for side in (-1, 1, -1, 1, 0)]
-    return Mesh([add(rotate(p), (x, 0, z)) for p in rows], [(0, 1, 3), (0, 3, 2), (2, 3, 4)], normals)
+    return Mesh([add(rotate(p), (x, 0, z)) for p in rows], [(0, 3, 1), (0, 2, 3), (2, 4, 3)], normals)
 
 
 def grass_patch():
-    greens = ["#5d9130", "#74a83c", "#95b34e"]
+    greens = ["#4f8029", "#649835", "#86a445"]
     groups = [Mesh(), Mesh(), Mesh()]
     for k in range(19 * 19):
         group = 0 if hashed(k, 6) < 0.45 else 1 if hashed(k, 6) < 0.85 else 2
@@ -260,8 +261,8 @@ def rock():
 
     mesh = icosphere(3).mapped(shape)
     foot = min(p[1] for p in mesh.positions)
-    write_glb(MODELS / "rock.glb", [(shaded(mesh.moved(
-        (0, -foot, 0)), 32), Material("rock", "#857f76", 0.9))])
+    stone = shaded(mesh.moved((0, -foot, 0)), 32)
+    write_glb(MODELS / "rock.glb", [(stone, Material("rock", "#857f76", 0.9))])
 
 
 def leaf(height, reach, width, heading):
@@ -269,7 +270,7 @@ def leaf(height, reach, width, heading):
     steps, rows = 6, []
     for k in range(steps + 1):
         t = k / steps
-        middle = (0, height * math.sin(t * 2.1) / math.sin(1.5708), reach * t * t)
+        middle = (0, height * math.sin(2.1 * t), reach * t * t)
         w = width * math.sin(math.pi * (0.06 + 0.94 * t)**0.8)
         rows += [(-w, middle[1] + 0.25 * w, middle[2]), (0, middle[1], middle[2]),
                  (w, middle[1] + 0.25 * w, middle[2])]
@@ -310,12 +311,10 @@ def tree():
     groups = [Mesh(), Mesh()]
     for k, (x, y, z, r) in enumerate(crowns):
         if k > 0:
-            bark.append(
-                shaded(
-                    sweep([(0, 1.25 + 0.1 * k, 0), (0.5 * x, 0.5 * (y + 1.4), 0.5 * z), (x, y, z)],
-                          [0.07, 0.05, 0.03], 8), 60))
-        blob = icosphere(2).mapped(lambda p: add(mul(p, r * (1 + 0.2 * noise(mul(p, 2.2), 20 + k))),
-                                                 (x, y, z)))
+            branch = [(0, 1.25 + 0.1 * k, 0), (0.5 * x, 0.5 * (y + 1.4), 0.5 * z), (x, y, z)]
+            bark.append(shaded(sweep(branch, [0.07, 0.05, 0.03], 8), 60))
+        blob = icosphere(2).mapped(lambda p: mul(p, r * (1 + 0.2 * noise(mul(p, 2.2), 20 + k))))
+        blob = blob.moved((x, y, z))
         groups[k % 2] = groups[k % 2].joined(shaded(blob, 75))
     write_glb(MODELS / "tree.glb", [(Mesh().joined(*bark), Material("bark", "#6b4a30", 0.9)),
                                     (groups[0], Material("foliage_dark", "#4d8a34", 0.8)),

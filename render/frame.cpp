@@ -111,18 +111,15 @@ View make_view(const Camera& camera, const SampleOffsets& offsets, int width_px,
 }
 
 FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& environment,
-                         const SampleOffsets& offsets, int width_px, int height_px) {
+                         const SampleOffsets& offsets, int height_px) {
   const SkyModel sky = make_sky(sun, environment);
   const float n = view.near_m, f = view.far_m;
-  const auto w = static_cast<float>(width_px), h = static_cast<float>(height_px);
   const Vector3f x = view.right * view.tan_half.x(), y = view.up * view.tan_half.y();
 
   FrameUniforms frame;
   frame.clip_from_world = view.clip_from_world;
   frame.shadow_from_world = Matrix4f::Identity();
-  frame.eye = vec4(view.eye, 2 * view.tan_half.y() / h);
-  frame.right = vec4(view.right);
-  frame.up = vec4(view.up);
+  frame.eye = vec4(view.eye, 2 * view.tan_half.y() / static_cast<float>(height_px));
   frame.ray_center = vec4(view.forward - view.shear.x() * x - view.shear.y() * y);
   frame.ray_x = vec4(x);
   frame.ray_y = vec4(y);
@@ -136,7 +133,6 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
   const std::array<Vector3f, 9> irradiance = sky_irradiance(sky);
   for (std::size_t k = 0; k < irradiance.size(); ++k) frame.irradiance[k] = vec4(irradiance[k]);
   frame.shadow = Vector4f::Zero();
-  frame.viewport = {w, h, 1 / w, 1 / h};
   return frame;
 }
 

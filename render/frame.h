@@ -16,7 +16,6 @@ struct FrameUniforms {
   Matrix4f clip_from_world;
   Matrix4f shadow_from_world;
   Vector4f eye;
-  Vector4f right, up;
   Vector4f ray_center, ray_x, ray_y;
   Vector4f depth;
   Vector4f sun_direction;
@@ -24,7 +23,6 @@ struct FrameUniforms {
   Vector4f zenith, horizon, ground, glow;
   std::array<Vector4f, 9> irradiance;
   Vector4f shadow;
-  Vector4f viewport;
 };
 
 /// The eye of one sub-frame: moved in the lens, looking along `forward`.
@@ -53,6 +51,6 @@ Vector3f jittered_sun(const Sun& sun, const Vector2f& offset);
 
 /// Fills everything but the shadow map's fields.
 FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& environment,
-                         const SampleOffsets& offsets, int width_px, int height_px);
+                         const SampleOffsets& offsets, int height_px);
 
 }  // namespace offstage::render

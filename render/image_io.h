@@ -10,8 +10,8 @@
 
 namespace offstage::render {
 
-/// Reads PNG, JPEG, TGA, BMP, GIF (its first frame), PSD or PNM, of up to 16384 pixels a side; 16 bits become 8.
-/// Throws FileError.
+/// Reads PNG, JPEG, TGA, BMP, GIF (its first frame), PSD or PNM, of up to 16384 pixels a side; 16 bits
+/// become 8. Throws FileError.
 Image read_image(const std::filesystem::path& path);
 /// The same from memory (textures embedded in model files); `name` is used in messages.
 Image decode_image(std::span<const uint8_t> bytes, const std::string& name);

@@ -1,7 +1,7 @@
 #pragma once
-/// Model files through assimp: OBJ, PLY, STL, glTF/GLB, Collada, FBX and what else it reads. assimp runs in a forked
-/// child with limits of time (8 s of processor time and 1 s more for each MiB of the file) and memory (4 GiB), because
-/// it crashes or hangs on hostile files; the caller gets a message instead.
+/// Model files through assimp: OBJ, PLY, STL, glTF/GLB, Collada, FBX and what else it reads. assimp runs in a
+/// forked child with limits of time (8 s of processor time and 1 s more for each MiB of the file) and memory
+/// (4 GiB), because it crashes or hangs on hostile files; the caller gets a message instead.
 
 #include <filesystem>
 
@@ -11,8 +11,12 @@ namespace offstage::render {
 
 /// Reads a model, applies its nodes' transforms, drops what cannot be drawn (points, lines, faces with bad
 /// indices or no area, non-finite vertices) with a warning, and reads its textures, embedded or beside it.
-/// Animation is ignored. Throws FileError with one line for a file that is missing, broken, or has no
-/// triangle left.
+/// Animation, skins, cameras, lights and vertex colours are ignored. There is one part per material, with
+/// normals (compute_normals where the file has none). Texture coordinates start at the image's top left, v
+/// down, as its rows run. Up axis and unit become Y and metres where the format states them (FBX, Collada).
+/// Colours of classic materials (diffuse, specular, shininess) are taken as sRGB, those of physically based
+/// ones as linear. Throws FileError with one line for a file that is missing, broken, or has no triangle
+/// left; UnavailableError if no process can be started.
 Model read_model(const std::filesystem::path& path);
 
 }  // namespace offstage::render

@@ -2,8 +2,9 @@
 /// Private: draws the instances of meshes: opaque ones in batches of one mesh and material, front to back;
 /// those that are not opaque one by one, back to front; and casters into the shadow map.
 
+#include <array>
 #include <map>
-#include <memory>
+#include <span>
 #include <utility>
 #include <vector>
 

@@ -3,6 +3,7 @@
 /// front over the opaque picture, balls ray-cast with depth among the opaque things.
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <vector>
 

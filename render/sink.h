@@ -38,14 +38,15 @@ struct VideoDef {
 /// (naming the package), or std::invalid_argument if the size or alpha is not possible with this format (with
 /// advice).
 void check_video(const VideoDef& def);
-/// ffmpeg (or the program that OFFSTAGE_FFMPEG names) as a child process in its own process group, fed raw frames,
-/// writing to NAME.part.EXT. Colour is BT.709 with sRGB's curve, alpha straight; the same frames give the same bytes on
-/// any number of cores. GIF has a palette per frame, so that a long film needs no memory. Throws as check_video does,
-/// and FileError if the file cannot be made.
+/// ffmpeg (or the program that OFFSTAGE_FFMPEG names) as a child process in its own process group, fed raw
+/// frames, writing to NAME.part.EXT. Colour is BT.709 with sRGB's curve, alpha straight; the same frames give
+/// the same bytes on any number of cores. GIF has a palette per frame, so that a long film needs no memory.
+/// Throws as check_video does, and FileError if the file cannot be made.
 std::unique_ptr<FrameSink> make_video_sink(const VideoDef& def);
 
-/// Raw top-down frames on standard output: rgba bytes, or yuv4mpeg (4:4:4) if `y4m`. A closed pipe throws
-/// FileError.
+/// Raw top-down frames on standard output: rgba bytes, or yuv4mpeg (4:4:4, BT.709, limited range) if `y4m`. A
+/// closed pipe throws FileError. Throws std::invalid_argument for an impossible size or rate, and on a
+/// terminal.
 std::unique_ptr<FrameSink> make_pipe_sink(bool y4m, int width_px, int height_px, double fps);
 
 /// Encoders ffmpeg offers among those used here, for `doctor`; empty if there is no ffmpeg.

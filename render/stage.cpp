@@ -1,7 +1,6 @@
 #include "render/stage.h"
 
 #include <algorithm>
-#include <cstring>
 
 #include "render/frame.h"
 #include "render/gl.h"
@@ -238,7 +237,7 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
     sum = {s.def.width_px, s.def.height_px, std::vector<float>(s.pixels.size(), 0.0f)};
   }
   const View view = make_view(s.camera, offsets, s.def.width_px, s.def.height_px);
-  FrameUniforms frame = make_frame(view, s.sun, s.environment, offsets, s.def.width_px, s.def.height_px);
+  FrameUniforms frame = make_frame(view, s.sun, s.environment, offsets, s.def.height_px);
 
   std::vector<const Instance*> shown;
   s.instances.for_each([&](const std::unique_ptr<Instance>& instance) { shown.push_back(instance.get()); });

@@ -3,7 +3,6 @@ layout(std140, binding = 0) uniform Frame {
   mat4 clip_from_world;
   mat4 shadow_from_world;   // to [0, 1] of the shadow map
   vec4 eye;                 // w: size of a pixel at distance 1
-  vec4 right, up;           // of the image plane
   vec4 ray_center, ray_x, ray_y;  // direction through a place of the screen: center + x * ndc.x + y * ndc.y
   vec4 depth;               // distance along the view axis = x / (depth + y); z: near plane
   vec4 sun_direction;       // w: 1 if the shadow map holds something
@@ -11,7 +10,6 @@ layout(std140, binding = 0) uniform Frame {
   vec4 zenith, horizon, ground, glow;  // zenith.w: fog density
   vec4 irradiance[9];       // ambient light of a white surface, spherical harmonics in x, y, z
   vec4 shadow;              // size of a texel [m], texels, 1 / texels, seed of the dither
-  vec4 viewport;            // size, 1 / size
 } frame;
 
 float saturate(float x) { return clamp(x, 0.0, 1.0); }

@@ -128,7 +128,7 @@ TEST(Placement, KindsMultiplyAndEachGroupScattersByItself) {
   for (std::size_t i = 0; i < 48; ++i) {
     suffixes.insert(copies.placed[i].suffix);
     const std::size_t group = i / 4, cell = group % 6;
-    const Vec3 centre(group < 6 ? 0 : 100 + (cell % 2 == 0 ? -10 : 10), 0,
+    const Vec3 centre((group < 6 ? 0 : 100) + (cell % 2 == 0 ? -10 : 10), 0,
                       -20.0 + 20.0 * static_cast<Real>(cell / 2));
     EXPECT_LE((at[i] - centre).cwiseAbs().maxCoeff(), 0.5) << i;
   }

@@ -178,10 +178,11 @@ TEST(SceneCheck, ExpectedParticlesAreRateTimesLifespan) {
   EXPECT_EQ(expected_alive(emitter, 0.5), 50);
   emitter.start = 9.5;
   EXPECT_EQ(expected_alive(emitter, 10), 50);
-  emitter = {.rate = 0.0, .count = 30.0, .interval = 0.5, .lifespan = 2.0};
-  EXPECT_EQ(expected_alive(emitter, 10), 120);
-  emitter = {.rate = 0.0, .bursts = {{.count = 10.0, .cycles = 100, .interval = 0.5}}, .lifespan = 2.0};
-  EXPECT_EQ(expected_alive(emitter, 10), 40);
+  const Emitter releases{.rate = 0.0, .count = 30.0, .interval = 0.5, .lifespan = 2.0};
+  EXPECT_EQ(expected_alive(releases, 10), 120);
+  const Emitter bursts{
+      .rate = 0.0, .bursts = {{.count = 10.0, .cycles = 100, .interval = 0.5}}, .lifespan = 2.0};
+  EXPECT_EQ(expected_alive(bursts, 10), 40);
 }
 
 TEST(SceneCheck, TooManyParticlesAreAnErrorAndHeldBackOnesAWarning) {
