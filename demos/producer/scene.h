@@ -288,9 +288,9 @@ using Light = std::variant<SunLight>;
 enum class Background { sky, transparent };
 
 struct EnvironmentSettings {
-  Color zenith{{0.16f, 0.32f, 0.65f, 1}};
-  Color horizon{{0.62f, 0.72f, 0.82f, 1}};
-  Color ground{{0.28f, 0.26f, 0.22f, 1}};
+  Color zenith{{0.2f, 0.42f, 0.88f, 1}};
+  Color horizon{{0.95f, 1.05f, 1.15f, 1}};
+  Color ground{{0.36f, 0.33f, 0.28f, 1}};
   Real intensity = 1;
   Real fog = 0;
   Background background = Background::sky;
