@@ -27,7 +27,6 @@ cmake --build build
 
 cmake --preset asan -DOFFSTAGE_WERROR=ON
 cmake --build build-asan --target sanitized_tests
-export LSAN_OPTIONS="suppressions=$PWD/tests/lsan.supp:print_suppressions=0"
 export UBSAN_OPTIONS=print_stacktrace=1:halt_on_error=1
 ctest --test-dir build-asan -L sanitized -j "$cores" --output-on-failure --progress "$@" || failed=1
 
