@@ -178,11 +178,14 @@ TEST(SceneCheck, ExpectedParticlesAreRateTimesLifespan) {
   EXPECT_EQ(expected_alive(emitter, 0.5), 50);
   emitter.start = 9.5;
   EXPECT_EQ(expected_alive(emitter, 10), 50);
-  const Emitter releases{.rate = 0.0, .count = 30.0, .interval = 0.5, .lifespan = 2.0};
-  EXPECT_EQ(expected_alive(releases, 10), 120);
-  const Emitter bursts{
-      .rate = 0.0, .bursts = {{.count = 10.0, .cycles = 100, .interval = 0.5}}, .lifespan = 2.0};
-  EXPECT_EQ(expected_alive(bursts, 10), 40);
+  emitter.start = 0;
+  emitter.rate = 0.0;
+  emitter.count = 30.0;
+  emitter.interval = 0.5;
+  EXPECT_EQ(expected_alive(emitter, 10), 120);
+  emitter.count = 0.0;
+  emitter.bursts.assign(1, EmitterBurst{.count = 10.0, .cycles = 100, .interval = 0.5});
+  EXPECT_EQ(expected_alive(emitter, 10), 40);
 }
 
 TEST(SceneCheck, TooManyParticlesAreAnErrorAndHeldBackOnesAWarning) {
