@@ -8,8 +8,8 @@
 namespace offstage::producer {
 namespace {
 
-Node reference_to(const std::string& name) {
-  return Object{{"$ref", "#/definitions/" + name}};
+Object reference_to(const std::string& name) {
+  return {{"$ref", "#/definitions/" + name}};
 }
 
 /// "a", "b" or "c"
@@ -168,13 +168,13 @@ Description Catalogue::refer(const std::string& name, std::string_view help,
   const bool known =
       std::any_of(objects_.begin(), objects_.end(), [&](const auto& o) { return o.name == name; });
   if (!known) describe(objects_.emplace_back(ObjectEntry{name, std::string(help), {}, {}, {}, {}}));
-  return {{{"$ref", "#/definitions/" + name}}, "[" + name + "](#" + name + ")"};
+  return {reference_to(name), "[" + name + "](#" + name + ")"};
 }
 
 Object Catalogue::share(const std::string& name, const Node& schema) {
   if (std::none_of(shared_.begin(), shared_.end(), [&](const Member& m) { return m.key == name; }))
     shared_.push_back({name, schema});
-  return {{"$ref", "#/definitions/" + name}};
+  return reference_to(name);
 }
 
 Node ObjectEntry::definition() const {

@@ -6,6 +6,7 @@
 /// new key is one line in scene_table.cpp; a new kind of value is one Codec. Those of plain values are in
 /// values.h.
 
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <initializer_list>
@@ -96,9 +97,9 @@ class Reader {
   std::optional<std::size_t> choice(const Node& node, std::span<const std::string> names);
   /// Which of `names` the key "type" of an object is; without that key the first, unless it is required.
   std::optional<std::size_t> type(const Node& node, std::span<const std::string> names, bool required);
-  /// Calls read(i, value) for each key of an object that is specs[i], at that key's path; refuses unknown
-  /// keys (other than "type" if the object is `tagged`) and misses required ones. `name` is what messages
-  /// call the object.
+  /// Calls read(i, value) for each key of an object that is specs[i], at that key's path. Reports unknown
+  /// keys (other than "type" if the object is `tagged`) and required ones that are missing. `name` is what
+  /// messages call the object.
   void keys(const Node& node, std::string_view name, std::span<const Spec* const> specs, bool tagged,
             const std::function<void(std::size_t, const Node&)>& read);
 
@@ -147,10 +148,10 @@ class Catalogue {
   Object shared_;
 };
 
-/// How a value of type V is read, written and described:
-///   static void read(Reader&, const Node&, const Spec&, V& out);      leaves `out` alone if the value is
-///   wrong static Node write(const V&);                                      or std::optional<Node>: nothing
-///   if absent static Description describe(Catalogue&, const Spec&);
+/// How a value of type V is read, written and described, by three static functions:
+/// - `void read(Reader&, const Node&, const Spec&, V& out)` leaves a usable `out` if the value is wrong;
+/// - `Node write(const V&)`, or `std::optional<Node>` where a value can be absent;
+/// - `Description describe(Catalogue&, const Spec&)`.
 template <class V>
 struct Codec;
 

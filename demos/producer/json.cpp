@@ -171,21 +171,25 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
   }
   void next() { ++token_; }
 
-  bool place(Node::Value value) {
-    add(std::move(value));
+  /// Adds a value to what is open.
+  template <class T>
+  Node& add(T&& value) {
+    const Position at = here();
+    next();
+    if (open_.empty()) return root = Node(std::forward<T>(value), at);
+    if (List* list = open_.back()->as<List>()) return list->emplace_back(std::forward<T>(value), at);
+    return open_.back()->as<Object>()->back().value = Node(std::forward<T>(value), at);
+  }
+  template <class T>
+  bool place(T&& value) {
+    add(std::forward<T>(value));
     return true;
   }
-  Node& add(Node::Value value) {
-    Node node(std::move(value), here());
-    next();
-    if (open_.empty()) return root = std::move(node);
-    if (List* list = open_.back()->as<List>()) return list->emplace_back(std::move(node));
-    return open_.back()->as<Object>()->back().value = std::move(node);
-  }
-  bool open(Node::Value value) {
+  template <class T>
+  bool open(T&& container) {
     if (open_.size() == kMaxDepth)
       return fail(here(), "nested deeper than " + std::to_string(kMaxDepth) + " levels");
-    open_.push_back(&add(std::move(value)));  // stays put: its parent grows only after it is closed
+    open_.push_back(&add(std::forward<T>(container)));  // stays put: its parent grows only after it is closed
     return true;
   }
   bool close() {

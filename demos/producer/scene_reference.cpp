@@ -16,7 +16,7 @@ A scene is a JSON file. It says what there is, how it moves, and how it is filme
   // a ball falls past a spinning wheel
   "materials": [{"name": "red", "color": "#c03020", "roughness": 0.3}],
   "bodies": [
-    {"name": "ball", "shape": {"type": "sphere", "radius": 0.2}, "position": [0, 3, 0], "material": "red"},
+    {"name": "ball", "shape": {"type": "sphere", "radius": 0.2}, "material": "red", "position": [0, 3, 0]},
     {"name": "wheel", "shape": {"type": "cylinder", "radius": 1, "height": 0.1}, "position": [2, 1, 0],
      "motion": "kinematic", "spin": [0, 3, 0]}
   ],
@@ -25,14 +25,16 @@ A scene is a JSON file. It says what there is, how it moves, and how it is filme
 }
 ```
 
-Every key has a default, except where its row says "required". A key that is not known, a value of the wrong type or out of its
-range, and a name that leads nowhere are errors; all of them are reported at once, each with file, line, column and path.
+Every key has a default, except where its row says "required". A key that is not known, a value of the wrong
+type or out of its range, and a name that leads nowhere are errors; all of them are reported at once, each
+with file, line, column and path.
 
 - **Comments** are `// to the end of the line` and `/* between */`.
-- **Units** are metres, kilograms, seconds and radians. What is in degrees says so in its name (`fov_deg`). Axes are
-  right-handed and Y is up. Sizes from 0.001 to 100 m and speeds below 300 m/s are what the simulation is made for.
-- **Frames** are numbered from 1; frame k shows the time start + (k - 1) / fps. There are duration * fps of them,
-  rounded.
+- **Units** are metres, kilograms, seconds and radians. What is in degrees says so in its name (`fov_deg`).
+  Axes are right-handed and Y is up. Sizes from 0.001 to 100 m and speeds below 300 m/s are what the
+  simulation is made for.
+- **Frames** are numbered from 1; frame k shows the time start + (k - 1) / fps. There are duration * fps of
+  them, rounded.
 - **Files** (models, textures) are sought in the folder of the scene file.
 - **Names** may be left out; an object without one is called after its kind and index, like `body_3`.
 - **Editors** complete and check a scene that starts with `"$schema": "scene.schema.json"`, the output of
@@ -44,8 +46,8 @@ range, and a name that leads nowhere are errors; all of them are reported at onc
 
 ## Colours
 
-`"#rrggbb"` or `"#rrggbbaa"` in sRGB, as picture editors show them, or linear `[r, g, b]` or `[r, g, b, a]`, where values above 1
-glow. Alpha is straight: 0 is transparent, 1 opaque.
+`"#rrggbb"` or `"#rrggbbaa"` in sRGB, as picture editors show them, or linear `[r, g, b]` or `[r, g, b, a]`,
+where values above 1 glow. Alpha is straight: 0 is transparent, 1 opaque.
 
 ## Numbers that vary
 
@@ -63,20 +65,23 @@ All that it can become must lie in the key's range.
 
 ## Copies
 
-Bodies and emitters may have `repeat`, `grid` and `scatter`. They multiply: a repeat of a grid of a scatter. A copy is the original
-moved as a whole, with its velocities and keyframes; copies of `rock` are called `rock_0`, `rock_1` and so on, and other
-objects refer to them by these names. One object has at most 100000 copies.
+Bodies and emitters may have `repeat`, `grid` and `scatter`. They multiply: a repeat of a grid of a scatter.
+A copy is the original moved as a whole, with its velocities and keyframes; copies of `rock` are called
+`rock_0`, `rock_1` and so on, and other objects refer to them by these names. One object has at most 100000
+copies.
 
 ## Including files
 
-`"include": ["stage.json"]` at the top reads other scene files first, sought beside the file that names them. Lists at the top
-(`materials`, `bodies` ...) are joined, the included ones first; other objects are merged key by key, and the including file
-wins. An object that names its `type` replaces one of another type.
+`"include": ["stage.json"]` at the top reads other scene files first, sought beside the file that names
+them. Lists at the top (`materials`, `bodies` ...) are joined, the included ones first; other objects are
+merged key by key, and the including file wins. An object that names its `type` replaces one of another
+type.
 
 ## Overrides
 
-`--set path=value` on the command line changes or adds a key: `--set emitters.0.rate=50`, `--set /emitters/0/rate=50`, or by name
-`--set emitters.rain.rate=50`. The value is JSON, or else text. It is checked like the file.
+`--set path=value` on the command line changes or adds a key: `--set emitters.0.rate=50`, `--set
+/emitters/0/rate=50`, or by name `--set emitters.rain.rate=50`. The value is JSON, or else text. It is
+checked like the file.
 )";
 
 std::string table_of(const ObjectEntry& object) {

@@ -243,7 +243,7 @@ void Codec<Color>::read(Reader& in, const Node& node, const Spec&, Color& out) {
 }
 Node Codec<Color>::write(const Color& color) {
   List list;
-  for (const float v : color.rgba) list.push_back(widen(v));
+  for (const float v : color.rgba) list.emplace_back(widen(v));
   if (color.rgba[3] == 1) list.pop_back();
   return list;
 }

@@ -253,6 +253,12 @@ TEST(SceneReference, InTheDocumentationIsUpToDate) {
   EXPECT_EQ(text, scene_reference()) << "write the output of scene_reference() to docs/scene-format.md";
 }
 
+TEST(SceneReference, ItsExampleIsAValidScene) {
+  const std::string text = scene_reference(), fence = "```json\n";
+  const std::size_t begin = text.find(fence) + fence.size();
+  EXPECT_TRUE(parse_scene(text.substr(begin, text.find("```", begin) - begin), "s", "").warnings.empty());
+}
+
 TEST(SceneReference, EveryLinkLeadsToAHeading) {
   const std::string text = scene_reference();
   for (std::size_t i = text.find("](#"); i != std::string::npos; i = text.find("](#", i + 1)) {
