@@ -25,13 +25,13 @@ failed=0
 cmake --preset release -DOFFSTAGE_WERROR=ON -DOFFSTAGE_TESTS=ON
 cmake --build build
 
-cmake --preset asan -DOFFSTAGE_WERROR=ON
+cmake --preset asan
 cmake --build build-asan --target sanitized_tests
 export UBSAN_OPTIONS=print_stacktrace=1:halt_on_error=1
 ctest --test-dir build-asan -L sanitized -j "$cores" --output-on-failure --progress "$@" || failed=1
 
 if [ "$tsan" = yes ]; then
-  cmake --preset tsan -DOFFSTAGE_WERROR=ON
+  cmake --preset tsan
   cmake --build build-tsan --target test_validation
   TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp" build-tsan/test_validation --gtest_filter='Determinism.*' || failed=1
 fi
