@@ -28,7 +28,7 @@ cmake --build build
 cmake --preset asan
 cmake --build build-asan --target sanitized_tests
 export UBSAN_OPTIONS=print_stacktrace=1:halt_on_error=1
-ctest --test-dir build-asan -L sanitized -j "$cores" --output-on-failure --progress "$@" || failed=1
+ctest --test-dir build-asan -L unit -j "$cores" --output-on-failure --progress "$@" || failed=1
 
 if [ "$tsan" = yes ]; then
   cmake --preset tsan
