@@ -13,7 +13,7 @@ namespace offstage::render {
 class FrameSink {
  public:
   virtual ~FrameSink() = default;
-  /// Throws FileError or UnavailableError (the encoder died: with its own last words).
+  /// Throws FileError, also when the encoder died: with its own last words.
   virtual void write(int frame, const Image& image) = 0;
   /// Completes the output: only now a video appears under its name. Without it the destructor discards what
   /// is partial.

@@ -1,9 +1,11 @@
 #include <algorithm>
 #include <cstdlib>
+#include <fstream>
 #include <memory>
 #include <mutex>
 #include <sstream>
 #include <stdexcept>
+#include <string_view>
 
 #include <fcntl.h>
 #include <sys/socket.h>
@@ -96,7 +98,32 @@ int send_all(int socket, std::span<const uint8_t> bytes) {
 }
 
 std::filesystem::path partial_name(const std::filesystem::path& path) {
-  return path.parent_path() / (path.stem().string() + ".part" + path.extension().string());
+  const std::string own = std::to_string(::getpid());  // another process may write the same film
+  return path.parent_path() / (path.stem().string() + ".part-" + own + path.extension().string());
+}
+
+/// Whether an MP4 or QuickTime file is whole: its boxes fill it exactly and the index is among them. ffmpeg ends with
+/// success even if the disk filled up while it moved the index to the front.
+bool has_whole_boxes(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary | std::ios::ate);
+  const auto size = static_cast<uint64_t>(in.tellg());
+  bool index = false;
+  uint64_t at = 0;
+  while (in && at + 8 <= size) {
+    uint8_t head[16] = {};
+    in.seekg(static_cast<std::streamoff>(at));
+    in.read(reinterpret_cast<char*>(head), at + 16 <= size ? 16 : 8);
+    const auto number = [&](int from, int bytes) {
+      uint64_t n = 0;
+      for (int i = 0; i < bytes; ++i) n = n << 8 | head[from + i];
+      return n;
+    };
+    const uint64_t length = number(0, 4) == 1 ? number(8, 8) : number(0, 4);
+    if (length < 8 || length > size - at) return false;
+    index |= std::string_view(reinterpret_cast<const char*>(head) + 4, 4) == "moov";
+    at += length;
+  }
+  return index && at == size;
 }
 
 /// Owns the partial file from before ffmpeg starts until it is whole.
@@ -156,6 +183,9 @@ class VideoSink final : public FrameSink {
     if (frames_ == 0) throw FileError(def_.path.string() + ": no frame was written");
     channel_.ours.close();
     if (const auto failure = process_.wait()) fail(failure);
+    const std::string ending = def_.path.extension().string();
+    if ((ending == ".mp4" || ending == ".mov") && !has_whole_boxes(file_.path()))
+      throw FileError(def_.path.string() + ": the film was cut short; is the disk full?");
     file_.commit();
     closed_ = true;
   }
@@ -164,7 +194,7 @@ class VideoSink final : public FrameSink {
   [[noreturn]] void fail(const std::optional<std::string>& how) {
     channel_.ours.close();
     const std::string words = one_line(words_.text());
-    throw UnavailableError(def_.path.string() + ": ffmpeg (" + encoder_ + ") ended early with " +
+    throw FileError(def_.path.string() + ": ffmpeg (" + encoder_ + ") ended early with " +
                            how.value_or("exit code 0") + (words.empty() ? "" : ": " + words));
   }
 

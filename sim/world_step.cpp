@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "sim/collision/overlap.h"
 #include "sim/coupled_system.h"
@@ -22,6 +23,36 @@ uint32_t substep_count(Real sampling_time, Real longest) {
 bool is_finite(const RigidBody& b) {
   return b.position.allFinite() && b.orientation.coeffs().allFinite() && b.momentum.allFinite() &&
          b.angular_momentum.allFinite();
+}
+
+/// Least edge of a solid's box in its own frame: what a fast body could pass through.
+Real thickness(const Solid& solid) {
+  if (std::holds_alternative<Plane>(*solid.shape)) return std::numeric_limits<Real>::infinity();
+  return bounds(solid, Pose{}).sizes().minCoeff();
+}
+
+/// Pose of a body at a share of the sub-step.
+Pose between(const Body& body, Real share) {
+  const Pose &a = body.before_substep, &b = body.pose;
+  return {a.position + share * (b.position - a.position), a.orientation.slerp(share, b.orientation)};
+}
+
+/// Whether two bodies touch anywhere on their ways through the sub-step: looked at so often that neither can pass the
+/// other in between, within a bounded number of looks.
+bool touch_on_the_way(const Body& a, const Body& b) {
+  constexpr int kMostLooks = 512;
+  const auto turn = [](const Body& body) {
+    const Real angle = body.before_substep.orientation.angularDistance(body.pose.orientation);
+    return angle > 0 ? angle * reach(body.solid) : 0;
+  };
+  const Vec3 slip = (a.pose.position - a.before_substep.position) - (b.pose.position - b.before_substep.position);
+  const Real travel = slip.norm() + turn(a) + turn(b), step = std::min(thickness(a.solid), thickness(b.solid)) / 2;
+  const int looks = travel < step * kMostLooks ? std::max(1, static_cast<int>(std::ceil(travel / step))) : kMostLooks;
+  for (int k = looks; k > 0; --k) {
+    const Real share = static_cast<Real>(k) / looks;
+    if (touching(a.solid, between(a, share), b.solid, between(b, share))) return true;
+  }
+  return false;
 }
 
 bool same(const Pose& a, const Pose& b) {
@@ -76,7 +107,10 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
 void World::Impl::keep_within_bounds(BodyHandle handle, Body& body, StepReport& report) {
   const bool finite = !body.is_dynamic() || is_finite(body.rigid);
   if (!finite) {
-    if (report.finite) report.non_finite_object = body.def.name;
+    if (report.finite) {
+      const RigidBody& b = body.rigid;
+      report.non_finite = {body.def.name, 0, body.before_substep.position, Vec3::Zero(), b.position, b.momentum / b.mass};
+    }
     report.finite = false;
     body.pose = body.before_substep;
     body.rigid.place(body.pose);
@@ -111,22 +145,20 @@ void World::Impl::update_obstacles(Real h) {
   fixed_changed = false;
 }
 
-/// Reports each pair with a dynamic body that touches at the end of the sub-step, once per step.
+/// Reports each pair with a dynamic body that touches during the sub-step, once per step.
 void World::Impl::find_contacts(Real time, StepReport& report) {
   const auto test = [&](BodyHandle a, BodyHandle b) {
     if (a == b) return;
     if (b < a) std::swap(a, b);
     const auto known = [&](const UnresolvedContact& c) { return c.a == a && c.b == b; };
     if (std::any_of(report.unresolved.begin(), report.unresolved.end(), known)) return;
-    const Body &body_a = *bodies[a], &body_b = *bodies[b];
-    if (touching(body_a.solid, body_a.pose, body_b.solid, body_b.pose))
-      report.unresolved.push_back({a, b, time});
+    if (touch_on_the_way(*bodies[a], *bodies[b])) report.unresolved.push_back({a, b, time});
   };
   for (std::size_t i = 0; i < moving_owners.size(); ++i) {
     const BodyHandle self = moving_owners[i];
     const Body& body = *bodies[self];
     if (!body.is_dynamic()) continue;
-    const Aabb box = bounds(body.solid, body.pose);
+    const Aabb box = bounds(body.solid, body.pose).merged(bounds(body.solid, body.before_substep));
     for (const auto& [obstacles, owners] :
          {std::pair(&fixed_obstacles, &fixed_owners), std::pair(&moving_obstacles, &moving_owners)}) {
       const auto test_owner = [&, &them = *owners](uint32_t k) { test(self, them[k]); };
@@ -148,8 +180,11 @@ void World::Impl::step_particles(Real start, Real h, const CoupledSystem& couple
     report.particle_collisions += tally.collisions;
     report.truncated_sweeps += tally.truncated;
     removed_any |= tally.expired + tally.retired + tally.removed > 0;
-    if (!tally.finite && report.finite) report.non_finite_object = system.def.name;
-    report.finite &= tally.finite;
+    if (tally.lost && report.finite) {
+      report.non_finite = *tally.lost;
+      report.non_finite.object = system.def.name;
+    }
+    report.finite &= !tally.lost;
   });
   if (removed_any) remove_dead_springs();
 }

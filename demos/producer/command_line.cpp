@@ -1,10 +1,14 @@
 #include "producer/command_line.h"
 
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <map>
 #include <new>
 
 #include <CLI/CLI.hpp>
+#include <fcntl.h>
 #include <fmt/format.h>
 
 #include "producer/commands.h"
@@ -12,6 +16,7 @@
 #include "producer/interrupt.h"
 #include "producer/output.h"
 #include "producer/simulation.h"
+#include "producer/talk.h"
 #include "render/error.h"
 
 namespace offstage::producer {
@@ -55,7 +60,7 @@ void add_picture(CLI::App& command, SceneOptions& scene) {
 
 void add_talk(CLI::App& command, TalkOptions& talk) {
   command.add_option("--progress", talk.progress, "auto, plain, json or none")
-      ->transform(CLI::CheckedTransformer(kProgressStyles));
+      ->transform(CLI::CheckedTransformer(kProgressStyles).description(""));
   command.add_flag("-q,--quiet", talk.quiet, "Say nothing but errors");
   command.add_flag("-v,--verbose", talk.verbose, "Say more: stage times, memory");
 }
@@ -65,10 +70,32 @@ void add_threads(CLI::App& command, int& threads) {
       ->check(CLI::Range(1, 256));
 }
 
+/// A program started with a standard stream closed would otherwise find its own files under that number.
+void open_standard_streams() {
+  for (int fd = 0; fd <= 2; ++fd)
+    if (fcntl(fd, F_GETFD) < 0) open("/dev/null", fd == 0 ? O_RDONLY : O_WRONLY);  // takes the lowest free number
+}
+
+/// Results that could not be written are a failure, whatever the command did.
+int flushed(int code) {
+  if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
+  say("offstage: standard output: {}\n", std::strerror(errno));
+  return code == kOk ? kRunFailed : code;
+}
+
+int dispatch(int argc, char** argv);
+
 }  // namespace
 
 int run(int argc, char** argv) {
+  open_standard_streams();
   install_signal_handlers();
+  return flushed(dispatch(argc, argv));
+}
+
+namespace {
+
+int dispatch(int argc, char** argv) {
 
   CLI::App app{"offstage turns a scene file into a physically simulated film, without a display or a GPU."};
   app.set_version_flag("--version", OFFSTAGE_VERSION);
@@ -186,34 +213,39 @@ int run(int argc, char** argv) {
     if (*bless_app) return bless_command(bless);
     return *doctor_app ? doctor_command() : kUsage;
   } catch (const SceneError& error) {
-    fmt::print(stderr, "{}\n", error.what());
+    say("{}\n", error.what());
     return kSceneInvalid;
   } catch (const OutputError& error) {
-    fmt::print(stderr, "offstage: {}\n", error.what());
+    say("offstage: {}\n", error.what());
     return kUsage;
   } catch (const std::invalid_argument& error) {
-    fmt::print(stderr, "offstage: {}\n", error.what());
+    say("offstage: {}\n", error.what());
     return kUsage;
   } catch (const render::UnavailableError& error) {
-    fmt::print(stderr, "offstage: {}\n", error.what());
+    say("offstage: {}\n", error.what());
     return kUnavailable;
   } catch (const DivergedError& error) {
     const std::string file = "offstage-diverged.json";
-    fmt::print(stderr, "offstage: {}\n", error.what());
+    say("offstage: {}\n", error.what());
     try {
       write_text_file(file, error.state());
-      fmt::print(stderr, "the state was saved to {}\n", file);
+      say("the state was saved to {}\n", file);
     } catch (const render::FileError& unsaved) {
-      fmt::print(stderr, "the state could not be saved: {}\n", unsaved.what());
+      say("the state could not be saved: {}\n", unsaved.what());
     }
     return kDiverged;
+  } catch (const Interrupted& interrupted) {
+    say("interrupted\n");
+    return 128 + interrupted.signal();
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "offstage: out of memory\n");
+    say("offstage: out of memory\n");
     return kRunFailed;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "offstage: {}\n", error.what());
+    say("offstage: {}\n", error.what());
     return kRunFailed;
   }
 }
+
+}  // namespace
 
 }  // namespace offstage::producer

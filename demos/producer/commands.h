@@ -2,6 +2,8 @@
 /// The commands behind the command line. Each takes what was asked for and returns an exit code; errors are
 /// thrown.
 
+#include <tbb/global_control.h>
+
 #include <optional>
 #include <string>
 #include <vector>
@@ -80,6 +82,11 @@ struct BlessOptions {
   int threads = 0;
 };
 int bless_command(const BlessOptions& options);
+
+/// As asked for, or every processor that may be used.
+int threads_or_all(int threads);
+/// Limits the simulation to so many threads while it lives.
+tbb::global_control simulation_threads(int threads);
 
 /// Loads a scene, prints its warnings to standard error unless quiet.
 LoadedScene load(const SceneOptions& options, bool quiet,

@@ -4,7 +4,6 @@
 #include <set>
 
 #include <fmt/format.h>
-#include <tbb/global_control.h>
 
 #include "producer/command_line.h"
 #include "producer/commands.h"
@@ -18,10 +17,6 @@ namespace offstage::producer {
 namespace {
 
 namespace fs = std::filesystem;
-
-int threads_or_all(int threads) {
-  return threads > 0 ? threads : available_processors();
-}
 
 std::set<std::string> pictures_in(const fs::path& folder) {
   std::set<std::string> names;
@@ -56,6 +51,8 @@ bool same_picture(const fs::path& a, const fs::path& b, const std::string& repor
 
 int compare_pictures(const CompareOptions& options) {
   const fs::path a = options.scene.file, b = options.other;
+  if (fs::is_directory(a) != fs::is_directory(b))
+    throw render::FileError(a.string() + " and " + b.string() + ": compare two pictures or two folders");
   if (!fs::is_directory(a)) return same_picture(a, b, options.report) ? kOk : kImagesDiffer;
   std::set<std::string> names = pictures_in(a);
   names.merge(pictures_in(b));
@@ -77,8 +74,7 @@ int compare_with_golden(const CompareOptions& options) {
   const LoadedScene scene = load(options.scene, true, golden_overrides());
   const Golden expected = read_golden(options.golden, scene.scene.name);
   const int threads = threads_or_all(options.threads);
-  const tbb::global_control control(tbb::global_control::max_allowed_parallelism,
-                                    static_cast<std::size_t>(threads));
+  const auto control = simulation_threads(options.threads);
   render::pin_environment(0);
   const Golden actual = draw_golden(scene, threads);
   const Verdict verdict = judge(expected, actual);
@@ -104,8 +100,7 @@ int bless_command(const BlessOptions& options) {
   if (options.reason.find_first_not_of(" \t") == std::string::npos)
     throw std::invalid_argument("bless: --reason must say why the pictures changed");
   const int threads = threads_or_all(options.threads);
-  const tbb::global_control control(tbb::global_control::max_allowed_parallelism,
-                                    static_cast<std::size_t>(threads));
+  const auto control = simulation_threads(options.threads);
   render::pin_environment(0);
   for (const std::string& file : options.scenes) {
     const LoadedScene scene =

@@ -10,6 +10,7 @@
 #include "producer/commands.h"
 #include "producer/fingerprint.h"
 #include "producer/simulation.h"
+#include "producer/talk.h"
 #include "render/context.h"
 #include "render/error.h"
 #include "render/image_io.h"
@@ -131,8 +132,14 @@ std::vector<std::string> SceneOptions::overrides() const {
   return all;
 }
 
+int threads_or_all(int threads) { return threads > 0 ? threads : available_processors(); }
+
+tbb::global_control simulation_threads(int threads) {
+  return {tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads_or_all(threads))};
+}
+
 void print_warnings(const std::vector<Problem>& warnings) {
-  for (const Problem& warning : warnings) fmt::print(stderr, "warning: {}\n", warning.describe());
+  for (const Problem& warning : warnings) say("warning: {}\n", warning.describe());
 }
 
 LoadedScene load(const SceneOptions& options, bool quiet, const std::vector<std::string>& more_overrides) {

@@ -14,6 +14,7 @@
 #include "producer/interrupt.h"
 #include "producer/output.h"
 #include "producer/production.h"
+#include "producer/talk.h"
 #include "render/context.h"
 #include "render/error.h"
 #include "render/image_io.h"
@@ -24,12 +25,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-int threads_or_all(int threads) {
-  return threads > 0 ? threads : available_processors();
-}
-
-tbb::global_control simulation_threads(int threads) {
-  return {tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads_or_all(threads))};
+/// Refuses, before the work, a file that could not or must not be written after it. An empty name is none.
+void check_file(const std::string& file, bool force) {
+  if (file.empty()) return;
+  const fs::path folder = fs::path(file).parent_path();
+  std::error_code error;
+  if (!folder.empty() && !fs::is_directory(folder, error)) throw OutputError(file + ": there is no folder " + folder.string());
+  const fs::file_status status = fs::status(file, error);
+  if (status.type() == fs::file_type::not_found) return;
+  if (status.type() != fs::file_type::regular) throw OutputError(file + ": is not a regular file");
+  if (!force) throw OutputError(file + ": exists already; replace it with --force");
 }
 
 /// With several drawing threads each context rasterises in its own thread: frames in parallel beat threads in
@@ -40,32 +45,35 @@ void pin_environment_for(int drawing_threads, int threads) {
 
 void report_run(const RunStats& stats, const TalkOptions& talk, const std::string& stats_file) {
   if (!stats_file.empty()) write_text_file(stats_file, to_json(stats));
+  if (talk.quiet) return;
   if (!stats.blank_frames.empty())
-    fmt::print(
-        stderr, "warning: frame {} is blank: all of its pixels are equal{}\n", stats.blank_frames.front(),
+    say("warning: frame {} is blank: all of its pixels are equal{}\n", stats.blank_frames.front(),
         stats.blank_frames.size() > 1 ? fmt::format(" (and {} more)", stats.blank_frames.size() - 1) : "");
   const SimulationTotals& t = stats.totals;
+  for (const std::string& body : t.lost_bodies)
+    say("warning: the body '{}' left the world (world.bounds) and stays where it left\n", body);
+  if (t.retired) say("note: {} particles left the world (world.bounds)\n", t.retired);
   if (t.skipped)
-    fmt::print(stderr, "warning: {} particles were not released: max_alive was reached\n", t.skipped);
-  if (t.waiting) fmt::print(stderr, "note: {} particles had to wait for room on their emitter\n", t.waiting);
+    say("warning: {} particles were not released: max_alive was reached\n", t.skipped);
+  if (t.waiting) say("note: {} particles had to wait for room on their emitter\n", t.waiting);
   if (t.removed)
-    fmt::print(stderr, "warning: {} particles were inside a body and had to be removed\n", t.removed);
+    say("warning: {} particles were inside a body and had to be removed\n", t.removed);
   if (t.truncated)
-    fmt::print(stderr, "note: {} particles hit more often in one step than is followed\n", t.truncated);
+    say("note: {} particles hit more often in one step than is followed\n", t.truncated);
   if (!talk.verbose) return;
   for (const auto& [name, times] : {std::pair("simulate", &stats.sim), std::pair("draw", &stats.render),
                                     std::pair("encode", &stats.encode)}) {
     const StageTimes::Summary s = times->summary();
-    fmt::print(stderr, "{:9} {:8.2f} ms mean  {:8.2f} p50  {:8.2f} p95  {:8.2f} max\n", name, s.mean, s.p50,
+    say("{:9} {:8.2f} ms mean  {:8.2f} p50  {:8.2f} p95  {:8.2f} max\n", name, s.mean, s.p50,
                s.p95, s.max);
   }
-  fmt::print(stderr, "{} frames in {:.2f} s, first after {:.2f} s, {:.0f} MB\n", stats.frames, stats.wall_s,
+  say("{} frames in {:.2f} s, first after {:.2f} s, {:.0f} MB\n", stats.frames, stats.wall_s,
              stats.startup_s, peak_rss_mb());
 }
 
 /// The exit code of a run that was interrupted, after saying how to go on.
 int interrupted(const RunStats& stats, int total, const std::string& advice) {
-  fmt::print(stderr, "interrupted: {} of {} frames done{}\n", stats.frames + stats.frames_kept, total,
+  say("interrupted: {} of {} frames done{}\n", stats.frames + stats.frames_kept, total,
              advice);
   return 128 + stats.interrupted_by;
 }
@@ -124,15 +132,16 @@ Plan make_plan(const RenderOptions& options, const ModelLibrary& models, LoadedS
   return plan;
 }
 
-/// Finished frames on disk become the video; the frames go when it is there.
-void assemble_video(const Plan& plan) {
+/// Finished frames on disk become the video; the frames go when it is there. False if interrupted.
+bool assemble_video(const Plan& plan) {
   auto video = render::make_video_sink(video_def(plan));
   for (const int frame : plan.frames) {
-    if (interrupt_signal()) return;
+    if (interrupt_signal()) return false;
     video->write(frame, render::read_image(render::frame_path(plan.frames_pattern, frame)));
   }
   video->close();
   fs::remove_all(plan.frames_pattern.parent_path());
+  return true;
 }
 
 RunStats draw(const Plan& plan, const ModelLibrary& models, const RenderOptions& options,
@@ -165,29 +174,29 @@ int render_to_frames(const Plan& plan, const ModelLibrary& models, const RenderO
   }
   stats.frames_kept = static_cast<int>(plan.frames.size() - missing.size());
   if (plan.through_frames && !stats.interrupted_by) {
-    assemble_video(plan);
-    stats.interrupted_by = interrupt_signal();
+    if (!assemble_video(plan)) stats.interrupted_by = interrupt_signal();
   }
   report_run(stats, options.talk, options.stats);
   if (stats.interrupted_by)
     return interrupted(stats, static_cast<int>(plan.frames.size()),
-                       "; go on with the same command and --resume");
+                       options.force ? "; go on with the same command and --resume instead of --force"
+                                     : "; go on with the same command and --resume");
   fmt::print("{}\n", plan.target.path.string());
   return kOk;
 }
 
 int render_to_video(const Plan& plan, const ModelLibrary& models, const RenderOptions& options) {
-  auto sink = render::make_video_sink(video_def(plan));
+  // A part of a film must not look like the whole, nor replace a whole one: it gets the name when it has all frames.
+  render::VideoDef def = video_def(plan);
+  const fs::path partial = def.path.replace_extension(".partial" + plan.target.path.extension().string());
+  auto sink = render::make_video_sink(def);
   const RunStats stats = draw(plan, models, options, plan.frames, *sink);
+  if (!stats.interrupted_by) fs::rename(partial, plan.target.path);
   report_run(stats, options.talk, options.stats);
   if (!stats.interrupted_by) {
     fmt::print("{}\n", plan.target.path.string());
     return kOk;
   }
-  // A part of a film must not look like the whole.
-  fs::path partial = plan.target.path;
-  partial.replace_extension(".partial" + plan.target.path.extension().string());
-  if (stats.frames > 0) fs::rename(plan.target.path, partial);
   return interrupted(stats, static_cast<int>(plan.frames.size()),
                      (stats.frames > 0 ? "; they are in " + partial.string() : std::string()) +
                          "; to be able to go on, start a video with --resume");
@@ -212,11 +221,14 @@ int render_command(const RenderOptions& options) {
   const Plan plan = make_plan(options, models, std::move(loaded));
   if (plan.target.kind == OutputKind::video) {
     render::check_video(video_def(plan));
-    if (fs::exists(plan.target.path) && !options.force)
-      throw OutputError(plan.target.path.string() + ": exists already; replace it with --force");
+    if (fs::exists(plan.target.path)) check_file(plan.target.path.string(), options.force);
   }
+  check_file(options.stats, options.force || options.resume);
   if (options.dry_run) return print_plan(plan);
-  if (plan.frames.empty()) return kOk;  // an empty chunk
+  if (plan.frames.empty()) {
+    say("note: this chunk has no frames: there are fewer frames than chunks\n");
+    return kOk;
+  }
 
   const auto threads = simulation_threads(options.threads);
   pin_environment_for(plan.jobs, plan.threads);
@@ -229,16 +241,17 @@ int render_command(const RenderOptions& options) {
 int frame_command(const FrameOptions& options) {
   const LoadedScene loaded = load(options.scene, options.talk.quiet);
   const Scene& scene = loaded.scene;
-  int frame = options.frame.value_or(1);
-  if (options.at)
-    frame = 1 + static_cast<int>(std::lround((*options.at - scene.output.start) * scene.output.fps));
-  if (frame < 0) frame += scene.frame_count() + 1;
-  if (frame < 1 || frame > scene.frame_count())
-    throw std::invalid_argument(
-        fmt::format("frame {} is outside the film; it has frames 1-{} (times {:g} to {:g} s)", frame,
-                    scene.frame_count(), scene.output.start, scene.output.start + scene.output.duration));
-  if (fs::exists(options.out) && !options.force)
-    throw OutputError(options.out + ": exists already; replace it with --force");
+  const int count = scene.frame_count();
+  double wanted = options.frame.value_or(1);
+  if (wanted < 0) wanted += count + 1;
+  if (options.at) wanted = 1 + std::round((*options.at - scene.output.start) * scene.output.fps);
+  if (!(wanted >= 1 && wanted <= count))
+    throw std::invalid_argument(fmt::format("frame {} is outside the film; it has frames 1-{}, times {:g} to {:g} s",
+                                            wanted, count, scene.output.start,
+                                            scene.output.start + (count - 1) / scene.output.fps));
+  const int frame = static_cast<int>(wanted);
+  if (fs::path(options.out).extension() != ".png") throw OutputError(options.out + ": a frame is a PNG file; give a name ending in .png");
+  check_file(options.out, options.force);
 
   class PictureSink : public render::FrameSink {
    public:
@@ -268,15 +281,13 @@ int simulate_command(const SimulateOptions& options) {
   std::vector<Problem> warnings;
   const ModelLibrary models(loaded.scene, loaded.folder, warnings);
   if (!options.talk.quiet) print_warnings(warnings);
+  check_file(options.stats, options.force);
+  check_file(options.trace, options.force);
   const auto threads = simulation_threads(options.threads);
   SimulateJob job{
       .cache = {}, .force = options.force, .trace = {}, .trace_every_step = options.trace_every == "step"};
   if (!options.cache.empty()) job.cache = options.cache;
-  if (!options.trace.empty()) {
-    if (fs::exists(options.trace) && !options.force)
-      throw OutputError(options.trace + ": exists already; replace it with --force");
-    job.trace = options.trace;
-  }
+  if (!options.trace.empty()) job.trace = options.trace;
   ProgressPrinter printer(options.talk.quiet ? ProgressStyle::none : options.talk.progress);
   const RunStats stats = simulate_frames(loaded, models, job, std::ref(printer));
   printer.finish();

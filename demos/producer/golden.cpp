@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "producer/fingerprint.h"
+#include "producer/interrupt.h"
 #include "producer/production.h"
 #include "render/context.h"
 #include "render/error.h"
@@ -83,6 +84,7 @@ Golden draw_golden(const LoadedScene& scene, int threads) {
   const ModelLibrary models(scene.scene, scene.folder, warnings);
   MemorySink sink(golden.frames);
   const RunStats stats = render_frames(scene, models, job, sink, {});
+  if (stats.interrupted_by) throw Interrupted(stats.interrupted_by);
   for (GoldenFrame& frame : golden.frames) frame.state_hash = stats.frame_states.at(frame.frame);
   golden.fingerprint = fingerprint(render::Context().info());
   return golden;

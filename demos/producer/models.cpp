@@ -1,7 +1,5 @@
 #include "producer/models.h"
 
-#include <fstream>
-#include <iterator>
 #include <set>
 
 #include <fmt/format.h>
@@ -16,6 +14,36 @@ namespace {
 
 std::string hex(XXH128_hash_t h) {
   return fmt::format("{:016x}{:016x}", h.high64, h.low64);
+}
+
+template <class T>
+void add_to(XXH3_state_t* hash, const std::vector<T>& values) {
+  XXH3_128bits_update(hash, values.data(), values.size() * sizeof(T));
+}
+
+void add_to(XXH3_state_t* hash, const render::Image& image) {
+  const int size[] = {image.width_px, image.height_px};
+  XXH3_128bits_update(hash, size, sizeof size);
+  add_to(hash, image.rgba);
+}
+
+/// All that was read, from the model's own file and from those it refers to (materials, textures).
+void add_to(XXH3_state_t* hash, const render::Model& model) {
+  for (const render::Model::Part& part : model.parts) {
+    XXH3_128bits_update(hash, &part.material, sizeof part.material);
+    add_to(hash, part.mesh.positions);
+    add_to(hash, part.mesh.normals);
+    add_to(hash, part.mesh.uvs);
+    add_to(hash, part.mesh.indices);
+  }
+  for (const render::Material& m : model.materials) {
+    const float numbers[] = {m.color.x(),    m.color.y(),    m.color.z(),    m.color.w(), m.metallic,
+                             m.roughness,    m.emission.x(), m.emission.y(), m.emission.z()};
+    const int choices[] = {m.two_sided, m.base_color_texture, m.metallic_roughness_texture, m.emission_texture};
+    XXH3_128bits_update(hash, numbers, sizeof numbers);
+    XXH3_128bits_update(hash, choices, sizeof choices);
+  }
+  for (const render::Image& texture : model.textures) add_to(hash, texture);
 }
 
 /// Every file a scene names, with the first place that names it.
@@ -41,25 +69,19 @@ ModelLibrary::ModelLibrary(const Scene& scene, const std::filesystem::path& fold
   std::vector<Problem> problems;
   XXH3_state_t* hash = XXH3_createState();
   XXH3_128bits_reset(hash);
-  const auto digest = [&](const std::filesystem::path& path) {
-    std::ifstream in(path, std::ios::binary);
-    const std::string bytes{std::istreambuf_iterator<char>(in), {}};
-    XXH3_128bits_update(hash, bytes.data(), bytes.size());
-  };
   const Files files = files_of(scene);
   for (const auto& [file, where] : files.models) {
     try {
       const render::Model& model = models_.emplace(file, render::read_model(folder / file)).first->second;
       for (const std::string& warning : model.warnings) warnings.push_back({where, file + ": " + warning});
-      digest(folder / file);
+      add_to(hash, model);
     } catch (const render::FileError& error) {
       problems.push_back({where, error.what()});
     }
   }
   for (const auto& [file, where] : files.textures) {
     try {
-      textures_.emplace(file, render::read_image(folder / file));
-      digest(folder / file);
+      add_to(hash, textures_.emplace(file, render::read_image(folder / file)).first->second);
     } catch (const render::FileError& error) {
       problems.push_back({where, error.what()});
     }

@@ -21,7 +21,7 @@ class ModelLibrary {
 
   const render::Model& model(const std::string& file) const { return models_.at(file); }
   const render::Image& texture(const std::string& file) const { return textures_.at(file); }
-  /// Digest of the files' contents, so that a run knows when one of them changed.
+  /// Digest of everything that was read, so that a run knows when a file changed.
   const std::string& digest() const { return digest_; }
 
  private:

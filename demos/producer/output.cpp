@@ -16,10 +16,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr int kMostFrames = 10'000'000;  // that a manifest can make us look for
 constexpr std::array kVideoEndings = {".mp4", ".webm", ".mov", ".gif", ".webp", ".apng", ".png"};
 
-nlohmann::ordered_json to_json(const Manifest& m) {
-  return {{"scene", m.scene},      {"settings", m.settings}, {"width", m.width_px},
+nlohmann::ordered_json to_json(const Manifest& m, const fs::path& pattern) {
+  return {{"pattern", pattern.filename().string()}, {"scene", m.scene},      {"settings", m.settings}, {"width", m.width_px},
           {"height", m.height_px}, {"frames", m.frames},     {"fps", m.fps}};
 }
 
@@ -27,6 +28,11 @@ nlohmann::ordered_json to_json(const Manifest& m) {
 
 OutputTarget parse_output(const std::string& out) {
   if (out == "-") return {OutputKind::pipe, {}};
+  const auto is_ending = [](const std::string& text) {
+    return std::ranges::find(kVideoEndings, text) != kVideoEndings.end();
+  };
+  if (out.empty() || is_ending(fs::path(out).filename().string()))
+    throw OutputError("'" + out + "': the output has no name");
   const fs::path path = out;
   if (out.ends_with('/') || fs::is_directory(path)) return {OutputKind::frames, path / "####.png"};
   const std::string ending = path.extension().string();
@@ -36,7 +42,7 @@ OutputTarget parse_output(const std::string& out) {
     return {OutputKind::frames, path};
   }
   if (ending.empty()) return {OutputKind::frames, path / "####.png"};
-  if (std::ranges::find(kVideoEndings, ending) == kVideoEndings.end())
+  if (!is_ending(ending))
     throw OutputError(out +
                       ": unknown kind of output; give a folder, a pattern such as frames/####.png, one of " +
                       fmt::format("{}", fmt::join(kVideoEndings, " ")) + ", or - for standard output");
@@ -69,14 +75,18 @@ std::vector<int> prepare_frames(const fs::path& pattern, const std::vector<int>&
   bool same_settings = false;  // without a manifest nobody knows what the frames there are
   if (std::ifstream in(manifest_path); in) {
     const auto old = nlohmann::json::parse(in, nullptr, false);
-    same_settings = old.is_object() && old.value("settings", std::string()) == manifest.settings;
+    same_settings = old.is_object() && old.value("settings", std::string()) == manifest.settings &&
+                    old.value("pattern", std::string()) == pattern.filename().string();
     if (!same_settings && existing != Existing::replace)
       throw OutputError(
           folder.string() +
           ": holds frames of another scene or other settings; choose another folder, or replace them with "
           "--force");
-    if (!same_settings && old.is_object())
-      for (int k = 1; k <= old.value("frames", 0); ++k) fs::remove(render::frame_path(pattern, k), error);
+    if (!same_settings && old.is_object()) {
+      const fs::path old_name = old.value("pattern", pattern.filename().string());
+      for (int k = 1; k <= std::min(old.value("frames", 0), kMostFrames); ++k)
+        fs::remove(render::frame_path(folder / old_name.filename(), k), error);
+    }
   }
 
   std::vector<int> missing;
@@ -90,7 +100,7 @@ std::vector<int> prepare_frames(const fs::path& pattern, const std::vector<int>&
                       is_whole_png(path, manifest.width_px, manifest.height_px);
     if (!keep) missing.push_back(frame);
   }
-  const std::string text = to_json(manifest).dump(2) + "\n";
+  const std::string text = to_json(manifest, pattern).dump(2) + "\n";
   render::write_file_atomically(manifest_path, {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
   return missing;
 }

@@ -37,6 +37,8 @@ class Picture {
   void add_body(const Body& body, const ModelLibrary& models, std::size_t& slot);
   void add_model(const std::string& file, const Eigen::Affine3f& body_from_model, const Body& body,
                  const ModelLibrary& models, std::vector<DrawnPart>& parts);
+  template <class Primitive>
+  render::MeshHandle primitive(const Primitive& shape);
   void add_points(const ParticleLook& look);
   void add_light_and_air();
 
@@ -50,6 +52,7 @@ class Picture {
   std::map<std::string, render::MaterialHandle> materials_;
   std::map<std::string, std::pair<std::vector<render::MeshHandle>, std::vector<render::MaterialHandle>>>
       models_;
+  std::map<std::vector<float>, render::MeshHandle> primitives_;  // by kind and sizes
   std::map<std::string, std::size_t> slot_of_;  // body name -> slot, for the follow camera
   std::map<std::string, Eigen::Vector3f> fixed_positions_;
   std::vector<DrawnBody> bodies_;

@@ -140,8 +140,12 @@ Emitter moved(Emitter emitter, const PlacedCopy& copy) {
   emitter.name += copy.suffix;
   emitter.placement = {};
   auto& surface = std::get<PlaneSurface>(emitter.surface);
+  const Quat moved = copy.motion.orientation * surface.orientation();
   surface.position = copy.motion.point_to_world(surface.position);
   surface.direction = copy.motion.vector_to_world(surface.direction);
+  surface.turn_deg = 0;
+  const Quat turn = surface.orientation().conjugate() * moved;  // about +Y alone
+  surface.turn_deg = 2 * std::atan2(turn.y(), turn.w()) * 180 / std::numbers::pi;
   return emitter;
 }
 

@@ -1,13 +1,9 @@
 #include "producer/production.h"
 
 #include <algorithm>
-#include <condition_variable>
 #include <cstring>
-#include <deque>
 #include <exception>
 #include <fstream>
-#include <map>
-#include <mutex>
 #include <sstream>
 #include <thread>
 
@@ -17,6 +13,7 @@
 
 #include "producer/interrupt.h"
 #include "producer/picture.h"
+#include "producer/pipeline.h"
 #include "producer/trace.h"
 #include "render/context.h"
 
@@ -29,14 +26,19 @@ double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
+/// Where snapshots come from: the simulation or a cache.
+class SnapshotSource {
+ public:
+  virtual ~SnapshotSource() = default;
+  /// The state at a frame, or an earlier one if `stop` said so on the way; asked for in ascending order.
+  virtual Snapshot at(int frame, const std::function<bool()>& stop) = 0;
+};
+
 class LiveSource : public SnapshotSource {
  public:
   explicit LiveSource(Simulation& simulation) : simulation_(simulation) {}
-  Snapshot at(int frame) override {
-    while (simulation_.frame() < frame) {
-      simulation_.advance();
-      if (interrupt_signal()) break;
-    }
+  Snapshot at(int frame, const std::function<bool()>& stop) override {
+    while (simulation_.frame() < frame && !stop()) simulation_.advance();
     return simulation_.snapshot();
   }
 
@@ -47,104 +49,11 @@ class LiveSource : public SnapshotSource {
 class CachedSource : public SnapshotSource {
  public:
   explicit CachedSource(SnapshotCache cache) : cache_(std::move(cache)) {}
-  Snapshot at(int frame) override { return cache_.read(frame); }
+  Snapshot at(int frame, const std::function<bool()>&) override { return cache_.read(frame); }
 
  private:
   SnapshotCache cache_;
 };
-
-/// A frame to draw. Snapshots are immutable and each serves two neighbouring frames, hence shared.
-struct Shot {
-  int index = 0;  // in the list of frames
-  int frame = 0;
-  std::shared_ptr<const Snapshot> previous, current;
-  double sim_ms = 0;
-};
-
-struct Print {
-  Shot shot;
-  render::Image image;
-  double render_ms = 0;
-};
-
-/// Hands shots to the drawing threads and brings the finished frames back in order. At most `window` frames
-/// are between the simulation and the sink, so memory is bounded. The first failure ends everything.
-class Pipeline {
- public:
-  explicit Pipeline(int window) : window_(window) {}
-
-  /// Waits for room; false when the run has failed.
-  bool push(Shot shot) {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return failure_ || shot.index < next_print_ + window_; });
-    if (failure_) return false;
-    shots_.push_back(std::move(shot));
-    changed_.notify_all();
-    return true;
-  }
-  void no_more_shots() {
-    const std::lock_guard lock(mutex_);
-    all_shot_ = true;
-    changed_.notify_all();
-  }
-  std::optional<Shot> take_shot() {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return failure_ || all_shot_ || !shots_.empty(); });
-    if (failure_ || shots_.empty()) return std::nullopt;
-    Shot shot = std::move(shots_.front());
-    shots_.pop_front();
-    ++drawing_;
-    return shot;
-  }
-  void give_print(Print print) {
-    const std::lock_guard lock(mutex_);
-    --drawing_;
-    const int index = print.shot.index;
-    prints_.emplace(index, std::move(print));
-    changed_.notify_all();
-  }
-  /// The next finished frame in order; none when all are through or the run has failed.
-  std::optional<Print> take_print() {
-    std::unique_lock lock(mutex_);
-    const auto ready = [&] { return !prints_.empty() && prints_.begin()->first == next_print_; };
-    changed_.wait(lock,
-                  [&] { return failure_ || ready() || (all_shot_ && shots_.empty() && drawing_ == 0); });
-    if (failure_ || !ready()) return std::nullopt;
-    Print print = std::move(prints_.begin()->second);
-    prints_.erase(prints_.begin());
-    ++next_print_;
-    changed_.notify_all();
-    return print;
-  }
-  void fail(std::exception_ptr error) {
-    const std::lock_guard lock(mutex_);
-    if (!failure_) failure_ = std::move(error);
-    changed_.notify_all();
-  }
-  void rethrow_failure() const {
-    if (failure_) std::rethrow_exception(failure_);
-  }
-
- private:
-  const int window_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<Shot> shots_;
-  std::map<int, Print> prints_;
-  int next_print_ = 0, drawing_ = 0;
-  bool all_shot_ = false;
-  std::exception_ptr failure_;
-};
-
-/// Runs `work`; a failure of it becomes the pipeline's.
-template <class F>
-void guarded(Pipeline& pipeline, F&& work) {
-  try {
-    work();
-  } catch (...) {
-    pipeline.fail(std::current_exception());
-  }
-}
 
 bool is_blank(const render::Image& image) {
   const auto* first = image.rgba.data();
@@ -192,20 +101,19 @@ void print_frames(Pipeline& pipeline, render::FrameSink& sink, int total, RunSta
 
 /// Produces the shots on the calling thread.
 void shoot(Pipeline& pipeline, SnapshotSource& source, const std::vector<int>& frames, bool needs_previous) {
+  const auto stop = [&] { return interrupt_signal() != 0 || pipeline.failed(); };
   std::shared_ptr<const Snapshot> last;
-  for (std::size_t i = 0; i < frames.size() && !interrupt_signal(); ++i) {
+  for (std::size_t i = 0; i < frames.size() && !stop(); ++i) {
     const auto start = Clock::now();
     const int frame = frames[i];
     std::shared_ptr<const Snapshot> previous;
     if (needs_previous && frame > 1)
-      previous =
-          last && last->frame == frame - 1 ? last : std::make_shared<const Snapshot>(source.at(frame - 1));
-    auto current = std::make_shared<const Snapshot>(source.at(frame));
-    if (current->frame != frame) break;  // interrupted on the way
+      previous = last && last->frame == frame - 1 ? last : std::make_shared<const Snapshot>(source.at(frame - 1, stop));
+    auto current = std::make_shared<const Snapshot>(source.at(frame, stop));
+    if (current->frame != frame) break;  // stopped on the way
     if (!previous) previous = current;
     last = current;
-    if (!pipeline.push(
-            {static_cast<int>(i), frame, std::move(previous), std::move(current), ms_since(start)}))
+    if (!pipeline.push({static_cast<int>(i), frame, std::move(previous), std::move(current), ms_since(start)}))
       return;
   }
   pipeline.no_more_shots();
@@ -243,20 +151,22 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
   }
 
   Pipeline pipeline(2 * job.threads + 2);
+  const auto draw = [&] { guarded(pipeline, [&] { draw_shots(pipeline, loaded.scene, models); }); };
+  const auto print = [&] {
+    guarded(pipeline, [&] { print_frames(pipeline, sink, static_cast<int>(job.frames.size()), stats, progress); });
+  };
   {
     std::vector<std::jthread> crew;
-    for (int i = 0; i < job.threads; ++i)
-      crew.emplace_back([&] { guarded(pipeline, [&] { draw_shots(pipeline, loaded.scene, models); }); });
-    crew.emplace_back([&] {
-      guarded(pipeline,
-              [&] { print_frames(pipeline, sink, static_cast<int>(job.frames.size()), stats, progress); });
+    // A thread that cannot be started must fail the run before the others are waited for.
+    guarded(pipeline, [&] {
+      for (int i = 0; i < job.threads; ++i) crew.emplace_back(draw);
+      crew.emplace_back(print);
+      shoot(pipeline, *source, job.frames, subframes(loaded.scene.render.quality) > 1);
     });
-    guarded(pipeline,
-            [&] { shoot(pipeline, *source, job.frames, subframes(loaded.scene.render.quality) > 1); });
   }
   pipeline.rethrow_failure();
 
-  stats.interrupted_by = interrupt_signal();
+  if (stats.frames < static_cast<int>(job.frames.size())) stats.interrupted_by = interrupt_signal();
   if (stats.frames > 0) sink.close();
   if (simulation) {
     stats.totals = simulation->totals();
@@ -282,9 +192,10 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
   stats.bodies = simulation.body_count();
   stats.energy_start = simulation.world().energy();
 
-  for (int frame = 1; frame <= total && !interrupt_signal(); ++frame) {
+  for (int frame = 1; frame <= total; ++frame) {
     const auto step_start = Clock::now();
-    simulation.advance();
+    while (simulation.frame() < frame && !interrupt_signal()) simulation.advance();
+    if (simulation.frame() < frame) break;  // interrupted
     stats.sim.add(ms_since(step_start));
     const auto write_start = Clock::now();
     if (cache) cache->write(simulation.snapshot());
@@ -301,9 +212,9 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
                 .particles = stats.particles,
                 .eta_s = ms_since(start) / 1000 / frame * (total - frame)});
   }
-  stats.interrupted_by = interrupt_signal();
+  if (stats.frames < total) stats.interrupted_by = interrupt_signal();
   if (cache && stats.frames == total) cache->finish(key, total);
-  if (trace) trace->close();
+  if (trace && stats.frames == total) trace->close();
   stats.totals = simulation.totals();
   stats.energy_end = simulation.world().energy();
   stats.state_hash = simulation.world().state_hash().hex();
@@ -315,7 +226,7 @@ std::string simulation_key(const LoadedScene& loaded, const ModelLibrary& models
   auto scene = nlohmann::ordered_json::parse(loaded.canonical);
   for (const char* key : {"name", "description", "camera", "lights", "environment", "render"})
     scene.erase(key);
-  return text_hash(scene.dump() + models.digest());
+  return text_hash(std::string(OFFSTAGE_VERSION) + scene.dump() + models.digest());
 }
 
 std::string settings_key(const LoadedScene& loaded, const ModelLibrary& models) {
@@ -343,6 +254,7 @@ std::string to_json(const RunStats& stats) {
   json["born"] = t.born;
   json["expired"] = t.expired;
   json["retired"] = t.retired;
+  json["lost_bodies"] = t.lost_bodies;
   json["ejected"] = t.ejected;
   json["removed"] = t.removed;
   json["truncated_sweeps"] = t.truncated;

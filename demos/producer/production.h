@@ -61,14 +61,6 @@ struct Progress {
 };
 using ProgressCallback = std::function<void(const Progress&)>;
 
-/// Where snapshots come from: the simulation or a cache.
-class SnapshotSource {
- public:
-  virtual ~SnapshotSource() = default;
-  /// The state at a frame; frames are asked for in ascending order.
-  virtual Snapshot at(int frame) = 0;
-};
-
 struct RenderJob {
   std::vector<int> frames;                     ///< to draw, ascending
   int threads = 1;                             ///< that draw, each with a context of its own

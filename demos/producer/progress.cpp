@@ -1,4 +1,5 @@
 #include "producer/progress.h"
+#include "producer/talk.h"
 
 #include <cstdio>
 #include <cstdlib>
@@ -33,8 +34,7 @@ ProgressPrinter::ProgressPrinter(ProgressStyle style) : style_(style) {
 void ProgressPrinter::operator()(const Progress& p) {
   if (style_ == ProgressStyle::none) return;
   if (style_ == ProgressStyle::json) {
-    fmt::print(stderr,
-               "{{\"frame\":{},\"total\":{},\"sim_ms\":{:.1f},\"render_ms\":{:.1f},\"encode_ms\":{:.1f},"
+    say("{{\"frame\":{},\"total\":{},\"sim_ms\":{:.1f},\"render_ms\":{:.1f},\"encode_ms\":{:.1f},"
                "\"particles\":{},\"eta_s\":{:.1f}}}\n",
                p.done, p.total, p.sim_ms, p.render_ms, p.encode_ms, p.particles, p.eta_s);
     return;
@@ -43,7 +43,7 @@ void ProgressPrinter::operator()(const Progress& p) {
   const bool terminal = style_ == ProgressStyle::automatic;
   if (p.done < p.total && now - last_ < (terminal ? kTerminalInterval : kLogInterval)) return;
   last_ = now;
-  fmt::print(stderr, "{}{}{}", terminal ? "\r\033[K" : "", text(p), terminal ? "" : "\n");
+  say("{}{}{}", terminal ? "\r\033[K" : "", text(p), terminal ? "" : "\n");
   std::fflush(stderr);
   line_open_ = terminal;
 }

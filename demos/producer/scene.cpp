@@ -1,6 +1,7 @@
 #include "producer/scene.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace offstage::producer {
 
@@ -14,6 +15,11 @@ int subframes(Quality quality) {
       return 16;
   }
   return 1;
+}
+
+Quat PlaneSurface::orientation() const {
+  const Quat turned(Eigen::AngleAxisd(turn_deg * std::numbers::pi / 180, Vec3::UnitY()));
+  return Quat::FromTwoVectors(Vec3::UnitY(), direction) * turned;
 }
 
 int Scene::frame_count() const {

@@ -188,7 +188,11 @@ struct ParticleGroup {
 struct PlaneSurface {
   Vec3 position = Vec3::Zero();
   Vec3 direction = Vec3::UnitY();
+  Real turn_deg = 0;  ///< of the rectangle about its direction
   Eigen::Vector2d size = {0.1, 0.1};
+
+  /// Takes +Y to the direction by the shortest rotation, after the turn.
+  Quat orientation() const;
 };
 using EmitterSurface = std::variant<PlaneSurface>;
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <set>
 #include <string>
@@ -68,7 +69,7 @@ class Checker {
     check_names();
     check_materials();
     for (const Body& body : scene_.bodies) check_body(body);
-    for (const ParticleGroup& group : scene_.particles) check_look(group.look, group.where.path + "/look");
+    for (const ParticleGroup& group : scene_.particles) check_group(group);
     for (const Emitter& emitter : scene_.emitters) check_emitter(emitter);
     for (const Spring& spring : scene_.springs) check_spring(spring);
     std::visit([&](const auto& camera) { check_camera(camera); }, scene_.camera);
@@ -156,6 +157,9 @@ class Checker {
     if (!kinematic && !body.spin.isZero(0))
       fail(path + "/spin", "only a kinematic body spins by itself; give it \"motion\": \"kinematic\"");
     check_times(body.keyframes, path + "/keyframes");
+    check_place(body.position, path + "/position");
+    if (const auto mass = mass_of(body); dynamic && mass && *mass > 0)
+      check_drag(scene_.world.integrator, body.linear_drag, *mass, path + "/linear_drag");
     if (!dynamic && !body.velocity.isZero(0))
       warn(path + "/velocity", "has no effect: the body is not dynamic");
     if (!dynamic && !body.angular_velocity.isZero(0))
@@ -171,7 +175,31 @@ class Checker {
     for (std::size_t i = 1; i < ramp.size(); ++i)
       if (ramp[i].first < ramp[i - 1].first) fail(path + step(i), "ages must not decrease");
   }
+  void check_group(const ParticleGroup& group) {
+    check_look(group.look, group.where.path + "/look");
+    check_drag(group.behaviour.integrator, group.behaviour.linear_drag, group.mass, group.where.path + "/linear_drag");
+    for (std::size_t i = 0; i < group.places.size(); ++i)
+      check_place(group.places[i].position, group.where.path + "/places" + step(i) + "/position");
+  }
+  void check_place(const Vec3& position, const std::string& path) {
+    if (position.cwiseAbs().maxCoeff() >= scene_.world.bounds)
+      fail(path, fmt::format("is outside the world, which ends {:g} m from the origin; see /world/bounds", scene_.world.bounds));
+  }
+  /// `m` is whatever the drag slows: a mass, or a moment of inertia.
+  void check_drag(sim::IntegratorKind integrator, Real drag, Real m, const std::string& path) {
+    const Real largest = largest_stable_step(integrator, 0, drag, m), used = std::min(scene_.world.step, 1 / scene_.output.fps);
+    if (drag > 0 && used >= largest)
+      fail(path, fmt::format("is too much for the step and so small a mass: /world/step must be less than {:.3g} s, is {:.3g} s",
+                             0.995 * largest, used));
+  }
   void check_look(const ParticleLook& look, const std::string& path) {
+    if (look.style == render::PointStyle::sphere) {
+      const bool fades = look.color.rgba.w() < 1 || std::ranges::any_of(look.color_over_age, [](const auto& key) {
+                           return key.second.rgba.w() < 1;
+                         });
+      if (fades) warn(path + "/color", "alpha has no effect: spheres are opaque");
+      if (look.additive) warn(path + "/additive", "has no effect: spheres are opaque");
+    }
     check_ages(look.color_over_age, path + "/color_over_age");
     check_ages(look.size_over_age, path + "/size_over_age");
   }
@@ -182,6 +210,16 @@ class Checker {
     check_look(emitter.look, path + "/look");
     if (emitter.end <= emitter.start)
       fail(path + "/end", fmt::format("must be after the start, {} s", emitter.start));
+    constexpr Real kSmallest = 1e-6;
+    const Real smallest = effects::lower_bound(emitter.radius);
+    if (effects::upper_bound(emitter.radius) < kSmallest)
+      fail(path + "/radius", fmt::format("must be at least {:g} m", kSmallest));
+    const Real lightest =
+        effects::upper_bound(emitter.mass) > 0
+            ? effects::lower_bound(emitter.mass)
+            : effects::lower_bound(emitter.density) * 4 / 3 * std::numbers::pi * smallest * smallest * smallest;
+    if (lightest > 0)
+      check_drag(emitter.behaviour.integrator, emitter.behaviour.linear_drag, lightest, path + "/linear_drag");
     const Real room = std::get<PlaneSurface>(emitter.surface).size.minCoeff();
     if (2 * effects::lower_bound(emitter.radius) > room) {
       fail(path + "/surface",

@@ -135,7 +135,7 @@ void Simulation::add_emitters(const Scene& scene) {
     effects::EmitterDef def{
         .name = emitter.name,
         .seed = scene.world.seed,
-        .surface = {.pose = {plane.position, Quat::FromTwoVectors(Vec3::UnitY(), plane.direction)},
+        .surface = {.pose = {plane.position, plane.orientation()},
                     .size = plane.size},
         .body = body_named(emitter.body),
         .rate = emitter.rate,
@@ -203,14 +203,15 @@ void Simulation::step(double sampling_time) {
     totals_.waiting += emitter.report().waited;
     totals_.skipped += emitter.report().skipped;
   }
+  for (const sim::BodyHandle lost : report.bodies_retired) totals_.lost_bodies.push_back(world_.body_def(lost).name);
   for (const sim::MovedBody& moved : world_.moved()) moving_poses_[slot_of_.at(moved.body)] = moved.pose;
 
   if (!report.finite)
     throw DivergedError(
         fmt::format("the simulation diverged at {:.4f} s: '{}' is no longer finite; use a smaller "
                     "world.step or weaker forces",
-                    world_.time(), report.non_finite_object),
-        state_dump());
+                    world_.time(), report.non_finite.object),
+        state_dump(report.non_finite));
   if (!report.unresolved.empty()) {
     const sim::UnresolvedContact& contact = report.unresolved.front();
     throw UnsupportedError(
@@ -222,13 +223,14 @@ void Simulation::step(double sampling_time) {
 }
 
 void Simulation::advance() {
-  if (frame_ == 0) {
-    // What comes before frame 1 is stepped in frame-sized pieces too, so that reports stay timely.
-    const int pieces = static_cast<int>(std::ceil(scene_.output.start * scene_.output.fps));
-    for (int i = 0; i < pieces; ++i) step(scene_.output.start / pieces);
-  } else {
-    step(1 / scene_.output.fps);
+  // What comes before frame 1 is stepped in frame-sized pieces too, so that a caller can stop in between.
+  const int pieces = static_cast<int>(std::ceil(scene_.output.start * scene_.output.fps));
+  if (skipped_pieces_ < pieces) {
+    step(scene_.output.start / pieces);
+    ++skipped_pieces_;
+    return;
   }
+  if (frame_ > 0) step(1 / scene_.output.fps);
   ++frame_;
 }
 
@@ -300,10 +302,18 @@ Snapshot Simulation::snapshot() const {
   return snapshot;
 }
 
-std::string Simulation::state_dump() const {
+std::string Simulation::state_dump(const sim::NonFinite& lost) const {
+  // Numbers that are not finite have no form in JSON, hence text.
+  const auto text = [](const Vec3& v) { return fmt::format("{} {} {}", v.x(), v.y(), v.z()); };
   nlohmann::ordered_json dump;
   dump["time"] = world_.time();
   dump["frame"] = frame_;
+  dump["not_finite"] = {{"object", lost.object},
+                        {"particle", lost.particle},
+                        {"position_before", text(lost.position_before)},
+                        {"velocity_before", text(lost.velocity_before)},
+                        {"position", text(lost.position)},
+                        {"velocity", text(lost.velocity)}};
   auto& bodies = dump["bodies"] = nlohmann::ordered_json::array();
   for (const NamedBody& body : moving_) {
     const sim::BodyState s = world_.body(body.handle);
@@ -318,14 +328,7 @@ std::string Simulation::state_dump() const {
   auto& systems = dump["particles"] = nlohmann::ordered_json::array();
   world_.for_each_particle_system([&](sim::ParticleSystemHandle handle) {
     const sim::ParticleArrays& p = world_.particles(handle);
-    nlohmann::ordered_json system = {{"name", world_.particle_system_def(handle).name}, {"count", p.size()}};
-    auto& bad = system["not_finite"] = nlohmann::ordered_json::array();
-    constexpr std::size_t kMostListed = 100;
-    for (std::size_t i = 0; i < p.size() && bad.size() < kMostListed; ++i)
-      if (!p.position[i].allFinite() || !p.velocity[i].allFinite())
-        bad.push_back(
-            {{"id", p.id[i]}, {"position", json_of(p.position[i])}, {"velocity", json_of(p.velocity[i])}});
-    systems.push_back(std::move(system));
+    systems.push_back({{"name", world_.particle_system_def(handle).name}, {"count", p.size()}});
   });
   return dump.dump(2) + "\n";
 }

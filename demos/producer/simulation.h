@@ -38,6 +38,7 @@ struct SimulationTotals {
   uint64_t substeps = 0, born = 0, expired = 0, retired = 0, ejected = 0, removed = 0, collisions = 0,
            truncated = 0;
   uint64_t waiting = 0, skipped = 0;  ///< of the emitters
+  std::vector<std::string> lost_bodies;  ///< left the world's bounds and were frozen there
 };
 
 class Simulation {
@@ -49,8 +50,8 @@ class Simulation {
   /// Called at the start of every internal step, with its time, if set: for traces.
   void on_substep(std::function<void(double time)> callback) { on_substep_ = std::move(callback); }
 
-  /// Advances from the frame it is at to the next; the first call goes to frame 1, through whatever
-  /// `output.start` skips. Throws DivergedError or UnsupportedError.
+  /// Advances by one frame. What `output.start` skips takes several calls, during which frame() is 0. Throws
+  /// DivergedError or UnsupportedError.
   void advance();
   int frame() const { return frame_; }
 
@@ -72,9 +73,8 @@ class Simulation {
   };
   const std::vector<NamedGroup>& particle_groups() const { return groups_; }
 
-  /// The state as JSON text, with the objects that are not finite named first; what is saved when a run
-  /// diverges.
-  std::string state_dump() const;
+  /// What stopped being finite, and the state of the rest, as JSON text: what is saved when a run diverges.
+  std::string state_dump(const sim::NonFinite& lost) const;
 
  private:
   void add_bodies(const Scene& scene, const ModelLibrary& models);
@@ -97,7 +97,7 @@ class Simulation {
   std::vector<sim::SpringDef> springs_;
   std::function<void(double)> on_substep_;
   SimulationTotals totals_;
-  int frame_ = 0;
+  int frame_ = 0, skipped_pieces_ = 0;
 };
 
 }  // namespace offstage::producer

@@ -25,7 +25,7 @@ struct Table<WorldSettings> {
         {"gravity", &T::gravity, "acceleration of free fall", "m/s^2"},
         {"wind", &T::wind, "velocity of the air, felt by drag", "m/s"},
         {"step", &T::step, "longest step of the simulation; every frame takes the fewest equal ones", "s",
-         over(0, 1)},
+         between(1e-6, 1)},
         {"integrator", &T::integrator, "method for bodies and everything joined by springs"},
         {"bounds", &T::bounds, "half the edge of the cube that things must stay in", "m", kPositive},
         {"seed", &T::seed, "changes every random number of the scene", "", kNotNegative},
@@ -329,6 +329,7 @@ struct Table<PlaneSurface> {
   static Fields<PlaneSurface> fields() {
     return {{"position", &PlaneSurface::position, "of its centre", "m"},
             {"direction", &PlaneSurface::direction, "its normal", "", kDirection},
+            {"turn_deg", &PlaneSurface::turn_deg, "turn of the rectangle about its normal", "degrees"},
             {"size", &PlaneSurface::size, "of its two edges", "m", kPositive}};
   }
 };

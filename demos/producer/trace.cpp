@@ -19,9 +19,12 @@ Trace::Trace(const std::filesystem::path& path, const Simulation& simulation)
 
 Trace::~Trace() {
   if (!file_) return;
-  std::fclose(file_);
+  const bool whole_rows = std::fclose(file_) == 0;
   std::error_code ignored;
-  std::filesystem::remove(temporary_, ignored);
+  if (whole_rows)
+    std::filesystem::rename(temporary_, path_.string() + ".partial", ignored);
+  else
+    std::filesystem::remove(temporary_, ignored);
 }
 
 void Trace::record(double time) {

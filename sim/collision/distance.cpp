@@ -92,11 +92,18 @@ std::vector<Aabb> triangle_boxes(const TriangleMesh& mesh) {
 
 }  // namespace
 
+static Real farthest(const TriangleMesh& mesh) {
+  Real r2 = 0;
+  for (const Vec3& v : mesh.vertices) r2 = std::max(r2, v.squaredNorm());
+  return std::sqrt(r2);
+}
+
 CollisionMesh::CollisionMesh(TriangleMesh welded)
     : mesh(std::move(welded)),
       topology(mesh),
       mass(mass_properties(mesh)),
       tree(triangle_boxes(mesh)),
+      reach(farthest(mesh)),
       solid(topology.defects().closed() && !topology.defects().inverted) {}
 
 // Voronoi regions of the triangle, after Ericson, "Real-Time Collision Detection" (2005), 5.1.5.
@@ -246,11 +253,7 @@ Aabb bounds(const Solid& s, const Pose& pose) {
 }
 
 Real reach(const Solid& s) {
-  if (s.mesh) {
-    Real r2 = 0;
-    for (const Vec3& v : s.mesh->mesh.vertices) r2 = std::max(r2, v.squaredNorm());
-    return std::sqrt(r2);
-  }
+  if (s.mesh) return s.mesh->reach;
   if (const auto* c = std::get_if<Capsule>(s.shape)) return c->height / 2 + c->radius;
   if (const auto* ball = std::get_if<Sphere>(s.shape)) return ball->radius;
   const Aabb box = local_bounds(s);

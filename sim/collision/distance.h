@@ -29,6 +29,7 @@ struct CollisionMesh {
   MeshTopology topology;
   MassProperties mass;
   AabbTree tree;
+  Real reach;  ///< distance of the farthest vertex from the origin [m]
   bool solid;  ///< closed and not inverted: it has an inside; else it is a two-sided surface
 };
 

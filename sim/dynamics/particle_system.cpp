@@ -37,7 +37,7 @@ ParticleTally& ParticleTally::operator+=(const ParticleTally& t) {
   removed += t.removed;
   collisions += t.collisions;
   truncated += t.truncated;
-  finite &= t.finite;
+  if (!lost) lost = t.lost;
   return *this;
 }
 
@@ -83,7 +83,7 @@ void ParticleSystem::settle(const ParticleStage& stage, const ParticleForces& fo
   Vec3 &x = arrays.position[i], &v = arrays.velocity[i];
   arrays.age[i] += duration;
   if (!x.allFinite() || !v.allFinite()) {
-    tally.finite = false;
+    if (!tally.lost) tally.lost = NonFinite{{}, arrays.id[i], x0, v0, x, v};
     ++tally.retired;
     fate_[i] = Fate::dead;
     return;

@@ -9,13 +9,14 @@
 #include "sim/collision/obstacles.h"
 #include "sim/dynamics/particle_forces.h"
 #include "sim/dynamics/particle_sweep.h"
+#include "sim/world.h"
 
 namespace offstage::sim {
 
 /// What became of a system's particles in a sub-step.
 struct ParticleTally {
   uint64_t expired = 0, retired = 0, ejected = 0, removed = 0, collisions = 0, truncated = 0;
-  bool finite = true;
+  std::optional<NonFinite> lost;  ///< the first particle that stopped being finite; `object` is left to the world
 
   ParticleTally& operator+=(const ParticleTally& t);
 };

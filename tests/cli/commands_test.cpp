@@ -89,7 +89,10 @@ TEST(Commands, DivergedSimulationIsExit5AndSavesTheState) {
   const Outcome run = offstage("simulate s.json", folder.path());
   EXPECT_EQ(run.code, 5) << run.err;
   EXPECT_NE(run.err.find("'doomed'"), std::string::npos) << run.err;
-  EXPECT_NE(read_file(folder / "offstage-diverged.json").find("doomed"), std::string::npos);
+  const json state = json::parse(read_file(folder / "offstage-diverged.json"));
+  EXPECT_EQ(state["not_finite"]["object"], "doomed");
+  EXPECT_EQ(state["not_finite"]["position_before"], "0 1 0");
+  EXPECT_NE(state["not_finite"]["velocity"].get<std::string>().find("inf"), std::string::npos);
 }
 
 TEST(Commands, ContactOfTwoBodiesIsAClearRefusalNotWrongPhysics) {
@@ -176,6 +179,49 @@ TEST(Commands, InfoDescribesScenesAndModels) {
   EXPECT_EQ(cube["triangles"], 12);
   EXPECT_EQ(cube["closed"], true);
   EXPECT_NEAR(cube["volume"].get<double>(), 1, 1e-9);
+}
+
+TEST(Commands, ABodyThatLeavesTheWorldIsNamed) {
+  const TemporaryFolder folder;
+  write_file(folder / "s.json", R"({"version": 1, "world": {"bounds": 2}, "bodies": [{"name": "runaway"}], "output": {"duration": 2}})");
+  const Outcome run = offstage("simulate s.json --progress none", folder.path());
+  EXPECT_EQ(run.code, 0);
+  EXPECT_NE(run.err.find("'runaway' left the world"), std::string::npos) << run.err;
+  EXPECT_EQ(json::parse(run.out)["lost_bodies"][0], "runaway");
+}
+
+TEST(Commands, FrameTimesOutsideTheFilmAreRefused) {
+  const TemporaryFolder folder;
+  for (const char* at : {"-1", "nan", "1e300", "1e9", "0.5", "-0.2"}) {
+    const Outcome run = offstage("frame " + tiny_scene() + " -o a.png --at=" + at, folder.path());
+    EXPECT_EQ(run.code, 2) << at;
+  }
+  EXPECT_EQ(offstage("frame " + tiny_scene() + " -o a.jpg -n 1", folder.path()).code, 2);
+  EXPECT_TRUE(contents(folder.path()).empty());
+}
+
+TEST(Commands, NobodyListeningIsNoReasonToEnd) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(offstage("render " + tiny_scene() + " -o a/ --frames 1-2 2>/dev/full", folder.path()).code, 0);
+  EXPECT_EQ(offstage("validate nowhere.json 2>&-", folder.path()).code, 3);
+  EXPECT_EQ(offstage("frame " + tiny_scene() + " -o f.png -q <&- >&- 2>&-", folder.path()).code, 0);
+  EXPECT_EQ(read_file(folder / "f.png"), read_file(folder / "a/0001.png"));
+}
+
+TEST(Commands, ResultsThatCannotBeWrittenAreAFailure) {
+  const TemporaryFolder folder;
+  for (const std::string& command :
+       {std::string("schema"), std::string("doctor"), "validate " + tiny_scene(), "simulate " + tiny_scene() + " -q"})
+    EXPECT_EQ(offstage(command + " >/dev/full", folder.path()).code, 1) << command;
+}
+
+TEST(Commands, StatsNeverReplaceAFileUnasked) {
+  const TemporaryFolder folder;
+  write_file(folder / "notes.json", "mine");
+  EXPECT_EQ(offstage("simulate " + tiny_scene() + " --stats notes.json", folder.path()).code, 2);
+  EXPECT_EQ(offstage("render " + tiny_scene() + " -o out/ --stats notes.json", folder.path()).code, 2);
+  EXPECT_EQ(offstage("render " + tiny_scene() + " -o out/ --stats nowhere/s.json", folder.path()).code, 2);
+  EXPECT_EQ(contents(folder.path()), (std::map<std::string, std::string>{{"notes.json", "mine"}}));
 }
 
 TEST(Commands, DoctorFindsGlAndEncoders) {

@@ -12,8 +12,9 @@ namespace fs = std::filesystem;
 
 Outcome offstage(const std::string& args, const fs::path& folder, const std::string& before) {
   const TemporaryFolder talk;
-  const std::string command = "cd '" + folder.string() + "' && " + before + " '" OFFSTAGE_BINARY_DIR "/offstage' " +
-                              args + " >'" + (talk / "out").string() + "' 2>'" + (talk / "err").string() + "' </dev/null";
+  // What the caller redirects comes later and wins.
+  const std::string command = "cd '" + folder.string() + "' && " + before + " '" OFFSTAGE_BINARY_DIR "/offstage' >'" +
+                              (talk / "out").string() + "' 2>'" + (talk / "err").string() + "' </dev/null " + args;
   const int status = std::system(command.c_str());
   return {.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1,
           .out = read_file(talk / "out"),

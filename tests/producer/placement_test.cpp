@@ -201,5 +201,18 @@ TEST(Placement, EmittersAreCopiedToo) {
   EXPECT_LT((surface.direction - Vec3(0, 0, -1)).norm(), 1e-12);
 }
 
+TEST(Placement, ACopiedEmitterTurnsAsAWhole) {
+  const Scene scene = scene_of(R"({"emitters": [
+    {"surface": {"direction": [0, 1, 0], "size": [2, 0.02]}, "repeat": {"count": 2, "turn_deg": 90}},
+    {"surface": {"direction": [1, 2, 3], "turn_deg": 20, "size": [2, 0.02]}, "repeat": {"count": 2, "turn_deg": -35}}]})");
+  for (const std::size_t first : {0u, 2u}) {
+    const auto& a = std::get<PlaneSurface>(scene.emitters[first].surface);
+    const auto& b = std::get<PlaneSurface>(scene.emitters[first + 1].surface);
+    const double turn = (first == 0 ? 90 : -35) * std::numbers::pi / 180;
+    const Quat expected = Quat(Eigen::AngleAxisd(turn, Vec3::UnitY())) * a.orientation();
+    EXPECT_LT(b.orientation().angularDistance(expected), 1e-12) << first;
+  }
+}
+
 }  // namespace
 }  // namespace offstage::producer

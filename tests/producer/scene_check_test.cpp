@@ -215,5 +215,31 @@ TEST(SceneCheck, AgesDoNotDecreaseAndEmittersEndAfterTheyStart) {
       "/emitters/0/look/size_over_age/2: ages must not decrease\n");
 }
 
+TEST(SceneCheck, DragThatWouldBlowUpIsRefused) {
+  // m/k = 0.01 s: explicit steps diverge from 0.02 s on (0.02785 s for Runge-Kutta).
+  const auto group = [](double step) {
+    return R"({"world": {"step": )" + std::to_string(step) +
+           R"(}, "particles": [{"mass": 0.01, "linear_drag": 1, "places": [{}]}]})";
+  };
+  EXPECT_EQ(errors_of(group(0.019)), "");
+  EXPECT_NE(errors_of(group(0.021)).find("/particles/0/linear_drag: is too much for the step"), std::string::npos);
+  const std::string drops = R"({"emitters": [{"radius": 0.002, "linear_drag": 0.02}]})";
+  EXPECT_NE(errors_of(drops).find("/emitters/0/linear_drag"), std::string::npos);
+  const std::string body = R"({"bodies": [{"mass": 1, "linear_drag": 1000}]})";
+  EXPECT_NE(errors_of(body).find("/bodies/0/linear_drag"), std::string::npos);
+}
+
+TEST(SceneCheck, NothingStartsOutsideTheWorld) {
+  EXPECT_NE(errors_of(R"({"bodies": [{"position": [5000, 0, 0]}]})").find("/bodies/0/position: is outside the world"),
+            std::string::npos);
+  EXPECT_EQ(errors_of(R"({"world": {"bounds": 6000}, "bodies": [{"position": [5000, 0, 0]}]})"), "");
+}
+
+TEST(SceneCheck, WhatSpheresCannotShowIsSaid) {
+  EXPECT_NE(warnings_of(R"({"particles": [{"places": [{}], "look": {"style": "sphere", "color": "#ff000080", "additive": true}}]})")
+                .find("/particles/0/look/color: alpha has no effect"),
+            std::string::npos);
+}
+
 }  // namespace
 }  // namespace offstage::producer

@@ -322,7 +322,7 @@ TEST(SceneOverride, IsCheckedLikeTheFile) {
   EXPECT_EQ(error("emitters.0.rate.mean=1"),
             "--set: /emitters/0/rate: is 5 and has no 'mean'; set it as a whole");
   EXPECT_EQ(error("world.step=fast"), "--set: /world/step: must be a number, got the string \"fast\"");
-  EXPECT_EQ(error("world.step=-1"), "--set: /world/step: must be greater than 0 and at most 1 s, got -1");
+  EXPECT_EQ(error("world.step=-1"), "--set: /world/step: must be between 1e-06 and 1 s, got -1");
   EXPECT_EQ(error("bodies.ball.mass=1"), "--set: /bodies: has no 'ball'; it is empty");
   EXPECT_EQ(error("duration"), "--set: must be path=value, got 'duration'");
   EXPECT_EQ(error("=3"), "--set: must be path=value, got '=3'");

@@ -170,7 +170,7 @@ TEST(VideoSink, DiscardsWhatIsPartialWithoutClose) {
   {
     const auto sink = make_video_sink({.path = folder / "a.mp4", .width_px = 32, .height_px = 32});
     sink->write(0, greys(32, 32, 0));
-    EXPECT_EQ(folder.names(), std::set<std::string>{"a.part.mp4"});
+    EXPECT_EQ(folder.names(), std::set<std::string>{"a.part-" + std::to_string(::getpid()) + ".mp4"});
   }
   EXPECT_EQ(folder.names(), std::set<std::string>{});
 }
@@ -181,7 +181,7 @@ TEST(VideoSink, ShowsTheLastWordsOfAKilledEncoder) {
                            fake_ffmpeg(folder,
                                        "head -c 5000 >/dev/null\n"
                                        "printf 'out of paint\\nreally' >&2\nkill -9 $$\n"));
-  const std::string message = message_of<UnavailableError>([&] {
+  const std::string message = message_of<FileError>([&] {
     const auto sink = make_video_sink({.path = folder / "a.mp4", .width_px = 640, .height_px = 480});
     for (int f = 0; f < 10; ++f) sink->write(f, greys(640, 480, f));
   });
@@ -196,7 +196,7 @@ TEST(VideoSink, ReportsAnEncoderThatFailsAtTheEnd) {
                            fake_ffmpeg(folder, "cat >/dev/null; echo no space >&2; exit 3\n"));
   const auto sink = make_video_sink({.path = folder / "a.mp4", .width_px = 32, .height_px = 32});
   sink->write(0, greys(32, 32, 0));
-  const std::string message = message_of<UnavailableError>([&] { sink->close(); });
+  const std::string message = message_of<FileError>([&] { sink->close(); });
   EXPECT_NE(message.find("exit code 3: no space"), std::string::npos) << message;
 }
 
@@ -208,7 +208,7 @@ TEST(VideoSink, RunsTheEncoderInItsOwnProcessGroup) {
       fake_ffmpeg(folder, "cut -d' ' -f5 /proc/$$/stat >" + report.string() + "; cat >/dev/null\n"));
   const auto sink = make_video_sink({.path = folder / "a.mp4", .width_px = 32, .height_px = 32});
   sink->write(0, greys(32, 32, 0));
-  sink->close();
+  EXPECT_THROW(sink->close(), FileError) << "success without a film is none";
   const int group = std::stoi(file_content(report));
   EXPECT_GT(group, 0);
   EXPECT_NE(group, ::getpgrp());

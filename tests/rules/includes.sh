@@ -24,9 +24,16 @@ for header in $public; do
 done
 forbid "$(ls -d demos/producer tests/producer tests/cli 2>/dev/null | tr '\n' ' ')" 'assimp|glad|GL/|stb|spng' "only render uses GL, assimp, stb and libspng"
 
-# One importer of each library.
-for library in 'assimp/' 'stb_image' 'spng.h' 'GL/osmesa.h'; do
-  users=$(grep -rlE "include *[<\"]$library" sim effects render demos | sed 's/\.[a-z]*$//' | sort -u | wc -l)
-  [ "$users" -ge 1 ] || { echo "nothing uses $library any more; drop it here"; status=1; }
-done
+# Who may use what: a library and the files, without their endings, that include it.
+only() {
+  local users
+  users=$(grep -rlE "include *[<\"]$1" sim effects render demos | sed 's/\.[a-z]*$//' | sort -u | tr '\n' ' ')
+  [ "$users" = "$2 " ] && return
+  echo "$1 is used by: $users; it should be: $2"
+  status=1
+}
+only 'assimp/' 'render/mesh_import render/mesh_material'
+only 'stb_image' 'render/image_io'
+only 'spng.h' 'render/image_io'
+only 'GL/osmesa.h' 'render/context'
 exit $status

@@ -1,5 +1,6 @@
 #include "sim/world.h"
 
+#include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>
@@ -92,6 +93,18 @@ TEST(World, EachUnresolvedPairOncePerStepAndNeverBetweenScriptedBodies) {
   EXPECT_TRUE(touched);
 }
 
+TEST(World, NoticesAFastBodyThatWouldPassAThinOneBetweenSteps) {
+  for (const Real speed : {20.0, 100.0, 300.0}) {
+    World world({.gravity = Vec3::Zero()});
+    world.add_body({.shape = Box{{0.02, 1, 1}}, .motion = MotionType::fixed});
+    const auto ball =
+        world.add_body({.shape = Sphere{0.01}, .pose = {Vec3(-0.5, 0.013, 0)}, .velocity = {speed, 0.1, 0}});
+    std::size_t contacts = 0;
+    for (int i = 0; i < 30 && world.body(ball).pose.position.x() < 0.5; ++i) contacts += world.step(1.0 / 60).unresolved.size();
+    EXPECT_GE(contacts, 1u) << speed << " m/s";
+  }
+}
+
 TEST(World, FreezesAndReportsABodyThatLeaves) {
   World world({.bounds = Aabb(Vec3::Constant(-2), Vec3::Constant(2))});
   const auto ball = world.add_body({.name = "ball"});
@@ -109,13 +122,18 @@ TEST(World, NamesWhatIsNotFiniteAndStaysUsable) {
   world.add_spring({.a = BodyPoint{a}, .b = WorldPoint{}, .stiffness = 1e300, .rest_length = 0});
   const StepReport report = world.step(0.1);
   EXPECT_FALSE(report.finite);
-  EXPECT_EQ(report.non_finite_object, "stiff");
+  EXPECT_EQ(report.non_finite.object, "stiff");
+  EXPECT_EQ(report.non_finite.position_before, Vec3(1, 0, 0));
+  EXPECT_FALSE(report.non_finite.position.allFinite() && report.non_finite.velocity.allFinite());
   EXPECT_TRUE(world.body(a).pose.position.allFinite());
   EXPECT_TRUE(world.step(0.1).finite);
 
   const auto system = world.add_particle_system({.name = "dust"});
   world.add_particle(system, {.velocity = {std::numeric_limits<Real>::quiet_NaN(), 0, 0}});
-  EXPECT_EQ(world.step(0.1).non_finite_object, "dust");
+  const NonFinite lost = world.step(0.1).non_finite;
+  EXPECT_EQ(lost.object, "dust");
+  EXPECT_EQ(lost.particle, 0u);
+  EXPECT_TRUE(std::isnan(lost.velocity.x()));
   EXPECT_EQ(world.particle_count(), 0u);
 }
 
