@@ -9,6 +9,9 @@
 namespace offstage::render {
 namespace {
 
+/// From so many sub-frames on, their own places on the sun's disc filter its shadows.
+constexpr int kManySamples = 16;
+
 constexpr float kRadians = std::numbers::pi_v<float> / 180;
 
 Vector4f vec4(const Vector3f& v, float w = 0) {
@@ -128,7 +131,7 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
   frame.sun_direction = vec4(jittered_sun(sun, offsets.light), 0);
   frame.sun_radiance = vec4(sun.color * sun.intensity, 0.5f * sun.size_deg * kRadians);
   frame.zenith = vec4(sky.zenith, environment.fog);
-  frame.horizon = vec4(sky.horizon);
+  frame.horizon = vec4(sky.horizon, offsets.count >= kManySamples ? 1.f : 0.f);
   frame.ground = vec4(sky.ground);
   frame.glow = vec4(sky.glow);
   const std::array<Vector3f, 9> irradiance = sky_irradiance(sky);
@@ -163,7 +166,8 @@ SampleOffsets sample_offsets(int i, int n) {
   };
   return {.pixel = hammersley(permuted(0.618, 0)),
           .lens = hammersley(permuted(0.414, n / 3)),
-          .light = hammersley(permuted(0.236, n / 2))};
+          .light = hammersley(permuted(0.236, n / 2)),
+          .count = n};
 }
 
 }  // namespace offstage::render

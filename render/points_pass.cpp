@@ -1,6 +1,7 @@
 #include "render/points_pass.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace offstage::render {
 namespace {
@@ -39,6 +40,12 @@ void PointSet::assign(std::span<const Point> values) {
   }
 }
 
+float PointSet::reach(std::size_t i) const {
+  const float radius = points[i].position.w();
+  const float stretch = def.style == PointStyle::streak ? 0.5f * def.stretch_s * points[i].velocity.head<3>().norm() : 0.f;
+  return radius + stretch;
+}
+
 PointsPass::PointsPass() : vertex_array_(gl::make_vertex_array()) {
   for (std::size_t k = 0; k < 3; ++k) {
     const std::string style = "STYLE " + std::to_string(k);
@@ -65,40 +72,48 @@ PointsPass::PointsPass() : vertex_array_(gl::make_vertex_array()) {
 void PointsPass::prepare(PointSet& set, const View& view) {
   const bool front_first = set.def.style == PointStyle::sphere;
   keys_.clear();
+  ordered_.clear();
   for (uint32_t i = 0; i < set.points.size(); ++i) {
-    const float depth = view.depth_of(set.points[i].position.head<3>());
+    const Vector3f center = set.points[i].position.head<3>();
+    const float depth = view.depth_of(center);
+    // The margin covers what is drawn a pixel wide because it is thinner.
+    if (!view.sees(center, set.reach(i) + 0.01f * std::abs(depth))) {
+      ordered_.push_back(set.points[i]);
+      continue;
+    }
     keys_.emplace_back(front_first ? depth : -depth, i);
   }
   std::sort(keys_.begin(), keys_.end(), [&set](const auto& a, const auto& b) {
     return a.first != b.first ? a.first < b.first : set.ids[a.second] < set.ids[b.second];
   });
-  ordered_.clear();
+  set.unseen = ordered_.size();
   for (const auto& [depth, i] : keys_) ordered_.push_back(set.points[i]);
   set.buffer.write(std::span<const GpuPoint>(ordered_));
 }
 
-void PointsPass::draw(const PointSet& set) {
-  glVertexArrayVertexBuffer(vertex_array_, 0, set.buffer, 0, sizeof(GpuPoint));
+void PointsPass::draw(const PointSet& set, std::size_t first) {
+  const auto offset = static_cast<GLintptr>(first * sizeof(GpuPoint));
+  glVertexArrayVertexBuffer(vertex_array_, 0, set.buffer, offset, sizeof(GpuPoint));
   glBindVertexArray(vertex_array_);
   glUniform4fv(1, 1, style_of(set.def).data());
-  glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(set.points.size()));
+  glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(set.points.size() - first));
 }
 
 void PointsPass::draw_shadow(const PointSet& set, const Matrix4f& shadow_clip_from_world) {
   shadow_programs_[static_cast<std::size_t>(set.def.style)]->use();
   glUniformMatrix4fv(0, 1, GL_FALSE, shadow_clip_from_world.data());
-  draw(set);
+  draw(set, 0);
 }
 
 void PointsPass::draw_spheres(const PointSet& set) {
   programs_[static_cast<std::size_t>(PointStyle::sphere)]->use();
   glUniform2f(2, set.def.metallic, set.def.roughness);
-  draw(set);
+  draw(set, set.unseen);
 }
 
 void PointsPass::draw_blended(const PointSet& set) {
   programs_[static_cast<std::size_t>(set.def.style)]->use();
-  draw(set);
+  draw(set, set.unseen);
 }
 
 }  // namespace offstage::render

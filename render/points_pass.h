@@ -21,9 +21,12 @@ struct PointSet {
   std::vector<GpuPoint> points;  ///< w of position: radius; w of velocity: a number of its own in [0, 1)
   std::vector<uint64_t> ids;
   Eigen::AlignedBox3f box;  ///< of what can be seen of them, streaks at full length
-  gl::StreamBuffer buffer;  ///< in the order they are drawn
+  gl::StreamBuffer buffer;  ///< in the order they are drawn; first those that only throw shadows into the view
+  std::size_t unseen = 0;   ///< how many those are
 
   void assign(std::span<const Point> values);
+  /// Radius of the ball around all that is drawn of a point [m].
+  float reach(std::size_t i) const;
 };
 
 class PointsPass {
@@ -36,7 +39,7 @@ class PointsPass {
   void draw_blended(const PointSet& set);
 
  private:
-  void draw(const PointSet& set);
+  void draw(const PointSet& set, std::size_t first);
 
   std::array<std::optional<gl::LazyProgram>, 3> programs_, shadow_programs_;
   gl::VertexArray vertex_array_;

@@ -2,7 +2,7 @@
 /// The stage: what there is to see, and the passes that draw it. It knows handles, transforms, meshes, points
 /// and materials, and nothing of physics.
 ///
-/// A frame is the mean of N sub-frames (Frame::samples), each drawn with its own offsets in the pixel, on the
+/// A frame is the mean of N sub-frames (see sample_offsets), each drawn with its own offsets in the pixel, on the
 /// sun's disc, in the lens and, by the caller moving things in between, in time. That one mechanism gives
 /// anti-aliasing, soft shadows, depth of field and motion blur.
 
@@ -76,6 +76,7 @@ struct SampleOffsets {
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
   Eigen::Vector2f lens = Eigen::Vector2f::Zero();
   Eigen::Vector2f light = Eigen::Vector2f::Zero();
+  int count = 1;  ///< of sub-frames in the frame: among many, one needs no filtering of its own
 };
 /// Offsets of sub-frame i of n: a fixed low-discrepancy set; all zero for n = 1.
 SampleOffsets sample_offsets(int i, int n);

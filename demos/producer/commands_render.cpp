@@ -37,12 +37,6 @@ void check_file(const std::string& file, bool force) {
   if (!force) throw OutputError(file + ": exists already; replace it with --force");
 }
 
-/// With several drawing threads each context rasterises in its own thread: frames in parallel beat threads in
-/// a frame.
-void pin_environment_for(int drawing_threads, int threads) {
-  render::pin_environment(drawing_threads > 1 ? 0 : threads);
-}
-
 void report_run(const RunStats& stats, const TalkOptions& talk, const std::string& stats_file) {
   if (!stats_file.empty()) write_text_file(stats_file, to_json(stats));
   if (talk.quiet) return;
@@ -231,7 +225,7 @@ int render_command(const RenderOptions& options) {
   }
 
   const auto threads = simulation_threads(options.threads);
-  pin_environment_for(plan.jobs, plan.threads);
+  render::pin_environment(plan.threads);
   if (plan.target.kind == OutputKind::pipe) return render_to_pipe(plan, models, options);
   if (plan.target.kind == OutputKind::frames || plan.through_frames)
     return render_to_frames(plan, models, options);
@@ -266,7 +260,7 @@ int frame_command(const FrameOptions& options) {
   const ModelLibrary models(scene, loaded.folder, warnings);
   if (!options.talk.quiet) print_warnings(warnings);
   const auto threads = simulation_threads(options.threads);
-  pin_environment_for(1, threads_or_all(options.threads));
+  render::pin_environment(threads_or_all(options.threads));
   PictureSink sink(options.out);
   const RunStats stats =
       render_frames(loaded, models, {.frames = {frame}, .threads = 1, .cache = {}}, sink, {});

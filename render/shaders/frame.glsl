@@ -7,7 +7,7 @@ layout(std140, binding = 0) uniform Frame {
   vec4 depth;               // distance along the view axis = x / (depth + y); z: near plane
   vec4 sun_direction;       // w: 1 if the shadow map holds something
   vec4 sun_radiance;        // of a white surface that faces it; w: radius of the disc [rad]
-  vec4 zenith, horizon, ground, glow;  // zenith.w: fog density
+  vec4 zenith, horizon, ground, glow;  // zenith.w: fog density; horizon.w: 1 if one of many sub-frames
   vec4 irradiance[9];       // ambient light of a white surface, spherical harmonics in x, y, z
   vec4 shadow;              // size of a texel [m], texels, 1 / texels, seed of the dither
 } frame;

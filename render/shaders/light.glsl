@@ -18,6 +18,7 @@ float sun_visibility(vec3 position, vec3 normal) {
   vec3 p = (frame.shadow_from_world * vec4(moved, 1.0)).xyz;
   if (any(notEqual(p.xy, clamp(p.xy, 0.0, 1.0)))) return 1.0;
   p.z = saturate(p.z);
+  if (frame.horizon.w != 0.0) return texture(shadow_map, p);  // the mean over the sub-frames is filter enough
 
   vec2 texel = p.xy * frame.shadow.y;
   vec2 base = floor(texel + 0.5);

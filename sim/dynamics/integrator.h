@@ -30,7 +30,7 @@ struct IntegratorWorkspace {
 enum class IntegratorKind {
   explicit_euler,    ///< N1, order 1
   symplectic_euler,  ///< order 1, keeps energy bounded; one force evaluation: the default for effects
-  midpoint,          ///< N3, RK2, order 2: the default for bodies' sub-steps of smooth forces
+  midpoint,          ///< N3, RK2, order 2
   rk4,               ///< N4, order 4
 };
 

@@ -17,7 +17,7 @@ for _ in $(seq "$runs"); do
   field startup_s
 done | median "start to first written frame of an empty scene [s]"
 
-for quality in draft:40 preview:16 final:6; do
+for quality in draft:60 preview:24 final:12; do
   for _ in $(seq "$runs"); do
     render tests/bench/film.json --quality "${quality%:*}" --frames "1-${quality#*:}" >/dev/null
     echo "$(field frames) $(field wall_s)" | awk '{print $1 / $2}'
