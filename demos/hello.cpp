@@ -35,7 +35,8 @@ int main(int argc, char** argv) try {
   render::Context context;
   render::Stage stage(context, {.width_px = 960, .height_px = 540});
   const auto red = stage.add_material({.color = {0.7f, 0.1f, 0.05f, 1}, .roughness = 0.35f});
-  const auto paving = stage.add_material({.color = {0.5f, 0.5f, 0.48f, 1}, .pattern = render::Pattern::paving});
+  const auto paving =
+      stage.add_material({.color = {0.5f, 0.5f, 0.48f, 1}, .pattern = render::Pattern::paving});
   const auto drawn_box = stage.add_instance(stage.add_mesh(render::make_box({0.6f, 0.4f, 0.2f}, 0.02f)), red);
   stage.add_instance(stage.add_mesh(render::make_ground(500)), paving, false);
   const auto drawn_balls = stage.add_points({.style = render::PointStyle::sphere});
@@ -51,10 +52,10 @@ int main(int argc, char** argv) try {
   }
   const sim::ParticleArrays& ball = world.particles(balls);
   stage.set_points(drawn_balls, std::vector<render::Point>{{.position = ball.position[0].cast<float>(),
-                                                           .velocity = ball.velocity[0].cast<float>(),
-                                                           .radius = 0.3f,
-                                                           .color = {0.9f, 0.6f, 0.1f, 1},
-                                                           .id = 0}});
+                                                            .velocity = ball.velocity[0].cast<float>(),
+                                                            .radius = 0.3f,
+                                                            .color = {0.9f, 0.6f, 0.1f, 1},
+                                                            .id = 0}});
 
   // The picture: sixteen sub-frames, averaged and tone mapped.
   constexpr int kSubframes = 16;

@@ -2,4 +2,6 @@
 
 #include "producer/command_line.h"
 
-int main(int argc, char** argv) { return offstage::producer::run(argc, argv); }
+int main(int argc, char** argv) {
+  return offstage::producer::run(argc, argv);
+}

@@ -14,9 +14,10 @@ struct ContextInfo {
   std::string glsl;
 };
 
-/// Sets and clears the environment variables that steer Mesa (LP_NUM_THREADS to `raster_threads`, which all contexts of the
-/// process share: llvmpipe has one rasteriser, so give it every processor even if several contexts draw at once). Call once,
-/// in main, before any thread starts: it uses setenv. Mesa reads them at the first context.
+/// Sets and clears the environment variables that steer Mesa (LP_NUM_THREADS to `raster_threads`, which all
+/// contexts of the process share: llvmpipe has one rasteriser, so give it every processor even if several
+/// contexts draw at once). Call once, in main, before any thread starts: it uses setenv. Mesa reads them at
+/// the first context.
 void pin_environment(int raster_threads);
 
 /// Owns the context, current on the thread that made it; use it from that thread only, and make no

@@ -78,7 +78,8 @@ View make_view(const Camera& camera, const SampleOffsets& offsets, int width_px,
   const float distance = sight.norm();
   view.forward = distance > 0 ? Vector3f(sight / distance) : Vector3f(-Vector3f::UnitZ());
   Vector3f side = view.forward.cross(camera.up);
-  if (side.norm() < 1e-6f) side = view.forward.cross(-Vector3f::UnitZ());  // straight down: as on a map, -Z is up
+  if (side.norm() < 1e-6f)
+    side = view.forward.cross(-Vector3f::UnitZ());  // straight down: as on a map, -Z is up
   view.right = side.norm() > 1e-6f ? Vector3f(side.normalized()) : perpendicular(view.forward);
   view.up = view.right.cross(view.forward);
 

@@ -42,7 +42,8 @@ void PointSet::assign(std::span<const Point> values) {
 
 float PointSet::reach(std::size_t i) const {
   const float radius = points[i].position.w();
-  const float stretch = def.style == PointStyle::streak ? 0.5f * def.stretch_s * points[i].velocity.head<3>().norm() : 0.f;
+  const float stretch =
+      def.style == PointStyle::streak ? 0.5f * def.stretch_s * points[i].velocity.head<3>().norm() : 0.f;
   return radius + stretch;
 }
 

@@ -21,8 +21,9 @@ struct PointSet {
   std::vector<GpuPoint> points;  ///< w of position: radius; w of velocity: a number of its own in [0, 1)
   std::vector<uint64_t> ids;
   Eigen::AlignedBox3f box;  ///< of what can be seen of them, streaks at full length
-  gl::StreamBuffer buffer;  ///< in the order they are drawn; first those that only throw shadows into the view
-  std::size_t unseen = 0;   ///< how many those are
+  gl::StreamBuffer
+      buffer;              ///< in the order they are drawn; first those that only throw shadows into the view
+  std::size_t unseen = 0;  ///< how many those are
 
   void assign(std::span<const Point> values);
   /// Radius of the ball around all that is drawn of a point [m].

@@ -2,8 +2,8 @@
 /// The stage: what there is to see, and the passes that draw it. It knows handles, transforms, meshes, points
 /// and materials, and nothing of physics.
 ///
-/// A frame is the mean of N sub-frames (see sample_offsets), each drawn with its own offsets in the pixel, on the
-/// sun's disc, in the lens and, by the caller moving things in between, in time. That one mechanism gives
+/// A frame is the mean of N sub-frames (see sample_offsets), each drawn with its own offsets in the pixel, on
+/// the sun's disc, in the lens and, by the caller moving things in between, in time. That one mechanism gives
 /// anti-aliasing, soft shadows, depth of field and motion blur.
 
 #include <memory>

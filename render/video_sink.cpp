@@ -102,8 +102,8 @@ std::filesystem::path partial_name(const std::filesystem::path& path) {
   return path.parent_path() / (path.stem().string() + ".part-" + own + path.extension().string());
 }
 
-/// Whether an MP4 or QuickTime file is whole: its boxes fill it exactly and the index is among them. ffmpeg ends with
-/// success even if the disk filled up while it moved the index to the front.
+/// Whether an MP4 or QuickTime file is whole: its boxes fill it exactly and the index is among them. ffmpeg
+/// ends with success even if the disk filled up while it moved the index to the front.
 bool has_whole_boxes(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary | std::ios::ate);
   const auto size = static_cast<uint64_t>(in.tellg());
@@ -195,7 +195,7 @@ class VideoSink final : public FrameSink {
     channel_.ours.close();
     const std::string words = one_line(words_.text());
     throw FileError(def_.path.string() + ": ffmpeg (" + encoder_ + ") ended early with " +
-                           how.value_or("exit code 0") + (words.empty() ? "" : ": " + words));
+                    how.value_or("exit code 0") + (words.empty() ? "" : ": " + words));
   }
 
   VideoDef def_;

@@ -93,8 +93,8 @@ struct UnresolvedContact {
   Real time = 0;  ///< [s]
 };
 
-/// Something that stopped being finite: what it was just before, and what became of it. Bodies: centre of mass; the
-/// velocity before is not kept.
+/// Something that stopped being finite: what it was just before, and what became of it. Bodies: centre of
+/// mass; the velocity before is not kept.
 struct NonFinite {
   std::string object;     ///< name of the body or the particle system
   uint64_t particle = 0;  ///< its id, in a system
@@ -115,7 +115,7 @@ struct StepReport {
   std::vector<BodyHandle> bodies_retired;     ///< left the world's bounds: frozen from here on
   std::vector<UnresolvedContact> unresolved;  ///< pairs of bodies in contact: the result is not valid physics
   bool finite = true;                         ///< false: something became NaN or infinite
-  NonFinite non_finite;                           ///< the first such object, if not finite
+  NonFinite non_finite;                       ///< the first such object, if not finite
 };
 
 /// Mechanical energy [J]: kinetic, gravitational (zero at y = 0) and elastic.

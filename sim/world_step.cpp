@@ -37,17 +37,20 @@ Pose between(const Body& body, Real share) {
   return {a.position + share * (b.position - a.position), a.orientation.slerp(share, b.orientation)};
 }
 
-/// Whether two bodies touch anywhere on their ways through the sub-step: looked at so often that neither can pass the
-/// other in between, within a bounded number of looks.
+/// Whether two bodies touch anywhere on their ways through the sub-step: looked at so often that neither can
+/// pass the other in between, within a bounded number of looks.
 bool touch_on_the_way(const Body& a, const Body& b) {
   constexpr int kMostLooks = 512;
   const auto turn = [](const Body& body) {
     const Real angle = body.before_substep.orientation.angularDistance(body.pose.orientation);
     return angle > 0 ? angle * reach(body.solid) : 0;
   };
-  const Vec3 slip = (a.pose.position - a.before_substep.position) - (b.pose.position - b.before_substep.position);
-  const Real travel = slip.norm() + turn(a) + turn(b), step = std::min(thickness(a.solid), thickness(b.solid)) / 2;
-  const int looks = travel < step * kMostLooks ? std::max(1, static_cast<int>(std::ceil(travel / step))) : kMostLooks;
+  const Vec3 slip =
+      (a.pose.position - a.before_substep.position) - (b.pose.position - b.before_substep.position);
+  const Real travel = slip.norm() + turn(a) + turn(b),
+             step = std::min(thickness(a.solid), thickness(b.solid)) / 2;
+  const int looks =
+      travel < step * kMostLooks ? std::max(1, static_cast<int>(std::ceil(travel / step))) : kMostLooks;
   for (int k = looks; k > 0; --k) {
     const Real share = static_cast<Real>(k) / looks;
     if (touching(a.solid, between(a, share), b.solid, between(b, share))) return true;
@@ -109,7 +112,8 @@ void World::Impl::keep_within_bounds(BodyHandle handle, Body& body, StepReport& 
   if (!finite) {
     if (report.finite) {
       const RigidBody& b = body.rigid;
-      report.non_finite = {body.def.name, 0, body.before_substep.position, Vec3::Zero(), b.position, b.momentum / b.mass};
+      report.non_finite = {body.def.name, 0,          body.before_substep.position,
+                           Vec3::Zero(),  b.position, b.momentum / b.mass};
     }
     report.finite = false;
     body.pose = body.before_substep;

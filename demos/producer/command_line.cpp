@@ -73,7 +73,8 @@ void add_threads(CLI::App& command, int& threads) {
 /// A program started with a standard stream closed would otherwise find its own files under that number.
 void open_standard_streams() {
   for (int fd = 0; fd <= 2; ++fd)
-    if (fcntl(fd, F_GETFD) < 0) open("/dev/null", fd == 0 ? O_RDONLY : O_WRONLY);  // takes the lowest free number
+    if (fcntl(fd, F_GETFD) < 0)
+      open("/dev/null", fd == 0 ? O_RDONLY : O_WRONLY);  // takes the lowest free number
 }
 
 /// Results that could not be written are a failure, whatever the command did.
@@ -96,7 +97,6 @@ int run(int argc, char** argv) {
 namespace {
 
 int dispatch(int argc, char** argv) {
-
   CLI::App app{"offstage turns a scene file into a physically simulated film, without a display or a GPU."};
   app.set_version_flag("--version", OFFSTAGE_VERSION);
   app.require_subcommand(1);

@@ -2,11 +2,11 @@
 /// The commands behind the command line. Each takes what was asked for and returns an exit code; errors are
 /// thrown.
 
-#include <tbb/global_control.h>
-
 #include <optional>
 #include <string>
 #include <vector>
+
+#include <tbb/global_control.h>
 
 #include "producer/progress.h"
 #include "producer/scene_io.h"

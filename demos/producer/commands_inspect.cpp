@@ -132,7 +132,9 @@ std::vector<std::string> SceneOptions::overrides() const {
   return all;
 }
 
-int threads_or_all(int threads) { return threads > 0 ? threads : available_processors(); }
+int threads_or_all(int threads) {
+  return threads > 0 ? threads : available_processors();
+}
 
 tbb::global_control simulation_threads(int threads) {
   return {tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads_or_all(threads))};

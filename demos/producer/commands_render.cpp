@@ -30,11 +30,17 @@ void check_file(const std::string& file, bool force) {
   if (file.empty()) return;
   const fs::path folder = fs::path(file).parent_path();
   std::error_code error;
-  if (!folder.empty() && !fs::is_directory(folder, error)) throw OutputError(file + ": there is no folder " + folder.string());
+  if (!folder.empty() && !fs::is_directory(folder, error))
+    throw OutputError(file + ": there is no folder " + folder.string());
   const fs::file_status status = fs::status(file, error);
   if (status.type() == fs::file_type::not_found) return;
   if (status.type() != fs::file_type::regular) throw OutputError(file + ": is not a regular file");
   if (!force) throw OutputError(file + ": exists already; replace it with --force");
+}
+
+void check_distinct(const std::string& a, const std::string& b) {
+  if (!a.empty() && fs::path(a).lexically_normal() == fs::path(b).lexically_normal())
+    throw OutputError(a + ": is named for two outputs");
 }
 
 void report_run(const RunStats& stats, const TalkOptions& talk, const std::string& stats_file) {
@@ -47,28 +53,23 @@ void report_run(const RunStats& stats, const TalkOptions& talk, const std::strin
   for (const std::string& body : t.lost_bodies)
     say("warning: the body '{}' left the world (world.bounds) and stays where it left\n", body);
   if (t.retired) say("note: {} particles left the world (world.bounds)\n", t.retired);
-  if (t.skipped)
-    say("warning: {} particles were not released: max_alive was reached\n", t.skipped);
+  if (t.skipped) say("warning: {} particles were not released: max_alive was reached\n", t.skipped);
   if (t.waiting) say("note: {} particles had to wait for room on their emitter\n", t.waiting);
-  if (t.removed)
-    say("warning: {} particles were inside a body and had to be removed\n", t.removed);
-  if (t.truncated)
-    say("note: {} particles hit more often in one step than is followed\n", t.truncated);
+  if (t.removed) say("warning: {} particles were inside a body and had to be removed\n", t.removed);
+  if (t.truncated) say("note: {} particles hit more often in one step than is followed\n", t.truncated);
   if (!talk.verbose) return;
   for (const auto& [name, times] : {std::pair("simulate", &stats.sim), std::pair("draw", &stats.render),
                                     std::pair("encode", &stats.encode)}) {
     const StageTimes::Summary s = times->summary();
-    say("{:9} {:8.2f} ms mean  {:8.2f} p50  {:8.2f} p95  {:8.2f} max\n", name, s.mean, s.p50,
-               s.p95, s.max);
+    say("{:9} {:8.2f} ms mean  {:8.2f} p50  {:8.2f} p95  {:8.2f} max\n", name, s.mean, s.p50, s.p95, s.max);
   }
-  say("{} frames in {:.2f} s, first after {:.2f} s, {:.0f} MB\n", stats.frames, stats.wall_s,
-             stats.startup_s, peak_rss_mb());
+  say("{} frames in {:.2f} s, first after {:.2f} s, {:.0f} MB\n", stats.frames, stats.wall_s, stats.startup_s,
+      peak_rss_mb());
 }
 
 /// The exit code of a run that was interrupted, after saying how to go on.
 int interrupted(const RunStats& stats, int total, const std::string& advice) {
-  say("interrupted: {} of {} frames done{}\n", stats.frames + stats.frames_kept, total,
-             advice);
+  say("interrupted: {} of {} frames done{}\n", stats.frames + stats.frames_kept, total, advice);
   return 128 + stats.interrupted_by;
 }
 
@@ -180,7 +181,8 @@ int render_to_frames(const Plan& plan, const ModelLibrary& models, const RenderO
 }
 
 int render_to_video(const Plan& plan, const ModelLibrary& models, const RenderOptions& options) {
-  // A part of a film must not look like the whole, nor replace a whole one: it gets the name when it has all frames.
+  // A part of a film must not look like the whole, nor replace a whole one: it gets the name when it has all
+  // frames.
   render::VideoDef def = video_def(plan);
   const fs::path partial = def.path.replace_extension(".partial" + plan.target.path.extension().string());
   auto sink = render::make_video_sink(def);
@@ -218,6 +220,7 @@ int render_command(const RenderOptions& options) {
     if (fs::exists(plan.target.path)) check_file(plan.target.path.string(), options.force);
   }
   check_file(options.stats, options.force || options.resume);
+  check_distinct(options.stats, options.out);
   if (options.dry_run) return print_plan(plan);
   if (plan.frames.empty()) {
     say("note: this chunk has no frames: there are fewer frames than chunks\n");
@@ -240,11 +243,12 @@ int frame_command(const FrameOptions& options) {
   if (wanted < 0) wanted += count + 1;
   if (options.at) wanted = 1 + std::round((*options.at - scene.output.start) * scene.output.fps);
   if (!(wanted >= 1 && wanted <= count))
-    throw std::invalid_argument(fmt::format("frame {} is outside the film; it has frames 1-{}, times {:g} to {:g} s",
-                                            wanted, count, scene.output.start,
-                                            scene.output.start + (count - 1) / scene.output.fps));
+    throw std::invalid_argument(
+        fmt::format("frame {} is outside the film; it has frames 1-{}, times {:g} to {:g} s", wanted, count,
+                    scene.output.start, scene.output.start + (count - 1) / scene.output.fps));
   const int frame = static_cast<int>(wanted);
-  if (fs::path(options.out).extension() != ".png") throw OutputError(options.out + ": a frame is a PNG file; give a name ending in .png");
+  if (fs::path(options.out).extension() != ".png")
+    throw OutputError(options.out + ": a frame is a PNG file; give a name ending in .png");
   check_file(options.out, options.force);
 
   class PictureSink : public render::FrameSink {
@@ -277,6 +281,7 @@ int simulate_command(const SimulateOptions& options) {
   if (!options.talk.quiet) print_warnings(warnings);
   check_file(options.stats, options.force);
   check_file(options.trace, options.force);
+  check_distinct(options.stats, options.trace);
   const auto threads = simulation_threads(options.threads);
   SimulateJob job{
       .cache = {}, .force = options.force, .trace = {}, .trace_every_step = options.trace_every == "step"};

@@ -26,7 +26,8 @@ struct Golden {
   std::vector<GoldenFrame> frames;
 };
 
-/// Draws the golden frames of a scene that was loaded with golden_overrides(): one early, one late. Throws Interrupted.
+/// Draws the golden frames of a scene that was loaded with golden_overrides(): one early, one late. Throws
+/// Interrupted.
 Golden draw_golden(const LoadedScene& scene, int threads);
 
 /// Reads and writes FOLDER/<scene>.json and its pictures FOLDER/<scene>-####.png. Throws FileError.

@@ -37,9 +37,10 @@ void add_to(XXH3_state_t* hash, const render::Model& model) {
     add_to(hash, part.mesh.indices);
   }
   for (const render::Material& m : model.materials) {
-    const float numbers[] = {m.color.x(),    m.color.y(),    m.color.z(),    m.color.w(), m.metallic,
-                             m.roughness,    m.emission.x(), m.emission.y(), m.emission.z()};
-    const int choices[] = {m.two_sided, m.base_color_texture, m.metallic_roughness_texture, m.emission_texture};
+    const float numbers[] = {m.color.x(), m.color.y(),    m.color.z(),    m.color.w(),   m.metallic,
+                             m.roughness, m.emission.x(), m.emission.y(), m.emission.z()};
+    const int choices[] = {m.two_sided, m.base_color_texture, m.metallic_roughness_texture,
+                           m.emission_texture};
     XXH3_128bits_update(hash, numbers, sizeof numbers);
     XXH3_128bits_update(hash, choices, sizeof choices);
   }

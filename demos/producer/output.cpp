@@ -20,8 +20,13 @@ constexpr int kMostFrames = 10'000'000;  // that a manifest can make us look for
 constexpr std::array kVideoEndings = {".mp4", ".webm", ".mov", ".gif", ".webp", ".apng", ".png"};
 
 nlohmann::ordered_json to_json(const Manifest& m, const fs::path& pattern) {
-  return {{"pattern", pattern.filename().string()}, {"scene", m.scene},      {"settings", m.settings}, {"width", m.width_px},
-          {"height", m.height_px}, {"frames", m.frames},     {"fps", m.fps}};
+  return {{"pattern", pattern.filename().string()},
+          {"scene", m.scene},
+          {"settings", m.settings},
+          {"width", m.width_px},
+          {"height", m.height_px},
+          {"frames", m.frames},
+          {"fps", m.fps}};
 }
 
 }  // namespace

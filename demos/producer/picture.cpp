@@ -29,21 +29,45 @@ Affine3f affine(const BodySample& s) {
   return Eigen::Translation3f(s.position) * s.orientation;
 }
 
-/// The mesh of a primitive, and the numbers that tell it from others. Boxes get a small bevel, so that their edges catch
-/// light.
-render::Mesh mesh_of(const sim::Sphere& s) { return render::make_sphere(f(s.radius)); }
-render::Mesh mesh_of(const sim::Box& s) { return render::make_box(s.size.cast<float>(), 0.04f * f(s.size.minCoeff())); }
-render::Mesh mesh_of(const sim::Capsule& s) { return render::make_capsule(f(s.radius), f(s.height)); }
-render::Mesh mesh_of(const sim::Cylinder& s) { return render::make_cylinder(f(s.radius), f(s.height)); }
-render::Mesh mesh_of(const sim::Cone& s) { return render::make_cone(f(s.radius), f(s.height)); }
-render::Mesh mesh_of(const sim::Plane&) { return render::make_ground(kGroundHalfSize); }
+/// The mesh of a primitive, and the numbers that tell it from others. Boxes get a small bevel, so that their
+/// edges catch light.
+render::Mesh mesh_of(const sim::Sphere& s) {
+  return render::make_sphere(f(s.radius));
+}
+render::Mesh mesh_of(const sim::Box& s) {
+  return render::make_box(s.size.cast<float>(), 0.04f * f(s.size.minCoeff()));
+}
+render::Mesh mesh_of(const sim::Capsule& s) {
+  return render::make_capsule(f(s.radius), f(s.height));
+}
+render::Mesh mesh_of(const sim::Cylinder& s) {
+  return render::make_cylinder(f(s.radius), f(s.height));
+}
+render::Mesh mesh_of(const sim::Cone& s) {
+  return render::make_cone(f(s.radius), f(s.height));
+}
+render::Mesh mesh_of(const sim::Plane&) {
+  return render::make_ground(kGroundHalfSize);
+}
 
-std::vector<float> key_of(const sim::Sphere& s) { return {0, f(s.radius)}; }
-std::vector<float> key_of(const sim::Box& s) { return {1, f(s.size.x()), f(s.size.y()), f(s.size.z())}; }
-std::vector<float> key_of(const sim::Capsule& s) { return {2, f(s.radius), f(s.height)}; }
-std::vector<float> key_of(const sim::Cylinder& s) { return {3, f(s.radius), f(s.height)}; }
-std::vector<float> key_of(const sim::Cone& s) { return {4, f(s.radius), f(s.height)}; }
-std::vector<float> key_of(const sim::Plane&) { return {5}; }
+std::vector<float> key_of(const sim::Sphere& s) {
+  return {0, f(s.radius)};
+}
+std::vector<float> key_of(const sim::Box& s) {
+  return {1, f(s.size.x()), f(s.size.y()), f(s.size.z())};
+}
+std::vector<float> key_of(const sim::Capsule& s) {
+  return {2, f(s.radius), f(s.height)};
+}
+std::vector<float> key_of(const sim::Cylinder& s) {
+  return {3, f(s.radius), f(s.height)};
+}
+std::vector<float> key_of(const sim::Cone& s) {
+  return {4, f(s.radius), f(s.height)};
+}
+std::vector<float> key_of(const sim::Plane&) {
+  return {5};
+}
 
 BodySample interpolate(const BodySample& a, const BodySample& b, float w) {
   return {a.position + w * (b.position - a.position), a.orientation.slerp(w, b.orientation)};
@@ -152,9 +176,9 @@ void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t
             } else {
               // A plane is the ground: it takes shadows and throws none.
               const bool casts = body.casts_shadow && !std::is_same_v<S, sim::Plane>;
-              drawn.parts.push_back({stage_.add_instance(primitive(shape),
-                                                         material(body.material, models), casts),
-                                     Affine3f::Identity()});
+              drawn.parts.push_back(
+                  {stage_.add_instance(primitive(shape), material(body.material, models), casts),
+                   Affine3f::Identity()});
             }
           },
           body.shape);

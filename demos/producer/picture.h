@@ -53,7 +53,7 @@ class Picture {
   std::map<std::string, std::pair<std::vector<render::MeshHandle>, std::vector<render::MaterialHandle>>>
       models_;
   std::map<std::vector<float>, render::MeshHandle> primitives_;  // by kind and sizes
-  std::map<std::string, std::size_t> slot_of_;  // body name -> slot, for the follow camera
+  std::map<std::string, std::size_t> slot_of_;                   // body name -> slot, for the follow camera
   std::map<std::string, Eigen::Vector3f> fixed_positions_;
   std::vector<DrawnBody> bodies_;
   std::vector<render::InstanceHandle> springs_;  // null where invisible

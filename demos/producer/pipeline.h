@@ -1,5 +1,6 @@
 #pragma once
-/// The hand-over between the simulation, the drawing threads and the sink: bounded, in order, and with one way to fail.
+/// The hand-over between the simulation, the drawing threads and the sink: bounded, in order, and with one
+/// way to fail.
 
 #include <condition_variable>
 #include <deque>

@@ -108,12 +108,15 @@ void shoot(Pipeline& pipeline, SnapshotSource& source, const std::vector<int>& f
     const int frame = frames[i];
     std::shared_ptr<const Snapshot> previous;
     if (needs_previous && frame > 1)
-      previous = last && last->frame == frame - 1 ? last : std::make_shared<const Snapshot>(source.at(frame - 1, stop));
+      previous = last && last->frame == frame - 1
+                     ? last
+                     : std::make_shared<const Snapshot>(source.at(frame - 1, stop));
     auto current = std::make_shared<const Snapshot>(source.at(frame, stop));
     if (current->frame != frame) break;  // stopped on the way
     if (!previous) previous = current;
     last = current;
-    if (!pipeline.push({static_cast<int>(i), frame, std::move(previous), std::move(current), ms_since(start)}))
+    if (!pipeline.push(
+            {static_cast<int>(i), frame, std::move(previous), std::move(current), ms_since(start)}))
       return;
   }
   pipeline.no_more_shots();
@@ -153,7 +156,8 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
   Pipeline pipeline(2 * job.threads + 2);
   const auto draw = [&] { guarded(pipeline, [&] { draw_shots(pipeline, loaded.scene, models); }); };
   const auto print = [&] {
-    guarded(pipeline, [&] { print_frames(pipeline, sink, static_cast<int>(job.frames.size()), stats, progress); });
+    guarded(pipeline,
+            [&] { print_frames(pipeline, sink, static_cast<int>(job.frames.size()), stats, progress); });
   };
   {
     std::vector<std::jthread> crew;

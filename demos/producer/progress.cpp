@@ -1,5 +1,4 @@
 #include "producer/progress.h"
-#include "producer/talk.h"
 
 #include <cstdio>
 #include <cstdlib>
@@ -7,6 +6,8 @@
 
 #include <fmt/format.h>
 #include <unistd.h>
+
+#include "producer/talk.h"
 
 namespace offstage::producer {
 namespace {
@@ -35,8 +36,8 @@ void ProgressPrinter::operator()(const Progress& p) {
   if (style_ == ProgressStyle::none) return;
   if (style_ == ProgressStyle::json) {
     say("{{\"frame\":{},\"total\":{},\"sim_ms\":{:.1f},\"render_ms\":{:.1f},\"encode_ms\":{:.1f},"
-               "\"particles\":{},\"eta_s\":{:.1f}}}\n",
-               p.done, p.total, p.sim_ms, p.render_ms, p.encode_ms, p.particles, p.eta_s);
+        "\"particles\":{},\"eta_s\":{:.1f}}}\n",
+        p.done, p.total, p.sim_ms, p.render_ms, p.encode_ms, p.particles, p.eta_s);
     return;
   }
   const auto now = std::chrono::steady_clock::now();

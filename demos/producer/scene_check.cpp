@@ -177,26 +177,30 @@ class Checker {
   }
   void check_group(const ParticleGroup& group) {
     check_look(group.look, group.where.path + "/look");
-    check_drag(group.behaviour.integrator, group.behaviour.linear_drag, group.mass, group.where.path + "/linear_drag");
+    check_drag(group.behaviour.integrator, group.behaviour.linear_drag, group.mass,
+               group.where.path + "/linear_drag");
     for (std::size_t i = 0; i < group.places.size(); ++i)
       check_place(group.places[i].position, group.where.path + "/places" + step(i) + "/position");
   }
   void check_place(const Vec3& position, const std::string& path) {
     if (position.cwiseAbs().maxCoeff() >= scene_.world.bounds)
-      fail(path, fmt::format("is outside the world, which ends {:g} m from the origin; see /world/bounds", scene_.world.bounds));
+      fail(path, fmt::format("is outside the world, which ends {:g} m from the origin; see /world/bounds",
+                             scene_.world.bounds));
   }
   /// `m` is whatever the drag slows: a mass, or a moment of inertia.
   void check_drag(sim::IntegratorKind integrator, Real drag, Real m, const std::string& path) {
-    const Real largest = largest_stable_step(integrator, 0, drag, m), used = std::min(scene_.world.step, 1 / scene_.output.fps);
+    const Real largest = largest_stable_step(integrator, 0, drag, m),
+               used = std::min(scene_.world.step, 1 / scene_.output.fps);
     if (drag > 0 && used >= largest)
-      fail(path, fmt::format("is too much for the step and so small a mass: /world/step must be less than {:.3g} s, is {:.3g} s",
+      fail(path, fmt::format("is too much for the step and so small a mass: /world/step must be less than "
+                             "{:.3g} s, is {:.3g} s",
                              0.995 * largest, used));
   }
   void check_look(const ParticleLook& look, const std::string& path) {
     if (look.style == render::PointStyle::sphere) {
-      const bool fades = look.color.rgba.w() < 1 || std::ranges::any_of(look.color_over_age, [](const auto& key) {
-                           return key.second.rgba.w() < 1;
-                         });
+      const bool fades =
+          look.color.rgba.w() < 1 ||
+          std::ranges::any_of(look.color_over_age, [](const auto& key) { return key.second.rgba.w() < 1; });
       if (fades) warn(path + "/color", "alpha has no effect: spheres are opaque");
       if (look.additive) warn(path + "/additive", "has no effect: spheres are opaque");
     }
@@ -214,12 +218,13 @@ class Checker {
     const Real smallest = effects::lower_bound(emitter.radius);
     if (effects::upper_bound(emitter.radius) < kSmallest)
       fail(path + "/radius", fmt::format("must be at least {:g} m", kSmallest));
-    const Real lightest =
-        effects::upper_bound(emitter.mass) > 0
-            ? effects::lower_bound(emitter.mass)
-            : effects::lower_bound(emitter.density) * 4 / 3 * std::numbers::pi * smallest * smallest * smallest;
+    const Real lightest = effects::upper_bound(emitter.mass) > 0
+                              ? effects::lower_bound(emitter.mass)
+                              : effects::lower_bound(emitter.density) * 4 / 3 * std::numbers::pi * smallest *
+                                    smallest * smallest;
     if (lightest > 0)
-      check_drag(emitter.behaviour.integrator, emitter.behaviour.linear_drag, lightest, path + "/linear_drag");
+      check_drag(emitter.behaviour.integrator, emitter.behaviour.linear_drag, lightest,
+                 path + "/linear_drag");
     const Real room = std::get<PlaneSurface>(emitter.surface).size.minCoeff();
     if (2 * effects::lower_bound(emitter.radius) > room) {
       fail(path + "/surface",

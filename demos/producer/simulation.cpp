@@ -132,27 +132,25 @@ void Simulation::add_emitters(const Scene& scene) {
   for (const Emitter& emitter : scene.emitters) {
     const auto system = world_.add_particle_system(system_def(emitter.name, emitter.behaviour));
     const auto& plane = std::get<PlaneSurface>(emitter.surface);
-    effects::EmitterDef def{
-        .name = emitter.name,
-        .seed = scene.world.seed,
-        .surface = {.pose = {plane.position, plane.orientation()},
-                    .size = plane.size},
-        .body = body_named(emitter.body),
-        .rate = emitter.rate,
-        .count = emitter.count,
-        .interval = emitter.interval,
-        .bursts = {},
-        .start = emitter.start,
-        .end = emitter.end,
-        .speed = emitter.speed,
-        .spread_deg = emitter.spread_deg,
-        .radius = emitter.radius,
-        .density = emitter.density,
-        .mass = emitter.mass,
-        .lifespan = emitter.lifespan,
-        .restitution = emitter.restitution,
-        .friction = emitter.friction,
-        .max_alive = static_cast<uint64_t>(emitter.max_alive)};
+    effects::EmitterDef def{.name = emitter.name,
+                            .seed = scene.world.seed,
+                            .surface = {.pose = {plane.position, plane.orientation()}, .size = plane.size},
+                            .body = body_named(emitter.body),
+                            .rate = emitter.rate,
+                            .count = emitter.count,
+                            .interval = emitter.interval,
+                            .bursts = {},
+                            .start = emitter.start,
+                            .end = emitter.end,
+                            .speed = emitter.speed,
+                            .spread_deg = emitter.spread_deg,
+                            .radius = emitter.radius,
+                            .density = emitter.density,
+                            .mass = emitter.mass,
+                            .lifespan = emitter.lifespan,
+                            .restitution = emitter.restitution,
+                            .friction = emitter.friction,
+                            .max_alive = static_cast<uint64_t>(emitter.max_alive)};
     for (const EmitterBurst& b : emitter.bursts)
       def.bursts.push_back({b.time, b.count, b.cycles, b.interval});
     at_place(emitter.where, [&] { emitters_.emplace_back(def, system); });
@@ -203,7 +201,8 @@ void Simulation::step(double sampling_time) {
     totals_.waiting += emitter.report().waited;
     totals_.skipped += emitter.report().skipped;
   }
-  for (const sim::BodyHandle lost : report.bodies_retired) totals_.lost_bodies.push_back(world_.body_def(lost).name);
+  for (const sim::BodyHandle lost : report.bodies_retired)
+    totals_.lost_bodies.push_back(world_.body_def(lost).name);
   for (const sim::MovedBody& moved : world_.moved()) moving_poses_[slot_of_.at(moved.body)] = moved.pose;
 
   if (!report.finite)

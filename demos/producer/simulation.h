@@ -37,7 +37,7 @@ class UnsupportedError : public std::runtime_error {
 struct SimulationTotals {
   uint64_t substeps = 0, born = 0, expired = 0, retired = 0, ejected = 0, removed = 0, collisions = 0,
            truncated = 0;
-  uint64_t waiting = 0, skipped = 0;  ///< of the emitters
+  uint64_t waiting = 0, skipped = 0;     ///< of the emitters
   std::vector<std::string> lost_bodies;  ///< left the world's bounds and were frozen there
 };
 

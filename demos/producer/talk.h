@@ -1,12 +1,12 @@
 #pragma once
-/// Talk to the person at the terminal. It goes to standard error, and that nobody reads it any more (a closed pipe, a full log
-/// disk) is no reason to end a run.
-
-#include <fmt/format.h>
+/// Talk to the person at the terminal. It goes to standard error, and that nobody reads it any more (a closed
+/// pipe, a full log disk) is no reason to end a run.
 
 #include <cstdio>
 #include <string>
 #include <utility>
+
+#include <fmt/format.h>
 
 namespace offstage::producer {
 

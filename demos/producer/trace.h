@@ -12,8 +12,8 @@ namespace offstage::producer {
 
 class Trace {
  public:
-  /// Throws render::FileError. The file appears under its name on close(); a trace that ends before that is kept with
-  /// .partial behind its name.
+  /// Throws render::FileError. The file appears under its name on close(); a trace that ends before that is
+  /// kept with .partial behind its name.
   Trace(const std::filesystem::path& path, const Simulation& simulation);
   ~Trace();
   Trace(const Trace&) = delete;

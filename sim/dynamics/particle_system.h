@@ -16,7 +16,8 @@ namespace offstage::sim {
 /// What became of a system's particles in a sub-step.
 struct ParticleTally {
   uint64_t expired = 0, retired = 0, ejected = 0, removed = 0, collisions = 0, truncated = 0;
-  std::optional<NonFinite> lost;  ///< the first particle that stopped being finite; `object` is left to the world
+  std::optional<NonFinite>
+      lost;  ///< the first particle that stopped being finite; `object` is left to the world
 
   ParticleTally& operator+=(const ParticleTally& t);
 };

@@ -1,15 +1,15 @@
-/// Reading a model against assimp alone with the same post-processing: what the child process, the checks and the hand-over
-/// cost.
+/// Reading a model against assimp alone with the same post-processing: what the child process, the checks and
+/// the hand-over cost.
 
-#include <benchmark/benchmark.h>
-#include <unistd.h>
-
-#include <assimp/Importer.hpp>
-#include <assimp/postprocess.h>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+
+#include <assimp/Importer.hpp>
+#include <assimp/postprocess.h>
+#include <benchmark/benchmark.h>
+#include <unistd.h>
 
 #include "render/mesh_io.h"
 
@@ -18,12 +18,14 @@ namespace {
 
 /// An OBJ of a wavy grid of n x n cells, with normals: 2 n^2 triangles.
 std::filesystem::path grid_file(int n) {
-  const auto path = std::filesystem::temp_directory_path() / ("offstage-grid-" + std::to_string(getpid()) + ".obj");
+  const auto path =
+      std::filesystem::temp_directory_path() / ("offstage-grid-" + std::to_string(getpid()) + ".obj");
   std::ofstream out(path);
   char line[96];
   for (int i = 0; i <= n; ++i)
     for (int j = 0; j <= n; ++j) {
-      std::snprintf(line, sizeof line, "v %.5f %.5f %.5f\nvn 0 1 0\n", 0.01 * i, 0.05 * std::sin(0.1 * (i + j)), 0.01 * j);
+      std::snprintf(line, sizeof line, "v %.5f %.5f %.5f\nvn 0 1 0\n", 0.01 * i,
+                    0.05 * std::sin(0.1 * (i + j)), 0.01 * j);
       out << line;
     }
   for (int i = 0; i < n; ++i)
@@ -39,7 +41,8 @@ void assimp_alone(benchmark::State& state) {
   const auto path = grid_file(static_cast<int>(state.range(0)));
   for (auto _ : state) {
     Assimp::Importer importer;
-    benchmark::DoNotOptimize(importer.ReadFile(path, aiProcess_Triangulate | aiProcess_JoinIdenticalVertices));
+    benchmark::DoNotOptimize(
+        importer.ReadFile(path, aiProcess_Triangulate | aiProcess_JoinIdenticalVertices));
   }
   std::filesystem::remove(path);
 }

@@ -1,11 +1,11 @@
 // What a user sees of the commands: exit codes, messages, and what is and is not written.
 
-#include <gtest/gtest.h>
-
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <sstream>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "cli/program.h"
 
@@ -24,8 +24,10 @@ TEST(Commands, ValidSceneIsCalledValid) {
 TEST(Commands, EveryProblemOfASceneIsReportedWithItsPlaceAndExit3) {
   const TemporaryFolder folder;
   write_file(folder / "bad.json",
-             "{\n  \"version\": 1,\n  \"bodies\": [\n    {\"shape\": {\"type\": \"sphere\", \"radius\": -1}, \"masss\": 2}\n  ]\n}\n");
-  for (const std::string command : {"validate bad.json", "render bad.json -o out/####.png", "simulate bad.json"}) {
+             "{\n  \"version\": 1,\n  \"bodies\": [\n    {\"shape\": {\"type\": \"sphere\", \"radius\": -1}, "
+             "\"masss\": 2}\n  ]\n}\n");
+  for (const std::string command :
+       {"validate bad.json", "render bad.json -o out/####.png", "simulate bad.json"}) {
     const Outcome run = offstage(command, folder.path());
     EXPECT_EQ(run.code, 3) << command;
     EXPECT_NE(run.err.find("bad.json:4:"), std::string::npos) << run.err;
@@ -39,8 +41,9 @@ TEST(Commands, EveryProblemOfASceneIsReportedWithItsPlaceAndExit3) {
 TEST(Commands, MissingSceneOrModelIsExit3) {
   const TemporaryFolder folder;
   EXPECT_EQ(offstage("validate nowhere.json", folder.path()).code, 3);
-  write_file(folder / "s.json",
-             R"({"version": 1, "bodies": [{"motion": "static", "shape": {"type": "mesh", "file": "no.obj"}}]})");
+  write_file(
+      folder / "s.json",
+      R"({"version": 1, "bodies": [{"motion": "static", "shape": {"type": "mesh", "file": "no.obj"}}]})");
   const Outcome run = offstage("validate s.json", folder.path());
   EXPECT_EQ(run.code, 3);
   EXPECT_NE(run.err.find("no.obj"), std::string::npos) << run.err;
@@ -49,7 +52,9 @@ TEST(Commands, MissingSceneOrModelIsExit3) {
 TEST(Commands, OpenMeshAsDynamicBodyIsRefusedByValidate) {
   const TemporaryFolder folder;
   write_file(folder / "open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-  write_file(folder / "s.json", R"({"version": 1, "bodies": [{"name": "sail", "shape": {"type": "mesh", "file": "open.obj"}}]})");
+  write_file(
+      folder / "s.json",
+      R"({"version": 1, "bodies": [{"name": "sail", "shape": {"type": "mesh", "file": "open.obj"}}]})");
   const Outcome run = offstage("validate s.json", folder.path());
   EXPECT_EQ(run.code, 3);
   EXPECT_NE(run.err.find("/bodies/0"), std::string::npos) << run.err;
@@ -58,8 +63,9 @@ TEST(Commands, OpenMeshAsDynamicBodyIsRefusedByValidate) {
 TEST(Commands, WrongUsageIsExit2) {
   const TemporaryFolder folder;
   for (const std::string& command :
-       {std::string(), std::string("rendr x"), "render " + tiny_scene(), "render " + tiny_scene() + " -o film.avi",
-        "render " + tiny_scene() + " -o out/ --frames 5-99", "render " + tiny_scene() + " -o out/ --chunk 3/2",
+       {std::string(), std::string("rendr x"), "render " + tiny_scene(),
+        "render " + tiny_scene() + " -o film.avi", "render " + tiny_scene() + " -o out/ --frames 5-99",
+        "render " + tiny_scene() + " -o out/ --chunk 3/2",
         "render " + tiny_scene() + " -o out/ --quality best", "frame " + tiny_scene() + " -o a.png --at 99"})
     EXPECT_EQ(offstage(command, folder.path()).code, 2) << command;
   EXPECT_TRUE(contents(folder.path()).empty());
@@ -74,8 +80,8 @@ TEST(Commands, HelpListsTheExitCodes) {
 
 TEST(Commands, MissingFfmpegIsExit4BeforeAnythingIsWritten) {
   const TemporaryFolder folder;
-  const Outcome run =
-      offstage("render " + tiny_scene() + " -o film.mp4", folder.path(), "OFFSTAGE_FFMPEG=/nonexistent/ffmpeg");
+  const Outcome run = offstage("render " + tiny_scene() + " -o film.mp4", folder.path(),
+                               "OFFSTAGE_FFMPEG=/nonexistent/ffmpeg");
   EXPECT_EQ(run.code, 4);
   EXPECT_NE(run.err.find("ffmpeg"), std::string::npos) << run.err;
   EXPECT_TRUE(contents(folder.path()).empty());
@@ -115,7 +121,8 @@ TEST(Commands, OverridesAreCheckedLikeTheFile) {
 
 TEST(Commands, DryRunPrintsAPlanAndWritesNothing) {
   const TemporaryFolder folder;
-  const Outcome run = offstage("render " + tiny_scene() + " -o out/####.png --frames 2-9x3 --dry-run", folder.path());
+  const Outcome run =
+      offstage("render " + tiny_scene() + " -o out/####.png --frames 2-9x3 --dry-run", folder.path());
   ASSERT_EQ(run.code, 0) << run.err;
   EXPECT_EQ(json::parse(run.out)["frames"], 3);
   EXPECT_TRUE(contents(folder.path()).empty());
@@ -123,7 +130,8 @@ TEST(Commands, DryRunPrintsAPlanAndWritesNothing) {
 
 TEST(Commands, StatsAreOneJsonObject) {
   const TemporaryFolder folder;
-  const Outcome run = offstage("render " + tiny_scene() + " -o out/ --frames 1-4 --stats stats.json -q", folder.path());
+  const Outcome run =
+      offstage("render " + tiny_scene() + " -o out/ --frames 1-4 --stats stats.json -q", folder.path());
   ASSERT_EQ(run.code, 0) << run.err;
   EXPECT_EQ(run.err, "");
   const json stats = json::parse(read_file(folder / "stats.json"));
@@ -131,7 +139,8 @@ TEST(Commands, StatsAreOneJsonObject) {
   EXPECT_EQ(stats["bodies"], 3);
   EXPECT_GT(stats["particles"], 20);
   EXPECT_EQ(stats["state_hash"].get<std::string>().size(), 32u);
-  for (const char* stage : {"sim_ms", "render_ms", "encode_ms"}) EXPECT_GE(stats[stage]["max"], stats[stage]["p50"]);
+  for (const char* stage : {"sim_ms", "render_ms", "encode_ms"})
+    EXPECT_GE(stats[stage]["max"], stats[stage]["p50"]);
 }
 
 /// Rows of one object in a trace.
@@ -152,7 +161,8 @@ std::vector<std::vector<double>> rows_of(const std::string& trace, const std::st
 
 TEST(Commands, TraceOfAFreeBodyIsTheClosedForm) {
   const TemporaryFolder folder;
-  const Outcome run = offstage("simulate " + tiny_scene() + " --trace t.csv --trace-every step", folder.path());
+  const Outcome run =
+      offstage("simulate " + tiny_scene() + " --trace t.csv --trace-every step", folder.path());
   ASSERT_EQ(run.code, 0) << run.err;
   const auto rows = rows_of(read_file(folder / "t.csv"), "thrown");
   ASSERT_EQ(rows.size(), 11u * 10 + 1) << "11 frame intervals of 10 steps, and the last state";
@@ -183,7 +193,9 @@ TEST(Commands, InfoDescribesScenesAndModels) {
 
 TEST(Commands, ABodyThatLeavesTheWorldIsNamed) {
   const TemporaryFolder folder;
-  write_file(folder / "s.json", R"({"version": 1, "world": {"bounds": 2}, "bodies": [{"name": "runaway"}], "output": {"duration": 2}})");
+  write_file(
+      folder / "s.json",
+      R"({"version": 1, "world": {"bounds": 2}, "bodies": [{"name": "runaway"}], "output": {"duration": 2}})");
   const Outcome run = offstage("simulate s.json --progress none", folder.path());
   EXPECT_EQ(run.code, 0);
   EXPECT_NE(run.err.find("'runaway' left the world"), std::string::npos) << run.err;
@@ -210,8 +222,8 @@ TEST(Commands, NobodyListeningIsNoReasonToEnd) {
 
 TEST(Commands, ResultsThatCannotBeWrittenAreAFailure) {
   const TemporaryFolder folder;
-  for (const std::string& command :
-       {std::string("schema"), std::string("doctor"), "validate " + tiny_scene(), "simulate " + tiny_scene() + " -q"})
+  for (const std::string& command : {std::string("schema"), std::string("doctor"), "validate " + tiny_scene(),
+                                     "simulate " + tiny_scene() + " -q"})
     EXPECT_EQ(offstage(command + " >/dev/full", folder.path()).code, 1) << command;
 }
 
@@ -221,6 +233,7 @@ TEST(Commands, StatsNeverReplaceAFileUnasked) {
   EXPECT_EQ(offstage("simulate " + tiny_scene() + " --stats notes.json", folder.path()).code, 2);
   EXPECT_EQ(offstage("render " + tiny_scene() + " -o out/ --stats notes.json", folder.path()).code, 2);
   EXPECT_EQ(offstage("render " + tiny_scene() + " -o out/ --stats nowhere/s.json", folder.path()).code, 2);
+  EXPECT_EQ(offstage("render " + tiny_scene() + " -o a.mp4 --stats ./a.mp4", folder.path()).code, 2);
   EXPECT_EQ(contents(folder.path()), (std::map<std::string, std::string>{{"notes.json", "mine"}}));
 }
 
@@ -235,8 +248,8 @@ TEST(Commands, DoctorFindsGlAndEncoders) {
 TEST(Commands, SchemaIsJsonAndNamesEverySection) {
   const TemporaryFolder folder;
   const json schema = json::parse(offstage("schema", folder.path()).out);
-  for (const char* section : {"world", "materials", "bodies", "particles", "emitters", "springs", "camera", "lights",
-                              "environment", "render", "output"})
+  for (const char* section : {"world", "materials", "bodies", "particles", "emitters", "springs", "camera",
+                              "lights", "environment", "render", "output"})
     EXPECT_TRUE(schema["properties"].contains(section)) << section;
 }
 

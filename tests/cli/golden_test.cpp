@@ -12,7 +12,8 @@ constexpr const char* kScene = OFFSTAGE_SOURCE_DIR "/tests/data/tiny.json";
 class Golden : public testing::Test {
  protected:
   void SetUp() override {
-    const Outcome run = offstage(std::string("bless ") + kScene + " --golden g --reason test", folder_.path(), "env -u CI");
+    const Outcome run =
+        offstage(std::string("bless ") + kScene + " --golden g --reason test", folder_.path(), "env -u CI");
     ASSERT_EQ(run.code, 0) << run.err;
   }
   Outcome compare(const std::string& more) {
@@ -29,8 +30,9 @@ TEST_F(Golden, UnchangedSceneIsIdentical) {
 }
 
 TEST_F(Golden, OnePercentOfAPhysicalParameterIsAChangeOfTheSimulation) {
-  for (const char* change : {"--set world.gravity=[0,-9.9081,0]", "--set emitters.0.speed.mean=3.03", "--set springs.0.stiffness=40.4",
-                             "--set particles.0.mass=0.505", "--set bodies.1.angular_velocity=[1.01,2,3]", "--seed 8"}) {
+  for (const char* change : {"--set world.gravity=[0,-9.9081,0]", "--set emitters.0.speed.mean=3.03",
+                             "--set springs.0.stiffness=40.4", "--set particles.0.mass=0.505",
+                             "--set bodies.1.angular_velocity=[1.01,2,3]", "--seed 8"}) {
     const Outcome run = compare(change);
     EXPECT_EQ(run.code, 6) << change << "\n" << run.out;
     EXPECT_NE(run.out.find("state differs"), std::string::npos) << change;
@@ -39,7 +41,8 @@ TEST_F(Golden, OnePercentOfAPhysicalParameterIsAChangeOfTheSimulation) {
 }
 
 TEST_F(Golden, OnePercentOfALookIsAChangeOfTheRenderer) {
-  for (const char* change : {"--set camera.radius=5.05", "--set lights=[{\"intensity\":3.03}]", "--set render.exposure=1.01"}) {
+  for (const char* change :
+       {"--set camera.radius=5.05", "--set lights=[{\"intensity\":3.03}]", "--set render.exposure=1.01"}) {
     const Outcome run = compare("\"" + std::string(change).replace(5, 1, "\" '") + "'");
     EXPECT_EQ(run.code, 6) << change << "\n" << run.out << run.err;
     EXPECT_NE(run.out.find("it is the renderer"), std::string::npos) << change;
@@ -48,8 +51,12 @@ TEST_F(Golden, OnePercentOfALookIsAChangeOfTheRenderer) {
 
 TEST_F(Golden, MissingGoldenAndEmptyReasonAreErrors) {
   EXPECT_EQ(offstage(std::string("compare ") + kScene + " --golden nowhere", folder_.path()).code, 1);
-  EXPECT_EQ(offstage(std::string("bless ") + kScene + " --golden g --reason ' '", folder_.path(), "env -u CI").code, 2);
-  EXPECT_EQ(offstage(std::string("bless ") + kScene + " --golden g --reason why", folder_.path(), "CI=true").code, 2)
+  EXPECT_EQ(
+      offstage(std::string("bless ") + kScene + " --golden g --reason ' '", folder_.path(), "env -u CI").code,
+      2);
+  EXPECT_EQ(
+      offstage(std::string("bless ") + kScene + " --golden g --reason why", folder_.path(), "CI=true").code,
+      2)
       << "never in CI";
 }
 

@@ -1,10 +1,10 @@
 #include "cli/program.h"
 
-#include <sys/wait.h>
-
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
+
+#include <sys/wait.h>
 
 namespace offstage::test {
 
@@ -13,8 +13,9 @@ namespace fs = std::filesystem;
 Outcome offstage(const std::string& args, const fs::path& folder, const std::string& before) {
   const TemporaryFolder talk;
   // What the caller redirects comes later and wins.
-  const std::string command = "cd '" + folder.string() + "' && " + before + " '" OFFSTAGE_BINARY_DIR "/offstage' >'" +
-                              (talk / "out").string() + "' 2>'" + (talk / "err").string() + "' </dev/null " + args;
+  const std::string command = "cd '" + folder.string() + "' && " + before +
+                              " '" OFFSTAGE_BINARY_DIR "/offstage' >'" + (talk / "out").string() + "' 2>'" +
+                              (talk / "err").string() + "' </dev/null " + args;
   const int status = std::system(command.c_str());
   return {.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1,
           .out = read_file(talk / "out"),
@@ -26,7 +27,9 @@ std::string read_file(const fs::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-void write_file(const fs::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
+void write_file(const fs::path& path, const std::string& text) {
+  std::ofstream(path, std::ios::binary) << text;
+}
 
 std::map<std::string, std::string> contents(const fs::path& folder) {
   std::map<std::string, std::string> files;
@@ -45,6 +48,8 @@ TemporaryFolder::~TemporaryFolder() {
   fs::remove_all(path_, ignored);
 }
 
-std::string tiny_scene() { return OFFSTAGE_SOURCE_DIR "/tests/data/tiny.json"; }
+std::string tiny_scene() {
+  return OFFSTAGE_SOURCE_DIR "/tests/data/tiny.json";
+}
 
 }  // namespace offstage::test

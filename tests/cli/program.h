@@ -14,7 +14,8 @@ struct Outcome {
 };
 
 /// Runs `build/offstage ARGS` in `folder`; `before` is shell text put in front ("ulimit -f 1;", "VAR=value").
-Outcome offstage(const std::string& args, const std::filesystem::path& folder, const std::string& before = {});
+Outcome offstage(const std::string& args, const std::filesystem::path& folder,
+                 const std::string& before = {});
 
 std::string read_file(const std::filesystem::path& path);
 void write_file(const std::filesystem::path& path, const std::string& text);

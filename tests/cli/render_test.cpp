@@ -1,14 +1,15 @@
-// Rendering as a user runs it: the same bytes however the work is split, interrupted or resumed, and nothing half-written.
+// Rendering as a user runs it: the same bytes however the work is split, interrupted or resumed, and nothing
+// half-written.
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
 
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/mount.h>
 #include <sys/wait.h>
 #include <unistd.h>
-
-#include <algorithm>
-#include <chrono>
-#include <thread>
 
 #include "cli/program.h"
 
@@ -38,7 +39,8 @@ TEST(Render, SameBytesForAnyNumberOfThreadsAndJobs) {
   ASSERT_EQ(reference().size(), 12u);
   for (const char* threads : {"--threads 2 --jobs 2", "--threads 4 --jobs 3", "--threads 2 --jobs 1"}) {
     const TemporaryFolder folder;
-    ASSERT_EQ(offstage(std::string("render ") + tiny_scene() + " -o out/ -q " + threads, folder.path()).code, 0);
+    ASSERT_EQ(offstage(std::string("render ") + tiny_scene() + " -o out/ -q " + threads, folder.path()).code,
+              0);
     EXPECT_EQ(frames(folder / "out"), reference()) << threads;
   }
 }
@@ -47,13 +49,19 @@ TEST(Render, CacheAndChunksGiveTheSameFrames) {
   const TemporaryFolder folder;
   ASSERT_EQ(offstage("simulate " + tiny_scene() + " --cache cache -q", folder.path()).code, 0);
   for (const char* chunk : {"2/3", "1/3", "3/3"})
-    ASSERT_EQ(offstage(std::string("render ") + tiny_scene() + " --cache cache -o out/ -q --chunk " + chunk, folder.path()).code, 0);
+    ASSERT_EQ(offstage(std::string("render ") + tiny_scene() + " --cache cache -o out/ -q --chunk " + chunk,
+                       folder.path())
+                  .code,
+              0);
   EXPECT_EQ(frames(folder / "out"), reference());
 
   // A cache of another scene, and a damaged one, are refused.
   EXPECT_EQ(offstage("render " + tiny_scene() + " --cache cache -o b/ --seed 8", folder.path()).code, 1);
   // The camera may change: that is what a cache is for.
-  EXPECT_EQ(offstage("render " + tiny_scene() + " --cache cache -o c/ -q --set camera.radius=6", folder.path()).code, 0);
+  EXPECT_EQ(
+      offstage("render " + tiny_scene() + " --cache cache -o c/ -q --set camera.radius=6", folder.path())
+          .code,
+      0);
   std::string bytes = read_file(folder / "cache/000005.snap");
   bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
   write_file(folder / "cache/000005.snap", bytes);
@@ -70,18 +78,21 @@ TEST(Render, ExistingOutputIsKeptUnlessForced) {
   EXPECT_EQ(offstage("render " + tiny_scene() + " -o out/ --frames 4 --seed 3", folder.path()).code, 2)
       << "frames of other settings do not mix";
   EXPECT_EQ(contents(folder / "out"), before);
-  EXPECT_EQ(offstage("render " + tiny_scene() + " -o out/ -q --frames 2 --seed 3 --force", folder.path()).code, 0);
+  EXPECT_EQ(
+      offstage("render " + tiny_scene() + " -o out/ -q --frames 2 --seed 3 --force", folder.path()).code, 0);
   EXPECT_EQ(frames(folder / "out").size(), 1u) << "frames of the other settings are gone";
 }
 
-/// Runs a render in the background, sends it `signal` once `frames_before` frames are there, returns its exit code.
+/// Runs a render in the background, sends it `signal` once `frames_before` frames are there, returns its exit
+/// code.
 int interrupt_render(const TemporaryFolder& folder, const std::string& out, int signal, const fs::path& watch,
                      std::size_t frames_before) {
   const pid_t child = fork();
   if (child == 0) {
     if (chdir(folder.path().c_str()) != 0) _exit(99);
-    execl(OFFSTAGE_BINARY_DIR "/offstage", "offstage", "render", tiny_scene().c_str(), "-o", out.c_str(), "-q", "--jobs", "1",
-          "--duration", "20", "--set", "bodies.thrown.collides=false", "--resume", nullptr);
+    execl(OFFSTAGE_BINARY_DIR "/offstage", "offstage", "render", tiny_scene().c_str(), "-o", out.c_str(),
+          "-q", "--jobs", "1", "--duration", "20", "--set", "bodies.thrown.collides=false", "--resume",
+          nullptr);
     _exit(99);
   }
   const auto count = [&] {
@@ -90,7 +101,8 @@ int interrupt_render(const TemporaryFolder& folder, const std::string& out, int 
     for (const auto& entry : fs::directory_iterator(watch, ignored)) n += entry.path().extension() == ".png";
     return n;
   };
-  for (int i = 0; i < 3000 && count() < frames_before; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  for (int i = 0; i < 3000 && count() < frames_before; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
   kill(child, signal);
   int status = 0;
   waitpid(child, &status, 0);
@@ -108,7 +120,8 @@ TEST(Render, InterruptedAndResumedGivesTheSameBytesAsOneRun) {
   for (const auto& [name, bytes] : part) EXPECT_TRUE(name.ends_with(".png")) << name;
 
   // The rest of a shorter piece, then one undisturbed run of the same piece.
-  const std::string piece = "render " + tiny_scene() + " -q --duration 20 --set bodies.thrown.collides=false --frames 1-" +
+  const std::string piece = "render " + tiny_scene() +
+                            " -q --duration 20 --set bodies.thrown.collides=false --frames 1-" +
                             std::to_string(part.size() + 4);
   ASSERT_EQ(offstage(piece + " -o out/ --resume", folder.path()).code, 0);
   ASSERT_EQ(offstage(piece + " -o whole/", folder.path()).code, 0);
@@ -131,11 +144,11 @@ TEST(Render, InterruptedVideoNeverLooksWhole) {
 TEST(Render, FullDiskIsAnErrorAndLeavesNoBrokenFile) {
   const TemporaryFolder folder;
   // A file size limit stands for the full disk: the write fails the same way.
-  const Outcome run = offstage("render " + tiny_scene() + " -o out/ --size 640x360", folder.path(), "ulimit -f 16;");
+  const Outcome run =
+      offstage("render " + tiny_scene() + " -o out/ --size 640x360", folder.path(), "ulimit -f 16;");
   EXPECT_EQ(run.code, 1);
   EXPECT_NE(run.err.find(".png"), std::string::npos) << run.err;
   EXPECT_TRUE(frames(folder / "out").empty());
-
 }
 
 TEST(Render, VideoOnAFullDiskIsAnErrorAndLeavesNoFilm) {
@@ -144,17 +157,21 @@ TEST(Render, VideoOnAFullDiskIsAnErrorAndLeavesNoFilm) {
   fs::create_directory(disk);
   if (mount("none", disk.c_str(), "tmpfs", 0, "size=8k") == 0) {
     for (const char* film : {"film.mp4", "film.mov", "film.apng"}) {
-      const Outcome run = offstage("render " + tiny_scene() + " -q --size 640x360 --duration 1 --seed 9 -o disk/" + film, folder.path());
+      const Outcome run =
+          offstage("render " + tiny_scene() + " -q --size 640x360 --duration 1 --seed 9 -o disk/" + film,
+                   folder.path());
       EXPECT_EQ(run.code, 1) << film << ": " << run.err;
       EXPECT_TRUE(contents(disk).empty()) << film;
     }
     umount(disk.c_str());
   }
   // Without the right to mount, an encoder that finds the disk full.
-  write_file(folder / "ffmpeg", "#!/bin/sh\ncase \"$*\" in *-encoders*) echo ' V....D libx264 x'; exit 0;; esac\n"
-                                "cat >/dev/null; echo 'No space left on device' >&2; exit 1\n");
+  write_file(folder / "ffmpeg",
+             "#!/bin/sh\ncase \"$*\" in *-encoders*) echo ' V....D libx264 x'; exit 0;; esac\n"
+             "cat >/dev/null; echo 'No space left on device' >&2; exit 1\n");
   fs::permissions(folder / "ffmpeg", fs::perms::owner_all);
-  const Outcome run = offstage("render " + tiny_scene() + " -q -o film.mp4", folder.path(), "OFFSTAGE_FFMPEG=./ffmpeg");
+  const Outcome run =
+      offstage("render " + tiny_scene() + " -q -o film.mp4", folder.path(), "OFFSTAGE_FFMPEG=./ffmpeg");
   EXPECT_EQ(run.code, 1) << run.err;
   EXPECT_NE(run.err.find("No space left on device"), std::string::npos) << run.err;
   EXPECT_FALSE(fs::exists(folder / "film.mp4"));
@@ -163,8 +180,10 @@ TEST(Render, VideoOnAFullDiskIsAnErrorAndLeavesNoFilm) {
 TEST(Render, InterruptedVideoLeavesAnEarlierFilmAlone) {
   const TemporaryFolder folder;
   write_file(folder / "film.mp4", "an earlier film");
-  const Outcome run = offstage("render " + tiny_scene() + " -q -o film.mp4 --force --duration 30 --jobs 1 "
-                               "--set bodies.thrown.collides=false", folder.path(), "timeout -s INT 2");
+  const Outcome run = offstage("render " + tiny_scene() +
+                                   " -q -o film.mp4 --force --duration 30 --jobs 1 "
+                                   "--set bodies.thrown.collides=false",
+                               folder.path(), "timeout -s INT 2");
   EXPECT_EQ(run.code, 124) << "timeout's own code for a signal it sent";
   EXPECT_EQ(read_file(folder / "film.mp4"), "an earlier film");
 }
@@ -172,15 +191,20 @@ TEST(Render, InterruptedVideoLeavesAnEarlierFilmAlone) {
 TEST(Render, TwoPatternsDoNotShareAFolder) {
   const TemporaryFolder folder;
   ASSERT_EQ(offstage("render " + tiny_scene() + " -q --frames 1-2 -o d/a_##.png", folder.path()).code, 0);
-  EXPECT_EQ(offstage("render " + tiny_scene() + " -q --frames 1-2 --seed 2 -o d/b_##.png", folder.path()).code, 2);
-  ASSERT_EQ(offstage("render " + tiny_scene() + " -q --frames 1-2 --seed 2 -o d/b_##.png --force", folder.path()).code, 0);
+  EXPECT_EQ(
+      offstage("render " + tiny_scene() + " -q --frames 1-2 --seed 2 -o d/b_##.png", folder.path()).code, 2);
+  ASSERT_EQ(
+      offstage("render " + tiny_scene() + " -q --frames 1-2 --seed 2 -o d/b_##.png --force", folder.path())
+          .code,
+      0);
   EXPECT_FALSE(fs::exists(folder / "d/a_01.png")) << "frames of other settings are gone";
 }
 
 TEST(Render, AThreadThatCannotBeStartedIsAnErrorNotAHang) {
   const TemporaryFolder folder;
   // No new thread fits into the address space.
-  const Outcome run = offstage("render " + tiny_scene() + " -q -o out/ --jobs 64", folder.path(), "ulimit -v 400000; timeout 60");
+  const Outcome run = offstage("render " + tiny_scene() + " -q -o out/ --jobs 64", folder.path(),
+                               "ulimit -v 400000; timeout 60");
   EXPECT_NE(run.code, 0);
   EXPECT_NE(run.code, 124) << "it hung";
 }
@@ -196,7 +220,8 @@ TEST(Render, PipeGivesRawFramesTopDown) {
   const TemporaryFolder folder;
   const Outcome run = offstage("render " + tiny_scene() + " -o - --frames 3-4 -q", folder.path());
   EXPECT_EQ(run.out.size(), 2u * 96 * 54 * 4);
-  const Outcome y4m = offstage("render " + tiny_scene() + " -o - --format y4m --frames 3-4 -q", folder.path());
+  const Outcome y4m =
+      offstage("render " + tiny_scene() + " -o - --format y4m --frames 3-4 -q", folder.path());
   EXPECT_EQ(y4m.out.substr(0, 10), "YUV4MPEG2 ");
 }
 
@@ -212,7 +237,11 @@ TEST(Render, QualityNeverChangesThePhysics) {
   const TemporaryFolder folder;
   std::map<std::string, std::string> hashes;
   for (const std::string quality : {"draft", "preview", "final"}) {
-    ASSERT_EQ(offstage("render " + tiny_scene() + " -o " + quality + "/ -q --frames 12 --force --stats s.json --quality " + quality, folder.path()).code, 0);
+    ASSERT_EQ(offstage("render " + tiny_scene() + " -o " + quality +
+                           "/ -q --frames 12 --force --stats s.json --quality " + quality,
+                       folder.path())
+                  .code,
+              0);
     const std::string stats = read_file(folder / "s.json");
     const auto at = stats.find("\"state_hash\"");
     hashes[stats.substr(at, 60)] = quality;
@@ -222,11 +251,17 @@ TEST(Render, QualityNeverChangesThePhysics) {
 
 TEST(Render, TransparentBackgroundHasAlpha) {
   const TemporaryFolder folder;
-  ASSERT_EQ(offstage("render " + tiny_scene() + " -o - --frames 1 -q --set environment.background=transparent "
-                     "--set bodies.ground.visible=false", folder.path()).code, 0);
-  const std::string rgba =
-      offstage("render " + tiny_scene() + " -o - --frames 1 -q --set environment.background=transparent "
-               "--set bodies.ground.visible=false", folder.path()).out;
+  ASSERT_EQ(offstage("render " + tiny_scene() +
+                         " -o - --frames 1 -q --set environment.background=transparent "
+                         "--set bodies.ground.visible=false",
+                     folder.path())
+                .code,
+            0);
+  const std::string rgba = offstage("render " + tiny_scene() +
+                                        " -o - --frames 1 -q --set environment.background=transparent "
+                                        "--set bodies.ground.visible=false",
+                                    folder.path())
+                               .out;
   ASSERT_EQ(rgba.size(), 96u * 54 * 4);
   std::size_t clear = 0, opaque = 0;
   for (std::size_t i = 3; i < rgba.size(); i += 4) {
@@ -235,7 +270,10 @@ TEST(Render, TransparentBackgroundHasAlpha) {
   }
   EXPECT_GT(clear, rgba.size() / 4 / 2);
   EXPECT_GT(opaque, 50u);
-  EXPECT_EQ(offstage("render " + tiny_scene() + " -o a.mp4 --set environment.background=transparent", folder.path()).code, 2)
+  EXPECT_EQ(
+      offstage("render " + tiny_scene() + " -o a.mp4 --set environment.background=transparent", folder.path())
+          .code,
+      2)
       << "mp4 has no alpha";
 }
 

@@ -1,4 +1,5 @@
-// The hand-over between the threads of a render: order, bounds, and that a failure anywhere ends it for everyone.
+// The hand-over between the threads of a render: order, bounds, and that a failure anywhere ends it for
+// everyone.
 
 #include "producer/pipeline.h"
 
@@ -95,7 +96,8 @@ TEST(Pipeline, EndsWithoutShotsAndWithoutDrawers) {
   Pipeline pipeline(2);
   std::jthread sink([&] { EXPECT_FALSE(pipeline.take_print()); });
   std::jthread shooter([&] {
-    for (int i = 0; pipeline.push({.index = i, .frame = i + 1}); ++i) ASSERT_LT(i, 2) << "the window was ignored";
+    for (int i = 0; pipeline.push({.index = i, .frame = i + 1}); ++i)
+      ASSERT_LT(i, 2) << "the window was ignored";
   });
   pipeline.fail(std::make_exception_ptr(std::runtime_error("no thread")));
   sink.join();

@@ -222,7 +222,8 @@ TEST(SceneCheck, DragThatWouldBlowUpIsRefused) {
            R"(}, "particles": [{"mass": 0.01, "linear_drag": 1, "places": [{}]}]})";
   };
   EXPECT_EQ(errors_of(group(0.019)), "");
-  EXPECT_NE(errors_of(group(0.021)).find("/particles/0/linear_drag: is too much for the step"), std::string::npos);
+  EXPECT_NE(errors_of(group(0.021)).find("/particles/0/linear_drag: is too much for the step"),
+            std::string::npos);
   const std::string drops = R"({"emitters": [{"radius": 0.002, "linear_drag": 0.02}]})";
   EXPECT_NE(errors_of(drops).find("/emitters/0/linear_drag"), std::string::npos);
   const std::string body = R"({"bodies": [{"mass": 1, "linear_drag": 1000}]})";
@@ -230,15 +231,18 @@ TEST(SceneCheck, DragThatWouldBlowUpIsRefused) {
 }
 
 TEST(SceneCheck, NothingStartsOutsideTheWorld) {
-  EXPECT_NE(errors_of(R"({"bodies": [{"position": [5000, 0, 0]}]})").find("/bodies/0/position: is outside the world"),
+  EXPECT_NE(errors_of(R"({"bodies": [{"position": [5000, 0, 0]}]})")
+                .find("/bodies/0/position: is outside the world"),
             std::string::npos);
   EXPECT_EQ(errors_of(R"({"world": {"bounds": 6000}, "bodies": [{"position": [5000, 0, 0]}]})"), "");
 }
 
 TEST(SceneCheck, WhatSpheresCannotShowIsSaid) {
-  EXPECT_NE(warnings_of(R"({"particles": [{"places": [{}], "look": {"style": "sphere", "color": "#ff000080", "additive": true}}]})")
-                .find("/particles/0/look/color: alpha has no effect"),
-            std::string::npos);
+  EXPECT_NE(
+      warnings_of(
+          R"({"particles": [{"places": [{}], "look": {"style": "sphere", "color": "#ff000080", "additive": true}}]})")
+          .find("/particles/0/look/color: alpha has no effect"),
+      std::string::npos);
 }
 
 }  // namespace

@@ -55,8 +55,7 @@ std::string hash_of_a_rich_scene(Context& context) {
 std::string hash_in_a_process_with(int raster_threads) {
   const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
   const std::string command = std::string(kThreadsVariable) + "=" + std::to_string(raster_threads) + " '" +
-                              program +
-                              "' --gtest_filter=Context.DrawsTheSameSceneTwice";
+                              program + "' --gtest_filter=Context.DrawsTheSameSceneTwice";
   FILE* pipe = popen(command.c_str(), "r");
   if (pipe == nullptr) return "cannot run " + command;
   std::string hash;

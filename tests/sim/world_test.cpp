@@ -100,7 +100,8 @@ TEST(World, NoticesAFastBodyThatWouldPassAThinOneBetweenSteps) {
     const auto ball =
         world.add_body({.shape = Sphere{0.01}, .pose = {Vec3(-0.5, 0.013, 0)}, .velocity = {speed, 0.1, 0}});
     std::size_t contacts = 0;
-    for (int i = 0; i < 30 && world.body(ball).pose.position.x() < 0.5; ++i) contacts += world.step(1.0 / 60).unresolved.size();
+    for (int i = 0; i < 30 && world.body(ball).pose.position.x() < 0.5; ++i)
+      contacts += world.step(1.0 / 60).unresolved.size();
     EXPECT_GE(contacts, 1u) << speed << " m/s";
   }
 }
