@@ -20,5 +20,6 @@ using MeshHandle = Handle<struct MeshTag>;
 using MaterialHandle = Handle<struct MaterialTag>;
 using InstanceHandle = Handle<struct InstanceTag>;
 using PointsHandle = Handle<struct PointsTag>;
+using LinesHandle = Handle<struct LinesTag>;
 
 }  // namespace offstage::render

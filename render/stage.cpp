@@ -4,6 +4,7 @@
 
 #include "render/frame.h"
 #include "render/gl.h"
+#include "render/lines_pass.h"
 #include "render/mesh_pass.h"
 #include "render/points_pass.h"
 #include "render/shadow_map.h"
@@ -49,11 +50,13 @@ struct Stage::Impl {
   Slots<std::unique_ptr<GpuMaterial>, MaterialTag> materials{"material"};
   Slots<std::unique_ptr<Instance>, InstanceTag> instances{"instance"};
   Slots<std::unique_ptr<PointSet>, PointsTag> point_sets{"point set"};
+  Slots<std::unique_ptr<LineSet>, LinesTag> line_sets{"line set"};
 
   Picture picture;
   ShadowMap shadow_map;
   MeshPass mesh_pass;
   PointsPass points_pass;
+  LinesPass lines_pass;
   gl::LazyProgram sky_program{{"frame.glsl", "sky.vert"}, {"frame.glsl", "sky.glsl", "sky.frag"}};
   gl::VertexArray no_attributes = gl::make_vertex_array();
   gl::StreamBuffer frame_buffer;
@@ -77,6 +80,7 @@ struct Stage::Impl {
                     const SampleOffsets& offsets, FrameUniforms& frame);
   void draw_opaque(std::span<PointSet* const> sets);
   void draw_blended(std::span<PointSet* const> sets);
+  void draw_lines(const View& view);
 };
 
 std::vector<PointSet*> Stage::Impl::prepare_points(const View& view) {
@@ -172,6 +176,13 @@ void Stage::Impl::draw_blended(std::span<PointSet* const> sets) {
   }
 }
 
+void Stage::Impl::draw_lines(const View& view) {
+  line_sets.for_each([&](const std::unique_ptr<LineSet>& set) {
+    lines_pass.prepare(*set, view);
+    lines_pass.draw(*set, def.width_px, def.height_px);
+  });
+}
+
 Stage::Stage(Context&, const StageDef& def) : impl_(std::make_unique<Impl>(def)) {}
 Stage::~Stage() = default;
 Stage::Stage(Stage&&) noexcept = default;
@@ -203,11 +214,20 @@ PointsHandle Stage::add_points(const PointsDef& def) {
   return impl_->point_sets.add(std::move(set));
 }
 
+LinesHandle Stage::add_lines(const LinesDef& def) {
+  auto set = std::make_unique<LineSet>();
+  set->def = def;
+  return impl_->line_sets.add(std::move(set));
+}
+
 void Stage::remove(InstanceHandle instance) {
   impl_->instances.remove(instance);
 }
 void Stage::remove(PointsHandle points) {
   impl_->point_sets.remove(points);
+}
+void Stage::remove(LinesHandle lines) {
+  impl_->line_sets.remove(lines);
 }
 
 void Stage::set_transform(InstanceHandle instance, const Eigen::Affine3f& world_from_mesh) {
@@ -218,6 +238,9 @@ void Stage::set_visible(InstanceHandle instance, bool visible) {
 }
 void Stage::set_points(PointsHandle points, std::span<const Point> values) {
   impl_->point_sets[points]->assign(values);
+}
+void Stage::set_lines(LinesHandle lines, std::span<const Line> values) {
+  impl_->line_sets[lines]->assign(values);
 }
 
 void Stage::set_camera(const Camera& camera) {
@@ -246,6 +269,7 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   s.draw_shadows(shown, sets, view, offsets, frame);
   s.draw_opaque(sets);
   s.draw_blended(sets);
+  s.draw_lines(view);
 
   glBindFramebuffer(GL_READ_FRAMEBUFFER, s.picture.framebuffer);
   glReadPixels(0, 0, s.def.width_px, s.def.height_px, GL_RGBA, GL_FLOAT, s.pixels.data());

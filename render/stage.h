@@ -71,6 +71,19 @@ struct PointsDef {
   float metallic = 0, roughness = 0.3f;  ///< of spheres
 };
 
+/// The stroke of a round pen: it faces the eye, is not lit, and shadows nothing. Where both ends are the same
+/// it is a dot; from a wide end to a narrow one, the head of an arrow.
+struct Line {
+  Vector3f a, b;
+  Vector4f color;                  ///< linear, straight alpha
+  float width_a = 1, width_b = 1;  ///< factors of the set's width at the two ends
+};
+
+struct LinesDef {
+  float width = 0.0025f;  ///< share of the picture's height, so that large and small pictures look alike
+  float hidden = 0;       ///< opacity of what opaque things hide, in [0, 1]
+};
+
 /// Offsets of one sub-frame, each in [-0.5, 0.5] (pixel, lens and light squares; mapped to discs inside).
 struct SampleOffsets {
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
@@ -98,13 +111,16 @@ class Stage {
   MaterialHandle add_material(const Material& material, std::span<const Image> textures = {});
   InstanceHandle add_instance(MeshHandle mesh, MaterialHandle material, bool casts_shadow = true);
   PointsHandle add_points(const PointsDef& def);
+  LinesHandle add_lines(const LinesDef& def);
 
   void remove(InstanceHandle instance);
   void remove(PointsHandle points);
+  void remove(LinesHandle lines);
 
   void set_transform(InstanceHandle instance, const Eigen::Affine3f& world_from_mesh);
   void set_visible(InstanceHandle instance, bool visible);
   void set_points(PointsHandle points, std::span<const Point> values);
+  void set_lines(LinesHandle lines, std::span<const Line> values);
 
   void set_camera(const Camera& camera);
   void set_sun(const Sun& sun);

@@ -65,6 +65,12 @@ class SlotMap {
   }
   const T& operator[](HandleType h) const { return const_cast<SlotMap&>(*this)[h]; }
 
+  /// The handle of the object in a slot; null if the slot is free.
+  HandleType at_slot(uint32_t index) const {
+    return index < slots_.size() && slots_[index].value ? HandleType{index, slots_[index].generation}
+                                                        : HandleType{};
+  }
+
   std::size_t size() const { return slots_.size() - free_.size(); }
   bool empty() const { return size() == 0; }
 

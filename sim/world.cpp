@@ -119,6 +119,11 @@ Motion Body::motion(Real now, Real time) const {
   return {later.pose(), v + w.cross(arm), w};
 }
 
+const CollisionShape& Body::collision_shape() {
+  if (!collision_shape_) collision_shape_.emplace(solid, def.motion == MotionType::dynamic);
+  return *collision_shape_;
+}
+
 bool WorldState::is_alive(const Attachment& a) const {
   if (const auto* b = std::get_if<BodyPoint>(&a)) return bodies.find(b->body) != nullptr;
   if (const auto* p = std::get_if<ParticlePoint>(&a)) {
@@ -156,7 +161,7 @@ World::~World() = default;
 World::World(World&&) noexcept = default;
 World& World::operator=(World&&) noexcept = default;
 
-MeshHandle World::add_mesh(const TriangleMesh& mesh) {
+MeshHandle World::add_mesh(const TriangleMesh& mesh, std::optional<ConvexDecomposition> decomposition) {
   for (const Vec3& v : mesh.vertices) check_finite("mesh", "a vertex", v);
   for (const Triangle& t : mesh.triangles)
     for (uint32_t v : t)
@@ -165,7 +170,7 @@ MeshHandle World::add_mesh(const TriangleMesh& mesh) {
                            " vertices");
   TriangleMesh welded = weld(mesh);
   if (welded.triangles.empty()) refuse("mesh", "it has no face");
-  return impl_->meshes.insert(std::make_unique<CollisionMesh>(std::move(welded)));
+  return impl_->meshes.insert(std::make_unique<CollisionMesh>(std::move(welded), std::move(decomposition)));
 }
 
 const MeshTopology& World::topology(MeshHandle mesh) const {
@@ -173,6 +178,10 @@ const MeshTopology& World::topology(MeshHandle mesh) const {
 }
 const TriangleMesh& World::mesh(MeshHandle mesh) const {
   return impl_->meshes[mesh]->mesh;
+}
+
+const CollisionMesh& World::collision_mesh(MeshHandle mesh) const {
+  return *impl_->meshes[mesh];
 }
 
 BodyHandle World::add_body(const BodyDef& def) {
@@ -191,7 +200,10 @@ BodyHandle World::add_body(const BodyDef& def) {
   if (def.motion == MotionType::kinematic) body->pose = def.track.at(impl_->now, def.pose).pose;
   body->before_step = body->before_substep = body->pose;
   impl_->fixed_changed = true;
-  return impl_->bodies.insert(std::move(body));
+  const BodyHandle handle = impl_->bodies.insert(std::move(body));
+  if (const Body& added = *impl_->bodies[handle]; added.def.collides)
+    impl_->broad_phase.insert(handle.index, bounds(added.solid, added.pose), !added.can_move());
+  return handle;
 }
 
 ParticleSystemHandle World::add_particle_system(const ParticleSystemDef& def) {
@@ -216,6 +228,7 @@ SpringHandle World::add_spring(const SpringDef& def) {
 
 bool World::remove(BodyHandle body) {
   if (!impl_->bodies.erase(body)) return false;
+  if (impl_->broad_phase.contains(body.index)) impl_->broad_phase.remove(body.index);
   std::erase_if(impl_->moved, [&](const MovedBody& m) { return m.body == body; });
   impl_->fixed_changed = true;
   impl_->remove_dead_springs();

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <variant>
@@ -16,6 +17,7 @@
 #include "sim/dynamics/integrator.h"
 #include "sim/dynamics/keyframes.h"
 #include "sim/dynamics/particles.h"
+#include "sim/geometry/convex_decomposition.h"
 #include "sim/geometry/mass_properties.h"
 #include "sim/geometry/mesh.h"
 #include "sim/handle.h"
@@ -23,6 +25,8 @@
 #include "sim/types.h"
 
 namespace offstage::sim {
+
+class CollisionMesh;
 
 struct BodyTag {};
 struct ParticleSystemTag {};
@@ -90,7 +94,7 @@ struct WorldDef {
 /// Two bodies that came into contact, which this version cannot resolve yet (see StepReport::unresolved).
 struct UnresolvedContact {
   BodyHandle a, b;
-  Real time = 0;  ///< [s]
+  Real time = 0;  ///< of the first touch [s]
 };
 
 /// Something that stopped being finite: what it was just before, and what became of it. Bodies: centre of
@@ -153,11 +157,14 @@ class World {
   World(World&&) noexcept;
   World& operator=(World&&) noexcept;
 
-  /// Registers a mesh: welds it, then computes topology, mass properties and bounding tree once (E2).
-  /// Throws std::invalid_argument for an index out of range, a non-finite vertex or no face at all.
-  MeshHandle add_mesh(const TriangleMesh& mesh);
+  /// Registers a mesh: welds it, then computes topology, mass properties, hull and bounding tree once (E2). The
+  /// convex decomposition, which is slow, is made when a body first needs it, unless the one that decompose() made of
+  /// the welded mesh is given. Throws std::invalid_argument for an index out of range, a non-finite vertex or no face
+  /// at all.
+  MeshHandle add_mesh(const TriangleMesh& mesh, std::optional<ConvexDecomposition> decomposition = {});
   const MeshTopology& topology(MeshHandle mesh) const;
   const TriangleMesh& mesh(MeshHandle mesh) const;  ///< as registered (welded)
+  const CollisionMesh& collision_mesh(MeshHandle mesh) const;
 
   /// Throws std::invalid_argument, saying which field and what is allowed, for a size, mass or density out of
   /// range; a dynamic body needs a solid: a plane or an open or inverted mesh is refused.

@@ -2,8 +2,11 @@
 /// The inside of the World, shared by the files that implement it.
 
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "sim/collision/broad_phase.h"
+#include "sim/collision/collision_shape.h"
 #include "sim/collision/distance.h"
 #include "sim/collision/obstacles.h"
 #include "sim/dynamics/particle_system.h"
@@ -26,8 +29,13 @@ struct Body {
   bool is_dynamic() const { return def.motion == MotionType::dynamic && !frozen; }
   bool is_kinematic() const { return def.motion == MotionType::kinematic && !frozen; }
   bool can_move() const { return is_dynamic() || (is_kinematic() && def.track.moves()); }
+  /// Made when another body first comes near, because a mesh may have to be decomposed for it.
+  const CollisionShape& collision_shape();
   /// Pose and velocities of the body's origin at a time not far from now.
   Motion motion(Real now, Real time) const;
+
+ private:
+  std::optional<CollisionShape> collision_shape_;
 };
 
 struct Spring {
@@ -56,7 +64,7 @@ struct World::Impl : WorldState {
   void step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report);
   void keep_within_bounds(BodyHandle handle, Body& body, StepReport& report);
   void update_obstacles(Real h);
-  void find_contacts(Real time, StepReport& report);
+  void find_contacts(Real start, Real h, StepReport& report);
   void collect_moved();
 
   // Time is a base plus a whole number of equal samplings: no sum of rounded steps.
@@ -67,9 +75,10 @@ struct World::Impl : WorldState {
   std::vector<MovedBody> moved;
   uint64_t born = 0;  // since the last report
 
-  // Collision partners of the current sub-step. What cannot move is arranged anew only when it changed (E9).
+  BroadPhase broad_phase;  // of the bodies that collide, by slot
+
+  // What particles can hit in the current sub-step. What cannot move is arranged anew only when it changed (E9).
   Obstacles fixed_obstacles, moving_obstacles;
-  std::vector<BodyHandle> fixed_owners, moving_owners;
   bool fixed_changed = true;
 };
 

@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
-#include "sim/collision/overlap.h"
+#include "sim/collision/narrow_phase.h"
 #include "sim/coupled_system.h"
 #include "sim/world_impl.h"
 
@@ -25,37 +24,18 @@ bool is_finite(const RigidBody& b) {
          b.angular_momentum.allFinite();
 }
 
-/// Least edge of a solid's box in its own frame: what a fast body could pass through.
-Real thickness(const Solid& solid) {
-  if (std::holds_alternative<Plane>(*solid.shape)) return std::numeric_limits<Real>::infinity();
-  return bounds(solid, Pose{}).sizes().minCoeff();
-}
+/// How near bodies count as touching [m].
+constexpr Real kTouch = 1e-6;
 
-/// Pose of a body at a share of the sub-step.
-Pose between(const Body& body, Real share) {
-  const Pose &a = body.before_substep, &b = body.pose;
-  return {a.position + share * (b.position - a.position), a.orientation.slerp(share, b.orientation)};
-}
-
-/// Whether two bodies touch anywhere on their ways through the sub-step: looked at so often that neither can
-/// pass the other in between, within a bounded number of looks.
-bool touch_on_the_way(const Body& a, const Body& b) {
-  constexpr int kMostLooks = 512;
-  const auto turn = [](const Body& body) {
-    const Real angle = body.before_substep.orientation.angularDistance(body.pose.orientation);
-    return angle > 0 ? angle * reach(body.solid) : 0;
-  };
-  const Vec3 slip =
-      (a.pose.position - a.before_substep.position) - (b.pose.position - b.before_substep.position);
-  const Real travel = slip.norm() + turn(a) + turn(b),
-             step = std::min(thickness(a.solid), thickness(b.solid)) / 2;
-  const int looks =
-      travel < step * kMostLooks ? std::max(1, static_cast<int>(std::ceil(travel / step))) : kMostLooks;
-  for (int k = looks; k > 0; --k) {
-    const Real share = static_cast<Real>(k) / looks;
-    if (touching(a.solid, between(a, share), b.solid, between(b, share))) return true;
-  }
-  return false;
+/// Box around all places of a body in the sub-step.
+Aabb swept_bounds(const Body& body) {
+  const PosePath path(body.before_substep, body.pose);
+  Aabb box = bounds(body.solid, body.before_substep).merged(bounds(body.solid, body.pose));
+  // A point leaves the chord of its path by no more than an eighth of its greatest acceleration.
+  const Real bulge = path.turn() > 0 ? path.max_acceleration(reach(body.solid)) / 8 : 0;
+  box.min().array() -= bulge + kTouch;
+  box.max().array() += bulge + kTouch;
+  return box;
 }
 
 bool same(const Pose& a, const Pose& b) {
@@ -102,7 +82,7 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
   });
 
   update_obstacles(h);
-  find_contacts(end, report);
+  find_contacts(start, h, report);
   step_particles(start, h, coupled, report);
 }
 
@@ -130,19 +110,15 @@ void World::Impl::keep_within_bounds(BodyHandle handle, Body& body, StepReport& 
 
 void World::Impl::update_obstacles(Real h) {
   std::vector<Obstacle> fixed, moving;
-  if (fixed_changed) fixed_owners.clear();
-  moving_owners.clear();
-  bodies.for_each([&](BodyHandle handle, const std::unique_ptr<Body>& body) {
+  bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& body) {
     if (!body->def.collides) return;
-    const auto add = [&](std::vector<Obstacle>& obstacles, std::vector<BodyHandle>& owners,
-                         const Pose& from) {
+    const auto add = [&](std::vector<Obstacle>& obstacles, const Pose& from) {
       obstacles.emplace_back(body->solid, from, body->pose, h, body->def.restitution, body->def.friction);
-      owners.push_back(handle);
     };
     if (body->can_move())
-      add(moving, moving_owners, body->before_substep);
+      add(moving, body->before_substep);
     else if (fixed_changed)
-      add(fixed, fixed_owners, body->pose);
+      add(fixed, body->pose);
   });
   moving_obstacles = Obstacles(std::move(moving));
   if (fixed_changed) fixed_obstacles = Obstacles(std::move(fixed));
@@ -150,25 +126,21 @@ void World::Impl::update_obstacles(Real h) {
 }
 
 /// Reports each pair with a dynamic body that touches during the sub-step, once per step.
-void World::Impl::find_contacts(Real time, StepReport& report) {
-  const auto test = [&](BodyHandle a, BodyHandle b) {
-    if (a == b) return;
-    if (b < a) std::swap(a, b);
+void World::Impl::find_contacts(Real start, Real h, StepReport& report) {
+  bodies.for_each([&](BodyHandle handle, const std::unique_ptr<Body>& body) {
+    if (body->def.collides && body->can_move()) broad_phase.move(handle.index, swept_bounds(*body));
+  });
+  for (const auto& [low, high] : broad_phase.pairs()) {
+    const BodyHandle a = bodies.at_slot(low), b = bodies.at_slot(high);
+    Body *first = bodies[a].get(), *second = bodies[b].get();
+    if (!first->is_dynamic() && !second->is_dynamic()) continue;
     const auto known = [&](const UnresolvedContact& c) { return c.a == a && c.b == b; };
-    if (std::any_of(report.unresolved.begin(), report.unresolved.end(), known)) return;
-    if (touch_on_the_way(*bodies[a], *bodies[b])) report.unresolved.push_back({a, b, time});
-  };
-  for (std::size_t i = 0; i < moving_owners.size(); ++i) {
-    const BodyHandle self = moving_owners[i];
-    const Body& body = *bodies[self];
-    if (!body.is_dynamic()) continue;
-    const Aabb box = bounds(body.solid, body.pose).merged(bounds(body.solid, body.before_substep));
-    for (const auto& [obstacles, owners] :
-         {std::pair(&fixed_obstacles, &fixed_owners), std::pair(&moving_obstacles, &moving_owners)}) {
-      const auto test_owner = [&, &them = *owners](uint32_t k) { test(self, them[k]); };
-      obstacles->for_each_plane(test_owner);
-      obstacles->near_box(box, test_owner);
-    }
+    if (std::any_of(report.unresolved.begin(), report.unresolved.end(), known)) continue;
+    if (first->collision_shape().is_plane()) std::swap(first, second);
+    const PosePath path(first->before_substep, first->pose), other_path(second->before_substep, second->pose);
+    if (const auto impact = time_of_impact(MovingShape{first->collision_shape(), path},
+                                           MovingShape{second->collision_shape(), other_path}, kTouch))
+      report.unresolved.push_back({a, b, start + impact->share * h});
   }
 }
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds offstage and runs its tests:  tests/run.sh [--long] [--tsan] [CTEST OPTIONS...]
-#   --long  also the long cases (label "long")
+#   --long  also the long cases (label "long"), for which scanned models are fetched
 #   --tsan  also the threaded tests under ThreadSanitizer
 # The unit tests and the model importer run a second time under AddressSanitizer and UndefinedBehaviorSanitizer.
 set -euo pipefail
@@ -30,6 +30,11 @@ cmake --build build-asan --target sanitized_tests
 export UBSAN_OPTIONS=print_stacktrace=1:halt_on_error=1
 ctest --test-dir build-asan -L unit -j "$cores" --output-on-failure "$@" || failed=1
 build-asan/test_validation --gtest_filter=Determinism.SameHashInEveryBuild --gtest_brief=1 || failed=1
+
+if [ ${#long[@]} = 0 ]; then
+  tests/meshes.sh build/meshes
+  export OFFSTAGE_MESHES=$PWD/build/meshes
+fi
 
 if [ "$tsan" = yes ]; then
   cmake --preset tsan

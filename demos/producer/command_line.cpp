@@ -38,6 +38,8 @@ void add_overrides(CLI::App& command, SceneOptions& scene) {
                   "Override a value of the scene: path=value, such as emitters.0.rate=200")
       ->allow_extra_args(false);
   command.add_option("--seed", scene.seed, "Seed of everything random");
+  command.add_flag("--no-cache", scene.no_cache,
+                   "Cut models into convex parts anew instead of keeping them in ~/.cache/offstage");
 }
 
 void add_scene(CLI::App& command, SceneOptions& scene) {

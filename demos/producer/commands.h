@@ -8,6 +8,7 @@
 
 #include <tbb/global_control.h>
 
+#include "producer/decomposition_cache.h"
 #include "producer/progress.h"
 #include "producer/scene_io.h"
 
@@ -20,7 +21,11 @@ struct SceneOptions {
   std::optional<std::string> quality, size;
   std::optional<double> fps, duration;
   std::optional<uint64_t> seed;
+  bool no_cache = false;  ///< neither read nor keep the convex parts of models on disk
 
+  DecompositionCache decompositions() const {
+    return no_cache ? DecompositionCache() : DecompositionCache::of_user();
+  }
   /// The shorthands as overrides, then `set`.
   std::vector<std::string> overrides() const;
 };

@@ -1,6 +1,7 @@
 // validate, schema, info and doctor, and what the commands share.
 
 #include <algorithm>
+#include <map>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -34,7 +35,19 @@ Json json_of(const V& v) {
   return array;
 }
 
-Json describe_model(const std::filesystem::path& path) {
+Json describe(const sim::ConvexDecomposition& decomposition) {
+  using Method = sim::ConvexDecomposition::Method;
+  static const std::map<Method, const char*> names = {{Method::convex, "convex"},
+                                                      {Method::exact, "exact"},
+                                                      {Method::approximate, "approximate"},
+                                                      {Method::none, "none"}};
+  Json json = {{"method", names.at(decomposition.method)}, {"count", decomposition.parts.size()}};
+  if (decomposition.method == Method::approximate) json["volume_error"] = decomposition.volume_error;
+  if (!decomposition.note.empty()) json["note"] = decomposition.note;
+  return json;
+}
+
+Json describe_model(const std::filesystem::path& path, const DecompositionCache& cache) {
   const render::Model model = render::read_model(path);
   const sim::TriangleMesh mesh = sim::weld(collision_mesh(model, 1));
   const sim::MeshTopology topology(mesh);
@@ -57,14 +70,15 @@ Json describe_model(const std::filesystem::path& path) {
     const sim::PrincipalInertia principal = sim::diagonalise(mass.inertia);
     json["principal_moments_per_density"] = json_of(principal.moments);
   }
+  json["convex_parts"] = describe(cache.decompose(mesh));
   json["warnings"] = model.warnings;
   return json;
 }
 
-Json describe_scene(const LoadedScene& loaded) {
+Json describe_scene(const LoadedScene& loaded, const DecompositionCache& cache) {
   const Scene& scene = loaded.scene;
   std::vector<Problem> warnings;
-  const ModelLibrary models(scene, loaded.folder, warnings);
+  const ModelLibrary models(scene, loaded.folder, cache, warnings);
   const Simulation simulation(scene, models);
   std::size_t placed = 0;
   for (const ParticleGroup& group : scene.particles) placed += group.places.size();
@@ -168,7 +182,7 @@ int validate_command(const SceneOptions& options, bool json) {
   };
   try {
     LoadedScene loaded = load_scene(options.file, options.overrides());
-    const ModelLibrary models(loaded.scene, loaded.folder, loaded.warnings);
+    const ModelLibrary models(loaded.scene, loaded.folder, options.decompositions(), loaded.warnings);
     const Simulation simulation(loaded.scene, models);  // what only building shows
     for (const Problem& warning : loaded.warnings) result["warnings"].push_back(list(warning));
     if (!json) {
@@ -192,7 +206,9 @@ int schema_command(bool reference) {
 
 int info_command(const SceneOptions& options, bool json) {
   const bool is_scene = std::filesystem::path(options.file).extension() == ".json";
-  const Json info = is_scene ? describe_scene(load(options, false)) : describe_model(options.file);
+  const DecompositionCache cache = options.decompositions();
+  const Json info =
+      is_scene ? describe_scene(load(options, false), cache) : describe_model(options.file, cache);
   if (json)
     fmt::print("{}\n", info.dump(2));
   else

@@ -212,7 +212,7 @@ int render_to_pipe(const Plan& plan, const ModelLibrary& models, const RenderOpt
 int render_command(const RenderOptions& options) {
   LoadedScene loaded = load(options.scene, options.talk.quiet);
   std::vector<Problem> warnings;
-  const ModelLibrary models(loaded.scene, loaded.folder, warnings);
+  const ModelLibrary models(loaded.scene, loaded.folder, options.scene.decompositions(), warnings);
   if (!options.talk.quiet) print_warnings(warnings);
   const Plan plan = make_plan(options, models, std::move(loaded));
   if (plan.target.kind == OutputKind::video) {
@@ -261,7 +261,7 @@ int frame_command(const FrameOptions& options) {
     fs::path path_;
   };
   std::vector<Problem> warnings;
-  const ModelLibrary models(scene, loaded.folder, warnings);
+  const ModelLibrary models(scene, loaded.folder, options.scene.decompositions(), warnings);
   if (!options.talk.quiet) print_warnings(warnings);
   const auto threads = simulation_threads(options.threads);
   render::pin_environment(threads_or_all(options.threads));
@@ -277,7 +277,7 @@ int frame_command(const FrameOptions& options) {
 int simulate_command(const SimulateOptions& options) {
   const LoadedScene loaded = load(options.scene, options.talk.quiet);
   std::vector<Problem> warnings;
-  const ModelLibrary models(loaded.scene, loaded.folder, warnings);
+  const ModelLibrary models(loaded.scene, loaded.folder, options.scene.decompositions(), warnings);
   if (!options.talk.quiet) print_warnings(warnings);
   check_file(options.stats, options.force);
   check_file(options.trace, options.force);

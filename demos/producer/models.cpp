@@ -1,5 +1,6 @@
 #include "producer/models.h"
 
+#include <algorithm>
 #include <set>
 
 #include <fmt/format.h>
@@ -8,6 +9,7 @@
 #include "render/error.h"
 #include "render/image_io.h"
 #include "render/mesh_io.h"
+#include "sim/geometry/mesh.h"
 
 namespace offstage::producer {
 namespace {
@@ -63,10 +65,36 @@ Files files_of(const Scene& scene) {
   return files;
 }
 
+/// Bodies whose convex parts something needs, with the first place that does: collisions with a body that moves by forces, or an
+/// overlay.
+std::map<std::string, Where> bodies_in_parts(const Scene& scene) {
+  std::map<std::string, Where> names;
+  const auto need = [&](const std::string& body, const Where& where) { names.emplace(body, where); };
+  const auto falls = [](const Body& body) { return body.collides && body.motion == sim::MotionType::dynamic; };
+  if (scene.bodies.size() > 1 && std::ranges::any_of(scene.bodies, falls))
+    for (const Body& body : scene.bodies)
+      if (body.collides) need(body.name, body.where);
+  for (const Overlay& overlay : scene.overlays) {
+    if (const auto* parts = std::get_if<PartsOverlay>(&overlay)) need(parts->body, parts->where);
+    if (const auto* closest = std::get_if<ClosestOverlay>(&overlay)) {
+      need(closest->a, closest->where);
+      need(closest->b, closest->where);
+    }
+    if (const auto* contacts = std::get_if<ContactsOverlay>(&overlay)) {
+      if (contacts->a.empty())
+        for (const Body& body : scene.bodies)
+          if (body.collides) need(body.name, contacts->where);
+      need(contacts->a, contacts->where);
+      need(contacts->b, contacts->where);
+    }
+  }
+  return names;
+}
+
 }  // namespace
 
 ModelLibrary::ModelLibrary(const Scene& scene, const std::filesystem::path& folder,
-                           std::vector<Problem>& warnings) {
+                           const DecompositionCache& cache, std::vector<Problem>& warnings) {
   std::vector<Problem> problems;
   XXH3_state_t* hash = XXH3_createState();
   XXH3_128bits_reset(hash);
@@ -90,6 +118,34 @@ ModelLibrary::ModelLibrary(const Scene& scene, const std::filesystem::path& fold
   digest_ = hex(XXH3_128bits_digest(hash));
   XXH3_freeState(hash);
   if (!problems.empty()) throw SceneError(std::move(problems));
+  decompose_models(scene, cache, warnings);
+}
+
+void ModelLibrary::decompose_models(const Scene& scene, const DecompositionCache& cache,
+                                    std::vector<Problem>& warnings) {
+  const std::map<std::string, Where> needed = bodies_in_parts(scene);
+  for (const Body& body : scene.bodies) {
+    const auto* mesh = std::get_if<MeshFile>(&body.shape);
+    const auto need = needed.find(body.name);
+    if (!mesh || need == needed.end() || parts_.contains(mesh->file)) continue;
+    const sim::ConvexDecomposition& parts =
+        parts_.emplace(mesh->file, cache.decompose(sim::weld(collision_mesh(model(mesh->file), 1))))
+            .first->second;
+    if (!parts.note.empty())
+      warnings.push_back({need->second, mesh->file + ": its convex parts are not exact: " + parts.note});
+  }
+}
+
+sim::ConvexDecomposition scaled(sim::ConvexDecomposition decomposition, double scale) {
+  for (sim::ConvexPolyhedron& part : decomposition.parts) {
+    std::vector<Vec3> vertices(part.vertices().begin(), part.vertices().end());
+    for (Vec3& v : vertices) v *= scale;
+    std::vector<std::vector<uint32_t>> faces(part.face_count());
+    for (uint32_t f = 0; f < part.face_count(); ++f)
+      faces[f].assign(part.face_vertices(f).begin(), part.face_vertices(f).end());
+    part = {std::move(vertices), faces};
+  }
+  return decomposition;
 }
 
 sim::TriangleMesh collision_mesh(const render::Model& model, double scale) {

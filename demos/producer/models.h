@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "producer/decomposition_cache.h"
 #include "producer/scene.h"
 #include "render/model.h"
+#include "sim/geometry/convex_decomposition.h"
 #include "sim/geometry/mesh.h"
 
 namespace offstage::producer {
@@ -15,23 +17,35 @@ namespace offstage::producer {
 class ModelLibrary {
  public:
   ModelLibrary() = default;
-  /// Reads every model and texture that the (flat) scene names, relative to `folder`. Throws SceneError with
-  /// every file that cannot be used; what was repaired in a model is added to `warnings`.
-  ModelLibrary(const Scene& scene, const std::filesystem::path& folder, std::vector<Problem>& warnings);
+  /// Reads every model and texture that the (flat) scene names, relative to `folder`, and cuts models into
+  /// convex parts where collisions of bodies or an overlay need that. Throws SceneError with every file that
+  /// cannot be used; what was repaired in a model or is only approximately right is added to `warnings`.
+  ModelLibrary(const Scene& scene, const std::filesystem::path& folder, const DecompositionCache& cache,
+               std::vector<Problem>& warnings);
 
   const render::Model& model(const std::string& file) const { return models_.at(file); }
+  /// The convex parts of a model at its own scale, or null if nothing needs them.
+  const sim::ConvexDecomposition* parts(const std::string& file) const {
+    const auto it = parts_.find(file);
+    return it == parts_.end() ? nullptr : &it->second;
+  }
   const render::Image& texture(const std::string& file) const { return textures_.at(file); }
   /// Digest of everything that was read, so that a run knows when a file changed.
   const std::string& digest() const { return digest_; }
 
  private:
+  void decompose_models(const Scene& scene, const DecompositionCache& cache, std::vector<Problem>& warnings);
+
   std::map<std::string, render::Model> models_;
   std::map<std::string, render::Image> textures_;
+  std::map<std::string, sim::ConvexDecomposition> parts_;
   std::string digest_;
 };
 
 /// All triangles of a model as one mesh for the simulation, scaled.
 sim::TriangleMesh collision_mesh(const render::Model& model, double scale);
+/// A model's convex parts as those of its scaled mesh.
+sim::ConvexDecomposition scaled(sim::ConvexDecomposition decomposition, double scale);
 
 /// XXH3-128 in hexadecimal of a text.
 std::string text_hash(const std::string& text);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "producer/line_sketch.h"
 #include "render/primitives.h"
 #include "render/tone_map.h"
 #include "sim/dynamics/keyframes.h"
@@ -85,6 +86,23 @@ Vector3f interpolate(const render::Point& a, const render::Point& b, float w, fl
          dt * ((w3 - 2 * w2 + w) * a.velocity + (w3 - w2) * b.velocity);
 }
 
+/// The parts overlay of a body, or null.
+const PartsOverlay* parts_overlay(const Scene& scene, const std::string& body) {
+  for (const Overlay& overlay : scene.overlays)
+    if (const auto* parts = std::get_if<PartsOverlay>(&overlay); parts && parts->body == body) return parts;
+  return nullptr;
+}
+
+render::Mesh mesh_of(const sim::ConvexPolyhedron& part) {
+  const sim::TriangleMesh triangles = part.triangles();
+  render::Mesh mesh;
+  for (const Vec3& v : triangles.vertices) mesh.positions.push_back(v.cast<float>());
+  for (const sim::Triangle& t : triangles.triangles)
+    mesh.indices.insert(mesh.indices.end(), t.begin(), t.end());
+  render::compute_normals(mesh, 20);
+  return mesh;
+}
+
 Vector3f follow_path(const std::vector<CameraKey>& keys, Vec3 CameraKey::*point, double time) {
   sim::KeyframeTrack track;
   for (const CameraKey& key : keys) track.keys.push_back({key.time, {key.*point, Quat::Identity()}});
@@ -109,6 +127,7 @@ Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context
   }
   for (const ParticleGroup& group : scene.particles) add_points(group.look);
   for (const Emitter& emitter : scene.emitters) add_points(emitter.look);
+  add_overlay_lines();
   add_light_and_air();
 }
 
@@ -160,39 +179,53 @@ render::MeshHandle Picture::primitive(const Primitive& shape) {
   return mesh;
 }
 
+void Picture::add_shape(const Body& body, const ModelLibrary& models, std::vector<DrawnPart>& parts) {
+  std::visit(
+      [&](const auto& shape) {
+        using S = std::decay_t<decltype(shape)>;
+        if constexpr (std::is_same_v<S, MeshFile>) {
+          add_model(shape.file, affine(Vec3::Zero(), Quat::Identity(), shape.scale), body, models, parts);
+        } else {
+          // A plane is the ground: it takes shadows and throws none.
+          const bool casts = body.casts_shadow && !std::is_same_v<S, sim::Plane>;
+          parts.push_back({stage_.add_instance(primitive(shape), material(body.material, models), casts),
+                           Affine3f::Identity()});
+        }
+      },
+      body.shape);
+}
+
+void Picture::add_convex_parts(const MeshFile& mesh, const Body& body, const ModelLibrary& models,
+                               std::vector<DrawnPart>& parts) {
+  const std::vector<sim::ConvexPolyhedron>& convex = models.parts(mesh.file)->parts;
+  sim::Aabb box;
+  for (const sim::ConvexPolyhedron& part : convex) box.extend(part.box());
+  for (std::size_t i = 0; i < convex.size(); ++i) {
+    render::Material look{.roughness = 0.45f};
+    look.color.head<3>() = distinct_color(i);
+    const Vec3 outwards = mesh.scale * (convex[i].centre() - box.center());
+    parts.push_back({stage_.add_instance(stage_.add_mesh(mesh_of(convex[i])), stage_.add_material(look),
+                                         body.casts_shadow),
+                     affine(Vec3::Zero(), Quat::Identity(), mesh.scale), outwards.cast<float>()});
+  }
+}
+
 void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t& slot) {
-  DrawnBody drawn{.slot = slot, .parts = {}};
-  if (body.visible) {
-    if (body.model) {
-      add_model(body.model->file, affine(body.model->position, body.model->orientation, body.model->scale),
-                body, models, drawn.parts);
-    } else {
-      std::visit(
-          [&](const auto& shape) {
-            using S = std::decay_t<decltype(shape)>;
-            if constexpr (std::is_same_v<S, MeshFile>) {
-              add_model(shape.file, affine(Vec3::Zero(), Quat::Identity(), shape.scale), body, models,
-                        drawn.parts);
-            } else {
-              // A plane is the ground: it takes shadows and throws none.
-              const bool casts = body.casts_shadow && !std::is_same_v<S, sim::Plane>;
-              drawn.parts.push_back(
-                  {stage_.add_instance(primitive(shape), material(body.material, models), casts),
-                   Affine3f::Identity()});
-            }
-          },
-          body.shape);
-    }
-  }
-  if (body.motion == sim::MotionType::fixed) {
-    const Affine3f world_from_body = affine(body.position, body.orientation);
-    for (const DrawnPart& part : drawn.parts)
-      stage_.set_transform(part.instance, world_from_body * part.body_from_part);
+  DrawnBody drawn{{}, affine(body.position, body.orientation), parts_overlay(scene_, body.name), {}};
+  if (drawn.overlay)
+    add_convex_parts(std::get<MeshFile>(body.shape), body, models, drawn.parts);
+  else if (body.visible && body.model)
+    add_model(body.model->file, affine(body.model->position, body.model->orientation, body.model->scale),
+              body, models, drawn.parts);
+  else if (body.visible)
+    add_shape(body, models, drawn.parts);
+
+  place_body(drawn, drawn.world_from_body, 0);
+  if (body.motion == sim::MotionType::fixed)
     fixed_positions_[body.name] = body.position.cast<float>();
-    return;
-  }
-  slot_of_[body.name] = slot++;
-  bodies_.push_back(std::move(drawn));
+  else
+    slot_of_[body.name] = *(drawn.slot = slot++);
+  if (drawn.slot || drawn.overlay) bodies_.push_back(std::move(drawn));
 }
 
 void Picture::add_points(const ParticleLook& look) {
@@ -204,6 +237,19 @@ void Picture::add_points(const ParticleLook& look) {
                                        .stretch_s = f(look.stretch),
                                        .metallic = f(look.metallic),
                                        .roughness = f(look.roughness)}));
+}
+
+void Picture::add_overlay_lines() {
+  for (const Overlay& overlay : scene_.overlays) {
+    overlays_.push_back(std::visit(
+        [&]<class O>(const O& o) {
+          if constexpr (std::is_base_of_v<LineLook, O>)
+            return stage_.add_lines({.width = f(o.width), .hidden = f(o.hidden)});
+          else
+            return render::LinesHandle();
+        },
+        overlay));
+  }
 }
 
 void Picture::add_light_and_air() {
@@ -304,18 +350,41 @@ void Picture::place_points(const Snapshot& previous, const Snapshot& current, fl
   }
 }
 
+void Picture::place_overlays(const Snapshot& previous, const Snapshot& current, float w) {
+  for (std::size_t i = 0; i < overlays_.size(); ++i) {
+    if (!overlays_[i]) continue;
+    const LineSet &before = previous.overlays[i], &now = current.overlays[i];
+    scratch_lines_ = now.lines;
+    // Where lines came or went there is no way between the two states.
+    if (w < 1 && before.ids == now.ids) {
+      for (std::size_t k = 0; k < scratch_lines_.size(); ++k) {
+        render::Line& line = scratch_lines_[k];
+        line.a = before.lines[k].a + w * (line.a - before.lines[k].a);
+        line.b = before.lines[k].b + w * (line.b - before.lines[k].b);
+      }
+    }
+    stage_.set_lines(overlays_[i], scratch_lines_);
+  }
+}
+
+void Picture::place_body(const DrawnBody& body, const Affine3f& world_from_body, double time) {
+  const float explode = body.overlay ? f(effects::mean(body.overlay->explode, time)) : 0;
+  for (const DrawnPart& part : body.parts)
+    stage_.set_transform(
+        part.instance, world_from_body * Eigen::Translation3f(explode * part.outwards) * part.body_from_part);
+}
+
 void Picture::place(const Snapshot& previous, const Snapshot& current, float w, double frame_time) {
   std::vector<BodySample> samples(current.bodies.size());
   for (std::size_t i = 0; i < samples.size(); ++i)
     samples[i] = w == 1 ? current.bodies[i] : interpolate(previous.bodies[i], current.bodies[i], w);
-  for (const DrawnBody& body : bodies_) {
-    const Affine3f world_from_body = affine(samples[body.slot]);
-    for (const DrawnPart& part : body.parts)
-      stage_.set_transform(part.instance, world_from_body * part.body_from_part);
-  }
+  const double time = current.time - (1 - w) * frame_time;
+  for (const DrawnBody& body : bodies_)
+    place_body(body, body.slot ? affine(samples[*body.slot]) : body.world_from_body, time);
   place_springs(previous, current, w);
   place_points(previous, current, w, frame_time);
-  stage_.set_camera(camera_at(current.time - (1 - w) * frame_time, samples));
+  place_overlays(previous, current, w);
+  stage_.set_camera(camera_at(time, samples));
 }
 
 render::Image Picture::draw(const Snapshot& previous, const Snapshot& current) {

@@ -3,7 +3,10 @@
 /// two states of a pair it interpolates (slerp for bodies, cubic for particles), so that sub-frames at
 /// different times give motion blur.
 
+#include <map>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "producer/models.h"
@@ -27,9 +30,13 @@ class Picture {
   struct DrawnPart {
     render::InstanceHandle instance;
     Eigen::Affine3f body_from_part;
+    Eigen::Vector3f outwards =
+        Eigen::Vector3f::Zero();  // where an explosion of 1 moves it, in the body's frame
   };
   struct DrawnBody {
-    std::size_t slot;  // in Snapshot::bodies
+    std::optional<std::size_t> slot;  // in Snapshot::bodies; none: it never moves
+    Eigen::Affine3f world_from_body;  // at time 0
+    const PartsOverlay* overlay;      // it is drawn as convex parts; or null
     std::vector<DrawnPart> parts;
   };
 
@@ -37,14 +44,20 @@ class Picture {
   void add_body(const Body& body, const ModelLibrary& models, std::size_t& slot);
   void add_model(const std::string& file, const Eigen::Affine3f& body_from_model, const Body& body,
                  const ModelLibrary& models, std::vector<DrawnPart>& parts);
+  void add_shape(const Body& body, const ModelLibrary& models, std::vector<DrawnPart>& parts);
+  void add_convex_parts(const MeshFile& mesh, const Body& body, const ModelLibrary& models,
+                        std::vector<DrawnPart>& parts);
   template <class Primitive>
   render::MeshHandle primitive(const Primitive& shape);
   void add_points(const ParticleLook& look);
+  void add_overlay_lines();
   void add_light_and_air();
 
   void place(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
+  void place_body(const DrawnBody& body, const Eigen::Affine3f& world_from_body, double time);
   void place_springs(const Snapshot& previous, const Snapshot& current, float w);
   void place_points(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
+  void place_overlays(const Snapshot& previous, const Snapshot& current, float w);
   render::Camera camera_at(double time, const std::vector<BodySample>& bodies) const;
 
   const Scene& scene_;
@@ -58,7 +71,9 @@ class Picture {
   std::vector<DrawnBody> bodies_;
   std::vector<render::InstanceHandle> springs_;  // null where invisible
   std::vector<render::PointsHandle> points_;
+  std::vector<render::LinesHandle> overlays_;  // null for those without lines
   std::vector<render::Point> scratch_;
+  std::vector<render::Line> scratch_lines_;
   render::HdrImage sum_;
 };
 

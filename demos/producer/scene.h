@@ -248,6 +248,45 @@ struct Spring {
   std::string material;
 };
 
+/// How the lines of an overlay are drawn.
+struct LineLook {
+  Real width = 0.003;  ///< share of the picture's height
+  Real hidden = 0.3;   ///< opacity of what is behind something
+};
+
+enum class BoundingVolumeKind { aabb, obb, sphere };
+
+/// The bounding tree of a mesh body, one level of it at a time.
+struct TreeOverlay : LineLook {
+  Where where;
+  std::string body;
+  BoundingVolumeKind volume = BoundingVolumeKind::obb;
+  Varying level = 3.0;  ///< 0: the root; between two levels one fades into the other
+};
+/// The convex parts of a mesh body in colours, instead of the body.
+struct PartsOverlay {
+  Where where;
+  std::string body;
+  Varying explode = 0.0;  ///< how much farther from the centre the parts are drawn, as a share
+};
+/// The closest points of two bodies, or how deep one is in the other.
+struct ClosestOverlay : LineLook {
+  Where where;
+  std::string a, b;
+  Color color{{1, 0.75f, 0.1f, 1}};
+  Color penetrating{{1, 0.08f, 0.05f, 1}};
+};
+/// Where bodies touch, and which way they push each other.
+struct ContactsOverlay : LineLook {
+  Where where;
+  std::string a, b;    ///< both empty: every pair
+  Real margin = 0.01;  ///< how near counts as touching
+  Real size = 0.06;    ///< radius of the ring around a point; its arrow is four times as long
+  Color color{{1, 0.75f, 0.1f, 1}};
+};
+/// What is drawn over the picture to show how the simulation sees it.
+using Overlay = std::variant<TreeOverlay, PartsOverlay, ClosestOverlay, ContactsOverlay>;
+
 /// What all cameras have.
 struct Lens {
   Real fov_deg = 40;
@@ -330,6 +369,7 @@ struct Scene {
   std::vector<ParticleGroup> particles;
   std::vector<Emitter> emitters;
   std::vector<Spring> springs;
+  std::vector<Overlay> overlays;
   Camera camera = StaticCamera{};
   std::vector<Light> lights = {SunLight{}};
   EnvironmentSettings environment;

@@ -72,6 +72,12 @@ class Checker {
     for (const ParticleGroup& group : scene_.particles) check_group(group);
     for (const Emitter& emitter : scene_.emitters) check_emitter(emitter);
     for (const Spring& spring : scene_.springs) check_spring(spring);
+    for (const Overlay& overlay : scene_.overlays)
+      std::visit(
+          [&](const auto& o) {
+            if (!o.where.path.empty()) check_overlay(o);  // else its type was wrong, and none was read
+          },
+          overlay);
     std::visit([&](const auto& camera) { check_camera(camera); }, scene_.camera);
     check_lights();
     check_film();
@@ -299,6 +305,44 @@ class Checker {
       fail(path, fmt::format("the spring '{}' is too stiff for the step: /world/step must be less than "
                              "{:.3g} s, is {:.3g} s",
                              spring.name, 0.995 * largest, used));
+  }
+
+  // --- Overlays ---
+
+  /// The body of that name; reports if there is none.
+  const Body* named_body(const std::string& path, const std::string& name) {
+    check_body_name(path, name);
+    const auto body = bodies_.find(name);
+    return body == bodies_.end() ? nullptr : body->second;
+  }
+  void check_mesh_body(const std::string& path, const std::string& name) {
+    const Body* body = named_body(path, name);
+    if (body && !std::holds_alternative<MeshFile>(body->shape))
+      fail(path, "the body '" + name + "' has no mesh");
+  }
+  void check_pair(const std::string& path, const std::string& a, const std::string& b) {
+    const Body *first = named_body(path + "/a", a), *second = named_body(path + "/b", b);
+    if (a == b) return fail(path + "/b", "is the same body as a");
+    const auto is_plane = [](const Body* body) {
+      return body && std::holds_alternative<sim::Plane>(body->shape);
+    };
+    if (is_plane(first) && is_plane(second)) fail(path, "two planes have no contact that could be shown");
+  }
+  void check_not_random(const std::string& path, const Varying& v) {
+    if (!std::holds_alternative<Real>(v) && !std::holds_alternative<effects::Curve>(v))
+      fail(path, "must be a number or a curve over time: nothing here is random");
+  }
+  void check_overlay(const TreeOverlay& overlay) {
+    check_mesh_body(overlay.where.path + "/body", overlay.body);
+    check_not_random(overlay.where.path + "/level", overlay.level);
+  }
+  void check_overlay(const PartsOverlay& overlay) {
+    check_mesh_body(overlay.where.path + "/body", overlay.body);
+    check_not_random(overlay.where.path + "/explode", overlay.explode);
+  }
+  void check_overlay(const ClosestOverlay& overlay) { check_pair(overlay.where.path, overlay.a, overlay.b); }
+  void check_overlay(const ContactsOverlay& overlay) {
+    if (!overlay.a.empty() || !overlay.b.empty()) check_pair(overlay.where.path, overlay.a, overlay.b);
   }
 
   // --- Camera, light, film ---

@@ -1,6 +1,7 @@
 #include "producer/scene_table.h"
 
 #include "producer/table_film.h"
+#include "producer/table_overlay.h"
 #include "producer/table_world.h"
 
 namespace offstage::producer {
@@ -21,6 +22,7 @@ struct Table<Scene> {
         {"particles", &T::particles, "groups of particles placed one by one"},
         {"emitters", &T::emitters, "sources of particles"},
         {"springs", &T::springs, "damped springs"},
+        {"overlays", &T::overlays, "what shows how the simulation sees the scene"},
         {"camera", &T::camera, "where the film is seen from"},
         {"lights", &T::lights, "the sun"},
         {"environment", &T::environment, "sky, ambient light, fog"},

@@ -72,6 +72,7 @@ Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
   add_particle_groups(scene);
   add_springs(scene);
   add_emitters(scene);
+  overlays_.emplace(scene, world_, bodies_);
 }
 
 void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
@@ -97,7 +98,7 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
           [&](const auto& shape) {
             if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, MeshFile>) {
               sim::MeshHandle& mesh = meshes[{shape.file, shape.scale}];
-              if (!mesh) mesh = world_.add_mesh(collision_mesh(models.model(shape.file), shape.scale));
+              if (!mesh) mesh = add_mesh(shape, models);
               def.shape = sim::MeshShape{mesh};
             } else {
               def.shape = shape;
@@ -112,6 +113,12 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
     moving_.push_back({body.name, handle});
     moving_poses_.push_back(world_.body(handle).pose);
   }
+}
+
+sim::MeshHandle Simulation::add_mesh(const MeshFile& file, const ModelLibrary& models) {
+  const sim::ConvexDecomposition* parts = models.parts(file.file);
+  return world_.add_mesh(collision_mesh(models.model(file.file), file.scale),
+                         parts ? std::optional(scaled(*parts, file.scale)) : std::nullopt);
 }
 
 void Simulation::add_particle_groups(const Scene& scene) {
@@ -297,6 +304,7 @@ Snapshot Simulation::snapshot() const {
     snapshot.point_sets.push_back(
         point_set(emitters_[i].target(), emitter.look, nullptr, effects::stream_id(emitter.name)));
   }
+  snapshot.overlays = overlays_->lines(world_);
   snapshot.state_hash = world_.state_hash();
   return snapshot;
 }

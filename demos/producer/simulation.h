@@ -5,12 +5,14 @@
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "effects/emitter.h"
 #include "producer/models.h"
+#include "producer/overlays.h"
 #include "producer/scene.h"
 #include "producer/snapshot.h"
 #include "sim/world.h"
@@ -78,6 +80,7 @@ class Simulation {
 
  private:
   void add_bodies(const Scene& scene, const ModelLibrary& models);
+  sim::MeshHandle add_mesh(const MeshFile& file, const ModelLibrary& models);
   void add_particle_groups(const Scene& scene);
   void add_emitters(const Scene& scene);
   void add_springs(const Scene& scene);
@@ -95,6 +98,7 @@ class Simulation {
   std::vector<sim::Pose> moving_poses_;             // kept up to date from World::moved()
   std::map<sim::BodyHandle, std::size_t> slot_of_;  // handle -> place in `moving_`
   std::vector<sim::SpringDef> springs_;
+  std::optional<Overlays> overlays_;
   std::function<void(double)> on_substep_;
   SimulationTotals totals_;
   int frame_ = 0, skipped_pieces_ = 0;

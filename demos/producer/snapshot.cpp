@@ -1,92 +1,28 @@
 #include "producer/snapshot.h"
 
-#include <cstring>
-#include <fstream>
-#include <iterator>
-#include <type_traits>
-
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <xxhash.h>
-#include <zstd.h>
 
+#include "producer/packed_file.h"
 #include "render/error.h"
 #include "render/image_io.h"
 
 namespace offstage::producer {
 namespace {
 
-constexpr char kMagic[8] = {'o', 'f', 'f', 's', 'n', 'a', 'p', '\0'};
-constexpr uint32_t kFormatVersion = 1;
-constexpr uint64_t kMaxPayload = uint64_t{1} << 34;
+using Eigen::Vector3f;
+using Eigen::Vector4f;
 
-struct Header {
-  char magic[8];
-  uint32_t version;
-  uint32_t reserved;
-  uint64_t payload_size;  // uncompressed
-  uint64_t checksum;      // of the uncompressed payload
-};
-static_assert(sizeof(Header) == 32);
-
-class Writer {
- public:
-  template <class T>
-  void put(const T& value) {
-    static_assert(std::is_arithmetic_v<T>);
-    const auto* bytes = reinterpret_cast<const uint8_t*>(&value);
-    bytes_.insert(bytes_.end(), bytes, bytes + sizeof value);
-  }
-  void put(const Eigen::Vector3f& v) { put(v.x()), put(v.y()), put(v.z()); }
-  const std::vector<uint8_t>& bytes() const { return bytes_; }
-
- private:
-  std::vector<uint8_t> bytes_;
-};
-
-class Reader {
- public:
-  Reader(std::span<const uint8_t> bytes, const std::string& source) : bytes_(bytes), source_(source) {}
-
-  template <class T>
-  T take() {
-    if (bytes_.size() < sizeof(T)) throw render::FileError(source_ + ": damaged snapshot (too short)");
-    T value;
-    std::memcpy(&value, bytes_.data(), sizeof value);
-    bytes_ = bytes_.subspan(sizeof value);
-    return value;
-  }
-  Eigen::Vector3f take_vector() {
-    const auto x = take<float>(), y = take<float>(), z = take<float>();
-    return {x, y, z};
-  }
-  /// A count of records of at least `record_size` bytes; a wrong one must not make us allocate the machine
-  /// away.
-  std::size_t take_count(std::size_t record_size) {
-    const auto n = take<uint64_t>();
-    if (n > bytes_.size() / record_size) throw render::FileError(source_ + ": damaged snapshot (bad count)");
-    return n;
-  }
-  bool at_end() const { return bytes_.empty(); }
-
- private:
-  std::span<const uint8_t> bytes_;
-  const std::string& source_;
-};
-
-std::vector<uint8_t> read_file(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw render::FileError(path.string() + ": cannot read the file");
-  return {std::istreambuf_iterator<char>(in), {}};
-}
+constexpr FileKind kKind = {"offsnap", 2, "snapshot"};
 
 constexpr std::size_t kBodyBytes = 7 * sizeof(float);
 constexpr std::size_t kSpringBytes = 6 * sizeof(float);
 constexpr std::size_t kPointBytes = 12 * sizeof(float) + sizeof(uint64_t);
+constexpr std::size_t kLineBytes = 12 * sizeof(float) + sizeof(uint64_t);
 
 void write_manifest(const std::filesystem::path& folder, const std::string& key, int frames, bool complete) {
   const nlohmann::ordered_json manifest = {
-      {"offstage_cache", kFormatVersion}, {"key", key}, {"frames", frames}, {"complete", complete}};
+      {"offstage_cache", kKind.version}, {"key", key}, {"frames", frames}, {"complete", complete}};
   const std::string text = manifest.dump(2) + "\n";
   render::write_file_atomically(folder / "cache.json",
                                 {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
@@ -101,7 +37,7 @@ uint64_t Snapshot::point_count() const {
 }
 
 std::vector<uint8_t> serialize(const Snapshot& snapshot) {
-  Writer out;
+  ByteWriter out;
   out.put(snapshot.frame);
   out.put(snapshot.time);
   out.put(snapshot.state_hash.low);
@@ -122,47 +58,29 @@ std::vector<uint8_t> serialize(const Snapshot& snapshot) {
       out.put(p.position);
       out.put(p.velocity);
       out.put(p.radius);
-      for (int c = 0; c < 4; ++c) out.put(p.color[c]);
+      out.put(p.color);
       out.put(set.ages[i]);
       out.put(p.id);
     }
   }
+  out.put(uint64_t{snapshot.overlays.size()});
+  for (const LineSet& set : snapshot.overlays) {
+    out.put(uint64_t{set.lines.size()});
+    for (std::size_t i = 0; i < set.lines.size(); ++i) {
+      const render::Line& line = set.lines[i];
+      out.put(line.a), out.put(line.b);
+      out.put(line.color);
+      out.put(line.width_a), out.put(line.width_b);
+      out.put(set.ids[i]);
+    }
+  }
 
-  const std::vector<uint8_t>& payload = out.bytes();
-  Header header{};
-  std::memcpy(header.magic, kMagic, sizeof kMagic);
-  header.version = kFormatVersion;
-  header.payload_size = payload.size();
-  header.checksum = XXH3_64bits(payload.data(), payload.size());
-  std::vector<uint8_t> bytes(sizeof header + ZSTD_compressBound(payload.size()));
-  std::memcpy(bytes.data(), &header, sizeof header);
-  const std::size_t packed = ZSTD_compress(bytes.data() + sizeof header, bytes.size() - sizeof header,
-                                           payload.data(), payload.size(), 1);
-  if (ZSTD_isError(packed)) throw render::FileError(std::string("zstd: ") + ZSTD_getErrorName(packed));
-  bytes.resize(sizeof header + packed);
-  return bytes;
+  return pack(kKind, out.bytes());
 }
 
 Snapshot deserialize(std::span<const uint8_t> bytes, const std::string& source) {
-  Header header;
-  if (bytes.size() < sizeof header) throw render::FileError(source + ": not a snapshot (too short)");
-  std::memcpy(&header, bytes.data(), sizeof header);
-  if (std::memcmp(header.magic, kMagic, sizeof kMagic) != 0)
-    throw render::FileError(source + ": not a snapshot");
-  if (header.version != kFormatVersion)
-    throw render::FileError(fmt::format("{}: snapshot format {}, this program reads {}; simulate again",
-                                        source, header.version, kFormatVersion));
-  if (header.payload_size > kMaxPayload) throw render::FileError(source + ": damaged snapshot (size)");
-  const auto packed = bytes.subspan(sizeof header);
-  // The header's size is not trusted before the frame agrees with it.
-  if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != header.payload_size)
-    throw render::FileError(source + ": damaged snapshot (size)");
-  std::vector<uint8_t> payload(header.payload_size);
-  const std::size_t n = ZSTD_decompress(payload.data(), payload.size(), packed.data(), packed.size());
-  if (ZSTD_isError(n) || n != payload.size() || XXH3_64bits(payload.data(), n) != header.checksum)
-    throw render::FileError(source + ": damaged snapshot (checksum)");
-
-  Reader in(payload, source);
+  const std::vector<uint8_t> payload = unpack(kKind, bytes, source);
+  ByteReader in(payload, source);
   Snapshot snapshot;
   snapshot.frame = in.take<int>();
   snapshot.time = in.take<double>();
@@ -170,28 +88,42 @@ Snapshot deserialize(std::span<const uint8_t> bytes, const std::string& source) 
   snapshot.state_hash.high = in.take<uint64_t>();
   snapshot.bodies.resize(in.take_count(kBodyBytes));
   for (BodySample& b : snapshot.bodies) {
-    b.position = in.take_vector();
+    b.position = in.take<Vector3f>();
     const auto w = in.take<float>();
-    const Eigen::Vector3f v = in.take_vector();
+    const auto v = in.take<Vector3f>();
     b.orientation = {w, v.x(), v.y(), v.z()};
   }
   snapshot.springs.resize(in.take_count(kSpringBytes));
-  for (SpringSample& s : snapshot.springs) s = {in.take_vector(), in.take_vector()};
+  for (SpringSample& s : snapshot.springs) s = {in.take<Vector3f>(), in.take<Vector3f>()};
   snapshot.point_sets.resize(in.take_count(sizeof(uint64_t)));
   for (PointSet& set : snapshot.point_sets) {
     set.points.resize(in.take_count(kPointBytes));
     set.ages.resize(set.points.size());
     for (std::size_t i = 0; i < set.points.size(); ++i) {
       render::Point& p = set.points[i];
-      p.position = in.take_vector();
-      p.velocity = in.take_vector();
+      p.position = in.take<Vector3f>();
+      p.velocity = in.take<Vector3f>();
       p.radius = in.take<float>();
-      for (int c = 0; c < 4; ++c) p.color[c] = in.take<float>();
+      p.color = in.take<Vector4f>();
       set.ages[i] = in.take<float>();
       p.id = in.take<uint64_t>();
     }
   }
-  if (!in.at_end()) throw render::FileError(source + ": damaged snapshot (trailing bytes)");
+  snapshot.overlays.resize(in.take_count(sizeof(uint64_t)));
+  for (LineSet& set : snapshot.overlays) {
+    set.lines.resize(in.take_count(kLineBytes));
+    set.ids.resize(set.lines.size());
+    for (std::size_t i = 0; i < set.lines.size(); ++i) {
+      render::Line& line = set.lines[i];
+      line.a = in.take<Vector3f>();
+      line.b = in.take<Vector3f>();
+      line.color = in.take<Vector4f>();
+      line.width_a = in.take<float>();
+      line.width_b = in.take<float>();
+      set.ids[i] = in.take<uint64_t>();
+    }
+  }
+  in.expect_end();
   return snapshot;
 }
 
@@ -221,7 +153,7 @@ void SnapshotCache::check(const std::string& key, int frames) const {
                             folder_.string());
   const std::vector<uint8_t> bytes = read_file(path);
   const auto manifest = nlohmann::json::parse(bytes.begin(), bytes.end(), nullptr, false);
-  if (!manifest.is_object() || manifest.value("offstage_cache", 0u) != kFormatVersion)
+  if (!manifest.is_object() || manifest.value("offstage_cache", 0u) != kKind.version)
     throw render::FileError(path.string() + ": not a cache of this version; simulate again");
   if (!manifest.value("complete", false))
     throw render::FileError(folder_.string() +

@@ -32,12 +32,19 @@ struct PointSet {
   std::vector<float> ages;  ///< [s]
 };
 
+/// What an overlay shows. A line with the same id in two snapshots is the same line, moved.
+struct LineSet {
+  std::vector<render::Line> lines;
+  std::vector<uint64_t> ids;
+};
+
 struct Snapshot {
   int frame = 1;
   double time = 0;                    ///< [s]
   std::vector<BodySample> bodies;     ///< moving bodies, in scene order
   std::vector<SpringSample> springs;  ///< in scene order
   std::vector<PointSet> point_sets;   ///< particle groups, then emitters, in scene order
+  std::vector<LineSet> overlays;      ///< in scene order; empty for those that draw no lines
   sim::StateHash state_hash;
 
   uint64_t point_count() const;

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
+#include <array>
+
+#include "sim/geometry/closest_points.h"
 
 namespace offstage::sim {
 namespace {
@@ -79,57 +81,7 @@ Real support_of(const Plane&, const Vec3& n) {
   return n.x() == 0 && n.z() == 0 && n.y() >= 0 ? 0 : kInfinity;
 }
 
-std::vector<Aabb> triangle_boxes(const TriangleMesh& mesh) {
-  std::vector<Aabb> boxes;
-  boxes.reserve(mesh.triangles.size());
-  for (const Triangle& t : mesh.triangles) {
-    Aabb box;
-    for (uint32_t v : t) box.extend(mesh.vertices[v]);
-    boxes.push_back(box);
-  }
-  return boxes;
-}
-
 }  // namespace
-
-static Real farthest(const TriangleMesh& mesh) {
-  Real r2 = 0;
-  for (const Vec3& v : mesh.vertices) r2 = std::max(r2, v.squaredNorm());
-  return std::sqrt(r2);
-}
-
-CollisionMesh::CollisionMesh(TriangleMesh welded)
-    : mesh(std::move(welded)),
-      topology(mesh),
-      mass(mass_properties(mesh)),
-      tree(triangle_boxes(mesh)),
-      reach(farthest(mesh)),
-      solid(topology.defects().closed() && !topology.defects().inverted) {}
-
-// Voronoi regions of the triangle, after Ericson, "Real-Time Collision Detection" (2005), 5.1.5.
-TrianglePoint closest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
-  const Real d1 = ab.dot(ap), d2 = ac.dot(ap), d3 = ab.dot(bp), d4 = ac.dot(bp), d5 = ab.dot(cp),
-             d6 = ac.dot(cp);
-  if (d1 <= 0 && d2 <= 0) return {a, {1, 0, 0}};
-  if (d3 >= 0 && d4 <= d3) return {b, {0, 1, 0}};
-  if (d6 >= 0 && d5 <= d6) return {c, {0, 0, 1}};
-  const Real vc = d1 * d4 - d3 * d2, vb = d5 * d2 - d1 * d6, va = d3 * d6 - d5 * d4;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) {
-    const Real t = d1 / (d1 - d3);
-    return {a + t * ab, {1 - t, t, 0}};
-  }
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) {
-    const Real t = d2 / (d2 - d6);
-    return {a + t * ac, {1 - t, 0, t}};
-  }
-  if (va <= 0 && d4 >= d3 && d5 >= d6) {
-    const Real t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return {b + t * (c - b), {0, 1 - t, t}};
-  }
-  const Real sum = va + vb + vc, v = vb / sum, w = vc / sum;
-  return {a + v * ab + w * ac, {1 - v - w, v, w}};
-}
 
 SurfaceDistance signed_distance(const Sphere& s, const Vec3& p) {
   return {p.norm() - s.radius, direction(p, Vec3::UnitY())};
@@ -210,11 +162,7 @@ SurfaceDistance signed_distance(const Solid& s, const Vec3& p) {
 }
 
 Real support(const Solid& s, const Vec3& n) {
-  if (s.mesh) {
-    Real best = -kInfinity;
-    for (const Vec3& v : s.mesh->mesh.vertices) best = std::max(best, n.dot(v));
-    return best;
-  }
+  if (s.mesh) return n.dot(s.mesh->hull.vertex(support_vertex(s.mesh->hull, n, 0)));
   return std::visit(
       [&](const auto& shape) -> Real {
         if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, MeshShape>)
@@ -237,12 +185,6 @@ Aabb local_bounds(const Solid& s) {
 
 Aabb bounds(const Solid& s, const Pose& pose) {
   const Mat3 to_world = pose.orientation.toRotationMatrix();
-  if (s.mesh) {
-    const Aabb box = local_bounds(s);
-    const Vec3 centre = to_world * box.center() + pose.position,
-               half = to_world.cwiseAbs() * (box.sizes() / 2);
-    return {centre - half, centre + half};
-  }
   Vec3 low, high;
   for (int i = 0; i < 3; ++i) {
     const Vec3 axis = to_world.row(i);
@@ -253,7 +195,7 @@ Aabb bounds(const Solid& s, const Pose& pose) {
 }
 
 Real reach(const Solid& s) {
-  if (s.mesh) return s.mesh->reach;
+  if (s.mesh) return s.mesh->hull.reach();
   if (const auto* c = std::get_if<Capsule>(s.shape)) return c->height / 2 + c->radius;
   if (const auto* ball = std::get_if<Sphere>(s.shape)) return ball->radius;
   const Aabb box = local_bounds(s);

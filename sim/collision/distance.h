@@ -4,12 +4,9 @@
 /// primitives are exact, inside and outside, and therefore convex functions of the point, which
 /// sphere_sweep.h relies on.
 
-#include <array>
 #include <limits>
 
-#include "sim/collision/aabb_tree.h"
-#include "sim/geometry/mass_properties.h"
-#include "sim/geometry/mesh.h"
+#include "sim/collision/collision_mesh.h"
 #include "sim/shape.h"
 #include "sim/types.h"
 
@@ -21,29 +18,10 @@ struct SurfaceDistance {
   Vec3 normal = Vec3::UnitY();
 };
 
-/// A registered mesh with what registration computes once (E2).
-struct CollisionMesh {
-  explicit CollisionMesh(TriangleMesh welded);
-
-  TriangleMesh mesh;
-  MeshTopology topology;
-  MassProperties mass;
-  AabbTree tree;
-  Real reach;  ///< distance of the farthest vertex from the origin [m]
-  bool solid;  ///< closed and not inverted: it has an inside; else it is a two-sided surface
-};
-
 struct Solid {
   const Shape* shape = nullptr;
   const CollisionMesh* mesh = nullptr;  ///< for a MeshShape
 };
-
-/// Where a point's projection on a triangle lies.
-struct TrianglePoint {
-  Vec3 point;
-  std::array<Real, 3> weights;  ///< barycentric; exactly 0 for the vertices that the closest feature excludes
-};
-TrianglePoint closest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);
 
 SurfaceDistance signed_distance(const Sphere& s, const Vec3& p);
 SurfaceDistance signed_distance(const Box& b, const Vec3& p);
@@ -61,7 +39,7 @@ Real support(const Solid& s, const Vec3& n);
 
 /// Box of a solid in its own frame, tight; infinite for a plane.
 Aabb local_bounds(const Solid& s);
-/// Box of a placed solid in the world; tight for primitives, around the placed local box for meshes.
+/// Box of a placed solid in the world, tight.
 Aabb bounds(const Solid& s, const Pose& pose);
 /// Distance of the farthest point from the frame's origin.
 Real reach(const Solid& s);

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "sim/collision/aabb_tree.h"
+#include "sim/collision/bounding_tree.h"
 #include "sim/collision/distance.h"
 
 namespace offstage::sim {
@@ -45,8 +45,6 @@ class Obstacles {
   Obstacles() = default;
   explicit Obstacles(std::vector<Obstacle> obstacles);
 
-  std::span<const Obstacle> all() const { return obstacles_; }
-
   /// Calls visit(obstacle) for those that a sphere may touch on its way from a to b (world), wherever in the
   /// sub-step.
   template <class Visit>
@@ -58,20 +56,9 @@ class Obstacles {
     Aabb box(a.cwiseMin(b), a.cwiseMax(b));
     box.min().array() -= margin;
     box.max().array() += margin;
-    near_box(box, [&](uint32_t i) { visit(obstacles_[i]); });
-  }
-
-  /// Calls visit(index in all()) for the boxed obstacles whose swept boxes meet a box.
-  template <class Visit>
-  void near_box(const Aabb& box, Visit&& visit) const {
     tree_.overlapping(box, [&](uint32_t k) {
-      if (boxes_[k].intersects(box)) visit(boxed_[k]);
+      if (boxes_[k].intersects(box)) visit(obstacles_[boxed_[k]]);
     });
-  }
-  /// Calls visit(index in all()) for every plane.
-  template <class Visit>
-  void for_each_plane(Visit&& visit) const {
-    for (const PlanePath& plane : planes_) visit(plane.obstacle);
   }
 
  private:

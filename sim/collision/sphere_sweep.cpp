@@ -1,5 +1,7 @@
 #include "sim/collision/sphere_sweep.h"
 
+#include "sim/geometry/closest_points.h"
+
 namespace offstage::sim {
 namespace {
 

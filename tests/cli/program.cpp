@@ -13,7 +13,8 @@ namespace fs = std::filesystem;
 Outcome offstage(const std::string& args, const fs::path& folder, const std::string& before) {
   const TemporaryFolder talk;
   // What the caller redirects comes later and wins.
-  const std::string command = "cd '" + folder.string() + "' && " + before +
+  const std::string command = "cd '" + folder.string() + "' && export XDG_CACHE_HOME='" +
+                              (talk / "cache").string() + "' && " + before +
                               " '" OFFSTAGE_BINARY_DIR "/offstage' >'" + (talk / "out").string() + "' 2>'" +
                               (talk / "err").string() + "' </dev/null " + args;
   const int status = std::system(command.c_str());

@@ -41,6 +41,12 @@ inline constexpr const char* kSampleScene = R"({
     {"a": {"particles": "chain"}, "b": {"particles": "chain", "index": 1}, "stiffness": 50, "damping": 0.1},
     {"name": "tie", "a": {"position": [0, 4, 0]}, "b": {"body": "ball", "position": [0, 0.25, 0]}, "material": "red"}
   ],
+  "overlays": [
+    {"type": "tree", "body": "rock_0", "volume": "sphere", "level": {"curve": [[0, 0], [3, 4]]}, "hidden": 0},
+    {"type": "parts", "body": "rock_1", "explode": 0.5},
+    {"type": "closest", "a": "ball", "b": "wheel", "color": "#40c0ff", "width": 0.004},
+    {"type": "contacts", "margin": 0.02}
+  ],
   "camera": {"type": "keyframes", "keyframes": [{"time": 0, "eye": [4, 2, 6]}, {"time": 3, "eye": [0, 2, 7]}]},
   "lights": [{"type": "sun", "direction": [1, 2, 1], "color": [1, 0.9, 0.8]}],
   "environment": {"fog": 0.01, "background": "sky"},

@@ -55,6 +55,31 @@ TEST(SceneCheck, NamesLeadSomewhere) {
             "/camera/body: there is no body 'car'; known: 'ball', 'rock_0', 'rock_1'\n");
 }
 
+TEST(SceneCheck, OverlaysShowWhatThereIs) {
+  EXPECT_EQ(errors_of(R"({
+    "bodies": [{"name": "ball"}, {"name": "floor", "motion": "static", "shape": {"type": "plane"}},
+               {"name": "wall", "motion": "static", "shape": {"type": "plane"}},
+               {"name": "rock", "shape": {"type": "mesh", "file": "LICENSE"}}],
+    "overlays": [
+      {"type": "tree", "body": "ball"}, {"type": "parts", "body": "rokc"},
+      {"type": "tree", "body": "rock", "level": {"mean": 2, "deviation": 1}},
+      {"type": "parts", "body": "rock", "explode": {"range": [0, 1]}},
+      {"type": "closest", "a": "ball", "b": "ball"}, {"type": "contacts", "a": "ball"},
+      {"type": "contacts", "a": "wall", "b": "floor"}, {"type": "contacts"},
+      {"type": "closest", "a": "rock", "b": "floor"}]})"),
+            "/overlays/0/body: the body 'ball' has no mesh\n"
+            "/overlays/1/body: there is no body 'rokc'; did you mean 'rock'?\n"
+            "/overlays/2/level: must be a number or a curve over time: nothing here is random\n"
+            "/overlays/3/explode: must be a number or a curve over time: nothing here is random\n"
+            "/overlays/4/b: is the same body as a\n"
+            "/overlays/5/b: there is no body ''; known: 'ball', 'floor', 'wall', 'rock'\n"
+            "/overlays/6: two planes have no contact that could be shown\n");
+  EXPECT_EQ(errors_of(R"({"overlays": [{"type": "tree", "body": "a", "level": -1}, {"body": "a"}]})"),
+            "/overlays/0/body: there is no body 'a'\n"
+            "/overlays/0/level: must be between 0 and 16, got -1\n"
+            "/overlays/1/type: is required: one of \"tree\", \"parts\", \"closest\" or \"contacts\"\n");
+}
+
 TEST(SceneCheck, FilesAreThere) {
   EXPECT_EQ(errors_of(R"({"materials": [{"texture": "no.png"}],
                           "bodies": [{"material": "material_0", "shape": {"type": "mesh", "file": "no.obj"}},

@@ -32,6 +32,7 @@ only() {
   echo "$1 is used by: $users; it should be: $2"
   status=1
 }
+only 'libqhull_r/' 'sim/geometry/convex_hull'
 only 'assimp/' 'render/mesh_import render/mesh_material'
 only 'stb_image' 'render/image_io'
 only 'spng.h' 'render/image_io'

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "sim/collision/overlap.h"
+#include "sim/collision/distance.h"
 #include "tests/meshes.h"
 #include "tests/random.h"
 
@@ -110,34 +110,6 @@ TEST(Sweep, ATouchingSphereHitsAtOnceWhenItApproachesAndNeverWhenItLeaves) {
   EXPECT_EQ(hit->normal, Vec3::UnitY());
   EXPECT_FALSE(sweep_sphere({&shape, nullptr}, a, Vec3(0.2, 0.7, 0), 0.1));
   EXPECT_FALSE(sweep_sphere({&shape, nullptr}, a, Vec3(0.2, 0.6, 0), 0.1));
-}
-
-TEST(Overlap, BoxesAreSeparatedByAnEdgePairThatNoFaceSeparates) {
-  const Shape box = Box{Vec3::Ones()};
-  const Quat a(Eigen::AngleAxisd(M_PI / 4, Vec3::UnitZ())), b(Eigen::AngleAxisd(M_PI / 4, Vec3::UnitX()));
-  // Edges along z and x cross at right angles above each other; each edge is sqrt(1/2) from its centre.
-  const Real touch = 2 * std::sqrt(0.5);
-  EXPECT_FALSE(touching({&box}, {Vec3::Zero(), a}, {&box}, {Vec3(0, touch + 1e-9, 0), b}));
-  EXPECT_TRUE(touching({&box}, {Vec3::Zero(), a}, {&box}, {Vec3(0, touch - 1e-9, 0), b}));
-}
-
-TEST(Overlap, ExactPairs) {
-  const Shape plane = Plane{}, box = Box{Vec3::Ones()}, ball = Sphere{0.5}, capsule = Capsule{0.2, 1},
-              cone = Cone{0.5, 1};
-  const Quat tilt(Eigen::AngleAxisd(M_PI / 4, Vec3::UnitZ()));
-  const auto both = [](const Shape& s, const Pose& p, const Shape& t, const Pose& q) {
-    const bool forward = touching({&s}, p, {&t}, q);
-    EXPECT_EQ(forward, touching({&t}, q, {&s}, p));
-    return forward;
-  };
-  for (const Real e : {-1e-9, 1e-9}) {
-    EXPECT_EQ(both(plane, {}, box, {Vec3(0, std::sqrt(0.5) + e, 0), tilt}), e < 0);
-    EXPECT_EQ(both(plane, {}, cone, {Vec3(0, 0.5 + e, 0)}), e < 0);
-    EXPECT_EQ(both(ball, {}, box, {Vec3(1 + e, 0, 0)}), e < 0);
-    EXPECT_EQ(both(ball, {}, box, {Vec3::Constant(0.5) + (0.5 + e) * Vec3::Ones().normalized()}), e < 0);
-    EXPECT_EQ(both(capsule, {}, ball, {Vec3(0.7 + e, 0.3, 0)}), e < 0);
-    EXPECT_EQ(both(capsule, {}, capsule, {Vec3(0.4 + e, 0.8, 0)}), e < 0);
-  }
 }
 
 }  // namespace

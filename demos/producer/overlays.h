@@ -1,0 +1,74 @@
+#pragma once
+/// The simulation side of overlays: bounding trees, closest points and contacts of bodies, as lines in the
+/// world. They look at the world and never change it.
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "producer/scene.h"
+#include "producer/snapshot.h"
+#include "sim/collision/collision_shape.h"
+#include "sim/world.h"
+
+namespace offstage::producer {
+
+class Overlays {
+ public:
+  using BodiesByName = std::map<std::string, sim::BodyHandle>;
+
+  /// The scene must outlive the overlays.
+  Overlays(const Scene& scene, const sim::World& world, const BodiesByName& bodies);
+
+  /// What each overlay shows of the world as it is now, in scene order; nothing for the parts of bodies,
+  /// which are no lines.
+  std::vector<LineSet> lines(const sim::World& world) const;
+
+ private:
+  /// The volumes of a tree down to the deepest level shown, as edges in the body's frame.
+  struct TreeLines {
+    struct Volume {
+      int level;
+      bool leaf;
+      std::vector<std::pair<Vec3, Vec3>> edges;
+    };
+    const TreeOverlay* overlay;
+    sim::BodyHandle body;
+    std::vector<Volume> volumes;
+  };
+  /// A body as the narrow phase sees it.
+  struct Collider {
+    sim::BodyHandle body;
+    sim::Shape shape;
+    std::optional<sim::CollisionShape> collision;
+  };
+  /// Not both are planes; if one is, it is the second.
+  struct ColliderPair {
+    const Collider *a, *b;
+  };
+  struct ClosestLines {
+    const ClosestOverlay* overlay;
+    ColliderPair pair;
+  };
+  struct ContactLines {
+    const ContactsOverlay* overlay;
+    std::vector<ColliderPair> pairs;
+  };
+  struct NoLines {};
+  using Source = std::variant<NoLines, TreeLines, ClosestLines, ContactLines>;
+
+  struct Builder;
+
+  static LineSet draw(const NoLines&, const sim::World&) { return {}; }
+  static LineSet draw(const TreeLines& tree, const sim::World& world);
+  static LineSet draw(const ClosestLines& closest, const sim::World& world);
+  static LineSet draw(const ContactLines& contacts, const sim::World& world);
+
+  std::map<std::string, Collider> colliders_;  // by body
+  std::vector<Source> sources_;
+};
+
+}  // namespace offstage::producer

@@ -1,0 +1,91 @@
+#pragma once
+/// Binary files of our own, compressed and checksummed: a header with a magic word and a format version, then the
+/// zstd-compressed payload. What is damaged, cut short or of another kind or version is told apart from what is whole.
+
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "render/error.h"
+
+namespace offstage::producer {
+
+/// Which kind of file: eight characters at most, the version that is read and written, and its name in messages.
+struct FileKind {
+  std::string_view magic;
+  uint32_t version;
+  std::string_view name;
+};
+
+std::vector<uint8_t> pack(const FileKind& kind, std::span<const uint8_t> payload);
+/// The payload. Throws render::FileError, naming `source`.
+std::vector<uint8_t> unpack(const FileKind& kind, std::span<const uint8_t> bytes, const std::string& source);
+
+/// Throws render::FileError.
+std::vector<uint8_t> read_file(const std::filesystem::path& path);
+
+/// Puts numbers and vectors one after the other, in the machine's byte order.
+class ByteWriter {
+ public:
+  template <class T>
+    requires std::is_arithmetic_v<T>
+  void put(T value) {
+    const auto* bytes = reinterpret_cast<const uint8_t*>(&value);
+    bytes_.insert(bytes_.end(), bytes, bytes + sizeof value);
+  }
+  template <class Scalar, int N>
+  void put(const Eigen::Matrix<Scalar, N, 1>& v) {
+    for (int i = 0; i < N; ++i) put(v[i]);
+  }
+  const std::vector<uint8_t>& bytes() const { return bytes_; }
+
+ private:
+  std::vector<uint8_t> bytes_;
+};
+
+/// Takes them out again. Throws render::FileError, naming `source`, where there is no more to take.
+class ByteReader {
+ public:
+  ByteReader(std::span<const uint8_t> bytes, const std::string& source) : bytes_(bytes), source_(source) {}
+
+  template <class T>
+    requires std::is_arithmetic_v<T>
+  T take() {
+    if (bytes_.size() < sizeof(T)) throw render::FileError(source_ + ": damaged (too short)");
+    T value;
+    std::memcpy(&value, bytes_.data(), sizeof value);
+    bytes_ = bytes_.subspan(sizeof value);
+    return value;
+  }
+  template <class V>
+    requires(!std::is_arithmetic_v<V>)
+  V take() {
+    V v;
+    for (int i = 0; i < V::SizeAtCompileTime; ++i) v[i] = take<typename V::Scalar>();
+    return v;
+  }
+  /// A count of records of at least `record_size` bytes; a wrong one must not make us allocate the machine
+  /// away.
+  std::size_t take_count(std::size_t record_size) {
+    const auto n = take<uint64_t>();
+    if (n > bytes_.size() / record_size) throw render::FileError(source_ + ": damaged (bad count)");
+    return n;
+  }
+  /// Throws if anything is left.
+  void expect_end() const {
+    if (!bytes_.empty()) throw render::FileError(source_ + ": damaged (trailing bytes)");
+  }
+
+ private:
+  std::span<const uint8_t> bytes_;
+  const std::string& source_;
+};
+
+}  // namespace offstage::producer

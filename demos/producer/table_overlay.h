@@ -1,0 +1,90 @@
+#pragma once
+/// The keys of overlays: what is drawn over the picture to show how the simulation sees it.
+
+#include <array>
+
+#include "producer/values.h"
+
+namespace offstage::producer {
+
+template <>
+struct Table<LineLook> {
+  static Fields<LineLook> fields() {
+    return {{"width", &LineLook::width, "of the lines, as a share of the picture's height", "", over(0, 0.1)},
+            {"hidden", &LineLook::hidden, "opacity of lines where they are behind something", "", kShare}};
+  }
+};
+
+template <>
+struct Names<BoundingVolumeKind> {
+  static constexpr std::array kNames = {"aabb", "obb", "sphere"};
+};
+template <>
+struct Table<TreeOverlay> {
+  static constexpr const char* kName = "tree_overlay";
+  static constexpr const char* kHelp =
+      "The bounding tree of a body with a mesh: the volumes of one level, and the leaves above it.";
+  static Fields<TreeOverlay> fields() {
+    using T = TreeOverlay;
+    return Fields<T>{{"body", &T::body, "name of a body with a mesh", kRequired},
+                     {"volume", &T::volume, "boxes along the body's axes, boxes along their own, or balls"},
+                     {"level", &T::level,
+                      "0: the root; between two whole numbers one level fades into the next; a number or a "
+                      "curve over time",
+                      "", between(0, 16)}}
+        .with_base<LineLook>();
+  }
+};
+template <>
+struct Table<PartsOverlay> {
+  static constexpr const char* kName = "parts_overlay";
+  static constexpr const char* kHelp =
+      "The convex parts of a body with a mesh, each in its colour, drawn instead of the body.";
+  static Fields<PartsOverlay> fields() {
+    using T = PartsOverlay;
+    return {
+        {"body", &T::body, "name of a body with a mesh", kRequired},
+        {"explode", &T::explode,
+         "how much farther from the middle the parts are drawn, as a share of their distance; a number or "
+         "a curve over time",
+         "", between(0, 100)}};
+  }
+};
+template <>
+struct Table<ClosestOverlay> {
+  static constexpr const char* kName = "closest_overlay";
+  static constexpr const char* kHelp =
+      "The closest points of two bodies, or the shortest way out where one is in the other.";
+  static Fields<ClosestOverlay> fields() {
+    using T = ClosestOverlay;
+    return Fields<T>{{"a", &T::a, "name of a body", kRequired},
+                     {"b", &T::b, "name of another", kRequired},
+                     {"color", &T::color, "of bodies apart"},
+                     {"penetrating", &T::penetrating, "colour of bodies in each other"}}
+        .with_base<LineLook>();
+  }
+};
+template <>
+struct Table<ContactsOverlay> {
+  static constexpr const char* kName = "contacts_overlay";
+  static constexpr const char* kHelp =
+      "Contact points of bodies, as rings, and the direction in which the first of two is pushed, as arrows.";
+  static Fields<ContactsOverlay> fields() {
+    using T = ContactsOverlay;
+    return Fields<T>{{"a", &T::a, "name of a body; empty: every pair of bodies that collide"},
+                     {"b", &T::b, "name of another; empty: every pair of bodies that collide"},
+                     {"margin", &T::margin, "bodies nearer than this count as touching", "m", kNotNegative},
+                     {"size", &T::size, "radius of the rings; arrows are four times as long", "m", kPositive},
+                     {"color", &T::color, "of rings and arrows"}}
+        .with_base<LineLook>();
+  }
+};
+template <>
+struct Tags<Overlay> {
+  static constexpr const char* kName = "overlay";
+  static constexpr const char* kHelp = "Something drawn over the picture to show how the simulation sees it.";
+  static constexpr std::array kTags = {"tree", "parts", "closest", "contacts"};
+  static constexpr bool kRequired = true;
+};
+
+}  // namespace offstage::producer

@@ -1,0 +1,77 @@
+#pragma once
+/// Broad phase (physics H5, H6, E9): the pairs of objects whose boxes meet, by a uniform or multi-level Grid.
+///
+/// Objects that stand still are settled: the grid that holds them is left alone, pairs of them are remembered
+/// as they were found, and a step costs what the others cost, which are entered in a grid of their own every
+/// time. Those of them that had not moved were entered in vain; once this has cost as much as settling all
+/// that stand still, they are settled together. So the work is a small multiple of the least possible,
+/// whatever moves when, and static objects come to cost nothing.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sim/collision/grid.h"
+
+namespace offstage::sim {
+
+class BroadPhase {
+ public:
+  explicit BroadPhase(GridKind kind = GridKind::multilevel) { sizes_.kind = kind; }
+
+  /// Adds an object under an index of the caller's, below CellTable::kMaxObjects; memory goes with the
+  /// greatest. The box is that of the bounding sphere, or a tighter or swept one. It may be a point and may
+  /// reach to infinity, but is neither empty nor NaN.
+  void insert(uint32_t object, const Aabb& box, bool is_static = false);
+  /// Gives an object another box. One that did not move needs no call. Static ones may move, too.
+  void move(uint32_t object, const Aabb& box);
+  void remove(uint32_t object);
+  bool contains(uint32_t object) const { return object < states_.size() && (states_[object] & kLive); }
+
+  /// All pairs whose boxes have a point in common and that are not both static, each once and in ascending
+  /// order: they depend on the boxes alone, not on threads nor on the past. Valid until the next call.
+  std::span<const IndexPair> pairs();
+
+  /// What the last pairs() did.
+  struct Work {
+    std::size_t entered = 0;   ///< objects entered because they may have moved
+    std::size_t copies = 0;    ///< in how many cells
+    std::size_t compared = 0;  ///< boxes compared
+    std::size_t settled = 0;   ///< objects in the grid that was made anew for those at rest; 0 if none was
+  };
+  const Work& work() const { return work_; }
+
+ private:
+  enum State : uint8_t { kLive = 1, kStatic = 2, kMoved = 4, kUnsettled = 8 };
+
+  bool is_settled(uint32_t object) const { return (states_[object] & (kLive | kUnsettled)) == kLive; }
+  void unsettle(uint32_t object);
+  void count_diameter(uint32_t object, Real sign);
+  void fit_uniform_width();
+  template <class Find>
+  void search(std::size_t jobs, Find&& find);
+  void find_among_moving();
+  void find_with_resting();
+  void find_large();
+  void collect();
+  void settle_if_due();
+
+  CellSizes sizes_;
+  std::size_t count_ = 0;  // of objects
+  Real diameters_ = 0;     // sum of the diameters of bounded objects [m]
+  Real bounded_ = 0;       // number of these
+
+  std::vector<Aabb> boxes_;          // by object
+  std::vector<uint8_t> states_;      // by object, bits of State
+  std::vector<uint32_t> unsettled_;  // objects, and removed ones until the next pairs()
+  Grid moving_, resting_;            // of the unsettled and of the settled objects
+  std::size_t in_vain_ = 0;          // objects entered in vain since the last settling
+
+  std::vector<Candidates> blocks_;  // of parallel jobs
+  std::size_t block_count_ = 0;
+  std::vector<IndexPair> pairs_, found_, merged_;
+  std::vector<uint32_t> begin_;  // of the pairs of each object in found_
+  Work work_;
+};
+
+}  // namespace offstage::sim

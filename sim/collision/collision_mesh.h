@@ -1,0 +1,41 @@
+#pragma once
+/// A registered mesh with what registration computes once, in the mesh's own frame (physics E2).
+
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "sim/collision/bounding_tree.h"
+#include "sim/collision/convex.h"
+#include "sim/geometry/convex_decomposition.h"
+#include "sim/geometry/mass_properties.h"
+#include "sim/geometry/mesh.h"
+
+namespace offstage::sim {
+
+class CollisionMesh {
+ public:
+  /// `known`: the mesh's decomposition, if somebody has kept it; else it is made when it is first asked for.
+  explicit CollisionMesh(TriangleMesh welded, std::optional<ConvexDecomposition> known = {});
+
+  TriangleMesh mesh;
+  MeshTopology topology;
+  MassProperties mass;
+  AabbTree tree;          ///< of the triangles
+  ConvexPolyhedron hull;  ///< of the vertices
+  bool solid;             ///< closed and not inverted: it has an inside; else it is a two-sided surface
+
+  /// Computed at the first call, which may take seconds; safe from several threads.
+  const ConvexDecomposition& decomposition() const;
+  /// Tree over the boxes of the decomposition's parts, whose items are their indices.
+  const AabbTree& part_tree() const;
+
+ private:
+  void decompose_once() const;
+
+  mutable std::once_flag once_;
+  mutable std::optional<ConvexDecomposition> decomposition_;
+  mutable AabbTree part_tree_;
+};
+
+}  // namespace offstage::sim

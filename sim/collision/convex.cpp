@@ -1,0 +1,161 @@
+#include "sim/collision/convex.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+
+namespace offstage::sim {
+namespace {
+
+constexpr std::size_t kScanned = 24;  // vertices; up to here looking at all of them is quicker than climbing
+// Share of the polyhedron's size by which it may fail to be convex: hulls merge faces that are closer to one
+// plane.
+constexpr Real kLevel = 1e-9;
+
+uint32_t highest(const ConvexPolyhedron& p, const Vec3& d) {
+  const std::span<const Vec3> vertices = p.vertices();
+  uint32_t best = 0;
+  Real height = d.dot(vertices[0]);
+  for (uint32_t v = 1; v < vertices.size(); ++v)
+    if (const Real h = d.dot(vertices[v]); h > height) {
+      height = h;
+      best = v;
+    }
+  return best;
+}
+
+/// The box corner whose coordinates have the signs of the bits.
+Vec3 corner(const Vec3& half, uint32_t bits) {
+  return {bits & 1 ? half.x() : -half.x(), bits & 2 ? half.y() : -half.y(), bits & 4 ? half.z() : -half.z()};
+}
+
+/// Of a disc about Y at a height; its centre if no point of the rim is favoured.
+Vec3 rim(const Vec3& d, Real radius, Real height) {
+  const Real rho = std::sqrt(d.x() * d.x() + d.z() * d.z());
+  if (!(rho > 0)) return {0, height, 0};
+  return {radius * (d.x() / rho), height, radius * (d.z() / rho)};
+}
+
+/// The apex if it is higher along d than the base's rim.
+Vec3 cone_support(const Vec3& half, const Vec3& d) {
+  const Real rho2 = d.x() * d.x() + d.z() * d.z(), rise = 2 * half.y() * d.y();
+  if (rise > 0 && rise * rise >= half.x() * half.x() * rho2) return {0, half.y(), 0};
+  return rim(d, half.x(), -half.y());
+}
+
+struct ConvexOf {
+  Convex operator()(const Sphere& s) const { return {.core = Convex::Core::point, .radius = s.radius}; }
+  Convex operator()(const Box& b) const { return {.core = Convex::Core::box, .half = b.size / 2}; }
+  Convex operator()(const Capsule& c) const {
+    return {.core = Convex::Core::segment, .half = Vec3(0, c.height / 2, 0), .radius = c.radius};
+  }
+  Convex operator()(const Cylinder& c) const {
+    return {.core = Convex::Core::cylinder, .half = Vec3(c.radius, c.height / 2, 0)};
+  }
+  Convex operator()(const Cone& c) const {
+    return {.core = Convex::Core::cone, .half = Vec3(c.radius, c.height / 2, 0)};
+  }
+  Convex operator()(const Plane&) const { return none(); }
+  Convex operator()(const MeshShape&) const { return none(); }
+
+  static Convex none() {
+    assert(false && "a plane and a mesh are not convex solids");
+    return {};
+  }
+};
+
+}  // namespace
+
+// On a convex polyhedron a vertex above its neighbours is above all, since the edges at it span a cone around
+// the polyhedron. On one that is convex only within rounding, a vertex that wrongly seems to be the top has a
+// neighbour almost as high.
+uint32_t support_vertex(const ConvexPolyhedron& p, const Vec3& d, uint32_t start) {
+  const std::span<const Vec3> vertices = p.vertices();
+  if (vertices.size() <= kScanned) return highest(p, d);
+  uint32_t top = start < vertices.size() ? start : 0;
+  Real height = d.dot(vertices[top]);
+  for (;;) {  // ends, for the height grows
+    uint32_t next = top;
+    Real best = -std::numeric_limits<Real>::infinity();
+    for (uint32_t v : p.vertex_neighbours(top))
+      if (const Real h = d.dot(vertices[v]); h > best) {
+        best = h;
+        next = v;
+      }
+    if (best > height) {
+      top = next;
+      height = best;
+      continue;
+    }
+    const Real drop = height - best, level = kLevel * p.reach();
+    return drop * drop > level * level * d.squaredNorm() ? top : highest(p, d);
+  }
+}
+
+Vec3 Convex::support(const Vec3& d, uint32_t& number) const {
+  switch (core) {
+    case Core::point:
+      break;
+    case Core::segment:
+      number = d.y() > 0;
+      return vertex(number);
+    case Core::triangle:
+      number = 0;
+      for (uint32_t k = 1; k < 3; ++k)
+        if (d.dot(*corners[k]) > d.dot(*corners[number])) number = k;
+      return *corners[number];
+    case Core::box:
+      number = (d.x() > 0 ? 1u : 0u) | (d.y() > 0 ? 2u : 0u) | (d.z() > 0 ? 4u : 0u);
+      return corner(half, number);
+    case Core::cylinder:
+      return rim(d, half.x(), std::copysign(half.y(), d.y()));
+    case Core::cone:
+      return cone_support(half, d);
+    case Core::polyhedron:
+      number = support_vertex(*polyhedron, d, number);
+      return polyhedron->vertex(number);
+  }
+  return Vec3::Zero();
+}
+
+Vec3 Convex::vertex(uint32_t number) const {
+  switch (core) {
+    case Core::segment:
+      return {0, number & 1 ? half.y() : -half.y(), 0};
+    case Core::triangle:
+      return *corners[number < 3 ? number : 0];
+    case Core::box:
+      return corner(half, number);
+    case Core::polyhedron:
+      return polyhedron->vertex(number < polyhedron->vertices().size() ? number : 0);
+    default:
+      return Vec3::Zero();
+  }
+}
+
+Vec3 Convex::centre() const {
+  if (core == Core::triangle) return (*corners[0] + *corners[1] + *corners[2]) / 3;
+  return core == Core::polyhedron ? polyhedron->centre() : Vec3::Zero();
+}
+
+Real Convex::reach() const {
+  if (core == Core::triangle)
+    return radius + std::sqrt(std::max(
+                        {corners[0]->squaredNorm(), corners[1]->squaredNorm(), corners[2]->squaredNorm()}));
+  return radius + (core == Core::polyhedron ? polyhedron->reach() : half.norm());
+}
+
+Convex convex(const Shape& primitive) {
+  return std::visit(ConvexOf{}, primitive);
+}
+
+Convex convex(const ConvexPolyhedron& polyhedron, Real radius) {
+  return {.core = Convex::Core::polyhedron, .radius = radius, .polyhedron = &polyhedron};
+}
+
+Convex convex_triangle(const Vec3& a, const Vec3& b, const Vec3& c) {
+  return {.core = Convex::Core::triangle, .corners = {&a, &b, &c}};
+}
+
+}  // namespace offstage::sim

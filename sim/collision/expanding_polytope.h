@@ -1,0 +1,26 @@
+#pragma once
+/// Penetration depth by the expanding polytope: van den Bergen, "Proximity queries and penetration depth
+/// computation on 3D game objects" (2001). A polytope inside A - B grows by support points beyond its face
+/// nearest to the origin until that face is one of A - B. Distances of faces are signed, so touching is no
+/// special case: an origin outside by rounding, or by little, gets a small positive distance along the same
+/// normal.
+
+#include "sim/collision/simplex.h"
+
+namespace offstage::sim {
+
+/// The surface point of A - B nearest to an origin that is inside, or barely outside.
+struct DeepestPoint {
+  Vec3 normal;    ///< unit, into A - B
+  Real distance;  ///< of the origin from the surface, negative inside: the plane through the point has
+                  ///< normal.w = distance
+  Vec3 on_a;      ///< point of A's core that it comes from
+  int iterations = 0;
+  bool converged = true;
+};
+
+/// Starts from the simplex that holds the origin or its nearest point, and leaves the final face there. If A
+/// - B is flat, the distance is 0 within rounding and the normal is across it, on the side of `sense`.
+DeepestPoint deepest_point(const MinkowskiDifference& m, Simplex& s, const Vec3& sense);
+
+}  // namespace offstage::sim

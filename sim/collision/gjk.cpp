@@ -1,0 +1,143 @@
+#include "sim/collision/gjk.h"
+
+#include <cmath>
+
+#include "sim/collision/expanding_polytope.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr int kMaxIterations = 100;
+constexpr Real kTolerance = 4;     // of the gap between the bounds of the distance, in roundings of a point
+constexpr Real kTouching = 64;     // roundings of a point; nearer cores have no direction between them
+constexpr Real kNear = 1e-9;       // of the size: if GJK stalls this near, the expanding polytope decides
+constexpr Real kLevel = 1 + 1e-14;  // ratio of squares that differ by rounding
+constexpr Real kAccepted = 1e-12;  // of the size: gap with which a stalled query is still an answer
+
+/// The last normal, or from the middle of B to that of A.
+Vec3 start_direction(const MinkowskiDifference& m, const GjkCache& cache) {
+  return cache.direction.squaredNorm() > 0 ? cache.direction : m.centre();
+}
+
+/// The simplex where the last query ended, or the support point along its normal.
+Simplex first_simplex(const MinkowskiDifference& m, const GjkCache& cache) {
+  Simplex s;
+  if (m.has_vertices() && cache.size > 0) {
+    s.size = std::min<std::size_t>(cache.size, cache.from.size());
+    for (std::size_t k = 0; k < s.size; ++k) s.points[k] = m.at(cache.from[k]);
+    return s;
+  }
+  s.size = 1;
+  s.points[0] = m.lowest(start_direction(m, cache), cache.from[0]);
+  return s;
+}
+
+void remember(const Simplex& s, const Vec3& direction, GjkCache& cache) {
+  cache.size = static_cast<uint32_t>(s.size);
+  for (std::size_t k = 0; k < s.size; ++k) cache.from[k] = s.points[k].from;
+  cache.direction = direction;
+}
+
+/// Of the solids, from the closest points of their cores.
+Separation around_cores(const MinkowskiDifference& m, Real distance, const Vec3& normal, const Vec3& on_a) {
+  Separation s;
+  s.distance = distance - m.radius();
+  s.normal = normal;
+  s.on_a = on_a - m.radius_a() * normal;
+  s.on_b = s.on_a - s.distance * normal;
+  return s;
+}
+
+Separation overlapping(const MinkowskiDifference& m, Simplex& s, GjkCache& cache, int iterations) {
+  const DeepestPoint deepest = deepest_point(m, s, start_direction(m, cache));
+  remember(s, deepest.normal, cache);
+  Separation result = around_cores(m, deepest.distance, deepest.normal, deepest.on_a);
+  result.iterations = iterations + deepest.iterations;
+  result.converged = deepest.converged;
+  return result;
+}
+
+/// Whether the nearest point of the simplex with a new corner is better: nearer to the origin, or as near within rounding
+/// but in a face rather than on its edge, which has the better normal.
+bool is_progress(const SimplexPoint& nearer, const SimplexPoint& nearest) {
+  return nearer.squared < nearest.squared ||
+         (nearer.size > nearest.size && nearer.squared <= kLevel * nearest.squared);
+}
+
+}  // namespace
+
+Separation gjk(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache& cache) {
+  const MinkowskiDifference m(a, b, a_from_b);
+  const Real rounding = m.rounding(), size = rounding / std::numeric_limits<Real>::epsilon();
+  Simplex s = first_simplex(m, cache);
+  SimplexPoint nearest = nearest_point(s);
+  reduce(s, nearest);
+  int iterations = 0;
+  bool converged = false;
+  Real distance = 0;
+  for (;;) {
+    distance = std::sqrt(nearest.squared);
+    if (nearest.size == 4 || distance <= kTouching * rounding) return overlapping(m, s, cache, iterations);
+    ++iterations;
+    const SupportPoint p = m.lowest(nearest.v, s.points[0].from);
+    const Real gap = distance - nearest.v.dot(p.w) / distance;
+    converged = gap <= kTolerance * rounding;
+    if (converged || iterations == kMaxIterations) break;
+    s.points[s.size++] = p;
+    const SimplexPoint nearer = nearest_point(s);
+    if (!is_progress(nearer, nearest)) {
+      --s.size;
+      if (distance < kNear * size) return overlapping(m, s, cache, iterations);
+      converged = gap <= kAccepted * size;
+      break;
+    }
+    nearest = nearer;
+    reduce(s, nearest);
+  }
+  const Vec3 normal = nearest.v / distance;
+  remember(s, normal, cache);
+  Separation result = around_cores(m, distance, normal, nearest.on_a(s));
+  result.iterations = iterations;
+  result.converged = converged;
+  return result;
+}
+
+Separation penetration(const Convex& a, const Convex& b, const Pose& a_from_b) {
+  GjkCache cache;
+  return gjk(a, b, a_from_b, cache);
+}
+
+bool overlap(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache& cache) {
+  const MinkowskiDifference m(a, b, a_from_b);
+  const Real radius2 = m.radius() * m.radius();
+  Simplex s;
+  SimplexPoint nearest;
+  Vec3 d = start_direction(m, cache);
+  if (m.has_vertices() && cache.size == 4) {  // the tetrahedron that held the origin last time
+    s = first_simplex(m, cache);
+    nearest = nearest_point(s);
+    if (nearest.size == 4) return true;
+    reduce(s, nearest);
+    d = nearest.v;
+  }
+  VertexPair hint = cache.from[0];
+  for (int i = 0; i < kMaxIterations; ++i) {
+    const SupportPoint p = m.lowest(d, hint);
+    hint = p.from;
+    if (const Real along = d.dot(p.w); along > 0 && along * along > radius2 * d.squaredNorm()) {
+      remember({1, {p}}, d.normalized(), cache);
+      return false;
+    }
+    s.points[s.size++] = p;
+    const SimplexPoint nearer = nearest_point(s);
+    if (!(nearer.squared < nearest.squared)) break;  // they touch within rounding
+    nearest = nearer;
+    reduce(s, nearest);
+    d = nearest.v;
+    if (nearest.size == 4 || nearest.squared <= radius2) break;
+  }
+  remember(s, cache.direction, cache);
+  return true;
+}
+
+}  // namespace offstage::sim

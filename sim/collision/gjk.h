@@ -1,0 +1,38 @@
+#pragma once
+/// Distance between convex solids by the algorithm of Gilbert, Johnson and Keerthi (1988), physics R4: the
+/// nearest point to the origin of the Minkowski difference A - B, from simplices whose sub-algorithm is
+/// solved robustly (Montanari, Petrinic, Barbieri, "Improving the GJK algorithm for faster and more reliable
+/// distance queries between convex objects", 2017). Supports climb the adjacency of polyhedra from the last
+/// vertex, and the simplex of the last query is where the next begins.
+
+#include <array>
+#include <cstdint>
+
+#include "sim/collision/convex.h"
+#include "sim/collision/minkowski.h"
+#include "sim/collision/separation.h"
+
+namespace offstage::sim {
+
+/// Where the last query of a pair ended; empty before the first. Any content is safe: it only decides how
+/// soon the answer is found, never what it is (beyond rounding and the choice between equal ones).
+struct GjkCache {
+  uint32_t size = 0;                 ///< of the simplex, in `from`; not used with curved cores
+  std::array<VertexPair, 4> from{};  ///< also where supports start to climb
+  Vec3 direction = Vec3::Zero();     ///< last normal, in A's frame; zero before the first query
+};
+
+/// Signed distance of A and B. Exact to rounding between cores with vertices, whatever their position; with a
+/// cylinder or a cone to 1e-12 of the size when apart and 1e-10 in penetration (some 0.5 % of those are a
+/// little worse, and say so by `converged`). Cores that overlap or touch are handed to deepest_point(), which
+/// has the normal of a face of A - B; so it does not depend on how near to touching they are.
+Separation gjk(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache& cache);
+
+/// The same without a cache: for solids known to overlap, the depth and direction of the least translation
+/// that separates them.
+Separation penetration(const Convex& a, const Convex& b, const Pose& a_from_b);
+
+/// Whether A and B have a point in common; ends at the first separating direction.
+bool overlap(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache& cache);
+
+}  // namespace offstage::sim

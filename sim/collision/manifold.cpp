@@ -1,0 +1,366 @@
+#include "sim/collision/manifold.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <utility>
+
+#include "sim/collision/supporting_feature.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr uint32_t kMaxCorners = SupportingFeature::kMaxCorners;
+
+/// Shares of the margin, which says how close counts as touching. By kTilt the gap along a face's normal may
+/// be shorter than the separation, and parallel edges may pass each other; by kRim a point may lie outside a
+/// face, and the true deepest point of a rim be deeper than the polygon's that stands for it.
+constexpr Real kTilt = 0.05, kRim = 0.001;
+/// Of the solids' size: what separations are found to.
+constexpr Real kRounding = 1e-9;
+/// Sine: a face further from across the separation's normal never gives the normal.
+constexpr Real kMaxTilt = 0.05;
+/// Sine: what is less inclined is parallel.
+constexpr Real kParallel = 1e-6;
+
+/// One of the two solids, as the manifold needs it, in A's frame.
+struct Body {
+  const Convex& convex;
+  Mat3 rotation;
+  Vec3 translation;
+  Vec3 outward;   ///< direction towards the other solid
+  uint32_t name;  ///< 0 for A, 1 for B
+
+  Vec3 local(const Vec3& d) const { return rotation.transpose() * d; }
+  /// Farthest point of the surface.
+  Vec3 support(const Vec3& d, uint32_t vertex) const {
+    return rotation * convex.support(local(d), vertex) + translation + convex.radius * d;
+  }
+  SupportingFeature feature(Real slack) const {
+    SupportingFeature f = supporting_feature(convex, local(outward), slack);
+    f.place(rotation, translation);
+    return f;
+  }
+  SupportingFeature edge(Real slack, const Vec3& on_surface) const {
+    const Vec3 on_core = on_surface - convex.radius * outward - translation;
+    SupportingFeature f = supporting_edge(convex, local(outward), slack, rotation.transpose() * on_core);
+    f.place(rotation, translation);
+    return f;
+  }
+};
+
+// Names of features
+
+uint32_t mixed(uint32_t x, uint32_t y) {
+  const uint64_t h = ((uint64_t{x} << 32 | y) + 0x9e3779b97f4a7c15u) * 0xbf58476d1ce4e5b9u;
+  return static_cast<uint32_t>((h ^ (h >> 32)) * 0x94d049bb133111ebu >> 32);
+}
+uint32_t vertex_id(const Body& body, uint32_t tag) {
+  return mixed(body.name, tag);
+}
+uint32_t edge_id(uint32_t tag, uint32_t other_tag) {
+  return mixed(std::min(tag, other_tag) + 2, std::max(tag, other_tag));
+}
+/// Of an edge of one body and an edge of the other, or of two of one.
+uint32_t crossing_id(const Body& x, uint32_t edge_x, const Body& y, uint32_t edge_y) {
+  return x.name < y.name ? mixed(edge_x, edge_y) : mixed(edge_y, edge_x);
+}
+
+// Clipping
+
+/// A corner of the incident feature's part over the reference face, and the side that leaves it: of the
+/// incident feature, or of the reference face if kMaxCorners are added.
+struct Corner {
+  Vec3 point;
+  uint32_t id;
+  uint32_t side;
+};
+
+struct Polygon {
+  uint32_t count = 0;
+  std::array<Corner, 2 * kMaxCorners> corners;
+
+  void add(const Corner& c) {
+    if (count < corners.size()) corners[count++] = c;
+  }
+};
+
+/// Sutherland and Hodgman, "Reentrant polygon clipping" (1974), against the planes that stand on the sides of
+/// the reference face. Segments and points pass as polygons of two corners and one.
+class Clipping {
+ public:
+  Clipping(const Body& reference_body, const SupportingFeature& reference, const Body& incident_body,
+           const SupportingFeature& incident, Real slop)
+      : reference_body_(reference_body),
+        reference_(reference),
+        incident_body_(incident_body),
+        incident_(incident) {
+    for (uint32_t k = 0; k < incident.count; ++k)
+      part_.add({incident.corners[k].point, vertex_id(incident_body, incident.corners[k].tag), k});
+    for (uint32_t k = 0; k < reference.count && part_.count > 0; ++k) cut(k, slop);
+  }
+
+  std::span<const Corner> corners() const { return {part_.corners.data(), part_.count}; }
+
+ private:
+  uint32_t tag_of(const SupportingFeature& f, uint32_t corner) const {
+    return f.corners[corner % f.count].tag;
+  }
+  uint32_t side_id(const SupportingFeature& f, uint32_t k) const {
+    return edge_id(tag_of(f, k), tag_of(f, k + 1));
+  }
+
+  /// Two neighbouring sides of the reference face meet in its vertex.
+  uint32_t id_of_crossing(uint32_t side, uint32_t reference_side) const {
+    const uint32_t cut = side_id(reference_, reference_side);
+    if (side < kMaxCorners)
+      return crossing_id(incident_body_, side_id(incident_, side), reference_body_, cut);
+    const uint32_t other = side - kMaxCorners;
+    if ((other + 1) % reference_.count == reference_side)
+      return vertex_id(reference_body_, tag_of(reference_, reference_side));
+    if ((reference_side + 1) % reference_.count == other)
+      return vertex_id(reference_body_, tag_of(reference_, other));
+    return mixed(side_id(reference_, other), cut);
+  }
+
+  void cut(uint32_t k, Real slop) {
+    const Vec3& corner = reference_.corners[k].point;
+    const Vec3& next = reference_.corners[(k + 1) % reference_.count].point;
+    const Vec3 inward = reference_.normal.cross(next - corner).normalized();
+    std::array<Real, 2 * kMaxCorners> inside;
+    bool all_inside = true;
+    for (uint32_t i = 0; i < part_.count; ++i) {
+      inside[i] = inward.dot(part_.corners[i].point - corner) + slop;
+      all_inside &= inside[i] >= 0;
+    }
+    if (all_inside) return;
+    Polygon whole;
+    for (; whole.count < part_.count; ++whole.count) whole.corners[whole.count] = part_.corners[whole.count];
+    part_.count = 0;
+    for (uint32_t i = 0; i < whole.count; ++i) {
+      const uint32_t j = (i + 1) % whole.count;
+      const Corner &from = whole.corners[i], &to = whole.corners[j];
+      const Real here = inside[i], there = inside[j];
+      if (here >= 0) part_.add(from);
+      if ((here >= 0) != (there >= 0))
+        part_.add({from.point + here / (here - there) * (to.point - from.point), id_of_crossing(from.side, k),
+                   here >= 0 ? kMaxCorners + k : from.side});
+    }
+  }
+
+  const Body& reference_body_;
+  const SupportingFeature& reference_;
+  const Body& incident_body_;
+  const SupportingFeature& incident_;
+  Polygon part_;
+};
+
+// Reduction
+
+/// Contact points before the reduction, no two of the same features.
+struct Candidates {
+  uint32_t count = 0;
+  std::array<ContactPoint, 2 * kMaxCorners + 1> points;
+
+  void add(const ContactPoint& p) {
+    for (uint32_t k = 0; k < count; ++k)
+      if (points[k].id == p.id) return;
+    if (count < points.size()) points[count++] = p;
+  }
+  Real least_separation() const {
+    Real least = std::numeric_limits<Real>::infinity();
+    for (uint32_t k = 0; k < count; ++k) least = std::min(least, points[k].separation);
+    return least;
+  }
+  /// The point of the largest measure; of equal ones (to a thousandth) the one of the least id, lest rounding
+  /// or the order choose.
+  template <class Measure>
+  const ContactPoint& most(Measure&& measure) const {
+    std::array<Real, 2 * kMaxCorners + 1> values;
+    for (uint32_t k = 0; k < count; ++k) values[k] = measure(points[k]);
+    const auto largest = std::max_element(values.begin(), values.begin() + count);
+    auto best = static_cast<uint32_t>(largest - values.begin());
+    for (uint32_t k = 0; k < count; ++k)
+      if (values[k] >= *largest - 1e-3 * std::abs(*largest) && points[k].id < points[best].id) best = k;
+    return points[best];
+  }
+};
+
+/// At most four points: all of them, or the deepest, the farthest from it, the one that spans the largest
+/// triangle with both, and the one that adds most to it. What is level within `slop` is equally deep.
+void reduce(Manifold& m, const Candidates& c, Real slop) {
+  m.count = 0;
+  const auto keep = [&m](const ContactPoint& p) { return (m.points[m.count++] = p).on_a; };
+  if (c.count <= m.points.size()) {
+    for (uint32_t k = 0; k < c.count; ++k) keep(c.points[k]);
+    return;
+  }
+  const Real level = c.least_separation() + slop;
+  const auto area = [&m](const Vec3& x, const Vec3& y, const Vec3& z) {
+    return m.normal.dot((y - x).cross(z - x));
+  };
+  const Vec3 p = keep(c.most([&](const ContactPoint& x) { return x.separation <= level ? 1.0 : 0.0; }));
+  const Vec3 q = keep(c.most([&](const ContactPoint& x) { return (x.on_a - p).squaredNorm(); }));
+  // Of points in a row the end away from q.
+  constexpr Real kRow = 1e-9;
+  const Vec3 r = keep(c.most([&](const ContactPoint& x) {
+    return std::abs(area(p, q, x.on_a)) + kRow * (x.on_a - q).squaredNorm();
+  }));
+  const Real sense = area(p, q, r) < 0 ? -1 : 1;
+  const auto gain = [&](const ContactPoint& x) {
+    return -std::min({sense * area(p, q, x.on_a), sense * area(q, r, x.on_a), sense * area(r, p, x.on_a)});
+  };
+  if (const ContactPoint& last = c.most(gain); gain(last) > 0) keep(last);
+}
+
+// Kinds of contact
+
+/// Whether a face of `reference` may give the normal: how far its normal is from the separation's, as a sine;
+/// or more than kMaxTilt.
+Real tilt(const Body& reference, const SupportingFeature& f, const Body& incident, uint32_t incident_vertex,
+          const Separation& s, Real tolerance) {
+  constexpr Real kNever = 2;
+  if (!f.is_face() || f.normal.dot(reference.outward) <= 0) return kNever;
+  const Real sine = f.normal.cross(reference.outward).norm();
+  if (sine > kMaxTilt || std::abs(s.distance) * sine > tolerance) return kNever;
+  const Vec3 on_reference = f.on_face + reference.convex.radius * f.normal;
+  const Real gap = f.normal.dot(incident.support(-f.normal, incident_vertex) - on_reference);
+  return s.distance - gap <= tolerance ? sine : kNever;
+}
+
+/// The incident feature over a face, which gives the normal. `closest` is the separation's point on the
+/// incident solid: of a rim it may be deeper than the corners that stand for it.
+void face_manifold(Manifold& m, const Body& reference, const SupportingFeature& face, const Body& incident,
+                   const SupportingFeature& other, const Vec3& closest, Real margin, Real slop) {
+  const Vec3 n = face.normal;
+  const bool on_a = reference.name == 0;
+  m.normal = on_a ? Vec3(-n) : n;
+  m.source = on_a ? NormalSource::face_of_a : NormalSource::face_of_b;
+  const Real offset = n.dot(face.on_face) + reference.convex.radius;
+  Candidates candidates;
+  const auto add = [&](const Vec3& on_incident, uint32_t id) {
+    const Real separation = n.dot(on_incident) - offset;
+    if (separation > margin) return;
+    const Vec3 on_reference = on_incident - separation * n;
+    candidates.add(on_a ? ContactPoint{on_reference, on_incident, separation, id}
+                        : ContactPoint{on_incident, on_reference, separation, id});
+  };
+  const Clipping part(reference, face, incident, other, slop);
+  for (const Corner& c : part.corners()) add(c.point - incident.convex.radius * n, c.id);
+  if (candidates.count == 0 || n.dot(closest) - offset < candidates.least_separation() - slop)
+    add(closest, mixed(2, incident.name));
+  reduce(m, candidates, slop);
+}
+
+/// The ends of the stretch along which two edges run side by side, if they do and are what the solids touch
+/// with.
+void parallel_edges(Manifold& m, const Body& a, const SupportingFeature& of_a, const Body& b,
+                    const SupportingFeature& of_b, Real distance, Real margin, Real tolerance) {
+  if (of_a.count < 2 || of_b.count < 2) return;
+  const Vec3 &p = of_a.corners[0].point, &q = of_b.corners[0].point;
+  const Vec3 u = of_a.corners[1].point - p, w = of_b.corners[1].point - q;
+  // Seen along the normal, in shares of B's edge: where A's edge begins and how far it goes. Then where it
+  // passes the ends of B's.
+  const Vec3 across = m.normal.cross(w), on_plane = across.cross(m.normal);
+  if (across.squaredNorm() < 0.5 * w.squaredNorm()) return;
+  const Real start = (p - q).dot(on_plane) / across.squaredNorm(),
+             along = u.dot(on_plane) / across.squaredNorm();
+  if (along == 0) return;
+  std::pair<Real, uint32_t> low{-start / along, vertex_id(b, of_b.corners[0].tag)},
+      high{(1 - start) / along, vertex_id(b, of_b.corners[1].tag)};
+  if (along < 0) std::swap(low, high);
+  if (low.first <= 0) low = {0, vertex_id(a, of_a.corners[0].tag)};
+  if (high.first >= 1) high = {1, vertex_id(a, of_a.corners[1].tag)};
+  if ((high.first - low.first) * u.norm() <= tolerance) return;
+
+  Candidates ends;
+  for (const auto& [t, id] : {low, high}) {
+    const Vec3 gap = p + t * u - q - (start + t * along) * w;
+    const Real separation = gap.dot(m.normal) - a.convex.radius - b.convex.radius;
+    if (std::abs(gap.dot(across)) > tolerance * across.norm() || separation > margin) return;
+    const Vec3 on_a = p + t * u - a.convex.radius * m.normal;
+    ends.add({on_a, on_a - separation * m.normal, separation, id});
+  }
+  if (ends.least_separation() <= distance + tolerance) reduce(m, ends, 0);
+}
+
+/// Of an edge or a vertex.
+uint32_t feature_id(const Body& body, const SupportingFeature& f) {
+  return f.edge != Vec3::Zero() ? edge_id(f.corners[0].tag, f.corners[f.count - 1].tag)
+                                : vertex_id(body, f.corners[0].tag);
+}
+
+/// Edges and vertices, where no face gives the normal.
+void edge_manifold(Manifold& m, const Body& a, const Body& b, const Separation& s, Real margin, Real slack,
+                   Real tolerance) {
+  const SupportingFeature of_a = a.edge(slack, s.on_a), of_b = b.edge(slack, s.on_b);
+  const bool across_a = of_a.edge != Vec3::Zero(), across_b = of_b.edge != Vec3::Zero();
+  m.source = across_b ? NormalSource::edge_of_b : across_a ? NormalSource::edge_of_a : NormalSource::points;
+  m.edge_a = of_a.edge;
+  m.edge_b = of_b.edge;
+  m.radius_a = a.convex.radius + of_a.rod;
+  m.radius_b = b.convex.radius + of_b.rod;
+  parallel_edges(m, a, of_a, b, of_b, s.distance, margin, tolerance);
+  if (m.count > 0) return;
+  if (across_a && across_b && of_a.edge.cross(of_b.edge).norm() > kParallel) m.source = NormalSource::edges;
+  m.count = 1;
+  m.points[0] = {s.on_a, s.on_b, s.distance, crossing_id(a, feature_id(a, of_a), b, feature_id(b, of_b))};
+}
+
+}  // namespace
+
+Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const Separation& s, Real margin) {
+  Manifold m;
+  m.normal = s.normal;
+  if (!(s.distance <= margin)) return m;
+  const Body body_a{a, Mat3::Identity(), Vec3::Zero(), -s.normal, 0};
+  const Body body_b{b, a_from_b.orientation.toRotationMatrix(), a_from_b.position, s.normal, 1};
+  const Real rounding = kRounding * (a.reach() + b.reach()), slack = margin + rounding;
+  const Real tolerance = kTilt * margin + rounding, slop = kRim * margin + rounding;
+
+  const SupportingFeature of_a = body_a.feature(slack), of_b = body_b.feature(slack);
+  const Real tilt_a = tilt(body_a, of_a, body_b, of_b.vertex, s, tolerance),
+             tilt_b = tilt(body_b, of_b, body_a, of_a.vertex, s, tolerance);
+  if (std::min(tilt_a, tilt_b) > kMaxTilt)
+    edge_manifold(m, body_a, body_b, s, margin, slack, tolerance);
+  else if (tilt_a <= tilt_b + kParallel)
+    face_manifold(m, body_a, of_a, body_b, of_b, s.on_b, margin, slop);
+  else
+    face_manifold(m, body_b, of_b, body_a, of_a, s.on_a, margin, slop);
+  return m;
+}
+
+Manifold placed(const Manifold& m, const Pose& pose) {
+  const Mat3 R = pose.orientation.toRotationMatrix();
+  Manifold result = m;
+  result.normal = R * m.normal;
+  result.edge_a = R * m.edge_a;
+  result.edge_b = R * m.edge_b;
+  for (uint32_t k = 0; k < m.count; ++k) {
+    result.points[k].on_a = R * m.points[k].on_a + pose.position;
+    result.points[k].on_b = R * m.points[k].on_b + pose.position;
+  }
+  return result;
+}
+
+Manifold plane_manifold(const Convex& a, const Pose& plane_from_a, Real margin) {
+  const Body body{a, plane_from_a.orientation.toRotationMatrix(), plane_from_a.position, -Vec3::UnitY(), 0};
+  const Real rounding = kRounding * a.reach();
+  const SupportingFeature feature = body.feature(margin + rounding);
+  Manifold m;
+  m.source = NormalSource::face_of_b;
+  Candidates candidates;
+  const auto add = [&](const Vec3& p, uint32_t id) {
+    if (p.y() <= margin) candidates.add({p, Vec3(p.x(), 0, p.z()), p.y(), id});
+  };
+  for (uint32_t k = 0; k < feature.count; ++k)
+    add(feature.corners[k].point - a.radius * Vec3::UnitY(), vertex_id(body, feature.corners[k].tag));
+  // Of a rim the lowest point may be between the corners that stand for it.
+  const Vec3 lowest = body.support(body.outward, feature.vertex);
+  if (lowest.y() < candidates.least_separation() - (kRim * margin + rounding)) add(lowest, mixed(2, 0));
+  reduce(m, candidates, kRim * margin + rounding);
+  return m;
+}
+
+}  // namespace offstage::sim

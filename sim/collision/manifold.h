@@ -1,0 +1,61 @@
+#pragma once
+/// Contact manifolds (physics R5): up to four points that represent where two convex solids touch, or would
+/// touch if they came closer.
+
+#include <array>
+#include <cstdint>
+
+#include "sim/collision/convex.h"
+#include "sim/collision/separation.h"
+
+namespace offstage::sim {
+
+/// One point of a manifold.
+struct ContactPoint {
+  Vec3 on_a = Vec3::Zero(), on_b = Vec3::Zero();  ///< on the surfaces; on_a - on_b = separation * normal
+  Real separation = 0;                            ///< [m], negative in penetration
+  /// Of the two features that meet here, a vertex and the other solid or an edge and an edge: the same from
+  /// step to step while they do.
+  uint32_t id = 0;
+};
+
+/// Which features the normal comes from: it decides how the normal turns with the bodies (contact_frame.h).
+enum class NormalSource : uint8_t {
+  face_of_a,  ///< the normal is fixed in A
+  face_of_b,  ///< the normal is fixed in B
+  edges,      ///< across a line fixed in A and one fixed in B
+  edge_of_a,  ///< from a point fixed in B, across a line fixed in A
+  edge_of_b,  ///< to a point fixed in A, across a line fixed in B
+  points,     ///< from a point fixed in B to one fixed in A
+};
+
+struct Manifold {
+  Vec3 normal = Vec3::UnitY();  ///< unit, from B to A
+  NormalSource source = NormalSource::points;
+  Vec3 edge_a = Vec3::Zero(), edge_b = Vec3::Zero();  ///< unit directions of the lines that `source` names
+  /// How far behind the surfaces those lines and points lie: of a sphere its centre, of a cylinder's side its
+  /// axis, of a sharp edge or vertex nothing [m]. 0 for faces.
+  Real radius_a = 0, radius_b = 0;
+  uint32_t count = 0;
+  std::array<ContactPoint, 4> points;  ///< the deepest first
+};
+
+/// The manifold of two solids around their closest (or deepest) points, in A's frame: the features of both
+/// that face each other along the normal, one clipped against the other, keeping what is within `margin` [m]
+/// of touching; of more than four points those that keep the deepest and the area. At least one point if the
+/// separation itself is within the margin, none otherwise. Points of a radius around an inclined core are
+/// below the core's: what is not the deepest lies a little inside the solid.
+///
+/// A face that is almost across the separation's normal gives the normal instead of it: where the gap along
+/// the face's normal is less than a twentieth of the margin shorter. So solids that rest on each other keep
+/// their normal and their points while they rock by that little.
+Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const Separation& s, Real margin);
+
+/// The same manifold in another frame, for instance world_from_a's.
+Manifold placed(const Manifold& m, const Pose& pose);
+
+/// The manifold of a solid A on the half-space y <= 0, B, in the half-space's frame. The deepest point is
+/// exact for every core, to two thousandths of the margin.
+Manifold plane_manifold(const Convex& a, const Pose& plane_from_a, Real margin);
+
+}  // namespace offstage::sim

@@ -1,0 +1,64 @@
+#pragma once
+/// The Minkowski difference A - B = {a - b} of two cores in A's frame, by its support mapping. It holds the
+/// origin where they overlap; otherwise its point nearest to the origin is the vector between their closest
+/// points.
+
+#include <limits>
+
+#include "sim/collision/convex.h"
+#include "sim/types.h"
+
+namespace offstage::sim {
+
+/// Vertex numbers of a core of A and one of B; see Convex::support.
+struct VertexPair {
+  uint32_t a = 0, b = 0;
+  bool operator==(const VertexPair&) const = default;
+};
+
+/// A point of A - B that is extreme in some direction.
+struct SupportPoint {
+  Vec3 w;  ///< the point
+  Vec3 a;  ///< the point of A's core which it comes from
+  VertexPair from;
+};
+
+class MinkowskiDifference {
+ public:
+  MinkowskiDifference(const Convex& a, const Convex& b, const Pose& a_from_b)
+      : a_(a), b_(b), R_(a_from_b.orientation.toRotationMatrix()), t_(a_from_b.position) {}
+
+  /// The point that is least along `d`, not necessarily unit; vertices are climbed from `hint`.
+  SupportPoint lowest(const Vec3& d, VertexPair hint) const {
+    SupportPoint p;
+    p.from = hint;
+    p.a = a_.support(-d, p.from.a);
+    p.w = p.a - place(b_.support(R_.transpose() * d, p.from.b));
+    return p;
+  }
+  /// The point of two vertices.
+  SupportPoint at(VertexPair from) const {
+    const Vec3 a = a_.vertex(from.a);
+    return {a - place(b_.vertex(from.b)), a, from};
+  }
+  /// Whether vertices tell all points of lowest().
+  bool has_vertices() const { return a_.has_vertices() && b_.has_vertices(); }
+  /// A point inside.
+  Vec3 centre() const { return a_.centre() - place(b_.centre()); }
+  /// The rounding error of its points, a bound up to a small factor [m].
+  Real rounding() const {
+    return std::numeric_limits<Real>::epsilon() * (a_.reach() + b_.reach() + t_.norm());
+  }
+  /// Sum of the radii around the cores [m].
+  Real radius() const { return a_.radius + b_.radius; }
+  Real radius_a() const { return a_.radius; }
+
+ private:
+  Vec3 place(const Vec3& in_b) const { return R_ * in_b + t_; }
+
+  const Convex &a_, &b_;
+  Mat3 R_;  ///< A's frame from B's
+  Vec3 t_;
+};
+
+}  // namespace offstage::sim

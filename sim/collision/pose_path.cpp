@@ -1,0 +1,38 @@
+#include "sim/collision/pose_path.h"
+
+#include <cmath>
+
+namespace offstage::sim {
+
+// With f half the angle and a(s) the half angle turned at share s, the interpolation has
+//   tan a = s sin f / ((1 - s) + s cos f),  da/ds = sin f / D,  D = 1 - 2 s (1 - s) (1 - cos f).
+// The spin 2 da/ds is largest at s = 1/2, 4 tan(f/2), and changes by at most 16 tan^3(f/2). A point at distance 1 from
+// the axis has the centripetal acceleration spin^2 and the tangential one of the spin's change.
+PosePath::PosePath(const Pose& start, const Pose& end)
+    : start_(start), end_(end), velocity_(end.position - start.position) {
+  if (start_.orientation.dot(end_.orientation) < 0) end_.orientation.coeffs() = -end_.orientation.coeffs();
+  const Quat rotation = end_.orientation * start_.orientation.conjugate();
+  sine_ = rotation.vec().norm();
+  // Orientations that differ by rounding alone do not turn.
+  if (start_.orientation.coeffs() == end_.orientation.coeffs() || sine_ < 1e-15) sine_ = 0;
+  cosine_ = std::max(0.0, rotation.w());
+  axis_ = sine_ > 0 ? Vec3(rotation.vec() / sine_) : Vec3::Zero();
+  turn_ = sine_ > 0 ? 2 * std::atan2(sine_, cosine_) : 0;
+  const Real half_tangent = sine_ / (1 + cosine_);
+  max_acceleration_ = 16 * half_tangent * half_tangent * (1 + half_tangent);
+}
+
+Pose PosePath::at(Real share) const {
+  Pose pose = start_;
+  pose.position += share * velocity_;
+  if (sine_ > 0)
+    pose.orientation.coeffs() =
+        ((1 - share) * start_.orientation.coeffs() + share * end_.orientation.coeffs()).normalized();
+  return pose;
+}
+
+Vec3 PosePath::angular_velocity(Real share) const {
+  return 2 * sine_ / (1 - 2 * share * (1 - share) * (1 - cosine_)) * axis_;
+}
+
+}  // namespace offstage::sim

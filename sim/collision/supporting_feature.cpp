@@ -1,0 +1,358 @@
+#include "sim/collision/supporting_feature.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+
+namespace offstage::sim {
+namespace {
+
+using Feature = SupportingFeature;
+constexpr uint32_t kMaxCorners = Feature::kMaxCorners;
+
+/// Of the solid's size: vertices so little below a face's plane belong to the face. Coordinates from files
+/// are seldom better, and what is meant to be flat comes as triangles that are not quite.
+constexpr Real kFlat = 1e-5;
+/// Cosine: edges and directions closer to a right angle are across each other. Normals at round solids are
+/// found to the root of what distances are found to.
+constexpr Real kAcross = 1e-4;
+
+/// Tags of the ends of a round side's line; rims have the ones below.
+constexpr uint32_t kLineTag = 2 * kMaxCorners;
+
+/// Directions around the circle. By halving the angle with square roots: the same bits on every machine.
+const std::array<Eigen::Vector2d, kMaxCorners>& circle() {
+  static const std::array<Eigen::Vector2d, kMaxCorners> points = [] {
+    Real cosine = 0;  // of a quarter turn
+    for (uint32_t parts = 4; parts < kMaxCorners; parts *= 2) cosine = std::sqrt((1 + cosine) / 2);
+    const Eigen::Matrix2d turn{{cosine, -std::sqrt(1 - cosine * cosine)},
+                               {std::sqrt(1 - cosine * cosine), cosine}};
+    std::array<Eigen::Vector2d, kMaxCorners> result;
+    result[0] = Eigen::Vector2d::UnitX();
+    for (uint32_t k = 1; k < kMaxCorners; ++k)
+      result[k] = k % (kMaxCorners / 4) == 0
+                      ? Eigen::Vector2d(-result[k - kMaxCorners / 4].y(), result[k - kMaxCorners / 4].x())
+                      : Eigen::Vector2d(turn * result[k - 1]);
+    return result;
+  }();
+  return points;
+}
+
+/// How much of a length lies within `slack` if its far end rises by `rise`, as a share.
+Real share_within(Real slack, Real rise) {
+  return rise > slack ? slack / rise : 1;
+}
+
+Feature point_feature(const Vec3& p, uint32_t tag) {
+  Feature f;
+  f.add(p, tag);
+  f.vertex = tag;
+  return f;
+}
+
+Feature segment_feature(const Vec3& p, uint32_t p_tag, const Vec3& q, uint32_t q_tag, const Vec3& d) {
+  Feature f = point_feature(p, p_tag);
+  f.add(q, q_tag);
+  const Vec3 along = (q - p).normalized();
+  if (std::abs(along.dot(d)) <= kAcross) f.edge = along;
+  return f;
+}
+
+// Box
+
+Vec3 box_extent(const Vec3& half, const Vec3& d, Real slack) {
+  Vec3 extent = 2 * half;
+  for (int i = 0; i < 3; ++i) extent[i] *= share_within(slack, extent[i] * std::abs(d[i]));
+  return extent;
+}
+
+Feature box_face(const Convex& c, const Vec3& d, Real slack) {
+  const Vec3 extent = box_extent(c.half, d, slack);
+  int axis = 0;
+  Real best = -1;
+  for (int i = 0; i < 3; ++i) {
+    const Real patch = extent[(i + 1) % 3] * extent[(i + 2) % 3] * std::abs(d[i]);
+    if (patch <= best) continue;
+    best = patch;
+    axis = i;
+  }
+  const uint32_t side = d[axis] > 0, i = static_cast<uint32_t>(axis), j = (i + 1) % 3, k = (i + 2) % 3;
+  Feature f;
+  f.normal[axis] = side ? 1 : -1;
+  for (uint32_t corner = 0; corner < 4; ++corner) {
+    // Counter-clockwise about +axis: (-,-) (+,-) (+,+) (-,+).
+    const uint32_t at = side ? corner : 3 - corner, right = at == 1 || at == 2, up = at >= 2;
+    const uint32_t tag = side << i | right << j | up << k;
+    f.add(c.vertex(tag), tag);
+  }
+  f.vertex = f.corners[0].tag;
+  f.on_face = f.corners[0].point;
+  return f;
+}
+
+Feature box_edge(const Convex& c, const Vec3& d, Real slack) {
+  const Vec3 extent = box_extent(c.half, d, slack);
+  uint32_t corner = 0;
+  c.support(d, corner);
+  int axis = 0, across = 0;
+  for (int i = 1; i < 3; ++i) {
+    if (extent[i] > extent[axis]) axis = i;
+    if (std::abs(d[i]) < std::abs(d[across])) across = i;
+  }
+  if (std::abs(d[across]) <= kAcross) axis = across;
+  const uint32_t other = corner ^ (1u << axis);
+  return segment_feature(c.vertex(corner), corner, c.vertex(other), other, d);
+}
+
+// Triangle
+
+/// The side of it that faces d; an edge if it has no area.
+Feature triangle_face(const Convex& c, const Vec3& d, Real slack) {
+  const Vec3 &p = *c.corners[0], &q = *c.corners[1], &r = *c.corners[2];
+  const Vec3 area = (q - p).cross(r - p);
+  const Real longest2 = std::max({(q - p).squaredNorm(), (r - q).squaredNorm(), (p - r).squaredNorm()});
+  if (!(area.norm() > kFlat * longest2)) return supporting_edge(c, d, slack, Vec3::Zero());
+  const bool front = area.dot(d) > 0;
+  Feature f;
+  f.normal = (front ? 1 : -1) * area.normalized();
+  for (uint32_t k = 0; k < 3; ++k) {
+    const uint32_t corner = front ? k : 2 - k;
+    f.add(*c.corners[corner], corner);
+  }
+  return f;
+}
+
+/// Of the two edges at the corner touched the one across d, or else the one of which most is within `slack`.
+Feature triangle_edge(const Convex& c, const Vec3& d, Real slack) {
+  uint32_t corner = 0;
+  const Vec3 top = c.support(d, corner);
+  Feature best;
+  Real best_length = -1;
+  for (const uint32_t other : {(corner + 1) % 3, (corner + 2) % 3}) {
+    const Vec3 edge = c.vertex(other) - top;
+    const Feature f = segment_feature(top, corner, c.vertex(other), other, d);
+    const Real length = f.edge != Vec3::Zero() ? std::numeric_limits<Real>::infinity()
+                                               : share_within(slack, -d.dot(edge)) * edge.norm();
+    if (!(edge.squaredNorm() > 0) || length <= best_length) continue;
+    best = f;
+    best_length = length;
+  }
+  return best.count > 0 ? best : point_feature(top, corner);
+}
+
+// Polyhedron
+
+/// The corners of a set of points of a plane that are farthest in as many directions: their hull but for
+/// corners so blunt that they fall between two directions.
+void spread_corners(Feature& f, const ConvexPolyhedron& p, std::span<const uint32_t> vertices,
+                    const Vec3& u) {
+  const Vec3 w = f.normal.cross(u);
+  f.count = 0;
+  for (const Eigen::Vector2d& direction : circle()) {
+    const Vec3 d = direction.x() * u + direction.y() * w;
+    uint32_t best = vertices[0];
+    for (uint32_t v : vertices)
+      if (d.dot(p.vertex(v)) > d.dot(p.vertex(best))) best = v;
+    if (f.count == 0 || (f.corners[f.count - 1].tag != best && f.corners[0].tag != best))
+      f.add(p.vertex(best), best);
+  }
+}
+
+/// The face, together with the vertices around it that are all but in its plane.
+Feature flat_part(const ConvexPolyhedron& p, uint32_t face) {
+  const ConvexPolyhedron::Plane& plane = p.plane(face);
+  const std::span<const uint32_t> loop = p.face_vertices(face);
+  const Vec3& along = p.edge_frame(p.face_edges(face)[0]).along;
+  Feature f;
+  f.normal = plane.normal;
+  f.on_face = p.vertex(loop[0]);
+
+  constexpr std::size_t kMaxVertices = 256;
+  std::array<uint32_t, kMaxVertices> vertices;
+  if (loop.size() > kMaxVertices) {
+    spread_corners(f, p, loop, along);
+    return f;
+  }
+  std::size_t count = loop.size();
+  std::copy(loop.begin(), loop.end(), vertices.begin());
+  const Real least = plane.offset - kFlat * p.reach();
+  for (std::size_t i = 0; i < count; ++i)
+    for (uint32_t v : p.vertex_neighbours(vertices[i])) {
+      if (count == kMaxVertices || plane.normal.dot(p.vertex(v)) < least) continue;
+      if (std::find(vertices.begin(), vertices.begin() + count, v) == vertices.begin() + count)
+        vertices[count++] = v;
+    }
+
+  if (count == loop.size() && count <= kMaxCorners)
+    for (uint32_t v : loop) f.add(p.vertex(v), v);
+  else
+    spread_corners(f, p, {vertices.data(), count}, along);
+  return f;
+}
+
+/// Part of the edge from one vertex to another that is within `slack` of the first along d.
+Vec3 part_within(const ConvexPolyhedron& p, uint32_t from, uint32_t to, const Vec3& d, Real slack) {
+  const Vec3 edge = p.vertex(to) - p.vertex(from);
+  return share_within(slack, -d.dot(edge)) * edge;
+}
+
+Feature polyhedron_edge(const ConvexPolyhedron& p, const Vec3& d, Real slack, uint32_t v) {
+  if (p.edges().empty()) return point_feature(p.vertex(v), v);
+  const auto slope = [&](uint32_t e) { return std::abs(d.dot(p.edge_frame(e).along)); };
+  const std::span<const uint32_t> edges = p.vertex_edges(v), ends = p.vertex_neighbours(v);
+  std::size_t longest = 0, across = 0;
+  Real length2 = -1;
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    if (slope(edges[k]) < slope(edges[across])) across = k;
+    const Real within2 = part_within(p, v, ends[k], d, slack).squaredNorm();
+    if (within2 <= length2) continue;
+    length2 = within2;
+    longest = k;
+  }
+  const uint32_t end = ends[slope(edges[across]) <= kAcross ? across : longest];
+  return segment_feature(p.vertex(v), v, p.vertex(end), end, d);
+}
+
+Feature polyhedron_face(const ConvexPolyhedron& p, const Vec3& d, Real slack, uint32_t v) {
+  if (p.dimension() < 2) return polyhedron_edge(p, d, slack, v);
+  uint32_t face = kNoFace;
+  Real best = -1;
+  for (uint32_t e : p.vertex_edges(v)) {
+    const uint32_t f = p.edge(e).tail == v ? p.edge(e).left : p.edge(e).right;
+    const std::span<const uint32_t> loop = p.face_vertices(f);
+    const auto at = static_cast<std::size_t>(std::find(loop.begin(), loop.end(), v) - loop.begin());
+    const Vec3 next = part_within(p, v, loop[(at + 1) % loop.size()], d, slack),
+               last = part_within(p, v, loop[(at + loop.size() - 1) % loop.size()], d, slack);
+    const Real patch = std::max(0.0, d.dot(next.cross(last)));
+    if (patch <= best) continue;
+    best = patch;
+    face = f;
+  }
+  return flat_part(p, face);
+}
+
+// Solids of revolution
+
+/// The direction away from the axis in which d leans.
+Vec3 outward(const Vec3& d) {
+  const Real rho = std::sqrt(d.x() * d.x() + d.z() * d.z());
+  return rho > 0 ? Vec3(d.x() / rho, 0, d.z() / rho) : Vec3::UnitX();
+}
+
+Feature disc(Real radius, Real y, bool up) {
+  Feature f;
+  f.normal = up ? Vec3::UnitY() : Vec3(-Vec3::UnitY());
+  for (uint32_t k = 0; k < kMaxCorners; ++k) {
+    // From +X towards +Z is clockwise seen from +Y.
+    const uint32_t at = up ? kMaxCorners - 1 - k : k;
+    f.add({radius * circle()[at].x(), y, radius * circle()[at].y()}, at + (up ? kMaxCorners : 0));
+  }
+  f.on_face = Vec3(0, y, 0);
+  return f;
+}
+
+/// The line of the round side that faces d: from the base to the top, or from the end that is farther along
+/// d. And its inclination: the outward normal there.
+struct RoundSide {
+  Vec3 from, to, normal;
+  uint32_t from_tag = kLineTag, to_tag = kLineTag + 1;
+};
+
+RoundSide round_side(const Convex& c, const Vec3& d) {
+  const Real R = c.half.x(), h = c.half.y(), top = c.core == Convex::Core::cone ? 0 : R;
+  const Vec3 out = outward(d);
+  RoundSide side{out * R - h * Vec3::UnitY(), out * top + h * Vec3::UnitY(),
+                 (2 * h * out + (R - top) * Vec3::UnitY()).normalized()};
+  if (d.dot(side.to) > d.dot(side.from)) {
+    std::swap(side.from, side.to);
+    std::swap(side.from_tag, side.to_tag);
+  }
+  return side;
+}
+
+/// Whether more of the flat side than of the round one is within `slack`. Both patches are about as wide
+/// across the plane through d and the axis, so what they extend in it decides.
+bool rests_on_disc(const Convex& c, const RoundSide& side, const Vec3& d, Real slack) {
+  const bool up = d.y() > 0;
+  if (up && c.core == Convex::Core::cone) return false;
+  const Real R = c.half.x(), lean = d.dot(outward(d)), length = (side.to - side.from).norm();
+  const Real disc_within = 2 * R * share_within(slack, 2 * R * lean) * std::abs(d.y()),
+             line_within = length * share_within(slack, d.dot(side.from - side.to)) * d.dot(side.normal);
+  return disc_within > line_within;
+}
+
+Feature revolved(const Convex& c, const Vec3& d, Real slack) {
+  const RoundSide side = round_side(c, d);
+  if (rests_on_disc(c, side, d, slack)) return disc(c.half.x(), std::copysign(c.half.y(), d.y()), d.y() > 0);
+  return segment_feature(side.from, side.from_tag, side.to, side.to_tag, d);
+}
+
+/// A line of the round side where it is across d or, unless it rests on a disc, almost is; else the rim,
+/// whose tangent always is; else the apex.
+Feature revolved_edge(const Convex& c, const Vec3& d, Real slack, const Vec3& on_surface) {
+  const RoundSide side = round_side(c, d);
+  Feature line = segment_feature(side.from, side.from_tag, side.to, side.to_tag, d);
+  if (line.edge != Vec3::Zero()) {
+    // On a cone the centre of curvature is where the normal meets the axis.
+    line.rod = std::max(0.0, outward(d).dot(on_surface)) / side.normal.dot(outward(d));
+    return line;
+  }
+  const bool apex = c.core == Convex::Core::cone && side.from.y() > 0;
+  if (rests_on_disc(c, side, d, slack)) line.count = 1;
+  if (!apex) line.edge = Vec3::UnitY().cross(outward(d));
+  return line;
+}
+
+}  // namespace
+
+void SupportingFeature::place(const Mat3& rotation, const Vec3& translation) {
+  for (uint32_t k = 0; k < count; ++k) corners[k].point = rotation * corners[k].point + translation;
+  normal = rotation * normal;
+  on_face = rotation * on_face + translation;
+  edge = rotation * edge;
+}
+
+SupportingFeature supporting_feature(const Convex& c, const Vec3& d, Real slack) {
+  switch (c.core) {
+    case Convex::Core::triangle:
+      return triangle_face(c, d, slack);
+    case Convex::Core::box:
+      return box_face(c, d, slack);
+    case Convex::Core::cylinder:
+    case Convex::Core::cone:
+      return revolved(c, d, slack);
+    case Convex::Core::polyhedron: {
+      const uint32_t v = support_vertex(*c.polyhedron, d, 0);
+      Feature f = polyhedron_face(*c.polyhedron, d, slack, v);
+      f.vertex = v;
+      return f;
+    }
+    default:
+      return supporting_edge(c, d, slack, Vec3::Zero());
+  }
+}
+
+SupportingFeature supporting_edge(const Convex& c, const Vec3& d, Real slack, const Vec3& on_surface) {
+  switch (c.core) {
+    case Convex::Core::point:
+      return point_feature(Vec3::Zero(), 0);
+    case Convex::Core::segment: {
+      if (!(c.half.y() > 0)) return point_feature(Vec3::Zero(), 0);
+      const uint32_t end = d.y() > 0;
+      return segment_feature(c.vertex(end), end, c.vertex(1 - end), 1 - end, d);
+    }
+    case Convex::Core::triangle:
+      return triangle_edge(c, d, slack);
+    case Convex::Core::box:
+      return box_edge(c, d, slack);
+    case Convex::Core::cylinder:
+    case Convex::Core::cone:
+      return revolved_edge(c, d, slack, on_surface);
+    case Convex::Core::polyhedron:
+      return polyhedron_edge(*c.polyhedron, d, slack, support_vertex(*c.polyhedron, d, 0));
+  }
+  return {};
+}
+
+}  // namespace offstage::sim

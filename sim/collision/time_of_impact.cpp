@@ -1,0 +1,111 @@
+#include "sim/collision/time_of_impact.h"
+
+#include <cmath>
+#include <limits>
+
+#include "sim/collision/gjk.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
+/// Far more than any pair needs whose rate bound is within a factor of a hundred of the truth.
+constexpr int kMaxAdvances = 2000;
+
+Pose relative(const Pose& a, const Pose& b) {
+  return {a.point_to_body(b.position), a.orientation.conjugate() * b.orientation};
+}
+
+/// The largest d.p over a placed solid's points relative to its frame's origin; d in the world.
+Real extent(const Convex& shape, const Quat& orientation, const Vec3& d) {
+  const Vec3 local = orientation.conjugate() * d;
+  uint32_t start = 0;
+  return local.dot(shape.support(local, start)) + shape.radius * local.norm();
+}
+
+/// Advances until the solids are within the tolerance. `gap_at(share, separation)` measures, filling in the separation.
+/// Each advance aims at half the tolerance, so that it ends after finitely many.
+template <class GapAt>
+std::optional<Impact> advance(const GapAt& gap_at, Real tolerance) {
+  Impact impact{0, {}};
+  for (impact.advances = 1; impact.advances <= kMaxAdvances; ++impact.advances) {
+    const Gap gap = gap_at(impact.share, impact.separation);
+    if (gap.distance <= tolerance) return impact;
+    const Real next = impact.share + gap.time_to(tolerance / 2);
+    if (!(next < 1)) return std::nullopt;
+    impact.share = next;
+  }
+  impact.converged = false;
+  return impact;
+}
+
+}  // namespace
+
+Real Gap::time_to(Real target) const {
+  const Real room = distance - target;
+  if (room <= 0) return 0;
+  const Real root = std::sqrt(rate * rate + 2 * acceleration * room);
+  // Of the two forms of the positive root of room = rate t + acceleration t^2 / 2, the one without cancellation.
+  if (rate > 0) return 2 * room / (rate + root);
+  return acceleration > 0 ? (root - rate) / acceleration : kInfinity;
+}
+
+Gap closing_gap(const MovingConvex& a, const MovingConvex& b, Real share, Real distance, const Vec3& normal) {
+  Gap gap{distance, normal.dot(b.path.velocity() - a.path.velocity()), 0};
+  // -n.(w x r) = r.(w x n) for the points of A, and n.(w x r) = r.(n x w) for those of B.
+  if (a.path.turn() > 0) {
+    gap.rate += extent(a.shape, a.path.at(share).orientation, a.path.angular_velocity(share).cross(normal));
+    gap.acceleration += a.path.max_acceleration(a.shape.reach());
+  }
+  if (b.path.turn() > 0) {
+    gap.rate += extent(b.shape, b.path.at(share).orientation, normal.cross(b.path.angular_velocity(share)));
+    gap.acceleration += b.path.max_acceleration(b.shape.reach());
+  }
+  return gap;
+}
+
+std::optional<Impact> time_of_impact(const MovingConvex& a, const MovingConvex& b, Real tolerance) {
+  GjkCache cache;
+  const auto gap_at = [&](Real share, Separation& s) {
+    const Pose pose = a.path.at(share);
+    s = gjk(a.shape, b.shape, relative(pose, b.path.at(share)), cache);
+    return closing_gap(a, b, share, s.distance, pose.vector_to_world(s.normal));
+  };
+  return advance(gap_at, tolerance);
+}
+
+// A point a of the solid is n.(a - o) over a plane through o. While the plane turns with w about o this changes by
+// n.(v_a - v_o) + (w x n).(a - o): as if the point moved and the plane stood still with the opposite rotation. The
+// relative acceleration seen from the plane adds the Coriolis and centripetal terms.
+std::optional<Impact> time_of_plane_impact(const MovingConvex& a, const PosePath& plane, Real tolerance) {
+  const Real reach = a.shape.reach();
+  // The greatest distance of a point of the solid from the plane's origin on the way: at one of its ends.
+  const Real lever = reach + std::sqrt(std::max((a.path.start().position - plane.start().position).squaredNorm(),
+                                                (a.path.end().position - plane.end().position).squaredNorm()));
+  const Vec3 travel = a.path.velocity() - plane.velocity();
+  const auto gap_at = [&](Real share, Separation& s) {
+    const Pose pose = a.path.at(share), ground = plane.at(share);
+    const Vec3 up = ground.vector_to_world(Vec3::UnitY()), w = plane.angular_velocity(share),
+               spin = a.path.angular_velocity(share);
+    const Vec3 down = pose.vector_to_body(-up);
+    uint32_t start = 0;
+    const Vec3 deepest = a.shape.support(down, start) + a.shape.radius * down;
+    s = {};
+    s.normal = -down;
+    s.distance = up.dot(pose.point_to_world(deepest) - ground.position);
+    s.on_a = deepest;
+    s.on_b = deepest - s.distance * s.normal;
+    s.iterations = 1;
+    const Vec3 turning = w.cross(up);
+    Gap gap{s.distance, -up.dot(travel) - turning.dot(pose.position - ground.position), 0};
+    gap.rate += extent(a.shape, pose.orientation, spin.cross(up) - turning);
+    const Real fastest = a.path.turn() > 0 ? std::sqrt(a.path.max_acceleration(1)) : 0,
+               ground_fastest = plane.turn() > 0 ? std::sqrt(plane.max_acceleration(1)) : 0;
+    gap.acceleration = a.path.max_acceleration(reach) + plane.max_acceleration(lever) +
+                       2 * ground_fastest * (travel.norm() + fastest * reach);
+    return gap;
+  };
+  return advance(gap_at, tolerance);
+}
+
+}  // namespace offstage::sim

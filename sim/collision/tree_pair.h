@@ -1,0 +1,108 @@
+#pragma once
+/// Traversal of two bounding trees of the same or of different kinds, each in the frame of its own mesh. Only
+/// where one frame lies in the other is needed: volumes are carried over as the descent meets them (physics
+/// H8). Nothing is allocated.
+
+#include <algorithm>
+#include <array>
+#include <concepts>
+#include <utility>
+
+#include "sim/collision/bounding_tree.h"
+#include "sim/collision/volume_pair.h"
+
+namespace offstage::sim {
+
+/// A pair of nodes yet to be visited; `gap` bounds the distance of what is beneath.
+template <class A, class B>
+struct NodePair {
+  const typename BoundingTree<A>::Node* a;
+  const typename BoundingTree<B>::Node* b;
+  Real gap = 0;
+};
+
+/// The pairs of nodes that remain for later. Each step down replaces a pair by two of which one is visited
+/// next, so no more than the sum of the depths remain.
+template <class A, class B>
+class NodePairStack {
+ public:
+  bool empty() const { return size_ == 0; }
+  void push(const NodePair<A, B>& pair) { pairs_[size_++] = pair; }
+  NodePair<A, B> pop() { return pairs_[--size_]; }
+
+ private:
+  std::array<NodePair<A, B>, 2 * kMaxTreeDepth + 2> pairs_;
+  std::size_t size_ = 0;
+};
+
+/// The two pairs into which a pair of nodes falls, of which not both are leaves: by the children of the
+/// larger one.
+template <class A, class B>
+std::pair<NodePair<A, B>, NodePair<A, B>> descend(const BoundingTree<A>& tree_a,
+                                                  const BoundingTree<B>& tree_b, const NodePair<A, B>& pair) {
+  const auto& [a, b, gap] = pair;
+  if (b->is_leaf() || (!a->is_leaf() && squared_size(a->volume) > squared_size(b->volume)))
+    return {{&tree_a.first_child(*a), b}, {&tree_a.second_child(*a), b}};
+  return {{a, &tree_b.first_child(*b)}, {a, &tree_b.second_child(*b)}};
+}
+
+/// Calls visit(item of a, item of b) for every pair of items whose leaves' volumes come within the
+/// placement's margin, in an order that depends on the trees alone. Where visit returns bool, false ends the
+/// traversal. Returns whether it went through.
+template <class A, class B, class Visit>
+bool for_each_pair(const BoundingTree<A>& tree_a, const BoundingTree<B>& tree_b, const Placement& a_from_b,
+                   Visit&& visit) {
+  const auto go_on = [&](uint32_t i, uint32_t j) {
+    if constexpr (std::same_as<decltype(visit(i, j)), bool>) return visit(i, j);
+    visit(i, j);
+    return true;
+  };
+  if (tree_a.empty() || tree_b.empty()) return true;
+  NodePairStack<A, B> stack;
+  stack.push({&tree_a.nodes()[0], &tree_b.nodes()[0]});
+  while (!stack.empty()) {
+    const NodePair<A, B> pair = stack.pop();
+    if (!overlap(pair.a->volume, pair.b->volume, a_from_b)) continue;
+    if (pair.a->is_leaf() && pair.b->is_leaf()) {
+      for (uint32_t i : tree_a.items(*pair.a))
+        for (uint32_t j : tree_b.items(*pair.b))
+          if (!go_on(i, j)) return false;
+      continue;
+    }
+    const auto [first, second] = descend(tree_a, tree_b, pair);
+    stack.push(second);
+    stack.push(first);
+  }
+  return true;
+}
+
+/// Branch and bound: calls distance(item of a, item of b) for every pair that can be nearer than the least
+/// value seen so far, starting from `limit`; nearer volumes first. The placement's margin plays no part.
+template <class A, class B, class Distance>
+void nearest_pair(const BoundingTree<A>& tree_a, const BoundingTree<B>& tree_b, const Placement& a_from_b,
+                  Real limit, Distance&& distance) {
+  if (tree_a.empty() || tree_b.empty()) return;
+  const auto bounded = [&](NodePair<A, B> pair) {
+    pair.gap = std::max(gap(pair.a->volume, pair.b->volume, a_from_b) - a_from_b.slack, 0.0);
+    return pair;
+  };
+  NodePairStack<A, B> stack;
+  stack.push(bounded({&tree_a.nodes()[0], &tree_b.nodes()[0]}));
+  while (!stack.empty()) {
+    const NodePair<A, B> pair = stack.pop();
+    if (pair.gap >= limit) continue;
+    if (pair.a->is_leaf() && pair.b->is_leaf()) {
+      for (uint32_t i : tree_a.items(*pair.a))
+        for (uint32_t j : tree_b.items(*pair.b)) limit = std::min(limit, distance(i, j));
+      continue;
+    }
+    auto [near, far] = descend(tree_a, tree_b, pair);
+    near = bounded(near);
+    far = bounded(far);
+    if (far.gap < near.gap) std::swap(near, far);
+    stack.push(far);
+    stack.push(near);
+  }
+}
+
+}  // namespace offstage::sim

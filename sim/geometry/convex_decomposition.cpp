@@ -1,0 +1,112 @@
+#include "sim/geometry/convex_decomposition.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "sim/geometry/convex_hull.h"
+#include "sim/geometry/hull_merge.h"
+#include "sim/geometry/joe_decomposition.h"
+#include "sim/geometry/mass_properties.h"
+#include "sim/geometry/polyhedron.h"
+#include "sim/geometry/voxel_decomposition.h"
+#include "sim/geometry/winding_number.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Distances below this share of a mesh's diagonal count as none: files give coordinates in single precision,
+/// so what was flat when it was drawn is flat within 1e-7.
+constexpr Real kSamePlace = 2e-7;
+/// How well the parts of an exact decomposition fill the solid, as a share of its volume.
+constexpr Real kExact = 1e-6;
+
+using Method = ConvexDecomposition::Method;
+
+Real relative_error(const std::vector<ConvexPolyhedron>& parts, Real volume) {
+  Real sum = 0;
+  for (const ConvexPolyhedron& p : parts) sum += hull_volume(p);
+  return std::abs(sum - volume) / volume;
+}
+
+/// The exact method's parts, or why there are none.
+struct ExactResult {
+  std::vector<ConvexPolyhedron> parts;
+  std::string failure;
+};
+
+ExactResult failed(std::string why) {
+  return {{}, std::move(why)};
+}
+
+/// Why the pieces of a surface cannot be cut apart, or nothing.
+std::string obstacle(const std::vector<Polyhedron>& shells, uint32_t max_reflex_edges) {
+  uint32_t reflex = 0;
+  for (const Polyhedron& shell : shells) {
+    if (signed_volume6(shell) < 0) return "a cavity inside";
+    reflex += count_reflex_edges(shell);
+  }
+  if (reflex <= max_reflex_edges) return {};
+  return std::to_string(reflex) + " reflex edges, more than " + std::to_string(max_reflex_edges);
+}
+
+ExactResult decompose_exactly(const TriangleMesh& mesh, const MeshTopology& topology, Real volume,
+                              const DecompositionSettings& settings) {
+  Aabb box;
+  for (const Vec3& v : mesh.vertices) box.extend(v);
+  const Real tolerance = kSamePlace * box.diagonal().norm();
+  std::vector<Polyhedron> shells = boundaries(mesh, topology, tolerance);
+  if (std::string why = obstacle(shells, settings.max_reflex_edges); !why.empty()) return failed(why);
+
+  const JoeResult cut =
+      resolve_reflex_edges(std::move(shells), {settings.min_dihedral, settings.min_distance}, tolerance);
+  if (cut.parts.empty()) return failed(cut.failure);
+  ExactResult result;
+  for (const Polyhedron& p : cut.parts) {
+    result.parts.push_back(convex_hull(p.points));
+    if (result.parts.back().dimension() < 3) result.parts.pop_back();
+  }
+  // A hull holds its part and more if that is not convex, so equal volumes prove all of them convex.
+  if (!(relative_error(result.parts, volume) <= kExact)) return failed("cuts that rounding spoils");
+  const WindingNumber winding(mesh);
+  for (const ConvexPolyhedron& p : result.parts)
+    if (winding.at(p.centre()) > 1.5) return failed("a surface that covers itself");
+  return result;
+}
+
+/// The same surface with its inside where a positive volume needs it.
+TriangleMesh turned_over(TriangleMesh mesh) {
+  for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
+  return mesh;
+}
+
+ConvexDecomposition decompose_approximately(const TriangleMesh& mesh, std::optional<Real> volume,
+                                            const DecompositionSettings& settings, const std::string& why) {
+  VoxelDecomposition voxels = decompose_by_voxels(mesh, settings.resolution, settings.max_parts);
+  if (voxels.parts.empty()) return {Method::none, {}, 0, "the surface encloses nothing: " + why};
+  const Real error = relative_error(voxels.parts, volume.value_or(voxels.inside_volume));
+  return {Method::approximate, std::move(voxels.parts), error, why};
+}
+
+}  // namespace
+
+ConvexDecomposition decompose(const TriangleMesh& mesh, const MeshTopology& topology,
+                              const DecompositionSettings& settings) {
+  if (mesh.triangles.empty()) return {Method::none, {}, 0, "no faces"};
+  if (!topology.defects().closed())
+    return decompose_approximately(mesh, {}, settings, topology.defects().describe());
+  if (topology.defects().inverted) {
+    const TriangleMesh outward = turned_over(mesh);
+    return decompose(outward, MeshTopology(outward), settings);
+  }
+  const Real volume = mass_properties(mesh).volume;
+  if (!(volume > 0)) return {Method::none, {}, 0, "the surface encloses nothing"};
+  ExactResult exact = decompose_exactly(mesh, topology, volume, settings);
+  if (exact.parts.empty()) return decompose_approximately(mesh, volume, settings, exact.failure);
+  const Real error = relative_error(exact.parts, volume);
+  const Method method = exact.parts.size() == 1 ? Method::convex : Method::exact;
+  return {method, std::move(exact.parts), error, {}};
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,29 @@
+#pragma once
+/// Whether points, segments and triangles meet (physics H7). All are closed sets: touching counts. Triangles
+/// may be degenerate, and are then the segment or the point that they cover.
+///
+/// Tests among points, segments and triangles are exact for the coordinates as given (predicates.h): they are
+/// symmetric, do not depend on the order of vertices, and nothing slips between two triangles that share an
+/// edge. Tests against boxes and spheres are rounded, with a relative error of a few units in the last place.
+
+#include <array>
+
+#include "sim/types.h"
+
+namespace offstage::sim {
+
+using TriangleVertices = std::array<Vec3, 3>;
+
+bool point_in_triangle(const Vec3& p, const TriangleVertices& t);
+bool segments_intersect(const Vec3& p0, const Vec3& p1, const Vec3& q0, const Vec3& q1);
+bool segment_intersects_triangle(const Vec3& p, const Vec3& q, const TriangleVertices& t);
+/// After Guigue and Devillers, "Fast and robust triangle-triangle overlap test using orientation predicates"
+/// (2003).
+bool triangles_intersect(const TriangleVertices& a, const TriangleVertices& b);
+
+/// The box is solid. Thirteen separating axes (Akenine-Moller, "Fast 3D triangle-box overlap testing", 2001).
+bool triangle_intersects_box(const TriangleVertices& t, const Aabb& box);
+/// The sphere is a solid ball.
+bool triangle_intersects_sphere(const TriangleVertices& t, const Vec3& centre, Real radius);
+
+}  // namespace offstage::sim

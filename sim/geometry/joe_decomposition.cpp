@@ -1,0 +1,198 @@
+#include "sim/geometry/joe_decomposition.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "sim/geometry/polyhedron_cut.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr Real kPi = std::numbers::pi;
+/// Angles that differ by less are equal [rad].
+constexpr Real kFlat = 1e-6;
+/// Shares of the limits that are asked for in turn.
+constexpr std::array<Real, 5> kRelaxed = {1, 0.5, 0.25, 0.1, 0};
+/// Shares of the dihedral angle that cuts are tried at, after the planes of the neighbourhood (F.2).
+constexpr std::array<Real, 5> kShares = {0.25, 0.5, 0.75, 0.375, 0.625};
+constexpr std::size_t kMaxCandidates = 12;
+/// Reflex edges with an acceptable cut that are compared before the best of their cuts is made.
+constexpr int kCompared = 8;
+/// Bounds of the whole work: parts, and half-edges of the polyhedra that candidate planes are tried on.
+constexpr std::size_t kMaxParts = 1024;
+constexpr Real kMaxWork = 5e7;
+
+Real mean_edge(const Polyhedron& p) {
+  Real sum = 0;
+  for (uint32_t h = 0; h < p.half_edges.size(); ++h) sum += (p.head_point(h) - p.origin_point(h)).norm();
+  return sum / static_cast<Real>(p.half_edges.size());
+}
+
+/// Angles at which a plane splits the wedge of a reflex edge into two that are not reflex, as F.2 lists them:
+/// along the two faces, through neighbouring edges, by fractions of the angle.
+class Candidates {
+ public:
+  Candidates(const Polyhedron& p, uint32_t h, Real tolerance) : wedge_(wedge(p, h)) {
+    add(kPi);
+    add(wedge_.angle - kPi);
+    for (uint32_t end : {h, p.half_edges[h].twin})
+      p.for_each_leaving(end, [&](uint32_t k) {
+        const Vec3 d = p.head_point(k) - p.origin_point(k);
+        if (wedge_.along.cross(d).norm() <= tolerance) return;
+        const Real theta = wedge_.angle_of(d);
+        add(theta);
+        add(theta < kPi ? theta + kPi : theta - kPi);
+      });
+    for (Real share : kShares) add(share * wedge_.angle);
+  }
+
+  const std::vector<Real>& angles() const { return angles_; }
+  Vec3 plane_normal(Real theta) const { return wedge_.plane_normal(theta); }
+
+ private:
+  void add(Real theta) {
+    if (theta < wedge_.angle - kPi - kFlat || theta > kPi + kFlat || angles_.size() == kMaxCandidates) return;
+    for (Real other : angles_)
+      if (std::abs(other - theta) < kFlat) return;
+    angles_.push_back(theta);
+  }
+
+  Wedge wedge_;
+  std::vector<Real> angles_;
+};
+
+/// How good a cut is.
+struct Merit {
+  int resolved = 0;                                       ///< reflex edges gone, less those cut in two
+  Real dihedral = std::numeric_limits<Real>::infinity();  ///< smallest angle it makes [rad]
+  Real distance = std::numeric_limits<Real>::infinity();  ///< of the nearest vertex off it [m]
+};
+
+void measure_distances(const Polyhedron& p, const Cut& cut, uint32_t face, Real tolerance, Merit& merit) {
+  p.for_each_around(face, [&](uint32_t h) {
+    const Real d = std::abs(cut.plane.normal.dot(p.origin_point(h)) - cut.plane.offset);
+    if (d > tolerance) merit.distance = std::min(merit.distance, d);
+  });
+}
+
+/// Nothing if a side of the cut is not inside the solid, which only rounding can bring about.
+std::optional<Merit> merit(const Polyhedron& p, const Cut& cut, Real tolerance) {
+  Merit m;
+  for (std::size_t k = 0; k < cut.corners.size(); ++k) {
+    const Cut::Corner &c = cut.corners[k], &next = cut.corners[(k + 1) % cut.corners.size()];
+    const uint32_t left = p.half_edges[c.half_edge].face;
+    const uint32_t right = c.across_face ? left : p.half_edges[p.half_edges[c.half_edge].twin].face;
+    const Wedge inside(next.point - c.point, p.faces[left].plane.normal, p.faces[right].plane.normal);
+    const Real above = inside.angle_of(cut.plane.normal.cross(inside.along)), below = inside.angle - above;
+    m.dihedral = std::min({m.dihedral, above, below});
+    measure_distances(p, cut, left, tolerance, m);
+    measure_distances(p, cut, right, tolerance, m);
+    if (!c.across_face && inside.angle > kPi + kFlat && std::max(above, below) <= kPi + kFlat) ++m.resolved;
+    if (c.on_edge && is_reflex(p, c.half_edge)) --m.resolved;
+  }
+  if (m.dihedral < kFlat) return {};
+  return m;
+}
+
+struct RatedCut {
+  Cut cut;
+  Merit merit;
+};
+
+bool better(const Merit& a, const Merit& b) {
+  return a.resolved != b.resolved ? a.resolved > b.resolved : a.dihedral > b.dihedral + kFlat;
+}
+
+class Decomposer {
+ public:
+  Decomposer(const CutLimits& limits, Real tolerance) : limits_(limits), tolerance_(tolerance) {}
+
+  JoeResult run(std::vector<Polyhedron> rest) {
+    JoeResult result;
+    while (!rest.empty()) {
+      Polyhedron p = std::move(rest.back());
+      rest.pop_back();
+      const std::vector<uint32_t> reflex = reflex_edges(p);
+      if (reflex.empty()) {
+        result.parts.push_back(std::move(p));
+        continue;
+      }
+      const std::optional<RatedCut> best = best_cut(p, reflex);
+      if (work_ > kMaxWork || result.parts.size() + rest.size() > kMaxParts) return {{}, "too many cuts"};
+      if (!best) return {{}, "no plane resolves an edge"};
+      for (Polyhedron& part : separate(std::move(p), best->cut)) rest.push_back(std::move(part));
+    }
+    return result;
+  }
+
+ private:
+  static std::vector<uint32_t> reflex_edges(const Polyhedron& p) {
+    std::vector<uint32_t> edges;
+    for (uint32_t h = 0; h < p.half_edges.size(); ++h)
+      if (h < p.half_edges[h].twin && is_reflex(p, h)) edges.push_back(h);
+    return edges;
+  }
+
+  /// The best of the acceptable cuts of the first edges that have one, under the strictest limits that leave
+  /// any.
+  std::optional<RatedCut> best_cut(const Polyhedron& p, const std::vector<uint32_t>& reflex) {
+    const Real edge = mean_edge(p);
+    std::optional<RatedCut> best;
+    for (Real relaxed : kRelaxed) {
+      int compared = 0;
+      for (uint32_t h : reflex) {
+        if (compared == kCompared || work_ > kMaxWork) break;
+        std::optional<RatedCut> cut = best_cut_at(p, h, relaxed, edge);
+        if (!cut) continue;
+        ++compared;
+        if (!best || better(cut->merit, best->merit)) best = std::move(cut);
+      }
+      if (best) break;
+    }
+    return best;
+  }
+
+  std::optional<RatedCut> best_cut_at(const Polyhedron& p, uint32_t h, Real relaxed, Real edge) {
+    std::optional<RatedCut> best;
+    const Candidates candidates(p, h, tolerance_);
+    for (Real theta : candidates.angles()) {
+      const Vec3 normal = candidates.plane_normal(theta);
+      work_ += static_cast<Real>(p.half_edges.size());
+      std::optional<Cut> cut = trace_cut(p, h, {normal, normal.dot(p.origin_point(h))}, tolerance_);
+      if (!cut) continue;
+      const std::optional<Merit> m = merit(p, *cut, tolerance_);
+      if (!m || m->dihedral < relaxed * limits_.dihedral || m->distance < relaxed * limits_.distance * edge)
+        continue;
+      if (!best || better(*m, best->merit)) best = RatedCut{std::move(*cut), *m};
+    }
+    return best;
+  }
+
+  CutLimits limits_;
+  Real tolerance_, work_ = 0;
+};
+
+}  // namespace
+
+bool is_reflex(const Polyhedron& p, uint32_t h) {
+  const Real angle = wedge(p, h).angle;
+  // A fin without thickness has an angle of 0 or, by rounding, a full turn.
+  return angle > kPi + kFlat && angle < 2 * kPi - kFlat;
+}
+
+uint32_t count_reflex_edges(const Polyhedron& p) {
+  uint32_t n = 0;
+  for (uint32_t h = 0; h < p.half_edges.size(); ++h) n += h < p.half_edges[h].twin && is_reflex(p, h);
+  return n;
+}
+
+JoeResult resolve_reflex_edges(std::vector<Polyhedron> polyhedra, const CutLimits& limits, Real tolerance) {
+  return Decomposer(limits, tolerance).run(std::move(polyhedra));
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,181 @@
+#include "sim/geometry/polyhedron.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <utility>
+
+namespace offstage::sim {
+namespace {
+
+using Plane = Polyhedron::Plane;
+
+constexpr uint32_t kNone = 0xffffffff;
+
+Vec3 doubled_area(const TriangleMesh& mesh, uint32_t face) {
+  const Triangle& t = mesh.triangles[face];
+  const Vec3& a = mesh.vertices[t[0]];
+  return (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a);
+}
+
+/// Least height of a triangle.
+Real thickness(const TriangleMesh& mesh, uint32_t face, Real area2) {
+  const Triangle& t = mesh.triangles[face];
+  Real longest = 0;
+  for (std::size_t k = 0; k < 3; ++k)
+    longest = std::max(longest, (mesh.vertices[t[k]] - mesh.vertices[t[(k + 1) % 3]]).norm());
+  return longest > 0 ? area2 / longest : 0;
+}
+
+/// The plane of each triangle, shared by neighbours that lie in one. Grown from the largest triangles, whose
+/// normals are the surest; slivers, which have none, go along with their neighbours.
+std::vector<Plane> shared_planes(const TriangleMesh& mesh, const MeshTopology& topology, Real tolerance) {
+  const auto n = static_cast<uint32_t>(mesh.triangles.size());
+  std::vector<Real> area(n);
+  for (uint32_t f = 0; f < n; ++f) area[f] = doubled_area(mesh, f).norm();
+  std::vector<uint32_t> seeds(n);
+  std::iota(seeds.begin(), seeds.end(), 0u);
+  std::stable_sort(seeds.begin(), seeds.end(), [&](uint32_t a, uint32_t b) { return area[a] > area[b]; });
+
+  std::vector<Plane> planes(n);
+  std::vector<bool> done(n, false);
+  const auto lies_in = [&](uint32_t f, const Plane& plane) {
+    for (uint32_t v : mesh.triangles[f])
+      if (std::abs(plane.normal.dot(mesh.vertices[v]) - plane.offset) > tolerance) return false;
+    return topology.face_normal(f).dot(plane.normal) > 0.5 || thickness(mesh, f, area[f]) <= tolerance;
+  };
+  std::vector<uint32_t> front;
+  for (uint32_t seed : seeds) {
+    if (done[seed]) continue;
+    const Vec3& normal = topology.face_normal(seed);
+    const Plane plane{normal, normal.dot(mesh.vertices[mesh.triangles[seed][0]])};
+    done[seed] = true;
+    front = {seed};
+    while (!front.empty()) {
+      const uint32_t f = front.back();
+      front.pop_back();
+      planes[f] = plane;
+      for (uint32_t g : topology.face_neighbours(f)) {
+        if (g == kNoFace || done[g] || !lies_in(g, plane)) continue;
+        done[g] = true;
+        front.push_back(g);
+      }
+    }
+  }
+  return planes;
+}
+
+/// The faces of one piece of surface, moved to a polyhedron of their own.
+Polyhedron extract(const Polyhedron& p, std::span<const uint32_t> faces, std::vector<uint32_t>& new_point,
+                   std::vector<uint32_t>& new_half_edge) {
+  Polyhedron part;
+  std::vector<uint32_t> points, half_edges;
+  for (uint32_t f : faces) {
+    part.faces.push_back({static_cast<uint32_t>(half_edges.size()), p.faces[f].plane});
+    p.for_each_around(f, [&](uint32_t h) {
+      new_half_edge[h] = static_cast<uint32_t>(half_edges.size());
+      half_edges.push_back(h);
+      part.half_edges.push_back(p.half_edges[h]);
+      part.half_edges.back().face = static_cast<uint32_t>(part.faces.size() - 1);
+      uint32_t& v = new_point[p.origin(h)];
+      if (v != kNone) return;
+      v = static_cast<uint32_t>(points.size());
+      points.push_back(p.origin(h));
+      part.points.push_back(p.origin_point(h));
+    });
+  }
+  std::vector<uint32_t> last(points.size(), kNone);
+  for (uint32_t k = 0; k < part.half_edges.size(); ++k) {
+    Polyhedron::HalfEdge& h = part.half_edges[k];
+    h = {new_point[h.origin],   h.face, new_half_edge[h.next], new_half_edge[h.previous],
+         new_half_edge[h.twin], k};
+    if (last[h.origin] != kNone) std::swap(h.sibling, part.half_edges[last[h.origin]].sibling);
+    last[h.origin] = k;
+  }
+  for (uint32_t v : points) new_point[v] = kNone;
+  return part;
+}
+
+}  // namespace
+
+Wedge::Wedge(const Vec3& edge, const Vec3& left_normal, const Vec3& right_normal)
+    : along(edge.normalized()), normal(left_normal), left(left_normal.cross(along).normalized()) {
+  angle = angle_of(along.cross(right_normal));
+}
+
+Real Wedge::angle_of(const Vec3& d) const {
+  const Real theta = std::atan2(-normal.dot(d), left.dot(d));
+  return theta < 0 ? theta + 2 * std::numbers::pi : theta;
+}
+
+Vec3 Wedge::direction(Real theta) const {
+  return std::cos(theta) * left - std::sin(theta) * normal;
+}
+
+Vec3 Wedge::plane_normal(Real theta) const {
+  return along.cross(direction(theta)).normalized();
+}
+
+Wedge wedge(const Polyhedron& p, uint32_t h) {
+  return {p.head_point(h) - p.origin_point(h), p.plane(h).normal, p.plane(p.half_edges[h].twin).normal};
+}
+
+std::vector<Polyhedron> boundaries(const TriangleMesh& mesh, const MeshTopology& topology, Real tolerance) {
+  const std::vector<Plane> planes = shared_planes(mesh, topology, tolerance);
+  Polyhedron all;
+  all.points = mesh.vertices;
+  std::vector<uint32_t> first_side(topology.edges().size(), kNone);
+  for (uint32_t f = 0; f < mesh.triangles.size(); ++f) {
+    if (topology.face_edges(f)[0] == kNoFace) continue;
+    const auto first = static_cast<uint32_t>(all.half_edges.size());
+    const auto face = static_cast<uint32_t>(all.faces.size());
+    all.faces.push_back({first, planes[f]});
+    for (uint32_t k = 0; k < 3; ++k) {
+      all.half_edges.push_back({mesh.triangles[f][k], face, first + (k + 1) % 3, first + (k + 2) % 3, kNone});
+      uint32_t& met = first_side[topology.face_edges(f)[k]];
+      if (met == kNone) {
+        met = first + k;
+      } else {
+        all.half_edges[first + k].twin = met;
+        all.half_edges[met].twin = first + k;
+      }
+    }
+  }
+  return components(all);
+}
+
+std::vector<Polyhedron> components(const Polyhedron& p) {
+  std::vector<Polyhedron> parts;
+  std::vector<uint32_t> new_point(p.points.size(), kNone), new_half_edge(p.half_edges.size(), kNone);
+  std::vector<bool> seen(p.faces.size(), false);
+  for (uint32_t first = 0; first < p.faces.size(); ++first) {
+    if (seen[first]) continue;
+    std::vector<uint32_t> faces = {first};
+    seen[first] = true;
+    for (std::size_t k = 0; k < faces.size(); ++k)
+      p.for_each_around(faces[k], [&](uint32_t h) {
+        const uint32_t across = p.half_edges[p.half_edges[h].twin].face;
+        if (!seen[across]) faces.push_back(across);
+        seen[across] = true;
+      });
+    std::sort(faces.begin(), faces.end());
+    parts.push_back(extract(p, faces, new_point, new_half_edge));
+  }
+  return parts;
+}
+
+Real signed_volume6(const Polyhedron& p) {
+  const Vec3 centre = std::accumulate(p.points.begin(), p.points.end(), Vec3(Vec3::Zero())) /
+                      static_cast<Real>(p.points.size());
+  Real volume = 0;
+  for (const Polyhedron::Face& f : p.faces) {
+    const Vec3 a = p.origin_point(f.first) - centre;
+    uint32_t h = p.half_edges[f.first].next;
+    for (; p.half_edges[h].next != f.first; h = p.half_edges[h].next)
+      volume += a.dot((p.origin_point(h) - centre).cross(p.head_point(h) - centre));
+  }
+  return volume;
+}
+
+}  // namespace offstage::sim

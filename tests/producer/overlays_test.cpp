@@ -1,0 +1,141 @@
+// What overlays show, against what is known of the bodies they show.
+
+#include "producer/overlays.h"
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+#include "producer/scene_io.h"
+#include "producer/simulation.h"
+
+namespace offstage::producer {
+namespace {
+
+using Eigen::Vector3f;
+
+/// The world of a scene given as text, with the source folder as its own.
+struct Shown {
+  explicit Shown(const std::string& text)
+      : loaded(parse_scene(text, "scene", OFFSTAGE_SOURCE_DIR)),
+        models(loaded.scene, loaded.folder, DecompositionCache(), loaded.warnings),
+        simulation(loaded.scene, models) {
+    simulation.advance();
+  }
+  LineSet lines(std::size_t overlay = 0) const { return simulation.snapshot().overlays.at(overlay); }
+
+  LoadedScene loaded;
+  ModelLibrary models;
+  Simulation simulation;
+};
+
+/// A scene of kinematic bodies and overlays.
+std::string scene(const std::string& bodies, const std::string& overlays) {
+  return R"({"bodies": [)" + bodies + R"(], "overlays": [)" + overlays + "]}";
+}
+std::string ball(const std::string& name, const std::string& position, const std::string& more = "") {
+  return R"({"name": ")" + name +
+         R"(", "motion": "kinematic", "shape": {"type": "sphere", "radius": 0.5}, "position": )" + position +
+         more + "}";
+}
+constexpr const char* kCrank =
+    R"({"name": "crank", "motion": "kinematic", "position": [1, 2, 3],
+        "shape": {"type": "mesh", "file": "assets/models/crank.glb", "scale": 2}})";
+std::string tree_of_crank(const std::string& more) {
+  return scene(kCrank, R"({"type": "tree", "body": "crank", )" + more + "}");
+}
+
+Eigen::AlignedBox3f box_of(const LineSet& set) {
+  Eigen::AlignedBox3f box;
+  for (const render::Line& line : set.lines) box.extend(line.a).extend(line.b);
+  return box;
+}
+
+TEST(Overlays, RootOfABoxTreeIsTheBoxOfTheMesh) {
+  const Shown shown(tree_of_crank(R"("volume": "aabb", "level": 0)"));
+  const LineSet set = shown.lines();
+  ASSERT_EQ(set.lines.size(), 12u);
+  const Eigen::AlignedBox3f model = shown.models.model("assets/models/crank.glb").bounds();
+  EXPECT_TRUE(box_of(set).min().isApprox(2 * model.min() + Vector3f(1, 2, 3), 1e-5f));
+  EXPECT_TRUE(box_of(set).max().isApprox(2 * model.max() + Vector3f(1, 2, 3), 1e-5f));
+}
+
+TEST(Overlays, LevelsOfATreeDoubleAndFadeIntoEachOther) {
+  for (const char* volume : {"aabb", "obb", "sphere"}) {
+    const std::string start = R"("volume": ")" + std::string(volume) + R"(", "level": )";
+    const auto at = [&](const char* level) { return Shown(tree_of_crank(start + level)).lines(); };
+    const LineSet two = at("2"), three = at("3"), between = at("2.25");
+    EXPECT_EQ(three.lines.size(), 2 * two.lines.size()) << volume;
+    EXPECT_EQ(between.lines.size(), two.lines.size() + three.lines.size());
+    float fading = 0, coming = 0;
+    for (const render::Line& line : between.lines)
+      (line.color.head<3>() == two.lines[0].color.head<3>() ? fading : coming) = line.color.w();
+    EXPECT_FLOAT_EQ(fading, 0.75f);
+    EXPECT_FLOAT_EQ(coming, 0.25f);
+  }
+}
+
+TEST(Overlays, ClosestPointsAreOnTheLineBetweenTheCentresOfBalls) {
+  const Shown shown(scene(
+      ball("left", "[0, 0, 0]") + "," + ball("right", "[0, 3, 0]"),
+      R"({"type": "closest", "a": "left", "b": "right", "color": [0, 0, 1], "penetrating": [1, 0, 0]})"));
+  const render::Line line = shown.lines().lines.at(0);
+  EXPECT_TRUE(line.a.isApprox(Vector3f(0, 0.5f, 0), 1e-5f));
+  EXPECT_TRUE(line.b.isApprox(Vector3f(0, 2.5f, 0), 1e-5f));
+  EXPECT_GT(line.color.z(), line.color.x());
+}
+
+TEST(Overlays, BodiesInEachOtherShowTheirDepthInAnotherColour) {
+  const Shown shown(scene(
+      ball("left", "[0, 0, 0]") + "," + ball("right", "[0, 0.8, 0]"),
+      R"({"type": "closest", "a": "left", "b": "right", "color": [0, 0, 1], "penetrating": [1, 0, 0]})"));
+  const render::Line line = shown.lines().lines.at(0);
+  EXPECT_NEAR((line.a - line.b).norm(), 0.2, 1e-5);
+  EXPECT_GT(line.color.x(), line.color.z());
+}
+
+TEST(Overlays, ContactsOfAllPairsArePushedApart) {
+  // A ball in the floor and a ball on the first; the third is far away, and the fourth does not collide.
+  const Shown shown(scene(R"({"motion": "static", "shape": {"type": "plane"}},)" +
+                              ball("low", "[0, 0.499, 0]") + "," + ball("high", "[0, 1.495, 0]") + "," +
+                              ball("far", "[5, 3, 0]") + "," +
+                              ball("ghost", "[0.2, 1, 0]", R"(, "collides": false)"),
+                          R"({"type": "contacts", "size": 0.05})"));
+  std::vector<float> heights;
+  for (const render::Line& line : shown.lines().lines) {
+    if (line.a == line.b) heights.push_back(line.a.y());
+    if (line.width_b > 0) continue;
+    // The head of an arrow: along the normal, which is vertical here.
+    EXPECT_NEAR(line.a.x(), 0, 1e-5);
+    EXPECT_NEAR(line.b.x(), 0, 1e-5);
+  }
+  std::ranges::sort(heights);
+  ASSERT_EQ(heights.size(), 2u) << testing::PrintToString(heights);
+  EXPECT_NEAR(heights[0], -0.0005, 1e-5);
+  EXPECT_NEAR(heights[1], 0.997, 1e-5);
+}
+
+TEST(Overlays, AreTheSameWhateverWasSeenBefore) {
+  const std::string text =
+      scene(ball("a", "[0, 0, 0]", R"(, "spin": [1, 2, 3])") + "," + std::string(kCrank),
+            R"({"type": "closest", "a": "a", "b": "crank"}, {"type": "contacts", "margin": 5})");
+  Shown once(text), often(text);
+  for (int frame = 0; frame < 5; ++frame) {
+    often.simulation.advance();
+    often.simulation.snapshot();
+    once.simulation.advance();
+  }
+  for (const std::size_t overlay : {0, 1}) {
+    const LineSet a = once.lines(overlay), b = often.lines(overlay);
+    ASSERT_EQ(a.ids, b.ids);
+    for (std::size_t i = 0; i < a.lines.size(); ++i) EXPECT_EQ(a.lines[i].a, b.lines[i].a);
+  }
+}
+
+TEST(Overlays, DoNotTouchTheState) {
+  const Shown with(tree_of_crank(R"("level": 3)")), without(scene(kCrank, ""));
+  EXPECT_EQ(with.simulation.snapshot().state_hash, without.simulation.snapshot().state_hash);
+}
+
+}  // namespace
+}  // namespace offstage::producer
