@@ -157,10 +157,10 @@ class World {
   World(World&&) noexcept;
   World& operator=(World&&) noexcept;
 
-  /// Registers a mesh: welds it, then computes topology, mass properties, hull and bounding tree once (E2). The
-  /// convex decomposition, which is slow, is made when a body first needs it, unless the one that decompose() made of
-  /// the welded mesh is given. Throws std::invalid_argument for an index out of range, a non-finite vertex or no face
-  /// at all.
+  /// Registers a mesh: welds it, then computes topology, mass properties, hull and bounding tree once (E2).
+  /// The convex decomposition, which is slow, is made when a body first needs it, unless the one that
+  /// decompose() made of the welded mesh is given. Throws std::invalid_argument for an index out of range, a
+  /// non-finite vertex or no face at all.
   MeshHandle add_mesh(const TriangleMesh& mesh, std::optional<ConvexDecomposition> decomposition = {});
   const MeshTopology& topology(MeshHandle mesh) const;
   const TriangleMesh& mesh(MeshHandle mesh) const;  ///< as registered (welded)

@@ -77,7 +77,8 @@ struct World::Impl : WorldState {
 
   BroadPhase broad_phase;  // of the bodies that collide, by slot
 
-  // What particles can hit in the current sub-step. What cannot move is arranged anew only when it changed (E9).
+  // What particles can hit in the current sub-step. What cannot move is arranged anew only when it changed
+  // (E9).
   Obstacles fixed_obstacles, moving_obstacles;
   bool fixed_changed = true;
 };

@@ -81,7 +81,8 @@ Golden draw_golden(const LoadedScene& scene, int threads) {
       .frames = {std::max(1, count / 5), std::max(1, count * 3 / 5)}, .threads = threads, .cache = {}};
   if (job.frames[0] == job.frames[1]) job.frames.pop_back();
   std::vector<Problem> warnings;
-  const ModelLibrary models(scene.scene, scene.folder, DecompositionCache(), warnings);  // nothing from outside
+  const ModelLibrary models(scene.scene, scene.folder, DecompositionCache(),
+                            warnings);  // nothing from outside
   MemorySink sink(golden.frames);
   const RunStats stats = render_frames(scene, models, job, sink, {});
   if (stats.interrupted_by) throw Interrupted(stats.interrupted_by);

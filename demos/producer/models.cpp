@@ -65,12 +65,14 @@ Files files_of(const Scene& scene) {
   return files;
 }
 
-/// Bodies whose convex parts something needs, with the first place that does: collisions with a body that moves by forces, or an
-/// overlay.
+/// Bodies whose convex parts something needs, with the first place that does: collisions with a body that
+/// moves by forces, or an overlay.
 std::map<std::string, Where> bodies_in_parts(const Scene& scene) {
   std::map<std::string, Where> names;
   const auto need = [&](const std::string& body, const Where& where) { names.emplace(body, where); };
-  const auto falls = [](const Body& body) { return body.collides && body.motion == sim::MotionType::dynamic; };
+  const auto falls = [](const Body& body) {
+    return body.collides && body.motion == sim::MotionType::dynamic;
+  };
   if (scene.bodies.size() > 1 && std::ranges::any_of(scene.bodies, falls))
     for (const Body& body : scene.bodies)
       if (body.collides) need(body.name, body.where);

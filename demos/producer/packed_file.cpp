@@ -55,7 +55,8 @@ std::vector<uint8_t> unpack(const FileKind& kind, std::span<const uint8_t> bytes
   if (header.payload_size > kMaxPayload) refuse(damaged + "(size)");
   const auto packed = bytes.subspan(sizeof header);
   // The header's size is not trusted before the frame agrees with it.
-  if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != header.payload_size) refuse(damaged + "(size)");
+  if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != header.payload_size)
+    refuse(damaged + "(size)");
   std::vector<uint8_t> payload(header.payload_size);
   const std::size_t n = ZSTD_decompress(payload.data(), payload.size(), packed.data(), packed.size());
   if (ZSTD_isError(n) || n != payload.size() || XXH3_64bits(payload.data(), n) != header.checksum)

@@ -1,6 +1,7 @@
 #pragma once
-/// Binary files of our own, compressed and checksummed: a header with a magic word and a format version, then the
-/// zstd-compressed payload. What is damaged, cut short or of another kind or version is told apart from what is whole.
+/// Binary files of our own, compressed and checksummed: a header with a magic word and a format version, then
+/// the zstd-compressed payload. What is damaged, cut short or of another kind or version is told apart from
+/// what is whole.
 
 #include <cstdint>
 #include <cstring>
@@ -17,7 +18,8 @@
 
 namespace offstage::producer {
 
-/// Which kind of file: eight characters at most, the version that is read and written, and its name in messages.
+/// Which kind of file: eight characters at most, the version that is read and written, and its name in
+/// messages.
 struct FileKind {
   std::string_view magic;
   uint32_t version;
@@ -35,7 +37,7 @@ std::vector<uint8_t> read_file(const std::filesystem::path& path);
 class ByteWriter {
  public:
   template <class T>
-    requires std::is_arithmetic_v<T>
+  requires std::is_arithmetic_v<T>
   void put(T value) {
     const auto* bytes = reinterpret_cast<const uint8_t*>(&value);
     bytes_.insert(bytes_.end(), bytes, bytes + sizeof value);
@@ -56,8 +58,7 @@ class ByteReader {
   ByteReader(std::span<const uint8_t> bytes, const std::string& source) : bytes_(bytes), source_(source) {}
 
   template <class T>
-    requires std::is_arithmetic_v<T>
-  T take() {
+  requires std::is_arithmetic_v<T> T take() {
     if (bytes_.size() < sizeof(T)) throw render::FileError(source_ + ": damaged (too short)");
     T value;
     std::memcpy(&value, bytes_.data(), sizeof value);
@@ -65,8 +66,7 @@ class ByteReader {
     return value;
   }
   template <class V>
-    requires(!std::is_arithmetic_v<V>)
-  V take() {
+  requires(!std::is_arithmetic_v<V>) V take() {
     V v;
     for (int i = 0; i < V::SizeAtCompileTime; ++i) v[i] = take<typename V::Scalar>();
     return v;

@@ -68,7 +68,8 @@ template <>
 struct Table<ContactsOverlay> {
   static constexpr const char* kName = "contacts_overlay";
   static constexpr const char* kHelp =
-      "Contact points of bodies, as rings, and the direction in which the first of two is pushed, as arrows.";
+      "Contact points of bodies, as rings, and as arrows the direction in which the first is pushed, or what "
+      "touches a plane.";
   static Fields<ContactsOverlay> fields() {
     using T = ContactsOverlay;
     return Fields<T>{{"a", &T::a, "name of a body; empty: every pair of bodies that collide"},

@@ -1,7 +1,8 @@
 #pragma once
-/// A body's shape as the narrow phase sees it: convex pieces, and a tree over their boxes. A primitive is one piece. A mesh is
-/// the parts of its convex decomposition, or its triangles: where it has no inside, and where its decomposition is only
-/// approximate and the body does not need one (see CollisionShape's constructor). The half-space under a plane has no pieces.
+/// A body's shape as the narrow phase sees it: convex pieces, and a tree over their boxes. A primitive is one
+/// piece. A mesh is the parts of its convex decomposition, or its triangles: where it has no inside, and
+/// where its decomposition is only approximate and the body does not need one (see CollisionShape's
+/// constructor). The half-space under a plane has no pieces.
 
 #include <optional>
 
@@ -13,9 +14,9 @@ namespace offstage::sim {
 
 class CollisionShape {
  public:
-  /// `solid` and what it points to must outlive the shape. A body that moves by forces sets `needs_volume`: against it
-  /// other bodies' depth must be known, so that a mesh is its parts even if they only approximate it; for others the
-  /// exact surface is preferred.
+  /// `solid` and what it points to must outlive the shape. A body that moves by forces sets `needs_volume`:
+  /// against it other bodies' depth must be known, so that a mesh is its parts even if they only approximate
+  /// it; for others the exact surface is preferred.
   CollisionShape(const Solid& solid, bool needs_volume);
 
   const Solid& solid() const { return solid_; }
@@ -25,7 +26,8 @@ class CollisionShape {
   Convex piece(uint32_t index) const;
   /// Its items are the indices of the pieces.
   const AabbTree& tree() const { return mesh_tree_ ? *mesh_tree_ : own_tree_; }
-  /// Whether the pieces are triangles that bound a solid: then something can be inside of it that touches none.
+  /// Whether the pieces are triangles that bound a solid: then something can be inside of it that touches
+  /// none.
   bool is_hollow() const { return triangles_ && solid_.mesh->solid; }
   /// A convex solid around all pieces, as tight as can be. Not of a plane.
   const Convex& hull() const { return hull_; }
@@ -33,8 +35,8 @@ class CollisionShape {
  private:
   Solid solid_;
   Convex hull_;
-  AabbTree own_tree_;                     // of a primitive: one box
-  const AabbTree* mesh_tree_ = nullptr;   // of parts or triangles
+  AabbTree own_tree_;                    // of a primitive: one box
+  const AabbTree* mesh_tree_ = nullptr;  // of parts or triangles
   bool triangles_ = false;
 };
 

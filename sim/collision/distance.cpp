@@ -1,8 +1,8 @@
 #include "sim/collision/distance.h"
 
 #include <algorithm>
-#include <cmath>
 #include <array>
+#include <cmath>
 
 #include "sim/geometry/closest_points.h"
 

@@ -12,7 +12,7 @@ constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 constexpr Real kTolerance = 64;           // in roundings of a point: of heights over a face
 constexpr Real kCurvedTolerance = 1e-10;  // of the size
 constexpr Real kDeep = 1e-6;              // of the size: depth from which a point tells the direction
-constexpr Real kAccepted = 1e-9;  // of the size: gap of the bounds with which an early end is still an answer
+constexpr Real kAccepted = 1e-9;  // of the size: an early end with this gap of its bounds is an answer
 
 using Index = uint16_t;
 
@@ -102,7 +102,7 @@ class ExpandingPolytope {
       for (std::size_t f = 1; f < face_count_; ++f)
         if (faces_[f].key < faces_[best].key) best = static_cast<Index>(f);
       Face& face = faces_[best];
-      if (face.is_key_exact || face.offset < -face.slack) return best;
+      if (face.is_key_exact || face.key == kInfinity || face.offset < -face.slack) return best;
       const SimplexPoint foot = nearest_on_triangle(w(face.corner[0]), w(face.corner[1]), w(face.corner[2]));
       if (foot.size < 3) face.key = std::sqrt(foot.squared);
       face.is_key_exact = true;
@@ -118,7 +118,7 @@ class ExpandingPolytope {
     const Real area = n.norm(), size2 = std::max(e.squaredNorm(), g.squaredNorm());
     const bool sliver = !(area > 4 * rounding_ * std::sqrt(size2));
     f.is_key_exact = sliver;
-    if (sliver) {  // it has no direction, and any point may replace it
+    if (sliver) {  // it has no direction; its neighbours are as near
       f.normal = Vec3::Zero();
       f.offset = 0;
       f.slack = f.key = kInfinity;
@@ -156,11 +156,11 @@ class ExpandingPolytope {
   }
 
   /// Coming over an edge into a face: kept, and then the edge is part of the outline, or removed with what is
-  /// behind it. A face that has the point in its plane is removed, lest slivers arise.
+  /// behind it.
   void visit(Edge e, const Vec3& p) {
     const Face& f = faces_[e.face];
     if (!f.alive) return;
-    if (f.normal.dot(p) - f.offset <= -f.slack) {
+    if (f.normal.dot(p) <= f.offset) {
       horizon_[horizon_size_++] = e;
       return;
     }

@@ -8,11 +8,11 @@ namespace offstage::sim {
 namespace {
 
 constexpr int kMaxIterations = 100;
-constexpr Real kTolerance = 4;     // of the gap between the bounds of the distance, in roundings of a point
-constexpr Real kTouching = 64;     // roundings of a point; nearer cores have no direction between them
-constexpr Real kNear = 1e-9;       // of the size: if GJK stalls this near, the expanding polytope decides
+constexpr Real kTolerance = 4;      // of the gap between the bounds of the distance, in roundings of a point
+constexpr Real kTouching = 64;      // roundings of a point; nearer cores have no direction between them
+constexpr Real kNear = 1e-9;        // of the size: if GJK stalls this near, the expanding polytope decides
 constexpr Real kLevel = 1 + 1e-14;  // ratio of squares that differ by rounding
-constexpr Real kAccepted = 1e-12;  // of the size: gap with which a stalled query is still an answer
+constexpr Real kAccepted = 1e-12;   // of the size: gap with which a stalled query is still an answer
 
 /// The last normal, or from the middle of B to that of A.
 Vec3 start_direction(const MinkowskiDifference& m, const GjkCache& cache) {
@@ -57,8 +57,8 @@ Separation overlapping(const MinkowskiDifference& m, Simplex& s, GjkCache& cache
   return result;
 }
 
-/// Whether the nearest point of the simplex with a new corner is better: nearer to the origin, or as near within rounding
-/// but in a face rather than on its edge, which has the better normal.
+/// Whether the nearest point of the simplex with a new corner is better: nearer to the origin, or as near
+/// within rounding but in a face rather than on its edge, which has the better normal.
 bool is_progress(const SimplexPoint& nearer, const SimplexPoint& nearest) {
   return nearer.squared < nearest.squared ||
          (nearer.size > nearest.size && nearer.squared <= kLevel * nearest.squared);

@@ -38,13 +38,14 @@ Separation plane_separation(const Convex& a, const Pose& a_from_plane) {
   return s;
 }
 
-/// How deep a shape is inside a hollow one that none of its pieces touches, as seen from the hollow one's frame: it is
-/// pushed out whole along the way that its centre has to the surface. None if it is outside.
+/// How deep a shape is inside a hollow one that none of its pieces touches, as seen from the hollow one's
+/// frame: it is pushed out whole along the way that its centre has to the surface. None if it is outside.
 struct Inside {
   Real depth;
   Vec3 outward, deepest;  // hollow's frame
 };
-std::optional<Inside> inside(const CollisionShape& hollow, const CollisionShape& other, const Pose& hollow_from_other) {
+std::optional<Inside> inside(const CollisionShape& hollow, const CollisionShape& other,
+                             const Pose& hollow_from_other) {
   if (!hollow.is_hollow() || other.is_plane()) return std::nullopt;
   const Vec3 centre = hollow_from_other.point_to_world(other.hull().centre());
   if (!hollow.tree().bounds().contains(centre)) return std::nullopt;
@@ -57,7 +58,8 @@ std::optional<Inside> inside(const CollisionShape& hollow, const CollisionShape&
   return Inside{s.normal.dot(centre - deepest) - s.distance, s.normal, deepest};
 }
 
-std::optional<Separation> containment(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b) {
+std::optional<Separation> containment(const CollisionShape& a, const CollisionShape& b,
+                                      const Pose& a_from_b) {
   Separation s;
   if (const auto b_in_a = inside(a, b, a_from_b)) {
     s.distance = -b_in_a->depth;
@@ -118,10 +120,11 @@ std::optional<Separation> separation(const CollisionShape& a, const CollisionSha
 bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b) {
   assert(!a.is_plane());
   if (b.is_plane()) return plane_separation(a.hull(), a_from_b).distance <= 0;
-  const bool apart = for_each_pair(a.tree(), b.tree(), placement(a, b, a_from_b, 0), [&](uint32_t i, uint32_t j) {
-    GjkCache fresh;
-    return !overlap(a.piece(i), b.piece(j), a_from_b, fresh);
-  });
+  const bool apart =
+      for_each_pair(a.tree(), b.tree(), placement(a, b, a_from_b, 0), [&](uint32_t i, uint32_t j) {
+        GjkCache fresh;
+        return !overlap(a.piece(i), b.piece(j), a_from_b, fresh);
+      });
   return !apart || containment(a, b, a_from_b);
 }
 

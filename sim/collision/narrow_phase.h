@@ -1,7 +1,8 @@
 #pragma once
-/// Narrow phase: what happens between two placed shapes of any kind (physics R3-R5, R12). Pairs of their convex pieces
-/// are found tree against tree, and each is put to GJK or V-Clip. Everything is reported in the frame of the first
-/// shape, A, with normals from B to A. A plane can only be the second, and not both can be planes.
+/// Narrow phase: what happens between two placed shapes of any kind (physics R3-R5, R12). Pairs of their
+/// convex pieces are found tree against tree, and each is put to GJK or V-Clip. Everything is reported in the
+/// frame of the first shape, A, with normals from B to A. A plane can only be the second, and not both can be
+/// planes.
 
 #include <cstdint>
 #include <limits>
@@ -19,8 +20,8 @@ namespace offstage::sim {
 /// Which algorithm measures pairs of polyhedra; both give the same answers. Round pieces always go to GJK.
 enum class DistanceMethod : uint8_t { gjk, vclip };
 
-/// What is remembered of a pair of shapes from one query to the next. It makes the next quick and changes no answer
-/// beyond rounding.
+/// What is remembered of a pair of shapes from one query to the next. It makes the next quick and changes no
+/// answer beyond rounding.
 class PairCache {
  public:
   struct Entry {
@@ -40,8 +41,8 @@ class PairCache {
   std::vector<Used> entries_;  // ascending by pieces
 };
 
-/// Signed distance of the closest, or deepest, two pieces; none if all are farther than `limit` [m]. Something inside
-/// a hollow shape is in penetration, too.
+/// Signed distance of the closest, or deepest, two pieces; none if all are farther than `limit` [m].
+/// Something inside a hollow shape is in penetration, too.
 std::optional<Separation> separation(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b,
                                      PairCache& cache, DistanceMethod method = DistanceMethod::gjk,
                                      Real limit = std::numeric_limits<Real>::infinity());
@@ -49,8 +50,8 @@ std::optional<Separation> separation(const CollisionShape& a, const CollisionSha
 /// Whether the shapes have a point in common.
 bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b);
 
-/// Appends the manifolds of all pairs of pieces within `margin` [m] of each other, in an order that depends on the
-/// shapes alone.
+/// Appends the manifolds of all pairs of pieces within `margin` [m] of each other, in an order that depends
+/// on the shapes alone.
 void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b, Real margin,
                     PairCache& cache, DistanceMethod method, std::vector<Manifold>& manifolds);
 
@@ -60,11 +61,11 @@ struct MovingShape {
   const PosePath& path;
 };
 
-/// A share of the step at which the shapes are within `tolerance` [m], > 0, of each other, and before which they are
-/// never within half of it; none if they stay more than half of it apart. Shapes that begin within it, or one inside
-/// the other, have their impact at share 0.
-/// Conservative advancement over both trees at once, with a bound on the motion per node: Tang, Kim, Manocha, "C2A:
-/// controlled conservative advancement for continuous collision detection of polygonal models" (2009).
+/// A share of the step at which the shapes are within `tolerance` [m], > 0, of each other, and before which
+/// they are never within half of it; none if they stay more than half of it apart. Shapes that begin within
+/// it, or one inside the other, have their impact at share 0. Conservative advancement over both trees at
+/// once, with a bound on the motion per node: Tang, Kim, Manocha, "C2A: controlled conservative advancement
+/// for continuous collision detection of polygonal models" (2009).
 std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance);
 
 }  // namespace offstage::sim

@@ -6,8 +6,9 @@ namespace offstage::sim {
 
 // With f half the angle and a(s) the half angle turned at share s, the interpolation has
 //   tan a = s sin f / ((1 - s) + s cos f),  da/ds = sin f / D,  D = 1 - 2 s (1 - s) (1 - cos f).
-// The spin 2 da/ds is largest at s = 1/2, 4 tan(f/2), and changes by at most 16 tan^3(f/2). A point at distance 1 from
-// the axis has the centripetal acceleration spin^2 and the tangential one of the spin's change.
+// The spin 2 da/ds is largest at s = 1/2, 4 tan(f/2), and changes by at most 16 tan^3(f/2). A point at
+// distance 1 from the axis has the centripetal acceleration spin^2 and the tangential one of the spin's
+// change.
 PosePath::PosePath(const Pose& start, const Pose& end)
     : start_(start), end_(end), velocity_(end.position - start.position) {
   if (start_.orientation.dot(end_.orientation) < 0) end_.orientation.coeffs() = -end_.orientation.coeffs();

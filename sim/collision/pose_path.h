@@ -1,8 +1,9 @@
 #pragma once
-/// How a solid gets from one pose to another during a step: its frame's origin goes straight and at constant speed, and
-/// its orientation along the shortest arc, as the normalised linear interpolation of the two quaternions. That
-/// turns about a fixed axis and needs no trigonometry; its rate is within 6 % of constant for a quarter turn and 1 +
-/// angle^2 / 48 for small ones. Time is the share of the step, from 0 to 1, so velocities are per step.
+/// How a solid gets from one pose to another during a step: its frame's origin goes straight and at constant
+/// speed, and its orientation along the shortest arc, as the normalised linear interpolation of the two
+/// quaternions. That turns about a fixed axis and needs no trigonometry; its rate is within 6 % of constant
+/// for a quarter turn and 1 + angle^2 / 48 for small ones. Time is the share of the step, from 0 to 1, so
+/// velocities are per step.
 
 #include "sim/types.h"
 
@@ -30,8 +31,8 @@ class PosePath {
  private:
   Pose start_, end_;
   Vec3 velocity_;
-  Vec3 axis_;              // unit, world
-  Real sine_, cosine_;     // of half the angle of the turn
+  Vec3 axis_;           // unit, world
+  Real sine_, cosine_;  // of half the angle of the turn
   Real turn_;
   Real max_acceleration_;  // of a point at distance 1
 };

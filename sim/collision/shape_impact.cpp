@@ -26,7 +26,8 @@ class Instant {
         tolerance_(tolerance),
         pose_a_(a.path.at(share)),
         pose_b_(b.path.at(share)),
-        a_from_b_{pose_a_.point_to_body(pose_b_.position), pose_a_.orientation.conjugate() * pose_b_.orientation},
+        a_from_b_{pose_a_.point_to_body(pose_b_.position),
+                  pose_a_.orientation.conjugate() * pose_b_.orientation},
         placement_(a_from_b_, a.shape.hull().reach() + b.shape.hull().reach(), 0),
         closing_(pose_a_.vector_to_body(b.path.velocity() - a.path.velocity())),
         spin_a_(pose_a_.vector_to_body(a.path.angular_velocity(share))),
@@ -36,7 +37,8 @@ class Instant {
   /// Where the first two pieces touch, if any do now; the closest of them.
   const std::optional<Separation>& contact() const { return contact_; }
 
-  /// The least share after which any two pieces can come within half the tolerance; 0 if two are within it now.
+  /// The least share after which any two pieces can come within half the tolerance; 0 if two are within it
+  /// now.
   Real time_to_contact(Real limit) {
     time_ = limit;
     const AabbTree &tree_a = a_.shape.tree(), &tree_b = b_.shape.tree();
@@ -66,7 +68,8 @@ class Instant {
   }
 
  private:
-  /// Bound for all that is beneath two nodes, along that axis of the two boxes on which they are farthest apart.
+  /// Bound for all that is beneath two nodes, along that axis of the two boxes on which they are farthest
+  /// apart.
   Real node_time(const Node& a, const Node& b) const {
     const Mat3& R = placement_.rotation;
     const Vec3 offset = placement_.point(centre(b.volume)) - centre(a.volume);

@@ -23,8 +23,8 @@ Real extent(const Convex& shape, const Quat& orientation, const Vec3& d) {
   return local.dot(shape.support(local, start)) + shape.radius * local.norm();
 }
 
-/// Advances until the solids are within the tolerance. `gap_at(share, separation)` measures, filling in the separation.
-/// Each advance aims at half the tolerance, so that it ends after finitely many.
+/// Advances until the solids are within the tolerance. `gap_at(share, separation)` measures, filling in the
+/// separation. Each advance aims at half the tolerance, so that it ends after finitely many.
 template <class GapAt>
 std::optional<Impact> advance(const GapAt& gap_at, Real tolerance) {
   Impact impact{0, {}};
@@ -45,7 +45,8 @@ Real Gap::time_to(Real target) const {
   const Real room = distance - target;
   if (room <= 0) return 0;
   const Real root = std::sqrt(rate * rate + 2 * acceleration * room);
-  // Of the two forms of the positive root of room = rate t + acceleration t^2 / 2, the one without cancellation.
+  // Of the two forms of the positive root of room = rate t + acceleration t^2 / 2, the one without
+  // cancellation.
   if (rate > 0) return 2 * room / (rate + root);
   return acceleration > 0 ? (root - rate) / acceleration : kInfinity;
 }
@@ -74,14 +75,15 @@ std::optional<Impact> time_of_impact(const MovingConvex& a, const MovingConvex& 
   return advance(gap_at, tolerance);
 }
 
-// A point a of the solid is n.(a - o) over a plane through o. While the plane turns with w about o this changes by
-// n.(v_a - v_o) + (w x n).(a - o): as if the point moved and the plane stood still with the opposite rotation. The
-// relative acceleration seen from the plane adds the Coriolis and centripetal terms.
+// A point a of the solid is n.(a - o) over a plane through o. While the plane turns with w about o this
+// changes by n.(v_a - v_o) + (w x n).(a - o): as if the point moved and the plane stood still with the
+// opposite rotation. The relative acceleration seen from the plane adds the Coriolis and centripetal terms.
 std::optional<Impact> time_of_plane_impact(const MovingConvex& a, const PosePath& plane, Real tolerance) {
   const Real reach = a.shape.reach();
   // The greatest distance of a point of the solid from the plane's origin on the way: at one of its ends.
-  const Real lever = reach + std::sqrt(std::max((a.path.start().position - plane.start().position).squaredNorm(),
-                                                (a.path.end().position - plane.end().position).squaredNorm()));
+  const Real lever =
+      reach + std::sqrt(std::max((a.path.start().position - plane.start().position).squaredNorm(),
+                                 (a.path.end().position - plane.end().position).squaredNorm()));
   const Vec3 travel = a.path.velocity() - plane.velocity();
   const auto gap_at = [&](Real share, Separation& s) {
     const Pose pose = a.path.at(share), ground = plane.at(share);

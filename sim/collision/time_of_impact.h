@@ -1,11 +1,11 @@
 #pragma once
-/// When two moving solids first touch: conservative advancement (Mirtich, "Impulse-based dynamic simulation of rigid
-/// body systems", 1996, 2.3), physics R3 and R12. From the distance now and the greatest rate at which it can
-/// shrink follows a time before which nothing touches; going there again and again closes in on the impact from the
-/// safe side, so nothing is ever passed through, however fast or thin.
+/// When two moving solids first touch: conservative advancement (Mirtich, "Impulse-based dynamic simulation
+/// of rigid body systems", 1996, 2.3), physics R3 and R12. From the distance now and the greatest rate at
+/// which it can shrink follows a time before which nothing touches; going there again and again closes in on
+/// the impact from the safe side, so nothing is ever passed through, however fast or thin.
 ///
-/// The rate is that along the separating direction, with the rotation's share taken from the support of both solids
-/// and its change bounded by the largest acceleration: for all points of both solids
+/// The rate is that along the separating direction, with the rotation's share taken from the support of both
+/// solids and its change bounded by the largest acceleration: for all points of both solids
 ///   gap(t + dt) >= distance - rate dt - acceleration dt^2 / 2.
 
 #include <optional>
@@ -29,13 +29,13 @@ struct MovingConvex {
   const PosePath& path;
 };
 
-/// A share of the step at which A and B are within `tolerance` [m], > 0, of each other, and before which they are never
-/// within half of it. None: they stay more than half of it apart to the end. Solids that begin within it have their
-/// impact at share 0.
+/// A share of the step at which A and B are within `tolerance` [m], > 0, of each other, and before which they
+/// are never within half of it. None: they stay more than half of it apart to the end. Solids that begin
+/// within it have their impact at share 0.
 std::optional<Impact> time_of_impact(const MovingConvex& a, const MovingConvex& b, Real tolerance);
 
-/// The same against the half-space under a plane, the xz plane of its path's frame. The normal is the plane's, in
-/// the solid's frame.
+/// The same against the half-space under a plane, the xz plane of its path's frame. The normal is the
+/// plane's, in the solid's frame.
 std::optional<Impact> time_of_plane_impact(const MovingConvex& a, const PosePath& plane, Real tolerance);
 
 /// The distance of two solids at some time, and how it can shrink from there on.

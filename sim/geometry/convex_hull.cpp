@@ -44,8 +44,8 @@ class Qhull {
     for (facetT* f = qh_.facet_list; f && f->next; f = f->next) {
       Triangle t;
       for (int k = 0; k < 3; ++k)
-        t[static_cast<std::size_t>(k)] = static_cast<uint32_t>(
-            qh_pointid(&qh_, static_cast<vertexT*>(f->vertices->e[k].p)->point));
+        t[static_cast<std::size_t>(k)] =
+            static_cast<uint32_t>(qh_pointid(&qh_, static_cast<vertexT*>(f->vertices->e[k].p)->point));
       if (f->toporient != qh_ORIENTclock) std::swap(t[1], t[2]);
       result.push_back(t);
     }
@@ -57,7 +57,8 @@ class Qhull {
   std::FILE* log_;
 };
 
-/// The points' best line or plane fitted by extreme points: no sums, so far-off and repeated points do no harm.
+/// The points' best line or plane fitted by extreme points: no sums, so far-off and repeated points do no
+/// harm.
 struct Frame {
   int dimension;  // of the set: 0-3
   Vec3 origin, along, normal;
@@ -89,16 +90,15 @@ Frame fit(std::span<const Vec3> points) {
   if (std::sqrt(width2) <= kFlat * extent) return frame;
 
   frame.normal = frame.along.cross(across(c)).normalized();
-  const Real thickness =
-      farthest([&](const Vec3& p) { return std::abs(frame.normal.dot(p - a)); }).second;
+  const Real thickness = farthest([&](const Vec3& p) { return std::abs(frame.normal.dot(p - a)); }).second;
   frame.dimension = thickness <= kFlat * extent ? 2 : 3;
   return frame;
 }
 
 ConvexPolyhedron segment_hull(std::span<const Vec3> points, const Frame& frame) {
-  const auto [low, high] = std::minmax_element(points.begin(), points.end(), [&](const Vec3& p, const Vec3& q) {
-    return frame.along.dot(p) < frame.along.dot(q);
-  });
+  const auto [low, high] = std::minmax_element(
+      points.begin(), points.end(),
+      [&](const Vec3& p, const Vec3& q) { return frame.along.dot(p) < frame.along.dot(q); });
   return {{*low, *high}, {}};
 }
 
@@ -168,9 +168,7 @@ class FaceMerger {
 
  private:
   const Vec3& corner(uint32_t t, std::size_t k) const { return points_[triangles_[t][k % 3]]; }
-  Vec3 area(uint32_t t) const {
-    return (corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0)) / 2;
-  }
+  Vec3 area(uint32_t t) const { return (corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0)) / 2; }
 
   void find_neighbours() {
     std::vector<std::array<uint32_t, 4>> sides;  // low, high, triangle, side
@@ -262,9 +260,10 @@ ConvexPolyhedron compact(std::span<const Vec3> points, Loops faces) {
   return {std::move(vertices), faces};
 }
 
-/// The polyhedron of a triangulated hull: with merged faces, or, where merging does not give a closed surface, with
-/// the triangles as they are. Empty if even they do not close.
-ConvexPolyhedron assemble(std::span<const Vec3> points, const std::vector<Triangle>& triangles, Real tolerance) {
+/// The polyhedron of a triangulated hull: with merged faces, or, where merging does not give a closed
+/// surface, with the triangles as they are. Empty if even they do not close.
+ConvexPolyhedron assemble(std::span<const Vec3> points, const std::vector<Triangle>& triangles,
+                          Real tolerance) {
   try {
     if (Loops faces = FaceMerger(points, triangles, tolerance).faces(); faces.size() >= 4)
       return compact(points, std::move(faces));
@@ -289,7 +288,8 @@ ConvexPolyhedron convex_hull(std::span<const Vec3> points) {
   if (frame.dimension == 1) return segment_hull(points, frame);
   if (frame.dimension == 2) return polygon_hull(points, frame);
 
-  // Qhull's tolerances grow with the coordinates: it works on the set moved to the origin and scaled to size 1.
+  // Qhull's tolerances grow with the coordinates: it works on the set moved to the origin and scaled to
+  // size 1.
   std::vector<Real> coordinates;
   coordinates.reserve(3 * points.size());
   for (const Vec3& p : points)

@@ -17,8 +17,7 @@ ConvexPolyhedron::ConvexPolyhedron(std::vector<Vec3> vertices, std::span<const s
     face_vertices_.items.insert(face_vertices_.items.end(), face.begin(), face.end());
     face_vertices_.start.push_back(static_cast<uint32_t>(face_vertices_.items.size()));
   }
-  if (faces.empty() && vertices_.size() > 2)
-    throw std::invalid_argument("more than two vertices need faces");
+  if (faces.empty() && vertices_.size() > 2) throw std::invalid_argument("more than two vertices need faces");
 
   for (const Vec3& v : vertices_) {
     centre_ += v / static_cast<Real>(vertices_.size());
@@ -55,7 +54,8 @@ void ConvexPolyhedron::find_edges() {
       return j < sides.size() && sides[j].low == sides[i].low && sides[j].high == sides[i].high;
     };
     if (!same(i + 1) || same(i + 2) || !sides[i].forward || sides[i + 1].forward)
-      throw std::invalid_argument("an edge does not have exactly two faces that run along it in opposite ways");
+      throw std::invalid_argument(
+          "an edge does not have exactly two faces that run along it in opposite ways");
     face_edges_.items[sides[i].slot] = face_edges_.items[sides[i + 1].slot] =
         static_cast<uint32_t>(edges_.size());
     edges_.push_back({sides[i].low, sides[i].high, sides[i].face, sides[i + 1].face});
@@ -115,8 +115,7 @@ TriangleMesh ConvexPolyhedron::triangles() const {
 ConvexPolyhedron box_polyhedron(const Vec3& size) {
   std::vector<Vec3> vertices;
   for (int i = 0; i < 8; ++i)
-    vertices.push_back(
-        size.cwiseProduct(Vec3(i & 1 ? 0.5 : -0.5, i & 2 ? 0.5 : -0.5, i & 4 ? 0.5 : -0.5)));
+    vertices.push_back(size.cwiseProduct(Vec3(i & 1 ? 0.5 : -0.5, i & 2 ? 0.5 : -0.5, i & 4 ? 0.5 : -0.5)));
   const std::array<std::vector<uint32_t>, 6> faces = {
       {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}}};
   return {std::move(vertices), faces};

@@ -19,8 +19,8 @@ class ConvexPolyhedron {
     uint32_t tail, head;
     uint32_t left, right;
   };
-  /// The unit vectors that bound the Voronoi regions at an edge (Mirtich, "V-Clip", 1998): along it from tail to
-  /// head, and perpendicular to it in its faces' planes, into the faces; zero where there is no face.
+  /// The unit vectors that bound the Voronoi regions at an edge (Mirtich, "V-Clip", 1998): along it from tail
+  /// to head, and perpendicular to it in its faces' planes, into the faces; zero where there is no face.
   struct EdgeFrame {
     Vec3 along, into_left, into_right;
   };
@@ -31,10 +31,10 @@ class ConvexPolyhedron {
   };
 
   ConvexPolyhedron() = default;
-  /// From faces whose vertices run counter-clockwise seen from outside. The caller vouches that the polyhedron
-  /// is convex and closed; convex_hull() makes one from any points. Without faces, at most two vertices.
-  /// Throws std::invalid_argument for an index out of range, a face of less than three vertices, or an edge
-  /// that does not have exactly two faces running along it in opposite directions.
+  /// From faces whose vertices run counter-clockwise seen from outside. The caller vouches that the
+  /// polyhedron is convex and closed; convex_hull() makes one from any points. Without faces, at most two
+  /// vertices. Throws std::invalid_argument for an index out of range, a face of less than three vertices, or
+  /// an edge that does not have exactly two faces running along it in opposite directions.
   ConvexPolyhedron(std::vector<Vec3> vertices, std::span<const std::vector<uint32_t>> faces);
 
   std::span<const Vec3> vertices() const { return vertices_; }

@@ -197,8 +197,10 @@ TEST(Commands, ConvexPartsAreKeptOnDiskUnlessToldNotTo) {
   const TemporaryFolder folder;
   // An L: two bars of a unit square's section.
   write_file(folder / "l.obj",
-             "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 1\nv 2 0 1\nv 2 1 1\nv 1 1 1\nv 1 2 1\nv 0 2 1\n"
-             "f 1 4 3 2\nf 1 6 5 4\nf 7 8 9 10\nf 7 10 11 12\nf 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\nf 5 6 12 11\n"
+             "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 1\nv 2 0 1\nv 2 1 1\nv 1 1 1\nv 1 "
+             "2 1\nv 0 2 1\n"
+             "f 1 4 3 2\nf 1 6 5 4\nf 7 8 9 10\nf 7 10 11 12\nf 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 "
+             "10\nf 5 6 12 11\n"
              "f 6 1 7 12\n");
   const auto cache = folder / "kept";
   const std::string there = "XDG_CACHE_HOME='" + cache.string() + "'";

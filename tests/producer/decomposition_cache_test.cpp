@@ -15,14 +15,15 @@ using render::ScratchFolder;
 
 bool equal(const sim::ConvexDecomposition& a, const sim::ConvexDecomposition& b) {
   if (a.method != b.method || a.volume_error != b.volume_error || a.note != b.note) return false;
-  return std::ranges::equal(a.parts, b.parts, [](const sim::ConvexPolyhedron& p, const sim::ConvexPolyhedron& q) {
-    if (!std::ranges::equal(p.vertices(), q.vertices()) || p.face_count() != q.face_count()) return false;
-    for (uint32_t f = 0; f < p.face_count(); ++f)
-      if (!std::ranges::equal(p.face_vertices(f), q.face_vertices(f)) ||
-          p.plane(f).normal != q.plane(f).normal || p.plane(f).offset != q.plane(f).offset)
-        return false;
-    return true;
-  });
+  return std::ranges::equal(
+      a.parts, b.parts, [](const sim::ConvexPolyhedron& p, const sim::ConvexPolyhedron& q) {
+        if (!std::ranges::equal(p.vertices(), q.vertices()) || p.face_count() != q.face_count()) return false;
+        for (uint32_t f = 0; f < p.face_count(); ++f)
+          if (!std::ranges::equal(p.face_vertices(f), q.face_vertices(f)) ||
+              p.plane(f).normal != q.plane(f).normal || p.plane(f).offset != q.plane(f).offset)
+            return false;
+        return true;
+      });
 }
 
 TEST(DecompositionCache, GivesBackEveryBit) {

@@ -116,9 +116,10 @@ TEST(Overlays, ContactsOfAllPairsArePushedApart) {
 }
 
 TEST(Overlays, AreTheSameWhateverWasSeenBefore) {
+  const std::string box = R"({"name": "box", "motion": "kinematic", "spin": [1, 2, 3]})";
   const std::string text =
-      scene(ball("a", "[0, 0, 0]", R"(, "spin": [1, 2, 3])") + "," + std::string(kCrank),
-            R"({"type": "closest", "a": "a", "b": "crank"}, {"type": "contacts", "margin": 5})");
+      scene(ball("a", "[0, 1.02, 0]") + "," + box,
+            R"({"type": "closest", "a": "a", "b": "box"}, {"type": "contacts", "margin": 0.3})");
   Shown once(text), often(text);
   for (int frame = 0; frame < 5; ++frame) {
     often.simulation.advance();

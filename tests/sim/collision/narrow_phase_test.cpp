@@ -11,9 +11,12 @@ namespace {
 
 /// A body's shape with all that it stands on.
 struct Piece {
-  explicit Piece(const Shape& s, bool needs_volume = true) : shape(s), collision({&shape, nullptr}, needs_volume) {}
+  explicit Piece(const Shape& s, bool needs_volume = true)
+      : shape(s), collision({&shape, nullptr}, needs_volume) {}
   Piece(const TriangleMesh& m, bool needs_volume)
-      : shape(MeshShape{}), mesh(std::make_unique<CollisionMesh>(m)), collision({&shape, mesh.get()}, needs_volume) {}
+      : shape(MeshShape{}),
+        mesh(std::make_unique<CollisionMesh>(m)),
+        collision({&shape, mesh.get()}, needs_volume) {}
   Piece(const Piece&) = delete;
 
   Shape shape;
@@ -54,8 +57,8 @@ Pose between(const Pose& a, const Pose& b) {
 }
 
 TEST(NarrowPhase, TouchingIsExactForEveryPairOfPrimitives) {
-  const Piece plane(Plane{}), box(Box{Vec3::Ones()}), ball(Sphere{0.5}), capsule(Capsule{0.2, 1}), cone(Cone{0.5, 1}),
-      cylinder(Cylinder{0.5, 1});
+  const Piece plane(Plane{}), box(Box{Vec3::Ones()}), ball(Sphere{0.5}), capsule(Capsule{0.2, 1}),
+      cone(Cone{0.5, 1}), cylinder(Cylinder{0.5, 1});
   const auto both = [](const Piece& s, const Pose& p, const Piece& t, const Pose& q) {
     const bool forward = touching(s.collision, t.collision, between(p, q));
     if (!t.collision.is_plane()) {
@@ -115,7 +118,8 @@ TEST(NarrowPhase, TheGapOfAnLHoldsABox) {
   ASSERT_TRUE(s);
   EXPECT_NEAR(s->distance, 0.35, 1e-9);
   std::vector<Manifold> manifolds;
-  find_manifolds(l.collision, box.collision, pose({-0.25, 0.25, 0}), 1e-3, cache, DistanceMethod::gjk, manifolds);
+  find_manifolds(l.collision, box.collision, pose({-0.25, 0.25, 0}), 1e-3, cache, DistanceMethod::gjk,
+                 manifolds);
   Vec3 pushes = Vec3::Zero();
   for (const Manifold& m : manifolds) {
     EXPECT_GE(m.count, 2u);
@@ -139,7 +143,8 @@ TEST(NarrowPhase, ABoxOnATiltedPlaneRestsOnFourPoints) {
     EXPECT_NEAR(s->distance, height - 1, 1e-12);
     EXPECT_NEAR((placed.vector_to_world(s->normal) - slope.vector_to_world(Vec3::UnitY())).norm(), 0, 1e-12);
     std::vector<Manifold> manifolds;
-    find_manifolds(box.collision, plane.collision, between(placed, slope), 0.01, cache, DistanceMethod::gjk, manifolds);
+    find_manifolds(box.collision, plane.collision, between(placed, slope), 0.01, cache, DistanceMethod::gjk,
+                   manifolds);
     if (height > 1.01) {
       EXPECT_TRUE(manifolds.empty()) << "farther than the margin";
       continue;
@@ -170,7 +175,8 @@ TEST(NarrowPhase, WhatIsInsideASolidIsInPenetration) {
     EXPECT_TRUE(touching(ball.collision, *solid, pose({-1, 0, 0})));
     EXPECT_FALSE(touching(*solid, ball.collision, pose({0, 0, 0}))) << "the hole";
     const PosePath resting{Pose{}}, inside(pose({1, 0, 0}));
-    const auto impact = time_of_impact(MovingShape{*solid, resting}, MovingShape{ball.collision, inside}, 1e-6);
+    const auto impact =
+        time_of_impact(MovingShape{*solid, resting}, MovingShape{ball.collision, inside}, 1e-6);
     ASSERT_TRUE(impact);
     EXPECT_EQ(impact->share, 0);
     EXPECT_LT(impact->separation.distance, 0);
@@ -194,8 +200,8 @@ TEST(NarrowPhase, OpenSurfacesAreTwoSided) {
     EXPECT_NEAR(s->distance, 0.2, 1e-9);
     EXPECT_NEAR(s->normal.y(), side, 1e-9);
     std::vector<Manifold> manifolds;
-    find_manifolds(box.collision, floor.collision, pose({0.3, -side * 0.5, 0.1}), 1e-3, cache, DistanceMethod::gjk,
-                   manifolds);
+    find_manifolds(box.collision, floor.collision, pose({0.3, -side * 0.5, 0.1}), 1e-3, cache,
+                   DistanceMethod::gjk, manifolds);
     ASSERT_FALSE(manifolds.empty());
     for (const Manifold& m : manifolds) EXPECT_NEAR(m.normal.y(), side, 1e-9);
   }
@@ -219,7 +225,8 @@ std::optional<Real> first_contact(const MovingShape& a, const MovingShape& b, Re
 }
 
 TEST(TimeOfImpact, OfNonConvexSolidsAgreesWithBisection) {
-  const Piece l(l_mesh(), true), hollow(l_mesh(), false), torus(torus_mesh(1, 0.3, 12, 8), false), rod(Capsule{0.05, 2});
+  const Piece l(l_mesh(), true), hollow(l_mesh(), false), torus(torus_mesh(1, 0.3, 12, 8), false),
+      rod(Capsule{0.05, 2});
   const Scatter random{8};
   constexpr Real kTolerance = 1e-6;
   int impacts = 0;
@@ -243,7 +250,8 @@ TEST(TimeOfImpact, OfNonConvexSolidsAgreesWithBisection) {
     ++impacts;
     EXPECT_TRUE(impact->converged);
     PairCache none;
-    const auto s = separation(a.collision, b.collision, between(way_a.at(impact->share), way_b.at(impact->share)), none);
+    const auto s =
+        separation(a.collision, b.collision, between(way_a.at(impact->share), way_b.at(impact->share)), none);
     EXPECT_LE(s->distance, kTolerance * (1 + 1e-6)) << i;
     if (impact->share > 0) {
       EXPECT_GT(s->distance, kTolerance / 2 - 1e-9) << i;

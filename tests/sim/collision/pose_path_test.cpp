@@ -23,7 +23,8 @@ TEST(PosePath, VelocitiesAreTheDerivativeOfTheWay) {
       const Vec3 r = path.at(s).vector_to_world(p);
       EXPECT_LT((path.velocity() + path.angular_velocity(s).cross(r) - measured).norm(), 1e-7);
       const Vec3 second = (path.at(s + 1e-4).point_to_world(p) - 2 * path.at(s).point_to_world(p) +
-                           path.at(s - 1e-4).point_to_world(p)) / 1e-8;
+                           path.at(s - 1e-4).point_to_world(p)) /
+                          1e-8;
       EXPECT_LE(second.norm(), path.max_acceleration(p.norm()) * (1 + 1e-4));
     }
     EXPECT_LT((path.at(1).point_to_world(p) - path.end().point_to_world(p)).norm(), 1e-14);

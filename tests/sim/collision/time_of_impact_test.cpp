@@ -18,7 +18,8 @@ Pose pose(const Vec3& position, Real angle = 0, const Vec3& axis = Vec3::UnitZ()
 Real distance(const MovingConvex& a, const MovingConvex& b, Real share) {
   const Pose p = a.path.at(share), q = b.path.at(share);
   GjkCache fresh;
-  return gjk(a.shape, b.shape, {p.point_to_body(q.position), p.orientation.conjugate() * q.orientation}, fresh)
+  return gjk(a.shape, b.shape, {p.point_to_body(q.position), p.orientation.conjugate() * q.orientation},
+             fresh)
       .distance;
 }
 
@@ -100,7 +101,8 @@ TEST(TimeOfImpact, TouchingAtTheStartIsAnImpactAtOnce) {
   }
 }
 
-// The advancement never comes late, stops within the tolerance, and misses nothing that the fine bisection sees.
+// The advancement never comes late, stops within the tolerance, and misses nothing that the fine bisection
+// sees.
 TEST(TimeOfImpact, AgreesWithFineBisection) {
   const Scatter random{11};
   const std::array<Shape, 5> shapes = {Box{Vec3(1, 0.05, 0.6)}, Capsule{0.1, 0.8}, Cylinder{0.4, 0.1},
@@ -109,7 +111,8 @@ TEST(TimeOfImpact, AgreesWithFineBisection) {
   for (uint64_t i = 0; i < 400; ++i) {
     const auto u = [&](uint64_t k) { return 2 * random.uniform(i, k) - 1; };
     const auto place = [&](uint64_t k, Real spread) {
-      return Pose{spread * Vec3(u(k), u(k + 1), u(k + 2)), Quat(u(k + 3), u(k + 4), u(k + 5), u(k + 6)).normalized()};
+      return Pose{spread * Vec3(u(k), u(k + 1), u(k + 2)),
+                  Quat(u(k + 3), u(k + 4), u(k + 5), u(k + 6)).normalized()};
     };
     std::vector<Vec3> cloud;
     for (uint64_t k = 0; k < 12; ++k) cloud.push_back(0.5 * Vec3(u(k), u(k + 12), u(k + 24)));
