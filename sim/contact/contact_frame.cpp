@@ -9,7 +9,7 @@ namespace {
 constexpr Real kCoincident = 1e-12;
 
 /// n = u x w / |u x w| with lines that turn with the bodies, up to the sign.
-Vec3 crossing_rate(const Manifold& m, const Motion& a, const Motion& b) {
+Vec3 crossing_rate(const Manifold& m, const Twist& a, const Twist& b) {
   const Vec3 &u = m.edge_a, &w = m.edge_b, cross = u.cross(w);
   const Vec3 rate =
       (a.angular_velocity.cross(u).cross(w) + u.cross(b.angular_velocity.cross(w))) / cross.norm();
@@ -18,7 +18,7 @@ Vec3 crossing_rate(const Manifold& m, const Motion& a, const Motion& b) {
 
 /// n = d / |d|, where d leads from a point or line of B to one of A. The nearest point of a line slides along
 /// it, and that does not change d across n and the line; along the line e, n.e = 0 gives n'.e = -n.e'.
-Vec3 pointing_rate(const Manifold& m, const ContactPoint& point, const Motion& a, const Motion& b) {
+Vec3 pointing_rate(const Manifold& m, const ContactPoint& point, const Twist& a, const Twist& b) {
   const Vec3 &n = m.normal, p = point.on_a + m.radius_a * n, q = point.on_b - m.radius_b * n;
   const Real distance = (p - q).dot(n);
   if (std::abs(distance) < kCoincident) return (a.angular_velocity + b.angular_velocity).cross(n) / 2;
@@ -49,7 +49,7 @@ ContactFrame contact_frame_rate(const ContactFrame& frame, const Vec3& n_rate) {
   return {n_rate, t_rate, n_rate.cross(frame.t) + frame.n.cross(t_rate)};
 }
 
-Vec3 normal_rate(const Manifold& m, const ContactPoint& point, const Motion& a, const Motion& b) {
+Vec3 normal_rate(const Manifold& m, const ContactPoint& point, const Twist& a, const Twist& b) {
   Vec3 rate;
   switch (m.source) {
     case NormalSource::face_of_a:

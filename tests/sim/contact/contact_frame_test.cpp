@@ -61,7 +61,7 @@ struct Pair {
   NormalSource source;
 };
 
-Pose moved(const Pose& p, const Motion& motion, Real t) {
+Pose moved(const Pose& p, const Twist& motion, Real t) {
   const Real angle = motion.angular_velocity.norm() * t;
   const Quat turn(Eigen::AngleAxisd(angle, motion.angular_velocity.normalized()));
   return {turn * p.position + t * motion.velocity, turn * p.orientation};
@@ -81,7 +81,7 @@ Separation separation(const Pair& pair, const Pose& a, const Pose& b) {
 }
 
 /// The normal's central difference over a step, from the geometry alone.
-Vec3 difference(const Pair& pair, const Motion& a, const Motion& b, Real h) {
+Vec3 difference(const Pair& pair, const Twist& a, const Twist& b, Real h) {
   const auto normal = [&](Real t) {
     const Pose at = moved(pair.world_from_a, a, t);
     return at.vector_to_world(separation(pair, at, moved(pair.world_from_b, b, t)).normal);
@@ -89,7 +89,7 @@ Vec3 difference(const Pair& pair, const Motion& a, const Motion& b, Real h) {
   return (normal(h) - normal(-h)) / (2 * h);
 }
 
-Vec3 rate(const Pair& pair, const Motion& a, const Motion& b) {
+Vec3 rate(const Pair& pair, const Twist& a, const Twist& b) {
   const Separation s = separation(pair, pair.world_from_a, pair.world_from_b);
   const Manifold m = placed(
       manifold(pair.a, pair.b, relative(pair.world_from_a, pair.world_from_b), s, std::max(0.0, s.distance)),
@@ -155,7 +155,7 @@ TEST(NormalRate, IsTheDerivativeOfTheGeometryForEverySource) {
   Dice dice(4);
   for (const Pair& pair : pairs())
     for (int k = 0; k < 10; ++k) {
-      const Motion a{dice.direction(), dice.direction()}, b{dice.direction(), dice.direction()};
+      const Twist a{dice.direction(), dice.direction()}, b{dice.direction(), dice.direction()};
       const Vec3 expected = (4 * difference(pair, a, b, h / 2) - difference(pair, a, b, h)) / 3;
       const Vec3 n = rate(pair, a, b);
       ASSERT_LT((n - expected).norm(), 2e-5 * (1 + n.norm()))
@@ -167,7 +167,7 @@ TEST(NormalRate, OfPolyhedraDiffersFromCentralDifferencesByTheSquareOfTheStep) {
   Dice dice(5);
   for (const Pair& pair : pairs()) {
     if (!pair.a.polyhedron || !pair.b.polyhedron) continue;
-    const Motion a{dice.direction(), dice.direction()}, b{dice.direction(), dice.direction()};
+    const Twist a{dice.direction(), dice.direction()}, b{dice.direction(), dice.direction()};
     const Vec3 n = rate(pair, a, b);
     const Real coarse = (difference(pair, a, b, 4e-3) - n).norm(),
                fine = (difference(pair, a, b, 2e-3) - n).norm();
