@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
+#include "sim/coupled_system.h"
 #include "sim/world_impl.h"
 
 namespace offstage::sim {
@@ -69,6 +71,10 @@ void check_track(const std::string& object, const KeyframeTrack& track) {
   }
 }
 
+void check_restitution(const std::string& object, Real e) {
+  if (!(e >= 0 && e <= 1)) refuse(object, "restitution is " + std::to_string(e) + ", allowed is 0 to 1");
+}
+
 void check_body(const std::string& object, const BodyDef& def) {
   std::visit([&](const auto& shape) { check_size(object, shape); }, def.shape);
   check_pose(object, "pose", def.pose);
@@ -79,8 +85,11 @@ void check_body(const std::string& object, const BodyDef& def) {
   check_not_negative(object, "linear_drag", def.linear_drag);
   check_not_negative(object, "angular_drag", def.angular_drag);
   check_not_negative(object, "friction", def.friction);
-  if (!(def.restitution >= 0 && def.restitution <= 1))
-    refuse(object, "restitution is " + std::to_string(def.restitution) + ", allowed is 0 to 1");
+  check_restitution(object, def.restitution);
+  check_finite(object, "friction_axis", def.friction_axis);
+  check_finite(object, "surface_velocity", def.surface_velocity);
+  if (def.cross_friction >= 0 && def.friction_axis == Vec3::Zero())
+    refuse(object, "cross_friction needs a friction_axis, allowed is any but 0 0 0");
   check_track(object, def.track);
 }
 
@@ -119,6 +128,25 @@ Motion Body::motion(Real now, Real time) const {
   return {later.pose(), v + w.cross(arm), w};
 }
 
+uint32_t World::Impl::surface_number(const std::string& material) {
+  const auto at = std::find(materials.begin(), materials.end(), material);
+  if (at == materials.end()) return materials.push_back(material), static_cast<uint32_t>(materials.size() - 1);
+  return static_cast<uint32_t>(at - materials.begin());
+}
+
+/// Whatever rests on a body that goes away wakes.
+void World::Impl::let_go(Body& body) {
+  wake(body);
+  graph.for_each([&](ContactPair& pair) {
+    if (&pair.a() == &body) wake(pair.b());
+    if (&pair.b() == &body) wake(pair.a());
+  });
+  graph.forget(body.handle.index);
+  std::erase(stepped, &body);
+  active_pairs.clear();
+  islands.clear();
+}
+
 const CollisionShape& Body::collision_shape() {
   if (!collision_shape_) collision_shape_.emplace(solid, def.motion == MotionType::dynamic);
   return *collision_shape_;
@@ -154,6 +182,8 @@ World::World(const WorldDef& def) : impl_(std::make_unique<Impl>()) {
   check_positive("world", "max_step", def.max_step);
   check_finite("world", "gravity", def.gravity);
   check_finite("world", "wind", def.wind);
+  check_positive("world", "collision_speed", def.collision_speed);
+  check_positive("world", "integration_error", def.integration_error);
   if (def.bounds.isEmpty()) refuse("world", "bounds are empty");
   impl_->def = def;
 }
@@ -198,11 +228,15 @@ BodyHandle World::add_body(const BodyDef& def) {
   body->pose = {def.pose.position, def.pose.orientation.normalized()};
   if (def.motion == MotionType::dynamic) body->rigid = make_rigid_body(object, def, body->solid);
   if (def.motion == MotionType::kinematic) body->pose = def.track.at(impl_->now, def.pose).pose;
-  body->before_step = body->before_substep = body->pose;
-  impl_->fixed_changed = true;
+  body->before_step = body->before_substep = body->start_pose = body->pose;
+  body->extent = std::holds_alternative<Plane>(def.shape) ? std::numeric_limits<Real>::infinity()
+                                                          : reach(body->solid);
+  body->surface = impl_->surface_number(def.material);
+  impl_->fixed_changed = impl_->lists_changed = true;
   const BodyHandle handle = impl_->bodies.insert(std::move(body));
+  impl_->bodies[handle]->handle = handle;
   if (const Body& added = *impl_->bodies[handle]; added.def.collides)
-    impl_->broad_phase.insert(handle.index, bounds(added.solid, added.pose), !added.can_move());
+    impl_->broad_phase.insert(handle.index, bounds(added.solid, added.pose), !added.is_dynamic());
   return handle;
 }
 
@@ -223,16 +257,50 @@ SpringHandle World::add_spring(const SpringDef& def) {
     refuse(object, "an end is attached to nothing that exists");
   const Real rest =
       def.rest_length >= 0 ? def.rest_length : (impl_->position(def.a) - impl_->position(def.b)).norm();
+  for (const Attachment* end : {&def.a, &def.b})
+    if (const auto* point = std::get_if<BodyPoint>(end)) impl_->wake(*impl_->bodies[point->body]);
   return impl_->springs.insert({def, rest});
 }
 
+ForceHandle World::add_force(const ForceDef& def) {
+  const std::string wrong = problem(def);
+  if (!wrong.empty()) refuse(quoted("force", def.name), wrong);
+  impl_->wake_all();
+  return impl_->force_defs.insert(def);
+}
+
+void World::add_contact_rule(const ContactRule& rule) {
+  const std::string object = "contact rule of \"" + rule.a + "\" and \"" + rule.b + '"';
+  if (rule.restitution) check_restitution(object, *rule.restitution);
+  if (rule.friction) check_not_negative(object, "friction", *rule.friction);
+  if (rule.static_friction) check_not_negative(object, "static_friction", *rule.static_friction);
+  impl_->rules[std::minmax(impl_->surface_number(rule.a), impl_->surface_number(rule.b))] = rule;
+  impl_->graph.forget_all();
+  impl_->wake_all();
+}
+
 bool World::remove(BodyHandle body) {
-  if (!impl_->bodies.erase(body)) return false;
+  const auto* found = impl_->bodies.find(body);
+  if (!found) return false;
+  impl_->let_go(**found);
+  impl_->bodies.erase(body);
   if (impl_->broad_phase.contains(body.index)) impl_->broad_phase.remove(body.index);
   std::erase_if(impl_->moved, [&](const MovedBody& m) { return m.body == body; });
-  impl_->fixed_changed = true;
+  impl_->fixed_changed = impl_->lists_changed = true;
   impl_->remove_dead_springs();
   return true;
+}
+
+bool World::remove(ForceHandle force) {
+  impl_->wake_all();
+  return impl_->force_defs.erase(force);
+}
+
+void World::set_velocity(BodyHandle handle, const Vec3& velocity, const Vec3& angular_velocity) {
+  Body& body = *impl_->bodies[handle];
+  if (!body.is_dynamic()) return;
+  impl_->wake(body);
+  body.rigid.set_velocity(velocity, angular_velocity);
 }
 
 bool World::remove(ParticleSystemHandle system) {
@@ -242,6 +310,9 @@ bool World::remove(ParticleSystemHandle system) {
 }
 
 bool World::remove(SpringHandle spring) {
+  if (const Spring* s = impl_->springs.find(spring))
+    for (const Attachment* end : {&s->def.a, &s->def.b})
+      if (const auto* point = std::get_if<BodyPoint>(end)) impl_->wake(*impl_->bodies[point->body]);
   return impl_->springs.erase(spring);
 }
 
@@ -303,6 +374,31 @@ void World::for_each_body(const std::function<void(BodyHandle)>& f) const {
 
 void World::for_each_particle_system(const std::function<void(ParticleSystemHandle)>& f) const {
   impl_->systems.for_each([&](ParticleSystemHandle handle, const auto&) { f(handle); });
+}
+
+std::vector<ContactState> World::contacts() const {
+  std::vector<ContactState> states;
+  impl_->graph.for_each([&](const ContactPair& pair) {
+    for (const PlacedManifold& m : pair.manifolds())
+      for (uint32_t k = 0; k < m.manifold.count; ++k) {
+        const ContactPoint& p = m.manifold.points[k];
+        if (p.separation > kTouching && m.force[k].x() == 0) continue;
+        const Vec3& f = m.force[k];
+        states.push_back({pair.a().handle, pair.b().handle, (p.on_a + p.on_b) / 2, m.frame.n,
+                          f.x() * m.frame.n + f.y() * m.frame.t + f.z() * m.frame.k, p.separation});
+      }
+  });
+  return states;
+}
+
+std::optional<uint32_t> World::island(BodyHandle handle) const {
+  const Body& body = *impl_->bodies[handle];
+  if (!body.is_dynamic()) return std::nullopt;
+  return body.asleep ? static_cast<uint32_t>(impl_->islands.size()) + body.island : body.island;
+}
+
+bool World::is_asleep(BodyHandle body) const {
+  return impl_->bodies[body]->asleep;
 }
 
 std::size_t World::body_count() const {

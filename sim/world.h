@@ -14,6 +14,8 @@
 #include <variant>
 #include <vector>
 
+#include "sim/contact/collision.h"
+#include "sim/dynamics/force_field.h"
 #include "sim/dynamics/integrator.h"
 #include "sim/dynamics/keyframes.h"
 #include "sim/dynamics/particles.h"
@@ -52,8 +54,13 @@ struct BodyDef {
   Real mass = 0;                         ///< [kg]; 0: from density and volume
   Real linear_drag = 0;                  ///< k_v of F = -k_v v [kg/s]
   Real angular_drag = 0;                 ///< k_w of tau = -k_w w [kg m^2/s]
-  Real restitution = 0.5;                ///< with particles: the larger of the two is used
-  Real friction = 0.5;                   ///< with particles: the geometric mean of the two is used
+  std::string material;                  ///< of the surface: what ContactRule names; may be empty
+  Real restitution = 0.5;                ///< of two the larger is used; in [0, 1]
+  Real friction = 0.5;                   ///< Coulomb's coefficient of what slides; of two the geometric mean
+  Real static_friction = -1;             ///< of what does not; negative: as `friction`
+  Real cross_friction = -1;              ///< of sliding across friction_axis; negative: as along it
+  Vec3 friction_axis = Vec3::Zero();     ///< the surface's grain, in the body's frame; zero: none
+  Vec3 surface_velocity = Vec3::Zero();  ///< of the surface against the body, as of a conveyor [m/s], its frame
   bool collides = true;                  ///< takes part in collisions with bodies and particles
   KeyframeTrack track;                   ///< for kinematic bodies
 };
@@ -82,19 +89,31 @@ struct SpringDef {
   Real rest_length = -1;  ///< L [m]; negative: the distance at creation
 };
 
+/// What two materials do to each other, in place of what would follow from each (see BodyDef).
+struct ContactRule {
+  std::string a, b;  ///< materials, in any order
+  std::optional<Real> restitution, friction, static_friction;
+};
+
+/// How resting contact is computed (physics N11, N12).
+enum class SolverKind {
+  exact,      ///< collisions at their very times, contact forces to rounding: slow where hundreds of bodies pile up
+  fast,       ///< time stepping on velocities: a bounded amount of work, errors far below a millimetre
+  automatic,  ///< exact where it costs less than fast or the group is small, by the work of steps before
+};
+
 struct WorldDef {
   Vec3 gravity = {0, -9.81, 0};                     ///< [m/s^2]
   Vec3 wind = Vec3::Zero();                         ///< air velocity felt by drag [m/s]
   Real max_step = 1.0 / 240;                        ///< longest internal step [s]
   IntegratorKind integrator = IntegratorKind::rk4;  ///< of bodies and of everything joined by springs
+  Real integration_error = 1e-6;  ///< per step, of the adaptive integrators: of any coordinate [m]
+  SolverKind solver = SolverKind::automatic;
+  ImpactLaw impact = ImpactLaw::simultaneous;
+  Real collision_speed = 0.05;  ///< bodies that meet slower than this do not bounce [m/s], > 0
+  bool sleep = true;            ///< groups of bodies at rest are left alone until something happens to them
   Aabb bounds =
       Aabb(Vec3::Constant(-1000), Vec3::Constant(1000));  ///< what leaves is retired and reported (E3)
-};
-
-/// Two bodies that came into contact, which this version cannot resolve yet (see StepReport::unresolved).
-struct UnresolvedContact {
-  BodyHandle a, b;
-  Real time = 0;  ///< of the first touch [s]
 };
 
 /// Something that stopped being finite: what it was just before, and what became of it. Bodies: centre of
@@ -116,9 +135,22 @@ struct StepReport {
   uint64_t particles_removed = 0;  ///< found inside a body and could not be projected out (P4)
   uint64_t particle_collisions = 0;
   uint64_t truncated_sweeps = 0;  ///< particles that used up their bounded number of hits within one sub-step
-  std::vector<BodyHandle> bodies_retired;     ///< left the world's bounds: frozen from here on
-  std::vector<UnresolvedContact> unresolved;  ///< pairs of bodies in contact: the result is not valid physics
-  bool finite = true;                         ///< false: something became NaN or infinite
+  std::vector<BodyHandle> bodies_retired;  ///< left the world's bounds: frozen from here on
+
+  // Contacts of bodies. Counts of the last sub-step, others of all.
+  uint32_t bodies_awake = 0, bodies_asleep = 0;
+  uint32_t islands = 0;           ///< groups of bodies that touch, or are joined
+  uint32_t contacts = 0;          ///< points that touch
+  Real penetration = 0;           ///< greatest at the start of a sub-step [m]
+  uint64_t collisions = 0;        ///< contacts that met faster than WorldDef::collision_speed
+  uint64_t tracebacks = 0;        ///< times that bodies were put back to a time of impact
+  uint64_t cut_short = 0;         ///< tracebacks that were given up for a sub-step: too many in it
+  uint64_t impact_fallbacks = 0;  ///< collisions, then contacts, that took projected Gauss-Seidel
+  ContactWork exact, fast;        ///< of the solvers of resting contact
+  ContactWork impacts;            ///< of the solver of collisions
+  IntegratorReport integration;   ///< of the free motion
+
+  bool finite = true;  ///< false: something became NaN or infinite
   NonFinite non_finite;                       ///< the first such object, if not finite
 };
 
@@ -126,6 +158,15 @@ struct StepReport {
 struct Energy {
   Real kinetic = 0, potential = 0, elastic = 0;
   Real total() const { return kinetic + potential + elastic; }
+};
+
+/// A point where two bodies touch.
+struct ContactState {
+  BodyHandle a, b;
+  Vec3 point = Vec3::Zero();   ///< between both surfaces, world [m]
+  Vec3 normal = Vec3::Zero();  ///< from b to a
+  Vec3 force = Vec3::Zero();   ///< on a: of the last sub-step, friction included [N]
+  Real separation = 0;         ///< [m], negative in penetration
 };
 
 struct MovedBody {
@@ -171,10 +212,17 @@ class World {
   BodyHandle add_body(const BodyDef& def);
   ParticleSystemHandle add_particle_system(const ParticleSystemDef& def);
   SpringHandle add_spring(const SpringDef& def);
+  ForceHandle add_force(const ForceDef& def);
+  /// Of two rules for the same materials the later counts.
+  void add_contact_rule(const ContactRule& rule);
 
   bool remove(BodyHandle body);  ///< springs attached to it go too; false if the handle is stale
   bool remove(ParticleSystemHandle system);
   bool remove(SpringHandle spring);
+  bool remove(ForceHandle force);
+
+  /// Gives a dynamic body another velocity of its centre of mass [m/s] and angular velocity [rad/s].
+  void set_velocity(BodyHandle body, const Vec3& velocity, const Vec3& angular_velocity);
 
   /// Adds a particle. `elapsed` is how long before the end of the coming sub-step it was born: it is
   /// integrated over just that part of it. Negative: it exists now and is stepped in full. Returns its id.
@@ -201,6 +249,12 @@ class World {
   const ParticleSystemDef& particle_system_def(ParticleSystemHandle system) const;
   void for_each_body(const std::function<void(BodyHandle)>& f) const;
   void for_each_particle_system(const std::function<void(ParticleSystemHandle)>& f) const;
+  /// The contact points at the end of the last step, in the order of their bodies.
+  std::vector<ContactState> contacts() const;
+  /// The group of touching bodies that a body belongs to, numbered in the order of their first bodies; none for
+  /// fixed and kinematic bodies.
+  std::optional<uint32_t> island(BodyHandle body) const;
+  bool is_asleep(BodyHandle body) const;
   std::size_t body_count() const;
   std::size_t particle_count() const;
 

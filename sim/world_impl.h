@@ -1,42 +1,22 @@
 #pragma once
 /// The inside of the World, shared by the files that implement it.
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "sim/body.h"
 #include "sim/collision/broad_phase.h"
-#include "sim/collision/collision_shape.h"
-#include "sim/collision/distance.h"
 #include "sim/collision/obstacles.h"
+#include "sim/contact/contact_solve.h"
+#include "sim/contact_graph.h"
 #include "sim/dynamics/particle_system.h"
-#include "sim/dynamics/rigid_body.h"
 #include "sim/world.h"
 
 namespace offstage::sim {
 
 class CoupledSystem;
-
-/// A body of the world. Its `solid` points into it and to its mesh, so it stays where it was made.
-struct Body {
-  BodyDef def;
-  Solid solid;
-  RigidBody rigid;  // dynamic bodies only
-  Pose pose;        // now
-  Pose before_substep, before_step;
-  bool frozen = false;
-
-  bool is_dynamic() const { return def.motion == MotionType::dynamic && !frozen; }
-  bool is_kinematic() const { return def.motion == MotionType::kinematic && !frozen; }
-  bool can_move() const { return is_dynamic() || (is_kinematic() && def.track.moves()); }
-  /// Made when another body first comes near, because a mesh may have to be decomposed for it.
-  const CollisionShape& collision_shape();
-  /// Pose and velocities of the body's origin at a time not far from now.
-  Motion motion(Real now, Real time) const;
-
- private:
-  std::optional<CollisionShape> collision_shape_;
-};
 
 struct Spring {
   SpringDef def;
@@ -50,6 +30,7 @@ struct WorldState {
   SlotMap<std::unique_ptr<Body>, BodyTag> bodies;
   SlotMap<ParticleSystem, ParticleSystemTag> systems;
   SlotMap<Spring, SpringTag> springs;
+  SlotMap<ForceDef, ForceTag> force_defs;
 
   ParticleForces forces(const ParticleSystem& system) const { return {system.def, def.gravity, def.wind}; }
   /// Whether the object that an attachment names exists.
@@ -58,24 +39,92 @@ struct WorldState {
   void remove_dead_springs();
 };
 
+/// Nearer than this bodies touch [m].
+constexpr Real kTouching = 2e-5;
+
+/// An island in a sub-step, whose bodies move together from the same time on.
+struct MovingIsland : Island {
+  CoupledSystem* motion = nullptr;  ///< that moved it from the interval's start; knows the way back
+  Real from = 0;                    ///< since the sub-step's start [s]
+};
+
 struct World::Impl : WorldState {
   StepReport step(Real sampling_time, const BeforeSubStep& before);
   void substep(Real start, Real end, StepReport& report);
-  void step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report);
-  void keep_within_bounds(BodyHandle handle, Body& body, StepReport& report);
-  void update_obstacles(Real h);
-  void find_contacts(Real start, Real h, StepReport& report);
   void collect_moved();
+
+  // Motion of bodies (world_step.cpp)
+  void begin_bodies(Real end);
+  void explode(Real start, Real end);
+  std::vector<const ForceDef*> active_forces() const;
+  CoupledSystem& move_all(Real start, Real h);
+  CoupledSystem& move_some(std::span<Body* const> group, Real start, Real from, Real duration);
+  void keep_within_bounds(Body& body, StepReport& report);
+
+  // Contacts (world_contacts.cpp)
+  PairSurface surface_of(const Body& a, const Body& b) const;
+  void update_pairs(Real h);
+  void find_points(ContactPair& pair, Real time, Real h) const;
+  bool move_in_broad_phase(Body& body, bool again);
+  void collect_pairs();
+  std::vector<Body*> wake_touched(Real start, Real h);
+  void find_moving_islands();
+  void solve_islands(Real h, StepReport& report);
+  void solve(std::span<Island* const> group, Real duration, StepReport& report);
+  void count_contacts(StepReport& report) const;
+
+  // Impacts (world_impacts.cpp)
+  struct Impact {
+    Real time;  ///< since the sub-step's start [s]
+    ContactPair* pair;
+  };
+  void resolve_impacts(Real start, Real h, StepReport& report);
+  std::optional<Real> impact_time(const ContactPair& pair, Real h) const;
+  std::optional<Real> point_impact_time(const ContactPair& pair, Real h) const;
+  void bring_to(MovingIsland& island, Real start, Real time, StepReport& report);
+  void join(uint32_t into, uint32_t island);
+  void find_pairs_again(uint32_t island, Real start, Real h, StepReport& report);
+  void collide(uint32_t island, Real start, Real time, Real h, StepReport& report);
+
+  uint32_t surface_number(const std::string& material);
+  void let_go(Body& body);
+
+  // Rest (world_sleep.cpp)
+  void wake(Body& body);
+  void wake_all();
+  void put_to_sleep(Real h);
+  void update_lists();
+
+  // Particles
+  void step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report);
+  void update_obstacles(Real h);
 
   // Time is a base plus a whole number of equal samplings: no sum of rounded steps.
   Real base_time = 0, sampling_time = 0;
-  uint64_t samplings = 0;
+  uint64_t samplings = 0, substeps = 0;
   Real now = 0;
 
   std::vector<MovedBody> moved;
   uint64_t born = 0;  // since the last report
 
+  // Lists of bodies in slot order, made anew when one was added, removed, fell asleep or woke.
+  bool lists_changed = true;
+  std::vector<Body*> awake, kinematic;  // dynamic ones; kinematic ones that move
+  std::vector<Body*> stepped;           // all that may have moved in this step
+  std::map<uint32_t, std::vector<Body*>> sleeping;
+  uint32_t sleeping_groups = 0;  // so far
+  std::size_t asleep = 0;        // bodies
+
   BroadPhase broad_phase;  // of the bodies that collide, by slot
+  ContactGraph graph;
+  std::vector<ContactPair*> active_pairs;  // those of which a body can move
+  std::vector<MovingIsland> islands;
+  std::map<uint32_t, SolverChoice> choices;  // by the slot of an island's first body
+  FastContacts fast_contacts;
+  std::vector<std::unique_ptr<CoupledSystem>> motions;  // of the sub-step
+
+  std::vector<std::string> materials;  // names; bodies have their numbers
+  std::map<std::pair<uint32_t, uint32_t>, ContactRule> rules;
 
   // What particles can hit in the current sub-step. What cannot move is arranged anew only when it changed
   // (E9).

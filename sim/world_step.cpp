@@ -1,9 +1,8 @@
-/// The loop of a sampling step (physics E4-E6), as far as it goes without resolving contacts between bodies.
+/// The loop of a sampling step (physics E4-E6).
 
 #include <algorithm>
 #include <cmath>
 
-#include "sim/collision/narrow_phase.h"
 #include "sim/coupled_system.h"
 #include "sim/world_impl.h"
 
@@ -24,20 +23,6 @@ bool is_finite(const RigidBody& b) {
          b.angular_momentum.allFinite();
 }
 
-/// How near bodies count as touching [m].
-constexpr Real kTouch = 1e-6;
-
-/// Box around all places of a body in the sub-step.
-Aabb swept_bounds(const Body& body) {
-  const PosePath path(body.before_substep, body.pose);
-  Aabb box = bounds(body.solid, body.before_substep).merged(bounds(body.solid, body.pose));
-  // A point leaves the chord of its path by no more than an eighth of its greatest acceleration.
-  const Real bulge = path.turn() > 0 ? path.max_acceleration(reach(body.solid)) / 8 : 0;
-  box.min().array() -= bulge + kTouch;
-  box.max().array() += bulge + kTouch;
-  return box;
-}
-
 bool same(const Pose& a, const Pose& b) {
   return a.position == b.position && a.orientation.coeffs() == b.orientation.coeffs();
 }
@@ -55,7 +40,10 @@ StepReport World::Impl::step(Real sampling, const BeforeSubStep& before) {
   }
   const auto at = [&](Real part) { return base_time + (static_cast<Real>(samplings) + part) * sampling; };
 
-  bodies.for_each([](BodyHandle, const std::unique_ptr<Body>& body) { body->before_step = body->pose; });
+  update_lists();
+  stepped.assign(awake.begin(), awake.end());
+  stepped.insert(stepped.end(), kinematic.begin(), kinematic.end());
+  for (Body* body : stepped) body->before_step = body->pose;
   report.substeps = substep_count(sampling, def.max_step);
   for (uint32_t i = 0; i < report.substeps; ++i) {
     const Real start = now, end = at(static_cast<Real>(i + 1) / report.substeps);
@@ -71,23 +59,92 @@ StepReport World::Impl::step(Real sampling, const BeforeSubStep& before) {
 
 void World::Impl::substep(Real start, Real end, StepReport& report) {
   const Real h = end - start;
-  bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& body) { body->before_substep = body->pose; });
+  ++substeps;
+  explode(start, end);
+  update_lists();
+  begin_bodies(end);
+  motions.clear();
+  CoupledSystem& motion = move_all(start, h);
+  if (!awake.empty()) {
+    do update_pairs(h);
+    while (!wake_touched(start, h).empty());
+    find_moving_islands();
+    solve_islands(h, report);
+    resolve_impacts(start, h, report);
+  }
+  for (Body* body : awake) keep_within_bounds(*body, report);
+  for (Body* body : kinematic) keep_within_bounds(*body, report);
+  count_contacts(report);
+  put_to_sleep(h);
+  for (const auto& m : motions) report.integration.add(m->report());
 
-  CoupledSystem coupled(*this);
-  coupled.step(integrator(def.integrator), start, h);
-  bodies.for_each([&](BodyHandle handle, const std::unique_ptr<Body>& body) {
-    if (!body->can_move()) return;
-    body->pose = body->is_dynamic() ? body->rigid.pose() : body->def.track.at(end, body->def.pose).pose;
-    keep_within_bounds(handle, *body, report);
+  if (!systems.empty()) {
+    update_obstacles(h);
+    step_particles(start, h, motion, report);
+  }
+}
+
+/// Every body that moves begins a sub-step; kinematic ones are moved through it at once.
+void World::Impl::begin_bodies(Real end) {
+  for (Body* body : awake) {
+    body->before_substep = body->pose;
+    body->begin_interval(0);
+  }
+  for (Body* body : kinematic) {
+    body->before_substep = body->pose;
+    body->begin_interval(0);
+    const Motion motion = body->def.track.at(end, body->def.pose);
+    body->pose = motion.pose;
+    body->drive = {motion.velocity, motion.angular_velocity};
+  }
+}
+
+/// Explosions that go off in the sub-step do so at its start.
+void World::Impl::explode(Real start, Real end) {
+  force_defs.for_each([&](ForceHandle, const ForceDef& def_) {
+    if (!def_.explodes(start, end)) return;
+    const Explosion& explosion = std::get<Explosion>(def_.effect);
+    bodies.for_each([&](BodyHandle handle, const std::unique_ptr<Body>& body) {
+      if (!body->is_dynamic()) return;
+      if (!def_.bodies.empty() && std::find(def_.bodies.begin(), def_.bodies.end(), handle) == def_.bodies.end())
+        return;
+      const Wrench blow = impulse(explosion, body->solid, body->pose, body->rigid.position);
+      if (blow.force == Vec3::Zero() && blow.torque == Vec3::Zero()) return;
+      wake(*body);
+      body->rigid.momentum += blow.force;
+      body->rigid.angular_momentum += blow.torque;
+    });
   });
+}
 
-  update_obstacles(h);
-  find_contacts(start, h, report);
-  step_particles(start, h, coupled, report);
+std::vector<const ForceDef*> World::Impl::active_forces() const {
+  std::vector<const ForceDef*> active;
+  force_defs.for_each([&](ForceHandle, const ForceDef& f) { active.push_back(&f); });
+  return active;
+}
+
+/// Moves all awake bodies, and the particles that springs hold, through the sub-step as if there were no contacts.
+CoupledSystem& World::Impl::move_all(Real start, Real h) {
+  motions.push_back(std::make_unique<CoupledSystem>(*this, active_forces()));
+  CoupledSystem& motion = *motions.back();
+  motion.save();
+  motion.step(integrator(def.integrator), start, h, def.integration_error);
+  for (Body* body : awake) body->pose = body->rigid.pose();
+  return motion;
+}
+
+/// The same for some bodies and what springs join to them, from `from` on over `duration`.
+CoupledSystem& World::Impl::move_some(std::span<Body* const> group, Real start, Real from, Real duration) {
+  motions.push_back(std::make_unique<CoupledSystem>(*this, group, active_forces()));
+  CoupledSystem& motion = *motions.back();
+  motion.save();
+  motion.step(integrator(def.integrator), start + from, duration, def.integration_error);
+  for (Body* body : group) body->pose = body->rigid.pose();
+  return motion;
 }
 
 /// Freezes a body that left the world or lost its numbers; the latter where it last was.
-void World::Impl::keep_within_bounds(BodyHandle handle, Body& body, StepReport& report) {
+void World::Impl::keep_within_bounds(Body& body, StepReport& report) {
   const bool finite = !body.is_dynamic() || is_finite(body.rigid);
   if (!finite) {
     if (report.finite) {
@@ -104,8 +161,8 @@ void World::Impl::keep_within_bounds(BodyHandle handle, Body& body, StepReport& 
   body.rigid.momentum.setZero();
   body.rigid.angular_momentum.setZero();
   body.frozen = true;
-  fixed_changed = true;
-  report.bodies_retired.push_back(handle);
+  fixed_changed = lists_changed = true;
+  report.bodies_retired.push_back(body.handle);
 }
 
 void World::Impl::update_obstacles(Real h) {
@@ -123,25 +180,6 @@ void World::Impl::update_obstacles(Real h) {
   moving_obstacles = Obstacles(std::move(moving));
   if (fixed_changed) fixed_obstacles = Obstacles(std::move(fixed));
   fixed_changed = false;
-}
-
-/// Reports each pair with a dynamic body that touches during the sub-step, once per step.
-void World::Impl::find_contacts(Real start, Real h, StepReport& report) {
-  bodies.for_each([&](BodyHandle handle, const std::unique_ptr<Body>& body) {
-    if (body->def.collides && body->can_move()) broad_phase.move(handle.index, swept_bounds(*body));
-  });
-  for (const auto& [low, high] : broad_phase.pairs()) {
-    const BodyHandle a = bodies.at_slot(low), b = bodies.at_slot(high);
-    Body *first = bodies[a].get(), *second = bodies[b].get();
-    if (!first->is_dynamic() && !second->is_dynamic()) continue;
-    const auto known = [&](const UnresolvedContact& c) { return c.a == a && c.b == b; };
-    if (std::any_of(report.unresolved.begin(), report.unresolved.end(), known)) continue;
-    if (first->collision_shape().is_plane()) std::swap(first, second);
-    const PosePath path(first->before_substep, first->pose), other_path(second->before_substep, second->pose);
-    if (const auto impact = time_of_impact(MovingShape{first->collision_shape(), path},
-                                           MovingShape{second->collision_shape(), other_path}, kTouch))
-      report.unresolved.push_back({a, b, start + impact->share * h});
-  }
 }
 
 void World::Impl::step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report) {
@@ -167,9 +205,10 @@ void World::Impl::step_particles(Real start, Real h, const CoupledSystem& couple
 
 void World::Impl::collect_moved() {
   moved.clear();
-  bodies.for_each([&](BodyHandle handle, const std::unique_ptr<Body>& body) {
-    if (!same(body->pose, body->before_step)) moved.push_back({handle, body->pose});
-  });
+  for (const Body* body : stepped)
+    if (!same(body->pose, body->before_step)) moved.push_back({body->handle, body->pose});
+  std::sort(moved.begin(), moved.end(),
+            [](const MovedBody& a, const MovedBody& b) { return a.body.index < b.body.index; });
 }
 
 }  // namespace offstage::sim

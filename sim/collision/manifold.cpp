@@ -2,27 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <span>
 #include <utility>
 
+#include "sim/collision/contact_candidates.h"
 #include "sim/collision/supporting_feature.h"
 
 namespace offstage::sim {
 namespace {
 
 constexpr uint32_t kMaxCorners = SupportingFeature::kMaxCorners;
-
-/// Shares of the margin, which says how close counts as touching. By kTilt the gap along a face's normal may
-/// be shorter than the separation, and parallel edges may pass each other; by kRim a point may lie outside a
-/// face, and the true deepest point of a rim be deeper than the polygon's that stands for it.
-constexpr Real kTilt = 0.05, kRim = 0.001;
-/// Of the solids' size: what separations are found to.
-constexpr Real kRounding = 1e-9;
-/// Sine: a face further from across the separation's normal never gives the normal.
-constexpr Real kMaxTilt = 0.05;
-/// Sine: what is less inclined is parallel.
-constexpr Real kParallel = 1e-6;
 
 /// One of the two solids, as the manifold needs it, in A's frame.
 struct Body {
@@ -49,23 +38,6 @@ struct Body {
     return f;
   }
 };
-
-// Names of features
-
-uint32_t mixed(uint32_t x, uint32_t y) {
-  const uint64_t h = ((uint64_t{x} << 32 | y) + 0x9e3779b97f4a7c15u) * 0xbf58476d1ce4e5b9u;
-  return static_cast<uint32_t>((h ^ (h >> 32)) * 0x94d049bb133111ebu >> 32);
-}
-uint32_t vertex_id(const Body& body, uint32_t tag) {
-  return mixed(body.name, tag);
-}
-uint32_t edge_id(uint32_t tag, uint32_t other_tag) {
-  return mixed(std::min(tag, other_tag) + 2, std::max(tag, other_tag));
-}
-/// Of an edge of one body and an edge of the other, or of two of one.
-uint32_t crossing_id(const Body& x, uint32_t edge_x, const Body& y, uint32_t edge_y) {
-  return x.name < y.name ? mixed(edge_x, edge_y) : mixed(edge_y, edge_x);
-}
 
 // Clipping
 
@@ -97,7 +69,7 @@ class Clipping {
         incident_body_(incident_body),
         incident_(incident) {
     for (uint32_t k = 0; k < incident.count; ++k)
-      part_.add({incident.corners[k].point, vertex_id(incident_body, incident.corners[k].tag), k});
+      part_.add({incident.corners[k].point, vertex_id(incident_body.name, incident.corners[k].tag), k});
     for (uint32_t k = 0; k < reference.count && part_.count > 0; ++k) cut(k, slop);
   }
 
@@ -114,13 +86,12 @@ class Clipping {
   /// Two neighbouring sides of the reference face meet in its vertex.
   uint32_t id_of_crossing(uint32_t side, uint32_t reference_side) const {
     const uint32_t cut = side_id(reference_, reference_side);
-    if (side < kMaxCorners)
-      return crossing_id(incident_body_, side_id(incident_, side), reference_body_, cut);
+    if (side < kMaxCorners) return crossing_id(incident_body_.name, side_id(incident_, side), cut);
     const uint32_t other = side - kMaxCorners;
     if ((other + 1) % reference_.count == reference_side)
-      return vertex_id(reference_body_, tag_of(reference_, reference_side));
+      return vertex_id(reference_body_.name, tag_of(reference_, reference_side));
     if ((reference_side + 1) % reference_.count == other)
-      return vertex_id(reference_body_, tag_of(reference_, other));
+      return vertex_id(reference_body_.name, tag_of(reference_, other));
     return mixed(side_id(reference_, other), cut);
   }
 
@@ -156,64 +127,6 @@ class Clipping {
   Polygon part_;
 };
 
-// Reduction
-
-/// Contact points before the reduction, no two of the same features.
-struct Candidates {
-  uint32_t count = 0;
-  std::array<ContactPoint, 2 * kMaxCorners + 1> points;
-
-  void add(const ContactPoint& p) {
-    for (uint32_t k = 0; k < count; ++k)
-      if (points[k].id == p.id) return;
-    if (count < points.size()) points[count++] = p;
-  }
-  Real least_separation() const {
-    Real least = std::numeric_limits<Real>::infinity();
-    for (uint32_t k = 0; k < count; ++k) least = std::min(least, points[k].separation);
-    return least;
-  }
-  /// The point of the largest measure; of equal ones (to a thousandth) the one of the least id, lest rounding
-  /// or the order choose.
-  template <class Measure>
-  const ContactPoint& most(Measure&& measure) const {
-    std::array<Real, 2 * kMaxCorners + 1> values;
-    for (uint32_t k = 0; k < count; ++k) values[k] = measure(points[k]);
-    const auto largest = std::max_element(values.begin(), values.begin() + count);
-    auto best = static_cast<uint32_t>(largest - values.begin());
-    for (uint32_t k = 0; k < count; ++k)
-      if (values[k] >= *largest - 1e-3 * std::abs(*largest) && points[k].id < points[best].id) best = k;
-    return points[best];
-  }
-};
-
-/// At most four points: all of them, or the deepest, the farthest from it, the one that spans the largest
-/// triangle with both, and the one that adds most to it. What is level within `slop` is equally deep.
-void reduce(Manifold& m, const Candidates& c, Real slop) {
-  m.count = 0;
-  const auto keep = [&m](const ContactPoint& p) { return (m.points[m.count++] = p).on_a; };
-  if (c.count <= m.points.size()) {
-    for (uint32_t k = 0; k < c.count; ++k) keep(c.points[k]);
-    return;
-  }
-  const Real level = c.least_separation() + slop;
-  const auto area = [&m](const Vec3& x, const Vec3& y, const Vec3& z) {
-    return m.normal.dot((y - x).cross(z - x));
-  };
-  const Vec3 p = keep(c.most([&](const ContactPoint& x) { return x.separation <= level ? 1.0 : 0.0; }));
-  const Vec3 q = keep(c.most([&](const ContactPoint& x) { return (x.on_a - p).squaredNorm(); }));
-  // Of points in a row the end away from q.
-  constexpr Real kRow = 1e-9;
-  const Vec3 r = keep(c.most([&](const ContactPoint& x) {
-    return std::abs(area(p, q, x.on_a)) + kRow * (x.on_a - q).squaredNorm();
-  }));
-  const Real sense = area(p, q, r) < 0 ? -1 : 1;
-  const auto gain = [&](const ContactPoint& x) {
-    return -std::min({sense * area(p, q, x.on_a), sense * area(q, r, x.on_a), sense * area(r, p, x.on_a)});
-  };
-  if (const ContactPoint& last = c.most(gain); gain(last) > 0) keep(last);
-}
-
 // Kinds of contact
 
 /// Whether a face of `reference` may give the normal: how far its normal is from the separation's, as a sine;
@@ -243,13 +156,13 @@ void face_manifold(Manifold& m, const Body& reference, const SupportingFeature& 
     const Real separation = n.dot(on_incident) - offset;
     if (separation > margin) return;
     const Vec3 on_reference = on_incident - separation * n;
-    candidates.add(on_a ? ContactPoint{on_reference, on_incident, separation, id}
-                        : ContactPoint{on_incident, on_reference, separation, id});
+    candidates.add(on_a ? Candidate{on_reference, on_incident, separation, id}
+                        : Candidate{on_incident, on_reference, separation, id});
   };
   const Clipping part(reference, face, incident, other, slop);
   for (const Corner& c : part.corners()) add(c.point - incident.convex.radius * n, c.id);
   if (candidates.count == 0 || n.dot(closest) - offset < candidates.least_separation() - slop)
-    add(closest, mixed(2, incident.name));
+    add(closest, closest_id(incident.name));
   reduce(m, candidates, slop);
 }
 
@@ -267,11 +180,11 @@ void parallel_edges(Manifold& m, const Body& a, const SupportingFeature& of_a, c
   const Real start = (p - q).dot(on_plane) / across.squaredNorm(),
              along = u.dot(on_plane) / across.squaredNorm();
   if (along == 0) return;
-  std::pair<Real, uint32_t> low{-start / along, vertex_id(b, of_b.corners[0].tag)},
-      high{(1 - start) / along, vertex_id(b, of_b.corners[1].tag)};
+  std::pair<Real, uint32_t> low{-start / along, vertex_id(b.name, of_b.corners[0].tag)},
+      high{(1 - start) / along, vertex_id(b.name, of_b.corners[1].tag)};
   if (along < 0) std::swap(low, high);
-  if (low.first <= 0) low = {0, vertex_id(a, of_a.corners[0].tag)};
-  if (high.first >= 1) high = {1, vertex_id(a, of_a.corners[1].tag)};
+  if (low.first <= 0) low = {0, vertex_id(a.name, of_a.corners[0].tag)};
+  if (high.first >= 1) high = {1, vertex_id(a.name, of_a.corners[1].tag)};
   if ((high.first - low.first) * u.norm() <= tolerance) return;
 
   Candidates ends;
@@ -288,7 +201,7 @@ void parallel_edges(Manifold& m, const Body& a, const SupportingFeature& of_a, c
 /// Of an edge or a vertex.
 uint32_t feature_id(const Body& body, const SupportingFeature& f) {
   return f.edge != Vec3::Zero() ? edge_id(f.corners[0].tag, f.corners[f.count - 1].tag)
-                                : vertex_id(body, f.corners[0].tag);
+                                : vertex_id(body.name, f.corners[0].tag);
 }
 
 /// Edges and vertices, where no face gives the normal.
@@ -305,7 +218,7 @@ void edge_manifold(Manifold& m, const Body& a, const Body& b, const Separation& 
   if (m.count > 0) return;
   if (across_a && across_b && of_a.edge.cross(of_b.edge).norm() > kParallel) m.source = NormalSource::edges;
   m.count = 1;
-  m.points[0] = {s.on_a, s.on_b, s.distance, crossing_id(a, feature_id(a, of_a), b, feature_id(b, of_b))};
+  m.points[0] = {s.on_a, s.on_b, s.distance, mixed(feature_id(a, of_a), feature_id(b, of_b))};
 }
 
 }  // namespace
@@ -316,7 +229,7 @@ Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const 
   if (!(s.distance <= margin)) return m;
   const Body body_a{a, Mat3::Identity(), Vec3::Zero(), -s.normal, 0};
   const Body body_b{b, a_from_b.orientation.toRotationMatrix(), a_from_b.position, s.normal, 1};
-  const Real rounding = kRounding * (a.reach() + b.reach()), slack = margin + rounding;
+  const Real rounding = kSeparationRounding * (a.reach() + b.reach()), slack = margin + rounding;
   const Real tolerance = kTilt * margin + rounding, slop = kRim * margin + rounding;
 
   const SupportingFeature of_a = body_a.feature(slack), of_b = body_b.feature(slack);
@@ -324,7 +237,7 @@ Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const 
              tilt_b = tilt(body_b, of_b, body_a, of_a.vertex, s, tolerance);
   if (std::min(tilt_a, tilt_b) > kMaxTilt)
     edge_manifold(m, body_a, body_b, s, margin, slack, tolerance);
-  else if (tilt_a <= tilt_b + kParallel)
+  else if (a_gives_normal(tilt_a, tilt_b, a.reach(), b.reach()))
     face_manifold(m, body_a, of_a, body_b, of_b, s.on_b, margin, slop);
   else
     face_manifold(m, body_b, of_b, body_a, of_a, s.on_a, margin, slop);
@@ -346,7 +259,7 @@ Manifold placed(const Manifold& m, const Pose& pose) {
 
 Manifold plane_manifold(const Convex& a, const Pose& plane_from_a, Real margin) {
   const Body body{a, plane_from_a.orientation.toRotationMatrix(), plane_from_a.position, -Vec3::UnitY(), 0};
-  const Real rounding = kRounding * a.reach();
+  const Real rounding = kSeparationRounding * a.reach();
   const SupportingFeature feature = body.feature(margin + rounding);
   Manifold m;
   m.source = NormalSource::face_of_b;
@@ -355,10 +268,10 @@ Manifold plane_manifold(const Convex& a, const Pose& plane_from_a, Real margin) 
     if (p.y() <= margin) candidates.add({p, Vec3(p.x(), 0, p.z()), p.y(), id});
   };
   for (uint32_t k = 0; k < feature.count; ++k)
-    add(feature.corners[k].point - a.radius * Vec3::UnitY(), vertex_id(body, feature.corners[k].tag));
+    add(feature.corners[k].point - a.radius * Vec3::UnitY(), vertex_id(body.name, feature.corners[k].tag));
   // Of a rim the lowest point may be between the corners that stand for it.
   const Vec3 lowest = body.support(body.outward, feature.vertex);
-  if (lowest.y() < candidates.least_separation() - (kRim * margin + rounding)) add(lowest, mixed(2, 0));
+  if (lowest.y() < candidates.least_separation() - (kRim * margin + rounding)) add(lowest, closest_id(0));
   reduce(m, candidates, kRim * margin + rounding);
   return m;
 }

@@ -48,7 +48,8 @@ struct Manifold {
 ///
 /// A face that is almost across the separation's normal gives the normal instead of it: where the gap along
 /// the face's normal is less than a twentieth of the margin shorter. So solids that rest on each other keep
-/// their normal and their points while they rock by that little.
+/// their normal and their points while they rock by that little. Of a face of each the less inclined one
+/// gives it; if they are alike (to a thousandth) the larger solid's, or A's.
 Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const Separation& s, Real margin);
 
 /// The same manifold in another frame, for instance world_from_a's.

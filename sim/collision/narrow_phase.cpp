@@ -4,6 +4,8 @@
 #include <cassert>
 #include <cmath>
 
+#include "sim/collision/box_box.h"
+#include "sim/collision/sphere_manifold.h"
 #include "sim/collision/tree_pair.h"
 
 namespace offstage::sim {
@@ -36,6 +38,20 @@ Separation plane_separation(const Convex& a, const Pose& a_from_plane) {
   s.distance = s.normal.dot(s.on_a - a_from_plane.position);
   s.on_b = s.on_a - s.distance * s.normal;
   return s;
+}
+
+/// The manifold of two pieces, in the quickest way there is for their cores.
+void find_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin, DistanceMethod method,
+                   PairCache& cache, std::pair<uint32_t, uint32_t> pieces, Manifold& m) {
+  using Core = Convex::Core;
+  if (is_sphere_pair(a, b)) {
+    m = sphere_manifold(a, b, a_from_b, margin);
+    return;
+  }
+  const bool boxes = a.core == Core::box && b.core == Core::box && a.radius == 0 && b.radius == 0;
+  if (boxes && box_manifold(a, b, a_from_b, margin, m)) return;
+  const Separation s = measure(a, b, a_from_b, method, cache.of(pieces.first, pieces.second));
+  if (s.distance <= margin) m = manifold(a, b, a_from_b, s, margin);
 }
 
 /// How deep a shape is inside a hollow one that none of its pieces touches, as seen from the hollow one's
@@ -131,23 +147,27 @@ bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_fr
 void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b, Real margin,
                     PairCache& cache, DistanceMethod method, std::vector<Manifold>& manifolds) {
   assert(!a.is_plane());
-  const auto add = [&](const Manifold& m) {
-    if (m.count > 0) manifolds.push_back(m);
-  };
-  if (b.is_plane()) return add(placed(plane_manifold(a.hull(), inverse(a_from_b), margin), a_from_b));
+  if (b.is_plane()) {
+    const Manifold m = plane_manifold(a.hull(), inverse(a_from_b), margin);
+    if (m.count > 0) manifolds.push_back(placed(m, a_from_b));
+    return;
+  }
   const std::size_t before = manifolds.size();
-  for_each_pair(a.tree(), b.tree(), placement(a, b, a_from_b, margin), [&](uint32_t i, uint32_t j) {
-    const Convex p = a.piece(i), q = b.piece(j);
-    const Separation s = measure(p, q, a_from_b, method, cache.of(i, j));
-    if (s.distance <= margin) add(manifold(p, q, a_from_b, s, margin));
-  });
+  const auto visit = [&](uint32_t i, uint32_t j) {
+    find_manifold(a.piece(i), b.piece(j), a_from_b, margin, method, cache, {i, j}, manifolds.emplace_back());
+    if (manifolds.back().count == 0) manifolds.pop_back();
+  };
+  if (a.piece_count() == 1 && b.piece_count() == 1)
+    visit(0, 0);
+  else
+    for_each_pair(a.tree(), b.tree(), placement(a, b, a_from_b, margin), visit);
   if (manifolds.size() > before) return;
   if (const auto s = containment(a, b, a_from_b)) {
     Manifold m;
     m.normal = s->normal;
     m.count = 1;
     m.points[0] = {s->on_a, s->on_b, s->distance, 0};
-    add(m);
+    manifolds.push_back(m);
   }
 }
 

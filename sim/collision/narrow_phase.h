@@ -51,7 +51,8 @@ std::optional<Separation> separation(const CollisionShape& a, const CollisionSha
 bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b);
 
 /// Appends the manifolds of all pairs of pieces within `margin` [m] of each other, in an order that depends
-/// on the shapes alone.
+/// on the shapes alone. Whatever the method, two boxes have the separating axis test, and spheres closed
+/// forms.
 void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b, Real margin,
                     PairCache& cache, DistanceMethod method, std::vector<Manifold>& manifolds);
 

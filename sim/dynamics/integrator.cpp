@@ -1,12 +1,18 @@
 #include "sim/dynamics/integrator.h"
 
+#include <algorithm>
+#include <cmath>
+
+#include "sim/dynamics/adaptive.h"
+#include "sim/dynamics/flat_array.h"
+#include "sim/dynamics/implicit_euler.h"
+
 namespace offstage::sim {
 namespace {
 
-using Array = Eigen::Map<Eigen::ArrayXd>;
-
-Array array(std::span<Real> s) {
-  return {s.data(), static_cast<Eigen::Index>(s.size())};
+void count(IntegratorWorkspace& work, uint64_t evaluations) {
+  ++work.report.steps;
+  work.report.evaluations += evaluations;
 }
 
 class ExplicitEuler final : public Integrator {
@@ -19,6 +25,7 @@ class ExplicitEuler final : public Integrator {
     system.force(t, x, p, work.dp);
     array(x) += h * array(work.dx);
     array(p) += h * array(work.dp);
+    count(work, 1);
   }
 };
 
@@ -32,6 +39,7 @@ class SymplecticEuler final : public Integrator {
     array(p) += h * array(work.dp);
     system.velocity(t, x, p, work.dx);
     array(x) += h * array(work.dx);
+    count(work, 1);
   }
 };
 
@@ -51,6 +59,7 @@ class Midpoint final : public Integrator {
     system.force(t + h / 2, work.x, work.p, work.dp);
     array(x) += h * array(work.dx);
     array(p) += h * array(work.dp);
+    count(work, 2);
   }
 };
 
@@ -79,16 +88,44 @@ class RungeKutta4 final : public Integrator {
     }
     array(x) += h * array(work.sum_x);
     array(p) += h * array(work.sum_p);
+    count(work, 4);
   }
 };
 
 }  // namespace
+
+void DynamicSystem::jacobian(Real t, std::span<const Real> x, std::span<const Real> p,
+                             SparseEntries& entries) const {
+  const std::size_t n = x.size(), size = n + p.size();
+  std::vector<Real> y(size), low(size), high(size);
+  std::copy(x.begin(), x.end(), y.begin());
+  std::copy(p.begin(), p.end(), y.begin() + static_cast<std::ptrdiff_t>(n));
+  const std::span all(y);
+  const auto evaluate = [&](std::vector<Real>& out) {
+    velocity(t, all.first(n), all.subspan(n), std::span(out).first(n));
+    force(t, all.first(n), all.subspan(n), std::span(out).subspan(n));
+  };
+  for (std::size_t column = 0; column < size; ++column) {
+    const Real value = y[column], d = 1e-6 * std::max(1.0, std::abs(value));
+    y[column] = value - d;
+    evaluate(low);
+    y[column] = value + d;
+    evaluate(high);
+    y[column] = value;
+    for (std::size_t row = 0; row < size; ++row)
+      entries.emplace_back(static_cast<int>(row), static_cast<int>(column), (high[row] - low[row]) / (2 * d));
+  }
+}
 
 const Integrator& integrator(IntegratorKind kind) {
   static const ExplicitEuler explicit_euler;
   static const SymplecticEuler symplectic_euler;
   static const Midpoint midpoint;
   static const RungeKutta4 rk4;
+  static const ImplicitEuler implicit_euler;
+  static const StepDoubling adaptive_euler(explicit_euler, 1), adaptive_midpoint(midpoint, 2),
+      adaptive_rk4(rk4, 4);
+  static const DormandPrince dormand_prince;
   switch (kind) {
     case IntegratorKind::explicit_euler:
       return explicit_euler;
@@ -98,6 +135,16 @@ const Integrator& integrator(IntegratorKind kind) {
       return midpoint;
     case IntegratorKind::rk4:
       break;
+    case IntegratorKind::implicit_euler:
+      return implicit_euler;
+    case IntegratorKind::adaptive_euler:
+      return adaptive_euler;
+    case IntegratorKind::adaptive_midpoint:
+      return adaptive_midpoint;
+    case IntegratorKind::adaptive_rk4:
+      return adaptive_rk4;
+    case IntegratorKind::dormand_prince:
+      return dormand_prince;
   }
   return rk4;
 }

@@ -38,6 +38,13 @@ class FreeFlight final : public DynamicSystem {
     for (std::size_t i = 0; i < mass_.size(); ++i)
       vec3(dp, 3 * i) = forces_.acceleration(vec3(p, 3 * i), mass_[i]);
   }
+  void jacobian(Real, std::span<const Real> x, std::span<const Real>, SparseEntries& entries) const override {
+    const auto n = static_cast<int>(x.size());
+    for (int i = 0; i < n; ++i) {
+      entries.emplace_back(i, n + i, 1);
+      entries.emplace_back(n + i, n + i, -forces_.drag / mass_[static_cast<std::size_t>(i / 3)]);
+    }
+  }
 
  private:
   const ParticleForces& forces_;

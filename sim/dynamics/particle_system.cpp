@@ -72,6 +72,7 @@ void ParticleSystem::fly(const ParticleForces& forces, Real t, Real h, std::size
   const auto x = part(arrays.position, begin, end), v = part(arrays.velocity, begin, end);
   scratch.position.assign(x.begin(), x.end());
   scratch.velocity.assign(v.begin(), v.end());
+  scratch.integrator.next_step = 0;  // whose step it was depends on the threads
   integrator(def.integrator)
       .step(FreeFlight(forces, part(arrays.mass, begin, end)), t, h, flat(x), flat(v), scratch.integrator);
 }

@@ -17,6 +17,7 @@ struct RigidBody {
   Quat orientation = Quat::Identity();
   Vec3 momentum = Vec3::Zero();          ///< L
   Vec3 angular_momentum = Vec3::Zero();  ///< H, about the centre of mass, world
+  Real next_step = 0;                    ///< what an adaptive integrator will try next [s]; 0: not known
 
   Vec3 velocity() const { return momentum / mass; }
   /// w = R I^-1 R^T H.

@@ -1,7 +1,7 @@
 /// Manifolds of solids in contact, each turned a little from query to query: from the separation to the
-/// points, and for boxes the whole query, separation included, next to Bullet's test of two boxes. Counters:
-/// points per query.
+/// points, and the whole query of two shapes, next to Bullet's test of two boxes. Counters: points per query.
 
+#include <memory>
 #include <numbers>
 #include <vector>
 
@@ -9,24 +9,23 @@
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <benchmark/benchmark.h>
 
-#include "sim/collision/gjk.h"
-#include "sim/collision/manifold.h"
+#include "sim/collision/narrow_phase.h"
+#include "sim/geometry/convex_hull.h"
 
 namespace offstage::sim {
 namespace {
 
-/// B under A, overlapping by 0.1 mm, turned about Y and rocked by 1e-4 rad.
-std::vector<Pose> poses() {
+/// B under A, its middle `depth` below A's, turned about Y and rocked by 1e-4 rad.
+std::vector<Pose> poses(Real depth = 0.9999) {
   std::vector<Pose> result;
   for (int k = 0; k < 1000; ++k)
-    result.push_back({Vec3(0.1, -0.9999, 0.2), Quat(Eigen::AngleAxisd(0.01 * k, Vec3::UnitY()) *
-                                                    Eigen::AngleAxisd(1e-4, Vec3::UnitX()))});
+    result.push_back({Vec3(0.1, -depth, 0.2), Quat(Eigen::AngleAxisd(0.01 * k, Vec3::UnitY()) *
+                                                   Eigen::AngleAxisd(1e-4, Vec3::UnitX()))});
   return result;
 }
 
 template <class Query>
-void run(benchmark::State& state, Query&& query) {
-  const std::vector<Pose> at = poses();
+void run(benchmark::State& state, const std::vector<Pose>& at, Query&& query) {
   std::size_t k = 0;
   uint64_t points = 0;
   for (auto _ : state) {
@@ -44,7 +43,7 @@ void points_of(benchmark::State& state, const Shape& shape_a, const Shape& shape
     GjkCache fresh;
     separations.push_back(gjk(a, b, pose, fresh));
   }
-  run(state, [&](std::size_t k) { return manifold(a, b, at[k], separations[k], 0.01).count; });
+  run(state, at, [&](std::size_t k) { return manifold(a, b, at[k], separations[k], 0.01).count; });
 }
 
 void boxes(benchmark::State& state) {
@@ -57,12 +56,124 @@ void cylinders(benchmark::State& state) {
   points_of(state, Cylinder{0.5, 1}, Cylinder{0.5, 1});
 }
 
+/// A shape for the narrow phase.
+struct Body {
+  explicit Body(const Shape& s) : shape(s), collision({&shape, nullptr}, true) {}
+  explicit Body(const ConvexPolyhedron& p)
+      : shape(MeshShape{}),
+        mesh(std::make_unique<CollisionMesh>(p.triangles())),
+        collision({&shape, mesh.get()}, true) {}
+
+  Shape shape;
+  std::unique_ptr<CollisionMesh> mesh;
+  CollisionShape collision;
+};
+
+/// Of radius 0.5, resting on a face.
+ConvexPolyhedron icosahedron() {
+  std::vector<Vec3> points;
+  for (int k = 0; k < 3; ++k)
+    for (const Real x : {-1.0, 1.0})
+      for (const Real y : {-std::numbers::phi, std::numbers::phi}) {
+        Vec3 p = Vec3::Zero();
+        p[k] = x;
+        p[(k + 1) % 3] = y;
+        points.push_back(0.5 * (Quat::FromTwoVectors(Vec3::Ones(), Vec3::UnitY()) * p.normalized()));
+      }
+  return convex_hull(points);
+}
+
+void query(benchmark::State& state, const Body& a, const Body& b, const std::vector<Pose>& at) {
+  PairCache cache;
+  std::vector<Manifold> manifolds;
+  run(state, at, [&](std::size_t k) {
+    manifolds.clear();
+    find_manifolds(a.collision, b.collision, at[k], 0.01, cache, DistanceMethod::gjk, manifolds);
+    return manifolds.empty() ? 0 : manifolds[0].count;
+  });
+}
+
+const Body& unit_box() {
+  static const Body box(Box{Vec3::Ones()});
+  return box;
+}
+const Body& small_ball() {
+  static const Body ball(Sphere{0.5});
+  return ball;
+}
+const Body& hedron() {
+  static const Body body(icosahedron());
+  return body;
+}
+const Body& ground() {
+  static const Body slab(Box{{200, 1, 200}});
+  return slab;
+}
+
 void boxes_with_separation(benchmark::State& state) {
   const Convex box = convex(Box{Vec3::Ones()});
   const std::vector<Pose> at = poses();
   GjkCache cache;
-  run(state,
+  run(state, at,
       [&](std::size_t k) { return manifold(box, box, at[k], gjk(box, box, at[k], cache), 0.01).count; });
+}
+void query_boxes(benchmark::State& state) {
+  query(state, unit_box(), unit_box(), poses());
+}
+void query_boxes_hovering(benchmark::State& state) {
+  query(state, unit_box(), unit_box(), poses(1.001));
+}
+void query_boxes_apart(benchmark::State& state) {
+  query(state, unit_box(), unit_box(), poses(1.05));
+}
+void query_box_on_ground(benchmark::State& state) {
+  query(state, unit_box(), ground(), poses());
+}
+void query_balls(benchmark::State& state) {
+  query(state, small_ball(), small_ball(), poses(0.97));
+}
+void query_ball_on_box(benchmark::State& state) {
+  query(state, small_ball(), unit_box(), poses());
+}
+/// B under A, turned about Y, so that they overlap by `depth`.
+std::vector<Pose> touching(const Body& a, const Body& b, Real depth) {
+  std::vector<Pose> at = poses(1);
+  for (Pose& p : at) {
+    PairCache fresh;
+    const Separation s = *separation(a.collision, b.collision, p, fresh);
+    p.position += (s.distance + depth) * s.normal;
+  }
+  return at;
+}
+/// The same while A tumbles.
+std::vector<Pose> tumbling(const Body& a, const Body& b, Real depth) {
+  std::vector<Pose> at = poses(1);
+  for (std::size_t k = 0; k < at.size(); ++k) {
+    const Quat turn(Eigen::AngleAxisd(0.01 * static_cast<Real>(k), Vec3(1, 2, 3).normalized()));
+    at[k] = {turn * at[k].position, turn};
+    PairCache fresh;
+    const Separation s = *separation(a.collision, b.collision, at[k], fresh);
+    at[k].position += (s.distance + depth) * s.normal;
+  }
+  return at;
+}
+void query_icosahedra(benchmark::State& state) {
+  query(state, hedron(), hedron(), touching(hedron(), hedron(), 1e-4));
+}
+void query_icosahedra_tumbling(benchmark::State& state) {
+  query(state, hedron(), hedron(), tumbling(hedron(), hedron(), 1e-4));
+}
+void query_icosahedron_tumbling_on_ground(benchmark::State& state) {
+  query(state, hedron(), ground(), tumbling(hedron(), ground(), 1e-4));
+}
+void query_icosahedra_hovering(benchmark::State& state) {
+  query(state, hedron(), hedron(), touching(hedron(), hedron(), -1e-4));
+}
+void query_icosahedron_on_ground(benchmark::State& state) {
+  query(state, hedron(), ground(), touching(hedron(), ground(), 1e-4));
+}
+void query_icosahedron_over_ground(benchmark::State& state) {
+  query(state, hedron(), ground(), touching(hedron(), ground(), -1e-4));
 }
 
 struct Counter : btDiscreteCollisionDetectorInterface::Result {
@@ -72,18 +183,18 @@ struct Counter : btDiscreteCollisionDetectorInterface::Result {
   uint32_t points = 0;
 };
 
-void bullet_boxes(benchmark::State& state) {
+void bullet(benchmark::State& state, Real depth) {
   const btBoxShape box(btVector3(0.5f, 0.5f, 0.5f));
   btBoxBoxDetector detector(&box, &box);
   std::vector<btTransform> transforms;
-  for (const Pose& p : poses()) {
+  for (const Pose& p : poses(depth)) {
     const Eigen::Quaternionf q = p.orientation.cast<float>();
     const Eigen::Vector3f x = p.position.cast<float>();
     transforms.emplace_back(btQuaternion(q.x(), q.y(), q.z(), q.w()), btVector3(x.x(), x.y(), x.z()));
   }
   btDiscreteCollisionDetectorInterface::ClosestPointInput input;
   input.m_transformA.setIdentity();
-  run(state, [&](std::size_t k) {
+  run(state, poses(depth), [&](std::size_t k) {
     Counter counter;
     input.m_transformB = transforms[k];
     detector.getClosestPoints(input, counter, nullptr);
@@ -91,11 +202,31 @@ void bullet_boxes(benchmark::State& state) {
   });
 }
 
+void bullet_boxes(benchmark::State& state) {
+  bullet(state, 0.9999);
+}
+void bullet_boxes_apart(benchmark::State& state) {
+  bullet(state, 1.05);
+}
+
 BENCHMARK(boxes);
 BENCHMARK(cylinder_on_box);
 BENCHMARK(cylinders);
 BENCHMARK(boxes_with_separation);
+BENCHMARK(query_boxes);
 BENCHMARK(bullet_boxes);
+BENCHMARK(query_boxes_hovering);
+BENCHMARK(query_boxes_apart);
+BENCHMARK(bullet_boxes_apart);
+BENCHMARK(query_box_on_ground);
+BENCHMARK(query_balls);
+BENCHMARK(query_ball_on_box);
+BENCHMARK(query_icosahedra);
+BENCHMARK(query_icosahedra_tumbling);
+BENCHMARK(query_icosahedra_hovering);
+BENCHMARK(query_icosahedron_on_ground);
+BENCHMARK(query_icosahedron_tumbling_on_ground);
+BENCHMARK(query_icosahedron_over_ground);
 
 }  // namespace
 }  // namespace offstage::sim

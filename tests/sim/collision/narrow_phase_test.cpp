@@ -160,6 +160,56 @@ TEST(NarrowPhase, ABoxOnATiltedPlaneRestsOnFourPoints) {
   }
 }
 
+TEST(NarrowPhase, ABoxRestsExactlyOnAGroundTwoHundredTimesAsLarge) {
+  const Piece ground(Box{{200, 10, 200}}), box(Box{Vec3::Ones()}), ball(Sphere{0.5});
+  PairCache cache;
+  const auto contact = [&](const Piece& a, const Pose& p, const Piece& b, const Pose& q) {
+    std::vector<Manifold> found;
+    find_manifolds(a.collision, b.collision, between(p, q), 1e-3, cache, DistanceMethod::gjk, found);
+    EXPECT_EQ(found.size(), 1u);
+    return found.empty() ? Manifold{} : found[0];
+  };
+  const Scatter random{2};
+  for (uint64_t k = 0; k < 100; ++k) {
+    const Pose on = pose({190 * random.uniform(k, 0) - 95, 5.5, 190 * random.uniform(k, 1) - 95},
+                         k % 4 == 0 ? 0 : 6 * random.uniform(k, 2), Vec3::UnitY());
+    // The whole world may stand askew.
+    const Pose world = k % 2 == 0 ? Pose{} : random_pose(random, k, 1);
+    const Pose on_world{world.point_to_world(on.position), world.orientation * on.orientation};
+    for (const Manifold& m : {contact(box, on_world, ground, world), contact(ground, world, box, on_world)}) {
+      ASSERT_EQ(m.count, 4u);
+      for (const ContactPoint& p : m.points) EXPECT_LT(std::abs(p.separation), 1e-12);
+    }
+    for (const Manifold& m :
+         {contact(ball, on_world, ground, world), contact(ground, world, ball, on_world)}) {
+      ASSERT_EQ(m.count, 1u);
+      EXPECT_LT(std::abs(m.points[0].separation), 1e-12);
+    }
+  }
+}
+
+/// Shapes of one piece skip the trees; the same as parts of a mesh do not.
+TEST(NarrowPhase, OnePieceHasTheManifoldThatItHasAmongOthers) {
+  const Piece box(Box{{1.5, 0.5, 0.5}}), l(l_mesh(), true);
+  PairCache cache;
+  std::vector<Manifold> alone, among;
+  find_manifolds(box.collision, box.collision, pose({0.3, -0.5, 0.1}), 1e-3, cache, DistanceMethod::gjk,
+                 alone);
+  find_manifolds(box.collision, l.collision, pose({0.3, -0.25, 0.1}), 1e-3, cache, DistanceMethod::gjk,
+                 among);
+  ASSERT_EQ(alone.size(), 1u);
+  ASSERT_FALSE(among.empty());
+  for (const Manifold& m : {alone[0], among[0]}) {
+    EXPECT_EQ(m.count, 4u);
+    EXPECT_NEAR(m.normal.y(), 1, 1e-12);
+    EXPECT_NEAR(m.points[0].separation, 0, 1e-12);
+  }
+  alone.clear();
+  find_manifolds(box.collision, box.collision, pose({0.3, -0.51, 0.1}), 1e-3, cache, DistanceMethod::gjk,
+                 alone);
+  EXPECT_TRUE(alone.empty()) << "farther than the margin";
+}
+
 TEST(NarrowPhase, WhatIsInsideASolidIsInPenetration) {
   const TriangleMesh torus = torus_mesh(1, 0.4, 48, 24);
   const Piece parts(torus, true), ball(Sphere{0.1});

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include <gtest/gtest.h>
 
@@ -25,20 +26,25 @@ class Oscillator final : public DynamicSystem {
   }
 };
 
+/// After equal steps; an adaptive integrator makes them too, because it is told that no error is too large.
 Real error(IntegratorKind kind, int steps) {
   constexpr Real kTime = 2;
   std::array<Real, 1> x = {1}, p = {0};
-  IntegratorWorkspace work;
+  IntegratorWorkspace work{.tolerance = std::numeric_limits<Real>::infinity()};
   for (int i = 0; i < steps; ++i)
     integrator(kind).step(Oscillator(), i * kTime / steps, kTime / steps, x, p, work);
   return std::abs(x[0] - Oscillator::exact(kTime));
 }
 
 TEST(Integrator, ObservedOrderOnADampedOscillator) {
+  // Step doubling corrects its result by its own estimate, which gains an order.
   for (const auto& [kind, order] :
        {std::pair(IntegratorKind::explicit_euler, 1.0), std::pair(IntegratorKind::symplectic_euler, 1.0),
-        std::pair(IntegratorKind::midpoint, 2.0), std::pair(IntegratorKind::rk4, 4.0)})
-    EXPECT_NEAR(std::log2(error(kind, 200) / error(kind, 400)), order, 0.1)
+        std::pair(IntegratorKind::midpoint, 2.0), std::pair(IntegratorKind::rk4, 4.0),
+        std::pair(IntegratorKind::implicit_euler, 1.0), std::pair(IntegratorKind::adaptive_euler, 2.0),
+        std::pair(IntegratorKind::adaptive_midpoint, 3.0), std::pair(IntegratorKind::adaptive_rk4, 5.0),
+        std::pair(IntegratorKind::dormand_prince, 5.0)})
+    EXPECT_NEAR(std::log2(error(kind, 40) / error(kind, 80)), order, 0.1)
         << "kind " << static_cast<int>(kind);
 }
 
@@ -85,6 +91,71 @@ TEST(Integrator, SymplecticEulerBoundsTheEnergyThatExplicitEulerPumps) {
   }
   EXPECT_NEAR(p[0] * p[0] + x[0] * x[0] - kH * x[0] * p[0], 1, 1e-12);
   EXPECT_NEAR((y[0] * y[0] + q[0] * q[0]) / std::pow(1 + kH * kH, 1000), 1, 1e-10);
+}
+
+constexpr std::array kAdaptive = {IntegratorKind::adaptive_euler, IntegratorKind::adaptive_midpoint,
+                                  IntegratorKind::adaptive_rk4, IntegratorKind::dormand_prince};
+
+// What each call learnt about the length of a step serves the next.
+TEST(Adaptive, RemembersItsStepBetweenCalls) {
+  for (IntegratorKind kind : kAdaptive) {
+    std::array<Real, 1> x = {1}, p = {0};
+    IntegratorWorkspace work{.tolerance = 1e-6};
+    integrator(kind).step(Oscillator(), 0, 0.5, x, p, work);
+    const IntegratorReport first = work.report;
+    EXPECT_GT(first.rejected, 0u);
+    integrator(kind).step(Oscillator(), 0.5, 0.5, x, p, work);
+    EXPECT_LE(work.report.rejected - first.rejected, first.rejected / 2) << static_cast<int>(kind);
+    EXPECT_EQ(work.report.missed, 0u);
+    EXPECT_NEAR(x[0], Oscillator::exact(1), 1e-4);
+  }
+}
+
+/// Its rates are never finite.
+class Broken final : public DynamicSystem {
+ public:
+  void velocity(Real, std::span<const Real>, std::span<const Real>, std::span<Real> dx) const override {
+    dx[0] = std::numeric_limits<Real>::quiet_NaN();
+  }
+  void force(Real, std::span<const Real>, std::span<const Real>, std::span<Real> dp) const override {
+    dp[0] = std::numeric_limits<Real>::infinity();
+  }
+};
+
+TEST(Adaptive, AlwaysEndsAndCountsWhatItCouldNotReach) {
+  for (IntegratorKind kind : kAdaptive) {
+    std::array<Real, 1> x = {1}, p = {0};
+    IntegratorWorkspace work;
+    integrator(kind).step(Broken(), 0, 1, x, p, work);
+    EXPECT_GT(work.report.missed, 0u);
+    EXPECT_LE(work.report.steps, 16384u);
+  }
+  std::array<Real, 1> x = {1}, p = {0};
+  IntegratorWorkspace work;
+  integrator(IntegratorKind::implicit_euler).step(Broken(), 0, 1, x, p, work);
+  EXPECT_EQ(work.report.steps, 64u);
+  EXPECT_EQ(work.report.missed, 64u);
+}
+
+// One step of x'' = -k x: (x, p) divided by 1 + h^2 k, with p - h k x.
+TEST(ImplicitEuler, SolvesALinearSpringExactly) {
+  class Spring final : public DynamicSystem {
+   public:
+    void velocity(Real, std::span<const Real>, std::span<const Real> p, std::span<Real> dx) const override {
+      dx[0] = p[0];
+    }
+    void force(Real, std::span<const Real> x, std::span<const Real>, std::span<Real> dp) const override {
+      dp[0] = -1e6 * x[0];
+    }
+  };
+  std::array<Real, 1> x = {0.3}, p = {-2};
+  constexpr Real kH = 1.0 / 30, kD = 1 + kH * kH * 1e6;
+  IntegratorWorkspace work;
+  integrator(IntegratorKind::implicit_euler).step(Spring(), 0, kH, x, p, work);
+  EXPECT_NEAR(x[0], (0.3 - kH * 2) / kD, 1e-15);
+  EXPECT_NEAR(p[0], (-2 - kH * 1e6 * 0.3) / kD, 1e-11);
+  EXPECT_LE(work.report.iterations, 3u);
+  EXPECT_EQ(work.report.missed + work.report.rejected, 0u);
 }
 
 }  // namespace

@@ -1,0 +1,61 @@
+#include "sim/collision/contact_candidates.h"
+
+#include <cmath>
+
+namespace offstage::sim {
+namespace {
+
+/// The point of the largest measure; of equal ones (to a thousandth) the one of the least id, lest rounding
+/// or the order choose.
+template <class Measure>
+const Candidate& most(const Candidates& c, Measure&& measure) {
+  std::array<Real, Candidates::kMax> values;
+  Real largest = -std::numeric_limits<Real>::infinity();
+  for (uint32_t k = 0; k < c.count; ++k) largest = std::max(largest, values[k] = measure(c.points[k]));
+  const Real enough = largest - 1e-3 * std::abs(largest);
+  const Candidate* best = nullptr;
+  for (uint32_t k = 0; k < c.count; ++k)
+    if (values[k] >= enough && (!best || c.points[k].id < best->id)) best = &c.points[k];
+  return best ? *best : c.points[0];
+}
+
+/// How far points lie to the left of the line from p to q as seen against the normal, times its length: twice
+/// the area of the triangle with them.
+struct LeftOf {
+  Vec3 inward;
+  Real offset;
+
+  LeftOf(const Vec3& normal, const Vec3& p, const Vec3& q)
+      : inward(normal.cross(q - p)), offset(inward.dot(p)) {}
+  Real operator()(const Vec3& x) const { return inward.dot(x) - offset; }
+};
+
+}  // namespace
+
+void reduce(Manifold& m, const Candidates& c, Real slop) {
+  m.count = 0;
+  const auto keep = [&m](const Candidate& p) {
+    m.points[m.count++] = {p.on_a, p.on_b, p.separation, p.id};
+    return p.on_a;
+  };
+  if (c.count <= m.points.size()) {
+    for (uint32_t k = 0; k < c.count; ++k) keep(c.points[k]);
+    return;
+  }
+  const Real level = c.least_separation() + slop;
+  const Vec3 p = keep(most(c, [&](const Candidate& x) { return x.separation <= level ? 1.0 : 0.0; }));
+  const Vec3 q = keep(most(c, [&](const Candidate& x) { return (x.on_a - p).squaredNorm(); }));
+  // Of points in a row the end away from q.
+  constexpr Real kRow = 1e-9;
+  const LeftOf pq(m.normal, p, q);
+  const Vec3 r = keep(
+      most(c, [&](const Candidate& x) { return std::abs(pq(x.on_a)) + kRow * (x.on_a - q).squaredNorm(); }));
+  const LeftOf qr(m.normal, q, r), rp(m.normal, r, p);
+  const Real sense = pq(r) < 0 ? -1 : 1;
+  const auto gain = [&](const Candidate& x) {
+    return -std::min({sense * pq(x.on_a), sense * qr(x.on_a), sense * rp(x.on_a)});
+  };
+  if (const Candidate& last = most(c, gain); gain(last) > 0) keep(last);
+}
+
+}  // namespace offstage::sim

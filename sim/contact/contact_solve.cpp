@@ -1,0 +1,387 @@
+#include "sim/contact/contact_solve.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <tuple>
+
+namespace offstage::sim {
+namespace {
+
+/// Of a penetration, the share that a step takes back, and the fastest that it does so [m/s].
+constexpr Real kPushOut = 0.2, kFastestPush = 0.5;
+/// Points that meet faster than this have come together in the interval, not before [m/s].
+constexpr Real kClosing = 1e-3;
+/// What slides slower than this is at rest, to static friction [m/s].
+constexpr Real kSlip = 1e-3;
+
+/// The material point of a round body that stands for a point of its surface: on the axis, or at the centre. The
+/// surface turns through the contact, these do not.
+Vec3 core_point(const Body& body, const Vec3& place) {
+  const Shape& shape = body.def.shape;
+  if (std::holds_alternative<Sphere>(shape)) return body.start_pose.position;
+  if (!std::holds_alternative<Capsule>(shape) && !std::holds_alternative<Cylinder>(shape) &&
+      !std::holds_alternative<Cone>(shape))
+    return place;
+  const Vec3 local = body.start_pose.point_to_body(place);
+  return body.start_pose.point_to_world(Vec3(0, local.y(), 0));
+}
+
+struct PointRates {
+  Vec3 velocity, acceleration;  ///< of a material point at the start; the latter without forces: w x (w x r)
+};
+
+PointRates rates(const Body& body, const Vec3& place) {
+  if (body.is_awake()) {
+    const Vec3 w = body.start.angular_velocity(), wr = w.cross(place - body.start.position);
+    return {body.start.velocity() + wr, w.cross(wr)};
+  }
+  // The velocities of kinematic bodies are those of the interval's end, so nothing is missing from them.
+  return {body.start_velocity(place), Vec3::Zero()};
+}
+
+Twist twist(const Body& body) {
+  // At the origin of the world's axes.
+  if (body.is_awake()) {
+    const Vec3 w = body.start.angular_velocity();
+    return {body.start.velocity() - w.cross(body.start.position), w};
+  }
+  if (!body.is_kinematic()) return {};
+  const Vec3& w = body.drive.angular_velocity;
+  return {body.drive.velocity - w.cross(body.pose.position), w};
+}
+
+bool is_face(NormalSource s) {
+  return s == NormalSource::face_of_a || s == NormalSource::face_of_b;
+}
+
+/// What the relative acceleration of R9 has besides the part that is linear in the accelerations of the bodies:
+///   n . (c_a'' - c_b'') + 2 n' . (c_a' - c_b') - |n'|^2 D
+/// with material points c on both bodies at a distance D along n. (Of two centres of spheres, this is
+/// n.c'' + n'.c', not twice the latter.) Tangentially, what turns with the bodies.
+Vec3 acceleration_bias(const ContactPair& pair, const PlacedManifold& placed, const ContactPoint& point) {
+  const Manifold& m = placed.manifold;
+  const Vec3 place_a = m.source == NormalSource::face_of_a ? point.on_a : core_point(pair.a(), point.on_a);
+  const Vec3 place_b = m.source == NormalSource::face_of_b ? point.on_b : core_point(pair.b(), point.on_b);
+  const PointRates a = rates(pair.a(), place_a), b = rates(pair.b(), place_b);
+  const Vec3 n_rate = is_face(m.source)
+                          ? twist(m.source == NormalSource::face_of_a ? pair.a() : pair.b())
+                                .angular_velocity.cross(m.normal)
+                          : normal_rate(m, point, twist(pair.a()), twist(pair.b()));
+  const Vec3 velocity = a.velocity - b.velocity, acceleration = a.acceleration - b.acceleration;
+  const Real distance = m.normal.dot(place_a - place_b);
+  return {m.normal.dot(acceleration) + 2 * n_rate.dot(velocity) - n_rate.squaredNorm() * distance,
+          placed.frame.t.dot(acceleration), placed.frame.k.dot(acceleration)};
+}
+
+/// Velocity that conveyor-like surfaces add.
+Vec3 surface_velocity(const ContactPair& pair) {
+  Vec3 v = Vec3::Zero();
+  if (pair.a().def.surface_velocity != Vec3::Zero())
+    v += pair.a().start_pose.vector_to_world(pair.a().def.surface_velocity);
+  if (pair.b().def.surface_velocity != Vec3::Zero())
+    v -= pair.b().start_pose.vector_to_world(pair.b().def.surface_velocity);
+  return v;
+}
+
+Vec3 in_frame(const ContactFrame& f, const Vec3& v) {
+  return {f.n.dot(v), f.t.dot(v), f.k.dot(v)};
+}
+
+/// Along and across the grain; static if nothing slides yet.
+std::pair<Real, Real> friction(const PairSurface& surface, const Vec3& u) {
+  const bool slips = u.y() * u.y() + u.z() * u.z() > kSlip * kSlip;
+  const Real mu = slips ? surface.friction : surface.static_friction;
+  return {mu, mu * surface.cross};
+}
+
+/// Where a body's velocities are given: of kinematic ones at the interval's end, for which they hold.
+Vec3 origin(const Body& body) {
+  return body.is_awake() ? body.start.position : body.pose.position;
+}
+
+/// The world's inverse inertia at an orientation.
+Mat3 inverse_inertia(const RigidBody& body, const Quat& orientation) {
+  const Mat3 R = orientation.toRotationMatrix();
+  return R * body.inverse_inertia * R.transpose();
+}
+
+Vec3 angular_momentum(const RigidBody& body, const Quat& q, const Vec3& w) {
+  return q * (body.inertia * (q.conjugate() * w));
+}
+
+/// The rotation by a vector of angle times axis: exact enough by series for what contacts turn in a step, and
+/// without trigonometry, whose last bits differ between libraries.
+Quat rotation(const Vec3& v) {
+  const Real s = v.squaredNorm() / 4;
+  const Real sine = 1 - s / 6 * (1 - s / 20 * (1 - s / 42)), cosine = 1 - s / 2 * (1 - s / 12 * (1 - s / 30));
+  return Quat(cosine, sine * v.x() / 2, sine * v.y() / 2, sine * v.z() / 2);
+}
+
+void displace(Body& body, const Vec3& shift, const Vec3& turn) {
+  RigidBody& r = body.rigid;
+  r.position += shift;
+  if (turn != Vec3::Zero()) r.orientation = (rotation(turn) * r.orientation).normalized();
+}
+
+}  // namespace
+
+// Exact
+
+std::optional<ContactWork> ExactContacts::solve(const Island& island, const ContactInterval& interval, Real budget) {
+  bodies_.clear();
+  contacts_.clear();
+  forces_.clear();
+  approach_.clear();
+  for (Body* body : island.bodies) {
+    body->row = static_cast<uint32_t>(bodies_.size());
+    add_body(*body);
+  }
+  for (ContactPair* pair : island.pairs) add_points(*pair, interval);
+  if (contacts_.empty()) return ContactWork{};
+
+  free_.resize(bodies_.size());
+  for (std::size_t i = 0; i < bodies_.size(); ++i) free_[i] << bodies_[i].velocity, bodies_[i].angular_velocity;
+  const std::optional<ContactWork> work = newton_.solve(bodies_, contacts_, budget);
+  if (!work) return work;
+  for (std::size_t i = 0; i < contacts_.size(); ++i) *forces_[i] = contacts_[i].impulse / interval.duration;
+  move_bodies(island, interval.duration);
+  return work;
+}
+
+uint32_t ExactContacts::add_body(Body& body) {
+  ContactBody b;
+  if (body.is_awake()) {
+    b.inverse_mass = 1 / body.rigid.mass;
+    b.inverse_inertia = inverse_inertia(body.rigid, body.rigid.orientation);
+    b.velocity = body.rigid.velocity();
+    b.angular_velocity = body.rigid.angular_velocity();
+  } else if (body.is_kinematic()) {
+    b.velocity = body.drive.velocity;
+    b.angular_velocity = body.drive.angular_velocity;
+  }
+  bodies_.push_back(b);
+  return static_cast<uint32_t>(bodies_.size() - 1);
+}
+
+void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interval) {
+  const Real h = interval.duration;
+  const uint32_t a = pair.a().is_awake() ? pair.a().row : add_body(pair.a());
+  const uint32_t b = pair.b().is_awake() ? pair.b().row : add_body(pair.b());
+  const Vec3 surface = surface_velocity(pair);
+  for (PlacedManifold& m : pair.manifolds())
+    for (uint32_t k = 0; k < m.manifold.count; ++k) {
+      const ContactPoint& point = m.manifold.points[k];
+      const bool touches = point.separation <= interval.touching;
+      if (pair.by_event && !touches) continue;
+      const Vec3 place = (point.on_a + point.on_b) / 2;
+      const Vec3 u = in_frame(m.frame, pair.relative_velocity(place) + surface);
+      Contact c{.a = a, .b = b, .frame = m.frame};
+      c.arm_a = place - origin(pair.a());
+      c.arm_b = place - origin(pair.b());
+      c.offset = h * acceleration_bias(pair, m, point) + in_frame(m.frame, surface);
+      c.target = touches ? std::min(-kPushOut * point.separation / h, kFastestPush) : -point.separation / h;
+      std::tie(c.friction_t, c.friction_k) = friction(pair.surface(), u);
+      c.impulse = h * m.force[k];
+      c.is_guessed = m.known[k];
+      contacts_.push_back(c);
+      forces_.push_back(&m.force[k]);
+      approach_.push_back(u.x());
+    }
+}
+
+/// Forces that act throughout the interval move bodies by half of what they change the velocity times the time;
+/// blows that end an approach, which acted at some time in it, by all of it, so that nothing gets through.
+void ExactContacts::move_bodies(const Island& island, Real duration) {
+  closing_.assign(bodies_.size(), 0);
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    if (approach_[i] < -kClosing && contacts_[i].impulse.x() > 0)
+      closing_[contacts_[i].a] = closing_[contacts_[i].b] = 1;
+  for (std::size_t i = 0; i < island.bodies.size(); ++i) {
+    Body& body = *island.bodies[i];
+    const Vec3 dv = bodies_[i].velocity - free_[i].head<3>(), dw = bodies_[i].angular_velocity - free_[i].tail<3>();
+    body.rigid.momentum += body.rigid.mass * dv;
+    body.rigid.angular_momentum += angular_momentum(body.rigid, body.rigid.orientation, dw);
+    const Real time = closing_[i] ? duration : duration / 2;
+    displace(body, time * dv, time * dw);
+  }
+}
+
+// Which of the two
+
+namespace {
+
+/// Fewer bodies than this are always worth it.
+constexpr std::size_t kFew = 6;
+/// Of the fast solver, per point and sub-step [ns].
+constexpr Real kFastPoint = 60;
+/// All attempts together may take this much of what the fast solver takes.
+constexpr Real kShare = 0.25, kMostAttempts = 240;
+
+Real fast_cost(const Island& island, Real duration) {
+  Real points = 0;
+  for (const ContactPair* pair : island.pairs)
+    for (const PlacedManifold& m : pair->manifolds()) points += m.manifold.count;
+  return points * kFastPoint * relaxation_substeps(duration);
+}
+
+}  // namespace
+
+bool SolverChoice::is_exact_worth(const Island& island) {
+  if (island.bodies.size() <= kFew || wait_ == 0) return true;
+  --wait_;
+  return false;
+}
+
+Real SolverChoice::budget(const Island& island, Real duration) const {
+  if (island.bodies.size() <= kFew) return std::numeric_limits<Real>::infinity();
+  return kShare * kMostAttempts * fast_cost(island, duration);
+}
+
+void SolverChoice::learn(const Island& island, Real duration, bool solved) {
+  if (island.bodies.size() <= kFew) return;
+  const Real fast = fast_cost(island, duration), cost = exact->cost();
+  if (solved && cost <= fast) return;
+  wait_ = static_cast<uint32_t>(std::clamp(cost / (kShare * fast), 1.0, kMostAttempts));
+}
+
+// Fast
+
+namespace {
+
+/// Other tangents for a patch.
+void turn(ContactPatch& patch, const ContactFrame& frame) {
+  for (uint32_t k = 0; k < patch.count; ++k) {
+    const Vec3 place = patch.points[k].t * patch.frame.t + patch.points[k].k * patch.frame.k;
+    patch.points[k].t = frame.t.dot(place);
+    patch.points[k].k = frame.k.dot(place);
+  }
+  patch.frame = frame;
+}
+
+}  // namespace
+
+ContactWork FastContacts::solve(std::span<const Island* const> islands, const ContactInterval& interval) {
+  const Real h = interval.duration;
+  bodies_.clear();
+  patches_.clear();
+  origins_.clear();
+  const auto add = [&](const Body& body) {
+    RelaxedBody b;
+    if (body.is_awake()) {
+      b.inverse_mass = 1 / body.rigid.mass;
+      b.inverse_inertia = inverse_inertia(body.start, body.start.orientation);
+      b.velocity = body.start.velocity();
+      b.angular_velocity = body.start.angular_velocity();
+      b.free_acceleration = (body.rigid.velocity() - b.velocity) / h;
+      b.free_angular_acceleration = (body.rigid.angular_velocity() - b.angular_velocity) / h;
+    } else if (body.is_kinematic()) {
+      b.velocity = body.drive.velocity;
+      b.angular_velocity = body.drive.angular_velocity;
+    }
+    bodies_.push_back(b);
+    return static_cast<uint32_t>(bodies_.size() - 1);
+  };
+  for (const Island* island : islands)
+    for (Body* body : island->bodies) body->row = add(*body);
+  for (const Island* island : islands)
+    for (ContactPair* pair : island->pairs) {
+      const uint32_t a = pair->a().is_awake() ? pair->a().row : add(pair->a());
+      const uint32_t b = pair->b().is_awake() ? pair->b().row : add(pair->b());
+      const Vec3 surface = surface_velocity(*pair);
+      for (PlacedManifold& m : pair->manifolds()) {
+        if (pair->by_event && pair->separation() > interval.touching) continue;
+        ContactPatch patch = contact_patch(m.manifold, origin(pair->a()), origin(pair->b()));
+        turn(patch, m.frame);
+        patch.a = a;
+        patch.b = b;
+        const Vec3 place = origin(pair->a()) + patch.arm_a;
+        const Vec3 u = in_frame(m.frame, pair->relative_velocity(place) + surface);
+        patch.offset = in_frame(m.frame, surface);
+        std::tie(patch.friction_t, patch.friction_k) = friction(pair->surface(), u);
+        for (uint32_t k = 0; k < patch.count; ++k) {
+          patch.points[k].force = m.force[k].x();
+          patch.force_t += m.force[k].y();
+          patch.force_k += m.force[k].z();
+        }
+        patch.torque_n = m.torque;
+        patches_.push_back(patch);
+        origins_.push_back(&m);
+      }
+    }
+  if (patches_.empty()) return {};
+  const ContactWork work = solver_.solve(bodies_, patches_, {h, relaxation_substeps(h)});
+
+  for (std::size_t i = 0; i < patches_.size(); ++i) {
+    const ContactPatch& patch = patches_[i];
+    // The patch's friction is shared out by the points' normal forces.
+    Real sum = 0;
+    for (uint32_t k = 0; k < patch.count; ++k) sum += patch.points[k].force;
+    for (uint32_t k = 0; k < patch.count; ++k) {
+      const Real share = sum > 0 ? patch.points[k].force / sum : 1.0 / patch.count;
+      origins_[i]->force[k] = {patch.points[k].force, share * patch.force_t, share * patch.force_k};
+    }
+    origins_[i]->torque = patch.torque_n;
+  }
+  for (const Island* island : islands)
+    for (Body* body : island->bodies) {
+      const RelaxedBody& b = bodies_[body->row];
+      displace(*body, b.displacement, b.rotation_vector);
+      body->rigid.momentum = body->rigid.mass * b.velocity;
+      body->rigid.angular_momentum = angular_momentum(body->rigid, body->rigid.orientation, b.angular_velocity);
+    }
+  return work;
+}
+
+// Collisions
+
+uint32_t resolve_collisions(const Island& island, Real reach, Real collision_speed, ImpactLaw law,
+                            ContactWork& work) {
+  std::vector<ContactBody> bodies;
+  std::vector<Contact> contacts;
+  std::vector<Real> restitution;
+  uint32_t collisions = 0;
+  for (Body* body : island.bodies) {
+    body->row = static_cast<uint32_t>(bodies.size());
+    bodies.push_back({1 / body->start.mass, inverse_inertia(body->start, body->start.orientation),
+                      body->start.velocity(), body->start.angular_velocity()});
+  }
+  for (ContactPair* pair : island.pairs) {
+    const auto row = [&](const Body& body) {
+      if (body.is_awake()) return body.row;
+      bodies.push_back({});
+      if (body.is_kinematic()) {
+        bodies.back().velocity = body.drive.velocity;
+        bodies.back().angular_velocity = body.drive.angular_velocity;
+      }
+      return static_cast<uint32_t>(bodies.size() - 1);
+    };
+    const uint32_t a = row(pair->a()), b = row(pair->b());
+    const Vec3 surface = surface_velocity(*pair);
+    for (const PlacedManifold& m : pair->manifolds())
+      for (uint32_t k = 0; k < m.manifold.count; ++k) {
+        const ContactPoint& point = m.manifold.points[k];
+        if (point.separation > reach) continue;
+        const Vec3 place = (point.on_a + point.on_b) / 2;
+        Contact c{.a = a, .b = b, .frame = m.frame};
+        c.arm_a = place - origin(pair->a());
+        c.arm_b = place - origin(pair->b());
+        c.offset = in_frame(m.frame, surface);
+        const Vec3 u = c.relative_velocity(bodies);
+        std::tie(c.friction_t, c.friction_k) = friction(pair->surface(), u);
+        contacts.push_back(c);
+        const bool bounces = u.x() < -collision_speed;
+        collisions += bounces;
+        restitution.push_back(bounces ? pair->surface().restitution : 0);
+      }
+  }
+  if (contacts.empty()) return 0;
+  work.add(collide(bodies, contacts, restitution, law));
+  for (Body* body : island.bodies) {
+    const ContactBody& b = bodies[body->row];
+    body->start.set_velocity(b.velocity, b.angular_velocity);
+  }
+  return collisions;
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,83 @@
+#pragma once
+/// From bodies and their contact pairs to problems for the solvers, and back: resting contact over an interval,
+/// and collisions at an instant (physics E6, R7-R10, N11, N12).
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "sim/contact/collision.h"
+#include "sim/contact/contact_pair.h"
+#include "sim/contact/proximal_newton.h"
+#include "sim/contact/relaxation.h"
+#include "sim/contact_graph.h"
+
+namespace offstage::sim {
+
+/// What all solutions of an interval share.
+struct ContactInterval {
+  Real duration;         ///< [s], > 0
+  Real touching;         ///< points nearer than this touch [m]
+};
+
+/// One island's contacts as a problem, solved to rounding. The bodies have moved freely through the interval from
+/// their `start` to `rigid`; what the contacts add is put on top. Keep one per island.
+class ExactContacts {
+ public:
+  /// None, and nothing changed, if that took more than `budget` [ns, see SolverChoice].
+  std::optional<ContactWork> solve(const Island& island, const ContactInterval& interval, Real budget);
+  /// What the last solve() took.
+  Real cost() const { return newton_.cost(); }
+
+ private:
+  uint32_t add_body(Body& body);
+  void add_points(ContactPair& pair, const ContactInterval& interval);
+  void move_bodies(const Island& island, Real duration);
+
+  std::vector<ContactBody> bodies_;
+  std::vector<Contact> contacts_;
+  std::vector<Vec3*> forces_;       // of the contacts, in their pairs
+  std::vector<Real> approach_;      // of the contacts at the start [m/s]
+  std::vector<uint8_t> closing_;    // by body: some contact came together in the interval
+  std::vector<Vec6> free_;          // by body: velocities without contacts
+  ProximalNewton newton_;
+};
+
+/// Several islands at once by the fast solver.
+class FastContacts {
+ public:
+  ContactWork solve(std::span<const Island* const> islands, const ContactInterval& interval);
+
+ private:
+  std::vector<RelaxedBody> bodies_;
+  std::vector<ContactPatch> patches_;
+  std::vector<PlacedManifold*> origins_;
+  RelaxationSolver solver_;
+};
+
+/// Whether an island is for the exact or the fast solver, by what the exact one cost on islands like it before.
+/// Costs are counted work times what the operations take on a machine of 2020 [ns], so that the choice
+/// is the same in every run.
+class SolverChoice {
+ public:
+  /// Whether to try the exact solver now.
+  bool is_exact_worth(const Island& island);
+  /// What the attempt may cost, so that all attempts together take but a share of what the fast solver takes.
+  Real budget(const Island& island, Real duration) const;
+  /// What became of the attempt.
+  void learn(const Island& island, Real duration, bool solved);
+
+  std::unique_ptr<ExactContacts> exact;
+  uint64_t used = 0;  ///< number of the sub-step
+
+ private:
+  uint32_t wait_ = 0;  // sub-steps until the next attempt
+};
+
+/// Resolves the collisions among an island's pairs at its bodies' `start`: what is nearer than `reach` [m]
+/// belongs to the cluster, what approaches faster than `collision_speed` bounces. Changes the bodies' velocities
+/// at the start. Returns how many contacts bounced.
+uint32_t resolve_collisions(const Island& island, Real reach, Real collision_speed, ImpactLaw law, ContactWork& work);
+
+}  // namespace offstage::sim

@@ -1,0 +1,71 @@
+#pragma once
+/// Four contact patches in SIMD lanes, as the fast solver works on them (relaxation.h).
+///
+/// A patch acts by a wrench about its centre, and what it feels is the relative twist there, in its frame.
+/// Both come in two groups of three: the normal group (linear along n, angular about t and k), by which the
+/// normal forces of all points act, and the friction group (linear along t and k, angular about n). A point
+/// at (x, y) along (t, k) has the normal velocity u_n + y w_t - x w_k, and its force f makes the wrench
+/// (f, y f, -x f) of the normal group.
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "sim/contact/lane_vector.h"
+
+namespace offstage::sim {
+
+struct ContactPatch;
+struct RelaxedBody;
+
+struct BodyTwist {
+  Lanes linear{}, angular{};
+};
+/// A body within a step: its velocity, and how far it has moved and turned since the start.
+struct BodyMotion {
+  BodyTwist velocity, shift;
+};
+
+struct PatchBatch {
+  struct Point {
+    Lanes x, y;               ///< along t and k [m]
+    Lanes mass;               ///< effective [kg], 0 in lanes that have no such point
+    Lanes start, separation;  ///< at the start of the step; now [m]
+    Lanes impulse;            ///< of a sub-step [N s]
+  };
+
+  std::array<uint32_t, 4> a, b, patch;  ///< the body beyond the last and kNone in lanes that are not used
+  std::array<bool, 4> moves_a, moves_b;
+  uint32_t count;       ///< of points, in the lane that has most
+  uint32_t rounds = 1;  ///< of normal and friction impulses in the next sweep
+  LaneVector n, t, k, arm_a, arm_b;
+  Lanes inverse_mass_a, inverse_mass_b;
+  LaneSymmetric inverse_inertia_a, inverse_inertia_b;
+  /// The twist that a unit wrench gives: within the normal group, within the friction group, and of the
+  /// friction group by the normal group's wrench.
+  LaneSymmetric normal_mobility, friction_mobility;
+  LaneMatrix coupling;
+  LaneVector offset;  ///< along n, t and k [m/s]
+  Lanes friction_t, friction_k;
+  LaneVector friction_impulse;  ///< along t, k, about n, of a sub-step
+  Lanes residual;               ///< by how much the last sweep changed the velocity of the centre [m/s]
+  std::array<Point, 4> points;
+};
+
+/// Fills a batch and gives the bodies the impulses that the patches' forces make in `substep` [s]. Of
+/// motions there is one more than bodies, for lanes that are not used.
+void prepare(PatchBatch& batch, std::array<uint32_t, 4> patches, std::span<const ContactPatch> all,
+             std::span<const RelaxedBody> bodies, std::span<BodyMotion> motions, Real substep);
+
+/// Solves each patch once, for velocities. Where a gap is open, the approach is limited to what closes it in
+/// 1 / `closing` [s].
+void sweep(PatchBatch& batch, std::span<BodyMotion> motions, Real closing);
+
+/// Moves the bodies, but not their velocities, apart where they overlap: by `share` of the depth, at most
+/// `limit` [m].
+void push_out(PatchBatch& batch, std::span<BodyMotion> motions, Real share, Real limit);
+
+/// Gives the patches their forces.
+void report(const PatchBatch& batch, std::span<ContactPatch> patches, Real substep);
+
+}  // namespace offstage::sim

@@ -1,0 +1,336 @@
+#include "sim/contact/proximal_newton.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace offstage::sim {
+namespace {
+
+/// Penalty times mobility: how many times stiffer than inertia a contact is. The method of multipliers leaves 1 /
+/// (1 + kStiffness e) of the error in a direction whose eigenvalue of the mobility is e (of the largest): with
+/// stacks of 100 at 1e-4. Larger ones cost digits of H.
+constexpr Real kStiffness = 1e5;
+constexpr Real kTolerance = 1e-9, kSmallest = 1e-11;  // of the velocities, and [m/s]
+constexpr Real kCoarse = 1e-5;
+constexpr uint32_t kPatience = 4;
+/// An iteration that leaves more than this is slow.
+constexpr Real kSlow = 0.2;
+constexpr uint32_t kMaxOuter = 60, kMaxNewton = 40, kMaxHalvings = 25, kMaxSweeps = 200;
+/// A matrix from before serves while each step leaves less of the gradient than this.
+constexpr Real kStale = 0.2;
+constexpr Real kMeritRounding = 1e-11;
+constexpr std::size_t kMixed = 5;
+constexpr uint32_t kMaxFactorizations = 300;
+/// What operations take [ns]: per contact, and per block of the factor.
+constexpr Real kSetUp = 150, kEvaluation = 80, kAssembly = 150, kSolve = 25, kProduct = 80;
+
+Mat3 cross_matrix(const Vec3& r) {
+  Mat3 m;
+  m << 0, -r.z(), r.y(), r.z(), 0, -r.x(), -r.y(), r.x(), 0;
+  return m;
+}
+
+/// J^T W J of a point at arms r, s: velocity at the point is v - [r] w.
+Mat6 block(const Mat3& W, const Vec3& r, const Vec3& s) {
+  const Mat3 R = cross_matrix(r), Ws = -W * cross_matrix(s);
+  Mat6 m;
+  m.topLeftCorner<3, 3>() = W;
+  m.topRightCorner<3, 3>() = Ws;
+  m.bottomLeftCorner<3, 3>() = R * W;
+  m.bottomRightCorner<3, 3>() = R * Ws;
+  return m;
+}
+
+}  // namespace
+
+std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, std::span<Contact> contacts,
+                                                 Real budget) {
+  ContactWork work{.solves = 1};
+  cost_ = kSetUp * static_cast<Real>(contacts.size());
+  budget_ = budget;
+  number_bodies(bodies, contacts);
+  set_points(bodies, contacts);
+  Real speed = 0;
+  for (const Point& p : points_) speed = std::max(speed, p.impulse.cwiseAbs().maxCoeff());
+  const Real tolerance = kSmallest + kTolerance * speed;
+
+  Real left = speed;
+  bool solved = false;
+  merit_ = evaluate(contacts, velocity_);
+  gradient(contacts);
+  mixing_.clear();
+  for (uint32_t outer = 0; outer < kMaxOuter && work.factorizations < kMaxFactorizations; ++outer) {
+    minimize(contacts, std::max(tolerance / 4, left / 20), work);
+    if (cost_ > budget_) return std::nullopt;
+    const Real before = left;
+    left = std::max(gradient_speed(), update_multipliers(contacts));
+    // The longer it takes the fewer digits are asked for.
+    solved = left <= std::min(tolerance * std::pow(10, outer / kPatience), tolerance + kCoarse * speed);
+    if (solved) break;
+    mix_lifts(left > kSlow * before);
+    merit_ = evaluate(contacts, velocity_);
+    gradient(contacts);
+  }
+
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    contacts[i].impulse = points_[i].multiplier;
+    apply(contacts[i], contacts[i].impulse, bodies);
+  }
+  if (!solved) {
+    work.iterations += relax(bodies, contacts, kMaxSweeps, tolerance);
+    ++work.fallbacks;
+    left = residual(bodies, contacts);
+  }
+  work.residual = left;
+  return work;
+}
+
+void ProximalNewton::number_bodies(std::span<const ContactBody> bodies, std::span<const Contact> contacts) {
+  row_of_body_.assign(bodies.size(), kNone);
+  body_of_row_.clear();
+  for (const Contact& c : contacts)
+    for (uint32_t body : {c.a, c.b})
+      if (bodies[body].is_moved() && row_of_body_[body] == kNone) {
+        row_of_body_[body] = 0;
+        body_of_row_.push_back(body);
+      }
+  std::sort(body_of_row_.begin(), body_of_row_.end());
+  for (uint32_t row = 0; row < body_of_row_.size(); ++row) row_of_body_[body_of_row_[row]] = row;
+
+  pairs_.clear();
+  for (const Contact& c : contacts) {
+    const auto [low, high] = std::minmax(row_of_body_[c.a], row_of_body_[c.b]);
+    if (high != kNone) pairs_.emplace_back(low, high);
+  }
+  std::sort(pairs_.begin(), pairs_.end());
+  pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
+
+  const std::size_t rows = body_of_row_.size();
+  free_.resize(rows);
+  velocity_.resize(rows);
+  trial_.resize(rows);
+  gradient_.resize(rows);
+  direction_.resize(rows);
+  mass_.resize(rows);
+  for (std::size_t row = 0; row < rows; ++row) {
+    const ContactBody& body = bodies[body_of_row_[row]];
+    free_[row] << body.velocity, body.angular_velocity;
+    velocity_[row] = free_[row];
+    mass_[row].setZero();
+    mass_[row].diagonal().head<3>().setConstant(1 / body.inverse_mass);
+    mass_[row].bottomRightCorner<3, 3>() = body.inverse_inertia.inverse();
+  }
+}
+
+/// The guess: multipliers from the contacts, and the velocities that go with them. `impulse` is left with
+/// the relative velocities without any impulse, for their scale.
+void ProximalNewton::set_points(std::span<const ContactBody> bodies, std::span<const Contact> contacts) {
+  if (factored_contacts_ != contacts.size()) is_factored_ = false;
+  points_.resize(contacts.size());
+  fixed_.resize(contacts.size());
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const Contact& c = contacts[i];
+    Point& p = points_[i];
+    p.a = row_of_body_[c.a];
+    p.b = row_of_body_[c.b];
+    p.pair = kNone;
+    if (p.a != kNone && p.b != kNone)
+      p.pair = static_cast<uint32_t>(
+          std::lower_bound(pairs_.begin(), pairs_.end(),
+                           std::pair<uint32_t, uint32_t>(std::minmax(p.a, p.b))) - pairs_.begin());
+    p.rho = kStiffness / mobility(c, bodies).diagonal().maxCoeff();
+    p.multiplier = c.is_guessed ? project_on_cone(c, c.impulse).point : Vec3(Vec3::Zero());
+    p.impulse = c.relative_velocity(bodies);
+    fixed_[i] = c.offset - Vec3(c.target, 0, 0);
+    if (p.a == kNone) fixed_[i] += c.to_frame(bodies[c.a].velocity_at(c.arm_a));
+    if (p.b == kNone) fixed_[i] -= c.to_frame(bodies[c.b].velocity_at(c.arm_b));
+
+    const Vec3 impulse = c.to_world(p.multiplier);
+    const auto add = [&](uint32_t row, uint32_t body, const Vec3& arm, Real sign) {
+      if (row == kNone) return;
+      velocity_[row].head<3>() += sign * bodies[body].inverse_mass * impulse;
+      velocity_[row].tail<3>() += sign * (bodies[body].inverse_inertia * arm.cross(impulse));
+    };
+    add(p.a, c.a, c.arm_a, 1);
+    add(p.b, c.b, c.arm_b, -1);
+  }
+  for (std::size_t i = 0; i < contacts.size(); ++i)
+    points_[i].lift =
+        cone_lift(contacts[i], relative_velocity(contacts[i], points_[i], velocity_) + fixed_[i]);
+}
+
+Vec3 ProximalNewton::relative_velocity(const Contact& c, const Point& p, std::span<const Vec6> velocity) const {
+  Vec3 u = Vec3::Zero();
+  if (p.a != kNone) u += velocity[p.a].head<3>() + velocity[p.a].tail<3>().cross(c.arm_a);
+  if (p.b != kNone) u -= velocity[p.b].head<3>() + velocity[p.b].tail<3>().cross(c.arm_b);
+  return c.to_frame(u);
+}
+
+/// The impulses at these velocities, and the function whose gradient is M (v - v0) - J^T p.
+Real ProximalNewton::evaluate(std::span<const Contact> contacts, std::span<const Vec6> velocity) {
+  Real merit = 0;
+  for (std::size_t row = 0; row < velocity.size(); ++row) {
+    const Vec6 d = velocity[row] - free_[row];
+    merit += 0.5 * d.dot(mass_[row] * d);
+  }
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const Contact& c = contacts[i];
+    Point& p = points_[i];
+    const Vec3 u = relative_velocity(c, p, velocity) + fixed_[i] + Vec3(p.lift, 0, 0);
+    const Vec3 q = p.multiplier - p.rho * u;
+    const ConeProjection projection = project_on_cone(c, q);
+    p.impulse = projection.point;
+    p.region = projection.region;
+    p.derivative = cone_derivative(c, q, projection);
+    merit += p.impulse.squaredNorm() / (2 * p.rho);
+  }
+  return merit;
+}
+
+void ProximalNewton::gradient(std::span<const Contact> contacts) {
+  for (std::size_t row = 0; row < gradient_.size(); ++row)
+    gradient_[row] = mass_[row] * (velocity_[row] - free_[row]);
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const Contact& c = contacts[i];
+    const Point& p = points_[i];
+    const Vec3 impulse = c.to_world(p.impulse);
+    if (p.a != kNone) {
+      gradient_[p.a].head<3>() -= impulse;
+      gradient_[p.a].tail<3>() -= c.arm_a.cross(impulse);
+    }
+    if (p.b != kNone) {
+      gradient_[p.b].head<3>() += impulse;
+      gradient_[p.b].tail<3>() += c.arm_b.cross(impulse);
+    }
+  }
+}
+
+/// The greatest velocity that the impulses out of balance give to a body.
+Real ProximalNewton::gradient_speed() const {
+  Real worst = 0;
+  for (std::size_t row = 0; row < gradient_.size(); ++row) {
+    const Vec6& g = gradient_[row];
+    const Real mass = mass_[row](0, 0);
+    // The angular part by a lower bound of the inertia's effect: the trace exceeds its eigenvalues.
+    const Mat3& inertia = mass_[row].bottomRightCorner<3, 3>();
+    const Real radius = std::sqrt(inertia.trace() / mass);
+    worst = std::max(worst, (g.head<3>().norm() + g.tail<3>().norm() / std::max(radius, 1e-12)) / mass);
+  }
+  return worst;
+}
+
+bool ProximalNewton::assemble(std::span<const Contact> contacts, ContactWork& work) {
+  factor_.analyze(static_cast<uint32_t>(mass_.size()), pairs_);
+  diagonal_ = mass_;
+  off_.assign(pairs_.size(), Mat6::Zero());
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const Contact& c = contacts[i];
+    const Point& p = points_[i];
+    if (p.region == ConeRegion::apex) continue;
+    Mat3 axes;
+    axes << c.frame.n, c.frame.t, c.frame.k;
+    const Mat3 W = p.rho * axes * p.derivative * axes.transpose();
+    if (p.a != kNone) diagonal_[p.a] += block(W, c.arm_a, c.arm_a);
+    if (p.b != kNone) diagonal_[p.b] += block(W, c.arm_b, c.arm_b);
+    if (p.pair == kNone) continue;
+    if (p.a < p.b)
+      off_[p.pair] -= block(W, c.arm_a, c.arm_b);
+    else
+      off_[p.pair] -= block(W, c.arm_b, c.arm_a);
+  }
+  ++work.factorizations;
+  cost_ += kProduct * static_cast<Real>(factor_.factor_products()) + kAssembly * static_cast<Real>(contacts.size());
+  factored_contacts_ = contacts.size();
+  return is_factored_ = factor_.factorize(diagonal_, off_);
+}
+
+/// Newton's method for the multipliers and limits as they are, down to a gradient of `tolerance` [m/s].
+bool ProximalNewton::minimize(std::span<const Contact> contacts, Real tolerance, ContactWork& work) {
+  Real before = std::numeric_limits<Real>::infinity();
+  for (uint32_t step = 0; step < kMaxNewton; ++step) {
+    const Real now = gradient_speed();
+    if (now <= tolerance) return true;
+    // The matrix from before is tried first, though some contacts may have changed sides.
+    if (!is_factored_ || now > kStale * before)
+      if (work.factorizations >= kMaxFactorizations || !assemble(contacts, work)) return false;
+    before = now;
+    ++work.iterations;
+    if (cost_ > budget_) return false;
+    if (!descend(contacts)) return false;
+  }
+  return false;
+}
+
+/// One step along -H^-1 g with back-tracking; false if rounding leaves no way down.
+bool ProximalNewton::descend(std::span<const Contact> contacts) {
+  direction_ = gradient_;
+  factor_.solve(direction_);
+  cost_ += kSolve * static_cast<Real>(factor_.factor_blocks()) + kEvaluation * static_cast<Real>(contacts.size());
+  Real slope = 0;
+  for (std::size_t row = 0; row < direction_.size(); ++row) slope -= direction_[row].dot(gradient_[row]);
+  const Real before = merit_, speed = gradient_speed();
+  const std::vector<Vec6> start = velocity_;
+  Real length = 1;
+  for (uint32_t k = 0; k < kMaxHalvings; ++k, length /= 2) {
+    for (std::size_t row = 0; row < direction_.size(); ++row)
+      velocity_[row] = start[row] - length * direction_[row];
+    merit_ = evaluate(contacts, velocity_);
+    if (merit_ <= before + 1e-4 * length * slope) {
+      gradient(contacts);
+      return true;
+    }
+    // Near the minimum the function's rounding hides its decrease; the gradient still tells.
+    if (merit_ > before + kMeritRounding * std::abs(before)) continue;
+    gradient(contacts);
+    if (gradient_speed() <= 0.8 * speed) return true;
+  }
+  velocity_ = start;
+  merit_ = evaluate(contacts, velocity_);
+  gradient(contacts);
+  return false;
+}
+
+/// q := p and g := mu |u_t|; returns how far they were from that, as velocities.
+Real ProximalNewton::update_multipliers(std::span<const Contact> contacts) {
+  Real change = 0;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    Point& p = points_[i];
+    change = std::max(change, (p.impulse - p.multiplier).cwiseAbs().maxCoeff() / p.rho);
+    p.multiplier = p.impulse;
+    const Real lift = cone_lift(contacts[i], relative_velocity(contacts[i], p, velocity_) + fixed_[i]);
+    p.rise = p.region == ConeRegion::apex ? 0 : lift - p.lift;  // what is open does not depend on it
+    change = std::max(change, std::abs(p.rise));
+    p.lift = lift;
+  }
+  return change;
+}
+
+/// Friction's feedback on the normal impulses can make g = mu |u_t(g)| a slow iteration. Anderson, "Iterative
+/// procedures for nonlinear integral equations" (1965), sees through that from the last few: to g goes the
+/// combination of them that lacks least.
+void ProximalNewton::mix_lifts(bool slow) {
+  const auto n = static_cast<Eigen::Index>(points_.size());
+  Eigen::VectorXd lift(n), rise(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    lift[i] = points_[static_cast<std::size_t>(i)].lift;
+    rise[i] = points_[static_cast<std::size_t>(i)].rise;
+  }
+  if (!mixing_.empty() && rise.norm() > 2 * mixing_.back().rise.norm()) mixing_.clear();
+  mixing_.push_back({lift, rise});
+  if (mixing_.size() > kMixed) mixing_.erase(mixing_.begin());
+  const auto m = static_cast<Eigen::Index>(mixing_.size()) - 1;
+  if (m == 0 || !slow || rise.norm() == 0) return;
+  Eigen::MatrixXd of_lift(n, m), of_rise(n, m);
+  for (Eigen::Index k = 0; k < m; ++k) {
+    const Mixed& before = mixing_[static_cast<std::size_t>(k)];
+    of_lift.col(k) = lift - before.lift;
+    of_rise.col(k) = rise - before.rise;
+  }
+  const Eigen::VectorXd share = of_rise.colPivHouseholderQr().solve(rise);
+  if (!share.allFinite()) return;
+  const Eigen::VectorXd mixed = lift - of_lift * share;
+  for (Eigen::Index i = 0; i < n; ++i) points_[static_cast<std::size_t>(i)].lift = std::max(mixed[i], 0.0);
+}
+
+}  // namespace offstage::sim

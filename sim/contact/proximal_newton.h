@@ -1,0 +1,83 @@
+#pragma once
+/// The exact solver of contact problems (physics N11): a proximal method of multipliers whose inner problems are
+/// solved by a semismooth Newton method on the velocities of the bodies, with the true friction cone.
+///
+/// Coulomb's law is p in the cone C, u~ = u + mu |u_t| n in its dual, p . u~ = 0 (De Saxce and Feng, "The bipotential
+/// method", 1998). With g = mu |u_t| held for now, multipliers q and penalties rho, the impulses
+///   p(v) = projection of q - rho (u(v) - target + g n) on C
+/// make M (v - v0) = J^T p(v) the stationarity of a smooth, strongly convex function of v, which Newton's method
+/// with line search minimises whatever the contacts are like: redundant ones leave the matrix
+///   H = M + sum J^T rho (dp/dq) J
+/// positive definite, and it has the sparsity of the graph of bodies. Then q := p and g := mu |u_t|, until
+/// neither changes; where nothing slides g is 0 and only q is left to converge. The multipliers of the last step are
+/// the guess for the next: at rest they are the answer, which one look confirms without any factorisation. See
+/// Rockafellar, "Monotone operators and the proximal point algorithm" (1976); Alart and Curnier, "A mixed formulation
+/// for frictional contact problems prone to Newton like solution methods" (1991).
+
+#include <limits>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sim/contact/block_cholesky.h"
+#include "sim/contact/contact_problem.h"
+#include "sim/contact/friction_cone.h"
+
+namespace offstage::sim {
+
+/// Keep one per island from step to step: a matrix of nearly the same contacts still serves to converge.
+class ProximalNewton {
+ public:
+  /// Solves to a residual of 1e-8 of the velocities (1e-11 m/s at least). Starts from the contacts' impulses,
+  /// which the bodies' velocities must not contain yet. If the bounded iterations do not get there, projected
+  /// Gauss-Seidel goes on from where they ended.
+  /// If that would take more than `budget` [ns, as cost() counts], there is no result and nothing is changed.
+  std::optional<ContactWork> solve(std::span<ContactBody> bodies, std::span<Contact> contacts,
+                                   Real budget = std::numeric_limits<Real>::infinity());
+
+  /// What the last solve() took by the number of its operations, on a machine of 2020 [ns].
+  Real cost() const { return cost_; }
+
+ private:
+  struct Point {
+    Vec3 multiplier, impulse;  // q, p(v)
+    Mat3 derivative;           // dp/dq, in the frame
+    Real rho, lift;            // lift: g
+    Real rise;                 // what g lacks
+    uint32_t a, b, pair;       // rows of the matrix; kNone for bodies that are not moved
+    ConeRegion region;
+  };
+  struct Mixed {
+    Eigen::VectorXd lift, rise;
+  };
+  static constexpr uint32_t kNone = UINT32_MAX;
+
+  void number_bodies(std::span<const ContactBody> bodies, std::span<const Contact> contacts);
+  void set_points(std::span<const ContactBody> bodies, std::span<const Contact> contacts);
+  Real evaluate(std::span<const Contact> contacts, std::span<const Vec6> velocity);
+  void gradient(std::span<const Contact> contacts);
+  Real gradient_speed() const;
+  bool assemble(std::span<const Contact> contacts, ContactWork& work);
+  bool minimize(std::span<const Contact> contacts, Real tolerance, ContactWork& work);
+  bool descend(std::span<const Contact> contacts);
+  Real update_multipliers(std::span<const Contact> contacts);
+  void mix_lifts(bool slow);
+  Vec3 relative_velocity(const Contact& c, const Point& p, std::span<const Vec6> velocity) const;
+
+  std::vector<uint32_t> body_of_row_, row_of_body_;
+  std::vector<std::pair<uint32_t, uint32_t>> pairs_;
+  std::vector<Point> points_;
+  std::vector<Vec6> free_, velocity_, trial_, gradient_, direction_;
+  std::vector<Vec3> fixed_;               // relative velocity that unmoved bodies and offsets add, less the target
+  std::vector<Mat6> mass_;                // of each row
+  std::vector<Mat6> diagonal_, off_;      // H
+  bool is_factored_ = false;
+  std::size_t factored_contacts_ = 0;     // their number when H was factored
+  std::vector<Mixed> mixing_;             // of the last iterations
+  BlockCholesky factor_;
+  Real merit_ = 0;
+  Real cost_ = 0, budget_ = 0;
+};
+
+}  // namespace offstage::sim

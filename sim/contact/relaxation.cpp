@@ -1,0 +1,177 @@
+#include "sim/contact/relaxation.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sim/contact/staged_loop.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Of the penetration that a step finds, the share that it takes away, and the fastest that it does [m/s].
+constexpr Real kPushShare = 0.2, kMaxPush = 3;
+
+/// Below this a step is not worth a second thread.
+constexpr std::size_t kSerialBatches = 48;
+constexpr uint32_t kBatchesPerBlock = 8, kBodiesPerBlock = 128;
+
+Vec3 vector_of(Lanes x) {
+  return {x[0], x[1], x[2]};
+}
+
+/// Whether a body's velocity changed by more than steady forces would: twice what the free motion has,
+/// counted as kinetic energy. Then it hit something.
+bool jumps(const RelaxedBody& b, const Vec3& dv, const Vec3& dw, Real duration) {
+  const Real inertia = b.inverse_inertia.trace() > 0 ? 3 * b.inverse_mass / b.inverse_inertia.trace() : 0;
+  const Real steady = b.free_acceleration.squaredNorm() + inertia * b.free_angular_acceleration.squaredNorm();
+  return dv.squaredNorm() + inertia * dw.squaredNorm() > 4 * duration * duration * steady;
+}
+
+}  // namespace
+
+ContactPatch contact_patch(const Manifold& m, const Vec3& centre_a, const Vec3& centre_b) {
+  ContactPatch p{.frame = contact_frame(m.normal), .count = m.count};
+  if (m.count == 0) return p;
+  const auto middle = [&m](uint32_t i) { return Vec3((m.points[i].on_a + m.points[i].on_b) / 2); };
+  Vec3 centre = Vec3::Zero();
+  for (uint32_t i = 0; i < m.count; ++i) centre += middle(i) / m.count;
+  p.arm_a = centre - centre_a;
+  p.arm_b = centre - centre_b;
+  for (uint32_t i = 0; i < m.count; ++i) {
+    const Vec3 d = middle(i) - centre;
+    p.points[i] = {p.frame.t.dot(d), p.frame.k.dot(d), m.points[i].separation, 0};
+  }
+  return p;
+}
+
+uint32_t relaxation_substeps(Real duration) {
+  return static_cast<uint32_t>(std::max(4.0, std::ceil(1920 * duration - 1e-6)));
+}
+
+// Stages
+
+void RelaxationSolver::plan_colors(Stage stage) {
+  const std::span<const uint32_t> begins = coloring_.begins();
+  for (std::size_t c = 0; c + 1 < begins.size(); ++c)
+    ranges_.push_back({stage, begins[c], begins[c + 1], kBatchesPerBlock});
+  const auto end = static_cast<uint32_t>(batches_.size());
+  if (begins.back() < end) ranges_.push_back({stage, begins.back(), end, end - begins.back()});
+}
+
+void RelaxationSolver::plan(uint32_t substeps) {
+  const auto bodies = static_cast<uint32_t>(bodies_.size()), batches = static_cast<uint32_t>(batches_.size());
+  ranges_.clear();
+  ranges_.push_back({Stage::start, 0, bodies, kBodiesPerBlock});
+  plan_colors(Stage::prepare);
+  for (uint32_t i = 0; i < substeps; ++i) {
+    if (i > 0) ranges_.push_back({Stage::extrapolate, 0, bodies, kBodiesPerBlock});
+    plan_colors(Stage::solve);
+    ranges_.push_back({Stage::advance, 0, bodies, kBodiesPerBlock});
+  }
+  // Contacts that closed in the last sub-step still have the velocity that closed them.
+  plan_colors(Stage::push);
+  plan_colors(Stage::solve);
+  ranges_.push_back({Stage::finish, 0, bodies, kBodiesPerBlock});
+  ranges_.push_back({Stage::report, 0, batches, kBatchesPerBlock});
+}
+
+void RelaxationSolver::run(const Range& range, uint32_t block) {
+  const uint32_t begin = range.begin + block * range.block_size,
+                 end = std::min(begin + range.block_size, range.end);
+  const auto each = [begin, end](auto&& work) {
+    for (uint32_t i = begin; i < end; ++i) work(i);
+  };
+  switch (range.stage) {
+    case Stage::start:
+      return each([this](uint32_t i) { start(i); });
+    case Stage::prepare:
+      return each([this](uint32_t i) {
+        sim::prepare(batches_[i], coloring_.batches()[i], patches_, bodies_, motions_, substep_);
+      });
+    case Stage::extrapolate:
+      return each([this](uint32_t i) { extrapolate(i); });
+    case Stage::solve:
+      return each([this](uint32_t i) { sweep(batches_[i], motions_, 1 / substep_); });
+    case Stage::advance:
+      return each([this](uint32_t i) { advance(i); });
+    case Stage::push:
+      return each(
+          [this](uint32_t i) { push_out(batches_[i], motions_, kPushShare, kMaxPush * def_.duration); });
+    case Stage::finish:
+      return each([this](uint32_t i) { finish(i); });
+    case Stage::report:
+      return each([this](uint32_t i) { sim::report(batches_[i], patches_, substep_); });
+  }
+}
+
+void RelaxationSolver::start(uint32_t i) {
+  const RelaxedBody& b = bodies_[i];
+  last_[i] = {lanes(b.velocity), lanes(b.angular_velocity)};
+  motions_[i] = {};
+  motions_[i].velocity = {lanes(Vec3(b.velocity + substep_ * b.free_acceleration)),
+                          lanes(Vec3(b.angular_velocity + substep_ * b.free_angular_acceleration))};
+}
+
+// What the contacts did in the last sub-step, as a guess for the next, and the free motion together: the
+// change of velocity was the sum of both.
+void RelaxationSolver::extrapolate(uint32_t i) {
+  BodyTwist& v = motions_[i].velocity;
+  const BodyTwist now = v;
+  v.linear += now.linear - last_[i].linear;
+  v.angular += now.angular - last_[i].angular;
+  last_[i] = now;
+}
+
+void RelaxationSolver::advance(uint32_t i) {
+  BodyMotion& m = motions_[i];
+  m.shift.linear += substep_ * m.velocity.linear;
+  m.shift.angular += substep_ * m.velocity.angular;
+}
+
+// The sub-steps moved with the velocities at their ends, which closes gaps exactly. For steady forces the
+// mean of old and new is the right one, and summed over the sub-steps the difference is that of a half
+// sub-step with the whole change of velocity.
+void RelaxationSolver::finish(uint32_t i) {
+  RelaxedBody& b = bodies_[i];
+  if (b.inverse_mass == 0) return;
+  const BodyMotion& m = motions_[i];
+  const Real h = def_.duration;
+  const Vec3 v = vector_of(m.velocity.linear), w = vector_of(m.velocity.angular);
+  const Vec3 dv = v - b.velocity, dw = w - b.angular_velocity;
+  const Real late = jumps(b, dv, dw, h) ? 0 : substep_ / 2;
+  b.displacement = vector_of(m.shift.linear) - h * b.velocity - h * h / 2 * b.free_acceleration - late * dv;
+  b.rotation_vector = vector_of(m.shift.angular) - h * b.angular_velocity -
+                      h * h / 2 * b.free_angular_acceleration - late * dw;
+  b.velocity = v;
+  b.angular_velocity = w;
+}
+
+void RelaxationSolver::set_up() {
+  const auto mover = [this](uint32_t i) { return bodies_[i].inverse_mass > 0 ? i : ContactColoring::kNone; };
+  links_.clear();
+  for (const ContactPatch& p : patches_) links_.push_back({mover(p.a), mover(p.b)});
+  coloring_.assign(static_cast<uint32_t>(bodies_.size()), links_);
+  batches_.resize(coloring_.batches().size());
+  motions_.resize(bodies_.size() + 1);
+  motions_.back() = {};
+  last_.resize(bodies_.size());
+}
+
+ContactWork RelaxationSolver::solve(std::span<RelaxedBody> bodies, std::span<ContactPatch> patches,
+                                    const RelaxationDef& def) {
+  bodies_ = bodies;
+  patches_ = patches;
+  def_ = def;
+  substep_ = def.duration / def.substeps;
+  set_up();
+  plan(def.substeps);
+  const uint32_t threads = batches_.size() < kSerialBatches ? 1 : available_threads();
+  run_stages(std::span<const Range>(ranges_), threads,
+             [this](const Range& range, uint32_t block) { run(range, block); });
+  ContactWork work{.solves = 1, .iterations = def.substeps + 1};
+  for (const PatchBatch& p : batches_)
+    for (int lane = 0; lane < 4; ++lane) work.residual = std::max(work.residual, p.residual[lane]);
+  return work;
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,111 @@
+#pragma once
+/// The fast contact solver (physics N12): time stepping on velocities (Stewart and Trinkle, "An implicit
+/// time-stepping scheme for rigid body dynamics with inelastic collisions and Coulomb friction", 1996) in
+/// many small sub-steps of one sweep of Gauss-Seidel each (Macklin et al., "Small steps in physics
+/// simulation", 2019). Penetration is taken away by moving the bodies, once per step; velocities never know
+/// of it.
+///
+/// What is solved is not the point but the patch, the up to four points of a manifold together: its bodies'
+/// relative twist has six components, its impulses make a wrench of six, and a symmetric matrix of 6 x 6 that
+/// is made once per step relates the two. Within a patch all is solved in these, whatever the number of
+/// points. Four patches that share no body are solved at once, one per SIMD lane, colour by colour of the
+/// contact graph.
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sim/collision/manifold.h"
+#include "sim/contact/contact_coloring.h"
+#include "sim/contact/contact_frame.h"
+#include "sim/contact/contact_problem.h"
+#include "sim/contact/patch_batch.h"
+#include "sim/types.h"
+
+namespace offstage::sim {
+
+/// A body during a step of the fast solver.
+struct RelaxedBody {
+  Real inverse_mass = 0;                  ///< [1/kg]; 0: contacts do not move it, but it may move
+  Mat3 inverse_inertia = Mat3::Zero();    ///< about the centre of mass, world axes [1/(kg m^2)]
+  Vec3 velocity = Vec3::Zero();           ///< of the centre of mass [m/s]; in: at the start, out: at the end
+  Vec3 angular_velocity = Vec3::Zero();   ///< world [rad/s]; likewise
+  Vec3 free_acceleration = Vec3::Zero();  ///< mean over the step, without contacts [m/s^2]
+  Vec3 free_angular_acceleration = Vec3::Zero();  ///< [rad/s^2]
+  /// Out: what contacts add to the free motion of the step [m], [rad]: position = free position +
+  /// displacement, orientation = exp(rotation_vector) free orientation.
+  Vec3 displacement = Vec3::Zero(), rotation_vector = Vec3::Zero();
+};
+
+/// Up to four points where the bodies a and b touch or may soon. Its frame stays as it is during the step.
+struct ContactPatch {
+  struct Point {
+    Real t = 0, k = 0;    ///< coordinates along the tangents, from the patch's centre [m]
+    Real separation = 0;  ///< at the start of the step, negative in penetration [m]
+    Real force = 0;       ///< normal [N]; in: a guess, that of the last step; out: at the end of this one
+  };
+  uint32_t a = 0, b = 0;                            ///< indices of bodies; not both unmoved
+  ContactFrame frame;                               ///< n from b to a
+  Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();  ///< from the centres of mass to the patch's centre [m]
+  Vec3 offset = Vec3::Zero();  ///< (n, t, k), added to the relative velocity: moving surfaces [m/s]
+  /// Coulomb's coefficients. Equal ones make the round cone, with different ones each axis has its own limit.
+  Real friction_t = 0, friction_k = 0;
+  uint32_t count = 0;
+  std::array<Point, 4> points;
+  /// Of all points together: tangential [N] and about the normal [N m]; in and out like Point::force.
+  Real force_t = 0, force_k = 0, torque_n = 0;
+};
+
+/// The patch of a manifold that is given in world axes, of bodies with these centres of mass, without
+/// friction and forces. Its points are in the manifold's order.
+ContactPatch contact_patch(const Manifold& m, const Vec3& centre_a, const Vec3& centre_b);
+
+/// As many sub-steps as make them 1/1920 s or shorter; at least four. Each costs one sweep over the patches.
+uint32_t relaxation_substeps(Real duration);
+
+struct RelaxationDef {
+  Real duration = 1.0 / 240;  ///< of the step [s], > 0
+  uint32_t substeps = 8;      ///< > 0
+};
+
+/// Keeps its memory from step to step, and nothing else.
+class RelaxationSolver {
+ public:
+  /// Moves the bodies through a step. Penetration is pushed out, gradually; where a gap is open, the bodies
+  /// may approach to close it and no further. The answer depends on the arguments and their order alone, not
+  /// on threads; oneTBB's are used if there is enough to do.
+  ContactWork solve(std::span<RelaxedBody> bodies, std::span<ContactPatch> patches, const RelaxationDef& def);
+
+ private:
+  enum class Stage : uint8_t { start, prepare, extrapolate, solve, advance, push, finish, report };
+  /// Blocks of a stage may run in any order and at the same time.
+  struct Range {
+    Stage stage;
+    uint32_t begin, end, block_size;
+
+    uint32_t block_count() const { return (end - begin + block_size - 1) / block_size; }
+  };
+
+  void set_up();
+  void plan(uint32_t substeps);
+  void plan_colors(Stage stage);
+  void run(const Range& range, uint32_t block);
+  void start(uint32_t body);
+  void extrapolate(uint32_t body);
+  void advance(uint32_t body);
+  void finish(uint32_t body);
+
+  std::span<RelaxedBody> bodies_;
+  std::span<ContactPatch> patches_;
+  RelaxationDef def_;
+  Real substep_ = 0;
+  std::vector<ContactColoring::Link> links_;
+  ContactColoring coloring_;
+  std::vector<PatchBatch> batches_;
+  std::vector<BodyMotion> motions_;  // one more than bodies: of unused lanes
+  std::vector<BodyTwist> last_;      // of the sub-step before
+  std::vector<Range> ranges_;
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,78 @@
+#pragma once
+/// Which bodies are near each other, where they touch, and the islands that they form: bodies joined, directly
+/// or by others, by contacts or springs. Islands are independent of each other (physics E6, E7, P6).
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "sim/collision/broad_phase.h"
+#include "sim/contact/contact_pair.h"
+
+namespace offstage::sim {
+
+/// Bodies that depend on each other, in slot order, and the pairs that join them or touch what does not move.
+struct Island {
+  std::vector<Body*> bodies;
+  std::vector<ContactPair*> pairs;
+};
+
+/// What holds for all pairs in a sub-step.
+struct ContactSettings {
+  Real touching;         ///< nearer than this is in contact [m]
+  Real collision_speed;  ///< WorldDef's
+  bool exact;            ///< every impact is traced back to; else only those that need it
+};
+
+class ContactGraph {
+ public:
+  /// Makes the pairs those that the broad phase found, of which at least one is dynamic: new ones are made by
+  /// `surface_of(a, b)`, those of before are kept, others forgotten. `body_at` gives the body in a slot.
+  template <class BodyAt, class SurfaceOf>
+  void update(std::span<const IndexPair> candidates, BodyAt&& body_at, SurfaceOf&& surface_of);
+
+  /// The pair of two slots, low first; null if they are not near.
+  ContactPair* find(uint32_t low, uint32_t high) const;
+  void forget(uint32_t slot);  ///< all pairs of a body
+  void forget_all() { entries_.clear(); }
+
+  /// All pairs in ascending order of their slots.
+  template <class F>
+  void for_each(F&& f) const {
+    for (const Entry& e : entries_) f(*e.pair);
+  }
+  std::size_t size() const { return entries_.size(); }
+  ContactPair& operator[](std::size_t i) const { return *entries_[i].pair; }
+
+ private:
+  struct Entry {
+    uint32_t low, high;
+    std::unique_ptr<ContactPair> pair;
+  };
+  std::vector<Entry> entries_, next_;
+};
+
+/// Groups awake bodies, which must be in slot order, by links between them; each island is in the order of its
+/// first body and sets Body::island. Pairs without points join nothing and are left out.
+std::vector<Island> find_islands(std::span<Body* const> bodies, std::span<ContactPair* const> pairs,
+                                 std::span<const std::pair<Body*, Body*>> springs);
+
+template <class BodyAt, class SurfaceOf>
+void ContactGraph::update(std::span<const IndexPair> candidates, BodyAt&& body_at, SurfaceOf&& surface_of) {
+  next_.clear();
+  std::size_t old = 0;
+  for (const auto& [low, high] : candidates) {
+    while (old < entries_.size() && std::pair(entries_[old].low, entries_[old].high) < std::pair(low, high)) ++old;
+    if (old < entries_.size() && entries_[old].low == low && entries_[old].high == high) {
+      next_.push_back(std::move(entries_[old++]));
+      continue;
+    }
+    Body *a = body_at(low), *b = body_at(high);
+    if (!a->is_dynamic() && !b->is_dynamic()) continue;
+    if (a->collision_shape().is_plane()) std::swap(a, b);
+    next_.push_back({low, high, std::make_unique<ContactPair>(*a, *b, surface_of(*a, *b))});
+  }
+  std::swap(entries_, next_);
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,148 @@
+#include "sim/dynamics/free_body.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "sim/dynamics/flat.h"
+#include "sim/dynamics/rigid_jacobian.h"
+
+namespace offstage::sim {
+namespace {
+
+/// The four numbers of the orientation in a body's coordinates.
+Eigen::Map<Eigen::Vector4d> turn_of(std::span<Real> x) {
+  return Eigen::Map<Eigen::Vector4d>(&x[3]);
+}
+Eigen::Map<const Eigen::Vector4d> turn_of(std::span<const Real> x) {
+  return Eigen::Map<const Eigen::Vector4d>(&x[3]);
+}
+
+RigidMotion motion_of(const RigidBody& body, std::span<const Real> x, std::span<const Real> p) {
+  const Quat q = Quat(turn_of(x)).normalized();
+  return {vec3(x, 0), q, vec3(p, 0) / body.mass, body.angular_velocity(q, vec3(p, 3))};
+}
+
+/// Whether all axes have the same moment of inertia, up to the rounding of a mesh's.
+bool is_isotropic(const Mat3& inertia) {
+  const Real tiny = 1e-13 * inertia(0, 0);
+  return std::abs(inertia(0, 1)) <= tiny && std::abs(inertia(0, 2)) <= tiny &&
+         std::abs(inertia(1, 2)) <= tiny && std::abs(inertia(1, 1) - inertia(0, 0)) <= tiny &&
+         std::abs(inertia(2, 2) - inertia(0, 0)) <= tiny;
+}
+
+bool is_pulled(const RigidBody& body, std::span<const ActiveForce> forces, Real from, Real to) {
+  return std::any_of(forces.begin(), forces.end(),
+                     [&](const ActiveForce& f) { return f.acts_on(body, from, to); });
+}
+
+void integrate(RigidBody& body, const BodyForces& forces, const Integrator& integrator, Real t, Real h,
+               IntegratorWorkspace& work) {
+  std::array<Real, kBodyX> x;
+  std::array<Real, kBodyP> p;
+  load(body, x, p);
+  work.next_step = body.next_step;
+  integrator.step(FreeBody(body, forces), t, h, x, p, work);
+  body.next_step = work.next_step;
+  store(x, p, body);
+}
+
+}  // namespace
+
+RigidStage::RigidStage(const RigidBody& rigid, std::span<const Real> x, std::span<const Real> p)
+    : body(rigid), turn(turn_of(x)), motion(motion_of(rigid, x, p)), angular_momentum(vec3(p, 3)) {}
+
+void RigidStage::velocity(std::span<Real> dx) const {
+  const Vec3& w = motion.angular_velocity;
+  vec3(dx, 0) = motion.velocity;
+  // dq/dt = 1/2 (0, w) q
+  turn_of(dx) = 0.5 * (Quat(0, w.x(), w.y(), w.z()) * Quat(turn)).coeffs();
+}
+
+void RigidStage::force(const BodyForces& forces, Real t, std::span<Real> dp) const {
+  Vec3 force = body.mass * forces.gravity - body.linear_drag * motion.velocity;
+  Vec3 torque = -body.angular_drag * motion.angular_velocity;
+  for (const ActiveForce& f : forces.forces) {
+    if (!f.acts_on(body)) continue;
+    const Wrench w = wrench(*f.def, t, motion, body.centre);
+    force += w.force;
+    torque += w.torque;
+  }
+  vec3(dp, 0) = force;
+  vec3(dp, 3) = torque;
+}
+
+void load(const RigidBody& body, std::span<Real> x, std::span<Real> p) {
+  vec3(x, 0) = body.position;
+  turn_of(x) = body.orientation.coeffs();
+  vec3(p, 0) = body.momentum;
+  vec3(p, 3) = body.angular_momentum;
+}
+
+void store(std::span<const Real> x, std::span<const Real> p, RigidBody& body) {
+  body.position = vec3(x, 0);
+  body.orientation = Quat(turn_of(x)).normalized();
+  body.momentum = vec3(p, 0);
+  body.angular_momentum = vec3(p, 3);
+}
+
+void FreeBody::velocity(Real, std::span<const Real> x, std::span<const Real> p, std::span<Real> dx) const {
+  RigidStage(body_, x, p).velocity(dx);
+}
+
+void FreeBody::force(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const {
+  if (forces_.forces.empty() && body_.linear_drag == 0 && body_.angular_drag == 0) {
+    vec3(dp, 0) = body_.mass * forces_.gravity;
+    vec3(dp, 3).setZero();
+  } else {
+    RigidStage(body_, x, p).force(forces_, t, dp);
+  }
+}
+
+void FreeBody::jacobian(Real t, std::span<const Real> x, std::span<const Real> p,
+                        SparseEntries& entries) const {
+  const RigidStage stage(body_, x, p);
+  const RigidDerivative d(stage);
+  const StateColumns at{0, static_cast<int>(kBodyX)};
+  add_block(d.own_rates(forces_, t), at, at, entries);
+}
+
+Quat rotation(const Vec3& w, Real h) {
+  // With a = h |w| / 2: (cos a, sin a / a * h w / 2), both even series in a. A large angle is halved until
+  // the series are short, and the result squared as often.
+  Vec3 half = h / 2 * w;
+  int squarings = 0;
+  for (; half.squaredNorm() > 0.25 && squarings < 600; ++squarings) half /= 2;
+  const Real s = half.squaredNorm();
+  // 1 - s/2! + s^2/4! - ... and 1 - s/3! + s^2/5! - ..., whose next terms are below 1e-17.
+  Real cosine = 1, sinc = 1;
+  for (int k = 14; k > 0; k -= 2) {
+    cosine = 1 - s / (k * (k - 1)) * cosine;
+    sinc = 1 - s / (k * (k + 1)) * sinc;
+  }
+  Quat q(cosine, sinc * half.x(), sinc * half.y(), sinc * half.z());
+  for (; squarings > 0; --squarings) q = (q * q).normalized();
+  return q;
+}
+
+void fly(RigidBody& body, const BodyForces& forces, const Integrator& integrator, Real t, Real h,
+         IntegratorWorkspace& work) {
+  if (body.linear_drag != 0 || body.angular_drag != 0 || is_pulled(body, forces.forces, t, t + h))
+    return integrate(body, forces, integrator, t, h, work);
+  const Vec3 velocity = body.velocity();
+  const Vec3 position = body.position + h * (velocity + h / 2 * forces.gravity);
+  const Vec3 momentum = body.momentum + h * body.mass * forces.gravity;
+  if (!body.angular_momentum.isZero(0)) {
+    if (is_isotropic(body.inertia)) {
+      const Quat turned = rotation(body.angular_momentum / body.inertia(0, 0), h) * body.orientation;
+      // The length is 1 up to rounding: one Newton step for 1 / sqrt(length^2) is enough.
+      body.orientation.coeffs() = (1.5 - 0.5 * turned.squaredNorm()) * turned.coeffs();
+    } else {
+      integrate(body, {Vec3::Zero(), {}}, integrator, t, h, work);
+    }
+  }
+  body.position = position;
+  body.momentum = momentum;
+}
+
+}  // namespace offstage::sim

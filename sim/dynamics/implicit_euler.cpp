@@ -1,0 +1,120 @@
+#include "sim/dynamics/implicit_euler.h"
+
+#include <algorithm>
+
+#include <Eigen/SparseLU>
+
+#include "sim/dynamics/flat_array.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr int kIterations = 16;
+/// A correction this small relative to the coordinates, or to a millimetre if they are smaller, is the last:
+/// the next would be its square.
+constexpr Real kConverged = 1e-9, kLeastScale = 1e-3;
+constexpr Real kShortest = 1.0 / 64;
+
+/// One implicit step of a system, from the state at `t` to the one at `t + h`.
+class ImplicitStep {
+ public:
+  ImplicitStep(const DynamicSystem& system, std::size_t x_size, std::size_t p_size, IntegratorReport& report)
+      : system_(system),
+        report_(report),
+        n_(static_cast<Eigen::Index>(x_size)),
+        size_(static_cast<Eigen::Index>(x_size + p_size)),
+        matrix_(size_, size_),
+        slope_(size_),
+        velocity_(x_size) {}
+
+  /// Improves `y` until it solves y = y0 + h f(t + h, y); false if that fails.
+  bool solve(Real t, Real h, const Eigen::VectorXd& y0, Eigen::VectorXd& y) {
+    for (int i = 0; i < kIterations; ++i) {
+      evaluate(t + h, y);
+      if (!factorize(t + h, h, y)) return false;
+      const Eigen::VectorXd correction = factors_.solve(y0 + h * slope_ - y);
+      y += correction;
+      ++report_.iterations;
+      if (!y.allFinite()) return false;
+      if (is_small(correction, t, h, y)) return true;
+    }
+    return false;
+  }
+
+ private:
+  std::span<const Real> head(const Eigen::VectorXd& y) const {
+    return {y.data(), static_cast<std::size_t>(n_)};
+  }
+  std::span<const Real> tail(const Eigen::VectorXd& y) const {
+    return {y.data() + n_, static_cast<std::size_t>(size_ - n_)};
+  }
+
+  void evaluate(Real t, const Eigen::VectorXd& y) {
+    system_.velocity(t, head(y), tail(y), {slope_.data(), head(y).size()});
+    system_.force(t, head(y), tail(y), {slope_.data() + n_, tail(y).size()});
+    ++report_.evaluations;
+  }
+
+  /// Factors of 1 - h df/dy. The pattern is the same for all states, so it is analysed once.
+  bool factorize(Real t, Real h, const Eigen::VectorXd& y) {
+    entries_.clear();
+    system_.jacobian(t, head(y), tail(y), entries_);
+    for (auto& e : entries_) e = {e.row(), e.col(), -h * e.value()};
+    for (int i = 0; i < size_; ++i) entries_.emplace_back(i, i, 1);
+    matrix_.setFromTriplets(entries_.begin(), entries_.end());
+    if (!analyzed_) factors_.analyzePattern(matrix_);
+    analyzed_ = true;
+    factors_.factorize(matrix_);
+    return factors_.info() == Eigen::Success;
+  }
+
+  /// Whether a correction that led to `y` moved nothing any more, neither by the coordinates nor by the
+  /// rates.
+  bool is_small(const Eigen::VectorXd& correction, Real t, Real h, const Eigen::VectorXd& y) {
+    system_.velocity(t + h, head(y), tail(y), velocity_);
+    array(velocity_) = h * (array(velocity_) - slope_.head(n_).array());
+    const Real least = kConverged * std::max(kLeastScale, greatest(head(y)));
+    return greatest(head(correction)) <= least && greatest(velocity_) <= least;
+  }
+
+  const DynamicSystem& system_;
+  IntegratorReport& report_;
+  Eigen::Index n_, size_;
+  Eigen::SparseMatrix<Real> matrix_;
+  Eigen::SparseLU<Eigen::SparseMatrix<Real>> factors_;
+  bool analyzed_ = false;
+  SparseEntries entries_;
+  Eigen::VectorXd slope_;
+  std::vector<Real> velocity_;
+};
+
+}  // namespace
+
+void ImplicitEuler::step(const DynamicSystem& system, Real t, Real h, std::span<Real> x, std::span<Real> p,
+                         IntegratorWorkspace& work) const {
+  if (x.empty()) return;
+  const auto n = static_cast<Eigen::Index>(x.size());
+  ImplicitStep implicit(system, x.size(), p.size(), work.report);
+  Eigen::VectorXd start(x.size() + p.size());
+  start << array(x).matrix(), array(p).matrix();
+  Eigen::VectorXd end(start.size());
+
+  Real length = h;
+  for (Real at = 0; at < h;) {
+    end = start;
+    const bool good = implicit.solve(t + at, length, start, end);
+    if (!good && length > h * kShortest) {
+      length /= 2;  // halves of h end exactly at h
+      ++work.report.rejected;
+      continue;
+    }
+    ++work.report.steps;
+    work.report.missed += !good;
+    start = end;
+    at += length;
+  }
+  array(x) = start.head(n).array();
+  array(p) = start.tail(start.size() - n).array();
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,186 @@
+#include "sim/spring_network.h"
+
+#include <algorithm>
+
+namespace offstage::sim {
+
+SpringNetwork::SpringNetwork(const WorldState& world, NetworkMembers members, const BodyForces& forces)
+    : forces_(forces), bodies_(std::move(members.bodies)) {
+  for (ParticleSystem* system : members.systems) add_group(world, *system);
+  x_.resize(particle_x(particles_));
+  p_.resize(particle_p(particles_));
+  add_springs(world, members.springs);
+}
+
+void SpringNetwork::add_group(const WorldState& world, ParticleSystem& system) {
+  Group group{&system, world.forces(system), {}, particles_};
+  for (std::size_t i = 0; i < system.arrays.size(); ++i)
+    if (system.whole_step(i)) group.members.push_back(i);
+  particles_ += group.members.size();
+  groups_.push_back(std::move(group));
+}
+
+bool SpringNetwork::holds(const ParticleSystem& system) const {
+  return std::any_of(groups_.begin(), groups_.end(), [&](const Group& g) { return g.system == &system; });
+}
+
+void SpringNetwork::begin_substep() const {
+  for (const Group& g : groups_) g.system->begin_coupled();
+}
+
+void SpringNetwork::add_springs(const WorldState& world, std::span<const Spring* const> springs) {
+  // A spring at a newborn waits until that has lived up to the end of the sub-step.
+  const auto ready = [&](const Attachment& a) {
+    const auto* p = std::get_if<ParticlePoint>(&a);
+    if (!p) return true;
+    const ParticleSystem& system = world.systems[p->system];
+    const auto i = system.find(p->id);
+    return i && system.whole_step(*i);
+  };
+  BodyIndex index;
+  for (std::size_t i = 0; i < bodies_.size(); ++i) index[bodies_[i]] = i;
+  for (const Spring* spring : springs)
+    if (const SpringDef& def = spring->def; ready(def.a) && ready(def.b))
+      springs_.push_back({resolve(world, def.a, index), resolve(world, def.b, index), def.stiffness,
+                          def.damping, spring->rest_length});
+}
+
+SpringNetwork::End SpringNetwork::resolve(const WorldState& world, const Attachment& a,
+                                          const BodyIndex& index) const {
+  if (const auto* w = std::get_if<WorldPoint>(&a)) return {.point = w->position};
+  if (const auto* b = std::get_if<BodyPoint>(&a)) {
+    const Body* body = world.bodies[b->body].get();
+    if (body->is_dynamic()) {
+      assert(index.contains(body) && "what a spring joins must be in one network");
+      return {End::Kind::dynamic, b->position - body->rigid.centre, body, index.at(body)};
+    }
+    if (body->can_move()) return {End::Kind::kinematic, b->position, body};
+    return {.point = body->pose.point_to_world(b->position)};
+  }
+  const auto& p = std::get<ParticlePoint>(a);
+  const ParticleSystem& system = world.systems[p.system];
+  const std::size_t i = *system.find(p.id);
+  const Group& group =
+      *std::find_if(groups_.begin(), groups_.end(), [&](const Group& g) { return g.system == &system; });
+  const auto member = std::lower_bound(group.members.begin(), group.members.end(), i) - group.members.begin();
+  return {End::Kind::particle, Vec3::Zero(), nullptr, group.offset + static_cast<std::size_t>(member),
+          system.arrays.mass[i]};
+}
+
+SpringNetwork::PointMotion SpringNetwork::motion(const End& end, Real t, std::span<const Real> x,
+                                                 std::span<const Real> p) const {
+  switch (end.kind) {
+    case End::Kind::still:
+      break;
+    case End::Kind::kinematic: {
+      const Motion m = end.body->def.track.at(t, end.body->def.pose);
+      const Vec3 arm = m.pose.vector_to_world(end.point);
+      return {m.pose.position + arm, m.velocity + m.angular_velocity.cross(arm)};
+    }
+    case End::Kind::dynamic: {
+      const RigidMotion m = stage(end.index, x, p).motion;
+      const Vec3 arm = m.orientation * end.point;
+      return {m.position + arm, m.velocity + m.angular_velocity.cross(arm)};
+    }
+    case End::Kind::particle:
+      return {vec3(x, particle_x(end.index)), vec3(p, particle_p(end.index))};
+  }
+  return {end.point, Vec3::Zero()};
+}
+
+SpringNetwork::Pull SpringNetwork::pull(const ActiveSpring& s, Real t, std::span<const Real> x,
+                                        std::span<const Real> p) const {
+  const PointMotion a = motion(s.a, t, x, p), b = motion(s.b, t, x, p);
+  const Vec3 d = a.position - b.position;
+  const Real length = d.norm();
+  if (length == 0) return {};
+  const Vec3 along = d / length, velocity = a.velocity - b.velocity;
+  return {along, length, s.stiffness * (length - s.rest_length) + s.damping * velocity.dot(along), velocity};
+}
+
+void SpringNetwork::apply(const End& end, const Vec3& force, std::span<const Real> x,
+                          std::span<Real> dp) const {
+  if (end.kind == End::Kind::dynamic) {
+    const std::size_t at = kBodyP * end.index;
+    const Eigen::Map<const Eigen::Vector4d> turn(&x[kBodyX * end.index + 3]);
+    vec3(dp, at) += force;
+    vec3(dp, at + 3) += (Quat(turn).normalized() * end.point).cross(force);
+  } else if (end.kind == End::Kind::particle) {
+    vec3(dp, particle_p(end.index)) += force / end.mass;
+  }
+}
+
+void SpringNetwork::velocity(Real, std::span<const Real> x, std::span<const Real> p,
+                             std::span<Real> dx) const {
+  for (std::size_t i = 0; i < bodies_.size(); ++i) stage(i, x, p).velocity(dx.subspan(kBodyX * i, kBodyX));
+  const auto particles = p.subspan(particle_p(0));
+  std::copy(particles.begin(), particles.end(), dx.begin() + static_cast<std::ptrdiff_t>(particle_x(0)));
+}
+
+void SpringNetwork::force(Real t, std::span<const Real> x, std::span<const Real> p,
+                          std::span<Real> dp) const {
+  for (std::size_t i = 0; i < bodies_.size(); ++i)
+    stage(i, x, p).force(forces_, t, dp.subspan(kBodyP * i, kBodyP));
+  for (const Group& g : groups_)
+    for (std::size_t k = 0; k < g.members.size(); ++k) {
+      const std::size_t at = particle_p(g.offset + k);
+      vec3(dp, at) = g.forces.acceleration(vec3(p, at), g.system->arrays.mass[g.members[k]]);
+    }
+  for (const ActiveSpring& s : springs_) {
+    const Pull f = pull(s, t, x, p);
+    apply(s.a, -f.size * f.along, x, dp);
+    apply(s.b, f.size * f.along, x, dp);
+  }
+}
+
+void SpringNetwork::load(std::span<Real> x, std::span<Real> p) const {
+  for (std::size_t i = 0; i < bodies_.size(); ++i)
+    sim::load(bodies_[i]->rigid, x.subspan(kBodyX * i, kBodyX), p.subspan(kBodyP * i, kBodyP));
+  for (const Group& g : groups_)
+    for (std::size_t k = 0; k < g.members.size(); ++k) {
+      vec3(x, particle_x(g.offset + k)) = g.system->arrays.position[g.members[k]];
+      vec3(p, particle_p(g.offset + k)) = g.system->arrays.velocity[g.members[k]];
+    }
+}
+
+void SpringNetwork::store(std::span<const Real> x, std::span<const Real> p) {
+  for (std::size_t i = 0; i < bodies_.size(); ++i)
+    sim::store(x.subspan(kBodyX * i, kBodyX), p.subspan(kBodyP * i, kBodyP), bodies_[i]->rigid);
+  for (const Group& g : groups_)
+    for (std::size_t k = 0; k < g.members.size(); ++k) {
+      g.system->arrays.position[g.members[k]] = vec3(x, particle_x(g.offset + k));
+      g.system->arrays.velocity[g.members[k]] = vec3(p, particle_p(g.offset + k));
+    }
+}
+
+void SpringNetwork::step(const Integrator& integrator, Real t, Real h, IntegratorWorkspace& work) {
+  load(x_, p_);
+  // The most careful member leads; without bodies there is none to remember.
+  work.next_step = 0;
+  for (const Body* body : bodies_)
+    if (const Real next = body->rigid.next_step; next > 0)
+      work.next_step = work.next_step > 0 ? std::min(work.next_step, next) : next;
+  integrator.step(*this, t, h, x_, p_, work);
+  for (Body* body : bodies_) body->rigid.next_step = work.next_step;
+  store(x_, p_);
+}
+
+void SpringNetwork::save() {
+  saved_x_.resize(x_.size());
+  saved_p_.resize(p_.size());
+  load(saved_x_, saved_p_);
+  saved_steps_.clear();
+  for (const Body* body : bodies_) saved_steps_.push_back(body->rigid.next_step);
+}
+
+void SpringNetwork::restore() {
+  store(saved_x_, saved_p_);
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    RigidBody& body = bodies_[i]->rigid;
+    body.next_step = saved_steps_[i];
+    // To the bit: normalising again might change the last one.
+    body.orientation.coeffs() = Eigen::Map<const Eigen::Vector4d>(&saved_x_[kBodyX * i + 3]);
+  }
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,234 @@
+/// Contacts of a sub-step: which bodies are near, where they touch, and the forces that keep them apart
+/// (physics E6, R7-R10).
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include "sim/coupled_system.h"
+#include "sim/spring_graph.h"
+#include "sim/world_impl.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Points are looked for this far beyond what the bodies' motion in the interval asks for: so far, and no further
+/// than this share of the smaller body [m].
+constexpr Real kMargin = 2e-3, kMarginShare = 0.05;
+/// Motion beyond this share of the smaller body within an interval: the points of its start do not tell any more
+/// what will meet.
+constexpr Real kFar = 0.25;
+/// How far bodies may shift against each other before their points are found anew [m].
+constexpr Real kReuse = 1e-5, kExactReuse = 1e-8;
+
+Real smaller_extent(const Body& a, const Body& b) {
+  return std::min(a.extent, b.extent);
+}
+
+/// Box around all places of a body in its interval.
+Aabb swept_bounds(const Body& body) {
+  Aabb box = bounds(body.solid, body.start_pose).merged(bounds(body.solid, body.pose));
+  Real margin = std::min(kMargin, kMarginShare * body.extent);
+  // A point leaves the chord of its path by no more than an eighth of its greatest acceleration.
+  const PosePath path = body.path();
+  if (path.turn() > 1e-3) margin += path.max_acceleration(body.extent) / 8;
+  box.min().array() -= margin;
+  box.max().array() += margin;
+  return box;
+}
+
+}  // namespace
+
+PairSurface World::Impl::surface_of(const Body& a, const Body& b) const {
+  const auto static_friction = [](const BodyDef& d) { return d.static_friction < 0 ? d.friction : d.static_friction; };
+  PairSurface s;
+  s.restitution = std::max(a.def.restitution, b.def.restitution);
+  s.friction = std::sqrt(a.def.friction * b.def.friction);
+  s.static_friction = std::sqrt(static_friction(a.def) * static_friction(b.def));
+  const auto rule = rules.find(std::minmax(a.surface, b.surface));
+  if (rule != rules.end()) {
+    s.restitution = rule->second.restitution.value_or(s.restitution);
+    s.friction = rule->second.friction.value_or(s.friction);
+    s.static_friction = rule->second.static_friction.value_or(rule->second.friction.value_or(s.static_friction));
+  }
+  for (const Body* body : {&a, &b}) {
+    const BodyDef& d = body->def;
+    if (d.cross_friction < 0 || d.friction_axis == Vec3::Zero() || s.grain) continue;
+    s.grain = body;
+    s.cross = d.friction > 0 ? std::sqrt(d.cross_friction / d.friction) : 1;
+  }
+  return s;
+}
+
+/// Gives a body's way to the broad phase; returns whether it is not within the one given before. That one
+/// stays part of it in the same sub-step.
+bool World::Impl::move_in_broad_phase(Body& body, bool again) {
+  if (!body.def.collides) return false;
+  Aabb box = swept_bounds(body);
+  if (again) {
+    if (body.swept.contains(box)) return false;
+    box.extend(body.swept);
+  }
+  body.swept = box;
+  broad_phase.move(body.handle.index, box);
+  return true;
+}
+
+/// The pairs of bodies whose ways come near each other.
+void World::Impl::collect_pairs() {
+  graph.update(
+      broad_phase.pairs(), [&](uint32_t slot) { return bodies[bodies.at_slot(slot)].get(); },
+      [&](const Body& a, const Body& b) { return surface_of(a, b); });
+  active_pairs.clear();
+  graph.for_each([&](ContactPair& pair) {
+    if (pair.a().can_move() || pair.b().can_move()) active_pairs.push_back(&pair);
+  });
+}
+
+void World::Impl::update_pairs(Real h) {
+  for (Body* body : awake) move_in_broad_phase(*body, false);
+  for (Body* body : kinematic) move_in_broad_phase(*body, false);
+  collect_pairs();
+  const auto find = [&](std::size_t i) {
+    active_pairs[i]->impacts = 0;
+    active_pairs[i]->gave_up = false;
+    find_points(*active_pairs[i], 0, h);
+  };
+  constexpr std::size_t kParallel = 64, kBlock = 16;
+  if (active_pairs.size() < kParallel) {
+    for (std::size_t i = 0; i < active_pairs.size(); ++i) find(i);
+  } else {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, active_pairs.size(), kBlock), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i < range.end(); ++i) find(i);
+    });
+  }
+}
+
+/// Where a pair's bodies touch at their interval's start, or may touch in what is left of the sub-step.
+void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
+  const Real left = h - time;
+  const Real size = smaller_extent(pair.a(), pair.b());
+  const Real base = std::min(kMargin, kMarginShare * size);
+  const Real motion = (pair.speed_bound() + 2 * def.gravity.norm() * left) * left;
+  const Real far = std::max(base, kFar * size);
+  const bool exact = def.solver == SolverKind::exact;
+  const Real margin = base + std::min(motion, far);
+  pair.find(pair.a().placed_at(time, h), pair.b().placed_at(time, h), margin, exact ? kExactReuse : kReuse);
+
+  pair.by_event = false;
+  if (pair.gave_up) return;
+  if (motion > far) {
+    pair.by_event = true;
+    return;
+  }
+  if (!exact && pair.surface().restitution == 0) return;
+  for (const PlacedManifold& m : pair.manifolds())
+    for (uint32_t k = 0; k < m.manifold.count; ++k) {
+      const ContactPoint& point = m.manifold.points[k];
+      const Real speed = pair.relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n);
+      if (speed < -def.collision_speed && point.separation + 2 * (speed - def.gravity.norm() * left) * left < 0)
+        pair.by_event = true;
+    }
+}
+
+/// Wakes what something that moves has come near, moves it through the sub-step, and returns it.
+std::vector<Body*> World::Impl::wake_touched(Real start, Real h) {
+  std::vector<Body*> touched;
+  for (ContactPair* pair : active_pairs)
+    for (Body* body : {&pair->a(), &pair->b()})
+      if (body->asleep && (!pair->manifolds().empty() || pair->by_event)) touched.push_back(body);
+  if (touched.empty()) return {};
+  const std::size_t before = stepped.size();
+  for (Body* body : touched) wake(*body);
+  std::vector<Body*> woken(stepped.begin() + static_cast<std::ptrdiff_t>(before), stepped.end());
+  std::sort(woken.begin(), woken.end(),
+            [](const Body* a, const Body* b) { return a->handle.index < b->handle.index; });
+  for (Body* body : woken) body->begin_interval(0);
+  move_some(woken, start, 0, h);
+  for (Body* body : woken) move_in_broad_phase(*body, false);
+  update_lists();
+  return woken;
+}
+
+void World::Impl::find_moving_islands() {
+  std::vector<std::pair<Body*, Body*>> joined;
+  if (!springs.empty()) {
+    const SpringGraph connections(*this);
+    std::vector<Body*> first(connections.size(), nullptr);
+    for (Body* body : awake) {
+      const std::size_t c = connections.component(*body);
+      if (c == SpringGraph::kNone) continue;
+      if (first[c]) joined.emplace_back(first[c], body);
+      first[c] = body;
+    }
+  }
+  std::vector<Island> found = find_islands(awake, active_pairs, joined);
+  islands.clear();
+  for (Island& island : found) islands.push_back({std::move(island), motions.front().get(), 0});
+}
+
+void World::Impl::solve_islands(Real h, StepReport& report) {
+  std::vector<Island*> all;
+  for (MovingIsland& island : islands)
+    if (!island.pairs.empty()) all.push_back(&island);
+  solve(all, h, report);
+}
+
+/// Contact forces of islands over an interval: each by the solver that suits it.
+void World::Impl::solve(std::span<Island* const> group, Real duration, StepReport& report) {
+  const ContactInterval interval{duration, kTouching};
+  std::vector<const Island*> fast;
+  std::vector<std::pair<Island*, SolverChoice*>> exact;
+  for (Island* island : group) {
+    SolverChoice& choice = choices[island->bodies.front()->handle.index];
+    choice.used = substeps;
+    if (def.solver == SolverKind::fast || (def.solver == SolverKind::automatic && !choice.is_exact_worth(*island))) {
+      fast.push_back(island);
+      continue;
+    }
+    if (!choice.exact) choice.exact = std::make_unique<ExactContacts>();
+    exact.emplace_back(island, &choice);
+  }
+  std::vector<ContactWork> work(exact.size());
+  std::vector<uint8_t> solved(exact.size(), 0);
+  const auto run = [&](std::size_t i) {
+    const auto& [island, choice] = exact[i];
+    const Real budget = def.solver == SolverKind::exact ? std::numeric_limits<Real>::infinity()
+                                                        : choice->budget(*island, duration);
+    const auto result = choice->exact->solve(*island, interval, budget);
+    solved[i] = result.has_value();
+    if (result) work[i] = *result;
+  };
+  if (exact.size() < 2) {
+    for (std::size_t i = 0; i < exact.size(); ++i) run(i);
+  } else {
+    tbb::parallel_for(std::size_t{0}, exact.size(), run);
+  }
+  for (std::size_t i = 0; i < exact.size(); ++i) {
+    const auto& [island, choice] = exact[i];
+    report.exact.add(work[i]);
+    choice->learn(*island, duration, solved[i]);
+    if (!solved[i]) fast.push_back(island);
+  }
+  if (!fast.empty()) report.fast.add(fast_contacts.solve(fast, interval));
+  for (Island* island : group)
+    for (Body* body : island->bodies) body->pose = body->rigid.pose();
+}
+
+void World::Impl::count_contacts(StepReport& report) const {
+  report.islands = static_cast<uint32_t>(islands.size());
+  report.bodies_awake = static_cast<uint32_t>(awake.size());
+  report.bodies_asleep = static_cast<uint32_t>(asleep);
+  report.contacts = 0;
+  for (const ContactPair* pair : active_pairs)
+    for (const PlacedManifold& m : pair->manifolds())
+      for (uint32_t k = 0; k < m.manifold.count; ++k) {
+        const Real separation = m.manifold.points[k].separation;
+        report.contacts += separation <= kTouching;
+        report.penetration = std::max(report.penetration, -separation);
+      }
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,198 @@
+/// Impacts within a sub-step (physics E6, E7, R12): bodies are put back to the time of impact, with all that is
+/// connected to them, collide there, and go on for the rest. Others are not touched. The work is bounded: a pair that
+/// collides too often in a sub-step, or any when there are too many impacts, is left to the contact solver, which
+/// lets nothing through either.
+
+#include <algorithm>
+#include <cmath>
+
+#include "sim/coupled_system.h"
+#include "sim/world_impl.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr uint32_t kMaxImpactsOfPair = 6;
+constexpr std::size_t kMaxImpacts = 64, kImpactsPerBody = 4;
+/// Points this near to each other when two bodies collide take part [m].
+constexpr Real kCluster = 1e-4;
+/// Shorter intervals are none [of the sub-step].
+constexpr Real kInstant = 1e-9;
+
+}  // namespace
+
+/// When a pair's bodies, which do not touch yet, will on their ways as they are now; or do already, approaching.
+std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) const {
+  if (!pair.by_event || pair.gave_up) return std::nullopt;
+  const Body &a = pair.a(), &b = pair.b();
+  const Real from = std::max(a.is_awake() ? a.from : 0, b.is_awake() ? b.from : 0);
+  if (from >= h * (1 - kInstant)) return std::nullopt;
+  if (pair.separation() <= kTouching) return point_impact_time(pair, h);
+  const auto path = [&](const Body& body) {
+    if (!body.can_move()) return PosePath(body.start_pose);
+    return PosePath(body.placed_at(from, h), body.pose);
+  };
+  const PosePath path_a = path(a), path_b = path(b);
+  const auto impact = time_of_impact(MovingShape{pair.a().collision_shape(), path_a},
+                                     MovingShape{pair.b().collision_shape(), path_b}, kTouching / 2);
+  if (!impact) return std::nullopt;
+  return from + impact->share * (h - from);
+}
+
+/// The same of bodies that touch somewhere: by those of the points known that do not.
+std::optional<Real> World::Impl::point_impact_time(const ContactPair& pair, Real h) const {
+  const Body &a = pair.a(), &b = pair.b();
+  const Real from = std::max(a.is_awake() ? a.from : 0, b.is_awake() ? b.from : 0);
+  std::optional<Real> first;
+  for (const PlacedManifold& m : pair.manifolds())
+    for (uint32_t k = 0; k < m.manifold.count; ++k) {
+      const ContactPoint& point = m.manifold.points[k];
+      const Real speed = pair.relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n);
+      if (speed >= -def.collision_speed) continue;
+      if (point.separation <= kTouching) return from;
+      // Both points go with their bodies, the normal with the one whose it is.
+      const bool with_b = m.manifold.source == NormalSource::face_of_b;
+      const Pose pose_a = a.placed_at(from, h), pose_b = b.placed_at(from, h);
+      const Vec3 on_a = pose_a.point_to_body(point.on_a), on_b = pose_b.point_to_body(point.on_b);
+      const Vec3 n = with_b ? pose_b.vector_to_body(m.frame.n) : pose_a.vector_to_body(m.frame.n);
+      const auto gap = [&](Real time) {
+        const Pose p = a.placed_at(time, h), q = b.placed_at(time, h);
+        const Vec3 normal = with_b ? q.vector_to_world(n) : p.vector_to_world(n);
+        return normal.dot(p.point_to_world(on_a) - q.point_to_world(on_b));
+      };
+      Real early = from, late = first.value_or(h);
+      if (gap(late) > kTouching / 2) continue;
+      for (int i = 0; i < 40 && late - early > kInstant * h; ++i) {
+        const Real middle = (early + late) / 2;
+        (gap(middle) > kTouching / 2 ? early : late) = middle;
+      }
+      first = late;
+    }
+  return first;
+}
+
+void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
+  std::vector<Impact> impacts;
+  const auto look = [&](ContactPair& pair) {
+    if (const auto time = impact_time(pair, h)) impacts.push_back({*time, &pair});
+  };
+  for (ContactPair* pair : active_pairs) look(*pair);
+
+  const std::size_t most = kMaxImpacts + kImpactsPerBody * awake.size();
+  for (std::size_t count = 0; !impacts.empty(); ++count) {
+    const auto first = std::min_element(impacts.begin(), impacts.end(),
+                                        [](const Impact& x, const Impact& y) { return x.time < y.time; });
+    const Impact impact = *first;
+    ContactPair& pair = *impact.pair;
+    if (++pair.impacts > kMaxImpactsOfPair || count >= most) {
+      pair.gave_up = true;
+      ++report.cut_short;
+    }
+    const uint32_t island = pair.a().is_awake() ? pair.a().island : pair.b().island;
+    if (pair.a().is_awake() && pair.b().is_awake()) {
+      bring_to(islands[pair.a().island], start, impact.time, report);
+      bring_to(islands[pair.b().island], start, impact.time, report);
+      join(island, pair.b().island);
+    } else {
+      bring_to(islands[island], start, impact.time, report);
+    }
+    ++report.tracebacks;
+    collide(island, start, impact.time, h, report);
+    // What was foreseen of these bodies is not what will be.
+    const auto involved = [&](const ContactPair& p) {
+      return (p.a().is_awake() && p.a().island == island) || (p.b().is_awake() && p.b().island == island);
+    };
+    std::erase_if(impacts, [&](const Impact& i) { return involved(*i.pair); });
+    for (ContactPair* p : active_pairs)
+      if (involved(*p)) look(*p);
+  }
+}
+
+/// Takes an island from wherever it has been moved back to a time, under the contact forces until then.
+void World::Impl::bring_to(MovingIsland& island, Real start, Real time, StepReport& report) {
+  if (island.from >= time) return;
+  island.motion->restore(island.bodies);
+  move_some(island.bodies, start, island.from, time - island.from);
+  Island* const one[] = {&island};
+  if (!island.pairs.empty()) solve(one, time - island.from, report);
+  for (Body* body : island.bodies) {
+    body->pose = body->rigid.pose();
+    body->begin_interval(time);
+  }
+  island.from = time;
+}
+
+/// Makes two islands, which must be at the same time, one.
+void World::Impl::join(uint32_t into, uint32_t other) {
+  if (into == other) return;
+  MovingIsland &x = islands[into], &y = islands[other];
+  for (Body* body : y.bodies) body->island = into;
+  x.bodies.insert(x.bodies.end(), y.bodies.begin(), y.bodies.end());
+  x.pairs.insert(x.pairs.end(), y.pairs.begin(), y.pairs.end());
+  std::sort(x.bodies.begin(), x.bodies.end(),
+            [](const Body* a, const Body* b) { return a->handle.index < b->handle.index; });
+  y.bodies.clear();
+  y.pairs.clear();
+}
+
+/// Collides an island's bodies with each other and with what they touch at a time, and moves them on from there.
+void World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepReport& report) {
+  // Whatever they touch now comes along, with what that touches in turn.
+  for (bool grown = true; grown;) {
+    grown = false;
+    MovingIsland& island = islands[number];
+    island.pairs.clear();
+    for (ContactPair* pair : active_pairs) {
+      const bool has_a = pair->a().is_awake() && pair->a().island == number,
+                 has_b = pair->b().is_awake() && pair->b().island == number;
+      if (!has_a && !has_b) continue;
+      find_points(*pair, time, h);
+      Body* other = has_a ? &pair->b() : &pair->a();
+      if (has_a != has_b && other->is_awake()) {
+        if (pair->separation() > kTouching) continue;
+        const uint32_t joined = other->island;
+        bring_to(islands[joined], start, time, report);
+        join(number, joined);
+        grown = true;
+        break;
+      }
+      if (!pair->manifolds().empty()) island.pairs.push_back(pair);
+    }
+  }
+  MovingIsland& island = islands[number];
+  report.collisions += resolve_collisions(island, kCluster, def.collision_speed, def.impact, report.impacts);
+  for (Body* body : island.bodies) body->rigid = body->start;
+  if (time >= h * (1 - kInstant)) return;
+  // Velocities are others now: what may meet, and what limits whom, too.
+  for (ContactPair* pair : island.pairs) find_points(*pair, time, h);
+  island.motion = &move_some(island.bodies, start, time, h - time);
+  Island* const one[] = {&island};
+  if (!island.pairs.empty()) solve(one, h - time, report);
+  find_pairs_again(number, start, h, report);
+}
+
+/// Bodies that leave the boxes that the broad phase was given have new neighbours, which may have to be woken.
+void World::Impl::find_pairs_again(uint32_t number, Real start, Real h, StepReport& report) {
+  bool left = false;
+  for (Body* body : islands[number].bodies) left |= move_in_broad_phase(*body, true);
+  if (!left) return;
+  collect_pairs();
+  for (ContactPair* pair : active_pairs)
+    if (pair->is_new()) find_points(*pair, std::max(pair->a().from, pair->b().from), h);
+  const std::vector<Body*> woken = wake_touched(start, h);
+  if (woken.empty()) return;
+  const auto added = static_cast<uint32_t>(islands.size());
+  islands.push_back({{woken, {}}, motions.back().get(), 0});
+  for (Body* body : woken) body->island = added;
+  collect_pairs();
+  for (ContactPair* pair : active_pairs) {
+    if (pair->is_new()) find_points(*pair, std::max(pair->a().from, pair->b().from), h);
+    const auto outside = [&](const Body& body) { return body.is_awake() && body.island != added; };
+    if (outside(pair->a()) || outside(pair->b()) || pair->manifolds().empty()) continue;
+    if (pair->a().is_awake() || pair->b().is_awake()) islands[added].pairs.push_back(pair);
+  }
+  Island* const one[] = {&islands[added]};
+  if (!islands[added].pairs.empty()) solve(one, h, report);
+}
+
+}  // namespace offstage::sim

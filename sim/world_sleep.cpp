@@ -1,0 +1,78 @@
+/// Rest: groups of bodies that have hardly moved for a while are left alone until something happens to them.
+
+#include <algorithm>
+
+#include "sim/world_impl.h"
+
+namespace offstage::sim {
+namespace {
+
+/// A body is quiet while none of its points moves faster than this [m/s], and goes to sleep after being quiet so
+/// long [s], with all of its island.
+constexpr Real kQuietSpeed = 0.01, kQuietTime = 0.5;
+
+Real fastest_point(const Body& body) {
+  return body.rigid.velocity().norm() + body.rigid.angular_velocity().norm() * body.extent;
+}
+
+}  // namespace
+
+void World::Impl::update_lists() {
+  if (!std::exchange(lists_changed, false)) return;
+  awake.clear();
+  kinematic.clear();
+  asleep = 0;
+  bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& body) {
+    if (body->is_awake()) awake.push_back(body.get());
+    if (body->is_dynamic() && body->asleep) ++asleep;
+    if (body->is_kinematic() && body->def.track.moves()) kinematic.push_back(body.get());
+  });
+}
+
+/// Wakes a body and its sleeping group.
+void World::Impl::wake(Body& body) {
+  body.quiet_time = 0;
+  if (!body.asleep) return;
+  const auto group = sleeping.find(body.island);
+  for (Body* member : group->second) {
+    member->asleep = false;
+    member->quiet_time = 0;
+    member->before_step = member->before_substep = member->pose;
+    stepped.push_back(member);
+  }
+  sleeping.erase(group);
+  lists_changed = fixed_changed = true;
+}
+
+void World::Impl::wake_all() {
+  while (!sleeping.empty()) wake(*sleeping.begin()->second.front());
+}
+
+void World::Impl::put_to_sleep(Real h) {
+  if (!def.sleep) return;
+  for (Body* body : awake) body->quiet_time = fastest_point(*body) < kQuietSpeed ? body->quiet_time + h : 0;
+  for (const MovingIsland& island : islands) {
+    if (island.bodies.empty()) continue;
+    const bool quiet = std::all_of(island.bodies.begin(), island.bodies.end(), [](const Body* body) {
+      return body->quiet_time >= kQuietTime && body->is_dynamic();
+    });
+    // Something pushes, or nothing holds: what hangs at the top of its flight is quiet for a moment only.
+    if (!quiet) continue;
+    const bool pushed = std::any_of(island.pairs.begin(), island.pairs.end(), [](const ContactPair* pair) {
+      const Body& other = pair->a().is_awake() ? pair->b() : pair->a();
+      return (other.is_kinematic() && other.def.track.moves()) ||
+             pair->a().def.surface_velocity != Vec3::Zero() || pair->b().def.surface_velocity != Vec3::Zero();
+    });
+    if (pushed) continue;
+    for (Body* body : island.bodies) {
+      body->asleep = true;
+      body->island = sleeping_groups;
+      body->rigid.momentum.setZero();
+      body->rigid.angular_momentum.setZero();
+    }
+    sleeping.emplace(sleeping_groups++, island.bodies);
+    lists_changed = fixed_changed = true;
+  }
+}
+
+}  // namespace offstage::sim

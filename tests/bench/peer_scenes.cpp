@@ -1,0 +1,107 @@
+/// The scenes of the peer benchmarks in this engine: the measurements, and the scenes themselves, are those of
+/// peer_common.hpp, the same code for every engine. Usage: peer_scenes SCENE N STEPS DT [VARIANT], with the variants
+/// exact, fast, auto (the default), each with +sleep, and +2 for two threads.
+
+#include <oneapi/tbb/global_control.h>
+
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "peer_common.hpp"
+#include "sim/world.h"
+
+namespace {
+
+using namespace offstage::sim;
+
+Vec3 vec(const peer::Vec3& v) {
+  return {v.x, v.y, v.z};
+}
+peer::Vec3 vec(const Vec3& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+TriangleMesh hull_mesh() {
+  TriangleMesh mesh;
+  for (const peer::Vec3& v : peer::hull_vertices()) mesh.vertices.push_back(vec(v));
+  for (const auto& f : peer::hull_faces())
+    mesh.triangles.push_back({static_cast<uint32_t>(f[0]), static_cast<uint32_t>(f[1]), static_cast<uint32_t>(f[2])});
+  return mesh;
+}
+
+WorldDef world_def(const peer::Scene& scene, double dt, const std::string& variant) {
+  WorldDef def{.gravity = vec(scene.gravity), .max_step = dt, .sleep = false};
+  if (variant.find("exact") != std::string::npos) def.solver = SolverKind::exact;
+  if (variant.find("fast") != std::string::npos) def.solver = SolverKind::fast;
+  if (variant.find("+sleep") != std::string::npos) def.sleep = true;
+  return def;
+}
+
+class Engine {
+ public:
+  Engine(const peer::Scene& scene, double dt, const std::string& variant)
+      : threads_(tbb::global_control::max_allowed_parallelism, variant.find("+2") != std::string::npos ? 2 : 1),
+        world_(world_def(scene, dt, variant)),
+        dt_(dt) {
+    if (!scene.joints.empty()) throw std::runtime_error("joints are not there yet");
+    MeshHandle hull;
+    for (const peer::Body& b : scene.bodies) {
+      BodyDef def{.motion = b.mass > 0 ? MotionType::dynamic : MotionType::fixed,
+                  .pose = {vec(b.pos), Quat(b.rot.w, b.rot.x, b.rot.y, b.rot.z)},
+                  .velocity = vec(b.vel),
+                  .mass = b.mass,
+                  .restitution = scene.restitution,
+                  .friction = scene.mu};
+      if (b.shape == peer::Shape::Box) {
+        def.shape = Box{2 * vec(b.half)};
+      } else if (b.shape == peer::Shape::Sphere) {
+        def.shape = Sphere{b.radius};
+      } else {
+        if (!hull) hull = world_.add_mesh(hull_mesh());
+        def.shape = MeshShape{hull};
+      }
+      handles_.push_back(world_.add_body(def));
+    }
+  }
+  ~Engine() {
+    if (!std::getenv("PEER_REPORT")) return;
+    const StepReport& r = report_;
+    std::fprintf(stderr,
+                 "exact: %lu solves %lu iterations %lu factorizations %lu fallbacks, residual %g; fast: %lu solves %lu fallbacks; "
+                 "impacts: %lu solves %lu fallbacks; collisions %lu tracebacks %lu cut short %lu; contacts %u islands %u\n",
+                 r.exact.solves, r.exact.iterations, r.exact.factorizations, r.exact.fallbacks, r.exact.residual,
+                 r.fast.solves, r.fast.fallbacks, r.impacts.solves, r.impacts.fallbacks, r.collisions, r.tracebacks,
+                 r.cut_short, r.contacts, r.islands);
+  }
+  void step() {
+    const StepReport r = world_.step(dt_);
+    report_.exact.add(r.exact);
+    report_.fast.add(r.fast);
+    report_.impacts.add(r.impacts);
+    report_.collisions += r.collisions;
+    report_.tracebacks += r.tracebacks;
+    report_.cut_short += r.cut_short;
+    report_.contacts = r.contacts;
+    report_.islands = r.islands;
+  }
+  void sync() {}
+  peer::State state(int i) const {
+    const BodyState s = world_.body(handles_[static_cast<std::size_t>(i)]);
+    const Quat& q = s.pose.orientation;
+    return {vec(s.centre), {q.w(), q.x(), q.y(), q.z()}, vec(s.velocity), vec(s.angular_velocity)};
+  }
+
+ private:
+  tbb::global_control threads_;
+  World world_;
+  double dt_;
+  std::vector<BodyHandle> handles_;
+  StepReport report_;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return peer::run<Engine>("offstage", peer::parse_args(argc, argv));
+}

@@ -1,0 +1,169 @@
+#include "sim/contact/collision.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <Eigen/LU>
+#include <gtest/gtest.h>
+
+#include "tests/sim/contact/contact_samples.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Two bodies of 2 and 3 kg whose centres are on the normal: K is diagonal.
+struct SpherePair {
+  static constexpr Real m12 = 2.0 * 3 / (2 + 3);
+  ContactSample sample;
+
+  explicit SpherePair(bool turn) {
+    sample.bodies = {sphere_body(2, 0.5), sphere_body(3, 0.25)};
+    if (!turn)
+      for (ContactBody& b : sample.bodies) b.inverse_inertia.setZero();
+    sample.contacts = {
+        contact_between(0, 1, Vec3(2, -1, 2) / 3, -0.5 * Vec3(2, -1, 2) / 3, 0.25 * Vec3(2, -1, 2) / 3, 0)};
+  }
+  Mat3 K() const { return mobility(sample.contacts[0], sample.bodies); }
+};
+
+// P5, and for solid spheres, which turn as well, the tangential mass 2/7 m12.
+TEST(Collision, ObliqueImpactSticksOrSlidesOnEitherSideOfTheCriticalFriction) {
+  const Vec3 u(-3, 1.2, -1.6);
+  constexpr Real e = 0.4, kAcross = 2.0;
+  for (const bool turn : {false, true}) {
+    const Real tangential = SpherePair::m12 * (turn ? 2.0 / 7 : 1), normal = (1 + e) * SpherePair::m12 * 3;
+    const Real critical = tangential * kAcross / normal;
+    const Mat3 K = SpherePair(turn).K();
+    for (const Real ratio : {0.0, 0.5, 0.999, 1.001, 3.0}) {
+      const Vec3 p = collision_impulse(K, u, e, ratio * critical, ratio * critical);
+      const Real across = std::min(ratio, 1.0) * tangential * kAcross;
+      EXPECT_LT((p - Vec3(normal, -across * 0.6, across * 0.8)).norm(), 1e-12) << ratio;
+    }
+  }
+}
+
+TEST(Collision, AxesWithTheirOwnCoefficientsStickOrSlideByThemselves) {
+  const Vec3 u(-3, 1.2, -1.6);
+  const Real normal = 1.5 * SpherePair::m12 * 3, t = SpherePair::m12 * 1.2, k = SpherePair::m12 * 1.6;
+  const Mat3 K = SpherePair(false).K();
+  for (const auto& [mu_t, mu_k] : {std::pair(0.1, 0.2), {0.1, 2.0}, {2.0, 0.1}, {2.0, 3.0}}) {
+    const Vec3 p = collision_impulse(K, u, 0.5, mu_t, mu_k);
+    const Vec3 expected(normal, -std::min(t, mu_t * normal), std::min(k, mu_k * normal));
+    EXPECT_LT((p - expected).norm(), 1e-12);
+  }
+}
+
+/// Coulomb's law after the impact, by the residual of the contact problem with the normal velocity as target.
+Real violation(ContactSample s, const Vec3& p) {
+  apply(s.contacts[0], p, s.bodies);
+  s.contacts[0].impulse = p;
+  s.contacts[0].target = s.contacts[0].relative_velocity(s.bodies).x();
+  return residual(s.bodies, s.contacts);
+}
+
+// Any bodies, so that all components of K are there: friction is right for the sliding that is left, the
+// restitution is right, or, where it would add energy, as large as it can be.
+TEST(Collision, OneContactObeysCoulombAndKeepsTheEnergy) {
+  for (const bool isotropic : {true, false}) {
+    Dice dice(isotropic ? 1 : 2);
+    int reduced = 0;
+    for (int k = 0; k < 5000; ++k) {
+      ContactSample s = random_contacts(dice, 2 + dice.index(2), 1, 2, isotropic);
+      Contact& c = s.contacts[0];
+      const Vec3 u = c.relative_velocity(s.bodies);
+      const Mat3 K = mobility(c, s.bodies);
+      const Real e = dice.uniform();
+      const Vec3 p = collision_impulse(K, u, e, c.friction_t, c.friction_k);
+      if (u.x() >= 0) {
+        ASSERT_EQ(p, Vec3::Zero());
+        continue;
+      }
+      ASSERT_GT(p.x(), 0);
+      ASSERT_LT(violation(s, p), 1e-11);
+      const Real energy = p.dot(u + K * p / 2), bounce = (u + K * p).x();
+      ASSERT_LT(energy, 2e-13 * p.norm() * u.norm());
+      if (std::abs(bounce + e * u.x()) < 1e-12) continue;
+      ++reduced;
+      ASSERT_GE(bounce, -1e-12);
+      ASSERT_LT(bounce, -e * u.x());
+      ASSERT_GT(energy, -1e-12 * (1 + p.norm() * u.norm()));
+    }
+    EXPECT_GT(reduced, 20);
+  }
+}
+
+TEST(Collision, ClustersKeepMomentumAndNeverGainEnergy) {
+  Dice dice(3);
+  for (int k = 0; k < 400; ++k) {
+    const uint32_t bodies = 3 + dice.index(4), contacts = 1 + dice.index(8);
+    ContactSample s = random_contacts(dice, bodies, contacts, 1, dice.chance(0.7));
+    s.bodies.back() = sphere_body(1, 1);
+    std::vector<Real> e;
+    for (uint32_t i = 0; i < contacts; ++i) e.push_back(dice.chance(0.3) ? 1 : dice.uniform());
+    const ImpactLaw law = dice.chance(0.5) ? ImpactLaw::simultaneous : ImpactLaw::sequential;
+    const Vec3 momentum = s.momentum(), angular = s.angular_momentum();
+    const Real energy = s.kinetic_energy();
+    const ContactWork work = collide(s.bodies, s.contacts, e, law);
+    ASSERT_LT((s.momentum() - momentum).norm(), 1e-11);
+    ASSERT_LT((s.angular_momentum() - angular).norm(), 1e-11);
+    ASSERT_LT(s.kinetic_energy(), energy + 1e-10);
+    for (const Contact& c : s.contacts) {
+      ASSERT_GE(c.impulse.x(), 0);
+      ASSERT_GT(c.relative_velocity(s.bodies).x(), -1e-8) << work.fallbacks;
+    }
+  }
+}
+
+/// Five balls in a row along x, the first `moving` of them at 1 m/s.
+ContactSample cradle(int moving) {
+  ContactSample s;
+  for (int i = 0; i < 5; ++i) {
+    s.bodies.push_back(sphere_body(0.3, 0.05));
+    if (i < moving) s.bodies.back().velocity = Vec3::UnitX();
+    const auto k = static_cast<uint32_t>(i);
+    if (i > 0)
+      s.contacts.push_back(contact_between(k, k - 1, Vec3::UnitX(), {-0.05, 0, 0}, {0.05, 0, 0}, 0.2));
+  }
+  return s;
+}
+
+TEST(Collision, NewtonsCradlePassesAsManyBallsOnAsCameIn) {
+  const std::vector<Real> e(4, 1);
+  for (int moving = 1; moving < 5; ++moving) {
+    ContactSample s = cradle(moving);
+    collide(s.bodies, s.contacts, e, ImpactLaw::sequential);
+    for (int i = 0; i < 5; ++i)
+      EXPECT_NEAR(s.bodies[static_cast<std::size_t>(i)].velocity.x(), i < 5 - moving ? 0 : 1, 1e-9);
+  }
+}
+
+// All at once, contacts at rest only must not close: the row of four leaves with one speed.
+TEST(Collision, SimultaneousCradleMovesAsOne) {
+  ContactSample s = cradle(1);
+  const ContactWork work = collide(s.bodies, s.contacts, std::vector<Real>(4, 1), ImpactLaw::simultaneous);
+  EXPECT_EQ(work.fallbacks, 0u);
+  // v0 = v - 1, v0 + 4 v = 1
+  EXPECT_NEAR(s.bodies[0].velocity.x(), -0.6, 1e-12);
+  for (std::size_t i = 1; i < 5; ++i) EXPECT_NEAR(s.bodies[i].velocity.x(), 0.4, 1e-12);
+}
+
+// A box that falls flat bounces flat, though four contacts are one too many for its three motions.
+TEST(Collision, BoxFallsFlatAndBouncesFlat) {
+  ContactSample s = stacked_boxes(1, Vec3(0, -2, 0), 0.5);
+  const ContactWork work = collide(s.bodies, s.contacts, std::vector<Real>(4, 0.5), ImpactLaw::simultaneous);
+  EXPECT_EQ(work.fallbacks, 0u);
+  EXPECT_LT((s.bodies[0].velocity - Vec3(0, 1, 0)).norm(), 1e-12);
+  EXPECT_LT(s.bodies[0].angular_velocity.norm(), 1e-12);
+}
+
+TEST(Collision, SequenceWithoutAnEndIsCutOff) {
+  ContactSample s = stacked_boxes(5, Vec3(0.3, -2, 0.1), 0.5);
+  const ContactWork work = collide(s.bodies, s.contacts, std::vector<Real>(20, 0.9), ImpactLaw::sequential);
+  EXPECT_LE(work.iterations, 200u * 20 + 20'000);
+  for (const Contact& c : s.contacts) EXPECT_GT(c.relative_velocity(s.bodies).x(), -1e-8);
+  EXPECT_TRUE(s.bodies[4].velocity.allFinite());
+}
+
+}  // namespace
+}  // namespace offstage::sim

@@ -1,0 +1,72 @@
+#pragma once
+/// What tests of bodies in contact share: everything is asked of both solvers, and nothing sleeps unless it is the
+/// matter.
+
+#include <algorithm>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "sim/world.h"
+
+namespace offstage::sim {
+
+inline std::string solver_name(const testing::TestParamInfo<SolverKind>& info) {
+  return info.param == SolverKind::exact ? "exact" : "fast";
+}
+
+class BothSolvers : public testing::TestWithParam<SolverKind> {
+ protected:
+  static bool is_exact() { return GetParam() == SolverKind::exact; }
+  /// A world of the solver that is tested.
+  static WorldDef def(Real max_step = 1.0 / 240) {
+    return {.max_step = max_step, .solver = GetParam(), .sleep = false};
+  }
+  static WorldDef weightless(Real max_step = 1.0 / 240) {
+    return {.gravity = Vec3::Zero(), .max_step = max_step, .solver = GetParam(), .sleep = false};
+  }
+};
+
+/// Instances of a suite for both solvers; `kind` is Solvers, or Long for what takes minutes.
+#define OFFSTAGE_BOTH_SOLVERS(kind, suite) \
+  INSTANTIATE_TEST_SUITE_P(kind, suite, testing::Values(SolverKind::exact, SolverKind::fast), solver_name)
+
+/// What many steps reported: counts summed, the greatest of the rest.
+struct Run {
+  Real penetration = 0;
+  uint64_t collisions = 0, tracebacks = 0, cut_short = 0, exact_fallbacks = 0, fast_fallbacks = 0;
+  bool finite = true;
+  StepReport last;
+
+  void add(const StepReport& r) {
+    penetration = std::max(penetration, r.penetration);
+    collisions += r.collisions;
+    tracebacks += r.tracebacks;
+    cut_short += r.cut_short;
+    exact_fallbacks += r.exact.fallbacks + r.impact_fallbacks;
+    fast_fallbacks += r.fast.fallbacks;
+    finite &= r.finite;
+    last = r;
+  }
+};
+
+/// Steps the world for some seconds.
+inline Run run(World& world, Real seconds, Real sampling = 1.0 / 240) {
+  Run all;
+  const Real end = world.time() + seconds - sampling / 2;
+  while (world.time() < end) all.add(world.step(sampling));
+  return all;
+}
+
+/// A plane that goes down towards +x at an angle.
+inline Pose incline(Real angle) {
+  return {Vec3::Zero(), Quat(Eigen::AngleAxisd(-angle, Vec3::UnitZ()))};
+}
+
+/// The place at a height over such a plane, upright to it.
+inline Pose over_incline(Real angle, Real height, const Quat& turn = Quat::Identity()) {
+  const Pose plane = incline(angle);
+  return {plane.point_to_world({0, height, 0}), plane.orientation * turn};
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,276 @@
+/// Bodies that bounce: balls, oblique impacts, elastic pairs, Newton's cradle, paddles, and impacts without end, all
+/// through the whole loop.
+
+#include <cmath>
+#include <vector>
+
+#include "tests/convex_samples.h"
+#include "tests/validation/both_solvers.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr Real kGravity = 9.81;
+
+class BallDrop : public BothSolvers {
+ protected:
+  struct Drop {
+    std::vector<Real> apexes;
+    Real rest_height;
+    Run run;
+  };
+  static Drop drop(Real e, Real max_step, Real seconds) {
+    constexpr Real kRadius = 0.05;
+    World world(def(max_step));
+    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = e});
+    const auto ball =
+        world.add_body({.shape = Sphere{kRadius}, .pose = {Vec3(0, 1 + kRadius, 0)}, .restitution = e});
+    Drop d;
+    Real last_v = 0;
+    while (world.time() < seconds) {
+      d.run.add(world.step(max_step));
+      const BodyState s = world.body(ball);
+      const Real y = s.centre.y() - kRadius, v = s.velocity.y();
+      // Of the parabola, from any point of it.
+      if (last_v > 0 && v <= 0 && y > 1e-2) d.apexes.push_back(y + v * v / (2 * kGravity));
+      last_v = v;
+    }
+    d.rest_height = world.body(ball).centre.y() - kRadius;
+    return d;
+  }
+};
+
+TEST_P(BallDrop, ApexesFallWithTheSquareOfTheRestitution) {
+  for (const Real max_step : {1.0 / 240, 1.0 / 60})
+    for (const Real e : {1.0, 0.9, 0.5}) {
+      const Drop d = drop(e, max_step, 4);
+      const std::size_t count = e == 0.5 ? 3 : 4;
+      ASSERT_GE(d.apexes.size(), count) << e;
+      for (std::size_t k = 0; k < count; ++k)
+        EXPECT_NEAR(d.apexes[k], std::pow(e, 2.0 * (Real(k) + 1)), 1e-3) << "e " << e << " step " << max_step;
+    }
+}
+
+TEST_P(BallDrop, WithoutRestitutionItRestsAtOnceAndWithHalfInTheEnd) {
+  for (const Real max_step : {1.0 / 240, 1.0 / 60}) {
+    const Drop dead = drop(0, max_step, 1);
+    EXPECT_TRUE(dead.apexes.empty());
+    EXPECT_NEAR(dead.rest_height, 0, 1e-3) << max_step;
+    EXPECT_NEAR(drop(0.5, max_step, 4).rest_height, 0, 1e-3) << max_step;
+  }
+}
+
+// Impacts come ever faster: they end by the collision threshold, each step with a bounded number.
+TEST_P(BallDrop, ImpactsWithoutEndTerminate) {
+  const Drop d = drop(0.5, 1.0 / 30, 4);
+  EXPECT_TRUE(d.run.finite);
+  EXPECT_GE(d.run.tracebacks, 3u);
+  EXPECT_LT(d.run.tracebacks, 40u);
+  EXPECT_EQ(d.run.last.tracebacks, 0u);
+  EXPECT_NEAR(d.rest_height, 0, 1e-3);
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, BallDrop);
+
+class ObliqueBall : public BothSolvers {};
+
+// A solid sphere sticks, and rolls, if mu (1 + e) u_n >= 2/7 u_t, else slides (P5). The contact point lies half the
+// touching distance outside the ball, which is what keeps the rolling case from rounding.
+TEST_P(ObliqueBall, SticksOrSlidesOnEitherSideOfTheCriticalFriction) {
+  constexpr Real kRadius = 0.1, e = 0.5, kAcross = 2, kDown = 3;
+  const Real critical = 2.0 / 7 * kAcross / ((1 + e) * kDown);
+  for (const Real ratio : {0.0, 0.5, 0.999, 1.001, 2.0}) {
+    const Real mu = ratio * critical;
+    World world(weightless());
+    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0, .friction = mu});
+    const auto ball = world.add_body({.shape = Sphere{kRadius},
+                                      .pose = {Vec3(0, 0.2, 0)},
+                                      .velocity = {kAcross, -kDown, 0},
+                                      .restitution = e,
+                                      .friction = mu});
+    const Run r = run(world, 0.1);
+    EXPECT_EQ(r.collisions, 1u);
+    const Real lost = std::min(2.0 / 7 * kAcross, mu * (1 + e) * kDown);
+    const BodyState s = world.body(ball);
+    EXPECT_NEAR(s.velocity.y(), e * kDown, 1e-12);
+    EXPECT_NEAR(s.velocity.x(), kAcross - lost, ratio < 1 ? 1e-12 : 1e-4) << ratio;
+    EXPECT_NEAR(s.velocity.z(), 0, 1e-12);
+    EXPECT_NEAR(s.angular_velocity.z(), -2.5 * lost / kRadius, 2e-4 * lost / kRadius) << ratio;
+  }
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, ObliqueBall);
+
+class ElasticPair : public BothSolvers {
+ protected:
+  struct Sum {
+    Vec3 momentum = Vec3::Zero(), angular = Vec3::Zero();
+    Real energy;
+  };
+  static Sum sum(const World& world, std::initializer_list<BodyHandle> bodies) {
+    Sum t;
+    for (const BodyHandle b : bodies) {
+      const BodyState s = world.body(b);
+      t.momentum += s.mass * s.velocity;
+      t.angular += s.centre.cross(s.mass * s.velocity) + s.angular_momentum;
+    }
+    t.energy = world.energy().total();
+    return t;
+  }
+  static void expect_kept(const Sum& before, const Sum& after, Real energy_tolerance) {
+    EXPECT_LT((after.momentum - before.momentum).norm(), 1e-12 * before.energy);
+    EXPECT_LT((after.angular - before.angular).norm(), 1e-12 * before.energy);
+    EXPECT_NEAR(after.energy / before.energy, 1, energy_tolerance);
+  }
+};
+
+TEST_P(ElasticPair, BallsKeepMomentumAngularMomentumAndEnergy) {
+  Dice dice(11);
+  for (int k = 0; k < 60; ++k) {
+    World world(weightless());
+    const Real ra = dice.uniform(0.02, 0.3), rb = dice.uniform(0.02, 0.3);
+    const Vec3 way = dice.direction(), side = way.cross(dice.direction()).normalized();
+    // Head-on, or anything up to a glance.
+    const Vec3 at = 0.7 * way + dice.uniform(0, k % 2 == 0 ? 0 : 0.95 * (ra + rb)) * side;
+    const auto ball = [&](Real r, const Vec3& p, const Vec3& v) {
+      return world.add_body({.shape = Sphere{r},
+                             .pose = {p},
+                             .velocity = v,
+                             .angular_velocity = 3 * dice.in_cube(),
+                             .density = dice.uniform(100, 5000),
+                             .restitution = 1,
+                             .friction = 0});
+    };
+    const auto a = ball(ra, Vec3::Zero(), dice.uniform(1, 4) * way), b = ball(rb, at, -dice.uniform(0.5, 3) * way);
+    const Sum before = sum(world, {a, b});
+    EXPECT_EQ(run(world, 0.6).collisions, 1u);
+    expect_kept(before, sum(world, {a, b}), 1e-12);
+  }
+}
+
+// A box turns after the impact, so its energy is as good as the integration of its free rotation.
+TEST_P(ElasticPair, BoxesAndCapsulesKeepThemToo) {
+  Dice dice(12);
+  int hits = 0;
+  for (int k = 0; k < 30; ++k) {
+    World world(weightless());
+    const auto body = [&](const Vec3& p, const Vec3& v) {
+      const Shape shape = dice.chance(0.5) ? Shape(Box{Vec3::Constant(0.3) + 0.2 * dice.in_cube()})
+                                           : Shape(Capsule{dice.uniform(0.05, 0.15), dice.uniform(0.1, 0.3)});
+      return world.add_body(
+          {.shape = shape, .pose = {p, dice.rotation()}, .velocity = v, .restitution = 1, .friction = 0});
+    };
+    const Vec3 way = dice.direction();
+    const auto a = body(Vec3::Zero(), 2 * way), b = body(0.7 * way + 0.05 * dice.in_cube(), -1 * way);
+    const Sum before = sum(world, {a, b});
+    const Run r = run(world, 0.4);
+    hits += r.collisions > 0;
+    EXPECT_TRUE(r.finite);
+    expect_kept(before, sum(world, {a, b}), 1e-6);
+  }
+  EXPECT_EQ(hits, 30);
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, ElasticPair);
+
+class Cradle : public BothSolvers {
+ protected:
+  /// Five balls in a row, the first `moving` at 1 m/s from a distance; their speeds afterwards.
+  static std::vector<Real> speeds(std::size_t moving, ImpactLaw law) {
+    constexpr Real kRadius = 0.05;
+    WorldDef def_ = weightless();
+    def_.impact = law;
+    World world(def_);
+    std::vector<BodyHandle> balls;
+    for (std::size_t i = 0; i < 5; ++i)
+      balls.push_back(world.add_body({.shape = Sphere{kRadius},
+                                      .pose = {Vec3(2 * kRadius * Real(i) - (i < moving ? 0.203 : 0), 0, 0)},
+                                      .velocity = {i < moving ? 1.0 : 0.0, 0, 0},
+                                      .restitution = 1,
+                                      .friction = 0}));
+    run(world, 0.5);
+    std::vector<Real> v;
+    for (const BodyHandle b : balls) v.push_back(world.body(b).velocity.x());
+    return v;
+  }
+};
+
+TEST_P(Cradle, SequentialImpactsPassOnAsManyBallsAsCameIn) {
+  for (std::size_t moving = 1; moving < 5; ++moving) {
+    const std::vector<Real> v = speeds(moving, ImpactLaw::sequential);
+    for (std::size_t i = 0; i < 5; ++i) EXPECT_NEAR(v[i], i < 5 - moving ? 0 : 1, 0.01) << moving << ' ' << i;
+  }
+}
+
+// All at once, contacts at rest only must not close: the row of four leaves with one speed.
+TEST_P(Cradle, SimultaneousImpactsSendTheRowOffAsOne) {
+  const std::vector<Real> v = speeds(1, ImpactLaw::simultaneous);
+  EXPECT_NEAR(v[0], -0.6, 1e-9);
+  for (std::size_t i = 1; i < 5; ++i) EXPECT_NEAR(v[i], 0.4, 1e-9);
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, Cradle);
+
+class Paddle : public BothSolvers {};
+
+TEST_P(Paddle, GivesABallTheSpeedOfItsSurfaceAndTheRestitution) {
+  for (const Real e : {1.0, 0.4}) {
+    World world(weightless());
+    world.add_body({.shape = Box{{0.1, 1, 1}},
+                    .motion = MotionType::kinematic,
+                    .restitution = e,
+                    .track = {.keys = {{0, {Vec3(0, 0, 0)}}, {1, {Vec3(2, 0, 0)}}},
+                              .interpolation = Interpolation::linear}});
+    const auto ball =
+        world.add_body({.shape = Sphere{0.1}, .pose = {Vec3(0.5, 0, 0)}, .velocity = {-1, 0, 0}, .restitution = e});
+    run(world, 0.5);
+    EXPECT_NEAR(world.body(ball).velocity.x(), 2 + e * 3, 1e-9);
+  }
+}
+
+TEST_P(Paddle, ATurningBatHitsWithTheVelocityOfWhereItHits) {
+  World world(weightless());
+  world.add_body({.shape = Box{{2, 0.1, 0.1}},
+                  .motion = MotionType::kinematic,
+                  .pose = {Vec3::Zero()},
+                  .restitution = 0.8,
+                  .friction = 0,
+                  .track = {.spin = {0, 0, 4}}});
+  // It lies 0.3 rad ahead, with the ball's surface on the bat's then.
+  const Vec3 along(std::cos(0.3), std::sin(0.3), 0), across(-along.y(), along.x(), 0);
+  const auto ball = world.add_body({.shape = Sphere{0.05},
+                                    .pose = {0.8 * along + 0.1 * across},
+                                    .restitution = 0,
+                                    .friction = 0});
+  run(world, 0.15);
+  const Vec3 v = world.body(ball).velocity;
+  EXPECT_NEAR((v - 1.8 * 4 * 0.8 * across).norm(), 0, 1e-3);
+}
+
+TEST_P(Paddle, ABoxPushesAStackAlong) {
+  World world(def());
+  world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
+  const auto pusher = world.add_body({.shape = Box{{0.2, 0.18, 0.4}},
+                                      .motion = MotionType::kinematic,
+                                      .pose = {Vec3(-0.25, 0.1, 0)},
+                                      .track = {.keys = {{0, {Vec3(-0.25, 0.1, 0)}}, {4, {Vec3(0.55, 0.1, 0)}}},
+                                                .interpolation = Interpolation::linear}});
+  std::vector<BodyHandle> stack;
+  for (int i = 0; i < 3; ++i)
+    stack.push_back(world.add_body({.shape = Box{Vec3::Constant(0.2)}, .pose = {Vec3(0, 0.1 + 0.2 * i, 0)}}));
+  const Run r = run(world, 3.5);
+  EXPECT_LT(r.penetration, 1e-3);
+  const Real face = world.body(pusher).pose.position.x() + 0.1;
+  for (int i = 0; i < 3; ++i) {
+    const BodyState s = world.body(stack[static_cast<std::size_t>(i)]);
+    EXPECT_NEAR(s.velocity.x(), 0.2, 2e-3) << i;
+    EXPECT_NEAR(s.centre.y(), 0.1 + 0.2 * i, 1e-3) << i;
+    EXPECT_NEAR(s.centre.x(), face + 0.1, 0.03) << i;
+  }
+  // Friction of the floor under all three, and nothing else, is what the pusher works against.
+  Vec3 push = Vec3::Zero();
+  for (const ContactState& c : world.contacts())
+    if (c.a == pusher || c.b == pusher) push += c.a == pusher ? -c.force : c.force;
+  const Real weight = 3 * world.body(stack[0]).mass * kGravity;
+  EXPECT_NEAR(push.x() / (0.5 * (weight - push.y())), 1, 0.01);
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, Paddle);
+
+}  // namespace
+}  // namespace offstage::sim
