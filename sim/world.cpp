@@ -142,6 +142,7 @@ void World::Impl::let_go(Body& body) {
     if (&pair.b() == &body) wake(pair.a());
   });
   graph.forget(body.handle.index);
+  pairs_changed = true;
   std::erase(stepped, &body);
   active_pairs.clear();
   islands.clear();
@@ -276,6 +277,7 @@ void World::add_contact_rule(const ContactRule& rule) {
   if (rule.static_friction) check_not_negative(object, "static_friction", *rule.static_friction);
   impl_->rules[std::minmax(impl_->surface_number(rule.a), impl_->surface_number(rule.b))] = rule;
   impl_->graph.forget_all();
+  impl_->pairs_changed = true;
   impl_->wake_all();
 }
 

@@ -20,6 +20,8 @@ constexpr Real kMargin = 2e-3, kMarginShare = 0.05;
 /// Motion beyond this share of the smaller body within an interval: the points of its start do not tell any more
 /// what will meet.
 constexpr Real kFar = 0.25;
+/// Room that bodies get in the broad phase: a share of their size, and as far as they get in so many steps.
+constexpr Real kRoom = 0.03, kSteps = 2;
 /// How far bodies may shift against each other before their points are found anew [m].
 constexpr Real kReuse = 1e-5, kExactReuse = 1e-8;
 
@@ -62,22 +64,27 @@ PairSurface World::Impl::surface_of(const Body& a, const Body& b) const {
   return s;
 }
 
-/// Gives a body's way to the broad phase; returns whether it is not within the one given before. That one
-/// stays part of it in the same sub-step.
+/// Gives a body's way to the broad phase, with some room, unless it is within what was given before; returns
+/// whether that was needed. In the same sub-step, what was given stays part of it.
 bool World::Impl::move_in_broad_phase(Body& body, bool again) {
   if (!body.def.collides) return false;
   Aabb box = swept_bounds(body);
-  if (again) {
-    if (body.swept.contains(box)) return false;
-    box.extend(body.swept);
-  }
+  if (body.swept.contains(box)) return false;
+  // Room for some more steps like this one.
+  const Vec3 shift = kSteps * (body.pose.position - body.start_pose.position);
+  const Vec3 room = Vec3::Constant(kRoom * body.extent);
+  box.min() += shift.cwiseMin(0) - room;
+  box.max() += shift.cwiseMax(0) + room;
+  if (again) box.extend(body.swept);
   body.swept = box;
   broad_phase.move(body.handle.index, box);
+  pairs_changed = true;
   return true;
 }
 
 /// The pairs of bodies whose ways come near each other.
 void World::Impl::collect_pairs() {
+  if (!std::exchange(pairs_changed, false)) return;
   graph.update(
       broad_phase.pairs(), [&](uint32_t slot) { return bodies[bodies.at_slot(slot)].get(); },
       [&](const Body& a, const Body& b) { return surface_of(a, b); });

@@ -108,7 +108,7 @@ struct World::Impl : WorldState {
   uint64_t born = 0;  // since the last report
 
   // Lists of bodies in slot order, made anew when one was added, removed, fell asleep or woke.
-  bool lists_changed = true;
+  bool lists_changed = true, pairs_changed = true;
   std::vector<Body*> awake, kinematic;  // dynamic ones; kinematic ones that move
   std::vector<Body*> stepped;           // all that may have moved in this step
   std::map<uint32_t, std::vector<Body*>> sleeping;

@@ -19,6 +19,7 @@ Real fastest_point(const Body& body) {
 
 void World::Impl::update_lists() {
   if (!std::exchange(lists_changed, false)) return;
+  pairs_changed = true;
   awake.clear();
   kinematic.clear();
   asleep = 0;

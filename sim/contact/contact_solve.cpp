@@ -55,12 +55,20 @@ bool is_face(NormalSource s) {
   return s == NormalSource::face_of_a || s == NormalSource::face_of_b;
 }
 
+/// Square of the angular velocity [1/s^2]. Below this, faces do not turn in a step.
+constexpr Real kNoSpin = 1e-14;
+Real spin(const Body& body) {
+  if (body.is_awake()) return body.start.angular_velocity().squaredNorm();
+  return body.is_kinematic() ? body.drive.angular_velocity.squaredNorm() : 0;
+}
+
 /// What the relative acceleration of R9 has besides the part that is linear in the accelerations of the bodies:
 ///   n . (c_a'' - c_b'') + 2 n' . (c_a' - c_b') - |n'|^2 D
 /// with material points c on both bodies at a distance D along n. (Of two centres of spheres, this is
 /// n.c'' + n'.c', not twice the latter.) Tangentially, what turns with the bodies.
 Vec3 acceleration_bias(const ContactPair& pair, const PlacedManifold& placed, const ContactPoint& point) {
   const Manifold& m = placed.manifold;
+  if (is_face(m.source) && spin(pair.a()) < kNoSpin && spin(pair.b()) < kNoSpin) return Vec3::Zero();
   const Vec3 place_a = m.source == NormalSource::face_of_a ? point.on_a : core_point(pair.a(), point.on_a);
   const Vec3 place_b = m.source == NormalSource::face_of_b ? point.on_b : core_point(pair.b(), point.on_b);
   const PointRates a = rates(pair.a(), place_a), b = rates(pair.b(), place_b);
@@ -215,8 +223,12 @@ namespace {
 constexpr std::size_t kFew = 6;
 /// Of the fast solver, per point and sub-step [ns].
 constexpr Real kFastPoint = 60;
-/// All attempts together may take this much of what the fast solver takes.
-constexpr Real kShare = 0.25, kMostAttempts = 240;
+/// How much dearer than the fast solver the exact one may be in the long run: it is worth that. What it takes beyond
+/// counts as a debt, of which it may have as much as so many steps of the fast solver: it is dear where an island is
+/// new, and cheap from then on.
+constexpr Real kWorth = 2.5, kCredit = 120;
+/// After that it waits until its debt is but this share of what the fast solver has taken.
+constexpr Real kShare = 0.25, kLongestWait = 2400;
 
 Real fast_cost(const Island& island, Real duration) {
   Real points = 0;
@@ -235,14 +247,16 @@ bool SolverChoice::is_exact_worth(const Island& island) {
 
 Real SolverChoice::budget(const Island& island, Real duration) const {
   if (island.bodies.size() <= kFew) return std::numeric_limits<Real>::infinity();
-  return kShare * kMostAttempts * fast_cost(island, duration);
+  return kCredit * fast_cost(island, duration);
 }
 
 void SolverChoice::learn(const Island& island, Real duration, bool solved) {
   if (island.bodies.size() <= kFew) return;
-  const Real fast = fast_cost(island, duration), cost = exact->cost();
-  if (solved && cost <= fast) return;
-  wait_ = static_cast<uint32_t>(std::clamp(cost / (kShare * fast), 1.0, kMostAttempts));
+  const Real fast = fast_cost(island, duration);
+  debt_ = std::max(0.0, debt_ + exact->cost() - kWorth * fast);
+  if (solved && debt_ <= kCredit * fast) return;
+  wait_ = static_cast<uint32_t>(std::clamp(debt_ / (kShare * fast), 1.0, kLongestWait));
+  debt_ = 0;
 }
 
 // Fast

@@ -73,6 +73,7 @@ class SolverChoice {
 
  private:
   uint32_t wait_ = 0;  // sub-steps until the next attempt
+  Real debt_ = 0;      // [ns]
 };
 
 /// Resolves the collisions among an island's pairs at its bodies' `start`: what is nearer than `reach` [m]

@@ -11,7 +11,7 @@ namespace {
 /// (1 + kStiffness e) of the error in a direction whose eigenvalue of the mobility is e (of the largest): with
 /// stacks of 100 at 1e-4. Larger ones cost digits of H.
 constexpr Real kStiffness = 1e5;
-constexpr Real kTolerance = 1e-9, kSmallest = 1e-11;  // of the velocities, and [m/s]
+constexpr Real kTolerance = 1e-7, kSmallest = 1e-11;  // of the velocities, and [m/s]
 constexpr Real kCoarse = 1e-5;
 constexpr uint32_t kPatience = 4;
 /// An iteration that leaves more than this is slow.
@@ -29,6 +29,12 @@ Mat3 cross_matrix(const Vec3& r) {
   Mat3 m;
   m << 0, -r.z(), r.y(), r.z(), 0, -r.x(), -r.y(), r.x(), 0;
   return m;
+}
+
+/// A third of the trace of mobility().
+Real mean_mobility(const ContactBody& body, const Vec3& r) {
+  const Mat3& I = body.inverse_inertia;
+  return body.inverse_mass + (r.squaredNorm() * I.trace() - r.dot(I * r)) / 3;
 }
 
 /// J^T W J of a point at arms r, s: velocity at the point is v - [r] w.
@@ -55,10 +61,10 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
   for (const Point& p : points_) speed = std::max(speed, p.impulse.cwiseAbs().maxCoeff());
   const Real tolerance = kSmallest + kTolerance * speed;
 
-  Real left = speed;
-  bool solved = false;
   merit_ = evaluate(contacts, velocity_);
   gradient(contacts);
+  Real left = gradient_speed();
+  bool solved = false;
   mixing_.clear();
   for (uint32_t outer = 0; outer < kMaxOuter && work.factorizations < kMaxFactorizations; ++outer) {
     minimize(contacts, std::max(tolerance / 4, left / 20), work);
@@ -139,7 +145,7 @@ void ProximalNewton::set_points(std::span<const ContactBody> bodies, std::span<c
       p.pair = static_cast<uint32_t>(
           std::lower_bound(pairs_.begin(), pairs_.end(),
                            std::pair<uint32_t, uint32_t>(std::minmax(p.a, p.b))) - pairs_.begin());
-    p.rho = kStiffness / mobility(c, bodies).diagonal().maxCoeff();
+    p.rho = kStiffness / (mean_mobility(bodies[c.a], c.arm_a) + mean_mobility(bodies[c.b], c.arm_b));
     p.multiplier = c.is_guessed ? project_on_cone(c, c.impulse).point : Vec3(Vec3::Zero());
     p.impulse = c.relative_velocity(bodies);
     fixed_[i] = c.offset - Vec3(c.target, 0, 0);
@@ -182,7 +188,7 @@ Real ProximalNewton::evaluate(std::span<const Contact> contacts, std::span<const
     const ConeProjection projection = project_on_cone(c, q);
     p.impulse = projection.point;
     p.region = projection.region;
-    p.derivative = cone_derivative(c, q, projection);
+    p.shifted = q;
     merit += p.impulse.squaredNorm() / (2 * p.rho);
   }
   return merit;
@@ -230,7 +236,7 @@ bool ProximalNewton::assemble(std::span<const Contact> contacts, ContactWork& wo
     if (p.region == ConeRegion::apex) continue;
     Mat3 axes;
     axes << c.frame.n, c.frame.t, c.frame.k;
-    const Mat3 W = p.rho * axes * p.derivative * axes.transpose();
+    const Mat3 W = p.rho * axes * cone_derivative(c, p.shifted, {p.impulse, p.region}) * axes.transpose();
     if (p.a != kNone) diagonal_[p.a] += block(W, c.arm_a, c.arm_a);
     if (p.b != kNone) diagonal_[p.b] += block(W, c.arm_b, c.arm_b);
     if (p.pair == kNone) continue;

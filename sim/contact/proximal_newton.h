@@ -29,7 +29,7 @@ namespace offstage::sim {
 /// Keep one per island from step to step: a matrix of nearly the same contacts still serves to converge.
 class ProximalNewton {
  public:
-  /// Solves to a residual of 1e-8 of the velocities (1e-11 m/s at least). Starts from the contacts' impulses,
+  /// Solves to a residual of 1e-7 of the velocities (1e-11 m/s at least). Starts from the contacts' impulses,
   /// which the bodies' velocities must not contain yet. If the bounded iterations do not get there, projected
   /// Gauss-Seidel goes on from where they ended.
   /// If that would take more than `budget` [ns, as cost() counts], there is no result and nothing is changed.
@@ -41,11 +41,9 @@ class ProximalNewton {
 
  private:
   struct Point {
-    Vec3 multiplier, impulse;  // q, p(v)
-    Mat3 derivative;           // dp/dq, in the frame
-    Real rho, lift;            // lift: g
-    Real rise;                 // what g lacks
-    uint32_t a, b, pair;       // rows of the matrix; kNone for bodies that are not moved
+    Vec3 multiplier, impulse, shifted;  // q, p(v), what p(v) is the projection of
+    Real rho, lift, rise;               // lift: g; rise: what g lacks
+    uint32_t a, b, pair;                // rows of the matrix; kNone for bodies that are not moved
     ConeRegion region;
   };
   struct Mixed {
