@@ -198,8 +198,9 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
     }
 }
 
-/// Forces that act throughout the interval move bodies by half of what they change the velocity times the time;
-/// blows that end an approach, which acted at some time in it, by all of it, so that nothing gets through.
+/// Forces that act throughout the interval move bodies by half of what they change the velocity times the time.
+/// A body of which a contact closed in the interval is blocked from some time in it on: it gets as far as its new
+/// velocity brings it, which is what the contact's target speaks of.
 void ExactContacts::move_bodies(const Island& island, Real duration) {
   closing_.assign(bodies_.size(), 0);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
@@ -207,11 +208,15 @@ void ExactContacts::move_bodies(const Island& island, Real duration) {
       closing_[contacts_[i].a] = closing_[contacts_[i].b] = 1;
   for (std::size_t i = 0; i < island.bodies.size(); ++i) {
     Body& body = *island.bodies[i];
-    const Vec3 dv = bodies_[i].velocity - free_[i].head<3>(), dw = bodies_[i].angular_velocity - free_[i].tail<3>();
+    const Vec3 free_v = free_[i].head<3>(), free_w = free_[i].tail<3>();
+    Vec3 dv = bodies_[i].velocity - free_v, dw = bodies_[i].angular_velocity - free_w;
     body.rigid.momentum += body.rigid.mass * dv;
     body.rigid.angular_momentum += angular_momentum(body.rigid, body.rigid.orientation, dw);
-    const Real time = closing_[i] ? duration : duration / 2;
-    displace(body, time * dv, time * dw);
+    if (closing_[i]) {
+      dv += bodies_[i].velocity - body.start.velocity();
+      dw += bodies_[i].angular_velocity - body.start.angular_velocity();
+    }
+    displace(body, duration / 2 * dv, duration / 2 * dw);
   }
 }
 

@@ -51,7 +51,7 @@ ConeProjection project_on_pyramid(const Contact& c, const Vec3& q) {
 ConeProjection project_on_cone(const Contact& c, const Vec3& q) {
   if (!c.is_isotropic()) return project_on_pyramid(c, q);
   const Real mu = c.friction_t, length = std::sqrt(q.y() * q.y() + q.z() * q.z());
-  if (length <= mu * q.x()) return {q, ConeRegion::inside};
+  if (q.x() >= 0 && length <= mu * q.x()) return {q, ConeRegion::inside};
   if (mu * length <= -q.x()) return {Vec3::Zero(), ConeRegion::apex};
   const Real normal = (q.x() + mu * length) / (1 + mu * mu), share = mu * normal / length;
   return {{normal, share * q.y(), share * q.z()}, ConeRegion::surface};

@@ -304,8 +304,13 @@ Real ProximalNewton::update_multipliers(std::span<const Contact> contacts) {
     Point& p = points_[i];
     change = std::max(change, (p.impulse - p.multiplier).cwiseAbs().maxCoeff() / p.rho);
     p.multiplier = p.impulse;
-    const Real lift = cone_lift(contacts[i], relative_velocity(contacts[i], p, velocity_) + fixed_[i]);
-    p.rise = p.region == ConeRegion::apex ? 0 : lift - p.lift;  // what is open does not depend on it
+    const Contact& c = contacts[i];
+    const Vec3 u = relative_velocity(c, p, velocity_) + fixed_[i];
+    const Real lift = cone_lift(c, u);
+    // What is open does not depend on it, if it still is.
+    const bool open = p.region == ConeRegion::apex &&
+                      project_on_cone(c, -p.rho * (u + Vec3(lift, 0, 0))).region == ConeRegion::apex;
+    p.rise = open ? 0 : lift - p.lift;
     change = std::max(change, std::abs(p.rise));
     p.lift = lift;
   }
