@@ -145,7 +145,6 @@ struct StepReport {
   uint64_t collisions = 0;        ///< contacts that met faster than WorldDef::collision_speed
   uint64_t tracebacks = 0;        ///< times that bodies were put back to a time of impact
   uint64_t cut_short = 0;         ///< tracebacks that were given up for a sub-step: too many in it
-  uint64_t impact_fallbacks = 0;  ///< collisions, then contacts, that took projected Gauss-Seidel
   ContactWork exact, fast;        ///< of the solvers of resting contact
   ContactWork impacts;            ///< of the solver of collisions
   IntegratorReport integration;   ///< of the free motion

@@ -22,7 +22,11 @@ install_packages $build_packages $test_packages
 cores=$(nproc)
 failed=0
 
-cmake --preset release -DOFFSTAGE_WERROR=ON -DOFFSTAGE_TESTS=ON
+# Beside other engines, if their harness is there (tests/bench/RESULTS.md).
+peers=()
+[ -d ../shared/peers ] && peers=("-DOFFSTAGE_PEERS=$(realpath ../shared/peers)")
+
+cmake --preset release -DOFFSTAGE_WERROR=ON -DOFFSTAGE_TESTS=ON "${peers[@]}"
 cmake --build build
 
 cmake --preset asan

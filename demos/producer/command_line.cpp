@@ -150,7 +150,9 @@ int dispatch(int argc, char** argv) {
   add_timing(*simulate_app, simulate.scene);
   simulate_app->add_option("--trace", simulate.trace,
                            "CSV of position, orientation and velocities of what moves");
-  simulate_app->add_option("--trace-every", simulate.trace_every, "frame or step")
+  simulate_app->add_option("--contacts", simulate.contacts,
+                           "CSV of the points where bodies touch, with the forces there");
+  simulate_app->add_option("--trace-every", simulate.trace_every, "frame or step, of both")
       ->check(CLI::IsMember({"frame", "step"}));
   simulate_app->add_option("--cache", simulate.cache,
                            "Folder for one snapshot per frame, for `render --cache`");

@@ -62,7 +62,7 @@ int frame_command(const FrameOptions& options);
 struct SimulateOptions {
   SceneOptions scene;
   TalkOptions talk;
-  std::string trace, trace_every = "frame", cache, stats;
+  std::string trace, contacts, trace_every = "frame", cache, stats;
   int threads = 0;
   bool force = false;
 };

@@ -57,6 +57,12 @@ void report_run(const RunStats& stats, const TalkOptions& talk, const std::strin
   if (t.waiting) say("note: {} particles had to wait for room on their emitter\n", t.waiting);
   if (t.removed) say("warning: {} particles were inside a body and had to be removed\n", t.removed);
   if (t.truncated) say("note: {} particles hit more often in one step than is followed\n", t.truncated);
+  if (t.fallbacks())
+    say("warning: {} groups of contacts were solved only roughly (fallbacks in the figures)\n",
+        t.fallbacks());
+  if (t.cut_short)
+    say("warning: {} times bodies met more often in one step than is followed; use a smaller world.step\n",
+        t.cut_short);
   if (!talk.verbose) return;
   for (const auto& [name, times] : {std::pair("simulate", &stats.sim), std::pair("draw", &stats.render),
                                     std::pair("encode", &stats.encode)}) {
@@ -281,12 +287,19 @@ int simulate_command(const SimulateOptions& options) {
   if (!options.talk.quiet) print_warnings(warnings);
   check_file(options.stats, options.force);
   check_file(options.trace, options.force);
+  check_file(options.contacts, options.force);
   check_distinct(options.stats, options.trace);
+  check_distinct(options.stats, options.contacts);
+  check_distinct(options.trace, options.contacts);
   const auto threads = simulation_threads(options.threads);
-  SimulateJob job{
-      .cache = {}, .force = options.force, .trace = {}, .trace_every_step = options.trace_every == "step"};
+  SimulateJob job{.cache = {},
+                  .force = options.force,
+                  .trace = {},
+                  .contacts = {},
+                  .trace_every_step = options.trace_every == "step"};
   if (!options.cache.empty()) job.cache = options.cache;
   if (!options.trace.empty()) job.trace = options.trace;
+  if (!options.contacts.empty()) job.contacts = options.contacts;
   ProgressPrinter printer(options.talk.quiet ? ProgressStyle::none : options.talk.progress);
   const RunStats stats = simulate_frames(loaded, models, job, std::ref(printer));
   printer.finish();

@@ -6,6 +6,7 @@
 
 #include "producer/line_sketch.h"
 #include "sim/collision/bounding_tree.h"
+#include "sim/collision/distance.h"
 #include "sim/collision/narrow_phase.h"
 
 namespace offstage::producer {
@@ -14,7 +15,9 @@ namespace {
 using Eigen::Vector4f;
 using Edges = std::vector<std::pair<Vec3, Vec3>>;
 
-constexpr float kDotWidth = 4;  // in widths of a line
+constexpr float kDotWidth = 4;                // in widths of a line
+constexpr Real kShortestArrow = 5e-3;         // [m]; a shorter one would be a blot
+constexpr uint64_t kByGeometry = 1ull << 63;  // in the ids of contacts
 
 sim::Pose relative(const sim::Pose& a, const sim::Pose& b) {
   return {a.point_to_body(b.position), a.orientation.conjugate() * b.orientation};
@@ -77,20 +80,47 @@ void draw_patch(const std::vector<Vec3>& points, const Vec3& normal, const Vecto
     sketch.line(around[i].second, around[(i + 1) % around.size()].second, color);
 }
 
+/// A point of contact with an arrow from it.
+void draw_point(const Vec3& p, const Vec3& normal, const Vec3& arrow, Real size, const Vector4f& color,
+                LineSketch& sketch) {
+  sketch.ring(p, normal, size, color);
+  sketch.dot(p, color, kDotWidth);
+  if (!arrow.isZero(0)) sketch.arrow(p, p + arrow, color);
+}
+
 /// `object` leaves room for the ids of points.
 void draw_manifold(const sim::Manifold& m, const sim::Pose& world_from_a, Real size, const Vector4f& color,
                    uint64_t object, LineSketch& sketch) {
   const Vec3 normal = world_from_a.vector_to_world(m.normal);
   std::vector<Vec3> points;
   for (uint32_t i = 0; i < m.count; ++i) {
-    const Vec3 p = world_from_a.point_to_world(0.5 * (m.points[i].on_a + m.points[i].on_b));
-    points.push_back(p);
+    points.push_back(world_from_a.point_to_world(0.5 * (m.points[i].on_a + m.points[i].on_b)));
     sketch.object(object + m.points[i].id);
-    sketch.ring(p, normal, size, color);
-    sketch.dot(p, color, kDotWidth);
-    sketch.arrow(p, p + 4 * size * normal, color);
+    draw_point(points.back(), normal, 4 * size * normal, size, color, sketch);
   }
   draw_patch(points, normal, color, sketch);
+}
+
+uint64_t pair_id(sim::BodyHandle a, sim::BodyHandle b) {
+  return (uint64_t{a.index} << 40) ^ (uint64_t{b.index} << 16);
+}
+
+/// The simulation's contacts between any two bodies, or between two given ones, by pair. Those of a pair are
+/// in an order that goes with the body: the points come in that of their depth, which may change while they
+/// stay.
+std::vector<sim::ContactState> contacts_of(const sim::World& world, sim::BodyHandle a, sim::BodyHandle b) {
+  std::vector<sim::ContactState> contacts = world.contacts();
+  if (a)
+    std::erase_if(contacts, [&](const sim::ContactState& c) {
+      return !(c.a == a && c.b == b) && !(c.a == b && c.b == a);
+    });
+  const auto along_body = [&](const sim::ContactState& c) {
+    const bool a_moves = world.body_def(c.a).motion == sim::MotionType::dynamic;
+    return world.body(a_moves ? c.a : c.b).pose.point_to_body(c.point).dot(Vec3(1, 0.618, 0.382));
+  };
+  const auto key = [&](const sim::ContactState& c) { return std::pair(pair_id(c.a, c.b), along_body(c)); };
+  std::ranges::stable_sort(contacts, {}, key);
+  return contacts;
 }
 
 }  // namespace
@@ -124,19 +154,41 @@ struct Overlays::Builder {
     return ClosestLines{&overlay, pair(overlay.a, overlay.b)};
   }
   Source operator()(const ContactsOverlay& overlay) const {
-    ContactLines contacts{&overlay, {}};
     if (!overlay.a.empty()) {
-      contacts.pairs.push_back(pair(overlay.a, overlay.b));
+      ContactLines contacts{&overlay, bodies.at(overlay.a), bodies.at(overlay.b), {}};
+      if (!is_dynamic(contacts.a) && !is_dynamic(contacts.b))
+        contacts.pairs.push_back(pair(overlay.a, overlay.b));
       return contacts;
     }
+    ContactLines contacts{&overlay, {}, {}, {}};
     for (std::size_t i = 0; i < scene.bodies.size(); ++i)
       for (std::size_t j = i + 1; j < scene.bodies.size(); ++j)
-        if (can_touch(scene.bodies[i], scene.bodies[j]))
+        if (touch_by_geometry(scene.bodies[i], scene.bodies[j]))
           contacts.pairs.push_back(pair(scene.bodies[i].name, scene.bodies[j].name));
     return contacts;
   }
+  Source operator()(const VelocitiesOverlay& overlay) const {
+    VelocityLines velocities{&overlay, {}};
+    for (const Body& body : scene.bodies)
+      if (overlay.body.empty() ? body.motion != sim::MotionType::fixed : body.name == overlay.body)
+        velocities.bodies.push_back(bodies.at(body.name));
+    return velocities;
+  }
+  Source operator()(const IslandsOverlay& overlay) const {
+    IslandLines islands{&overlay, {}};
+    for (const Body& body : scene.bodies) {
+      const sim::BodyHandle handle = bodies.at(body.name);
+      if (!is_dynamic(handle)) continue;
+      const sim::Shape& shape = world.body_def(handle).shape;
+      islands.bodies.push_back({handle, edges_of(sim::local_bounds({&shape, collision_mesh_of(shape)}))});
+    }
+    return islands;
+  }
 
  private:
+  bool is_dynamic(sim::BodyHandle body) const {
+    return world.body_def(body).motion == sim::MotionType::dynamic;
+  }
   template <class Tree>
   static void add_volumes(const Tree& built, TreeLines& tree) {
     const auto deepest = static_cast<int>(std::ceil(effects::upper_bound(tree.overlay->level)));
@@ -145,10 +197,14 @@ struct Overlays::Builder {
         tree.volumes.push_back({static_cast<int>(level), leaf, edges_of(volume)});
     });
   }
-  static bool can_touch(const Body& a, const Body& b) {
+  /// Whether bodies can touch of which the simulation knows no contacts: at least one moves, and none by
+  /// forces.
+  static bool touch_by_geometry(const Body& a, const Body& b) {
+    using enum sim::MotionType;
     const auto is_plane = [](const Body& body) { return std::holds_alternative<sim::Plane>(body.shape); };
-    const bool moves = a.motion != sim::MotionType::fixed || b.motion != sim::MotionType::fixed;
-    return moves && a.collides && b.collides && !(is_plane(a) && is_plane(b));
+    const bool scripted =
+        (a.motion == kinematic && b.motion != dynamic) || (b.motion == kinematic && a.motion != dynamic);
+    return scripted && a.collides && b.collides && !(is_plane(a) && is_plane(b));
   }
   const sim::CollisionMesh* collision_mesh_of(const sim::Shape& shape) const {
     const auto* mesh = std::get_if<sim::MeshShape>(&shape);
@@ -225,6 +281,15 @@ LineSet Overlays::draw(const ContactLines& contacts, const sim::World& world) {
   const ContactsOverlay& overlay = *contacts.overlay;
   const Vector4f color = light(overlay.color.rgba);
   LineSketch sketch;
+  uint64_t pair = 0, number = 0;
+  for (const sim::ContactState& c : contacts_of(world, contacts.a, contacts.b)) {
+    number = pair == pair_id(c.a, c.b) ? number + 1 : 0;
+    pair = pair_id(c.a, c.b);
+    sketch.object(pair + number);
+    const Vec3 arrow =
+        overlay.force_scale > 0 ? Vec3(overlay.force_scale * c.force) : 4 * overlay.size * c.normal;
+    draw_point(c.point, c.normal, arrow, overlay.size, color, sketch);
+  }
   std::vector<sim::Manifold> manifolds;
   for (std::size_t i = 0; i < contacts.pairs.size(); ++i) {
     const auto [first, second] = contacts.pairs[i];
@@ -234,7 +299,41 @@ LineSet Overlays::draw(const ContactLines& contacts, const sim::World& world) {
     sim::find_manifolds(*first->collision, *second->collision, relative(a, b), overlay.margin, cache,
                         sim::DistanceMethod::gjk, manifolds);
     for (std::size_t k = 0; k < manifolds.size(); ++k)
-      draw_manifold(manifolds[k], a, overlay.size, color, (i << 48) + (k << 32), sketch);
+      draw_manifold(manifolds[k], a, overlay.size, color, kByGeometry + (i << 44) + (k << 32), sketch);
+  }
+  return sketch.take();
+}
+
+LineSet Overlays::draw(const VelocityLines& velocities, const sim::World& world) {
+  const VelocitiesOverlay& overlay = *velocities.overlay;
+  LineSketch sketch;
+  const auto arrow = [&](uint64_t id, const Vec3& from, const Vec3& along, const Color& color) {
+    sketch.object(id);
+    if (along.norm() > kShortestArrow) sketch.arrow(from, from + along, light(color.rgba));
+  };
+  for (const sim::BodyHandle body : velocities.bodies) {
+    const sim::BodyState s = world.body(body);
+    arrow(2 * body.index, s.centre, overlay.scale * s.velocity, overlay.color);
+    arrow(2 * body.index + 1, s.centre, overlay.angular_scale * s.angular_velocity, overlay.angular_color);
+  }
+  return sketch.take();
+}
+
+LineSet Overlays::draw(const IslandLines& islands, const sim::World& world) {
+  // A group has the colour of its first body, so that it keeps it while others come and go.
+  std::map<uint32_t, std::size_t> first;
+  LineSketch sketch;
+  for (std::size_t i = 0; i < islands.bodies.size(); ++i) {
+    const auto& [body, edges] = islands.bodies[i];
+    const std::optional<uint32_t> island = world.island(body);
+    const std::size_t number = island ? first.emplace(*island, i).first->second : i;
+    Vector4f color;
+    color << distinct_color(number), 1;
+    if (world.is_asleep(body)) color.head<3>() *= static_cast<float>(islands.overlay->asleep);
+    const sim::Pose pose = world.body(body).pose;
+    sketch.object(body.index);
+    for (const auto& [a, b] : edges)
+      sketch.line(pose.point_to_world(a), pose.point_to_world(b), light(color));
   }
   return sketch.take();
 }

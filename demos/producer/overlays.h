@@ -1,6 +1,6 @@
 #pragma once
-/// The simulation side of overlays: bounding trees, closest points and contacts of bodies, as lines in the
-/// world. They look at the world and never change it.
+/// The simulation side of overlays: bounding trees, closest points, contacts, velocities and groups of
+/// bodies, as lines in the world. They look at the world and never change it.
 
 #include <map>
 #include <optional>
@@ -55,10 +55,23 @@ class Overlays {
   };
   struct ContactLines {
     const ContactsOverlay* overlay;
-    std::vector<ColliderPair> pairs;
+    sim::BodyHandle a, b;             // of the simulation's contacts those of these; null: all
+    std::vector<ColliderPair> pairs;  // of which the simulation knows no contacts
+  };
+  struct VelocityLines {
+    const VelocitiesOverlay* overlay;
+    std::vector<sim::BodyHandle> bodies;
+  };
+  struct IslandLines {
+    struct Boxed {
+      sim::BodyHandle body;
+      std::vector<std::pair<Vec3, Vec3>> edges;  // in the body's frame
+    };
+    const IslandsOverlay* overlay;
+    std::vector<Boxed> bodies;
   };
   struct NoLines {};
-  using Source = std::variant<NoLines, TreeLines, ClosestLines, ContactLines>;
+  using Source = std::variant<NoLines, TreeLines, ClosestLines, ContactLines, VelocityLines, IslandLines>;
 
   struct Builder;
 
@@ -66,6 +79,8 @@ class Overlays {
   static LineSet draw(const TreeLines& tree, const sim::World& world);
   static LineSet draw(const ClosestLines& closest, const sim::World& world);
   static LineSet draw(const ContactLines& contacts, const sim::World& world);
+  static LineSet draw(const VelocityLines& velocities, const sim::World& world);
+  static LineSet draw(const IslandLines& islands, const sim::World& world);
 
   std::map<std::string, Collider> colliders_;  // by body
   std::vector<Source> sources_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <unordered_map>
 
 #include "producer/line_sketch.h"
 #include "render/primitives.h"
@@ -355,12 +356,17 @@ void Picture::place_overlays(const Snapshot& previous, const Snapshot& current, 
     if (!overlays_[i]) continue;
     const LineSet &before = previous.overlays[i], &now = current.overlays[i];
     scratch_lines_ = now.lines;
-    // Where lines came or went there is no way between the two states.
-    if (w < 1 && before.ids == now.ids) {
+    if (w < 1) {
+      // Lines that came have no way between the two states.
+      std::unordered_map<uint64_t, std::size_t> places;
+      for (std::size_t k = 0; k < before.ids.size(); ++k) places.emplace(before.ids[k], k);
       for (std::size_t k = 0; k < scratch_lines_.size(); ++k) {
+        const auto place = places.find(now.ids[k]);
+        if (place == places.end()) continue;
+        const render::Line& was = before.lines[place->second];
         render::Line& line = scratch_lines_[k];
-        line.a = before.lines[k].a + w * (line.a - before.lines[k].a);
-        line.b = before.lines[k].b + w * (line.b - before.lines[k].b);
+        line.a = was.a + w * (line.a - was.a);
+        line.b = was.b + w * (line.b - was.b);
       }
     }
     stage_.set_lines(overlays_[i], scratch_lines_);

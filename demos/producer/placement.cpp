@@ -179,6 +179,21 @@ std::vector<T> expand_all(const std::vector<T>& originals, uint64_t seed, std::v
   return all;
 }
 
+/// Names of bodies that have copies become those of all copies.
+void name_copies(const std::vector<Body>& originals, const std::vector<Body>& copies,
+                 std::vector<std::string>& names) {
+  std::vector<std::string> all;
+  for (const std::string& name : names) {
+    const auto original = std::ranges::find(originals, name, &Body::name);
+    if (original == originals.end())
+      all.push_back(name);
+    else
+      for (const Body& copy : copies)
+        if (copy.where.path == original->where.path) all.push_back(copy.name);
+  }
+  names = std::move(all);
+}
+
 }  // namespace
 
 int copy_count(const Placement& placement) {
@@ -227,6 +242,12 @@ Scene expand(const Scene& scene, std::vector<Problem>& errors, std::vector<Probl
   Scene flat = scene;
   flat.bodies = expand_all(scene.bodies, scene.world.seed, errors, warnings);
   flat.emitters = expand_all(scene.emitters, scene.world.seed, errors, warnings);
+  for (Force& force : flat.forces)
+    std::visit(
+        [&](auto& f) {
+          if constexpr (requires { f.bodies; }) name_copies(scene.bodies, flat.bodies, f.bodies);
+        },
+        force);
   return flat;
 }
 

@@ -36,8 +36,9 @@ int copy_count(const Placement& placement);
 /// asked for.
 Copies expand(const Placement& placement, const Vec3& position, uint64_t seed, std::string_view name);
 
-/// Replaces each body and emitter that has a placement by its copies. Adds to `errors` those with too many
-/// copies, which stay as they are, and to `warnings` those of which some found no place.
+/// Replaces each body and emitter that has a placement by its copies, also in the lists of what forces act
+/// on. Adds to `errors` those with too many copies, which stay as they are, and to `warnings` those of which
+/// some found no place.
 Scene expand(const Scene& scene, std::vector<Problem>& errors, std::vector<Problem>& warnings);
 
 }  // namespace offstage::producer

@@ -191,8 +191,14 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
   std::optional<SnapshotCache> cache;
   if (job.cache) cache.emplace(*job.cache).create(key, total, job.force);
   std::optional<Trace> trace;
+  std::optional<ContactTrace> contacts;
   if (job.trace) trace.emplace(*job.trace, simulation);
-  if (trace && job.trace_every_step) simulation.on_substep([&](double time) { trace->record(time); });
+  if (job.contacts) contacts.emplace(*job.contacts, simulation);
+  const auto record = [&](double time) {
+    if (trace) trace->record(time);
+    if (contacts) contacts->record(time);
+  };
+  if (job.trace_every_step) simulation.on_substep(record);
   stats.bodies = simulation.body_count();
   stats.energy_start = simulation.world().energy();
 
@@ -204,7 +210,7 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
     const auto write_start = Clock::now();
     if (cache) cache->write(simulation.snapshot());
     const bool at_step = job.trace_every_step && frame < total;  // that state is the next sub-step's start
-    if (trace && !at_step) trace->record(simulation.world().time());
+    if (!at_step) record(simulation.world().time());
     stats.encode.add(ms_since(write_start));
     ++stats.frames;
     stats.particles = simulation.world().particle_count();
@@ -219,6 +225,7 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
   if (stats.frames < total) stats.interrupted_by = interrupt_signal();
   if (cache && stats.frames == total) cache->finish(key, total);
   if (trace && stats.frames == total) trace->close();
+  if (contacts && stats.frames == total) contacts->close();
   stats.totals = simulation.totals();
   stats.energy_end = simulation.world().energy();
   stats.state_hash = simulation.world().state_hash().hex();
@@ -237,8 +244,46 @@ std::string settings_key(const LoadedScene& loaded, const ModelLibrary& models) 
   return text_hash(std::string(OFFSTAGE_VERSION) + loaded.canonical + models.digest());
 }
 
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(const sim::ContactWork& work) {
+  return {{"solves", work.solves},
+          {"iterations", work.iterations},
+          {"factorizations", work.factorizations},
+          {"fallbacks", work.fallbacks},
+          {"residual", work.residual}};
+}
+Json json_of(const sim::IntegratorReport& report) {
+  return {{"steps", report.steps},
+          {"rejected", report.rejected},
+          {"evaluations", report.evaluations},
+          {"iterations", report.iterations},
+          {"missed", report.missed}};
+}
+
+/// What bodies do to each other, and what it took.
+void add_contact_figures(const SimulationTotals& t, Json& json) {
+  json["bodies_awake"] = t.bodies_awake;
+  json["bodies_asleep"] = t.bodies_asleep;
+  json["islands"] = t.islands;
+  json["contacts"] = t.contacts;
+  json["most_contacts"] = t.most_contacts;
+  json["penetration"] = t.penetration;
+  json["collisions"] = t.collisions;
+  json["tracebacks"] = t.tracebacks;
+  json["cut_short"] = t.cut_short;
+  json["exact_solver"] = json_of(t.exact);
+  json["fast_solver"] = json_of(t.fast);
+  json["impact_solver"] = json_of(t.impacts);
+  json["integration"] = json_of(t.integration);
+}
+
+}  // namespace
+
 std::string to_json(const RunStats& stats) {
-  nlohmann::ordered_json json;
+  Json json;
   json["frames"] = stats.frames;
   json["frames_kept"] = stats.frames_kept;
   json["wall_s"] = stats.wall_s;
@@ -254,7 +299,7 @@ std::string to_json(const RunStats& stats) {
   json["most_particles"] = stats.most_particles;
   const SimulationTotals& t = stats.totals;
   json["substeps"] = t.substeps;
-  json["contacts"] = t.collisions;
+  json["particle_collisions"] = t.particle_collisions;
   json["born"] = t.born;
   json["expired"] = t.expired;
   json["retired"] = t.retired;
@@ -264,6 +309,7 @@ std::string to_json(const RunStats& stats) {
   json["truncated_sweeps"] = t.truncated;
   json["emitter_waits"] = t.waiting;
   json["emitter_skips"] = t.skipped;
+  add_contact_figures(t, json);
   for (const auto& [name, energy] :
        {std::pair("energy_start", &stats.energy_start), std::pair("energy_end", &stats.energy_end)})
     if (*energy)

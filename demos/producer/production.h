@@ -75,8 +75,9 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
 struct SimulateJob {
   std::optional<std::filesystem::path> cache;  ///< write a snapshot per frame
   bool force = false;
-  std::optional<std::filesystem::path> trace;  ///< CSV of every moving body and placed particle
-  bool trace_every_step = false;               ///< else once a frame
+  std::optional<std::filesystem::path> trace;     ///< CSV of every moving body and placed particle
+  std::optional<std::filesystem::path> contacts;  ///< CSV of the points where bodies touch
+  bool trace_every_step = false;                  ///< both; else once a frame
 };
 
 /// Runs the physics alone, over all frames.

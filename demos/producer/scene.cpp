@@ -22,6 +22,13 @@ Quat PlaneSurface::orientation() const {
   return Quat::FromTwoVectors(Vec3::UnitY(), direction) * turned;
 }
 
+NamedForce& named(Force& force) {
+  return std::visit([](NamedForce& f) -> NamedForce& { return f; }, force);
+}
+const NamedForce& named(const Force& force) {
+  return std::visit([](const NamedForce& f) -> const NamedForce& { return f; }, force);
+}
+
 int Scene::frame_count() const {
   return static_cast<int>(std::lround(output.duration * output.fps));
 }

@@ -3,6 +3,7 @@
 /// of the scene format with the same name; scene_table.cpp gives each its unit, range and line of help, once,
 /// for the loader, the schema and the reference. SI units; angles in degrees where a name says so.
 
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -17,6 +18,8 @@
 #include "render/model.h"
 #include "render/stage.h"
 #include "render/tone_map.h"
+#include "sim/contact/collision.h"
+#include "sim/dynamics/force_field.h"
 #include "sim/dynamics/integrator.h"
 #include "sim/dynamics/keyframes.h"
 #include "sim/shape.h"
@@ -42,7 +45,12 @@ struct WorldSettings {
   Vec3 wind = Vec3::Zero();
   Real step = 1.0 / 240;
   sim::IntegratorKind integrator = sim::IntegratorKind::rk4;
-  Real bounds = 1000;  ///< half the edge of the cube everything must stay in
+  Real integration_error = 1e-6;  ///< per step, of the adaptive integrators
+  sim::SolverKind solver = sim::SolverKind::automatic;
+  sim::ImpactLaw impact = sim::ImpactLaw::simultaneous;
+  Real collision_speed = 0.05;  ///< bodies that meet slower than this do not bounce
+  bool sleep = true;            ///< groups of bodies at rest are left alone
+  Real bounds = 1000;           ///< half the edge of the cube everything must stay in
   uint64_t seed = 1;
 };
 
@@ -61,7 +69,16 @@ struct Material {
   std::string texture;  ///< image file
   bool two_sided = false;
   Real restitution = 0.5;
-  Real friction = 0.5;
+  Real friction = 0.5;                  ///< of what slides
+  std::optional<Real> static_friction;  ///< of what does not; default: `friction`
+  std::optional<Real> cross_friction;   ///< of sliding across a body's friction_axis; default: `friction`
+};
+
+/// What two materials do to each other, in place of what would follow from each.
+struct ContactRule {
+  Where where;
+  std::array<std::string, 2> materials;  ///< names, in any order
+  std::optional<Real> restitution, friction, static_friction;
 };
 
 /// A model file as a shape: its triangles collide and give the mass.
@@ -129,6 +146,8 @@ struct Body {
   Real mass = 0;
   Real linear_drag = 0;
   Real angular_drag = 0;
+  Vec3 friction_axis = Vec3::Zero();     ///< the surface's grain, in the body's frame
+  Vec3 surface_velocity = Vec3::Zero();  ///< of the surface against the body, in its frame
   bool collides = true;
   bool visible = true;
   bool casts_shadow = true;
@@ -248,6 +267,59 @@ struct Spring {
   std::string material;
 };
 
+// Forces on bodies. Those that can act on many have the names of what they act on; none: all dynamic bodies.
+
+struct NamedForce {
+  Where where;
+  std::string name;
+};
+/// What fields have: whom, when and where they act.
+struct FieldScope : NamedForce {
+  std::vector<std::string> bodies;
+  Real start = 0;
+  Real end = 1e30;
+  sim::Region region;
+  int drop_rate = 0;  ///< power of the fall from 1 in the middle of the region to 0 at its edge
+};
+struct ConstantField : FieldScope {
+  Vec3 force = Vec3::Zero();
+};
+struct PointField : FieldScope {
+  Vec3 point = Vec3::Zero();
+  Real force = 1;  ///< towards the point; negative: away from it
+};
+struct WindField : FieldScope {
+  Vec3 wind = Vec3::Zero();
+  Real drag = 1;
+};
+struct HandKey {
+  Real time = 0;
+  Vec3 position = Vec3::Zero();
+};
+/// A damped spring of no length from a body to a point that moves, as of a hand.
+struct Grab : NamedForce {
+  std::string body;
+  Vec3 point = Vec3::Zero();  ///< of the body, in its frame
+  std::vector<HandKey> keyframes;
+  Real stiffness = 100;
+  Real damping = 10;
+  Real start = 0;
+  Real end = 1e30;
+};
+struct Explosion : NamedForce {
+  std::vector<std::string> bodies;
+  Real time = 0;
+  Vec3 point = Vec3::Zero();
+  Real impulse = 1;
+  Real radius = 1;
+  int drop_rate = 1;
+};
+using Force = std::variant<ConstantField, PointField, WindField, Grab, Explosion>;
+
+/// What every force has.
+NamedForce& named(Force& force);
+const NamedForce& named(const Force& force);
+
 /// How the lines of an overlay are drawn.
 struct LineLook {
   Real width = 0.003;  ///< share of the picture's height
@@ -276,16 +348,33 @@ struct ClosestOverlay : LineLook {
   Color color{{1, 0.75f, 0.1f, 1}};
   Color penetrating{{1, 0.08f, 0.05f, 1}};
 };
-/// Where bodies touch, and which way they push each other.
+/// Where bodies touch, and which way they push each other: the contacts of the simulation, and by geometry
+/// those of bodies that no force moves, which it has none of.
 struct ContactsOverlay : LineLook {
   Where where;
-  std::string a, b;    ///< both empty: every pair
-  Real margin = 0.01;  ///< how near counts as touching
-  Real size = 0.06;    ///< radius of the ring around a point; its arrow is four times as long
+  std::string a, b;      ///< both empty: every pair
+  Real margin = 0.01;    ///< by geometry, how near counts as touching
+  Real size = 0.06;      ///< radius of the ring around a point; its arrow is four times as long
+  Real force_scale = 0;  ///< length of an arrow per newton, which is then the contact's force
   Color color{{1, 0.75f, 0.1f, 1}};
 };
+/// How fast bodies move, as arrows from their centres of mass.
+struct VelocitiesOverlay : LineLook {
+  Where where;
+  std::string body;        ///< empty: all that move
+  Real scale = 0.2;        ///< length per m/s
+  Real angular_scale = 0;  ///< of a second arrow along the axis of rotation, per rad/s
+  Color color{{0.2f, 0.8f, 1, 1}};
+  Color angular_color{{1, 0.3f, 0.8f, 1}};
+};
+/// Which bodies touch each other directly or through others: a box around each, in a colour of their group.
+struct IslandsOverlay : LineLook {
+  Where where;
+  Real asleep = 0.25;  ///< brightness of bodies that are asleep
+};
 /// What is drawn over the picture to show how the simulation sees it.
-using Overlay = std::variant<TreeOverlay, PartsOverlay, ClosestOverlay, ContactsOverlay>;
+using Overlay = std::variant<TreeOverlay, PartsOverlay, ClosestOverlay, ContactsOverlay, VelocitiesOverlay,
+                             IslandsOverlay>;
 
 /// What all cameras have.
 struct Lens {
@@ -365,10 +454,12 @@ struct Scene {
   std::string description;
   WorldSettings world;
   std::vector<Material> materials;
+  std::vector<ContactRule> contacts;
   std::vector<Body> bodies;
   std::vector<ParticleGroup> particles;
   std::vector<Emitter> emitters;
   std::vector<Spring> springs;
+  std::vector<Force> forces;
   std::vector<Overlay> overlays;
   Camera camera = StaticCamera{};
   std::vector<Light> lights = {SunLight{}};

@@ -68,10 +68,17 @@ class Checker {
   Findings run() {
     check_names();
     check_materials();
+    check_contact_rules();
     for (const Body& body : scene_.bodies) check_body(body);
     for (const ParticleGroup& group : scene_.particles) check_group(group);
     for (const Emitter& emitter : scene_.emitters) check_emitter(emitter);
     for (const Spring& spring : scene_.springs) check_spring(spring);
+    for (const Force& force : scene_.forces)
+      std::visit(
+          [&](const auto& f) {
+            if (!f.where.path.empty()) check_force(f);  // else its type was wrong, and none was read
+          },
+          force);
     for (const Overlay& overlay : scene_.overlays)
       std::visit(
           [&](const auto& o) {
@@ -110,6 +117,9 @@ class Checker {
     check_unique(scene_.particles);
     check_unique(flat_.emitters);
     check_unique(scene_.springs);
+    std::vector<NamedForce> forces;
+    for (const Force& force : scene_.forces) forces.push_back(named(force));
+    check_unique(forces);
   }
 
   void check_body_name(const std::string& path, const std::string& name) {
@@ -137,6 +147,34 @@ class Checker {
     for (const Material& material : scene_.materials)
       if (!used_materials_.contains(material.name))
         warn(material.where.path, "the material '" + material.name + "' is not used");
+      else
+        check_grain(material);
+  }
+  /// Friction across a grain takes a material that has it and a body that says which way the grain goes.
+  void check_grain(const Material& material) {
+    bool any = false;
+    for (const Body& body : scene_.bodies) any = any || (body.material == material.name && has_grain(body));
+    if (material.cross_friction && !any)
+      warn(material.where.path + "/cross_friction",
+           "has no effect: no body of this material has a friction_axis");
+  }
+  static bool has_grain(const Body& body) { return !body.friction_axis.isZero(0); }
+
+  void check_contact_rules() {
+    std::map<std::pair<std::string, std::string>, std::string> owners;
+    for (const ContactRule& rule : scene_.contacts) {
+      const std::string& path = rule.where.path;
+      const auto& [a, b] = rule.materials;
+      if (a.empty() || b.empty()) continue;  // reported as what they are
+      for (std::size_t i = 0; i < 2; ++i)
+        if (const std::string& name = rule.materials[i]; !find_named(scene_.materials, name))
+          fail(path + "/materials" + step(i),
+               "there is no material '" + name + "'" + suggestion(name, names_of(scene_.materials)));
+      const auto [it, fresh] = owners.emplace(std::minmax(a, b), path);
+      if (!fresh) fail(path + "/materials", "are already those of " + it->second);
+      if (!rule.restitution && !rule.friction && !rule.static_friction)
+        warn(path, "has no effect: gives neither restitution nor friction");
+    }
   }
 
   template <class Key>
@@ -172,6 +210,9 @@ class Checker {
       warn(path + "/angular_velocity", "has no effect: the body is not dynamic");
     if (body.mass > 0 && body.density != Body{}.density)
       warn(path + "/density", "has no effect: the mass is given");
+    const Material* material = find_named(scene_.materials, body.material);
+    if (has_grain(body) && !(material && material->cross_friction))
+      warn(path + "/friction_axis", "has no effect: the body's material has no cross_friction");
   }
 
   // --- Particles and emitters ---
@@ -298,14 +339,69 @@ class Checker {
     // One spring alone on a point of each mass: further springs, and ends away from a centre of mass, only
     // shorten the step it needs, so what fails here fails in the scene.
     const Real reduced = 1 / (1 / *a + 1 / *b);
-    const Real largest =
-        largest_stable_step(scene_.world.integrator, spring.stiffness, spring.damping, reduced);
+    check_stiffness(spring.stiffness, spring.damping, reduced, path, "the spring '" + spring.name + "'");
+  }
+  void check_stiffness(Real stiffness, Real damping, Real mass, const std::string& path,
+                       const std::string& what) {
+    const Real largest = largest_stable_step(scene_.world.integrator, stiffness, damping, mass);
     const Real used = std::min(scene_.world.step, 1 / scene_.output.fps);
     if (used >= largest)
-      fail(path, fmt::format("the spring '{}' is too stiff for the step: /world/step must be less than "
+      fail(path, fmt::format("{} is too stiff for the step: /world/step must be less than "
                              "{:.3g} s, is {:.3g} s",
-                             spring.name, 0.995 * largest, used));
+                             what, 0.995 * largest, used));
   }
+
+  // --- Forces ---
+
+  void check_pushed(const std::string& path, const std::string& name, const Body* body) {
+    if (body && body->motion != sim::MotionType::dynamic)
+      warn(path, "has no effect: the body '" + name + "' is not dynamic");
+  }
+  void check_pushed(const NamedForce& force, const std::vector<std::string>& bodies) {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const Body* all_copies = find_named(scene_.bodies, bodies[i]);
+      const std::string path = force.where.path + "/bodies" + step(i);
+      check_pushed(path, bodies[i], all_copies ? all_copies : named_body(path, bodies[i]));
+    }
+  }
+  void check_period(const NamedForce& force, Real start, Real end) {
+    if (end <= start) fail(force.where.path + "/end", fmt::format("must be after the start, {} s", start));
+  }
+  void check_scope(const FieldScope& field) {
+    check_pushed(field, field.bodies);
+    check_period(field, field.start, field.end);
+    if (field.drop_rate > 0 && std::holds_alternative<sim::Everywhere>(field.region))
+      warn(field.where.path + "/drop_rate", "has no effect without a region");
+  }
+  /// Whether a list names a body, or what it is a copy of.
+  bool names(const std::vector<std::string>& bodies, const Body& body) const {
+    return std::ranges::any_of(bodies, [&](const std::string& name) {
+      const Body* original = find_named(scene_.bodies, name);
+      return name == body.name || (original && original->where.path == body.where.path);
+    });
+  }
+  void check_force(const ConstantField& field) { check_scope(field); }
+  void check_force(const PointField& field) { check_scope(field); }
+  void check_force(const WindField& wind) {
+    check_scope(wind);
+    Real lightest = kUnlimited;
+    for (const Body& body : flat_.bodies)
+      if (wind.bodies.empty() || names(wind.bodies, body))
+        lightest = std::min(lightest, mass_of(body).value_or(kUnlimited));
+    if (lightest > 0) check_drag(scene_.world.integrator, wind.drag, lightest, wind.where.path + "/drag");
+  }
+  void check_force(const Grab& grab) {
+    const std::string& path = grab.where.path;
+    if (!grab.body.empty()) check_pushed(path + "/body", grab.body, named_body(path + "/body", grab.body));
+    check_period(grab, grab.start, grab.end);
+    if (grab.keyframes.empty()) fail(path, "needs at least one of \"keyframes\"");
+    check_times(grab.keyframes, path + "/keyframes");
+    const auto body = bodies_.find(grab.body);
+    const auto mass = body == bodies_.end() ? std::nullopt : mass_of(*body->second);
+    if (mass && *mass > 0 && std::isfinite(*mass))
+      check_stiffness(grab.stiffness, grab.damping, *mass, path, "the grab '" + grab.name + "'");
+  }
+  void check_force(const Explosion& explosion) { check_pushed(explosion, explosion.bodies); }
 
   // --- Overlays ---
 
@@ -344,6 +440,13 @@ class Checker {
   void check_overlay(const ContactsOverlay& overlay) {
     if (!overlay.a.empty() || !overlay.b.empty()) check_pair(overlay.where.path, overlay.a, overlay.b);
   }
+  void check_overlay(const VelocitiesOverlay& overlay) {
+    const std::string path = overlay.where.path + "/body";
+    const Body* body = overlay.body.empty() ? nullptr : named_body(path, overlay.body);
+    if (body && body->motion == sim::MotionType::fixed)
+      warn(path, "shows nothing: the body '" + overlay.body + "' is static");
+  }
+  void check_overlay(const IslandsOverlay&) {}
 
   // --- Camera, light, film ---
 
@@ -397,7 +500,9 @@ Findings check_scene(const Scene& scene, const Scene& flat, const std::filesyste
 
 Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real c, Real m) {
   // x'' = -(k/m) x and v' = -(c/m) v: the ends of the stability region on the imaginary and on the negative
-  // real axis. The Euler methods and the midpoint rule share 2; Runge-Kutta 4 has 2 sqrt(2) and 2.785.
+  // real axis. The Euler methods and the midpoint rule share 2; Runge-Kutta 4 has 2 sqrt(2) and 2.785. The
+  // implicit method has no end, and the others, from there on, find their own step.
+  if (integrator >= sim::IntegratorKind::implicit_euler) return kUnlimited;
   const bool rk4 = integrator == sim::IntegratorKind::rk4;
   const Real by_stiffness = (rk4 ? 2 * std::sqrt(2.0) : 2) * std::sqrt(m / k),
              by_damping = (rk4 ? 2.785 : 2) * m / c;

@@ -67,8 +67,8 @@ All that it can become must lie in the key's range.
 
 Bodies and emitters may have `repeat`, `grid` and `scatter`. They multiply: a repeat of a grid of a scatter.
 A copy is the original moved as a whole, with its velocities and keyframes; copies of `rock` are called
-`rock_0`, `rock_1` and so on, and other objects refer to them by these names. One object has at most 100000
-copies.
+`rock_0`, `rock_1` and so on, and other objects refer to them by these names; in the list of what a force
+acts on, `rock` is all of them. One object has at most 100000 copies.
 
 ## Including files
 

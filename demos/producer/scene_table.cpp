@@ -1,6 +1,7 @@
 #include "producer/scene_table.h"
 
 #include "producer/table_film.h"
+#include "producer/table_force.h"
 #include "producer/table_overlay.h"
 #include "producer/table_world.h"
 
@@ -18,10 +19,12 @@ struct Table<Scene> {
         {"description", &T::description, "what there is to see"},
         {"world", &T::world, "what holds for everything that is simulated"},
         {"materials", &T::materials, "looks and contact behaviours, used by name"},
+        {"contacts", &T::contacts, "what two materials do to each other"},
         {"bodies", &T::bodies, "rigid bodies"},
         {"particles", &T::particles, "groups of particles placed one by one"},
         {"emitters", &T::emitters, "sources of particles"},
         {"springs", &T::springs, "damped springs"},
+        {"forces", &T::forces, "fields, wind, hands and explosions that act on bodies"},
         {"overlays", &T::overlays, "what shows how the simulation sees the scene"},
         {"camera", &T::camera, "where the film is seen from"},
         {"lights", &T::lights, "the sun"},

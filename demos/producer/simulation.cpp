@@ -14,6 +14,7 @@ namespace {
 
 /// Property number of the per-particle brightness; the emitter's own properties are small numbers.
 constexpr uint32_t kBrightness = 1000;
+constexpr Real kForever = std::numeric_limits<Real>::infinity();
 
 const Material* find_material(const Scene& scene, const std::string& name) {
   const auto it = std::ranges::find(scene.materials, name, &Material::name);
@@ -55,11 +56,52 @@ std::size_t index_of(const sim::ParticleArrays& particles, uint64_t id) {
                                                : particles.size();
 }
 
+sim::ConstantField effect_of(const ConstantField& f) {
+  return {f.force, f.region, static_cast<uint32_t>(f.drop_rate)};
+}
+sim::PointField effect_of(const PointField& f) {
+  return {f.point, f.force, f.region, static_cast<uint32_t>(f.drop_rate)};
+}
+sim::WindField effect_of(const WindField& f) {
+  return {f.wind, f.drag, f.region, static_cast<uint32_t>(f.drop_rate)};
+}
+sim::Grab effect_of(const Grab& f) {
+  sim::Grab grab{.point = f.point, .track = {}, .stiffness = f.stiffness, .damping = f.damping};
+  for (const HandKey& key : f.keyframes)
+    grab.track.keys.push_back({key.time, {key.position, Quat::Identity()}});
+  return grab;
+}
+sim::Explosion effect_of(const Explosion& f) {
+  return {f.point, f.impulse, f.radius, static_cast<uint32_t>(f.drop_rate)};
+}
+
 nlohmann::ordered_json json_of(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
 }
 
 }  // namespace
+
+void SimulationTotals::add(const sim::StepReport& report) {
+  substeps += report.substeps;
+  born += report.particles_born;
+  expired += report.particles_expired;
+  retired += report.particles_retired;
+  ejected += report.particles_ejected;
+  removed += report.particles_removed;
+  particle_collisions += report.particle_collisions;
+  truncated += report.truncated_sweeps;
+  bodies_awake = report.bodies_awake;
+  bodies_asleep = report.bodies_asleep;
+  islands = report.islands;
+  penetration = std::max(penetration, report.penetration);
+  collisions += report.collisions;
+  tracebacks += report.tracebacks;
+  cut_short += report.cut_short;
+  exact.add(report.exact);
+  fast.add(report.fast);
+  impacts.add(report.impacts);
+  integration.add(report.integration);
+}
 
 Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
     : scene_(scene),
@@ -67,10 +109,24 @@ Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
               .wind = scene.world.wind,
               .max_step = scene.world.step,
               .integrator = scene.world.integrator,
+              .integration_error = scene.world.integration_error,
+              .solver = scene.world.solver,
+              .impact = scene.world.impact,
+              .collision_speed = scene.world.collision_speed,
+              .sleep = scene.world.sleep,
               .bounds = sim::Aabb(Vec3::Constant(-scene.world.bounds), Vec3::Constant(scene.world.bounds))}) {
   add_bodies(scene, models);
+  for (const ContactRule& rule : scene.contacts)
+    at_place(rule.where, [&] {
+      world_.add_contact_rule({.a = rule.materials[0],
+                               .b = rule.materials[1],
+                               .restitution = rule.restitution,
+                               .friction = rule.friction,
+                               .static_friction = rule.static_friction});
+    });
   add_particle_groups(scene);
   add_springs(scene);
+  add_forces(scene);
   add_emitters(scene);
   overlays_.emplace(scene, world_, bodies_);
 }
@@ -87,11 +143,18 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
                      .mass = body.mass,
                      .linear_drag = body.linear_drag,
                      .angular_drag = body.angular_drag,
+                     .material = body.material,
+                     .surface_velocity = body.surface_velocity,
                      .collides = body.collides,
                      .track = track_of(body)};
     if (const Material* material = find_material(scene, body.material)) {
       def.restitution = material->restitution;
       def.friction = material->friction;
+      def.static_friction = material->static_friction.value_or(def.static_friction);
+      if (material->cross_friction && !body.friction_axis.isZero(0)) {
+        def.cross_friction = *material->cross_friction;
+        def.friction_axis = body.friction_axis;
+      }
     }
     const sim::BodyHandle handle = at_place(body.where, [&] {
       std::visit(
@@ -185,6 +248,26 @@ void Simulation::add_springs(const Scene& scene) {
   }
 }
 
+void Simulation::add_forces(const Scene& scene) {
+  const auto add = [&](const NamedForce& force, const std::vector<std::string>& bodies, Real start, Real end,
+                       auto effect) {
+    sim::ForceDef def{.name = force.name, .bodies = {}, .start = start, .end = end, .effect = effect};
+    for (const std::string& name : bodies) def.bodies.push_back(body_named(name));
+    at_place(force.where, [&] { world_.add_force(def); });
+  };
+  for (const Force& force : scene.forces)
+    std::visit(
+        [&]<class F>(const F& f) {
+          if constexpr (std::is_same_v<F, Explosion>)
+            add(f, f.bodies, f.time, kForever, effect_of(f));
+          else if constexpr (std::is_same_v<F, Grab>)
+            add(f, {f.body}, f.start, f.end, effect_of(f));
+          else
+            add(f, f.bodies, f.start, f.end, effect_of(f));
+        },
+        force);
+}
+
 sim::BodyHandle Simulation::body_named(const std::string& name) const {
   const auto it = bodies_.find(name);
   return it == bodies_.end() ? sim::BodyHandle{} : it->second;
@@ -195,14 +278,9 @@ void Simulation::step(double sampling_time) {
     if (on_substep_) on_substep_(start);
     for (effects::Emitter& emitter : emitters_) emitter.emit(world_, start, end);
   });
-  totals_.substeps += report.substeps;
-  totals_.born += report.particles_born;
-  totals_.expired += report.particles_expired;
-  totals_.retired += report.particles_retired;
-  totals_.ejected += report.particles_ejected;
-  totals_.removed += report.particles_removed;
-  totals_.collisions += report.particle_collisions;
-  totals_.truncated += report.truncated_sweeps;
+  totals_.add(report);
+  totals_.contacts = world_.contacts().size();
+  totals_.most_contacts = std::max(totals_.most_contacts, totals_.contacts);
   totals_.waiting = totals_.skipped = 0;
   for (const effects::Emitter& emitter : emitters_) {
     totals_.waiting += emitter.report().waited;
@@ -218,14 +296,6 @@ void Simulation::step(double sampling_time) {
                     "world.step or weaker forces",
                     world_.time(), report.non_finite.object),
         state_dump(report.non_finite));
-  if (!report.unresolved.empty()) {
-    const sim::UnresolvedContact& contact = report.unresolved.front();
-    throw UnsupportedError(
-        fmt::format("bodies '{}' and '{}' touch at {:.4f} s, and contact between bodies is not available in "
-                    "this version; keep "
-                    "dynamic bodies apart, or give one of them \"collides\": false",
-                    world_.body_def(contact.a).name, world_.body_def(contact.b).name, contact.time));
-  }
 }
 
 void Simulation::advance() {

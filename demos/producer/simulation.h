@@ -29,18 +29,25 @@ class DivergedError : public std::runtime_error {
  private:
   std::string state_;
 };
-/// The scene needs something of the physics that is not there, such as contact between bodies.
-class UnsupportedError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
-/// Sums of the step reports of a run.
+/// What the step reports of a run come to.
 struct SimulationTotals {
-  uint64_t substeps = 0, born = 0, expired = 0, retired = 0, ejected = 0, removed = 0, collisions = 0,
-           truncated = 0;
+  uint64_t substeps = 0, born = 0, expired = 0, retired = 0, ejected = 0, removed = 0,
+           particle_collisions = 0, truncated = 0;
   uint64_t waiting = 0, skipped = 0;     ///< of the emitters
   std::vector<std::string> lost_bodies;  ///< left the world's bounds and were frozen there
+
+  uint32_t bodies_awake = 0, bodies_asleep = 0, islands = 0;  ///< at the end
+  std::size_t contacts = 0;                                   ///< points where bodies touch, at the end
+  std::size_t most_contacts = 0;                              ///< at the end of a frame
+  sim::Real penetration = 0;                                  ///< greatest of the run [m]
+  uint64_t collisions = 0, tracebacks = 0, cut_short = 0;
+  sim::ContactWork exact, fast, impacts;
+  sim::IntegratorReport integration;
+
+  /// Problems of contacts that the solvers meant for them did not solve.
+  uint64_t fallbacks() const { return exact.fallbacks + fast.fallbacks + impacts.fallbacks; }
+  void add(const sim::StepReport& report);
 };
 
 class Simulation {
@@ -53,7 +60,7 @@ class Simulation {
   void on_substep(std::function<void(double time)> callback) { on_substep_ = std::move(callback); }
 
   /// Advances by one frame. What `output.start` skips takes several calls, during which frame() is 0. Throws
-  /// DivergedError or UnsupportedError.
+  /// DivergedError.
   void advance();
   int frame() const { return frame_; }
 
@@ -84,6 +91,7 @@ class Simulation {
   void add_particle_groups(const Scene& scene);
   void add_emitters(const Scene& scene);
   void add_springs(const Scene& scene);
+  void add_forces(const Scene& scene);
   sim::BodyHandle body_named(const std::string& name) const;
   void step(double sampling_time);
   PointSet point_set(sim::ParticleSystemHandle system, const ParticleLook& look,

@@ -69,14 +69,47 @@ struct Table<ContactsOverlay> {
   static constexpr const char* kName = "contacts_overlay";
   static constexpr const char* kHelp =
       "Contact points of bodies, as rings, and as arrows the direction in which the first is pushed, or what "
-      "touches a plane.";
+      "touches a plane. They are those of the simulation, or by geometry if neither body is dynamic.";
   static Fields<ContactsOverlay> fields() {
     using T = ContactsOverlay;
     return Fields<T>{{"a", &T::a, "name of a body; empty: every pair of bodies that collide"},
                      {"b", &T::b, "name of another; empty: every pair of bodies that collide"},
-                     {"margin", &T::margin, "bodies nearer than this count as touching", "m", kNotNegative},
+                     {"margin", &T::margin,
+                      "bodies that are not dynamic count as touching if nearer than this", "m", kNotNegative},
                      {"size", &T::size, "radius of the rings; arrows are four times as long", "m", kPositive},
+                     {"force_scale", &T::force_scale,
+                      "length of arrows per force, which they then show with its friction; 0: arrows of one "
+                      "length",
+                      "m/N", kNotNegative},
                      {"color", &T::color, "of rings and arrows"}}
+        .with_base<LineLook>();
+  }
+};
+template <>
+struct Table<VelocitiesOverlay> {
+  static constexpr const char* kName = "velocities_overlay";
+  static constexpr const char* kHelp = "How fast bodies move, as arrows from their centres of mass.";
+  static Fields<VelocitiesOverlay> fields() {
+    using T = VelocitiesOverlay;
+    return Fields<T>{
+        {"body", &T::body, "name of a body; empty: all that are not static"},
+        {"scale", &T::scale, "length of arrows per speed", "s", kNotNegative},
+        {"angular_scale", &T::angular_scale,
+         "length of arrows along the axis of rotation per angular speed; 0: none", "m s/rad", kNotNegative},
+        {"color", &T::color, "of arrows of velocity"},
+        {"angular_color", &T::angular_color, "of arrows of angular velocity"}}
+        .with_base<LineLook>();
+  }
+};
+template <>
+struct Table<IslandsOverlay> {
+  static constexpr const char* kName = "islands_overlay";
+  static constexpr const char* kHelp =
+      "Groups of dynamic bodies that touch each other directly or through others: a box around each body in "
+      "the colour of its group.";
+  static Fields<IslandsOverlay> fields() {
+    using T = IslandsOverlay;
+    return Fields<T>{{"asleep", &T::asleep, "brightness of bodies that are asleep", "", kShare}}
         .with_base<LineLook>();
   }
 };
@@ -84,7 +117,7 @@ template <>
 struct Tags<Overlay> {
   static constexpr const char* kName = "overlay";
   static constexpr const char* kHelp = "Something drawn over the picture to show how the simulation sees it.";
-  static constexpr std::array kTags = {"tree", "parts", "closest", "contacts"};
+  static constexpr std::array kTags = {"tree", "parts", "closest", "contacts", "velocities", "islands"};
   static constexpr bool kRequired = true;
 };
 

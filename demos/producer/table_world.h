@@ -1,6 +1,6 @@
 #pragma once
 /// The keys of what is simulated: the world, materials, bodies with their shapes and placement, particles,
-/// emitters, springs.
+/// emitters, springs. Those of forces are in table_force.h.
 
 #include <array>
 
@@ -13,7 +13,17 @@ namespace offstage::producer {
 
 template <>
 struct Names<sim::IntegratorKind> {
-  static constexpr std::array kNames = {"explicit_euler", "symplectic_euler", "midpoint", "rk4"};
+  static constexpr std::array kNames = {
+      "explicit_euler", "symplectic_euler",  "midpoint",     "rk4",           "implicit_euler",
+      "adaptive_euler", "adaptive_midpoint", "adaptive_rk4", "dormand_prince"};
+};
+template <>
+struct Names<sim::SolverKind> {
+  static constexpr std::array kNames = {"exact", "fast", "auto"};
+};
+template <>
+struct Names<sim::ImpactLaw> {
+  static constexpr std::array kNames = {"simultaneous", "sequential"};
 };
 template <>
 struct Table<WorldSettings> {
@@ -27,6 +37,19 @@ struct Table<WorldSettings> {
         {"step", &T::step, "longest step of the simulation; every frame takes the fewest equal ones", "s",
          between(1e-6, 1)},
         {"integrator", &T::integrator, "method for bodies and everything joined by springs"},
+        {"integration_error", &T::integration_error,
+         "greatest error of a coordinate that an adaptive integrator or `dormand_prince` allows in a step",
+         "m", between(1e-14, 1)},
+        {"solver", &T::solver,
+         "of resting contact: `exact` finds contact forces to rounding and collisions at their very times, "
+         "`fast` takes a bounded amount of work, `auto` the exact one where that is not slower"},
+        {"impact", &T::impact,
+         "of collisions at the same time: all solved together, or one after the other, which lets a blow "
+         "pass "
+         "through a row of balls"},
+        {"collision_speed", &T::collision_speed, "bodies that meet slower than this do not bounce", "m/s",
+         over(0, 100)},
+        {"sleep", &T::sleep, "bodies at rest are left alone until something happens to them"},
         {"bounds", &T::bounds, "half the edge of the cube that things must stay in", "m", kPositive},
         {"seed", &T::seed, "changes every random number of the scene", "", kNotNegative},
     };
@@ -58,9 +81,31 @@ struct Table<Material> {
         {"pattern_scale", &T::pattern_scale, "size of one cell of the pattern", "m", kPositive},
         {"texture", &T::texture, "image file, multiplies the base colour; empty: none"},
         {"two_sided", &T::two_sided, "lit and drawn from behind too"},
-        {"restitution", &T::restitution, "bounciness against particles; the larger of the two counts", "",
-         kShare},
-        {"friction", &T::friction, "Coulomb's coefficient against particles; the geometric mean counts", "",
+        {"restitution", &T::restitution, "bounciness; of two the larger counts", "", kShare},
+        {"friction", &T::friction,
+         "Coulomb's coefficient of what slides; of two the geometric mean counts, as of the next two", "",
+         kNotNegative},
+        {"static_friction", &T::static_friction,
+         "the same of what does not slide, between bodies; left out: `friction`", "", kNotNegative},
+        {"cross_friction", &T::cross_friction,
+         "the same of sliding across the `friction_axis` of a body; left out: `friction`", "", kNotNegative},
+    };
+  }
+};
+template <>
+struct Table<ContactRule> {
+  static constexpr const char* kName = "contact";
+  static constexpr const char* kHelp =
+      "What bodies of two materials do to each other, in place of what would follow from each material.";
+  static Fields<ContactRule> fields() {
+    using T = ContactRule;
+    return {
+        {"materials", &T::materials, "names of two materials, in any order; may be the same", kRequired},
+        {"restitution", &T::restitution, "bounciness; left out: by the materials", "", kShare},
+        {"friction", &T::friction, "Coulomb's coefficient of what slides; left out: by the materials", "",
+         kNotNegative},
+        {"static_friction", &T::static_friction,
+         "of what does not slide; left out: `friction` if that is given, else by the materials", "",
          kNotNegative},
     };
   }
@@ -237,6 +282,11 @@ struct Table<Body> {
         {"linear_drag", &T::linear_drag, "force against the air per speed", "kg/s", kNotNegative},
         {"angular_drag", &T::angular_drag, "torque against rotation per angular speed", "kg m^2/s",
          kNotNegative},
+        {"friction_axis", &T::friction_axis,
+         "direction of the surface's grain in the body's frame, along which `friction` counts and across it "
+         "the material's `cross_friction`; zero: none"},
+        {"surface_velocity", &T::surface_velocity,
+         "of the surface against the body, as of a conveyor belt; in the body's frame", "m/s"},
         {"collides", &T::collides, "takes part in collisions"},
         {"visible", &T::visible, "is drawn"},
         {"casts_shadow", &T::casts_shadow, "throws a shadow"},

@@ -10,14 +10,14 @@
 
 namespace offstage::producer {
 
-Trace::Trace(const std::filesystem::path& path, const Simulation& simulation)
-    : path_(path), temporary_(path.string() + fmt::format(".{}.part", getpid())), simulation_(simulation) {
+CsvFile::CsvFile(const std::filesystem::path& path, const std::string& header)
+    : path_(path), temporary_(path.string() + fmt::format(".{}.part", getpid())) {
   file_ = std::fopen(temporary_.c_str(), "wb");
-  if (!file_) throw render::FileError(path_.string() + ": " + std::strerror(errno));
-  write("time,object,x,y,z,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz\n");
+  if (!file_) fail();
+  write(header + "\n");
 }
 
-Trace::~Trace() {
+CsvFile::~CsvFile() {
   if (!file_) return;
   const bool whole_rows = std::fclose(file_) == 0;
   std::error_code ignored;
@@ -26,6 +26,27 @@ Trace::~Trace() {
   else
     std::filesystem::remove(temporary_, ignored);
 }
+
+void CsvFile::write(const std::string& rows) {
+  if (std::fwrite(rows.data(), 1, rows.size(), file_) != rows.size()) fail();
+}
+
+void CsvFile::close() {
+  const bool flushed = std::fflush(file_) == 0 && fsync(fileno(file_)) == 0;
+  if (!flushed) fail();
+  std::fclose(file_);
+  file_ = nullptr;
+  std::error_code error;
+  std::filesystem::rename(temporary_, path_, error);
+  if (error) throw render::FileError(path_.string() + ": " + error.message());
+}
+
+void CsvFile::fail() {
+  throw render::FileError(path_.string() + ": " + std::strerror(errno));
+}
+
+Trace::Trace(const std::filesystem::path& path, const Simulation& simulation)
+    : file_(path, "time,object,x,y,z,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz"), simulation_(simulation) {}
 
 void Trace::record(double time) {
   const sim::World& world = simulation_.world();
@@ -45,25 +66,22 @@ void Trace::record(double time) {
                      particles.id[i], p.x(), p.y(), p.z(), v.x(), v.y(), v.z());
     }
   }
-  write(rows);
+  file_.write(rows);
 }
 
-void Trace::write(const std::string& text) {
-  if (std::fwrite(text.data(), 1, text.size(), file_) != text.size()) fail();
-}
+ContactTrace::ContactTrace(const std::filesystem::path& path, const Simulation& simulation)
+    : file_(path, "time,a,b,x,y,z,nx,ny,nz,fx,fy,fz,separation"), simulation_(simulation) {}
 
-void Trace::close() {
-  const bool flushed = std::fflush(file_) == 0 && fsync(fileno(file_)) == 0;
-  if (!flushed) fail();
-  std::fclose(file_);
-  file_ = nullptr;
-  std::error_code error;
-  std::filesystem::rename(temporary_, path_, error);
-  if (error) throw render::FileError(path_.string() + ": " + error.message());
-}
-
-void Trace::fail() {
-  throw render::FileError(path_.string() + ": " + std::strerror(errno));
+void ContactTrace::record(double time) {
+  const sim::World& world = simulation_.world();
+  std::string rows;
+  for (const sim::ContactState& c : world.contacts()) {
+    const sim::Vec3 &p = c.point, &n = c.normal, &f = c.force;
+    fmt::format_to(std::back_inserter(rows), "{},{},{},{},{},{},{},{},{},{},{},{},{}\n", time,
+                   world.body_def(c.a).name, world.body_def(c.b).name, p.x(), p.y(), p.z(), n.x(), n.y(),
+                   n.z(), f.x(), f.y(), f.z(), c.separation);
+  }
+  file_.write(rows);
 }
 
 }  // namespace offstage::producer

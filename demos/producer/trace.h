@@ -1,6 +1,6 @@
 #pragma once
-/// CSV of where everything went: time, object, position, orientation, velocities. Values are written with all
-/// their digits, so that a trace can be checked against closed forms.
+/// CSV of what happened in a simulation. Values are written with all their digits, so that a trace can be
+/// checked against closed forms.
 
 #include <cstdio>
 #include <filesystem>
@@ -10,26 +10,53 @@
 
 namespace offstage::producer {
 
-class Trace {
+/// A table that grows row by row. It appears under its name on close(); one that ends before that is kept
+/// with .partial behind its name.
+class CsvFile {
  public:
-  /// Throws render::FileError. The file appears under its name on close(); a trace that ends before that is
-  /// kept with .partial behind its name.
-  Trace(const std::filesystem::path& path, const Simulation& simulation);
-  ~Trace();
-  Trace(const Trace&) = delete;
-  Trace& operator=(const Trace&) = delete;
+  /// Throws render::FileError, as do the others.
+  CsvFile(const std::filesystem::path& path, const std::string& header);
+  ~CsvFile();
+  CsvFile(const CsvFile&) = delete;
+  CsvFile& operator=(const CsvFile&) = delete;
 
-  /// One row per moving body and per placed particle ("group/id").
-  void record(double time);
+  /// Whole rows, each with its end of line.
+  void write(const std::string& rows);
   void close();
 
  private:
-  void write(const std::string& text);
   void fail();
 
   std::filesystem::path path_, temporary_;
-  const Simulation& simulation_;
   std::FILE* file_ = nullptr;
+};
+
+/// Where everything went: time, object, position, orientation, velocities.
+class Trace {
+ public:
+  Trace(const std::filesystem::path& path, const Simulation& simulation);
+
+  /// One row per moving body and per placed particle ("group/id").
+  void record(double time);
+  void close() { file_.close(); }
+
+ private:
+  CsvFile file_;
+  const Simulation& simulation_;
+};
+
+/// Where bodies touched: time, the two bodies, point, normal from b to a, force on a, separation.
+class ContactTrace {
+ public:
+  ContactTrace(const std::filesystem::path& path, const Simulation& simulation);
+
+  /// One row per contact point.
+  void record(double time);
+  void close() { file_.close(); }
+
+ private:
+  CsvFile file_;
+  const Simulation& simulation_;
 };
 
 }  // namespace offstage::producer

@@ -127,10 +127,14 @@ Description Codec<uint64_t>::describe(Catalogue&, const Spec& spec) {
 
 // --- vectors, orientations, colours ---
 
+Description describe_tuple(Description item, std::size_t size) {
+  const auto n = static_cast<int64_t>(size);
+  return {{{"type", "array"}, {"items", std::move(item.schema)}, {"minItems", n}, {"maxItems", n}},
+          std::to_string(size) + " " + item.type + "s"};
+}
+
 Description describe_vector(Description item, int size, bool nonzero) {
-  Description d{
-      {{"type", "array"}, {"items", std::move(item.schema)}, {"minItems", size}, {"maxItems", size}},
-      std::to_string(size) + " " + item.type + "s"};
+  Description d = describe_tuple(std::move(item), static_cast<std::size_t>(size));
   if (nonzero) d.schema.push_back({"not", Object{{"items", Object{{"const", 0}}}}});
   return d;
 }

@@ -2,6 +2,7 @@
 /// How plain values stand in a scene file: numbers, text, vectors, orientations, colours, numbers that vary,
 /// keys over age.
 
+#include <array>
 #include <string>
 #include <utility>
 #include <vector>
@@ -96,6 +97,27 @@ struct Codec<Eigen::Matrix<S, N, 1>> {
   }
   static Description describe(Catalogue& all, const Spec& spec) {
     return describe_vector(Codec<S>::describe(all, spec), N, spec.limits.nonzero);
+  }
+};
+
+Description describe_tuple(Description item, std::size_t size);
+
+/// A list of so many values of one kind.
+template <class V, std::size_t N>
+struct Codec<std::array<V, N>> {
+  static void read(Reader& in, const Node& node, const Spec& spec, std::array<V, N>& out) {
+    const List* list = in.list(node, "a list of " + std::to_string(N) + " values", N, N);
+    if (!list) return;
+    for (std::size_t i = 0; i < N; ++i)
+      in.within(std::to_string(i), [&] { Codec<V>::read(in, (*list)[i], spec, out[i]); });
+  }
+  static Node write(const std::array<V, N>& values) {
+    List list;
+    for (const V& value : values) list.push_back(Codec<V>::write(value));
+    return list;
+  }
+  static Description describe(Catalogue& all, const Spec& spec) {
+    return describe_tuple(Codec<V>::describe(all, spec), N);
   }
 };
 

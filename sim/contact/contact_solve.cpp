@@ -391,7 +391,8 @@ uint32_t resolve_collisions(const Island& island, Real reach, Real collision_spe
         contacts.push_back(c);
         const bool bounces = u.x() < -collision_speed;
         collisions += bounces;
-        restitution.push_back(bounces ? pair->surface().restitution : 0);
+        // In sequence, a contact at rest may be hit by the impulse of another.
+        restitution.push_back(bounces || law == ImpactLaw::sequential ? pair->surface().restitution : 0);
       }
   }
   if (contacts.empty()) return 0;

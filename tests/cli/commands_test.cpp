@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <sstream>
 
 #include <gtest/gtest.h>
@@ -101,15 +102,66 @@ TEST(Commands, DivergedSimulationIsExit5AndSavesTheState) {
   EXPECT_NE(state["not_finite"]["velocity"].get<std::string>().find("inf"), std::string::npos);
 }
 
-TEST(Commands, ContactOfTwoBodiesIsAClearRefusalNotWrongPhysics) {
+/// A crate of 8 kg that falls on the floor, with more keys of the scene.
+std::string falling_crate(const std::string& more) {
+  return R"({"version": 1, "materials": [{"name": "wood", "restitution": 0}],
+    "bodies": [{"name": "floor", "motion": "static", "shape": {"type": "plane"}, "material": "wood"},
+               {"name": "crate", "mass": 8, "material": "wood", "position": [0, 0.6, 0]}],
+    "output": {"duration": 1.5})" +
+         more + "}";
+}
+
+TEST(Commands, ContactsOfARestingBodyCarryItsWeight) {
   const TemporaryFolder folder;
-  write_file(folder / "s.json",
-             R"({"version": 1, "bodies": [{"name": "floor", "motion": "static", "shape": {"type": "plane"}},
-                 {"name": "crate", "position": [0, 1, 0]}], "output": {"duration": 2}})");
-  const Outcome run = offstage("simulate s.json", folder.path());
-  EXPECT_EQ(run.code, 1);
-  EXPECT_NE(run.err.find("'crate'"), std::string::npos) << run.err;
-  EXPECT_NE(run.err.find("'floor'"), std::string::npos) << run.err;
+  for (const std::string solver : {"exact", "fast", "auto"}) {
+    write_file(folder / "s.json", falling_crate(R"(, "world": {"solver": ")" + solver + R"("})"));
+    const Outcome run = offstage("simulate s.json --contacts c.csv --force --progress none", folder.path());
+    ASSERT_EQ(run.code, 0) << run.err;
+    std::istringstream rows(read_file(folder / "c.csv"));
+    std::string row;
+    std::getline(rows, row);
+    EXPECT_EQ(row, "time,a,b,x,y,z,nx,ny,nz,fx,fy,fz,separation");
+    std::map<std::string, double> weight;  // by time
+    while (std::getline(rows, row)) {
+      std::istringstream cells(row);
+      std::vector<std::string> cell(13);
+      for (std::string& text : cell) std::getline(cells, text, ',');
+      const double up = cell[1] == "crate" ? 1 : -1;  // the force is on a, the normal from b to a
+      EXPECT_EQ(cell[1] == "crate" ? cell[2] : cell[1], "floor");
+      EXPECT_NEAR(std::stod(cell[7]), up, 1e-9);
+      EXPECT_NEAR(std::abs(std::stod(cell[3])), 0.5, 1e-3);
+      weight[cell[0]] += up * std::stod(cell[10]);
+    }
+    ASSERT_GT(weight.size(), 30u) << solver;
+    EXPECT_NEAR(weight.rbegin()->second, 8 * 9.81, 0.01) << solver;
+  }
+}
+
+TEST(Commands, FiguresOfContactsAreInTheStats) {
+  const TemporaryFolder folder;
+  write_file(folder / "s.json", falling_crate(R"(, "world": {"solver": "exact", "sleep": false})"));
+  const Outcome run = offstage("simulate s.json --progress none", folder.path());
+  ASSERT_EQ(run.code, 0) << run.err;
+  EXPECT_EQ(run.err, "") << "nothing to warn of";
+  const json stats = json::parse(run.out);
+  EXPECT_EQ(stats["contacts"], 4);
+  EXPECT_EQ(stats["islands"], 1);
+  EXPECT_EQ(stats["bodies_awake"], 1);
+  EXPECT_GE(stats["most_contacts"], 4);
+  EXPECT_GE(stats["collisions"], 1);
+  EXPECT_LT(stats["penetration"], 1e-3);
+  EXPECT_GT(stats["exact_solver"]["solves"], 0);
+  for (const char* solver : {"exact_solver", "fast_solver", "impact_solver"})
+    EXPECT_EQ(stats[solver]["fallbacks"], 0);
+  EXPECT_NEAR(stats["energy_end"]["potential"].get<double>(), 8 * 9.81 * 0.5, 0.1);
+}
+
+TEST(Commands, TwoOutputsNeverShareAFile) {
+  const TemporaryFolder folder;
+  write_file(folder / "s.json", falling_crate(""));
+  EXPECT_EQ(offstage("simulate s.json --trace a.csv --contacts ./a.csv", folder.path()).code, 2);
+  EXPECT_EQ(offstage("simulate s.json --stats a.csv --contacts a.csv", folder.path()).code, 2);
+  EXPECT_EQ(contents(folder.path()).size(), 1u);
 }
 
 TEST(Commands, OverridesAreCheckedLikeTheFile) {
@@ -273,8 +325,8 @@ TEST(Commands, DoctorFindsGlAndEncoders) {
 TEST(Commands, SchemaIsJsonAndNamesEverySection) {
   const TemporaryFolder folder;
   const json schema = json::parse(offstage("schema", folder.path()).out);
-  for (const char* section : {"world", "materials", "bodies", "particles", "emitters", "springs", "camera",
-                              "lights", "environment", "render", "output"})
+  for (const char* section : {"world", "materials", "bodies", "particles", "emitters", "springs", "contacts",
+                              "forces", "overlays", "camera", "lights", "environment", "render", "output"})
     EXPECT_TRUE(schema["properties"].contains(section)) << section;
 }
 

@@ -3,6 +3,8 @@
 #include "producer/overlays.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include <gtest/gtest.h>
 
@@ -113,6 +115,73 @@ TEST(Overlays, ContactsOfAllPairsArePushedApart) {
   ASSERT_EQ(heights.size(), 2u) << testing::PrintToString(heights);
   EXPECT_NEAR(heights[0], -0.0005, 1e-5);
   EXPECT_NEAR(heights[1], 0.997, 1e-5);
+}
+
+/// A cube of 2 kg that has come to rest on the floor after half a second, and one in free fall far above.
+std::string resting_and_falling(const std::string& overlays, const std::string& more = "") {
+  return R"({"materials": [{"name": "wood", "restitution": 0}], "bodies": [
+    {"name": "floor", "motion": "static", "shape": {"type": "plane"}, "material": "wood"},
+    {"name": "resting", "mass": 2, "position": [0, 0.501, 0], "material": "wood"},
+    {"name": "falling", "mass": 2, "position": [3, 90, 0], "velocity": [1, 0, 0], "angular_velocity": [0, 0, 2]}],
+    "output": {"fps": 10}, "overlays": [)" +
+         overlays + "]" + more + "}";
+}
+Shown after_half_a_second(const std::string& text) {
+  Shown shown(text);
+  for (int frame = 0; frame < 5; ++frame) shown.simulation.advance();
+  return shown;
+}
+/// From the start to the tip of every arrow of a set.
+std::vector<Vector3f> arrows(const LineSet& set) {
+  std::vector<Vector3f> all;
+  for (std::size_t i = 1; i < set.lines.size(); ++i)
+    if (set.lines[i].width_b == 0) all.push_back(set.lines[i].b - set.lines[i - 1].a);
+  return all;
+}
+
+TEST(Overlays, ForcesOfContactsAddUpToTheWeight) {
+  const Shown shown = after_half_a_second(resting_and_falling(
+      R"({"type": "contacts", "force_scale": 0.1}, {"type": "contacts", "size": 0.05},
+         {"type": "contacts", "a": "falling", "b": "floor"}, {"type": "contacts", "a": "floor", "b": "resting"})"));
+  const std::vector<Vector3f> forces = arrows(shown.lines(0)), normals = arrows(shown.lines(1));
+  ASSERT_EQ(forces.size(), 4u);
+  Vector3f sum = Vector3f::Zero();
+  for (const Vector3f& force : forces) sum += force;
+  EXPECT_NEAR(std::abs(sum.y()), 0.1 * 2 * 9.81, 1e-3);
+  ASSERT_EQ(normals.size(), 4u);
+  for (const Vector3f& normal : normals) EXPECT_NEAR(std::abs(normal.y()), 4 * 0.05, 1e-5);
+  EXPECT_TRUE(shown.lines(2).lines.empty());
+  EXPECT_EQ(shown.lines(3).lines.size(), shown.lines(1).lines.size());
+}
+
+TEST(Overlays, VelocitiesAreArrowsFromTheCentre) {
+  const Shown shown = after_half_a_second(resting_and_falling(
+      R"({"type": "velocities", "body": "falling", "scale": 0.5, "angular_scale": 0.25}, {"type": "velocities"})"));
+  const std::vector<Vector3f> shown_arrows = arrows(shown.lines(0));
+  ASSERT_EQ(shown_arrows.size(), 2u);
+  EXPECT_TRUE(shown_arrows[0].isApprox(0.5f * Vector3f(1, -9.81f * 0.5f, 0), 1e-5f));
+  EXPECT_TRUE(shown_arrows[1].isApprox(Vector3f(0, 0, 0.5f), 1e-5f));
+  EXPECT_TRUE(shown.lines(0).lines[0].a.isApprox(Vector3f(3.5f, 90 - 9.81f / 8, 0), 1e-5f));
+  EXPECT_EQ(arrows(shown.lines(1)).size(), 1u) << "what rests has none, nor has the floor";
+}
+
+TEST(Overlays, GroupsThatTouchShareAColourAndSleepersAreDim) {
+  const std::string stack =
+      R"({"name": "upper", "position": [0, 1.5, 0]}, {"name": "lower", "position": [0, 0.5, 0]},
+    {"name": "lone", "position": [5, 0.5, 0]}, {"motion": "static", "shape": {"type": "plane"}})";
+  const auto colors = [&](const std::string& sleep) {
+    Shown shown(R"({"world": {"sleep": )" + sleep + R"(}, "bodies": [)" + stack +
+                R"(], "overlays": [{"type": "islands", "asleep": 0.5}]})");
+    for (int frame = 0; frame < 90; ++frame) shown.simulation.advance();
+    const LineSet set = shown.lines();
+    EXPECT_EQ(set.lines.size(), 3u * 12);
+    return std::array{set.lines[0].color, set.lines[12].color, set.lines[24].color};
+  };
+  const auto awake = colors("false"), asleep = colors("true");
+  EXPECT_EQ(awake[0], awake[1]);
+  EXPECT_NE(awake[0], awake[2]);
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_TRUE(asleep[i].head<3>().isApprox(0.5f * awake[i].head<3>(), 1e-5f)) << i;
 }
 
 TEST(Overlays, AreTheSameWhateverWasSeenBefore) {

@@ -8,15 +8,20 @@ inline constexpr const char* kSampleScene = R"({
   "$schema": "scene.schema.json",
   "version": 1,
   "description": "everything at once",
-  "world": {"gravity": [0, -9.81, 0], "wind": [1, 0, 0], "step": 0.002, "integrator": "midpoint", "seed": 42},
+  "world": {"gravity": [0, -9.81, 0], "wind": [1, 0, 0], "step": 0.002, "integrator": "midpoint",
+            "integration_error": 1e-5, "solver": "fast", "impact": "sequential", "collision_speed": 0.1, "sleep": false,
+            "seed": 42},
   "materials": [
-    {"name": "red", "color": "#c03020", "roughness": 0.3, "restitution": 1},
+    {"name": "red", "color": "#c03020", "roughness": 0.3, "restitution": 1, "friction": 0.2,
+     "static_friction": 0.4, "cross_friction": 0.6},
     {"name": "glass", "color": [0.9, 1, 1, 0.25], "metallic": 0, "pattern": "checker", "pattern_color": "#00000080"}
   ],
+  "contacts": [{"materials": ["red", "glass"], "restitution": 0.1, "friction": 0, "static_friction": 0.05}],
   "bodies": [
     // primitives
     {"name": "floor", "shape": {"type": "plane"}, "motion": "static", "material": "glass"},
-    {"name": "ball", "shape": {"type": "sphere", "radius": 0.25}, "position": [0, 2, 0], "mass": 2, "material": "red"},
+    {"name": "ball", "shape": {"type": "sphere", "radius": 0.25}, "position": [0, 2, 0], "mass": 2, "material": "red",
+     "friction_axis": [1, 0, 0], "surface_velocity": [0, 0, 1]},
     {"name": "wheel", "shape": {"type": "cylinder", "radius": 1, "height": 0.2}, "motion": "kinematic",
      "orientation": {"axis": [1, 0, 0], "angle_deg": 90}, "spin": [0, 3, 0],
      "keyframes": [{"time": 0}, {"time": 2, "position": [1, 1, 0], "orientation": [1, 0, 0, 1]}], "loop": true},
@@ -41,11 +46,20 @@ inline constexpr const char* kSampleScene = R"({
     {"a": {"particles": "chain"}, "b": {"particles": "chain", "index": 1}, "stiffness": 50, "damping": 0.1},
     {"name": "tie", "a": {"position": [0, 4, 0]}, "b": {"body": "ball", "position": [0, 0.25, 0]}, "material": "red"}
   ],
+  "forces": [
+    {"type": "constant", "force": [0, 0, 1], "region": {"type": "box", "size": [4, 4, 4]}, "drop_rate": 1},
+    {"type": "point", "point": [0, 5, 0], "force": -3, "region": {"type": "sphere", "radius": 2}, "end": 2},
+    {"type": "wind", "name": "gust", "wind": [5, 0, 0], "drag": 0.1, "start": 0.5, "bodies": ["ball"]},
+    {"type": "grab", "body": "ball", "point": [0, 0.25, 0], "keyframes": [{"position": [0, 3, 0]}], "end": 1},
+    {"type": "explosion", "time": 1, "point": [0, 0, 0.1], "impulse": 4, "radius": 3, "drop_rate": 2}
+  ],
   "overlays": [
     {"type": "tree", "body": "rock_0", "volume": "sphere", "level": {"curve": [[0, 0], [3, 4]]}, "hidden": 0},
     {"type": "parts", "body": "rock_1", "explode": 0.5},
     {"type": "closest", "a": "ball", "b": "wheel", "color": "#40c0ff", "width": 0.004},
-    {"type": "contacts", "margin": 0.02}
+    {"type": "contacts", "margin": 0.02, "force_scale": 0.01},
+    {"type": "velocities", "angular_scale": 0.1},
+    {"type": "islands", "asleep": 0.1}
   ],
   "camera": {"type": "keyframes", "keyframes": [{"time": 0, "eye": [4, 2, 6]}, {"time": 3, "eye": [0, 2, 7]}]},
   "lights": [{"type": "sun", "direction": [1, 2, 1], "color": [1, 0.9, 0.8]}],

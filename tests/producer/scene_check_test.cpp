@@ -77,7 +77,8 @@ TEST(SceneCheck, OverlaysShowWhatThereIs) {
   EXPECT_EQ(errors_of(R"({"overlays": [{"type": "tree", "body": "a", "level": -1}, {"body": "a"}]})"),
             "/overlays/0/body: there is no body 'a'\n"
             "/overlays/0/level: must be between 0 and 16, got -1\n"
-            "/overlays/1/type: is required: one of \"tree\", \"parts\", \"closest\" or \"contacts\"\n");
+            "/overlays/1/type: is required: one of \"tree\", \"parts\", \"closest\", \"contacts\", "
+            "\"velocities\" or \"islands\"\n");
 }
 
 TEST(SceneCheck, FilesAreThere) {
@@ -131,6 +132,72 @@ TEST(SceneCheck, WhatHasNoEffectIsWarnedOf) {
             "/emitters/0: releases no particles: rate, count and bursts are zero\n"
             "/springs/0: has no effect: neither end can move\n"
             "/render/size: is odd: most video formats need even numbers\n");
+}
+
+TEST(SceneCheck, ContactRulesNameTwoMaterialsOnce) {
+  EXPECT_EQ(errors_of(R"({"materials": [{"name": "ice"}, {"name": "steel"}],
+    "bodies": [{"material": "ice"}, {"material": "steel"}],
+    "contacts": [{"materials": ["ice", "steel"], "friction": 0.02}, {"materials": ["steel", "ice"], "friction": 1},
+                 {"materials": ["ice", "stele"], "restitution": 1}, {"materials": ["ice"]}, {"friction": 1},
+                 {"materials": ["ice", ""], "restitution": 2}]})"),
+            "/contacts/1/materials: are already those of /contacts/0\n"
+            "/contacts/2/materials/1: there is no material 'stele'; did you mean 'steel'?\n"
+            "/contacts/3/materials: must be a list of 2 values, got 1 items\n"
+            "/contacts/4/materials: is required: names of two materials, in any order; may be the same\n"
+            "/contacts/5/materials/1: must not be empty\n"
+            "/contacts/5/restitution: must be between 0 and 1, got 2\n");
+  EXPECT_EQ(warnings_of(R"({"materials": [{"name": "ice"}], "bodies": [{"material": "ice"}],
+                           "contacts": [{"materials": ["ice", "ice"]}]})"),
+            "/contacts/0: has no effect: gives neither restitution nor friction\n");
+}
+
+TEST(SceneCheck, FrictionAcrossAGrainTakesMaterialAndAxis) {
+  EXPECT_EQ(warnings_of(R"({"materials": [{"name": "planks", "cross_friction": 1}, {"name": "ice"}],
+    "bodies": [{"material": "planks"}, {"material": "ice", "friction_axis": [1, 0, 0]}]})"),
+            "/materials/0/cross_friction: has no effect: no body of this material has a friction_axis\n"
+            "/bodies/1/friction_axis: has no effect: the body's material has no cross_friction\n");
+  EXPECT_EQ(warnings_of(R"({"materials": [{"name": "planks", "cross_friction": 1}],
+    "bodies": [{"material": "planks", "friction_axis": [1, 0, 0]}]})"),
+            "");
+}
+
+TEST(SceneCheck, ForcesActOnWhatThereIs) {
+  EXPECT_EQ(
+      errors_of(R"({"bodies": [{"name": "crate", "repeat": {"count": 2}}, {"name": "ball", "mass": 1}],
+    "forces": [{"type": "constant", "bodies": ["crate_1", "bal", "crate"]}, {"type": "wind", "end": 0},
+               {"type": "grab", "body": "ball"},
+               {"type": "grab", "body": "ball", "keyframes": [{"time": 1}, {"time": 1}]},
+               {"type": "explosion", "name": "force_0"}, {"type": "field"}]})"),
+      "/forces/0/bodies/1: there is no body 'bal'; did you mean 'ball'?\n"
+      "/forces/1/end: must be after the start, 0 s\n"
+      "/forces/2: needs at least one of \"keyframes\"\n"
+      "/forces/3/keyframes/1/time: times must increase, got 1 after 1\n"
+      "/forces/4/name: the name 'force_0' is already that of /forces/0\n"
+      "/forces/5/type: must be one of \"constant\", \"point\", \"wind\", \"grab\" or \"explosion\", got "
+      "the string \"field\"\n");
+  EXPECT_EQ(warnings_of(R"({"bodies": [{"name": "wall", "motion": "static"}, {"name": "ball"}],
+    "forces": [{"type": "point", "bodies": ["ball", "wall"], "drop_rate": 1}]})"),
+            "/forces/0/bodies/1: has no effect: the body 'wall' is not dynamic\n"
+            "/forces/0/drop_rate: has no effect without a region\n");
+}
+
+TEST(SceneCheck, GrabsAndWindsTooStrongForTheStepAreRefusedUnlessTheIntegratorFollows) {
+  const auto scene = [](const std::string& integrator) {
+    return R"({"world": {"step": 0.01, "integrator": ")" + integrator +
+           R"("}, "bodies": [{"name": "ball", "mass": 1}],
+      "forces": [{"type": "wind", "drag": 300},
+                 {"type": "grab", "body": "ball", "keyframes": [{}], "stiffness": 90000, "damping": 0}]})";
+  };
+  // 2.785 m / c = 0.0093 s, and 2.83 sqrt(m / k) = 0.0094 s.
+  EXPECT_EQ(
+      errors_of(scene("rk4")),
+      "/forces/0/drag: is too much for the step and so small a mass: /world/step must be less than 0.00924 "
+      "s, "
+      "is 0.01 s\n"
+      "/forces/1: the grab 'force_1' is too stiff for the step: /world/step must be less than 0.00938 s, is "
+      "0.01 s\n");
+  for (const char* integrator : {"implicit_euler", "adaptive_rk4", "dormand_prince"})
+    EXPECT_EQ(errors_of(scene(integrator)), "");
 }
 
 // --- Springs ---

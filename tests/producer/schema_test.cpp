@@ -88,7 +88,11 @@ class SceneSchema : public testing::Test {
   void walk_object(const Slot& slot, const json& rule, const std::function<void(const Slot&)>& leaf,
                    const std::function<void(const Slot&, const json& minimal)>& object) const {
     json minimal = json::object();
-    for (const json& key : rule.value("required", json::array())) minimal[key.get<std::string>()] = "LICENSE";
+    for (const json& key : rule.value("required", json::array())) {
+      const json& value = resolve(rule.at("properties").at(key.get<std::string>()));
+      minimal[key.get<std::string>()] =
+          value.contains("minItems") ? json::array({"LICENSE", "LICENSE"}) : json("LICENSE");
+    }
     if (rule.at("properties").value("/type/const"_json_pointer, "") != "")
       minimal["type"] = rule.at("properties").at("type").at("const");
     object(slot, minimal);
