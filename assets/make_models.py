@@ -220,6 +220,76 @@ def flywheel():
                                         (band, STEEL)])
 
 
+# --- stone, tracks and tops -----------------------------------------------------------------------
+
+
+def voussoir():
+    """A wedge of a half round arch of 11, chamfered; the flat sides of its back and belly are across Y."""
+    half, inner, outer = math.pi / 22, 1.2, 1.62
+    flat = math.cos(half)
+    outline = [(-outer * flat * math.tan(half), outer * flat), (-inner * flat * math.tan(half), inner * flat),
+               (inner * flat * math.tan(half), inner * flat), (outer * flat * math.tan(half), outer * flat)]
+    stone = shaded(extrude(outline, -0.3, 0.3, 0.012), 20)
+    assert open_edges(stone) == 0
+    write_glb(MODELS / "voussoir.glb", [(stone, Material("limestone", "#c9bfa8", 0.9))])
+
+
+def top():
+    """A peg top that ends in a point."""
+    profile = [(0, 0), (0.0022, 0.004), (0.003, 0.012), (0.012, 0.018), (0.026, 0.027), (0.03, 0.033),
+               (0.03, 0.037), (0.026, 0.041), (0.008, 0.046), (0.0035, 0.05), (0.003, 0.068), (0.002, 0.07),
+               (0, 0.07)]
+    bands = [("steel", profile[:3]), ("red", profile[2:6]), ("cream", profile[5:8]), ("red", profile[7:10]),
+             ("steel", profile[9:])]
+    paint = {"steel": STEEL, "red": Material("lacquer", "#b02a1c", 0.25),
+             "cream": Material("cream", "#ead9ae", 0.3)}
+    assert open_edges(lathe(profile, 40)) == 0
+    write_glb(MODELS / "top.glb", [(shaded(lathe(part, 40), 30), paint[name]) for name, part in bands])
+
+
+def gutter(path, radius, wall, segments=10):
+    """A half pipe, open upwards, along a path of the points of its bottom line; a closed solid."""
+    angles = [math.pi * (k / segments - 0.5) for k in range(segments + 1)]
+    section = [(radius * math.sin(a), radius - radius * math.cos(a)) for a in angles]
+    section += [((radius + wall) * math.sin(a), radius - (radius + wall) * math.cos(a)) for a in angles[::-1]]
+    rows = []
+    for k, p in enumerate(path):
+        ahead = sub(path[min(k + 1, len(path) - 1)], path[max(k - 1, 0)])
+        side = unit(cross(ahead, (0, 1, 0)))
+        up = unit(cross(side, ahead))
+        rows += [add(p, add(mul(side, x), mul(up, y))) for x, y in section]
+    n = len(section)
+    triangles = grid_triangles(len(path), n, wrap_columns=True)
+    last = (len(path) - 1) * n
+    for k in range(segments):
+        a, b, c, d = k, k + 1, n - 1 - k, n - 2 - k
+        triangles += [(a, b, c), (b, d, c), (last + a, last + c, last + b), (last + b, last + c, last + d)]
+    return oriented(Mesh(rows, triangles))
+
+
+def oriented(mesh):
+    """A closed mesh turned the right side out."""
+    return mesh if volume(mesh) > 0 else Mesh(mesh.positions, [(a, c, b) for a, b, c in mesh.triangles])
+
+
+def marble_run():
+    beech = Material("beech", "#c99a5f", 0.5)
+    red, blue = Material("red_stain", "#a8322a", 0.45), Material("blue_stain", "#2c5a86", 0.45)
+
+    def save(name, mesh, material):
+        assert open_edges(mesh) == 0 and volume(mesh) > 0
+        write_glb(MODELS / name, [(shaded(mesh, 30), material)])
+
+    bowl = [(0.016, 0), (0.022, 0.016), (0.036, 0.026), (0.07, 0.036), (0.11, 0.052), (0.13, 0.072)]
+    funnel = bowl + [(r + 0.006, y) for r, y in bowl[::-1]]
+    save("funnel.glb", oriented(lathe(rounded(funnel, 1, closed=True) + rounded(funnel, 1, closed=True)[:1], 64)), beech)
+    turns, radius, fall = 2, 0.1, 0.2
+    helix = [(radius * math.cos(a), -fall * k / 96, radius * math.sin(a))
+             for k, a in ((k, 2 * math.pi * turns * k / 96) for k in range(97))]
+    save("helix.glb", gutter(helix, 0.014, 0.004), blue)
+    save("chute.glb", gutter([(0, 0, 0), (0.3, 0, 0)], 0.014, 0.004), red)
+
+
 # --- set dressing ---------------------------------------------------------------------------------
 
 
@@ -323,7 +393,7 @@ def tree():
 
 ALL = [
     duck, fountain, sprinkler, t_handle, landscape, gears, crank, connecting_rod, piston, flywheel,
-    grass_patch, rock, pot, tree
+    voussoir, top, marble_run, grass_patch, rock, pot, tree
 ]
 
 if __name__ == "__main__":

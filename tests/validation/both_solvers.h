@@ -32,7 +32,7 @@ class BothSolvers : public testing::TestWithParam<SolverKind> {
   INSTANTIATE_TEST_SUITE_P(kind, suite, testing::Values(SolverKind::exact, SolverKind::fast), solver_name)
 
 /// What many steps reported: counts summed, the greatest of the rest.
-struct Run {
+struct Tally {
   Real penetration = 0;
   uint64_t collisions = 0, tracebacks = 0, cut_short = 0, exact_fallbacks = 0, fast_fallbacks = 0;
   bool finite = true;
@@ -43,7 +43,7 @@ struct Run {
     collisions += r.collisions;
     tracebacks += r.tracebacks;
     cut_short += r.cut_short;
-    exact_fallbacks += r.exact.fallbacks + r.impact_fallbacks;
+    exact_fallbacks += r.exact.fallbacks + r.impacts.fallbacks;
     fast_fallbacks += r.fast.fallbacks;
     finite &= r.finite;
     last = r;
@@ -51,8 +51,8 @@ struct Run {
 };
 
 /// Steps the world for some seconds.
-inline Run run(World& world, Real seconds, Real sampling = 1.0 / 240) {
-  Run all;
+inline Tally run(World& world, Real seconds, Real sampling = 1.0 / 240) {
+  Tally all;
   const Real end = world.time() + seconds - sampling / 2;
   while (world.time() < end) all.add(world.step(sampling));
   return all;

@@ -17,7 +17,7 @@ class BallDrop : public BothSolvers {
   struct Drop {
     std::vector<Real> apexes;
     Real rest_height;
-    Run run;
+    Tally tally;
   };
   static Drop drop(Real e, Real max_step, Real seconds) {
     constexpr Real kRadius = 0.05;
@@ -28,7 +28,7 @@ class BallDrop : public BothSolvers {
     Drop d;
     Real last_v = 0;
     while (world.time() < seconds) {
-      d.run.add(world.step(max_step));
+      d.tally.add(world.step(max_step));
       const BodyState s = world.body(ball);
       const Real y = s.centre.y() - kRadius, v = s.velocity.y();
       // Of the parabola, from any point of it.
@@ -63,10 +63,10 @@ TEST_P(BallDrop, WithoutRestitutionItRestsAtOnceAndWithHalfInTheEnd) {
 // Impacts come ever faster: they end by the collision threshold, each step with a bounded number.
 TEST_P(BallDrop, ImpactsWithoutEndTerminate) {
   const Drop d = drop(0.5, 1.0 / 30, 4);
-  EXPECT_TRUE(d.run.finite);
-  EXPECT_GE(d.run.tracebacks, 3u);
-  EXPECT_LT(d.run.tracebacks, 40u);
-  EXPECT_EQ(d.run.last.tracebacks, 0u);
+  EXPECT_TRUE(d.tally.finite);
+  EXPECT_GE(d.tally.tracebacks, 3u);
+  EXPECT_LT(d.tally.tracebacks, 40u);
+  EXPECT_EQ(d.tally.last.tracebacks, 0u);
   EXPECT_NEAR(d.rest_height, 0, 1e-3);
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, BallDrop);
@@ -87,7 +87,7 @@ TEST_P(ObliqueBall, SticksOrSlidesOnEitherSideOfTheCriticalFriction) {
                                       .velocity = {kAcross, -kDown, 0},
                                       .restitution = e,
                                       .friction = mu});
-    const Run r = run(world, 0.1);
+    const Tally r = run(world, 0.1);
     EXPECT_EQ(r.collisions, 1u);
     const Real lost = std::min(2.0 / 7 * kAcross, mu * (1 + e) * kDown);
     const BodyState s = world.body(ball);
@@ -161,7 +161,7 @@ TEST_P(ElasticPair, BoxesAndCapsulesKeepThemToo) {
     const Vec3 way = dice.direction();
     const auto a = body(Vec3::Zero(), 2 * way), b = body(0.7 * way + 0.05 * dice.in_cube(), -1 * way);
     const Sum before = sum(world, {a, b});
-    const Run r = run(world, 0.4);
+    const Tally r = run(world, 0.4);
     hits += r.collisions > 0;
     EXPECT_TRUE(r.finite);
     expect_kept(before, sum(world, {a, b}), 1e-6);
@@ -254,7 +254,7 @@ TEST_P(Paddle, ABoxPushesAStackAlong) {
   std::vector<BodyHandle> stack;
   for (int i = 0; i < 3; ++i)
     stack.push_back(world.add_body({.shape = Box{Vec3::Constant(0.2)}, .pose = {Vec3(0, 0.1 + 0.2 * i, 0)}}));
-  const Run r = run(world, 3.5);
+  const Tally r = run(world, 3.5);
   EXPECT_LT(r.penetration, 1e-3);
   const Real face = world.body(pusher).pose.position.x() + 0.1;
   for (int i = 0; i < 3; ++i) {

@@ -1,0 +1,326 @@
+/// Sliding, sticking, rolling and tipping against what Coulomb's law gives in closed form.
+
+#include <cmath>
+#include <numbers>
+
+#include "tests/validation/both_solvers.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr Real kGravity = 9.81;
+
+class Incline : public BothSolvers {
+ protected:
+  /// Where a box of 0.2 m that starts at rest is after `seconds`, from where it was, along the plane's axes.
+  static Vec3 way(const Shape& shape, Real height, const BodyDef& ground, Real angle, Real seconds,
+                  Real* fastest = nullptr) {
+    World world(def());
+    BodyDef plane = ground;
+    plane.shape = Plane{};
+    plane.motion = MotionType::fixed;
+    plane.pose = incline(angle);
+    world.add_body(plane);
+    const auto body = world.add_body({.shape = shape, .pose = over_incline(angle, height), .restitution = 0});
+    const Vec3 start = world.body(body).centre;
+    while (world.time() < seconds - 1e-9) {
+      world.step(1.0 / 240);
+      if (fastest) *fastest = std::max(*fastest, world.body(body).angular_velocity.norm());
+    }
+    return plane.pose.vector_to_body(world.body(body).centre - start);
+  }
+};
+
+TEST_P(Incline, BoxStaysBelowTheAngleOfFriction) {
+  for (const Real degrees : {5.0, 20.0, 26.0}) {
+    const Vec3 s = way(Box{Vec3::Constant(0.2)}, 0.1, {.restitution = 0}, degrees * std::numbers::pi / 180, 10);
+    EXPECT_LT(s.norm(), 1e-6) << degrees;
+  }
+}
+
+TEST_P(Incline, BoxSlidesAsComputedAbove) {
+  for (const Real degrees : {27.0, 35.0, 42.0}) {
+    const Real a = degrees * std::numbers::pi / 180, t = 2;
+    const Vec3 s = way(Box{{0.4, 0.1, 0.3}}, 0.05, {.restitution = 0}, a, t);
+    const Real expected = 0.5 * kGravity * (std::sin(a) - 0.5 * std::cos(a)) * t * t;
+    EXPECT_NEAR(s.x() / expected, 1, degrees > 30 ? 0.002 : 0.01) << degrees;
+    EXPECT_LT(std::abs(s.z()), 1e-6 * (1 + s.x())) << degrees;
+    EXPECT_LT(std::abs(s.y()), 1e-4) << degrees;
+  }
+}
+
+// Grain at 30 degrees to the slope. Each axis has its own limit: across it holds, along it slides.
+TEST_P(Incline, BoxFollowsTheGrainOfASurface) {
+  const Real a = 0.4, phi = std::numbers::pi / 6, t = 1.5;
+  const Vec3 axis(std::cos(phi), 0, std::sin(phi)), across(-std::sin(phi), 0, std::cos(phi));
+  // With the box's 0.5: 0.2 along the grain, and across it 0.6, or 0.1, which is less than what pulls there.
+  for (const Real mu_across : {0.6, 0.1}) {
+    const BodyDef ground{
+        .restitution = 0, .friction = 0.08, .cross_friction = mu_across * mu_across / 0.5, .friction_axis = axis};
+    const Vec3 s = way(Box{{0.4, 0.1, 0.4}}, 0.05, ground, a, t);
+    const Real pull_along = std::sin(a) * std::cos(phi), pull_across = std::sin(a) * std::sin(phi);
+    const Real along = 0.5 * kGravity * (pull_along - 0.2 * std::cos(a)) * t * t;
+    const Real aside = 0.5 * kGravity * std::max(pull_across - mu_across * std::cos(a), 0.0) * t * t;
+    EXPECT_NEAR(s.dot(axis) / along, 1, 0.005) << mu_across;
+    EXPECT_NEAR(-s.dot(across), aside, 0.005 * along) << mu_across;
+  }
+}
+
+TEST_P(Incline, CylinderRollsWithTwoThirdsOfThePull) {
+  const Real a = 0.3, t = 2;
+  World world(def());
+  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .pose = incline(a), .restitution = 0});
+  const Quat lying(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitX()));
+  const auto roller =
+      world.add_body({.shape = Cylinder{0.1, 0.3}, .pose = over_incline(a, 0.1, lying), .restitution = 0});
+  const Vec3 start = world.body(roller).centre;
+  run(world, t);
+  const Vec3 s = incline(a).vector_to_body(world.body(roller).centre - start);
+  EXPECT_NEAR(s.x() / (kGravity / 3 * std::sin(a) * t * t), 1, 0.005);
+  EXPECT_NEAR(world.body(roller).angular_velocity.z() * 0.1 / (-2.0 / 3 * kGravity * std::sin(a) * t), 1, 0.005);
+  EXPECT_LT(std::abs(s.z()), 1e-3);
+}
+
+// On a slope a slender box tips over its lower edge if tan a > width / height, unless friction gives way first.
+TEST_P(Incline, BoxTipsIfFrictionHoldsMoreThanWidthOverHeight) {
+  constexpr Real kWidth = 0.12, kHeight = 0.4;  // ratio 0.3
+  const auto outcome = [&](Real tangent, Real mu) {
+    Real turning = 0;
+    const Vec3 s = way(Box{{kWidth, kHeight, 0.2}}, kHeight / 2, {.restitution = 0, .friction = mu * mu / 0.5},
+                       std::atan(tangent), 0.7, &turning);
+    return std::pair(s, turning);
+  };
+  const auto [stood, stood_turning] = outcome(0.27, 0.5);
+  EXPECT_LT(stood.norm(), 1e-4);
+  EXPECT_LT(stood_turning, 0.01);
+  const auto [slid, slid_turning] = outcome(0.4, 0.25);
+  EXPECT_NEAR(slid.x() / (0.5 * kGravity * std::cos(std::atan(0.4)) * 0.15 * 0.49), 1, 0.01);
+  EXPECT_LT(slid_turning, 0.01);
+  const auto [tipped, tipped_turning] = outcome(0.4, 0.6);
+  EXPECT_GT(tipped_turning, 1);
+  EXPECT_LT(tipped.y(), -0.05);
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, Incline);
+
+class Level : public BothSolvers {
+ protected:
+  static BodyHandle add_floor(World& world, Real mu, Real mu_static = -1) {
+    return world.add_body({.shape = Plane{},
+                           .motion = MotionType::fixed,
+                           .restitution = 0,
+                           .friction = mu,
+                           .static_friction = mu_static});
+  }
+};
+
+TEST_P(Level, SlidingBallRollsAfterTwoSeventhsAtFiveSevenths) {
+  constexpr Real kSpeed = 3, kMu = 0.3, kRadius = 0.1;
+  World world(def());
+  add_floor(world, kMu);
+  const auto ball = world.add_body({.shape = Sphere{kRadius},
+                                    .pose = {Vec3(0, kRadius, 0)},
+                                    .velocity = {kSpeed, 0, 0},
+                                    .restitution = 0,
+                                    .friction = kMu});
+  const Real rolls = 2 * kSpeed / (7 * kMu * kGravity);
+  const auto slip = [&] {
+    const BodyState s = world.body(ball);
+    return s.velocity.x() + kRadius * s.angular_velocity.z();
+  };
+  // Slipping falls from v0 at 7/2 mu g.
+  run(world, 0.9 * rolls, rolls / 70);
+  EXPECT_NEAR(slip(), 0.1 * kSpeed, 0.005 * kSpeed);
+  run(world, 0.115 * rolls, rolls / 70 / 4);
+  EXPECT_NEAR(slip(), 0, 0.001 * kSpeed);
+  EXPECT_NEAR(world.body(ball).velocity.x() / (5.0 / 7 * kSpeed), 1, 0.005);
+  const Real then = world.body(ball).centre.x();
+  EXPECT_NEAR(then / ((1 - 1.0 / 7) * kSpeed * world.time()), 1, 0.01);
+  run(world, 1);
+  EXPECT_NEAR((world.body(ball).centre.x() - then) / (5.0 / 7 * kSpeed), 1, 0.005);
+}
+
+TEST_P(Level, StaticFrictionHoldsUpToItsLimitThenTheDynamicOneDecides) {
+  constexpr Real kStatic = 0.6, kDynamic = 0.3, kMass = 2;
+  const auto slide = [&](Real pull, Real speed) {
+    World world(def());
+    add_floor(world, kDynamic, kStatic);
+    const auto box = world.add_body({.shape = Box{{0.4, 0.1, 0.4}},
+                                     .pose = {Vec3(0, 0.05, 0)},
+                                     .velocity = {speed, 0, 0},
+                                     .mass = kMass,
+                                     .restitution = 0,
+                                     .friction = kDynamic,
+                                     .static_friction = kStatic});
+    world.add_force({.effect = ConstantField{.force = {pull * kMass * kGravity, 0, 0}}});
+    run(world, 1);
+    return world.body(box).centre.x();
+  };
+  EXPECT_LT(std::abs(slide(0.57, 0)), 1e-6);
+  EXPECT_NEAR(slide(0.63, 0) / (0.5 * kGravity * (0.63 - kDynamic)), 1, 0.01);
+  // What slides already is not held by what would hold it at rest.
+  EXPECT_NEAR(slide(0.5, 1) / (1 + 0.5 * kGravity * (0.5 - kDynamic)), 1, 0.005);
+}
+
+TEST_P(Level, ConveyorBringsABoxToItsSpeed) {
+  constexpr Real kBelt = 1.5, kMu = 0.4;
+  World world(def());
+  world.add_body({.shape = Box{{20, 1, 2}},
+                  .motion = MotionType::fixed,
+                  .pose = {Vec3(0, -0.5, 0)},
+                  .restitution = 0,
+                  .friction = kMu,
+                  .surface_velocity = {kBelt, 0, 0}});
+  const auto box = world.add_body(
+      {.shape = Box{{0.4, 0.1, 0.4}}, .pose = {Vec3(0, 0.05, 0)}, .restitution = 0, .friction = kMu});
+  const Real takes = kBelt / (kMu * kGravity);
+  run(world, takes / 2, takes / 100);
+  EXPECT_NEAR(world.body(box).velocity.x(), kBelt / 2, 0.005 * kBelt);
+  run(world, 0.52 * takes, takes / 100);
+  EXPECT_NEAR(world.body(box).velocity.x(), kBelt, 0.001 * kBelt);
+  run(world, 1);
+  EXPECT_NEAR(world.body(box).centre.x(), kBelt * (world.time() - takes / 2), 0.005 * kBelt);
+}
+
+// A plank under a box on a smooth floor: together, or each for itself.
+TEST_P(Level, PlankPulledFromUnderABox) {
+  constexpr Real kMu = 0.3, kBox = 2, kPlank = 3, t = 0.8;
+  for (const Real pull : {10.0, 40.0}) {
+    World world(def());
+    add_floor(world, 0);
+    const auto plank = world.add_body({.shape = Box{{8, 0.1, 1}},
+                                       .pose = {Vec3(0, 0.05, 0)},
+                                       .mass = kPlank,
+                                       .restitution = 0,
+                                       .friction = kMu});
+    const auto box = world.add_body({.shape = Box{{0.4, 0.1, 0.4}},
+                                     .pose = {Vec3(0, 0.15, 0)},
+                                     .mass = kBox,
+                                     .restitution = 0,
+                                     .friction = kMu});
+    world.add_force({.bodies = {plank}, .effect = ConstantField{.force = {pull, 0, 0}}});
+    run(world, t);
+    const Real most = kMu * kBox * kGravity, common = pull / (kBox + kPlank);
+    const bool slips = common > kMu * kGravity;
+    EXPECT_NEAR(world.body(box).centre.x() / ((slips ? kMu * kGravity : common) * t * t / 2), 1, 0.005) << pull;
+    EXPECT_NEAR(world.body(plank).centre.x() / ((slips ? (pull - most) / kPlank : common) * t * t / 2), 1, 0.005)
+        << pull;
+  }
+}
+
+TEST_P(Level, BoxPushedOnABox) {
+  constexpr Real kMu = 0.3, kTop = 2, kBottom = 3, t = 0.8;
+  for (const Real push : {6.0, 20.0}) {
+    World world(def());
+    add_floor(world, 0);
+    const auto bottom = world.add_body({.shape = Box{{8, 0.1, 1}},
+                                        .pose = {Vec3(0, 0.05, 0)},
+                                        .mass = kBottom,
+                                        .restitution = 0,
+                                        .friction = kMu});
+    const auto top = world.add_body({.shape = Box{{0.4, 0.1, 0.4}},
+                                     .pose = {Vec3(0, 0.15, 0)},
+                                     .mass = kTop,
+                                     .restitution = 0,
+                                     .friction = kMu});
+    world.add_force({.bodies = {top}, .effect = ConstantField{.force = {push, 0, 0}}});
+    run(world, t);
+    const Real most = kMu * kTop * kGravity, common = push / (kTop + kBottom);
+    const bool slips = common * kBottom > most;
+    EXPECT_NEAR(world.body(top).centre.x() / ((slips ? (push - most) / kTop : common) * t * t / 2), 1, 0.005) << push;
+    EXPECT_NEAR(world.body(bottom).centre.x() / ((slips ? most / kBottom : common) * t * t / 2), 1, 0.005) << push;
+  }
+}
+
+// A pusher that speeds up evenly takes two boxes in a row along; between them acts what moves the second.
+TEST_P(Level, PusherDrivesARowOfBoxes) {
+  constexpr Real kAcceleration = 2, kMu = 0.2, kMass = 1.5;
+  World world(def());
+  add_floor(world, kMu);
+  KeyframeTrack track;  // the cubic through quadratic positions is their parabola, but for the first key
+  for (int i = 0; i <= 40; ++i) {
+    const Real t = 0.05 * i;
+    track.keys.push_back({t, {Vec3(-0.5 + 0.5 * kAcceleration * t * t, 0.2, 0)}});
+  }
+  world.add_body({.shape = Box{{0.2, 0.2, 0.4}}, .motion = MotionType::kinematic, .friction = 0, .track = track});
+  std::vector<BodyHandle> row;
+  for (int i = 0; i < 2; ++i)
+    row.push_back(world.add_body({.shape = Box{{0.2, 0.4, 0.4}},
+                                  .pose = {Vec3(-0.3 + 0.2 * i, 0.2, 0)},
+                                  .mass = kMass,
+                                  .restitution = 0,
+                                  .friction = kMu}));
+  run(world, 1);
+  Vec3 between = Vec3::Zero();
+  for (const ContactState& c : world.contacts()) {
+    if (c.a == row[1] && c.b == row[0]) between += c.force;
+    if (c.a == row[0] && c.b == row[1]) between -= c.force;
+  }
+  EXPECT_NEAR(world.body(row[1]).velocity.x() / kAcceleration, 1, 0.005);
+  EXPECT_NEAR(between.x() / (kMass * (kAcceleration + kMu * kGravity)), 1, 0.02);
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, Level);
+
+/// A thin box that falls over a lower edge, as one degree of freedom: phi, of the centre from over the edge.
+struct FallingRod {
+  Real mass, inertia, distance;  // inertia about the centre, distance from the edge
+  bool rough;
+
+  Real acceleration(Real phi, Real rate) const {
+    const Real d = distance, s = std::sin(phi), c = std::cos(phi);
+    if (rough) return mass * kGravity * d * s / (inertia + mass * d * d);
+    // The centre goes straight down: T = (I + m d^2 sin^2 phi) phi'^2 / 2, V = m g d cos phi.
+    return mass * d * s * (kGravity - d * c * rate * rate) / (inertia + mass * d * d * s * s);
+  }
+  /// By RK4, from rest.
+  Real angle(Real phi, Real seconds) const {
+    constexpr int kSteps = 20000;
+    const Real h = seconds / kSteps;
+    Real w = 0;
+    for (int i = 0; i < kSteps; ++i) {
+      const Real k1 = acceleration(phi, w), k2 = acceleration(phi + h / 2 * w, w + h / 2 * k1),
+                 k3 = acceleration(phi + h / 2 * w + h * h / 4 * k1, w + h / 2 * k2),
+                 k4 = acceleration(phi + h * w + h * h / 2 * k2, w + h * k3);
+      phi += h * w + h * h / 6 * (k1 + k2 + k3);
+      w += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+    }
+    return phi;
+  }
+};
+
+class Rod : public BothSolvers {};
+
+TEST_P(Rod, FallsFromUprightOnARoughAndOnASmoothFloor) {
+  constexpr Real kLength = 1, kWidth = 0.02, kStart = 0.1;
+  const Real lean = std::atan2(kWidth, kLength), d = std::hypot(kWidth, kLength) / 2;
+  for (const bool rough : {true, false}) {
+    World world(def());
+    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0, .friction = rough ? 8.0 : 0});
+    // Leaning to +x, over its edge at the origin; phi = kStart.
+    const Quat turn(Eigen::AngleAxisd(-(kStart + lean), Vec3::UnitZ()));
+    const Vec3 edge(kWidth / 2, -kLength / 2, 0);
+    const auto body = world.add_body({.shape = Box{{kWidth, kLength, 0.1}},
+                                      .pose = {-(turn * edge), turn},
+                                      .mass = 1,
+                                      .restitution = 0,
+                                      .friction = rough ? 8.0 : 0});
+    const FallingRod rod{1, (kLength * kLength + kWidth * kWidth) / 12, d, rough};
+    const Vec3 start = world.body(body).centre;
+    // Until 50 degrees: further down no friction holds the foot any more (tan of what it needs has a pole).
+    for (int k = 1; k < 40; ++k) {
+      run(world, 0.025, 1.0 / 240);
+      const Real phi = rod.angle(kStart, world.time());
+      if (phi > 50 * std::numbers::pi / 180) break;
+      const BodyState s = world.body(body);
+      const Vec3 tip = s.pose.point_to_world({-kWidth / 2, kLength / 2, 0});
+      const Vec3 foot_to_tip = Eigen::AngleAxisd(-(phi + lean), Vec3::UnitZ()) * Vec3(-kWidth, kLength, 0);
+      const Vec3 centre(rough ? d * std::sin(phi) : start.x(), d * std::cos(phi), 0);
+      const Vec3 foot = centre - d * Vec3(std::sin(phi), std::cos(phi), 0);
+      ASSERT_LT((tip - foot - foot_to_tip).norm(), 0.01 * kLength) << "rough " << rough << " at " << world.time();
+    }
+    EXPECT_GT(world.time(), 0.4);
+  }
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, Rod);
+
+}  // namespace
+}  // namespace offstage::sim

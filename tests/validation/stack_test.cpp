@@ -1,0 +1,244 @@
+/// What people build: stacks, card houses, arches, piles. They stand where statics says so, and fall where it does not.
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "tests/random.h"
+#include "tests/validation/both_solvers.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr Real kPi = std::numbers::pi;
+
+BodyHandle add_ground(World& world, Real friction = 0.5) {
+  return world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0, .friction = friction});
+}
+
+/// Boxes of 0.2 m on each other, the k-th of `mass(k)`.
+template <class Mass>
+std::vector<BodyHandle> add_stack(World& world, int count, Mass&& mass) {
+  std::vector<BodyHandle> boxes;
+  for (int i = 0; i < count; ++i)
+    boxes.push_back(world.add_body({.shape = Box{Vec3::Constant(0.2)},
+                                    .pose = {Vec3(0, 0.1 + 0.2 * i, 0)},
+                                    .mass = mass(i),
+                                    .restitution = 0}));
+  return boxes;
+}
+
+class Stack : public BothSolvers {
+ protected:
+  static void expect_stands(Real seconds, Real max_step) {
+    World world(def(max_step));
+    add_ground(world);
+    const auto boxes = add_stack(world, 10, [](int) { return 8; });
+    const Tally t = run(world, seconds, max_step);
+    const Vec3 drift = world.body(boxes.back()).centre - Vec3(0, 1.9, 0);
+    EXPECT_LT(drift.norm(), 1e-3) << max_step;
+    EXPECT_LT(t.penetration, 5e-4) << max_step;
+    EXPECT_EQ(t.exact_fallbacks, 0u) << max_step;
+  }
+};
+class LongStack : public Stack {};
+
+TEST_P(Stack, TenBoxesStand) {
+  for (const Real max_step : {1.0 / 240, 1.0 / 60}) expect_stands(5, max_step);
+}
+TEST_P(LongStack, TenBoxesStandForAMinute) {
+  expect_stands(60, 1.0 / 240);
+}
+
+TEST_P(Stack, HeavyOnTopStands) {
+  for (const Real ratio : {100.0, 1000.0}) {
+    World world(def());
+    add_ground(world);
+    const auto boxes = add_stack(world, 4, [&](int i) { return i == 3 ? ratio : 1; });
+    const Tally t = run(world, 10);
+    const Vec3 drift = world.body(boxes.back()).centre - Vec3(0, 0.7, 0);
+    // The exact solver does not mind; to the fast one the light boxes are soft.
+    const Real allowed = is_exact() ? 1e-5 : ratio == 100 ? 1e-3 : 5e-3;
+    EXPECT_LT(drift.norm(), allowed) << ratio;
+    EXPECT_LT(t.penetration, allowed) << ratio;
+    EXPECT_EQ(t.exact_fallbacks, 0u) << ratio;
+  }
+}
+
+// Each contact's force is what statics says: the weight of all above.
+TEST_P(Stack, CarriesItsWeight) {
+  World world(def());
+  add_ground(world);
+  const auto boxes = add_stack(world, 5, [](int i) { return 1 + i; });
+  run(world, 2);
+  for (std::size_t k = 0; k < 5; ++k) {
+    Vec3 force = Vec3::Zero();
+    Real above = 0;
+    for (std::size_t i = k; i < 5; ++i) above += Real(1 + i) * 9.81;
+    for (const ContactState& c : world.contacts()) {
+      const bool is_a = c.a == boxes[k], is_b = c.b == boxes[k];
+      const bool from_below = (is_a && c.normal.y() > 0) || (is_b && c.normal.y() < 0);
+      if (from_below) force += is_a ? c.force : -c.force;
+    }
+    EXPECT_NEAR(force.y() / above, 1, is_exact() ? 1e-6 : 1e-3) << k;
+  }
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, Stack);
+OFFSTAGE_BOTH_SOLVERS(Long, LongStack);
+
+class Cards : public BothSolvers {
+ protected:
+  /// Two cards lean against a post that stands between them. Post and cards are smooth, so that only the
+  /// floor's friction keeps a card from sliding: m g (L/2 sin a - t/2 cos a) = mu m g L cos a about its foot.
+  static Real height_after(Real share_of_bound, Real seconds) {
+    constexpr Real kLength = 0.4, kThick = 0.01, kTilt = 20 * kPi / 180, kPost = 0.02;
+    const Real bound =
+        (kLength * std::sin(kTilt) - kThick * std::cos(kTilt)) / (2 * kLength * std::cos(kTilt));
+    World world(def());
+    add_ground(world, share_of_bound * bound);
+    world.add_contact_rule({.a = "card", .b = "post", .friction = 0});
+    world.add_body({.shape = Box{{kPost, 0.5, 0.3}}, .pose = {Vec3(0, 0.25, 0)}, .mass = 0.3,
+                    .material = "post", .restitution = 0, .friction = 0.5});
+    BodyHandle card;
+    for (const Real side : {-1.0, 1.0}) {
+      const Quat turn(Eigen::AngleAxisd(side * kTilt, Vec3::UnitZ()));
+      // Its upper edge touches the post, its lower one the floor: both edges of its inner face.
+      const Vec3 top = turn * Vec3(-side * kThick / 2, kLength / 2, 0),
+                 foot = turn * Vec3(-side * kThick / 2, -kLength / 2, 0);
+      const Vec3 centre(side * kPost / 2 - top.x(), -foot.y(), 0);
+      card = world.add_body({.shape = Box{{kThick, kLength, 0.25}},
+                             .pose = {centre, turn},
+                             .mass = 0.1,
+                             .material = "card",
+                             .restitution = 0,
+                             .friction = share_of_bound * bound});
+    }
+    const Real start = world.body(card).centre.y();
+    run(world, seconds);
+    return world.body(card).centre.y() / start;
+  }
+};
+
+TEST_P(Cards, LeanUpToTheStaticBoundOfFriction) {
+  EXPECT_NEAR(height_after(1.1, 5), 1, 1e-3);
+  EXPECT_LT(height_after(0.9, 2), 0.3);
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, Cards);
+
+/// A round arch of equal wedges with joints at angles s (2 k - n) / n from the crown, between fixed springers.
+struct Arch {
+  static constexpr int kWedges = 9;
+  static constexpr Real kInner = 1, kOuter = 1.5, kSpan = 75 * kPi / 180;
+
+  /// Joint k at theta carries a thrust of horizontal part H and the weight between it and the crown, V ~ theta; it
+  /// slips unless the thrust is within phi of the joint's normal: V / tan(theta + phi) <= H <= V / tan(theta - phi).
+  static bool can_stand(Real mu) {
+    const Real phi = std::atan(mu);
+    Real low = 0, high = 1e9;
+    for (int k = kWedges / 2 + 1; k <= kWedges; ++k) {
+      const Real theta = kSpan * (2 * k - kWedges) / kWedges;
+      if (theta + phi < kPi / 2) low = std::max(low, theta / std::tan(theta + phi));
+      if (theta > phi) high = std::min(high, theta / std::tan(theta - phi));
+    }
+    return low <= high;
+  }
+  static Real friction_bound() {
+    Real low = 0, high = 2;
+    for (int i = 0; i < 60; ++i) (can_stand((low + high) / 2) ? high : low) = (low + high) / 2;
+    return high;
+  }
+  /// In the world's axes; springers are wedges, too.
+  static TriangleMesh wedge(int k) {
+    TriangleMesh mesh;
+    for (const Real z : {-0.2, 0.2})
+      for (int side : {0, 1})
+        for (const Real r : {kInner, kOuter}) {
+          const Real theta = kSpan * (2 * (k + side) - kWedges) / kWedges;
+          mesh.vertices.emplace_back(r * std::sin(theta), r * std::cos(theta), z);
+        }
+    mesh.triangles = {{0, 1, 3}, {0, 3, 2}, {4, 6, 7}, {4, 7, 5}, {0, 4, 5}, {0, 5, 1},
+                      {2, 3, 7}, {2, 7, 6}, {0, 2, 6}, {0, 6, 4}, {1, 5, 7}, {1, 7, 3}};
+    return mesh;
+  }
+};
+
+class Masonry : public BothSolvers {
+ protected:
+  /// How far the arch's stones are from where they were built at the end, at most.
+  static Real displacement(Real mu, Real seconds) {
+    World world(def());
+    std::vector<BodyHandle> stones;
+    for (int k = -1; k <= Arch::kWedges; ++k) {
+      const bool fixed = k < 0 || k == Arch::kWedges;
+      const auto stone = world.add_body({.shape = MeshShape{world.add_mesh(Arch::wedge(k))},
+                                         .motion = fixed ? MotionType::fixed : MotionType::dynamic,
+                                         .density = 2000,
+                                         .restitution = 0,
+                                         .friction = mu});
+      if (!fixed) stones.push_back(stone);
+    }
+    run(world, seconds);
+    Real far = 0;
+    for (const BodyHandle s : stones) far = std::max(far, world.body(s).pose.position.norm());
+    return far;
+  }
+};
+
+TEST_P(Masonry, ArchStandsAboveItsBoundOfFrictionAndFallsBelow) {
+  const Real bound = Arch::friction_bound();
+  EXPECT_GT(bound, 0.05);
+  EXPECT_LT(displacement(1.2 * bound, 5), 2e-3);
+  EXPECT_GT(displacement(0.8 * bound, 2), 0.1);
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, Masonry);
+
+class Pile : public BothSolvers {
+ protected:
+  /// Boxes dropped into a pit of 1.6 m, without order.
+  static void expect_settles(uint64_t count, Real seconds) {
+    WorldDef sleepy = def();
+    sleepy.sleep = true;
+    World world(sleepy);
+    const auto wall = [&](const Vec3& size, const Vec3& at) {
+      world.add_body({.shape = Box{size}, .motion = MotionType::fixed, .pose = {at}, .restitution = 0});
+    };
+    constexpr Real kPit = 1.6, kHigh = 6;
+    wall({3, 0.2, 3}, {0, -0.1, 0});
+    for (const Real side : {-1.0, 1.0}) {
+      wall({0.2, kHigh, 3}, {side * (kPit / 2 + 0.1), kHigh / 2, 0});
+      wall({3, kHigh, 0.2}, {0, kHigh / 2, side * (kPit / 2 + 0.1)});
+    }
+    const Scatter random{7};
+    std::vector<BodyHandle> boxes;
+    for (uint64_t i = 0; i < count; ++i) {
+      const auto u = [&](uint64_t k) { return 2 * random.uniform(i, k) - 1; };
+      const Vec3 at(-0.5 + 0.5 * Real(i % 3), 0.4 + 0.4 * Real(i / 9), -0.5 + 0.5 * Real(i / 3 % 3));
+      const Quat turn = Quat(u(0), u(1), u(2), u(3)).normalized();
+      const Vec3 size = Vec3::Constant(0.2) + 0.05 * Vec3(u(4), u(5), u(6));
+      boxes.push_back(world.add_body({.shape = Box{size}, .pose = {at, turn}, .restitution = 0.1}));
+    }
+    const Tally t = run(world, seconds, 1.0 / 60);
+    EXPECT_TRUE(t.finite);
+    EXPECT_LT(t.penetration, 2e-3);
+    EXPECT_LT(t.last.penetration, 1e-3);
+    EXPECT_EQ(t.last.bodies_asleep, count);
+    EXPECT_LT(t.exact_fallbacks, seconds);
+    for (const BodyHandle b : boxes) {
+      const Vec3 c = world.body(b).centre;
+      EXPECT_TRUE(std::abs(c.x()) < kPit / 2 && std::abs(c.z()) < kPit / 2 && c.y() > 0) << c.transpose();
+    }
+  }
+};
+class LongPile : public Pile {};
+
+TEST_P(Pile, SixtyBoxesComeToRestInAPit) {
+  expect_settles(60, 5);
+}
+TEST_P(LongPile, FiveHundredBoxesComeToRestInAPit) {
+  expect_settles(500, 20);
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, Pile);
+OFFSTAGE_BOTH_SOLVERS(Long, LongPile);
+
+}  // namespace
+}  // namespace offstage::sim
