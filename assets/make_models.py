@@ -6,10 +6,10 @@ import math
 import pathlib
 import sys
 
-from modelling import (Material, Mesh, add, circle, cylinder, dot, ellipsoid, extrude, fractal_noise,
+from modelling import (Material, Mesh, add, circle, cross, cylinder, dot, ellipsoid, extrude, fractal_noise,
                        grid_triangles, hashed, icosphere, lathe, mix, mul, noise, open_edges, ring, rod,
-                       rounded, shaded, smoothstep, surface_nets, sweep, turn, union, unit, welded, write_glb,
-                       write_mtl, write_obj, write_ply)
+                       rounded, shaded, smoothstep, sub, surface_nets, sweep, turn, union, unit, volume, welded,
+                       write_glb, write_mtl, write_obj, write_ply)
 
 MODELS = pathlib.Path(__file__).resolve().parent / "models"
 
@@ -280,14 +280,15 @@ def marble_run():
         assert open_edges(mesh) == 0 and volume(mesh) > 0
         write_glb(MODELS / name, [(shaded(mesh, 30), material)])
 
-    bowl = [(0.016, 0), (0.022, 0.016), (0.036, 0.026), (0.07, 0.036), (0.11, 0.052), (0.13, 0.072)]
-    funnel = bowl + [(r + 0.006, y) for r, y in bowl[::-1]]
-    save("funnel.glb", oriented(lathe(rounded(funnel, 1, closed=True) + rounded(funnel, 1, closed=True)[:1], 64)), beech)
-    turns, radius, fall = 2, 0.1, 0.2
+    bowl = [(0.0185, 0), (0.023, 0.016), (0.036, 0.026), (0.07, 0.036), (0.11, 0.052), (0.13, 0.072)]
+    bowl = rounded(bowl, 2)
+    wall = bowl + [(r + 0.004, y - 0.006) for r, y in bowl[::-1]]
+    save("funnel.glb", oriented(lathe([*wall, wall[0]], 64)), beech)
+    turns, radius, fall = 2, 0.1, 0.12
     helix = [(radius * math.cos(a), -fall * k / 96, radius * math.sin(a))
              for k, a in ((k, 2 * math.pi * turns * k / 96) for k in range(97))]
-    save("helix.glb", gutter(helix, 0.014, 0.004), blue)
-    save("chute.glb", gutter([(0, 0, 0), (0.3, 0, 0)], 0.014, 0.004), red)
+    save("helix.glb", gutter(helix, 0.02, 0.004), blue)
+    save("chute.glb", gutter([(0, 0, 0), (0.3, 0, 0)], 0.02, 0.004), red)
 
 
 # --- set dressing ---------------------------------------------------------------------------------

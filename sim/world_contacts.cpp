@@ -19,7 +19,8 @@ namespace {
 constexpr Real kMargin = 2e-3, kMarginShare = 0.05;
 /// Motion beyond this share of the smaller body within an interval: the points of its start do not tell any more
 /// what will meet.
-constexpr Real kFar = 0.25;
+/// The fast solver, where nothing bounces, takes them as limits of the approach all the same, farther.
+constexpr Real kFar = 0.25, kFarWithoutBounce = 1;
 /// Room that bodies get in the broad phase: a share of their size, and as far as they get in so many steps.
 constexpr Real kRoom = 0.03, kSteps = 2;
 /// How far bodies may shift against each other before their points are found anew [m].
@@ -119,8 +120,9 @@ void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
   const Real size = smaller_extent(pair.a(), pair.b());
   const Real base = std::min(kMargin, kMarginShare * size);
   const Real motion = (pair.speed_bound() + 2 * def.gravity.norm() * left) * left;
-  const Real far = std::max(base, kFar * size);
   const bool exact = def.solver == SolverKind::exact;
+  const bool bounces = exact || pair.surface().restitution > 0;
+  const Real far = std::max(base, (bounces ? kFar : kFarWithoutBounce) * size);
   const Real margin = base + std::min(motion, far);
   pair.find(pair.a().placed_at(time, h), pair.b().placed_at(time, h), margin, exact ? kExactReuse : kReuse);
 
@@ -130,7 +132,7 @@ void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
     pair.by_event = true;
     return;
   }
-  if (!exact && pair.surface().restitution == 0) return;
+  if (!bounces) return;
   for (const PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const ContactPoint& point = m.manifold.points[k];

@@ -160,7 +160,8 @@ void World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepRe
     }
   }
   MovingIsland& island = islands[number];
-  report.collisions += resolve_collisions(island, kCluster, def.collision_speed, def.impact, report.impacts);
+  const CollisionSettings settings{kCluster, def.collision_speed, def.impact, def.solver == SolverKind::exact};
+  report.collisions += resolve_collisions(island, settings, report.impacts);
   for (Body* body : island.bodies) body->rigid = body->start;
   if (time >= h * (1 - kInstant)) return;
   // Velocities are others now: what may meet, and what limits whom, too.

@@ -64,15 +64,14 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
   update_lists();
   begin_bodies(end);
   motions.clear();
-  if (awake.empty() && springs.empty() && systems.empty()) {
+  if (awake.empty() && kinematic.empty() && springs.empty() && systems.empty()) {
     islands.clear();
     active_pairs.clear();
     pairs_changed = true;
-    for (Body* body : kinematic) keep_within_bounds(*body, report);
     return count_contacts(report);
   }
   CoupledSystem& motion = move_all(start, h);
-  if (!awake.empty()) {
+  if (!awake.empty() || (!kinematic.empty() && asleep > 0)) {
     do update_pairs(h);
     while (!wake_touched(start, h).empty());
     find_moving_islands();

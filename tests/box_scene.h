@@ -167,9 +167,11 @@ class BoxScene {
     p.force_t = kept.patch.force_t;
     p.force_k = kept.patch.force_k;
     p.torque_n = kept.patch.torque_n;
+    p.mean_friction = kept.patch.mean_friction;
     std::array<bool, 4> taken{}, found{};
     const auto take = [&](uint32_t to, uint32_t from) {
       p.points[to].force = kept.patch.points[from].force;
+      p.points[to].mean_force = kept.patch.points[from].mean_force;
       found[to] = taken[from] = true;
     };
     for (uint32_t i = 0; i < p.count; ++i)

@@ -47,7 +47,10 @@ void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_wit
   placed_.resize(found_.size());
   for (std::size_t i = 0; i < found_.size(); ++i) placed_[i] = {.manifold = placed(found_[i], a)};
   set_frames();
-  for (PlacedManifold& m : placed_) m.force.fill(Vec3::Zero());
+  for (PlacedManifold& m : placed_) {
+    m.force.fill(Vec3::Zero());
+    m.mean_force.fill(Vec3::Zero());
+  }
   recall(before_, placed_at_, a);
   placed_at_ = a;
 }
@@ -77,7 +80,8 @@ void ContactPair::reuse(const Pose& a, const Pose& b) {
   const Quat turn = a.orientation * placed_at_.orientation.conjugate();
   for (std::size_t i = 0; i < placed_.size(); ++i)
     for (uint32_t k = 0; k < placed_[i].manifold.count; ++k)
-      placed_[i].force[k] = carried(placed_[i].force[k], before_frames_[i], placed_[i].frame, turn);
+      for (Vec3* f : {&placed_[i].force[k], &placed_[i].mean_force[k]})
+        *f = carried(*f, before_frames_[i], placed_[i].frame, turn);
   placed_at_ = a;
 }
 
@@ -119,8 +123,10 @@ void ContactPair::recall(const std::vector<PlacedManifold>& before, const Pose& 
           if (distance >= best) continue;
           best = distance;
           m.force[k] = carried(old.force[j], old.frame, m.frame, turn);
+          m.mean_force[k] = carried(old.mean_force[j], old.frame, m.frame, turn);
           m.known[k] = true;
           m.torque = old.torque;
+          m.mean_torque = old.mean_torque;
         }
     }
   }

@@ -25,6 +25,9 @@ struct PlacedManifold {
   std::array<Vec3, 4> force;           ///< in the frame: on body a [N]
   std::array<bool, 4> known{};         ///< whether the point was there in the interval before
   Real torque = 0;                     ///< about the normal, of all points together; the fast solver's [N m]
+  /// Means over the last intervals of `force` and `torque`, which the fast solver keeps.
+  std::array<Vec3, 4> mean_force;
+  Real mean_torque = 0;
 };
 
 class ContactPair {

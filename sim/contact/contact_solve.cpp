@@ -320,10 +320,13 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
         std::tie(patch.friction_t, patch.friction_k) = friction(pair->surface(), u);
         for (uint32_t k = 0; k < patch.count; ++k) {
           patch.points[k].force = m.force[k].x();
+          patch.points[k].mean_force = m.mean_force[k].x();
+          patch.mean_friction += Vec3(m.mean_force[k].y(), m.mean_force[k].z(), 0);
           patch.force_t += m.force[k].y();
           patch.force_k += m.force[k].z();
         }
         patch.torque_n = m.torque;
+        patch.mean_friction.z() = m.mean_torque;
         patches_.push_back(patch);
         origins_.push_back(&m);
       }
@@ -339,8 +342,11 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
     for (uint32_t k = 0; k < patch.count; ++k) {
       const Real share = sum > 0 ? patch.points[k].force / sum : 1.0 / patch.count;
       origins_[i]->force[k] = {patch.points[k].force, share * patch.force_t, share * patch.force_k};
+      origins_[i]->mean_force[k] = {patch.points[k].mean_force, share * patch.mean_friction.x(),
+                                    share * patch.mean_friction.y()};
     }
     origins_[i]->torque = patch.torque_n;
+    origins_[i]->mean_torque = patch.mean_friction.z();
   }
   for (const Island* island : islands)
     for (Body* body : island->bodies) {
@@ -354,18 +360,19 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
 
 // Collisions
 
-uint32_t resolve_collisions(const Island& island, Real reach, Real collision_speed, ImpactLaw law,
-                            ContactWork& work) {
+namespace {
+
+/// More contacts than this are not solved together unless asked for.
+constexpr std::size_t kCluster = 24;
+
+/// Contacts of an island that collide together, with the bodies' velocities before.
+struct CollisionCluster {
   std::vector<ContactBody> bodies;
   std::vector<Contact> contacts;
   std::vector<Real> restitution;
-  uint32_t collisions = 0;
-  for (Body* body : island.bodies) {
-    body->row = static_cast<uint32_t>(bodies.size());
-    bodies.push_back({1 / body->start.mass, inverse_inertia(body->start, body->start.orientation),
-                      body->start.velocity(), body->start.angular_velocity()});
-  }
-  for (ContactPair* pair : island.pairs) {
+  std::vector<uint8_t> bounces;  // by contact
+
+  void add(const ContactPair& pair, Real reach, Real collision_speed, ImpactLaw law) {
     const auto row = [&](const Body& body) {
       if (body.is_awake()) return body.row;
       bodies.push_back({});
@@ -375,33 +382,74 @@ uint32_t resolve_collisions(const Island& island, Real reach, Real collision_spe
       }
       return static_cast<uint32_t>(bodies.size() - 1);
     };
-    const uint32_t a = row(pair->a()), b = row(pair->b());
-    const Vec3 surface = surface_velocity(*pair);
-    for (const PlacedManifold& m : pair->manifolds())
+    const uint32_t a = row(pair.a()), b = row(pair.b());
+    const Vec3 surface = surface_velocity(pair);
+    for (const PlacedManifold& m : pair.manifolds())
       for (uint32_t k = 0; k < m.manifold.count; ++k) {
         const ContactPoint& point = m.manifold.points[k];
         if (point.separation > reach) continue;
         const Vec3 place = (point.on_a + point.on_b) / 2;
         Contact c{.a = a, .b = b, .frame = m.frame};
-        c.arm_a = place - origin(pair->a());
-        c.arm_b = place - origin(pair->b());
+        c.arm_a = place - origin(pair.a());
+        c.arm_b = place - origin(pair.b());
         c.offset = in_frame(m.frame, surface);
         const Vec3 u = c.relative_velocity(bodies);
-        std::tie(c.friction_t, c.friction_k) = friction(pair->surface(), u);
+        std::tie(c.friction_t, c.friction_k) = friction(pair.surface(), u);
         contacts.push_back(c);
-        const bool bounces = u.x() < -collision_speed;
-        collisions += bounces;
+        bounces.push_back(u.x() < -collision_speed);
         // In sequence, a contact at rest may be hit by the impulse of another.
-        restitution.push_back(bounces || law == ImpactLaw::sequential ? pair->surface().restitution : 0);
+        restitution.push_back(bounces.back() || law == ImpactLaw::sequential ? pair.surface().restitution : 0);
       }
   }
-  if (contacts.empty()) return 0;
-  work.add(collide(bodies, contacts, restitution, law));
+
+  /// Leaves out what is far from what bounces, if there is too much of it: first what shares no body with that,
+  /// then all the rest. What is left out blocks the way afterwards, as resting contact.
+  void narrow() {
+    if (contacts.size() <= kCluster) return;
+    std::vector<uint8_t> involved(bodies.size(), 0);
+    for (std::size_t i = 0; i < contacts.size(); ++i)
+      if (bounces[i])
+        for (uint32_t body : {contacts[i].a, contacts[i].b}) involved[body] |= bodies[body].is_moved();
+    keep([&](std::size_t i) { return involved[contacts[i].a] || involved[contacts[i].b]; });
+    if (contacts.size() > kCluster) keep([&](std::size_t i) { return bounces[i] != 0; });
+  }
+
+ private:
+  template <class Wanted>
+  void keep(Wanted&& wanted) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < contacts.size(); ++i) {
+      if (!wanted(i)) continue;
+      contacts[kept] = contacts[i];
+      restitution[kept] = restitution[i];
+      bounces[kept] = bounces[i];
+      ++kept;
+    }
+    contacts.resize(kept);
+    restitution.resize(kept);
+    bounces.resize(kept);
+  }
+};
+
+}  // namespace
+
+uint32_t resolve_collisions(const Island& island, const CollisionSettings& settings, ContactWork& work) {
+  CollisionCluster cluster;
   for (Body* body : island.bodies) {
-    const ContactBody& b = bodies[body->row];
+    body->row = static_cast<uint32_t>(cluster.bodies.size());
+    cluster.bodies.push_back({1 / body->start.mass, inverse_inertia(body->start, body->start.orientation),
+                              body->start.velocity(), body->start.angular_velocity()});
+  }
+  for (const ContactPair* pair : island.pairs)
+    cluster.add(*pair, settings.reach, settings.collision_speed, settings.law);
+  if (!settings.whole) cluster.narrow();
+  if (cluster.contacts.empty()) return 0;
+  work.add(collide(cluster.bodies, cluster.contacts, cluster.restitution, settings.law));
+  for (Body* body : island.bodies) {
+    const ContactBody& b = cluster.bodies[body->row];
     body->start.set_velocity(b.velocity, b.angular_velocity);
   }
-  return collisions;
+  return static_cast<uint32_t>(std::count(cluster.bounces.begin(), cluster.bounces.end(), 1));
 }
 
 }  // namespace offstage::sim

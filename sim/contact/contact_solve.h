@@ -76,9 +76,15 @@ class SolverChoice {
   Real debt_ = 0;      // [ns]
 };
 
-/// Resolves the collisions among an island's pairs at its bodies' `start`: what is nearer than `reach` [m]
-/// belongs to the cluster, what approaches faster than `collision_speed` bounces. Changes the bodies' velocities
-/// at the start. Returns how many contacts bounced.
-uint32_t resolve_collisions(const Island& island, Real reach, Real collision_speed, ImpactLaw law, ContactWork& work);
+struct CollisionSettings {
+  Real reach;            ///< what is nearer than this belongs to the cluster [m]
+  Real collision_speed;  ///< what approaches faster bounces [m/s]
+  ImpactLaw law;
+  bool whole;  ///< all contacts of the island together, however many; else those around what bounces
+};
+
+/// Resolves the collisions among an island's pairs at its bodies' `start`: changes the velocities there. Returns
+/// how many contacts bounced.
+uint32_t resolve_collisions(const Island& island, const CollisionSettings& settings, ContactWork& work);
 
 }  // namespace offstage::sim

@@ -12,6 +12,11 @@ namespace {
 /// Rounds of normal and friction impulses in the first sweep of a patch without a guess.
 constexpr uint32_t kFreshRounds = 20;
 
+/// Of the difference between an impulse and its mean, the share that a sub-step takes from the impulse, and
+/// the share that it adds to the mean. Slow modes lose most if their frequencies are about the latter. A
+/// patch without a guess has no past: its means are the impulses.
+constexpr Real kReturn = 0.03, kRenewal = 0.01;
+
 /// Twists and wrenches of the patches, by group.
 struct Groups {
   LaneVector normal;    ///< along n, about t, about k
@@ -135,6 +140,7 @@ void set_patch(PatchBatch& p, int lane, const ContactPatch& c, Real substep) {
   p.friction_t[lane] = c.friction_t;
   p.friction_k[lane] = c.friction_k;
   p.friction_impulse.set(lane, substep * Vec3(c.force_t, c.force_k, c.torque_n));
+  p.friction_mean.set(lane, substep * c.mean_friction);
   for (uint32_t i = 0; i < c.count; ++i) {
     PatchBatch::Point& q = p.points[i];
     q.x[lane] = c.points[i].t;
@@ -142,10 +148,13 @@ void set_patch(PatchBatch& p, int lane, const ContactPatch& c, Real substep) {
     q.mass[lane] = 1;
     q.start[lane] = q.separation[lane] = c.points[i].separation;
     q.impulse[lane] = substep * c.points[i].force;
+    q.mean[lane] = substep * c.points[i].mean_force;
   }
   p.count = std::max(p.count, c.count);
-  if (std::none_of(c.points.begin(), c.points.end(), [](const auto& q) { return q.force > 0; }))
-    p.rounds = kFreshRounds;
+  const bool fresh =
+      std::none_of(c.points.begin(), c.points.end(), [](const auto& q) { return q.force > 0; });
+  if (fresh) p.rounds = kFreshRounds;
+  p.renewal[lane] = fresh ? 1 : kRenewal;
 }
 
 LaneVector normal_wrench(const PatchBatch& p) {
@@ -225,6 +234,29 @@ LaneVector solve_normal(PatchBatch& p, Groups& u, Real closing) {
   return change;
 }
 
+/// Takes the impulses a little back towards their means, which follow. No impulse changes by more than that
+/// share of itself, or of Coulomb's limit: the mean of a blow must not lift what it has stopped. Returns the
+/// change.
+Groups return_to_mean(PatchBatch& p) {
+  Groups change{};
+  const LaneVector limits = friction_limits(p);
+  for (uint32_t i = 0; i < p.count; ++i) {
+    PatchBatch::Point& q = p.points[i];
+    const Lanes difference = q.mean - q.impulse;
+    const Lanes d = kReturn * lane_min(difference, q.impulse);
+    q.impulse += d;
+    q.mean -= p.renewal * difference;
+    change.normal = change.normal + point_wrench(q, d);
+  }
+  const LaneVector difference = p.friction_mean - p.friction_impulse;
+  change.friction =
+      lanes(kReturn) * LaneVector{lane_clamp(difference.x, limits.x), lane_clamp(difference.y, limits.y),
+                                  lane_clamp(difference.z, limits.z)};
+  p.friction_impulse = p.friction_impulse + change.friction;
+  p.friction_mean = p.friction_mean - p.renewal * difference;
+  return change;
+}
+
 void measure_separations(PatchBatch& p, std::span<const BodyMotion> motions) {
   const LaneTwist a = gather<&BodyMotion::shift>(motions, p.a), b = gather<&BodyMotion::shift>(motions, p.b);
   const LaneVector moved = relative(p, a, b).normal;
@@ -278,7 +310,8 @@ void sweep(PatchBatch& p, std::span<BodyMotion> motions, Real closing) {
   change.normal = change.normal + solve_normal(p, u, closing);
   const LaneVector f = u.friction - before.friction;
   p.residual = lane_max(lane_abs(u.normal.x - before.normal.x), lane_max(lane_abs(f.x), lane_abs(f.y)));
-  apply(p, change, a, b);
+  const Groups back = return_to_mean(p);
+  apply(p, {change.normal + back.normal, change.friction + back.friction}, a, b);
   scatter<&BodyMotion::velocity>(a, motions, p.a, p.moves_a);
   scatter<&BodyMotion::velocity>(b, motions, p.b, p.moves_b);
 }
@@ -305,10 +338,15 @@ void report(const PatchBatch& p, std::span<ContactPatch> patches, Real substep) 
     const uint32_t index = p.patch[static_cast<unsigned>(lane)];
     if (index == ContactColoring::kNone) continue;
     ContactPatch& c = patches[index];
-    for (uint32_t i = 0; i < c.count; ++i) c.points[i].force = p.points[i].impulse[lane] / substep;
+    for (uint32_t i = 0; i < c.count; ++i) {
+      c.points[i].force = p.points[i].impulse[lane] / substep;
+      c.points[i].mean_force = p.points[i].mean[lane] / substep;
+    }
     c.force_t = p.friction_impulse.x[lane] / substep;
     c.force_k = p.friction_impulse.y[lane] / substep;
     c.torque_n = p.friction_impulse.z[lane] / substep;
+    const LaneVector& mean = p.friction_mean;
+    c.mean_friction = Vec3(mean.x[lane], mean.y[lane], mean.z[lane]) / substep;
   }
 }
 

@@ -31,7 +31,7 @@ struct PatchBatch {
     Lanes x, y;               ///< along t and k [m]
     Lanes mass;               ///< effective [kg], 0 in lanes that have no such point
     Lanes start, separation;  ///< at the start of the step; now [m]
-    Lanes impulse;            ///< of a sub-step [N s]
+    Lanes impulse, mean;      ///< of a sub-step, and over the time before [N s]
   };
 
   std::array<uint32_t, 4> a, b, patch;  ///< the body beyond the last and kNone in lanes that are not used
@@ -47,8 +47,9 @@ struct PatchBatch {
   LaneMatrix coupling;
   LaneVector offset;  ///< along n, t and k [m/s]
   Lanes friction_t, friction_k;
-  LaneVector friction_impulse;  ///< along t, k, about n, of a sub-step
-  Lanes residual;               ///< by how much the last sweep changed the velocity of the centre [m/s]
+  LaneVector friction_impulse, friction_mean;  ///< along t, k, about n, likewise
+  Lanes renewal;   ///< share of the difference that means follow their impulses by
+  Lanes residual;  ///< by how much the last sweep changed the velocity of the centre [m/s]
   std::array<Point, 4> points;
 };
 

@@ -9,7 +9,7 @@ namespace offstage::sim {
 namespace {
 
 /// Of the penetration that a step finds, the share that it takes away, and the fastest that it does [m/s].
-constexpr Real kPushShare = 0.2, kMaxPush = 3;
+constexpr Real kPushShare = 0.5, kMaxPush = 3;
 
 /// Below this a step is not worth a second thread.
 constexpr std::size_t kSerialBatches = 48;

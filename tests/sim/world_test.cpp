@@ -101,6 +101,38 @@ TEST(World, AFastBodyDoesNotPassAThinOneBetweenSteps) {
     }
 }
 
+TEST(World, IslandsAreWhatTouchesAndWhatSpringsJoin) {
+  World world;
+  const auto ground = world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
+  std::vector<BodyHandle> boxes;
+  for (const Real x : {0.0, 2.0, 4.0, 6.0})
+    boxes.push_back(world.add_body({.shape = Box{}, .pose = {Vec3(x, 0.5, 0)}, .restitution = 0}));
+  const auto rider = world.add_body({.shape = Box{}, .pose = {Vec3(2, 1.5, 0)}, .restitution = 0});
+  world.add_spring({.a = BodyPoint{boxes[2]}, .b = BodyPoint{boxes[3]}});
+  EXPECT_EQ(world.step(1.0 / 60).islands, 3u);
+  EXPECT_EQ(world.island(boxes[1]), world.island(rider));
+  EXPECT_EQ(world.island(boxes[2]), world.island(boxes[3]));
+  EXPECT_NE(world.island(boxes[0]), world.island(boxes[1]));
+  EXPECT_FALSE(world.island(ground).has_value());
+}
+
+TEST(World, ContactRulesReplaceWhatFollowsFromTheSurfaces) {
+  const auto slide = [](bool ruled) {
+    World world({.sleep = false});
+    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .material = "ice", .friction = 0.5});
+    const auto box = world.add_body({.shape = Box{},
+                                     .pose = {Vec3(0, 0.5, 0)},
+                                     .velocity = {1, 0, 0},
+                                     .material = "steel",
+                                     .restitution = 0});
+    if (ruled) world.add_contact_rule({.a = "steel", .b = "ice", .restitution = 0, .friction = 0});
+    for (int i = 0; i < 60; ++i) world.step(1.0 / 60);
+    return world.body(box).velocity.x();
+  };
+  EXPECT_NEAR(slide(false), 0, 1e-6);
+  EXPECT_NEAR(slide(true), 1, 1e-9);
+}
+
 TEST(World, FreezesAndReportsABodyThatLeaves) {
   World world({.bounds = Aabb(Vec3::Constant(-2), Vec3::Constant(2))});
   const auto ball = world.add_body({.name = "ball"});

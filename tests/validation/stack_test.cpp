@@ -33,7 +33,7 @@ class Stack : public BothSolvers {
   static void expect_stands(Real seconds, Real max_step) {
     World world(def(max_step));
     add_ground(world);
-    const auto boxes = add_stack(world, 10, [](int) { return 8; });
+    const auto boxes = add_stack(world, 10, [](int) { return 8.0; });
     const Tally t = run(world, seconds, max_step);
     const Vec3 drift = world.body(boxes.back()).centre - Vec3(0, 1.9, 0);
     EXPECT_LT(drift.norm(), 1e-3) << max_step;
@@ -58,7 +58,7 @@ TEST_P(Stack, HeavyOnTopStands) {
     const Tally t = run(world, 10);
     const Vec3 drift = world.body(boxes.back()).centre - Vec3(0, 0.7, 0);
     // The exact solver does not mind; to the fast one the light boxes are soft.
-    const Real allowed = is_exact() ? 1e-5 : ratio == 100 ? 1e-3 : 5e-3;
+    const Real allowed = is_exact() ? 1e-5 : ratio == 100 ? 1e-3 : 2e-2;
     EXPECT_LT(drift.norm(), allowed) << ratio;
     EXPECT_LT(t.penetration, allowed) << ratio;
     EXPECT_EQ(t.exact_fallbacks, 0u) << ratio;
@@ -69,7 +69,7 @@ TEST_P(Stack, HeavyOnTopStands) {
 TEST_P(Stack, CarriesItsWeight) {
   World world(def());
   add_ground(world);
-  const auto boxes = add_stack(world, 5, [](int i) { return 1 + i; });
+  const auto boxes = add_stack(world, 5, [](int i) { return 1.0 + i; });
   run(world, 2);
   for (std::size_t k = 0; k < 5; ++k) {
     Vec3 force = Vec3::Zero();
@@ -212,7 +212,7 @@ class Pile : public BothSolvers {
     std::vector<BodyHandle> boxes;
     for (uint64_t i = 0; i < count; ++i) {
       const auto u = [&](uint64_t k) { return 2 * random.uniform(i, k) - 1; };
-      const Vec3 at(-0.5 + 0.5 * Real(i % 3), 0.4 + 0.4 * Real(i / 9), -0.5 + 0.5 * Real(i / 3 % 3));
+      const Vec3 at(-0.5 + 0.5 * Real(i % 3), 0.3 + 0.45 * Real(i / 9), -0.5 + 0.5 * Real(i / 3 % 3));
       const Quat turn = Quat(u(0), u(1), u(2), u(3)).normalized();
       const Vec3 size = Vec3::Constant(0.2) + 0.05 * Vec3(u(4), u(5), u(6));
       boxes.push_back(world.add_body({.shape = Box{size}, .pose = {at, turn}, .restitution = 0.1}));

@@ -40,8 +40,8 @@ TEST(Relaxation, StackOfTenStays) {
   BoxScene s = box_stack(10);
   const BoxScene start = s;
   s.run(4, kStep);
-  EXPECT_LT(greatest_move(s, start), 1e-4);
-  EXPECT_LT(s.kinetic_energy(), 1e-5);
+  EXPECT_LT(greatest_move(s, start), 3e-4);
+  EXPECT_LT(s.kinetic_energy(), 1e-9);
 }
 
 TEST(Relaxation, BoxDoesNotCreepBelowTheFrictionAngle) {
@@ -79,15 +79,22 @@ TEST(Relaxation, WallOfHundredStandsAtCoarseSteps) {
   BoxScene s = brick_wall(100);
   const BoxScene start = s;
   s.run(4, 1.0 / 60);
-  EXPECT_LT(greatest_move(s, start), 0.02);
+  EXPECT_LT(greatest_move(s, start), 2e-3);
   EXPECT_LT(s.deepest(), 1e-3);
+}
+
+// Without the return to the mean forces the wall sways on: 0.02 J.
+TEST(Relaxation, WallOfHundredComesToRest) {
+  BoxScene s = brick_wall(100);
+  s.run(2, kStep);
+  EXPECT_LT(s.kinetic_energy(), 1e-5);
 }
 
 TEST(LongRelaxation, WallOfThousandStandsAtCoarseSteps) {
   BoxScene s = brick_wall(1000);
   const BoxScene start = s;
   s.run(4, 1.0 / 60);
-  EXPECT_LT(greatest_move(s, start), 0.4);
+  EXPECT_LT(greatest_move(s, start), 0.02);
   EXPECT_LT(s.deepest(), 1e-3);
 }
 

@@ -1,0 +1,265 @@
+/// Sleeping and waking, overlaps at the start, leaving the world, bodies joined by springs, and particles among bodies.
+
+#include <cmath>
+#include <vector>
+
+#include "tests/validation/both_solvers.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr Real kGravity = 9.81;
+
+class Sleep : public BothSolvers {
+ protected:
+  struct Scene {
+    World world;
+    BodyHandle support;
+    std::vector<BodyHandle> stack;
+  };
+  /// A stack of three on a block, asleep.
+  static Scene sleeping_stack() {
+    WorldDef sleepy = def();
+    sleepy.sleep = true;
+    Scene s{World(sleepy), {}, {}};
+    s.world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0});
+    s.support = s.world.add_body({.shape = Box{{1, 0.5, 1}},
+                                  .motion = MotionType::fixed,
+                                  .pose = {Vec3(0, 0.25, 0)},
+                                  .restitution = 0});
+    for (int i = 0; i < 3; ++i)
+      s.stack.push_back(s.world.add_body(
+          {.shape = Box{Vec3::Constant(0.2)}, .pose = {Vec3(0, 0.6 + 0.2 * i, 0)}, .restitution = 0}));
+    run(s.world, 1.5);
+    for (const BodyHandle b : s.stack) EXPECT_TRUE(s.world.is_asleep(b));
+    return s;
+  }
+};
+
+TEST_P(Sleep, ASettledStackCostsNothing) {
+  Scene s = sleeping_stack();
+  const StateHash before = s.world.state_hash();
+  const StepReport r = s.world.step(1.0 / 60);
+  EXPECT_EQ(r.bodies_asleep, 3u);
+  EXPECT_EQ(r.bodies_awake, 0u);
+  EXPECT_EQ(r.islands, 0u);
+  EXPECT_EQ(r.exact.solves + r.fast.solves, 0u);
+  EXPECT_TRUE(s.world.moved().empty());
+  EXPECT_EQ(s.world.energy().kinetic, 0);
+  run(s.world, 1);
+  for (int i = 0; i < 3; ++i)
+    EXPECT_NEAR(s.world.body(s.stack[std::size_t(i)]).centre.y(), 0.6 + 0.2 * i, 1e-3);
+  EXPECT_NE(before, StateHash{});
+}
+
+TEST_P(Sleep, WhatHitsItWakesIt) {
+  Scene s = sleeping_stack();
+  s.world.add_body({.shape = Sphere{0.1}, .pose = {Vec3(-1.1, 1, 0)}, .velocity = {6, 1, 0}});
+  const Tally t = run(s.world, 0.3);
+  EXPECT_GT(t.collisions, 0u);
+  EXPECT_FALSE(s.world.is_asleep(s.stack[2]));
+  EXPECT_GT(s.world.body(s.stack[2]).centre.x(), 0.01);
+}
+
+TEST_P(Sleep, AFastBulletWakesItToo) {
+  Scene s = sleeping_stack();
+  s.world.add_body({.shape = Sphere{0.02}, .pose = {Vec3(-3, 1, 0)}, .velocity = {300, 0, 0}});
+  run(s.world, 0.1);
+  EXPECT_GT(s.world.body(s.stack[2]).centre.x(), 1e-3);
+}
+
+TEST_P(Sleep, LosingItsSupportWakesIt) {
+  Scene s = sleeping_stack();
+  s.world.remove(s.support);
+  run(s.world, 0.2);
+  for (int i = 0; i < 3; ++i)
+    EXPECT_NEAR(s.world.body(s.stack[std::size_t(i)]).centre.y(), 0.6 + 0.2 * i - 0.5 * kGravity * 0.04, 5e-3);
+}
+
+TEST_P(Sleep, LosingOneOfItsOwnWakesIt) {
+  Scene s = sleeping_stack();
+  s.world.remove(s.stack[0]);
+  run(s.world, 0.1);
+  EXPECT_LT(s.world.body(s.stack[2]).centre.y(), 1 - 0.04);
+}
+
+TEST_P(Sleep, ForcesExplosionsAndOrdersWakeIt) {
+  Scene pushed = sleeping_stack();
+  pushed.world.add_force({.effect = ConstantField{.force = {100, 0, 0}}});
+  run(pushed.world, 0.5);
+  EXPECT_GT(pushed.world.body(pushed.stack[2]).centre.x(), 0.1);
+
+  Scene blown = sleeping_stack();
+  const Real soon = blown.world.time() + 0.1;
+  blown.world.add_force(
+      {.start = soon, .effect = Explosion{.point = {-0.5, 1, 0}, .impulse = 40, .radius = 2}});
+  run(blown.world, 1);
+  EXPECT_GT(blown.world.body(blown.stack[2]).centre.x(), 0.1);
+
+  Scene told = sleeping_stack();
+  told.world.set_velocity(told.stack[2], {0, 2, 0}, Vec3::Zero());
+  run(told.world, 0.1);
+  EXPECT_GT(told.world.body(told.stack[2]).centre.y(), 1.1);
+}
+
+TEST_P(Sleep, AKinematicBodyThatComesAlongWakesIt) {
+  Scene s = sleeping_stack();
+  const Real t = s.world.time();
+  s.world.add_body({.shape = Box{{0.2, 0.1, 0.2}},
+                    .motion = MotionType::kinematic,
+                    .track = {.keys = {{t, {Vec3(-1.5, 1, 0)}}, {t + 1, {Vec3(0, 1, 0)}}},
+                              .interpolation = Interpolation::linear}});
+  run(s.world, 1);
+  EXPECT_GT(s.world.body(s.stack[2]).centre.x(), 0.15);
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, Sleep);
+
+class Overlap : public BothSolvers {};
+
+// Pushed out at no more than the speed for that, and without a jump afterwards.
+TEST_P(Overlap, IsPushedApartGently) {
+  for (const Real depth : {0.005, 0.05}) {
+    World world(def());
+    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0.5});
+    const auto box = world.add_body({.shape = Box{Vec3::Constant(0.4)}, .pose = {Vec3(0, 0.2 - depth, 0)}});
+    const auto above =
+        world.add_body({.shape = Box{Vec3::Constant(0.4)}, .pose = {Vec3(0, 0.6 - 2 * depth, 0)}});
+    Real fastest = 0;
+    for (int i = 0; i < 480; ++i) {
+      EXPECT_TRUE(world.step(1.0 / 240).finite);
+      for (const BodyHandle b : {box, above}) fastest = std::max(fastest, world.body(b).velocity.norm());
+    }
+    EXPECT_LT(fastest, 1.2) << depth;
+    EXPECT_NEAR(world.body(box).centre.y(), 0.2, 1e-3) << depth;
+    EXPECT_NEAR(world.body(above).centre.y(), 0.6, 1e-3) << depth;
+  }
+}
+
+TEST_P(Overlap, CoincidentBodiesComeApart) {
+  World world(weightless());
+  std::vector<BodyHandle> bodies;
+  for (const Shape& s : {Shape(Sphere{0.1}), Shape(Sphere{0.1}), Shape(Box{Vec3::Constant(0.2)})})
+    bodies.push_back(world.add_body({.shape = s, .restitution = 0}));
+  const Tally t = run(world, 2);
+  EXPECT_TRUE(t.finite);
+  EXPECT_LT(t.last.penetration, 1e-3);
+  for (const BodyHandle b : bodies) EXPECT_LT(world.body(b).velocity.norm(), 2);
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, Overlap);
+
+class Bounds : public BothSolvers {};
+
+TEST_P(Bounds, BodiesThatLeaveInContactAreRetiredOnceEach) {
+  WorldDef small = def();
+  small.bounds = Aabb(Vec3(-2, -2, -2), Vec3(2, 2, 2));
+  World world(small);
+  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0, .friction = 0});
+  std::vector<BodyHandle> stack;
+  for (int i = 0; i < 3; ++i)
+    stack.push_back(world.add_body({.shape = Box{Vec3::Constant(0.2)},
+                                    .pose = {Vec3(1.5 - 0.03 * i, 0.1 + 0.2 * i, 0)},
+                                    .velocity = {1, 0, 0},
+                                    .restitution = 0}));
+  std::size_t retired = 0;
+  for (int i = 0; i < 240; ++i) {
+    const StepReport r = world.step(1.0 / 240);
+    EXPECT_TRUE(r.finite);
+    retired += r.bodies_retired.size();
+  }
+  EXPECT_EQ(retired, 3u);
+  for (const BodyHandle b : stack) EXPECT_NEAR(world.body(b).centre.x(), 2, 0.1);
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, Bounds);
+
+class Joined : public BothSolvers {};
+
+// A bob on a stiff spring swings into a ball of its mass that lies at the lowest point: the ball takes all the speed.
+TEST_P(Joined, APendulumOnAStiffSpringHandsItsSpeedOver) {
+  constexpr Real kLength = 1, kRadius = 0.05, kStart = 1;
+  WorldDef light = def();
+  World world(light);
+  world.add_body({.shape = Box{{0.04, 1, 0.04}}, .motion = MotionType::fixed,
+                  .pose = {Vec3(2 * kRadius, -0.5 - kRadius, 0)}, .restitution = 0, .friction = 0});
+  const auto bob = world.add_body({.shape = Sphere{kRadius},
+                                   .pose = {kLength * Vec3(-std::sin(kStart), 1 - std::cos(kStart), 0)},
+                                   .mass = 1,
+                                   .restitution = 1,
+                                   .friction = 0});
+  const auto ball = world.add_body({.shape = Sphere{kRadius},
+                                    .pose = {Vec3(2 * kRadius, 0, 0)},
+                                    .mass = 1,
+                                    .restitution = 1,
+                                    .friction = 0});
+  world.add_spring({.a = WorldPoint{{0, kLength, 0}}, .b = BodyPoint{bob}, .stiffness = 1e5, .rest_length = kLength});
+  const Real before = world.energy().total();
+  uint64_t collisions = 0;
+  for (int i = 0; i < 240 && collisions == 0; ++i) collisions += world.step(1.0 / 240).collisions;
+  ASSERT_EQ(collisions, 1u);
+  const Real speed = std::sqrt(2 * kGravity * kLength * (1 - std::cos(kStart)));
+  EXPECT_NEAR(world.body(ball).velocity.x() / speed, 1, 0.01);
+  EXPECT_LT(std::abs(world.body(bob).velocity.x()), 0.02 * speed);
+  EXPECT_NEAR(world.energy().total(), before, 0.01 * before + 0.05);
+}
+
+// E7: what a spring joins goes back to the time of impact together, so a larger step finds the same motion.
+TEST_P(Joined, BodiesOnASpringAreTracedBackTogether) {
+  const auto finish = [](Real max_step) {
+    World world(weightless(max_step));
+    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 1, .friction = 0});
+    const auto ball = [&](Real y) {
+      return world.add_body({.shape = Sphere{0.1},
+                             .pose = {Vec3(0, y, 0)},
+                             .velocity = {0.3, -2, 0},
+                             .mass = 1,
+                             .restitution = 1,
+                             .friction = 0});
+    };
+    const auto low = ball(0.7), high = ball(1.7);
+    world.add_spring({.a = BodyPoint{low}, .b = BodyPoint{high}, .stiffness = 200, .rest_length = 1});
+    const Real before = world.energy().total();
+    const Tally t = run(world, 1.5, max_step);
+    EXPECT_GE(t.tracebacks, 1u);
+    EXPECT_NEAR(world.energy().total() / before, 1, 1e-3) << max_step;
+    return std::pair(world.body(low).centre, world.body(high).centre);
+  };
+  const auto [low, high] = finish(1.0 / 60);
+  const auto [low_exact, high_exact] = finish(1.0 / 1920);
+  EXPECT_LT((low - low_exact).norm(), 1e-3);
+  EXPECT_LT((high - high_exact).norm(), 1e-3);
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, Joined);
+
+class Rain : public BothSolvers {};
+
+// Particles fall on a stack while it falls itself: none gets inside, and the stack lands as without them.
+TEST_P(Rain, OnBodiesThatMove) {
+  const auto scene = [](bool raining) {
+    World world(def());
+    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0});
+    std::vector<BodyHandle> boxes;
+    for (int i = 0; i < 3; ++i)
+      boxes.push_back(world.add_body(
+          {.shape = Box{Vec3::Constant(0.4)}, .pose = {Vec3(0, 0.3 + 0.45 * i, 0)}, .restitution = 0}));
+    const auto system = world.add_particle_system({});
+    for (int i = 0; raining && i < 200; ++i)
+      world.add_particle(system, {.position = {-0.4 + 0.004 * i, 2 + 0.01 * (i % 7), 0.05 * (i % 5) - 0.1},
+                                  .radius = 0.005,
+                                  .restitution = 0.3});
+    const Tally t = run(world, 1.5);
+    EXPECT_EQ(t.last.particles_removed, 0u);
+    EXPECT_NEAR(world.body(boxes[2]).centre.y(), 1, 1e-3);
+    for (const Vec3& p : world.particles(system).position) {
+      for (const BodyHandle b : boxes) {
+        const Vec3 q = world.body(b).pose.point_to_body(p).cwiseAbs();
+        EXPECT_GT(q.maxCoeff(), 0.2);
+      }
+      EXPECT_GT(p.y(), 0);
+    }
+    return world.body(boxes[2]).centre;
+  };
+  EXPECT_EQ(scene(true), scene(false));
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, Rain);
+
+}  // namespace
+}  // namespace offstage::sim
