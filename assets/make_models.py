@@ -8,8 +8,8 @@ import sys
 
 from modelling import (Material, Mesh, add, circle, cross, cylinder, dot, ellipsoid, extrude, fractal_noise,
                        grid_triangles, hashed, icosphere, lathe, mix, mul, noise, open_edges, ring, rod,
-                       rounded, shaded, smoothstep, sub, surface_nets, sweep, turn, union, unit, volume, welded,
-                       write_glb, write_mtl, write_obj, write_ply)
+                       rounded, shaded, smoothstep, sub, surface_nets, sweep, turn, union, unit, volume,
+                       welded, write_glb, write_mtl, write_obj, write_ply)
 
 MODELS = pathlib.Path(__file__).resolve().parent / "models"
 

@@ -36,7 +36,10 @@ Aabb swept_bounds(const Body& body) {
   Real margin = std::min(kMargin, kMarginShare * body.extent);
   // A point leaves the chord of its path by no more than an eighth of its greatest acceleration.
   const PosePath path = body.path();
-  if (path.turn() > 1e-3) margin += path.max_acceleration(body.extent) / 8;
+  if (path.turn() > 0.5)
+    margin += body.extent;  // whatever way it turns: around the balls that it is in
+  else if (path.turn() > 1e-3)
+    margin += path.max_acceleration(body.extent) / 8;
   box.min().array() -= margin;
   box.max().array() += margin;
   return box;

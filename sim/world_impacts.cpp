@@ -12,10 +12,17 @@
 namespace offstage::sim {
 namespace {
 
-constexpr uint32_t kMaxImpactsOfPair = 6;
-constexpr std::size_t kMaxImpacts = 64, kImpactsPerBody = 4;
+constexpr uint32_t kMaxImpactsOfPair = 6, kMaxOfTumblingPair = 100;
+constexpr std::size_t kMaxImpacts = 128, kImpactsPerBody = 4;
 /// Points this near to each other when two bodies collide take part [m].
 constexpr Real kCluster = 1e-4;
+/// Bodies that turn by more in an interval are looked at in pieces of as much [rad]; at most so many.
+constexpr Real kTurn = 0.5, kMostPieces = 512;
+
+Real spin(const Body& body) {
+  return body.is_awake() ? body.start.angular_velocity().norm() : 0;
+}
+
 /// Shorter intervals are none [of the sub-step].
 constexpr Real kInstant = 1e-9;
 
@@ -27,6 +34,8 @@ std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) co
   const Body &a = pair.a(), &b = pair.b();
   const Real from = std::max(a.is_awake() ? a.from : 0, b.is_awake() ? b.from : 0);
   if (from >= h * (1 - kInstant)) return std::nullopt;
+  const Real turn = std::max(spin(a), spin(b)) * (h - from);
+  if (turn > kTurn) return tumbling_impact_time(pair, from, h, turn);
   if (pair.separation() <= kTouching) return point_impact_time(pair, h);
   const auto path = [&](const Body& body) {
     if (!body.can_move()) return PosePath(body.start_pose);
@@ -37,6 +46,36 @@ std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) co
                                      MovingShape{pair.b().collision_shape(), path_b}, kTouching / 2);
   if (!impact) return std::nullopt;
   return from + impact->share * (h - from);
+}
+
+/// A path knows no more than half a turn: what tumbles faster goes in pieces, each turning about the body's present
+/// axis.
+std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, Real from, Real h, Real turn) const {
+  const auto place = [&](const Body& body, Real time) {
+    if (!body.is_awake()) return body.placed_at(time, h);
+    const Vec3 w = body.start.angular_velocity();
+    const Real rate = w.norm(), share = (time - body.from) / (h - body.from);
+    RigidBody at = body.start;
+    at.position += share * (body.rigid.position - body.start.position);
+    if (rate > 0) {
+      const Real half = 0.5 * rate * (time - body.from);
+      const Vec3 axis = w / rate * std::sin(half);
+      at.orientation = (Quat(std::cos(half), axis.x(), axis.y(), axis.z()) * body.start.orientation).normalized();
+    }
+    return at.pose();
+  };
+  const auto pieces = static_cast<uint32_t>(std::min(std::ceil(turn / kTurn), kMostPieces));
+  // What touches now has just met.
+  const uint32_t first = pair.separation() <= kTouching ? 1 : 0;
+  for (uint32_t i = first; i < pieces; ++i) {
+    const Real begin = from + (h - from) * i / pieces, end = from + (h - from) * (i + 1) / pieces;
+    const PosePath path_a(place(pair.a(), begin), place(pair.a(), end)),
+        path_b(place(pair.b(), begin), place(pair.b(), end));
+    const auto impact = time_of_impact(MovingShape{pair.a().collision_shape(), path_a},
+                                       MovingShape{pair.b().collision_shape(), path_b}, kTouching / 2);
+    if (impact) return begin + impact->share * (end - begin);
+  }
+  return std::nullopt;
 }
 
 /// The same of bodies that touch somewhere: by those of the points known that do not.
@@ -84,7 +123,8 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
                                         [](const Impact& x, const Impact& y) { return x.time < y.time; });
     const Impact impact = *first;
     ContactPair& pair = *impact.pair;
-    if (++pair.impacts > kMaxImpactsOfPair || count >= most) {
+    const bool tumbles = std::max(spin(pair.a()), spin(pair.b())) * h > kTurn;
+    if (++pair.impacts > (tumbles ? kMaxOfTumblingPair : kMaxImpactsOfPair) || count >= most) {
       pair.gave_up = true;
       ++report.cut_short;
     }

@@ -6,6 +6,8 @@
 #include <optional>
 #include <vector>
 
+#include <oneapi/tbb/task_arena.h>
+
 #include "sim/body.h"
 #include "sim/collision/broad_phase.h"
 #include "sim/collision/obstacles.h"
@@ -57,7 +59,8 @@ struct World::Impl : WorldState {
   void begin_bodies(Real end);
   void explode(Real start, Real end);
   std::vector<const ForceDef*> active_forces() const;
-  CoupledSystem& move_all(Real start, Real h);
+  void move_bodies(Real start, Real h, StepReport& report);
+  void move_all(Real start, Real h);
   CoupledSystem& move_some(std::span<Body* const> group, Real start, Real from, Real duration);
   void keep_within_bounds(Body& body, StepReport& report);
 
@@ -80,6 +83,7 @@ struct World::Impl : WorldState {
   };
   void resolve_impacts(Real start, Real h, StepReport& report);
   std::optional<Real> impact_time(const ContactPair& pair, Real h) const;
+  std::optional<Real> tumbling_impact_time(const ContactPair& pair, Real from, Real h, Real turn) const;
   std::optional<Real> point_impact_time(const ContactPair& pair, Real h) const;
   void bring_to(MovingIsland& island, Real start, Real time, StepReport& report);
   void join(uint32_t into, uint32_t island);
@@ -117,6 +121,7 @@ struct World::Impl : WorldState {
 
   BroadPhase broad_phase;  // of the bodies that collide, by slot
   ContactGraph graph;
+  tbb::task_arena serial{1};
   std::vector<ContactPair*> active_pairs;  // those of which a body can move
   std::vector<MovingIsland> islands;
   std::map<uint32_t, SolverChoice> choices;  // by the slot of an island's first body

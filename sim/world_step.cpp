@@ -10,6 +10,7 @@ namespace offstage::sim {
 namespace {
 
 constexpr Real kMaxSubsteps = 1e6;
+constexpr std::size_t kWorthThreads = 200;
 
 /// The fewest equal sub-steps not longer than `longest`. Rounding of a ratio that is meant to be whole adds
 /// none.
@@ -70,7 +71,23 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
     pairs_changed = true;
     return count_contacts(report);
   }
-  CoupledSystem& motion = move_all(start, h);
+  // Few bodies are not worth waking threads for, and waiting for them on a busy machine.
+  const auto bodies_move = [&] { move_bodies(start, h, report); };
+  if (awake.size() < kWorthThreads)
+    serial.execute(bodies_move);
+  else
+    bodies_move();
+  for (const auto& m : motions) report.integration.add(m->report());
+
+  if (!systems.empty()) {
+    update_obstacles(h);
+    step_particles(start, h, *motions.front(), report);
+  }
+}
+
+/// All that bodies do in a sub-step.
+void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
+  move_all(start, h);
   if (!awake.empty() || (!kinematic.empty() && asleep > 0)) {
     do update_pairs(h);
     while (!wake_touched(start, h).empty());
@@ -82,12 +99,6 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
   for (Body* body : kinematic) keep_within_bounds(*body, report);
   count_contacts(report);
   put_to_sleep(h);
-  for (const auto& m : motions) report.integration.add(m->report());
-
-  if (!systems.empty()) {
-    update_obstacles(h);
-    step_particles(start, h, motion, report);
-  }
 }
 
 /// Every body that moves begins a sub-step; kinematic ones are moved through it at once.
@@ -130,13 +141,12 @@ std::vector<const ForceDef*> World::Impl::active_forces() const {
 }
 
 /// Moves all awake bodies, and the particles that springs hold, through the sub-step as if there were no contacts.
-CoupledSystem& World::Impl::move_all(Real start, Real h) {
+void World::Impl::move_all(Real start, Real h) {
   motions.push_back(std::make_unique<CoupledSystem>(*this, active_forces()));
   CoupledSystem& motion = *motions.back();
   motion.save();
   motion.step(integrator(def.integrator), start, h, def.integration_error);
   for (Body* body : awake) body->pose = body->rigid.pose();
-  return motion;
 }
 
 /// The same for some bodies and what springs join to them, from `from` on over `duration`.

@@ -187,7 +187,8 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       Contact c{.a = a, .b = b, .frame = m.frame};
       c.arm_a = place - origin(pair.a());
       c.arm_b = place - origin(pair.b());
-      c.offset = h * acceleration_bias(pair, m, point) + in_frame(m.frame, surface);
+      c.offset = in_frame(m.frame, surface);
+      if (touches) c.offset += h * acceleration_bias(pair, m, point);
       c.target = touches ? std::min(-kPushOut * point.separation / h, kFastestPush) : -point.separation / h;
       std::tie(c.friction_t, c.friction_k) = friction(pair.surface(), u);
       c.impulse = h * m.force[k];
@@ -199,12 +200,12 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
 }
 
 /// Forces that act throughout the interval move bodies by half of what they change the velocity times the time.
-/// A body of which a contact closed in the interval is blocked from some time in it on: it gets as far as its new
-/// velocity brings it, which is what the contact's target speaks of.
+/// A body of which a contact closed in the interval, or parted and came back, is blocked from some time in it on: it
+/// gets as far as its new velocity brings it, which is what the contact's target speaks of.
 void ExactContacts::move_bodies(const Island& island, Real duration) {
   closing_.assign(bodies_.size(), 0);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
-    if (approach_[i] < -kClosing && contacts_[i].impulse.x() > 0)
+    if (std::abs(approach_[i]) > kClosing && contacts_[i].impulse.x() > 0)
       closing_[contacts_[i].a] = closing_[contacts_[i].b] = 1;
   for (std::size_t i = 0; i < island.bodies.size(); ++i) {
     Body& body = *island.bodies[i];

@@ -16,6 +16,8 @@ constexpr uint32_t kFreshRounds = 20;
 /// the share that it adds to the mean. Slow modes lose most if their frequencies are about the latter. A
 /// patch without a guess has no past: its means are the impulses.
 constexpr Real kReturn = 0.03, kRenewal = 0.01;
+/// Friction up to this share of its limit, squared, holds.
+constexpr Real kHolds = 0.96;
 
 /// Twists and wrenches of the patches, by group.
 struct Groups {
@@ -248,6 +250,10 @@ Groups return_to_mean(PatchBatch& p) {
     q.mean -= p.renewal * difference;
     change.normal = change.normal + point_wrench(q, d);
   }
+  // What slides has its friction from the law, which knows no mean.
+  const LaneVector& f = p.friction_impulse;
+  const Lanes holds = f.x * f.x + f.y * f.y < kHolds * limits.x * limits.y ? lanes(1) : lanes(0);
+  p.friction_mean = p.friction_impulse + holds * (p.friction_mean - p.friction_impulse);
   const LaneVector difference = p.friction_mean - p.friction_impulse;
   change.friction =
       lanes(kReturn) * LaneVector{lane_clamp(difference.x, limits.x), lane_clamp(difference.y, limits.y),

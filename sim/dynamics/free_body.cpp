@@ -10,6 +10,10 @@
 namespace offstage::sim {
 namespace {
 
+/// Pieces in which the free rotation of a sub-step is integrated [rad], and the most of them.
+constexpr Real kTurn = 0.5, kMostPieces = 1000;
+
+
 /// The four numbers of the orientation in a body's coordinates.
 Eigen::Map<Eigen::Vector4d> turn_of(std::span<Real> x) {
   return Eigen::Map<Eigen::Vector4d>(&x[3]);
@@ -138,7 +142,11 @@ void fly(RigidBody& body, const BodyForces& forces, const Integrator& integrator
       // The length is 1 up to rounding: one Newton step for 1 / sqrt(length^2) is enough.
       body.orientation.coeffs() = (1.5 - 0.5 * turned.squaredNorm()) * turned.coeffs();
     } else {
-      integrate(body, {Vec3::Zero(), {}}, integrator, t, h, work);
+      // No integrator of a fixed step follows what turns by much more than this in it.
+      const Real turn = body.angular_velocity().norm() * h;
+      const Real pieces = std::clamp(std::ceil(turn / kTurn), 1.0, kMostPieces);
+      for (Real i = 0; i < pieces; ++i)
+        integrate(body, {Vec3::Zero(), {}}, integrator, t + i * h / pieces, h / pieces, work);
     }
   }
   body.position = position;

@@ -94,8 +94,8 @@ TEST(World, AFastBodyDoesNotPassAThinOneBetweenSteps) {
     for (const Real speed : {20.0, 100.0, 300.0}) {
       World world({.gravity = Vec3::Zero(), .solver = solver});
       world.add_body({.shape = Box{{0.02, 1, 1}}, .motion = MotionType::fixed});
-      const auto ball =
-          world.add_body({.shape = Sphere{0.01}, .pose = {Vec3(-0.5, 0.013, 0)}, .velocity = {speed, 0.1, 0}});
+      const auto ball = world.add_body(
+          {.shape = Sphere{0.01}, .pose = {Vec3(-0.5, 0.013, 0)}, .velocity = {speed, 0.1, 0}});
       for (int i = 0; i < 60; ++i) world.step(1.0 / 60);
       EXPECT_LT(world.body(ball).pose.position.x(), -0.019) << speed << " m/s";
     }

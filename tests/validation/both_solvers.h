@@ -1,6 +1,6 @@
 #pragma once
-/// What tests of bodies in contact share: everything is asked of both solvers, and nothing sleeps unless it is the
-/// matter.
+/// What tests of bodies in contact share: everything is asked of both solvers, and nothing sleeps unless it
+/// is the matter.
 
 #include <algorithm>
 #include <string>

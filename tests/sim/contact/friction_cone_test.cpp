@@ -30,7 +30,8 @@ bool is_inside(const Contact& c, const Vec3& p, Real slack) {
   return std::abs(p.y()) <= c.friction_t * p.x() + slack && std::abs(p.z()) <= c.friction_k * p.x() + slack;
 }
 
-// On a convex cone the nearest point p of q is the one with p . (q - p) = 0 and (q - p) . r <= 0 for all r in it.
+// On a convex cone the nearest point p of q is the one with p . (q - p) = 0 and (q - p) . r <= 0 for all r in
+// it.
 TEST(FrictionCone, ProjectionIsTheNearestPoint) {
   Dice dice(1);
   for (int i = 0; i < 20'000; ++i) {
@@ -94,7 +95,8 @@ TEST(FrictionCone, DerivativeAgreesWithDifferences) {
   EXPECT_GT(compared, 4000);
 }
 
-// The lift is what makes u~ of sliding lie in the dual cone: p . u~ >= 0 for all p in the cone, 0 for the one against u.
+// The lift is what makes u~ of sliding lie in the dual cone: p . u~ >= 0 for all p in the cone, 0 for the one
+// against u.
 TEST(FrictionCone, LiftPutsSlidingOnTheDualCone) {
   Dice dice(3);
   for (int i = 0; i < 1000; ++i) {
@@ -102,9 +104,9 @@ TEST(FrictionCone, LiftPutsSlidingOnTheDualCone) {
     const Vec3 u(0, dice.uniform(-1, 1), dice.uniform(-1, 1));
     const Vec3 lifted = u + cone_lift(c, u) * Vec3::UnitX();
     for (int k = 0; k < 8; ++k) ASSERT_GT(project_on_cone(c, 2 * dice.in_cube()).point.dot(lifted), -1e-12);
-    const Vec3 against = c.is_isotropic()
-                             ? Vec3(1, -c.friction_t * u.y() / u.norm(), -c.friction_t * u.z() / u.norm())
-                             : Vec3(1, -std::copysign(c.friction_t, u.y()), -std::copysign(c.friction_k, u.z()));
+    const Vec3 against =
+        c.is_isotropic() ? Vec3(1, -c.friction_t * u.y() / u.norm(), -c.friction_t * u.z() / u.norm())
+                         : Vec3(1, -std::copysign(c.friction_t, u.y()), -std::copysign(c.friction_k, u.z()));
     ASSERT_NEAR(against.dot(lifted), 0, 1e-12);
   }
 }
