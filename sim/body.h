@@ -26,7 +26,7 @@ struct Body {
   Real from = 0;    // since the sub-step's start [s]
   RigidBody start;  // dynamic bodies: its state then
   Pose start_pose;
-  Aabb swept;       // around its ways in the sub-step, as the broad phase has it
+  Aabb swept;   // around its ways in the sub-step, as the broad phase has it
   Twist drive;  // kinematic bodies: velocity of the pose's origin and angular velocity, at the interval's end
 
   Real extent = 0;       // reach() of the solid; of a plane infinite
@@ -34,9 +34,9 @@ struct Body {
 
   // Rest
   bool asleep = false;
-  Real quiet_time = 0;    // for how long it has hardly moved [s]
-  uint32_t island = 0;    // awake: number among the islands of the sub-step; asleep: of the sleeping ones
-  uint32_t row = 0;       // among the bodies of its island
+  Real quiet_time = 0;  // for how long it has hardly moved [s]
+  uint32_t island = 0;  // awake: number among the islands of the sub-step; asleep: of the sleeping ones
+  uint32_t row = 0;     // among the bodies of its island
 
   bool is_dynamic() const { return def.motion == MotionType::dynamic && !frozen; }
   bool is_kinematic() const { return def.motion == MotionType::kinematic && !frozen; }

@@ -1,6 +1,6 @@
 #pragma once
-/// Which bodies are near each other, where they touch, and the islands that they form: bodies joined, directly
-/// or by others, by contacts or springs. Islands are independent of each other (physics E6, E7, P6).
+/// Which bodies are near each other, where they touch, and the islands that they form: bodies joined,
+/// directly or by others, by contacts or springs. Islands are independent of each other (physics E6, E7, P6).
 
 #include <memory>
 #include <span>
@@ -52,8 +52,8 @@ class ContactGraph {
   std::vector<Entry> entries_, next_;
 };
 
-/// Groups awake bodies, which must be in slot order, by links between them; each island is in the order of its
-/// first body and sets Body::island. Pairs without points join nothing and are left out.
+/// Groups awake bodies, which must be in slot order, by links between them; each island is in the order of
+/// its first body and sets Body::island. Pairs without points join nothing and are left out.
 std::vector<Island> find_islands(std::span<Body* const> bodies, std::span<ContactPair* const> pairs,
                                  std::span<const std::pair<Body*, Body*>> springs);
 
@@ -62,7 +62,8 @@ void ContactGraph::update(std::span<const IndexPair> candidates, BodyAt&& body_a
   next_.clear();
   std::size_t old = 0;
   for (const auto& [low, high] : candidates) {
-    while (old < entries_.size() && std::pair(entries_[old].low, entries_[old].high) < std::pair(low, high)) ++old;
+    while (old < entries_.size() && std::pair(entries_[old].low, entries_[old].high) < std::pair(low, high))
+      ++old;
     if (old < entries_.size() && entries_[old].low == low && entries_[old].high == high) {
       next_.push_back(std::move(entries_[old++]));
       continue;

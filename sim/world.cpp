@@ -130,7 +130,8 @@ Motion Body::motion(Real now, Real time) const {
 
 uint32_t World::Impl::surface_number(const std::string& material) {
   const auto at = std::find(materials.begin(), materials.end(), material);
-  if (at == materials.end()) return materials.push_back(material), static_cast<uint32_t>(materials.size() - 1);
+  if (at == materials.end())
+    return materials.push_back(material), static_cast<uint32_t>(materials.size() - 1);
   return static_cast<uint32_t>(at - materials.begin());
 }
 
@@ -230,8 +231,8 @@ BodyHandle World::add_body(const BodyDef& def) {
   if (def.motion == MotionType::dynamic) body->rigid = make_rigid_body(object, def, body->solid);
   if (def.motion == MotionType::kinematic) body->pose = def.track.at(impl_->now, def.pose).pose;
   body->before_step = body->before_substep = body->start_pose = body->pose;
-  body->extent = std::holds_alternative<Plane>(def.shape) ? std::numeric_limits<Real>::infinity()
-                                                          : reach(body->solid);
+  body->extent =
+      std::holds_alternative<Plane>(def.shape) ? std::numeric_limits<Real>::infinity() : reach(body->solid);
   body->surface = impl_->surface_number(def.material);
   impl_->fixed_changed = impl_->lists_changed = true;
   const BodyHandle handle = impl_->bodies.insert(std::move(body));

@@ -60,9 +60,10 @@ struct BodyDef {
   Real static_friction = -1;             ///< of what does not; negative: as `friction`
   Real cross_friction = -1;              ///< of sliding across friction_axis; negative: as along it
   Vec3 friction_axis = Vec3::Zero();     ///< the surface's grain, in the body's frame; zero: none
-  Vec3 surface_velocity = Vec3::Zero();  ///< of the surface against the body, as of a conveyor [m/s], its frame
-  bool collides = true;                  ///< takes part in collisions with bodies and particles
-  KeyframeTrack track;                   ///< for kinematic bodies
+  Vec3 surface_velocity =
+      Vec3::Zero();      ///< of the surface against the body, as of a conveyor [m/s], its frame
+  bool collides = true;  ///< takes part in collisions with bodies and particles
+  KeyframeTrack track;   ///< for kinematic bodies
 };
 
 /// Where a spring ends: a point of the world, a point of a body (body frame), or a particle by its id.
@@ -97,8 +98,9 @@ struct ContactRule {
 
 /// How resting contact is computed (physics N11, N12).
 enum class SolverKind {
-  exact,      ///< collisions at their very times, contact forces to rounding: slow where hundreds of bodies pile up
-  fast,       ///< time stepping on velocities: a bounded amount of work, errors far below a millimetre
+  exact,  ///< collisions at their very times, contact forces to rounding: slow where hundreds of bodies pile
+          ///< up
+  fast,   ///< time stepping on velocities: a bounded amount of work, errors far below a millimetre
   automatic,  ///< exact where it costs less than fast or the group is small, by the work of steps before
 };
 
@@ -139,18 +141,18 @@ struct StepReport {
 
   // Contacts of bodies. Counts of the last sub-step, others of all.
   uint32_t bodies_awake = 0, bodies_asleep = 0;
-  uint32_t islands = 0;           ///< groups of bodies that touch, or are joined
-  uint32_t contacts = 0;          ///< points that touch
-  Real penetration = 0;           ///< greatest at the start of a sub-step [m]
-  uint64_t collisions = 0;        ///< contacts that met faster than WorldDef::collision_speed
-  uint64_t tracebacks = 0;        ///< times that bodies were put back to a time of impact
-  uint64_t cut_short = 0;         ///< tracebacks that were given up for a sub-step: too many in it
-  ContactWork exact, fast;        ///< of the solvers of resting contact
-  ContactWork impacts;            ///< of the solver of collisions
-  IntegratorReport integration;   ///< of the free motion
+  uint32_t islands = 0;          ///< groups of bodies that touch, or are joined
+  uint32_t contacts = 0;         ///< points that touch
+  Real penetration = 0;          ///< greatest at the start of a sub-step [m]
+  uint64_t collisions = 0;       ///< contacts that met faster than WorldDef::collision_speed
+  uint64_t tracebacks = 0;       ///< times that bodies were put back to a time of impact
+  uint64_t cut_short = 0;        ///< tracebacks that were given up for a sub-step: too many in it
+  ContactWork exact, fast;       ///< of the solvers of resting contact
+  ContactWork impacts;           ///< of the solver of collisions
+  IntegratorReport integration;  ///< of the free motion
 
-  bool finite = true;  ///< false: something became NaN or infinite
-  NonFinite non_finite;                       ///< the first such object, if not finite
+  bool finite = true;    ///< false: something became NaN or infinite
+  NonFinite non_finite;  ///< the first such object, if not finite
 };
 
 /// Mechanical energy [J]: kinetic, gravitational (zero at y = 0) and elastic.
@@ -164,8 +166,9 @@ struct ContactState {
   BodyHandle a, b;
   Vec3 point = Vec3::Zero();   ///< between both surfaces, world [m]
   Vec3 normal = Vec3::Zero();  ///< from b to a
-  Vec3 force = Vec3::Zero();   ///< on a: of the last sub-step, friction included [N]
-  Real separation = 0;         ///< [m], negative in penetration
+  /// On a: of the last sub-step, friction included [N]; by the fast solver, at its end.
+  Vec3 force = Vec3::Zero();
+  Real separation = 0;  ///< [m], negative in penetration
 };
 
 struct MovedBody {
@@ -250,8 +253,8 @@ class World {
   void for_each_particle_system(const std::function<void(ParticleSystemHandle)>& f) const;
   /// The contact points at the end of the last step, in the order of their bodies.
   std::vector<ContactState> contacts() const;
-  /// The group of touching bodies that a body belongs to, numbered in the order of their first bodies; none for
-  /// fixed and kinematic bodies.
+  /// The group of touching bodies that a body belongs to, numbered in the order of their first bodies; none
+  /// for fixed and kinematic bodies.
   std::optional<uint32_t> island(BodyHandle body) const;
   bool is_asleep(BodyHandle body) const;
   std::size_t body_count() const;

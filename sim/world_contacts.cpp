@@ -14,12 +14,12 @@
 namespace offstage::sim {
 namespace {
 
-/// Points are looked for this far beyond what the bodies' motion in the interval asks for: so far, and no further
-/// than this share of the smaller body [m].
+/// Points are looked for this far beyond what the bodies' motion in the interval asks for: so far, and no
+/// further than this share of the smaller body [m].
 constexpr Real kMargin = 2e-3, kMarginShare = 0.05;
-/// Motion beyond this share of the smaller body within an interval: the points of its start do not tell any more
-/// what will meet.
-/// The fast solver, where nothing bounces, takes them as limits of the approach all the same, farther.
+/// Motion beyond this share of the smaller body within an interval: the points of its start do not tell any
+/// more what will meet. The fast solver, where nothing bounces, takes them as limits of the approach all the
+/// same, farther.
 constexpr Real kFar = 0.25, kFarWithoutBounce = 1;
 /// Room that bodies get in the broad phase: a share of their size, and as far as they get in so many steps.
 constexpr Real kRoom = 0.03, kSteps = 2;
@@ -48,7 +48,9 @@ Aabb swept_bounds(const Body& body) {
 }  // namespace
 
 PairSurface World::Impl::surface_of(const Body& a, const Body& b) const {
-  const auto static_friction = [](const BodyDef& d) { return d.static_friction < 0 ? d.friction : d.static_friction; };
+  const auto static_friction = [](const BodyDef& d) {
+    return d.static_friction < 0 ? d.friction : d.static_friction;
+  };
   PairSurface s;
   s.restitution = std::max(a.def.restitution, b.def.restitution);
   s.friction = std::sqrt(a.def.friction * b.def.friction);
@@ -57,7 +59,8 @@ PairSurface World::Impl::surface_of(const Body& a, const Body& b) const {
   if (rule != rules.end()) {
     s.restitution = rule->second.restitution.value_or(s.restitution);
     s.friction = rule->second.friction.value_or(s.friction);
-    s.static_friction = rule->second.static_friction.value_or(rule->second.friction.value_or(s.static_friction));
+    s.static_friction =
+        rule->second.static_friction.value_or(rule->second.friction.value_or(s.static_friction));
   }
   for (const Body* body : {&a, &b}) {
     const BodyDef& d = body->def;
@@ -111,9 +114,10 @@ void World::Impl::update_pairs(Real h) {
   if (active_pairs.size() < kParallel) {
     for (std::size_t i = 0; i < active_pairs.size(); ++i) find(i);
   } else {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, active_pairs.size(), kBlock), [&](const auto& range) {
-      for (std::size_t i = range.begin(); i < range.end(); ++i) find(i);
-    });
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, active_pairs.size(), kBlock),
+                      [&](const auto& range) {
+                        for (std::size_t i = range.begin(); i < range.end(); ++i) find(i);
+                      });
   }
 }
 
@@ -140,7 +144,8 @@ void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const ContactPoint& point = m.manifold.points[k];
       const Real speed = pair.relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n);
-      if (speed < -def.collision_speed && point.separation + 2 * (speed - def.gravity.norm() * left) * left < 0)
+      if (speed < -def.collision_speed &&
+          point.separation + 2 * (speed - def.gravity.norm() * left) * left < 0)
         pair.by_event = true;
     }
 }
@@ -196,7 +201,8 @@ void World::Impl::solve(std::span<Island* const> group, Real duration, StepRepor
   for (Island* island : group) {
     SolverChoice& choice = choices[island->bodies.front()->handle.index];
     choice.used = substeps;
-    if (def.solver == SolverKind::fast || (def.solver == SolverKind::automatic && !choice.is_exact_worth(*island))) {
+    if (def.solver == SolverKind::fast ||
+        (def.solver == SolverKind::automatic && !choice.is_exact_worth(*island))) {
       fast.push_back(island);
       continue;
     }

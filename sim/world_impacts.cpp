@@ -1,7 +1,7 @@
-/// Impacts within a sub-step (physics E6, E7, R12): bodies are put back to the time of impact, with all that is
-/// connected to them, collide there, and go on for the rest. Others are not touched. The work is bounded: a pair that
-/// collides too often in a sub-step, or any when there are too many impacts, is left to the contact solver, which
-/// lets nothing through either.
+/// Impacts within a sub-step (physics E6, E7, R12): bodies are put back to the time of impact, with all that
+/// is connected to them, collide there, and go on for the rest. Others are not touched. The work is bounded:
+/// a pair that collides too often in a sub-step, or any when there are too many impacts, is left to the
+/// contact solver, which lets nothing through either.
 
 #include <algorithm>
 #include <cmath>
@@ -28,7 +28,8 @@ constexpr Real kInstant = 1e-9;
 
 }  // namespace
 
-/// When a pair's bodies, which do not touch yet, will on their ways as they are now; or do already, approaching.
+/// When a pair's bodies, which do not touch yet, will on their ways as they are now; or do already,
+/// approaching.
 std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) const {
   if (!pair.by_event || pair.gave_up) return std::nullopt;
   const Body &a = pair.a(), &b = pair.b();
@@ -48,9 +49,10 @@ std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) co
   return from + impact->share * (h - from);
 }
 
-/// A path knows no more than half a turn: what tumbles faster goes in pieces, each turning about the body's present
-/// axis.
-std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, Real from, Real h, Real turn) const {
+/// A path knows no more than half a turn: what tumbles faster goes in pieces, each turning about the body's
+/// present axis.
+std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, Real from, Real h,
+                                                      Real turn) const {
   const auto place = [&](const Body& body, Real time) {
     if (!body.is_awake()) return body.placed_at(time, h);
     const Vec3 w = body.start.angular_velocity();
@@ -60,7 +62,8 @@ std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, R
     if (rate > 0) {
       const Real half = 0.5 * rate * (time - body.from);
       const Vec3 axis = w / rate * std::sin(half);
-      at.orientation = (Quat(std::cos(half), axis.x(), axis.y(), axis.z()) * body.start.orientation).normalized();
+      at.orientation =
+          (Quat(std::cos(half), axis.x(), axis.y(), axis.z()) * body.start.orientation).normalized();
     }
     return at.pose();
   };
@@ -175,7 +178,8 @@ void World::Impl::join(uint32_t into, uint32_t other) {
   y.pairs.clear();
 }
 
-/// Collides an island's bodies with each other and with what they touch at a time, and moves them on from there.
+/// Collides an island's bodies with each other and with what they touch at a time, and moves them on from
+/// there.
 void World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepReport& report) {
   // Whatever they touch now comes along, with what that touches in turn.
   for (bool grown = true; grown;) {
@@ -200,7 +204,8 @@ void World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepRe
     }
   }
   MovingIsland& island = islands[number];
-  const CollisionSettings settings{kCluster, def.collision_speed, def.impact, def.solver == SolverKind::exact};
+  const CollisionSettings settings{kCluster, def.collision_speed, def.impact,
+                                   def.solver == SolverKind::exact};
   report.collisions += resolve_collisions(island, settings, report.impacts);
   for (Body* body : island.bodies) body->rigid = body->start;
   if (time >= h * (1 - kInstant)) return;
@@ -212,7 +217,8 @@ void World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepRe
   find_pairs_again(number, start, h, report);
 }
 
-/// Bodies that leave the boxes that the broad phase was given have new neighbours, which may have to be woken.
+/// Bodies that leave the boxes that the broad phase was given have new neighbours, which may have to be
+/// woken.
 void World::Impl::find_pairs_again(uint32_t number, Real start, Real h, StepReport& report) {
   bool left = false;
   for (Body* body : islands[number].bodies) left |= move_in_broad_phase(*body, true);

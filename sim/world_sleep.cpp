@@ -7,8 +7,8 @@
 namespace offstage::sim {
 namespace {
 
-/// A body is quiet while none of its points moves faster than this [m/s], and goes to sleep after being quiet so
-/// long [s], with all of its island.
+/// A body is quiet while none of its points moves faster than this [m/s], and goes to sleep after being quiet
+/// so long [s], with all of its island.
 constexpr Real kQuietSpeed = 0.01, kQuietTime = 0.5;
 
 Real fastest_point(const Body& body) {

@@ -123,7 +123,8 @@ void World::Impl::explode(Real start, Real end) {
     const Explosion& explosion = std::get<Explosion>(def_.effect);
     bodies.for_each([&](BodyHandle handle, const std::unique_ptr<Body>& body) {
       if (!body->is_dynamic()) return;
-      if (!def_.bodies.empty() && std::find(def_.bodies.begin(), def_.bodies.end(), handle) == def_.bodies.end())
+      if (!def_.bodies.empty() &&
+          std::find(def_.bodies.begin(), def_.bodies.end(), handle) == def_.bodies.end())
         return;
       const Wrench blow = impulse(explosion, body->solid, body->pose, body->rigid.position);
       if (blow.force == Vec3::Zero() && blow.torque == Vec3::Zero()) return;
@@ -140,7 +141,8 @@ std::vector<const ForceDef*> World::Impl::active_forces() const {
   return active;
 }
 
-/// Moves all awake bodies, and the particles that springs hold, through the sub-step as if there were no contacts.
+/// Moves all awake bodies, and the particles that springs hold, through the sub-step as if there were no
+/// contacts.
 void World::Impl::move_all(Real start, Real h) {
   motions.push_back(std::make_unique<CoupledSystem>(*this, active_forces()));
   CoupledSystem& motion = *motions.back();

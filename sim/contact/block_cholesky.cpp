@@ -1,9 +1,10 @@
 #include "sim/contact/block_cholesky.h"
 
-#include <Eigen/OrderingMethods>
-#include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
+
+#include <Eigen/OrderingMethods>
+#include <Eigen/SparseCore>
 
 namespace offstage::sim {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
-/// Cholesky factorisation of a sparse symmetric positive definite matrix of 6 x 6 blocks, one row of blocks for
-/// each body. Bodies are eliminated in an order of approximate minimum degree, so that a stack or a chain
+/// Cholesky factorisation of a sparse symmetric positive definite matrix of 6 x 6 blocks, one row of blocks
+/// for each body. Bodies are eliminated in an order of approximate minimum degree, so that a stack or a chain
 /// of n costs O(n), a wall about O(n^1.5) (physics N11).
 
 #include <cstdint>
@@ -40,10 +40,10 @@ class BlockCholesky {
 
   std::vector<std::pair<uint32_t, uint32_t>> pairs_;
   std::vector<uint32_t> order_, place_;  // order_[k]: the row eliminated k-th; place_: its inverse
-  std::vector<uint32_t> begin_, row_;    // columns of L under the diagonal, in order of elimination, ascending
-  std::vector<uint32_t> pair_at_;        // where in row_ the block of each pair goes
+  std::vector<uint32_t> begin_, row_;  // columns of L under the diagonal, in order of elimination, ascending
+  std::vector<uint32_t> pair_at_;      // where in row_ the block of each pair goes
   std::size_t products_ = 0;
-  std::vector<Mat6> diagonal_, below_;   // L; the diagonal holds the inverses of its triangles
+  std::vector<Mat6> diagonal_, below_;  // L; the diagonal holds the inverses of its triangles
 };
 
 }  // namespace offstage::sim

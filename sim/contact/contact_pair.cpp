@@ -30,8 +30,7 @@ void ContactPair::clear() {
 
 void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_within) {
   const Pose a_from_b = between(a, b);
-  const Real reach_b = b_->collision_shape().is_plane() ? a_->extent + a_from_b.position.norm()
-                                                        : b_->extent;
+  const Real reach_b = b_->collision_shape().is_plane() ? a_->extent + a_from_b.position.norm() : b_->extent;
   if (found_margin_ >= margin && found_margin_ <= 4 * margin && reuse_within > 0 &&
       difference(a_from_b, a_from_b_, reach_b) <= reuse_within) {
     reuse(a, b);
@@ -87,7 +86,8 @@ void ContactPair::reuse(const Pose& a, const Pose& b) {
 
 /// Forces of an old frame in a new one: they turn with body a. (A frame's tangents can jump while its normal
 /// hardly moves.)
-Vec3 ContactPair::carried(const Vec3& force, const ContactFrame& old, const ContactFrame& now, const Quat& turn) {
+Vec3 ContactPair::carried(const Vec3& force, const ContactFrame& old, const ContactFrame& now,
+                          const Quat& turn) {
   const Vec3 f = turn * (force.x() * old.n + force.y() * old.t + force.z() * old.k);
   return {now.n.dot(f), now.t.dot(f), now.k.dot(f)};
 }
@@ -141,13 +141,16 @@ Real ContactPair::separation() const {
 
 Real ContactPair::speed_bound() const {
   const auto speed = [](const Body& body) {
-    if (body.is_awake()) return body.start.angular_velocity().norm() * (body.extent + body.start.centre.norm());
+    if (body.is_awake())
+      return body.start.angular_velocity().norm() * (body.extent + body.start.centre.norm());
     return body.is_kinematic() && body.drive.angular_velocity != Vec3::Zero()
                ? body.drive.angular_velocity.norm() * body.extent
                : 0.0;
   };
   const auto velocity = [](const Body& body) {
-    return body.is_awake() ? body.start.velocity() : body.is_kinematic() ? body.drive.velocity : Vec3(Vec3::Zero());
+    return body.is_awake()       ? body.start.velocity()
+           : body.is_kinematic() ? body.drive.velocity
+                                 : Vec3(Vec3::Zero());
   };
   return (velocity(*a_) - velocity(*b_)).norm() + speed(*a_) + speed(*b_);
 }

@@ -14,17 +14,17 @@ namespace offstage::sim {
 /// How the surfaces of two bodies act on each other.
 struct PairSurface {
   Real restitution = 0, friction = 0, static_friction = 0;
-  Real cross = 1;            ///< friction across the grain over that along it
+  Real cross = 1;               ///< friction across the grain over that along it
   const Body* grain = nullptr;  ///< whose axis the grain is; null: isotropic
 };
 
 /// A manifold placed in the world, with the forces that acted at its points.
 struct PlacedManifold {
-  Manifold manifold;                   ///< world
-  ContactFrame frame;                  ///< isotropic friction's, or along the grain
-  std::array<Vec3, 4> force;           ///< in the frame: on body a [N]
-  std::array<bool, 4> known{};         ///< whether the point was there in the interval before
-  Real torque = 0;                     ///< about the normal, of all points together; the fast solver's [N m]
+  Manifold manifold;            ///< world
+  ContactFrame frame;           ///< isotropic friction's, or along the grain
+  std::array<Vec3, 4> force;    ///< in the frame: on body a [N]
+  std::array<bool, 4> known{};  ///< whether the point was there in the interval before
+  Real torque = 0;              ///< about the normal, of all points together; the fast solver's [N m]
   /// Means over the last intervals of `force` and `torque`, which the fast solver keeps.
   std::array<Vec3, 4> mean_force;
   Real mean_torque = 0;
@@ -59,9 +59,9 @@ class ContactPair {
   /// Velocity of a's point against b's at a place of the world, at the interval's start [m/s].
   Vec3 relative_velocity(const Vec3& point) const;
 
-  uint32_t impacts = 0;      ///< in this sub-step
-  bool gave_up = false;      ///< too many of them: no more trace-backs in this sub-step
-  bool by_event = false;     ///< an impact of this pair is traced back to; else its points limit the approach
+  uint32_t impacts = 0;   ///< in this sub-step
+  bool gave_up = false;   ///< too many of them: no more trace-backs in this sub-step
+  bool by_event = false;  ///< an impact of this pair is traced back to; else its points limit the approach
 
  private:
   static Vec3 carried(const Vec3& force, const ContactFrame& old, const ContactFrame& now, const Quat& turn);
@@ -75,7 +75,7 @@ class ContactPair {
   std::vector<Manifold> found_;  // in a's frame
   Pose a_from_b_;                // when found
   Real found_margin_ = -1, found_reuse_ = 0;
-  Pose placed_at_;               // of a, when placed
+  Pose placed_at_;  // of a, when placed
   std::vector<PlacedManifold> placed_, before_;
   std::vector<ContactFrame> before_frames_;
 };

@@ -7,8 +7,8 @@
 ///   0 <= p_n,  0 <= u_n - target,  p_n (u_n - target) = 0,
 ///   (p_t, p_k) in the friction limits given by p_n, against (u_t, u_k) with the greatest dissipation.
 /// For a collision v are the velocities before it, and target = -e u_n of those. For resting contact over a
-/// time h, v are the velocities that the bodies would have after h without contacts; then p / h are the contact
-/// forces, and (u - u(now)) / h the relative accelerations of R9.
+/// time h, v are the velocities that the bodies would have after h without contacts; then p / h are the
+/// contact forces, and (u - u(now)) / h the relative accelerations of R9.
 
 #include <cstdint>
 #include <span>
@@ -35,8 +35,8 @@ struct ContactBody {
 
 /// One point where body a touches body b. Its numbers are in the order normal, t, k of its frame.
 struct Contact {
-  uint32_t a = 0, b = 0;                           ///< indices of bodies; not both unmoved
-  ContactFrame frame;                              ///< n from b to a
+  uint32_t a = 0, b = 0;                            ///< indices of bodies; not both unmoved
+  ContactFrame frame;                               ///< n from b to a
   Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();  ///< from the centres of mass to the point, world [m]
   Vec3 offset = Vec3::Zero();  ///< added to the relative velocity: moving surfaces, turning frames [m/s]
   Real target = 0;             ///< least normal velocity afterwards [m/s]
@@ -87,6 +87,7 @@ struct ContactWork {
 /// Projected Gauss-Seidel from the impulses that the contacts hold, which the bodies' velocities must already
 /// contain: sweeps in order, each contact solved by itself, until a sweep changes no velocity by more than
 /// `tolerance` [m/s]. Returns the number of sweeps. The fall-back of the other solvers.
-uint32_t relax(std::span<ContactBody> bodies, std::span<Contact> contacts, uint32_t max_sweeps, Real tolerance);
+uint32_t relax(std::span<ContactBody> bodies, std::span<Contact> contacts, uint32_t max_sweeps,
+               Real tolerance);
 
 }  // namespace offstage::sim

@@ -15,8 +15,8 @@ constexpr Real kClosing = 1e-3;
 /// What slides slower than this is at rest, to static friction [m/s].
 constexpr Real kSlip = 1e-3;
 
-/// The material point of a round body that stands for a point of its surface: on the axis, or at the centre. The
-/// surface turns through the contact, these do not.
+/// The material point of a round body that stands for a point of its surface: on the axis, or at the centre.
+/// The surface turns through the contact, these do not.
 Vec3 core_point(const Body& body, const Vec3& place) {
   const Shape& shape = body.def.shape;
   if (std::holds_alternative<Sphere>(shape)) return body.start_pose.position;
@@ -62,7 +62,8 @@ Real spin(const Body& body) {
   return body.is_kinematic() ? body.drive.angular_velocity.squaredNorm() : 0;
 }
 
-/// What the relative acceleration of R9 has besides the part that is linear in the accelerations of the bodies:
+/// What the relative acceleration of R9 has besides the part that is linear in the accelerations of the
+/// bodies:
 ///   n . (c_a'' - c_b'') + 2 n' . (c_a' - c_b') - |n'|^2 D
 /// with material points c on both bodies at a distance D along n. (Of two centres of spheres, this is
 /// n.c'' + n'.c', not twice the latter.) Tangentially, what turns with the bodies.
@@ -72,10 +73,10 @@ Vec3 acceleration_bias(const ContactPair& pair, const PlacedManifold& placed, co
   const Vec3 place_a = m.source == NormalSource::face_of_a ? point.on_a : core_point(pair.a(), point.on_a);
   const Vec3 place_b = m.source == NormalSource::face_of_b ? point.on_b : core_point(pair.b(), point.on_b);
   const PointRates a = rates(pair.a(), place_a), b = rates(pair.b(), place_b);
-  const Vec3 n_rate = is_face(m.source)
-                          ? twist(m.source == NormalSource::face_of_a ? pair.a() : pair.b())
-                                .angular_velocity.cross(m.normal)
-                          : normal_rate(m, point, twist(pair.a()), twist(pair.b()));
+  const Vec3 n_rate =
+      is_face(m.source)
+          ? twist(m.source == NormalSource::face_of_a ? pair.a() : pair.b()).angular_velocity.cross(m.normal)
+          : normal_rate(m, point, twist(pair.a()), twist(pair.b()));
   const Vec3 velocity = a.velocity - b.velocity, acceleration = a.acceleration - b.acceleration;
   const Real distance = m.normal.dot(place_a - place_b);
   return {m.normal.dot(acceleration) + 2 * n_rate.dot(velocity) - n_rate.squaredNorm() * distance,
@@ -136,7 +137,8 @@ void displace(Body& body, const Vec3& shift, const Vec3& turn) {
 
 // Exact
 
-std::optional<ContactWork> ExactContacts::solve(const Island& island, const ContactInterval& interval, Real budget) {
+std::optional<ContactWork> ExactContacts::solve(const Island& island, const ContactInterval& interval,
+                                                Real budget) {
   bodies_.clear();
   contacts_.clear();
   forces_.clear();
@@ -149,7 +151,8 @@ std::optional<ContactWork> ExactContacts::solve(const Island& island, const Cont
   if (contacts_.empty()) return ContactWork{};
 
   free_.resize(bodies_.size());
-  for (std::size_t i = 0; i < bodies_.size(); ++i) free_[i] << bodies_[i].velocity, bodies_[i].angular_velocity;
+  for (std::size_t i = 0; i < bodies_.size(); ++i)
+    free_[i] << bodies_[i].velocity, bodies_[i].angular_velocity;
   const std::optional<ContactWork> work = newton_.solve(bodies_, contacts_, budget);
   if (!work) return work;
   for (std::size_t i = 0; i < contacts_.size(); ++i) *forces_[i] = contacts_[i].impulse / interval.duration;
@@ -199,9 +202,9 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
     }
 }
 
-/// Forces that act throughout the interval move bodies by half of what they change the velocity times the time.
-/// A body of which a contact closed in the interval, or parted and came back, is blocked from some time in it on: it
-/// gets as far as its new velocity brings it, which is what the contact's target speaks of.
+/// Forces that act throughout the interval move bodies by half of what they change the velocity times the
+/// time. A body of which a contact closed in the interval, or parted and came back, is blocked from some time
+/// in it on: it gets as far as its new velocity brings it, which is what the contact's target speaks of.
 void ExactContacts::move_bodies(const Island& island, Real duration) {
   closing_.assign(bodies_.size(), 0);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
@@ -229,9 +232,9 @@ namespace {
 constexpr std::size_t kFew = 6;
 /// Of the fast solver, per point and sub-step [ns].
 constexpr Real kFastPoint = 60;
-/// How much dearer than the fast solver the exact one may be in the long run: it is worth that. What it takes beyond
-/// counts as a debt, of which it may have as much as so many steps of the fast solver: it is dear where an island is
-/// new, and cheap from then on.
+/// How much dearer than the fast solver the exact one may be in the long run: it is worth that. What it takes
+/// beyond counts as a debt, of which it may have as much as so many steps of the fast solver: it is dear
+/// where an island is new, and cheap from then on.
 constexpr Real kWorth = 2.5, kCredit = 120;
 /// After that it waits until its debt is but this share of what the fast solver has taken.
 constexpr Real kShare = 0.25, kLongestWait = 2400;
@@ -354,7 +357,8 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
       const RelaxedBody& b = bodies_[body->row];
       displace(*body, b.displacement, b.rotation_vector);
       body->rigid.momentum = body->rigid.mass * b.velocity;
-      body->rigid.angular_momentum = angular_momentum(body->rigid, body->rigid.orientation, b.angular_velocity);
+      body->rigid.angular_momentum =
+          angular_momentum(body->rigid, body->rigid.orientation, b.angular_velocity);
     }
   return work;
 }
@@ -399,12 +403,13 @@ struct CollisionCluster {
         contacts.push_back(c);
         bounces.push_back(u.x() < -collision_speed);
         // In sequence, a contact at rest may be hit by the impulse of another.
-        restitution.push_back(bounces.back() || law == ImpactLaw::sequential ? pair.surface().restitution : 0);
+        restitution.push_back(bounces.back() || law == ImpactLaw::sequential ? pair.surface().restitution
+                                                                             : 0);
       }
   }
 
-  /// Leaves out what is far from what bounces, if there is too much of it: first what shares no body with that,
-  /// then all the rest. What is left out blocks the way afterwards, as resting contact.
+  /// Leaves out what is far from what bounces, if there is too much of it: first what shares no body with
+  /// that, then all the rest. What is left out blocks the way afterwards, as resting contact.
   void narrow() {
     if (contacts.size() <= kCluster) return;
     std::vector<uint8_t> involved(bodies.size(), 0);

@@ -1,6 +1,6 @@
 #pragma once
-/// From bodies and their contact pairs to problems for the solvers, and back: resting contact over an interval,
-/// and collisions at an instant (physics E6, R7-R10, N11, N12).
+/// From bodies and their contact pairs to problems for the solvers, and back: resting contact over an
+/// interval, and collisions at an instant (physics E6, R7-R10, N11, N12).
 
 #include <memory>
 #include <optional>
@@ -17,12 +17,12 @@ namespace offstage::sim {
 
 /// What all solutions of an interval share.
 struct ContactInterval {
-  Real duration;         ///< [s], > 0
-  Real touching;         ///< points nearer than this touch [m]
+  Real duration;  ///< [s], > 0
+  Real touching;  ///< points nearer than this touch [m]
 };
 
-/// One island's contacts as a problem, solved to rounding. The bodies have moved freely through the interval from
-/// their `start` to `rigid`; what the contacts add is put on top. Keep one per island.
+/// One island's contacts as a problem, solved to rounding. The bodies have moved freely through the interval
+/// from their `start` to `rigid`; what the contacts add is put on top. Keep one per island.
 class ExactContacts {
  public:
   /// None, and nothing changed, if that took more than `budget` [ns, see SolverChoice].
@@ -37,10 +37,10 @@ class ExactContacts {
 
   std::vector<ContactBody> bodies_;
   std::vector<Contact> contacts_;
-  std::vector<Vec3*> forces_;       // of the contacts, in their pairs
-  std::vector<Real> approach_;      // of the contacts at the start [m/s]
-  std::vector<uint8_t> closing_;    // by body: some contact came together in the interval
-  std::vector<Vec6> free_;          // by body: velocities without contacts
+  std::vector<Vec3*> forces_;     // of the contacts, in their pairs
+  std::vector<Real> approach_;    // of the contacts at the start [m/s]
+  std::vector<uint8_t> closing_;  // by body: some contact came together in the interval
+  std::vector<Vec6> free_;        // by body: velocities without contacts
   ProximalNewton newton_;
 };
 
@@ -56,9 +56,9 @@ class FastContacts {
   RelaxationSolver solver_;
 };
 
-/// Whether an island is for the exact or the fast solver, by what the exact one cost on islands like it before.
-/// Costs are counted work times what the operations take on a machine of 2020 [ns], so that the choice
-/// is the same in every run.
+/// Whether an island is for the exact or the fast solver, by what the exact one cost on islands like it
+/// before. Costs are counted work times what the operations take on a machine of 2020 [ns], so that the
+/// choice is the same in every run.
 class SolverChoice {
  public:
   /// Whether to try the exact solver now.
@@ -83,8 +83,8 @@ struct CollisionSettings {
   bool whole;  ///< all contacts of the island together, however many; else those around what bounces
 };
 
-/// Resolves the collisions among an island's pairs at its bodies' `start`: changes the velocities there. Returns
-/// how many contacts bounced.
+/// Resolves the collisions among an island's pairs at its bodies' `start`: changes the velocities there.
+/// Returns how many contacts bounced.
 uint32_t resolve_collisions(const Island& island, const CollisionSettings& settings, ContactWork& work);
 
 }  // namespace offstage::sim

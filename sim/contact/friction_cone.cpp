@@ -12,13 +12,13 @@ struct Reached {
   int t, k;
 };
 constexpr Reached kPyramid[] = {
-    {ConeRegion::low_t, -1, 0},    {ConeRegion::high_t, 1, 0},   {ConeRegion::low_k, 0, -1},
+    {ConeRegion::low_t, -1, 0},    {ConeRegion::high_t, 1, 0},    {ConeRegion::low_k, 0, -1},
     {ConeRegion::high_k, 0, 1},    {ConeRegion::low_low, -1, -1}, {ConeRegion::low_high, -1, 1},
     {ConeRegion::high_low, 1, -1}, {ConeRegion::high_high, 1, 1},
 };
 
-/// The projection on the plane or line in which these limits are reached is P P^T / P^2 on p_n and what goes with
-/// it, and leaves the other axis alone.
+/// The projection on the plane or line in which these limits are reached is P P^T / P^2 on p_n and what goes
+/// with it, and leaves the other axis alone.
 Mat3 pyramid_derivative(const Contact& c, int t, int k) {
   const Vec3 along(1, t * c.friction_t, k * c.friction_k);
   Mat3 D = along * along.transpose() / along.squaredNorm();

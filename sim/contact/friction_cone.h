@@ -1,6 +1,6 @@
 #pragma once
-/// The cone of a contact's impulses, (p_t, p_k) within what p_n allows, as a set to project on: round for isotropic
-/// friction, a pyramid where each axis has its own limit.
+/// The cone of a contact's impulses, (p_t, p_k) within what p_n allows, as a set to project on: round for
+/// isotropic friction, a pyramid where each axis has its own limit.
 
 #include <cstdint>
 
@@ -29,8 +29,8 @@ struct ConeProjection {
   ConeRegion region;
 };
 
-/// The nearest point of the cone of a contact. Of the apex and the inside, which the corner belongs to both, it
-/// is the inside: so that a stack at rest is closed all at once, not from the bottom up.
+/// The nearest point of the cone of a contact. Of the apex and the inside, which the corner belongs to both,
+/// it is the inside: so that a stack at rest is closed all at once, not from the bottom up.
 ConeProjection project_on_cone(const Contact& c, const Vec3& q);
 
 /// The derivative of the projection, symmetric and between 0 and 1, of a point that was projected.

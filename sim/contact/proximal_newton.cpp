@@ -7,9 +7,9 @@
 namespace offstage::sim {
 namespace {
 
-/// Penalty times mobility: how many times stiffer than inertia a contact is. The method of multipliers leaves 1 /
-/// (1 + kStiffness e) of the error in a direction whose eigenvalue of the mobility is e (of the largest): with
-/// stacks of 100 at 1e-4. Larger ones cost digits of H.
+/// Penalty times mobility: how many times stiffer than inertia a contact is. The method of multipliers leaves
+/// 1 / (1 + kStiffness e) of the error in a direction whose eigenvalue of the mobility is e (of the largest):
+/// with stacks of 100 at 1e-4. Larger ones cost digits of H.
 constexpr Real kStiffness = 1e5;
 constexpr Real kTolerance = 1e-7, kSmallest = 1e-11;  // of the velocities, and [m/s]
 constexpr Real kCoarse = 1e-5;
@@ -142,9 +142,9 @@ void ProximalNewton::set_points(std::span<const ContactBody> bodies, std::span<c
     p.b = row_of_body_[c.b];
     p.pair = kNone;
     if (p.a != kNone && p.b != kNone)
-      p.pair = static_cast<uint32_t>(
-          std::lower_bound(pairs_.begin(), pairs_.end(),
-                           std::pair<uint32_t, uint32_t>(std::minmax(p.a, p.b))) - pairs_.begin());
+      p.pair = static_cast<uint32_t>(std::lower_bound(pairs_.begin(), pairs_.end(),
+                                                      std::pair<uint32_t, uint32_t>(std::minmax(p.a, p.b))) -
+                                     pairs_.begin());
     p.rho = kStiffness / (mean_mobility(bodies[c.a], c.arm_a) + mean_mobility(bodies[c.b], c.arm_b));
     p.multiplier = c.is_guessed ? project_on_cone(c, c.impulse).point : Vec3(Vec3::Zero());
     p.impulse = c.relative_velocity(bodies);
@@ -166,7 +166,8 @@ void ProximalNewton::set_points(std::span<const ContactBody> bodies, std::span<c
         cone_lift(contacts[i], relative_velocity(contacts[i], points_[i], velocity_) + fixed_[i]);
 }
 
-Vec3 ProximalNewton::relative_velocity(const Contact& c, const Point& p, std::span<const Vec6> velocity) const {
+Vec3 ProximalNewton::relative_velocity(const Contact& c, const Point& p,
+                                       std::span<const Vec6> velocity) const {
   Vec3 u = Vec3::Zero();
   if (p.a != kNone) u += velocity[p.a].head<3>() + velocity[p.a].tail<3>().cross(c.arm_a);
   if (p.b != kNone) u -= velocity[p.b].head<3>() + velocity[p.b].tail<3>().cross(c.arm_b);
@@ -246,7 +247,8 @@ bool ProximalNewton::assemble(std::span<const Contact> contacts, ContactWork& wo
       off_[p.pair] -= block(W, c.arm_b, c.arm_a);
   }
   ++work.factorizations;
-  cost_ += kProduct * static_cast<Real>(factor_.factor_products()) + kAssembly * static_cast<Real>(contacts.size());
+  cost_ += kProduct * static_cast<Real>(factor_.factor_products()) +
+           kAssembly * static_cast<Real>(contacts.size());
   factored_contacts_ = contacts.size();
   return is_factored_ = factor_.factorize(diagonal_, off_);
 }
@@ -272,7 +274,8 @@ bool ProximalNewton::minimize(std::span<const Contact> contacts, Real tolerance,
 bool ProximalNewton::descend(std::span<const Contact> contacts) {
   direction_ = gradient_;
   factor_.solve(direction_);
-  cost_ += kSolve * static_cast<Real>(factor_.factor_blocks()) + kEvaluation * static_cast<Real>(contacts.size());
+  cost_ +=
+      kSolve * static_cast<Real>(factor_.factor_blocks()) + kEvaluation * static_cast<Real>(contacts.size());
   Real slope = 0;
   for (std::size_t row = 0; row < direction_.size(); ++row) slope -= direction_[row].dot(gradient_[row]);
   const Real before = merit_, speed = gradient_speed();

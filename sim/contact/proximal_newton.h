@@ -1,18 +1,19 @@
 #pragma once
-/// The exact solver of contact problems (physics N11): a proximal method of multipliers whose inner problems are
-/// solved by a semismooth Newton method on the velocities of the bodies, with the true friction cone.
+/// The exact solver of contact problems (physics N11): a proximal method of multipliers whose inner problems
+/// are solved by a semismooth Newton method on the velocities of the bodies, with the true friction cone.
 ///
-/// Coulomb's law is p in the cone C, u~ = u + mu |u_t| n in its dual, p . u~ = 0 (De Saxce and Feng, "The bipotential
-/// method", 1998). With g = mu |u_t| held for now, multipliers q and penalties rho, the impulses
+/// Coulomb's law is p in the cone C, u~ = u + mu |u_t| n in its dual, p . u~ = 0 (De Saxce and Feng, "The
+/// bipotential method", 1998). With g = mu |u_t| held for now, multipliers q and penalties rho, the impulses
 ///   p(v) = projection of q - rho (u(v) - target + g n) on C
-/// make M (v - v0) = J^T p(v) the stationarity of a smooth, strongly convex function of v, which Newton's method
-/// with line search minimises whatever the contacts are like: redundant ones leave the matrix
+/// make M (v - v0) = J^T p(v) the stationarity of a smooth, strongly convex function of v, which Newton's
+/// method with line search minimises whatever the contacts are like: redundant ones leave the matrix
 ///   H = M + sum J^T rho (dp/dq) J
 /// positive definite, and it has the sparsity of the graph of bodies. Then q := p and g := mu |u_t|, until
-/// neither changes; where nothing slides g is 0 and only q is left to converge. The multipliers of the last step are
-/// the guess for the next: at rest they are the answer, which one look confirms without any factorisation. See
-/// Rockafellar, "Monotone operators and the proximal point algorithm" (1976); Alart and Curnier, "A mixed formulation
-/// for frictional contact problems prone to Newton like solution methods" (1991).
+/// neither changes; where nothing slides g is 0 and only q is left to converge. The multipliers of the last
+/// step are the guess for the next: at rest they are the answer, which one look confirms without any
+/// factorisation. See Rockafellar, "Monotone operators and the proximal point algorithm" (1976); Alart and
+/// Curnier, "A mixed formulation for frictional contact problems prone to Newton like solution methods"
+/// (1991).
 
 #include <limits>
 #include <optional>
@@ -67,12 +68,12 @@ class ProximalNewton {
   std::vector<std::pair<uint32_t, uint32_t>> pairs_;
   std::vector<Point> points_;
   std::vector<Vec6> free_, velocity_, trial_, gradient_, direction_;
-  std::vector<Vec3> fixed_;               // relative velocity that unmoved bodies and offsets add, less the target
-  std::vector<Mat6> mass_;                // of each row
-  std::vector<Mat6> diagonal_, off_;      // H
+  std::vector<Vec3> fixed_;  // relative velocity that unmoved bodies and offsets add, less the target
+  std::vector<Mat6> mass_;   // of each row
+  std::vector<Mat6> diagonal_, off_;  // H
   bool is_factored_ = false;
-  std::size_t factored_contacts_ = 0;     // their number when H was factored
-  std::vector<Mixed> mixing_;             // of the last iterations
+  std::size_t factored_contacts_ = 0;  // their number when H was factored
+  std::vector<Mixed> mixing_;          // of the last iterations
   BlockCholesky factor_;
   Real merit_ = 0;
   Real cost_ = 0, budget_ = 0;

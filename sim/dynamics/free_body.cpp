@@ -13,7 +13,6 @@ namespace {
 /// Pieces in which the free rotation of a sub-step is integrated [rad], and the most of them.
 constexpr Real kTurn = 0.5, kMostPieces = 1000;
 
-
 /// The four numbers of the orientation in a body's coordinates.
 Eigen::Map<Eigen::Vector4d> turn_of(std::span<Real> x) {
   return Eigen::Map<Eigen::Vector4d>(&x[3]);

