@@ -14,32 +14,32 @@ namespace offstage::sim {
 
 /// Its `solid` points into it and to its mesh, so it stays where it was made.
 struct Body {
-  BodyDef def;
+  // What the contact pairs ask for comes first, so that it lies together.
   BodyHandle handle;
-  Solid solid;
-  RigidBody rigid;  // dynamic bodies only
-  Pose pose;        // now
-  Pose before_substep, before_step;
-  bool frozen = false;
+  MotionType type = MotionType::dynamic;  // as defined, until it left the world's bounds
+  bool asleep = false;
+  uint32_t surface = 0;  // number of its material, for rules
+  uint32_t island = 0;   // awake: number among the islands of the sub-step; asleep: of the sleeping ones
+  uint32_t row = 0;      // among the bodies of its island
+  Real extent = 0;       // reach() of the solid; of a plane infinite
+  Pose pose;             // now
 
   // The interval in which it moves at the moment: a whole sub-step, or what an impact has left of it.
-  Real from = 0;    // since the sub-step's start [s]
-  RigidBody start;  // dynamic bodies: its state then
+  Real from = 0;  // since the sub-step's start [s]
   Pose start_pose;
-  Aabb swept;   // around its ways in the sub-step, as the broad phase has it
+  Twist start_twist;  // dynamic bodies: of the centre of mass then
   Twist drive;  // kinematic bodies: velocity of the pose's origin and angular velocity, at the interval's end
+  RigidBody start;  // dynamic bodies: its state then
+  RigidBody rigid;  // dynamic bodies only: now
 
-  Real extent = 0;       // reach() of the solid; of a plane infinite
-  uint32_t surface = 0;  // number of its material, for rules
-
-  // Rest
-  bool asleep = false;
+  Pose before_substep, before_step;
+  Aabb swept;           // around its ways in the sub-step, as the broad phase has it
   Real quiet_time = 0;  // for how long it has hardly moved [s]
-  uint32_t island = 0;  // awake: number among the islands of the sub-step; asleep: of the sleeping ones
-  uint32_t row = 0;     // among the bodies of its island
+  BodyDef def;
+  Solid solid;
 
-  bool is_dynamic() const { return def.motion == MotionType::dynamic && !frozen; }
-  bool is_kinematic() const { return def.motion == MotionType::kinematic && !frozen; }
+  bool is_dynamic() const { return type == MotionType::dynamic; }
+  bool is_kinematic() const { return type == MotionType::kinematic; }
   bool is_awake() const { return is_dynamic() && !asleep; }
   bool can_move() const { return is_awake() || (is_kinematic() && def.track.moves()); }
   /// Made when another body first comes near, because a mesh may have to be decomposed for it.
@@ -50,7 +50,13 @@ struct Body {
   void begin_interval(Real time) {
     from = time;
     start = rigid;
+    start_twist = {rigid.velocity(), rigid.angular_velocity()};
     start_pose = pose;
+  }
+  /// A collision changes the velocities of the centre of mass at the interval's start.
+  void set_start_velocity(const Vec3& v, const Vec3& w) {
+    start.set_velocity(v, w);
+    start_twist = {v, w};
   }
   /// From the interval's start to now.
   PosePath path() const { return {start_pose, pose}; }
@@ -61,7 +67,7 @@ struct Body {
   }
   /// The velocity at the interval's start, of the material point that is at a place of the world.
   Vec3 start_velocity(const Vec3& place) const {
-    if (is_awake()) return start.velocity() + start.angular_velocity().cross(place - start.position);
+    if (is_awake()) return start_twist.at(place - start.position);
     return is_kinematic() ? drive.at(place - pose.position) : Vec3(Vec3::Zero());
   }
 

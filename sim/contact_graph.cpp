@@ -27,14 +27,6 @@ class Sets {
 
 }  // namespace
 
-ContactPair* ContactGraph::find(uint32_t low, uint32_t high) const {
-  const auto at = std::lower_bound(entries_.begin(), entries_.end(), std::pair(low, high),
-                                   [](const Entry& e, const std::pair<uint32_t, uint32_t>& key) {
-                                     return std::pair(e.low, e.high) < key;
-                                   });
-  return at != entries_.end() && at->low == low && at->high == high ? at->pair.get() : nullptr;
-}
-
 void ContactGraph::forget(uint32_t slot) {
   std::erase_if(entries_, [slot](const Entry& e) { return e.low == slot || e.high == slot; });
 }

@@ -17,13 +17,6 @@ struct Island {
   std::vector<ContactPair*> pairs;
 };
 
-/// What holds for all pairs in a sub-step.
-struct ContactSettings {
-  Real touching;         ///< nearer than this is in contact [m]
-  Real collision_speed;  ///< WorldDef's
-  bool exact;            ///< every impact is traced back to; else only those that need it
-};
-
 class ContactGraph {
  public:
   /// Makes the pairs those that the broad phase found, of which at least one is dynamic: new ones are made by
@@ -31,8 +24,6 @@ class ContactGraph {
   template <class BodyAt, class SurfaceOf>
   void update(std::span<const IndexPair> candidates, BodyAt&& body_at, SurfaceOf&& surface_of);
 
-  /// The pair of two slots, low first; null if they are not near.
-  ContactPair* find(uint32_t low, uint32_t high) const;
   void forget(uint32_t slot);  ///< all pairs of a body
   void forget_all() { entries_.clear(); }
 

@@ -59,7 +59,7 @@ StateHash World::state_hash() const {
     hash.add(handle);
     hash.add(body->pose.position);
     hash.add(body->pose.orientation);
-    hash.add(body->frozen);
+    hash.add(body->type != body->def.motion);
     if (body->def.motion != MotionType::dynamic) return;
     hash.add(body->rigid.momentum);
     hash.add(body->rigid.angular_momentum);

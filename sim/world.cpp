@@ -221,6 +221,7 @@ BodyHandle World::add_body(const BodyDef& def) {
   check_body(object, def);
   auto body = std::make_unique<Body>();
   body->def = def;
+  body->type = def.motion;
   body->solid.shape = &body->def.shape;
   if (const auto* shape = std::get_if<MeshShape>(&def.shape)) {
     const auto* mesh = impl_->meshes.find(shape->mesh);
@@ -385,8 +386,8 @@ std::vector<ContactState> World::contacts() const {
     for (const PlacedManifold& m : pair.manifolds())
       for (uint32_t k = 0; k < m.manifold.count; ++k) {
         const ContactPoint& p = m.manifold.points[k];
-        if (p.separation > kTouching && m.force[k].x() == 0) continue;
-        const Vec3& f = m.force[k];
+        if (p.separation > kTouching && m.forces[k].now.x() == 0) continue;
+        const Vec3& f = m.forces[k].now;
         states.push_back({pair.a().handle, pair.b().handle, (p.on_a + p.on_b) / 2, m.frame.n,
                           f.x() * m.frame.n + f.y() * m.frame.t + f.z() * m.frame.k, p.separation});
       }

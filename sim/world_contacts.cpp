@@ -25,6 +25,8 @@ constexpr Real kFar = 0.25, kFarWithoutBounce = 1;
 constexpr Real kRoom = 0.03, kSteps = 2;
 /// How far bodies may shift against each other before their points are found anew [m].
 constexpr Real kReuse = 1e-5, kExactReuse = 1e-8;
+/// Bodies turn if their turning moves their surfaces by more than this in an interval [m].
+constexpr Real kTurning = 2e-4;
 
 Real smaller_extent(const Body& a, const Body& b) {
   return std::min(a.extent, b.extent);
@@ -64,6 +66,7 @@ PairSurface World::Impl::surface_of(const Body& a, const Body& b) const {
   }
   for (const Body* body : {&a, &b}) {
     const BodyDef& d = body->def;
+    s.conveys |= d.surface_velocity != Vec3::Zero();
     if (d.cross_friction < 0 || d.friction_axis == Vec3::Zero() || s.grain) continue;
     s.grain = body;
     s.cross = d.friction > 0 ? std::sqrt(d.cross_friction / d.friction) : 1;
@@ -106,6 +109,9 @@ void World::Impl::update_pairs(Real h) {
   for (Body* body : kinematic) move_in_broad_phase(*body, false);
   collect_pairs();
   const auto find = [&](std::size_t i) {
+    // They lie all over the memory.
+    if (i + 6 < active_pairs.size()) __builtin_prefetch(active_pairs[i + 6]);
+    if (i + 3 < active_pairs.size()) active_pairs[i + 3]->prefetch();
     active_pairs[i]->impacts = 0;
     active_pairs[i]->gave_up = false;
     find_points(*active_pairs[i], 0, h);
@@ -130,8 +136,9 @@ void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
   const bool exact = def.solver == SolverKind::exact;
   const bool bounces = exact || pair.surface().restitution > 0;
   const Real far = std::max(base, (bounces ? kFar : kFarWithoutBounce) * size);
-  const Real margin = base + std::min(motion, far);
-  pair.find(pair.a().placed_at(time, h), pair.b().placed_at(time, h), margin, exact ? kExactReuse : kReuse);
+  const Real margin = base + std::min(2 * motion, far);
+  pair.find(pair.a().placed_at(time, h), pair.b().placed_at(time, h), margin, exact ? kExactReuse : kReuse,
+            pair.turning_speed() * left > kTurning);
 
   pair.by_event = false;
   if (pair.gave_up) return;
@@ -152,6 +159,7 @@ void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
 
 /// Wakes what something that moves has come near, moves it through the sub-step, and returns it.
 std::vector<Body*> World::Impl::wake_touched(Real start, Real h) {
+  if (asleep == 0) return {};
   std::vector<Body*> touched;
   for (ContactPair* pair : active_pairs)
     for (Body* body : {&pair->a(), &pair->b()})
@@ -200,7 +208,6 @@ void World::Impl::solve(std::span<Island* const> group, Real duration, StepRepor
   std::vector<std::pair<Island*, SolverChoice*>> exact;
   for (Island* island : group) {
     SolverChoice& choice = choices[island->bodies.front()->handle.index];
-    choice.used = substeps;
     if (def.solver == SolverKind::fast ||
         (def.solver == SolverKind::automatic && !choice.is_exact_worth(*island))) {
       fast.push_back(island);

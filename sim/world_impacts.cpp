@@ -20,7 +20,7 @@ constexpr Real kCluster = 1e-4;
 constexpr Real kTurn = 0.5, kMostPieces = 512;
 
 Real spin(const Body& body) {
-  return body.is_awake() ? body.start.angular_velocity().norm() : 0;
+  return body.is_awake() ? body.start_twist.angular_velocity.norm() : 0;
 }
 
 /// Shorter intervals are none [of the sub-step].
@@ -55,7 +55,7 @@ std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, R
                                                       Real turn) const {
   const auto place = [&](const Body& body, Real time) {
     if (!body.is_awake()) return body.placed_at(time, h);
-    const Vec3 w = body.start.angular_velocity();
+    const Vec3 w = body.start_twist.angular_velocity;
     const Real rate = w.norm(), share = (time - body.from) / (h - body.from);
     RigidBody at = body.start;
     at.position += share * (body.rigid.position - body.start.position);

@@ -61,8 +61,7 @@ void World::Impl::put_to_sleep(Real h) {
     if (!quiet) continue;
     const bool pushed = std::any_of(island.pairs.begin(), island.pairs.end(), [](const ContactPair* pair) {
       const Body& other = pair->a().is_awake() ? pair->b() : pair->a();
-      return (other.is_kinematic() && other.def.track.moves()) ||
-             pair->a().def.surface_velocity != Vec3::Zero() || pair->b().def.surface_velocity != Vec3::Zero();
+      return (other.is_kinematic() && other.def.track.moves()) || pair->surface().conveys;
     });
     if (pushed) continue;
     for (Body* body : island.bodies) {

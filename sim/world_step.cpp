@@ -178,7 +178,7 @@ void World::Impl::keep_within_bounds(Body& body, StepReport& report) {
   }
   body.rigid.momentum.setZero();
   body.rigid.angular_momentum.setZero();
-  body.frozen = true;
+  body.type = MotionType::fixed;
   fixed_changed = lists_changed = true;
   report.bodies_retired.push_back(body.handle);
 }

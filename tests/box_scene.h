@@ -153,7 +153,8 @@ class BoxScene {
     const Real margin = 0.01 + reach(a, h) + reach(b, h);
     const Manifold m = placed(manifold(x, y, a_from_b, gjk(x, y, a_from_b, cache), margin), a.pose);
     if (m.count == 0) return;
-    ContactPatch p = contact_patch(m, a.pose.position, b.pose.position);
+    ContactPatch p;
+    set_points(p, m, contact_frame(m.normal), a.pose.position, b.pose.position);
     p.a = i;
     p.b = j;
     p.friction_t = p.friction_k = friction;

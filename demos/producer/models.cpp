@@ -126,14 +126,17 @@ ModelLibrary::ModelLibrary(const Scene& scene, const std::filesystem::path& fold
 void ModelLibrary::decompose_models(const Scene& scene, const DecompositionCache& cache,
                                     std::vector<Problem>& warnings) {
   const std::map<std::string, Where> needed = bodies_in_parts(scene);
+  std::set<std::string> warned;
   for (const Body& body : scene.bodies) {
     const auto* mesh = std::get_if<MeshFile>(&body.shape);
     const auto need = needed.find(body.name);
-    if (!mesh || need == needed.end() || parts_.contains(mesh->file)) continue;
-    const sim::ConvexDecomposition& parts =
-        parts_.emplace(mesh->file, cache.decompose(sim::weld(collision_mesh(model(mesh->file), 1))))
-            .first->second;
-    if (!parts.note.empty())
+    if (!mesh || need == needed.end()) continue;
+    if (!parts_.contains(mesh->file))
+      parts_.emplace(mesh->file, cache.decompose(sim::weld(collision_mesh(model(mesh->file), 1))));
+    const sim::ConvexDecomposition& parts = parts_.at(mesh->file);
+    // What stands still collides with its triangles then.
+    const bool matters = body.motion == sim::MotionType::dynamic;
+    if (matters && !parts.note.empty() && warned.insert(mesh->file).second)
       warnings.push_back({need->second, mesh->file + ": its convex parts are not exact: " + parts.note});
   }
 }

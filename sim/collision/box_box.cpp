@@ -283,7 +283,7 @@ struct FacePair {
 
 /// The points of the contact and, if it is deeper, `closest`, the separation's point on the incident box.
 void fill(Manifold& m, const FacePair& pair, const FaceContact& contact, const Pose& a_from_b, Real margin,
-          Real slop, const Separation* closest) {
+          Real slop, const Separation* closest, Manifold* more) {
   const bool on_a = pair.body == 0;
   const int axis = pair.face.axis, u = pair.face.axis_of(0), v = pair.face.axis_of(1);
   const Mat3 rotation = pair.body == 0 ? Mat3::Identity() : a_from_b.orientation.toRotationMatrix();
@@ -310,12 +310,13 @@ void fill(Manifold& m, const FacePair& pair, const FaceContact& contact, const P
     if (candidates.count == 0 || height < candidates.least_separation() - slop)
       add(p - height * n, height, closest_id(1 - pair.body));
   }
-  reduce(m, candidates, slop);
+  reduce(m, candidates, slop, more);
 }
 
 }  // namespace
 
-bool box_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin, Manifold& m) {
+bool box_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin, Manifold& m,
+                  Manifold* more) {
   const Placed at{a_from_b.orientation.toRotationMatrix(), a_from_b.position};
   const Gaps gaps(a.half, b.half, at);
   m.count = 0;
@@ -337,19 +338,29 @@ bool box_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real m
              slop = kRim * margin + rounding;
   const Tilted of_a = tilted_face(-n, gaps.a, axis.gap, tolerance),
                of_b = tilted_face(at.rotation.transpose() * n, gaps.b, axis.gap, tolerance);
-  if (std::min(of_a.sine, of_b.sine) > kMaxTilt) {
+  const bool by_edges = std::min(of_a.sine, of_b.sine) > kMaxTilt;
+  if (by_edges) {
     if (!edges) return false;
     m = manifold(a, b, a_from_b, *edges, margin);
+    if (!more) return true;
+  }
+  const Mat3 b_from_a = at.rotation.transpose();
+  const bool a_gives = by_edges ? n.cwiseAbs().maxCoeff() >= (b_from_a * n).cwiseAbs().maxCoeff()
+                                : a_gives_normal(of_a.sine, of_b.sine, reach_a, reach_b);
+  const FacePair pair =
+      a_gives ? FacePair{a, b, at, of_a.face, 0} : FacePair{b, a, at.inverse(), of_b.face, 1};
+  if (by_edges) {
+    const Real cosine = (a_gives ? n : Vec3(b_from_a * n)).cwiseAbs().maxCoeff();
+    if (cosine <= kNearFace) return true;
+    fill(*more, pair, pair.contact(margin + rounding, slop), a_from_b, margin, slop, nullptr, nullptr);
+    drop_below(*more, std::min(0.0, axis.gap) + slop);
     return true;
   }
-  const FacePair pair = a_gives_normal(of_a.sine, of_b.sine, reach_a, reach_b)
-                            ? FacePair{a, b, at, of_a.face, 0}
-                            : FacePair{b, a, at.inverse(), of_b.face, 1};
   const Real gap = pair.body == 0 ? gaps.a[pair.face.axis] : gaps.b[pair.face.axis];
   const FaceContact contact = pair.contact(margin + rounding, slop);
   const bool is_known = edges || axis.gap <= 0;
   if (!is_known && !pair.is_distance(gap, contact, margin, slop, rounding)) return false;
-  fill(m, pair, contact, a_from_b, margin, slop, edges ? &*edges : nullptr);
+  fill(m, pair, contact, a_from_b, margin, slop, edges ? &*edges : nullptr, more);
   return m.count > 0;
 }
 

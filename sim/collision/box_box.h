@@ -11,6 +11,7 @@ namespace offstage::sim {
 /// than `margin` [m] apart. False, and the manifold has none either, if the axes do not tell the distance:
 /// when the boxes are apart with a vertex or a parallel edge closest to an edge, or where edges are so nearly
 /// parallel that rounding shows.
-bool box_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin, Manifold& manifold);
+bool box_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin, Manifold& manifold,
+                  Manifold* more = nullptr);
 
 }  // namespace offstage::sim

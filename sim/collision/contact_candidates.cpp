@@ -1,6 +1,7 @@
 #include "sim/collision/contact_candidates.h"
 
 #include <cmath>
+#include <utility>
 
 namespace offstage::sim {
 namespace {
@@ -32,7 +33,7 @@ struct LeftOf {
 
 }  // namespace
 
-void reduce(Manifold& m, const Candidates& c, Real slop) {
+void reduce(Manifold& m, const Candidates& c, Real slop, Manifold* more) {
   m.count = 0;
   const auto keep = [&m](const Candidate& p) {
     m.points[m.count++] = {p.on_a, p.on_b, p.separation, p.id};
@@ -56,6 +57,20 @@ void reduce(Manifold& m, const Candidates& c, Real slop) {
     return -std::min({sense * pq(x.on_a), sense * qr(x.on_a), sense * rp(x.on_a)});
   };
   if (const Candidate& last = most(c, gain); gain(last) > 0) keep(last);
+  if (!more) return;
+  Candidates rest;
+  for (uint32_t k = 0; k < c.count; ++k) {
+    const auto is_kept = [&](const ContactPoint& x) { return x.id == c.points[k].id; };
+    if (std::none_of(m.points.begin(), m.points.begin() + m.count, is_kept)) rest.add(c.points[k]);
+  }
+  *more = m;
+  reduce(*more, rest, slop);
+}
+
+void drop_below(Manifold& m, Real least) {
+  const uint32_t count = std::exchange(m.count, 0);
+  for (uint32_t k = 0; k < count; ++k)
+    if (m.points[k].separation > least) m.points[m.count++] = m.points[k];
 }
 
 }  // namespace offstage::sim

@@ -19,6 +19,8 @@ inline constexpr Real kTilt = 0.05, kRim = 0.001;
 inline constexpr Real kSeparationRounding = 1e-9;
 /// Sine: a face further from across the separation's normal never gives the normal.
 inline constexpr Real kMaxTilt = 0.05;
+/// Cosine: a face more inclined to the separation's normal is not near to anything.
+inline constexpr Real kNearFace = 0.9;
 /// Sine: what is less inclined is parallel.
 inline constexpr Real kParallel = 1e-6;
 
@@ -78,7 +80,10 @@ struct Candidates {
 
 /// Gives the manifold, whose normal is known, at most four of the points: all of them, or the deepest, the
 /// farthest from it, the one that spans the largest triangle with both, and the one that adds most to it.
-/// What is level within `slop` is equally deep.
-void reduce(Manifold& m, const Candidates& c, Real slop);
+/// What is level within `slop` is equally deep. `more`, if there is one, gets four of those left out.
+void reduce(Manifold& m, const Candidates& c, Real slop, Manifold* more = nullptr);
+
+/// Leaves out the points that are not farther apart than `least` [m].
+void drop_below(Manifold& m, Real least);
 
 }  // namespace offstage::sim

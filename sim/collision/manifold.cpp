@@ -145,7 +145,8 @@ Real tilt(const Body& reference, const SupportingFeature& f, const Body& inciden
 /// The incident feature over a face, which gives the normal. `closest` is the separation's point on the
 /// incident solid: of a rim it may be deeper than the corners that stand for it.
 void face_manifold(Manifold& m, const Body& reference, const SupportingFeature& face, const Body& incident,
-                   const SupportingFeature& other, const Vec3& closest, Real margin, Real slop) {
+                   const SupportingFeature& other, const Vec3& closest, Real margin, Real slop,
+                   Manifold* more) {
   const Vec3 n = face.normal;
   const bool on_a = reference.name == 0;
   m.normal = on_a ? Vec3(-n) : n;
@@ -163,7 +164,12 @@ void face_manifold(Manifold& m, const Body& reference, const SupportingFeature& 
   for (const Corner& c : part.corners()) add(c.point - incident.convex.radius * n, c.id);
   if (candidates.count == 0 || n.dot(closest) - offset < candidates.least_separation() - slop)
     add(closest, closest_id(incident.name));
-  reduce(m, candidates, slop);
+  reduce(m, candidates, slop, more);
+}
+
+/// Whether something may come near a face besides what touches with an edge or a vertex.
+bool is_near(const Body& body, const SupportingFeature& f) {
+  return f.is_face() && f.normal.dot(body.outward) > kNearFace;
 }
 
 /// The ends of the stretch along which two edges run side by side, if they do and are what the solids touch
@@ -223,7 +229,8 @@ void edge_manifold(Manifold& m, const Body& a, const Body& b, const Separation& 
 
 }  // namespace
 
-Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const Separation& s, Real margin) {
+Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const Separation& s, Real margin,
+                  Manifold* more) {
   Manifold m;
   m.normal = s.normal;
   if (!(s.distance <= margin)) return m;
@@ -235,12 +242,21 @@ Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const 
   const SupportingFeature of_a = body_a.feature(slack), of_b = body_b.feature(slack);
   const Real tilt_a = tilt(body_a, of_a, body_b, of_b.vertex, s, tolerance),
              tilt_b = tilt(body_b, of_b, body_a, of_a.vertex, s, tolerance);
-  if (std::min(tilt_a, tilt_b) > kMaxTilt)
-    edge_manifold(m, body_a, body_b, s, margin, slack, tolerance);
-  else if (a_gives_normal(tilt_a, tilt_b, a.reach(), b.reach()))
-    face_manifold(m, body_a, of_a, body_b, of_b, s.on_b, margin, slop);
-  else
-    face_manifold(m, body_b, of_b, body_a, of_a, s.on_a, margin, slop);
+  const bool by_a = a_gives_normal(tilt_a, tilt_b, a.reach(), b.reach());
+  if (std::min(tilt_a, tilt_b) <= kMaxTilt) {
+    if (by_a)
+      face_manifold(m, body_a, of_a, body_b, of_b, s.on_b, margin, slop, more);
+    else
+      face_manifold(m, body_b, of_b, body_a, of_a, s.on_a, margin, slop, more);
+    return m;
+  }
+  edge_manifold(m, body_a, body_b, s, margin, slack, tolerance);
+  if (!more) return m;
+  if (is_near(body_a, of_a) && (by_a || !is_near(body_b, of_b)))
+    face_manifold(*more, body_a, of_a, body_b, of_b, s.on_b, margin, slop, nullptr);
+  else if (is_near(body_b, of_b))
+    face_manifold(*more, body_b, of_b, body_a, of_a, s.on_a, margin, slop, nullptr);
+  drop_below(*more, std::min(0.0, s.distance) + slop);
   return m;
 }
 

@@ -50,7 +50,11 @@ struct Manifold {
 /// the face's normal is less than a twentieth of the margin shorter. So solids that rest on each other keep
 /// their normal and their points while they rock by that little. Of a face of each the less inclined one
 /// gives it; if they are alike (to a thousandth) the larger solid's, or A's.
-Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const Separation& s, Real margin);
+///
+/// `more`, if there is one, gets what of solids that turn may touch next and would otherwise go unseen:
+/// points left out of more than four, and where an edge or a vertex touches what comes near a face besides.
+Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const Separation& s, Real margin,
+                  Manifold* more = nullptr);
 
 /// The same manifold in another frame, for instance world_from_a's.
 Manifold placed(const Manifold& m, const Pose& pose);

@@ -42,16 +42,16 @@ Separation plane_separation(const Convex& a, const Pose& a_from_plane) {
 
 /// The manifold of two pieces, in the quickest way there is for their cores.
 void find_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin, DistanceMethod method,
-                   PairCache& cache, std::pair<uint32_t, uint32_t> pieces, Manifold& m) {
+                   PairCache& cache, std::pair<uint32_t, uint32_t> pieces, Manifold& m, Manifold* more) {
   using Core = Convex::Core;
   if (is_sphere_pair(a, b)) {
-    m = sphere_manifold(a, b, a_from_b, margin);
+    sphere_manifold(a, b, a_from_b, margin, m);
     return;
   }
   const bool boxes = a.core == Core::box && b.core == Core::box && a.radius == 0 && b.radius == 0;
-  if (boxes && box_manifold(a, b, a_from_b, margin, m)) return;
+  if (boxes && box_manifold(a, b, a_from_b, margin, m, more)) return;
   const Separation s = measure(a, b, a_from_b, method, cache.of(pieces.first, pieces.second));
-  if (s.distance <= margin) m = manifold(a, b, a_from_b, s, margin);
+  if (s.distance <= margin) m = manifold(a, b, a_from_b, s, margin, more);
 }
 
 /// How deep a shape is inside a hollow one that none of its pieces touches, as seen from the hollow one's
@@ -145,7 +145,7 @@ bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_fr
 }
 
 void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b, Real margin,
-                    PairCache& cache, DistanceMethod method, std::vector<Manifold>& manifolds) {
+                    PairCache& cache, DistanceMethod method, std::vector<Manifold>& manifolds, bool turning) {
   assert(!a.is_plane());
   if (b.is_plane()) {
     const Manifold m = plane_manifold(a.hull(), inverse(a_from_b), margin);
@@ -154,8 +154,11 @@ void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose
   }
   const std::size_t before = manifolds.size();
   const auto visit = [&](uint32_t i, uint32_t j) {
-    find_manifold(a.piece(i), b.piece(j), a_from_b, margin, method, cache, {i, j}, manifolds.emplace_back());
+    Manifold more;
+    find_manifold(a.piece(i), b.piece(j), a_from_b, margin, method, cache, {i, j}, manifolds.emplace_back(),
+                  turning ? &more : nullptr);
     if (manifolds.back().count == 0) manifolds.pop_back();
+    if (more.count > 0) manifolds.push_back(more);
   };
   if (a.piece_count() == 1 && b.piece_count() == 1)
     visit(0, 0);

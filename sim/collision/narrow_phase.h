@@ -52,9 +52,11 @@ bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_fr
 
 /// Appends the manifolds of all pairs of pieces within `margin` [m] of each other, in an order that depends
 /// on the shapes alone. Whatever the method, two boxes have the separating axis test, and spheres closed
-/// forms.
+/// forms. Of shapes that turn against each other it tells also what may touch next, as further manifolds
+/// (`more` of manifold()).
 void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b, Real margin,
-                    PairCache& cache, DistanceMethod method, std::vector<Manifold>& manifolds);
+                    PairCache& cache, DistanceMethod method, std::vector<Manifold>& manifolds,
+                    bool turning = false);
 
 /// A shape on its way.
 struct MovingShape {

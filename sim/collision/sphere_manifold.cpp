@@ -107,13 +107,14 @@ bool is_sphere_pair(const Convex& a, const Convex& b) {
   return (a.core == Core::point && is_known(b)) || (b.core == Core::point && is_known(a));
 }
 
-Manifold sphere_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin) {
+void sphere_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin, Manifold& m) {
   const uint32_t other = b.core == Core::point ? 0 : 1;
   const Vec3 centre = other == 0 ? a_from_b.position : a_from_b.point_to_body(Vec3::Zero());
   const Nearest n = nearest(other == 0 ? a : b, centre);
   const Real separation = n.distance - a.radius - b.radius;
-  Manifold m;
-  if (!(separation <= margin)) return m;
+  m.count = 0;
+  if (!(separation <= margin)) return;
+  m.source = NormalSource::points;
   m.normal = other == 0 ? Vec3(-n.outward) : a_from_b.vector_to_world(n.outward);
   m.radius_a = a.radius;
   m.radius_b = b.radius;
@@ -129,7 +130,6 @@ Manifold sphere_manifold(const Convex& a, const Convex& b, const Pose& a_from_b,
     p.on_a = -a.radius * m.normal;
     p.on_b = p.on_a - separation * m.normal;
   }
-  return m;
 }
 
 }  // namespace offstage::sim

@@ -9,8 +9,8 @@ namespace offstage::sim {
 /// without radius.
 bool is_sphere_pair(const Convex& a, const Convex& b);
 
-/// Their manifold, of one point, or of none if they are farther than `margin` [m] apart. The normal is that
-/// of the closest feature of the other solid: exactly, other than manifold()'s.
-Manifold sphere_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin);
+/// Gives their manifold, of one point, or of none if they are farther than `margin` [m] apart. The normal is
+/// that of the closest feature of the other solid: exactly, other than manifold()'s.
+void sphere_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin, Manifold& m);
 
 }  // namespace offstage::sim

@@ -4,11 +4,15 @@
 #include <cmath>
 #include <limits>
 
+#include "sim/collision/sphere_manifold.h"
+
 namespace offstage::sim {
 namespace {
 
 /// Points that are this near to each other are the same, whatever their features are called [m].
 constexpr Real kSame = 5e-3;
+/// Of squared distances: points of the same features count as so much nearer.
+constexpr Real kSameFeature = 1.0 / 16;
 
 Pose between(const Pose& a, const Pose& b) {
   return {a.point_to_body(b.position), a.orientation.conjugate() * b.orientation};
@@ -20,51 +24,90 @@ Real difference(const Pose& p, const Pose& q, Real reach) {
   return (p.position - q.position).norm() + 2 * half_sine * reach;
 }
 
-}  // namespace
-
-void ContactPair::clear() {
-  placed_.clear();
-  found_.clear();
-  found_margin_ = -1;
+bool is_sphere_pair(Body& a, Body& b) {
+  const CollisionShape &p = a.collision_shape(), &q = b.collision_shape();
+  if (p.is_plane() || q.is_plane() || p.piece_count() != 1 || q.piece_count() != 1) return false;
+  return is_sphere_pair(p.piece(0), q.piece(0));
 }
 
-void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_within) {
-  const Pose a_from_b = between(a, b);
-  const Real reach_b = b_->collision_shape().is_plane() ? a_->extent + a_from_b.position.norm() : b_->extent;
-  if (found_margin_ >= margin && found_margin_ <= 4 * margin && reuse_within > 0 &&
-      difference(a_from_b, a_from_b_, reach_b) <= reuse_within) {
-    reuse(a, b);
+Vec3 world_vector(const ContactFrame& f, const Vec3& v) {
+  return v.x() * f.n + v.y() * f.t + v.z() * f.k;
+}
+Vec3 frame_vector(const ContactFrame& f, const Vec3& v) {
+  return {f.n.dot(v), f.t.dot(v), f.k.dot(v)};
+}
+
+/// Copies no more than the points that there are.
+void place(const Manifold& local, const Pose& pose, Manifold& m) {
+  m.normal = pose.vector_to_world(local.normal);
+  m.source = local.source;
+  m.edge_a = pose.vector_to_world(local.edge_a);
+  m.edge_b = pose.vector_to_world(local.edge_b);
+  m.radius_a = local.radius_a;
+  m.radius_b = local.radius_b;
+  m.count = local.count;
+  for (uint32_t k = 0; k < local.count; ++k) {
+    const ContactPoint& p = local.points[k];
+    m.points[k] = {pose.point_to_world(p.on_a), pose.point_to_world(p.on_b), p.separation, p.id};
+  }
+}
+
+}  // namespace
+
+ContactPair::ContactPair(Body& a, Body& b, const PairSurface& surface)
+    : a_(&a), b_(&b), surface_(surface), quick_(is_sphere_pair(a, b)) {}
+
+void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_within, bool turning) {
+  const Real apart = a_->extent + b_->extent + margin;
+  if ((a.position - b.position).squaredNorm() > apart * apart) {
+    placed_.clear();
+    found_margin_ = 0;
     return;
   }
-  std::swap(before_, placed_);
-  found_.clear();
+  // Pairs are found side by side; what they need for a moment is each thread's own.
+  static thread_local std::vector<Remembered> before;
+  static thread_local std::vector<Manifold> scratch;
+  before.clear();
+  remember(before);
+  const Pose a_from_b = between(a, b);
+  const Real reach_b = b_->collision_shape().is_plane() ? a_->extent + a_from_b.position.norm() : b_->extent;
+  if (!quick_ && found_margin_ >= margin && found_margin_ <= 4 * margin && reuse_within > 0 &&
+      difference(a_from_b, a_from_b_, reach_b) <= reuse_within) {
+    reuse(a, b, before);
+    return;
+  }
+  std::vector<Manifold>& found = quick_ ? scratch : found_;
+  found.clear();
   find_manifolds(a_->collision_shape(), b_->collision_shape(), a_from_b, margin, cache_, DistanceMethod::gjk,
-                 found_);
+                 found, turning);
   cache_.forget_unused();
   a_from_b_ = a_from_b;
   found_margin_ = margin;
-  placed_.resize(found_.size());
-  for (std::size_t i = 0; i < found_.size(); ++i) placed_[i] = {.manifold = placed(found_[i], a)};
-  set_frames();
-  for (PlacedManifold& m : placed_) {
-    m.force.fill(Vec3::Zero());
-    m.mean_force.fill(Vec3::Zero());
+  placed_.resize(found.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    place(found[i], a, placed_[i].manifold);
+    set_frame(placed_[i]);
   }
-  recall(before_, placed_at_, a);
+  recall(before, a);
   placed_at_ = a;
 }
 
+PointForce ContactPair::recalled(const Remembered& p, const ContactFrame& frame, const Pose& a) {
+  const Vec3 last = frame_vector(frame, a.vector_to_world(p.last));
+  return {last, last, frame_vector(frame, a.vector_to_world(p.mean)), true};
+}
+
 /// The points stay where they are on their bodies; the normal stays with a.
-void ContactPair::reuse(const Pose& a, const Pose& b) {
-  before_frames_.clear();
+void ContactPair::reuse(const Pose& a, const Pose& b, const std::vector<Remembered>& points) {
+  std::size_t next = 0;
   for (std::size_t i = 0; i < found_.size(); ++i) {
     const Manifold& local = found_[i];
-    Manifold& m = placed_[i].manifold;
-    placed_[i].known.fill(true);
-    before_frames_.push_back(placed_[i].frame);
+    PlacedManifold& placed = placed_[i];
+    Manifold& m = placed.manifold;
     m.normal = a.vector_to_world(local.normal);
     m.edge_a = a.vector_to_world(local.edge_a);
     m.edge_b = a.vector_to_world(local.edge_b);
+    set_frame(placed);
     for (uint32_t k = 0; k < local.count; ++k) {
       const Vec3 on_a = a.point_to_world(local.points[k].on_a);
       const Vec3 on_b = b.point_to_world(a_from_b_.point_to_body(local.points[k].on_b));
@@ -73,61 +116,57 @@ void ContactPair::reuse(const Pose& a, const Pose& b) {
       const Vec3 middle = (on_a + on_b) / 2;
       m.points[k].on_a = middle + m.points[k].separation / 2 * m.normal;
       m.points[k].on_b = middle - m.points[k].separation / 2 * m.normal;
+      const Remembered& p = points[next++];
+      placed.forces[k] = recalled(p, placed.frame, a);
     }
   }
-  set_frames();
-  const Quat turn = a.orientation * placed_at_.orientation.conjugate();
-  for (std::size_t i = 0; i < placed_.size(); ++i)
-    for (uint32_t k = 0; k < placed_[i].manifold.count; ++k)
-      for (Vec3* f : {&placed_[i].force[k], &placed_[i].mean_force[k]})
-        *f = carried(*f, before_frames_[i], placed_[i].frame, turn);
   placed_at_ = a;
 }
 
-/// Forces of an old frame in a new one: they turn with body a. (A frame's tangents can jump while its normal
-/// hardly moves.)
-Vec3 ContactPair::carried(const Vec3& force, const ContactFrame& old, const ContactFrame& now,
-                          const Quat& turn) {
-  const Vec3 f = turn * (force.x() * old.n + force.y() * old.t + force.z() * old.k);
-  return {now.n.dot(f), now.t.dot(f), now.k.dot(f)};
+void ContactPair::set_frame(PlacedManifold& m) const {
+  m.frame = contact_frame(m.manifold.normal);
+  if (!surface_.grain) return;
+  const Vec3& n = m.frame.n;
+  const Vec3 axis = surface_.grain->start_pose.vector_to_world(surface_.grain->def.friction_axis);
+  const Vec3 along = axis - n.dot(axis) * n;
+  const Real length = along.norm();
+  if (length < 1e-6 * axis.norm()) return;  // the grain stands on the contact
+  m.frame.t = along / length;
+  m.frame.k = n.cross(m.frame.t);
 }
 
-void ContactPair::set_frames() {
-  for (PlacedManifold& m : placed_) {
-    m.frame = contact_frame(m.manifold.normal);
-    if (!surface_.grain) continue;
-    const Vec3& n = m.frame.n;
-    const Vec3 axis = surface_.grain->start_pose.vector_to_world(surface_.grain->def.friction_axis);
-    const Vec3 along = axis - n.dot(axis) * n;
-    const Real length = along.norm();
-    if (length < 1e-6 * axis.norm()) continue;  // the grain stands on the contact
-    m.frame.t = along / length;
-    m.frame.k = n.cross(m.frame.t);
-  }
+/// Forces turn with body a. (A frame's tangents can jump while its normal hardly moves.)
+void ContactPair::remember(std::vector<Remembered>& points) const {
+  for (const PlacedManifold& m : placed_)
+    for (uint32_t k = 0; k < m.manifold.count; ++k) {
+      const ContactPoint& p = m.manifold.points[k];
+      points.push_back({placed_at_.point_to_body(p.on_a),
+                        placed_at_.vector_to_body(world_vector(m.frame, m.forces[k].last)),
+                        placed_at_.vector_to_body(world_vector(m.frame, m.forces[k].mean)), m.torque,
+                        m.mean_torque, p.id});
+    }
 }
 
 /// Points that were there before keep their forces: those of the same features, or else nearby.
-void ContactPair::recall(const std::vector<PlacedManifold>& before, const Pose& a_before, const Pose& a) {
-  if (before.empty()) return;
-  const Quat turn = a.orientation * a_before.orientation.conjugate();
+void ContactPair::recall(const std::vector<Remembered>& points, const Pose& a) {
   for (PlacedManifold& m : placed_) {
+    m.torque = m.mean_torque = 0;
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
+      m.forces[k] = {};
       const ContactPoint& point = m.manifold.points[k];
       const Vec3 on_a = a.point_to_body(point.on_a);
-      Real best = kSame;
-      for (const PlacedManifold& old : before)
-        for (uint32_t j = 0; j < old.manifold.count; ++j) {
-          const ContactPoint& p = old.manifold.points[j];
-          const Real distance =
-              (a_before.point_to_body(p.on_a) - on_a).norm() * (p.id == point.id ? 0.25 : 1);
-          if (distance >= best) continue;
-          best = distance;
-          m.force[k] = carried(old.force[j], old.frame, m.frame, turn);
-          m.mean_force[k] = carried(old.mean_force[j], old.frame, m.frame, turn);
-          m.known[k] = true;
-          m.torque = old.torque;
-          m.mean_torque = old.mean_torque;
-        }
+      const Remembered* best = nullptr;
+      Real nearest = kSame * kSame;
+      for (const Remembered& p : points) {
+        const Real distance = (p.on_a - on_a).squaredNorm() * (p.id == point.id ? kSameFeature : 1);
+        if (distance >= nearest) continue;
+        nearest = distance;
+        best = &p;
+      }
+      if (!best) continue;
+      m.forces[k] = recalled(*best, m.frame, a);
+      m.torque = best->torque;
+      m.mean_torque = best->mean_torque;
     }
   }
 }
@@ -139,20 +178,25 @@ Real ContactPair::separation() const {
   return least;
 }
 
-Real ContactPair::speed_bound() const {
-  const auto speed = [](const Body& body) {
+Real ContactPair::turning_speed() const {
+  const auto turning = [](const Body& body) {
+    if (std::holds_alternative<Sphere>(body.def.shape)) return 0.0;  // its centre is what moves its surface
     if (body.is_awake())
-      return body.start.angular_velocity().norm() * (body.extent + body.start.centre.norm());
+      return body.start_twist.angular_velocity.norm() * (body.extent + body.start.centre.norm());
     return body.is_kinematic() && body.drive.angular_velocity != Vec3::Zero()
                ? body.drive.angular_velocity.norm() * body.extent
                : 0.0;
   };
+  return turning(*a_) + turning(*b_);
+}
+
+Real ContactPair::speed_bound() const {
   const auto velocity = [](const Body& body) {
-    return body.is_awake()       ? body.start.velocity()
+    return body.is_awake()       ? body.start_twist.velocity
            : body.is_kinematic() ? body.drive.velocity
                                  : Vec3(Vec3::Zero());
   };
-  return (velocity(*a_) - velocity(*b_)).norm() + speed(*a_) + speed(*b_);
+  return (velocity(*a_) - velocity(*b_)).norm() + turning_speed();
 }
 
 Vec3 ContactPair::relative_velocity(const Vec3& point) const {

@@ -16,35 +16,46 @@ struct PairSurface {
   Real restitution = 0, friction = 0, static_friction = 0;
   Real cross = 1;               ///< friction across the grain over that along it
   const Body* grain = nullptr;  ///< whose axis the grain is; null: isotropic
+  bool conveys = false;         ///< a surface moves along the body
+};
+
+/// What acts at a point of a manifold, on body a, in the manifold's frame.
+struct PointForce {
+  Vec3 now = Vec3::Zero();   ///< mean over the interval [N]
+  Vec3 last = Vec3::Zero();  ///< at its end, what the next one begins with [N]
+  Vec3 mean = Vec3::Zero();  ///< over the intervals before; the fast solver's [N]
+  bool known = false;        ///< whether the point was there in the interval before
 };
 
 /// A manifold placed in the world, with the forces that acted at its points.
 struct PlacedManifold {
-  Manifold manifold;            ///< world
-  ContactFrame frame;           ///< isotropic friction's, or along the grain
-  std::array<Vec3, 4> force;    ///< in the frame: on body a [N]
-  std::array<bool, 4> known{};  ///< whether the point was there in the interval before
-  Real torque = 0;              ///< about the normal, of all points together; the fast solver's [N m]
-  /// Means over the last intervals of `force` and `torque`, which the fast solver keeps.
-  std::array<Vec3, 4> mean_force;
-  Real mean_torque = 0;
+  ContactFrame frame;                ///< isotropic friction's, or along the grain
+  Real torque = 0, mean_torque = 0;  ///< about the normal, of all points together; the fast solver's [N m]
+  Manifold manifold;                 ///< world
+  std::array<PointForce, 4> forces;
 };
 
 class ContactPair {
  public:
   /// A plane can only be `b`. Not both are planes.
-  ContactPair(Body& a, Body& b, const PairSurface& surface) : a_(&a), b_(&b), surface_(surface) {}
+  ContactPair(Body& a, Body& b, const PairSurface& surface);
 
   Body& a() const { return *a_; }
   Body& b() const { return *b_; }
   const PairSurface& surface() const { return surface_; }
-  void set_surface(const PairSurface& surface) { surface_ = surface; }
 
   /// Finds where the bodies, placed, are within `margin` [m] of each other. If they are placed as before to
-  /// each other, within `reuse` [m], the points are taken over and only their distances are new.
-  void find(const Pose& a, const Pose& b, Real margin, Real reuse);
-  /// Forgets where they touch.
-  void clear();
+  /// each other, within `reuse` [m], the points are taken over and only their distances are new. `turning`:
+  /// see find_manifolds().
+  void find(const Pose& a, const Pose& b, Real margin, Real reuse, bool turning);
+
+  /// Asks for the manifolds' memory, which find() will want.
+  void prefetch() const {
+    constexpr std::size_t kLine = 64, kFirstPoint = 512;
+    const char* data = reinterpret_cast<const char*>(placed_.data());
+    if (!placed_.empty())
+      for (std::size_t i = 0; i < kFirstPoint; i += kLine) __builtin_prefetch(data + i);
+  }
 
   /// Whether find() was never called.
   bool is_new() const { return found_margin_ < 0; }
@@ -56,6 +67,8 @@ class ContactPair {
   Real separation() const;
   /// Greatest speed at which a point of the pair can come closer: of all points of both [m/s].
   Real speed_bound() const;
+  /// Of it, by their turning alone.
+  Real turning_speed() const;
   /// Velocity of a's point against b's at a place of the world, at the interval's start [m/s].
   Vec3 relative_velocity(const Vec3& point) const;
 
@@ -64,20 +77,27 @@ class ContactPair {
   bool by_event = false;  ///< an impact of this pair is traced back to; else its points limit the approach
 
  private:
-  static Vec3 carried(const Vec3& force, const ContactFrame& old, const ContactFrame& now, const Quat& turn);
-  void recall(const std::vector<PlacedManifold>& before, const Pose& a_before, const Pose& a);
-  void reuse(const Pose& a, const Pose& b);
-  void set_frames();
+  /// A point with its forces, all in a's frame.
+  struct Remembered {
+    Vec3 on_a, last, mean;
+    Real torque, mean_torque;
+    uint32_t id;
+  };
+  static PointForce recalled(const Remembered& p, const ContactFrame& frame, const Pose& a);
+  void remember(std::vector<Remembered>& points) const;
+  void recall(const std::vector<Remembered>& points, const Pose& a);
+  void reuse(const Pose& a, const Pose& b, const std::vector<Remembered>& points);
+  void set_frame(PlacedManifold& m) const;
 
   Body *a_, *b_;
   PairSurface surface_;
+  bool quick_;  // to find anew, as quick as to take over
   PairCache cache_;
-  std::vector<Manifold> found_;  // in a's frame
+  std::vector<Manifold> found_;  // in a's frame; none if quick
   Pose a_from_b_;                // when found
-  Real found_margin_ = -1, found_reuse_ = 0;
+  Real found_margin_ = -1;
   Pose placed_at_;  // of a, when placed
-  std::vector<PlacedManifold> placed_, before_;
-  std::vector<ContactFrame> before_frames_;
+  std::vector<PlacedManifold> placed_;
 };
 
 }  // namespace offstage::sim

@@ -33,8 +33,8 @@ struct PointRates {
 
 PointRates rates(const Body& body, const Vec3& place) {
   if (body.is_awake()) {
-    const Vec3 w = body.start.angular_velocity(), wr = w.cross(place - body.start.position);
-    return {body.start.velocity() + wr, w.cross(wr)};
+    const Vec3 &w = body.start_twist.angular_velocity, wr = w.cross(place - body.start.position);
+    return {body.start_twist.velocity + wr, w.cross(wr)};
   }
   // The velocities of kinematic bodies are those of the interval's end, so nothing is missing from them.
   return {body.start_velocity(place), Vec3::Zero()};
@@ -43,8 +43,8 @@ PointRates rates(const Body& body, const Vec3& place) {
 Twist twist(const Body& body) {
   // At the origin of the world's axes.
   if (body.is_awake()) {
-    const Vec3 w = body.start.angular_velocity();
-    return {body.start.velocity() - w.cross(body.start.position), w};
+    const Vec3& w = body.start_twist.angular_velocity;
+    return {body.start_twist.velocity - w.cross(body.start.position), w};
   }
   if (!body.is_kinematic()) return {};
   const Vec3& w = body.drive.angular_velocity;
@@ -58,7 +58,7 @@ bool is_face(NormalSource s) {
 /// Square of the angular velocity [1/s^2]. Below this, faces do not turn in a step.
 constexpr Real kNoSpin = 1e-14;
 Real spin(const Body& body) {
-  if (body.is_awake()) return body.start.angular_velocity().squaredNorm();
+  if (body.is_awake()) return body.start_twist.angular_velocity.squaredNorm();
   return body.is_kinematic() ? body.drive.angular_velocity.squaredNorm() : 0;
 }
 
@@ -85,12 +85,9 @@ Vec3 acceleration_bias(const ContactPair& pair, const PlacedManifold& placed, co
 
 /// Velocity that conveyor-like surfaces add.
 Vec3 surface_velocity(const ContactPair& pair) {
-  Vec3 v = Vec3::Zero();
-  if (pair.a().def.surface_velocity != Vec3::Zero())
-    v += pair.a().start_pose.vector_to_world(pair.a().def.surface_velocity);
-  if (pair.b().def.surface_velocity != Vec3::Zero())
-    v -= pair.b().start_pose.vector_to_world(pair.b().def.surface_velocity);
-  return v;
+  if (!pair.surface().conveys) return Vec3::Zero();
+  return pair.a().start_pose.vector_to_world(pair.a().def.surface_velocity) -
+         pair.b().start_pose.vector_to_world(pair.b().def.surface_velocity);
 }
 
 Vec3 in_frame(const ContactFrame& f, const Vec3& v) {
@@ -155,7 +152,8 @@ std::optional<ContactWork> ExactContacts::solve(const Island& island, const Cont
     free_[i] << bodies_[i].velocity, bodies_[i].angular_velocity;
   const std::optional<ContactWork> work = newton_.solve(bodies_, contacts_, budget);
   if (!work) return work;
-  for (std::size_t i = 0; i < contacts_.size(); ++i) *forces_[i] = contacts_[i].impulse / interval.duration;
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    forces_[i]->now = forces_[i]->last = contacts_[i].impulse / interval.duration;
   move_bodies(island, interval.duration);
   return work;
 }
@@ -194,10 +192,10 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       if (touches) c.offset += h * acceleration_bias(pair, m, point);
       c.target = touches ? std::min(-kPushOut * point.separation / h, kFastestPush) : -point.separation / h;
       std::tie(c.friction_t, c.friction_k) = friction(pair.surface(), u);
-      c.impulse = h * m.force[k];
-      c.is_guessed = m.known[k];
+      c.impulse = h * m.forces[k].last;
+      c.is_guessed = m.forces[k].known;
       contacts_.push_back(c);
-      forces_.push_back(&m.force[k]);
+      forces_.push_back(&m.forces[k]);
       approach_.push_back(u.x());
     }
 }
@@ -217,8 +215,8 @@ void ExactContacts::move_bodies(const Island& island, Real duration) {
     body.rigid.momentum += body.rigid.mass * dv;
     body.rigid.angular_momentum += angular_momentum(body.rigid, body.rigid.orientation, dw);
     if (closing_[i]) {
-      dv += bodies_[i].velocity - body.start.velocity();
-      dw += bodies_[i].angular_velocity - body.start.angular_velocity();
+      dv += bodies_[i].velocity - body.start_twist.velocity;
+      dw += bodies_[i].angular_velocity - body.start_twist.angular_velocity;
     }
     displace(body, duration / 2 * dv, duration / 2 * dw);
   }
@@ -270,20 +268,6 @@ void SolverChoice::learn(const Island& island, Real duration, bool solved) {
 
 // Fast
 
-namespace {
-
-/// Other tangents for a patch.
-void turn(ContactPatch& patch, const ContactFrame& frame) {
-  for (uint32_t k = 0; k < patch.count; ++k) {
-    const Vec3 place = patch.points[k].t * patch.frame.t + patch.points[k].k * patch.frame.k;
-    patch.points[k].t = frame.t.dot(place);
-    patch.points[k].k = frame.k.dot(place);
-  }
-  patch.frame = frame;
-}
-
-}  // namespace
-
 ContactWork FastContacts::solve(std::span<const Island* const> islands, const ContactInterval& interval) {
   const Real h = interval.duration;
   bodies_.clear();
@@ -294,8 +278,8 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
     if (body.is_awake()) {
       b.inverse_mass = 1 / body.rigid.mass;
       b.inverse_inertia = inverse_inertia(body.start, body.start.orientation);
-      b.velocity = body.start.velocity();
-      b.angular_velocity = body.start.angular_velocity();
+      b.velocity = body.start_twist.velocity;
+      b.angular_velocity = body.start_twist.angular_velocity;
       b.free_acceleration = (body.rigid.velocity() - b.velocity) / h;
       b.free_angular_acceleration = (body.rigid.angular_velocity() - b.angular_velocity) / h;
     } else if (body.is_kinematic()) {
@@ -314,8 +298,8 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
       const Vec3 surface = surface_velocity(*pair);
       for (PlacedManifold& m : pair->manifolds()) {
         if (pair->by_event && pair->separation() > interval.touching) continue;
-        ContactPatch patch = contact_patch(m.manifold, origin(pair->a()), origin(pair->b()));
-        turn(patch, m.frame);
+        ContactPatch& patch = patches_.emplace_back();
+        set_points(patch, m.manifold, m.frame, origin(pair->a()), origin(pair->b()));
         patch.a = a;
         patch.b = b;
         const Vec3 place = origin(pair->a()) + patch.arm_a;
@@ -323,15 +307,15 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
         patch.offset = in_frame(m.frame, surface);
         std::tie(patch.friction_t, patch.friction_k) = friction(pair->surface(), u);
         for (uint32_t k = 0; k < patch.count; ++k) {
-          patch.points[k].force = m.force[k].x();
-          patch.points[k].mean_force = m.mean_force[k].x();
-          patch.mean_friction += Vec3(m.mean_force[k].y(), m.mean_force[k].z(), 0);
-          patch.force_t += m.force[k].y();
-          patch.force_k += m.force[k].z();
+          const PointForce& f = m.forces[k];
+          patch.points[k].force = f.last.x();
+          patch.points[k].mean_force = f.mean.x();
+          patch.mean_friction += Vec3(f.mean.y(), f.mean.z(), 0);
+          patch.force_t += f.last.y();
+          patch.force_k += f.last.z();
         }
         patch.torque_n = m.torque;
         patch.mean_friction.z() = m.mean_torque;
-        patches_.push_back(patch);
         origins_.push_back(&m);
       }
     }
@@ -345,9 +329,11 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
     for (uint32_t k = 0; k < patch.count; ++k) sum += patch.points[k].force;
     for (uint32_t k = 0; k < patch.count; ++k) {
       const Real share = sum > 0 ? patch.points[k].force / sum : 1.0 / patch.count;
-      origins_[i]->force[k] = {patch.points[k].force, share * patch.force_t, share * patch.force_k};
-      origins_[i]->mean_force[k] = {patch.points[k].mean_force, share * patch.mean_friction.x(),
-                                    share * patch.mean_friction.y()};
+      PointForce& f = origins_[i]->forces[k];
+      f.now = {patch.points[k].impulse / h, share * patch.friction_impulse.x() / h,
+               share * patch.friction_impulse.y() / h};
+      f.last = {patch.points[k].force, share * patch.force_t, share * patch.force_k};
+      f.mean = {patch.points[k].mean_force, share * patch.mean_friction.x(), share * patch.mean_friction.y()};
     }
     origins_[i]->torque = patch.torque_n;
     origins_[i]->mean_torque = patch.mean_friction.z();
@@ -444,7 +430,7 @@ uint32_t resolve_collisions(const Island& island, const CollisionSettings& setti
   for (Body* body : island.bodies) {
     body->row = static_cast<uint32_t>(cluster.bodies.size());
     cluster.bodies.push_back({1 / body->start.mass, inverse_inertia(body->start, body->start.orientation),
-                              body->start.velocity(), body->start.angular_velocity()});
+                              body->start_twist.velocity, body->start_twist.angular_velocity});
   }
   for (const ContactPair* pair : island.pairs)
     cluster.add(*pair, settings.reach, settings.collision_speed, settings.law);
@@ -453,7 +439,7 @@ uint32_t resolve_collisions(const Island& island, const CollisionSettings& setti
   work.add(collide(cluster.bodies, cluster.contacts, cluster.restitution, settings.law));
   for (Body* body : island.bodies) {
     const ContactBody& b = cluster.bodies[body->row];
-    body->start.set_velocity(b.velocity, b.angular_velocity);
+    body->set_start_velocity(b.velocity, b.angular_velocity);
   }
   return static_cast<uint32_t>(std::count(cluster.bounces.begin(), cluster.bounces.end(), 1));
 }

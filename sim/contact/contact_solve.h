@@ -37,10 +37,10 @@ class ExactContacts {
 
   std::vector<ContactBody> bodies_;
   std::vector<Contact> contacts_;
-  std::vector<Vec3*> forces_;     // of the contacts, in their pairs
-  std::vector<Real> approach_;    // of the contacts at the start [m/s]
-  std::vector<uint8_t> closing_;  // by body: some contact came together in the interval
-  std::vector<Vec6> free_;        // by body: velocities without contacts
+  std::vector<PointForce*> forces_;  // of the contacts, in their pairs
+  std::vector<Real> approach_;       // of the contacts at the start [m/s]
+  std::vector<uint8_t> closing_;     // by body: some contact came together in the interval
+  std::vector<Vec6> free_;           // by body: velocities without contacts
   ProximalNewton newton_;
 };
 
@@ -69,7 +69,6 @@ class SolverChoice {
   void learn(const Island& island, Real duration, bool solved);
 
   std::unique_ptr<ExactContacts> exact;
-  uint64_t used = 0;  ///< number of the sub-step
 
  private:
   uint32_t wait_ = 0;  // sub-steps until the next attempt

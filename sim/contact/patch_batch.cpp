@@ -1,6 +1,9 @@
 #include "sim/contact/patch_batch.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <type_traits>
 #include <utility>
 
 #include "sim/contact/contact_coloring.h"
@@ -9,8 +12,11 @@
 namespace offstage::sim {
 namespace {
 
-/// Rounds of normal and friction impulses in the first sweep of a patch without a guess.
-constexpr uint32_t kFreshRounds = 20;
+/// A sweep goes over a patch in rounds, until one changes its velocities by less than this [m/s] or there
+/// were enough. What holds takes one; a blow takes more, or some of the points would be pressed in. A patch
+/// without a guess is at first solved to the end, or it would slip until the sweeps have found one.
+constexpr Real kSettled = 0.01, kSolved = 1e-9;
+constexpr uint32_t kRounds = 20;
 
 /// Of the difference between an impulse and its mean, the share that a sub-step takes from the impulse, and
 /// the share that it adds to the mean. Slow modes lose most if their frequencies are about the latter. A
@@ -52,8 +58,13 @@ void scatter(const LaneTwist& v, std::span<BodyMotion> motions, const std::array
   place(3) = {linear.d, angular.d};
 }
 
+/// At the centre.
+LaneVector relative_velocity(const PatchBatch& p, const LaneTwist& a, const LaneTwist& b) {
+  return a.linear + cross(a.angular, p.arm_a) - b.linear - cross(b.angular, p.arm_b);
+}
+
 Groups relative(const PatchBatch& p, const LaneTwist& a, const LaneTwist& b) {
-  const LaneVector linear = a.linear + cross(a.angular, p.arm_a) - b.linear - cross(b.angular, p.arm_b);
+  const LaneVector linear = relative_velocity(p, a, b);
   const LaneVector angular = a.angular - b.angular;
   return {{dot(p.n, linear), dot(p.t, angular), dot(p.k, angular)},
           {dot(p.t, linear), dot(p.k, linear), dot(p.n, angular)}};
@@ -112,7 +123,24 @@ Mobility mobility(const PatchBatch& p, const LaneVector& arm, Lanes m, const Lan
   return {symmetric(f), symmetric(g), {row(g[0]), row(g[1]), row(g[2])}};
 }
 
-void set_mobility(PatchBatch& p) {
+void set_single_mobility(PatchBatch& p) {
+  const LaneVector* const axes[] = {&p.n, &p.t, &p.k};
+  const auto entry = [&](int i, int j) {
+    const LaneVector &x = *axes[i], &y = *axes[j];
+    return (p.inverse_mass_a + p.inverse_mass_b) * dot(x, y) +
+           dot(cross(p.arm_a, x), p.inverse_inertia_a * cross(p.arm_a, y)) +
+           dot(cross(p.arm_b, x), p.inverse_inertia_b * cross(p.arm_b, y));
+  };
+  p.normal_mobility.xx = entry(0, 0);
+  p.friction_mobility.xx = entry(1, 1);
+  p.friction_mobility.xy = entry(1, 2);
+  p.friction_mobility.yy = entry(2, 2);
+  p.coupling.x.x = entry(1, 0);
+  p.coupling.y.x = entry(2, 0);
+  p.points[0].mass *= lane_inverse(p.normal_mobility.xx);
+}
+
+void set_full_mobility(PatchBatch& p) {
   const Mobility a = mobility(p, p.arm_a, p.inverse_mass_a, p.inverse_inertia_a);
   const Mobility b = mobility(p, p.arm_b, p.inverse_mass_b, p.inverse_inertia_b);
   p.normal_mobility = a.normal + b.normal;
@@ -124,7 +152,30 @@ void set_mobility(PatchBatch& p) {
   }
 }
 
+void set_mobility(PatchBatch& p) {
+  if (p.count == 1)
+    set_single_mobility(p);
+  else
+    set_full_mobility(p);
+  const LaneSymmetric& K = p.friction_mobility;
+  p.inverse_determinant = lane_inverse(K.xx * K.yy - K.xy * K.xy);
+  p.inverse_bound = lane_inverse(lane_max(K.xx, K.yy) + lane_abs(K.xy));
+  p.inverse_spin = lane_inverse(K.zz);
+}
+
 // Filling
+
+/// Nothing but what is used: a batch is large.
+void clear(PatchBatch& p, std::array<uint32_t, 4> patches, std::span<const ContactPatch> all) {
+  static_assert(std::is_trivial_v<PatchBatch>);
+  uint32_t count = 0;
+  for (uint32_t i : patches)
+    if (i != ContactColoring::kNone) count = std::max(count, all[i].count);
+  std::memset(&p, 0, offsetof(PatchBatch, points) + count * sizeof(PatchBatch::Point));
+  p.count = count;
+  p.tolerance = kSettled;
+  p.patch = patches;
+}
 
 void set_body(uint32_t index, std::span<const RelaxedBody> bodies, int lane, Lanes& inverse_mass,
               LaneSymmetric& inverse_inertia) {
@@ -152,10 +203,9 @@ void set_patch(PatchBatch& p, int lane, const ContactPatch& c, Real substep) {
     q.impulse[lane] = substep * c.points[i].force;
     q.mean[lane] = substep * c.points[i].mean_force;
   }
-  p.count = std::max(p.count, c.count);
   const bool fresh =
       std::none_of(c.points.begin(), c.points.end(), [](const auto& q) { return q.force > 0; });
-  if (fresh) p.rounds = kFreshRounds;
+  if (fresh) p.tolerance = kSolved;
   p.renewal[lane] = fresh ? 1 : kRenewal;
 }
 
@@ -188,11 +238,9 @@ LaneVector friction_limits(const PatchBatch& p) {
 LaneVector coulomb_impulse(const PatchBatch& p, const LaneVector& u, const LaneVector& limits) {
   const LaneSymmetric& K = p.friction_mobility;
   const LaneVector& old = p.friction_impulse;
-  const Lanes inverse = lane_inverse(K.xx * K.yy - K.xy * K.xy),
-              shorter = lane_inverse(lane_max(K.xx, K.yy) + lane_abs(K.xy));
-  const Lanes stick_t = old.x - inverse * (K.yy * u.x - K.xy * u.y);
-  const Lanes stick_k = old.y - inverse * (K.xx * u.y - K.xy * u.x);
-  const Lanes slide_t = old.x - shorter * u.x, slide_k = old.y - shorter * u.y;
+  const Lanes stick_t = old.x - p.inverse_determinant * (K.yy * u.x - K.xy * u.y);
+  const Lanes stick_k = old.y - p.inverse_determinant * (K.xx * u.y - K.xy * u.x);
+  const Lanes slide_t = old.x - p.inverse_bound * u.x, slide_k = old.y - p.inverse_bound * u.y;
   const Lanes slide = lane_sqrt(slide_t * slide_t + slide_k * slide_k);
   const Lanes scale = slide > limits.x ? limits.x / slide : lanes(1);
   const auto round = p.friction_t == p.friction_k;
@@ -210,7 +258,7 @@ LaneVector solve_friction(PatchBatch& p, Groups& u) {
   const LaneSymmetric& K = p.friction_mobility;
   const Lanes spin =
       u.friction.z + K.xz * (next.x - p.friction_impulse.x) + K.yz * (next.y - p.friction_impulse.y);
-  next.z = lane_clamp(p.friction_impulse.z - lane_inverse(K.zz) * spin, limits.z);
+  next.z = lane_clamp(p.friction_impulse.z - p.inverse_spin * spin, limits.z);
   const LaneVector change = next - p.friction_impulse;
   p.friction_impulse = next;
   u.friction = u.friction + K * change;
@@ -263,6 +311,43 @@ Groups return_to_mean(PatchBatch& p) {
   return change;
 }
 
+bool is_below(Lanes x, Real limit) {
+  return _mm256_movemask_pd(_mm256_cmp_pd(x, lanes(limit), _CMP_GT_OQ)) == 0;
+}
+Lanes greatest(const LaneVector& v) {
+  return lane_max(lane_abs(v.x), lane_max(lane_abs(v.y), lane_abs(v.z)));
+}
+
+// Patches of one point, as those of round bodies: no moments.
+
+/// A velocity or impulse there, along n, t and k.
+using Single = LaneVector;
+
+Single in_frame(const PatchBatch& p, const LaneVector& v) {
+  return {dot(p.n, v), dot(p.t, v), dot(p.k, v)};
+}
+
+/// What solve_normal() and solve_friction() do. They return the change.
+Single solve_single_normal(PatchBatch& p, Single& u, Real closing) {
+  PatchBatch::Point& q = p.points[0];
+  const Lanes rate = u.x + closing * lane_max(q.separation, Lanes{});
+  const Lanes next = lane_max(q.impulse - q.mass * rate, Lanes{});
+  const Lanes d = next - q.impulse;
+  q.impulse = next;
+  u = u + d * Single{p.normal_mobility.xx, p.coupling.x.x, p.coupling.y.x};
+  return {d, Lanes{}, Lanes{}};
+}
+Single solve_single_friction(PatchBatch& p, Single& u) {
+  const Lanes& force = p.points[0].impulse;
+  const LaneVector next =
+      coulomb_impulse(p, {u.y, u.z, Lanes{}}, {p.friction_t * force, p.friction_k * force, Lanes{}});
+  const Lanes t = next.x - p.friction_impulse.x, k = next.y - p.friction_impulse.y;
+  p.friction_impulse = next;
+  const LaneSymmetric& K = p.friction_mobility;
+  u = u + Single{p.coupling.x.x * t + p.coupling.y.x * k, K.xx * t + K.xy * k, K.xy * t + K.yy * k};
+  return {Lanes{}, t, k};
+}
+
 void measure_separations(PatchBatch& p, std::span<const BodyMotion> motions) {
   const LaneTwist a = gather<&BodyMotion::shift>(motions, p.a), b = gather<&BodyMotion::shift>(motions, p.b);
   const LaneVector moved = relative(p, a, b).normal;
@@ -270,12 +355,39 @@ void measure_separations(PatchBatch& p, std::span<const BodyMotion> motions) {
     p.points[i].separation = p.points[i].start + point_part(p.points[i], moved);
 }
 
+void sweep_single(PatchBatch& p, std::span<BodyMotion> motions, Real closing) {
+  const LaneTwist moved_a = gather<&BodyMotion::shift>(motions, p.a),
+                  moved_b = gather<&BodyMotion::shift>(motions, p.b);
+  p.points[0].separation = p.points[0].start + dot(p.n, relative_velocity(p, moved_a, moved_b));
+  LaneTwist a = gather<&BodyMotion::velocity>(motions, p.a), b = gather<&BodyMotion::velocity>(motions, p.b);
+  Single u = in_frame(p, relative_velocity(p, a, b)) + p.offset;
+  const Single before = u;
+  Single change{};
+  const Real tolerance = std::exchange(p.tolerance, kSettled);
+  for (uint32_t i = 0; i < kRounds; ++i) {
+    const Single last = u;
+    change = change + solve_single_normal(p, u, closing);
+    change = change + solve_single_friction(p, u);
+    if (is_below(greatest(u - last), tolerance)) break;
+  }
+  change = change + solve_single_normal(p, u, closing);
+  p.residual = greatest(u - before);
+  const Groups back = return_to_mean(p);
+  change = change + Single{back.normal.x, back.friction.x, back.friction.y};
+  const LaneVector force = change.x * p.n + change.y * p.t + change.z * p.k;
+  a.linear = a.linear + p.inverse_mass_a * force;
+  a.angular = a.angular + p.inverse_inertia_a * cross(p.arm_a, force);
+  b.linear = b.linear - p.inverse_mass_b * force;
+  b.angular = b.angular - p.inverse_inertia_b * cross(p.arm_b, force);
+  scatter<&BodyMotion::velocity>(a, motions, p.a, p.moves_a);
+  scatter<&BodyMotion::velocity>(b, motions, p.b, p.moves_b);
+}
+
 }  // namespace
 
 void prepare(PatchBatch& p, std::array<uint32_t, 4> patches, std::span<const ContactPatch> all,
              std::span<const RelaxedBody> bodies, std::span<BodyMotion> motions, Real substep) {
-  p = PatchBatch{};
-  p.patch = patches;
+  clear(p, patches, all);
   p.a.fill(static_cast<uint32_t>(bodies.size()));
   p.b = p.a;
   for (int lane = 0; lane < 4; ++lane) {
@@ -297,10 +409,15 @@ void prepare(PatchBatch& p, std::array<uint32_t, 4> patches, std::span<const Con
   scatter<&BodyMotion::velocity>(b, motions, p.b, p.moves_b);
 }
 
+void begin_substep(PatchBatch& p) {
+  for (uint32_t i = 0; i < p.count; ++i) p.points[i].before += p.points[i].impulse;
+  p.friction_before = p.friction_before + p.friction_impulse;
+}
+
 // The friction sees the normal impulses of this sweep, and what it does to the normal velocities is made
-// good. A patch without a guess is solved to the end at first, or it would slip until the sweeps have found
-// one.
+// good.
 void sweep(PatchBatch& p, std::span<BodyMotion> motions, Real closing) {
+  if (p.count == 1) return sweep_single(p, motions, closing);
   measure_separations(p, motions);
   LaneTwist a = gather<&BodyMotion::velocity>(motions, p.a), b = gather<&BodyMotion::velocity>(motions, p.b);
   Groups u = relative(p, a, b);
@@ -309,9 +426,13 @@ void sweep(PatchBatch& p, std::span<BodyMotion> motions, Real closing) {
   u.friction.y += p.offset.z;
   const Groups before = u;
   Groups change{};
-  for (uint32_t i = std::exchange(p.rounds, 1); i > 0; --i) {
+  const Real tolerance = std::exchange(p.tolerance, kSettled);
+  for (uint32_t i = 0; i < kRounds; ++i) {
+    const Groups last = u;
     change.normal = change.normal + solve_normal(p, u, closing);
     change.friction = change.friction + solve_friction(p, u);
+    const Lanes moved = lane_max(greatest(u.normal - last.normal), greatest(u.friction - last.friction));
+    if (is_below(moved, tolerance)) break;
   }
   change.normal = change.normal + solve_normal(p, u, closing);
   const LaneVector f = u.friction - before.friction;
@@ -347,12 +468,15 @@ void report(const PatchBatch& p, std::span<ContactPatch> patches, Real substep) 
     for (uint32_t i = 0; i < c.count; ++i) {
       c.points[i].force = p.points[i].impulse[lane] / substep;
       c.points[i].mean_force = p.points[i].mean[lane] / substep;
+      c.points[i].impulse = p.points[i].before[lane] + p.points[i].impulse[lane];
     }
     c.force_t = p.friction_impulse.x[lane] / substep;
     c.force_k = p.friction_impulse.y[lane] / substep;
     c.torque_n = p.friction_impulse.z[lane] / substep;
     const LaneVector& mean = p.friction_mean;
     c.mean_friction = Vec3(mean.x[lane], mean.y[lane], mean.z[lane]) / substep;
+    const LaneVector sum = p.friction_before + p.friction_impulse;
+    c.friction_impulse = Vec3(sum.x[lane], sum.y[lane], sum.z[lane]);
   }
 }
 

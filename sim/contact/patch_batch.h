@@ -32,12 +32,13 @@ struct PatchBatch {
     Lanes mass;               ///< effective [kg], 0 in lanes that have no such point
     Lanes start, separation;  ///< at the start of the step; now [m]
     Lanes impulse, mean;      ///< of a sub-step, and over the time before [N s]
+    Lanes before;             ///< of the sub-steps before [N s]
   };
 
   std::array<uint32_t, 4> a, b, patch;  ///< the body beyond the last and kNone in lanes that are not used
   std::array<bool, 4> moves_a, moves_b;
-  uint32_t count;       ///< of points, in the lane that has most
-  uint32_t rounds = 1;  ///< of normal and friction impulses in the next sweep
+  uint32_t count;  ///< of points, in the lane that has most
+  Real tolerance;  ///< of the next sweep's rounds [m/s]
   LaneVector n, t, k, arm_a, arm_b;
   Lanes inverse_mass_a, inverse_mass_b;
   LaneSymmetric inverse_inertia_a, inverse_inertia_b;
@@ -45,9 +46,12 @@ struct PatchBatch {
   /// friction group by the normal group's wrench.
   LaneSymmetric normal_mobility, friction_mobility;
   LaneMatrix coupling;
+  /// Of the friction group: 1 / determinant of the part along t and k, 1 / a bound on its eigenvalues, and
+  /// 1 / that about n.
+  Lanes inverse_determinant, inverse_bound, inverse_spin;
   LaneVector offset;  ///< along n, t and k [m/s]
   Lanes friction_t, friction_k;
-  LaneVector friction_impulse, friction_mean;  ///< along t, k, about n, likewise
+  LaneVector friction_impulse, friction_mean, friction_before;  ///< along t, k, about n, likewise
   Lanes renewal;   ///< share of the difference that means follow their impulses by
   Lanes residual;  ///< by how much the last sweep changed the velocity of the centre [m/s]
   std::array<Point, 4> points;
@@ -57,6 +61,9 @@ struct PatchBatch {
 /// motions there is one more than bodies, for lanes that are not used.
 void prepare(PatchBatch& batch, std::array<uint32_t, 4> patches, std::span<const ContactPatch> all,
              std::span<const RelaxedBody> bodies, std::span<BodyMotion> motions, Real substep);
+
+/// A sub-step ends, and the next one begins with its impulses.
+void begin_substep(PatchBatch& batch);
 
 /// Solves each patch once, for velocities. Where a gap is open, the approach is limited to what closes it in
 /// 1 / `closing` [s].

@@ -1,7 +1,9 @@
 #include "sim/contact/relaxation.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <utility>
 
 #include "sim/contact/staged_loop.h"
 
@@ -13,6 +15,11 @@ constexpr Real kPushShare = 0.5, kMaxPush = 3;
 
 /// Below this a step is not worth a second thread.
 constexpr std::size_t kSerialBatches = 48;
+/// A sweep that changes the velocity of a patch by more than this strikes its bodies [m/s]: what else they
+/// touch gets another sweep before they move, or it would be pressed in; and so on, so many times at most.
+constexpr Real kBlow = 0.2;
+constexpr uint32_t kRepeats = 12;
+
 constexpr uint32_t kBatchesPerBlock = 8, kBodiesPerBlock = 128;
 
 Vec3 vector_of(Lanes x) {
@@ -29,19 +36,21 @@ bool jumps(const RelaxedBody& b, const Vec3& dv, const Vec3& dw, Real duration) 
 
 }  // namespace
 
-ContactPatch contact_patch(const Manifold& m, const Vec3& centre_a, const Vec3& centre_b) {
-  ContactPatch p{.frame = contact_frame(m.normal), .count = m.count};
-  if (m.count == 0) return p;
+void set_points(ContactPatch& p, const Manifold& m, const ContactFrame& frame, const Vec3& centre_a,
+                const Vec3& centre_b) {
+  p.frame = frame;
+  p.count = m.count;
+  if (m.count == 0) return;
   const auto middle = [&m](uint32_t i) { return Vec3((m.points[i].on_a + m.points[i].on_b) / 2); };
-  Vec3 centre = Vec3::Zero();
-  for (uint32_t i = 0; i < m.count; ++i) centre += middle(i) / m.count;
+  Vec3 centre = middle(0);
+  for (uint32_t i = 1; i < m.count; ++i) centre += middle(i);
+  centre /= m.count;
   p.arm_a = centre - centre_a;
   p.arm_b = centre - centre_b;
   for (uint32_t i = 0; i < m.count; ++i) {
     const Vec3 d = middle(i) - centre;
-    p.points[i] = {p.frame.t.dot(d), p.frame.k.dot(d), m.points[i].separation, 0};
+    p.points[i] = {.t = frame.t.dot(d), .k = frame.k.dot(d), .separation = m.points[i].separation};
   }
-  return p;
 }
 
 uint32_t relaxation_substeps(Real duration) {
@@ -65,7 +74,8 @@ void RelaxationSolver::plan(uint32_t substeps) {
   plan_colors(Stage::prepare);
   for (uint32_t i = 0; i < substeps; ++i) {
     if (i > 0) ranges_.push_back({Stage::extrapolate, 0, bodies, kBodiesPerBlock});
-    plan_colors(Stage::solve);
+    plan_colors(i > 0 ? Stage::solve_next : Stage::solve);
+    ranges_.push_back({Stage::repeat, 0, 1, 1});
     ranges_.push_back({Stage::advance, 0, bodies, kBodiesPerBlock});
   }
   // Contacts that closed in the last sub-step still have the velocity that closed them.
@@ -91,7 +101,14 @@ void RelaxationSolver::run(const Range& range, uint32_t block) {
     case Stage::extrapolate:
       return each([this](uint32_t i) { extrapolate(i); });
     case Stage::solve:
-      return each([this](uint32_t i) { sweep(batches_[i], motions_, 1 / substep_); });
+      return each([this](uint32_t i) { solve(i); });
+    case Stage::solve_next:
+      return each([this](uint32_t i) {
+        begin_substep(batches_[i]);
+        solve(i);
+      });
+    case Stage::repeat:
+      return repeat();
     case Stage::advance:
       return each([this](uint32_t i) { advance(i); });
     case Stage::push:
@@ -120,6 +137,36 @@ void RelaxationSolver::extrapolate(uint32_t i) {
   v.linear += now.linear - last_[i].linear;
   v.angular += now.angular - last_[i].angular;
   last_[i] = now;
+}
+
+void RelaxationSolver::solve(uint32_t i) {
+  PatchBatch& p = batches_[i];
+  sweep(p, motions_, 1 / substep_);
+  for (unsigned lane = 0; lane < 4; ++lane) {
+    if (!(p.residual[lane] > kBlow)) continue;
+    if (p.moves_a[lane]) struck_[p.a[lane]] = sweep_;
+    if (p.moves_b[lane]) struck_[p.b[lane]] = sweep_;
+    std::atomic_ref(strikes_).store(true, std::memory_order_relaxed);
+  }
+}
+
+bool RelaxationSolver::is_struck(uint32_t i, uint32_t since) const {
+  const PatchBatch& p = batches_[i];
+  for (unsigned lane = 0; lane < 4; ++lane)
+    if (struck_[p.a[lane]] >= since || struck_[p.b[lane]] >= since) return true;
+  return false;
+}
+
+void RelaxationSolver::repeat() {
+  for (uint32_t k = 0; k < kRepeats && std::exchange(strikes_, false); ++k) {
+    const uint32_t last = sweep_++;
+    const auto count = static_cast<uint32_t>(batches_.size());
+    for (uint32_t n = 0; n < count; ++n) {
+      const uint32_t i = k % 2 == 0 ? count - 1 - n : n;  // there and back: the blow goes both ways
+      if (is_struck(i, last)) solve(i);
+    }
+  }
+  ++sweep_;
 }
 
 void RelaxationSolver::advance(uint32_t i) {
@@ -155,6 +202,9 @@ void RelaxationSolver::set_up() {
   motions_.resize(bodies_.size() + 1);
   motions_.back() = {};
   last_.resize(bodies_.size());
+  sweep_ = 1;
+  struck_.assign(bodies_.size() + 1, 0);
+  strikes_ = false;
 }
 
 ContactWork RelaxationSolver::solve(std::span<RelaxedBody> bodies, std::span<ContactPatch> patches,

@@ -51,6 +51,7 @@ struct ContactPatch {
     Real separation = 0;  ///< at the start of the step, negative in penetration [m]
     Real force = 0;       ///< normal [N]; in: a guess, that of the last step; out: at the end of this one
     Real mean_force = 0;  ///< over the time before [N]; in and out likewise
+    Real impulse = 0;     ///< out: of the whole step [N s]
   };
   uint32_t a = 0, b = 0;                            ///< indices of bodies; not both unmoved
   ContactFrame frame;                               ///< n from b to a
@@ -62,12 +63,14 @@ struct ContactPatch {
   std::array<Point, 4> points;
   /// Of all points together: tangential [N] and about the normal [N m]; in and out like Point::force.
   Real force_t = 0, force_k = 0, torque_n = 0;
-  Vec3 mean_friction = Vec3::Zero();  ///< the mean of these, like Point::mean_force
+  Vec3 mean_friction = Vec3::Zero();     ///< the mean of these, like Point::mean_force
+  Vec3 friction_impulse = Vec3::Zero();  ///< likewise, like Point::impulse
 };
 
-/// The patch of a manifold that is given in world axes, of bodies with these centres of mass, without
-/// friction and forces. Its points are in the manifold's order.
-ContactPatch contact_patch(const Manifold& m, const Vec3& centre_a, const Vec3& centre_b);
+/// Gives a patch the points of a manifold, which is in world axes like the frame, whose n is its normal; the
+/// bodies have these centres of mass. The points stay in the manifold's order.
+void set_points(ContactPatch& patch, const Manifold& m, const ContactFrame& frame, const Vec3& centre_a,
+                const Vec3& centre_b);
 
 /// As many sub-steps as make them 1/1920 s or shorter; at least four. Each costs one sweep over the patches.
 uint32_t relaxation_substeps(Real duration);
@@ -86,7 +89,18 @@ class RelaxationSolver {
   ContactWork solve(std::span<RelaxedBody> bodies, std::span<ContactPatch> patches, const RelaxationDef& def);
 
  private:
-  enum class Stage : uint8_t { start, prepare, extrapolate, solve, advance, push, finish, report };
+  enum class Stage : uint8_t {
+    start,
+    prepare,
+    extrapolate,
+    solve,
+    solve_next,  // in another sub-step
+    repeat,
+    advance,
+    push,
+    finish,
+    report
+  };
   /// Blocks of a stage may run in any order and at the same time.
   struct Range {
     Stage stage;
@@ -101,6 +115,9 @@ class RelaxationSolver {
   void run(const Range& range, uint32_t block);
   void start(uint32_t body);
   void extrapolate(uint32_t body);
+  void solve(uint32_t batch);
+  bool is_struck(uint32_t batch, uint32_t since) const;
+  void repeat();
   void advance(uint32_t body);
   void finish(uint32_t body);
 
@@ -114,6 +131,10 @@ class RelaxationSolver {
   std::vector<BodyMotion> motions_;  // one more than bodies: of unused lanes
   std::vector<BodyTwist> last_;      // of the sub-step before
   std::vector<Range> ranges_;
+  // Sweeps are numbered; those that strike a body leave their number with it.
+  uint32_t sweep_ = 0;
+  std::vector<uint32_t> struck_;
+  bool strikes_ = false;  // some body, in the last sweep
 };
 
 }  // namespace offstage::sim

@@ -105,7 +105,7 @@ TEST(SpringGraph, ConnectsThroughParticleSystemsButNotThroughTheWorld) {
   for (uint64_t i = 0; i < 6; ++i) b.push_back(sky.add(i));
   const ParticleSystemHandle beads = sky.world.systems.insert({});
   sky.world.systems[beads].add({}, -1);
-  sky.world.bodies[b[5]]->frozen = true;
+  sky.world.bodies[b[5]]->type = MotionType::fixed;
   sky.join(BodyPoint{b[3]}, BodyPoint{b[1]});
   sky.join(ParticlePoint{beads, 0}, BodyPoint{b[3]});
   sky.join(ParticlePoint{beads, 0}, BodyPoint{b[0]});

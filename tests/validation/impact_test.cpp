@@ -203,8 +203,8 @@ TEST_P(Cradle, SequentialImpactsPassOnAsManyBallsAsCameIn) {
 // All at once, contacts at rest only must not close: the row of four leaves with one speed.
 TEST_P(Cradle, SimultaneousImpactsSendTheRowOffAsOne) {
   const std::vector<Real> v = speeds(1, ImpactLaw::simultaneous);
-  EXPECT_NEAR(v[0], -0.6, 1e-9);
-  for (std::size_t i = 1; i < 5; ++i) EXPECT_NEAR(v[i], 0.4, 1e-9);
+  EXPECT_NEAR(v[0], -0.6, 1e-8);
+  for (std::size_t i = 1; i < 5; ++i) EXPECT_NEAR(v[i], 0.4, 1e-8);
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, Cradle);
 

@@ -17,6 +17,12 @@ std::vector<Convex> solids(Real size) {
           convex(Box{{size, 0.6 * size, 1.7 * size}})};
 }
 
+Manifold found(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin) {
+  Manifold m;
+  sphere_manifold(a, b, a_from_b, margin, m);
+  return m;
+}
+
 TEST(SphereManifold, IsTheSeparationByGjk) {
   Dice dice(3);
   int contacts = 0;
@@ -28,7 +34,7 @@ TEST(SphereManifold, IsTheSeparationByGjk) {
     const Pose pose{1.5 * size * dice.in_cube(), dice.chance(0.2) ? Quat::Identity() : dice.rotation()};
     GjkCache fresh;
     const Separation s = gjk(other, ball, pose, fresh);
-    const Manifold m = sphere_manifold(other, ball, pose, margin);
+    const Manifold m = found(other, ball, pose, margin);
     SCOPED_TRACE(k);
     ASSERT_EQ(m.count, s.distance <= margin ? 1u : 0u);
     if (m.count == 0) continue;
@@ -39,7 +45,7 @@ TEST(SphereManifold, IsTheSeparationByGjk) {
     ASSERT_LT((p.on_a - s.on_a).norm() + (p.on_b - s.on_b).norm(), 1e-6 * size);
     ASSERT_LT((p.on_a - p.on_b - p.separation * m.normal).norm(), 1e-14 * size);
     // The same seen from the ball.
-    const Manifold seen = sphere_manifold(ball, other, inverse(pose), margin);
+    const Manifold seen = found(ball, other, inverse(pose), margin);
     ASSERT_EQ(seen.count, 1u);
     ASSERT_NEAR(seen.points[0].separation, p.separation, 1e-13 * size);
     ASSERT_LT((pose.vector_to_world(seen.normal) + m.normal).norm(), 1e-9);
@@ -51,7 +57,7 @@ TEST(SphereManifold, IsTheSeparationByGjk) {
 TEST(SphereManifold, TheNormalComesFromTheClosestFeature) {
   const Convex box = convex(Box{{2, 2, 2}}), capsule = convex(Capsule{0.25, 1}), ball = convex(Sphere{0.5});
   const auto of = [&](const Convex& a, const Vec3& at) {
-    return sphere_manifold(a, ball, {at, Quat::Identity()}, 0.1);
+    return found(a, ball, {at, Quat::Identity()}, 0.1);
   };
   const Manifold face = of(box, {0.3, 1.5, 0.2}), edge = of(box, {1.3, 1.4, 0.2}),
                  vertex = of(box, {1.2, 1.2, 1.2}), inside = of(box, {0.9, 0.3, 0.2}),
@@ -78,7 +84,7 @@ TEST(SphereManifold, TheNormalComesFromTheClosestFeature) {
 TEST(SphereManifold, CoincidentCentresHaveANormal) {
   const Convex ball = convex(Sphere{0.5});
   for (const Convex& other : solids(1)) {
-    const Manifold m = sphere_manifold(other, ball, {}, 0.1);
+    const Manifold m = found(other, ball, {}, 0.1);
     ASSERT_EQ(m.count, 1u);
     EXPECT_EQ(m.normal.norm(), 1);
     EXPECT_TRUE(m.points[0].on_a.allFinite() && m.points[0].on_b.allFinite());

@@ -13,7 +13,7 @@ namespace {
 std::unique_ptr<Body> make_body(const Shape& shape, MotionType motion, const Pose& pose) {
   auto body = std::make_unique<Body>();
   body->def.shape = shape;
-  body->def.motion = motion;
+  body->def.motion = body->type = motion;
   body->solid.shape = &body->def.shape;
   body->pose = body->start_pose = pose;
   body->extent =
@@ -36,14 +36,15 @@ struct BoxOnGround {
         pair(*box, *ground, surface) {}
 
   PlacedManifold& find(const Pose& pose, Real reuse = 1e-5) {
-    pair.find(pose, Pose{}, 1e-3, reuse);
+    pair.find(pose, Pose{}, 1e-3, reuse, false);
     EXPECT_EQ(pair.manifolds().size(), 1u);
     return pair.manifolds().front();
   }
 };
 
 Vec3 world_force(const PlacedManifold& m, uint32_t k) {
-  return m.force[k].x() * m.frame.n + m.force[k].y() * m.frame.t + m.force[k].z() * m.frame.k;
+  return m.forces[k].last.x() * m.frame.n + m.forces[k].last.y() * m.frame.t +
+         m.forces[k].last.z() * m.frame.k;
 }
 
 TEST(ContactPair, FindsTheFourCornersOfABoxOnTheGround) {
@@ -55,11 +56,11 @@ TEST(ContactPair, FindsTheFourCornersOfABoxOnTheGround) {
   EXPECT_NEAR((m.frame.n - Vec3::UnitY()).norm(), 0, 1e-12);
   for (uint32_t k = 0; k < 4; ++k) {
     EXPECT_NEAR(m.manifold.points[k].separation, 4e-4, 1e-12);
-    EXPECT_FALSE(m.known[k]);
-    EXPECT_EQ(m.force[k], Vec3::Zero());
+    EXPECT_FALSE(m.forces[k].known);
+    EXPECT_EQ(m.forces[k].now, Vec3::Zero());
   }
   EXPECT_NEAR(scene.pair.separation(), 4e-4, 1e-12);
-  scene.pair.find({Vec3(3, 0.2, -2)}, Pose{}, 1e-3, 1e-5);
+  scene.pair.find({Vec3(3, 0.2, -2)}, Pose{}, 1e-3, 1e-5, false);
   EXPECT_TRUE(scene.pair.manifolds().empty());
   EXPECT_EQ(scene.pair.separation(), std::numeric_limits<Real>::infinity());
 }
@@ -71,7 +72,7 @@ TEST(ContactPair, TakesPointsOverWithNewDistances) {
   const PlacedManifold& m = scene.find({Vec3(0, 0.1 - 4e-6, 0)});
   ASSERT_EQ(m.manifold.count, 4u);
   for (uint32_t k = 0; k < 4; ++k) {
-    EXPECT_TRUE(m.known[k]);
+    EXPECT_TRUE(m.forces[k].known);
     EXPECT_NEAR(m.manifold.points[k].separation, -4e-6, 1e-12);
   }
 }
@@ -83,7 +84,7 @@ TEST(ContactPair, ForcesStayWithTheirPoints) {
     PlacedManifold& before = scene.find({Vec3(0, 0.1, 0)}, reuse);
     std::array<Vec3, 4> corner, force;
     for (uint32_t k = 0; k < 4; ++k) {
-      before.force[k] = {1.0 + k, 0.1 * k, -0.2};
+      before.forces[k].last = {1.0 + k, 0.1 * k, -0.2};
       corner[k] = before.manifold.points[k].on_a - Vec3(0, 0.1, 0);
       force[k] = world_force(before, k);
     }
@@ -97,7 +98,7 @@ TEST(ContactPair, ForcesStayWithTheirPoints) {
       for (std::size_t j = 0; j < 4; ++j) {
         if ((corner[j] - local).norm() > 5e-3) continue;
         found = true;
-        EXPECT_TRUE(after.known[k]);
+        EXPECT_TRUE(after.forces[k].known);
         EXPECT_LT((world_force(after, k) - turn * force[j]).norm(), 1e-12);
       }
       EXPECT_TRUE(found);
@@ -108,26 +109,27 @@ TEST(ContactPair, ForcesStayWithTheirPoints) {
 TEST(ContactPair, ForcesOfPointsThatAreGoneAreForgotten) {
   BoxOnGround scene;
   PlacedManifold& m = scene.find({Vec3(0, 0.1, 0)});
-  for (uint32_t k = 0; k < 4; ++k) m.force[k] = Vec3::UnitX();
-  scene.pair.clear();
-  EXPECT_TRUE(scene.pair.is_new());
+  for (uint32_t k = 0; k < 4; ++k) m.forces[k].last = Vec3::UnitX();
+  scene.pair.find({Vec3(0, 0.2, 0)}, Pose{}, 1e-3, 1e-5, false);
+  EXPECT_TRUE(scene.pair.manifolds().empty());
   const PlacedManifold& again = scene.find({Vec3(0, 0.1, 0)});
-  for (uint32_t k = 0; k < 4; ++k) EXPECT_FALSE(again.known[k]);
+  for (uint32_t k = 0; k < 4; ++k) EXPECT_FALSE(again.forces[k].known);
 }
 
 TEST(ContactPair, TheGrainDecidesTheTangents) {
-  BoxOnGround plain;
-  PairSurface surface;
-  surface.cross = 2;
-  surface.grain = plain.ground.get();
-  plain.ground->def.friction_axis = {1, 5, 1};  // only what lies in the surface counts
-  plain.pair.set_surface(surface);
-  const PlacedManifold& m = plain.find({Vec3(0, 0.1, 0)});
+  BoxOnGround scene;
+  scene.ground->def.friction_axis = {1, 5, 1};  // only what lies in the surface counts
+  ContactPair pair(*scene.box, *scene.ground, {.cross = 2, .grain = scene.ground.get()});
+  const auto find = [&](const Vec3& at) {
+    pair.find({at}, Pose{}, 1e-3, 1e-5, false);
+    return pair.manifolds().at(0);
+  };
+  const PlacedManifold m = find({0, 0.1, 0});
   EXPECT_NEAR((m.frame.t - Vec3(1, 0, 1).normalized()).norm(), 0, 1e-12);
   EXPECT_NEAR((m.frame.k - m.frame.n.cross(m.frame.t)).norm(), 0, 1e-12);
   // Upright to the surface it names no direction: any tangents do.
-  plain.ground->def.friction_axis = {0, 1, 0};
-  const PlacedManifold& any = plain.find({Vec3(0.1, 0.1, 0)});
+  scene.ground->def.friction_axis = {0, 1, 0};
+  const PlacedManifold any = find({0.1, 0.1, 0});
   EXPECT_NEAR(any.frame.t.norm(), 1, 1e-12);
   EXPECT_NEAR(any.frame.t.dot(any.frame.n), 0, 1e-12);
 }
