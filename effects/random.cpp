@@ -14,7 +14,7 @@ uint64_t mix(uint64_t x) {
 }
 
 uint64_t random_bits(uint64_t seed, uint64_t stream, uint64_t index, uint32_t property) {
-  const uint64_t key = mix(seed ^ mix(stream + 0x9e3779b97f4a7c15u));
+  const uint64_t key = combined(seed, stream);
   const auto low = [](uint64_t x) { return static_cast<uint32_t>(x); };
   const auto high = [](uint64_t x) { return static_cast<uint32_t>(x >> 32); };
   const auto words = philox({low(index), high(index), property, 0}, {low(key), high(key)});
@@ -64,6 +64,10 @@ uint64_t stream_id(std::string_view name) {
   uint64_t hash = 0xcbf29ce484222325u;
   for (char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
   return hash;
+}
+
+uint64_t combined(uint64_t a, uint64_t b) {
+  return mix(a ^ mix(b + 0x9e3779b97f4a7c15u));
 }
 
 Real RandomStream::uniform(uint64_t index, uint32_t property) const {

@@ -21,6 +21,9 @@ std::array<uint32_t, 4> philox(std::array<uint32_t, 4> counter, std::array<uint3
 /// Stable 64-bit name of a stream, from an object's name (FNV-1a).
 uint64_t stream_id(std::string_view name);
 
+/// One well-mixed number from two: the index of what has two of them, such as the child of a particle.
+uint64_t combined(uint64_t a, uint64_t b);
+
 /// The random numbers of one object's stream: pure functions of (index, property).
 class RandomStream {
  public:

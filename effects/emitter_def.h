@@ -1,0 +1,56 @@
+#pragma once
+/// What an emitter releases, from where and when (physics F1, F2): every number a distribution.
+
+#include <string>
+#include <vector>
+
+#include "effects/distribution.h"
+#include "effects/emitter_surface.h"
+#include "sim/world.h"
+
+namespace offstage::effects {
+
+/// `count` particles at once at `time`, `cycles` times, `interval` apart.
+struct Burst {
+  Real time = 0;         ///< [s]
+  Varying count = 10.0;  ///< rounded, >= 0
+  int cycles = 1;        ///< >= 1
+  Real interval = 1;     ///< [s], > 0
+};
+
+/// From `start` up to, and without, `end` [s].
+struct TimeWindow {
+  Real start = 0, end = 1e30;
+};
+
+/// Times are on the emitter's clock, which shows 0 at the `origin` given to the Emitter.
+struct EmitterDef {
+  std::string name;  ///< also names its random stream
+  uint64_t seed = 1;
+  EmitterSurface surface;
+  sim::BodyHandle body;  ///< null: fixed in the world; else moves with the body and adds its velocity
+  /// Places are drawn anywhere on the surface and nothing waits for room: for particles that do not collide
+  /// with each other.
+  bool overlap = false;
+  Varying rate = 100.0;    ///< particles per second, released one by one; 0: only `count` and bursts
+  Varying count = 0.0;     ///< particles per release, rounded; 0: no periodic release
+  Varying interval = 0.1;  ///< between releases [s], > 0
+  std::vector<Burst> bursts;
+  Real start = 0;                   ///< of `rate` and `count` [s]
+  Real end = 1e30;                  ///< of everything [s]; the living live on
+  std::vector<TimeWindow> windows;  ///< when `rate` and `count` release; none: always
+  Real prewarm = 0;                 ///< how long before `start` they have begun already [s], >= 0
+  Vec3 direction = Vec3::Zero();    ///< in the body's frame, or the world's; zero: the surface's normal
+  Varying speed = 1.0;              ///< along the direction [m/s]
+  Varying spread_deg = 0.0;         ///< angle from the direction [degrees]; azimuth uniform
+  Varying radius = 0.01;            ///< [m], > 0
+  Varying density = 1000.0;         ///< [kg/m^3]; gives the mass unless `mass` is set
+  Varying mass = 0.0;               ///< [kg]; 0: from density and radius
+  Varying lifespan = 5.0;           ///< [s], > 0
+  Varying restitution = 0.3;        ///< in [0, 1]
+  Varying friction = 0.5;           ///< >= 0
+  Varying charge = 0.0;             ///< [C]
+  uint64_t max_alive = 1'000'000;   ///< particles over this are not released, and counted
+};
+
+}  // namespace offstage::effects

@@ -1,0 +1,48 @@
+#pragma once
+/// When an emitter releases how many particles. The times depend on its own clock alone, so they are the same
+/// at any frame rate.
+
+#include <algorithm>
+#include <vector>
+
+#include "effects/emitter_def.h"
+
+namespace offstage::effects {
+
+/// Particles that are due together.
+struct Release {
+  Real time;
+  uint64_t count;
+  bool waited = false;  ///< for room on the surface
+};
+
+class Schedule {
+ public:
+  /// `origin`: the time at which the emitter's clock shows 0.
+  Schedule(const EmitterDef& def, Real origin);
+
+  /// Appends what has become due up to `end`, each kind in order of time.
+  void collect(Real end, std::vector<Release>& due);
+  /// Nothing is due after this time.
+  void stop(Real time) { end_ = std::min(end_, time); }
+
+ private:
+  void collect_singles(Real end, std::vector<Release>& due);
+  void collect_periodic(Real end, std::vector<Release>& due);
+  void collect_bursts(Real end, std::vector<Release>& due);
+  Real next_birth(Real last);
+  Real draw(const Varying& v, uint64_t number, uint32_t property, Real time) const;
+  bool open(Real time) const;
+
+  // Times in here are on the world's clock, those of the definitions on the emitter's.
+  Varying rate_, count_, interval_;
+  std::vector<Burst> bursts_;
+  std::vector<TimeWindow> windows_;
+  RandomStream random_;
+  Real origin_, start_, end_;
+  Real next_single_, next_periodic_;  // times of the next particle of `rate`, the next release of `count`
+  uint64_t singles_ = 0, periodic_ = 0, rate_window_ = 0;
+  std::vector<uint64_t> burst_cycles_;  // already released, per burst
+};
+
+}  // namespace offstage::effects

@@ -1,0 +1,49 @@
+#include "effects/spacing.h"
+
+#include <algorithm>
+#include <bit>
+
+namespace offstage::effects {
+namespace {
+
+constexpr uint32_t kNone = 0xffffffff;
+/// Keeps the table's size within reason; longer chains are slower, not wrong.
+constexpr uint64_t kMaxBuckets = uint64_t{1} << 24;
+
+using Cell = Eigen::Matrix<int64_t, 3, 1>;
+
+}  // namespace
+
+void Spacing::reset(uint64_t count, Real diameter) {
+  edge_ = diameter;
+  buckets_.assign(std::bit_ceil(std::min(count + 1, kMaxBuckets)), kNone);
+  balls_.clear();
+}
+
+uint32_t& Spacing::bucket(const Cell& cell) {
+  const auto key = [&](int axis) { return static_cast<uint64_t>(cell[axis]); };
+  return buckets_[combined(combined(key(0), key(1)), key(2)) & (buckets_.size() - 1)];
+}
+
+/// Balls of other cells may share the bucket; they are looked at for nothing.
+bool Spacing::is_clear(const Cell& cell, const Vec3& centre, Real radius) {
+  for (uint32_t i = bucket(cell); i != kNone; i = balls_[i].next) {
+    const Real reach = radius + balls_[i].radius;
+    if ((balls_[i].centre - centre).squaredNorm() < reach * reach) return false;
+  }
+  return true;
+}
+
+bool Spacing::add(const Vec3& centre, Real radius) {
+  const Cell middle = (centre / edge_).array().floor().cast<int64_t>();
+  for (int64_t x = -1; x <= 1; ++x)
+    for (int64_t y = -1; y <= 1; ++y)
+      for (int64_t z = -1; z <= 1; ++z)
+        if (!is_clear(middle + Cell(x, y, z), centre, radius)) return false;
+  uint32_t& head = bucket(middle);
+  balls_.push_back({centre, radius, head});
+  head = static_cast<uint32_t>(balls_.size() - 1);
+  return true;
+}
+
+}  // namespace offstage::effects

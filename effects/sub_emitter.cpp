@@ -1,0 +1,107 @@
+#include "effects/sub_emitter.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "effects/emitter_surface.h"
+#include "effects/limits.h"
+#include "effects/newborn.h"
+
+namespace offstage::effects {
+namespace {
+
+const SubEmitterDef& checked(const SubEmitterDef& def) {
+  const std::string owner = "sub-emitter \"" + def.name + "\"";
+  check(owner, "count", def.count, kCounts);
+  check(owner, "velocity_percent", def.velocity_percent, kAnyNumber);
+  check_particle(owner, def);
+  if (!(def.age >= 0)) throw std::invalid_argument(owner + ": age must be >= 0");
+  if (!(def.probability >= 0 && def.probability <= 1))
+    throw std::invalid_argument(owner + ": probability is outside 0 to 1");
+  return def;
+}
+
+}  // namespace
+
+SubEmitter::SubEmitter(const SubEmitterDef& def, sim::ParticleSystemHandle parents,
+                       sim::ParticleSystemHandle target)
+    : def_(checked(def)), parents_(parents), target_(target), random_(def.seed, stream_id(def.name)) {}
+
+void SubEmitter::emit(sim::World& world, Real start, Real end) {
+  born_ = 0;
+  if (def_.trigger == Trigger::age)
+    answer_ages(world, start, end);
+  else
+    answer_events(world, start, end);
+}
+
+void SubEmitter::answer_events(sim::World& world, Real start, Real end) {
+  using Kind = sim::ParticleEvent::Kind;
+  const Kind kind = def_.trigger == Trigger::death ? Kind::death : Kind::collision;
+  for (const sim::ParticleEvent& event : world.particle_events())
+    if (event.kind == kind && event.system == parents_) answer(world, event, start, end);
+}
+
+void SubEmitter::answer_ages(sim::World& world, Real start, Real end) {
+  // What is added to the parents' own system comes after those there are now.
+  const std::size_t count = world.particles(parents_).size();
+  const std::vector<std::size_t>& fresh = newcomers_.find(world.particles(parents_));
+  auto next = fresh.begin();
+  for (std::size_t i = 0; i < count; ++i) {
+    const sim::ParticleArrays& p = world.particles(parents_);
+    const bool is_new = next != fresh.end() && *next == i;
+    next += is_new;
+    const Real age = p.age[i];
+    const bool reached = age > 0 && (age < def_.age || is_new) && def_.age <= age + (end - start);
+    if (!reached || def_.age >= p.lifespan[i]) continue;
+    const Real time = start + (def_.age - age);
+    const Parent parent = parent_at(world, parents_, i, time);
+    answer(world,
+           {.system = parents_,
+            .id = parent.id,
+            .time = time,
+            .position = parent.position,
+            .velocity = parent.velocity,
+            .mass = parent.mass,
+            .radius = parent.radius,
+            .age = parent.age},
+           start, end);
+  }
+}
+
+void SubEmitter::answer(sim::World& world, const sim::ParticleEvent& event, Real start, Real end) {
+  if (event.velocity.norm() < def_.min_speed) return;
+  // An age is reached once; its time is rounded in other ways at another frame rate.
+  const uint64_t occasion = def_.trigger == Trigger::age ? 0 : std::bit_cast<uint64_t>(event.time);
+  const uint64_t index = combined(event.id, occasion);
+  const Draws draw(random_, index, event.time);
+  if (draw.uniform(kChance) > def_.probability) return;
+
+  const uint64_t count = rounded(draw(def_.count, kCount)), alive = world.particles(target_).size();
+  const uint64_t allowed = std::min({count, def_.max_alive > alive ? def_.max_alive - alive : 0,
+                                     def_.max_per_step - std::min(born_, def_.max_per_step)});
+  for (uint64_t k = 0; k < allowed; ++k) {
+    const Draws own(random_, combined(index, k + 1), event.time);
+    report_.released += add_newborn(world, target_, answer_to(event, own), event.time, start, end);
+  }
+  born_ += allowed;
+  report_.skipped += count - allowed;
+  ++report_.answered;
+}
+
+sim::Particle SubEmitter::answer_to(const sim::ParticleEvent& event, const Draws& draw) const {
+  sim::Particle particle = drawn_particle(def_, draw);
+  const bool hit = !event.normal.isZero(0);
+  const Real speed = event.velocity.norm();
+  const Vec3 axis = hit && def_.axis == Axis::normal ? event.normal
+                    : speed > 0                      ? Vec3(event.velocity / speed)
+                                                     : Vec3(Vec3::UnitY());
+  // It touches what its parent touched.
+  particle.position = event.position + (particle.radius - event.radius) * event.normal;
+  particle.velocity = draw(def_.velocity_percent, kPercent) / 100 * event.velocity +
+                      draw(def_.speed, kSpeed) * Cone{axis, perpendicular(axis)}.drawn(def_.spread_deg, draw);
+  return particle;
+}
+
+}  // namespace offstage::effects

@@ -1,0 +1,80 @@
+#include "effects/trail.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "effects/emitter_surface.h"
+#include "effects/limits.h"
+#include "effects/newborn.h"
+
+namespace offstage::effects {
+namespace {
+
+const TrailDef& checked(const TrailDef& def) {
+  const std::string owner = "trail \"" + def.name + "\"";
+  check(owner, "rate", def.rate, kRates);
+  check(owner, "velocity_percent", def.velocity_percent, kAnyNumber);
+  check_particle(owner, def);
+  if (std::holds_alternative<Curve>(def.rate))
+    throw std::invalid_argument(owner + ": rate must not be a curve");
+  if (!(def.start_age >= 0)) throw std::invalid_argument(owner + ": start_age must be >= 0");
+  return def;
+}
+
+}  // namespace
+
+Trail::Trail(const TrailDef& def, sim::ParticleSystemHandle parents, sim::ParticleSystemHandle target)
+    : def_(checked(def)), parents_(parents), target_(target), random_(def.seed, stream_id(def.name)) {
+  if (parents && parents == target)
+    throw std::invalid_argument("trail \"" + def.name + "\": a trail of trails would never end");
+}
+
+void Trail::emit(sim::World& world, Real start, Real end) {
+  const sim::ParticleArrays& p = world.particles(parents_);
+  const std::vector<std::size_t>& fresh = newcomers_.find(p);
+  auto next = fresh.begin();
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    const bool is_new = next != fresh.end() && *next == i;
+    next += is_new;
+    // A newborn's time of birth shows when it has been stepped; then it catches up.
+    if (p.age[i] > 0) leave(world, i, is_new, start, end);
+  }
+}
+
+/// What particle i leaves behind in the sub-step, and if it is new, what it has left since its birth.
+void Trail::leave(sim::World& world, std::size_t i, bool is_new, Real start, Real end) {
+  const sim::ParticleArrays& p = world.particles(parents_);
+  const Draws draw(random_, p.id[i], start);
+  const Real rate = std::min(kMaxRate, draw(def_.rate, kRate)), phase = draw.uniform(kChance);
+  if (!(rate > 0)) return;
+  const Real age = p.age[i], last_age = std::min(def_.end_age, p.lifespan[i]);
+  // Particle k is left at the age start_age + (k + phase) / rate.
+  const auto left_by_age = [&](Real a) {
+    return static_cast<uint64_t>(
+        std::max(0.0, std::floor((std::min(a, last_age) - def_.start_age) * rate - phase) + 1));
+  };
+  const uint64_t first = is_new ? 0 : left_by_age(age), last = left_by_age(age + (end - start));
+  for (uint64_t k = first; k < last; ++k) {
+    if (world.particles(target_).size() >= def_.max_alive) {
+      report_.skipped += last - k;
+      return;
+    }
+    const Real time = start + (def_.start_age + (static_cast<Real>(k) + phase) / rate - age);
+    const Draws own(random_, combined(p.id[i], k + 1), time);
+    report_.released +=
+        add_newborn(world, target_, left_by(parent_at(world, parents_, i, time), own), time, start, end);
+  }
+}
+
+sim::Particle Trail::left_by(const Parent& parent, const Draws& draw) const {
+  sim::Particle particle = drawn_particle(def_, draw);
+  const Real speed = parent.velocity.norm();
+  const Vec3 backwards = speed > 0 ? Vec3(-parent.velocity / speed) : Vec3(Vec3::UnitY());
+  particle.position = parent.position;
+  particle.velocity =
+      draw(def_.velocity_percent, kPercent) / 100 * parent.velocity +
+      draw(def_.speed, kSpeed) * Cone{backwards, perpendicular(backwards)}.drawn(def_.spread_deg, draw);
+  return particle;
+}
+
+}  // namespace offstage::effects

@@ -1,0 +1,162 @@
+#include "effects/worst_case.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "effects/limits.h"
+#include "effects/newborn.h"
+
+namespace offstage::effects {
+namespace {
+
+/// Whole numbers up to this are exact, and more are as good as no bound.
+constexpr Real kSaturated = 0x1p53;
+/// Times nothing it is nothing.
+constexpr Real kHuge = 1e300;
+constexpr Real kEver = std::numeric_limits<Real>::infinity();
+
+uint64_t saturated(Real x) {
+  return x < kSaturated ? static_cast<uint64_t>(std::max(0.0, x)) : std::numeric_limits<uint64_t>::max();
+}
+
+Real most(const Varying& count) {
+  return static_cast<Real>(rounded(upper_bound(count)));
+}
+
+// Quotients that are meant to be whole are.
+Real up(Real x) {
+  return std::ceil(x * (1 - 1e-12));
+}
+Real down(Real x) {
+  return std::floor(x * (1 + 1e-12));
+}
+
+Real highest_rate(const Varying& rate) {
+  return std::clamp(upper_bound(rate), 0.0, kMaxRate);
+}
+
+/// Released between start and end, and within a time `window`, ends included: an age that is a sum of
+/// sub-steps may fall short of a lifespan by rounding.
+Real most_released(const EmitterDef& def, Real start, Real end, Real window) {
+  const Real rate = highest_rate(def.rate), interval = lower_bound(def.interval), length = end - start;
+  Real sum = 0;
+  if (length >= 0)
+    sum += (rate > 0 ? std::min(down(rate * window) + 1, down(rate * length)) : 0) +
+           most(def.count) * (std::min(down(window / interval), down(length / interval)) + 1);
+  for (const Burst& b : def.bursts) {
+    if (b.time > end) continue;
+    const Real in_run = std::min<Real>(b.cycles, down((end - b.time) / b.interval) + 1);
+    sum += most(b.count) * std::min(in_run, down(window / b.interval) + 1);
+  }
+  return sum;
+}
+
+Real largest_release(const EmitterDef& def) {
+  Real count = std::max(1.0, most(def.count));
+  for (const Burst& b : def.bursts) count = std::max(count, most(b.count));
+  return count;
+}
+
+/// Whether a release may not find room. On a mesh it is hard to tell, so it may.
+bool can_wait(const EmitterDef& def) {
+  if (def.overlap) return false;
+  const ReleaseSurface surface(def.surface);
+  const Real radius = upper_bound(def.radius), count = largest_release(def);
+  if (count <= 1) return false;
+  return !surface.has_cells() || std::isinf(radius) ||
+         count > static_cast<Real>(surface.cells(2 * radius).count());
+}
+
+/// A particle with `left` splits left, of which its own life has time for `own`, and all that come from it.
+/// Children live long enough for `each` splits.
+Real family(Real children, int left, int own, int each) {
+  // By splits left, of a child at the start of its life: the particles of shorter depth are known first.
+  std::vector<std::vector<Real>> size(static_cast<std::size_t>(left) + 1);
+  const int most_own = std::min(left, std::max(own, each));
+  for (int d = 0; d <= left; ++d) {
+    auto& row = size[static_cast<std::size_t>(d)];
+    row.assign(static_cast<std::size_t>(most_own) + 1, 1.0);
+    if (d == 0) continue;
+    const auto& before = size[static_cast<std::size_t>(d) - 1];
+    for (std::size_t j = 1; j < row.size(); ++j)
+      row[j] = std::min(
+          kHuge, before[j - 1] + children * before[static_cast<std::size_t>(std::min(each, most_own))]);
+  }
+  return size.back()[static_cast<std::size_t>(std::min(own, most_own))];
+}
+
+/// `alive` from what can be born within a lifespan, and within the limits of the system and the run.
+WorstCase bounded(Real born, Real lifespan, Real at_once, Real rate, uint64_t max_alive) {
+  const Real alive = std::min(born, std::ceil(at_once + (rate > 0 ? rate * lifespan : 0)));
+  return {saturated(born), std::min(saturated(alive), max_alive), lifespan, at_once, rate};
+}
+
+/// Where each parent has `children`, all within the time `after` its own birth.
+WorstCase bounded_children(const WorstCase& parents, Real children, Real after, Real lifespan,
+                           uint64_t max_alive) {
+  const Real at_once = parents.at_once + (parents.rate > 0 ? parents.rate * after : 0);
+  return bounded(static_cast<Real>(parents.born) * children, lifespan, children * at_once,
+                 children * parents.rate, max_alive);
+}
+
+}  // namespace
+
+WorstCase worst_case(const EmitterDef& def, Real duration) {
+  const Real start = def.start - def.prewarm, end = std::min(def.end, duration);
+  const Real lifespan = upper_bound(def.lifespan), born = most_released(def, start, end, kEver);
+  // What waits may come together with what is born later.
+  if (can_wait(def)) return bounded(born, lifespan, born, 0, def.max_alive);
+  Real at_once = 1 + most(def.count),
+       rate = highest_rate(def.rate) + most(def.count) / lower_bound(def.interval);
+  for (const Burst& b : def.bursts) {
+    at_once += most(b.count);
+    if (b.cycles > 1) rate += most(b.count) / b.interval;
+  }
+  WorstCase all = bounded(born, lifespan, at_once, rate, def.max_alive);
+  all.alive = std::min(saturated(most_released(def, start, end, lifespan)), def.max_alive);
+  return all;
+}
+
+WorstCase worst_case(const SplitDef& def, const WorstCase& parents, bool same_system) {
+  if (!def.enabled) return {};
+  const Real first = lower_bound(def.age), delay = lower_bound(def.delay);
+  // The first split at `first`, the others `delay` apart, all before the end of a life.
+  const auto splits_in = [&](Real life) {
+    return life > first ? static_cast<int>(std::min<Real>(def.depth, up((life - first) / delay))) : 0;
+  };
+  const Real shrink = upper_bound(def.lifespan_percent) / 100, count = most(def.count);
+  const int own = splits_in(parents.lifespan);
+  if (!same_system)
+    return bounded_children(parents, count * own, parents.lifespan, shrink * parents.lifespan, def.max_alive);
+  const int each = shrink <= 1 ? splits_in(shrink * parents.lifespan) : def.depth;
+  const Real lifespan = parents.lifespan * std::pow(std::max(1.0, shrink), def.depth);
+  return bounded_children(parents, family(count, def.depth, own, each) - 1, def.depth * lifespan, lifespan,
+                          def.max_alive);
+}
+
+WorstCase worst_case(const TrailDef& def, const WorstCase& parents) {
+  const Real rate = highest_rate(def.rate), time = std::min(parents.lifespan, def.end_age) - def.start_age;
+  if (!(time > 0)) return {};
+  // Each parent's times are even, and each may begin with a particle at once.
+  const WorstCase begun = bounded_children(parents, 1, parents.lifespan, 0, def.max_alive);
+  return bounded(static_cast<Real>(parents.born) * up(rate * time), upper_bound(def.lifespan), begun.at_once,
+                 begun.rate + static_cast<Real>(parents.alive) * rate, def.max_alive);
+}
+
+WorstCase worst_case(const SubEmitterDef& def, const WorstCase& parents, Real hits_per_parent) {
+  const Real events = def.probability > 0 ? (def.trigger == Trigger::collision ? hits_per_parent : 1) : 0;
+  return bounded_children(parents, events * most(def.count), parents.lifespan, upper_bound(def.lifespan),
+                          def.max_alive);
+}
+
+Real highest_clear_rate(const EmitterDef& def) {
+  const ReleaseSurface surface(def.surface);
+  const Real diameter = 2 * upper_bound(def.radius);
+  const Real slowest = std::max({0.0, lower_bound(def.speed), -upper_bound(def.speed)});
+  if (!surface.has_cells() || std::isinf(diameter)) return 0;
+  return static_cast<Real>(surface.cells(diameter).count()) * slowest / diameter;
+}
+
+}  // namespace offstage::effects

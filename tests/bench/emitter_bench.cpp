@@ -1,0 +1,73 @@
+/// Births per second: an emitter of a million particles per second with every parameter drawn, on each
+/// surface, and what is born from particles. The world does nothing but take them in.
+
+#include <benchmark/benchmark.h>
+
+#include "effects/emitter.h"
+#include "effects/trail.h"
+
+namespace offstage::effects {
+namespace {
+
+constexpr Real kStep = 1.0 / 240;
+
+/// A million births a second, one by one (range 1: 0) or in a burst each sub-step (1), from a kind of surface
+/// (range 0).
+void births(benchmark::State& state) {
+  const auto kind = static_cast<SurfaceKind>(state.range(0));
+  const sim::TriangleMesh tetrahedron{{{0, 0, 0}, {9, 0, 0}, {0, 9, 0}, {0, 0, 9}},
+                                      {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
+  const bool single = state.range(1) == 0;
+  uint64_t born = 0;
+  for (auto _ : state) {
+    state.PauseTiming();
+    sim::World world;
+    const auto system = world.add_particle_system({});
+    Emitter emitter({.surface = {.kind = kind, .size = {5, 5}, .radius = 3, .mesh = tetrahedron},
+                     .rate = single ? 1e6 : 0.0,
+                     .count = single ? 0.0 : 4167.0,
+                     .interval = kStep,
+                     .speed = Normal{5, 2},
+                     .spread_deg = Normal{0, 20},
+                     .radius = Normal{0.01, 0.005},
+                     .lifespan = Normal{5, 2},
+                     .restitution = Uniform{0.1, 0.5},
+                     .friction = Uniform{0.1, 0.5},
+                     .charge = Normal{0, 1e-6},
+                     .max_alive = 100'000'000},
+                    system);
+    state.ResumeTiming();
+    for (int i = 0; i < 120; ++i) emitter.emit(world, i * kStep, (i + 1) * kStep);
+    born += emitter.report().released;
+  }
+  state.counters["births/s"] = benchmark::Counter(static_cast<double>(born), benchmark::Counter::kIsRate);
+}
+
+/// Ten thousand stars that leave a hundred particles a second each.
+void trails(benchmark::State& state) {
+  uint64_t born = 0;
+  for (auto _ : state) {
+    state.PauseTiming();
+    sim::World world;
+    const auto stars = world.add_particle_system({}), target = world.add_particle_system({});
+    for (int i = 0; i < 10'000; ++i)
+      world.add_particle(stars, {.position = {0, 100, 0.1 * i}, .velocity = {9, 9, 0}});
+    Trail trail({.rate = 100.0, .max_alive = 100'000'000}, stars, target);
+    world.step(kStep, [&](Real start, Real end) { trail.emit(world, start, end); });
+    state.ResumeTiming();
+    for (int i = 1; i < 60; ++i) trail.emit(world, kStep, 2 * kStep);
+    born += trail.report().released;
+  }
+  state.counters["births/s"] = benchmark::Counter(static_cast<double>(born), benchmark::Counter::kIsRate);
+}
+
+BENCHMARK(births)
+    ->ArgNames({"surface", "burst"})
+    ->ArgsProduct({{0, 1, 2, 3}, {0, 1}})
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK(trails)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace offstage::effects
+
+BENCHMARK_MAIN();

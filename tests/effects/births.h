@@ -1,0 +1,41 @@
+#pragma once
+/// What emitters brought into a world, told from the particles at its end.
+
+#include <vector>
+
+#include "effects/emitter.h"
+
+namespace offstage::effects {
+
+/// A particle as it was at its own birth, if nothing has acted on it since.
+struct Birth {
+  Real time;
+  Vec3 position, velocity;
+  Real radius;
+};
+
+inline std::vector<Birth> births_of(const sim::World& world, sim::ParticleSystemHandle system) {
+  const sim::ParticleArrays& p = world.particles(system);
+  std::vector<Birth> births;
+  for (std::size_t i = 0; i < p.size(); ++i)
+    births.push_back(
+        {world.time() - p.age[i], p.position[i] - p.age[i] * p.velocity[i], p.velocity[i], p.radius[i]});
+  return births;
+}
+
+/// A world in which nothing acts on particles.
+inline sim::World empty_world(Real max_step = 1.0 / 240) {
+  return sim::World({.gravity = Vec3::Zero(),
+                     .max_step = max_step,
+                     .bounds = sim::Aabb(Vec3::Constant(-1e6), Vec3::Constant(1e6))});
+}
+
+/// Steps a world for some time, giving each sub-step to all of `sources` in turn.
+template <class... Sources>
+void run(sim::World& world, Real seconds, int fps, Sources&... sources) {
+  const int frames = static_cast<int>(seconds * fps + 0.5);
+  for (int i = 0; i < frames; ++i)
+    world.step(1.0 / fps, [&](Real start, Real end) { (sources.emit(world, start, end), ...); });
+}
+
+}  // namespace offstage::effects
