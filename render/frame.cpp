@@ -124,6 +124,7 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
   FrameUniforms frame;
   frame.clip_from_world = view.clip_from_world;
   frame.shadow_from_world = Matrix4f::Identity();
+  frame.smoke_from_world = Matrix4f::Identity();
   frame.eye = vec4(view.eye, 2 * view.tan_half.y() / static_cast<float>(height_px));
   frame.ray_center = vec4(view.forward - view.shear.x() * x - view.shear.y() * y);
   frame.ray_x = vec4(x);

@@ -15,6 +15,7 @@ using Eigen::Matrix4f;
 struct FrameUniforms {
   Matrix4f clip_from_world;
   Matrix4f shadow_from_world;
+  Matrix4f smoke_from_world;
   Vector4f eye;
   Vector4f ray_center, ray_x, ray_y;
   Vector4f depth;
@@ -49,7 +50,7 @@ Vector2f square_to_disc(const Vector2f& p);
 /// The direction towards a place of the sun's disc.
 Vector3f jittered_sun(const Sun& sun, const Vector2f& offset);
 
-/// Fills everything but the shadow map's fields.
+/// Fills everything but the fields of the shadow map and of smoke.
 FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& environment,
                          const SampleOffsets& offsets, int height_px);
 

@@ -1,7 +1,6 @@
 #include "render/mesh_pass.h"
 
 #include <algorithm>
-#include <tuple>
 
 #include "render/texture.h"
 
@@ -115,7 +114,8 @@ MeshPass::MeshPass()
                        {"SHADOW 1", "TEXTURED 1"}),
       white_(make_white_texture()) {}
 
-void MeshPass::prepare(std::span<const Instance* const> instances, const View& view) {
+void MeshPass::prepare(std::span<const Instance* const> instances, const View& view, bool in_smoke) {
+  in_smoke_ = in_smoke;
   std::vector<Item> seen, casting;
   for (uint32_t i = 0; i < instances.size(); ++i) {
     const Instance& instance = *instances[i];
@@ -182,12 +182,13 @@ void MeshPass::draw(const Batch& batch, const gl::StreamBuffer& rows) {
 }
 
 gl::LazyProgram& MeshPass::surface_program(const GpuMaterial& material) {
-  const auto key = std::make_pair(material.pattern, material.textured);
+  const auto key = std::make_tuple(material.pattern, material.textured, in_smoke_);
   const auto found = surface_programs_.find(key);
   if (found != surface_programs_.end()) return found->second;
   std::vector<std::string> defines;
   std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "light.glsl", "material.glsl"};
   if (material.textured) defines.push_back("TEXTURED 1");
+  if (in_smoke_) defines.push_back("SMOKE 1");
   if (material.pattern != Pattern::none) {
     defines.push_back("PATTERN " + std::to_string(static_cast<int>(material.pattern)));
     fragment.push_back("pattern.glsl");

@@ -5,6 +5,7 @@
 #include <array>
 #include <map>
 #include <span>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -57,8 +58,9 @@ struct Instance {
 class MeshPass {
  public:
   MeshPass();
-  /// Sorts what is visible for this view. The instances must stay where they are until it is drawn.
-  void prepare(std::span<const Instance* const> instances, const View& view);
+  /// Sorts what is visible for this view; `in_smoke`: smoke shadows it. The instances must stay where they
+  /// are until it is drawn.
+  void prepare(std::span<const Instance* const> instances, const View& view, bool in_smoke);
   void draw_shadows(const Matrix4f& shadow_clip_from_world);
   void draw_opaque();
   void draw_blended();
@@ -78,8 +80,9 @@ class MeshPass {
   gl::LazyProgram& surface_program(const GpuMaterial& material);
   gl::LazyProgram& shadow_program(const GpuMaterial& material);
 
-  std::map<std::pair<Pattern, bool>, gl::LazyProgram> surface_programs_;
+  std::map<std::tuple<Pattern, bool, bool>, gl::LazyProgram> surface_programs_;  ///< textured, in smoke
   gl::LazyProgram opaque_shadow_, dithered_shadow_, textured_shadow_;
+  bool in_smoke_ = false;
   gl::Texture white_;
   gl::StreamBuffer rows_, shadow_rows_;
   std::vector<Batch> opaque_, blended_, casters_;

@@ -23,7 +23,15 @@ Vector4f style_of(const PointsDef& def) {
 void PointSet::assign(std::span<const Point> values) {
   points.clear();
   ids.clear();
+  ages.clear();
   box.setEmpty();
+  std::vector<Point> by_id;
+  const auto smaller_id = [](const Point& a, const Point& b) { return a.id < b.id; };
+  if (is_splatted() && !std::is_sorted(values.begin(), values.end(), smaller_id)) {
+    by_id.assign(values.begin(), values.end());
+    std::stable_sort(by_id.begin(), by_id.end(), smaller_id);
+    values = by_id;
+  }
   for (const Point& value : values) {
     const bool drawable =
         value.radius > 0 && value.color.w() > 0 && value.position.allFinite() && value.velocity.allFinite();
@@ -34,36 +42,36 @@ void PointSet::assign(std::span<const Point> values) {
     point.color = value.color;
     points.push_back(point);
     ids.push_back(value.id);
+    ages.push_back(value.age);
     Vector3f reach = Vector3f::Constant(value.radius);
-    if (def.style == PointStyle::streak) reach += value.velocity.cwiseAbs() * (0.5f * def.stretch_s);
+    if (is_stretched()) reach += value.velocity.cwiseAbs() * (0.5f * def.stretch_s);
     box.extend(value.position - reach).extend(value.position + reach);
   }
 }
 
 float PointSet::reach(std::size_t i) const {
   const float radius = points[i].position.w();
-  const float stretch =
-      def.style == PointStyle::streak ? 0.5f * def.stretch_s * points[i].velocity.head<3>().norm() : 0.f;
+  const float stretch = is_stretched() ? 0.5f * def.stretch_s * points[i].velocity.head<3>().norm() : 0.f;
   return radius + stretch;
 }
 
+PointsPass::Programs& PointsPass::programs(PointStyle style) {
+  const auto found = programs_.find(style);
+  if (found != programs_.end()) return found->second;
+  const std::string define = "STYLE " + std::to_string(static_cast<int>(style));
+  const std::vector<std::string_view> vertex = {"frame.glsl", "sky.glsl", "light.glsl", "points.vert"};
+  std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "points_shape.glsl", "points.frag"};
+  if (style == PointStyle::sphere) fragment = {"frame.glsl", "sky.glsl", "light.glsl", "sphere.frag"};
+  return programs_
+      .emplace(style, Programs{{vertex, fragment, {define}},
+                               {vertex, fragment, {define, "SMOKE 1"}},
+                               {{"frame.glsl", "points.vert"},
+                                {"frame.glsl", "points_shape.glsl", "points_shadow.frag"},
+                                {define, "SHADOW 1"}}})
+      .first->second;
+}
+
 PointsPass::PointsPass() : vertex_array_(gl::make_vertex_array()) {
-  for (std::size_t k = 0; k < 3; ++k) {
-    const std::string style = "STYLE " + std::to_string(k);
-    const bool sphere = k == static_cast<std::size_t>(PointStyle::sphere);
-    const std::vector<std::string_view> vertex = {"frame.glsl", "sky.glsl", "light.glsl", "points.vert"};
-    std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl"};
-    if (sphere) {
-      fragment.insert(fragment.end(), {"light.glsl", "sphere.frag"});
-    } else {
-      fragment.insert(fragment.end(), {"points_shape.glsl", "points.frag"});
-    }
-    programs_[k].emplace(vertex, fragment, std::vector{style});
-    shadow_programs_[k].emplace(
-        std::vector<std::string_view>{"frame.glsl", "points.vert"},
-        std::vector<std::string_view>{"frame.glsl", "points_shape.glsl", "points_shadow.frag"},
-        std::vector{style, std::string("SHADOW 1")});
-  }
   gl::set_attribute(vertex_array_, 0, 0, 4, offsetof(GpuPoint, position));
   gl::set_attribute(vertex_array_, 1, 0, 4, offsetof(GpuPoint, velocity));
   gl::set_attribute(vertex_array_, 2, 0, 4, offsetof(GpuPoint, color));
@@ -101,19 +109,20 @@ void PointsPass::draw(const PointSet& set, std::size_t first) {
 }
 
 void PointsPass::draw_shadow(const PointSet& set, const Matrix4f& shadow_clip_from_world) {
-  shadow_programs_[static_cast<std::size_t>(set.def.style)]->use();
+  programs(set.def.style).shadow.use();
   glUniformMatrix4fv(0, 1, GL_FALSE, shadow_clip_from_world.data());
   draw(set, 0);
 }
 
-void PointsPass::draw_spheres(const PointSet& set) {
-  programs_[static_cast<std::size_t>(PointStyle::sphere)]->use();
+void PointsPass::draw_spheres(const PointSet& set, bool in_smoke) {
+  Programs& sphere = programs(PointStyle::sphere);
+  (in_smoke ? sphere.seen_in_smoke : sphere.seen).use();
   glUniform2f(2, set.def.metallic, set.def.roughness);
   draw(set, set.unseen);
 }
 
 void PointsPass::draw_blended(const PointSet& set) {
-  programs_[static_cast<std::size_t>(set.def.style)]->use();
+  programs(set.def.style).seen.use();
   draw(set, set.unseen);
 }
 

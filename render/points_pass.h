@@ -1,10 +1,9 @@
 #pragma once
-/// Private: draws particles. Every particle is one quad, drawn instanced: sprites and streaks blended back to
-/// front over the opaque picture, balls ray-cast with depth among the opaque things.
+/// Private: draws balls, sprites and flakes. Every particle is one quad, drawn instanced: sprites and flakes
+/// blended back to front over the opaque picture, balls ray-cast with depth among the opaque things.
 
-#include <array>
 #include <cstdint>
-#include <optional>
+#include <map>
 #include <vector>
 
 #include "render/frame.h"
@@ -20,12 +19,18 @@ struct PointSet {
   PointsDef def;
   std::vector<GpuPoint> points;  ///< w of position: radius; w of velocity: a number of its own in [0, 1)
   std::vector<uint64_t> ids;
+  std::vector<float> ages;
   Eigen::AlignedBox3f box;  ///< of what can be seen of them, streaks at full length
   gl::StreamBuffer
       buffer;              ///< in the order they are drawn; first those that only throw shadows into the view
   std::size_t unseen = 0;  ///< how many those are
 
   void assign(std::span<const Point> values);
+  /// Smoke and fire, which PuffsPass draws; StreaksPass draws streaks.
+  bool is_puffs() const { return def.style == PointStyle::smoke || def.style == PointStyle::fire; }
+  bool is_splatted() const { return is_puffs() || def.style == PointStyle::streak; }
+  /// Whether points are drawn out along their motion.
+  bool is_stretched() const { return def.style != PointStyle::sprite && def.style != PointStyle::sphere; }
   /// Radius of the ball around all that is drawn of a point [m].
   float reach(std::size_t i) const;
 };
@@ -36,13 +41,18 @@ class PointsPass {
   /// Uploads in drawing order: back to front for this view where they are blended.
   void prepare(PointSet& set, const View& view);
   void draw_shadow(const PointSet& set, const Matrix4f& shadow_clip_from_world);
-  void draw_spheres(const PointSet& set);
+  void draw_spheres(const PointSet& set, bool in_smoke);
   void draw_blended(const PointSet& set);
 
  private:
   void draw(const PointSet& set, std::size_t first);
 
-  std::array<std::optional<gl::LazyProgram>, 3> programs_, shadow_programs_;
+  struct Programs {
+    gl::LazyProgram seen, seen_in_smoke, shadow;
+  };
+  Programs& programs(PointStyle style);
+
+  std::map<PointStyle, Programs> programs_;
   gl::VertexArray vertex_array_;
   std::vector<GpuPoint> ordered_;
   std::vector<std::pair<float, uint32_t>> keys_;

@@ -86,4 +86,10 @@ void ShadowMap::end() const {
   glBindTextureUnit(0, depth_);
 }
 
+void ShadowMap::read(int x, int y, int width, int height, std::vector<float>& depths) const {
+  depths.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_);
+  glReadPixels(x, y, width, height, GL_DEPTH_COMPONENT, GL_FLOAT, depths.data());
+}
+
 }  // namespace offstage::render

@@ -4,6 +4,7 @@
 /// goes in steps, so that shadows do not swim when the camera or things move.
 
 #include <span>
+#include <vector>
 
 #include "render/frame.h"
 #include "render/gl.h"
@@ -33,6 +34,8 @@ class ShadowMap {
   void begin() const;
   /// Ends drawing and leaves the map bound as texture unit 0.
   void end() const;
+  /// Depths of a rectangle of texels, row by row, for what is lit on the CPU.
+  void read(int x, int y, int width, int height, std::vector<float>& depths) const;
 
  private:
   int size_px_;

@@ -7,8 +7,10 @@
 #include "render/lines_pass.h"
 #include "render/mesh_pass.h"
 #include "render/points_pass.h"
+#include "render/puffs_pass.h"
 #include "render/shadow_map.h"
 #include "render/slots.h"
+#include "render/streaks_pass.h"
 
 namespace offstage::render {
 namespace {
@@ -56,6 +58,8 @@ struct Stage::Impl {
   ShadowMap shadow_map;
   MeshPass mesh_pass;
   PointsPass points_pass;
+  PuffsPass puffs_pass;
+  StreaksPass streaks_pass;
   LinesPass lines_pass;
   gl::LazyProgram sky_program{{"frame.glsl", "sky.vert"}, {"frame.glsl", "sky.glsl", "sky.frag"}};
   gl::VertexArray no_attributes = gl::make_vertex_array();
@@ -66,6 +70,8 @@ struct Stage::Impl {
       : def(stage_def),
         picture(def.width_px, def.height_px),
         shadow_map(def.shadow_map_px),
+        puffs_pass(def.width_px, def.height_px),
+        streaks_pass(def.width_px, def.height_px),
         pixels(static_cast<std::size_t>(def.width_px) * static_cast<std::size_t>(def.height_px) * 4) {
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
     gl::check_error("making the stage");
@@ -79,7 +85,7 @@ struct Stage::Impl {
   void draw_shadows(std::span<const Instance* const> shown, std::span<PointSet* const> sets, const View& view,
                     const SampleOffsets& offsets, FrameUniforms& frame);
   void draw_opaque(std::span<PointSet* const> sets);
-  void draw_blended(std::span<PointSet* const> sets);
+  void draw_blended(std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame);
   void draw_lines(const View& view);
 };
 
@@ -87,7 +93,7 @@ std::vector<PointSet*> Stage::Impl::prepare_points(const View& view) {
   std::vector<PointSet*> result;
   point_sets.for_each([&](const std::unique_ptr<PointSet>& set) {
     if (set->points.empty()) return;
-    points_pass.prepare(*set, view);
+    if (!set->is_splatted()) points_pass.prepare(*set, view);
     result.push_back(set.get());
   });
   return result;
@@ -103,7 +109,7 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
     }
   }
   for (const PointSet* set : sets) {
-    if (!set->def.casts_shadow) continue;
+    if (!set->def.casts_shadow || set->is_splatted()) continue;
     for (int k = 0; k < 8; ++k) {
       casters.push_back({set->box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k)), 1e-3f});
     }
@@ -128,7 +134,7 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
   shadow_map.begin();
   mesh_pass.draw_shadows(shadow.clip_from_world);
   for (const PointSet* set : sets) {
-    if (set->def.casts_shadow) points_pass.draw_shadow(*set, shadow.clip_from_world);
+    if (set->def.casts_shadow && !set->is_splatted()) points_pass.draw_shadow(*set, shadow.clip_from_world);
   }
   shadow_map.end();
 }
@@ -147,7 +153,7 @@ void Stage::Impl::draw_opaque(std::span<PointSet* const> sets) {
   mesh_pass.draw_opaque();
   glDisable(GL_CULL_FACE);
   for (const PointSet* set : sets) {
-    if (set->def.style == PointStyle::sphere) points_pass.draw_spheres(*set);
+    if (set->def.style == PointStyle::sphere) points_pass.draw_spheres(*set, puffs_pass.shades());
   }
   if (environment.visible) {
     glDepthFunc(GL_EQUAL);  // only where nothing was drawn
@@ -158,7 +164,8 @@ void Stage::Impl::draw_opaque(std::span<PointSet* const> sets) {
   }
 }
 
-void Stage::Impl::draw_blended(std::span<PointSet* const> sets) {
+void Stage::Impl::draw_blended(std::span<PointSet* const> sets, const View& view,
+                               const FrameUniforms& frame) {
   // Premultiplied: what adds light has no alpha, so one blend function serves both.
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
@@ -171,9 +178,12 @@ void Stage::Impl::draw_blended(std::span<PointSet* const> sets) {
   glBlitNamedFramebuffer(picture.framebuffer, picture.depth_copy_framebuffer, 0, 0, def.width_px,
                          def.height_px, 0, 0, def.width_px, def.height_px, GL_DEPTH_BUFFER_BIT, GL_NEAREST);
   glBindTextureUnit(kSceneDepthUnit, picture.depth_copy);
+  const PuffLight light(puffs_pass.grid(), frame, sun.direction.normalized());
+  puffs_pass.draw(sets, view, light, shadow_map, picture.framebuffer);
   for (const PointSet* set : sets) {
-    if (blended(set)) points_pass.draw_blended(*set);
+    if (blended(set) && !set->is_splatted()) points_pass.draw_blended(*set);
   }
+  streaks_pass.draw(sets, view, light, shadow_map, picture.framebuffer);
 }
 
 void Stage::Impl::draw_lines(const View& view) {
@@ -264,11 +274,12 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
 
   std::vector<const Instance*> shown;
   s.instances.for_each([&](const std::unique_ptr<Instance>& instance) { shown.push_back(instance.get()); });
-  s.mesh_pass.prepare(shown, view);
   const std::vector<PointSet*> sets = s.prepare_points(view);
+  s.puffs_pass.prepare(sets, s.sun, frame);
+  s.mesh_pass.prepare(shown, view, s.puffs_pass.shades());
   s.draw_shadows(shown, sets, view, offsets, frame);
   s.draw_opaque(sets);
-  s.draw_blended(sets);
+  s.draw_blended(sets, view, frame);
   s.draw_lines(view);
 
   glBindFramebuffer(GL_READ_FRAMEBUFFER, s.picture.framebuffer);

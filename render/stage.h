@@ -52,22 +52,29 @@ struct Point {
   Vector3f velocity;  ///< [m/s], stretches streaks
   float radius;       ///< [m]
   Vector4f color;     ///< linear, straight alpha
-  uint64_t id;        ///< breaks ties when sorting
+  uint64_t id;        ///< breaks ties when sorting, and gives a puff its shape
+  float age = 0;      ///< [s], turns puffs slowly
 };
 
 enum class PointStyle {
   sprite,  ///< soft round billboard, sorted, depth-faded
   streak,  ///< billboard stretched along its motion during the exposure: rain, sparks, water
   sphere,  ///< opaque lit ball
+  smoke,   ///< puff with a broken edge, lit through the other puffs between it and the sun
+  fire,    ///< tongue of flame along its motion: it glows, whatever `additive` and `lit` say, and hides a
+           ///< little
+  flake,   ///< thin irregular disc, bright against the light: snow, dust
 };
 
 struct PointsDef {
   PointStyle style = PointStyle::sprite;
-  bool additive = false;  ///< add light instead of covering: fire, sparks
-  bool lit = true;        ///< by sun and sky; false: its colour is its light
-  bool casts_shadow = true;
-  float softness = 0.5f;        ///< width of the fade at the rim, as a share of the radius, in [0, 1]
-  float stretch_s = 1.0f / 60;  ///< streaks are velocity * stretch_s long [s]
+  bool additive = false;     ///< add light instead of covering: fire, sparks
+  bool lit = true;           ///< by sun and sky; false: its colour is its light
+  bool casts_shadow = true;  ///< on the scene; of smoke on other smoke, too
+  float softness = 0.5f;     ///< width of the fade at the rim, as a share of the radius, in [0, 1]
+  float stretch_s =
+      1.0f / 60;    ///< streaks are velocity * stretch_s long, others but balls and sprites longer by it [s]
+  float taper = 0;  ///< share by which a streak fades towards its tail, in [0, 1]: 0 a drop, 1 a spark
   float metallic = 0, roughness = 0.3f;  ///< of spheres
 };
 

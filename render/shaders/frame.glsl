@@ -2,6 +2,7 @@
 layout(std140, binding = 0) uniform Frame {
   mat4 clip_from_world;
   mat4 shadow_from_world;   // to [0, 1] of the shadow map
+  mat4 smoke_from_world;    // to [0, 1] of the smoke's optical depth
   vec4 eye;                 // w: size of a pixel at distance 1
   vec4 ray_center, ray_x, ray_y;  // direction through a place of the screen: center + x * ndc.x + y * ndc.y
   vec4 depth;               // distance along the view axis = x / (depth + y); z: near plane

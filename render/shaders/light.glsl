@@ -11,7 +11,7 @@ struct Surface {
 // Share of the sun's light that arrives. A tent of 3x3 texels in four fetches (I. Castano, "Shadow Mapping Summary",
 // 2013). The point is moved off its surface by about a texel, more where the light grazes, which keeps a surface from
 // shadowing itself without detaching shadows from their casters.
-float sun_visibility(vec3 position, vec3 normal) {
+float shadow_map_visibility(vec3 position, vec3 normal) {
   if (frame.sun_direction.w == 0.0) return 1.0;
   float cosine = saturate(dot(normal, frame.sun_direction.xyz));
   vec3 moved = position + frame.shadow.x * (normal * (2.2 * sqrt(1.0 - cosine * cosine) + 0.3) + 0.7 * frame.sun_direction.xyz);
@@ -31,6 +31,19 @@ float sun_visibility(vec3 position, vec3 normal) {
               w0.x * w1.y * texture(shadow_map, vec3(base + vec2(o0.x, o1.y), p.z)) +
               w1.x * w1.y * texture(shadow_map, vec3(base + o1, p.z));
   return sum * (1.0 / 16.0);
+}
+
+#ifdef SMOKE
+layout(binding = 5) uniform sampler3D smoke_depth;
+#endif
+
+// The same through smoke.
+float sun_visibility(vec3 position, vec3 normal) {
+  float visibility = shadow_map_visibility(position, normal);
+#ifdef SMOKE
+  visibility *= exp(-texture(smoke_depth, (frame.smoke_from_world * vec4(position, 1.0)).xyz).r);
+#endif
+  return visibility;
 }
 
 // GGX with the visibility term of E. Hammon (2017) for the sun; for the sky the split sum of B. Karis, "Physically

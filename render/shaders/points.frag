@@ -1,7 +1,10 @@
-// Sprites and streaks, blended over the finished opaque picture.
+// Sprites and flakes, blended over the finished opaque picture.
 layout(location = 0) in vec3 place;
 layout(location = 1) in vec4 light;
-layout(location = 2) in vec4 rim;
+layout(location = 2) in float reach;
+#if STYLE == 5
+layout(location = 3) flat in vec2 lobe;
+#endif
 layout(location = 1) uniform vec4 style;  // softness, stretch [s], lit, additive
 layout(binding = 4) uniform sampler2D scene_depth;
 layout(location = 0) out vec4 color;
@@ -14,12 +17,15 @@ float depth_fade(float radius) {
 
 void main() {
   vec3 radiance = light.rgb;
-  float alpha = light.a * coverage(place, style.x);
-#if STYLE == 0
-  alpha *= depth_fade(rim.w);
+#if STYLE == 5
+  // Three blunt corners, more or less.
+  float c = dot(place.xy, lobe) * inversesqrt(dot(place.xy, place.xy) + 1e-6);
+  float alpha = light.a * coverage(place * (1.15 - 0.15 * c * (4.0 * c * c - 3.0)), style.x);
 #else
-  float m = 1.0 - sqrt(max(1.0 - place.x * place.x, 0.0)), m2 = m * m;
-  radiance = mix(radiance, rim.rgb, 0.02 + 0.98 * m2 * m2 * m);  // Fresnel
+  float alpha = light.a * coverage(place, style.x);
+#endif
+#if STYLE == 0
+  alpha *= depth_fade(reach);
 #endif
   color = vec4(radiance * alpha, alpha * (1.0 - style.w));
 }

@@ -1,4 +1,4 @@
-// One quad per particle. STYLE is 0 sprite, 1 streak, 2 sphere; with SHADOW it faces the sun instead of the eye.
+// One quad per particle. STYLE is 0 sprite, 2 sphere, 5 flake; with SHADOW it faces the sun instead of the eye.
 layout(location = 0) in vec4 in_position;  // w: radius
 layout(location = 1) in vec4 in_velocity;  // w: a number of its own in [0, 1)
 layout(location = 2) in vec4 in_color;
@@ -7,7 +7,7 @@ layout(location = 0) uniform mat4 shadow_clip_from_world;
 #endif
 layout(location = 1) uniform vec4 style;  // softness, stretch [s], lit, additive
 
-// The place on the quad in radii: across, up, and for a streak half the length of its axis, which up runs along.
+// The place on the quad in radii: across, up, and for a flake half the length of its axis, which up runs along.
 layout(location = 0) out vec3 place;
 #ifdef SHADOW
 layout(location = 1) flat out vec2 dimming;  // alpha, shift of the dither
@@ -17,7 +17,10 @@ layout(location = 2) flat out vec4 ball;     // centre, radius
 layout(location = 3) out vec3 position;      // on the quad
 #else
 layout(location = 1) out vec4 light;         // fog included; w: alpha
-layout(location = 2) out vec4 rim;           // what a streak mirrors at its sides; w: radius
+layout(location = 2) out float reach;        // radius
+#if STYLE == 5
+layout(location = 3) flat out vec2 lobe;     // direction of a flake's first corner
+#endif
 #endif
 
 // The vector between viewer and particle, unit, and the width of a pixel or texel there.
@@ -44,14 +47,12 @@ vec3 puff_light(vec3 p, vec3 n, vec3 u, vec3 to_viewer, float radius) {
   // Some light gets into the shadow of a cloud from all around.
   return ambient(n) + frame.sun_radiance.rgb * (phase * mix(0.2, 1.0, visibility));
 }
-#elif STYLE == 1
-// A drop drawn out by its motion: it refracts the sky behind it, and it is bright when the sun stands behind it.
-vec3 drop_light(vec3 p, vec3 to_viewer) {
-  vec3 through = mix(sky_reflection(-to_viewer, 0.25), ambient(vec3(0.0, 1.0, 0.0)), 0.5);
-  float forward = 0.5 - 0.5 * dot(frame.sun_direction.xyz, to_viewer);
-  float forward2 = forward * forward, forward8 = forward2 * forward2 * forward2 * forward2;
+#elif STYLE == 5
+// Ice and dust let light through in all directions, most of it forwards.
+vec3 flake_light(vec3 p, vec3 to_viewer) {
+  float forward = saturate(-dot(frame.sun_direction.xyz, to_viewer)), forward2 = forward * forward;
   float visibility = sun_visibility(p, frame.sun_direction.xyz);
-  return through + frame.sun_radiance.rgb * (visibility * (0.12 + 0.9 * forward8));
+  return ambient(vec3(0.0, 0.5, 0.0)) + frame.sun_radiance.rgb * (visibility * (0.4 + 0.8 * forward2 * forward2));
 }
 #endif
 #endif
@@ -66,13 +67,13 @@ void main() {
   // What would be thinner than a pixel stays about one wide and gets fainter instead.
   float drawn = STYLE == 2 ? radius : max(radius, 0.6 * viewer.w);
   float thinning = radius / drawn;
-#if STYLE == 1
+#if STYLE == 5
   vec3 half_axis = in_velocity.xyz * (0.5 * style.y);
   vec3 across_view = half_axis - viewer.xyz * dot(half_axis, viewer.xyz);
   float half_length = length(across_view);
   vec3 w = half_length > 1e-6 ? across_view / half_length : cross(viewer.xyz, u);
   u = cross(w, viewer.xyz);
-  alpha *= thinning;
+  alpha *= thinning * thinning;
   // With its rounded ends it is as long as it moved.
   float straight = max(half_length - drawn, 0.0) / drawn;
   vec3 at = p + half_axis * (half_length > drawn ? corner.y * (1.0 - drawn / half_length) : 0.0) +
@@ -80,15 +81,15 @@ void main() {
   place = vec3(corner.x, corner.y * (straight + 1.0), straight);
 #else
   vec3 w = cross(viewer.xyz, u);
-  float reach = drawn;
+  float half_side = drawn;
 #if STYLE == 0
   alpha *= thinning * thinning;
 #elif !defined(SHADOW)
   // The silhouette is that of the cone from the eye that touches the ball.
   float sine = radius * frame.eye.w / viewer.w;
-  reach *= inversesqrt(max(1.0 - sine * sine, 0.02));
+  half_side *= inversesqrt(max(1.0 - sine * sine, 0.02));
 #endif
-  vec3 at = p + reach * (u * corner.x + w * corner.y);
+  vec3 at = p + half_side * (u * corner.x + w * corner.y);
   place = vec3(corner, 0.0);
 #endif
 
@@ -97,6 +98,10 @@ void main() {
   gl_Position = shadow_clip_from_world * vec4(at, 1.0);
 #else
   gl_Position = frame.clip_from_world * vec4(at, 1.0);
+#if STYLE == 5
+  float turn = 6.2831853 * in_velocity.w;
+  lobe = vec2(cos(turn), sin(turn));
+#endif
 #if STYLE == 2
   color = in_color;
   ball = in_position;
@@ -106,17 +111,15 @@ void main() {
   vec4 fog = fog_to(p) * vec4(vec3(1.0 - style.w), 1.0);
   // What comes close to the lens fades out before it is cut.
   light = vec4(in_color.rgb, alpha * saturate(0.5 * (gl_Position.w - frame.depth.z) / drawn));
-  rim = vec4(in_color.rgb, drawn);
+  reach = drawn;
   if (style.z != 0.0) {
 #if STYLE == 0
     light.rgb *= puff_light(p, normalize(u * corner.x + w * corner.y + 0.7 * viewer.xyz), u, viewer.xyz, drawn);
-#else
-    light.rgb *= drop_light(p, viewer.xyz);
-    rim.rgb = sky_reflection(normalize(u * corner.x - 0.6 * viewer.xyz), 0.1);
+#elif STYLE == 5
+    light.rgb *= flake_light(p, viewer.xyz);
 #endif
   }
   light.rgb = light.rgb * fog.w + fog.rgb;
-  rim.rgb = rim.rgb * fog.w + fog.rgb;
 #endif
 #endif
 }

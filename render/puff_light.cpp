@@ -1,0 +1,106 @@
+#include "render/puff_light.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace offstage::render {
+namespace {
+
+// Light of the sun in smoke under an optical depth: scattered once, a few and many times.
+float sun_share(float depth, float albedo) {
+  return 0.68f * std::exp(-depth) +
+         albedo * (0.3f * std::exp(-0.35f * depth) + 0.12f * albedo * std::exp(-0.1f * depth));
+}
+
+}  // namespace
+
+PuffLight::PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_uniforms,
+                     const Vector3f& sun_direction)
+    : grid(opacity),
+      frame(frame_uniforms),
+      sky{.sun_direction = frame_uniforms.sun_direction.head<3>(),
+          .zenith = frame_uniforms.zenith.head<3>(),
+          .horizon = frame_uniforms.horizon.head<3>(),
+          .ground = frame_uniforms.ground.head<3>(),
+          .glow = frame_uniforms.glow.head<3>()},
+      to_sun(sun_direction) {}
+
+PuffRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vector3f& albedo,
+                                 float visibility, const Vector3f& to_eye) const {
+  // Optical depth and its slope, from the corners of a tetrahedron in the puff.
+  static const std::array<Vector3f, 4> kCorners = {Vector3f(1, 1, 1), Vector3f(1, -1, -1),
+                                                   Vector3f(-1, 1, -1), Vector3f(-1, -1, 1)};
+  const float reach = std::max(0.5f * radius, 0.5f * grid.cell_m());
+  float depth = 0;
+  Vector3f slope = Vector3f::Zero();
+  for (const Vector3f& corner : kCorners) {
+    const float d = grid.depth(place + reach * corner);
+    depth += 0.25f * d;
+    slope += d / (4 * reach) * corner;
+  }
+  // What lies above takes light from the sky; steps grow, as far smoke need not be seen in detail.
+  float above = 0, step = grid.cell_m();
+  Vector3f p = place;
+  for (int k = 0; k < 4 && !grid.empty(); ++k, step *= 2) {
+    p.y() += step;
+    above += step * grid.density(p);
+  }
+
+  const float white = albedo.maxCoeff();
+  const float steepness = slope.norm();
+  const float change = std::min(radius * steepness, 3.0f);
+  const float middle = sun_share(depth, white), direct = std::exp(-depth);
+  const float light = sun_share(std::max(depth - change, 0.0f), white),
+              dark = sun_share(depth + change, white);
+  const float forward = std::max(-to_sun.dot(to_eye), 0.0f), forward2 = forward * forward;
+  const Vector3f sun = visibility * frame.sun_radiance.head<3>();
+  const float sky_share = 0.25f + 0.75f * std::exp(-0.6f * above);
+
+  PuffRadiance result;
+  result.constant = sun * (0.68f * middle + 0.9f * direct * forward2 * forward2 * forward2) +
+                    sky_share * frame.irradiance[0].head<3>();
+  Vector3f towards_light = 0.36f * direct * to_sun;
+  if (steepness > 1e-6f) towards_light -= 0.65f * (light - dark) / steepness * slope;
+  result.slope = sun * towards_light.transpose();
+  result.slope.col(0) += sky_share * frame.irradiance[3].head<3>();
+  result.slope.col(1) += sky_share * frame.irradiance[1].head<3>();
+  result.slope.col(2) += sky_share * frame.irradiance[2].head<3>();
+  return result;
+}
+
+Vector3f PuffLight::ambient(const Vector3f& n) const {
+  const std::array<float, 9> basis = {1,
+                                      n.y(),
+                                      n.z(),
+                                      n.x(),
+                                      n.x() * n.y(),
+                                      n.y() * n.z(),
+                                      3 * n.z() * n.z() - 1,
+                                      n.x() * n.z(),
+                                      n.x() * n.x() - n.y() * n.y()};
+  Vector3f sum = Vector3f::Zero();
+  for (std::size_t k = 0; k < basis.size(); ++k) sum += basis[k] * frame.irradiance[k].head<3>();
+  return sum.cwiseMax(0.0f);
+}
+
+Vector3f PuffLight::sky_reflection(const Vector3f& direction, float roughness) const {
+  const float blur = 0.02f + 0.5f * roughness;
+  const float t = std::clamp((blur - direction.y()) / (2 * blur), 0.0f, 1.0f), below = t * t * (3 - 2 * t);
+  const Vector3f above =
+      sky_radiance(sky, Vector3f(direction.x(), std::max(direction.y(), 0.0f), direction.z()));
+  const Vector3f sharp = above + below * (sky.ground - above);
+  return sharp + roughness * roughness * (ambient(direction) - sharp);
+}
+
+Vector4f PuffLight::fog_to(const Vector3f& place) const {
+  const Vector3f ray = place - frame.eye.head<3>();
+  const float distance = ray.norm(), far = distance / 250;
+  const float transmittance = std::exp(-(frame.zenith.w() * distance + far * far));
+  const Vector3f level = Vector3f(ray.x(), std::max(ray.y(), 0.0f), ray.z()).normalized();
+  Vector4f result;
+  result << sky_radiance(sky, level) * (1 - transmittance), transmittance;
+  return result;
+}
+
+}  // namespace offstage::render

@@ -1,0 +1,312 @@
+#include "render/puffs_pass.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numbers>
+
+#include <tbb/parallel_for.h>
+
+#include "render/scene_shadow.h"
+
+namespace offstage::render {
+namespace {
+
+constexpr GLuint kSmokeUnit = 5, kColorUnit = 6, kLowDepthUnit = 7;
+constexpr float kMostOpaque = 0.98f;              // of one puff, so that its optical depth is finite
+constexpr double kHalf_px = 8, kQuarter_px = 64;  // radii from which the picture is made smaller
+constexpr float kTolerance = 0.25f;               // depth in typical radii over which puffs change little
+constexpr float kFlameCover = 0.6f;               // soot: deep flames glow, but do not add up without end
+constexpr float kFlameWobble = 0.5f;              // [rad]
+constexpr float kSpin = 0.35f;                    // [rad/s]
+
+PuffAtlas::Kind kind_of(const PointSet& set) {
+  return set.def.style == PointStyle::fire ? PuffAtlas::Kind::flame : PuffAtlas::Kind::smoke;
+}
+
+// Independent numbers of a puff from its number in [0, 1), which has 24 bits.
+struct Shape {
+  int variant;
+  bool mirrored;
+  float turn;  // in [0, 1)
+  explicit Shape(float own) {
+    const auto bits = static_cast<uint32_t>(own * 0x1p24f);
+    variant = static_cast<int>(bits % PuffAtlas::kVariants);
+    mirrored = (bits & PuffAtlas::kVariants) != 0;
+    turn = static_cast<float>(bits >> 4) * 0x1p-20f;
+  }
+};
+
+// The sun's disc blurs the shadow of a drop to nothing within a few tens of its widths, so drops are a mist.
+void add_drops(const PointSet& set, std::vector<OpacityGrid::Absorber>& absorbers) {
+  constexpr float kLost = 0.6f;  // of the light that meets a drop
+  for (const GpuPoint& point : set.points) {
+    const float radius = point.position.w();
+    const float length = std::max(set.def.stretch_s * point.velocity.head<3>().norm(), 2 * radius);
+    absorbers.push_back({point.position.head<3>(), 0.5f * length,
+                         kLost * 2 * radius * length * std::min(point.color.w(), 1.0f)});
+  }
+}
+
+// Flames are redder where they are thin.
+constexpr float kFlameThin[3] = {0.85f, 0.45f, 0.2f}, kFlameThick[3] = {0.3f, 0.75f, 1.0f};
+
+}  // namespace
+
+void PuffsPass::prepare(std::span<const PointSet* const> sets, const Sun& sun, FrameUniforms& frame) {
+  std::vector<OpacityGrid::Absorber> absorbers;
+  for (const PointSet* set : sets) {
+    if (set->is_puffs() && !atlas_) atlas_ = std::make_unique<PuffAtlas>();
+    if (!set->def.casts_shadow || !sun.shadows || sun.intensity <= 0) continue;
+    if (set->def.style == PointStyle::streak) add_drops(*set, absorbers);
+    if (set->def.style != PointStyle::smoke) continue;
+    const float mean_cover = atlas_->mean_cover(PuffAtlas::Kind::smoke);
+    for (const GpuPoint& point : set->points) {
+      const float radius = point.position.w();
+      const float depth = -std::log(1 - std::min(point.color.w(), kMostOpaque));
+      absorbers.push_back({point.position.head<3>(), radius, depth * mean_cover * 4 * radius * radius});
+    }
+  }
+  grid_.build(absorbers, -sun.direction.normalized());
+  if (grid_.empty()) return;
+  const auto size = grid_.size();
+  if (grid_texture_ == 0 || size != grid_size_) {
+    GLuint name = 0;
+    glCreateTextures(GL_TEXTURE_3D, 1, &name);
+    grid_texture_ = gl::Texture(name);
+    grid_size_ = size;
+    glTextureStorage3D(grid_texture_, 1, GL_R32F, size[0], size[1], size[2]);
+    glTextureParameteri(grid_texture_, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTextureParameteri(grid_texture_, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    for (const GLenum axis : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, GL_TEXTURE_WRAP_R})
+      glTextureParameteri(grid_texture_, axis, GL_CLAMP_TO_EDGE);
+  }
+  glTextureSubImage3D(grid_texture_, 0, 0, 0, 0, size[0], size[1], size[2], GL_RED, GL_FLOAT,
+                      grid_.sums().data());
+  glBindTextureUnit(kSmokeUnit, grid_texture_);
+  frame.smoke_from_world = grid_.texture_from_world();
+}
+
+int PuffsPass::sort_visible(std::span<const PointSet* const> sets, const View& view, float pixel_m) {
+  keys_.clear();
+  farthest_m_ = 0;
+  uint32_t number = 0;
+  double area = 0, volume = 0, area_px = 0, volume_px = 0;
+  for (const PointSet* set : sets) {
+    if (!set->is_puffs()) continue;
+    for (std::size_t i = 0; i < set->points.size(); ++i, ++number) {
+      const Vector3f center = set->points[i].position.head<3>();
+      const float depth = view.depth_of(center);
+      if (depth <= view.near_m || !view.sees(center, set->reach(i) + 0.01f * depth)) continue;
+      // Depth is positive, so its bits are in order; ties go by set and, in a set, by id.
+      keys_.push_back(uint64_t{std::bit_cast<uint32_t>(depth)} << 32 | number);
+      const auto r = static_cast<double>(set->points[i].position.w());
+      const double px = r / static_cast<double>(depth * pixel_m);
+      area += r * r;
+      volume += r * r * r;
+      area_px += px * px;
+      volume_px += px * px * px;
+      farthest_m_ = std::max(farthest_m_, depth + set->points[i].position.w());
+    }
+  }
+  std::sort(keys_.begin(), keys_.end());
+  if (keys_.empty()) return 1;
+  // In a picture of half or a quarter of the size, large puffs look the same and cost a fraction.
+  typical_m_ = static_cast<float>(volume / area);
+  const double typical_px = volume_px / area_px;
+  return typical_px < kHalf_px ? 1 : typical_px < kQuarter_px ? 2 : 4;
+}
+
+void PuffsPass::make_splats(std::span<const PointSet* const> sets, const View& view, const PuffLight& light,
+                            const ShadowMap& shadow_map, int factor) {
+  const FrameUniforms& frame = light.frame;
+  struct Source {
+    const PointSet* set;
+    uint32_t first;
+  };
+  std::vector<Source> sources;
+  Eigen::AlignedBox3f box;
+  uint32_t count = 0;
+  for (const PointSet* set : sets) {
+    if (!set->is_puffs()) continue;
+    sources.push_back({set, count});
+    count += static_cast<uint32_t>(set->points.size());
+    if (set->def.style == PointStyle::smoke && set->def.lit) box.extend(set->box);
+  }
+  SceneShadow shadow;
+  if (!box.isEmpty()) shadow.read(shadow_map, frame, box);
+  const float pixel_m = frame.eye.w() * static_cast<float>(factor);
+  const Vector2f half_size(0.5f * static_cast<float>(width_px_) / static_cast<float>(factor),
+                           0.5f * static_cast<float>(height_px_) / static_cast<float>(factor));
+
+  const auto splat_of = [&](uint64_t key) {
+    const auto number = static_cast<uint32_t>(key);
+    auto source = sources.begin();
+    while (source + 1 != sources.end() && (source + 1)->first <= number) ++source;
+    const PointSet& set = *source->set;
+    const std::size_t i = number - source->first;
+    const GpuPoint& point = set.points[i];
+    const Vector3f center = point.position.head<3>();
+    const float radius = point.position.w();
+    const bool flame = set.def.style == PointStyle::fire;
+
+    Splat s;
+    s.depth = view.depth_of(center);
+    const Vector4f clip = view.clip_from_world * center.homogeneous();
+    s.x = (clip.x() / clip.w() + 1) * half_size.x();
+    s.y = (clip.y() / clip.w() + 1) * half_size.y();
+    const float pixel = pixel_m * s.depth, drawn = std::max(radius, 0.7f * pixel);
+    const float radius_px = drawn / pixel, thinning = radius / drawn;
+    s.inverse_reach = 0.5f / drawn;
+    s.cover = flame ? kFlameCover : set.def.additive ? 0.0f : 1.0f;
+    s.opacity = std::min(point.color.w(), 1.0f) * thinning * thinning *
+                std::clamp(0.5f * (s.depth - view.near_m) / drawn, 0.0f, 1.0f);
+
+    // Axes of the cell on the screen, and the stretch along the motion.
+    const Shape shape(point.velocity.w());
+    const Vector3f velocity = point.velocity.head<3>();
+    Vector2f motion(velocity.dot(view.right), velocity.dot(view.up));
+    const float stretch = 1 + 0.5f * set.def.stretch_s * motion.norm() / drawn;
+    if (flame) motion += 0.2f * Vector2f(view.right.y(), view.up.y());  // what does not move burns upwards
+    const Vector2f along = motion.norm() > 1e-6f ? Vector2f(motion.normalized()) : Vector2f(0, 1);
+    float angle = 2 * std::numbers::pi_v<float> * shape.turn + kSpin * (2 * shape.turn - 1) * set.ages[i];
+    if (flame) angle = std::atan2(along.x(), along.y()) + kFlameWobble * (2 * shape.turn - 1);
+    const float c = std::cos(angle), sine = std::sin(angle);
+    const Vector2f u = (shape.mirrored ? -1.0f : 1.0f) * Vector2f(c, -sine), v(sine, c);
+    const Vector2f u_px = (u - (1 - 1 / stretch) * u.dot(along) * along) / radius_px;
+    const Vector2f v_px = (v - (1 - 1 / stretch) * v.dot(along) * along) / radius_px;
+    s.ux = u_px.x();
+    s.uy = u_px.y();
+    s.vx = v_px.x();
+    s.vy = v_px.y();
+    const Vector2f half =
+        (Vector2f::Ones() + (stretch * stretch - 1) * along.cwiseAbs2()).cwiseSqrt() * radius_px;
+    s.half_x = half.x();
+    s.half_y = half.y();
+    s.cell = atlas_->level(kind_of(set), shape.variant, 2 * radius_px * stretch);
+
+    const Vector4f fog = light.fog_to(center);
+    const Vector3f haze = s.cover * fog.head<3>();
+    const Vector3f albedo = point.color.head<3>();
+    PuffRadiance radiance;
+    Eigen::Matrix3f by_cell_normal = Eigen::Matrix3f::Zero();
+    if (flame) {
+      for (int k = 0; k < 3; ++k) {
+        radiance.constant[k] = (0.5f + shape.turn) * kFlameThin[k];
+        by_cell_normal(k, 2) = (0.5f + shape.turn) * kFlameThick[k];
+      }
+    } else if (set.def.lit) {
+      radiance = light.radiance(center, radius, albedo, shadow.visibility(center, radius),
+                                (view.eye - center).normalized());
+      Eigen::Matrix3f world_from_cell;
+      world_from_cell << u.x() * view.right + u.y() * view.up, v.x() * view.right + v.y() * view.up,
+          -view.forward;
+      by_cell_normal = radiance.slope * world_from_cell;
+    } else {
+      radiance.constant.setOnes();
+    }
+    for (int k = 0; k < 3; ++k) {
+      s.radiance[k][0] = albedo[k] * fog.w() * radiance.constant[k] + haze[k];
+      for (int j = 0; j < 3; ++j) s.radiance[k][j + 1] = albedo[k] * fog.w() * by_cell_normal(k, j);
+    }
+    return s;
+  };
+  splats_.resize(keys_.size());
+  constexpr std::size_t kBlock = 512;
+  tbb::parallel_for(std::size_t{0}, (keys_.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
+    for (std::size_t k = block * kBlock; k < std::min(keys_.size(), (block + 1) * kBlock); ++k)
+      splats_[k] = splat_of(keys_[k]);
+  });
+}
+
+void PuffsPass::read_depth(const FrameUniforms& frame, GLuint framebuffer, int factor) {
+  picture_.width_px = (width_px_ + factor - 1) / factor;
+  picture_.height_px = (height_px_ + factor - 1) / factor;
+  picture_.depth.assign(
+      static_cast<std::size_t>(picture_.width_px) * static_cast<std::size_t>(picture_.height_px), 0);
+  Eigen::AlignedBox2f seen;
+  for (const Splat& s : splats_) {
+    seen.extend(Vector2f(s.x - s.half_x, s.y - s.half_y)).extend(Vector2f(s.x + s.half_x, s.y + s.half_y));
+  }
+  const auto low = [](float x, int limit) {
+    return static_cast<int>(std::clamp(std::floor(x) - 1, 0.0f, static_cast<float>(limit)));
+  };
+  const auto high = [](float x, int limit) {
+    return static_cast<int>(std::clamp(std::ceil(x) + 1, 0.0f, static_cast<float>(limit)));
+  };
+  const int x0 = low(seen.min().x(), picture_.width_px), x1 = high(seen.max().x(), picture_.width_px);
+  const int y0 = low(seen.min().y(), picture_.height_px), y1 = high(seen.max().y(), picture_.height_px);
+  if (x0 >= x1 || y0 >= y1) return;
+  const int left = x0 * factor, bottom = y0 * factor;
+  const int width = std::min(x1 * factor, width_px_) - left,
+            height = std::min(y1 * factor, height_px_) - bottom;
+  depths_.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer);
+  glReadPixels(left, bottom, width, height, GL_DEPTH_COMPONENT, GL_FLOAT, depths_.data());
+  // The nearest and the farthest of the pixels in turns, so that what is laid over the scene finds both sides
+  // of every edge (Jansen and Bavoil, "Fast Rendering of Opacity Mapped Particles", 2011). Nearer is more.
+  tbb::parallel_for(y0, y1, [&](int y) {
+    for (int x = x0; x < x1; ++x) {
+      const bool nearest = ((x ^ y) & 1) != 0;
+      float value = nearest ? 0.0f : 1.0f;
+      for (int j = y * factor - bottom; j < std::min((y + 1) * factor - bottom, height); ++j) {
+        for (int i = x * factor - left; i < std::min((x + 1) * factor - left, width); ++i) {
+          const float d = depths_[static_cast<std::size_t>(j) * static_cast<std::size_t>(width) +
+                                  static_cast<std::size_t>(i)];
+          value = nearest ? std::max(value, d) : std::min(value, d);
+        }
+      }
+      picture_.depth[static_cast<std::size_t>(y * picture_.width_px + x)] =
+          std::min(frame.depth.x() / (value + frame.depth.y()), farthest_m_);
+    }
+  });
+}
+
+void PuffsPass::composite(GLuint framebuffer, int factor) {
+  if (picture_.x0 >= picture_.x1) return;
+  if (texture_factor_ != factor) {
+    texture_factor_ = factor;
+    colors_ = gl::make_target(GL_RGBA32F, picture_.width_px, picture_.height_px, GL_NEAREST);
+    low_depths_ = gl::make_target(GL_R32F, picture_.width_px, picture_.height_px, GL_NEAREST);
+  }
+  const auto upload = [this](GLuint texture, GLenum format, const std::vector<float>& values,
+                             int components) {
+    const int width = picture_.x1 - picture_.x0, height = picture_.y1 - picture_.y0;
+    const auto first =
+        (static_cast<std::ptrdiff_t>(picture_.y0) * picture_.width_px + picture_.x0) * components;
+    glTextureSubImage2D(texture, 0, picture_.x0, picture_.y0, width, height, format, GL_FLOAT,
+                        values.data() + first);
+  };
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, picture_.width_px);
+  upload(colors_, GL_RGBA, picture_.rgbt, 4);
+  upload(low_depths_, GL_RED, picture_.depth, 1);
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
+  glBindTextureUnit(kColorUnit, colors_);
+  glBindTextureUnit(kLowDepthUnit, low_depths_);
+
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+  glDisable(GL_DEPTH_TEST);
+  glEnable(GL_SCISSOR_TEST);
+  glScissor(picture_.x0 * factor, picture_.y0 * factor, (picture_.x1 - picture_.x0) * factor,
+            (picture_.y1 - picture_.y0) * factor);
+  program_.use();
+  glUniform3f(0, static_cast<float>(factor), kTolerance * typical_m_, farthest_m_);
+  glUniform4i(1, picture_.x0, picture_.y0, picture_.x1 - 1, picture_.y1 - 1);
+  glBindVertexArray(no_attributes_);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glDisable(GL_SCISSOR_TEST);
+  glEnable(GL_DEPTH_TEST);
+}
+
+void PuffsPass::draw(std::span<const PointSet* const> sets, const View& view, const PuffLight& light,
+                     const ShadowMap& shadow_map, GLuint framebuffer) {
+  const FrameUniforms& frame = light.frame;
+  const int factor = sort_visible(sets, view, frame.eye.w());
+  if (keys_.empty()) return;
+  make_splats(sets, view, light, shadow_map, factor);
+  read_depth(frame, framebuffer, factor);
+  draw_splats(std::span<const Splat>(splats_), picture_);
+  composite(framebuffer, factor);
+}
+
+}  // namespace offstage::render

@@ -1,0 +1,54 @@
+#pragma once
+/// Private: draws many soft particles over each other on the CPU, front to back, by tiles in parallel. Where
+/// those in front cover a tile, those behind are not touched. llvmpipe needs several times as long for the
+/// same, since every quad goes through its vertex shader and set-up on one thread.
+
+#include <span>
+#include <vector>
+
+#include "render/puff_atlas.h"
+
+namespace offstage::render {
+
+/// One puff on the screen, in pixels of the picture it is drawn in, y upwards: an affine picture of an
+/// atlas's cell, lit by its normals. It fades where the scene cuts through it.
+struct Splat {
+  float x, y;                  ///< of the centre
+  float half_x, half_y;        ///< half-size of the rectangle around it
+  float ux, uy, vx, vy;        ///< place in the atlas's cell, in [-1, 1]: u = ux * dx + uy * dy, v likewise
+  float depth, inverse_reach;  ///< along the view axis [m]; 1 / (2 * radius)
+  float opacity;               ///< where the cell covers all
+  float cover;                 ///< of its opacity that hides what is behind: 1 smoke, 0 only adds light
+  /// Radiance of red, green, blue where the normal is n: r[0] + r[1] n.x + r[2] n.y + r[3] n.z
+  float radiance[3][4];
+  PuffAtlas::Level cell;
+};
+
+/// One streak on the screen: the stroke of a soft round pen.
+struct StreakSplat {
+  float x, y;
+  float half_x, half_y;
+  float along_x, along_y;                ///< unit vector to its head
+  float half_length, inverse_radius;     ///< of the straight part; 1 / radius
+  float depth, depth_slope;              ///< at the centre [m], and its change per pixel towards the head
+  float inverse_reach;                   ///< 1 / (2 * radius) [1/m]
+  float opacity, cover;                  ///< as of a Splat
+  float softness, taper;                 ///< as in PointsDef
+  float light[3], rim[3], rim_slope[3];  ///< radiance in the middle; mirrored at the sides, by place across
+};
+
+/// What splats are drawn in. Premultiplied colour, and the share of what is behind that still shows.
+struct SplatPicture {
+  int width_px = 0, height_px = 0;
+  std::vector<float> depth;  ///< of the scene along the view axis [m], one a pixel
+  std::vector<float> rgbt;   ///< 4 a pixel; written where a splat may be
+
+  /// Rectangle of pixels that may have changed, whole tiles; the rest of rgbt is not touched.
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+};
+
+/// `front_to_back`: the order matters. The result does not depend on the number of threads.
+void draw_splats(std::span<const Splat> front_to_back, SplatPicture& picture);
+void draw_splats(std::span<const StreakSplat> front_to_back, SplatPicture& picture);
+
+}  // namespace offstage::render

@@ -1,0 +1,168 @@
+#include "render/streaks_pass.h"
+
+#include <bit>
+
+#include <tbb/parallel_for.h>
+
+namespace offstage::render {
+namespace {
+
+constexpr GLuint kColorUnit = 6;
+constexpr float kThinnest_px = 0.6f;  // radius; what is thinner stays as wide and gets fainter
+
+// A drop drawn out by its motion: it refracts the sky behind it, and it is bright when the sun stands behind
+// it.
+Vector3f drop_light(const PuffLight& light, const Vector3f& place, const Vector3f& to_eye, float visibility) {
+  const Vector3f through = 0.5f * (light.sky_reflection(-to_eye, 0.25f) + light.ambient(Vector3f::UnitY()));
+  const float forward = 0.5f - 0.5f * light.to_sun.dot(to_eye);
+  const float forward2 = forward * forward, forward8 = forward2 * forward2 * forward2 * forward2;
+  const float sun = visibility * std::exp(-light.grid.depth(place)) * (0.12f + 0.9f * forward8);
+  return through + sun * light.frame.sun_radiance.head<3>();
+}
+
+// A place on the screen [px], and the distance along the view axis.
+Vector3f project(const View& view, const Vector3f& place, const Vector2f& half_size) {
+  const Vector4f clip = view.clip_from_world * place.homogeneous();
+  return {(clip.x() / clip.w() + 1) * half_size.x(), (clip.y() / clip.w() + 1) * half_size.y(), clip.w()};
+}
+
+StreakSplat splat_of(const GpuPoint& point, const PointsDef& def, const View& view, const PuffLight& light,
+                     const SceneShadow& shadow, const Vector2f& half_size) {
+  const Vector3f center = point.position.head<3>(), to_eye = (view.eye - center).normalized();
+  const float distance = view.depth_of(center), pixel = light.frame.eye.w() * distance;
+  const float radius = point.position.w(), drawn = std::max(radius, kThinnest_px * pixel);
+
+  // With its rounded ends it is as long as it moved; its ends must not come behind the eye.
+  Vector3f half_axis = 0.5f * def.stretch_s * point.velocity.head<3>();
+  const float half_length = half_axis.norm();
+  half_axis *= half_length > drawn ? 1 - drawn / half_length : 0;
+  const float towards = half_axis.dot(view.forward), room = distance - view.near_m;
+  if (std::abs(towards) > 0.9f * room) half_axis *= 0.9f * room / std::abs(towards);
+  const Vector3f head = project(view, center + half_axis, half_size),
+                 tail = project(view, center - half_axis, half_size);
+
+  StreakSplat s;
+  const Vector2f axis = 0.5f * (head - tail).head<2>();
+  s.half_length = axis.norm();
+  const Vector2f along = s.half_length > 1e-3f ? Vector2f(axis / s.half_length) : Vector2f(0, 1);
+  s.along_x = along.x();
+  s.along_y = along.y();
+  s.x = 0.5f * (head.x() + tail.x());
+  s.y = 0.5f * (head.y() + tail.y());
+  const float radius_px = drawn / pixel;
+  s.inverse_radius = 1 / radius_px;
+  s.half_x = std::abs(axis.x()) + radius_px;
+  s.half_y = std::abs(axis.y()) + radius_px;
+  s.depth = 0.5f * (head.z() + tail.z());
+  s.depth_slope = 0.5f * (head.z() - tail.z()) / std::max(s.half_length, 1.0f);
+  s.inverse_reach = 0.5f / drawn;
+  s.opacity =
+      std::min(point.color.w(), 1.0f) * (radius / drawn) * std::clamp(0.5f * room / drawn, 0.0f, 1.0f);
+  s.cover = def.additive ? 0.0f : 1.0f;
+  s.softness = std::clamp(def.softness, 0.01f, 1.0f);
+  s.taper = def.taper;
+
+  const Vector4f fog = light.fog_to(center);
+  const Vector3f own = point.color.head<3>(), haze = s.cover * fog.head<3>();
+  Vector3f middle = own, left = own, right = own;
+  if (def.lit) {
+    middle = own.cwiseProduct(drop_light(light, center, to_eye, shadow.visibility(center)));
+    const Vector3f across = along.y() * view.right - along.x() * view.up;
+    left = light.sky_reflection((-across - 0.6f * to_eye).normalized(), 0.1f);
+    right = light.sky_reflection((across - 0.6f * to_eye).normalized(), 0.1f);
+  }
+  for (int c = 0; c < 3; ++c) {
+    s.light[c] = middle[c] * fog.w() + haze[c];
+    s.rim[c] = 0.5f * (left[c] + right[c]) * fog.w() + haze[c];
+    s.rim_slope[c] = 0.5f * (right[c] - left[c]) * fog.w();
+  }
+  return s;
+}
+
+}  // namespace
+
+StreaksPass::StreaksPass(int width_px, int height_px) {
+  picture_.width_px = width_px;
+  picture_.height_px = height_px;
+}
+
+void StreaksPass::sort_visible(std::span<const PointSet* const> sets, const View& view) {
+  sources_.clear();
+  keys_.clear();
+  uint32_t number = 0;
+  for (const PointSet* set : sets) {
+    if (set->def.style != PointStyle::streak) continue;
+    sources_.push_back({set, number});
+    for (std::size_t i = 0; i < set->points.size(); ++i, ++number) {
+      const Vector3f center = set->points[i].position.head<3>();
+      const float depth = view.depth_of(center);
+      // The margin covers what is drawn a pixel wide because it is thinner.
+      if (depth <= view.near_m || !view.sees(center, set->reach(i) + 0.01f * depth)) continue;
+      // Depth is positive, so its bits are in order; ties go by set and, in a set, by id.
+      keys_.push_back(uint64_t{std::bit_cast<uint32_t>(depth)} << 32 | number);
+    }
+  }
+  std::sort(keys_.begin(), keys_.end());
+}
+
+void StreaksPass::read_depth(const FrameUniforms& frame, GLuint framebuffer) {
+  const auto width = static_cast<std::size_t>(picture_.width_px),
+             height = static_cast<std::size_t>(picture_.height_px);
+  picture_.depth.resize(width * height);
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer);
+  glReadPixels(0, 0, picture_.width_px, picture_.height_px, GL_DEPTH_COMPONENT, GL_FLOAT,
+               picture_.depth.data());
+  tbb::parallel_for(std::size_t{0}, height, [&](std::size_t y) {
+    for (std::size_t i = y * width; i < (y + 1) * width; ++i)
+      picture_.depth[i] = frame.depth.x() / (picture_.depth[i] + frame.depth.y());
+  });
+}
+
+void StreaksPass::composite(GLuint framebuffer) {
+  const int x = picture_.x0, y = picture_.y0, width = picture_.x1 - x, height = picture_.y1 - y;
+  if (width <= 0) return;
+  if (colors_ == 0) colors_ = gl::make_target(GL_RGBA32F, picture_.width_px, picture_.height_px, GL_NEAREST);
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, picture_.width_px);
+  glTextureSubImage2D(colors_, 0, x, y, width, height, GL_RGBA, GL_FLOAT,
+                      picture_.rgbt.data() + (static_cast<std::ptrdiff_t>(y) * picture_.width_px + x) * 4);
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
+  glBindTextureUnit(kColorUnit, colors_);
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+  glDisable(GL_DEPTH_TEST);
+  glEnable(GL_SCISSOR_TEST);
+  glScissor(x, y, width, height);
+  program_.use();
+  glBindVertexArray(no_attributes_);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glDisable(GL_SCISSOR_TEST);
+  glEnable(GL_DEPTH_TEST);
+}
+
+void StreaksPass::draw(std::span<const PointSet* const> sets, const View& view, const PuffLight& light,
+                       const ShadowMap& shadow_map, GLuint framebuffer) {
+  sort_visible(sets, view);
+  if (keys_.empty()) return;
+  Eigen::AlignedBox3f box;
+  for (const Source& source : sources_)
+    if (source.set->def.lit) box.extend(source.set->box);
+  if (!box.isEmpty()) shadow_.read(shadow_map, light.frame, box);
+
+  const Vector2f half_size(0.5f * static_cast<float>(picture_.width_px),
+                           0.5f * static_cast<float>(picture_.height_px));
+  splats_.resize(keys_.size());
+  constexpr std::size_t kBlock = 512;
+  tbb::parallel_for(std::size_t{0}, (keys_.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
+    for (std::size_t k = block * kBlock; k < std::min(keys_.size(), (block + 1) * kBlock); ++k) {
+      const auto number = static_cast<uint32_t>(keys_[k]);
+      auto source = sources_.end() - 1;
+      while (source->first > number) --source;
+      splats_[k] = splat_of(source->set->points[number - source->first], source->set->def, view, light,
+                            shadow_, half_size);
+    }
+  });
+  read_depth(light.frame, framebuffer);
+  draw_splats(std::span<const StreakSplat>(splats_), picture_);
+  composite(framebuffer);
+}
+
+}  // namespace offstage::render
