@@ -5,6 +5,8 @@
 #include <limits>
 #include <tuple>
 
+#include <oneapi/tbb/parallel_for.h>
+
 namespace offstage::sim {
 namespace {
 
@@ -268,84 +270,117 @@ void SolverChoice::learn(const Island& island, Real duration, bool solved) {
 
 // Fast
 
-ContactWork FastContacts::solve(std::span<const Island* const> islands, const ContactInterval& interval) {
-  const Real h = interval.duration;
-  bodies_.clear();
-  patches_.clear();
+namespace {
+
+/// Below so many a loop is not worth a second thread.
+constexpr std::size_t kSerial = 256, kBlock = 64;
+
+template <class Work>
+void for_each_index(std::size_t count, Work&& work) {
+  if (count < kSerial) {
+    for (std::size_t i = 0; i < count; ++i) work(i);
+    return;
+  }
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kBlock), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) work(i);
+  });
+}
+
+RelaxedBody relaxed(const Body& body, Real duration) {
+  RelaxedBody b;
+  if (body.is_awake()) {
+    b.inverse_mass = 1 / body.rigid.mass;
+    b.inverse_inertia = inverse_inertia(body.start, body.start.orientation);
+    b.velocity = body.start_twist.velocity;
+    b.angular_velocity = body.start_twist.angular_velocity;
+    b.free_acceleration = (body.rigid.velocity() - b.velocity) / duration;
+    b.free_angular_acceleration = (body.rigid.angular_velocity() - b.angular_velocity) / duration;
+  } else if (body.is_kinematic()) {
+    b.velocity = body.drive.velocity;
+    b.angular_velocity = body.drive.angular_velocity;
+  }
+  return b;
+}
+
+/// Of a manifold, with the forces that it begins with.
+void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifold& m) {
+  const Vec3 centre_a = origin(pair.a()), surface = surface_velocity(pair);
+  set_points(patch, m.manifold, m.frame, centre_a, origin(pair.b()));
+  const Vec3 u = in_frame(m.frame, pair.relative_velocity(centre_a + patch.arm_a) + surface);
+  patch.offset = in_frame(m.frame, surface);
+  std::tie(patch.friction_t, patch.friction_k) = friction(pair.surface(), u);
+  for (uint32_t k = 0; k < patch.count; ++k) {
+    const PointForce& f = m.forces[k];
+    patch.points[k].force = f.last.x();
+    patch.points[k].mean_force = f.mean.x();
+    patch.mean_friction += Vec3(f.mean.y(), f.mean.z(), 0);
+    patch.force_t += f.last.y();
+    patch.force_k += f.last.z();
+  }
+  patch.torque_n = m.torque;
+  patch.mean_friction.z() = m.mean_torque;
+}
+
+/// The patch's friction is shared out by the points' normal forces.
+void tell_forces(const ContactPatch& patch, Real duration, PlacedManifold& m) {
+  Real sum = 0;
+  for (uint32_t k = 0; k < patch.count; ++k) sum += patch.points[k].force;
+  for (uint32_t k = 0; k < patch.count; ++k) {
+    const ContactPatch::Point& p = patch.points[k];
+    const Real share = sum > 0 ? p.force / sum : 1.0 / patch.count;
+    PointForce& f = m.forces[k];
+    f.now =
+        Vec3(p.impulse, share * patch.friction_impulse.x(), share * patch.friction_impulse.y()) / duration;
+    f.last = {p.force, share * patch.force_t, share * patch.force_k};
+    f.mean = {p.mean_force, share * patch.mean_friction.x(), share * patch.mean_friction.y()};
+  }
+  m.torque = patch.torque_n;
+  m.mean_torque = patch.mean_friction.z();
+}
+
+void move(Body& body, const RelaxedBody& b) {
+  displace(body, b.displacement, b.rotation_vector);
+  RigidBody& r = body.rigid;
+  r.momentum = r.mass * b.velocity;
+  r.angular_momentum = angular_momentum(r, r.orientation, b.angular_velocity);
+}
+
+}  // namespace
+
+void FastContacts::collect(std::span<const Island* const> islands, Real touching) {
+  members_.clear();
   origins_.clear();
-  const auto add = [&](const Body& body) {
-    RelaxedBody b;
-    if (body.is_awake()) {
-      b.inverse_mass = 1 / body.rigid.mass;
-      b.inverse_inertia = inverse_inertia(body.start, body.start.orientation);
-      b.velocity = body.start_twist.velocity;
-      b.angular_velocity = body.start_twist.angular_velocity;
-      b.free_acceleration = (body.rigid.velocity() - b.velocity) / h;
-      b.free_angular_acceleration = (body.rigid.angular_velocity() - b.angular_velocity) / h;
-    } else if (body.is_kinematic()) {
-      b.velocity = body.drive.velocity;
-      b.angular_velocity = body.drive.angular_velocity;
-    }
-    bodies_.push_back(b);
-    return static_cast<uint32_t>(bodies_.size() - 1);
+  const auto add = [this](Body& body) {
+    members_.push_back(&body);
+    return static_cast<uint32_t>(members_.size() - 1);
   };
   for (const Island* island : islands)
     for (Body* body : island->bodies) body->row = add(*body);
+  moved_ = members_.size();
   for (const Island* island : islands)
     for (ContactPair* pair : island->pairs) {
+      if (pair->by_event && pair->separation() > touching) continue;
       const uint32_t a = pair->a().is_awake() ? pair->a().row : add(pair->a());
       const uint32_t b = pair->b().is_awake() ? pair->b().row : add(pair->b());
-      const Vec3 surface = surface_velocity(*pair);
-      for (PlacedManifold& m : pair->manifolds()) {
-        if (pair->by_event && pair->separation() > interval.touching) continue;
-        ContactPatch& patch = patches_.emplace_back();
-        set_points(patch, m.manifold, m.frame, origin(pair->a()), origin(pair->b()));
-        patch.a = a;
-        patch.b = b;
-        const Vec3 place = origin(pair->a()) + patch.arm_a;
-        const Vec3 u = in_frame(m.frame, pair->relative_velocity(place) + surface);
-        patch.offset = in_frame(m.frame, surface);
-        std::tie(patch.friction_t, patch.friction_k) = friction(pair->surface(), u);
-        for (uint32_t k = 0; k < patch.count; ++k) {
-          const PointForce& f = m.forces[k];
-          patch.points[k].force = f.last.x();
-          patch.points[k].mean_force = f.mean.x();
-          patch.mean_friction += Vec3(f.mean.y(), f.mean.z(), 0);
-          patch.force_t += f.last.y();
-          patch.force_k += f.last.z();
-        }
-        patch.torque_n = m.torque;
-        patch.mean_friction.z() = m.mean_torque;
-        origins_.push_back(&m);
-      }
+      for (PlacedManifold& m : pair->manifolds()) origins_.push_back({pair, &m, a, b});
     }
-  if (patches_.empty()) return {};
-  const ContactWork work = solver_.solve(bodies_, patches_, {h, relaxation_substeps(h)});
+}
 
-  for (std::size_t i = 0; i < patches_.size(); ++i) {
-    const ContactPatch& patch = patches_[i];
-    // The patch's friction is shared out by the points' normal forces.
-    Real sum = 0;
-    for (uint32_t k = 0; k < patch.count; ++k) sum += patch.points[k].force;
-    for (uint32_t k = 0; k < patch.count; ++k) {
-      const Real share = sum > 0 ? patch.points[k].force / sum : 1.0 / patch.count;
-      PointForce& f = origins_[i]->forces[k];
-      f.now = {patch.points[k].impulse / h, share * patch.friction_impulse.x() / h,
-               share * patch.friction_impulse.y() / h};
-      f.last = {patch.points[k].force, share * patch.force_t, share * patch.force_k};
-      f.mean = {patch.points[k].mean_force, share * patch.mean_friction.x(), share * patch.mean_friction.y()};
-    }
-    origins_[i]->torque = patch.torque_n;
-    origins_[i]->mean_torque = patch.mean_friction.z();
-  }
-  for (const Island* island : islands)
-    for (Body* body : island->bodies) {
-      const RelaxedBody& b = bodies_[body->row];
-      displace(*body, b.displacement, b.rotation_vector);
-      body->rigid.momentum = body->rigid.mass * b.velocity;
-      body->rigid.angular_momentum =
-          angular_momentum(body->rigid, body->rigid.orientation, b.angular_velocity);
-    }
+ContactWork FastContacts::solve(std::span<const Island* const> islands, const ContactInterval& interval) {
+  const Real h = interval.duration;
+  collect(islands, interval.touching);
+  if (origins_.empty()) return {};
+  bodies_.resize(members_.size());
+  patches_.resize(origins_.size());
+  for_each_index(bodies_.size(), [&](std::size_t i) { bodies_[i] = relaxed(*members_[i], h); });
+  for_each_index(patches_.size(), [&](std::size_t i) {
+    const auto& [pair, manifold, a, b] = origins_[i];
+    patches_[i] = {.a = a, .b = b, .frame = manifold->frame};
+    set_patch(patches_[i], *pair, *manifold);
+  });
+  const ContactWork work = solver_.solve(bodies_, patches_, {h, relaxation_substeps(h)});
+  for_each_index(patches_.size(), [&](std::size_t i) { tell_forces(patches_[i], h, *origins_[i].manifold); });
+  for_each_index(moved_, [&](std::size_t i) { move(*members_[i], bodies_[i]); });
   return work;
 }
 

@@ -50,9 +50,18 @@ class FastContacts {
   ContactWork solve(std::span<const Island* const> islands, const ContactInterval& interval);
 
  private:
+  struct Origin {
+    ContactPair* pair;
+    PlacedManifold* manifold;
+    uint32_t a, b;
+  };
+  void collect(std::span<const Island* const> islands, Real touching);
+
+  std::vector<Body*> members_;  // those that move first, then one for each contact with another
+  std::size_t moved_ = 0;
   std::vector<RelaxedBody> bodies_;
+  std::vector<Origin> origins_;  // of the patches
   std::vector<ContactPatch> patches_;
-  std::vector<PlacedManifold*> origins_;
   RelaxationSolver solver_;
 };
 
