@@ -48,7 +48,7 @@ void CoupledSystem::resolve(const WorldState& world, std::span<const ForceDef* c
 }
 
 void CoupledSystem::gather(WorldState& world, std::span<Body* const> bodies, bool all_systems) {
-  if (world.springs.empty()) {
+  if (world.springs.empty() && !world.has_pair_forces()) {
     lone_.assign(bodies.begin(), bodies.end());
     return;
   }

@@ -1,7 +1,7 @@
 #pragma once
-/// The motion of bodies, and of the particles that springs hold on to, between contacts (physics E6, R1, R2):
-/// a body that no spring holds flies alone, what springs join is integrated together. How an object moves
-/// does not depend on what else moves.
+/// The motion of bodies, and of the particles that springs hold on to or that act on each other, between
+/// contacts (physics E6, R1, R2, P2): a body that no spring holds flies alone, what is joined is integrated
+/// together. How an object moves does not depend on what else moves.
 
 #include <vector>
 
@@ -11,8 +11,8 @@ namespace offstage::sim {
 
 class CoupledSystem {
  public:
-  /// All dynamic bodies, and all particle systems that springs hold on to. The world must not gain or lose
-  /// anything while this is in use.
+  /// All dynamic bodies, and all particle systems that springs hold on to or whose particles act on others.
+  /// The world must not gain or lose anything while this is in use.
   explicit CoupledSystem(WorldState& world, std::span<const ForceDef* const> forces = {});
   /// These bodies, and what joins them; for the rest of a sub-step that one of everything has begun. They
   /// must contain all that are connected() to them.

@@ -6,20 +6,36 @@
 namespace offstage::sim {
 
 SpringGraph::SpringGraph(const WorldState& world) : world_(world) {
-  world.springs.for_each([&](SpringHandle, const Spring& spring) {
-    for (const Attachment* a : {&spring.def.a, &spring.def.b})
-      if (const void* o = object(*a)) objects_.push_back(o);
+  for_each_link([&](const void* a, const void* b) {
+    for (const void* o : {a, b})
+      if (o) objects_.push_back(o);
   });
   std::sort(objects_.begin(), objects_.end());
   objects_.erase(std::unique(objects_.begin(), objects_.end()), objects_.end());
   parent_.resize(objects_.size());
   std::iota(parent_.begin(), parent_.end(), std::size_t{0});
-  world.springs.for_each([&](SpringHandle, const Spring& spring) {
-    const std::size_t a = find(object(spring.def.a)), b = find(object(spring.def.b));
+  for_each_link([&](const void* object_a, const void* object_b) {
+    const std::size_t a = find(object_a), b = find(object_b);
     if (a != kNone && b != kNone) parent_[std::max(a, b)] = std::min(a, b);
   });
   // A parent comes before its children, so one pass leaves only roots.
   for (std::size_t& parent : parent_) parent = parent_[parent];
+}
+
+/// Calls f(a, b) for what is joined directly; either may be null, or both the same.
+template <class F>
+void SpringGraph::for_each_link(F&& f) const {
+  world_.springs.for_each(
+      [&](SpringHandle, const Spring& spring) { f(object(spring.def.a), object(spring.def.b)); });
+  world_.force_defs.for_each([&](ForceHandle, const ForceDef& force) {
+    if (!force.is_pairwise()) return;
+    const void* first = nullptr;
+    for (ParticleSystemHandle handle : force.systems)
+      if (const void* system = world_.systems.find(handle)) {
+        if (!first) first = system;
+        f(first, system);
+      }
+  });
 }
 
 std::size_t SpringGraph::component(const Spring& spring) const {

@@ -1,6 +1,6 @@
 #pragma once
-/// What springs join (physics E7): dynamic bodies and particle systems that are connected through springs,
-/// however far, form a component. A particle system counts as one object.
+/// What springs and forces between particles join (physics E7): dynamic bodies and particle systems that are
+/// connected through them, however far, form a component. A particle system counts as one object.
 
 #include <span>
 #include <utility>
@@ -18,7 +18,7 @@ class SpringGraph {
 
   /// Numbers of components are below this.
   std::size_t size() const { return objects_.size(); }
-  /// A number that connected objects share; kNone for what no spring holds.
+  /// A number that connected objects share; kNone for what nothing joins.
   std::size_t component(const Body& body) const { return find(&body); }
   std::size_t component(const ParticleSystem& system) const { return find(&system); }
   /// That of its ends; kNone if neither can be moved.
@@ -26,6 +26,8 @@ class SpringGraph {
 
  private:
   const void* object(const Attachment& a) const;
+  template <class F>
+  void for_each_link(F&& f) const;
   std::size_t find(const void* object) const;
   std::size_t root(std::size_t i) const;
 

@@ -81,13 +81,12 @@ void SpringNetwork::jacobian(Real t, std::span<const Real> x, std::span<const Re
     const StateColumns columns{static_cast<int>(kBodyX * i), n + static_cast<int>(kBodyP * i)};
     add_block(RigidDerivative(at).own_rates(forces_, t), columns, columns, entries);
   }
+  const auto particles_x = x.subspan(particle_x(0));
   for (const Group& g : groups_)
-    for (std::size_t k = 0; k < 3 * g.members.size(); ++k) {
-      const int at_x = static_cast<int>(particle_x(g.offset) + k);
-      const int at_p = n + static_cast<int>(particle_p(g.offset) + k);
-      entries.emplace_back(at_x, at_p, 1);
-      entries.emplace_back(at_p, at_p, -g.forces.drag / g.system->arrays.mass[g.members[k / 3]]);
-    }
+    g.forces.jacobian(t, g.part(particles_x), g.mass, static_cast<int>(particle_x(g.offset)),
+                      n + static_cast<int>(particle_p(g.offset)), entries);
+  pair_forces_.jacobian(t, particles_x, static_cast<int>(particle_x(0)), n + static_cast<int>(particle_p(0)),
+                        entries);
   for (const ActiveSpring& s : springs_) add_derivatives(s, t, x, p, entries);
 }
 

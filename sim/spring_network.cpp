@@ -10,14 +10,32 @@ SpringNetwork::SpringNetwork(const WorldState& world, NetworkMembers members, co
   x_.resize(particle_x(particles_));
   p_.resize(particle_p(particles_));
   add_springs(world, members.springs);
+  add_pair_forces(world);
 }
 
 void SpringNetwork::add_group(const WorldState& world, ParticleSystem& system) {
-  Group group{&system, world.forces(system), {}, particles_};
+  Group group{&system, world.forces(system), {}, {}, particles_};
   for (std::size_t i = 0; i < system.arrays.size(); ++i)
-    if (system.whole_step(i)) group.members.push_back(i);
+    if (system.whole_step(i)) {
+      group.members.push_back(i);
+      group.mass.push_back(system.arrays.mass[i]);
+    }
   particles_ += group.members.size();
   groups_.push_back(std::move(group));
+}
+
+/// Newborns take part from the next sub-step on.
+void SpringNetwork::add_pair_forces(const WorldState& world) {
+  world.force_defs.for_each([&](ForceHandle, const ForceDef& def) {
+    if (!def.is_pairwise()) return;
+    std::vector<PairMember> members;
+    for (const Group& g : groups_) {
+      if (!def.acts_on(g.system->handle)) continue;
+      for (std::size_t k = 0; k < g.members.size(); ++k)
+        members.push_back({g.offset + k, g.mass[k], g.system->arrays.charge[g.members[k]]});
+    }
+    if (!members.empty()) pair_forces_.add(def, std::move(members));
+  });
 }
 
 bool SpringNetwork::holds(const ParticleSystem& system) const {
@@ -121,11 +139,11 @@ void SpringNetwork::force(Real t, std::span<const Real> x, std::span<const Real>
                           std::span<Real> dp) const {
   for (std::size_t i = 0; i < bodies_.size(); ++i)
     stage(i, x, p).force(forces_, t, dp.subspan(kBodyP * i, kBodyP));
+  const auto particles_x = x.subspan(particle_x(0)), particles_v = p.subspan(particle_p(0));
+  const auto particles_dv = dp.subspan(particle_p(0));
   for (const Group& g : groups_)
-    for (std::size_t k = 0; k < g.members.size(); ++k) {
-      const std::size_t at = particle_p(g.offset + k);
-      vec3(dp, at) = g.forces.acceleration(vec3(p, at), g.system->arrays.mass[g.members[k]]);
-    }
+    g.forces.accelerate(t, g.part(particles_x), g.part(particles_v), g.mass, g.part(particles_dv));
+  pair_forces_.accelerate(t, particles_x, particles_dv);
   for (const ActiveSpring& s : springs_) {
     const Pull f = pull(s, t, x, p);
     apply(s.a, -f.size * f.along, x, dp);
@@ -160,7 +178,9 @@ void SpringNetwork::step(const Integrator& integrator, Real t, Real h, Integrato
   for (const Body* body : bodies_)
     if (const Real next = body->rigid.next_step; next > 0)
       work.next_step = work.next_step > 0 ? std::min(work.next_step, next) : next;
-  integrator.step(*this, t, h, x_, p_, work);
+  const bool particles_only = bodies_.empty() && springs_.empty();
+  (particles_only ? sim::integrator(groups_.front().system->def.integrator) : integrator)
+      .step(*this, t, h, x_, p_, work);
   for (Body* body : bodies_) body->rigid.next_step = work.next_step;
   store(x_, p_);
 }

@@ -1,5 +1,6 @@
 #pragma once
-/// Bodies and particles that springs join, as one dynamic system (physics R1, R2, P2).
+/// Bodies and particles that springs and forces between particles join, as one dynamic system (physics R1,
+/// R2, P2).
 ///
 /// Layout: per body x = [position 3, quaternion x y z w], p = [L 3, H 3]; then per particle x = position, p =
 /// velocity.
@@ -8,11 +9,12 @@
 #include <vector>
 
 #include "sim/dynamics/free_body.h"
+#include "sim/dynamics/pair_forces.h"
 #include "sim/world_impl.h"
 
 namespace offstage::sim {
 
-/// What a network consists of: a component of the graph of springs, or several.
+/// What a network consists of: a component of the SpringGraph, or several.
 struct NetworkMembers {
   std::vector<Body*> bodies;
   std::vector<ParticleSystem*> systems;
@@ -29,7 +31,8 @@ class SpringNetwork final : public DynamicSystem {
 
   /// Tells the particle systems that a sub-step begins.
   void begin_substep() const;
-  /// Advances the members from t to t + h.
+  /// Advances the members from t to t + h. Where only forces between particles join them, the integrator is
+  /// that of the first system.
   void step(const Integrator& integrator, Real t, Real h, IntegratorWorkspace& work);
 
   /// Keeps the state, and takes the members back to the one kept last.
@@ -46,7 +49,14 @@ class SpringNetwork final : public DynamicSystem {
     ParticleSystem* system;
     ParticleForces forces;
     std::vector<std::size_t> members;  // the particles that live through the whole sub-step
+    std::vector<Real> mass;            // of these
     std::size_t offset;                // of the first in units of 3, after the bodies
+
+    /// The part of these in all particles' coordinates or velocities.
+    template <class T>
+    std::span<T> part(std::span<T> particles) const {
+      return particles.subspan(3 * offset, 3 * members.size());
+    }
   };
   /// A spring's end, resolved to where it is in the state.
   struct End {
@@ -82,6 +92,7 @@ class SpringNetwork final : public DynamicSystem {
     return {bodies_[body]->rigid, x.subspan(kBodyX * body, kBodyX), p.subspan(kBodyP * body, kBodyP)};
   }
   void add_group(const WorldState& world, ParticleSystem& system);
+  void add_pair_forces(const WorldState& world);
   void add_springs(const WorldState& world, std::span<const Spring* const> springs);
   End resolve(const WorldState& world, const Attachment& a, const BodyIndex& index) const;
   PointMotion motion(const End& end, Real t, std::span<const Real> x, std::span<const Real> p) const;
@@ -98,6 +109,7 @@ class SpringNetwork final : public DynamicSystem {
   std::vector<Body*> bodies_;
   std::vector<Group> groups_;
   std::vector<ActiveSpring> springs_;
+  PairForces pair_forces_;
   std::size_t particles_ = 0;
   std::vector<Real> x_, p_, saved_x_, saved_p_, saved_steps_;
 };

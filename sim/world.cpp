@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "sim/coupled_system.h"
+#include "sim/dynamics/pair_forces.h"
 #include "sim/world_impl.h"
 
 namespace offstage::sim {
@@ -111,6 +112,28 @@ RigidBody make_rigid_body(const std::string& object, const BodyDef& def, const S
   return rigid;
 }
 
+/// Of the particles that act on each other.
+Real pair_energy(const WorldState& world, Real time) {
+  Real energy = 0;
+  world.force_defs.for_each([&](ForceHandle, const ForceDef& def) {
+    if (!def.is_pairwise()) return;
+    std::vector<Real> x;
+    std::vector<PairMember> members;
+    world.systems.for_each([&](ParticleSystemHandle handle, const ParticleSystem& system) {
+      if (!def.acts_on(handle)) return;
+      const ParticleArrays& p = system.arrays;
+      for (std::size_t i = 0; i < p.size(); ++i) {
+        members.push_back({members.size(), p.mass[i], p.charge[i]});
+        x.insert(x.end(), p.position[i].begin(), p.position[i].end());
+      }
+    });
+    PairForces forces;
+    forces.add(def, std::move(members));
+    energy += forces.potential_energy(time, x);
+  });
+  return energy;
+}
+
 }  // namespace
 
 Motion Body::motion(Real now, Real time) const {
@@ -161,6 +184,20 @@ bool WorldState::is_alive(const Attachment& a) const {
     return system && system->find(p->id);
   }
   return true;
+}
+
+ParticleForces WorldState::forces(const ParticleSystem& system) const {
+  std::vector<const ForceDef*> acting;
+  force_defs.for_each([&](ForceHandle, const ForceDef& f) {
+    if (!f.is_explosion() && !f.is_pairwise() && f.acts_on(system.handle)) acting.push_back(&f);
+  });
+  return {system.def, def.gravity, def.wind, std::move(acting)};
+}
+
+bool WorldState::has_pair_forces() const {
+  bool any = false;
+  force_defs.for_each([&](ForceHandle, const ForceDef& f) { any |= f.is_pairwise(); });
+  return any;
 }
 
 Vec3 WorldState::position(const Attachment& a) const {
@@ -249,7 +286,9 @@ ParticleSystemHandle World::add_particle_system(const ParticleSystemDef& def) {
   check_finite(object, "force", def.force);
   ParticleSystem system;
   system.def = def;
-  return impl_->systems.insert(std::move(system));
+  const ParticleSystemHandle handle = impl_->systems.insert(std::move(system));
+  impl_->systems[handle].handle = handle;
+  return handle;
 }
 
 SpringHandle World::add_spring(const SpringDef& def) {
@@ -288,6 +327,7 @@ bool World::remove(BodyHandle body) {
   if (!found) return false;
   impl_->let_go(**found);
   impl_->bodies.erase(body);
+  impl_->nudges.erase(body.index);
   if (impl_->broad_phase.contains(body.index)) impl_->broad_phase.remove(body.index);
   std::erase_if(impl_->moved, [&](const MovedBody& m) { return m.body == body; });
   impl_->fixed_changed = impl_->lists_changed = true;
@@ -309,6 +349,7 @@ void World::set_velocity(BodyHandle handle, const Vec3& velocity, const Vec3& an
 
 bool World::remove(ParticleSystemHandle system) {
   if (!impl_->systems.erase(system)) return false;
+  std::erase_if(impl_->particle_events, [&](const ParticleEvent& e) { return e.system == system; });
   impl_->remove_dead_springs();
   return true;
 }
@@ -347,6 +388,9 @@ const ParticleArrays& World::particles(ParticleSystemHandle system) const {
 }
 const ParticleSystemDef& World::particle_system_def(ParticleSystemHandle system) const {
   return impl_->systems[system].def;
+}
+std::span<const ParticleEvent> World::particle_events() const {
+  return impl_->particle_events;
 }
 Motion World::body_motion(BodyHandle body, Real time) const {
   return impl_->bodies[body]->motion(impl_->now, time);
@@ -434,6 +478,7 @@ Energy World::energy() const {
     const Real stretch = (impl_->position(s.def.a) - impl_->position(s.def.b)).norm() - s.rest_length;
     e.elastic += s.def.stiffness * stretch * stretch / 2;
   });
+  e.potential += pair_energy(*impl_, impl_->now);
   return e;
 }
 

@@ -31,10 +31,8 @@ namespace offstage::sim {
 class CollisionMesh;
 
 struct BodyTag {};
-struct ParticleSystemTag {};
 struct SpringTag {};
 using BodyHandle = Handle<BodyTag>;
-using ParticleSystemHandle = Handle<ParticleSystemTag>;
 using SpringHandle = Handle<SpringTag>;
 
 enum class MotionType {
@@ -155,7 +153,8 @@ struct StepReport {
   NonFinite non_finite;  ///< the first such object, if not finite
 };
 
-/// Mechanical energy [J]: kinetic, gravitational (zero at y = 0) and elastic.
+/// Mechanical energy [J]: kinetic, gravitational (zero at y = 0) with that of the forces between particles
+/// (zero far out), and elastic.
 struct Energy {
   Real kinetic = 0, potential = 0, elastic = 0;
   Real total() const { return kinetic + potential + elastic; }
@@ -249,6 +248,9 @@ class World {
   Motion body_motion(BodyHandle body, Real time) const;
   const ParticleArrays& particles(ParticleSystemHandle system) const;
   const ParticleSystemDef& particle_system_def(ParticleSystemHandle system) const;
+  /// What happened to the particles of systems that report it, in the last sub-step; in the order of system
+  /// and id, of one particle in the order of time.
+  std::span<const ParticleEvent> particle_events() const;
   void for_each_body(const std::function<void(BodyHandle)>& f) const;
   void for_each_particle_system(const std::function<void(ParticleSystemHandle)>& f) const;
   /// The contact points at the end of the last step, in the order of their bodies.

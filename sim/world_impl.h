@@ -13,6 +13,7 @@
 #include "sim/collision/obstacles.h"
 #include "sim/contact/contact_solve.h"
 #include "sim/contact_graph.h"
+#include "sim/dynamics/particle_collisions.h"
 #include "sim/dynamics/particle_system.h"
 #include "sim/world.h"
 
@@ -34,7 +35,10 @@ struct WorldState {
   SlotMap<Spring, SpringTag> springs;
   SlotMap<ForceDef, ForceTag> force_defs;
 
-  ParticleForces forces(const ParticleSystem& system) const { return {system.def, def.gravity, def.wind}; }
+  /// What acts on each particle of a system alone.
+  ParticleForces forces(const ParticleSystem& system) const;
+  /// Whether particles act on each other.
+  bool has_pair_forces() const;
   /// Whether the object that an attachment names exists.
   bool is_alive(const Attachment& a) const;
   Vec3 position(const Attachment& a) const;
@@ -102,6 +106,9 @@ struct World::Impl : WorldState {
   // Particles
   void step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report);
   void update_obstacles(Real h);
+  void collide_particles(const ParticleStage& stage, const CoupledSystem& coupled);
+  void add_events(std::vector<ParticleEvent>& events);
+  void push_bodies(std::span<const Reaction> reactions);
 
   // Time is a base plus a whole number of equal samplings: no sum of rounded steps.
   Real base_time = 0, sampling_time = 0;
@@ -135,6 +142,9 @@ struct World::Impl : WorldState {
   // (E9).
   Obstacles fixed_obstacles, moving_obstacles;
   bool fixed_changed = true;
+  ParticleCollisions particle_collisions;
+  std::vector<ParticleEvent> particle_events;  // of the last sub-step
+  std::map<uint32_t, Reaction> nudges;         // too weak to wake the body, by its slot; they add up
 };
 
 }  // namespace offstage::sim

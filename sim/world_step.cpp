@@ -73,7 +73,7 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
   }
   // Few bodies are not worth waking threads for, and waiting for them on a busy machine.
   const auto bodies_move = [&] { move_bodies(start, h, report); };
-  if (awake.size() < kWorthThreads)
+  if (awake.size() < kWorthThreads && !has_pair_forces())
     serial.execute(bodies_move);
   else
     bodies_move();
@@ -123,14 +123,18 @@ void World::Impl::explode(Real start, Real end) {
     const Explosion& explosion = std::get<Explosion>(def_.effect);
     bodies.for_each([&](BodyHandle handle, const std::unique_ptr<Body>& body) {
       if (!body->is_dynamic()) return;
-      if (!def_.bodies.empty() &&
-          std::find(def_.bodies.begin(), def_.bodies.end(), handle) == def_.bodies.end())
-        return;
+      if (!def_.acts_on(handle)) return;
       const Wrench blow = impulse(explosion, body->solid, body->pose, body->rigid.position);
       if (blow.force == Vec3::Zero() && blow.torque == Vec3::Zero()) return;
       wake(*body);
       body->rigid.momentum += blow.force;
       body->rigid.angular_momentum += blow.torque;
+    });
+    systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
+      if (!def_.acts_on(handle)) return;
+      ParticleArrays& p = system.arrays;
+      for (std::size_t i = 0; i < p.size(); ++i)
+        if (system.whole_step(i)) p.velocity[i] += impulse(explosion, p.position[i]) / p.mass[i];
     });
   });
 }
@@ -185,10 +189,18 @@ void World::Impl::keep_within_bounds(Body& body, StepReport& report) {
 
 void World::Impl::update_obstacles(Real h) {
   std::vector<Obstacle> fixed, moving;
-  bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& body) {
+  bodies.for_each([&](BodyHandle handle, const std::unique_ptr<Body>& body) {
     if (!body->def.collides) return;
     const auto add = [&](std::vector<Obstacle>& obstacles, const Pose& from) {
-      obstacles.emplace_back(body->solid, from, body->pose, h, body->def.restitution, body->def.friction);
+      Obstacle& o = obstacles.emplace_back(body->solid, from, body->pose, h, body->def.restitution,
+                                           body->def.friction);
+      o.body = handle.index;
+      if (!body->is_dynamic()) return;
+      const RigidBody& rigid = body->rigid;
+      const Mat3 axes = rigid.orientation.toRotationMatrix();
+      o.inverse_mass = 1 / rigid.mass;
+      o.inverse_inertia = axes * rigid.inverse_inertia * axes.transpose();
+      o.centre = rigid.centre;
     };
     if (body->can_move())
       add(moving, body->before_substep);
@@ -202,9 +214,22 @@ void World::Impl::update_obstacles(Real h) {
 
 void World::Impl::step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report) {
   const ParticleStage stage{start, h, fixed_obstacles, moving_obstacles, def.bounds};
+  collide_particles(stage, coupled);
+  auto collided = particle_collisions.outcomes().begin();
+  std::vector<Reaction> reactions;
   bool removed_any = false;
+  particle_events.clear();
   systems.for_each([&](ParticleSystemHandle, ParticleSystem& system) {
-    const ParticleTally tally = system.step(stage, forces(system), coupled.holds(system));
+    ParticleTally tally;
+    if (system.hits_particles()) {
+      tally = std::move(collided->tally);
+      tally += system.end_step(stage, collided->touched, collided->trapped);
+      ++collided;
+    } else {
+      tally = system.step(stage, forces(system), coupled.holds(system));
+    }
+    add_events(tally.events);
+    reactions.insert(reactions.end(), tally.reactions.begin(), tally.reactions.end());
     report.particles_expired += tally.expired;
     report.particles_retired += tally.retired;
     report.particles_ejected += tally.ejected;
@@ -219,6 +244,7 @@ void World::Impl::step_particles(Real start, Real h, const CoupledSystem& couple
     report.finite &= !tally.lost;
   });
   if (removed_any) remove_dead_springs();
+  push_bodies(reactions);
 }
 
 void World::Impl::collect_moved() {

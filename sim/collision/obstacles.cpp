@@ -35,6 +35,12 @@ Pose Obstacle::at(Real fraction) const {
   return pose;
 }
 
+Mat3 Obstacle::mobility(const Vec3& arm) const {
+  Mat3 cross;
+  cross << 0, -arm.z(), arm.y(), arm.z(), 0, -arm.x(), -arm.y(), arm.x(), 0;
+  return inverse_mass * Mat3::Identity() - cross * inverse_inertia * cross;
+}
+
 int Obstacle::pieces(Real particle_radius) const {
   if (turn == 0) return 1;
   // An arc of angle a and radius R leaves its chord by R a^2 / 8.

@@ -1,7 +1,6 @@
 #pragma once
-/// The bodies that particles can hit, as they move during one sub-step, arranged for quick rejection. Dynamic
-/// bodies are here like kinematic ones: a particle that hits one sees infinite mass and gives it no reaction
-/// (P8 is not in this version), while its velocity still carries the particle along.
+/// The bodies that particles can hit, as they move during one sub-step, arranged for quick rejection. Their
+/// ways are given: what particles do to a body counts from the next sub-step on (P8).
 
 #include <algorithm>
 #include <span>
@@ -23,6 +22,12 @@ struct Obstacle {
   Vec3 velocity_at(const Vec3& p, Real fraction) const {
     return velocity + angular_velocity.cross(p - start.position - fraction * (end.position - start.position));
   }
+  /// Where its centre of mass is at a fraction of the sub-step.
+  Vec3 centre_at(Real fraction) const { return at(fraction).point_to_world(centre); }
+  /// K of P8: the velocity that a unit impulse at `arm` from the centre of mass gives to the point there,
+  /// world axes [1/kg].
+  Mat3 mobility(const Vec3& arm) const;
+  bool is_dynamic() const { return inverse_mass > 0; }
   /// In the frame of a turning solid a straight path is curved. Into how many straight pieces it must be cut
   /// so that they deviate from it by no more than kChordError of the particle's radius; bounded.
   int pieces(Real particle_radius) const;
@@ -37,6 +42,18 @@ struct Obstacle {
   Real turn = 0;                                                  ///< angle turned [rad]
   Real extent;                                                    ///< reach() of the solid
   Real restitution, friction;
+  uint32_t body = 0;      ///< a number of the world's for it
+  Real inverse_mass = 0;  ///< [1/kg]; 0: particles do not move it
+  Mat3 inverse_inertia =
+      Mat3::Zero();  ///< about the centre of mass, world axes at the end of the sub-step [1/(kg m^2)]
+  Vec3 centre = Vec3::Zero();  ///< of mass, in the solid's frame
+};
+
+/// What a particle did to a body.
+struct Reaction {
+  uint32_t body;         ///< Obstacle::body
+  Vec3 impulse;          ///< [N s]
+  Vec3 angular_impulse;  ///< about the centre of mass [N m s]
 };
 
 /// A set of obstacles: planes in a list, the others in a tree of swept boxes.
@@ -44,6 +61,8 @@ class Obstacles {
  public:
   Obstacles() = default;
   explicit Obstacles(std::vector<Obstacle> obstacles);
+
+  std::span<const Obstacle> all() const { return obstacles_; }
 
   /// Calls visit(obstacle) for those that a sphere may touch on its way from a to b (world), wherever in the
   /// sub-step.

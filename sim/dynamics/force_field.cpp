@@ -8,53 +8,56 @@
 namespace offstage::sim {
 namespace {
 
-/// 1 in the middle of a region, falling linearly to 0 at the edge, negative outside.
-Real depth(const Everywhere&, const Vec3&) {
-  return 1;
-}
-Real depth(const SphereRegion& s, const Vec3& point) {
-  return 1 - (point - s.centre).norm() / s.radius;
-}
-Real depth(const BoxRegion& b, const Vec3& point) {
-  return 1 - ((point - b.centre).cwiseAbs().array() / (b.size / 2).array()).maxCoeff();
-}
-
-/// A whole power by multiplication: the same bits everywhere.
-Real power(Real base, uint32_t exponent) {
-  Real result = 1;
-  for (; exponent > 0; exponent /= 2, base *= base)
-    if (exponent % 2) result *= base;
-  return result;
-}
-
-Real strength_at_depth(Real depth, uint32_t drop_rate) {
-  return depth > 0 ? power(depth, drop_rate) : 0;
-}
-
 Vec3 direction(const Vec3& v) {
   const Real length = v.norm();
   return length > 0 ? Vec3(v / length) : Vec3(Vec3::Zero());
 }
 
-Wrench at(const ConstantField& f, Real, const RigidMotion& m, const Vec3&) {
-  return {strength(f.region, f.drop_rate, m.position) * f.force, Vec3::Zero()};
+/// A body at a stage, and what of it forces depend on beside its motion.
+struct Target {
+  const RigidMotion& motion;
+  const Vec3& centre;
+  Real linear_drag;
+};
+
+Wrench at(const ConstantField& f, Real, const Target& t) {
+  return {strength(f.region, f.drop_rate, t.motion.position) * f.force, Vec3::Zero()};
 }
-Wrench at(const PointField& f, Real, const RigidMotion& m, const Vec3&) {
-  return {strength(f.region, f.drop_rate, m.position) * f.force * direction(f.point - m.position),
+Wrench at(const PointField& f, Real, const Target& t) {
+  return {
+      strength(f.region, f.drop_rate, t.motion.position) * f.force * direction(f.point - t.motion.position),
+      Vec3::Zero()};
+}
+template <class Flow>
+Wrench in_air(const Flow& f, const Vec3& air, const Target& t) {
+  return {strength(f.region, f.drop_rate, t.motion.position) *
+              air_drag(f.drag, t.linear_drag, air, t.motion.velocity),
           Vec3::Zero()};
 }
-Wrench at(const WindField& f, Real, const RigidMotion& m, const Vec3&) {
-  return {strength(f.region, f.drop_rate, m.position) * f.drag * (f.wind - m.velocity), Vec3::Zero()};
+Wrench at(const WindField& f, Real, const Target& t) {
+  return in_air(f, f.wind, t);
 }
-Wrench at(const Grab& f, Real time, const RigidMotion& m, const Vec3& centre) {
+Wrench at(const Vortex& f, Real, const Target& t) {
+  return in_air(f, velocity(f, t.motion.position), t);
+}
+Wrench at(const Turbulence& f, Real time, const Target& t) {
+  return in_air(f, TurbulentFlow(f, time).velocity(t.motion.position), t);
+}
+Wrench at(const Grab& f, Real time, const Target& t) {
+  const RigidMotion& m = t.motion;
   const Motion hand = f.track.at(time, Pose{});
-  const Vec3 arm = m.orientation * (f.point - centre);
+  const Vec3 arm = m.orientation * (f.point - t.centre);
   const Vec3 gap = m.position + arm - hand.pose.position;
   const Vec3 gap_rate = m.velocity + m.angular_velocity.cross(arm) - hand.velocity;
   const Vec3 force = -f.stiffness * gap - f.damping * gap_rate;
   return {force, arm.cross(force)};
 }
-Wrench at(const Explosion&, Real, const RigidMotion&, const Vec3&) {
+Wrench at(const Explosion&, Real, const Target&) {
+  return {};
+}
+template <class PairLaw>
+Wrench at(const PairLaw&, Real, const Target&) {
+  static_assert(kIsPairLaw<PairLaw>);
   return {};
 }
 
@@ -90,6 +93,36 @@ std::string problem(const WindField& f) {
   if (!f.wind.allFinite()) return "wind is not finite";
   return is_not_negative(f.drag) ? problem(f.region) : "drag must be a finite number >= 0";
 }
+std::string problem(const Vortex& f) {
+  if (!f.point.allFinite()) return "point is not finite";
+  if (!f.axis.allFinite() || !(f.axis.norm() > 0)) return "axis must be finite and not 0";
+  if (!std::isfinite(f.circulation)) return "circulation is not finite";
+  if (!is_positive(f.radius)) return "radius must be a finite number > 0";
+  return is_not_negative(f.drag) ? problem(f.region) : "drag must be a finite number >= 0";
+}
+std::string problem(const Turbulence& f) {
+  if (!is_not_negative(f.speed)) return "speed must be a finite number >= 0";
+  if (!is_positive(f.scale)) return "scale must be a finite number > 0";
+  if (f.octaves < 1 || f.octaves > Turbulence::kMaxOctaves) return "octaves must be 1 to 8";
+  if (!is_not_negative(f.lifetime)) return "lifetime must be a finite number >= 0";
+  if (!f.drift.allFinite()) return "drift is not finite";
+  return is_not_negative(f.drag) ? problem(f.region) : "drag must be a finite number >= 0";
+}
+std::string problem(const MutualGravitation& f) {
+  if (!is_not_negative(f.constant)) return "constant must be a finite number >= 0";
+  if (!is_not_negative(f.softening)) return "softening must be a finite number >= 0";
+  return is_not_negative(f.cut_off) ? problem(f.region) : "cut_off must be a finite number >= 0";
+}
+std::string problem(const Coulomb& f) {
+  if (!is_not_negative(f.constant)) return "constant must be a finite number >= 0";
+  if (!is_not_negative(f.softening)) return "softening must be a finite number >= 0";
+  return is_not_negative(f.cut_off) ? problem(f.region) : "cut_off must be a finite number >= 0";
+}
+std::string problem(const LennardJones& f) {
+  if (!is_not_negative(f.epsilon)) return "epsilon must be a finite number >= 0";
+  if (!is_positive(f.sigma)) return "sigma must be a finite number > 0";
+  return is_not_negative(f.cut_off) ? problem(f.region) : "cut_off must be a finite number >= 0";
+}
 std::string problem(const Grab& f) {
   if (!f.point.allFinite()) return "point is not finite";
   if (f.track.keys.empty()) return "track has no keys";
@@ -100,7 +133,8 @@ std::string problem(const Grab& f) {
       return "track.keys: times must be finite and strictly increasing";
   }
   if (!is_not_negative(f.stiffness)) return "stiffness must be a finite number >= 0";
-  return is_not_negative(f.damping) ? "" : "damping must be a finite number >= 0";
+  if (!is_not_negative(f.damping)) return "damping must be a finite number >= 0";
+  return f.reach > 0 ? "" : "reach must be > 0";
 }
 std::string problem(const Explosion& f) {
   if (!f.point.allFinite()) return "point is not finite";
@@ -110,21 +144,39 @@ std::string problem(const Explosion& f) {
 
 }  // namespace
 
-Real strength(const Region& region, uint32_t drop_rate, const Vec3& point) {
-  return std::visit([&](const auto& r) { return strength_at_depth(depth(r, point), drop_rate); }, region);
+Vec3 velocity(const Vortex& vortex, const Vec3& point) {
+  constexpr Real kTwoPi = 6.28318530717958647692;
+  const Vec3 axis = vortex.axis.normalized(), turned = axis.cross(point - vortex.point);
+  return vortex.circulation / (kTwoPi * (turned.squaredNorm() + vortex.radius * vortex.radius)) * turned;
+}
+
+bool ForceDef::acts_on(BodyHandle body) const {
+  return bodies.empty() ? systems.empty() : std::find(bodies.begin(), bodies.end(), body) != bodies.end();
+}
+bool ForceDef::acts_on(ParticleSystemHandle system) const {
+  return std::find(systems.begin(), systems.end(), system) != systems.end();
+}
+bool ForceDef::is_pairwise() const {
+  return std::visit([]<class E>(const E&) { return kIsPairLaw<E>; }, effect);
 }
 
 std::string problem(const ForceDef& def) {
   if (!std::isfinite(def.start)) return "start is not finite";
   if (!(def.end >= def.start)) return "end must not be before start";
-  if (std::holds_alternative<Grab>(def.effect) && def.bodies.size() != 1)
-    return "bodies: a grab holds exactly one body";
+  const bool holds_body = def.bodies.size() == 1 && def.systems.empty();
+  const bool holds_particles = def.bodies.empty() && !def.systems.empty();
+  if (std::holds_alternative<Grab>(def.effect) && !holds_body && !holds_particles)
+    return "bodies: a grab holds exactly one body, or particle systems";
+  if (def.is_pairwise() && !holds_particles)
+    return "systems: a force between particles needs particle systems, and no bodies";
   return std::visit([](const auto& effect) { return problem(effect); }, def.effect);
 }
 
-Wrench wrench(const ForceDef& def, Real time, const RigidMotion& motion, const Vec3& centre) {
+Wrench wrench(const ForceDef& def, Real time, const RigidMotion& motion, const Vec3& centre,
+              Real linear_drag) {
   if (!def.is_on(time)) return {};
-  return std::visit([&](const auto& effect) { return at(effect, time, motion, centre); }, def.effect);
+  const Target target{motion, centre, linear_drag};
+  return std::visit([&](const auto& effect) { return at(effect, time, target); }, def.effect);
 }
 
 Wrench impulse(const Explosion& explosion, const Solid& solid, const Pose& pose, const Vec3& centre) {
@@ -142,8 +194,15 @@ Wrench impulse(const Explosion& explosion, const Solid& solid, const Pose& pose,
   return {blow, (hit - centre).cross(blow)};
 }
 
+Vec3 impulse(const Explosion& explosion, const Vec3& point) {
+  const Vec3 way = point - explosion.point;
+  return explosion.impulse * strength_at_depth(1 - way.norm() / explosion.radius, explosion.drop_rate) *
+         direction(way);
+}
+
 bool ActiveForce::acts_on(const RigidBody& body) const {
-  return def->bodies.empty() || std::binary_search(only.begin(), only.end(), &body);
+  if (def->bodies.empty()) return def->systems.empty();
+  return std::binary_search(only.begin(), only.end(), &body);
 }
 
 }  // namespace offstage::sim

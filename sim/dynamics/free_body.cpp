@@ -67,7 +67,7 @@ void RigidStage::force(const BodyForces& forces, Real t, std::span<Real> dp) con
   Vec3 torque = -body.angular_drag * motion.angular_velocity;
   for (const ActiveForce& f : forces.forces) {
     if (!f.acts_on(body)) continue;
-    const Wrench w = wrench(*f.def, t, motion, body.centre);
+    const Wrench w = wrench(*f.def, t, motion, body.centre, body.linear_drag);
     force += w.force;
     torque += w.torque;
   }

@@ -1,29 +1,43 @@
 #pragma once
-/// The forces that act on each particle of a system alone: gravity, viscous drag, a constant force (physics
-/// P2).
+/// The forces that act on each particle of a system alone: gravity, viscous drag, a constant force, and the
+/// world's fields, moving air and hands (physics P2).
 
 #include <algorithm>
 #include <span>
+#include <vector>
 
 #include "sim/dynamics/flat.h"
+#include "sim/dynamics/force_field.h"
 #include "sim/dynamics/integrator.h"
 #include "sim/dynamics/particles.h"
 
 namespace offstage::sim {
 
 struct ParticleForces {
-  ParticleForces(const ParticleSystemDef& def, const Vec3& world_gravity, const Vec3& air)
+  ParticleForces(const ParticleSystemDef& def, const Vec3& world_gravity, const Vec3& air,
+                 std::vector<const ForceDef*> acting = {})
       : gravity(def.gravity ? world_gravity : Vec3::Zero()),
         force(def.force),
         wind(air),
-        drag(def.linear_drag) {}
+        drag(def.linear_drag),
+        fields(std::move(acting)) {}
 
+  /// By what is the same everywhere: without `fields`.
   Vec3 acceleration(const Vec3& v, Real mass) const {
     return gravity + (force - drag * (v - wind)) * (1 / mass);
   }
+  /// By everything, of a run of particles: x, v and dv have x y z after each other.
+  void accelerate(Real t, std::span<const Real> x, std::span<const Real> v, std::span<const Real> mass,
+                  std::span<Real> dv) const;
+  /// Appends the derivatives of (dx/dt, dv/dt) of a run of particles by (x, v), which begin at the rows and
+  /// columns `at_x` and `at_v`. Left out is how fields change from place to place: it does not make a system
+  /// stiff.
+  void jacobian(Real t, std::span<const Real> x, std::span<const Real> mass, int at_x, int at_v,
+                SparseEntries& entries) const;
 
   Vec3 gravity, force, wind;
   Real drag;
+  std::vector<const ForceDef*> fields;  ///< those of the world that act on the system
 };
 
 /// A run of particles in free flight. The state is position and velocity, x y z after each other.
@@ -34,16 +48,12 @@ class FreeFlight final : public DynamicSystem {
   void velocity(Real, std::span<const Real>, std::span<const Real> p, std::span<Real> dx) const override {
     std::copy(p.begin(), p.end(), dx.begin());
   }
-  void force(Real, std::span<const Real>, std::span<const Real> p, std::span<Real> dp) const override {
-    for (std::size_t i = 0; i < mass_.size(); ++i)
-      vec3(dp, 3 * i) = forces_.acceleration(vec3(p, 3 * i), mass_[i]);
+  void force(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const override {
+    forces_.accelerate(t, x, p, mass_, dp);
   }
-  void jacobian(Real, std::span<const Real> x, std::span<const Real>, SparseEntries& entries) const override {
-    const auto n = static_cast<int>(x.size());
-    for (int i = 0; i < n; ++i) {
-      entries.emplace_back(i, n + i, 1);
-      entries.emplace_back(n + i, n + i, -forces_.drag / mass_[static_cast<std::size_t>(i / 3)]);
-    }
+  void jacobian(Real t, std::span<const Real> x, std::span<const Real>,
+                SparseEntries& entries) const override {
+    forces_.jacobian(t, x, mass_, 0, static_cast<int>(x.size()), entries);
   }
 
  private:

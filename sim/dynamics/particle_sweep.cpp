@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "sim/collision/sphere_sweep.h"
+#include "sim/contact/collision.h"
 
 namespace offstage::sim {
 namespace {
@@ -25,80 +27,89 @@ constexpr int kContactPasses = 8;
 SweepOutcome ParticleSweep::operator()(ParticlePath& path, Real born, const Vec3& extra) {
   SweepOutcome outcome;
   contact_count_ = 0;
-  collect_near(path.start, path.end, path.radius);
-  if (near_.empty()) return outcome;
-  if (!eject(path, born, outcome)) {
+  reactions_before_finish_ = log_.reactions.size();
+  near_.find(path.start, path.end, path.radius);
+  if (near_.all().empty()) return outcome;
+  if (!near_.eject(path.start, path.end, path.radius, born, outcome.ejected)) {
     outcome.trapped = true;
     return outcome;
   }
   Real from = born;
   for (int hits = 0;; ++hits) {
-    const Hit hit = first_hit(path, from);
+    const ObstacleHit hit = near_.first_hit(path.start, path.end, path.radius, from);
     if (!hit.obstacle) return outcome;
     outcome.hit = true;
     respond(path, hit, from, extra, outcome);
     from = hit.fraction;
     if (hits + 1 == kMaxHits) break;
-    collect_near(path.start, path.end, path.radius);
+    near_.find(path.start, path.end, path.radius);
   }
   outcome.truncated = true;
   path.end = path.start;
   return outcome;
 }
 
-void ParticleSweep::collect_near(const Vec3& a, const Vec3& b, Real radius) {
+void NearObstacles::find(const Vec3& a, const Vec3& b, Real radius) {
   near_.clear();
   const auto add = [&](const Obstacle& o) { near_.push_back(&o); };
   fixed_.near_path(a, b, radius + kSkin, add);
   moving_.near_path(a, b, radius + kSkin, add);
 }
 
-/// Projects a particle out of the bodies that it starts in, along the nearest face (P4); the whole path moves
-/// with it.
-bool ParticleSweep::eject(ParticlePath& path, Real fraction, SweepOutcome& outcome) {
+bool NearObstacles::eject(Vec3& start, Vec3& end, Real radius, Real fraction, bool& deep) {
   for (int round = 0; round <= kMaxEjections; ++round) {
     bool clear = true;
     for (const Obstacle* o : near_) {
       const Pose pose = o->at(fraction);
-      const SurfaceDistance s = signed_distance(o->solid, pose.point_to_body(path.start));
-      if (s.distance >= path.radius) continue;
+      const SurfaceDistance s = signed_distance(o->solid, pose.point_to_body(start));
+      if (s.distance >= radius) continue;
       if (round == kMaxEjections) return false;
       clear = false;
-      outcome.ejected |= path.radius - s.distance > kDriftDepth * path.radius;
-      const Vec3 out = (path.radius + kSkin - s.distance) * pose.vector_to_world(s.normal);
-      path.start += out;
-      path.end += out;
+      deep |= radius - s.distance > kDriftDepth * radius;
+      const Vec3 out = (radius + kSkin - s.distance) * pose.vector_to_world(s.normal);
+      start += out;
+      end += out;
     }
     if (clear) return true;
-    collect_near(path.start, path.end, path.radius);
+    find(start, end, radius);
   }
   return false;
 }
 
-ParticleSweep::Hit ParticleSweep::first_hit(const ParticlePath& path, Real from) const {
-  Hit first;
-  for (const Obstacle* o : near_) sweep_obstacle(*o, path, from, first);
+ObstacleHit NearObstacles::first_hit(const Vec3& a, const Vec3& b, Real radius, Real from) const {
+  ObstacleHit first;
+  for (const Obstacle* o : near_) {
+    const ObstacleHit found =
+        hit(*o, a, b, radius, from, first.obstacle ? first.fraction : std::numeric_limits<Real>::infinity());
+    if (found.obstacle) first = found;
+  }
   return first;
 }
 
-/// Replaces `first` if the path meets the obstacle earlier.
-void ParticleSweep::sweep_obstacle(const Obstacle& o, const ParticlePath& path, Real from, Hit& first) const {
-  const int pieces = o.pieces(path.radius);
-  const Vec3 way = path.end - path.start;
-  Vec3 a = o.at(from).point_to_body(path.start);
+ObstacleHit NearObstacles::hit(const Obstacle& o, const Vec3& a, const Vec3& b, Real radius, Real from,
+                               Real latest) {
+  const int pieces = o.pieces(radius);
+  const Vec3 way = b - a;
+  Vec3 p = o.at(from).point_to_body(a);
   for (int k = 0; k < pieces; ++k) {
     const Real share = static_cast<Real>(k + 1) / pieces, before = static_cast<Real>(k) / pieces;
-    const Vec3 b = o.at(from + share * (1 - from)).point_to_body(path.start + share * way);
-    if (const auto hit = sweep_sphere(o.solid, a, b, path.radius + kSkin / 2)) {
+    const Vec3 q = o.at(from + share * (1 - from)).point_to_body(a + share * way);
+    if (const auto hit = sweep_sphere(o.solid, p, q, radius + kSkin / 2)) {
       const Real fraction = from + (before + hit->fraction / pieces) * (1 - from);
-      if (first.obstacle && fraction >= first.fraction) return;
+      if (fraction >= latest) return {};
       const Pose pose = o.at(fraction);
-      const Vec3 local = a + hit->fraction * (b - a) + (path.radius + kSkin - hit->distance) * hit->normal;
-      first = {&o, fraction, pose.point_to_world(local), pose.vector_to_world(hit->normal)};
-      return;
+      const Vec3 local = p + hit->fraction * (q - p) + (radius + kSkin - hit->distance) * hit->normal;
+      return {&o, fraction, pose.point_to_world(local), pose.vector_to_world(hit->normal)};
     }
-    a = b;
+    p = q;
   }
+  return {};
+}
+
+/// Whether the particle moved it before in this sub-step: it then moves away, but not before the next one.
+bool ParticleSweep::was_struck(const Obstacle& o) const {
+  return std::any_of(contacts_.begin(), contacts_.begin() + static_cast<std::ptrdiff_t>(contact_count_),
+                     [&](const Contact& c) { return c.gives_way && c.obstacle == &o; });
 }
 
 /// Velocity after free flight: the midpoint rule, exact for constant forces.
@@ -109,33 +120,49 @@ Vec3 ParticleSweep::fly(const Vec3& v, Real mass, Real duration, const Vec3& ext
 
 /// Puts the particle at the hit with its velocity after the impulse (P5), and integrates the rest of its
 /// path.
-void ParticleSweep::respond(ParticlePath& path, const Hit& hit, Real from, const Vec3& extra,
+void ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real from, const Vec3& extra,
                             SweepOutcome& outcome) {
   const Obstacle& o = *hit.obstacle;
   const Real friction = std::sqrt(path.friction * o.friction);
-  const Vec3 body_velocity = o.velocity_at(hit.position, hit.fraction);
+  log_.reactions.resize(reactions_before_finish_);
   Vec3 v = fly(path.start_velocity, path.mass, (hit.fraction - from) * h_, extra);
 
-  const Vec3 u = v - body_velocity;
+  const Vec3 u = v - o.velocity_at(hit.position, hit.fraction);
   const Real approach = -u.dot(hit.normal);
   const Real pressing = -(forces_.acceleration(v, path.mass) + extra).dot(hit.normal);
   const Real gain = pressing * h_;  // approach speed that the forces would restore within one sub-step
   Real restitution = std::max(path.restitution, o.restitution);
   // A bounce lasts 2 e u / a. One that ends within the sub-step is the tail of an infinite series (E6, Zeno).
   if (2 * restitution * approach < gain) restitution = 0;
-  if (approach > std::max(gain, 0.0)) ++outcome.collisions;
-  if (approach > 0) v += collision_impulse(path.mass, u, hit.normal, restitution, friction) / path.mass;
-  if (restitution == 0) {
-    // The oldest contact gives way: it matters least where the particle is now.
-    if (contact_count_ == contacts_.size()) {
-      std::move(contacts_.begin() + 1, contacts_.end(), contacts_.begin());
-      --contact_count_;
-    }
-    contacts_[contact_count_++] = {hit.normal, &o, friction};
+  const bool strikes = approach > std::max(gain, 0.0);
+  // Only what strikes moves the obstacle: what rests on it is held by what holds the obstacle.
+  const bool moves_it = strikes && o.is_dynamic(), moved_it = was_struck(o);
+  if (approach > 0 && !moved_it) {
+    const Vec3 contact = hit.position - path.radius * hit.normal;
+    const Vec3 impulse = moves_it ? collision_impulse(o, contact, hit.fraction, path.mass, u, hit.normal,
+                                                      restitution, friction)
+                                  : collision_impulse(path.mass, u, hit.normal, restitution, friction);
+    v += impulse / path.mass;
+    if (o.is_dynamic()) log_.reactions.push_back(reaction(o, contact, hit.fraction, impulse));
   }
+  if (strikes && !moved_it) {
+    ++outcome.collisions;
+    if (log_.wants_strikes) log_.strikes.push_back({hit.fraction, hit.position, v, hit.normal});
+  }
+  if (restitution == 0 || moves_it) add_contact({hit.normal, &o, friction, hit.fraction, moves_it});
   path.start = hit.position;
   path.start_velocity = v;
+  reactions_before_finish_ = log_.reactions.size();
   finish(path, (1 - hit.fraction) * h_, extra);
+}
+
+/// The oldest contact gives way: it matters least where the particle is now.
+void ParticleSweep::add_contact(const Contact& contact) {
+  if (contact_count_ == contacts_.size()) {
+    std::move(contacts_.begin() + 1, contacts_.end(), contacts_.begin());
+    --contact_count_;
+  }
+  contacts_[contact_count_++] = contact;
 }
 
 /// Moves over the remaining time. What the forces would press into surfaces that the particle rests on, these
@@ -145,9 +172,14 @@ void ParticleSweep::finish(ParticlePath& path, Real duration, const Vec3& extra)
   Vec3 v = fly(path.start_velocity, path.mass, duration, extra);
   const Vec3 predicted = path.start + duration * path.start_velocity;
   const auto press = [&](const Contact& c) {
+    if (c.gives_way) return false;
     const Vec3 u = v - c.obstacle->velocity_at(predicted, 1);
     if (u.dot(c.normal) >= 0) return false;
-    v += collision_impulse(path.mass, u, c.normal, 0, c.friction) / path.mass;
+    const Vec3 impulse = collision_impulse(path.mass, u, c.normal, 0, c.friction);
+    v += impulse / path.mass;
+    if (c.obstacle->is_dynamic())
+      log_.reactions.push_back(
+          reaction(*c.obstacle, path.start - path.radius * c.normal, c.fraction, impulse));
     return true;
   };
   for (int pass = 0; pass < kContactPasses; ++pass) {
@@ -157,6 +189,27 @@ void ParticleSweep::finish(ParticlePath& path, Real duration, const Vec3& extra)
   }
   path.end_velocity = v;
   path.end = path.start + duration / 2 * (path.start_velocity + v);
+  for (std::size_t i = 0; i < contact_count_; ++i) {
+    const Contact& c = contacts_[i];
+    if (!c.gives_way) continue;
+    const Vec3 behind = duration * c.obstacle->velocity_at(path.start, 1) - (path.end - path.start);
+    if (behind.dot(c.normal) > 0) path.end += behind.dot(c.normal) * c.normal;
+  }
+}
+
+Vec3 collision_impulse(const Obstacle& o, const Vec3& contact, Real fraction, Real particle_mass,
+                       const Vec3& u, const Vec3& n, Real restitution, Real friction) {
+  if (!o.is_dynamic()) return collision_impulse(particle_mass, u, n, restitution, friction);
+  const ContactFrame f = contact_frame(n);
+  Mat3 axes;
+  axes << f.n, f.t, f.k;
+  const Mat3 K = o.mobility(contact - o.centre_at(fraction)) + Mat3::Identity() / particle_mass;
+  return axes * collision_impulse(Mat3(axes.transpose() * K * axes), Vec3(axes.transpose() * u), restitution,
+                                  friction, friction);
+}
+
+Reaction reaction(const Obstacle& o, const Vec3& contact, Real fraction, const Vec3& impulse_on_particle) {
+  return {o.body, -impulse_on_particle, (o.centre_at(fraction) - contact).cross(impulse_on_particle)};
 }
 
 }  // namespace offstage::sim

@@ -29,43 +29,96 @@ struct SweepOutcome {
   bool truncated = false;   ///< used up its hits
 };
 
+/// A collision of a particle, after it.
+struct Strike {
+  Real fraction;  ///< of the sub-step
+  Vec3 position, velocity;
+  Vec3 normal;  ///< of what was hit, towards the particle
+};
+
+/// What sweeps leave behind for others.
+struct SweepLog {
+  std::vector<Reaction> reactions;
+  std::vector<Strike> strikes;  ///< of the particle swept last, if wanted
+  bool wants_strikes = false;
+};
+
+/// Where a particle on its path comes to touch an obstacle.
+struct ObstacleHit {
+  const Obstacle* obstacle = nullptr;
+  Real fraction = 1;  ///< of the sub-step
+  Vec3 position;      ///< of the particle's centre
+  Vec3 normal;        ///< of the obstacle
+};
+
+/// Impulse on a particle that meets an obstacle at its surface point `contact`, at a fraction of the
+/// sub-step, with the relative velocity u, u.n < 0 (P5, P8).
+Vec3 collision_impulse(const Obstacle& o, const Vec3& contact, Real fraction, Real particle_mass,
+                       const Vec3& u, const Vec3& n, Real restitution, Real friction);
+/// What an impulse on a particle does to the obstacle.
+Reaction reaction(const Obstacle& o, const Vec3& contact, Real fraction, const Vec3& impulse_on_particle);
+
+/// The obstacles that are near one particle's way.
+class NearObstacles {
+ public:
+  NearObstacles(const Obstacles& fixed, const Obstacles& moving) : fixed_(fixed), moving_(moving) {}
+
+  /// Looks for those that a sphere may touch on its way from a to b.
+  void find(const Vec3& a, const Vec3& b, Real radius);
+  std::span<const Obstacle* const> all() const { return near_; }
+
+  /// Projects a sphere, to be at `start` at a fraction of the sub-step, out of the bodies that it is in,
+  /// along the nearest face (P4); `end` moves with it. False if that does not succeed. `deep`: it was inside
+  /// by more than rounding and straightened paths make. Those found must be those near `start` and `end`.
+  bool eject(Vec3& start, Vec3& end, Real radius, Real fraction, bool& deep);
+  /// Of those found, the first that a sphere meets on its way from a at a fraction of the sub-step to b at
+  /// its end.
+  ObstacleHit first_hit(const Vec3& a, const Vec3& b, Real radius, Real from) const;
+  /// Where a sphere meets one; none if it does not before `latest`, a fraction of the sub-step.
+  static ObstacleHit hit(const Obstacle& o, const Vec3& a, const Vec3& b, Real radius, Real from,
+                         Real latest);
+
+ private:
+  const Obstacles& fixed_;
+  const Obstacles& moving_;
+  std::vector<const Obstacle*> near_;
+};
+
 class ParticleSweep {
  public:
   /// `fixed` and `moving` are the obstacles of a sub-step of length h [s].
-  ParticleSweep(const Obstacles& fixed, const Obstacles& moving, const ParticleForces& forces, Real h)
-      : fixed_(fixed), moving_(moving), forces_(forces), h_(h) {}
+  ParticleSweep(const Obstacles& fixed, const Obstacles& moving, const ParticleForces& forces, Real h,
+                SweepLog& log)
+      : near_(fixed, moving), forces_(forces), h_(h), log_(log) {}
 
   /// The particle lives from fraction `born` of the sub-step to its end. `extra` is the mean acceleration by
   /// forces beyond ParticleForces (springs).
   SweepOutcome operator()(ParticlePath& path, Real born, const Vec3& extra);
 
  private:
-  struct Hit {
-    const Obstacle* obstacle = nullptr;
-    Real fraction = 1;  // of the sub-step
-    Vec3 position;      // of the particle's centre
-    Vec3 normal;
-  };
   /// A surface that presses on the particle until the end of the sub-step.
   struct Contact {
     Vec3 normal;
     const Obstacle* obstacle;
     Real friction;
+    Real fraction;  // since when
+    /// Its obstacle was struck and gives way, but not before the next sub-step: so long it only is in the
+    /// way.
+    bool gives_way;
   };
 
-  void collect_near(const Vec3& a, const Vec3& b, Real radius);
-  bool eject(ParticlePath& path, Real fraction, SweepOutcome& outcome);
-  Hit first_hit(const ParticlePath& path, Real from) const;
-  void sweep_obstacle(const Obstacle& o, const ParticlePath& path, Real from, Hit& first) const;
-  void respond(ParticlePath& path, const Hit& hit, Real from, const Vec3& extra, SweepOutcome& outcome);
+  bool was_struck(const Obstacle& o) const;
+  void respond(ParticlePath& path, const ObstacleHit& hit, Real from, const Vec3& extra,
+               SweepOutcome& outcome);
   void finish(ParticlePath& path, Real duration, const Vec3& extra);
+  void add_contact(const Contact& contact);
   Vec3 fly(const Vec3& v, Real mass, Real duration, const Vec3& extra) const;
 
-  const Obstacles& fixed_;
-  const Obstacles& moving_;
+  NearObstacles near_;
   const ParticleForces& forces_;
   Real h_;
-  std::vector<const Obstacle*> near_;
+  SweepLog& log_;
+  std::size_t reactions_before_finish_ = 0;
   std::array<Contact, 4> contacts_;
   std::size_t contact_count_ = 0;
 };

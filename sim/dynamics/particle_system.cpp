@@ -7,6 +7,8 @@
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/parallel_invoke.h>
 
+#include "sim/dynamics/flat.h"
+
 namespace offstage::sim {
 namespace {
 
@@ -38,6 +40,8 @@ ParticleTally& ParticleTally::operator+=(const ParticleTally& t) {
   collisions += t.collisions;
   truncated += t.truncated;
   if (!lost) lost = t.lost;
+  reactions.insert(reactions.end(), t.reactions.begin(), t.reactions.end());
+  events.insert(events.end(), t.events.begin(), t.events.end());
   return *this;
 }
 
@@ -50,6 +54,7 @@ uint64_t ParticleSystem::add(const Particle& p, Real elapsed) {
   arrays.lifespan.push_back(p.lifespan);
   arrays.restitution.push_back(p.restitution);
   arrays.friction.push_back(p.friction);
+  arrays.charge.push_back(p.charge);
   arrays.id.push_back(next_id);
   newborn.push_back(elapsed);
   return next_id++;
@@ -77,84 +82,170 @@ void ParticleSystem::fly(const ParticleForces& forces, Real t, Real h, std::size
       .step(FreeFlight(forces, part(arrays.mass, begin, end)), t, h, flat(x), flat(v), scratch.integrator);
 }
 
-/// Everything after integration for particle i, which started its `duration` at (x0, v0).
-void ParticleSystem::settle(const ParticleStage& stage, const ParticleForces& forces, ParticleSweep& sweep,
-                            std::size_t i, const Vec3& x0, const Vec3& v0, Real duration, bool coupled,
-                            ParticleTally& tally) {
-  Vec3 &x = arrays.position[i], &v = arrays.velocity[i];
-  arrays.age[i] += duration;
-  if (!x.allFinite() || !v.allFinite()) {
-    if (!tally.lost) tally.lost = NonFinite{{}, arrays.id[i], x0, v0, x, v};
-    ++tally.retired;
-    fate_[i] = Fate::dead;
-    return;
-  }
-  bool dead = false;
-  if (def.collides && duration > 0) {
-    ParticlePath path{
-        x0, v0, x, v, arrays.mass[i], arrays.radius[i], arrays.restitution[i], arrays.friction[i]};
-    const Vec3 extra = coupled ? Vec3((v - v0) / duration - forces.acceleration((v0 + v) / 2, path.mass))
-                               : Vec3(Vec3::Zero());
-    const SweepOutcome outcome = sweep(path, 1 - duration / stage.h, extra);
-    x = path.end;
-    v = path.end_velocity;
-    tally.collisions += outcome.collisions;
-    tally.ejected += outcome.ejected;
-    tally.truncated += outcome.truncated;
-    tally.removed += outcome.trapped;
-    const bool spent = outcome.hit && def.dies_on_hit;
-    tally.expired += spent;
-    dead = outcome.trapped || spent;
-  }
-  if (!dead && arrays.age[i] >= arrays.lifespan[i]) {
-    ++tally.expired;
-    dead = true;
-  }
-  if (!dead && !stage.bounds.contains(x)) {
-    ++tally.retired;
-    dead = true;
-  }
-  fate_[i] = dead ? Fate::dead : Fate::alive;
-}
-
-ParticleTally ParticleSystem::step(const ParticleStage& stage, const ParticleForces& forces, bool coupled) {
+/// Flies every particle, and calls make_landing(chunk)(i, flight, integrated) when it has flown; `integrated`
+/// says that it was before, by a network of springs. Calls of a chunk are in order, those of different chunks
+/// at the same time.
+template <class MakeLanding>
+void ParticleSystem::fly_each(const ParticleStage& stage, const ParticleForces& forces, bool coupled,
+                              MakeLanding&& make_landing) {
   const std::size_t count = arrays.size(), old = count - newborn.size();
-  fate_.resize(count);
   tbb::enumerable_thread_specific<Scratch> scratches;
-  std::vector<ParticleTally> tallies(chunk_count(old) + chunk_count(newborn.size()));
-
   tbb::parallel_for(std::size_t{0}, chunk_count(old), [&](std::size_t chunk) {
     const std::size_t begin = chunk * kChunk, end = std::min(old, begin + kChunk);
-    ParticleSweep sweep(stage.fixed, stage.moving, forces, stage.h);
+    auto land = make_landing(chunk);
     Scratch& scratch = scratches.local();
     if (!coupled) fly(forces, stage.time, stage.h, begin, end, scratch);
     const Vec3* x0 = coupled ? &start_position_[begin] : scratch.position.data();
     const Vec3* v0 = coupled ? &start_velocity_[begin] : scratch.velocity.data();
-    for (std::size_t i = begin; i < end; ++i)
-      settle(stage, forces, sweep, i, x0[i - begin], v0[i - begin], stage.h, coupled, tallies[chunk]);
+    for (std::size_t i = begin; i < end; ++i) land(i, Flight{x0[i - begin], v0[i - begin], stage.h}, coupled);
   });
 
   // Each newborn has its own time to fly.
   tbb::parallel_for(std::size_t{0}, chunk_count(newborn.size()), [&](std::size_t chunk) {
     const std::size_t begin = old + chunk * kChunk, end = std::min(count, begin + kChunk);
-    ParticleSweep sweep(stage.fixed, stage.moving, forces, stage.h);
+    auto land = make_landing(chunk_count(old) + chunk);
     Scratch& scratch = scratches.local();
-    ParticleTally& tally = tallies[chunk_count(old) + chunk];
     for (std::size_t i = begin; i < end; ++i) {
       const bool integrated = coupled && whole_step(i);
       const Real duration = whole_step(i) ? stage.h : std::min(newborn[i - old], stage.h);
       if (!integrated) fly(forces, stage.time + (stage.h - duration), duration, i, i + 1, scratch);
       const Vec3 x0 = integrated ? start_position_[i] : scratch.position[0];
       const Vec3 v0 = integrated ? start_velocity_[i] : scratch.velocity[0];
-      settle(stage, forces, sweep, i, x0, v0, duration, integrated, tally);
+      land(i, Flight{x0, v0, duration}, integrated);
     }
   });
+}
 
+bool ParticleSystem::is_lost(std::size_t i, const Flight& flight, ParticleTally& tally) const {
+  const Vec3 &x = arrays.position[i], &v = arrays.velocity[i];
+  if (x.allFinite() && v.allFinite()) return false;
+  if (!tally.lost) tally.lost = NonFinite{{}, arrays.id[i], flight.position, flight.velocity, x, v};
+  ++tally.retired;
+  return true;
+}
+
+/// Takes a particle that has flown through its collisions with bodies.
+SweepOutcome ParticleSystem::sweep(const ParticleStage& stage, const ParticleForces& forces,
+                                   ParticleSweep& sweep, std::size_t i, const Flight& flight,
+                                   bool integrated) {
+  Vec3 &x = arrays.position[i], &v = arrays.velocity[i];
+  ParticlePath path{flight.position,       flight.velocity,   x, v, arrays.mass[i], arrays.radius[i],
+                    arrays.restitution[i], arrays.friction[i]};
+  const bool more = integrated || !forces.fields.empty();
+  const Vec3 extra = more ? Vec3((v - flight.velocity) / flight.duration -
+                                 forces.acceleration((flight.velocity + v) / 2, path.mass))
+                          : Vec3(Vec3::Zero());
+  const SweepOutcome outcome = sweep(path, 1 - flight.duration / stage.h, extra);
+  x = path.end;
+  v = path.end_velocity;
+  return outcome;
+}
+
+/// The end of a particle's sub-step; `spent` if it collided and that was its death.
+void ParticleSystem::end(const ParticleStage& stage, std::size_t i, bool spent, bool trapped,
+                         ParticleTally& tally) {
+  tally.removed += trapped;
+  tally.expired += spent;
+  bool dead = trapped || spent;
+  if (!dead && arrays.age[i] >= arrays.lifespan[i]) {
+    ++tally.expired;
+    dead = true;
+    if (def.report_deaths) {
+      const Real over = arrays.age[i] - arrays.lifespan[i];
+      tally.events.push_back({ParticleEvent::Kind::death, handle, arrays.id[i], stage.time + stage.h - over,
+                              arrays.position[i] - over * arrays.velocity[i], arrays.velocity[i],
+                              Vec3::Zero(), arrays.mass[i], arrays.radius[i], arrays.lifespan[i]});
+    }
+  }
+  if (!dead && !stage.bounds.contains(arrays.position[i])) {
+    ++tally.retired;
+    dead = true;
+  }
+  fate_[i] = dead ? Fate::dead : Fate::alive;
+}
+
+ParticleEvent ParticleSystem::collision_event(const ParticleStage& stage, std::size_t i,
+                                              const Strike& strike) const {
+  return {ParticleEvent::Kind::collision,
+          handle,
+          arrays.id[i],
+          stage.time + strike.fraction * stage.h,
+          strike.position,
+          strike.velocity,
+          strike.normal,
+          arrays.mass[i],
+          arrays.radius[i],
+          arrays.age[i] - (1 - strike.fraction) * stage.h};
+}
+
+ParticleTally ParticleSystem::sum_up(std::span<const ParticleTally> tallies) {
   newborn.clear();
   ParticleTally sum;
   for (const ParticleTally& t : tallies) sum += t;
   if (sum.expired + sum.retired + sum.removed > 0) remove_dead();
   return sum;
+}
+
+ParticleTally ParticleSystem::step(const ParticleStage& stage, const ParticleForces& forces, bool coupled) {
+  const std::size_t old = arrays.size() - newborn.size();
+  fate_.resize(arrays.size());
+  std::vector<ParticleTally> tallies(chunk_count(old) + chunk_count(newborn.size()));
+  std::vector<SweepLog> logs(tallies.size());
+  fly_each(stage, forces, coupled, [&](std::size_t chunk) {
+    logs[chunk].wants_strikes = def.report_collisions;
+    return [&, chunk, &log = logs[chunk],
+            obstacles = ParticleSweep(stage.fixed, stage.moving, forces, stage.h, logs[chunk])](
+               std::size_t i, const Flight& flight, bool integrated) mutable {
+      ParticleTally& tally = tallies[chunk];
+      arrays.age[i] += flight.duration;
+      if (is_lost(i, flight, tally)) {
+        fate_[i] = Fate::dead;
+        return;
+      }
+      SweepOutcome outcome;
+      if (def.collides && flight.duration > 0)
+        outcome = sweep(stage, forces, obstacles, i, flight, integrated);
+      tally.collisions += outcome.collisions;
+      tally.ejected += outcome.ejected;
+      tally.truncated += outcome.truncated;
+      for (const Strike& strike : log.strikes) tally.events.push_back(collision_event(stage, i, strike));
+      log.strikes.clear();
+      end(stage, i, outcome.hit && def.dies_on_hit, outcome.trapped, tally);
+    };
+  });
+  for (std::size_t chunk = 0; chunk < logs.size(); ++chunk)
+    tallies[chunk].reactions = std::move(logs[chunk].reactions);
+  return sum_up(tallies);
+}
+
+void ParticleSystem::fly_all(const ParticleStage& stage, const ParticleForces& forces, bool coupled) {
+  start_position_.resize(arrays.size());
+  start_velocity_.resize(arrays.size());
+  duration_.resize(arrays.size());
+  fly_each(stage, forces, coupled, [&](std::size_t) {
+    return [&](std::size_t i, const Flight& flight, bool) {
+      start_position_[i] = flight.position;
+      start_velocity_[i] = flight.velocity;
+      duration_[i] = flight.duration;
+      arrays.age[i] += flight.duration;
+    };
+  });
+}
+
+ParticleTally ParticleSystem::end_step(const ParticleStage& stage, std::span<const uint8_t> touched,
+                                       std::span<const uint8_t> trapped) {
+  const std::size_t count = arrays.size();
+  fate_.resize(count);
+  std::vector<ParticleTally> tallies(chunk_count(count));
+  tbb::parallel_for(std::size_t{0}, tallies.size(), [&](std::size_t chunk) {
+    for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
+      if (is_lost(i, flight(i), tallies[chunk]))
+        fate_[i] = Fate::dead;
+      else
+        end(stage, i, touched[i] && def.dies_on_hit, trapped[i], tallies[chunk]);
+    }
+  });
+  return sum_up(tallies);
 }
 
 void ParticleSystem::remove_dead() {
@@ -166,10 +257,11 @@ void ParticleSystem::remove_dead() {
       if (fate_[i] == Fate::alive) array[to++] = array[i];
     array.resize(to);
   };
-  tbb::parallel_invoke(
-      [&] { compact(arrays.position); }, [&] { compact(arrays.velocity); }, [&] { compact(arrays.mass); },
-      [&] { compact(arrays.radius); }, [&] { compact(arrays.age); }, [&] { compact(arrays.lifespan); },
-      [&] { compact(arrays.restitution); }, [&] { compact(arrays.friction); }, [&] { compact(arrays.id); });
+  tbb::parallel_invoke([&] { compact(arrays.position); }, [&] { compact(arrays.velocity); },
+                       [&] { compact(arrays.mass); }, [&] { compact(arrays.radius); },
+                       [&] { compact(arrays.age); }, [&] { compact(arrays.lifespan); },
+                       [&] { compact(arrays.restitution); }, [&] { compact(arrays.friction); },
+                       [&] { compact(arrays.charge); }, [&] { compact(arrays.id); });
 }
 
 }  // namespace offstage::sim

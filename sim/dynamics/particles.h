@@ -2,13 +2,18 @@
 /// Particle systems as structures of arrays (physics P1), and their impulse at one collision (P5).
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "sim/dynamics/integrator.h"
+#include "sim/handle.h"
 #include "sim/types.h"
 
 namespace offstage::sim {
+
+struct ParticleSystemTag {};
+using ParticleSystemHandle = Handle<ParticleSystemTag>;
 
 /// One particle as it is created.
 struct Particle {
@@ -19,22 +24,40 @@ struct Particle {
   Real lifespan = 1e30;  ///< [s]; removed when its age reaches it
   Real restitution = 0.5;
   Real friction = 0.5;
+  Real charge = 0;  ///< [C]
 };
 
 struct ParticleSystemDef {
   std::string name;
-  Real linear_drag = 0;       ///< k_d of F = -k_d (v - wind) [kg/s]
-  bool gravity = true;        ///< feels the world's gravity
-  Vec3 force = Vec3::Zero();  ///< constant extra force per particle [N]
-  bool collides = true;       ///< with bodies (the book's "complex" flag)
-  bool dies_on_hit = false;   ///< removed at its first collision
+  Real linear_drag = 0;            ///< k_d of F = -k_d (v - wind) [kg/s]
+  bool gravity = true;             ///< feels the world's gravity
+  Vec3 force = Vec3::Zero();       ///< constant extra force per particle [N]
+  bool collides = true;            ///< with bodies (the book's "complex" flag)
+  bool internal = false;           ///< its particles collide with each other
+  bool external = false;           ///< its particles collide with those of other systems that have this, too
+  bool dies_on_hit = false;        ///< removed at its first collision
+  bool report_collisions = false;  ///< as ParticleEvent
+  bool report_deaths = false;      ///< of age, as ParticleEvent
   IntegratorKind integrator = IntegratorKind::symplectic_euler;
+};
+
+/// Something that happened to a particle in the last sub-step, for effects to answer to.
+struct ParticleEvent {
+  enum class Kind : uint8_t { collision, death };
+  Kind kind = Kind::collision;
+  ParticleSystemHandle system;
+  uint64_t id = 0;
+  Real time = 0;                 ///< of the world [s]
+  Vec3 position = Vec3::Zero();  ///< of its centre [m]
+  Vec3 velocity = Vec3::Zero();  ///< after it [m/s]
+  Vec3 normal = Vec3::Zero();    ///< of what was hit, towards the particle; zero for a death
+  Real mass = 0, radius = 0, age = 0;
 };
 
 /// The state of one system. Arrays run in parallel, in order of creation; removal keeps the order.
 struct ParticleArrays {
   std::vector<Vec3> position, velocity;
-  std::vector<Real> mass, radius, age, lifespan, restitution, friction;
+  std::vector<Real> mass, radius, age, lifespan, restitution, friction, charge;
   std::vector<uint64_t> id;  ///< unique in its system, ascending, never reused
 
   std::size_t size() const { return position.size(); }
@@ -44,5 +67,10 @@ struct ParticleArrays {
 /// v2 and unit normal n, u.n < 0 (P5): restitution e along n; sticks tangentially if the friction cone
 /// allows, else slides with |P_t| = mu P_n against the sliding direction.
 Vec3 collision_impulse(Real m12, const Vec3& u, const Vec3& n, Real restitution, Real friction);
+
+/// When two spheres come to touch whose centres are `distance` apart when they do (P3): d and u are the
+/// present difference of their centres and of their velocities. Zero if they overlap and approach; none if
+/// they never meet.
+std::optional<Real> meeting_time(const Vec3& d, const Vec3& u, Real distance);
 
 }  // namespace offstage::sim

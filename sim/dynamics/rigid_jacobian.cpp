@@ -76,10 +76,14 @@ Eigen::Matrix<Real, 13, 13> RigidDerivative::own_rates(const BodyForces& forces,
   d.bottomRows<3>() = -body.angular_drag * angular_velocity_;
   for (const ActiveForce& f : forces.forces) {
     if (!f.acts_on(body) || !f.def->is_on(t)) continue;
-    if (const auto* wind = std::get_if<WindField>(&f.def->effect)) {
-      const Real drag = wind->drag * strength(wind->region, wind->drop_rate, stage_.motion.position);
-      d.block<3, 3>(kMomentum, kMomentum).diagonal().array() -= drag / body.mass;
-    }
+    const Real drag = std::visit(
+        [&](const auto& effect) -> Real {
+          if constexpr (requires { effect.drag; })
+            return effect.drag * strength(effect.region, effect.drop_rate, stage_.motion.position);
+          return 0;
+        },
+        f.def->effect);
+    d.block<3, 3>(kMomentum, kMomentum).diagonal().array() -= drag / body.mass;
     if (const auto* grab = std::get_if<Grab>(&f.def->effect)) {
       const Vec3 arm = stage_.motion.orientation * (grab->point - body.centre);
       const Vec3 force = wrench(*f.def, t, stage_.motion, body.centre).force;

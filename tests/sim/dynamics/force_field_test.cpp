@@ -52,6 +52,20 @@ TEST(Wind, CarriesABodyUpToItsSpeed) {
   EXPECT_NEAR((body.velocity() - (1 - std::exp(-1.5)) * Vec3(5, 0, 1)).norm(), 0, 1e-9);
 }
 
+// The air is that which particles feel; with no drag of the field it acts through the body's own.
+TEST(Air, MovesBodiesByItsDragOrTheirOwn) {
+  const Turbulence turbulence{.speed = 3, .drag = 0.5, .region = SphereRegion{{0, 0, 0}, 4}, .drop_rate = 1};
+  const Vortex vortex{.circulation = 7, .radius = 0.5};
+  RigidMotion motion = at_rest({0, 1, 0.5});
+  motion.velocity = {1, 2, 3};
+  const Vec3 air = TurbulentFlow(turbulence, 0.2).velocity(motion.position);
+  const Real share = 1 - motion.position.norm() / 4;
+  const Vec3 by_field = wrench({.effect = turbulence}, 0.2, motion, Vec3::Zero(), 0.3).force;
+  EXPECT_NEAR((by_field - share * 0.5 * (air - motion.velocity)).norm(), 0, 1e-15);
+  const Vec3 by_own = wrench({.effect = vortex}, 0.2, motion, Vec3::Zero(), 0.3).force;
+  EXPECT_NEAR((by_own - 0.3 * velocity(vortex, motion.position)).norm(), 0, 1e-15);
+}
+
 // In the end the hand's point of a body hangs below the hand by its weight, and the body below that point.
 TEST(Grab, HoldsABodyByItsPoint) {
   const ForceDef grab{.effect = Grab{.point = {0.5, 0, 0},
@@ -121,6 +135,13 @@ TEST(ForceDef, SaysWhatIsWrong) {
   EXPECT_NE(problem({.effect = Grab{}}).find("bodies"), std::string::npos);
   EXPECT_NE(problem({.bodies = {BodyHandle{0, 1}}, .effect = Grab{}}).find("keys"), std::string::npos);
   EXPECT_NE(problem({.effect = Explosion{.radius = std::nan("")}}).find("radius"), std::string::npos);
+  EXPECT_NE(problem({.effect = LennardJones{}}).find("systems"), std::string::npos);
+  const std::vector<ParticleSystemHandle> systems = {{0, 1}};
+  EXPECT_EQ(problem({.systems = systems, .effect = Coulomb{}}), "");
+  EXPECT_NE(problem({.systems = systems, .effect = LennardJones{.sigma = 0}}).find("sigma"),
+            std::string::npos);
+  EXPECT_NE(problem({.effect = Vortex{.axis = Vec3::Zero()}}).find("axis"), std::string::npos);
+  EXPECT_NE(problem({.effect = Turbulence{.octaves = 9}}).find("octaves"), std::string::npos);
 }
 
 }  // namespace

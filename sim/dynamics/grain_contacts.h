@@ -1,0 +1,141 @@
+#pragma once
+/// Resting contact of grains with each other and with bodies, and whatever GrainImpacts left (physics P6, P7,
+/// P8, R10): a complementarity problem on the velocities at the end of the sub-step with Coulomb's round
+/// cone, as of bodies (contact_problem.h). Grains do not turn, so a contact's mobility is a number and its
+/// solution closed. It is relaxed by projected Gauss-Seidel from the impulses of the sub-step before: a heap
+/// at rest is its own solution. Grains lie in layers (NeighborGrid), two to a slab, and a slab's contacts
+/// reach no farther than the layers beside it: all even slabs may be relaxed at the same time, then all odd
+/// ones.
+
+#include <limits>
+#include <span>
+#include <tuple>
+#include <vector>
+
+#include "sim/dynamics/grain.h"
+#include "sim/dynamics/grain_impacts.h"
+#include "sim/dynamics/grain_search.h"
+#include "sim/dynamics/particle_sweep.h"
+
+namespace offstage::sim {
+
+class GrainContacts {
+ public:
+  static constexpr uint32_t kNone = ~0u;
+  /// Gaps below this share of the radii count as contact: what impulses of a sub-step may close.
+  static constexpr Real kMargin = 0.1;
+
+  /// The grains, in an order by layers.
+  struct Order {
+    std::span<const uint32_t> layer_begin;  ///< of each layer, an even number, and the end
+    std::span<const uint32_t> layer;        ///< of each grain
+    std::span<const uint32_t> before;       ///< index of each in the solution before, or kNone
+  };
+
+  /// Moves the grains to the end of their sub-step: `end` gets their positions, the grains their velocities,
+  /// `touched` whether they press on anything. Appends what bodies and grains got.
+  void solve(std::span<Grain> grains, const Order& order, const GrainSearch& search,
+             const GrainImpacts& impacts, const GrainStep& step, std::span<Vec3> end,
+             std::span<uint8_t> touched, std::vector<Reaction>& reactions, std::vector<GrainStrike>& strikes);
+
+  std::size_t contacts() const { return pairs_.size() + surfaces_.size(); }
+  uint32_t sweeps() const { return sweeps_; }
+
+ private:
+  static constexpr Real kNever = std::numeric_limits<Real>::infinity();
+
+  /// Of a contact: its normal and how it acts, and the impulse on the first grain (world, N s).
+  struct Contact {
+    Vec3 normal;
+    Vec3 impulse;
+    Real target;    // least normal velocity at the end [m/s]
+    Real friction;  // Coulomb's coefficient
+    Real mass;      // effective [kg]
+    Real time;      // since when [s]
+    bool is_impact;
+  };
+  struct Pair : Contact {
+    uint32_t a, b;
+    bool is_far;  // not in neighbouring layers
+  };
+  struct Surface : Contact {
+    uint32_t grain;
+    const Obstacle* obstacle;
+    uint32_t body;
+    Vec3 velocity;  // of the surface
+  };
+  struct Motion {
+    Vec3 velocity;
+    Real inverse_mass;
+  };
+  /// Two grains that would pass through each other.
+  struct Passing {
+    Real time;
+    uint32_t a, b;
+    bool a_stands, b_stands;  // by then
+
+    bool operator>(const Passing& o) const { return std::tie(time, a, b) > std::tie(o.time, o.a, o.b); }
+  };
+  struct Found {
+    std::vector<Pair> pairs;
+    std::vector<Surface> surfaces;
+    std::vector<Reaction> reactions;
+    std::vector<GrainStrike> strikes;
+    std::vector<Passing> passing;
+  };
+
+  std::size_t chunk_count() const;
+  template <class F>
+  void for_each_chunk(F&& f) const;
+  template <class OnPair, class OnSurface>
+  void for_each_contact(OnPair&& on_pair, OnSurface&& on_surface);
+
+  // grain_contacts.cpp
+  void find();
+  void find_pairs(uint32_t i, Found& found) const;
+  void find_surfaces(uint32_t i, NearObstacles& near, Found& found) const;
+  void add_surface(uint32_t i, const Obstacle& o, const Vec3& normal, Real target_or_gap, Real time,
+                   bool meets, std::size_t first, Found& found) const;
+  void recall(Pair& pair) const;
+  void recall(Surface& surface) const;
+  void collect();
+  // grain_relaxation.cpp
+  void relax();
+  void displace(std::span<Vec3> end, std::span<uint8_t> touched);
+  void push_apart(std::span<Vec3> end);
+  // grain_passing.cpp
+  void stop_passing(std::span<Vec3> end);
+  bool set_out(std::span<const Vec3> end);
+  void find_passing();
+  template <class Add>
+  void find_passing(uint32_t i, uint32_t j, Real after, Add&& add) const;
+  void stop(const Passing& passing);
+  bool stands(uint32_t i) const { return stop_[i] < kNever; }
+  // grain_relaxation.cpp
+  void keep_outside(std::span<Vec3> end, std::vector<Reaction>& reactions, std::vector<GrainStrike>& strikes);
+  void keep_outside(uint32_t i, NearObstacles& near, Vec3& end, Found& found);
+  void report(uint32_t i, const Vec3& end, Found& found) const;
+
+  std::span<Grain> grains_;
+  Order order_;
+  const GrainSearch* search_ = nullptr;
+  const GrainImpacts* impacts_ = nullptr;
+  const GrainStep* step_ = nullptr;
+  std::vector<Found> found_;  // by chunk
+  std::vector<Pair> pairs_, pairs_before_;
+  std::vector<Surface> surfaces_, surfaces_before_;
+  // Where a grain's contacts begin; of a pair it is the first one's.
+  std::vector<uint32_t> pair_begin_, surface_begin_, pair_begin_before_, surface_begin_before_;
+  std::vector<uint32_t> far_;
+  std::vector<Motion> motion_;
+  std::vector<Real> slab_change_;
+  // The ways as contact made them, whether they are long, and when those that end early do.
+  std::vector<Grain> ways_;
+  std::vector<uint8_t> is_long_;
+  std::vector<Real> stop_;
+  GrainSearch way_search_;
+  Real h_before_ = 0;
+  uint32_t sweeps_ = 0;
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,108 @@
+/// What GrainContacts does about grains that its solution sends through each other. It knows of those that
+/// come near each other on their ways as they were before: contact may turn a fast grain towards others. So
+/// the ways that it made are swept once more, in the order of time, and two grains that would pass stop for
+/// the rest of the sub-step. What stops stays clear of what has not come yet, so nothing passes, and each
+/// grain stops once at most.
+
+#include <algorithm>
+#include <queue>
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include "sim/dynamics/grain_contacts.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Two whose ways are shorter than this share of their radii cannot pass each other.
+constexpr Real kShort = 0.5;
+/// So near, of the distance they had or of that at which they touch, they stop: nearer than contact lets them
+/// come.
+constexpr Real kNearest = 0.992;
+
+}  // namespace
+
+/// Makes the ways to the ends; whether any is long, in the frame that moves with the mean.
+bool GrainContacts::set_out(std::span<const Vec3> end) {
+  const std::size_t n = grains_.size();
+  const Real h = step_->h;
+  ways_.resize(n);
+  is_long_.resize(n);
+  Vec3 drift = Vec3::Zero();
+  for (std::size_t i = 0; i < n; ++i) drift += (end[i] - grains_[i].position) / static_cast<Real>(n);
+  tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
+    for (std::size_t i = c * GrainSearch::kChunk; i < std::min(n, (c + 1) * GrainSearch::kChunk); ++i) {
+      Grain& g = ways_[i] = grains_[i];
+      const Vec3 way = end[i] - g.position;
+      g.path_velocity = g.from < h ? Vec3(way / (h - g.from)) : Vec3::Zero();
+      is_long_[i] = (way - drift).norm() > kShort * g.radius;
+    }
+  });
+  return std::find(is_long_.begin(), is_long_.end(), 1) != is_long_.end();
+}
+
+/// When two grains come too near each other after a time, as far as is known where they stop.
+template <class Add>
+void GrainContacts::find_passing(uint32_t i, uint32_t j, Real after, Add&& add) const {
+  const Grain &a = ways_[i], &b = ways_[j];
+  if (!may_collide(a, b)) return;
+  const Real from = std::max({a.from, b.from, after});
+  const Vec3 d = a.at(std::min(from, stop_[i])) - b.at(std::min(from, stop_[j]));
+  const Vec3 u = (stands(i) ? 0 : 1) * a.path_velocity - (stands(j) ? 0 : 1) * b.path_velocity;
+  const Real first = std::max(a.from, b.from), reach = a.radius + b.radius;
+  const Real nearest = std::min(kNearest * std::min(reach, (a.at(first) - b.at(first)).norm()), d.norm());
+  const auto met = meeting_time(d, u, nearest);
+  if (met && from + *met < step_->h) add(Passing{from + *met, i, j, stands(i), stands(j)});
+}
+
+void GrainContacts::find_passing() {
+  stop_.assign(grains_.size(), kNever);
+  tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
+    std::vector<Passing>& passing = found_[c].passing;
+    passing.clear();
+    const auto add = [&](const Passing& p) { passing.push_back(p); };
+    const std::size_t end = std::min(grains_.size(), (c + 1) * GrainSearch::kChunk);
+    for (auto i = static_cast<uint32_t>(c * GrainSearch::kChunk); i < end; ++i)
+      for (const uint32_t j : way_search_.partners(i))
+        if (is_long_[i] || is_long_[j]) find_passing(i, j, 0, add);
+  });
+}
+
+/// Both stop, and no longer approach each other.
+void GrainContacts::stop(const Passing& p) {
+  stop_[p.a] = std::min(stop_[p.a], p.time);
+  stop_[p.b] = std::min(stop_[p.b], p.time);
+  Grain &a = grains_[p.a], &b = grains_[p.b];
+  const Vec3 d = ways_[p.a].at(stop_[p.a]) - ways_[p.b].at(stop_[p.b]);
+  const Real approach = -(a.velocity - b.velocity).dot(d);
+  if (!(approach > 0)) return;
+  const Vec3 impulse = a.mass * b.mass / (a.mass + b.mass) * approach / d.squaredNorm() * d;
+  a.velocity += impulse / a.mass;
+  b.velocity -= impulse / b.mass;
+}
+
+void GrainContacts::stop_passing(std::span<Vec3> end) {
+  if (!set_out(end)) return;
+  way_search_.build(ways_, step_->h, 0);
+  way_search_.list_partners(ways_);
+  find_passing();
+  std::priority_queue<Passing, std::vector<Passing>, std::greater<>> queue;
+  for (const Found& found : found_)
+    for (const Passing& p : found.passing) queue.push(p);
+  const auto add = [&](const Passing& p) { queue.push(p); };
+  while (!queue.empty()) {
+    const Passing p = queue.top();
+    queue.pop();
+    if (stands(p.a) != p.a_stands || stands(p.b) != p.b_stands) continue;
+    stop(p);
+    for (const uint32_t i : {p.a, p.b}) {
+      if (i == p.a ? p.a_stands : p.b_stands) continue;
+      end[i] = ways_[i].at(p.time);
+      way_search_.for_each_near(ways_[i], [&](uint32_t k) {
+        if (k != i && !stands(k)) find_passing(i, k, p.time, add);
+      });
+    }
+  }
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,203 @@
+/// The solution of GrainContacts and what follows from it.
+
+#include <algorithm>
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include "sim/dynamics/grain_contacts.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Sweeps of Gauss-Seidel end when one changes no velocity by more than this [m/s], or after so much work:
+/// few contacts are solved exactly, many go on from the sub-step before.
+constexpr Real kTolerance = 1e-7;
+constexpr std::size_t kMaxContactVisits = 1'000'000;
+constexpr std::size_t kMinSweeps = 30, kMaxSweeps = 1000;
+/// Overlap of grains below this share of their radii is left, and of more this share is taken away in a
+/// sub-step: by moving them, so that velocities do not know of it.
+constexpr Real kSlop = 0.002, kPush = 0.2;
+constexpr int kMaxSlides = 4;
+constexpr std::size_t kChunk = GrainSearch::kChunk;
+
+/// The impulse's change that brings a contact with relative velocity u to its target, within Coulomb's cone.
+template <class Contact>
+Vec3 correct(Contact& c, const Vec3& u) {
+  const Vec3 before = c.impulse;
+  const Vec3 wanted = before - c.mass * (u - c.target * c.normal);
+  const Real pressing = wanted.dot(c.normal);
+  if (pressing > 0) {
+    Vec3 across = wanted - pressing * c.normal;
+    const Real limit = c.friction * pressing, size2 = across.squaredNorm();
+    if (size2 > limit * limit) across *= limit / std::sqrt(size2);
+    c.impulse = pressing * c.normal + across;
+  } else {
+    c.impulse.setZero();
+  }
+  return c.impulse - before;
+}
+
+}  // namespace
+
+/// Calls on_pair for every pair and on_surface for every contact with a body; those that share a grain never
+/// at the same time, and always in the same order.
+template <class OnPair, class OnSurface>
+void GrainContacts::for_each_contact(OnPair&& on_pair, OnSurface&& on_surface) {
+  const std::size_t slabs = (order_.layer_begin.size() - 1) / 2;
+  for (std::size_t color = 0; color < 2; ++color)
+    tbb::parallel_for(std::size_t{0}, slabs / 2, [&](std::size_t k) {
+      const std::size_t slab = 2 * k + color;
+      const uint32_t begin = order_.layer_begin[2 * slab], end = order_.layer_begin[2 * slab + 2];
+      for (uint32_t c = pair_begin_[begin]; c < pair_begin_[end]; ++c)
+        if (!pairs_[c].is_far) on_pair(pairs_[c], slab);
+      for (uint32_t c = surface_begin_[begin]; c < surface_begin_[end]; ++c) on_surface(surfaces_[c], slab);
+    });
+  for (const uint32_t c : far_) on_pair(pairs_[c], 0);
+}
+
+void GrainContacts::relax() {
+  motion_.resize(grains_.size());
+  tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
+    for (std::size_t i = c * kChunk; i < std::min(grains_.size(), (c + 1) * kChunk); ++i)
+      motion_[i] = {grains_[i].velocity, 1 / grains_[i].mass};
+  });
+  const auto apply = [&](const Pair& c, const Vec3& impulse) {
+    motion_[c.a].velocity += motion_[c.a].inverse_mass * impulse;
+    motion_[c.b].velocity -= motion_[c.b].inverse_mass * impulse;
+  };
+  for_each_contact([&](const Pair& c, std::size_t) { apply(c, c.impulse); },
+                   [&](const Surface& c, std::size_t) {
+                     motion_[c.grain].velocity += motion_[c.grain].inverse_mass * c.impulse;
+                   });
+  const std::size_t slabs = (order_.layer_begin.size() - 1) / 2;
+  const std::size_t most =
+      std::clamp(kMaxContactVisits / std::max(contacts(), std::size_t{1}), kMinSweeps, kMaxSweeps);
+  Real change = 1;
+  for (sweeps_ = 0; sweeps_ < most && change > kTolerance; ++sweeps_) {
+    slab_change_.assign(slabs, 0);
+    const auto note = [&](std::size_t slab, const Vec3& impulse, Real mass) {
+      slab_change_[slab] = std::max(slab_change_[slab], impulse.squaredNorm() / (mass * mass));
+    };
+    for_each_contact(
+        [&](Pair& c, std::size_t slab) {
+          const Vec3 more = correct(c, motion_[c.a].velocity - motion_[c.b].velocity);
+          apply(c, more);
+          note(slab, more, c.mass);
+        },
+        [&](Surface& c, std::size_t slab) {
+          Motion& m = motion_[c.grain];
+          const Vec3 more = correct(c, m.velocity - c.velocity);
+          m.velocity += m.inverse_mass * more;
+          note(slab, more, c.mass);
+        });
+    change = std::sqrt(*std::max_element(slab_change_.begin(), slab_change_.end()));
+  }
+}
+
+/// Where the impulses bring the grains, each from its time on.
+void GrainContacts::displace(std::span<Vec3> end, std::span<uint8_t> touched) {
+  const Real h = step_->h;
+  const auto press = [&](const Contact& c, uint32_t i, Real sign) {
+    if (!touched[i]) end[i] = grains_[i].at(h);
+    touched[i] = 1;
+    end[i] += sign * (h - c.time) / grains_[i].mass * c.impulse;
+  };
+  for_each_contact(
+      [&](const Pair& c, std::size_t) {
+        if (c.impulse == Vec3::Zero()) return;
+        press(c, c.a, 1);
+        press(c, c.b, -1);
+      },
+      [&](const Surface& c, std::size_t) {
+        if (c.impulse != Vec3::Zero()) press(c, c.grain, 1);
+      });
+  tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
+    for (std::size_t i = c * kChunk; i < std::min(grains_.size(), (c + 1) * kChunk); ++i)
+      grains_[i].velocity = motion_[i].velocity;
+  });
+}
+
+/// Takes some of the overlap away.
+void GrainContacts::push_apart(std::span<Vec3> end) {
+  for_each_contact(
+      [&](const Pair& c, std::size_t) {
+        const Vec3 d = end[c.a] - end[c.b];
+        const Real reach = grains_[c.a].radius + grains_[c.b].radius, distance = d.norm();
+        const Real excess = reach * (1 - kSlop) - distance;
+        if (excess <= 0 || !(distance > 0)) return;
+        const Vec3 push = kPush * excess / distance * c.mass * d;
+        end[c.a] += push / grains_[c.a].mass;
+        end[c.b] -= push / grains_[c.b].mass;
+      },
+      [](const Surface&, std::size_t) {});
+}
+
+/// No grain ends its sub-step inside a body or beyond it.
+void GrainContacts::keep_outside(std::span<Vec3> end, std::vector<Reaction>& reactions,
+                                 std::vector<GrainStrike>& strikes) {
+  const auto for_each = [&](auto&& f) {
+    tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
+      NearObstacles near(step_->fixed, step_->moving);
+      for (auto i = static_cast<uint32_t>(c * kChunk); i < std::min(grains_.size(), (c + 1) * kChunk); ++i)
+        f(i, near, found_[c]);
+    });
+  };
+  for_each([&](uint32_t i, NearObstacles& near, Found& found) {
+    if (grains_[i].hits_bodies) keep_outside(i, near, end[i], found);
+  });
+  for_each([&](uint32_t i, NearObstacles&, Found& found) { report(i, end[i], found); });
+  for (const Found& found : found_) {
+    reactions.insert(reactions.end(), found.reactions.begin(), found.reactions.end());
+    strikes.insert(strikes.end(), found.strikes.begin(), found.strikes.end());
+  }
+}
+
+void GrainContacts::keep_outside(uint32_t i, NearObstacles& near, Vec3& end, Found& found) {
+  Grain& g = grains_[i];
+  const Real h = step_->h;
+  near.find(g.position, end, g.radius);
+  if (near.all().empty()) return;
+  Vec3 from = g.position;
+  Real fraction = g.from / h;
+  for (int slide = 0;; ++slide) {
+    const ObstacleHit hit = near.first_hit(from, end, g.radius, fraction);
+    if (!hit.obstacle) return;
+    from = hit.position;
+    fraction = hit.fraction;
+    const Obstacle& o = *hit.obstacle;
+    const Vec3 surface = o.velocity_at(from, fraction);
+    const Real behind = (end - from - (1 - fraction) * h * surface).dot(hit.normal);
+    if (slide == kMaxSlides) {
+      end = from;
+      return;
+    }
+    if (behind < 0) end -= behind * hit.normal;
+    const Real approach = (surface - g.velocity).dot(hit.normal);
+    if (approach <= 0 || o.body == impacts_->struck_body(i)) continue;
+    g.velocity += approach * hit.normal;
+    if (o.is_dynamic())
+      found.reactions.push_back(
+          reaction(o, from - g.radius * hit.normal, fraction, g.mass * approach * hit.normal));
+  }
+}
+
+/// Tells of what a grain got by its contacts; those of pairs tell both.
+void GrainContacts::report(uint32_t i, const Vec3& end, Found& found) const {
+  const auto strike = [&](const Contact& c, uint32_t grain, const Vec3& normal) {
+    if (c.is_impact && c.impulse != Vec3::Zero())
+      found.strikes.push_back({grain, c.time, grains_[grain].at(c.time), grains_[grain].velocity, normal});
+  };
+  for (uint32_t k = pair_begin_[i]; k < pair_begin_[i + 1]; ++k) {
+    strike(pairs_[k], pairs_[k].a, pairs_[k].normal);
+    strike(pairs_[k], pairs_[k].b, -pairs_[k].normal);
+  }
+  for (uint32_t k = surface_begin_[i]; k < surface_begin_[i + 1]; ++k) {
+    const Surface& s = surfaces_[k];
+    strike(s, i, s.normal);
+    if (s.obstacle->is_dynamic() && s.impulse != Vec3::Zero())
+      found.reactions.push_back(
+          reaction(*s.obstacle, end - grains_[i].radius * s.normal, s.time / step_->h, s.impulse));
+  }
+}
+
+}  // namespace offstage::sim

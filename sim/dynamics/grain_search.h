@@ -1,0 +1,88 @@
+#pragma once
+/// Which grains come near each other on their ways. Each has a ball around its way, in a frame that moves
+/// with the mean of all; balls are sorted by size into classes, each a factor two wide, with a grid each, so
+/// that neither the large nor the fast make cells too wide for the others.
+
+#include <span>
+#include <vector>
+
+#include "sim/dynamics/grain.h"
+#include "sim/dynamics/neighbor_grid.h"
+
+namespace offstage::sim {
+
+class GrainSearch {
+ public:
+  static constexpr std::size_t kChunk = 512;
+
+  /// Sorts the grains, or of them the `members`. `margin` is how near counts [m].
+  void build(std::span<const Grain> grains, Real h, Real margin);
+  void build(std::span<const Grain> grains, std::span<const uint32_t> members, Real h, Real margin);
+
+  /// Calls f(index) for the grains whose ways may come near that of `grain`, which may be in another state
+  /// than when it was sorted, and for itself.
+  template <class F>
+  void for_each_near(const Grain& grain, F&& f) const {
+    const Ball b = ball(grain);
+    for (const SizeClass& c : classes_)
+      c.grid.for_each_near(b.centre, b.radius + c.radius, [&](uint32_t k) {
+        if (meets(b, c.balls[k])) f(c.member[k]);
+      });
+  }
+
+  /// Lists for each sorted grain those it may collide with and whose ways may come near its own; of a pair
+  /// one lists the other.
+  void list_partners(std::span<const Grain> grains);
+  std::span<const uint32_t> partners(uint32_t i) const {
+    return std::span(partners_[i / kChunk]).subspan(first_[i], count_[i]);
+  }
+
+ private:
+  /// The partners of grain i, of a pair one of both only.
+  template <class F>
+  void for_each_partner(const Grain& grain, uint32_t i, F&& f) const {
+    const Ball b = ball(grain);
+    const int own = size_class(b.radius);
+    for (const SizeClass& c : classes_) {
+      if (c.size < own) continue;
+      c.grid.for_each_near(b.centre, b.radius + c.radius, [&](uint32_t k) {
+        const uint32_t j = c.member[k];
+        if ((c.size > own || j > i) && meets(b, c.balls[k])) f(j);
+      });
+    }
+  }
+
+  struct Ball {
+    Vec3 centre;
+    Real radius;
+  };
+  struct SizeClass {
+    int size = 0;
+    Real radius = 0;  // of the largest ball
+    NeighborGrid grid;
+    std::vector<uint32_t> member;
+    std::vector<Ball> balls;
+    std::vector<Vec3> centres;
+  };
+
+  static bool meets(const Ball& a, const Ball& b) {
+    const Real reach = a.radius + b.radius;
+    return (a.centre - b.centre).squaredNorm() <= reach * reach;
+  }
+  Ball ball(const Grain& g) const {
+    const Vec3 way = (h_ - g.from) / 2 * (g.path_velocity - drift_);
+    return {g.position - g.from * drift_ + way, way.norm() + g.radius + margin_ / 2};
+  }
+  int size_class(Real radius) const { return std::ilogb(radius / unit_); }
+
+  Vec3 drift_ = Vec3::Zero();
+  Real h_ = 0, margin_ = 0, unit_ = 1;
+  std::vector<SizeClass> classes_;  // finer ones first
+  std::vector<uint32_t> all_;
+  std::vector<Ball> balls_;
+  std::vector<int> size_class_;
+  std::vector<std::vector<uint32_t>> partners_;  // by chunk
+  std::vector<uint32_t> first_, count_;          // of each grain in its chunk's
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,97 @@
+#include "sim/dynamics/neighbor_grid.h"
+
+#include <bit>
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_reduce.h>
+
+namespace offstage::sim {
+namespace {
+
+constexpr std::size_t kChunk = 4096;
+/// Points are parted by the first bits of their cells, then each part is sorted by itself.
+constexpr uint32_t kPartBits = 8;
+/// Fewer cells along an axis would make a neighbour twice.
+constexpr uint32_t kMinBits = 2;
+
+Aabb bounding_box(std::span<const Vec3> points) {
+  return tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, points.size(), kChunk), Aabb(),
+      [&](const auto& range, Aabb box) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) box.extend(points[i]);
+        return box;
+      },
+      [](const Aabb& a, const Aabb& b) { return a.merged(b); });
+}
+
+}  // namespace
+
+/// As many cells as the points' box has, but not many more than there are points: longer axes wrap first.
+void NeighborGrid::choose_torus(std::span<const Vec3> points) {
+  const Aabb box = bounding_box(points);
+  std::array<Real, 3> extent;
+  for (int k = 0; k < 3; ++k)
+    extent[static_cast<std::size_t>(k)] =
+        static_cast<Real>(coordinate(box.max()[k]) - coordinate(box.min()[k]) + 1);
+  axis_ = {0, 1, 2};
+  std::stable_sort(axis_.begin(), axis_.end(), [&](Eigen::Index a, Eigen::Index b) {
+    return extent[static_cast<std::size_t>(a)] > extent[static_cast<std::size_t>(b)];
+  });
+  for (std::size_t k = 0; k < 3; ++k)
+    bits_[k] = std::max(
+        kMinBits, static_cast<uint32_t>(std::ceil(std::log2(extent[static_cast<std::size_t>(axis_[k])]))));
+  const uint32_t budget = std::max(3 * kMinBits, static_cast<uint32_t>(std::bit_width(points.size()) + 1));
+  while (bits_[0] + bits_[1] + bits_[2] > budget) --*std::max_element(bits_.begin(), bits_.end());
+  for (std::size_t k = 0; k < 3; ++k) mask_[k] = (1u << bits_[k]) - 1;
+}
+
+void NeighborGrid::build(std::span<const Vec3> points, Real cell) {
+  const std::size_t n = points.size();
+  cell_ = cell;
+  inverse_ = 1 / cell;
+  entries_.resize(n);
+  if (n == 0) return;
+  choose_torus(points);
+  const uint32_t all_bits = bits_[0] + bits_[1] + bits_[2];
+  const uint32_t shift = all_bits > kPartBits ? all_bits - kPartBits : 0, parts = 1u << (all_bits - shift);
+  const std::size_t chunks = (n + kChunk - 1) / kChunk;
+  const auto for_chunks = [&](auto&& f) {
+    tbb::parallel_for(std::size_t{0}, chunks,
+                      [&](std::size_t c) { f(c, c * kChunk, std::min(n, (c + 1) * kChunk)); });
+  };
+
+  bucket_.resize(n);
+  counts_.assign(parts * chunks + 1, 0);
+  for_chunks([&](std::size_t c, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      ++counts_[(bucket_[i] = bucket(points[i]), bucket_[i] >> shift) * chunks + c];
+  });
+  uint32_t sum = 0;
+  for (uint32_t& count : counts_) sum += std::exchange(count, sum);
+  place_ = counts_;
+  parted_.resize(n);
+  for_chunks([&](std::size_t c, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      parted_[place_[(bucket_[i] >> shift) * chunks + c]++] = {bucket_[i], static_cast<uint32_t>(i)};
+  });
+
+  begin_.assign((std::size_t{1} << all_bits) + 1, 0);
+  begin_.back() = static_cast<uint32_t>(n);
+  tbb::parallel_for(std::size_t{0}, std::size_t{parts}, [&](std::size_t part) {
+    const uint32_t first = counts_[part * chunks], last = counts_[(part + 1) * chunks];
+    uint32_t* const begin = &begin_[part << shift];
+    const std::size_t cells = std::size_t{1} << shift, base = part << shift;
+    for (uint32_t e = first; e < last; ++e) ++begin[parted_[e].first - base];
+    uint32_t place = first;
+    for (std::size_t b = 0; b < cells; ++b) place += std::exchange(begin[b], place);
+    for (uint32_t e = first; e < last; ++e) {
+      const auto [bucket, index] = parted_[e];
+      entries_[begin[bucket - base]++] = {points[index], index};
+    }
+    for (std::size_t b = cells - 1; b > 0; --b) begin[b] = begin[b - 1];
+    begin[0] = first;
+  });
+}
+
+}  // namespace offstage::sim

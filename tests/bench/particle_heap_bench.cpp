@@ -1,0 +1,89 @@
+/// Particles that collide with each other: sub-steps per second of a column of grains that comes down to a
+/// heap, of one that stands, and of a thin cloud in free flight, by their number.
+
+#include <cmath>
+
+#include <benchmark/benchmark.h>
+
+#include "effects/random.h"
+#include "sim/world.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr Real kStep = 1.0 / 120, kRadius = 0.005;
+
+void run(benchmark::State& state, World& world, int warm_up) {
+  for (int i = 0; i < warm_up; ++i) world.step(kStep);
+  uint64_t collisions = 0;
+  for (auto _ : state) collisions += world.step(kStep).particle_collisions;
+  const auto steps = static_cast<double>(state.iterations());
+  state.SetItemsProcessed(state.iterations() * state.range(0));
+  state.counters["substeps/s"] = benchmark::Counter(steps, benchmark::Counter::kIsRate);
+  state.counters["collisions"] =
+      benchmark::Counter(static_cast<double>(collisions), benchmark::Counter::kAvgIterations);
+}
+
+/// Grains in a lattice with some disorder, twice as high as it is wide, on rough ground.
+World column(std::size_t count) {
+  World world({.max_step = kStep});
+  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0});
+  const auto system = world.add_particle_system({.internal = true});
+  const effects::RandomStream random(1, 0);
+  const auto side = static_cast<std::size_t>(std::ceil(std::cbrt(static_cast<Real>(count) / 2)));
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vec3 cell(static_cast<Real>(i % side), static_cast<Real>(i / (side * side)),
+                    static_cast<Real>(i / side % side));
+    world.add_particle(system, {.position = 2.1 * kRadius * cell + Vec3(4e-4 * random.uniform(i, 0), 0.006,
+                                                                        4e-4 * random.uniform(i, 1)),
+                                .mass = 0.001,
+                                .radius = kRadius,
+                                .restitution = 0.2});
+  }
+  return world;
+}
+
+void heap_forming(benchmark::State& state) {
+  World world = column(static_cast<std::size_t>(state.range(0)));
+  run(state, world, 24);
+}
+void heap_at_rest(benchmark::State& state) {
+  World world = column(static_cast<std::size_t>(state.range(0)));
+  run(state, world, 360);
+}
+
+/// A thousandth of the space is filled.
+void ballistic(benchmark::State& state) {
+  World world({.max_step = kStep});
+  const auto system = world.add_particle_system({.internal = true});
+  const effects::RandomStream random(1, 0);
+  const auto count = static_cast<std::size_t>(state.range(0));
+  const Real side = kRadius * std::cbrt(4'000 * static_cast<Real>(count));
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto at = [&](uint32_t k) { return random.uniform(i, k) - 0.5; };
+    world.add_particle(system, {.position = side * Vec3(at(0), at(1), at(2)),
+                                .velocity = 2 * Vec3(at(3), at(4), at(5)),
+                                .mass = 0.001,
+                                .radius = kRadius});
+  }
+  run(state, world, 2);
+}
+
+BENCHMARK(heap_forming)
+    ->Arg(10'000)
+    ->Arg(100'000)
+    ->Iterations(40)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK(heap_at_rest)
+    ->Arg(10'000)
+    ->Arg(100'000)
+    ->Iterations(20)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK(ballistic)->Arg(10'000)->Arg(100'000)->Arg(1'000'000)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+}  // namespace
+}  // namespace offstage::sim
+
+BENCHMARK_MAIN();
