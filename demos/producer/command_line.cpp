@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <new>
 
@@ -52,12 +53,22 @@ void add_timing(CLI::App& command, SceneOptions& scene) {
   command.add_option("--duration", scene.duration, "Length of the film in seconds");
 }
 
-void add_picture(CLI::App& command, SceneOptions& scene) {
+void add_quality(CLI::App& command, SceneOptions& scene) {
   command
       .add_option("--quality", scene.quality,
                   "Sub-frames per frame: draft 1, preview 4, final 16 (the physics stays)")
       ->check(CLI::IsMember({"draft", "preview", "final"}));
+}
+
+void add_picture(CLI::App& command, SceneOptions& scene) {
+  add_quality(command, scene);
   command.add_option("--size", scene.size, "Picture size WxH, such as 1280x720");
+}
+
+void add_small_picture(CLI::App& command, SceneOptions& scene) {
+  add_quality(command, scene);
+  command.add_option("--size", scene.size,
+                     "Size of each picture WxH (default: 320 pixels on the longer side)");
 }
 
 void add_talk(CLI::App& command, TalkOptions& talk) {
@@ -72,6 +83,53 @@ void add_threads(CLI::App& command, int& threads) {
       ->check(CLI::Range(1, 256));
 }
 
+CLI::App* add_sheet(CLI::App& app, SheetOptions& sheet) {
+  CLI::App* command =
+      app.add_subcommand("sheet", "Draw frames of the whole film small, in one PNG with time codes");
+  add_scene(*command, sheet.scene);
+  command->add_option("-o,--output", sheet.out, "PNG file")->required();
+  command->add_option("--count", sheet.count, "How many frames, evenly from the first to the last")
+      ->check(CLI::Range(1, 400))
+      ->capture_default_str();
+  command->add_option("--columns", sheet.columns, "Pictures in a row")->check(CLI::Range(1, 100));
+  add_small_picture(*command, sheet.scene);
+  add_timing(*command, sheet.scene);
+  add_threads(*command, sheet.threads);
+  command->add_flag("--force", sheet.force, "Replace an existing file");
+  add_talk(*command, sheet.talk);
+  return command;
+}
+
+CLI::App* add_sweep(CLI::App& app, SweepOptions& sweep) {
+  CLI::App* command = app.add_subcommand(
+      "sweep", "Run a scene with different values: one labelled PNG of all, a CSV of their figures");
+  add_scene(*command, sweep.scene);
+  command
+      ->add_option("--vary", sweep.vary,
+                   "What varies: path=a:b:step or path=x,y,z, such as emitters.0.rate=100:400:50; given\n"
+                   "several times, every combination is run (at most 256)")
+      ->required()
+      ->allow_extra_args(false);
+  command
+      ->add_option("--at", sweep.at, "Times of the pictures in seconds: 1 or 0.5,1,2 (default: the middle)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command->add_option("-o,--output", sweep.out, "PNG file")->required();
+  command->add_option("--csv", sweep.csv,
+                      "Figures of every run at the last of the times (default: beside the PNG)");
+  command->add_option("--columns", sweep.columns, "Pictures in a row")->check(CLI::Range(1, 100));
+  add_small_picture(*command, sweep.scene);
+  add_timing(*command, sweep.scene);
+  add_threads(*command, sweep.threads);
+  command->add_option("--jobs", sweep.jobs, "Runs at the same time (default: as --threads, if memory allows)")
+      ->check(CLI::Range(1, 64));
+  auto* resume =
+      command->add_flag("--resume", sweep.resume, "Keep the finished runs of an interrupted sweep");
+  command->add_flag("--force", sweep.force, "Replace existing output")->excludes(resume);
+  command->add_flag("-q,--quiet", sweep.quiet, "Say nothing but errors and failed runs");
+  return command;
+}
+
 /// A program started with a standard stream closed would otherwise find its own files under that number.
 void open_standard_streams() {
   for (int fd = 0; fd <= 2; ++fd)
@@ -84,6 +142,44 @@ int flushed(int code) {
   if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
   say("offstage: standard output: {}\n", std::strerror(errno));
   return code == kOk ? kRunFailed : code;
+}
+
+/// The exit code of a command; what it throws becomes a message and a code of its own.
+int reported(const std::function<int()>& command) {
+  try {
+    return command();
+  } catch (const SceneError& error) {
+    say("{}\n", error.what());
+    return kSceneInvalid;
+  } catch (const OutputError& error) {
+    say("offstage: {}\n", error.what());
+    return kUsage;
+  } catch (const std::invalid_argument& error) {
+    say("offstage: {}\n", error.what());
+    return kUsage;
+  } catch (const render::UnavailableError& error) {
+    say("offstage: {}\n", error.what());
+    return kUnavailable;
+  } catch (const DivergedError& error) {
+    const std::string file = "offstage-diverged.json";
+    say("offstage: {}\n", error.what());
+    try {
+      write_text_file(file, error.state());
+      say("the state was saved to {}\n", file);
+    } catch (const render::FileError& unsaved) {
+      say("the state could not be saved: {}\n", unsaved.what());
+    }
+    return kDiverged;
+  } catch (const Interrupted& interrupted) {
+    say("interrupted\n");
+    return 128 + interrupted.signal();
+  } catch (const std::bad_alloc&) {
+    say("offstage: out of memory\n");
+    return kRunFailed;
+  } catch (const std::exception& error) {
+    say("offstage: {}\n", error.what());
+    return kRunFailed;
+  }
 }
 
 int dispatch(int argc, char** argv);
@@ -127,7 +223,14 @@ int dispatch(int argc, char** argv) {
   auto* resume =
       render_app->add_flag("--resume", render.resume, "Keep finished frames that have the same settings");
   render_app->add_flag("--force", render.force, "Replace existing output")->excludes(resume);
-  render_app->add_flag("--dry-run", render.dry_run, "Print the plan as JSON and write nothing");
+  auto* dry_run =
+      render_app->add_flag("--dry-run", render.dry_run, "Print the plan as JSON and write nothing");
+  render_app
+      ->add_flag("--watch", render.watch,
+                 "Render again whenever the scene, an include, a model or a texture changes, until Ctrl-C;\n"
+                 "only whole results replace the output, and errors of the scene keep the last one")
+      ->excludes(resume)
+      ->excludes(dry_run);
   render_app->add_option("--stats", render.stats, "Write figures of the run to this JSON file");
   add_talk(*render_app, render.talk);
 
@@ -143,6 +246,11 @@ int dispatch(int argc, char** argv) {
   add_threads(*frame_app, frame.threads);
   frame_app->add_flag("--force", frame.force, "Replace an existing file");
   add_talk(*frame_app, frame.talk);
+
+  SheetOptions sheet;
+  auto* sheet_app = add_sheet(app, sheet);
+  SweepOptions sweep;
+  auto* sweep_app = add_sweep(app, sweep);
 
   SimulateOptions simulate;
   auto* simulate_app = app.add_subcommand("simulate", "Run the physics alone; prints its figures as JSON");
@@ -170,6 +278,10 @@ int dispatch(int argc, char** argv) {
   bool reference = false;
   auto* schema_app = app.add_subcommand("schema", "Print the JSON Schema of the scene format");
   schema_app->add_flag("--reference", reference, "Print the reference in Markdown instead");
+
+  std::string preset;
+  auto* presets_app = app.add_subcommand("presets", "List the effects that scenes can name, or print one");
+  presets_app->add_option("name", preset, "Preset to print");
 
   SceneOptions info;
   bool info_json = false;
@@ -206,48 +318,23 @@ int dispatch(int argc, char** argv) {
     return app.exit(error) == 0 ? kOk : kUsage;
   }
 
-  try {
+  return reported([&] {
+    if (*render_app && render.watch)
+      return watch_command(
+          render, [](const RenderOptions& once) { return reported([&] { return render_command(once); }); });
     if (*render_app) return render_command(render);
     if (*frame_app) return frame_command(frame);
+    if (*sheet_app) return sheet_command(sheet);
+    if (*sweep_app) return sweep_command(sweep);
     if (*simulate_app) return simulate_command(simulate);
     if (*validate_app) return validate_command(validate, validate_json);
     if (*schema_app) return schema_command(reference);
     if (*info_app) return info_command(info, info_json);
+    if (*presets_app) return presets_command(preset);
     if (*compare_app) return compare_command(compare);
     if (*bless_app) return bless_command(bless);
-    return *doctor_app ? doctor_command() : kUsage;
-  } catch (const SceneError& error) {
-    say("{}\n", error.what());
-    return kSceneInvalid;
-  } catch (const OutputError& error) {
-    say("offstage: {}\n", error.what());
-    return kUsage;
-  } catch (const std::invalid_argument& error) {
-    say("offstage: {}\n", error.what());
-    return kUsage;
-  } catch (const render::UnavailableError& error) {
-    say("offstage: {}\n", error.what());
-    return kUnavailable;
-  } catch (const DivergedError& error) {
-    const std::string file = "offstage-diverged.json";
-    say("offstage: {}\n", error.what());
-    try {
-      write_text_file(file, error.state());
-      say("the state was saved to {}\n", file);
-    } catch (const render::FileError& unsaved) {
-      say("the state could not be saved: {}\n", unsaved.what());
-    }
-    return kDiverged;
-  } catch (const Interrupted& interrupted) {
-    say("interrupted\n");
-    return 128 + interrupted.signal();
-  } catch (const std::bad_alloc&) {
-    say("offstage: out of memory\n");
-    return kRunFailed;
-  } catch (const std::exception& error) {
-    say("offstage: {}\n", error.what());
-    return kRunFailed;
-  }
+    return *doctor_app ? doctor_command() : static_cast<int>(kUsage);
+  });
 }
 
 }  // namespace

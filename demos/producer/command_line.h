@@ -1,6 +1,6 @@
 #pragma once
-/// The command line: offstage render | simulate | frame | validate | schema | info | compare | bless |
-/// doctor.
+/// The command line: offstage render | frame | sheet | sweep | simulate | validate | schema | info | compare
+/// | bless | doctor.
 
 namespace offstage::producer {
 

@@ -2,6 +2,7 @@
 /// The commands behind the command line. Each takes what was asked for and returns an exit code; errors are
 /// thrown.
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -44,9 +45,13 @@ struct RenderOptions {
   std::string cache, stats;
   int threads = 0;  ///< 0: all available
   int jobs = 0;     ///< 0: as `threads`
-  bool resume = false, force = false, dry_run = false;
+  bool resume = false, force = false, dry_run = false, watch = false;
 };
 int render_command(const RenderOptions& options);
+/// Renders, and again whenever a file that the scene is made of changes, until a signal ends it. Every render
+/// runs in a process of its own; what a whole one made replaces the output, a failed one leaves the last good
+/// result. `render` is the render command that reports its errors itself.
+int watch_command(const RenderOptions& options, const std::function<int(const RenderOptions&)>& render);
 
 struct FrameOptions {
   SceneOptions scene;
@@ -59,6 +64,27 @@ struct FrameOptions {
 };
 int frame_command(const FrameOptions& options);
 
+struct SheetOptions {
+  SceneOptions scene;
+  TalkOptions talk;
+  std::string out;
+  int count = 12, columns = 0;  ///< columns 0: chosen by the count
+  int threads = 0;
+  bool force = false;
+};
+int sheet_command(const SheetOptions& options);
+
+struct SweepOptions {
+  SceneOptions scene;
+  std::vector<std::string> vary;
+  std::vector<double> at;  ///< times [s]; none: the middle of the film
+  std::string out, csv;    ///< csv empty: beside the sheet
+  int columns = 0;         ///< 0: chosen by what varies
+  int threads = 0, jobs = 0;
+  bool resume = false, force = false, quiet = false;
+};
+int sweep_command(const SweepOptions& options);
+
 struct SimulateOptions {
   SceneOptions scene;
   TalkOptions talk;
@@ -70,6 +96,8 @@ int simulate_command(const SimulateOptions& options);
 
 int validate_command(const SceneOptions& options, bool json);
 int schema_command(bool reference);
+/// All presets with a line each, or the text of one.
+int presets_command(const std::string& name);
 int info_command(const SceneOptions& options, bool json);
 int doctor_command();
 
@@ -98,5 +126,18 @@ LoadedScene load(const SceneOptions& options, bool quiet,
                  const std::vector<std::string>& more_overrides = {});
 void print_warnings(const std::vector<Problem>& warnings);
 void write_text_file(const std::string& path, const std::string& text);
+
+/// Refuses, before the work, a file that could not or must not be written after it. An empty name is none.
+/// Throws OutputError.
+void check_file(const std::string& file, bool force);
+void check_distinct(const std::string& a, const std::string& b);
+/// Throws OutputError unless the name ends in .png.
+void check_png(const std::string& file);
+
+/// The frame nearest to a time. Throws std::invalid_argument for one outside of the film.
+int frame_at(const Scene& scene, double time);
+inline constexpr int kSmallSide_px = 320;  ///< of the pictures of a sheet
+/// A size such as "320x180" for small pictures of a scene: its shape, and the longer side as given.
+std::string small_size(const Scene& scene, int longer_side_px);
 
 }  // namespace offstage::producer

@@ -10,6 +10,7 @@
 #include "producer/command_line.h"
 #include "producer/commands.h"
 #include "producer/fingerprint.h"
+#include "producer/scene_check_particles.h"
 #include "producer/simulation.h"
 #include "producer/talk.h"
 #include "render/context.h"
@@ -102,6 +103,20 @@ Json describe_scene(const LoadedScene& loaded, const DecompositionCache& cache) 
           {"settings", settings_key(loaded, models)}};
 }
 
+/// How many particles a scene can have at most, in all and of each name.
+struct MostParticles {
+  uint64_t alive = 0;
+  Json by_name = Json::object();
+};
+MostParticles most_particles(const Scene& scene) {
+  MostParticles most;
+  for (const ParticleBound& bound : particle_bounds(scene)) {
+    most.alive += bound.alive;
+    most.by_name[bound.name] = bound.alive;
+  }
+  return most;
+}
+
 /// JSON as indented "key: value" lines.
 void print_readable(const Json& json, int indent = 0) {
   for (const auto& [key, value] : json.items()) {
@@ -185,10 +200,14 @@ int validate_command(const SceneOptions& options, bool json) {
     const ModelLibrary models(loaded.scene, loaded.folder, options.decompositions(), loaded.warnings);
     const Simulation simulation(loaded.scene, models);  // what only building shows
     for (const Problem& warning : loaded.warnings) result["warnings"].push_back(list(warning));
+    const MostParticles most = most_particles(loaded.scene);
+    result["most_particles"] = most.alive;
+    result["most_particles_by_name"] = most.by_name;
     if (!json) {
       print_warnings(loaded.warnings);
-      fmt::print("{}: valid, {} frames, {} bodies, {} emitters\n", options.file, loaded.scene.frame_count(),
-                 loaded.scene.bodies.size(), loaded.scene.emitters.size());
+      fmt::print("{}: valid, {} frames, {} bodies, {} emitters, at most {} particles at once\n", options.file,
+                 loaded.scene.frame_count(), loaded.scene.bodies.size(), loaded.scene.emitters.size(),
+                 most.alive);
     }
   } catch (const SceneError& error) {
     if (!json) throw;

@@ -25,24 +25,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Refuses, before the work, a file that could not or must not be written after it. An empty name is none.
-void check_file(const std::string& file, bool force) {
-  if (file.empty()) return;
-  const fs::path folder = fs::path(file).parent_path();
-  std::error_code error;
-  if (!folder.empty() && !fs::is_directory(folder, error))
-    throw OutputError(file + ": there is no folder " + folder.string());
-  const fs::file_status status = fs::status(file, error);
-  if (status.type() == fs::file_type::not_found) return;
-  if (status.type() != fs::file_type::regular) throw OutputError(file + ": is not a regular file");
-  if (!force) throw OutputError(file + ": exists already; replace it with --force");
-}
-
-void check_distinct(const std::string& a, const std::string& b) {
-  if (!a.empty() && fs::path(a).lexically_normal() == fs::path(b).lexically_normal())
-    throw OutputError(a + ": is named for two outputs");
-}
-
 void report_run(const RunStats& stats, const TalkOptions& talk, const std::string& stats_file) {
   if (!stats_file.empty()) write_text_file(stats_file, to_json(stats));
   if (talk.quiet) return;
@@ -213,7 +195,41 @@ int render_to_pipe(const Plan& plan, const ModelLibrary& models, const RenderOpt
   return stats.interrupted_by ? interrupted(stats, static_cast<int>(plan.frames.size()), "") : kOk;
 }
 
+int checked_frame(const Scene& scene, double wanted) {
+  const int count = scene.frame_count();
+  if (wanted >= 1 && wanted <= count) return static_cast<int>(wanted);
+  throw std::invalid_argument(
+      fmt::format("frame {} is outside the film; it has frames 1-{}, times {:g} to {:g} s", wanted, count,
+                  scene.output.start, scene.output.start + (count - 1) / scene.output.fps));
+}
+
 }  // namespace
+
+void check_file(const std::string& file, bool force) {
+  if (file.empty()) return;
+  const fs::path folder = fs::path(file).parent_path();
+  std::error_code error;
+  if (!folder.empty() && !fs::is_directory(folder, error))
+    throw OutputError(file + ": there is no folder " + folder.string());
+  const fs::file_status status = fs::status(file, error);
+  if (status.type() == fs::file_type::not_found) return;
+  if (status.type() != fs::file_type::regular) throw OutputError(file + ": is not a regular file");
+  if (!force) throw OutputError(file + ": exists already; replace it with --force");
+}
+
+void check_distinct(const std::string& a, const std::string& b) {
+  if (!a.empty() && fs::path(a).lexically_normal() == fs::path(b).lexically_normal())
+    throw OutputError(a + ": is named for two outputs");
+}
+
+void check_png(const std::string& file) {
+  if (fs::path(file).extension() != ".png")
+    throw OutputError(file + ": a picture is a PNG file; give a name ending in .png");
+}
+
+int frame_at(const Scene& scene, double time) {
+  return checked_frame(scene, 1 + std::round((time - scene.output.start) * scene.output.fps));
+}
 
 int render_command(const RenderOptions& options) {
   LoadedScene loaded = load(options.scene, options.talk.quiet);
@@ -244,17 +260,14 @@ int render_command(const RenderOptions& options) {
 int frame_command(const FrameOptions& options) {
   const LoadedScene loaded = load(options.scene, options.talk.quiet);
   const Scene& scene = loaded.scene;
-  const int count = scene.frame_count();
-  double wanted = options.frame.value_or(1);
-  if (wanted < 0) wanted += count + 1;
-  if (options.at) wanted = 1 + std::round((*options.at - scene.output.start) * scene.output.fps);
-  if (!(wanted >= 1 && wanted <= count))
-    throw std::invalid_argument(
-        fmt::format("frame {} is outside the film; it has frames 1-{}, times {:g} to {:g} s", wanted, count,
-                    scene.output.start, scene.output.start + (count - 1) / scene.output.fps));
-  const int frame = static_cast<int>(wanted);
-  if (fs::path(options.out).extension() != ".png")
-    throw OutputError(options.out + ": a frame is a PNG file; give a name ending in .png");
+  int frame = 0;
+  if (options.at) {
+    frame = frame_at(scene, *options.at);
+  } else {
+    const double wanted = options.frame.value_or(1);
+    frame = checked_frame(scene, wanted < 0 ? wanted + scene.frame_count() + 1 : wanted);
+  }
+  check_png(options.out);
   check_file(options.out, options.force);
 
   class PictureSink : public render::FrameSink {

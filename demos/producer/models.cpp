@@ -60,6 +60,9 @@ Files files_of(const Scene& scene) {
     if (const auto* mesh = std::get_if<MeshFile>(&body.shape)) files.models.emplace(mesh->file, body.where);
     if (body.model) files.models.emplace(body.model->file, body.where);
   }
+  for (const Emitter& emitter : scene.emitters)
+    if (const auto* mesh = std::get_if<MeshSurface>(&emitter.surface))
+      files.models.emplace(mesh->file, emitter.where);
   for (const Material& material : scene.materials)
     if (!material.texture.empty()) files.textures.emplace(material.texture, material.where);
   return files;

@@ -6,6 +6,8 @@
 #include <unordered_map>
 
 #include "producer/line_sketch.h"
+#include "producer/particle_sources.h"
+#include "render/bloom.h"
 #include "render/primitives.h"
 #include "render/tone_map.h"
 #include "sim/dynamics/keyframes.h"
@@ -126,8 +128,10 @@ Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context
                                 material(spring.material, models));
     springs_.push_back(rod);
   }
-  for (const ParticleGroup& group : scene.particles) add_points(group.look);
-  for (const Emitter& emitter : scene.emitters) add_points(emitter.look);
+  for (const ParticleLook* look : looks_of(scene)) {
+    points_.push_back(stage_.add_points(points_def(*look)));
+    styles_.push_back(points_def(*look).style);
+  }
   add_overlay_lines();
   add_light_and_air();
 }
@@ -229,17 +233,6 @@ void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t
   if (drawn.slot || drawn.overlay) bodies_.push_back(std::move(drawn));
 }
 
-void Picture::add_points(const ParticleLook& look) {
-  points_.push_back(stage_.add_points({.style = look.style,
-                                       .additive = look.additive,
-                                       .lit = look.lit,
-                                       .casts_shadow = look.casts_shadow,
-                                       .softness = f(look.softness),
-                                       .stretch_s = f(look.stretch),
-                                       .metallic = f(look.metallic),
-                                       .roughness = f(look.roughness)}));
-}
-
 void Picture::add_overlay_lines() {
   for (const Overlay& overlay : scene_.overlays) {
     overlays_.push_back(std::visit(
@@ -326,11 +319,8 @@ void Picture::place_points(const Snapshot& previous, const Snapshot& current, fl
   const float back = (1 - w) * dt;
   for (std::size_t set = 0; set < points_.size(); ++set) {
     const PointSet &before = previous.point_sets[set], &now = current.point_sets[set];
-    const ParticleLook& look = set < scene_.particles.size()
-                                   ? scene_.particles[set].look
-                                   : scene_.emitters[set - scene_.particles.size()].look;
     // A streak is its own motion blur: it stays where the frame ends and is as long as its style says.
-    if (w == 1 || look.style == render::PointStyle::streak) {
+    if (w == 1 || styles_[set] == render::PointStyle::streak) {
       stage_.set_points(points_[set], now.points);
       continue;
     }
@@ -405,6 +395,10 @@ render::Image Picture::draw(const Snapshot& previous, const Snapshot& current) {
     place(previous, current, w, frame_time);
     stage_.draw(render::sample_offsets(i, n), sum_);
   }
+  if (scene_.render.bloom > 0)
+    render::add_bloom(sum_, {.strength = f(scene_.render.bloom),
+                             .exposure = f(scene_.render.exposure),
+                             .sample_weight = 1 / static_cast<float>(n)});
   render::Image image = render::tone_map(sum_, {.curve = scene_.render.tone_curve,
                                                 .exposure = f(scene_.render.exposure),
                                                 .sample_weight = 1 / static_cast<float>(n)});

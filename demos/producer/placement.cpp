@@ -136,16 +136,31 @@ Body moved(Body body, const PlacedCopy& copy) {
   return body;
 }
 
+void turn_surface(PlaneSurface& surface, const Quat& q) {
+  const Quat turned = q * surface.orientation();
+  surface.direction = q * surface.direction;
+  surface.turn_deg = 0;
+  const Quat turn = surface.orientation().conjugate() * turned;  // about +Y alone
+  surface.turn_deg = 2 * std::atan2(turn.y(), turn.w()) * 180 / std::numbers::pi;
+}
+void turn_surface(SphereSurface&, const Quat&) {}
+void turn_surface(DiscSurface& surface, const Quat& q) {
+  surface.direction = q * surface.direction;
+}
+void turn_surface(MeshSurface& surface, const Quat& q) {
+  surface.orientation = q * surface.orientation;
+}
+
 Emitter moved(Emitter emitter, const PlacedCopy& copy) {
   emitter.name += copy.suffix;
   emitter.placement = {};
-  auto& surface = std::get<PlaneSurface>(emitter.surface);
-  const Quat moved = copy.motion.orientation * surface.orientation();
-  surface.position = copy.motion.point_to_world(surface.position);
-  surface.direction = copy.motion.vector_to_world(surface.direction);
-  surface.turn_deg = 0;
-  const Quat turn = surface.orientation().conjugate() * moved;  // about +Y alone
-  surface.turn_deg = 2 * std::atan2(turn.y(), turn.w()) * 180 / std::numbers::pi;
+  std::visit(
+      [&](auto& surface) {
+        surface.position = copy.motion.point_to_world(surface.position);
+        turn_surface(surface, copy.motion.orientation);
+      },
+      emitter.surface);
+  emitter.direction = copy.motion.vector_to_world(emitter.direction);
   return emitter;
 }
 
@@ -153,7 +168,7 @@ const Vec3& position_of(const Body& body) {
   return body.position;
 }
 const Vec3& position_of(const Emitter& emitter) {
-  return std::get<PlaneSurface>(emitter.surface).position;
+  return position_of(emitter.surface);
 }
 
 template <class T>
@@ -179,17 +194,20 @@ std::vector<T> expand_all(const std::vector<T>& originals, uint64_t seed, std::v
   return all;
 }
 
-/// Names of bodies that have copies become those of all copies.
-void name_copies(const std::vector<Body>& originals, const std::vector<Body>& copies,
+/// Names of objects that have copies become those of all copies. What follows a slash stays behind each.
+template <class T>
+void name_copies(const std::vector<T>& originals, const std::vector<T>& copies,
                  std::vector<std::string>& names) {
   std::vector<std::string> all;
   for (const std::string& name : names) {
-    const auto original = std::ranges::find(originals, name, &Body::name);
+    const auto is_named = [&](const T& o) { return name == o.name || name.starts_with(o.name + "/"); };
+    const auto original = std::ranges::find_if(originals, is_named);
     if (original == originals.end())
       all.push_back(name);
     else
-      for (const Body& copy : copies)
-        if (copy.where.path == original->where.path) all.push_back(copy.name);
+      for (const T& copy : copies)
+        if (copy.where.path == original->where.path)
+          all.push_back(copy.name + name.substr(original->name.size()));
   }
   names = std::move(all);
 }
@@ -246,6 +264,7 @@ Scene expand(const Scene& scene, std::vector<Problem>& errors, std::vector<Probl
     std::visit(
         [&](auto& f) {
           if constexpr (requires { f.bodies; }) name_copies(scene.bodies, flat.bodies, f.bodies);
+          name_copies(scene.emitters, flat.emitters, f.particles);
         },
         force);
   return flat;

@@ -1,7 +1,6 @@
 #include "producer/scene.h"
 
 #include <cmath>
-#include <numbers>
 
 namespace offstage::producer {
 
@@ -15,18 +14,6 @@ int subframes(Quality quality) {
       return 16;
   }
   return 1;
-}
-
-Quat PlaneSurface::orientation() const {
-  const Quat turned(Eigen::AngleAxisd(turn_deg * std::numbers::pi / 180, Vec3::UnitY()));
-  return Quat::FromTwoVectors(Vec3::UnitY(), direction) * turned;
-}
-
-NamedForce& named(Force& force) {
-  return std::visit([](NamedForce& f) -> NamedForce& { return f; }, force);
-}
-const NamedForce& named(const Force& force) {
-  return std::visit([](const NamedForce& f) -> const NamedForce& { return f; }, force);
 }
 
 int Scene::frame_count() const {

@@ -4,7 +4,7 @@
 /// for the loader, the schema and the reference. SI units; angles in degrees where a name says so.
 
 #include <array>
-#include <map>
+
 #include <optional>
 #include <string>
 #include <utility>
@@ -13,13 +13,15 @@
 
 #include <Eigen/Core>
 
-#include "effects/distribution.h"
 #include "producer/error.h"
+#include "producer/scene_effects.h"
+#include "producer/scene_forces.h"
+#include "producer/scene_particles.h"
+#include "producer/scene_values.h"
 #include "render/model.h"
 #include "render/stage.h"
 #include "render/tone_map.h"
 #include "sim/contact/collision.h"
-#include "sim/dynamics/force_field.h"
 #include "sim/dynamics/integrator.h"
 #include "sim/dynamics/keyframes.h"
 #include "sim/shape.h"
@@ -27,18 +29,6 @@
 #include "sim/world.h"
 
 namespace offstage::producer {
-
-using effects::Varying;
-using sim::Quat;
-using sim::Real;
-using sim::Vec3;
-
-/// Linear colour with straight alpha. In files "#rrggbb", "#rrggbbaa" (sRGB) or linear [r, g, b] or [r, g, b,
-/// a].
-struct Color {
-  Eigen::Vector4f rgba = {1, 1, 1, 1};
-  Eigen::Vector3f rgb() const { return rgba.head<3>(); }
-};
 
 struct WorldSettings {
   Vec3 gravity = {0, -9.81, 0};
@@ -97,34 +87,6 @@ struct ModelLook {
   Quat orientation = Quat::Identity();
 };
 
-/// Copies in a row or a ring: copy i is moved by i * offset and turned by i * turn_deg about the vertical
-/// through `pivot`.
-struct Repeat {
-  int count = 2;
-  Vec3 offset = Vec3::Zero();
-  Real turn_deg = 0;
-  Vec3 pivot = Vec3::Zero();
-};
-/// Copies on a grid centred on the original in x and z, upwards from it in y.
-struct Grid {
-  Eigen::Vector3i count = {1, 1, 1};
-  Vec3 spacing = Vec3::Ones();
-};
-/// Copies at random places of a rectangle centred on the original.
-struct Scatter {
-  int count = 10;
-  Eigen::Vector2d size = {10, 10};  ///< along x and z
-  Real min_distance = 0;            ///< between copies; those that find no place are left out with a warning
-  bool turn = true;                 ///< random turn about the vertical
-  Varying scale = 1.0;              ///< of a body's shape and model
-  uint64_t seed = 1;
-};
-struct Placement {
-  std::optional<Repeat> repeat;
-  std::optional<Grid> grid;
-  std::optional<Scatter> scatter;
-};
-
 struct BodyKey {
   Real time = 0;
   std::optional<Vec3> position;     ///< default: the body's
@@ -158,95 +120,6 @@ struct Body {
   Placement placement;  ///< its three keys stand directly in the body
 };
 
-/// How particles are drawn.
-struct ParticleLook {
-  render::PointStyle style = render::PointStyle::sprite;
-  Color color;
-  std::vector<std::pair<Real, Color>> color_over_age;  ///< [age 0..1, colour]; multiplies `color`
-  std::vector<std::pair<Real, Real>> size_over_age;    ///< [age 0..1, factor]
-  Real color_deviation = 0;                            ///< of brightness, per particle
-  bool additive = false;
-  bool lit = true;
-  bool casts_shadow = true;
-  Real softness = 0.5;
-  Real stretch = 1.0 / 60;
-  Real metallic = 0;
-  Real roughness = 0.3;
-};
-
-/// What particles of a group or an emitter feel and do, other than their own parameters.
-struct ParticleBehaviour {
-  Real linear_drag = 0;
-  bool gravity = true;
-  Vec3 force = Vec3::Zero();
-  bool collides = true;
-  bool dies_on_hit = false;
-  sim::IntegratorKind integrator = sim::IntegratorKind::symplectic_euler;
-};
-
-struct ParticlePlace {
-  Vec3 position = Vec3::Zero();
-  Vec3 velocity = Vec3::Zero();
-  std::optional<Color> color;  ///< default: the look's
-};
-
-/// Particles placed one by one.
-struct ParticleGroup {
-  Where where;
-  std::string name;
-  std::vector<ParticlePlace> places;
-  Real radius = 0.05;
-  Real mass = 1;
-  Real restitution = 0.5;
-  Real friction = 0.5;
-  ParticleBehaviour behaviour;  ///< its keys stand directly in the group
-  ParticleLook look;
-};
-
-/// A rectangle that particles leave along `direction`.
-struct PlaneSurface {
-  Vec3 position = Vec3::Zero();
-  Vec3 direction = Vec3::UnitY();
-  Real turn_deg = 0;  ///< of the rectangle about its direction
-  Eigen::Vector2d size = {0.1, 0.1};
-
-  /// Takes +Y to the direction by the shortest rotation, after the turn.
-  Quat orientation() const;
-};
-using EmitterSurface = std::variant<PlaneSurface>;
-
-struct EmitterBurst {
-  Real time = 0;
-  Varying count = 10.0;
-  int cycles = 1;
-  Real interval = 1;
-};
-
-struct Emitter {
-  Where where;
-  std::string name;
-  std::string body;  ///< name of the body it moves with; empty: fixed in the world
-  EmitterSurface surface = PlaneSurface{};
-  Varying rate = 100.0;
-  Varying count = 0.0;
-  Varying interval = 0.1;
-  std::vector<EmitterBurst> bursts;
-  Real start = 0;
-  Real end = 1e30;
-  Varying speed = 1.0;
-  Varying spread_deg = 0.0;
-  Varying radius = 0.01;
-  Varying density = 1000.0;
-  Varying mass = 0.0;
-  Varying lifespan = 5.0;
-  Varying restitution = 0.3;
-  Varying friction = 0.5;
-  int64_t max_alive = 1'000'000;
-  ParticleBehaviour behaviour;  ///< its keys stand directly in the emitter
-  ParticleLook look;
-  Placement placement;
-};
-
 /// One end of a spring: a point of the world, of a body (in its frame), or one particle of a group.
 struct SpringEnd {
   std::string body;
@@ -266,59 +139,6 @@ struct Spring {
   Real radius = 0.01;  ///< of the drawn rod
   std::string material;
 };
-
-// Forces on bodies. Those that can act on many have the names of what they act on; none: all dynamic bodies.
-
-struct NamedForce {
-  Where where;
-  std::string name;
-};
-/// What fields have: whom, when and where they act.
-struct FieldScope : NamedForce {
-  std::vector<std::string> bodies;
-  Real start = 0;
-  Real end = 1e30;
-  sim::Region region;
-  int drop_rate = 0;  ///< power of the fall from 1 in the middle of the region to 0 at its edge
-};
-struct ConstantField : FieldScope {
-  Vec3 force = Vec3::Zero();
-};
-struct PointField : FieldScope {
-  Vec3 point = Vec3::Zero();
-  Real force = 1;  ///< towards the point; negative: away from it
-};
-struct WindField : FieldScope {
-  Vec3 wind = Vec3::Zero();
-  Real drag = 1;
-};
-struct HandKey {
-  Real time = 0;
-  Vec3 position = Vec3::Zero();
-};
-/// A damped spring of no length from a body to a point that moves, as of a hand.
-struct Grab : NamedForce {
-  std::string body;
-  Vec3 point = Vec3::Zero();  ///< of the body, in its frame
-  std::vector<HandKey> keyframes;
-  Real stiffness = 100;
-  Real damping = 10;
-  Real start = 0;
-  Real end = 1e30;
-};
-struct Explosion : NamedForce {
-  std::vector<std::string> bodies;
-  Real time = 0;
-  Vec3 point = Vec3::Zero();
-  Real impulse = 1;
-  Real radius = 1;
-  int drop_rate = 1;
-};
-using Force = std::variant<ConstantField, PointField, WindField, Grab, Explosion>;
-
-/// What every force has.
-NamedForce& named(Force& force);
-const NamedForce& named(const Force& force);
 
 /// How the lines of an overlay are drawn.
 struct LineLook {
@@ -437,6 +257,7 @@ struct RenderSettings {
   Quality quality = Quality::preview;
   Real shutter = 0.5;  ///< share of the frame time the shutter is open
   Real exposure = 1;
+  Real bloom = 0.12;  ///< share of the light beyond white that spreads as glow
   render::ToneCurve tone_curve = render::ToneCurve::filmic;
   int shadow_map = 2048;
 };
@@ -458,6 +279,7 @@ struct Scene {
   std::vector<Body> bodies;
   std::vector<ParticleGroup> particles;
   std::vector<Emitter> emitters;
+  std::vector<Effect> effects;  ///< once a scene is loaded, its emitters and forces are among the others
   std::vector<Spring> springs;
   std::vector<Force> forces;
   std::vector<Overlay> overlays;

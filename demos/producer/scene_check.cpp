@@ -4,21 +4,19 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numbers>
 #include <optional>
 #include <set>
 #include <string>
 
 #include <fmt/format.h>
 
-#include "producer/placement.h"
+#include "producer/scene_check_particles.h"
 #include "producer/suggest.h"
 #include "sim/geometry/mass_properties.h"
 
 namespace offstage::producer {
 namespace {
 
-constexpr Real kMostParticles = 2e7;
 constexpr Real kUnlimited = std::numeric_limits<Real>::infinity();
 
 template <class T>
@@ -36,11 +34,6 @@ const T* find_named(const std::vector<T>& objects, const std::string& name) {
 
 std::string step(std::size_t i) {
   return "/" + std::to_string(i);
-}
-
-/// A usual value: the mean, or the height of a curve.
-Real usual(const Varying& v) {
-  return std::holds_alternative<effects::Curve>(v) ? effects::upper_bound(v) : effects::mean(v, 0);
 }
 
 /// The mass that resists a force; infinite for what does not move; nothing for a mesh, which is not read
@@ -63,6 +56,9 @@ class Checker {
   Checker(const Scene& scene, const Scene& flat, const std::filesystem::path& folder)
       : scene_(scene), flat_(flat), folder_(folder) {
     for (const Body& body : flat.bodies) bodies_.emplace(body.name, &body);
+    systems_ = particle_names(flat);
+    for (const std::string& name : particle_names(scene))
+      if (std::ranges::find(systems_, name) == systems_.end()) systems_.push_back(name);
   }
 
   Findings run() {
@@ -70,7 +66,7 @@ class Checker {
     check_materials();
     check_contact_rules();
     for (const Body& body : scene_.bodies) check_body(body);
-    for (const ParticleGroup& group : scene_.particles) check_group(group);
+    check_particles(scene_, flat_, findings_);
     for (const Emitter& emitter : scene_.emitters) check_emitter(emitter);
     for (const Spring& spring : scene_.springs) check_spring(spring);
     for (const Force& force : scene_.forces)
@@ -114,8 +110,7 @@ class Checker {
   void check_names() {
     check_unique(scene_.materials);
     check_unique(flat_.bodies);
-    check_unique(scene_.particles);
-    check_unique(flat_.emitters);
+
     check_unique(scene_.springs);
     std::vector<NamedForce> forces;
     for (const Force& force : scene_.forces) forces.push_back(named(force));
@@ -215,89 +210,18 @@ class Checker {
       warn(path + "/friction_axis", "has no effect: the body's material has no cross_friction");
   }
 
-  // --- Particles and emitters ---
-
-  template <class V>
-  void check_ages(const std::vector<std::pair<Real, V>>& ramp, const std::string& path) {
-    for (std::size_t i = 1; i < ramp.size(); ++i)
-      if (ramp[i].first < ramp[i - 1].first) fail(path + step(i), "ages must not decrease");
-  }
-  void check_group(const ParticleGroup& group) {
-    check_look(group.look, group.where.path + "/look");
-    check_drag(group.behaviour.integrator, group.behaviour.linear_drag, group.mass,
-               group.where.path + "/linear_drag");
-    for (std::size_t i = 0; i < group.places.size(); ++i)
-      check_place(group.places[i].position, group.where.path + "/places" + step(i) + "/position");
-  }
   void check_place(const Vec3& position, const std::string& path) {
-    if (position.cwiseAbs().maxCoeff() >= scene_.world.bounds)
-      fail(path, fmt::format("is outside the world, which ends {:g} m from the origin; see /world/bounds",
-                             scene_.world.bounds));
+    if (const auto problem = outside(scene_, position)) fail(path, *problem);
   }
-  /// `m` is whatever the drag slows: a mass, or a moment of inertia.
   void check_drag(sim::IntegratorKind integrator, Real drag, Real m, const std::string& path) {
-    const Real largest = largest_stable_step(integrator, 0, drag, m),
-               used = std::min(scene_.world.step, 1 / scene_.output.fps);
-    if (drag > 0 && used >= largest)
-      fail(path, fmt::format("is too much for the step and so small a mass: /world/step must be less than "
-                             "{:.3g} s, is {:.3g} s",
-                             0.995 * largest, used));
-  }
-  void check_look(const ParticleLook& look, const std::string& path) {
-    if (look.style == render::PointStyle::sphere) {
-      const bool fades =
-          look.color.rgba.w() < 1 ||
-          std::ranges::any_of(look.color_over_age, [](const auto& key) { return key.second.rgba.w() < 1; });
-      if (fades) warn(path + "/color", "alpha has no effect: spheres are opaque");
-      if (look.additive) warn(path + "/additive", "has no effect: spheres are opaque");
-    }
-    check_ages(look.color_over_age, path + "/color_over_age");
-    check_ages(look.size_over_age, path + "/size_over_age");
+    if (const auto problem = too_much_drag(scene_, integrator, drag, m)) fail(path, *problem);
   }
 
   void check_emitter(const Emitter& emitter) {
     const std::string& path = emitter.where.path;
     if (!emitter.body.empty()) check_body_name(path + "/body", emitter.body);
-    check_look(emitter.look, path + "/look");
-    if (emitter.end <= emitter.start)
-      fail(path + "/end", fmt::format("must be after the start, {} s", emitter.start));
-    constexpr Real kSmallest = 1e-6;
-    const Real smallest = effects::lower_bound(emitter.radius);
-    if (effects::upper_bound(emitter.radius) < kSmallest)
-      fail(path + "/radius", fmt::format("must be at least {:g} m", kSmallest));
-    const Real lightest = effects::upper_bound(emitter.mass) > 0
-                              ? effects::lower_bound(emitter.mass)
-                              : effects::lower_bound(emitter.density) * 4 / 3 * std::numbers::pi * smallest *
-                                    smallest * smallest;
-    if (lightest > 0)
-      check_drag(emitter.behaviour.integrator, emitter.behaviour.linear_drag, lightest,
-                 path + "/linear_drag");
-    const Real room = std::get<PlaneSurface>(emitter.surface).size.minCoeff();
-    if (2 * effects::lower_bound(emitter.radius) > room) {
-      fail(path + "/surface",
-           fmt::format(
-               "is too small for a single particle: it is {} m wide and the smallest particle {:.3g} m", room,
-               2 * effects::lower_bound(emitter.radius)));
-    } else if (2 * effects::upper_bound(emitter.radius) > room) {
-      warn(path + "/surface", fmt::format("is only {} m wide: too small for the largest particles", room));
-    }
-
-    const Real alive = expected_alive(emitter, scene_.output.start + scene_.output.duration);
-    const Real all = alive * copy_count(emitter.placement);
-    if (all > kMostParticles) {
-      fail(path,
-           fmt::format(
-               "would have about {:.3g} particles alive at once, more than {:.3g}; lower rate, count or "
-               "lifespan",
-               all, kMostParticles));
-    } else if (alive > static_cast<Real>(emitter.max_alive)) {
-      warn(path + "/max_alive",
-           fmt::format("will hold back particles: about {:.3g} would be alive at once, {} are "
-                       "allowed",
-                       alive, emitter.max_alive));
-    } else if (alive == 0) {
-      warn(path, "releases no particles: rate, count and bursts are zero");
-    }
+    if (const auto* mesh = std::get_if<MeshSurface>(&emitter.surface))
+      check_file(path + "/surface/file", mesh->file);
   }
 
   // --- Springs ---
@@ -367,11 +291,21 @@ class Checker {
   void check_period(const NamedForce& force, Real start, Real end) {
     if (end <= start) fail(force.where.path + "/end", fmt::format("must be after the start, {} s", start));
   }
+  void check_systems(const NamedForce& force, const std::vector<std::string>& particles) {
+    for (std::size_t i = 0; i < particles.size(); ++i)
+      if (std::ranges::find(systems_, particles[i]) == systems_.end())
+        fail(force.where.path + "/particles" + step(i),
+             "there are no particles '" + particles[i] + "'" + suggestion(particles[i], systems_));
+  }
+  void check_region(const std::string& path, const sim::Region& region, int drop_rate) {
+    if (drop_rate > 0 && std::holds_alternative<sim::Everywhere>(region))
+      warn(path + "/drop_rate", "has no effect without a region");
+  }
   void check_scope(const FieldScope& field) {
     check_pushed(field, field.bodies);
+    check_systems(field, field.particles);
     check_period(field, field.start, field.end);
-    if (field.drop_rate > 0 && std::holds_alternative<sim::Everywhere>(field.region))
-      warn(field.where.path + "/drop_rate", "has no effect without a region");
+    check_region(field.where.path, field.region, field.drop_rate);
   }
   /// Whether a list names a body, or what it is a copy of.
   bool names(const std::vector<std::string>& bodies, const Body& body) const {
@@ -382,16 +316,27 @@ class Checker {
   }
   void check_force(const ConstantField& field) { check_scope(field); }
   void check_force(const PointField& field) { check_scope(field); }
+  void check_force(const VortexField& vortex) { check_scope(vortex); }
+  void check_force(const TurbulenceField& turbulence) { check_scope(turbulence); }
+  void check_force(const PairScope& force) {
+    check_systems(force, force.particles);
+    check_period(force, force.start, force.end);
+    check_region(force.where.path, force.region, force.drop_rate);
+    if (force.particles.empty() && !force.where.path.empty())
+      warn(force.where.path + "/particles", "has no effect: names none");
+  }
   void check_force(const WindField& wind) {
     check_scope(wind);
     Real lightest = kUnlimited;
     for (const Body& body : flat_.bodies)
-      if (wind.bodies.empty() || names(wind.bodies, body))
+      if (names(wind.bodies, body) || (wind.bodies.empty() && wind.particles.empty()))
         lightest = std::min(lightest, mass_of(body).value_or(kUnlimited));
     if (lightest > 0) check_drag(scene_.world.integrator, wind.drag, lightest, wind.where.path + "/drag");
   }
   void check_force(const Grab& grab) {
     const std::string& path = grab.where.path;
+    check_systems(grab, grab.particles);
+    if (grab.body.empty() && grab.particles.empty()) fail(path, "needs a \"body\" or \"particles\" to hold");
     if (!grab.body.empty()) check_pushed(path + "/body", grab.body, named_body(path + "/body", grab.body));
     check_period(grab, grab.start, grab.end);
     if (grab.keyframes.empty()) fail(path, "needs at least one of \"keyframes\"");
@@ -401,7 +346,10 @@ class Checker {
     if (mass && *mass > 0 && std::isfinite(*mass))
       check_stiffness(grab.stiffness, grab.damping, *mass, path, "the grab '" + grab.name + "'");
   }
-  void check_force(const Explosion& explosion) { check_pushed(explosion, explosion.bodies); }
+  void check_force(const Explosion& explosion) {
+    check_pushed(explosion, explosion.bodies);
+    check_systems(explosion, explosion.particles);
+  }
 
   // --- Overlays ---
 
@@ -488,6 +436,7 @@ class Checker {
   const Scene& flat_;
   std::filesystem::path folder_;
   std::map<std::string, const Body*> bodies_;  // with their copies, by name
+  std::vector<std::string> systems_;           // of particles
   std::set<std::string> used_materials_;
   Findings findings_;
 };
@@ -509,14 +458,20 @@ Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real c, Real m)
   return std::min(by_stiffness, by_damping);
 }
 
-Real expected_alive(const Emitter& emitter, Real film_end) {
-  const Real window = std::max(0.0, std::min(emitter.end, film_end) - emitter.start);
-  const Real lifespan = usual(emitter.lifespan), span = std::min(lifespan, window);
-  Real alive =
-      usual(emitter.rate) * span + usual(emitter.count) * std::max(1.0, span / usual(emitter.interval));
-  for (const EmitterBurst& burst : emitter.bursts)
-    alive += usual(burst.count) * std::clamp(lifespan / burst.interval, 1.0, static_cast<Real>(burst.cycles));
-  return alive;
+std::optional<std::string> too_much_drag(const Scene& scene, sim::IntegratorKind integrator, Real drag,
+                                         Real m) {
+  const Real largest = largest_stable_step(integrator, 0, drag, m),
+             used = std::min(scene.world.step, 1 / scene.output.fps);
+  if (drag <= 0 || used < largest) return {};
+  return fmt::format(
+      "is too much for the step and so small a mass: /world/step must be less than {:.3g} s, is {:.3g} s",
+      0.995 * largest, used);
+}
+
+std::optional<std::string> outside(const Scene& scene, const Vec3& position) {
+  if (position.cwiseAbs().maxCoeff() < scene.world.bounds) return {};
+  return fmt::format("is outside the world, which ends {:g} m from the origin; see /world/bounds",
+                     scene.world.bounds);
 }
 
 }  // namespace offstage::producer

@@ -3,6 +3,8 @@
 /// increase, files that exist, springs that the step can follow, emitters that can emit.
 
 #include <filesystem>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "producer/error.h"
@@ -22,7 +24,10 @@ Findings check_scene(const Scene& scene, const Scene& flat, const std::filesyste
 /// reduced mass m.
 Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real c, Real m);
 
-/// About how many particles an emitter has alive at its height until `film_end`, were it not for max_alive.
-Real expected_alive(const Emitter& emitter, Real film_end);
+/// What is wrong with a drag [kg/s] on what resists by m: a mass, or a moment of inertia.
+std::optional<std::string> too_much_drag(const Scene& scene, sim::IntegratorKind integrator, Real drag,
+                                         Real m);
+/// What is wrong with a place that is not in the world.
+std::optional<std::string> outside(const Scene& scene, const Vec3& position);
 
 }  // namespace offstage::producer

@@ -4,6 +4,7 @@
 #include <tuple>
 
 #include "producer/placement.h"
+#include "producer/presets.h"
 #include "producer/scene_check.h"
 #include "producer/scene_source.h"
 #include "producer/scene_table.h"
@@ -47,11 +48,13 @@ LoadedScene parse_scene(std::string_view text, const std::string& name, const st
   std::vector<Problem> errors;
   const Node defaults = write_scene({});
   for (const std::string& override : overrides) apply_override(source, override, defaults, errors);
+  const std::vector<EffectParts> from_effects = lay_presets(source, folder, errors);
 
   Scene described;
   Reader reader(source.files);
   read_scene(reader, source.root, described);
   errors.insert(errors.end(), reader.problems().begin(), reader.problems().end());
+  place_effects(described, from_effects);
   name_everything(described, name);
 
   std::vector<Problem> misplaced, crowded;

@@ -74,36 +74,13 @@ void stamp(Node& node, Position at) {
 
 // --- Includes ---
 
+void merge(Node& base, Node top, bool at_root);
+
 /// The same for all names of a file, as far as the system can tell.
 fs::path identity_of(const fs::path& file) {
   std::error_code error;
   fs::path identity = fs::weakly_canonical(file, error);
   return error ? file : identity;
-}
-
-/// Lays `top` over `base`; an object that names its type replaces one of another.
-void merge(Node& base, Node top, bool at_root) {
-  Object* below = base.as<Object>();
-  Object* above = top.as<Object>();
-  const Node* type = top.find("type");
-  const Node* old_type = base.find("type");
-  if (!below || !above || (type && (!old_type || to_text(*type) != to_text(*old_type)))) {
-    base = std::move(top);
-    return;
-  }
-  base.at = top.at;
-  for (Member& member : *above) {
-    Node* same = base.find(member.key);
-    List* list = same ? same->as<List>() : nullptr;
-    List* more = member.value.as<List>();
-    if (!same) {
-      below->push_back(std::move(member));
-    } else if (at_root && list && more) {
-      std::move(more->begin(), more->end(), std::back_inserter(*list));
-    } else {
-      merge(*same, std::move(member.value), false);
-    }
-  }
 }
 
 class Includer {
@@ -192,7 +169,37 @@ class Includer {
   std::vector<std::string>& files_;
 };
 
+/// Lays `top` over `base`; an object that names its type replaces one of another. Lists at the root are
+/// joined.
+void merge(Node& base, Node top, bool at_root) {
+  Object* below = base.as<Object>();
+  Object* above = top.as<Object>();
+  const Node* type = top.find("type");
+  const Node* old_type = base.find("type");
+  if (!below || !above || (type && (!old_type || to_text(*type) != to_text(*old_type)))) {
+    base = std::move(top);
+    return;
+  }
+  base.at = top.at;
+  for (Member& member : *above) {
+    Node* same = base.find(member.key);
+    List* list = same ? same->as<List>() : nullptr;
+    List* more = member.value.as<List>();
+    if (!same) {
+      below->push_back(std::move(member));
+    } else if (at_root && list && more) {
+      std::move(more->begin(), more->end(), std::back_inserter(*list));
+    } else {
+      merge(*same, std::move(member.value), false);
+    }
+  }
+}
+
 }  // namespace
+
+void lay_over(Node& base, Node top) {
+  merge(base, std::move(top), false);
+}
 
 Where SceneSource::locate(const std::string& path) const {
   const Node* node = &root;

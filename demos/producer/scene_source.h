@@ -28,6 +28,9 @@ std::string read_text(const std::filesystem::path& file);
 /// included first. Throws SceneError for what is no JSON, cannot be read, or includes itself.
 SceneSource read_source(std::string_view text, const std::string& name, const std::filesystem::path& folder);
 
+/// Lays `top` over `base`, object by object; one that names its type replaces one of another.
+void lay_over(Node& base, Node top);
+
 /// Sets "path=value" in the tree; the value is JSON or else a string, the path as in /emitters/0/rate or
 /// emitters.rain.rate. What the tree lacks is made, lists with the content they have in `defaults`. Adds to
 /// `problems` if the path leads nowhere.

@@ -3,6 +3,7 @@
 #include "producer/table_film.h"
 #include "producer/table_force.h"
 #include "producer/table_overlay.h"
+#include "producer/table_particles.h"
 #include "producer/table_world.h"
 
 namespace offstage::producer {
@@ -23,8 +24,9 @@ struct Table<Scene> {
         {"bodies", &T::bodies, "rigid bodies"},
         {"particles", &T::particles, "groups of particles placed one by one"},
         {"emitters", &T::emitters, "sources of particles"},
+        {"effects", &T::effects, "presets of emitters and forces, at some place"},
         {"springs", &T::springs, "damped springs"},
-        {"forces", &T::forces, "fields, wind, hands and explosions that act on bodies"},
+        {"forces", &T::forces, "fields, moving air, hands, explosions, forces between particles"},
         {"overlays", &T::overlays, "what shows how the simulation sees the scene"},
         {"camera", &T::camera, "where the film is seen from"},
         {"lights", &T::lights, "the sun"},

@@ -7,28 +7,15 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "effects/color.h"
+#include "producer/emitter_defs.h"
+#include "producer/force_defs.h"
 
 namespace offstage::producer {
 namespace {
 
-/// Property number of the per-particle brightness; the emitter's own properties are small numbers.
-constexpr uint32_t kBrightness = 1000;
-constexpr Real kForever = std::numeric_limits<Real>::infinity();
-
 const Material* find_material(const Scene& scene, const std::string& name) {
   const auto it = std::ranges::find(scene.materials, name, &Material::name);
   return it == scene.materials.end() ? nullptr : &*it;
-}
-
-sim::ParticleSystemDef system_def(const std::string& name, const ParticleBehaviour& b) {
-  return {.name = name,
-          .linear_drag = b.linear_drag,
-          .gravity = b.gravity,
-          .force = b.force,
-          .collides = b.collides,
-          .dies_on_hit = b.dies_on_hit,
-          .integrator = b.integrator};
 }
 
 sim::KeyframeTrack track_of(const Body& body) {
@@ -54,25 +41,6 @@ std::size_t index_of(const sim::ParticleArrays& particles, uint64_t id) {
   const auto it = std::ranges::lower_bound(particles.id, id);
   return it != particles.id.end() && *it == id ? static_cast<std::size_t>(it - particles.id.begin())
                                                : particles.size();
-}
-
-sim::ConstantField effect_of(const ConstantField& f) {
-  return {f.force, f.region, static_cast<uint32_t>(f.drop_rate)};
-}
-sim::PointField effect_of(const PointField& f) {
-  return {f.point, f.force, f.region, static_cast<uint32_t>(f.drop_rate)};
-}
-sim::WindField effect_of(const WindField& f) {
-  return {f.wind, f.drag, f.region, static_cast<uint32_t>(f.drop_rate)};
-}
-sim::Grab effect_of(const Grab& f) {
-  sim::Grab grab{.point = f.point, .track = {}, .stiffness = f.stiffness, .damping = f.damping};
-  for (const HandKey& key : f.keyframes)
-    grab.track.keys.push_back({key.time, {key.position, Quat::Identity()}});
-  return grab;
-}
-sim::Explosion effect_of(const Explosion& f) {
-  return {f.point, f.impulse, f.radius, static_cast<uint32_t>(f.drop_rate)};
 }
 
 nlohmann::ordered_json json_of(const Vec3& v) {
@@ -126,8 +94,8 @@ Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
     });
   add_particle_groups(scene);
   add_springs(scene);
+  sources_.emplace(scene, models, world_, [this](const std::string& name) { return body_named(name); });
   add_forces(scene);
-  add_emitters(scene);
   overlays_.emplace(scene, world_, bodies_);
 }
 
@@ -193,37 +161,10 @@ void Simulation::add_particle_groups(const Scene& scene) {
                                    .mass = group.mass,
                                    .radius = group.radius,
                                    .restitution = group.restitution,
-                                   .friction = group.friction});
+                                   .friction = group.friction,
+                                   .charge = group.charge});
     groups_.push_back({group.name, system});
-  }
-}
-
-void Simulation::add_emitters(const Scene& scene) {
-  for (const Emitter& emitter : scene.emitters) {
-    const auto system = world_.add_particle_system(system_def(emitter.name, emitter.behaviour));
-    const auto& plane = std::get<PlaneSurface>(emitter.surface);
-    effects::EmitterDef def{.name = emitter.name,
-                            .seed = scene.world.seed,
-                            .surface = {.pose = {plane.position, plane.orientation()}, .size = plane.size},
-                            .body = body_named(emitter.body),
-                            .rate = emitter.rate,
-                            .count = emitter.count,
-                            .interval = emitter.interval,
-                            .bursts = {},
-                            .start = emitter.start,
-                            .end = emitter.end,
-                            .speed = emitter.speed,
-                            .spread_deg = emitter.spread_deg,
-                            .radius = emitter.radius,
-                            .density = emitter.density,
-                            .mass = emitter.mass,
-                            .lifespan = emitter.lifespan,
-                            .restitution = emitter.restitution,
-                            .friction = emitter.friction,
-                            .max_alive = static_cast<uint64_t>(emitter.max_alive)};
-    for (const EmitterBurst& b : emitter.bursts)
-      def.bursts.push_back({b.time, b.count, b.cycles, b.interval});
-    at_place(emitter.where, [&] { emitters_.emplace_back(def, system); });
+    group_looks_.emplace_back(group.look, scene.world.seed, group.name);
   }
 }
 
@@ -249,23 +190,18 @@ void Simulation::add_springs(const Scene& scene) {
 }
 
 void Simulation::add_forces(const Scene& scene) {
-  const auto add = [&](const NamedForce& force, const std::vector<std::string>& bodies, Real start, Real end,
-                       auto effect) {
-    sim::ForceDef def{.name = force.name, .bodies = {}, .start = start, .end = end, .effect = effect};
-    for (const std::string& name : bodies) def.bodies.push_back(body_named(name));
-    at_place(force.where, [&] { world_.add_force(def); });
-  };
-  for (const Force& force : scene.forces)
-    std::visit(
-        [&]<class F>(const F& f) {
-          if constexpr (std::is_same_v<F, Explosion>)
-            add(f, f.bodies, f.time, kForever, effect_of(f));
-          else if constexpr (std::is_same_v<F, Grab>)
-            add(f, {f.body}, f.start, f.end, effect_of(f));
-          else
-            add(f, f.bodies, f.start, f.end, effect_of(f));
-        },
-        force);
+  for (const Force& force : scene.forces) {
+    sim::ForceDef def = force_def(force);
+    const ForceTargets targets = targets_of(force);
+    for (const std::string& name : targets.bodies) def.bodies.push_back(body_named(name));
+    for (const std::string& name : targets.particles) def.systems.push_back(system_named(name));
+    at_place(named(force).where, [&] { world_.add_force(def); });
+  }
+}
+
+sim::ParticleSystemHandle Simulation::system_named(const std::string& name) const {
+  const auto group = std::ranges::find(groups_, name, &NamedGroup::name);
+  return group == groups_.end() ? sources_->system(name) : group->handle;
 }
 
 sim::BodyHandle Simulation::body_named(const std::string& name) const {
@@ -276,16 +212,14 @@ sim::BodyHandle Simulation::body_named(const std::string& name) const {
 void Simulation::step(double sampling_time) {
   const sim::StepReport report = world_.step(sampling_time, [&](Real start, Real end) {
     if (on_substep_) on_substep_(start);
-    for (effects::Emitter& emitter : emitters_) emitter.emit(world_, start, end);
+    sources_->emit(world_, start, end);
   });
   totals_.add(report);
   totals_.contacts = world_.contacts().size();
   totals_.most_contacts = std::max(totals_.most_contacts, totals_.contacts);
-  totals_.waiting = totals_.skipped = 0;
-  for (const effects::Emitter& emitter : emitters_) {
-    totals_.waiting += emitter.report().waited;
-    totals_.skipped += emitter.report().skipped;
-  }
+  const ParticleSources::Counts counts = sources_->counts();
+  totals_.waiting = counts.waiting;
+  totals_.skipped = counts.skipped;
   for (const sim::BodyHandle lost : report.bodies_retired)
     totals_.lost_bodies.push_back(world_.body_def(lost).name);
   for (const sim::MovedBody& moved : world_.moved()) moving_poses_[slot_of_.at(moved.body)] = moved.pose;
@@ -310,38 +244,6 @@ void Simulation::advance() {
   ++frame_;
 }
 
-PointSet Simulation::point_set(sim::ParticleSystemHandle system, const ParticleLook& look,
-                               const std::vector<ParticlePlace>* places, uint64_t stream) const {
-  const sim::ParticleArrays& particles = world_.particles(system);
-  const effects::RandomStream random(scene_.world.seed, stream);
-  effects::ColorRamp colors;
-  for (const auto& [age, color] : look.color_over_age) colors.keys.push_back({age, color.rgba});
-  effects::SizeRamp sizes;
-  for (const auto& [age, size] : look.size_over_age) sizes.keys.push_back({age, static_cast<float>(size)});
-
-  PointSet set;
-  set.points.resize(particles.size());
-  set.ages.resize(particles.size());
-  for (std::size_t i = 0; i < particles.size(); ++i) {
-    const Real age = particles.age[i] / particles.lifespan[i];
-    render::Point& p = set.points[i];
-    p.position = particles.position[i].cast<float>();
-    p.velocity = particles.velocity[i].cast<float>();
-    p.radius = static_cast<float>(particles.radius[i]);
-    p.id = particles.id[i];
-    p.color = places && (*places)[p.id].color ? (*places)[p.id].color->rgba : look.color.rgba;
-    if (!colors.keys.empty()) p.color = p.color.cwiseProduct(colors.at(age));
-    if (!sizes.keys.empty()) p.radius *= sizes.at(age);
-    if (look.color_deviation > 0) {
-      const effects::Normal brightness{.mean = 1, .deviation = look.color_deviation, .min = 0};
-      p.color.head<3>() *=
-          static_cast<float>(effects::sample(brightness, random.uniform(p.id, kBrightness), 0));
-    }
-    set.ages[i] = static_cast<float>(particles.age[i]);
-  }
-  return set;
-}
-
 Snapshot Simulation::snapshot() const {
   Snapshot snapshot;
   snapshot.frame = frame_;
@@ -364,16 +266,10 @@ Snapshot Simulation::snapshot() const {
   for (const sim::SpringDef& spring : springs_)
     snapshot.springs.push_back({end_point(spring.a), end_point(spring.b)});
 
-  for (std::size_t i = 0; i < groups_.size(); ++i) {
-    const ParticleGroup& group = scene_.particles[i];
+  for (std::size_t i = 0; i < groups_.size(); ++i)
     snapshot.point_sets.push_back(
-        point_set(groups_[i].handle, group.look, &group.places, effects::stream_id(group.name)));
-  }
-  for (std::size_t i = 0; i < emitters_.size(); ++i) {
-    const Emitter& emitter = scene_.emitters[i];
-    snapshot.point_sets.push_back(
-        point_set(emitters_[i].target(), emitter.look, nullptr, effects::stream_id(emitter.name)));
-  }
+        group_looks_[i].points(world_.particles(groups_[i].handle), &scene_.particles[i].places));
+  sources_->add_points(world_, snapshot.point_sets);
   snapshot.overlays = overlays_->lines(world_);
   snapshot.state_hash = world_.state_hash();
   return snapshot;

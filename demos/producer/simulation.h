@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "effects/emitter.h"
 #include "producer/models.h"
 #include "producer/overlays.h"
+#include "producer/particle_sources.h"
 #include "producer/scene.h"
 #include "producer/snapshot.h"
 #include "sim/world.h"
@@ -89,19 +89,18 @@ class Simulation {
   void add_bodies(const Scene& scene, const ModelLibrary& models);
   sim::MeshHandle add_mesh(const MeshFile& file, const ModelLibrary& models);
   void add_particle_groups(const Scene& scene);
-  void add_emitters(const Scene& scene);
   void add_springs(const Scene& scene);
   void add_forces(const Scene& scene);
   sim::BodyHandle body_named(const std::string& name) const;
+  sim::ParticleSystemHandle system_named(const std::string& name) const;
   void step(double sampling_time);
-  PointSet point_set(sim::ParticleSystemHandle system, const ParticleLook& look,
-                     const std::vector<ParticlePlace>* places, uint64_t stream) const;
 
   const Scene& scene_;
   sim::World world_;
-  std::vector<effects::Emitter> emitters_;
+  std::optional<ParticleSources> sources_;
   std::vector<NamedBody> moving_;
   std::vector<NamedGroup> groups_;
+  std::vector<LookRamps> group_looks_;
   std::map<std::string, sim::BodyHandle> bodies_;
   std::vector<sim::Pose> moving_poses_;             // kept up to date from World::moved()
   std::map<sim::BodyHandle, std::size_t> slot_of_;  // handle -> place in `moving_`

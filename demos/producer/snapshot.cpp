@@ -105,7 +105,7 @@ Snapshot deserialize(std::span<const uint8_t> bytes, const std::string& source) 
       p.velocity = in.take<Vector3f>();
       p.radius = in.take<float>();
       p.color = in.take<Vector4f>();
-      set.ages[i] = in.take<float>();
+      p.age = set.ages[i] = in.take<float>();
       p.id = in.take<uint64_t>();
     }
   }

@@ -144,6 +144,7 @@ struct Table<RenderSettings> {
         {"quality", &T::quality, "1, 4 or 16 sub-frames per frame"},
         {"shutter", &T::shutter, "share of the frame time that the shutter is open: motion blur", "", kShare},
         {"exposure", &T::exposure, "factor of all light", "", kPositive},
+        {"bloom", &T::bloom, "share of very bright light that spreads as glow; 0: none", "", kNotNegative},
         {"tone_curve", &T::tone_curve, "from light to the picture"},
         {"shadow_map", &T::shadow_map, "width and height of the sun's shadow map", "pixels",
          between(64, 16384)}};

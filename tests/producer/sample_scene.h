@@ -40,8 +40,16 @@ inline constexpr const char* kSampleScene = R"({
      "lifespan": {"curve": [[0, 1], [2, 1.5]]}, "spread_deg": 5, "dies_on_hit": true,
      "look": {"style": "streak", "color": "#a0c0ff", "color_over_age": [[0, "#ffffff"], [1, [1, 1, 1, 0]]],
               "size_over_age": [[0, 1], [1, 0.5]], "additive": true}},
-    {"name": "puff", "body": "ball", "rate": 0, "bursts": [{"time": 1, "count": 30, "cycles": 2}], "gravity": false}
+    {"name": "puff", "body": "ball", "rate": 0, "bursts": [{"time": 1, "count": 30, "cycles": 2}], "gravity": false,
+     "surface": {"type": "sphere", "radius": 0.2}, "overlap": true, "windows": [{"start": 0, "end": 2}], "prewarm": 0.5,
+     "split": {"count": 2, "age": 0.2, "depth": 2}, "look": {"style": "spark", "temperature_over_age": [[0, 2000], [1, 1200]]},
+     "trails": [{"name": "tail", "rate": 30, "look": {"style": "smoke", "ramp": "smooth"}}], "on_age": [{"age": 0.5, "count": 3}],
+     "on_collision": [{"name": "splash", "axis": "velocity", "on_death": [{"count": 1}]}]},
+    {"name": "hose", "preset": "water_jet", "rate": 10},
+    {"name": "ring", "surface": {"type": "disc", "direction": [1, 0, 0]}, "direction": [0, 1, 0], "internal": true, "charge": 1e-9},
+    {"name": "shell", "surface": {"type": "mesh", "file": "LICENSE"}, "rate": 5}
   ],
+  "effects": [{"preset": "rain", "name": "shower", "position": [9, 0, 0], "start": 1, "overrides": {"rain": {"rate": 50}}}],
   "springs": [
     {"a": {"particles": "chain"}, "b": {"particles": "chain", "index": 1}, "stiffness": 50, "damping": 0.1},
     {"name": "tie", "a": {"position": [0, 4, 0]}, "b": {"body": "ball", "position": [0, 0.25, 0]}, "material": "red"}
@@ -51,7 +59,11 @@ inline constexpr const char* kSampleScene = R"({
     {"type": "point", "point": [0, 5, 0], "force": -3, "region": {"type": "sphere", "radius": 2}, "end": 2},
     {"type": "wind", "name": "gust", "wind": [5, 0, 0], "drag": 0.1, "start": 0.5, "bodies": ["ball"]},
     {"type": "grab", "body": "ball", "point": [0, 0.25, 0], "keyframes": [{"position": [0, 3, 0]}], "end": 1},
-    {"type": "explosion", "time": 1, "point": [0, 0, 0.1], "impulse": 4, "radius": 3, "drop_rate": 2}
+    {"type": "explosion", "time": 1, "point": [0, 0, 0.1], "impulse": 4, "radius": 3, "drop_rate": 2, "particles": ["rain", "puff/tail"]},
+    {"type": "vortex", "particles": ["puff"], "circulation": 2, "drag": 0.001},
+    {"type": "turbulence", "particles": ["puff", "puff/splash"], "speed": 2, "scale": 0.5, "octaves": 3},
+    {"type": "gravitation", "particles": ["ring"]}, {"type": "coulomb", "particles": ["ring"], "cut_off": 0.5},
+    {"type": "lennard_jones", "particles": ["ring"], "sigma": 0.02, "cut_off": 0.05}
   ],
   "overlays": [
     {"type": "tree", "body": "rock_0", "volume": "sphere", "level": {"curve": [[0, 0], [3, 4]]}, "hidden": 0},

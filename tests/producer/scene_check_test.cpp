@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "producer/scene_check_particles.h"
 #include "producer/scene_io.h"
 
 namespace offstage::producer {
@@ -129,7 +130,7 @@ TEST(SceneCheck, WhatHasNoEffectIsWarnedOf) {
             "/materials/0: the material 'lone' is not used\n"
             "/bodies/0/velocity: has no effect: the body is not dynamic\n"
             "/bodies/1/density: has no effect: the mass is given\n"
-            "/emitters/0: releases no particles: rate, count and bursts are zero\n"
+            "/emitters/0: releases no particles: rate, count and bursts are zero, or never in the film\n"
             "/springs/0: has no effect: neither end can move\n"
             "/render/size: is odd: most video formats need even numbers\n");
 }
@@ -173,8 +174,8 @@ TEST(SceneCheck, ForcesActOnWhatThereIs) {
       "/forces/2: needs at least one of \"keyframes\"\n"
       "/forces/3/keyframes/1/time: times must increase, got 1 after 1\n"
       "/forces/4/name: the name 'force_0' is already that of /forces/0\n"
-      "/forces/5/type: must be one of \"constant\", \"point\", \"wind\", \"grab\" or \"explosion\", got "
-      "the string \"field\"\n");
+      "/forces/5/type: must be one of \"constant\", \"point\", \"wind\", \"grab\", \"explosion\", "
+      "\"vortex\", \"turbulence\", \"gravitation\", \"coulomb\" or \"lennard_jones\", got the string \"field\"\n");
   EXPECT_EQ(warnings_of(R"({"bodies": [{"name": "wall", "motion": "static"}, {"name": "ball"}],
     "forces": [{"type": "point", "bodies": ["ball", "wall"], "drop_rate": 1}]})"),
             "/forces/0/bodies/1: has no effect: the body 'wall' is not dynamic\n"
@@ -262,39 +263,56 @@ TEST(SceneCheck, ASpringEndMustBeOneThing) {
 
 // --- Emitters ---
 
-TEST(SceneCheck, ExpectedParticlesAreRateTimesLifespan) {
-  Emitter emitter;
-  emitter.rate = 100.0;
-  emitter.lifespan = 2.0;
-  EXPECT_EQ(expected_alive(emitter, 10), 200);
-  EXPECT_EQ(expected_alive(emitter, 0.5), 50);
-  emitter.start = 9.5;
-  EXPECT_EQ(expected_alive(emitter, 10), 50);
-  emitter.start = 0;
-  emitter.rate = 0.0;
-  emitter.count = 30.0;
-  emitter.interval = 0.5;
-  EXPECT_EQ(expected_alive(emitter, 10), 120);
-  emitter.count = 0.0;
-  emitter.bursts.assign(1, EmitterBurst{.count = 10.0, .cycles = 100, .interval = 0.5});
-  EXPECT_EQ(expected_alive(emitter, 10), 40);
+TEST(SceneCheck, TooManyParticlesAreAnErrorAndHeldBackOnesAWarning) {
+  EXPECT_EQ(
+      warnings_of(R"({"emitters": [{"rate": 1000, "lifespan": 2, "max_alive": 1900}]})"),
+      "/emitters/0/max_alive: may hold back particles: 2e+03 could be alive at once, 1900 are allowed\n");
+  EXPECT_EQ(warnings_of(R"({"emitters": [{"rate": 1000, "lifespan": 2, "max_alive": 2000}]})"), "");
+  EXPECT_EQ(errors_of(R"({"emitters": [{"rate": 1.1e7, "lifespan": 2}]})"),
+            "/emitters/0: could have 2.2e+07 particles alive at once, more than 2e+07; lower rate, count or "
+            "lifespan\n");
 }
 
-TEST(SceneCheck, TooManyParticlesAreAnErrorAndHeldBackOnesAWarning) {
-  EXPECT_EQ(warnings_of(R"({"emitters": [{"rate": 1000, "lifespan": 2, "max_alive": 1999}]})"),
-            "/emitters/0/max_alive: will hold back particles: about 2e+03 would be alive at once, 1999 are "
-            "allowed\n");
-  EXPECT_EQ(warnings_of(R"({"emitters": [{"rate": 1000, "lifespan": 2, "max_alive": 2000}]})"), "");
+TEST(SceneCheck, ASplitThatExplodesIsRefused) {
+  const auto scene = [](int depth) {
+    return R"({"emitters": [{"rate": 10, "split": {"count": 9, "age": 0.1, "delay": 0.1, "depth": )" +
+           std::to_string(depth) + "}}]}";
+  };
+  EXPECT_EQ(errors_of(scene(2)), "");
+  EXPECT_NE(errors_of(scene(9)).find("/emitters/0: could have 5e+10 particles alive at once"),
+            std::string::npos)
+      << errors_of(scene(9));
+}
+
+TEST(SceneCheck, BoundsCountWhatIsBornFromParticles) {
+  const Scene scene = parse_scene(R"({"output": {"duration": 1}, "emitters": [
+    {"name": "shell", "rate": 0, "bursts": [{"count": 3}], "lifespan": 0.5,
+     "trails": [{"name": "tail", "rate": 100, "lifespan": 9}],
+     "on_death": [{"name": "star", "count": 20, "on_death": [{"count": 2}]}]}]})",
+                                  "s", OFFSTAGE_SOURCE_DIR)
+                          .scene;
+  std::string text;
+  for (const ParticleBound& bound : particle_bounds(scene))
+    text += bound.name + " " + std::to_string(bound.alive) + "\n";
+  EXPECT_EQ(text, "shell 3\nshell/tail 150\nshell/star 60\nshell/star/on_death_0 120\n");
+}
+
+TEST(SceneCheck, ForcesNameParticles) {
   EXPECT_EQ(
-      errors_of(R"({"emitters": [{"rate": 1.1e7, "lifespan": 2}]})"),
-      "/emitters/0: would have about 2.2e+07 particles alive at once, more than 2e+07; lower rate, count or "
-      "lifespan\n");
+      errors_of(R"({
+    "emitters": [{"name": "rain", "on_collision": [{"name": "splash"}], "repeat": {"count": 2, "offset": [1, 0, 0]}}],
+    "forces": [{"type": "turbulence", "particles": ["rain", "rain/splash", "rain_1/splash"]},
+               {"type": "vortex", "particles": ["rain/spalsh"]}, {"type": "grab", "keyframes": [{}]},
+               {"type": "coulomb"}]})"),
+      "/forces/1/particles/0: there are no particles 'rain/spalsh'; did you mean 'rain/splash'?\n"
+      "/forces/2: needs a \"body\" or \"particles\" to hold\n"
+      "/forces/3/particles: is required: names of groups and emitters whose particles act on each other\n");
 }
 
 TEST(SceneCheck, ASurfaceHasRoomForAParticle) {
   EXPECT_EQ(errors_of(R"({"emitters": [{"radius": 0.06}]})"),
             "/emitters/0/surface: is too small for a single particle: it is 0.1 m wide and the smallest "
-            "particle 0.12 m\n");
+            "particle 0.12 m; or let newborns \"overlap\"\n");
   EXPECT_EQ(warnings_of(R"({"emitters": [{"radius": {"range": [0.04, 0.06]}}]})"),
             "/emitters/0/surface: is only 0.1 m wide: too small for the largest particles\n");
 }

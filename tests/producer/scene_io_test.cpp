@@ -51,7 +51,7 @@ TEST(SceneIo, EveryPartOfTheSampleArrives) {
   EXPECT_EQ(std::get<effects::Curve>(rain.lifespan).keys[1], std::pair(2.0, 1.5));
   EXPECT_EQ(std::get<Real>(rain.spread_deg), 5);
   EXPECT_TRUE(rain.behaviour.dies_on_hit);
-  EXPECT_EQ(rain.look.style, render::PointStyle::streak);
+  EXPECT_EQ(rain.look.style, LookStyle::streak);
   EXPECT_EQ(rain.look.size_over_age[1], std::pair(1.0, 0.5));
   EXPECT_FALSE(scene.emitters[1].behaviour.gravity);
   EXPECT_EQ(scene.springs[0].name, "spring_0");
@@ -302,7 +302,7 @@ TEST(SceneOverride, ReachesAnyKeyByIndexNameOrPointer) {
                       "camera.type=orbit", "camera.radius=12", "world.gravity.1=-1"});
   EXPECT_EQ(std::get<effects::Normal>(scene.emitters[0].rate).mean, 7);
   EXPECT_EQ(std::get<Real>(scene.emitters[1].speed), 3);
-  EXPECT_FALSE(scene.emitters[1].look.lit);
+  EXPECT_EQ(scene.emitters[1].look.lit, false);
   EXPECT_EQ(scene.bodies[0].position, Vec3(1, 9, 3));
   EXPECT_EQ(scene.bodies[0].name, "red ball");
   EXPECT_EQ(scene.render.quality, Quality::final);

@@ -49,6 +49,13 @@ class SceneSchema : public testing::Test {
     json rule;  // the schema of the value
   };
 
+  /// Whether a path goes round in what is born from what is born from particles.
+  static bool is_deep(const std::string& path) {
+    int lists = 0;
+    for (std::size_t at = 0; (at = path.find("/0", at)) != std::string::npos; ++at) ++lists;
+    return lists > 2;
+  }
+
   const json& resolve(const json& rule) const {
     return rule.contains("$ref")
                ? schema_json.at(json::json_pointer(rule.at("$ref").get<std::string>().substr(1)))
@@ -60,7 +67,9 @@ class SceneSchema : public testing::Test {
   void walk(const Slot& slot, const std::function<void(const Slot&)>& leaf,
             const std::function<void(const Slot&, const json& minimal)>& object) const {
     const json& rule = resolve(slot.rule);
-    if (rule.contains("properties")) {
+    if (is_deep(slot.path)) {
+      leaf({slot.path, slot.scene_with, rule});
+    } else if (rule.contains("properties")) {
       walk_object(slot, rule, leaf, object);
     } else if (rule.contains("oneOf") && resolve(rule.at("oneOf")[0]).contains("properties") &&
                resolve(rule.at("oneOf")[0]).at("properties").contains("type")) {
@@ -90,8 +99,9 @@ class SceneSchema : public testing::Test {
     json minimal = json::object();
     for (const json& key : rule.value("required", json::array())) {
       const json& value = resolve(rule.at("properties").at(key.get<std::string>()));
-      minimal[key.get<std::string>()] =
-          value.contains("minItems") ? json::array({"LICENSE", "LICENSE"}) : json("LICENSE");
+      minimal[key.get<std::string>()] = value.contains("minItems") ? json::array({"LICENSE", "LICENSE"})
+                                        : value.value("type", "") == "array" ? json::array({"LICENSE"})
+                                                                             : json("LICENSE");
     }
     if (rule.at("properties").value("/type/const"_json_pointer, "") != "")
       minimal["type"] = rule.at("properties").at("type").at("const");
