@@ -70,7 +70,7 @@ class Picture {
   std::vector<DrawnBody> bodies_;
   std::vector<render::InstanceHandle> springs_;  // null where invisible
   std::vector<render::PointsHandle> points_;
-  std::vector<render::PointStyle> styles_;  // of the same
+  std::vector<render::PointStyle> styles_;     // of the same
   std::vector<render::LinesHandle> overlays_;  // null for those without lines
   std::vector<render::Point> scratch_;
   std::vector<render::Line> scratch_lines_;

@@ -4,7 +4,6 @@
 /// for the loader, the schema and the reference. SI units; angles in degrees where a name says so.
 
 #include <array>
-
 #include <optional>
 #include <string>
 #include <utility>

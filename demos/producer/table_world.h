@@ -1,6 +1,6 @@
 #pragma once
-/// The keys of what is simulated: the world, materials, bodies with their shapes and placement, springs. Those of
-/// particles are in table_particles.h, those of forces in table_force.h.
+/// The keys of what is simulated: the world, materials, bodies with their shapes and placement, springs.
+/// Those of particles are in table_particles.h, those of forces in table_force.h.
 
 #include <array>
 
