@@ -7,6 +7,7 @@
 #include "sim/collision/distance.h"
 #include "sim/collision/pose_path.h"
 #include "sim/contact/contact_frame.h"
+#include "sim/dynamics/force_field.h"
 #include "sim/dynamics/rigid_body.h"
 #include "sim/world.h"
 
@@ -35,6 +36,7 @@ struct Body {
   Pose before_substep, before_step;
   Aabb swept;           // around its ways in the sub-step, as the broad phase has it
   Real quiet_time = 0;  // for how long it has hardly moved [s]
+  Wrench rest_push;     // asleep: what forces that change did to it when it fell asleep, about its centre
   BodyDef def;
   Solid solid;
 

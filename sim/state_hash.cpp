@@ -1,5 +1,6 @@
 /// Hash of everything that evolves, in slot order and little-endian bytes (the only byte order supported).
 
+#include <algorithm>
 #include <bit>
 #include <new>
 #include <type_traits>
@@ -71,6 +72,8 @@ StateHash World::state_hash() const {
     for (const auto* v : {&a.position, &a.velocity}) hash.add(*v);
     for (const auto* v : {&a.mass, &a.radius, &a.age, &a.lifespan, &a.restitution, &a.friction}) hash.add(*v);
     hash.add(a.id);
+    // Only where there are any, so that the hash of what knows no charge stays as it was.
+    if (std::any_of(a.charge.begin(), a.charge.end(), [](Real q) { return q != 0; })) hash.add(a.charge);
   });
   impl_->springs.for_each([&](SpringHandle handle, const Spring& spring) {
     hash.add(handle);

@@ -198,6 +198,7 @@ void World::Impl::solve_islands(Real h, StepReport& report) {
   std::vector<Island*> all;
   for (MovingIsland& island : islands)
     if (!island.pairs.empty()) all.push_back(&island);
+  patience.begin(all, h);
   solve(all, h, report);
 }
 
@@ -209,7 +210,7 @@ void World::Impl::solve(std::span<Island* const> group, Real duration, StepRepor
   for (Island* island : group) {
     SolverChoice& choice = choices[island->bodies.front()->handle.index];
     if (def.solver == SolverKind::fast ||
-        (def.solver == SolverKind::automatic && !choice.is_exact_worth(*island))) {
+        (def.solver == SolverKind::automatic && !choice.is_exact_worth(*island, patience))) {
       fast.push_back(island);
       continue;
     }
@@ -221,7 +222,7 @@ void World::Impl::solve(std::span<Island* const> group, Real duration, StepRepor
   const auto run = [&](std::size_t i) {
     const auto& [island, choice] = exact[i];
     const Real budget = def.solver == SolverKind::exact ? std::numeric_limits<Real>::infinity()
-                                                        : choice->budget(*island, duration);
+                                                        : choice->budget(*island, duration, patience);
     const auto result = choice->exact->solve(*island, interval, budget);
     solved[i] = result.has_value();
     if (result) work[i] = *result;
@@ -234,7 +235,7 @@ void World::Impl::solve(std::span<Island* const> group, Real duration, StepRepor
   for (std::size_t i = 0; i < exact.size(); ++i) {
     const auto& [island, choice] = exact[i];
     report.exact.add(work[i]);
-    choice->learn(*island, duration, solved[i]);
+    choice->learn(*island, duration, solved[i], patience);
     if (!solved[i]) fast.push_back(island);
   }
   if (!fast.empty()) report.fast.add(fast_contacts.solve(fast, interval));

@@ -100,7 +100,9 @@ struct World::Impl : WorldState {
   // Rest (world_sleep.cpp)
   void wake(Body& body);
   void wake_all();
-  void put_to_sleep(Real h);
+  Wrench changing_push(const Body& body, Real time) const;
+  void wake_pushed(Real time);
+  void put_to_sleep(Real start, Real h);
   void update_lists();
 
   // Particles
@@ -132,6 +134,7 @@ struct World::Impl : WorldState {
   std::vector<ContactPair*> active_pairs;  // those of which a body can move
   std::vector<MovingIsland> islands;
   std::map<uint32_t, SolverChoice> choices;  // by the slot of an island's first body
+  SolverPatience patience;
   FastContacts fast_contacts;
   std::vector<std::unique_ptr<CoupledSystem>> motions;  // of the sub-step
 

@@ -10,6 +10,9 @@ namespace {
 /// A body is quiet while none of its points moves faster than this [m/s], and goes to sleep after being quiet
 /// so long [s], with all of its island.
 constexpr Real kQuietSpeed = 0.01, kQuietTime = 0.5;
+/// A sleeping body wakes when forces push it so differently from when it fell asleep that one of its points
+/// would be accelerated by this [m/s^2].
+constexpr Real kPush = 0.01;
 
 Real fastest_point(const Body& body) {
   return body.rigid.velocity().norm() + body.rigid.angular_velocity().norm() * body.extent;
@@ -49,7 +52,39 @@ void World::Impl::wake_all() {
   while (!sleeping.empty()) wake(*sleeping.begin()->second.front());
 }
 
-void World::Impl::put_to_sleep(Real h) {
+/// What the forces that may change in time do to a body at rest.
+Wrench World::Impl::changing_push(const Body& body, Real time) const {
+  const RigidMotion at_rest{body.rigid.position, body.rigid.orientation, Vec3::Zero(), Vec3::Zero()};
+  Wrench sum;
+  force_defs.for_each([&](ForceHandle, const ForceDef& force) {
+    if (!force.changes() || !force.acts_on(body.handle)) return;
+    const Wrench w = wrench(force, time, at_rest, body.rigid.centre, body.rigid.linear_drag);
+    sum.force += w.force;
+    sum.torque += w.torque;
+  });
+  return sum;
+}
+
+/// Wakes whom a force has begun to push, or no longer holds.
+void World::Impl::wake_pushed(Real time) {
+  bool changing = false;
+  force_defs.for_each([&](ForceHandle, const ForceDef& force) { changing |= force.changes(); });
+  if (!changing) return;
+  std::vector<Body*> pushed;
+  for (const auto& [number, group] : sleeping) {
+    const auto woken = std::find_if(group.begin(), group.end(), [&](const Body* body) {
+      const Wrench push = changing_push(*body, time);
+      const Vec3 turn =
+          body->rigid.angular_velocity(body->rigid.orientation, push.torque - body->rest_push.torque);
+      return (push.force - body->rest_push.force).norm() / body->rigid.mass + turn.norm() * body->extent >
+             kPush;
+    });
+    if (woken != group.end()) pushed.push_back(*woken);
+  }
+  for (Body* body : pushed) wake(*body);
+}
+
+void World::Impl::put_to_sleep(Real start, Real h) {
   if (!def.sleep) return;
   for (Body* body : awake) body->quiet_time = fastest_point(*body) < kQuietSpeed ? body->quiet_time + h : 0;
   for (const MovingIsland& island : islands) {
@@ -67,6 +102,7 @@ void World::Impl::put_to_sleep(Real h) {
     for (Body* body : island.bodies) {
       body->asleep = true;
       body->island = sleeping_groups;
+      body->rest_push = changing_push(*body, start);
       body->rigid.momentum.setZero();
       body->rigid.angular_momentum.setZero();
     }

@@ -61,6 +61,7 @@ StepReport World::Impl::step(Real sampling, const BeforeSubStep& before) {
 void World::Impl::substep(Real start, Real end, StepReport& report) {
   const Real h = end - start;
   ++substeps;
+  wake_pushed(start);
   explode(start, end);
   update_lists();
   begin_bodies(end);
@@ -98,7 +99,7 @@ void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
   for (Body* body : awake) keep_within_bounds(*body, report);
   for (Body* body : kinematic) keep_within_bounds(*body, report);
   count_contacts(report);
-  put_to_sleep(h);
+  put_to_sleep(start, h);
 }
 
 /// Every body that moves begins a sub-step; kinematic ones are moved through it at once.

@@ -160,6 +160,13 @@ bool ForceDef::is_pairwise() const {
   return std::visit([]<class E>(const E&) { return kIsPairLaw<E>; }, effect);
 }
 
+bool ForceDef::changes() const {
+  if (is_explosion() || is_pairwise()) return false;
+  const auto* grab = std::get_if<Grab>(&effect);
+  return start > 0 || end < std::numeric_limits<Real>::infinity() || (grab && grab->track.moves()) ||
+         std::holds_alternative<Turbulence>(effect);
+}
+
 std::string problem(const ForceDef& def) {
   if (!std::isfinite(def.start)) return "start is not finite";
   if (!(def.end >= def.start)) return "end must not be before start";

@@ -105,6 +105,8 @@ struct ForceDef {
   bool is_explosion() const { return std::holds_alternative<Explosion>(effect); }
   /// Whether it is a force of particles on each other.
   bool is_pairwise() const;
+  /// Whether what it does to a body at rest can be another thing at another time.
+  bool changes() const;
   /// Whether it is an explosion that goes off in the time from `from` up to but without `to`.
   bool explodes(Real from, Real to) const { return is_explosion() && from <= start && start < to; }
 };

@@ -85,15 +85,17 @@ void GrainContacts::find_pairs(uint32_t i, Found& found) const {
   for (const uint32_t j : search_->partners(i)) {
     const Grain& b = grains_[j];
     Pair pair;
+    Vec3 normal;
+    Real target, time;
     const Vec3 u = a.velocity - b.velocity;
     if (const auto met = meeting(a, b, h)) {
       const Real speed = -u.dot(met->normal);
       pair.is_impact = is_impact(speed, greater_acceleration(a, b), *step_);
       // What is no impact acts all the time, because what presses does, and closes the gap by the end.
       const Real from = std::max(a.from, b.from);
-      pair.target = pair.is_impact ? pair_restitution(a, b) * speed : -speed * (met->time - from) / h;
-      pair.normal = met->normal;
-      pair.time = pair.is_impact ? met->time : from;
+      target = pair.is_impact ? pair_restitution(a, b) * speed : -speed * (met->time - from) / h;
+      normal = met->normal;
+      time = pair.is_impact ? met->time : from;
     } else {
       // The normal half-way does not turn over for those that press into each other. Those that fly past each
       // other have to be looked at where they are.
@@ -102,17 +104,20 @@ void GrainContacts::find_pairs(uint32_t i, Found& found) const {
       const Vec3 middle = way.squaredNorm() < reach * reach / 64 ? Vec3(d - way / 2) : d;
       const Real size = middle.norm();
       if (!(size > 0)) continue;
-      pair.normal = middle / size;
-      const Real gap = d.dot(pair.normal) - reach;
+      normal = middle / size;
+      const Real gap = d.dot(normal) - reach;
       if (gap > kMargin / 2 * reach) continue;
       pair.is_impact = false;
-      pair.target = std::min(0.0, u.dot(pair.normal) - gap / h);
-      pair.time = std::max(a.from, b.from);
+      target = std::min(0.0, u.dot(normal) - gap / h);
+      time = std::max(a.from, b.from);
     }
     pair.a = i;
     pair.b = j;
-    pair.mass = a.mass * b.mass / (a.mass + b.mass);
-    pair.friction = pair_friction(a.friction, b.friction);
+    pair.normal_single = normal.cast<float>();
+    pair.mass = static_cast<float>(a.mass * b.mass / (a.mass + b.mass));
+    pair.target = static_cast<float>(target);
+    pair.time = static_cast<float>(time);
+    pair.friction = static_cast<float>(pair_friction(a.friction, b.friction));
     const uint32_t apart = order_.layer[i] - order_.layer[j];
     const auto layers = static_cast<uint32_t>(order_.layer_begin.size() - 1);
     pair.is_far = !(apart + 1 <= 2 || apart == layers - 1 || apart + layers == 1);
@@ -148,40 +153,42 @@ void GrainContacts::find_surfaces(uint32_t i, NearObstacles& near, Found& found)
 void GrainContacts::add_surface(uint32_t i, const Obstacle& o, const Vec3& normal, Real gap, Real time,
                                 bool meets, std::size_t first, Found& found) const {
   for (std::size_t k = first; k < found.surfaces.size(); ++k)
-    if (found.surfaces[k].obstacle == &o && found.surfaces[k].normal.dot(normal) > kSameSurface) return;
+    if (found.surfaces[k].obstacle == &o && found.surfaces[k].normal().dot(normal) > kSameSurface) return;
   const Grain& g = grains_[i];
   Surface s;
   s.grain = i;
   s.obstacle = &o;
   s.body = o.body;
-  s.normal = normal;
-  s.velocity = o.velocity_at(g.at(step_->h) - g.radius * normal, 1);
-  s.friction = pair_friction(g.friction, o.friction);
-  s.mass = g.mass;
-  const Real speed = (s.velocity - g.velocity).dot(normal);
+  const Vec3 velocity = o.velocity_at(g.at(step_->h) - g.radius * normal, 1);
+  s.normal_single = normal.cast<float>();
+  s.velocity = velocity;
+  s.friction = static_cast<float>(pair_friction(g.friction, o.friction));
+  s.mass = static_cast<float>(g.mass);
+  const Real speed = (velocity - g.velocity).dot(normal);
   s.is_impact = meets && is_impact(speed, g.acceleration.norm(), *step_);
-  s.target = meets ? -speed * (time - g.from) / step_->h : std::min(0.0, -speed - gap / step_->h);
-  s.time = s.is_impact ? time : g.from;
+  Real target = meets ? -speed * (time - g.from) / step_->h : std::min(0.0, -speed - gap / step_->h);
+  s.time = static_cast<float>(s.is_impact ? time : g.from);
   if (s.is_impact) {
     // The body gives way, but only later: the grain is left with the velocity that it then has.
     const Vec3 arm = g.at(time) - g.radius * normal - o.centre_at(time / step_->h);
     const Real yielding = o.is_dynamic() ? g.mass * normal.dot(o.mobility(arm) * normal) : 0;
-    s.target = speed * ((1 + std::max(g.restitution, o.restitution)) / (1 + yielding) - 1);
+    target = speed * ((1 + std::max(g.restitution, o.restitution)) / (1 + yielding) - 1);
   }
+  s.target = static_cast<float>(target);
   recall(s);
   found.surfaces.push_back(s);
 }
 
 /// The impulse of the sub-step before as the guess.
 void GrainContacts::recall(Pair& pair) const {
-  pair.impulse.setZero();
+  pair.impulse_single.setZero();
   const uint32_t a = order_.before[pair.a], b = order_.before[pair.b];
   if (a == kNone || b == kNone || pair.is_impact) return;
   const auto look = [&](uint32_t from, uint32_t to, Real sign) {
     for (uint32_t k = pair_begin_before_[from]; k < pair_begin_before_[from + 1]; ++k) {
       if (pairs_before_[k].b != to) continue;
-      pair.impulse =
-          admissible(sign * step_->h / h_before_ * pairs_before_[k].impulse, pair.normal, pair.friction);
+      const Vec3 impulse = sign * step_->h / h_before_ * pairs_before_[k].impulse();
+      pair.impulse_single = admissible(impulse, pair.normal(), pair.friction).cast<float>();
       return true;
     }
     return false;
@@ -190,13 +197,13 @@ void GrainContacts::recall(Pair& pair) const {
 }
 
 void GrainContacts::recall(Surface& s) const {
-  s.impulse.setZero();
+  s.impulse_single.setZero();
   const uint32_t i = order_.before[s.grain];
   if (i == kNone || s.is_impact) return;
   for (uint32_t k = surface_begin_before_[i]; k < surface_begin_before_[i + 1]; ++k) {
     const Surface& old = surfaces_before_[k];
-    if (old.body != s.body || old.normal.dot(s.normal) < kSameSurface) continue;
-    s.impulse = admissible(step_->h / h_before_ * old.impulse, s.normal, s.friction);
+    if (old.body != s.body || old.normal().dot(s.normal()) < kSameSurface) continue;
+    s.impulse_single = admissible(step_->h / h_before_ * old.impulse(), s.normal(), s.friction).cast<float>();
     return;
   }
 }

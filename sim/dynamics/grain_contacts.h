@@ -44,24 +44,29 @@ class GrainContacts {
  private:
   static constexpr Real kNever = std::numeric_limits<Real>::infinity();
 
-  /// Of a contact: its normal and how it acts, and the impulse on the first grain (world, N s).
+  /// Of a contact: how it acts, in single precision, because the time of a sweep is that of reading the
+  /// contacts. What two grains give each other is equal and opposite all the same, and velocities are double.
   struct Contact {
-    Vec3 normal;
-    Vec3 impulse;
-    Real target;    // least normal velocity at the end [m/s]
-    Real friction;  // Coulomb's coefficient
-    Real mass;      // effective [kg]
-    Real time;      // since when [s]
-    bool is_impact;
+    Eigen::Vector3f normal_single;
+    Eigen::Vector3f impulse_single;
+    float target;    // least normal velocity at the end [m/s]
+    float friction;  // Coulomb's coefficient
+    float mass;      // effective [kg]
+    float time;      // since when [s]
+
+    Vec3 normal() const { return normal_single.cast<Real>(); }
+    Vec3 impulse() const { return impulse_single.cast<Real>(); }  // on the first grain, world [N s]
+    bool acts() const { return impulse_single != Eigen::Vector3f::Zero(); }
   };
   struct Pair : Contact {
-    uint32_t a, b;
-    bool is_far;  // not in neighbouring layers
+    uint32_t a : 31, is_impact : 1;
+    uint32_t b : 31, is_far : 1;  // far: not in neighbouring layers
   };
   struct Surface : Contact {
     uint32_t grain;
-    const Obstacle* obstacle;
+    bool is_impact;
     uint32_t body;
+    const Obstacle* obstacle;
     Vec3 velocity;  // of the surface
   };
   struct Motion {
@@ -107,6 +112,7 @@ class GrainContacts {
   void stop_passing(std::span<Vec3> end);
   bool set_out(std::span<const Vec3> end);
   void find_passing();
+  void list_near();
   template <class Add>
   void find_passing(uint32_t i, uint32_t j, Real after, Add&& add) const;
   void stop(const Passing& passing);
@@ -128,12 +134,14 @@ class GrainContacts {
   std::vector<uint32_t> pair_begin_, surface_begin_, pair_begin_before_, surface_begin_before_;
   std::vector<uint32_t> far_;
   std::vector<Motion> motion_;
-  std::vector<Real> slab_change_;
+  std::vector<Real> slab_change2_;
   // The ways as contact made them, whether they are long, and when those that end early do.
   std::vector<Grain> ways_;
   std::vector<uint8_t> is_long_;
   std::vector<Real> stop_;
   GrainSearch way_search_;
+  // Of each grain those whose ways may come near its own, if one of the two is long.
+  std::vector<uint32_t> near_begin_, near_;
   Real h_before_ = 0;
   uint32_t sweeps_ = 0;
 };

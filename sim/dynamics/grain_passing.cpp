@@ -63,8 +63,24 @@ void GrainContacts::find_passing() {
     const auto add = [&](const Passing& p) { passing.push_back(p); };
     const std::size_t end = std::min(grains_.size(), (c + 1) * GrainSearch::kChunk);
     for (auto i = static_cast<uint32_t>(c * GrainSearch::kChunk); i < end; ++i)
-      for (const uint32_t j : way_search_.partners(i))
-        if (is_long_[i] || is_long_[j]) find_passing(i, j, 0, add);
+      for (const uint32_t j : way_search_.partners(i)) find_passing(i, j, 0, add);
+  });
+}
+
+void GrainContacts::list_near() {
+  const auto n = static_cast<uint32_t>(grains_.size());
+  near_begin_.assign(n + 1, 0);
+  const auto for_each = [&](auto&& f) {
+    for (uint32_t i = 0; i < n; ++i)
+      for (const uint32_t j : way_search_.partners(i)) f(i, j);
+  };
+  for_each([&](uint32_t i, uint32_t j) { ++near_begin_[i], ++near_begin_[j]; });
+  uint32_t sum = 0;
+  for (uint32_t& begin : near_begin_) begin = sum += begin;
+  near_.resize(sum);
+  for_each([&](uint32_t i, uint32_t j) {
+    near_[--near_begin_[i]] = j;
+    near_[--near_begin_[j]] = i;
   });
 }
 
@@ -84,8 +100,9 @@ void GrainContacts::stop(const Passing& p) {
 void GrainContacts::stop_passing(std::span<Vec3> end) {
   if (!set_out(end)) return;
   way_search_.build(ways_, step_->h, 0);
-  way_search_.list_partners(ways_);
+  way_search_.list_partners(ways_, is_long_);
   find_passing();
+  list_near();
   std::priority_queue<Passing, std::vector<Passing>, std::greater<>> queue;
   for (const Found& found : found_)
     for (const Passing& p : found.passing) queue.push(p);
@@ -98,9 +115,8 @@ void GrainContacts::stop_passing(std::span<Vec3> end) {
     for (const uint32_t i : {p.a, p.b}) {
       if (i == p.a ? p.a_stands : p.b_stands) continue;
       end[i] = ways_[i].at(p.time);
-      way_search_.for_each_near(ways_[i], [&](uint32_t k) {
-        if (k != i && !stands(k)) find_passing(i, k, p.time, add);
-      });
+      for (uint32_t n = near_begin_[i]; n < near_begin_[i + 1]; ++n)
+        if (!stands(near_[n])) find_passing(i, near_[n], p.time, add);
     }
   }
 }

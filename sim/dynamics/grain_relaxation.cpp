@@ -1,6 +1,7 @@
 /// The solution of GrainContacts and what follows from it.
 
 #include <algorithm>
+#include <array>
 
 #include <oneapi/tbb/parallel_for.h>
 
@@ -18,23 +19,26 @@ constexpr std::size_t kMinSweeps = 30, kMaxSweeps = 1000;
 /// sub-step: by moving them, so that velocities do not know of it.
 constexpr Real kSlop = 0.002, kPush = 0.2;
 constexpr int kMaxSlides = 4;
+/// Parts of a slab that are gone through side by side: contacts that follow each other should not wait for
+/// each other's velocities.
+constexpr uint32_t kStreams = 4;
 constexpr std::size_t kChunk = GrainSearch::kChunk;
 
 /// The impulse's change that brings a contact with relative velocity u to its target, within Coulomb's cone.
 template <class Contact>
 Vec3 correct(Contact& c, const Vec3& u) {
-  const Vec3 before = c.impulse;
-  const Vec3 wanted = before - c.mass * (u - c.target * c.normal);
-  const Real pressing = wanted.dot(c.normal);
+  const Vec3 before = c.impulse(), normal = c.normal();
+  const Vec3 wanted = before - c.mass * (u - c.target * normal);
+  const Real pressing = wanted.dot(normal);
   if (pressing > 0) {
-    Vec3 across = wanted - pressing * c.normal;
+    Vec3 across = wanted - pressing * normal;
     const Real limit = c.friction * pressing, size2 = across.squaredNorm();
     if (size2 > limit * limit) across *= limit / std::sqrt(size2);
-    c.impulse = pressing * c.normal + across;
+    c.impulse_single = (pressing * normal + across).template cast<float>();
   } else {
-    c.impulse.setZero();
+    c.impulse_single.setZero();
   }
-  return c.impulse - before;
+  return c.impulse() - before;
 }
 
 }  // namespace
@@ -48,8 +52,18 @@ void GrainContacts::for_each_contact(OnPair&& on_pair, OnSurface&& on_surface) {
     tbb::parallel_for(std::size_t{0}, slabs / 2, [&](std::size_t k) {
       const std::size_t slab = 2 * k + color;
       const uint32_t begin = order_.layer_begin[2 * slab], end = order_.layer_begin[2 * slab + 2];
-      for (uint32_t c = pair_begin_[begin]; c < pair_begin_[end]; ++c)
-        if (!pairs_[c].is_far) on_pair(pairs_[c], slab);
+      std::array<uint32_t, kStreams + 1> next;
+      for (uint32_t s = 0; s <= kStreams; ++s) next[s] = pair_begin_[begin + (end - begin) * s / kStreams];
+      const std::array<uint32_t, kStreams + 1> first = next;
+      for (bool more = true; more;) {
+        more = false;
+        for (uint32_t s = 0; s < kStreams; ++s) {
+          if (next[s] == first[s + 1]) continue;
+          Pair& c = pairs_[next[s]++];
+          if (!c.is_far) on_pair(c, slab);
+          more = true;
+        }
+      }
       for (uint32_t c = surface_begin_[begin]; c < surface_begin_[end]; ++c) on_surface(surfaces_[c], slab);
     });
   for (const uint32_t c : far_) on_pair(pairs_[c], 0);
@@ -65,18 +79,20 @@ void GrainContacts::relax() {
     motion_[c.a].velocity += motion_[c.a].inverse_mass * impulse;
     motion_[c.b].velocity -= motion_[c.b].inverse_mass * impulse;
   };
-  for_each_contact([&](const Pair& c, std::size_t) { apply(c, c.impulse); },
-                   [&](const Surface& c, std::size_t) {
-                     motion_[c.grain].velocity += motion_[c.grain].inverse_mass * c.impulse;
-                   });
+  const auto press = [&](const Surface& c, const Vec3& impulse) {
+    motion_[c.grain].velocity += motion_[c.grain].inverse_mass * impulse;
+  };
+  for_each_contact([&](const Pair& c, std::size_t) { apply(c, c.impulse()); },
+                   [&](const Surface& c, std::size_t) { press(c, c.impulse()); });
   const std::size_t slabs = (order_.layer_begin.size() - 1) / 2;
   const std::size_t most =
       std::clamp(kMaxContactVisits / std::max(contacts(), std::size_t{1}), kMinSweeps, kMaxSweeps);
-  Real change = 1;
-  for (sweeps_ = 0; sweeps_ < most && change > kTolerance; ++sweeps_) {
-    slab_change_.assign(slabs, 0);
+  Real change2 = 1;
+  for (sweeps_ = 0; sweeps_ < most && change2 > kTolerance * kTolerance; ++sweeps_) {
+    slab_change2_.assign(slabs, 0);
     const auto note = [&](std::size_t slab, const Vec3& impulse, Real mass) {
-      slab_change_[slab] = std::max(slab_change_[slab], impulse.squaredNorm() / (mass * mass));
+      const Real size2 = impulse.squaredNorm(), mass2 = mass * mass;
+      if (size2 > slab_change2_[slab] * mass2) slab_change2_[slab] = size2 / mass2;
     };
     for_each_contact(
         [&](Pair& c, std::size_t slab) {
@@ -85,12 +101,11 @@ void GrainContacts::relax() {
           note(slab, more, c.mass);
         },
         [&](Surface& c, std::size_t slab) {
-          Motion& m = motion_[c.grain];
-          const Vec3 more = correct(c, m.velocity - c.velocity);
-          m.velocity += m.inverse_mass * more;
+          const Vec3 more = correct(c, motion_[c.grain].velocity - c.velocity);
+          press(c, more);
           note(slab, more, c.mass);
         });
-    change = std::sqrt(*std::max_element(slab_change_.begin(), slab_change_.end()));
+    change2 = *std::max_element(slab_change2_.begin(), slab_change2_.end());
   }
 }
 
@@ -100,16 +115,16 @@ void GrainContacts::displace(std::span<Vec3> end, std::span<uint8_t> touched) {
   const auto press = [&](const Contact& c, uint32_t i, Real sign) {
     if (!touched[i]) end[i] = grains_[i].at(h);
     touched[i] = 1;
-    end[i] += sign * (h - c.time) / grains_[i].mass * c.impulse;
+    end[i] += sign * (h - c.time) / grains_[i].mass * c.impulse();
   };
   for_each_contact(
       [&](const Pair& c, std::size_t) {
-        if (c.impulse == Vec3::Zero()) return;
+        if (!c.acts()) return;
         press(c, c.a, 1);
         press(c, c.b, -1);
       },
       [&](const Surface& c, std::size_t) {
-        if (c.impulse != Vec3::Zero()) press(c, c.grain, 1);
+        if (c.acts()) press(c, c.grain, 1);
       });
   tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
     for (std::size_t i = c * kChunk; i < std::min(grains_.size(), (c + 1) * kChunk); ++i)
@@ -183,20 +198,20 @@ void GrainContacts::keep_outside(uint32_t i, NearObstacles& near, Vec3& end, Fou
 
 /// Tells of what a grain got by its contacts; those of pairs tell both.
 void GrainContacts::report(uint32_t i, const Vec3& end, Found& found) const {
-  const auto strike = [&](const Contact& c, uint32_t grain, const Vec3& normal) {
-    if (c.is_impact && c.impulse != Vec3::Zero())
+  const auto strike = [&](const auto& c, uint32_t grain, const Vec3& normal) {
+    if (c.is_impact && c.acts())
       found.strikes.push_back({grain, c.time, grains_[grain].at(c.time), grains_[grain].velocity, normal});
   };
   for (uint32_t k = pair_begin_[i]; k < pair_begin_[i + 1]; ++k) {
-    strike(pairs_[k], pairs_[k].a, pairs_[k].normal);
-    strike(pairs_[k], pairs_[k].b, -pairs_[k].normal);
+    strike(pairs_[k], pairs_[k].a, pairs_[k].normal());
+    strike(pairs_[k], pairs_[k].b, -pairs_[k].normal());
   }
   for (uint32_t k = surface_begin_[i]; k < surface_begin_[i + 1]; ++k) {
     const Surface& s = surfaces_[k];
-    strike(s, i, s.normal);
-    if (s.obstacle->is_dynamic() && s.impulse != Vec3::Zero())
+    strike(s, i, s.normal());
+    if (s.obstacle->is_dynamic() && s.acts())
       found.reactions.push_back(
-          reaction(*s.obstacle, end - grains_[i].radius * s.normal, s.time / step_->h, s.impulse));
+          reaction(*s.obstacle, end - grains_[i].radius * s.normal(), s.time / step_->h, s.impulse()));
   }
 }
 

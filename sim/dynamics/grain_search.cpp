@@ -54,24 +54,60 @@ void GrainSearch::build(std::span<const Grain> grains, std::span<const uint32_t>
     c.balls.push_back(b);
     c.centres.push_back(b.centre);
   }
-  for (SizeClass& c : classes_) c.grid.build(c.centres, 2 * c.radius);
+  for (SizeClass& c : classes_) c.grid.build(c.centres, 2 * c.radius * (1 + 1e-9));
+}
+
+/// Makes the lists of the grains, which go through the cells in their order; `for_each_partner` is called
+/// with the class of a grain, its place there, and whom to tell of a partner's index.
+template <class ForEachPartner>
+void GrainSearch::list(std::span<const Grain> grains, ForEachPartner&& for_each_partner) {
+  struct Range {
+    const SizeClass* own;
+    std::size_t begin, end;
+  };
+  std::vector<Range> ranges;
+  for (const SizeClass& c : classes_)
+    for (std::size_t begin = 0; begin < c.member.size(); begin += kChunk)
+      ranges.push_back({&c, begin, std::min(begin + kChunk, c.member.size())});
+  partners_.resize(ranges.size());
+  lists_.assign(grains.size(), {});
+  tbb::parallel_for(std::size_t{0}, ranges.size(), [&](std::size_t r) {
+    const auto& [own, begin, end] = ranges[r];
+    std::vector<uint32_t>& partners = partners_[r];
+    partners.clear();
+    for (std::size_t place = begin; place < end; ++place) {
+      const uint32_t i = own->member[own->grid.at(place)];
+      const auto first = static_cast<uint32_t>(partners.size());
+      for_each_partner(*own, place, [&](uint32_t j) {
+        if (may_collide(grains[i], grains[j])) partners.push_back(j);
+      });
+      lists_[i] = {static_cast<uint32_t>(r), first, static_cast<uint32_t>(partners.size()) - first};
+    }
+  });
 }
 
 void GrainSearch::list_partners(std::span<const Grain> grains) {
-  const std::size_t n = grains.size();
-  partners_.resize((n + kChunk - 1) / kChunk);
-  first_.resize(n);
-  count_.resize(n);
-  tbb::parallel_for(std::size_t{0}, partners_.size(), [&](std::size_t c) {
-    std::vector<uint32_t>& partners = partners_[c];
-    partners.clear();
-    for (auto i = static_cast<uint32_t>(c * kChunk); i < std::min(n, (c + 1) * kChunk); ++i) {
-      first_[i] = static_cast<uint32_t>(partners.size());
-      for_each_partner(grains[i], i, [&](uint32_t j) {
-        if (may_collide(grains[i], grains[j])) partners.push_back(j);
+  list(grains, [&](const SizeClass& own, std::size_t place, auto&& add) {
+    const Ball& b = own.balls[own.grid.at(place)];
+    own.grid.for_each_pair(place, b.radius + own.radius, [&](uint32_t k) {
+      if (meets(b, own.balls[k])) add(own.member[k]);
+    });
+    for (const SizeClass& coarser : classes_) {
+      if (coarser.size <= own.size) continue;
+      coarser.grid.for_each_near(b.centre, b.radius + coarser.radius, [&](uint32_t k) {
+        if (meets(b, coarser.balls[k])) add(coarser.member[k]);
       });
-      count_[i] = static_cast<uint32_t>(partners.size()) - first_[i];
     }
+  });
+}
+
+void GrainSearch::list_partners(std::span<const Grain> grains, std::span<const uint8_t> chosen) {
+  list(grains, [&](const SizeClass& own, std::size_t place, auto&& add) {
+    const uint32_t i = own.member[own.grid.at(place)];
+    if (!chosen[i]) return;
+    for_each_near(grains[i], [&](uint32_t j) {
+      if (j > i || (j < i && !chosen[j])) add(j);
+    });
   });
 }
 

@@ -30,28 +30,18 @@ class GrainSearch {
       });
   }
 
-  /// Lists for each sorted grain those it may collide with and whose ways may come near its own; of a pair
-  /// one lists the other.
+  /// Lists for each grain, of which all must have been sorted, those it may collide with and whose ways may
+  /// come near its own; of a pair one lists the other.
   void list_partners(std::span<const Grain> grains);
+  /// The same for pairs of which at least one is among the `chosen`, a flag for each grain; that one lists
+  /// the other.
+  void list_partners(std::span<const Grain> grains, std::span<const uint8_t> chosen);
   std::span<const uint32_t> partners(uint32_t i) const {
-    return std::span(partners_[i / kChunk]).subspan(first_[i], count_[i]);
+    const List& list = lists_[i];
+    return std::span(partners_[list.chunk]).subspan(list.first, list.count);
   }
 
  private:
-  /// The partners of grain i, of a pair one of both only.
-  template <class F>
-  void for_each_partner(const Grain& grain, uint32_t i, F&& f) const {
-    const Ball b = ball(grain);
-    const int own = size_class(b.radius);
-    for (const SizeClass& c : classes_) {
-      if (c.size < own) continue;
-      c.grid.for_each_near(b.centre, b.radius + c.radius, [&](uint32_t k) {
-        const uint32_t j = c.member[k];
-        if ((c.size > own || j > i) && meets(b, c.balls[k])) f(j);
-      });
-    }
-  }
-
   struct Ball {
     Vec3 centre;
     Real radius;
@@ -64,6 +54,14 @@ class GrainSearch {
     std::vector<Ball> balls;
     std::vector<Vec3> centres;
   };
+
+  /// The partners of a grain, among those of its chunk.
+  struct List {
+    uint32_t chunk = 0, first = 0, count = 0;
+  };
+
+  template <class ForEachPartner>
+  void list(std::span<const Grain> grains, ForEachPartner&& for_each_partner);
 
   static bool meets(const Ball& a, const Ball& b) {
     const Real reach = a.radius + b.radius;
@@ -82,7 +80,7 @@ class GrainSearch {
   std::vector<Ball> balls_;
   std::vector<int> size_class_;
   std::vector<std::vector<uint32_t>> partners_;  // by chunk
-  std::vector<uint32_t> first_, count_;          // of each grain in its chunk's
+  std::vector<List> lists_;                      // by grain
 };
 
 }  // namespace offstage::sim

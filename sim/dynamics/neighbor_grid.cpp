@@ -50,7 +50,8 @@ void NeighborGrid::build(std::span<const Vec3> points, Real cell) {
   const std::size_t n = points.size();
   cell_ = cell;
   inverse_ = 1 / cell;
-  entries_.resize(n);
+  index_.resize(n);
+  for (std::vector<Real>* of_axis : {&x_, &y_, &z_}) of_axis->resize(n + kLanes);
   if (n == 0) return;
   choose_torus(points);
   const uint32_t all_bits = bits_[0] + bits_[1] + bits_[2];
@@ -87,7 +88,11 @@ void NeighborGrid::build(std::span<const Vec3> points, Real cell) {
     for (std::size_t b = 0; b < cells; ++b) place += std::exchange(begin[b], place);
     for (uint32_t e = first; e < last; ++e) {
       const auto [bucket, index] = parted_[e];
-      entries_[begin[bucket - base]++] = {points[index], index};
+      const uint32_t at = begin[bucket - base]++;
+      x_[at] = points[index].x();
+      y_[at] = points[index].y();
+      z_[at] = points[index].z();
+      index_[at] = index;
     }
     for (std::size_t b = cells - 1; b > 0; --b) begin[b] = begin[b - 1];
     begin[0] = first;

@@ -11,7 +11,7 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kStep = 1.0 / 120, kRadius = 0.005;
+constexpr Real kStep = 1.0 / 240, kRadius = 0.005;
 
 void run(benchmark::State& state, World& world, int warm_up) {
   for (int i = 0; i < warm_up; ++i) world.step(kStep);
@@ -45,11 +45,11 @@ World column(std::size_t count) {
 
 void heap_forming(benchmark::State& state) {
   World world = column(static_cast<std::size_t>(state.range(0)));
-  run(state, world, 24);
+  run(state, world, 48);
 }
 void heap_at_rest(benchmark::State& state) {
   World world = column(static_cast<std::size_t>(state.range(0)));
-  run(state, world, 360);
+  run(state, world, 720);
 }
 
 /// A thousandth of the space is filled.

@@ -104,6 +104,39 @@ TEST_P(Sleep, ForcesExplosionsAndOrdersWakeIt) {
   EXPECT_GT(told.world.body(told.stack[2]).centre.y(), 1.1);
 }
 
+TEST_P(Sleep, AForceThatBeginsLaterAHandThatPullsAndTheEndOfASupportWakeIt) {
+  Scene pushed = sleeping_stack();
+  const Real soon = pushed.world.time() + 1;
+  pushed.world.add_force({.start = soon, .effect = ConstantField{.force = {100, 0, 0}}});
+  run(pushed.world, 0.99);
+  EXPECT_TRUE(pushed.world.is_asleep(pushed.stack[2]));
+  run(pushed.world, 0.5);
+  EXPECT_GT(pushed.world.body(pushed.stack[2]).centre.x(), 0.1);
+
+  Scene pulled = sleeping_stack();
+  const Real now = pulled.world.time();
+  const Vec3 top = pulled.world.body(pulled.stack[2]).centre;
+  Grab grab{.stiffness = 1000, .damping = 10};
+  for (const auto& [time, height] : {std::pair(now, 0.0), {now + 1, 0.0}, {now + 2, 0.5}})
+    grab.track.keys.push_back({time, {.position = top + Vec3(0, height, 0)}});
+  grab.track.interpolation = Interpolation::linear;
+  pulled.world.add_force({.bodies = {pulled.stack[2]}, .effect = grab});
+  run(pulled.world, 0.99);
+  EXPECT_TRUE(pulled.world.is_asleep(pulled.stack[2]));
+  run(pulled.world, 1.2);
+  EXPECT_GT(pulled.world.body(pulled.stack[2]).centre.y(), top.y() + 0.2);
+
+  WorldDef sleepy = def();
+  sleepy.sleep = true;
+  World held(sleepy);
+  const BodyHandle ball = held.add_body({.shape = Sphere{0.1}, .pose = {.position = {0, 2, 0}}, .mass = 2});
+  held.add_force({.end = 2, .effect = ConstantField{.force = -2 * sleepy.gravity}});
+  run(held, 1.9);
+  EXPECT_TRUE(held.is_asleep(ball));
+  run(held, 0.3);
+  EXPECT_NEAR(held.body(ball).velocity.y(), 0.2 * sleepy.gravity.y(), 0.05);
+}
+
 TEST_P(Sleep, AKinematicBodyThatComesAlongWakesIt) {
   Scene s = sleeping_stack();
   const Real t = s.world.time();
