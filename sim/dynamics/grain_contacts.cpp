@@ -111,8 +111,8 @@ void GrainContacts::find_pairs(uint32_t i, Found& found) const {
       target = std::min(0.0, u.dot(normal) - gap / h);
       time = std::max(a.from, b.from);
     }
-    pair.a = i;
-    pair.b = j;
+    pair.a = i & kIndex;
+    pair.b = j & kIndex;
     pair.normal_single = normal.cast<float>();
     pair.mass = static_cast<float>(a.mass * b.mass / (a.mass + b.mass));
     pair.target = static_cast<float>(target);

@@ -58,6 +58,7 @@ class GrainContacts {
     Vec3 impulse() const { return impulse_single.cast<Real>(); }  // on the first grain, world [N s]
     bool acts() const { return impulse_single != Eigen::Vector3f::Zero(); }
   };
+  static constexpr uint32_t kIndex = 0x7fffffff;  // all bits of a grain's number
   struct Pair : Contact {
     uint32_t a : 31, is_impact : 1;
     uint32_t b : 31, is_far : 1;  // far: not in neighbouring layers
