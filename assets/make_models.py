@@ -291,6 +291,82 @@ def marble_run():
     save("chute.glb", gutter([(0, 0, 0), (0.3, 0, 0)], 0.02, 0.004), red)
 
 
+# --- cloth and what lies on it --------------------------------------------------------------------
+
+
+def dishes():
+    china = Material("china", "#e9e6de", 0.22)
+
+    def save(name, profile, material):
+        mesh = oriented(lathe(rounded(profile, 2), 64))
+        assert open_edges(mesh) == 0
+        write_glb(MODELS / name, [(shaded(mesh, 50), material)])
+
+    save("plate.glb", [(0, 0), (0.07, 0), (0.075, 0.004), (0.1, 0.012), (0.13, 0.019), (0.132, 0.022),
+                       (0.128, 0.023), (0.1, 0.017), (0.075, 0.009), (0, 0.008)], china)
+    save("bowl.glb", [(0, 0), (0.035, 0), (0.037, 0.006), (0.06, 0.022), (0.078, 0.05), (0.084, 0.075),
+                      (0.081, 0.077), (0.074, 0.05), (0.056, 0.026), (0.03, 0.012), (0, 0.01)],
+         Material("glaze", "#3f6f8c", 0.2))
+    save("goblet.glb", [(0, 0), (0.038, 0), (0.038, 0.004), (0.012, 0.01), (0.006, 0.022), (0.006, 0.07),
+                        (0.012, 0.08), (0.032, 0.1), (0.038, 0.13), (0.036, 0.165), (0.034, 0.165),
+                        (0.034, 0.13), (0.028, 0.104), (0, 0.09)], Material("silver", "#d6d4ce", 0.2, 1))
+
+
+def parachute():
+    """A dome with a hole on top and a ribbon from every fourth edge of its rim to a ring below: one open sheet."""
+    sectors, rings, lines, steps = 48, 15, 12, 14
+    radius, ring, depth = 1.5, 0.2, 3.0
+
+    def around(r, y, k):
+        a = 2 * math.pi * k / sectors
+        return (r * math.sin(a), y, r * math.cos(a))
+
+    angles = [math.radians(mix(6, 82, j / (rings - 1))) for j in range(rings)]
+    positions = [around(radius * math.sin(a), radius * math.cos(a), k) for a in angles for k in range(sectors)]
+    triangles = []
+    for j in range(rings - 1):
+        for k in range(sectors):
+            a, b = j * sectors + k, j * sectors + (k + 1) % sectors
+            c, d = a + sectors, b + sectors
+            triangles += [(a, c, b), (b, c, d)] if (j + k) % 2 else [(a, c, d), (a, d, b)]
+    rim = (rings - 1) * sectors
+    for line in range(lines):
+        k = line * sectors // lines
+        top = (positions[rim + k], positions[rim + k + 1])
+        foot = tuple(around(ring, -depth, x) for x in (k + 0.5 - 1, k + 0.5 + 1))
+        last = (rim + k, rim + k + 1)
+        for step in range(1, steps + 1):
+            t = step / steps
+            row = len(positions)
+            positions += [mix_points(top[0], foot[0], t), mix_points(top[1], foot[1], t)]
+            triangles += [(last[0], row, last[1]), (last[1], row, row + 1)]
+            last = (row, row + 1)
+    write_glb(MODELS / "parachute.glb", [(shaded(Mesh(positions, triangles), 180), Material("canopy", "#c8502a", 0.7))])
+
+
+def mix_points(a, b, t):
+    return tuple(mix(x, y, t) for x, y in zip(a, b))
+
+
+def hammock():
+    """A sagging sheet, narrower at its ends, hung along X."""
+    columns, rows = 72, 32
+    positions = []
+    for i in range(columns + 1):
+        x = 2 * i / columns - 1
+        half = mix(0.3, 0.58, (1 - x * x)**0.7)
+        for j in range(rows + 1):
+            z = 2 * j / rows - 1
+            positions.append((1.1 * x, 0.42 * (x * x - 1) + 0.16 * z * z * (1 - x * x), half * z))
+    triangles = []
+    for i in range(columns):
+        for j in range(rows):
+            a, c = i * (rows + 1) + j, (i + 1) * (rows + 1) + j
+            b, d = a + 1, c + 1
+            triangles += [(a, b, c), (b, d, c)] if (i + j) % 2 else [(a, b, d), (a, d, c)]
+    write_glb(MODELS / "hammock.glb", [(shaded(Mesh(positions, triangles), 180), Material("canvas", "#d8c9a8", 0.9))])
+
+
 # --- set dressing ---------------------------------------------------------------------------------
 
 
@@ -394,7 +470,8 @@ def tree():
 
 ALL = [
     duck, fountain, sprinkler, t_handle, landscape, gears, crank, connecting_rod, piston, flywheel,
-    voussoir, top, marble_run, grass_patch, rock, pot, tree
+    voussoir, top, marble_run, dishes, parachute,
+    hammock, grass_patch, rock, pot, tree
 ]
 
 if __name__ == "__main__":

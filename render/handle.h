@@ -21,5 +21,6 @@ using MaterialHandle = Handle<struct MaterialTag>;
 using InstanceHandle = Handle<struct InstanceTag>;
 using PointsHandle = Handle<struct PointsTag>;
 using LinesHandle = Handle<struct LinesTag>;
+using ClothHandle = Handle<struct ClothTag>;
 
 }  // namespace offstage::render

@@ -77,7 +77,10 @@ GpuMaterial make_gpu_material(const Material& material, std::span<const Image> t
   uniforms.color = material.color;
   uniforms.pattern_color << material.pattern_color, std::max(material.pattern_scale, 1e-4f);
   uniforms.emission << material.emission, 0;
-  uniforms.surface = {material.metallic, material.roughness, 0, 0};
+  const Fabric& fabric = material.fabric;
+  uniforms.surface = {material.metallic, material.roughness, std::max(fabric.thread, 1e-6f), fabric.relief};
+  uniforms.back << fabric.back_color.value_or(material.color.head<3>()), fabric.translucency;
+  uniforms.sheen << fabric.sheen * fabric.sheen_color, fabric.back_color ? 1 : 0;
   result.uniforms = gl::make_buffer(std::span<const MaterialUniforms>(&uniforms, 1));
 
   const std::array<int, 3> indices = {material.base_color_texture, material.metallic_roughness_texture,
@@ -90,6 +93,7 @@ GpuMaterial make_gpu_material(const Material& material, std::span<const Image> t
   }
   const Image* base = texture_at(textures, material.base_color_texture);
   result.pattern = material.pattern;
+  result.weave = fabric.weave;
   result.two_sided = material.two_sided;
   result.blended = material.color.w() < 1 || (base != nullptr && has_alpha(*base));
   result.casts = material.color.w() > 0;
@@ -191,7 +195,7 @@ gl::LazyProgram& MeshPass::surface_program(const GpuMaterial& material) {
   if (in_smoke_) defines.push_back("SMOKE 1");
   if (material.pattern != Pattern::none) {
     defines.push_back("PATTERN " + std::to_string(static_cast<int>(material.pattern)));
-    fragment.push_back("pattern.glsl");
+    fragment.insert(fragment.end(), {"noise.glsl", "pattern.glsl"});
   }
   fragment.push_back("mesh.frag");
   const std::vector<std::string_view> vertex = {"frame.glsl", "mesh.vert"};

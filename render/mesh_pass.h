@@ -27,13 +27,14 @@ struct GpuMesh {
 
 /// The uniform block of shaders/material.glsl.
 struct MaterialUniforms {
-  Vector4f color, pattern_color, emission, surface;
+  Vector4f color, pattern_color, emission, surface, back, sheen;
 };
 
 struct GpuMaterial {
   gl::Buffer uniforms;
   std::array<gl::Texture, 3> textures;  ///< base colour, metallic and roughness, emission
   Pattern pattern = Pattern::none;
+  Weave weave = Weave::plain;
   bool textured = false;
   bool two_sided = false;
   bool blended = false;

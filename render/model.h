@@ -2,6 +2,7 @@
 /// Drawable data on the CPU: meshes, materials, and models that combine them. All colours are linear.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,8 +32,23 @@ struct Mesh {
 /// duplicated there).
 void compute_normals(Mesh& mesh, float crease_deg = 40);
 
-/// Procedural surface patterns, evaluated in object space so that they need no texture coordinates.
-enum class Pattern { none, checker, grid, noise, brick, wood, lawn, paving };
+/// Procedural surface patterns, evaluated in object space so that they need no texture coordinates; on cloths
+/// along the cloth.
+enum class Pattern { none, checker, grid, noise, brick, wood, lawn, paving, stripes, gingham };
+
+/// How the threads of a fabric cross; `none`: it has no threads, as leather and rubber.
+enum class Weave { none, plain, twill, satin };
+
+/// What the material of a cloth has besides.
+struct Fabric {
+  Weave weave = Weave::plain;
+  float thread = 0.001f;  ///< width of a thread [m], > 0
+  float relief = 0.5f;    ///< how strongly threads stand out, in [0, 1]
+  float sheen = 0.2f;     ///< light scattered by fibres that stand off, seen where it grazes, in [0, 1]
+  Vector3f sheen_color = {1, 1, 1};
+  float translucency = 0.15f;               ///< share of the diffuse light that goes through, in [0, 1]
+  std::optional<Vector3f> back_color = {};  ///< none: the front's
+};
 
 /// Metallic/roughness material.
 struct Material {
@@ -45,6 +61,7 @@ struct Material {
   Vector3f pattern_color = {0.4f, 0.4f, 0.4f};  ///< second colour of the pattern
   float pattern_scale = 1;                      ///< size of one cell [m], > 0
   bool two_sided = false;
+  Fabric fabric = {};           ///< of cloths alone
   int base_color_texture = -1;  ///< index into Model::textures, -1: none
   int metallic_roughness_texture = -1;
   int emission_texture = -1;

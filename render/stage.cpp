@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "render/cloth_pass.h"
 #include "render/frame.h"
 #include "render/gl.h"
 #include "render/lines_pass.h"
@@ -53,10 +54,12 @@ struct Stage::Impl {
   Slots<std::unique_ptr<Instance>, InstanceTag> instances{"instance"};
   Slots<std::unique_ptr<PointSet>, PointsTag> point_sets{"point set"};
   Slots<std::unique_ptr<LineSet>, LinesTag> line_sets{"line set"};
+  Slots<std::unique_ptr<Cloth>, ClothTag> cloths{"cloth"};
 
   Picture picture;
   ShadowMap shadow_map;
   MeshPass mesh_pass;
+  ClothPass cloth_pass;
   PointsPass points_pass;
   PuffsPass puffs_pass;
   StreaksPass streaks_pass;
@@ -82,9 +85,11 @@ struct Stage::Impl {
     glBindBufferBase(GL_UNIFORM_BUFFER, kFrameBlock, frame_buffer);
   }
   std::vector<PointSet*> prepare_points(const View& view);
-  void draw_shadows(std::span<const Instance* const> shown, std::span<PointSet* const> sets, const View& view,
-                    const SampleOffsets& offsets, FrameUniforms& frame);
-  void draw_opaque(std::span<PointSet* const> sets);
+  std::vector<const Cloth*> prepare_cloths();
+  void draw_shadows(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
+                    std::span<PointSet* const> sets, const View& view, const SampleOffsets& offsets,
+                    FrameUniforms& frame);
+  void draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets);
   void draw_blended(std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame);
   void draw_lines(const View& view);
 };
@@ -99,8 +104,19 @@ std::vector<PointSet*> Stage::Impl::prepare_points(const View& view) {
   return result;
 }
 
-void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span<PointSet* const> sets,
-                               const View& view, const SampleOffsets& offsets, FrameUniforms& frame) {
+std::vector<const Cloth*> Stage::Impl::prepare_cloths() {
+  std::vector<const Cloth*> result;
+  cloths.for_each([&](const std::unique_ptr<Cloth>& cloth) {
+    if (!cloth->is_seen()) return;
+    cloth_pass.prepare(*cloth);
+    result.push_back(cloth.get());
+  });
+  return result;
+}
+
+void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
+                               std::span<PointSet* const> sets, const View& view,
+                               const SampleOffsets& offsets, FrameUniforms& frame) {
   std::vector<Caster> casters;
   for (const Instance* instance : shown) {
     if (instance->visible && instance->casts_shadow && instance->mesh->index_count > 0 &&
@@ -108,11 +124,15 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
       casters.push_back(instance->ball());
     }
   }
+  const auto add_corners = [&casters](const Eigen::AlignedBox3f& box) {
+    for (int k = 0; k < 8; ++k)
+      casters.push_back({box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k)), 1e-3f});
+  };
+  for (const Cloth* cloth : sheets) {
+    if (cloth->casts_shadow) add_corners(cloth->surface.box());
+  }
   for (const PointSet* set : sets) {
-    if (!set->def.casts_shadow || set->is_splatted()) continue;
-    for (int k = 0; k < 8; ++k) {
-      casters.push_back({set->box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k)), 1e-3f});
-    }
+    if (set->def.casts_shadow && !set->is_splatted()) add_corners(set->box);
   }
   // Without a caster the map is empty, which is light everywhere.
   ShadowFrame shadow;
@@ -133,13 +153,16 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
 
   shadow_map.begin();
   mesh_pass.draw_shadows(shadow.clip_from_world);
+  for (const Cloth* cloth : sheets) {
+    if (cloth->casts_shadow) cloth_pass.draw_shadow(*cloth, shadow.clip_from_world);
+  }
   for (const PointSet* set : sets) {
     if (set->def.casts_shadow && !set->is_splatted()) points_pass.draw_shadow(*set, shadow.clip_from_world);
   }
   shadow_map.end();
 }
 
-void Stage::Impl::draw_opaque(std::span<PointSet* const> sets) {
+void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets) {
   glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
   glViewport(0, 0, def.width_px, def.height_px);
   glEnable(GL_DEPTH_TEST);
@@ -150,6 +173,7 @@ void Stage::Impl::draw_opaque(std::span<PointSet* const> sets) {
   glClearNamedFramebufferfv(picture.framebuffer, GL_COLOR, 0, nothing);
   glClearNamedFramebufferfv(picture.framebuffer, GL_DEPTH, 0, nothing);
 
+  for (const Cloth* cloth : sheets) cloth_pass.draw(*cloth, puffs_pass.shades());
   mesh_pass.draw_opaque();
   glDisable(GL_CULL_FACE);
   for (const PointSet* set : sets) {
@@ -230,6 +254,16 @@ LinesHandle Stage::add_lines(const LinesDef& def) {
   return impl_->line_sets.add(std::move(set));
 }
 
+ClothHandle Stage::add_cloth(const ClothDef& def, MaterialHandle material) {
+  auto cloth = std::make_unique<Cloth>();
+  cloth->material = impl_->materials[material].get();
+  cloth->thickness = def.thickness;
+  cloth->texture_from_uv = def.texture_size.cwiseInverse();
+  cloth->casts_shadow = def.casts_shadow;
+  cloth->surface.set_mesh(def.triangles, def.uvs);
+  return impl_->cloths.add(std::move(cloth));
+}
+
 void Stage::remove(InstanceHandle instance) {
   impl_->instances.remove(instance);
 }
@@ -238,6 +272,9 @@ void Stage::remove(PointsHandle points) {
 }
 void Stage::remove(LinesHandle lines) {
   impl_->line_sets.remove(lines);
+}
+void Stage::remove(ClothHandle cloth) {
+  impl_->cloths.remove(cloth);
 }
 
 void Stage::set_transform(InstanceHandle instance, const Eigen::Affine3f& world_from_mesh) {
@@ -251,6 +288,15 @@ void Stage::set_points(PointsHandle points, std::span<const Point> values) {
 }
 void Stage::set_lines(LinesHandle lines, std::span<const Line> values) {
   impl_->line_sets[lines]->assign(values);
+}
+
+void Stage::set_cloth(ClothHandle cloth, std::span<const Vector3f> positions) {
+  Cloth& c = *impl_->cloths[cloth];
+  c.surface.set_positions(positions, c.thickness);
+}
+void Stage::set_cloth_mesh(ClothHandle cloth, std::span<const uint32_t> triangles,
+                           std::span<const Vector2f> uvs) {
+  impl_->cloths[cloth]->surface.set_mesh(triangles, uvs);
 }
 
 void Stage::set_camera(const Camera& camera) {
@@ -277,8 +323,9 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   const std::vector<PointSet*> sets = s.prepare_points(view);
   s.puffs_pass.prepare(sets, s.sun, frame);
   s.mesh_pass.prepare(shown, view, s.puffs_pass.shades());
-  s.draw_shadows(shown, sets, view, offsets, frame);
-  s.draw_opaque(sets);
+  const std::vector<const Cloth*> sheets = s.prepare_cloths();
+  s.draw_shadows(shown, sheets, sets, view, offsets, frame);
+  s.draw_opaque(sheets, sets);
   s.draw_blended(sets, view, frame);
   s.draw_lines(view);
 

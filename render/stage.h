@@ -8,6 +8,7 @@
 
 #include <memory>
 #include <span>
+#include <vector>
 
 #include <Eigen/Geometry>
 
@@ -91,6 +92,15 @@ struct LinesDef {
   float hidden = 0;       ///< opacity of what opaque things hide, in [0, 1]
 };
 
+/// A thin sheet of triangles that bends: drawn smooth, from both sides, with the fabric of its material.
+struct ClothDef {
+  std::vector<uint32_t> triangles;  ///< three vertices each, counter-clockwise seen from the front
+  std::vector<Vector2f> uvs;        ///< place of each vertex along the cloth [m]
+  float thickness = 0.001f;         ///< [m], >= 0
+  Vector2f texture_size = {1, 1};   ///< of one copy of the material's texture on the cloth [m], > 0
+  bool casts_shadow = true;
+};
+
 /// Offsets of one sub-frame, each in [-0.5, 0.5] (pixel, lens and light squares; mapped to discs inside).
 struct SampleOffsets {
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
@@ -119,15 +129,24 @@ class Stage {
   InstanceHandle add_instance(MeshHandle mesh, MaterialHandle material, bool casts_shadow = true);
   PointsHandle add_points(const PointsDef& def);
   LinesHandle add_lines(const LinesDef& def);
+  /// Nothing is seen of it before set_cloth. Throws std::invalid_argument for triangles of vertices that have
+  /// no place.
+  ClothHandle add_cloth(const ClothDef& def, MaterialHandle material);
 
   void remove(InstanceHandle instance);
   void remove(PointsHandle points);
   void remove(LinesHandle lines);
+  void remove(ClothHandle cloth);
 
   void set_transform(InstanceHandle instance, const Eigen::Affine3f& world_from_mesh);
   void set_visible(InstanceHandle instance, bool visible);
   void set_points(PointsHandle points, std::span<const Point> values);
   void set_lines(LinesHandle lines, std::span<const Line> values);
+
+  /// Where the vertices of a cloth are in the world; throws std::invalid_argument if their number is wrong.
+  void set_cloth(ClothHandle cloth, std::span<const Vector3f> positions);
+  /// Gives a cloth other triangles, as after it tore. It is not seen again before set_cloth.
+  void set_cloth_mesh(ClothHandle cloth, std::span<const uint32_t> triangles, std::span<const Vector2f> uvs);
 
   void set_camera(const Camera& camera);
   void set_sun(const Sun& sun);

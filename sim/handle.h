@@ -73,6 +73,8 @@ class SlotMap {
 
   std::size_t size() const { return slots_.size() - free_.size(); }
   bool empty() const { return size() == 0; }
+  /// Above every index of a handle.
+  std::size_t slot_count() const { return slots_.size(); }
 
   /// Calls f(handle, object) for every live object in slot order.
   template <class F>

@@ -79,6 +79,12 @@ StateHash World::state_hash() const {
     hash.add(handle);
     hash.add(spring.rest_length);
   });
+  impl_->cloths.for_each([&](ClothHandle handle, const std::unique_ptr<Cloth>& cloth) {
+    hash.add(handle);
+    hash.add(cloth->version);
+    for (const auto* v : {&cloth->points, &cloth->velocities}) hash.add(*v);
+    hash.add(cloth->sources);
+  });
   return hash.digest();
 }
 

@@ -326,6 +326,7 @@ bool World::remove(BodyHandle body) {
   const auto* found = impl_->bodies.find(body);
   if (!found) return false;
   impl_->let_go(**found);
+  impl_->let_go_of_cloths(body);
   impl_->bodies.erase(body);
   impl_->nudges.erase(body.index);
   if (impl_->broad_phase.contains(body.index)) impl_->broad_phase.remove(body.index);
@@ -479,6 +480,13 @@ Energy World::energy() const {
     e.elastic += s.def.stiffness * stretch * stretch / 2;
   });
   e.potential += pair_energy(*impl_, impl_->now);
+  impl_->cloths.for_each([&](auto, const std::unique_ptr<Cloth>& cloth) {
+    for (std::size_t i = 0; i < cloth->points.size(); ++i) {
+      e.kinetic += cloth->masses[i] * cloth->velocities[i].squaredNorm() / 2;
+      e.potential -= cloth->masses[i] * g.dot(cloth->points[i]);
+    }
+    e.elastic += elastic_energy(*cloth);
+  });
   return e;
 }
 

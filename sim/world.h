@@ -14,6 +14,7 @@
 #include <variant>
 #include <vector>
 
+#include "sim/cloth/cloth.h"
 #include "sim/contact/collision.h"
 #include "sim/dynamics/force_field.h"
 #include "sim/dynamics/integrator.h"
@@ -119,8 +120,8 @@ struct WorldDef {
 /// Something that stopped being finite: what it was just before, and what became of it. Bodies: centre of
 /// mass; the velocity before is not kept.
 struct NonFinite {
-  std::string object;     ///< name of the body or the particle system
-  uint64_t particle = 0;  ///< its id, in a system
+  std::string object;     ///< name of the body, the particle system or the cloth
+  uint64_t particle = 0;  ///< its id, in a system; the point of a cloth
   Vec3 position_before = Vec3::Zero(), velocity_before = Vec3::Zero();
   Vec3 position = Vec3::Zero(), velocity = Vec3::Zero();
 };
@@ -148,6 +149,13 @@ struct StepReport {
   ContactWork exact, fast;       ///< of the solvers of resting contact
   ContactWork impacts;           ///< of the solver of collisions
   IntegratorReport integration;  ///< of the free motion
+
+  uint64_t cloth_contacts = 0;  ///< at the end, of all cloths; the others as ClothReport has them
+  uint64_t cloth_self_contacts = 0;
+  Real cloth_strain = 0;       ///< greatest
+  Real cloth_penetration = 0;  ///< deepest [m]
+  uint64_t cloth_moves_limited = 0, cloth_moves_held_back = 0, cloth_crossings = 0, cloth_springs_torn = 0;
+  uint64_t cloth_unconverged = 0;
 
   bool finite = true;    ///< false: something became NaN or infinite
   NonFinite non_finite;  ///< the first such object, if not finite
@@ -213,6 +221,7 @@ class World {
   BodyHandle add_body(const BodyDef& def);
   ParticleSystemHandle add_particle_system(const ParticleSystemDef& def);
   SpringHandle add_spring(const SpringDef& def);
+  ClothHandle add_cloth(const ClothDef& def);
   ForceHandle add_force(const ForceDef& def);
   /// Of two rules for the same materials the later counts.
   void add_contact_rule(const ContactRule& rule);
@@ -220,6 +229,7 @@ class World {
   bool remove(BodyHandle body);  ///< springs attached to it go too; false if the handle is stale
   bool remove(ParticleSystemHandle system);
   bool remove(SpringHandle spring);
+  bool remove(ClothHandle cloth);
   bool remove(ForceHandle force);
 
   /// Gives a dynamic body another velocity of its centre of mass [m/s] and angular velocity [rad/s].
@@ -251,6 +261,11 @@ class World {
   /// What happened to the particles of systems that report it, in the last sub-step; in the order of system
   /// and id, of one particle in the order of time.
   std::span<const ParticleEvent> particle_events() const;
+  ClothView cloth(ClothHandle cloth) const;
+  const ClothDef& cloth_def(ClothHandle cloth) const;
+  const ClothReport& cloth_report(ClothHandle cloth) const;  ///< of the last step
+  void for_each_cloth(const std::function<void(ClothHandle)>& f) const;
+  std::size_t cloth_count() const;
   void for_each_body(const std::function<void(BodyHandle)>& f) const;
   void for_each_particle_system(const std::function<void(ParticleSystemHandle)>& f) const;
   /// The contact points at the end of the last step, in the order of their bodies.

@@ -9,6 +9,7 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include "sim/body.h"
+#include "sim/cloth/cloth_system.h"
 #include "sim/collision/broad_phase.h"
 #include "sim/collision/obstacles.h"
 #include "sim/contact/contact_solve.h"
@@ -34,6 +35,7 @@ struct WorldState {
   SlotMap<ParticleSystem, ParticleSystemTag> systems;
   SlotMap<Spring, SpringTag> springs;
   SlotMap<ForceDef, ForceTag> force_defs;
+  SlotMap<std::unique_ptr<Cloth>, ClothTag> cloths;
 
   /// What acts on each particle of a system alone.
   ParticleForces forces(const ParticleSystem& system) const;
@@ -112,6 +114,14 @@ struct World::Impl : WorldState {
   void add_events(std::vector<ParticleEvent>& events);
   void push_bodies(std::span<const Reaction> reactions);
 
+  // Cloths (world_cloth.cpp)
+  void arrange_cloths();
+  void begin_cloths();
+  std::vector<ClothBody> bodies_near_cloths(Real h) const;
+  void step_cloths(Real start, Real h);
+  void report_cloths(StepReport& report);
+  void let_go_of_cloths(BodyHandle body);
+
   // Time is a base plus a whole number of equal samplings: no sum of rounded steps.
   Real base_time = 0, sampling_time = 0;
   uint64_t samplings = 0, substeps = 0;
@@ -147,7 +157,8 @@ struct World::Impl : WorldState {
   bool fixed_changed = true;
   ParticleCollisions particle_collisions;
   std::vector<ParticleEvent> particle_events;  // of the last sub-step
-  std::map<uint32_t, Reaction> nudges;         // too weak to wake the body, by its slot; they add up
+  ClothSystem cloth_system;
+  std::map<uint32_t, Reaction> nudges;  // too weak to wake the body, by its slot; they add up
 };
 
 }  // namespace offstage::sim

@@ -45,6 +45,7 @@ StepReport World::Impl::step(Real sampling, const BeforeSubStep& before) {
   stepped.assign(awake.begin(), awake.end());
   stepped.insert(stepped.end(), kinematic.begin(), kinematic.end());
   for (Body* body : stepped) body->before_step = body->pose;
+  begin_cloths();
   report.substeps = substep_count(sampling, def.max_step);
   for (uint32_t i = 0; i < report.substeps; ++i) {
     const Real start = now, end = at(static_cast<Real>(i + 1) / report.substeps);
@@ -54,6 +55,7 @@ StepReport World::Impl::step(Real sampling, const BeforeSubStep& before) {
   }
   ++samplings;
   report.particles_born = std::exchange(born, 0);
+  report_cloths(report);
   collect_moved();
   return report;
 }
@@ -70,7 +72,8 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
     islands.clear();
     active_pairs.clear();
     pairs_changed = true;
-    return count_contacts(report);
+    count_contacts(report);
+    return step_cloths(start, h);
   }
   // Few bodies are not worth waking threads for, and waiting for them on a busy machine.
   const auto bodies_move = [&] { move_bodies(start, h, report); };
@@ -84,6 +87,7 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
     update_obstacles(h);
     step_particles(start, h, *motions.front(), report);
   }
+  step_cloths(start, h);
 }
 
 /// All that bodies do in a sub-step.
@@ -193,8 +197,8 @@ void World::Impl::update_obstacles(Real h) {
   bodies.for_each([&](BodyHandle handle, const std::unique_ptr<Body>& body) {
     if (!body->def.collides) return;
     const auto add = [&](std::vector<Obstacle>& obstacles, const Pose& from) {
-      Obstacle& o = obstacles.emplace_back(body->solid, from, body->pose, h, body->def.restitution,
-                                           body->def.friction);
+      Obstacle& o =
+          obstacles.emplace_back(body->solid, from, body->pose, h, body->def.restitution, body->def.friction);
       o.body = handle.index;
       if (!body->is_dynamic()) return;
       const RigidBody& rigid = body->rigid;

@@ -260,7 +260,8 @@ int dispatch(int argc, char** argv) {
                            "CSV of position, orientation and velocities of what moves");
   simulate_app->add_option("--contacts", simulate.contacts,
                            "CSV of the points where bodies touch, with the forces there");
-  simulate_app->add_option("--trace-every", simulate.trace_every, "frame or step, of both")
+  simulate_app->add_option("--cloths", simulate.cloths, "CSV of strain and contacts of cloths");
+  simulate_app->add_option("--trace-every", simulate.trace_every, "frame or step, of all three")
       ->check(CLI::IsMember({"frame", "step"}));
   simulate_app->add_option("--cache", simulate.cache,
                            "Folder for one snapshot per frame, for `render --cache`");
@@ -280,8 +281,9 @@ int dispatch(int argc, char** argv) {
   schema_app->add_flag("--reference", reference, "Print the reference in Markdown instead");
 
   std::string preset;
-  auto* presets_app = app.add_subcommand("presets", "List the effects that scenes can name, or print one");
-  presets_app->add_option("name", preset, "Preset to print");
+  auto* presets_app =
+      app.add_subcommand("presets", "List the effects and fabrics that scenes can name, or print one");
+  presets_app->add_option("name", preset, "Preset or fabric to print");
 
   SceneOptions info;
   bool info_json = false;

@@ -95,6 +95,7 @@ Json describe_scene(const LoadedScene& loaded, const DecompositionCache& cache) 
           {"particles", placed},
           {"emitters", scene.emitters.size()},
           {"springs", scene.springs.size()},
+          {"cloths", scene.cloths.size()},
           {"materials", scene.materials.size()},
           {"frames", scene.frame_count()},
           {"fps", scene.output.fps},

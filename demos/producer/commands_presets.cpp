@@ -3,7 +3,9 @@
 #include <algorithm>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
+#include "effects/fabric.h"
 #include "producer/command_line.h"
 #include "producer/commands.h"
 #include "producer/presets.h"
@@ -11,6 +13,23 @@
 namespace offstage::producer {
 
 int presets_command(const std::string& name) {
+  if (const effects::FabricPreset* preset = effects::find_fabric(name)) {
+    const effects::Fabric& f = preset->fabric;
+    const nlohmann::ordered_json figures = {{"areal_density", f.areal_density},
+                                            {"stretch", f.stretch},
+                                            {"shear", f.shear},
+                                            {"bend", f.bend},
+                                            {"damping", f.damping},
+                                            {"friction", f.friction},
+                                            {"self_friction", f.self_friction},
+                                            {"thickness", f.thickness},
+                                            {"drag", f.drag},
+                                            {"lift", f.lift},
+                                            {"max_stretch", f.max_stretch},
+                                            {"max_shear", f.max_shear}};
+    fmt::print("{}\n", figures.dump(2));
+    return kOk;
+  }
   if (!name.empty()) {
     fmt::print("{}", read_text(preset_file(name)));
     return kOk;
@@ -20,6 +39,9 @@ int presets_command(const std::string& name) {
   for (const std::string& preset : names) width = std::max(width, preset.size());
   for (const std::string& preset : names)
     fmt::print("{:{}}  {}\n", preset, width, preset_description(preset));
+  fmt::print("\nFabrics, for the key \"fabric\" of cloths:\n");
+  for (const effects::FabricPreset& fabric : effects::fabric_presets())
+    fmt::print("{:{}}  {}\n", fabric.name, width, fabric.help);
   return kOk;
 }
 

@@ -304,15 +304,20 @@ int simulate_command(const SimulateOptions& options) {
   check_distinct(options.stats, options.trace);
   check_distinct(options.stats, options.contacts);
   check_distinct(options.trace, options.contacts);
+  check_file(options.cloths, options.force);
+  for (const std::string& other : {options.stats, options.trace, options.contacts})
+    check_distinct(other, options.cloths);
   const auto threads = simulation_threads(options.threads);
   SimulateJob job{.cache = {},
                   .force = options.force,
                   .trace = {},
                   .contacts = {},
+                  .cloths = {},
                   .trace_every_step = options.trace_every == "step"};
   if (!options.cache.empty()) job.cache = options.cache;
   if (!options.trace.empty()) job.trace = options.trace;
   if (!options.contacts.empty()) job.contacts = options.contacts;
+  if (!options.cloths.empty()) job.cloths = options.cloths;
   ProgressPrinter printer(options.talk.quiet ? ProgressStyle::none : options.talk.progress);
   const RunStats stats = simulate_frames(loaded, models, job, std::ref(printer));
   printer.finish();

@@ -205,6 +205,11 @@ template <class T>
 struct Fields : std::vector<Field<T>> {
   Fields(std::initializer_list<Field<T>> own) : std::vector<Field<T>>(own) {}
 
+  /// Adds more keys of its own.
+  Fields then(std::initializer_list<Field<T>> more) && {
+    this->insert(this->end(), more);
+    return std::move(*this);
+  }
   /// Adds the keys of a member, or of a base, that stand directly in T.
   template <class Part>
   Fields with(Part T::*part) && {

@@ -71,7 +71,8 @@ sim::ForceDef force_def(const Force& force) {
 ForceTargets targets_of(const Force& force) {
   return std::visit(
       []<class F>(const F& f) {
-        ForceTargets targets{{}, f.particles};
+        ForceTargets targets{{}, f.particles, {}};
+        if constexpr (requires { f.cloths; }) targets.cloths = f.cloths;
         if constexpr (requires { f.bodies; }) targets.bodies = f.bodies;
         if constexpr (requires { f.body; })
           if (!f.body.empty()) targets.bodies.push_back(f.body);

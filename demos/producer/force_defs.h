@@ -14,7 +14,7 @@ sim::ForceDef force_def(const Force& force);
 
 /// Names of what a force acts on.
 struct ForceTargets {
-  std::vector<std::string> bodies, particles;
+  std::vector<std::string> bodies, particles, cloths;
 };
 ForceTargets targets_of(const Force& force);
 

@@ -60,6 +60,8 @@ Files files_of(const Scene& scene) {
     if (const auto* mesh = std::get_if<MeshFile>(&body.shape)) files.models.emplace(mesh->file, body.where);
     if (body.model) files.models.emplace(body.model->file, body.where);
   }
+  for (const Cloth& cloth : scene.cloths)
+    if (const auto* mesh = std::get_if<MeshFile>(&cloth.shape)) files.models.emplace(mesh->file, cloth.where);
   for (const Emitter& emitter : scene.emitters)
     if (const auto* mesh = std::get_if<MeshSurface>(&emitter.surface))
       files.models.emplace(mesh->file, emitter.where);

@@ -130,6 +130,7 @@ struct Overlays::Builder {
   const Scene& scene;
   const sim::World& world;
   const BodiesByName& bodies;
+  const ClothsByName& cloths;
   Overlays& out;
 
   Source operator()(const TreeOverlay& overlay) const {
@@ -184,6 +185,12 @@ struct Overlays::Builder {
     }
     return islands;
   }
+  Source operator()(const ClothOverlay& overlay) const {
+    ClothLines lines{&overlay, {}};
+    for (const Cloth& cloth : scene.cloths)
+      if (overlay.cloth.empty() || cloth.name == overlay.cloth) lines.cloths.push_back(cloths.at(cloth.name));
+    return lines;
+  }
 
  private:
   bool is_dynamic(sim::BodyHandle body) const {
@@ -226,8 +233,9 @@ struct Overlays::Builder {
   }
 };
 
-Overlays::Overlays(const Scene& scene, const sim::World& world, const BodiesByName& bodies) {
-  const Builder builder{scene, world, bodies, *this};
+Overlays::Overlays(const Scene& scene, const sim::World& world, const BodiesByName& bodies,
+                   const ClothsByName& cloths) {
+  const Builder builder{scene, world, bodies, cloths, *this};
   for (const Overlay& overlay : scene.overlays) sources_.push_back(std::visit(builder, overlay));
 }
 
@@ -334,6 +342,29 @@ LineSet Overlays::draw(const IslandLines& islands, const sim::World& world) {
     sketch.object(body.index);
     for (const auto& [a, b] : edges)
       sketch.line(pose.point_to_world(a), pose.point_to_world(b), light(color));
+  }
+  return sketch.take();
+}
+
+LineSet Overlays::draw(const ClothLines& cloths, const sim::World& world) {
+  LineSketch sketch;
+  for (const sim::ClothHandle handle : cloths.cloths) {
+    const sim::ClothView cloth = world.cloth(handle);
+    const sim::ClothDef& def = world.cloth_def(handle);
+    const std::vector<Vec3>& rest = def.rest_vertices.empty() ? def.vertices : def.rest_vertices;
+    for (uint32_t t = 0; t < cloth.triangles.size(); ++t) {
+      for (uint32_t k = 0; k < 3; ++k) {
+        const uint32_t a = cloth.triangles[t][k], b = cloth.triangles[t][(k + 1) % 3];
+        if (a > b) continue;  // of the two triangles at an edge one draws it
+        const Real length = (rest[cloth.sources[a]] - rest[cloth.sources[b]]).norm();
+        const Real strain = (cloth.points[a] - cloth.points[b]).norm() / length - 1;
+        const Real share = std::clamp(strain / cloths.overlay->strain, 0.0, 1.0);
+        Vector4f color;
+        color << hue_color(0.7 * (1 - share) + 0.06), 1;
+        sketch.object((uint64_t{handle.index} << 48) + 3 * t + k);
+        sketch.line(cloth.points[a], cloth.points[b], light(color));
+      }
+    }
   }
   return sketch.take();
 }

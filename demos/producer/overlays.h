@@ -1,6 +1,6 @@
 #pragma once
 /// The simulation side of overlays: bounding trees, closest points, contacts, velocities and groups of
-/// bodies, as lines in the world. They look at the world and never change it.
+/// bodies, and the strain of cloths, as lines in the world. They look at the world and never change it.
 
 #include <map>
 #include <optional>
@@ -19,9 +19,11 @@ namespace offstage::producer {
 class Overlays {
  public:
   using BodiesByName = std::map<std::string, sim::BodyHandle>;
+  using ClothsByName = std::map<std::string, sim::ClothHandle>;
 
   /// The scene must outlive the overlays.
-  Overlays(const Scene& scene, const sim::World& world, const BodiesByName& bodies);
+  Overlays(const Scene& scene, const sim::World& world, const BodiesByName& bodies,
+           const ClothsByName& cloths);
 
   /// What each overlay shows of the world as it is now, in scene order; nothing for the parts of bodies,
   /// which are no lines.
@@ -70,8 +72,13 @@ class Overlays {
     const IslandsOverlay* overlay;
     std::vector<Boxed> bodies;
   };
+  struct ClothLines {
+    const ClothOverlay* overlay;
+    std::vector<sim::ClothHandle> cloths;
+  };
   struct NoLines {};
-  using Source = std::variant<NoLines, TreeLines, ClosestLines, ContactLines, VelocityLines, IslandLines>;
+  using Source =
+      std::variant<NoLines, TreeLines, ClosestLines, ContactLines, VelocityLines, IslandLines, ClothLines>;
 
   struct Builder;
 
@@ -81,6 +88,7 @@ class Overlays {
   static LineSet draw(const ContactLines& contacts, const sim::World& world);
   static LineSet draw(const VelocityLines& velocities, const sim::World& world);
   static LineSet draw(const IslandLines& islands, const sim::World& world);
+  static LineSet draw(const ClothLines& cloths, const sim::World& world);
 
   std::map<std::string, Collider> colliders_;  // by body
   std::vector<Source> sources_;

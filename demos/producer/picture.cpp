@@ -5,6 +5,7 @@
 #include <numbers>
 #include <unordered_map>
 
+#include "producer/cloth_defs.h"
 #include "producer/line_sketch.h"
 #include "producer/particle_sources.h"
 #include "render/bloom.h"
@@ -89,6 +90,22 @@ Vector3f interpolate(const render::Point& a, const render::Point& b, float w, fl
          dt * ((w3 - 2 * w2 + w) * a.velocity + (w3 - w2) * b.velocity);
 }
 
+/// A point of a cloth between two states, by the cubic through both. Where a blow came between, the
+/// velocities at both ends say little about the way: what they are off the mean one counts up to half of
+/// that.
+Vector3f interpolate(const Vector3f& a, const Vector3f& va, const Vector3f& b, const Vector3f& vb, float w,
+                     float dt) {
+  const Vector3f step = b - a;
+  const float most = 0.5f * step.norm();
+  const auto limited = [&](const Vector3f& v) -> Vector3f {
+    const Vector3f off = dt * v - step;
+    const float length = off.norm();
+    return length > most ? Vector3f(off * (most / length)) : off;
+  };
+  const float rest = 1 - w;
+  return a + w * step + w * rest * (rest * limited(va) - w * limited(vb));
+}
+
 /// The parts overlay of a body, or null.
 const PartsOverlay* parts_overlay(const Scene& scene, const std::string& body) {
   for (const Overlay& overlay : scene.overlays)
@@ -128,6 +145,7 @@ Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context
                                 material(spring.material, models));
     springs_.push_back(rod);
   }
+  for (const Cloth& cloth : scene.cloths) add_cloth(cloth, models);
   for (const ParticleLook* look : looks_of(scene)) {
     points_.push_back(stage_.add_points(points_def(*look)));
     styles_.push_back(points_def(*look).style);
@@ -136,10 +154,9 @@ Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context
   add_light_and_air();
 }
 
-render::MaterialHandle Picture::material(const std::string& name, const ModelLibrary& models) {
-  if (const auto it = materials_.find(name); it != materials_.end()) return it->second;
+render::Material Picture::material_named(const std::string& name, const ModelLibrary& models,
+                                         std::vector<render::Image>& textures) const {
   render::Material m;
-  std::vector<render::Image> textures;
   const auto it = std::ranges::find(scene_.materials, name, &Material::name);
   if (it != scene_.materials.end()) {
     m = {.name = it->name,
@@ -156,7 +173,57 @@ render::MaterialHandle Picture::material(const std::string& name, const ModelLib
       m.base_color_texture = 0;
     }
   }
+  return m;
+}
+
+render::MaterialHandle Picture::material(const std::string& name, const ModelLibrary& models) {
+  if (const auto it = materials_.find(name); it != materials_.end()) return it->second;
+  std::vector<render::Image> textures;
+  const render::Material m = material_named(name, models, textures);
   return materials_[name] = stage_.add_material(m, textures);
+}
+
+render::MaterialHandle Picture::cloth_material(const Cloth& cloth, const ModelLibrary& models) {
+  render::MaterialHandle& known = fabrics_[cloth.fabric + "/" + cloth.material];
+  if (known) return known;
+  render::Material m = fabric_look(cloth.fabric);
+  std::vector<render::Image> textures;
+  if (const auto it = std::ranges::find(scene_.materials, cloth.material, &Material::name);
+      it != scene_.materials.end()) {
+    render::Fabric fabric = m.fabric;
+    fabric.back_color.reset();  // that of another front
+    if (const std::optional<FabricLook>& look = it->fabric) {
+      fabric = {.weave = look->weave,
+                .thread = f(look->thread),
+                .relief = f(look->relief),
+                .sheen = f(look->sheen),
+                .sheen_color = look->sheen_color.rgb(),
+                .translucency = f(look->translucency)};
+      if (look->back_color) fabric.back_color = look->back_color->rgb();
+    }
+    m = material_named(cloth.material, models, textures);
+    m.fabric = fabric;
+  }
+  return known = stage_.add_material(m, textures);
+}
+
+void Picture::add_cloth(const Cloth& cloth, const ModelLibrary& models) {
+  DrawnCloth drawn;
+  if (cloth.visible) {
+    const auto* mesh = std::get_if<MeshFile>(&cloth.shape);
+    FlatCloth flat = flat_cloth(cloth, mesh ? &models.model(mesh->file) : nullptr);
+    drawn.triangles = flat.triangles();
+    drawn.uvs = std::move(flat.uvs);
+    Eigen::AlignedBox2f box;
+    for (const Eigen::Vector2f& uv : drawn.uvs) box.extend(uv);
+    drawn.cloth = stage_.add_cloth({.triangles = drawn.triangles,
+                                    .uvs = drawn.uvs,
+                                    .thickness = f(flat.def.thickness),
+                                    .texture_size = box.sizes().cwiseMax(1e-6f),
+                                    .casts_shadow = cloth.casts_shadow},
+                                   cloth_material(cloth, models));
+  }
+  cloths_.push_back(std::move(drawn));
 }
 
 void Picture::add_model(const std::string& file, const Affine3f& body_from_model, const Body& body,
@@ -341,6 +408,31 @@ void Picture::place_points(const Snapshot& previous, const Snapshot& current, fl
   }
 }
 
+void Picture::give_mesh(DrawnCloth& drawn, const ClothSample& sample) {
+  if (drawn.version == sample.version) return;
+  drawn.version = sample.version;
+  if (sample.version == 0) return stage_.set_cloth_mesh(drawn.cloth, drawn.triangles, drawn.uvs);
+  std::vector<Eigen::Vector2f> uvs;
+  for (const uint32_t source : sample.sources) uvs.push_back(drawn.uvs[source]);
+  stage_.set_cloth_mesh(drawn.cloth, sample.triangles, uvs);
+}
+
+void Picture::place_cloths(const Snapshot& previous, const Snapshot& current, float w, double frame_time) {
+  const auto dt = static_cast<float>(frame_time);
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    if (!cloths_[c].cloth) continue;
+    const ClothSample &before = previous.cloths[c], &now = current.cloths[c];
+    give_mesh(cloths_[c], now);
+    scratch_places_ = now.points;
+    for (std::size_t i = 0; w < 1 && i < now.points.size(); ++i)
+      scratch_places_[i] =
+          i < before.points.size()
+              ? interpolate(before.points[i], before.velocities[i], now.points[i], now.velocities[i], w, dt)
+              : Vector3f(now.points[i] - (1 - w) * dt * now.velocities[i]);
+    stage_.set_cloth(cloths_[c].cloth, scratch_places_);
+  }
+}
+
 void Picture::place_overlays(const Snapshot& previous, const Snapshot& current, float w) {
   for (std::size_t i = 0; i < overlays_.size(); ++i) {
     if (!overlays_[i]) continue;
@@ -379,6 +471,7 @@ void Picture::place(const Snapshot& previous, const Snapshot& current, float w, 
     place_body(body, body.slot ? affine(samples[*body.slot]) : body.world_from_body, time);
   place_springs(previous, current, w);
   place_points(previous, current, w, frame_time);
+  place_cloths(previous, current, w, frame_time);
   place_overlays(previous, current, w);
   stage_.set_camera(camera_at(time, samples));
 }

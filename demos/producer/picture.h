@@ -1,7 +1,7 @@
 #pragma once
 /// The drawing side of a scene: builds a stage and turns pairs of snapshots into finished frames. Between the
-/// two states of a pair it interpolates (slerp for bodies, cubic for particles), so that sub-frames at
-/// different times give motion blur.
+/// two states of a pair it interpolates (slerp for bodies, cubic for particles and cloths), so that
+/// sub-frames at different times give motion blur.
 
 #include <map>
 #include <optional>
@@ -40,6 +40,16 @@ class Picture {
     std::vector<DrawnPart> parts;
   };
 
+  /// A cloth, its places along the flat one, and which triangles the stage has of it.
+  struct DrawnCloth {
+    render::ClothHandle cloth;  // null where invisible
+    std::vector<uint32_t> triangles;
+    std::vector<Eigen::Vector2f> uvs;
+    uint32_t version = 0;
+  };
+
+  render::Material material_named(const std::string& name, const ModelLibrary& models,
+                                  std::vector<render::Image>& textures) const;
   render::MaterialHandle material(const std::string& name, const ModelLibrary& models);
   void add_body(const Body& body, const ModelLibrary& models, std::size_t& slot);
   void add_model(const std::string& file, const Eigen::Affine3f& body_from_model, const Body& body,
@@ -49,6 +59,8 @@ class Picture {
                         std::vector<DrawnPart>& parts);
   template <class Primitive>
   render::MeshHandle primitive(const Primitive& shape);
+  void add_cloth(const Cloth& cloth, const ModelLibrary& models);
+  render::MaterialHandle cloth_material(const Cloth& cloth, const ModelLibrary& models);
   void add_overlay_lines();
   void add_light_and_air();
 
@@ -56,6 +68,8 @@ class Picture {
   void place_body(const DrawnBody& body, const Eigen::Affine3f& world_from_body, double time);
   void place_springs(const Snapshot& previous, const Snapshot& current, float w);
   void place_points(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
+  void place_cloths(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
+  void give_mesh(DrawnCloth& drawn, const ClothSample& sample);
   void place_overlays(const Snapshot& previous, const Snapshot& current, float w);
   render::Camera camera_at(double time, const std::vector<BodySample>& bodies) const;
 
@@ -70,9 +84,12 @@ class Picture {
   std::vector<DrawnBody> bodies_;
   std::vector<render::InstanceHandle> springs_;  // null where invisible
   std::vector<render::PointsHandle> points_;
-  std::vector<render::PointStyle> styles_;     // of the same
+  std::vector<render::PointStyle> styles_;                 // of the same
+  std::map<std::string, render::MaterialHandle> fabrics_;  // by fabric and material
+  std::vector<DrawnCloth> cloths_;
   std::vector<render::LinesHandle> overlays_;  // null for those without lines
   std::vector<render::Point> scratch_;
+  std::vector<Eigen::Vector3f> scratch_places_;
   std::vector<render::Line> scratch_lines_;
   render::HdrImage sum_;
 };

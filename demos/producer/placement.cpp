@@ -164,6 +164,22 @@ Emitter moved(Emitter emitter, const PlacedCopy& copy) {
   return emitter;
 }
 
+Cloth moved(Cloth cloth, const PlacedCopy& copy) {
+  cloth.name += copy.suffix;
+  cloth.placement = {};
+  cloth.position = copy.motion.point_to_world(cloth.position);
+  cloth.orientation = copy.motion.orientation * cloth.orientation;
+  cloth.velocity = copy.motion.vector_to_world(cloth.velocity);
+  if (auto* grid = std::get_if<GridShape>(&cloth.shape))
+    grid->size *= copy.scale;
+  else
+    std::get<MeshFile>(cloth.shape).scale *= copy.scale;
+  return cloth;
+}
+
+const Vec3& position_of(const Cloth& cloth) {
+  return cloth.position;
+}
 const Vec3& position_of(const Body& body) {
   return body.position;
 }
@@ -260,11 +276,13 @@ Scene expand(const Scene& scene, std::vector<Problem>& errors, std::vector<Probl
   Scene flat = scene;
   flat.bodies = expand_all(scene.bodies, scene.world.seed, errors, warnings);
   flat.emitters = expand_all(scene.emitters, scene.world.seed, errors, warnings);
+  flat.cloths = expand_all(scene.cloths, scene.world.seed, errors, warnings);
   for (Force& force : flat.forces)
     std::visit(
         [&](auto& f) {
           if constexpr (requires { f.bodies; }) name_copies(scene.bodies, flat.bodies, f.bodies);
           name_copies(scene.emitters, flat.emitters, f.particles);
+          if constexpr (requires { f.cloths; }) name_copies(scene.cloths, flat.cloths, f.cloths);
         },
         force);
   return flat;

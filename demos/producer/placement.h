@@ -1,5 +1,5 @@
 #pragma once
-/// Copies of bodies and emitters in rows, rings, grids and at random places.
+/// Copies of bodies, cloths and emitters in rows, rings, grids and at random places.
 ///
 /// The three kinds multiply: a repeat of a grid of a scatter. The same scene gives the same copies, bit for
 /// bit.
@@ -36,9 +36,9 @@ int copy_count(const Placement& placement);
 /// asked for.
 Copies expand(const Placement& placement, const Vec3& position, uint64_t seed, std::string_view name);
 
-/// Replaces each body and emitter that has a placement by its copies, also in the lists of what forces act
-/// on. Adds to `errors` those with too many copies, which stay as they are, and to `warnings` those of which
-/// some found no place.
+/// Replaces each body, cloth and emitter that has a placement by its copies, also in the lists of what forces
+/// act on. Adds to `errors` those with too many copies, which stay as they are, and to `warnings` those of
+/// which some found no place.
 Scene expand(const Scene& scene, std::vector<Problem>& errors, std::vector<Problem>& warnings);
 
 }  // namespace offstage::producer

@@ -192,11 +192,14 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
   if (job.cache) cache.emplace(*job.cache).create(key, total, job.force);
   std::optional<Trace> trace;
   std::optional<ContactTrace> contacts;
+  std::optional<ClothTrace> cloths;
   if (job.trace) trace.emplace(*job.trace, simulation);
   if (job.contacts) contacts.emplace(*job.contacts, simulation);
+  if (job.cloths) cloths.emplace(*job.cloths, simulation);
   const auto record = [&](double time) {
     if (trace) trace->record(time);
     if (contacts) contacts->record(time);
+    if (cloths) cloths->record(time);
   };
   if (job.trace_every_step) simulation.on_substep(record);
   stats.bodies = simulation.body_count();
@@ -226,6 +229,7 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
   if (cache && stats.frames == total) cache->finish(key, total);
   if (trace && stats.frames == total) trace->close();
   if (contacts && stats.frames == total) contacts->close();
+  if (cloths && stats.frames == total) cloths->close();
   stats.totals = simulation.totals();
   stats.energy_end = simulation.world().energy();
   stats.state_hash = simulation.world().state_hash().hex();
@@ -280,6 +284,18 @@ void add_contact_figures(const SimulationTotals& t, Json& json) {
   json["integration"] = json_of(t.integration);
 }
 
+Json cloth_figures(const SimulationTotals& t) {
+  return {{"strain", t.cloth_strain},
+          {"penetration", t.cloth_penetration},
+          {"contacts", t.cloth_contacts},
+          {"self_contacts", t.cloth_self_contacts},
+          {"moves_limited", t.cloth_moves_limited},
+          {"moves_held_back", t.cloth_moves_held_back},
+          {"crossings", t.cloth_crossings},
+          {"springs_torn", t.cloth_springs_torn},
+          {"unconverged", t.cloth_unconverged}};
+}
+
 }  // namespace
 
 std::string to_json(const RunStats& stats) {
@@ -310,6 +326,7 @@ std::string to_json(const RunStats& stats) {
   json["emitter_waits"] = t.waiting;
   json["emitter_skips"] = t.skipped;
   add_contact_figures(t, json);
+  json["cloth"] = cloth_figures(t);
   for (const auto& [name, energy] :
        {std::pair("energy_start", &stats.energy_start), std::pair("energy_end", &stats.energy_end)})
     if (*energy)

@@ -13,6 +13,7 @@
 #include <Eigen/Core>
 
 #include "producer/error.h"
+#include "producer/scene_cloth.h"
 #include "producer/scene_effects.h"
 #include "producer/scene_forces.h"
 #include "producer/scene_particles.h"
@@ -43,6 +44,17 @@ struct WorldSettings {
   uint64_t seed = 1;
 };
 
+/// What the look of a cloth has besides.
+struct FabricLook {
+  render::Weave weave = render::Weave::plain;
+  Real thread = 0.001;
+  Real relief = 0.5;
+  Real sheen = 0.2;
+  Color sheen_color;
+  Real translucency = 0.15;
+  std::optional<Color> back_color;  ///< default: the front's
+};
+
 /// Look and contact behaviour in one.
 struct Material {
   Where where;
@@ -57,6 +69,7 @@ struct Material {
   Real pattern_scale = 1;
   std::string texture;  ///< image file
   bool two_sided = false;
+  std::optional<FabricLook> fabric;  ///< of cloths; default: that of what the cloth is made of
   Real restitution = 0.5;
   Real friction = 0.5;                  ///< of what slides
   std::optional<Real> static_friction;  ///< of what does not; default: `friction`
@@ -70,11 +83,6 @@ struct ContactRule {
   std::optional<Real> restitution, friction, static_friction;
 };
 
-/// A model file as a shape: its triangles collide and give the mass.
-struct MeshFile {
-  std::string file;
-  Real scale = 1;
-};
 using Shape =
     std::variant<sim::Sphere, sim::Box, sim::Capsule, sim::Cylinder, sim::Cone, sim::Plane, MeshFile>;
 
@@ -191,9 +199,15 @@ struct IslandsOverlay : LineLook {
   Where where;
   Real asleep = 0.25;  ///< brightness of bodies that are asleep
 };
+/// The threads of cloths, in colours of their strain: blue at rest, red where they are stretched.
+struct ClothOverlay : LineLook {
+  Where where;
+  std::string cloth;   ///< empty: all
+  Real strain = 0.05;  ///< at which a thread is red
+};
 /// What is drawn over the picture to show how the simulation sees it.
 using Overlay = std::variant<TreeOverlay, PartsOverlay, ClosestOverlay, ContactsOverlay, VelocitiesOverlay,
-                             IslandsOverlay>;
+                             IslandsOverlay, ClothOverlay>;
 
 /// What all cameras have.
 struct Lens {
@@ -280,6 +294,7 @@ struct Scene {
   std::vector<Emitter> emitters;
   std::vector<Effect> effects;  ///< once a scene is loaded, its emitters and forces are among the others
   std::vector<Spring> springs;
+  std::vector<Cloth> cloths;
   std::vector<Force> forces;
   std::vector<Overlay> overlays;
   Camera camera = StaticCamera{};

@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "producer/scene_check_cloths.h"
 #include "producer/scene_check_particles.h"
 #include "producer/suggest.h"
 #include "sim/geometry/mass_properties.h"
@@ -67,6 +68,7 @@ class Checker {
     check_contact_rules();
     for (const Body& body : scene_.bodies) check_body(body);
     check_particles(scene_, flat_, findings_);
+    check_cloths(scene_, flat_, folder_, findings_);
     for (const Emitter& emitter : scene_.emitters) check_emitter(emitter);
     for (const Spring& spring : scene_.springs) check_spring(spring);
     for (const Force& force : scene_.forces)
@@ -112,6 +114,7 @@ class Checker {
     check_unique(flat_.bodies);
 
     check_unique(scene_.springs);
+    check_unique(flat_.cloths);
     std::vector<NamedForce> forces;
     for (const Force& force : scene_.forces) forces.push_back(named(force));
     check_unique(forces);
@@ -139,6 +142,8 @@ class Checker {
     for (const Body& body : scene_.bodies) check_material_name(body.where.path + "/material", body.material);
     for (const Spring& spring : scene_.springs)
       check_material_name(spring.where.path + "/material", spring.material);
+    for (const Cloth& cloth : scene_.cloths)
+      check_material_name(cloth.where.path + "/material", cloth.material);
     for (const Material& material : scene_.materials)
       if (!used_materials_.contains(material.name))
         warn(material.where.path, "the material '" + material.name + "' is not used");
@@ -297,6 +302,12 @@ class Checker {
         fail(force.where.path + "/particles" + step(i),
              "there are no particles '" + particles[i] + "'" + suggestion(particles[i], systems_));
   }
+  void check_cloth_names(const NamedForce& force, const std::vector<std::string>& cloths) {
+    for (std::size_t i = 0; i < cloths.size(); ++i)
+      if (!find_named(scene_.cloths, cloths[i]) && !find_named(flat_.cloths, cloths[i]))
+        fail(force.where.path + "/cloths" + step(i),
+             "there is no cloth '" + cloths[i] + "'" + suggestion(cloths[i], names_of(flat_.cloths)));
+  }
   void check_region(const std::string& path, const sim::Region& region, int drop_rate) {
     if (drop_rate > 0 && std::holds_alternative<sim::Everywhere>(region))
       warn(path + "/drop_rate", "has no effect without a region");
@@ -304,6 +315,7 @@ class Checker {
   void check_scope(const FieldScope& field) {
     check_pushed(field, field.bodies);
     check_systems(field, field.particles);
+    check_cloth_names(field, field.cloths);
     check_period(field, field.start, field.end);
     check_region(field.where.path, field.region, field.drop_rate);
   }
@@ -329,14 +341,16 @@ class Checker {
     check_scope(wind);
     Real lightest = kUnlimited;
     for (const Body& body : flat_.bodies)
-      if (names(wind.bodies, body) || (wind.bodies.empty() && wind.particles.empty()))
+      if (names(wind.bodies, body) || (wind.bodies.empty() && wind.particles.empty() && wind.cloths.empty()))
         lightest = std::min(lightest, mass_of(body).value_or(kUnlimited));
     if (lightest > 0) check_drag(scene_.world.integrator, wind.drag, lightest, wind.where.path + "/drag");
   }
   void check_force(const Grab& grab) {
     const std::string& path = grab.where.path;
     check_systems(grab, grab.particles);
-    if (grab.body.empty() && grab.particles.empty()) fail(path, "needs a \"body\" or \"particles\" to hold");
+    check_cloth_names(grab, grab.cloths);
+    if (grab.body.empty() && grab.particles.empty() && grab.cloths.empty())
+      fail(path, "needs a \"body\", \"particles\" or \"cloths\" to hold");
     if (!grab.body.empty()) check_pushed(path + "/body", grab.body, named_body(path + "/body", grab.body));
     check_period(grab, grab.start, grab.end);
     if (grab.keyframes.empty()) fail(path, "needs at least one of \"keyframes\"");
@@ -349,6 +363,7 @@ class Checker {
   void check_force(const Explosion& explosion) {
     check_pushed(explosion, explosion.bodies);
     check_systems(explosion, explosion.particles);
+    check_cloth_names(explosion, explosion.cloths);
   }
 
   // --- Overlays ---
@@ -395,6 +410,11 @@ class Checker {
       warn(path, "shows nothing: the body '" + overlay.body + "' is static");
   }
   void check_overlay(const IslandsOverlay&) {}
+  void check_overlay(const ClothOverlay& overlay) {
+    if (!overlay.cloth.empty() && !find_named(flat_.cloths, overlay.cloth))
+      fail(overlay.where.path + "/cloth",
+           "there is no cloth '" + overlay.cloth + "'" + suggestion(overlay.cloth, names_of(flat_.cloths)));
+  }
 
   // --- Camera, light, film ---
 

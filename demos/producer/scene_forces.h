@@ -1,6 +1,6 @@
 #pragma once
 /// The forces of a scene; see scene.h. Those that can act on many have the names of what they act on; none:
-/// all dynamic bodies and no particles.
+/// all dynamic bodies, all cloths and no particles.
 
 #include <string>
 #include <variant>
@@ -21,6 +21,7 @@ struct NamedForce {
 struct ForceScope : NamedForce {
   std::vector<std::string> bodies;
   std::vector<std::string> particles;  ///< names of groups, of emitters, or of what is born from those
+  std::vector<std::string> cloths;
   Real start = 0;
   Real end = 1e30;
 };
@@ -87,17 +88,19 @@ struct HandKey {
 struct Grab : NamedForce {
   std::string body;
   std::vector<std::string> particles;
+  std::vector<std::string> cloths;
   Vec3 point = Vec3::Zero();  ///< of the body, in its frame
   std::vector<HandKey> keyframes;
   Real stiffness = 100;
   Real damping = 10;
-  Real reach = 1e30;  ///< of particles
+  Real reach = 1e30;  ///< of particles and of points of cloths
   Real start = 0;
   Real end = 1e30;
 };
 struct Explosion : NamedForce {
   std::vector<std::string> bodies;
   std::vector<std::string> particles;
+  std::vector<std::string> cloths;
   Real time = 0;
   Vec3 point = Vec3::Zero();
   Real impulse = 1;

@@ -25,6 +25,7 @@ void name_everything(Scene& scene, const std::string& file) {
   name_objects(scene.particles, "particles");
   name_objects(scene.emitters, "emitter");
   name_objects(scene.springs, "spring");
+  name_objects(scene.cloths, "cloth");
   for (std::size_t i = 0; i < scene.forces.size(); ++i)
     if (std::string& name = named(scene.forces[i]).name; name.empty()) name = "force_" + std::to_string(i);
 }

@@ -1,5 +1,6 @@
 #include "producer/scene_table.h"
 
+#include "producer/table_cloth.h"
 #include "producer/table_film.h"
 #include "producer/table_force.h"
 #include "producer/table_overlay.h"
@@ -26,6 +27,7 @@ struct Table<Scene> {
         {"emitters", &T::emitters, "sources of particles"},
         {"effects", &T::effects, "presets of emitters and forces, at some place"},
         {"springs", &T::springs, "damped springs"},
+        {"cloths", &T::cloths, "cloths"},
         {"forces", &T::forces, "fields, moving air, hands, explosions, forces between particles"},
         {"overlays", &T::overlays, "what shows how the simulation sees the scene"},
         {"camera", &T::camera, "where the film is seen from"},

@@ -25,6 +25,12 @@ struct Color {
   Eigen::Vector3f rgb() const { return rgba.head<3>(); }
 };
 
+/// A model file as a shape: its triangles collide and give the mass; of a cloth, they are the cloth.
+struct MeshFile {
+  std::string file;
+  Real scale = 1;
+};
+
 /// Copies in a row or a ring: copy i is moved by i * offset and turned by i * turn_deg about the vertical
 /// through `pivot`.
 struct Repeat {

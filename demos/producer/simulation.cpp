@@ -7,8 +7,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "producer/cloth_defs.h"
 #include "producer/emitter_defs.h"
 #include "producer/force_defs.h"
+#include "producer/scene_check_cloths.h"
 
 namespace offstage::producer {
 namespace {
@@ -43,6 +45,18 @@ std::size_t index_of(const sim::ParticleArrays& particles, uint64_t id) {
                                                : particles.size();
 }
 
+ClothSample cloth_sample(const sim::ClothView& view) {
+  ClothSample sample;
+  for (const Vec3& p : view.points) sample.points.push_back(p.cast<float>());
+  for (const Vec3& v : view.velocities) sample.velocities.push_back(v.cast<float>());
+  sample.version = view.version;
+  if (view.version == 0) return sample;
+  for (const sim::Triangle& t : view.triangles)
+    sample.triangles.insert(sample.triangles.end(), t.begin(), t.end());
+  sample.sources.assign(view.sources.begin(), view.sources.end());
+  return sample;
+}
+
 nlohmann::ordered_json json_of(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
 }
@@ -65,6 +79,15 @@ void SimulationTotals::add(const sim::StepReport& report) {
   collisions += report.collisions;
   tracebacks += report.tracebacks;
   cut_short += report.cut_short;
+  cloth_strain = std::max(cloth_strain, report.cloth_strain);
+  cloth_penetration = std::max(cloth_penetration, report.cloth_penetration);
+  cloth_contacts = report.cloth_contacts;
+  cloth_self_contacts = report.cloth_self_contacts;
+  cloth_moves_limited += report.cloth_moves_limited;
+  cloth_moves_held_back += report.cloth_moves_held_back;
+  cloth_crossings += report.cloth_crossings;
+  cloth_springs_torn += report.cloth_springs_torn;
+  cloth_unconverged += report.cloth_unconverged;
   exact.add(report.exact);
   fast.add(report.fast);
   impacts.add(report.impacts);
@@ -94,9 +117,12 @@ Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
     });
   add_particle_groups(scene);
   add_springs(scene);
+  add_cloths(scene, models);
   sources_.emplace(scene, models, world_, [this](const std::string& name) { return body_named(name); });
   add_forces(scene);
-  overlays_.emplace(scene, world_, bodies_);
+  std::map<std::string, sim::ClothHandle> cloths;
+  for (const auto& [name, handle] : cloths_) cloths.emplace(name, handle);
+  overlays_.emplace(scene, world_, bodies_, cloths);
 }
 
 void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
@@ -189,12 +215,38 @@ void Simulation::add_springs(const Scene& scene) {
   }
 }
 
+void Simulation::add_cloths(const Scene& scene, const ModelLibrary& models) {
+  for (const Cloth& cloth : scene.cloths) {
+    const auto* mesh = std::get_if<MeshFile>(&cloth.shape);
+    FlatCloth flat =
+        at_place(cloth.where, [&] { return flat_cloth(cloth, mesh ? &models.model(mesh->file) : nullptr); });
+    for (const ClothPin& pin : cloth.pins) {
+      const PinScope& scope = scope_of(pin);
+      const std::vector<uint32_t> held =
+          at_place(scope.where, [&] { return pinned_vertices(pin, cloth, flat); });
+      if (held.empty()) throw SceneError(scope.where, "holds no vertex of the cloth");
+      const sim::BodyHandle body = body_named(scope.body);
+      for (const uint32_t vertex : held) {
+        const Vec3& p = flat.def.vertices[vertex];
+        flat.def.pins.push_back({.vertex = vertex,
+                                 .body = body,
+                                 .position = body ? world_.body(body).pose.point_to_body(p) : p,
+                                 .until = scope.until});
+      }
+    }
+    if (const auto what = too_stiff(scene, flat.def)) throw SceneError(cloth.where, *what);
+    at_place(cloth.where, [&] { cloths_.push_back({cloth.name, world_.add_cloth(flat.def)}); });
+  }
+}
+
 void Simulation::add_forces(const Scene& scene) {
   for (const Force& force : scene.forces) {
     sim::ForceDef def = force_def(force);
     const ForceTargets targets = targets_of(force);
     for (const std::string& name : targets.bodies) def.bodies.push_back(body_named(name));
     for (const std::string& name : targets.particles) def.systems.push_back(system_named(name));
+    for (const std::string& name : targets.cloths)
+      def.cloths.push_back(std::ranges::find(cloths_, name, &NamedCloth::name)->handle);
     at_place(named(force).where, [&] { world_.add_force(def); });
   }
 }
@@ -270,6 +322,7 @@ Snapshot Simulation::snapshot() const {
     snapshot.point_sets.push_back(
         group_looks_[i].points(world_.particles(groups_[i].handle), &scene_.particles[i].places));
   sources_->add_points(world_, snapshot.point_sets);
+  for (const NamedCloth& cloth : cloths_) snapshot.cloths.push_back(cloth_sample(world_.cloth(cloth.handle)));
   snapshot.overlays = overlays_->lines(world_);
   snapshot.state_hash = world_.state_hash();
   return snapshot;

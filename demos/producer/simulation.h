@@ -42,6 +42,12 @@ struct SimulationTotals {
   std::size_t most_contacts = 0;                              ///< at the end of a frame
   sim::Real penetration = 0;                                  ///< greatest of the run [m]
   uint64_t collisions = 0, tracebacks = 0, cut_short = 0;
+
+  // Of cloths: greatest of the run, at its end, and sums.
+  sim::Real cloth_strain = 0, cloth_penetration = 0;
+  uint64_t cloth_contacts = 0, cloth_self_contacts = 0;
+  uint64_t cloth_moves_limited = 0, cloth_moves_held_back = 0, cloth_crossings = 0, cloth_springs_torn = 0,
+           cloth_unconverged = 0;
   sim::ContactWork exact, fast, impacts;
   sim::IntegratorReport integration;
 
@@ -81,6 +87,12 @@ class Simulation {
     sim::ParticleSystemHandle handle;
   };
   const std::vector<NamedGroup>& particle_groups() const { return groups_; }
+  struct NamedCloth {
+    std::string name;
+    sim::ClothHandle handle;
+  };
+  /// In scene order.
+  const std::vector<NamedCloth>& cloths() const { return cloths_; }
 
   /// What stopped being finite, and the state of the rest, as JSON text: what is saved when a run diverges.
   std::string state_dump(const sim::NonFinite& lost) const;
@@ -90,6 +102,7 @@ class Simulation {
   sim::MeshHandle add_mesh(const MeshFile& file, const ModelLibrary& models);
   void add_particle_groups(const Scene& scene);
   void add_springs(const Scene& scene);
+  void add_cloths(const Scene& scene, const ModelLibrary& models);
   void add_forces(const Scene& scene);
   sim::BodyHandle body_named(const std::string& name) const;
   sim::ParticleSystemHandle system_named(const std::string& name) const;
@@ -100,6 +113,7 @@ class Simulation {
   std::optional<ParticleSources> sources_;
   std::vector<NamedBody> moving_;
   std::vector<NamedGroup> groups_;
+  std::vector<NamedCloth> cloths_;
   std::vector<LookRamps> group_looks_;
   std::map<std::string, sim::BodyHandle> bodies_;
   std::vector<sim::Pose> moving_poses_;             // kept up to date from World::moved()

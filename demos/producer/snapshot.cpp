@@ -13,12 +13,27 @@ namespace {
 using Eigen::Vector3f;
 using Eigen::Vector4f;
 
-constexpr FileKind kKind = {"offsnap", 2, "snapshot"};
+constexpr FileKind kKind = {"offsnap", 3, "snapshot"};
 
 constexpr std::size_t kBodyBytes = 7 * sizeof(float);
 constexpr std::size_t kSpringBytes = 6 * sizeof(float);
 constexpr std::size_t kPointBytes = 12 * sizeof(float) + sizeof(uint64_t);
+constexpr std::size_t kClothBytes = 4 * sizeof(uint64_t) + sizeof(uint32_t);
 constexpr std::size_t kLineBytes = 12 * sizeof(float) + sizeof(uint64_t);
+
+void put(ByteWriter& out, const std::vector<Vector3f>& values) {
+  out.put(uint64_t{values.size()});
+  for (const Vector3f& v : values) out.put(v);
+}
+void put(ByteWriter& out, const std::vector<uint32_t>& values) {
+  out.put(uint64_t{values.size()});
+  for (const uint32_t v : values) out.put(v);
+}
+template <class T>
+void take(ByteReader& in, std::vector<T>& values) {
+  values.resize(in.take_count(sizeof(T)));
+  for (T& v : values) v = in.take<T>();
+}
 
 void write_manifest(const std::filesystem::path& folder, const std::string& key, int frames, bool complete) {
   const nlohmann::ordered_json manifest = {
@@ -62,6 +77,14 @@ std::vector<uint8_t> serialize(const Snapshot& snapshot) {
       out.put(set.ages[i]);
       out.put(p.id);
     }
+  }
+  out.put(uint64_t{snapshot.cloths.size()});
+  for (const ClothSample& cloth : snapshot.cloths) {
+    put(out, cloth.points);
+    put(out, cloth.velocities);
+    out.put(cloth.version);
+    put(out, cloth.triangles);
+    put(out, cloth.sources);
   }
   out.put(uint64_t{snapshot.overlays.size()});
   for (const LineSet& set : snapshot.overlays) {
@@ -108,6 +131,14 @@ Snapshot deserialize(std::span<const uint8_t> bytes, const std::string& source) 
       p.age = set.ages[i] = in.take<float>();
       p.id = in.take<uint64_t>();
     }
+  }
+  snapshot.cloths.resize(in.take_count(kClothBytes));
+  for (ClothSample& cloth : snapshot.cloths) {
+    take(in, cloth.points);
+    take(in, cloth.velocities);
+    cloth.version = in.take<uint32_t>();
+    take(in, cloth.triangles);
+    take(in, cloth.sources);
   }
   snapshot.overlays.resize(in.take_count(sizeof(uint64_t)));
   for (LineSet& set : snapshot.overlays) {

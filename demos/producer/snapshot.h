@@ -32,6 +32,15 @@ struct PointSet {
   std::vector<float> ages;  ///< [s]
 };
 
+/// A cloth.
+struct ClothSample {
+  std::vector<Eigen::Vector3f> points;      ///< [m]
+  std::vector<Eigen::Vector3f> velocities;  ///< [m/s]
+  uint32_t version = 0;                     ///< of the next two; 0: the cloth is whole, and they are empty
+  std::vector<uint32_t> triangles;          ///< three points each
+  std::vector<uint32_t> sources;  ///< of each point the vertex of the scene's cloth that it comes from
+};
+
 /// What an overlay shows. A line with the same id in two snapshots is the same line, moved.
 struct LineSet {
   std::vector<render::Line> lines;
@@ -44,6 +53,7 @@ struct Snapshot {
   std::vector<BodySample> bodies;     ///< moving bodies, in scene order
   std::vector<SpringSample> springs;  ///< in scene order
   std::vector<PointSet> point_sets;   ///< particle groups, then emitters, in scene order
+  std::vector<ClothSample> cloths;    ///< in scene order
   std::vector<LineSet> overlays;      ///< in scene order; empty for those that draw no lines
   sim::StateHash state_hash;
 

@@ -49,6 +49,12 @@ inline constexpr const char* kDropRateHelp =
     "power of its fall from the middle of the region to nothing at the edge; 0: the same throughout";
 inline constexpr const char* kParticlesHelp =
     "names of groups, of emitters, or of what is born from their particles, such as rain/splash";
+inline constexpr const char* kClothsHelp =
+    "names of cloths, of one or of all copies; moving air acts on their triangles, other forces as on the "
+    "whole cloth, spread over it by mass";
+inline constexpr const char* kBodiesHelp =
+    "names of what it acts on, of one or of all copies; this and the next two empty: all dynamic bodies and "
+    "all cloths";
 inline constexpr const char* kForceNameHelp = "unique; empty: force_ and its index";
 inline constexpr const char* kAirDragHelp =
     "force per speed against this air; 0: only through the drag that things have of their own";
@@ -57,12 +63,11 @@ template <>
 struct Table<ForceScope> {
   static Fields<ForceScope> fields() {
     using T = ForceScope;
-    return {
-        {"bodies", &T::bodies,
-         "names of what it acts on, of one or of all copies; this and `particles` empty: all dynamic bodies"},
-        {"particles", &T::particles, kParticlesHelp},
-        {"start", &T::start, "from when", "s", kNotNegative},
-        {"end", &T::end, "until when", "s", kNotNegative}};
+    return {{"bodies", &T::bodies, kBodiesHelp},
+            {"particles", &T::particles, kParticlesHelp},
+            {"cloths", &T::cloths, kClothsHelp},
+            {"start", &T::start, "from when", "s", kNotNegative},
+            {"end", &T::end, "until when", "s", kNotNegative}};
   }
 };
 template <>
@@ -138,19 +143,21 @@ template <>
 struct Table<Grab> {
   static constexpr const char* kName = "grab";
   static constexpr const char* kHelp =
-      "A hand that moves through keyframes and holds a point of a body, or particles, by a damped spring of "
-      "no "
-      "length.";
+      "A hand that moves through keyframes and holds a point of a body, or particles, or points of cloths, "
+      "by "
+      "damped springs of no length.";
   static Fields<Grab> fields() {
     using T = Grab;
     return {{"name", &T::name, kForceNameHelp},
             {"body", &T::body, "name of a dynamic body; empty: none"},
             {"particles", &T::particles, kParticlesHelp},
+            {"cloths", &T::cloths, "names of cloths"},
             {"point", &T::point, "where it is held, in the body's frame", "m"},
             {"keyframes", &T::keyframes, "places of the hand, smooth in between; at least one"},
             {"stiffness", &T::stiffness, "force per distance", "N/m", kNotNegative},
             {"damping", &T::damping, "force per speed against the hand", "N s/m", kNotNegative},
-            {"reach", &T::reach, "particles farther away than this are left alone", "m", kPositive},
+            {"reach", &T::reach, "particles and points of cloths farther away than this are left alone", "m",
+             kPositive},
             {"start", &T::start, "when it takes hold", "s", kNotNegative},
             {"end", &T::end, "when it lets go", "s", kNotNegative}};
   }
@@ -164,9 +171,9 @@ struct Table<Explosion> {
     using T = Explosion;
     return {
         {"name", &T::name, kForceNameHelp},
-        {"bodies", &T::bodies,
-         "names of what it acts on, of one or of all copies; this and `particles` empty: all dynamic bodies"},
+        {"bodies", &T::bodies, kBodiesHelp},
         {"particles", &T::particles, kParticlesHelp},
+        {"cloths", &T::cloths, kClothsHelp},
         {"time", &T::time, "when", "s", kNotNegative},
         {"point", &T::point, "where", "m"},
         {"impulse", &T::impulse, "on what is right at the point; negative: towards it", "N s"},
@@ -253,7 +260,7 @@ struct Table<LennardJonesForce> {
 template <>
 struct Tags<Force> {
   static constexpr const char* kName = "force";
-  static constexpr const char* kHelp = "Something that pushes or pulls bodies and particles.";
+  static constexpr const char* kHelp = "Something that pushes or pulls bodies, cloths and particles.";
   static constexpr std::array kTags = {"constant", "point",      "wind",        "grab",    "explosion",
                                        "vortex",   "turbulence", "gravitation", "coulomb", "lennard_jones"};
   static constexpr bool kRequired = true;

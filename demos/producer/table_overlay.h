@@ -114,10 +114,23 @@ struct Table<IslandsOverlay> {
   }
 };
 template <>
+struct Table<ClothOverlay> {
+  static constexpr const char* kName = "cloth_overlay";
+  static constexpr const char* kHelp =
+      "The threads of cloths, in colours of their strain: blue at rest, red where they are stretched.";
+  static Fields<ClothOverlay> fields() {
+    using T = ClothOverlay;
+    return Fields<T>{{"cloth", &T::cloth, "name of a cloth; empty: all"},
+                     {"strain", &T::strain, "at which a thread is red", "", over(0, 10)}}
+        .with_base<LineLook>();
+  }
+};
+template <>
 struct Tags<Overlay> {
   static constexpr const char* kName = "overlay";
   static constexpr const char* kHelp = "Something drawn over the picture to show how the simulation sees it.";
-  static constexpr std::array kTags = {"tree", "parts", "closest", "contacts", "velocities", "islands"};
+  static constexpr std::array kTags = {"tree",       "parts",   "closest", "contacts",
+                                       "velocities", "islands", "cloth"};
   static constexpr bool kRequired = true;
 };
 

@@ -58,8 +58,8 @@ struct Table<WorldSettings> {
 
 template <>
 struct Names<render::Pattern> {
-  static constexpr std::array kNames = {"none",  "checker", "grid", "noise",
-                                        "brick", "wood",    "lawn", "paving"};
+  static constexpr std::array kNames = {"none", "checker", "grid",   "noise",   "brick",
+                                        "wood", "lawn",    "paving", "stripes", "gingham"};
 };
 
 template <>
@@ -69,7 +69,7 @@ struct Table<Material> {
   static Fields<Material> fields() {
     using T = Material;
     return {
-        {"name", &T::name, "what bodies and springs call it; empty: material_ and its index"},
+        {"name", &T::name, "what bodies, springs and cloths call it; empty: material_ and its index"},
         {"color", &T::color, "base colour; with alpha below 1 it is translucent"},
         {"metallic", &T::metallic, "0: dielectric, 1: metal", "", kShare},
         {"roughness", &T::roughness, "0: mirror, 1: dull", "", kShare},
@@ -81,6 +81,7 @@ struct Table<Material> {
         {"pattern_scale", &T::pattern_scale, "size of one cell of the pattern", "m", kPositive},
         {"texture", &T::texture, "image file, multiplies the base colour; empty: none"},
         {"two_sided", &T::two_sided, "lit and drawn from behind too"},
+        {"fabric", &T::fabric, "look of threads on cloths; left out: that of the cloth's fabric"},
         {"restitution", &T::restitution, "bounciness; of two the larger counts", "", kShare},
         {"friction", &T::friction,
          "Coulomb's coefficient of what slides; of two the geometric mean counts, as of the next two", "",

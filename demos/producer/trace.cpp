@@ -58,6 +58,21 @@ void Trace::record(double time) {
     fmt::format_to(std::back_inserter(rows), "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", time, name,
                    p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z(), v.x(), v.y(), v.z(), w.x(), w.y(), w.z());
   }
+  for (const auto& [name, handle] : simulation_.cloths()) {
+    const sim::ClothView cloth = world.cloth(handle);
+    const std::vector<sim::Real>& masses = world.cloth_def(handle).masses;
+    sim::Vec3 p = sim::Vec3::Zero(), v = sim::Vec3::Zero();
+    sim::Real mass = 0;
+    for (std::size_t i = 0; i < masses.size(); ++i) {
+      mass += masses[i];
+      p += masses[i] * cloth.points[i];
+      v += masses[i] * cloth.velocities[i];
+    }
+    p /= mass;
+    v /= mass;
+    fmt::format_to(std::back_inserter(rows), "{},{},{},{},{},1,0,0,0,{},{},{},0,0,0\n", time, name, p.x(),
+                   p.y(), p.z(), v.x(), v.y(), v.z());
+  }
   for (const auto& [name, handle] : simulation_.particle_groups()) {
     const sim::ParticleArrays& particles = world.particles(handle);
     for (std::size_t i = 0; i < particles.size(); ++i) {
@@ -65,6 +80,25 @@ void Trace::record(double time) {
       fmt::format_to(std::back_inserter(rows), "{},{}/{},{},{},{},1,0,0,0,{},{},{},0,0,0\n", time, name,
                      particles.id[i], p.x(), p.y(), p.z(), v.x(), v.y(), v.z());
     }
+  }
+  file_.write(rows);
+}
+
+ClothTrace::ClothTrace(const std::filesystem::path& path, const Simulation& simulation)
+    : file_(path,
+            "time,cloth,points,max_strain,mean_strain,contacts,self_contacts,penetration,limited,held_back,"
+            "crossings,torn,unconverged"),
+      simulation_(simulation) {}
+
+void ClothTrace::record(double time) {
+  const sim::World& world = simulation_.world();
+  std::string rows;
+  for (const auto& [name, handle] : simulation_.cloths()) {
+    const sim::ClothReport& r = world.cloth_report(handle);
+    fmt::format_to(std::back_inserter(rows), "{},{},{},{},{},{},{},{},{},{},{},{},{}\n", time, name,
+                   world.cloth(handle).points.size(), r.max_strain, r.mean_strain, r.contacts,
+                   r.self_contacts, r.penetration, r.limited, r.held_back, r.crossings, r.torn,
+                   r.unconverged);
   }
   file_.write(rows);
 }

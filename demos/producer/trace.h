@@ -36,7 +36,22 @@ class Trace {
  public:
   Trace(const std::filesystem::path& path, const Simulation& simulation);
 
-  /// One row per moving body and per placed particle ("group/id").
+  /// One row per moving body, per cloth (its centre of mass and mean velocity) and per placed particle
+  /// ("group/id").
+  void record(double time);
+  void close() { file_.close(); }
+
+ private:
+  CsvFile file_;
+  const Simulation& simulation_;
+};
+
+/// How cloths did: time, cloth, points, strain, contacts and what had to be held back.
+class ClothTrace {
+ public:
+  ClothTrace(const std::filesystem::path& path, const Simulation& simulation);
+
+  /// One row per cloth.
   void record(double time);
   void close() { file_.close(); }
 

@@ -46,26 +46,41 @@ float sun_visibility(vec3 position, vec3 normal) {
   return visibility;
 }
 
-// GGX with the visibility term of E. Hammon (2017) for the sun; for the sky the split sum of B. Karis, "Physically
-// Based Shading on Mobile" (2014). `view` points to the eye.
+// GGX with the visibility term of E. Hammon (2017), times pi.
+float sun_lobe(float a, float nl, float nv, float nh) {
+  float a2 = a * a;
+  float d = nh * nh * (a2 - 1.0) + 1.0;
+  float lobe = a2 / (d * d) * 0.5 / mix(2.0 * nl * nv, nl + nv, a);
+  return min(lobe, 40.0);
+}
+float sun_roughness(float roughness) { return max(roughness * roughness, 0.5 * frame.sun_radiance.w + 0.002); }
+
+vec3 fresnel_at(vec3 f0, float vh) {
+  float m = 1.0 - vh, m2 = m * m;
+  return f0 + (1.0 - f0) * (m2 * m2 * m);
+}
+
+// The split sum of B. Karis, "Physically Based Shading on Mobile" (2014).
+vec3 sky_reflectance(vec3 f0, float roughness, float nv) {
+  vec4 r = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
+  float t = min(r.x * r.x, exp2(-9.28 * nv)) * r.x + r.y;
+  return f0 * (-1.04 * t + r.z) + (1.04 * t + r.w);
+}
+
+// The sun's light and the sky's that a surface sends to the eye; `view` points to it.
 vec3 shade(Surface s, vec3 normal, vec3 view, float visibility) {
   vec3 l = frame.sun_direction.xyz;
   vec3 h = normalize(l + view);
   float nl = saturate(dot(normal, l)), nv = max(abs(dot(normal, view)), 1e-3);
   float nh = saturate(dot(normal, h)), vh = saturate(dot(view, h));
-  float a = max(s.roughness * s.roughness, 0.5 * frame.sun_radiance.w + 0.002), a2 = a * a;
 
   vec3 f0 = mix(vec3(0.04), s.albedo, s.metallic);
-  float m = 1.0 - vh, m2 = m * m;
-  vec3 fresnel = f0 + (1.0 - f0) * (m2 * m2 * m);
-  float d = nh * nh * (a2 - 1.0) + 1.0;
-  float lobe = a2 / (d * d) * 0.5 / mix(2.0 * nl * nv, nl + nv, a);  // D V pi
+  vec3 fresnel = fresnel_at(f0, vh);
+  float lobe = sun_lobe(sun_roughness(s.roughness), nl, nv, nh);
   vec3 diffuse = s.albedo * (1.0 - s.metallic);
-  vec3 sun = frame.sun_radiance.rgb * (nl * visibility) * (diffuse * (1.0 - fresnel) + min(lobe, 40.0) * fresnel);
+  vec3 sun = frame.sun_radiance.rgb * (nl * visibility) * (diffuse * (1.0 - fresnel) + lobe * fresnel);
 
-  vec4 r = s.roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
-  float t = min(r.x * r.x, exp2(-9.28 * nv)) * r.x + r.y;
-  vec3 reflectance = f0 * (-1.04 * t + r.z) + (1.04 * t + r.w);
+  vec3 reflectance = sky_reflectance(f0, s.roughness, nv);
   vec3 sky = ambient(normal) * diffuse * (1.0 - reflectance) +
              sky_reflection(reflect(-view, normal), s.roughness) * reflectance;
   return sun + sky + s.emission;

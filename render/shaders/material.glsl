@@ -2,7 +2,9 @@ layout(std140, binding = 1) uniform Material {
   vec4 color;
   vec4 pattern_color;  // w: size of a cell [m]
   vec4 emission;
-  vec4 surface;        // metallic, roughness
+  vec4 surface;        // metallic, roughness; of fabric: width of a thread [m], relief
+  vec4 back;           // of fabric: colour of its back; w: translucency
+  vec4 sheen;          // of fabric: colour; w: 1 if the back has a colour of its own
 } material;
 
 #ifdef TEXTURED

@@ -6,50 +6,6 @@ struct PatternSample {
   vec3 slope;       // gradient of the surface's height, along the object's axes
 };
 
-uint mix_bits(uint h) {
-  h = (h ^ (h >> 15)) * 0x2C1B3C6Du;
-  h = (h ^ (h >> 12)) * 0x297A2D39u;
-  return h ^ (h >> 15);
-}
-
-// In [0, 1).
-float cell_random(vec2 cell, uint salt) {
-  uvec2 c = uvec2(ivec2(cell));
-  return float(mix_bits(c.x * 0x9E3779B1u ^ c.y * 0x85EBCA77u ^ salt) >> 8) * (1.0 / 16777216.0);
-}
-
-// Value noise in [0, 1] and its gradient.
-vec3 noise(vec2 p, uint salt) {
-  vec2 cell = floor(p), f = p - cell;
-  vec2 s = f * f * (3.0 - 2.0 * f), ds = 6.0 * f * (1.0 - f);
-  float a = cell_random(cell, salt), b = cell_random(cell + vec2(1.0, 0.0), salt);
-  float c = cell_random(cell + vec2(0.0, 1.0), salt), d = cell_random(cell + vec2(1.0, 1.0), salt);
-  float k = a - b - c + d;
-  return vec3(a + (b - a) * s.x + (c - a) * s.y + k * s.x * s.y, ds * vec2(b - a + k * s.y, c - a + k * s.x));
-}
-
-float noise(vec3 p) {
-  vec3 cell = floor(p), f = p - cell;
-  vec3 s = f * f * (3.0 - 2.0 * f);
-  uint z = uint(int(cell.z));
-  uint salt0 = z * 0xC2B2AE3Du, salt1 = (z + 1u) * 0xC2B2AE3Du;
-  vec2 x = vec2(1.0, 0.0);
-  vec4 low = vec4(cell_random(cell.xy, salt0), cell_random(cell.xy + x, salt0), cell_random(cell.xy + x.yx, salt0),
-                  cell_random(cell.xy + x.xx, salt0));
-  vec4 high = vec4(cell_random(cell.xy, salt1), cell_random(cell.xy + x, salt1), cell_random(cell.xy + x.yx, salt1),
-                   cell_random(cell.xy + x.xx, salt1));
-  vec4 c = mix(low, high, s.z);
-  return mix(mix(c.x, c.y, s.x), mix(c.z, c.w, s.x), s.y);
-}
-
-// 1 while a detail of this size is well above the pixel's footprint, 0 when it drowns in it.
-float visible(float footprint, float size) { return 1.0 - smoothstep(0.2, 0.7, footprint / size); }
-
-// The share of a box of width w around p in which a square wave of period 2 is up.
-vec2 square_wave(vec2 p, vec2 w) {
-  return 0.5 + (abs(fract((p - 0.5 * w) * 0.5) - 0.5) - abs(fract((p + 0.5 * w) * 0.5) - 0.5)) / w;
-}
-
 // Bricks or slabs in rows: `size` of one, `joint` half the joint's width, all in metres.
 struct Masonry {
   vec2 cell;
@@ -115,12 +71,17 @@ PatternSample pattern_sample(vec3 p, vec3 n) {
   vec2 w = max(abs(vec2(dot(dx, u), dot(dx, v))), abs(vec2(dot(dy, u), dot(dy, v)))) + 1e-5 * scale;
   vec2 slope = vec2(0.0);
 
-#if PATTERN == 1 || PATTERN == 2  // checker, grid
+#if PATTERN == 1 || PATTERN == 2 || PATTERN == 8 || PATTERN == 9  // checker, grid, stripes, gingham
   float broad = (noise(q / scale * 0.63, 1u).x - 0.5) * visible(footprint, 1.6 * scale);
   float fine = (noise(q / scale * 9.0, 2u).x - 0.5) * visible(footprint, scale / 9.0);
 #if PATTERN == 1
   vec2 wave = square_wave(q / scale, w / scale);
   result.color = mix(a, b, wave.x + wave.y - 2.0 * wave.x * wave.y);
+#elif PATTERN == 8  // stripes
+  result.color = mix(a, b, square_wave(q / scale, w / scale).x);
+#elif PATTERN == 9  // gingham: stripes both ways, half as strong where only one is
+  vec2 wave = square_wave(q / scale, w / scale);
+  result.color = mix(a, b, 0.5 * (wave.x + wave.y));
 #else
   const float kLine = 0.03;
   vec2 k = q / scale + 0.5 * kLine, e0 = k - 0.5 * w / scale, e1 = k + 0.5 * w / scale;

@@ -35,4 +35,9 @@ const AabbTree& CollisionMesh::part_tree() const {
   return part_tree_;
 }
 
+const ClearCells& CollisionMesh::clear_cells() const {
+  std::call_once(clear_once_, [this] { clear_cells_.emplace(mesh, solid); });
+  return *clear_cells_;
+}
+
 }  // namespace offstage::sim

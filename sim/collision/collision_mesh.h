@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "sim/collision/bounding_tree.h"
+#include "sim/collision/clear_cells.h"
 #include "sim/collision/convex.h"
 #include "sim/geometry/convex_decomposition.h"
 #include "sim/geometry/mass_properties.h"
@@ -29,6 +30,9 @@ class CollisionMesh {
   const ConvexDecomposition& decomposition() const;
   /// Tree over the boxes of the decomposition's parts, whose items are their indices.
   const AabbTree& part_tree() const;
+  /// The space around it that is clear of it. Computed at the first call, which takes some 10 ms; safe from
+  /// several threads.
+  const ClearCells& clear_cells() const;
 
  private:
   void decompose_once() const;
@@ -36,6 +40,8 @@ class CollisionMesh {
   mutable std::once_flag once_;
   mutable std::optional<ConvexDecomposition> decomposition_;
   mutable AabbTree part_tree_;
+  mutable std::once_flag clear_once_;
+  mutable std::optional<ClearCells> clear_cells_;
 };
 
 }  // namespace offstage::sim

@@ -151,10 +151,14 @@ Vec3 velocity(const Vortex& vortex, const Vec3& point) {
 }
 
 bool ForceDef::acts_on(BodyHandle body) const {
-  return bodies.empty() ? systems.empty() : std::find(bodies.begin(), bodies.end(), body) != bodies.end();
+  return names_nothing() || std::find(bodies.begin(), bodies.end(), body) != bodies.end();
 }
 bool ForceDef::acts_on(ParticleSystemHandle system) const {
   return std::find(systems.begin(), systems.end(), system) != systems.end();
+}
+bool ForceDef::acts_on(ClothHandle cloth) const {
+  return (names_nothing() && !is_pairwise()) ||
+         std::find(cloths.begin(), cloths.end(), cloth) != cloths.end();
 }
 bool ForceDef::is_pairwise() const {
   return std::visit([]<class E>(const E&) { return kIsPairLaw<E>; }, effect);
@@ -172,8 +176,9 @@ std::string problem(const ForceDef& def) {
   if (!(def.end >= def.start)) return "end must not be before start";
   const bool holds_body = def.bodies.size() == 1 && def.systems.empty();
   const bool holds_particles = def.bodies.empty() && !def.systems.empty();
-  if (std::holds_alternative<Grab>(def.effect) && !holds_body && !holds_particles)
-    return "bodies: a grab holds exactly one body, or particle systems";
+  const bool holds_cloths = def.bodies.empty() && def.systems.empty() && !def.cloths.empty();
+  if (std::holds_alternative<Grab>(def.effect) && !holds_body && !holds_particles && !holds_cloths)
+    return "bodies: a grab holds exactly one body, or particle systems, or cloths";
   if (def.is_pairwise() && !holds_particles)
     return "systems: a force between particles needs particle systems, and no bodies";
   return std::visit([](const auto& effect) { return problem(effect); }, def.effect);
@@ -208,7 +213,7 @@ Vec3 impulse(const Explosion& explosion, const Vec3& point) {
 }
 
 bool ActiveForce::acts_on(const RigidBody& body) const {
-  if (def->bodies.empty()) return def->systems.empty();
+  if (def->bodies.empty()) return def->names_nothing();
   return std::binary_search(only.begin(), only.end(), &body);
 }
 

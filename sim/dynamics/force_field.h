@@ -24,6 +24,8 @@ struct BodyTag;
 using BodyHandle = Handle<BodyTag>;
 struct ParticleSystemTag;
 using ParticleSystemHandle = Handle<ParticleSystemTag>;
+struct ClothTag;
+using ClothHandle = Handle<ClothTag>;
 struct ForceTag {};
 using ForceHandle = Handle<ForceTag>;
 struct Solid;
@@ -92,15 +94,20 @@ struct ForceDef {
                               MutualGravitation, Coulomb, LennardJones>;
 
   std::string name;
-  /// What it acts on. If neither bodies nor particle systems are named: all dynamic bodies, no particles.
+  /// What it acts on. If nothing is named: all dynamic bodies and all cloths, no particles.
   std::vector<BodyHandle> bodies;
   std::vector<ParticleSystemHandle> systems;
+  /// Cloths feel moving air by their triangles; every other force, and the drag of one with k > 0, is that on
+  /// a whole cloth, spread over its points by their mass.
+  std::vector<ClothHandle> cloths;
   Real start = 0;                                    ///< [s]
   Real end = std::numeric_limits<Real>::infinity();  ///< [s]
   Effect effect;
 
   bool acts_on(BodyHandle body) const;
   bool acts_on(ParticleSystemHandle system) const;
+  bool acts_on(ClothHandle cloth) const;
+  bool names_nothing() const { return bodies.empty() && systems.empty() && cloths.empty(); }
   bool is_on(Real time) const { return time >= start && time < end; }
   bool is_explosion() const { return std::holds_alternative<Explosion>(effect); }
   /// Whether it is a force of particles on each other.

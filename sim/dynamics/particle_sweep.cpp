@@ -22,6 +22,11 @@ constexpr Real kDriftDepth = Obstacle::kChordError;
 /// Passes over simultaneous contacts; two at right angles need one.
 constexpr int kContactPasses = 8;
 
+/// Whether a sphere, in the solid's frame, surely does not touch it.
+bool is_clear(const Solid& solid, const Vec3& centre, Real radius) {
+  return solid.mesh && solid.mesh->clear_cells().is_clear(centre, radius);
+}
+
 }  // namespace
 
 SweepOutcome ParticleSweep::operator()(ParticlePath& path, Real born, const Vec3& extra) {
@@ -52,7 +57,10 @@ SweepOutcome ParticleSweep::operator()(ParticlePath& path, Real born, const Vec3
 void NearObstacles::find(const Vec3& a, const Vec3& b, Real radius) {
   near_.clear();
   const auto add = [&](const Obstacle& o) { near_.push_back(&o); };
-  fixed_.near_path(a, b, radius + kSkin, add);
+  const Real reach = radius + kSkin + (b - a).norm();
+  fixed_.near_path(a, b, radius + kSkin, [&](const Obstacle& o) {
+    if (!is_clear(o.solid, o.start.point_to_body(a), reach)) add(o);
+  });
   moving_.near_path(a, b, radius + kSkin, add);
 }
 
@@ -61,7 +69,9 @@ bool NearObstacles::eject(Vec3& start, Vec3& end, Real radius, Real fraction, bo
     bool clear = true;
     for (const Obstacle* o : near_) {
       const Pose pose = o->at(fraction);
-      const SurfaceDistance s = signed_distance(o->solid, pose.point_to_body(start));
+      const Vec3 centre = pose.point_to_body(start);
+      if (is_clear(o->solid, centre, radius)) continue;
+      const SurfaceDistance s = signed_distance(o->solid, centre);
       if (s.distance >= radius) continue;
       if (round == kMaxEjections) return false;
       clear = false;

@@ -1,10 +1,11 @@
-/// Particles under gravity and drag that bounce on a plane: sub-steps per second, with how many of them touch
-/// it.
+/// Particles under gravity and drag that bounce on a plane, and on a mesh in turbulent air: sub-steps per
+/// second, with how many of them touch something.
 
 #include <benchmark/benchmark.h>
 
 #include "effects/random.h"
 #include "sim/world.h"
+#include "tests/meshes.h"
 
 namespace offstage::sim {
 namespace {
@@ -25,9 +26,7 @@ World rain(std::size_t count, Real height, ParticleSystemHandle& system) {
   return world;
 }
 
-void run(benchmark::State& state, Real height, int warm_up) {
-  ParticleSystemHandle system;
-  World world = rain(static_cast<std::size_t>(state.range(0)), height, system);
+void time_steps(benchmark::State& state, World& world, int warm_up) {
   for (int i = 0; i < warm_up; ++i) world.step(kStep);
   uint64_t collisions = 0;
   for (auto _ : state) collisions += world.step(kStep).particle_collisions;
@@ -36,6 +35,12 @@ void run(benchmark::State& state, Real height, int warm_up) {
       benchmark::Counter(static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
   state.counters["collisions"] =
       benchmark::Counter(static_cast<double>(collisions), benchmark::Counter::kAvgIterations);
+}
+
+void run(benchmark::State& state, Real height, int warm_up) {
+  ParticleSystemHandle system;
+  World world = rain(static_cast<std::size_t>(state.range(0)), height, system);
+  time_steps(state, world, warm_up);
 }
 
 void falling(benchmark::State& state) {
@@ -48,9 +53,28 @@ void at_rest(benchmark::State& state) {
   run(state, 0, 480);
 }
 
+/// Into eddies of two sizes, past a torus of 18 432 triangles that stands in their midst.
+void on_mesh_in_eddies(benchmark::State& state) {
+  ParticleSystemHandle system;
+  World world = rain(static_cast<std::size_t>(state.range(0)), 5, system);
+  world.add_body({.name = "torus",
+                  .shape = MeshShape{world.add_mesh(torus_mesh(2, 0.8, 144, 64))},
+                  .motion = MotionType::fixed,
+                  .pose = {.position = {5, 2.5, 5}}});
+  world.add_force(
+      {.systems = {system}, .effect = Turbulence{.speed = 3, .scale = 2, .octaves = 2, .drag = 1e-3}});
+  time_steps(state, world, 24);
+}
+
 BENCHMARK(falling)->Arg(1'000'000)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(bouncing)->Arg(1'000'000)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(at_rest)->Arg(1'000'000)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(on_mesh_in_eddies)
+    ->RangeMultiplier(10)
+    ->Range(10'000, 1'000'000)
+    ->MeasureProcessCPUTime()
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
 
 }  // namespace
 }  // namespace offstage::sim

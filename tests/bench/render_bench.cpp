@@ -81,7 +81,7 @@ BENCHMARK(BM_DrawEmpty)->Unit(benchmark::kMillisecond);
 void BM_DrawGround(benchmark::State& state) {
   time_draw(state, [&](Stage& stage) { set_the_ground(stage, static_cast<Pattern>(state.range(0))); });
 }
-BENCHMARK(BM_DrawGround)->DenseRange(0, 7)->ArgName("pattern")->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_DrawGround)->DenseRange(0, 9)->ArgName("pattern")->Unit(benchmark::kMillisecond);
 
 void BM_DrawModels(benchmark::State& state) {
   time_draw(state, set_models);
@@ -111,6 +111,50 @@ void BM_DrawSpheres(benchmark::State& state) {
   });
 }
 BENCHMARK(BM_DrawSpheres)->Unit(benchmark::kMillisecond);
+
+// A sheet of n by n cells, 4 m wide, draped over a ball of 1 m.
+struct Drape {
+  explicit Drape(int n) {
+    for (int j = 0; j <= n; ++j)
+      for (int i = 0; i <= n; ++i) {
+        const Vector2f uv(4 * static_cast<float>(i) / static_cast<float>(n),
+                          4 * static_cast<float>(j) / static_cast<float>(n));
+        const float x = uv.x() - 2, z = uv.y() - 2, r = std::sqrt(x * x + z * z), around = std::atan2(z, x);
+        const float on_ball = std::min(r, 1.6f), below = r - on_ball;
+        const float out = 1.02f * std::sin(on_ball / 1.02f) + 0.1f * below * (1 + std::sin(14 * around));
+        def.uvs.push_back(uv);
+        points.emplace_back(out * std::cos(around), 1 + 1.02f * std::cos(on_ball / 1.02f) - 0.8f * below,
+                            out * std::sin(around));
+      }
+    const auto at = [n](int i, int j) { return static_cast<uint32_t>(j * (n + 1) + i); };
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < n; ++i)
+        for (const uint32_t v :
+             {at(i, j), at(i, j + 1), at(i + 1, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)})
+          def.triangles.push_back(v);
+    def.thickness = 0.02f;
+  }
+  ClothDef def;
+  std::vector<Vector3f> points;
+};
+
+// Sub-frames of a cloth that moves: its surface is made anew for each.
+void BM_DrawCloth(benchmark::State& state) {
+  Context context;
+  Stage stage(context, kStage);
+  set_the_ground(stage, Pattern::checker);
+  const Drape drape(static_cast<int>(state.range(0)));
+  const ClothHandle cloth = stage.add_cloth(drape.def, stage.add_material({.roughness = 0.9f}));
+  HdrImage sum;
+  int i = 0;
+  const auto draw = [&] {
+    stage.set_cloth(cloth, drape.points);
+    stage.draw(sample_offsets(i++ % 16, 16), sum);
+  };
+  draw();  // compiles what the scene needs
+  for (auto _ : state) draw();
+}
+BENCHMARK(BM_DrawCloth)->Arg(60)->Arg(100)->Arg(200)->ArgName("cells")->Unit(benchmark::kMillisecond);
 
 void BM_ToneMapAndEdges(benchmark::State& state) {
   Context context;

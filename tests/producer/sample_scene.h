@@ -13,7 +13,8 @@ inline constexpr const char* kSampleScene = R"({
             "seed": 42},
   "materials": [
     {"name": "red", "color": "#c03020", "roughness": 0.3, "restitution": 1, "friction": 0.2,
-     "static_friction": 0.4, "cross_friction": 0.6},
+     "static_friction": 0.4, "cross_friction": 0.6,
+     "fabric": {"weave": "twill", "thread": 0.002, "sheen": 0.4, "translucency": 0.1, "back_color": "#ffffff"}},
     {"name": "glass", "color": [0.9, 1, 1, 0.25], "metallic": 0, "pattern": "checker", "pattern_color": "#00000080"}
   ],
   "contacts": [{"materials": ["red", "glass"], "restitution": 0.1, "friction": 0, "static_friction": 0.05}],
@@ -54,6 +55,16 @@ inline constexpr const char* kSampleScene = R"({
     {"a": {"particles": "chain"}, "b": {"particles": "chain", "index": 1}, "stiffness": 50, "damping": 0.1},
     {"name": "tie", "a": {"position": [0, 4, 0]}, "b": {"body": "ball", "position": [0, 0.25, 0]}, "material": "red"}
   ],
+  "cloths": [
+    {"name": "curtain", "shape": {"type": "grid", "size": [2, 1], "cells": [8, 4]}, "fabric": "silk", "thickness": 0.01, "max_shear": 1.2,
+     "material": "red", "position": [0, 9, 0], "orientation": {"axis": [1, 0, 0], "angle_deg": 90}, "velocity": [1, 0, 0],
+     "pins": [{"type": "corners", "corners": ["top_left"]}, {"type": "side", "side": "left", "every": 2, "body": "ball", "until": 1},
+              {"type": "nearest", "point": [1, 0, 0]}, {"type": "box", "centre": [1, 0, 0], "size": [0.1, 1, 1]}],
+     "seams": [{"type": "sides", "a": "left", "b": "right", "reversed": true}, {"type": "points", "a": [0, 0, 0], "b": [0, 0, 0.5]}],
+     "seam_time": 0.5, "tear": 1.5, "air_density": 1, "integrator": "implicit", "substep": 0.001,
+     "repeat": {"count": 2, "offset": [0, 0, 3]}},
+    {"name": "sack", "shape": {"type": "mesh", "file": "LICENSE", "scale": 2}, "self_collision": false, "casts_shadow": false}
+  ],
   "forces": [
     {"type": "constant", "force": [0, 0, 1], "region": {"type": "box", "size": [4, 4, 4]}, "drop_rate": 1},
     {"type": "point", "point": [0, 5, 0], "force": -3, "region": {"type": "sphere", "radius": 2}, "end": 2},
@@ -61,7 +72,7 @@ inline constexpr const char* kSampleScene = R"({
     {"type": "grab", "body": "ball", "point": [0, 0.25, 0], "keyframes": [{"position": [0, 3, 0]}], "end": 1},
     {"type": "explosion", "time": 1, "point": [0, 0, 0.1], "impulse": 4, "radius": 3, "drop_rate": 2, "particles": ["rain", "puff/tail"]},
     {"type": "vortex", "particles": ["puff"], "circulation": 2, "drag": 0.001},
-    {"type": "turbulence", "particles": ["puff", "puff/splash"], "speed": 2, "scale": 0.5, "octaves": 3},
+    {"type": "turbulence", "particles": ["puff", "puff/splash"], "speed": 2, "scale": 0.5, "octaves": 3, "cloths": ["curtain"]},
     {"type": "gravitation", "particles": ["ring"]}, {"type": "coulomb", "particles": ["ring"], "cut_off": 0.5},
     {"type": "lennard_jones", "particles": ["ring"], "sigma": 0.02, "cut_off": 0.05}
   ],
@@ -71,7 +82,8 @@ inline constexpr const char* kSampleScene = R"({
     {"type": "closest", "a": "ball", "b": "wheel", "color": "#40c0ff", "width": 0.004},
     {"type": "contacts", "margin": 0.02, "force_scale": 0.01},
     {"type": "velocities", "angular_scale": 0.1},
-    {"type": "islands", "asleep": 0.1}
+    {"type": "islands", "asleep": 0.1},
+    {"type": "cloth", "cloth": "sack", "strain": 0.1}
   ],
   "camera": {"type": "keyframes", "keyframes": [{"time": 0, "eye": [4, 2, 6]}, {"time": 3, "eye": [0, 2, 7]}]},
   "lights": [{"type": "sun", "direction": [1, 2, 1], "color": [1, 0.9, 0.8]}],

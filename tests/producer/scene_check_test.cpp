@@ -79,7 +79,7 @@ TEST(SceneCheck, OverlaysShowWhatThereIs) {
             "/overlays/0/body: there is no body 'a'\n"
             "/overlays/0/level: must be between 0 and 16, got -1\n"
             "/overlays/1/type: is required: one of \"tree\", \"parts\", \"closest\", \"contacts\", "
-            "\"velocities\" or \"islands\"\n");
+            "\"velocities\", \"islands\" or \"cloth\"\n");
 }
 
 TEST(SceneCheck, FilesAreThere) {
@@ -163,19 +163,19 @@ TEST(SceneCheck, FrictionAcrossAGrainTakesMaterialAndAxis) {
 }
 
 TEST(SceneCheck, ForcesActOnWhatThereIs) {
-  EXPECT_EQ(
-      errors_of(R"({"bodies": [{"name": "crate", "repeat": {"count": 2}}, {"name": "ball", "mass": 1}],
+  EXPECT_EQ(errors_of(R"({"bodies": [{"name": "crate", "repeat": {"count": 2}}, {"name": "ball", "mass": 1}],
     "forces": [{"type": "constant", "bodies": ["crate_1", "bal", "crate"]}, {"type": "wind", "end": 0},
                {"type": "grab", "body": "ball"},
                {"type": "grab", "body": "ball", "keyframes": [{"time": 1}, {"time": 1}]},
                {"type": "explosion", "name": "force_0"}, {"type": "field"}]})"),
-      "/forces/0/bodies/1: there is no body 'bal'; did you mean 'ball'?\n"
-      "/forces/1/end: must be after the start, 0 s\n"
-      "/forces/2: needs at least one of \"keyframes\"\n"
-      "/forces/3/keyframes/1/time: times must increase, got 1 after 1\n"
-      "/forces/4/name: the name 'force_0' is already that of /forces/0\n"
-      "/forces/5/type: must be one of \"constant\", \"point\", \"wind\", \"grab\", \"explosion\", "
-      "\"vortex\", \"turbulence\", \"gravitation\", \"coulomb\" or \"lennard_jones\", got the string \"field\"\n");
+            "/forces/0/bodies/1: there is no body 'bal'; did you mean 'ball'?\n"
+            "/forces/1/end: must be after the start, 0 s\n"
+            "/forces/2: needs at least one of \"keyframes\"\n"
+            "/forces/3/keyframes/1/time: times must increase, got 1 after 1\n"
+            "/forces/4/name: the name 'force_0' is already that of /forces/0\n"
+            "/forces/5/type: must be one of \"constant\", \"point\", \"wind\", \"grab\", \"explosion\", "
+            "\"vortex\", \"turbulence\", \"gravitation\", \"coulomb\" or \"lennard_jones\", got the string "
+            "\"field\"\n");
   EXPECT_EQ(warnings_of(R"({"bodies": [{"name": "wall", "motion": "static"}, {"name": "ball"}],
     "forces": [{"type": "point", "bodies": ["ball", "wall"], "drop_rate": 1}]})"),
             "/forces/0/bodies/1: has no effect: the body 'wall' is not dynamic\n"
@@ -305,7 +305,7 @@ TEST(SceneCheck, ForcesNameParticles) {
                {"type": "vortex", "particles": ["rain/spalsh"]}, {"type": "grab", "keyframes": [{}]},
                {"type": "coulomb"}]})"),
       "/forces/1/particles/0: there are no particles 'rain/spalsh'; did you mean 'rain/splash'?\n"
-      "/forces/2: needs a \"body\" or \"particles\" to hold\n"
+      "/forces/2: needs a \"body\", \"particles\" or \"cloths\" to hold\n"
       "/forces/3/particles: is required: names of groups and emitters whose particles act on each other\n");
 }
 

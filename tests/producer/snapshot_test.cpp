@@ -20,6 +20,12 @@ Snapshot sample() {
     s.point_sets[1].points.push_back({{x, -x, 0}, {0, x, 1}, 0.01f * x, {0.1f, 0.2f, 0.3f, 1}, i * i});
     s.point_sets[1].ages.push_back(x / 30);
   }
+  s.cloths.resize(2);
+  s.cloths[0] = {.points = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}},
+                 .velocities = {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}},
+                 .version = 3,
+                 .triangles = {0, 1, 2},
+                 .sources = {0, 1, 1}};
   s.overlays.resize(3);
   s.overlays[1].lines = {{{1, 2, 3}, {4, 5, 6}, {0.1f, 0.2f, 0.3f, 0.4f}, 2, 0},
                          {{0, 0, 0}, {0, 0, 0}, {1, 1, 1, 1}}};
@@ -37,6 +43,9 @@ TEST(Snapshot, ComesBackAsItWas) {
   ASSERT_EQ(back.point_sets.size(), 2u);
   EXPECT_EQ(back.point_sets[1].points[7].id, 49u);
   EXPECT_EQ(back.point_sets[1].points[7].color, sample().point_sets[1].points[7].color);
+  ASSERT_EQ(back.cloths.size(), 2u);
+  EXPECT_EQ(back.cloths[0].points, sample().cloths[0].points);
+  EXPECT_EQ(back.cloths[0].sources, sample().cloths[0].sources);
   ASSERT_EQ(back.overlays.size(), 3u);
   EXPECT_EQ(back.overlays[1].lines[0].b, Eigen::Vector3f(4, 5, 6));
   EXPECT_EQ(back.overlays[1].ids[1], 8u);

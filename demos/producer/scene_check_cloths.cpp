@@ -1,0 +1,111 @@
+#include "producer/scene_check_cloths.h"
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "producer/cloth_defs.h"
+#include "producer/suggest.h"
+
+namespace offstage::producer {
+namespace {
+
+constexpr std::array kKinds = {"stretch", "shear", "bend"};
+
+class ClothChecker {
+ public:
+  ClothChecker(const Scene& scene, const Scene& flat, const std::filesystem::path& folder, Findings& findings)
+      : scene_(scene), flat_(flat), folder_(folder), findings_(findings) {}
+
+  void check(const Cloth& cloth) {
+    const std::string& path = cloth.where.path;
+    check_material(cloth);
+    if (!effects::find_fabric(cloth.fabric))
+      return fail(path + "/fabric",
+                  "there is no fabric '" + cloth.fabric + "'" + suggestion(cloth.fabric, fabric_names()));
+    for (const ClothPin& pin : cloth.pins) check_body(scope_of(pin));
+    if (const auto* mesh = std::get_if<MeshFile>(&cloth.shape)) {
+      std::error_code error;
+      if (!mesh->file.empty() && !std::filesystem::is_regular_file(folder_ / mesh->file, error))
+        fail(path + "/shape/file", "there is no file '" + (folder_ / mesh->file).string() + "'");
+      return;
+    }
+    try {
+      check_grid(cloth, flat_cloth(cloth, nullptr));
+    } catch (const std::invalid_argument& error) {
+      fail(path, error.what());
+    }
+  }
+
+ private:
+  void fail(std::string path, std::string what) {
+    findings_.errors.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
+  }
+  void warn(std::string path, std::string what) {
+    findings_.warnings.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
+  }
+
+  void check_material(const Cloth& cloth) {
+    if (cloth.material.empty()) return;
+    const auto material = std::ranges::find(scene_.materials, cloth.material, &Material::name);
+    if (material != scene_.materials.end() && material->color.rgba.w() < 1)
+      warn(cloth.where.path + "/material", "cloths are drawn opaque, whatever the alpha of their colour");
+  }
+
+  void check_body(const PinScope& pin) {
+    if (pin.body.empty() || std::ranges::find(flat_.bodies, pin.body, &Body::name) != flat_.bodies.end())
+      return;
+    std::vector<std::string> names;
+    for (const Body& body : flat_.bodies) names.push_back(body.name);
+    fail(pin.where.path + "/body", "there is no body '" + pin.body + "'" + suggestion(pin.body, names));
+  }
+
+  void check_grid(const Cloth& cloth, FlatCloth flat) {
+    for (const ClothPin& pin : cloth.pins) {
+      const PinScope& scope = scope_of(pin);
+      if (scope.where.path.empty()) continue;  // its type was wrong, and none was read
+      const std::vector<uint32_t> held = pinned_vertices(pin, cloth, flat);
+      if (held.empty()) fail(scope.where.path, "holds no vertex of the cloth; " + extent(flat));
+    }
+    if (const std::string what = sim::problem(flat.def); !what.empty()) return fail(cloth.where.path, what);
+    if (const auto what = too_stiff(scene_, flat.def)) fail(cloth.where.path, *what);
+  }
+
+  static std::string extent(const FlatCloth& flat) {
+    sim::Aabb box;
+    for (const Vec3& p : flat.places) box.extend(p);
+    const auto &a = box.min(), &b = box.max();
+    return fmt::format("in its own frame it reaches from ({:g}, {:g}, {:g}) to ({:g}, {:g}, {:g})", a.x(),
+                       a.y(), a.z(), b.x(), b.y(), b.z());
+  }
+
+  const Scene& scene_;
+  const Scene& flat_;
+  std::filesystem::path folder_;
+  Findings& findings_;
+};
+
+}  // namespace
+
+void check_cloths(const Scene& scene, const Scene& flat, const std::filesystem::path& folder,
+                  Findings& findings) {
+  ClothChecker checker(scene, flat, folder, findings);
+  for (const Cloth& cloth : scene.cloths) checker.check(cloth);
+}
+
+std::optional<std::string> too_stiff(const Scene& scene, const sim::ClothDef& cloth) {
+  const sim::StableStep stable = sim::largest_stable_step(cloth);
+  const Real used = std::min({cloth.substep, scene.world.step, 1 / scene.output.fps});
+  if (used < stable.step) return {};
+  const sim::ClothSpring& spring = cloth.springs[stable.spring];
+  return fmt::format(
+      "its springs are too stiff for an explicit integrator: the {} spring between vertices {} and {} "
+      "({:.3g} "
+      "N/m) needs a substep less than {:.3g} s, got {:.3g} s; or use \"position_based\" or \"implicit\"",
+      kKinds.at(static_cast<std::size_t>(spring.kind)), spring.a, spring.b, spring.stiffness,
+      0.995 * stable.step, used);
+}
+
+}  // namespace offstage::producer

@@ -1,0 +1,89 @@
+#include "effects/fabric.h"
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+
+namespace offstage::effects {
+namespace {
+
+// Areal densities and bending rigidities are those of the trade's tables (Kawabata's measurements lie around
+// them). Stiffness along the threads is a tenth to a hundredth of the true one: at these loads it already is
+// far below a per cent, and what is stiffer only costs steps. Shear is what lets woven cloth drape in folds.
+const std::array<FabricPreset, 5> kPresets = {{
+    {"silk",
+     "light and flowing, many small folds",
+     {.areal_density = 0.06,
+      .stretch = 600,
+      .shear = 12,
+      .bend = 4e-6,
+      .damping = 0.02,
+      .friction = 0.25,
+      .self_friction = 0.2,
+      .thickness = 0.004,
+      .drag = 1,
+      .lift = 0.92}},
+    {"cotton",
+     "sheets, shirts, flags",
+     {.areal_density = 0.15,
+      .stretch = 1500,
+      .shear = 40,
+      .bend = 2e-5,
+      .damping = 0.04,
+      .friction = 0.45,
+      .self_friction = 0.35,
+      .thickness = 0.005,
+      .drag = 1,
+      .lift = 0.92}},
+    {"denim",
+     "heavy and stiff, few large folds",
+     {.areal_density = 0.4,
+      .stretch = 4000,
+      .shear = 250,
+      .bend = 2.5e-4,
+      .damping = 0.06,
+      .friction = 0.55,
+      .self_friction = 0.45,
+      .thickness = 0.006,
+      .drag = 1,
+      .lift = 0.92}},
+    {"leather",
+     "thick, hardly folds",
+     {.areal_density = 0.9,
+      .stretch = 9000,
+      .shear = 2500,
+      .bend = 2e-3,
+      .damping = 0.12,
+      .friction = 0.6,
+      .self_friction = 0.5,
+      .thickness = 0.007,
+      .drag = 1,
+      .lift = 0.92}},
+    {"rubber",
+     "a sheet that stretches and springs back",
+     {.areal_density = 1.2,
+      .stretch = 900,
+      .shear = 450,
+      .bend = 3e-4,
+      .damping = 0.03,
+      .friction = 0.9,
+      .self_friction = 0.9,
+      .thickness = 0.006,
+      .drag = 1,
+      .lift = 0.92,
+      .max_stretch = 2}},
+}};
+
+}  // namespace
+
+std::span<const FabricPreset> fabric_presets() {
+  return kPresets;
+}
+
+const FabricPreset* find_fabric(const std::string& name) {
+  const auto at =
+      std::find_if(kPresets.begin(), kPresets.end(), [&](const FabricPreset& p) { return p.name == name; });
+  return at == kPresets.end() ? nullptr : &*at;
+}
+
+}  // namespace offstage::effects

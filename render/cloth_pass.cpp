@@ -1,0 +1,75 @@
+#include "render/cloth_pass.h"
+
+#include <string>
+#include <vector>
+
+namespace offstage::render {
+namespace {
+
+constexpr GLuint kMaterialBlock = 1, kFirstTextureUnit = 1;
+
+gl::VertexArray make_layout() {
+  gl::VertexArray layout = gl::make_vertex_array();
+  gl::set_attribute(layout, 0, 0, 4, offsetof(ClothVertex, position));
+  gl::set_attribute(layout, 1, 0, 4, offsetof(ClothVertex, normal));
+  gl::set_attribute(layout, 2, 0, 2, offsetof(ClothVertex, uv));
+  return layout;
+}
+
+}  // namespace
+
+void ClothPass::prepare(Cloth& cloth) {
+  if (cloth.vertex_array == 0) cloth.vertex_array = make_layout();
+  cloth.vertices.write(cloth.surface.vertices());
+  if (cloth.uploaded != cloth.surface.version()) {
+    cloth.indices.write(std::span<const uint32_t>(cloth.surface.indices()));
+    cloth.uploaded = cloth.surface.version();
+  }
+  glVertexArrayVertexBuffer(cloth.vertex_array, 0, cloth.vertices, 0, sizeof(ClothVertex));
+  glVertexArrayElementBuffer(cloth.vertex_array, cloth.indices);
+}
+
+void ClothPass::draw_triangles(const Cloth& cloth) {
+  glBindVertexArray(cloth.vertex_array);
+  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(cloth.surface.indices().size()), GL_UNSIGNED_INT,
+                 nullptr);
+}
+
+void ClothPass::draw_shadow(const Cloth& cloth, const Matrix4f& shadow_clip_from_world) {
+  shadow_.use();
+  glUniformMatrix4fv(0, 1, GL_FALSE, shadow_clip_from_world.data());
+  draw_triangles(cloth);
+}
+
+gl::LazyProgram& ClothPass::program(const GpuMaterial& material, bool in_smoke) {
+  const bool textured = material.textures[0] != 0;
+  const auto key = std::make_tuple(material.weave, material.pattern, textured, in_smoke);
+  const auto found = programs_.find(key);
+  if (found != programs_.end()) return found->second;
+  std::vector<std::string> defines = {"WEAVE " + std::to_string(static_cast<int>(material.weave))};
+  std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "light.glsl", "material.glsl",
+                                            "noise.glsl"};
+  if (textured) defines.push_back("TEXTURED 1");
+  if (in_smoke) defines.push_back("SMOKE 1");
+  if (material.pattern != Pattern::none) {
+    defines.push_back("PATTERN " + std::to_string(static_cast<int>(material.pattern)));
+    fragment.push_back("pattern.glsl");
+  }
+  fragment.insert(fragment.end(), {"fabric.glsl", "cloth.frag"});
+  const std::vector<std::string_view> vertex = {"frame.glsl", "cloth.vert"};
+  return programs_.emplace(key, gl::LazyProgram(vertex, fragment, defines)).first->second;
+}
+
+void ClothPass::draw(const Cloth& cloth, bool in_smoke) {
+  program(*cloth.material, in_smoke).use();
+  glDisable(GL_CULL_FACE);
+  glFrontFace(GL_CCW);
+  glBindBufferBase(GL_UNIFORM_BUFFER, kMaterialBlock, cloth.material->uniforms);
+  if (cloth.material->textures[0] != 0) {
+    glBindTextureUnit(kFirstTextureUnit, cloth.material->textures[0]);
+    glUniform2f(0, cloth.texture_from_uv.x(), cloth.texture_from_uv.y());
+  }
+  draw_triangles(cloth);
+}
+
+}  // namespace offstage::render

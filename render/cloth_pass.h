@@ -1,0 +1,46 @@
+#pragma once
+/// Private: draws cloths, opaque, from both sides, and into the shadow map.
+
+#include <map>
+#include <span>
+#include <tuple>
+
+#include "render/cloth_surface.h"
+#include "render/frame.h"
+#include "render/gl.h"
+#include "render/mesh_pass.h"
+
+namespace offstage::render {
+
+/// A cloth as the stage holds it.
+struct Cloth {
+  const GpuMaterial* material = nullptr;
+  float thickness = 0;
+  Vector2f texture_from_uv = {1, 1};
+  bool casts_shadow = true;
+  ClothSurface surface;
+
+  gl::StreamBuffer vertices, indices;
+  uint32_t uploaded = 0;  ///< version of the indices
+  gl::VertexArray vertex_array;
+
+  bool is_seen() const { return !surface.vertices().empty() && !surface.indices().empty(); }
+};
+
+class ClothPass {
+ public:
+  ClothPass() : shadow_({"frame.glsl", "cloth.vert"}, {}, {"SHADOW 1"}) {}
+  /// Uploads a cloth as it is now.
+  void prepare(Cloth& cloth);
+  void draw_shadow(const Cloth& cloth, const Matrix4f& shadow_clip_from_world);
+  void draw(const Cloth& cloth, bool in_smoke);
+
+ private:
+  static void draw_triangles(const Cloth& cloth);
+  gl::LazyProgram& program(const GpuMaterial& material, bool in_smoke);
+
+  std::map<std::tuple<Weave, Pattern, bool, bool>, gl::LazyProgram> programs_;  ///< textured, in smoke
+  gl::LazyProgram shadow_;
+};
+
+}  // namespace offstage::render

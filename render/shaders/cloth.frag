@@ -1,0 +1,46 @@
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec4 normal;
+layout(location = 2) in vec3 place;
+layout(location = 0) uniform vec2 texture_from_uv;
+layout(location = 0) out vec4 color;
+
+void main() {
+  vec3 view = normalize(frame.eye.xyz - position);
+  float side = gl_FrontFacing ? 1.0 : -1.0;
+  vec3 n = normalize(normal.xyz) * side;
+  n = normalize(n + view * max(0.02 - dot(n, view), 0.0));  // smooth normals can turn away at outlines
+  vec2 uv = place.xy;
+  Surface s = Surface(material.color.rgb, material.surface.y, material.surface.x, material.emission.rgb);
+  vec2 slope = vec2(0.0);
+#ifdef PATTERN
+  PatternSample pattern = pattern_sample(vec3(uv, 0.0), vec3(0.0, 0.0, 1.0));
+  s.albedo = pattern.color;
+  s.roughness = saturate(s.roughness * pattern.roughness);
+  slope = pattern.slope.xy;
+#endif
+#ifdef TEXTURED
+  s.albedo *= texture(base_color_texture, uv * texture_from_uv).rgb;
+#endif
+  vec3 through = s.albedo;
+  if (material.sheen.w != 0.0) {
+    through = sqrt(s.albedo * material.back.rgb);
+    if (!gl_FrontFacing) s.albedo = material.back.rgb;
+  }
+  Threads weave = threads(uv);
+  s.albedo *= weave.shade;
+  through *= s.albedo / max(max(s.albedo.r, s.albedo.g), max(s.albedo.b, 1e-3));  // deeper: it went farther
+  slope += weave.slope;
+  mat2x3 along = cloth_frame(position, n, uv);
+  vec3 relief = normalize(n - side * (along[0] * slope.x + along[1] * slope.y));
+
+  // In folds the sky is hidden, but cloth is what hides it: light comes from there in the cloth's own colour.
+  float open = exp2(-2.2 * max(side * place.z, 0.0));
+  vec3 opened = open / (1.0 - s.albedo * (0.8 * (1.0 - open)));
+
+  // The side that the sun sees is the one that can be in shadow.
+  float towards_sun = dot(n, frame.sun_direction.xyz) < 0.0 ? -1.0 : 1.0;
+  vec3 lit = position + normal.xyz * (abs(normal.w) * towards_sun * side - normal.w);
+  float visibility = sun_visibility(lit, n * towards_sun);
+  vec3 radiance = shade_fabric(s, through, relief, view, visibility, opened);
+  color = vec4(apply_fog(radiance, position), 1.0);
+}

@@ -1,0 +1,76 @@
+// Threads and the light of fabrics. WEAVE is the number of the enumerator.
+struct Threads {
+  float shade;  // factor of the colour: darker between threads
+  vec2 slope;   // gradient of the height, along the cloth
+};
+
+// `uv` in metres along the weft and the warp.
+Threads threads(vec2 uv) {
+  Threads result = Threads(1.0, vec2(0.0));
+#if WEAVE > 0
+  float width = material.surface.z, relief = material.surface.w;
+  vec2 p = uv / width, dx = dFdx(p), dy = dFdy(p);
+  float footprint = sqrt(max(dot(dx, dx), dot(dy, dy)));
+  float near = visible(footprint, 1.0);
+  vec2 cell = floor(p), f = p - cell - 0.5;
+#if WEAVE == 1  // plain: one over, one under
+  bool warp = mod(cell.x + cell.y, 2.0) < 0.5;
+#elif WEAVE == 2  // twill: three over, one under, shifted by one
+  bool warp = mod(cell.x + cell.y, 4.0) > 0.5;
+#else  // satin: four over, one under, shifted by two
+  bool warp = mod(cell.x + 2.0 * cell.y, 5.0) > 0.5;
+#endif
+  // A round thread across its run, which dips under its neighbours at both ends of a float.
+  float across = warp ? f.x : f.y, along = warp ? f.y : f.x, far = 4.0 * across * across;
+  vec2 dip = vec2(across, 0.6 * along) * (-1.8 * relief * near);
+  result.slope = warp ? dip : dip.yx;
+  result.shade = 1.0 + 0.55 * relief * near * (0.2 - far * far);
+  // No two threads are alike: uneven along their length, by patches that a larger footprint can still see.
+  vec2 slub = vec2(noise(p * vec2(0.5, 0.03), 21u).x, noise(p * vec2(0.03, 0.5), 22u).x) - 0.5;
+  result.shade *= 1.0 + 0.22 * relief * (warp ? slub.x : slub.y) * near +
+                  0.10 * relief * (slub.x + slub.y) * (1.0 - near) * visible(footprint, 3.0);
+#endif
+  return result;
+}
+
+// Directions in which u and v grow on the surface (C. Schueler, "Followup: Normal Mapping Without Precomputed
+// Tangents", 2013), each of length about 1.
+mat2x3 cloth_frame(vec3 position, vec3 n, vec2 uv) {
+  vec3 px = dFdx(position), py = dFdy(position);
+  vec2 ux = dFdx(uv), uy = dFdy(uv);
+  vec3 a = cross(py, n), b = cross(n, px);
+  vec3 t = a * ux.x + b * uy.x, s = a * ux.y + b * uy.y;
+  return mat2x3(t, s) * inversesqrt(max(max(dot(t, t), dot(s, s)), 1e-20));
+}
+
+// A cloth: its fibres scatter light through it and, where it grazes, back (sheen by A. Estevez and C. Kulla,
+// "Production Friendly Microfacet Sheen BRDF", 2017, at roughness 1/4, with the visibility of D. Neubelt and
+// M. Pettineo, 2013). `open`: share of the sky that folds leave.
+vec3 shade_fabric(Surface s, vec3 through, vec3 normal, vec3 view, float visibility, vec3 open) {
+  vec3 l = frame.sun_direction.xyz;
+  vec3 h = normalize(l + view);
+  float cosine = dot(normal, l);
+  float nl = saturate(cosine), nv = max(abs(dot(normal, view)), 1e-3);
+  float nh = saturate(dot(normal, h)), vh = saturate(dot(view, h));
+
+  vec3 f0 = mix(vec3(0.04), s.albedo, s.metallic);
+  vec3 fresnel = fresnel_at(f0, vh);
+  float lobe = sun_lobe(sun_roughness(s.roughness), nl, nv, nh);
+  vec3 sheen = material.sheen.rgb * sqrt(s.albedo);  // fibres are dyed like the cloth
+  float grazing = 1.0 - nv, sheen_sky = 0.03 + 0.45 * grazing * grazing * grazing;
+  float sin2 = 1.0 - nh * nh, sheen_sun = 0.75 * sin2 * sin2 / (nl + nv - nl * nv);
+  float rest = 1.0 - max(sheen.r, max(sheen.g, sheen.b)) * sheen_sky;
+  vec3 diffuse = s.albedo * ((1.0 - s.metallic) * rest);
+
+  // What enters on one side is scattered until it leaves on either: light wraps softly around the edge of shadow.
+  float share = material.back.w, wrap = 0.35 * share, norm = 1.0 / ((1.0 + wrap) * (1.0 + wrap));
+  float front = saturate((cosine + wrap) * norm), behind = saturate((wrap - cosine) * norm);
+  vec3 sun = diffuse * (1.0 - fresnel) * ((1.0 - share) * front) + through * (share * behind) +
+             nl * (lobe * fresnel + sheen * sheen_sun);
+
+  vec3 reflectance = sky_reflectance(f0, s.roughness, nv);
+  vec3 above = ambient(normal), below = ambient(-normal);
+  vec3 sky = diffuse * (1.0 - reflectance) * (1.0 - share) * above + through * share * below +
+             sky_reflection(reflect(-view, normal), s.roughness) * reflectance + sheen * sheen_sky * above;
+  return frame.sun_radiance.rgb * visibility * sun + sky * open + s.emission;
+}

@@ -1,0 +1,215 @@
+#include "sim/cloth/cloth_contacts.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include "sim/collision/sphere_sweep.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr std::size_t kChunk = 1024;
+/// Share of an overlap that is taken back per sub-step of the world where a body lies on cloth that lies on
+/// something: gently, because the world moves the body only a sub-step later.
+constexpr Real kStabilization = 0.3;
+/// Two normals with a cosine below this face each other: what lies between is pinched.
+constexpr Real kFacing = -0.5;
+constexpr std::size_t kMaxTouches = 8;
+
+}  // namespace
+
+/// Near is what a point can come to within twice the way that it and the body make at their present speeds.
+void ClothContacts::look(const ClothPoints& points, uint32_t i, std::vector<Near>& found) const {
+  const Vec3 p = points.at(i);
+  const Vec3 v = points.velocity[i].head<3>();
+  for (uint32_t b = 0; b < bodies_.size(); ++b) {
+    if (!bodies_[b].collides) continue;
+    const Obstacle& way = bodies_[b].way();
+    const Real reach = seen_reach_[i];
+    if (boxes_[b].squaredExteriorDistance(p) > (reach + points.thickness[i]) * (reach + points.thickness[i]))
+      continue;
+    const Vec3 place = bodies_[b].end().point_to_body(p);
+    const SurfaceDistance s = signed_distance(way.solid, place);
+    const Real relative = (v - way.velocity_at(p, 0)).norm() * h_;
+    if (s.distance < points.thickness[i] + 2 * relative + reach) found.push_back({i, b, place, s.distance});
+  }
+}
+
+void ClothContacts::find(const ClothPoints& points, std::span<const uint8_t> collides,
+                         std::span<ClothBody> bodies, Real h) {
+  bodies_ = bodies;
+  collides_ = collides;
+  active_.assign(points.cloth.empty() ? 0 : points.cloth.back() + 1, 0);
+  h_ = h;
+  near_.clear();
+  boxes_.clear();
+  for (ClothBody& body : bodies) {
+    body.begin(0, 0, 0);
+    boxes_.push_back(body.way().swept_bounds());
+  }
+  seen_at_.resize(points.size());
+  seen_reach_.resize(points.size());
+  std::vector<std::vector<Near>> found((points.size() + kChunk - 1) / kChunk);
+  const auto chunk = [&](std::size_t c) {
+    for (std::size_t i = c * kChunk, end = std::min(points.size(), i + kChunk); i < end; ++i) {
+      seen_at_[i] = points.at(i);
+      // What acceleration may add; gravity alone makes 0.2 mm in 1/240 s.
+      seen_reach_[i] = points.thickness[i] + 2 * h * points.velocity[i].norm();
+      if (collides[i]) look(points, static_cast<uint32_t>(i), found[c]);
+    }
+  };
+  if (bodies.empty()) return;
+  tbb::parallel_for(std::size_t{0}, found.size(), chunk);
+  for (const auto& f : found) near_.insert(near_.end(), f.begin(), f.end());
+}
+
+void ClothContacts::find_runaways(const ClothPoints& points) {
+  if (bodies_.empty()) return;
+  std::vector<Near> found;
+  for (uint32_t i = 0; i < points.size(); ++i) {
+    const Vec3 p = points.at(i);
+    if ((p - seen_at_[i]).squaredNorm() <= seen_reach_[i] * seen_reach_[i] || !collides_[i]) continue;
+    seen_reach_[i] = points.thickness[i] + 2 * h_ * points.velocity[i].norm();
+    seen_at_[i] = p;
+    look(points, i, found);
+  }
+  if (found.empty()) return;
+  const auto same = [](const Near& a, const Near& b) { return a.point == b.point && a.body == b.body; };
+  const auto before = [](const Near& a, const Near& b) {
+    return a.point != b.point ? a.point < b.point : a.body < b.body;
+  };
+  near_.insert(near_.end(), found.begin(), found.end());
+  std::stable_sort(near_.begin(), near_.end(), before);
+  near_.erase(std::unique(near_.begin(), near_.end(), same), near_.end());
+}
+
+/// Whether a point is nearer to a body than the cloth's thickness, or came through its surface.
+bool ClothContacts::touch(const ClothPoints& points, Near& near, Touch& t) const {
+  ClothBody& body = bodies_[near.body];
+  const Real thickness = points.thickness[near.point];
+  const Vec3 place = body.end().point_to_body(points.at(near.point));
+  // The distance changes by no more than the point moves.
+  const Real moved = (place - near.place).norm();
+  if (near.distance - moved >= thickness) return false;
+  const Vec3 from = body.start().point_to_body(points.start_at(near.point));
+  t.near = &near;
+  t.body = &body;
+  if ((place - from).squaredNorm() > thickness * thickness / 4) {
+    if (const auto hit = sweep_sphere(body.solid(), from, place, thickness / 4)) {
+      const Vec3 centre = from + hit->fraction * (place - from);
+      t.gap = hit->normal.dot(place - centre) + hit->distance - thickness;
+      t.normal = body.end().vector_to_world(hit->normal);
+      t.on_body = body.end().point_to_world(centre - hit->distance * hit->normal);
+      near.place = place;
+      near.distance = -2 * thickness;  // unknown: it may be on the far side
+      return t.gap < 0;
+    }
+  }
+  const SurfaceDistance s = signed_distance(body.solid(), place);
+  near.place = place;
+  near.distance = s.distance;
+  t.gap = s.distance - thickness;
+  t.normal = body.end().vector_to_world(s.normal);
+  t.on_body = body.end().point_to_world(place - s.distance * s.normal);
+  return t.gap < 0;
+}
+
+void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<VelocityCut>& cuts) {
+  std::fill(active_.begin(), active_.end(), 0);
+  for (std::size_t k = 0; k < near_.size();) {
+    std::array<Touch, kMaxTouches> touches;
+    std::size_t count = 0;
+    const uint32_t point = near_[k].point;
+    for (; k < near_.size() && near_[k].point == point; ++k)
+      if (count < kMaxTouches && touch(points, near_[k], touches[count])) ++count;
+    if (count == 0) continue;
+    active_[points.cloth[point]] += count;
+    // What is fixed comes last, so that its surface is kept best.
+    std::stable_sort(
+        touches.begin(), touches.begin() + static_cast<std::ptrdiff_t>(count),
+        [](const Touch& a, const Touch& b) { return a.body->is_dynamic() > b.body->is_dynamic(); });
+    for (std::size_t a = 0; a < count; ++a) {
+      bool supported = points.inverse_mass[point] == 0;
+      for (std::size_t b = 0; b < count; ++b) {
+        if (touches[a].normal.dot(touches[b].normal) > kFacing) continue;
+        supported = true;
+        if (a < b && (touches[a].body->is_dynamic() || touches[b].body->is_dynamic()))
+          pinch(touches[a], touches[b]);
+      }
+      if (points.inverse_mass[point] == 0) block(touches[a]);
+      press(points, touches[a], dt, parts, supported && touches[a].body->is_dynamic(), cuts);
+    }
+  }
+}
+
+/// Two bodies with a point between them push each other, on velocities: they must not come nearer.
+void ClothContacts::pinch(Touch& a, Touch& b) {
+  const Vec3 n = (a.normal - b.normal).normalized();
+  const Real mobility = a.body->mobility(a.on_body, n) + b.body->mobility(b.on_body, n);
+  if (!(mobility > 0)) return;
+  const Real approach = n.dot(a.body->velocity(a.on_body) - b.body->velocity(b.on_body));
+  const Real overlap = -(a.gap + b.gap);
+  const Real impulse = (approach + kStabilization * overlap / h_) / mobility;
+  if (!(impulse > 0)) return;
+  a.body->push(-impulse * n, a.on_body);
+  b.body->push(impulse * n, b.on_body);
+  a.near->pressed += impulse;
+  b.near->pressed += impulse;
+}
+
+/// A body meets a point that a pin holds.
+void ClothContacts::block(Touch& t) {
+  const Real mobility = t.body->mobility(t.on_body, t.normal);
+  if (!(mobility > 0)) return;
+  const Real approach = t.normal.dot(t.body->velocity(t.on_body));
+  const Real impulse = (approach - kStabilization * t.gap / h_) / mobility;
+  if (!(impulse > 0)) return;
+  t.body->push(-impulse * t.normal, t.on_body);
+  t.near->pressed += impulse;
+}
+
+/// Puts a point out of one body; `supported`: another body holds it from behind, and pinch() moved this one.
+void ClothContacts::press(ClothPoints& points, Touch& t, Real dt, Real parts, bool supported,
+                          std::vector<VelocityCut>& cuts) {
+  const uint32_t i = t.near->point;
+  const Vec3& n = t.normal;
+  ClothBody& body = *t.body;
+  body.touched = true;
+  const Vec3 motion = points.at(i) - points.start_at(i) - body.surface_motion(t.on_body);
+  const Real w = points.inverse_mass[i];
+  if (!(w > 0)) return;
+  const Real already = std::min(t.gap - n.dot(motion), 0.0);  // gap at the start
+  Real pressed = t.near->pressed / parts * dt;                // [kg m]
+  Vec3 correction = Vec3::Zero();
+  if (!supported) {
+    const Real push = -t.gap / (w + body.mobility(t.on_body, n));
+    pressed += push;
+    correction = push * n;
+    if (already < 0) cuts.push_back({i, padded(std::min(-already, push * w) * n)});
+  }
+  const Vec3 slip = motion - n.dot(motion) * n;
+  const Real length = slip.norm();
+  if (length > 0) {
+    const Real friction = std::sqrt(points.friction[i] * body.way().friction);
+    const Vec3 along = slip / length;
+    const Real stick = length / (w + body.mobility(t.on_body, along));
+    correction -= std::min(stick, friction * pressed) * along;
+  }
+  points.position[i] += padded(w * correction);
+  body.push(-correction / dt, t.on_body);
+}
+
+void ClothContacts::measure(const ClothPoints& points, std::span<Real> penetration) const {
+  for (const Near& near : near_) {
+    const ClothBody& body = bodies_[near.body];
+    const Vec3 place = body.end().point_to_body(points.at(near.point));
+    if (near.distance - (place - near.place).norm() >= 0) continue;
+    Real& deepest = penetration[points.cloth[near.point]];
+    deepest = std::max(deepest, -signed_distance(body.solid(), place).distance);
+  }
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,132 @@
+#include "sim/cloth/cloth_forces.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace offstage::sim {
+namespace {
+
+/// The points of one cloth as their accelerations are made.
+struct Run {
+  const Cloth& cloth;
+  std::size_t first;
+  Real time;
+  ClothPoints& points;
+  Real total_mass;
+  std::vector<Vec3> air;  // velocity of it, at each point
+
+  std::size_t size() const { return cloth.points.size(); }
+  Vec3 at(std::size_t i) const { return points.at(first + i); }
+  Vec3 velocity(std::size_t i) const { return points.velocity[first + i].head<3>(); }
+  /// A force on the whole cloth gives each point its share by mass.
+  void accelerate(std::size_t i, const Vec3& force) {
+    points.acceleration[first + i] += padded(force / total_mass);
+  }
+};
+
+Vec3 direction(const Vec3& v) {
+  const Real length = v.norm();
+  return length > 0 ? Vec3(v / length) : Vec3(Vec3::Zero());
+}
+
+template <class Field, class Flow>
+void blow(const Field& f, Run& run, Flow&& flow) {
+  for (std::size_t i = 0; i < run.size(); ++i) {
+    const Real share = strength(f.region, f.drop_rate, run.at(i));
+    if (!(share > 0)) continue;
+    const Vec3 air = flow(i);
+    run.air[i] += share * air;
+    if (f.drag > 0) run.accelerate(i, share * f.drag * (air - run.velocity(i)));
+  }
+}
+
+void add(const WindField& f, Run& run) {
+  blow(f, run, [&](std::size_t) { return f.wind; });
+}
+void add(const Vortex& f, Run& run) {
+  blow(f, run, [&](std::size_t i) { return velocity(f, run.at(i)); });
+}
+void add(const Turbulence& f, Run& run) {
+  std::vector<Real> places, air(3 * run.size());
+  for (std::size_t i = 0; i < run.size(); ++i) {
+    const Vec3 p = run.at(i);
+    places.insert(places.end(), p.begin(), p.end());
+  }
+  TurbulentFlow(f, run.time).velocity(places, air);
+  blow(f, run, [&](std::size_t i) { return Vec3(air[3 * i], air[3 * i + 1], air[3 * i + 2]); });
+}
+void add(const ConstantField& f, Run& run) {
+  for (std::size_t i = 0; i < run.size(); ++i)
+    run.accelerate(i, strength(f.region, f.drop_rate, run.at(i)) * f.force);
+}
+void add(const PointField& f, Run& run) {
+  for (std::size_t i = 0; i < run.size(); ++i)
+    run.accelerate(i, strength(f.region, f.drop_rate, run.at(i)) * f.force * direction(f.point - run.at(i)));
+}
+void add(const Grab& f, Run& run) {
+  const Motion hand = f.track.at(run.time, Pose{});
+  for (std::size_t i = 0; i < run.size(); ++i) {
+    const Vec3 gap = run.at(i) - hand.pose.position;
+    if (gap.norm() > f.reach) continue;
+    run.accelerate(i, -f.stiffness * gap - f.damping * (run.velocity(i) - hand.velocity));
+  }
+}
+void add(const Explosion&, Run&) {}
+template <class PairLaw>
+void add(const PairLaw&, Run&) {
+  static_assert(kIsPairLaw<PairLaw>);
+}
+
+/// Drag and lift (ClothAir), a third to each corner.
+void blow_on_triangles(Run& run, Real h) {
+  const ClothAir& air = run.cloth.def.air;
+  if (!(air.density > 0) || !(air.drag > 0)) return;
+  for (const Triangle& t : run.cloth.triangles) {
+    const Vec3 a = run.at(t[0]);
+    const Vec3 doubled = (run.at(t[1]) - a).cross(run.at(t[2]) - a);
+    const Real size = doubled.norm();
+    if (!(size > 0)) continue;
+    const Vec3 n = doubled / size;
+    const Vec3 u = (run.air[t[0]] + run.air[t[1]] + run.air[t[2]] - run.velocity(t[0]) - run.velocity(t[1]) -
+                    run.velocity(t[2])) /
+                   3;
+    const Real scale = air.density * size / 4 * u.norm();  // rho A/2 |u|
+    const Real mass = run.cloth.masses[t[0]] + run.cloth.masses[t[1]] + run.cloth.masses[t[2]];
+    const Real rate = 2 * scale * air.drag / mass;
+    const Vec3 force = scale / (1 + h * rate) * ((air.drag - air.lift) * u + air.lift * u.dot(n) * n);
+    for (uint32_t corner : t)
+      run.points.acceleration[run.first + corner] += padded(force / (3 * run.cloth.masses[corner]));
+  }
+}
+
+void inflate(Run& run) {
+  const Cloth& cloth = run.cloth;
+  if (cloth.def.pressure == 0) return;
+  const Real volume = enclosed_volume(cloth.points, cloth.triangles);
+  // A volume of less than a tenth counts as that: what is crushed flat does not burst.
+  const Real pressure = cloth.def.pressure * cloth.rest_volume / std::max(volume, 0.1 * cloth.rest_volume);
+  for (const Triangle& t : cloth.triangles) {
+    const Vec3 a = run.at(t[0]);
+    const Vec3 third = pressure / 6 * (run.at(t[1]) - a).cross(run.at(t[2]) - a);
+    for (uint32_t corner : t)
+      run.points.acceleration[run.first + corner] += padded(third / cloth.masses[corner]);
+  }
+}
+
+}  // namespace
+
+void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather& weather,
+                      ClothPoints& points) {
+  Real total = 0;
+  for (Real m : cloth.masses) total += m;
+  Run run{cloth, first, weather.time, points, total, std::vector<Vec3>(cloth.points.size(), weather.wind)};
+  std::fill_n(points.acceleration.begin() + static_cast<std::ptrdiff_t>(first), run.size(),
+              padded(weather.gravity));
+  for (const ForceDef* f : weather.forces)
+    if (f->acts_on(cloth.handle) && f->is_on(weather.time))
+      std::visit([&](const auto& effect) { add(effect, run); }, f->effect);
+  blow_on_triangles(run, weather.h);
+  inflate(run);
+}
+
+}  // namespace offstage::sim

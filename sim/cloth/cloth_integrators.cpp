@@ -1,0 +1,212 @@
+#include "sim/cloth/cloth_integrators.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace offstage::sim {
+namespace {
+
+constexpr int kMaxIterations = 300;
+/// Of the residual against the right side, in the preconditioner's norm, squared.
+constexpr Real kTolerance2 = 1e-12;
+
+using Run = std::vector<Vec4>;
+
+bool is_held(const ClothPoints& points, std::size_t i) {
+  return !(points.inverse_mass[i] > 0);
+}
+
+/// Velocity of what is held through the sub-step.
+Vec4 held_velocity(const ClothPoints& points, std::size_t i, Real h) {
+  return (points.position[i] - points.start[i]) / h;
+}
+
+/// Accelerations at positions and velocities of a run; 0 of what is held.
+void accelerate(const ClothPoints& points, const ClothRange& cloth, const Run& x, const Run& v, Run& a) {
+  std::fill(a.begin(), a.end(), Vec4::Zero());
+  for (const ClothSpring& s : cloth.springs) {
+    const std::size_t i = s.a - cloth.begin, j = s.b - cloth.begin;
+    const Vec4 d = x[i] - x[j];
+    const Real length = d.norm();
+    if (!(length > 0)) continue;
+    const Vec4 u = d / length;
+    const Vec4 force = (s.stiffness * (length - s.rest_length) + s.damping * u.dot(v[i] - v[j])) * u;
+    a[i] -= force;
+    a[j] += force;
+  }
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const std::size_t k = cloth.begin + i;
+    a[i] = is_held(points, k) ? Vec4(Vec4::Zero())
+                              : Vec4(points.inverse_mass[k] * a[i] + points.acceleration[k]);
+  }
+}
+
+/// Where a run starts, with the velocity of what is held.
+void begin(const ClothPoints& points, const ClothRange& cloth, Real h, Run& x, Run& v) {
+  x.assign(points.start.begin() + static_cast<std::ptrdiff_t>(cloth.begin),
+           points.start.begin() + static_cast<std::ptrdiff_t>(cloth.end));
+  v.resize(x.size());
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    const std::size_t k = cloth.begin + i;
+    v[i] = is_held(points, k) ? held_velocity(points, k, h) : points.velocity[k];
+  }
+}
+
+/// The matrix of backward Euler: of each spring alpha u u^T + beta 1 between its ends, and the masses.
+class ImplicitSystem {
+ public:
+  ImplicitSystem(const ClothPoints& points, const ClothRange& cloth, Real h)
+      : points_(points), cloth_(cloth) {
+    block_.assign(cloth.end - cloth.begin, Mat3::Zero());
+    for (std::size_t i = 0; i < block_.size(); ++i)
+      block_[i].diagonal().setConstant(points.mass[cloth.begin + i]);
+    for (const ClothSpring& s : cloth.springs) {
+      const Vec4 d = points.start[s.a] - points.start[s.b];
+      const Real length = d.norm();
+      const Vec4 u = length > 0 ? Vec4(d / length) : Vec4(Vec4::Zero());
+      const Real sideways = length > s.rest_length ? 1 - s.rest_length / length : 0;
+      const Real stiff = h * h * s.stiffness;
+      const Link link{u, stiff * (1 - sideways) + h * s.damping, stiff * sideways,
+                      s.stiffness * (length - s.rest_length)};
+      links_.push_back(link);
+      const Mat3 k = link.along * u.head<3>() * u.head<3>().transpose() + link.across * Mat3::Identity();
+      block_[s.a - cloth.begin] += k;
+      block_[s.b - cloth.begin] += k;
+    }
+    for (Mat3& b : block_) b = b.inverse().eval();
+  }
+
+  /// y = A p, 0 where held.
+  void multiply(const Run& p, Run& y) const {
+    for (std::size_t i = 0; i < p.size(); ++i) y[i] = points_.mass[cloth_.begin + i] * p[i];
+    for (std::size_t k = 0; k < links_.size(); ++k) {
+      const ClothSpring& s = cloth_.springs[k];
+      const Link& link = links_[k];
+      const std::size_t a = s.a - cloth_.begin, b = s.b - cloth_.begin;
+      const Vec4 q = p[a] - p[b];
+      const Vec4 f = link.along * link.direction.dot(q) * link.direction + link.across * q;
+      y[a] += f;
+      y[b] -= f;
+    }
+    clear_held(y);
+  }
+
+  void precondition(const Run& r, Run& z) const {
+    for (std::size_t i = 0; i < r.size(); ++i) z[i] = padded(block_[i] * r[i].head<3>());
+  }
+
+  /// M v + h (spring forces + M a), 0 where held.
+  Run right_side(const Run& v, Real h) const {
+    Run b(v.size());
+    for (std::size_t i = 0; i < b.size(); ++i) {
+      const std::size_t k = cloth_.begin + i;
+      b[i] = points_.mass[k] * (v[i] + h * points_.acceleration[k]);
+    }
+    for (std::size_t k = 0; k < links_.size(); ++k) {
+      const Vec4 f = h * links_[k].force * links_[k].direction;
+      b[cloth_.springs[k].a - cloth_.begin] -= f;
+      b[cloth_.springs[k].b - cloth_.begin] += f;
+    }
+    clear_held(b);
+    return b;
+  }
+
+ private:
+  struct Link {
+    Vec4 direction;
+    Real along, across, force;
+  };
+
+  void clear_held(Run& y) const {
+    for (std::size_t i = 0; i < y.size(); ++i)
+      if (is_held(points_, cloth_.begin + i)) y[i].setZero();
+  }
+
+  const ClothPoints& points_;
+  const ClothRange& cloth_;
+  std::vector<Link> links_;
+  std::vector<Mat3> block_;  // inverse
+};
+
+Real dot(const Run& a, const Run& b) {
+  Real sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i].dot(b[i]);
+  return sum;
+}
+
+/// Preconditioned conjugate gradients from a guess v, whose held points keep it.
+bool solve(const ImplicitSystem& system, const Run& b, Run& v) {
+  Run r(v.size()), z(v.size()), y(v.size());
+  system.multiply(v, y);
+  for (std::size_t i = 0; i < r.size(); ++i) r[i] = b[i] - y[i];
+  system.precondition(b, z);
+  const Real enough = kTolerance2 * dot(b, z);
+  system.precondition(r, z);
+  Run p = z;
+  Real rz = dot(r, z);
+  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
+    if (!(rz > enough)) return true;
+    system.multiply(p, y);
+    const Real step = rz / dot(p, y);
+    for (std::size_t i = 0; i < v.size(); ++i) {
+      v[i] += step * p[i];
+      r[i] -= step * y[i];
+    }
+    system.precondition(r, z);
+    const Real next = dot(r, z);
+    for (std::size_t i = 0; i < p.size(); ++i) p[i] = z[i] + next / rz * p[i];
+    rz = next;
+  }
+  return false;
+}
+
+}  // namespace
+
+void step_symplectic(ClothPoints& points, const ClothRange& cloth, Real h) {
+  Run x, v;
+  begin(points, cloth, h, x, v);
+  Run a(x.size());
+  accelerate(points, cloth, x, v, a);
+  for (std::size_t i = 0; i < x.size(); ++i)
+    if (!is_held(points, cloth.begin + i)) points.position[cloth.begin + i] = x[i] + h * (v[i] + h * a[i]);
+}
+
+void step_rk4(ClothPoints& points, const ClothRange& cloth, Real h, std::span<Vec4> kick) {
+  Run x, v;
+  begin(points, cloth, h, x, v);
+  const std::size_t n = x.size();
+  const std::array<Real, 4> at = {0, h / 2, h / 2, h}, share = {h / 6, h / 3, h / 3, h / 6};
+  Run dx(v), dv(n, Vec4::Zero()), stage_x(n), stage_v(n), move(n, Vec4::Zero()), gain(n, Vec4::Zero());
+  for (std::size_t k = 0; k < 4; ++k) {
+    for (std::size_t i = 0; i < n; ++i) {
+      stage_x[i] = x[i] + at[k] * dx[i];
+      stage_v[i] = v[i] + at[k] * dv[i];
+    }
+    accelerate(points, cloth, stage_x, stage_v, dv);
+    dx = stage_v;
+    for (std::size_t i = 0; i < n; ++i) {
+      move[i] += share[k] * dx[i];
+      gain[i] += share[k] * dv[i];
+    }
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t k = cloth.begin + i;
+    if (is_held(points, k)) continue;
+    points.position[k] = x[i] + move[i];
+    kick[k] = v[i] + gain[i] - move[i] / h;
+  }
+}
+
+bool step_implicit(ClothPoints& points, const ClothRange& cloth, Real h) {
+  Run x, v;
+  begin(points, cloth, h, x, v);
+  const ImplicitSystem system(points, cloth, h);
+  const Run b = system.right_side(v, h);
+  const bool converged = solve(system, b, v);
+  for (std::size_t i = 0; i < x.size(); ++i)
+    if (!is_held(points, cloth.begin + i)) points.position[cloth.begin + i] = x[i] + h * v[i];
+  return converged;
+}
+
+}  // namespace offstage::sim

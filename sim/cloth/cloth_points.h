@@ -1,0 +1,36 @@
+#pragma once
+/// The points of all cloths of a world, as structures of arrays.
+
+#include <cstdint>
+#include <vector>
+
+#include "sim/geometry/mesh.h"
+#include "sim/types.h"
+
+namespace offstage::sim {
+
+/// x y z 0: aligned, so that one instruction handles it.
+using Vec4 = Eigen::Vector4d;
+
+inline Vec4 padded(const Vec3& p) {
+  return {p.x(), p.y(), p.z(), 0};
+}
+
+struct ClothPoints {
+  std::vector<Vec4> position;
+  std::vector<Vec4> start;         ///< position at the start of the cloth's sub-step
+  std::vector<Vec4> velocity;      ///< mean of the last sub-step of the cloth
+  std::vector<Vec4> acceleration;  ///< by everything but springs and contacts
+  std::vector<Vec4> rest;          ///< in the unstrained cloth
+  std::vector<Vec4> pull;          ///< impulse times the sub-step, that springs gave what pins hold [kg m]
+  std::vector<Real> mass;          ///< [kg]
+  std::vector<Real> inverse_mass;  ///< 0 of what pins hold
+  std::vector<Real> thickness, friction, self_friction;
+  std::vector<uint32_t> cloth;  ///< which it belongs to
+
+  std::size_t size() const { return position.size(); }
+  Vec3 at(std::size_t i) const { return position[i].head<3>(); }
+  Vec3 start_at(std::size_t i) const { return start[i].head<3>(); }
+};
+
+}  // namespace offstage::sim

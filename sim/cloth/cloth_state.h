@@ -1,0 +1,36 @@
+#pragma once
+/// One cloth of a world between steps.
+
+#include "sim/cloth/cloth.h"
+
+namespace offstage::sim {
+
+struct Cloth {
+  /// `def` must have no problem().
+  Cloth(ClothHandle cloth, const ClothDef& definition);
+
+  ClothView view() const { return {points, velocities, triangles, sources, version}; }
+
+  ClothHandle handle;
+  ClothDef def;
+  std::vector<Vec3> points, velocities, rest;
+  std::vector<Real> masses;
+  std::vector<uint32_t> sources;
+  std::vector<Triangle> triangles;
+  std::vector<ClothSpring> springs;  ///< those that hold
+  std::vector<ClothPin> pins;        ///< those that hold
+  std::vector<Real> seam_lengths;    ///< at the start [m]
+  Real rest_volume = 0;              ///< inside of a closed one [m^3]
+  Real age = 0;                      ///< [s]
+  uint32_t version = 0;
+  bool stopped = false;  ///< lost its numbers: is left where it was
+  ClothReport report;
+};
+
+/// Volume inside of a closed surface by the divergence theorem [m^3].
+Real enclosed_volume(std::span<const Vec3> points, std::span<const Triangle> triangles);
+
+/// Of its springs [J].
+Real elastic_energy(const Cloth& cloth);
+
+}  // namespace offstage::sim

@@ -1,0 +1,298 @@
+#include "sim/cloth/cloth_system.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sim/cloth/cloth_integrators.h"
+#include "sim/cloth/tearing.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Rounds of shortening moves; what is not right then is put back to where it started.
+constexpr int kMaxRounds = 64;
+/// Substeps of cloth in one of the world.
+constexpr Real kMaxParts = 1000;
+/// Stretch is not limited so that cloth could not tear: the limit is at least this much above.
+constexpr Real kBeyondTear = 1.05;
+/// For how long pairs of cloth with cloth are sought at a time [s].
+constexpr Real kHorizon = 1.0 / 120;
+
+}  // namespace
+
+void ClothSystem::assign(std::vector<Cloth*> cloths) {
+  cloths_ = std::move(cloths);
+  changed_ = true;
+}
+
+/// Lays out the points and springs of all cloths after each other.
+void ClothSystem::assemble() {
+  changed_ = false;
+  points_ = {};
+  first_.clear();
+  collides_.clear();
+  seams_.clear();
+  all_springs_.clear();
+  first_spring_.clear();
+  std::vector<ClothSpring> swept;
+  std::vector<StretchLimit::Limit> limits;
+  std::vector<Triangle> colliding;
+  for (uint32_t c = 0; c < cloths_.size(); ++c) {
+    const Cloth& cloth = *cloths_[c];
+    const auto first = static_cast<uint32_t>(points_.size());
+    first_.push_back(first);
+    for (std::size_t i = 0; i < cloth.points.size(); ++i) {
+      points_.position.push_back(padded(cloth.points[i]));
+      points_.velocity.push_back(padded(cloth.velocities[i]));
+      points_.rest.push_back(padded(cloth.rest[i]));
+      points_.mass.push_back(cloth.masses[i]);
+      points_.thickness.push_back(cloth.def.thickness);
+      points_.friction.push_back(cloth.def.friction);
+      points_.self_friction.push_back(cloth.def.self_friction);
+      points_.cloth.push_back(c);
+      collides_.push_back(cloth.def.collides && !cloth.stopped);
+    }
+    first_spring_.push_back(all_springs_.size());
+    for (ClothSpring s : cloth.springs) {
+      s.a += first;
+      s.b += first;
+      all_springs_.push_back(s);
+      if (cloth.def.integrator == ClothIntegrator::position_based) swept.push_back(s);
+      Real limit = s.kind == SpringKind::stretch ? cloth.def.max_stretch
+                   : s.kind == SpringKind::shear ? cloth.def.max_shear
+                                                 : 0;
+      if (limit > 0 && s.kind == SpringKind::stretch) limit = std::max(limit, kBeyondTear * cloth.def.tear);
+      if (limit > 0) limits.push_back({s.a, s.b, s.rest_length, limit * s.rest_length});
+    }
+    if (cloth.def.self_collision)
+      for (const Triangle& t : cloth.triangles)
+        colliding.push_back({first + t[0], first + t[1], first + t[2]});
+    for (std::size_t k = 0; k < cloth.def.seams.size(); ++k)
+      seams_.push_back({first + cloth.def.seams[k].a, first + cloth.def.seams[k].b, 0, cloth.seam_lengths[k],
+                        cloth.def.seam_time});
+  }
+  first_spring_.push_back(all_springs_.size());
+  kick_.assign(points_.size(), Vec4::Zero());
+  points_.start = points_.position;
+  points_.acceleration.assign(points_.size(), Vec4::Zero());
+  points_.pull.assign(points_.size(), Vec4::Zero());
+  springs_.assign(swept, points_.size());
+  limit_.assign(std::move(limits));
+  self_contacts_.assign(std::move(colliding), points_);
+}
+
+Aabb ClothSystem::reach(Real h) const {
+  Aabb box;
+  for (const Cloth* cloth : cloths_)
+    for (std::size_t i = 0; i < cloth->points.size(); ++i) {
+      const Vec3 around = Vec3::Constant(2 * cloth->def.thickness + 2 * h * cloth->velocities[i].norm());
+      box.extend(Vec3(cloth->points[i] - around));
+      box.extend(Vec3(cloth->points[i] + around));
+    }
+  return box;
+}
+
+/// What pins hold has no inverse mass in this sub-step of the world.
+void ClothSystem::find_held(Real time, std::span<ClothBody> bodies) {
+  held_.clear();
+  for (std::size_t i = 0; i < points_.size(); ++i) points_.inverse_mass[i] = 1 / points_.mass[i];
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    Cloth& cloth = *cloths_[c];
+    std::erase_if(cloth.pins, [&](const ClothPin& pin) { return pin.until <= time; });
+    for (const ClothPin& pin : cloth.pins) {
+      const auto point = static_cast<uint32_t>(first_[c]) + pin.vertex;
+      ClothBody* body = nullptr;
+      if (pin.body) {
+        const auto at = std::find_if(bodies.begin(), bodies.end(),
+                                     [&](const ClothBody& b) { return b.way().body == pin.body.index; });
+        if (at == bodies.end()) continue;
+        body = &*at;
+      }
+      points_.inverse_mass[point] = 0;
+      held_.push_back({point, body, pin.position});
+    }
+    if (cloth.stopped)
+      std::fill_n(points_.inverse_mass.begin() + static_cast<std::ptrdiff_t>(first_[c]), cloth.points.size(),
+                  0.0);
+  }
+}
+
+void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies) {
+  if (cloths_.empty()) return;
+  if (changed_) assemble();
+  bodies_ = bodies;
+  points_.inverse_mass.resize(points_.size());
+  Real longest = weather.h;
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    longest = std::min(longest, cloths_[c]->def.substep);
+    add_outer_forces(*cloths_[c], first_[c], weather, points_);
+  }
+  const Real parts = std::clamp(std::ceil(weather.h / longest * (1 - 1e-12)), 1.0, kMaxParts);
+  const Real dt = weather.h / parts;
+  parts_ = parts;
+  find_held(weather.time, bodies);
+  contacts_.find(points_, collides_, bodies, weather.h);
+  for (Real k = 0; k < parts; ++k) {
+    for (Cloth* cloth : cloths_) cloth->age += dt;
+    substep(k / parts, (k + 1) / parts, dt);
+  }
+  count_penetration();
+  write_back();
+}
+
+void ClothSystem::substep(Real from, Real to, Real dt) {
+  for (ClothBody& body : bodies_) body.begin(from, to, dt);
+  points_.start = points_.position;
+  cuts_.clear();
+  move_held();
+  integrate(dt);
+  close_seams();
+  if (!limit_.empty()) limit_.project(points_);
+  if (!self_contacts_.empty()) {
+    self_contacts_.find(points_, dt, kHorizon);
+    self_contacts_.solve(points_);
+  }
+  contacts_.find_runaways(points_);
+  contacts_.solve(points_, dt, parts_, cuts_);
+  shorten_moves(dt);
+  end_substep(dt);
+  pull_bodies(dt);
+}
+
+void ClothSystem::move_held() {
+  for (Held& held : held_) {
+    points_.position[held.point] =
+        padded(held.body ? held.body->end().point_to_world(held.position) : held.position);
+    points_.pull[held.point].setZero();
+  }
+}
+
+void ClothSystem::integrate(Real dt) {
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    const ClothIntegrator integrator = cloths_[c]->def.integrator;
+    const std::span springs(all_springs_);
+    const ClothRange range{first_[c], first_[c] + cloths_[c]->points.size(),
+                           springs.subspan(first_spring_[c], first_spring_[c + 1] - first_spring_[c])};
+    if (integrator == ClothIntegrator::symplectic) step_symplectic(points_, range, dt);
+    if (integrator == ClothIntegrator::rk4) step_rk4(points_, range, dt, kick_);
+    if (integrator == ClothIntegrator::implicit && !step_implicit(points_, range, dt))
+      ++cloths_[c]->report.unconverged;
+    if (integrator != ClothIntegrator::position_based) continue;
+    for (std::size_t i = range.begin; i < range.end; ++i)
+      if (points_.inverse_mass[i] > 0)
+        points_.position[i] += dt * (points_.velocity[i] + dt * points_.acceleration[i]);
+  }
+  springs_.sweep(points_, dt);
+}
+
+/// Seams draw together evenly in their time and then hold.
+void ClothSystem::close_seams() {
+  for (const Seam& s : seams_) {
+    const Cloth& cloth = *cloths_[points_.cloth[s.a]];
+    const Real open = std::max(0.0, 1 - cloth.age / s.time);
+    const Real length = std::max(open * s.open_length, cloth.def.self_collision ? cloth.def.thickness : 0.0);
+    const Vec4 d = points_.position[s.a] - points_.position[s.b];
+    const Real now = d.norm(), mass = points_.inverse_mass[s.a] + points_.inverse_mass[s.b];
+    if (now <= length || !(mass > 0)) continue;
+    const Vec4 move = (now - length) / (now * mass) * d;
+    points_.position[s.a] -= points_.inverse_mass[s.a] * move;
+    points_.position[s.b] += points_.inverse_mass[s.b] * move;
+  }
+}
+
+/// Until nothing is too long and nothing crossed.
+void ClothSystem::shorten_moves(Real dt) {
+  if (limit_.empty() && self_contacts_.empty()) return;
+  if (!self_contacts_.empty()) self_contacts_.find_doubtful(points_, dt, kHorizon);
+  shares_.assign(points_.size(), 1);
+  bool again = true;
+  for (int round = 0; again && round < kMaxRounds; ++round) {
+    again = limit_.shorten(points_, shares_);
+    if (!self_contacts_.empty()) again |= self_contacts_.shorten(points_, shares_);
+  }
+  for (uint32_t i : self_contacts_.take_held_back()) ++cloths_[points_.cloth[i]]->report.held_back;
+  for (uint32_t i : self_contacts_.take_crossed()) ++cloths_[points_.cloth[i]]->report.crossings;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (!(points_.inverse_mass[i] > 0)) continue;
+    const Real share = again ? 0 : shares_[i];
+    if (share == 1) continue;
+    ++cloths_[points_.cloth[i]]->report.limited;
+    points_.position[i] = points_.start[i] + share * (points_.position[i] - points_.start[i]);
+  }
+}
+
+void ClothSystem::end_substep(Real dt) {
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    points_.velocity[i] = (points_.position[i] - points_.start[i]) / dt + kick_[i];
+  if (!self_contacts_.empty()) self_contacts_.end_substep(points_, dt);
+  for (const VelocityCut& cut : cuts_) points_.velocity[cut.point] -= cut.move / dt;
+}
+
+/// Bodies feel what hangs on their pins.
+void ClothSystem::pull_bodies(Real dt) {
+  for (const Held& held : held_) {
+    if (!held.body || !held.body->is_dynamic()) continue;
+    const Vec4 weight = dt * points_.mass[held.point] * points_.acceleration[held.point];
+    held.body->push((points_.pull[held.point] / dt + weight).head<3>(), points_.at(held.point));
+  }
+}
+
+void ClothSystem::write_back() {
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    Cloth& cloth = *cloths_[c];
+    bool finite = true;
+    for (std::size_t i = 0; i < cloth.points.size(); ++i) {
+      finite &= points_.position[first_[c] + i].allFinite() && points_.velocity[first_[c] + i].allFinite();
+    }
+    if (!finite) {
+      stop(cloth, first_[c]);
+      continue;
+    }
+    for (std::size_t i = 0; i < cloth.points.size(); ++i) {
+      cloth.points[i] = points_.at(first_[c] + i);
+      cloth.velocities[i] = points_.velocity[first_[c] + i].head<3>();
+    }
+    const uint32_t torn = tear(cloth);
+    cloth.report.torn += torn;
+    changed_ |= torn > 0;
+  }
+}
+
+void ClothSystem::count_penetration() {
+  std::vector<Real> deepest(cloths_.size(), 0);
+  contacts_.measure(points_, deepest);
+  for (std::size_t c = 0; c < cloths_.size(); ++c)
+    cloths_[c]->report.penetration = std::max(cloths_[c]->report.penetration, deepest[c]);
+}
+
+void ClothSystem::measure() {
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    Cloth& cloth = *cloths_[c];
+    Real sum = 0;
+    std::size_t count = 0;
+    for (const ClothSpring& s : cloth.springs) {
+      if (s.kind != SpringKind::stretch) continue;
+      const Real strain = (cloth.points[s.a] - cloth.points[s.b]).norm() / s.rest_length - 1;
+      cloth.report.max_strain = std::max(cloth.report.max_strain, strain);
+      sum += std::abs(strain);
+      ++count;
+    }
+    cloth.report.mean_strain = count > 0 ? sum / static_cast<Real>(count) : 0;
+    if (c < contacts_.active().size()) cloth.report.contacts = contacts_.active()[c];
+    if (c < self_contacts_.active().size()) cloth.report.self_contacts = self_contacts_.active()[c];
+  }
+}
+
+/// A cloth that lost its numbers stays where it last was.
+void ClothSystem::stop(Cloth& cloth, std::size_t first) {
+  cloth.stopped = true;
+  cloth.report.finite = false;
+  for (std::size_t i = 0; i < cloth.points.size(); ++i) {
+    cloth.velocities[i].setZero();
+    points_.position[first + i] = padded(cloth.points[i]);
+    points_.velocity[first + i].setZero();
+  }
+  changed_ = true;
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,83 @@
+#pragma once
+/// All cloths of a world at work. In a sub-step of the world: outer forces, what can touch, then sub-steps of
+/// cloth, in each of which every cloth moves by its integrator, then its stretch limit, its contacts with
+/// cloth and those with bodies are solved, and at last moves are shortened until nothing is too long and no
+/// cloth went through cloth.
+
+#include <span>
+#include <vector>
+
+#include "sim/cloth/cloth_bodies.h"
+#include "sim/cloth/cloth_contacts.h"
+#include "sim/cloth/cloth_forces.h"
+#include "sim/cloth/cloth_points.h"
+#include "sim/cloth/cloth_springs.h"
+#include "sim/cloth/cloth_state.h"
+#include "sim/cloth/self_contacts.h"
+#include "sim/cloth/stretch_limit.h"
+
+namespace offstage::sim {
+
+class ClothSystem {
+ public:
+  /// The cloths to step, which must stay where they are until the next call.
+  void assign(std::vector<Cloth*> cloths);
+
+  /// Takes them through a sub-step of the world. `bodies` are those that may be touched or hold pins.
+  void step(const ClothWeather& weather, std::span<ClothBody> bodies);
+
+  /// Writes strains and counts of contacts into the cloths' reports.
+  void measure();
+
+  std::size_t pair_count() const { return self_contacts_.pair_count(); }  ///< of cloth near cloth
+  uint64_t searches() const { return self_contacts_.searches(); }         ///< for these, since the start
+
+  /// Around all points and where they may come to within h.
+  Aabb reach(Real h) const;
+
+ private:
+  struct Held {
+    uint32_t point;
+    ClothBody* body;  // null: the world
+    Vec3 position;
+  };
+  struct Seam {
+    uint32_t a, b;
+    Real length, open_length, time;  // now, at the start [m]; in which it closes [s]
+  };
+
+  void assemble();
+  void find_held(Real time, std::span<ClothBody> bodies);
+  void substep(Real from, Real to, Real dt);
+  void move_held();
+  void integrate(Real dt);
+  void close_seams();
+  void shorten_moves(Real dt);
+  void end_substep(Real dt);
+  void pull_bodies(Real dt);
+  void write_back();
+  void stop(Cloth& cloth, std::size_t first);
+  void count_penetration();
+
+  std::vector<Cloth*> cloths_;
+  std::vector<std::size_t> first_;         // point of each cloth
+  std::vector<ClothSpring> all_springs_;   // by cloth, between points of all
+  std::vector<std::size_t> first_spring_;  // of each cloth, and the end
+  std::vector<Vec4> kick_;                 // of velocities at the end of a sub-step, beside their moves
+  bool changed_ = false;
+  Real parts_ = 1;  // sub-steps of cloth in one of the world
+
+  ClothPoints points_;
+  ClothSprings springs_;
+  StretchLimit limit_;
+  ClothContacts contacts_;
+  SelfContacts self_contacts_;
+  std::vector<uint8_t> collides_;
+  std::vector<Held> held_;
+  std::vector<Seam> seams_;
+  std::vector<VelocityCut> cuts_;
+  MoveShares shares_;
+  std::span<ClothBody> bodies_;
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,127 @@
+#include "sim/cloth/cloth_tree.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+namespace offstage::sim {
+namespace {
+
+constexpr uint32_t kLeaf = 4;
+/// A patch is flat enough if all its normals have at least this cosine with a common direction.
+constexpr Real kLeaning = 0.3;
+
+/// The number of the connected piece of each triangle: its least point.
+std::vector<uint32_t> pieces(std::span<const Triangle> triangles, std::size_t point_count) {
+  std::vector<uint32_t> parent(point_count);
+  std::iota(parent.begin(), parent.end(), 0u);
+  const auto root = [&](uint32_t i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  for (const Triangle& t : triangles) {
+    const std::array<uint32_t, 3> r = {root(t[0]), root(t[1]), root(t[2])};
+    for (uint32_t k : r) parent[k] = std::min({r[0], r[1], r[2]});
+  }
+  std::vector<uint32_t> piece;
+  for (const Triangle& t : triangles) piece.push_back(root(t[0]));
+  return piece;
+}
+
+}  // namespace
+
+void ClothTree::build(std::span<const Triangle> triangles, std::span<const Vec4> points) {
+  triangles_.assign(triangles.begin(), triangles.end());
+  order_.resize(triangles.size());
+  std::iota(order_.begin(), order_.end(), 0u);
+  piece_ = pieces(triangles, points.size());
+  std::stable_sort(order_.begin(), order_.end(),
+                   [&](uint32_t a, uint32_t b) { return piece_[a] < piece_[b]; });
+  boxes_.resize(triangles.size());
+  nodes_.clear();
+  std::vector<Vec4> centres;
+  for (const Triangle& t : triangles) centres.push_back((points[t[0]] + points[t[1]] + points[t[2]]) / 3);
+  if (!triangles.empty()) build_below(centres, 0, static_cast<uint32_t>(triangles.size()));
+}
+
+/// Parts between pieces first; a piece is halved along its longest axis.
+uint32_t ClothTree::build_below(const std::vector<Vec4>& centres, uint32_t first, uint32_t count) {
+  const auto at = static_cast<uint32_t>(nodes_.size());
+  nodes_.emplace_back();
+  nodes_[at].first = first;
+  nodes_[at].count = count;
+  nodes_[at].second = 0;
+  nodes_[at].connected = piece_[order_[first]] == piece_[order_[first + count - 1]];
+  if (count <= kLeaf) return at;
+  uint32_t half = count / 2;
+  if (!nodes_[at].connected) {
+    // Where the piece in the middle begins or, if that is the first, ends.
+    const auto begin = order_.begin() + first;
+    const uint32_t middle = piece_[*(begin + half)];
+    const auto same = [&](uint32_t t) { return piece_[t] == middle; };
+    half = static_cast<uint32_t>(std::find_if(begin, begin + count, same) - begin);
+    if (half == 0) half = static_cast<uint32_t>(std::find_if_not(begin, begin + count, same) - begin);
+  } else {
+    halve(centres, first, count, half);
+  }
+  build_below(centres, first, half);
+  const uint32_t second = build_below(centres, first + half, count - half);
+  nodes_[at].second = second;
+  return at;
+}
+
+void ClothTree::halve(const std::vector<Vec4>& centres, uint32_t first, uint32_t count, uint32_t half) {
+  Vec4 low = centres[order_[first]], high = low;
+  for (uint32_t i = first; i < first + count; ++i) {
+    low = low.cwiseMin(centres[order_[i]]);
+    high = high.cwiseMax(centres[order_[i]]);
+  }
+  int axis;
+  (high - low).head<3>().maxCoeff(&axis);
+  const auto begin = order_.begin() + first;
+  std::nth_element(begin, begin + half, begin + count, [&](uint32_t a, uint32_t b) {
+    return centres[a][axis] != centres[b][axis] ? centres[a][axis] < centres[b][axis] : a < b;
+  });
+}
+
+void ClothTree::fit(std::span<const Vec4> from, std::span<const Vec4> to, std::span<const Real> margin) {
+  std::vector<Vec4> normals(order_.size());
+  for (std::size_t i = 0; i < order_.size(); ++i) {
+    const Triangle& t = triangles_[order_[i]];
+    const Vec4 &a = from[t[0]], &b = from[t[1]], &c = from[t[2]];
+    const Vec4 low = a.cwiseMin(b).cwiseMin(c).cwiseMin(to[t[0]]).cwiseMin(to[t[1]]).cwiseMin(to[t[2]]);
+    const Vec4 high = a.cwiseMax(b).cwiseMax(c).cwiseMax(to[t[0]]).cwiseMax(to[t[1]]).cwiseMax(to[t[2]]);
+    const Vec4 around = Vec4::Constant(std::max({margin[t[0]], margin[t[1]], margin[t[2]]}));
+    boxes_[i] = {low - around, high + around};
+    const Vec3 n = (b - a).head<3>().cross((c - a).head<3>());
+    const Real size = n.norm();
+    normals[i] = size > 0 ? padded(n / size) : Vec4(Vec4::Zero());
+  }
+  for (std::size_t k = nodes_.size(); k-- > 0;) {
+    Node& node = nodes_[k];
+    if (node.second != 0) {
+      const Node &a = nodes_[k + 1], &b = nodes_[node.second];
+      node.low = a.low.cwiseMin(b.low);
+      node.high = a.high.cwiseMax(b.high);
+      node.normal_low = a.normal_low.cwiseMin(b.normal_low);
+      node.normal_high = a.normal_high.cwiseMax(b.normal_high);
+    } else {
+      node.low = boxes_[node.first].low;
+      node.high = boxes_[node.first].high;
+      node.normal_low = node.normal_high = normals[node.first];
+      for (uint32_t i = node.first + 1; i < node.first + node.count; ++i) {
+        node.low = node.low.cwiseMin(boxes_[i].low);
+        node.high = node.high.cwiseMax(boxes_[i].high);
+        node.normal_low = node.normal_low.cwiseMin(normals[i]);
+        node.normal_high = node.normal_high.cwiseMax(normals[i]);
+      }
+    }
+    const Vec4 middle = node.normal_low + node.normal_high;
+    const Real size = middle.norm();
+    const Vec4 least = (middle.cwiseProduct(node.normal_low)).cwiseMin(middle.cwiseProduct(node.normal_high));
+    node.leans = node.connected && least.sum() > kLeaning * size;
+  }
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,124 @@
+#pragma once
+/// Tree of boxes over the triangles of all cloths, refitted as they move, that finds which may touch each
+/// other. A connected patch whose normals all lean to one side cannot touch itself and is passed over whole
+/// (Volino and Magnenat-Thalmann, "Efficient self-collision detection on smoothly discretized surface
+/// animations using geometrical shape regularity", 1994; the outline of a patch is not tested).
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "sim/cloth/cloth_points.h"
+
+namespace offstage::sim {
+
+class ClothTree {
+ public:
+  /// Triangles that may touch others, over the points of the unstrained cloths.
+  void build(std::span<const Triangle> triangles, std::span<const Vec4> rest);
+  /// Fits boxes around the triangles on their ways from `from` to `to`, larger by each point's `margin`.
+  void fit(std::span<const Vec4> from, std::span<const Vec4> to, std::span<const Real> margin);
+
+  /// Calls visit(a, b) for pairs of triangles whose boxes meet, each once, in an order that depends on the
+  /// tree and the boxes alone.
+  template <class Visit>
+  void pairs(Visit&& visit) const;
+  /// Calls visit(triangle) for those whose boxes meet `box`.
+  template <class Visit>
+  void overlapping(const Aabb& box, Visit&& visit) const;
+
+  Aabb bounds() const {
+    return nodes_.empty() ? Aabb() : Aabb(nodes_[0].low.head<3>(), nodes_[0].high.head<3>());
+  }
+
+ private:
+  struct Node {
+    Vec4 low, high;                // box
+    Vec4 normal_low, normal_high;  // of the unit normals
+    uint32_t first, count;         // triangles, in order_
+    uint32_t second;               // node; the first child is the next one. 0: a leaf
+    bool connected = false;        // all of it one piece
+    bool leans = false;            // that, and all normals to one side
+  };
+  struct Box {
+    Vec4 low, high;
+  };
+
+  uint32_t build_below(const std::vector<Vec4>& centres, uint32_t first, uint32_t count);
+  void halve(const std::vector<Vec4>& centres, uint32_t first, uint32_t count, uint32_t half);
+  template <class Visit>
+  void within(uint32_t node, Visit& visit) const;
+  template <class Visit>
+  void between(uint32_t a, uint32_t b, Visit& visit) const;
+  static bool meet(const Vec4& low_a, const Vec4& high_a, const Vec4& low_b, const Vec4& high_b) {
+    return (low_a.array() <= high_b.array()).all() && (low_b.array() <= high_a.array()).all();
+  }
+
+  std::vector<Triangle> triangles_;
+  std::vector<uint32_t> order_;
+  std::vector<uint32_t> piece_;  // connected piece of each triangle
+  std::vector<Box> boxes_;       // in the order of order_
+  std::vector<Node> nodes_;
+};
+
+template <class Visit>
+void ClothTree::pairs(Visit&& visit) const {
+  if (!nodes_.empty()) within(0, visit);
+}
+
+template <class Visit>
+void ClothTree::within(uint32_t at, Visit& visit) const {
+  const Node& node = nodes_[at];
+  if (node.leans) return;
+  if (node.second != 0) {
+    within(at + 1, visit);
+    within(node.second, visit);
+    between(at + 1, node.second, visit);
+    return;
+  }
+  for (uint32_t i = node.first; i < node.first + node.count; ++i)
+    for (uint32_t j = i + 1; j < node.first + node.count; ++j)
+      if (meet(boxes_[i].low, boxes_[i].high, boxes_[j].low, boxes_[j].high)) visit(order_[i], order_[j]);
+}
+
+template <class Visit>
+void ClothTree::between(uint32_t at_a, uint32_t at_b, Visit& visit) const {
+  const Node &a = nodes_[at_a], &b = nodes_[at_b];
+  if (!meet(a.low, a.high, b.low, b.high)) return;
+  if (a.second == 0 && b.second == 0) {
+    for (uint32_t i = a.first; i < a.first + a.count; ++i)
+      for (uint32_t j = b.first; j < b.first + b.count; ++j)
+        if (meet(boxes_[i].low, boxes_[i].high, boxes_[j].low, boxes_[j].high)) visit(order_[i], order_[j]);
+    return;
+  }
+  if (b.second == 0 || (a.second != 0 && a.count >= b.count)) {
+    between(at_a + 1, at_b, visit);
+    between(a.second, at_b, visit);
+  } else {
+    between(at_a, at_b + 1, visit);
+    between(at_a, b.second, visit);
+  }
+}
+
+template <class Visit>
+void ClothTree::overlapping(const Aabb& box, Visit&& visit) const {
+  if (nodes_.empty()) return;
+  const Vec4 low = padded(box.min()), high = padded(box.max());
+  std::vector<uint32_t> open{0};
+  while (!open.empty()) {
+    const uint32_t at = open.back();
+    const Node& node = nodes_[at];
+    open.pop_back();
+    if (!meet(node.low, node.high, low, high)) continue;
+    if (node.second != 0) {
+      open.push_back(node.second);
+      open.push_back(at + 1);
+      continue;
+    }
+    for (uint32_t i = node.first; i < node.first + node.count; ++i)
+      if (meet(boxes_[i].low, boxes_[i].high, low, high)) visit(order_[i]);
+  }
+}
+
+}  // namespace offstage::sim

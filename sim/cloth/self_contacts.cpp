@@ -1,0 +1,262 @@
+#include "sim/cloth/self_contacts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "sim/geometry/closest_points.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Pairs are sought this much farther than they touch, in thicknesses; half of it is how far points may stray
+/// from the ways foreseen.
+constexpr Real kMargin = 1;
+/// What is near at rest in the cloth itself, is not pushed farther apart than this share of it.
+constexpr Real kRestShare = 0.8;
+/// Share of an overlap that is taken back per sub-step, so that layers do not fly apart.
+constexpr Real kRecovery = 0.05;
+/// What must be left of the distance, so that there always is a plane between.
+constexpr Real kLeft = 0.1;
+/// Distance below which no normal can be told [m].
+constexpr Real kNoSide = 1e-9;
+/// Moves are halved until they are less than this share, and then given up.
+constexpr Real kLeastShare = 0.1;
+
+Vec3 place(std::span<const Vec4> points, uint32_t i) {
+  return points[i].head<3>();
+}
+
+struct Closest {
+  std::array<Real, 4> weights;  // 1, -b or 1 - s, s, -(1 - t), -t
+  Vec4 apart;                   // from the second's to the first's point
+  bool inner;                   // edges: neither point is an end
+};
+
+Real fraction_along(const Vec3& p, const Vec3& a, const Vec3& b) {
+  const Real length2 = (b - a).squaredNorm();
+  return length2 > 0 ? std::clamp((p - a).dot(b - a) / length2, 0.0, 1.0) : 0;
+}
+
+Closest closest(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool edges) {
+  const Vec3 p0 = place(x, p[0]), p1 = place(x, p[1]), p2 = place(x, p[2]), p3 = place(x, p[3]);
+  if (!edges) {
+    const TrianglePoint q = closest_on_triangle(p0, p1, p2, p3);
+    return {{1, -q.weights[0], -q.weights[1], -q.weights[2]}, padded(p0 - q.point), true};
+  }
+  const ClosestPoints q = closest_on_segments(p0, p1, p2, p3);
+  const Real s = fraction_along(q.on_a, p0, p1), t = fraction_along(q.on_b, p2, p3);
+  const bool inner = s > 0 && s < 1 && t > 0 && t < 1;
+  return {{1 - s, s, t - 1, -t}, padded(q.on_a - q.on_b), inner};
+}
+
+/// Whether the boxes of both are farther apart than `reach`: quick, and true of most.
+bool boxes_apart(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool edges, Real reach) {
+  const Vec4 &p0 = x[p[0]], &p1 = x[p[1]], &p2 = x[p[2]], &p3 = x[p[3]];
+  const Vec4 low_a = edges ? Vec4(p0.cwiseMin(p1)) : p0, high_a = edges ? Vec4(p0.cwiseMax(p1)) : p0;
+  Vec4 low_b = p2.cwiseMin(p3), high_b = p2.cwiseMax(p3);
+  if (!edges) {
+    low_b = low_b.cwiseMin(p1);
+    high_b = high_b.cwiseMax(p1);
+  }
+  return ((low_a - high_b).cwiseMax(low_b - high_a)).maxCoeff() > reach;
+}
+
+/// How many of a pair's points belong to the first of the two.
+int first_side(bool edges) {
+  return edges ? 2 : 1;
+}
+
+}  // namespace
+
+void SelfContacts::assign(std::vector<Triangle> triangles, const ClothPoints& points) {
+  triangles_ = std::move(triangles);
+  tree_.build(triangles_, points.rest);
+  std::vector<uint8_t> point_taken(points.size(), 0);
+  std::map<std::pair<uint32_t, uint32_t>, bool> edge_taken;
+  owns_point_.assign(triangles_.size(), {});
+  owns_edge_.assign(triangles_.size(), {});
+  for (std::size_t t = 0; t < triangles_.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const uint32_t a = triangles_[t][k], b = triangles_[t][(k + 1) % 3];
+      owns_point_[t][k] = !std::exchange(point_taken[a], uint8_t{1});
+      owns_edge_[t][k] = edge_taken.try_emplace(std::minmax(a, b)).second;
+    }
+  pairs_.clear();
+  contacts_.clear();
+  travel_.assign(points.size(), 0);
+  move_.assign(points.size(), 0);
+  margin_.resize(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) margin_[i] = points.thickness[i] * (1 + kMargin) / 2;
+  horizon_ = -1;
+}
+
+void SelfContacts::add(const ClothPoints& points, std::span<const Vec4> velocity,
+                       const std::array<uint32_t, 4>& p, bool edges, Real horizon) {
+  for (int i = 0; i < first_side(edges); ++i)
+    for (int j = first_side(edges); j < 4; ++j)
+      if (p[static_cast<std::size_t>(i)] == p[static_cast<std::size_t>(j)]) return;
+  Real fastest2 = 0;
+  for (int i = 0; i < first_side(edges); ++i)
+    for (int j = first_side(edges); j < 4; ++j)
+      fastest2 = std::max(
+          fastest2, (velocity[p[static_cast<std::size_t>(i)]] - velocity[p[static_cast<std::size_t>(j)]])
+                        .squaredNorm());
+  Real thickness = (points.thickness[p[0]] + points.thickness[p[3]]) / 2;
+  const Real reach = thickness * (1 + kMargin) + std::sqrt(fastest2) * horizon;
+  if (boxes_apart(points.start, p, edges, reach)) return;
+  const Real distance = closest(points.start, p, edges).apart.norm();
+  // What lies on each other, as the sides of a fresh tear, has no side yet.
+  if (!(distance > kNoSide)) return;
+  if (distance > reach) return;
+  if (points.cloth[p[0]] == points.cloth[p[3]])
+    thickness = std::min(thickness, kRestShare * closest(points.rest, p, edges).apart.norm());
+  pairs_.push_back({p, edges, thickness, distance, 0});
+}
+
+void SelfContacts::search(const ClothPoints& points, std::span<const Vec4> velocity, Real horizon) {
+  ++searches_;
+  since_ = 0;
+  horizon_ = horizon;
+  foreseen_from_ = points.start;
+  foreseen_velocity_.assign(velocity.begin(), velocity.end());
+  Vec4 drift = Vec4::Zero();
+  for (const Vec4& v : velocity) drift += v / static_cast<Real>(velocity.size());
+  std::vector<Vec4> to(points.size());
+  for (std::size_t i = 0; i < to.size(); ++i) to[i] = points.start[i] + horizon * (velocity[i] - drift);
+  tree_.fit(points.start, to, margin_);
+  std::fill(travel_.begin(), travel_.end(), 0.0);
+  pairs_.clear();
+  tree_.pairs([&](uint32_t ta, uint32_t tb) {
+    const Triangle &a = triangles_[ta], &b = triangles_[tb];
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (owns_point_[ta][k]) add(points, velocity, {a[k], b[0], b[1], b[2]}, false, horizon);
+      if (owns_point_[tb][k]) add(points, velocity, {b[k], a[0], a[1], a[2]}, false, horizon);
+      if (!owns_edge_[ta][k]) continue;
+      for (std::size_t j = 0; j < 3; ++j)
+        if (owns_edge_[tb][j])
+          add(points, velocity, {a[k], a[(k + 1) % 3], b[j], b[(j + 1) % 3]}, true, horizon);
+    }
+  });
+}
+
+/// Whether any point is farther from the way foreseen for it than the pairs known are good for.
+bool SelfContacts::strayed(const ClothPoints& points, Real dt) const {
+  if (since_ + dt > horizon_ * (1 + 1e-9)) return true;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Real far = kMargin / 2 * points.thickness[i];
+    const Vec4 off = points.position[i] - foreseen_from_[i] - (since_ + dt) * foreseen_velocity_[i];
+    if (off.squaredNorm() > far * far) return true;
+  }
+  return false;
+}
+
+/// From where all were at the start of the sub-step, at the velocities they now have in it.
+void SelfContacts::search_again(const ClothPoints& points, Real dt, Real horizon) {
+  std::vector<Vec4> velocity(points.size());
+  for (std::size_t i = 0; i < velocity.size(); ++i) velocity[i] = (points.position[i] - points.start[i]) / dt;
+  search(points, velocity, std::max(horizon, dt));
+}
+
+Real SelfContacts::moves(const ClothPoints&, const Pair& pair) const {
+  return move_[pair.points[0]] + move_[pair.points[1]] + move_[pair.points[2]] + move_[pair.points[3]];
+}
+
+SelfContacts::Contact SelfContacts::look(const ClothPoints& points, uint32_t k) {
+  Pair& pair = pairs_[k];
+  const Closest c = closest(points.start, pair.points, pair.edges);
+  pair.distance = c.apart.norm();
+  pair.travel = travelled(pair);
+  const Vec4 normal = pair.distance > 0 ? Vec4(c.apart / pair.distance) : Vec4(Vec4::UnitY());
+  return {k, c.weights, normal, pair.distance, c.inner};
+}
+
+void SelfContacts::find(const ClothPoints& points, Real dt, Real horizon) {
+  if (strayed(points, dt)) search_again(points, dt, horizon);
+  for (std::size_t i = 0; i < move_.size(); ++i) move_[i] = (points.position[i] - points.start[i]).norm();
+  contacts_.clear();
+  for (uint32_t k = 0; k < pairs_.size(); ++k) {
+    const Pair& pair = pairs_[k];
+    const Real moved = moves(points, pair);
+    if (pair.distance - (travelled(pair) - pair.travel) - moved > pair.thickness) continue;
+    const Contact contact = look(points, k);
+    if (contact.distance - moved <= pair.thickness) contacts_.push_back(contact);
+  }
+}
+
+void SelfContacts::solve(ClothPoints& points) {
+  active_.assign(points.cloth.back() + 1, 0);
+  for (const Contact& c : contacts_) {
+    if (!c.pushes) continue;
+    const Pair& pair = pairs_[c.pair];
+    Vec4 apart = Vec4::Zero(), moved = Vec4::Zero();
+    Real mobility = 0;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const uint32_t i = pair.points[k];
+      apart += c.weights[k] * points.position[i];
+      moved += c.weights[k] * (points.position[i] - points.start[i]);
+      mobility += c.weights[k] * c.weights[k] * points.inverse_mass[i];
+    }
+    const Real kept = c.distance >= pair.thickness ? pair.thickness
+                                                   : c.distance + kRecovery * (pair.thickness - c.distance);
+    const Real push = kept - c.normal.dot(apart);
+    if (!(push > 0) || !(mobility > 0)) continue;
+    ++active_[points.cloth[pair.points[0]]];
+    Vec4 move = push * c.normal;
+    const Vec4 slip = moved - c.normal.dot(moved) * c.normal;
+    const Real length = slip.norm();
+    const Real friction =
+        std::sqrt(points.self_friction[pair.points[0]] * points.self_friction[pair.points[3]]);
+    if (length > 0) move -= std::min(1.0, friction * push / length) * slip;
+    for (std::size_t k = 0; k < 4; ++k)
+      points.position[pair.points[k]] +=
+          (c.weights[k] * points.inverse_mass[pair.points[k]] / mobility) * move;
+  }
+}
+
+void SelfContacts::find_doubtful(const ClothPoints& points, Real dt, Real horizon) {
+  if (strayed(points, dt)) search_again(points, dt, horizon);
+  for (std::size_t i = 0; i < move_.size(); ++i) move_[i] = (points.position[i] - points.start[i]).norm();
+  contacts_.clear();
+  for (uint32_t k = 0; k < pairs_.size(); ++k) {
+    const Pair& pair = pairs_[k];
+    const Real moved = moves(points, pair);
+    if (pair.distance - (travelled(pair) - pair.travel) - moved > kLeft * pair.distance) continue;
+    const Contact contact = look(points, k);
+    if (contact.distance - moved <= kLeft * contact.distance) contacts_.push_back(contact);
+  }
+}
+
+bool SelfContacts::shorten(const ClothPoints& points, MoveShares& shares) {
+  bool any = false;
+  for (const Contact& c : contacts_) {
+    const Pair& pair = pairs_[c.pair];
+    Real first = 1e300, second = -1e300;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const uint32_t i = pair.points[k];
+      const Vec4 end = points.start[i] + shares[i] * (points.position[i] - points.start[i]);
+      const Real height = c.normal.dot(end - points.start[pair.points[0]]);
+      static_cast<int>(k) < first_side(pair.edges) ? first = std::min(first, height)
+                                                   : second = std::max(second, height);
+    }
+    if (first - second >= kLeft * c.distance) continue;
+    bool lowered = false;
+    for (uint32_t i : pair.points) {
+      if (!(points.inverse_mass[i] > 0) || shares[i] == 0) continue;
+      shares[i] = shares[i] / 2 < kLeastShare ? 0 : shares[i] / 2;
+      held_back_.push_back(i);
+      lowered = true;
+    }
+    any |= lowered;
+    if (!lowered) crossed_.push_back(pair.points[0]);
+  }
+  return any;
+}
+
+void SelfContacts::end_substep(const ClothPoints& points, Real dt) {
+  since_ += dt;
+  for (std::size_t i = 0; i < travel_.size(); ++i)
+    travel_[i] += (points.position[i] - points.start[i]).norm();
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,94 @@
+#pragma once
+/// Contact of cloth with cloth: of points with triangles, and of edges with edges, at the cloths' thickness
+/// and with friction.
+///
+/// Nothing that was not through another goes through: pairs whose moves together are shorter than their
+/// distance cannot have crossed; for the others there is a plane between the two at the start of the
+/// sub-step, and unless a plane with the same normal still is between them at its end, their moves are
+/// shortened.
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sim/cloth/cloth_points.h"
+#include "sim/cloth/cloth_tree.h"
+#include "sim/cloth/stretch_limit.h"
+
+namespace offstage::sim {
+
+class SelfContacts {
+ public:
+  /// Triangles of the cloths that collide with cloth.
+  void assign(std::vector<Triangle> triangles, const ClothPoints& points);
+  bool empty() const { return triangles_.empty(); }
+
+  /// After points moved freely in a sub-step of length dt: finds pairs if those known no longer suffice, and
+  /// those that may touch in the sub-step. `horizon` is how long pairs are meant to suffice [s].
+  void find(const ClothPoints& points, Real dt, Real horizon);
+  /// Pushes apart what is nearer than its thickness.
+  void solve(ClothPoints& points);
+  /// Finds the pairs that may have crossed by the moves that are made now.
+  void find_doubtful(const ClothPoints& points, Real dt, Real horizon);
+  /// Lowers the shares of moves of those that did; whether any.
+  bool shorten(const ClothPoints& points, MoveShares& shares);
+  /// After the sub-step: how far points have come.
+  void end_substep(const ClothPoints& points, Real dt);
+
+  std::span<const uint64_t> active() const { return active_; }  ///< contacts of the last solve(), by cloth
+  std::size_t pair_count() const { return pairs_.size(); }
+  uint64_t searches() const { return searches_; }  ///< since the start
+  /// Points whose moves shorten() shortened, and those of pairs that it could not keep from crossing because
+  /// pins hold them; since the last call.
+  std::vector<uint32_t> take_held_back() { return std::exchange(held_back_, {}); }
+  std::vector<uint32_t> take_crossed() { return std::exchange(crossed_, {}); }
+
+ private:
+  /// A point (the first) and a triangle, or an edge (the first two) and an edge.
+  struct Pair {
+    std::array<uint32_t, 4> points;
+    bool edges;
+    Real thickness;
+    Real distance;  // when last looked at
+    Real travel;    // of all four together until then
+  };
+  struct Contact {
+    uint32_t pair;
+    std::array<Real, 4> weights;  // of the difference of both closest points
+    Vec4 normal;                  // from the second to the first
+    Real distance;                // at the start of the sub-step
+    bool pushes;                  // else its neighbours do so
+  };
+
+  void search(const ClothPoints& points, std::span<const Vec4> velocity, Real horizon);
+  void add(const ClothPoints& points, std::span<const Vec4> velocity, const std::array<uint32_t, 4>& p,
+           bool edges, Real horizon);
+  bool strayed(const ClothPoints& points, Real dt) const;
+  void search_again(const ClothPoints& points, Real dt, Real horizon);
+  Real travelled(const Pair& pair) const {
+    return travel_[pair.points[0]] + travel_[pair.points[1]] + travel_[pair.points[2]] +
+           travel_[pair.points[3]];
+  }
+  Real moves(const ClothPoints& points, const Pair& pair) const;
+  Contact look(const ClothPoints& points, uint32_t pair);
+
+  std::vector<Triangle> triangles_;
+  std::vector<std::array<bool, 3>> owns_point_, owns_edge_;  // of each triangle, so that each has one owner
+  ClothTree tree_;
+
+  std::vector<Pair> pairs_;
+  std::vector<Contact> contacts_;  // of the sub-step; then those in doubt
+  std::vector<uint64_t> active_;
+  uint64_t searches_ = 0;
+  std::vector<uint32_t> held_back_, crossed_;
+
+  // Since the last search: ways foreseen, and the paths made.
+  Real since_ = 0, horizon_ = -1;
+  std::vector<Vec4> foreseen_from_, foreseen_velocity_;
+  std::vector<Real> travel_, margin_;
+  std::vector<Real> move_;  // of each point in the sub-step
+};
+
+}  // namespace offstage::sim

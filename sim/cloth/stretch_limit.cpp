@@ -1,0 +1,76 @@
+#include "sim/cloth/stretch_limit.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace offstage::sim {
+namespace {
+
+constexpr int kSweeps = 8;
+/// Projection aims at this share of the allowed elongation: at the limit itself every outward move would have
+/// to be taken back whole, and the cloth would freeze there.
+constexpr Real kAim = 0.97;
+/// Slack of the check against rounding; far below what is promised.
+constexpr Real kSlack = 1e-12;
+
+/// The greatest s in [0, 1] with |k1 + s k2| <= longest; 0 if there is none.
+Real greatest_share(const Vec4& k1, const Vec4& k2, Real longest) {
+  const Real a = k2.squaredNorm(), b = k1.dot(k2), c = k1.squaredNorm() - longest * longest;
+  const Real root = b * b - a * c;
+  if (!(a > 0) || !(root >= 0)) return 0;
+  // The larger root (-b + sqrt(root)) / a, without cancellation.
+  const Real s = b > 0 ? -c / (b + std::sqrt(root)) : (std::sqrt(root) - b) / a;
+  return std::clamp(s * (1 - kSlack), 0.0, 1.0);
+}
+
+}  // namespace
+
+void StretchLimit::project(ClothPoints& points) const {
+  Vec4* const x = points.position.data();
+  const Real* const w = points.inverse_mass.data();
+  bool again = true;
+  for (int sweep = 0; sweep < kSweeps && again; ++sweep) {
+    again = false;
+    const auto draw = [&](const Limit& l) {
+      const Vec4 d = x[l.a] - x[l.b];
+      const Real length2 = d.squaredNorm();
+      const Real mass = w[l.a] + w[l.b];
+      if (length2 <= l.longest * l.longest || !(mass > 0)) return;
+      again = true;
+      const Real length = std::sqrt(length2), aim = l.rest + kAim * (l.longest - l.rest);
+      const Vec4 move = ((length - aim) / (length * mass)) * d;
+      x[l.a] -= w[l.a] * move;
+      x[l.b] += w[l.b] * move;
+      if (w[l.a] == 0) points.pull[l.a] -= move;
+      if (w[l.b] == 0) points.pull[l.b] += move;
+    };
+    std::for_each(limits_.begin(), limits_.end(), draw);
+  }
+}
+
+bool StretchLimit::shorten(const ClothPoints& points, MoveShares& shares) const {
+  bool any = false;
+  for (const Limit& l : limits_) {
+    const Vec4 move_a = points.position[l.a] - points.start[l.a];
+    const Vec4 move_b = points.position[l.b] - points.start[l.b];
+    const Vec4 d = points.start[l.a] - points.start[l.b];
+    const Vec4 move = shares[l.a] * move_a - shares[l.b] * move_b;
+    // What began too long may at least get no longer.
+    const Real allowed2 = std::max(l.longest * l.longest, d.squaredNorm());
+    if ((d + move).squaredNorm() <= allowed2 * (1 + kSlack)) continue;
+    const bool free_a = points.inverse_mass[l.a] > 0 && shares[l.a] > 0;
+    const bool free_b = points.inverse_mass[l.b] > 0 && shares[l.b] > 0;
+    if (!free_a && !free_b) continue;
+    Vec4 k1 = d, k2 = Vec4::Zero();
+    free_a ? k2 += shares[l.a]* move_a : k1 += shares[l.a] * move_a;
+    free_b ? k2 -= shares[l.b]* move_b : k1 -= shares[l.b] * move_b;
+    Real s = greatest_share(k1, k2, std::sqrt(std::max(allowed2, k1.squaredNorm())));
+    if (s > 1 - 1e-9) s = 0;  // no progress to rounding
+    if (free_a) shares[l.a] *= s;
+    if (free_b) shares[l.b] *= s;
+    any = true;
+  }
+  return any;
+}
+
+}  // namespace offstage::sim
