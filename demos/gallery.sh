@@ -6,7 +6,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 
 shots="wall:1.6 dominoes:2 arch:4.7 marbles:1.5 pile:0.9 explosion:1.5 coins:2 cradle:0.4 sprinkler:3.3 rain:4 fountain:5 machine:4.35
-  t_handle:1 landscape:3 collision:4.2 smoke:6 fire:4 fireworks:5 sparks:3 rocket_exhaust:3.5"
+  flag:4 landscape:3 drape:3.5 smoke:6 fire:4 fireworks:5 sparks:3 rocket_exhaust:3.5"
 inputs=()
 for shot in $shots; do
   picture=$folder/${shot%:*}.png
