@@ -5,6 +5,7 @@
 #include <array>
 
 #include "producer/placement.h"
+#include "producer/table_fabric.h"
 #include "producer/values.h"
 
 namespace offstage::producer {
