@@ -138,7 +138,7 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
   frame.glow = vec4(sky.glow);
   const std::array<Vector3f, 9> irradiance = sky_irradiance(sky);
   for (std::size_t k = 0; k < irradiance.size(); ++k) frame.irradiance[k] = vec4(irradiance[k]);
-  frame.shadow = Vector4f::Zero();
+  frame.shadow = frame.penumbra = Vector4f::Zero();
   return frame;
 }
 

@@ -23,7 +23,7 @@ struct FrameUniforms {
   Vector4f sun_radiance;
   Vector4f zenith, horizon, ground, glow;
   std::array<Vector4f, 9> irradiance;
-  Vector4f shadow;
+  Vector4f shadow, penumbra;
 };
 
 /// The eye of one sub-frame: moved in the lens, looking along `forward`.

@@ -18,6 +18,7 @@ std::string info_log(GLuint object, PFNGLGETSHADERIVPROC query, PFNGLGETSHADERIN
 void attach_shader(GLuint program, GLenum stage, std::span<const std::string_view> files,
                    std::span<const std::string> defines) {
   std::string text = "#version 450 core\n";
+  if (stage == GL_FRAGMENT_SHADER) text += "#define FRAGMENT 1\n";
   for (const std::string& define : defines) text += "#define " + define + "\n";
   for (const std::string_view file : files) text.append(shader_source(file));
 

@@ -44,6 +44,9 @@ struct BufferTraits {
 struct TextureTraits {
   static void destroy(GLuint name) { glDeleteTextures(1, &name); }
 };
+struct SamplerTraits {
+  static void destroy(GLuint name) { glDeleteSamplers(1, &name); }
+};
 struct FramebufferTraits {
   static void destroy(GLuint name) { glDeleteFramebuffers(1, &name); }
 };
@@ -55,6 +58,7 @@ struct ProgramTraits {
 };
 using Buffer = Object<BufferTraits>;
 using Texture = Object<TextureTraits>;
+using Sampler = Object<SamplerTraits>;
 using Framebuffer = Object<FramebufferTraits>;
 using VertexArray = Object<VertexArrayTraits>;
 using Program = Object<ProgramTraits>;

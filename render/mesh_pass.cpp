@@ -216,13 +216,26 @@ void MeshPass::draw_shadows(const Matrix4f& shadow_clip_from_world) {
   }
 }
 
+void MeshPass::set_facing(const Batch& batch) {
+  (batch.material->two_sided ? glDisable : glEnable)(GL_CULL_FACE);
+  glFrontFace(batch.mirrored ? GL_CW : GL_CCW);
+}
+
+void MeshPass::draw_depth(const Matrix4f& clip_from_world) {
+  opaque_shadow_.use();
+  glUniformMatrix4fv(0, 1, GL_FALSE, clip_from_world.data());
+  for (const Batch& batch : opaque_) {
+    set_facing(batch);
+    draw(batch, rows_);
+  }
+}
+
 void MeshPass::draw_opaque() {
   constexpr float kOpaqueAlpha = 0.99f;
   const auto draw_batch = [this](const Batch& batch) {
     surface_program(*batch.material).use();
     glUniform1f(0, kOpaqueAlpha);
-    (batch.material->two_sided ? glDisable : glEnable)(GL_CULL_FACE);
-    glFrontFace(batch.mirrored ? GL_CW : GL_CCW);
+    set_facing(batch);
     bind(*batch.material);
     draw(batch, rows_);
   };
@@ -237,8 +250,7 @@ void MeshPass::draw_blended() {
   for (const Batch& batch : blended_) {
     surface_program(*batch.material).use();
     glUniform1f(0, kVisibleAlpha);
-    (batch.material->two_sided ? glDisable : glEnable)(GL_CULL_FACE);
-    glFrontFace(batch.mirrored ? GL_CW : GL_CCW);
+    set_facing(batch);
     bind(*batch.material);
     draw(batch, rows_);
   }

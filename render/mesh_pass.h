@@ -63,6 +63,8 @@ class MeshPass {
   /// are until it is drawn.
   void prepare(std::span<const Instance* const> instances, const View& view, bool in_smoke);
   void draw_shadows(const Matrix4f& shadow_clip_from_world);
+  /// Depth alone of what is wholly opaque, so that only what is seen is shaded.
+  void draw_depth(const Matrix4f& clip_from_world);
   void draw_opaque();
   void draw_blended();
 
@@ -80,6 +82,7 @@ class MeshPass {
   void bind(const GpuMaterial& material);
   gl::LazyProgram& surface_program(const GpuMaterial& material);
   gl::LazyProgram& shadow_program(const GpuMaterial& material);
+  static void set_facing(const Batch& batch);
 
   std::map<std::tuple<Pattern, bool, bool>, gl::LazyProgram> surface_programs_;  ///< textured, in smoke
   gl::LazyProgram opaque_shadow_, dithered_shadow_, textured_shadow_;

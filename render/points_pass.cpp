@@ -67,7 +67,8 @@ PointsPass::Programs& PointsPass::programs(PointStyle style) {
                                {vertex, fragment, {define, "SMOKE 1"}},
                                {{"frame.glsl", "points.vert"},
                                 {"frame.glsl", "points_shape.glsl", "points_shadow.frag"},
-                                {define, "SHADOW 1"}}})
+                                {define, "SHADOW 1"}},
+                               {vertex, fragment, {define, "DEPTH 1"}}})
       .first->second;
 }
 
@@ -112,6 +113,11 @@ void PointsPass::draw_shadow(const PointSet& set, const Matrix4f& shadow_clip_fr
   programs(set.def.style).shadow.use();
   glUniformMatrix4fv(0, 1, GL_FALSE, shadow_clip_from_world.data());
   draw(set, 0);
+}
+
+void PointsPass::draw_depth(const PointSet& set) {
+  programs(set.def.style).depth.use();
+  draw(set, set.unseen);
 }
 
 void PointsPass::draw_spheres(const PointSet& set, bool in_smoke) {

@@ -41,6 +41,8 @@ class PointsPass {
   /// Uploads in drawing order: back to front for this view where they are blended.
   void prepare(PointSet& set, const View& view);
   void draw_shadow(const PointSet& set, const Matrix4f& shadow_clip_from_world);
+  /// Depth alone of balls.
+  void draw_depth(const PointSet& set);
   void draw_spheres(const PointSet& set, bool in_smoke);
   void draw_blended(const PointSet& set);
 
@@ -48,7 +50,7 @@ class PointsPass {
   void draw(const PointSet& set, std::size_t first);
 
   struct Programs {
-    gl::LazyProgram seen, seen_in_smoke, shadow;
+    gl::LazyProgram seen, seen_in_smoke, shadow, depth;
   };
   Programs& programs(PointStyle style);
 

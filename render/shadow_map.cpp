@@ -3,6 +3,11 @@
 #include <algorithm>
 
 namespace offstage::render {
+namespace {
+
+constexpr GLuint kPlainUnit = 9;
+
+}  // namespace
 
 ShadowFrame fit_shadow(std::span<const Caster> casters, const View& view, const Vector3f& sun_direction,
                        float pixel_m, int size_px) {
@@ -50,6 +55,7 @@ ShadowFrame fit_shadow(std::span<const Caster> casters, const View& view, const 
 
   ShadowFrame frame;
   frame.texel_m = texel;
+  frame.depth_m = depth;
   frame.clip_from_world = Matrix4f::Identity();
   frame.clip_from_world.row(0) << 2 / side * light_from_world.row(0), -2 / side * snapped.x() - 1;
   frame.clip_from_world.row(1) << 2 / side * light_from_world.row(1), -2 / side * snapped.y() - 1;
@@ -63,6 +69,13 @@ ShadowMap::ShadowMap(int size_px)
       framebuffer_(gl::make_framebuffer(0, depth_)) {
   glTextureParameteri(depth_, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
   glTextureParameteri(depth_, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
+  GLuint name = 0;
+  glCreateSamplers(1, &name);
+  plain_ = gl::Sampler(name);
+  glSamplerParameteri(plain_, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  glSamplerParameteri(plain_, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  glSamplerParameteri(plain_, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  glSamplerParameteri(plain_, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
 }
 
 void ShadowMap::begin() const {
@@ -84,6 +97,8 @@ void ShadowMap::end() const {
   glDisable(GL_POLYGON_OFFSET_FILL);
   glDisable(GL_DEPTH_CLAMP);
   glBindTextureUnit(0, depth_);
+  glBindTextureUnit(kPlainUnit, depth_);
+  glBindSampler(kPlainUnit, plain_);
 }
 
 void ShadowMap::read(int x, int y, int width, int height, std::vector<float>& depths) const {

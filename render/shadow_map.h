@@ -20,6 +20,7 @@ struct Caster {
 struct ShadowFrame {
   Matrix4f clip_from_world;
   float texel_m = 0;  ///< 0: nothing in view can be in a shadow
+  float depth_m = 0;  ///< along the light, from 0 to 1 in the map
 };
 
 /// `pixel_m`: width of a pixel of the picture at distance 1.
@@ -32,7 +33,7 @@ class ShadowMap {
   int size_px() const { return size_px_; }
   /// Binds and clears the map and sets the state for drawing casters into it.
   void begin() const;
-  /// Ends drawing and leaves the map bound as texture unit 0.
+  /// Ends drawing and leaves the map bound for shading.
   void end() const;
   /// Depths of a rectangle of texels, row by row, for what is lit on the CPU.
   void read(int x, int y, int width, int height, std::vector<float>& depths) const;
@@ -41,6 +42,7 @@ class ShadowMap {
   int size_px_;
   gl::Texture depth_;
   gl::Framebuffer framebuffer_;
+  gl::Sampler plain_;  ///< reads depths without comparing
 };
 
 }  // namespace offstage::render

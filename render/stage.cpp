@@ -1,12 +1,15 @@
 #include "render/stage.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "render/cloth_pass.h"
 #include "render/frame.h"
 #include "render/gl.h"
 #include "render/lines_pass.h"
 #include "render/mesh_pass.h"
+#include "render/occlusion_pass.h"
 #include "render/points_pass.h"
 #include "render/puffs_pass.h"
 #include "render/shadow_map.h"
@@ -17,6 +20,7 @@ namespace offstage::render {
 namespace {
 
 constexpr GLuint kFrameBlock = 0, kSceneDepthUnit = 4;
+constexpr float kReach = 0.1f;  // how far things hide the sky, as a share of the distance to the target
 
 /// Colour and depth of the picture, and the copy of depth that particles read while they are drawn.
 struct Picture {
@@ -30,6 +34,21 @@ struct Picture {
         framebuffer(gl::make_framebuffer(color, depth)),
         depth_copy_framebuffer(gl::make_framebuffer(0, depth_copy)) {}
 };
+
+/// Tells the sub-frames of a frame apart.
+float seed_of(const SampleOffsets& offsets) {
+  return 1 + offsets.light.x() + 2 * offsets.light.y();
+}
+
+/// What a sub-frame must soften by itself, so that the mean of all is as soft as the sun's disc makes it.
+Vector4f penumbra_of(const ShadowFrame& shadow, const Sun& sun, float size_px, int count) {
+  constexpr float kWidest_px = 24;
+  const float half = std::tan(0.5f * sun.size_deg * std::numbers::pi_v<float> / 180);
+  const float side_m = shadow.texel_m * size_px, ratio = side_m / shadow.depth_m;
+  const float taps = count == 1 ? 8 : count < 16 ? 6 : 4;
+  return {half * shadow.depth_m / shadow.texel_m / std::sqrt(static_cast<float>(count)), kWidest_px,
+          ratio * ratio, taps};
+}
 
 void add_bottom_up(const std::vector<float>& pixels, HdrImage& sum) {
   const std::size_t row = static_cast<std::size_t>(sum.width_px) * 4;
@@ -58,6 +77,7 @@ struct Stage::Impl {
 
   Picture picture;
   ShadowMap shadow_map;
+  OcclusionPass occlusion_pass;
   MeshPass mesh_pass;
   ClothPass cloth_pass;
   PointsPass points_pass;
@@ -73,6 +93,7 @@ struct Stage::Impl {
       : def(stage_def),
         picture(def.width_px, def.height_px),
         shadow_map(def.shadow_map_px),
+        occlusion_pass(def.width_px, def.height_px),
         puffs_pass(def.width_px, def.height_px),
         streaks_pass(def.width_px, def.height_px),
         pixels(static_cast<std::size_t>(def.width_px) * static_cast<std::size_t>(def.height_px) * 4) {
@@ -89,6 +110,7 @@ struct Stage::Impl {
   void draw_shadows(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
                     std::span<PointSet* const> sets, const View& view, const SampleOffsets& offsets,
                     FrameUniforms& frame);
+  void draw_depth(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view);
   void draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets);
   void draw_blended(std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame);
   void draw_lines(const View& view);
@@ -144,8 +166,9 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
     map_from_clip.col(3) << 0.5f, 0.5f, 0, 1;
     frame.shadow_from_world = map_from_clip * shadow.clip_from_world;
     const auto size = static_cast<float>(def.shadow_map_px);
-    const float seed = 1 + offsets.light.x() + 2 * offsets.light.y();
+    const float seed = seed_of(offsets);
     frame.shadow = {shadow.texel_m, size, 1 / size, seed};
+    frame.penumbra = penumbra_of(shadow, sun, size, offsets.count);
     frame.sun_direction.w() = 1;
   }
   upload(frame);
@@ -162,7 +185,8 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
   shadow_map.end();
 }
 
-void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets) {
+void Stage::Impl::draw_depth(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets,
+                             const View& view) {
   glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
   glViewport(0, 0, def.width_px, def.height_px);
   glEnable(GL_DEPTH_TEST);
@@ -173,6 +197,25 @@ void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<Po
   glClearNamedFramebufferfv(picture.framebuffer, GL_COLOR, 0, nothing);
   glClearNamedFramebufferfv(picture.framebuffer, GL_DEPTH, 0, nothing);
 
+  // A hair behind, so that no rounding hides a surface from its own shading.
+  glEnable(GL_POLYGON_OFFSET_FILL);
+  glPolygonOffset(0, -4);
+  glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+  glDisable(GL_CULL_FACE);
+  for (const Cloth* cloth : sheets) cloth_pass.draw_shadow(*cloth, view.clip_from_world);
+  mesh_pass.draw_depth(view.clip_from_world);
+  glDisable(GL_CULL_FACE);
+  for (const PointSet* set : sets) {
+    if (set->def.style == PointStyle::sphere) points_pass.draw_depth(*set);
+  }
+  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  glDisable(GL_POLYGON_OFFSET_FILL);
+}
+
+void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets) {
+  glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
+  glViewport(0, 0, def.width_px, def.height_px);
+  glDepthFunc(GL_GEQUAL);
   for (const Cloth* cloth : sheets) cloth_pass.draw(*cloth, puffs_pass.shades());
   mesh_pass.draw_opaque();
   glDisable(GL_CULL_FACE);
@@ -184,8 +227,8 @@ void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<Po
     sky_program.use();
     glBindVertexArray(no_attributes);
     glDrawArrays(GL_TRIANGLES, 0, 3);
-    glDepthFunc(GL_GREATER);
   }
+  glDepthFunc(GL_GREATER);
 }
 
 void Stage::Impl::draw_blended(std::span<PointSet* const> sets, const View& view,
@@ -325,6 +368,10 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   s.mesh_pass.prepare(shown, view, s.puffs_pass.shades());
   const std::vector<const Cloth*> sheets = s.prepare_cloths();
   s.draw_shadows(shown, sheets, sets, view, offsets, frame);
+  s.draw_depth(sheets, sets, view);
+  const float reach =
+      s.environment.occlusion_reach.value_or(kReach * (s.camera.target - s.camera.eye).norm());
+  s.occlusion_pass.draw(s.picture.depth, view, reach, offsets.count, seed_of(offsets));
   s.draw_opaque(sheets, sets);
   s.draw_blended(sets, view, frame);
   s.draw_lines(view);

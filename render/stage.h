@@ -7,6 +7,7 @@
 /// anti-aliasing, soft shadows, depth of field and motion blur.
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -44,7 +45,10 @@ struct Environment {
   Vector3f ground = {0.36f, 0.33f, 0.28f};  ///< seen below the horizon, and light from below
   float intensity = 1;                      ///< scales sky and ambient together
   float fog = 0;                            ///< density [1/m]; transmittance exp(-fog * distance)
-  bool visible = true;                      ///< false: transparent background; it still lights the scene
+  /// How far away things hide the sky from each other [m]; 0: not at all; none: a tenth of the camera's
+  /// distance to its target.
+  std::optional<float> occlusion_reach = {};
+  bool visible = true;  ///< false: transparent background; it still lights the scene
 };
 
 /// One drawn particle.

@@ -35,6 +35,7 @@ void main() {
 
   // In folds the sky is hidden, but cloth is what hides it: light comes from there in the cloth's own colour.
   float open = exp2(-2.2 * max(side * place.z, 0.0));
+  open *= open_sky(1.0 / gl_FragCoord.w);
   vec3 opened = open / (1.0 - s.albedo * (0.8 * (1.0 - open)));
 
   // The side that the sun sees is the one that can be in shadow.

@@ -11,6 +11,7 @@ layout(std140, binding = 0) uniform Frame {
   vec4 zenith, horizon, ground, glow;  // zenith.w: fog density; horizon.w: 1 if one of many sub-frames
   vec4 irradiance[9];       // ambient light of a white surface, spherical harmonics in x, y, z
   vec4 shadow;              // size of a texel [m], texels, 1 / texels, seed of the dither
+  vec4 penumbra;            // of the shadow map: half-width [texels] per depth, the widest [texels], depth per its width, taps
 } frame;
 
 float saturate(float x) { return clamp(x, 0.0, 1.0); }

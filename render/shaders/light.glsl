@@ -1,4 +1,4 @@
-// Shadow map and shading of opaque surfaces.
+// Shadow map, openness to the sky, and shading of opaque surfaces.
 layout(binding = 0) uniform sampler2DShadow shadow_map;
 
 struct Surface {
@@ -8,30 +8,60 @@ struct Surface {
   vec3 emission;
 };
 
-// Share of the sun's light that arrives. A tent of 3x3 texels in four fetches (I. Castano, "Shadow Mapping Summary",
-// 2013). The point is moved off its surface by about a texel, more where the light grazes, which keeps a surface from
-// shadowing itself without detaching shadows from their casters.
-float shadow_map_visibility(vec3 position, vec3 normal) {
-  if (frame.sun_direction.w == 0.0) return 1.0;
+// A place in the shadow map. The point is moved off its surface by about a texel, more where the light grazes, which
+// keeps a surface from shadowing itself without detaching shadows from their casters.
+vec3 shadow_place(vec3 position, vec3 normal) {
   float cosine = saturate(dot(normal, frame.sun_direction.xyz));
   vec3 moved = position + frame.shadow.x * (normal * (2.2 * sqrt(1.0 - cosine * cosine) + 0.3) + 0.7 * frame.sun_direction.xyz);
   vec3 p = (frame.shadow_from_world * vec4(moved, 1.0)).xyz;
-  if (any(notEqual(p.xy, clamp(p.xy, 0.0, 1.0)))) return 1.0;
-  p.z = saturate(p.z);
-  if (frame.horizon.w != 0.0) return texture(shadow_map, p);  // the mean over the sub-frames is filter enough
-
-  vec2 texel = p.xy * frame.shadow.y;
-  vec2 base = floor(texel + 0.5);
-  vec2 f = texel + 0.5 - base;
-  base = (base - 0.5) * frame.shadow.z;
-  vec2 w0 = 3.0 - 2.0 * f, w1 = 1.0 + 2.0 * f;
-  vec2 o0 = ((2.0 - f) / w0 - 1.0) * frame.shadow.z, o1 = (f / w1 + 1.0) * frame.shadow.z;
-  float sum = w0.x * w0.y * texture(shadow_map, vec3(base + o0, p.z)) +
-              w1.x * w0.y * texture(shadow_map, vec3(base + vec2(o1.x, o0.y), p.z)) +
-              w0.x * w1.y * texture(shadow_map, vec3(base + vec2(o0.x, o1.y), p.z)) +
-              w1.x * w1.y * texture(shadow_map, vec3(base + o1, p.z));
-  return sum * (1.0 / 16.0);
+  return vec3(p.xy, max(p.z, 0.0));
 }
+bool off_shadow_map(vec3 p) { return any(notEqual(p.xy, clamp(p.xy, 0.0, 1.0))); }
+
+#ifdef FRAGMENT
+layout(binding = 9) uniform sampler2D shadow_depth;  // the shadow map without comparing
+
+// Shadows are as soft as what throws them is far away (R. Fernando, "Percentage-Closer Soft Shadows", 2005): first the
+// mean depth of what is in between, then the share of a disc as wide as its penumbra. Where nothing or only shadow is
+// near, as almost everywhere, the first is all; a loop of no rounds is how the second is skipped.
+float shadow_map_visibility(vec3 position, vec3 normal) {
+  if (frame.sun_direction.w == 0.0) return 1.0;
+  vec3 p = shadow_place(position, normal);
+  if (off_shadow_map(p)) return 1.0;
+  float turn = 6.2831853 * dither(gl_FragCoord.xy, frame.shadow.w);
+  vec2 a = vec2(cos(turn), sin(turn));
+  // Along its own surface a tap is higher or lower.
+  vec3 g = mat3(frame.shadow_from_world) * normal;
+  vec2 slope = g.xy * (frame.penumbra.z / min(g.z, -1e-9));
+  float steep = inversesqrt(dot(slope, slope) + 1e-12);
+  slope *= -min(1.0, 4.0 * sqrt(frame.penumbra.z) * steep);
+  float beside = min(1.0 / steep, 4.0 * sqrt(frame.penumbra.z)) * frame.shadow.z;
+  float search = min(frame.penumbra.x * p.z, frame.penumbra.y) + 1.0, sum = 0.0, blockers = 0.0;
+  for (int k = 0; k < 4; ++k) {
+    vec2 offset = a * (0.7 * search * frame.shadow.z);
+    vec4 depth = textureGather(shadow_depth, p.xy + offset);
+    vec4 blocks = vec4(lessThan(depth, vec4(min(p.z + dot(slope, offset) - beside, 1.0))));
+    sum += dot(depth, blocks);
+    blockers += dot(blocks, vec4(1.0));
+    a = vec2(-a.y, a.x);
+  }
+  int taps = blockers == 0.0 || blockers == 16.0 ? 0 : int(frame.penumbra.w);
+  float penumbra = clamp(frame.penumbra.x * (p.z - sum / max(blockers, 1.0)), 1.0, frame.penumbra.y);
+  float lit = 0.0, n = frame.penumbra.w;
+  for (int k = 0; k < taps; ++k) {
+    vec2 offset = a * (penumbra * frame.shadow.z * sqrt((float(k) + 0.5) / n));
+    lit += texture(shadow_map, vec3(p.xy + offset, min(p.z + dot(slope, offset), 1.0)));
+    a = mat2(-0.73736888, -0.67549029, 0.67549029, -0.73736888) * a;  // by the golden angle
+  }
+  return taps == 0 ? (blockers == 0.0 ? 1.0 : 0.0) : lit / n;
+}
+#else
+float shadow_map_visibility(vec3 position, vec3 normal) {
+  if (frame.sun_direction.w == 0.0) return 1.0;
+  vec3 p = shadow_place(position, normal);
+  return off_shadow_map(p) ? 1.0 : texture(shadow_map, vec3(p.xy, min(p.z, 1.0)));
+}
+#endif
 
 #ifdef SMOKE
 layout(binding = 5) uniform sampler3D smoke_depth;
@@ -45,6 +75,21 @@ float sun_visibility(vec3 position, vec3 normal) {
 #endif
   return visibility;
 }
+
+#ifdef FRAGMENT
+layout(binding = 8) uniform sampler2D openness;  // half the picture's size; y: the distance it was found at
+
+// Share of the sky that near things leave over a pixel at a distance along the view axis. Of the four texels around it
+// those count that are as far away.
+float open_sky(float distance) {
+  vec2 p = 0.5 * gl_FragCoord.xy + 0.25, f = fract(p - 0.5);
+  p /= vec2(textureSize(openness, 0));
+  vec4 open = textureGather(openness, p, 0), off = textureGather(openness, p, 1) / distance - 1.0;
+  vec4 weight = vec4((1.0 - f.x) * f.y, f.x * f.y, f.x * (1.0 - f.y), (1.0 - f.x) * (1.0 - f.y)) + 0.002;
+  weight /= 1.0 + 1e4 * off * off;
+  return dot(open, weight) / dot(weight, vec4(1.0));
+}
+#endif
 
 // GGX with the visibility term of E. Hammon (2017), times pi.
 float sun_lobe(float a, float nl, float nv, float nh) {
@@ -67,8 +112,15 @@ vec3 sky_reflectance(vec3 f0, float roughness, float nv) {
   return f0 * (-1.04 * t + r.z) + (1.04 * t + r.w);
 }
 
-// The sun's light and the sky's that a surface sends to the eye; `view` points to it.
-vec3 shade(Surface s, vec3 normal, vec3 view, float visibility) {
+// Where the sky is hidden, other surfaces send some of the light instead: as many as there are of this one's colour
+// (J. Jimenez et al., "Practical Realtime Strategies for Accurate Indirect Occlusion", 2016).
+vec3 with_bounces(float open, vec3 albedo) {
+  vec3 a = 2.0404 * albedo - 0.3324, b = 0.6417 - 4.7951 * albedo, c = 2.7552 * albedo + 0.6903;
+  return max(vec3(open), ((open * a + b) * open + c) * open);
+}
+
+// The sun's light and the sky's that a surface sends to the eye; `view` points to it; `open` of the sky is not hidden.
+vec3 shade(Surface s, vec3 normal, vec3 view, float visibility, float open) {
   vec3 l = frame.sun_direction.xyz;
   vec3 h = normalize(l + view);
   float nl = saturate(dot(normal, l)), nv = max(abs(dot(normal, view)), 1e-3);
@@ -81,7 +133,8 @@ vec3 shade(Surface s, vec3 normal, vec3 view, float visibility) {
   vec3 sun = frame.sun_radiance.rgb * (nl * visibility) * (diffuse * (1.0 - fresnel) + lobe * fresnel);
 
   vec3 reflectance = sky_reflectance(f0, s.roughness, nv);
-  vec3 sky = ambient(normal) * diffuse * (1.0 - reflectance) +
-             sky_reflection(reflect(-view, normal), s.roughness) * reflectance;
+  float mirrored = saturate((nv + open) * (nv + open) - 1.0 + open);
+  vec3 sky = ambient(normal) * diffuse * (1.0 - reflectance) * with_bounces(open, s.albedo) +
+             sky_reflection(reflect(-view, normal), s.roughness) * reflectance * mirrored;
   return sun + sky + s.emission;
 }

@@ -24,7 +24,7 @@ float filtered_roughness(float roughness, vec3 normal) {
 
 void main() {
   vec3 view = normalize(frame.eye.xyz - position);
-  vec3 n = normalize(gl_FrontFacing ? normal : -normal);
+  vec3 smooth_normal = normalize(gl_FrontFacing ? normal : -normal), n = smooth_normal;
   float alpha = material.color.a;
   Surface s = Surface(material.color.rgb, material.surface.y, material.surface.x, material.emission.rgb);
 #ifdef PATTERN
@@ -44,6 +44,6 @@ void main() {
 #endif
   if (alpha < min_alpha) discard;
   s.roughness = filtered_roughness(s.roughness, n);
-  vec3 radiance = apply_fog(shade(s, n, view, sun_visibility(position, n)), position);
+  vec3 radiance = apply_fog(shade(s, n, view, sun_visibility(position, smooth_normal), open_sky(1.0 / gl_FragCoord.w)), position);
   color = vec4(radiance * alpha, alpha);
 }

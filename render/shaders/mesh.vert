@@ -6,7 +6,7 @@ layout(location = 4) in vec4 row_y;
 layout(location = 5) in vec4 row_z;
 
 #ifdef SHADOW
-layout(location = 0) uniform mat4 shadow_clip_from_world;
+layout(location = 0) uniform mat4 shadow_clip_from_world;  // or the picture's, for depth alone
 #else
 layout(location = 0) out vec3 position;
 layout(location = 1) out vec3 normal;
@@ -21,6 +21,8 @@ layout(location = 5) flat out vec3 axis_x;  // the object's axes in the world
 layout(location = 6) flat out vec3 axis_y;
 layout(location = 7) flat out vec3 axis_z;
 #endif
+
+invariant gl_Position;
 
 void main() {
   vec4 p = vec4(in_position, 1.0);

@@ -17,11 +17,13 @@ void main() {
   vec3 n = offset / ball.w;
   vec4 clip = frame.clip_from_world * vec4(hit, 1.0);
   gl_FragDepth = clip.z / clip.w;
+#ifndef DEPTH
 
   vec3 radiance = color.rgb;
   if (style.z != 0.0) {
     Surface s = Surface(color.rgb, surface.y, surface.x, vec3(0.0));
-    radiance = shade(s, n, -ray, sun_visibility(hit, n));
+    radiance = shade(s, n, -ray, sun_visibility(hit, n), open_sky(clip.w));
   }
   result = vec4(apply_fog(radiance, hit), 1.0);
+#endif
 }
