@@ -133,6 +133,7 @@ void MeshPass::prepare(std::span<const Instance* const> instances, const View& v
   const auto transparent = std::partition(seen.begin(), seen.end(),
                                           [](const Item& item) { return !item.instance->material->blended; });
   std::vector<Item> see_through(transparent, seen.end());
+  seen.erase(transparent, seen.end());
   // What is cut out by its texture is opaque where the texture is, so it is drawn in both passes.
   const auto by_batch = [](const Item& a, const Item& b) {
     return std::tie(a.instance->batch_key, a.mirrored, a.depth, a.order) <
