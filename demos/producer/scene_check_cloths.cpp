@@ -103,7 +103,7 @@ std::optional<std::string> too_stiff(const Scene& scene, const sim::ClothDef& cl
   return fmt::format(
       "its springs are too stiff for an explicit integrator: the {} spring between vertices {} and {} "
       "({:.3g} "
-      "N/m) needs a substep less than {:.3g} s, got {:.3g} s; or use \"position_based\" or \"implicit\"",
+      "N/m) needs a substep less than {:.3g} s, got {:.3g} s; or use \"relaxed\" or \"implicit\"",
       kKinds.at(static_cast<std::size_t>(spring.kind)), spring.a, spring.b, spring.stiffness,
       0.995 * stable.step, used);
 }

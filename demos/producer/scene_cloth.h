@@ -84,7 +84,7 @@ struct Cloth {
   Real tear = 0;
   Real pressure = 0;
   Real air_density = 1.2;
-  sim::ClothIntegrator integrator = sim::ClothIntegrator::position_based;
+  sim::ClothIntegrator integrator = sim::ClothIntegrator::relaxed;
   Real substep = 1.0 / 960;
   bool visible = true;
   bool casts_shadow = true;

@@ -145,7 +145,7 @@ struct Tags<ClothSeam> {
 
 template <>
 struct Names<sim::ClothIntegrator> {
-  static constexpr std::array kNames = {"position_based", "implicit", "symplectic", "rk4"};
+  static constexpr std::array kNames = {"relaxed", "implicit", "symplectic", "rk4"};
 };
 template <>
 struct Table<Cloth> {

@@ -50,10 +50,11 @@ struct ClothSeam {
 
 /// How the springs are stepped.
 enum class ClothIntegrator : uint8_t {
-  /// Compliant constraints in small sub-steps (Macklin et al., "Small Steps in Physics Simulation", 2019):
-  /// stable for any stiffness.
-  position_based,
-  implicit,  ///< backward Euler, linearised once (Baraff and Witkin, "Large Steps in Cloth Simulation", 1998)
+  /// Backward Euler, linearised once and solved by one symmetric Gauss-Seidel sweep: true to every static
+  /// load, quick, and stable, because springs too stiff for it count as softer (ClothReport::softened).
+  relaxed,
+  /// Backward Euler, linearised once (Baraff and Witkin, "Large Steps in Cloth Simulation", 1998) and solved.
+  implicit,
   symplectic,  ///< explicit: unstable beyond largest_stable_step()
   rk4,         ///< explicit, of fourth order between collisions: likewise
 };
@@ -97,7 +98,7 @@ struct ClothDef {
   /// pressure V0 / V, as that of a gas that keeps its temperature. 0: none.
   Real pressure = 0;
 
-  ClothIntegrator integrator = ClothIntegrator::position_based;
+  ClothIntegrator integrator = ClothIntegrator::relaxed;
   Real substep = 1.0 / 960;  ///< longest step of its own [s], > 0; never longer than the world's
 };
 
@@ -123,6 +124,7 @@ struct ClothReport {
   uint64_t limited = 0;        ///< moves shortened, to keep max_stretch and max_shear or for the next reason
   uint64_t held_back = 0;    ///< times that a move was shortened because cloth would have gone through cloth
   uint64_t crossings = 0;    ///< pairs that had to be let go: the guarantee against crossing is lost there
+  uint64_t softened = 0;     ///< springs too stiff for the `relaxed` integrator at this step
   uint64_t torn = 0;         ///< springs
   uint64_t unconverged = 0;  ///< solves of the implicit integrator that ended at their bound
   bool finite = true;        ///< false: it stopped being finite, and was stopped where it last was

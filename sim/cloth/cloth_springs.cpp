@@ -11,6 +11,20 @@ namespace {
 
 /// Springs at a time, and from how many on threads are worth their waking.
 constexpr std::size_t kBlock = 2048, kWorthThreads = 60000;
+constexpr uint32_t kMaxColors = 64;
+/// Points as near as this have no direction between them [m^2].
+constexpr Real kNoLength2 = 1e-24;
+/// Between two points that are held [1/kg].
+constexpr Real kNoMobility = 1e-100;
+
+/// An impulse (times the step) pulls a and b together. What pins hold passes it on.
+inline void give(ClothPoints& points, std::span<Vec4> moves, uint32_t a, uint32_t b, const Vec4& impulse) {
+  const Real wa = points.inverse_mass[a], wb = points.inverse_mass[b];
+  moves[a] -= wa * impulse;
+  moves[b] += wb * impulse;
+  if (wa == 0) points.pull[a] -= impulse;
+  if (wb == 0) points.pull[b] += impulse;
+}
 
 /// Greedy: each spring gets the first colour that neither of its ends has.
 std::vector<uint32_t> colors(std::span<const ClothSpring> springs, std::size_t point_count) {
@@ -19,8 +33,8 @@ std::vector<uint32_t> colors(std::span<const ClothSpring> springs, std::size_t p
   for (std::size_t i = 0; i < springs.size(); ++i) {
     const uint64_t taken = used[springs[i].a] | used[springs[i].b];
     const uint32_t first = static_cast<uint32_t>(std::countr_one(taken));
-    color[i] = std::min(first, 64u);
-    if (first == 64) continue;
+    color[i] = std::min(first, kMaxColors);
+    if (first == kMaxColors) continue;
     used[springs[i].a] |= uint64_t{1} << first;
     used[springs[i].b] |= uint64_t{1} << first;
   }
@@ -30,56 +44,90 @@ std::vector<uint32_t> colors(std::span<const ClothSpring> springs, std::size_t p
 }  // namespace
 
 void ClothSprings::assign(std::span<const ClothSpring> springs, std::size_t point_count) {
-  // Colour 64 takes what finds no other: at points with very many springs. It is swept by one thread.
+  // The last colour takes what finds no other, at points with very many springs. One thread does it.
   const std::vector<uint32_t> color = colors(springs, point_count);
-  color_start_.assign(66, 0);
+  color_start_.assign(kMaxColors + 2, 0);
   for (uint32_t c : color) ++color_start_[c + 1];
   for (std::size_t c = 1; c < color_start_.size(); ++c) color_start_[c] += color_start_[c - 1];
   std::vector<std::size_t> next(color_start_.begin(), color_start_.end());
   spring_.resize(springs.size());
   for (std::size_t i = 0; i < springs.size(); ++i) {
     const ClothSpring& s = springs[i];
-    spring_[next[color[i]]++] = {s.a, s.b, s.rest_length, 1 / s.stiffness, s.damping / s.stiffness};
+    spring_[next[color[i]]++] = {s.a, s.b, s.rest_length, s.stiffness, s.damping};
+  }
+  link_.resize(spring_.size());
+  stages_.clear();
+  for (auto kind : {Stage::pull, Stage::forward, Stage::backward}) {
+    for (std::size_t c = 0; c + 1 < color_start_.size(); ++c) {
+      const std::size_t k = kind == Stage::backward ? color_start_.size() - 2 - c : c;
+      if (color_start_[k + 1] > color_start_[k])
+        stages_.push_back({kind, color_start_[k], color_start_[k + 1], k == kMaxColors});
+    }
   }
 }
 
-void ClothSprings::sweep(ClothPoints& points, Real h) const {
-  struct Stage {
-    std::size_t begin, end;
-    bool whole;
-    uint32_t block_count() const {
-      return whole ? 1 : static_cast<uint32_t>((end - begin + kBlock - 1) / kBlock);
-    }
-  };
-  std::vector<Stage> stages;
-  for (std::size_t c = 0; c + 1 < color_start_.size(); ++c)
-    if (color_start_[c + 1] > color_start_[c])
-      stages.push_back({color_start_[c], color_start_[c + 1], c == 64});
+uint32_t ClothSprings::Stage::block_count() const {
+  return whole ? 1 : static_cast<uint32_t>((end - begin + kBlock - 1) / kBlock);
+}
+
+void ClothSprings::step(ClothPoints& points, std::span<Vec4> moves, Real h) {
   const uint32_t threads = spring_.size() < kWorthThreads ? 1 : available_threads();
-  run_stages(std::span(stages), threads, [&](const Stage& stage, uint32_t block) {
+  run_stages(std::span(stages_), threads, [&](const Stage& stage, uint32_t block) {
     const std::size_t begin = stage.begin + block * kBlock;
-    sweep_block(points, h, begin, stage.whole ? stage.end : std::min(begin + kBlock, stage.end));
+    const std::size_t end = stage.whole ? stage.end : std::min(begin + kBlock, stage.end);
+    if (stage.kind == Stage::pull)
+      pull(points, moves, h, begin, end);
+    else if (stage.kind == Stage::forward)
+      for (std::size_t i = begin; i < end; ++i) relax(points, moves, i);
+    else
+      for (std::size_t i = end; i-- > begin;) relax(points, moves, i);
   });
 }
 
-void ClothSprings::sweep_block(ClothPoints& points, Real h, std::size_t begin, std::size_t end) const {
-  Vec4* const x = points.position.data();
-  const Vec4* const x0 = points.start.data();
+/// The explicit step, and what the sweeps need.
+void ClothSprings::pull(ClothPoints& points, std::span<Vec4> moves, Real h, std::size_t begin,
+                        std::size_t end) {
+  constexpr std::size_t kLanes = 16;
+  using Lanes = Eigen::Array<Real, kLanes, 1>;
+  const Vec4* const x = points.start.data();
   const Real* const w = points.inverse_mass.data();
-  for (std::size_t i = begin; i < end; ++i) {
-    const Spring& s = spring_[i];
-    const Real wa = w[s.a], wb = w[s.b];
-    const Vec4 d = x[s.a] - x[s.b], moved = d - (x0[s.a] - x0[s.b]);
-    const Real length = std::sqrt(d.squaredNorm());
-    if (!(length > 0)) continue;
-    const Real gamma = s.damping / h;
-    const Real error = length - s.rest + gamma * (d.dot(moved) / length);
-    const Real correction = error / (((1 + gamma) * (wa + wb) + s.compliance / (h * h)) * length);
-    x[s.a] -= (wa * correction) * d;
-    x[s.b] += (wb * correction) * d;
-    if (wa == 0) points.pull[s.a] -= correction * d;
-    if (wb == 0) points.pull[s.b] += correction * d;
+  for (std::size_t first = begin; first < end; first += kLanes) {
+    const std::size_t count = std::min(kLanes, end - first);
+    std::array<Vec4, kLanes> direction;
+    Lanes length2 = Lanes::Ones(), rest = Lanes::Ones(), stiff = Lanes::Zero(), damping = Lanes::Zero(),
+          mobility = Lanes::Ones();
+    for (std::size_t k = 0; k < count; ++k) {
+      const Spring& s = spring_[first + k];
+      const auto lane = static_cast<Eigen::Index>(k);
+      direction[k] = x[s.a] - x[s.b];
+      length2[lane] = std::max(direction[k].squaredNorm(), kNoLength2);
+      rest[lane] = s.rest;
+      stiff[lane] = s.stiffness;
+      damping[lane] = s.damping;
+      mobility[lane] = w[s.a] + w[s.b];
+    }
+    const Lanes length = length2.sqrt(), inverse = length.inverse();
+    stiff = (h * h * stiff).min(kMaxRatio / mobility.max(kNoMobility));
+    const Lanes pulls = stiff * (length - rest) * inverse, resists = stiff + h * damping,
+                forget = (1 + resists * mobility).inverse(), along = resists * forget;
+    for (std::size_t k = 0; k < count; ++k) {
+      const Spring& s = spring_[first + k];
+      const auto lane = static_cast<Eigen::Index>(k);
+      give(points, moves, s.a, s.b, pulls[lane] * direction[k]);
+      Link& link = link_[first + k];
+      link = {(inverse[lane] * direction[k]).cast<float>(), static_cast<float>(forget[lane]), 0, s.a, s.b};
+      link.axis[3] = static_cast<float>(along[lane]);
+    }
   }
+}
+
+/// Gauss-Seidel on the impulses, which are zero at first: the equation of a spring is r + impulse / c = 0.
+void ClothSprings::relax(ClothPoints& points, std::span<Vec4> moves, std::size_t spring) {
+  Link& link = link_[spring];
+  const Vec4 u = link.axis.cast<Real>().cwiseProduct(Vec4(1, 1, 1, 0));
+  const Real step = Real{link.axis[3]} * u.dot(moves[link.a] - moves[link.b]) - Real{link.forget} * link.impulse;
+  link.impulse += static_cast<float>(step);
+  give(points, moves, link.a, link.b, step * u);
 }
 
 }  // namespace offstage::sim

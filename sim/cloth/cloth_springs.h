@@ -1,7 +1,10 @@
 #pragma once
-/// The springs of cloths as compliant constraints (Macklin, Mueller, Chentanez, "XPBD", 2016), swept over
-/// once per small sub-step (Macklin et al., "Small Steps in Physics Simulation", 2019). Springs of a colour
-/// share no point, so that a sweep gives the same bits on any number of threads.
+/// The springs of cloths by backward Euler, linearised once (Baraff and Witkin, "Large Steps in Cloth
+/// Simulation", 1998), and relaxed: from the explicit step, which has every force as it is, a few symmetric
+/// Gauss-Seidel sweeps take out what springs and damping do not allow. At rest nothing is left for the sweeps
+/// to do, so that what hangs or carries a load has its true length, however few they are.
+///
+/// Springs of a colour share no point, so that a sweep gives the same bits on any number of threads.
 
 #include <cstdint>
 #include <span>
@@ -17,23 +20,42 @@ class ClothSprings {
   /// Springs between points of all cloths; their order decides about colours.
   void assign(std::span<const ClothSpring> springs, std::size_t point_count);
 
-  /// One sweep over all springs on positions that moved from their start over h. Always in the same order:
-  /// changing it from step to step would have no state of rest. No over-relaxation: it excites the highest
-  /// mode.
-  void sweep(ClothPoints& points, Real h) const;
+  /// Changes `moves`, which points would make from their start in a step of length h, by the springs. Those of
+  /// what pins hold stay, and what pulls at them is added to their `pull`.
+  void step(ClothPoints& points, std::span<Vec4> moves, Real h);
 
-  std::size_t size() const { return spring_.size(); }
+  /// Greatest h^2 k (1/m_a + 1/m_b) of a spring in a step; what is stiffer is taken as having this. From about
+  /// 10 on, one symmetric sweep leaves so much of the explicit step's excess in a woven sheet that it grows
+  /// (measured; an exact solution has no such limit).
+  static constexpr Real kMaxRatio = 6;
 
  private:
   struct Spring {
     uint32_t a, b;
-    Real rest, compliance, damping;  // compliance: 1/k; damping: c/k
+    Real rest, stiffness, damping;
+  };
+  /// A spring in the step, small because all of them pass through memory in every sweep. Moves d apart along
+  /// the direction are resisted by the impulse `along` d, less `forget` of that of the sweeps before.
+  struct Link {
+    Eigen::Vector4f axis;  // unit, from b to a; the fourth is `along`
+    float forget, impulse;
+    uint32_t a, b;
+  };
+  struct Stage {
+    enum { pull, forward, backward } kind;
+    std::size_t begin, end;
+    bool whole;  // by one thread
+
+    uint32_t block_count() const;
   };
 
-  void sweep_block(ClothPoints& points, Real h, std::size_t begin, std::size_t end) const;
+  void pull(ClothPoints& points, std::span<Vec4> moves, Real h, std::size_t begin, std::size_t end);
+  void relax(ClothPoints& points, std::span<Vec4> moves, std::size_t spring);
 
   std::vector<Spring> spring_;            // by colour
   std::vector<std::size_t> color_start_;  // and the end
+  std::vector<Link> link_;                // of the step
+  std::vector<Stage> stages_;             // of any step
 };
 
 }  // namespace offstage::sim

@@ -57,7 +57,7 @@ void ClothSystem::assemble() {
       s.a += first;
       s.b += first;
       all_springs_.push_back(s);
-      if (cloth.def.integrator == ClothIntegrator::position_based) swept.push_back(s);
+      if (cloth.def.integrator == ClothIntegrator::relaxed) swept.push_back(s);
       Real limit = s.kind == SpringKind::stretch ? cloth.def.max_stretch
                    : s.kind == SpringKind::shear ? cloth.def.max_shear
                                                  : 0;
@@ -73,6 +73,7 @@ void ClothSystem::assemble() {
   }
   first_spring_.push_back(all_springs_.size());
   kick_.assign(points_.size(), Vec4::Zero());
+  moves_.assign(points_.size(), Vec4::Zero());
   points_.start = points_.position;
   points_.acceleration.assign(points_.size(), Vec4::Zero());
   points_.pull.assign(points_.size(), Vec4::Zero());
@@ -128,7 +129,7 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
     add_outer_forces(*cloths_[c], first_[c], weather, points_);
   }
   const Real parts = std::clamp(std::ceil(weather.h / longest * (1 - 1e-12)), 1.0, kMaxParts);
-  const Real dt = weather.h / parts;
+  const Real dt = dt_ = weather.h / parts;
   parts_ = parts;
   find_held(weather.time, bodies);
   contacts_.find(points_, collides_, bodies, weather.h);
@@ -177,12 +178,17 @@ void ClothSystem::integrate(Real dt) {
     if (integrator == ClothIntegrator::rk4) step_rk4(points_, range, dt, kick_);
     if (integrator == ClothIntegrator::implicit && !step_implicit(points_, range, dt))
       ++cloths_[c]->report.unconverged;
-    if (integrator != ClothIntegrator::position_based) continue;
+    if (integrator != ClothIntegrator::relaxed) continue;
     for (std::size_t i = range.begin; i < range.end; ++i)
-      if (points_.inverse_mass[i] > 0)
-        points_.position[i] += dt * (points_.velocity[i] + dt * points_.acceleration[i]);
+      moves_[i] = points_.inverse_mass[i] > 0
+                      ? Vec4(dt * (points_.velocity[i] + dt * points_.acceleration[i]))
+                      : Vec4(points_.position[i] - points_.start[i]);
   }
-  springs_.sweep(points_, dt);
+  springs_.step(points_, moves_, dt);
+  for (std::size_t c = 0; c < cloths_.size(); ++c)
+    if (cloths_[c]->def.integrator == ClothIntegrator::relaxed)
+      for (std::size_t i = first_[c], end = i + cloths_[c]->points.size(); i < end; ++i)
+        if (points_.inverse_mass[i] > 0) points_.position[i] = points_.start[i] + moves_[i];
 }
 
 /// Seams draw together evenly in their time and then hold.
@@ -268,9 +274,12 @@ void ClothSystem::count_penetration() {
 void ClothSystem::measure() {
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     Cloth& cloth = *cloths_[c];
+    const bool relaxed = cloth.def.integrator == ClothIntegrator::relaxed;
     Real sum = 0;
     std::size_t count = 0;
     for (const ClothSpring& s : cloth.springs) {
+      const Real mobility = 1 / cloth.masses[s.a] + 1 / cloth.masses[s.b];
+      cloth.report.softened += relaxed && dt_ * dt_ * s.stiffness * mobility > ClothSprings::kMaxRatio;
       if (s.kind != SpringKind::stretch) continue;
       const Real strain = (cloth.points[s.a] - cloth.points[s.b]).norm() / s.rest_length - 1;
       cloth.report.max_strain = std::max(cloth.report.max_strain, strain);

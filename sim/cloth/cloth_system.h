@@ -63,9 +63,11 @@ class ClothSystem {
   std::vector<std::size_t> first_;         // point of each cloth
   std::vector<ClothSpring> all_springs_;   // by cloth, between points of all
   std::vector<std::size_t> first_spring_;  // of each cloth, and the end
+  std::vector<Vec4> moves_;                // of a sub-step, by outer forces and springs
   std::vector<Vec4> kick_;                 // of velocities at the end of a sub-step, beside their moves
   bool changed_ = false;
   Real parts_ = 1;  // sub-steps of cloth in one of the world
+  Real dt_ = 0;     // of the last one [s]
 
   ClothPoints points_;
   ClothSprings springs_;

@@ -1,6 +1,6 @@
 /// A square of cotton of 4 m dropped on a sphere of radius 1 on the ground, 72 frames at 24 per second: CPU
 /// time per frame, and how well it did: strain, depth in bodies, crossings of cloth. bench_cloth [CELLS
-/// SELF_COLLISION]; without arguments the usual cases.
+/// SELF_COLLISION [SUBSTEPS_PER_SECOND]]; without arguments the usual cases.
 
 #include <cstdio>
 #include <cstdlib>
@@ -44,11 +44,12 @@ std::size_t crossings(const ClothView& cloth) {
   return count;
 }
 
-void run(uint32_t cells, bool self_collision) {
+void run(uint32_t cells, bool self_collision, Real rate) {
   effects::Fabric fabric = effects::find_fabric("cotton")->fabric;
   fabric.thickness = 0.012;
   ClothDef def = effects::grid_cloth({4, 4, cells, cells}, {Vec3(0.15, 2.35, 0)}, fabric);
   def.self_collision = self_collision;
+  if (rate > 0) def.substep = 1 / rate;
   World world;
   world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
   world.add_body({.shape = Sphere{1}, .motion = MotionType::fixed, .pose = {{0, 1, 0}}});
@@ -78,10 +79,10 @@ void run(uint32_t cells, bool self_collision) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc == 3) {
-    run(static_cast<uint32_t>(std::atoi(argv[1])), std::atoi(argv[2]) != 0);
+  if (argc >= 3) {
+    run(static_cast<uint32_t>(std::atoi(argv[1])), std::atoi(argv[2]) != 0, argc > 3 ? std::atof(argv[3]) : 0);
     return 0;
   }
   for (uint32_t cells : {60u, 100u, 200u})
-    for (bool self : {false, true}) run(cells, self);
+    for (bool self : {false, true}) run(cells, self, 0);
 }

@@ -53,21 +53,24 @@ TEST_P(EveryIntegrator, HangsAThreadByItsClosedForm) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Cloth, EveryIntegrator,
-                         ::testing::Values(ClothIntegrator::implicit, ClothIntegrator::symplectic,
-                                           ClothIntegrator::rk4));
+                         ::testing::Values(ClothIntegrator::relaxed, ClothIntegrator::implicit,
+                                           ClothIntegrator::symplectic, ClothIntegrator::rk4));
 
 TEST(Cloth, AStiffOneIsStableAtOneStepPerFrame) {
-  for (ClothIntegrator integrator : {ClothIntegrator::position_based, ClothIntegrator::implicit}) {
+  for (ClothIntegrator integrator : {ClothIntegrator::relaxed, ClothIntegrator::implicit}) {
     ClothDef def = effects::grid_cloth({1, 1, 10, 10}, {}, effects::find_fabric("leather")->fabric);
     def.integrator = integrator;
     def.substep = 1;
     def.pins = {{.vertex = 0, .position = def.vertices[0]}, {.vertex = 10, .position = def.vertices[10]}};
     World world({.max_step = 1.0 / 24});
     const ClothHandle cloth = world.add_cloth(def);
-    for (int i = 0; i < 120; ++i) world.step(1.0 / 24);
+    for (int i = 0; i < 120; ++i) {
+      world.step(1.0 / 24);
+      // Motion is only what its fall gave.
+      ASSERT_LE(world.energy().kinetic + world.energy().potential, 1e-9);
+    }
     EXPECT_TRUE(world.cloth_report(cloth).finite);
-    // No more than falling by its own size would have given it.
-    EXPECT_LE(world.energy().kinetic, 0.9 * 9.81 * 1);
+    EXPECT_LT(world.energy().kinetic, 0.01);
   }
 }
 
