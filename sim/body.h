@@ -34,9 +34,10 @@ struct Body {
   RigidBody rigid;  // dynamic bodies only: now
 
   Pose before_substep, before_step;
-  Aabb swept;           // around its ways in the sub-step, as the broad phase has it
-  Real quiet_time = 0;  // for how long it has hardly moved [s]
-  Wrench rest_push;     // asleep: what forces that change did to it when it fell asleep, about its centre
+  Aabb swept;             // around its ways in the sub-step, as the broad phase has it
+  Real quiet_time = 0;    // for how long it has hardly moved [s]
+  bool on_cloth = false;  // touched by cloth in the last sub-step
+  Wrench rest_push;       // asleep: what forces that change did to it when it fell asleep, about its centre
   BodyDef def;
   Solid solid;
 

@@ -7,6 +7,14 @@
 #include "sim/world_impl.h"
 
 namespace offstage::sim {
+namespace {
+
+/// Cloth under a body that moves slower than this is at rest [m/s].
+constexpr Real kClothRest = 0.05;
+/// A change of speed in a sub-step that is a blow; gravity's is a fifth of it [m/s].
+constexpr Real kBlow = 0.2;
+
+}  // namespace
 
 ClothHandle World::add_cloth(const ClothDef& def) {
   const std::string object = def.name.empty() ? "cloth" : "cloth \"" + def.name + '"';
@@ -24,6 +32,7 @@ ClothHandle World::add_cloth(const ClothDef& def) {
 
 bool World::remove(ClothHandle cloth) {
   if (!impl_->cloths.erase(cloth)) return false;
+  impl_->wake_all();
   impl_->arrange_cloths();
   return true;
 }
@@ -73,21 +82,16 @@ std::vector<ClothBody> World::Impl::bodies_near_cloths(Real h) const {
   std::vector<ClothBody> near;
   bodies.for_each([&](BodyHandle handle, const std::unique_ptr<Body>& body) {
     if (!body->def.collides && !holds[handle.index]) return;
-    const Pose& from = body->can_move() ? body->before_substep : body->pose;
-    Obstacle way(body->solid, from, body->pose, h, body->def.restitution, body->def.friction);
-    way.body = handle.index;
+    Obstacle way = way_of(*body, h);
     if (!holds[handle.index] && !std::holds_alternative<Plane>(*way.solid.shape) &&
         !way.swept_bounds().intersects(around))
       return;
     Vec3 velocity = way.velocity, spin = way.angular_velocity;
-    if (body->is_dynamic()) {
-      const RigidBody& rigid = body->rigid;
-      const Mat3 axes = rigid.orientation.toRotationMatrix();
-      way.inverse_mass = 1 / rigid.mass;
-      way.inverse_inertia = axes * rigid.inverse_inertia * axes.transpose();
-      way.centre = rigid.centre;
-      velocity = rigid.velocity();
-      spin = rigid.angular_velocity();
+    if (body->is_awake()) {
+      velocity = body->rigid.velocity();
+      spin = body->rigid.angular_velocity();
+    } else {
+      way.inverse_mass = 0;  // asleep: as if fixed, until what lies beneath it moves
     }
     near.emplace_back(way, h, velocity, spin, body->def.surface_velocity);
     near.back().collides = body->def.collides;
@@ -100,12 +104,26 @@ void World::Impl::step_cloths(Real start, Real h) {
   std::vector<ClothBody> near = bodies_near_cloths(h);
   const std::vector<const ForceDef*> forces = active_forces();
   cloth_system.step({start, h, def.gravity, def.wind, forces}, near);
+  answer_cloths(near);
+  hit_cloths(h);
+}
+
+/// What cloths did to bodies counts from the next sub-step on; a blow has moved them already in this one, or
+/// cloth that stops them would lag behind.
+void World::Impl::answer_cloths(std::span<const ClothBody> near) {
   std::vector<Reaction> reactions;
-  for (const ClothBody& body : near) {
-    if (!body.touched || !body.is_dynamic()) continue;
-    // What lies on cloth moves with it and must not fall asleep before the cloth is at rest.
-    bodies[bodies.at_slot(body.way().body)]->quiet_time = 0;
-    reactions.push_back(body.reaction());
+  for (const ClothBody& at : near) {
+    Body& body = *bodies[bodies.at_slot(at.way().body)];
+    const bool left = std::exchange(body.on_cloth, at.touched) && !at.touched;
+    if (!body.is_dynamic()) continue;
+    // It sleeps while what it lies on is at rest, and wakes when that moves or goes.
+    if (left || at.touching_speed > kClothRest) wake(body);
+    if (!at.touched || body.asleep) continue;
+    if (at.reaction().impulse.norm() > kBlow * body.rigid.mass) {
+      body.pose = at.end();
+      body.rigid.place(body.pose);
+    }
+    reactions.push_back(at.reaction());
   }
   push_bodies(reactions);
 }

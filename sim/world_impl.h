@@ -109,6 +109,7 @@ struct World::Impl : WorldState {
 
   // Particles
   void step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report);
+  Obstacle way_of(const Body& body, Real h) const;
   void update_obstacles(Real h);
   void collide_particles(const ParticleStage& stage, const CoupledSystem& coupled);
   void add_events(std::vector<ParticleEvent>& events);
@@ -119,6 +120,8 @@ struct World::Impl : WorldState {
   void begin_cloths();
   std::vector<ClothBody> bodies_near_cloths(Real h) const;
   void step_cloths(Real start, Real h);
+  void answer_cloths(std::span<const ClothBody> near);
+  void hit_cloths(Real h);
   void report_cloths(StepReport& report);
   void let_go_of_cloths(BodyHandle body);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "sim/coupled_system.h"
 #include "sim/world_impl.h"
@@ -141,6 +142,13 @@ void World::Impl::explode(Real start, Real end) {
       for (std::size_t i = 0; i < p.size(); ++i)
         if (system.whole_step(i)) p.velocity[i] += impulse(explosion, p.position[i]) / p.mass[i];
     });
+    cloths.for_each([&](ClothHandle handle, const std::unique_ptr<Cloth>& cloth) {
+      if (!def_.acts_on(handle)) return;
+      // Each point gets its share of a blow on the whole, by mass.
+      const Real total = std::accumulate(cloth->masses.begin(), cloth->masses.end(), 0.0);
+      for (std::size_t i = 0; i < cloth->points.size(); ++i)
+        cloth->velocities[i] += impulse(explosion, cloth->points[i]) / total;
+    });
   });
 }
 
@@ -192,25 +200,28 @@ void World::Impl::keep_within_bounds(Body& body, StepReport& report) {
   report.bodies_retired.push_back(body.handle);
 }
 
+/// A body on its way through the sub-step of length h.
+Obstacle World::Impl::way_of(const Body& body, Real h) const {
+  const Pose& from = body.can_move() ? body.before_substep : body.pose;
+  Obstacle o(body.solid, from, body.pose, h, body.def.restitution, body.def.friction);
+  o.body = body.handle.index;
+  if (!body.is_dynamic()) return o;
+  const RigidBody& rigid = body.rigid;
+  const Mat3 axes = rigid.orientation.toRotationMatrix();
+  o.inverse_mass = 1 / rigid.mass;
+  o.inverse_inertia = axes * rigid.inverse_inertia * axes.transpose();
+  o.centre = rigid.centre;
+  return o;
+}
+
 void World::Impl::update_obstacles(Real h) {
   std::vector<Obstacle> fixed, moving;
-  bodies.for_each([&](BodyHandle handle, const std::unique_ptr<Body>& body) {
+  bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& body) {
     if (!body->def.collides) return;
-    const auto add = [&](std::vector<Obstacle>& obstacles, const Pose& from) {
-      Obstacle& o =
-          obstacles.emplace_back(body->solid, from, body->pose, h, body->def.restitution, body->def.friction);
-      o.body = handle.index;
-      if (!body->is_dynamic()) return;
-      const RigidBody& rigid = body->rigid;
-      const Mat3 axes = rigid.orientation.toRotationMatrix();
-      o.inverse_mass = 1 / rigid.mass;
-      o.inverse_inertia = axes * rigid.inverse_inertia * axes.transpose();
-      o.centre = rigid.centre;
-    };
     if (body->can_move())
-      add(moving, body->before_substep);
+      moving.push_back(way_of(*body, h));
     else if (fixed_changed)
-      add(fixed, body->pose);
+      fixed.push_back(way_of(*body, h));
   });
   moving_obstacles = Obstacles(std::move(moving));
   if (fixed_changed) fixed_obstacles = Obstacles(std::move(fixed));

@@ -103,18 +103,19 @@ effects::Fabric fabric_of(const Cloth& cloth) {
                                 suggestion(cloth.fabric, fabric_names()));
   effects::Fabric f = preset->fabric;
   const FabricChanges& c = cloth.changes;
-  f.areal_density = c.areal_density.value_or(f.areal_density);
-  f.stretch = c.stretch.value_or(f.stretch);
-  f.shear = c.shear.value_or(f.shear);
-  f.bend = c.bend.value_or(f.bend);
-  f.damping = c.damping.value_or(f.damping);
-  f.friction = c.friction.value_or(f.friction);
-  f.self_friction = c.self_friction.value_or(f.self_friction);
-  f.thickness = c.thickness.value_or(f.thickness);
-  f.drag = c.drag.value_or(f.drag);
-  f.lift = c.lift.value_or(f.lift);
-  f.max_stretch = c.max_stretch.value_or(f.max_stretch);
-  f.max_shear = c.max_shear.value_or(f.max_shear);
+  const auto change = [](const std::optional<double>& to, double& value) { value = to.value_or(value); };
+  change(c.areal_density, f.areal_density);
+  change(c.stretch, f.stretch);
+  change(c.shear, f.shear);
+  change(c.bend, f.bend);
+  change(c.damping, f.damping);
+  change(c.friction, f.friction);
+  change(c.self_friction, f.self_friction);
+  change(c.thickness, f.thickness);
+  change(c.drag, f.drag);
+  change(c.lift, f.lift);
+  change(c.max_stretch, f.max_stretch);
+  change(c.max_shear, f.max_shear);
   return f;
 }
 

@@ -130,6 +130,7 @@ Cloth::Cloth(ClothHandle cloth, const ClothDef& definition)
       points(def.vertices),
       velocities(points.size(), def.velocity),
       rest(def.rest_vertices.empty() ? def.vertices : def.rest_vertices),
+      before(points),
       masses(def.masses),
       triangles(def.triangles),
       springs(def.springs),

@@ -118,6 +118,7 @@ StableStep largest_stable_step(const ClothDef& def);
 struct ClothReport {
   uint64_t contacts = 0;       ///< of vertices and bodies' corners with bodies, at the end
   uint64_t self_contacts = 0;  ///< at the end
+  uint64_t particle_hits = 0;  ///< of all sub-steps
   Real max_strain = 0;         ///< of stretch springs, greatest (|d| - L) / L
   Real mean_strain = 0;        ///< of stretch springs, mean |(|d| - L) / L|
   Real penetration = 0;        ///< deepest, of a vertex behind a body's surface, 0 while it is outside [m]

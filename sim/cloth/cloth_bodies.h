@@ -3,6 +3,7 @@
 /// by what cloth does to them. That is returned as reactions and counts for the world from its next sub-step
 /// on (as for particles, P8).
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -19,6 +20,7 @@ class ClothBody {
 
   /// A sub-step of cloth begins: from and to which fraction of the world's, dt [s] long.
   void begin(Real from, Real to, Real dt);
+  Real duration() const { return dt_; }         ///< of that sub-step [s]
   const Pose& start() const { return start_; }  ///< of that sub-step
   const Pose& end() const { return end_; }
   const Solid& solid() const { return way_.solid; }
@@ -35,8 +37,15 @@ class ClothBody {
   void push(const Vec3& impulse, const Vec3& p);
 
   const Reaction& reaction() const { return reaction_; }
-  bool touched = false;  ///< by cloth, in this sub-step of the world
-  bool collides = true;  ///< else it only holds pins
+  /// A point of cloth touches it, which moves at this speed against it [m/s].
+  void touch(Real speed) {
+    touched = true;
+    touching_speed = std::max(touching_speed, speed);
+  }
+
+  bool touched = false;     ///< by cloth, in this sub-step of the world
+  Real touching_speed = 0;  ///< greatest [m/s]
+  bool collides = true;     ///< else it only holds pins
 
  private:
   Obstacle way_;

@@ -1,7 +1,6 @@
 #include "sim/cloth/cloth_contacts.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <oneapi/tbb/parallel_for.h>
@@ -17,7 +16,7 @@ constexpr std::size_t kChunk = 1024;
 constexpr Real kStabilization = 0.3;
 /// Two normals with a cosine below this face each other: what lies between is pinched.
 constexpr Real kFacing = -0.5;
-constexpr std::size_t kMaxTouches = 8;
+constexpr int kStopSweeps = 10;
 
 }  // namespace
 
@@ -119,28 +118,30 @@ bool ClothContacts::touch(const ClothPoints& points, Near& near, Touch& t) const
 
 void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<VelocityCut>& cuts) {
   std::fill(active_.begin(), active_.end(), 0);
+  any_dynamic_ = false;
   for (std::size_t k = 0; k < near_.size();) {
-    std::array<Touch, kMaxTouches> touches;
-    std::size_t count = 0;
+    touches_.clear();
     const uint32_t point = near_[k].point;
-    for (; k < near_.size() && near_[k].point == point; ++k)
-      if (count < kMaxTouches && touch(points, near_[k], touches[count])) ++count;
+    for (Touch t; k < near_.size() && near_[k].point == point; ++k)
+      if (touch(points, near_[k], t)) touches_.push_back(t);
+    const std::size_t count = touches_.size();
     if (count == 0) continue;
     active_[points.cloth[point]] += count;
+    any_dynamic_ |= std::ranges::any_of(touches_, [](const Touch& t) { return t.body->is_dynamic(); });
     // What is fixed comes last, so that its surface is kept best.
-    std::stable_sort(
-        touches.begin(), touches.begin() + static_cast<std::ptrdiff_t>(count),
-        [](const Touch& a, const Touch& b) { return a.body->is_dynamic() > b.body->is_dynamic(); });
+    std::stable_sort(touches_.begin(), touches_.end(), [](const Touch& a, const Touch& b) {
+      return a.body->is_dynamic() > b.body->is_dynamic();
+    });
     for (std::size_t a = 0; a < count; ++a) {
       bool supported = points.inverse_mass[point] == 0;
       for (std::size_t b = 0; b < count; ++b) {
-        if (touches[a].normal.dot(touches[b].normal) > kFacing) continue;
+        if (touches_[a].normal.dot(touches_[b].normal) > kFacing) continue;
         supported = true;
-        if (a < b && (touches[a].body->is_dynamic() || touches[b].body->is_dynamic()))
-          pinch(touches[a], touches[b]);
+        if (a < b && (touches_[a].body->is_dynamic() || touches_[b].body->is_dynamic()))
+          pinch(touches_[a], touches_[b]);
       }
-      if (points.inverse_mass[point] == 0) block(touches[a]);
-      press(points, touches[a], dt, parts, supported && touches[a].body->is_dynamic(), cuts);
+      if (points.inverse_mass[point] == 0) block(touches_[a]);
+      press(points, touches_[a], dt, parts, supported && touches_[a].body->is_dynamic(), cuts);
     }
   }
 }
@@ -171,14 +172,52 @@ void ClothContacts::block(Touch& t) {
   t.near->pressed += impulse;
 }
 
+std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, const MoveShares& shares,
+                                             std::span<const Real> recoil) {
+  struct Stop {
+    Touch touch;
+    Vec3 velocity;  // of the point
+    Real impulse = 0;
+  };
+  std::vector<Stop> stops;
+  for (Near& near : near_) {
+    ClothBody& body = bodies_[near.body];
+    if (!body.is_dynamic() || shares[near.point] == 1) continue;
+    const Vec3 p = points.at(near.point), place = body.end().point_to_body(p);
+    const Real thickness = points.thickness[near.point];
+    if (near.distance - (place - near.place).norm() >= thickness) continue;
+    const SurfaceDistance s = signed_distance(body.solid(), place);
+    if (s.distance >= thickness) continue;
+    stops.push_back({{&near, &body, body.end().vector_to_world(s.normal),
+                      body.end().point_to_world(place - s.distance * s.normal), s.distance - thickness},
+                     (p - points.start_at(near.point)) / body.duration()});
+  }
+  std::vector<Vec3> taken(recoil.size(), Vec3::Zero());
+  // Projected Gauss-Seidel: all of them stop a body together, or the first would turn it aside.
+  for (int sweep = 0; sweep < kStopSweeps; ++sweep)
+    for (Stop& s : stops) {
+      const Touch& t = s.touch;
+      const uint32_t cloth = points.cloth[t.near->point];
+      const Real depth = std::min(-t.gap, points.thickness[t.near->point]);
+      const Real approach =
+          t.normal.dot(t.body->velocity(t.on_body) - s.velocity) + kStabilization * depth / h_;
+      const Real impulse =
+          std::max(-s.impulse, approach / (t.body->mobility(t.on_body, t.normal) + recoil[cloth]));
+      s.impulse += impulse;
+      t.body->push(-impulse * t.normal, t.on_body);
+      taken[cloth] += impulse * t.normal;
+    }
+  return taken;
+}
+
 /// Puts a point out of one body; `supported`: another body holds it from behind, and pinch() moved this one.
 void ClothContacts::press(ClothPoints& points, Touch& t, Real dt, Real parts, bool supported,
                           std::vector<VelocityCut>& cuts) {
   const uint32_t i = t.near->point;
   const Vec3& n = t.normal;
   ClothBody& body = *t.body;
-  body.touched = true;
   const Vec3 motion = points.at(i) - points.start_at(i) - body.surface_motion(t.on_body);
+  body.touch((points.velocity[i].head<3>() - body.velocity(t.on_body)).norm());
   const Real w = points.inverse_mass[i];
   if (!(w > 0)) return;
   const Real already = std::min(t.gap - n.dot(motion), 0.0);  // gap at the start

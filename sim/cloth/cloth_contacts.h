@@ -10,6 +10,7 @@
 
 #include "sim/cloth/cloth_bodies.h"
 #include "sim/cloth/cloth_points.h"
+#include "sim/cloth/stretch_limit.h"
 
 namespace offstage::sim {
 
@@ -29,7 +30,13 @@ class ClothContacts {
   /// Puts points out of the bodies, in a sub-step of cloth of length dt, one of `parts` of the world's.
   /// Appends to `cuts`.
   void solve(ClothPoints& points, Real dt, Real parts, std::vector<VelocityCut>& cuts);
+  /// After moves were shortened, by `shares`: cloth that can get no farther stops the bodies that press into
+  /// it. `recoil` is the inverse mass of what is behind each point's cloth: 0 if it hangs on the world.
+  /// Returns by cloth the impulse that it takes up [N s].
+  std::vector<Vec3> stop_bodies(const ClothPoints& points, const MoveShares& shares,
+                                std::span<const Real> recoil);
 
+  bool any_dynamic() const { return any_dynamic_; }  ///< whether a body that can be pushed touches cloth
   std::span<const uint64_t> active() const { return active_; }  ///< contacts of the last solve(), by cloth
   /// Raises, by cloth, how deep any of its points is behind a surface, at the end of a sub-step.
   void measure(const ClothPoints& points, std::span<Real> penetration) const;
@@ -58,11 +65,13 @@ class ClothContacts {
   std::span<ClothBody> bodies_;
   std::span<const uint8_t> collides_;
   Real h_ = 0;
+  bool any_dynamic_ = false;
   std::vector<Near> near_;  // by point
   std::vector<Vec3> seen_at_;
   std::vector<Real> seen_reach_;  // how far each point may move before it must be looked at again
   std::vector<Aabb> boxes_;       // of the bodies' ways
   std::vector<uint64_t> active_;
+  std::vector<Touch> touches_;  // of one point
 };
 
 }  // namespace offstage::sim

@@ -42,6 +42,23 @@ void accelerate(const ClothPoints& points, const ClothRange& cloth, const Run& x
   }
 }
 
+/// What springs do to what is held, over the time h.
+void pass_on(ClothPoints& points, const ClothRange& cloth, const Run& x, const Run& v, Real h, Real dt) {
+  for (const ClothSpring& s : cloth.springs) {
+    const bool a = is_held(points, s.a), b = is_held(points, s.b);
+    if (a == b) continue;
+    const Vec4 d = x[s.a - cloth.begin] - x[s.b - cloth.begin];
+    const Real length = d.norm();
+    if (!(length > 0)) continue;
+    const Vec4 u = d / length;
+    const Vec4 impulse = h * dt *
+                         (s.stiffness * (length - s.rest_length) +
+                          s.damping * u.dot(v[s.a - cloth.begin] - v[s.b - cloth.begin])) *
+                         u;
+    a ? points.pull[s.a] -= impulse : points.pull[s.b] += impulse;
+  }
+}
+
 /// Where a run starts, with the velocity of what is held.
 void begin(const ClothPoints& points, const ClothRange& cloth, Real h, Run& x, Run& v) {
   x.assign(points.start.begin() + static_cast<std::ptrdiff_t>(cloth.begin),
@@ -90,6 +107,19 @@ class ImplicitSystem {
       y[b] -= f;
     }
     clear_held(y);
+  }
+
+  /// What the springs do to what is held, when all move with v through the step.
+  void pass_on(ClothPoints& points, const Run& v, Real h) const {
+    for (std::size_t k = 0; k < links_.size(); ++k) {
+      const ClothSpring& s = cloth_.springs[k];
+      const Link& link = links_[k];
+      const Vec4 q = v[s.a - cloth_.begin] - v[s.b - cloth_.begin];
+      const Vec4 impulse =
+          h * ((h * link.force + link.along * link.direction.dot(q)) * link.direction + link.across * q);
+      if (is_held(points, s.a)) points.pull[s.a] -= impulse;
+      if (is_held(points, s.b)) points.pull[s.b] += impulse;
+    }
   }
 
   void precondition(const Run& r, Run& z) const {
@@ -168,6 +198,7 @@ void step_symplectic(ClothPoints& points, const ClothRange& cloth, Real h) {
   begin(points, cloth, h, x, v);
   Run a(x.size());
   accelerate(points, cloth, x, v, a);
+  pass_on(points, cloth, x, v, h, h);
   for (std::size_t i = 0; i < x.size(); ++i)
     if (!is_held(points, cloth.begin + i)) points.position[cloth.begin + i] = x[i] + h * (v[i] + h * a[i]);
 }
@@ -184,6 +215,7 @@ void step_rk4(ClothPoints& points, const ClothRange& cloth, Real h, std::span<Ve
       stage_v[i] = v[i] + at[k] * dv[i];
     }
     accelerate(points, cloth, stage_x, stage_v, dv);
+    pass_on(points, cloth, stage_x, stage_v, share[k], h);
     dx = stage_v;
     for (std::size_t i = 0; i < n; ++i) {
       move[i] += share[k] * dx[i];
@@ -204,6 +236,7 @@ bool step_implicit(ClothPoints& points, const ClothRange& cloth, Real h) {
   const ImplicitSystem system(points, cloth, h);
   const Run b = system.right_side(v, h);
   const bool converged = solve(system, b, v);
+  system.pass_on(points, v, h);
   for (std::size_t i = 0; i < x.size(); ++i)
     if (!is_held(points, cloth.begin + i)) points.position[cloth.begin + i] = x[i] + h * v[i];
   return converged;

@@ -14,6 +14,7 @@ struct Cloth {
   ClothHandle handle;
   ClothDef def;
   std::vector<Vec3> points, velocities, rest;
+  std::vector<Vec3> before;  ///< the points at the start of the world's sub-step
   std::vector<Real> masses;
   std::vector<uint32_t> sources;
   std::vector<Triangle> triangles;

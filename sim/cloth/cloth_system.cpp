@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "sim/cloth/cloth_integrators.h"
 #include "sim/cloth/tearing.h"
@@ -11,10 +12,14 @@ namespace {
 
 /// Rounds of shortening moves; what is not right then is put back to where it started.
 constexpr int kMaxRounds = 64;
+/// Turns of contacts with bodies and of the stretch limit.
+constexpr int kMaxTurns = 4;
 /// Substeps of cloth in one of the world.
 constexpr Real kMaxParts = 1000;
 /// Stretch is not limited so that cloth could not tear: the limit is at least this much above.
 constexpr Real kBeyondTear = 1.05;
+/// How long a span is, at most [s].
+constexpr Real kSpan = 1.0 / 480;
 /// For how long pairs of cloth with cloth are sought at a time [s].
 constexpr Real kHorizon = 1.0 / 120;
 
@@ -36,7 +41,7 @@ void ClothSystem::assemble() {
   first_spring_.clear();
   std::vector<ClothSpring> swept;
   std::vector<StretchLimit::Limit> limits;
-  std::vector<Triangle> colliding;
+  std::vector<Triangle> colliding, touching;  // cloth; bodies
   for (uint32_t c = 0; c < cloths_.size(); ++c) {
     const Cloth& cloth = *cloths_[c];
     const auto first = static_cast<uint32_t>(points_.size());
@@ -64,6 +69,9 @@ void ClothSystem::assemble() {
       if (limit > 0 && s.kind == SpringKind::stretch) limit = std::max(limit, kBeyondTear * cloth.def.tear);
       if (limit > 0) limits.push_back({s.a, s.b, s.rest_length, limit * s.rest_length});
     }
+    if (cloth.def.collides && !cloth.stopped)
+      for (const Triangle& t : cloth.triangles)
+        touching.push_back({first + t[0], first + t[1], first + t[2]});
     if (cloth.def.self_collision)
       for (const Triangle& t : cloth.triangles)
         colliding.push_back({first + t[0], first + t[1], first + t[2]});
@@ -80,6 +88,8 @@ void ClothSystem::assemble() {
   springs_.assign(swept, points_.size());
   limit_.assign(std::move(limits));
   self_contacts_.assign(std::move(colliding), points_);
+  corner_contacts_.assign(std::move(touching), points_);
+  span_ = 0;
 }
 
 Aabb ClothSystem::reach(Real h) const {
@@ -104,9 +114,9 @@ void ClothSystem::find_held(Real time, std::span<ClothBody> bodies) {
       const auto point = static_cast<uint32_t>(first_[c]) + pin.vertex;
       ClothBody* body = nullptr;
       if (pin.body) {
-        const auto at = std::find_if(bodies.begin(), bodies.end(),
-                                     [&](const ClothBody& b) { return b.way().body == pin.body.index; });
-        if (at == bodies.end()) continue;
+        const auto at = std::ranges::lower_bound(bodies, pin.body.index, {},
+                                                 [](const ClothBody& b) { return b.way().body; });
+        if (at == bodies.end() || at->way().body != pin.body.index) continue;
         body = &*at;
       }
       points_.inverse_mass[point] = 0;
@@ -126,6 +136,8 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
   Real longest = weather.h;
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     longest = std::min(longest, cloths_[c]->def.substep);
+    for (std::size_t i = 0; i < cloths_[c]->points.size(); ++i)  // blows may have changed them
+      points_.velocity[first_[c] + i] = padded(cloths_[c]->velocities[i]);
     add_outer_forces(*cloths_[c], first_[c], weather, points_);
   }
   const Real parts = std::clamp(std::ceil(weather.h / longest * (1 - 1e-12)), 1.0, kMaxParts);
@@ -133,31 +145,54 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
   parts_ = parts;
   find_held(weather.time, bodies);
   contacts_.find(points_, collides_, bodies, weather.h);
+  corner_contacts_.find(points_, bodies, weather.h);
+  const Real span = std::max(1.0, std::floor(kSpan / dt * (1 + 1e-9)));
   for (Real k = 0; k < parts; ++k) {
     for (Cloth* cloth : cloths_) cloth->age += dt;
-    substep(k / parts, (k + 1) / parts, dt);
+    substep(k / parts, (k + 1) / parts, dt, k + 1 == parts || span_ + 1 >= span);
   }
   count_penetration();
   write_back();
 }
 
-void ClothSystem::substep(Real from, Real to, Real dt) {
+/// Contact of cloth with cloth is dearest, and looked at once in a span of several sub-steps.
+void ClothSystem::substep(Real from, Real to, Real dt, bool ends_span) {
+  if (span_++ == 0) span_start_ = points_.position;
   for (ClothBody& body : bodies_) body.begin(from, to, dt);
   points_.start = points_.position;
   cuts_.clear();
   move_held();
   integrate(dt);
   close_seams();
-  if (!limit_.empty()) limit_.project(points_);
-  if (!self_contacts_.empty()) {
-    self_contacts_.find(points_, dt, kHorizon);
-    self_contacts_.solve(points_);
-  }
-  contacts_.find_runaways(points_);
-  contacts_.solve(points_, dt, parts_, cuts_);
-  shorten_moves(dt);
+  limit_.project(points_);
+  if (ends_span && !self_contacts_.empty()) push_apart(dt);
+  touch_bodies(dt);
+  shorten_moves(dt, ends_span);
   end_substep(dt);
   pull_bodies(dt);
+  if (ends_span) span_ = 0;
+}
+
+/// Pushes layers of cloth apart that came too near in the span. That changes velocities as spread over it.
+void ClothSystem::push_apart(Real dt) {
+  points_.start.swap(span_start_);
+  free_ = points_.position;
+  self_contacts_.find(points_, span_ * dt, kHorizon);
+  self_contacts_.solve(points_);
+  points_.start.swap(span_start_);
+  if (span_ == 1) return;
+  for (uint32_t i = 0; i < points_.size(); ++i)
+    if (points_.position[i] != free_[i])
+      cuts_.push_back({i, (1 - 1.0 / span_) * (points_.position[i] - free_[i])});
+}
+
+/// Bodies push cloth that pulls at what is too long, which pushes back: in turns.
+void ClothSystem::touch_bodies(Real dt) {
+  contacts_.find_runaways(points_);
+  corner_contacts_.solve(points_, dt, cuts_);
+  contacts_.solve(points_, dt, parts_, cuts_);
+  for (int round = 1; round < kMaxTurns && contacts_.any_dynamic() && limit_.project(points_); ++round)
+    contacts_.solve(points_, dt, parts_, cuts_);
 }
 
 void ClothSystem::move_held() {
@@ -207,14 +242,18 @@ void ClothSystem::close_seams() {
 }
 
 /// Until nothing is too long and nothing crossed.
-void ClothSystem::shorten_moves(Real dt) {
-  if (limit_.empty() && self_contacts_.empty()) return;
-  if (!self_contacts_.empty()) self_contacts_.find_doubtful(points_, dt, kHorizon);
+void ClothSystem::shorten_moves(Real dt, bool ends_span) {
+  const bool self = ends_span && !self_contacts_.empty();
+  if (limit_.empty() && !self) return;
+  if (self) {
+    points_.start.swap(span_start_);  // the moves of the whole span
+    self_contacts_.find_doubtful(points_, span_ * dt, kHorizon);
+  }
   shares_.assign(points_.size(), 1);
   bool again = true;
   for (int round = 0; again && round < kMaxRounds; ++round) {
     again = limit_.shorten(points_, shares_);
-    if (!self_contacts_.empty()) again |= self_contacts_.shorten(points_, shares_);
+    if (self) again |= self_contacts_.shorten(points_, shares_);
   }
   for (uint32_t i : self_contacts_.take_held_back()) ++cloths_[points_.cloth[i]]->report.held_back;
   for (uint32_t i : self_contacts_.take_crossed()) ++cloths_[points_.cloth[i]]->report.crossings;
@@ -224,13 +263,38 @@ void ClothSystem::shorten_moves(Real dt) {
     if (share == 1) continue;
     ++cloths_[points_.cloth[i]]->report.limited;
     points_.position[i] = points_.start[i] + share * (points_.position[i] - points_.start[i]);
+    shares_[i] = share;
+    // Its velocity is that of the shortened move, which in a span is not that of the last sub-step.
+    if (self)
+      kick_[i] = (points_.position[i] - points_.start[i]) / (span_ * dt) -
+                 (points_.position[i] - span_start_[i]) / dt;
   }
+  if (self) {
+    std::erase_if(cuts_, [&](const VelocityCut& cut) { return shares_[cut.point] != 1; });
+    self_contacts_.end_substep(points_, span_ * dt);
+    points_.start.swap(span_start_);
+  }
+  const std::vector<Real> recoil = recoils();
+  const std::vector<Vec3> taken = contacts_.stop_bodies(points_, shares_, recoil);
+  for (std::size_t c = 0; c < cloths_.size(); ++c)
+    if (recoil[c] > 0 && taken[c] != Vec3::Zero())
+      for (std::size_t i = first_[c], end = i + cloths_[c]->points.size(); i < end; ++i)
+        kick_[i] += padded(recoil[c] * taken[c]);
+}
+
+/// Of each cloth the inverse of its mass; 0 if pins hold it, which take up what it is pushed.
+std::vector<Real> ClothSystem::recoils() const {
+  std::vector<Real> recoil;
+  for (const Cloth* cloth : cloths_)
+    recoil.push_back(
+        cloth->pins.empty() ? 1 / std::accumulate(cloth->masses.begin(), cloth->masses.end(), 0.0) : 0);
+  return recoil;
 }
 
 void ClothSystem::end_substep(Real dt) {
   for (std::size_t i = 0; i < points_.size(); ++i)
     points_.velocity[i] = (points_.position[i] - points_.start[i]) / dt + kick_[i];
-  if (!self_contacts_.empty()) self_contacts_.end_substep(points_, dt);
+  std::fill(kick_.begin(), kick_.end(), Vec4::Zero());
   for (const VelocityCut& cut : cuts_) points_.velocity[cut.point] -= cut.move / dt;
 }
 
@@ -254,6 +318,7 @@ void ClothSystem::write_back() {
       stop(cloth, first_[c]);
       continue;
     }
+    cloth.before = cloth.points;
     for (std::size_t i = 0; i < cloth.points.size(); ++i) {
       cloth.points[i] = points_.at(first_[c] + i);
       cloth.velocities[i] = points_.velocity[first_[c] + i].head<3>();

@@ -13,6 +13,7 @@
 #include "sim/cloth/cloth_points.h"
 #include "sim/cloth/cloth_springs.h"
 #include "sim/cloth/cloth_state.h"
+#include "sim/cloth/corner_contacts.h"
 #include "sim/cloth/self_contacts.h"
 #include "sim/cloth/stretch_limit.h"
 
@@ -28,9 +29,6 @@ class ClothSystem {
 
   /// Writes strains and counts of contacts into the cloths' reports.
   void measure();
-
-  std::size_t pair_count() const { return self_contacts_.pair_count(); }  ///< of cloth near cloth
-  uint64_t searches() const { return self_contacts_.searches(); }         ///< for these, since the start
 
   /// Around all points and where they may come to within h.
   Aabb reach(Real h) const;
@@ -48,11 +46,14 @@ class ClothSystem {
 
   void assemble();
   void find_held(Real time, std::span<ClothBody> bodies);
-  void substep(Real from, Real to, Real dt);
+  void substep(Real from, Real to, Real dt, bool ends_span);
+  void push_apart(Real dt);
   void move_held();
   void integrate(Real dt);
   void close_seams();
-  void shorten_moves(Real dt);
+  void touch_bodies(Real dt);
+  void shorten_moves(Real dt, bool ends_span);
+  std::vector<Real> recoils() const;
   void end_substep(Real dt);
   void pull_bodies(Real dt);
   void write_back();
@@ -73,7 +74,10 @@ class ClothSystem {
   ClothSprings springs_;
   StretchLimit limit_;
   ClothContacts contacts_;
+  CornerContacts corner_contacts_;
   SelfContacts self_contacts_;
+  std::vector<Vec4> span_start_, free_;  // positions when the span of self-contact began; before its pushes
+  uint32_t span_ = 0;                    // sub-steps of cloth since then
   std::vector<uint8_t> collides_;
   std::vector<Held> held_;
   std::vector<Seam> seams_;

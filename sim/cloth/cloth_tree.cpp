@@ -12,6 +12,35 @@ constexpr uint32_t kLeaf = 4;
 /// A patch is flat enough if all its normals have at least this cosine with a common direction.
 constexpr Real kLeaning = 0.3;
 
+constexpr uint32_t kNone = ~0u;
+
+/// The triangle across each edge; none at borders and where more than two meet.
+std::vector<std::array<uint32_t, 3>> neighbours(std::span<const Triangle> triangles) {
+  std::vector<std::array<uint32_t, 3>> beside(triangles.size(), {kNone, kNone, kNone});
+  struct Edge {
+    std::pair<uint32_t, uint32_t> ends;
+    uint32_t triangle, corner;
+  };
+  std::vector<Edge> edges;
+  for (uint32_t t = 0; t < triangles.size(); ++t)
+    for (uint32_t k = 0; k < 3; ++k)
+      edges.push_back({std::minmax(triangles[t][k], triangles[t][(k + 1) % 3]), t, k});
+  std::ranges::stable_sort(edges, {}, &Edge::ends);
+  for (std::size_t i = 0, end; i < edges.size(); i = end) {
+    for (end = i + 1; end < edges.size() && edges[end].ends == edges[i].ends; ++end) {
+    }
+    if (end - i != 2) continue;
+    beside[edges[i].triangle][edges[i].corner] = edges[i + 1].triangle;
+    beside[edges[i + 1].triangle][edges[i + 1].corner] = edges[i].triangle;
+  }
+  return beside;
+}
+
+/// Twice the area of a triangle in the plane.
+Real turn(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
+  return (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
+}
+
 /// The number of the connected piece of each triangle: its least point.
 std::vector<uint32_t> pieces(std::span<const Triangle> triangles, std::size_t point_count) {
   std::vector<uint32_t> parent(point_count);
@@ -36,6 +65,7 @@ void ClothTree::build(std::span<const Triangle> triangles, std::span<const Vec4>
   order_.resize(triangles.size());
   std::iota(order_.begin(), order_.end(), 0u);
   piece_ = pieces(triangles, points.size());
+  beside_ = neighbours(triangles);
   std::stable_sort(order_.begin(), order_.end(),
                    [&](uint32_t a, uint32_t b) { return piece_[a] < piece_[b]; });
   boxes_.resize(triangles.size());
@@ -43,6 +73,43 @@ void ClothTree::build(std::span<const Triangle> triangles, std::span<const Vec4>
   std::vector<Vec4> centres;
   for (const Triangle& t : triangles) centres.push_back((points[t[0]] + points[t[1]] + points[t[2]]) / 3);
   if (!triangles.empty()) build_below(centres, 0, static_cast<uint32_t>(triangles.size()));
+  place_.resize(order_.size());
+  for (uint32_t i = 0; i < order_.size(); ++i) place_[order_[i]] = i;
+}
+
+/// Whether the outline of a patch, seen along its mean normal, crosses itself: sweeps over its segments.
+bool ClothTree::outline_crosses(std::span<const Vec4> points, const Node& node) const {
+  if (node.count <= kLeaf) return true;  // no dearer to look at its triangles
+  const Vec3 normal = (node.normal_low + node.normal_high).head<3>().normalized();
+  const Vec3 u = normal.unitOrthogonal(), v = normal.cross(u);
+  struct Segment {
+    uint32_t a, b;
+    Eigen::Vector2d from, to;
+    Real low, high;
+  };
+  std::vector<Segment> outline;
+  const auto seen = [&](uint32_t i) {
+    const Vec3 p = points[i].head<3>();
+    return Eigen::Vector2d(u.dot(p), v.dot(p));
+  };
+  for (uint32_t i = node.first; i < node.first + node.count; ++i)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const uint32_t other = beside_[order_[i]][k];
+      if (other != kNone && place_[other] - node.first < node.count) continue;
+      const Triangle& t = triangles_[order_[i]];
+      const Eigen::Vector2d a = seen(t[k]), b = seen(t[(k + 1) % 3]);
+      outline.push_back({t[k], t[(k + 1) % 3], a, b, std::min(a.x(), b.x()), std::max(a.x(), b.x())});
+    }
+  std::ranges::stable_sort(outline, {}, &Segment::low);
+  for (std::size_t i = 0; i < outline.size(); ++i)
+    for (std::size_t j = i + 1; j < outline.size() && outline[j].low <= outline[i].high; ++j) {
+      const Segment &p = outline[i], &q = outline[j];
+      if (p.a == q.a || p.a == q.b || p.b == q.a || p.b == q.b) continue;
+      if (turn(p.from, p.to, q.from) * turn(p.from, p.to, q.to) <= 0 &&
+          turn(q.from, q.to, p.from) * turn(q.from, q.to, p.to) <= 0)
+        return true;
+    }
+  return false;
 }
 
 /// Parts between pieces first; a piece is halved along its longest axis.

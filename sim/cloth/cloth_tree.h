@@ -1,9 +1,11 @@
 #pragma once
 /// Tree of boxes over the triangles of all cloths, refitted as they move, that finds which may touch each
-/// other. A connected patch whose normals all lean to one side cannot touch itself and is passed over whole
-/// (Volino and Magnenat-Thalmann, "Efficient self-collision detection on smoothly discretized surface
-/// animations using geometrical shape regularity", 1994; the outline of a patch is not tested).
+/// other. A connected patch whose normals all lean to one side, and whose outline seen from there does not
+/// cross itself, cannot cross itself and is passed over whole (Volino and Magnenat-Thalmann, "Efficient
+/// self-collision detection on smoothly discretized surface animations using geometrical shape regularity",
+/// 1994).
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -21,16 +23,12 @@ class ClothTree {
   void fit(std::span<const Vec4> from, std::span<const Vec4> to, std::span<const Real> margin);
 
   /// Calls visit(a, b) for pairs of triangles whose boxes meet, each once, in an order that depends on the
-  /// tree and the boxes alone.
+  /// tree and the boxes alone. `points` as fitted.
   template <class Visit>
-  void pairs(Visit&& visit) const;
+  void pairs(std::span<const Vec4> points, Visit&& visit) const;
   /// Calls visit(triangle) for those whose boxes meet `box`.
   template <class Visit>
   void overlapping(const Aabb& box, Visit&& visit) const;
-
-  Aabb bounds() const {
-    return nodes_.empty() ? Aabb() : Aabb(nodes_[0].low.head<3>(), nodes_[0].high.head<3>());
-  }
 
  private:
   struct Node {
@@ -48,7 +46,8 @@ class ClothTree {
   uint32_t build_below(const std::vector<Vec4>& centres, uint32_t first, uint32_t count);
   void halve(const std::vector<Vec4>& centres, uint32_t first, uint32_t count, uint32_t half);
   template <class Visit>
-  void within(uint32_t node, Visit& visit) const;
+  void within(std::span<const Vec4> points, uint32_t node, Visit& visit) const;
+  bool outline_crosses(std::span<const Vec4> points, const Node& node) const;
   template <class Visit>
   void between(uint32_t a, uint32_t b, Visit& visit) const;
   static bool meet(const Vec4& low_a, const Vec4& high_a, const Vec4& low_b, const Vec4& high_b) {
@@ -57,23 +56,25 @@ class ClothTree {
 
   std::vector<Triangle> triangles_;
   std::vector<uint32_t> order_;
-  std::vector<uint32_t> piece_;  // connected piece of each triangle
-  std::vector<Box> boxes_;       // in the order of order_
+  std::vector<uint32_t> place_;                  // of each triangle in order_
+  std::vector<uint32_t> piece_;                  // connected piece of each triangle
+  std::vector<std::array<uint32_t, 3>> beside_;  // triangle across each edge from a corner to the next
+  std::vector<Box> boxes_;                       // in the order of order_
   std::vector<Node> nodes_;
 };
 
 template <class Visit>
-void ClothTree::pairs(Visit&& visit) const {
-  if (!nodes_.empty()) within(0, visit);
+void ClothTree::pairs(std::span<const Vec4> points, Visit&& visit) const {
+  if (!nodes_.empty()) within(points, 0, visit);
 }
 
 template <class Visit>
-void ClothTree::within(uint32_t at, Visit& visit) const {
+void ClothTree::within(std::span<const Vec4> points, uint32_t at, Visit& visit) const {
   const Node& node = nodes_[at];
-  if (node.leans) return;
+  if (node.leans && !outline_crosses(points, node)) return;
   if (node.second != 0) {
-    within(at + 1, visit);
-    within(node.second, visit);
+    within(points, at + 1, visit);
+    within(points, node.second, visit);
     between(at + 1, node.second, visit);
     return;
   }

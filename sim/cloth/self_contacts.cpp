@@ -115,7 +115,6 @@ void SelfContacts::add(const ClothPoints& points, std::span<const Vec4> velocity
 }
 
 void SelfContacts::search(const ClothPoints& points, std::span<const Vec4> velocity, Real horizon) {
-  ++searches_;
   since_ = 0;
   horizon_ = horizon;
   foreseen_from_ = points.start;
@@ -127,7 +126,7 @@ void SelfContacts::search(const ClothPoints& points, std::span<const Vec4> veloc
   tree_.fit(points.start, to, margin_);
   std::fill(travel_.begin(), travel_.end(), 0.0);
   pairs_.clear();
-  tree_.pairs([&](uint32_t ta, uint32_t tb) {
+  tree_.pairs(points.start, [&](uint32_t ta, uint32_t tb) {
     const Triangle &a = triangles_[ta], &b = triangles_[tb];
     for (std::size_t k = 0; k < 3; ++k) {
       if (owns_point_[ta][k]) add(points, velocity, {a[k], b[0], b[1], b[2]}, false, horizon);
@@ -158,10 +157,6 @@ void SelfContacts::search_again(const ClothPoints& points, Real dt, Real horizon
   search(points, velocity, std::max(horizon, dt));
 }
 
-Real SelfContacts::moves(const ClothPoints&, const Pair& pair) const {
-  return move_[pair.points[0]] + move_[pair.points[1]] + move_[pair.points[2]] + move_[pair.points[3]];
-}
-
 SelfContacts::Contact SelfContacts::look(const ClothPoints& points, uint32_t k) {
   Pair& pair = pairs_[k];
   const Closest c = closest(points.start, pair.points, pair.edges);
@@ -171,17 +166,28 @@ SelfContacts::Contact SelfContacts::look(const ClothPoints& points, uint32_t k) 
   return {k, c.weights, normal, pair.distance, c.inner};
 }
 
-void SelfContacts::find(const ClothPoints& points, Real dt, Real horizon) {
+/// The pairs that the moves made now may bring nearer than `reach(pair)`.
+template <class Reach>
+void SelfContacts::gather(const ClothPoints& points, Real dt, Real horizon, Reach&& reach) {
   if (strayed(points, dt)) search_again(points, dt, horizon);
   for (std::size_t i = 0; i < move_.size(); ++i) move_[i] = (points.position[i] - points.start[i]).norm();
   contacts_.clear();
   for (uint32_t k = 0; k < pairs_.size(); ++k) {
     const Pair& pair = pairs_[k];
-    const Real moved = moves(points, pair);
-    if (pair.distance - (travelled(pair) - pair.travel) - moved > pair.thickness) continue;
+    const auto& p = pair.points;
+    const Real moved = move_[p[0]] + move_[p[1]] + move_[p[2]] + move_[p[3]];
+    if (pair.distance - (travelled(pair) - pair.travel) - moved > reach(pair)) continue;
     const Contact contact = look(points, k);
-    if (contact.distance - moved <= pair.thickness) contacts_.push_back(contact);
+    if (contact.distance - moved <= reach(pair)) contacts_.push_back(contact);
   }
+}
+
+void SelfContacts::find(const ClothPoints& points, Real dt, Real horizon) {
+  gather(points, dt, horizon, [](const Pair& pair) { return pair.thickness; });
+}
+
+void SelfContacts::find_doubtful(const ClothPoints& points, Real dt, Real horizon) {
+  gather(points, dt, horizon, [](const Pair& pair) { return kLeft * pair.distance; });
 }
 
 void SelfContacts::solve(ClothPoints& points) {
@@ -208,22 +214,12 @@ void SelfContacts::solve(ClothPoints& points) {
     const Real friction =
         std::sqrt(points.self_friction[pair.points[0]] * points.self_friction[pair.points[3]]);
     if (length > 0) move -= std::min(1.0, friction * push / length) * slip;
-    for (std::size_t k = 0; k < 4; ++k)
-      points.position[pair.points[k]] +=
-          (c.weights[k] * points.inverse_mass[pair.points[k]] / mobility) * move;
-  }
-}
-
-void SelfContacts::find_doubtful(const ClothPoints& points, Real dt, Real horizon) {
-  if (strayed(points, dt)) search_again(points, dt, horizon);
-  for (std::size_t i = 0; i < move_.size(); ++i) move_[i] = (points.position[i] - points.start[i]).norm();
-  contacts_.clear();
-  for (uint32_t k = 0; k < pairs_.size(); ++k) {
-    const Pair& pair = pairs_[k];
-    const Real moved = moves(points, pair);
-    if (pair.distance - (travelled(pair) - pair.travel) - moved > kLeft * pair.distance) continue;
-    const Contact contact = look(points, k);
-    if (contact.distance - moved <= kLeft * contact.distance) contacts_.push_back(contact);
+    for (std::size_t k = 0; k < 4; ++k) {
+      const uint32_t i = pair.points[k];
+      const Vec4 impulse = (c.weights[k] / mobility) * move;
+      points.position[i] += points.inverse_mass[i] * impulse;
+      if (points.inverse_mass[i] == 0) points.pull[i] += impulse;
+    }
   }
 }
 

@@ -38,8 +38,6 @@ class SelfContacts {
   void end_substep(const ClothPoints& points, Real dt);
 
   std::span<const uint64_t> active() const { return active_; }  ///< contacts of the last solve(), by cloth
-  std::size_t pair_count() const { return pairs_.size(); }
-  uint64_t searches() const { return searches_; }  ///< since the start
   /// Points whose moves shorten() shortened, and those of pairs that it could not keep from crossing because
   /// pins hold them; since the last call.
   std::vector<uint32_t> take_held_back() { return std::exchange(held_back_, {}); }
@@ -71,7 +69,8 @@ class SelfContacts {
     return travel_[pair.points[0]] + travel_[pair.points[1]] + travel_[pair.points[2]] +
            travel_[pair.points[3]];
   }
-  Real moves(const ClothPoints& points, const Pair& pair) const;
+  template <class Reach>
+  void gather(const ClothPoints& points, Real dt, Real horizon, Reach&& reach);
   Contact look(const ClothPoints& points, uint32_t pair);
 
   std::vector<Triangle> triangles_;
@@ -81,7 +80,6 @@ class SelfContacts {
   std::vector<Pair> pairs_;
   std::vector<Contact> contacts_;  // of the sub-step; then those in doubt
   std::vector<uint64_t> active_;
-  uint64_t searches_ = 0;
   std::vector<uint32_t> held_back_, crossed_;
 
   // Since the last search: ways foreseen, and the paths made.

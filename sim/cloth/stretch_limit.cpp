@@ -25,10 +25,10 @@ Real greatest_share(const Vec4& k1, const Vec4& k2, Real longest) {
 
 }  // namespace
 
-void StretchLimit::project(ClothPoints& points) const {
+bool StretchLimit::project(ClothPoints& points) const {
   Vec4* const x = points.position.data();
   const Real* const w = points.inverse_mass.data();
-  bool again = true;
+  bool again = true, any = false;
   for (int sweep = 0; sweep < kSweeps && again; ++sweep) {
     again = false;
     const auto draw = [&](const Limit& l) {
@@ -45,7 +45,9 @@ void StretchLimit::project(ClothPoints& points) const {
       if (w[l.b] == 0) points.pull[l.b] += move;
     };
     std::for_each(limits_.begin(), limits_.end(), draw);
+    any |= again;
   }
+  return any;
 }
 
 bool StretchLimit::shorten(const ClothPoints& points, MoveShares& shares) const {

@@ -23,8 +23,8 @@ class StretchLimit {
   void assign(std::vector<Limit> limits) { limits_ = std::move(limits); }
   bool empty() const { return limits_.empty(); }
 
-  /// Draws together what is too long. It may not suffice.
-  void project(ClothPoints& points) const;
+  /// Draws together what is too long; whether anything was. It may not suffice.
+  bool project(ClothPoints& points) const;
 
   /// Lowers shares of moves where a limit does not hold; whether it did. If both ends made none, the lengths
   /// would be those at the start, which held. What pins hold always makes its whole move.

@@ -54,6 +54,7 @@ bool split(Cloth& cloth, uint32_t point, const Vec3& along) {
   const auto added = static_cast<uint32_t>(cloth.points.size());
   for (Triangle* t : beyond) std::replace(t->begin(), t->end(), point, added);
   cloth.points.push_back(cloth.points[point]);
+  cloth.before.push_back(cloth.before[point]);
   cloth.velocities.push_back(cloth.velocities[point]);
   cloth.rest.push_back(cloth.rest[point]);
   cloth.sources.push_back(cloth.sources[point]);

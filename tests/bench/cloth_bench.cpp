@@ -7,9 +7,8 @@
 #include <ctime>
 
 #include "effects/cloth.h"
-#include "sim/collision/bounding_tree.h"
-#include "sim/geometry/intersection.h"
 #include "sim/world.h"
+#include "tests/cloth_crossings.h"
 
 namespace {
 
@@ -20,28 +19,6 @@ double cpu_seconds() {
   timespec t;
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
-std::size_t crossings(const ClothView& cloth) {
-  std::vector<Aabb> boxes;
-  for (const Triangle& t : cloth.triangles) {
-    Aabb& box = boxes.emplace_back();
-    for (uint32_t corner : t) box.extend(cloth.points[corner]);
-  }
-  const AabbTree tree(boxes);
-  const auto corners = [&](const Triangle& t) {
-    return TriangleVertices{cloth.points[t[0]], cloth.points[t[1]], cloth.points[t[2]]};
-  };
-  std::size_t count = 0;
-  for (uint32_t i = 0; i < boxes.size(); ++i)
-    tree.overlapping(boxes[i], [&](uint32_t j) {
-      const Triangle &a = cloth.triangles[i], &b = cloth.triangles[j];
-      for (uint32_t p : a)
-        for (uint32_t q : b)
-          if (p == q) return;
-      count += j > i && boxes[i].intersects(boxes[j]) && triangles_intersect(corners(a), corners(b));
-    });
-  return count;
 }
 
 void run(uint32_t cells, bool self_collision, Real rate) {
@@ -80,7 +57,8 @@ void run(uint32_t cells, bool self_collision, Real rate) {
 
 int main(int argc, char** argv) {
   if (argc >= 3) {
-    run(static_cast<uint32_t>(std::atoi(argv[1])), std::atoi(argv[2]) != 0, argc > 3 ? std::atof(argv[3]) : 0);
+    run(static_cast<uint32_t>(std::atoi(argv[1])), std::atoi(argv[2]) != 0,
+        argc > 3 ? std::atof(argv[3]) : 0);
     return 0;
   }
   for (uint32_t cells : {60u, 100u, 200u})

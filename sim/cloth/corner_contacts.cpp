@@ -1,0 +1,157 @@
+#include "sim/cloth/corner_contacts.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace offstage::sim {
+namespace {
+
+/// Of the cloth's thickness, which its points keep: flat parts do not feel features at all.
+constexpr Real kDistance = 0.5;
+/// Triangles steeper than this against what points out of a feature do not lie over it.
+constexpr Real kLeastCosine = 0.3;
+constexpr int kMaxSamples = 32;            // of an edge
+constexpr std::size_t kMaxCorners = 2000;  // of a mesh
+/// Share of an overlap at the start that is taken back per sub-step.
+constexpr Real kRecovery = 0.2;
+
+int samples(Real length, Real spacing, int least) {
+  return std::clamp(static_cast<int>(std::ceil(length / spacing)), least, kMaxSamples);
+}
+
+}  // namespace
+
+void CornerContacts::assign(std::vector<Triangle> triangles, const ClothPoints& points) {
+  triangles_ = std::move(triangles);
+  tree_.build(triangles_, points.rest);
+  Real sum = 0;
+  for (const Triangle& t : triangles_) sum += (points.rest[t[0]] - points.rest[t[1]]).norm();
+  spacing_ = triangles_.empty() ? 1 : std::max(1e-3, sum / static_cast<Real>(triangles_.size()) / 2);
+  near_.clear();
+}
+
+std::vector<CornerContacts::Corner> CornerContacts::corners(const Solid& solid) const {
+  std::vector<Corner> found;
+  const auto rim = [&](Real radius, Real y, Real up, Real depth) {
+    const int count = std::max(8, 2 * samples(std::numbers::pi * radius, spacing_, 4));
+    for (int k = 0; k < count; ++k) {
+      // Of a quarter by the tangent of half the angle, nearly evenly; needs no sine.
+      const Real t = 4.0 * k / count, quarter = std::floor(t), s = t - quarter;
+      const Real half = s * (std::numbers::sqrt2 - 1), d = 1 + half * half;  // tan of half the angle
+      Vec3 around((1 - half * half) / d, 0, 2 * half / d);
+      for (Real q = 0; q < quarter; ++q) around = Vec3(-around.z(), 0, around.x());
+      found.push_back(
+          {radius * around + y * Vec3::UnitY(), (around + up * Vec3::UnitY()).normalized(), depth});
+    }
+  };
+  if (const auto* box = std::get_if<Box>(solid.shape)) {
+    const Vec3 half = box->size / 2;
+    for (int axis = 0; axis < 3; ++axis)
+      for (int side = 0; side < 4; ++side) {
+        Vec3 outward = Vec3::Zero();
+        outward[(axis + 1) % 3] = side & 1 ? 1 : -1;
+        outward[(axis + 2) % 3] = side & 2 ? 1 : -1;
+        const int count = samples(box->size[axis], spacing_, 1);
+        for (int k = 0; k <= count; ++k) {
+          Vec3 direction = outward;
+          direction[axis] = k == 0 ? -1 : k == count ? 1 : 0;
+          Vec3 place = half.cwiseProduct(outward);
+          place[axis] = half[axis] * (2.0 * k / count - 1);
+          found.push_back({place, direction.normalized(), half.minCoeff()});
+        }
+      }
+  } else if (const auto* cylinder = std::get_if<Cylinder>(solid.shape)) {
+    const Real depth = std::min(cylinder->radius, cylinder->height / 2);
+    for (Real up : {-1.0, 1.0}) rim(cylinder->radius, up * cylinder->height / 2, up, depth);
+  } else if (const auto* cone = std::get_if<Cone>(solid.shape)) {
+    const Real depth = std::min(cone->radius, cone->height) / 2;
+    rim(cone->radius, -cone->height / 2, -1, depth);
+    found.push_back({Vec3(0, cone->height / 2, 0), Vec3::UnitY(), depth});
+  } else if (solid.mesh && solid.mesh->solid && solid.mesh->hull.vertices().size() <= kMaxCorners) {
+    const Aabb around = local_bounds(solid);
+    for (const Vec3& v : solid.mesh->hull.vertices())
+      found.push_back({v, (v - around.center()).normalized(), around.sizes().minCoeff() / 4});
+  }
+  return found;
+}
+
+void CornerContacts::find(const ClothPoints& points, std::span<ClothBody> bodies, Real h) {
+  bodies_ = bodies;
+  near_.clear();
+  if (triangles_.empty()) return;
+  bool fitted = false;
+  for (uint32_t b = 0; b < bodies.size(); ++b) {
+    if (!bodies[b].collides) continue;
+    const Obstacle& way = bodies[b].way();
+    for (const Corner& corner : corners(way.solid)) {
+      if (!std::exchange(fitted, true)) {
+        std::vector<Real> margin(points.size());
+        for (std::size_t i = 0; i < margin.size(); ++i)
+          margin[i] = points.thickness[i] + 2 * h * points.velocity[i].norm();
+        tree_.fit(points.position, points.position, margin);
+      }
+      const Vec3 from = way.start.point_to_world(corner.place), to = way.end.point_to_world(corner.place);
+      const Real depth = std::min(corner.depth, 2 * spacing_);
+      Aabb box(from.cwiseMin(to), from.cwiseMax(to));
+      box.min().array() -= depth;
+      box.max().array() += depth;
+      tree_.overlapping(box, [&](uint32_t t) {
+        near_.push_back({{corner.place, corner.outward, depth}, b, t});
+      });
+    }
+  }
+}
+
+void CornerContacts::solve(ClothPoints& points, Real dt, std::vector<VelocityCut>& cuts) {
+  for (const Near& near : near_) press(points, near, dt, cuts);
+}
+
+void CornerContacts::press(ClothPoints& points, const Near& near, Real dt, std::vector<VelocityCut>& cuts) {
+  const Triangle& t = triangles_[near.triangle];
+  ClothBody& body = bodies_[near.body];
+  const Vec3 p = body.end().point_to_world(near.corner.place);
+  const Vec3 outward = body.end().vector_to_world(near.corner.outward);
+  const Vec3 a = points.at(t[0]), ab = points.at(t[1]) - a, ac = points.at(t[2]) - a;
+  const Vec3 cross = ab.cross(ac);
+  const Real size2 = cross.squaredNorm();
+  if (!(size2 > 0)) return;
+  const Vec3 n = cross / std::sqrt(size2) * (cross.dot(outward) < 0 ? -1 : 1);
+  const Real cosine = n.dot(outward);
+  if (cosine < kLeastCosine) return;
+  const Real height = n.dot(a - p), gap = height - kDistance * points.thickness[t[0]];
+  if (gap >= 0 || height < -near.corner.depth) return;
+  const Vec3 hit = p + height / cosine * outward - a;
+  const Real s = hit.cross(ac).dot(cross) / size2, r = ab.cross(hit).dot(cross) / size2;
+  const std::array<Real, 3> weights = {1 - s - r, s, r};
+  if (std::ranges::min(weights) < 0) return;
+
+  Vec3 motion = -body.surface_motion(p);
+  Real mobility = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    motion += weights[k] * (points.at(t[k]) - points.start_at(t[k]));
+    mobility += weights[k] * weights[k] * points.inverse_mass[t[k]];
+  }
+  const Real before = std::min(gap - n.dot(motion), 0.0), push = -gap + (1 - kRecovery) * before;
+  const Real total = mobility + body.mobility(p, n);
+  if (!(push > 0) || !(total > 0)) return;
+  Vec3 impulse = push / total * n;
+  const Vec3 slip = motion - n.dot(motion) * n;
+  const Real length = slip.norm();
+  if (length > 0) {
+    const Real friction = std::sqrt(points.friction[t[0]] * body.way().friction);
+    impulse -= std::min(length, friction * push) / (total * length) * slip;
+  }
+  const Real recovered = std::min(push, -kRecovery * before);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Real w = points.inverse_mass[t[k]];
+    points.position[t[k]] += padded(w * weights[k] * impulse);
+    if (w == 0) points.pull[t[k]] += padded(weights[k] * impulse);
+    if (recovered > 0) cuts.push_back({t[k], padded(w * weights[k] * recovered / total * n)});
+  }
+  body.touch(0);
+  body.push(-impulse / dt, p);
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,45 @@
+#pragma once
+/// Contact of the sharp features of bodies with triangles of cloth: corners and edges of boxes, rims of
+/// cylinders and cones, vertices of meshes' hulls. Points of cloth keep out of bodies by themselves
+/// (cloth_contacts.h); here what is between them does.
+
+#include <span>
+#include <vector>
+
+#include "sim/cloth/cloth_bodies.h"
+#include "sim/cloth/cloth_contacts.h"
+#include "sim/cloth/cloth_tree.h"
+
+namespace offstage::sim {
+
+class CornerContacts {
+ public:
+  /// Triangles of the cloths that collide with bodies.
+  void assign(std::vector<Triangle> triangles, const ClothPoints& points);
+  /// What can meet in a sub-step of the world of length h.
+  void find(const ClothPoints& points, std::span<ClothBody> bodies, Real h);
+  /// Pushes apart in a sub-step of cloth of length dt. Appends to `cuts`.
+  void solve(ClothPoints& points, Real dt, std::vector<VelocityCut>& cuts);
+
+ private:
+  /// A sample of a feature, in the body's frame.
+  struct Corner {
+    Vec3 place, outward;
+    Real depth;  // how far behind it cloth is still taken to have come from outside [m]
+  };
+  struct Near {
+    Corner corner;
+    uint32_t body, triangle;
+  };
+
+  std::vector<Corner> corners(const Solid& solid) const;
+  void press(ClothPoints& points, const Near& near, Real dt, std::vector<VelocityCut>& cuts);
+
+  std::vector<Triangle> triangles_;
+  ClothTree tree_;
+  Real spacing_ = 0;  // of samples: half a mean edge of the cloths [m]
+  std::span<ClothBody> bodies_;
+  std::vector<Near> near_;
+};
+
+}  // namespace offstage::sim
