@@ -1,18 +1,58 @@
 #!/usr/bin/env bash
-# Draws docs/gallery.jpg, the README's picture, from the scenes as they are now. Needs build/offstage.
+# Draws a picture of every scene and writes demos/README.md around them, and docs/gallery.jpg, the strip of the README:
+#   demos/gallery.sh [NAME...]     only these scenes are drawn anew
+# Needs build/offstage and ffmpeg. The words are those at the head of each scene file.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
 
-shots="wall:1.6 dominoes:2 arch:4.7 marbles:1.5 pile:0.9 explosion:1.5 coins:2 cradle:0.4 sprinkler:3.3 rain:4 fountain:5 machine:4.35
-  flag:4 landscape:3 drape:3.5 smoke:6 fire:4 fireworks:5 sparks:3 rocket_exhaust:3.5"
-inputs=()
-for shot in $shots; do
-  picture=$folder/${shot%:*}.png
-  build/offstage frame "demos/scenes/${shot%:*}.json" --at "${shot#*:}" -o "$picture" --size 640x360 --quality final -q >&2
-  inputs+=(-i "$picture")
+# Chapters, and of each scene the moment that shows it best.
+chapters=(
+  "Rigid bodies|wall:1.6 dominoes:2 arch:4.7 marbles:1.5 pile:0.9 explosion:1.5 coins:2 cradle:0.4 cradle_simultaneous:0.4 t_handle:3 collision:4 machine:4.35 glass:2.2 studio:2.5"
+  "Cloth|drape:3.5 flag:4 curtain:3 sheets:3 rotating_sphere:3"
+  "Water and weather|fountain:5 jet_fountain:3 sprinkler:3.3 lawn_sprinkler:3 water_jet:3 rain:4 rain_square:3 hail:3 snow:5 thunderstorm:3"
+  "Smoke and fire|smoke:6 fire:4 fireworks:5 sparks:3 rocket_exhaust:3.5 grenade:1.5 dust:3"
+  "Particles|landscape:3"
+)
+strip="wall dominoes arch marbles pile explosion glass cradle sprinkler rain fountain machine flag landscape drape smoke fire fireworks sparks rocket_exhaust"
+
+mkdir -p demos/pictures
+draw() {  # SCENE TIME
+  local png
+  png=$(mktemp --suffix .png)
+  build/offstage frame "demos/scenes/$1.json" --at "$2" -o "$png" --force --size 640x360 --quality final -q >&2
+  ffmpeg -y -loglevel error -i "$png" -q:v 4 "demos/pictures/$1.jpg"
+  rm "$png"
+}
+words() { sed -n '/^\/\//!q; s/^\/\/ *//p' "demos/scenes/$1.json" | tr '\n' ' ' | sed 's/ *$//; s/[^.]$/&./'; }
+
+listed=" "
+{
+  echo "# Gallery"
+  echo
+  echo "Each scene is one file of \`demos/scenes\`; \`demos/run.sh NAME\` builds the program and renders its film. This page is written by"
+  echo "\`demos/gallery.sh\`."
+  for chapter in "${chapters[@]}"; do
+    printf '\n## %s\n' "${chapter%%|*}"
+    for shot in ${chapter#*|}; do
+      name=${shot%:*}
+      [ -f "demos/scenes/$name.json" ] || continue
+      listed+="$name "
+      if [ $# -eq 0 ] || [[ " $* " == *" $name "* ]] || [ ! -f "demos/pictures/$name.jpg" ]; then draw "$name" "${shot#*:}"; fi
+      printf '\n### %s\n\n![%s](pictures/%s.jpg)\n\n%s\n' "$name" "$name" "$name" "$(words "$name")"
+    done
+  done
+} >demos/README.md
+for scene in demos/scenes/*.json; do
+  name=$(basename -s .json "$scene")
+  [[ $listed == *" $name "* ]] || echo "warning: $name is in no chapter of demos/gallery.sh" >&2
 done
-ffmpeg -y -loglevel error "${inputs[@]}" -q:v 3 -filter_complex \
-  "[0][1][2][3][4]hstack=inputs=5[a];[5][6][7][8][9]hstack=inputs=5[b];[10][11][12][13][14]hstack=inputs=5[c];\
-[15][16][17][18][19]hstack=inputs=5[d];[a][b][c][d]vstack=inputs=4,scale=1920:-2" docs/gallery.jpg
+
+inputs=()
+count=0
+for name in $strip; do
+  [ -f "demos/pictures/$name.jpg" ] && inputs+=(-i "demos/pictures/$name.jpg") && count=$((count + 1))
+done
+columns=5 rows=$((count / 5))
+layout=$(for k in $(seq 0 $((columns * rows - 1))); do printf '%d_%d|' $((k % columns * 640)) $((k / columns * 360)); done)
+ffmpeg -y -loglevel error "${inputs[@]:0:$((2 * columns * rows))}" -q:v 3 \
+  -filter_complex "xstack=inputs=$((columns * rows)):layout=${layout%|},scale=1920:-2" docs/gallery.jpg

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Builds offstage and renders a film of the gallery:  demos/run.sh [NAME] [RENDER OPTIONS...]
-# NAME is a scene of demos/scenes without .json (default: fountain); "all" renders every one, "list" names them.
+# NAME is a scene of demos/scenes without .json (default: fountain); "all" renders every one, "list" names them, "reel" cuts a minute
+# from the best of them.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . cmake/packages.sh
@@ -11,7 +12,7 @@ if [ "$name" = list ]; then
   basename -s .json demos/scenes/*.json
   exit 0
 fi
-if [ "$name" != all ] && [ ! -f "demos/scenes/$name.json" ]; then
+if [ "$name" != all ] && [ "$name" != reel ] && [ ! -f "demos/scenes/$name.json" ]; then
   echo "There is no scene '$name'; there are: $(basename -s .json demos/scenes/*.json | tr '\n' ' ')" >&2
   exit 2
 fi
@@ -21,6 +22,9 @@ install_packages $build_packages
 cmake --build build --target offstage >&2
 
 mkdir -p out
+if [ "$name" = reel ]; then
+  exec demos/reel.sh "$@"
+fi
 for scene in demos/scenes/*.json; do
   this=$(basename -s .json "$scene")
   if [ "$name" = all ] || [ "$name" = "$this" ]; then

@@ -41,16 +41,16 @@ void ClothPass::draw_shadow(const Cloth& cloth, const Matrix4f& shadow_clip_from
   draw_triangles(cloth);
 }
 
-gl::LazyProgram& ClothPass::program(const GpuMaterial& material, bool in_smoke) {
+gl::LazyProgram& ClothPass::program(const GpuMaterial& material, const Features& features) {
   const bool textured = material.textures[0] != 0;
-  const auto key = std::make_tuple(material.weave, material.pattern, textured, in_smoke);
+  const auto key = std::make_tuple(material.weave, material.pattern, textured, features);
   const auto found = programs_.find(key);
   if (found != programs_.end()) return found->second;
-  std::vector<std::string> defines = {"WEAVE " + std::to_string(static_cast<int>(material.weave))};
-  std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "light.glsl", "material.glsl",
-                                            "noise.glsl"};
+  std::vector<std::string> defines = features;
+  defines.push_back("WEAVE " + std::to_string(static_cast<int>(material.weave)));
+  std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl",      "light.glsl",
+                                            "lamps.glsl", "material.glsl", "noise.glsl"};
   if (textured) defines.push_back("TEXTURED 1");
-  if (in_smoke) defines.push_back("SMOKE 1");
   if (material.pattern != Pattern::none) {
     defines.push_back("PATTERN " + std::to_string(static_cast<int>(material.pattern)));
     fragment.push_back("pattern.glsl");
@@ -60,8 +60,8 @@ gl::LazyProgram& ClothPass::program(const GpuMaterial& material, bool in_smoke) 
   return programs_.emplace(key, gl::LazyProgram(vertex, fragment, defines)).first->second;
 }
 
-void ClothPass::draw(const Cloth& cloth, bool in_smoke) {
-  program(*cloth.material, in_smoke).use();
+void ClothPass::draw(const Cloth& cloth, const Features& features) {
+  program(*cloth.material, features).use();
   glDisable(GL_CULL_FACE);
   glFrontFace(GL_CCW);
   glBindBufferBase(GL_UNIFORM_BUFFER, kMaterialBlock, cloth.material->uniforms);

@@ -33,13 +33,13 @@ class ClothPass {
   /// Uploads a cloth as it is now.
   void prepare(Cloth& cloth);
   void draw_shadow(const Cloth& cloth, const Matrix4f& shadow_clip_from_world);
-  void draw(const Cloth& cloth, bool in_smoke);
+  void draw(const Cloth& cloth, const Features& features);
 
  private:
   static void draw_triangles(const Cloth& cloth);
-  gl::LazyProgram& program(const GpuMaterial& material, bool in_smoke);
+  gl::LazyProgram& program(const GpuMaterial& material, const Features& features);
 
-  std::map<std::tuple<Weave, Pattern, bool, bool>, gl::LazyProgram> programs_;  ///< textured, in smoke
+  std::map<std::tuple<Weave, Pattern, bool, Features>, gl::LazyProgram> programs_;  ///< textured
   gl::LazyProgram shadow_;
 };
 

@@ -139,6 +139,7 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
   const std::array<Vector3f, 9> irradiance = sky_irradiance(sky);
   for (std::size_t k = 0; k < irradiance.size(); ++k) frame.irradiance[k] = vec4(irradiance[k]);
   frame.shadow = frame.penumbra = Vector4f::Zero();
+  frame.air = {0, 0, environment.clouds, static_cast<float>(offsets.count)};
   return frame;
 }
 

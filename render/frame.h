@@ -4,12 +4,25 @@
 
 #include <array>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "render/stage.h"
 
 namespace offstage::render {
 
 using Eigen::Matrix4f;
+
+/// A lamp of a sub-frame, as shaders/lamps.glsl reads it.
+struct LampUniforms {
+  Vector4f position = Vector4f::Zero();   ///< w: radius
+  Vector4f intensity = Vector4f::Zero();  ///< w: 0 no shadow, 1 shadow in a cone, 2 all around
+  Vector4f direction = Vector4f::Zero();  ///< w: what the cosine to it counts
+  Vector4f right =
+      Vector4f::Zero();            ///< w: what is added; the sum, in [0, 1], is the share that shines there
+  Vector4f up = Vector4f::Zero();  ///< w: tangent of half the angle of a tile of the shadow map
+  Vector4f block = Vector4f::Zero();  ///< first corner in the shadow map, size of a tile, texels of a tile
+};
 
 /// The uniform block of shaders/frame.glsl, in its std140 layout.
 struct FrameUniforms {
@@ -24,7 +37,12 @@ struct FrameUniforms {
   Vector4f zenith, horizon, ground, glow;
   std::array<Vector4f, 9> irradiance;
   Vector4f shadow, penumbra;
+  Vector4f air;
+  std::array<LampUniforms, kMostLamps> lamps;
 };
+
+/// Defines of the shaders that light depends on, such as "SMOKE 1".
+using Features = std::vector<std::string>;
 
 /// The eye of one sub-frame: moved in the lens, looking along `forward`.
 struct View {

@@ -74,6 +74,8 @@ Buffer make_buffer(std::span<const T> values) {
 }
 /// A 2D texture of one level, clamped to its edges.
 Texture make_target(GLenum format, int width_px, int height_px, GLenum filter);
+/// Reads depths of a texture that compares as they are.
+Sampler make_depth_sampler();
 /// Throws UnavailableError if it is not complete. A texture of 0 leaves that attachment empty.
 Framebuffer make_framebuffer(GLuint color, GLuint depth);
 

@@ -59,6 +59,25 @@ ImageDifference difference(const Image& a, const Image& b) {
   return result;
 }
 
+Image reduced(const Image& image, int width_px) {
+  const int step = std::max(1, (image.width_px + width_px - 1) / width_px);
+  Image small{std::max(1, image.width_px / step), std::max(1, image.height_px / step), {}};
+  small.rgba.reserve(4 * small.pixel_count());
+  const int columns = std::min(step, image.width_px), rows = std::min(step, image.height_px);
+  for (int y = 0; y < small.height_px; ++y)
+    for (int x = 0; x < small.width_px; ++x)
+      for (int c = 0; c < 4; ++c) {
+        int sum = 0;
+        for (int j = 0; j < rows; ++j)
+          for (int i = 0; i < columns; ++i)
+            sum +=
+                image
+                    .rgba[static_cast<std::size_t>(((y * step + j) * image.width_px + x * step + i) * 4 + c)];
+        small.rgba.push_back(static_cast<uint8_t>((sum + columns * rows / 2) / (columns * rows)));
+      }
+  return small;
+}
+
 Image amplified_difference(const Image& a, const Image& b, int gain) {
   require_same_size(a, b);
   Image result{a.width_px, a.height_px, std::vector<uint8_t>(a.rgba.size())};

@@ -45,6 +45,8 @@ struct ImageDifference {
 };
 /// Throws std::invalid_argument if the sizes differ.
 ImageDifference difference(const Image& a, const Image& b);
+/// A copy so many pixels wide or less, each pixel the mean of those it stands for.
+Image reduced(const Image& image, int width_px);
 /// The absolute difference times `gain`, opaque.
 Image amplified_difference(const Image& a, const Image& b, int gain = 16);
 

@@ -54,6 +54,7 @@ GpuMesh::GpuMesh(const Mesh& source) : vertex_array(gl::make_vertex_array()) {
   const Eigen::AlignedBox3f box = mesh->bounds();
   center = box.isEmpty() ? Vector3f(0, 0, 0) : Vector3f(box.center());
   for (const Vector3f& p : mesh->positions) radius = std::max(radius, (p - center).norm());
+  thickness = box.isEmpty() ? 0 : box.sizes().minCoeff();
   flat = !box.isEmpty() && box.sizes().minCoeff() <= 1e-4f * box.sizes().maxCoeff();
 
   index_count = static_cast<GLsizei>(mesh->indices.size());
@@ -81,6 +82,7 @@ GpuMaterial make_gpu_material(const Material& material, std::span<const Image> t
   uniforms.surface = {material.metallic, material.roughness, std::max(fabric.thread, 1e-6f), fabric.relief};
   uniforms.back << fabric.back_color.value_or(material.color.head<3>()), fabric.translucency;
   uniforms.sheen << fabric.sheen * fabric.sheen_color, fabric.back_color ? 1 : 0;
+  uniforms.glass = {material.transmission, 1 / std::max(material.refraction, 1.0f), 0, 0};
   result.uniforms = gl::make_buffer(std::span<const MaterialUniforms>(&uniforms, 1));
 
   const std::array<int, 3> indices = {material.base_color_texture, material.metallic_roughness_texture,
@@ -97,12 +99,16 @@ GpuMaterial make_gpu_material(const Material& material, std::span<const Image> t
   result.two_sided = material.two_sided;
   result.blended = material.color.w() < 1 || (base != nullptr && has_alpha(*base));
   result.casts = material.color.w() > 0;
+  result.glass = material.transmission > 0 && !result.blended;
   return result;
 }
 
+float Instance::scale() const {
+  return world_from_mesh.linear().colwise().norm().maxCoeff();
+}
+
 Caster Instance::ball() const {
-  const Eigen::Matrix3f linear = world_from_mesh.linear();
-  return {world_from_mesh * mesh->center, mesh->radius * linear.colwise().norm().maxCoeff()};
+  return {world_from_mesh * mesh->center, mesh->radius * scale()};
 }
 
 bool Instance::is_ground() const {
@@ -118,8 +124,9 @@ MeshPass::MeshPass()
                        {"SHADOW 1", "TEXTURED 1"}),
       white_(make_white_texture()) {}
 
-void MeshPass::prepare(std::span<const Instance* const> instances, const View& view, bool in_smoke) {
-  in_smoke_ = in_smoke;
+void MeshPass::prepare(std::span<const Instance* const> instances, const View& view,
+                       const Features& features) {
+  features_ = features;
   std::vector<Item> seen, casting;
   for (uint32_t i = 0; i < instances.size(); ++i) {
     const Instance& instance = *instances[i];
@@ -134,6 +141,10 @@ void MeshPass::prepare(std::span<const Instance* const> instances, const View& v
                                           [](const Item& item) { return !item.instance->material->blended; });
   std::vector<Item> see_through(transparent, seen.end());
   seen.erase(transparent, seen.end());
+  const auto glassy = std::partition(seen.begin(), seen.end(),
+                                     [](const Item& item) { return !item.instance->material->glass; });
+  std::vector<Item> glass(glassy, seen.end());
+  seen.erase(glassy, seen.end());
   // What is cut out by its texture is opaque where the texture is, so it is drawn in both passes.
   const auto by_batch = [](const Item& a, const Item& b) {
     return std::tie(a.instance->batch_key, a.mirrored, a.depth, a.order) <
@@ -141,9 +152,11 @@ void MeshPass::prepare(std::span<const Instance* const> instances, const View& v
   };
   std::sort(seen.begin(), seen.end(), by_batch);
   std::sort(casting.begin(), casting.end(), by_batch);
-  std::sort(see_through.begin(), see_through.end(), [](const Item& a, const Item& b) {
+  const auto back_first = [](const Item& a, const Item& b) {
     return std::tie(b.depth, a.order) < std::tie(a.depth, b.order);
-  });
+  };
+  std::sort(see_through.begin(), see_through.end(), back_first);
+  std::sort(glass.begin(), glass.end(), back_first);
 
   std::vector<Rows> rows, shadow_rows;
   const auto append = [](const std::vector<Item>& items, bool merge, std::vector<Rows>& out,
@@ -156,13 +169,14 @@ void MeshPass::prepare(std::span<const Instance* const> instances, const View& v
                          batches.back().mirrored == item.mirrored;
       if (!joins) {
         batches.push_back({instance.mesh, instance.material, item.mirrored, item.depth,
-                           static_cast<GLuint>(out.size()), 0});
+                           static_cast<GLuint>(out.size()), 0, instance.mesh->thickness * instance.scale()});
       }
       ++batches.back().count;
       out.push_back(rows_of(instance.world_from_mesh));
     }
   };
   append(seen, true, rows, opaque_);
+  append(glass, false, rows, glass_);
   append(see_through, false, rows, blended_);
   append(casting, true, shadow_rows, casters_);
   std::stable_sort(opaque_.begin(), opaque_.end(),
@@ -187,13 +201,17 @@ void MeshPass::draw(const Batch& batch, const gl::StreamBuffer& rows) {
 }
 
 gl::LazyProgram& MeshPass::surface_program(const GpuMaterial& material) {
-  const auto key = std::make_tuple(material.pattern, material.textured, in_smoke_);
+  const auto key = std::make_tuple(material.pattern, material.textured, material.glass, features_);
   const auto found = surface_programs_.find(key);
   if (found != surface_programs_.end()) return found->second;
-  std::vector<std::string> defines;
-  std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "light.glsl", "material.glsl"};
+  std::vector<std::string> defines = features_;
+  std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "light.glsl", "lamps.glsl",
+                                            "material.glsl"};
   if (material.textured) defines.push_back("TEXTURED 1");
-  if (in_smoke_) defines.push_back("SMOKE 1");
+  if (material.glass) {
+    defines.push_back("GLASS 1");
+    fragment.push_back("glass.glsl");
+  }
   if (material.pattern != Pattern::none) {
     defines.push_back("PATTERN " + std::to_string(static_cast<int>(material.pattern)));
     fragment.insert(fragment.end(), {"noise.glsl", "pattern.glsl"});
@@ -204,7 +222,7 @@ gl::LazyProgram& MeshPass::surface_program(const GpuMaterial& material) {
 }
 
 gl::LazyProgram& MeshPass::shadow_program(const GpuMaterial& material) {
-  if (!material.blended) return opaque_shadow_;
+  if (!material.blended && !material.glass) return opaque_shadow_;
   return material.textured ? textured_shadow_ : dithered_shadow_;
 }
 
@@ -243,6 +261,17 @@ void MeshPass::draw_opaque() {
   for (const Batch& batch : opaque_) draw_batch(batch);
   for (const Batch& batch : blended_) {
     if (batch.material->textured) draw_batch(batch);
+  }
+}
+
+void MeshPass::draw_glass() {
+  for (const Batch& batch : glass_) {
+    surface_program(*batch.material).use();
+    glUniform1f(0, 0);
+    glUniform1f(1, batch.thickness);
+    set_facing(batch);
+    bind(*batch.material);
+    draw(batch, rows_);
   }
 }
 

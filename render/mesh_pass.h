@@ -22,12 +22,13 @@ struct GpuMesh {
   GLsizei index_count = 0;
   Vector3f center;  ///< of the bounding ball
   float radius = 0;
-  bool flat = false;  ///< lies in a plane along an axis
+  float thickness = 0;  ///< the least side of the box around it
+  bool flat = false;    ///< lies in a plane along an axis
 };
 
 /// The uniform block of shaders/material.glsl.
 struct MaterialUniforms {
-  Vector4f color, pattern_color, emission, surface, back, sheen;
+  Vector4f color, pattern_color, emission, surface, back, sheen, glass;
 };
 
 struct GpuMaterial {
@@ -38,7 +39,8 @@ struct GpuMaterial {
   bool textured = false;
   bool two_sided = false;
   bool blended = false;
-  bool casts = true;  ///< false if fully transparent
+  bool casts = true;   ///< false if fully transparent
+  bool glass = false;  ///< light goes through and is refracted
 };
 
 GpuMaterial make_gpu_material(const Material& material, std::span<const Image> textures);
@@ -51,6 +53,7 @@ struct Instance {
   bool casts_shadow = true;
   bool visible = true;
 
+  float scale() const;
   Caster ball() const;
   /// Ground shadows nothing that the film shows, and would stretch the shadow map over all of it.
   bool is_ground() const;
@@ -59,13 +62,15 @@ struct Instance {
 class MeshPass {
  public:
   MeshPass();
-  /// Sorts what is visible for this view; `in_smoke`: smoke shadows it. The instances must stay where they
-  /// are until it is drawn.
-  void prepare(std::span<const Instance* const> instances, const View& view, bool in_smoke);
+  /// Sorts what is visible for this view. The instances must stay where they are until it is drawn.
+  void prepare(std::span<const Instance* const> instances, const View& view, const Features& features);
   void draw_shadows(const Matrix4f& shadow_clip_from_world);
   /// Depth alone of what is wholly opaque, so that only what is seen is shaded.
   void draw_depth(const Matrix4f& clip_from_world);
   void draw_opaque();
+  bool has_glass() const { return !glass_.empty(); }
+  /// Back to front, over a picture that is also bound to be seen through them.
+  void draw_glass();
   void draw_blended();
 
  private:
@@ -77,6 +82,7 @@ class MeshPass {
     float depth;
     GLuint first;  ///< of its instances' rows
     GLsizei count;
+    float thickness;  ///< in the world, of the first
   };
   void draw(const Batch& batch, const gl::StreamBuffer& rows);
   void bind(const GpuMaterial& material);
@@ -84,12 +90,13 @@ class MeshPass {
   gl::LazyProgram& shadow_program(const GpuMaterial& material);
   static void set_facing(const Batch& batch);
 
-  std::map<std::tuple<Pattern, bool, bool>, gl::LazyProgram> surface_programs_;  ///< textured, in smoke
+  std::map<std::tuple<Pattern, bool, bool, Features>, gl::LazyProgram>
+      surface_programs_;  ///< textured, glass
   gl::LazyProgram opaque_shadow_, dithered_shadow_, textured_shadow_;
-  bool in_smoke_ = false;
+  Features features_;
   gl::Texture white_;
   gl::StreamBuffer rows_, shadow_rows_;
-  std::vector<Batch> opaque_, blended_, casters_;
+  std::vector<Batch> opaque_, glass_, blended_, casters_;
 };
 
 }  // namespace offstage::render

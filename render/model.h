@@ -34,7 +34,22 @@ void compute_normals(Mesh& mesh, float crease_deg = 40);
 
 /// Procedural surface patterns, evaluated in object space so that they need no texture coordinates; on cloths
 /// along the cloth.
-enum class Pattern { none, checker, grid, noise, brick, wood, lawn, paving, stripes, gingham };
+enum class Pattern {
+  none,
+  checker,
+  grid,
+  noise,
+  brick,
+  wood,
+  lawn,
+  paving,
+  stripes,
+  gingham,
+  concrete,
+  sand,
+  planks,
+  water
+};
 
 /// How the threads of a fabric cross; `none`: it has no threads, as leather and rubber.
 enum class Weave { none, plain, twill, satin };
@@ -57,6 +72,8 @@ struct Material {
   float metallic = 0;                      ///< in [0, 1]
   float roughness = 0.5f;                  ///< in [0, 1]
   Vector3f emission = Vector3f::Zero();    ///< radiance [arbitrary units, 1 = sunlit white]
+  float transmission = 0;   ///< share of the light under the surface that goes through, in [0, 1]
+  float refraction = 1.5f;  ///< index of, in [1, 3]
   Pattern pattern = Pattern::none;
   Vector3f pattern_color = {0.4f, 0.4f, 0.4f};  ///< second colour of the pattern
   float pattern_scale = 1;                      ///< size of one cell [m], > 0

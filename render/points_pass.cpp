@@ -55,20 +55,24 @@ float PointSet::reach(std::size_t i) const {
   return radius + stretch;
 }
 
-PointsPass::Programs& PointsPass::programs(PointStyle style) {
-  const auto found = programs_.find(style);
+PointsPass::Programs& PointsPass::programs(PointStyle style, const Features& features) {
+  const auto found = programs_.find({style, features});
   if (found != programs_.end()) return found->second;
   const std::string define = "STYLE " + std::to_string(static_cast<int>(style));
-  const std::vector<std::string_view> vertex = {"frame.glsl", "sky.glsl", "light.glsl", "points.vert"};
+  const std::vector<std::string_view> vertex = {"frame.glsl", "sky.glsl", "light.glsl", "lamps.glsl",
+                                                "points.vert"};
   std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "points_shape.glsl", "points.frag"};
-  if (style == PointStyle::sphere) fragment = {"frame.glsl", "sky.glsl", "light.glsl", "sphere.frag"};
+  if (style == PointStyle::sphere)
+    fragment = {"frame.glsl", "sky.glsl", "light.glsl", "lamps.glsl", "sphere.frag"};
+  std::vector<std::string> defines = features;
+  defines.push_back(define);
   return programs_
-      .emplace(style, Programs{{vertex, fragment, {define}},
-                               {vertex, fragment, {define, "SMOKE 1"}},
-                               {{"frame.glsl", "points.vert"},
-                                {"frame.glsl", "points_shape.glsl", "points_shadow.frag"},
-                                {define, "SHADOW 1"}},
-                               {vertex, fragment, {define, "DEPTH 1"}}})
+      .emplace(std::pair(style, features),
+               Programs{{vertex, fragment, defines},
+                        {{"frame.glsl", "points.vert"},
+                         {"frame.glsl", "points_shape.glsl", "points_shadow.frag"},
+                         {define, "SHADOW 1"}},
+                        {vertex, fragment, {define, "DEPTH 1"}}})
       .first->second;
 }
 
@@ -120,15 +124,14 @@ void PointsPass::draw_depth(const PointSet& set) {
   draw(set, set.unseen);
 }
 
-void PointsPass::draw_spheres(const PointSet& set, bool in_smoke) {
-  Programs& sphere = programs(PointStyle::sphere);
-  (in_smoke ? sphere.seen_in_smoke : sphere.seen).use();
+void PointsPass::draw_spheres(const PointSet& set, const Features& features) {
+  programs(PointStyle::sphere, features).seen.use();
   glUniform2f(2, set.def.metallic, set.def.roughness);
   draw(set, set.unseen);
 }
 
-void PointsPass::draw_blended(const PointSet& set) {
-  programs(set.def.style).seen.use();
+void PointsPass::draw_blended(const PointSet& set, const Features& features) {
+  programs(set.def.style, features).seen.use();
   draw(set, set.unseen);
 }
 

@@ -43,18 +43,18 @@ class PointsPass {
   void draw_shadow(const PointSet& set, const Matrix4f& shadow_clip_from_world);
   /// Depth alone of balls.
   void draw_depth(const PointSet& set);
-  void draw_spheres(const PointSet& set, bool in_smoke);
-  void draw_blended(const PointSet& set);
+  void draw_spheres(const PointSet& set, const Features& features);
+  void draw_blended(const PointSet& set, const Features& features);
 
  private:
   void draw(const PointSet& set, std::size_t first);
 
   struct Programs {
-    gl::LazyProgram seen, seen_in_smoke, shadow, depth;
+    gl::LazyProgram seen, shadow, depth;
   };
-  Programs& programs(PointStyle style);
+  Programs& programs(PointStyle style, const Features& features = {});
 
-  std::map<PointStyle, Programs> programs_;
+  std::map<std::pair<PointStyle, Features>, Programs> programs_;
   gl::VertexArray vertex_array_;
   std::vector<GpuPoint> ordered_;
   std::vector<std::pair<float, uint32_t>> keys_;

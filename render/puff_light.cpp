@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "render/lamps.h"
+
 namespace offstage::render {
 namespace {
 
@@ -63,6 +65,12 @@ PuffRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vect
   Vector3f towards_light = 0.36f * direct * to_sun;
   if (steepness > 1e-6f) towards_light -= 0.65f * (light - dark) / steepness * slope;
   result.slope = sun * towards_light.transpose();
+  for (int k = 0; k < static_cast<int>(frame.air.x()); ++k) {
+    Vector3f towards;
+    const Vector3f lamp = lamp_radiance(frame.lamps[static_cast<std::size_t>(k)], place, towards);
+    result.constant += 0.3f * lamp;
+    result.slope += 0.3f * lamp * towards.transpose();
+  }
   result.slope.col(0) += sky_share * frame.irradiance[3].head<3>();
   result.slope.col(1) += sky_share * frame.irradiance[1].head<3>();
   result.slope.col(2) += sky_share * frame.irradiance[2].head<3>();
@@ -91,6 +99,14 @@ Vector3f PuffLight::sky_reflection(const Vector3f& direction, float roughness) c
       sky_radiance(sky, Vector3f(direction.x(), std::max(direction.y(), 0.0f), direction.z()));
   const Vector3f sharp = above + below * (sky.ground - above);
   return sharp + roughness * roughness * (ambient(direction) - sharp);
+}
+
+Vector3f PuffLight::lamps_around(const Vector3f& place) const {
+  constexpr float kShare = 0.3f;
+  Vector3f sum = Vector3f::Zero(), towards;
+  for (int k = 0; k < static_cast<int>(frame.air.x()); ++k)
+    sum += lamp_radiance(frame.lamps[static_cast<std::size_t>(k)], place, towards);
+  return kShare * sum;
 }
 
 Vector4f PuffLight::fog_to(const Vector3f& place) const {

@@ -31,6 +31,8 @@ struct PuffLight {
   /// as in shaders/sky.glsl.
   Vector3f ambient(const Vector3f& normal) const;
   Vector3f sky_reflection(const Vector3f& direction, float roughness) const;
+  /// Radiance of a white thing so small that it is lit by lamps from all sides.
+  Vector3f lamps_around(const Vector3f& place) const;
   /// Light added on the way to the eye, and in w the share that arrives: as fog_to in shaders/sky.glsl.
   Vector4f fog_to(const Vector3f& place) const;
 };

@@ -15,10 +15,11 @@ namespace {
 constexpr GLuint kSmokeUnit = 5, kColorUnit = 6, kLowDepthUnit = 7;
 constexpr float kMostOpaque = 0.98f;              // of one puff, so that its optical depth is finite
 constexpr double kHalf_px = 8, kQuarter_px = 64;  // radii from which the picture is made smaller
-constexpr float kTolerance = 0.25f;               // depth in typical radii over which puffs change little
-constexpr float kFlameCover = 0.6f;               // soot: deep flames glow, but do not add up without end
-constexpr float kFlameWobble = 0.5f;              // [rad]
-constexpr float kSpin = 0.35f;                    // [rad/s]
+constexpr float kNearest = 1.2f;      // radius from which a puff fades, as a share of half the height
+constexpr float kTolerance = 0.25f;   // depth in typical radii over which puffs change little
+constexpr float kFlameCover = 0.6f;   // soot: deep flames glow, but do not add up without end
+constexpr float kFlameWobble = 0.5f;  // [rad]
+constexpr float kSpin = 0.35f;        // [rad/s]
 
 PuffAtlas::Kind kind_of(const PointSet& set) {
   return set.def.style == PointStyle::fire ? PuffAtlas::Kind::flame : PuffAtlas::Kind::smoke;
@@ -161,6 +162,10 @@ void PuffsPass::make_splats(std::span<const PointSet* const> sets, const View& v
     s.cover = flame ? kFlameCover : set.def.additive ? 0.0f : 1.0f;
     s.opacity = std::min(point.color.w(), 1.0f) * thinning * thinning *
                 std::clamp(0.5f * (s.depth - view.near_m) / drawn, 0.0f, 1.0f);
+
+    // What comes so near that it fills the picture fades before the eye is in it.
+    const float apart = std::clamp(0.5f * s.depth / radius - 1, 0.0f, 1.0f);
+    s.opacity *= std::max(apart, std::clamp(2 - radius_px / (kNearest * half_size.y()), 0.0f, 1.0f));
 
     // Axes of the cell on the screen, and the stretch along the motion.
     const Shape shape(point.velocity.w());

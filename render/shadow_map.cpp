@@ -66,16 +66,10 @@ ShadowFrame fit_shadow(std::span<const Caster> casters, const View& view, const 
 ShadowMap::ShadowMap(int size_px)
     : size_px_(size_px),
       depth_(gl::make_target(GL_DEPTH_COMPONENT32F, size_px, size_px, GL_LINEAR)),
-      framebuffer_(gl::make_framebuffer(0, depth_)) {
+      framebuffer_(gl::make_framebuffer(0, depth_)),
+      plain_(gl::make_depth_sampler()) {
   glTextureParameteri(depth_, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
   glTextureParameteri(depth_, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
-  GLuint name = 0;
-  glCreateSamplers(1, &name);
-  plain_ = gl::Sampler(name);
-  glSamplerParameteri(plain_, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-  glSamplerParameteri(plain_, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-  glSamplerParameteri(plain_, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
-  glSamplerParameteri(plain_, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
 }
 
 void ShadowMap::begin() const {

@@ -42,7 +42,7 @@ class ShadowMap {
   int size_px_;
   gl::Texture depth_;
   gl::Framebuffer framebuffer_;
-  gl::Sampler plain_;  ///< reads depths without comparing
+  gl::Sampler plain_;
 };
 
 }  // namespace offstage::render

@@ -10,11 +10,19 @@ SkyModel make_sky(const Sun& sun, const Environment& environment) {
   constexpr float kGlow = 0.12f;  // of the sun's radiance
   const Vector3f direction = sun.direction.normalized();
   const float risen = std::clamp(0.5f + 5 * direction.y(), 0.0f, 1.0f);
-  return {.sun_direction = direction,
-          .zenith = environment.intensity * environment.zenith,
-          .horizon = environment.intensity * environment.horizon,
-          .ground = environment.intensity * environment.ground,
-          .glow = environment.intensity * kGlow * risen * sun.intensity * sun.color};
+  SkyModel sky{.sun_direction = direction,
+               .zenith = environment.intensity * environment.zenith,
+               .horizon = environment.intensity * environment.horizon,
+               .ground = environment.intensity * environment.ground,
+               .glow = environment.intensity * kGlow * risen * sun.intensity * sun.color};
+  if (environment.ground_albedo) {
+    // Level ground sees the whole sky: its share of low and high parts by the cosine, of the gradient above.
+    constexpr float kLow = 0.066f;
+    const Vector3f light = sky.zenith + kLow * (sky.horizon - sky.zenith) +
+                           std::max(direction.y(), 0.0f) * sun.intensity * sun.color;
+    sky.ground = environment.ground_albedo->cwiseProduct(light);
+  }
+  return sky;
 }
 
 Vector3f sky_radiance(const SkyModel& sky, const Vector3f& direction) {

@@ -7,6 +7,7 @@
 #include "render/cloth_pass.h"
 #include "render/frame.h"
 #include "render/gl.h"
+#include "render/lamps.h"
 #include "render/lines_pass.h"
 #include "render/mesh_pass.h"
 #include "render/occlusion_pass.h"
@@ -19,13 +20,15 @@
 namespace offstage::render {
 namespace {
 
-constexpr GLuint kFrameBlock = 0, kSceneDepthUnit = 4;
+constexpr GLuint kFrameBlock = 0, kSceneDepthUnit = 4, kBehindUnit = 12;
 constexpr float kReach = 0.1f;  // how far things hide the sky, as a share of the distance to the target
 
 /// Colour and depth of the picture, and the copy of depth that particles read while they are drawn.
 struct Picture {
   gl::Texture color, depth, depth_copy;
   gl::Framebuffer framebuffer, depth_copy_framebuffer;
+  gl::Texture behind;  ///< what is seen through glass; made when there is some
+  gl::Framebuffer behind_framebuffer;
 
   Picture(int width_px, int height_px)
       : color(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)),
@@ -67,6 +70,9 @@ struct Stage::Impl {
   Camera camera;
   Sun sun;
   Environment environment;
+  std::vector<Lamp> lamps;
+  float time = 0;
+  Features features;  ///< of this sub-frame
 
   Slots<std::unique_ptr<GpuMesh>, MeshTag> meshes{"mesh"};
   Slots<std::unique_ptr<GpuMaterial>, MaterialTag> materials{"material"};
@@ -78,13 +84,15 @@ struct Stage::Impl {
   Picture picture;
   ShadowMap shadow_map;
   OcclusionPass occlusion_pass;
+  LampPass lamp_pass;
   MeshPass mesh_pass;
   ClothPass cloth_pass;
   PointsPass points_pass;
   PuffsPass puffs_pass;
   StreaksPass streaks_pass;
   LinesPass lines_pass;
-  gl::LazyProgram sky_program{{"frame.glsl", "sky.vert"}, {"frame.glsl", "sky.glsl", "sky.frag"}};
+  gl::LazyProgram sky_program{{"frame.glsl", "sky.vert"},
+                              {"frame.glsl", "sky.glsl", "noise.glsl", "sky.frag"}};
   gl::VertexArray no_attributes = gl::make_vertex_array();
   gl::StreamBuffer frame_buffer;
   std::vector<float> pixels;
@@ -110,6 +118,9 @@ struct Stage::Impl {
   void draw_shadows(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
                     std::span<PointSet* const> sets, const View& view, const SampleOffsets& offsets,
                     FrameUniforms& frame);
+  void prepare_lamps(std::span<PointSet* const> sets, const SampleOffsets& offsets, FrameUniforms& frame);
+  void draw_lamp_shadows(std::span<const Caster> casters, std::span<const Cloth* const> sheets);
+  void draw_glass();
   void draw_depth(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view);
   void draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets);
   void draw_blended(std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame);
@@ -172,6 +183,7 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
     frame.sun_direction.w() = 1;
   }
   upload(frame);
+  draw_lamp_shadows(casters, sheets);
   if (shadow.texel_m == 0) return;
 
   shadow_map.begin();
@@ -183,6 +195,43 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
     if (set->def.casts_shadow && !set->is_splatted()) points_pass.draw_shadow(*set, shadow.clip_from_world);
   }
   shadow_map.end();
+}
+
+void Stage::Impl::prepare_lamps(std::span<PointSet* const> sets, const SampleOffsets& offsets,
+                                FrameUniforms& frame) {
+  std::vector<Lamp> all = lamps;
+  for (const PointSet* set : sets)
+    if (set->def.style == PointStyle::fire) all.push_back(lamp_of_fire(*set));
+  lamp_pass.prepare(all, offsets, frame);
+  frame.air.y() = time;
+  features.clear();
+  if (puffs_pass.shades()) features.push_back("SMOKE 1");
+  if (frame.air.x() > 0) features.push_back("LAMPS 1");
+}
+
+void Stage::Impl::draw_lamp_shadows(std::span<const Caster> casters, std::span<const Cloth* const> sheets) {
+  if (lamp_pass.tiles().empty()) return;
+  lamp_pass.begin();
+  for (const LampPass::Tile& tile : lamp_pass.tiles()) {
+    if (std::none_of(casters.begin(), casters.end(), [&](const Caster& c) { return tile.sees(c); })) continue;
+    lamp_pass.begin(tile);
+    mesh_pass.draw_shadows(tile.clip_from_world);
+    for (const Cloth* cloth : sheets)
+      if (cloth->casts_shadow) cloth_pass.draw_shadow(*cloth, tile.clip_from_world);
+  }
+  lamp_pass.end();
+}
+
+void Stage::Impl::draw_glass() {
+  if (!mesh_pass.has_glass()) return;
+  if (picture.behind == 0) {
+    picture.behind = gl::make_target(GL_RGBA32F, def.width_px, def.height_px, GL_LINEAR);
+    picture.behind_framebuffer = gl::make_framebuffer(picture.behind, 0);
+  }
+  glBlitNamedFramebuffer(picture.framebuffer, picture.behind_framebuffer, 0, 0, def.width_px, def.height_px,
+                         0, 0, def.width_px, def.height_px, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  glBindTextureUnit(kBehindUnit, picture.behind);
+  mesh_pass.draw_glass();
 }
 
 void Stage::Impl::draw_depth(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets,
@@ -216,11 +265,11 @@ void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<Po
   glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
   glViewport(0, 0, def.width_px, def.height_px);
   glDepthFunc(GL_GEQUAL);
-  for (const Cloth* cloth : sheets) cloth_pass.draw(*cloth, puffs_pass.shades());
+  for (const Cloth* cloth : sheets) cloth_pass.draw(*cloth, features);
   mesh_pass.draw_opaque();
   glDisable(GL_CULL_FACE);
   for (const PointSet* set : sets) {
-    if (set->def.style == PointStyle::sphere) points_pass.draw_spheres(*set, puffs_pass.shades());
+    if (set->def.style == PointStyle::sphere) points_pass.draw_spheres(*set, features);
   }
   if (environment.visible) {
     glDepthFunc(GL_EQUAL);  // only where nothing was drawn
@@ -229,6 +278,7 @@ void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<Po
     glDrawArrays(GL_TRIANGLES, 0, 3);
   }
   glDepthFunc(GL_GREATER);
+  draw_glass();
 }
 
 void Stage::Impl::draw_blended(std::span<PointSet* const> sets, const View& view,
@@ -248,7 +298,7 @@ void Stage::Impl::draw_blended(std::span<PointSet* const> sets, const View& view
   const PuffLight light(puffs_pass.grid(), frame, sun.direction.normalized());
   puffs_pass.draw(sets, view, light, shadow_map, picture.framebuffer);
   for (const PointSet* set : sets) {
-    if (blended(set) && !set->is_splatted()) points_pass.draw_blended(*set);
+    if (blended(set) && !set->is_splatted()) points_pass.draw_blended(*set, features);
   }
   streaks_pass.draw(sets, view, light, shadow_map, picture.framebuffer);
 }
@@ -352,6 +402,13 @@ void Stage::set_environment(const Environment& environment) {
   impl_->environment = environment;
 }
 
+void Stage::set_lamps(std::span<const Lamp> lamps) {
+  impl_->lamps.assign(lamps.begin(), lamps.end());
+}
+void Stage::set_time(float time) {
+  impl_->time = time;
+}
+
 void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   Impl& s = *impl_;
   if (sum.width_px != s.def.width_px || sum.height_px != s.def.height_px ||
@@ -365,7 +422,8 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   s.instances.for_each([&](const std::unique_ptr<Instance>& instance) { shown.push_back(instance.get()); });
   const std::vector<PointSet*> sets = s.prepare_points(view);
   s.puffs_pass.prepare(sets, s.sun, frame);
-  s.mesh_pass.prepare(shown, view, s.puffs_pass.shades());
+  s.prepare_lamps(sets, offsets, frame);
+  s.mesh_pass.prepare(shown, view, s.features);
   const std::vector<const Cloth*> sheets = s.prepare_cloths();
   s.draw_shadows(shown, sheets, sets, view, offsets, frame);
   s.draw_depth(sheets, sets, view);

@@ -38,13 +38,30 @@ struct Sun {
   bool shadows = true;
 };
 
+/// A source of light near the scene: a glowing ball, cone, or rectangle.
+struct Lamp {
+  Vector3f position = {0, 3, 0};
+  Vector3f intensity = {10, 10, 10};  ///< radiance of a white surface 1 m away that faces it
+  float radius = 0.1f;                ///< of a ball [m], > 0
+  Vector2f size = {0, 0};             ///< of a rectangle [m]; else zero
+  Vector3f direction = {0, -1, 0};    ///< in which cones and rectangles shine, unit
+  float cone_deg = 0;                 ///< of a cone, across; else zero
+  float softness = 0.3f;              ///< share of the cone over which its edge fades
+  bool shadows = true;
+};
+inline constexpr std::size_t kMostLamps = 8;        ///< that light at once; the strongest do
+inline constexpr std::size_t kMostLampShadows = 4;  ///< of these, the first that want to
+
 /// Sky, ambient light from it, and fog towards its horizon.
 struct Environment {
   Vector3f zenith = {0.20f, 0.42f, 0.88f};
   Vector3f horizon = {0.95f, 1.05f, 1.15f};
   Vector3f ground = {0.36f, 0.33f, 0.28f};  ///< seen below the horizon, and light from below
   float intensity = 1;                      ///< scales sky and ambient together
-  float fog = 0;                            ///< density [1/m]; transmittance exp(-fog * distance)
+  /// Of the ground that sends back the light of sun and sky, in place of `ground`.
+  std::optional<Vector3f> ground_albedo = {};
+  float clouds = 0;  ///< share of the sky that they cover
+  float fog = 0;     ///< density [1/m]; transmittance exp(-fog * distance)
   /// How far away things hide the sky from each other [m]; 0: not at all; none: a tenth of the camera's
   /// distance to its target.
   std::optional<float> occlusion_reach = {};
@@ -155,6 +172,9 @@ class Stage {
   void set_camera(const Camera& camera);
   void set_sun(const Sun& sun);
   void set_environment(const Environment& environment);
+  void set_lamps(std::span<const Lamp> lamps);
+  /// Of what moves by itself: ripples, clouds [s].
+  void set_time(float time);
 
   /// Draws one sub-frame and adds it to `sum`, which is sized and cleared first if it does not have the
   /// stage's size. Throws UnavailableError on a GL error.

@@ -8,6 +8,8 @@ namespace offstage::render {
 namespace {
 
 constexpr GLuint kColorUnit = 6;
+constexpr float kNearest =
+    0.016f;  // radius from which a streak at the lens fades, as a share of half the picture
 constexpr float kThinnest_px = 0.6f;  // radius; what is thinner stays as wide and gets fainter
 
 // A drop drawn out by its motion: it refracts the sky behind it, and it is bright when the sun stands behind
@@ -17,7 +19,7 @@ Vector3f drop_light(const PuffLight& light, const Vector3f& place, const Vector3
   const float forward = 0.5f - 0.5f * light.to_sun.dot(to_eye);
   const float forward2 = forward * forward, forward8 = forward2 * forward2 * forward2 * forward2;
   const float sun = visibility * std::exp(-light.grid.depth(place)) * (0.12f + 0.9f * forward8);
-  return through + sun * light.frame.sun_radiance.head<3>();
+  return through + sun * light.frame.sun_radiance.head<3>() + light.lamps_around(place);
 }
 
 // A place on the screen [px], and the distance along the view axis.
@@ -58,6 +60,9 @@ StreakSplat splat_of(const GpuPoint& point, const PointsDef& def, const View& vi
   s.inverse_reach = 0.5f / drawn;
   s.opacity =
       std::min(point.color.w(), 1.0f) * (radius / drawn) * std::clamp(0.5f * room / drawn, 0.0f, 1.0f);
+  // A drop at the lens would be a bar across the picture.
+  const float apart = std::clamp(0.1f * distance / view.near_m - 1, 0.0f, 1.0f);
+  s.opacity *= std::max(apart, std::clamp(2 - radius_px / (kNearest * half_size.y()), 0.0f, 1.0f));
   s.cover = def.additive ? 0.0f : 1.0f;
   s.softness = std::clamp(def.softness, 0.01f, 1.0f);
   s.taper = def.taper;

@@ -78,6 +78,25 @@ float srgb_decode(float encoded) {
   return static_cast<float>(x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4));
 }
 
+float metered_exposure(const HdrImage& sum, float sample_weight) {
+  constexpr double kGrey = 0.5, kDarkest = 1e-3, kMost = 16;
+  double logarithms = 0;
+  std::size_t pixels = 0;
+  // Every third pixel each way is enough to measure.
+  for (int y = 0; y < sum.height_px; y += 3) {
+    for (int x = 0; x < sum.width_px; x += 3, ++pixels) {
+      const float* p =
+          sum.rgba.data() + 4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(sum.width_px) +
+                                 static_cast<std::size_t>(x));
+      const float luminance = sample_weight * (0.2126f * p[0] + 0.7152f * p[1] + 0.0722f * p[2]);
+      logarithms += std::log(std::max(static_cast<double>(luminance), kDarkest));
+    }
+  }
+  if (pixels == 0) return 1;
+  const double mean = std::exp(logarithms / static_cast<double>(pixels));
+  return static_cast<float>(std::clamp(kGrey / mean, 1 / kMost, kMost));
+}
+
 Image tone_map(const HdrImage& sum, const ToneMap& options) {
   constexpr float kOpaque = 0.9999f;  // of N summed ones times 1/N
   Image image{sum.width_px, sum.height_px, std::vector<uint8_t>(sum.rgba.size())};

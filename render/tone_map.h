@@ -22,6 +22,10 @@ struct ToneMap {
 float srgb_encode(float linear);
 float srgb_decode(float encoded);
 
+/// The exposure that gives a picture the mean brightness of a sunlit grey of 18 %: by the geometric mean of
+/// its luminance, which a lamp or a black corner hardly changes, and within four stops of 1 either way.
+float metered_exposure(const HdrImage& sum, float sample_weight);
+
 Image tone_map(const HdrImage& sum, const ToneMap& options);
 
 /// Smooths stair steps along edges of high contrast: the draft quality's anti-aliasing, for one sub-frame.

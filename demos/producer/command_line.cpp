@@ -232,6 +232,8 @@ int dispatch(int argc, char** argv) {
       ->excludes(resume)
       ->excludes(dry_run);
   render_app->add_option("--stats", render.stats, "Write figures of the run to this JSON file");
+  render_app->add_option("--report", render.report,
+                         "Write pictures, plots, settings and hashes of the run to this HTML file");
   add_talk(*render_app, render.talk);
 
   FrameOptions frame;

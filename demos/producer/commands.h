@@ -42,7 +42,7 @@ struct RenderOptions {
   std::string out;
   std::string frames, chunk;
   std::string format = "rgba";  ///< of standard output
-  std::string cache, stats;
+  std::string cache, stats, report;
   int threads = 0;  ///< 0: all available
   int jobs = 0;     ///< 0: as `threads`
   bool resume = false, force = false, dry_run = false, watch = false;

@@ -14,6 +14,7 @@
 #include "producer/interrupt.h"
 #include "producer/output.h"
 #include "producer/production.h"
+#include "producer/run_report.h"
 #include "producer/talk.h"
 #include "render/context.h"
 #include "render/error.h"
@@ -130,10 +131,12 @@ bool assemble_video(const Plan& plan) {
 RunStats draw(const Plan& plan, const ModelLibrary& models, const RenderOptions& options,
               std::vector<int> frames, render::FrameSink& sink) {
   ProgressPrinter printer(options.talk.quiet ? ProgressStyle::none : options.talk.progress);
-  RenderJob job{.frames = std::move(frames), .threads = plan.jobs, .cache = {}};
+  RenderJob job{
+      .frames = std::move(frames), .threads = plan.jobs, .cache = {}, .report = !options.report.empty()};
   if (!options.cache.empty()) job.cache = options.cache;
   RunStats stats = render_frames(plan.loaded, models, job, sink, std::ref(printer));
   printer.finish();
+  if (job.report) write_text_file(options.report, run_report(plan.loaded, plan.settings, stats));
   return stats;
 }
 
@@ -243,6 +246,9 @@ int render_command(const RenderOptions& options) {
   }
   check_file(options.stats, options.force || options.resume);
   check_distinct(options.stats, options.out);
+  check_file(options.report, options.force || options.resume);
+  check_distinct(options.report, options.out);
+  check_distinct(options.report, options.stats);
   if (options.dry_run) return print_plan(plan);
   if (plan.frames.empty()) {
     say("note: this chunk has no frames: there are fewer frames than chunks\n");

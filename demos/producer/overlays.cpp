@@ -15,6 +15,7 @@ namespace {
 using Eigen::Vector4f;
 using Edges = std::vector<std::pair<Vec3, Vec3>>;
 
+constexpr Real kTrailStep = 1.0 / 120;        // [s]
 constexpr float kDotWidth = 4;                // in widths of a line
 constexpr Real kShortestArrow = 5e-3;         // [m]; a shorter one would be a blot
 constexpr uint64_t kByGeometry = 1ull << 63;  // in the ids of contacts
@@ -185,6 +186,19 @@ struct Overlays::Builder {
     }
     return islands;
   }
+  Source operator()(const TrailsOverlay& overlay) const {
+    TrailLines lines{&overlay, {}};
+    for (const Body& body : scene.bodies) {
+      if (overlay.body.empty() ? body.motion != sim::MotionType::dynamic : body.name != overlay.body)
+        continue;
+      Vector4f color;
+      color << distinct_color(lines.trails.size()), 1;
+      if (overlay.color) color = overlay.color->rgba;
+      lines.trails.push_back({bodies.at(body.name), color, {}});
+    }
+    return lines;
+  }
+  Source operator()(const TextOverlay&) const { return NoLines{}; }
   Source operator()(const ClothOverlay& overlay) const {
     ClothLines lines{&overlay, {}};
     for (const Cloth& cloth : scene.cloths)
@@ -244,6 +258,19 @@ std::vector<LineSet> Overlays::lines(const sim::World& world) const {
   for (const Source& source : sources_)
     all.push_back(std::visit([&](const auto& s) { return draw(s, world); }, source));
   return all;
+}
+
+void Overlays::record(const sim::World& world) {
+  for (Source& source : sources_) {
+    auto* lines = std::get_if<TrailLines>(&source);
+    if (!lines) continue;
+    for (TrailLines::Trail& trail : lines->trails) {
+      auto& places = trail.places;
+      if (!places.empty() && world.time() - places.back().first < kTrailStep) continue;
+      places.emplace_back(world.time(), world.body(trail.body).centre);
+      while (places.front().first < world.time() - lines->overlay->duration) places.pop_front();
+    }
+  }
 }
 
 LineSet Overlays::draw(const TreeLines& tree, const sim::World& world) {
@@ -342,6 +369,25 @@ LineSet Overlays::draw(const IslandLines& islands, const sim::World& world) {
     sketch.object(body.index);
     for (const auto& [a, b] : edges)
       sketch.line(pose.point_to_world(a), pose.point_to_world(b), light(color));
+  }
+  return sketch.take();
+}
+
+LineSet Overlays::draw(const TrailLines& lines, const sim::World& world) {
+  LineSketch sketch;
+  for (const TrailLines::Trail& trail : lines.trails) {
+    const auto& places = trail.places;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const auto& [time, from] = places[i];
+      const Vec3 to = i + 1 < places.size() ? places[i + 1].second : world.body(trail.body).centre;
+      const auto fresh =
+          static_cast<float>(std::clamp(1 - (world.time() - time) / lines.overlay->duration, 0.0, 1.0));
+      Vector4f color = light(trail.color);
+      color.w() *= fresh;
+      sketch.object((uint64_t{trail.body.index} << 32) +
+                    static_cast<uint64_t>(std::llround(time / kTrailStep)));
+      sketch.line(from, to, color, fresh, fresh);
+    }
   }
   return sketch.take();
 }

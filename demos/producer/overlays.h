@@ -2,6 +2,7 @@
 /// The simulation side of overlays: bounding trees, closest points, contacts, velocities and groups of
 /// bodies, and the strain of cloths, as lines in the world. They look at the world and never change it.
 
+#include <deque>
 #include <map>
 #include <optional>
 #include <string>
@@ -28,6 +29,8 @@ class Overlays {
   /// What each overlay shows of the world as it is now, in scene order; nothing for the parts of bodies,
   /// which are no lines.
   std::vector<LineSet> lines(const sim::World& world) const;
+  /// To be called as time goes on, for what shows the past.
+  void record(const sim::World& world);
 
  private:
   /// The volumes of a tree down to the deepest level shown, as edges in the body's frame.
@@ -76,9 +79,18 @@ class Overlays {
     const ClothOverlay* overlay;
     std::vector<sim::ClothHandle> cloths;
   };
+  struct TrailLines {
+    struct Trail {
+      sim::BodyHandle body;
+      Eigen::Vector4f color;
+      std::deque<std::pair<Real, Vec3>> places;  // time and centre of mass, oldest first
+    };
+    const TrailsOverlay* overlay;
+    std::vector<Trail> trails;
+  };
   struct NoLines {};
-  using Source =
-      std::variant<NoLines, TreeLines, ClosestLines, ContactLines, VelocityLines, IslandLines, ClothLines>;
+  using Source = std::variant<NoLines, TreeLines, ClosestLines, ContactLines, VelocityLines, IslandLines,
+                              ClothLines, TrailLines>;
 
   struct Builder;
 
@@ -89,6 +101,7 @@ class Overlays {
   static LineSet draw(const VelocityLines& velocities, const sim::World& world);
   static LineSet draw(const IslandLines& islands, const sim::World& world);
   static LineSet draw(const ClothLines& cloths, const sim::World& world);
+  static LineSet draw(const TrailLines& trails, const sim::World& world);
 
   std::map<std::string, Collider> colliders_;  // by body
   std::vector<Source> sources_;

@@ -5,13 +5,15 @@
 #include <numbers>
 #include <unordered_map>
 
+#include "effects/distribution.h"
 #include "producer/cloth_defs.h"
+#include "producer/lights.h"
 #include "producer/line_sketch.h"
 #include "producer/particle_sources.h"
+#include "producer/texts.h"
 #include "render/bloom.h"
 #include "render/primitives.h"
 #include "render/tone_map.h"
-#include "sim/dynamics/keyframes.h"
 
 namespace offstage::producer {
 namespace {
@@ -123,19 +125,14 @@ render::Mesh mesh_of(const sim::ConvexPolyhedron& part) {
   return mesh;
 }
 
-Vector3f follow_path(const std::vector<CameraKey>& keys, Vec3 CameraKey::*point, double time) {
-  sim::KeyframeTrack track;
-  for (const CameraKey& key : keys) track.keys.push_back({key.time, {key.*point, Quat::Identity()}});
-  return track.at(time, {}).pose.position.cast<float>();
-}
-
 }  // namespace
 
 Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context& context)
     : scene_(scene),
       stage_(context, {.width_px = scene.render.size.x(),
                        .height_px = scene.render.size.y(),
-                       .shadow_map_px = scene.render.shadow_map}) {
+                       .shadow_map_px = scene.render.shadow_map}),
+      camera_(scene, models) {
   std::size_t slot = 0;
   for (const Body& body : scene.bodies) add_body(body, models, slot);
   for (const Spring& spring : scene.springs) {
@@ -149,9 +146,41 @@ Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context
   for (const ParticleLook* look : looks_of(scene)) {
     points_.push_back(stage_.add_points(points_def(*look)));
     styles_.push_back(points_def(*look).style);
+    smears_.push_back(add_smears(*look));
   }
   add_overlay_lines();
-  add_light_and_air();
+  stage_.set_sun(sun_of(scene));
+  stage_.set_environment(environment_of(scene));
+}
+
+render::PointsHandle Picture::add_smears(const ParticleLook& look) {
+  render::PointsDef def = points_def(look);
+  if (def.style != render::PointStyle::sphere || subframe_time() == 0) return {};
+  def.style = render::PointStyle::streak;
+  def.stretch_s = subframe_time();
+  return stage_.add_points(def);
+}
+
+float Picture::subframe_time() const {
+  const int n = subframes(scene_.render.quality);
+  return n == 1 ? 0 : f(scene_.render.shutter / scene_.output.fps) / static_cast<float>(n);
+}
+
+void Picture::set_balls(std::size_t set, std::span<const render::Point> balls) {
+  // A ball that moves by more than its radius from one sub-frame to the next would be seen as a row of balls.
+  std::vector<render::Point> still;
+  scratch_smears_.clear();
+  for (const render::Point& ball : balls) {
+    const float way = subframe_time() * ball.velocity.norm();
+    if (way < ball.radius) {
+      still.push_back(ball);
+      continue;
+    }
+    scratch_smears_.push_back(ball);
+    scratch_smears_.back().color.w() *= 1 / (1 + way * 2 / (std::numbers::pi_v<float> * ball.radius));
+  }
+  stage_.set_points(points_[set], still);
+  stage_.set_points(smears_[set], scratch_smears_);
 }
 
 render::Material Picture::material_named(const std::string& name, const ModelLibrary& models,
@@ -164,6 +193,8 @@ render::Material Picture::material_named(const std::string& name, const ModelLib
          .metallic = f(it->metallic),
          .roughness = f(it->roughness),
          .emission = it->emission.rgb() * f(it->emission_strength),
+         .transmission = f(it->transmission),
+         .refraction = f(it->refraction),
          .pattern = it->pattern,
          .pattern_color = it->pattern_color.rgb(),
          .pattern_scale = f(it->pattern_scale),
@@ -294,9 +325,9 @@ void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t
 
   place_body(drawn, drawn.world_from_body, 0);
   if (body.motion == sim::MotionType::fixed)
-    fixed_positions_[body.name] = body.position.cast<float>();
+    places_.add_fixed(body.name, drawn.world_from_body);
   else
-    slot_of_[body.name] = *(drawn.slot = slot++);
+    places_.add_moving(body.name, *(drawn.slot = slot++));
   if (drawn.slot || drawn.overlay) bodies_.push_back(std::move(drawn));
 }
 
@@ -311,60 +342,6 @@ void Picture::add_overlay_lines() {
         },
         overlay));
   }
-}
-
-void Picture::add_light_and_air() {
-  render::Sun sun{.intensity = 0, .shadows = false};
-  for (const Light& light : scene_.lights) {
-    const auto& l = std::get<SunLight>(light);
-    sun = {.direction = l.direction.normalized().cast<float>(),
-           .color = l.color.rgb(),
-           .intensity = f(l.intensity),
-           .size_deg = f(l.size_deg),
-           .shadows = l.shadows};
-  }
-  stage_.set_sun(sun);
-  const EnvironmentSettings& e = scene_.environment;
-  stage_.set_environment({.zenith = e.zenith.rgb(),
-                          .horizon = e.horizon.rgb(),
-                          .ground = e.ground.rgb(),
-                          .intensity = f(e.intensity),
-                          .fog = f(e.fog),
-                          .visible = e.background == Background::sky});
-}
-
-render::Camera Picture::camera_at(double time, const std::vector<BodySample>& bodies) const {
-  render::Camera camera;
-  const auto lens = [&](const Lens& l) {
-    camera.fov_deg = f(l.fov_deg);
-    camera.aperture = f(l.aperture);
-    camera.focus = f(l.focus);
-  };
-  std::visit(
-      [&](const auto& c) {
-        using C = std::decay_t<decltype(c)>;
-        lens(c);
-        if constexpr (std::is_same_v<C, StaticCamera>) {
-          camera.eye = c.eye.template cast<float>();
-          camera.target = c.target.template cast<float>();
-        } else if constexpr (std::is_same_v<C, KeyframedCamera>) {
-          camera.eye = follow_path(c.keyframes, &CameraKey::eye, time);
-          camera.target = follow_path(c.keyframes, &CameraKey::target, time);
-        } else if constexpr (std::is_same_v<C, OrbitCamera>) {
-          const Real angle = (c.start_deg + c.turn_deg_per_s * time) * std::numbers::pi / 180;
-          camera.target = c.target.template cast<float>();
-          camera.eye = (c.target + Vec3(c.radius * std::sin(angle), c.height, c.radius * std::cos(angle)))
-                           .template cast<float>();
-        } else {
-          const auto moving = slot_of_.find(c.body);
-          const Vector3f at =
-              moving != slot_of_.end() ? bodies[moving->second].position : fixed_positions_.at(c.body);
-          camera.eye = at + c.offset.template cast<float>();
-          camera.target = at + c.look_offset.template cast<float>();
-        }
-      },
-      scene_.camera);
-  return camera;
 }
 
 void Picture::place_springs(const Snapshot& previous, const Snapshot& current, float w) {
@@ -387,8 +364,11 @@ void Picture::place_points(const Snapshot& previous, const Snapshot& current, fl
   for (std::size_t set = 0; set < points_.size(); ++set) {
     const PointSet &before = previous.point_sets[set], &now = current.point_sets[set];
     // A streak is its own motion blur: it stays where the frame ends and is as long as its style says.
+    const auto show = [&](std::span<const render::Point> points) {
+      smears_[set] ? set_balls(set, points) : stage_.set_points(points_[set], points);
+    };
     if (w == 1 || styles_[set] == render::PointStyle::streak) {
-      stage_.set_points(points_[set], now.points);
+      show(now.points);
       continue;
     }
     scratch_.clear();
@@ -404,7 +384,7 @@ void Picture::place_points(const Snapshot& previous, const Snapshot& current, fl
         p.position -= back * p.velocity;
       scratch_.push_back(p);
     }
-    stage_.set_points(points_[set], scratch_);
+    show(scratch_);
   }
 }
 
@@ -473,7 +453,15 @@ void Picture::place(const Snapshot& previous, const Snapshot& current, float w, 
   place_points(previous, current, w, frame_time);
   place_cloths(previous, current, w, frame_time);
   place_overlays(previous, current, w);
-  stage_.set_camera(camera_at(time, samples));
+  stage_.set_camera(camera_.at(time, places_, samples));
+  stage_.set_lamps(lamps_of(scene_, time, places_, samples));
+  stage_.set_time(f(time));
+}
+
+float Picture::exposure(double time, float sample_weight) const {
+  const float factor = f(effects::mean(scene_.render.exposure, time));
+  return scene_.render.metering == Metering::fixed ? factor
+                                                   : factor * render::metered_exposure(sum_, sample_weight);
 }
 
 render::Image Picture::draw(const Snapshot& previous, const Snapshot& current) {
@@ -488,14 +476,14 @@ render::Image Picture::draw(const Snapshot& previous, const Snapshot& current) {
     place(previous, current, w, frame_time);
     stage_.draw(render::sample_offsets(i, n), sum_);
   }
+  const float weight = 1 / static_cast<float>(n), exposed = exposure(current.time, weight);
   if (scene_.render.bloom > 0)
-    render::add_bloom(sum_, {.strength = f(scene_.render.bloom),
-                             .exposure = f(scene_.render.exposure),
-                             .sample_weight = 1 / static_cast<float>(n)});
-  render::Image image = render::tone_map(sum_, {.curve = scene_.render.tone_curve,
-                                                .exposure = f(scene_.render.exposure),
-                                                .sample_weight = 1 / static_cast<float>(n)});
+    render::add_bloom(sum_,
+                      {.strength = f(scene_.render.bloom), .exposure = exposed, .sample_weight = weight});
+  render::Image image = render::tone_map(
+      sum_, {.curve = scene_.render.tone_curve, .exposure = exposed, .sample_weight = weight});
   if (n == 1) render::filter_edges(image);
+  write_texts(scene_, current, image);
   return image;
 }
 

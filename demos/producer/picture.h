@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "producer/body_places.h"
+#include "producer/camera.h"
 #include "producer/models.h"
 #include "producer/scene.h"
 #include "producer/snapshot.h"
@@ -61,17 +63,20 @@ class Picture {
   render::MeshHandle primitive(const Primitive& shape);
   void add_cloth(const Cloth& cloth, const ModelLibrary& models);
   render::MaterialHandle cloth_material(const Cloth& cloth, const ModelLibrary& models);
+  render::PointsHandle add_smears(const ParticleLook& look);
   void add_overlay_lines();
-  void add_light_and_air();
 
   void place(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
   void place_body(const DrawnBody& body, const Eigen::Affine3f& world_from_body, double time);
   void place_springs(const Snapshot& previous, const Snapshot& current, float w);
   void place_points(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
+  /// Between two sub-frames; 0 if there is one alone [s].
+  float subframe_time() const;
+  void set_balls(std::size_t set, std::span<const render::Point> balls);
   void place_cloths(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
   void give_mesh(DrawnCloth& drawn, const ClothSample& sample);
   void place_overlays(const Snapshot& previous, const Snapshot& current, float w);
-  render::Camera camera_at(double time, const std::vector<BodySample>& bodies) const;
+  float exposure(double time, float sample_weight) const;
 
   const Scene& scene_;
   render::Stage stage_;
@@ -79,16 +84,17 @@ class Picture {
   std::map<std::string, std::pair<std::vector<render::MeshHandle>, std::vector<render::MaterialHandle>>>
       models_;
   std::map<std::vector<float>, render::MeshHandle> primitives_;  // by kind and sizes
-  std::map<std::string, std::size_t> slot_of_;                   // body name -> slot, for the follow camera
-  std::map<std::string, Eigen::Vector3f> fixed_positions_;
+  BodyPlaces places_;
+  CameraRig camera_;
   std::vector<DrawnBody> bodies_;
   std::vector<render::InstanceHandle> springs_;  // null where invisible
   std::vector<render::PointsHandle> points_;
-  std::vector<render::PointStyle> styles_;                 // of the same
+  std::vector<render::PointStyle> styles_;    // of the same
+  std::vector<render::PointsHandle> smears_;  // of balls, what moves too far in a sub-frame; or null
   std::map<std::string, render::MaterialHandle> fabrics_;  // by fabric and material
   std::vector<DrawnCloth> cloths_;
   std::vector<render::LinesHandle> overlays_;  // null for those without lines
-  std::vector<render::Point> scratch_;
+  std::vector<render::Point> scratch_, scratch_smears_;
   std::vector<Eigen::Vector3f> scratch_places_;
   std::vector<render::Line> scratch_lines_;
   render::HdrImage sum_;

@@ -22,6 +22,8 @@ struct Shot {
   int frame = 0;
   std::shared_ptr<const Snapshot> previous, current;
   double sim_ms = 0;
+  std::size_t contacts = 0;           // of bodies; without a cache
+  std::optional<sim::Energy> energy;  // without a cache
 };
 
 struct Print {

@@ -32,6 +32,8 @@ class SnapshotSource {
   virtual ~SnapshotSource() = default;
   /// The state at a frame, or an earlier one if `stop` said so on the way; asked for in ascending order.
   virtual Snapshot at(int frame, const std::function<bool()>& stop) = 0;
+  /// Adds what is known besides of the latest state.
+  virtual void describe(Shot&) const {}
 };
 
 class LiveSource : public SnapshotSource {
@@ -40,6 +42,10 @@ class LiveSource : public SnapshotSource {
   Snapshot at(int frame, const std::function<bool()>& stop) override {
     while (simulation_.frame() < frame && !stop()) simulation_.advance();
     return simulation_.snapshot();
+  }
+  void describe(Shot& shot) const override {
+    shot.contacts = simulation_.world().contacts().size();
+    shot.energy = simulation_.world().energy();
   }
 
  private:
@@ -72,7 +78,26 @@ void draw_shots(Pipeline& pipeline, const Scene& scene, const ModelLibrary& mode
   }
 }
 
-void print_frames(Pipeline& pipeline, render::FrameSink& sink, int total, RunStats& stats,
+/// Keeps what a report shows of a frame.
+void keep(const Print& print, double encode_ms, int total, RunStats& stats) {
+  constexpr int kPictures = 12, kWidth_px = 320;
+  const Snapshot& state = *print.shot.current;
+  stats.figures.push_back({.frame = print.shot.frame,
+                           .time = state.time,
+                           .sim_ms = print.shot.sim_ms,
+                           .render_ms = print.render_ms,
+                           .encode_ms = encode_ms,
+                           .particles = state.point_count(),
+                           .contacts = print.shot.contacts,
+                           .energy = print.shot.energy,
+                           .state_hash = state.state_hash.hex(),
+                           .pixel_hash = render::pixel_hash(print.image)});
+  const int every = std::max(1, (total + kPictures - 1) / kPictures);
+  if (print.shot.index % every == 0)
+    stats.pictures.emplace_back(print.shot.frame, render::reduced(print.image, kWidth_px));
+}
+
+void print_frames(Pipeline& pipeline, render::FrameSink& sink, int total, bool report, RunStats& stats,
                   const ProgressCallback& progress) {
   const auto start = Clock::now();
   while (auto print = pipeline.take_print()) {
@@ -87,6 +112,7 @@ void print_frames(Pipeline& pipeline, render::FrameSink& sink, int total, RunSta
     stats.particles = state.point_count();
     stats.most_particles = std::max(stats.most_particles, stats.particles);
     stats.state_hash = stats.frame_states[print->shot.frame] = state.state_hash.hex();
+    if (report) keep(*print, encode_ms, total, stats);
     if (is_blank(print->image)) stats.blank_frames.push_back(print->shot.frame);
     if (progress)
       progress({.done = stats.frames,
@@ -100,7 +126,8 @@ void print_frames(Pipeline& pipeline, render::FrameSink& sink, int total, RunSta
 }
 
 /// Produces the shots on the calling thread.
-void shoot(Pipeline& pipeline, SnapshotSource& source, const std::vector<int>& frames, bool needs_previous) {
+void shoot(Pipeline& pipeline, SnapshotSource& source, const std::vector<int>& frames, bool needs_previous,
+           bool report) {
   const auto stop = [&] { return interrupt_signal() != 0 || pipeline.failed(); };
   std::shared_ptr<const Snapshot> last;
   for (std::size_t i = 0; i < frames.size() && !stop(); ++i) {
@@ -115,9 +142,9 @@ void shoot(Pipeline& pipeline, SnapshotSource& source, const std::vector<int>& f
     if (current->frame != frame) break;  // stopped on the way
     if (!previous) previous = current;
     last = current;
-    if (!pipeline.push(
-            {static_cast<int>(i), frame, std::move(previous), std::move(current), ms_since(start)}))
-      return;
+    Shot shot{static_cast<int>(i), frame, std::move(previous), std::move(current), ms_since(start), 0, {}};
+    if (report) source.describe(shot);
+    if (!pipeline.push(std::move(shot))) return;
   }
   pipeline.no_more_shots();
 }
@@ -156,8 +183,9 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
   Pipeline pipeline(2 * job.threads + 2);
   const auto draw = [&] { guarded(pipeline, [&] { draw_shots(pipeline, loaded.scene, models); }); };
   const auto print = [&] {
-    guarded(pipeline,
-            [&] { print_frames(pipeline, sink, static_cast<int>(job.frames.size()), stats, progress); });
+    guarded(pipeline, [&] {
+      print_frames(pipeline, sink, static_cast<int>(job.frames.size()), job.report, stats, progress);
+    });
   };
   {
     std::vector<std::jthread> crew;
@@ -165,7 +193,7 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
     guarded(pipeline, [&] {
       for (int i = 0; i < job.threads; ++i) crew.emplace_back(draw);
       crew.emplace_back(print);
-      shoot(pipeline, *source, job.frames, subframes(loaded.scene.render.quality) > 1);
+      shoot(pipeline, *source, job.frames, subframes(loaded.scene.render.quality) > 1, job.report);
     });
   }
   pipeline.rethrow_failure();

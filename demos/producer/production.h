@@ -31,6 +31,17 @@ class StageTimes {
   std::vector<double> ms_;
 };
 
+/// What is known of one frame, for a report.
+struct FrameFigures {
+  int frame = 0;
+  double time = 0;  ///< of the film [s]
+  double sim_ms = 0, render_ms = 0, encode_ms = 0;
+  uint64_t particles = 0;
+  std::size_t contacts = 0;           ///< of bodies; without a cache
+  std::optional<sim::Energy> energy;  ///< without a cache
+  std::string state_hash, pixel_hash;
+};
+
 /// What a run did: the stats object of the command line.
 struct RunStats {
   int frames = 0;       ///< written by this run
@@ -45,6 +56,8 @@ struct RunStats {
   std::optional<sim::Energy> energy_start, energy_end;  ///< without a cache
   std::string state_hash;                               ///< after the last frame
   std::map<int, std::string> frame_states;              ///< state hash of every drawn frame
+  std::vector<FrameFigures> figures;                    ///< if the job asks for them
+  std::vector<std::pair<int, render::Image>> pictures;  ///< small ones of about a dozen frames, likewise
   std::vector<int> blank_frames;                        ///< all pixels equal: something is probably wrong
   int interrupted_by = 0;                               ///< signal, or 0
 };
@@ -65,6 +78,7 @@ struct RenderJob {
   std::vector<int> frames;                     ///< to draw, ascending
   int threads = 1;                             ///< that draw, each with a context of its own
   std::optional<std::filesystem::path> cache;  ///< read states from here instead of simulating
+  bool report = false;                         ///< keep figures and pictures
 };
 
 /// Draws the frames into the sink and closes it. After an interrupt it finishes the frames in flight, closes

@@ -64,6 +64,8 @@ struct Material {
   Real roughness = 0.5;
   Color emission{{0, 0, 0, 1}};
   Real emission_strength = 1;
+  Real transmission = 0;  ///< share of the light under the surface that goes through, as in glass
+  Real refraction = 1.5;  ///< index of
   render::Pattern pattern = render::Pattern::none;
   Color pattern_color{{0.4f, 0.4f, 0.4f, 1}};
   Real pattern_scale = 1;
@@ -205,15 +207,37 @@ struct ClothOverlay : LineLook {
   std::string cloth;   ///< empty: all
   Real strain = 0.05;  ///< at which a thread is red
 };
+/// Where the centres of mass of bodies have been.
+struct TrailsOverlay : LineLook {
+  Where where;
+  std::string body;            ///< empty: all dynamic ones
+  Real duration = 1;           ///< how far back
+  std::optional<Color> color;  ///< default: a colour of its own for each
+};
+enum class TextPlace { top_left, top_right, bottom_left, bottom_right, center };
+/// Words on the picture.
+struct TextOverlay {
+  Where where;
+  std::string text = "{time}";
+  TextPlace place = TextPlace::bottom_left;
+  Real size = 0.035;  ///< height of a line, as a share of the picture's
+  Color color{{1, 1, 1, 1}};
+  Real from = 0;  ///< when it is shown
+  std::optional<Real> until;
+};
 /// What is drawn over the picture to show how the simulation sees it.
 using Overlay = std::variant<TreeOverlay, PartsOverlay, ClosestOverlay, ContactsOverlay, VelocitiesOverlay,
-                             IslandsOverlay, ClothOverlay>;
+                             IslandsOverlay, ClothOverlay, TrailsOverlay, TextOverlay>;
 
 /// What all cameras have.
 struct Lens {
   Real fov_deg = 40;
+  std::optional<Real> focal_mm;  ///< in place of fov_deg
   Real aperture = 0;
   Real focus = 0;
+  std::string focus_on;          ///< body, in place of `focus`
+  std::string look_at;           ///< body, in place of the target
+  std::vector<std::string> fit;  ///< bodies that are to fill the picture
 };
 struct StaticCamera : Lens {
   Vec3 eye = {4, 2.5, 6};
@@ -223,6 +247,7 @@ struct CameraKey {
   Real time = 0;
   Vec3 eye = {4, 2.5, 6};
   Vec3 target = Vec3::Zero();
+  std::optional<Real> fov_deg, focus;  ///< default: the camera's
 };
 struct KeyframedCamera : Lens {
   std::vector<CameraKey> keyframes;
@@ -248,16 +273,40 @@ struct SunLight {
   Real size_deg = 1.5;
   bool shadows = true;
 };
-using Light = std::variant<SunLight>;
+/// What lights near the scene have.
+struct LampBase {
+  Where where;
+  std::string body;  ///< that carries it; empty: none
+  Vec3 position = {0, 3, 0};
+  Color color{{1, 0.85f, 0.65f, 1}};
+  Varying intensity = 10.0;  ///< brightness of a white surface 1 m away that faces it
+  bool shadows = true;
+};
+struct PointLight : LampBase {
+  Real radius = 0.1;
+};
+struct SpotLight : LampBase {
+  Vec3 target = Vec3::Zero();
+  Real angle_deg = 40;
+  Real softness = 0.3;
+  Real radius = 0.05;
+};
+struct AreaLight : LampBase {
+  Vec3 target = Vec3::Zero();
+  Eigen::Vector2d size = {1, 1};
+};
+using Light = std::variant<SunLight, PointLight, SpotLight, AreaLight>;
 
 enum class Background { sky, transparent };
 
 struct EnvironmentSettings {
   Color zenith{{0.2f, 0.42f, 0.88f, 1}};
   Color horizon{{0.95f, 1.05f, 1.15f, 1}};
-  Color ground{{0.36f, 0.33f, 0.28f, 1}};
+  std::optional<Color> ground;  ///< default: what the ground plane sends back
   Real intensity = 1;
   Real fog = 0;
+  Real clouds = 0;
+  std::optional<Real> occlusion;  ///< how far away things hide the sky; default: by the camera's distance
   Background background = Background::sky;
 };
 
@@ -265,11 +314,15 @@ struct EnvironmentSettings {
 enum class Quality { draft, preview, final };
 int subframes(Quality quality);
 
+/// `automatic`: each frame is exposed so that its mean brightness is that of the same grey.
+enum class Metering { fixed, automatic };
+
 struct RenderSettings {
   Eigen::Vector2i size = {1280, 720};
   Quality quality = Quality::preview;
   Real shutter = 0.5;  ///< share of the frame time the shutter is open
-  Real exposure = 1;
+  Varying exposure = 1.0;
+  Metering metering = Metering::fixed;
   Real bloom = 0.12;  ///< share of the light beyond white that spreads as glow
   render::ToneCurve tone_curve = render::ToneCurve::filmic;
   int shadow_map = 2048;

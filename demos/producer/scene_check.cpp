@@ -83,7 +83,12 @@ class Checker {
             if (!o.where.path.empty()) check_overlay(o);  // else its type was wrong, and none was read
           },
           overlay);
-    std::visit([&](const auto& camera) { check_camera(camera); }, scene_.camera);
+    std::visit(
+        [&](const auto& camera) {
+          check_camera(camera);
+          check_lens(camera);
+        },
+        scene_.camera);
     check_lights();
     check_film();
     return std::move(findings_);
@@ -410,6 +415,13 @@ class Checker {
       warn(path, "shows nothing: the body '" + overlay.body + "' is static");
   }
   void check_overlay(const IslandsOverlay&) {}
+  void check_overlay(const TrailsOverlay& overlay) {
+    if (!overlay.body.empty()) named_body(overlay.where.path + "/body", overlay.body);
+  }
+  void check_overlay(const TextOverlay& overlay) {
+    if (overlay.until && *overlay.until <= overlay.from)
+      fail(overlay.where.path + "/until", "must be later than from");
+  }
   void check_overlay(const ClothOverlay& overlay) {
     if (!overlay.cloth.empty() && !find_named(flat_.cloths, overlay.cloth))
       fail(overlay.where.path + "/cloth",
@@ -434,16 +446,41 @@ class Checker {
     check_view(camera.offset, camera.look_offset, "/camera");
   }
 
+  void check_lens(const Lens& lens) {
+    if (!lens.focus_on.empty()) check_body_name("/camera/focus_on", lens.focus_on);
+    if (!lens.look_at.empty()) check_body_name("/camera/look_at", lens.look_at);
+    for (std::size_t i = 0; i < lens.fit.size(); ++i) check_body_name("/camera/fit" + step(i), lens.fit[i]);
+  }
+
+  void check_light(const SunLight& sun, const std::string& path) {
+    if (sun.direction.y() <= 0)
+      fail(path + "/direction", "the sun must be above the horizon: y must be greater than 0");
+  }
+  void check_lamp(const LampBase& lamp, const std::string& path) {
+    if (!lamp.body.empty()) check_body_name(path + "/body", lamp.body);
+    check_not_random(path + "/intensity", lamp.intensity);
+  }
+  void check_light(const PointLight& light, const std::string& path) { check_lamp(light, path); }
+  template <class Directed>
+  void check_light(const Directed& light, const std::string& path) {
+    check_lamp(light, path);
+    if (light.target == light.position) fail(path + "/target", "is where the light is");
+  }
   void check_lights() {
+    constexpr std::size_t kMostLamps = 8;
+    std::size_t suns = 0, lamps = 0;
     for (std::size_t i = 0; i < scene_.lights.size(); ++i) {
       const std::string path = "/lights" + step(i);
-      if (i > 0) fail(path, "there can be only one sun");
-      if (std::get<SunLight>(scene_.lights[i]).direction.y() <= 0)
-        fail(path + "/direction", "the sun must be above the horizon: y must be greater than 0");
+      ++(std::holds_alternative<SunLight>(scene_.lights[i]) ? suns : lamps);
+      if (suns > 1) fail(path, "there can be only one sun");
+      if (lamps > kMostLamps)
+        fail(path, fmt::format("there can be only {} lights besides the sun", kMostLamps));
+      std::visit([&](const auto& light) { check_light(light, path); }, scene_.lights[i]);
     }
   }
 
   void check_film() {
+    check_not_random("/render/exposure", scene_.render.exposure);
     const auto& size = scene_.render.size;
     if (size.x() % 2 != 0 || size.y() % 2 != 0)
       warn("/render/size", "is odd: most video formats need even numbers");

@@ -264,6 +264,7 @@ sim::BodyHandle Simulation::body_named(const std::string& name) const {
 void Simulation::step(double sampling_time) {
   const sim::StepReport report = world_.step(sampling_time, [&](Real start, Real end) {
     if (on_substep_) on_substep_(start);
+    overlays_->record(world_);
     sources_->emit(world_, start, end);
   });
   totals_.add(report);

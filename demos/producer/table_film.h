@@ -13,8 +13,17 @@ template <>
 struct Table<Lens> {
   static Fields<Lens> fields() {
     return {{"fov_deg", &Lens::fov_deg, "vertical field of view", "degrees", inside(0, 180)},
+            {"focal_mm", &Lens::focal_mm,
+             "focal length for a picture 36 mm wide, in place of fov_deg: 24 is wide, 50 normal, 100 long",
+             "mm", between(1, 2000)},
             {"aperture", &Lens::aperture, "diameter of the lens; 0: everything is sharp", "m", kNotNegative},
-            {"focus", &Lens::focus, "distance that is sharp; 0: the target's", "m", kNotNegative}};
+            {"focus", &Lens::focus, "distance that is sharp; 0: the target's", "m", kNotNegative},
+            {"focus_on", &Lens::focus_on, "name of a body that is sharp, wherever it goes"},
+            {"look_at", &Lens::look_at, "name of a body that is looked at, wherever it goes"},
+            {"fit", &Lens::fit,
+             "names of bodies that fill the picture: the camera keeps its direction and goes as near as all "
+             "of them, "
+             "where they begin, allow"}};
   }
 };
 template <>
@@ -32,9 +41,13 @@ struct Table<CameraKey> {
   static constexpr const char* kName = "camera_key";
   static constexpr const char* kHelp = "A view at a time.";
   static Fields<CameraKey> fields() {
-    return {{"time", &CameraKey::time, "when; times must increase", "s"},
-            {"eye", &CameraKey::eye, "where the camera is", "m"},
-            {"target", &CameraKey::target, "where it looks", "m"}};
+    return {
+        {"time", &CameraKey::time, "when; times must increase", "s"},
+        {"eye", &CameraKey::eye, "where the camera is", "m"},
+        {"target", &CameraKey::target, "where it looks", "m"},
+        {"fov_deg", &CameraKey::fov_deg, "field of view then; default: the camera's", "degrees",
+         inside(0, 180)},
+        {"focus", &CameraKey::focus, "distance that is sharp then; default: the camera's", "m", kPositive}};
   }
 };
 template <>
@@ -96,11 +109,58 @@ struct Table<SunLight> {
   }
 };
 template <>
+struct Table<LampBase> {
+  static Fields<LampBase> fields() {
+    using T = LampBase;
+    return {{"body", &T::body, "name of the body that carries it, in whose frame it then is; empty: none"},
+            {"position", &T::position, "where it is", "m"},
+            {"color", &T::color, "colour of its light"},
+            {"intensity", &T::intensity,
+             "brightness of a white surface 1 m away that faces it; a number or a curve over time", "",
+             kNotNegative},
+            {"shadows", &T::shadows, "throws shadows"}};
+  }
+};
+template <>
+struct Table<PointLight> {
+  static constexpr const char* kName = "point_light";
+  static constexpr const char* kHelp = "A glowing ball: a bulb, a fire.";
+  static Fields<PointLight> fields() {
+    using T = PointLight;
+    return Fields<T>{{"radius", &T::radius, "of the ball: the softness of shadows", "m", kPositive}}
+        .with_base<LampBase>();
+  }
+};
+template <>
+struct Table<SpotLight> {
+  static constexpr const char* kName = "spot_light";
+  static constexpr const char* kHelp = "A cone of light.";
+  static Fields<SpotLight> fields() {
+    using T = SpotLight;
+    return Fields<T>{{"target", &T::target, "where it points", "m"},
+                     {"angle_deg", &T::angle_deg, "of the whole cone", "degrees", between(1, 150)},
+                     {"softness", &T::softness, "share of the cone over which its edge fades", "", kShare},
+                     {"radius", &T::radius, "of the lamp: the softness of shadows", "m", kPositive}}
+        .with_base<LampBase>();
+  }
+};
+template <>
+struct Table<AreaLight> {
+  static constexpr const char* kName = "area_light";
+  static constexpr const char* kHelp = "A glowing rectangle: a window, a lamp with a large screen.";
+  static Fields<AreaLight> fields() {
+    using T = AreaLight;
+    return Fields<T>{{"target", &T::target, "where it points", "m"},
+                     {"size", &T::size, "width and height: the softness of shadows", "m", kPositive}}
+        .with_base<LampBase>();
+  }
+};
+template <>
 struct Tags<Light> {
   static constexpr const char* kName = "light";
   static constexpr const char* kHelp =
       "A source of light besides the sky. An empty list of lights leaves the sky alone.";
-  static constexpr std::array kTags = {"sun"};
+  static constexpr std::array kTags = {"sun", "point", "spot", "area"};
   static constexpr bool kRequired = false;
 };
 
@@ -116,18 +176,29 @@ struct Table<EnvironmentSettings> {
   static constexpr const char* kHelp = "Sky, the light that comes from it, and fog.";
   static Fields<EnvironmentSettings> fields() {
     using T = EnvironmentSettings;
-    return {{"zenith", &T::zenith, "the sky overhead"},
-            {"horizon", &T::horizon, "the sky at the horizon, and the fog"},
-            {"ground", &T::ground, "below the horizon, and light from below"},
-            {"intensity", &T::intensity, "factor of sky and ambient light", "", kNotNegative},
-            {"fog", &T::fog, "density; a share exp(-fog * distance) of the light comes through", "1/m",
-             kNotNegative},
-            {"background", &T::background, "the sky, or nothing: pictures with an alpha channel"}};
+    return {
+        {"zenith", &T::zenith, "the sky overhead"},
+        {"horizon", &T::horizon, "the sky at the horizon, and the fog"},
+        {"ground", &T::ground,
+         "below the horizon, and light from below; default: what sun and sky let the ground plane send back"},
+        {"intensity", &T::intensity, "factor of sky and ambient light", "", kNotNegative},
+        {"fog", &T::fog, "density; a share exp(-fog * distance) of the light comes through", "1/m",
+         kNotNegative},
+        {"clouds", &T::clouds, "share of the sky that clouds cover", "", kShare},
+        {"occlusion", &T::occlusion,
+         "how far away things hide the sky from each other; 0: not at all; default: a tenth of the camera's "
+         "distance",
+         "m", kNotNegative},
+        {"background", &T::background, "the sky, or nothing: pictures with an alpha channel"}};
   }
 };
 template <>
 struct Names<Quality> {
   static constexpr std::array kNames = {"draft", "preview", "final"};
+};
+template <>
+struct Names<Metering> {
+  static constexpr std::array kNames = {"fixed", "automatic"};
 };
 template <>
 struct Names<render::ToneCurve> {
@@ -143,7 +214,9 @@ struct Table<RenderSettings> {
         {"size", &T::size, "width and height; even for video", "pixels", between(16, 16384)},
         {"quality", &T::quality, "1, 4 or 16 sub-frames per frame"},
         {"shutter", &T::shutter, "share of the frame time that the shutter is open: motion blur", "", kShare},
-        {"exposure", &T::exposure, "factor of all light", "", kPositive},
+        {"exposure", &T::exposure, "factor of all light; a number or a curve over time", "", kPositive},
+        {"metering", &T::metering,
+         "automatic: exposure is a factor besides what makes each frame as bright as the others"},
         {"bloom", &T::bloom, "share of very bright light that spreads as glow; 0: none", "", kNotNegative},
         {"tone_curve", &T::tone_curve, "from light to the picture"},
         {"shadow_map", &T::shadow_map, "width and height of the sun's shadow map", "pixels",

@@ -126,11 +126,43 @@ struct Table<ClothOverlay> {
   }
 };
 template <>
+struct Table<TrailsOverlay> {
+  static constexpr const char* kName = "trails_overlay";
+  static constexpr const char* kHelp = "Where the centres of mass of bodies have been.";
+  static Fields<TrailsOverlay> fields() {
+    using T = TrailsOverlay;
+    return Fields<T>{{"body", &T::body, "name of a body; empty: all dynamic ones"},
+                     {"duration", &T::duration, "how far back a trail goes", "s", over(0, 60)},
+                     {"color", &T::color, "default: a colour of its own for each"}}
+        .with_base<LineLook>();
+  }
+};
+template <>
+struct Names<TextPlace> {
+  static constexpr std::array kNames = {"top_left", "top_right", "bottom_left", "bottom_right", "center"};
+};
+template <>
+struct Table<TextOverlay> {
+  static constexpr const char* kName = "text_overlay";
+  static constexpr const char* kHelp = "Words on the picture.";
+  static Fields<TextOverlay> fields() {
+    using T = TextOverlay;
+    return {{"text", &T::text,
+             "ASCII; {time}, {frame}, {bodies} and {particles} stand for the film's figures, a line break "
+             "for one"},
+            {"place", &T::place, "where in the picture"},
+            {"size", &T::size, "height of a line, as a share of the picture's", "", over(0, 0.5)},
+            {"color", &T::color, "of the letters"},
+            {"from", &T::from, "when it appears", "s"},
+            {"until", &T::until, "when it goes; default: it stays", "s"}};
+  }
+};
+template <>
 struct Tags<Overlay> {
   static constexpr const char* kName = "overlay";
   static constexpr const char* kHelp = "Something drawn over the picture to show how the simulation sees it.";
-  static constexpr std::array kTags = {"tree",       "parts",   "closest", "contacts",
-                                       "velocities", "islands", "cloth"};
+  static constexpr std::array kTags = {"tree",    "parts", "closest", "contacts", "velocities",
+                                       "islands", "cloth", "trails",  "text"};
   static constexpr bool kRequired = true;
 };
 

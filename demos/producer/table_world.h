@@ -59,8 +59,9 @@ struct Table<WorldSettings> {
 
 template <>
 struct Names<render::Pattern> {
-  static constexpr std::array kNames = {"none", "checker", "grid",   "noise",   "brick",
-                                        "wood", "lawn",    "paving", "stripes", "gingham"};
+  static constexpr std::array kNames = {"none",     "checker", "grid",   "noise",   "brick",
+                                        "wood",     "lawn",    "paving", "stripes", "gingham",
+                                        "concrete", "sand",    "planks", "water"};
 };
 
 template <>
@@ -74,6 +75,11 @@ struct Table<Material> {
         {"color", &T::color, "base colour; with alpha below 1 it is translucent"},
         {"metallic", &T::metallic, "0: dielectric, 1: metal", "", kShare},
         {"roughness", &T::roughness, "0: mirror, 1: dull", "", kShare},
+        {"transmission", &T::transmission,
+         "share of the light under the surface that goes through: 1 is glass, its colour what it lets "
+         "through",
+         "", kShare},
+        {"refraction", &T::refraction, "index of refraction of what light goes through", "", between(1, 3)},
         {"emission", &T::emission, "colour of the light it gives off"},
         {"emission_strength", &T::emission_strength, "factor of the emission; 1: as bright as a sunlit white",
          "", kNotNegative},

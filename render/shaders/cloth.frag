@@ -43,5 +43,8 @@ void main() {
   vec3 lit = position + normal.xyz * (abs(normal.w) * towards_sun * side - normal.w);
   float visibility = sun_visibility(lit, n * towards_sun);
   vec3 radiance = shade_fabric(s, through, relief, view, visibility, opened);
+#ifdef LAMPS
+  radiance += lamp_light(s, relief, n, view, position);
+#endif
   color = vec4(apply_fog(radiance, position), 1.0);
 }

@@ -1,4 +1,13 @@
 // What every shader of a frame knows; the same fields as FrameUniforms in frame.h.
+struct Lamp {
+  vec4 position;   // w: radius
+  vec4 intensity;  // radiance of a white surface at 1 m; w: 0 no shadow, 1 shadow in a cone, 2 all around
+  vec4 direction;  // w: what the cosine to it counts
+  vec4 right;      // w: what is added; the sum, in [0, 1], is the share that shines there
+  vec4 up;         // w: tangent of half the angle of a tile of the shadow map
+  vec4 block;      // first corner in the shadow map; size of a tile there
+};
+
 layout(std140, binding = 0) uniform Frame {
   mat4 clip_from_world;
   mat4 shadow_from_world;   // to [0, 1] of the shadow map
@@ -12,6 +21,8 @@ layout(std140, binding = 0) uniform Frame {
   vec4 irradiance[9];       // ambient light of a white surface, spherical harmonics in x, y, z
   vec4 shadow;              // size of a texel [m], texels, 1 / texels, seed of the dither
   vec4 penumbra;            // of the shadow map: half-width [texels] per depth, the widest [texels], depth per its width, taps
+  vec4 air;                 // number of lamps, time [s], share of clouds, number of sub-frames
+  Lamp lamps[8];
 } frame;
 
 float saturate(float x) { return clamp(x, 0.0, 1.0); }

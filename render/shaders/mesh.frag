@@ -44,6 +44,17 @@ void main() {
 #endif
   if (alpha < min_alpha) discard;
   s.roughness = filtered_roughness(s.roughness, n);
-  vec3 radiance = apply_fog(shade(s, n, view, sun_visibility(position, smooth_normal), open_sky(1.0 / gl_FragCoord.w)), position);
+  vec3 albedo = s.albedo;
+#ifdef GLASS
+  s.albedo *= 1.0 - material.glass.x;
+#endif
+  vec3 radiance = shade(s, n, view, sun_visibility(position, smooth_normal), open_sky(1.0 / gl_FragCoord.w));
+#ifdef LAMPS
+  radiance += lamp_light(s, n, smooth_normal, view, position);
+#endif
+#ifdef GLASS
+  radiance += albedo * (material.glass.x * seen_through(position, n, view));
+#endif
+  radiance = apply_fog(radiance, position);
   color = vec4(radiance * alpha, alpha);
 }

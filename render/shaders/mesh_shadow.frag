@@ -3,7 +3,7 @@
 layout(location = 2) in vec2 uv;
 #endif
 void main() {
-  float alpha = material.color.a;
+  float alpha = material.color.a * (1.0 - 0.75 * material.glass.x);
 #ifdef TEXTURED
   alpha *= texture(base_color_texture, uv).a;
 #endif

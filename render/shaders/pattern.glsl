@@ -117,6 +117,48 @@ PatternSample pattern_sample(vec3 p, vec3 n) {
   result.color = mix(a, b, saturate(tone)) * max(shade, 0.25);
   slope = 0.2 * clump.yz + 0.3 * (blade.yz + blade2.yz);
 
+#elif PATTERN == 10  // concrete: blotches, pores, and the joints of its shuttering
+  float broad = (noise(q / scale * 0.7, 23u).x - 0.5) * visible(footprint, scale / 0.7);
+  float cloud = (noise(q / scale * 2.9, 24u).x - 0.5) * visible(footprint, scale / 2.9);
+  vec3 grain = (noise(q / scale * 47.0, 25u) - vec3(0.5, 0.0, 0.0)) * visible(footprint, scale / 47.0);
+  float pore = smoothstep(0.80, 0.95, noise(q / scale * 29.0, 26u).x) * visible(footprint, scale / 40.0);
+  Masonry m = masonry(q, vec2(4.0 * scale, 2.0 * scale), 0.006 * scale, 0.0, 0.012 * scale, footprint);
+  float tone = 1.0 + 0.16 * broad + 0.14 * cloud + 0.07 * grain.x;
+  result.color = mix(b, a * tone * (1.0 + 0.06 * (cell_random(m.cell, 27u) - 0.5)), m.stone) * (1.0 - 0.35 * pore);
+  result.roughness = 1.0 + 0.3 * cloud;
+  slope = m.slope + 0.05 * grain.yz;
+
+#elif PATTERN == 11  // sand: ripples that branch, and grains
+  vec3 bend = (noise(q / scale * 0.45, 28u) - vec3(0.5, 0.0, 0.0)) * visible(footprint, scale / 0.45);
+  float phase = 6.2831853 * (q.y / scale * 2.2 + 2.4 * bend.x + 0.3 * q.x / scale), ridge = visible(footprint, 0.45 * scale);
+  vec3 grain = (noise(q / scale * 83.0, 29u) - vec3(0.5, 0.0, 0.0)) * visible(footprint, scale / 83.0);
+  float broad = (noise(q / scale * 0.21, 30u).x - 0.5) * visible(footprint, scale / 0.21);
+  float high = 0.5 + 0.5 * sin(phase);
+  result.color = mix(b, a, saturate(0.5 + 0.35 * (high - 0.5) * ridge + 0.8 * broad)) * (1.0 + 0.22 * grain.x);
+  slope = 0.16 * grain.yz + ridge * 0.22 * cos(phase) * vec2(0.13, 1.0);
+
+#elif PATTERN == 12  // planks: boards of wood side by side
+  Masonry m = masonry(q, vec2(9.0 * scale, scale), 0.01 * scale, 0.0, 0.02 * scale, footprint);
+  float tint = cell_random(m.cell, 31u) - 0.5, shift = 50.0 * cell_random(m.cell, 32u);
+  vec2 along = vec2(q.x * 0.5, q.y * 5.0) / scale + shift;
+  float wave = noise(along, 33u).x, rings = fract(4.0 * noise(along * vec2(0.6, 0.7), 34u).x + 0.5 * wave);
+  float late = smoothstep(0.2, 0.8, rings) * (1.0 - smoothstep(0.9, 1.0, rings));
+  late = mix(0.45, late, visible(footprint, 0.08 * scale));
+  float fibre = (noise(along * vec2(3.0, 9.0), 35u).x - 0.5) * visible(footprint, 0.02 * scale);
+  vec3 wood = mix(a, b, saturate(0.12 + 0.45 * late + 0.45 * fibre + 0.35 * tint)) * (1.0 + 0.25 * tint);
+  result.color = mix(0.25 * b, wood, m.stone);
+  result.roughness = 1.0 + 0.2 * late + 0.2 * fibre;
+  slope = m.slope;
+
+#elif PATTERN == 13  // water: ripples of several lengths that run in their directions
+  float t = frame.air.y;
+  vec2 r = q / scale, turned = mat2(0.8, 0.6, -0.6, 0.8) * r;
+  vec3 n1 = noise(r * 1.3 + t * vec2(0.7, 0.2), 36u), n2 = noise(turned * 2.9 - t * vec2(0.5, 0.9), 37u);
+  vec3 n3 = noise(r * 6.1 + t * vec2(-1.3, 0.8), 38u);
+  slope = 0.09 * n1.yz * visible(footprint, scale / 1.3) + 0.07 * n2.yz * visible(footprint, scale / 2.9) +
+          0.05 * n3.yz * visible(footprint, scale / 6.1);
+  result.color = mix(a, b, 0.3 * (n1.x + n2.x - 1.0) + 0.3);
+
 #else  // paving
   Masonry m = masonry(q, vec2(1.45 * scale, scale), 0.012 * scale, 0.0, 0.025 * scale, footprint);
   float near = visible(footprint, scale);

@@ -114,10 +114,14 @@ void main() {
   reach = drawn;
   if (style.z != 0.0) {
 #if STYLE == 0
-    light.rgb *= puff_light(p, normalize(u * corner.x + w * corner.y + 0.7 * viewer.xyz), u, viewer.xyz, drawn);
+    vec3 shine = puff_light(p, normalize(u * corner.x + w * corner.y + 0.7 * viewer.xyz), u, viewer.xyz, drawn);
 #elif STYLE == 5
-    light.rgb *= flake_light(p, viewer.xyz);
+    vec3 shine = flake_light(p, viewer.xyz);
 #endif
+#ifdef LAMPS
+    shine += lamps_all_around(p);
+#endif
+    light.rgb *= shine;
   }
   light.rgb = light.rgb * fog.w + fog.rgb;
 #endif

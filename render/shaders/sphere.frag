@@ -22,7 +22,12 @@ void main() {
   vec3 radiance = color.rgb;
   if (style.z != 0.0) {
     Surface s = Surface(color.rgb, surface.y, surface.x, vec3(0.0));
-    radiance = shade(s, n, -ray, sun_visibility(hit, n), open_sky(clip.w));
+#ifdef LAMPS
+    radiance = lamp_light(s, n, n, -ray, hit);
+#else
+    radiance = vec3(0.0);
+#endif
+    radiance += shade(s, n, -ray, sun_visibility(hit, n), open_sky(clip.w));
   }
   result = vec4(apply_fog(radiance, hit), 1.0);
 #endif

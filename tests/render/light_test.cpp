@@ -1,0 +1,154 @@
+#include <cmath>
+
+#include "render/tone_map.h"
+#include "tests/render/gl_fixture.h"
+
+namespace offstage::render {
+namespace {
+
+const Environment kDark{.intensity = 0, .occlusion_reach = 0.f, .visible = false};
+const Material kWhite{.color = {1, 1, 1, 1}, .roughness = 1};
+
+// A white floor seen from above, under a dark sky without a sun.
+struct Floor {
+  explicit Floor(const Environment& environment = kDark, const Material& look = kWhite) : s(160, 120) {
+    s.stage.set_environment(environment);
+    s.stage.set_sun({.intensity = 0, .shadows = false});
+    s.stage.set_camera(camera);
+    s.add(make_ground(20), look);
+  }
+  float at(float x, float z, const SampleOffsets& offsets = {}) {
+    const Vector2f place = project(camera, {x, 0, z}, 160, 120);
+    return pixel(s.draw(offsets), static_cast<int>(place.x()), static_cast<int>(place.y())).y();
+  }
+  Camera camera{.eye = {0, 9, 0.01f}, .target = {0, 0, 0}};
+  SmallStage s;
+};
+
+TEST(StageLight, OfALampFallsWithTheSquareOfTheDistance) {
+  for (const float height : {1.0f, 2.0f, 4.0f}) {
+    Floor floor;
+    floor.s.stage.set_lamps(std::array{
+        Lamp{.position = {0, height, 0}, .intensity = {3, 3, 3}, .radius = 0.01f, .shadows = false}});
+    // As of the sun: Fresnel takes 4 %, the rough highlight gives about 1 % back.
+    EXPECT_NEAR(floor.at(0.02f, 0) * height * height, 3, 0.15);
+  }
+}
+
+TEST(StageLight, OfAConeEndsAtItsEdge) {
+  Floor floor;
+  floor.s.stage.set_lamps(std::array{Lamp{
+      .position = {0, 3, 0}, .intensity = {9, 9, 9}, .radius = 0.01f, .cone_deg = 60, .softness = 0.1f}});
+  const float edge = 3 * std::tan(0.5236f);
+  EXPECT_GT(floor.at(0.85f * edge, 0), 0.3f);
+  EXPECT_EQ(floor.at(1.1f * edge, 0), 0);
+}
+
+TEST(StageLight, LampsThrowShadowsWhereGeometrySays) {
+  for (const float cone_deg : {0.0f, 100.0f}) {
+    // A box of 0.5 m with its top 1 m up, under a lamp 3 m up: its shadow is 0.75 m wide, as is its side's
+    // light 1.5 m off.
+    Floor floor;
+    floor.s.add(make_box({0.5f, 0.5f, 0.5f}), kWhite, {1.2f, 0.75f, 0});
+    floor.s.stage.set_lamps(std::array{Lamp{.position = {0, 3, 0},
+                                            .intensity = {9, 9, 9},
+                                            .radius = 0.01f,
+                                            .cone_deg = cone_deg,
+                                            .softness = 0.1f}});
+    const float open = floor.at(-1.8f, 0);
+    EXPECT_NEAR(floor.at(1.7f, 0), 0, 0.02 * open) << cone_deg;
+    EXPECT_NEAR(floor.at(0, 1.8f) / open, 1, 0.03) << cone_deg;
+    EXPECT_GT(floor.at(1.75f, 0.6f), 0.5f * open) << cone_deg;
+  }
+}
+
+TEST(StageLight, SkyIsHiddenBesideWhatStandsOnTheGround) {
+  // Dark, for white things send each other nearly all of the light that they hide.
+  const Material dark{.color = {0.2f, 0.2f, 0.2f, 1}, .roughness = 1};
+  Floor floor({.zenith = {1, 1, 1},
+               .horizon = {1, 1, 1},
+               .ground = {0, 0, 0},
+               .occlusion_reach = 2.f,
+               .visible = false},
+              dark);
+  floor.s.add(make_box({1, 0.4f, 1}), kWhite, {0, 0.2f, 0});
+  const float open = floor.at(3, 2);
+  EXPECT_NEAR(open, floor.at(-3, -2), 0.01f * open);
+  EXPECT_LT(floor.at(0.62f, 0), 0.9f * open);
+  EXPECT_GT(floor.at(0.62f, 0), 0.3f * open) << "half the sky and what the box sends back";
+}
+
+TEST(StageLight, ShadowsHardenTowardsWhatThrowsThem) {
+  // One sub-frame, a large sun at 45 degrees behind a wall 2 m high: the edge of the shadow of its foot is
+  // sharp, that of its top soft, as wide as the way of the light to it times the sun's width.
+  const auto width_of_edge = [](float height) {
+    Floor floor;
+    floor.s.stage.set_sun({.direction = Vector3f(1, 1, 0).normalized(), .intensity = 3, .size_deg = 8});
+    floor.s.add(make_box({0.05f, 0.1f, 3}), kWhite, {0, height, 0});
+    const float open = floor.at(3, 0);
+    int partial = 0;
+    for (float x = -height - 0.6f; x < -height + 0.6f; x += 0.02f) {
+      const float share = floor.at(x, 0) / open;
+      partial += share > 0.1f && share < 0.9f;
+    }
+    return partial;
+  };
+  EXPECT_GT(width_of_edge(2), 2 * width_of_edge(0.15f));
+}
+
+TEST(StageLight, GroundSendsTheLightOfSunAndSkyUp) {
+  // The underside of a box over ground of albedo 0.5 under an even sky and the sun overhead.
+  SmallStage s;
+  s.stage.set_environment({.zenith = {1, 1, 1},
+                           .horizon = {1, 1, 1},
+                           .ground_albedo = Vector3f(0.5f, 0.5f, 0.5f),
+                           .occlusion_reach = 0.f,
+                           .visible = false});
+  s.stage.set_sun({.direction = {0, 1, 0}, .color = {1, 1, 1}, .intensity = 2, .shadows = false});
+  s.stage.set_camera({.eye = {0, -5, 0.01f}, .target = {0, 0, 0}});
+  s.add(make_box({3, 1, 3}), kWhite);
+  EXPECT_NEAR(center_pixel(s.draw()).x(), 0.5f * (1 + 2), 0.1);
+}
+
+TEST(StageLight, GlassShowsWhatIsBehindItInItsColour) {
+  SmallStage s;
+  s.stage.set_environment(kDark);
+  s.stage.set_sun({.intensity = 0, .shadows = false});
+  s.add(make_box({4, 4, 0.1f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {1, 1, 1}}, {0, 0, -1});
+  s.add(make_box({2, 2, 0.05f}), {.color = {0.2f, 0.9f, 0.5f, 1}, .roughness = 0.05f, .transmission = 1},
+        {0, 0, 1});
+  const Vector4f seen = center_pixel(s.draw());
+  const float fresnel = 0.96f;
+  EXPECT_NEAR(seen.x(), 0.2f * fresnel, 0.02);
+  EXPECT_NEAR(seen.y(), 0.9f * fresnel, 0.03);
+  EXPECT_NEAR(seen.z(), 0.5f * fresnel, 0.02);
+}
+
+TEST(StageLight, OfAFireFallsOnWhatIsAround) {
+  Floor floor;
+  const PointsHandle flames = floor.s.stage.add_points({.style = PointStyle::fire});
+  std::vector<Point> points;
+  for (uint64_t k = 0; k < 20; ++k)
+    points.push_back({.position = {0, 0.5f + 0.02f * static_cast<float>(k), 0},
+                      .velocity = {0, 1, 0},
+                      .radius = 0.15f,
+                      .color = {6, 3, 1, 1},
+                      .id = k});
+  EXPECT_EQ(floor.at(1.5f, 0), 0);
+  floor.s.stage.set_points(flames, points);
+  const float near = floor.at(1.5f, 0), far = floor.at(3, 0);
+  EXPECT_GT(near, 0.01f);
+  EXPECT_GT(near, 3 * far);
+}
+
+TEST(ToneMap, MeteringBringsEveryEvenPictureToTheSameGrey) {
+  for (const float light : {0.05f, 0.5f, 4.0f}) {
+    HdrImage picture{30, 20, {}};
+    for (int k = 0; k < 600; ++k)
+      picture.rgba.insert(picture.rgba.end(), {2 * light, 2 * light, 2 * light, 2});
+    EXPECT_NEAR(metered_exposure(picture, 0.5f) * light, 0.5f, 1e-3f);
+  }
+}
+
+}  // namespace
+}  // namespace offstage::render
