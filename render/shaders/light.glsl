@@ -37,7 +37,8 @@ float shadow_map_visibility(vec3 position, vec3 normal) {
   slope *= -min(1.0, 4.0 * sqrt(frame.penumbra.z) * steep);
   float beside = min(1.0 / steep, 4.0 * sqrt(frame.penumbra.z)) * frame.shadow.z;
   float search = min(frame.penumbra.x * p.z, frame.penumbra.y) + 1.0, sum = 0.0, blockers = 0.0;
-  for (int k = 0; k < 4; ++k) {
+  int rounds = g.z < 0.0 ? 4 : 0;  // none where a surface looks away from the sun
+  for (int k = 0; k < rounds; ++k) {
     vec2 offset = a * (0.7 * search * frame.shadow.z);
     vec4 depth = textureGather(shadow_depth, p.xy + offset);
     vec4 blocks = vec4(lessThan(depth, vec4(min(p.z + dot(slope, offset) - beside, 1.0))));

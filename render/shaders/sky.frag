@@ -4,7 +4,8 @@ layout(location = 0) out vec4 color;
 // Fair weather clouds on a level far up: how thick they are there, from 0.
 float cloud_thickness(vec2 p) {
   float sum = 0.0, amplitude = 0.5;
-  for (int octave = 0; octave < 5; ++octave) {
+  int octaves = frame.air.z > 0.0 ? 5 : 0;  // not a constant: the loop must not be unrolled, for compilation takes time
+  for (int octave = 0; octave < octaves; ++octave) {
     sum += amplitude * noise(p, uint(40 + octave)).x;
     p = mat2(1.6, 1.2, -1.2, 1.6) * p + 7.1;
     amplitude *= 0.5;
