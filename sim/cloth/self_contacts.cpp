@@ -12,6 +12,8 @@ namespace {
 /// Pairs are sought this much farther than they touch, in thicknesses; half of it is how far points may stray
 /// from the ways foreseen.
 constexpr Real kMargin = 1;
+/// Up to this part of all points are sought again alone.
+constexpr std::size_t kFew = 3;
 /// What is near at rest in the cloth itself, is not pushed farther apart than this share of it.
 constexpr Real kRestShare = 0.8;
 /// Share of an overlap that is taken back per sub-step, so that layers do not fly apart.
@@ -103,7 +105,7 @@ void SelfContacts::add(const ClothPoints& points, std::span<const Vec4> velocity
           fastest2, (velocity[p[static_cast<std::size_t>(i)]] - velocity[p[static_cast<std::size_t>(j)]])
                         .squaredNorm());
   Real thickness = (points.thickness[p[0]] + points.thickness[p[3]]) / 2;
-  const Real reach = thickness * (1 + kMargin) + std::sqrt(fastest2) * horizon;
+  const Real reach = thickness * (1 + 1.5 * kMargin) + std::sqrt(fastest2) * horizon;
   if (boxes_apart(points.start, p, edges, reach)) return;
   const Real distance = closest(points.start, p, edges).apart.norm();
   // What lies on each other, as the sides of a fresh tear, has no side yet.
@@ -112,6 +114,7 @@ void SelfContacts::add(const ClothPoints& points, std::span<const Vec4> velocity
   if (points.cloth[p[0]] == points.cloth[p[3]])
     thickness = std::min(thickness, kRestShare * closest(points.rest, p, edges).apart.norm());
   pairs_.push_back({p, edges, thickness, distance, 0});
+  pairs_.back().travel = travelled(pairs_.back());
 }
 
 void SelfContacts::search(const ClothPoints& points, std::span<const Vec4> velocity, Real horizon) {
@@ -150,11 +153,64 @@ bool SelfContacts::strayed(const ClothPoints& points, Real dt) const {
   return false;
 }
 
-/// From where all were at the start of the sub-step, at the velocities they now have in it.
+/// From where all were at the start of the sub-step, at the velocities they now have in it. While the horizon
+/// lasts and few strayed, only the pairs of those are sought again, over what is left of it.
 void SelfContacts::search_again(const ClothPoints& points, Real dt, Real horizon) {
+  std::vector<uint8_t> strays(points.size(), 0);
+  std::size_t count = 0;
+  const bool expired = since_ + dt > horizon_ * (1 + 1e-9);
   std::vector<Vec4> velocity(points.size());
-  for (std::size_t i = 0; i < velocity.size(); ++i) velocity[i] = (points.position[i] - points.start[i]) / dt;
-  search(points, velocity, std::max(horizon, dt));
+  for (std::size_t i = 0; i < velocity.size(); ++i) {
+    velocity[i] = (points.position[i] - points.start[i]) / dt;
+    if (expired) continue;
+    const Real far = kMargin / 4 * points.thickness[i];
+    const Vec4 off = points.position[i] - foreseen_from_[i] - (since_ + dt) * foreseen_velocity_[i];
+    strays[i] = off.squaredNorm() > far * far;
+    count += strays[i];
+  }
+  if (expired || count > points.size() / kFew) return search(points, velocity, std::max(horizon, dt));
+
+  Vec4 drift = Vec4::Zero();
+  std::vector<Vec4> from(points.size()), to(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (strays[i]) {
+      foreseen_velocity_[i] = velocity[i];
+      foreseen_from_[i] = points.start[i] - since_ * velocity[i];
+    }
+    drift += foreseen_velocity_[i] / static_cast<Real>(points.size());
+  }
+  const Real left = horizon_ - since_;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    from[i] = foreseen_from_[i] + since_ * foreseen_velocity_[i];
+    to[i] = from[i] + left * (foreseen_velocity_[i] - drift);
+  }
+  tree_.fit(from, to, margin_);
+  const auto is_stray = [&](const auto& p) {
+    return std::ranges::any_of(p, [&](uint32_t i) { return strays[i] != 0; });
+  };
+  std::erase_if(pairs_, [&](const Pair& pair) { return is_stray(pair.points); });
+  const auto seek = [&](const std::array<uint32_t, 4>& p, bool edges) {
+    if (is_stray(p)) add(points, foreseen_velocity_, p, edges, left);
+  };
+  for (uint32_t ta = 0; ta < triangles_.size(); ++ta) {
+    const Triangle& a = triangles_[ta];
+    if (!is_stray(a)) continue;
+    Aabb box;
+    for (uint32_t i : a)
+      for (const Vec4& p : {from[i], to[i]})
+        box.extend(Vec3(p.head<3>().array() - margin_[i])).extend(Vec3(p.head<3>().array() + margin_[i]));
+    tree_.overlapping(box, [&](uint32_t tb) {
+      const Triangle& b = triangles_[tb];
+      if (tb == ta || (tb < ta && is_stray(b))) return;  // had from its side
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (owns_point_[ta][k]) seek({a[k], b[0], b[1], b[2]}, false);
+        if (owns_point_[tb][k]) seek({b[k], a[0], a[1], a[2]}, false);
+        if (!owns_edge_[ta][k]) continue;
+        for (std::size_t m = 0; m < 3; ++m)
+          if (owns_edge_[tb][m]) seek({a[k], a[(k + 1) % 3], b[m], b[(m + 1) % 3]}, true);
+      }
+    });
+  }
 }
 
 SelfContacts::Contact SelfContacts::look(const ClothPoints& points, uint32_t k) {

@@ -1,10 +1,12 @@
 /// A square of cotton of 4 m dropped on a sphere of radius 1 on the ground, 72 frames at 24 per second: CPU
 /// time per frame, and how well it did: strain, depth in bodies, crossings of cloth. bench_cloth [CELLS
-/// SELF_COLLISION [SUBSTEPS_PER_SECOND]]; without arguments the usual cases.
+/// SELF_COLLISION [SUBSTEPS_PER_SECOND]] or peer NODES
+/// [SUBSTEPS_PER_SECOND]; without arguments the usual cases.
 
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
+#include <string>
 
 #include "effects/cloth.h"
 #include "sim/world.h"
@@ -53,9 +55,45 @@ void run(uint32_t cells, bool self_collision, Real rate) {
       cells, cells, self_collision, 1e3 * total / kFrames, 1e3 * worst, mean, strain, depth, crossed);
 }
 
+/// The peers' scene `cloth N` (PEERS.md): N x N nodes of 1 kg in all, hung by two corners over a sphere, 4 s
+/// in steps of 1/240 s, without air and self-collision.
+void run_peer(uint32_t nodes, Real rate) {
+  effects::Fabric fabric = effects::find_fabric("cotton")->fabric;
+  fabric.areal_density = 0.25;
+  fabric.thickness = 0.02;
+  fabric.friction = 0.5;
+  const uint32_t cells = nodes - 1;
+  ClothDef def = effects::grid_cloth({2, 2, cells, cells}, {Vec3(0, 2, 0)}, fabric);
+  def.air.density = 0;
+  def.self_collision = false;
+  if (rate > 0) def.substep = 1 / rate;
+  for (uint32_t corner : {0u, cells})
+    def.pins.push_back({.vertex = corner, .position = def.vertices[corner]});
+  World world;
+  world.add_body({.shape = Sphere{0.4}, .motion = MotionType::fixed, .pose = {{0, 1.2, 0}}, .friction = 0.5});
+  const ClothHandle cloth = world.add_cloth(def);
+  constexpr int kSteps = 960;
+  const double before = cpu_seconds();
+  Real greatest = 0, depth = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    const StepReport report = world.step(1.0 / 240);
+    greatest = std::max(greatest, report.cloth_strain);
+    depth = std::max(depth, report.cloth_penetration);
+  }
+  const ClothReport& end = world.cloth_report(cloth);
+  std::printf(
+      "cloth %u: %.3f CPU ms a step; at the end strain mean %.5f greatest %.4f (ever %.4f); in bodies %.2g "
+      "m\n",
+      nodes, 1e3 * (cpu_seconds() - before) / kSteps, end.mean_strain, end.max_strain, greatest, depth);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc >= 3 && std::string(argv[1]) == "peer") {
+    run_peer(static_cast<uint32_t>(std::atoi(argv[2])), argc > 3 ? std::atof(argv[3]) : 0);
+    return 0;
+  }
   if (argc >= 3) {
     run(static_cast<uint32_t>(std::atoi(argv[1])), std::atoi(argv[2]) != 0,
         argc > 3 ? std::atof(argv[3]) : 0);
