@@ -11,10 +11,13 @@
 
 namespace offstage::sim {
 
+class Articulation;
+
 /// Bodies that depend on each other, in slot order, and the pairs that join them or touch what does not move.
 struct Island {
   std::vector<Body*> bodies;
   std::vector<ContactPair*> pairs;
+  std::vector<Articulation*> articulations;
 };
 
 class ContactGraph {

@@ -48,7 +48,7 @@ void CoupledSystem::resolve(const WorldState& world, std::span<const ForceDef* c
 }
 
 void CoupledSystem::gather(WorldState& world, std::span<Body* const> bodies, bool all_systems) {
-  if (world.springs.empty() && !world.has_pair_forces()) {
+  if (world.springs.empty() && world.articulations.empty() && !world.has_pair_forces()) {
     lone_.assign(bodies.begin(), bodies.end());
     return;
   }
@@ -78,8 +78,18 @@ void CoupledSystem::gather(WorldState& world, std::span<Body* const> bodies, boo
     const std::size_t c = graph.component(spring);
     if (c != SpringGraph::kNone && has_network(c)) network(c).springs.push_back(&spring);
   });
+  for (const auto& articulation : world.articulations) {
+    const std::size_t c = graph.component(*articulation);
+    if (has_network(c)) network(c).articulations.push_back(articulation.get());
+  }
   networks_.reserve(networks.size());
   for (NetworkMembers& members : networks) networks_.emplace_back(world, std::move(members), forces_);
+}
+
+JointTally CoupledSystem::joint_tally() const {
+  JointTally sum;
+  for (const SpringNetwork& n : networks_) sum.add(n.joint_tally());
+  return sum;
 }
 
 bool CoupledSystem::holds(const ParticleSystem& system) const {

@@ -36,6 +36,8 @@ class CoupledSystem {
 
   /// What all steps so far took.
   const IntegratorReport& report() const { return report_; }
+  /// What was left of joints, of all steps so far.
+  JointTally joint_tally() const;
 
  private:
   /// What changes when a body flies.

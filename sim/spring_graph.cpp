@@ -27,6 +27,8 @@ template <class F>
 void SpringGraph::for_each_link(F&& f) const {
   world_.springs.for_each(
       [&](SpringHandle, const Spring& spring) { f(object(spring.def.a), object(spring.def.b)); });
+  for (const auto& articulation : world_.articulations)
+    for (const Body* body : articulation->bodies()) f(articulation->bodies().front(), body);
   world_.force_defs.for_each([&](ForceHandle, const ForceDef& force) {
     if (!force.is_pairwise()) return;
     const void* first = nullptr;
@@ -41,6 +43,10 @@ void SpringGraph::for_each_link(F&& f) const {
 std::size_t SpringGraph::component(const Spring& spring) const {
   const std::size_t a = find(object(spring.def.a));
   return a != kNone ? a : find(object(spring.def.b));
+}
+
+std::size_t SpringGraph::component(const Articulation& articulation) const {
+  return find(articulation.bodies().front());
 }
 
 /// What of a spring's end moves with it.

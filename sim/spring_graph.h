@@ -1,5 +1,5 @@
 #pragma once
-/// What springs and forces between particles join (physics E7): dynamic bodies and particle systems that are
+/// What springs, joints and forces between particles join (physics E7): dynamic bodies and particle systems that are
 /// connected through them, however far, form a component. A particle system counts as one object.
 
 #include <span>
@@ -23,6 +23,7 @@ class SpringGraph {
   std::size_t component(const ParticleSystem& system) const { return find(&system); }
   /// That of its ends; kNone if neither can be moved.
   std::size_t component(const Spring& spring) const;
+  std::size_t component(const Articulation& articulation) const;
 
  private:
   const void* object(const Attachment& a) const;

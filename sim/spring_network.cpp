@@ -1,15 +1,26 @@
 #include "sim/spring_network.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace offstage::sim {
+namespace {
+
+/// Pieces in which the motion of what joints hold is integrated: of its turning, and of the phase of its fastest
+/// swinging [rad]; and the most of them.
+constexpr Real kTurn = 0.12, kSwing = 1, kMostPieces = 64;
+
+}  // namespace
 
 SpringNetwork::SpringNetwork(const WorldState& world, NetworkMembers members, const BodyForces& forces)
     : forces_(forces), bodies_(std::move(members.bodies)) {
   for (ParticleSystem* system : members.systems) add_group(world, *system);
   x_.resize(particle_x(particles_));
   p_.resize(particle_p(particles_));
-  add_springs(world, members.springs);
+  BodyIndex index;
+  for (std::size_t i = 0; i < bodies_.size(); ++i) index[bodies_[i]] = i;
+  add_springs(world, members.springs, index);
+  for (Articulation* a : members.articulations) add_articulation(*a, index);
   add_pair_forces(world);
 }
 
@@ -46,7 +57,8 @@ void SpringNetwork::begin_substep() const {
   for (const Group& g : groups_) g.system->begin_coupled();
 }
 
-void SpringNetwork::add_springs(const WorldState& world, std::span<const Spring* const> springs) {
+void SpringNetwork::add_springs(const WorldState& world, std::span<const Spring* const> springs,
+                                const BodyIndex& index) {
   // A spring at a newborn waits until that has lived up to the end of the sub-step.
   const auto ready = [&](const Attachment& a) {
     const auto* p = std::get_if<ParticlePoint>(&a);
@@ -55,12 +67,16 @@ void SpringNetwork::add_springs(const WorldState& world, std::span<const Spring*
     const auto i = system.find(p->id);
     return i && system.whole_step(*i);
   };
-  BodyIndex index;
-  for (std::size_t i = 0; i < bodies_.size(); ++i) index[bodies_[i]] = i;
   for (const Spring* spring : springs)
     if (const SpringDef& def = spring->def; ready(def.a) && ready(def.b))
       springs_.push_back({resolve(world, def.a, index), resolve(world, def.b, index), def.stiffness,
                           def.damping, spring->rest_length});
+}
+
+void SpringNetwork::add_articulation(Articulation& articulation, const BodyIndex& index) {
+  Jointed jointed{&articulation, {}};
+  for (const Body* body : articulation.bodies()) jointed.links.push_back(index.at(body));
+  articulations_.push_back(std::move(jointed));
 }
 
 SpringNetwork::End SpringNetwork::resolve(const WorldState& world, const Attachment& a,
@@ -149,6 +165,41 @@ void SpringNetwork::force(Real t, std::span<const Real> x, std::span<const Real>
     apply(s.a, -f.size * f.along, x, dp);
     apply(s.b, f.size * f.along, x, dp);
   }
+  for (const Jointed& j : articulations_) add_joint_forces(j, t, x, p, dp);
+}
+
+void SpringNetwork::add_joint_forces(const Jointed& jointed, Real t, std::span<const Real> x,
+                                     std::span<const Real> p, std::span<Real> dp) const {
+  const std::size_t count = jointed.links.size();
+  std::vector<LinkMotion> motion(count);
+  std::vector<LinkMobility> mobility(count);
+  std::vector<Vec6> forces(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t i = jointed.links[k];
+    const RigidStage s = stage(i, x, p);
+    const Mat3 axes = s.motion.orientation.toRotationMatrix();
+    motion[k] = {s.motion.position, axes, s.motion.velocity, s.motion.angular_velocity};
+    mobility[k] = {1 / s.body.mass, axes * s.body.inverse_inertia * axes.transpose()};
+    forces[k] << vec3(dp, kBodyP * i), vec3(dp, kBodyP * i + 3);
+  }
+  jointed.articulation->add_forces(t, motion, mobility, forces);
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t at = kBodyP * jointed.links[k];
+    vec3(dp, at) = forces[k].head<3>();
+    vec3(dp, at + 3) = forces[k].tail<3>();
+  }
+}
+
+/// No integrator of a fixed step follows what turns by much more in it, or swings: links that are pulled tight
+/// are the masses of a string.
+Real SpringNetwork::joint_pieces(Real h) const {
+  Real fastest = 0, tightest = 0;
+  for (const Jointed& j : articulations_) {
+    for (const Body* body : j.articulation->bodies())
+      fastest = std::max(fastest, body->rigid.angular_velocity().norm());
+    tightest = std::max(tightest, j.articulation->greatest_frequency());
+  }
+  return std::clamp(std::ceil(std::max(fastest / kTurn, tightest / kSwing) * h), 1.0, kMostPieces);
 }
 
 void SpringNetwork::load(std::span<Real> x, std::span<Real> p) const {
@@ -172,6 +223,7 @@ void SpringNetwork::store(std::span<const Real> x, std::span<const Real> p) {
 }
 
 void SpringNetwork::step(const Integrator& integrator, Real t, Real h, IntegratorWorkspace& work) {
+  for (const Jointed& j : articulations_) j.articulation->pass_on_blows(t, joint_tally_);
   load(x_, p_);
   // The most careful member leads; without bodies there is none to remember.
   work.next_step = 0;
@@ -179,8 +231,18 @@ void SpringNetwork::step(const Integrator& integrator, Real t, Real h, Integrato
     if (const Real next = body->rigid.next_step; next > 0)
       work.next_step = work.next_step > 0 ? std::min(work.next_step, next) : next;
   const bool particles_only = bodies_.empty() && springs_.empty();
-  (particles_only ? sim::integrator(groups_.front().system->def.integrator) : integrator)
-      .step(*this, t, h, x_, p_, work);
+  const Integrator& chosen =
+      particles_only ? sim::integrator(groups_.front().system->def.integrator) : integrator;
+  const Real pieces = joint_pieces(h);
+  for (Real i = 0; i < pieces; ++i) {
+    const Real duration = h / pieces, begin = t + i * duration;
+    for (const Jointed& j : articulations_) j.articulation->begin_motion(begin, duration);
+    chosen.step(*this, begin, duration, x_, p_, work);
+    if (articulations_.empty()) break;
+    store(x_, p_);
+    for (const Jointed& j : articulations_) j.articulation->settle(begin + duration, joint_tally_);
+    load(x_, p_);
+  }
   for (Body* body : bodies_) body->rigid.next_step = work.next_step;
   store(x_, p_);
 }

@@ -1,6 +1,6 @@
 #pragma once
-/// Bodies and particles that springs and forces between particles join, as one dynamic system (physics R1,
-/// R2, P2).
+/// Bodies and particles that springs, joints and forces between particles join, as one dynamic system (physics
+/// R1, R2, A1, P2).
 ///
 /// Layout: per body x = [position 3, quaternion x y z w], p = [L 3, H 3]; then per particle x = position, p =
 /// velocity.
@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "sim/articulation/articulation.h"
 #include "sim/dynamics/free_body.h"
 #include "sim/dynamics/pair_forces.h"
 #include "sim/world_impl.h"
@@ -19,6 +20,7 @@ struct NetworkMembers {
   std::vector<Body*> bodies;
   std::vector<ParticleSystem*> systems;
   std::vector<const Spring*> springs;
+  std::vector<Articulation*> articulations;
 };
 
 class SpringNetwork final : public DynamicSystem {
@@ -34,6 +36,8 @@ class SpringNetwork final : public DynamicSystem {
   /// Advances the members from t to t + h. Where only forces between particles join them, the integrator is
   /// that of the first system.
   void step(const Integrator& integrator, Real t, Real h, IntegratorWorkspace& work);
+
+  const JointTally& joint_tally() const { return joint_tally_; }
 
   /// Keeps the state, and takes the members back to the one kept last.
   void save();
@@ -69,6 +73,11 @@ class SpringNetwork final : public DynamicSystem {
 
     bool is_moved() const { return kind == Kind::dynamic || kind == Kind::particle; }
   };
+  /// An articulation, whose links are these of the bodies.
+  struct Jointed {
+    Articulation* articulation;
+    std::vector<std::size_t> links;
+  };
   struct PointMotion {
     Vec3 position, velocity;
   };
@@ -91,9 +100,13 @@ class SpringNetwork final : public DynamicSystem {
   RigidStage stage(std::size_t body, std::span<const Real> x, std::span<const Real> p) const {
     return {bodies_[body]->rigid, x.subspan(kBodyX * body, kBodyX), p.subspan(kBodyP * body, kBodyP)};
   }
+  void add_articulation(Articulation& articulation, const BodyIndex& index);
+  void add_joint_forces(const Jointed& jointed, Real t, std::span<const Real> x, std::span<const Real> p,
+                        std::span<Real> dp) const;
+  Real joint_pieces(Real h) const;
   void add_group(const WorldState& world, ParticleSystem& system);
   void add_pair_forces(const WorldState& world);
-  void add_springs(const WorldState& world, std::span<const Spring* const> springs);
+  void add_springs(const WorldState& world, std::span<const Spring* const> springs, const BodyIndex& index);
   End resolve(const WorldState& world, const Attachment& a, const BodyIndex& index) const;
   PointMotion motion(const End& end, Real t, std::span<const Real> x, std::span<const Real> p) const;
   Pull pull(const ActiveSpring& spring, Real t, std::span<const Real> x, std::span<const Real> p) const;
@@ -109,6 +122,8 @@ class SpringNetwork final : public DynamicSystem {
   std::vector<Body*> bodies_;
   std::vector<Group> groups_;
   std::vector<ActiveSpring> springs_;
+  std::vector<Jointed> articulations_;
+  JointTally joint_tally_;
   PairForces pair_forces_;
   std::size_t particles_ = 0;
   std::vector<Real> x_, p_, saved_x_, saved_p_, saved_steps_;

@@ -327,6 +327,7 @@ bool World::remove(BodyHandle body) {
   if (!found) return false;
   impl_->let_go(**found);
   impl_->let_go_of_cloths(body);
+  impl_->let_go_of_joints(**found);
   impl_->bodies.erase(body);
   impl_->nudges.erase(body.index);
   if (impl_->broad_phase.contains(body.index)) impl_->broad_phase.remove(body.index);

@@ -14,6 +14,7 @@
 #include <variant>
 #include <vector>
 
+#include "sim/articulation/joint.h"
 #include "sim/cloth/cloth.h"
 #include "sim/contact/collision.h"
 #include "sim/dynamics/force_field.h"
@@ -150,6 +151,10 @@ struct StepReport {
   ContactWork impacts;           ///< of the solver of collisions
   IntegratorReport integration;  ///< of the free motion
 
+  Real joint_error = 0;  ///< greatest that was left of a joint's constraint at the end of a motion [m], [rad]
+  uint64_t joints_unsolved = 0;             ///< times that joints could not be put back together
+  std::vector<JointHandle> joints_broken;  ///< by too great a force, in this step
+
   uint64_t cloth_contacts = 0;  ///< at the end, of all cloths; the others as ClothReport has them
   uint64_t cloth_self_contacts = 0;
   Real cloth_strain = 0;       ///< greatest
@@ -221,14 +226,17 @@ class World {
   BodyHandle add_body(const BodyDef& def);
   ParticleSystemHandle add_particle_system(const ParticleSystemDef& def);
   SpringHandle add_spring(const SpringDef& def);
+  /// Throws std::invalid_argument for bodies of which none is dynamic, and for fields out of range.
+  JointHandle add_joint(const JointDef& def);
   ClothHandle add_cloth(const ClothDef& def);
   ForceHandle add_force(const ForceDef& def);
   /// Of two rules for the same materials the later counts.
   void add_contact_rule(const ContactRule& rule);
 
-  bool remove(BodyHandle body);  ///< springs attached to it go too; false if the handle is stale
+  bool remove(BodyHandle body);  ///< springs and joints at it go too; false if the handle is stale
   bool remove(ParticleSystemHandle system);
   bool remove(SpringHandle spring);
+  bool remove(JointHandle joint);
   bool remove(ClothHandle cloth);
   bool remove(ForceHandle force);
 
@@ -256,6 +264,9 @@ class World {
   /// Motion of a point of a body (world position at its current pose) at a time inside the current sub-step:
   /// exact for kinematic bodies, extrapolated for dynamic ones.
   Motion body_motion(BodyHandle body, Real time) const;
+  JointState joint(JointHandle joint) const;  ///< of one that broke: as it was then
+  const JointDef& joint_def(JointHandle joint) const;
+  void for_each_joint(const std::function<void(JointHandle)>& f) const;
   const ParticleArrays& particles(ParticleSystemHandle system) const;
   const ParticleSystemDef& particle_system_def(ParticleSystemHandle system) const;
   /// What happened to the particles of systems that report it, in the last sub-step; in the order of system

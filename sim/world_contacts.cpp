@@ -100,6 +100,7 @@ void World::Impl::collect_pairs() {
       [&](const Body& a, const Body& b) { return surface_of(a, b); });
   active_pairs.clear();
   graph.for_each([&](ContactPair& pair) {
+    if (are_jointed(pair.a(), pair.b())) return;
     if (pair.a().can_move() || pair.b().can_move()) active_pairs.push_back(&pair);
   });
 }
@@ -179,7 +180,7 @@ std::vector<Body*> World::Impl::wake_touched(Real start, Real h) {
 
 void World::Impl::find_moving_islands() {
   std::vector<std::pair<Body*, Body*>> joined;
-  if (!springs.empty()) {
+  if (!springs.empty() || !articulations.empty()) {
     const SpringGraph connections(*this);
     std::vector<Body*> first(connections.size(), nullptr);
     for (Body* body : awake) {
@@ -192,19 +193,27 @@ void World::Impl::find_moving_islands() {
   std::vector<Island> found = find_islands(awake, active_pairs, joined);
   islands.clear();
   for (Island& island : found) islands.push_back({std::move(island), motions.front().get(), 0});
+  for (const auto& articulation : articulations)
+    if (const Body& first = *articulation->bodies().front(); first.is_awake())
+      islands[first.island].articulations.push_back(articulation.get());
 }
 
-void World::Impl::solve_islands(Real h, StepReport& report) {
+void World::Impl::solve_islands(Real start, Real h, StepReport& report) {
   std::vector<Island*> all;
   for (MovingIsland& island : islands)
-    if (!island.pairs.empty()) all.push_back(&island);
+    if (has_forces(island)) all.push_back(&island);
   patience.begin(all, h);
-  solve(all, h, report);
+  solve(all, h, start + h, report);
 }
 
-/// Contact forces of islands over an interval: each by the solver that suits it.
-void World::Impl::solve(std::span<Island* const> group, Real duration, StepReport& report) {
-  const ContactInterval interval{duration, kTouching};
+/// What contacts have added to the motion is not quite what joints allow.
+void World::Impl::settle_joints(const Island& island, Real end) {
+  for (Articulation* articulation : island.articulations) articulation->settle(end, joint_tally);
+}
+
+/// Contact forces of islands over an interval, to a time of the world: each by the solver that suits it.
+void World::Impl::solve(std::span<Island* const> group, Real duration, Real end, StepReport& report) {
+  const ContactInterval interval{duration, end, kTouching};
   std::vector<const Island*> fast;
   std::vector<std::pair<Island*, SolverChoice*>> exact;
   for (Island* island : group) {
@@ -239,8 +248,10 @@ void World::Impl::solve(std::span<Island* const> group, Real duration, StepRepor
     if (!solved[i]) fast.push_back(island);
   }
   if (!fast.empty()) report.fast.add(fast_contacts.solve(fast, interval));
-  for (Island* island : group)
+  for (Island* island : group) {
+    settle_joints(*island, end);
     for (Body* body : island->bodies) body->pose = body->rigid.pose();
+  }
 }
 
 void World::Impl::count_contacts(StepReport& report) const {

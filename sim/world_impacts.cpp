@@ -157,7 +157,7 @@ void World::Impl::bring_to(MovingIsland& island, Real start, Real time, StepRepo
   island.motion->restore(island.bodies);
   move_some(island.bodies, start, island.from, time - island.from);
   Island* const one[] = {&island};
-  if (!island.pairs.empty()) solve(one, time - island.from, report);
+  if (has_forces(island)) solve(one, time - island.from, start + time, report);
   for (Body* body : island.bodies) {
     body->pose = body->rigid.pose();
     body->begin_interval(time);
@@ -172,10 +172,12 @@ void World::Impl::join(uint32_t into, uint32_t other) {
   for (Body* body : y.bodies) body->island = into;
   x.bodies.insert(x.bodies.end(), y.bodies.begin(), y.bodies.end());
   x.pairs.insert(x.pairs.end(), y.pairs.begin(), y.pairs.end());
+  x.articulations.insert(x.articulations.end(), y.articulations.begin(), y.articulations.end());
   std::sort(x.bodies.begin(), x.bodies.end(),
             [](const Body* a, const Body* b) { return a->handle.index < b->handle.index; });
   y.bodies.clear();
   y.pairs.clear();
+  y.articulations.clear();
 }
 
 /// Collides an island's bodies with each other and with what they touch at a time, and moves them on from
@@ -204,7 +206,7 @@ void World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepRe
     }
   }
   MovingIsland& island = islands[number];
-  const CollisionSettings settings{kCluster, def.collision_speed, def.impact,
+  const CollisionSettings settings{start + time, kCluster, def.collision_speed, def.impact,
                                    def.solver == SolverKind::exact};
   report.collisions += resolve_collisions(island, settings, report.impacts);
   for (Body* body : island.bodies) body->rigid = body->start;
@@ -213,7 +215,7 @@ void World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepRe
   for (ContactPair* pair : island.pairs) find_points(*pair, time, h);
   island.motion = &move_some(island.bodies, start, time, h - time);
   Island* const one[] = {&island};
-  if (!island.pairs.empty()) solve(one, h - time, report);
+  if (has_forces(island)) solve(one, h - time, start + h, report);
   find_pairs_again(number, start, h, report);
 }
 
@@ -229,8 +231,11 @@ void World::Impl::find_pairs_again(uint32_t number, Real start, Real h, StepRepo
   const std::vector<Body*> woken = wake_touched(start, h);
   if (woken.empty()) return;
   const auto added = static_cast<uint32_t>(islands.size());
-  islands.push_back({{woken, {}}, motions.back().get(), 0});
+  islands.push_back({{woken, {}, {}}, motions.back().get(), 0});
   for (Body* body : woken) body->island = added;
+  for (const auto& articulation : articulations)
+    if (articulation->bodies().front()->is_awake() && articulation->bodies().front()->island == added)
+      islands[added].articulations.push_back(articulation.get());
   collect_pairs();
   for (ContactPair* pair : active_pairs) {
     if (pair->is_new()) find_points(*pair, std::max(pair->a().from, pair->b().from), h);
@@ -239,7 +244,7 @@ void World::Impl::find_pairs_again(uint32_t number, Real start, Real h, StepRepo
     if (pair->a().is_awake() || pair->b().is_awake()) islands[added].pairs.push_back(pair);
   }
   Island* const one[] = {&islands[added]};
-  if (!islands[added].pairs.empty()) solve(one, h, report);
+  if (has_forces(islands[added])) solve(one, h, start + h, report);
 }
 
 }  // namespace offstage::sim

@@ -8,6 +8,7 @@
 
 #include <oneapi/tbb/task_arena.h>
 
+#include "sim/articulation/articulation.h"
 #include "sim/body.h"
 #include "sim/cloth/cloth_system.h"
 #include "sim/collision/broad_phase.h"
@@ -36,6 +37,8 @@ struct WorldState {
   SlotMap<Spring, SpringTag> springs;
   SlotMap<ForceDef, ForceTag> force_defs;
   SlotMap<std::unique_ptr<Cloth>, ClothTag> cloths;
+  SlotMap<std::unique_ptr<Joint>, JointTag> joints;
+  std::vector<std::unique_ptr<Articulation>> articulations;  // of the joints that hold, as components
 
   /// What acts on each particle of a system alone.
   ParticleForces forces(const ParticleSystem& system) const;
@@ -78,8 +81,9 @@ struct World::Impl : WorldState {
   void collect_pairs();
   std::vector<Body*> wake_touched(Real start, Real h);
   void find_moving_islands();
-  void solve_islands(Real h, StepReport& report);
-  void solve(std::span<Island* const> group, Real duration, StepReport& report);
+  void solve_islands(Real start, Real h, StepReport& report);
+  void solve(std::span<Island* const> group, Real duration, Real end, StepReport& report);
+  void settle_joints(const Island& island, Real end);
   void count_contacts(StepReport& report) const;
 
   // Impacts (world_impacts.cpp)
@@ -106,6 +110,13 @@ struct World::Impl : WorldState {
   void wake_pushed(Real time);
   void put_to_sleep(Real start, Real h);
   void update_lists();
+
+  // Joints (world_joints.cpp)
+  void update_articulations();
+  void break_joints(StepReport& report);
+  void let_go_of_joints(const Body& body);
+  bool is_driven(const Island& island) const;
+  bool are_jointed(const Body& a, const Body& b) const;
 
   // Particles
   void step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report);
@@ -134,7 +145,9 @@ struct World::Impl : WorldState {
   uint64_t born = 0;  // since the last report
 
   // Lists of bodies in slot order, made anew when one was added, removed, fell asleep or woke.
-  bool lists_changed = true, pairs_changed = true;
+  bool lists_changed = true, pairs_changed = true, joints_changed = false;
+  JointTally joint_tally;  // of the sub-step, beside that of the motions
+  std::vector<std::pair<uint32_t, uint32_t>> apart;  // slots of bodies that do not collide, because of a joint
   std::vector<Body*> awake, kinematic;  // dynamic ones; kinematic ones that move
   std::vector<Body*> stepped;           // all that may have moved in this step
   std::map<uint32_t, std::vector<Body*>> sleeping;

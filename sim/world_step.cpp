@@ -66,6 +66,7 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
   ++substeps;
   wake_pushed(start);
   explode(start, end);
+  update_articulations();
   update_lists();
   begin_bodies(end);
   motions.clear();
@@ -82,7 +83,15 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
     serial.execute(bodies_move);
   else
     bodies_move();
-  for (const auto& m : motions) report.integration.add(m->report());
+  for (const auto& m : motions) {
+    report.integration.add(m->report());
+    joint_tally.add(m->joint_tally());
+  }
+  report.joint_error = std::max(report.joint_error, joint_tally.error);
+  report.joints_unsolved += joint_tally.unsolved;
+  joint_tally = {};
+  for (const auto& articulation : articulations) articulation->count_turns(end);
+  break_joints(report);
 
   if (!systems.empty()) {
     update_obstacles(h);
@@ -98,7 +107,7 @@ void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
     do update_pairs(h);
     while (!wake_touched(start, h).empty());
     find_moving_islands();
-    solve_islands(h, report);
+    solve_islands(start, h, report);
     resolve_impacts(start, h, report);
   }
   for (Body* body : awake) keep_within_bounds(*body, report);
@@ -196,7 +205,7 @@ void World::Impl::keep_within_bounds(Body& body, StepReport& report) {
   body.rigid.momentum.setZero();
   body.rigid.angular_momentum.setZero();
   body.type = MotionType::fixed;
-  fixed_changed = lists_changed = true;
+  fixed_changed = lists_changed = joints_changed = true;
   report.bodies_retired.push_back(body.handle);
 }
 

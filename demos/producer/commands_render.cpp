@@ -35,6 +35,9 @@ void report_run(const RunStats& stats, const TalkOptions& talk, const std::strin
   const SimulationTotals& t = stats.totals;
   for (const std::string& body : t.lost_bodies)
     say("warning: the body '{}' left the world (world.bounds) and stays where it left\n", body);
+  for (const std::string& joint : t.broken_joints) say("note: the joint '{}' broke\n", joint);
+  if (t.joints_unsolved)
+    say("warning: joints could not be put back together {} times; use a smaller world.step\n", t.joints_unsolved);
   if (t.retired) say("note: {} particles left the world (world.bounds)\n", t.retired);
   if (t.skipped) say("warning: {} particles were not released: max_alive was reached\n", t.skipped);
   if (t.waiting) say("note: {} particles had to wait for room on their emitter\n", t.waiting);

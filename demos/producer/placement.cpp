@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "effects/random.h"
+#include "producer/articulation_defs.h"
 
 namespace offstage::producer {
 namespace {
@@ -277,6 +278,7 @@ Scene expand(const Scene& scene, std::vector<Problem>& errors, std::vector<Probl
   flat.bodies = expand_all(scene.bodies, scene.world.seed, errors, warnings);
   flat.emitters = expand_all(scene.emitters, scene.world.seed, errors, warnings);
   flat.cloths = expand_all(scene.cloths, scene.world.seed, errors, warnings);
+  expand_joints(scene, flat, errors, warnings);
   for (Force& force : flat.forces)
     std::visit(
         [&](auto& f) {

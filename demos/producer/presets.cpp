@@ -211,7 +211,7 @@ fs::path presets_folder() {
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
   if (!error) places.push_back(program.parent_path().parent_path() / "share/offstage/presets");
   // Where this was compiled, for a program that was not installed.
-  places.push_back(fs::path(__FILE__).parent_path().parent_path().parent_path() / "effects/presets");
+  places.emplace_back(OFFSTAGE_PRESETS_SOURCE);
   for (const fs::path& place : places)
     if (fs::is_directory(place, error)) return place;
   return {};

@@ -306,6 +306,9 @@ void add_contact_figures(const SimulationTotals& t, Json& json) {
   json["collisions"] = t.collisions;
   json["tracebacks"] = t.tracebacks;
   json["cut_short"] = t.cut_short;
+  json["joint_error"] = t.joint_error;
+  json["joints_unsolved"] = t.joints_unsolved;
+  json["broken_joints"] = t.broken_joints;
   json["exact_solver"] = json_of(t.exact);
   json["fast_solver"] = json_of(t.fast);
   json["impact_solver"] = json_of(t.impacts);

@@ -16,6 +16,7 @@
 #include "producer/scene_cloth.h"
 #include "producer/scene_effects.h"
 #include "producer/scene_forces.h"
+#include "producer/scene_joint.h"
 #include "producer/scene_particles.h"
 #include "producer/scene_values.h"
 #include "render/model.h"
@@ -347,6 +348,8 @@ struct Scene {
   std::vector<Emitter> emitters;
   std::vector<Effect> effects;  ///< once a scene is loaded, its emitters and forces are among the others
   std::vector<Spring> springs;
+  std::vector<Joint> joints;
+  std::vector<ArticulationTemplate> articulations;  ///< become bodies and joints with the copies
   std::vector<Cloth> cloths;
   std::vector<Force> forces;
   std::vector<Overlay> overlays;

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "producer/scene_check_cloths.h"
+#include "producer/scene_check_joints.h"
 #include "producer/scene_check_particles.h"
 #include "producer/suggest.h"
 #include "sim/geometry/mass_properties.h"
@@ -69,6 +70,7 @@ class Checker {
     for (const Body& body : scene_.bodies) check_body(body);
     check_particles(scene_, flat_, findings_);
     check_cloths(scene_, flat_, folder_, findings_);
+    check_joints(scene_, flat_, findings_);
     for (const Emitter& emitter : scene_.emitters) check_emitter(emitter);
     for (const Spring& spring : scene_.springs) check_spring(spring);
     for (const Force& force : scene_.forces)
@@ -149,6 +151,7 @@ class Checker {
       check_material_name(spring.where.path + "/material", spring.material);
     for (const Cloth& cloth : scene_.cloths)
       check_material_name(cloth.where.path + "/material", cloth.material);
+    check_materials_of_articulations();
     for (const Material& material : scene_.materials)
       if (!used_materials_.contains(material.name))
         warn(material.where.path, "the material '" + material.name + "' is not used");
@@ -260,6 +263,15 @@ class Checker {
     fail(path + "/index", fmt::format("must be less than {}, the number of particles of '{}', got {}",
                                       group->places.size(), group->name, end.index));
     return {};
+  }
+
+  /// Their bodies are in the flat scene only.
+  void check_materials_of_articulations() {
+    std::set<std::pair<std::string, std::string>> seen;
+    for (const Body& body : flat_.bodies)
+      if (body.where.path.starts_with("/articulations/") && !body.material.empty() &&
+          seen.emplace(body.where.path, body.material).second)
+        check_material_name(body.where.path, body.material);
   }
 
   void check_spring(const Spring& spring) {

@@ -25,7 +25,14 @@ void name_everything(Scene& scene, const std::string& file) {
   name_objects(scene.particles, "particles");
   name_objects(scene.emitters, "emitter");
   name_objects(scene.springs, "spring");
+  name_objects(scene.joints, "joint");
   name_objects(scene.cloths, "cloth");
+  for (std::size_t i = 0; i < scene.articulations.size(); ++i)
+    std::visit(
+        [i](auto& a) {
+          if (a.name.empty()) a.name = "articulation_" + std::to_string(i);
+        },
+        scene.articulations[i]);
   for (std::size_t i = 0; i < scene.forces.size(); ++i)
     if (std::string& name = named(scene.forces[i]).name; name.empty()) name = "force_" + std::to_string(i);
 }

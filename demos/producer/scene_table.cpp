@@ -1,6 +1,7 @@
 #include "producer/scene_table.h"
 
 #include "producer/table_cloth.h"
+#include "producer/table_joint.h"
 #include "producer/table_film.h"
 #include "producer/table_force.h"
 #include "producer/table_overlay.h"
@@ -27,6 +28,8 @@ struct Table<Scene> {
         {"emitters", &T::emitters, "sources of particles"},
         {"effects", &T::effects, "presets of emitters and forces, at some place"},
         {"springs", &T::springs, "damped springs"},
+        {"joints", &T::joints, "what holds bodies together"},
+        {"articulations", &T::articulations, "ready-made bodies with their joints"},
         {"cloths", &T::cloths, "cloths"},
         {"forces", &T::forces, "fields, moving air, hands, explosions, forces between particles"},
         {"overlays", &T::overlays, "what shows how the simulation sees the scene"},

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "producer/articulation_defs.h"
 #include "producer/cloth_defs.h"
 #include "producer/emitter_defs.h"
 #include "producer/force_defs.h"
@@ -79,6 +80,8 @@ void SimulationTotals::add(const sim::StepReport& report) {
   collisions += report.collisions;
   tracebacks += report.tracebacks;
   cut_short += report.cut_short;
+  joint_error = std::max(joint_error, report.joint_error);
+  joints_unsolved += report.joints_unsolved;
   cloth_strain = std::max(cloth_strain, report.cloth_strain);
   cloth_penetration = std::max(cloth_penetration, report.cloth_penetration);
   cloth_contacts = report.cloth_contacts;
@@ -117,6 +120,7 @@ Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
     });
   add_particle_groups(scene);
   add_springs(scene);
+  add_joints(scene);
   add_cloths(scene, models);
   sources_.emplace(scene, models, world_, [this](const std::string& name) { return body_named(name); });
   add_forces(scene);
@@ -215,6 +219,15 @@ void Simulation::add_springs(const Scene& scene) {
   }
 }
 
+void Simulation::add_joints(const Scene& scene) {
+  for (const Joint& joint : scene.joints) {
+    sim::JointDef def = joint_def(joint);
+    def.a = body_named(joint.a);
+    def.b = body_named(joint.b);
+    at_place(joint.where, [&] { world_.add_joint(def); });
+  }
+}
+
 void Simulation::add_cloths(const Scene& scene, const ModelLibrary& models) {
   for (const Cloth& cloth : scene.cloths) {
     const auto* mesh = std::get_if<MeshFile>(&cloth.shape);
@@ -273,6 +286,8 @@ void Simulation::step(double sampling_time) {
   const ParticleSources::Counts counts = sources_->counts();
   totals_.waiting = counts.waiting;
   totals_.skipped = counts.skipped;
+  for (const sim::JointHandle broken : report.joints_broken)
+    totals_.broken_joints.push_back(world_.joint_def(broken).name);
   for (const sim::BodyHandle lost : report.bodies_retired)
     totals_.lost_bodies.push_back(world_.body_def(lost).name);
   for (const sim::MovedBody& moved : world_.moved()) moving_poses_[slot_of_.at(moved.body)] = moved.pose;

@@ -35,6 +35,9 @@ struct SimulationTotals {
   uint64_t substeps = 0, born = 0, expired = 0, retired = 0, ejected = 0, removed = 0,
            particle_collisions = 0, truncated = 0;
   uint64_t waiting = 0, skipped = 0;     ///< of the emitters
+  std::vector<std::string> broken_joints;  ///< in the order in which they broke
+  sim::Real joint_error = 0;               ///< greatest that was left of a constraint [m], [rad]
+  uint64_t joints_unsolved = 0;            ///< times that joints could not be put back together
   std::vector<std::string> lost_bodies;  ///< left the world's bounds and were frozen there
 
   uint32_t bodies_awake = 0, bodies_asleep = 0, islands = 0;  ///< at the end
@@ -102,6 +105,7 @@ class Simulation {
   sim::MeshHandle add_mesh(const MeshFile& file, const ModelLibrary& models);
   void add_particle_groups(const Scene& scene);
   void add_springs(const Scene& scene);
+  void add_joints(const Scene& scene);
   void add_cloths(const Scene& scene, const ModelLibrary& models);
   void add_forces(const Scene& scene);
   sim::BodyHandle body_named(const std::string& name) const;

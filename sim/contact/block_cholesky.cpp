@@ -10,23 +10,24 @@ namespace offstage::sim {
 namespace {
 
 /// The inverse of the triangle of a block's Cholesky factor; false if the block is not positive definite.
-bool invert_factor(const Mat6& block, Mat6& inverse) {
-  Mat6 L = Mat6::Zero();
-  for (int j = 0; j < 6; ++j) {
+template <int N>
+bool invert_factor(const Eigen::Matrix<Real, N, N>& block, Eigen::Matrix<Real, N, N>& inverse) {
+  Eigen::Matrix<Real, N, N> L = Eigen::Matrix<Real, N, N>::Zero();
+  for (int j = 0; j < N; ++j) {
     Real d = block(j, j);
     for (int k = 0; k < j; ++k) d -= L(j, k) * L(j, k);
     if (!(d > 0) || !std::isfinite(d)) return false;
     L(j, j) = std::sqrt(d);
-    for (int i = j + 1; i < 6; ++i) {
+    for (int i = j + 1; i < N; ++i) {
       Real s = block(i, j);
       for (int k = 0; k < j; ++k) s -= L(i, k) * L(j, k);
       L(i, j) = s / L(j, j);
     }
   }
   inverse.setZero();
-  for (int j = 0; j < 6; ++j) {
+  for (int j = 0; j < N; ++j) {
     inverse(j, j) = 1 / L(j, j);
-    for (int i = j + 1; i < 6; ++i) {
+    for (int i = j + 1; i < N; ++i) {
       Real s = 0;
       for (int k = j; k < i; ++k) s -= L(i, k) * inverse(k, j);
       inverse(i, j) = s / L(i, i);
@@ -37,10 +38,19 @@ bool invert_factor(const Mat6& block, Mat6& inverse) {
 
 }  // namespace
 
-void BlockCholesky::analyze(uint32_t rows, std::span<const std::pair<uint32_t, uint32_t>> pairs) {
-  if (rows == order_.size() && std::equal(pairs.begin(), pairs.end(), pairs_.begin(), pairs_.end())) return;
+template <int N>
+void BlockCholesky<N>::analyze(uint32_t rows, std::span<const std::pair<uint32_t, uint32_t>> pairs,
+                               std::span<const BlockRowKind> kinds) {
+  if (rows == order_.size() && std::equal(pairs.begin(), pairs.end(), pairs_.begin(), pairs_.end()) &&
+      std::equal(kinds.begin(), kinds.end(), kinds_.begin(), kinds_.end()))
+    return;
   pairs_.assign(pairs.begin(), pairs.end());
+  kinds_.assign(kinds.begin(), kinds.end());
   order(rows);
+  if (!kinds_.empty()) put_empty_rows_after_neighbours();
+  sign_.assign(rows, 1);
+  for (uint32_t k = 0; k < rows; ++k)
+    if (!kinds_.empty() && kinds_[order_[k]].is_negative) sign_[k] = -1;
   find_columns(rows);
   pair_at_.resize(pairs_.size());
   for (std::size_t e = 0; e < pairs_.size(); ++e) {
@@ -52,7 +62,8 @@ void BlockCholesky::analyze(uint32_t rows, std::span<const std::pair<uint32_t, u
   below_.resize(row_.size());
 }
 
-void BlockCholesky::order(uint32_t rows) {
+template <int N>
+void BlockCholesky<N>::order(uint32_t rows) {
   const auto n = static_cast<Eigen::Index>(rows);
   std::vector<Eigen::Triplet<Real, int>> entries;
   for (uint32_t i = 0; i < rows; ++i) entries.emplace_back(static_cast<int>(i), static_cast<int>(i), 1);
@@ -72,8 +83,22 @@ void BlockCholesky::order(uint32_t rows) {
   }
 }
 
+/// To right after the last of them: after the first the pivot may be zero still, if that one is held by others.
+template <int N>
+void BlockCholesky<N>::put_empty_rows_after_neighbours() {
+  std::vector<uint32_t> last = place_;
+  for (const auto& [i, j] : pairs_) {
+    if (kinds_[i].is_empty) last[i] = std::max(last[i], place_[j]);
+    if (kinds_[j].is_empty) last[j] = std::max(last[j], place_[i]);
+  }
+  const auto key = [&](uint32_t row) { return std::pair(last[row], kinds_[row].is_empty); };
+  std::stable_sort(order_.begin(), order_.end(), [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
+  for (uint32_t k = 0; k < order_.size(); ++k) place_[order_[k]] = k;
+}
+
 /// The columns of the factor: those of the matrix, and all of a column passed on to its first row.
-void BlockCholesky::find_columns(uint32_t rows) {
+template <int N>
+void BlockCholesky<N>::find_columns(uint32_t rows) {
   std::vector<std::vector<uint32_t>> columns(rows);
   for (const auto& pair : pairs_) {
     const auto [column, row] = std::minmax(place_[pair.first], place_[pair.second]);
@@ -96,10 +121,11 @@ void BlockCholesky::find_columns(uint32_t rows) {
   }
 }
 
-bool BlockCholesky::factorize(std::span<const Mat6> diagonal, std::span<const Mat6> pairs) {
+template <int N>
+bool BlockCholesky<N>::factorize(std::span<const Block> diagonal, std::span<const Block> pairs) {
   const auto n = static_cast<uint32_t>(order_.size());
   for (uint32_t k = 0; k < n; ++k) diagonal_[k] = diagonal[order_[k]];
-  std::fill(below_.begin(), below_.end(), Mat6::Zero());
+  std::fill(below_.begin(), below_.end(), Block::Zero());
   for (std::size_t e = 0; e < pairs_.size(); ++e) {
     // The lower triangle wants the block whose row is eliminated later.
     if (place_[pairs_[e].first] < place_[pairs_[e].second])
@@ -107,38 +133,44 @@ bool BlockCholesky::factorize(std::span<const Mat6> diagonal, std::span<const Ma
     else
       below_[pair_at_[e]] = pairs[e];
   }
-  Mat6 inverse;
+  Block inverse;
   for (uint32_t j = 0; j < n; ++j) {
-    if (!invert_factor(diagonal_[j], inverse)) return false;
+    if (!invert_factor<N>(sign_[j] < 0 ? Block(-diagonal_[j]) : diagonal_[j], inverse)) return false;
     diagonal_[j] = inverse;
     const uint32_t first = begin_[j], last = begin_[j + 1];
     for (uint32_t p = first; p < last; ++p) below_[p] = (below_[p] * inverse.transpose()).eval();
+    // What is kept under the diagonal is L S, from which the rows of L have the sign once more.
     for (uint32_t q = first; q < last; ++q) {
       const uint32_t column = row_[q];
-      diagonal_[column].noalias() -= below_[q] * below_[q].transpose();
+      const Block row = sign_[j] * below_[q];
+      diagonal_[column].noalias() -= below_[q] * row.transpose();
       uint32_t at = begin_[column];
       for (uint32_t p = q + 1; p < last; ++p) {
         while (row_[at] != row_[p]) ++at;
-        below_[at].noalias() -= below_[p] * below_[q].transpose();
+        below_[at].noalias() -= below_[p] * row.transpose();
       }
     }
   }
   return true;
 }
 
-void BlockCholesky::solve(std::span<Vec6> x) const {
+template <int N>
+void BlockCholesky<N>::solve(std::span<Vector> x) const {
   const auto n = static_cast<uint32_t>(order_.size());
   for (uint32_t j = 0; j < n; ++j) {
-    const Vec6 y = diagonal_[j] * x[order_[j]];
+    const Vector y = sign_[j] * (diagonal_[j] * x[order_[j]]);
     x[order_[j]] = y;
     for (uint32_t p = begin_[j]; p < begin_[j + 1]; ++p) x[order_[row_[p]]].noalias() -= below_[p] * y;
   }
   for (uint32_t j = n; j-- > 0;) {
-    Vec6 y = x[order_[j]];
+    Vector y = x[order_[j]];
     for (uint32_t p = begin_[j]; p < begin_[j + 1]; ++p)
-      y.noalias() -= below_[p].transpose() * x[order_[row_[p]]];
+      y.noalias() -= sign_[j] * (below_[p].transpose() * x[order_[row_[p]]]);
     x[order_[j]] = diagonal_[j].transpose() * y;
   }
 }
+
+template class BlockCholesky<3>;
+template class BlockCholesky<6>;
 
 }  // namespace offstage::sim

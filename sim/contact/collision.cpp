@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -149,8 +150,15 @@ Real approach(const Contact& c, std::span<const ContactBody> bodies) {
   return std::max(0.0, -c.relative_velocity(bodies).x());
 }
 
-/// Few contacts by pivoting; many by sweeps, whose impulses the proximal method takes further if need be.
-void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, ContactWork& work) {
+/// Few contacts by pivoting; many by sweeps, whose impulses the proximal method takes further if need be; with
+/// joints by that alone.
+void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, const JointProblem& joints,
+                    ContactWork& work) {
+  if (!joints.empty()) {
+    for (Contact& c : contacts) c.is_guessed = false;
+    constexpr Real kWhatever = std::numeric_limits<Real>::infinity();
+    return work.add(*ProximalNewton().solve(bodies, contacts, kWhatever, joints));
+  }
   if (contacts.size() <= kDense) return work.add(solve_by_pivoting(bodies, contacts));
   const std::vector<ContactBody> before(bodies.begin(), bodies.end());
   Real fastest = 0;
@@ -171,10 +179,12 @@ void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, 
 /// A cluster's collision with its restitutions scaled down by the factor that keeps the energy.
 class Cluster {
  public:
-  Cluster(std::span<ContactBody> bodies, std::span<Contact> contacts, std::span<const Real> restitution)
+  Cluster(std::span<ContactBody> bodies, std::span<Contact> contacts, std::span<const Real> restitution,
+          const JointProblem& joints)
       : bodies_(bodies),
         contacts_(contacts),
         restitution_(restitution),
+        joints_(joints),
         before_(bodies.begin(), bodies.end()) {
     for (const Contact& c : contacts) velocities_.push_back(c.relative_velocity(bodies));
   }
@@ -202,7 +212,7 @@ class Cluster {
     for (std::size_t i = 0; i < contacts_.size(); ++i)
       contacts_[i].target = std::max(0.0, -factor * restitution_[i] * velocities_[i].x());
     ContactWork work;
-    solve_together(bodies_, contacts_, work);
+    solve_together(bodies_, contacts_, joints_, work);
     return work;
   }
 
@@ -224,23 +234,25 @@ class Cluster {
       second += contacts_[i].impulse.dot(contacts_[i].relative_velocity(bodies_) - velocities_[i]) / 2;
     }
     const Real factor = first < 0 ? std::min(1.0, -first / second) : 0;
-    std::copy(before_.begin(), before_.end(), bodies_.begin());
-    for (Contact& c : contacts_) {
-      c.impulse *= factor;
-      apply(c, c.impulse, bodies_);
+    for (Contact& c : contacts_) c.impulse *= factor;
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+      bodies_[i].velocity = before_[i].velocity + factor * (bodies_[i].velocity - before_[i].velocity);
+      bodies_[i].angular_velocity =
+          before_[i].angular_velocity + factor * (bodies_[i].angular_velocity - before_[i].angular_velocity);
     }
   }
 
   std::span<ContactBody> bodies_;
   std::span<Contact> contacts_;
   std::span<const Real> restitution_;
+  const JointProblem& joints_;
   std::vector<ContactBody> before_;
   std::vector<Vec3> velocities_;
 };
 
 /// Impulses one at a time, the fastest approach first; those as fast but for rounding in order.
 ContactWork collide_in_sequence(std::span<ContactBody> bodies, std::span<Contact> contacts,
-                                std::span<const Real> restitution) {
+                                std::span<const Real> restitution, const JointProblem& joints) {
   ContactWork work{.solves = 1};
   Real still = 0;
   for (Contact& c : contacts) {
@@ -248,13 +260,20 @@ ContactWork collide_in_sequence(std::span<ContactBody> bodies, std::span<Contact
     c.impulse.setZero();
     c.target = 0;
   }
-  for (; work.iterations < kImpulses * contacts.size(); ++work.iterations) {
+  for (std::size_t count = 0; count < kImpulses * contacts.size(); ++count, ++work.iterations) {
     Real fastest = 0;
     std::size_t next = contacts.size();
     for (std::size_t i = 0; i < contacts.size(); ++i)
       if (approach(contacts[i], bodies) > fastest + still) fastest = approach(contacts[next = i], bodies);
     if (next == contacts.size()) return work;
     Contact& c = contacts[next];
+    if (!joints.empty()) {
+      const Vec3 before = c.impulse;
+      work.add(Cluster(bodies, std::span(&c, 1), restitution.subspan(next, 1), joints).solve());
+      c.impulse += before;
+      c.target = 0;
+      continue;
+    }
     const Vec3 p = collision_impulse(mobility(c, bodies), c.relative_velocity(bodies), restitution[next],
                                      c.friction_t, c.friction_k);
     c.impulse += p;
@@ -262,7 +281,7 @@ ContactWork collide_in_sequence(std::span<ContactBody> bodies, std::span<Contact
   }
   std::vector<Vec3> impulses;
   for (const Contact& c : contacts) impulses.push_back(c.impulse);
-  solve_together(bodies, contacts, work);
+  solve_together(bodies, contacts, joints, work);
   work.solves = 1;
   for (std::size_t i = 0; i < contacts.size(); ++i) contacts[i].impulse += impulses[i];
   return work;
@@ -283,10 +302,10 @@ Vec3 collision_impulse(const Mat3& K, const Vec3& u, Real restitution, Real mu_t
 }
 
 ContactWork collide(std::span<ContactBody> bodies, std::span<Contact> contacts,
-                    std::span<const Real> restitution, ImpactLaw law) {
+                    std::span<const Real> restitution, ImpactLaw law, const JointProblem& joints) {
   if (contacts.empty()) return {};
-  if (law == ImpactLaw::sequential) return collide_in_sequence(bodies, contacts, restitution);
-  return Cluster(bodies, contacts, restitution).solve();
+  if (law == ImpactLaw::sequential) return collide_in_sequence(bodies, contacts, restitution, joints);
+  return Cluster(bodies, contacts, restitution, joints).solve();
 }
 
 }  // namespace offstage::sim

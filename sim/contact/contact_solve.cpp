@@ -134,6 +134,65 @@ void displace(Body& body, const Vec3& shift, const Vec3& turn) {
 
 }  // namespace
 
+// Joints
+
+bool has_forces(const Island& island) {
+  return !island.pairs.empty() ||
+         std::any_of(island.articulations.begin(), island.articulations.end(),
+                     [](const Articulation* a) { return a->has_bounded_rows(); });
+}
+
+void IslandJoints::collect_constraints(const Island& island, Real time, bool at_start) {
+  const auto row = [](const Articulation& a, uint32_t link) {
+    return link == JointSystem::kDriven ? kUnmoved : a.bodies()[link]->row;
+  };
+  for (Articulation* a : island.articulations) {
+    a->place(time, at_start);
+    articulations_.push_back(a);
+    const JointSystem& system = a->system();
+    for (std::size_t j = 0; j < system.joints().size(); ++j)
+      constraints_.push_back(
+          {row(*a, system.joints()[j].a), row(*a, system.joints()[j].b), &system.rows()[j]});
+  }
+}
+
+void IslandJoints::collect(std::span<const Island* const> islands, const ContactInterval& interval) {
+  articulations_.clear();
+  constraints_.clear();
+  bounded_.clear();
+  origins_.clear();
+  bounded_ends_.clear();
+  for (const Island* island : islands) {
+    const std::size_t first = articulations_.size();
+    collect_constraints(*island, interval.end, false);
+    for (std::size_t i = first; i < articulations_.size(); ++i) {
+      collect_bounded_rows(*articulations_[i], interval.duration, interval.end, bounded_, origins_);
+      bounded_ends_.push_back(static_cast<uint32_t>(bounded_.size()));
+    }
+  }
+  impulses_.assign(constraints_.size(), Vec6::Zero());
+}
+
+void IslandJoints::collect_for_collision(const Island& island, Real time) {
+  articulations_.clear();
+  constraints_.clear();
+  bounded_.clear();
+  collect_constraints(island, time, true);
+  for (const Articulation* a : articulations_) collect_stops(*a, time, bounded_);
+  impulses_.assign(constraints_.size(), Vec6::Zero());
+}
+
+void IslandJoints::tell(Real duration) {
+  for (std::size_t i = 0; i < bounded_.size(); ++i)
+    origins_[i].joint->efforts[origins_[i].slot] = bounded_[i].impulse / duration;
+  std::size_t first = 0;
+  for (Articulation* a : articulations_) {
+    const std::size_t count = a->joints().size();
+    a->add_impulses(std::span(impulses_).subspan(first, count), duration);
+    first += count;
+  }
+}
+
 // Exact
 
 std::optional<ContactWork> ExactContacts::solve(const Island& island, const ContactInterval& interval,
@@ -147,13 +206,16 @@ std::optional<ContactWork> ExactContacts::solve(const Island& island, const Cont
     add_body(*body);
   }
   for (ContactPair* pair : island.pairs) add_points(*pair, interval);
-  if (contacts_.empty()) return ContactWork{};
+  const Island* const one[] = {&island};
+  joints_.collect(one, interval);
+  if (contacts_.empty() && joints_.bounded().empty()) return ContactWork{};
 
   free_.resize(bodies_.size());
   for (std::size_t i = 0; i < bodies_.size(); ++i)
     free_[i] << bodies_[i].velocity, bodies_[i].angular_velocity;
-  const std::optional<ContactWork> work = newton_.solve(bodies_, contacts_, budget);
+  const std::optional<ContactWork> work = newton_.solve(bodies_, contacts_, budget, joints_.problem());
   if (!work) return work;
+  joints_.tell(interval.duration);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     forces_[i]->now = forces_[i]->last = contacts_[i].impulse / interval.duration;
   move_bodies(island, interval.duration);
@@ -210,6 +272,7 @@ void ExactContacts::move_bodies(const Island& island, Real duration) {
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     if (std::abs(approach_[i]) > kClosing && contacts_[i].impulse.x() > 0)
       closing_[contacts_[i].a] = closing_[contacts_[i].b] = 1;
+  close_stops();
   for (std::size_t i = 0; i < island.bodies.size(); ++i) {
     Body& body = *island.bodies[i];
     const Vec3 free_v = free_[i].head<3>(), free_w = free_[i].tail<3>();
@@ -224,6 +287,16 @@ void ExactContacts::move_bodies(const Island& island, Real duration) {
   }
 }
 
+/// Joints that got to where they stop block their bodies likewise.
+void ExactContacts::close_stops() {
+  for (std::size_t i = 0; i < joints_.bounded().size(); ++i) {
+    const BoundedRow& row = joints_.bounded()[i];
+    if (!joints_.origins()[i].is_stop || row.impulse == 0) continue;
+    for (uint32_t body : {row.a, row.b})
+      if (body != kUnmoved) closing_[body] = 1;
+  }
+}
+
 // Which of the two
 
 namespace {
@@ -233,6 +306,8 @@ constexpr std::size_t kFew = 6;
 constexpr Real kSmall = 1e5;
 /// Of the fast solver, per point and sub-step [ns].
 constexpr Real kFastPoint = 60;
+/// Of the fast solver, per joint and sub-step [ns].
+constexpr Real kFastJoint = 200;
 /// How much dearer than the fast solver the exact one may be in the long run: it is worth that. What it takes
 /// beyond counts as a debt, of which it may have as much as so many steps of the fast solver: it is dear
 /// where an island is new, and cheap from then on.
@@ -246,7 +321,9 @@ Real fast_cost(const Island& island, Real duration) {
   Real points = 0;
   for (const ContactPair* pair : island.pairs)
     for (const PlacedManifold& m : pair->manifolds()) points += m.manifold.count;
-  return points * kFastPoint * relaxation_substeps(duration);
+  Real joints = 0;
+  for (const Articulation* a : island.articulations) joints += static_cast<Real>(a->joints().size());
+  return (points * kFastPoint + joints * kFastJoint) * relaxation_substeps(duration);
 }
 
 }  // namespace
@@ -383,7 +460,8 @@ void FastContacts::collect(std::span<const Island* const> islands, Real touching
 ContactWork FastContacts::solve(std::span<const Island* const> islands, const ContactInterval& interval) {
   const Real h = interval.duration;
   collect(islands, interval.touching);
-  if (origins_.empty()) return {};
+  joints_.collect(islands, interval);
+  if (origins_.empty() && joints_.bounded().empty()) return {};
   bodies_.resize(members_.size());
   patches_.resize(origins_.size());
   for_each_index(bodies_.size(), [&](std::size_t i) { bodies_[i] = relaxed(*members_[i], h); });
@@ -392,7 +470,9 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
     patches_[i] = {.a = a, .b = b, .frame = manifold->frame};
     set_patch(patches_[i], *pair, *manifold);
   });
-  const ContactWork work = solver_.solve(bodies_, patches_, {h, relaxation_substeps(h)});
+  RelaxedJoints relaxed_joints(joints_.problem(), joints_.articulations(), joints_.bounded_ends());
+  const ContactWork work = solver_.solve(bodies_, patches_, {h, relaxation_substeps(h)}, &relaxed_joints);
+  joints_.tell(h);
   for_each_index(patches_.size(), [&](std::size_t i) { tell_forces(patches_[i], h, *origins_[i].manifold); });
   for_each_index(moved_, [&](std::size_t i) { move(*members_[i], bodies_[i]); });
   return work;
@@ -485,7 +565,9 @@ uint32_t resolve_collisions(const Island& island, const CollisionSettings& setti
     cluster.add(*pair, settings.reach, settings.collision_speed, settings.law);
   if (!settings.whole) cluster.narrow();
   if (cluster.contacts.empty()) return 0;
-  work.add(collide(cluster.bodies, cluster.contacts, cluster.restitution, settings.law));
+  IslandJoints joints;
+  joints.collect_for_collision(island, settings.time);
+  work.add(collide(cluster.bodies, cluster.contacts, cluster.restitution, settings.law, joints.problem()));
   for (Body* body : island.bodies) {
     const ContactBody& b = cluster.bodies[body->row];
     body->set_start_velocity(b.velocity, b.angular_velocity);

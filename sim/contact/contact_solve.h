@@ -7,10 +7,12 @@
 #include <span>
 #include <vector>
 
+#include "sim/articulation/joint_limits.h"
 #include "sim/contact/collision.h"
 #include "sim/contact/contact_pair.h"
 #include "sim/contact/proximal_newton.h"
 #include "sim/contact/relaxation.h"
+#include "sim/contact/relaxed_joints.h"
 #include "sim/contact_graph.h"
 
 namespace offstage::sim {
@@ -18,7 +20,39 @@ namespace offstage::sim {
 /// What all solutions of an interval share.
 struct ContactInterval {
   Real duration;  ///< [s], > 0
+  Real end;       ///< the world's time [s]
   Real touching;  ///< points nearer than this touch [m]
+};
+
+/// Whether anything but free motion happens in an island.
+bool has_forces(const Island& island);
+
+/// The joints of islands as part of a problem: their bodies have the indices Body::row.
+class IslandJoints {
+ public:
+  /// For an interval.
+  void collect(std::span<const Island* const> islands, const ContactInterval& interval);
+  /// For a collision at the bodies' start.
+  void collect_for_collision(const Island& island, Real time);
+  JointProblem problem() { return {constraints_, bounded_, impulses_}; }
+  /// After the solution: the joints tell of their forces, and keep them as a guess.
+  void tell(Real duration);
+
+  std::span<Articulation* const> articulations() const { return articulations_; }
+  /// Where the rows with bounds of each articulation end.
+  std::span<const uint32_t> bounded_ends() const { return bounded_ends_; }
+  std::span<const BoundedRow> bounded() const { return bounded_; }
+  std::span<const BoundedOrigin> origins() const { return origins_; }
+
+ private:
+  void collect_constraints(const Island& island, Real time, bool at_start);
+
+  std::vector<Articulation*> articulations_;
+  std::vector<JointConstraint> constraints_;
+  std::vector<BoundedRow> bounded_;
+  std::vector<BoundedOrigin> origins_;
+  std::vector<uint32_t> bounded_ends_;
+  std::vector<Vec6> impulses_;
 };
 
 /// One island's contacts as a problem, solved to rounding. The bodies have moved freely through the interval
@@ -34,6 +68,7 @@ class ExactContacts {
   uint32_t add_body(Body& body);
   void add_points(ContactPair& pair, const ContactInterval& interval);
   void move_bodies(const Island& island, Real duration);
+  void close_stops();
 
   std::vector<ContactBody> bodies_;
   std::vector<Contact> contacts_;
@@ -41,6 +76,7 @@ class ExactContacts {
   std::vector<Real> approach_;       // of the contacts at the start [m/s]
   std::vector<uint8_t> closing_;     // by body: some contact came together in the interval
   std::vector<Vec6> free_;           // by body: velocities without contacts
+  IslandJoints joints_;
   ProximalNewton newton_;
 };
 
@@ -62,6 +98,7 @@ class FastContacts {
   std::vector<RelaxedBody> bodies_;
   std::vector<Origin> origins_;  // of the patches
   std::vector<ContactPatch> patches_;
+  IslandJoints joints_;
   RelaxationSolver solver_;
 };
 
@@ -104,6 +141,7 @@ class SolverChoice {
 };
 
 struct CollisionSettings {
+  Real time;             ///< the world's [s]
   Real reach;            ///< what is nearer than this belongs to the cluster [m]
   Real collision_speed;  ///< what approaches faster bounces [m/s]
   ImpactLaw law;

@@ -21,6 +21,8 @@ constexpr uint32_t kMaxOuter = 60, kMaxNewton = 40, kMaxHalvings = 25, kMaxSweep
 constexpr Real kStale = 0.2;
 constexpr Real kMeritRounding = 1e-11;
 constexpr std::size_t kMixed = 5;
+/// Of the mobility of a joint's constraints: keeps those that depend on each other apart.
+constexpr Real kRegularization = 1e-11;
 constexpr uint32_t kMaxFactorizations = 300;
 /// What operations take [ns]: per contact, and per block of the factor.
 constexpr Real kSetUp = 150, kEvaluation = 80, kAssembly = 150, kSolve = 25, kProduct = 80;
@@ -51,14 +53,19 @@ Mat6 block(const Mat3& W, const Vec3& r, const Vec3& s) {
 }  // namespace
 
 std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, std::span<Contact> contacts,
-                                                 Real budget) {
+                                                 Real budget, const JointProblem& joints) {
   ContactWork work{.solves = 1};
-  cost_ = kSetUp * static_cast<Real>(contacts.size());
+  cost_ = kSetUp * static_cast<Real>(contacts.size() + joints.constraints.size());
   budget_ = budget;
+  joints_ = joints;
   number_bodies(bodies, contacts);
+  find_pairs(contacts);
   set_points(bodies, contacts);
+  set_joints();
   Real speed = 0;
   for (const Point& p : points_) speed = std::max(speed, p.impulse.cwiseAbs().maxCoeff());
+  for (const Bounded& p : bounded_) speed = std::max(speed, std::abs(p.impulse));
+  if (!constraints_.empty()) satisfy_constraints();
   const Real tolerance = kSmallest + kTolerance * speed;
 
   merit_ = evaluate(contacts, velocity_);
@@ -79,6 +86,13 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
     gradient(contacts);
   }
 
+  if (!joints.empty()) {
+    for (std::size_t i = 0; i < contacts.size(); ++i) contacts[i].impulse = points_[i].multiplier;
+    finish_joints(bodies);
+    work.fallbacks += !solved;
+    work.residual = left;
+    return work;
+  }
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     contacts[i].impulse = points_[i].multiplier;
     apply(contacts[i], contacts[i].impulse, bodies);
@@ -95,29 +109,31 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
 void ProximalNewton::number_bodies(std::span<const ContactBody> bodies, std::span<const Contact> contacts) {
   row_of_body_.assign(bodies.size(), kNone);
   body_of_row_.clear();
-  for (const Contact& c : contacts)
-    for (uint32_t body : {c.a, c.b})
-      if (bodies[body].is_moved() && row_of_body_[body] == kNone) {
-        row_of_body_[body] = 0;
-        body_of_row_.push_back(body);
-      }
+  const auto add = [&](uint32_t body) {
+    if (body == kUnmoved || !bodies[body].is_moved() || row_of_body_[body] != kNone) return;
+    row_of_body_[body] = 0;
+    body_of_row_.push_back(body);
+  };
+  for (const Contact& c : contacts) {
+    add(c.a);
+    add(c.b);
+  }
+  for (const JointConstraint& c : joints_.constraints) {
+    add(c.a);
+    add(c.b);
+  }
+  for (const BoundedRow& r : joints_.bounded) {
+    add(r.a);
+    add(r.b);
+  }
   std::sort(body_of_row_.begin(), body_of_row_.end());
   for (uint32_t row = 0; row < body_of_row_.size(); ++row) row_of_body_[body_of_row_[row]] = row;
-
-  pairs_.clear();
-  for (const Contact& c : contacts) {
-    const auto [low, high] = std::minmax(row_of_body_[c.a], row_of_body_[c.b]);
-    if (high != kNone) pairs_.emplace_back(low, high);
-  }
-  std::sort(pairs_.begin(), pairs_.end());
-  pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
 
   const std::size_t rows = body_of_row_.size();
   free_.resize(rows);
   velocity_.resize(rows);
   trial_.resize(rows);
   gradient_.resize(rows);
-  direction_.resize(rows);
   mass_.resize(rows);
   for (std::size_t row = 0; row < rows; ++row) {
     const ContactBody& body = bodies[body_of_row_[row]];
@@ -127,6 +143,36 @@ void ProximalNewton::number_bodies(std::span<const ContactBody> bodies, std::spa
     mass_[row].diagonal().head<3>().setConstant(1 / body.inverse_mass);
     mass_[row].bottomRightCorner<3, 3>() = body.inverse_inertia.inverse();
   }
+}
+
+/// Bodies that share a contact or a row with bounds, and the constraints' rows with their bodies.
+void ProximalNewton::find_pairs(std::span<const Contact> contacts) {
+  const auto row = [this](uint32_t body) { return body == kUnmoved ? kNone : row_of_body_[body]; };
+  pairs_.clear();
+  const auto add = [this](uint32_t a, uint32_t b) {
+    const auto [low, high] = std::minmax(a, b);
+    if (high != kNone) pairs_.emplace_back(low, high);
+  };
+  for (const Contact& c : contacts) add(row(c.a), row(c.b));
+  for (const BoundedRow& r : joints_.bounded) add(row(r.a), row(r.b));
+  const auto rows = static_cast<uint32_t>(body_of_row_.size());
+  for (uint32_t j = 0; j < joints_.constraints.size(); ++j) {
+    add(row(joints_.constraints[j].a), rows + j);
+    add(row(joints_.constraints[j].b), rows + j);
+  }
+  std::sort(pairs_.begin(), pairs_.end());
+  pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
+  kinds_.clear();
+  if (joints_.constraints.empty()) return;
+  kinds_.resize(rows + joints_.constraints.size());
+  std::fill(kinds_.begin() + rows, kinds_.end(), BlockRowKind{.is_negative = true, .is_empty = true});
+}
+
+/// Where the block of two rows is; kNone if one is of nothing that moves.
+uint32_t ProximalNewton::pair_of(uint32_t row, uint32_t other) const {
+  if (row == kNone || other == kNone) return kNone;
+  const std::pair<uint32_t, uint32_t> pair = std::minmax(row, other);
+  return static_cast<uint32_t>(std::lower_bound(pairs_.begin(), pairs_.end(), pair) - pairs_.begin());
 }
 
 /// The guess: multipliers from the contacts, and the velocities that go with them. `impulse` is left with
@@ -140,11 +186,7 @@ void ProximalNewton::set_points(std::span<const ContactBody> bodies, std::span<c
     Point& p = points_[i];
     p.a = row_of_body_[c.a];
     p.b = row_of_body_[c.b];
-    p.pair = kNone;
-    if (p.a != kNone && p.b != kNone)
-      p.pair = static_cast<uint32_t>(std::lower_bound(pairs_.begin(), pairs_.end(),
-                                                      std::pair<uint32_t, uint32_t>(std::minmax(p.a, p.b))) -
-                                     pairs_.begin());
+    p.pair = pair_of(p.a, p.b);
     p.rho = kStiffness / (mean_mobility(bodies[c.a], c.arm_a) + mean_mobility(bodies[c.b], c.arm_b));
     p.multiplier = c.is_guessed ? project_on_cone(c, c.impulse).point : Vec3(Vec3::Zero());
     p.impulse = c.relative_velocity(bodies);
@@ -164,6 +206,99 @@ void ProximalNewton::set_points(std::span<const ContactBody> bodies, std::span<c
   for (std::size_t i = 0; i < contacts.size(); ++i)
     points_[i].lift =
         cone_lift(contacts[i], relative_velocity(contacts[i], points_[i], velocity_) + fixed_[i]);
+}
+
+/// After the points: the impulses of rows with bounds add to the velocities, too.
+void ProximalNewton::set_joints() {
+  const auto row = [this](uint32_t body) { return body == kUnmoved ? kNone : row_of_body_[body]; };
+  const auto rows = static_cast<uint32_t>(body_of_row_.size());
+  bounded_.clear();
+  for (const BoundedRow& r : joints_.bounded) {
+    Bounded p{.multiplier = std::clamp(r.impulse, r.lower, r.upper),
+              .impulse = r.offset - r.target,
+              .a = row(r.a),
+              .b = row(r.b),
+              .is_free = false};
+    p.pair = pair_of(p.a, p.b);
+    Real mobility = 0;
+    for (const auto& [at, on] : {std::pair(p.a, &r.on_a), std::pair(p.b, &r.on_b)}) {
+      if (at == kNone) continue;
+      Vec6 response = *on / mass_[at](0, 0);
+      response.tail<3>() = mass_[at].bottomRightCorner<3, 3>().inverse() * on->tail<3>();
+      mobility += on->dot(response);
+      p.impulse += on->dot(free_[at]);
+      velocity_[at] += p.multiplier * response;
+    }
+    p.rho = kStiffness / mobility;
+    bounded_.push_back(p);
+  }
+  constraints_.clear();
+  for (uint32_t j = 0; j < joints_.constraints.size(); ++j) {
+    const JointConstraint& c = joints_.constraints[j];
+    Constraint k{.a = row(c.a), .b = row(c.b), .diagonal = Mat6::Zero(), .impulse = Vec6::Zero()};
+    k.pair_a = pair_of(k.a, rows + j);
+    k.pair_b = pair_of(k.b, rows + j);
+    for (Eigen::Index i = 0; i < 6; ++i) {
+      Real mobility = 0;
+      for (const auto& [at, on] : {std::pair(k.a, &c.rows->on_a), std::pair(k.b, &c.rows->on_b)})
+        if (at != kNone)
+          mobility += on->col(i).dot(mass_[at].llt().solve(on->col(i)));
+      k.diagonal(i, i) = mobility > 0 ? -kRegularization * mobility : -1;
+    }
+    constraints_.push_back(k);
+  }
+  direction_.resize(rows + constraints_.size());
+  if (!joints_.empty() || factor_.rows() != direction_.size()) is_factored_ = false;
+}
+
+/// The nearest velocities, weighted with the masses, that differ from those without impulses by what the joints
+/// allow.
+void ProximalNewton::satisfy_constraints() {
+  factor_.analyze(static_cast<uint32_t>(direction_.size()), pairs_, kinds_);
+  add_constraint_blocks();
+  is_factored_ = factor_.factorize(diagonal_, off_);
+  std::fill(gradient_.begin(), gradient_.end(), Vec6::Zero());
+  for (int k = 0; is_factored_ && k < 2; ++k) {
+    solve_for_direction();
+    for (std::size_t row = 0; row < velocity_.size(); ++row) velocity_[row] -= direction_[row];
+  }
+  is_factored_ = false;
+}
+
+/// The matrix of the masses and constraints.
+void ProximalNewton::add_constraint_blocks() {
+  diagonal_ = mass_;
+  off_.assign(pairs_.size(), Mat6::Zero());
+  for (std::size_t j = 0; j < constraints_.size(); ++j) {
+    const Constraint& c = constraints_[j];
+    diagonal_.push_back(c.diagonal);
+    if (c.pair_a != kNone) off_[c.pair_a] = joints_.constraints[j].rows->on_a;
+    if (c.pair_b != kNone) off_[c.pair_b] = joints_.constraints[j].rows->on_b;
+  }
+}
+
+/// Newton's step against the gradient and what is left of the constraints, with the change of their impulses.
+void ProximalNewton::solve_for_direction() {
+  std::copy(gradient_.begin(), gradient_.end(), direction_.begin());
+  for (std::size_t j = 0; j < constraints_.size(); ++j) {
+    const Constraint& c = constraints_[j];
+    Vec6& left = direction_[gradient_.size() + j];
+    left.setZero();
+    if (c.a != kNone) left += joints_.constraints[j].rows->on_a.transpose() * (velocity_[c.a] - free_[c.a]);
+    if (c.b != kNone) left += joints_.constraints[j].rows->on_b.transpose() * (velocity_[c.b] - free_[c.b]);
+  }
+  factor_.solve(direction_);
+  for (std::size_t j = 0; j < constraints_.size(); ++j)
+    constraints_[j].impulse += direction_[gradient_.size() + j];
+}
+
+void ProximalNewton::finish_joints(std::span<ContactBody> bodies) {
+  for (std::size_t row = 0; row < velocity_.size(); ++row) {
+    bodies[body_of_row_[row]].velocity = velocity_[row].head<3>();
+    bodies[body_of_row_[row]].angular_velocity = velocity_[row].tail<3>();
+  }
+  for (std::size_t i = 0; i < bounded_.size(); ++i) joints_.bounded[i].impulse = bounded_[i].multiplier;
+  for (std::size_t j = 0; j < joints_.impulses.size(); ++j) joints_.impulses[j] = constraints_[j].impulse;
 }
 
 Vec3 ProximalNewton::relative_velocity(const Contact& c, const Point& p,
@@ -192,7 +327,26 @@ Real ProximalNewton::evaluate(std::span<const Contact> contacts, std::span<const
     p.shifted = q;
     merit += p.impulse.squaredNorm() / (2 * p.rho);
   }
+  for (std::size_t i = 0; i < bounded_.size(); ++i) {
+    const BoundedRow& r = joints_.bounded[i];
+    Bounded& p = bounded_[i];
+    const Real u = relative_velocity(r, p, velocity) - r.target;
+    const Real wanted = (p.multiplier - p.rho * u) / (1 + p.rho * r.softness);
+    p.impulse = std::clamp(wanted, r.lower, r.upper);
+    p.is_free = p.impulse == wanted;
+    // The greatest value of -p u - s p^2 / 2 - (p - q)^2 / (2 rho): convex in u, with the derivative -p.
+    merit -= p.impulse * u + r.softness * p.impulse * p.impulse / 2 +
+             std::pow(p.impulse - p.multiplier, 2) / (2 * p.rho);
+  }
   return merit;
+}
+
+Real ProximalNewton::relative_velocity(const BoundedRow& r, const Bounded& p,
+                                       std::span<const Vec6> velocity) const {
+  Real u = r.offset;
+  if (p.a != kNone) u += r.on_a.dot(velocity[p.a]);
+  if (p.b != kNone) u += r.on_b.dot(velocity[p.b]);
+  return u;
 }
 
 void ProximalNewton::gradient(std::span<const Contact> contacts) {
@@ -211,6 +365,16 @@ void ProximalNewton::gradient(std::span<const Contact> contacts) {
       gradient_[p.b].tail<3>() += c.arm_b.cross(impulse);
     }
   }
+  for (std::size_t i = 0; i < bounded_.size(); ++i) {
+    const Bounded& p = bounded_[i];
+    if (p.a != kNone) gradient_[p.a] -= p.impulse * joints_.bounded[i].on_a;
+    if (p.b != kNone) gradient_[p.b] -= p.impulse * joints_.bounded[i].on_b;
+  }
+  for (std::size_t j = 0; j < constraints_.size(); ++j) {
+    const Constraint& c = constraints_[j];
+    if (c.a != kNone) gradient_[c.a] -= joints_.constraints[j].rows->on_a * c.impulse;
+    if (c.b != kNone) gradient_[c.b] -= joints_.constraints[j].rows->on_b * c.impulse;
+  }
 }
 
 /// The greatest velocity that the impulses out of balance give to a body.
@@ -228,9 +392,8 @@ Real ProximalNewton::gradient_speed() const {
 }
 
 bool ProximalNewton::assemble(std::span<const Contact> contacts, ContactWork& work) {
-  factor_.analyze(static_cast<uint32_t>(mass_.size()), pairs_);
-  diagonal_ = mass_;
-  off_.assign(pairs_.size(), Mat6::Zero());
+  factor_.analyze(static_cast<uint32_t>(direction_.size()), pairs_, kinds_);
+  add_constraint_blocks();
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const Contact& c = contacts[i];
     const Point& p = points_[i];
@@ -245,6 +408,16 @@ bool ProximalNewton::assemble(std::span<const Contact> contacts, ContactWork& wo
       off_[p.pair] -= block(W, c.arm_a, c.arm_b);
     else
       off_[p.pair] -= block(W, c.arm_b, c.arm_a);
+  }
+  for (std::size_t i = 0; i < bounded_.size(); ++i) {
+    const Bounded& p = bounded_[i];
+    if (!p.is_free) continue;
+    const BoundedRow& r = joints_.bounded[i];
+    const Real weight = p.rho / (1 + p.rho * r.softness);
+    if (p.a != kNone) diagonal_[p.a] += weight * r.on_a * r.on_a.transpose();
+    if (p.b != kNone) diagonal_[p.b] += weight * r.on_b * r.on_b.transpose();
+    if (p.pair == kNone) continue;
+    off_[p.pair] += p.a < p.b ? weight * r.on_a * r.on_b.transpose() : weight * r.on_b * r.on_a.transpose();
   }
   ++work.factorizations;
   cost_ += kProduct * static_cast<Real>(factor_.factor_products()) +
@@ -272,17 +445,16 @@ bool ProximalNewton::minimize(std::span<const Contact> contacts, Real tolerance,
 
 /// One step along -H^-1 g with back-tracking; false if rounding leaves no way down.
 bool ProximalNewton::descend(std::span<const Contact> contacts) {
-  direction_ = gradient_;
-  factor_.solve(direction_);
+  solve_for_direction();
   cost_ +=
       kSolve * static_cast<Real>(factor_.factor_blocks()) + kEvaluation * static_cast<Real>(contacts.size());
   Real slope = 0;
-  for (std::size_t row = 0; row < direction_.size(); ++row) slope -= direction_[row].dot(gradient_[row]);
+  for (std::size_t row = 0; row < gradient_.size(); ++row) slope -= direction_[row].dot(gradient_[row]);
   const Real before = merit_, speed = gradient_speed();
   const std::vector<Vec6> start = velocity_;
   Real length = 1;
   for (uint32_t k = 0; k < kMaxHalvings; ++k, length /= 2) {
-    for (std::size_t row = 0; row < direction_.size(); ++row)
+    for (std::size_t row = 0; row < velocity_.size(); ++row)
       velocity_[row] = start[row] - length * direction_[row];
     merit_ = evaluate(contacts, velocity_);
     if (merit_ <= before + 1e-4 * length * slope) {
@@ -316,6 +488,10 @@ Real ProximalNewton::update_multipliers(std::span<const Contact> contacts) {
     p.rise = open ? 0 : lift - p.lift;
     change = std::max(change, std::abs(p.rise));
     p.lift = lift;
+  }
+  for (Bounded& p : bounded_) {
+    change = std::max(change, std::abs(p.impulse - p.multiplier) / p.rho);
+    p.multiplier = p.impulse;
   }
   return change;
 }

@@ -14,6 +14,10 @@
 /// factorisation. See Rockafellar, "Monotone operators and the proximal point algorithm" (1976); Alart and
 /// Curnier, "A mixed formulation for frictional contact problems prone to Newton like solution methods"
 /// (1991).
+///
+/// Joints are constraints J (v - v0) = 0 of that minimisation: Newton's steps come from the quasi-definite system
+/// of H and J, so that all velocities on the way satisfy them. Rows with bounds are treated like contacts, with an
+/// interval in place of the cone.
 
 #include <limits>
 #include <optional>
@@ -24,6 +28,7 @@
 #include "sim/contact/block_cholesky.h"
 #include "sim/contact/contact_problem.h"
 #include "sim/contact/friction_cone.h"
+#include "sim/contact/joint_problem.h"
 
 namespace offstage::sim {
 
@@ -35,7 +40,8 @@ class ProximalNewton {
   /// Gauss-Seidel goes on from where they ended.
   /// If that would take more than `budget` [ns, as cost() counts], there is no result and nothing is changed.
   std::optional<ContactWork> solve(std::span<ContactBody> bodies, std::span<Contact> contacts,
-                                   Real budget = std::numeric_limits<Real>::infinity());
+                                   Real budget = std::numeric_limits<Real>::infinity(),
+                                   const JointProblem& joints = {});
 
   /// What the last solve() took by the number of its operations, on a machine of 2020 [ns].
   Real cost() const { return cost_; }
@@ -47,13 +53,32 @@ class ProximalNewton {
     uint32_t a, b, pair;                // rows of the matrix; kNone for bodies that are not moved
     ConeRegion region;
   };
+  /// A row with bounds: q, p(v), and whether p(v) is within them.
+  struct Bounded {
+    Real multiplier, impulse, rho;
+    uint32_t a, b, pair;
+    bool is_free;
+  };
+  /// A joint's constraints are a row of the matrix after those of the bodies.
+  struct Constraint {
+    uint32_t a, b, pair_a, pair_b;
+    Mat6 diagonal;
+    Vec6 impulse;
+  };
   struct Mixed {
     Eigen::VectorXd lift, rise;
   };
   static constexpr uint32_t kNone = UINT32_MAX;
 
   void number_bodies(std::span<const ContactBody> bodies, std::span<const Contact> contacts);
+  void find_pairs(std::span<const Contact> contacts);
+  uint32_t pair_of(uint32_t row, uint32_t other) const;
   void set_points(std::span<const ContactBody> bodies, std::span<const Contact> contacts);
+  void set_joints();
+  void satisfy_constraints();
+  void add_constraint_blocks();
+  void solve_for_direction();
+  void finish_joints(std::span<ContactBody> bodies);
   Real evaluate(std::span<const Contact> contacts, std::span<const Vec6> velocity);
   void gradient(std::span<const Contact> contacts);
   Real gradient_speed() const;
@@ -64,6 +89,8 @@ class ProximalNewton {
   void mix_lifts(bool slow);
   Vec3 relative_velocity(const Contact& c, const Point& p, std::span<const Vec6> velocity) const;
 
+  Real relative_velocity(const BoundedRow& r, const Bounded& p, std::span<const Vec6> velocity) const;
+
   std::vector<uint32_t> body_of_row_, row_of_body_;
   std::vector<std::pair<uint32_t, uint32_t>> pairs_;
   std::vector<Point> points_;
@@ -71,10 +98,14 @@ class ProximalNewton {
   std::vector<Vec3> fixed_;  // relative velocity that unmoved bodies and offsets add, less the target
   std::vector<Mat6> mass_;   // of each row
   std::vector<Mat6> diagonal_, off_;  // H
+  std::vector<BlockRowKind> kinds_;
+  JointProblem joints_;
+  std::vector<Bounded> bounded_;
+  std::vector<Constraint> constraints_;
   bool is_factored_ = false;
   std::size_t factored_contacts_ = 0;  // their number when H was factored
   std::vector<Mixed> mixing_;          // of the last iterations
-  BlockCholesky factor_;
+  BlockCholesky<6> factor_;
   Real merit_ = 0;
   Real cost_ = 0, budget_ = 0;
 };

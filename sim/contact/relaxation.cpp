@@ -72,15 +72,19 @@ void RelaxationSolver::plan(uint32_t substeps) {
   ranges_.clear();
   ranges_.push_back({Stage::start, 0, bodies, kBodiesPerBlock});
   plan_colors(Stage::prepare);
+  const uint32_t joints = joints_ ? joints_->count() : 0;
+  if (joints > 0) ranges_.push_back({Stage::start_joints, 0, joints, 1});
   for (uint32_t i = 0; i < substeps; ++i) {
     if (i > 0) ranges_.push_back({Stage::extrapolate, 0, bodies, kBodiesPerBlock});
     plan_colors(i > 0 ? Stage::solve_next : Stage::solve);
     ranges_.push_back({Stage::repeat, 0, 1, 1});
+    if (joints > 0) ranges_.push_back({Stage::join, 0, joints, 1, i + 1});
     ranges_.push_back({Stage::advance, 0, bodies, kBodiesPerBlock});
   }
   // Contacts that closed in the last sub-step still have the velocity that closed them.
   plan_colors(Stage::push);
   plan_colors(Stage::solve);
+  if (joints > 0) ranges_.push_back({Stage::join_last, 0, joints, 1, substeps});
   ranges_.push_back({Stage::finish, 0, bodies, kBodiesPerBlock});
   ranges_.push_back({Stage::report, 0, batches, kBatchesPerBlock});
 }
@@ -109,6 +113,13 @@ void RelaxationSolver::run(const Range& range, uint32_t block) {
       });
     case Stage::repeat:
       return repeat();
+    case Stage::start_joints:
+      return each([this](uint32_t i) { joints_->start(i, motions_); });
+    case Stage::join:
+    case Stage::join_last:
+      return each([&](uint32_t i) {
+        joints_->solve(i, motions_, range.substep * substep_, range.stage == Stage::join_last);
+      });
     case Stage::advance:
       return each([this](uint32_t i) { advance(i); });
     case Stage::push:
@@ -208,16 +219,19 @@ void RelaxationSolver::set_up() {
 }
 
 ContactWork RelaxationSolver::solve(std::span<RelaxedBody> bodies, std::span<ContactPatch> patches,
-                                    const RelaxationDef& def) {
+                                    const RelaxationDef& def, RelaxedJoints* joints) {
   bodies_ = bodies;
   patches_ = patches;
   def_ = def;
+  joints_ = joints;
+  if (joints) joints->begin(bodies, def.duration, def.substeps);
   substep_ = def.duration / def.substeps;
   set_up();
   plan(def.substeps);
   const uint32_t threads = batches_.size() < kSerialBatches ? 1 : available_threads();
   run_stages(std::span<const Range>(ranges_), threads,
              [this](const Range& range, uint32_t block) { run(range, block); });
+  if (joints) joints->finish();
   ContactWork work{.solves = 1, .iterations = def.substeps + 1};
   for (const PatchBatch& p : batches_)
     for (int lane = 0; lane < 4; ++lane) work.residual = std::max(work.residual, p.residual[lane]);

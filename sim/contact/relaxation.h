@@ -27,6 +27,7 @@
 #include "sim/contact/contact_frame.h"
 #include "sim/contact/contact_problem.h"
 #include "sim/contact/patch_batch.h"
+#include "sim/contact/relaxed_joints.h"
 #include "sim/types.h"
 
 namespace offstage::sim {
@@ -86,7 +87,8 @@ class RelaxationSolver {
   /// Moves the bodies through a step. Penetration is pushed out, gradually; where a gap is open, the bodies
   /// may approach to close it and no further. The answer depends on the arguments and their order alone, not
   /// on threads; oneTBB's are used if there is enough to do.
-  ContactWork solve(std::span<RelaxedBody> bodies, std::span<ContactPatch> patches, const RelaxationDef& def);
+  ContactWork solve(std::span<RelaxedBody> bodies, std::span<ContactPatch> patches, const RelaxationDef& def,
+                    RelaxedJoints* joints = nullptr);
 
  private:
   enum class Stage : uint8_t {
@@ -96,6 +98,9 @@ class RelaxationSolver {
     solve,
     solve_next,  // in another sub-step
     repeat,
+    start_joints,
+    join,
+    join_last,
     advance,
     push,
     finish,
@@ -105,6 +110,7 @@ class RelaxationSolver {
   struct Range {
     Stage stage;
     uint32_t begin, end, block_size;
+    uint32_t substep = 0;
 
     uint32_t block_count() const { return (end - begin + block_size - 1) / block_size; }
   };
@@ -124,6 +130,7 @@ class RelaxationSolver {
   std::span<RelaxedBody> bodies_;
   std::span<ContactPatch> patches_;
   RelaxationDef def_;
+  RelaxedJoints* joints_ = nullptr;  // null: none
   Real substep_ = 0;
   std::vector<ContactColoring::Link> links_;
   ContactColoring coloring_;

@@ -48,7 +48,6 @@ class Engine {
                  variant.find("+2") != std::string::npos ? 2 : 1),
         world_(world_def(scene, dt, variant)),
         dt_(dt) {
-    if (!scene.joints.empty()) throw std::runtime_error("joints are not there yet");
     MeshHandle hull;
     for (const peer::Body& b : scene.bodies) {
       BodyDef def{.motion = b.mass > 0 ? MotionType::dynamic : MotionType::fixed,
@@ -56,7 +55,8 @@ class Engine {
                   .velocity = vec(b.vel),
                   .mass = b.mass,
                   .restitution = scene.restitution,
-                  .friction = scene.mu};
+                  .friction = scene.mu,
+                  .collides = scene.contacts};
       if (b.shape == peer::Shape::Box) {
         def.shape = Box{2 * vec(b.half)};
       } else if (b.shape == peer::Shape::Sphere) {
@@ -66,6 +66,13 @@ class Engine {
         def.shape = MeshShape{hull};
       }
       handles_.push_back(world_.add_body(def));
+    }
+    for (const auto& joint : scene.joints) {
+      JointDef def;
+      def.a = handles_[static_cast<std::size_t>(joint.b)];
+      if (joint.a >= 0) def.b = handles_[static_cast<std::size_t>(joint.a)];
+      def.anchor = vec(joint.anchor);
+      world_.add_joint(def);
     }
   }
   /// What the solvers did goes to the error output.

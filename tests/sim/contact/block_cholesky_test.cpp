@@ -55,7 +55,7 @@ Pairs random_pairs(Dice& dice, uint32_t rows, uint32_t count) {
 
 TEST(BlockCholesky, SolvesAsTheDenseOneDoes) {
   Dice dice(1);
-  BlockCholesky cholesky;  // kept, so that one pattern follows another
+  BlockCholesky<6> cholesky;  // kept, so that one pattern follows another
   for (int round = 0; round < 120; ++round) {
     const uint32_t rows = 1 + dice.index(20);
     const Pairs pairs = random_pairs(dice, rows, dice.index(4 * rows));
@@ -82,7 +82,7 @@ TEST(BlockCholesky, SaysWhenTheMatrixIsNotPositiveDefinite) {
   Dice dice(2);
   const Pairs pairs = {{0, 1}, {1, 2}};
   Matrix m = random_matrix(dice, 3, pairs, 1);
-  BlockCholesky cholesky;
+  BlockCholesky<6> cholesky;
   cholesky.analyze(3, pairs);
   ASSERT_TRUE(cholesky.factorize(m.diagonal, m.off));
   m.diagonal[1] -= 100 * Mat6::Identity();
@@ -106,11 +106,50 @@ TEST(BlockCholesky, ReordersSoThatLittleFillsIn) {
   }
   std::sort(stack.begin(), stack.end());
   std::sort(wall.begin(), wall.end());
-  BlockCholesky cholesky;
+  BlockCholesky<6> cholesky;
   cholesky.analyze(kRows, stack);
   EXPECT_EQ(cholesky.factor_blocks(), 2 * kRows - 1);
   cholesky.analyze(kRows, wall);
   EXPECT_LT(cholesky.factor_blocks(), kRows * kWide / 2);
+}
+
+TEST(BlockCholesky, SolvesQuasiDefiniteMatricesWhateverComesFirst) {
+  Dice dice(7);
+  for (int round = 0; round < 40; ++round) {
+    // Bodies, and rows that join two of them, with nothing on the diagonal.
+    const uint32_t bodies = 2 + dice.index(12), joints = 1 + dice.index(bodies - 1);
+    std::vector<Mat6> diagonal, off;
+    std::vector<BlockRowKind> kinds(joints, {.is_negative = true, .is_empty = true});
+    kinds.resize(joints + bodies);
+    Pairs pairs;
+    for (uint32_t j = 0; j < joints; ++j) {
+      diagonal.push_back(Mat6::Zero());
+      pairs.emplace_back(j, joints + j);
+      pairs.emplace_back(j, joints + j + 1);
+    }
+    Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(6 * kinds.size(), 6 * kinds.size());
+    for (uint32_t i = 0; i < bodies; ++i) {
+      const Mat6 m = random_block(dice);
+      diagonal.push_back(m * m.transpose() + 0.1 * Mat6::Identity());
+      dense.block<6, 6>(6 * (joints + i), 6 * (joints + i)) = diagonal.back();
+    }
+    for (const auto& [i, j] : pairs) {
+      // As of joints: whatever one body does, another can undo.
+      off.push_back(Mat6::Identity() + 0.2 * random_block(dice));
+      dense.block<6, 6>(6 * i, 6 * j) = off.back();
+      dense.block<6, 6>(6 * j, 6 * i) = off.back().transpose();
+    }
+    BlockCholesky<6> cholesky;
+    cholesky.analyze(static_cast<uint32_t>(kinds.size()), pairs, kinds);
+    ASSERT_TRUE(cholesky.factorize(diagonal, off));
+    std::vector<Vec6> x(kinds.size());
+    Eigen::VectorXd b(dense.rows());
+    for (std::size_t i = 0; i < x.size(); ++i) b.segment<6>(6 * i) = x[i] = random_block(dice).col(0);
+    cholesky.solve(x);
+    Eigen::VectorXd found(b.size());
+    for (std::size_t i = 0; i < x.size(); ++i) found.segment<6>(6 * i) = x[i];
+    EXPECT_LT((dense * found - b).norm(), 1e-10 * b.norm() * (1 + found.norm()));
+  }
 }
 
 }  // namespace

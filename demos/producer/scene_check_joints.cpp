@@ -1,0 +1,110 @@
+#include "producer/scene_check_joints.h"
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "producer/suggest.h"
+
+namespace offstage::producer {
+namespace {
+
+class JointChecker {
+ public:
+  JointChecker(const Scene& scene, const Scene& flat, Findings& findings)
+      : scene_(scene), flat_(flat), findings_(findings) {}
+
+  void run() {
+    check_unique();
+    for (const Joint& joint : scene_.joints) check(joint);
+    for (const ArticulationTemplate& articulation : scene_.articulations)
+      std::visit([this](const auto& a) { check(a); }, articulation);
+  }
+
+ private:
+  void fail(std::string path, std::string what) {
+    findings_.errors.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
+  }
+
+  void check_unique() {
+    std::vector<std::string> names;
+    for (const Joint& joint : flat_.joints) {
+      if (std::ranges::find(names, joint.name) != names.end())
+        return fail(joint.where.path + "/name", "the name '" + joint.name + "' is already that of another joint");
+      names.push_back(joint.name);
+    }
+  }
+
+  const Body* body(const std::string& path, const std::string& name) {
+    for (const std::vector<Body>* bodies : {&flat_.bodies, &scene_.bodies}) {
+      const auto it = std::ranges::find(*bodies, name, &Body::name);
+      if (it != bodies->end()) return &*it;
+    }
+    std::vector<std::string> names;
+    for (const Body& b : flat_.bodies) names.push_back(b.name);
+    fail(path, "there is no body '" + name + "'" + suggestion(name, names));
+    return nullptr;
+  }
+
+  void check(const Joint& joint) {
+    const std::string& path = joint.where.path;
+    const Body* a = joint.a.empty() ? nullptr : body(path + "/a", joint.a);
+    const Body* b = joint.b.empty() ? nullptr : body(path + "/b", joint.b);
+    if (!joint.a.empty() && joint.a == joint.b) fail(path + "/b", "is the same body as \"a\"");
+    const auto moves = [](const Body* body) { return body && body->motion == sim::MotionType::dynamic; };
+    if (a && (joint.b.empty() || b) && !moves(a) && !moves(b))
+      fail(path, "joins nothing that forces can move: one of its bodies must be dynamic");
+    const bool slides =
+        joint.type == sim::JointType::prismatic || joint.type == sim::JointType::distance;
+    if (joint.limits && !slides) fail(path + "/limits", "is for prismatic and distance joints; use \"limits_deg\"");
+    if (joint.limits_deg && slides) fail(path + "/limits_deg", "is for joints that turn; use \"limits\"");
+    check_limits(path + "/limits", joint.limits);
+    check_limits(path + "/limits_deg", joint.limits_deg);
+    if (joint.motor) check_motor(path + "/motor", joint);
+  }
+
+  void check_limits(const std::string& path, const std::optional<std::array<Real, 2>>& limits) {
+    if (limits && !((*limits)[0] <= 0 && (*limits)[1] >= 0))
+      fail(path, "must be a range that contains 0, where the joint is at time 0");
+  }
+
+  void check_motor(const std::string& path, const Joint& joint) {
+    if (joint.type != sim::JointType::revolute && joint.type != sim::JointType::prismatic &&
+        joint.type != sim::JointType::distance)
+      fail(path, "drives revolute, prismatic and distance joints only");
+    for (std::size_t i = 1; i < joint.motor->keys.size(); ++i)
+      if (!(joint.motor->keys[i].time > joint.motor->keys[i - 1].time))
+        fail(path + "/keys/" + std::to_string(i) + "/time", "must be later than that of the key before");
+  }
+
+  void check(const Chain& chain) {
+    if (chain.where.path.empty()) return;  // its type was wrong, and none was read
+    if ((chain.to - chain.from).norm() < 1e-6) fail(chain.where.path + "/to", "is where \"from\" is");
+    const auto is_still = [this](const std::string& end) {
+      const auto it = std::ranges::find(flat_.bodies, end, &Body::name);
+      return end == "world" || (it != flat_.bodies.end() && it->motion != sim::MotionType::dynamic);
+    };
+    if (is_still(chain.start) && is_still(chain.end) && chain.sag < 1.0005)
+      fail(chain.where.path + "/sag", "must be over 1.0005 if both ends are held still: a taut chain bears nothing across");
+    for (const auto& [key, end] : {std::pair("/start", &chain.start), {"/end", &chain.end}})
+      if (!end->empty() && *end != "world") body(chain.where.path + key, *end);
+  }
+  void check(const Bridge& bridge) {
+    if (bridge.where.path.empty()) return;
+    const Vec3 across = bridge.to - bridge.from;
+    if (across.cross(Vec3::UnitY()).norm() < 1e-3 * across.norm() || across.norm() < 1e-6)
+      fail(bridge.where.path + "/to", "must be away from \"from\", not straight above or below it");
+  }
+  void check(const Ragdoll&) {}
+
+  const Scene &scene_, &flat_;
+  Findings& findings_;
+};
+
+}  // namespace
+
+void check_joints(const Scene& scene, const Scene& flat, Findings& findings) {
+  JointChecker(scene, flat, findings).run();
+}
+
+}  // namespace offstage::producer

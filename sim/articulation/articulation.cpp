@@ -1,0 +1,325 @@
+#include "sim/articulation/articulation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "sim/dynamics/free_body.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Positions are put together in so many steps of Newton's method at most, until they are this near [m].
+constexpr int kMostSteps = 8;
+constexpr Real kTogether = 1e-12;
+/// What has come apart farther than this is brought back by no more in a step: its constraints say little about
+/// so far [m].
+constexpr Real kFarApart = 0.1;
+constexpr Real kSmall = 1e-4;
+constexpr int kVelocitySteps = 2;
+/// Velocities that fit together less than this have been changed from outside [m/s].
+constexpr Real kDisturbed = 1e-7;
+
+bool is_moved(const Body* body) {
+  return body && body->is_dynamic();
+}
+
+std::vector<Body*> dynamic_bodies(std::span<Joint* const> joints) {
+  std::vector<Body*> bodies;
+  for (const Joint* joint : joints)
+    for (Body* body : {joint->a, joint->b})
+      if (is_moved(body)) bodies.push_back(body);
+  std::sort(bodies.begin(), bodies.end(),
+            [](const Body* a, const Body* b) { return a->handle.index < b->handle.index; });
+  bodies.erase(std::unique(bodies.begin(), bodies.end()), bodies.end());
+  return bodies;
+}
+
+uint32_t index_in(std::span<Body* const> bodies, const Body* body) {
+  if (!is_moved(body)) return JointSystem::kDriven;
+  const auto at = std::lower_bound(
+      bodies.begin(), bodies.end(), body,
+      [](const Body* a, const Body* b) { return a->handle.index < b->handle.index; });
+  return static_cast<uint32_t>(at - bodies.begin());
+}
+
+JointSystem make_system(std::span<Body* const> bodies, std::span<Joint* const> joints) {
+  std::vector<JointSystem::Topology> topology;
+  for (const Joint* joint : joints)
+    topology.push_back(
+        {index_in(bodies, joint->a), index_in(bodies, joint->b), constraint_count(joint->def.type)});
+  return {static_cast<uint32_t>(bodies.size()), std::move(topology)};
+}
+
+LinkMotion motion_of(const RigidBody& rigid) {
+  return {rigid.position, rigid.orientation.toRotationMatrix(), rigid.velocity(), rigid.angular_velocity()};
+}
+
+LinkMobility mobility_of(const RigidBody& rigid, const Mat3& axes) {
+  return {1 / rigid.mass, axes * rigid.inverse_inertia * axes.transpose()};
+}
+
+Vec6 join(const Vec3& linear, const Vec3& angular) {
+  Vec6 v;
+  v << linear, angular;
+  return v;
+}
+
+}  // namespace
+
+LinkMotion link_motion(const Body* body, Real time) {
+  if (!body) return {};
+  if (body->is_dynamic()) return motion_of(body->rigid);
+  if (!body->is_kinematic()) return {.position = body->pose.position, .axes = body->pose.orientation.toRotationMatrix()};
+  const Motion m = body->def.track.at(time, body->def.pose);
+  return {m.pose.position, m.pose.orientation.toRotationMatrix(), m.velocity, m.angular_velocity};
+}
+
+JointFrame link_frame(const Body* body, const JointFrame& in_body) {
+  JointFrame frame = in_body;
+  if (is_moved(body)) frame.point -= body->rigid.centre;
+  return frame;
+}
+
+bool Joint::has_bounded_rows() const {
+  return def.lower > -JointDef::kFree || def.upper < JointDef::kFree || def.swing < JointDef::kFree ||
+         def.friction > 0 || def.damping > 0 || def.motor.mode != Motor::Mode::none;
+}
+
+Articulation::Articulation(std::vector<Joint*> joints)
+    : joints_(std::move(joints)), bodies_(dynamic_bodies(joints_)), system_(make_system(bodies_, joints_)) {
+  for (Joint* joint : joints_) {
+    joint->articulation = this;
+    has_bounded_rows_ |= joint->has_bounded_rows();
+    frames_a_.push_back(link_frame(joint->a, joint->on_a));
+    frames_b_.push_back(link_frame(joint->b, joint->on_b));
+  }
+  driven_a_.resize(joints_.size());
+  driven_b_.resize(joints_.size());
+  rows_.resize(joints_.size());
+  motion_.resize(bodies_.size());
+  mobility_.resize(bodies_.size());
+  velocities_.resize(bodies_.size());
+  change_.resize(joints_.size());
+  impulses_.resize(joints_.size());
+}
+
+uint32_t Articulation::index(const Body& body) const {
+  return index_in(bodies_, &body);
+}
+
+/// A link that a force F pulls at an arm r swings at w^2 = F K / r, where K is the mobility at the joint across the
+/// arm; a string of such links at up to twice that.
+Real Articulation::greatest_frequency() const {
+  Real greatest = 0;
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    const Real force = joints_[j]->force.norm();
+    const auto consider = [&](const Body* body, const JointFrame& frame) {
+      if (!is_moved(body)) return;
+      const Vec3& r = frame.point;
+      const Mat3& I = body->rigid.inverse_inertia;
+      const Real length = r.norm();
+      if (length < kTogether) return;
+      const Real turning = (r.squaredNorm() * I.trace() - r.dot(I * r)) / 2;
+      greatest = std::max(greatest, force * (1 / body->rigid.mass + turning) / length);
+    };
+    consider(joints_[j]->a, frames_a_[j]);
+    consider(joints_[j]->b, frames_b_[j]);
+  }
+  return std::sqrt(greatest);
+}
+
+void Articulation::begin_motion(Real t, Real h) {
+  // Of kinematic links the mean over the motion: their velocities may jump at keys.
+  const auto acceleration = [&](const Body* body) -> Driven {
+    if (!body || !body->is_kinematic()) return {};
+    const LinkMotion before = link_motion(body, t), after = link_motion(body, t + h);
+    return {(after.velocity - before.velocity) / h, (after.angular_velocity - before.angular_velocity) / h};
+  };
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    driven_a_[j] = acceleration(joints_[j]->a);
+    driven_b_[j] = acceleration(joints_[j]->b);
+  }
+}
+
+/// `still_a` and `still_b` keep the motion of links that are driven.
+JointPlace Articulation::place_of(std::size_t j, Real time, std::span<const LinkMotion> motion,
+                                  LinkMotion& still_a, LinkMotion& still_b) const {
+  const auto& [a, b, count] = system_.joints()[j];
+  const auto link = [&](uint32_t i, const Body* body, LinkMotion& still) -> const LinkMotion& {
+    return i != JointSystem::kDriven ? motion[i] : still = link_motion(body, time);
+  };
+  return {link(a, joints_[j]->a, still_a), frames_a_[j], link(b, joints_[j]->b, still_b), frames_b_[j]};
+}
+
+bool Articulation::set_rows(Real time, std::span<const LinkMotion> motion,
+                            std::span<const LinkMobility> mobility) {
+  LinkMotion still_a, still_b;
+  for (std::size_t j = 0; j < joints_.size(); ++j)
+    rows_[j] = joint_rows(joints_[j]->def.type, place_of(j, time, motion, still_a, still_b), joints_[j]->length);
+  return system_.factorize(rows_, mobility);
+}
+
+void Articulation::add_forces(Real t, std::span<const LinkMotion> motion, std::span<const LinkMobility> mobility,
+                              std::span<Vec6> forces) {
+  if (!set_rows(t, motion, mobility)) return;
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    // d/dt (I w) = torque: the angular acceleration has the turning of the inertia in it.
+    const Mat3& R = motion[i].axes;
+    const Vec3& w = motion[i].angular_velocity;
+    const Vec3 H = R * (bodies_[i]->rigid.inertia * (R.transpose() * w));
+    velocities_[i] = mobility[i].velocity(forces[i] - join(Vec3::Zero(), w.cross(H)));
+  }
+  system_.relative(velocities_, change_);
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    const auto& [a, b, count] = system_.joints()[j];
+    Vec6 known = change_[j] + rows_[j].bias;
+    if (a == JointSystem::kDriven)
+      known += rows_[j].on_a.transpose() * join(driven_a_[j].acceleration, driven_a_[j].angular_acceleration);
+    if (b == JointSystem::kDriven)
+      known += rows_[j].on_b.transpose() * join(driven_b_[j].acceleration, driven_b_[j].angular_acceleration);
+    change_[j] = -known;
+  }
+  system_.correct(change_, impulses_, velocities_);
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    const auto& [a, b, count] = system_.joints()[j];
+    if (a != JointSystem::kDriven) forces[a] += rows_[j].on_a * impulses_[j];
+    if (b != JointSystem::kDriven) forces[b] += rows_[j].on_b * impulses_[j];
+  }
+  tell(motion, 1, false);
+}
+
+/// The joints' forces by `impulses_`.
+void Articulation::tell(std::span<const LinkMotion> motion, Real duration, bool add) {
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    Joint& joint = *joints_[j];
+    const Vec6 on_a = rows_[j].on_a * impulses_[j] / duration;
+    const uint32_t a = system_.joints()[j].a;
+    const Mat3 axes = a != JointSystem::kDriven ? motion[a].axes : link_motion(joint.a, 0).axes;
+    const Vec3 force = on_a.head<3>();
+    // What keeps the axes together, without the moment of the force.
+    const Vec3 torque = on_a.tail<3>() - (axes * frames_a_[j].point).cross(force);
+    joint.force = add ? Vec3(joint.force + force) : force;
+    joint.torque = add ? Vec3(joint.torque + torque) : torque;
+  }
+}
+
+void Articulation::add_impulses(std::span<const Vec6> impulses, Real duration) {
+  impulses_.assign(impulses.begin(), impulses.end());
+  tell(motion_, duration, true);
+}
+
+void Articulation::count_turns(Real time) {
+  LinkMotion still_a, still_b;
+  read_bodies();
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    Joint& joint = *joints_[j];
+    if (!has_free_coordinate(joint.def.type)) continue;
+    const JointPlace place = place_of(j, time, motion_, still_a, still_b);
+    const Real now = free_row(joint.def.type, place, joint.length).error;
+    constexpr Real kTurn = 2 * std::numbers::pi;
+    const bool is_angle = joint.def.type != JointType::prismatic && joint.def.type != JointType::distance;
+    joint.coordinate = is_angle ? now + kTurn * std::round((joint.coordinate - now) / kTurn) : now;
+  }
+}
+
+void Articulation::read_bodies(bool at_start) {
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    const RigidBody& rigid = at_start ? bodies_[i]->start : bodies_[i]->rigid;
+    motion_[i] = motion_of(rigid);
+    mobility_[i] = mobility_of(rigid, motion_[i].axes);
+    velocities_[i] = join(motion_[i].velocity, motion_[i].angular_velocity);
+  }
+}
+
+void Articulation::place(Real time, bool at_start) {
+  read_bodies(at_start);
+  set_rows(time, motion_, mobility_);
+}
+
+/// J v, driven links included.
+void Articulation::residual(Real time, std::span<const Vec6> velocities, std::span<Vec6> result) const {
+  system_.relative(velocities, result);
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    const auto& [a, b, count] = system_.joints()[j];
+    const auto add = [&](const Body* body, const Mat6& on) {
+      if (!body || !body->is_kinematic()) return;
+      const LinkMotion m = link_motion(body, time);
+      result[j] += on.transpose() * join(m.velocity, m.angular_velocity);
+    };
+    if (a == JointSystem::kDriven) add(joints_[j]->a, system_.rows()[j].on_a);
+    if (b == JointSystem::kDriven) add(joints_[j]->b, system_.rows()[j].on_b);
+  }
+}
+
+void Articulation::pass_on_blows(Real time, JointTally& tally) {
+  LinkMotion still_a, still_b;
+  read_bodies();
+  Real fastest = 0;
+  for (std::size_t j = 0; j < joints_.size(); ++j)
+    rows_[j] = joint_rows(joints_[j]->def.type, place_of(j, time, motion_, still_a, still_b), joints_[j]->length);
+  system_.update(rows_);
+  residual(time, velocities_, change_);
+  for (const Vec6& c : change_) fastest = std::max(fastest, c.cwiseAbs().maxCoeff());
+  if (fastest > kDisturbed) settle(time, tally);
+}
+
+void Articulation::settle(Real time, JointTally& tally) {
+  LinkMotion still_a, still_b;
+  Real apart = 0;
+  std::vector<Pose> before(bodies_.size());  // of the centres
+  for (int step = 0; step < kMostSteps; ++step) {
+    read_bodies();
+    Real now = 0;
+    for (std::size_t j = 0; j < joints_.size(); ++j) {
+      rows_[j] =
+          joint_rows(joints_[j]->def.type, place_of(j, time, motion_, still_a, still_b), joints_[j]->length);
+      now = std::max(now, rows_[j].error.cwiseAbs().maxCoeff());
+    }
+    // One factorisation serves for small corrections.
+    if (step > 0 && now <= kSmall) {
+      system_.update(rows_);
+    } else if (!system_.factorize(rows_, mobility_)) {
+      ++tally.unsolved;
+      return;
+    }
+    // Where links are stretched out, Newton's method may lead away: never farther than it was.
+    if (step > 0 && now > apart) {
+      for (std::size_t i = 0; i < bodies_.size(); ++i) {
+        const Vec3 w = motion_[i].angular_velocity;
+        bodies_[i]->rigid.position = before[i].position;
+        bodies_[i]->rigid.orientation = before[i].orientation;
+        bodies_[i]->rigid.set_velocity(motion_[i].velocity, w);
+      }
+      break;
+    }
+    const bool is_slow = step > 0 && now > 0.5 * apart;
+    apart = now;
+    if (now <= kTogether || is_slow) break;
+    for (std::size_t i = 0; i < bodies_.size(); ++i)
+      before[i] = {bodies_[i]->rigid.position, bodies_[i]->rigid.orientation};
+    for (std::size_t j = 0; j < joints_.size(); ++j)
+      change_[j] = -rows_[j].error * std::min(1.0, kFarApart / std::max(now, kTogether));
+    std::vector<Vec6> shift(bodies_.size(), Vec6::Zero());
+    system_.correct(change_, impulses_, shift);
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+      RigidBody& r = bodies_[i]->rigid;
+      const Vec3 w = r.angular_velocity();
+      r.position += shift[i].head<3>();
+      r.orientation = (rotation(shift[i].tail<3>(), 1) * r.orientation).normalized();
+      r.set_velocity(r.velocity(), w);
+    }
+  }
+  tally.error = std::max(tally.error, apart);
+  if (apart > kSmall) ++tally.unsolved;
+  read_bodies();
+  for (int k = 0; k < kVelocitySteps; ++k) {
+    residual(time, velocities_, change_);
+    for (Vec6& c : change_) c = -c;
+    system_.correct(change_, impulses_, velocities_);
+  }
+  for (std::size_t i = 0; i < bodies_.size(); ++i)
+    bodies_[i]->rigid.set_velocity(velocities_[i].head<3>(), velocities_[i].tail<3>());
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,115 @@
+#pragma once
+/// Bodies that joints hold together (physics A1, A4, A5): the joint forces of their motion, so that they stay
+/// together to the integrator's accuracy, and the removal of what it leaves.
+
+#include <array>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "sim/articulation/joint_system.h"
+#include "sim/body.h"
+
+namespace offstage::sim {
+
+class Articulation;
+
+/// A joint of the world.
+struct Joint {
+  JointDef def;
+  JointHandle handle;
+  Body *a = nullptr, *b = nullptr;  ///< b may be null: the world
+  JointFrame on_a, on_b;            ///< in the bodies' frames
+  Real length = 0;                  ///< of a rod
+  Articulation* articulation = nullptr;
+
+  bool is_broken = false;
+  Real coordinate = 0;                               ///< the free one, with whole turns
+  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  ///< on a at its anchor, of the last sub-step
+  std::array<Real, 9> efforts = {};                  ///< of its rows with bounds, as a guess (joint_limits.h)
+
+  /// Whether it does more than hold its bodies together.
+  bool has_bounded_rows() const;
+};
+
+/// What joints did in a step: figures for StepReport.
+struct JointTally {
+  uint64_t unsolved = 0;  ///< systems that could not be factored, or positions that did not come together
+  Real error = 0;         ///< greatest that was left of a constraint [m], of angles [rad]
+
+  void add(const JointTally& t) {
+    unsolved += t.unsolved;
+    error = error < t.error ? t.error : error;
+  }
+};
+
+/// Motion of a body's centre of mass, or origin if it is not dynamic, at a time.
+LinkMotion link_motion(const Body* body, Real time);
+/// Where a joint is on a body, from the point that link_motion() tells of.
+JointFrame link_frame(const Body* body, const JointFrame& in_body);
+
+class Articulation {
+ public:
+  /// All joints of one connected component, of which each joins at least one dynamic body.
+  explicit Articulation(std::vector<Joint*> joints);
+
+  std::span<Body* const> bodies() const { return bodies_; }  ///< the dynamic ones, in slot order
+  std::span<Joint* const> joints() const { return joints_; }
+
+  /// An estimate of the fastest swinging of links under the forces that their joints had last [rad/s].
+  Real greatest_frequency() const;
+  /// A motion from t to t + h begins.
+  void begin_motion(Real t, Real h);
+  /// At a time within: adds the joint forces to `forces` [force, torque] of the links, which are about to move
+  /// from `motion` under these.
+  void add_forces(Real t, std::span<const LinkMotion> motion, std::span<const LinkMobility> mobility,
+                  std::span<Vec6> forces);
+  /// Passes on, through the joints, what has pushed single bodies since they were settled last.
+  void pass_on_blows(Real time, JointTally& tally);
+  /// Puts the bodies' `rigid` back together at a time: positions by the shortest way, weighted with the masses,
+  /// then velocities.
+  void settle(Real time, JointTally& tally);
+
+  /// Takes the constraints of the bodies as `rigid` has them, for what impulses of contacts add to their motion;
+  /// or as they were at their interval's `start`.
+  void place(Real time, bool at_start = false);
+  /// Where a joint is, since place().
+  JointPlace joint_place(std::size_t j, Real time, LinkMotion& still_a, LinkMotion& still_b) const {
+    return place_of(j, time, motion_, still_a, still_b);
+  }
+  bool has_bounded_rows() const { return has_bounded_rows_; }
+  const JointSystem& system() const { return system_; }
+  JointSystem& system() { return system_; }
+  /// The joints also tell of these impulses, over a duration, besides those of the motion.
+  void add_impulses(std::span<const Vec6> impulses, Real duration);
+  /// Brings the free coordinates up to date, which count whole turns; at least once in half a turn.
+  void count_turns(Real time);
+
+  uint32_t index(const Body& body) const;
+
+ private:
+  struct Driven {
+    Vec3 acceleration = Vec3::Zero(), angular_acceleration = Vec3::Zero();
+  };
+
+  JointPlace place_of(std::size_t j, Real time, std::span<const LinkMotion> motion, LinkMotion& still_a,
+                      LinkMotion& still_b) const;
+  bool set_rows(Real time, std::span<const LinkMotion> motion, std::span<const LinkMobility> mobility);
+  void read_bodies(bool at_start = false);
+  void residual(Real time, std::span<const Vec6> velocities, std::span<Vec6> result) const;
+  void tell(std::span<const LinkMotion> motion, Real duration, bool add);
+
+  std::vector<Joint*> joints_;
+  std::vector<Body*> bodies_;
+  std::vector<JointFrame> frames_a_, frames_b_;  // from the links' centres
+  std::vector<Driven> driven_a_, driven_b_;      // in this motion
+  bool has_bounded_rows_ = false;
+  JointSystem system_;
+
+  std::vector<JointRows> rows_;
+  std::vector<LinkMotion> motion_;
+  std::vector<LinkMobility> mobility_;
+  std::vector<Vec6> velocities_, change_, impulses_;
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,27 @@
+#pragma once
+/// Limits, motors, friction and damping of joints as rows with bounds (physics A6).
+
+#include <vector>
+
+#include "sim/articulation/articulation.h"
+#include "sim/contact/joint_problem.h"
+
+namespace offstage::sim {
+
+/// Where the row of a joint with bounds comes from.
+struct BoundedOrigin {
+  Joint* joint;
+  std::size_t slot;  ///< in Joint::efforts
+  /// It says where the joint may be at the interval's end, not how it moves until then.
+  bool is_stop;
+};
+
+/// The rows of an articulation, after its place(), for an interval of a length that ends at `time`. Its bodies
+/// have the indices Body::row. Appends.
+void collect_bounded_rows(const Articulation& articulation, Real duration, Real time,
+                          std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins);
+
+/// Those of limits that are reached, for a collision at `time`.
+void collect_stops(const Articulation& articulation, Real time, std::vector<BoundedRow>& rows);
+
+}  // namespace offstage::sim
