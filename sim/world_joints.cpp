@@ -137,13 +137,13 @@ JointState World::joint(JointHandle handle) const {
   state.axis = place.axes_b.col(2);
   state.force = joint.force;
   state.torque = joint.torque;
-  state.coordinate = joint.coordinate;
   state.broken = joint.is_broken;
   if (has_free_coordinate(joint.def.type)) {
     const JointRow row = free_row(joint.def.type, place, joint.length);
     Vec6 va, vb;
     va << a.velocity, a.angular_velocity;
     vb << b.velocity, b.angular_velocity;
+    state.coordinate = counts_turns(joint) ? joint.coordinate : row.error;
     state.speed = row.on_a.dot(va) + row.on_b.dot(vb);
   }
   const JointRows rows = joint_rows(joint.def.type, place, joint.length);

@@ -67,6 +67,10 @@ Vec6 join(const Vec3& linear, const Vec3& angular) {
 
 }  // namespace
 
+bool counts_turns(const Joint& joint) {
+  return joint.def.type == JointType::revolute || joint.def.type == JointType::universal;
+}
+
 LinkMotion link_motion(const Body* body, Real time) {
   if (!body) return {};
   if (body->is_dynamic()) return motion_of(body->rigid);
@@ -91,6 +95,7 @@ Articulation::Articulation(std::vector<Joint*> joints)
   for (Joint* joint : joints_) {
     joint->articulation = this;
     has_bounded_rows_ |= joint->has_bounded_rows();
+    for (const Body* body : {joint->a, joint->b}) has_kinematic_ |= body && body->is_kinematic();
     frames_a_.push_back(link_frame(joint->a, joint->on_a));
     frames_b_.push_back(link_frame(joint->b, joint->on_b));
   }
@@ -210,16 +215,16 @@ void Articulation::add_impulses(std::span<const Vec6> impulses, Real duration) {
 }
 
 void Articulation::count_turns(Real time) {
+  if (std::none_of(joints_.begin(), joints_.end(), [](const Joint* j) { return counts_turns(*j); })) return;
   LinkMotion still_a, still_b;
   read_bodies();
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     Joint& joint = *joints_[j];
-    if (!has_free_coordinate(joint.def.type)) continue;
+    if (!counts_turns(joint)) continue;
     const JointPlace place = place_of(j, time, motion_, still_a, still_b);
     const Real now = free_row(joint.def.type, place, joint.length).error;
     constexpr Real kTurn = 2 * std::numbers::pi;
-    const bool is_angle = joint.def.type != JointType::prismatic && joint.def.type != JointType::distance;
-    joint.coordinate = is_angle ? now + kTurn * std::round((joint.coordinate - now) / kTurn) : now;
+    joint.coordinate = now + kTurn * std::round((joint.coordinate - now) / kTurn);
   }
 }
 
@@ -253,6 +258,12 @@ void Articulation::residual(Real time, std::span<const Vec6> velocities, std::sp
 }
 
 void Articulation::pass_on_blows(Real time, JointTally& tally) {
+  const bool is_settled = std::equal(bodies_.begin(), bodies_.end(), settled_.begin(), settled_.end(),
+                                     [](const Body* body, const Momenta& m) {
+                                       return body->rigid.momentum == m.linear &&
+                                              body->rigid.angular_momentum == m.angular;
+                                     });
+  if (is_settled && !has_kinematic_) return;
   LinkMotion still_a, still_b;
   read_bodies();
   Real fastest = 0;
@@ -320,6 +331,8 @@ void Articulation::settle(Real time, JointTally& tally) {
   }
   for (std::size_t i = 0; i < bodies_.size(); ++i)
     bodies_[i]->rigid.set_velocity(velocities_[i].head<3>(), velocities_[i].tail<3>());
+  settled_.clear();
+  for (const Body* body : bodies_) settled_.push_back({body->rigid.momentum, body->rigid.angular_momentum});
 }
 
 }  // namespace offstage::sim

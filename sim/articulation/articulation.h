@@ -24,7 +24,7 @@ struct Joint {
   Articulation* articulation = nullptr;
 
   bool is_broken = false;
-  Real coordinate = 0;                               ///< the free one, with whole turns
+  Real coordinate = 0;                               ///< of joints that count turns
   Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  ///< on a at its anchor, of the last sub-step
   std::array<Real, 9> efforts = {};                  ///< of its rows with bounds, as a guess (joint_limits.h)
 
@@ -43,6 +43,8 @@ struct JointTally {
   }
 };
 
+/// Whether its coordinate is an angle that can go round and round; then Joint::coordinate counts its turns.
+bool counts_turns(const Joint& joint);
 /// Motion of a body's centre of mass, or origin if it is not dynamic, at a time.
 LinkMotion link_motion(const Body* body, Real time);
 /// Where a joint is on a body, from the point that link_motion() tells of.
@@ -82,7 +84,7 @@ class Articulation {
   JointSystem& system() { return system_; }
   /// The joints also tell of these impulses, over a duration, besides those of the motion.
   void add_impulses(std::span<const Vec6> impulses, Real duration);
-  /// Brings the free coordinates up to date, which count whole turns; at least once in half a turn.
+  /// Brings the coordinates that count whole turns up to date; at least once in half a turn.
   void count_turns(Real time);
 
   uint32_t index(const Body& body) const;
@@ -90,6 +92,10 @@ class Articulation {
  private:
   struct Driven {
     Vec3 acceleration = Vec3::Zero(), angular_acceleration = Vec3::Zero();
+  };
+
+  struct Momenta {
+    Vec3 linear, angular;
   };
 
   JointPlace place_of(std::size_t j, Real time, std::span<const LinkMotion> motion, LinkMotion& still_a,
@@ -103,7 +109,8 @@ class Articulation {
   std::vector<Body*> bodies_;
   std::vector<JointFrame> frames_a_, frames_b_;  // from the links' centres
   std::vector<Driven> driven_a_, driven_b_;      // in this motion
-  bool has_bounded_rows_ = false;
+  bool has_bounded_rows_ = false, has_kinematic_ = false;
+  std::vector<Momenta> settled_;  // of the bodies, as settle() left them
   JointSystem system_;
 
   std::vector<JointRows> rows_;

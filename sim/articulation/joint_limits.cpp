@@ -16,10 +16,6 @@ constexpr Real kNear = 0.02, kReached = 1e-4;
 /// Slots of Joint::efforts.
 enum Slot : std::size_t { kLimit = 0, kSwing = 1, kMotor = 2, kFriction = 3, kDamping = 6 };
 
-bool is_angle(JointType type) {
-  return type != JointType::prismatic && type != JointType::distance;
-}
-
 /// One joint's rows.
 class RowMaker {
  public:
@@ -55,7 +51,7 @@ class RowMaker {
   /// The free coordinate with its whole turns.
   JointRow free() const {
     JointRow row = free_row(def_.type, place_, joint_.length);
-    if (!is_angle(def_.type)) return row;
+    if (!counts_turns(joint_)) return row;
     constexpr Real kTurn = 2 * std::numbers::pi;
     row.error += kTurn * std::round((joint_.coordinate - row.error) / kTurn);
     return row;
