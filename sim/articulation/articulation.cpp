@@ -109,10 +109,6 @@ Articulation::Articulation(std::vector<Joint*> joints)
   impulses_.resize(joints_.size());
 }
 
-uint32_t Articulation::index(const Body& body) const {
-  return index_in(bodies_, &body);
-}
-
 /// A link that a force F pulls at an arm r swings at w^2 = F K / r, where K is the mobility at the joint across the
 /// arm; a string of such links at up to twice that.
 Real Articulation::greatest_frequency() const {
@@ -167,7 +163,7 @@ bool Articulation::set_rows(Real time, std::span<const LinkMotion> motion,
 
 void Articulation::add_forces(Real t, std::span<const LinkMotion> motion, std::span<const LinkMobility> mobility,
                               std::span<Vec6> forces) {
-  if (!set_rows(t, motion, mobility)) return;
+  if (!set_rows(t, motion, mobility)) return;  // settle() will find the same, and count it
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     // d/dt (I w) = torque: the angular acceleration has the turning of the inertia in it.
     const Mat3& R = motion[i].axes;

@@ -87,8 +87,6 @@ class Articulation {
   /// Brings the coordinates that count whole turns up to date; at least once in half a turn.
   void count_turns(Real time);
 
-  uint32_t index(const Body& body) const;
-
  private:
   struct Driven {
     Vec3 acceleration = Vec3::Zero(), angular_acceleration = Vec3::Zero();

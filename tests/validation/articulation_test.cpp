@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <oneapi/tbb/global_control.h>
 
 #include "tests/validation/both_solvers.h"
 
@@ -513,6 +514,35 @@ TEST_P(Joints, LieStillOnTheFloorAndSleep) {
   EXPECT_EQ(all.last.bodies_asleep, 8u);
   EXPECT_LT(all.penetration, 1e-3);
   EXPECT_EQ(all.exact_fallbacks + all.fast_fallbacks + all.cut_short, 0u);
+}
+
+TEST_P(Joints, MoveTheSameWayForAnyNumberOfThreads) {
+  const auto hash = [&](std::size_t threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    World world(def());
+    BodyDef floor;
+    floor.shape = Plane{};
+    floor.motion = MotionType::fixed;
+    world.add_body(floor);
+    // Chains in a heap.
+    for (int chain = 0; chain < 8; ++chain) {
+      JointDef joint{.swing = 1, .friction = 0.05};
+      for (int i = 0; i < 6; ++i) {
+        const BodyHandle last = joint.a;
+        const Vec3 position(0.22 * i + 0.05 * (chain % 3), 0.3 + 0.15 * chain, 0.04 * (chain % 5));
+        joint.a = add_box(world, {0.2, 0.1, 0.1}, 1, position, Quat::Identity(), true);
+        joint.b = last;
+        joint.axis = Vec3::UnitX();
+        joint.anchor = position - Vec3(0.11, 0, 0);
+        if (i > 0) world.add_joint(joint);
+      }
+    }
+    run(world, 0.5);
+    return world.state_hash();
+  };
+  const StateHash one = hash(1);
+  EXPECT_EQ(hash(2), one);
+  EXPECT_EQ(hash(2), one);
 }
 
 OFFSTAGE_BOTH_SOLVERS(Solvers, Joints);
