@@ -525,7 +525,7 @@ TEST_P(Joints, MoveTheSameWayForAnyNumberOfThreads) {
     floor.motion = MotionType::fixed;
     world.add_body(floor);
     // Chains in a heap.
-    for (int chain = 0; chain < 8; ++chain) {
+    for (int chain = 0; chain < 4; ++chain) {
       JointDef joint{.swing = 1, .friction = 0.05};
       for (int i = 0; i < 6; ++i) {
         const BodyHandle last = joint.a;
