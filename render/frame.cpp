@@ -170,6 +170,7 @@ SampleOffsets sample_offsets(int i, int n) {
   return {.pixel = hammersley(permuted(0.618, 0)),
           .lens = hammersley(permuted(0.414, n / 3)),
           .light = hammersley(permuted(0.236, n / 2)),
+          .index = i,
           .count = n};
 }
 

@@ -1,6 +1,8 @@
 #include "render/mesh_pass.h"
 
 #include <algorithm>
+#include <bit>
+#include <numeric>
 
 #include "render/texture.h"
 
@@ -30,6 +32,32 @@ const Image* texture_at(std::span<const Image> textures, int index) {
              : nullptr;
 }
 
+/// Whether each edge is passed through once in either direction; corners count as one where they coincide.
+bool is_closed(const Mesh& mesh) {
+  const auto bits = [](float x) { return std::bit_cast<uint32_t>(x + 0.0f); };  // -0 is 0
+  const auto before = [&](uint32_t a, uint32_t b) {
+    const Vector3f &p = mesh.positions[a], &q = mesh.positions[b];
+    return std::array{bits(p.x()), bits(p.y()), bits(p.z())} < std::array{bits(q.x()), bits(q.y()), bits(q.z())};
+  };
+  std::vector<uint32_t> order(mesh.positions.size()), place(order.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::sort(order.begin(), order.end(), before);
+  for (std::size_t i = 0; i < order.size(); ++i)
+    place[order[i]] = i > 0 && !before(order[i - 1], order[i]) ? place[order[i - 1]] : order[i];
+
+  std::vector<uint64_t> edges, reversed;
+  for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const uint64_t a = place[mesh.indices[i + k]], b = place[mesh.indices[i + (k + 1) % 3]];
+      if (a == b) continue;
+      edges.push_back(a << 32 | b);
+      reversed.push_back(b << 32 | a);
+    }
+  std::sort(edges.begin(), edges.end());
+  std::sort(reversed.begin(), reversed.end());
+  return edges == reversed;
+}
+
 }  // namespace
 
 struct MeshPass::Item {
@@ -55,6 +83,7 @@ GpuMesh::GpuMesh(const Mesh& source) : vertex_array(gl::make_vertex_array()) {
   center = box.isEmpty() ? Vector3f(0, 0, 0) : Vector3f(box.center());
   for (const Vector3f& p : mesh->positions) radius = std::max(radius, (p - center).norm());
   thickness = box.isEmpty() ? 0 : box.sizes().minCoeff();
+  closed = is_closed(*mesh);
   flat = !box.isEmpty() && box.sizes().minCoeff() <= 1e-4f * box.sizes().maxCoeff();
 
   index_count = static_cast<GLsizei>(mesh->indices.size());
@@ -226,17 +255,21 @@ gl::LazyProgram& MeshPass::shadow_program(const GpuMaterial& material) {
   return material.textured ? textured_shadow_ : dithered_shadow_;
 }
 
-void MeshPass::draw_shadows(const Matrix4f& shadow_clip_from_world) {
+void MeshPass::draw_shadows(const Matrix4f& shadow_clip_from_world, bool front_only) {
   for (const Batch& batch : casters_) {
     shadow_program(*batch.material).use();
     glUniformMatrix4fv(0, 1, GL_FALSE, shadow_clip_from_world.data());
+    const GpuMaterial& material = *batch.material;
+    set_facing(batch, !(front_only && batch.mesh->closed && !material.blended && !material.glass));
     bind(*batch.material);
     draw(batch, shadow_rows_);
   }
+  glDisable(GL_CULL_FACE);
+  glFrontFace(GL_CCW);
 }
 
-void MeshPass::set_facing(const Batch& batch) {
-  (batch.material->two_sided ? glDisable : glEnable)(GL_CULL_FACE);
+void MeshPass::set_facing(const Batch& batch, bool both_sides) {
+  (both_sides ? glDisable : glEnable)(GL_CULL_FACE);
   glFrontFace(batch.mirrored ? GL_CW : GL_CCW);
 }
 
@@ -244,7 +277,7 @@ void MeshPass::draw_depth(const Matrix4f& clip_from_world) {
   opaque_shadow_.use();
   glUniformMatrix4fv(0, 1, GL_FALSE, clip_from_world.data());
   for (const Batch& batch : opaque_) {
-    set_facing(batch);
+    set_facing(batch, batch.material->two_sided);
     draw(batch, rows_);
   }
 }
@@ -254,7 +287,7 @@ void MeshPass::draw_opaque() {
   const auto draw_batch = [this](const Batch& batch) {
     surface_program(*batch.material).use();
     glUniform1f(0, kOpaqueAlpha);
-    set_facing(batch);
+    set_facing(batch, batch.material->two_sided);
     bind(*batch.material);
     draw(batch, rows_);
   };
@@ -269,7 +302,7 @@ void MeshPass::draw_glass() {
     surface_program(*batch.material).use();
     glUniform1f(0, 0);
     glUniform1f(1, batch.thickness);
-    set_facing(batch);
+    set_facing(batch, batch.material->two_sided);
     bind(*batch.material);
     draw(batch, rows_);
   }
@@ -280,7 +313,7 @@ void MeshPass::draw_blended() {
   for (const Batch& batch : blended_) {
     surface_program(*batch.material).use();
     glUniform1f(0, kVisibleAlpha);
-    set_facing(batch);
+    set_facing(batch, batch.material->two_sided);
     bind(*batch.material);
     draw(batch, rows_);
   }

@@ -24,6 +24,7 @@ struct GpuMesh {
   float radius = 0;
   float thickness = 0;  ///< the least side of the box around it
   bool flat = false;    ///< lies in a plane along an axis
+  bool closed = false;  ///< every edge has a triangle on either side, so that the front hides the back
 };
 
 /// The uniform block of shaders/material.glsl.
@@ -64,7 +65,8 @@ class MeshPass {
   MeshPass();
   /// Sorts what is visible for this view. The instances must stay where they are until it is drawn.
   void prepare(std::span<const Instance* const> instances, const View& view, const Features& features);
-  void draw_shadows(const Matrix4f& shadow_clip_from_world);
+  /// `front_only`: of closed opaque meshes only the side that the light falls on; the matrix must not mirror.
+  void draw_shadows(const Matrix4f& shadow_clip_from_world, bool front_only);
   /// Depth alone of what is wholly opaque, so that only what is seen is shaded.
   void draw_depth(const Matrix4f& clip_from_world);
   void draw_opaque();
@@ -88,7 +90,7 @@ class MeshPass {
   void bind(const GpuMaterial& material);
   gl::LazyProgram& surface_program(const GpuMaterial& material);
   gl::LazyProgram& shadow_program(const GpuMaterial& material);
-  static void set_facing(const Batch& batch);
+  static void set_facing(const Batch& batch, bool both_sides);
 
   std::map<std::tuple<Pattern, bool, bool, Features>, gl::LazyProgram>
       surface_programs_;  ///< textured, glass

@@ -63,7 +63,7 @@ void append_cap(std::vector<ProfilePoint>& profile, float radius, float center_y
 // Grid lines of a box's axis: the flat part, and the bevel's arc in equal angles when projected from its
 // centre.
 std::vector<float> box_lines(float half, float bevel) {
-  constexpr int kArcSteps = 3;
+  constexpr int kArcSteps = 1;
   if (bevel <= 0) return {-half, half};
   std::vector<float> lines;
   for (int k = kArcSteps; k >= 0; --k) {

@@ -107,7 +107,7 @@ inline void draw_lanes(const StreakSplat& s, float dx, float dy, std::size_t at,
   const Lanes m = 1 - square_root(1 - side * side), m2 = m * m;
   const Lanes mirrored = 0.02f + 0.98f * (m2 * m2 * m);
   const auto add_light = [&](std::array<float, kTilePixels>& plane, std::size_t c) {
-    lanes_of(plane, at) += seen * (s.light[c] + mirrored * (s.rim[c] + s.rim_slope[c] * side - s.light[c]));
+    lanes_of(plane, at) += seen * (s.light.middle[c] + mirrored * (s.light.rim[c] + s.light.rim_slope[c] * side - s.light.middle[c]));
   };
   add_light(tile.red, 0);
   add_light(tile.green, 1);
@@ -150,9 +150,6 @@ Splat in_bytes(Splat s) {
     r[0] -= r[1] + r[2] + r[3];
     for (std::size_t k = 1; k < 4; ++k) r[k] /= 127.5f;
   }
-  return s;
-}
-StreakSplat in_bytes(const StreakSplat& s) {
   return s;
 }
 
@@ -205,7 +202,7 @@ void draw_tile(std::span<const S> splats, std::span<const uint32_t> order, int t
 }
 
 template <class S>
-void draw_by_tiles(std::span<const S> front_to_back, SplatPicture& picture) {
+void draw_by_tiles(std::span<const S> splats, SplatPicture& picture) {
   picture.x0 = picture.y0 = picture.x1 = picture.y1 = 0;
   const int nx = (picture.width_px + kTileWidth_px - 1) / kTileWidth_px;
   const int ny = (picture.height_px + kTileHeight_px - 1) / kTileHeight_px;
@@ -213,12 +210,10 @@ void draw_by_tiles(std::span<const S> front_to_back, SplatPicture& picture) {
       static_cast<std::size_t>(picture.width_px) * static_cast<std::size_t>(picture.height_px);
   picture.rgbt.resize(4 * pixels);
 
-  std::vector<S> splats(front_to_back.size());
   std::vector<TileRange> ranges(splats.size());
   std::vector<uint32_t> begins(static_cast<std::size_t>(nx * ny) + 1, 0);
   TileRange touched{nx, ny, 0, 0};
   for (std::size_t i = 0; i < splats.size(); ++i) {
-    splats[i] = in_bytes(front_to_back[i]);
     const TileRange r = ranges[i] = tiles_of(splats[i], picture);
     for (int y = r.y0; y < r.y1; ++y)
       for (int x = r.x0; x < r.x1; ++x) ++begins[static_cast<std::size_t>(y * nx + x) + 1];
@@ -238,7 +233,7 @@ void draw_by_tiles(std::span<const S> front_to_back, SplatPicture& picture) {
   tbb::parallel_for(0, columns * rows, [&](int k) {
     const int x = touched.x0 + k % columns, y = touched.y0 + k / columns;
     const auto t = static_cast<std::size_t>(y * nx + x);
-    draw_tile(std::span<const S>(splats),
+    draw_tile(splats,
               std::span<const uint32_t>(orders).subspan(begins[t], begins[t + 1] - begins[t]),
               x * kTileWidth_px, y * kTileHeight_px, picture);
   });
@@ -251,7 +246,9 @@ void draw_by_tiles(std::span<const S> front_to_back, SplatPicture& picture) {
 }  // namespace
 
 void draw_splats(std::span<const Splat> front_to_back, SplatPicture& picture) {
-  draw_by_tiles(front_to_back, picture);
+  std::vector<Splat> splats(front_to_back.size());
+  std::ranges::transform(front_to_back, splats.begin(), in_bytes);
+  draw_by_tiles(std::span<const Splat>(splats), picture);
 }
 void draw_splats(std::span<const StreakSplat> front_to_back, SplatPicture& picture) {
   draw_by_tiles(front_to_back, picture);

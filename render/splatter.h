@@ -24,6 +24,11 @@ struct Splat {
   PuffAtlas::Level cell;
 };
 
+/// What a streak sends to the eye: radiance in the middle, and mirrored at the sides, by the place across.
+struct StreakLight {
+  float middle[3], rim[3], rim_slope[3];
+};
+
 /// One streak on the screen: the stroke of a soft round pen.
 struct StreakSplat {
   float x, y;
@@ -34,7 +39,7 @@ struct StreakSplat {
   float inverse_reach;                   ///< 1 / (2 * radius) [1/m]
   float opacity, cover;                  ///< as of a Splat
   float softness, taper;                 ///< as in PointsDef
-  float light[3], rim[3], rim_slope[3];  ///< radiance in the middle; mirrored at the sides, by place across
+  StreakLight light;
 };
 
 /// What splats are drawn in. Premultiplied colour, and the share of what is behind that still shows.

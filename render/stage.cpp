@@ -21,21 +21,22 @@ namespace offstage::render {
 namespace {
 
 constexpr GLuint kFrameBlock = 0, kSceneDepthUnit = 4, kBehindUnit = 12;
+constexpr int kStrip_px = 32;   // rows that are read back at once: they stay in the processor's cache
 constexpr float kReach = 0.1f;  // how far things hide the sky, as a share of the distance to the target
 
-/// Colour and depth of the picture, and the copy of depth that particles read while they are drawn.
+/// Colour and depth of the picture.
 struct Picture {
-  gl::Texture color, depth, depth_copy;
-  gl::Framebuffer framebuffer, depth_copy_framebuffer;
+  gl::Texture color, depth;
+  gl::Framebuffer framebuffer;
+  gl::Texture depth_copy;  ///< that particles read while they are drawn; made when there are some
+  gl::Framebuffer depth_copy_framebuffer;
   gl::Texture behind;  ///< what is seen through glass; made when there is some
   gl::Framebuffer behind_framebuffer;
 
   Picture(int width_px, int height_px)
       : color(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)),
         depth(gl::make_target(GL_DEPTH_COMPONENT32F, width_px, height_px, GL_NEAREST)),
-        depth_copy(gl::make_target(GL_DEPTH_COMPONENT32F, width_px, height_px, GL_NEAREST)),
-        framebuffer(gl::make_framebuffer(color, depth)),
-        depth_copy_framebuffer(gl::make_framebuffer(0, depth_copy)) {}
+        framebuffer(gl::make_framebuffer(color, depth)) {}
 };
 
 /// Tells the sub-frames of a frame apart.
@@ -53,13 +54,17 @@ Vector4f penumbra_of(const ShadowFrame& shadow, const Sun& sun, float size_px, i
           ratio * ratio, taps};
 }
 
-void add_bottom_up(const std::vector<float>& pixels, HdrImage& sum) {
+/// Adds what is in the bound framebuffer, whose rows run from the bottom up.
+void add_picture(std::vector<float>& strip, HdrImage& sum) {
   const std::size_t row = static_cast<std::size_t>(sum.width_px) * 4;
-  const auto height = static_cast<std::size_t>(sum.height_px);
-  for (std::size_t y = 0; y < height; ++y) {
-    const float* in = pixels.data() + (height - 1 - y) * row;
-    float* out = sum.rgba.data() + y * row;
-    for (std::size_t i = 0; i < row; ++i) out[i] += in[i];
+  for (int bottom = 0; bottom < sum.height_px; bottom += kStrip_px) {
+    const int rows = std::min(kStrip_px, sum.height_px - bottom);
+    glReadPixels(0, bottom, sum.width_px, rows, GL_RGBA, GL_FLOAT, strip.data());
+    for (int y = 0; y < rows; ++y) {
+      const float* in = strip.data() + static_cast<std::size_t>(y) * row;
+      float* out = sum.rgba.data() + static_cast<std::size_t>(sum.height_px - 1 - bottom - y) * row;
+      for (std::size_t i = 0; i < row; ++i) out[i] += in[i];
+    }
   }
 }
 
@@ -95,7 +100,7 @@ struct Stage::Impl {
                               {"frame.glsl", "sky.glsl", "noise.glsl", "sky.frag"}};
   gl::VertexArray no_attributes = gl::make_vertex_array();
   gl::StreamBuffer frame_buffer;
-  std::vector<float> pixels;
+  std::vector<float> strip;
 
   explicit Impl(const StageDef& stage_def)
       : def(stage_def),
@@ -104,7 +109,7 @@ struct Stage::Impl {
         occlusion_pass(def.width_px, def.height_px),
         puffs_pass(def.width_px, def.height_px),
         streaks_pass(def.width_px, def.height_px),
-        pixels(static_cast<std::size_t>(def.width_px) * static_cast<std::size_t>(def.height_px) * 4) {
+        strip(static_cast<std::size_t>(def.width_px) * kStrip_px * 4) {
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
     gl::check_error("making the stage");
   }
@@ -123,7 +128,8 @@ struct Stage::Impl {
   void draw_glass();
   void draw_depth(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view);
   void draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets);
-  void draw_blended(std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame);
+  void draw_blended(std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame,
+                    bool new_frame);
   void draw_lines(const View& view);
 };
 
@@ -187,7 +193,7 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
   if (shadow.texel_m == 0) return;
 
   shadow_map.begin();
-  mesh_pass.draw_shadows(shadow.clip_from_world);
+  mesh_pass.draw_shadows(shadow.clip_from_world, true);
   for (const Cloth* cloth : sheets) {
     if (cloth->casts_shadow) cloth_pass.draw_shadow(*cloth, shadow.clip_from_world);
   }
@@ -215,7 +221,7 @@ void Stage::Impl::draw_lamp_shadows(std::span<const Caster> casters, std::span<c
   for (const LampPass::Tile& tile : lamp_pass.tiles()) {
     if (std::none_of(casters.begin(), casters.end(), [&](const Caster& c) { return tile.sees(c); })) continue;
     lamp_pass.begin(tile);
-    mesh_pass.draw_shadows(tile.clip_from_world);
+    mesh_pass.draw_shadows(tile.clip_from_world, false);
     for (const Cloth* cloth : sheets)
       if (cloth->casts_shadow) cloth_pass.draw_shadow(*cloth, tile.clip_from_world);
   }
@@ -243,7 +249,7 @@ void Stage::Impl::draw_depth(std::span<const Cloth* const> sheets, std::span<Poi
   glDepthFunc(GL_GREATER);
   glDisable(GL_BLEND);
   const float nothing[4] = {0, 0, 0, 0};
-  glClearNamedFramebufferfv(picture.framebuffer, GL_COLOR, 0, nothing);
+  if (!environment.visible) glClearNamedFramebufferfv(picture.framebuffer, GL_COLOR, 0, nothing);
   glClearNamedFramebufferfv(picture.framebuffer, GL_DEPTH, 0, nothing);
 
   // A hair behind, so that no rounding hides a surface from its own shading.
@@ -282,7 +288,7 @@ void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<Po
 }
 
 void Stage::Impl::draw_blended(std::span<PointSet* const> sets, const View& view,
-                               const FrameUniforms& frame) {
+                               const FrameUniforms& frame, bool new_frame) {
   // Premultiplied: what adds light has no alpha, so one blend function serves both.
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
@@ -292,6 +298,10 @@ void Stage::Impl::draw_blended(std::span<PointSet* const> sets, const View& view
 
   const auto blended = [](const PointSet* set) { return set->def.style != PointStyle::sphere; };
   if (std::none_of(sets.begin(), sets.end(), blended)) return;
+  if (picture.depth_copy == 0) {
+    picture.depth_copy = gl::make_target(GL_DEPTH_COMPONENT32F, def.width_px, def.height_px, GL_NEAREST);
+    picture.depth_copy_framebuffer = gl::make_framebuffer(0, picture.depth_copy);
+  }
   glBlitNamedFramebuffer(picture.framebuffer, picture.depth_copy_framebuffer, 0, 0, def.width_px,
                          def.height_px, 0, 0, def.width_px, def.height_px, GL_DEPTH_BUFFER_BIT, GL_NEAREST);
   glBindTextureUnit(kSceneDepthUnit, picture.depth_copy);
@@ -300,7 +310,7 @@ void Stage::Impl::draw_blended(std::span<PointSet* const> sets, const View& view
   for (const PointSet* set : sets) {
     if (blended(set) && !set->is_splatted()) points_pass.draw_blended(*set, features);
   }
-  streaks_pass.draw(sets, view, light, shadow_map, picture.framebuffer);
+  streaks_pass.draw(sets, view, light, shadow_map, picture.framebuffer, new_frame);
 }
 
 void Stage::Impl::draw_lines(const View& view) {
@@ -412,8 +422,9 @@ void Stage::set_time(float time) {
 void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   Impl& s = *impl_;
   if (sum.width_px != s.def.width_px || sum.height_px != s.def.height_px ||
-      sum.rgba.size() != s.pixels.size()) {
-    sum = {s.def.width_px, s.def.height_px, std::vector<float>(s.pixels.size(), 0.0f)};
+      sum.rgba.size() != sum.pixel_count() * 4) {
+    sum = {s.def.width_px, s.def.height_px, {}};
+    sum.rgba.assign(sum.pixel_count() * 4, 0.0f);
   }
   const View view = make_view(s.camera, offsets, s.def.width_px, s.def.height_px);
   FrameUniforms frame = make_frame(view, s.sun, s.environment, offsets, s.def.height_px);
@@ -431,13 +442,12 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
       s.environment.occlusion_reach.value_or(kReach * (s.camera.target - s.camera.eye).norm());
   s.occlusion_pass.draw(s.picture.depth, view, reach, offsets.count, seed_of(offsets));
   s.draw_opaque(sheets, sets);
-  s.draw_blended(sets, view, frame);
+  s.draw_blended(sets, view, frame, offsets.index == 0);
   s.draw_lines(view);
 
   glBindFramebuffer(GL_READ_FRAMEBUFFER, s.picture.framebuffer);
-  glReadPixels(0, 0, s.def.width_px, s.def.height_px, GL_RGBA, GL_FLOAT, s.pixels.data());
+  add_picture(s.strip, sum);
   gl::check_error("drawing a frame");
-  add_bottom_up(s.pixels, sum);
 }
 
 }  // namespace offstage::render

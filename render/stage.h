@@ -127,6 +127,7 @@ struct SampleOffsets {
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
   Eigen::Vector2f lens = Eigen::Vector2f::Zero();
   Eigen::Vector2f light = Eigen::Vector2f::Zero();
+  int index = 0;  ///< of the sub-frame
   int count = 1;  ///< of sub-frames in the frame: among many, one needs no filtering of its own
 };
 /// Offsets of sub-frame i of n: a fixed low-discrepancy set; all zero for n = 1.

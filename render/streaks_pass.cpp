@@ -28,10 +28,34 @@ Vector3f project(const View& view, const Vector3f& place, const Vector2f& half_s
   return {(clip.x() / clip.w() + 1) * half_size.x(), (clip.y() / clip.w() + 1) * half_size.y(), clip.w()};
 }
 
-StreakSplat splat_of(const GpuPoint& point, const PointsDef& def, const View& view, const PuffLight& light,
-                     const SceneShadow& shadow, const Vector2f& half_size) {
+/// `along`: its direction on the screen.
+StreakLight light_of(const GpuPoint& point, const PointsDef& def, const View& view, const PuffLight& light,
+                     const SceneShadow& shadow, const Vector2f& along) {
   const Vector3f center = point.position.head<3>(), to_eye = (view.eye - center).normalized();
-  const float distance = view.depth_of(center), pixel = light.frame.eye.w() * distance;
+  const Vector4f fog = light.fog_to(center);
+  const float cover = def.additive ? 0.0f : 1.0f;
+  const Vector3f own = point.color.head<3>(), haze = cover * fog.head<3>();
+  Vector3f middle = own, left = own, right = own;
+  if (def.lit) {
+    middle = own.cwiseProduct(drop_light(light, center, to_eye, shadow.visibility(center)));
+    const Vector3f across = along.y() * view.right - along.x() * view.up;
+    left = light.sky_reflection((-across - 0.6f * to_eye).normalized(), 0.1f);
+    right = light.sky_reflection((across - 0.6f * to_eye).normalized(), 0.1f);
+  }
+  StreakLight s;
+  for (int c = 0; c < 3; ++c) {
+    s.middle[c] = middle[c] * fog.w() + haze[c];
+    s.rim[c] = 0.5f * (left[c] + right[c]) * fog.w() + haze[c];
+    s.rim_slope[c] = 0.5f * (right[c] - left[c]) * fog.w();
+  }
+  return s;
+}
+
+/// All but its light.
+StreakSplat splat_of(const GpuPoint& point, const PointsDef& def, const View& view, float pixel_m,
+                     const Vector2f& half_size) {
+  const Vector3f center = point.position.head<3>();
+  const float distance = view.depth_of(center), pixel = pixel_m * distance;
   const float radius = point.position.w(), drawn = std::max(radius, kThinnest_px * pixel);
 
   // With its rounded ends it is as long as it moved; its ends must not come behind the eye.
@@ -66,21 +90,6 @@ StreakSplat splat_of(const GpuPoint& point, const PointsDef& def, const View& vi
   s.cover = def.additive ? 0.0f : 1.0f;
   s.softness = std::clamp(def.softness, 0.01f, 1.0f);
   s.taper = def.taper;
-
-  const Vector4f fog = light.fog_to(center);
-  const Vector3f own = point.color.head<3>(), haze = s.cover * fog.head<3>();
-  Vector3f middle = own, left = own, right = own;
-  if (def.lit) {
-    middle = own.cwiseProduct(drop_light(light, center, to_eye, shadow.visibility(center)));
-    const Vector3f across = along.y() * view.right - along.x() * view.up;
-    left = light.sky_reflection((-across - 0.6f * to_eye).normalized(), 0.1f);
-    right = light.sky_reflection((across - 0.6f * to_eye).normalized(), 0.1f);
-  }
-  for (int c = 0; c < 3; ++c) {
-    s.light[c] = middle[c] * fog.w() + haze[c];
-    s.rim[c] = 0.5f * (left[c] + right[c]) * fog.w() + haze[c];
-    s.rim_slope[c] = 0.5f * (right[c] - left[c]) * fog.w();
-  }
   return s;
 }
 
@@ -144,9 +153,11 @@ void StreaksPass::composite(GLuint framebuffer) {
 }
 
 void StreaksPass::draw(std::span<const PointSet* const> sets, const View& view, const PuffLight& light,
-                       const ShadowMap& shadow_map, GLuint framebuffer) {
+                       const ShadowMap& shadow_map, GLuint framebuffer, bool new_frame) {
   sort_visible(sets, view);
   if (keys_.empty()) return;
+  if (new_frame) lights_.clear();
+  lights_.resize(sources_.back().first + sources_.back().set->points.size());
   Eigen::AlignedBox3f box;
   for (const Source& source : sources_)
     if (source.set->def.lit) box.extend(source.set->box);
@@ -161,8 +172,14 @@ void StreaksPass::draw(std::span<const PointSet* const> sets, const View& view, 
       const auto number = static_cast<uint32_t>(keys_[k]);
       auto source = sources_.end() - 1;
       while (source->first > number) --source;
-      splats_[k] = splat_of(source->set->points[number - source->first], source->set->def, view, light,
-                            shadow_, half_size);
+      const PointSet& set = *source->set;
+      const std::size_t i = number - source->first;
+      StreakSplat& s = splats_[k];
+      s = splat_of(set.points[i], set.def, view, light.frame.eye.w(), half_size);
+      KnownLight& known = lights_[number];
+      if (known.id != set.ids[i])
+        known = {set.ids[i], light_of(set.points[i], set.def, view, light, shadow_, {s.along_x, s.along_y})};
+      s.light = known.light;
     }
   });
   read_depth(light.frame, framebuffer);

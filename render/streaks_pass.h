@@ -18,9 +18,10 @@ namespace offstage::render {
 class StreaksPass {
  public:
   StreaksPass(int width_px, int height_px);
-  /// Draws over the picture in `framebuffer`. `light`: with the smoke between sun and streaks.
+  /// Draws over the picture in `framebuffer`. `light`: with the smoke between sun and streaks. Streaks stay where
+  /// they are during a frame, so only its first sub-frame (`new_frame`) works out their light.
   void draw(std::span<const PointSet* const> sets, const View& view, const PuffLight& light,
-            const ShadowMap& shadow_map, GLuint framebuffer);
+            const ShadowMap& shadow_map, GLuint framebuffer, bool new_frame);
 
  private:
   void sort_visible(std::span<const PointSet* const> sets, const View& view);
@@ -34,8 +35,12 @@ class StreaksPass {
   std::vector<Source> sources_;
   std::vector<uint64_t> keys_;  ///< depth and number of a point, nearest first
   std::vector<StreakSplat> splats_;
+  struct KnownLight {
+    uint64_t id = ~uint64_t{0};
+    StreakLight light;
+  };
+  std::vector<KnownLight> lights_;  ///< by number, of those seen in this frame
   SceneShadow shadow_;
-  std::vector<float> depths_;
   SplatPicture picture_;
   gl::Texture colors_;
   gl::LazyProgram program_{{"frame.glsl", "sky.vert"}, {"frame.glsl", "streaks.frag"}};
