@@ -4,6 +4,7 @@
 #include <map>
 #include <span>
 #include <tuple>
+#include <vector>
 
 #include "render/cloth_surface.h"
 #include "render/frame.h"
@@ -19,6 +20,8 @@ struct Cloth {
   Vector2f texture_from_uv = {1, 1};
   bool casts_shadow = true;
   ClothSurface surface;
+  uint32_t object = 0;           ///< id in Channels
+  std::vector<Vector3f> before;  ///< where its vertices were at Stage::remember
 
   gl::StreamBuffer vertices, indices;
   uint32_t uploaded = 0;  ///< version of the indices

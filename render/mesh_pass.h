@@ -4,6 +4,7 @@
 
 #include <array>
 #include <map>
+#include <optional>
 #include <span>
 #include <tuple>
 #include <utility>
@@ -53,6 +54,8 @@ struct Instance {
   Eigen::Affine3f world_from_mesh = Eigen::Affine3f::Identity();
   bool casts_shadow = true;
   bool visible = true;
+  uint32_t object = 0;                    ///< id in Channels
+  std::optional<Eigen::Affine3f> before;  ///< where it was at Stage::remember
 
   float scale() const;
   Caster ball() const;

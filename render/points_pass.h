@@ -24,6 +24,7 @@ struct PointSet {
   gl::StreamBuffer
       buffer;              ///< in the order they are drawn; first those that only throw shadows into the view
   std::size_t unseen = 0;  ///< how many those are
+  uint32_t object = 0;     ///< id in Channels
 
   void assign(std::span<const Point> values);
   /// Smoke and fire, which PuffsPass draws; StreaksPass draws streaks.
@@ -45,6 +46,9 @@ class PointsPass {
   void draw_depth(const PointSet& set);
   void draw_spheres(const PointSet& set, const Features& features);
   void draw_blended(const PointSet& set, const Features& features);
+  /// Balls with channels_ball.frag, whose uniforms are set in between.
+  void use_channels() { channels_.use(); }
+  void draw_channels(const PointSet& set) { draw(set, set.unseen); }
 
  private:
   void draw(const PointSet& set, std::size_t first);
@@ -55,6 +59,9 @@ class PointsPass {
   Programs& programs(PointStyle style, const Features& features = {});
 
   std::map<std::pair<PointStyle, Features>, Programs> programs_;
+  gl::LazyProgram channels_{{"frame.glsl", "sky.glsl", "light.glsl", "lamps.glsl", "points.vert"},
+                            {"frame.glsl", "channels_ball.frag"},
+                            {"STYLE 2", "CHANNELS 1"}};
   gl::VertexArray vertex_array_;
   std::vector<GpuPoint> ordered_;
   std::vector<std::pair<float, uint32_t>> keys_;

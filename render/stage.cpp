@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "render/channels_pass.h"
 #include "render/cloth_pass.h"
 #include "render/frame.h"
 #include "render/gl.h"
@@ -73,6 +74,7 @@ void add_picture(std::vector<float>& strip, HdrImage& sum) {
 struct Stage::Impl {
   StageDef def;
   Camera camera;
+  std::optional<Camera> camera_before;
   Sun sun;
   Environment environment;
   std::vector<Lamp> lamps;
@@ -96,6 +98,7 @@ struct Stage::Impl {
   PuffsPass puffs_pass;
   StreaksPass streaks_pass;
   LinesPass lines_pass;
+  std::optional<ChannelsPass> channels_pass;  ///< made when asked for
   gl::LazyProgram sky_program{{"frame.glsl", "sky.vert"},
                               {"frame.glsl", "sky.glsl", "noise.glsl", "sky.frag"}};
   gl::VertexArray no_attributes = gl::make_vertex_array();
@@ -417,6 +420,50 @@ void Stage::set_lamps(std::span<const Lamp> lamps) {
 }
 void Stage::set_time(float time) {
   impl_->time = time;
+}
+
+void Stage::set_object(InstanceHandle instance, uint32_t id) {
+  impl_->instances[instance]->object = id;
+}
+void Stage::set_object(ClothHandle cloth, uint32_t id) {
+  impl_->cloths[cloth]->object = id;
+}
+void Stage::set_object(PointsHandle points, uint32_t id) {
+  impl_->point_sets[points]->object = id;
+}
+
+void Stage::remember() {
+  Impl& s = *impl_;
+  s.camera_before = s.camera;
+  s.instances.for_each([](const std::unique_ptr<Instance>& i) { i->before = i->world_from_mesh; });
+  s.cloths.for_each([](const std::unique_ptr<Cloth>& cloth) {
+    cloth->before.clear();
+    for (const ClothVertex& v : cloth->surface.vertices()) cloth->before.push_back(v.position);
+  });
+}
+
+Channels Stage::channels(float time) {
+  Impl& s = *impl_;
+  if (!s.channels_pass) s.channels_pass.emplace(s.def.width_px, s.def.height_px);
+  ChannelsPass& pass = *s.channels_pass;
+  const auto view_of = [&](const Camera& camera) { return make_view(camera, {}, s.def.width_px, s.def.height_px); };
+  const View view = view_of(s.camera);
+  s.upload(make_frame(view, s.sun, s.environment, {}, s.def.height_px));
+  const std::vector<PointSet*> sets = s.prepare_points(view);
+  const std::vector<const Cloth*> sheets = s.prepare_cloths();
+  pass.begin(view.clip_from_world, view_of(s.camera_before.value_or(s.camera)).clip_from_world);
+  s.instances.for_each([&](const std::unique_ptr<Instance>& instance) {
+    const Caster ball = instance->ball();
+    if (instance->visible && instance->mesh->index_count > 0 && !instance->material->blended &&
+        view.sees(ball.center, ball.radius))
+      pass.draw(*instance);
+  });
+  for (const Cloth* cloth : sheets) pass.draw(*cloth);
+  for (const PointSet* set : sets)
+    if (set->def.style == PointStyle::sphere) pass.draw_balls(s.points_pass, *set, time);
+  Channels result;
+  pass.end(result);
+  return result;
 }
 
 void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {

@@ -13,6 +13,7 @@
 
 #include <Eigen/Geometry>
 
+#include "render/channels.h"
 #include "render/context.h"
 #include "render/handle.h"
 #include "render/image.h"
@@ -180,6 +181,16 @@ class Stage {
   /// Draws one sub-frame and adds it to `sum`, which is sized and cleared first if it does not have the
   /// stage's size. Throws UnavailableError on a GL error.
   void draw(const SampleOffsets& offsets, HdrImage& sum);
+
+  /// Whose it is in Channels; 0, the default: nobody's.
+  void set_object(InstanceHandle instance, uint32_t id);
+  void set_object(ClothHandle cloth, uint32_t id);
+  void set_object(PointsHandle points, uint32_t id);
+  /// Motion is measured from where everything is now, camera included.
+  void remember();
+  /// Depth, normals, ids and motion of what is in place. `time`: since `remember` [s], by which balls moved on with
+  /// their velocity.
+  Channels channels(float time);
 
  private:
   struct Impl;

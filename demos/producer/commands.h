@@ -45,6 +45,7 @@ struct RenderOptions {
   std::string cache, stats, report;
   int threads = 0;  ///< 0: all available
   int jobs = 0;     ///< 0: as `threads`
+  std::vector<std::string> channels;  ///< depth, normal, id, motion
   bool resume = false, force = false, dry_run = false, watch = false;
 };
 int render_command(const RenderOptions& options);
@@ -59,6 +60,7 @@ struct FrameOptions {
   std::string out;
   std::optional<int> frame;
   std::optional<double> at;
+  std::vector<std::string> channels;
   int threads = 0;
   bool force = false;
 };

@@ -1,5 +1,6 @@
 // render, frame and simulate.
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -63,6 +64,11 @@ void report_run(const RunStats& stats, const TalkOptions& talk, const std::strin
 int interrupted(const RunStats& stats, int total, const std::string& advice) {
   say("interrupted: {} of {} frames done{}\n", stats.frames + stats.frames_kept, total, advice);
   return 128 + stats.interrupted_by;
+}
+
+render::ChannelChoice channels_of(const std::vector<std::string>& names) {
+  const auto has = [&](const char* name) { return std::ranges::find(names, name) != names.end(); };
+  return {.depth = has("depth"), .normal = has("normal"), .id = has("id"), .motion = has("motion")};
 }
 
 struct Plan {
@@ -137,6 +143,8 @@ RunStats draw(const Plan& plan, const ModelLibrary& models, const RenderOptions&
   RenderJob job{
       .frames = std::move(frames), .threads = plan.jobs, .cache = {}, .report = !options.report.empty()};
   if (!options.cache.empty()) job.cache = options.cache;
+  job.channels = channels_of(options.channels);
+  job.channels_file = fs::path(plan.frames_pattern).replace_extension(".exr");
   RunStats stats = render_frames(plan.loaded, models, job, sink, std::ref(printer));
   printer.finish();
   if (job.report) write_text_file(options.report, run_report(plan.loaded, plan.settings, stats));
@@ -252,6 +260,8 @@ int render_command(const RenderOptions& options) {
   check_file(options.report, options.force || options.resume);
   check_distinct(options.report, options.out);
   check_distinct(options.report, options.stats);
+  if (!options.channels.empty() && plan.target.kind != OutputKind::frames)
+    throw OutputError(options.out + ": channels are files beside frames; give a folder or frames/####.png");
   if (options.dry_run) return print_plan(plan);
   if (plan.frames.empty()) {
     say("note: this chunk has no frames: there are fewer frames than chunks\n");
@@ -278,6 +288,8 @@ int frame_command(const FrameOptions& options) {
   }
   check_png(options.out);
   check_file(options.out, options.force);
+  const fs::path data = fs::path(options.out).replace_extension(".exr");
+  if (!options.channels.empty()) check_file(data.string(), options.force);
 
   class PictureSink : public render::FrameSink {
    public:
@@ -295,7 +307,13 @@ int frame_command(const FrameOptions& options) {
   render::pin_environment(threads_or_all(options.threads));
   PictureSink sink(options.out);
   const RunStats stats =
-      render_frames(loaded, models, {.frames = {frame}, .threads = 1, .cache = {}}, sink, {});
+      render_frames(loaded, models,
+                    {.frames = {frame},
+                     .threads = 1,
+                     .cache = {},
+                     .channels = channels_of(options.channels),
+                     .channels_file = data},
+                    sink, {});
   report_run(stats, options.talk, "");
   if (stats.interrupted_by) return interrupted(stats, 1, "");
   fmt::print("{}\n", options.out);

@@ -125,7 +125,27 @@ render::Mesh mesh_of(const sim::ConvexPolyhedron& part) {
   return mesh;
 }
 
+std::string name_or(const std::string& name, const char* kind, uint32_t id) {
+  return name.empty() ? kind + (" " + std::to_string(id)) : name;
+}
+
 }  // namespace
+
+std::map<uint32_t, std::string> object_names(const Scene& scene) {
+  std::map<uint32_t, std::string> names;
+  uint32_t id = 0;
+  const auto add = [&](const std::string& name, const char* kind) {
+    ++id;
+    names[id] = name_or(name, kind, id);
+  };
+  for (const Body& body : scene.bodies) add(body.name, "body");
+  for (const Cloth& cloth : scene.cloths) add(cloth.name, "cloth");
+  for (const ParticleGroup& group : scene.particles) add(group.name, "particles");
+  for (const Emitter& emitter : scene.emitters)
+    for_each_source(emitter, [&](const ParticleSource&, const ParticleSource*, const std::string& name,
+                                 const Birth&) { add(name, "particles"); });
+  return names;
+}
 
 Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context& context)
     : scene_(scene),
@@ -134,7 +154,8 @@ Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context
                        .shadow_map_px = scene.render.shadow_map}),
       camera_(scene, models) {
   std::size_t slot = 0;
-  for (const Body& body : scene.bodies) add_body(body, models, slot);
+  uint32_t object = 0;
+  for (const Body& body : scene.bodies) add_body(body, models, slot, ++object);
   for (const Spring& spring : scene.springs) {
     render::InstanceHandle rod;
     if (spring.visible)
@@ -142,9 +163,14 @@ Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context
                                 material(spring.material, models));
     springs_.push_back(rod);
   }
-  for (const Cloth& cloth : scene.cloths) add_cloth(cloth, models);
+  for (const Cloth& cloth : scene.cloths) {
+    add_cloth(cloth, models);
+    ++object;
+    if (cloths_.back().cloth) stage_.set_object(cloths_.back().cloth, object);
+  }
   for (const ParticleLook* look : looks_of(scene)) {
     points_.push_back(stage_.add_points(points_def(*look)));
+    stage_.set_object(points_.back(), ++object);
     styles_.push_back(points_def(*look).style);
     smears_.push_back(add_smears(*look));
   }
@@ -313,7 +339,7 @@ void Picture::add_convex_parts(const MeshFile& mesh, const Body& body, const Mod
   }
 }
 
-void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t& slot) {
+void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t& slot, uint32_t object) {
   DrawnBody drawn{{}, affine(body.position, body.orientation), parts_overlay(scene_, body.name), {}};
   if (drawn.overlay)
     add_convex_parts(std::get<MeshFile>(body.shape), body, models, drawn.parts);
@@ -323,6 +349,7 @@ void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t
   else if (body.visible)
     add_shape(body, models, drawn.parts);
 
+  for (const DrawnPart& part : drawn.parts) stage_.set_object(part.instance, object);
   place_body(drawn, drawn.world_from_body, 0);
   if (body.motion == sim::MotionType::fixed)
     places_.add_fixed(body.name, drawn.world_from_body);
@@ -462,6 +489,14 @@ float Picture::exposure(double time, float sample_weight) const {
   const float factor = f(effects::mean(scene_.render.exposure, time));
   return scene_.render.metering == Metering::fixed ? factor
                                                    : factor * render::metered_exposure(sum_, sample_weight);
+}
+
+render::Channels Picture::channels(const Snapshot& previous, const Snapshot& current) {
+  const double frame_time = &previous == &current ? 0 : 1 / scene_.output.fps;
+  place(previous, previous, 1, frame_time);
+  stage_.remember();
+  place(previous, current, 1, frame_time);
+  return stage_.channels(f(frame_time));
 }
 
 render::Image Picture::draw(const Snapshot& previous, const Snapshot& current) {

@@ -14,10 +14,14 @@
 #include "producer/models.h"
 #include "producer/scene.h"
 #include "producer/snapshot.h"
+#include "render/channels.h"
 #include "render/image.h"
 #include "render/stage.h"
 
 namespace offstage::producer {
+
+/// What the ids of Channels stand for: bodies, cloths, particles, in scene order from 1.
+std::map<uint32_t, std::string> object_names(const Scene& scene);
 
 class Picture {
  public:
@@ -27,6 +31,9 @@ class Picture {
   /// The frame at `current`; the shutter is open during the end of the interval from `previous`, the frame
   /// before it (or the same snapshot for the first frame, which has no motion blur).
   render::Image draw(const Snapshot& previous, const Snapshot& current);
+
+  /// Depth, normals, ids and motion at `current`; motion since `previous`, both as for `draw`.
+  render::Channels channels(const Snapshot& previous, const Snapshot& current);
 
  private:
   struct DrawnPart {
@@ -53,7 +60,7 @@ class Picture {
   render::Material material_named(const std::string& name, const ModelLibrary& models,
                                   std::vector<render::Image>& textures) const;
   render::MaterialHandle material(const std::string& name, const ModelLibrary& models);
-  void add_body(const Body& body, const ModelLibrary& models, std::size_t& slot);
+  void add_body(const Body& body, const ModelLibrary& models, std::size_t& slot, uint32_t object);
   void add_model(const std::string& file, const Eigen::Affine3f& body_from_model, const Body& body,
                  const ModelLibrary& models, std::vector<DrawnPart>& parts);
   void add_shape(const Body& body, const ModelLibrary& models, std::vector<DrawnPart>& parts);

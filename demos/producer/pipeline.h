@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "producer/snapshot.h"
+#include "render/channels.h"
 #include "render/image.h"
 
 namespace offstage::producer {
@@ -29,6 +30,7 @@ struct Shot {
 struct Print {
   Shot shot;
   render::Image image;
+  std::optional<render::Channels> channels;
   double render_ms = 0;
 };
 

@@ -68,13 +68,15 @@ bool is_blank(const render::Image& image) {
   return true;
 }
 
-void draw_shots(Pipeline& pipeline, const Scene& scene, const ModelLibrary& models) {
+void draw_shots(Pipeline& pipeline, const Scene& scene, const ModelLibrary& models, bool channels) {
   render::Context context;
   Picture picture(scene, models, context);
   while (auto shot = pipeline.take_shot()) {
     const auto start = Clock::now();
     render::Image image = picture.draw(*shot->previous, *shot->current);
-    pipeline.give_print({std::move(*shot), std::move(image), ms_since(start)});
+    std::optional<render::Channels> data;
+    if (channels) data = picture.channels(*shot->previous, *shot->current);
+    pipeline.give_print({std::move(*shot), std::move(image), std::move(data), ms_since(start)});
   }
 }
 
@@ -97,12 +99,18 @@ void keep(const Print& print, double encode_ms, int total, RunStats& stats) {
     stats.pictures.emplace_back(print.shot.frame, render::reduced(print.image, kWidth_px));
 }
 
-void print_frames(Pipeline& pipeline, render::FrameSink& sink, int total, bool report, RunStats& stats,
-                  const ProgressCallback& progress) {
+void print_frames(Pipeline& pipeline, render::FrameSink& sink, const Scene& scene, const RenderJob& job,
+                  RunStats& stats, const ProgressCallback& progress) {
   const auto start = Clock::now();
+  const auto total = static_cast<int>(job.frames.size());
+  const bool numbered = job.channels_file.filename().string().find('#') != std::string::npos;
+  const std::map<uint32_t, std::string> objects = object_names(scene);
   while (auto print = pipeline.take_print()) {
     const auto encode_start = Clock::now();
     sink.write(print->shot.frame, print->image);
+    if (print->channels)
+      render::write_exr(numbered ? render::frame_path(job.channels_file, print->shot.frame) : job.channels_file,
+                        *print->channels, job.channels, objects);
     const double encode_ms = ms_since(encode_start);
     if (stats.frames++ == 0) stats.startup_s = process_age_s();
     stats.sim.add(print->shot.sim_ms);
@@ -112,7 +120,7 @@ void print_frames(Pipeline& pipeline, render::FrameSink& sink, int total, bool r
     stats.particles = state.point_count();
     stats.most_particles = std::max(stats.most_particles, stats.particles);
     stats.state_hash = stats.frame_states[print->shot.frame] = state.state_hash.hex();
-    if (report) keep(*print, encode_ms, total, stats);
+    if (job.report) keep(*print, encode_ms, total, stats);
     if (is_blank(print->image)) stats.blank_frames.push_back(print->shot.frame);
     if (progress)
       progress({.done = stats.frames,
@@ -181,10 +189,10 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
   }
 
   Pipeline pipeline(2 * job.threads + 2);
-  const auto draw = [&] { guarded(pipeline, [&] { draw_shots(pipeline, loaded.scene, models); }); };
+  const auto draw = [&] { guarded(pipeline, [&] { draw_shots(pipeline, loaded.scene, models, job.channels.any()); }); };
   const auto print = [&] {
     guarded(pipeline, [&] {
-      print_frames(pipeline, sink, static_cast<int>(job.frames.size()), job.report, stats, progress);
+      print_frames(pipeline, sink, loaded.scene, job, stats, progress);
     });
   };
   {
@@ -193,7 +201,8 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
     guarded(pipeline, [&] {
       for (int i = 0; i < job.threads; ++i) crew.emplace_back(draw);
       crew.emplace_back(print);
-      shoot(pipeline, *source, job.frames, subframes(loaded.scene.render.quality) > 1, job.report);
+      shoot(pipeline, *source, job.frames,
+            subframes(loaded.scene.render.quality) > 1 || job.channels.any(), job.report);
     });
   }
   pipeline.rethrow_failure();

@@ -15,6 +15,9 @@ layout(location = 1) flat out vec2 dimming;  // alpha, shift of the dither
 layout(location = 1) flat out vec4 color;
 layout(location = 2) flat out vec4 ball;     // centre, radius
 layout(location = 3) out vec3 position;      // on the quad
+#ifdef CHANNELS
+layout(location = 4) flat out vec3 velocity;
+#endif
 #else
 layout(location = 1) out vec4 light;         // fog included; w: alpha
 layout(location = 2) out float reach;        // radius
@@ -106,6 +109,9 @@ void main() {
   color = in_color;
   ball = in_position;
   position = at;
+#ifdef CHANNELS
+  velocity = in_velocity.xyz;
+#endif
 #else
   // Added light is dimmed by the fog but brings none of its colour.
   vec4 fog = fog_to(p) * vec4(vec3(1.0 - style.w), 1.0);

@@ -249,6 +249,20 @@ TEST(Render, QualityNeverChangesThePhysics) {
   EXPECT_EQ(hashes.size(), 1u);
 }
 
+TEST(Render, ChannelsStandBesideTheFramesAndOnlyThere) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(offstage("render " + tiny_scene() + " -o out/ -q --frames 2-3 --channels depth,id", folder.path()).code, 0);
+  const auto files = frames(folder / "out");
+  ASSERT_EQ(files.size(), 4u);
+  for (const char* name : {"0002", "0003"}) {
+    EXPECT_EQ(files.at(name + std::string(".png")), reference().at(name + std::string(".png"))) << "the picture is the same";
+    EXPECT_EQ(files.at(name + std::string(".exr")).substr(0, 4), "\x76\x2f\x31\x01");
+    EXPECT_NE(files.at(name + std::string(".exr")).find("2 thrown\n"), std::string::npos);
+  }
+  EXPECT_EQ(offstage("render " + tiny_scene() + " -o a.mp4 --channels depth", folder.path()).code, 2);
+  EXPECT_EQ(offstage("render " + tiny_scene() + " -o b/ --channels colour", folder.path()).code, 2);
+}
+
 TEST(Render, TransparentBackgroundHasAlpha) {
   const TemporaryFolder folder;
   ASSERT_EQ(offstage("render " + tiny_scene() +

@@ -165,6 +165,32 @@ TEST(Overlays, VelocitiesAreArrowsFromTheCentre) {
   EXPECT_EQ(arrows(shown.lines(1)).size(), 1u) << "what rests has none, nor has the floor";
 }
 
+TEST(Overlays, TrailsLieOnTheWayAndEndWhenTheyAreOld) {
+  Shown shown(R"({"bodies": [{"name": "thrown", "position": [0, 50, 0], "velocity": [2, 3, 0],
+                              "shape": {"type": "sphere", "radius": 0.1}},
+                             {"name": "other", "motion": "static", "position": [9, 9, 9], "shape": {"type": "sphere"}}],
+                  "output": {"fps": 50, "duration": 2}, "overlays": [{"type": "trails", "duration": 0.4}]})");
+  while (shown.simulation.world().time() < 0.9999) shown.simulation.advance();
+  const LineSet trail = shown.lines();
+  ASSERT_GT(trail.lines.size(), 10u);
+  float oldest = 1e9f, newest = 0, last_alpha = 0, way = 0;
+  for (const render::Line& line : trail.lines) {
+    for (const Vector3f& place : {line.a, line.b}) {
+      const float t = place.x() / 2;  // the parabola of its flight
+      EXPECT_NEAR(place.y(), 50 + 3 * t - 0.5f * 9.81f * t * t, 2e-3f);
+      oldest = std::min(oldest, t);
+      newest = std::max(newest, t);
+    }
+    EXPECT_GE(line.color.w(), last_alpha) << "towards the body it is fresher";
+    last_alpha = line.color.w();
+    way += (line.b - line.a).norm();
+  }
+  const double now = shown.simulation.world().time();
+  EXPECT_NEAR(newest, now, 1e-4) << "it reaches the body";
+  EXPECT_NEAR(oldest, now - 0.4, 0.05);
+  EXPECT_NEAR(way, 0.4 * std::hypot(2, 3 - 9.81 * (now - 0.2)), 0.4) << "without gaps";
+}
+
 TEST(Overlays, GroupsThatTouchShareAColourAndSleepersAreDim) {
   const std::string stack =
       R"({"name": "upper", "position": [0, 1.5, 0]}, {"name": "lower", "position": [0, 0.5, 0]},

@@ -129,9 +129,7 @@ TEST(Splatter, StreakCoversAsMuchAsItsStroke) {
                                          .cover = 1,
                                          .softness = 0.5f,
                                          .taper = 0,
-                                         .light = {1, 1, 1},
-                                         .rim = {1, 1, 1},
-                                         .rim_slope = {}}};
+                                         .light = {.middle = {1, 1, 1}, .rim = {1, 1, 1}, .rim_slope = {}}}};
     draw_splats(std::span<const StreakSplat>(streaks), picture);
     double area = 0;
     for (int y = picture.y0; y < picture.y1; ++y)

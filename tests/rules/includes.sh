@@ -36,5 +36,6 @@ only 'libqhull_r/' 'sim/geometry/convex_hull'
 only 'assimp/' 'render/mesh_import render/mesh_material'
 only 'stb_image' 'render/image_io'
 only 'spng.h' 'render/image_io'
+only 'Imf' 'render/exr'
 only 'GL/osmesa.h' 'render/context'
 exit $status

@@ -1,0 +1,25 @@
+// For depth, normals, ids and motion: where a vertex is in the picture, and where it was.
+layout(location = 0) in vec3 in_position;
+layout(location = 1) in vec3 in_normal;
+#ifdef CLOTH
+layout(location = 2) in vec3 in_before;
+#endif
+layout(location = 0) uniform mat4 clip_from_mesh;
+layout(location = 4) uniform mat4 clip_before_from_mesh;
+layout(location = 8) uniform mat3 world_from_normal;
+
+layout(location = 0) out vec3 normal;
+layout(location = 1) out vec4 now;
+layout(location = 2) out vec4 before;
+
+void main() {
+#ifdef CLOTH
+  vec3 was = in_before;
+#else
+  vec3 was = in_position;
+#endif
+  normal = world_from_normal * in_normal;
+  before = clip_before_from_mesh * vec4(was, 1.0);
+  now = clip_from_mesh * vec4(in_position, 1.0);
+  gl_Position = now;
+}

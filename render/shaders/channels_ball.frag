@@ -1,0 +1,22 @@
+// Depth, normal, id and motion of a ball, by ray casting on its quad.
+layout(location = 2) flat in vec4 ball;  // centre, radius
+layout(location = 3) in vec3 position;
+layout(location = 4) flat in vec3 velocity;
+layout(location = 4) uniform mat4 clip_before_from_world;
+layout(location = 11) uniform vec4 half_size_id_time;  // half the picture [px], y downwards; id; time since before
+layout(location = 0) out vec4 normal_id;
+layout(location = 1) out vec4 motion_depth;
+
+void main() {
+  vec3 ray = normalize(position - frame.eye.xyz), to_eye = frame.eye.xyz - ball.xyz;
+  vec3 nearest = to_eye - ray * dot(to_eye, ray);  // of the ray to the centre
+  float h2 = ball.w * ball.w - dot(nearest, nearest);
+  if (h2 < 0.0) discard;
+  vec3 offset = nearest - ray * sqrt(h2), hit = ball.xyz + offset;
+  vec4 now = frame.clip_from_world * vec4(hit, 1.0);
+  vec4 before = clip_before_from_world * vec4(hit - half_size_id_time.w * velocity, 1.0);
+  gl_FragDepth = now.z / now.w;
+  normal_id = vec4(offset / ball.w, half_size_id_time.z);
+  vec2 way = before.w > 0.0 ? now.xy / now.w - before.xy / before.w : vec2(0.0);
+  motion_depth = vec4(half_size_id_time.xy * way, now.w, 0.0);
+}
