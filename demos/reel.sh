@@ -3,6 +3,8 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 mkdir -p out/reel
+options=("$@")
+[[ " $* " == *" --size "* ]] || options+=(--size 1280x720)
 
 # scene|from [s]|length [s]|title
 shots='wall|0.9|4|Stacks, friction, a wrecking ball
@@ -33,7 +35,7 @@ while IFS='|' read -r scene from length title; do
  "overlays": [{"type": "text", "text": "$title", "place": "bottom_left", "size": 0.05}],
  "output": {"start": $from, "duration": $length, "fps": 30}}
 END
-  [ -f "$shot.mp4" ] || build/offstage render "$shot.json" -o "$shot.mp4" --size 1280x720 "$@"
+  [ -f "$shot.mp4" ] || build/offstage render "$shot.json" -o "$shot.mp4" "${options[@]}"
   echo "file '$(basename "$shot.mp4")'" >>"$list"
 done <<<"$shots"
 ffmpeg -y -loglevel error -f concat -i "$list" -c copy out/reel.mp4

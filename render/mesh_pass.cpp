@@ -17,6 +17,8 @@ static_assert(sizeof(Vertex) == 32);
 
 constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1;
 constexpr GLuint kMaterialBlock = 1, kFirstTextureUnit = 1;
+constexpr float kSmooth = 0.3f;      // less rough, a surface shows an image of the scene
+constexpr float kMirrorSteps = 14;   // along the ray on which it is looked for
 
 // The first three rows of a transform.
 using Rows = std::array<Vector4f, 3>;
@@ -129,6 +131,7 @@ GpuMaterial make_gpu_material(const Material& material, std::span<const Image> t
   result.blended = material.color.w() < 1 || (base != nullptr && has_alpha(*base));
   result.casts = material.color.w() > 0;
   result.glass = material.transmission > 0 && !result.blended;
+  result.mirror = !result.glass && !result.blended && material.roughness < kSmooth;
   return result;
 }
 
@@ -229,14 +232,18 @@ void MeshPass::draw(const Batch& batch, const gl::StreamBuffer& rows) {
                                       batch.count, batch.first);
 }
 
-gl::LazyProgram& MeshPass::surface_program(const GpuMaterial& material) {
-  const auto key = std::make_tuple(material.pattern, material.textured, material.glass, features_);
+gl::LazyProgram& MeshPass::surface_program(const GpuMaterial& material, bool mirror) {
+  const auto key = std::make_tuple(material.pattern, material.textured, material.glass, mirror, features_);
   const auto found = surface_programs_.find(key);
   if (found != surface_programs_.end()) return found->second;
   std::vector<std::string> defines = features_;
   std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "light.glsl", "lamps.glsl",
                                             "material.glsl"};
   if (material.textured) defines.push_back("TEXTURED 1");
+  if (mirror) {
+    defines.push_back("MIRROR 1");
+    fragment.push_back("mirror.glsl");
+  }
   if (material.glass) {
     defines.push_back("GLASS 1");
     fragment.push_back("glass.glsl");
@@ -294,6 +301,22 @@ void MeshPass::draw_opaque() {
   for (const Batch& batch : opaque_) draw_batch(batch);
   for (const Batch& batch : blended_) {
     if (batch.material->textured) draw_batch(batch);
+  }
+}
+
+bool MeshPass::has_mirrors() const {
+  return std::ranges::any_of(opaque_, [](const Batch& batch) { return batch.material->mirror; });
+}
+
+void MeshPass::draw_mirrors(float reach) {
+  for (const Batch& batch : opaque_) {
+    if (!batch.material->mirror) continue;
+    surface_program(*batch.material, true).use();
+    glUniform1f(0, 0);
+    glUniform2f(2, reach, kMirrorSteps);
+    set_facing(batch, batch.material->two_sided);
+    bind(*batch.material);
+    draw(batch, rows_);
   }
 }
 

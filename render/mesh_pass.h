@@ -42,7 +42,8 @@ struct GpuMaterial {
   bool two_sided = false;
   bool blended = false;
   bool casts = true;   ///< false if fully transparent
-  bool glass = false;  ///< light goes through and is refracted
+  bool glass = false;   ///< light goes through and is refracted
+  bool mirror = false;  ///< smooth enough to show the scene in it
 };
 
 GpuMaterial make_gpu_material(const Material& material, std::span<const Image> textures);
@@ -74,6 +75,10 @@ class MeshPass {
   void draw_depth(const Matrix4f& clip_from_world);
   void draw_opaque();
   bool has_glass() const { return !glass_.empty(); }
+  bool has_mirrors() const;
+  /// Once more what mirrors the scene, with the finished picture and its depth bound. `reach`: how far away things
+  /// are looked for [m].
+  void draw_mirrors(float reach);
   /// Back to front, over a picture that is also bound to be seen through them.
   void draw_glass();
   void draw_blended();
@@ -91,12 +96,12 @@ class MeshPass {
   };
   void draw(const Batch& batch, const gl::StreamBuffer& rows);
   void bind(const GpuMaterial& material);
-  gl::LazyProgram& surface_program(const GpuMaterial& material);
+  gl::LazyProgram& surface_program(const GpuMaterial& material, bool mirror = false);
   gl::LazyProgram& shadow_program(const GpuMaterial& material);
   static void set_facing(const Batch& batch, bool both_sides);
 
-  std::map<std::tuple<Pattern, bool, bool, Features>, gl::LazyProgram>
-      surface_programs_;  ///< textured, glass
+  std::map<std::tuple<Pattern, bool, bool, bool, Features>, gl::LazyProgram>
+      surface_programs_;  ///< textured, glass, mirror
   gl::LazyProgram opaque_shadow_, dithered_shadow_, textured_shadow_;
   Features features_;
   gl::Texture white_;

@@ -23,6 +23,7 @@ namespace {
 
 constexpr GLuint kFrameBlock = 0, kSceneDepthUnit = 4, kBehindUnit = 12;
 constexpr int kStrip_px = 32;   // rows that are read back at once: they stay in the processor's cache
+constexpr float kMirrorReach = 0.6f;  // how far away mirrors look for the scene, likewise
 constexpr float kReach = 0.1f;  // how far things hide the sky, as a share of the distance to the target
 
 /// Colour and depth of the picture.
@@ -128,6 +129,9 @@ struct Stage::Impl {
                     FrameUniforms& frame);
   void prepare_lamps(std::span<PointSet* const> sets, const SampleOffsets& offsets, FrameUniforms& frame);
   void draw_lamp_shadows(std::span<const Caster> casters, std::span<const Cloth* const> sheets);
+  void copy_depth();
+  void copy_picture();
+  void draw_mirrors();
   void draw_glass();
   void draw_depth(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view);
   void draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets);
@@ -231,8 +235,17 @@ void Stage::Impl::draw_lamp_shadows(std::span<const Caster> casters, std::span<c
   lamp_pass.end();
 }
 
-void Stage::Impl::draw_glass() {
-  if (!mesh_pass.has_glass()) return;
+void Stage::Impl::copy_depth() {
+  if (picture.depth_copy == 0) {
+    picture.depth_copy = gl::make_target(GL_DEPTH_COMPONENT32F, def.width_px, def.height_px, GL_NEAREST);
+    picture.depth_copy_framebuffer = gl::make_framebuffer(0, picture.depth_copy);
+  }
+  glBlitNamedFramebuffer(picture.framebuffer, picture.depth_copy_framebuffer, 0, 0, def.width_px,
+                         def.height_px, 0, 0, def.width_px, def.height_px, GL_DEPTH_BUFFER_BIT, GL_NEAREST);
+  glBindTextureUnit(kSceneDepthUnit, picture.depth_copy);
+}
+
+void Stage::Impl::copy_picture() {
   if (picture.behind == 0) {
     picture.behind = gl::make_target(GL_RGBA32F, def.width_px, def.height_px, GL_LINEAR);
     picture.behind_framebuffer = gl::make_framebuffer(picture.behind, 0);
@@ -240,6 +253,20 @@ void Stage::Impl::draw_glass() {
   glBlitNamedFramebuffer(picture.framebuffer, picture.behind_framebuffer, 0, 0, def.width_px, def.height_px,
                          0, 0, def.width_px, def.height_px, GL_COLOR_BUFFER_BIT, GL_NEAREST);
   glBindTextureUnit(kBehindUnit, picture.behind);
+}
+
+void Stage::Impl::draw_mirrors() {
+  if (!mesh_pass.has_mirrors()) return;
+  copy_depth();
+  copy_picture();
+  glDepthFunc(GL_GEQUAL);  // over themselves
+  mesh_pass.draw_mirrors(kMirrorReach * (camera.target - camera.eye).norm());
+  glDepthFunc(GL_GREATER);
+}
+
+void Stage::Impl::draw_glass() {
+  if (!mesh_pass.has_glass()) return;
+  copy_picture();
   mesh_pass.draw_glass();
 }
 
@@ -287,6 +314,7 @@ void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<Po
     glDrawArrays(GL_TRIANGLES, 0, 3);
   }
   glDepthFunc(GL_GREATER);
+  draw_mirrors();
   draw_glass();
 }
 
@@ -301,13 +329,7 @@ void Stage::Impl::draw_blended(std::span<PointSet* const> sets, const View& view
 
   const auto blended = [](const PointSet* set) { return set->def.style != PointStyle::sphere; };
   if (std::none_of(sets.begin(), sets.end(), blended)) return;
-  if (picture.depth_copy == 0) {
-    picture.depth_copy = gl::make_target(GL_DEPTH_COMPONENT32F, def.width_px, def.height_px, GL_NEAREST);
-    picture.depth_copy_framebuffer = gl::make_framebuffer(0, picture.depth_copy);
-  }
-  glBlitNamedFramebuffer(picture.framebuffer, picture.depth_copy_framebuffer, 0, 0, def.width_px,
-                         def.height_px, 0, 0, def.width_px, def.height_px, GL_DEPTH_BUFFER_BIT, GL_NEAREST);
-  glBindTextureUnit(kSceneDepthUnit, picture.depth_copy);
+  copy_depth();
   const PuffLight light(puffs_pass.grid(), frame, sun.direction.normalized());
   puffs_pass.draw(sets, view, light, shadow_map, picture.framebuffer);
   for (const PointSet* set : sets) {

@@ -30,8 +30,8 @@ struct Shot {
 struct Print {
   Shot shot;
   render::Image image;
-  std::optional<render::Channels> channels;
   double render_ms = 0;
+  render::Channels channels;  // empty unless asked for
 };
 
 /// Hands shots to the drawing threads and brings the finished frames back in order. At most `window` frames

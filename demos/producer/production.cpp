@@ -74,9 +74,9 @@ void draw_shots(Pipeline& pipeline, const Scene& scene, const ModelLibrary& mode
   while (auto shot = pipeline.take_shot()) {
     const auto start = Clock::now();
     render::Image image = picture.draw(*shot->previous, *shot->current);
-    std::optional<render::Channels> data;
+    render::Channels data;
     if (channels) data = picture.channels(*shot->previous, *shot->current);
-    pipeline.give_print({std::move(*shot), std::move(image), std::move(data), ms_since(start)});
+    pipeline.give_print({std::move(*shot), std::move(image), ms_since(start), std::move(data)});
   }
 }
 
@@ -108,9 +108,9 @@ void print_frames(Pipeline& pipeline, render::FrameSink& sink, const Scene& scen
   while (auto print = pipeline.take_print()) {
     const auto encode_start = Clock::now();
     sink.write(print->shot.frame, print->image);
-    if (print->channels)
+    if (job.channels.any())
       render::write_exr(numbered ? render::frame_path(job.channels_file, print->shot.frame) : job.channels_file,
-                        *print->channels, job.channels, objects);
+                        print->channels, job.channels, objects);
     const double encode_ms = ms_since(encode_start);
     if (stats.frames++ == 0) stats.startup_s = process_age_s();
     stats.sim.add(print->shot.sim_ms);
@@ -188,7 +188,7 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
     source = std::make_unique<LiveSource>(*simulation);
   }
 
-  Pipeline pipeline(2 * job.threads + 2);
+  Pipeline pipeline(job.threads + 2);
   const auto draw = [&] { guarded(pipeline, [&] { draw_shots(pipeline, loaded.scene, models, job.channels.any()); }); };
   const auto print = [&] {
     guarded(pipeline, [&] {

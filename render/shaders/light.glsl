@@ -120,6 +120,10 @@ vec3 with_bounces(float open, vec3 albedo) {
   return max(vec3(open), ((open * a + b) * open + c) * open);
 }
 
+#ifdef MIRROR
+vec4 in_mirror = vec4(0.0);  // light that a smooth surface mirrors of the scene; w: its share, the rest is sky
+#endif
+
 // The sun's light and the sky's that a surface sends to the eye; `view` points to it; `open` of the sky is not hidden.
 vec3 shade(Surface s, vec3 normal, vec3 view, float visibility, float open) {
   vec3 l = frame.sun_direction.xyz;
@@ -135,7 +139,10 @@ vec3 shade(Surface s, vec3 normal, vec3 view, float visibility, float open) {
 
   vec3 reflectance = sky_reflectance(f0, s.roughness, nv);
   float mirrored = saturate((nv + open) * (nv + open) - 1.0 + open);
-  vec3 sky = ambient(normal) * diffuse * (1.0 - reflectance) * with_bounces(open, s.albedo) +
-             sky_reflection(reflect(-view, normal), s.roughness) * reflectance * mirrored;
+  vec3 mirror_image = sky_reflection(reflect(-view, normal), s.roughness) * mirrored;
+#ifdef MIRROR
+  mirror_image = mix(mirror_image, in_mirror.rgb, in_mirror.w);
+#endif
+  vec3 sky = ambient(normal) * diffuse * (1.0 - reflectance) * with_bounces(open, s.albedo) + mirror_image * reflectance;
   return sun + sky + s.emission;
 }

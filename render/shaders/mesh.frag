@@ -48,6 +48,9 @@ void main() {
 #ifdef GLASS
   s.albedo *= 1.0 - material.glass.x;
 #endif
+#ifdef MIRROR
+  in_mirror = seen_in_mirror(position, n, view, s.roughness);
+#endif
   vec3 radiance = shade(s, n, view, sun_visibility(position, smooth_normal), open_sky(1.0 / gl_FragCoord.w));
 #ifdef LAMPS
   radiance += lamp_light(s, n, smooth_normal, view, position);

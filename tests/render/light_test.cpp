@@ -124,6 +124,30 @@ TEST(StageLight, GlassShowsWhatIsBehindItInItsColour) {
   EXPECT_NEAR(seen.z(), 0.5f * fresnel, 0.02);
 }
 
+TEST(StageLight, MirrorsShowTheSceneWhereGeometrySays) {
+  Camera camera{.eye = {0, 1.5f, 6}, .target = {0, 1, 0}};
+  SmallStage s(192, 128);
+  s.stage.set_environment(kDark);
+  s.stage.set_sun({.intensity = 0, .shadows = false});
+  s.stage.set_camera(camera);
+  s.add(make_ground(20), {.color = {0.9f, 0.9f, 0.9f, 1}, .metallic = 1, .roughness = 0.02f});
+  // A glowing square over the floor: the one in the floor is seen where the line to its mirror image meets the floor.
+  s.add(make_box({1, 1, 0.05f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {1, 0.2f, 0}}, {0, 1, 0});
+  const HdrImage picture = s.draw();
+  const auto mirrored = [&](float x, float y) {
+    const Vector2f p = project(camera, {x, -y, 0}, 192, 128);
+    return pixel(picture, static_cast<int>(p.x()), static_cast<int>(p.y()));
+  };
+  EXPECT_NEAR(mirrored(0, 1).x(), 0.9f, 0.06f);
+  EXPECT_NEAR(mirrored(0, 1).y(), 0.18f, 0.03f);
+  EXPECT_NEAR(mirrored(0.4f, 0.6f).x(), 0.9f, 0.06f);
+  EXPECT_NEAR(mirrored(0.8f, 1).x(), 0, 0.02f) << "beside it";
+  EXPECT_NEAR(mirrored(0, 0.3f).x(), 0, 0.02f) << "below it";
+  // What is not in the picture cannot be found.
+  s.stage.set_camera(camera = {.eye = {0, 1.5f, 6}, .target = {0, -0.7f, 0}, .fov_deg = 15});
+  EXPECT_NEAR(pixel(s.draw(), 96, 64).x(), 0, 0.02f);
+}
+
 TEST(StageLight, OfAFireFallsOnWhatIsAround) {
   Floor floor;
   const PointsHandle flames = floor.s.stage.add_points({.style = PointStyle::fire});
