@@ -18,6 +18,7 @@ static_assert(sizeof(Vertex) == 32);
 constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1;
 constexpr GLuint kMaterialBlock = 1, kFirstTextureUnit = 1;
 constexpr float kSmooth = 0.3f;      // less rough, a surface shows an image of the scene
+constexpr GLsizei kFewIndices = 1200;  // of a mesh that costs little to draw again
 constexpr float kMirrorSteps = 14;   // along the ray on which it is looked for
 
 // The first three rows of a transform.
@@ -131,7 +132,8 @@ GpuMaterial make_gpu_material(const Material& material, std::span<const Image> t
   result.blended = material.color.w() < 1 || (base != nullptr && has_alpha(*base));
   result.casts = material.color.w() > 0;
   result.glass = material.transmission > 0 && !result.blended;
-  result.mirror = !result.glass && !result.blended && material.roughness < kSmooth;
+  result.smooth = !result.glass && !result.blended && material.roughness < kSmooth;
+  result.metal = material.metallic > 0.5f;
   return result;
 }
 
@@ -304,13 +306,18 @@ void MeshPass::draw_opaque() {
   }
 }
 
+// Floors, walls and metal. Of curved lacquer only a sliver at its outline mirrors, which many triangles are not worth.
+bool MeshPass::mirrors(const Batch& batch) {
+  return batch.material->smooth && (batch.material->metal || batch.mesh->index_count <= kFewIndices);
+}
+
 bool MeshPass::has_mirrors() const {
-  return std::ranges::any_of(opaque_, [](const Batch& batch) { return batch.material->mirror; });
+  return std::ranges::any_of(opaque_, mirrors);
 }
 
 void MeshPass::draw_mirrors(float reach) {
   for (const Batch& batch : opaque_) {
-    if (!batch.material->mirror) continue;
+    if (!mirrors(batch)) continue;
     surface_program(*batch.material, true).use();
     glUniform1f(0, 0);
     glUniform2f(2, reach, kMirrorSteps);

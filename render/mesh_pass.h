@@ -43,7 +43,8 @@ struct GpuMaterial {
   bool blended = false;
   bool casts = true;   ///< false if fully transparent
   bool glass = false;   ///< light goes through and is refracted
-  bool mirror = false;  ///< smooth enough to show the scene in it
+  bool smooth = false;  ///< enough to show the scene in it
+  bool metal = false;
 };
 
 GpuMaterial make_gpu_material(const Material& material, std::span<const Image> textures);
@@ -76,8 +77,8 @@ class MeshPass {
   void draw_opaque();
   bool has_glass() const { return !glass_.empty(); }
   bool has_mirrors() const;
-  /// Once more what mirrors the scene, with the finished picture and its depth bound. `reach`: how far away things
-  /// are looked for [m].
+  /// What surfaces mirror of the scene, to be added to the picture, which is bound with its depth. `reach`: how far
+  /// away things are looked for [m].
   void draw_mirrors(float reach);
   /// Back to front, over a picture that is also bound to be seen through them.
   void draw_glass();
@@ -99,6 +100,7 @@ class MeshPass {
   gl::LazyProgram& surface_program(const GpuMaterial& material, bool mirror = false);
   gl::LazyProgram& shadow_program(const GpuMaterial& material);
   static void set_facing(const Batch& batch, bool both_sides);
+  static bool mirrors(const Batch& batch);
 
   std::map<std::tuple<Pattern, bool, bool, bool, Features>, gl::LazyProgram>
       surface_programs_;  ///< textured, glass, mirror

@@ -31,9 +31,7 @@ struct Picture {
   gl::Texture color, depth;
   gl::Framebuffer framebuffer;
   gl::Texture depth_copy;  ///< that particles read while they are drawn; made when there are some
-  gl::Framebuffer depth_copy_framebuffer;
-  gl::Texture behind;  ///< what is seen through glass; made when there is some
-  gl::Framebuffer behind_framebuffer;
+  gl::Texture behind;  ///< what is seen through glass and in mirrors; made when there is some
 
   Picture(int width_px, int height_px)
       : color(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)),
@@ -129,6 +127,7 @@ struct Stage::Impl {
                     FrameUniforms& frame);
   void prepare_lamps(std::span<PointSet* const> sets, const SampleOffsets& offsets, FrameUniforms& frame);
   void draw_lamp_shadows(std::span<const Caster> casters, std::span<const Cloth* const> sheets);
+  void copy(GLuint from, GLuint to) const;
   void copy_depth();
   void copy_picture();
   void draw_mirrors();
@@ -235,23 +234,22 @@ void Stage::Impl::draw_lamp_shadows(std::span<const Caster> casters, std::span<c
   lamp_pass.end();
 }
 
+void Stage::Impl::copy(GLuint from, GLuint to) const {
+  glCopyImageSubData(from, GL_TEXTURE_2D, 0, 0, 0, 0, to, GL_TEXTURE_2D, 0, 0, 0, 0, def.width_px,
+                     def.height_px, 1);
+}
+
 void Stage::Impl::copy_depth() {
-  if (picture.depth_copy == 0) {
+  if (picture.depth_copy == 0)
     picture.depth_copy = gl::make_target(GL_DEPTH_COMPONENT32F, def.width_px, def.height_px, GL_NEAREST);
-    picture.depth_copy_framebuffer = gl::make_framebuffer(0, picture.depth_copy);
-  }
-  glBlitNamedFramebuffer(picture.framebuffer, picture.depth_copy_framebuffer, 0, 0, def.width_px,
-                         def.height_px, 0, 0, def.width_px, def.height_px, GL_DEPTH_BUFFER_BIT, GL_NEAREST);
+  copy(picture.depth, picture.depth_copy);
   glBindTextureUnit(kSceneDepthUnit, picture.depth_copy);
 }
 
 void Stage::Impl::copy_picture() {
-  if (picture.behind == 0) {
+  if (picture.behind == 0)
     picture.behind = gl::make_target(GL_RGBA32F, def.width_px, def.height_px, GL_LINEAR);
-    picture.behind_framebuffer = gl::make_framebuffer(picture.behind, 0);
-  }
-  glBlitNamedFramebuffer(picture.framebuffer, picture.behind_framebuffer, 0, 0, def.width_px, def.height_px,
-                         0, 0, def.width_px, def.height_px, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  copy(picture.color, picture.behind);
   glBindTextureUnit(kBehindUnit, picture.behind);
 }
 
@@ -260,7 +258,12 @@ void Stage::Impl::draw_mirrors() {
   copy_depth();
   copy_picture();
   glDepthFunc(GL_GEQUAL);  // over themselves
+  glDepthMask(GL_FALSE);
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_ONE, GL_ONE);
   mesh_pass.draw_mirrors(kMirrorReach * (camera.target - camera.eye).norm());
+  glDisable(GL_BLEND);
+  glDepthMask(GL_TRUE);
   glDepthFunc(GL_GREATER);
 }
 

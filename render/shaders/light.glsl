@@ -120,10 +120,6 @@ vec3 with_bounces(float open, vec3 albedo) {
   return max(vec3(open), ((open * a + b) * open + c) * open);
 }
 
-#ifdef MIRROR
-vec4 in_mirror = vec4(0.0);  // light that a smooth surface mirrors of the scene; w: its share, the rest is sky
-#endif
-
 // The sun's light and the sky's that a surface sends to the eye; `view` points to it; `open` of the sky is not hidden.
 vec3 shade(Surface s, vec3 normal, vec3 view, float visibility, float open) {
   vec3 l = frame.sun_direction.xyz;
@@ -139,10 +135,15 @@ vec3 shade(Surface s, vec3 normal, vec3 view, float visibility, float open) {
 
   vec3 reflectance = sky_reflectance(f0, s.roughness, nv);
   float mirrored = saturate((nv + open) * (nv + open) - 1.0 + open);
-  vec3 mirror_image = sky_reflection(reflect(-view, normal), s.roughness) * mirrored;
-#ifdef MIRROR
-  mirror_image = mix(mirror_image, in_mirror.rgb, in_mirror.w);
-#endif
-  vec3 sky = ambient(normal) * diffuse * (1.0 - reflectance) * with_bounces(open, s.albedo) + mirror_image * reflectance;
+  vec3 sky = ambient(normal) * diffuse * (1.0 - reflectance) * with_bounces(open, s.albedo) +
+             sky_reflection(reflect(-view, normal), s.roughness) * reflectance * mirrored;
   return sun + sky + s.emission;
+}
+
+// What `shade` lacks where it is not the sky that is mirrored, but in a share w the `scene`.
+vec3 mirror_gain(Surface s, vec3 normal, vec3 view, float open, vec4 scene) {
+  float nv = max(abs(dot(normal, view)), 1e-3);
+  vec3 reflectance = sky_reflectance(mix(vec3(0.04), s.albedo, s.metallic), s.roughness, nv);
+  float mirrored = saturate((nv + open) * (nv + open) - 1.0 + open);
+  return (scene.rgb - sky_reflection(reflect(-view, normal), s.roughness) * mirrored) * reflectance * scene.w;
 }

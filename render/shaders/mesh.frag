@@ -44,12 +44,14 @@ void main() {
 #endif
   if (alpha < min_alpha) discard;
   s.roughness = filtered_roughness(s.roughness, n);
+#ifdef MIRROR
+  // Added to what was drawn already.
+  vec4 scene = seen_in_mirror(position, n, view, s.roughness);
+  color = vec4(mirror_gain(s, n, view, open_sky(1.0 / gl_FragCoord.w), scene) * fog_to(position).w, 0.0);
+#else
   vec3 albedo = s.albedo;
 #ifdef GLASS
   s.albedo *= 1.0 - material.glass.x;
-#endif
-#ifdef MIRROR
-  in_mirror = seen_in_mirror(position, n, view, s.roughness);
 #endif
   vec3 radiance = shade(s, n, view, sun_visibility(position, smooth_normal), open_sky(1.0 / gl_FragCoord.w));
 #ifdef LAMPS
@@ -60,4 +62,5 @@ void main() {
 #endif
   radiance = apply_fog(radiance, position);
   color = vec4(radiance * alpha, alpha);
+#endif
 }
