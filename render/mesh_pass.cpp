@@ -308,7 +308,7 @@ void MeshPass::draw_opaque() {
 
 // Floors, walls and metal. Of curved lacquer only a sliver at its outline mirrors, which many triangles are not worth.
 bool MeshPass::mirrors(const Batch& batch) {
-  return batch.material->smooth && (batch.material->metal || batch.mesh->index_count <= kFewIndices);
+  return batch.material->smooth && (batch.material->metal || batch.mesh->flat || batch.mesh->index_count <= kFewIndices);
 }
 
 bool MeshPass::has_mirrors() const {
