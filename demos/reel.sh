@@ -13,12 +13,13 @@ arch|3|4|An arch that stands by friction
 marbles|1|4|Exact collisions with meshes
 cradle|0|3|Simultaneous and sequential impacts
 explosion|0.6|4|Islands and explosions
-pile|0.2|4|Heaps of every shape
-machine|2|4|Kinematic machines
+pile|0.2|3|Heaps of every shape
+ragdolls|1|4|Joints with limits and motors
+machine|2|3|Kinematic machines
 drape|0.8|3|Cloth
 flag|2|4|Wind
 fountain|3|4|Thousands of drops
-sprinkler|2|3|Sprinklers
+sprinkler|2|2|Sprinklers
 rain|2|4|Rain and splashes
 smoke|4|3|Smoke that shadows itself
 fire|2.5|3|Fire that lights its surroundings
