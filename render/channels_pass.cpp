@@ -73,7 +73,8 @@ void ChannelsPass::draw(const Cloth& cloth) {
   glVertexArrayVertexBuffer(cloth_layout_, 1, places_before_, 0, sizeof(Vector3f));
   glVertexArrayElementBuffer(cloth_layout_, cloth.indices);
   glBindVertexArray(cloth_layout_);
-  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(cloth.surface.indices().size()), GL_UNSIGNED_INT, nullptr);
+  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(cloth.surface.indices().size()), GL_UNSIGNED_INT,
+                 nullptr);
 }
 
 void ChannelsPass::draw_balls(PointsPass& pass, const PointSet& set, float time) {
@@ -87,8 +88,12 @@ void ChannelsPass::draw_balls(PointsPass& pass, const PointSet& set, float time)
 
 void ChannelsPass::end(Channels& result) {
   const auto count = static_cast<std::size_t>(width_px_) * static_cast<std::size_t>(height_px_);
-  result = {width_px_, height_px_, std::vector<float>(count), std::vector<Vector3f>(count),
-            std::vector<uint32_t>(count), std::vector<Vector2f>(count)};
+  result = {width_px_,
+            height_px_,
+            std::vector<float>(count),
+            std::vector<Vector3f>(count),
+            std::vector<uint32_t>(count),
+            std::vector<Vector2f>(count)};
   std::vector<Vector4f> pixels(count);
   glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_);
   // Rows come from the bottom up.

@@ -17,9 +17,9 @@ static_assert(sizeof(Vertex) == 32);
 
 constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1;
 constexpr GLuint kMaterialBlock = 1, kFirstTextureUnit = 1;
-constexpr float kSmooth = 0.3f;      // less rough, a surface shows an image of the scene
+constexpr float kSmooth = 0.3f;        // less rough, a surface shows an image of the scene
 constexpr GLsizei kFewIndices = 1200;  // of a mesh that costs little to draw again
-constexpr float kMirrorSteps = 14;   // along the ray on which it is looked for
+constexpr float kMirrorSteps = 14;     // along the ray on which it is looked for
 
 // The first three rows of a transform.
 using Rows = std::array<Vector4f, 3>;
@@ -40,7 +40,8 @@ bool is_closed(const Mesh& mesh) {
   const auto bits = [](float x) { return std::bit_cast<uint32_t>(x + 0.0f); };  // -0 is 0
   const auto before = [&](uint32_t a, uint32_t b) {
     const Vector3f &p = mesh.positions[a], &q = mesh.positions[b];
-    return std::array{bits(p.x()), bits(p.y()), bits(p.z())} < std::array{bits(q.x()), bits(q.y()), bits(q.z())};
+    return std::array{bits(p.x()), bits(p.y()), bits(p.z())} <
+           std::array{bits(q.x()), bits(q.y()), bits(q.z())};
   };
   std::vector<uint32_t> order(mesh.positions.size()), place(order.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -306,9 +307,11 @@ void MeshPass::draw_opaque() {
   }
 }
 
-// Floors, walls and metal. Of curved lacquer only a sliver at its outline mirrors, which many triangles are not worth.
+// Floors, walls and metal. Of curved lacquer only a sliver at its outline mirrors, which many triangles are
+// not worth.
 bool MeshPass::mirrors(const Batch& batch) {
-  return batch.material->smooth && (batch.material->metal || batch.mesh->flat || batch.mesh->index_count <= kFewIndices);
+  return batch.material->smooth &&
+         (batch.material->metal || batch.mesh->flat || batch.mesh->index_count <= kFewIndices);
 }
 
 bool MeshPass::has_mirrors() const {

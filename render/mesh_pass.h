@@ -41,7 +41,7 @@ struct GpuMaterial {
   bool textured = false;
   bool two_sided = false;
   bool blended = false;
-  bool casts = true;   ///< false if fully transparent
+  bool casts = true;    ///< false if fully transparent
   bool glass = false;   ///< light goes through and is refracted
   bool smooth = false;  ///< enough to show the scene in it
   bool metal = false;
@@ -77,8 +77,8 @@ class MeshPass {
   void draw_opaque();
   bool has_glass() const { return !glass_.empty(); }
   bool has_mirrors() const;
-  /// What surfaces mirror of the scene, to be added to the picture, which is bound with its depth. `reach`: how far
-  /// away things are looked for [m].
+  /// What surfaces mirror of the scene, to be added to the picture, which is bound with its depth. `reach`:
+  /// how far away things are looked for [m].
   void draw_mirrors(float reach);
   /// Back to front, over a picture that is also bound to be seen through them.
   void draw_glass();

@@ -60,8 +60,8 @@ void append_cap(std::vector<ProfilePoint>& profile, float radius, float center_y
   }
 }
 
-// Grid lines of a box's axis: the flat part between two bevels, each of one facet a face. Their normals make them look
-// round, and finer ones would be most of what a scene of boxes costs.
+// Grid lines of a box's axis: the flat part between two bevels, each of one facet a face. Their normals make
+// them look round, and finer ones would be most of what a scene of boxes costs.
 std::vector<float> box_lines(float half, float bevel) {
   if (bevel <= 0) return {-half, half};
   return {-half, bevel - half, half - bevel, half};

@@ -107,7 +107,9 @@ inline void draw_lanes(const StreakSplat& s, float dx, float dy, std::size_t at,
   const Lanes m = 1 - square_root(1 - side * side), m2 = m * m;
   const Lanes mirrored = 0.02f + 0.98f * (m2 * m2 * m);
   const auto add_light = [&](std::array<float, kTilePixels>& plane, std::size_t c) {
-    lanes_of(plane, at) += seen * (s.light.middle[c] + mirrored * (s.light.rim[c] + s.light.rim_slope[c] * side - s.light.middle[c]));
+    lanes_of(plane, at) +=
+        seen *
+        (s.light.middle[c] + mirrored * (s.light.rim[c] + s.light.rim_slope[c] * side - s.light.middle[c]));
   };
   add_light(tile.red, 0);
   add_light(tile.green, 1);
@@ -233,8 +235,7 @@ void draw_by_tiles(std::span<const S> splats, SplatPicture& picture) {
   tbb::parallel_for(0, columns * rows, [&](int k) {
     const int x = touched.x0 + k % columns, y = touched.y0 + k / columns;
     const auto t = static_cast<std::size_t>(y * nx + x);
-    draw_tile(splats,
-              std::span<const uint32_t>(orders).subspan(begins[t], begins[t + 1] - begins[t]),
+    draw_tile(splats, std::span<const uint32_t>(orders).subspan(begins[t], begins[t + 1] - begins[t]),
               x * kTileWidth_px, y * kTileHeight_px, picture);
   });
   picture.x0 = touched.x0 * kTileWidth_px;

@@ -33,12 +33,12 @@ struct StreakLight {
 struct StreakSplat {
   float x, y;
   float half_x, half_y;
-  float along_x, along_y;                ///< unit vector to its head
-  float half_length, inverse_radius;     ///< of the straight part; 1 / radius
-  float depth, depth_slope;              ///< at the centre [m], and its change per pixel towards the head
-  float inverse_reach;                   ///< 1 / (2 * radius) [1/m]
-  float opacity, cover;                  ///< as of a Splat
-  float softness, taper;                 ///< as in PointsDef
+  float along_x, along_y;             ///< unit vector to its head
+  float half_length, inverse_radius;  ///< of the straight part; 1 / radius
+  float depth, depth_slope;           ///< at the centre [m], and its change per pixel towards the head
+  float inverse_reach;                ///< 1 / (2 * radius) [1/m]
+  float opacity, cover;               ///< as of a Splat
+  float softness, taper;              ///< as in PointsDef
   StreakLight light;
 };
 

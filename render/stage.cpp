@@ -22,16 +22,16 @@ namespace offstage::render {
 namespace {
 
 constexpr GLuint kFrameBlock = 0, kSceneDepthUnit = 4, kBehindUnit = 12;
-constexpr int kStrip_px = 32;   // rows that are read back at once: they stay in the processor's cache
+constexpr int kStrip_px = 32;         // rows that are read back at once: they stay in the processor's cache
 constexpr float kMirrorReach = 0.6f;  // how far away mirrors look for the scene, likewise
-constexpr float kReach = 0.1f;  // how far things hide the sky, as a share of the distance to the target
+constexpr float kReach = 0.1f;        // how far things hide the sky, as a share of the distance to the target
 
 /// Colour and depth of the picture.
 struct Picture {
   gl::Texture color, depth;
   gl::Framebuffer framebuffer;
   gl::Texture depth_copy;  ///< that particles read while they are drawn; made when there are some
-  gl::Texture behind;  ///< what is seen through glass and in mirrors; made when there is some
+  gl::Texture behind;      ///< what is seen through glass and in mirrors; made when there is some
 
   Picture(int width_px, int height_px)
       : color(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)),
@@ -321,8 +321,8 @@ void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<Po
   draw_glass();
 }
 
-void Stage::Impl::draw_blended(std::span<PointSet* const> sets, const View& view,
-                               const FrameUniforms& frame, bool new_frame) {
+void Stage::Impl::draw_blended(std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame,
+                               bool new_frame) {
   // Premultiplied: what adds light has no alpha, so one blend function serves both.
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
@@ -471,7 +471,9 @@ Channels Stage::channels(float time) {
   Impl& s = *impl_;
   if (!s.channels_pass) s.channels_pass.emplace(s.def.width_px, s.def.height_px);
   ChannelsPass& pass = *s.channels_pass;
-  const auto view_of = [&](const Camera& camera) { return make_view(camera, {}, s.def.width_px, s.def.height_px); };
+  const auto view_of = [&](const Camera& camera) {
+    return make_view(camera, {}, s.def.width_px, s.def.height_px);
+  };
   const View view = view_of(s.camera);
   s.upload(make_frame(view, s.sun, s.environment, {}, s.def.height_px));
   const std::vector<PointSet*> sets = s.prepare_points(view);

@@ -188,8 +188,8 @@ class Stage {
   void set_object(PointsHandle points, uint32_t id);
   /// Motion is measured from where everything is now, camera included.
   void remember();
-  /// Depth, normals, ids and motion of what is in place. `time`: since `remember` [s], by which balls moved on with
-  /// their velocity.
+  /// Depth, normals, ids and motion of what is in place. `time`: since `remember` [s], by which balls moved
+  /// on with their velocity.
   Channels channels(float time);
 
  private:

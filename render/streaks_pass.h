@@ -18,8 +18,8 @@ namespace offstage::render {
 class StreaksPass {
  public:
   StreaksPass(int width_px, int height_px);
-  /// Draws over the picture in `framebuffer`. `light`: with the smoke between sun and streaks. Streaks stay where
-  /// they are during a frame, so only its first sub-frame (`new_frame`) works out their light.
+  /// Draws over the picture in `framebuffer`. `light`: with the smoke between sun and streaks. Streaks stay
+  /// where they are during a frame, so only its first sub-frame (`new_frame`) works out their light.
   void draw(std::span<const PointSet* const> sets, const View& view, const PuffLight& light,
             const ShadowMap& shadow_map, GLuint framebuffer, bool new_frame);
 

@@ -43,8 +43,8 @@ struct RenderOptions {
   std::string frames, chunk;
   std::string format = "rgba";  ///< of standard output
   std::string cache, stats, report;
-  int threads = 0;  ///< 0: all available
-  int jobs = 0;     ///< 0: as `threads`
+  int threads = 0;                    ///< 0: all available
+  int jobs = 0;                       ///< 0: as `threads`
   std::vector<std::string> channels;  ///< depth, normal, id, motion
   bool resume = false, force = false, dry_run = false, watch = false;
 };

@@ -38,7 +38,8 @@ void report_run(const RunStats& stats, const TalkOptions& talk, const std::strin
     say("warning: the body '{}' left the world (world.bounds) and stays where it left\n", body);
   for (const std::string& joint : t.broken_joints) say("note: the joint '{}' broke\n", joint);
   if (t.joints_unsolved)
-    say("warning: joints could not be put back together {} times; use a smaller world.step\n", t.joints_unsolved);
+    say("warning: joints could not be put back together {} times; use a smaller world.step\n",
+        t.joints_unsolved);
   if (t.retired) say("note: {} particles left the world (world.bounds)\n", t.retired);
   if (t.skipped) say("warning: {} particles were not released: max_alive was reached\n", t.skipped);
   if (t.waiting) say("note: {} particles had to wait for room on their emitter\n", t.waiting);
@@ -306,14 +307,13 @@ int frame_command(const FrameOptions& options) {
   const auto threads = simulation_threads(options.threads);
   render::pin_environment(threads_or_all(options.threads));
   PictureSink sink(options.out);
-  const RunStats stats =
-      render_frames(loaded, models,
-                    {.frames = {frame},
-                     .threads = 1,
-                     .cache = {},
-                     .channels = channels_of(options.channels),
-                     .channels_file = data},
-                    sink, {});
+  const RunStats stats = render_frames(loaded, models,
+                                       {.frames = {frame},
+                                        .threads = 1,
+                                        .cache = {},
+                                        .channels = channels_of(options.channels),
+                                        .channels_file = data},
+                                       sink, {});
   report_run(stats, options.talk, "");
   if (stats.interrupted_by) return interrupted(stats, 1, "");
   fmt::print("{}\n", options.out);

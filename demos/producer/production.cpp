@@ -109,8 +109,9 @@ void print_frames(Pipeline& pipeline, render::FrameSink& sink, const Scene& scen
     const auto encode_start = Clock::now();
     sink.write(print->shot.frame, print->image);
     if (job.channels.any())
-      render::write_exr(numbered ? render::frame_path(job.channels_file, print->shot.frame) : job.channels_file,
-                        print->channels, job.channels, objects);
+      render::write_exr(
+          numbered ? render::frame_path(job.channels_file, print->shot.frame) : job.channels_file,
+          print->channels, job.channels, objects);
     const double encode_ms = ms_since(encode_start);
     if (stats.frames++ == 0) stats.startup_s = process_age_s();
     stats.sim.add(print->shot.sim_ms);
@@ -189,11 +190,11 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
   }
 
   Pipeline pipeline(job.threads + 2);
-  const auto draw = [&] { guarded(pipeline, [&] { draw_shots(pipeline, loaded.scene, models, job.channels.any()); }); };
+  const auto draw = [&] {
+    guarded(pipeline, [&] { draw_shots(pipeline, loaded.scene, models, job.channels.any()); });
+  };
   const auto print = [&] {
-    guarded(pipeline, [&] {
-      print_frames(pipeline, sink, loaded.scene, job, stats, progress);
-    });
+    guarded(pipeline, [&] { print_frames(pipeline, sink, loaded.scene, job, stats, progress); });
   };
   {
     std::vector<std::jthread> crew;
@@ -201,8 +202,8 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
     guarded(pipeline, [&] {
       for (int i = 0; i < job.threads; ++i) crew.emplace_back(draw);
       crew.emplace_back(print);
-      shoot(pipeline, *source, job.frames,
-            subframes(loaded.scene.render.quality) > 1 || job.channels.any(), job.report);
+      shoot(pipeline, *source, job.frames, subframes(loaded.scene.render.quality) > 1 || job.channels.any(),
+            job.report);
     });
   }
   pipeline.rethrow_failure();

@@ -81,7 +81,7 @@ struct RenderJob {
   std::optional<std::filesystem::path> cache;  ///< read states from here instead of simulating
   bool report = false;                         ///< keep figures and pictures
   render::ChannelChoice channels;              ///< written beside the frames ...
-  std::filesystem::path channels_file;         ///< ... as these; '#' as in render::frame_path, or for one frame
+  std::filesystem::path channels_file;  ///< ... as these; '#' as in render::frame_path, or for one frame
 };
 
 /// Draws the frames into the sink and closes it. After an interrupt it finishes the frames in flight, closes

@@ -251,11 +251,14 @@ TEST(Render, QualityNeverChangesThePhysics) {
 
 TEST(Render, ChannelsStandBesideTheFramesAndOnlyThere) {
   const TemporaryFolder folder;
-  ASSERT_EQ(offstage("render " + tiny_scene() + " -o out/ -q --frames 2-3 --channels depth,id", folder.path()).code, 0);
+  ASSERT_EQ(
+      offstage("render " + tiny_scene() + " -o out/ -q --frames 2-3 --channels depth,id", folder.path()).code,
+      0);
   const auto files = frames(folder / "out");
   ASSERT_EQ(files.size(), 4u);
   for (const char* name : {"0002", "0003"}) {
-    EXPECT_EQ(files.at(name + std::string(".png")), reference().at(name + std::string(".png"))) << "the picture is the same";
+    EXPECT_EQ(files.at(name + std::string(".png")), reference().at(name + std::string(".png")))
+        << "the picture is the same";
     EXPECT_EQ(files.at(name + std::string(".exr")).substr(0, 4), "\x76\x2f\x31\x01");
     EXPECT_NE(files.at(name + std::string(".exr")).find("2 thrown\n"), std::string::npos);
   }

@@ -30,7 +30,8 @@ RunStats three_frames() {
 }
 
 std::string page(const RunStats& stats = three_frames()) {
-  LoadedScene loaded = parse_scene(R"({"name": "a < b & c", "description": "<script>"})", "scene", OFFSTAGE_SOURCE_DIR);
+  LoadedScene loaded =
+      parse_scene(R"({"name": "a < b & c", "description": "<script>"})", "scene", OFFSTAGE_SOURCE_DIR);
   return run_report(loaded, "settings-hash", stats);
 }
 

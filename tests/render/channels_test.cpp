@@ -54,8 +54,11 @@ TEST(StageChannels, IdsTellWhatIsInFront) {
   s.stage.set_object(s.add(make_box({1, 1, 1}), {}, {0, 0, 1}), 3);
   s.stage.set_object(s.add(make_box({4, 4, 1}), {}, {0, 0, -1}), 4);
   const PointsHandle balls = s.stage.add_points({.style = PointStyle::sphere});
-  s.stage.set_points(balls, std::array{Point{.position = {1.2f, 0, 0}, .velocity = Vector3f::Zero(), .radius = 0.2f,
-                                             .color = {1, 1, 1, 1}, .id = 1}});
+  s.stage.set_points(balls, std::array{Point{.position = {1.2f, 0, 0},
+                                             .velocity = Vector3f::Zero(),
+                                             .radius = 0.2f,
+                                             .color = {1, 1, 1, 1},
+                                             .id = 1}});
   s.stage.set_object(balls, 5);
   const Channels c = s.stage.channels(0);
   const auto id_at = [&](const Vector3f& place) {
@@ -88,8 +91,10 @@ TEST(StageChannels, MotionIsThatOfTheBodyInPixels) {
 TEST(StageChannels, BallsMoveWithTheirVelocityAndTheCameraMovesEverything) {
   SmallStage s;
   const PointsHandle balls = s.stage.add_points({.style = PointStyle::sphere});
-  s.stage.set_points(balls, std::array{Point{.position = {0, 0, 0}, .velocity = {1, 0, 0}, .radius = 0.5f,
-                                             .color = {1, 1, 1, 1}, .id = 1}});
+  s.stage.set_points(
+      balls,
+      std::array{Point{
+          .position = {0, 0, 0}, .velocity = {1, 0, 0}, .radius = 0.5f, .color = {1, 1, 1, 1}, .id = 1}});
   s.stage.remember();
   Channels c = s.stage.channels(0.1f);
   EXPECT_NEAR(c.motion[middle(c)].x(), 0.1f * pixels_per_m(4.5f), 0.05f);
@@ -100,10 +105,10 @@ TEST(StageChannels, BallsMoveWithTheirVelocityAndTheCameraMovesEverything) {
 
 TEST(StageChannels, ClothsMoveByTheirVertices) {
   SmallStage s;
-  const ClothHandle cloth =
-      s.stage.add_cloth({.triangles = {0, 1, 2, 0, 2, 3}, .uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}}},
-                        s.stage.add_material({}));
-  std::array<Vector3f, 4> places = {Vector3f(-1, -1, 0), Vector3f(1, -1, 0), Vector3f(1, 1, 0), Vector3f(-1, 1, 0)};
+  const ClothHandle cloth = s.stage.add_cloth(
+      {.triangles = {0, 1, 2, 0, 2, 3}, .uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}}}, s.stage.add_material({}));
+  std::array<Vector3f, 4> places = {Vector3f(-1, -1, 0), Vector3f(1, -1, 0), Vector3f(1, 1, 0),
+                                    Vector3f(-1, 1, 0)};
   s.stage.set_cloth(cloth, places);
   s.stage.set_object(cloth, 9);
   s.stage.remember();

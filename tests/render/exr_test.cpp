@@ -46,7 +46,8 @@ TEST(Exr, KeepsEveryNumber) {
             {{16'000'001, "the box"}});
   EXPECT_EQ(read<float>(folder / "a.exr", "Z", Imf::FLOAT), c.depth);
   EXPECT_EQ(read<uint32_t>(folder / "a.exr", "id", Imf::UINT), c.id);
-  const auto y = read<float>(folder / "a.exr", "N.Y", Imf::FLOAT), my = read<float>(folder / "a.exr", "motion.Y", Imf::FLOAT);
+  const auto y = read<float>(folder / "a.exr", "N.Y", Imf::FLOAT),
+             my = read<float>(folder / "a.exr", "motion.Y", Imf::FLOAT);
   for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_EQ(y[i], c.normal[i].y());
     EXPECT_EQ(my[i], c.motion[i].y());
@@ -60,7 +61,8 @@ TEST(Exr, HoldsOnlyWhatWasChosen) {
   write_exr(folder / "a.exr", sample(), {.motion = true}, {});
   Imf::InputFile file((folder / "a.exr").c_str());
   std::vector<std::string> names;
-  for (auto i = file.header().channels().begin(); i != file.header().channels().end(); ++i) names.push_back(i.name());
+  for (auto i = file.header().channels().begin(); i != file.header().channels().end(); ++i)
+    names.push_back(i.name());
   EXPECT_EQ(names, (std::vector<std::string>{"motion.X", "motion.Y"}));
 }
 

@@ -131,8 +131,10 @@ TEST(StageLight, MirrorsShowTheSceneWhereGeometrySays) {
   s.stage.set_sun({.intensity = 0, .shadows = false});
   s.stage.set_camera(camera);
   s.add(make_ground(20), {.color = {0.9f, 0.9f, 0.9f, 1}, .metallic = 1, .roughness = 0.02f});
-  // A glowing square over the floor: the one in the floor is seen where the line to its mirror image meets the floor.
-  s.add(make_box({1, 1, 0.05f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {1, 0.2f, 0}}, {0, 1, 0});
+  // A glowing square over the floor: the one in the floor is seen where the line to its mirror image meets
+  // the floor.
+  s.add(make_box({1, 1, 0.05f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {1, 0.2f, 0}},
+        {0, 1, 0});
   const HdrImage picture = s.draw();
   const auto mirrored = [&](float x, float y) {
     const Vector2f p = project(camera, {x, -y, 0}, 192, 128);
