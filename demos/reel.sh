@@ -5,6 +5,9 @@ cd "$(dirname "$0")/.."
 mkdir -p out/reel
 options=("$@")
 [[ " $* " == *" --size "* ]] || options+=(--size 1280x720)
+# Shots of other options do not fit together with new ones.
+[ "$(cat out/reel/options 2>/dev/null)" = "${options[*]}" ] || rm -f out/reel/*.mp4
+echo "${options[*]}" >out/reel/options
 
 # scene|from [s]|length [s]|title
 shots='wall|0.9|4|Stacks, friction, a wrecking ball
@@ -14,7 +17,7 @@ marbles|1|4|Exact collisions with meshes
 cradle|0|3|Simultaneous and sequential impacts
 explosion|0.6|4|Islands and explosions
 pile|0.2|3|Heaps of every shape
-ragdolls|1|4|Joints with limits and motors
+ragdolls|1|4|Joints with limits
 machine|2|3|Kinematic machines
 drape|0.8|3|Cloth
 flag|2|4|Wind
