@@ -113,7 +113,7 @@ struct World::Impl : WorldState {
 
   // Joints (world_joints.cpp)
   void update_articulations();
-  void break_joints(StepReport& report);
+  void break_joints(Real h, StepReport& report);
   void let_go_of_joints(const Body& body);
   bool is_driven(const Island& island) const;
   bool are_jointed(const Body& a, const Body& b) const;

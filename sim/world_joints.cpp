@@ -30,6 +30,9 @@ void check(const JointDef& def) {
     refuse(def, "limits are " + std::to_string(def.lower) + " to " + std::to_string(def.upper) +
                     ", allowed is a range that contains 0, where the joint is made");
   check_not_negative(def, "swing", def.swing);
+  if (def.has_limits() && def.type == JointType::fixed) refuse(def, "a fixed joint has nothing to limit");
+  if (def.swing < JointDef::kFree && def.type != JointType::spherical && def.type != JointType::universal)
+    refuse(def, "swing is for spherical and universal joints only");
   check_not_negative(def, "friction", def.friction);
   check_not_negative(def, "damping", def.damping);
   check_not_negative(def, "max_force", def.max_force);
@@ -41,6 +44,9 @@ void check(const JointDef& def) {
                          def.type == JointType::distance;
   if (def.motor.mode != Motor::Mode::none && !can_drive)
     refuse(def, "a motor drives revolute, prismatic and distance joints only");
+  if ((def.friction > 0 || def.damping > 0) && !def.has_free_coordinate())
+    refuse(def, "friction and damping act where a joint may move: not on a fixed one, nor on a rod without "
+                "limits and motor");
   for (std::size_t i = 0; i < def.motor.targets.size(); ++i)
     if (const Motor::Key& key = def.motor.targets[i];
         !std::isfinite(key.time) || !std::isfinite(key.target) ||
@@ -135,10 +141,10 @@ JointState World::joint(JointHandle handle) const {
   state.anchor_a = a.position + place.arm_a;
   state.anchor_b = b.position + place.arm_b;
   state.axis = place.axes_b.col(2);
-  state.force = joint.force;
-  state.torque = joint.torque;
+  state.force = joint.borne.force;
+  state.torque = joint.borne.torque;
   state.broken = joint.is_broken;
-  if (has_free_coordinate(joint.def.type)) {
+  if (joint.def.has_free_coordinate()) {
     const JointRow row = free_row(joint.def.type, place, joint.length);
     Vec6 va, vb;
     va << a.velocity, a.angular_velocity;
@@ -146,7 +152,7 @@ JointState World::joint(JointHandle handle) const {
     state.coordinate = counts_turns(joint) ? joint.coordinate : row.error;
     state.speed = row.on_a.dot(va) + row.on_b.dot(vb);
   }
-  const JointRows rows = joint_rows(joint.def.type, place, joint.length);
+  const JointRows rows = joint_rows(joint.def, place, joint.length);
   state.error = rows.error.head<3>().norm();
   return state;
 }
@@ -197,13 +203,15 @@ void World::Impl::update_articulations() {
   pairs_changed = true;
 }
 
-/// Those that had to bear too much in the sub-step hold no longer.
-void World::Impl::break_joints(StepReport& report) {
+/// Those that had to bear too much in a sub-step of length h hold no longer.
+void World::Impl::break_joints(Real h, StepReport& report) {
   for (const auto& articulation : articulations) {
     if (!articulation->bodies().front()->is_awake()) continue;
     for (Joint* joint : articulation->joints()) {
-      if (joint->is_broken || (!(joint->force.norm() > joint->def.max_force) &&
-                               !(joint->torque.norm() > joint->def.max_torque)))
+      const Wrench blow = std::exchange(joint->blow, {});
+      joint->borne = {joint->load.force + blow.force / h, joint->load.torque + blow.torque / h};
+      if (!(joint->borne.force.norm() > joint->def.max_force) &&
+          !(joint->borne.torque.norm() > joint->def.max_torque))
         continue;
       joint->is_broken = joints_changed = true;
       report.joints_broken.push_back(joint->handle);

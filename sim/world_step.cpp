@@ -91,7 +91,7 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
   report.joints_unsolved += joint_tally.unsolved;
   joint_tally = {};
   for (const auto& articulation : articulations) articulation->count_turns(end);
-  break_joints(report);
+  break_joints(h, report);
 
   if (!systems.empty()) {
     update_obstacles(h);

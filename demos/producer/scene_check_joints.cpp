@@ -1,9 +1,11 @@
 #include "producer/scene_check_joints.h"
 
 #include <algorithm>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "producer/articulation_defs.h"
 #include "producer/suggest.h"
 
 namespace offstage::producer {
@@ -27,12 +29,10 @@ class JointChecker {
   }
 
   void check_unique() {
-    std::vector<std::string> names;
-    for (const Joint& joint : flat_.joints) {
-      if (std::ranges::find(names, joint.name) != names.end())
+    std::set<std::string> names;
+    for (const Joint& joint : flat_.joints)
+      if (!names.insert(joint.name).second)
         return fail(joint.where.path + "/name", "the name '" + joint.name + "' is already that of another joint");
-      names.push_back(joint.name);
-    }
   }
 
   const Body* body(const std::string& path, const std::string& name) {
@@ -60,6 +60,14 @@ class JointChecker {
     if (joint.limits_deg && slides) fail(path + "/limits_deg", "is for joints that turn; use \"limits\"");
     check_limits(path + "/limits", joint.limits);
     check_limits(path + "/limits_deg", joint.limits_deg);
+    if (joint.limits_deg && joint.type == sim::JointType::fixed)
+      fail(path + "/limits_deg", "is for joints that turn; a fixed one does not");
+    if (joint.swing_deg && joint.type != sim::JointType::spherical && joint.type != sim::JointType::universal)
+      fail(path + "/swing_deg", "is for spherical and universal joints");
+    if (!joint_def(joint).has_free_coordinate())
+      for (const auto& [key, value] : {std::pair("/friction", joint.friction), {"/damping", joint.damping}})
+        if (value > 0)
+          fail(path + key, "acts where a joint may move: not on a fixed one, nor on a rod without limits and motor");
     if (joint.motor) check_motor(path + "/motor", joint);
   }
 

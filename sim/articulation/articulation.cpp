@@ -47,7 +47,7 @@ JointSystem make_system(std::span<Body* const> bodies, std::span<Joint* const> j
   std::vector<JointSystem::Topology> topology;
   for (const Joint* joint : joints)
     topology.push_back(
-        {index_in(bodies, joint->a), index_in(bodies, joint->b), constraint_count(joint->def.type)});
+        {index_in(bodies, joint->a), index_in(bodies, joint->b), constraint_count(joint->def)});
   return {static_cast<uint32_t>(bodies.size()), std::move(topology)};
 }
 
@@ -114,7 +114,7 @@ Articulation::Articulation(std::vector<Joint*> joints)
 Real Articulation::greatest_frequency() const {
   Real greatest = 0;
   for (std::size_t j = 0; j < joints_.size(); ++j) {
-    const Real force = joints_[j]->force.norm();
+    const Real force = joints_[j]->load.force.norm();
     const auto consider = [&](const Body* body, const JointFrame& frame) {
       if (!is_moved(body)) return;
       const Vec3& r = frame.point;
@@ -153,17 +153,16 @@ JointPlace Articulation::place_of(std::size_t j, Real time, std::span<const Link
   return {link(a, joints_[j]->a, still_a), frames_a_[j], link(b, joints_[j]->b, still_b), frames_b_[j]};
 }
 
-bool Articulation::set_rows(Real time, std::span<const LinkMotion> motion,
-                            std::span<const LinkMobility> mobility) {
+void Articulation::read_rows(Real time, std::span<const LinkMotion> motion) {
   LinkMotion still_a, still_b;
   for (std::size_t j = 0; j < joints_.size(); ++j)
-    rows_[j] = joint_rows(joints_[j]->def.type, place_of(j, time, motion, still_a, still_b), joints_[j]->length);
-  return system_.factorize(rows_, mobility);
+    rows_[j] = joint_rows(joints_[j]->def, place_of(j, time, motion, still_a, still_b), joints_[j]->length);
 }
 
 void Articulation::add_forces(Real t, std::span<const LinkMotion> motion, std::span<const LinkMobility> mobility,
                               std::span<Vec6> forces) {
-  if (!set_rows(t, motion, mobility)) return;  // settle() will find the same, and count it
+  read_rows(t, motion);
+  if (!system_.factorize(rows_, mobility)) return;  // settle() will find the same, and count it
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     // d/dt (I w) = torque: the angular acceleration has the turning of the inertia in it.
     const Mat3& R = motion[i].axes;
@@ -187,27 +186,25 @@ void Articulation::add_forces(Real t, std::span<const LinkMotion> motion, std::s
     if (a != JointSystem::kDriven) forces[a] += rows_[j].on_a * impulses_[j];
     if (b != JointSystem::kDriven) forces[b] += rows_[j].on_b * impulses_[j];
   }
-  tell(motion, 1, false);
+  for (std::size_t j = 0; j < joints_.size(); ++j) joints_[j]->load = wrench(j, impulses_[j], motion);
 }
 
-/// The joints' forces by `impulses_`.
-void Articulation::tell(std::span<const LinkMotion> motion, Real duration, bool add) {
-  for (std::size_t j = 0; j < joints_.size(); ++j) {
-    Joint& joint = *joints_[j];
-    const Vec6 on_a = rows_[j].on_a * impulses_[j] / duration;
-    const uint32_t a = system_.joints()[j].a;
-    const Mat3 axes = a != JointSystem::kDriven ? motion[a].axes : link_motion(joint.a, 0).axes;
-    const Vec3 force = on_a.head<3>();
-    // What keeps the axes together, without the moment of the force.
-    const Vec3 torque = on_a.tail<3>() - (axes * frames_a_[j].point).cross(force);
-    joint.force = add ? Vec3(joint.force + force) : force;
-    joint.torque = add ? Vec3(joint.torque + torque) : torque;
-  }
+/// What an impulse of a joint's constraints does, or a force.
+Wrench Articulation::wrench(std::size_t j, const Vec6& impulse, std::span<const LinkMotion> motion) const {
+  const Vec6 on_a = rows_[j].on_a * impulse;
+  const uint32_t a = system_.joints()[j].a;
+  const Mat3 axes = a != JointSystem::kDriven ? motion[a].axes : link_motion(joints_[j]->a, 0).axes;
+  // What keeps the axes together, without the moment of the force.
+  return {on_a.head<3>(), on_a.tail<3>() - (axes * frames_a_[j].point).cross(on_a.head<3>())};
 }
 
-void Articulation::add_impulses(std::span<const Vec6> impulses, Real duration) {
-  impulses_.assign(impulses.begin(), impulses.end());
-  tell(motion_, duration, true);
+void Articulation::add_loads(std::span<const Vec6> impulses, Real duration) {
+  for (std::size_t j = 0; j < joints_.size(); ++j)
+    joints_[j]->load += wrench(j, impulses[j] / duration, motion_);
+}
+
+void Articulation::add_blows(std::span<const Vec6> impulses) {
+  for (std::size_t j = 0; j < joints_.size(); ++j) joints_[j]->blow += wrench(j, impulses[j], motion_);
 }
 
 void Articulation::count_turns(Real time) {
@@ -235,7 +232,8 @@ void Articulation::read_bodies(bool at_start) {
 
 void Articulation::place(Real time, bool at_start) {
   read_bodies(at_start);
-  set_rows(time, motion_, mobility_);
+  read_rows(time, motion_);
+  system_.factorize(rows_, mobility_);
 }
 
 /// J v, driven links included.
@@ -260,11 +258,9 @@ void Articulation::pass_on_blows(Real time, JointTally& tally) {
                                               body->rigid.angular_momentum == m.angular;
                                      });
   if (is_settled && !has_kinematic_) return;
-  LinkMotion still_a, still_b;
-  read_bodies();
   Real fastest = 0;
-  for (std::size_t j = 0; j < joints_.size(); ++j)
-    rows_[j] = joint_rows(joints_[j]->def.type, place_of(j, time, motion_, still_a, still_b), joints_[j]->length);
+  read_bodies();
+  read_rows(time, motion_);
   system_.update(rows_);
   residual(time, velocities_, change_);
   for (const Vec6& c : change_) fastest = std::max(fastest, c.cwiseAbs().maxCoeff());
@@ -272,17 +268,13 @@ void Articulation::pass_on_blows(Real time, JointTally& tally) {
 }
 
 void Articulation::settle(Real time, JointTally& tally) {
-  LinkMotion still_a, still_b;
   Real apart = 0;
   std::vector<Pose> before(bodies_.size());  // of the centres
   for (int step = 0; step < kMostSteps; ++step) {
     read_bodies();
+    read_rows(time, motion_);
     Real now = 0;
-    for (std::size_t j = 0; j < joints_.size(); ++j) {
-      rows_[j] =
-          joint_rows(joints_[j]->def.type, place_of(j, time, motion_, still_a, still_b), joints_[j]->length);
-      now = std::max(now, rows_[j].error.cwiseAbs().maxCoeff());
-    }
+    for (const JointRows& rows : rows_) now = std::max(now, rows.error.cwiseAbs().maxCoeff());
     // One factorisation serves for small corrections.
     if (step > 0 && now <= kSmall) {
       system_.update(rows_);
@@ -293,10 +285,9 @@ void Articulation::settle(Real time, JointTally& tally) {
     // Where links are stretched out, Newton's method may lead away: never farther than it was.
     if (step > 0 && now > apart) {
       for (std::size_t i = 0; i < bodies_.size(); ++i) {
-        const Vec3 w = motion_[i].angular_velocity;
         bodies_[i]->rigid.position = before[i].position;
         bodies_[i]->rigid.orientation = before[i].orientation;
-        bodies_[i]->rigid.set_velocity(motion_[i].velocity, w);
+        bodies_[i]->rigid.set_velocity(motion_[i].velocity, motion_[i].angular_velocity);
       }
       break;
     }
@@ -324,6 +315,7 @@ void Articulation::settle(Real time, JointTally& tally) {
     residual(time, velocities_, change_);
     for (Vec6& c : change_) c = -c;
     system_.correct(change_, impulses_, velocities_);
+    add_blows(impulses_);
   }
   for (std::size_t i = 0; i < bodies_.size(); ++i)
     bodies_[i]->rigid.set_velocity(velocities_[i].head<3>(), velocities_[i].tail<3>());

@@ -9,6 +9,7 @@
 
 #include "sim/articulation/joint_system.h"
 #include "sim/body.h"
+#include "sim/dynamics/force_field.h"
 
 namespace offstage::sim {
 
@@ -25,8 +26,12 @@ struct Joint {
 
   bool is_broken = false;
   Real coordinate = 0;                               ///< of joints that count turns
-  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  ///< on a at its anchor, of the last sub-step
-  std::array<Real, 9> efforts = {};                  ///< of its rows with bounds, as a guess (joint_limits.h)
+  // What it does to a, about the anchor.
+  Wrench load;                       ///< in the last motion, with the contacts in it [N], [N m]
+  Wrench blow;                       ///< impulses of collisions in this sub-step [N s], [N m s]
+  Wrench borne;                      ///< load and blows of the last sub-step together [N], [N m]
+  Vec6 reaction = Vec6::Zero();      ///< to contacts, by its constraints, as a guess
+  std::array<Real, 9> efforts = {};  ///< of its rows with bounds, as a guess (joint_limits.h)
 
   /// Whether it does more than hold its bodies together.
   bool has_bounded_rows() const;
@@ -82,8 +87,10 @@ class Articulation {
   bool has_bounded_rows() const { return has_bounded_rows_; }
   const JointSystem& system() const { return system_; }
   JointSystem& system() { return system_; }
-  /// The joints also tell of these impulses, over a duration, besides those of the motion.
-  void add_impulses(std::span<const Vec6> impulses, Real duration);
+  /// The joints bear these impulses of their constraints over a duration, besides the forces of the motion.
+  void add_loads(std::span<const Vec6> impulses, Real duration);
+  /// Or all at once.
+  void add_blows(std::span<const Vec6> impulses);
   /// Brings the coordinates that count whole turns up to date; at least once in half a turn.
   void count_turns(Real time);
 
@@ -98,10 +105,10 @@ class Articulation {
 
   JointPlace place_of(std::size_t j, Real time, std::span<const LinkMotion> motion, LinkMotion& still_a,
                       LinkMotion& still_b) const;
-  bool set_rows(Real time, std::span<const LinkMotion> motion, std::span<const LinkMobility> mobility);
+  void read_rows(Real time, std::span<const LinkMotion> motion);
   void read_bodies(bool at_start = false);
   void residual(Real time, std::span<const Vec6> velocities, std::span<Vec6> result) const;
-  void tell(std::span<const LinkMotion> motion, Real duration, bool add);
+  Wrench wrench(std::size_t j, const Vec6& impulse, std::span<const LinkMotion> motion) const;
 
   std::vector<Joint*> joints_;
   std::vector<Body*> bodies_;

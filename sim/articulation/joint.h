@@ -22,7 +22,8 @@ enum class JointType : uint8_t {
   revolute,   ///< turns about the axis
   prismatic,  ///< slides along the axis, without turning
   universal,  ///< turns about the axis, fixed in a, and about the second one, fixed in b
-  distance,   ///< the anchors stay as far apart as they are: a massless rod
+  distance,   ///< the anchors stay as far apart as they are: a massless rod; with limits or a motor its length may
+              ///< change: a rope, a winch
 };
 
 /// What drives the free coordinate of a joint: the angle of a revolute one [rad], the way of a prismatic one [m],
@@ -64,15 +65,23 @@ struct JointDef {
   Real damping = 0;    ///< viscous, in each free direction [N m s] or [N s/m]
   Motor motor = {};    ///< of revolute, prismatic and distance joints
   Real max_force = kFree;   ///< breaks beyond [N]
-  Real max_torque = kFree;  ///< breaks beyond, of what keeps the axes together [N m]
+  Real max_torque = kFree;  ///< breaks beyond: what keeps the axes together, limits, motor and friction [N m]
   bool collide = false;     ///< whether the two bodies also collide with each other
+
+  bool has_limits() const { return lower > -kFree || upper < kFree; }
+  /// Whether there is a coordinate that limits, motor and friction can act on.
+  bool has_free_coordinate() const {
+    return type != JointType::fixed &&
+           (type != JointType::distance || has_limits() || motor.mode != Motor::Mode::none);
+  }
 };
 
 /// What can be asked of a joint.
 struct JointState {
   Vec3 anchor_a = Vec3::Zero(), anchor_b = Vec3::Zero();  ///< world [m]
   Vec3 axis = Vec3::UnitZ();                              ///< world, with b
-  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();       ///< on a at its anchor, of the last sub-step [N], [N m]
+  /// On a at its anchor, on average over the last sub-step, with the blows of collisions [N], [N m].
+  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
   Real coordinate = 0;                                    ///< of the free one; 0 for joints that have none
   Real speed = 0;                                         ///< of the free one
   Real error = 0;                                         ///< how far the anchors are apart that should not be [m]

@@ -29,7 +29,7 @@ class RowMaker {
   void add_all(std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins) {
     rows_ = &rows;
     origins_ = &origins;
-    if (has_free_coordinate(def_.type)) {
+    if (def_.has_free_coordinate()) {
       add_range(free(), kLimit, def_.lower, def_.upper);
       add_motor(free());
     }
@@ -40,11 +40,13 @@ class RowMaker {
     if (def_.friction > 0 || def_.damping > 0) add_resistance();
   }
 
-  void add_stops(std::vector<BoundedRow>& rows) {
-    if (has_free_coordinate(def_.type)) add_stop(free(), def_.lower, def_.upper, rows);
+  void add_stops(std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins) {
+    rows_ = &rows;
+    origins_ = &origins;
+    if (def_.has_free_coordinate()) add_stop(free(), kLimit, def_.lower, def_.upper);
     if (def_.swing < kInfinite)
-      add_stop(swing_row(def_.type, place_), def_.type == JointType::universal ? -def_.swing : -kInfinite,
-               def_.swing, rows);
+      add_stop(swing_row(def_.type, place_), kSwing,
+               def_.type == JointType::universal ? -def_.swing : -kInfinite, def_.swing);
   }
 
  private:
@@ -89,10 +91,13 @@ class RowMaker {
     return row.error - h_ / 2 * sum;
   }
 
-  void add(BoundedRow row, std::size_t slot, bool is_stop) {
-    row.impulse = std::clamp(h_ * joint_.efforts[slot], row.lower, row.upper);
+  void add(const BoundedRow& row, std::size_t slot, bool is_stop) {
     rows_->push_back(row);
-    origins_->push_back({&joint_, slot, is_stop});
+    origins_->push_back({&joint_, slot, place_.arm_a, is_stop});
+  }
+  void add_guessed(BoundedRow row, std::size_t slot, bool is_stop) {
+    row.impulse = std::clamp(h_ * joint_.efforts[slot], row.lower, row.upper);
+    add(row, slot, is_stop);
   }
 
   /// Both sides; of a range without width it is held.
@@ -109,7 +114,7 @@ class RowMaker {
     r.lower = lower == upper || above < below ? -kInfinite : 0;
     r.upper = lower == upper || below <= above ? kInfinite : 0;
     r.target = below <= above ? -towards(start - lower) : towards(upper - start);
-    add(r, slot, true);
+    add_guessed(r, slot, true);
   }
 
   void add_motor(const JointRow& row) {
@@ -121,7 +126,7 @@ class RowMaker {
     const Real target = motor.target(time_);
     if (motor.mode == Motor::Mode::speed) {
       r.target = target;
-      return add(r, kMotor, false);
+      return add_guessed(r, kMotor, false);
     }
     const Real missing = target - at_start(row);
     if (motor.stiffness == 0) {
@@ -132,7 +137,7 @@ class RowMaker {
       r.softness = 1 / (h_ * resistance);
       r.target = motor.stiffness * missing / resistance;
     }
-    add(r, kMotor, true);
+    add_guessed(r, kMotor, true);
   }
 
   /// Of all free directions.
@@ -155,18 +160,18 @@ class RowMaker {
       if (def_.friction > 0) {
         r.upper = h_ * def_.friction;
         r.lower = -r.upper;
-        add(r, kFriction + i, false);
+        add_guessed(r, kFriction + i, false);
       }
       if (def_.damping > 0) {
         r.upper = kInfinite;
         r.lower = -kInfinite;
         r.softness = 1 / (h_ * def_.damping);
-        add(r, kDamping + i, false);
+        add_guessed(r, kDamping + i, false);
       }
     }
   }
 
-  void add_stop(const JointRow& row, Real lower, Real upper, std::vector<BoundedRow>& rows) const {
+  void add_stop(const JointRow& row, std::size_t slot, Real lower, Real upper) {
     BoundedRow r = bounded(row);
     if (row.error - lower < kReached)
       r.upper = kInfinite;
@@ -174,7 +179,7 @@ class RowMaker {
       r.lower = -kInfinite;
     else
       return;
-    rows.push_back(r);
+    add(r, slot, true);
   }
 
   Joint& joint_;
@@ -196,10 +201,11 @@ void collect_bounded_rows(const Articulation& articulation, Real duration, Real 
       RowMaker(articulation, j, duration, time).add_all(rows, origins);
 }
 
-void collect_stops(const Articulation& articulation, Real time, std::vector<BoundedRow>& rows) {
+void collect_stops(const Articulation& articulation, Real time, std::vector<BoundedRow>& rows,
+                   std::vector<BoundedOrigin>& origins) {
   if (!articulation.has_bounded_rows()) return;
   for (std::size_t j = 0; j < articulation.joints().size(); ++j)
-    if (articulation.joints()[j]->has_bounded_rows()) RowMaker(articulation, j, 1, time).add_stops(rows);
+    if (articulation.joints()[j]->has_bounded_rows()) RowMaker(articulation, j, 1, time).add_stops(rows, origins);
 }
 
 }  // namespace offstage::sim

@@ -12,6 +12,7 @@ namespace offstage::sim {
 struct BoundedOrigin {
   Joint* joint;
   std::size_t slot;  ///< in Joint::efforts
+  Vec3 arm;          ///< from the centre of the joint's body a to the anchor, world [m]
   /// It says where the joint may be at the interval's end, not how it moves until then.
   bool is_stop;
 };
@@ -22,6 +23,7 @@ void collect_bounded_rows(const Articulation& articulation, Real duration, Real 
                           std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins);
 
 /// Those of limits that are reached, for a collision at `time`.
-void collect_stops(const Articulation& articulation, Real time, std::vector<BoundedRow>& rows);
+void collect_stops(const Articulation& articulation, Real time, std::vector<BoundedRow>& rows,
+                   std::vector<BoundedOrigin>& origins);
 
 }  // namespace offstage::sim

@@ -62,8 +62,8 @@ void JointRows::add(const JointRow& row) {
   bias[i] = row.bias;
 }
 
-uint32_t constraint_count(JointType type) {
-  switch (type) {
+uint32_t constraint_count(const JointDef& def) {
+  switch (def.type) {
     case JointType::spherical:
       return 3;
     case JointType::fixed:
@@ -74,19 +74,20 @@ uint32_t constraint_count(JointType type) {
     case JointType::universal:
       return 4;
     case JointType::distance:
-      return 1;
+      return def.has_free_coordinate() ? 0 : 1;
   }
   return 0;
 }
 
-JointRows joint_rows(JointType type, const JointPlace& p, Real length) {
+JointRows joint_rows(const JointDef& def, const JointPlace& p, Real length) {
+  const JointType type = def.type;
   JointRows rows;
   const auto slide = [&](int axis) { rows.add(slide_row(p, p.axes_b.col(axis))); };
   const auto perpendicular = [&](int of_a, int of_b) {
     rows.add(perpendicular_row(p, p.axes_a.col(of_a), p.axes_b.col(of_b)));
   };
   if (type == JointType::distance) {
-    rows.add(length_row(p, length));
+    if (!def.has_free_coordinate()) rows.add(length_row(p, length));
     return rows;
   }
   slide(0);
@@ -103,10 +104,6 @@ JointRows joint_rows(JointType type, const JointPlace& p, Real length) {
 
 JointRow turning_row(const Vec3& axis) {
   return {join(Vec3::Zero(), axis), join(Vec3::Zero(), -axis)};
-}
-
-bool has_free_coordinate(JointType type) {
-  return type != JointType::fixed;
 }
 
 JointRow free_row(JointType type, const JointPlace& p, Real length) {

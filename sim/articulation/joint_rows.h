@@ -17,6 +17,18 @@ struct LinkMotion {
   Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
 };
 
+/// What impulses do to a link: [1/kg], and world axes [1/(kg m^2)].
+struct LinkMobility {
+  Real inverse_mass = 0;
+  Mat3 inverse_inertia = Mat3::Zero();
+
+  Vec6 velocity(const Vec6& impulse) const {
+    Vec6 v;
+    v << inverse_mass * impulse.head<3>(), inverse_inertia * impulse.tail<3>();
+    return v;
+  }
+};
+
 /// Where a joint is on a link: from its centre, in its axes. Columns of `axes`: the second axis, what makes a
 /// right-handed frame, the axis.
 struct JointFrame {
@@ -49,11 +61,11 @@ struct JointRows {
   void add(const JointRow& row);
 };
 
-uint32_t constraint_count(JointType type);
+/// Of a distance joint only if it is a rod, which has a length to keep.
+uint32_t constraint_count(const JointDef& def);
 /// `length` of a rod.
-JointRows joint_rows(JointType type, const JointPlace& place, Real length);
+JointRows joint_rows(const JointDef& def, const JointPlace& place, Real length);
 
-bool has_free_coordinate(JointType type);
 /// The free coordinate of a revolute, prismatic or distance joint, the first of a universal one, the twist of a
 /// spherical one, with its row; `error` is the coordinate, of angles within half a turn.
 JointRow free_row(JointType type, const JointPlace& place, Real length);

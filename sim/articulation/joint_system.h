@@ -15,18 +15,6 @@
 
 namespace offstage::sim {
 
-/// Of a link: [1/kg], and world axes [1/(kg m^2)].
-struct LinkMobility {
-  Real inverse_mass = 0;
-  Mat3 inverse_inertia = Mat3::Zero();
-
-  Vec6 velocity(const Vec6& impulse) const {
-    Vec6 v;
-    v << inverse_mass * impulse.head<3>(), inverse_inertia * impulse.tail<3>();
-    return v;
-  }
-};
-
 class JointSystem {
  public:
   static constexpr uint32_t kDriven = UINT32_MAX;  ///< in place of a link: none that forces move

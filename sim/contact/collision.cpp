@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -156,8 +156,7 @@ void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, 
                     ContactWork& work) {
   if (!joints.empty()) {
     for (Contact& c : contacts) c.is_guessed = false;
-    constexpr Real kWhatever = std::numeric_limits<Real>::infinity();
-    return work.add(*ProximalNewton().solve(bodies, contacts, kWhatever, joints));
+    return work.add(*ProximalNewton().solve(bodies, contacts, joints));
   }
   if (contacts.size() <= kDense) return work.add(solve_by_pivoting(bodies, contacts));
   const std::vector<ContactBody> before(bodies.begin(), bodies.end());
@@ -235,6 +234,8 @@ class Cluster {
     }
     const Real factor = first < 0 ? std::min(1.0, -first / second) : 0;
     for (Contact& c : contacts_) c.impulse *= factor;
+    for (Vec6& p : joints_.impulses) p *= factor;
+    for (BoundedRow& r : joints_.bounded) r.impulse *= factor;
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
       bodies_[i].velocity = before_[i].velocity + factor * (bodies_[i].velocity - before_[i].velocity);
       bodies_[i].angular_velocity =
@@ -250,10 +251,34 @@ class Cluster {
   std::vector<Vec3> velocities_;
 };
 
+/// Sums up what several solutions do to the joints.
+class JointSums {
+ public:
+  explicit JointSums(const JointProblem& joints)
+      : joints_(joints), impulses_(joints.impulses.size(), Vec6::Zero()), bounded_(joints.bounded.size(), 0) {}
+
+  void add_last() {
+    for (std::size_t j = 0; j < impulses_.size(); ++j)
+      impulses_[j] += std::exchange(joints_.impulses[j], Vec6::Zero());
+    for (std::size_t i = 0; i < bounded_.size(); ++i)
+      bounded_[i] += std::exchange(joints_.bounded[i].impulse, 0);
+  }
+  void write() const {
+    std::copy(impulses_.begin(), impulses_.end(), joints_.impulses.begin());
+    for (std::size_t i = 0; i < bounded_.size(); ++i) joints_.bounded[i].impulse = bounded_[i];
+  }
+
+ private:
+  const JointProblem& joints_;
+  std::vector<Vec6> impulses_;
+  std::vector<Real> bounded_;
+};
+
 /// Impulses one at a time, the fastest approach first; those as fast but for rounding in order.
 ContactWork collide_in_sequence(std::span<ContactBody> bodies, std::span<Contact> contacts,
                                 std::span<const Real> restitution, const JointProblem& joints) {
   ContactWork work{.solves = 1};
+  JointSums sums(joints);
   Real still = 0;
   for (Contact& c : contacts) {
     still = std::max(still, kResting * approach(c, bodies));
@@ -265,13 +290,17 @@ ContactWork collide_in_sequence(std::span<ContactBody> bodies, std::span<Contact
     std::size_t next = contacts.size();
     for (std::size_t i = 0; i < contacts.size(); ++i)
       if (approach(contacts[i], bodies) > fastest + still) fastest = approach(contacts[next = i], bodies);
-    if (next == contacts.size()) return work;
+    if (next == contacts.size()) {
+      sums.write();
+      return work;
+    }
     Contact& c = contacts[next];
     if (!joints.empty()) {
       const Vec3 before = c.impulse;
       work.add(Cluster(bodies, std::span(&c, 1), restitution.subspan(next, 1), joints).solve());
       c.impulse += before;
       c.target = 0;
+      sums.add_last();
       continue;
     }
     const Vec3 p = collision_impulse(mobility(c, bodies), c.relative_velocity(bodies), restitution[next],
@@ -283,6 +312,8 @@ ContactWork collide_in_sequence(std::span<ContactBody> bodies, std::span<Contact
   for (const Contact& c : contacts) impulses.push_back(c.impulse);
   solve_together(bodies, contacts, joints, work);
   work.solves = 1;
+  sums.add_last();
+  sums.write();
   for (std::size_t i = 0; i < contacts.size(); ++i) contacts[i].impulse += impulses[i];
   return work;
 }

@@ -162,34 +162,57 @@ void IslandJoints::collect(std::span<const Island* const> islands, const Contact
   bounded_.clear();
   origins_.clear();
   bounded_ends_.clear();
+  impulses_.clear();
   for (const Island* island : islands) {
     const std::size_t first = articulations_.size();
     collect_constraints(*island, interval.end, false);
     for (std::size_t i = first; i < articulations_.size(); ++i) {
       collect_bounded_rows(*articulations_[i], interval.duration, interval.end, bounded_, origins_);
       bounded_ends_.push_back(static_cast<uint32_t>(bounded_.size()));
+      for (const Joint* joint : articulations_[i]->joints())
+        impulses_.push_back(interval.duration * joint->reaction);
     }
   }
-  impulses_.assign(constraints_.size(), Vec6::Zero());
 }
 
 void IslandJoints::collect_for_collision(const Island& island, Real time) {
   articulations_.clear();
   constraints_.clear();
   bounded_.clear();
+  origins_.clear();
   collect_constraints(island, time, true);
-  for (const Articulation* a : articulations_) collect_stops(*a, time, bounded_);
+  for (const Articulation* a : articulations_) collect_stops(*a, time, bounded_, origins_);
   impulses_.assign(constraints_.size(), Vec6::Zero());
 }
 
-void IslandJoints::tell(Real duration) {
-  for (std::size_t i = 0; i < bounded_.size(); ++i)
-    origins_[i].joint->efforts[origins_[i].slot] = bounded_[i].impulse / duration;
+/// What a row with bounds does to its joint.
+Wrench IslandJoints::wrench(std::size_t i, Real impulse) const {
+  const Vec6 on_a = impulse * bounded_[i].on_a;
+  return {on_a.head<3>(), on_a.tail<3>() - origins_[i].arm.cross(on_a.head<3>())};
+}
+
+void IslandJoints::tell_blows() {
+  for (std::size_t i = 0; i < bounded_.size(); ++i) origins_[i].joint->blow += wrench(i, bounded_[i].impulse);
   std::size_t first = 0;
   for (Articulation* a : articulations_) {
-    const std::size_t count = a->joints().size();
-    a->add_impulses(std::span(impulses_).subspan(first, count), duration);
-    first += count;
+    a->add_blows(std::span(impulses_).subspan(first, a->joints().size()));
+    first += a->joints().size();
+  }
+}
+
+void IslandJoints::tell(Real duration) {
+  for (std::size_t i = 0; i < bounded_.size(); ++i) {
+    const Real effort = bounded_[i].impulse / duration;
+    origins_[i].joint->efforts[origins_[i].slot] = effort;
+    origins_[i].joint->load += wrench(i, effort);
+  }
+  std::size_t first = 0;
+  for (Articulation* a : articulations_) {
+    const std::span of_articulation = std::span(impulses_).subspan(first, a->joints().size());
+    a->add_loads(of_articulation, duration);
+    for (std::size_t j = 0; j < of_articulation.size(); ++j)
+      a->joints()[j]->reaction = of_articulation[j] / duration;
+    first += of_articulation.size();
   }
 }
 
@@ -213,7 +236,7 @@ std::optional<ContactWork> ExactContacts::solve(const Island& island, const Cont
   free_.resize(bodies_.size());
   for (std::size_t i = 0; i < bodies_.size(); ++i)
     free_[i] << bodies_[i].velocity, bodies_[i].angular_velocity;
-  const std::optional<ContactWork> work = newton_.solve(bodies_, contacts_, budget, joints_.problem());
+  const std::optional<ContactWork> work = newton_.solve(bodies_, contacts_, joints_.problem(), budget);
   if (!work) return work;
   joints_.tell(interval.duration);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
@@ -572,6 +595,7 @@ uint32_t resolve_collisions(const Island& island, const CollisionSettings& setti
     const ContactBody& b = cluster.bodies[body->row];
     body->set_start_velocity(b.velocity, b.angular_velocity);
   }
+  joints.tell_blows();
   return static_cast<uint32_t>(std::count(cluster.bounces.begin(), cluster.bounces.end(), 1));
 }
 

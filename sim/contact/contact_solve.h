@@ -34,6 +34,8 @@ class IslandJoints {
   void collect(std::span<const Island* const> islands, const ContactInterval& interval);
   /// For a collision at the bodies' start.
   void collect_for_collision(const Island& island, Real time);
+  /// After a collision: the joints bear its blows.
+  void tell_blows();
   JointProblem problem() { return {constraints_, bounded_, impulses_}; }
   /// After the solution: the joints tell of their forces, and keep them as a guess.
   void tell(Real duration);
@@ -46,6 +48,7 @@ class IslandJoints {
 
  private:
   void collect_constraints(const Island& island, Real time, bool at_start);
+  Wrench wrench(std::size_t bounded, Real impulse) const;
 
   std::vector<Articulation*> articulations_;
   std::vector<JointConstraint> constraints_;

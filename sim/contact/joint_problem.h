@@ -33,7 +33,7 @@ struct BoundedRow {
 struct JointProblem {
   std::span<const JointConstraint> constraints;
   std::span<BoundedRow> bounded;
-  std::span<Vec6> impulses;  ///< out: of the constraints, by their rows
+  std::span<Vec6> impulses;  ///< of the constraints, by their rows; in: a guess; out: the solution
 
   bool empty() const { return constraints.empty() && bounded.empty(); }
 };

@@ -53,7 +53,7 @@ Mat6 block(const Mat3& W, const Vec3& r, const Vec3& s) {
 }  // namespace
 
 std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, std::span<Contact> contacts,
-                                                 Real budget, const JointProblem& joints) {
+                                                 const JointProblem& joints, Real budget) {
   ContactWork work{.solves = 1};
   cost_ = kSetUp * static_cast<Real>(contacts.size() + joints.constraints.size());
   budget_ = budget;
@@ -65,8 +65,9 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
   Real speed = 0;
   for (const Point& p : points_) speed = std::max(speed, p.impulse.cwiseAbs().maxCoeff());
   for (const Bounded& p : bounded_) speed = std::max(speed, std::abs(p.impulse));
-  if (!constraints_.empty()) satisfy_constraints();
   const Real tolerance = kSmallest + kTolerance * speed;
+  // At rest the impulses of before still hold the joints together.
+  if (constraint_speed() > tolerance / 4) satisfy_constraints();
 
   merit_ = evaluate(contacts, velocity_);
   gradient(contacts);
@@ -135,6 +136,7 @@ void ProximalNewton::number_bodies(std::span<const ContactBody> bodies, std::spa
   trial_.resize(rows);
   gradient_.resize(rows);
   mass_.resize(rows);
+  mobility_.resize(rows);
   for (std::size_t row = 0; row < rows; ++row) {
     const ContactBody& body = bodies[body_of_row_[row]];
     free_[row] << body.velocity, body.angular_velocity;
@@ -142,6 +144,7 @@ void ProximalNewton::number_bodies(std::span<const ContactBody> bodies, std::spa
     mass_[row].setZero();
     mass_[row].diagonal().head<3>().setConstant(1 / body.inverse_mass);
     mass_[row].bottomRightCorner<3, 3>() = body.inverse_inertia.inverse();
+    mobility_[row] = {body.inverse_mass, body.inverse_inertia};
   }
 }
 
@@ -223,8 +226,7 @@ void ProximalNewton::set_joints() {
     Real mobility = 0;
     for (const auto& [at, on] : {std::pair(p.a, &r.on_a), std::pair(p.b, &r.on_b)}) {
       if (at == kNone) continue;
-      Vec6 response = *on / mass_[at](0, 0);
-      response.tail<3>() = mass_[at].bottomRightCorner<3, 3>().inverse() * on->tail<3>();
+      const Vec6 response = mobility_[at].velocity(*on);
       mobility += on->dot(response);
       p.impulse += on->dot(free_[at]);
       velocity_[at] += p.multiplier * response;
@@ -235,20 +237,39 @@ void ProximalNewton::set_joints() {
   constraints_.clear();
   for (uint32_t j = 0; j < joints_.constraints.size(); ++j) {
     const JointConstraint& c = joints_.constraints[j];
-    Constraint k{.a = row(c.a), .b = row(c.b), .diagonal = Mat6::Zero(), .impulse = Vec6::Zero()};
+    Constraint k{.a = row(c.a), .b = row(c.b), .diagonal = Mat6::Zero(), .impulse = joints_.impulses[j]};
     k.pair_a = pair_of(k.a, rows + j);
     k.pair_b = pair_of(k.b, rows + j);
     for (Eigen::Index i = 0; i < 6; ++i) {
       Real mobility = 0;
       for (const auto& [at, on] : {std::pair(k.a, &c.rows->on_a), std::pair(k.b, &c.rows->on_b)})
-        if (at != kNone)
-          mobility += on->col(i).dot(mass_[at].llt().solve(on->col(i)));
+        if (at != kNone) mobility += on->col(i).dot(mobility_[at].velocity(on->col(i)));
       k.diagonal(i, i) = mobility > 0 ? -kRegularization * mobility : -1;
     }
+    if (k.a != kNone) velocity_[k.a] += mobility_[k.a].velocity(c.rows->on_a * k.impulse);
+    if (k.b != kNone) velocity_[k.b] += mobility_[k.b].velocity(c.rows->on_b * k.impulse);
     constraints_.push_back(k);
   }
   direction_.resize(rows + constraints_.size());
   if (!joints_.empty() || factor_.rows() != direction_.size()) is_factored_ = false;
+}
+
+/// How far the velocities are from what the joints allow.
+Real ProximalNewton::constraint_speed() const {
+  Real worst = 0;
+  for (std::size_t j = 0; j < constraints_.size(); ++j)
+    worst = std::max(worst, violation(j).cwiseAbs().maxCoeff());
+  return worst;
+}
+
+/// J (v - v0) of a joint.
+Vec6 ProximalNewton::violation(std::size_t j) const {
+  const Constraint& c = constraints_[j];
+  const JointRows& rows = *joints_.constraints[j].rows;
+  Vec6 v = Vec6::Zero();
+  if (c.a != kNone) v += rows.on_a.transpose() * (velocity_[c.a] - free_[c.a]);
+  if (c.b != kNone) v += rows.on_b.transpose() * (velocity_[c.b] - free_[c.b]);
+  return v;
 }
 
 /// The nearest velocities, weighted with the masses, that differ from those without impulses by what the joints
@@ -280,13 +301,7 @@ void ProximalNewton::add_constraint_blocks() {
 /// Newton's step against the gradient and what is left of the constraints, with the change of their impulses.
 void ProximalNewton::solve_for_direction() {
   std::copy(gradient_.begin(), gradient_.end(), direction_.begin());
-  for (std::size_t j = 0; j < constraints_.size(); ++j) {
-    const Constraint& c = constraints_[j];
-    Vec6& left = direction_[gradient_.size() + j];
-    left.setZero();
-    if (c.a != kNone) left += joints_.constraints[j].rows->on_a.transpose() * (velocity_[c.a] - free_[c.a]);
-    if (c.b != kNone) left += joints_.constraints[j].rows->on_b.transpose() * (velocity_[c.b] - free_[c.b]);
-  }
+  for (std::size_t j = 0; j < constraints_.size(); ++j) direction_[gradient_.size() + j] = violation(j);
   factor_.solve(direction_);
   for (std::size_t j = 0; j < constraints_.size(); ++j)
     constraints_[j].impulse += direction_[gradient_.size() + j];

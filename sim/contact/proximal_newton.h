@@ -40,8 +40,8 @@ class ProximalNewton {
   /// Gauss-Seidel goes on from where they ended.
   /// If that would take more than `budget` [ns, as cost() counts], there is no result and nothing is changed.
   std::optional<ContactWork> solve(std::span<ContactBody> bodies, std::span<Contact> contacts,
-                                   Real budget = std::numeric_limits<Real>::infinity(),
-                                   const JointProblem& joints = {});
+                                   const JointProblem& joints = {},
+                                   Real budget = std::numeric_limits<Real>::infinity());
 
   /// What the last solve() took by the number of its operations, on a machine of 2020 [ns].
   Real cost() const { return cost_; }
@@ -75,6 +75,8 @@ class ProximalNewton {
   uint32_t pair_of(uint32_t row, uint32_t other) const;
   void set_points(std::span<const ContactBody> bodies, std::span<const Contact> contacts);
   void set_joints();
+  Real constraint_speed() const;
+  Vec6 violation(std::size_t j) const;
   void satisfy_constraints();
   void add_constraint_blocks();
   void solve_for_direction();
@@ -97,6 +99,7 @@ class ProximalNewton {
   std::vector<Vec6> free_, velocity_, trial_, gradient_, direction_;
   std::vector<Vec3> fixed_;  // relative velocity that unmoved bodies and offsets add, less the target
   std::vector<Mat6> mass_;   // of each row
+  std::vector<LinkMobility> mobility_;
   std::vector<Mat6> diagonal_, off_;  // H
   std::vector<BlockRowKind> kinds_;
   JointProblem joints_;

@@ -48,6 +48,7 @@ RelaxedJoints::RelaxedJoints(const JointProblem& problem, std::span<Articulation
     part.velocities.resize(links);
     part.change.resize(joints);
     part.impulses.resize(joints);
+    part.now.assign(joints, Vec6::Zero());
     part.sum.assign(joints, Vec6::Zero());
     parts_.push_back(std::move(part));
     constraint += static_cast<uint32_t>(joints);
@@ -95,6 +96,7 @@ void RelaxedJoints::prepare_row(Part& part, uint32_t i, std::span<const RelaxedB
     system.relative(row.response, part.change);
     for (Vec6& c : part.change) c = -c;
     system.correct(part.change, part.impulses, row.response);
+    row.reaction = part.impulses;
     mobility = 0;
     for (std::size_t k = 0; k < links; ++k) {
       if (part.bodies[k] == r.a) mobility += r.on_a.dot(row.response[k]);
@@ -105,11 +107,12 @@ void RelaxedJoints::prepare_row(Part& part, uint32_t i, std::span<const RelaxedB
   row.inverse_stiffness = stiffness > 1e-300 ? 1 / stiffness : 0;
 }
 
-void RelaxedJoints::push(const Part& part, uint32_t i, Real impulse, std::span<BodyMotion> motions) const {
+void RelaxedJoints::push(Part& part, uint32_t i, Real impulse, std::span<BodyMotion> motions) const {
   const Row& row = rows_[i];
   if (!row.response.empty()) {
     for (std::size_t k = 0; k < part.bodies.size(); ++k)
       add_to(motions[part.bodies[k]], impulse * row.response[k]);
+    for (std::size_t j = 0; j < part.now.size(); ++j) part.now[j] += impulse * row.reaction[j];
     return;
   }
   const BoundedRow& r = problem_.bounded[i];
@@ -118,7 +121,7 @@ void RelaxedJoints::push(const Part& part, uint32_t i, Real impulse, std::span<B
 }
 
 void RelaxedJoints::start(uint32_t p, std::span<BodyMotion> motions) {
-  const Part& part = parts_[p];
+  Part& part = parts_[p];
   for (uint32_t i = part.first_row; i < part.last_row; ++i)
     if (rows_[i].impulse != 0) push(part, i, rows_[i].impulse, motions);
 }
@@ -134,7 +137,9 @@ void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapse
   std::fill(correction.begin(), correction.end(), Vec6::Zero());
   system.correct(part.change, part.impulses, correction);
   for (std::size_t k = 0; k < part.bodies.size(); ++k) add_to(motions[part.bodies[k]], correction[k]);
-  for (std::size_t j = 0; j < part.sum.size(); ++j) part.sum[j] += part.impulses[j];
+  // The motion of a sub-step goes on in the next, with all that acted in it; after the last there is none.
+  if (is_last) std::fill(part.now.begin(), part.now.end(), Vec6::Zero());
+  for (std::size_t j = 0; j < part.now.size(); ++j) part.now[j] += part.impulses[j];
 
   for (uint32_t i = part.first_row; i < part.last_row; ++i) {
     const BoundedRow& r = problem_.bounded[i];
@@ -145,9 +150,10 @@ void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapse
     const Real wanted = row.impulse - (u - r.target + row.softness * row.impulse) * row.inverse_stiffness;
     const Real next = std::clamp(wanted, row.lower, row.upper);
     push(part, i, next - row.impulse, motions);
+    row.sum += is_last ? next - row.impulse : next;
     row.impulse = next;
-    if (!is_last) row.sum += next;
   }
+  for (std::size_t j = 0; j < part.sum.size(); ++j) part.sum[j] += part.now[j];
 }
 
 void RelaxedJoints::finish() {

@@ -38,18 +38,20 @@ class RelaxedJoints {
     Real impulse, lower, upper;     // of a sub-step
     Real softness, sum = 0;         // for that; of the whole step
     std::vector<Vec6> response;     // of the links; none: of its own two, in `response_a` and `response_b`
+    std::vector<Vec6> reaction;     // of the joints to that, likewise
     Vec6 response_a, response_b;
   };
   struct Part {
     Articulation* articulation;
     uint32_t first_constraint, first_row, last_row;
     std::vector<uint32_t> bodies;  // of the links
-    std::vector<Vec6> velocities, change, impulses, sum;
+    std::vector<Vec6> velocities, change, impulses;
+    std::vector<Vec6> now, sum;  // impulses of the joints in this sub-step, and in the whole step
   };
 
   void prepare(Part& part, std::span<const RelaxedBody> bodies);
   void prepare_row(Part& part, uint32_t i, std::span<const RelaxedBody> bodies);
-  void push(const Part& part, uint32_t i, Real impulse, std::span<BodyMotion> motions) const;
+  void push(Part& part, uint32_t i, Real impulse, std::span<BodyMotion> motions) const;
 
   JointProblem problem_;
   std::vector<Part> parts_;

@@ -121,9 +121,16 @@ struct ForceDef {
 /// What is wrong with a definition: the field, and what is allowed. Empty: nothing.
 std::string problem(const ForceDef& def);
 
-/// A force and a torque about the centre of mass, or an impulse and an angular impulse; world axes.
+/// A force and a torque about the centre of mass unless said otherwise, or an impulse and an angular impulse;
+/// world axes.
 struct Wrench {
   Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
+
+  Wrench& operator+=(const Wrench& w) {
+    force += w.force;
+    torque += w.torque;
+    return *this;
+  }
 };
 
 /// A body at a stage of an integration.

@@ -413,7 +413,7 @@ TEST_P(Joints, BreakBeyondTheirForce) {
   EXPECT_NEAR((world.body(hook.a).centre - world.body(more.a).centre).norm(), 0.1, 1e-9);
 }
 
-TEST_P(Joints, RodsKeepTheirLengthAndRopesMayBeShorter) {
+TEST_P(Joints, KeepTheLengthOfARod) {
   World world(def());
   JointDef rod{.type = JointType::distance, .anchor = {1, 0, 0}, .anchor_b = {0, 0, 0}};
   rod.a = add_box(world, {0.1, 0.1, 0.1}, 1, {1, 0, 0});
@@ -422,6 +422,71 @@ TEST_P(Joints, RodsKeepTheirLengthAndRopesMayBeShorter) {
     world.step(1.0 / 240);
     const JointState state = world.joint(joint);
     ASSERT_NEAR((state.anchor_a - state.anchor_b).norm(), 1, 1e-9);
+  }
+}
+
+// A weight on a rope of 2 m that is held 1 m below its end: it falls freely for that metre, and then hangs.
+TEST_P(Joints, LetARopeBeShorterButNotLonger) {
+  World world(def());
+  JointDef rope{.type = JointType::distance, .anchor_b = {0, 1, 0}, .upper = 1};
+  rope.a = add_box(world, {0.1, 0.1, 0.1}, 2, Vec3::Zero());
+  const JointHandle joint = world.add_joint(rope);
+  const Real falls = std::sqrt(2 / kG);
+  while (world.time() < falls - 0.02) world.step(1.0 / 240);
+  EXPECT_NEAR(world.body(rope.a).centre.y(), -kG / 2 * std::pow(world.time(), 2), 1e-3);
+  EXPECT_EQ(world.joint(joint).force.norm(), 0);
+  Real lowest = 0;
+  while (world.time() < 4) {
+    world.step(1.0 / 240);
+    lowest = std::min(lowest, world.body(rope.a).centre.y());
+  }
+  EXPECT_GT(lowest, -1.01);
+  EXPECT_NEAR(world.body(rope.a).centre.y(), -1, 1e-3);
+  EXPECT_NEAR(world.joint(joint).force.y(), 2 * kG, 1e-3 * kG);
+}
+
+TEST_P(Joints, WindTheRopeOfAWinch) {
+  World world(def());
+  JointDef winch{.type = JointType::distance, .anchor_b = {0, 3, 0}};
+  winch.motor = {.mode = Motor::Mode::position, .targets = {{0, 0}, {1, 0}, {3, -1.5}}};
+  winch.a = add_box(world, {0.1, 0.1, 0.1}, 2, Vec3::Zero());
+  const JointHandle joint = world.add_joint(winch);
+  run(world, 2);
+  EXPECT_NEAR(world.body(winch.a).velocity.y(), 0.75, 1e-3);
+  EXPECT_NEAR(world.joint(joint).force.y(), 2 * kG, 1e-3 * kG);
+  run(world, 2);
+  EXPECT_NEAR(world.body(winch.a).centre.y(), 1.5, 1e-3);
+}
+
+// A shelf on one fixed joint, and a box that lies on it: the joint bears both, with their moment.
+TEST_P(Joints, TellWhatTheyBear) {
+  World world(def());
+  JointDef wall{.type = JointType::fixed};
+  wall.a = add_box(world, {1, 0.1, 0.5}, 3, {0.5, 0, 0}, Quat::Identity(), true);
+  const JointHandle joint = world.add_joint(wall);
+  add_box(world, {0.2, 0.2, 0.2}, 2, {0.7, 0.15, 0}, Quat::Identity(), true);
+  run(world, 2);
+  EXPECT_NEAR(world.joint(joint).force.y(), 5 * kG, 1e-3 * kG);
+  EXPECT_NEAR(world.joint(joint).torque.z(), (3 * 0.5 + 2 * 0.7) * kG, 1e-2 * kG);
+  EXPECT_LT(world.joint(joint).force.head<1>().norm() + world.joint(joint).torque.head<2>().norm(), 1e-2);
+}
+
+// The ball alone could hang on it; its blow cannot.
+TEST_P(Joints, BreakByABlow) {
+  for (const Real height : {0.0, 1.0}) {
+    World world(def());
+    JointDef wall{.type = JointType::fixed, .max_force = 200};
+    wall.a = add_box(world, {1, 0.1, 0.5}, 3, {0.5, 0, 0}, Quat::Identity(), true);
+    world.add_joint(wall);
+    BodyDef ball;
+    ball.shape = Sphere{0.1};
+    ball.mass = 2;
+    ball.restitution = 0.5;
+    ball.pose.position = {0.5, 0.15 + height, 0};
+    world.add_body(ball);
+    std::size_t broken = 0;
+    for (int i = 0; i < 240; ++i) broken += world.step(1.0 / 240).joints_broken.size();
+    EXPECT_EQ(broken, height > 0 ? 1u : 0u);
   }
 }
 

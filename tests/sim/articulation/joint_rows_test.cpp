@@ -62,11 +62,11 @@ TEST(JointRows, AreTheDerivativesOfTheirConstraintsAnywhere) {
     for (const JointType type : kTypes) {
       const auto rows = [&](Real t) {
         const LinkMotion at_a = a.at(t), at_b = b.at(t);
-        return joint_rows(type, JointPlace(at_a, on_a, at_b, on_b), 0.5);
+        return joint_rows({.type = type}, JointPlace(at_a, on_a, at_b, on_b), 0.5);
       };
       constexpr Real kStep = 1e-4;
       const JointRows now = rows(0), before = rows(-kStep), after = rows(kStep);
-      ASSERT_EQ(now.count, constraint_count(type));
+      ASSERT_EQ(now.count, constraint_count({.type = type}));
       const Vec6 rate = now.on_a.transpose() * join(a.start.velocity, a.start.angular_velocity) +
                         now.on_b.transpose() * join(b.start.velocity, b.start.angular_velocity);
       const Vec6 second = now.on_a.transpose() * join(a.acceleration, Vec3::Zero()) +
