@@ -11,7 +11,7 @@
 #include "sim/articulation/articulation.h"
 #include "sim/body.h"
 #include "sim/cloth/cloth_system.h"
-#include "sim/collision/broad_phase.h"
+#include "sim/collision/grouped_broad_phase.h"
 #include "sim/collision/obstacles.h"
 #include "sim/contact/contact_solve.h"
 #include "sim/contact_graph.h"
@@ -154,7 +154,7 @@ struct World::Impl : WorldState {
   uint32_t sleeping_groups = 0;  // so far
   std::size_t asleep = 0;        // bodies
 
-  BroadPhase broad_phase;  // of the bodies that collide, by slot
+  GroupedBroadPhase broad_phase;  // of the bodies that collide, by slot; articulations are groups
   ContactGraph graph;
   tbb::task_arena serial{1};
   std::vector<ContactPair*> active_pairs;  // those of which a body can move

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 #include <stdexcept>
 
 #include "sim/world_impl.h"
@@ -72,6 +74,31 @@ JointFrame in_body(const Body* body, const Vec3& point, const Mat3& axes) {
 
 bool is_dynamic(const Body* body) {
   return body && body->is_dynamic();
+}
+
+/// Slots of the bodies of a component that move and collide, those that joints connect after each other.
+std::vector<uint32_t> colliding_links(std::span<Joint* const> component) {
+  std::map<const Body*, std::vector<const Body*>> neighbours;
+  const Body* first = nullptr;
+  for (const Joint* joint : component) {
+    for (const Body* end : {joint->a, joint->b})
+      if (is_dynamic(end) && (!first || end->handle.index < first->handle.index)) first = end;
+    if (!is_dynamic(joint->a) || !is_dynamic(joint->b)) continue;
+    neighbours[joint->a].push_back(joint->b);
+    neighbours[joint->b].push_back(joint->a);
+  }
+  std::vector<uint32_t> slots;
+  std::set<const Body*> seen;
+  std::vector<const Body*> open = {first};
+  while (!open.empty()) {
+    const Body* body = open.back();
+    open.pop_back();
+    if (!seen.insert(body).second) continue;
+    if (body->def.collides) slots.push_back(body->handle.index);
+    const std::vector<const Body*>& next = neighbours[body];
+    open.insert(open.end(), next.rbegin(), next.rend());
+  }
+  return slots;
 }
 
 /// A motor that goes on moving, or a link that does by itself.
@@ -198,8 +225,12 @@ void World::Impl::update_articulations() {
     }
     components[n].push_back(joint);
   }
-  for (std::vector<Joint*>& component : components)
+  std::vector<std::vector<uint32_t>> groups;
+  for (std::vector<Joint*>& component : components) {
+    groups.push_back(colliding_links(component));
     articulations.push_back(std::make_unique<Articulation>(std::move(component)));
+  }
+  broad_phase.set_groups(groups);
   pairs_changed = true;
 }
 

@@ -11,6 +11,14 @@ namespace {
 /// 1 / (1 + kStiffness e) of the error in a direction whose eigenvalue of the mobility is e (of the largest):
 /// with stacks of 100 at 1e-4. Larger ones cost digits of H.
 constexpr Real kStiffness = 1e5;
+/// Rows with bounds less so, until that lasts too long: dry friction, whose bounds may be small, turns over within
+/// bound / rho, and Newton's method would go from kink to kink.
+constexpr Real kBoundedStiffness = 1e3;
+/// Joints pass on what a contact does, and a guess that is far off changes which others are closed. Then the first
+/// iterations are softer, each by that factor than the next (heaps of chains: a third of the factorisations, a tenth
+/// of the fall-backs).
+constexpr int kSoftSteps = 4;
+constexpr Real kStiffen = 10, kFarOff = 1e-3;
 constexpr Real kTolerance = 1e-7, kSmallest = 1e-11;  // of the velocities, and [m/s]
 constexpr Real kCoarse = 1e-5;
 constexpr uint32_t kPatience = 4;
@@ -74,6 +82,8 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
   Real left = gradient_speed();
   bool solved = false;
   mixing_.clear();
+  if (!joints.empty() && left > kFarOff * speed)
+    if (!come_near(contacts, tolerance, work)) return std::nullopt;
   for (uint32_t outer = 0; outer < kMaxOuter && work.factorizations < kMaxFactorizations; ++outer) {
     minimize(contacts, std::max(tolerance / 4, left / 20), work);
     if (cost_ > budget_) return std::nullopt;
@@ -83,6 +93,7 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
     solved = left <= std::min(tolerance * std::pow(10, outer / kPatience), tolerance + kCoarse * speed);
     if (solved) break;
     mix_lifts(left > kSlow * before);
+    if (outer == 2 * kPatience) stiffen(1, kStiffness / kBoundedStiffness);
     merit_ = evaluate(contacts, velocity_);
     gradient(contacts);
   }
@@ -178,6 +189,32 @@ uint32_t ProximalNewton::pair_of(uint32_t row, uint32_t other) const {
   return static_cast<uint32_t>(std::lower_bound(pairs_.begin(), pairs_.end(), pair) - pairs_.begin());
 }
 
+/// Multiplies the penalties.
+void ProximalNewton::stiffen(Real contacts, Real bounded) {
+  if (contacts == 1 && bounded_.empty()) return;
+  for (Point& p : points_) p.rho *= contacts;
+  for (Bounded& p : bounded_) p.rho *= bounded;
+  is_factored_ = false;
+}
+
+/// Towards the solution from a guess that is far from it; false if the budget is spent.
+bool ProximalNewton::come_near(std::span<const Contact> contacts, Real tolerance, ContactWork& work) {
+  Real softness = 1;
+  for (int k = 0; k < kSoftSteps; ++k) softness /= kStiffen;
+  stiffen(softness, softness);
+  for (int k = 0; k < kSoftSteps; ++k) {
+    merit_ = evaluate(contacts, velocity_);
+    gradient(contacts);
+    minimize(contacts, std::max(tolerance / 4, gradient_speed() / 20), work);
+    if (cost_ > budget_) return false;
+    update_multipliers(contacts);
+    stiffen(kStiffen, kStiffen);
+  }
+  merit_ = evaluate(contacts, velocity_);
+  gradient(contacts);
+  return true;
+}
+
 /// The guess: multipliers from the contacts, and the velocities that go with them. `impulse` is left with
 /// the relative velocities without any impulse, for their scale.
 void ProximalNewton::set_points(std::span<const ContactBody> bodies, std::span<const Contact> contacts) {
@@ -231,7 +268,7 @@ void ProximalNewton::set_joints() {
       p.impulse += on->dot(free_[at]);
       velocity_[at] += p.multiplier * response;
     }
-    p.rho = kStiffness / mobility;
+    p.rho = kBoundedStiffness / mobility;
     bounded_.push_back(p);
   }
   constraints_.clear();

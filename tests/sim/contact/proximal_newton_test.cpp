@@ -113,7 +113,7 @@ TEST(ProximalNewton, ChangesNothingIfTheBudgetDoesNotDo) {
   ContactSample s = random_contacts(dice, 8, 20, 0.7, true);
   const ContactSample before = s;
   ProximalNewton solver;
-  EXPECT_FALSE(solver.solve(s.bodies, s.contacts, 1).has_value());
+  EXPECT_FALSE(solver.solve(s.bodies, s.contacts, {}, 1).has_value());
   EXPECT_EQ(difference(s, before), 0);
   for (std::size_t i = 0; i < s.contacts.size(); ++i)
     EXPECT_EQ(s.contacts[i].impulse, before.contacts[i].impulse);

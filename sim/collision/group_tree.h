@@ -1,0 +1,41 @@
+#pragma once
+/// The bounding tree of a group of objects, as the links of an articulation (physics A2): a balanced hierarchy of
+/// boxes whose leaves are those of the objects, in an order that has neighbours next to each other, so that its
+/// branches are parts of the group. It is refitted as the objects move, and never rebuilt.
+
+#include <span>
+#include <vector>
+
+#include "sim/collision/cell_table.h"
+#include "sim/types.h"
+
+namespace offstage::sim {
+
+class GroupTree {
+ public:
+  /// At least one member.
+  explicit GroupTree(std::span<const uint32_t> members);
+
+  std::span<const uint32_t> members() const { return members_; }
+  /// Takes the boxes of the members as they are now, by object.
+  void refit(std::span<const Aabb> boxes);
+  const Aabb& bounds() const { return boxes_[1]; }
+
+  // Each appends the pairs whose boxes have a point in common, the lesser object first.
+  void find_own_pairs(std::vector<IndexPair>& pairs) const;
+  void find_pairs(uint32_t object, const Aabb& box, std::vector<IndexPair>& pairs) const;
+  void find_pairs(const GroupTree& other, std::vector<IndexPair>& pairs) const;
+
+ private:
+  bool is_leaf(std::size_t node) const { return node >= members_.size(); }
+  uint32_t member(std::size_t leaf) const { return members_[leaf - members_.size()]; }
+  std::size_t place(std::size_t node, std::span<const uint32_t> members, std::size_t next);
+  void find_within(std::size_t node, std::vector<IndexPair>& pairs) const;
+  void find_between(std::size_t node, const GroupTree& other, std::size_t other_node,
+                    std::vector<IndexPair>& pairs) const;
+
+  std::vector<uint32_t> members_;  // of the leaves
+  std::vector<Aabb> boxes_;        // node i has the children 2 i and 2 i + 1; the root is 1, the leaves come last
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,49 @@
+#pragma once
+/// A broad phase of two levels (physics A2): groups of objects, as the links of articulations, have one box in the
+/// grid, and a tree below it, which finds their pairs with what meets that box and with each other. What does not
+/// belong to a group is in the grid itself.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sim/collision/broad_phase.h"
+#include "sim/collision/group_tree.h"
+
+namespace offstage::sim {
+
+class GroupedBroadPhase {
+ public:
+  /// As of BroadPhase, whichever level an object is on.
+  void insert(uint32_t object, const Aabb& box, bool is_static = false);
+  void move(uint32_t object, const Aabb& box);
+  void remove(uint32_t object);
+  bool contains(uint32_t object) const { return object < group_of_.size() && group_of_[object] != kAbsent; }
+
+  /// The groups from now on: objects that it contains, none of them static, each in one group at most.
+  void set_groups(std::span<const std::vector<uint32_t>> groups);
+
+  /// The pairs that BroadPhase::pairs() would give.
+  std::span<const IndexPair> pairs();
+
+ private:
+  static constexpr uint32_t kAbsent = UINT32_MAX, kAlone = UINT32_MAX - 1;
+  /// In the grid under its first member.
+  struct Group {
+    GroupTree tree;
+    bool is_whole = true;  // no member has been removed; otherwise it is a group no longer
+    bool moved = true;
+    std::vector<IndexPair> own_pairs = {};
+  };
+
+  bool is_grouped(uint32_t object) const { return group_of_[object] < kAlone; }
+  void dissolve(uint32_t group);
+
+  BroadPhase grid_;
+  std::vector<Aabb> boxes_;         // by object
+  std::vector<uint32_t> group_of_;  // by object
+  std::vector<Group> groups_;
+  std::vector<IndexPair> pairs_;
+};
+
+}  // namespace offstage::sim
