@@ -6,10 +6,10 @@ import math
 import pathlib
 import sys
 
-from modelling import (Material, Mesh, add, circle, cross, cylinder, dot, ellipsoid, extrude, fractal_noise,
+from modelling import (Material, Mesh, Node, add, circle, cross, cylinder, dot, ellipsoid, extrude, fractal_noise,
                        grid_triangles, hashed, icosphere, lathe, mix, mul, noise, open_edges, ring, rod,
                        rounded, shaded, smoothstep, sub, surface_nets, sweep, turn, union, unit, volume,
-                       welded, write_glb, write_mtl, write_obj, write_ply)
+                       welded, write_glb, write_glb_tree, write_mtl, write_obj, write_ply)
 
 MODELS = pathlib.Path(__file__).resolve().parent / "models"
 
@@ -218,6 +218,48 @@ def flywheel():
     band = shaded(ring(circle(1.506, 144), 1.45, 0.1, 0.004), 30)
     write_glb(MODELS / "flywheel.glb", [(rim.joined(hub, spokes(6, 0.24, 1.3, 0.2, 0.06)), GREEN),
                                         (band, STEEL)])
+
+
+# --- a robot arm ----------------------------------------------------------------------------------
+
+
+def robot_arm():
+    """Links as nodes, each about the axis that it turns on: the base's is y, the arms' z; fingers slide along x."""
+    orange, grey = Material("orange", "#e8742c", 0.4), Material("graphite", "#3a3f45", 0.5, 0.4)
+
+    def upright(radius, y0, y1, chamfer=0.01):
+        return shaded(cylinder(radius, y0, y1, chamfer), 30).turned("x", -90)
+
+    def box(low, high, chamfer=0.008):
+        outline = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
+        return shaded(extrude(outline, low[2], high[2], chamfer), 30)
+
+    def arm(r0, r1, distance, z0, z1):
+        return shaded(extrude(link(r0, r1, distance), z0, z1, 0.012), 30)
+
+    def pin(radius, half, y=0):
+        return shaded(cylinder(radius, -half, half, 0.006), 30).moved((0, y, 0))
+
+    base = [(upright(0.36, 0, 0.06, 0.02).joined(upright(0.27, 0.05, 0.2, 0.02)), grey)]
+    cheek = shaded(extrude([(-0.2, 0.1), (0.2, 0.1), (0.13, 0.45), (-0.13, 0.45)], 0.125, 0.185, 0.01), 30)
+    turret = [(upright(0.25, 0.005, 0.12, 0.015).joined(cheek, cheek.moved((0, 0, -0.31))), orange),
+              (pin(0.08, 0.2, 0.35), grey)]
+    upper = [(arm(0.12, 0.1, 0.8, -0.11, 0.11), orange), (pin(0.05, 0.18, 0.8), grey)]
+    fork = arm(0.1, 0.07, 0.62, 0.12, 0.17)
+    fore = [(fork.joined(fork.moved((0, 0, -0.29)), box((-0.055, 0.2, -0.125), (0.055, 0.5, 0.125))), orange),
+            (pin(0.04, 0.185, 0.62), grey)]
+    hand = [(arm(0.07, 0.06, 0.1, -0.11, 0.11).joined(box((-0.2, 0.1, -0.07), (0.2, 0.16, 0.07))), grey)]
+    finger = [(box((-0.02, 0, -0.06), (0.02, 0.17, 0.06)), orange)]
+    left = Node("finger_left", finger, (-0.16, 0.165, 0))
+    right = Node("finger_right", finger, (0.16, 0.165, 0))
+    tree = Node("base", base, (0, 0, 0), [
+        Node("turret", turret, (0, 0.2, 0), [
+            Node("upper_arm", upper, (0, 0.35, 0), [
+                Node("forearm", fore, (0, 0.8, 0), [Node("hand", hand, (0, 0.62, 0), [left, right])])
+            ])
+        ])
+    ])
+    write_glb_tree(MODELS / "robot_arm.glb", tree)
 
 
 # --- stone, tracks and tops -----------------------------------------------------------------------
@@ -469,7 +511,7 @@ def tree():
 
 
 ALL = [
-    duck, fountain, sprinkler, t_handle, landscape, gears, crank, connecting_rod, piston, flywheel,
+    duck, fountain, sprinkler, t_handle, landscape, gears, crank, connecting_rod, piston, flywheel, robot_arm,
     voussoir, top, marble_run, dishes, parachute,
     hammock, grass_patch, rock, pot, tree
 ]

@@ -424,9 +424,21 @@ class Material:
         return [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055)**2.4 for c in channels]
 
 
+@dataclass
+class Node:
+    name: str
+    parts: list  # of (mesh, material), about the node's origin
+    position: tuple = (0, 0, 0)  # in the parent
+    children: list = field(default_factory=list)
+
+
 def write_glb(path, parts):
     """One node with a primitive for each (mesh, material)."""
-    blob, views, accessors, primitives, materials = b"", [], [], [], []
+    write_glb_tree(path, Node(path.stem, parts))
+
+
+def write_glb_tree(path, root):
+    blob, views, accessors, materials, meshes, nodes = b"", [], [], [], [], []
 
     def store(data, target, **accessor):
         nonlocal blob
@@ -435,7 +447,7 @@ def write_glb(path, parts):
         blob += data + b"\0" * (-len(data) % 4)
         return len(accessors) - 1
 
-    for mesh, material in parts:
+    def primitive(mesh, material):
         p = [struct.unpack("<3f", struct.pack("<3f", *v)) for v in mesh.positions]
         low, high = ([f(v[k] for v in p) for k in range(3)] for f in (min, max))
         flat = [i for t in mesh.triangles for i in t]
@@ -450,7 +462,6 @@ def write_glb(path, parts):
         }
         indices = store(struct.pack(f"<{len(flat)}{code}", *flat), 34963, componentType=kind, count=len(flat),
                         type="SCALAR")
-        primitives.append({"attributes": attributes, "indices": indices, "material": len(materials)})
         materials.append({
             "name": material.name,
             "doubleSided": material.two_sided,
@@ -460,6 +471,19 @@ def write_glb(path, parts):
                 "roughnessFactor": material.roughness
             }
         })
+        return {"attributes": attributes, "indices": indices, "material": len(materials) - 1}
+
+    def place(node):
+        index = len(nodes)
+        nodes.append({"mesh": len(meshes), "name": node.name})
+        meshes.append({"name": node.name, "primitives": [primitive(*part) for part in node.parts]})
+        if any(node.position):
+            nodes[index]["translation"] = list(node.position)
+        if node.children:
+            nodes[index]["children"] = [place(child) for child in node.children]
+        return index
+
+    place(root)
     document = {
         "asset": {
             "version": "2.0",
@@ -469,14 +493,8 @@ def write_glb(path, parts):
         "scenes": [{
             "nodes": [0]
         }],
-        "nodes": [{
-            "mesh": 0,
-            "name": path.stem
-        }],
-        "meshes": [{
-            "name": path.stem,
-            "primitives": primitives
-        }],
+        "nodes": nodes,
+        "meshes": meshes,
         "materials": materials,
         "accessors": accessors,
         "bufferViews": views,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <tuple>
 
 #include <assimp/Importer.hpp>
@@ -181,21 +182,57 @@ class PartBuilder {
   Dropped dropped_;
 };
 
-/// Depth first with a stack of its own: the depth is the file's choice.
-void place_nodes(const aiScene& scene, PartBuilder& builder) {
+/// Gives nodes names of their own.
+class NodeNames {
+ public:
+  std::string next(const aiNode& node) {
+    const std::string name = node.mName.length > 0 ? node.mName.C_Str() : "node";
+    std::string unique = name;
+    for (int& count = counts_[name]; !taken_.insert(unique).second;) unique = name + "_" + std::to_string(++count + 1);
+    return unique;
+  }
+
+ private:
+  std::map<std::string, int> counts_;
+  std::set<std::string> taken_;
+};
+
+/// Without scale, which the triangles have; of a node that is flat or turned inside out the nearest rotation.
+Affine3d turned_and_moved(const Affine3d& m) {
+  const Eigen::Matrix3d rotation = m.rotation();
+  if (!rotation.allFinite() || !m.translation().allFinite()) return Affine3d::Identity();
+  return Eigen::Translation3d(m.translation()) * rotation;
+}
+
+/// Lists the nodes that have meshes, and adds the meshes of all of them, or of the one that is `wanted`. Depth first
+/// with a stack of its own: the depth is the file's choice.
+void place_nodes(const aiScene& scene, const std::string& wanted, PartBuilder& builder, Model& model) {
   struct Item {
     const aiNode* node;
     Affine3d world_from_parent;
+    int parent;
   };
-  std::vector<Item> stack = {{scene.mRootNode, Affine3d(Eigen::Scaling(metres_per_unit(scene)))}};
+  NodeNames names;
+  std::vector<Item> stack = {{scene.mRootNode, Affine3d(Eigen::Scaling(metres_per_unit(scene))), -1}};
   while (!stack.empty()) {
-    const Item item = stack.back();
+    Item item = stack.back();
     stack.pop_back();
     if (!item.node) continue;
-    const Affine3d world_from_node = item.world_from_parent * to_eigen(item.node->mTransformation);
-    for (unsigned i = 0; i < item.node->mNumMeshes; ++i) builder.add(item.node->mMeshes[i], world_from_node);
-    for (unsigned i = item.node->mNumChildren; i-- > 0;)
-      stack.push_back({item.node->mChildren[i], world_from_node});
+    const aiNode& node = *item.node;
+    const Affine3d world_from_node = item.world_from_parent * to_eigen(node.mTransformation);
+    if (node.mNumMeshes > 0) {
+      const Affine3d rigid = turned_and_moved(world_from_node);
+      model.nodes.push_back({names.next(node), item.parent, rigid.translation().cast<float>(),
+                             Eigen::Quaternionf(rigid.linear().cast<float>()).normalized()});
+      item.parent = static_cast<int>(model.nodes.size() - 1);
+      for (unsigned i = 0; i < node.mNumMeshes; ++i) {
+        if (wanted.empty())
+          builder.add(node.mMeshes[i], world_from_node);
+        else if (wanted == model.nodes.back().name)
+          builder.add(node.mMeshes[i], rigid.inverse() * world_from_node);
+      }
+    }
+    for (unsigned i = node.mNumChildren; i-- > 0;) stack.push_back({node.mChildren[i], world_from_node, item.parent});
   }
 }
 
@@ -208,7 +245,7 @@ std::string reason(const Assimp::Importer& importer) {
 
 }  // namespace
 
-Model import_model(const std::filesystem::path& path) {
+Model import_model(const std::filesystem::path& path, const std::string& node) {
   Assimp::Importer importer;
   importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, kIgnored);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
@@ -220,7 +257,12 @@ Model import_model(const std::filesystem::path& path) {
   std::vector<unsigned> uv_sets = import_materials(*scene, path.parent_path(), model);
   if (model.materials.empty()) model.materials.emplace_back();
   PartBuilder builder(*scene, std::move(uv_sets), model);
-  place_nodes(*scene, builder);
+  place_nodes(*scene, node, builder, model);
+  if (!node.empty() && std::ranges::find(model.nodes, node, &Model::Node::name) == model.nodes.end()) {
+    std::string why = path.string() + ": has no node '" + node + "' with triangles; known:";
+    for (std::size_t i = 0; i < std::min<std::size_t>(model.nodes.size(), 20); ++i) why += " '" + model.nodes[i].name + "'";
+    throw FileError(why);
+  }
   std::erase_if(model.parts, [](const Model::Part& part) { return part.mesh.indices.empty(); });
 
   const std::vector<std::string> dropped = builder.dropped().describe();

@@ -38,6 +38,12 @@ void transfer(Archive& archive, Model& model) {
     archive.array(part.mesh.uvs);
     archive.array(part.mesh.indices);
   });
+  archive.list(model.nodes, [&](Model::Node& node) {
+    archive.array(node.name);
+    archive.value(node.parent);
+    archive.value(node.position);
+    archive.value(node.orientation.coeffs());
+  });
   archive.list(model.materials, [&](Material& m) {
     archive.array(m.name);
     archive.value(m.color);
@@ -168,11 +174,12 @@ void limit_this_process(uint64_t file_bytes) {
 }
 
 /// The child: leaves a model or a message in the memory file.
-[[noreturn]] void import_and_exit(const std::filesystem::path& path, uint64_t file_bytes, int memory) {
+[[noreturn]] void import_and_exit(const std::filesystem::path& path, const std::string& node, uint64_t file_bytes,
+                                  int memory) {
   std::string message;
   try {
     limit_this_process(file_bytes);
-    Model model = import_model(path);
+    Model model = import_model(path, node);
     Writer writer(memory);
     transfer(writer, model);
     ::_exit(kModelExit);
@@ -218,13 +225,22 @@ uint64_t checked_size(const std::filesystem::path& path) {
 
 }  // namespace
 
-Model read_model(const std::filesystem::path& path) {
+ModelPath split_node(const std::filesystem::path& path) {
+  const std::string text = path.string();
+  const std::size_t mark = text.rfind('#');
+  std::error_code error;
+  if (mark == std::string::npos || std::filesystem::exists(path, error)) return {path, ""};
+  return {text.substr(0, mark), text.substr(mark + 1)};
+}
+
+Model read_model(const std::filesystem::path& file) {
+  const auto [path, node] = split_node(file);
   const uint64_t size = checked_size(path);
   const Descriptor memory(::memfd_create("offstage-model", MFD_CLOEXEC));
   if (!memory) throw UnavailableError("no memory file for the model reader: " + system_reason(errno));
   const pid_t child = ::fork();
   if (child < 0) throw UnavailableError("the model reader cannot be started: " + system_reason(errno));
-  if (child == 0) import_and_exit(path, size, memory.fd());
+  if (child == 0) import_and_exit(path, node, size, memory.fd());
 
   const int status = wait_status(child);
   const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 0;

@@ -9,6 +9,13 @@
 
 namespace offstage::render {
 
+struct ModelPath {
+  std::filesystem::path file;
+  std::string node;  ///< empty: all of it
+};
+/// Takes FILE#NODE apart, unless there is a file of that whole name.
+ModelPath split_node(const std::filesystem::path& path);
+
 /// Reads a model, applies its nodes' transforms, drops what cannot be drawn (points, lines, faces with bad
 /// indices or no area, non-finite vertices) with a warning, and reads its textures, embedded or beside it.
 /// Animation, skins, cameras, lights and vertex colours are ignored. There is one part per material, with
@@ -17,6 +24,7 @@ namespace offstage::render {
 /// Colours of classic materials (diffuse, specular, shininess) are taken as sRGB, those of physically based
 /// ones as linear. Throws FileError with one line for a file that is missing, broken, or has no triangle
 /// left; UnavailableError if no process can be started.
+/// Of a path that ends in #NODE only that node's own triangles, from where it is (Model::Node).
 Model read_model(const std::filesystem::path& path);
 
 }  // namespace offstage::render

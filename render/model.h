@@ -86,11 +86,20 @@ struct Material {
 
 /// What a model file holds, with the node hierarchy already applied.
 struct Model {
+  /// A node that has triangles, and where it is: turned and moved, without its scale. A part of a model that moves
+  /// against others is one.
+  struct Node {
+    std::string name;  ///< unique; of namesakes the later ones end in _2, _3 ...
+    int parent = -1;   ///< index of the nearest node above that has triangles, -1: none
+    Eigen::Vector3f position = Eigen::Vector3f::Zero();
+    Eigen::Quaternionf orientation = Eigen::Quaternionf::Identity();
+  };
   struct Part {
     Mesh mesh;
     int material = 0;  ///< index into `materials`
   };
   std::vector<Part> parts;
+  std::vector<Node> nodes;  ///< parents first
   std::vector<Material> materials;
   std::vector<Image> textures;
   std::vector<std::string> warnings;  ///< what was repaired or ignored, one line each

@@ -119,7 +119,8 @@ Real Motor::target(Real time) const {
   if (after == targets.begin()) return after->target;
   const Key& before = *(after - 1);
   if (after == targets.end()) return before.target;
-  return before.target + (time - before.time) / (after->time - before.time) * (after->target - before.target);
+  const Real share = (time - before.time) / (after->time - before.time);
+  return before.target + (smooth ? share * share * (3 - 2 * share) : share) * (after->target - before.target);
 }
 
 JointHandle World::add_joint(const JointDef& def) {

@@ -273,7 +273,8 @@ int dispatch(int argc, char** argv) {
   simulate_app->add_option("--contacts", simulate.contacts,
                            "CSV of the points where bodies touch, with the forces there");
   simulate_app->add_option("--cloths", simulate.cloths, "CSV of strain and contacts of cloths");
-  simulate_app->add_option("--trace-every", simulate.trace_every, "frame or step, of all three")
+  simulate_app->add_option("--joints", simulate.joints, "CSV of what joints bear and how they stand");
+  simulate_app->add_option("--trace-every", simulate.trace_every, "frame or step, of all of these")
       ->check(CLI::IsMember({"frame", "step"}));
   simulate_app->add_option("--cache", simulate.cache,
                            "Folder for one snapshot per frame, for `render --cache`");

@@ -90,7 +90,7 @@ int sweep_command(const SweepOptions& options);
 struct SimulateOptions {
   SceneOptions scene;
   TalkOptions talk;
-  std::string trace, contacts, cloths, trace_every = "frame", cache, stats;
+  std::string trace, contacts, cloths, joints, trace_every = "frame", cache, stats;
   int threads = 0;
   bool force = false;
 };

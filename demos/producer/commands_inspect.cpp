@@ -72,6 +72,12 @@ Json describe_model(const std::filesystem::path& path, const DecompositionCache&
     json["principal_moments_per_density"] = json_of(principal.moments);
   }
   json["convex_parts"] = describe(cache.decompose(mesh));
+  Json nodes = Json::array();
+  for (const render::Model::Node& node : model.nodes) {
+    nodes.push_back({{"name", node.name}, {"position", json_of(node.position)}});
+    if (node.parent >= 0) nodes.back()["parent"] = model.nodes[static_cast<std::size_t>(node.parent)].name;
+  }
+  json["nodes"] = nodes;
   json["warnings"] = model.warnings;
   return json;
 }

@@ -1,6 +1,7 @@
 // render, frame and simulate.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 
@@ -325,26 +326,24 @@ int simulate_command(const SimulateOptions& options) {
   std::vector<Problem> warnings;
   const ModelLibrary models(loaded.scene, loaded.folder, options.scene.decompositions(), warnings);
   if (!options.talk.quiet) print_warnings(warnings);
-  check_file(options.stats, options.force);
-  check_file(options.trace, options.force);
-  check_file(options.contacts, options.force);
-  check_distinct(options.stats, options.trace);
-  check_distinct(options.stats, options.contacts);
-  check_distinct(options.trace, options.contacts);
-  check_file(options.cloths, options.force);
-  for (const std::string& other : {options.stats, options.trace, options.contacts})
-    check_distinct(other, options.cloths);
+  const std::array files = {options.stats, options.trace, options.contacts, options.cloths, options.joints};
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    check_file(files[i], options.force);
+    for (std::size_t k = 0; k < i; ++k) check_distinct(files[k], files[i]);
+  }
   const auto threads = simulation_threads(options.threads);
   SimulateJob job{.cache = {},
                   .force = options.force,
                   .trace = {},
                   .contacts = {},
                   .cloths = {},
+                  .joints = {},
                   .trace_every_step = options.trace_every == "step"};
   if (!options.cache.empty()) job.cache = options.cache;
   if (!options.trace.empty()) job.trace = options.trace;
   if (!options.contacts.empty()) job.contacts = options.contacts;
   if (!options.cloths.empty()) job.cloths = options.cloths;
+  if (!options.joints.empty()) job.joints = options.joints;
   ProgressPrinter printer(options.talk.quiet ? ProgressStyle::none : options.talk.progress);
   const RunStats stats = simulate_frames(loaded, models, job, std::ref(printer));
   printer.finish();

@@ -38,6 +38,12 @@ void add_to(XXH3_state_t* hash, const render::Model& model) {
     add_to(hash, part.mesh.uvs);
     add_to(hash, part.mesh.indices);
   }
+  for (const render::Model::Node& node : model.nodes) {
+    XXH3_128bits_update(hash, node.name.data(), node.name.size());
+    XXH3_128bits_update(hash, &node.parent, sizeof node.parent);
+    XXH3_128bits_update(hash, node.position.data(), 3 * sizeof(float));
+    XXH3_128bits_update(hash, node.orientation.coeffs().data(), 4 * sizeof(float));
+  }
   for (const render::Material& m : model.materials) {
     const float numbers[] = {m.color.x(), m.color.y(),    m.color.z(),    m.color.w(),   m.metallic,
                              m.roughness, m.emission.x(), m.emission.y(), m.emission.z()};

@@ -186,6 +186,13 @@ struct Overlays::Builder {
     }
     return islands;
   }
+  Source operator()(const JointsOverlay& overlay) const {
+    JointLines lines{&overlay, {}};
+    world.for_each_joint([&](sim::JointHandle joint) {
+      if (overlay.joint.empty() || overlay.joint == world.joint_def(joint).name) lines.joints.push_back(joint);
+    });
+    return lines;
+  }
   Source operator()(const TrailsOverlay& overlay) const {
     TrailLines lines{&overlay, {}};
     for (const Body& body : scene.bodies) {
@@ -369,6 +376,35 @@ LineSet Overlays::draw(const IslandLines& islands, const sim::World& world) {
     sketch.object(body.index);
     for (const auto& [a, b] : edges)
       sketch.line(pose.point_to_world(a), pose.point_to_world(b), light(color));
+  }
+  return sketch.take();
+}
+
+LineSet Overlays::draw(const JointLines& joints, const sim::World& world) {
+  using enum sim::JointType;
+  const JointsOverlay& overlay = *joints.overlay;
+  const Vector4f color = light(overlay.color.rgba);
+  LineSketch sketch;
+  for (const sim::JointHandle handle : joints.joints) {
+    const sim::JointState joint = world.joint(handle);
+    if (joint.broken) continue;
+    const sim::JointDef& def = world.joint_def(handle);
+    sketch.object(handle.index);
+    sketch.dot(joint.anchor_a, color, kDotWidth);
+    if (def.type == distance) {
+      sketch.dot(joint.anchor_b, color, kDotWidth);
+      sketch.line(joint.anchor_a, joint.anchor_b, color);
+    }
+    for (const auto& [body, anchor] : {std::pair(def.a, joint.anchor_a), {def.b, joint.anchor_b}})
+      if (body && world.body_def(body).motion == sim::MotionType::dynamic)
+        sketch.line(anchor, world.body(body).centre, color);
+    if (def.type == revolute || def.type == prismatic || def.type == universal) {
+      const Vec3 along = 2 * overlay.size * joint.axis;
+      sketch.line(joint.anchor_b - along, joint.anchor_b + along, color);
+      sketch.ring(joint.anchor_b, joint.axis, overlay.size, color);
+    }
+    if (const Vec3 arrow = overlay.force_scale * joint.force; arrow.norm() > kShortestArrow)
+      sketch.arrow(joint.anchor_a, joint.anchor_a + arrow, light(overlay.force_color.rgba));
   }
   return sketch.take();
 }

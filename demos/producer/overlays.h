@@ -75,6 +75,10 @@ class Overlays {
     const IslandsOverlay* overlay;
     std::vector<Boxed> bodies;
   };
+  struct JointLines {
+    const JointsOverlay* overlay;
+    std::vector<sim::JointHandle> joints;
+  };
   struct ClothLines {
     const ClothOverlay* overlay;
     std::vector<sim::ClothHandle> cloths;
@@ -90,7 +94,7 @@ class Overlays {
   };
   struct NoLines {};
   using Source = std::variant<NoLines, TreeLines, ClosestLines, ContactLines, VelocityLines, IslandLines,
-                              ClothLines, TrailLines>;
+                              JointLines, ClothLines, TrailLines>;
 
   struct Builder;
 
@@ -100,6 +104,7 @@ class Overlays {
   static LineSet draw(const ContactLines& contacts, const sim::World& world);
   static LineSet draw(const VelocityLines& velocities, const sim::World& world);
   static LineSet draw(const IslandLines& islands, const sim::World& world);
+  static LineSet draw(const JointLines& joints, const sim::World& world);
   static LineSet draw(const ClothLines& cloths, const sim::World& world);
   static LineSet draw(const TrailLines& trails, const sim::World& world);
 

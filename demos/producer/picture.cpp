@@ -117,13 +117,15 @@ Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context
   std::size_t slot = 0;
   uint32_t object = 0;
   for (const Body& body : scene.bodies) add_body(body, models, slot, ++object);
-  for (const Spring& spring : scene.springs) {
-    render::InstanceHandle rod;
-    if (spring.visible)
-      rod = stage_.add_instance(stage_.add_mesh(render::make_cylinder(f(spring.radius), 1)),
-                                material(spring.material, models));
-    springs_.push_back(rod);
-  }
+  // In the order of Snapshot::rods.
+  const auto add_rod = [&](const auto& rod) {
+    rods_.push_back(rod.visible ? stage_.add_instance(stage_.add_mesh(render::make_cylinder(f(rod.radius), 1)),
+                                                      material(rod.material, models))
+                                : render::InstanceHandle());
+  };
+  for (const Spring& spring : scene.springs) add_rod(spring);
+  for (const Joint& joint : scene.joints)
+    if (joint.behaviour.type == sim::JointType::distance) add_rod(joint);
   for (const Cloth& cloth : scene.cloths) {
     add_cloth(cloth, models);
     ++object;

@@ -75,7 +75,7 @@ class Picture {
 
   void place(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
   void place_body(const DrawnBody& body, const Eigen::Affine3f& world_from_body, double time);
-  void place_springs(const Snapshot& previous, const Snapshot& current, float w);
+  void place_rods(const Snapshot& previous, const Snapshot& current, float w);
   void place_points(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
   /// Between two sub-frames; 0 if there is one alone [s].
   float subframe_time() const;
@@ -94,7 +94,7 @@ class Picture {
   BodyPlaces places_;
   CameraRig camera_;
   std::vector<DrawnBody> bodies_;
-  std::vector<render::InstanceHandle> springs_;  // null where invisible
+  std::vector<render::InstanceHandle> rods_;  // null where invisible
   std::vector<render::PointsHandle> points_;
   std::vector<render::PointStyle> styles_;    // of the same
   std::vector<render::PointsHandle> smears_;  // of balls, what moves too far in a sub-frame; or null

@@ -84,15 +84,15 @@ void Picture::place_body(const DrawnBody& body, const Affine3f& world_from_body,
         part.instance, world_from_body * Eigen::Translation3f(explode * part.outwards) * part.body_from_part);
 }
 
-void Picture::place_springs(const Snapshot& previous, const Snapshot& current, float w) {
-  for (std::size_t i = 0; i < springs_.size(); ++i) {
-    if (!springs_[i]) continue;
-    const SpringSample &s0 = previous.springs[i], &s1 = current.springs[i];
+void Picture::place_rods(const Snapshot& previous, const Snapshot& current, float w) {
+  for (std::size_t i = 0; i < rods_.size(); ++i) {
+    if (!rods_[i]) continue;
+    const RodSample &s0 = previous.rods[i], &s1 = current.rods[i];
     const Vector3f a = s0.a + w * (s1.a - s0.a), b = s0.b + w * (s1.b - s0.b), d = b - a;
     const bool drawn = d.allFinite() && d.norm() > 1e-6f;
-    stage_.set_visible(springs_[i], drawn);
+    stage_.set_visible(rods_[i], drawn);
     if (drawn)
-      stage_.set_transform(springs_[i], Eigen::Translation3f(0.5f * (a + b)) *
+      stage_.set_transform(rods_[i], Eigen::Translation3f(0.5f * (a + b)) *
                                             Eigen::Quaternionf::FromTwoVectors(Vector3f::UnitY(), d) *
                                             Eigen::Scaling(1.f, d.norm(), 1.f));
   }
@@ -182,7 +182,7 @@ void Picture::place(const Snapshot& previous, const Snapshot& current, float w, 
   const double time = current.time - (1 - w) * frame_time;
   for (const DrawnBody& body : bodies_)
     place_body(body, body.slot ? affine(samples[*body.slot]) : body.world_from_body, time);
-  place_springs(previous, current, w);
+  place_rods(previous, current, w);
   place_points(previous, current, w, frame_time);
   place_cloths(previous, current, w, frame_time);
   place_overlays(previous, current, w);

@@ -234,10 +234,13 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
   if (job.trace) trace.emplace(*job.trace, simulation);
   if (job.contacts) contacts.emplace(*job.contacts, simulation);
   if (job.cloths) cloths.emplace(*job.cloths, simulation);
+  std::optional<JointTrace> joints;
+  if (job.joints) joints.emplace(*job.joints, simulation);
   const auto record = [&](double time) {
     if (trace) trace->record(time);
     if (contacts) contacts->record(time);
     if (cloths) cloths->record(time);
+    if (joints) joints->record(time);
   };
   if (job.trace_every_step) simulation.on_substep(record);
   stats.bodies = simulation.body_count();
@@ -268,6 +271,7 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
   if (trace && stats.frames == total) trace->close();
   if (contacts && stats.frames == total) contacts->close();
   if (cloths && stats.frames == total) cloths->close();
+  if (joints && stats.frames == total) joints->close();
   stats.totals = simulation.totals();
   stats.energy_end = simulation.world().energy();
   stats.state_hash = simulation.world().state_hash().hex();

@@ -95,7 +95,8 @@ struct SimulateJob {
   std::optional<std::filesystem::path> trace;     ///< CSV of every moving body and placed particle
   std::optional<std::filesystem::path> contacts;  ///< CSV of the points where bodies touch
   std::optional<std::filesystem::path> cloths;    ///< CSV of strain and contacts of cloths
-  bool trace_every_step = false;                  ///< all three; else once a frame
+  std::optional<std::filesystem::path> joints;    ///< CSV of what joints bear and how they stand
+  bool trace_every_step = false;                  ///< all of them; else once a frame
 };
 
 /// Runs the physics alone, over all frames.

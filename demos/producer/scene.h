@@ -202,6 +202,15 @@ struct IslandsOverlay : LineLook {
   Where where;
   Real asleep = 0.25;  ///< brightness of bodies that are asleep
 };
+/// Joints: where they are, the axes that they leave free, and what they bear.
+struct JointsOverlay : LineLook {
+  Where where;
+  std::string joint;     ///< empty: all
+  Real size = 0.08;      ///< radius of the ring around an axis, which is four times as long
+  Real force_scale = 0;  ///< length of an arrow per newton on a; 0: none
+  Color color{{1, 0.45f, 0.1f, 1}};
+  Color force_color{{0.2f, 0.8f, 1, 1}};
+};
 /// The threads of cloths, in colours of their strain: blue at rest, red where they are stretched.
 struct ClothOverlay : LineLook {
   Where where;
@@ -228,7 +237,7 @@ struct TextOverlay {
 };
 /// What is drawn over the picture to show how the simulation sees it.
 using Overlay = std::variant<TreeOverlay, PartsOverlay, ClosestOverlay, ContactsOverlay, VelocitiesOverlay,
-                             IslandsOverlay, ClothOverlay, TrailsOverlay, TextOverlay>;
+                             IslandsOverlay, JointsOverlay, ClothOverlay, TrailsOverlay, TextOverlay>;
 
 /// What all cameras have.
 struct Lens {

@@ -434,6 +434,11 @@ class Checker {
     if (overlay.until && *overlay.until <= overlay.from)
       fail(overlay.where.path + "/until", "must be later than from");
   }
+  void check_overlay(const JointsOverlay& overlay) {
+    if (!overlay.joint.empty() && !find_named(flat_.joints, overlay.joint))
+      fail(overlay.where.path + "/joint",
+           "there is no joint '" + overlay.joint + "'" + suggestion(overlay.joint, names_of(flat_.joints)));
+  }
   void check_overlay(const ClothOverlay& overlay) {
     if (!overlay.cloth.empty() && !find_named(flat_.cloths, overlay.cloth))
       fail(overlay.where.path + "/cloth",

@@ -1,6 +1,7 @@
 #include "producer/scene_check_joints.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <string>
 #include <vector>
@@ -11,6 +12,8 @@
 namespace offstage::producer {
 namespace {
 
+constexpr Real kMostSteering = 35;  // [degrees]
+
 class JointChecker {
  public:
   JointChecker(const Scene& scene, const Scene& flat, Findings& findings)
@@ -20,7 +23,11 @@ class JointChecker {
     check_unique();
     for (const Joint& joint : scene_.joints) check(joint);
     for (const ArticulationTemplate& articulation : scene_.articulations)
-      std::visit([this](const auto& a) { check(a); }, articulation);
+      std::visit(
+          [this](const auto& a) {
+            if (!a.where.path.empty()) check(a);  // else its type was wrong, and none was read
+          },
+          articulation);
   }
 
  private:
@@ -54,21 +61,29 @@ class JointChecker {
     const auto moves = [](const Body* body) { return body && body->motion == sim::MotionType::dynamic; };
     if (a && (joint.b.empty() || b) && !moves(a) && !moves(b))
       fail(path, "joins nothing that forces can move: one of its bodies must be dynamic");
-    const bool slides =
-        joint.type == sim::JointType::prismatic || joint.type == sim::JointType::distance;
+    check(path, joint.behaviour);
+  }
+
+  void check(const std::string& path, const JointBehaviour& joint) {
+    using enum sim::JointType;
+    const bool slides = joint.type == prismatic || joint.type == distance;
     if (joint.limits && !slides) fail(path + "/limits", "is for prismatic and distance joints; use \"limits_deg\"");
     if (joint.limits_deg && slides) fail(path + "/limits_deg", "is for joints that turn; use \"limits\"");
     check_limits(path + "/limits", joint.limits);
     check_limits(path + "/limits_deg", joint.limits_deg);
-    if (joint.limits_deg && joint.type == sim::JointType::fixed)
+    if (joint.limits_deg && joint.type == fixed)
       fail(path + "/limits_deg", "is for joints that turn; a fixed one does not");
-    if (joint.swing_deg && joint.type != sim::JointType::spherical && joint.type != sim::JointType::universal)
+    if (joint.swing_deg && joint.type != spherical && joint.type != universal)
       fail(path + "/swing_deg", "is for spherical and universal joints");
-    if (!joint_def(joint).has_free_coordinate())
+    Joint whole;
+    whole.behaviour = joint;
+    if (!joint_def(whole).has_free_coordinate())
       for (const auto& [key, value] : {std::pair("/friction", joint.friction), {"/damping", joint.damping}})
         if (value > 0)
           fail(path + key, "acts where a joint may move: not on a fixed one, nor on a rod without limits and motor");
-    if (joint.motor) check_motor(path + "/motor", joint);
+    if (!joint.motor) return;
+    if (joint.type != revolute && !slides) fail(path + "/motor", "drives revolute, prismatic and distance joints only");
+    check_keys(path + "/motor/keys", joint.motor->keys);
   }
 
   void check_limits(const std::string& path, const std::optional<std::array<Real, 2>>& limits) {
@@ -76,17 +91,13 @@ class JointChecker {
       fail(path, "must be a range that contains 0, where the joint is at time 0");
   }
 
-  void check_motor(const std::string& path, const Joint& joint) {
-    if (joint.type != sim::JointType::revolute && joint.type != sim::JointType::prismatic &&
-        joint.type != sim::JointType::distance)
-      fail(path, "drives revolute, prismatic and distance joints only");
-    for (std::size_t i = 1; i < joint.motor->keys.size(); ++i)
-      if (!(joint.motor->keys[i].time > joint.motor->keys[i - 1].time))
-        fail(path + "/keys/" + std::to_string(i) + "/time", "must be later than that of the key before");
+  void check_keys(const std::string& path, const std::vector<MotorKey>& keys) {
+    for (std::size_t i = 1; i < keys.size(); ++i)
+      if (!(keys[i].time > keys[i - 1].time))
+        fail(path + "/" + std::to_string(i) + "/time", "must be later than that of the key before");
   }
 
   void check(const Chain& chain) {
-    if (chain.where.path.empty()) return;  // its type was wrong, and none was read
     if ((chain.to - chain.from).norm() < 1e-6) fail(chain.where.path + "/to", "is where \"from\" is");
     const auto is_still = [this](const std::string& end) {
       const auto it = std::ranges::find(flat_.bodies, end, &Body::name);
@@ -98,12 +109,45 @@ class JointChecker {
       if (!end->empty() && *end != "world") body(chain.where.path + key, *end);
   }
   void check(const Bridge& bridge) {
-    if (bridge.where.path.empty()) return;
     const Vec3 across = bridge.to - bridge.from;
     if (across.cross(Vec3::UnitY()).norm() < 1e-3 * across.norm() || across.norm() < 1e-6)
       fail(bridge.where.path + "/to", "must be away from \"from\", not straight above or below it");
   }
   void check(const Ragdoll&) {}
+  void check(const Vehicle& vehicle) {
+    const std::string& path = vehicle.where.path;
+    check_keys(path + "/speed", vehicle.speed);
+    check_keys(path + "/steer", vehicle.steer);
+    for (std::size_t i = 0; i < vehicle.steer.size(); ++i)
+      if (!(std::abs(vehicle.steer[i].target) <= kMostSteering))
+        fail(path + "/steer/" + std::to_string(i) + "/target", "must be from -35 to 35 degrees");
+    if (!(vehicle.wheel_radius <= 0.2 * std::min(vehicle.length, 2 * vehicle.width)))
+      fail(path + "/wheel_radius", "must be at most a fifth of the length and two fifths of the width");
+  }
+  void check(const Crane& crane) {
+    const std::string& path = crane.where.path;
+    for (const auto& [key, keys] : {std::pair("/slew", &crane.slew), {"/trolley", &crane.trolley}, {"/hoist", &crane.hoist}})
+      check_keys(path + key, *keys);
+    if (!(crane.load_size <= 0.25 * std::min(crane.height, crane.reach)))
+      fail(path + "/load_size", "must be at most a quarter of the height and of the reach");
+  }
+  void check(const ModelTree& tree) {
+    const std::string& path = tree.where.path;
+    if (!tree.base.empty() && tree.base != "world") body(path + "/base", tree.base);
+    std::vector<std::string> names;
+    for (const ModelTree::Link& link : tree.links) names.push_back(link.name);
+    std::set<std::string> seen;
+    for (const NodeJoint& joint : tree.joints) {
+      check(joint.where.path, joint.behaviour);
+      if (joint.behaviour.type == sim::JointType::distance)
+        fail(joint.where.path + "/type", "must be another: a node and the one above it have no distance to keep");
+      if (!names.empty() && std::ranges::find(names, joint.node) == names.end())
+        fail(joint.where.path + "/node",
+             tree.file + " has no node '" + joint.node + "' with triangles" + suggestion(joint.node, names));
+      else if (!seen.insert(joint.node).second)
+        fail(joint.where.path + "/node", "has a joint already");
+    }
+  }
 
   const Scene &scene_, &flat_;
   Findings& findings_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
+#include "producer/model_articulation.h"
 #include "producer/placement.h"
 #include "producer/presets.h"
 #include "producer/scene_check.h"
@@ -66,6 +67,7 @@ LoadedScene parse_scene(std::string_view text, const std::string& name, const st
   name_everything(described, name);
 
   std::vector<Problem> misplaced, crowded;
+  read_links(described, folder, misplaced);
   LoadedScene loaded{expand(described, misplaced, crowded), folder, {}, to_text(write_scene(described))};
   const Findings findings = check_scene(described, loaded.scene, folder);
   append(errors, misplaced, source);

@@ -22,17 +22,14 @@ struct JointMotor {
   sim::Motor::Mode mode = sim::Motor::Mode::speed;
   Real target = 0;             ///< without keys
   std::vector<MotorKey> keys;  ///< in order of time
+  bool smooth = false;         ///< between keys
   std::optional<Real> max_effort;
   Real stiffness = 0, damping = 0;
 };
 
-struct Joint {
-  Where where;
-  std::string name;
+/// How a joint moves, and what moves it.
+struct JointBehaviour {
   sim::JointType type = sim::JointType::spherical;
-  std::string a, b;  ///< names of bodies; b empty: the world
-  Vec3 anchor = Vec3::Zero();
-  Vec3 anchor_b = Vec3::Zero();  ///< of a rod
   Vec3 axis = Vec3::UnitZ();
   Vec3 second_axis = Vec3::UnitX();
   std::optional<std::array<Real, 2>> limits;      ///< of sliding and lengths [m]
@@ -41,7 +38,19 @@ struct Joint {
   Real friction = 0, damping = 0;
   std::optional<JointMotor> motor;
   std::optional<Real> max_force, max_torque;
+};
+
+struct Joint {
+  Where where;
+  std::string name;
+  JointBehaviour behaviour;
+  std::string a, b;  ///< names of bodies; b empty: the world
+  Vec3 anchor = Vec3::Zero();
+  Vec3 anchor_b = Vec3::Zero();  ///< of a rod
   bool collide = false;
+  bool visible = true;  ///< of a rod or rope
+  Real radius = 0.01;   ///< likewise
+  std::string material;
 };
 
 /// Links between two points: capsules end to end.
@@ -89,6 +98,70 @@ struct Bridge {
   std::optional<Real> max_force;
 };
 
-using ArticulationTemplate = std::variant<Chain, Ragdoll, Bridge>;
+/// A car on springs: driven by its rear wheels, steered by the front ones. Forwards is +Z, left +X.
+struct Vehicle {
+  Where where;
+  std::string name;
+  Vec3 position = Vec3::Zero();  ///< on the ground in the middle of its wheels
+  Quat orientation = Quat::Identity();
+  Vec3 velocity = Vec3::Zero();
+  Real length = 4, width = 1.8, wheel_radius = 0.36;
+  Real mass = 1200;
+  Real suspension_hz = 1.6;  ///< of its bouncing
+  std::vector<MotorKey> speed;  ///< [m/s]
+  std::vector<MotorKey> steer;  ///< of the middle of the front axle [degrees], left positive
+  Real max_torque = 900;        ///< of each rear wheel
+  std::string paint, trim, tyre;  ///< names of materials
+  Placement placement;
+};
+
+/// A tower crane with a load on its rope. The jib points along +X.
+struct Crane {
+  Where where;
+  std::string name;
+  Vec3 position = Vec3::Zero();  ///< the foot of its mast
+  Quat orientation = Quat::Identity();
+  Real height = 8, reach = 6;
+  Real load_mass = 400, load_size = 0.9;
+  std::vector<MotorKey> slew;     ///< turning of the jib [degrees]
+  std::vector<MotorKey> trolley;  ///< way outwards [m]
+  std::vector<MotorKey> hoist;    ///< way of the load upwards [m]
+  std::string frame, load;        ///< names of materials
+  Placement placement;
+};
+
+/// The joint above a node of a model.
+struct NodeJoint {
+  Where where;
+  std::string node;
+  JointBehaviour behaviour;  ///< axes as the node has them
+};
+/// The nodes of a model file that have triangles as links, each joined to the one above it where it is.
+struct ModelTree {
+  Where where;
+  std::string name;
+  std::string file;
+  Vec3 position = Vec3::Zero();
+  Quat orientation = Quat::Identity();
+  Vec3 velocity = Vec3::Zero();
+  Real scale = 1;
+  Real density = 1000;
+  std::string base = "world";  ///< what holds the uppermost nodes: a body, "world", or nothing
+  std::string material;        ///< empty: those of the file
+  bool collides = true;
+  Real friction = 0, damping = 0;  ///< of the joints that are not in `joints`, which are spherical
+  std::vector<NodeJoint> joints;
+  Placement placement;
+
+  /// A node as read from the file; see render::Model::Node.
+  struct Link {
+    std::string name;
+    int parent;
+    sim::Pose pose;
+  };
+  std::vector<Link> links;  ///< empty if the file could not be read
+};
+
+using ArticulationTemplate = std::variant<Chain, Ragdoll, Bridge, Vehicle, Crane, ModelTree>;
 
 }  // namespace offstage::producer

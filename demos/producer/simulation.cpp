@@ -224,7 +224,10 @@ void Simulation::add_joints(const Scene& scene) {
     sim::JointDef def = joint_def(joint);
     def.a = body_named(joint.a);
     def.b = body_named(joint.b);
-    at_place(joint.where, [&] { world_.add_joint(def); });
+    at_place(joint.where, [&] {
+      const sim::JointHandle handle = world_.add_joint(def);
+      if (def.type == sim::JointType::distance) rods_.push_back(handle);
+    });
   }
 }
 
@@ -332,7 +335,12 @@ Snapshot Simulation::snapshot() const {
     return std::get<sim::WorldPoint>(attachment).position.cast<float>();
   };
   for (const sim::SpringDef& spring : springs_)
-    snapshot.springs.push_back({end_point(spring.a), end_point(spring.b)});
+    snapshot.rods.push_back({end_point(spring.a), end_point(spring.b)});
+  for (const sim::JointHandle rod : rods_) {
+    const sim::JointState state = world_.joint(rod);
+    const Eigen::Vector3f a = state.anchor_a.cast<float>();
+    snapshot.rods.push_back({a, state.broken ? a : Eigen::Vector3f(state.anchor_b.cast<float>())});
+  }
 
   for (std::size_t i = 0; i < groups_.size(); ++i)
     snapshot.point_sets.push_back(

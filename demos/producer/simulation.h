@@ -123,6 +123,7 @@ class Simulation {
   std::vector<sim::Pose> moving_poses_;             // kept up to date from World::moved()
   std::map<sim::BodyHandle, std::size_t> slot_of_;  // handle -> place in `moving_`
   std::vector<sim::SpringDef> springs_;
+  std::vector<sim::JointHandle> rods_;  // distance joints
   std::optional<Overlays> overlays_;
   std::function<void(double)> on_substep_;
   SimulationTotals totals_;

@@ -16,7 +16,7 @@ using Eigen::Vector4f;
 constexpr FileKind kKind = {"offsnap", 3, "snapshot"};
 
 constexpr std::size_t kBodyBytes = 7 * sizeof(float);
-constexpr std::size_t kSpringBytes = 6 * sizeof(float);
+constexpr std::size_t kRodBytes = 6 * sizeof(float);
 constexpr std::size_t kPointBytes = 12 * sizeof(float) + sizeof(uint64_t);
 constexpr std::size_t kClothBytes = 4 * sizeof(uint64_t) + sizeof(uint32_t);
 constexpr std::size_t kLineBytes = 12 * sizeof(float) + sizeof(uint64_t);
@@ -63,8 +63,8 @@ std::vector<uint8_t> serialize(const Snapshot& snapshot) {
     out.put(b.orientation.w());
     out.put(Eigen::Vector3f(b.orientation.vec()));
   }
-  out.put(uint64_t{snapshot.springs.size()});
-  for (const SpringSample& s : snapshot.springs) out.put(s.a), out.put(s.b);
+  out.put(uint64_t{snapshot.rods.size()});
+  for (const RodSample& s : snapshot.rods) out.put(s.a), out.put(s.b);
   out.put(uint64_t{snapshot.point_sets.size()});
   for (const PointSet& set : snapshot.point_sets) {
     out.put(uint64_t{set.points.size()});
@@ -116,8 +116,8 @@ Snapshot deserialize(std::span<const uint8_t> bytes, const std::string& source) 
     const auto v = in.take<Vector3f>();
     b.orientation = {w, v.x(), v.y(), v.z()};
   }
-  snapshot.springs.resize(in.take_count(kSpringBytes));
-  for (SpringSample& s : snapshot.springs) s = {in.take<Vector3f>(), in.take<Vector3f>()};
+  snapshot.rods.resize(in.take_count(kRodBytes));
+  for (RodSample& s : snapshot.rods) s = {in.take<Vector3f>(), in.take<Vector3f>()};
   snapshot.point_sets.resize(in.take_count(sizeof(uint64_t)));
   for (PointSet& set : snapshot.point_sets) {
     set.points.resize(in.take_count(kPointBytes));

@@ -21,8 +21,8 @@ struct BodySample {
   Eigen::Quaternionf orientation;
 };
 
-/// Ends of a spring.
-struct SpringSample {
+/// Ends of a spring, or of a joint that is a rod or rope; both the same where it is gone.
+struct RodSample {
   Eigen::Vector3f a, b;
 };
 
@@ -51,7 +51,7 @@ struct Snapshot {
   int frame = 1;
   double time = 0;                    ///< [s]
   std::vector<BodySample> bodies;     ///< moving bodies, in scene order
-  std::vector<SpringSample> springs;  ///< in scene order
+  std::vector<RodSample> rods;        ///< springs, then distance joints, in scene order
   std::vector<PointSet> point_sets;   ///< particle groups, then emitters, in scene order
   std::vector<ClothSample> cloths;    ///< in scene order
   std::vector<LineSet> overlays;      ///< in scene order; empty for those that draw no lines

@@ -174,7 +174,7 @@ struct Table<MeshFile> {
   static constexpr const char* kName = "mesh";
   static constexpr const char* kHelp = "A model file as a shape: its triangles collide and give the mass.";
   static Fields<MeshFile> fields() {
-    return {{"file", &MeshFile::file, "model file", kRequired},
+    return {{"file", &MeshFile::file, "model file, or FILE#NODE for one of its nodes", kRequired},
             {"scale", &MeshFile::scale, "factor of its size", "", kPositive}};
   }
 };

@@ -60,6 +60,21 @@ class ClothTrace {
   const Simulation& simulation_;
 };
 
+/// How joints stood and what they bore: time, joint, anchor on a, force and torque on a, the free coordinate and its
+/// speed, how far the anchors are apart, 1 if it is broken.
+class JointTrace {
+ public:
+  JointTrace(const std::filesystem::path& path, const Simulation& simulation);
+
+  /// One row per joint.
+  void record(double time);
+  void close() { file_.close(); }
+
+ private:
+  CsvFile file_;
+  const Simulation& simulation_;
+};
+
 /// Where bodies touched: time, the two bodies, point, normal from b to a, force on a, separation.
 class ContactTrace {
  public:

@@ -16,6 +16,7 @@
 #include "producer/error.h"
 #include "producer/json.h"
 #include "producer/models.h"
+#include "render/mesh_io.h"
 
 namespace offstage::producer {
 namespace {
@@ -37,7 +38,7 @@ bool is_name(const std::string& text) {
   constexpr std::size_t kLongestName = 4096, kLongestEnding = 8;
   if (text.empty() || text.size() > kLongestName || text.find_first_of("\n\"*?") != std::string::npos)
     return false;
-  const std::string ending = fs::path(text).extension().string();
+  const std::string ending = render::split_node(text).file.extension().string();
   return ending.size() > 1 && ending.size() <= kLongestEnding &&
          std::isalpha(static_cast<unsigned char>(ending[1]));
 }
@@ -103,7 +104,7 @@ std::set<fs::path> files_of_scene(const fs::path& scene, const std::vector<std::
   std::vector<fs::path> unread = {scene.lexically_normal()};
   const auto add = [&](const std::string& name, const fs::path& folder) {
     if (!is_name(name) || files.size() >= kMostFiles) return;
-    const fs::path file = (folder / name).lexically_normal();
+    const fs::path file = render::split_node((folder / name).lexically_normal()).file;
     if (files.insert(file).second) unread.push_back(file);
   };
   for (const std::string& override : overrides)

@@ -30,13 +30,14 @@ enum class JointType : uint8_t {
 /// the length of a rod [m]; each 0 as the joint was made.
 struct Motor {
   enum class Mode : uint8_t { none, speed, position };
-  /// A target at a time; between two it changes linearly, before the first and after the last it stays.
+  /// A target at a time; before the first and after the last it stays.
   struct Key {
     Real time = 0;    ///< [s]
     Real target = 0;  ///< [rad/s] or [m/s], or [rad] or [m]
   };
   Mode mode = Mode::none;
   std::vector<Key> targets = {};  ///< strictly increasing times; none: 0
+  bool smooth = false;  ///< between two of them it changes like a cubic that is at rest at both; else evenly
   Real max_effort = std::numeric_limits<Real>::infinity();  ///< [N m] or [N]
   /// Of a position: effort = stiffness (target - position) - damping speed. Stiffness 0: it is held, as firmly
   /// as max_effort allows.

@@ -1,6 +1,9 @@
 // Joints and articulations of a scene: their copies, what is refused, and that they hold.
 
+#include <cmath>
+#include <numbers>
 #include <set>
+#include <stdexcept>
 
 #include <gtest/gtest.h>
 
@@ -90,6 +93,87 @@ TEST(Articulations, AreAsTheyStandAndHoldWhenTheyFall) {
     if (name != "ann_0/head") continue;
     EXPECT_LT(simulation.world().body(handle).centre.y(), 1);
   }
+}
+
+sim::BodyHandle handle_of(const Simulation& simulation, const std::string& name) {
+  for (const auto& [known, handle] : simulation.moving_bodies())
+    if (known == name) return handle;
+  throw std::out_of_range(name);
+}
+
+// The speed of its rear wheels, half of it in the mean of a smooth start; turning, a circle of L / tan(angle).
+TEST(Vehicle, DrivesAsFastAsItsWheelsAndTurnsAsItIsSteered) {
+  const LoadedScene loaded = parse(R"(
+    "output": {"fps": 30, "duration": 8}, "world": {"solver": "fast"},
+    "materials": [{"name": "road", "friction": 1, "restitution": 0}],
+    "bodies": [{"name": "ground", "motion": "static", "shape": {"type": "plane"}, "material": "road"}],
+    "articulations": [{"type": "vehicle", "name": "car", "tyre": "road",
+      "speed": [{"time": 0.5, "target": 0}, {"time": 3.5, "target": 3}],
+      "steer": [{"time": 4, "target": 0}, {"time": 5, "target": 20}]}])");
+  const ModelLibrary models;
+  Simulation simulation(loaded.scene, models);
+  const sim::BodyHandle chassis = handle_of(simulation, "car/chassis");
+  const auto advance_to = [&](Real time) {
+    while (simulation.world().time() < time) simulation.advance();
+    return simulation.world().body(chassis);
+  };
+  const sim::BodyState standing = advance_to(0.5);
+  EXPECT_LT(standing.velocity.norm(), 0.01) << "its springs bear it where it stands";
+  const sim::BodyState driving = advance_to(4);
+  EXPECT_NEAR(driving.velocity.z(), 3, 0.03);
+  EXPECT_NEAR(driving.pose.position.z(), 3.0 / 2 * 3 + 3 * 0.5, 0.15);
+  EXPECT_NEAR(driving.pose.position.x(), 0, 0.02);
+  // Round a circle about a point on the line of the rear axle.
+  const sim::BodyState turning = advance_to(6);
+  const Real base = 0.62 * 4, radius = base / std::tan(20 * std::numbers::pi / 180);
+  EXPECT_NEAR(turning.angular_velocity.y(), turning.velocity.norm() / std::hypot(radius, base / 2), 0.02);
+}
+
+TEST(Crane, BearsItsLoadAndMovesItByItsMotors) {
+  const LoadedScene loaded = parse(R"(
+    "output": {"fps": 30, "duration": 16}, "world": {"solver": "exact"},
+    "articulations": [{"type": "crane", "name": "crane", "height": 8, "reach": 6, "load_mass": 400,
+      "hoist": [{"time": 1, "target": 0}, {"time": 5, "target": 2}]}])");
+  const ModelLibrary models;
+  Simulation simulation(loaded.scene, models);
+  const sim::World& world = simulation.world();
+  sim::JointHandle rope;
+  world.for_each_joint([&](sim::JointHandle j) {
+    if (world.joint_def(j).name == "crane/rope") rope = j;
+  });
+  const Real before = world.joint(rope).anchor_a.y();
+  while (world.time() < 1) simulation.advance();
+  EXPECT_NEAR(world.joint(rope).force.y(), 400 * 9.81, 1);
+  while (world.time() < 6) simulation.advance();
+  EXPECT_NEAR(world.joint(rope).anchor_a.y() - before, 2, 1e-3);
+  EXPECT_EQ(simulation.snapshot().rods.size(), 1u);
+}
+
+TEST(ModelTrees, AreTheNodesOfTheirFile) {
+  const std::string arm = R"({"type": "model", "name": "arm", "file": "assets/models/robot_arm.glb", "position": [1, 0, 0],
+      "orientation": {"axis": [0, 1, 0], "angle_deg": 90}, "scale": 2, "joints": [)";
+  const LoadedScene loaded = parse(R"("articulations": [)" + arm + R"({"node": "base", "type": "fixed"},
+      {"node": "finger_left", "type": "prismatic", "axis": [1, 0, 0], "limits": [0, 0.1]}]}])");
+  const Scene& scene = loaded.scene;
+  ASSERT_EQ(scene.bodies.size(), 7u);
+  ASSERT_EQ(scene.joints.size(), 7u);
+  const Body& hand = scene.bodies[4];
+  EXPECT_EQ(hand.name, "arm/hand");
+  EXPECT_LT((hand.position - Vec3(1, 2 * 1.97, 0)).norm(), 1e-6);
+  const Joint& finger = scene.joints[5];
+  EXPECT_EQ(finger.name, "arm/finger_left");
+  EXPECT_EQ(finger.b, "arm/hand");
+  EXPECT_EQ(finger.behaviour.type, sim::JointType::prismatic);
+  EXPECT_LT((finger.behaviour.axis - Vec3(0, 0, -1)).norm(), 1e-6) << "turned with the model";
+  EXPECT_LT((finger.anchor - Vec3(1, 2 * 2.135, 0.32)).norm(), 1e-6);
+  EXPECT_EQ(scene.joints[0].b, "");
+
+  EXPECT_EQ(errors_of(R"("articulations": [)" + arm + R"({"node": "hnad"}, {"node": "hand", "type": "distance"}]}])"),
+            "/articulations/0/joints/0/node: assets/models/robot_arm.glb has no node 'hnad' with triangles; did you mean "
+            "'hand'?\n/articulations/0/joints/1/type: must be another: a node and the one above it have no distance to "
+            "keep\n");
+  EXPECT_NE(errors_of(R"("articulations": [{"type": "model", "file": "none.glb"}])").find("/articulations/0/file: "),
+            std::string::npos);
 }
 
 }  // namespace

@@ -233,5 +233,26 @@ TEST(Overlays, DoNotTouchTheState) {
   EXPECT_EQ(with.simulation.snapshot().state_hash, without.simulation.snapshot().state_hash);
 }
 
+// A weight of 2 kg that hangs on a hinge: its axis, a line to the centre, and an arrow for what the hinge bears.
+TEST(JointsOverlay, ShowsTheHingeAndWhatItBears) {
+  Shown shown(R"({"bodies": [{"name": "arm", "shape": {"type": "box", "size": [0.1, 1, 0.1]}, "density": 200,
+                              "position": [0, 0.5, 0]}],
+    "joints": [{"name": "hinge", "type": "revolute", "a": "arm", "anchor": [0, 1, 0], "axis": [0, 0, 1]}],
+    "output": {"fps": 10},
+    "overlays": [{"type": "joints", "joint": "hinge", "size": 0.1, "force_scale": 0.05}]})");
+  shown.simulation.advance();
+  const LineSet set = shown.lines();
+  float lowest = 1, highest = 1, along = 0;
+  for (const render::Line& line : set.lines)
+    for (const Vector3f& p : {line.a, line.b}) {
+      lowest = std::min(lowest, p.y());
+      highest = std::max(highest, p.y());
+      along = std::max(along, std::abs(p.z()));
+    }
+  EXPECT_NEAR(lowest, 0.5, 1e-4) << "the centre of the arm";
+  EXPECT_NEAR(along, 0.2, 1e-4) << "the axis";
+  EXPECT_NEAR(highest, 1 + 0.05 * 2 * 9.81, 1e-3) << "the arrow";
+}
+
 }  // namespace
 }  // namespace offstage::producer

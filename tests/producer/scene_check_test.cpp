@@ -79,7 +79,7 @@ TEST(SceneCheck, OverlaysShowWhatThereIs) {
             "/overlays/0/body: there is no body 'a'\n"
             "/overlays/0/level: must be between 0 and 16, got -1\n"
             "/overlays/1/type: is required: one of \"tree\", \"parts\", \"closest\", \"contacts\", "
-            "\"velocities\", \"islands\", \"cloth\", \"trails\" or \"text\"\n");
+            "\"velocities\", \"islands\", \"joints\", \"cloth\", \"trails\" or \"text\"\n");
 }
 
 TEST(SceneCheck, FilesAreThere) {

@@ -192,7 +192,7 @@ TEST(SceneIo, WhatIsRequiredIsMissed) {
   EXPECT_EQ(
       errors_of(
           R"({"bodies": [{"shape": {"type": "mesh"}, "model": {"file": ""}}], "camera": {"type": "follow"}})"),
-      "s:1:23: /bodies/0/shape/file: is required: model file\n"
+      "s:1:23: /bodies/0/shape/file: is required: model file, or FILE#NODE for one of its nodes\n"
       "s:1:59: /bodies/0/model/file: must not be empty\n"
       "s:1:76: /camera/body: is required: name of the body");
 }

@@ -13,7 +13,7 @@ Snapshot sample() {
   s.time = 1.0 / 3;
   s.bodies = {{{1, 2, 3}, Eigen::Quaternionf(0.5f, 0.5f, -0.5f, 0.5f)},
               {{-1, 0, 1e-20f}, Eigen::Quaternionf::Identity()}};
-  s.springs = {{{0, 1, 0}, {2, 1, 0}}};
+  s.rods = {{{0, 1, 0}, {2, 1, 0}}};
   s.point_sets.resize(2);
   for (uint64_t i = 0; i < 100; ++i) {
     const auto x = static_cast<float>(i);

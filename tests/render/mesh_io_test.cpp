@@ -97,6 +97,33 @@ TEST(ReadModel, PlacesInstancesByTheirNodes) {
   EXPECT_TRUE(model.bounds().max().isApprox(Vector3f(12, 3, 0), 1e-6f)) << model.bounds().max().transpose();
 }
 
+TEST(ReadModel, ListsTheNodesWithTrianglesAndReadsOneOfThem) {
+  const ScratchFolder folder;
+  const std::filesystem::path file = folder.put(
+      "a.gltf", gltf(R"([{"name":"root","children":[1],"translation":[10,0,0]},
+                         {"name":"arm","mesh":0,"scale":[2,2,2],"translation":[0,1,0],"children":[2]},
+                         {"children":[3],"translation":[1,0,0]},
+                         {"name":"arm","mesh":0,"rotation":[0,0,0.70710678,0.70710678]}])",
+                     R"(,"materials":[{}])"));
+  const Model whole = read_model(file);
+  ASSERT_EQ(whole.nodes.size(), 2u);
+  EXPECT_EQ(whole.nodes[0].name, "arm");
+  EXPECT_EQ(whole.nodes[0].parent, -1);
+  EXPECT_TRUE(whole.nodes[0].position.isApprox(Vector3f(10, 1, 0), 1e-6f));
+  EXPECT_TRUE(whole.nodes[0].orientation.isApprox(Eigen::Quaternionf::Identity(), 1e-6f));
+  EXPECT_EQ(whole.nodes[1].name, "arm_2");
+  EXPECT_EQ(whole.nodes[1].parent, 0);
+  EXPECT_TRUE(whole.nodes[1].position.isApprox(Vector3f(12, 1, 0), 1e-6f));
+  EXPECT_TRUE((whole.nodes[1].orientation * Vector3f::UnitX()).isApprox(Vector3f::UnitY(), 1e-5f));
+
+  // Its own triangle alone, as large as in the whole model, from where it is.
+  const Model arm = read_model(file.string() + "#arm_2");
+  EXPECT_EQ(arm.triangle_count(), 1u);
+  EXPECT_TRUE(arm.bounds().min().isApprox(Vector3f(0, 0, 0), 1e-5f)) << arm.bounds().min().transpose();
+  EXPECT_TRUE(arm.bounds().max().isApprox(Vector3f(2, 2, 0), 1e-5f)) << arm.bounds().max().transpose();
+  EXPECT_THROW(read_model(file.string() + "#leg"), FileError);
+}
+
 TEST(ReadModel, KeepsTheOutsideOutsideUnderAMirror) {
   const ScratchFolder folder;
   const std::string dae_head =
