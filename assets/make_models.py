@@ -355,16 +355,23 @@ def dishes():
 
 
 def parachute():
-    """A dome with a hole on top and a ribbon from every fourth edge of its rim to a ring below: one open sheet."""
-    sectors, rings, lines, steps = 48, 15, 12, 14
-    radius, ring, depth = 1.5, 0.2, 3.0
+    """A flat round canopy with a vent, folded in pleats from its top down, and twelve ribbons from its rim: one open
+    sheet. Of the rays from the top every other lies farther out; between neighbours is the angle of the flat sheet, so that nothing is
+    strained."""
+    sectors, rings, lines, steps = 48, 18, 12, 16
+    radius, vent, length, width = 1.7, 0.12, 3.2, 0.03
+    step = 2 * math.pi / sectors
+    inner = 0.32
+    # cos(inner) cos(outer) + sin(inner) sin(outer) cos(step) = cos(step), solved for outer.
+    size = math.hypot(math.cos(inner), math.sin(inner) * math.cos(step))
+    outer = math.atan2(math.sin(inner) * math.cos(step), math.cos(inner)) + math.acos(math.cos(step) / size)
 
-    def around(r, y, k):
-        a = 2 * math.pi * k / sectors
-        return (r * math.sin(a), y, r * math.cos(a))
+    def ray(k, r):
+        away, a = (outer if k % 2 else inner), step * k
+        return (r * math.sin(away) * math.sin(a), -r * math.cos(away), r * math.sin(away) * math.cos(a))
 
-    angles = [math.radians(mix(6, 82, j / (rings - 1))) for j in range(rings)]
-    positions = [around(radius * math.sin(a), radius * math.cos(a), k) for a in angles for k in range(sectors)]
+    radii = [mix(vent, radius, j / (rings - 1)) for j in range(rings)]
+    positions = [ray(k, r) for r in radii for k in range(sectors)]
     triangles = []
     for j in range(rings - 1):
         for k in range(sectors):
@@ -373,15 +380,16 @@ def parachute():
             triangles += [(a, c, b), (b, c, d)] if (j + k) % 2 else [(a, c, d), (a, d, b)]
     rim = (rings - 1) * sectors
     for line in range(lines):
-        k = line * sectors // lines
-        top = (positions[rim + k], positions[rim + k + 1])
-        foot = tuple(around(ring, -depth, x) for x in (k + 0.5 - 1, k + 0.5 + 1))
-        last = (rim + k, rim + k + 1)
-        for step in range(1, steps + 1):
-            t = step / steps
+        k = line * sectors // lines + 1  # an outer fold
+        top, a = positions[rim + k], step * k
+        side = (width / 2 * math.cos(a), 0, -width / 2 * math.sin(a))
+        foot = (0.14 * math.sin(a), -radius - length, 0.14 * math.cos(a))
+        last = (rim + k, rim + k)
+        for n in range(1, steps + 1):
+            middle = mix_points(top, foot, n / steps)
             row = len(positions)
-            positions += [mix_points(top[0], foot[0], t), mix_points(top[1], foot[1], t)]
-            triangles += [(last[0], row, last[1]), (last[1], row, row + 1)]
+            positions += [sub(middle, side), add(middle, side)]
+            triangles += [(last[0], row, row + 1)] if n == 1 else [(last[0], row, last[1]), (last[1], row, row + 1)]
             last = (row, row + 1)
     write_glb(MODELS / "parachute.glb", [(shaded(Mesh(positions, triangles), 180), Material("canopy", "#c8502a", 0.7))])
 
@@ -392,7 +400,7 @@ def mix_points(a, b, t):
 
 def hammock():
     """A sagging sheet, narrower at its ends, hung along X."""
-    columns, rows = 72, 32
+    columns, rows = 48, 22
     positions = []
     for i in range(columns + 1):
         x = 2 * i / columns - 1

@@ -157,6 +157,7 @@ struct StepReport {
 
   uint64_t cloth_contacts = 0;  ///< at the end, of all cloths; the others as ClothReport has them
   uint64_t cloth_self_contacts = 0;
+  uint64_t cloth_springs_softened = 0;  ///< at the end, too
   Real cloth_strain = 0;       ///< greatest
   Real cloth_penetration = 0;  ///< deepest [m]
   uint64_t cloth_moves_limited = 0, cloth_moves_held_back = 0, cloth_crossings = 0, cloth_springs_torn = 0;

@@ -108,8 +108,7 @@ void World::Impl::step_cloths(Real start, Real h) {
   hit_cloths(h);
 }
 
-/// What cloths did to bodies counts from the next sub-step on; a blow has moved them already in this one, or
-/// cloth that stops them would lag behind.
+/// What cloths did to bodies has moved them in this sub-step, and changes their velocities from the next on.
 void World::Impl::answer_cloths(std::span<const ClothBody> near) {
   std::vector<Reaction> reactions;
   for (const ClothBody& at : near) {
@@ -119,7 +118,9 @@ void World::Impl::answer_cloths(std::span<const ClothBody> near) {
     // It sleeps while what it lies on is at rest, and wakes when that moves or goes.
     if (left || at.touching_speed > kClothRest) wake(body);
     if (!at.touched || body.asleep) continue;
-    if (at.reaction().impulse.norm() > kBlow * body.rigid.mass) {
+    // It is where cloth met it: put back to where it would be without, it would drag cloth along each time.
+    // Between two bodies cloth acts on velocities, and only a blow moves them.
+    if (!at.pinches || at.reaction().impulse.norm() > kBlow * body.rigid.mass) {
       body.pose = at.end();
       body.rigid.place(body.pose);
     }
@@ -134,6 +135,7 @@ void World::Impl::report_cloths(StepReport& report) {
     const ClothReport& r = cloth->report;
     report.cloth_contacts += r.contacts;
     report.cloth_self_contacts += r.self_contacts;
+    report.cloth_springs_softened += r.softened;
     report.cloth_strain = std::max(report.cloth_strain, r.max_strain);
     report.cloth_penetration = std::max(report.cloth_penetration, r.penetration);
     report.cloth_moves_limited += r.limited;

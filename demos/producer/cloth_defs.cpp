@@ -152,6 +152,7 @@ FlatCloth flat_cloth(const Cloth& cloth, const render::Model* model) {
   def.self_collision = cloth.self_collision;
   def.tear = cloth.tear;
   def.pressure = cloth.pressure;
+  def.ram_pressure = cloth.ram_pressure;
   def.air.density = cloth.air_density;
   def.integrator = cloth.integrator;
   def.substep = cloth.substep;

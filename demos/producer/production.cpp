@@ -334,6 +334,7 @@ Json cloth_figures(const SimulationTotals& t) {
           {"penetration", t.cloth_penetration},
           {"contacts", t.cloth_contacts},
           {"self_contacts", t.cloth_self_contacts},
+          {"springs_softened", t.cloth_springs_softened},
           {"moves_limited", t.cloth_moves_limited},
           {"moves_held_back", t.cloth_moves_held_back},
           {"crossings", t.cloth_crossings},

@@ -82,7 +82,7 @@ struct Cloth {
   bool collides = true;
   bool self_collision = true;
   Real tear = 0;
-  Real pressure = 0;
+  Real pressure = 0, ram_pressure = 0;
   Real air_density = 1.2;
   sim::ClothIntegrator integrator = sim::ClothIntegrator::relaxed;
   Real substep = 1.0 / 960;

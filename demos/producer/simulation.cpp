@@ -86,6 +86,7 @@ void SimulationTotals::add(const sim::StepReport& report) {
   cloth_penetration = std::max(cloth_penetration, report.cloth_penetration);
   cloth_contacts = report.cloth_contacts;
   cloth_self_contacts = report.cloth_self_contacts;
+  cloth_springs_softened = report.cloth_springs_softened;
   cloth_moves_limited += report.cloth_moves_limited;
   cloth_moves_held_back += report.cloth_moves_held_back;
   cloth_crossings += report.cloth_crossings;

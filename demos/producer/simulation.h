@@ -48,7 +48,7 @@ struct SimulationTotals {
 
   // Of cloths: greatest of the run, at its end, and sums.
   sim::Real cloth_strain = 0, cloth_penetration = 0;
-  uint64_t cloth_contacts = 0, cloth_self_contacts = 0;
+  uint64_t cloth_contacts = 0, cloth_self_contacts = 0, cloth_springs_softened = 0;
   uint64_t cloth_moves_limited = 0, cloth_moves_held_back = 0, cloth_crossings = 0, cloth_springs_torn = 0,
            cloth_unconverged = 0;
   sim::ContactWork exact, fast, impacts;

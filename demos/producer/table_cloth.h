@@ -173,6 +173,10 @@ struct Table<Cloth> {
              kNotNegative},
             {"pressure", &T::pressure, "inside of a closed cloth, over that of the air, at its first volume",
              "Pa"},
+            {"ram_pressure", &T::ram_pressure,
+             "share of the stagnation pressure of the air that comes in at the mouth of an open cloth, which "
+             "builds up inside: about 1 for a parachute",
+             "", kNotNegative},
             {"air_density", &T::air_density, "of the air it moves in; 0: none", "kg/m^3", kNotNegative},
             {"integrator", &T::integrator,
              "how its springs are stepped; the last two are explicit, for soft cloth and short steps"},

@@ -97,6 +97,9 @@ struct ClothDef {
   /// Over-pressure inside of a closed cloth [Pa]: at its rest volume V0; at the volume V it is
   /// pressure V0 / V, as that of a gas that keeps its temperature. 0: none.
   Real pressure = 0;
+  /// Of an open cloth that catches the air, as a parachute: which share of the stagnation pressure rho (u.m)^2
+  /// / 2 of the air that comes in at its mouth builds up inside, on the side its normals point away from. 0: none.
+  Real ram_pressure = 0;
 
   ClothIntegrator integrator = ClothIntegrator::relaxed;
   Real substep = 1.0 / 960;  ///< longest step of its own [s], > 0; never longer than the world's
@@ -125,7 +128,7 @@ struct ClothReport {
   uint64_t limited = 0;        ///< moves shortened, to keep max_stretch and max_shear or for the next reason
   uint64_t held_back = 0;    ///< times that a move was shortened because cloth would have gone through cloth
   uint64_t crossings = 0;    ///< pairs that had to be let go: the guarantee against crossing is lost there
-  uint64_t softened = 0;     ///< springs too stiff for the `relaxed` integrator at this step
+  uint64_t softened = 0;     ///< springs too stiff for the `relaxed` integrator at its step, at the end
   uint64_t torn = 0;         ///< springs
   uint64_t unconverged = 0;  ///< solves of the implicit integrator that ended at their bound
   bool finite = true;        ///< false: it stopped being finite, and was stopped where it last was

@@ -26,6 +26,9 @@ class ClothBody {
   const Solid& solid() const { return way_.solid; }
   const Obstacle& way() const { return way_; }
   bool is_dynamic() const { return way_.is_dynamic(); }
+  /// [kg]; infinite of what nothing moves.
+  Real mass() const { return 1 / way_.inverse_mass; }
+  const Vec3& centre() const { return centre_; }  ///< of mass, at the end of the cloth's sub-step
 
   /// How far its surface moves in the sub-step of cloth, where the point `p` (world) is at its end.
   Vec3 surface_motion(const Vec3& p) const;
@@ -45,6 +48,7 @@ class ClothBody {
 
   bool touched = false;     ///< by cloth, in this sub-step of the world
   Real touching_speed = 0;  ///< greatest [m/s]
+  bool pinches = false;     ///< cloth against another body, in this sub-step of the world
   bool collides = true;     ///< else it only holds pins
 
  private:

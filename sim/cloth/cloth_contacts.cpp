@@ -118,6 +118,7 @@ bool ClothContacts::touch(const ClothPoints& points, Near& near, Touch& t) const
 
 void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<VelocityCut>& cuts) {
   std::fill(active_.begin(), active_.end(), 0);
+  touches_body_.assign(points.size(), 0);
   any_dynamic_ = false;
   for (std::size_t k = 0; k < near_.size();) {
     touches_.clear();
@@ -127,6 +128,7 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
     const std::size_t count = touches_.size();
     if (count == 0) continue;
     active_[points.cloth[point]] += count;
+    touches_body_[point] = 1;
     any_dynamic_ |= std::ranges::any_of(touches_, [](const Touch& t) { return t.body->is_dynamic(); });
     // What is fixed comes last, so that its surface is kept best.
     std::stable_sort(touches_.begin(), touches_.end(), [](const Touch& a, const Touch& b) {
@@ -138,37 +140,54 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
         if (touches_[a].normal.dot(touches_[b].normal) > kFacing) continue;
         supported = true;
         if (a < b && (touches_[a].body->is_dynamic() || touches_[b].body->is_dynamic()))
-          pinch(touches_[a], touches_[b]);
+          pinch(touches_[a], touches_[b],
+                std::sqrt(points.friction[point] *
+                          std::min(touches_[a].body->way().friction, touches_[b].body->way().friction)));
       }
-      if (points.inverse_mass[point] == 0) block(touches_[a]);
+      if (points.inverse_mass[point] == 0) block(touches_[a], points.holder[point]);
       press(points, touches_[a], dt, parts, supported && touches_[a].body->is_dynamic(), cuts);
     }
   }
 }
 
-/// Two bodies with a point between them push each other, on velocities: they must not come nearer.
-void ClothContacts::pinch(Touch& a, Touch& b) {
+/// Two bodies with a point between them push each other, on velocities: they must not come nearer. The point
+/// hands friction on, too, which is more than its own mass could.
+void ClothContacts::pinch(Touch& a, Touch& b, Real friction) {
   const Vec3 n = (a.normal - b.normal).normalized();
   const Real mobility = a.body->mobility(a.on_body, n) + b.body->mobility(b.on_body, n);
   if (!(mobility > 0)) return;
   const Real approach = n.dot(a.body->velocity(a.on_body) - b.body->velocity(b.on_body));
   const Real overlap = -(a.gap + b.gap);
   const Real impulse = (approach + kStabilization * overlap / h_) / mobility;
+  a.body->pinches = b.body->pinches = true;
   if (!(impulse > 0)) return;
   a.body->push(-impulse * n, a.on_body);
   b.body->push(impulse * n, b.on_body);
   a.near->pressed += impulse;
   b.near->pressed += impulse;
+  const Vec3 relative = a.body->velocity(a.on_body) - b.body->velocity(b.on_body);
+  const Vec3 slip = relative - n.dot(relative) * n;
+  const Real speed = slip.norm();
+  if (!(speed > 0)) return;
+  const Vec3 along = slip / speed;
+  const Real stick = speed / (a.body->mobility(a.on_body, along) + b.body->mobility(b.on_body, along));
+  const Real held = std::min(stick, friction * impulse);
+  a.body->push(-held * along, a.on_body);
+  b.body->push(held * along, b.on_body);
 }
 
-/// A body meets a point that a pin holds.
-void ClothContacts::block(Touch& t) {
-  const Real mobility = t.body->mobility(t.on_body, t.normal);
+/// A body meets a point that a pin of the world or of another body holds.
+void ClothContacts::block(Touch& t, ClothBody* holder) {
+  if (holder == t.body) return;
+  const Real mobility =
+      t.body->mobility(t.on_body, t.normal) + (holder ? holder->mobility(t.on_body, t.normal) : 0);
   if (!(mobility > 0)) return;
-  const Real approach = t.normal.dot(t.body->velocity(t.on_body));
+  const Vec3 held = holder ? holder->velocity(t.on_body) : Vec3(Vec3::Zero());
+  const Real approach = t.normal.dot(t.body->velocity(t.on_body) - held);
   const Real impulse = (approach - kStabilization * t.gap / h_) / mobility;
   if (!(impulse > 0)) return;
   t.body->push(-impulse * t.normal, t.on_body);
+  if (holder) holder->push(impulse * t.normal, t.on_body);
   t.near->pressed += impulse;
 }
 
@@ -222,12 +241,16 @@ void ClothContacts::press(ClothPoints& points, Touch& t, Real dt, Real parts, bo
   if (!(w > 0)) return;
   const Real already = std::min(t.gap - n.dot(motion), 0.0);  // gap at the start
   Real pressed = t.near->pressed / parts * dt;                // [kg m]
-  Vec3 correction = Vec3::Zero();
+  Vec3 correction = Vec3::Zero(), recovery = Vec3::Zero();
   if (!supported) {
     const Real push = -t.gap / (w + body.mobility(t.on_body, n));
     pressed += push;
     correction = push * n;
-    if (already < 0) cuts.push_back({i, padded(std::min(-already, push * w) * n)});
+    // What it was in already is taken back without motion, of the point or of the body.
+    if (already < 0) {
+      recovery = std::min(-already / w, push) * n;
+      cuts.push_back({i, padded(w * recovery)});
+    }
   }
   const Vec3 slip = motion - n.dot(motion) * n;
   const Real length = slip.norm();
@@ -238,7 +261,7 @@ void ClothContacts::press(ClothPoints& points, Touch& t, Real dt, Real parts, bo
     correction -= std::min(stick, friction * pressed) * along;
   }
   points.position[i] += padded(w * correction);
-  body.push(-correction / dt, t.on_body);
+  body.push((recovery - correction) / dt, t.on_body);
 }
 
 void ClothContacts::measure(const ClothPoints& points, std::span<Real> penetration) const {

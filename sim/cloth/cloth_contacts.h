@@ -36,6 +36,8 @@ class ClothContacts {
   std::vector<Vec3> stop_bodies(const ClothPoints& points, const MoveShares& shares,
                                 std::span<const Real> recoil);
 
+  /// Whether a point touched a body in the last solve().
+  bool touches(std::size_t point) const { return point < touches_body_.size() && touches_body_[point] != 0; }
   bool any_dynamic() const { return any_dynamic_; }  ///< whether a body that can be pushed touches cloth
   std::span<const uint64_t> active() const { return active_; }  ///< contacts of the last solve(), by cloth
   /// Raises, by cloth, how deep any of its points is behind a surface, at the end of a sub-step.
@@ -57,8 +59,8 @@ class ClothContacts {
 
   void look(const ClothPoints& points, uint32_t point, std::vector<Near>& found) const;
   bool touch(const ClothPoints& points, Near& near, Touch& t) const;
-  void pinch(Touch& a, Touch& b);
-  void block(Touch& t);
+  void pinch(Touch& a, Touch& b, Real friction);
+  void block(Touch& t, ClothBody* holder);
   void press(ClothPoints& points, Touch& t, Real dt, Real parts, bool supported,
              std::vector<VelocityCut>& cuts);
 
@@ -67,6 +69,7 @@ class ClothContacts {
   Real h_ = 0;
   bool any_dynamic_ = false;
   std::vector<Near> near_;  // by point
+  std::vector<uint8_t> touches_body_;  // of each point
   std::vector<Vec3> seen_at_;
   std::vector<Real> seen_reach_;  // how far each point may move before it must be looked at again
   std::vector<Aabb> boxes_;       // of the bodies' ways

@@ -99,18 +99,42 @@ void blow_on_triangles(Run& run, Real h) {
   }
 }
 
+/// A pressure inside, the same on all triangles.
+void push_out(Run& run, Real pressure) {
+  for (const Triangle& t : run.cloth.triangles) {
+    const Vec3 a = run.at(t[0]);
+    const Vec3 third = pressure / 6 * (run.at(t[1]) - a).cross(run.at(t[2]) - a);
+    for (uint32_t corner : t)
+      run.points.acceleration[run.first + corner] += padded(third / run.cloth.masses[corner]);
+  }
+}
+
 void inflate(Run& run) {
   const Cloth& cloth = run.cloth;
   if (cloth.def.pressure == 0) return;
   const Real volume = enclosed_volume(cloth.points, cloth.triangles);
   // A volume of less than a tenth counts as that: what is crushed flat does not burst.
-  const Real pressure = cloth.def.pressure * cloth.rest_volume / std::max(volume, 0.1 * cloth.rest_volume);
-  for (const Triangle& t : cloth.triangles) {
+  push_out(run, cloth.def.pressure * cloth.rest_volume / std::max(volume, 0.1 * cloth.rest_volume));
+}
+
+/// An open cloth that faces the air stops what comes in at its mouth: inside of it the pressure of stagnation
+/// builds up, everywhere the same. A fan over its border would close the surface, whose area vectors then
+/// add up to zero: that of the mouth is the opposite of the cloth's.
+void catch_air(Run& run, Real h) {
+  const ClothDef& def = run.cloth.def;
+  if (!(def.ram_pressure > 0)) return;
+  Vec3 cap = Vec3::Zero(), stream = Vec3::Zero();
+  for (const Triangle& t : run.cloth.triangles) {
     const Vec3 a = run.at(t[0]);
-    const Vec3 third = pressure / 6 * (run.at(t[1]) - a).cross(run.at(t[2]) - a);
-    for (uint32_t corner : t)
-      run.points.acceleration[run.first + corner] += padded(third / cloth.masses[corner]);
+    cap += (run.at(t[1]) - a).cross(run.at(t[2]) - a) / 2;
   }
+  for (std::size_t i = 0; i < run.size(); ++i)
+    stream += run.cloth.masses[i] / run.total_mass * (run.air[i] - run.velocity(i));
+  const Real area = cap.norm(), speed = area > 0 ? cap.dot(stream) / area : 0;
+  if (!(speed > 0)) return;
+  const Real whole = def.ram_pressure * def.air.density / 2 * speed * speed;
+  const Real rate = 2 * whole * area / (speed * run.total_mass);
+  push_out(run, whole / (1 + h * rate));
 }
 
 }  // namespace
@@ -127,6 +151,7 @@ void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather&
       std::visit([&](const auto& effect) { add(effect, run); }, f->effect);
   blow_on_triangles(run, weather.h);
   inflate(run);
+  catch_air(run, weather.h);
 }
 
 }  // namespace offstage::sim

@@ -9,6 +9,8 @@
 
 namespace offstage::sim {
 
+class ClothBody;
+
 /// x y z 0: aligned, so that one instruction handles it.
 using Vec4 = Eigen::Vector4d;
 
@@ -25,6 +27,7 @@ struct ClothPoints {
   std::vector<Vec4> pull;          ///< impulse times the sub-step, that springs gave what pins hold [kg m]
   std::vector<Real> mass;          ///< [kg]
   std::vector<Real> inverse_mass;  ///< 0 of what pins hold
+  std::vector<ClothBody*> holder;  ///< the body whose pin holds it; null: none, or the world
   std::vector<Real> thickness, friction, self_friction;
   std::vector<uint32_t> cloth;  ///< which it belongs to
 

@@ -12,6 +12,13 @@ namespace {
 /// Springs at a time, and from how many on threads are worth their waking.
 constexpr std::size_t kBlock = 2048, kWorthThreads = 60000;
 constexpr uint32_t kMaxColors = 64;
+/// What is too stiff for the step counts as softer. From h^2 k (1/m_a + 1/m_b) = 10 on in a woven sheet, whose
+/// points have four stiff springs, one symmetric sweep leaves so much of the explicit step's excess that it
+/// grows (measured; an exact solution has no such limit). What counts is what all springs of both points make
+/// of it, four times as much there: in a mesh of triangles, where six meet, each may have less.
+constexpr Real kMaxRatio = 6, kMaxRatioOfAll = 24;
+/// A spring as soft as this stays as it is.
+constexpr Real kSoftRatio = 0.5;
 /// Points as near as this have no direction between them [m^2].
 constexpr Real kNoLength2 = 1e-24;
 /// Between two points that are held [1/kg].
@@ -43,9 +50,16 @@ std::vector<uint32_t> colors(std::span<const ClothSpring> springs, std::size_t p
 
 }  // namespace
 
-void ClothSprings::assign(std::span<const ClothSpring> springs, std::size_t point_count) {
+void ClothSprings::assign(std::span<const ClothSpring> springs, const ClothPoints& points) {
+  std::vector<Real> around(points.size(), 0);  // sum of k / m of the springs at each point
+  for (const ClothSpring& s : springs)
+    for (uint32_t end : {s.a, s.b}) around[end] += s.stiffness / points.mass[end];
+  const auto most = [&](const ClothSpring& s) {
+    const Real own = s.stiffness * (1 / points.mass[s.a] + 1 / points.mass[s.b]);
+    return std::clamp(kMaxRatioOfAll * own / (around[s.a] + around[s.b]), kSoftRatio, kMaxRatio);
+  };
   // The last colour takes what finds no other, at points with very many springs. One thread does it.
-  const std::vector<uint32_t> color = colors(springs, point_count);
+  const std::vector<uint32_t> color = colors(springs, points.size());
   color_start_.assign(kMaxColors + 2, 0);
   for (uint32_t c : color) ++color_start_[c + 1];
   for (std::size_t c = 1; c < color_start_.size(); ++c) color_start_[c] += color_start_[c - 1];
@@ -53,7 +67,7 @@ void ClothSprings::assign(std::span<const ClothSpring> springs, std::size_t poin
   spring_.resize(springs.size());
   for (std::size_t i = 0; i < springs.size(); ++i) {
     const ClothSpring& s = springs[i];
-    spring_[next[color[i]]++] = {s.a, s.b, s.rest_length, s.stiffness, s.damping};
+    spring_[next[color[i]]++] = {s.a, s.b, s.rest_length, s.stiffness, s.damping, most(s)};
   }
   link_.resize(spring_.size());
   stages_.clear();
@@ -84,6 +98,12 @@ void ClothSprings::step(ClothPoints& points, std::span<Vec4> moves, Real h) {
   });
 }
 
+void ClothSprings::count_softened(const ClothPoints& points, Real h, std::span<uint64_t> softened) const {
+  for (const Spring& s : spring_)
+    softened[points.cloth[s.a]] +=
+        h * h * s.stiffness * (points.inverse_mass[s.a] + points.inverse_mass[s.b]) > s.most;
+}
+
 /// The explicit step, and what the sweeps need.
 void ClothSprings::pull(ClothPoints& points, std::span<Vec4> moves, Real h, std::size_t begin,
                         std::size_t end) {
@@ -95,7 +115,7 @@ void ClothSprings::pull(ClothPoints& points, std::span<Vec4> moves, Real h, std:
     const std::size_t count = std::min(kLanes, end - first);
     std::array<Vec4, kLanes> direction;
     Lanes length2 = Lanes::Ones(), rest = Lanes::Ones(), stiff = Lanes::Zero(), damping = Lanes::Zero(),
-          mobility = Lanes::Ones();
+          mobility = Lanes::Ones(), most = Lanes::Ones();
     for (std::size_t k = 0; k < count; ++k) {
       const Spring& s = spring_[first + k];
       const auto lane = static_cast<Eigen::Index>(k);
@@ -104,10 +124,11 @@ void ClothSprings::pull(ClothPoints& points, std::span<Vec4> moves, Real h, std:
       rest[lane] = s.rest;
       stiff[lane] = s.stiffness;
       damping[lane] = s.damping;
+      most[lane] = s.most;
       mobility[lane] = w[s.a] + w[s.b];
     }
     const Lanes length = length2.sqrt(), inverse = length.inverse();
-    stiff = (h * h * stiff).min(kMaxRatio / mobility.max(kNoMobility));
+    stiff = (h * h * stiff).min(most / mobility.max(kNoMobility));
     const Lanes pulls = stiff * (length - rest) * inverse, resists = stiff + h * damping,
                 forget = (1 + resists * mobility).inverse(), along = resists * forget;
     for (std::size_t k = 0; k < count; ++k) {

@@ -18,21 +18,20 @@ namespace offstage::sim {
 class ClothSprings {
  public:
   /// Springs between points of all cloths; their order decides about colours.
-  void assign(std::span<const ClothSpring> springs, std::size_t point_count);
+  void assign(std::span<const ClothSpring> springs, const ClothPoints& points);
 
   /// Changes `moves`, which points would make from their start in a step of length h, by the springs. Those of
   /// what pins hold stay, and what pulls at them is added to their `pull`.
   void step(ClothPoints& points, std::span<Vec4> moves, Real h);
 
-  /// Greatest h^2 k (1/m_a + 1/m_b) of a spring in a step; what is stiffer is taken as having this. From about
-  /// 10 on, one symmetric sweep leaves so much of the explicit step's excess in a woven sheet that it grows
-  /// (measured; an exact solution has no such limit).
-  static constexpr Real kMaxRatio = 6;
+  /// Adds, by cloth, how many springs count as softer in a step of length h.
+  void count_softened(const ClothPoints& points, Real h, std::span<uint64_t> softened) const;
 
  private:
   struct Spring {
     uint32_t a, b;
     Real rest, stiffness, damping;
+    Real most;  // of h^2 k (1/m_a + 1/m_b)
   };
   /// A spring in the step, small because all of them pass through memory in every sweep. Moves d apart along
   /// the direction are resisted by the impulse `along` d, less `forget` of that of the sweeps before.

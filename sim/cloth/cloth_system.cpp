@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "sim/cloth/cloth_integrators.h"
@@ -85,7 +86,7 @@ void ClothSystem::assemble() {
   points_.start = points_.position;
   points_.acceleration.assign(points_.size(), Vec4::Zero());
   points_.pull.assign(points_.size(), Vec4::Zero());
-  springs_.assign(swept, points_.size());
+  springs_.assign(swept, points_);
   limit_.assign(std::move(limits));
   self_contacts_.assign(std::move(colliding), points_);
   corner_contacts_.assign(std::move(touching), points_);
@@ -106,6 +107,7 @@ Aabb ClothSystem::reach(Real h) const {
 /// What pins hold has no inverse mass in this sub-step of the world.
 void ClothSystem::find_held(Real time, std::span<ClothBody> bodies) {
   held_.clear();
+  points_.holder.assign(points_.size(), nullptr);
   for (std::size_t i = 0; i < points_.size(); ++i) points_.inverse_mass[i] = 1 / points_.mass[i];
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     Cloth& cloth = *cloths_[c];
@@ -120,6 +122,7 @@ void ClothSystem::find_held(Real time, std::span<ClothBody> bodies) {
         body = &*at;
       }
       points_.inverse_mass[point] = 0;
+      points_.holder[point] = body;
       held_.push_back({point, body, pin.position});
     }
     if (cloth.stopped)
@@ -241,6 +244,20 @@ void ClothSystem::close_seams() {
   }
 }
 
+/// The mean move of cloths that fly free, in whose frame moves are shortened, or they were held back in the air.
+/// None if pins hold any point, or bodies touch it.
+Vec4 ClothSystem::common_move() const {
+  if (!held_.empty()) return Vec4::Zero();
+  Vec4 sum = Vec4::Zero();
+  Real mass = 0;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (contacts_.touches(i)) return Vec4::Zero();
+    sum += points_.mass[i] * (points_.position[i] - points_.start[i]);
+    mass += points_.mass[i];
+  }
+  return sum / mass;
+}
+
 /// Until nothing is too long and nothing crossed.
 void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   const bool self = ends_span && !self_contacts_.empty();
@@ -250,6 +267,8 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
     self_contacts_.find_doubtful(points_, span_ * dt, kHorizon);
   }
   shares_.assign(points_.size(), 1);
+  const Vec4 drift = common_move();
+  for (Vec4& start : points_.start) start += drift;
   bool again = true;
   for (int round = 0; again && round < kMaxRounds; ++round) {
     again = limit_.shorten(points_, shares_);
@@ -264,30 +283,57 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
     ++cloths_[points_.cloth[i]]->report.limited;
     points_.position[i] = points_.start[i] + share * (points_.position[i] - points_.start[i]);
     shares_[i] = share;
+  }
+  for (Vec4& start : points_.start) start -= drift;
+  for (std::size_t i = 0; self && i < points_.size(); ++i)
     // Its velocity is that of the shortened move, which in a span is not that of the last sub-step.
-    if (self)
+    if (shares_[i] != 1 && points_.inverse_mass[i] > 0)
       kick_[i] = (points_.position[i] - points_.start[i]) / (span_ * dt) -
                  (points_.position[i] - span_start_[i]) / dt;
-  }
   if (self) {
     std::erase_if(cuts_, [&](const VelocityCut& cut) { return shares_[cut.point] != 1; });
     self_contacts_.end_substep(points_, span_ * dt);
     points_.start.swap(span_start_);
   }
-  const std::vector<Real> recoil = recoils();
-  const std::vector<Vec3> taken = contacts_.stop_bodies(points_, shares_, recoil);
-  for (std::size_t c = 0; c < cloths_.size(); ++c)
-    if (recoil[c] > 0 && taken[c] != Vec3::Zero())
-      for (std::size_t i = first_[c], end = i + cloths_[c]->points.size(); i < end; ++i)
-        kick_[i] += padded(recoil[c] * taken[c]);
+  stop_bodies();
 }
 
-/// Of each cloth the inverse of its mass; 0 if pins hold it, which take up what it is pushed.
+/// A cloth that gives no more stops bodies as one with those that it hangs on.
+void ClothSystem::stop_bodies() {
+  const std::vector<Real> recoil = recoils();
+  const std::vector<Vec3> taken = contacts_.stop_bodies(points_, shares_, recoil);
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    if (!(recoil[c] > 0) || taken[c] == Vec3::Zero()) continue;
+    const Vec3 gain = recoil[c] * taken[c];
+    for (std::size_t i = first_[c], end = i + cloths_[c]->points.size(); i < end; ++i)
+      kick_[i] += padded(gain);
+    for (ClothBody* body : holders(c)) body->push(body->mass() * gain, body->centre());
+  }
+}
+
+/// The bodies that hold pins of a cloth, each once.
+std::vector<ClothBody*> ClothSystem::holders(std::size_t cloth) const {
+  std::vector<ClothBody*> found;
+  for (const Held& held : held_)
+    if (points_.cloth[held.point] == cloth && held.body && !std::ranges::count(found, held.body))
+      found.push_back(held.body);
+  return found;
+}
+
+/// Of each cloth the inverse of its mass and of that of the bodies which hold it; 0 if anything fixed does,
+/// which takes up what it is pushed.
 std::vector<Real> ClothSystem::recoils() const {
-  std::vector<Real> recoil;
+  std::vector<Real> mass;
   for (const Cloth* cloth : cloths_)
-    recoil.push_back(
-        cloth->pins.empty() ? 1 / std::accumulate(cloth->masses.begin(), cloth->masses.end(), 0.0) : 0);
+    mass.push_back(std::accumulate(cloth->masses.begin(), cloth->masses.end(), 0.0));
+  for (const Held& held : held_)
+    if (!held.body || !held.body->is_dynamic())
+      mass[points_.cloth[held.point]] = std::numeric_limits<Real>::infinity();
+  std::vector<Real> recoil;
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    for (const ClothBody* body : holders(c)) mass[c] += body->mass();
+    recoil.push_back(1 / mass[c]);
+  }
   return recoil;
 }
 
@@ -337,14 +383,14 @@ void ClothSystem::count_penetration() {
 }
 
 void ClothSystem::measure() {
+  std::vector<uint64_t> softened(cloths_.size(), 0);
+  if (!changed_) springs_.count_softened(points_, dt_, softened);
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     Cloth& cloth = *cloths_[c];
-    const bool relaxed = cloth.def.integrator == ClothIntegrator::relaxed;
+    cloth.report.softened = softened[c];
     Real sum = 0;
     std::size_t count = 0;
     for (const ClothSpring& s : cloth.springs) {
-      const Real mobility = 1 / cloth.masses[s.a] + 1 / cloth.masses[s.b];
-      cloth.report.softened += relaxed && dt_ * dt_ * s.stiffness * mobility > ClothSprings::kMaxRatio;
       if (s.kind != SpringKind::stretch) continue;
       const Real strain = (cloth.points[s.a] - cloth.points[s.b]).norm() / s.rest_length - 1;
       cloth.report.max_strain = std::max(cloth.report.max_strain, strain);

@@ -52,7 +52,10 @@ class ClothSystem {
   void integrate(Real dt);
   void close_seams();
   void touch_bodies(Real dt);
+  Vec4 common_move() const;
   void shorten_moves(Real dt, bool ends_span);
+  void stop_bodies();
+  std::vector<ClothBody*> holders(std::size_t cloth) const;
   std::vector<Real> recoils() const;
   void end_substep(Real dt);
   void pull_bodies(Real dt);

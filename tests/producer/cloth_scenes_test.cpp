@@ -1,0 +1,76 @@
+/// Every scene of the gallery with cloth, ten seconds long: nothing is inside of anything, and no cloth crosses
+/// itself.
+
+#include <filesystem>
+
+#include <gtest/gtest.h>
+
+#include "cloth_crossings.h"
+#include "producer/scene_io.h"
+#include "producer/simulation.h"
+#include "sim/collision/distance.h"
+
+namespace offstage::producer {
+namespace {
+
+std::vector<std::string> scenes_with_cloth() {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(OFFSTAGE_SOURCE_DIR "/demos/scenes"))
+    if (entry.path().extension() == ".json" && !load_scene(entry.path()).scene.cloths.empty())
+      names.push_back(entry.path().stem());
+  std::ranges::sort(names);
+  return names;
+}
+
+/// Points behind the surface of a body; of meshes the simulation's own figure says it.
+std::size_t points_inside(const sim::World& world, const sim::ClothView& cloth) {
+  std::size_t count = 0;
+  world.for_each_body([&](sim::BodyHandle handle) {
+    const sim::BodyDef& def = world.body_def(handle);
+    if (!def.collides || std::holds_alternative<sim::MeshShape>(def.shape)) return;
+    const sim::Pose pose = world.body(handle).pose;
+    for (const sim::Vec3& p : cloth.points)
+      count += sim::signed_distance(sim::Solid{&def.shape, nullptr}, pose.point_to_body(p)).distance < 0;
+  });
+  return count;
+}
+
+/// All cloths that collide with cloth, as one.
+std::size_t crossed_pairs(const Simulation& simulation) {
+  std::vector<sim::Vec3> points;
+  std::vector<sim::Triangle> triangles;
+  for (const Simulation::NamedCloth& cloth : simulation.cloths()) {
+    if (!simulation.world().cloth_def(cloth.handle).self_collision) continue;
+    const sim::ClothView view = simulation.world().cloth(cloth.handle);
+    const auto first = static_cast<uint32_t>(points.size());
+    points.insert(points.end(), view.points.begin(), view.points.end());
+    for (const sim::Triangle& t : view.triangles)
+      triangles.push_back({first + t[0], first + t[1], first + t[2]});
+  }
+  return sim::crossings({.points = points, .velocities = {}, .triangles = triangles, .sources = {}});
+}
+
+class LongClothScene : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(LongClothScene, KeepsClothOutOfBodiesAndOfItself) {
+  LoadedScene loaded = load_scene(OFFSTAGE_SOURCE_DIR "/demos/scenes/" + GetParam() + ".json");
+  const ModelLibrary models(loaded.scene, loaded.folder, DecompositionCache(), loaded.warnings);
+  Simulation simulation(loaded.scene, models);
+  const int frames = static_cast<int>(10 * loaded.scene.output.fps);
+  for (int i = 0; i < frames; ++i) {
+    simulation.advance();
+    std::size_t inside = 0;
+    for (const Simulation::NamedCloth& cloth : simulation.cloths())
+      inside += points_inside(simulation.world(), simulation.world().cloth(cloth.handle));
+    ASSERT_EQ(inside, 0u) << "frame " << i;
+    ASSERT_EQ(crossed_pairs(simulation), 0u) << "frame " << i;
+  }
+  EXPECT_EQ(simulation.totals().cloth_crossings, 0u);
+  EXPECT_EQ(simulation.totals().cloth_penetration, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Long, LongClothScene, ::testing::ValuesIn(scenes_with_cloth()),
+                         [](const auto& scene) { return scene.param; });
+
+}  // namespace
+}  // namespace offstage::producer

@@ -1,0 +1,216 @@
+/// What air, pressure, seams and weight do to cloth, against closed forms.
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "effects/cloth.h"
+#include "meshes.h"
+#include "sim/cloth/cloth_state.h"
+#include "sim/world.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr Real kGravity = 9.81;
+
+const effects::Fabric& cotton() {
+  return effects::find_fabric("cotton")->fabric;
+}
+
+Vec3 momentum(const ClothDef& def, const ClothView& view) {
+  Vec3 sum = Vec3::Zero();
+  for (std::size_t i = 0; i < view.points.size(); ++i) sum += def.masses[i] * view.velocities[i];
+  return sum;
+}
+
+TEST(ClothAir, AFlatSheetFallsAtItsTerminalSpeed) {
+  // Square to the air: m g = rho A C_D v^2 / 2, and on the way v = v_t tanh(g t / v_t).
+  World world;
+  const ClothDef def = effects::grid_cloth({1, 1, 10, 10}, {}, cotton());
+  const ClothHandle cloth = world.add_cloth(def);
+  const Real terminal = std::sqrt(2 * cotton().areal_density * kGravity / (1.2 * cotton().drag));
+  Real mass = 0;
+  for (Real m : def.masses) mass += m;
+  for (int frame = 1; frame <= 48; ++frame) {
+    world.step(1.0 / 48);
+    const Real speed = -momentum(def, world.cloth(cloth)).y() / mass;
+    // Of first order in the world's step: 1/240 s of g / v_t is 0.026.
+    EXPECT_NEAR(speed, terminal * std::tanh(kGravity * frame / 48 / terminal), 0.01 * terminal) << frame;
+  }
+}
+
+TEST(ClothAir, LiftsAndDragsAPlateAslantAsItsCoefficientsSay) {
+  // F = rho A / 2 U^2 ((C_D - C_L) u + C_L (u.n) n), u and n unit: along the wind and across it.
+  constexpr Real kWind = 10, kStep = 1e-4, kSide = 0.8;
+  for (Real angle : {0.2, 0.7, 1.3}) {
+    World world({.gravity = Vec3::Zero(), .wind = {kWind, 0, 0}, .max_step = kStep});
+    const Pose pose{Vec3::Zero(), Quat(Eigen::AngleAxis<Real>(angle, Vec3::UnitZ()))};
+    ClothDef def = effects::grid_cloth({kSide, kSide, 6, 6}, pose, cotton());
+    def.air = {.drag = 1.1, .lift = 0.8, .density = 1.25};
+    const ClothHandle cloth = world.add_cloth(def);
+    world.step(kStep);
+    const Vec3 force = momentum(def, world.cloth(cloth)) / kStep;
+    const Real sine = std::sin(angle), cosine = std::cos(angle);
+    const Real dynamic = 1.25 * kSide * kSide / 2 * kWind * kWind;
+    // n = (-sin, cos, 0), u.n = -sin.
+    EXPECT_NEAR(force.x(), dynamic * (0.3 + 0.8 * sine * sine), 0.01 * dynamic) << angle;
+    EXPECT_NEAR(force.y(), -dynamic * 0.8 * sine * cosine, 0.01 * dynamic) << angle;
+    EXPECT_NEAR(force.z(), 0, 1e-9);
+  }
+}
+
+TEST(ClothAir, AnOpenBoxTakesTheStagnationPressureOfItsMouth) {
+  // Four walls and a lid: walls cancel each other, and the lid is as large as the mouth.
+  constexpr Real kWind = 6, kStep = 1e-4;
+  World world({.gravity = Vec3::Zero(), .wind = {0, kWind, 0}, .max_step = kStep});
+  TriangleMesh box = box_mesh({0.5, 0.5, 0.5});
+  std::erase_if(box.triangles, [&](const Triangle& t) {
+    return box.vertices[t[0]].y() + box.vertices[t[1]].y() + box.vertices[t[2]].y() < -0.7;
+  });
+  ASSERT_EQ(box.triangles.size(), 10u);
+  ClothDef def = effects::mesh_cloth(box, {}, cotton());
+  def.air = {.drag = 0, .lift = 0, .density = 1.2};
+  def.ram_pressure = 0.9;
+  def.self_collision = false;
+  const ClothHandle cloth = world.add_cloth(def);
+  world.step(kStep);
+  const Vec3 force = momentum(def, world.cloth(cloth)) / kStep;
+  EXPECT_NEAR(force.y(), 0.9 * 1.2 / 2 * kWind * kWind * 0.25, 0.01 * force.y());
+  EXPECT_NEAR(force.x(), 0, 1e-9);
+
+  // From behind it catches nothing.
+  World lee({.gravity = Vec3::Zero(), .wind = {0, -kWind, 0}, .max_step = kStep});
+  const ClothHandle other = lee.add_cloth(def);
+  lee.step(kStep);
+  EXPECT_EQ(momentum(def, lee.cloth(other)), Vec3::Zero());
+}
+
+TEST(ClothPressure, HoldsASkinByBoylesLaw) {
+  // At rest the virial of the springs is that of the pressure: sum k (l - L) l = 3 p V; and p V = p0 V0.
+  effects::Fabric rubber = effects::find_fabric("rubber")->fabric;
+  rubber.damping = 0.3;
+  World world({.gravity = Vec3::Zero()});
+  ClothDef def = effects::mesh_cloth(sphere_mesh(0.3, 20, 12), {}, rubber);
+  def.pressure = 300;
+  def.self_collision = false;
+  const ClothHandle cloth = world.add_cloth(def);
+  for (int i = 0; i < 96; ++i) world.step(1.0 / 24);
+  const ClothView view = world.cloth(cloth);
+  Real virial = 0;
+  for (const ClothSpring& s : def.springs) {
+    const Real length = (view.points[s.a] - view.points[s.b]).norm();
+    virial += s.stiffness * (length - s.rest_length) * length;
+  }
+  const Real rest = enclosed_volume(def.vertices, def.triangles);
+  EXPECT_NEAR(virial, 3 * def.pressure * rest, 0.01 * virial);
+  EXPECT_GT(enclosed_volume(view.points, view.triangles), 1.05 * rest);
+}
+
+TEST(ClothSeams, HoldAWeightClosed) {
+  // Two sheets, one above the other, sewn together; a body hangs on the lower one.
+  constexpr uint32_t kCells = 10;
+  ClothDef def = effects::grid_cloth({0.5, 0.4, kCells, 8}, {}, cotton());
+  const auto per_sheet = static_cast<uint32_t>(def.vertices.size());
+  const auto add_sheet = [&](ClothDef lower) {
+    for (ClothSpring s : lower.springs) {
+      s.a += per_sheet;
+      s.b += per_sheet;
+      def.springs.push_back(s);
+    }
+    for (const Triangle& t : lower.triangles)
+      def.triangles.push_back({t[0] + per_sheet, t[1] + per_sheet, t[2] + per_sheet});
+    def.vertices.insert(def.vertices.end(), lower.vertices.begin(), lower.vertices.end());
+    def.masses.insert(def.masses.end(), lower.masses.begin(), lower.masses.end());
+  };
+  add_sheet(effects::grid_cloth({0.5, 0.4, kCells, 8}, {Vec3(0, 0, 0.45)}, cotton()));
+  for (Vec3& v : def.vertices) v = Vec3(v.x(), 2 - v.z(), 0);  // hangs
+  def.seam_time = 0.5;
+  def.max_stretch = 0;
+  World world;
+  const BodyHandle weight =
+      world.add_body({.shape = Box{{0.5, 0.05, 0.05}}, .pose = {{0, 1.32, 0}}, .mass = 1, .collides = false});
+  const uint32_t last = per_sheet + 8 * (kCells + 1);
+  for (uint32_t c = 0; c <= kCells; ++c) {
+    def.pins.push_back({.vertex = c, .position = def.vertices[c]});
+    def.pins.push_back({.vertex = last + c, .body = weight, .position = def.vertices[last + c] - Vec3(0, 1.32, 0)});
+    def.seams.push_back({8 * (kCells + 1) + c, per_sheet + c});
+  }
+  const ClothHandle cloth = world.add_cloth(def);
+  for (int i = 0; i < 96; ++i) world.step(1.0 / 24);
+  const ClothView view = world.cloth(cloth);
+  for (const ClothSeam& s : def.seams)
+    EXPECT_LT((view.points[s.a] - view.points[s.b]).norm(), 1.05 * def.thickness);
+  // And it carries: without the seam the weight had fallen by metres.
+  EXPECT_GT(world.body(weight).centre.y(), 1.2);
+}
+
+TEST(ClothHanging, AStripHangsInACatenary) {
+  // y = a cosh(x / a), with 2 a sinh(w / 2a) = l for ends w apart at one height.
+  constexpr Real kSpan = 1;
+  constexpr uint32_t kCells = 60;
+  effects::Fabric tape = cotton();
+  tape.stretch = 20000;
+  tape.bend = 0;
+  tape.max_stretch = 0;
+  ClothDef def = effects::grid_cloth({1.5, 0.05, kCells, 2}, {}, tape);
+  def.air.density = 0.4;  // damps its swinging
+  def.self_collision = false;
+  def.integrator = ClothIntegrator::implicit;
+  // Starts as two straight halves.
+  def.rest_vertices = def.vertices;
+  const Real slope = std::sqrt(1.5 * 1.5 - kSpan * kSpan) / kSpan;
+  for (Vec3& v : def.vertices) {
+    const Real x = v.x() * kSpan / 1.5;
+    v = Vec3(x, (std::abs(x) - kSpan / 2) * slope, v.z());
+  }
+  for (uint32_t r = 0; r <= 2; ++r)
+    for (uint32_t c : {0u, kCells}) {
+      const uint32_t k = r * (kCells + 1) + c;
+      def.pins.push_back({.vertex = k, .position = def.vertices[k]});
+    }
+  World world;
+  const ClothHandle cloth = world.add_cloth(def);
+  for (int i = 0; i < 240; ++i) world.step(1.0 / 24);
+  const ClothView view = world.cloth(cloth);
+  const uint32_t middle = kCells + 1;  // the middle row
+  Real length = 0;
+  for (uint32_t c = 0; c < kCells; ++c)
+    length += (view.points[middle + c + 1] - view.points[middle + c]).norm();
+  EXPECT_NEAR(length, 1.5, 1.5e-3);
+  Real low = 0.01, high = 10;  // a: its length falls with a
+  for (int i = 0; i < 100; ++i) {
+    const Real a = (low + high) / 2;
+    (2 * a * std::sinh(kSpan / (2 * a)) > length ? low : high) = a;
+  }
+  const Real sag = low * (std::cosh(kSpan / (2 * low)) - 1);
+  for (uint32_t c = 0; c <= kCells; ++c) {
+    const Vec3& p = view.points[middle + c];
+    EXPECT_NEAR(p.y(), low * std::cosh(p.x() / low) - low - sag, 0.005 * sag) << c;
+  }
+}
+
+TEST(ClothPins, AClothCarriedByABodyHandsBlowsOnToIt) {
+  // A frame in free space carries a taut cloth; a ball flies into it. Nothing else can take up momentum.
+  World world({.gravity = Vec3::Zero()});
+  const BodyHandle frame = world.add_body({.shape = Box{{1, 0.02, 1}}, .mass = 2, .collides = false});
+  constexpr uint32_t kCells = 16;
+  ClothDef def = effects::grid_cloth({0.9, 0.9, kCells, kCells}, {}, cotton());
+  def.air.density = 0;
+  def.max_stretch = 1.02;
+  for (uint32_t i = 0; i <= kCells; ++i)
+    for (uint32_t k : {i, kCells * (kCells + 1) + i, (kCells + 1) * i, (kCells + 1) * i + kCells})
+      def.pins.push_back({.vertex = k, .body = frame, .position = def.vertices[k]});
+  const ClothHandle cloth = world.add_cloth(def);
+  constexpr Real kMass = 0.5, kSpeed = 3;
+  const BodyHandle ball = world.add_body(
+      {.shape = Sphere{0.1}, .pose = {{0, 0.3, 0}}, .velocity = {0, -kSpeed, 0}, .mass = kMass});
+  for (int i = 0; i < 24; ++i) world.step(1.0 / 24);
+  EXPECT_LT(world.body(frame).velocity.y(), -0.3);
+  const Vec3 sum = kMass * world.body(ball).velocity + 2 * world.body(frame).velocity +
+                   momentum(def, world.cloth(cloth));
+  EXPECT_LT((sum - Vec3(0, -kSpeed * kMass, 0)).norm(), 0.02 * kSpeed * kMass);
+}
+
+}  // namespace
+}  // namespace offstage::sim
