@@ -1,6 +1,6 @@
 #pragma once
 /// Counts pairs of triangles of a cloth that cut each other and share no corner: the independent check of its
-/// self-collision.
+/// self-collision. The sides of a tear, whose points lay on each other, count as sharing it.
 
 #include <vector>
 
@@ -26,7 +26,7 @@ inline std::size_t crossings(const ClothView& cloth) {
       const Triangle &a = cloth.triangles[i], &b = cloth.triangles[j];
       for (uint32_t p : a)
         for (uint32_t q : b)
-          if (p == q) return;
+          if (cloth.sources[p] == cloth.sources[q]) return;
       count += j > i && boxes[i].intersects(boxes[j]) && triangles_intersect(corners(a), corners(b));
     });
   return count;

@@ -75,12 +75,9 @@ std::string number_problem(const ClothDef& def) {
       {"thickness", def.thickness}, {"substep", def.substep}, {"seam_time", def.seam_time}};
   for (const auto& [field, value] : positive)
     if (!is_positive(value)) return std::string(field) + " must be a finite number > 0";
-  const std::pair<const char*, Real> not_negative[] = {{"friction", def.friction},
-                                                       {"self_friction", def.self_friction},
-                                                       {"air.drag", def.air.drag},
-                                                       {"air.lift", def.air.lift},
-                                                       {"air.density", def.air.density},
-                                                       {"ram_pressure", def.ram_pressure}};
+  const std::pair<const char*, Real> not_negative[] = {
+      {"friction", def.friction}, {"self_friction", def.self_friction}, {"air.drag", def.air.drag},
+      {"air.lift", def.air.lift}, {"air.density", def.air.density},     {"ram_pressure", def.ram_pressure}};
   for (const auto& [field, value] : not_negative)
     if (!is_not_negative(value)) return std::string(field) + " must be a finite number >= 0";
   if (def.air.lift > def.air.drag) return "air.lift must not be above air.drag";

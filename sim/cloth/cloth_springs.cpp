@@ -12,10 +12,10 @@ namespace {
 /// Springs at a time, and from how many on threads are worth their waking.
 constexpr std::size_t kBlock = 2048, kWorthThreads = 60000;
 constexpr uint32_t kMaxColors = 64;
-/// What is too stiff for the step counts as softer. From h^2 k (1/m_a + 1/m_b) = 10 on in a woven sheet, whose
-/// points have four stiff springs, one symmetric sweep leaves so much of the explicit step's excess that it
-/// grows (measured; an exact solution has no such limit). What counts is what all springs of both points make
-/// of it, four times as much there: in a mesh of triangles, where six meet, each may have less.
+/// What is too stiff for the step counts as softer. From h^2 k (1/m_a + 1/m_b) = 10 on in a woven sheet,
+/// whose points have four stiff springs, one symmetric sweep leaves so much of the explicit step's excess
+/// that it grows (measured; an exact solution has no such limit). What counts is what all springs of both
+/// points make of it, four times as much there: in a mesh of triangles, where six meet, each may have less.
 constexpr Real kMaxRatio = 6, kMaxRatioOfAll = 24;
 /// A spring as soft as this stays as it is.
 constexpr Real kSoftRatio = 0.5;
@@ -146,7 +146,8 @@ void ClothSprings::pull(ClothPoints& points, std::span<Vec4> moves, Real h, std:
 void ClothSprings::relax(ClothPoints& points, std::span<Vec4> moves, std::size_t spring) {
   Link& link = link_[spring];
   const Vec4 u = link.axis.cast<Real>().cwiseProduct(Vec4(1, 1, 1, 0));
-  const Real step = Real{link.axis[3]} * u.dot(moves[link.a] - moves[link.b]) - Real{link.forget} * link.impulse;
+  const Real step =
+      Real{link.axis[3]} * u.dot(moves[link.a] - moves[link.b]) - Real{link.forget} * link.impulse;
   link.impulse += static_cast<float>(step);
   give(points, moves, link.a, link.b, step * u);
 }

@@ -244,8 +244,8 @@ void ClothSystem::close_seams() {
   }
 }
 
-/// The mean move of cloths that fly free, in whose frame moves are shortened, or they were held back in the air.
-/// None if pins hold any point, or bodies touch it.
+/// The mean move of cloths that fly free, in whose frame moves are shortened, or they were held back in the
+/// air. None if pins hold any point, or bodies touch it.
 Vec4 ClothSystem::common_move() const {
   if (!held_.empty()) return Vec4::Zero();
   Vec4 sum = Vec4::Zero();

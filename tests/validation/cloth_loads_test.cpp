@@ -133,7 +133,8 @@ TEST(ClothSeams, HoldAWeightClosed) {
   const uint32_t last = per_sheet + 8 * (kCells + 1);
   for (uint32_t c = 0; c <= kCells; ++c) {
     def.pins.push_back({.vertex = c, .position = def.vertices[c]});
-    def.pins.push_back({.vertex = last + c, .body = weight, .position = def.vertices[last + c] - Vec3(0, 1.32, 0)});
+    def.pins.push_back(
+        {.vertex = last + c, .body = weight, .position = def.vertices[last + c] - Vec3(0, 1.32, 0)});
     def.seams.push_back({8 * (kCells + 1) + c, per_sheet + c});
   }
   const ClothHandle cloth = world.add_cloth(def);
@@ -207,8 +208,8 @@ TEST(ClothPins, AClothCarriedByABodyHandsBlowsOnToIt) {
       {.shape = Sphere{0.1}, .pose = {{0, 0.3, 0}}, .velocity = {0, -kSpeed, 0}, .mass = kMass});
   for (int i = 0; i < 24; ++i) world.step(1.0 / 24);
   EXPECT_LT(world.body(frame).velocity.y(), -0.3);
-  const Vec3 sum = kMass * world.body(ball).velocity + 2 * world.body(frame).velocity +
-                   momentum(def, world.cloth(cloth));
+  const Vec3 sum =
+      kMass * world.body(ball).velocity + 2 * world.body(frame).velocity + momentum(def, world.cloth(cloth));
   EXPECT_LT((sum - Vec3(0, -kSpeed * kMass, 0)).norm(), 0.02 * kSpeed * kMass);
 }
 
