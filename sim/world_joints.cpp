@@ -180,7 +180,8 @@ JointState World::joint(JointHandle handle) const {
     state.coordinate = counts_turns(joint) ? joint.coordinate : row.error;
     state.speed = row.on_a.dot(va) + row.on_b.dot(vb);
   }
-  const JointRows rows = joint_rows(joint.def, place, joint.length);
+  JointRows rows;
+  set_joint_rows(joint.def, place, joint.length, rows);
   state.error = rows.error.head<3>().norm();
   return state;
 }

@@ -295,8 +295,8 @@ int dispatch(int argc, char** argv) {
 
   std::string preset;
   auto* presets_app =
-      app.add_subcommand("presets", "List the effects and fabrics that scenes can name, or print one");
-  presets_app->add_option("name", preset, "Preset or fabric to print");
+      app.add_subcommand("presets", "List the effects, fabrics and articulations that scenes can name, or print one");
+  presets_app->add_option("name", preset, "Preset, fabric or articulation to print");
 
   SceneOptions info;
   bool info_json = false;

@@ -9,8 +9,36 @@
 #include "producer/command_line.h"
 #include "producer/commands.h"
 #include "producer/presets.h"
+#include "producer/scene_table.h"
+#include "producer/table_joint.h"
 
 namespace offstage::producer {
+namespace {
+
+struct ArticulationPreset {
+  std::string name, help;
+  ArticulationTemplate made;  ///< with every default
+};
+
+std::vector<ArticulationPreset> articulation_presets() {
+  std::vector<ArticulationPreset> presets;
+  const auto add = [&]<class... T>(std::variant<T...>*) {
+    (presets.push_back({Tags<ArticulationTemplate>::kTags[presets.size()], Table<T>::kHelp, T{}}), ...);
+  };
+  add(static_cast<ArticulationTemplate*>(nullptr));
+  return presets;
+}
+
+/// As a scene would have it.
+std::string text_of(const ArticulationPreset& preset) {
+  Scene scene;
+  scene.articulations.push_back(preset.made);
+  const Node written = write_scene(scene);
+  const Node& all = *written.find("articulations");
+  return to_text(all.as<List>()->front(), 2);
+}
+
+}  // namespace
 
 int presets_command(const std::string& name) {
   if (const effects::FabricPreset* preset = effects::find_fabric(name)) {
@@ -30,6 +58,11 @@ int presets_command(const std::string& name) {
     fmt::print("{}\n", figures.dump(2));
     return kOk;
   }
+  for (const ArticulationPreset& preset : articulation_presets()) {
+    if (preset.name != name) continue;
+    fmt::print("{}\n", text_of(preset));
+    return kOk;
+  }
   if (!name.empty()) {
     fmt::print("{}", read_text(preset_file(name)));
     return kOk;
@@ -42,6 +75,9 @@ int presets_command(const std::string& name) {
   fmt::print("\nFabrics, for the key \"fabric\" of cloths:\n");
   for (const effects::FabricPreset& fabric : effects::fabric_presets())
     fmt::print("{:{}}  {}\n", fabric.name, width, fabric.help);
+  fmt::print("\nReady-made bodies with their joints, for the key \"articulations\":\n");
+  for (const ArticulationPreset& preset : articulation_presets())
+    fmt::print("{:{}}  {}\n", preset.name, width, preset.help.substr(0, preset.help.find_first_of(".:")));
   return kOk;
 }
 

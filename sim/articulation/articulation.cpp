@@ -9,7 +9,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Positions are put together in so many steps of Newton's method at most, until they are this near [m].
+/// Positions are put together in so many steps of Newton's method at most, until they are this near [m], and
+/// velocities until they fit together as well [m/s].
 constexpr int kMostSteps = 8;
 constexpr Real kTogether = 1e-12;
 /// What has come apart farther than this is brought back by no more in a step: its constraints say little about
@@ -156,7 +157,7 @@ JointPlace Articulation::place_of(std::size_t j, Real time, std::span<const Link
 void Articulation::read_rows(Real time, std::span<const LinkMotion> motion) {
   LinkMotion still_a, still_b;
   for (std::size_t j = 0; j < joints_.size(); ++j)
-    rows_[j] = joint_rows(joints_[j]->def, place_of(j, time, motion, still_a, still_b), joints_[j]->length);
+    set_joint_rows(joints_[j]->def, place_of(j, time, motion, still_a, still_b), joints_[j]->length, rows_[j]);
 }
 
 void Articulation::add_forces(Real t, std::span<const LinkMotion> motion, std::span<const LinkMobility> mobility,
@@ -313,7 +314,12 @@ void Articulation::settle(Real time, JointTally& tally) {
   read_bodies();
   for (int k = 0; k < kVelocitySteps; ++k) {
     residual(time, velocities_, change_);
-    for (Vec6& c : change_) c = -c;
+    Real fastest = 0;
+    for (Vec6& c : change_) {
+      fastest = std::max(fastest, c.cwiseAbs().maxCoeff());
+      c = -c;
+    }
+    if (fastest <= kTogether) break;
     system_.correct(change_, impulses_, velocities_);
     add_blows(impulses_);
   }

@@ -23,6 +23,24 @@ JointRow slide_row(const JointPlace& p, const Vec3& t) {
           t.dot(wa.cross(turning) - wb.cross(wb.cross(s)) - 2 * wb.cross(seen))};
 }
 
+/// Both anchors at the same place, along the world's axes: d2C/dt2 has besides the accelerations
+/// w_a x (w_a x r_a) - w_b x (w_b x r_b).
+void add_meeting_rows(const JointPlace& p, JointRows& rows) {
+  const auto cross_matrix = [](const Vec3& r) {
+    Mat3 m;
+    m << 0, -r.z(), r.y(), r.z(), 0, -r.x(), -r.y(), r.x(), 0;
+    return m;
+  };
+  const Vec3 &wa = p.a.angular_velocity, &wb = p.b.angular_velocity;
+  rows.on_a.topLeftCorner<3, 3>().setIdentity();
+  rows.on_a.bottomLeftCorner<3, 3>() = cross_matrix(p.arm_a);
+  rows.on_b.topLeftCorner<3, 3>() = -Mat3::Identity();
+  rows.on_b.bottomLeftCorner<3, 3>() = -cross_matrix(p.arm_b);
+  rows.error.head<3>() = p.apart;
+  rows.bias.head<3>() = wa.cross(wa.cross(p.arm_a)) - wb.cross(wb.cross(p.arm_b));
+  rows.count = 3;
+}
+
 /// u . v = 0, where u goes with a and v with b.
 JointRow perpendicular_row(const JointPlace& p, const Vec3& u, const Vec3& v) {
   const Vec3 n = u.cross(v), &wa = p.a.angular_velocity, &wb = p.b.angular_velocity;
@@ -79,27 +97,27 @@ uint32_t constraint_count(const JointDef& def) {
   return 0;
 }
 
-JointRows joint_rows(const JointDef& def, const JointPlace& p, Real length) {
+void set_joint_rows(const JointDef& def, const JointPlace& p, Real length, JointRows& rows) {
   const JointType type = def.type;
-  JointRows rows;
-  const auto slide = [&](int axis) { rows.add(slide_row(p, p.axes_b.col(axis))); };
+  rows = {};
   const auto perpendicular = [&](int of_a, int of_b) {
     rows.add(perpendicular_row(p, p.axes_a.col(of_a), p.axes_b.col(of_b)));
   };
   if (type == JointType::distance) {
     if (!def.has_free_coordinate()) rows.add(length_row(p, length));
-    return rows;
+    return;
   }
-  slide(0);
-  slide(1);
-  if (type != JointType::prismatic) slide(2);
+  if (type == JointType::prismatic) {
+    for (const int across : {0, 1}) rows.add(slide_row(p, p.axes_b.col(across)));
+  } else {
+    add_meeting_rows(p, rows);
+  }
   if (type == JointType::universal) perpendicular(2, 0);
   if (type == JointType::revolute || type == JointType::fixed || type == JointType::prismatic) {
     perpendicular(2, 0);
     perpendicular(2, 1);
   }
   if (type == JointType::fixed || type == JointType::prismatic) perpendicular(0, 1);
-  return rows;
 }
 
 JointRow turning_row(const Vec3& axis) {

@@ -64,7 +64,7 @@ struct JointRows {
 /// Of a distance joint only if it is a rod, which has a length to keep.
 uint32_t constraint_count(const JointDef& def);
 /// `length` of a rod.
-JointRows joint_rows(const JointDef& def, const JointPlace& place, Real length);
+void set_joint_rows(const JointDef& def, const JointPlace& place, Real length, JointRows& rows);
 
 /// The free coordinate of a revolute, prismatic or distance joint, the first of a universal one, the twist of a
 /// spherical one, with its row; `error` is the coordinate, of angles within half a turn.

@@ -74,7 +74,7 @@ void JointSystem::find_couplings() {
 }
 
 bool JointSystem::factorize(std::span<const JointRows> rows, std::span<const LinkMobility> links) {
-  rows_.assign(rows.begin(), rows.end());
+  rows_ = rows;
   links_.assign(links.begin(), links.end());
   response_a_.resize(rows.size());
   response_b_.resize(rows.size());

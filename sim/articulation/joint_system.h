@@ -26,12 +26,13 @@ class JointSystem {
   /// The joints must connect all links.
   JointSystem(uint32_t links, std::vector<Topology> joints);
 
-  /// Factors the system. False, and nothing can be solved, if the constraints are degenerate beyond help.
+  /// Factors the system of rows that the caller keeps. False, and nothing can be solved, if the constraints are
+  /// degenerate beyond help.
   bool factorize(std::span<const JointRows> rows, std::span<const LinkMobility> links);
 
   /// Takes constraints that are near those of the last factorize(), whose factor goes on to serve: correct() is
   /// then to be repeated.
-  void update(std::span<const JointRows> rows) { rows_.assign(rows.begin(), rows.end()); }
+  void update(std::span<const JointRows> rows) { rows_ = rows; }
 
   /// J v of the joints; driven links count as still.
   void relative(std::span<const Vec6> velocities, std::span<Vec6> result) const;
@@ -79,7 +80,7 @@ class JointSystem {
   std::vector<Coupling> couplings_;
   bool has_loops_ = false, is_small_ = false, is_factored_ = false, needs_refinement_ = false;
 
-  std::vector<JointRows> rows_;
+  std::span<const JointRows> rows_;
   std::vector<LinkMobility> links_;
   std::vector<Mat6> response_a_, response_b_;  // M^-1 J^T of each joint
   Matrix<3> small_;                            // where no joint has more than three constraints

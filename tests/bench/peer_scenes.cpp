@@ -35,6 +35,7 @@ TriangleMesh hull_mesh() {
 
 WorldDef world_def(const peer::Scene& scene, double dt, const std::string& variant) {
   WorldDef def{.gravity = vec(scene.gravity), .max_step = dt, .sleep = false};
+  def.bounds = {Vec3::Constant(-1e5), Vec3::Constant(1e5)};  // a chain of 10 000 links is 5 km long
   if (variant.find("exact") != std::string::npos) def.solver = SolverKind::exact;
   if (variant.find("fast") != std::string::npos) def.solver = SolverKind::fast;
   if (variant.find("+sleep") != std::string::npos) def.sleep = true;

@@ -22,6 +22,19 @@ TEST(Commands, ValidSceneIsCalledValid) {
   EXPECT_NE(run.out.find("valid, 12 frames"), std::string::npos) << run.out;
 }
 
+TEST(Commands, PresetsNameEffectsFabricsAndArticulations) {
+  const TemporaryFolder folder;
+  const Outcome all = offstage("presets", folder.path());
+  for (const std::string name : {"rain ", "denim ", "ragdoll ", "crane "})
+    EXPECT_NE(all.out.find("\n" + name), std::string::npos) << name;
+  // What it prints of one is what a scene may say.
+  const Outcome crane = offstage("presets crane", folder.path());
+  ASSERT_EQ(crane.code, 0) << crane.err;
+  EXPECT_EQ(json::parse(crane.out).at("reach"), 6);
+  write_file(folder / "s.json", R"({"version": 1, "articulations": [)" + crane.out + "]}");
+  EXPECT_EQ(offstage("validate s.json", folder.path()).code, 0);
+}
+
 TEST(Commands, EveryProblemOfASceneIsReportedWithItsPlaceAndExit3) {
   const TemporaryFolder folder;
   write_file(folder / "bad.json",

@@ -62,7 +62,9 @@ TEST(JointRows, AreTheDerivativesOfTheirConstraintsAnywhere) {
     for (const JointType type : kTypes) {
       const auto rows = [&](Real t) {
         const LinkMotion at_a = a.at(t), at_b = b.at(t);
-        return joint_rows({.type = type}, JointPlace(at_a, on_a, at_b, on_b), 0.5);
+        JointRows at_time;
+        set_joint_rows({.type = type}, JointPlace(at_a, on_a, at_b, on_b), 0.5, at_time);
+        return at_time;
       };
       constexpr Real kStep = 1e-4;
       const JointRows now = rows(0), before = rows(-kStep), after = rows(kStep);
