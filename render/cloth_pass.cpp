@@ -41,6 +41,11 @@ void ClothPass::draw_shadow(const Cloth& cloth, const Matrix4f& shadow_clip_from
   draw_triangles(cloth);
 }
 
+void ClothPass::draw_depth(const Cloth& cloth) {
+  depth_.use();
+  draw_triangles(cloth);
+}
+
 gl::LazyProgram& ClothPass::program(const GpuMaterial& material, const Features& features) {
   const bool textured = material.textures[0] != 0;
   const auto key = std::make_tuple(material.weave, material.pattern, textured, features);

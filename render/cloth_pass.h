@@ -32,10 +32,13 @@ struct Cloth {
 
 class ClothPass {
  public:
-  ClothPass() : shadow_({"frame.glsl", "cloth.vert"}, {}, {"SHADOW 1"}) {}
+  ClothPass()
+      : shadow_({"frame.glsl", "cloth.vert"}, {}, {"SHADOW 1"}), depth_({"frame.glsl", "cloth.vert"}, {}, {}) {}
   /// Uploads a cloth as it is now.
   void prepare(Cloth& cloth);
   void draw_shadow(const Cloth& cloth, const Matrix4f& shadow_clip_from_world);
+  /// Its depth in the picture, of the very surface that `draw` shades.
+  void draw_depth(const Cloth& cloth);
   void draw(const Cloth& cloth, const Features& features);
 
  private:
@@ -43,7 +46,7 @@ class ClothPass {
   gl::LazyProgram& program(const GpuMaterial& material, const Features& features);
 
   std::map<std::tuple<Weave, Pattern, bool, Features>, gl::LazyProgram> programs_;  ///< textured
-  gl::LazyProgram shadow_;
+  gl::LazyProgram shadow_, depth_;
 };
 
 }  // namespace offstage::render

@@ -282,7 +282,7 @@ void Stage::Impl::draw_depth(std::span<const Cloth* const> sheets, std::span<Poi
   glDepthFunc(GL_GREATER);
   glDisable(GL_BLEND);
   const float nothing[4] = {0, 0, 0, 0};
-  if (!environment.visible) glClearNamedFramebufferfv(picture.framebuffer, GL_COLOR, 0, nothing);
+  glClearNamedFramebufferfv(picture.framebuffer, GL_COLOR, 0, nothing);
   glClearNamedFramebufferfv(picture.framebuffer, GL_DEPTH, 0, nothing);
 
   // A hair behind, so that no rounding hides a surface from its own shading.
@@ -290,7 +290,7 @@ void Stage::Impl::draw_depth(std::span<const Cloth* const> sheets, std::span<Poi
   glPolygonOffset(0, -4);
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
   glDisable(GL_CULL_FACE);
-  for (const Cloth* cloth : sheets) cloth_pass.draw_shadow(*cloth, view.clip_from_world);
+  for (const Cloth* cloth : sheets) cloth_pass.draw_depth(*cloth);
   mesh_pass.draw_depth(view.clip_from_world);
   glDisable(GL_CULL_FACE);
   for (const PointSet* set : sets) {

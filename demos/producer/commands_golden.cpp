@@ -76,7 +76,7 @@ int compare_with_golden(const CompareOptions& options) {
   const int threads = threads_or_all(options.threads);
   const auto control = simulation_threads(options.threads);
   render::pin_environment(threads);
-  const Golden actual = draw_golden(scene);
+  const Golden actual = draw_golden(scene, threads);
   const Verdict verdict = judge(expected, actual);
   fmt::print("{}", verdict.text);
   if (verdict.pass) return kOk;
@@ -106,7 +106,7 @@ int bless_command(const BlessOptions& options) {
     const LoadedScene scene =
         load({.file = file, .set = {}, .quality = {}, .size = {}, .fps = {}, .duration = {}, .seed = {}},
              true, golden_overrides());
-    Golden golden = draw_golden(scene);
+    Golden golden = draw_golden(scene, threads);
     golden.reason = options.reason;
     write_golden(options.golden, golden);
     fmt::print("{}: {} frames\n", golden.scene, golden.frames.size());

@@ -73,12 +73,12 @@ std::vector<std::string> golden_overrides() {
   return {"/render/size=[256,144]", "/render/quality=preview", "/render/shadow_map=1024"};
 }
 
-Golden draw_golden(const LoadedScene& scene) {
+Golden draw_golden(const LoadedScene& scene, int threads) {
   Golden golden;
   golden.scene = scene.scene.name;
   const int count = scene.scene.frame_count();
   RenderJob job{
-      .frames = {std::max(1, count / 5), std::max(1, count * 3 / 5)}, .threads = 1, .cache = {}};
+      .frames = {std::max(1, count / 5), std::max(1, count * 3 / 5)}, .threads = threads, .cache = {}};
   if (job.frames[0] == job.frames[1]) job.frames.pop_back();
   std::vector<Problem> warnings;
   const ModelLibrary models(scene.scene, scene.folder, DecompositionCache(),

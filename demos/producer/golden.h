@@ -26,9 +26,9 @@ struct Golden {
   std::vector<GoldenFrame> frames;
 };
 
-/// Draws the golden frames of a scene that was loaded with golden_overrides(): one early, then one late, both on this
-/// thread. Throws Interrupted.
-Golden draw_golden(const LoadedScene& scene);
+/// Draws the golden frames of a scene that was loaded with golden_overrides(): one early, one late. Throws
+/// Interrupted.
+Golden draw_golden(const LoadedScene& scene, int threads);
 
 /// Reads and writes FOLDER/<scene>.json and its pictures FOLDER/<scene>-####.png. Throws FileError.
 Golden read_golden(const std::filesystem::path& folder, const std::string& scene);

@@ -8,6 +8,8 @@ layout(location = 0) uniform mat4 shadow_clip_from_world;
 layout(location = 0) out vec3 position;
 layout(location = 1) out vec4 normal;  // w: height of `position` over the middle layer [m]
 layout(location = 2) out vec3 place;   // uv, and how hollow the front is
+// Depth alone is drawn first, by another program.
+invariant gl_Position;
 #endif
 
 void main() {

@@ -184,5 +184,26 @@ TEST(StageCloth, TornSheetHasItsNewTrianglesAndIsOpenBetween) {
   EXPECT_EQ(pixel(picture, 36, 32).w(), 1);
 }
 
+// A crumpled thick sheet has places where one surface hides another by a hair; what was drawn before must not show there.
+TEST(StageCloth, IsDrawnTheSameWhateverWasDrawnBefore) {
+  ClothStage s(plain(), {0.3f, 0.5f, 1});
+  Sheet sheet(12);
+  for (std::size_t i = 0; i < sheet.points.size(); ++i) {
+    const auto k = static_cast<float>(i);
+    sheet.points[i] += 0.25f * Vector3f(std::sin(7.1f * k), std::sin(11.3f * k), std::sin(5.7f * k));
+  }
+  const Environment sky{.intensity = 1, .visible = true};
+  Environment bright = sky;
+  bright.zenith = bright.horizon = {9, 0, 9};
+  s.stage.set_cloth(s.cloth, sheet.points);
+  s.stage.set_environment(sky);
+  const HdrImage first = s.draw();
+  for (std::size_t i = 3; i < first.rgba.size(); i += 4) ASSERT_EQ(first.rgba[i], 1) << "a hole at " << i / 4;
+  s.stage.set_environment(bright);
+  s.draw();
+  s.stage.set_environment(sky);
+  EXPECT_EQ(s.draw().rgba, first.rgba);
+}
+
 }  // namespace
 }  // namespace offstage::render
