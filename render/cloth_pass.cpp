@@ -52,6 +52,7 @@ gl::LazyProgram& ClothPass::program(const GpuMaterial& material, const Features&
   const auto found = programs_.find(key);
   if (found != programs_.end()) return found->second;
   std::vector<std::string> defines = features;
+  defines.push_back("FLAT 1");
   defines.push_back("WEAVE " + std::to_string(static_cast<int>(material.weave)));
   std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl",      "light.glsl",
                                             "lamps.glsl", "material.glsl", "noise.glsl"};

@@ -115,6 +115,12 @@ View make_view(const Camera& camera, const SampleOffsets& offsets, int width_px,
   return view;
 }
 
+Vector3f FrameUniforms::irradiance_at(std::size_t k) const {
+  if (k < 7) return irradiance[k].head<3>();
+  const std::size_t first = 3 * (k - 7);
+  return {irradiance[first].w(), irradiance[first + 1].w(), irradiance[first + 2].w()};
+}
+
 FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& environment,
                          const SampleOffsets& offsets, int height_px) {
   const SkyModel sky = make_sky(sun, environment);
@@ -123,7 +129,7 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
 
   FrameUniforms frame;
   frame.clip_from_world = view.clip_from_world;
-  frame.shadow_from_world = Matrix4f::Identity();
+  frame.shadow_rows = {Vector4f::UnitX(), Vector4f::UnitY(), Vector4f::UnitZ()};
   frame.smoke_from_world = Matrix4f::Identity();
   frame.eye = vec4(view.eye, 2 * view.tan_half.y() / static_cast<float>(height_px));
   frame.ray_center = vec4(view.forward - view.shear.x() * x - view.shear.y() * y);
@@ -137,7 +143,8 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
   frame.ground = vec4(sky.ground);
   frame.glow = vec4(sky.glow);
   const std::array<Vector3f, 9> irradiance = sky_irradiance(sky);
-  for (std::size_t k = 0; k < irradiance.size(); ++k) frame.irradiance[k] = vec4(irradiance[k]);
+  for (std::size_t k = 0; k < 7; ++k)
+    frame.irradiance[k] = vec4(irradiance[k], k < 6 ? irradiance[7 + k / 3][static_cast<int>(k % 3)] : 0);
   frame.shadow = frame.penumbra = Vector4f::Zero();
   frame.air = {0, 0, environment.clouds, static_cast<float>(offsets.count)};
   return frame;

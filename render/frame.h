@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -24,22 +25,27 @@ struct LampUniforms {
   Vector4f block = Vector4f::Zero();  ///< first corner in the shadow map, size of a tile, texels of a tile
 };
 
-/// The uniform block of shaders/frame.glsl, in its std140 layout.
+/// The uniform block of shaders/frame.glsl, in its std140 layout. Matrices come first: Eigen aligns them
+/// more.
 struct FrameUniforms {
   Matrix4f clip_from_world;
-  Matrix4f shadow_from_world;
   Matrix4f smoke_from_world;
   Vector4f eye;
-  Vector4f ray_center, ray_x, ray_y;
-  Vector4f depth;
+  std::array<Vector4f, 3> shadow_rows;
   Vector4f sun_direction;
   Vector4f sun_radiance;
   Vector4f zenith, horizon, ground, glow;
-  std::array<Vector4f, 9> irradiance;
+  std::array<Vector4f, 7> irradiance;  ///< the last two of nine coefficients in the others' w
   Vector4f shadow, penumbra;
+  Vector4f ray_center, ray_x, ray_y;
+  Vector4f depth;
   Vector4f air;
   std::array<LampUniforms, kMostLamps> lamps;
+
+  Vector3f irradiance_at(std::size_t k) const;  ///< coefficient k of the nine
 };
+
+static_assert(offsetof(FrameUniforms, lamps) == 32 * sizeof(Vector4f));
 
 /// Defines of the shaders that light depends on, such as "SMOKE 1".
 using Features = std::vector<std::string>;

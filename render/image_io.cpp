@@ -6,12 +6,12 @@
 #include <stdexcept>
 
 #include <fcntl.h>
-#include <spng.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "render/error.h"
 #include "render/file_io.h"
+#include "render/png.h"
 
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
@@ -31,10 +31,6 @@ namespace {
 constexpr int kMaxSide = 16384;  // OpenGL's limit here too
 constexpr uint64_t kMaxFileBytes = uint64_t{1} << 30;
 
-void check_png(int error, const char* what) {
-  if (error != 0) throw std::runtime_error(std::string("PNG encoder: ") + what + ": " + spng_strerror(error));
-}
-
 bool is_opaque(const Image& image) {
   for (std::size_t i = 3; i < image.rgba.size(); i += 4) {
     if (image.rgba[i] != 255) return false;
@@ -43,7 +39,7 @@ bool is_opaque(const Image& image) {
 }
 
 std::vector<uint8_t> without_alpha(const Image& image) {
-  std::vector<uint8_t> rgb(image.pixel_count() * 3);
+  std::vector<uint8_t> rgb(image.rgba.size() / 4 * 3);
   const uint8_t* in = image.rgba.data();
   for (uint8_t *out = rgb.data(), *end = out + rgb.size(); out != end; out += 3, in += 4) {
     out[0] = in[0];
@@ -119,35 +115,12 @@ Image decode_image(std::span<const uint8_t> bytes, const std::string& name) {
 }
 
 std::vector<uint8_t> encode_png(const Image& image) {
-  if (image.width_px <= 0 || image.height_px <= 0 || image.rgba.size() != image.pixel_count() * 4) {
-    throw std::invalid_argument("encode_png: the image's size and its pixels do not agree");
-  }
   const bool opaque = is_opaque(image);
   const std::vector<uint8_t> rgb = opaque ? without_alpha(image) : std::vector<uint8_t>{};
-  const std::vector<uint8_t>& pixels = opaque ? rgb : image.rgba;
-
-  const std::unique_ptr<spng_ctx, void (*)(spng_ctx*)> context(spng_ctx_new(SPNG_CTX_ENCODER), spng_ctx_free);
-  if (!context) throw std::bad_alloc();
-  spng_ihdr header{};
-  header.width = static_cast<uint32_t>(image.width_px);
-  header.height = static_cast<uint32_t>(image.height_px);
-  header.bit_depth = 8;
-  header.color_type = opaque ? SPNG_COLOR_TYPE_TRUECOLOR : SPNG_COLOR_TYPE_TRUECOLOR_ALPHA;
-  check_png(spng_set_option(context.get(), SPNG_ENCODE_TO_BUFFER, 1), "output");
-  check_png(spng_set_option(context.get(), SPNG_IMG_COMPRESSION_LEVEL, 1), "level");
-  check_png(spng_set_option(context.get(), SPNG_FILTER_CHOICE, SPNG_FILTER_CHOICE_UP), "filter");
-  check_png(spng_set_ihdr(context.get(), &header), "header");
-  check_png(
-      spng_encode_image(context.get(), pixels.data(), pixels.size(), SPNG_FMT_PNG, SPNG_ENCODE_FINALIZE),
-      "pixels");
-
-  std::size_t size = 0;
-  int error = 0;
-  const std::unique_ptr<void, void (*)(void*)> png(spng_get_png_buffer(context.get(), &size, &error),
-                                                   std::free);
-  check_png(error, "result");
-  const auto* bytes = static_cast<const uint8_t*>(png.get());
-  return {bytes, bytes + size};
+  return encode_png(PngPixels{.width_px = image.width_px,
+                              .height_px = image.height_px,
+                              .channels = opaque ? 3 : 4,
+                              .samples = opaque ? rgb : image.rgba});
 }
 
 void write_file_atomically(const std::filesystem::path& path, std::span<const uint8_t> bytes) {

@@ -1,6 +1,5 @@
 #pragma once
-/// Image files. Reading by stb_image, writing PNG by libspng (level 1, filter UP: fast, and only a little
-/// larger).
+/// Image files. Reading by stb_image, writing PNG by libdeflate.
 
 #include <filesystem>
 #include <span>

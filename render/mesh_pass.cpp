@@ -240,6 +240,7 @@ gl::LazyProgram& MeshPass::surface_program(const GpuMaterial& material, bool mir
   const auto found = surface_programs_.find(key);
   if (found != surface_programs_.end()) return found->second;
   std::vector<std::string> defines = features_;
+  defines.push_back("FLAT 1");
   std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "light.glsl", "lamps.glsl",
                                             "material.glsl"};
   if (material.textured) defines.push_back("TEXTURED 1");

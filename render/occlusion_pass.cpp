@@ -14,6 +14,7 @@ constexpr int kFewSamples = 4;    // up to so many sub-frames, each is smoothed 
 OcclusionPass::OcclusionPass(int width_px, int height_px)
     : width_px_((width_px + 1) / 2),
       height_px_((height_px + 1) / 2),
+      picture_size_(static_cast<float>(width_px), static_cast<float>(height_px)),
       open_(gl::make_target(GL_RG32F, width_px_, height_px_, GL_NEAREST)),
       smooth_(gl::make_target(GL_RG32F, width_px_, height_px_, GL_NEAREST)),
       open_framebuffer_(gl::make_framebuffer(open_, 0)),
@@ -40,7 +41,10 @@ void OcclusionPass::draw(GLuint depth, const View& view, float reach, int count,
   };
   program_.use();
   glUniform4f(0, reach, reach * pixels, kWidest * 2 * static_cast<float>(height_px_), seed);
-  glUniform1i(1, count == 1 ? 10 : few ? 6 : 4);
+  glUniform1i(1, count == 1 ? 6 : few ? 6 : 4);
+  const Vector2f per_pixel = 2 * view.tan_half.array() / picture_size_.array();
+  const Vector2f first = (0.5f * per_pixel).array() - view.tan_half.array() * (1 + view.shear.array());
+  glUniform4f(2, per_pixel.x(), per_pixel.y(), first.x(), first.y());
   cover(open_framebuffer_);
   glBindTextureUnit(kOpennessUnit, open_);
   if (few) {

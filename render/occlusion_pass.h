@@ -17,9 +17,10 @@ class OcclusionPass {
 
  private:
   int width_px_, height_px_;
+  Vector2f picture_size_;
   gl::Texture open_, smooth_;
   gl::Framebuffer open_framebuffer_, smooth_framebuffer_;
-  gl::LazyProgram program_{{"frame.glsl", "sky.vert"}, {"frame.glsl", "occlusion.frag"}};
+  gl::LazyProgram program_{{"frame.glsl", "occlusion.vert"}, {"frame.glsl", "occlusion.frag"}};
   gl::LazyProgram blur_{{"frame.glsl", "sky.vert"}, {"frame.glsl", "occlusion_blur.frag"}};
   gl::VertexArray no_attributes_ = gl::make_vertex_array();
 };

@@ -61,7 +61,7 @@ PuffRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vect
 
   PuffRadiance result;
   result.constant = sun * (0.68f * middle + 0.9f * direct * forward2 * forward2 * forward2) +
-                    sky_share * frame.irradiance[0].head<3>();
+                    sky_share * frame.irradiance_at(0);
   Vector3f towards_light = 0.36f * direct * to_sun;
   if (steepness > 1e-6f) towards_light -= 0.65f * (light - dark) / steepness * slope;
   result.slope = sun * towards_light.transpose();
@@ -71,9 +71,9 @@ PuffRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vect
     result.constant += 0.3f * lamp;
     result.slope += 0.3f * lamp * towards.transpose();
   }
-  result.slope.col(0) += sky_share * frame.irradiance[3].head<3>();
-  result.slope.col(1) += sky_share * frame.irradiance[1].head<3>();
-  result.slope.col(2) += sky_share * frame.irradiance[2].head<3>();
+  result.slope.col(0) += sky_share * frame.irradiance_at(3);
+  result.slope.col(1) += sky_share * frame.irradiance_at(1);
+  result.slope.col(2) += sky_share * frame.irradiance_at(2);
   return result;
 }
 
@@ -88,7 +88,7 @@ Vector3f PuffLight::ambient(const Vector3f& n) const {
                                       n.x() * n.z(),
                                       n.x() * n.x() - n.y() * n.y()};
   Vector3f sum = Vector3f::Zero();
-  for (std::size_t k = 0; k < basis.size(); ++k) sum += basis[k] * frame.irradiance[k].head<3>();
+  for (std::size_t k = 0; k < basis.size(); ++k) sum += basis[k] * frame.irradiance_at(k);
   return sum.cwiseMax(0.0f);
 }
 

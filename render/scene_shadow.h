@@ -15,7 +15,8 @@ class SceneShadow {
   void read(const ShadowMap& map, const FrameUniforms& frame, const Eigen::AlignedBox3f& box) {
     lit_ = frame.sun_direction.w() == 0;
     if (lit_) return;
-    shadow_from_world_ = frame.shadow_from_world;
+    for (int row = 0; row < 3; ++row)
+      map_from_world_.row(row) = frame.shadow_rows[static_cast<std::size_t>(row)].transpose();
     size_px_ = static_cast<float>(map.size_px());
     Eigen::AlignedBox2f seen;
     for (int k = 0; k < 8; ++k)
@@ -39,7 +40,7 @@ class SceneShadow {
 
  private:
   Vector3f texel_of(const Vector3f& place) const {
-    Vector3f p = (shadow_from_world_ * place.homogeneous()).head<3>();
+    Vector3f p = map_from_world_ * place.homogeneous();
     p.head<2>() *= size_px_;
     return p;
   }
@@ -50,7 +51,7 @@ class SceneShadow {
     return std::clamp(p.z(), 0.0f, 1.0f) <= depths_[static_cast<std::size_t>(y * width_ + x)] ? 1.0f : 0.0f;
   }
 
-  Matrix4f shadow_from_world_ = Matrix4f::Identity();
+  Eigen::Matrix<float, 3, 4> map_from_world_ = Eigen::Matrix<float, 3, 4>::Identity();
   float size_px_ = 0;
   int x0_ = 0, y0_ = 0, width_ = 0, height_ = 0;
   bool lit_ = true;

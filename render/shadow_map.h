@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "render/frame.h"
 #include "render/gl.h"
 
@@ -23,6 +25,9 @@ struct ShadowFrame {
   float depth_m = 0;  ///< along the light, from 0 to 1 in the map
 };
 
+/// The furthest from a place that its shadow is searched for [texels].
+inline constexpr float kWidestPenumbra_px = 24;
+
 /// `pixel_m`: width of a pixel of the picture at distance 1.
 ShadowFrame fit_shadow(std::span<const Caster> casters, const View& view, const Vector3f& sun_direction,
                        float pixel_m, int size_px);
@@ -31,6 +36,10 @@ class ShadowMap {
  public:
   explicit ShadowMap(int size_px);
   int size_px() const { return size_px_; }
+  /// Says where casters are, so that shading only searches the map where one may be in front: the rest of the
+  /// ground is lit at the cost of one look.
+  void mark(const ShadowFrame& frame, std::span<const Caster> balls,
+            std::span<const Eigen::AlignedBox3f> boxes);
   /// Binds and clears the map and sets the state for drawing casters into it.
   void begin() const;
   /// Ends drawing and leaves the map bound for shading.
@@ -43,6 +52,8 @@ class ShadowMap {
   gl::Texture depth_;
   gl::Framebuffer framebuffer_;
   gl::Sampler plain_;
+  std::vector<float> nearest_;  ///< depth of the casters around each cell of a coarse grid over the map
+  gl::Texture nearest_texture_;
 };
 
 }  // namespace offstage::render

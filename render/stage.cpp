@@ -46,11 +46,10 @@ float seed_of(const SampleOffsets& offsets) {
 
 /// What a sub-frame must soften by itself, so that the mean of all is as soft as the sun's disc makes it.
 Vector4f penumbra_of(const ShadowFrame& shadow, const Sun& sun, float size_px, int count) {
-  constexpr float kWidest_px = 24;
   const float half = std::tan(0.5f * sun.size_deg * std::numbers::pi_v<float> / 180);
   const float side_m = shadow.texel_m * size_px, ratio = side_m / shadow.depth_m;
   const float taps = count == 1 ? 8 : count < 16 ? 6 : 4;
-  return {half * shadow.depth_m / shadow.texel_m / std::sqrt(static_cast<float>(count)), kWidest_px,
+  return {half * shadow.depth_m / shadow.texel_m / std::sqrt(static_cast<float>(count)), kWidestPenumbra_px,
           ratio * ratio, taps};
 }
 
@@ -98,8 +97,8 @@ struct Stage::Impl {
   StreaksPass streaks_pass;
   LinesPass lines_pass;
   std::optional<ChannelsPass> channels_pass;  ///< made when asked for
-  gl::LazyProgram sky_program{{"frame.glsl", "sky.vert"},
-                              {"frame.glsl", "sky.glsl", "noise.glsl", "sky.frag"}};
+  gl::LazyProgram sky_program{
+      {"frame.glsl", "sky.vert"}, {"frame.glsl", "sky.glsl", "noise.glsl", "sky.frag"}, {"FLAT 1"}};
   gl::VertexArray no_attributes = gl::make_vertex_array();
   gl::StreamBuffer frame_buffer;
   std::vector<float> strip;
@@ -169,15 +168,17 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
       casters.push_back(instance->ball());
     }
   }
-  const auto add_corners = [&casters](const Eigen::AlignedBox3f& box) {
-    for (int k = 0; k < 8; ++k)
-      casters.push_back({box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k)), 1e-3f});
-  };
+  const std::size_t balls = casters.size();
+  std::vector<Eigen::AlignedBox3f> boxes;
   for (const Cloth* cloth : sheets) {
-    if (cloth->casts_shadow) add_corners(cloth->surface.box());
+    if (cloth->casts_shadow) boxes.push_back(cloth->surface.box());
   }
   for (const PointSet* set : sets) {
-    if (set->def.casts_shadow && !set->is_splatted()) add_corners(set->box);
+    if (set->def.casts_shadow && !set->is_splatted()) boxes.push_back(set->box);
+  }
+  for (const Eigen::AlignedBox3f& box : boxes) {
+    for (int k = 0; k < 8; ++k)
+      casters.push_back({box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k)), 1e-3f});
   }
   // Without a caster the map is empty, which is light everywhere.
   ShadowFrame shadow;
@@ -187,12 +188,15 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
     Matrix4f map_from_clip = Matrix4f::Identity();
     map_from_clip.diagonal() << 0.5f, 0.5f, 1, 1;
     map_from_clip.col(3) << 0.5f, 0.5f, 0, 1;
-    frame.shadow_from_world = map_from_clip * shadow.clip_from_world;
+    const Matrix4f map_from_world = map_from_clip * shadow.clip_from_world;
+    for (int row = 0; row < 3; ++row)
+      frame.shadow_rows[static_cast<std::size_t>(row)] = map_from_world.row(row).transpose();
     const auto size = static_cast<float>(def.shadow_map_px);
     const float seed = seed_of(offsets);
     frame.shadow = {shadow.texel_m, size, 1 / size, seed};
     frame.penumbra = penumbra_of(shadow, sun, size, offsets.count);
     frame.sun_direction.w() = 1;
+    shadow_map.mark(shadow, std::span(casters).first(balls), boxes);
   }
   upload(frame);
   draw_lamp_shadows(casters, sheets);

@@ -13,7 +13,7 @@ void main() {
   float h2 = ball.w * ball.w - dot(nearest, nearest);
   if (h2 < 0.0) discard;
   vec3 offset = nearest - ray * sqrt(h2), hit = ball.xyz + offset;
-  vec4 now = frame.clip_from_world * vec4(hit, 1.0);
+  vec4 now = uniforms.clip_from_world * vec4(hit, 1.0);
   vec4 before = clip_before_from_world * vec4(hit - half_size_id_time.w * velocity, 1.0);
   gl_FragDepth = now.z / now.w;
   normal_id = vec4(offset / ball.w, half_size_id_time.z);

@@ -22,6 +22,9 @@ void main() {
   position = in_position.xyz + lift * in_normal.xyz;
   normal = vec4(in_normal.xyz, lift);
   place = vec3(in_uv, in_position.w);
-  gl_Position = frame.clip_from_world * vec4(position, 1.0);
+#ifdef FLAT
+  pass_frame();
+#endif
+  gl_Position = uniforms.clip_from_world * vec4(position, 1.0);
 #endif
 }

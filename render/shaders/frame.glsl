@@ -8,22 +8,51 @@ struct Lamp {
   vec4 block;      // first corner in the shadow map; size of a tile there
 };
 
+// What shading reads for nearly every pixel.
+#define NONE
+#define FRAME_FIELDS(qualifier) \
+  qualifier vec4 eye;               /* w: size of a pixel at distance 1 */ \
+  qualifier vec4 shadow_rows[3];    /* world to [0, 1] of the shadow map, by rows */ \
+  qualifier vec4 sun_direction;     /* w: 1 if the shadow map holds something */ \
+  qualifier vec4 sun_radiance;      /* of a white surface that faces it; w: radius of the disc [rad] */ \
+  qualifier vec4 zenith, horizon, ground, glow;  /* zenith.w: fog density; horizon.w: 1 if one of many sub-frames */ \
+  qualifier vec4 irradiance[7];     /* ambient light of a white surface: see ambient() */ \
+  qualifier vec4 shadow;            /* size of a texel [m], texels, 1 / texels, seed of the dither */ \
+  qualifier vec4 penumbra;          /* of the shadow map: half-width [texels] per depth, the widest [texels], depth per its width, taps */
+
 layout(std140, binding = 0) uniform Frame {
   mat4 clip_from_world;
-  mat4 shadow_from_world;   // to [0, 1] of the shadow map
-  mat4 smoke_from_world;    // to [0, 1] of the smoke's optical depth
-  vec4 eye;                 // w: size of a pixel at distance 1
+  mat4 smoke_from_world;  // to [0, 1] of the smoke's optical depth
+  FRAME_FIELDS(NONE)
   vec4 ray_center, ray_x, ray_y;  // direction through a place of the screen: center + x * ndc.x + y * ndc.y
-  vec4 depth;               // distance along the view axis = x / (depth + y); z: near plane
-  vec4 sun_direction;       // w: 1 if the shadow map holds something
-  vec4 sun_radiance;        // of a white surface that faces it; w: radius of the disc [rad]
-  vec4 zenith, horizon, ground, glow;  // zenith.w: fog density; horizon.w: 1 if one of many sub-frames
-  vec4 irradiance[9];       // ambient light of a white surface, spherical harmonics in x, y, z
-  vec4 shadow;              // size of a texel [m], texels, 1 / texels, seed of the dither
-  vec4 penumbra;            // of the shadow map: half-width [texels] per depth, the widest [texels], depth per its width, taps
-  vec4 air;                 // number of lamps, time [s], share of clouds, number of sub-frames
+  vec4 depth;             // distance along the view axis = x / (depth + y); z: near plane
+  vec4 air;               // number of lamps, time [s], share of clouds, number of sub-frames
   Lamp lamps[8];
-} frame;
+} uniforms;
+
+// llvmpipe's fragment shaders read a uniform lane by lane, in forty instructions (Mesa 22.3), which was half of all that
+// shading cost. Flat inputs are as good as constants, so those fields come along with each triangle.
+#ifndef FLAT
+#define frame uniforms
+#elif defined(FRAGMENT)
+layout(location = 8) in FlatFrame { FRAME_FIELDS(flat) } frame;
+#else
+#define frame uniforms
+layout(location = 8) out FlatFrame { FRAME_FIELDS(flat) } flat_frame;
+void pass_frame() {
+  flat_frame.eye = uniforms.eye;
+  flat_frame.shadow_rows = uniforms.shadow_rows;
+  flat_frame.sun_direction = uniforms.sun_direction;
+  flat_frame.sun_radiance = uniforms.sun_radiance;
+  flat_frame.zenith = uniforms.zenith;
+  flat_frame.horizon = uniforms.horizon;
+  flat_frame.ground = uniforms.ground;
+  flat_frame.glow = uniforms.glow;
+  flat_frame.irradiance = uniforms.irradiance;
+  flat_frame.shadow = uniforms.shadow;
+  flat_frame.penumbra = uniforms.penumbra;
+}
+#endif
 
 float saturate(float x) { return clamp(x, 0.0, 1.0); }
 

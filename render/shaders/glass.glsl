@@ -10,7 +10,7 @@ vec3 seen_through(vec3 position, vec3 n, vec3 view) {
   vec3 leaving = refract(inside, -out_normal, 1.0 / material.glass.y);
   if (dot(leaving, leaving) < 0.5) leaving = inside;  // it would be reflected inside
   vec3 f0 = vec3(pow((1.0 - material.glass.y) / (1.0 + material.glass.y), 2.0));
-  vec4 clip = frame.clip_from_world * vec4(far_side + thickness * leaving, 1.0);
+  vec4 clip = uniforms.clip_from_world * vec4(far_side + thickness * leaving, 1.0);
   vec2 place = 0.5 + 0.5 * clip.xy / clip.w;
   vec2 off = abs(place - 0.5);
   float on_screen = clip.w > 0.0 ? 1.0 - smoothstep(0.46, 0.5, max(off.x, off.y)) : 0.0;

@@ -12,7 +12,7 @@ vec3 lamp_radiance(Lamp lamp, vec3 position, out vec3 l) {
 // On something so small that it is lit from all sides.
 vec3 lamps_all_around(vec3 position) {
   vec3 sum = vec3(0.0), l;
-  for (int k = 0; k < int(frame.air.x); ++k) sum += lamp_radiance(frame.lamps[k], position, l);
+  for (int k = 0; k < int(uniforms.air.x); ++k) sum += lamp_radiance(uniforms.lamps[k], position, l);
   return 0.3 * sum;
 }
 
@@ -49,7 +49,7 @@ float lamp_visibility(Lamp lamp, vec3 position, vec3 normal) {
   if (p.z < kLampNear || any(notEqual(p.xy, clamp(p.xy, tile.xy - 0.01, tile.zw + 0.01)))) return p.z < kLampNear ? 1.0 : 0.0;
   float turn = 6.2831853 * dither(gl_FragCoord.xy, frame.shadow.w + 0.31), z = 1.0 - kLampNear / p.z;
   vec2 a = vec2(cos(turn), sin(turn));
-  float px_per_m = 0.5 * size_px / (lamp.up.w * p.z), sub = inversesqrt(frame.air.w);
+  float px_per_m = 0.5 * size_px / (lamp.up.w * p.z), sub = inversesqrt(uniforms.air.w);
   float search = min(0.5 * lamp.position.w * px_per_m * sub, 16.0) + 1.0, sum = 0.0, blockers = 0.0;
   for (int k = 0; k < 4; ++k) {
     vec4 depth = textureGather(lamp_depths, clamp(p.xy + a * (0.7 * search * texel), tile.xy, tile.zw));
@@ -58,7 +58,7 @@ float lamp_visibility(Lamp lamp, vec3 position, vec3 normal) {
     blockers += dot(blocks, vec4(1.0));
     a = vec2(-a.y, a.x);
   }
-  int taps = blockers == 0.0 || blockers == 16.0 ? 0 : (frame.air.w < 16.0 ? 6 : 4);
+  int taps = blockers == 0.0 || blockers == 16.0 ? 0 : (uniforms.air.w < 16.0 ? 6 : 4);
   float between = sum / max(blockers, 1.0), lit = 0.0;
   float penumbra = clamp(lamp.position.w * (p.z - between) / max(between, kLampNear) * px_per_m * sub, 1.0, 16.0);
   for (int k = 0; k < taps; ++k) {
@@ -73,8 +73,8 @@ float lamp_visibility(Lamp lamp, vec3 position, vec3 normal) {
 vec3 lamp_light(Surface s, vec3 normal, vec3 smooth_normal, vec3 view, vec3 position) {
   vec3 f0 = mix(vec3(0.04), s.albedo, s.metallic), diffuse = s.albedo * (1.0 - s.metallic), sum = vec3(0.0), l;
   float nv = max(abs(dot(normal, view)), 1e-3);
-  for (int k = 0; k < int(frame.air.x); ++k) {
-    Lamp lamp = frame.lamps[k];
+  for (int k = 0; k < int(uniforms.air.x); ++k) {
+    Lamp lamp = uniforms.lamps[k];
     vec3 light = lamp_radiance(lamp, position, l), h = normalize(l + view);
     float nl = saturate(dot(normal, l)), vh = saturate(dot(view, h));
     // A lamp that is large from here has a large highlight.

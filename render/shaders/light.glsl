@@ -8,18 +8,21 @@ struct Surface {
   vec3 emission;
 };
 
+vec3 in_shadow_map(vec4 v) { return vec3(dot(frame.shadow_rows[0], v), dot(frame.shadow_rows[1], v), dot(frame.shadow_rows[2], v)); }
+
 // A place in the shadow map. The point is moved off its surface by about a texel, more where the light grazes, which
 // keeps a surface from shadowing itself without detaching shadows from their casters.
 vec3 shadow_place(vec3 position, vec3 normal) {
   float cosine = saturate(dot(normal, frame.sun_direction.xyz));
   vec3 moved = position + frame.shadow.x * (normal * (2.2 * sqrt(1.0 - cosine * cosine) + 0.3) + 0.7 * frame.sun_direction.xyz);
-  vec3 p = (frame.shadow_from_world * vec4(moved, 1.0)).xyz;
+  vec3 p = in_shadow_map(vec4(moved, 1.0));
   return vec3(p.xy, max(p.z, 0.0));
 }
 bool off_shadow_map(vec3 p) { return any(notEqual(p.xy, clamp(p.xy, 0.0, 1.0))); }
 
 #ifdef FRAGMENT
 layout(binding = 9) uniform sampler2D shadow_depth;  // the shadow map without comparing
+layout(binding = 13) uniform sampler2D casters;      // the depth from which on something can be in front
 
 // Shadows are as soft as what throws them is far away (R. Fernando, "Percentage-Closer Soft Shadows", 2005): first the
 // mean depth of what is in between, then the share of a disc as wide as its penumbra. Where nothing or only shadow is
@@ -31,13 +34,15 @@ float shadow_map_visibility(vec3 position, vec3 normal) {
   float turn = 6.2831853 * dither(gl_FragCoord.xy, frame.shadow.w);
   vec2 a = vec2(cos(turn), sin(turn));
   // Along its own surface a tap is higher or lower.
-  vec3 g = mat3(frame.shadow_from_world) * normal;
+  vec3 g = in_shadow_map(vec4(normal, 0.0));
   vec2 slope = g.xy * (frame.penumbra.z / min(g.z, -1e-9));
   float steep = inversesqrt(dot(slope, slope) + 1e-12);
   slope *= -min(1.0, 4.0 * sqrt(frame.penumbra.z) * steep);
   float beside = min(1.0 / steep, 4.0 * sqrt(frame.penumbra.z)) * frame.shadow.z;
   float search = min(frame.penumbra.x * p.z, frame.penumbra.y) + 1.0, sum = 0.0, blockers = 0.0;
-  int rounds = g.z < 0.0 ? 4 : 0;  // none where a surface looks away from the sun
+  // None where a surface looks away from the sun, or nothing can be in front of it.
+  float nearest = texelFetch(casters, ivec2(p.xy * vec2(textureSize(casters, 0))), 0).r;
+  int rounds = g.z < 0.0 && p.z > nearest ? 4 : 0;
   for (int k = 0; k < rounds; ++k) {
     vec2 offset = a * (0.7 * search * frame.shadow.z);
     vec4 depth = textureGather(shadow_depth, p.xy + offset);
@@ -72,7 +77,7 @@ layout(binding = 5) uniform sampler3D smoke_depth;
 float sun_visibility(vec3 position, vec3 normal) {
   float visibility = shadow_map_visibility(position, normal);
 #ifdef SMOKE
-  visibility *= exp(-texture(smoke_depth, (frame.smoke_from_world * vec4(position, 1.0)).xyz).r);
+  visibility *= exp(-texture(smoke_depth, (uniforms.smoke_from_world * vec4(position, 1.0)).xyz).r);
 #endif
   return visibility;
 }

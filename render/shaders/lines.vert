@@ -12,7 +12,7 @@ layout(location = 2) flat out vec4 color;
 void main() {
   bool at_b = (gl_VertexID & 1) != 0;
   float side = (gl_VertexID & 2) != 0 ? 1.0 : -1.0;
-  vec4 a = frame.clip_from_world * vec4(in_a.xyz, 1.0), b = frame.clip_from_world * vec4(in_b.xyz, 1.0);
+  vec4 a = uniforms.clip_from_world * vec4(in_a.xyz, 1.0), b = uniforms.clip_from_world * vec4(in_b.xyz, 1.0);
   vec2 pa = a.xy / a.w * half_size, pb = b.xy / b.w * half_size;
   float length_px = distance(pa, pb);
   vec2 u = length_px > 1e-3 ? (pb - pa) / length_px : vec2(1.0, 0.0), v = vec2(-u.y, u.x);
@@ -25,5 +25,5 @@ void main() {
   // A line has the depth of the front of a tube as wide as it is drawn, so that one on a surface is not cut by it.
   float w = at_b ? b.w : a.w;
   float front = w * (1.0 - (at_b ? stroke.z : stroke.y) * frame.eye.w);
-  gl_Position = vec4(p / half_size, saturate(frame.depth.x / front - frame.depth.y), 1.0);
+  gl_Position = vec4(p / half_size, saturate(uniforms.depth.x / front - uniforms.depth.y), 1.0);
 }

@@ -35,7 +35,10 @@ void main() {
   normal = normalize(vec3(dot(cx, in_normal), dot(cy, in_normal), dot(cz, in_normal)));
   if (dot(row_x.xyz, cx) < 0.0) normal = -normal;
   position = world;
-  gl_Position = frame.clip_from_world * vec4(world, 1.0);
+#ifdef FLAT
+  pass_frame();
+#endif
+  gl_Position = uniforms.clip_from_world * vec4(world, 1.0);
 #endif
 #ifdef TEXTURED
   uv = in_uv;

@@ -5,7 +5,7 @@ layout(binding = 4) uniform sampler2D scene_depth;
 layout(binding = 12) uniform sampler2D behind;
 layout(location = 2) uniform vec2 search;  // length of the ray [m], steps
 
-float scene_distance(vec2 place) { return frame.depth.x / (textureLod(scene_depth, place, 0.0).r + frame.depth.y); }
+float scene_distance(vec2 place) { return uniforms.depth.x / (textureLod(scene_depth, place, 0.0).r + uniforms.depth.y); }
 
 // Light, and the share of it that was found.
 vec4 seen_in_mirror(vec3 position, vec3 n, vec3 view, float roughness) {
@@ -15,7 +15,7 @@ vec4 seen_in_mirror(vec3 position, vec3 n, vec3 view, float roughness) {
   float spread = 0.5 * roughness * roughness * sqrt(off);
   ray = normalize(ray + spread * (cos(turn) * side + sin(turn) * cross(ray, side)));
   if (dot(ray, n) <= 0.02) ray = reflect(-view, n);
-  vec4 from = frame.clip_from_world * vec4(position, 1.0), way = frame.clip_from_world * vec4(ray, 0.0) * search.x;
+  vec4 from = uniforms.clip_from_world * vec4(position, 1.0), way = uniforms.clip_from_world * vec4(ray, 0.0) * search.x;
   // Up to the near plane and the picture's edge.
   float end = way.w < 0.0 ? min(1.0, 0.9 * from.w / -way.w) : 1.0;
   // The surface itself is this much nearer a pixel further.

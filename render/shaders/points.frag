@@ -11,7 +11,7 @@ layout(location = 0) out vec4 color;
 
 // Fades where a sprite meets a surface, instead of being cut.
 float depth_fade(float radius) {
-  float behind = frame.depth.x / (texelFetch(scene_depth, ivec2(gl_FragCoord.xy), 0).r + frame.depth.y);
+  float behind = uniforms.depth.x / (texelFetch(scene_depth, ivec2(gl_FragCoord.xy), 0).r + uniforms.depth.y);
   return saturate((behind - 1.0 / gl_FragCoord.w) / radius);
 }
 

@@ -100,7 +100,7 @@ void main() {
   dimming = vec2(alpha, in_velocity.w);
   gl_Position = shadow_clip_from_world * vec4(at, 1.0);
 #else
-  gl_Position = frame.clip_from_world * vec4(at, 1.0);
+  gl_Position = uniforms.clip_from_world * vec4(at, 1.0);
 #if STYLE == 5
   float turn = 6.2831853 * in_velocity.w;
   lobe = vec2(cos(turn), sin(turn));
@@ -116,7 +116,7 @@ void main() {
   // Added light is dimmed by the fog but brings none of its colour.
   vec4 fog = fog_to(p) * vec4(vec3(1.0 - style.w), 1.0);
   // What comes close to the lens fades out before it is cut.
-  light = vec4(in_color.rgb, alpha * saturate(0.5 * (gl_Position.w - frame.depth.z) / drawn));
+  light = vec4(in_color.rgb, alpha * saturate(0.5 * (gl_Position.w - uniforms.depth.z) / drawn));
   reach = drawn;
   if (style.z != 0.0) {
 #if STYLE == 0

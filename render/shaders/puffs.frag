@@ -8,7 +8,7 @@ layout(binding = 7) uniform sampler2D puff_depth;
 layout(location = 0) out vec4 color;
 
 void main() {
-  float depth = min(frame.depth.x / (texelFetch(scene_depth, ivec2(gl_FragCoord.xy), 0).r + frame.depth.y), scale.z);
+  float depth = min(uniforms.depth.x / (texelFetch(scene_depth, ivec2(gl_FragCoord.xy), 0).r + uniforms.depth.y), scale.z);
   vec2 p = gl_FragCoord.xy / scale.x - 0.5;
   vec2 base = floor(p), f = p - base;
   vec4 sum = vec4(0.0);

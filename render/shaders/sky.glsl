@@ -10,12 +10,13 @@ vec3 sky_gradient(float y) {
   return mix(frame.zenith.rgb, frame.horizon.rgb, 0.3 * u2 + 0.7 * u4 * u4);
 }
 
-// Ambient light on a white surface, from order-2 spherical harmonics.
+// Ambient light on a white surface, from spherical harmonics of order 2. The last two of the nine coefficients lie in the
+// others' fourth components.
 vec3 ambient(vec3 n) {
-  return max(frame.irradiance[0].rgb + frame.irradiance[1].rgb * n.y + frame.irradiance[2].rgb * n.z +
-             frame.irradiance[3].rgb * n.x + frame.irradiance[4].rgb * (n.x * n.y) +
-             frame.irradiance[5].rgb * (n.y * n.z) + frame.irradiance[6].rgb * (3.0 * n.z * n.z - 1.0) +
-             frame.irradiance[7].rgb * (n.x * n.z) + frame.irradiance[8].rgb * (n.x * n.x - n.y * n.y), 0.0);
+  vec4 c[7] = frame.irradiance;
+  vec3 c7 = vec3(c[0].w, c[1].w, c[2].w), c8 = vec3(c[3].w, c[4].w, c[5].w);
+  return max(c[0].rgb + c[1].rgb * n.y + c[2].rgb * n.z + c[3].rgb * n.x + c[4].rgb * (n.x * n.y) + c[5].rgb * (n.y * n.z) +
+             c[6].rgb * (3.0 * n.z * n.z - 1.0) + c7 * (n.x * n.z) + c8 * (n.x * n.x - n.y * n.y), 0.0);
 }
 
 // What a surface of this roughness reflects from a direction: the sky, more and more blurred.

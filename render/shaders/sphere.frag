@@ -15,7 +15,7 @@ void main() {
   vec3 offset = nearest - ray * sqrt(h2);
   vec3 hit = ball.xyz + offset;
   vec3 n = offset / ball.w;
-  vec4 clip = frame.clip_from_world * vec4(hit, 1.0);
+  vec4 clip = uniforms.clip_from_world * vec4(hit, 1.0);
   gl_FragDepth = clip.z / clip.w;
 #ifndef DEPTH
 

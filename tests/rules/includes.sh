@@ -15,14 +15,14 @@ forbid() {
 }
 
 json='nlohmann|CLI/|valijson'
-forbid sim "render/|effects/|producer/|$json|assimp|glad|GL/|stb|spng" "sim includes more than std, Eigen, oneTBB, Qhull and xxhash"
-forbid effects "render/|producer/|$json|assimp|glad|GL/|stb|spng" "effects includes more than sim"
+forbid sim "render/|effects/|producer/|$json|assimp|glad|GL/|stb|libdeflate" "sim includes more than std, Eigen, oneTBB, Qhull and xxhash"
+forbid effects "render/|producer/|$json|assimp|glad|GL/|stb|libdeflate" "effects includes more than sim"
 forbid render "sim/|effects/|producer/|$json" "render knows something of physics or JSON"
 public=$(grep -L 'Private' render/*.h)
 for header in $public; do
-  forbid "$header" 'assimp|glad|GL/|stb|spng' "a public header shows a library behind it"
+  forbid "$header" 'assimp|glad|GL/|stb|libdeflate' "a public header shows a library behind it"
 done
-forbid "$(ls -d demos/producer tests/producer tests/cli 2>/dev/null | tr '\n' ' ')" 'assimp|glad|GL/|stb|spng' "only render uses GL, assimp, stb and libspng"
+forbid "$(ls -d demos/producer tests/producer tests/cli 2>/dev/null | tr '\n' ' ')" 'assimp|glad|GL/|stb|libdeflate' "only render uses GL, assimp, stb and libdeflate"
 
 # Who may use what: a library and the files, without their endings, that include it.
 only() {
@@ -35,7 +35,7 @@ only() {
 only 'libqhull_r/' 'sim/geometry/convex_hull'
 only 'assimp/' 'render/mesh_import render/mesh_material'
 only 'stb_image' 'render/image_io'
-only 'spng.h' 'render/image_io'
+only 'libdeflate.h' 'render/png'
 only 'Imf' 'render/exr'
 only 'GL/osmesa.h' 'render/context'
 exit $status

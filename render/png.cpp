@@ -1,0 +1,97 @@
+#include "render/png.h"
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <new>
+#include <stdexcept>
+#include <string_view>
+
+#include <libdeflate.h>
+
+namespace offstage::render {
+namespace {
+
+constexpr int kLevel = 1;
+
+void append_number(std::vector<uint8_t>& out, uint32_t value) {
+  for (int shift = 24; shift >= 0; shift -= 8) out.push_back(static_cast<uint8_t>(value >> shift));
+}
+
+/// Adds the check sum of a chunk, which goes from its name at `start` to the end.
+void close_chunk(std::vector<uint8_t>& out, std::size_t start) {
+  append_number(out, libdeflate_crc32(0, out.data() + start, out.size() - start));
+}
+
+void append_chunk(std::vector<uint8_t>& out, std::string_view name, std::span<const uint8_t> data) {
+  append_number(out, static_cast<uint32_t>(data.size()));
+  const std::size_t start = out.size();
+  out.insert(out.end(), name.begin(), name.end());
+  out.insert(out.end(), data.begin(), data.end());
+  close_chunk(out, start);
+}
+
+/// Each row as its difference to the one above, after a byte that says so.
+std::vector<uint8_t> filtered(const PngPixels& pixels, std::size_t row_bytes) {
+  constexpr uint8_t kUp = 2;
+  const auto rows = static_cast<std::size_t>(pixels.height_px);
+  std::vector<uint8_t> result((row_bytes + 1) * rows);
+  const std::vector<uint8_t> nothing(row_bytes, 0);
+  const uint8_t* above = nothing.data();
+  const uint8_t* here = pixels.samples.data();
+  uint8_t* out = result.data();
+  for (std::size_t y = 0; y < rows; ++y) {
+    *out++ = kUp;
+    for (std::size_t i = 0; i < row_bytes; ++i) out[i] = static_cast<uint8_t>(here[i] - above[i]);
+    above = here;
+    here += row_bytes;
+    out += row_bytes;
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<uint8_t> encode_png(const PngPixels& pixels) {
+  const std::size_t row_bytes = static_cast<std::size_t>(std::max(pixels.width_px, 0)) *
+                                static_cast<std::size_t>(pixels.channels * pixels.bits / 8);
+  if (pixels.width_px <= 0 || pixels.height_px <= 0 ||
+      pixels.samples.size() != row_bytes * static_cast<std::size_t>(pixels.height_px))
+    throw std::invalid_argument("encode_png: the image's size and its pixels do not agree");
+
+  std::vector<uint8_t> png = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
+  std::vector<uint8_t> header;
+  append_number(header, static_cast<uint32_t>(pixels.width_px));
+  append_number(header, static_cast<uint32_t>(pixels.height_px));
+  const auto kind = static_cast<uint8_t>(pixels.channels == 1 ? 0 : pixels.channels == 3 ? 2 : 6);
+  // Deflate, the standard's filters, not interlaced.
+  header.insert(header.end(), {static_cast<uint8_t>(pixels.bits), kind, 0, 0, 0});
+  append_chunk(png, "IHDR", header);
+
+  if (!pixels.comment.empty()) {
+    // Keyword, not compressed, no language, no translation of the keyword.
+    constexpr std::string_view kStart("Comment\0\0\0\0\0", 12);
+    std::vector<uint8_t> text(kStart.begin(), kStart.end());
+    text.insert(text.end(), pixels.comment.begin(), pixels.comment.end());
+    append_chunk(png, "iTXt", text);
+  }
+
+  const std::vector<uint8_t> rows = filtered(pixels, row_bytes);
+  const std::unique_ptr<libdeflate_compressor, void (*)(libdeflate_compressor*)> compressor(
+      libdeflate_alloc_compressor(kLevel), libdeflate_free_compressor);
+  if (!compressor) throw std::bad_alloc();
+  const std::size_t length_at = png.size(), name_at = length_at + 4, data_at = name_at + 4;
+  png.resize(data_at + libdeflate_zlib_compress_bound(compressor.get(), rows.size()));
+  const std::size_t size = libdeflate_zlib_compress(compressor.get(), rows.data(), rows.size(),
+                                                    png.data() + data_at, png.size() - data_at);
+  png.resize(data_at + size);
+  for (std::size_t k = 0; k < 4; ++k) {
+    png[length_at + k] = static_cast<uint8_t>(size >> (24 - 8 * k));
+    png[name_at + k] = static_cast<uint8_t>("IDAT"[k]);
+  }
+  close_chunk(png, name_at);
+  append_chunk(png, "IEND", {});
+  return png;
+}
+
+}  // namespace offstage::render
