@@ -17,16 +17,16 @@ marbles|1|4|Exact collisions with meshes
 cradle|0|3|Simultaneous and sequential impacts
 explosion|0.6|4|Islands and explosions
 pile|0.2|3|Heaps of every shape
-ragdolls|1|4|Joints with limits
+ragdolls|0.2|4|Joints with limits
 machine|2|3|Kinematic machines
-drape|0.8|3|Cloth
+drape|0.1|3|Cloth
 flag|2|4|Wind
 fountain|3|4|Thousands of drops
 sprinkler|2|2|Sprinklers
 rain|2|4|Rain and splashes
 smoke|4|3|Smoke that shadows itself
 fire|2.5|3|Fire that lights its surroundings
-fireworks|2|4|Emitters that emit emitters'
+fireworks|2.5|4|Emitters that emit emitters'
 
 list=out/reel/list.txt
 : >"$list"

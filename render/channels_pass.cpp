@@ -26,13 +26,13 @@ void ChannelsPass::begin(const Matrix4f& clip_from_world, const Matrix4f& clip_b
   clip_before_from_world_ = clip_before_from_world;
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
   glViewport(0, 0, width_px_, height_px_);
+  glEnable(GL_DEPTH_TEST);
+  glDepthMask(GL_TRUE);  // clearing obeys it, and what drew the picture left it off
+  glDepthFunc(GL_GREATER);
+  glDisable(GL_BLEND);
   const std::array<float, 4> nothing = {0, 0, 0, 0};
   for (const GLint k : {0, 1}) glClearNamedFramebufferfv(framebuffer_, GL_COLOR, k, nothing.data());
   glClearNamedFramebufferfv(framebuffer_, GL_DEPTH, 0, nothing.data());
-  glEnable(GL_DEPTH_TEST);
-  glDepthMask(GL_TRUE);
-  glDepthFunc(GL_GREATER);
-  glDisable(GL_BLEND);
 }
 
 void ChannelsPass::set_matrices(const Matrix4f& world_from_mesh, const Matrix4f& world_before_from_mesh,

@@ -38,7 +38,7 @@ class Buffer : public Imf::OStream {
 }  // namespace
 
 void write_exr(const std::filesystem::path& path, const Channels& channels, const ChannelChoice& choice,
-               const std::map<uint32_t, std::string>& objects) {
+               const ObjectNames& objects) {
   Imf::Header header(channels.width_px, channels.height_px);
   header.compression() = Imf::ZIP_COMPRESSION;
   Imf::FrameBuffer pixels;
@@ -48,19 +48,19 @@ void write_exr(const std::filesystem::path& path, const Channels& channels, cons
     auto* base = static_cast<char*>(const_cast<void*>(first));
     pixels.insert(name, Imf::Slice(type, base, stride, stride * static_cast<std::size_t>(channels.width_px)));
   };
-  if (choice.depth) add("Z", Imf::FLOAT, channels.depth.data(), sizeof(float));
-  if (choice.normal) {
+  if (choice.has(Channel::depth)) add("Z", Imf::FLOAT, channels.depth.data(), sizeof(float));
+  if (choice.has(Channel::normal)) {
     const char* names[] = {"N.X", "N.Y", "N.Z"};
     for (int k = 0; k < 3; ++k)
       add(names[k], Imf::FLOAT, channels.normal.data()->data() + k, sizeof(Eigen::Vector3f));
   }
-  if (choice.id) {
+  if (choice.has(Channel::id)) {
     add("id", Imf::UINT, channels.id.data(), sizeof(uint32_t));
     std::string text;
     for (const auto& [id, name] : objects) text += std::to_string(id) + " " + name + "\n";
     header.insert("objects", Imf::StringAttribute(text));
   }
-  if (choice.motion) {
+  if (choice.has(Channel::motion)) {
     const char* names[] = {"motion.X", "motion.Y"};
     for (int k = 0; k < 2; ++k)
       add(names[k], Imf::FLOAT, channels.motion.data()->data() + k, sizeof(Eigen::Vector2f));

@@ -78,14 +78,17 @@ void add_talk(CLI::App& command, TalkOptions& talk) {
   command.add_flag("-v,--verbose", talk.verbose, "Say more: stage times, memory");
 }
 
-CLI::Option* add_channels(CLI::App& app, std::vector<std::string>& channels) {
-  return app
-      .add_option("--channels", channels,
-                  "Also write numbers for each pixel beside every frame, as FRAME.exr:\n"
-                  "depth [m], normal, id, motion [px since the frame before]; several with commas")
+void add_channels(CLI::App& app, SceneOptions& scene) {
+  app.add_option("--channels", scene.channels,
+                 "Also write numbers for each pixel beside every frame, or in FILM.channels beside a video:\n"
+                 "depth [m], normal, id, motion [px since the frame before]; several with commas")
       ->delimiter(',')
       ->check(CLI::IsMember({"depth", "normal", "id", "motion"}));
+  app.add_option("--channel-format", scene.channel_format,
+                 "exr: FRAME.exr with all numbers as they are; png: FRAME.depth.png and so on, scaled")
+      ->check(CLI::IsMember({"exr", "png"}));
 }
+
 void add_threads(CLI::App& command, int& threads) {
   command.add_option("--threads", threads, "Threads of the simulation (default: all available)")
       ->check(CLI::Range(1, 256));
@@ -230,7 +233,7 @@ int dispatch(int argc, char** argv) {
       ->check(CLI::Range(1, 64));
   auto* resume =
       render_app->add_flag("--resume", render.resume, "Keep finished frames that have the same settings");
-  add_channels(*render_app, render.channels)->excludes(resume);
+  add_channels(*render_app, render.scene);
   render_app->add_flag("--force", render.force, "Replace existing output")->excludes(resume);
   auto* dry_run =
       render_app->add_flag("--dry-run", render.dry_run, "Print the plan as JSON and write nothing");
@@ -255,7 +258,7 @@ int dispatch(int argc, char** argv) {
   add_picture(*frame_app, frame.scene);
   add_timing(*frame_app, frame.scene);
   add_threads(*frame_app, frame.threads);
-  add_channels(*frame_app, frame.channels);
+  add_channels(*frame_app, frame.scene);
   frame_app->add_flag("--force", frame.force, "Replace an existing file");
   add_talk(*frame_app, frame.talk);
 
@@ -294,8 +297,8 @@ int dispatch(int argc, char** argv) {
   schema_app->add_flag("--reference", reference, "Print the reference in Markdown instead");
 
   std::string preset;
-  auto* presets_app =
-      app.add_subcommand("presets", "List the effects, fabrics and articulations that scenes can name, or print one");
+  auto* presets_app = app.add_subcommand(
+      "presets", "List the effects, fabrics and articulations that scenes can name, or print one");
   presets_app->add_option("name", preset, "Preset, fabric or articulation to print");
 
   SceneOptions info;

@@ -22,6 +22,8 @@ struct SceneOptions {
   std::optional<std::string> quality, size;
   std::optional<double> fps, duration;
   std::optional<uint64_t> seed;
+  std::vector<std::string> channels;  ///< depth, normal, id, motion; empty: as the scene says
+  std::optional<std::string> channel_format;
   bool no_cache = false;  ///< neither read nor keep the convex parts of models on disk
 
   DecompositionCache decompositions() const {
@@ -43,9 +45,8 @@ struct RenderOptions {
   std::string frames, chunk;
   std::string format = "rgba";  ///< of standard output
   std::string cache, stats, report;
-  int threads = 0;                    ///< 0: all available
-  int jobs = 0;                       ///< 0: as `threads`
-  std::vector<std::string> channels;  ///< depth, normal, id, motion
+  int threads = 0;  ///< 0: all available
+  int jobs = 0;     ///< 0: as `threads`
   bool resume = false, force = false, dry_run = false, watch = false;
 };
 int render_command(const RenderOptions& options);
@@ -60,7 +61,6 @@ struct FrameOptions {
   std::string out;
   std::optional<int> frame;
   std::optional<double> at;
-  std::vector<std::string> channels;
   int threads = 0;
   bool force = false;
 };

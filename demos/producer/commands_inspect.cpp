@@ -164,6 +164,9 @@ std::vector<std::string> SceneOptions::overrides() const {
   if (fps) all.push_back(fmt::format("/output/fps={}", *fps));
   if (duration) all.push_back(fmt::format("/output/duration={}", *duration));
   if (seed) all.push_back(fmt::format("/world/seed={}", *seed));
+  if (!channels.empty())
+    all.push_back(fmt::format("/output/channels=[\"{}\"]", fmt::join(channels, "\",\"")));
+  if (channel_format) all.push_back("/output/channel_format=" + *channel_format);
   all.insert(all.end(), set.begin(), set.end());
   return all;
 }

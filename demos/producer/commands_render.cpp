@@ -68,11 +68,6 @@ int interrupted(const RunStats& stats, int total, const std::string& advice) {
   return 128 + stats.interrupted_by;
 }
 
-render::ChannelChoice channels_of(const std::vector<std::string>& names) {
-  const auto has = [&](const char* name) { return std::ranges::find(names, name) != names.end(); };
-  return {.depth = has("depth"), .normal = has("normal"), .id = has("id"), .motion = has("motion")};
-}
-
 struct Plan {
   LoadedScene loaded;
   OutputTarget target;
@@ -81,6 +76,7 @@ struct Plan {
   int threads = 1, jobs = 1;
   bool through_frames = false;  // a video that can be resumed: frames first, then the video
   fs::path frames_pattern;      // where frames go, if they do
+  ChannelFiles channels;
 };
 
 render::VideoDef video_def(const Plan& plan) {
@@ -124,6 +120,11 @@ Plan make_plan(const RenderOptions& options, const ModelLibrary& models, LoadedS
   plan.through_frames = plan.target.kind == OutputKind::video && options.resume;
   plan.frames_pattern =
       plan.through_frames ? fs::path(plan.target.path.string() + ".frames") / "####.png" : plan.target.path;
+  const OutputSettings& output = plan.loaded.scene.output;
+  plan.channels = {{output.channels, output.channel_format},
+                   plan.target.kind == OutputKind::frames
+                       ? fs::path(plan.frames_pattern).replace_extension()
+                       : fs::path(plan.target.path).replace_extension(".channels") / "####"};
   return plan;
 }
 
@@ -145,8 +146,8 @@ RunStats draw(const Plan& plan, const ModelLibrary& models, const RenderOptions&
   RenderJob job{
       .frames = std::move(frames), .threads = plan.jobs, .cache = {}, .report = !options.report.empty()};
   if (!options.cache.empty()) job.cache = options.cache;
-  job.channels = channels_of(options.channels);
-  job.channels_file = fs::path(plan.frames_pattern).replace_extension(".exr");
+  job.channels = plan.channels.choice;
+  job.channels_stem = plan.channels.stem;
   RunStats stats = render_frames(plan.loaded, models, job, sink, std::ref(printer));
   printer.finish();
   if (job.report) write_text_file(options.report, run_report(plan.loaded, plan.settings, stats));
@@ -158,7 +159,9 @@ int render_to_frames(const Plan& plan, const ModelLibrary& models, const RenderO
   const Existing existing = options.force    ? Existing::replace
                             : options.resume ? Existing::keep
                                              : Existing::refuse;
-  const std::vector<int> missing = prepare_frames(plan.frames_pattern, plan.frames,
+  if (plan.through_frames && plan.channels.choice.any())
+    fs::create_directories(plan.channels.stem.parent_path());
+  const std::vector<int> missing = prepare_frames(plan.frames_pattern, plan.channels, plan.frames,
                                                   {.scene = scene.name,
                                                    .settings = plan.settings,
                                                    .width_px = scene.render.size.x(),
@@ -189,6 +192,8 @@ int render_to_video(const Plan& plan, const ModelLibrary& models, const RenderOp
   // frames.
   render::VideoDef def = video_def(plan);
   const fs::path partial = def.path.replace_extension(".partial" + plan.target.path.extension().string());
+  if (plan.channels.choice.any())
+    prepare_channels(plan.channels, plan.loaded.scene.frame_count(), options.force);
   auto sink = render::make_video_sink(def);
   const RunStats stats = draw(plan, models, options, plan.frames, *sink);
   if (!stats.interrupted_by) fs::rename(partial, plan.target.path);
@@ -262,8 +267,8 @@ int render_command(const RenderOptions& options) {
   check_file(options.report, options.force || options.resume);
   check_distinct(options.report, options.out);
   check_distinct(options.report, options.stats);
-  if (!options.channels.empty() && plan.target.kind != OutputKind::frames)
-    throw OutputError(options.out + ": channels are files beside frames; give a folder or frames/####.png");
+  if (plan.channels.choice.any() && plan.target.kind == OutputKind::pipe)
+    throw OutputError("-: channels are files beside frames or a video; name a folder or a file");
   if (options.dry_run) return print_plan(plan);
   if (plan.frames.empty()) {
     say("note: this chunk has no frames: there are fewer frames than chunks\n");
@@ -290,8 +295,9 @@ int frame_command(const FrameOptions& options) {
   }
   check_png(options.out);
   check_file(options.out, options.force);
-  const fs::path data = fs::path(options.out).replace_extension(".exr");
-  if (!options.channels.empty()) check_file(data.string(), options.force);
+  const render::ChannelChoice channels{scene.output.channels, scene.output.channel_format};
+  const fs::path stem = fs::path(options.out).replace_extension();
+  for (const fs::path& file : render::channel_files(stem, channels)) check_file(file.string(), options.force);
 
   class PictureSink : public render::FrameSink {
    public:
@@ -308,13 +314,9 @@ int frame_command(const FrameOptions& options) {
   const auto threads = simulation_threads(options.threads);
   render::pin_environment(threads_or_all(options.threads));
   PictureSink sink(options.out);
-  const RunStats stats = render_frames(loaded, models,
-                                       {.frames = {frame},
-                                        .threads = 1,
-                                        .cache = {},
-                                        .channels = channels_of(options.channels),
-                                        .channels_file = data},
-                                       sink, {});
+  const RunStats stats = render_frames(
+      loaded, models,
+      {.frames = {frame}, .threads = 1, .cache = {}, .channels = channels, .channels_stem = stem}, sink, {});
   report_run(stats, options.talk, "");
   if (stats.interrupted_by) return interrupted(stats, 1, "");
   fmt::print("{}\n", options.out);

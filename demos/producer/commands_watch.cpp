@@ -167,7 +167,12 @@ class Watcher {
   /// Gives the finished files their names; those of an earlier, longer film go.
   void publish(const fs::path& made) {
     if (target_.kind == OutputKind::video) {
-      fs::rename(made / target_.path.filename(), target_.path);
+      // The video, and its folder of channels if it has any.
+      for (const auto& entry : fs::directory_iterator(made)) {
+        const fs::path place = folder() / entry.path().filename();
+        if (entry.is_directory()) fs::remove_all(place);
+        fs::rename(entry.path(), place);
+      }
     } else {
       fs::create_directories(folder());
       std::set<fs::path> stale = frames_in(target_.path);

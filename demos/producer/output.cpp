@@ -29,6 +29,16 @@ nlohmann::ordered_json to_json(const Manifest& m, const fs::path& pattern) {
           {"fps", m.fps}};
 }
 
+/// Whatever channels and formats frames 1 to `count` may have.
+void remove_channels(const fs::path& stem, int count) {
+  using render::Channel;
+  const std::vector all = {Channel::depth, Channel::normal, Channel::id, Channel::motion};
+  std::error_code error;
+  for (const auto format : {render::ChannelFormat::exr, render::ChannelFormat::png})
+    for (int k = 1; k <= count; ++k)
+      for (const fs::path& path : ChannelFiles{{all, format}, stem}.of(k)) fs::remove(path, error);
+}
+
 }  // namespace
 
 OutputTarget parse_output(const std::string& out) {
@@ -69,8 +79,8 @@ bool is_whole_png(const fs::path& path, int width_px, int height_px) {
          number(20) == height_px && std::memcmp(tail.data() + 4, "IEND", 4) == 0;
 }
 
-std::vector<int> prepare_frames(const fs::path& pattern, const std::vector<int>& frames,
-                                const Manifest& manifest, Existing existing) {
+std::vector<int> prepare_frames(const fs::path& pattern, const ChannelFiles& channels,
+                                const std::vector<int>& frames, const Manifest& manifest, Existing existing) {
   const fs::path folder = pattern.has_parent_path() ? pattern.parent_path() : ".";
   const fs::path manifest_path = folder / "manifest.json";
   std::error_code error;
@@ -89,8 +99,9 @@ std::vector<int> prepare_frames(const fs::path& pattern, const std::vector<int>&
           "--force");
     if (!same_settings && old.is_object()) {
       const fs::path old_name = old.value("pattern", pattern.filename().string());
-      for (int k = 1; k <= std::min(old.value("frames", 0), kMostFrames); ++k)
-        fs::remove(render::frame_path(folder / old_name.filename(), k), error);
+      const int count = std::min(old.value("frames", 0), kMostFrames);
+      for (int k = 1; k <= count; ++k) fs::remove(render::frame_path(folder / old_name.filename(), k), error);
+      remove_channels(fs::path(folder / old_name.filename()).replace_extension(), count);
     }
   }
 
@@ -101,13 +112,25 @@ std::vector<int> prepare_frames(const fs::path& pattern, const std::vector<int>&
     if (there && existing == Existing::refuse)
       throw OutputError(path.string() +
                         ": exists already; keep finished frames with --resume, or replace them with --force");
-    const bool keep = there && same_settings && existing == Existing::keep &&
-                      is_whole_png(path, manifest.width_px, manifest.height_px);
+    const bool keep =
+        there && same_settings && existing == Existing::keep &&
+        is_whole_png(path, manifest.width_px, manifest.height_px) &&
+        std::ranges::all_of(channels.of(frame), [](const fs::path& p) { return fs::exists(p); });
     if (!keep) missing.push_back(frame);
   }
   const std::string text = to_json(manifest, pattern).dump(2) + "\n";
   render::write_file_atomically(manifest_path, {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
   return missing;
+}
+
+void prepare_channels(const ChannelFiles& channels, int frames, bool replace) {
+  const fs::path folder = channels.stem.parent_path();
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw render::FileError(folder.string() + ": cannot make the folder: " + error.message());
+  if (replace) remove_channels(channels.stem, frames);
+  if (!replace && !fs::is_empty(folder))
+    throw OutputError(folder.string() + ": holds channels already; replace them with --force");
 }
 
 }  // namespace offstage::producer

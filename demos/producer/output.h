@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "producer/scene_io.h"
+#include "render/channels.h"
 #include "render/sink.h"
 
 namespace offstage::producer {
@@ -38,13 +39,27 @@ struct Manifest {
   double fps = 30;
 };
 
+/// Files with channels: which, and how their names begin, with '#' as in render::frame_path.
+struct ChannelFiles {
+  render::ChannelChoice choice;
+  std::filesystem::path stem;
+
+  std::vector<std::filesystem::path> of(int frame) const {
+    return render::channel_files(render::frame_path(stem, frame), choice);
+  }
+};
+
 enum class Existing { refuse, keep, replace };
 
 /// Prepares a folder of frames: checks or writes the manifest and returns those of `frames` that have to be
 /// drawn. Frames of other settings are never mixed in: they are refused, or removed with Existing::replace.
 /// Throws OutputError or FileError.
-std::vector<int> prepare_frames(const std::filesystem::path& pattern, const std::vector<int>& frames,
-                                const Manifest& manifest, Existing existing);
+/// `channels` belong to the frames: one that lacks a file of theirs is drawn again.
+std::vector<int> prepare_frames(const std::filesystem::path& pattern, const ChannelFiles& channels,
+                                const std::vector<int>& frames, const Manifest& manifest, Existing existing);
+
+/// The same for the channels of a video, of `frames` frames in all.
+void prepare_channels(const ChannelFiles& channels, int frames, bool replace);
 
 /// Whether a file is a complete PNG of this size.
 bool is_whole_png(const std::filesystem::path& path, int width_px, int height_px);

@@ -92,8 +92,8 @@ std::string name_or(const std::string& name, const char* kind, uint32_t id) {
 
 }  // namespace
 
-std::map<uint32_t, std::string> object_names(const Scene& scene) {
-  std::map<uint32_t, std::string> names;
+render::ObjectNames object_names(const Scene& scene) {
+  render::ObjectNames names;
   uint32_t id = 0;
   const auto add = [&](const std::string& name, const char* kind) {
     ++id;
@@ -119,9 +119,10 @@ Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context
   for (const Body& body : scene.bodies) add_body(body, models, slot, ++object);
   // In the order of Snapshot::rods.
   const auto add_rod = [&](const auto& rod) {
-    rods_.push_back(rod.visible ? stage_.add_instance(stage_.add_mesh(render::make_cylinder(f(rod.radius), 1)),
-                                                      material(rod.material, models))
-                                : render::InstanceHandle());
+    rods_.push_back(rod.visible
+                        ? stage_.add_instance(stage_.add_mesh(render::make_cylinder(f(rod.radius), 1)),
+                                              material(rod.material, models))
+                        : render::InstanceHandle());
   };
   for (const Spring& spring : scene.springs) add_rod(spring);
   for (const Joint& joint : scene.joints)

@@ -21,7 +21,7 @@
 namespace offstage::producer {
 
 /// What the ids of Channels stand for: bodies, cloths, particles, in scene order from 1.
-std::map<uint32_t, std::string> object_names(const Scene& scene);
+render::ObjectNames object_names(const Scene& scene);
 
 class Picture {
  public:

@@ -103,14 +103,14 @@ void print_frames(Pipeline& pipeline, render::FrameSink& sink, const Scene& scen
                   RunStats& stats, const ProgressCallback& progress) {
   const auto start = Clock::now();
   const auto total = static_cast<int>(job.frames.size());
-  const bool numbered = job.channels_file.filename().string().find('#') != std::string::npos;
-  const std::map<uint32_t, std::string> objects = object_names(scene);
+  const bool numbered = job.channels_stem.filename().string().find('#') != std::string::npos;
+  const render::ObjectNames objects = object_names(scene);
   while (auto print = pipeline.take_print()) {
     const auto encode_start = Clock::now();
     sink.write(print->shot.frame, print->image);
     if (job.channels.any())
-      render::write_exr(
-          numbered ? render::frame_path(job.channels_file, print->shot.frame) : job.channels_file,
+      render::write_channels(
+          numbered ? render::frame_path(job.channels_stem, print->shot.frame) : job.channels_stem,
           print->channels, job.channels, objects);
     const double encode_ms = ms_since(encode_start);
     if (stats.frames++ == 0) stats.startup_s = process_age_s();
@@ -283,6 +283,8 @@ std::string simulation_key(const LoadedScene& loaded, const ModelLibrary& models
   auto scene = nlohmann::ordered_json::parse(loaded.canonical);
   for (const char* key : {"name", "description", "camera", "lights", "environment", "render"})
     scene.erase(key);
+  if (scene.contains("output"))
+    for (const char* key : {"channels", "channel_format"}) scene["output"].erase(key);
   return text_hash(std::string(OFFSTAGE_VERSION) + scene.dump() + models.digest());
 }
 

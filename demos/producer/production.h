@@ -80,8 +80,8 @@ struct RenderJob {
   int threads = 1;                             ///< that draw, each with a context of its own
   std::optional<std::filesystem::path> cache;  ///< read states from here instead of simulating
   bool report = false;                         ///< keep figures and pictures
-  render::ChannelChoice channels;              ///< written beside the frames ...
-  std::filesystem::path channels_file;  ///< ... as these; '#' as in render::frame_path, or for one frame
+  render::ChannelChoice channels;              ///< to write ...
+  std::filesystem::path channels_stem;  ///< ... as these; '#' as in render::frame_path, or for one frame
 };
 
 /// Draws the frames into the sink and closes it. After an interrupt it finishes the frames in flight, closes

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "producer/contact_sheet.h"
 #include "render/image_io.h"
@@ -53,15 +54,26 @@ struct Series {
   std::function<double(const FrameFigures&)> value;
 };
 
-/// A number with as many digits as a label needs.
+/// A round number; what rounding leaves of zero is zero.
 std::string label(double value) {
-  return fmt::format("{:.3g}", value);
+  return fmt::format("{:g}", std::abs(value) < 1e-12 ? 0.0 : value);
+}
+
+/// Round numbers within a range, about `count` of them.
+std::vector<double> ticks(double low, double high, int count) {
+  const double rough = (high - low) / count, power = std::pow(10, std::floor(std::log10(rough)));
+  const double share = rough / power;
+  const double step = power * (share <= 1 ? 1 : share <= 2 ? 2 : share <= 5 ? 5 : 10);
+  std::vector<double> result;
+  // The margin takes the last one in where rounding has put it a hair beyond.
+  for (double k = std::ceil(low / step); k * step <= high + 1e-6 * step; ++k) result.push_back(k * step);
+  return result;
 }
 
 /// Lines over the film's time as an inline drawing.
 std::string plot(const std::string& title, const std::vector<FrameFigures>& figures,
                  const std::vector<Series>& all) {
-  constexpr double kWidth = 1000, kHeight = 220, kLeft = 70, kRight = 15, kTop = 28, kBottom = 24;
+  constexpr double kWidth = 1000, kHeight = 220, kLeft = 70, kRight = 25, kTop = 28, kBottom = 24;
   double low = 0, high = 0;
   for (const FrameFigures& f : figures)
     for (const Series& s : all) {
@@ -77,15 +89,13 @@ std::string plot(const std::string& title, const std::vector<FrameFigures>& figu
 
   std::string svg = fmt::format("<svg viewBox=\"0 0 {} {}\"><text x=\"{}\" y=\"18\">{}</text>\n", kWidth,
                                 kHeight, kLeft, escaped(title));
-  for (int k = 0; k <= 4; ++k) {
-    const double v = low + (high - low) * k / 4;
+  for (const double v : ticks(low, high, 4)) {
     svg += fmt::format(
         "<line x1=\"{0}\" x2=\"{1}\" y1=\"{2:.1f}\" y2=\"{2:.1f}\" stroke=\"#eee\"/>"
         "<text x=\"{3}\" y=\"{4:.1f}\" text-anchor=\"end\">{5}</text>\n",
         kLeft, kWidth - kRight, y(v), kLeft - 6, y(v) + 4, label(v));
   }
-  for (int k = 0; k <= 5; ++k) {
-    const double t = begin + (end - begin) * k / 5;
+  for (const double t : ticks(begin, end, 8)) {
     svg += fmt::format("<text x=\"{:.1f}\" y=\"{}\" text-anchor=\"middle\">{} s</text>\n", x(t), kHeight - 6,
                        label(t));
   }
@@ -94,6 +104,7 @@ std::string plot(const std::string& title, const std::vector<FrameFigures>& figu
     svg += fmt::format("<polyline fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\" points=\"", s.color);
     for (const FrameFigures& f : figures) svg += fmt::format("{:.1f},{:.1f} ", x(f.time), y(s.value(f)));
     svg += "\"/>\n";
+    if (all.size() == 1) continue;  // the title says what it is
     svg += fmt::format("<text x=\"{}\" y=\"18\" text-anchor=\"end\" style=\"fill:{}\">{}</text>\n", legend,
                        s.color, s.name);
     legend -= 110;
@@ -153,14 +164,14 @@ std::string run_report(const LoadedScene& loaded, const std::string& settings, c
       "charset=\"utf-8\"><title>{0}</title>\n{1}</head><body>\n"
       "<h1>{0}</h1>\n<p>{2}</p>\n<p>{3} frames of {4} x {5} pixels, {6:g} a second; {7} bodies, at most {8} "
       "particles; "
-      "{9:.1f} s.</p>\n",
+      "made in {9:.1f} s.</p>\n",
       escaped(scene.name), kStyle, escaped(scene.description), stats.frames, scene.render.size.x(),
       scene.render.size.y(), scene.output.fps, stats.bodies, stats.most_particles, stats.wall_s);
   html += sheet(scene, stats);
   html += "<h2>Plots</h2>\n" + plots(stats.figures);
   html += "<h2>Figures</h2>\n<pre>" + escaped(to_json(stats)) + "</pre>\n";
-  html += "<h2>Settings</h2>\n<p>Hash <code>" + settings + "</code></p>\n<pre>" + escaped(loaded.canonical) +
-          "</pre>\n";
+  html += "<h2>Settings</h2>\n<p>Hash <code>" + settings + "</code></p>\n<pre>" +
+          escaped(nlohmann::ordered_json::parse(loaded.canonical).dump(2)) + "</pre>\n";
   html += "<h2>Hashes</h2>\n" + hashes(stats.figures);
   return html + "</body></html>\n";
 }

@@ -19,6 +19,7 @@
 #include "producer/scene_joint.h"
 #include "producer/scene_particles.h"
 #include "producer/scene_values.h"
+#include "render/channels.h"
 #include "render/model.h"
 #include "render/stage.h"
 #include "render/tone_map.h"
@@ -343,6 +344,8 @@ struct OutputSettings {
   Real duration = 5;
   Real start =
       0;  ///< time of frame 1: what happens before is simulated and not shown (a fountain already running)
+  std::vector<render::Channel> channels;  ///< numbers for each pixel, in files beside the frames or the video
+  render::ChannelFormat channel_format = render::ChannelFormat::exr;
 };
 
 struct Scene {

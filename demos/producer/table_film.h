@@ -224,15 +224,30 @@ struct Table<RenderSettings> {
   }
 };
 template <>
+struct Names<render::Channel> {
+  static constexpr std::array kNames = {"depth", "normal", "id", "motion"};
+};
+template <>
+struct Names<render::ChannelFormat> {
+  static constexpr std::array kNames = {"exr", "png"};
+};
+template <>
 struct Table<OutputSettings> {
   static constexpr const char* kName = "output";
-  static constexpr const char* kHelp = "The film's time.";
+  static constexpr const char* kHelp = "The film's time, and the numbers that go with its pictures.";
   static Fields<OutputSettings> fields() {
     using T = OutputSettings;
-    return {{"fps", &T::fps, "frames per second", "1/s", between(1, 1000)},
-            {"duration", &T::duration, "length of the film", "s", over(0, 86400)},
-            {"start", &T::start, "time of the first frame; what happens before is simulated and not shown",
-             "s", between(0, 86400)}};
+    return {
+        {"fps", &T::fps, "frames per second", "1/s", between(1, 1000)},
+        {"duration", &T::duration, "length of the film", "s", over(0, 86400)},
+        {"start", &T::start, "time of the first frame; what happens before is simulated and not shown", "s",
+         between(0, 86400)},
+        {"channels", &T::channels,
+         "numbers for each pixel, beside each frame (or in FILM.channels beside a video): depth [m], normal, "
+         "id, motion [px since the frame before]"},
+        {"channel_format", &T::channel_format,
+         "exr: FRAME.exr with all as they are; png: FRAME.depth.png (16 bits, mm) and so on, each with its "
+         "scale in its comment"}};
   }
 };
 

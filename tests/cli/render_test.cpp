@@ -262,8 +262,38 @@ TEST(Render, ChannelsStandBesideTheFramesAndOnlyThere) {
     EXPECT_EQ(files.at(name + std::string(".exr")).substr(0, 4), "\x76\x2f\x31\x01");
     EXPECT_NE(files.at(name + std::string(".exr")).find("2 thrown\n"), std::string::npos);
   }
-  EXPECT_EQ(offstage("render " + tiny_scene() + " -o a.mp4 --channels depth", folder.path()).code, 2);
+  EXPECT_EQ(offstage("render " + tiny_scene() + " -o - --channels depth", folder.path()).code, 2);
   EXPECT_EQ(offstage("render " + tiny_scene() + " -o b/ --channels colour", folder.path()).code, 2);
+}
+
+TEST(Render, ChannelsStandInAFolderBesideAVideo) {
+  const TemporaryFolder folder;
+  const std::string command =
+      "render " + tiny_scene() + " -o a.gif -q --frames 1-2 --channels depth,id --channel-format png";
+  ASSERT_EQ(offstage(command, folder.path()).code, 0);
+  const auto files = frames(folder / "a.channels");
+  ASSERT_EQ(files.size(), 4u);
+  for (const char* name : {"0001.depth.png", "0001.id.png", "0002.depth.png", "0002.id.png"})
+    EXPECT_EQ(files.at(name).substr(1, 3), "PNG") << name;
+  EXPECT_NE(files.at("0002.id.png").find(" thrown\n"), std::string::npos);
+  std::filesystem::remove(folder / "a.gif");
+  EXPECT_EQ(offstage(command, folder.path()).code, 2) << "what is there is kept";
+  EXPECT_EQ(offstage(command + " --force", folder.path()).code, 0);
+}
+
+TEST(Render, ResumeDrawsAFrameAgainThatLacksAChannel) {
+  const TemporaryFolder folder;
+  const std::string command = "render " + tiny_scene() +
+                              " -o out/ -q --frames 1-3 --set 'output.channels=[\"normal\"]' "
+                              "--set output.channel_format=png ";
+  ASSERT_EQ(offstage(command, folder.path()).code, 0);
+  const auto whole = frames(folder / "out");
+  ASSERT_EQ(whole.size(), 6u);
+  std::filesystem::remove(folder / "out/0002.normal.png");
+  std::filesystem::remove(folder / "out/0003.png");
+  ASSERT_EQ(offstage(command + "--resume --stats s.json", folder.path()).code, 0);
+  EXPECT_EQ(frames(folder / "out"), whole);
+  EXPECT_NE(read_file(folder / "s.json").find("\"frames_kept\": 1"), std::string::npos);
 }
 
 TEST(Render, TransparentBackgroundHasAlpha) {

@@ -49,6 +49,20 @@ TEST(StageChannels, DepthOfTheGroundIsTheClosedForm) {
   EXPECT_EQ(sky.id[at(sky, 48, 2)], 0u);
 }
 
+TEST(StageChannels, APictureInBetweenLeavesNothingOfTheFrameBefore) {
+  SmallStage s;
+  s.stage.set_object(s.add(make_box({4, 4, 1}), {}, {0, 0, -1}), 4);
+  const InstanceHandle front = s.add(make_box({1, 1, 1}), {}, {0, 0, 1});
+  s.stage.set_object(front, 3);
+  const Channels before = s.stage.channels(0);
+  EXPECT_EQ(before.id[middle(before)], 3u);
+  HdrImage sum;
+  s.stage.draw({}, sum);
+  s.stage.set_visible(front, false);
+  const Channels after = s.stage.channels(0);
+  EXPECT_EQ(after.id[middle(after)], 4u);
+}
+
 TEST(StageChannels, IdsTellWhatIsInFront) {
   SmallStage s;
   s.stage.set_object(s.add(make_box({1, 1, 1}), {}, {0, 0, 1}), 3);

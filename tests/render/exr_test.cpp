@@ -42,7 +42,7 @@ std::vector<T> read(const std::filesystem::path& path, const char* name, Imf::Pi
 TEST(Exr, KeepsEveryNumber) {
   const ScratchFolder folder;
   const Channels c = sample();
-  write_exr(folder / "a.exr", c, {.depth = true, .normal = true, .id = true, .motion = true},
+  write_exr(folder / "a.exr", c, {{Channel::depth, Channel::normal, Channel::id, Channel::motion}},
             {{16'000'001, "the box"}});
   EXPECT_EQ(read<float>(folder / "a.exr", "Z", Imf::FLOAT), c.depth);
   EXPECT_EQ(read<uint32_t>(folder / "a.exr", "id", Imf::UINT), c.id);
@@ -58,7 +58,7 @@ TEST(Exr, KeepsEveryNumber) {
 
 TEST(Exr, HoldsOnlyWhatWasChosen) {
   const ScratchFolder folder;
-  write_exr(folder / "a.exr", sample(), {.motion = true}, {});
+  write_exr(folder / "a.exr", sample(), {{Channel::motion}}, {});
   Imf::InputFile file((folder / "a.exr").c_str());
   std::vector<std::string> names;
   for (auto i = file.header().channels().begin(); i != file.header().channels().end(); ++i)
