@@ -75,6 +75,7 @@ class MeshPass {
   /// Depth alone of what is wholly opaque, so that only what is seen is shaded.
   void draw_depth(const Matrix4f& clip_from_world);
   void draw_opaque();
+  bool has_opaque() const { return !opaque_.empty(); }
   bool has_glass() const { return !glass_.empty(); }
   bool has_mirrors() const;
   /// What surfaces mirror of the scene, to be added to the picture, which is bound with its depth. `reach`:

@@ -516,8 +516,12 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   const std::vector<const Cloth*> sheets = s.prepare_cloths();
   s.draw_shadows(shown, sheets, sets, view, offsets, frame);
   s.draw_depth(sheets, sets, view);
-  const float reach =
-      s.environment.occlusion_reach.value_or(kReach * (s.camera.target - s.camera.eye).norm());
+  // Where nothing opaque is, nothing hides the sky; its two programs are not built either.
+  const bool opaque =
+      s.mesh_pass.has_opaque() || !sheets.empty() ||
+      std::ranges::any_of(sets, [](const PointSet* set) { return set->def.style == PointStyle::sphere; });
+  const float nearby = kReach * (s.camera.target - s.camera.eye).norm();
+  const float reach = opaque ? s.environment.occlusion_reach.value_or(nearby) : 0;
   s.occlusion_pass.draw(s.picture.depth, view, reach, offsets.count, seed_of(offsets));
   s.draw_opaque(sheets, sets);
   s.draw_blended(sets, view, frame, offsets.index == 0);

@@ -50,8 +50,13 @@ class ClothChecker {
   void check_material(const Cloth& cloth) {
     if (cloth.material.empty()) return;
     const auto material = std::ranges::find(scene_.materials, cloth.material, &Material::name);
-    if (material != scene_.materials.end() && material->color.rgba.w() < 1)
+    if (material == scene_.materials.end()) return;
+    if (material->color.rgba.w() < 1)
       warn(cloth.where.path + "/material", "cloths are drawn opaque, whatever the alpha of their colour");
+    if (material->transmission > 0)
+      warn(cloth.where.path + "/material",
+           "cloths are drawn opaque, whatever the transmission of their material; light comes through by "
+           "fabric.translucency");
   }
 
   void check_body(const PinScope& pin) {
