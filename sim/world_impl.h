@@ -115,7 +115,7 @@ struct World::Impl : WorldState {
   void update_articulations();
   void break_joints(Real h, StepReport& report);
   void let_go_of_joints(const Body& body);
-  bool is_driven(const Island& island) const;
+  bool is_driven(const Island& island, Real time) const;
   bool are_jointed(const Body& a, const Body& b) const;
 
   // Particles

@@ -101,11 +101,12 @@ std::vector<uint32_t> colliding_links(std::span<Joint* const> component) {
   return slots;
 }
 
-/// A motor that goes on moving, or a link that does by itself.
-bool drives(const Joint& joint) {
+/// A motor that goes on moving or is yet to, or a link that does by itself.
+bool drives(const Joint& joint, Real time) {
   const Motor& motor = joint.def.motor;
-  if (motor.mode != Motor::Mode::none && (motor.targets.size() > 1 || (motor.mode == Motor::Mode::speed && motor.target(0) != 0)))
-    return true;
+  const bool has_keys_left = motor.targets.size() > 1 && motor.targets.back().time > time;
+  const bool turns_on = motor.mode == Motor::Mode::speed && motor.target(time) != 0;
+  if (motor.mode != Motor::Mode::none && (has_keys_left || turns_on)) return true;
   const auto moves = [](const Body* body) { return body && body->is_kinematic() && body->def.track.moves(); };
   return moves(joint.a) || moves(joint.b);
 }
@@ -268,9 +269,10 @@ void World::Impl::let_go_of_joints(const Body& body) {
 }
 
 /// Whether joints keep an island from coming to rest.
-bool World::Impl::is_driven(const Island& island) const {
-  return std::any_of(island.articulations.begin(), island.articulations.end(), [](const Articulation* a) {
-    return std::any_of(a->joints().begin(), a->joints().end(), [](const Joint* joint) { return drives(*joint); });
+bool World::Impl::is_driven(const Island& island, Real time) const {
+  return std::any_of(island.articulations.begin(), island.articulations.end(), [&](const Articulation* a) {
+    return std::any_of(a->joints().begin(), a->joints().end(),
+                       [&](const Joint* joint) { return drives(*joint, time); });
   });
 }
 

@@ -93,7 +93,7 @@ void World::Impl::put_to_sleep(Real start, Real h) {
       return body->quiet_time >= kQuietTime && body->is_dynamic();
     });
     // Something pushes, or nothing holds: what hangs at the top of its flight is quiet for a moment only.
-    if (!quiet || is_driven(island)) continue;
+    if (!quiet || is_driven(island, start + h)) continue;
     const bool pushed = std::any_of(island.pairs.begin(), island.pairs.end(), [](const ContactPair* pair) {
       const Body& other = pair->a().is_awake() ? pair->b() : pair->a();
       return (other.is_kinematic() && other.def.track.moves()) || pair->surface().conveys;

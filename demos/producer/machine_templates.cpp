@@ -97,7 +97,7 @@ Parts build(const Vehicle& car) {
       inside(make.box(hub, car.trim, size, hub_mass, centre));
       Joint& spring = make.join(prismatic, hub, hub, "chassis", centre);
       spring.behaviour.limits = std::array{-travel, travel};
-      // Bears the car's weight where it stands.
+      // Bears the car's weight on Earth, which it is built for.
       spring.behaviour.motor = JointMotor{.mode = sim::Motor::Mode::position,
                                           .target = -load * kGravity / stiffness,
                                           .stiffness = stiffness,

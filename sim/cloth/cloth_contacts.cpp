@@ -118,7 +118,8 @@ bool ClothContacts::touch(const ClothPoints& points, Near& near, Touch& t) const
 
 void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<VelocityCut>& cuts) {
   std::fill(active_.begin(), active_.end(), 0);
-  touches_body_.assign(points.size(), 0);
+  touched_.assign(points.size(), nullptr);
+  touches_several_.assign(points.size(), 0);
   any_dynamic_ = false;
   for (std::size_t k = 0; k < near_.size();) {
     touches_.clear();
@@ -128,7 +129,8 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
     const std::size_t count = touches_.size();
     if (count == 0) continue;
     active_[points.cloth[point]] += count;
-    touches_body_[point] = 1;
+    touched_[point] = touches_.front().body;
+    touches_several_[point] = count > 1;
     any_dynamic_ |= std::ranges::any_of(touches_, [](const Touch& t) { return t.body->is_dynamic(); });
     // What is fixed comes last, so that its surface is kept best.
     std::stable_sort(touches_.begin(), touches_.end(), [](const Touch& a, const Touch& b) {

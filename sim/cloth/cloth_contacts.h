@@ -37,7 +37,9 @@ class ClothContacts {
                                 std::span<const Real> recoil);
 
   /// Whether a point touched a body in the last solve().
-  bool touches(std::size_t point) const { return point < touches_body_.size() && touches_body_[point] != 0; }
+  bool touches_other_than(std::size_t point, const ClothBody* body) const {
+    return point < touched_.size() && touched_[point] && (touched_[point] != body || touches_several_[point]);
+  }
   bool any_dynamic() const { return any_dynamic_; }  ///< whether a body that can be pushed touches cloth
   std::span<const uint64_t> active() const { return active_; }  ///< contacts of the last solve(), by cloth
   /// Raises, by cloth, how deep any of its points is behind a surface, at the end of a sub-step.
@@ -69,7 +71,9 @@ class ClothContacts {
   Real h_ = 0;
   bool any_dynamic_ = false;
   std::vector<Near> near_;  // by point
-  std::vector<uint8_t> touches_body_;  // of each point
+  // Of each point: a body that it touches, and whether it touches others.
+  std::vector<const ClothBody*> touched_;
+  std::vector<uint8_t> touches_several_;
   std::vector<Vec3> seen_at_;
   std::vector<Real> seen_reach_;  // how far each point may move before it must be looked at again
   std::vector<Aabb> boxes_;       // of the bodies' ways

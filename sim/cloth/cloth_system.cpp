@@ -22,7 +22,7 @@ constexpr Real kBeyondTear = 1.05;
 /// How long a span is, at most [s].
 constexpr Real kSpan = 1.0 / 480;
 /// For how long pairs of cloth with cloth are sought at a time [s].
-constexpr Real kHorizon = 1.0 / 60;
+constexpr Real kHorizon = 1.0 / 120;
 
 }  // namespace
 
@@ -244,17 +244,22 @@ void ClothSystem::close_seams() {
   }
 }
 
-/// The mean move of cloths that fly free, in whose frame moves are shortened, or they were held back in the
-/// air. None if pins hold any point, or bodies touch it.
+/// The move in whose frame moves are shortened, or what flies or falls would be held back in the air: the mean
+/// one of cloths that are free, and of the pins if one body holds them all. None if other bodies touch cloth.
 Vec4 ClothSystem::common_move() const {
-  if (!held_.empty()) return Vec4::Zero();
+  const ClothBody* const holder = held_.empty() ? nullptr : held_.front().body;
+  if (!held_.empty() && !holder) return Vec4::Zero();
+  if (std::ranges::any_of(held_, [&](const Held& held) { return held.body != holder; })) return Vec4::Zero();
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    if (contacts_.touches_other_than(i, holder)) return Vec4::Zero();
   Vec4 sum = Vec4::Zero();
   Real mass = 0;
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    if (contacts_.touches(i)) return Vec4::Zero();
+  const auto add = [&](std::size_t i) {
     sum += points_.mass[i] * (points_.position[i] - points_.start[i]);
     mass += points_.mass[i];
-  }
+  };
+  for (const Held& held : held_) add(held.point);
+  for (std::size_t i = 0; held_.empty() && i < points_.size(); ++i) add(i);
   return sum / mass;
 }
 

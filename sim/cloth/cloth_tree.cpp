@@ -75,6 +75,15 @@ void ClothTree::build(std::span<const Triangle> triangles, std::span<const Vec4>
   if (!triangles.empty()) build_below(centres, 0, static_cast<uint32_t>(triangles.size()));
   place_.resize(order_.size());
   for (uint32_t i = 0; i < order_.size(); ++i) place_[order_[i]] = i;
+  parent_.assign(nodes_.size(), 0);
+  leaf_.resize(order_.size());
+  for (uint32_t k = 0; k < nodes_.size(); ++k) {
+    const Node& node = nodes_[k];
+    if (node.second != 0)
+      parent_[k + 1] = parent_[node.second] = k;
+    else
+      std::fill_n(leaf_.begin() + node.first, node.count, k);
+  }
 }
 
 /// Whether the outline of a patch, seen along its mean normal, crosses itself: sweeps over its segments.
@@ -152,42 +161,79 @@ void ClothTree::halve(const std::vector<Vec4>& centres, uint32_t first, uint32_t
   });
 }
 
+void ClothTree::Box::extend(const Box& b) {
+  low = low.cwiseMin(b.low);
+  high = high.cwiseMax(b.high);
+  least_move = least_move.cwiseMin(b.least_move);
+  greatest_move = greatest_move.cwiseMax(b.greatest_move);
+}
+
+ClothTree::Box ClothTree::box_of(const Triangle& t, std::span<const Vec4> from, std::span<const Vec4> to,
+                                 std::span<const Real> margin) const {
+  const Vec4 &a = from[t[0]], &b = from[t[1]], &c = from[t[2]];
+  const Vec4 move_a = to[t[0]] - a, move_b = to[t[1]] - b, move_c = to[t[2]] - c;
+  const Vec4 around = Vec4::Constant(std::max({margin[t[0]], margin[t[1]], margin[t[2]]}));
+  return {a.cwiseMin(b).cwiseMin(c) - around, a.cwiseMax(b).cwiseMax(c) + around,
+          move_a.cwiseMin(move_b).cwiseMin(move_c), move_a.cwiseMax(move_b).cwiseMax(move_c)};
+}
+
+void ClothTree::fit_box(Node& node, uint32_t at) const {
+  if (node.second != 0) {
+    node.box = nodes_[at + 1].box;
+    node.box.extend(nodes_[node.second].box);
+    return;
+  }
+  node.box = boxes_[node.first];
+  for (uint32_t i = node.first + 1; i < node.first + node.count; ++i) node.box.extend(boxes_[i]);
+}
+
 void ClothTree::fit(std::span<const Vec4> from, std::span<const Vec4> to, std::span<const Real> margin) {
-  std::vector<Vec4> normals(order_.size());
-  for (std::size_t i = 0; i < order_.size(); ++i) {
-    const Triangle& t = triangles_[order_[i]];
-    const Vec4 &a = from[t[0]], &b = from[t[1]], &c = from[t[2]];
-    const Vec4 low = a.cwiseMin(b).cwiseMin(c).cwiseMin(to[t[0]]).cwiseMin(to[t[1]]).cwiseMin(to[t[2]]);
-    const Vec4 high = a.cwiseMax(b).cwiseMax(c).cwiseMax(to[t[0]]).cwiseMax(to[t[1]]).cwiseMax(to[t[2]]);
-    const Vec4 around = Vec4::Constant(std::max({margin[t[0]], margin[t[1]], margin[t[2]]}));
-    boxes_[i] = {low - around, high + around};
+  std::vector<std::array<Vec4, 2>> normals(order_.size());  // least and greatest at both ends of the way
+  const auto unit_normal = [](const Vec4& a, const Vec4& b, const Vec4& c) {
     const Vec3 n = (b - a).head<3>().cross((c - a).head<3>());
     const Real size = n.norm();
-    normals[i] = size > 0 ? padded(n / size) : Vec4(Vec4::Zero());
+    return size > 0 ? padded(n / size) : Vec4(Vec4::Zero());
+  };
+  for (std::size_t i = 0; i < order_.size(); ++i) {
+    const Triangle& t = triangles_[order_[i]];
+    boxes_[i] = box_of(t, from, to, margin);
+    const Vec4 first = unit_normal(from[t[0]], from[t[1]], from[t[2]]);
+    const Vec4 last = unit_normal(to[t[0]], to[t[1]], to[t[2]]);
+    normals[i] = {first.cwiseMin(last), first.cwiseMax(last)};
   }
-  for (std::size_t k = nodes_.size(); k-- > 0;) {
+  for (auto k = static_cast<uint32_t>(nodes_.size()); k-- > 0;) {
     Node& node = nodes_[k];
+    fit_box(node, k);
     if (node.second != 0) {
       const Node &a = nodes_[k + 1], &b = nodes_[node.second];
-      node.low = a.low.cwiseMin(b.low);
-      node.high = a.high.cwiseMax(b.high);
       node.normal_low = a.normal_low.cwiseMin(b.normal_low);
       node.normal_high = a.normal_high.cwiseMax(b.normal_high);
     } else {
-      node.low = boxes_[node.first].low;
-      node.high = boxes_[node.first].high;
-      node.normal_low = node.normal_high = normals[node.first];
+      node.normal_low = normals[node.first][0];
+      node.normal_high = normals[node.first][1];
       for (uint32_t i = node.first + 1; i < node.first + node.count; ++i) {
-        node.low = node.low.cwiseMin(boxes_[i].low);
-        node.high = node.high.cwiseMax(boxes_[i].high);
-        node.normal_low = node.normal_low.cwiseMin(normals[i]);
-        node.normal_high = node.normal_high.cwiseMax(normals[i]);
+        node.normal_low = node.normal_low.cwiseMin(normals[i][0]);
+        node.normal_high = node.normal_high.cwiseMax(normals[i][1]);
       }
     }
     const Vec4 middle = node.normal_low + node.normal_high;
     const Real size = middle.norm();
     const Vec4 least = (middle.cwiseProduct(node.normal_low)).cwiseMin(middle.cwiseProduct(node.normal_high));
     node.leans = node.connected && least.sum() > kLeaning * size;
+  }
+}
+
+void ClothTree::refit(std::span<const uint32_t> triangles, std::span<const Vec4> from,
+                      std::span<const Vec4> to, std::span<const Real> margin) {
+  std::vector<uint8_t> changed(nodes_.size(), 0);
+  for (uint32_t t : triangles) {
+    boxes_[place_[t]] = box_of(triangles_[t], from, to, margin);
+    changed[leaf_[place_[t]]] = 1;
+  }
+  for (auto k = static_cast<uint32_t>(nodes_.size()); k-- > 0;) {  // children come after their parents
+    if (!changed[k]) continue;
+    fit_box(nodes_[k], k);
+    changed[parent_[k]] = 1;
   }
 }
 

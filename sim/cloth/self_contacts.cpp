@@ -11,7 +11,7 @@ namespace {
 
 /// Pairs are sought this much farther than they touch, in thicknesses; half of it is how far points may stray
 /// from the ways foreseen.
-constexpr Real kMargin = 1;
+constexpr Real kMargin = 0.6;
 /// Up to this part of all points are sought again alone.
 constexpr std::size_t kFew = 3;
 /// What is near at rest in the cloth itself, is not pushed farther apart than this share of it.
@@ -22,6 +22,8 @@ constexpr Real kRecovery = 0.05;
 constexpr Real kLeft = 0.1;
 /// Distance below which no normal can be told [m].
 constexpr Real kNoSide = 1e-9;
+/// What is left of a length along a unit vector of single precision.
+constexpr Real kUnit = 1 - 1e-6;
 /// Moves are halved until they are less than this share, and then given up.
 constexpr Real kLeastShare = 0.1;
 
@@ -73,6 +75,28 @@ bool planes_apart(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, boo
   return height * height > reach * reach * n.squaredNorm();
 }
 
+/// Whether a triangle lies on one side of another's plane, farther from it than `reach`.
+bool above(std::span<const Vec4> x, const Triangle& a, const Triangle& b, Real reach) {
+  const Vec3 p0 = place(x, b[0]), n = (place(x, b[1]) - p0).cross(place(x, b[2]) - p0);
+  const Real h0 = n.dot(place(x, a[0]) - p0), h1 = n.dot(place(x, a[1]) - p0), h2 = n.dot(place(x, a[2]) - p0);
+  const Real least = std::max(std::min({h0, h1, h2}), -std::max({h0, h1, h2}));
+  return least > 0 && least * least > reach * reach * n.squaredNorm();
+}
+
+/// How near pairs of two triangles must be to be kept, or more: by the bounds of their velocities.
+Real reach_of(const ClothPoints& points, std::span<const Vec4> velocity, const Triangle& a, const Triangle& b,
+              Real horizon) {
+  const auto least = [&](const Triangle& t) -> Vec4 {
+    return velocity[t[0]].cwiseMin(velocity[t[1]]).cwiseMin(velocity[t[2]]);
+  };
+  const auto greatest = [&](const Triangle& t) -> Vec4 {
+    return velocity[t[0]].cwiseMax(velocity[t[1]]).cwiseMax(velocity[t[2]]);
+  };
+  const Vec4 relative = (greatest(a) - least(b)).cwiseMax(greatest(b) - least(a));
+  return (points.thickness[a[0]] + points.thickness[b[0]]) / 2 * (1 + 1.5 * kMargin) +
+         relative.norm() * horizon;
+}
+
 /// How many of a pair's points belong to the first of the two.
 int first_side(bool edges) {
   return edges ? 2 : 1;
@@ -102,6 +126,25 @@ void SelfContacts::assign(std::vector<Triangle> triangles, const ClothPoints& po
   horizon_ = -1;
 }
 
+/// Keeps the pairs of two triangles' points and edges that may touch within the horizon, if `wanted(points)`.
+template <class Wanted>
+void SelfContacts::add_pairs(const ClothPoints& points, std::span<const Vec4> velocity, uint32_t ta,
+                             uint32_t tb, Real horizon, Wanted&& wanted) {
+  const Triangle &a = triangles_[ta], &b = triangles_[tb];
+  const Real most = reach_of(points, velocity, a, b, horizon);
+  if (above(points.start, a, b, most) || above(points.start, b, a, most)) return;
+  const auto seek = [&](const std::array<uint32_t, 4>& p, bool edges) {
+    if (wanted(p) && !boxes_apart(points.start, p, edges, most)) add(points, velocity, p, edges, horizon);
+  };
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (owns_point_[ta][k]) seek({a[k], b[0], b[1], b[2]}, false);
+    if (owns_point_[tb][k]) seek({b[k], a[0], a[1], a[2]}, false);
+    if (!owns_edge_[ta][k]) continue;
+    for (std::size_t j = 0; j < 3; ++j)
+      if (owns_edge_[tb][j]) seek({a[k], a[(k + 1) % 3], b[j], b[(j + 1) % 3]}, true);
+  }
+}
+
 void SelfContacts::add(const ClothPoints& points, std::span<const Vec4> velocity,
                        const std::array<uint32_t, 4>& p, bool edges, Real horizon) {
   for (int i = 0; i < first_side(edges); ++i)
@@ -115,14 +158,15 @@ void SelfContacts::add(const ClothPoints& points, std::span<const Vec4> velocity
                         .squaredNorm());
   Real thickness = (points.thickness[p[0]] + points.thickness[p[3]]) / 2;
   const Real reach = thickness * (1 + 1.5 * kMargin) + std::sqrt(fastest2) * horizon;
-  if (boxes_apart(points.start, p, edges, reach) || planes_apart(points.start, p, edges, reach)) return;
-  const Real distance = closest(points.start, p, edges).apart.norm();
+  if (planes_apart(points.start, p, edges, reach)) return;
+  const Closest c = closest(points.start, p, edges);
+  const Real distance = c.apart.norm();
   // What lies on each other, as the sides of a fresh tear, has no side yet.
   if (!(distance > kNoSide)) return;
   if (distance > reach) return;
   if (points.cloth[p[0]] == points.cloth[p[3]])
     thickness = std::min(thickness, kRestShare * closest(points.rest, p, edges).apart.norm());
-  pairs_.push_back({p, edges, thickness, distance, 0});
+  pairs_.push_back({p, edges, thickness, distance, 0, (c.apart / distance).head<3>().cast<float>()});
   pairs_.back().travel = travelled(pairs_.back());
 }
 
@@ -131,23 +175,13 @@ void SelfContacts::search(const ClothPoints& points, std::span<const Vec4> veloc
   horizon_ = horizon;
   foreseen_from_ = points.start;
   foreseen_velocity_.assign(velocity.begin(), velocity.end());
-  Vec4 drift = Vec4::Zero();
-  for (const Vec4& v : velocity) drift += v / static_cast<Real>(velocity.size());
-  std::vector<Vec4> to(points.size());
-  for (std::size_t i = 0; i < to.size(); ++i) to[i] = points.start[i] + horizon * (velocity[i] - drift);
-  tree_.fit(points.start, to, margin_);
+  foreseen_to_.resize(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) foreseen_to_[i] = points.start[i] + horizon * velocity[i];
+  tree_.fit(foreseen_from_, foreseen_to_, margin_);
   std::fill(travel_.begin(), travel_.end(), 0.0);
   pairs_.clear();
   tree_.pairs(points.start, [&](uint32_t ta, uint32_t tb) {
-    const Triangle &a = triangles_[ta], &b = triangles_[tb];
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (owns_point_[ta][k]) add(points, velocity, {a[k], b[0], b[1], b[2]}, false, horizon);
-      if (owns_point_[tb][k]) add(points, velocity, {b[k], a[0], a[1], a[2]}, false, horizon);
-      if (!owns_edge_[ta][k]) continue;
-      for (std::size_t j = 0; j < 3; ++j)
-        if (owns_edge_[tb][j])
-          add(points, velocity, {a[k], a[(k + 1) % 3], b[j], b[(j + 1) % 3]}, true, horizon);
-    }
+    add_pairs(points, velocity, ta, tb, horizon, [](const auto&) { return true; });
   });
 }
 
@@ -179,47 +213,26 @@ void SelfContacts::search_again(const ClothPoints& points, Real dt, Real horizon
   }
   if (expired || count > points.size() / kFew) return search(points, velocity, std::max(horizon, dt));
 
-  Vec4 drift = Vec4::Zero();
-  std::vector<Vec4> from(points.size()), to(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (strays[i]) {
-      foreseen_velocity_[i] = velocity[i];
-      foreseen_from_[i] = points.start[i] - since_ * velocity[i];
-    }
-    drift += foreseen_velocity_[i] / static_cast<Real>(points.size());
-  }
   const Real left = horizon_ - since_;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    from[i] = foreseen_from_[i] + since_ * foreseen_velocity_[i];
-    to[i] = from[i] + left * (foreseen_velocity_[i] - drift);
+    if (!strays[i]) continue;
+    foreseen_velocity_[i] = velocity[i];
+    foreseen_from_[i] = points.start[i] - since_ * velocity[i];
+    foreseen_to_[i] = points.start[i] + left * velocity[i];
   }
-  tree_.fit(from, to, margin_);
   const auto is_stray = [&](const auto& p) {
     return std::ranges::any_of(p, [&](uint32_t i) { return strays[i] != 0; });
   };
+  std::vector<uint32_t> seeking;
+  for (uint32_t t = 0; t < triangles_.size(); ++t)
+    if (is_stray(triangles_[t])) seeking.push_back(t);
+  tree_.refit(seeking, foreseen_from_, foreseen_to_, margin_);
   std::erase_if(pairs_, [&](const Pair& pair) { return is_stray(pair.points); });
-  const auto seek = [&](const std::array<uint32_t, 4>& p, bool edges) {
-    if (is_stray(p)) add(points, foreseen_velocity_, p, edges, left);
-  };
-  for (uint32_t ta = 0; ta < triangles_.size(); ++ta) {
-    const Triangle& a = triangles_[ta];
-    if (!is_stray(a)) continue;
-    Aabb box;
-    for (uint32_t i : a)
-      for (const Vec4& p : {from[i], to[i]})
-        box.extend(Vec3(p.head<3>().array() - margin_[i])).extend(Vec3(p.head<3>().array() + margin_[i]));
-    tree_.overlapping(box, [&](uint32_t tb) {
-      const Triangle& b = triangles_[tb];
-      if (tb == ta || (tb < ta && is_stray(b))) return;  // had from its side
-      for (std::size_t k = 0; k < 3; ++k) {
-        if (owns_point_[ta][k]) seek({a[k], b[0], b[1], b[2]}, false);
-        if (owns_point_[tb][k]) seek({b[k], a[0], a[1], a[2]}, false);
-        if (!owns_edge_[ta][k]) continue;
-        for (std::size_t m = 0; m < 3; ++m)
-          if (owns_edge_[tb][m]) seek({a[k], a[(k + 1) % 3], b[m], b[(m + 1) % 3]}, true);
-      }
+  for (uint32_t ta : seeking)
+    tree_.meeting(ta, [&](uint32_t tb) {
+      if (tb == ta || (tb < ta && is_stray(triangles_[tb]))) return;  // had from its side
+      add_pairs(points, foreseen_velocity_, ta, tb, left, is_stray);
     });
-  }
 }
 
 SelfContacts::Contact SelfContacts::look(const ClothPoints& points, uint32_t k) {
@@ -228,7 +241,23 @@ SelfContacts::Contact SelfContacts::look(const ClothPoints& points, uint32_t k) 
   pair.distance = c.apart.norm();
   pair.travel = travelled(pair);
   const Vec4 normal = pair.distance > 0 ? Vec4(c.apart / pair.distance) : Vec4(Vec4::UnitY());
+  pair.normal = normal.head<3>().cast<float>();
   return {k, c.weights, normal, pair.distance, c.inner};
+}
+
+/// The distance that any parts of the moves made now leave a pair along the direction in which it was apart
+/// when last looked at, or less: no more than is left in truth.
+Real SelfContacts::left_between(const ClothPoints& points, const Pair& pair) {
+  const Vec4 normal = padded(pair.normal.cast<Real>());
+  const Vec4& origin = points.start[pair.points[0]];
+  Real first = 1e300, second = -1e300;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const uint32_t i = pair.points[k];
+    const Real from = normal.dot(points.start[i] - origin), to = normal.dot(points.position[i] - origin);
+    static_cast<int>(k) < first_side(pair.edges) ? first = std::min({first, from, to})
+                                                 : second = std::max({second, from, to});
+  }
+  return (first - second) * kUnit;
 }
 
 /// The pairs that the moves made now may bring nearer than `reach(pair)`.
@@ -242,6 +271,7 @@ void SelfContacts::gather(const ClothPoints& points, Real dt, Real horizon, Reac
     const auto& p = pair.points;
     const Real moved = move_[p[0]] + move_[p[1]] + move_[p[2]] + move_[p[3]];
     if (pair.distance - (travelled(pair) - pair.travel) - moved > reach(pair)) continue;
+    if (left_between(points, pair) > reach(pair)) continue;
     const Contact contact = look(points, k);
     if (contact.distance - moved <= reach(pair)) contacts_.push_back(contact);
   }

@@ -49,8 +49,9 @@ class SelfContacts {
     std::array<uint32_t, 4> points;
     bool edges;
     Real thickness;
-    Real distance;  // when last looked at
-    Real travel;    // of all four together until then
+    Real distance;           // when last looked at
+    Real travel;             // of all four together until then
+    Eigen::Vector3f normal;  // from the second to the first then
   };
   struct Contact {
     uint32_t pair;
@@ -61,6 +62,9 @@ class SelfContacts {
   };
 
   void search(const ClothPoints& points, std::span<const Vec4> velocity, Real horizon);
+  template <class Wanted>
+  void add_pairs(const ClothPoints& points, std::span<const Vec4> velocity, uint32_t ta, uint32_t tb,
+                 Real horizon, Wanted&& wanted);
   void add(const ClothPoints& points, std::span<const Vec4> velocity, const std::array<uint32_t, 4>& p,
            bool edges, Real horizon);
   bool strayed(const ClothPoints& points, Real dt) const;
@@ -71,6 +75,7 @@ class SelfContacts {
   }
   template <class Reach>
   void gather(const ClothPoints& points, Real dt, Real horizon, Reach&& reach);
+  static Real left_between(const ClothPoints& points, const Pair& pair);
   Contact look(const ClothPoints& points, uint32_t pair);
 
   std::vector<Triangle> triangles_;
@@ -84,7 +89,7 @@ class SelfContacts {
 
   // Since the last search: ways foreseen, and the paths made.
   Real since_ = 0, horizon_ = -1;
-  std::vector<Vec4> foreseen_from_, foreseen_velocity_;
+  std::vector<Vec4> foreseen_from_, foreseen_to_, foreseen_velocity_;
   std::vector<Real> travel_, margin_;
   std::vector<Real> move_;  // of each point in the sub-step
 };

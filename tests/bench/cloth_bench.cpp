@@ -3,6 +3,7 @@
 /// SELF_COLLISION [SUBSTEPS_PER_SECOND]] or peer NODES
 /// [SUBSTEPS_PER_SECOND]; without arguments the usual cases.
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
@@ -25,7 +26,7 @@ double cpu_seconds() {
 
 void run(uint32_t cells, bool self_collision, Real rate) {
   effects::Fabric fabric = effects::find_fabric("cotton")->fabric;
-  fabric.thickness = 0.012;
+  fabric.thickness = std::min(0.012, 0.3 * 4.0 / cells);
   ClothDef def = effects::grid_cloth({4, 4, cells, cells}, {Vec3(0.15, 2.35, 0)}, fabric);
   def.self_collision = self_collision;
   if (rate > 0) def.substep = 1 / rate;
