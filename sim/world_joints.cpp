@@ -20,7 +20,9 @@ void check_not_negative(const JointDef& def, const char* field, Real value) {
 }
 
 void check(const JointDef& def) {
-  for (const auto& [field, v] : {std::pair("anchor", def.anchor), {"anchor_b", def.anchor_b}, {"axis", def.axis},
+  for (const auto& [field, v] : {std::pair("anchor", def.anchor),
+                                 {"anchor_b", def.anchor_b},
+                                 {"axis", def.axis},
                                  {"second_axis", def.second_axis}})
     if (!v.allFinite()) refuse(def, std::string(field) + " is not finite");
   if (!(def.axis.norm() > 1e-9)) refuse(def, "axis is 0 0 0, allowed is any direction");
@@ -42,17 +44,18 @@ void check(const JointDef& def) {
   check_not_negative(def, "motor.max_effort", def.motor.max_effort);
   check_not_negative(def, "motor.stiffness", def.motor.stiffness);
   check_not_negative(def, "motor.damping", def.motor.damping);
-  const bool can_drive = def.type == JointType::revolute || def.type == JointType::prismatic ||
-                         def.type == JointType::distance;
+  const bool can_drive =
+      def.type == JointType::revolute || def.type == JointType::prismatic || def.type == JointType::distance;
   if (def.motor.mode != Motor::Mode::none && !can_drive)
     refuse(def, "a motor drives revolute, prismatic and distance joints only");
   if ((def.friction > 0 || def.damping > 0) && !def.has_free_coordinate())
-    refuse(def, "friction and damping act where a joint may move: not on a fixed one, nor on a rod without "
-                "limits and motor");
+    refuse(def,
+           "friction and damping act where a joint may move: not on a fixed one, nor on a rod without "
+           "limits and motor");
   for (std::size_t i = 0; i < def.motor.targets.size(); ++i)
-    if (const Motor::Key& key = def.motor.targets[i];
-        !std::isfinite(key.time) || !std::isfinite(key.target) ||
-        (i > 0 && key.time <= def.motor.targets[i - 1].time))
+    if (const Motor::Key& key = def.motor.targets[i]; !std::isfinite(key.time) ||
+                                                      !std::isfinite(key.target) ||
+                                                      (i > 0 && key.time <= def.motor.targets[i - 1].time))
       refuse(def, "motor.targets: must be finite, with strictly increasing times");
 }
 
@@ -136,7 +139,8 @@ JointHandle World::add_joint(const JointDef& def) {
   joint->def = def;
   joint->a = body(def.a, "a");
   joint->b = body(def.b, "b");
-  if (!is_dynamic(joint->a) && !is_dynamic(joint->b)) refuse(def, "at least one of its bodies must be dynamic");
+  if (!is_dynamic(joint->a) && !is_dynamic(joint->b))
+    refuse(def, "at least one of its bodies must be dynamic");
   if (joint->a == joint->b) refuse(def, "a and b are the same");
   const Mat3 axes = frame_axes(def.axis, def.second_axis);
   const bool is_rod = def.type == JointType::distance;

@@ -97,8 +97,9 @@ struct ClothDef {
   /// Over-pressure inside of a closed cloth [Pa]: at its rest volume V0; at the volume V it is
   /// pressure V0 / V, as that of a gas that keeps its temperature. 0: none.
   Real pressure = 0;
-  /// Of an open cloth that catches the air, as a parachute: which share of the stagnation pressure rho (u.m)^2
-  /// / 2 of the air that comes in at its mouth builds up inside, on the side its normals point away from. 0: none.
+  /// Of an open cloth that catches the air, as a parachute: which share of the stagnation pressure rho
+  /// (u.m)^2 / 2 of the air that comes in at its mouth builds up inside, on the side its normals point away
+  /// from. 0: none.
   Real ram_pressure = 0;
 
   ClothIntegrator integrator = ClothIntegrator::relaxed;

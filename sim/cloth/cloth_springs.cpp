@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 
+#include "sim/collision/lanes.h"
 #include "sim/contact/staged_loop.h"
 
 namespace offstage::sim {
@@ -23,6 +25,27 @@ constexpr Real kSoftRatio = 0.5;
 constexpr Real kNoLength2 = 1e-24;
 /// Between two points that are held [1/kg].
 constexpr Real kNoMobility = 1e-100;
+
+/// Four numbers in one instruction, where Eigen's casts go one by one.
+typedef float Floats __attribute__((vector_size(16)));
+
+inline Vec4 widened(const Eigen::Vector4f& v) {
+  Floats from;
+  std::memcpy(&from, v.data(), sizeof(from));
+  const Lanes to = __builtin_convertvector(from, Lanes);
+  Vec4 result;
+  std::memcpy(result.data(), &to, sizeof(to));
+  return result;
+}
+
+inline Eigen::Vector4f narrowed(const Vec4& v) {
+  Lanes from;
+  std::memcpy(&from, v.data(), sizeof(from));
+  const Floats to = __builtin_convertvector(from, Floats);
+  Eigen::Vector4f result;
+  std::memcpy(result.data(), &to, sizeof(to));
+  return result;
+}
 
 /// An impulse (times the step) pulls a and b together. What pins hold passes it on.
 inline void give(ClothPoints& points, std::span<Vec4> moves, uint32_t a, uint32_t b, const Vec4& impulse) {
@@ -108,14 +131,14 @@ void ClothSprings::count_softened(const ClothPoints& points, Real h, std::span<u
 void ClothSprings::pull(ClothPoints& points, std::span<Vec4> moves, Real h, std::size_t begin,
                         std::size_t end) {
   constexpr std::size_t kLanes = 16;
-  using Lanes = Eigen::Array<Real, kLanes, 1>;
+  using Batch = Eigen::Array<Real, kLanes, 1>;
   const Vec4* const x = points.start.data();
   const Real* const w = points.inverse_mass.data();
   for (std::size_t first = begin; first < end; first += kLanes) {
     const std::size_t count = std::min(kLanes, end - first);
     std::array<Vec4, kLanes> direction;
-    Lanes length2 = Lanes::Ones(), rest = Lanes::Ones(), stiff = Lanes::Zero(), damping = Lanes::Zero(),
-          mobility = Lanes::Ones(), most = Lanes::Ones();
+    Batch length2 = Batch::Ones(), rest = Batch::Ones(), stiff = Batch::Zero(), damping = Batch::Zero(),
+          mobility = Batch::Ones(), most = Batch::Ones();
     for (std::size_t k = 0; k < count; ++k) {
       const Spring& s = spring_[first + k];
       const auto lane = static_cast<Eigen::Index>(k);
@@ -127,16 +150,16 @@ void ClothSprings::pull(ClothPoints& points, std::span<Vec4> moves, Real h, std:
       most[lane] = s.most;
       mobility[lane] = w[s.a] + w[s.b];
     }
-    const Lanes length = length2.sqrt(), inverse = length.inverse();
+    const Batch length = length2.sqrt(), inverse = length.inverse();
     stiff = (h * h * stiff).min(most / mobility.max(kNoMobility));
-    const Lanes pulls = stiff * (length - rest) * inverse, resists = stiff + h * damping,
+    const Batch pulls = stiff * (length - rest) * inverse, resists = stiff + h * damping,
                 forget = (1 + resists * mobility).inverse(), along = resists * forget;
     for (std::size_t k = 0; k < count; ++k) {
       const Spring& s = spring_[first + k];
       const auto lane = static_cast<Eigen::Index>(k);
       give(points, moves, s.a, s.b, pulls[lane] * direction[k]);
       Link& link = link_[first + k];
-      link = {(inverse[lane] * direction[k]).cast<float>(), static_cast<float>(forget[lane]), 0, s.a, s.b};
+      link = {narrowed(inverse[lane] * direction[k]), static_cast<float>(forget[lane]), 0, s.a, s.b};
       link.axis[3] = static_cast<float>(along[lane]);
     }
   }
@@ -145,7 +168,7 @@ void ClothSprings::pull(ClothPoints& points, std::span<Vec4> moves, Real h, std:
 /// Gauss-Seidel on the impulses, which are zero at first: the equation of a spring is r + impulse / c = 0.
 void ClothSprings::relax(ClothPoints& points, std::span<Vec4> moves, std::size_t spring) {
   Link& link = link_[spring];
-  const Vec4 u = link.axis.cast<Real>().cwiseProduct(Vec4(1, 1, 1, 0));
+  const Vec4 u = widened(link.axis).cwiseProduct(Vec4(1, 1, 1, 0));
   const Real step =
       Real{link.axis[3]} * u.dot(moves[link.a] - moves[link.b]) - Real{link.forget} * link.impulse;
   link.impulse += static_cast<float>(step);

@@ -20,8 +20,8 @@ class ClothSprings {
   /// Springs between points of all cloths; their order decides about colours.
   void assign(std::span<const ClothSpring> springs, const ClothPoints& points);
 
-  /// Changes `moves`, which points would make from their start in a step of length h, by the springs. Those of
-  /// what pins hold stay, and what pulls at them is added to their `pull`.
+  /// Changes `moves`, which points would make from their start in a step of length h, by the springs. Those
+  /// of what pins hold stay, and what pulls at them is added to their `pull`.
   void step(ClothPoints& points, std::span<Vec4> moves, Real h);
 
   /// Adds, by cloth, how many springs count as softer in a step of length h.

@@ -87,7 +87,7 @@ void ClothSystem::assemble() {
   points_.acceleration.assign(points_.size(), Vec4::Zero());
   points_.pull.assign(points_.size(), Vec4::Zero());
   springs_.assign(swept, points_);
-  limit_.assign(std::move(limits));
+  limit_.assign(std::move(limits), points_.size());
   self_contacts_.assign(std::move(colliding), points_);
   corner_contacts_.assign(std::move(touching), points_);
   span_ = 0;
@@ -244,8 +244,9 @@ void ClothSystem::close_seams() {
   }
 }
 
-/// The move in whose frame moves are shortened, or what flies or falls would be held back in the air: the mean
-/// one of cloths that are free, and of the pins if one body holds them all. None if other bodies touch cloth.
+/// The move in whose frame moves are shortened, or what flies or falls would be held back in the air: the
+/// mean one of cloths that are free, and of the pins if one body holds them all. None if other bodies touch
+/// cloth.
 Vec4 ClothSystem::common_move() const {
   const ClothBody* const holder = held_.empty() ? nullptr : held_.front().body;
   if (!held_.empty() && !holder) return Vec4::Zero();
@@ -276,8 +277,9 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   for (Vec4& start : points_.start) start += drift;
   bool again = true;
   for (int round = 0; again && round < kMaxRounds; ++round) {
-    again = limit_.shorten(points_, shares_);
-    if (self) again |= self_contacts_.shorten(points_, shares_);
+    again = round == 0 ? limit_.shorten_whole_moves(points_, shares_, lowered_)
+                       : limit_.shorten(points_, shares_, lowered_);
+    if (self) again |= self_contacts_.shorten(points_, shares_, lowered_);
   }
   for (uint32_t i : self_contacts_.take_held_back()) ++cloths_[points_.cloth[i]]->report.held_back;
   for (uint32_t i : self_contacts_.take_crossed()) ++cloths_[points_.cloth[i]]->report.crossings;

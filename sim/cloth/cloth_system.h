@@ -86,6 +86,7 @@ class ClothSystem {
   std::vector<Seam> seams_;
   std::vector<VelocityCut> cuts_;
   MoveShares shares_;
+  std::vector<uint32_t> lowered_;  // points whose shares were lowered in a round
   std::span<ClothBody> bodies_;
 };
 

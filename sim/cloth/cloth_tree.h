@@ -19,8 +19,8 @@ class ClothTree {
  public:
   /// Triangles that may touch others, over the points of the unstrained cloths.
   void build(std::span<const Triangle> triangles, std::span<const Vec4> rest);
-  /// Fits boxes around the triangles at `from`, larger by each point's `margin`, with the bounds of their ways
-  /// to `to`.
+  /// Fits boxes around the triangles at `from`, larger by each point's `margin`, with the bounds of their
+  /// ways to `to`.
   void fit(std::span<const Vec4> from, std::span<const Vec4> to, std::span<const Real> margin);
   /// The same of a few triangles, for meeting() and overlapping().
   void refit(std::span<const uint32_t> triangles, std::span<const Vec4> from, std::span<const Vec4> to,

@@ -78,7 +78,8 @@ bool planes_apart(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, boo
 /// Whether a triangle lies on one side of another's plane, farther from it than `reach`.
 bool above(std::span<const Vec4> x, const Triangle& a, const Triangle& b, Real reach) {
   const Vec3 p0 = place(x, b[0]), n = (place(x, b[1]) - p0).cross(place(x, b[2]) - p0);
-  const Real h0 = n.dot(place(x, a[0]) - p0), h1 = n.dot(place(x, a[1]) - p0), h2 = n.dot(place(x, a[2]) - p0);
+  const Real h0 = n.dot(place(x, a[0]) - p0), h1 = n.dot(place(x, a[1]) - p0),
+             h2 = n.dot(place(x, a[2]) - p0);
   const Real least = std::max(std::min({h0, h1, h2}), -std::max({h0, h1, h2}));
   return least > 0 && least * least > reach * reach * n.squaredNorm();
 }
@@ -318,7 +319,7 @@ void SelfContacts::solve(ClothPoints& points) {
   }
 }
 
-bool SelfContacts::shorten(const ClothPoints& points, MoveShares& shares) {
+bool SelfContacts::shorten(const ClothPoints& points, MoveShares& shares, std::vector<uint32_t>& lowered) {
   bool any = false;
   for (const Contact& c : contacts_) {
     const Pair& pair = pairs_[c.pair];
@@ -331,15 +332,16 @@ bool SelfContacts::shorten(const ClothPoints& points, MoveShares& shares) {
                                                    : second = std::max(second, height);
     }
     if (first - second >= kLeft * c.distance) continue;
-    bool lowered = false;
+    bool any_here = false;
     for (uint32_t i : pair.points) {
       if (!(points.inverse_mass[i] > 0) || shares[i] == 0) continue;
       shares[i] = shares[i] / 2 < kLeastShare ? 0 : shares[i] / 2;
       held_back_.push_back(i);
-      lowered = true;
+      lowered.push_back(i);
+      any_here = true;
     }
-    any |= lowered;
-    if (!lowered) crossed_.push_back(pair.points[0]);
+    any |= any_here;
+    if (!any_here) crossed_.push_back(pair.points[0]);
   }
   return any;
 }

@@ -32,8 +32,8 @@ class SelfContacts {
   void solve(ClothPoints& points);
   /// Finds the pairs that may have crossed by the moves that are made now.
   void find_doubtful(const ClothPoints& points, Real dt, Real horizon);
-  /// Lowers the shares of moves of those that did; whether any.
-  bool shorten(const ClothPoints& points, MoveShares& shares);
+  /// Lowers the shares of moves of those that did, and adds their points to `lowered`; whether any.
+  bool shorten(const ClothPoints& points, MoveShares& shares, std::vector<uint32_t>& lowered);
   /// After the sub-step: how far points have come.
   void end_substep(const ClothPoints& points, Real dt);
 

@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace offstage::sim {
 namespace {
 
-constexpr int kSweeps = 8;
+constexpr uint8_t kSweeps = 8;
 /// Projection aims at this share of the allowed elongation: at the limit itself every outward move would have
 /// to be taken back whole, and the cloth would freeze there.
 constexpr Real kAim = 0.97;
@@ -25,13 +26,29 @@ Real greatest_share(const Vec4& k1, const Vec4& k2, Real longest) {
 
 }  // namespace
 
+void StretchLimit::assign(std::vector<Limit> limits, std::size_t point_count) {
+  limits_ = std::move(limits);
+  looked_in_.assign(limits_.size(), round_);
+  first_at_.assign(point_count + 1, 0);
+  for (const Limit& l : limits_)
+    for (const uint32_t end : {l.a, l.b}) ++first_at_[end + 1];
+  for (std::size_t i = 0; i < point_count; ++i) first_at_[i + 1] += first_at_[i];
+  limits_at_.resize(2 * limits_.size());
+  std::vector<uint32_t> next(first_at_);
+  for (uint32_t k = 0; k < limits_.size(); ++k)
+    for (const uint32_t end : {limits_[k].a, limits_[k].b}) limits_at_[next[end]++] = k;
+}
+
 bool StretchLimit::project(ClothPoints& points) const {
   Vec4* const x = points.position.data();
   const Real* const w = points.inverse_mass.data();
   bool again = true, any = false;
-  for (int sweep = 0; sweep < kSweeps && again; ++sweep) {
+  std::vector<uint8_t> moved_in(points.size(), 0);  // the sweep; 0: none
+  for (uint8_t sweep = 1; sweep <= kSweeps && again; ++sweep) {
     again = false;
     const auto draw = [&](const Limit& l) {
+      // Where nothing moved since, it is as it was found.
+      if (sweep > 1 && moved_in[l.a] < sweep - 1 && moved_in[l.b] < sweep - 1) return;
       const Vec4 d = x[l.a] - x[l.b];
       const Real length2 = d.squaredNorm();
       const Real mass = w[l.a] + w[l.b];
@@ -41,6 +58,7 @@ bool StretchLimit::project(ClothPoints& points) const {
       const Vec4 move = ((length - aim) / (length * mass)) * d;
       x[l.a] -= w[l.a] * move;
       x[l.b] += w[l.b] * move;
+      moved_in[l.a] = moved_in[l.b] = sweep;
       if (w[l.a] == 0) points.pull[l.a] -= move;
       if (w[l.b] == 0) points.pull[l.b] += move;
     };
@@ -50,29 +68,54 @@ bool StretchLimit::project(ClothPoints& points) const {
   return any;
 }
 
-bool StretchLimit::shorten(const ClothPoints& points, MoveShares& shares) const {
-  bool any = false;
+bool StretchLimit::shorten_whole_moves(const ClothPoints& points, MoveShares& shares,
+                                       std::vector<uint32_t>& lowered) const {
+  lowered.clear();
   for (const Limit& l : limits_) {
-    const Vec4 move_a = points.position[l.a] - points.start[l.a];
-    const Vec4 move_b = points.position[l.b] - points.start[l.b];
-    const Vec4 d = points.start[l.a] - points.start[l.b];
-    const Vec4 move = shares[l.a] * move_a - shares[l.b] * move_b;
-    // What began too long may at least get no longer.
-    const Real allowed2 = std::max(l.longest * l.longest, d.squaredNorm());
-    if ((d + move).squaredNorm() <= allowed2 * (1 + kSlack)) continue;
-    const bool free_a = points.inverse_mass[l.a] > 0 && shares[l.a] > 0;
-    const bool free_b = points.inverse_mass[l.b] > 0 && shares[l.b] > 0;
-    if (!free_a && !free_b) continue;
-    Vec4 k1 = d, k2 = Vec4::Zero();
-    free_a ? k2 += shares[l.a]* move_a : k1 += shares[l.a] * move_a;
-    free_b ? k2 -= shares[l.b]* move_b : k1 -= shares[l.b] * move_b;
-    Real s = greatest_share(k1, k2, std::sqrt(std::max(allowed2, k1.squaredNorm())));
-    if (s > 1 - 1e-9) s = 0;  // no progress to rounding
-    if (free_a) shares[l.a] *= s;
-    if (free_b) shares[l.b] *= s;
-    any = true;
+    const bool whole = shares[l.a] == 1 && shares[l.b] == 1;
+    if (whole && (points.position[l.a] - points.position[l.b]).squaredNorm() <= l.longest * l.longest)
+      continue;
+    look(l, points, shares, lowered);
   }
-  return any;
+  return !lowered.empty();
+}
+
+bool StretchLimit::shorten(const ClothPoints& points, MoveShares& shares, std::vector<uint32_t>& lowered) {
+  std::vector<uint32_t> now;
+  ++round_;
+  for (const uint32_t i : lowered)
+    for (uint32_t k = first_at_[i]; k < first_at_[i + 1]; ++k)
+      if (std::exchange(looked_in_[limits_at_[k]], round_) != round_)
+        look(limits_[limits_at_[k]], points, shares, now);
+  lowered = std::move(now);
+  return !lowered.empty();
+}
+
+void StretchLimit::look(const Limit& l, const ClothPoints& points, MoveShares& shares,
+                        std::vector<uint32_t>& lowered) const {
+  const Vec4 move_a = points.position[l.a] - points.start[l.a];
+  const Vec4 move_b = points.position[l.b] - points.start[l.b];
+  const Vec4 d = points.start[l.a] - points.start[l.b];
+  const Vec4 move = shares[l.a] * move_a - shares[l.b] * move_b;
+  // What began too long may at least get no longer.
+  const Real allowed2 = std::max(l.longest * l.longest, d.squaredNorm());
+  if ((d + move).squaredNorm() <= allowed2 * (1 + kSlack)) return;
+  const bool free_a = points.inverse_mass[l.a] > 0 && shares[l.a] > 0;
+  const bool free_b = points.inverse_mass[l.b] > 0 && shares[l.b] > 0;
+  if (!free_a && !free_b) return;
+  Vec4 k1 = d, k2 = Vec4::Zero();
+  free_a ? k2 += shares[l.a]* move_a : k1 += shares[l.a] * move_a;
+  free_b ? k2 -= shares[l.b]* move_b : k1 -= shares[l.b] * move_b;
+  Real s = greatest_share(k1, k2, std::sqrt(std::max(allowed2, k1.squaredNorm())));
+  if (s > 1 - 1e-9) s = 0;  // no progress to rounding
+  if (free_a) {
+    shares[l.a] *= s;
+    lowered.push_back(l.a);
+  }
+  if (free_b) {
+    shares[l.b] *= s;
+    lowered.push_back(l.b);
+  }
 }
 
 }  // namespace offstage::sim

@@ -20,18 +20,29 @@ class StretchLimit {
     Real rest, longest;  // [m]
   };
 
-  void assign(std::vector<Limit> limits) { limits_ = std::move(limits); }
+  void assign(std::vector<Limit> limits, std::size_t point_count);
   bool empty() const { return limits_.empty(); }
 
   /// Draws together what is too long; whether anything was. It may not suffice.
   bool project(ClothPoints& points) const;
 
   /// Lowers shares of moves where a limit does not hold; whether it did. If both ends made none, the lengths
-  /// would be those at the start, which held. What pins hold always makes its whole move.
-  bool shorten(const ClothPoints& points, MoveShares& shares) const;
+  /// would be those at the start, which held. What pins hold always makes its whole move. Looks at the limits
+  /// of the points in `lowered`, whose shares were lowered since they were looked at last, and leaves there
+  /// those that it lowered itself. While all shares are 1, at all limits.
+  bool shorten(const ClothPoints& points, MoveShares& shares, std::vector<uint32_t>& lowered);
+  bool shorten_whole_moves(const ClothPoints& points, MoveShares& shares,
+                           std::vector<uint32_t>& lowered) const;
 
  private:
+  void look(const Limit& limit, const ClothPoints& points, MoveShares& shares,
+            std::vector<uint32_t>& lowered) const;
+
   std::vector<Limit> limits_;
+  std::vector<uint32_t> limits_at_,
+      first_at_;                     // of each point, one point's after another's; where they begin
+  std::vector<uint32_t> looked_in_;  // the round in which each limit was looked at last
+  uint32_t round_ = 0;
 };
 
 }  // namespace offstage::sim
