@@ -22,7 +22,7 @@ constexpr Real kBeyondTear = 1.05;
 /// How long a span is, at most [s].
 constexpr Real kSpan = 1.0 / 480;
 /// For how long pairs of cloth with cloth are sought at a time [s].
-constexpr Real kHorizon = 1.0 / 120;
+constexpr Real kHorizon = 1.0 / 80;
 
 }  // namespace
 

@@ -11,15 +11,16 @@ namespace {
 
 /// Pairs are sought this much farther than they touch, in thicknesses; half of it is how far points may stray
 /// from the ways foreseen.
-constexpr Real kMargin = 0.6;
+constexpr Real kMargin = 0.8;
 /// Up to this part of all points are sought again alone.
 constexpr std::size_t kFew = 3;
 /// What is near at rest in the cloth itself, is not pushed farther apart than this share of it.
 constexpr Real kRestShare = 0.8;
 /// Share of an overlap that is taken back per sub-step, so that layers do not fly apart.
 constexpr Real kRecovery = 0.05;
-/// What must be left of the distance, so that there always is a plane between.
-constexpr Real kLeft = 0.1;
+/// What must be left of the distance, so that there always is a plane between. What is nearer than this share of
+/// its thickness comes no nearer: else its distance would soon be lost in rounding, and its side with it.
+constexpr Real kLeft = 0.1, kNearest = 0.02;
 /// Distance below which no normal can be told [m].
 constexpr Real kNoSide = 1e-9;
 /// What is left of a length along a unit vector of single precision.
@@ -96,6 +97,10 @@ Real reach_of(const ClothPoints& points, std::span<const Vec4> velocity, const T
   const Vec4 relative = (greatest(a) - least(b)).cwiseMax(greatest(b) - least(a));
   return (points.thickness[a[0]] + points.thickness[b[0]]) / 2 * (1 + 1.5 * kMargin) +
          relative.norm() * horizon;
+}
+
+Real least_distance(Real distance, Real thickness) {
+  return (1 - 1e-9) * std::max(kLeft * distance, std::min(distance, kNearest * thickness));
 }
 
 /// How many of a pair's points belong to the first of the two.
@@ -283,7 +288,7 @@ void SelfContacts::find(const ClothPoints& points, Real dt, Real horizon) {
 }
 
 void SelfContacts::find_doubtful(const ClothPoints& points, Real dt, Real horizon) {
-  gather(points, dt, horizon, [](const Pair& pair) { return kLeft * pair.distance; });
+  gather(points, dt, horizon, [](const Pair& pair) { return least_distance(pair.distance, pair.thickness); });
 }
 
 void SelfContacts::solve(ClothPoints& points) {
@@ -331,7 +336,7 @@ bool SelfContacts::shorten(const ClothPoints& points, MoveShares& shares, std::v
       static_cast<int>(k) < first_side(pair.edges) ? first = std::min(first, height)
                                                    : second = std::max(second, height);
     }
-    if (first - second >= kLeft * c.distance) continue;
+    if (first - second >= least_distance(c.distance, pair.thickness)) continue;
     bool any_here = false;
     for (uint32_t i : pair.points) {
       if (!(points.inverse_mass[i] > 0) || shares[i] == 0) continue;
