@@ -1,0 +1,70 @@
+#include "sim/cloth/self_contacts.h"
+
+#include <gtest/gtest.h>
+
+namespace offstage::sim {
+namespace {
+
+/// Two triangles of 1 m, one above the other, as free cloths of 10 mm that touch each other.
+struct Layers {
+  explicit Layers(Real apart) {
+    for (const Real height : {0.0, apart})
+      for (const Vec4& p : {Vec4(0, height, 0, 0), Vec4(1, height, 0, 0), Vec4(0, height, 1, 0)})
+        points.position.push_back(p);
+    points.start = points.rest = points.position;
+    points.velocity.assign(6, Vec4::Zero());
+    points.acceleration = points.pull = points.velocity;
+    points.mass.assign(6, 1);
+    points.inverse_mass.assign(6, 1);
+    points.holder.assign(6, nullptr);
+    points.thickness.assign(6, 0.01);
+    points.friction = points.self_friction = std::vector<Real>(6, 0);
+    points.cloth = {0, 0, 0, 1, 1, 1};
+    contacts.assign({{0, 1, 2}, {3, 4, 5}}, points);
+  }
+  /// Both layers move as far towards these ways [m] as they may.
+  void move(const Vec4& lower, const Vec4& upper, Real dt = 1.0 / 480) {
+    points.start = points.position;
+    for (std::size_t i = 0; i < 6; ++i) points.position[i] += i < 3 ? lower : upper;
+    contacts.find_doubtful(points, dt, 1.0 / 60);
+    MoveShares shares(6, 1);
+    std::vector<uint32_t> lowered;
+    for (int round = 0; round < 64 && contacts.shorten(points, shares, lowered); ++round) {
+    }
+    for (std::size_t i = 0; i < 6; ++i)
+      points.position[i] = points.start[i] + shares[i] * (points.position[i] - points.start[i]);
+    contacts.end_substep(points, dt);
+  }
+  Real least_height() const {
+    return std::min({points.position[3].y(), points.position[4].y(), points.position[5].y()}) -
+           std::max({points.position[0].y(), points.position[1].y(), points.position[2].y()});
+  }
+
+  ClothPoints points;
+  SelfContacts contacts;
+};
+
+// Moves that leave a seventh of the distance each time would soon leave none that has a side.
+TEST(SelfContacts, KeepADistanceHoweverOftenTheyArePressed) {
+  Layers layers(0.02);
+  for (int i = 0; i < 60; ++i) {
+    layers.move(Vec4::Zero(), Vec4(0, -0.85 * layers.least_height(), 0, 0));
+    ASSERT_GT(layers.least_height(), 1e-4) << i;
+  }
+}
+
+// They fall together unhindered, until the lower one stops.
+TEST(SelfContacts, LetLayersMoveTogetherAndHoldTheOneBehind) {
+  Layers layers(0.03);
+  const Vec4 way(0, -0.02, 0, 0);
+  for (int i = 0; i < 10; ++i) layers.move(way, way);
+  EXPECT_NEAR(layers.least_height(), 0.03, 1e-12);
+  for (int i = 0; i < 10; ++i) {
+    layers.move(Vec4::Zero(), way);
+    ASSERT_GT(layers.least_height(), 0) << i;
+  }
+  EXPECT_LT(layers.least_height(), 0.03);
+}
+
+}  // namespace
+}  // namespace offstage::sim
