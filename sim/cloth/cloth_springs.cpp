@@ -88,11 +88,15 @@ void ClothSprings::assign(std::span<const ClothSpring> springs, const ClothPoint
   for (std::size_t c = 1; c < color_start_.size(); ++c) color_start_[c] += color_start_[c - 1];
   std::vector<std::size_t> next(color_start_.begin(), color_start_.end());
   spring_.resize(springs.size());
+  stuff_.resize(springs.size());
   for (std::size_t i = 0; i < springs.size(); ++i) {
     const ClothSpring& s = springs[i];
-    spring_[next[color[i]]++] = {s.a, s.b, s.rest_length, s.stiffness, s.damping, most(s)};
+    const std::size_t at = next[color[i]]++;
+    spring_[at] = {s.a, s.b, s.rest_length, 0};
+    stuff_[at] = {s.stiffness, s.damping, most(s)};
   }
   link_.resize(spring_.size());
+  prepared_for_ = -1;
   stages_.clear();
   for (auto kind : {Stage::pull, Stage::forward, Stage::backward}) {
     for (std::size_t c = 0; c + 1 < color_start_.size(); ++c) {
@@ -108,12 +112,13 @@ uint32_t ClothSprings::Stage::block_count() const {
 }
 
 void ClothSprings::step(ClothPoints& points, std::span<Vec4> moves, Real h) {
+  prepare(points, h);
   const uint32_t threads = spring_.size() < kWorthThreads ? 1 : available_threads();
   run_stages(std::span(stages_), threads, [&](const Stage& stage, uint32_t block) {
     const std::size_t begin = stage.begin + block * kBlock;
     const std::size_t end = stage.whole ? stage.end : std::min(begin + kBlock, stage.end);
     if (stage.kind == Stage::pull)
-      pull(points, moves, h, begin, end);
+      pull(points, moves, begin, end);
     else if (stage.kind == Stage::forward)
       for (std::size_t i = begin; i < end; ++i) relax(points, moves, i);
     else
@@ -121,46 +126,48 @@ void ClothSprings::step(ClothPoints& points, std::span<Vec4> moves, Real h) {
   });
 }
 
-void ClothSprings::count_softened(const ClothPoints& points, Real h, std::span<uint64_t> softened) const {
-  for (const Spring& s : spring_)
-    softened[points.cloth[s.a]] +=
-        h * h * s.stiffness * (points.inverse_mass[s.a] + points.inverse_mass[s.b]) > s.most;
+/// What depends on the step and on what pins hold alone.
+void ClothSprings::prepare(const ClothPoints& points, Real h) {
+  if (h == prepared_for_ && points.inverse_mass == inverse_mass_) return;
+  prepared_for_ = h;
+  inverse_mass_ = points.inverse_mass;
+  softened_.assign(points.cloth.empty() ? 0 : points.cloth.back() + 1, 0);
+  for (std::size_t i = 0; i < spring_.size(); ++i) {
+    Spring& s = spring_[i];
+    const Stuff& stuff = stuff_[i];
+    const Real mobility = inverse_mass_[s.a] + inverse_mass_[s.b];
+    softened_[points.cloth[s.a]] += h * h * stuff.stiffness * mobility > stuff.most;
+    s.stiffness = std::min(h * h * stuff.stiffness, stuff.most / std::max(mobility, kNoMobility));
+    const Real resists = s.stiffness + h * stuff.damping, forget = 1 / (1 + resists * mobility);
+    link_[i] = {Eigen::Vector4f(0, 0, 0, static_cast<float>(resists * forget)), static_cast<float>(forget), 0,
+                s.a, s.b};
+  }
 }
 
-/// The explicit step, and what the sweeps need.
-void ClothSprings::pull(ClothPoints& points, std::span<Vec4> moves, Real h, std::size_t begin,
-                        std::size_t end) {
+/// The explicit step, and the directions for the sweeps.
+void ClothSprings::pull(ClothPoints& points, std::span<Vec4> moves, std::size_t begin, std::size_t end) {
   constexpr std::size_t kLanes = 16;
   using Batch = Eigen::Array<Real, kLanes, 1>;
   const Vec4* const x = points.start.data();
-  const Real* const w = points.inverse_mass.data();
   for (std::size_t first = begin; first < end; first += kLanes) {
     const std::size_t count = std::min(kLanes, end - first);
     std::array<Vec4, kLanes> direction;
-    Batch length2 = Batch::Ones(), rest = Batch::Ones(), stiff = Batch::Zero(), damping = Batch::Zero(),
-          mobility = Batch::Ones(), most = Batch::Ones();
+    Batch length2 = Batch::Ones();
     for (std::size_t k = 0; k < count; ++k) {
       const Spring& s = spring_[first + k];
-      const auto lane = static_cast<Eigen::Index>(k);
       direction[k] = x[s.a] - x[s.b];
-      length2[lane] = std::max(direction[k].squaredNorm(), kNoLength2);
-      rest[lane] = s.rest;
-      stiff[lane] = s.stiffness;
-      damping[lane] = s.damping;
-      most[lane] = s.most;
-      mobility[lane] = w[s.a] + w[s.b];
+      length2[static_cast<Eigen::Index>(k)] = std::max(direction[k].squaredNorm(), kNoLength2);
     }
     const Batch length = length2.sqrt(), inverse = length.inverse();
-    stiff = (h * h * stiff).min(most / mobility.max(kNoMobility));
-    const Batch pulls = stiff * (length - rest) * inverse, resists = stiff + h * damping,
-                forget = (1 + resists * mobility).inverse(), along = resists * forget;
     for (std::size_t k = 0; k < count; ++k) {
       const Spring& s = spring_[first + k];
       const auto lane = static_cast<Eigen::Index>(k);
-      give(points, moves, s.a, s.b, pulls[lane] * direction[k]);
+      give(points, moves, s.a, s.b, s.stiffness * (length[lane] - s.rest) * inverse[lane] * direction[k]);
       Link& link = link_[first + k];
-      link = {narrowed(inverse[lane] * direction[k]), static_cast<float>(forget[lane]), 0, s.a, s.b};
-      link.axis[3] = static_cast<float>(along[lane]);
+      const float along = link.axis[3];
+      link.axis = narrowed(inverse[lane] * direction[k]);
+      link.axis[3] = along;
+      link.impulse = 0;
     }
   }
 }

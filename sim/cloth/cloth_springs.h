@@ -24,13 +24,16 @@ class ClothSprings {
   /// of what pins hold stay, and what pulls at them is added to their `pull`.
   void step(ClothPoints& points, std::span<Vec4> moves, Real h);
 
-  /// Adds, by cloth, how many springs count as softer in a step of length h.
-  void count_softened(const ClothPoints& points, Real h, std::span<uint64_t> softened) const;
+  /// How many springs counted as softer in the last step, by cloth; empty before the first.
+  std::span<const uint64_t> softened() const { return softened_; }
 
  private:
   struct Spring {
     uint32_t a, b;
-    Real rest, stiffness, damping;
+    Real rest, stiffness;  // the latter times h^2, and as soft as it must be
+  };
+  struct Stuff {
+    Real stiffness, damping;
     Real most;  // of h^2 k (1/m_a + 1/m_b)
   };
   /// A spring in the step, small because all of them pass through memory in every sweep. Moves d apart along
@@ -48,13 +51,18 @@ class ClothSprings {
     uint32_t block_count() const;
   };
 
-  void pull(ClothPoints& points, std::span<Vec4> moves, Real h, std::size_t begin, std::size_t end);
+  void prepare(const ClothPoints& points, Real h);
+  void pull(ClothPoints& points, std::span<Vec4> moves, std::size_t begin, std::size_t end);
   void relax(ClothPoints& points, std::span<Vec4> moves, std::size_t spring);
 
   std::vector<Spring> spring_;            // by colour
+  std::vector<Stuff> stuff_;              // of each
   std::vector<std::size_t> color_start_;  // and the end
   std::vector<Link> link_;                // of the step
   std::vector<Stage> stages_;             // of any step
+  std::vector<Real> inverse_mass_;        // that springs were prepared for
+  Real prepared_for_ = -1;                // step [s]; < 0: none
+  std::vector<uint64_t> softened_;
 };
 
 }  // namespace offstage::sim

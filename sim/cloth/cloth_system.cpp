@@ -144,7 +144,7 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
     add_outer_forces(*cloths_[c], first_[c], weather, points_);
   }
   const Real parts = std::clamp(std::ceil(weather.h / longest * (1 - 1e-12)), 1.0, kMaxParts);
-  const Real dt = dt_ = weather.h / parts;
+  const Real dt = weather.h / parts;
   parts_ = parts;
   find_held(weather.time, bodies);
   contacts_.find(points_, collides_, bodies, weather.h);
@@ -390,11 +390,9 @@ void ClothSystem::count_penetration() {
 }
 
 void ClothSystem::measure() {
-  std::vector<uint64_t> softened(cloths_.size(), 0);
-  if (!changed_) springs_.count_softened(points_, dt_, softened);
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     Cloth& cloth = *cloths_[c];
-    cloth.report.softened = softened[c];
+    if (!changed_ && c < springs_.softened().size()) cloth.report.softened = springs_.softened()[c];
     Real sum = 0;
     std::size_t count = 0;
     for (const ClothSpring& s : cloth.springs) {

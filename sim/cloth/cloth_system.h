@@ -71,7 +71,6 @@ class ClothSystem {
   std::vector<Vec4> kick_;                 // of velocities at the end of a sub-step, beside their moves
   bool changed_ = false;
   Real parts_ = 1;  // sub-steps of cloth in one of the world
-  Real dt_ = 0;     // of the last one [s]
 
   ClothPoints points_;
   ClothSprings springs_;

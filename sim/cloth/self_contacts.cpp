@@ -18,8 +18,8 @@ constexpr std::size_t kFew = 3;
 constexpr Real kRestShare = 0.8;
 /// Share of an overlap that is taken back per sub-step, so that layers do not fly apart.
 constexpr Real kRecovery = 0.05;
-/// What must be left of the distance, so that there always is a plane between. What is nearer than this share of
-/// its thickness comes no nearer: else its distance would soon be lost in rounding, and its side with it.
+/// What must be left of the distance, so that there always is a plane between. What is nearer than this share
+/// of its thickness comes no nearer: else its distance would soon be lost in rounding, and its side with it.
 constexpr Real kLeft = 0.1, kNearest = 0.02;
 /// Distance below which no normal can be told [m].
 constexpr Real kNoSide = 1e-9;
