@@ -357,7 +357,7 @@ def dishes():
 def parachute():
     """A flat round canopy with a vent, folded in pleats from its top down, and twelve ribbons from its rim: one open
     sheet. Of the rays from the top every other lies farther out; between neighbours is the angle of the flat sheet, so that nothing is
-    strained."""
+    strained. Across two gores of a twelfth the texture's u goes to and fro, so that stripes half as wide colour every other one."""
     sectors, rings, lines, steps = 48, 18, 12, 16
     radius, vent, length, width = 1.7, 0.12, 3.2, 0.03
     step = 2 * math.pi / sectors
@@ -391,7 +391,17 @@ def parachute():
             positions += [sub(middle, side), add(middle, side)]
             triangles += [(last[0], row, row + 1)] if n == 1 else [(last[0], row, last[1]), (last[1], row, row + 1)]
             last = (row, row + 1)
-    write_glb(MODELS / "parachute.glb", [(shaded(Mesh(positions, triangles), 180), Material("canopy", "#c8502a", 0.7))])
+    mesh = shaded(Mesh(positions, triangles), 180)
+
+    def uv(p):
+        away = math.hypot(*p)
+        if away > 1.001 * radius:  # a ribbon
+            return (0.3, away)
+        turns = lines / 2 * (math.atan2(p[0], p[2]) + step) / (2 * math.pi) % 1
+        return (0.02 + 0.36 * abs(2 * turns - 1), away)
+
+    mesh.uvs = [uv(p) for p in mesh.positions]
+    write_glb(MODELS / "parachute.glb", [(mesh, Material("canopy", "#c8502a", 0.7))])
 
 
 def mix_points(a, b, t):

@@ -95,6 +95,7 @@ class Mesh:
     positions: list = field(default_factory=list)
     triangles: list = field(default_factory=list)
     normals: list = field(default_factory=list)  # empty, or one per position
+    uvs: list = field(default_factory=list)  # the same; where it matters, given last
 
     def moved(self, offset):
         return self.mapped(lambda p: add(p, offset))
@@ -460,6 +461,9 @@ def write_glb_tree(path, root):
                 store(b"".join(struct.pack("<3f", *v) for v in mesh.normals), 34962, componentType=5126,
                       count=len(p), type="VEC3"),
         }
+        if mesh.uvs:
+            attributes["TEXCOORD_0"] = store(b"".join(struct.pack("<2f", *uv) for uv in mesh.uvs), 34962,
+                                             componentType=5126, count=len(p), type="VEC2")
         indices = store(struct.pack(f"<{len(flat)}{code}", *flat), 34963, componentType=kind, count=len(flat),
                         type="SCALAR")
         materials.append({
