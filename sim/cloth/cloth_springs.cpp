@@ -88,12 +88,12 @@ void ClothSprings::assign(std::span<const ClothSpring> springs, const ClothPoint
   for (std::size_t c = 1; c < color_start_.size(); ++c) color_start_[c] += color_start_[c - 1];
   std::vector<std::size_t> next(color_start_.begin(), color_start_.end());
   spring_.resize(springs.size());
-  stuff_.resize(springs.size());
+  material_.resize(springs.size());
   for (std::size_t i = 0; i < springs.size(); ++i) {
     const ClothSpring& s = springs[i];
     const std::size_t at = next[color[i]]++;
     spring_[at] = {s.a, s.b, s.rest_length, 0};
-    stuff_[at] = {s.stiffness, s.damping, most(s)};
+    material_[at] = {s.stiffness, s.damping, most(s)};
   }
   link_.resize(spring_.size());
   prepared_for_ = -1;
@@ -134,11 +134,11 @@ void ClothSprings::prepare(const ClothPoints& points, Real h) {
   softened_.assign(points.cloth.empty() ? 0 : points.cloth.back() + 1, 0);
   for (std::size_t i = 0; i < spring_.size(); ++i) {
     Spring& s = spring_[i];
-    const Stuff& stuff = stuff_[i];
+    const Material& material = material_[i];
     const Real mobility = inverse_mass_[s.a] + inverse_mass_[s.b];
-    softened_[points.cloth[s.a]] += h * h * stuff.stiffness * mobility > stuff.most;
-    s.stiffness = std::min(h * h * stuff.stiffness, stuff.most / std::max(mobility, kNoMobility));
-    const Real resists = s.stiffness + h * stuff.damping, forget = 1 / (1 + resists * mobility);
+    softened_[points.cloth[s.a]] += h * h * material.stiffness * mobility > material.most;
+    s.stiffness = std::min(h * h * material.stiffness, material.most / std::max(mobility, kNoMobility));
+    const Real resists = s.stiffness + h * material.damping, forget = 1 / (1 + resists * mobility);
     link_[i] = {Eigen::Vector4f(0, 0, 0, static_cast<float>(resists * forget)), static_cast<float>(forget), 0,
                 s.a, s.b};
   }

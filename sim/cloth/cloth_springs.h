@@ -32,7 +32,7 @@ class ClothSprings {
     uint32_t a, b;
     Real rest, stiffness;  // the latter times h^2, and as soft as it must be
   };
-  struct Stuff {
+  struct Material {
     Real stiffness, damping;
     Real most;  // of h^2 k (1/m_a + 1/m_b)
   };
@@ -56,7 +56,7 @@ class ClothSprings {
   void relax(ClothPoints& points, std::span<Vec4> moves, std::size_t spring);
 
   std::vector<Spring> spring_;            // by colour
-  std::vector<Stuff> stuff_;              // of each
+  std::vector<Material> material_;        // of each
   std::vector<std::size_t> color_start_;  // and the end
   std::vector<Link> link_;                // of the step
   std::vector<Stage> stages_;             // of any step
