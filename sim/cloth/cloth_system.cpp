@@ -268,12 +268,10 @@ Vec4 ClothSystem::common_move() const {
 void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   const bool self = ends_span && !self_contacts_.empty();
   if (limit_.empty() && !self) return;
-  if (self) {
-    points_.start.swap(span_start_);  // the moves of the whole span
-    self_contacts_.find_doubtful(points_, span_ * dt, kHorizon);
-  }
-  shares_.assign(points_.size(), 1);
+  if (self) points_.start.swap(span_start_);  // the moves of the whole span
   const Vec4 drift = common_move();
+  if (self) self_contacts_.find_doubtful(points_, span_ * dt, kHorizon, drift);
+  shares_.assign(points_.size(), 1);
   for (Vec4& start : points_.start) start += drift;
   bool again = true;
   for (int round = 0; again && round < kMaxRounds; ++round) {

@@ -253,42 +253,47 @@ SelfContacts::Contact SelfContacts::look(const ClothPoints& points, uint32_t k) 
 
 /// The distance that any parts of the moves made now leave a pair along the direction in which it was apart
 /// when last looked at, or less: no more than is left in truth.
-Real SelfContacts::left_between(const ClothPoints& points, const Pair& pair) {
+Real SelfContacts::left_between(const ClothPoints& points, const Pair& pair, const Vec4& drift) {
   const Vec4 normal = padded(pair.normal.cast<Real>());
   const Vec4& origin = points.start[pair.points[0]];
   Real first = 1e300, second = -1e300;
   for (std::size_t k = 0; k < 4; ++k) {
     const uint32_t i = pair.points[k];
-    const Real from = normal.dot(points.start[i] - origin), to = normal.dot(points.position[i] - origin);
+    const Real from = normal.dot(points.start[i] + drift - origin),
+               to = normal.dot(points.position[i] - origin);
     static_cast<int>(k) < first_side(pair.edges) ? first = std::min({first, from, to})
                                                  : second = std::max({second, from, to});
   }
   return (first - second) * kUnit;
 }
 
-/// The pairs that the moves made now may bring nearer than `reach(pair)`.
+/// The pairs that any parts of the moves made now, beyond that of all together, may bring nearer than
+/// `reach(pair)`.
 template <class Reach>
-void SelfContacts::gather(const ClothPoints& points, Real dt, Real horizon, Reach&& reach) {
+void SelfContacts::gather(const ClothPoints& points, Real dt, Real horizon, const Vec4& drift,
+                          Reach&& reach) {
   if (strayed(points, dt)) search_again(points, dt, horizon);
-  for (std::size_t i = 0; i < move_.size(); ++i) move_[i] = (points.position[i] - points.start[i]).norm();
+  for (std::size_t i = 0; i < move_.size(); ++i)
+    move_[i] = (points.position[i] - points.start[i] - drift).norm();
   contacts_.clear();
   for (uint32_t k = 0; k < pairs_.size(); ++k) {
     const Pair& pair = pairs_[k];
     const auto& p = pair.points;
     const Real moved = move_[p[0]] + move_[p[1]] + move_[p[2]] + move_[p[3]];
     if (pair.distance - (travelled(pair) - pair.travel) - moved > reach(pair)) continue;
-    if (left_between(points, pair) > reach(pair)) continue;
+    if (left_between(points, pair, drift) > reach(pair)) continue;
     const Contact contact = look(points, k);
     if (contact.distance - moved <= reach(pair)) contacts_.push_back(contact);
   }
 }
 
 void SelfContacts::find(const ClothPoints& points, Real dt, Real horizon) {
-  gather(points, dt, horizon, [](const Pair& pair) { return pair.thickness; });
+  gather(points, dt, horizon, Vec4::Zero(), [](const Pair& pair) { return pair.thickness; });
 }
 
-void SelfContacts::find_doubtful(const ClothPoints& points, Real dt, Real horizon) {
-  gather(points, dt, horizon, [](const Pair& pair) { return least_distance(pair.distance, pair.thickness); });
+void SelfContacts::find_doubtful(const ClothPoints& points, Real dt, Real horizon, const Vec4& drift) {
+  gather(points, dt, horizon, drift,
+         [](const Pair& pair) { return least_distance(pair.distance, pair.thickness); });
 }
 
 void SelfContacts::solve(ClothPoints& points) {

@@ -30,8 +30,9 @@ class SelfContacts {
   void find(const ClothPoints& points, Real dt, Real horizon);
   /// Pushes apart what is nearer than its thickness.
   void solve(ClothPoints& points);
-  /// Finds the pairs that may have crossed by the moves that are made now.
-  void find_doubtful(const ClothPoints& points, Real dt, Real horizon);
+  /// Finds the pairs that may have crossed by the moves that are made now, or would by a part of any. All
+  /// points make the move `drift` in any case.
+  void find_doubtful(const ClothPoints& points, Real dt, Real horizon, const Vec4& drift);
   /// Lowers the shares of moves of those that did, and adds their points to `lowered`; whether any.
   bool shorten(const ClothPoints& points, MoveShares& shares, std::vector<uint32_t>& lowered);
   /// After the sub-step: how far points have come.
@@ -74,8 +75,8 @@ class SelfContacts {
            travel_[pair.points[3]];
   }
   template <class Reach>
-  void gather(const ClothPoints& points, Real dt, Real horizon, Reach&& reach);
-  static Real left_between(const ClothPoints& points, const Pair& pair);
+  void gather(const ClothPoints& points, Real dt, Real horizon, const Vec4& drift, Reach&& reach);
+  static Real left_between(const ClothPoints& points, const Pair& pair, const Vec4& drift);
   Contact look(const ClothPoints& points, uint32_t pair);
 
   std::vector<Triangle> triangles_;

@@ -26,7 +26,7 @@ struct Layers {
   void move(const Vec4& lower, const Vec4& upper, Real dt = 1.0 / 480) {
     points.start = points.position;
     for (std::size_t i = 0; i < 6; ++i) points.position[i] += i < 3 ? lower : upper;
-    contacts.find_doubtful(points, dt, 1.0 / 60);
+    contacts.find_doubtful(points, dt, 1.0 / 60, Vec4::Zero());
     MoveShares shares(6, 1);
     std::vector<uint32_t> lowered;
     for (int round = 0; round < 64 && contacts.shorten(points, shares, lowered); ++round) {
