@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 
 #include <tbb/parallel_for.h>
@@ -28,13 +27,18 @@ struct Layer {
   }
 };
 
+bool has_glow(const HdrImage& sum, float threshold) {
+  const std::vector<float>& p = sum.rgba;
+  for (std::size_t i = 0; i < p.size(); i += 4)
+    if (p[i] > threshold || p[i + 1] > threshold || p[i + 2] > threshold) return true;
+  return false;
+}
+
 // The light above the threshold, half the size. A pixel that is a hundred times too bright, as a glint of the
 // sun is, counts as ten: it would flicker.
-bool extract(const HdrImage& sum, float threshold, Layer& out) {
-  std::atomic<bool> any = false;
+void extract(const HdrImage& sum, float threshold, Layer& out) {
   const float most = 10 * threshold;
   tbb::parallel_for(0, out.height, [&](int y) {
-    bool found = false;
     for (int x = 0; x < out.width; ++x) {
       Rgb total{};
       for (int k = 0; k < 4; ++k) {
@@ -45,14 +49,11 @@ bool extract(const HdrImage& sum, float threshold, Layer& out) {
                                    static_cast<std::size_t>(sx));
         const float brightest = std::max({p[0], p[1], p[2]});
         if (!(brightest > threshold)) continue;
-        found = true;
         total += Rgb{p[0], p[1], p[2], 0} * (0.25f * (std::min(brightest, most) - threshold) / brightest);
       }
       out.at(x, y) = total;
     }
-    if (found) any.store(true, std::memory_order_relaxed);
   });
-  return any.load();
 }
 
 // Half the size by the binomial filter 1 3 3 1 in both directions, which is smooth enough for bright dots.
@@ -83,10 +84,11 @@ inline Rgb enlarged(const Layer& in, int x, int y) {
 }  // namespace
 
 void add_bloom(HdrImage& sum, const Bloom& options) {
-  if (sum.rgba.empty()) return;
+  const float threshold = options.threshold / (options.exposure * options.sample_weight);
+  if (!has_glow(sum, threshold)) return;
   std::vector<Layer> layers;
   layers.emplace_back((sum.width_px + 1) / 2, (sum.height_px + 1) / 2);
-  if (!extract(sum, options.threshold / (options.exposure * options.sample_weight), layers[0])) return;
+  extract(sum, threshold, layers[0]);
   const auto widest =
       static_cast<int>(std::lround(std::log2(options.radius * static_cast<float>(sum.height_px))));
   for (int k = 0; k < widest && std::min(layers.back().width, layers.back().height) > 2; ++k)

@@ -145,7 +145,9 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
   const std::array<Vector3f, 9> irradiance = sky_irradiance(sky);
   for (std::size_t k = 0; k < 7; ++k)
     frame.irradiance[k] = vec4(irradiance[k], k < 6 ? irradiance[7 + k / 3][static_cast<int>(k % 3)] : 0);
-  frame.shadow = frame.penumbra = Vector4f::Zero();
+  // The dither of every pixel passes evenly through [0, 1).
+  frame.shadow = {0, 0, 0, static_cast<float>(offsets.index) / static_cast<float>(offsets.count)};
+  frame.penumbra = Vector4f::Zero();
   frame.air = {0, 0, environment.clouds, static_cast<float>(offsets.count)};
   return frame;
 }

@@ -93,7 +93,10 @@ GpuMesh::GpuMesh(const Mesh& source) : vertex_array(gl::make_vertex_array()) {
   index_count = static_cast<GLsizei>(mesh->indices.size());
   if (index_count == 0) return;
   vertices = gl::make_buffer(std::span<const Vertex>(packed));
-  indices = gl::make_buffer(std::span<const uint32_t>(mesh->indices));
+  std::vector<uint32_t> both = mesh->indices;
+  both.insert(both.end(), source.coarse_indices.begin(), source.coarse_indices.end());
+  coarse_count = static_cast<GLsizei>(source.coarse_indices.size());
+  indices = gl::make_buffer(std::span<const uint32_t>(both));
   glVertexArrayVertexBuffer(vertex_array, kVertexBinding, vertices, 0, sizeof(Vertex));
   glVertexArrayElementBuffer(vertex_array, indices);
   gl::set_attribute(vertex_array, 0, kVertexBinding, 3, offsetof(Vertex, position));
@@ -228,11 +231,15 @@ void MeshPass::bind(const GpuMaterial& material) {
   }
 }
 
-void MeshPass::draw(const Batch& batch, const gl::StreamBuffer& rows) {
-  glVertexArrayVertexBuffer(batch.mesh->vertex_array, kInstanceBinding, rows, 0, sizeof(Rows));
-  glBindVertexArray(batch.mesh->vertex_array);
-  glDrawElementsInstancedBaseInstance(GL_TRIANGLES, batch.mesh->index_count, GL_UNSIGNED_INT, nullptr,
-                                      batch.count, batch.first);
+void MeshPass::draw(const Batch& batch, const gl::StreamBuffer& rows, Detail detail) {
+  const GpuMesh& mesh = *batch.mesh;
+  const bool coarse = detail == Detail::coarse && mesh.coarse_count > 0;
+  const std::size_t first = coarse ? static_cast<std::size_t>(mesh.index_count) * sizeof(uint32_t) : 0;
+  glVertexArrayVertexBuffer(mesh.vertex_array, kInstanceBinding, rows, 0, sizeof(Rows));
+  glBindVertexArray(mesh.vertex_array);
+  glDrawElementsInstancedBaseInstance(GL_TRIANGLES, coarse ? mesh.coarse_count : mesh.index_count,
+                                      GL_UNSIGNED_INT, reinterpret_cast<const void*>(first), batch.count,
+                                      batch.first);
 }
 
 gl::LazyProgram& MeshPass::surface_program(const GpuMaterial& material, bool mirror) {
@@ -273,7 +280,7 @@ void MeshPass::draw_shadows(const Matrix4f& shadow_clip_from_world, bool front_o
     const GpuMaterial& material = *batch.material;
     set_facing(batch, !(front_only && batch.mesh->closed && !material.blended && !material.glass));
     bind(*batch.material);
-    draw(batch, shadow_rows_);
+    draw(batch, shadow_rows_, Detail::coarse);
   }
   glDisable(GL_CULL_FACE);
   glFrontFace(GL_CCW);
@@ -289,7 +296,7 @@ void MeshPass::draw_depth(const Matrix4f& clip_from_world) {
   glUniformMatrix4fv(0, 1, GL_FALSE, clip_from_world.data());
   for (const Batch& batch : opaque_) {
     set_facing(batch, batch.material->two_sided);
-    draw(batch, rows_);
+    draw(batch, rows_, Detail::coarse);
   }
 }
 

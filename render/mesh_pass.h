@@ -21,7 +21,8 @@ struct GpuMesh {
   gl::Buffer vertices, indices;
   gl::VertexArray vertex_array;
   GLsizei index_count = 0;
-  Vector3f center;  ///< of the bounding ball
+  GLsizei coarse_count = 0;  ///< of the indices behind those, of Mesh::coarse_indices
+  Vector3f center;           ///< of the bounding ball
   float radius = 0;
   float thickness = 0;  ///< the least side of the box around it
   bool flat = false;    ///< lies in a plane along an axis
@@ -87,6 +88,7 @@ class MeshPass {
 
  private:
   struct Item;
+  enum class Detail { full, coarse };
   struct Batch {
     const GpuMesh* mesh;
     const GpuMaterial* material;
@@ -96,7 +98,7 @@ class MeshPass {
     GLsizei count;
     float thickness;  ///< in the world, of the first
   };
-  void draw(const Batch& batch, const gl::StreamBuffer& rows);
+  void draw(const Batch& batch, const gl::StreamBuffer& rows, Detail detail = Detail::full);
   void bind(const GpuMaterial& material);
   gl::LazyProgram& surface_program(const GpuMaterial& material, bool mirror = false);
   gl::LazyProgram& shadow_program(const GpuMaterial& material);

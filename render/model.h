@@ -24,6 +24,9 @@ struct Mesh {
   std::vector<Vector3f> normals;
   std::vector<Vector2f> uvs;
   std::vector<uint32_t> indices;  ///< three per triangle, counter-clockwise seen from outside
+  /// A coarser surface of the same vertices, just inside of the other and as closed, for shadows and depth;
+  /// empty: no other.
+  std::vector<uint32_t> coarse_indices;
 
   Eigen::AlignedBox3f bounds() const;
 };
@@ -86,8 +89,8 @@ struct Material {
 
 /// What a model file holds, with the node hierarchy already applied.
 struct Model {
-  /// A node that has triangles, and where it is: turned and moved, without its scale. A part of a model that moves
-  /// against others is one.
+  /// A node that has triangles, and where it is: turned and moved, without its scale. A part of a model that
+  /// moves against others is one.
   struct Node {
     std::string name;  ///< unique; of namesakes the later ones end in _2, _3 ...
     int parent = -1;   ///< index of the nearest node above that has triangles, -1: none

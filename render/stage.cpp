@@ -39,11 +39,6 @@ struct Picture {
         framebuffer(gl::make_framebuffer(color, depth)) {}
 };
 
-/// Tells the sub-frames of a frame apart.
-float seed_of(const SampleOffsets& offsets) {
-  return 1 + offsets.light.x() + 2 * offsets.light.y();
-}
-
 /// What a sub-frame must soften by itself, so that the mean of all is as soft as the sun's disc makes it.
 Vector4f penumbra_of(const ShadowFrame& shadow, const Sun& sun, float size_px, int count) {
   const float half = std::tan(0.5f * sun.size_deg * std::numbers::pi_v<float> / 180);
@@ -192,8 +187,7 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
     for (int row = 0; row < 3; ++row)
       frame.shadow_rows[static_cast<std::size_t>(row)] = map_from_world.row(row).transpose();
     const auto size = static_cast<float>(def.shadow_map_px);
-    const float seed = seed_of(offsets);
-    frame.shadow = {shadow.texel_m, size, 1 / size, seed};
+    frame.shadow.head<3>() << shadow.texel_m, size, 1 / size;
     frame.penumbra = penumbra_of(shadow, sun, size, offsets.count);
     frame.sun_direction.w() = 1;
     shadow_map.mark(shadow, std::span(casters).first(balls), boxes);
@@ -522,7 +516,7 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
       std::ranges::any_of(sets, [](const PointSet* set) { return set->def.style == PointStyle::sphere; });
   const float nearby = kReach * (s.camera.target - s.camera.eye).norm();
   const float reach = opaque ? s.environment.occlusion_reach.value_or(nearby) : 0;
-  s.occlusion_pass.draw(s.picture.depth, view, reach, offsets.count, seed_of(offsets));
+  s.occlusion_pass.draw(s.picture.depth, view, reach, offsets.count, frame.shadow.w());
   s.draw_opaque(sheets, sets);
   s.draw_blended(sets, view, frame, offsets.index == 0);
   s.draw_lines(view);

@@ -7,17 +7,25 @@ uint mix_bits(uint h) {
 }
 
 // In [0, 1).
+float unit_of(uint bits) { return float(mix_bits(bits) >> 8) * (1.0 / 16777216.0); }
+
+const uvec2 kPrimes = uvec2(0x9E3779B1u, 0x85EBCA77u);
 float cell_random(vec2 cell, uint salt) {
-  uvec2 c = uvec2(ivec2(cell));
-  return float(mix_bits(c.x * 0x9E3779B1u ^ c.y * 0x85EBCA77u ^ salt) >> 8) * (1.0 / 16777216.0);
+  uvec2 c = uvec2(ivec2(cell)) * kPrimes;
+  return unit_of(c.x ^ c.y ^ salt);
+}
+// Of the cell, and those after it along x, y and both. Multiplying whole numbers is what costs.
+vec4 cells_random(vec2 cell, uint salt) {
+  uvec2 c = uvec2(ivec2(cell)) * kPrimes, d = c + kPrimes;
+  return vec4(unit_of(c.x ^ c.y ^ salt), unit_of(d.x ^ c.y ^ salt), unit_of(c.x ^ d.y ^ salt), unit_of(d.x ^ d.y ^ salt));
 }
 
 // Value noise in [0, 1] and its gradient.
 vec3 noise(vec2 p, uint salt) {
   vec2 cell = floor(p), f = p - cell;
   vec2 s = f * f * (3.0 - 2.0 * f), ds = 6.0 * f * (1.0 - f);
-  float a = cell_random(cell, salt), b = cell_random(cell + vec2(1.0, 0.0), salt);
-  float c = cell_random(cell + vec2(0.0, 1.0), salt), d = cell_random(cell + vec2(1.0, 1.0), salt);
+  vec4 r = cells_random(cell, salt);
+  float a = r.x, b = r.y, c = r.z, d = r.w;
   float k = a - b - c + d;
   return vec3(a + (b - a) * s.x + (c - a) * s.y + k * s.x * s.y, ds * vec2(b - a + k * s.y, c - a + k * s.x));
 }
@@ -27,12 +35,7 @@ float noise(vec3 p) {
   vec3 s = f * f * (3.0 - 2.0 * f);
   uint z = uint(int(cell.z));
   uint salt0 = z * 0xC2B2AE3Du, salt1 = (z + 1u) * 0xC2B2AE3Du;
-  vec2 x = vec2(1.0, 0.0);
-  vec4 low = vec4(cell_random(cell.xy, salt0), cell_random(cell.xy + x, salt0), cell_random(cell.xy + x.yx, salt0),
-                  cell_random(cell.xy + x.xx, salt0));
-  vec4 high = vec4(cell_random(cell.xy, salt1), cell_random(cell.xy + x, salt1), cell_random(cell.xy + x.yx, salt1),
-                   cell_random(cell.xy + x.xx, salt1));
-  vec4 c = mix(low, high, s.z);
+  vec4 c = mix(cells_random(cell.xy, salt0), cells_random(cell.xy, salt1), s.z);
   return mix(mix(c.x, c.y, s.x), mix(c.z, c.w, s.x), s.y);
 }
 

@@ -29,7 +29,7 @@ void main() {
   r2 *= r2;
   // Nothing to find in the sky, nor in less than a pixel.
   int n = texelFetch(scene_depth, p, 0).r == 0.0 || radius < 1.5 ? 0 : taps;
-  float turn = 6.2831853 * dither(gl_FragCoord.xy, reach.w), start = dither(gl_FragCoord.yx, 0.37 + reach.w);
+  float turn = 6.2831853 * dither(gl_FragCoord.xy, reach.w), start = dither(gl_FragCoord.yx, 0.37 + 7.0 * reach.w);
   vec2 a = vec2(cos(turn), sin(turn));
   float sum = 0.0;
   for (int k = 0; k < n; ++k) {

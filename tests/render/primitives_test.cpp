@@ -55,25 +55,40 @@ Totals totals_of(const Mesh& mesh) {
   return totals;
 }
 
+// Those that do not run once in each direction between positions of the same bits.
+int bad_edges(const Mesh& mesh) {
+  std::map<std::pair<std::array<float, 3>, std::array<float, 3>>, int> edges;
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto from = key(mesh.positions[mesh.indices[i + k]]);
+      const auto to = key(mesh.positions[mesh.indices[i + (k + 1) % 3]]);
+      ++edges[{from, to}];
+    }
+  }
+  int bad = 0;
+  for (const auto& [edge, count] : edges) {
+    const auto back = edges.find({edge.second, edge.first});
+    bad += count != 1 || back == edges.end() || back->second != 1;
+  }
+  return bad;
+}
+
 TEST(Primitives, AreClosedAndWoundOutwards) {
   for (const Named& shape : closed_primitives()) {
-    // Each edge runs once in each direction between positions of the same bits.
-    std::map<std::pair<std::array<float, 3>, std::array<float, 3>>, int> edges;
-    for (std::size_t i = 0; i < shape.mesh.indices.size(); i += 3) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        const auto from = key(shape.mesh.positions[shape.mesh.indices[i + k]]);
-        const auto to = key(shape.mesh.positions[shape.mesh.indices[i + (k + 1) % 3]]);
-        ++edges[{from, to}];
-      }
-    }
-    int bad = 0;
-    for (const auto& [edge, count] : edges) {
-      const auto back = edges.find({edge.second, edge.first});
-      bad += count != 1 || back == edges.end() || back->second != 1;
-    }
-    EXPECT_EQ(bad, 0) << shape.name;
+    EXPECT_EQ(bad_edges(shape.mesh), 0) << shape.name;
     EXPECT_GT(totals_of(shape.mesh).volume, 0) << shape.name;
   }
+}
+
+TEST(Primitives, CoarseBoxIsClosedAndJustInsideOfTheOther) {
+  const Mesh box = make_box({1, 2, 3}, 0.02f);
+  Mesh coarse = box;
+  coarse.indices = box.coarse_indices;
+  EXPECT_EQ(bad_edges(coarse), 0);
+  EXPECT_EQ(coarse.indices.size() / 3, 44u);
+  EXPECT_EQ(box.indices.size() / 3, 108u);
+  EXPECT_LT(totals_of(coarse).volume, totals_of(box).volume);
+  EXPECT_GT(totals_of(coarse).volume, 0.999 * totals_of(box).volume);
 }
 
 TEST(Primitives, HaveTheAreaVolumeAndBoundsOfTheirShape) {
