@@ -97,15 +97,20 @@ class Workshop {
   fs::path folder_;
 };
 
-/// The frames that the manifest of a folder lists and that are there.
+/// The frames that the manifest of a folder lists, with their channels, and that are there.
 std::set<fs::path> frames_in(const fs::path& pattern) {
   std::set<fs::path> frames;
   std::ifstream in(pattern.parent_path() / "manifest.json");
   const auto manifest = nlohmann::json::parse(in, nullptr, false);
   if (!manifest.is_object() || manifest.value("pattern", std::string()) != pattern.filename().string())
     return frames;
-  for (int frame = 1; frame <= manifest.value("frames", 0); ++frame)
-    if (const fs::path path = render::frame_path(pattern, frame); fs::exists(path)) frames.insert(path);
+  const fs::path stem = fs::path(pattern).replace_extension();
+  for (int frame = 1; frame <= manifest.value("frames", 0); ++frame) {
+    std::vector<fs::path> files = all_channel_files(stem, frame);
+    files.push_back(render::frame_path(pattern, frame));
+    for (const fs::path& path : files)
+      if (fs::exists(path)) frames.insert(path);
+  }
   return frames;
 }
 

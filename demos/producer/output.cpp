@@ -29,17 +29,23 @@ nlohmann::ordered_json to_json(const Manifest& m, const fs::path& pattern) {
           {"fps", m.fps}};
 }
 
-/// Whatever channels and formats frames 1 to `count` may have.
 void remove_channels(const fs::path& stem, int count) {
-  using render::Channel;
-  const std::vector all = {Channel::depth, Channel::normal, Channel::id, Channel::motion};
   std::error_code error;
-  for (const auto format : {render::ChannelFormat::exr, render::ChannelFormat::png})
-    for (int k = 1; k <= count; ++k)
-      for (const fs::path& path : ChannelFiles{{all, format}, stem}.of(k)) fs::remove(path, error);
+  for (int k = 1; k <= count; ++k)
+    for (const fs::path& path : all_channel_files(stem, k)) fs::remove(path, error);
 }
 
 }  // namespace
+
+std::vector<fs::path> all_channel_files(const fs::path& stem, int frame) {
+  using render::Channel;
+  std::vector<fs::path> files;
+  for (const auto format : {render::ChannelFormat::exr, render::ChannelFormat::png}) {
+    const ChannelFiles all{{{Channel::depth, Channel::normal, Channel::id, Channel::motion}, format}, stem};
+    for (fs::path& path : all.of(frame)) files.push_back(std::move(path));
+  }
+  return files;
+}
 
 OutputTarget parse_output(const std::string& out) {
   if (out == "-") return {OutputKind::pipe, {}};

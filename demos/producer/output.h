@@ -49,6 +49,9 @@ struct ChannelFiles {
   }
 };
 
+/// Those of every channel and format that a frame may have.
+std::vector<std::filesystem::path> all_channel_files(const std::filesystem::path& stem, int frame);
+
 enum class Existing { refuse, keep, replace };
 
 /// Prepares a folder of frames: checks or writes the manifest and returns those of `frames` that have to be

@@ -26,7 +26,8 @@ layout(binding = 13) uniform sampler2D casters;      // the depth from which on 
 
 // Shadows are as soft as what throws them is far away (R. Fernando, "Percentage-Closer Soft Shadows", 2005): first the
 // mean depth of what is in between, then the share of a disc as wide as its penumbra. Where nothing or only shadow is
-// near, as almost everywhere, the first is all; a loop of no rounds is how the second is skipped.
+// near, as almost everywhere, the first is all. llvmpipe runs a loop's body until no pixel of eight wants another round, once at
+// least: such loops look at their condition at the end.
 float shadow_map_visibility(vec3 position, vec3 normal) {
   if (frame.sun_direction.w == 0.0) return 1.0;
   vec3 p = shadow_place(position, normal);
@@ -43,23 +44,25 @@ float shadow_map_visibility(vec3 position, vec3 normal) {
   // None where a surface looks away from the sun, or nothing can be in front of it.
   float nearest = texelFetch(casters, ivec2(p.xy * vec2(textureSize(casters, 0))), 0).r;
   int rounds = g.z < 0.0 && p.z > nearest ? 4 : 0;
-  for (int k = 0; k < rounds; ++k) {
+  int k = 0;
+  do {
     vec2 offset = a * (0.7 * search * frame.shadow.z);
     vec4 depth = textureGather(shadow_depth, p.xy + offset);
     vec4 blocks = vec4(lessThan(depth, vec4(min(p.z + dot(slope, offset) - beside, 1.0))));
     sum += dot(depth, blocks);
     blockers += dot(blocks, vec4(1.0));
     a = vec2(-a.y, a.x);
-  }
-  int taps = blockers == 0.0 || blockers == 16.0 ? 0 : int(frame.penumbra.w);
+  } while (++k < rounds);
+  int taps = rounds == 0 || blockers == 0.0 || blockers == 16.0 ? 0 : int(frame.penumbra.w);
   float penumbra = clamp(frame.penumbra.x * (p.z - sum / max(blockers, 1.0)), 1.0, frame.penumbra.y);
   float lit = 0.0, n = frame.penumbra.w;
-  for (int k = 0; k < taps; ++k) {
+  k = 0;
+  do {
     vec2 offset = a * (penumbra * frame.shadow.z * sqrt((float(k) + 0.5) / n));
     lit += texture(shadow_map, vec3(p.xy + offset, min(p.z + dot(slope, offset), 1.0)));
     a = mat2(-0.73736888, -0.67549029, 0.67549029, -0.73736888) * a;  // by the golden angle
-  }
-  return taps == 0 ? (blockers == 0.0 ? 1.0 : 0.0) : lit / n;
+  } while (++k < taps);
+  return rounds == 0 || blockers == 0.0 ? 1.0 : blockers == 16.0 ? 0.0 : lit / n;
 }
 #else
 float shadow_map_visibility(vec3 position, vec3 normal) {

@@ -32,14 +32,15 @@ void main() {
   float turn = 6.2831853 * dither(gl_FragCoord.xy, reach.w), start = dither(gl_FragCoord.yx, 0.37 + 7.0 * reach.w);
   vec2 a = vec2(cos(turn), sin(turn));
   float sum = 0.0;
-  for (int k = 0; k < n; ++k) {
+  int k = 0;
+  do {
     float share = (float(k) + start) / float(taps);
     ivec2 tap = p + ivec2(round(a * (radius * share * share + 1.5)));
     vec3 v = place_at(clamp(tap, ivec2(0), size - 1)) - here;
     float v2 = dot(v, v), fade = max(1.0 - v2 / r2, 0.0);
     sum += fade * max(dot(v, normal) * inversesqrt(v2 + 1e-12) - 0.08, 0.0);
     a = mat2(-0.73736888, -0.67549029, 0.67549029, -0.73736888) * a;  // by the golden angle
-  }
-  float hidden = 5.0 * sum / float(taps);
+  } while (++k < n);
+  float hidden = n == 0 ? 0.0 : 5.0 * sum / float(taps);
   result = vec2(1.0 / (1.0 + hidden * (1.0 + hidden)), distance);
 }

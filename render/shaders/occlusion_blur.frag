@@ -6,12 +6,12 @@ void main() {
   ivec2 p = ivec2(gl_FragCoord.xy), last = textureSize(openness, 0) - 1;
   vec2 here = texelFetch(openness, p, 0).rg;
   float sum = 0.0, weights = 0.0;
-  int count = here.y > 0.0 ? 9 : 0;  // not a constant: the loop must not be unrolled, for compilation takes time
-  for (int k = 0; k < count; ++k) {
+  int count = here.y > 0.0 ? 9 : 0, k = 0;  // not a constant: the loop must not be unrolled, for compilation takes time
+  do {
     vec2 texel = texelFetch(openness, clamp(p + ivec2(k % 3 - 1, k / 3 - 1), ivec2(0), last), 0).rg;
     float off = texel.y / here.y - 1.0, weight = 1.0 / (1.0 + 1e4 * off * off);
     sum += weight * texel.x;
     weights += weight;
-  }
+  } while (++k < count);
   result = vec2(sum / max(weights, 1e-6), here.y);
 }
