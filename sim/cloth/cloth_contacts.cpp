@@ -193,7 +193,7 @@ void ClothContacts::block(Touch& t, ClothBody* holder) {
   t.near->pressed += impulse;
 }
 
-std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, const MoveShares& shares,
+std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::span<const uint8_t> shortened,
                                              std::span<const Real> recoil) {
   struct Stop {
     Touch touch;
@@ -203,7 +203,7 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, const Mo
   std::vector<Stop> stops;
   for (Near& near : near_) {
     ClothBody& body = bodies_[near.body];
-    if (!body.is_dynamic() || shares[near.point] == 1) continue;
+    if (!body.is_dynamic() || !shortened[near.point]) continue;
     const Vec3 p = points.at(near.point), place = body.end().point_to_body(p);
     const Real thickness = points.thickness[near.point];
     if (near.distance - (place - near.place).norm() >= thickness) continue;

@@ -30,10 +30,10 @@ class ClothContacts {
   /// Puts points out of the bodies, in a sub-step of cloth of length dt, one of `parts` of the world's.
   /// Appends to `cuts`.
   void solve(ClothPoints& points, Real dt, Real parts, std::vector<VelocityCut>& cuts);
-  /// After moves were shortened, by `shares`: cloth that can get no farther stops the bodies that press into
-  /// it. `recoil` is the inverse mass of what is behind each point's cloth: 0 if it hangs on the world.
-  /// Returns by cloth the impulse that it takes up [N s].
-  std::vector<Vec3> stop_bodies(const ClothPoints& points, const MoveShares& shares,
+  /// After moves were shortened, those of points that are not 0 in `shortened`: cloth that can get no farther
+  /// stops the bodies that press into it. `recoil` is the inverse mass of what is behind each point's cloth:
+  /// 0 if it hangs on the world. Returns by cloth the impulse that it takes up [N s].
+  std::vector<Vec3> stop_bodies(const ClothPoints& points, std::span<const uint8_t> shortened,
                                 std::span<const Real> recoil);
 
   /// Whether a point touched a body in the last solve().

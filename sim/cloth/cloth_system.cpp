@@ -264,12 +264,33 @@ Vec4 ClothSystem::common_move() const {
   return sum / mass;
 }
 
-/// Until nothing is too long and nothing crossed.
+/// Until nothing is too long and nothing crossed. What is held back in a moving frame goes ways that its
+/// pairs were not sought for, and is looked at once more in the world's.
 void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   const bool self = ends_span && !self_contacts_.empty();
   if (limit_.empty() && !self) return;
   if (self) points_.start.swap(span_start_);  // the moves of the whole span
+  shortened_.assign(points_.size(), 0);
   const Vec4 drift = common_move();
+  if (shorten_moves_in(drift, dt, self) && self && !drift.isZero()) shorten_moves_in(Vec4::Zero(), dt, self);
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (!shortened_[i]) continue;
+    ++cloths_[points_.cloth[i]]->report.limited;
+    // Its velocity is that of the shortened move, which in a span is not that of the last sub-step.
+    if (self)
+      kick_[i] = (points_.position[i] - points_.start[i]) / (span_ * dt) -
+                 (points_.position[i] - span_start_[i]) / dt;
+  }
+  if (self) {
+    std::erase_if(cuts_, [&](const VelocityCut& cut) { return shortened_[cut.point] != 0; });
+    self_contacts_.end_substep(points_, span_ * dt);
+    points_.start.swap(span_start_);
+  }
+  stop_bodies();
+}
+
+/// Shortens moves beyond that which all make in any case; whether any.
+bool ClothSystem::shorten_moves_in(const Vec4& drift, Real dt, bool self) {
   if (self) self_contacts_.find_doubtful(points_, span_ * dt, kHorizon, drift);
   shares_.assign(points_.size(), 1);
   for (Vec4& start : points_.start) start += drift;
@@ -281,32 +302,22 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   }
   for (uint32_t i : self_contacts_.take_held_back()) ++cloths_[points_.cloth[i]]->report.held_back;
   for (uint32_t i : self_contacts_.take_crossed()) ++cloths_[points_.cloth[i]]->report.crossings;
+  bool any = false;
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    if (!(points_.inverse_mass[i] > 0)) continue;
     const Real share = again ? 0 : shares_[i];
-    if (share == 1) continue;
-    ++cloths_[points_.cloth[i]]->report.limited;
+    if (share == 1 || !(points_.inverse_mass[i] > 0)) continue;
     points_.position[i] = points_.start[i] + share * (points_.position[i] - points_.start[i]);
-    shares_[i] = share;
+    shortened_[i] = 1;
+    any = true;
   }
   for (Vec4& start : points_.start) start -= drift;
-  for (std::size_t i = 0; self && i < points_.size(); ++i)
-    // Its velocity is that of the shortened move, which in a span is not that of the last sub-step.
-    if (shares_[i] != 1 && points_.inverse_mass[i] > 0)
-      kick_[i] = (points_.position[i] - points_.start[i]) / (span_ * dt) -
-                 (points_.position[i] - span_start_[i]) / dt;
-  if (self) {
-    std::erase_if(cuts_, [&](const VelocityCut& cut) { return shares_[cut.point] != 1; });
-    self_contacts_.end_substep(points_, span_ * dt);
-    points_.start.swap(span_start_);
-  }
-  stop_bodies();
+  return any;
 }
 
 /// A cloth that gives no more stops bodies as one with those that it hangs on.
 void ClothSystem::stop_bodies() {
   const std::vector<Real> recoil = recoils();
-  const std::vector<Vec3> taken = contacts_.stop_bodies(points_, shares_, recoil);
+  const std::vector<Vec3> taken = contacts_.stop_bodies(points_, shortened_, recoil);
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     if (!(recoil[c] > 0) || taken[c] == Vec3::Zero()) continue;
     const Vec3 gain = recoil[c] * taken[c];

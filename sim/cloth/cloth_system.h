@@ -54,6 +54,7 @@ class ClothSystem {
   void touch_bodies(Real dt);
   Vec4 common_move() const;
   void shorten_moves(Real dt, bool ends_span);
+  bool shorten_moves_in(const Vec4& drift, Real dt, bool self);
   void stop_bodies();
   std::vector<ClothBody*> holders(std::size_t cloth) const;
   std::vector<Real> recoils() const;
@@ -85,7 +86,8 @@ class ClothSystem {
   std::vector<Seam> seams_;
   std::vector<VelocityCut> cuts_;
   MoveShares shares_;
-  std::vector<uint32_t> lowered_;  // points whose shares were lowered in a round
+  std::vector<uint8_t> shortened_;  // whether a point's move was, in the sub-step
+  std::vector<uint32_t> lowered_;   // points whose shares were lowered in a round
   std::span<ClothBody> bodies_;
 };
 

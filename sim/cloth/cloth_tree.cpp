@@ -3,14 +3,20 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 
 namespace offstage::sim {
 namespace {
 
-constexpr uint32_t kLeaf = 4;
 /// A patch is flat enough if all its normals have at least this cosine with a common direction.
 constexpr Real kLeaning = 0.3;
+
+/// And the triangles around a point, if they have this one: an angle a then is seen as one of at most
+/// 2 atan(tan(a / 2) / cosine) < a / cosine.
+constexpr Real kStarLeaning = 0.7;
+/// How much a triangle's angles may grow by strain.
+constexpr Real kStrainedAngle = 1.15;
 
 constexpr uint32_t kNone = ~0u;
 
@@ -58,6 +64,24 @@ std::vector<uint32_t> pieces(std::span<const Triangle> triangles, std::size_t po
   return piece;
 }
 
+/// Least and greatest of a triangle's unit normals at both ends of its way.
+std::array<Vec4, 2> normal_bounds(const Triangle& t, std::span<const Vec4> from, std::span<const Vec4> to) {
+  const auto unit_normal = [&](std::span<const Vec4> x) {
+    const Vec3 n = (x[t[1]] - x[t[0]]).head<3>().cross((x[t[2]] - x[t[0]]).head<3>());
+    const Real size = n.norm();
+    return size > 0 ? padded(n / size) : Vec4(Vec4::Zero());
+  };
+  const Vec4 first = unit_normal(from), last = unit_normal(to);
+  return {first.cwiseMin(last), first.cwiseMax(last)};
+}
+
+/// Whether all normals within bounds have at least this cosine with the middle one.
+bool lean(const Vec4& low, const Vec4& high, Real cosine) {
+  const Vec4 middle = low + high;
+  const Vec4 least = middle.cwiseProduct(low).cwiseMin(middle.cwiseProduct(high));
+  return least.sum() > cosine * middle.norm();
+}
+
 }  // namespace
 
 void ClothTree::build(std::span<const Triangle> triangles, std::span<const Vec4> points) {
@@ -69,26 +93,68 @@ void ClothTree::build(std::span<const Triangle> triangles, std::span<const Vec4>
   std::stable_sort(order_.begin(), order_.end(),
                    [&](uint32_t a, uint32_t b) { return piece_[a] < piece_[b]; });
   boxes_.resize(triangles.size());
+  normals_.resize(triangles.size());
   nodes_.clear();
   std::vector<Vec4> centres;
   for (const Triangle& t : triangles) centres.push_back((points[t[0]] + points[t[1]] + points[t[2]]) / 3);
   if (!triangles.empty()) build_below(centres, 0, static_cast<uint32_t>(triangles.size()));
   place_.resize(order_.size());
   for (uint32_t i = 0; i < order_.size(); ++i) place_[order_[i]] = i;
-  parent_.assign(nodes_.size(), 0);
   leaf_.resize(order_.size());
+  leaves_.clear();
   for (uint32_t k = 0; k < nodes_.size(); ++k) {
-    const Node& node = nodes_[k];
-    if (node.second != 0)
-      parent_[k + 1] = parent_[node.second] = k;
-    else
-      std::fill_n(leaf_.begin() + node.first, node.count, k);
+    Node& node = nodes_[k];
+    if (node.second != 0) continue;
+    std::fill_n(leaf_.begin() + node.first, node.count, k);
+    node.leaf = static_cast<uint32_t>(leaves_.size());
+    leaves_.emplace_back().clear();
   }
+  build_stars(points);
+}
+
+void ClothTree::build_stars(std::span<const Vec4> rest) {
+  stars_.assign(rest.size(), {});
+  std::vector<Real> angle(rest.size(), 0);
+  std::vector<uint32_t> joined(rest.size(), 0);  // neighbours in a star that share an edge
+  for (std::size_t t = 0; t < triangles_.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Triangle& p = triangles_[t];
+      const std::size_t next = (k + 1) % 3, last = (k + 2) % 3;
+      const Vec3 a = (rest[p[next]] - rest[p[k]]).head<3>(), b = (rest[p[last]] - rest[p[k]]).head<3>();
+      angle[p[k]] += std::atan2(a.cross(b).norm(), a.dot(b));
+      joined[p[k]] += beside_[t][k] != kNone;
+      ++stars_[p[k]].count;
+    }
+  uint32_t first = 0;
+  for (std::size_t i = 0; i < stars_.size(); ++i) {
+    Star& star = stars_[i];
+    star.first = first;
+    first += star.count;
+    // Each edge that leads from the point counts once for the triangle that it is the first edge of.
+    const bool closed = joined[i] == star.count, fan = joined[i] + 1 == star.count;
+    const Real seen = angle[i] * kStrainedAngle / kStarLeaning;
+    star.simple = (closed && seen < 4 * std::numbers::pi) || (fan && seen < 2 * std::numbers::pi);
+  }
+  around_.resize(first);
+  std::vector<uint32_t> taken(stars_.size(), 0);
+  for (uint32_t place = 0; place < order_.size(); ++place)
+    for (uint32_t i : triangles_[order_[place]]) around_[stars_[i].first + taken[i]++] = place;
+}
+
+void ClothTree::fit_star(Star& star) const {
+  star.leans = false;
+  if (!star.simple) return;
+  Vec4 low = Vec4::Ones(), high = -low;
+  for (uint32_t i = star.first; i < star.first + star.count; ++i) {
+    low = low.cwiseMin(normals_[around_[i]][0]);
+    high = high.cwiseMax(normals_[around_[i]][1]);
+  }
+  star.leans = lean(low, high, kStarLeaning);
 }
 
 /// Whether the outline of a patch, seen along its mean normal, crosses itself: sweeps over its segments.
 bool ClothTree::outline_crosses(std::span<const Vec4> points, const Node& node) const {
-  if (node.count <= kLeaf) return true;  // no dearer to look at its triangles
+  if (node.count <= EightBoxes::kCount) return true;  // no dearer to look at its triangles
   const Vec3 normal = (node.normal_low + node.normal_high).head<3>().normalized();
   const Vec3 u = normal.unitOrthogonal(), v = normal.cross(u);
   struct Segment {
@@ -129,8 +195,8 @@ uint32_t ClothTree::build_below(const std::vector<Vec4>& centres, uint32_t first
   nodes_[at].count = count;
   nodes_[at].second = 0;
   nodes_[at].connected = piece_[order_[first]] == piece_[order_[first + count - 1]];
-  if (count <= kLeaf) return at;
-  uint32_t half = count / 2;
+  if (count <= EightBoxes::kCount) return at;
+  uint32_t half = (count / 2 + EightBoxes::kCount - 1) / EightBoxes::kCount * EightBoxes::kCount;
   if (!nodes_[at].connected) {
     // Where the piece in the middle begins or, if that is the first, ends.
     const auto begin = order_.begin() + first;
@@ -161,80 +227,66 @@ void ClothTree::halve(const std::vector<Vec4>& centres, uint32_t first, uint32_t
   });
 }
 
-void ClothTree::Box::extend(const Box& b) {
-  low = low.cwiseMin(b.low);
-  high = high.cwiseMax(b.high);
-  least_move = least_move.cwiseMin(b.least_move);
-  greatest_move = greatest_move.cwiseMax(b.greatest_move);
-}
-
-ClothTree::Box ClothTree::box_of(const Triangle& t, std::span<const Vec4> from, std::span<const Vec4> to,
-                                 std::span<const Real> margin) const {
-  const Vec4 &a = from[t[0]], &b = from[t[1]], &c = from[t[2]];
-  const Vec4 move_a = to[t[0]] - a, move_b = to[t[1]] - b, move_c = to[t[2]] - c;
+void ClothTree::fit_triangle(uint32_t place, std::span<const Vec4> from, std::span<const Vec4> to,
+                             std::span<const Real> margin) {
+  const Triangle& t = triangles_[order_[place]];
   const Vec4 around = Vec4::Constant(std::max({margin[t[0]], margin[t[1]], margin[t[2]]}));
-  return {a.cwiseMin(b).cwiseMin(c) - around, a.cwiseMax(b).cwiseMax(c) + around,
-          move_a.cwiseMin(move_b).cwiseMin(move_c), move_a.cwiseMax(move_b).cwiseMax(move_c)};
+  const auto least = [&](std::span<const Vec4> x) -> Vec4 {
+    return x[t[0]].cwiseMin(x[t[1]]).cwiseMin(x[t[2]]) - around;
+  };
+  const auto greatest = [&](std::span<const Vec4> x) -> Vec4 {
+    return x[t[0]].cwiseMax(x[t[1]]).cwiseMax(x[t[2]]) + around;
+  };
+  boxes_[place] = MovingBox::around(least(from), greatest(from), least(to), greatest(to));
+  normals_[place] = normal_bounds(t, from, to);
+  Node& node = nodes_[leaf_[place]];
+  leaves_[node.leaf].set(place - node.first, boxes_[place]);
+  node.fresh |= 1u << (place - node.first);
 }
 
-void ClothTree::fit_box(Node& node, uint32_t at) const {
+void ClothTree::fit_node(uint32_t at) {
+  Node& node = nodes_[at];
   if (node.second != 0) {
-    node.box = nodes_[at + 1].box;
-    node.box.extend(nodes_[node.second].box);
-    return;
+    const Node &a = nodes_[at + 1], &b = nodes_[node.second];
+    node.box = a.box;
+    node.box.extend(b.box);
+    node.normal_low = a.normal_low.cwiseMin(b.normal_low);
+    node.normal_high = a.normal_high.cwiseMax(b.normal_high);
+  } else {
+    node.box = boxes_[node.first];
+    node.normal_low = normals_[node.first][0];
+    node.normal_high = normals_[node.first][1];
+    for (uint32_t i = node.first + 1; i < node.first + node.count; ++i) {
+      node.box.extend(boxes_[i]);
+      node.normal_low = node.normal_low.cwiseMin(normals_[i][0]);
+      node.normal_high = node.normal_high.cwiseMax(normals_[i][1]);
+    }
   }
-  node.box = boxes_[node.first];
-  for (uint32_t i = node.first + 1; i < node.first + node.count; ++i) node.box.extend(boxes_[i]);
+  node.leans = node.connected && lean(node.normal_low, node.normal_high, kLeaning);
+}
+
+/// What is above fresh triangles, children before their parents.
+void ClothTree::fit_above() {
+  for (auto k = static_cast<uint32_t>(nodes_.size()); k-- > 0;) {
+    Node& node = nodes_[k];
+    if (node.second != 0) node.fresh = (nodes_[k + 1].fresh | nodes_[node.second].fresh) != 0;
+    if (node.fresh != 0) fit_node(k);
+  }
 }
 
 void ClothTree::fit(std::span<const Vec4> from, std::span<const Vec4> to, std::span<const Real> margin) {
-  std::vector<std::array<Vec4, 2>> normals(order_.size());  // least and greatest at both ends of the way
-  const auto unit_normal = [](const Vec4& a, const Vec4& b, const Vec4& c) {
-    const Vec3 n = (b - a).head<3>().cross((c - a).head<3>());
-    const Real size = n.norm();
-    return size > 0 ? padded(n / size) : Vec4(Vec4::Zero());
-  };
-  for (std::size_t i = 0; i < order_.size(); ++i) {
-    const Triangle& t = triangles_[order_[i]];
-    boxes_[i] = box_of(t, from, to, margin);
-    const Vec4 first = unit_normal(from[t[0]], from[t[1]], from[t[2]]);
-    const Vec4 last = unit_normal(to[t[0]], to[t[1]], to[t[2]]);
-    normals[i] = {first.cwiseMin(last), first.cwiseMax(last)};
-  }
-  for (auto k = static_cast<uint32_t>(nodes_.size()); k-- > 0;) {
-    Node& node = nodes_[k];
-    fit_box(node, k);
-    if (node.second != 0) {
-      const Node &a = nodes_[k + 1], &b = nodes_[node.second];
-      node.normal_low = a.normal_low.cwiseMin(b.normal_low);
-      node.normal_high = a.normal_high.cwiseMax(b.normal_high);
-    } else {
-      node.normal_low = normals[node.first][0];
-      node.normal_high = normals[node.first][1];
-      for (uint32_t i = node.first + 1; i < node.first + node.count; ++i) {
-        node.normal_low = node.normal_low.cwiseMin(normals[i][0]);
-        node.normal_high = node.normal_high.cwiseMax(normals[i][1]);
-      }
-    }
-    const Vec4 middle = node.normal_low + node.normal_high;
-    const Real size = middle.norm();
-    const Vec4 least = (middle.cwiseProduct(node.normal_low)).cwiseMin(middle.cwiseProduct(node.normal_high));
-    node.leans = node.connected && least.sum() > kLeaning * size;
-  }
+  for (uint32_t i = 0; i < order_.size(); ++i) fit_triangle(i, from, to, margin);
+  for (Star& star : stars_) fit_star(star);
+  fit_above();
 }
 
 void ClothTree::refit(std::span<const uint32_t> triangles, std::span<const Vec4> from,
                       std::span<const Vec4> to, std::span<const Real> margin) {
-  std::vector<uint8_t> changed(nodes_.size(), 0);
-  for (uint32_t t : triangles) {
-    boxes_[place_[t]] = box_of(triangles_[t], from, to, margin);
-    changed[leaf_[place_[t]]] = 1;
-  }
-  for (auto k = static_cast<uint32_t>(nodes_.size()); k-- > 0;) {  // children come after their parents
-    if (!changed[k]) continue;
-    fit_box(nodes_[k], k);
-    changed[parent_[k]] = 1;
-  }
+  for (Node& node : nodes_) node.fresh = 0;
+  for (uint32_t t : triangles) fit_triangle(place_[t], from, to, margin);
+  for (uint32_t t : triangles)
+    for (uint32_t i : triangles_[t]) fit_star(stars_[i]);
+  fit_above();
 }
 
 }  // namespace offstage::sim

@@ -3,15 +3,18 @@
 /// other. A connected patch whose normals all lean to one side, and whose outline seen from there does not
 /// cross itself, cannot cross itself and is passed over whole (Volino and Magnenat-Thalmann, "Efficient
 /// self-collision detection on smoothly discretized surface animations using geometrical shape regularity",
-/// 1994).
+/// 1994). So are the triangles around one point whose normals lean to one side, unless their angles there
+/// could add up to more than a full turn as seen from that side.
 
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <functional>
 #include <span>
 #include <vector>
 
 #include "sim/cloth/cloth_points.h"
+#include "sim/cloth/moving_box.h"
 
 namespace offstage::sim {
 
@@ -22,68 +25,71 @@ class ClothTree {
   /// Fits boxes around the triangles at `from`, larger by each point's `margin`, with the bounds of their
   /// ways to `to`.
   void fit(std::span<const Vec4> from, std::span<const Vec4> to, std::span<const Real> margin);
-  /// The same of a few triangles, for meeting() and overlapping().
+  /// The same of a few triangles.
   void refit(std::span<const uint32_t> triangles, std::span<const Vec4> from, std::span<const Vec4> to,
              std::span<const Real> margin);
 
   /// Calls visit(a, b) for pairs of triangles whose boxes meet on their ways, each once, in an order that
-  /// depends on the tree and the boxes alone. `points` as fitted.
+  /// depends on the tree and the boxes alone; only for pairs of which one was fitted in the last call of
+  /// fit() or refit(). `points` as fitted.
   template <class Visit>
   void pairs(std::span<const Vec4> points, Visit&& visit) const;
-  /// Calls visit(other) for the triangles that one of the tree meets on their ways, itself among them.
-  template <class Visit>
-  void meeting(uint32_t triangle, Visit&& visit) const {
-    meeting(boxes_[place_[triangle]], visit);
-  }
   /// Calls visit(triangle) for those that meet a box that stays where it is.
   template <class Visit>
-  void overlapping(const Aabb& box, Visit&& visit) const {
-    meeting({padded(box.min()), padded(box.max()), Vec4::Zero(), Vec4::Zero()}, visit);
-  }
+  void overlapping(const Aabb& bounds, Visit&& visit) const;
 
  private:
-  /// Of points at first, and of the ways that they make. What moves together meets nothing by that.
-  struct Box {
-    Vec4 low, high, least_move, greatest_move;
-
-    void extend(const Box& b);
-    bool meets(const Box& b) const {
-      const Vec4 nearer_a = (least_move - b.greatest_move).cwiseMin(0);
-      const Vec4 nearer_b = (b.least_move - greatest_move).cwiseMin(0);
-      return ((low - b.high + nearer_a).cwiseMax(b.low - high + nearer_b)).maxCoeff() <= 0;
-    }
-  };
   struct Node {
-    Box box;
+    MovingBox box;
     Vec4 normal_low, normal_high;  // of the unit normals
     uint32_t first, count;         // triangles, in order_
     uint32_t second;               // node; the first child is the next one. 0: a leaf
+    uint32_t leaf = 0;             // then: in leaves_
+    uint32_t fresh = 0;            // lanes of a leaf that were fitted last; else whether any below
     bool connected = false;        // all of it one piece
     bool leans = false;            // that, and all normals to one side
   };
 
-  Box box_of(const Triangle& t, std::span<const Vec4> from, std::span<const Vec4> to,
-             std::span<const Real> margin) const;
-  void fit_box(Node& node, uint32_t at) const;
+  /// All triangles around a point.
+  struct Star {
+    uint32_t first, count;  // places in order_, in around_
+    bool simple;            // one fan, that does not overlap itself as long as its normals lean enough
+    bool leans = false;     // that, and they do
+  };
+
+  void build_stars(std::span<const Vec4> rest);
+  void fit_star(Star& star) const;
+  bool in_leaning_star(const Triangle& a, const Triangle& b) const {
+    for (uint32_t i : a)
+      if ((i == b[0] || i == b[1] || i == b[2]) && stars_[i].leans) return true;
+    return false;
+  }
+  void fit_triangle(uint32_t place, std::span<const Vec4> from, std::span<const Vec4> to,
+                    std::span<const Real> margin);
+  void fit_node(uint32_t at);
+  void fit_above();
   uint32_t build_below(const std::vector<Vec4>& centres, uint32_t first, uint32_t count);
   void halve(const std::vector<Vec4>& centres, uint32_t first, uint32_t count, uint32_t half);
   template <class Visit>
   void within(std::span<const Vec4> points, uint32_t node, Visit& visit) const;
+  template <class Visit>
+  void look(const Node& own, uint32_t lane, const Node& other, uint32_t lanes, Visit& visit) const;
   bool outline_crosses(std::span<const Vec4> points, const Node& node) const;
   template <class Visit>
   void between(uint32_t a, uint32_t b, Visit& visit) const;
-  template <class Visit>
-  void meeting(const Box& box, Visit&& visit) const;
 
   std::vector<Triangle> triangles_;
   std::vector<uint32_t> order_;
   std::vector<uint32_t> place_;                  // of each triangle in order_
   std::vector<uint32_t> piece_;                  // connected piece of each triangle
   std::vector<std::array<uint32_t, 3>> beside_;  // triangle across each edge from a corner to the next
-  std::vector<Box> boxes_;                       // in the order of order_
+  std::vector<MovingBox> boxes_;                 // in the order of order_, as the next
+  std::vector<std::array<Vec4, 2>> normals_;     // bounds of the unit normals at both ends of the way
+  std::vector<Star> stars_;                      // of each point
+  std::vector<uint32_t> around_;
   std::vector<Node> nodes_;
-  std::vector<uint32_t> parent_;  // of each node; the root's is itself
-  std::vector<uint32_t> leaf_;    // of each place in order_
+  std::vector<uint32_t> leaf_;  // node of each place in order_
+  std::vector<EightBoxes> leaves_;
 };
 
 template <class Visit>
@@ -94,26 +100,34 @@ void ClothTree::pairs(std::span<const Vec4> points, Visit&& visit) const {
 template <class Visit>
 void ClothTree::within(std::span<const Vec4> points, uint32_t at, Visit& visit) const {
   const Node& node = nodes_[at];
-  if (node.leans && !outline_crosses(points, node)) return;
+  if (node.fresh == 0 || (node.leans && !outline_crosses(points, node))) return;
   if (node.second != 0) {
     within(points, at + 1, visit);
     within(points, node.second, visit);
     between(at + 1, node.second, visit);
     return;
   }
-  for (uint32_t i = node.first; i < node.first + node.count; ++i)
-    for (uint32_t j = i + 1; j < node.first + node.count; ++j)
-      if (boxes_[i].meets(boxes_[j])) visit(order_[i], order_[j]);
+  for (uint32_t i = 0; i < node.count; ++i) look(node, i, node, ~1u << i, visit);
+}
+
+/// A triangle of a leaf at those of a leaf that are in `lanes`.
+template <class Visit>
+void ClothTree::look(const Node& own, uint32_t lane, const Node& other, uint32_t lanes, Visit& visit) const {
+  if ((own.fresh >> lane & 1) == 0) lanes &= other.fresh;
+  if (lanes == 0) return;
+  const uint32_t a = order_[own.first + lane];
+  for (lanes &= leaves_[other.leaf].meeting(boxes_[own.first + lane]); lanes != 0; lanes &= lanes - 1) {
+    const uint32_t b = order_[other.first + static_cast<uint32_t>(std::countr_zero(lanes))];
+    if (!in_leaning_star(triangles_[a], triangles_[b])) visit(a, b);
+  }
 }
 
 template <class Visit>
 void ClothTree::between(uint32_t at_a, uint32_t at_b, Visit& visit) const {
   const Node &a = nodes_[at_a], &b = nodes_[at_b];
-  if (!a.box.meets(b.box)) return;
+  if ((a.fresh | b.fresh) == 0 || !a.box.meets(b.box)) return;
   if (a.second == 0 && b.second == 0) {
-    for (uint32_t i = a.first; i < a.first + a.count; ++i)
-      for (uint32_t j = b.first; j < b.first + b.count; ++j)
-        if (boxes_[i].meets(boxes_[j])) visit(order_[i], order_[j]);
+    for (uint32_t i = 0; i < a.count; ++i) look(a, i, b, ~0u, visit);
     return;
   }
   if (b.second == 0 || (a.second != 0 && a.count >= b.count)) {
@@ -126,8 +140,10 @@ void ClothTree::between(uint32_t at_a, uint32_t at_b, Visit& visit) const {
 }
 
 template <class Visit>
-void ClothTree::meeting(const Box& box, Visit&& visit) const {
+void ClothTree::overlapping(const Aabb& bounds, Visit&& visit) const {
   if (nodes_.empty()) return;
+  const Vec4 low = padded(bounds.min()), high = padded(bounds.max());
+  const MovingBox box = MovingBox::around(low, high, low, high);
   std::vector<uint32_t> open{0};
   while (!open.empty()) {
     const uint32_t at = open.back();
@@ -139,8 +155,8 @@ void ClothTree::meeting(const Box& box, Visit&& visit) const {
       open.push_back(at + 1);
       continue;
     }
-    for (uint32_t i = node.first; i < node.first + node.count; ++i)
-      if (boxes_[i].meets(box)) visit(order_[i]);
+    for (uint32_t lanes = leaves_[node.leaf].meeting(box); lanes != 0; lanes &= lanes - 1)
+      visit(order_[node.first + static_cast<uint32_t>(std::countr_zero(lanes))]);
   }
 }
 

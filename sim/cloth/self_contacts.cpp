@@ -12,6 +12,8 @@ namespace {
 /// Pairs are sought this much farther than they touch, in thicknesses; half of it is how far points may stray
 /// from the ways foreseen.
 constexpr Real kMargin = 0.8;
+/// The same of pairs sought while others keep their ways foreseen, of which these may stray by a quarter now.
+constexpr Real kStrayMargin = 1.5 * kMargin;
 /// Up to this part of all points are sought again alone.
 constexpr std::size_t kFew = 3;
 /// What is near at rest in the cloth itself, is not pushed farther apart than this share of it.
@@ -55,16 +57,23 @@ Closest closest(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool 
   return {{1 - s, s, t - 1, -t}, padded(q.on_a - q.on_b), inner};
 }
 
-/// Whether the boxes of both are farther apart than `reach`: quick, and true of most.
-bool boxes_apart(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool edges, Real reach) {
-  const Vec4 &p0 = x[p[0]], &p1 = x[p[1]], &p2 = x[p[2]], &p3 = x[p[3]];
-  const Vec4 low_a = edges ? Vec4(p0.cwiseMin(p1)) : p0, high_a = edges ? Vec4(p0.cwiseMax(p1)) : p0;
-  Vec4 low_b = p2.cwiseMin(p3), high_b = p2.cwiseMax(p3);
-  if (!edges) {
-    low_b = low_b.cwiseMin(p1);
-    high_b = high_b.cwiseMax(p1);
+/// Whether the boxes of both are farther apart than `reach`, along the same axis at the start and at the end:
+/// quick, and true of most.
+bool boxes_apart(std::span<const Vec4> start, std::span<const Vec4> end, const std::array<uint32_t, 4>& p,
+                 bool edges, Real reach) {
+  Vec4 over = Vec4::Constant(1e300), under = over;
+  for (std::span<const Vec4> x : {start, end}) {
+    const Vec4 &p0 = x[p[0]], &p1 = x[p[1]], &p2 = x[p[2]], &p3 = x[p[3]];
+    const Vec4 low_a = edges ? Vec4(p0.cwiseMin(p1)) : p0, high_a = edges ? Vec4(p0.cwiseMax(p1)) : p0;
+    Vec4 low_b = p2.cwiseMin(p3), high_b = p2.cwiseMax(p3);
+    if (!edges) {
+      low_b = low_b.cwiseMin(p1);
+      high_b = high_b.cwiseMax(p1);
+    }
+    over = over.cwiseMin(low_a - high_b);
+    under = under.cwiseMin(low_b - high_a);
   }
-  return ((low_a - high_b).cwiseMax(low_b - high_a)).maxCoeff() > reach;
+  return over.cwiseMax(under).maxCoeff() > reach;
 }
 
 /// Whether the planes through both with their common normal are farther apart than `reach`: of edges that
@@ -76,35 +85,12 @@ bool planes_apart(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, boo
   return height * height > reach * reach * n.squaredNorm();
 }
 
-/// Whether a triangle lies on one side of another's plane, farther from it than `reach`.
-bool above(std::span<const Vec4> x, const Triangle& a, const Triangle& b, Real reach) {
-  const Vec3 p0 = place(x, b[0]), n = (place(x, b[1]) - p0).cross(place(x, b[2]) - p0);
-  const Real h0 = n.dot(place(x, a[0]) - p0), h1 = n.dot(place(x, a[1]) - p0),
-             h2 = n.dot(place(x, a[2]) - p0);
-  const Real least = std::max(std::min({h0, h1, h2}), -std::max({h0, h1, h2}));
-  return least > 0 && least * least > reach * reach * n.squaredNorm();
-}
-
-/// How near pairs of two triangles must be to be kept, or more: by the bounds of their velocities.
-Real reach_of(const ClothPoints& points, std::span<const Vec4> velocity, const Triangle& a, const Triangle& b,
-              Real horizon) {
-  const auto least = [&](const Triangle& t) -> Vec4 {
-    return velocity[t[0]].cwiseMin(velocity[t[1]]).cwiseMin(velocity[t[2]]);
-  };
-  const auto greatest = [&](const Triangle& t) -> Vec4 {
-    return velocity[t[0]].cwiseMax(velocity[t[1]]).cwiseMax(velocity[t[2]]);
-  };
-  const Vec4 relative = (greatest(a) - least(b)).cwiseMax(greatest(b) - least(a));
-  return (points.thickness[a[0]] + points.thickness[b[0]]) / 2 * (1 + 1.5 * kMargin) +
-         relative.norm() * horizon;
-}
-
 Real least_distance(Real distance, Real thickness) {
   return (1 - 1e-9) * std::max(kLeft * distance, std::min(distance, kNearest * thickness));
 }
 
 /// How many of a pair's points belong to the first of the two.
-int first_side(bool edges) {
+std::size_t first_side(bool edges) {
   return edges ? 2 : 1;
 }
 
@@ -127,6 +113,8 @@ void SelfContacts::assign(std::vector<Triangle> triangles, const ClothPoints& po
   contacts_.clear();
   travel_.assign(points.size(), 0);
   move_.assign(points.size(), 0);
+  for (auto* foreseen : {&foreseen_from_, &foreseen_to_, &foreseen_velocity_})
+    foreseen->assign(points.size(), Vec4::Zero());
   margin_.resize(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) margin_[i] = points.thickness[i] * (1 + kMargin) / 2;
   horizon_ = -1;
@@ -134,13 +122,11 @@ void SelfContacts::assign(std::vector<Triangle> triangles, const ClothPoints& po
 
 /// Keeps the pairs of two triangles' points and edges that may touch within the horizon, if `wanted(points)`.
 template <class Wanted>
-void SelfContacts::add_pairs(const ClothPoints& points, std::span<const Vec4> velocity, uint32_t ta,
-                             uint32_t tb, Real horizon, Wanted&& wanted) {
+void SelfContacts::add_pairs(const ClothPoints& points, uint32_t ta, uint32_t tb, Real slack,
+                             Wanted&& wanted) {
   const Triangle &a = triangles_[ta], &b = triangles_[tb];
-  const Real most = reach_of(points, velocity, a, b, horizon);
-  if (above(points.start, a, b, most) || above(points.start, b, a, most)) return;
   const auto seek = [&](const std::array<uint32_t, 4>& p, bool edges) {
-    if (wanted(p) && !boxes_apart(points.start, p, edges, most)) add(points, velocity, p, edges, horizon);
+    if (wanted(p)) add(points, p, edges, slack);
   };
   for (std::size_t k = 0; k < 3; ++k) {
     if (owns_point_[ta][k]) seek({a[k], b[0], b[1], b[2]}, false);
@@ -151,19 +137,19 @@ void SelfContacts::add_pairs(const ClothPoints& points, std::span<const Vec4> ve
   }
 }
 
-void SelfContacts::add(const ClothPoints& points, std::span<const Vec4> velocity,
-                       const std::array<uint32_t, 4>& p, bool edges, Real horizon) {
-  for (int i = 0; i < first_side(edges); ++i)
-    for (int j = first_side(edges); j < 4; ++j)
-      if (p[static_cast<std::size_t>(i)] == p[static_cast<std::size_t>(j)]) return;
-  Real fastest2 = 0;
-  for (int i = 0; i < first_side(edges); ++i)
-    for (int j = first_side(edges); j < 4; ++j)
-      fastest2 = std::max(
-          fastest2, (velocity[p[static_cast<std::size_t>(i)]] - velocity[p[static_cast<std::size_t>(j)]])
-                        .squaredNorm());
+void SelfContacts::add(const ClothPoints& points, const std::array<uint32_t, 4>& p, bool edges, Real slack) {
+  const auto first = std::span(p).first(first_side(edges)), second = std::span(p).subspan(first_side(edges));
+  for (uint32_t i : first)
+    if (std::ranges::find(second, i) != second.end()) return;
   Real thickness = (points.thickness[p[0]] + points.thickness[p[3]]) / 2;
-  const Real reach = thickness * (1 + 1.5 * kMargin) + std::sqrt(fastest2) * horizon;
+  const Real near = thickness * (1 + slack);
+  if (boxes_apart(points.start, foreseen_to_, p, edges, near)) return;
+  Real longest2 = 0;  // of the ways of one relative to the other
+  for (uint32_t i : first)
+    for (uint32_t j : second)
+      longest2 = std::max(
+          longest2, (foreseen_to_[i] - points.start[i] - foreseen_to_[j] + points.start[j]).squaredNorm());
+  const Real reach = near + std::sqrt(longest2);
   if (planes_apart(points.start, p, edges, reach)) return;
   const Closest c = closest(points.start, p, edges);
   const Real distance = c.apart.norm();
@@ -176,28 +162,41 @@ void SelfContacts::add(const ClothPoints& points, std::span<const Vec4> velocity
   pairs_.back().travel = travelled(pairs_.back());
 }
 
-void SelfContacts::search(const ClothPoints& points, std::span<const Vec4> velocity, Real horizon) {
+/// That a point goes on until the horizon at the velocity that it has in this sub-step.
+void SelfContacts::foresee(const ClothPoints& points, std::size_t i, Real dt) {
+  const Vec4 velocity = (points.position[i] - points.start[i]) / dt;
+  foreseen_velocity_[i] = velocity;
+  foreseen_from_[i] = points.start[i] - since_ * velocity;
+  foreseen_to_[i] = points.start[i] + (horizon_ - since_) * velocity;
+}
+
+void SelfContacts::search(const ClothPoints& points, Real dt, Real horizon) {
   since_ = 0;
-  horizon_ = horizon;
-  foreseen_from_ = points.start;
-  foreseen_velocity_.assign(velocity.begin(), velocity.end());
-  foreseen_to_.resize(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) foreseen_to_[i] = points.start[i] + horizon * velocity[i];
+  horizon_ = std::max(horizon, dt);
+  for (std::size_t i = 0; i < points.size(); ++i) foresee(points, i, dt);
   tree_.fit(foreseen_from_, foreseen_to_, margin_);
   std::fill(travel_.begin(), travel_.end(), 0.0);
   pairs_.clear();
   tree_.pairs(points.start, [&](uint32_t ta, uint32_t tb) {
-    add_pairs(points, velocity, ta, tb, horizon, [](const auto&) { return true; });
+    add_pairs(points, ta, tb, kMargin, [](const auto&) { return true; });
   });
+}
+
+bool SelfContacts::expired(Real dt) const {
+  return since_ + dt > horizon_ * (1 + 1e-9);
+}
+
+/// How far a point is from the way foreseen for it.
+Vec4 SelfContacts::off_course(const ClothPoints& points, std::size_t i, Real dt) const {
+  return points.position[i] - foreseen_from_[i] - (since_ + dt) * foreseen_velocity_[i];
 }
 
 /// Whether any point is farther from the way foreseen for it than the pairs known are good for.
 bool SelfContacts::strayed(const ClothPoints& points, Real dt) const {
-  if (since_ + dt > horizon_ * (1 + 1e-9)) return true;
+  if (expired(dt)) return true;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Real far = kMargin / 2 * points.thickness[i];
-    const Vec4 off = points.position[i] - foreseen_from_[i] - (since_ + dt) * foreseen_velocity_[i];
-    if (off.squaredNorm() > far * far) return true;
+    if (off_course(points, i, dt).squaredNorm() > far * far) return true;
   }
   return false;
 }
@@ -205,27 +204,18 @@ bool SelfContacts::strayed(const ClothPoints& points, Real dt) const {
 /// From where all were at the start of the sub-step, at the velocities they now have in it. While the horizon
 /// lasts and few strayed, only the pairs of those are sought again, over what is left of it.
 void SelfContacts::search_again(const ClothPoints& points, Real dt, Real horizon) {
+  if (expired(dt)) return search(points, dt, horizon);
   std::vector<uint8_t> strays(points.size(), 0);
   std::size_t count = 0;
-  const bool expired = since_ + dt > horizon_ * (1 + 1e-9);
-  std::vector<Vec4> velocity(points.size());
-  for (std::size_t i = 0; i < velocity.size(); ++i) {
-    velocity[i] = (points.position[i] - points.start[i]) / dt;
-    if (expired) continue;
+  for (std::size_t i = 0; i < points.size(); ++i) {
     const Real far = kMargin / 4 * points.thickness[i];
-    const Vec4 off = points.position[i] - foreseen_from_[i] - (since_ + dt) * foreseen_velocity_[i];
-    strays[i] = off.squaredNorm() > far * far;
+    strays[i] = off_course(points, i, dt).squaredNorm() > far * far;
     count += strays[i];
   }
-  if (expired || count > points.size() / kFew) return search(points, velocity, std::max(horizon, dt));
+  if (count > points.size() / kFew) return search(points, dt, horizon);
 
-  const Real left = horizon_ - since_;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!strays[i]) continue;
-    foreseen_velocity_[i] = velocity[i];
-    foreseen_from_[i] = points.start[i] - since_ * velocity[i];
-    foreseen_to_[i] = points.start[i] + left * velocity[i];
-  }
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (strays[i]) foresee(points, i, dt);
   const auto is_stray = [&](const auto& p) {
     return std::ranges::any_of(p, [&](uint32_t i) { return strays[i] != 0; });
   };
@@ -234,11 +224,8 @@ void SelfContacts::search_again(const ClothPoints& points, Real dt, Real horizon
     if (is_stray(triangles_[t])) seeking.push_back(t);
   tree_.refit(seeking, foreseen_from_, foreseen_to_, margin_);
   std::erase_if(pairs_, [&](const Pair& pair) { return is_stray(pair.points); });
-  for (uint32_t ta : seeking)
-    tree_.meeting(ta, [&](uint32_t tb) {
-      if (tb == ta || (tb < ta && is_stray(triangles_[tb]))) return;  // had from its side
-      add_pairs(points, foreseen_velocity_, ta, tb, left, is_stray);
-    });
+  tree_.pairs(points.start,
+              [&](uint32_t ta, uint32_t tb) { add_pairs(points, ta, tb, kStrayMargin, is_stray); });
 }
 
 SelfContacts::Contact SelfContacts::look(const ClothPoints& points, uint32_t k) {
@@ -261,8 +248,7 @@ Real SelfContacts::left_between(const ClothPoints& points, const Pair& pair, con
     const uint32_t i = pair.points[k];
     const Real from = normal.dot(points.start[i] + drift - origin),
                to = normal.dot(points.position[i] - origin);
-    static_cast<int>(k) < first_side(pair.edges) ? first = std::min({first, from, to})
-                                                 : second = std::max({second, from, to});
+    k < first_side(pair.edges) ? first = std::min({first, from, to}) : second = std::max({second, from, to});
   }
   return (first - second) * kUnit;
 }
@@ -338,8 +324,7 @@ bool SelfContacts::shorten(const ClothPoints& points, MoveShares& shares, std::v
       const uint32_t i = pair.points[k];
       const Vec4 end = points.start[i] + shares[i] * (points.position[i] - points.start[i]);
       const Real height = c.normal.dot(end - points.start[pair.points[0]]);
-      static_cast<int>(k) < first_side(pair.edges) ? first = std::min(first, height)
-                                                   : second = std::max(second, height);
+      k < first_side(pair.edges) ? first = std::min(first, height) : second = std::max(second, height);
     }
     if (first - second >= least_distance(c.distance, pair.thickness)) continue;
     bool any_here = false;

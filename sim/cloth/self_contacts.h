@@ -62,12 +62,13 @@ class SelfContacts {
     bool pushes;                  // else its neighbours do so
   };
 
-  void search(const ClothPoints& points, std::span<const Vec4> velocity, Real horizon);
+  void foresee(const ClothPoints& points, std::size_t i, Real dt);
+  void search(const ClothPoints& points, Real dt, Real horizon);
   template <class Wanted>
-  void add_pairs(const ClothPoints& points, std::span<const Vec4> velocity, uint32_t ta, uint32_t tb,
-                 Real horizon, Wanted&& wanted);
-  void add(const ClothPoints& points, std::span<const Vec4> velocity, const std::array<uint32_t, 4>& p,
-           bool edges, Real horizon);
+  void add_pairs(const ClothPoints& points, uint32_t ta, uint32_t tb, Real slack, Wanted&& wanted);
+  void add(const ClothPoints& points, const std::array<uint32_t, 4>& p, bool edges, Real slack);
+  bool expired(Real dt) const;
+  Vec4 off_course(const ClothPoints& points, std::size_t i, Real dt) const;
   bool strayed(const ClothPoints& points, Real dt) const;
   void search_again(const ClothPoints& points, Real dt, Real horizon);
   Real travelled(const Pair& pair) const {
