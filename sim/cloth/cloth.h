@@ -89,7 +89,7 @@ struct ClothDef {
 
   Real max_stretch = 0;  ///< greatest length of stretch springs over their rest length, > 1; 0: no limit (F7)
   Real max_shear = 0;    ///< the same of shear springs
-  /// Length over rest length at which a stretch spring tears, > 1; 0: never. max_stretch counts as 1.05 of
+  /// Length over rest length at which a stretch spring tears, > 1; 0: never. max_stretch counts as 1.2 of
   /// it, if it is less.
   Real tear = 0;
 

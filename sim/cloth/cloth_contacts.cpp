@@ -118,19 +118,19 @@ bool ClothContacts::touch(const ClothPoints& points, Near& near, Touch& t) const
 
 void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<VelocityCut>& cuts) {
   std::fill(active_.begin(), active_.end(), 0);
-  touched_.assign(points.size(), nullptr);
-  touches_several_.assign(points.size(), 0);
+  near_to_.assign(points.size(), nullptr);
+  near_several_.assign(points.size(), 0);
   any_dynamic_ = false;
   for (std::size_t k = 0; k < near_.size();) {
     touches_.clear();
     const uint32_t point = near_[k].point;
+    near_to_[point] = &bodies_[near_[k].body];
+    near_several_[point] = k + 1 < near_.size() && near_[k + 1].point == point;
     for (Touch t; k < near_.size() && near_[k].point == point; ++k)
       if (touch(points, near_[k], t)) touches_.push_back(t);
     const std::size_t count = touches_.size();
     if (count == 0) continue;
     active_[points.cloth[point]] += count;
-    touched_[point] = touches_.front().body;
-    touches_several_[point] = count > 1;
     any_dynamic_ |= std::ranges::any_of(touches_, [](const Touch& t) { return t.body->is_dynamic(); });
     // What is fixed comes last, so that its surface is kept best.
     std::stable_sort(touches_.begin(), touches_.end(), [](const Touch& a, const Touch& b) {

@@ -36,9 +36,9 @@ class ClothContacts {
   std::vector<Vec3> stop_bodies(const ClothPoints& points, std::span<const uint8_t> shortened,
                                 std::span<const Real> recoil);
 
-  /// Whether a point touched a body in the last solve().
-  bool touches_other_than(std::size_t point, const ClothBody* body) const {
-    return point < touched_.size() && touched_[point] && (touched_[point] != body || touches_several_[point]);
+  /// Whether a point was so near to another body in the last solve() that it may touch that soon.
+  bool is_near_other_than(std::size_t point, const ClothBody* body) const {
+    return point < near_to_.size() && near_to_[point] && (near_to_[point] != body || near_several_[point]);
   }
   bool any_dynamic() const { return any_dynamic_; }  ///< whether a body that can be pushed touches cloth
   std::span<const uint64_t> active() const { return active_; }  ///< contacts of the last solve(), by cloth
@@ -71,9 +71,9 @@ class ClothContacts {
   Real h_ = 0;
   bool any_dynamic_ = false;
   std::vector<Near> near_;  // by point
-  // Of each point: a body that it touches, and whether it touches others.
-  std::vector<const ClothBody*> touched_;
-  std::vector<uint8_t> touches_several_;
+  // Of each point: a body that it is near to, and whether it is to others.
+  std::vector<const ClothBody*> near_to_;
+  std::vector<uint8_t> near_several_;
   std::vector<Vec3> seen_at_;
   std::vector<Real> seen_reach_;  // how far each point may move before it must be looked at again
   std::vector<Aabb> boxes_;       // of the bodies' ways

@@ -18,7 +18,7 @@ constexpr int kMaxTurns = 4;
 /// Substeps of cloth in one of the world.
 constexpr Real kMaxParts = 1000;
 /// Stretch is not limited so that cloth could not tear: the limit is at least this much above.
-constexpr Real kBeyondTear = 1.05;
+constexpr Real kBeyondTear = 1.2;
 /// How long a span is, at most [s].
 constexpr Real kSpan = 1.0 / 480;
 /// For how long pairs of cloth with cloth are sought at a time [s].
@@ -88,6 +88,10 @@ void ClothSystem::assemble() {
   points_.pull.assign(points_.size(), Vec4::Zero());
   springs_.assign(swept, points_);
   limit_.assign(std::move(limits), points_.size());
+  pieces_.assign(points_.size());
+  for (const ClothSpring& s : all_springs_) pieces_.join(s.a, s.b);
+  for (const Seam& s : seams_) pieces_.join(s.a, s.b);
+  pieces_.keep();
   self_contacts_.assign(std::move(colliding), points_);
   corner_contacts_.assign(std::move(touching), points_);
   span_ = 0;
@@ -244,24 +248,43 @@ void ClothSystem::close_seams() {
   }
 }
 
-/// The move in whose frame moves are shortened, or what flies or falls would be held back in the air: the
-/// mean one of cloths that are free, and of the pins if one body holds them all. None if other bodies touch
-/// cloth.
-Vec4 ClothSystem::common_move() const {
-  const ClothBody* const holder = held_.empty() ? nullptr : held_.front().body;
-  if (!held_.empty() && !holder) return Vec4::Zero();
-  if (std::ranges::any_of(held_, [&](const Held& held) { return held.body != holder; })) return Vec4::Zero();
-  for (std::size_t i = 0; i < points_.size(); ++i)
-    if (contacts_.touches_other_than(i, holder)) return Vec4::Zero();
-  Vec4 sum = Vec4::Zero();
-  Real mass = 0;
-  const auto add = [&](std::size_t i) {
-    sum += points_.mass[i] * (points_.position[i] - points_.start[i]);
-    mass += points_.mass[i];
+/// The moves in whose frames moves are shortened, or what flies or falls would be held back in the air: of a
+/// piece of cloth with all that it may cross the mean one if it is free, that of its pins if one body holds
+/// them all; none if it is near another body. Whether any move.
+bool ClothSystem::find_drifts() {
+  struct Frame {
+    bool rests = false;  // in the world
+    const ClothBody* holder = nullptr;
+    Vec4 sum = Vec4::Zero();
+    Real mass = 0;
   };
-  for (const Held& held : held_) add(held.point);
-  for (std::size_t i = 0; held_.empty() && i < points_.size(); ++i) add(i);
-  return sum / mass;
+  std::vector<Frame> frames(pieces_.count());
+  const auto frame_of = [&](uint32_t i) -> Frame& { return frames[pieces_.of(i)]; };
+  const auto add = [&](uint32_t i) {
+    Frame& frame = frame_of(i);
+    frame.sum += points_.mass[i] * (points_.position[i] - points_.start[i]);
+    frame.mass += points_.mass[i];
+  };
+  pieces_.forget();
+  self_contacts_.for_doubtful([&](const auto& p) { pieces_.join(p[0], p[3]); });
+  for (const Held& held : held_) {
+    Frame& frame = frame_of(held.point);
+    frame.rests |= !held.body || (frame.holder && frame.holder != held.body);
+    frame.holder = held.body;
+    add(held.point);
+  }
+  for (uint32_t i = 0; i < points_.size(); ++i) {
+    Frame& frame = frame_of(i);
+    if (frame.rests) continue;
+    frame.rests = cloths_[points_.cloth[i]]->stopped || contacts_.is_near_other_than(i, frame.holder);
+    if (!frame.holder) add(i);
+  }
+  if (std::ranges::all_of(frames, &Frame::rests)) return false;
+  for (uint32_t i = 0; i < points_.size(); ++i) {
+    const Frame& frame = frame_of(i);
+    if (!frame.rests) drift_[i] = frame.sum / frame.mass;
+  }
+  return true;
 }
 
 /// Until nothing is too long and nothing crossed. What is held back in a moving frame goes ways that its
@@ -270,9 +293,22 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   const bool self = ends_span && !self_contacts_.empty();
   if (limit_.empty() && !self) return;
   if (self) points_.start.swap(span_start_);  // the moves of the whole span
+  const auto find_doubtful = [&] {
+    self ? self_contacts_.find_doubtful(points_, span_ * dt, kHorizon, drift_) : self_contacts_.find_none();
+  };
   shortened_.assign(points_.size(), 0);
-  const Vec4 drift = common_move();
-  if (shorten_moves_in(drift, dt, self) && self && !drift.isZero()) shorten_moves_in(Vec4::Zero(), dt, self);
+  drift_.assign(points_.size(), Vec4::Zero());
+  find_doubtful();
+  bool look = true;
+  if (find_drifts()) {
+    find_doubtful();
+    look = shorten_doubtful() && self;
+    self_contacts_.take_crossed();  // in the world's frame nothing has to
+    drift_.assign(points_.size(), Vec4::Zero());
+    if (look) find_doubtful();
+  }
+  if (look) shorten_doubtful();
+  for (uint32_t i : self_contacts_.take_crossed()) ++cloths_[points_.cloth[i]]->report.crossings;
   for (std::size_t i = 0; i < points_.size(); ++i) {
     if (!shortened_[i]) continue;
     ++cloths_[points_.cloth[i]]->report.limited;
@@ -289,28 +325,27 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   stop_bodies();
 }
 
-/// Shortens moves beyond that which all make in any case; whether any.
-bool ClothSystem::shorten_moves_in(const Vec4& drift, Real dt, bool self) {
-  if (self) self_contacts_.find_doubtful(points_, span_ * dt, kHorizon, drift);
+/// Shortens moves beyond the drifts; whether any.
+bool ClothSystem::shorten_doubtful() {
   shares_.assign(points_.size(), 1);
-  for (Vec4& start : points_.start) start += drift;
+  for (std::size_t i = 0; i < points_.size(); ++i) points_.start[i] += drift_[i];
   bool again = true;
   for (int round = 0; again && round < kMaxRounds; ++round) {
     again = round == 0 ? limit_.shorten_whole_moves(points_, shares_, lowered_)
                        : limit_.shorten(points_, shares_, lowered_);
-    if (self) again |= self_contacts_.shorten(points_, shares_, lowered_);
+    again |= self_contacts_.shorten(points_, shares_, lowered_);
   }
   for (uint32_t i : self_contacts_.take_held_back()) ++cloths_[points_.cloth[i]]->report.held_back;
-  for (uint32_t i : self_contacts_.take_crossed()) ++cloths_[points_.cloth[i]]->report.crossings;
   bool any = false;
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Real share = again ? 0 : shares_[i];
-    if (share == 1 || !(points_.inverse_mass[i] > 0)) continue;
-    points_.position[i] = points_.start[i] + share * (points_.position[i] - points_.start[i]);
-    shortened_[i] = 1;
-    any = true;
+    if (share != 1 && points_.inverse_mass[i] > 0) {
+      points_.position[i] = points_.start[i] + share * (points_.position[i] - points_.start[i]);
+      shortened_[i] = 1;
+      any = true;
+    }
+    points_.start[i] -= drift_[i];
   }
-  for (Vec4& start : points_.start) start -= drift;
   return any;
 }
 

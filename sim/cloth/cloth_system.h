@@ -10,6 +10,7 @@
 #include "sim/cloth/cloth_bodies.h"
 #include "sim/cloth/cloth_contacts.h"
 #include "sim/cloth/cloth_forces.h"
+#include "sim/cloth/cloth_pieces.h"
 #include "sim/cloth/cloth_points.h"
 #include "sim/cloth/cloth_springs.h"
 #include "sim/cloth/cloth_state.h"
@@ -52,9 +53,9 @@ class ClothSystem {
   void integrate(Real dt);
   void close_seams();
   void touch_bodies(Real dt);
-  Vec4 common_move() const;
+  bool find_drifts();
   void shorten_moves(Real dt, bool ends_span);
-  bool shorten_moves_in(const Vec4& drift, Real dt, bool self);
+  bool shorten_doubtful();
   void stop_bodies();
   std::vector<ClothBody*> holders(std::size_t cloth) const;
   std::vector<Real> recoils() const;
@@ -85,6 +86,8 @@ class ClothSystem {
   std::vector<Held> held_;
   std::vector<Seam> seams_;
   std::vector<VelocityCut> cuts_;
+  ClothPieces pieces_;
+  std::vector<Vec4> drift_;  // the move of the frame in which each point's move is shortened
   MoveShares shares_;
   std::vector<uint8_t> shortened_;  // whether a point's move was, in the sub-step
   std::vector<uint32_t> lowered_;   // points whose shares were lowered in a round

@@ -85,8 +85,8 @@ bool planes_apart(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, boo
   return height * height > reach * reach * n.squaredNorm();
 }
 
-Real least_distance(Real distance, Real thickness) {
-  return (1 - 1e-9) * std::max(kLeft * distance, std::min(distance, kNearest * thickness));
+Real least_distance(Real distance, Real nearest) {
+  return (1 - 1e-9) * std::max(kLeft * distance, std::min(distance, nearest));
 }
 
 /// How many of a pair's points belong to the first of the two.
@@ -113,6 +113,7 @@ void SelfContacts::assign(std::vector<Triangle> triangles, const ClothPoints& po
   contacts_.clear();
   travel_.assign(points.size(), 0);
   move_.assign(points.size(), 0);
+  still_.assign(points.size(), Vec4::Zero());
   for (auto* foreseen : {&foreseen_from_, &foreseen_to_, &foreseen_velocity_})
     foreseen->assign(points.size(), Vec4::Zero());
   margin_.resize(points.size());
@@ -153,12 +154,15 @@ void SelfContacts::add(const ClothPoints& points, const std::array<uint32_t, 4>&
   if (planes_apart(points.start, p, edges, reach)) return;
   const Closest c = closest(points.start, p, edges);
   const Real distance = c.apart.norm();
-  // What lies on each other, as the sides of a fresh tear, has no side yet.
-  if (!(distance > kNoSide)) return;
-  if (distance > reach) return;
-  if (points.cloth[p[0]] == points.cloth[p[3]])
-    thickness = std::min(thickness, kRestShare * closest(points.rest, p, edges).apart.norm());
-  pairs_.push_back({p, edges, thickness, distance, 0, (c.apart / distance).head<3>().cast<float>()});
+  if (!(distance > kNoSide) || distance > reach) return;
+  const Real nearest = kNearest * thickness;
+  if (points.cloth[p[0]] == points.cloth[p[3]]) {
+    const Real at_rest = closest(points.rest, p, edges).apart.norm();
+    // The edges of a tear have no side until they have parted: else they would hold each other for ever.
+    if (at_rest < kNoSide && distance < nearest) return;
+    thickness = std::min(thickness, kRestShare * at_rest);
+  }
+  pairs_.push_back({p, edges, thickness, nearest, distance, 0, (c.apart / distance).head<3>().cast<float>()});
   pairs_.back().travel = travelled(pairs_.back());
 }
 
@@ -240,32 +244,32 @@ SelfContacts::Contact SelfContacts::look(const ClothPoints& points, uint32_t k) 
 
 /// The distance that any parts of the moves made now leave a pair along the direction in which it was apart
 /// when last looked at, or less: no more than is left in truth.
-Real SelfContacts::left_between(const ClothPoints& points, const Pair& pair, const Vec4& drift) {
+Real SelfContacts::left_between(const ClothPoints& points, const Pair& pair, std::span<const Vec4> drift) {
   const Vec4 normal = padded(pair.normal.cast<Real>());
   const Vec4& origin = points.start[pair.points[0]];
   Real first = 1e300, second = -1e300;
   for (std::size_t k = 0; k < 4; ++k) {
     const uint32_t i = pair.points[k];
-    const Real from = normal.dot(points.start[i] + drift - origin),
+    const Real from = normal.dot(points.start[i] + drift[i] - origin),
                to = normal.dot(points.position[i] - origin);
     k < first_side(pair.edges) ? first = std::min({first, from, to}) : second = std::max({second, from, to});
   }
   return (first - second) * kUnit;
 }
 
-/// The pairs that any parts of the moves made now, beyond that of all together, may bring nearer than
-/// `reach(pair)`.
+/// The pairs that any parts of the moves made now, beyond the drifts, may bring nearer than `reach(pair)`.
 template <class Reach>
-void SelfContacts::gather(const ClothPoints& points, Real dt, Real horizon, const Vec4& drift,
+void SelfContacts::gather(const ClothPoints& points, Real dt, Real horizon, std::span<const Vec4> drift,
                           Reach&& reach) {
   if (strayed(points, dt)) search_again(points, dt, horizon);
   for (std::size_t i = 0; i < move_.size(); ++i)
-    move_[i] = (points.position[i] - points.start[i] - drift).norm();
+    move_[i] = (points.position[i] - points.start[i] - drift[i]).norm();
   contacts_.clear();
   for (uint32_t k = 0; k < pairs_.size(); ++k) {
     const Pair& pair = pairs_[k];
     const auto& p = pair.points;
-    const Real moved = move_[p[0]] + move_[p[1]] + move_[p[2]] + move_[p[3]];
+    const Real moved = move_[p[0]] + move_[p[1]] + move_[p[2]] + move_[p[3]] +
+                       (drift[p[0]] == drift[p[3]] ? 0 : (drift[p[0]] - drift[p[3]]).norm());
     if (pair.distance - (travelled(pair) - pair.travel) - moved > reach(pair)) continue;
     if (left_between(points, pair, drift) > reach(pair)) continue;
     const Contact contact = look(points, k);
@@ -274,12 +278,13 @@ void SelfContacts::gather(const ClothPoints& points, Real dt, Real horizon, cons
 }
 
 void SelfContacts::find(const ClothPoints& points, Real dt, Real horizon) {
-  gather(points, dt, horizon, Vec4::Zero(), [](const Pair& pair) { return pair.thickness; });
+  gather(points, dt, horizon, still_, [](const Pair& pair) { return pair.thickness; });
 }
 
-void SelfContacts::find_doubtful(const ClothPoints& points, Real dt, Real horizon, const Vec4& drift) {
+void SelfContacts::find_doubtful(const ClothPoints& points, Real dt, Real horizon,
+                                 std::span<const Vec4> drift) {
   gather(points, dt, horizon, drift,
-         [](const Pair& pair) { return least_distance(pair.distance, pair.thickness); });
+         [](const Pair& pair) { return least_distance(pair.distance, pair.nearest); });
 }
 
 void SelfContacts::solve(ClothPoints& points) {
@@ -326,7 +331,7 @@ bool SelfContacts::shorten(const ClothPoints& points, MoveShares& shares, std::v
       const Real height = c.normal.dot(end - points.start[pair.points[0]]);
       k < first_side(pair.edges) ? first = std::min(first, height) : second = std::max(second, height);
     }
-    if (first - second >= least_distance(c.distance, pair.thickness)) continue;
+    if (first - second >= least_distance(c.distance, pair.nearest)) continue;
     bool any_here = false;
     for (uint32_t i : pair.points) {
       if (!(points.inverse_mass[i] > 0) || shares[i] == 0) continue;

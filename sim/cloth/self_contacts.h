@@ -30,9 +30,15 @@ class SelfContacts {
   void find(const ClothPoints& points, Real dt, Real horizon);
   /// Pushes apart what is nearer than its thickness.
   void solve(ClothPoints& points);
-  /// Finds the pairs that may have crossed by the moves that are made now, or would by a part of any. All
-  /// points make the move `drift` in any case.
-  void find_doubtful(const ClothPoints& points, Real dt, Real horizon, const Vec4& drift);
+  /// Finds the pairs that may have crossed by the moves that are made now, or would by a part of any beyond
+  /// the drift of the point; what hangs together drifts together.
+  void find_doubtful(const ClothPoints& points, Real dt, Real horizon, std::span<const Vec4> drift);
+  void find_none() { contacts_.clear(); }
+  /// Calls visit(points) for the pairs found: four, of which the first and the last are of one each.
+  template <class Visit>
+  void for_doubtful(Visit&& visit) const {
+    for (const Contact& c : contacts_) visit(pairs_[c.pair].points);
+  }
   /// Lowers the shares of moves of those that did, and adds their points to `lowered`; whether any.
   bool shorten(const ClothPoints& points, MoveShares& shares, std::vector<uint32_t>& lowered);
   /// After the sub-step: how far points have come.
@@ -50,6 +56,7 @@ class SelfContacts {
     std::array<uint32_t, 4> points;
     bool edges;
     Real thickness;
+    Real nearest;            // comes no nearer than this, if it is not yet
     Real distance;           // when last looked at
     Real travel;             // of all four together until then
     Eigen::Vector3f normal;  // from the second to the first then
@@ -76,8 +83,8 @@ class SelfContacts {
            travel_[pair.points[3]];
   }
   template <class Reach>
-  void gather(const ClothPoints& points, Real dt, Real horizon, const Vec4& drift, Reach&& reach);
-  static Real left_between(const ClothPoints& points, const Pair& pair, const Vec4& drift);
+  void gather(const ClothPoints& points, Real dt, Real horizon, std::span<const Vec4> drift, Reach&& reach);
+  static Real left_between(const ClothPoints& points, const Pair& pair, std::span<const Vec4> drift);
   Contact look(const ClothPoints& points, uint32_t pair);
 
   std::vector<Triangle> triangles_;
@@ -93,7 +100,8 @@ class SelfContacts {
   Real since_ = 0, horizon_ = -1;
   std::vector<Vec4> foreseen_from_, foreseen_to_, foreseen_velocity_;
   std::vector<Real> travel_, margin_;
-  std::vector<Real> move_;  // of each point in the sub-step
+  std::vector<Vec4> still_;  // no drifts
+  std::vector<Real> move_;   // of each point in the sub-step
 };
 
 }  // namespace offstage::sim

@@ -6,79 +6,195 @@
 namespace offstage::sim {
 namespace {
 
+/// How far a tear relieves the cloth around it in a step, in lengths of the spring that broke.
+constexpr Real kRelief = 2;
+
 struct Broken {
   uint32_t spring;
+  bool at_border;
   Real ratio;  // of length over rest length
 };
 
-/// Over the limit, the worst first.
+bool holds(const Triangle& t, uint32_t point) {
+  return t[0] == point || t[1] == point || t[2] == point;
+}
+
+std::vector<uint32_t> triangles_around(const Cloth& cloth, uint32_t point) {
+  std::vector<uint32_t> around;
+  for (uint32_t t = 0; t < cloth.triangles.size(); ++t)
+    if (holds(cloth.triangles[t], point)) around.push_back(t);
+  return around;
+}
+
+/// The points beside one, once for each triangle.
+std::vector<uint32_t> points_around(const Cloth& cloth, uint32_t point) {
+  std::vector<uint32_t> around;
+  for (uint32_t t : triangles_around(cloth, point))
+    for (uint32_t i : cloth.triangles[t])
+      if (i != point) around.push_back(i);
+  std::sort(around.begin(), around.end());
+  return around;
+}
+
+/// Whether some edge from the point has a triangle on one side alone.
+bool is_at_border(const Cloth& cloth, uint32_t point) {
+  const std::vector<uint32_t> around = points_around(cloth, point);
+  return std::any_of(around.begin(), around.end(),
+                     [&](uint32_t i) { return std::count(around.begin(), around.end(), i) == 1; });
+}
+
+/// Over the limit, in the order in which they break.
 std::vector<Broken> overstretched(const Cloth& cloth) {
   std::vector<Broken> broken;
   for (uint32_t i = 0; i < cloth.springs.size(); ++i) {
     const ClothSpring& s = cloth.springs[i];
     if (s.kind != SpringKind::stretch) continue;
     const Real ratio = (cloth.points[s.a] - cloth.points[s.b]).norm() / s.rest_length;
-    if (ratio > cloth.def.tear) broken.push_back({i, ratio});
+    if (ratio > cloth.def.tear)
+      broken.push_back({i, is_at_border(cloth, s.a) || is_at_border(cloth, s.b), ratio});
   }
-  std::stable_sort(broken.begin(), broken.end(),
-                   [](const Broken& a, const Broken& b) { return a.ratio > b.ratio; });
+  std::stable_sort(broken.begin(), broken.end(), [](const Broken& a, const Broken& b) {
+    return a.at_border != b.at_border ? a.at_border : a.ratio > b.ratio;
+  });
   return broken;
 }
 
-Real area(const Cloth& cloth, const Triangle& t) {
+Vec3 rest_centre(const Cloth& cloth, const Triangle& t) {
+  return (cloth.rest[t[0]] + cloth.rest[t[1]] + cloth.rest[t[2]]) / 3;
+}
+
+Real rest_area(const Cloth& cloth, const Triangle& t) {
   const Vec3& a = cloth.rest[t[0]];
   return (cloth.rest[t[1]] - a).cross(cloth.rest[t[2]] - a).norm() / 2;
 }
 
-bool holds(const Triangle& t, uint32_t point) {
-  return t[0] == point || t[1] == point || t[2] == point;
-}
+/// Triangles at a point, each of which shares an edge with another one.
+struct Fan {
+  std::vector<uint32_t> triangles;
 
-/// On which side of the plane through a point, in the unstrained cloth, a place lies; `along` is its normal.
-bool is_beyond(const Cloth& cloth, uint32_t point, const Vec3& along, const Vec3& place) {
-  return along.dot(place - cloth.rest[point]) > 0;
-}
-
-/// Parts the cloth at a point: the triangles beyond the plane get a new one. None if all are on one side.
-bool split(Cloth& cloth, uint32_t point, const Vec3& along) {
-  Real kept = 0, moved = 0;
-  std::vector<Triangle*> beyond;
-  for (Triangle& t : cloth.triangles) {
-    if (!holds(t, point)) continue;
-    const Vec3 centre = (cloth.rest[t[0]] + cloth.rest[t[1]] + cloth.rest[t[2]]) / 3;
-    const bool far = is_beyond(cloth, point, along, centre);
-    (far ? moved : kept) += area(cloth, t);
-    if (far) beyond.push_back(&t);
+  bool holds_point(const Cloth& cloth, uint32_t i) const {
+    return std::any_of(triangles.begin(), triangles.end(),
+                       [&](uint32_t t) { return holds(cloth.triangles[t], i); });
   }
-  if (!(kept > 0) || !(moved > 0)) return false;
-  const auto added = static_cast<uint32_t>(cloth.points.size());
-  for (Triangle* t : beyond) std::replace(t->begin(), t->end(), point, added);
-  cloth.points.push_back(cloth.points[point]);
-  cloth.before.push_back(cloth.before[point]);
-  cloth.velocities.push_back(cloth.velocities[point]);
-  cloth.rest.push_back(cloth.rest[point]);
-  cloth.sources.push_back(cloth.sources[point]);
-  const Real share = moved / (kept + moved);
-  cloth.masses.push_back(share * cloth.masses[point]);
-  cloth.masses[point] *= 1 - share;
-  // A spring goes with the side of its other end; one that reaches over the tear is cut.
-  std::erase_if(cloth.springs, [&](ClothSpring& s) {
-    if (s.a != point && s.b != point) return false;
-    uint32_t& end = s.a == point ? s.a : s.b;
-    const uint32_t other = s.a == point ? s.b : s.a;
-    if (is_beyond(cloth, point, along, cloth.rest[other])) end = added;
-    if (s.kind != SpringKind::stretch) return false;
-    // A thread without a triangle beside it is none.
-    return std::none_of(cloth.triangles.begin(), cloth.triangles.end(),
-                        [&](const Triangle& t) { return holds(t, end) && holds(t, other); });
-  });
-  ++cloth.version;
-  return true;
+  Real area(const Cloth& cloth) const {
+    Real sum = 0;
+    for (uint32_t t : triangles) sum += rest_area(cloth, cloth.triangles[t]);
+    return sum;
+  }
+  /// How much a direction from the point leads into one of the triangles.
+  Real faces(const Cloth& cloth, uint32_t point, const Vec3& direction) const {
+    Real most = -1;
+    for (uint32_t t : triangles)
+      most = std::max(
+          most, direction.dot((rest_centre(cloth, cloth.triangles[t]) - cloth.rest[point]).normalized()));
+    return most;
+  }
+};
+
+/// The fans at a point, if edges across the plane through it with this normal join nothing. Zero: no plane.
+std::vector<Fan> fans_at(const Cloth& cloth, uint32_t point, const Vec3& normal) {
+  std::vector<uint32_t> left = triangles_around(cloth, point);
+  const auto is_beyond = [&](uint32_t t) {
+    return normal.dot(rest_centre(cloth, cloth.triangles[t]) - cloth.rest[point]) > 0;
+  };
+  const auto share_edge = [&](uint32_t t, uint32_t u) {
+    return std::any_of(cloth.triangles[t].begin(), cloth.triangles[t].end(),
+                       [&](uint32_t i) { return i != point && holds(cloth.triangles[u], i); });
+  };
+  std::vector<Fan> fans;
+  while (!left.empty()) {
+    Fan& fan = fans.emplace_back();
+    fan.triangles.push_back(left.front());
+    left.erase(left.begin());
+    for (std::size_t k = 0; k < fan.triangles.size(); ++k) {
+      const uint32_t t = fan.triangles[k];
+      std::erase_if(left, [&](uint32_t u) {
+        const bool joined = share_edge(t, u) && is_beyond(t) == is_beyond(u);
+        if (joined) fan.triangles.push_back(u);
+        return joined;
+      });
+    }
+  }
+  return fans;
 }
 
-std::size_t triangles_around(const Cloth& cloth, uint32_t point) {
-  return static_cast<std::size_t>(std::count_if(cloth.triangles.begin(), cloth.triangles.end(),
-                                                [&](const Triangle& t) { return holds(t, point); }));
+/// Gives every fan but the first a point of its own, and springs to the fans that they belong to.
+void part(Cloth& cloth, uint32_t point, const std::vector<Fan>& fans) {
+  const auto fans_with = [&](uint32_t i) {
+    std::vector<std::size_t> with;
+    for (std::size_t f = 0; f < fans.size(); ++f)
+      if (fans[f].holds_point(cloth, i)) with.push_back(f);
+    return with;
+  };
+  // Those across the tear are cut.
+  std::erase_if(cloth.springs, [&](const ClothSpring& s) {
+    if (s.a == point || s.b == point) return false;
+    const std::vector<std::size_t> a = fans_with(s.a), b = fans_with(s.b);
+    return !a.empty() && !b.empty() &&
+           std::none_of(a.begin(), a.end(), [&](std::size_t f) { return std::ranges::count(b, f) > 0; });
+  });
+
+  Real area = 0;
+  for (const Fan& fan : fans) area += fan.area(cloth);
+  const Real mass = cloth.masses[point];
+  std::vector<uint32_t> own(fans.size(), point);  // the point of each fan
+  for (std::size_t f = 0; f < fans.size(); ++f) {
+    const Real share = area > 0 ? fans[f].area(cloth) / area : 1.0 / static_cast<Real>(fans.size());
+    if (f == 0) {
+      cloth.masses[point] = share * mass;
+      continue;
+    }
+    own[f] = static_cast<uint32_t>(cloth.points.size());
+    cloth.points.push_back(cloth.points[point]);
+    cloth.before.push_back(cloth.before[point]);
+    cloth.velocities.push_back(cloth.velocities[point]);
+    cloth.rest.push_back(cloth.rest[point]);
+    cloth.sources.push_back(cloth.sources[point]);
+    cloth.masses.push_back(share * mass);
+  }
+
+  const std::size_t count = cloth.springs.size();
+  for (std::size_t k = 0; k < count; ++k) {
+    ClothSpring s = cloth.springs[k];
+    if (s.a != point && s.b != point) continue;
+    const uint32_t other = s.a == point ? s.b : s.a;
+    std::vector<std::size_t> with = fans_with(other);
+    if (with.empty()) {
+      const Vec3 direction = (cloth.rest[other] - cloth.rest[point]).normalized();
+      const auto less = [&](const Fan& a, const Fan& b) {
+        return a.faces(cloth, point, direction) < b.faces(cloth, point, direction);
+      };
+      with.push_back(
+          static_cast<std::size_t>(std::max_element(fans.begin(), fans.end(), less) - fans.begin()));
+    }
+    // Both sides of a tear along an edge have their half of its threads.
+    s.stiffness /= static_cast<Real>(with.size());
+    s.damping /= static_cast<Real>(with.size());
+    for (std::size_t j = 0; j < with.size(); ++j) {
+      (s.a == other ? s.b : s.a) = own[with[j]];
+      if (j == 0)
+        cloth.springs[k] = s;
+      else
+        cloth.springs.push_back(s);
+    }
+  }
+  for (std::size_t f = 1; f < fans.size(); ++f)
+    for (uint32_t t : fans[f].triangles)
+      std::replace(cloth.triangles[t].begin(), cloth.triangles[t].end(), point, own[f]);
+  ++cloth.version;
+}
+
+/// Parts the cloth at a point, and what that leaves joined to it by a point. False: all is on one side.
+bool split(Cloth& cloth, uint32_t point, const Vec3& normal) {
+  const std::vector<Fan> fans = fans_at(cloth, point, normal);
+  if (fans.size() < 2) return false;
+  std::vector<uint32_t> beside = points_around(cloth, point);
+  beside.erase(std::unique(beside.begin(), beside.end()), beside.end());
+  part(cloth, point, fans);
+  for (uint32_t i : beside)
+    if (const std::vector<Fan> apart = fans_at(cloth, i, Vec3::Zero()); apart.size() > 1)
+      part(cloth, i, apart);
+  return true;
 }
 
 }  // namespace
@@ -86,17 +202,18 @@ std::size_t triangles_around(const Cloth& cloth, uint32_t point) {
 uint32_t tear(Cloth& cloth) {
   if (cloth.def.tear == 0) return 0;
   std::vector<ClothSpring> torn;
-  std::vector<uint8_t> used(cloth.points.size(), 0);
   for (const Broken& b : overstretched(cloth)) {
     const ClothSpring& s = cloth.springs[b.spring];
-    if (used[s.a] || used[s.b]) continue;
-    used[s.a] = used[s.b] = 1;
-    torn.push_back(s);
+    const bool relieved = std::any_of(torn.begin(), torn.end(), [&](const ClothSpring& t) {
+      return (cloth.rest[t.a] - cloth.rest[s.a]).norm() < kRelief * t.rest_length;
+    });
+    if (!relieved) torn.push_back(s);
   }
   for (const ClothSpring& s : torn) {
-    const bool a_first = triangles_around(cloth, s.a) >= triangles_around(cloth, s.b);
-    const uint32_t through = a_first ? s.a : s.b, other = a_first ? s.b : s.a;
-    if (split(cloth, through, cloth.rest[other] - cloth.rest[through])) continue;
+    const bool a_first = is_at_border(cloth, s.a) || !is_at_border(cloth, s.b);
+    const uint32_t first = a_first ? s.a : s.b, second = a_first ? s.b : s.a;
+    const Vec3 along = cloth.rest[second] - cloth.rest[first];
+    if (split(cloth, first, along) || split(cloth, second, -along)) continue;
     // A lone thread: nothing but the spring parts.
     std::erase_if(cloth.springs,
                   [&](const ClothSpring& k) { return k.a == s.a && k.b == s.b && k.kind == s.kind; });

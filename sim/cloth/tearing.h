@@ -5,11 +5,12 @@
 
 namespace offstage::sim {
 
-/// Breaks the stretch springs that are longer than the cloth's limit, the worst first, and at most one at any
-/// point: each relieves those around it. The cloth parts through the end of a broken spring with more
-/// triangles around, along the plane across the spring: the triangles on its far side get a point of their
-/// own, with its share of mass. Ends that are pinned or on a border come loose only as far as the triangles
-/// around let them. Returns how many springs broke; `version` grows if any triangle changed.
+/// Breaks stretch springs that are longer than the cloth's limit: those at the ends of tears and other
+/// borders first, then the worst, and only one near any place in a step, for it relieves those around it. So
+/// tears run on as lines, and a blow does not shatter the cloth. It parts through an end of the broken spring
+/// along the plane across it: the triangles on the far side get a point of their own, with its share of mass.
+/// What then holds together by a mere point comes apart there. Returns how many springs broke; `version`
+/// grows if any triangle changed.
 uint32_t tear(Cloth& cloth);
 
 }  // namespace offstage::sim

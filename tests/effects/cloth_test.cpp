@@ -2,7 +2,9 @@
 
 #include "effects/cloth.h"
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -39,6 +41,27 @@ Real settled_elongation(ClothDef def, uint32_t n, Real length) {
   const ClothHandle cloth = world.add_cloth(def);
   for (int i = 0; i < 96; ++i) world.step(1.0 / 24);
   return -world.cloth(cloth).points[n].y() - length;
+}
+
+/// How many pieces the triangles at a point would fall into without it.
+int fan_count(std::span<const Triangle> triangles, uint32_t point) {
+  std::vector<Triangle> left;
+  for (const Triangle& t : triangles)
+    if (std::ranges::count(t, point) > 0) left.push_back(t);
+  int fans = 0;
+  while (!left.empty()) {
+    ++fans;
+    std::vector<Triangle> fan = {left.back()};
+    left.pop_back();
+    for (std::size_t k = 0; k < fan.size(); ++k)
+      std::erase_if(left, [&](const Triangle& t) {
+        const bool beside = std::ranges::any_of(
+            t, [&](uint32_t i) { return i != point && std::ranges::count(fan[k], i) > 0; });
+        if (beside) fan.push_back(t);
+        return beside;
+      });
+  }
+  return fans;
 }
 
 class EveryIntegrator : public ::testing::TestWithParam<ClothIntegrator> {};
@@ -133,6 +156,57 @@ TEST(Cloth, TearsUnderALoadAndStaysAMesh) {
   EXPECT_EQ(view.sources.size(), view.points.size());
   for (const Triangle& t : view.triangles)
     for (uint32_t corner : t) ASSERT_LT(corner, view.points.size());
+  for (uint32_t i = 0; i < view.points.size(); ++i) EXPECT_EQ(fan_count(view.triangles, i), 1) << i;
+}
+
+// Nothing hangs on the cloth that a ball tore out of it, and that is one hole: not a shower of threads.
+TEST(Cloth, ABallTearsAHole) {
+  ClothDef def = effects::grid_cloth({2, 2, 40, 40}, {Vec3(0, 1, 0)}, effects::find_fabric("cotton")->fabric);
+  def.tear = 1.2;
+  for (uint32_t c = 0; c <= 40; ++c) {
+    def.pins.push_back({.vertex = c, .position = def.vertices[c]});
+    def.pins.push_back({.vertex = 1640 + c, .position = def.vertices[1640 + c]});
+  }
+  World world;
+  const ClothHandle cloth = world.add_cloth(def);
+  const BodyHandle ball =
+      world.add_body({.shape = Sphere{0.12}, .pose = {{0.01, 1.3, 0.02}}, .velocity = {0, -12, 0}});
+  uint64_t torn = 0;
+  for (int i = 0; i < 12; ++i) torn += world.step(1.0 / 24).cloth_springs_torn;
+  EXPECT_LT(world.body(ball).pose.position.y(), 0.5);
+  EXPECT_GT(torn, 6u);
+  EXPECT_LT(torn, 400u);
+  const ClothView view = world.cloth(cloth);
+  for (uint32_t i = 0; i < view.points.size(); ++i) EXPECT_EQ(fan_count(view.triangles, i), 1) << i;
+}
+
+// Let go while its threads are at their limit, it falls as anything does, whatever else hangs in the world.
+TEST(Cloth, FallsFreelyAtItsStretchLimitBesideOneThatHangs) {
+  const effects::Fabric cotton = effects::find_fabric("cotton")->fabric;
+  World world;
+  ClothHandle loose;
+  for (Real x : {0.0, 5.0}) {
+    ClothDef def = effects::grid_cloth({1, 1, 16, 16}, {Vec3(x, 0, 0)}, cotton);
+    def.max_stretch = 1.005;
+    def.air.density = 0;
+    def.pins.push_back({.vertex = 0, .position = def.vertices[0], .until = x > 0 ? 0.5 : 100});
+    loose = world.add_cloth(def);
+  }
+  const auto mean_velocity = [&] {
+    const ClothView view = world.cloth(loose);
+    Vec3 sum = Vec3::Zero();
+    for (const Vec3& v : view.velocities) sum += v;
+    return Vec3(sum / static_cast<Real>(view.velocities.size()));
+  };
+  for (int i = 0; i < 30; ++i) world.step(1.0 / 60);
+  const Vec3 before = mean_velocity();
+  uint64_t limited = 0;
+  for (int i = 0; i < 30; ++i) {
+    world.step(1.0 / 60);
+    limited += world.cloth_report(loose).limited;
+  }
+  EXPECT_GT(limited, 100u);
+  EXPECT_NEAR(mean_velocity().y() - before.y(), -9.81 * 0.5, 0.05);
 }
 
 }  // namespace
