@@ -214,6 +214,10 @@ Obstacle World::Impl::way_of(const Body& body, Real h) const {
   const Pose& from = body.can_move() ? body.before_substep : body.pose;
   Obstacle o(body.solid, from, body.pose, h, body.def.restitution, body.def.friction);
   o.body = body.handle.index;
+  if (body.def.cross_friction >= 0 && body.def.friction > 0) {
+    o.fibre = body.def.friction_axis;
+    o.cross_friction = std::sqrt(body.def.cross_friction / body.def.friction);
+  }
   if (!body.is_dynamic()) return o;
   const RigidBody& rigid = body.rigid;
   const Mat3 axes = rigid.orientation.toRotationMatrix();

@@ -88,6 +88,7 @@ void ClothSystem::assemble() {
   points_.pull.assign(points_.size(), Vec4::Zero());
   springs_.assign(swept, points_);
   limit_.assign(std::move(limits), points_.size());
+  drift_.assign(points_.size(), Vec4::Zero());
   pieces_.assign(points_.size());
   for (const ClothSpring& s : all_springs_) pieces_.join(s.a, s.b);
   for (const Seam& s : seams_) pieces_.join(s.a, s.b);
@@ -273,13 +274,15 @@ bool ClothSystem::find_drifts() {
     frame.holder = held.body;
     add(held.point);
   }
+  const auto all_rest = [&] { return std::ranges::all_of(frames, &Frame::rests); };
+  if (all_rest()) return false;
   for (uint32_t i = 0; i < points_.size(); ++i) {
     Frame& frame = frame_of(i);
     if (frame.rests) continue;
     frame.rests = cloths_[points_.cloth[i]]->stopped || contacts_.is_near_other_than(i, frame.holder);
     if (!frame.holder) add(i);
   }
-  if (std::ranges::all_of(frames, &Frame::rests)) return false;
+  if (all_rest()) return false;
   for (uint32_t i = 0; i < points_.size(); ++i) {
     const Frame& frame = frame_of(i);
     if (!frame.rests) drift_[i] = frame.sum / frame.mass;
@@ -297,19 +300,24 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
     self ? self_contacts_.find_doubtful(points_, span_ * dt, kHorizon, drift_) : self_contacts_.find_none();
   };
   shortened_.assign(points_.size(), 0);
-  drift_.assign(points_.size(), Vec4::Zero());
   find_doubtful();
-  bool look = true;
+  bool look = true, any = false;
   if (find_drifts()) {
     find_doubtful();
-    look = shorten_doubtful() && self;
+    const auto shift = [&](Real sign) {
+      for (std::size_t i = 0; i < points_.size(); ++i) points_.start[i] += sign * drift_[i];
+    };
+    shift(1);
+    any = shorten_doubtful();
+    shift(-1);
+    look = any && self;
     self_contacts_.take_crossed();  // in the world's frame nothing has to
     drift_.assign(points_.size(), Vec4::Zero());
     if (look) find_doubtful();
   }
-  if (look) shorten_doubtful();
+  if (look) any |= shorten_doubtful();
   for (uint32_t i : self_contacts_.take_crossed()) ++cloths_[points_.cloth[i]]->report.crossings;
-  for (std::size_t i = 0; i < points_.size(); ++i) {
+  for (std::size_t i = 0; any && i < points_.size(); ++i) {
     if (!shortened_[i]) continue;
     ++cloths_[points_.cloth[i]]->report.limited;
     // Its velocity is that of the shortened move, which in a span is not that of the last sub-step.
@@ -325,26 +333,25 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   stop_bodies();
 }
 
-/// Shortens moves beyond the drifts; whether any.
+/// Shortens moves from where points started; whether any.
 bool ClothSystem::shorten_doubtful() {
   shares_.assign(points_.size(), 1);
-  for (std::size_t i = 0; i < points_.size(); ++i) points_.start[i] += drift_[i];
-  bool again = true;
+  bool again = true, any = false;
   for (int round = 0; again && round < kMaxRounds; ++round) {
     again = round == 0 ? limit_.shorten_whole_moves(points_, shares_, lowered_)
                        : limit_.shorten(points_, shares_, lowered_);
     again |= self_contacts_.shorten(points_, shares_, lowered_);
+    any |= again;
   }
+  if (!any) return false;
   for (uint32_t i : self_contacts_.take_held_back()) ++cloths_[points_.cloth[i]]->report.held_back;
-  bool any = false;
+  any = false;
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Real share = again ? 0 : shares_[i];
-    if (share != 1 && points_.inverse_mass[i] > 0) {
-      points_.position[i] = points_.start[i] + share * (points_.position[i] - points_.start[i]);
-      shortened_[i] = 1;
-      any = true;
-    }
-    points_.start[i] -= drift_[i];
+    if (share == 1 || !(points_.inverse_mass[i] > 0)) continue;
+    points_.position[i] = points_.start[i] + share * (points_.position[i] - points_.start[i]);
+    shortened_[i] = 1;
+    any = true;
   }
   return any;
 }

@@ -35,6 +35,14 @@ Pose Obstacle::at(Real fraction) const {
   return pose;
 }
 
+Vec3 Obstacle::fibre_on(const Vec3& n, Real fraction) const {
+  if (cross_friction == 1 || fibre.isZero()) return Vec3::Zero();
+  const Vec3 axis = at(fraction).vector_to_world(fibre), along = axis - n.dot(axis) * n;
+  const Real length = along.norm();
+  if (length < 1e-6 * axis.norm()) return Vec3::Zero();  // it stands on the surface
+  return along / length;
+}
+
 Mat3 Obstacle::mobility(const Vec3& arm) const {
   Mat3 cross;
   cross << 0, -arm.z(), arm.y(), arm.z(), 0, -arm.x(), -arm.y(), arm.x(), 0;

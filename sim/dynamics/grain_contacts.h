@@ -7,6 +7,8 @@
 /// reach no farther than the layers beside it: all even slabs may be relaxed at the same time, then all odd
 /// ones.
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <span>
 #include <tuple>
@@ -56,6 +58,11 @@ class GrainContacts {
 
     Vec3 normal() const { return normal_single.cast<Real>(); }
     Vec3 impulse() const { return impulse_single.cast<Real>(); }  // on the first grain, world [N s]
+    /// What is left of an impulse along the surface that friction can hold no more of than `limit`.
+    Vec3 held(const Vec3& along, Real limit) const {
+      const Real size2 = along.squaredNorm();
+      return size2 > limit * limit ? Vec3(limit / std::sqrt(size2) * along) : along;
+    }
     bool acts() const { return impulse_single != Eigen::Vector3f::Zero(); }
   };
   static constexpr uint32_t kIndex = 0x7fffffff;  // all bits of a grain's number
@@ -69,6 +76,16 @@ class GrainContacts {
     uint32_t body;
     const Obstacle* obstacle;
     Vec3 velocity;  // of the surface
+    Vec3 fibre;     // Obstacle::fibre_on the surface
+
+    /// Along and across the fibre each for itself.
+    Vec3 held(const Vec3& along, Real limit) const {
+      if (fibre.isZero()) return Contact::held(along, limit);
+      const Vec3 across = normal().cross(fibre);
+      const Real most = limit * obstacle->cross_friction;
+      return std::clamp(fibre.dot(along), -limit, limit) * fibre +
+             std::clamp(across.dot(along), -most, most) * across;
+    }
   };
   struct Motion {
     Vec3 velocity;

@@ -135,9 +135,9 @@ void GrainImpacts::collide_with_obstacle(const Impact& impact) {
   const Real fraction = impact.time / step_->h;
   const Vec3 contact = g.at(impact.time) - g.radius * impact.normal;
   const Vec3 u = g.velocity_at(impact.time, step_->h) - o.velocity_at(contact, fraction);
-  const Vec3 impulse =
-      collision_impulse(o, contact, fraction, g.mass, u, impact.normal,
-                        std::max(g.restitution, o.restitution), pair_friction(g.friction, o.friction));
+  const Vec3 impulse = collision_impulse(o, contact, fraction, g.mass, u, impact.normal,
+                                         std::max(g.restitution, o.restitution),
+                                         pair_friction(g.friction, o.friction), o.is_dynamic());
   if (o.is_dynamic()) {
     reactions_->push_back(reaction(o, contact, fraction, impulse));
     struck_body_[impact.a] = o.body;

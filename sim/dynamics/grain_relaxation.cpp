@@ -31,10 +31,8 @@ Vec3 correct(Contact& c, const Vec3& u) {
   const Vec3 wanted = before - c.mass * (u - c.target * normal);
   const Real pressing = wanted.dot(normal);
   if (pressing > 0) {
-    Vec3 across = wanted - pressing * normal;
-    const Real limit = c.friction * pressing, size2 = across.squaredNorm();
-    if (size2 > limit * limit) across *= limit / std::sqrt(size2);
-    c.impulse_single = (pressing * normal + across).template cast<float>();
+    const Vec3 along = c.held(wanted - pressing * normal, c.friction * pressing);
+    c.impulse_single = (pressing * normal + along).template cast<float>();
   } else {
     c.impulse_single.setZero();
   }

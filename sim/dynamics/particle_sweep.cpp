@@ -149,9 +149,8 @@ void ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real fro
   const bool moves_it = strikes && o.is_dynamic(), moved_it = was_struck(o);
   if (approach > 0 && !moved_it) {
     const Vec3 contact = hit.position - path.radius * hit.normal;
-    const Vec3 impulse = moves_it ? collision_impulse(o, contact, hit.fraction, path.mass, u, hit.normal,
-                                                      restitution, friction)
-                                  : collision_impulse(path.mass, u, hit.normal, restitution, friction);
+    const Vec3 impulse = collision_impulse(o, contact, hit.fraction, path.mass, u, hit.normal, restitution,
+                                           friction, moves_it);
     v += impulse / path.mass;
     if (o.is_dynamic()) log_.reactions.push_back(reaction(o, contact, hit.fraction, impulse));
   }
@@ -185,7 +184,8 @@ void ParticleSweep::finish(ParticlePath& path, Real duration, const Vec3& extra)
     if (c.gives_way) return false;
     const Vec3 u = v - c.obstacle->velocity_at(predicted, 1);
     if (u.dot(c.normal) >= 0) return false;
-    const Vec3 impulse = collision_impulse(path.mass, u, c.normal, 0, c.friction);
+    const Vec3 impulse =
+        collision_impulse(*c.obstacle, predicted, 1, path.mass, u, c.normal, 0, c.friction, false);
     v += impulse / path.mass;
     if (c.obstacle->is_dynamic())
       log_.reactions.push_back(
@@ -208,14 +208,17 @@ void ParticleSweep::finish(ParticlePath& path, Real duration, const Vec3& extra)
 }
 
 Vec3 collision_impulse(const Obstacle& o, const Vec3& contact, Real fraction, Real particle_mass,
-                       const Vec3& u, const Vec3& n, Real restitution, Real friction) {
-  if (!o.is_dynamic()) return collision_impulse(particle_mass, u, n, restitution, friction);
-  const ContactFrame f = contact_frame(n);
+                       const Vec3& u, const Vec3& n, Real restitution, Real friction, bool moves_it) {
+  const Vec3 fibre = o.fibre_on(n, fraction);
+  const bool isotropic = fibre.isZero();
+  if (!moves_it && isotropic) return collision_impulse(particle_mass, u, n, restitution, friction);
+  const ContactFrame f = isotropic ? contact_frame(n) : ContactFrame{n, fibre, n.cross(fibre)};
   Mat3 axes;
   axes << f.n, f.t, f.k;
-  const Mat3 K = o.mobility(contact - o.centre_at(fraction)) + Mat3::Identity() / particle_mass;
+  Mat3 K = Mat3::Identity() / particle_mass;
+  if (moves_it) K += o.mobility(contact - o.centre_at(fraction));
   return axes * collision_impulse(Mat3(axes.transpose() * K * axes), Vec3(axes.transpose() * u), restitution,
-                                  friction, friction);
+                                  friction, isotropic ? friction : o.cross_friction * friction);
 }
 
 Reaction reaction(const Obstacle& o, const Vec3& contact, Real fraction, const Vec3& impulse_on_particle) {

@@ -52,9 +52,11 @@ struct ObstacleHit {
 };
 
 /// Impulse on a particle that meets an obstacle at its surface point `contact`, at a fraction of the
-/// sub-step, with the relative velocity u, u.n < 0 (P5, P8).
+/// sub-step, with the relative velocity u, u.n < 0 (P5, P8); `moves_it`: an obstacle that gives way.
+/// `friction` counts along the obstacle's fibre; across it `cross_friction` of that, and each sticks or
+/// slides by itself.
 Vec3 collision_impulse(const Obstacle& o, const Vec3& contact, Real fraction, Real particle_mass,
-                       const Vec3& u, const Vec3& n, Real restitution, Real friction);
+                       const Vec3& u, const Vec3& n, Real restitution, Real friction, bool moves_it);
 /// What an impulse on a particle does to the obstacle.
 Reaction reaction(const Obstacle& o, const Vec3& contact, Real fraction, const Vec3& impulse_on_particle);
 

@@ -55,6 +55,30 @@ TEST(ParticleRest, AStackOfTenBeadsStandsAndItsForcesSumUp) {
   }
 }
 
+// On planks they slide twice as far along the grain as across it; v^2 / (2 mu g) each.
+TEST(ParticleRest, SlidesByTheFrictionAlongAndAcrossTheGrain) {
+  for (bool internal : {false, true}) {
+    World world;
+    world.add_body({.shape = Plane{},
+                    .motion = MotionType::fixed,
+                    .restitution = 0,
+                    .friction = 0.1,
+                    .cross_friction = 0.4,
+                    .friction_axis = Vec3(0, 0, 3)});
+    const auto system = world.add_particle_system({.internal = internal});
+    for (const Vec3& v : {Vec3(2, 0, 0), Vec3(0, 0, -2)})
+      world.add_particle(
+          system,
+          {.position = v.normalized() + Vec3(0, 0.01, 0), .velocity = v, .restitution = 0, .friction = 0.4});
+    for (int i = 0; i < 120; ++i) world.step(kFrame);
+    const auto& at = world.particles(system).position;
+    const Real across = 4 / (2 * 0.4 * 9.81), along = 4 / (2 * 0.2 * 9.81);
+    EXPECT_NEAR(at[0].x(), 1 + across, 0.01 * across) << internal;
+    EXPECT_NEAR(at[1].z(), -1 - along, 0.01 * along) << internal;
+    EXPECT_NEAR(world.particles(system).velocity[0].norm(), 0, 1e-9);
+  }
+}
+
 /// A loose column of sand is let go; one in a lattice, of grains that do not turn, would stand. Returns how
 /// high it still stands over how far it reaches.
 struct Heap {
