@@ -444,16 +444,16 @@ void ClothSystem::measure() {
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     Cloth& cloth = *cloths_[c];
     if (!changed_ && c < springs_.softened().size()) cloth.report.softened = springs_.softened()[c];
-    Real sum = 0;
-    std::size_t count = 0;
+    Eigen::ArrayXd length2(cloth.springs.size()), rest(cloth.springs.size());
+    Eigen::Index count = 0;
     for (const ClothSpring& s : cloth.springs) {
       if (s.kind != SpringKind::stretch) continue;
-      const Real strain = (cloth.points[s.a] - cloth.points[s.b]).norm() / s.rest_length - 1;
-      cloth.report.max_strain = std::max(cloth.report.max_strain, strain);
-      sum += std::abs(strain);
-      ++count;
+      length2[count] = (cloth.points[s.a] - cloth.points[s.b]).squaredNorm();
+      rest[count++] = s.rest_length;
     }
-    cloth.report.mean_strain = count > 0 ? sum / static_cast<Real>(count) : 0;
+    const Eigen::ArrayXd strain = length2.head(count).sqrt() / rest.head(count) - 1;
+    cloth.report.max_strain = count > 0 ? std::max(cloth.report.max_strain, strain.maxCoeff()) : 0;
+    cloth.report.mean_strain = count > 0 ? strain.abs().mean() : 0;
     if (c < contacts_.active().size()) cloth.report.contacts = contacts_.active()[c];
     if (c < self_contacts_.active().size()) cloth.report.self_contacts = self_contacts_.active()[c];
   }
