@@ -11,7 +11,7 @@ chapters=(
   "Articulated bodies|wrecking_chain:1.45 ragdolls:1.4 bridge:1.6 double_pendulums:12 linkage:5 gyroscope:2.6 robot_arm:5 crane:4.7 vehicle:7 multi_pendulum:1.2"
   "Cloth|drape:3.5 flag:4 curtain:3 sheets:3 rotating_sphere:3 tablecloth:1.68 hammock:5 torn_banner:4 parachute:1.2"
   "Water and weather|fountain:5 jet_fountain:3 sprinkler:3.3 lawn_sprinkler:3 water_jet:3 rain:4 rain_square:3 hail:3 snow:5 thunderstorm:3"
-  "Smoke and fire|smoke:6 fire:4 fireworks:5 sparks:3 rocket_exhaust:3.5 grenade:1.5 dust:3"
+  "Smoke and fire|smoke:6 fire:4 fireworks:8 sparks:3 rocket_exhaust:3.5 grenade:1.5 dust:3"
   "Particles|landscape:3"
 )
 strip="wall dominoes arch marbles pile explosion glass cradle sprinkler rain fountain machine flag landscape drape smoke fire fireworks sparks rocket_exhaust"
