@@ -105,9 +105,10 @@ void Emitter::release(sim::World& world, const Release& r, Real start, Real end)
   const uint64_t alive = world.particles(target_).size();
   const uint64_t allowed = std::min(r.count, def_.max_alive > alive ? def_.max_alive - alive : 0);
   if (allowed > 0) {
-    const Real birth = std::max(r.time, start);
+    // What did not have to wait but was due before now is prewarming's.
+    const Real birth = r.waited ? std::max(r.time, start) : r.time;
     const Batch batch{allowed, birth, end, largest_diameter(allowed, birth),
-                      def_.body ? world.body_motion(def_.body, birth) : sim::Motion{}};
+                      def_.body ? world.body_motion(def_.body, std::max(birth, start)) : sim::Motion{}};
     const uint64_t placed = def_.overlap           ? place_anywhere(world, batch)
                             : surface_.has_cells() ? place_in_cells(world, batch)
                                                    : place_apart(world, batch);

@@ -152,14 +152,14 @@ struct StepReport {
   IntegratorReport integration;  ///< of the free motion
 
   Real joint_error = 0;  ///< greatest that was left of a joint's constraint at the end of a motion [m], [rad]
-  uint64_t joints_unsolved = 0;             ///< times that joints could not be put back together
+  uint64_t joints_unsolved = 0;            ///< times that joints could not be put back together
   std::vector<JointHandle> joints_broken;  ///< by too great a force, in this step
 
   uint64_t cloth_contacts = 0;  ///< at the end, of all cloths; the others as ClothReport has them
   uint64_t cloth_self_contacts = 0;
   uint64_t cloth_springs_softened = 0;  ///< at the end, too
-  Real cloth_strain = 0;       ///< greatest
-  Real cloth_penetration = 0;  ///< deepest [m]
+  Real cloth_strain = 0;                ///< greatest
+  Real cloth_penetration = 0;           ///< deepest [m]
   uint64_t cloth_moves_limited = 0, cloth_moves_held_back = 0, cloth_crossings = 0, cloth_springs_torn = 0;
   uint64_t cloth_unconverged = 0;
 
@@ -245,7 +245,8 @@ class World {
   void set_velocity(BodyHandle body, const Vec3& velocity, const Vec3& angular_velocity);
 
   /// Adds a particle. `elapsed` is how long before the end of the coming sub-step it was born: it is
-  /// integrated over just that part of it. Negative: it exists now and is stepped in full. Returns its id.
+  /// integrated over just that part of it, and freely, through bodies, over what is longer. Negative: it
+  /// exists now and is stepped in full. Returns its id.
   uint64_t add_particle(ParticleSystemHandle system, const Particle& particle, Real elapsed = -1);
 
   /// Called before each sub-step with its start and end time; emitters add their particles here.

@@ -334,8 +334,8 @@ struct Table<Emitter> {
         {"end", &T::end, "of everything; the living live on", "s", kNotNegative},
         {"windows", &T::windows, "when `rate` and `count` release; empty: always"},
         {"prewarm", &T::prewarm,
-         "how long before `start` it has begun already; what is born before time 0 has flown straight "
-         "until then",
+         "how long before `start` it has begun already; what is born before time 0 has flown freely "
+         "until then, past bodies",
          "s", kNotNegative},
     }
                               .with_base<ParticleSource>()

@@ -14,6 +14,8 @@ namespace {
 
 /// Particles per task; a chunk's state stays in the second-level cache between integration and sweep.
 constexpr std::size_t kChunk = 1024;
+/// Steps a second of what was born long ago, and how many at most.
+constexpr Real kStepsBefore = 120, kMostStepsBefore = 10000;
 
 std::size_t chunk_count(std::size_t n) {
   return (n + kChunk - 1) / kChunk;
@@ -82,6 +84,16 @@ void ParticleSystem::fly(const ParticleForces& forces, Real t, Real h, std::size
       .step(FreeFlight(forces, part(arrays.mass, begin, end)), t, h, flat(x), flat(v), scratch.integrator);
 }
 
+/// What was born before the world began, or long before this sub-step, has flown freely until it begins.
+void ParticleSystem::fly_before(const ParticleForces& forces, const ParticleStage& stage, std::size_t i,
+                                Real duration, Scratch& scratch) {
+  duration = std::min(duration, arrays.lifespan[i]);
+  if (!(duration > 1e-9 * stage.h)) return;  // nothing but rounding
+  const Real steps = std::clamp(std::ceil(duration * kStepsBefore), 1.0, kMostStepsBefore);
+  for (Real k = 0; k < steps; ++k) fly(forces, stage.time, duration / steps, i, i + 1, scratch);
+  arrays.age[i] += duration;
+}
+
 /// Flies every particle, and calls make_landing(chunk)(i, flight, integrated) when it has flown; `integrated`
 /// says that it was before, by a network of springs. Calls of a chunk are in order, those of different chunks
 /// at the same time.
@@ -107,6 +119,7 @@ void ParticleSystem::fly_each(const ParticleStage& stage, const ParticleForces& 
     Scratch& scratch = scratches.local();
     for (std::size_t i = begin; i < end; ++i) {
       const bool integrated = coupled && whole_step(i);
+      fly_before(forces, stage, i, newborn[i - old] - stage.h, scratch);
       const Real duration = whole_step(i) ? stage.h : std::min(newborn[i - old], stage.h);
       if (!integrated) fly(forces, stage.time + (stage.h - duration), duration, i, i + 1, scratch);
       const Vec3 x0 = integrated ? start_position_[i] : scratch.position[0];

@@ -86,6 +86,8 @@ struct ParticleSystem {
 
   void fly(const ParticleForces& forces, Real t, Real h, std::size_t begin, std::size_t end,
            Scratch& scratch);
+  void fly_before(const ParticleForces& forces, const ParticleStage& stage, std::size_t i, Real duration,
+                  Scratch& scratch);
   SweepOutcome sweep(const ParticleStage& stage, const ParticleForces& forces, ParticleSweep& sweep,
                      std::size_t i, const Flight& flight, bool integrated);
   void remove_dead();

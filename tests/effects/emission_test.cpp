@@ -1,5 +1,6 @@
 /// When and from where emitters release: windows, prewarming, stopping, moving bodies.
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -75,6 +76,22 @@ TEST(Emission, APrewarmedEmitterIsWhereOneThatStartedEarlierIs) {
   run(world, 2, 60, prewarmed, started);
   EXPECT_NEAR(static_cast<Real>(world.particles(warm).size()), 120, 1);
   EXPECT_EQ(world.particles(warm).position, world.particles(early).position);
+}
+
+// At the first picture there is rain all the way down, of every age.
+TEST(Emission, WhatIsBornBeforeTheWorldHasFlownUntilThen) {
+  World world({.gravity = Vec3(0, -10, 0)});
+  const auto system = world.add_particle_system({});
+  Emitter emitter({.rate = 100.0, .prewarm = 2, .direction = Vec3::UnitX(), .speed = 1.0, .lifespan = 1e9},
+                  system);
+  run(world, 1.0 / 60, 60, emitter);
+  const auto& p = world.particles(system);
+  EXPECT_NEAR(static_cast<Real>(p.size()), 201, 2);
+  EXPECT_NEAR(*std::ranges::max_element(p.age), 2, 0.03);
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    EXPECT_NEAR(p.position[i].x(), p.age[i], 0.12);
+    EXPECT_NEAR(p.position[i].y(), -5 * p.age[i] * p.age[i], 0.12);
+  }
 }
 
 TEST(Emission, StoppingReleasesNothingMoreAndKillsNobody) {
