@@ -12,6 +12,12 @@ namespace {
 
 using Pairs = std::multiset<std::pair<uint32_t, uint32_t>>;
 
+Pairs found_by(const ClothTree& tree, std::span<const Vec4> points) {
+  Pairs pairs;
+  tree.pairs(points, [&](uint32_t a, uint32_t b) { pairs.insert(std::minmax(a, b)); });
+  return pairs;
+}
+
 /// Triangles apart from each other, so that no surface tells that any cannot meet, on short ways.
 struct Swarm {
   explicit Swarm(uint32_t count) {
@@ -51,11 +57,7 @@ struct Swarm {
         if ((fresh.contains(a) || fresh.contains(b)) && !apart(a, b)) pairs.emplace(a, b);
     return pairs;
   }
-  Pairs found() const {
-    Pairs pairs;
-    tree.pairs(from, [&](uint32_t a, uint32_t b) { pairs.insert(std::minmax(a, b)); });
-    return pairs;
-  }
+  Pairs found() const { return found_by(tree, from); }
 
   std::vector<Triangle> triangles;
   std::vector<Vec4> from, to;
@@ -102,11 +104,7 @@ struct Strip {
     tree.build(triangles, rest);
     tree.fit(points, points, std::vector<Real>(points.size(), 0.005));
   }
-  Pairs found() const {
-    Pairs pairs;
-    tree.pairs(points, [&](uint32_t a, uint32_t b) { pairs.insert(std::minmax(a, b)); });
-    return pairs;
-  }
+  Pairs found() const { return found_by(tree, points); }
 
   std::vector<Triangle> triangles;
   std::vector<Vec4> points, rest;
