@@ -1,6 +1,7 @@
 #include "render/cloth_pass.h"
 
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace offstage::render {
@@ -16,7 +17,19 @@ gl::VertexArray make_layout() {
   return layout;
 }
 
+gl::LazyProgram make_sheer_shadow(std::vector<std::string> defines) {
+  return {{"frame.glsl", "cloth.vert"},
+          {"frame.glsl", "material.glsl", "sheer.glsl", "cloth_shadow.frag"},
+          std::move(defines)};
+}
+
 }  // namespace
+
+ClothPass::ClothPass()
+    : shadow_({"frame.glsl", "cloth.vert"}, {}, {"SHADOW 1"}),
+      sheer_shadow_(make_sheer_shadow({"SHADOW 1", "SHEER 1"})),
+      textured_sheer_shadow_(make_sheer_shadow({"SHADOW 1", "SHEER 1", "TEXTURED 1"})),
+      depth_({"frame.glsl", "cloth.vert"}, {}, {}) {}
 
 void ClothPass::prepare(Cloth& cloth) {
   if (cloth.vertex_array == 0) cloth.vertex_array = make_layout();
@@ -35,8 +48,20 @@ void ClothPass::draw_triangles(const Cloth& cloth) {
                  nullptr);
 }
 
+void ClothPass::bind(const Cloth& cloth, GLint texture_from_uv) {
+  glBindBufferBase(GL_UNIFORM_BUFFER, kMaterialBlock, cloth.material->uniforms);
+  if (cloth.material->textures[0] == 0) return;
+  glBindTextureUnit(kFirstTextureUnit, cloth.material->textures[0]);
+  glUniform2f(texture_from_uv, cloth.texture_from_uv.x(), cloth.texture_from_uv.y());
+}
+
 void ClothPass::draw_shadow(const Cloth& cloth, const Matrix4f& shadow_clip_from_world) {
-  shadow_.use();
+  if (!cloth.is_sheer()) {
+    shadow_.use();
+  } else {
+    (cloth.material->textures[0] != 0 ? textured_sheer_shadow_ : sheer_shadow_).use();
+    bind(cloth, 1);
+  }
   glUniformMatrix4fv(0, 1, GL_FALSE, shadow_clip_from_world.data());
   draw_triangles(cloth);
 }
@@ -48,7 +73,8 @@ void ClothPass::draw_depth(const Cloth& cloth) {
 
 gl::LazyProgram& ClothPass::program(const GpuMaterial& material, const Features& features) {
   const bool textured = material.textures[0] != 0;
-  const auto key = std::make_tuple(material.weave, material.pattern, textured, features);
+  const bool sheer = material.lets_through();
+  const auto key = std::make_tuple(material.weave, material.pattern, textured, sheer, features);
   const auto found = programs_.find(key);
   if (found != programs_.end()) return found->second;
   std::vector<std::string> defines = features;
@@ -61,6 +87,10 @@ gl::LazyProgram& ClothPass::program(const GpuMaterial& material, const Features&
     defines.push_back("PATTERN " + std::to_string(static_cast<int>(material.pattern)));
     fragment.push_back("pattern.glsl");
   }
+  if (sheer) {
+    defines.push_back("SHEER 1");
+    fragment.push_back("sheer.glsl");
+  }
   fragment.insert(fragment.end(), {"fabric.glsl", "cloth.frag"});
   const std::vector<std::string_view> vertex = {"frame.glsl", "cloth.vert"};
   return programs_.emplace(key, gl::LazyProgram(vertex, fragment, defines)).first->second;
@@ -70,11 +100,7 @@ void ClothPass::draw(const Cloth& cloth, const Features& features) {
   program(*cloth.material, features).use();
   glDisable(GL_CULL_FACE);
   glFrontFace(GL_CCW);
-  glBindBufferBase(GL_UNIFORM_BUFFER, kMaterialBlock, cloth.material->uniforms);
-  if (cloth.material->textures[0] != 0) {
-    glBindTextureUnit(kFirstTextureUnit, cloth.material->textures[0]);
-    glUniform2f(0, cloth.texture_from_uv.x(), cloth.texture_from_uv.y());
-  }
+  bind(cloth, 0);
   draw_triangles(cloth);
 }
 

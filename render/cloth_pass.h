@@ -1,5 +1,5 @@
 #pragma once
-/// Private: draws cloths, opaque, from both sides, and into the shadow map.
+/// Private: draws cloths, from both sides, and into the shadow map.
 
 #include <map>
 #include <span>
@@ -27,26 +27,28 @@ struct Cloth {
   uint32_t uploaded = 0;  ///< version of the indices
   gl::VertexArray vertex_array;
 
+  /// Something is seen through it.
+  bool is_sheer() const { return material->lets_through(); }
   bool is_seen() const { return !surface.vertices().empty() && !surface.indices().empty(); }
 };
 
 class ClothPass {
  public:
-  ClothPass()
-      : shadow_({"frame.glsl", "cloth.vert"}, {}, {"SHADOW 1"}), depth_({"frame.glsl", "cloth.vert"}, {}, {}) {}
+  ClothPass();
   /// Uploads a cloth as it is now.
   void prepare(Cloth& cloth);
   void draw_shadow(const Cloth& cloth, const Matrix4f& shadow_clip_from_world);
-  /// Its depth in the picture, of the very surface that `draw` shades.
+  /// The depth of an opaque one in the picture, of the very surface that `draw` shades.
   void draw_depth(const Cloth& cloth);
   void draw(const Cloth& cloth, const Features& features);
 
  private:
+  static void bind(const Cloth& cloth, GLint texture_from_uv);
   static void draw_triangles(const Cloth& cloth);
   gl::LazyProgram& program(const GpuMaterial& material, const Features& features);
 
-  std::map<std::tuple<Weave, Pattern, bool, Features>, gl::LazyProgram> programs_;  ///< textured
-  gl::LazyProgram shadow_, depth_;
+  std::map<std::tuple<Weave, Pattern, bool, bool, Features>, gl::LazyProgram> programs_;  ///< textured, sheer
+  gl::LazyProgram shadow_, sheer_shadow_, textured_sheer_shadow_, depth_;
 };
 
 }  // namespace offstage::render

@@ -46,6 +46,9 @@ struct GpuMaterial {
   bool glass = false;   ///< light goes through and is refracted
   bool smooth = false;  ///< enough to show the scene in it
   bool metal = false;
+
+  /// Something is seen through it.
+  bool lets_through() const { return blended || glass; }
 };
 
 GpuMaterial make_gpu_material(const Material& material, std::span<const Image> textures);

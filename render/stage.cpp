@@ -128,6 +128,7 @@ struct Stage::Impl {
   void draw_glass();
   void draw_depth(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view);
   void draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets);
+  void draw_sheer(std::span<const Cloth* const> sheets);
   void draw_blended(std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame,
                     bool new_frame);
   void draw_lines(const View& view);
@@ -288,7 +289,8 @@ void Stage::Impl::draw_depth(std::span<const Cloth* const> sheets, std::span<Poi
   glPolygonOffset(0, -4);
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
   glDisable(GL_CULL_FACE);
-  for (const Cloth* cloth : sheets) cloth_pass.draw_depth(*cloth);
+  for (const Cloth* cloth : sheets)
+    if (!cloth->is_sheer()) cloth_pass.draw_depth(*cloth);
   mesh_pass.draw_depth(view.clip_from_world);
   glDisable(GL_CULL_FACE);
   for (const PointSet* set : sets) {
@@ -302,7 +304,8 @@ void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<Po
   glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
   glViewport(0, 0, def.width_px, def.height_px);
   glDepthFunc(GL_GEQUAL);
-  for (const Cloth* cloth : sheets) cloth_pass.draw(*cloth, features);
+  for (const Cloth* cloth : sheets)
+    if (!cloth->is_sheer()) cloth_pass.draw(*cloth, features);
   mesh_pass.draw_opaque();
   glDisable(GL_CULL_FACE);
   for (const PointSet* set : sets) {
@@ -315,8 +318,17 @@ void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<Po
     glDrawArrays(GL_TRIANGLES, 0, 3);
   }
   glDepthFunc(GL_GREATER);
+  draw_sheer(sheets);
   draw_mirrors();
   draw_glass();
+}
+
+void Stage::Impl::draw_sheer(std::span<const Cloth* const> sheets) {
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  for (const Cloth* cloth : sheets)
+    if (cloth->is_sheer()) cloth_pass.draw(*cloth, features);
+  glDisable(GL_BLEND);
 }
 
 void Stage::Impl::draw_blended(std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame,

@@ -21,7 +21,6 @@ class ClothChecker {
 
   void check(const Cloth& cloth) {
     const std::string& path = cloth.where.path;
-    check_material(cloth);
     if (!effects::find_fabric(cloth.fabric))
       return fail(path + "/fabric",
                   "there is no fabric '" + cloth.fabric + "'" + suggestion(cloth.fabric, fabric_names()));
@@ -42,21 +41,6 @@ class ClothChecker {
  private:
   void fail(std::string path, std::string what) {
     findings_.errors.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
-  }
-  void warn(std::string path, std::string what) {
-    findings_.warnings.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
-  }
-
-  void check_material(const Cloth& cloth) {
-    if (cloth.material.empty()) return;
-    const auto material = std::ranges::find(scene_.materials, cloth.material, &Material::name);
-    if (material == scene_.materials.end()) return;
-    if (material->color.rgba.w() < 1)
-      warn(cloth.where.path + "/material", "cloths are drawn opaque, whatever the alpha of their colour");
-    if (material->transmission > 0)
-      warn(cloth.where.path + "/material",
-           "cloths are drawn opaque, whatever the transmission of their material; light comes through by "
-           "fabric.translucency");
   }
 
   void check_body(const PinScope& pin) {

@@ -72,12 +72,12 @@ struct Table<Material> {
     using T = Material;
     return {
         {"name", &T::name, "what bodies, springs and cloths call it; empty: material_ and its index"},
-        {"color", &T::color, "base colour; with alpha below 1 it is translucent"},
+        {"color", &T::color, "base colour; with alpha below 1 it is translucent, and so is its shadow"},
         {"metallic", &T::metallic, "0: dielectric, 1: metal", "", kShare},
         {"roughness", &T::roughness, "0: mirror, 1: dull", "", kShare},
         {"transmission", &T::transmission,
          "share of the light under the surface that goes through: 1 is glass, its colour what it lets "
-         "through",
+         "through; of a cloth, what goes between its threads, as it is",
          "", kShare},
         {"refraction", &T::refraction, "index of refraction of what light goes through", "", between(1, 3)},
         {"emission", &T::emission, "colour of the light it gives off"},

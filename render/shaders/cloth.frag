@@ -10,6 +10,14 @@ void main() {
   vec3 n = normalize(normal.xyz) * side;
   n = normalize(n + view * max(0.02 - dot(n, view), 0.0));  // smooth normals can turn away at outlines
   vec2 uv = place.xy;
+#ifdef SHEER
+  float opacity = material.color.a * (1.0 - material.glass.x);
+#ifdef TEXTURED
+  opacity *= texture(base_color_texture, uv * texture_from_uv).a;
+#endif
+  float alpha = alpha_of(cover_of(opacity, dot(n, view)), uv);
+  if (alpha == 0.0) discard;
+#endif
   Surface s = Surface(material.color.rgb, material.surface.y, material.surface.x, material.emission.rgb);
   vec2 slope = vec2(0.0);
 #ifdef PATTERN
@@ -35,7 +43,9 @@ void main() {
 
   // In folds the sky is hidden, but cloth is what hides it: light comes from there in the cloth's own colour.
   float open = exp2(-2.2 * max(side * place.z, 0.0));
-  open *= open_sky(1.0 / gl_FragCoord.w);
+#ifndef SHEER
+  open *= open_sky(1.0 / gl_FragCoord.w);  // of what is seen through it otherwise
+#endif
   vec3 opened = open / (1.0 - s.albedo * (0.8 * (1.0 - open)));
 
   // The side that the sun sees is the one that can be in shadow.
@@ -46,5 +56,10 @@ void main() {
 #ifdef LAMPS
   radiance += lamp_light(s, relief, n, view, position);
 #endif
-  color = vec4(apply_fog(radiance, position), 1.0);
+  radiance = apply_fog(radiance, position);
+#ifdef SHEER
+  color = vec4(radiance * alpha, alpha);
+#else
+  color = vec4(radiance, 1.0);
+#endif
 }

@@ -4,6 +4,9 @@ layout(location = 2) in vec2 in_uv;        // along the cloth [m]
 
 #ifdef SHADOW
 layout(location = 0) uniform mat4 shadow_clip_from_world;
+#ifdef SHEER
+layout(location = 2) out vec3 place;
+#endif
 #else
 layout(location = 0) out vec3 position;
 layout(location = 1) out vec4 normal;  // w: height of `position` over the middle layer [m]
@@ -15,6 +18,9 @@ invariant gl_Position;
 void main() {
 #ifdef SHADOW
   gl_Position = shadow_clip_from_world * vec4(in_position.xyz, 1.0);
+#ifdef SHEER
+  place = vec3(in_uv, in_position.w);
+#endif
 #else
   // The one layer there is stands for whichever side is seen; towards the outline it goes over into the other.
   vec3 view = normalize(frame.eye.xyz - in_position.xyz);

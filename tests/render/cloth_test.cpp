@@ -1,8 +1,10 @@
 // The drawn surface of cloths, against what is known of flat sheets and balls, and how light falls on them.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
@@ -155,6 +157,70 @@ TEST(StageCloth, ThrowsItsShadowOnWhatIsBehind) {
   EXPECT_LT(shadowed, 0.3f * below());
 }
 
+/// Mean of the red of a few pixels in the middle, or below it, of a frame of `count` sub-frames.
+float mean_red(ClothStage& s, int count, int below_px = 0) {
+  HdrImage sum;
+  for (int i = 0; i < count; ++i) s.stage.draw(sample_offsets(i, count), sum);
+  float result = 0;
+  for (int y = 28; y < 36; ++y)
+    for (int x = 44; x < 52; ++x) result += pixel(sum, x, y + below_px).x() / static_cast<float>(64 * count);
+  return result;
+}
+
+/// Black cloth of an alpha.
+Material sheer(float alpha) {
+  Material m = plain();
+  m.color = {0, 0, 0, alpha};
+  return m;
+}
+
+TEST(StageCloth, HidesTheShareOfWhatIsBehindThatItsOpacitySays) {
+  for (const int count : {1, 4, 16})
+    for (const float alpha : {0.25f, 0.5f, 0.9f}) {
+      ClothStage s(sheer(alpha), {0, 0, -1});
+      s.add(make_box({8, 8, 0.1f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {1, 1, 1}},
+            {0, 0, -1});
+      EXPECT_NEAR(mean_red(s, count), 1 - alpha, 0.03f) << count << " sub-frames";
+    }
+}
+
+TEST(StageCloth, TransmissionLetsThroughAsAlphaDoes) {
+  Material m = sheer(1);
+  m.transmission = 0.7f;
+  ClothStage s(m, {0, 0, -1});
+  s.add(make_box({8, 8, 0.1f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {1, 1, 1}}, {0, 0, -1});
+  EXPECT_NEAR(mean_red(s, 4), 0.7f, 0.03f);
+}
+
+TEST(StageCloth, TwoLayersHideMoreThanOneInWhateverOrder) {
+  for (const float second : {-0.5f, 0.5f}) {
+    ClothStage s(sheer(0.5f), {0, 0, -1});
+    s.add(make_box({8, 8, 0.1f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {1, 1, 1}}, {0, 0, -1});
+    Sheet sheet(12);
+    std::ranges::reverse(sheet.triangles);  // its back in front, as in a fold
+    for (Vector3f& p : sheet.points) p.z() = second;
+    const ClothHandle other = s.stage.add_cloth({.triangles = sheet.triangles, .uvs = sheet.uvs},
+                                                s.stage.add_material(sheer(0.25f)));
+    s.stage.set_cloth(other, sheet.points);
+    const float seen = mean_red(s, 16);
+    EXPECT_LT(seen, 0.45f);  // 0.375 where their holes have nothing to do with each other
+    EXPECT_GT(seen, 0.2f);
+  }
+}
+
+TEST(StageCloth, ShadowIsAsLightAsTheClothIsOpen) {
+  const auto floor = [](std::optional<float> alpha) {
+    ClothStage s(sheer(alpha.value_or(1)), {0, 0.6f, 1}, {0, -3, 4});
+    s.add(make_box({8, 8, 0.1f}), {.color = {1, 1, 1, 1}, .roughness = 1}, {0, 0, -1});
+    if (!alpha) s.stage.remove(s.cloth);
+    return mean_red(s, 4, 22);
+  };
+  const float lit = floor(std::nullopt), dark = floor(1.0f);
+  EXPECT_LT(dark, 0.3f * lit);
+  for (const float alpha : {0.3f, 0.6f})
+    EXPECT_NEAR((floor(alpha) - dark) / (lit - dark), 1 - alpha, 0.07f) << alpha;
+}
+
 TEST(StageCloth, WeaveFadesToItsMeanFarAway) {
   // Threads a thousandth of a pixel wide: no pixel differs from the mean.
   Material woven = plain();
@@ -184,7 +250,8 @@ TEST(StageCloth, TornSheetHasItsNewTrianglesAndIsOpenBetween) {
   EXPECT_EQ(pixel(picture, 36, 32).w(), 1);
 }
 
-// A crumpled thick sheet has places where one surface hides another by a hair; what was drawn before must not show there.
+// A crumpled thick sheet has places where one surface hides another by a hair; what was drawn before must not
+// show there.
 TEST(StageCloth, IsDrawnTheSameWhateverWasDrawnBefore) {
   ClothStage s(plain(), {0.3f, 0.5f, 1});
   Sheet sheet(12);
