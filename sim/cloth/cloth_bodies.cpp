@@ -32,6 +32,7 @@ void ClothBody::begin(Real from, Real to, Real dt) {
   end_ = moved(way_.at(to), way_.centre, shift_, turn_);
   centre_ = end_.point_to_world(way_.centre);
   dt_ = dt;
+  to_ = to;
 }
 
 Vec3 ClothBody::surface_motion(const Vec3& p) const {
@@ -59,6 +60,14 @@ void ClothBody::push(const Vec3& impulse, const Vec3& p) {
   angular_velocity_ += dw;
   gained_ += dv;
   gained_spin_ += dw;
+}
+
+void ClothBody::pull(const Vec3& impulse, const Vec3& p, Real share) {
+  const Vec3 gained = gained_, gained_spin = gained_spin_;
+  push(impulse, p);
+  shift_ += share * dt_ * (gained_ - gained);
+  turn_ += share * dt_ * (gained_spin_ - gained_spin);
+  end_ = moved(way_.at(to_), way_.centre, shift_, turn_);
 }
 
 }  // namespace offstage::sim

@@ -38,6 +38,9 @@ class ClothBody {
   Real mobility(const Vec3& p, const Vec3& n) const;
   /// An impulse at a point [N s].
   void push(const Vec3& impulse, const Vec3& p);
+  /// The same by what hangs on a pin, which moves the body in this sub-step of cloth already: by `share` of
+  /// what the gain of velocity does in one. A body that followed later than it was pulled would gain energy.
+  void pull(const Vec3& impulse, const Vec3& p, Real share);
 
   const Reaction& reaction() const { return reaction_; }
   /// A point of cloth touches it, which moves at this speed against it [m/s].
@@ -59,8 +62,8 @@ class ClothBody {
   Vec3 gained_ = Vec3::Zero(), gained_spin_ = Vec3::Zero();  // of velocity
   Vec3 shift_ = Vec3::Zero(), turn_ = Vec3::Zero();          // by that, of the centre
   Vec3 centre_ = Vec3::Zero();                               // of mass, at the end of cloth's sub-step
-  Pose start_, end_;
-  Real dt_ = 0;
+  Pose start_, end_;                                         // of that sub-step
+  Real dt_ = 0, to_ = 0;                                     // of cloth's sub-step
   Reaction reaction_;
 };
 

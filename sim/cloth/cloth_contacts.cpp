@@ -263,7 +263,7 @@ void ClothContacts::press(ClothPoints& points, Touch& t, Real dt, Real parts, bo
     correction -= std::min(stick, friction * pressed) * along;
   }
   points.position[i] += padded(w * correction);
-  body.push((recovery - correction) / dt, t.on_body);
+  body.pull((recovery - correction) / dt, t.on_body, 1);
 }
 
 void ClothContacts::measure(const ClothPoints& points, std::span<Real> penetration) const {

@@ -126,8 +126,10 @@ void ClothSprings::step(ClothPoints& points, std::span<Vec4> moves, Real h) {
   });
 }
 
-/// What depends on the step and on what pins hold alone.
-void ClothSprings::prepare(const ClothPoints& points, Real h) {
+/// What depends on the step and on what pins hold alone. Steps of one rate differ in their last bits, as
+/// differences of times do: in single precision they are one.
+void ClothSprings::prepare(const ClothPoints& points, Real step) {
+  const Real h = static_cast<float>(step);
   if (h == prepared_for_ && points.inverse_mass == inverse_mass_) return;
   prepared_for_ = h;
   inverse_mass_ = points.inverse_mass;

@@ -51,7 +51,7 @@ class ClothSprings {
     uint32_t block_count() const;
   };
 
-  void prepare(const ClothPoints& points, Real h);
+  void prepare(const ClothPoints& points, Real step);
   void pull(ClothPoints& points, std::span<Vec4> moves, std::size_t begin, std::size_t end);
   void relax(ClothPoints& points, std::span<Vec4> moves, std::size_t spring);
 

@@ -41,7 +41,7 @@ void ClothSystem::assemble() {
   all_springs_.clear();
   first_spring_.clear();
   std::vector<ClothSpring> swept;
-  std::vector<StretchLimit::Limit> limits;
+  std::vector<StretchLimit::Limit> limits, ties;
   std::vector<Triangle> colliding, touching;  // cloth; bodies
   for (uint32_t c = 0; c < cloths_.size(); ++c) {
     const Cloth& cloth = *cloths_[c];
@@ -76,9 +76,10 @@ void ClothSystem::assemble() {
     if (cloth.def.self_collision)
       for (const Triangle& t : cloth.triangles)
         colliding.push_back({first + t[0], first + t[1], first + t[2]});
-    for (std::size_t k = 0; k < cloth.def.seams.size(); ++k)
-      seams_.push_back({first + cloth.def.seams[k].a, first + cloth.def.seams[k].b, 0, cloth.seam_lengths[k],
-                        cloth.def.seam_time});
+    for (std::size_t k = 0; k < cloth.def.seams.size(); ++k) {
+      seams_.push_back({c, cloth.seam_lengths[k]});
+      ties.push_back({first + cloth.def.seams[k].a, first + cloth.def.seams[k].b, 0, 0});
+    }
   }
   first_spring_.push_back(all_springs_.size());
   kick_.assign(points_.size(), Vec4::Zero());
@@ -87,12 +88,12 @@ void ClothSystem::assemble() {
   points_.acceleration.assign(points_.size(), Vec4::Zero());
   points_.pull.assign(points_.size(), Vec4::Zero());
   springs_.assign(swept, points_);
-  limit_.assign(std::move(limits), points_.size());
   drift_.assign(points_.size(), Vec4::Zero());
   pieces_.assign(points_.size());
   for (const ClothSpring& s : all_springs_) pieces_.join(s.a, s.b);
-  for (const Seam& s : seams_) pieces_.join(s.a, s.b);
+  for (const StretchLimit::Limit& t : ties) pieces_.join(t.a, t.b);
   pieces_.keep();
+  limit_.assign(std::move(limits), std::move(ties), points_.size());
   self_contacts_.assign(std::move(colliding), points_);
   corner_contacts_.assign(std::move(touching), points_);
   span_ = 0;
@@ -171,7 +172,7 @@ void ClothSystem::substep(Real from, Real to, Real dt, bool ends_span) {
   cuts_.clear();
   move_held();
   integrate(dt);
-  close_seams();
+  close_seams(dt);
   limit_.project(points_);
   if (ends_span && !self_contacts_.empty()) push_apart(dt);
   touch_bodies(dt);
@@ -205,6 +206,7 @@ void ClothSystem::touch_bodies(Real dt) {
 
 void ClothSystem::move_held() {
   for (Held& held : held_) {
+    held.from = points_.position[held.point];
     points_.position[held.point] =
         padded(held.body ? held.body->end().point_to_world(held.position) : held.position);
     points_.pull[held.point].setZero();
@@ -212,6 +214,9 @@ void ClothSystem::move_held() {
 }
 
 void ClothSystem::integrate(Real dt) {
+  // Springs begin where bodies are, which they have pulled since points were put on them.
+  for (const Held& held : held_)
+    if (held.body) points_.start[held.point] = padded(held.body->start().point_to_world(held.position));
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     const ClothIntegrator integrator = cloths_[c]->def.integrator;
     const std::span springs(all_springs_);
@@ -232,20 +237,19 @@ void ClothSystem::integrate(Real dt) {
     if (cloths_[c]->def.integrator == ClothIntegrator::relaxed)
       for (std::size_t i = first_[c], end = i + cloths_[c]->points.size(); i < end; ++i)
         if (points_.inverse_mass[i] > 0) points_.position[i] = points_.start[i] + moves_[i];
+  for (const Held& held : held_) points_.start[held.point] = held.from;
 }
 
-/// Seams draw together evenly in their time and then hold.
-void ClothSystem::close_seams() {
-  for (const Seam& s : seams_) {
-    const Cloth& cloth = *cloths_[points_.cloth[s.a]];
-    const Real open = std::max(0.0, 1 - cloth.age / s.time);
-    const Real length = std::max(open * s.open_length, cloth.def.self_collision ? cloth.def.thickness : 0.0);
-    const Vec4 d = points_.position[s.a] - points_.position[s.b];
-    const Real now = d.norm(), mass = points_.inverse_mass[s.a] + points_.inverse_mass[s.b];
-    if (now <= length || !(mass > 0)) continue;
-    const Vec4 move = (now - length) / (now * mass) * d;
-    points_.position[s.a] -= points_.inverse_mass[s.a] * move;
-    points_.position[s.b] += points_.inverse_mass[s.b] * move;
+/// Seams draw together evenly in their time and then hold. One that was held up goes on no faster: more than
+/// the cloth beside it can follow in a sub-step would only be taken back.
+void ClothSystem::close_seams(Real dt) {
+  for (std::size_t k = 0; k < seams_.size(); ++k) {
+    const Cloth& cloth = *cloths_[seams_[k].cloth];
+    const Real closed = cloth.def.self_collision ? cloth.def.thickness : 0;
+    const Real speed = seams_[k].open_length / cloth.def.seam_time;
+    const Real now = limit_.tie_length(k, points_);
+    const Real planned = seams_[k].open_length - speed * cloth.age;
+    limit_.set_tie(k, std::max({planned, closed, now - speed * dt}));
   }
 }
 
@@ -402,12 +406,17 @@ void ClothSystem::end_substep(Real dt) {
   for (const VelocityCut& cut : cuts_) points_.velocity[cut.point] -= cut.move / dt;
 }
 
-/// Bodies feel what hangs on their pins.
+/// Bodies feel what hangs on their pins, and move by it as the points of the cloth did: by forces of the
+/// start of the sub-step at once, by those of its end from the next on, by those between half.
 void ClothSystem::pull_bodies(Real dt) {
   for (const Held& held : held_) {
     if (!held.body || !held.body->is_dynamic()) continue;
+    const ClothIntegrator integrator = cloths_[points_.cloth[held.point]]->def.integrator;
+    const Real share = integrator == ClothIntegrator::implicit ? 0
+                       : integrator == ClothIntegrator::rk4    ? 0.5
+                                                               : 1;
     const Vec4 weight = dt * points_.mass[held.point] * points_.acceleration[held.point];
-    held.body->push((points_.pull[held.point] / dt + weight).head<3>(), points_.at(held.point));
+    held.body->pull((points_.pull[held.point] / dt + weight).head<3>(), points_.at(held.point), share);
   }
 }
 

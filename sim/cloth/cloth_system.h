@@ -39,10 +39,11 @@ class ClothSystem {
     uint32_t point;
     ClothBody* body;  // null: the world
     Vec3 position;
+    Vec4 from = Vec4::Zero();  // where the sub-step began
   };
   struct Seam {
-    uint32_t a, b;
-    Real length, open_length, time;  // now, at the start [m]; in which it closes [s]
+    uint32_t cloth;
+    Real open_length;  // at the start [m]
   };
 
   void assemble();
@@ -51,7 +52,7 @@ class ClothSystem {
   void push_apart(Real dt);
   void move_held();
   void integrate(Real dt);
-  void close_seams();
+  void close_seams(Real dt);
   void touch_bodies(Real dt);
   bool find_drifts();
   void shorten_moves(Real dt, bool ends_span);

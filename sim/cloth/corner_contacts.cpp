@@ -151,7 +151,7 @@ void CornerContacts::press(ClothPoints& points, const Near& near, Real dt, std::
     if (recovered > 0) cuts.push_back({t[k], padded(w * weights[k] * recovered / total * n)});
   }
   body.touch(0);
-  body.push(-impulse / dt, p);
+  body.pull(-impulse / dt, p, 1);
 }
 
 }  // namespace offstage::sim

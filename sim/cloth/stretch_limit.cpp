@@ -26,8 +26,9 @@ Real greatest_share(const Vec4& k1, const Vec4& k2, Real longest) {
 
 }  // namespace
 
-void StretchLimit::assign(std::vector<Limit> limits, std::size_t point_count) {
+void StretchLimit::assign(std::vector<Limit> limits, std::vector<Limit> ties, std::size_t point_count) {
   limits_ = std::move(limits);
+  ties_ = std::move(ties);
   looked_in_.assign(limits_.size(), round_);
   first_at_.assign(point_count + 1, 0);
   for (const Limit& l : limits_)
@@ -63,6 +64,7 @@ bool StretchLimit::project(ClothPoints& points) const {
       if (w[l.b] == 0) points.pull[l.b] += move;
     };
     std::for_each(limits_.begin(), limits_.end(), draw);
+    std::for_each(ties_.begin(), ties_.end(), draw);
     any |= again;
   }
   return any;
@@ -77,6 +79,7 @@ bool StretchLimit::shorten_whole_moves(const ClothPoints& points, MoveShares& sh
       continue;
     look(l, points, shares, lowered);
   }
+  even_ties(points, shares, lowered);
   return !lowered.empty();
 }
 
@@ -88,7 +91,19 @@ bool StretchLimit::shorten(const ClothPoints& points, MoveShares& shares, std::v
       if (std::exchange(looked_in_[limits_at_[k]], round_) != round_)
         look(limits_[limits_at_[k]], points, shares, now);
   lowered = std::move(now);
+  even_ties(points, shares, lowered);
   return !lowered.empty();
+}
+
+void StretchLimit::even_ties(const ClothPoints& points, MoveShares& shares,
+                             std::vector<uint32_t>& lowered) const {
+  for (const Limit& t : ties_) {
+    if (shares[t.a] == shares[t.b]) continue;
+    const uint32_t ahead = shares[t.a] > shares[t.b] ? t.a : t.b;
+    if (points.inverse_mass[ahead] == 0) continue;
+    shares[ahead] = std::min(shares[t.a], shares[t.b]);
+    lowered.push_back(ahead);
+  }
 }
 
 void StretchLimit::look(const Limit& l, const ClothPoints& points, MoveShares& shares,

@@ -20,8 +20,15 @@ class StretchLimit {
     Real rest, longest;  // [m]
   };
 
-  void assign(std::vector<Limit> limits, std::size_t point_count);
+  /// Ties, as seams are, are drawn together with the limits, but no move is shortened because one is too
+  /// long: its ends make the same share of their moves, so that none opens.
+  void assign(std::vector<Limit> limits, std::vector<Limit> ties, std::size_t point_count);
   bool empty() const { return limits_.empty(); }
+  /// What a tie measured at the start of the sub-step, and the length that it may have from now on [m].
+  Real tie_length(std::size_t tie, const ClothPoints& points) const {
+    return (points.start[ties_[tie].a] - points.start[ties_[tie].b]).norm();
+  }
+  void set_tie(std::size_t tie, Real length) { ties_[tie].rest = ties_[tie].longest = length; }
 
   /// Draws together what is too long; whether anything was. It may not suffice.
   bool project(ClothPoints& points) const;
@@ -38,7 +45,9 @@ class StretchLimit {
   void look(const Limit& limit, const ClothPoints& points, MoveShares& shares,
             std::vector<uint32_t>& lowered) const;
 
-  std::vector<Limit> limits_;
+  void even_ties(const ClothPoints& points, MoveShares& shares, std::vector<uint32_t>& lowered) const;
+
+  std::vector<Limit> limits_, ties_;
   std::vector<uint32_t> limits_at_,
       first_at_;                     // of each point, one point's after another's; where they begin
   std::vector<uint32_t> looked_in_;  // the round in which each limit was looked at last

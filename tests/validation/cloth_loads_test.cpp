@@ -107,8 +107,11 @@ TEST(ClothPressure, HoldsASkinByBoylesLaw) {
   EXPECT_GT(enclosed_volume(view.points, view.triangles), 1.05 * rest);
 }
 
-TEST(ClothSeams, HoldAWeightClosed) {
-  // Two sheets, one above the other, sewn together; a body hangs on the lower one.
+class ClothSeams : public testing::TestWithParam<Real> {};
+
+TEST_P(ClothSeams, HoldAWeightClosed) {
+  // Two sheets, one above the other, sewn together; a body hangs on the lower one. By its springs alone the
+  // cloth would stretch by 0.15: a limit below that carries, and must let the seam close nevertheless.
   constexpr uint32_t kCells = 10;
   ClothDef def = effects::grid_cloth({0.5, 0.4, kCells, 8}, {}, cotton());
   const auto per_sheet = static_cast<uint32_t>(def.vertices.size());
@@ -126,7 +129,7 @@ TEST(ClothSeams, HoldAWeightClosed) {
   add_sheet(effects::grid_cloth({0.5, 0.4, kCells, 8}, {Vec3(0, 0, 0.45)}, cotton()));
   for (Vec3& v : def.vertices) v = Vec3(v.x(), 2 - v.z(), 0);  // hangs
   def.seam_time = 0.5;
-  def.max_stretch = 0;
+  def.max_stretch = def.max_shear = GetParam();
   World world;
   const BodyHandle weight =
       world.add_body({.shape = Box{{0.5, 0.05, 0.05}}, .pose = {{0, 1.32, 0}}, .mass = 1, .collides = false});
@@ -144,6 +147,86 @@ TEST(ClothSeams, HoldAWeightClosed) {
     EXPECT_LT((view.points[s.a] - view.points[s.b]).norm(), 1.05 * def.thickness);
   // And it carries: without the seam the weight had fallen by metres.
   EXPECT_GT(world.body(weight).centre.y(), 1.2);
+}
+
+INSTANTIATE_TEST_SUITE_P(Limits, ClothSeams, testing::Values(0, 1.1));
+
+/// Heights of a body in each second, lowest and highest.
+struct Swing {
+  Real lowest, highest;
+};
+std::vector<Swing> swings(World& world, BodyHandle body, int seconds) {
+  std::vector<Swing> result;
+  for (int s = 0; s < seconds; ++s) {
+    result.push_back({world.body(body).centre.y(), world.body(body).centre.y()});
+    for (int i = 0; i < 120; ++i) {
+      world.step(1.0 / 120);
+      const Real y = world.body(body).centre.y();
+      result.back() = {std::min(result.back().lowest, y), std::max(result.back().highest, y)};
+    }
+  }
+  return result;
+}
+
+/// Without what takes energy from a cloth.
+ClothDef lossless(ClothDef def) {
+  for (ClothSpring& s : def.springs) s.damping = 0;
+  def.air.density = 0;
+  def.friction = 0;
+  def.max_stretch = def.max_shear = 0;
+  return def;
+}
+
+class ClothSwing : public testing::TestWithParam<std::pair<ClothIntegrator, Real>> {};
+
+TEST_P(ClothSwing, AWeightThatBouncesOnThemGainsNoEnergy) {
+  // It swings about where it will hang, as far down as up: explicit integrators keep that, others damp it.
+  const auto [integrator, rate] = GetParam();
+  ClothDef def = lossless(effects::grid_cloth({0.5, 0.8, 10, 16}, {}, cotton()));
+  for (Vec3& v : def.vertices) v = Vec3(v.x(), 1.6 - v.z(), 0);  // hangs
+  def.integrator = integrator;
+  def.substep = 1 / rate;
+  World world;
+  const Vec3 place(0, 1.2, 0);
+  const BodyHandle weight =
+      world.add_body({.shape = Box{{0.5, 0.05, 0.05}}, .pose = {place}, .mass = 0.3, .collides = false});
+  for (uint32_t c = 0; c <= 10; ++c) {
+    const uint32_t low = 16 * 11 + c;
+    def.pins.push_back({.vertex = c, .position = def.vertices[c]});
+    def.pins.push_back({.vertex = low, .body = weight, .position = def.vertices[low] - place});
+  }
+  world.add_cloth(def);
+  const std::vector<Swing> swing = swings(world, weight, 8);
+  const Real first = swing.front().highest - swing.front().lowest;
+  const bool is_explicit = integrator == ClothIntegrator::symplectic || integrator == ClothIntegrator::rk4;
+  EXPECT_GT(first, 0.005);
+  for (const Swing& s : swing) {
+    EXPECT_LT(s.highest, 1.2 + 0.01 * first);
+    EXPECT_LT(s.highest - s.lowest, 1.01 * first);
+    EXPECT_GT(s.highest - s.lowest, is_explicit ? 0.99 * first : 0);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Integrators, ClothSwing,
+                         testing::Values(std::pair{ClothIntegrator::relaxed, 960.0},
+                                         std::pair{ClothIntegrator::relaxed, 240.0},
+                                         std::pair{ClothIntegrator::implicit, 960.0},
+                                         std::pair{ClothIntegrator::symplectic, 4000.0},
+                                         std::pair{ClothIntegrator::rk4, 4000.0}));
+
+TEST(ClothTrampoline, NeverThrowsABallHigherThanItCame) {
+  for (Real mass : {0.3, 1.0, 5.0}) {
+    ClothDef def = lossless(effects::grid_cloth({2, 2, 20, 20}, {Vec3(0, 1, 0)}, cotton()));
+    World world;
+    const BodyHandle ball = world.add_body({.shape = Sphere{0.3}, .pose = {{0, 1.31, 0}}, .mass = mass});
+    for (uint32_t i = 0; i < def.vertices.size(); ++i)
+      if (std::max(std::abs(def.vertices[i].x()), std::abs(def.vertices[i].z())) > 0.99)
+        def.pins.push_back({.vertex = i, .position = def.vertices[i]});
+    world.add_cloth(def);
+    const std::vector<Swing> swing = swings(world, ball, 8);
+    for (std::size_t s = 1; s < swing.size(); ++s)
+      EXPECT_LT(swing[s].highest, swing[s - 1].highest + 1e-4) << mass << " kg, second " << s;
+  }
 }
 
 TEST(ClothHanging, AStripHangsInACatenary) {
