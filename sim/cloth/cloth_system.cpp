@@ -257,28 +257,21 @@ void ClothSystem::close_seams(Real dt) {
 /// piece of cloth with all that it may cross the mean one if it is free, that of its pins if one body holds
 /// them all; none if it is near another body. Whether any move.
 bool ClothSystem::find_drifts() {
-  struct Frame {
-    bool rests = false;  // in the world
-    const ClothBody* holder = nullptr;
-    Vec4 sum = Vec4::Zero();
-    Real mass = 0;
-  };
-  std::vector<Frame> frames(pieces_.count());
-  const auto frame_of = [&](uint32_t i) -> Frame& { return frames[pieces_.of(i)]; };
-  const auto add = [&](uint32_t i) {
-    Frame& frame = frame_of(i);
-    frame.sum += points_.mass[i] * (points_.position[i] - points_.start[i]);
-    frame.mass += points_.mass[i];
-  };
   pieces_.forget();
   self_contacts_.for_doubtful([&](const auto& p) { pieces_.join(p[0], p[3]); });
+  frames_.assign(pieces_.count(), {});
+  const auto add = [&](uint32_t i) {
+    Frame& frame = frame_of(i);
+    frame.move += points_.mass[i] * (points_.position[i] - points_.start[i]);
+    frame.mass += points_.mass[i];
+  };
   for (const Held& held : held_) {
     Frame& frame = frame_of(held.point);
     frame.rests |= !held.body || (frame.holder && frame.holder != held.body);
     frame.holder = held.body;
     add(held.point);
   }
-  const auto all_rest = [&] { return std::ranges::all_of(frames, &Frame::rests); };
+  const auto all_rest = [&] { return std::ranges::all_of(frames_, &Frame::rests); };
   if (all_rest()) return false;
   for (uint32_t i = 0; i < points_.size(); ++i) {
     Frame& frame = frame_of(i);
@@ -287,10 +280,10 @@ bool ClothSystem::find_drifts() {
     if (!frame.holder) add(i);
   }
   if (all_rest()) return false;
-  for (uint32_t i = 0; i < points_.size(); ++i) {
-    const Frame& frame = frame_of(i);
-    if (!frame.rests) drift_[i] = frame.sum / frame.mass;
-  }
+  for (Frame& frame : frames_)
+    if (!frame.rests) frame.move /= frame.mass;
+  for (uint32_t i = 0; i < points_.size(); ++i)
+    if (!frame_of(i).rests) drift_[i] = frame_of(i).move;
   return true;
 }
 
@@ -299,46 +292,84 @@ bool ClothSystem::find_drifts() {
 void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   const bool self = ends_span && !self_contacts_.empty();
   if (limit_.empty() && !self) return;
-  if (self) points_.start.swap(span_start_);  // the moves of the whole span
+  if (self) points_.start.swap(span_start_);                           // the moves of the whole span
+  const std::vector<Vec4>& from = self ? span_start_ : points_.start;  // of the sub-step
   const auto find_doubtful = [&] {
     self ? self_contacts_.find_doubtful(points_, span_ * dt, kHorizon, drift_) : self_contacts_.find_none();
   };
-  shortened_.assign(points_.size(), 0);
+  shortened_.assign(points_.size(), kWhole);
   find_doubtful();
-  bool look = true, any = false;
+  bool any = false, any_in_piece = false;
   if (find_drifts()) {
+    add_momenta(1, from, dt);
     find_doubtful();
-    const auto shift = [&](Real sign) {
-      for (std::size_t i = 0; i < points_.size(); ++i) points_.start[i] += sign * drift_[i];
-    };
-    shift(1);
-    any = shorten_doubtful();
-    shift(-1);
-    look = any && self;
+    any = any_in_piece = shorten_in_pieces();
     self_contacts_.take_crossed();  // in the world's frame nothing has to
     drift_.assign(points_.size(), Vec4::Zero());
-    if (look) find_doubtful();
+    if (any && self) find_doubtful();
+    if (any && self) shorten_doubtful(kInWorld);
+  } else {
+    any = shorten_doubtful(kInWorld);
   }
-  if (look) any |= shorten_doubtful();
   for (uint32_t i : self_contacts_.take_crossed()) ++cloths_[points_.cloth[i]]->report.crossings;
   for (std::size_t i = 0; any && i < points_.size(); ++i) {
-    if (!shortened_[i]) continue;
+    if (shortened_[i] == kWhole) continue;
     ++cloths_[points_.cloth[i]]->report.limited;
     // Its velocity is that of the shortened move, which in a span is not that of the last sub-step.
     if (self)
-      kick_[i] = (points_.position[i] - points_.start[i]) / (span_ * dt) -
-                 (points_.position[i] - span_start_[i]) / dt;
+      kick_[i] =
+          (points_.position[i] - points_.start[i]) / (span_ * dt) - (points_.position[i] - from[i]) / dt;
+  }
+  if (self) std::erase_if(cuts_, [&](const VelocityCut& cut) { return shortened_[cut.point] != kWhole; });
+  if (any_in_piece) {
+    add_momenta(-1, from, dt);
+    give_momenta_back();
   }
   if (self) {
-    std::erase_if(cuts_, [&](const VelocityCut& cut) { return shortened_[cut.point] != 0; });
     self_contacts_.end_substep(points_, span_ * dt);
     points_.start.swap(span_start_);
   }
   stop_bodies();
 }
 
-/// Shortens moves from where points started; whether any.
-bool ClothSystem::shorten_doubtful() {
+/// In the frames of the pieces; whether any. A free piece goes on as a whole as it would have: what is held
+/// back within it is inner forces' doing.
+bool ClothSystem::shorten_in_pieces() {
+  const auto shift_starts = [&](Real sign) {
+    for (std::size_t i = 0; i < points_.size(); ++i) points_.start[i] += sign * drift_[i];
+  };
+  shift_starts(1);
+  const bool any = shorten_doubtful(kInPiece);
+  shift_starts(-1);
+  if (!any) return false;
+  for (uint32_t i = 0; i < points_.size(); ++i) {
+    Frame& frame = frame_of(i);
+    frame.move -= points_.mass[i] / frame.mass * (points_.position[i] - points_.start[i]);
+  }
+  for (uint32_t i = 0; i < points_.size(); ++i)
+    if (frame_of(i).is_free()) points_.position[i] += frame_of(i).move;
+  return true;
+}
+
+/// Adds (or takes, with the sign) the momenta of free pieces at the end of the sub-step that began at `from`.
+void ClothSystem::add_momenta(Real sign, std::span<const Vec4> from, Real dt) {
+  for (uint32_t i = 0; i < points_.size(); ++i)
+    frame_of(i).momentum += sign * points_.mass[i] * ((points_.position[i] - from[i]) / dt + kick_[i]);
+  for (const VelocityCut& cut : cuts_)
+    frame_of(cut.point).momentum -= sign * points_.mass[cut.point] / dt * cut.move;
+}
+
+/// What pieces lost by shortening in their own frames. What the world's frame took is lost to what they met.
+void ClothSystem::give_momenta_back() {
+  for (uint32_t i = 0; i < points_.size(); ++i) frame_of(i).met |= shortened_[i] == kInWorld;
+  for (uint32_t i = 0; i < points_.size(); ++i) {
+    const Frame& frame = frame_of(i);
+    if (frame.is_free() && !frame.met) kick_[i] += frame.momentum / frame.mass;
+  }
+}
+
+/// Shortens moves from where points started; whether any. Notes `how` of the points.
+bool ClothSystem::shorten_doubtful(Shortened how) {
   shares_.assign(points_.size(), 1);
   bool again = true, any = false;
   for (int round = 0; again && round < kMaxRounds; ++round) {
@@ -354,7 +385,7 @@ bool ClothSystem::shorten_doubtful() {
     const Real share = again ? 0 : shares_[i];
     if (share == 1 || !(points_.inverse_mass[i] > 0)) continue;
     points_.position[i] = points_.start[i] + share * (points_.position[i] - points_.start[i]);
-    shortened_[i] = 1;
+    shortened_[i] = how;
     any = true;
   }
   return any;

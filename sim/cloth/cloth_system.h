@@ -41,6 +41,18 @@ class ClothSystem {
     Vec3 position;
     Vec4 from = Vec4::Zero();  // where the sub-step began
   };
+  /// In which frame a point's move was shortened.
+  enum Shortened : uint8_t { kWhole, kInPiece, kInWorld };
+  /// Of a piece of cloth with all that it may cross, in which its moves are shortened.
+  struct Frame {
+    bool rests = false;  // in the world
+    bool met = false;    // what is not of the piece, in the world's frame
+    const ClothBody* holder = nullptr;
+    Vec4 move = Vec4::Zero(), momentum = Vec4::Zero();  // of its points, or of its pins; of a free piece
+    Real mass = 0;                                      // of the same
+
+    bool is_free() const { return !rests && !holder; }
+  };
   struct Seam {
     uint32_t cloth;
     Real open_length;  // at the start [m]
@@ -56,7 +68,11 @@ class ClothSystem {
   void touch_bodies(Real dt);
   bool find_drifts();
   void shorten_moves(Real dt, bool ends_span);
-  bool shorten_doubtful();
+  bool shorten_in_pieces();
+  bool shorten_doubtful(Shortened how);
+  void add_momenta(Real sign, std::span<const Vec4> from, Real dt);
+  void give_momenta_back();
+  Frame& frame_of(uint32_t point) { return frames_[pieces_.of(point)]; }
   void stop_bodies();
   std::vector<ClothBody*> holders(std::size_t cloth) const;
   std::vector<Real> recoils() const;
@@ -90,7 +106,8 @@ class ClothSystem {
   ClothPieces pieces_;
   std::vector<Vec4> drift_;  // the move of the frame in which each point's move is shortened
   MoveShares shares_;
-  std::vector<uint8_t> shortened_;  // whether a point's move was, in the sub-step
+  std::vector<Frame> frames_;       // of the pieces
+  std::vector<uint8_t> shortened_;  // how a point's move was, in the sub-step
   std::vector<uint32_t> lowered_;   // points whose shares were lowered in a round
   std::span<ClothBody> bodies_;
 };
