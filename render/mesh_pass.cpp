@@ -35,6 +35,23 @@ const Image* texture_at(std::span<const Image> textures, int index) {
              : nullptr;
 }
 
+/// The greatest slope of a surface with this pattern, but for the edges of its stones; none if it is more
+/// than mirrors can be told from.
+std::optional<float> unevenness_of(Pattern pattern) {
+  switch (pattern) {
+    case Pattern::none:
+    case Pattern::checker:
+    case Pattern::grid:
+    case Pattern::stripes:
+    case Pattern::gingham:
+      return 0.0f;
+    case Pattern::paving:
+      return 0.05f;
+    default:
+      return std::nullopt;
+  }
+}
+
 /// Whether each edge is passed through once in either direction; corners count as one where they coincide.
 bool is_closed(const Mesh& mesh) {
   const auto bits = [](float x) { return std::bit_cast<uint32_t>(x + 0.0f); };  // -0 is 0
@@ -83,12 +100,16 @@ GpuMesh::GpuMesh(const Mesh& source) : vertex_array(gl::make_vertex_array()) {
   for (std::size_t i = 0; i < packed.size(); ++i) {
     packed[i] = {mesh->positions[i], mesh->normals[i], mesh->uvs.empty() ? Vector2f(0, 0) : mesh->uvs[i]};
   }
-  const Eigen::AlignedBox3f box = mesh->bounds();
+  box = mesh->bounds();
   center = box.isEmpty() ? Vector3f(0, 0, 0) : Vector3f(box.center());
   for (const Vector3f& p : mesh->positions) radius = std::max(radius, (p - center).norm());
   thickness = box.isEmpty() ? 0 : box.sizes().minCoeff();
   closed = is_closed(*mesh);
-  flat = !box.isEmpty() && box.sizes().minCoeff() <= 1e-4f * box.sizes().maxCoeff();
+  if (!box.isEmpty()) {
+    Eigen::Index axis = 0;
+    flat = box.sizes().minCoeff(&axis) <= 1e-4f * box.sizes().maxCoeff();
+    flat_normal = Vector3f::Unit(axis);
+  }
 
   index_count = static_cast<GLsizei>(mesh->indices.size());
   if (index_count == 0) return;
@@ -213,6 +234,8 @@ void MeshPass::prepare(std::span<const Instance* const> instances, const View& v
       out.push_back(rows_of(instance.world_from_mesh));
     }
   };
+  seen_.clear();
+  for (const Item& item : seen) seen_.push_back(item.instance);
   append(seen, true, rows, opaque_);
   append(glass, false, rows, glass_);
   append(see_through, false, rows, blended_);
@@ -322,20 +345,70 @@ bool MeshPass::mirrors(const Batch& batch) {
          (batch.material->metal || batch.mesh->flat || batch.mesh->index_count <= kFewIndices);
 }
 
-bool MeshPass::has_mirrors() const {
-  return std::ranges::any_of(opaque_, mirrors);
+Eigen::AlignedBox2f MeshPass::mirrored_area(const Batch& batch, const View& view, float reach,
+                                            std::span<const Eigen::AlignedBox3f> others) const {
+  const Eigen::AlignedBox2f all(Vector2f(-1, -1), Vector2f(1, 1));
+  const std::optional<float> unevenness = unevenness_of(batch.material->pattern);
+  if (!batch.mesh->flat || batch.count > 1 || !unevenness) return all;
+  const Instance& mirror = *seen_[batch.first];
+  const Vector3f normal =
+      (mirror.world_from_mesh.linear().inverse().transpose() * batch.mesh->flat_normal).normalized();
+  const Vector3f place = mirror.world_from_mesh * batch.mesh->center;
+  // Rays leave the mirrored direction by twice the slope, and by what roughness spreads them.
+  const float margin = (2 * *unevenness + 0.5f * kSmooth * kSmooth) * reach;
+  Eigen::AlignedBox2f area;
+  const auto add = [&](const Vector3f& corner) {
+    const Vector3f image = corner - 2 * normal.dot(corner - place) * normal;
+    const float depth = view.depth_of(image);
+    if (depth - margin <= view.near_m) {
+      area = all;
+      return;
+    }
+    for (const float nearness : {depth - margin, depth + margin})
+      for (const float side : {-margin, margin}) {
+        const Vector2f across(view.right.dot(image - view.eye) + side, view.up.dot(image - view.eye) + side);
+        area.extend(view.shear + across.cwiseQuotient(view.tan_half) / nearness);
+      }
+  };
+  const auto add_box = [&](const Eigen::AlignedBox3f& box, const Eigen::Affine3f& world_from_box) {
+    for (int k = 0; k < 8; ++k)
+      add(world_from_box * box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k)));
+  };
+  for (const Instance* instance : seen_)
+    if (instance != &mirror) add_box(instance->mesh->box, instance->world_from_mesh);
+  for (const Eigen::AlignedBox3f& box : others) add_box(box, Eigen::Affine3f::Identity());
+  return area.intersection(all);
+}
+
+bool MeshPass::find_mirrors(const View& view, float reach, std::span<const Eigen::AlignedBox3f> others,
+                            int width_px, int height_px) {
+  mirrors_.clear();
+  const Vector2f half_size(0.5f * static_cast<float>(width_px), 0.5f * static_cast<float>(height_px));
+  for (const Batch& batch : opaque_) {
+    if (!mirrors(batch)) continue;
+    const Eigen::AlignedBox2f area = mirrored_area(batch, view, reach, others);
+    if (area.isEmpty()) continue;
+    const auto pixel = [&](const Vector2f& p) {
+      return (p + Vector2f::Ones()).cwiseProduct(half_size).eval();
+    };
+    mirrors_.push_back({&batch, Eigen::AlignedBox2i(pixel(area.min()).array().floor().cast<int>(),
+                                                    pixel(area.max()).array().ceil().cast<int>())});
+  }
+  return !mirrors_.empty();
 }
 
 void MeshPass::draw_mirrors(float reach) {
-  for (const Batch& batch : opaque_) {
-    if (!mirrors(batch)) continue;
-    surface_program(*batch.material, true).use();
+  glEnable(GL_SCISSOR_TEST);
+  for (const auto& [batch, area] : mirrors_) {
+    surface_program(*batch->material, true).use();
     glUniform1f(0, 0);
     glUniform2f(2, reach, kMirrorSteps);
-    set_facing(batch, batch.material->two_sided);
-    bind(*batch.material);
-    draw(batch, rows_);
+    set_facing(*batch, batch->material->two_sided);
+    bind(*batch->material);
+    glScissor(area.min().x(), area.min().y(), area.sizes().x(), area.sizes().y());
+    draw(*batch, rows_);
   }
+  glDisable(GL_SCISSOR_TEST);
 }
 
 void MeshPass::draw_glass() {

@@ -22,10 +22,12 @@ struct GpuMesh {
   gl::VertexArray vertex_array;
   GLsizei index_count = 0;
   GLsizei coarse_count = 0;  ///< of the indices behind those, of Mesh::coarse_indices
-  Vector3f center;           ///< of the bounding ball
+  Eigen::AlignedBox3f box;
+  Vector3f center;  ///< of the bounding ball
   float radius = 0;
   float thickness = 0;  ///< the least side of the box around it
   bool flat = false;    ///< lies in a plane along an axis
+  Vector3f flat_normal = {0, 0, 0};
   bool closed = false;  ///< every edge has a triangle on either side, so that the front hides the back
 };
 
@@ -81,9 +83,12 @@ class MeshPass {
   void draw_opaque();
   bool has_opaque() const { return !opaque_.empty(); }
   bool has_glass() const { return !glass_.empty(); }
-  bool has_mirrors() const;
-  /// What surfaces mirror of the scene, to be added to the picture, which is bound with its depth. `reach`:
-  /// how far away things are looked for [m].
+  /// Finds the surfaces that mirror something of the scene, and where in a picture of a size; false if there
+  /// are none. `reach`: how far away things are looked for [m]. `others`: boxes around what is opaque besides
+  /// the instances.
+  bool find_mirrors(const View& view, float reach, std::span<const Eigen::AlignedBox3f> others, int width_px,
+                    int height_px);
+  /// What those mirror, to be added to the picture, which is bound with its depth.
   void draw_mirrors(float reach);
   /// Back to front, over a picture that is also bound to be seen through them.
   void draw_glass();
@@ -107,6 +112,8 @@ class MeshPass {
   gl::LazyProgram& shadow_program(const GpuMaterial& material);
   static void set_facing(const Batch& batch, bool both_sides);
   static bool mirrors(const Batch& batch);
+  Eigen::AlignedBox2f mirrored_area(const Batch& batch, const View& view, float reach,
+                                    std::span<const Eigen::AlignedBox3f> others) const;
 
   std::map<std::tuple<Pattern, bool, bool, bool, Features>, gl::LazyProgram>
       surface_programs_;  ///< textured, glass, mirror
@@ -115,6 +122,12 @@ class MeshPass {
   gl::Texture white_;
   gl::StreamBuffer rows_, shadow_rows_;
   std::vector<Batch> opaque_, glass_, blended_, casters_;
+  std::vector<const Instance*> seen_;  ///< opaque ones, by rows
+  struct Mirror {
+    const Batch* batch;
+    Eigen::AlignedBox2i area_px;
+  };
+  std::vector<Mirror> mirrors_;
 };
 
 }  // namespace offstage::render

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "render/shadow_map.h"
@@ -48,14 +49,15 @@ class SceneShadow {
     const Vector3f p = texel_of(place);
     const int x = static_cast<int>(std::floor(p.x())) - x0_, y = static_cast<int>(std::floor(p.y())) - y0_;
     if (x < 0 || y < 0 || x >= width_ || y >= height_) return 1;
-    return std::clamp(p.z(), 0.0f, 1.0f) <= depths_[static_cast<std::size_t>(y * width_ + x)] ? 1.0f : 0.0f;
+    const auto depth = static_cast<float>(depths_[static_cast<std::size_t>(y * width_ + x)]);
+    return std::clamp(p.z(), 0.0f, 1.0f) * 65535 <= depth + 0.5f ? 1.0f : 0.0f;
   }
 
   Eigen::Matrix<float, 3, 4> map_from_world_ = Eigen::Matrix<float, 3, 4>::Identity();
   float size_px_ = 0;
   int x0_ = 0, y0_ = 0, width_ = 0, height_ = 0;
   bool lit_ = true;
-  std::vector<float> depths_;
+  std::vector<uint16_t> depths_;
 };
 
 }  // namespace offstage::render

@@ -133,10 +133,20 @@ void ShadowMap::end() const {
   glBindSampler(kPlainUnit, plain_);
 }
 
-void ShadowMap::read(int x, int y, int width, int height, std::vector<float>& depths) const {
-  depths.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+void ShadowMap::read(int x, int y, int width, int height, std::vector<uint16_t>& depths) const {
+  constexpr int kRows = 32;  // at once
+  const auto row = static_cast<std::size_t>(width), size = row * static_cast<std::size_t>(height);
+  if (depths.capacity() < size) depths = {};  // no room for both
+  depths.resize(size);
+  std::vector<float> strip(row * kRows);
   glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_);
-  glReadPixels(x, y, width, height, GL_DEPTH_COMPONENT, GL_FLOAT, depths.data());
+  for (int first = 0; first < height; first += kRows) {
+    const int rows = std::min(kRows, height - first);
+    glReadPixels(x, y + first, width, rows, GL_DEPTH_COMPONENT, GL_FLOAT, strip.data());
+    uint16_t* out = depths.data() + static_cast<std::size_t>(first) * row;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(rows) * row; ++i)
+      out[i] = static_cast<uint16_t>(strip[i] * 65535.0f + 0.5f);
+  }
 }
 
 }  // namespace offstage::render

@@ -3,6 +3,7 @@
 /// shadow anything, so no texel is spent on the far horizon; it sits on a grid of whole texels and its size
 /// goes in steps, so that shadows do not swim when the camera or things move.
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -44,8 +45,8 @@ class ShadowMap {
   void begin() const;
   /// Ends drawing and leaves the map bound for shading.
   void end() const;
-  /// Depths of a rectangle of texels, row by row, for what is lit on the CPU.
-  void read(int x, int y, int width, int height, std::vector<float>& depths) const;
+  /// Depths of a rectangle of texels, row by row, for what is lit on the CPU; 65535 is 1.
+  void read(int x, int y, int width, int height, std::vector<uint16_t>& depths) const;
 
  private:
   int size_px_;

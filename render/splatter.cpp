@@ -25,13 +25,11 @@ struct TileRange {
 };
 
 template <class S>
-TileRange tiles_of(const S& s, const SplatPicture& picture) {
+TileRange tiles_of(const S& s, int nx, int ny) {
   const auto tile = [](float at, int size_px, int limit) {
     return static_cast<int>(
         std::clamp(std::floor(at / static_cast<float>(size_px)), -1.0f, static_cast<float>(limit)));
   };
-  const int nx = (picture.width_px + kTileWidth_px - 1) / kTileWidth_px;
-  const int ny = (picture.height_px + kTileHeight_px - 1) / kTileHeight_px;
   return {std::max(tile(s.x - s.half_x, kTileWidth_px, nx), 0),
           std::max(tile(s.y - s.half_y, kTileHeight_px, ny), 0),
           std::min(tile(s.x + s.half_x, kTileWidth_px, nx) + 1, nx),
@@ -105,11 +103,11 @@ inline void draw_lanes(const StreakSplat& s, float dx, float dy, std::size_t at,
   // Fresnel's reflection by Schlick's approximation.
   const Lanes side = clamped(across, -1, 1);
   const Lanes m = 1 - square_root(1 - side * side), m2 = m * m;
+  const StreakLight& light = *s.light;
   const Lanes mirrored = 0.02f + 0.98f * (m2 * m2 * m);
   const auto add_light = [&](std::array<float, kTilePixels>& plane, std::size_t c) {
     lanes_of(plane, at) +=
-        seen *
-        (s.light.middle[c] + mirrored * (s.light.rim[c] + s.light.rim_slope[c] * side - s.light.middle[c]));
+        seen * (light.middle[c] + mirrored * (light.rim[c] + light.rim_slope[c] * side - light.middle[c]));
   };
   add_light(tile.red, 0);
   add_light(tile.green, 1);
@@ -162,23 +160,11 @@ bool is_covered(const Tile& tile) {
   return *std::max_element(most.begin(), most.end()) < kHidden;
 }
 
+/// Draws into a tile whose depths are set; `farthest` is the greatest of them.
 template <class S>
 void draw_tile(std::span<const S> splats, std::span<const uint32_t> order, int tile_x, int tile_y,
-               SplatPicture& picture) {
-  Tile tile;
-  const int width = std::min(kTileWidth_px, picture.width_px - tile_x);
-  const int height = std::min(kTileHeight_px, picture.height_px - tile_y);
-  float farthest = 0;
-  for (int y = 0; y < height; ++y) {
-    const float* in =
-        picture.depth.data() + static_cast<std::ptrdiff_t>(tile_y + y) * picture.width_px + tile_x;
-    for (int x = 0; x < width; ++x) {
-      const auto at = static_cast<std::size_t>(y * kTileWidth_px + x);
-      tile.depth[at] = in[x];
-      tile.through[at] = 1;
-      farthest = std::max(farthest, in[x]);
-    }
-  }
+               float farthest, Tile& tile) {
+  tile.through.fill(1);
   int since_check = 0;
   constexpr std::size_t kAhead = 4;
   for (std::size_t k = 0; k < order.size(); ++k) {
@@ -190,69 +176,126 @@ void draw_tile(std::span<const S> splats, std::span<const uint32_t> order, int t
     since_check = 0;
     if (is_covered(tile)) break;
   }
-  for (int y = 0; y < height; ++y) {
-    float* out =
-        picture.rgbt.data() + (static_cast<std::ptrdiff_t>(tile_y + y) * picture.width_px + tile_x) * 4;
-    for (int x = 0; x < width; ++x, out += 4) {
-      const auto at = static_cast<std::size_t>(y * kTileWidth_px + x);
-      out[0] = tile.red[at];
-      out[1] = tile.green[at];
-      out[2] = tile.blue[at];
-      out[3] = tile.through[at];
-    }
-  }
 }
 
 template <class S>
-void draw_by_tiles(std::span<const S> splats, SplatPicture& picture) {
-  picture.x0 = picture.y0 = picture.x1 = picture.y1 = 0;
-  const int nx = (picture.width_px + kTileWidth_px - 1) / kTileWidth_px;
-  const int ny = (picture.height_px + kTileHeight_px - 1) / kTileHeight_px;
-  const auto pixels =
-      static_cast<std::size_t>(picture.width_px) * static_cast<std::size_t>(picture.height_px);
-  picture.rgbt.resize(4 * pixels);
-
-  std::vector<TileRange> ranges(splats.size());
-  std::vector<uint32_t> begins(static_cast<std::size_t>(nx * ny) + 1, 0);
+void sort_by_tiles(std::span<const S> splats, int width_px, int height_px, SplatTiles& tiles) {
+  const int nx = tiles.columns = (width_px + kTileWidth_px - 1) / kTileWidth_px;
+  const int ny = tiles.rows = (height_px + kTileHeight_px - 1) / kTileHeight_px;
+  tiles.begins.assign(static_cast<std::size_t>(nx * ny) + 1, 0);
   TileRange touched{nx, ny, 0, 0};
-  for (std::size_t i = 0; i < splats.size(); ++i) {
-    const TileRange r = ranges[i] = tiles_of(splats[i], picture);
+  for (const S& s : splats) {
+    const TileRange r = tiles_of(s, nx, ny);
     for (int y = r.y0; y < r.y1; ++y)
-      for (int x = r.x0; x < r.x1; ++x) ++begins[static_cast<std::size_t>(y * nx + x) + 1];
+      for (int x = r.x0; x < r.x1; ++x) ++tiles.begins[static_cast<std::size_t>(y * nx + x) + 1];
     if (r.x0 < r.x1 && r.y0 < r.y1)
       touched = {std::min(touched.x0, r.x0), std::min(touched.y0, r.y0), std::max(touched.x1, r.x1),
                  std::max(touched.y1, r.y1)};
   }
-  if (touched.x0 >= touched.x1) return;
-  for (std::size_t t = 1; t < begins.size(); ++t) begins[t] += begins[t - 1];
-  std::vector<uint32_t> orders(begins.back()), ends(begins.begin(), begins.end() - 1);
-  for (uint32_t i = 0; i < splats.size(); ++i)
-    for (int y = ranges[i].y0; y < ranges[i].y1; ++y)
-      for (int x = ranges[i].x0; x < ranges[i].x1; ++x)
-        orders[ends[static_cast<std::size_t>(y * nx + x)]++] = i;
+  if (touched.x0 >= touched.x1) touched = {0, 0, 0, 0};
+  tiles.x0 = touched.x0;
+  tiles.y0 = touched.y0;
+  tiles.x1 = touched.x1;
+  tiles.y1 = touched.y1;
+  for (std::size_t t = 1; t < tiles.begins.size(); ++t) tiles.begins[t] += tiles.begins[t - 1];
+  tiles.order.resize(tiles.begins.back());
+  std::vector<uint32_t> ends(tiles.begins.begin(), tiles.begins.end() - 1);
+  for (uint32_t i = 0; i < splats.size(); ++i) {
+    const TileRange r = tiles_of(splats[i], nx, ny);
+    for (int y = r.y0; y < r.y1; ++y)
+      for (int x = r.x0; x < r.x1; ++x) tiles.order[ends[static_cast<std::size_t>(y * nx + x)]++] = i;
+  }
+}
 
-  const int columns = touched.x1 - touched.x0, rows = touched.y1 - touched.y0;
-  tbb::parallel_for(0, columns * rows, [&](int k) {
-    const int x = touched.x0 + k % columns, y = touched.y0 + k / columns;
-    const auto t = static_cast<std::size_t>(y * nx + x);
-    draw_tile(splats, std::span<const uint32_t>(orders).subspan(begins[t], begins[t + 1] - begins[t]),
-              x * kTileWidth_px, y * kTileHeight_px, picture);
-  });
-  picture.x0 = touched.x0 * kTileWidth_px;
-  picture.y0 = touched.y0 * kTileHeight_px;
-  picture.x1 = std::min(touched.x1 * kTileWidth_px, picture.width_px);
-  picture.y1 = std::min(touched.y1 * kTileHeight_px, picture.height_px);
+/// Calls f(i, at) for every pixel of a tile with its number in the picture's rows and its place in the tile.
+template <class F>
+void for_each_pixel(int x0, int y0, int width_px, int height_px, F&& f) {
+  const int width = std::min(kTileWidth_px, width_px - x0), height = std::min(kTileHeight_px, height_px - y0);
+  for (int y = 0; y < height; ++y) {
+    const auto row =
+        static_cast<std::size_t>(y0 + y) * static_cast<std::size_t>(width_px) + static_cast<std::size_t>(x0);
+    for (int x = 0; x < width; ++x)
+      f(row + static_cast<std::size_t>(x), static_cast<std::size_t>(y * kTileWidth_px + x));
+  }
 }
 
 }  // namespace
 
+std::span<const uint32_t> SplatTiles::of(int x, int y) const {
+  const auto t = static_cast<std::size_t>(y * columns + x);
+  return std::span(order).subspan(begins[t], begins[t + 1] - begins[t]);
+}
+
 void draw_splats(std::span<const Splat> front_to_back, SplatPicture& picture) {
   std::vector<Splat> splats(front_to_back.size());
   std::ranges::transform(front_to_back, splats.begin(), in_bytes);
-  draw_by_tiles(std::span<const Splat>(splats), picture);
+  const auto pixels =
+      static_cast<std::size_t>(picture.width_px) * static_cast<std::size_t>(picture.height_px);
+  picture.rgbt.resize(4 * pixels);
+  SplatTiles tiles;
+  sort_by_tiles(std::span<const Splat>(splats), picture.width_px, picture.height_px, tiles);
+  const int columns = tiles.x1 - tiles.x0, rows = tiles.y1 - tiles.y0;
+  tbb::parallel_for(0, columns * rows, [&](int k) {
+    const int tile_x = tiles.x0 + k % columns, tile_y = tiles.y0 + k / columns;
+    const int x = tile_x * kTileWidth_px, y = tile_y * kTileHeight_px;
+    Tile tile;
+    float farthest = 0;
+    for_each_pixel(x, y, picture.width_px, picture.height_px, [&](std::size_t i, std::size_t at) {
+      tile.depth[at] = picture.depth[i];
+      farthest = std::max(farthest, picture.depth[i]);
+    });
+    draw_tile(std::span<const Splat>(splats), tiles.of(tile_x, tile_y), x, y, farthest, tile);
+    for_each_pixel(x, y, picture.width_px, picture.height_px, [&](std::size_t i, std::size_t at) {
+      float* out = picture.rgbt.data() + 4 * i;
+      out[0] = tile.red[at];
+      out[1] = tile.green[at];
+      out[2] = tile.blue[at];
+      out[3] = tile.through[at];
+    });
+  });
+  picture.x0 = tiles.x0 * kTileWidth_px;
+  picture.y0 = tiles.y0 * kTileHeight_px;
+  picture.x1 = std::min(tiles.x1 * kTileWidth_px, picture.width_px);
+  picture.y1 = std::min(tiles.y1 * kTileHeight_px, picture.height_px);
 }
-void draw_splats(std::span<const StreakSplat> front_to_back, SplatPicture& picture) {
-  draw_by_tiles(front_to_back, picture);
+
+void StreakBands::sort(std::span<const StreakSplat> front_to_back, int width_px, int height_px) {
+  static_assert(kRows % kTileHeight_px == 0);
+  streaks_ = front_to_back;
+  width_px_ = width_px;
+  sort_by_tiles(streaks_, width_px, height_px, tiles_);
+}
+
+bool StreakBands::touches(int bottom) const {
+  return !tiles_.empty() && bottom < tiles_.y1 * kTileHeight_px &&
+         bottom + kRows > tiles_.y0 * kTileHeight_px;
+}
+
+void StreakBands::lay_over(int bottom, int rows, std::span<const float> depth,
+                           const Eigen::Vector2f& distance, std::span<float> rgba) const {
+  const int columns = tiles_.x1 - tiles_.x0, first_row = bottom / kTileHeight_px;
+  const int tile_rows = (rows + kTileHeight_px - 1) / kTileHeight_px;
+  tbb::parallel_for(0, columns * tile_rows, [&](int k) {
+    const int tile_x = tiles_.x0 + k % columns, row = k / columns;
+    const std::span<const uint32_t> order = tiles_.of(tile_x, first_row + row);
+    if (order.empty()) return;
+    const int x = tile_x * kTileWidth_px, y = row * kTileHeight_px;
+    Tile tile;
+    float farthest = 0;
+    for_each_pixel(x, y, width_px_, rows, [&](std::size_t i, std::size_t at) {
+      tile.depth[at] = distance.x() / (depth[i] + distance.y());
+      farthest = std::max(farthest, tile.depth[at]);
+    });
+    draw_tile(streaks_, order, x, bottom + y, farthest, tile);
+    for_each_pixel(x, y, width_px_, rows, [&](std::size_t i, std::size_t at) {
+      float* out = rgba.data() + 4 * i;
+      const float through = tile.through[at];
+      out[0] = tile.red[at] + through * out[0];
+      out[1] = tile.green[at] + through * out[1];
+      out[2] = tile.blue[at] + through * out[2];
+      out[3] = 1 - through * (1 - out[3]);
+    });
+  });
 }
 
 }  // namespace offstage::render

@@ -3,8 +3,11 @@
 /// those in front cover a tile, those behind are not touched. llvmpipe needs several times as long for the
 /// same, since every quad goes through its vertex shader and set-up on one thread.
 
+#include <cstdint>
 #include <span>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "render/puff_atlas.h"
 
@@ -39,7 +42,7 @@ struct StreakSplat {
   float inverse_reach;                ///< 1 / (2 * radius) [1/m]
   float opacity, cover;               ///< as of a Splat
   float softness, taper;              ///< as in PointsDef
-  StreakLight light;
+  const StreakLight* light;
 };
 
 /// What splats are drawn in. Premultiplied colour, and the share of what is behind that still shows.
@@ -52,8 +55,38 @@ struct SplatPicture {
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 };
 
+/// Which splats touch each tile of a picture, in their order.
+struct SplatTiles {
+  int columns = 0, rows = 0;
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;  ///< rectangle of tiles that any touches
+  std::vector<uint32_t> begins;        ///< of each tile's splats in `order`, by rows; then the end
+  std::vector<uint32_t> order;
+
+  bool empty() const { return x0 >= x1; }
+  std::span<const uint32_t> of(int x, int y) const;
+};
+
 /// `front_to_back`: the order matters. The result does not depend on the number of threads.
 void draw_splats(std::span<const Splat> front_to_back, SplatPicture& picture);
-void draw_splats(std::span<const StreakSplat> front_to_back, SplatPicture& picture);
+
+/// Streaks over a picture that is there by bands alone, as it is read back: it needs no other of its size.
+class StreakBands {
+ public:
+  static constexpr int kRows = 32;  ///< of a band [px]
+
+  /// Finds what each tile has to draw. The streaks must stay where they are.
+  void sort(std::span<const StreakSplat> front_to_back, int width_px, int height_px);
+  bool touches(int bottom) const;
+  /// Lays streaks over a band of `rows` rows, `bottom` being a multiple of kRows. `depth`, one a pixel: of
+  /// the depth buffer, the distance along the view axis being x / (depth + y) of `distance`. `rgba`:
+  /// premultiplied.
+  void lay_over(int bottom, int rows, std::span<const float> depth, const Eigen::Vector2f& distance,
+                std::span<float> rgba) const;
+
+ private:
+  std::span<const StreakSplat> streaks_;
+  int width_px_ = 0;
+  SplatTiles tiles_;
+};
 
 }  // namespace offstage::render

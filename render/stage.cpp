@@ -22,7 +22,6 @@ namespace offstage::render {
 namespace {
 
 constexpr GLuint kFrameBlock = 0, kSceneDepthUnit = 4, kBehindUnit = 12;
-constexpr int kStrip_px = 32;         // rows that are read back at once: they stay in the processor's cache
 constexpr float kMirrorReach = 0.6f;  // how far away mirrors look for the scene, likewise
 constexpr float kReach = 0.1f;        // how far things hide the sky, as a share of the distance to the target
 
@@ -46,20 +45,6 @@ Vector4f penumbra_of(const ShadowFrame& shadow, const Sun& sun, float size_px, i
   const float taps = count == 1 ? 8 : count < 16 ? 6 : 4;
   return {half * shadow.depth_m / shadow.texel_m / std::sqrt(static_cast<float>(count)), kWidestPenumbra_px,
           ratio * ratio, taps};
-}
-
-/// Adds what is in the bound framebuffer, whose rows run from the bottom up.
-void add_picture(std::vector<float>& strip, HdrImage& sum) {
-  const std::size_t row = static_cast<std::size_t>(sum.width_px) * 4;
-  for (int bottom = 0; bottom < sum.height_px; bottom += kStrip_px) {
-    const int rows = std::min(kStrip_px, sum.height_px - bottom);
-    glReadPixels(0, bottom, sum.width_px, rows, GL_RGBA, GL_FLOAT, strip.data());
-    for (int y = 0; y < rows; ++y) {
-      const float* in = strip.data() + static_cast<std::size_t>(y) * row;
-      float* out = sum.rgba.data() + static_cast<std::size_t>(sum.height_px - 1 - bottom - y) * row;
-      for (std::size_t i = 0; i < row; ++i) out[i] += in[i];
-    }
-  }
 }
 
 }  // namespace
@@ -105,7 +90,7 @@ struct Stage::Impl {
         occlusion_pass(def.width_px, def.height_px),
         puffs_pass(def.width_px, def.height_px),
         streaks_pass(def.width_px, def.height_px),
-        strip(static_cast<std::size_t>(def.width_px) * kStrip_px * 4) {
+        strip(static_cast<std::size_t>(def.width_px) * StreakBands::kRows * 4) {
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
     gl::check_error("making the stage");
   }
@@ -124,14 +109,15 @@ struct Stage::Impl {
   void copy(GLuint from, GLuint to) const;
   void copy_depth();
   void copy_picture();
-  void draw_mirrors();
+  void draw_mirrors(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view);
   void draw_glass();
   void draw_depth(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view);
-  void draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets);
+  void draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view);
   void draw_sheer(std::span<const Cloth* const> sheets);
   void draw_blended(std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame,
                     bool new_frame);
   void draw_lines(const View& view);
+  void add_picture(const FrameUniforms& frame, HdrImage& sum);
 };
 
 std::vector<PointSet*> Stage::Impl::prepare_points(const View& view) {
@@ -252,15 +238,21 @@ void Stage::Impl::copy_picture() {
   glBindTextureUnit(kBehindUnit, picture.behind);
 }
 
-void Stage::Impl::draw_mirrors() {
-  if (!mesh_pass.has_mirrors()) return;
+void Stage::Impl::draw_mirrors(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets,
+                               const View& view) {
+  const float reach = kMirrorReach * (camera.target - camera.eye).norm();
+  std::vector<Eigen::AlignedBox3f> others;
+  for (const Cloth* cloth : sheets) others.push_back(cloth->surface.box());
+  for (const PointSet* set : sets)
+    if (set->def.style == PointStyle::sphere) others.push_back(set->box);
+  if (!mesh_pass.find_mirrors(view, reach, others, def.width_px, def.height_px)) return;
   copy_depth();
   copy_picture();
   glDepthFunc(GL_GEQUAL);  // over themselves
   glDepthMask(GL_FALSE);
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE);
-  mesh_pass.draw_mirrors(kMirrorReach * (camera.target - camera.eye).norm());
+  mesh_pass.draw_mirrors(reach);
   glDisable(GL_BLEND);
   glDepthMask(GL_TRUE);
   glDepthFunc(GL_GREATER);
@@ -300,7 +292,8 @@ void Stage::Impl::draw_depth(std::span<const Cloth* const> sheets, std::span<Poi
   glDisable(GL_POLYGON_OFFSET_FILL);
 }
 
-void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets) {
+void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets,
+                              const View& view) {
   glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
   glViewport(0, 0, def.width_px, def.height_px);
   glDepthFunc(GL_GEQUAL);
@@ -319,7 +312,7 @@ void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<Po
   }
   glDepthFunc(GL_GREATER);
   draw_sheer(sheets);
-  draw_mirrors();
+  draw_mirrors(sheets, sets, view);
   draw_glass();
 }
 
@@ -333,6 +326,7 @@ void Stage::Impl::draw_sheer(std::span<const Cloth* const> sheets) {
 
 void Stage::Impl::draw_blended(std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame,
                                bool new_frame) {
+  streaks_pass.clear();
   // Premultiplied: what adds light has no alpha, so one blend function serves both.
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
@@ -342,13 +336,15 @@ void Stage::Impl::draw_blended(std::span<PointSet* const> sets, const View& view
 
   const auto blended = [](const PointSet* set) { return set->def.style != PointStyle::sphere; };
   if (std::none_of(sets.begin(), sets.end(), blended)) return;
-  copy_depth();
+  if (!std::ranges::all_of(
+          sets, [&](const PointSet* set) { return !blended(set) || set->def.style == PointStyle::streak; }))
+    copy_depth();
   const PuffLight light(puffs_pass.grid(), frame, sun.direction.normalized());
   puffs_pass.draw(sets, view, light, shadow_map, picture.framebuffer);
   for (const PointSet* set : sets) {
     if (blended(set) && !set->is_splatted()) points_pass.draw_blended(*set, features);
   }
-  streaks_pass.draw(sets, view, light, shadow_map, picture.framebuffer, new_frame);
+  streaks_pass.prepare(sets, view, light, shadow_map, new_frame);
 }
 
 void Stage::Impl::draw_lines(const View& view) {
@@ -356,6 +352,22 @@ void Stage::Impl::draw_lines(const View& view) {
     lines_pass.prepare(*set, view);
     lines_pass.draw(*set, def.width_px, def.height_px);
   });
+}
+
+// By bands, which stay in the processor's cache; rows run from the bottom up.
+void Stage::Impl::add_picture(const FrameUniforms& frame, HdrImage& sum) {
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, picture.framebuffer);
+  const std::size_t row = static_cast<std::size_t>(sum.width_px) * 4;
+  for (int bottom = 0; bottom < sum.height_px; bottom += StreakBands::kRows) {
+    const int rows = std::min(StreakBands::kRows, sum.height_px - bottom);
+    glReadPixels(0, bottom, sum.width_px, rows, GL_RGBA, GL_FLOAT, strip.data());
+    streaks_pass.lay_over(bottom, rows, frame, strip);
+    for (int y = 0; y < rows; ++y) {
+      const float* in = strip.data() + static_cast<std::size_t>(y) * row;
+      float* out = sum.rgba.data() + static_cast<std::size_t>(sum.height_px - 1 - bottom - y) * row;
+      for (std::size_t i = 0; i < row; ++i) out[i] += in[i];
+    }
+  }
 }
 
 Stage::Stage(Context&, const StageDef& def) : impl_(std::make_unique<Impl>(def)) {}
@@ -529,12 +541,11 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   const float nearby = kReach * (s.camera.target - s.camera.eye).norm();
   const float reach = opaque ? s.environment.occlusion_reach.value_or(nearby) : 0;
   s.occlusion_pass.draw(s.picture.depth, view, reach, offsets.count, frame.shadow.w());
-  s.draw_opaque(sheets, sets);
+  s.draw_opaque(sheets, sets, view);
   s.draw_blended(sets, view, frame, offsets.index == 0);
   s.draw_lines(view);
 
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, s.picture.framebuffer);
-  add_picture(s.strip, sum);
+  s.add_picture(frame, sum);
   gl::check_error("drawing a frame");
 }
 

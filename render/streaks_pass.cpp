@@ -7,7 +7,6 @@
 namespace offstage::render {
 namespace {
 
-constexpr GLuint kColorUnit = 6;
 constexpr float kNearest =
     0.016f;  // radius from which a streak at the lens fades, as a share of half the picture
 constexpr float kThinnest_px = 0.6f;  // radius; what is thinner stays as wide and gets fainter
@@ -95,10 +94,7 @@ StreakSplat splat_of(const GpuPoint& point, const PointsDef& def, const View& vi
 
 }  // namespace
 
-StreaksPass::StreaksPass(int width_px, int height_px) {
-  picture_.width_px = width_px;
-  picture_.height_px = height_px;
-}
+StreaksPass::StreaksPass(int width_px, int height_px) : width_px_(width_px), height_px_(height_px) {}
 
 void StreaksPass::sort_visible(std::span<const PointSet* const> sets, const View& view) {
   sources_.clear();
@@ -119,52 +115,19 @@ void StreaksPass::sort_visible(std::span<const PointSet* const> sets, const View
   std::sort(keys_.begin(), keys_.end());
 }
 
-void StreaksPass::read_depth(const FrameUniforms& frame, GLuint framebuffer) {
-  const auto width = static_cast<std::size_t>(picture_.width_px),
-             height = static_cast<std::size_t>(picture_.height_px);
-  picture_.depth.resize(width * height);
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer);
-  glReadPixels(0, 0, picture_.width_px, picture_.height_px, GL_DEPTH_COMPONENT, GL_FLOAT,
-               picture_.depth.data());
-  tbb::parallel_for(std::size_t{0}, height, [&](std::size_t y) {
-    for (std::size_t i = y * width; i < (y + 1) * width; ++i)
-      picture_.depth[i] = frame.depth.x() / (picture_.depth[i] + frame.depth.y());
-  });
-}
-
-void StreaksPass::composite(GLuint framebuffer) {
-  const int x = picture_.x0, y = picture_.y0, width = picture_.x1 - x, height = picture_.y1 - y;
-  if (width <= 0) return;
-  if (colors_ == 0) colors_ = gl::make_target(GL_RGBA32F, picture_.width_px, picture_.height_px, GL_NEAREST);
-  glPixelStorei(GL_UNPACK_ROW_LENGTH, picture_.width_px);
-  glTextureSubImage2D(colors_, 0, x, y, width, height, GL_RGBA, GL_FLOAT,
-                      picture_.rgbt.data() + (static_cast<std::ptrdiff_t>(y) * picture_.width_px + x) * 4);
-  glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
-  glBindTextureUnit(kColorUnit, colors_);
-  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
-  glDisable(GL_DEPTH_TEST);
-  glEnable(GL_SCISSOR_TEST);
-  glScissor(x, y, width, height);
-  program_.use();
-  glBindVertexArray(no_attributes_);
-  glDrawArrays(GL_TRIANGLES, 0, 3);
-  glDisable(GL_SCISSOR_TEST);
-  glEnable(GL_DEPTH_TEST);
-}
-
-void StreaksPass::draw(std::span<const PointSet* const> sets, const View& view, const PuffLight& light,
-                       const ShadowMap& shadow_map, GLuint framebuffer, bool new_frame) {
+void StreaksPass::prepare(std::span<const PointSet* const> sets, const View& view, const PuffLight& light,
+                          const ShadowMap& shadow_map, bool new_frame) {
   sort_visible(sets, view);
-  if (keys_.empty()) return;
+  any_ = !keys_.empty();
+  if (!any_) return;
   if (new_frame) lights_.clear();
   lights_.resize(sources_.back().first + sources_.back().set->points.size());
   Eigen::AlignedBox3f box;
   for (const Source& source : sources_)
     if (source.set->def.lit) box.extend(source.set->box);
-  if (!box.isEmpty()) shadow_.read(shadow_map, light.frame, box);
+  if (new_frame && !box.isEmpty()) shadow_.read(shadow_map, light.frame, box);
 
-  const Vector2f half_size(0.5f * static_cast<float>(picture_.width_px),
-                           0.5f * static_cast<float>(picture_.height_px));
+  const Vector2f half_size(0.5f * static_cast<float>(width_px_), 0.5f * static_cast<float>(height_px_));
   splats_.resize(keys_.size());
   constexpr std::size_t kBlock = 512;
   tbb::parallel_for(std::size_t{0}, (keys_.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
@@ -179,12 +142,17 @@ void StreaksPass::draw(std::span<const PointSet* const> sets, const View& view, 
       KnownLight& known = lights_[number];
       if (known.id != set.ids[i])
         known = {set.ids[i], light_of(set.points[i], set.def, view, light, shadow_, {s.along_x, s.along_y})};
-      s.light = known.light;
+      s.light = &known.light;
     }
   });
-  read_depth(light.frame, framebuffer);
-  draw_splats(std::span<const StreakSplat>(splats_), picture_);
-  composite(framebuffer);
+  bands_.sort(splats_, width_px_, height_px_);
+}
+
+void StreaksPass::lay_over(int bottom, int rows, const FrameUniforms& frame, std::span<float> rgba) {
+  if (!any_ || !bands_.touches(bottom)) return;
+  depth_.resize(static_cast<std::size_t>(width_px_) * StreakBands::kRows);
+  glReadPixels(0, bottom, width_px_, rows, GL_DEPTH_COMPONENT, GL_FLOAT, depth_.data());
+  bands_.lay_over(bottom, rows, depth_, frame.depth.head<2>(), rgba);
 }
 
 }  // namespace offstage::render

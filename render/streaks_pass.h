@@ -1,6 +1,6 @@
 #pragma once
 /// Private: draws streaks: drops, sparks, trails. They are lit one by one, sorted together and splatted on
-/// the CPU, in a picture of full size that is then laid over the scene.
+/// the CPU, over the finished picture as it is read back.
 
 #include <span>
 #include <vector>
@@ -18,15 +18,17 @@ namespace offstage::render {
 class StreaksPass {
  public:
   StreaksPass(int width_px, int height_px);
-  /// Draws over the picture in `framebuffer`. `light`: with the smoke between sun and streaks. Streaks stay
-  /// where they are during a frame, so only its first sub-frame (`new_frame`) works out their light.
-  void draw(std::span<const PointSet* const> sets, const View& view, const PuffLight& light,
-            const ShadowMap& shadow_map, GLuint framebuffer, bool new_frame);
+  /// Forgets those of the sub-frame before.
+  void clear() { any_ = false; }
+  /// Makes ready what a sub-frame shows. `light`: with the smoke between sun and streaks. Streaks stay where
+  /// they are during a frame, so only its first sub-frame (`new_frame`) works out their light.
+  void prepare(std::span<const PointSet* const> sets, const View& view, const PuffLight& light,
+               const ShadowMap& shadow_map, bool new_frame);
+  /// Lays them over a band of the picture in the framebuffer that is bound for reading (see StreakBands).
+  void lay_over(int bottom, int rows, const FrameUniforms& frame, std::span<float> rgba);
 
  private:
   void sort_visible(std::span<const PointSet* const> sets, const View& view);
-  void read_depth(const FrameUniforms& frame, GLuint framebuffer);
-  void composite(GLuint framebuffer);
 
   struct Source {
     const PointSet* set;
@@ -41,10 +43,10 @@ class StreaksPass {
   };
   std::vector<KnownLight> lights_;  ///< by number, of those seen in this frame
   SceneShadow shadow_;
-  SplatPicture picture_;
-  gl::Texture colors_;
-  gl::LazyProgram program_{{"frame.glsl", "sky.vert"}, {"frame.glsl", "streaks.frag"}};
-  gl::VertexArray no_attributes_ = gl::make_vertex_array();
+  int width_px_, height_px_;
+  bool any_ = false;
+  StreakBands bands_;
+  std::vector<float> depth_;  ///< of a band
 };
 
 }  // namespace offstage::render

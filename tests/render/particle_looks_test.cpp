@@ -112,8 +112,8 @@ TEST(Splatter, PuffFadesEvenlyAsAPlaneCutsThroughIt) {
 
 TEST(Splatter, StreakCoversAsMuchAsItsStroke) {
   for (const float angle : {0.0f, 0.4f, 1.2f, 1.5707f}) {
-    SplatPicture picture{.width_px = 150, .height_px = 120, .depth = std::vector<float>(150 * 120, 9)};
     const float c = std::cos(angle), s = std::sin(angle), half = 30, radius = 3;
+    const StreakLight light = {.middle = {1, 1, 1}, .rim = {1, 1, 1}, .rim_slope = {}};
     const std::array streaks{StreakSplat{.x = 75,
                                          .y = 60,
                                          .half_x = half * c + radius,
@@ -129,12 +129,17 @@ TEST(Splatter, StreakCoversAsMuchAsItsStroke) {
                                          .cover = 1,
                                          .softness = 0.5f,
                                          .taper = 0,
-                                         .light = {.middle = {1, 1, 1}, .rim = {1, 1, 1}, .rim_slope = {}}}};
-    draw_splats(std::span<const StreakSplat>(streaks), picture);
+                                         .light = &light}};
+    StreakBands bands;
+    bands.sort(streaks, 150, 120);
+    const std::vector<float> depth(150 * StreakBands::kRows, 1.0f);
     double area = 0;
-    for (int y = picture.y0; y < picture.y1; ++y)
-      for (int x = picture.x0; x < picture.x1; ++x)
-        area += static_cast<double>(1 - pixel_of(picture, x, y)[3]);
+    for (int bottom = 0; bottom < 120; bottom += StreakBands::kRows) {
+      const int rows = std::min(StreakBands::kRows, 120 - bottom);
+      std::vector<float> rgba(150 * StreakBands::kRows * 4, 0.0f);
+      if (bands.touches(bottom)) bands.lay_over(bottom, rows, depth, {9, 0}, rgba);
+      for (std::size_t i = 3; i < rgba.size(); i += 4) area += static_cast<double>(rgba[i]);
+    }
     // Its soft rim counts half: 2 * 60 * 2.25, and the ends.
     EXPECT_NEAR(area, 60 * 4.5 + 16, 4) << angle;
   }
