@@ -18,6 +18,8 @@ class ClearCells {
   /// Whether a sphere (mesh frame) surely neither touches the surface nor is inside of it; may be false for
   /// one that does not, too, if that is within three cells of the surface.
   bool is_clear(const Vec3& centre, Real radius) const;
+  /// Whether a point is surely not inside; may be false for one that is not, if the surface is in its cell.
+  bool is_outside(const Vec3& p) const { return steps_[index(cell_of(p))] > 0; }
   /// Edge of a cell [m].
   Real cell() const { return cell_; }
 

@@ -127,26 +127,45 @@ SurfaceDistance signed_distance(const Plane&, const Vec3& p) {
   return {p.y(), Vec3::UnitY()};
 }
 
-SurfaceDistance signed_distance(const CollisionMesh& m, const Vec3& p) {
-  Real best2 = kInfinity;
+namespace {
+
+/// Of the nearest triangle, if any is nearer than the root of `limit2`.
+SurfaceDistance mesh_distance(const CollisionMesh& m, const Vec3& p, Real limit2) {
+  Real best2 = limit2;
   uint32_t face = 0;
   TrianglePoint nearest;
-  m.tree.nearest(p, [&](uint32_t i) {
-    const Triangle& t = m.mesh.triangles[i];
-    const auto& v = m.mesh.vertices;
-    const TrianglePoint q = closest_on_triangle(p, v[t[0]], v[t[1]], v[t[2]]);
-    const Real d2 = (p - q.point).squaredNorm();
-    if (d2 < best2) {
-      best2 = d2;
-      face = i;
-      nearest = q;
-    }
-    return d2;
-  });
+  m.tree.nearest(
+      p,
+      [&](uint32_t i) {
+        const Triangle& t = m.mesh.triangles[i];
+        const auto& v = m.mesh.vertices;
+        const TrianglePoint q = closest_on_triangle(p, v[t[0]], v[t[1]], v[t[2]]);
+        const Real d2 = (p - q.point).squaredNorm();
+        if (d2 < best2) {
+          best2 = d2;
+          face = i;
+          nearest = q;
+        }
+        return d2;
+      },
+      limit2);
+  if (best2 == limit2) return {};
   const Vec3 outward = feature_normal(m, face, nearest.weights), away = p - nearest.point;
   const Vec3 n = direction(away, outward);
   const bool inside = m.solid && outward.dot(away) < 0;
   return inside ? SurfaceDistance{-away.norm(), -n} : SurfaceDistance{away.norm(), n};
+}
+
+}  // namespace
+
+SurfaceDistance signed_distance(const CollisionMesh& m, const Vec3& p) {
+  return mesh_distance(m, p, kInfinity);
+}
+
+SurfaceDistance signed_distance_below(const Solid& s, const Vec3& p, Real limit) {
+  // What is not known to be outside may be deep inside.
+  const bool outside = s.mesh && (!s.mesh->solid || s.mesh->clear_cells().is_outside(p));
+  return outside ? mesh_distance(*s.mesh, p, limit * limit) : signed_distance(s, p);
 }
 
 SurfaceDistance signed_distance(const Solid& s, const Vec3& p) {

@@ -33,6 +33,8 @@ SurfaceDistance signed_distance(const Plane&, const Vec3& p);
 /// by the pseudonormal of the nearest feature.
 SurfaceDistance signed_distance(const CollisionMesh& m, const Vec3& p);
 SurfaceDistance signed_distance(const Solid& s, const Vec3& p);
+/// The same where the distance is less than `limit` [m], >= 0; else any that is not. Far cheaper off a mesh.
+SurfaceDistance signed_distance_below(const Solid& s, const Vec3& p, Real limit);
 
 /// Support function: the largest n.x over the points x of a solid; infinite for a plane unless n is +Y.
 Real support(const Solid& s, const Vec3& n);

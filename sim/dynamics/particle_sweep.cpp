@@ -71,7 +71,7 @@ bool NearObstacles::eject(Vec3& start, Vec3& end, Real radius, Real fraction, bo
       const Pose pose = o->at(fraction);
       const Vec3 centre = pose.point_to_body(start);
       if (is_clear(o->solid, centre, radius)) continue;
-      const SurfaceDistance s = signed_distance(o->solid, centre);
+      const SurfaceDistance s = signed_distance_below(o->solid, centre, radius);
       if (s.distance >= radius) continue;
       if (round == kMaxEjections) return false;
       clear = false;

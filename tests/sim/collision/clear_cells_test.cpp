@@ -37,6 +37,26 @@ TEST(ClearCells, WhatIsClearTouchesNothingAndIsNotInside) {
   }
 }
 
+TEST(ClearCells, LeaveASearchOfWhatIsNearAsExactAsAWholeOne) {
+  constexpr Real kLimit = 0.05;
+  const Shape shape = MeshShape{};
+  int near = 0;
+  for (const TriangleMesh& mesh : {torus_mesh(1, 0.4, 48, 24), box_mesh({3, 0.5, 0.01}), open_box()}) {
+    const CollisionMesh solid(mesh);
+    for (uint64_t i = 0; i < 4000; ++i) {
+      const Vec3 p = random_point(i, {3, 1.2, 3});
+      const SurfaceDistance whole = signed_distance(solid, p);
+      const SurfaceDistance below = signed_distance_below({&shape, &solid}, p, kLimit);
+      near += whole.distance < kLimit;
+      EXPECT_EQ(below.distance < kLimit, whole.distance < kLimit) << p.transpose();
+      if (whole.distance >= kLimit) continue;
+      EXPECT_EQ(below.distance, whole.distance) << p.transpose();
+      EXPECT_EQ(below.normal, whole.normal) << p.transpose();
+    }
+  }
+  EXPECT_GT(near, 500);
+}
+
 TEST(ClearCells, WhatIsThreeCellsAwayIsClear) {
   // Of a small sphere: its cell and the surface's lose one each, a chessboard's diagonal the factor sqrt(3).
   const CollisionMesh torus(torus_mesh(1, 0.4, 48, 24));
