@@ -72,6 +72,31 @@ std::array<Vector3f, 8> View::corners(float far_distance) const {
   return result;
 }
 
+void ScreenArea::add(const Vector3f& place) {
+  const float depth = view_.depth_of(place);
+  if (depth - margin_ <= view_.near_m) return add_all();
+  const Vector2f center(view_.right.dot(place - view_.eye), view_.up.dot(place - view_.eye));
+  for (const float distance : {depth - margin_, depth + margin_})
+    for (const float side : {-margin_, margin_})
+      area_.extend(view_.shear + (center.array() + side).matrix().cwiseQuotient(view_.tan_half) / distance);
+}
+
+void ScreenArea::add_all() {
+  area_.extend(Vector2f(-1, -1)).extend(Vector2f(1, 1));
+}
+
+bool ScreenArea::empty() const {
+  return !area_.intersects(Eigen::AlignedBox2f(Vector2f(-1, -1), Vector2f(1, 1)));
+}
+
+Eigen::AlignedBox2i ScreenArea::pixels(int width_px, int height_px) const {
+  const Vector2f half_size(0.5f * static_cast<float>(width_px), 0.5f * static_cast<float>(height_px));
+  const auto pixel = [&](const Vector2f& p) {
+    return ((p.array().max(-1).min(1) + 1) * half_size.array()).eval();
+  };
+  return {pixel(area_.min()).floor().cast<int>().matrix(), pixel(area_.max()).ceil().cast<int>().matrix()};
+}
+
 View make_view(const Camera& camera, const SampleOffsets& offsets, int width_px, int height_px) {
   View view;
   const Vector3f sight = camera.target - camera.eye;

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "render/stage.h"
 
 namespace offstage::render {
@@ -63,6 +65,22 @@ struct View {
   float depth_of(const Vector3f& point) const { return forward.dot(point - eye); }
   /// The corners of the frustum cut at a distance; four near, then four far.
   std::array<Vector3f, 8> corners(float far_distance) const;
+};
+
+/// The rectangle of a picture that places take, each with a margin around it [m].
+class ScreenArea {
+ public:
+  ScreenArea(const View& view, float margin) : view_(view), margin_(margin) {}
+  void add(const Vector3f& place);
+  void add_all();
+  bool empty() const;
+  /// From the lower left corner, in a picture of a size.
+  Eigen::AlignedBox2i pixels(int width_px, int height_px) const;
+
+ private:
+  const View& view_;
+  float margin_;
+  Eigen::AlignedBox2f area_;  ///< in [-1, 1]
 };
 
 /// Depth runs from 1 at the near plane to 0 at the far one: with floats that keeps precision far away.

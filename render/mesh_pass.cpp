@@ -35,6 +35,10 @@ const Image* texture_at(std::span<const Image> textures, int index) {
              : nullptr;
 }
 
+Vector3f corner(const Eigen::AlignedBox3f& box, int k) {
+  return box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k));
+}
+
 /// The greatest slope of a surface with this pattern, but for the edges of its stones; none if it is more
 /// than mirrors can be told from.
 std::optional<float> unevenness_of(Pattern pattern) {
@@ -345,54 +349,50 @@ bool MeshPass::mirrors(const Batch& batch) {
          (batch.material->metal || batch.mesh->flat || batch.mesh->index_count <= kFewIndices);
 }
 
-Eigen::AlignedBox2f MeshPass::mirrored_area(const Batch& batch, const View& view, float reach,
-                                            std::span<const Eigen::AlignedBox3f> others) const {
-  const Eigen::AlignedBox2f all(Vector2f(-1, -1), Vector2f(1, 1));
+ScreenArea MeshPass::occluded_area(const View& view, float reach,
+                                   std::span<const Eigen::AlignedBox3f> others) const {
+  ScreenArea area(view, reach);
+  if (std::ranges::count_if(seen_, [](const Instance* instance) { return instance->mesh->flat; }) > 1)
+    area.add_all();
+  for (const Instance* instance : seen_) {
+    if (instance->mesh->flat) continue;
+    for (int k = 0; k < 8; ++k) area.add(instance->world_from_mesh * corner(instance->mesh->box, k));
+  }
+  for (const Eigen::AlignedBox3f& box : others)
+    for (int k = 0; k < 8; ++k) area.add(corner(box, k));
+  return area;
+}
+
+ScreenArea MeshPass::mirrored_area(const Batch& batch, const View& view, float reach,
+                                   std::span<const Eigen::AlignedBox3f> others) const {
   const std::optional<float> unevenness = unevenness_of(batch.material->pattern);
-  if (!batch.mesh->flat || batch.count > 1 || !unevenness) return all;
+  // Rays leave the mirrored direction by twice the slope, and by what roughness spreads them.
+  ScreenArea area(view, (2 * unevenness.value_or(0) + 0.5f * kSmooth * kSmooth) * reach);
+  if (!batch.mesh->flat || batch.count > 1 || !unevenness) {
+    area.add_all();
+    return area;
+  }
   const Instance& mirror = *seen_[batch.first];
   const Vector3f normal =
       (mirror.world_from_mesh.linear().inverse().transpose() * batch.mesh->flat_normal).normalized();
   const Vector3f place = mirror.world_from_mesh * batch.mesh->center;
-  // Rays leave the mirrored direction by twice the slope, and by what roughness spreads them.
-  const float margin = (2 * *unevenness + 0.5f * kSmooth * kSmooth) * reach;
-  Eigen::AlignedBox2f area;
-  const auto add = [&](const Vector3f& corner) {
-    const Vector3f image = corner - 2 * normal.dot(corner - place) * normal;
-    const float depth = view.depth_of(image);
-    if (depth - margin <= view.near_m) {
-      area = all;
-      return;
-    }
-    for (const float nearness : {depth - margin, depth + margin})
-      for (const float side : {-margin, margin}) {
-        const Vector2f across(view.right.dot(image - view.eye) + side, view.up.dot(image - view.eye) + side);
-        area.extend(view.shear + across.cwiseQuotient(view.tan_half) / nearness);
-      }
-  };
-  const auto add_box = [&](const Eigen::AlignedBox3f& box, const Eigen::Affine3f& world_from_box) {
-    for (int k = 0; k < 8; ++k)
-      add(world_from_box * box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k)));
-  };
-  for (const Instance* instance : seen_)
-    if (instance != &mirror) add_box(instance->mesh->box, instance->world_from_mesh);
-  for (const Eigen::AlignedBox3f& box : others) add_box(box, Eigen::Affine3f::Identity());
-  return area.intersection(all);
+  const auto add = [&](const Vector3f& p) { area.add(p - 2 * normal.dot(p - place) * normal); };
+  for (const Instance* instance : seen_) {
+    if (instance == &mirror) continue;
+    for (int k = 0; k < 8; ++k) add(instance->world_from_mesh * corner(instance->mesh->box, k));
+  }
+  for (const Eigen::AlignedBox3f& box : others)
+    for (int k = 0; k < 8; ++k) add(corner(box, k));
+  return area;
 }
 
 bool MeshPass::find_mirrors(const View& view, float reach, std::span<const Eigen::AlignedBox3f> others,
                             int width_px, int height_px) {
   mirrors_.clear();
-  const Vector2f half_size(0.5f * static_cast<float>(width_px), 0.5f * static_cast<float>(height_px));
   for (const Batch& batch : opaque_) {
     if (!mirrors(batch)) continue;
-    const Eigen::AlignedBox2f area = mirrored_area(batch, view, reach, others);
-    if (area.isEmpty()) continue;
-    const auto pixel = [&](const Vector2f& p) {
-      return (p + Vector2f::Ones()).cwiseProduct(half_size).eval();
-    };
-    mirrors_.push_back({&batch, Eigen::AlignedBox2i(pixel(area.min()).array().floor().cast<int>(),
-                                                    pixel(area.max()).array().ceil().cast<int>())});
+    const ScreenArea area = mirrored_area(batch, view, reach, others);
+    if (!area.empty()) mirrors_.push_back({&batch, area.pixels(width_px, height_px)});
   }
   return !mirrors_.empty();
 }

@@ -81,11 +81,12 @@ class MeshPass {
   /// Depth alone of what is wholly opaque, so that only what is seen is shaded.
   void draw_depth(const Matrix4f& clip_from_world);
   void draw_opaque();
-  bool has_opaque() const { return !opaque_.empty(); }
+  /// Where opaque surfaces can hide the sky within `reach` [m]: around all but a plane. `others`: boxes
+  /// around what is opaque besides the instances.
+  ScreenArea occluded_area(const View& view, float reach, std::span<const Eigen::AlignedBox3f> others) const;
   bool has_glass() const { return !glass_.empty(); }
   /// Finds the surfaces that mirror something of the scene, and where in a picture of a size; false if there
-  /// are none. `reach`: how far away things are looked for [m]. `others`: boxes around what is opaque besides
-  /// the instances.
+  /// are none. `reach`: how far away things are looked for [m]. `others` as above.
   bool find_mirrors(const View& view, float reach, std::span<const Eigen::AlignedBox3f> others, int width_px,
                     int height_px);
   /// What those mirror, to be added to the picture, which is bound with its depth.
@@ -112,8 +113,8 @@ class MeshPass {
   gl::LazyProgram& shadow_program(const GpuMaterial& material);
   static void set_facing(const Batch& batch, bool both_sides);
   static bool mirrors(const Batch& batch);
-  Eigen::AlignedBox2f mirrored_area(const Batch& batch, const View& view, float reach,
-                                    std::span<const Eigen::AlignedBox3f> others) const;
+  ScreenArea mirrored_area(const Batch& batch, const View& view, float reach,
+                           std::span<const Eigen::AlignedBox3f> others) const;
 
   std::map<std::tuple<Pattern, bool, bool, bool, Features>, gl::LazyProgram>
       surface_programs_;  ///< textured, glass, mirror

@@ -12,8 +12,8 @@ class OcclusionPass {
  public:
   OcclusionPass(int width_px, int height_px);
   /// Reads the texture `depth` and leaves the result bound for shading. `reach`: how far away things are
-  /// looked for [m]; 0: all is open. `count`: of sub-frames, `seed` of this one.
-  void draw(GLuint depth, const View& view, float reach, int count, float seed);
+  /// looked for [m]; 0: all is open, as it is outside of `area`. `count`: of sub-frames, `seed` of this one.
+  void draw(GLuint depth, const View& view, float reach, const ScreenArea& area, int count, float seed);
 
  private:
   int width_px_, height_px_;

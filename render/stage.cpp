@@ -109,10 +109,11 @@ struct Stage::Impl {
   void copy(GLuint from, GLuint to) const;
   void copy_depth();
   void copy_picture();
-  void draw_mirrors(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view);
+  void draw_mirrors(const View& view, std::span<const Eigen::AlignedBox3f> others);
   void draw_glass();
   void draw_depth(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view);
-  void draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view);
+  void draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view,
+                   std::span<const Eigen::AlignedBox3f> others);
   void draw_sheer(std::span<const Cloth* const> sheets);
   void draw_blended(std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame,
                     bool new_frame);
@@ -238,13 +239,8 @@ void Stage::Impl::copy_picture() {
   glBindTextureUnit(kBehindUnit, picture.behind);
 }
 
-void Stage::Impl::draw_mirrors(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets,
-                               const View& view) {
+void Stage::Impl::draw_mirrors(const View& view, std::span<const Eigen::AlignedBox3f> others) {
   const float reach = kMirrorReach * (camera.target - camera.eye).norm();
-  std::vector<Eigen::AlignedBox3f> others;
-  for (const Cloth* cloth : sheets) others.push_back(cloth->surface.box());
-  for (const PointSet* set : sets)
-    if (set->def.style == PointStyle::sphere) others.push_back(set->box);
   if (!mesh_pass.find_mirrors(view, reach, others, def.width_px, def.height_px)) return;
   copy_depth();
   copy_picture();
@@ -293,7 +289,7 @@ void Stage::Impl::draw_depth(std::span<const Cloth* const> sheets, std::span<Poi
 }
 
 void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets,
-                              const View& view) {
+                              const View& view, std::span<const Eigen::AlignedBox3f> others) {
   glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
   glViewport(0, 0, def.width_px, def.height_px);
   glDepthFunc(GL_GEQUAL);
@@ -312,7 +308,7 @@ void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<Po
   }
   glDepthFunc(GL_GREATER);
   draw_sheer(sheets);
-  draw_mirrors(sheets, sets, view);
+  draw_mirrors(view, others);
   draw_glass();
 }
 
@@ -534,14 +530,16 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   const std::vector<const Cloth*> sheets = s.prepare_cloths();
   s.draw_shadows(shown, sheets, sets, view, offsets, frame);
   s.draw_depth(sheets, sets, view);
-  // Where nothing opaque is, nothing hides the sky; its two programs are not built either.
-  const bool opaque =
-      s.mesh_pass.has_opaque() || !sheets.empty() ||
-      std::ranges::any_of(sets, [](const PointSet* set) { return set->def.style == PointStyle::sphere; });
-  const float nearby = kReach * (s.camera.target - s.camera.eye).norm();
-  const float reach = opaque ? s.environment.occlusion_reach.value_or(nearby) : 0;
-  s.occlusion_pass.draw(s.picture.depth, view, reach, offsets.count, frame.shadow.w());
-  s.draw_opaque(sheets, sets, view);
+  std::vector<Eigen::AlignedBox3f> others;  // what is opaque besides meshes
+  for (const Cloth* cloth : sheets)
+    if (!cloth->is_sheer()) others.push_back(cloth->surface.box());
+  for (const PointSet* set : sets)
+    if (set->def.style == PointStyle::sphere) others.push_back(set->box);
+  const float reach =
+      s.environment.occlusion_reach.value_or(kReach * (s.camera.target - s.camera.eye).norm());
+  s.occlusion_pass.draw(s.picture.depth, view, reach, s.mesh_pass.occluded_area(view, reach, others),
+                        offsets.count, frame.shadow.w());
+  s.draw_opaque(sheets, sets, view, others);
   s.draw_blended(sets, view, frame, offsets.index == 0);
   s.draw_lines(view);
 
