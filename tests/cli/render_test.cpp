@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <set>
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -139,6 +140,56 @@ TEST(Render, InterruptedVideoNeverLooksWhole) {
   ASSERT_EQ(offstage(piece + " -o whole.mp4", folder.path()).code, 0);
   EXPECT_EQ(read_file(folder / "film.mp4"), read_file(folder / "whole.mp4"));
   EXPECT_FALSE(fs::exists(folder / "film.mp4.frames"));
+}
+
+/// `offstage render scene.json -o out/ --watch` in the background; it ends with the object.
+class WatchedRender {
+ public:
+  explicit WatchedRender(const fs::path& folder) : child_(fork()) {
+    if (child_ != 0) return;
+    if (chdir(folder.c_str()) != 0) _exit(99);
+    execl(OFFSTAGE_BINARY_DIR "/offstage", "offstage", "render", "scene.json", "-o", "out/", "-q", "--watch",
+          nullptr);
+    _exit(99);
+  }
+  ~WatchedRender() {
+    kill(child_, SIGINT);
+    waitpid(child_, nullptr, 0);
+  }
+
+ private:
+  pid_t child_;
+};
+
+TEST(Render, WatchTakesAwayFramesAndChannelsThatTheNewFilmHasNot) {
+  const TemporaryFolder folder;
+  const auto write_scene = [&](const std::string& output) {
+    write_file(folder / "scene.json", R"({"version": 1, "bodies": [{"shape": {"type": "sphere"}}], )"
+                                      R"("render": {"size": [64, 36], "quality": "draft"}, "output": )" +
+                                          output + "}");
+  };
+  const auto files = [&] {
+    std::set<std::string> names;
+    for (const auto& [name, bytes] : contents(folder / "out")) names.insert(name);
+    return names;
+  };
+  const auto comes_to = [&](const std::set<std::string>& expected) {
+    for (int i = 0; i < 3000 && files() != expected; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    return files() == expected;
+  };
+  fs::create_directory(folder / "out");
+  write_file(folder / "out" / "0003.exr.txt", "of someone else");
+  write_scene(R"({"duration": 0.1, "channels": ["depth"]})");
+  const WatchedRender watch(folder.path());
+  ASSERT_TRUE(comes_to({"0001.exr", "0001.png", "0002.exr", "0002.png", "0003.exr", "0003.exr.txt",
+                        "0003.png", "manifest.json"}));
+  write_scene(R"({"duration": 0.06, "channels": ["depth"]})");
+  EXPECT_TRUE(comes_to({"0001.exr", "0001.png", "0002.exr", "0002.png", "0003.exr.txt", "manifest.json"}))
+      << "a shorter film";
+  write_scene(R"({"duration": 0.06})");
+  EXPECT_TRUE(comes_to({"0001.png", "0002.png", "0003.exr.txt", "manifest.json"}))
+      << "a film without channels";
 }
 
 TEST(Render, FullDiskIsAnErrorAndLeavesNoBrokenFile) {
