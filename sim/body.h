@@ -23,6 +23,7 @@ struct Body {
   uint32_t island = 0;   // awake: number among the islands of the sub-step; asleep: of the sleeping ones
   uint32_t row = 0;      // among the bodies of its island
   Real extent = 0;       // reach() of the solid; of a plane infinite
+  Real blow = 0;         // speed of what is near and may strike it in the sub-step [m/s]
   Pose pose;             // now
 
   // The interval in which it moves at the moment: a whole sub-step, or what an impact has left of it.

@@ -25,6 +25,8 @@ constexpr Real kFar = 0.25, kFarWithoutBounce = 1;
 constexpr Real kRoom = 0.03, kSteps = 2;
 /// How far bodies may shift against each other before their points are found anew [m].
 constexpr Real kReuse = 1e-5, kExactReuse = 1e-8;
+/// How often a blow is passed on from body to body.
+constexpr uint32_t kPassedOn = 3;
 /// Bodies turn if their turning moves their surfaces by more than this in an interval [m].
 constexpr Real kTurning = 2e-4;
 
@@ -105,10 +107,33 @@ void World::Impl::collect_pairs() {
   });
 }
 
+/// What strikes a body in the sub-step gives it a speed that it does not have yet, and what it touches then
+/// half of that, and so on.
+void World::Impl::foresee_blows(Real h) {
+  if (def.solver == SolverKind::exact) return;  // it goes from one impact to the next
+  for (Body* body : awake) body->blow = 0;
+  const auto strike = [](Body& body, Real speed) {
+    if (body.is_awake()) body.blow = std::max(body.blow, speed);
+  };
+  Real fastest = 0;
+  for (const ContactPair* pair : active_pairs) {
+    const Real speed = pair->speed_bound();
+    strike(pair->a(), speed);
+    strike(pair->b(), speed);
+    fastest = std::max(fastest, speed);
+  }
+  for (uint32_t i = 0; i < kPassedOn && fastest * h > kMargin; ++i)
+    for (const ContactPair* pair : active_pairs) {
+      strike(pair->a(), pair->b().blow / 2);
+      strike(pair->b(), pair->a().blow / 2);
+    }
+}
+
 void World::Impl::update_pairs(Real h) {
   for (Body* body : awake) move_in_broad_phase(*body, false);
   for (Body* body : kinematic) move_in_broad_phase(*body, false);
   collect_pairs();
+  foresee_blows(h);
   const auto find = [&](std::size_t i) {
     // They lie all over the memory.
     if (i + 6 < active_pairs.size()) __builtin_prefetch(active_pairs[i + 6]);
@@ -137,7 +162,9 @@ void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
   const bool exact = def.solver == SolverKind::exact;
   const bool bounces = exact || pair.surface().restitution > 0;
   const Real far = std::max(base, (bounces ? kFar : kFarWithoutBounce) * size);
-  const Real margin = base + std::min(2 * motion, far);
+  // A blow moves a body no faster than what strikes it.
+  const Real blow = std::max(pair.a().blow, pair.b().blow) * left;
+  const Real margin = base + std::min(std::max(2 * motion, blow), far);
   pair.find(pair.a().placed_at(time, h), pair.b().placed_at(time, h), margin, exact ? kExactReuse : kReuse,
             pair.turning_speed() * left > kTurning);
 

@@ -75,6 +75,7 @@ struct World::Impl : WorldState {
 
   // Contacts (world_contacts.cpp)
   PairSurface surface_of(const Body& a, const Body& b) const;
+  void foresee_blows(Real h);
   void update_pairs(Real h);
   void find_points(ContactPair& pair, Real time, Real h) const;
   bool move_in_broad_phase(Body& body, bool again);
@@ -147,7 +148,8 @@ struct World::Impl : WorldState {
   // Lists of bodies in slot order, made anew when one was added, removed, fell asleep or woke.
   bool lists_changed = true, pairs_changed = true, joints_changed = false;
   JointTally joint_tally;  // of the sub-step, beside that of the motions
-  std::vector<std::pair<uint32_t, uint32_t>> apart;  // slots of bodies that do not collide, because of a joint
+  std::vector<std::pair<uint32_t, uint32_t>>
+      apart;                            // slots of bodies that do not collide, because of a joint
   std::vector<Body*> awake, kinematic;  // dynamic ones; kinematic ones that move
   std::vector<Body*> stepped;           // all that may have moved in this step
   std::map<uint32_t, std::vector<Body*>> sleeping;

@@ -316,7 +316,7 @@ void fill(Manifold& m, const FacePair& pair, const FaceContact& contact, const P
 }  // namespace
 
 bool box_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin, Manifold& m,
-                  Manifold* more) {
+                  MoreManifolds* more) {
   const Placed at{a_from_b.orientation.toRotationMatrix(), a_from_b.position};
   const Gaps gaps(a.half, b.half, at);
   m.count = 0;
@@ -352,15 +352,17 @@ bool box_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real m
   if (by_edges) {
     const Real cosine = (a_gives ? n : Vec3(b_from_a * n)).cwiseAbs().maxCoeff();
     if (cosine <= kNearFace) return true;
-    fill(*more, pair, pair.contact(margin + rounding, slop), a_from_b, margin, slop, nullptr, nullptr);
-    drop_below(*more, std::min(0.0, axis.gap) + slop);
+    auto& [near, left_out] = more->manifolds;
+    fill(near, pair, pair.contact(margin + rounding, slop), a_from_b, margin, slop, nullptr, &left_out);
+    for (Manifold& further : more->manifolds) drop_below(further, std::min(0.0, axis.gap) + slop);
     return true;
   }
   const Real gap = pair.body == 0 ? gaps.a[pair.face.axis] : gaps.b[pair.face.axis];
   const FaceContact contact = pair.contact(margin + rounding, slop);
   const bool is_known = edges || axis.gap <= 0;
   if (!is_known && !pair.is_distance(gap, contact, margin, slop, rounding)) return false;
-  fill(m, pair, contact, a_from_b, margin, slop, edges ? &*edges : nullptr, more);
+  fill(m, pair, contact, a_from_b, margin, slop, edges ? &*edges : nullptr,
+       more ? &more->manifolds[0] : nullptr);
   return m.count > 0;
 }
 

@@ -12,6 +12,6 @@ namespace offstage::sim {
 /// when the boxes are apart with a vertex or a parallel edge closest to an edge, or where edges are so nearly
 /// parallel that rounding shows.
 bool box_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin, Manifold& manifold,
-                  Manifold* more = nullptr);
+                  MoreManifolds* more = nullptr);
 
 }  // namespace offstage::sim

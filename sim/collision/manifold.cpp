@@ -230,7 +230,7 @@ void edge_manifold(Manifold& m, const Body& a, const Body& b, const Separation& 
 }  // namespace
 
 Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const Separation& s, Real margin,
-                  Manifold* more) {
+                  MoreManifolds* more) {
   Manifold m;
   m.normal = s.normal;
   if (!(s.distance <= margin)) return m;
@@ -244,19 +244,21 @@ Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const 
              tilt_b = tilt(body_b, of_b, body_a, of_a.vertex, s, tolerance);
   const bool by_a = a_gives_normal(tilt_a, tilt_b, a.reach(), b.reach());
   if (std::min(tilt_a, tilt_b) <= kMaxTilt) {
+    Manifold* const left_out = more ? &more->manifolds[0] : nullptr;
     if (by_a)
-      face_manifold(m, body_a, of_a, body_b, of_b, s.on_b, margin, slop, more);
+      face_manifold(m, body_a, of_a, body_b, of_b, s.on_b, margin, slop, left_out);
     else
-      face_manifold(m, body_b, of_b, body_a, of_a, s.on_a, margin, slop, more);
+      face_manifold(m, body_b, of_b, body_a, of_a, s.on_a, margin, slop, left_out);
     return m;
   }
   edge_manifold(m, body_a, body_b, s, margin, slack, tolerance);
   if (!more) return m;
+  auto& [face, left_out] = more->manifolds;
   if (is_near(body_a, of_a) && (by_a || !is_near(body_b, of_b)))
-    face_manifold(*more, body_a, of_a, body_b, of_b, s.on_b, margin, slop, nullptr);
+    face_manifold(face, body_a, of_a, body_b, of_b, s.on_b, margin, slop, &left_out);
   else if (is_near(body_b, of_b))
-    face_manifold(*more, body_b, of_b, body_a, of_a, s.on_a, margin, slop, nullptr);
-  drop_below(*more, std::min(0.0, s.distance) + slop);
+    face_manifold(face, body_b, of_b, body_a, of_a, s.on_a, margin, slop, &left_out);
+  for (Manifold& near : more->manifolds) drop_below(near, std::min(0.0, s.distance) + slop);
   return m;
 }
 

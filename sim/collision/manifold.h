@@ -40,6 +40,12 @@ struct Manifold {
   std::array<ContactPoint, 4> points;  ///< the deepest first
 };
 
+/// Of solids that turn: points left out of more than four; and where an edge or a vertex touches, what comes
+/// near a face besides, with those left out of it.
+struct MoreManifolds {
+  std::array<Manifold, 2> manifolds;
+};
+
 /// The manifold of two solids around their closest (or deepest) points, in A's frame: the features of both
 /// that face each other along the normal, one clipped against the other, keeping what is within `margin` [m]
 /// of touching; of more than four points those that keep the deepest and the area. At least one point if the
@@ -51,11 +57,9 @@ struct Manifold {
 /// their normal and their points while they rock by that little. Of a face of each the less inclined one
 /// gives it; if they are alike (to a thousandth) the larger solid's, or A's.
 ///
-/// `more`, if there is one, gets what of solids that turn may touch next and would otherwise go unseen:
-/// points left out of more than four, and where an edge or a vertex touches what comes near a face besides.
+/// `more`, if there is one, gets what of solids that turn may touch next and would otherwise go unseen.
 Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const Separation& s, Real margin,
-                  Manifold* more = nullptr);
-
+                  MoreManifolds* more = nullptr);
 /// The same manifold in another frame, for instance world_from_a's.
 Manifold placed(const Manifold& m, const Pose& pose);
 

@@ -42,7 +42,7 @@ Separation plane_separation(const Convex& a, const Pose& a_from_plane) {
 
 /// The manifold of two pieces, in the quickest way there is for their cores.
 void find_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin, DistanceMethod method,
-                   PairCache& cache, std::pair<uint32_t, uint32_t> pieces, Manifold& m, Manifold* more) {
+                   PairCache& cache, std::pair<uint32_t, uint32_t> pieces, Manifold& m, MoreManifolds* more) {
   using Core = Convex::Core;
   if (is_sphere_pair(a, b)) {
     sphere_manifold(a, b, a_from_b, margin, m);
@@ -154,11 +154,14 @@ void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose
   }
   const std::size_t before = manifolds.size();
   const auto visit = [&](uint32_t i, uint32_t j) {
-    Manifold more;
+    std::optional<MoreManifolds> more;
+    if (turning) more.emplace();
     find_manifold(a.piece(i), b.piece(j), a_from_b, margin, method, cache, {i, j}, manifolds.emplace_back(),
-                  turning ? &more : nullptr);
+                  more ? &*more : nullptr);
     if (manifolds.back().count == 0) manifolds.pop_back();
-    if (more.count > 0) manifolds.push_back(more);
+    if (!more) return;
+    for (const Manifold& m : more->manifolds)
+      if (m.count > 0) manifolds.push_back(m);
   };
   if (a.piece_count() == 1 && b.piece_count() == 1)
     visit(0, 0);

@@ -25,7 +25,9 @@ void ContactColoring::assign(uint32_t bodies, std::span<const Link> links) {
   begins_.assign(1, 0);
   for (uint32_t c = 0; c < kColors && counts[c] > 0; ++c)
     begins_.push_back(begins_.back() + (counts[c] + kLanes - 1) / kLanes);
-  batches_.assign(begins_.back() + counts[kColors], {kNone, kNone, kNone, kNone});
+  Batch unused;
+  unused.fill(kNone);
+  batches_.assign(begins_.back() + counts[kColors], unused);
   std::array<uint32_t, kColors + 1> filled{};
   for (std::size_t i = 0; i < links.size(); ++i) {
     const uint32_t color = colors_[i], place = filled[color]++;

@@ -11,7 +11,7 @@ namespace offstage::sim {
 
 class ContactColoring {
  public:
-  static constexpr uint32_t kLanes = 4, kNone = UINT32_MAX;
+  static constexpr uint32_t kLanes = 8, kNone = UINT32_MAX;
   /// Patches of one colour, kNone in lanes that are not used.
   using Batch = std::array<uint32_t, kLanes>;
   /// kNone for a body that contacts do not move: it may be in many patches of a colour.

@@ -13,6 +13,10 @@ namespace {
 constexpr Real kSame = 5e-3;
 /// Of squared distances: points of the same features count as so much nearer.
 constexpr Real kSameFeature = 1.0 / 16;
+/// Cosine: a force that is not more inclined than this belongs to the normal.
+constexpr Real kAlong = 0.7;
+/// Of the spread of points, what makes it invertible.
+constexpr Real kFlat = 1e-6;
 
 Pose between(const Pose& a, const Pose& b) {
   return {a.point_to_body(b.position), a.orientation.conjugate() * b.orientation};
@@ -52,6 +56,31 @@ void place(const Manifold& local, const Pose& pose, Manifold& m) {
   }
 }
 
+/// By points: shares of a force at `centre`, in a's frame like `frame`. They make a sum of 1 and, if the
+/// place is among the points, have their centre there: linear over the plane of the points.
+using Weights = std::array<Real, 4>;
+Weights weights(const Manifold& m, const ContactFrame& frame, const Pose& a, const Vec3& centre) {
+  const uint32_t count = m.count;
+  std::array<Eigen::Vector2d, 4> at;
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (uint32_t k = 0; k < count; ++k) {
+    const Vec3 p = a.point_to_body(m.points[k].on_a) - centre;
+    at[k] = {frame.t.dot(p), frame.k.dot(p)};
+    middle += at[k] / count;
+  }
+  Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
+  for (uint32_t k = 0; k < count; ++k) spread += (at[k] - middle) * (at[k] - middle).transpose();
+  // In a line, or at one place, the spread has no inverse: a little more of it does not matter.
+  spread += kFlat * (spread.trace() + kSame * kSame) * Eigen::Matrix2d::Identity();
+  const Eigen::Vector2d slope = -spread.inverse() * middle;
+  Weights result{};
+  Real sum = 0;
+  for (uint32_t k = 0; k < count; ++k)
+    sum += result[k] = std::max(0.0, 1.0 / count + slope.dot(at[k] - middle));
+  for (Real& w : result) w /= sum;
+  return result;
+}
+
 }  // namespace
 
 ContactPair::ContactPair(Body& a, Body& b, const PairSurface& surface)
@@ -89,6 +118,7 @@ void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_wit
     set_frame(placed_[i]);
   }
   recall(before, a);
+  inherit(before, a);
   placed_at_ = a;
 }
 
@@ -143,30 +173,59 @@ void ContactPair::remember(std::vector<Remembered>& points) const {
       points.push_back({placed_at_.point_to_body(p.on_a),
                         placed_at_.vector_to_body(world_vector(m.frame, m.forces[k].last)),
                         placed_at_.vector_to_body(world_vector(m.frame, m.forces[k].mean)), m.torque,
-                        m.mean_torque, p.id});
+                        m.mean_torque, p.id, false});
     }
 }
 
 /// Points that were there before keep their forces: those of the same features, or else nearby.
-void ContactPair::recall(const std::vector<Remembered>& points, const Pose& a) {
+void ContactPair::recall(std::vector<Remembered>& points, const Pose& a) {
   for (PlacedManifold& m : placed_) {
     m.torque = m.mean_torque = 0;
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       m.forces[k] = {};
       const ContactPoint& point = m.manifold.points[k];
       const Vec3 on_a = a.point_to_body(point.on_a);
-      const Remembered* best = nullptr;
+      Remembered* best = nullptr;
       Real nearest = kSame * kSame;
-      for (const Remembered& p : points) {
+      for (Remembered& p : points) {
         const Real distance = (p.on_a - on_a).squaredNorm() * (p.id == point.id ? kSameFeature : 1);
         if (distance >= nearest) continue;
         nearest = distance;
         best = &p;
       }
       if (!best) continue;
+      best->taken = true;
       m.forces[k] = recalled(*best, m.frame, a);
       m.torque = best->torque;
       m.mean_torque = best->mean_torque;
+    }
+  }
+}
+
+/// What acted at points that are gone goes on to act at those that came for them: faces that lie on each
+/// other may have other corners in every step, and what they bear does not change by that. Of the first
+/// manifold along whose normal it is, each point gets a share, so that the sum acts where it did, as far as
+/// the points reach.
+void ContactPair::inherit(std::vector<Remembered>& points, const Pose& a) {
+  for (PlacedManifold& m : placed_) {
+    const ContactFrame frame{a.vector_to_body(m.frame.n), a.vector_to_body(m.frame.t),
+                             a.vector_to_body(m.frame.k)};
+    Vec3 force = Vec3::Zero(), mean = Vec3::Zero(), moment = Vec3::Zero();
+    Real pressure = 0;
+    for (Remembered& p : points) {
+      const Real normal = p.last.dot(frame.n);
+      if (p.taken || !(normal > kAlong * p.last.norm())) continue;
+      p.taken = true;
+      force += p.last;
+      mean += p.mean;
+      moment += normal * p.on_a;
+      pressure += normal;
+    }
+    if (pressure == 0) continue;
+    const Weights shares = weights(m.manifold, frame, a, moment / pressure);
+    for (uint32_t k = 0; k < m.manifold.count; ++k) {
+      m.forces[k].last += shares[k] * frame_vector(frame, force);
+      m.forces[k].mean += shares[k] * frame_vector(frame, mean);
     }
   }
 }

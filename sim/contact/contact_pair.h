@@ -82,10 +82,12 @@ class ContactPair {
     Vec3 on_a, last, mean;
     Real torque, mean_torque;
     uint32_t id;
+    bool taken = false;  ///< by points that are there now
   };
   static PointForce recalled(const Remembered& p, const ContactFrame& frame, const Pose& a);
   void remember(std::vector<Remembered>& points) const;
-  void recall(const std::vector<Remembered>& points, const Pose& a);
+  void recall(std::vector<Remembered>& points, const Pose& a);
+  void inherit(std::vector<Remembered>& points, const Pose& a);
   void reuse(const Pose& a, const Pose& b, const std::vector<Remembered>& points);
   void set_frame(PlacedManifold& m) const;
 

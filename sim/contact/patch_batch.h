@@ -1,16 +1,20 @@
 #pragma once
-/// Four contact patches in SIMD lanes, as the fast solver works on them (relaxation.h).
+/// Eight contact patches in SIMD lanes, as the fast solver works on them (relaxation.h).
 ///
 /// A patch acts by a wrench about its centre, and what it feels is the relative twist there, in its frame.
 /// Both come in two groups of three: the normal group (linear along n, angular about t and k), by which the
 /// normal forces of all points act, and the friction group (linear along t and k, angular about n). A point
 /// at (x, y) along (t, k) has the normal velocity u_n + y w_t - x w_k, and its force f makes the wrench
 /// (f, y f, -x f) of the normal group.
+///
+/// All is in single precision. Of velocities and places only what changes within the step is: a body's
+/// velocity at the start may be great, and what it makes between two bodies is found in double precision.
 
 #include <array>
 #include <cstdint>
 #include <span>
 
+#include "sim/contact/contact_coloring.h"
 #include "sim/contact/lane_vector.h"
 
 namespace offstage::sim {
@@ -18,40 +22,50 @@ namespace offstage::sim {
 struct ContactPatch;
 struct RelaxedBody;
 
-struct BodyTwist {
-  Lanes linear{}, angular{};
-};
-/// A body within a step: its velocity, and how far it has moved and turned since the start.
+/// A body within a step, against one that keeps its velocity: the change of velocity since the start, and how
+/// far that has moved and turned it. Linear in elements 0 to 2, angular in 4 to 6.
 struct BodyMotion {
-  BodyTwist velocity, shift;
+  FloatLanes velocity{}, shift{};
+};
+
+/// Twists and wrenches of the patches, by group.
+struct PatchGroups {
+  LaneVector<FloatLanes> normal;    ///< along n, about t, about k
+  LaneVector<FloatLanes> friction;  ///< along t, along k, about n
 };
 
 struct PatchBatch {
+  using Lanes = FloatLanes;
+  using Vector = LaneVector<Lanes>;
+  using Symmetric = LaneSymmetric<Lanes>;
+  using Index = ContactColoring::Batch;  ///< by lane
+
   struct Point {
-    Lanes x, y;               ///< along t and k [m]
-    Lanes mass;               ///< effective [kg], 0 in lanes that have no such point
-    Lanes start, separation;  ///< at the start of the step; now [m]
-    Lanes impulse, mean;      ///< of a sub-step, and over the time before [N s]
-    Lanes before;             ///< of the sub-steps before [N s]
+    Lanes x, y;           ///< along t and k [m]
+    Lanes mass;           ///< effective [kg], 0 in lanes that have no such point
+    Lanes start;          ///< separation at the start of the step [m]
+    Lanes impulse, mean;  ///< of a sub-step, and over the time before [N s]
+    Lanes before;         ///< of the sub-steps before [N s]
   };
 
-  std::array<uint32_t, 4> a, b, patch;  ///< the body beyond the last and kNone in lanes that are not used
-  std::array<bool, 4> moves_a, moves_b;
-  uint32_t count;  ///< of points, in the lane that has most
-  Real tolerance;  ///< of the next sweep's rounds [m/s]
-  LaneVector n, t, k, arm_a, arm_b;
+  Index a, b, patch;  ///< the body beyond the last and kNone in lanes that are not used
+  std::array<bool, ContactColoring::kLanes> moves_a, moves_b;
+  uint32_t count;   ///< of points, in the lane that has most
+  float tolerance;  ///< of the next sweep's rounds [m/s]
+  Vector n, t, k, arm_a, arm_b;
   Lanes inverse_mass_a, inverse_mass_b;
-  LaneSymmetric inverse_inertia_a, inverse_inertia_b;
+  Symmetric inverse_inertia_a, inverse_inertia_b;
   /// The twist that a unit wrench gives: within the normal group, within the friction group, and of the
   /// friction group by the normal group's wrench.
-  LaneSymmetric normal_mobility, friction_mobility;
-  LaneMatrix coupling;
+  Symmetric normal_mobility, friction_mobility;
+  LaneMatrix<Lanes> coupling;
   /// Of the friction group: 1 / determinant of the part along t and k, 1 / a bound on its eigenvalues, and
   /// 1 / that about n.
   Lanes inverse_determinant, inverse_bound, inverse_spin;
-  LaneVector offset;  ///< along n, t and k [m/s]
+  PatchGroups approach;  ///< the twist that the velocities at the start make, moving surfaces included
+  Lanes conveyed;        ///< of that, what surfaces add along n [m/s]
   Lanes friction_t, friction_k;
-  LaneVector friction_impulse, friction_mean, friction_before;  ///< along t, k, about n, likewise
+  Vector friction_impulse, friction_mean, friction_before;  ///< along t, k, about n, likewise
   Lanes renewal;   ///< share of the difference that means follow their impulses by
   Lanes residual;  ///< by how much the last sweep changed the velocity of the centre [m/s]
   std::array<Point, 4> points;
@@ -59,19 +73,19 @@ struct PatchBatch {
 
 /// Fills a batch and gives the bodies the impulses that the patches' forces make in `substep` [s]. Of
 /// motions there is one more than bodies, for lanes that are not used.
-void prepare(PatchBatch& batch, std::array<uint32_t, 4> patches, std::span<const ContactPatch> all,
+void prepare(PatchBatch& batch, const PatchBatch::Index& patches, std::span<const ContactPatch> all,
              std::span<const RelaxedBody> bodies, std::span<BodyMotion> motions, Real substep);
 
 /// A sub-step ends, and the next one begins with its impulses.
 void begin_substep(PatchBatch& batch);
 
 /// Solves each patch once, for velocities. Where a gap is open, the approach is limited to what closes it in
-/// 1 / `closing` [s].
-void sweep(PatchBatch& batch, std::span<BodyMotion> motions, Real closing);
+/// `substep` [s], `elapsed` [s] after the start.
+void sweep(PatchBatch& batch, std::span<BodyMotion> motions, Real substep, Real elapsed);
 
 /// Moves the bodies, but not their velocities, apart where they overlap: by `share` of the depth, at most
 /// `limit` [m].
-void push_out(PatchBatch& batch, std::span<BodyMotion> motions, Real share, Real limit);
+void push_out(PatchBatch& batch, std::span<BodyMotion> motions, Real elapsed, Real share, Real limit);
 
 /// Gives the patches their forces.
 void report(const PatchBatch& batch, std::span<ContactPatch> patches, Real substep);

@@ -17,13 +17,20 @@ constexpr Real kPushShare = 0.5, kMaxPush = 3;
 constexpr std::size_t kSerialBatches = 48;
 /// A sweep that changes the velocity of a patch by more than this strikes its bodies [m/s]: what else they
 /// touch gets another sweep before they move, or it would be pressed in; and so on, so many times at most.
-constexpr Real kBlow = 0.2;
+constexpr Real kBlow = 0.1;
 constexpr uint32_t kRepeats = 12;
 
 constexpr uint32_t kBatchesPerBlock = 8, kBodiesPerBlock = 128;
 
-Vec3 vector_of(Lanes x) {
+Vec3 linear_part(FloatLanes x) {
   return {x[0], x[1], x[2]};
+}
+Vec3 angular_part(FloatLanes x) {
+  return {x[4], x[5], x[6]};
+}
+FloatLanes joined(const Vec3& linear, const Vec3& angular) {
+  const Eigen::Vector3f v = linear.cast<float>(), w = angular.cast<float>();
+  return FloatLanes{v.x(), v.y(), v.z(), 0, w.x(), w.y(), w.z(), 0};
 }
 
 /// Whether a body's velocity changed by more than steady forces would: twice what the free motion has,
@@ -59,16 +66,16 @@ uint32_t relaxation_substeps(Real duration) {
 
 // Stages
 
-void RelaxationSolver::plan_colors(Stage stage) {
+void RelaxationSolver::plan_colors(Stage stage, uint32_t substep) {
   const std::span<const uint32_t> begins = coloring_.begins();
   for (std::size_t c = 0; c + 1 < begins.size(); ++c)
-    ranges_.push_back({stage, begins[c], begins[c + 1], kBatchesPerBlock});
+    ranges_.push_back({stage, begins[c], begins[c + 1], kBatchesPerBlock, substep});
   const auto end = static_cast<uint32_t>(batches_.size());
-  if (begins.back() < end) ranges_.push_back({stage, begins.back(), end, end - begins.back()});
+  if (begins.back() < end) ranges_.push_back({stage, begins.back(), end, end - begins.back(), substep});
 }
 
 void RelaxationSolver::plan(uint32_t substeps) {
-  const auto bodies = static_cast<uint32_t>(bodies_.size()), batches = static_cast<uint32_t>(batches_.size());
+  const auto bodies = static_cast<uint32_t>(bodies_.size());
   ranges_.clear();
   ranges_.push_back({Stage::start, 0, bodies, kBodiesPerBlock});
   plan_colors(Stage::prepare);
@@ -76,17 +83,17 @@ void RelaxationSolver::plan(uint32_t substeps) {
   if (joints > 0) ranges_.push_back({Stage::start_joints, 0, joints, 1});
   for (uint32_t i = 0; i < substeps; ++i) {
     if (i > 0) ranges_.push_back({Stage::extrapolate, 0, bodies, kBodiesPerBlock});
-    plan_colors(i > 0 ? Stage::solve_next : Stage::solve);
-    ranges_.push_back({Stage::repeat, 0, 1, 1});
+    plan_colors(i > 0 ? Stage::solve_next : Stage::solve, i);
+    ranges_.push_back({Stage::repeat, 0, 1, 1, i});
     if (joints > 0) ranges_.push_back({Stage::join, 0, joints, 1, i + 1});
     ranges_.push_back({Stage::advance, 0, bodies, kBodiesPerBlock});
   }
   // Contacts that closed in the last sub-step still have the velocity that closed them.
-  plan_colors(Stage::push);
-  plan_colors(Stage::solve);
+  plan_colors(Stage::push, substeps);
+  plan_colors(Stage::solve, substeps);
   if (joints > 0) ranges_.push_back({Stage::join_last, 0, joints, 1, substeps});
   ranges_.push_back({Stage::finish, 0, bodies, kBodiesPerBlock});
-  ranges_.push_back({Stage::report, 0, batches, kBatchesPerBlock});
+  plan_colors(Stage::report, substeps);
 }
 
 void RelaxationSolver::run(const Range& range, uint32_t block) {
@@ -105,14 +112,14 @@ void RelaxationSolver::run(const Range& range, uint32_t block) {
     case Stage::extrapolate:
       return each([this](uint32_t i) { extrapolate(i); });
     case Stage::solve:
-      return each([this](uint32_t i) { solve(i); });
+      return each([&](uint32_t i) { solve(i, range.substep); });
     case Stage::solve_next:
-      return each([this](uint32_t i) {
+      return each([&](uint32_t i) {
         begin_substep(batches_[i]);
-        solve(i);
+        solve(i, range.substep);
       });
     case Stage::repeat:
-      return repeat();
+      return repeat(range.substep);
     case Stage::start_joints:
       return each([this](uint32_t i) { joints_->start(i, motions_); });
     case Stage::join:
@@ -123,37 +130,36 @@ void RelaxationSolver::run(const Range& range, uint32_t block) {
     case Stage::advance:
       return each([this](uint32_t i) { advance(i); });
     case Stage::push:
-      return each(
-          [this](uint32_t i) { push_out(batches_[i], motions_, kPushShare, kMaxPush * def_.duration); });
+      return each([&](uint32_t i) {
+        push_out(batches_[i], motions_, def_.duration, kPushShare, kMaxPush * def_.duration);
+      });
     case Stage::finish:
       return each([this](uint32_t i) { finish(i); });
     case Stage::report:
-      return each([this](uint32_t i) { sim::report(batches_[i], patches_, substep_); });
+      return each([this](uint32_t i) { report(i); });
   }
 }
 
 void RelaxationSolver::start(uint32_t i) {
   const RelaxedBody& b = bodies_[i];
-  last_[i] = {lanes(b.velocity), lanes(b.angular_velocity)};
-  motions_[i] = {};
-  motions_[i].velocity = {lanes(Vec3(b.velocity + substep_ * b.free_acceleration)),
-                          lanes(Vec3(b.angular_velocity + substep_ * b.free_angular_acceleration))};
+  last_[i] = FloatLanes{};
+  motions_[i] = {joined(substep_ * b.free_acceleration, substep_ * b.free_angular_acceleration),
+                 FloatLanes{}};
 }
 
 // What the contacts did in the last sub-step, as a guess for the next, and the free motion together: the
 // change of velocity was the sum of both.
 void RelaxationSolver::extrapolate(uint32_t i) {
-  BodyTwist& v = motions_[i].velocity;
-  const BodyTwist now = v;
-  v.linear += now.linear - last_[i].linear;
-  v.angular += now.angular - last_[i].angular;
+  FloatLanes& v = motions_[i].velocity;
+  const FloatLanes now = v;
+  v += now - last_[i];
   last_[i] = now;
 }
 
-void RelaxationSolver::solve(uint32_t i) {
+void RelaxationSolver::solve(uint32_t i, uint32_t substep) {
   PatchBatch& p = batches_[i];
-  sweep(p, motions_, 1 / substep_);
-  for (unsigned lane = 0; lane < 4; ++lane) {
+  sweep(p, motions_, substep_, substep * substep_);
+  for (unsigned lane = 0; lane < ContactColoring::kLanes; ++lane) {
     if (!(p.residual[lane] > kBlow)) continue;
     if (p.moves_a[lane]) struck_[p.a[lane]] = sweep_;
     if (p.moves_b[lane]) struck_[p.b[lane]] = sweep_;
@@ -163,18 +169,18 @@ void RelaxationSolver::solve(uint32_t i) {
 
 bool RelaxationSolver::is_struck(uint32_t i, uint32_t since) const {
   const PatchBatch& p = batches_[i];
-  for (unsigned lane = 0; lane < 4; ++lane)
+  for (unsigned lane = 0; lane < ContactColoring::kLanes; ++lane)
     if (struck_[p.a[lane]] >= since || struck_[p.b[lane]] >= since) return true;
   return false;
 }
 
-void RelaxationSolver::repeat() {
+void RelaxationSolver::repeat(uint32_t substep) {
   for (uint32_t k = 0; k < kRepeats && std::exchange(strikes_, false); ++k) {
     const uint32_t last = sweep_++;
     const auto count = static_cast<uint32_t>(batches_.size());
     for (uint32_t n = 0; n < count; ++n) {
       const uint32_t i = k % 2 == 0 ? count - 1 - n : n;  // there and back: the blow goes both ways
-      if (is_struck(i, last)) solve(i);
+      if (is_struck(i, last)) solve(i, substep);
     }
   }
   ++sweep_;
@@ -182,8 +188,7 @@ void RelaxationSolver::repeat() {
 
 void RelaxationSolver::advance(uint32_t i) {
   BodyMotion& m = motions_[i];
-  m.shift.linear += substep_ * m.velocity.linear;
-  m.shift.angular += substep_ * m.velocity.angular;
+  m.shift += float_lanes(substep_) * m.velocity;
 }
 
 // The sub-steps moved with the velocities at their ends, which closes gaps exactly. For steady forces the
@@ -194,14 +199,39 @@ void RelaxationSolver::finish(uint32_t i) {
   if (b.inverse_mass == 0) return;
   const BodyMotion& m = motions_[i];
   const Real h = def_.duration;
-  const Vec3 v = vector_of(m.velocity.linear), w = vector_of(m.velocity.angular);
-  const Vec3 dv = v - b.velocity, dw = w - b.angular_velocity;
+  const Vec3 dv = linear_part(m.velocity), dw = angular_part(m.velocity);
   const Real late = jumps(b, dv, dw, h) ? 0 : substep_ / 2;
-  b.displacement = vector_of(m.shift.linear) - h * b.velocity - h * h / 2 * b.free_acceleration - late * dv;
-  b.rotation_vector = vector_of(m.shift.angular) - h * b.angular_velocity -
-                      h * h / 2 * b.free_angular_acceleration - late * dw;
-  b.velocity = v;
-  b.angular_velocity = w;
+  b.displacement = linear_part(m.shift) - h * h / 2 * b.free_acceleration - late * dv;
+  b.rotation_vector = angular_part(m.shift) - h * h / 2 * b.free_angular_acceleration - late * dw;
+  b.velocity += has_joints() ? dv : Vec3(h * b.free_acceleration);
+  b.angular_velocity += has_joints() ? dw : Vec3(h * b.free_angular_acceleration);
+}
+
+// Where nothing but contacts acts, velocities are made anew from their impulses: what these give to one body
+// they take from the other, to the last bits of double precision, so that momentum is kept.
+void RelaxationSolver::report(uint32_t i) {
+  sim::report(batches_[i], patches_, substep_);
+  if (has_joints()) return;
+  for (const uint32_t index : coloring_.batches()[i]) {
+    if (index == ContactColoring::kNone) continue;
+    const ContactPatch& p = patches_[index];
+    Vec3 normal = Vec3::Zero();  // the impulse along n and its moments about t and k
+    for (uint32_t k = 0; k < p.count; ++k) {
+      const ContactPatch::Point& q = p.points[k];
+      normal += q.impulse * Vec3(1, q.k, -q.t);
+    }
+    const auto& [n, t, k] = p.frame;
+    const Vec3& friction = p.friction_impulse;
+    const Vec3 impulse = normal.x() * n + friction.x() * t + friction.y() * k;
+    const Vec3 torque = friction.z() * n + normal.y() * t + normal.z() * k;
+    const auto push = [](RelaxedBody& b, const Vec3& arm, const Vec3& by, const Vec3& turn) {
+      if (b.inverse_mass == 0) return;
+      b.velocity += b.inverse_mass * by;
+      b.angular_velocity += b.inverse_inertia * (arm.cross(by) + turn);
+    };
+    push(bodies_[p.a], p.arm_a, impulse, torque);
+    push(bodies_[p.b], p.arm_b, -impulse, -torque);
+  }
 }
 
 void RelaxationSolver::set_up() {
@@ -234,7 +264,8 @@ ContactWork RelaxationSolver::solve(std::span<RelaxedBody> bodies, std::span<Con
   if (joints) joints->finish();
   ContactWork work{.solves = 1, .iterations = def.substeps + 1};
   for (const PatchBatch& p : batches_)
-    for (int lane = 0; lane < 4; ++lane) work.residual = std::max(work.residual, p.residual[lane]);
+    for (unsigned lane = 0; lane < ContactColoring::kLanes; ++lane)
+      work.residual = std::max(work.residual, Real{p.residual[lane]});
   return work;
 }
 

@@ -14,7 +14,7 @@
 /// What is solved is not the point but the patch, the up to four points of a manifold together: its bodies'
 /// relative twist has six components, its impulses make a wrench of six, and a symmetric matrix of 6 x 6 that
 /// is made once per step relates the two. Within a patch all is solved in these, whatever the number of
-/// points. Four patches that share no body are solved at once, one per SIMD lane, colour by colour of the
+/// points. Eight patches that share no body are solved at once, one per SIMD lane, colour by colour of the
 /// contact graph.
 
 #include <array>
@@ -117,15 +117,17 @@ class RelaxationSolver {
 
   void set_up();
   void plan(uint32_t substeps);
-  void plan_colors(Stage stage);
+  void plan_colors(Stage stage, uint32_t substep = 0);
   void run(const Range& range, uint32_t block);
   void start(uint32_t body);
   void extrapolate(uint32_t body);
-  void solve(uint32_t batch);
+  void solve(uint32_t batch, uint32_t substep);
   bool is_struck(uint32_t batch, uint32_t since) const;
-  void repeat();
+  void repeat(uint32_t substep);
   void advance(uint32_t body);
   void finish(uint32_t body);
+  void report(uint32_t batch);
+  bool has_joints() const { return joints_ && joints_->count() > 0; }
 
   std::span<RelaxedBody> bodies_;
   std::span<ContactPatch> patches_;
@@ -136,7 +138,7 @@ class RelaxationSolver {
   ContactColoring coloring_;
   std::vector<PatchBatch> batches_;
   std::vector<BodyMotion> motions_;  // one more than bodies: of unused lanes
-  std::vector<BodyTwist> last_;      // of the sub-step before
+  std::vector<FloatLanes> last_;     // velocities of the sub-step before
   std::vector<Range> ranges_;
   // Sweeps are numbered; those that strike a body leave their number with it.
   uint32_t sweep_ = 0;

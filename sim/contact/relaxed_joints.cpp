@@ -11,25 +11,32 @@ namespace {
 /// Rows times links beyond which what each row does is not kept for all links.
 constexpr std::size_t kMostResponses = 20000;
 
-Vec6 velocity_of(const BodyMotion& m) {
+/// Since the step's start.
+Vec6 change_of(const BodyMotion& m) {
   Vec6 v;
-  for (int i = 0; i < 3; ++i) {
-    v[i] = m.velocity.linear[i];
-    v[i + 3] = m.velocity.angular[i];
+  for (unsigned i = 0; i < 3; ++i) {
+    v[i] = m.velocity[i];
+    v[i + 3] = m.velocity[i + 4];
   }
   return v;
 }
 
+Vec6 velocity_of(const RelaxedBody& b, const BodyMotion& m) {
+  Vec6 v;
+  v << b.velocity, b.angular_velocity;
+  return v + change_of(m);
+}
+
 void add_to(BodyMotion& m, const Vec6& v) {
-  m.velocity.linear += Lanes{v[0], v[1], v[2], 0};
-  m.velocity.angular += Lanes{v[3], v[4], v[5], 0};
+  const Eigen::Matrix<float, 6, 1> f = v.cast<float>();
+  m.velocity += FloatLanes{f[0], f[1], f[2], 0, f[3], f[4], f[5], 0};
 }
 
 /// Without contacts and rows with bounds.
-Vec6 free_velocity(const RelaxedBody& b, Real elapsed) {
+Vec6 free_change(const RelaxedBody& b, Real elapsed) {
   Vec6 v;
-  v << b.velocity + elapsed * b.free_acceleration, b.angular_velocity + elapsed * b.free_angular_acceleration;
-  return v;
+  v << b.free_acceleration, b.free_angular_acceleration;
+  return elapsed * v;
 }
 
 }  // namespace
@@ -130,7 +137,7 @@ void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapse
   Part& part = parts_[p];
   JointSystem& system = part.articulation->system();
   for (std::size_t k = 0; k < part.bodies.size(); ++k)
-    part.velocities[k] = velocity_of(motions[part.bodies[k]]) - free_velocity(bodies_[part.bodies[k]], elapsed);
+    part.velocities[k] = change_of(motions[part.bodies[k]]) - free_change(bodies_[part.bodies[k]], elapsed);
   system.relative(part.velocities, part.change);
   for (Vec6& c : part.change) c = -c;
   std::vector<Vec6>& correction = part.velocities;
@@ -145,8 +152,8 @@ void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapse
     const BoundedRow& r = problem_.bounded[i];
     Row& row = rows_[i];
     Real u = r.offset;
-    if (r.a != kUnmoved) u += r.on_a.dot(velocity_of(motions[r.a]));
-    if (r.b != kUnmoved) u += r.on_b.dot(velocity_of(motions[r.b]));
+    if (r.a != kUnmoved) u += r.on_a.dot(velocity_of(bodies_[r.a], motions[r.a]));
+    if (r.b != kUnmoved) u += r.on_b.dot(velocity_of(bodies_[r.b], motions[r.b]));
     const Real wanted = row.impulse - (u - r.target + row.softness * row.impulse) * row.inverse_stiffness;
     const Real next = std::clamp(wanted, row.lower, row.upper);
     push(part, i, next - row.impulse, motions);

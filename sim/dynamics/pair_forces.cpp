@@ -151,11 +151,11 @@ struct Cloud {
 /// The force on particle i by all others.
 template <class Kernel>
 Vec3 force_by_all(const Kernel& kernel, const Cloud& c, std::size_t i) {
-  LaneVector sum{};
+  LaneVector<Lanes> sum{};
   const Lanes x = lanes(c.x[i]), y = lanes(c.y[i]), z = lanes(c.z[i]), w = lanes(c.w[i]);
   for (std::size_t j = 0; j < c.x.size(); j += 4) {
     const auto four = [&](const std::vector<Real>& v) { return Lanes(_mm256_loadu_pd(&v[j])); };
-    const LaneVector d{x - four(c.x), y - four(c.y), z - four(c.z)};
+    const LaneVector<Lanes> d{x - four(c.x), y - four(c.y), z - four(c.z)};
     // At no distance, as to itself, this is a finite factor times nothing.
     sum = sum + (w * four(c.w) * kernel.factor(dot(d, d))) * d;
   }

@@ -153,7 +153,7 @@ TEST(Relaxation, PushingOutLeavesNoVelocity) {
   EXPECT_LT(s.deepest(), 1e-6);
   EXPECT_LT(s.kinetic_energy(), 1e-12);
   EXPECT_LT((s.bodies[0].pose.position + 3 * (s.bodies[1].pose.position - Vec3(0.1, 0.9, 0.2))).norm(),
-            1e-12);
+            1e-7);
 }
 
 TEST(Relaxation, ForcesAreWeightAndFrictionOfASlidingBox) {
@@ -169,9 +169,9 @@ TEST(Relaxation, ForcesAreWeightAndFrictionOfASlidingBox) {
     }
     if (k < 24) continue;  // until the pressure has moved forward
     const Vec3 tangential = p.force_t * p.frame.t + p.force_k * p.frame.k, v = s.bodies[1].velocity;
-    ASSERT_NEAR(normal, 9.81, 1e-6);
-    ASSERT_NEAR(tangential.norm(), 0.5 * 9.81, 1e-6);
-    ASSERT_LT(tangential.cross(v).norm(), 1e-6 * v.norm());
+    ASSERT_NEAR(normal, 9.81, 1e-5);
+    ASSERT_NEAR(tangential.norm(), 0.5 * 9.81, 1e-5);
+    ASSERT_LT(tangential.cross(v).norm(), 1e-5 * v.norm());
   }
 }
 
