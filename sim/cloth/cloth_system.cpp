@@ -246,7 +246,7 @@ void ClothSystem::close_seams(Real dt) {
   for (std::size_t k = 0; k < seams_.size(); ++k) {
     const Cloth& cloth = *cloths_[seams_[k].cloth];
     const Real closed = cloth.def.self_collision ? cloth.def.thickness : 0;
-    const Real speed = seams_[k].open_length / cloth.def.seam_time;
+    const Real speed = std::max(seams_[k].open_length, cloth.def.thickness) / cloth.def.seam_time;
     const Real now = limit_.tie_length(k, points_);
     const Real planned = seams_[k].open_length - speed * cloth.age;
     limit_.set_tie(k, std::max({planned, closed, now - speed * dt}));
