@@ -69,13 +69,16 @@ std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, R
   };
   const auto pieces = static_cast<uint32_t>(std::min(std::ceil(turn / kTurn), kMostPieces));
   // What touches now has just met.
-  const uint32_t first = pair.separation() <= kTouching ? 1 : 0;
-  for (uint32_t i = first; i < pieces; ++i) {
+  const bool touches = pair.separation() <= kTouching;
+  for (uint32_t i = 0; i < pieces; ++i) {
     const Real begin = from + (h - from) * i / pieces, end = from + (h - from) * (i + 1) / pieces;
     const PosePath path_a(place(pair.a(), begin), place(pair.a(), end)),
         path_b(place(pair.b(), begin), place(pair.b(), end));
-    const auto impact = time_of_impact(MovingShape{pair.a().collision_shape(), path_a},
-                                       MovingShape{pair.b().collision_shape(), path_b}, kTouching / 2);
+    const MovingShape a{pair.a().collision_shape(), path_a}, b{pair.b().collision_shape(), path_b};
+    std::optional<sim::Impact> impact;
+    const bool met =
+        (i == 0 && touches) || ((impact = time_of_impact(a, b, kTouching / 2)) && impact->share == 0);
+    if (met) impact = time_of_next_impact(a, b, kTouching / 2, def.collision_speed * (end - begin));
     if (impact) return begin + impact->share * (end - begin);
   }
   return std::nullopt;

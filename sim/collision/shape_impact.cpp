@@ -13,6 +13,8 @@ namespace {
 
 constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 constexpr int kMaxAdvances = 2000;
+/// How often touching shapes are looked at on their way.
+constexpr int kLooks = 32;
 
 using Node = AabbTree::Node;
 
@@ -116,6 +118,11 @@ class Instant {
   std::optional<Separation> contact_;
 };
 
+/// Of the point at a place of the world on its way [m per step].
+Vec3 velocity(const PosePath& path, Real share, const Vec3& place) {
+  return path.velocity() + path.angular_velocity(share).cross(place - path.at(share).position);
+}
+
 }  // namespace
 
 std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance) {
@@ -151,6 +158,28 @@ std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b,
   if (const auto s = separation(a.shape, b.shape, Instant(a, b, impact.share, tolerance).a_from_b(), none))
     impact.separation = *s;
   return impact;
+}
+
+std::optional<Impact> time_of_next_impact(const MovingShape& a, const MovingShape& b, Real tolerance,
+                                          Real speed) {
+  PairCache cache;
+  for (int look = 1; look < kLooks; ++look) {
+    const Real share = Real(look) / kLooks;
+    const Pose pose_a = a.path.at(share), pose_b = b.path.at(share);
+    const Pose a_from_b{pose_a.point_to_body(pose_b.position),
+                        pose_a.orientation.conjugate() * pose_b.orientation};
+    const auto s = separation(a.shape, b.shape, a_from_b, cache, DistanceMethod::gjk, tolerance);
+    if (!s) {
+      const PosePath rest_a(pose_a, a.path.end()), rest_b(pose_b, b.path.end());
+      auto impact = time_of_impact({a.shape, rest_a}, {b.shape, rest_b}, tolerance);
+      if (impact) impact->share = share + impact->share * (1 - share);
+      return impact;
+    }
+    const Vec3 at_a = pose_a.point_to_world(s->on_a), at_b = pose_a.point_to_world(s->on_b);
+    const Vec3 approach = velocity(b.path, share, at_b) - velocity(a.path, share, at_a);
+    if (approach.dot(pose_a.vector_to_world(s->normal)) > speed) return Impact{share, *s, look, true};
+  }
+  return std::nullopt;
 }
 
 }  // namespace offstage::sim

@@ -310,6 +310,35 @@ TEST(TimeOfImpact, OfNonConvexSolidsAgreesWithBisection) {
   EXPECT_GT(impacts, 20);
 }
 
+TEST(TimeOfNextImpact, ARodThatTouchesMeetsTheGroundAgainWithItsOtherEnd) {
+  TriangleMesh sheet_mesh;
+  sheet_mesh.vertices = {{-2, 0, -2}, {2, 0, -2}, {2, 0, 2}, {-2, 0, 2}};
+  sheet_mesh.triangles = {{0, 2, 1}, {0, 3, 2}};
+  const Piece rod(Box{{1, 0.02, 0.02}}), plane(Plane{}), sheet(sheet_mesh, false), slab(Box{{4, 1, 4}});
+  constexpr Real kTilt = 0.2, kTolerance = 1e-5, kSpeed = 0.01;
+  const Real high = 0.5 * std::sin(kTilt) + 0.01 * std::cos(kTilt);  // of the centre, when an end touches
+  for (const Piece* ground : {&plane, &sheet, &slab}) {
+    const PosePath rest(pose({0, ground == &slab ? -0.5 : 0, 0}));
+    const auto next = [&](const Pose& start, const Pose& end) {
+      const PosePath way(start, end);
+      return time_of_next_impact({rod.collision, way}, {ground->collision, rest}, kTolerance, kSpeed);
+    };
+    const Pose start = pose({0, high, 0}, kTilt);
+    const auto rocks = next(start, pose({0, high, 0}, -2 * kTilt));
+    ASSERT_TRUE(rocks);
+    const Pose then = PosePath(start, pose({0, high, 0}, -2 * kTilt)).at(rocks->share);
+    EXPECT_NEAR(then.point_to_world({0.5, -0.01, 0}).y(), 0, 1e-3);
+    EXPECT_NEAR(then.vector_to_world(Vec3::UnitX()).y(), -std::sin(kTilt), 1e-3) << "the other end";
+    EXPECT_NEAR(rocks->separation.distance, 0, 2 * kTolerance);
+
+    EXPECT_FALSE(next(start, pose({0, high + 0.2, 0}, kTilt / 2))) << "lifts off";
+    const Pose flat = pose({0, 0.01, 0});
+    EXPECT_FALSE(next(flat, pose({0.5, 0.01, 0}, 0.4, Vec3::UnitY()))) << "slides and turns";
+    EXPECT_FALSE(next(flat, pose({0, 0.01 - kSpeed / 2, 0}))) << "slower than an impact";
+    EXPECT_TRUE(next(flat, pose({0, 0.01 - kSpeed * 2, 0}))) << "still comes nearer";
+  }
+}
+
 TEST(PairCache, KeepsWhatIsUsed) {
   PairCache cache;
   cache.of(3, 1).gjk.size = 7;
