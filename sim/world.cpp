@@ -441,6 +441,28 @@ std::vector<ContactState> World::contacts() const {
   return states;
 }
 
+std::vector<BodyOverlap> World::overlaps(Real least) const {
+  impl_->update_articulations();  // joined bodies pass through each other
+  BroadPhase boxes;
+  impl_->bodies.for_each([&](BodyHandle handle, const auto& body) {
+    if (body->def.collides) boxes.insert(handle.index, bounds(body->solid, body->pose), !body->is_dynamic());
+  });
+  std::vector<BodyOverlap> found;
+  for (const IndexPair& pair : boxes.pairs()) {
+    Body* a = impl_->bodies[impl_->bodies.at_slot(pair.a)].get();
+    Body* b = impl_->bodies[impl_->bodies.at_slot(pair.b)].get();
+    if (impl_->are_jointed(*a, *b)) continue;
+    if (a->collision_shape().is_plane()) std::swap(a, b);
+    const Pose a_from_b{a->pose.point_to_body(b->pose.position),
+                        a->pose.orientation.conjugate() * b->pose.orientation};
+    PairCache none;
+    const auto s =
+        separation(a->collision_shape(), b->collision_shape(), a_from_b, none, DistanceMethod::gjk, -least);
+    if (s) found.push_back({a->handle, b->handle, -s->distance});
+  }
+  return found;
+}
+
 std::optional<uint32_t> World::island(BodyHandle handle) const {
   const Body& body = *impl_->bodies[handle];
   if (!body.is_dynamic()) return std::nullopt;

@@ -195,6 +195,27 @@ void write_text_file(const std::string& path, const std::string& text) {
   render::write_file_atomically(path, {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
 }
 
+/// Bodies that begin in each other, the deepest first: they will be pushed apart, which moves them.
+void add_overlaps(const Scene& scene, const Simulation& simulation, std::vector<Problem>& warnings) {
+  constexpr double kVisible = 1e-3;
+  constexpr std::size_t kMost = 5;
+  const sim::World& world = simulation.world();
+  std::vector<sim::BodyOverlap> overlaps = world.overlaps(kVisible);
+  std::ranges::stable_sort(overlaps, std::ranges::greater{}, &sim::BodyOverlap::depth);
+  const auto place = [&](const std::string& name) {
+    const auto body = std::ranges::find(scene.bodies, name, &Body::name);
+    return body == scene.bodies.end() ? Where{} : body->where;
+  };
+  for (std::size_t i = 0; i < std::min(overlaps.size(), kMost); ++i) {
+    const auto& [a, b, depth] = overlaps[i];
+    const std::string &name = world.body_def(a).name, &other = world.body_def(b).name;
+    warnings.push_back(
+        {place(name), fmt::format("\"{}\" begins {:.3g} mm inside \"{}\"", name, 1e3 * depth, other)});
+  }
+  if (overlaps.size() > kMost)
+    warnings.back().what += fmt::format(", and {} more pairs of bodies overlap", overlaps.size() - kMost);
+}
+
 int validate_command(const SceneOptions& options, bool json) {
   Json result = {
       {"file", options.file}, {"valid", true}, {"errors", Json::array()}, {"warnings", Json::array()}};
@@ -209,6 +230,7 @@ int validate_command(const SceneOptions& options, bool json) {
     LoadedScene loaded = load_scene(options.file, options.overrides());
     const ModelLibrary models(loaded.scene, loaded.folder, options.decompositions(), loaded.warnings);
     const Simulation simulation(loaded.scene, models);  // what only building shows
+    add_overlaps(loaded.scene, simulation, loaded.warnings);
     for (const Problem& warning : loaded.warnings) result["warnings"].push_back(list(warning));
     const MostParticles most = most_particles(loaded.scene);
     result["most_particles"] = most.alive;

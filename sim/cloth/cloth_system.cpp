@@ -344,7 +344,8 @@ bool ClothSystem::shorten_in_pieces() {
   if (!any) return false;
   for (uint32_t i = 0; i < points_.size(); ++i) {
     Frame& frame = frame_of(i);
-    frame.move -= points_.mass[i] / frame.mass * (points_.position[i] - points_.start[i]);
+    if (frame.is_free())
+      frame.move -= points_.mass[i] / frame.mass * (points_.position[i] - points_.start[i]);
   }
   for (uint32_t i = 0; i < points_.size(); ++i)
     if (frame_of(i).is_free()) points_.position[i] += frame_of(i).move;

@@ -74,6 +74,20 @@ TEST(Commands, OpenMeshAsDynamicBodyIsRefusedByValidate) {
   EXPECT_NE(run.err.find("/bodies/0"), std::string::npos) << run.err;
 }
 
+TEST(Commands, ValidateWarnsOfBodiesThatBeginInEachOther) {
+  const TemporaryFolder folder;
+  write_file(folder / "s.json", R"({"version": 1, "bodies": [
+    {"name": "floor", "motion": "static", "shape": {"type": "plane"}},
+    {"name": "rests", "position": [0, 0.5, 0], "shape": {"type": "box", "size": [1, 1, 1]}},
+    {"name": "sunk", "position": [3, 0.49, 0], "shape": {"type": "box", "size": [1, 1, 1]}},
+    {"name": "ghost", "position": [3, 0.5, 0], "collides": false, "shape": {"type": "box", "size": [1, 1, 1]}}]})");
+  const Outcome run = offstage("validate s.json", folder.path());
+  EXPECT_EQ(run.code, 0);
+  EXPECT_NE(run.err.find("/bodies/2: \"sunk\" begins 10 mm inside \"floor\""), std::string::npos) << run.err;
+  EXPECT_EQ(run.err.find("rests"), std::string::npos) << run.err;
+  EXPECT_EQ(run.err.find("ghost"), std::string::npos) << run.err;
+}
+
 TEST(Commands, WrongUsageIsExit2) {
   const TemporaryFolder folder;
   for (const std::string& command :
