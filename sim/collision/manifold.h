@@ -60,6 +60,7 @@ struct MoreManifolds {
 /// `more`, if there is one, gets what of solids that turn may touch next and would otherwise go unseen.
 Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const Separation& s, Real margin,
                   MoreManifolds* more = nullptr);
+
 /// The same manifold in another frame, for instance world_from_a's.
 Manifold placed(const Manifold& m, const Pose& pose);
 

@@ -13,7 +13,8 @@ namespace {
 constexpr Real kSame = 5e-3;
 /// Of squared distances: points of the same features count as so much nearer.
 constexpr Real kSameFeature = 1.0 / 16;
-/// Cosine: a force that is not more inclined than this belongs to the normal.
+/// Cosine: a force that is not more inclined than this belongs to the normal. With a coefficient of friction
+/// of 1 it is 45 degrees away at most.
 constexpr Real kAlong = 0.7;
 /// Of the spread of points, what makes it invertible.
 constexpr Real kFlat = 1e-6;

@@ -455,8 +455,8 @@ void tell_forces(const ContactPatch& patch, Real duration, PlacedManifold& m) {
 void move(Body& body, const RelaxedBody& b) {
   displace(body, b.displacement, b.rotation_vector);
   RigidBody& r = body.rigid;
-  r.momentum = r.mass * b.velocity;
-  r.angular_momentum = angular_momentum(r, r.orientation, b.angular_velocity);
+  r.momentum += b.impulse;
+  r.angular_momentum += b.angular_impulse;
 }
 
 }  // namespace

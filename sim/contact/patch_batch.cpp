@@ -451,8 +451,13 @@ void prepare(PatchBatch& p, const PatchBatch::Index& patches, std::span<const Co
 }
 
 void begin_substep(PatchBatch& p) {
-  for (uint32_t i = 0; i < p.count; ++i) p.points[i].before += p.points[i].impulse;
+  for (uint32_t i = 0; i < p.count; ++i) {
+    PatchBatch::Point& q = p.points[i];
+    q.before += q.impulse;
+    q.shift += q.before;
+  }
   p.friction_before = p.friction_before + p.friction_impulse;
+  p.friction_shift = p.friction_shift + p.friction_before;
 }
 
 // The friction sees the normal impulses of this sweep, and what it does to the normal velocities is made
@@ -488,19 +493,23 @@ void sweep(PatchBatch& p, std::span<BodyMotion> motions, Real substep, Real elap
   scatter<&BodyMotion::velocity>(b, motions, p.b, p.moves_b);
 }
 
-void push_out(PatchBatch& p, std::span<BodyMotion> motions, Real elapsed, Real share, Real limit) {
+void push_out(PatchBatch& p, std::span<BodyMotion> motions, Real substep, Real elapsed, Real share,
+              Real limit) {
+  const FloatLanes time = float_lanes(substep);
   LaneTwist a = gather<&BodyMotion::shift>(motions, p.a), b = gather<&BodyMotion::shift>(motions, p.b);
   Vector moved = moved_normal(p, motions, elapsed);
   Vector change{};
   for (uint32_t i = 0; i < p.count; ++i) {
-    const PatchBatch::Point& q = p.points[i];
+    PatchBatch::Point& q = p.points[i];
     const FloatLanes s = q.start + point_part(q, moved);
     const FloatLanes d =
         q.mass * lane_min(lane_max(float_lanes(-share) * s, FloatLanes{}), float_lanes(limit));
+    q.shift = time * (q.shift + q.before + q.impulse) + d;
     const Vector f = point_wrench(q, d);
     change = change + f;
     moved = moved + p.normal_mobility * f;
   }
+  p.friction_shift = time * (p.friction_shift + p.friction_before + p.friction_impulse);
   apply(p, Groups{change, Vector{}}, a, b);
   scatter<&BodyMotion::shift>(a, motions, p.a, p.moves_a);
   scatter<&BodyMotion::shift>(b, motions, p.b, p.moves_b);
@@ -516,6 +525,7 @@ void report(const PatchBatch& p, std::span<ContactPatch> patches, Real substep) 
       c.points[i].force = q.impulse[lane] / substep;
       c.points[i].mean_force = q.mean[lane] / substep;
       c.points[i].impulse = Real{q.before[lane]} + Real{q.impulse[lane]};
+      c.points[i].shift = q.shift[lane];
     }
     const Vec3 friction = lane_of(p.friction_impulse, lane);
     c.force_t = friction.x() / substep;
@@ -523,6 +533,7 @@ void report(const PatchBatch& p, std::span<ContactPatch> patches, Real substep) 
     c.torque_n = friction.z() / substep;
     c.mean_friction = lane_of(p.friction_mean, lane) / substep;
     c.friction_impulse = lane_of(p.friction_before, lane) + friction;
+    c.friction_shift = lane_of(p.friction_shift, lane);
   }
 }
 

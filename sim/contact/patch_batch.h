@@ -46,6 +46,7 @@ struct PatchBatch {
     Lanes start;          ///< separation at the start of the step [m]
     Lanes impulse, mean;  ///< of a sub-step, and over the time before [N s]
     Lanes before;         ///< of the sub-steps before [N s]
+    Lanes shift;          ///< mass times the way that these brought: in sub-steps [N s], in the end [kg m]
   };
 
   Index a, b, patch;  ///< the body beyond the last and kNone in lanes that are not used
@@ -65,7 +66,7 @@ struct PatchBatch {
   PatchGroups approach;  ///< the twist that the velocities at the start make, moving surfaces included
   Lanes conveyed;        ///< of that, what surfaces add along n [m/s]
   Lanes friction_t, friction_k;
-  Vector friction_impulse, friction_mean, friction_before;  ///< along t, k, about n, likewise
+  Vector friction_impulse, friction_mean, friction_before, friction_shift;  ///< along t, k, about n, likewise
   Lanes renewal;   ///< share of the difference that means follow their impulses by
   Lanes residual;  ///< by how much the last sweep changed the velocity of the centre [m/s]
   std::array<Point, 4> points;
@@ -84,8 +85,9 @@ void begin_substep(PatchBatch& batch);
 void sweep(PatchBatch& batch, std::span<BodyMotion> motions, Real substep, Real elapsed);
 
 /// Moves the bodies, but not their velocities, apart where they overlap: by `share` of the depth, at most
-/// `limit` [m].
-void push_out(PatchBatch& batch, std::span<BodyMotion> motions, Real elapsed, Real share, Real limit);
+/// `limit` [m]. The last sub-step has moved them.
+void push_out(PatchBatch& batch, std::span<BodyMotion> motions, Real substep, Real elapsed, Real share,
+              Real limit);
 
 /// Gives the patches their forces.
 void report(const PatchBatch& batch, std::span<ContactPatch> patches, Real substep);

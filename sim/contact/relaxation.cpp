@@ -6,17 +6,23 @@
 #include <utility>
 
 #include "sim/contact/staged_loop.h"
+#include "sim/dynamics/force_field.h"
 
 namespace offstage::sim {
 namespace {
 
 /// Of the penetration that a step finds, the share that it takes away, and the fastest that it does [m/s].
+/// What one patch moves opens the gaps of others, whose forces are then missing until they close: with 0.65
+/// and 0.8 a wall of 1000 bricks trembled (0.2 and 2 J after 4 s for 0.001), with 1 it fell; with 0.3 the
+/// greatest overlap in heaps was the same.
 constexpr Real kPushShare = 0.5, kMaxPush = 3;
 
 /// Below this a step is not worth a second thread.
 constexpr std::size_t kSerialBatches = 48;
 /// A sweep that changes the velocity of a patch by more than this strikes its bodies [m/s]: what else they
-/// touch gets another sweep before they move, or it would be pressed in; and so on, so many times at most.
+/// touch gets another sweep before they move, or it would be pressed in; and so on, so many times at most. In
+/// a sub-step of 1/1920 s such a speed presses in 0.05 mm. (At half and at twice of it the greatest overlap
+/// of 1000 boxes that fall on a heap was 0.5 and 0.7 mm for 0.8, which is how it scatters, in the same time.)
 constexpr Real kBlow = 0.1;
 constexpr uint32_t kRepeats = 12;
 
@@ -131,7 +137,7 @@ void RelaxationSolver::run(const Range& range, uint32_t block) {
       return each([this](uint32_t i) { advance(i); });
     case Stage::push:
       return each([&](uint32_t i) {
-        push_out(batches_[i], motions_, def_.duration, kPushShare, kMaxPush * def_.duration);
+        push_out(batches_[i], motions_, substep_, def_.duration, kPushShare, kMaxPush * def_.duration);
       });
     case Stage::finish:
       return each([this](uint32_t i) { finish(i); });
@@ -200,38 +206,65 @@ void RelaxationSolver::finish(uint32_t i) {
   const BodyMotion& m = motions_[i];
   const Real h = def_.duration;
   const Vec3 dv = linear_part(m.velocity), dw = angular_part(m.velocity);
-  const Real late = jumps(b, dv, dw, h) ? 0 : substep_ / 2;
-  b.displacement = linear_part(m.shift) - h * h / 2 * b.free_acceleration - late * dv;
-  b.rotation_vector = angular_part(m.shift) - h * h / 2 * b.free_angular_acceleration - late * dw;
-  b.velocity += has_joints() ? dv : Vec3(h * b.free_acceleration);
-  b.angular_velocity += has_joints() ? dw : Vec3(h * b.free_angular_acceleration);
+  late_[i] = jumps(b, dv, dw, h) ? 0 : substep_ / 2;
+  b.impulse = b.angular_impulse = b.displacement = b.rotation_vector = Vec3::Zero();
+  if (!has_joints()) {  // report() adds what contacts do
+    b.velocity += h * b.free_acceleration;
+    b.angular_velocity += h * b.free_angular_acceleration;
+    return;
+  }
+  b.displacement = linear_part(m.shift) - h * h / 2 * b.free_acceleration - late_[i] * dv;
+  b.rotation_vector = angular_part(m.shift) - h * h / 2 * b.free_angular_acceleration - late_[i] * dw;
+  b.velocity += dv;
+  b.angular_velocity += dw;
+  b.impulse = (dv - h * b.free_acceleration) / b.inverse_mass;
+  b.angular_impulse = b.inverse_inertia.inverse() * (dw - h * b.free_angular_acceleration);
 }
 
-// Where nothing but contacts acts, velocities are made anew from their impulses: what these give to one body
-// they take from the other, to the last bits of double precision, so that momentum is kept.
+namespace {
+
+/// About a patch's centre, in world axes: of what the points have along n, and all together along t, k and
+/// about n.
+Wrench wrench(const ContactPatch& p, Real ContactPatch::Point::*normal, const Vec3& friction) {
+  Vec3 sum = Vec3::Zero();  // along n, and the moments about t and k
+  for (uint32_t i = 0; i < p.count; ++i) {
+    const ContactPatch::Point& q = p.points[i];
+    sum += q.*normal * Vec3(1, q.k, -q.t);
+  }
+  const auto& [n, t, k] = p.frame;
+  return {sum.x() * n + friction.x() * t + friction.y() * k, friction.z() * n + sum.y() * t + sum.z() * k};
+}
+
+}  // namespace
+
+/// To both bodies what the patch did in the step, in double precision.
+void RelaxationSolver::give(const ContactPatch& p) {
+  const Wrench impulse = wrench(p, &ContactPatch::Point::impulse, p.friction_impulse);
+  const Wrench shift = wrench(p, &ContactPatch::Point::shift, p.friction_shift);
+  const auto to = [&](uint32_t body, const Vec3& arm, Real sign) {
+    RelaxedBody& b = bodies_[body];
+    if (b.inverse_mass == 0) return;
+    const Real late = late_[body];
+    const Vec3 force = sign * impulse.force, torque = sign * (arm.cross(impulse.force) + impulse.torque);
+    const Vec3 way = sign * shift.force, turn = sign * (arm.cross(shift.force) + shift.torque);
+    b.impulse += force;
+    b.angular_impulse += torque;
+    b.velocity += b.inverse_mass * force;
+    b.angular_velocity += b.inverse_inertia * torque;
+    b.displacement += b.inverse_mass * (way - late * force);
+    b.rotation_vector += b.inverse_inertia * (turn - late * torque);
+  };
+  to(p.a, p.arm_a, 1);
+  to(p.b, p.arm_b, -1);
+}
+
+// Where nothing but contacts acts, motion is made anew from their impulses: what these give to one body they
+// take from the other, to the last bits of double precision, so that momentum is kept.
 void RelaxationSolver::report(uint32_t i) {
   sim::report(batches_[i], patches_, substep_);
   if (has_joints()) return;
-  for (const uint32_t index : coloring_.batches()[i]) {
-    if (index == ContactColoring::kNone) continue;
-    const ContactPatch& p = patches_[index];
-    Vec3 normal = Vec3::Zero();  // the impulse along n and its moments about t and k
-    for (uint32_t k = 0; k < p.count; ++k) {
-      const ContactPatch::Point& q = p.points[k];
-      normal += q.impulse * Vec3(1, q.k, -q.t);
-    }
-    const auto& [n, t, k] = p.frame;
-    const Vec3& friction = p.friction_impulse;
-    const Vec3 impulse = normal.x() * n + friction.x() * t + friction.y() * k;
-    const Vec3 torque = friction.z() * n + normal.y() * t + normal.z() * k;
-    const auto push = [](RelaxedBody& b, const Vec3& arm, const Vec3& by, const Vec3& turn) {
-      if (b.inverse_mass == 0) return;
-      b.velocity += b.inverse_mass * by;
-      b.angular_velocity += b.inverse_inertia * (arm.cross(by) + turn);
-    };
-    push(bodies_[p.a], p.arm_a, impulse, torque);
-    push(bodies_[p.b], p.arm_b, -impulse, -torque);
-  }
+  for (const uint32_t patch : coloring_.batches()[i])
+    if (patch != ContactColoring::kNone) give(patches_[patch]);
 }
 
 void RelaxationSolver::set_up() {
@@ -243,6 +276,7 @@ void RelaxationSolver::set_up() {
   motions_.resize(bodies_.size() + 1);
   motions_.back() = {};
   last_.resize(bodies_.size());
+  late_.resize(bodies_.size());
   sweep_ = 1;
   struck_.assign(bodies_.size() + 1, 0);
   strikes_ = false;

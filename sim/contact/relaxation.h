@@ -40,6 +40,9 @@ struct RelaxedBody {
   Vec3 angular_velocity = Vec3::Zero();   ///< world [rad/s]; likewise
   Vec3 free_acceleration = Vec3::Zero();  ///< mean over the step, without contacts [m/s^2]
   Vec3 free_angular_acceleration = Vec3::Zero();  ///< [rad/s^2]
+  /// Out: what contacts and joints add to the free motion's momentum [N s], and to its angular momentum about
+  /// the centre of mass [N m s]. Of contacts alone, what two bodies give each other is the same to rounding.
+  Vec3 impulse = Vec3::Zero(), angular_impulse = Vec3::Zero();
   /// Out: what contacts add to the free motion of the step [m], [rad]: position = free position +
   /// displacement, orientation = exp(rotation_vector) free orientation.
   Vec3 displacement = Vec3::Zero(), rotation_vector = Vec3::Zero();
@@ -53,6 +56,7 @@ struct ContactPatch {
     Real force = 0;       ///< normal [N]; in: a guess, that of the last step; out: at the end of this one
     Real mean_force = 0;  ///< over the time before [N]; in and out likewise
     Real impulse = 0;     ///< out: of the whole step [N s]
+    Real shift = 0;       ///< out: mass times the way that it moved the bodies in the step [kg m]
   };
   uint32_t a = 0, b = 0;                            ///< indices of bodies; not both unmoved
   ContactFrame frame;                               ///< n from b to a
@@ -66,6 +70,7 @@ struct ContactPatch {
   Real force_t = 0, force_k = 0, torque_n = 0;
   Vec3 mean_friction = Vec3::Zero();     ///< the mean of these, like Point::mean_force
   Vec3 friction_impulse = Vec3::Zero();  ///< likewise, like Point::impulse
+  Vec3 friction_shift = Vec3::Zero();    ///< likewise, like Point::shift
 };
 
 /// Gives a patch the points of a manifold, which is in world axes like the frame, whose n is its normal; the
@@ -127,6 +132,7 @@ class RelaxationSolver {
   void advance(uint32_t body);
   void finish(uint32_t body);
   void report(uint32_t batch);
+  void give(const ContactPatch& patch);
   bool has_joints() const { return joints_ && joints_->count() > 0; }
 
   std::span<RelaxedBody> bodies_;
@@ -139,6 +145,7 @@ class RelaxationSolver {
   std::vector<PatchBatch> batches_;
   std::vector<BodyMotion> motions_;  // one more than bodies: of unused lanes
   std::vector<FloatLanes> last_;     // velocities of the sub-step before
+  std::vector<Real> late_;           // by body: see finish() [s]
   std::vector<Range> ranges_;
   // Sweeps are numbered; those that strike a body leave their number with it.
   uint32_t sweep_ = 0;

@@ -153,7 +153,7 @@ TEST(Relaxation, PushingOutLeavesNoVelocity) {
   EXPECT_LT(s.deepest(), 1e-6);
   EXPECT_LT(s.kinetic_energy(), 1e-12);
   EXPECT_LT((s.bodies[0].pose.position + 3 * (s.bodies[1].pose.position - Vec3(0.1, 0.9, 0.2))).norm(),
-            1e-7);
+            1e-12);
 }
 
 TEST(Relaxation, ForcesAreWeightAndFrictionOfASlidingBox) {
