@@ -192,11 +192,14 @@ int render_to_video(const Plan& plan, const ModelLibrary& models, const RenderOp
   // frames.
   render::VideoDef def = video_def(plan);
   const fs::path partial = def.path.replace_extension(".partial" + plan.target.path.extension().string());
-  if (plan.channels.choice.any())
-    prepare_channels(plan.channels, plan.loaded.scene.frame_count(), options.force);
+  if (plan.channels.choice.any()) prepare_channels(plan.channels.stem.parent_path(), options.force);
   auto sink = render::make_video_sink(def);
   const RunStats stats = draw(plan, models, options, plan.frames, *sink);
-  if (!stats.interrupted_by) fs::rename(partial, plan.target.path);
+  if (!stats.interrupted_by) {
+    fs::rename(partial, plan.target.path);
+    if (!plan.channels.choice.any())
+      remove_channels(channels_folder(plan.target.path));  // of an earlier film
+  }
   report_run(stats, options.talk, options.stats);
   if (!stats.interrupted_by) {
     fmt::print("{}\n", plan.target.path.string());
@@ -261,6 +264,10 @@ int render_command(const RenderOptions& options) {
   if (plan.target.kind == OutputKind::video) {
     render::check_video(video_def(plan));
     if (fs::exists(plan.target.path)) check_file(plan.target.path.string(), options.force);
+    const fs::path stale = channels_folder(plan.target.path);
+    if (!plan.channels.choice.any() && !options.force && holds_channels(stale))
+      throw OutputError(stale.string() +
+                        ": holds channels of an earlier film; remove it, or let --force do so");
   }
   check_file(options.stats, options.force || options.resume);
   check_distinct(options.stats, options.out);

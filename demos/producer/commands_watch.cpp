@@ -172,7 +172,8 @@ class Watcher {
   /// Gives the finished files their names; those of an earlier, longer film go.
   void publish(const fs::path& made) {
     if (target_.kind == OutputKind::video) {
-      // The video, and its folder of channels if it has any.
+      // The video, and its folder of channels if it has any; those of an earlier film go.
+      remove_channels(channels_folder(target_.path));
       for (const auto& entry : fs::directory_iterator(made)) {
         const fs::path place = folder() / entry.path().filename();
         if (entry.is_directory()) fs::remove_all(place);

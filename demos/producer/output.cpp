@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstring>
 #include <fstream>
 
@@ -29,10 +30,26 @@ nlohmann::ordered_json to_json(const Manifest& m, const fs::path& pattern) {
           {"fps", m.fps}};
 }
 
-void remove_channels(const fs::path& stem, int count) {
+void remove_channels_of(const fs::path& stem, int count) {
   std::error_code error;
   for (int k = 1; k <= count; ++k)
     for (const fs::path& path : all_channel_files(stem, k)) fs::remove(path, error);
+}
+
+/// What a film of any length left in its folder of channels.
+std::vector<fs::path> channels_in(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string(), number = name.substr(0, name.find('.'));
+    constexpr std::size_t kMostDigits = 9;
+    if (number.empty() || number.size() > kMostDigits ||
+        !std::ranges::all_of(number, [](unsigned char c) { return std::isdigit(c); }))
+      continue;
+    const std::vector<fs::path> known = all_channel_files(folder / "####", std::stoi(number));
+    if (std::ranges::find(known, entry.path()) != known.end()) files.push_back(entry.path());
+  }
+  return files;
 }
 
 }  // namespace
@@ -107,7 +124,7 @@ std::vector<int> prepare_frames(const fs::path& pattern, const ChannelFiles& cha
       const fs::path old_name = old.value("pattern", pattern.filename().string());
       const int count = std::min(old.value("frames", 0), kMostFrames);
       for (int k = 1; k <= count; ++k) fs::remove(render::frame_path(folder / old_name.filename(), k), error);
-      remove_channels(fs::path(folder / old_name.filename()).replace_extension(), count);
+      remove_channels_of(fs::path(folder / old_name.filename()).replace_extension(), count);
     }
   }
 
@@ -129,12 +146,25 @@ std::vector<int> prepare_frames(const fs::path& pattern, const ChannelFiles& cha
   return missing;
 }
 
-void prepare_channels(const ChannelFiles& channels, int frames, bool replace) {
-  const fs::path folder = channels.stem.parent_path();
+fs::path channels_folder(const fs::path& video) {
+  return fs::path(video).replace_extension(".channels");
+}
+
+bool holds_channels(const fs::path& folder) {
+  return !channels_in(folder).empty();
+}
+
+void remove_channels(const fs::path& folder) {
+  std::error_code error;
+  for (const fs::path& path : channels_in(folder)) fs::remove(path, error);
+  fs::remove(folder, error);  // unless it holds something else
+}
+
+void prepare_channels(const fs::path& folder, bool replace) {
+  if (replace) remove_channels(folder);
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw render::FileError(folder.string() + ": cannot make the folder: " + error.message());
-  if (replace) remove_channels(channels.stem, frames);
   if (!replace && !fs::is_empty(folder))
     throw OutputError(folder.string() + ": holds channels already; replace them with --force");
 }

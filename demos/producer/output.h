@@ -61,8 +61,17 @@ enum class Existing { refuse, keep, replace };
 std::vector<int> prepare_frames(const std::filesystem::path& pattern, const ChannelFiles& channels,
                                 const std::vector<int>& frames, const Manifest& manifest, Existing existing);
 
-/// The same for the channels of a video, of `frames` frames in all.
-void prepare_channels(const ChannelFiles& channels, int frames, bool replace);
+/// Where the channels of a video go: FILM.channels.
+std::filesystem::path channels_folder(const std::filesystem::path& video);
+
+/// Whether there are channels of an earlier film.
+bool holds_channels(const std::filesystem::path& folder);
+
+/// Removes them, whatever their frames and format, and the folder unless it holds something else.
+void remove_channels(const std::filesystem::path& folder);
+
+/// Makes the folder for the channels of a video. Those that are there are refused, or removed to be replaced.
+void prepare_channels(const std::filesystem::path& folder, bool replace);
 
 /// Whether a file is a complete PNG of this size.
 bool is_whole_png(const std::filesystem::path& path, int width_px, int height_px);

@@ -332,6 +332,28 @@ TEST(Render, ChannelsStandInAFolderBesideAVideo) {
   EXPECT_EQ(offstage(command + " --force", folder.path()).code, 0);
 }
 
+TEST(Render, ChannelsOfAnEarlierFilmDoNotStayBesideAnother) {
+  const TemporaryFolder folder;
+  const std::string command = "render " + tiny_scene() + " -o a.gif -q ";
+  const auto names = [&] {
+    std::set<std::string> all;
+    for (const auto& [name, bytes] : contents(folder / "a.channels")) all.insert(name);
+    return all;
+  };
+  ASSERT_EQ(offstage(command + "--frames 1-3 --channels depth", folder.path()).code, 0);
+  ASSERT_EQ(names(), (std::set<std::string>{"0001.exr", "0002.exr", "0003.exr"}));
+  ASSERT_EQ(offstage(command + "--frames 1-2 --channels id --channel-format png --force", folder.path()).code,
+            0);
+  EXPECT_EQ(names(), (std::set<std::string>{"0001.id.png", "0002.id.png"})) << "of a shorter film";
+
+  std::filesystem::remove(folder / "a.gif");
+  EXPECT_EQ(offstage(command + "--frames 1-2", folder.path()).code, 2) << "what is there is kept";
+  EXPECT_EQ(names().size(), 2u);
+  write_file(folder / "a.channels" / "notes.txt", "of someone else");
+  ASSERT_EQ(offstage(command + "--frames 1-2 --force", folder.path()).code, 0);
+  EXPECT_EQ(names(), std::set<std::string>{"notes.txt"}) << "a film without channels";
+}
+
 TEST(Render, ResumeDrawsAFrameAgainThatLacksAChannel) {
   const TemporaryFolder folder;
   const std::string command = "render " + tiny_scene() +
