@@ -229,7 +229,7 @@ int dispatch(int argc, char** argv) {
   render_app->add_option("--format", render.format, "Of standard output: rgba or y4m")
       ->check(CLI::IsMember({"rgba", "y4m"}));
   add_threads(*render_app, render.threads);
-  render_app->add_option("--jobs", render.jobs, "Frames drawn at the same time (default: as --threads)")
+  render_app->add_option("--jobs", render.jobs, "Frames drawn at the same time (default: half of --threads)")
       ->check(CLI::Range(1, 64));
   auto* resume =
       render_app->add_flag("--resume", render.resume, "Keep finished frames that have the same settings");
