@@ -21,6 +21,11 @@ constexpr float kSmooth = 0.3f;        // less rough, a surface shows an image o
 constexpr GLsizei kFewIndices = 1200;  // of a mesh that costs little to draw again
 constexpr float kMirrorSteps = 14;     // along the ray on which it is looked for
 
+constexpr int kManyPixels =
+    100'000;  // to shade in a simpler way, for which another program is worth building
+constexpr int kOpennessReach_px = 6;  // beyond where the sky is hidden that it is looked up
+constexpr float kGrazing = 0.05f;     // sine of the sun's height over a plane below which shadows are endless
+
 // The first three rows of a transform.
 using Rows = std::array<Vector4f, 3>;
 
@@ -37,6 +42,14 @@ const Image* texture_at(std::span<const Image> textures, int index) {
 
 Vector3f corner(const Eigen::AlignedBox3f& box, int k) {
   return box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k));
+}
+
+/// The pixels of an area and those around it, within a picture of a size.
+Eigen::AlignedBox2i around(const ScreenArea& area, int reach_px, int width_px, int height_px) {
+  if (area.empty()) return {};
+  const Eigen::AlignedBox2i pixels = area.pixels(width_px, height_px);
+  return {(pixels.min().array() - reach_px).max(0).matrix(),
+          (pixels.max().array() + reach_px).min(Eigen::Array2i(width_px, height_px)).matrix()};
 }
 
 /// The greatest slope of a surface with this pattern, but for the edges of its stones; none if it is more
@@ -240,6 +253,8 @@ void MeshPass::prepare(std::span<const Instance* const> instances, const View& v
   };
   seen_.clear();
   for (const Item& item : seen) seen_.push_back(item.instance);
+  casting_.clear();
+  for (const Item& item : casting) casting_.push_back(item.instance);
   append(seen, true, rows, opaque_);
   append(glass, false, rows, glass_);
   append(see_through, false, rows, blended_);
@@ -269,8 +284,8 @@ void MeshPass::draw(const Batch& batch, const gl::StreamBuffer& rows, Detail det
                                       batch.first);
 }
 
-gl::LazyProgram& MeshPass::surface_program(const GpuMaterial& material, bool mirror) {
-  const auto key = std::make_tuple(material.pattern, material.textured, material.glass, mirror, features_);
+gl::LazyProgram& MeshPass::surface_program(const GpuMaterial& material, Shading shading) {
+  const auto key = std::make_tuple(material.pattern, material.textured, material.glass, shading, features_);
   const auto found = surface_programs_.find(key);
   if (found != surface_programs_.end()) return found->second;
   std::vector<std::string> defines = features_;
@@ -278,7 +293,8 @@ gl::LazyProgram& MeshPass::surface_program(const GpuMaterial& material, bool mir
   std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "light.glsl", "lamps.glsl",
                                             "material.glsl"};
   if (material.textured) defines.push_back("TEXTURED 1");
-  if (mirror) {
+  if (shading == Shading::unhidden) defines.push_back("UNHIDDEN 1");
+  if (shading == Shading::mirror) {
     defines.push_back("MIRROR 1");
     fragment.push_back("mirror.glsl");
   }
@@ -327,18 +343,41 @@ void MeshPass::draw_depth(const Matrix4f& clip_from_world) {
   }
 }
 
-void MeshPass::draw_opaque() {
+void MeshPass::draw_batch(const Batch& batch, Shading shading) {
   constexpr float kOpaqueAlpha = 0.99f;
-  const auto draw_batch = [this](const Batch& batch) {
-    surface_program(*batch.material).use();
-    glUniform1f(0, kOpaqueAlpha);
-    set_facing(batch, batch.material->two_sided);
-    bind(*batch.material);
-    draw(batch, rows_);
-  };
-  for (const Batch& batch : opaque_) draw_batch(batch);
+  surface_program(*batch.material, shading).use();
+  glUniform1f(0, kOpaqueAlpha);
+  set_facing(batch, batch.material->two_sided);
+  bind(*batch.material);
+  draw(batch, rows_);
+}
+
+void MeshPass::draw_opaque(const View& view, const Hiding& hiding, int width_px, int height_px) {
+  for (const Batch& batch : opaque_) {
+    const Eigen::AlignedBox2i hidden =
+        around(hidden_area(batch, view, hiding), kOpennessReach_px, width_px, height_px);
+    const int inside_px = hidden.isEmpty() ? 0 : hidden.sizes().prod();
+    if (width_px * height_px - inside_px < kManyPixels) {
+      draw_batch(batch, Shading::whole);
+      continue;
+    }
+    glEnable(GL_SCISSOR_TEST);
+    const auto draw_within = [&](int x0, int y0, int x1, int y1, Shading shading) {
+      if (x0 >= x1 || y0 >= y1) return;
+      glScissor(x0, y0, x1 - x0, y1 - y0);
+      draw_batch(batch, shading);
+    };
+    const Eigen::Vector2i low = hidden.isEmpty() ? Eigen::Vector2i(0, 0) : Eigen::Vector2i(hidden.min()),
+                          high = hidden.isEmpty() ? Eigen::Vector2i(0, 0) : Eigen::Vector2i(hidden.max());
+    draw_within(low.x(), low.y(), high.x(), high.y(), Shading::whole);
+    draw_within(0, 0, width_px, low.y(), Shading::unhidden);
+    draw_within(0, low.y(), low.x(), high.y(), Shading::unhidden);
+    draw_within(high.x(), low.y(), width_px, high.y(), Shading::unhidden);
+    draw_within(0, high.y(), width_px, height_px, Shading::unhidden);
+    glDisable(GL_SCISSOR_TEST);
+  }
   for (const Batch& batch : blended_) {
-    if (batch.material->textured) draw_batch(batch);
+    if (batch.material->textured) draw_batch(batch, Shading::whole);
   }
 }
 
@@ -360,6 +399,65 @@ ScreenArea MeshPass::occluded_area(const View& view, float reach,
   }
   for (const Eigen::AlignedBox3f& box : others)
     for (int k = 0; k < 8; ++k) area.add(corner(box, k));
+  return area;
+}
+
+// Of a plane; of anything else all of the picture.
+ScreenArea MeshPass::hidden_area(const Batch& batch, const View& view, const Hiding& hiding) const {
+  ScreenArea area(view, 0);
+  const auto flat = [](const Instance* instance) { return instance->mesh->flat; };
+  const bool alone = hiding.sky_reach_m <= 0 || std::ranges::count_if(seen_, flat) == 1;
+  const Instance& plane = *seen_[batch.first];
+  const Vector3f normal =
+      (plane.world_from_mesh.linear().inverse().transpose() * batch.mesh->flat_normal).normalized();
+  const Vector3f place = plane.world_from_mesh * batch.mesh->center;
+  const float slant = normal.dot(hiding.to_sun);
+  if (!batch.mesh->flat || batch.count > 1 || !alone ||
+      (hiding.shadow_reach_m > 0 && std::abs(slant) < kGrazing)) {
+    area.add_all();
+    return area;
+  }
+  using Corners = std::array<Vector3f, 8>;
+  const auto height = [&](const Vector3f& p) { return normal.dot(p - place); };
+  const auto add_around = [&](const Corners& corners, const Vector3f& direction, float reach) {
+    const Vector3f u = reach * normal.unitOrthogonal(), v = normal.cross(u);
+    for (const Vector3f& p : corners) {
+      const Vector3f q = p - height(p) / normal.dot(direction) * direction;
+      for (const float side : {-1.0f, 1.0f}) {
+        area.add(q + u + side * v);
+        area.add(q - u + side * v);
+      }
+    }
+  };
+  const auto hide_sky = [&](const Corners& corners) {
+    const auto is_far = [&](float side) {
+      return std::ranges::all_of(corners,
+                                 [&](const Vector3f& p) { return side * height(p) > hiding.sky_reach_m; });
+    };
+    if (!is_far(1) && !is_far(-1)) add_around(corners, normal, hiding.sky_reach_m);
+  };
+  const auto corners_of = [](const Instance& instance) {
+    Corners corners;
+    for (int k = 0; k < 8; ++k)
+      corners[static_cast<std::size_t>(k)] = instance.world_from_mesh * corner(instance.mesh->box, k);
+    return corners;
+  };
+  const auto corners_of_box = [](const Eigen::AlignedBox3f& box) {
+    Corners corners;
+    for (int k = 0; k < 8; ++k) corners[static_cast<std::size_t>(k)] = corner(box, k);
+    return corners;
+  };
+  if (hiding.sky_reach_m > 0) {
+    for (const Instance* instance : seen_)
+      if (instance != &plane) hide_sky(corners_of(*instance));
+    for (const Eigen::AlignedBox3f& box : hiding.solid) hide_sky(corners_of_box(box));
+  }
+  if (hiding.shadow_reach_m > 0) {
+    const float reach = hiding.shadow_reach_m / std::abs(slant);
+    for (const Instance* instance : casting_) add_around(corners_of(*instance), hiding.to_sun, reach);
+    for (const Eigen::AlignedBox3f& box : hiding.casting)
+      add_around(corners_of_box(box), hiding.to_sun, reach);
+  }
   return area;
 }
 
@@ -400,7 +498,7 @@ bool MeshPass::find_mirrors(const View& view, float reach, std::span<const Eigen
 void MeshPass::draw_mirrors(float reach) {
   glEnable(GL_SCISSOR_TEST);
   for (const auto& [batch, area] : mirrors_) {
-    surface_program(*batch->material, true).use();
+    surface_program(*batch->material, Shading::mirror).use();
     glUniform1f(0, 0);
     glUniform2f(2, reach, kMirrorSteps);
     set_facing(*batch, batch->material->two_sided);

@@ -71,6 +71,15 @@ struct Instance {
   bool is_ground() const;
 };
 
+/// What can hide light from surfaces, and from how far away; nothing does from no distance.
+struct Hiding {
+  float sky_reach_m = 0;
+  std::vector<Eigen::AlignedBox3f> solid;  ///< boxes around what hides the sky besides the instances
+  Vector3f to_sun = Vector3f::UnitY();
+  float shadow_reach_m = 0;                  ///< across the light
+  std::vector<Eigen::AlignedBox3f> casting;  ///< boxes around what casts shadows besides the instances
+};
+
 class MeshPass {
  public:
   MeshPass();
@@ -80,7 +89,9 @@ class MeshPass {
   void draw_shadows(const Matrix4f& shadow_clip_from_world, bool front_only);
   /// Depth alone of what is wholly opaque, so that only what is seen is shaded.
   void draw_depth(const Matrix4f& clip_from_world);
-  void draw_opaque();
+  /// A plane is shaded without looking for what hides light from it where nothing can, if that is much of a
+  /// picture of this size.
+  void draw_opaque(const View& view, const Hiding& hiding, int width_px, int height_px);
   /// Where opaque surfaces can hide the sky within `reach` [m]: around all but a plane. `others`: boxes
   /// around what is opaque besides the instances.
   ScreenArea occluded_area(const View& view, float reach, std::span<const Eigen::AlignedBox3f> others) const;
@@ -109,21 +120,25 @@ class MeshPass {
   };
   void draw(const Batch& batch, const gl::StreamBuffer& rows, Detail detail = Detail::full);
   void bind(const GpuMaterial& material);
-  gl::LazyProgram& surface_program(const GpuMaterial& material, bool mirror = false);
+  enum class Shading { whole, unhidden, mirror };
+  gl::LazyProgram& surface_program(const GpuMaterial& material, Shading shading = Shading::whole);
   gl::LazyProgram& shadow_program(const GpuMaterial& material);
   static void set_facing(const Batch& batch, bool both_sides);
+  void draw_batch(const Batch& batch, Shading shading);
   static bool mirrors(const Batch& batch);
+  ScreenArea hidden_area(const Batch& batch, const View& view, const Hiding& hiding) const;
   ScreenArea mirrored_area(const Batch& batch, const View& view, float reach,
                            std::span<const Eigen::AlignedBox3f> others) const;
 
-  std::map<std::tuple<Pattern, bool, bool, bool, Features>, gl::LazyProgram>
-      surface_programs_;  ///< textured, glass, mirror
+  std::map<std::tuple<Pattern, bool, bool, Shading, Features>, gl::LazyProgram>
+      surface_programs_;  ///< textured, glass
   gl::LazyProgram opaque_shadow_, dithered_shadow_, textured_shadow_;
   Features features_;
   gl::Texture white_;
   gl::StreamBuffer rows_, shadow_rows_;
   std::vector<Batch> opaque_, glass_, blended_, casters_;
-  std::vector<const Instance*> seen_;  ///< opaque ones, by rows
+  std::vector<const Instance*> seen_;     ///< opaque ones, by rows
+  std::vector<const Instance*> casting_;  ///< by rows
   struct Mirror {
     const Batch* batch;
     Eigen::AlignedBox2i area_px;

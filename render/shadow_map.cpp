@@ -78,8 +78,7 @@ ShadowMap::ShadowMap(int size_px)
 void ShadowMap::mark(const ShadowFrame& frame, std::span<const Caster> balls,
                      std::span<const Eigen::AlignedBox3f> boxes) {
   constexpr float kNothing = 2;  // behind all that the map holds
-  // The search's reach, its four texels at once, and what a place is moved off its surface.
-  const float reach_m = (kWidestPenumbra_px + 6) * frame.texel_m;
+  const float reach_m = search_m(frame);
   const Matrix4f& clip = frame.clip_from_world;
   const Vector3f per_m(clip.row(0).head<3>().norm(), clip.row(1).head<3>().norm(),
                        clip.row(2).head<3>().norm());

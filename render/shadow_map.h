@@ -33,6 +33,12 @@ inline constexpr float kWidestPenumbra_px = 24;
 ShadowFrame fit_shadow(std::span<const Caster> casters, const View& view, const Vector3f& sun_direction,
                        float pixel_m, int size_px);
 
+/// How far beside a caster something of its shadow is found, across the light: the search's reach, its four
+/// texels at once, and what a place is moved off its surface.
+inline float search_m(const ShadowFrame& frame) {
+  return (kWidestPenumbra_px + 6) * frame.texel_m;
+}
+
 class ShadowMap {
  public:
   explicit ShadowMap(int size_px);

@@ -103,7 +103,7 @@ struct Stage::Impl {
   std::vector<const Cloth*> prepare_cloths();
   void draw_shadows(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
                     std::span<PointSet* const> sets, const View& view, const SampleOffsets& offsets,
-                    FrameUniforms& frame);
+                    FrameUniforms& frame, Hiding& hiding);
   void prepare_lamps(std::span<PointSet* const> sets, const SampleOffsets& offsets, FrameUniforms& frame);
   void draw_lamp_shadows(std::span<const Caster> casters, std::span<const Cloth* const> sheets);
   void copy(GLuint from, GLuint to) const;
@@ -113,7 +113,7 @@ struct Stage::Impl {
   void draw_glass();
   void draw_depth(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view);
   void draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view,
-                   std::span<const Eigen::AlignedBox3f> others);
+                   const Hiding& hiding);
   void draw_sheer(std::span<const Cloth* const> sheets);
   void draw_blended(std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame,
                     bool new_frame);
@@ -143,7 +143,7 @@ std::vector<const Cloth*> Stage::Impl::prepare_cloths() {
 
 void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
                                std::span<PointSet* const> sets, const View& view,
-                               const SampleOffsets& offsets, FrameUniforms& frame) {
+                               const SampleOffsets& offsets, FrameUniforms& frame, Hiding& hiding) {
   std::vector<Caster> casters;
   for (const Instance* instance : shown) {
     if (instance->visible && instance->casts_shadow && instance->mesh->index_count > 0 &&
@@ -152,7 +152,7 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
     }
   }
   const std::size_t balls = casters.size();
-  std::vector<Eigen::AlignedBox3f> boxes;
+  std::vector<Eigen::AlignedBox3f>& boxes = hiding.casting;
   for (const Cloth* cloth : sheets) {
     if (cloth->casts_shadow) boxes.push_back(cloth->surface.box());
   }
@@ -183,6 +183,8 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
   upload(frame);
   draw_lamp_shadows(casters, sheets);
   if (shadow.texel_m == 0) return;
+  hiding.to_sun = frame.sun_direction.head<3>();
+  hiding.shadow_reach_m = search_m(shadow);
 
   shadow_map.begin();
   mesh_pass.draw_shadows(shadow.clip_from_world, true);
@@ -289,13 +291,13 @@ void Stage::Impl::draw_depth(std::span<const Cloth* const> sheets, std::span<Poi
 }
 
 void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets,
-                              const View& view, std::span<const Eigen::AlignedBox3f> others) {
+                              const View& view, const Hiding& hiding) {
   glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
   glViewport(0, 0, def.width_px, def.height_px);
   glDepthFunc(GL_GEQUAL);
   for (const Cloth* cloth : sheets)
     if (!cloth->is_sheer()) cloth_pass.draw(*cloth, features);
-  mesh_pass.draw_opaque();
+  mesh_pass.draw_opaque(view, hiding, def.width_px, def.height_px);
   glDisable(GL_CULL_FACE);
   for (const PointSet* set : sets) {
     if (set->def.style == PointStyle::sphere) points_pass.draw_spheres(*set, features);
@@ -308,7 +310,7 @@ void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<Po
   }
   glDepthFunc(GL_GREATER);
   draw_sheer(sheets);
-  draw_mirrors(view, others);
+  draw_mirrors(view, hiding.solid);
   draw_glass();
 }
 
@@ -528,18 +530,19 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   s.prepare_lamps(sets, offsets, frame);
   s.mesh_pass.prepare(shown, view, s.features);
   const std::vector<const Cloth*> sheets = s.prepare_cloths();
-  s.draw_shadows(shown, sheets, sets, view, offsets, frame);
+  Hiding hiding;
+  s.draw_shadows(shown, sheets, sets, view, offsets, frame, hiding);
   s.draw_depth(sheets, sets, view);
-  std::vector<Eigen::AlignedBox3f> others;  // what is opaque besides meshes
   for (const Cloth* cloth : sheets)
-    if (!cloth->is_sheer()) others.push_back(cloth->surface.box());
+    if (!cloth->is_sheer()) hiding.solid.push_back(cloth->surface.box());
   for (const PointSet* set : sets)
-    if (set->def.style == PointStyle::sphere) others.push_back(set->box);
-  const float reach =
+    if (set->def.style == PointStyle::sphere) hiding.solid.push_back(set->box);
+  hiding.sky_reach_m =
       s.environment.occlusion_reach.value_or(kReach * (s.camera.target - s.camera.eye).norm());
-  s.occlusion_pass.draw(s.picture.depth, view, reach, s.mesh_pass.occluded_area(view, reach, others),
-                        offsets.count, frame.shadow.w());
-  s.draw_opaque(sheets, sets, view, others);
+  s.occlusion_pass.draw(s.picture.depth, view, hiding.sky_reach_m,
+                        s.mesh_pass.occluded_area(view, hiding.sky_reach_m, hiding.solid), offsets.count,
+                        frame.shadow.w());
+  s.draw_opaque(sheets, sets, view, hiding);
   s.draw_blended(sets, view, frame, offsets.index == 0);
   s.draw_lines(view);
 

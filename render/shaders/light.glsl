@@ -76,9 +76,13 @@ float shadow_map_visibility(vec3 position, vec3 normal) {
 layout(binding = 5) uniform sampler3D smoke_depth;
 #endif
 
-// The same through smoke.
+// The same through smoke. UNHIDDEN: where nothing solid is near enough to hide the sun or the sky.
 float sun_visibility(vec3 position, vec3 normal) {
+#ifdef UNHIDDEN
+  float visibility = 1.0;
+#else
   float visibility = shadow_map_visibility(position, normal);
+#endif
 #ifdef SMOKE
   visibility *= exp(-texture(smoke_depth, (uniforms.smoke_from_world * vec4(position, 1.0)).xyz).r);
 #endif
@@ -91,12 +95,16 @@ layout(binding = 8) uniform sampler2D openness;  // half the picture's size; y: 
 // Share of the sky that near things leave over a pixel at a distance along the view axis. Of the four texels around it
 // those count that are as far away.
 float open_sky(float distance) {
+#ifdef UNHIDDEN
+  return 1.0;
+#else
   vec2 p = 0.5 * gl_FragCoord.xy + 0.25, f = fract(p - 0.5);
   p /= vec2(textureSize(openness, 0));
   vec4 open = textureGather(openness, p, 0), off = textureGather(openness, p, 1) / distance - 1.0;
   vec4 weight = vec4((1.0 - f.x) * f.y, f.x * f.y, f.x * (1.0 - f.y), (1.0 - f.x) * (1.0 - f.y)) + 0.002;
   weight /= 1.0 + 1e4 * off * off;
   return dot(open, weight) / dot(weight, vec4(1.0));
+#endif
 }
 #endif
 

@@ -42,7 +42,9 @@ float noise(vec3 p) {
 // 1 while a detail of this size is well above the pixel's footprint, 0 when it drowns in it.
 float visible(float footprint, float size) { return 1.0 - smoothstep(0.2, 0.7, footprint / size); }
 
-// The share of a box of width w around p in which a square wave of period 2 is up.
+// The share of a box of width w around p in which a square wave of period 2 is up. On a hem w can be nothing, and
+// rounding all that is left of the difference: a share beyond [0, 1] would make colours negative.
 vec2 square_wave(vec2 p, vec2 w) {
-  return 0.5 + (abs(fract((p - 0.5 * w) * 0.5) - 0.5) - abs(fract((p + 0.5 * w) * 0.5) - 0.5)) / w;
+  w = max(w, 1e-3);
+  return clamp(0.5 + (abs(fract((p - 0.5 * w) * 0.5) - 0.5) - abs(fract((p + 0.5 * w) * 0.5) - 0.5)) / w, 0.0, 1.0);
 }
