@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "sim/coupled_system.h"
+#include "sim/dynamics/free_body.h"
 #include "sim/world_impl.h"
 
 namespace offstage::sim {
@@ -18,6 +19,9 @@ constexpr std::size_t kMaxImpacts = 128, kImpactsPerBody = 4;
 constexpr Real kCluster = 1e-4;
 /// Bodies that turn by more in an interval are looked at in pieces of as much [rad]; at most so many.
 constexpr Real kTurn = 0.5, kMostPieces = 512;
+/// What turns by more in an interval is soon elsewhere than where contact forces of its start are: it flies
+/// [rad].
+constexpr Real kWhirl = 3;
 
 Real spin(const Body& body) {
   return body.is_awake() ? body.start_twist.angular_velocity.norm() : 0;
@@ -25,6 +29,35 @@ Real spin(const Body& body) {
 
 /// Shorter intervals are none [of the sub-step].
 constexpr Real kInstant = 1e-9;
+
+/// A body on its way through its interval, turning as nothing but its spin makes it.
+class Tumbling {
+ public:
+  /// One that whirls flies under gravity, another goes straight to where forces take it.
+  Tumbling(const Body& body, const WorldDef& def, bool whirls, Real h)
+      : body_(body), def_(def), whirls_(whirls), h_(h), turning_(body.start), now_(body.from) {}
+
+  /// Its place at a time of the sub-step of length h, not before the last.
+  Pose go_on(Real time) {
+    if (!body_.is_awake()) return body_.placed_at(time, h_);
+    fly(turning_, {def_.gravity, {}}, integrator(def_.integrator), now_, time - now_, work_);
+    now_ = time;
+    if (!whirls_) {
+      const Real share = (time - body_.from) / (h_ - body_.from);
+      turning_.position = body_.start.position + share * (body_.rigid.position - body_.start.position);
+    }
+    return turning_.pose();
+  }
+
+ private:
+  const Body& body_;
+  const WorldDef& def_;
+  bool whirls_;
+  Real h_;
+  RigidBody turning_;
+  Real now_;
+  IntegratorWorkspace work_;
+};
 
 }  // namespace
 
@@ -49,37 +82,27 @@ std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) co
   return from + impact->share * (h - from);
 }
 
-/// A path knows no more than half a turn: what tumbles faster goes in pieces, each turning about the body's
-/// present axis.
+/// A path knows no more than half a turn: what tumbles faster goes in pieces.
 std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, Real from, Real h,
                                                       Real turn) const {
-  const auto place = [&](const Body& body, Real time) {
-    if (!body.is_awake()) return body.placed_at(time, h);
-    const Vec3 w = body.start_twist.angular_velocity;
-    const Real rate = w.norm(), share = (time - body.from) / (h - body.from);
-    RigidBody at = body.start;
-    at.position += share * (body.rigid.position - body.start.position);
-    if (rate > 0) {
-      const Real half = 0.5 * rate * (time - body.from);
-      const Vec3 axis = w / rate * std::sin(half);
-      at.orientation =
-          (Quat(std::cos(half), axis.x(), axis.y(), axis.z()) * body.start.orientation).normalized();
-    }
-    return at.pose();
-  };
+  const bool whirls = turn > kWhirl;
+  Tumbling body_a(pair.a(), def, whirls, h), body_b(pair.b(), def, whirls, h);
+  Pose begin_a = body_a.go_on(from), begin_b = body_b.go_on(from);
   const auto pieces = static_cast<uint32_t>(std::min(std::ceil(turn / kTurn), kMostPieces));
   // What touches now has just met.
   const bool touches = pair.separation() <= kTouching;
   for (uint32_t i = 0; i < pieces; ++i) {
     const Real begin = from + (h - from) * i / pieces, end = from + (h - from) * (i + 1) / pieces;
-    const PosePath path_a(place(pair.a(), begin), place(pair.a(), end)),
-        path_b(place(pair.b(), begin), place(pair.b(), end));
+    const PosePath path_a(begin_a, body_a.go_on(end)), path_b(begin_b, body_b.go_on(end));
+    begin_a = path_a.end();
+    begin_b = path_b.end();
     const MovingShape a{pair.a().collision_shape(), path_a}, b{pair.b().collision_shape(), path_b};
     std::optional<sim::Impact> impact;
     const bool met =
         (i == 0 && touches) || ((impact = time_of_impact(a, b, kTouching / 2)) && impact->share == 0);
     if (met) impact = time_of_next_impact(a, b, kTouching / 2, def.collision_speed * (end - begin));
     if (impact) return begin + impact->share * (end - begin);
+    if (whirls && touches) return end;  // what the contact did by then is over, or to be found anew
   }
   return std::nullopt;
 }

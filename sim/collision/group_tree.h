@@ -1,7 +1,7 @@
 #pragma once
-/// The bounding tree of a group of objects, as the links of an articulation (physics A2): a balanced hierarchy of
-/// boxes whose leaves are those of the objects, in an order that has neighbours next to each other, so that its
-/// branches are parts of the group. It is refitted as the objects move, and never rebuilt.
+/// The bounding tree of a group of objects, as the links of an articulation (physics A2): a balanced
+/// hierarchy of boxes whose leaves are those of the objects, in an order that has neighbours next to each
+/// other, so that its branches are parts of the group. It is refitted as the objects move, and never rebuilt.
 
 #include <span>
 #include <vector>
@@ -35,7 +35,7 @@ class GroupTree {
                     std::vector<IndexPair>& pairs) const;
 
   std::vector<uint32_t> members_;  // of the leaves
-  std::vector<Aabb> boxes_;        // node i has the children 2 i and 2 i + 1; the root is 1, the leaves come last
+  std::vector<Aabb> boxes_;  // node i has the children 2 i and 2 i + 1; the root is 1, the leaves come last
 };
 
 }  // namespace offstage::sim

@@ -1,7 +1,7 @@
 #pragma once
-/// A broad phase of two levels (physics A2): groups of objects, as the links of articulations, have one box in the
-/// grid, and a tree below it, which finds their pairs with what meets that box and with each other. What does not
-/// belong to a group is in the grid itself.
+/// A broad phase of two levels (physics A2): groups of objects, as the links of articulations, have one box
+/// in the grid, and a tree below it, which finds their pairs with what meets that box and with each other.
+/// What does not belong to a group is in the grid itself.
 
 #include <cstdint>
 #include <span>

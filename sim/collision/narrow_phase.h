@@ -72,8 +72,9 @@ struct MovingShape {
 std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance);
 
 /// The same of shapes that are within the tolerance at the start, and may stay so or part: when their
-/// nearest, or deepest, points approach each other faster than `speed` [m per step], > 0. As there is always
-/// something near, these are looked at here and there on the way, up to where the shapes are apart.
+/// nearest, or deepest, points approach each other faster than `speed` [m per step], > 0, and than the rate
+/// of the turn is off even. As there is always something near, these are looked at here and there on the way,
+/// up to where the shapes are apart.
 std::optional<Impact> time_of_next_impact(const MovingShape& a, const MovingShape& b, Real tolerance,
                                           Real speed);
 

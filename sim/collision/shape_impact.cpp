@@ -118,6 +118,13 @@ class Instant {
   std::optional<Separation> contact_;
 };
 
+/// How far a path's speed may be off that of an even turn, for the points of a shape on it: its rate is that
+/// of an even one within angle^2 / 24 [m per step].
+Real unevenness(const MovingShape& s) {
+  if (s.shape.is_plane()) return 0;
+  return s.path.turn() * s.path.max_acceleration(s.shape.hull().reach()) / 24;
+}
+
 /// Of the point at a place of the world on its way [m per step].
 Vec3 velocity(const PosePath& path, Real share, const Vec3& place) {
   return path.velocity() + path.angular_velocity(share).cross(place - path.at(share).position);
@@ -163,6 +170,7 @@ std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b,
 std::optional<Impact> time_of_next_impact(const MovingShape& a, const MovingShape& b, Real tolerance,
                                           Real speed) {
   PairCache cache;
+  const Real least = speed + unevenness(a) + unevenness(b);
   for (int look = 1; look < kLooks; ++look) {
     const Real share = Real(look) / kLooks;
     const Pose pose_a = a.path.at(share), pose_b = b.path.at(share);
@@ -177,7 +185,7 @@ std::optional<Impact> time_of_next_impact(const MovingShape& a, const MovingShap
     }
     const Vec3 at_a = pose_a.point_to_world(s->on_a), at_b = pose_a.point_to_world(s->on_b);
     const Vec3 approach = velocity(b.path, share, at_b) - velocity(a.path, share, at_a);
-    if (approach.dot(pose_a.vector_to_world(s->normal)) > speed) return Impact{share, *s, look, true};
+    if (approach.dot(pose_a.vector_to_world(s->normal)) > least) return Impact{share, *s, look, true};
   }
   return std::nullopt;
 }

@@ -72,9 +72,11 @@ class BodyBullet : public BothSolvers {
                                           .angular_velocity = 100 * Vec3(u(6), u(7), u(8)),
                                           .density = 8000,
                                           .restitution = e});
+      const Real energy = world.energy().kinetic;
       EXPECT_FALSE(gets_through(world, bullet, plate, max_step))
           << "shot " << i << ", bullet " << i % 7 << ", plate " << i / 7 % 5 << (free ? ", free" : ", fixed")
           << ", restitution " << e << ", step " << max_step;
+      EXPECT_LE(world.energy().kinetic, 1.01 * energy) << "shot " << i;
       world.remove(bullet);
       world.remove(plate);
     }
