@@ -456,9 +456,12 @@ std::vector<BodyOverlap> World::overlaps(Real least) const {
     const Pose a_from_b{a->pose.point_to_body(b->pose.position),
                         a->pose.orientation.conjugate() * b->pose.orientation};
     PairCache none;
+    // Trees are searched down to a limit, which bounds that touch are at 0 of: so it is above that.
     const auto s =
-        separation(a->collision_shape(), b->collision_shape(), a_from_b, none, DistanceMethod::gjk, -least);
-    if (s) found.push_back({a->handle, b->handle, -s->distance});
+        separation(a->collision_shape(), b->collision_shape(), a_from_b, none, DistanceMethod::gjk, least);
+    if (!s || -s->distance <= least) continue;
+    if (!a->is_dynamic()) std::swap(a, b);
+    found.push_back({a->handle, b->handle, -s->distance});
   }
   return found;
 }

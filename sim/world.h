@@ -289,8 +289,8 @@ class World {
   void for_each_particle_system(const std::function<void(ParticleSystemHandle)>& f) const;
   /// The contact points at the end of the last step, in the order of their bodies.
   std::vector<ContactState> contacts() const;
-  /// Bodies that overlap where they are now by more than `least` [m], at least one of each two dynamic, in
-  /// the order of slots. What begins so is pushed apart.
+  /// Bodies that overlap where they are now by more than `least` [m], > 0, in the order of slots; `a` is
+  /// dynamic. What begins so is pushed apart.
   std::vector<BodyOverlap> overlaps(Real least) const;
   /// The group of touching bodies that a body belongs to, numbered in the order of their first bodies; none
   /// for fixed and kinematic bodies.

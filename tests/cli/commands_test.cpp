@@ -77,7 +77,7 @@ TEST(Commands, OpenMeshAsDynamicBodyIsRefusedByValidate) {
 TEST(Commands, ValidateWarnsOfBodiesThatBeginInEachOther) {
   const TemporaryFolder folder;
   write_file(folder / "s.json", R"({"version": 1, "bodies": [
-    {"name": "floor", "motion": "static", "shape": {"type": "plane"}},
+    {"name": "floor", "motion": "static", "shape": {"type": "box", "size": [9, 1, 9]}, "position": [0, -0.5, 0]},
     {"name": "rests", "position": [0, 0.5, 0], "shape": {"type": "box", "size": [1, 1, 1]}},
     {"name": "sunk", "position": [3, 0.49, 0], "shape": {"type": "box", "size": [1, 1, 1]}},
     {"name": "ghost", "position": [3, 0.5, 0], "collides": false, "shape": {"type": "box", "size": [1, 1, 1]}}]})");
