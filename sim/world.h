@@ -146,7 +146,7 @@ struct StepReport {
   Real penetration = 0;          ///< greatest at the start of a sub-step [m]
   uint64_t collisions = 0;       ///< contacts that met faster than WorldDef::collision_speed
   uint64_t tracebacks = 0;       ///< times that bodies were put back to a time of impact
-  uint64_t cut_short = 0;        ///< tracebacks that were given up for a sub-step: too many in it
+  uint64_t cut_short = 0;        ///< pairs that were not traced back any more in a sub-step: too many impacts
   ContactWork exact, fast;       ///< of the solvers of resting contact
   ContactWork impacts;           ///< of the solver of collisions
   IntegratorReport integration;  ///< of the free motion

@@ -142,7 +142,7 @@ void World::Impl::update_pairs(Real h) {
     if (i + 6 < active_pairs.size()) __builtin_prefetch(active_pairs[i + 6]);
     if (i + 3 < active_pairs.size()) active_pairs[i + 3]->prefetch();
     active_pairs[i]->impacts = 0;
-    active_pairs[i]->gave_up = false;
+    active_pairs[i]->gave_up = active_pairs[i]->settled = false;
     find_points(*active_pairs[i], 0, h);
   };
   constexpr std::size_t kParallel = 64, kBlock = 16;
@@ -177,7 +177,7 @@ void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
     pair.by_event = true;
     return;
   }
-  if (!bounces) return;
+  if (!bounces || pair.settled) return;
   for (const PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const ContactPoint& point = m.manifold.points[k];

@@ -74,6 +74,7 @@ class ContactPair {
 
   uint32_t impacts = 0;   ///< in this sub-step
   bool gave_up = false;   ///< too many of them: no more trace-backs in this sub-step
+  bool settled = false;   ///< its points limit the approach in this sub-step even if it would bounce
   bool by_event = false;  ///< an impact of this pair is traced back to; else its points limit the approach
 
  private:
