@@ -16,6 +16,10 @@ namespace offstage::sim {
 /// Its `solid` points into it and to its mesh, so it stays where it was made.
 struct Body {
   // What the contact pairs ask for comes first, so that it lies together.
+ private:
+  std::optional<CollisionShape> collision_shape_;
+
+ public:
   BodyHandle handle;
   MotionType type = MotionType::dynamic;  // as defined, until it left the world's bounds
   bool asleep = false;
@@ -31,8 +35,9 @@ struct Body {
   Pose start_pose;
   Twist start_twist;  // dynamic bodies: of the centre of mass then
   Twist drive;  // kinematic bodies: velocity of the pose's origin and angular velocity, at the interval's end
-  RigidBody start;  // dynamic bodies: its state then
-  RigidBody rigid;  // dynamic bodies only: now
+  Real turning = 0;  // see turning_speed()
+  RigidState start;  // dynamic bodies: its state then
+  RigidBody rigid;   // dynamic bodies only: now
 
   Pose before_substep, before_step;
   Aabb swept;             // around its ways in the sub-step, as the broad phase has it
@@ -45,6 +50,9 @@ struct Body {
   bool is_dynamic() const { return type == MotionType::dynamic; }
   bool is_kinematic() const { return type == MotionType::kinematic; }
   bool is_awake() const { return is_dynamic() && !asleep; }
+  /// The speed at which its turning moves its surface in the interval; none of a sphere, which its centre
+  /// alone moves [m/s].
+  Real turning_speed() const { return is_awake() || is_kinematic() ? turning : 0; }
   bool can_move() const { return is_awake() || (is_kinematic() && def.track.moves()); }
   /// Made when another body first comes near, because a mesh may have to be decomposed for it.
   const CollisionShape& collision_shape();
@@ -53,14 +61,29 @@ struct Body {
   /// An interval begins now.
   void begin_interval(Real time) {
     from = time;
-    start = rigid;
+    start = rigid.state();
     start_twist = {rigid.velocity(), rigid.angular_velocity()};
     start_pose = pose;
+    set_turning(start_twist.angular_velocity, extent + rigid.centre.norm());
+  }
+  /// Where the interval brings it to, kinematic.
+  void drive_to(const Motion& motion) {
+    pose = motion.pose;
+    drive = {motion.velocity, motion.angular_velocity};
+    set_turning(drive.angular_velocity, extent);
   }
   /// A collision changes the velocities of the centre of mass at the interval's start.
   void set_start_velocity(const Vec3& v, const Vec3& w) {
-    start.set_velocity(v, w);
+    start.momentum = rigid.mass * v;
+    start.angular_momentum = rigid.spin_momentum(start.orientation, w);
     start_twist = {v, w};
+    set_turning(w, extent + rigid.centre.norm());
+  }
+  /// The body as it was at the interval's start.
+  RigidBody at_start() const {
+    RigidBody body = rigid;
+    body.set_state(start);
+    return body;
   }
   /// From the interval's start to now.
   PosePath path() const { return {start_pose, pose}; }
@@ -76,7 +99,11 @@ struct Body {
   }
 
  private:
-  std::optional<CollisionShape> collision_shape_;
+  void set_turning(const Vec3& angular_velocity, Real reach) {
+    const bool turns = !std::holds_alternative<Sphere>(def.shape) &&
+                       angular_velocity != Vec3::Zero();  // a plane has no reach
+    turning = turns ? angular_velocity.norm() * reach : 0;
+  }
 };
 
 }  // namespace offstage::sim

@@ -130,25 +130,12 @@ void CoupledSystem::fly_lone(const Integrator& integrator, Real t, Real h, Real 
 void CoupledSystem::save() {
   kept_.clear();
   kept_.reserve(lone_.size());
-  for (const Body* body : lone_) {
-    const RigidBody& r = body->rigid;
-    kept_.push_back({r.position, r.orientation, r.momentum, r.angular_momentum, r.next_step});
-  }
+  for (const Body* body : lone_) kept_.push_back(body->rigid.state());
   for (SpringNetwork& n : networks_) n.save();
 }
 
-void CoupledSystem::restore_lone(std::size_t i) {
-  RigidBody& r = lone_[i]->rigid;
-  const Kept& k = kept_[i];
-  r.position = k.position;
-  r.orientation = k.orientation;
-  r.momentum = k.momentum;
-  r.angular_momentum = k.angular_momentum;
-  r.next_step = k.next_step;
-}
-
 void CoupledSystem::restore() {
-  for (std::size_t i = 0; i < lone_.size(); ++i) restore_lone(i);
+  for (std::size_t i = 0; i < lone_.size(); ++i) lone_[i]->rigid.set_state(kept_[i]);
   for (SpringNetwork& n : networks_) n.restore();
 }
 
@@ -159,7 +146,7 @@ void CoupledSystem::restore(std::span<Body* const> bodies) {
   }
   for (const Body* body : bodies) {
     const auto at = std::lower_bound(lone_index_.begin(), lone_index_.end(), std::pair(body, std::size_t{0}));
-    if (at != lone_index_.end() && at->first == body) restore_lone(at->second);
+    if (at != lone_index_.end() && at->first == body) lone_[at->second]->rigid.set_state(kept_[at->second]);
   }
   for (SpringNetwork& n : networks_)
     if (std::find_first_of(n.bodies().begin(), n.bodies().end(), bodies.begin(), bodies.end()) !=

@@ -40,17 +40,8 @@ class CoupledSystem {
   JointTally joint_tally() const;
 
  private:
-  /// What changes when a body flies.
-  struct Kept {
-    Vec3 position;
-    Quat orientation;
-    Vec3 momentum, angular_momentum;
-    Real next_step;
-  };
-
   void resolve(const WorldState& world, std::span<const ForceDef* const> forces);
   void gather(WorldState& world, std::span<Body* const> bodies, bool all_systems);
-  void restore_lone(std::size_t i);
   void fly_lone(const Integrator& integrator, Real t, Real h, Real tolerance);
 
   bool begins_substep_;
@@ -58,7 +49,7 @@ class CoupledSystem {
   BodyForces forces_;
   std::vector<Body*> lone_;
   std::vector<SpringNetwork> networks_;
-  std::vector<Kept> kept_;                                       // of the lone bodies
+  std::vector<RigidState> kept_;                                 // of the lone bodies
   std::vector<std::pair<const Body*, std::size_t>> lone_index_;  // by address; made when first needed
   IntegratorReport report_;
 };

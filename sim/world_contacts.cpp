@@ -8,6 +8,7 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include "sim/coupled_system.h"
+#include "sim/parallel_loop.h"
 #include "sim/spring_graph.h"
 #include "sim/world_impl.h"
 
@@ -23,6 +24,8 @@ constexpr Real kMargin = 2e-3, kMarginShare = 0.05;
 constexpr Real kFar = 0.25, kFarWithoutBounce = 1;
 /// Room that bodies get in the broad phase: a share of their size, and as far as they get in so many steps.
 constexpr Real kRoom = 0.03, kSteps = 2;
+/// Of the extent: a bow wider than this is of a turn by more than half a radian.
+constexpr Real kWide = 0.036;
 /// How far bodies may shift against each other before their points are found anew [m].
 constexpr Real kReuse = 1e-5, kExactReuse = 1e-8;
 /// Of the speed of what strikes it, a body of the same mass gets this share if it does not bounce: then both
@@ -41,15 +44,20 @@ Real smaller_extent(const Body& a, const Body& b) {
 Aabb swept_bounds(const Body& body) {
   Aabb box = bounds(body.solid, body.start_pose).merged(bounds(body.solid, body.pose));
   Real margin = std::min(kMargin, kMarginShare * body.extent);
-  // A point leaves the chord of its path by no more than an eighth of its greatest acceleration.
-  const PosePath path = body.path();
-  if (path.turn() > 0.5)
-    margin += body.extent;  // whatever way it turns: around the balls that it is in
-  else if (path.turn() > 1e-3)
-    margin += path.max_acceleration(body.extent) / 8;
+  if (!std::holds_alternative<Sphere>(body.def.shape)) {
+    // A point leaves the chord of its path by no more than an eighth of its greatest acceleration. Or,
+    // whatever way the body turns: around the balls that it is in.
+    const Real bow = body.path().max_acceleration(body.extent) / 8;
+    margin += bow > kWide * body.extent ? body.extent : bow;
+  }
   box.min().array() -= margin;
   box.max().array() += margin;
   return box;
+}
+
+/// Whether a body's way is not within what the broad phase has of it.
+bool leaves_swept(const Body& body) {
+  return body.def.collides && !body.swept.contains(swept_bounds(body));
 }
 
 }  // namespace
@@ -82,9 +90,8 @@ PairSurface World::Impl::surface_of(const Body& a, const Body& b) const {
 /// Gives a body's way to the broad phase, with some room, unless it is within what was given before; returns
 /// whether that was needed. In the same sub-step, what was given stays part of it.
 bool World::Impl::move_in_broad_phase(Body& body, bool again) {
-  if (!body.def.collides) return false;
+  if (!leaves_swept(body)) return false;
   Aabb box = swept_bounds(body);
-  if (body.swept.contains(box)) return false;
   // Room for some more steps like this one.
   const Vec3 shift = kSteps * (body.pose.position - body.start_pose.position);
   const Vec3 room = Vec3::Constant(kRoom * body.extent);
@@ -133,7 +140,10 @@ void World::Impl::foresee_blows(Real h) {
 }
 
 void World::Impl::update_pairs(Real h) {
-  for (Body* body : awake) move_in_broad_phase(*body, false);
+  std::vector<uint8_t> leaves(awake.size());
+  for_each_index(awake.size(), [&](std::size_t i) { leaves[i] = leaves_swept(*awake[i]); });
+  for (std::size_t i = 0; i < awake.size(); ++i)
+    if (leaves[i]) move_in_broad_phase(*awake[i], false);
   for (Body* body : kinematic) move_in_broad_phase(*body, false);
   collect_pairs();
   foresee_blows(h);
@@ -168,8 +178,10 @@ void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
   // A blow moves a body no faster than what strikes it.
   const Real blow = std::max(pair.a().blow, pair.b().blow) * left;
   const Real margin = base + std::min(std::max(2 * motion, blow), far);
+  // A blow makes what it moves turn, too.
+  const Real turning = pair.turning_speed() * left + (blow > kMargin ? blow : 0);
   pair.find(pair.a().placed_at(time, h), pair.b().placed_at(time, h), margin, exact ? kExactReuse : kReuse,
-            pair.turning_speed() * left > kTurning);
+            turning > kTurning);
 
   pair.by_event = false;
   if (pair.gave_up) return;
@@ -222,6 +234,7 @@ void World::Impl::find_moving_islands() {
   }
   std::vector<Island> found = find_islands(awake, active_pairs, joined);
   islands.clear();
+  islands.reserve(found.size());
   for (Island& island : found) islands.push_back({std::move(island), motions.front().get(), 0});
   for (const auto& articulation : articulations)
     if (const Body& first = *articulation->bodies().front(); first.is_awake())
@@ -232,7 +245,7 @@ void World::Impl::solve_islands(Real start, Real h, StepReport& report) {
   std::vector<Island*> all;
   for (MovingIsland& island : islands)
     if (has_forces(island)) all.push_back(&island);
-  patience.begin(all, h);
+  if (def.solver == SolverKind::automatic) patience.begin(all, h);
   solve(all, h, start + h, report);
 }
 
@@ -247,9 +260,12 @@ void World::Impl::solve(std::span<Island* const> group, Real duration, Real end,
   std::vector<const Island*> fast;
   std::vector<std::pair<Island*, SolverChoice*>> exact;
   for (Island* island : group) {
+    if (def.solver == SolverKind::fast) {
+      fast.push_back(island);
+      continue;
+    }
     SolverChoice& choice = choices[island->bodies.front()->handle.index];
-    if (def.solver == SolverKind::fast ||
-        (def.solver == SolverKind::automatic && !choice.is_exact_worth(*island, patience))) {
+    if (def.solver == SolverKind::automatic && !choice.is_exact_worth(*island, patience)) {
       fast.push_back(island);
       continue;
     }

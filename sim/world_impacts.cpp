@@ -39,7 +39,7 @@ class Tumbling {
  public:
   /// One that whirls flies under gravity, another goes straight to where forces take it.
   Tumbling(const Body& body, const WorldDef& def, bool whirls, Real h)
-      : body_(body), def_(def), whirls_(whirls), h_(h), turning_(body.start), now_(body.from) {}
+      : body_(body), def_(def), whirls_(whirls), h_(h), turning_(body.at_start()), now_(body.from) {}
 
   /// Its place at a time of the sub-step of length h, not before the last.
   Pose go_on(Real time) {
@@ -254,7 +254,7 @@ void World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepRe
   const CollisionSettings settings{start + time, kCluster, def.collision_speed, def.impact,
                                    def.solver == SolverKind::exact};
   report.collisions += resolve_collisions(island, settings, report.impacts);
-  for (Body* body : island.bodies) body->rigid = body->start;
+  for (Body* body : island.bodies) body->rigid.set_state(body->start);
   if (time >= h * (1 - kInstant)) return;
   // Velocities are others now: what may meet, and what limits whom, too.
   for (ContactPair* pair : island.pairs) find_points(*pair, time, h);

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "sim/coupled_system.h"
+#include "sim/parallel_loop.h"
 #include "sim/world_impl.h"
 
 namespace offstage::sim {
@@ -118,16 +119,14 @@ void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
 
 /// Every body that moves begins a sub-step; kinematic ones are moved through it at once.
 void World::Impl::begin_bodies(Real end) {
-  for (Body* body : awake) {
-    body->before_substep = body->pose;
-    body->begin_interval(0);
-  }
+  for_each_index(awake.size(), [&](std::size_t i) {
+    awake[i]->before_substep = awake[i]->pose;
+    awake[i]->begin_interval(0);
+  });
   for (Body* body : kinematic) {
     body->before_substep = body->pose;
     body->begin_interval(0);
-    const Motion motion = body->def.track.at(end, body->def.pose);
-    body->pose = motion.pose;
-    body->drive = {motion.velocity, motion.angular_velocity};
+    body->drive_to(body->def.track.at(end, body->def.pose));
   }
 }
 

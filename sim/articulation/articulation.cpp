@@ -13,8 +13,8 @@ namespace {
 /// velocities until they fit together as well [m/s].
 constexpr int kMostSteps = 8;
 constexpr Real kTogether = 1e-12;
-/// What has come apart farther than this is brought back by no more in a step: its constraints say little about
-/// so far [m].
+/// What has come apart farther than this is brought back by no more in a step: its constraints say little
+/// about so far [m].
 constexpr Real kFarApart = 0.1;
 constexpr Real kSmall = 1e-4;
 constexpr int kVelocitySteps = 2;
@@ -38,9 +38,9 @@ std::vector<Body*> dynamic_bodies(std::span<Joint* const> joints) {
 
 uint32_t index_in(std::span<Body* const> bodies, const Body* body) {
   if (!is_moved(body)) return JointSystem::kDriven;
-  const auto at = std::lower_bound(
-      bodies.begin(), bodies.end(), body,
-      [](const Body* a, const Body* b) { return a->handle.index < b->handle.index; });
+  const auto at = std::lower_bound(bodies.begin(), bodies.end(), body, [](const Body* a, const Body* b) {
+    return a->handle.index < b->handle.index;
+  });
   return static_cast<uint32_t>(at - bodies.begin());
 }
 
@@ -75,7 +75,8 @@ bool counts_turns(const Joint& joint) {
 LinkMotion link_motion(const Body* body, Real time) {
   if (!body) return {};
   if (body->is_dynamic()) return motion_of(body->rigid);
-  if (!body->is_kinematic()) return {.position = body->pose.position, .axes = body->pose.orientation.toRotationMatrix()};
+  if (!body->is_kinematic())
+    return {.position = body->pose.position, .axes = body->pose.orientation.toRotationMatrix()};
   const Motion m = body->def.track.at(time, body->def.pose);
   return {m.pose.position, m.pose.orientation.toRotationMatrix(), m.velocity, m.angular_velocity};
 }
@@ -110,8 +111,8 @@ Articulation::Articulation(std::vector<Joint*> joints)
   impulses_.resize(joints_.size());
 }
 
-/// A link that a force F pulls at an arm r swings at w^2 = F K / r, where K is the mobility at the joint across the
-/// arm; a string of such links at up to twice that.
+/// A link that a force F pulls at an arm r swings at w^2 = F K / r, where K is the mobility at the joint
+/// across the arm; a string of such links at up to twice that.
 Real Articulation::greatest_frequency() const {
   Real greatest = 0;
   for (std::size_t j = 0; j < joints_.size(); ++j) {
@@ -157,11 +158,12 @@ JointPlace Articulation::place_of(std::size_t j, Real time, std::span<const Link
 void Articulation::read_rows(Real time, std::span<const LinkMotion> motion) {
   LinkMotion still_a, still_b;
   for (std::size_t j = 0; j < joints_.size(); ++j)
-    set_joint_rows(joints_[j]->def, place_of(j, time, motion, still_a, still_b), joints_[j]->length, rows_[j]);
+    set_joint_rows(joints_[j]->def, place_of(j, time, motion, still_a, still_b), joints_[j]->length,
+                   rows_[j]);
 }
 
-void Articulation::add_forces(Real t, std::span<const LinkMotion> motion, std::span<const LinkMobility> mobility,
-                              std::span<Vec6> forces) {
+void Articulation::add_forces(Real t, std::span<const LinkMotion> motion,
+                              std::span<const LinkMobility> mobility, std::span<Vec6> forces) {
   read_rows(t, motion);
   if (!system_.factorize(rows_, mobility)) return;  // settle() will find the same, and count it
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
@@ -224,7 +226,7 @@ void Articulation::count_turns(Real time) {
 
 void Articulation::read_bodies(bool at_start) {
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    const RigidBody& rigid = at_start ? bodies_[i]->start : bodies_[i]->rigid;
+    const RigidBody rigid = at_start ? bodies_[i]->at_start() : bodies_[i]->rigid;
     motion_[i] = motion_of(rigid);
     mobility_[i] = mobility_of(rigid, motion_[i].axes);
     velocities_[i] = join(motion_[i].velocity, motion_[i].angular_velocity);
@@ -253,11 +255,11 @@ void Articulation::residual(Real time, std::span<const Vec6> velocities, std::sp
 }
 
 void Articulation::pass_on_blows(Real time, JointTally& tally) {
-  const bool is_settled = std::equal(bodies_.begin(), bodies_.end(), settled_.begin(), settled_.end(),
-                                     [](const Body* body, const Momenta& m) {
-                                       return body->rigid.momentum == m.linear &&
-                                              body->rigid.angular_momentum == m.angular;
-                                     });
+  const bool is_settled =
+      std::equal(bodies_.begin(), bodies_.end(), settled_.begin(), settled_.end(),
+                 [](const Body* body, const Momenta& m) {
+                   return body->rigid.momentum == m.linear && body->rigid.angular_momentum == m.angular;
+                 });
   if (is_settled && !has_kinematic_) return;
   Real fastest = 0;
   read_bodies();

@@ -203,7 +203,15 @@ Aabb local_bounds(const Solid& s) {
 }
 
 Aabb bounds(const Solid& s, const Pose& pose) {
+  if (const auto* ball = std::get_if<Sphere>(s.shape)) {
+    const Vec3 half = Vec3::Constant(ball->radius);
+    return {pose.position - half, pose.position + half};
+  }
   const Mat3 to_world = pose.orientation.toRotationMatrix();
+  if (const auto* box = std::get_if<Box>(s.shape)) {
+    const Vec3 half = to_world.cwiseAbs() * box->size / 2;
+    return {pose.position - half, pose.position + half};
+  }
   Vec3 low, high;
   for (int i = 0; i < 3; ++i) {
     const Vec3 axis = to_world.row(i);

@@ -45,7 +45,7 @@ void find_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real 
                    PairCache& cache, std::pair<uint32_t, uint32_t> pieces, Manifold& m, MoreManifolds* more) {
   using Core = Convex::Core;
   if (is_sphere_pair(a, b)) {
-    sphere_manifold(a, b, a_from_b, margin, m);
+    sphere_manifold(a, Pose{}, b, a_from_b, margin, m);
     return;
   }
   const bool boxes = a.core == Core::box && b.core == Core::box && a.radius == 0 && b.radius == 0;

@@ -18,9 +18,12 @@ PosePath::PosePath(const Pose& start, const Pose& end)
   if (start_.orientation.coeffs() == end_.orientation.coeffs() || sine_ < 1e-15) sine_ = 0;
   cosine_ = std::max(0.0, rotation.w());
   axis_ = sine_ > 0 ? Vec3(rotation.vec() / sine_) : Vec3::Zero();
-  turn_ = sine_ > 0 ? 2 * std::atan2(sine_, cosine_) : 0;
   const Real half_tangent = sine_ / (1 + cosine_);
   max_acceleration_ = 16 * half_tangent * half_tangent * (1 + half_tangent);
+}
+
+Real PosePath::turn() const {
+  return sine_ > 0 ? 2 * std::atan2(sine_, cosine_) : 0;
 }
 
 Pose PosePath::at(Real share) const {

@@ -23,17 +23,17 @@ class PosePath {
   const Vec3& velocity() const { return velocity_; }
   /// World [rad per step].
   Vec3 angular_velocity(Real share) const;
-  /// The angle between both orientations, 0 to pi [rad].
-  Real turn() const { return turn_; }
+  /// Whether the orientations differ, and the angle between them, 0 to pi [rad].
+  bool turns() const { return sine_ > 0; }
+  Real turn() const;
   /// No point within `reach` of the origin has an acceleration beyond this at any time [m per step^2].
   Real max_acceleration(Real reach) const { return reach * max_acceleration_; }
 
  private:
   Pose start_, end_;
   Vec3 velocity_;
-  Vec3 axis_;           // unit, world
-  Real sine_, cosine_;  // of half the angle of the turn
-  Real turn_;
+  Vec3 axis_;              // unit, world
+  Real sine_, cosine_;     // of half the angle of the turn
   Real max_acceleration_;  // of a point at distance 1
 };
 

@@ -84,11 +84,11 @@ class Instant {
     if (normal.dot(offset) > 0) normal = -normal;  // from B to A
     const Real reach_a = reach(a.volume), reach_b = reach(b.volume);
     Gap gap{std::max(gap_a, gap_b) - placement_.slack, normal.dot(closing_), 0};
-    if (a_.path.turn() > 0) {
+    if (a_.path.turns()) {
       gap.rate += spin_a_.cross(normal).norm() * reach_a;
       gap.acceleration += a_.path.max_acceleration(reach_a);
     }
-    if (b_.path.turn() > 0) {
+    if (b_.path.turns()) {
       gap.rate += spin_b_.cross(normal).norm() * reach_b;
       gap.acceleration += b_.path.max_acceleration(reach_b);
     }

@@ -107,27 +107,30 @@ bool is_sphere_pair(const Convex& a, const Convex& b) {
   return (a.core == Core::point && is_known(b)) || (b.core == Core::point && is_known(a));
 }
 
-void sphere_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin, Manifold& m) {
+void sphere_manifold(const Convex& a, const Pose& pose_a, const Convex& b, const Pose& pose_b, Real margin,
+                     Manifold& m) {
   const uint32_t other = b.core == Core::point ? 0 : 1;
-  const Vec3 centre = other == 0 ? a_from_b.position : a_from_b.point_to_body(Vec3::Zero());
-  const Nearest n = nearest(other == 0 ? a : b, centre);
+  const Pose& pose = other == 0 ? pose_a : pose_b;
+  const Vec3& centre = other == 0 ? pose_b.position : pose_a.position;
+  const Nearest n = nearest(other == 0 ? a : b, pose.point_to_body(centre));
   const Real separation = n.distance - a.radius - b.radius;
   m.count = 0;
   if (!(separation <= margin)) return;
+  const Vec3 outward = pose.vector_to_world(n.outward);
   m.source = NormalSource::points;
-  m.normal = other == 0 ? Vec3(-n.outward) : a_from_b.vector_to_world(n.outward);
+  m.normal = other == 0 ? Vec3(-outward) : outward;
   m.radius_a = a.radius;
   m.radius_b = b.radius;
-  set_source(m, n, other, other == 0 ? n.edge : a_from_b.vector_to_world(n.edge));
-  // From the sphere's centre, which is in A's frame 0 or B's position.
+  set_source(m, n, other, pose.vector_to_world(n.edge));
+  // From the sphere's centre.
   ContactPoint& p = m.points[m.count++];
   p.separation = separation;
   p.id = contact_id(n, other);
   if (other == 0) {
-    p.on_b = a_from_b.position + b.radius * m.normal;
+    p.on_b = centre + b.radius * m.normal;
     p.on_a = p.on_b + separation * m.normal;
   } else {
-    p.on_a = -a.radius * m.normal;
+    p.on_a = centre - a.radius * m.normal;
     p.on_b = p.on_a - separation * m.normal;
   }
 }

@@ -54,11 +54,11 @@ Real Gap::time_to(Real target) const {
 Gap closing_gap(const MovingConvex& a, const MovingConvex& b, Real share, Real distance, const Vec3& normal) {
   Gap gap{distance, normal.dot(b.path.velocity() - a.path.velocity()), 0};
   // -n.(w x r) = r.(w x n) for the points of A, and n.(w x r) = r.(n x w) for those of B.
-  if (a.path.turn() > 0) {
+  if (a.path.turns()) {
     gap.rate += extent(a.shape, a.path.at(share).orientation, a.path.angular_velocity(share).cross(normal));
     gap.acceleration += a.path.max_acceleration(a.shape.reach());
   }
-  if (b.path.turn() > 0) {
+  if (b.path.turns()) {
     gap.rate += extent(b.shape, b.path.at(share).orientation, normal.cross(b.path.angular_velocity(share)));
     gap.acceleration += b.path.max_acceleration(b.shape.reach());
   }
@@ -101,8 +101,8 @@ std::optional<Impact> time_of_plane_impact(const MovingConvex& a, const PosePath
     const Vec3 turning = w.cross(up);
     Gap gap{s.distance, -up.dot(travel) - turning.dot(pose.position - ground.position), 0};
     gap.rate += extent(a.shape, pose.orientation, spin.cross(up) - turning);
-    const Real fastest = a.path.turn() > 0 ? std::sqrt(a.path.max_acceleration(1)) : 0,
-               ground_fastest = plane.turn() > 0 ? std::sqrt(plane.max_acceleration(1)) : 0;
+    const Real fastest = a.path.turns() ? std::sqrt(a.path.max_acceleration(1)) : 0,
+               ground_fastest = plane.turns() ? std::sqrt(plane.max_acceleration(1)) : 0;
     gap.acceleration = a.path.max_acceleration(reach) + plane.max_acceleration(lever) +
                        2 * ground_fastest * (travel.norm() + fastest * reach);
     return gap;

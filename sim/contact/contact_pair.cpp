@@ -85,7 +85,7 @@ Weights weights(const Manifold& m, const ContactFrame& frame, const Pose& a, con
 }  // namespace
 
 ContactPair::ContactPair(Body& a, Body& b, const PairSurface& surface)
-    : a_(&a), b_(&b), surface_(surface), quick_(is_sphere_pair(a, b)) {}
+    : a_(&a), b_(&b), surface_(surface), has_sphere_(is_sphere_pair(a, b)) {}
 
 void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_within, bool turning) {
   const Real apart = a_->extent + b_->extent + margin;
@@ -94,19 +94,22 @@ void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_wit
     found_margin_ = 0;
     return;
   }
+  if (has_sphere_) {
+    found_margin_ = margin;
+    return find_one_point(a, b, margin);
+  }
   // Pairs are found side by side; what they need for a moment is each thread's own.
   static thread_local std::vector<Remembered> before;
-  static thread_local std::vector<Manifold> scratch;
+  static thread_local std::vector<Manifold> found;
+  const Pose a_from_b = between(a, b);
   before.clear();
   remember(before);
-  const Pose a_from_b = between(a, b);
   const Real reach_b = b_->collision_shape().is_plane() ? a_->extent + a_from_b.position.norm() : b_->extent;
-  if (!quick_ && found_margin_ >= margin && found_margin_ <= 4 * margin && reuse_within > 0 &&
+  if (found_margin_ >= margin && found_margin_ <= 4 * margin && reuse_within > 0 &&
       difference(a_from_b, a_from_b_, reach_b) <= reuse_within) {
     reuse(a, b, before);
     return;
   }
-  std::vector<Manifold>& found = quick_ ? scratch : found_;
   found.clear();
   find_manifolds(a_->collision_shape(), b_->collision_shape(), a_from_b, margin, cache_, DistanceMethod::gjk,
                  found, turning);
@@ -121,6 +124,22 @@ void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_wit
   recall(before, a);
   inherit(before, a);
   placed_at_ = a;
+  found_.clear();
+}
+
+/// Of a sphere. Its force stays as it is in the world, for the sphere turns under it when it rolls.
+void ContactPair::find_one_point(const Pose& a, const Pose& b, Real margin) {
+  const bool known = !placed_.empty();
+  placed_.resize(1);
+  PlacedManifold& m = placed_.front();
+  sphere_manifold(a_->collision_shape().piece(0), a, b_->collision_shape().piece(0), b, margin, m.manifold);
+  if (m.manifold.count == 0) return placed_.clear();
+  const ContactFrame before = m.frame;
+  set_frame(m);
+  if (!known) return;
+  PointForce& f = m.forces[0];
+  const Vec3 last = frame_vector(m.frame, world_vector(before, f.last));
+  f = {last, last, frame_vector(m.frame, world_vector(before, f.mean)), true};
 }
 
 PointForce ContactPair::recalled(const Remembered& p, const ContactFrame& frame, const Pose& a) {
@@ -130,6 +149,11 @@ PointForce ContactPair::recalled(const Remembered& p, const ContactFrame& frame,
 
 /// The points stay where they are on their bodies; the normal stays with a.
 void ContactPair::reuse(const Pose& a, const Pose& b, const std::vector<Remembered>& points) {
+  if (found_.empty()) {
+    found_.resize(placed_.size());
+    const Pose to_a = between(placed_at_, Pose{});
+    for (std::size_t i = 0; i < placed_.size(); ++i) place(placed_[i].manifold, to_a, found_[i]);
+  }
   std::size_t next = 0;
   for (std::size_t i = 0; i < found_.size(); ++i) {
     const Manifold& local = found_[i];
@@ -147,8 +171,7 @@ void ContactPair::reuse(const Pose& a, const Pose& b, const std::vector<Remember
       const Vec3 middle = (on_a + on_b) / 2;
       m.points[k].on_a = middle + m.points[k].separation / 2 * m.normal;
       m.points[k].on_b = middle - m.points[k].separation / 2 * m.normal;
-      const Remembered& p = points[next++];
-      placed.forces[k] = recalled(p, placed.frame, a);
+      placed.forces[k] = recalled(points[next++], placed.frame, a);
     }
   }
   placed_at_ = a;
@@ -236,18 +259,6 @@ Real ContactPair::separation() const {
   for (const PlacedManifold& m : placed_)
     for (uint32_t k = 0; k < m.manifold.count; ++k) least = std::min(least, m.manifold.points[k].separation);
   return least;
-}
-
-Real ContactPair::turning_speed() const {
-  const auto turning = [](const Body& body) {
-    if (std::holds_alternative<Sphere>(body.def.shape)) return 0.0;  // its centre is what moves its surface
-    if (body.is_awake())
-      return body.start_twist.angular_velocity.norm() * (body.extent + body.start.centre.norm());
-    return body.is_kinematic() && body.drive.angular_velocity != Vec3::Zero()
-               ? body.drive.angular_velocity.norm() * body.extent
-               : 0.0;
-  };
-  return turning(*a_) + turning(*b_);
 }
 
 Real ContactPair::speed_bound() const {

@@ -68,7 +68,7 @@ class ContactPair {
   /// Greatest speed at which a point of the pair can come closer: of all points of both [m/s].
   Real speed_bound() const;
   /// Of it, by their turning alone.
-  Real turning_speed() const;
+  Real turning_speed() const { return a_->turning_speed() + b_->turning_speed(); }
   /// Velocity of a's point against b's at a place of the world, at the interval's start [m/s].
   Vec3 relative_velocity(const Vec3& point) const;
 
@@ -86,6 +86,7 @@ class ContactPair {
     bool taken = false;  ///< by points that are there now
   };
   static PointForce recalled(const Remembered& p, const ContactFrame& frame, const Pose& a);
+  void find_one_point(const Pose& a, const Pose& b, Real margin);
   void remember(std::vector<Remembered>& points) const;
   void recall(std::vector<Remembered>& points, const Pose& a);
   void inherit(std::vector<Remembered>& points, const Pose& a);
@@ -94,10 +95,11 @@ class ContactPair {
 
   Body *a_, *b_;
   PairSurface surface_;
-  bool quick_;  // to find anew, as quick as to take over
+  bool has_sphere_;  // then there is one point at most, as quick to find anew as to take over
   PairCache cache_;
-  std::vector<Manifold> found_;  // in a's frame; none if quick
-  Pose a_from_b_;                // when found
+  // In a's frame; filled only when they are first taken over: what moves has no use for the memory.
+  std::vector<Manifold> found_;
+  Pose a_from_b_;  // when found
   Real found_margin_ = -1;
   Pose placed_at_;  // of a, when placed
   std::vector<PlacedManifold> placed_;

@@ -5,7 +5,7 @@
 #include <limits>
 #include <tuple>
 
-#include <oneapi/tbb/parallel_for.h>
+#include "sim/parallel_loop.h"
 
 namespace offstage::sim {
 namespace {
@@ -114,10 +114,6 @@ Mat3 inverse_inertia(const RigidBody& body, const Quat& orientation) {
   return R * body.inverse_inertia * R.transpose();
 }
 
-Vec3 angular_momentum(const RigidBody& body, const Quat& q, const Vec3& w) {
-  return q * (body.inertia * (q.conjugate() * w));
-}
-
 /// The rotation by a vector of angle times axis: exact enough by series for what contacts turn in a step, and
 /// without trigonometry, whose last bits differ between libraries.
 Quat rotation(const Vec3& v) {
@@ -137,9 +133,8 @@ void displace(Body& body, const Vec3& shift, const Vec3& turn) {
 // Joints
 
 bool has_forces(const Island& island) {
-  return !island.pairs.empty() ||
-         std::any_of(island.articulations.begin(), island.articulations.end(),
-                     [](const Articulation* a) { return a->has_bounded_rows(); });
+  return !island.pairs.empty() || std::any_of(island.articulations.begin(), island.articulations.end(),
+                                              [](const Articulation* a) { return a->has_bounded_rows(); });
 }
 
 void IslandJoints::collect_constraints(const Island& island, Real time, bool at_start) {
@@ -301,7 +296,7 @@ void ExactContacts::move_bodies(const Island& island, Real duration) {
     const Vec3 free_v = free_[i].head<3>(), free_w = free_[i].tail<3>();
     Vec3 dv = bodies_[i].velocity - free_v, dw = bodies_[i].angular_velocity - free_w;
     body.rigid.momentum += body.rigid.mass * dv;
-    body.rigid.angular_momentum += angular_momentum(body.rigid, body.rigid.orientation, dw);
+    body.rigid.angular_momentum += body.rigid.spin_momentum(body.rigid.orientation, dw);
     if (closing_[i]) {
       dv += bodies_[i].velocity - body.start_twist.velocity;
       dw += bodies_[i].angular_velocity - body.start_twist.angular_velocity;
@@ -386,25 +381,11 @@ void SolverChoice::learn(const Island& island, Real duration, bool solved, Solve
 
 namespace {
 
-/// Below so many a loop is not worth a second thread.
-constexpr std::size_t kSerial = 256, kBlock = 64;
-
-template <class Work>
-void for_each_index(std::size_t count, Work&& work) {
-  if (count < kSerial) {
-    for (std::size_t i = 0; i < count; ++i) work(i);
-    return;
-  }
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kBlock), [&](const auto& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) work(i);
-  });
-}
-
 RelaxedBody relaxed(const Body& body, Real duration) {
   RelaxedBody b;
   if (body.is_awake()) {
     b.inverse_mass = 1 / body.rigid.mass;
-    b.inverse_inertia = inverse_inertia(body.start, body.start.orientation);
+    b.inverse_inertia = inverse_inertia(body.rigid, body.start.orientation);
     b.velocity = body.start_twist.velocity;
     b.angular_velocity = body.start_twist.angular_velocity;
     b.free_acceleration = (body.rigid.velocity() - b.velocity) / duration;
@@ -416,23 +397,25 @@ RelaxedBody relaxed(const Body& body, Real duration) {
   return b;
 }
 
-/// Of a manifold, with the forces that it begins with.
+/// Of a manifold, with the forces that it begins with. What the patch was in another step does not matter.
 void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifold& m) {
   const Vec3 centre_a = origin(pair.a()), surface = surface_velocity(pair);
   set_points(patch, m.manifold, m.frame, centre_a, origin(pair.b()));
   const Vec3 u = in_frame(m.frame, pair.relative_velocity(centre_a + patch.arm_a) + surface);
   patch.offset = in_frame(m.frame, surface);
   std::tie(patch.friction_t, patch.friction_k) = friction(pair.surface(), u);
+  Vec3 last(0, 0, m.torque), mean(0, 0, m.mean_torque);
   for (uint32_t k = 0; k < patch.count; ++k) {
     const PointForce& f = m.forces[k];
     patch.points[k].force = f.last.x();
     patch.points[k].mean_force = f.mean.x();
-    patch.mean_friction += Vec3(f.mean.y(), f.mean.z(), 0);
-    patch.force_t += f.last.y();
-    patch.force_k += f.last.z();
+    last.head<2>() += f.last.tail<2>();
+    mean.head<2>() += f.mean.tail<2>();
   }
-  patch.torque_n = m.torque;
-  patch.mean_friction.z() = m.mean_torque;
+  patch.force_t = last.x();
+  patch.force_k = last.y();
+  patch.torque_n = last.z();
+  patch.mean_friction = mean;
 }
 
 /// The patch's friction is shared out by the points' normal forces.
@@ -490,7 +473,8 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
   for_each_index(bodies_.size(), [&](std::size_t i) { bodies_[i] = relaxed(*members_[i], h); });
   for_each_index(patches_.size(), [&](std::size_t i) {
     const auto& [pair, manifold, a, b] = origins_[i];
-    patches_[i] = {.a = a, .b = b, .frame = manifold->frame};
+    patches_[i].a = a;
+    patches_[i].b = b;
     set_patch(patches_[i], *pair, *manifold);
   });
   RelaxedJoints relaxed_joints(joints_.problem(), joints_.articulations(), joints_.bounded_ends());
@@ -581,7 +565,7 @@ uint32_t resolve_collisions(const Island& island, const CollisionSettings& setti
   CollisionCluster cluster;
   for (Body* body : island.bodies) {
     body->row = static_cast<uint32_t>(cluster.bodies.size());
-    cluster.bodies.push_back({1 / body->start.mass, inverse_inertia(body->start, body->start.orientation),
+    cluster.bodies.push_back({1 / body->rigid.mass, inverse_inertia(body->rigid, body->start.orientation),
                               body->start_twist.velocity, body->start_twist.angular_velocity});
   }
   for (const ContactPair* pair : island.pairs)

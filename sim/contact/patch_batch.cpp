@@ -238,7 +238,7 @@ void set_patch(PatchBatch& p, unsigned lane, const ContactPatch& c, Real substep
     q.mean[lane] = narrow(substep * c.points[i].mean_force);
   }
   const bool fresh =
-      std::none_of(c.points.begin(), c.points.end(), [](const auto& q) { return q.force > 0; });
+      std::none_of(c.points.begin(), c.points.begin() + c.count, [](const auto& q) { return q.force > 0; });
   if (fresh) p.tolerance = kSolved;
   p.renewal[lane] = fresh ? 1 : kRenewal;
 }
@@ -493,26 +493,37 @@ void sweep(PatchBatch& p, std::span<BodyMotion> motions, Real substep, Real elap
   scatter<&BodyMotion::velocity>(b, motions, p.b, p.moves_b);
 }
 
-void push_out(PatchBatch& p, std::span<BodyMotion> motions, Real substep, Real elapsed, Real share,
-              Real limit) {
+void end_substeps(PatchBatch& p, Real substep) {
   const FloatLanes time = float_lanes(substep);
-  LaneTwist a = gather<&BodyMotion::shift>(motions, p.a), b = gather<&BodyMotion::shift>(motions, p.b);
-  Vector moved = moved_normal(p, motions, elapsed);
-  Vector change{};
   for (uint32_t i = 0; i < p.count; ++i) {
     PatchBatch::Point& q = p.points[i];
-    const FloatLanes s = q.start + point_part(q, moved);
-    const FloatLanes d =
-        q.mass * lane_min(lane_max(float_lanes(-share) * s, FloatLanes{}), float_lanes(limit));
-    q.shift = time * (q.shift + q.before + q.impulse) + d;
+    q.shift = time * (q.shift + q.before + q.impulse);
+  }
+  p.friction_shift = time * (p.friction_shift + p.friction_before + p.friction_impulse);
+}
+
+FloatLanes push_out(PatchBatch& p, std::span<BodyMotion> motions, const PushOut& push) {
+  LaneTwist a = gather<&BodyMotion::shift>(motions, p.a), b = gather<&BodyMotion::shift>(motions, p.b);
+  Vector moved = moved_normal(p, motions, push.elapsed);
+  Vector change{};
+  FloatLanes farthest{};
+  for (uint32_t i = 0; i < p.count; ++i) {
+    PatchBatch::Point& q = p.points[i];
+    const FloatLanes way = float_lanes(-push.share) * (q.start + point_part(q, moved));
+    const FloatLanes next =
+        lane_min(lane_max(q.push + q.mass * way, FloatLanes{}), q.mass * float_lanes(push.limit));
+    const FloatLanes d = next - q.push;
+    q.push = next;
+    q.shift += d;
+    farthest = d != FloatLanes{} ? lane_max(farthest, lane_abs(way)) : farthest;
     const Vector f = point_wrench(q, d);
     change = change + f;
     moved = moved + p.normal_mobility * f;
   }
-  p.friction_shift = time * (p.friction_shift + p.friction_before + p.friction_impulse);
   apply(p, Groups{change, Vector{}}, a, b);
   scatter<&BodyMotion::shift>(a, motions, p.a, p.moves_a);
   scatter<&BodyMotion::shift>(b, motions, p.b, p.moves_b);
+  return farthest;
 }
 
 void report(const PatchBatch& p, std::span<ContactPatch> patches, Real substep) {

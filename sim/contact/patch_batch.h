@@ -47,6 +47,7 @@ struct PatchBatch {
     Lanes impulse, mean;  ///< of a sub-step, and over the time before [N s]
     Lanes before;         ///< of the sub-steps before [N s]
     Lanes shift;          ///< mass times the way that these brought: in sub-steps [N s], in the end [kg m]
+    Lanes push;           ///< of that, what took penetration away [kg m]
   };
 
   Index a, b, patch;  ///< the body beyond the last and kNone in lanes that are not used
@@ -84,10 +85,18 @@ void begin_substep(PatchBatch& batch);
 /// `substep` [s], `elapsed` [s] after the start.
 void sweep(PatchBatch& batch, std::span<BodyMotion> motions, Real substep, Real elapsed);
 
-/// Moves the bodies, but not their velocities, apart where they overlap: by `share` of the depth, at most
-/// `limit` [m]. The last sub-step has moved them.
-void push_out(PatchBatch& batch, std::span<BodyMotion> motions, Real substep, Real elapsed, Real share,
-              Real limit);
+/// The last sub-step has moved the bodies.
+void end_substeps(PatchBatch& batch, Real substep);
+
+/// How penetration is taken away.
+struct PushOut {
+  Real elapsed;  ///< since the start [s]
+  Real share;    ///< of the depth that a push takes away
+  Real limit;    ///< the farthest that pushes move in a step [m]
+};
+/// Moves the bodies, but not their velocities, apart where they overlap, and takes back of what it did before
+/// where that opened a gap. Returns by lanes how far [m].
+FloatLanes push_out(PatchBatch& batch, std::span<BodyMotion> motions, const PushOut& push);
 
 /// Gives the patches their forces.
 void report(const PatchBatch& batch, std::span<ContactPatch> patches, Real substep);

@@ -108,6 +108,7 @@ class RelaxationSolver {
     join_last,
     advance,
     push,
+    push_again,
     finish,
     report
   };
@@ -127,8 +128,11 @@ class RelaxationSolver {
   void start(uint32_t body);
   void extrapolate(uint32_t body);
   void solve(uint32_t batch, uint32_t substep);
+  void push(uint32_t batch, Real threshold);
+  void strike(const PatchBatch& batch, FloatLanes blow, Real threshold);
   bool is_struck(uint32_t batch, uint32_t since) const;
-  void repeat(uint32_t substep);
+  template <class Again>
+  void repeat(Again&& again);
   void advance(uint32_t body);
   void finish(uint32_t body);
   void report(uint32_t batch);

@@ -6,18 +6,24 @@
 
 namespace offstage::sim {
 
-struct RigidBody {
+/// What changes as a rigid body moves.
+struct RigidState {
+  Vec3 position = Vec3::Zero();  ///< of the centre of mass, world
+  Quat orientation = Quat::Identity();
+  Vec3 momentum = Vec3::Zero();          ///< L
+  Vec3 angular_momentum = Vec3::Zero();  ///< H, about the centre of mass, world
+  Real next_step = 0;                    ///< what an adaptive integrator will try next [s]; 0: not known
+};
+
+struct RigidBody : RigidState {
   Real mass = 1;
   Vec3 centre = Vec3::Zero();       ///< of mass, in the shape's frame
   Mat3 inertia = Mat3::Identity();  ///< about the centre of mass, axes of the shape's frame
   Mat3 inverse_inertia = Mat3::Identity();
   Real linear_drag = 0, angular_drag = 0;
 
-  Vec3 position = Vec3::Zero();  ///< of the centre of mass, world
-  Quat orientation = Quat::Identity();
-  Vec3 momentum = Vec3::Zero();          ///< L
-  Vec3 angular_momentum = Vec3::Zero();  ///< H, about the centre of mass, world
-  Real next_step = 0;                    ///< what an adaptive integrator will try next [s]; 0: not known
+  const RigidState& state() const { return *this; }
+  void set_state(const RigidState& state) { static_cast<RigidState&>(*this) = state; }
 
   Vec3 velocity() const { return momentum / mass; }
   /// w = R I^-1 R^T H.
@@ -25,6 +31,8 @@ struct RigidBody {
   Vec3 angular_velocity(const Quat& q, const Vec3& H) const {
     return q * (inverse_inertia * (q.conjugate() * H));
   }
+  /// H of a spin.
+  Vec3 spin_momentum(const Quat& q, const Vec3& w) const { return q * (inertia * (q.conjugate() * w)); }
   Pose pose() const { return {position - orientation * centre, orientation}; }
 
   void place(const Pose& pose) {
@@ -33,7 +41,7 @@ struct RigidBody {
   }
   void set_velocity(const Vec3& v, const Vec3& w) {
     momentum = mass * v;
-    angular_momentum = orientation * (inertia * (orientation.conjugate() * w));
+    angular_momentum = spin_momentum(orientation, w);
   }
 };
 

@@ -19,7 +19,7 @@ std::vector<Convex> solids(Real size) {
 
 Manifold found(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin) {
   Manifold m;
-  sphere_manifold(a, b, a_from_b, margin, m);
+  sphere_manifold(a, Pose{}, b, a_from_b, margin, m);
   return m;
 }
 

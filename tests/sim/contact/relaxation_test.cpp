@@ -156,6 +156,17 @@ TEST(Relaxation, PushingOutLeavesNoVelocity) {
             1e-12);
 }
 
+// Each box of a column has one above and one below that push it back: only together they get out.
+TEST(Relaxation, ColumnPressedTogetherIsPushedApartTogether) {
+  BoxScene s = box_stack(20);
+  Real down = 0;
+  for (BoxBody& b : s.bodies)
+    if (b.mass > 0) b.pose.position.y() -= down += 2e-3;
+  ASSERT_GT(s.deepest(), 1.9e-3);
+  s.run(0.5, kStep);
+  EXPECT_LT(s.deepest(), 7e-4);  // 3 mm if each were pushed alone
+}
+
 TEST(Relaxation, ForcesAreWeightAndFrictionOfASlidingBox) {
   BoxScene s = sliding_box(20);
   for (int k = 0; k < 240; ++k) {
