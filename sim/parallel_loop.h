@@ -2,7 +2,6 @@
 /// Loops over things that do not depend on each other.
 
 #include <cstddef>
-#include <utility>
 
 #include <oneapi/tbb/parallel_for.h>
 

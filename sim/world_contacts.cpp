@@ -55,11 +55,6 @@ Aabb swept_bounds(const Body& body) {
   return box;
 }
 
-/// Whether a body's way is not within what the broad phase has of it.
-bool leaves_swept(const Body& body) {
-  return body.def.collides && !body.swept.contains(swept_bounds(body));
-}
-
 }  // namespace
 
 PairSurface World::Impl::surface_of(const Body& a, const Body& b) const {
@@ -89,19 +84,22 @@ PairSurface World::Impl::surface_of(const Body& a, const Body& b) const {
 
 /// Gives a body's way to the broad phase, with some room, unless it is within what was given before; returns
 /// whether that was needed. In the same sub-step, what was given stays part of it.
-bool World::Impl::move_in_broad_phase(Body& body, bool again) {
-  if (!leaves_swept(body)) return false;
-  Aabb box = swept_bounds(body);
+bool World::Impl::move_in_broad_phase(Body& body, Aabb way, bool again) {
+  if (!body.def.collides || body.swept.contains(way)) return false;
   // Room for some more steps like this one.
   const Vec3 shift = kSteps * (body.pose.position - body.start_pose.position);
   const Vec3 room = Vec3::Constant(kRoom * body.extent);
-  box.min() += shift.cwiseMin(0) - room;
-  box.max() += shift.cwiseMax(0) + room;
-  if (again) box.extend(body.swept);
-  body.swept = box;
-  broad_phase.move(body.handle.index, box);
+  way.min() += shift.cwiseMin(0) - room;
+  way.max() += shift.cwiseMax(0) + room;
+  if (again) way.extend(body.swept);
+  body.swept = way;
+  broad_phase.move(body.handle.index, way);
   pairs_changed = true;
   return true;
+}
+
+bool World::Impl::move_in_broad_phase(Body& body, bool again) {
+  return move_in_broad_phase(body, swept_bounds(body), again);
 }
 
 /// The pairs of bodies whose ways come near each other.
@@ -140,10 +138,9 @@ void World::Impl::foresee_blows(Real h) {
 }
 
 void World::Impl::update_pairs(Real h) {
-  std::vector<uint8_t> leaves(awake.size());
-  for_each_index(awake.size(), [&](std::size_t i) { leaves[i] = leaves_swept(*awake[i]); });
-  for (std::size_t i = 0; i < awake.size(); ++i)
-    if (leaves[i]) move_in_broad_phase(*awake[i], false);
+  std::vector<Aabb> ways(awake.size());
+  for_each_index(awake.size(), [&](std::size_t i) { ways[i] = swept_bounds(*awake[i]); });
+  for (std::size_t i = 0; i < awake.size(); ++i) move_in_broad_phase(*awake[i], ways[i], false);
   for (Body* body : kinematic) move_in_broad_phase(*body, false);
   collect_pairs();
   foresee_blows(h);

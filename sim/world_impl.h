@@ -79,6 +79,7 @@ struct World::Impl : WorldState {
   void update_pairs(Real h);
   void find_points(ContactPair& pair, Real time, Real h) const;
   bool move_in_broad_phase(Body& body, bool again);
+  bool move_in_broad_phase(Body& body, Aabb way, bool again);
   void collect_pairs();
   std::vector<Body*> wake_touched(Real start, Real h);
   void find_moving_islands();

@@ -85,7 +85,7 @@ void begin_substep(PatchBatch& batch);
 /// `substep` [s], `elapsed` [s] after the start.
 void sweep(PatchBatch& batch, std::span<BodyMotion> motions, Real substep, Real elapsed);
 
-/// The last sub-step has moved the bodies.
+/// The last sub-step has moved the bodies: from now on Point::shift counts ways, and pushes begin.
 void end_substeps(PatchBatch& batch, Real substep);
 
 /// How penetration is taken away.
@@ -95,7 +95,7 @@ struct PushOut {
   Real limit;    ///< the farthest that pushes move in a step [m]
 };
 /// Moves the bodies, but not their velocities, apart where they overlap, and takes back of what it did before
-/// where that opened a gap. Returns by lanes how far [m].
+/// where that opened a gap, as far as it did. Returns by lanes the farthest way that it wanted [m].
 FloatLanes push_out(PatchBatch& batch, std::span<BodyMotion> motions, const PushOut& push);
 
 /// Gives the patches their forces.

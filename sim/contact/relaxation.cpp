@@ -27,7 +27,7 @@ constexpr Real kBlow = 0.1;
 constexpr uint32_t kRepeats = 12;
 /// What lies under a load gives way only together: a push as far as kPress is passed on likewise, and then on
 /// to where it is but kPassedOn [m]. In heaps of 3000 boxes columns stayed 1 mm in each other for seconds while
-/// they lay still, now 0.6 mm; the sampled overlap was above 1 mm in 114 of 360 instants, now in 3. From less
+/// they lay still, now 0.6 mm; the sampled overlap was above 1 mm in 114 of 360 instants, now in 5. From less
 /// on it would do more, but a wall of 1000 bricks begins to sway by it: one that stands stays below.
 constexpr Real kPress = 3e-4, kPassedOn = 1e-4;
 

@@ -2,8 +2,8 @@
 /// The fast contact solver (physics N12): time stepping on velocities (Stewart and Trinkle, "An implicit
 /// time-stepping scheme for rigid body dynamics with inelastic collisions and Coulomb friction", 1996) in
 /// many small sub-steps of one sweep of Gauss-Seidel each (Macklin et al., "Small steps in physics
-/// simulation", 2019). Penetration is taken away by moving the bodies, once per step; velocities never know
-/// of it.
+/// simulation", 2019). Penetration is taken away by moving the bodies, at the end of the step, in a sweep
+/// that is repeated where it pushes far; velocities never know of it.
 ///
 /// One sweep leaves an error, which the next takes on as a change of velocity: the forces of a tall stack are
 /// the springs of a spurious oscillator, and a mode that a sweep reduces by the share e swings at sqrt(e) per
