@@ -201,7 +201,8 @@ void ContactPair::remember(std::vector<Remembered>& points) const {
     }
 }
 
-/// Points that were there before keep their forces: those of the same features, or else nearby.
+/// Points that were there before keep their forces: those of the same features, or else nearby. Each force
+/// goes to one point, or the forces of a pair that is found anew again and again would grow without end.
 void ContactPair::recall(std::vector<Remembered>& points, const Pose& a) {
   for (PlacedManifold& m : placed_) {
     m.torque = m.mean_torque = 0;
@@ -213,7 +214,7 @@ void ContactPair::recall(std::vector<Remembered>& points, const Pose& a) {
       Real nearest = kSame * kSame;
       for (Remembered& p : points) {
         const Real distance = (p.on_a - on_a).squaredNorm() * (p.id == point.id ? kSameFeature : 1);
-        if (distance >= nearest) continue;
+        if (p.taken || distance >= nearest) continue;
         nearest = distance;
         best = &p;
       }

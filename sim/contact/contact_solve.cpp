@@ -235,7 +235,10 @@ std::optional<ContactWork> ExactContacts::solve(const Island& island, const Cont
   if (!work) return work;
   joints_.tell(interval.duration);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
-    forces_[i]->now = forces_[i]->last = contacts_[i].impulse / interval.duration;
+    forces_[i]->now = contacts_[i].impulse / interval.duration;
+  // Of joints, what holds them is known of this interval alone, and has to go with it.
+  if (interval.is_remembered || !island.articulations.empty())
+    for (PointForce* force : forces_) force->last = force->now;
   move_bodies(island, interval.duration);
   return work;
 }
@@ -419,18 +422,20 @@ void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifol
 }
 
 /// The patch's friction is shared out by the points' normal forces.
-void tell_forces(const ContactPatch& patch, Real duration, PlacedManifold& m) {
+void tell_forces(const ContactPatch& patch, const ContactInterval& interval, PlacedManifold& m) {
   Real sum = 0;
   for (uint32_t k = 0; k < patch.count; ++k) sum += patch.points[k].force;
   for (uint32_t k = 0; k < patch.count; ++k) {
     const ContactPatch::Point& p = patch.points[k];
     const Real share = sum > 0 ? p.force / sum : 1.0 / patch.count;
     PointForce& f = m.forces[k];
-    f.now =
-        Vec3(p.impulse, share * patch.friction_impulse.x(), share * patch.friction_impulse.y()) / duration;
+    f.now = Vec3(p.impulse, share * patch.friction_impulse.x(), share * patch.friction_impulse.y()) /
+            interval.duration;
+    if (!interval.is_remembered) continue;
     f.last = {p.force, share * patch.force_t, share * patch.force_k};
     f.mean = {p.mean_force, share * patch.mean_friction.x(), share * patch.mean_friction.y()};
   }
+  if (!interval.is_remembered) return;
   m.torque = patch.torque_n;
   m.mean_torque = patch.mean_friction.z();
 }
@@ -480,7 +485,8 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
   RelaxedJoints relaxed_joints(joints_.problem(), joints_.articulations(), joints_.bounded_ends());
   const ContactWork work = solver_.solve(bodies_, patches_, {h, relaxation_substeps(h)}, &relaxed_joints);
   joints_.tell(h);
-  for_each_index(patches_.size(), [&](std::size_t i) { tell_forces(patches_[i], h, *origins_[i].manifold); });
+  for_each_index(patches_.size(),
+                 [&](std::size_t i) { tell_forces(patches_[i], interval, *origins_[i].manifold); });
   for_each_index(moved_, [&](std::size_t i) { move(*members_[i], bodies_[i]); });
   return work;
 }

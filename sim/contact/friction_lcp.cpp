@@ -8,6 +8,7 @@
 #include <Eigen/QR>
 
 #include "sim/contact/friction_pivoting.h"
+#include "sim/contact/proximal_newton.h"
 
 namespace offstage::sim {
 namespace {
@@ -19,14 +20,15 @@ using Eigen::VectorXd;
 
 using Mat36 = Eigen::Matrix<Real, 3, 6>;
 
-constexpr Real kAccurate = 1e-12;  ///< of the greatest velocity: solved, but for rounding
-constexpr Real kAccepted = 1e-10;  ///< likewise: with more than this left over, fall back
-constexpr Real kSliding = 1e-9;    ///< likewise: slower contacts do not slide
-constexpr Real kRank = 1e-11;      ///< of the greatest pivot: redundant contacts make the matrix singular
+constexpr Real kAccurate = 1e-12;   ///< of the greatest velocity: solved, but for rounding
+constexpr Real kAccepted = 1e-10;   ///< likewise: with more than this left over, other methods go on
+constexpr Real kGoodEnough = 1e-5;  ///< likewise: with more than this left over of those, fall back
+constexpr Real kSliding = 1e-9;     ///< likewise: slower contacts do not slide
+constexpr Real kRank = 1e-11;       ///< of the greatest pivot: redundant contacts make the matrix singular
 /// Of the diagonal, added to it for pivoting: redundant contacts then share their load in one way only.
 constexpr Real kSoftness = 1e-7;
 constexpr std::size_t kRounds = 4;  ///< of pivoting, with other tangents and another order
-constexpr int kNewtonSteps = 25, kHalvings = 6, kFallbacks = 12;
+constexpr int kNewtonSteps = 25, kStepsInVain = 10, kHalvings = 6, kFallbacks = 12;
 constexpr uint32_t kSweeps = 200;
 
 /// A side of a contact: its u is J (v, w) of the body.
@@ -78,6 +80,7 @@ class FrictionSolver {
 
  private:
   void solve_by_rounds(ContactWork& work);
+  void solve_by_newton(ContactWork& work);
   void fall_back(ContactWork& work);
   VectorXd impulses() const;
   void set_impulses(const VectorXd& p);
@@ -222,7 +225,8 @@ Real FrictionSolver::evaluate(const VectorXd& p, bool with_jacobian) {
 Real FrictionSolver::polish(VectorXd& best, ContactWork& work) {
   VectorXd p = best;
   Real worst = evaluate(p, false), least = worst;
-  for (int k = 0; k < kNewtonSteps && worst > kAccurate * scale_; ++k) {
+  int last = 0;
+  for (int k = 0; k < std::min(kNewtonSteps, last + kStepsInVain) && worst > kAccurate * scale_; ++k) {
     evaluate(p, true);
     Eigen::CompleteOrthogonalDecomposition<MatrixXd> qr;
     qr.setThreshold(kRank);
@@ -239,6 +243,7 @@ Real FrictionSolver::polish(VectorXd& best, ContactWork& work) {
     if (worst < least) {
       least = worst;
       best = p;
+      last = k + 1;
     }
   }
   return least;
@@ -287,6 +292,21 @@ void FrictionSolver::solve_by_rounds(ContactWork& work) {
   }
 }
 
+/// Pivoting may cycle among redundant contacts that just touch; the proximal method does not mind them, but
+/// stops short of the last digits.
+void FrictionSolver::solve_by_newton(ContactWork& work) {
+  const VectorXd before = impulses();
+  const Real least = residual(bodies_, contacts_);
+  set_impulses(VectorXd::Zero(before.size()));
+  for (Contact& c : contacts_) c.is_guessed = false;
+  const ContactWork newton = *ProximalNewton().solve(bodies_, contacts_);
+  work.iterations += newton.iterations;
+  work.factorizations += newton.factorizations;
+  VectorXd p = impulses();
+  if (polish(p, work) < evaluate(impulses(), false)) set_impulses(p);
+  if (residual(bodies_, contacts_) > least) set_impulses(before);
+}
+
 /// Gauss-Seidel comes near from anywhere, but slowly; Newton is fast once near.
 void FrictionSolver::fall_back(ContactWork& work) {
   ++work.fallbacks;
@@ -301,7 +321,8 @@ void FrictionSolver::fall_back(ContactWork& work) {
 ContactWork FrictionSolver::solve() {
   ContactWork work{.solves = 1};
   solve_by_rounds(work);
-  if (residual(bodies_, contacts_) > kAccepted * scale_) fall_back(work);
+  if (residual(bodies_, contacts_) > kAccepted * scale_) solve_by_newton(work);
+  if (residual(bodies_, contacts_) > kGoodEnough * scale_) fall_back(work);
   work.residual = residual(bodies_, contacts_);
   return work;
 }

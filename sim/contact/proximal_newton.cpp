@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace offstage::sim {
 namespace {
@@ -11,20 +12,24 @@ namespace {
 /// 1 / (1 + kStiffness e) of the error in a direction whose eigenvalue of the mobility is e (of the largest):
 /// with stacks of 100 at 1e-4. Larger ones cost digits of H.
 constexpr Real kStiffness = 1e5;
-/// Rows with bounds less so, until that lasts too long: dry friction, whose bounds may be small, turns over within
-/// bound / rho, and Newton's method would go from kink to kink.
+/// Rows with bounds less so, until that lasts too long: dry friction, whose bounds may be small, turns over
+/// within bound / rho, and Newton's method would go from kink to kink.
 constexpr Real kBoundedStiffness = 1e3;
-/// Joints pass on what a contact does, and a guess that is far off changes which others are closed. Then the first
-/// iterations are softer, each by that factor than the next (heaps of chains: a third of the factorisations, a tenth
-/// of the fall-backs).
+/// Joints pass on what a contact does, and a guess that is far off changes which others are closed. Then the
+/// first iterations are softer, each by that factor than the next (heaps of chains: a third of the
+/// factorisations, a tenth of the fall-backs).
 constexpr int kSoftSteps = 4;
 constexpr Real kStiffen = 10, kFarOff = 1e-3;
+/// Without joints a guess that is far off starts that much softer, which changes fewer contacts in each
+/// iteration, and stiffens when the multipliers are what is slow (heaps of boxes: half of the factorisations,
+/// a seventh of the fall-backs).
+constexpr Real kSoft = 1e-2;
 constexpr Real kTolerance = 1e-7, kSmallest = 1e-11;  // of the velocities, and [m/s]
 constexpr Real kCoarse = 1e-5;
 constexpr uint32_t kPatience = 4;
 /// An iteration that leaves more than this is slow.
 constexpr Real kSlow = 0.2;
-constexpr uint32_t kMaxOuter = 60, kMaxNewton = 40, kMaxHalvings = 25, kMaxSweeps = 200;
+constexpr uint32_t kMaxOuter = 120, kMaxNewton = 40, kMaxHalvings = 25, kMaxSweeps = 200;
 /// A matrix from before serves while each step leaves less of the gradient than this.
 constexpr Real kStale = 0.2;
 constexpr Real kMeritRounding = 1e-11;
@@ -82,18 +87,42 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
   Real left = gradient_speed();
   bool solved = false;
   mixing_.clear();
-  if (!joints.empty() && left > kFarOff * speed)
-    if (!come_near(contacts, tolerance, work)) return std::nullopt;
+  Real softness = 1;
+  if (left > kFarOff * speed) {
+    if (!joints.empty()) {
+      if (!come_near(contacts, tolerance, work)) return std::nullopt;
+    } else {
+      stiffen(softness = kSoft, 1);
+      merit_ = evaluate(contacts, velocity_);
+      gradient(contacts);
+      left = gradient_speed();
+    }
+  }
+  Change change;
+  uint32_t began = 0;
   for (uint32_t outer = 0; outer < kMaxOuter && work.factorizations < kMaxFactorizations; ++outer) {
     minimize(contacts, std::max(tolerance / 4, left / 20), work);
     if (cost_ > budget_) return std::nullopt;
-    const Real before = left;
-    left = std::max(gradient_speed(), update_multipliers(contacts));
+    const Real before = left, multipliers_before = change.multipliers;
+    change = update_multipliers(contacts);
+    left = std::max({gradient_speed(), change.multipliers, change.lifts});
     // The longer it takes the fewer digits are asked for.
-    solved = left <= std::min(tolerance * std::pow(10, outer / kPatience), tolerance + kCoarse * speed);
-    if (solved) break;
+    solved =
+        left <= std::min(tolerance * std::pow(10, (outer - began) / kPatience), tolerance + kCoarse * speed);
+    if (solved && softness == 1) break;
+    if (solved) {  // the last digits are the stiff ones'
+      stiffen(1 / std::exchange(softness, 1), 1);
+      merit_ = evaluate(contacts, velocity_);
+      gradient(contacts);
+      began = outer + 1;
+      continue;
+    }
     mix_lifts(left > kSlow * before);
     if (outer == 2 * kPatience) stiffen(1, kStiffness / kBoundedStiffness);
+    if (softness < 1 && change.multipliers > std::max(kSlow * multipliers_before, left / 2)) {
+      stiffen(kStiffen, 1);
+      softness *= kStiffen;
+    }
     merit_ = evaluate(contacts, velocity_);
     gradient(contacts);
   }
@@ -309,8 +338,8 @@ Vec6 ProximalNewton::violation(std::size_t j) const {
   return v;
 }
 
-/// The nearest velocities, weighted with the masses, that differ from those without impulses by what the joints
-/// allow.
+/// The nearest velocities, weighted with the masses, that differ from those without impulses by what the
+/// joints allow.
 void ProximalNewton::satisfy_constraints() {
   factor_.analyze(static_cast<uint32_t>(direction_.size()), pairs_, kinds_);
   add_constraint_blocks();
@@ -524,12 +553,13 @@ bool ProximalNewton::descend(std::span<const Contact> contacts) {
   return false;
 }
 
-/// q := p and g := mu |u_t|; returns how far they were from that, as velocities.
-Real ProximalNewton::update_multipliers(std::span<const Contact> contacts) {
-  Real change = 0;
+/// q := p and g := mu |u_t|; returns how far they were from that.
+ProximalNewton::Change ProximalNewton::update_multipliers(std::span<const Contact> contacts) {
+  Change change;
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     Point& p = points_[i];
-    change = std::max(change, (p.impulse - p.multiplier).cwiseAbs().maxCoeff() / p.rho);
+    const Vec3 lacking = (p.impulse - p.multiplier) / p.rho;
+    change.multipliers = std::max(change.multipliers, lacking.cwiseAbs().maxCoeff());
     p.multiplier = p.impulse;
     const Contact& c = contacts[i];
     const Vec3 u = relative_velocity(c, p, velocity_) + fixed_[i];
@@ -538,11 +568,11 @@ Real ProximalNewton::update_multipliers(std::span<const Contact> contacts) {
     const bool open = p.region == ConeRegion::apex &&
                       project_on_cone(c, -p.rho * (u + Vec3(lift, 0, 0))).region == ConeRegion::apex;
     p.rise = open ? 0 : lift - p.lift;
-    change = std::max(change, std::abs(p.rise));
+    change.lifts = std::max(change.lifts, std::abs(p.rise));
     p.lift = lift;
   }
   for (Bounded& p : bounded_) {
-    change = std::max(change, std::abs(p.impulse - p.multiplier) / p.rho);
+    change.multipliers = std::max(change.multipliers, std::abs(p.impulse - p.multiplier) / p.rho);
     p.multiplier = p.impulse;
   }
   return change;

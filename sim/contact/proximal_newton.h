@@ -15,9 +15,9 @@
 /// Curnier, "A mixed formulation for frictional contact problems prone to Newton like solution methods"
 /// (1991).
 ///
-/// Joints are constraints J (v - v0) = 0 of that minimisation: Newton's steps come from the quasi-definite system
-/// of H and J, so that all velocities on the way satisfy them. Rows with bounds are treated like contacts, with an
-/// interval in place of the cone.
+/// Joints are constraints J (v - v0) = 0 of that minimisation: Newton's steps come from the quasi-definite
+/// system of H and J, so that all velocities on the way satisfy them. Rows with bounds are treated like
+/// contacts, with an interval in place of the cone.
 
 #include <limits>
 #include <optional>
@@ -68,6 +68,10 @@ class ProximalNewton {
   struct Mixed {
     Eigen::VectorXd lift, rise;
   };
+  /// What an iteration changed, as velocities [m/s].
+  struct Change {
+    Real multipliers = 0, lifts = 0;
+  };
   static constexpr uint32_t kNone = UINT32_MAX;
 
   void number_bodies(std::span<const ContactBody> bodies, std::span<const Contact> contacts);
@@ -89,7 +93,7 @@ class ProximalNewton {
   bool assemble(std::span<const Contact> contacts, ContactWork& work);
   bool minimize(std::span<const Contact> contacts, Real tolerance, ContactWork& work);
   bool descend(std::span<const Contact> contacts);
-  Real update_multipliers(std::span<const Contact> contacts);
+  Change update_multipliers(std::span<const Contact> contacts);
   void mix_lifts(bool slow);
   Vec3 relative_velocity(const Contact& c, const Point& p, std::span<const Vec6> velocity) const;
 

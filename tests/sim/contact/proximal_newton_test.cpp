@@ -26,9 +26,9 @@ TEST(ProximalNewton, WithoutFrictionAgreesWithPivoting) {
   for (int round = 0; round < 200; ++round) {
     ContactSample s = random_contacts(dice, 2 + dice.index(6), 1 + dice.index(12), 0, true), t = s;
     const ContactWork newton = *ProximalNewton().solve(s.bodies, s.contacts);
-    const ContactWork pivoting = solve_by_pivoting(t.bodies, t.contacts);
+    solve_by_pivoting(t.bodies, t.contacts);
     EXPECT_EQ(newton.fallbacks, 0u);
-    if (pivoting.fallbacks > 0) continue;
+    if (residual(t.bodies, t.contacts) > 1e-8) continue;
     ++compared;
     ASSERT_LT(difference(s, t), 1e-6) << round;
   }
