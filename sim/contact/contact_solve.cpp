@@ -236,8 +236,7 @@ std::optional<ContactWork> ExactContacts::solve(const Island& island, const Cont
   joints_.tell(interval.duration);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     forces_[i]->now = contacts_[i].impulse / interval.duration;
-  // Of joints, what holds them is known of this interval alone, and has to go with it.
-  if (interval.is_remembered || !island.articulations.empty())
+  if (interval.is_remembered)
     for (PointForce* force : forces_) force->last = force->now;
   move_bodies(island, interval.duration);
   return work;

@@ -24,7 +24,7 @@ constexpr Real kStiffen = 10, kFarOff = 1e-3;
 /// iteration, and stiffens when the multipliers are what is slow (heaps of boxes: half of the factorisations,
 /// a seventh of the fall-backs).
 constexpr Real kSoft = 1e-2;
-constexpr Real kTolerance = 1e-7, kSmallest = 1e-11;  // of the velocities, and [m/s]
+constexpr Real kTolerance = 3e-8, kSmallest = 1e-11;  // of the velocities, and [m/s]
 constexpr Real kCoarse = 1e-5;
 constexpr uint32_t kPatience = 4;
 /// An iteration that leaves more than this is slow.
@@ -82,7 +82,7 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
   // At rest the impulses of before still hold the joints together.
   if (constraint_speed() > tolerance / 4) satisfy_constraints();
 
-  merit_ = evaluate(contacts, velocity_);
+  evaluate(contacts);
   gradient(contacts);
   Real left = gradient_speed();
   bool solved = false;
@@ -93,7 +93,7 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
       if (!come_near(contacts, tolerance, work)) return std::nullopt;
     } else {
       stiffen(softness = kSoft, 1);
-      merit_ = evaluate(contacts, velocity_);
+      evaluate(contacts);
       gradient(contacts);
       left = gradient_speed();
     }
@@ -112,7 +112,7 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
     if (solved && softness == 1) break;
     if (solved) {  // the last digits are the stiff ones'
       stiffen(1 / std::exchange(softness, 1), 1);
-      merit_ = evaluate(contacts, velocity_);
+      evaluate(contacts);
       gradient(contacts);
       began = outer + 1;
       continue;
@@ -123,7 +123,7 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
       stiffen(kStiffen, 1);
       softness *= kStiffen;
     }
-    merit_ = evaluate(contacts, velocity_);
+    evaluate(contacts);
     gradient(contacts);
   }
 
@@ -232,14 +232,14 @@ bool ProximalNewton::come_near(std::span<const Contact> contacts, Real tolerance
   for (int k = 0; k < kSoftSteps; ++k) softness /= kStiffen;
   stiffen(softness, softness);
   for (int k = 0; k < kSoftSteps; ++k) {
-    merit_ = evaluate(contacts, velocity_);
+    evaluate(contacts);
     gradient(contacts);
     minimize(contacts, std::max(tolerance / 4, gradient_speed() / 20), work);
     if (cost_ > budget_) return false;
     update_multipliers(contacts);
     stiffen(kStiffen, kStiffen);
   }
-  merit_ = evaluate(contacts, velocity_);
+  evaluate(contacts);
   gradient(contacts);
   return true;
 }
@@ -348,6 +348,8 @@ void ProximalNewton::satisfy_constraints() {
   for (int k = 0; is_factored_ && k < 2; ++k) {
     solve_for_direction();
     for (std::size_t row = 0; row < velocity_.size(); ++row) velocity_[row] -= direction_[row];
+    for (std::size_t j = 0; j < constraints_.size(); ++j)
+      constraints_[j].impulse += direction_[gradient_.size() + j];
   }
   is_factored_ = false;
 }
@@ -364,13 +366,12 @@ void ProximalNewton::add_constraint_blocks() {
   }
 }
 
-/// Newton's step against the gradient and what is left of the constraints, with the change of their impulses.
+/// Against the gradient and what is left of the constraints: -direction_ is Newton's step of the velocities,
+/// and direction_ after those that of the constraints' impulses.
 void ProximalNewton::solve_for_direction() {
   std::copy(gradient_.begin(), gradient_.end(), direction_.begin());
   for (std::size_t j = 0; j < constraints_.size(); ++j) direction_[gradient_.size() + j] = violation(j);
   factor_.solve(direction_);
-  for (std::size_t j = 0; j < constraints_.size(); ++j)
-    constraints_[j].impulse += direction_[gradient_.size() + j];
 }
 
 void ProximalNewton::finish_joints(std::span<ContactBody> bodies) {
@@ -390,36 +391,39 @@ Vec3 ProximalNewton::relative_velocity(const Contact& c, const Point& p,
   return c.to_frame(u);
 }
 
-/// The impulses at these velocities, and the function whose gradient is M (v - v0) - J^T p.
-Real ProximalNewton::evaluate(std::span<const Contact> contacts, std::span<const Vec6> velocity) {
-  Real merit = 0;
-  for (std::size_t row = 0; row < velocity.size(); ++row) {
-    const Vec6 d = velocity[row] - free_[row];
-    merit += 0.5 * d.dot(mass_[row] * d);
+/// The impulses at the velocities, and the function whose gradient is M (v - v0) - J^T p, with the
+/// constraints' impulses among p.
+void ProximalNewton::evaluate(std::span<const Contact> contacts) {
+  merit_ = {};
+  for (std::size_t row = 0; row < velocity_.size(); ++row) {
+    const Vec6 d = velocity_[row] - free_[row];
+    merit_.add(0.5 * d.dot(mass_[row] * d));
   }
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const Contact& c = contacts[i];
     Point& p = points_[i];
-    const Vec3 u = relative_velocity(c, p, velocity) + fixed_[i] + Vec3(p.lift, 0, 0);
+    const Vec3 u = relative_velocity(c, p, velocity_) + fixed_[i] + Vec3(p.lift, 0, 0);
     const Vec3 q = p.multiplier - p.rho * u;
     const ConeProjection projection = project_on_cone(c, q);
     p.impulse = projection.point;
     p.region = projection.region;
     p.shifted = q;
-    merit += p.impulse.squaredNorm() / (2 * p.rho);
+    merit_.add(p.impulse.squaredNorm() / (2 * p.rho));
   }
   for (std::size_t i = 0; i < bounded_.size(); ++i) {
     const BoundedRow& r = joints_.bounded[i];
     Bounded& p = bounded_[i];
-    const Real u = relative_velocity(r, p, velocity) - r.target;
+    const Real u = relative_velocity(r, p, velocity_) - r.target;
     const Real wanted = (p.multiplier - p.rho * u) / (1 + p.rho * r.softness);
     p.impulse = std::clamp(wanted, r.lower, r.upper);
     p.is_free = p.impulse == wanted;
     // The greatest value of -p u - s p^2 / 2 - (p - q)^2 / (2 rho): convex in u, with the derivative -p.
-    merit -= p.impulse * u + r.softness * p.impulse * p.impulse / 2 +
-             std::pow(p.impulse - p.multiplier, 2) / (2 * p.rho);
+    merit_.add(-p.impulse * u);
+    merit_.add(-r.softness * p.impulse * p.impulse / 2);
+    merit_.add(-std::pow(p.impulse - p.multiplier, 2) / (2 * p.rho));
   }
-  return merit;
+  for (std::size_t j = 0; j < constraints_.size(); ++j)
+    merit_.add(-constraints_[j].impulse.dot(violation(j)));
 }
 
 Real ProximalNewton::relative_velocity(const BoundedRow& r, const Bounded& p,
@@ -529,27 +533,35 @@ bool ProximalNewton::descend(std::span<const Contact> contacts) {
   solve_for_direction();
   cost_ +=
       kSolve * static_cast<Real>(factor_.factor_blocks()) + kEvaluation * static_cast<Real>(contacts.size());
+  // With the constraints' new impulses the step goes downhill, even where it leads back to what joints allow.
+  const auto add_to_constraints = [this, &contacts](Real sign) {
+    for (std::size_t j = 0; j < constraints_.size(); ++j)
+      constraints_[j].impulse += sign * direction_[gradient_.size() + j];
+    evaluate(contacts);
+    gradient(contacts);
+  };
+  if (!constraints_.empty()) add_to_constraints(1);
   Real slope = 0;
   for (std::size_t row = 0; row < gradient_.size(); ++row) slope -= direction_[row].dot(gradient_[row]);
-  const Real before = merit_, speed = gradient_speed();
+  const Merit before = merit_;
+  const Real speed = gradient_speed();
   const std::vector<Vec6> start = velocity_;
   Real length = 1;
   for (uint32_t k = 0; k < kMaxHalvings; ++k, length /= 2) {
     for (std::size_t row = 0; row < velocity_.size(); ++row)
       velocity_[row] = start[row] - length * direction_[row];
-    merit_ = evaluate(contacts, velocity_);
-    if (merit_ <= before + 1e-4 * length * slope) {
+    evaluate(contacts);
+    if (merit_.value <= before.value + 1e-4 * length * slope) {
       gradient(contacts);
       return true;
     }
     // Near the minimum the function's rounding hides its decrease; the gradient still tells.
-    if (merit_ > before + kMeritRounding * std::abs(before)) continue;
+    if (merit_.value > before.value + kMeritRounding * before.size) continue;
     gradient(contacts);
     if (gradient_speed() <= 0.8 * speed) return true;
   }
   velocity_ = start;
-  merit_ = evaluate(contacts, velocity_);
-  gradient(contacts);
+  add_to_constraints(-1);
   return false;
 }
 

@@ -19,6 +19,7 @@
 /// system of H and J, so that all velocities on the way satisfy them. Rows with bounds are treated like
 /// contacts, with an interval in place of the cone.
 
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <span>
@@ -72,6 +73,14 @@ class ProximalNewton {
   struct Change {
     Real multipliers = 0, lifts = 0;
   };
+  /// The function that is minimised, and the sum of its terms' sizes, of which rounding is a share.
+  struct Merit {
+    Real value = 0, size = 0;
+    void add(Real term) {
+      value += term;
+      size += std::abs(term);
+    }
+  };
   static constexpr uint32_t kNone = UINT32_MAX;
 
   void number_bodies(std::span<const ContactBody> bodies, std::span<const Contact> contacts);
@@ -87,7 +96,7 @@ class ProximalNewton {
   void add_constraint_blocks();
   void solve_for_direction();
   void finish_joints(std::span<ContactBody> bodies);
-  Real evaluate(std::span<const Contact> contacts, std::span<const Vec6> velocity);
+  void evaluate(std::span<const Contact> contacts);
   void gradient(std::span<const Contact> contacts);
   Real gradient_speed() const;
   bool assemble(std::span<const Contact> contacts, ContactWork& work);
@@ -115,7 +124,7 @@ class ProximalNewton {
   std::size_t factored_contacts_ = 0;  // their number when H was factored
   std::vector<Mixed> mixing_;          // of the last iterations
   BlockCholesky<6> factor_;
-  Real merit_ = 0;
+  Merit merit_;
   Real cost_ = 0, budget_ = 0;
 };
 
