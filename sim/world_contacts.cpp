@@ -33,8 +33,6 @@ constexpr Real kReuse = 1e-5, kExactReuse = 1e-8;
 /// less than 7.7 m/s that is within kMargin in a step of 1/240 s.
 constexpr Real kPassedShare = 0.5;
 constexpr uint32_t kPassedOn = 3;
-/// Shorter intervals, of the sub-step, end with forces that need not last.
-constexpr Real kLasting = 0.5;
 /// Bodies turn if their turning moves their surfaces by more than this in an interval [m].
 constexpr Real kTurning = 2e-4;
 
@@ -245,7 +243,7 @@ void World::Impl::solve_islands(Real start, Real h, StepReport& report) {
   for (MovingIsland& island : islands)
     if (has_forces(island)) all.push_back(&island);
   if (def.solver == SolverKind::automatic) patience.begin(all, h);
-  solve(all, h, start + h, h, report);
+  solve(all, h, start + h, Interval::whole, report);
 }
 
 /// What contacts have added to the motion is not quite what joints allow.
@@ -253,10 +251,10 @@ void World::Impl::settle_joints(const Island& island, Real end) {
   for (Articulation* articulation : island.articulations) articulation->settle(end, joint_tally);
 }
 
-/// Contact forces of islands over an interval of a sub-step of length h, to a time of the world: each by the
-/// solver that suits it.
-void World::Impl::solve(std::span<Island* const> group, Real duration, Real end, Real h, StepReport& report) {
-  const ContactInterval interval{duration, end, kTouching, duration >= kLasting * h};
+/// Contact forces of islands over an interval, to a time of the world: each by the solver that suits it.
+void World::Impl::solve(std::span<Island* const> group, Real duration, Real end, Interval kind,
+                        StepReport& report) {
+  const ContactInterval interval{duration, end, kTouching, kind == Interval::whole};
   std::vector<const Island*> fast;
   std::vector<std::pair<Island*, SolverChoice*>> exact;
   for (Island* island : group) {

@@ -84,7 +84,9 @@ struct World::Impl : WorldState {
   std::vector<Body*> wake_touched(Real start, Real h);
   void find_moving_islands();
   void solve_islands(Real start, Real h, StepReport& report);
-  void solve(std::span<Island* const> group, Real duration, Real end, Real h, StepReport& report);
+  /// Of a sub-step, as nothing had hit anything, or before or after an impact.
+  enum class Interval : uint8_t { whole, part };
+  void solve(std::span<Island* const> group, Real duration, Real end, Interval kind, StepReport& report);
   void settle_joints(const Island& island, Real end);
   void count_contacts(StepReport& report) const;
 
@@ -98,7 +100,7 @@ struct World::Impl : WorldState {
   std::optional<Real> tumbling_impact_time(const ContactPair& pair, Real from, Real h, Real turn) const;
   std::optional<Real> point_impact_time(const ContactPair& pair, Real h) const;
   void settle_pairs(uint32_t island, StepReport& report);
-  void bring_to(MovingIsland& island, Real start, Real time, Real h, StepReport& report);
+  void bring_to(MovingIsland& island, Real start, Real time, StepReport& report);
   void join(uint32_t into, uint32_t island);
   void find_pairs_again(uint32_t island, Real start, Real h, StepReport& report);
   void collide(uint32_t island, Real start, Real time, Real h, StepReport& report);

@@ -22,8 +22,9 @@ struct ContactInterval {
   Real duration;  ///< [s], > 0
   Real end;       ///< the world's time [s]
   Real touching;  ///< points nearer than this touch [m]
-  /// Whether its forces are what the next one begins with. What stops a body in a moment takes a force that
-  /// would throw it far if it lasted: after short intervals it is still the forces from before.
+  /// Whether its forces are what the next one begins with. What stops a body in the moment before or after an
+  /// impact takes a force that would throw it far if it lasted, and an interval that is made anew after each
+  /// of many impacts would add to its forces each time.
   bool is_remembered = true;
 };
 
