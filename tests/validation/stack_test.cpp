@@ -240,33 +240,45 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, Masonry);
 
 class Pile : public BothSolvers {
  protected:
-  /// Boxes dropped into a pit of 1.6 m, without order.
-  static void expect_settles(uint64_t count, Real seconds) {
-    WorldDef sleepy = def();
-    sleepy.sleep = true;
-    World world(sleepy);
+  static void add_pit(World& world, Real width) {
+    constexpr Real kHigh = 6;
     const auto wall = [&](const Vec3& size, const Vec3& at) {
       world.add_body({.shape = Box{size}, .motion = MotionType::fixed, .pose = {at}, .restitution = 0});
     };
-    constexpr Real kPit = 1.6, kHigh = 6;
     wall({3, 0.2, 3}, {0, -0.1, 0});
     for (const Real side : {-1.0, 1.0}) {
-      wall({0.2, kHigh, 3}, {side * (kPit / 2 + 0.1), kHigh / 2, 0});
-      wall({3, kHigh, 0.2}, {0, kHigh / 2, side * (kPit / 2 + 0.1)});
+      wall({0.2, kHigh, 3}, {side * (width / 2 + 0.1), kHigh / 2, 0});
+      wall({3, kHigh, 0.2}, {0, kHigh / 2, side * (width / 2 + 0.1)});
     }
+  }
+
+  /// One of boxes whose sizes and turns have no order.
+  static BodyDef box(const Scatter& random, uint64_t i, const Vec3& at) {
+    const auto u = [&](uint64_t k) { return 2 * random.uniform(i, k) - 1; };
+    const Quat turn = Quat(u(0), u(1), u(2), u(3)).normalized();
+    const Vec3 size = Vec3::Constant(0.2) + 0.05 * Vec3(u(4), u(5), u(6));
+    return {.shape = Box{size}, .pose = {at, turn}, .restitution = 0.1};
+  }
+
+  /// Boxes dropped into a pit of 1.6 m. On the way a blow can press in a corner that was not near before; it
+  /// is pushed out at once.
+  static void expect_settles(uint64_t count, Real seconds, Real angular_drag, Real blow) {
+    WorldDef sleepy = def();
+    sleepy.sleep = true;
+    World world(sleepy);
+    constexpr Real kPit = 1.6;
+    add_pit(world, kPit);
     const Scatter random{7};
     std::vector<BodyHandle> boxes;
     for (uint64_t i = 0; i < count; ++i) {
-      const auto u = [&](uint64_t k) { return 2 * random.uniform(i, k) - 1; };
       const Vec3 at(-0.5 + 0.5 * Real(i % 3), 0.3 + 0.45 * Real(i / 9), -0.5 + 0.5 * Real(i / 3 % 3));
-      const Quat turn = Quat(u(0), u(1), u(2), u(3)).normalized();
-      const Vec3 size = Vec3::Constant(0.2) + 0.05 * Vec3(u(4), u(5), u(6));
-      boxes.push_back(world.add_body({.shape = Box{size}, .pose = {at, turn}, .restitution = 0.1}));
+      BodyDef def = box(random, i, at);
+      def.angular_drag = angular_drag;
+      boxes.push_back(world.add_body(def));
     }
     const Tally t = run(world, seconds, 1.0 / 60);
     EXPECT_TRUE(t.finite);
-    // On the way a blow can press in a corner that was not near before; it is pushed out at once.
-    EXPECT_LT(t.penetration, 5e-3);
+    EXPECT_LT(t.penetration, blow);
     EXPECT_LT(t.last.penetration, 1e-3);
     EXPECT_EQ(t.last.bodies_asleep, count);
     EXPECT_LT(t.exact_fallbacks, 20 * seconds);
@@ -278,11 +290,37 @@ class Pile : public BothSolvers {
 };
 class LongPile : public Pile {};
 
-TEST_P(Pile, BoxesComeToRestInAPit) {
-  expect_settles(is_exact() ? 30 : 60, 5);
+// What stops a box in the moment after an impact must not throw it in the next; nor what holds two of them in
+// an interval that a hundred impacts make anew. Pushing out and rounding may lift a little.
+TEST_P(Pile, BoxesThatKnockTogetherGainNoEnergy) {
+  for (const uint64_t seed : {3, 4, 10}) {
+    World world(def());
+    add_pit(world, 0.8);
+    const Scatter random{seed};
+    for (uint64_t i = 0; i < (is_exact() ? 8 : 20); ++i) {
+      const Vec3 at(0.02 * (2 * random.uniform(i, 7) - 1), 0.3 + 0.45 * Real(i),
+                    0.02 * (2 * random.uniform(i, 8) - 1));
+      world.add_body(box(random, i, at));
+    }
+    const Real start = world.energy().total();
+    Real before = start;
+    while (world.time() < 2) {
+      world.step(1.0 / 240);
+      const Real now = world.energy().total();
+      ASSERT_LT(now - before, 5e-4 * start) << "seed " << seed << " at " << world.time();
+      before = now;
+    }
+    EXPECT_LT(before, 0.5 * start);
+  }
 }
+
+TEST_P(Pile, BoxesComeToRestInAPit) {
+  expect_settles(is_exact() ? 30 : 60, 5, 0, 5e-3);
+}
+// The last of 500 come down at 20 m/s. Of so many one may come to hang between two corners of others, where
+// nothing but the air would stop its swing.
 TEST_P(LongPile, HundredsOfBoxesComeToRestInAPit) {
-  expect_settles(is_exact() ? 60 : 500, 20);
+  expect_settles(is_exact() ? 60 : 500, 20, 0.05, 0.02);
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, Pile);
 OFFSTAGE_BOTH_SOLVERS(Long, LongPile);

@@ -106,6 +106,23 @@ TEST(ContactPair, ForcesStayWithTheirPoints) {
   }
 }
 
+// Where one point becomes two, its force stays one.
+TEST(ContactPair, AForceGoesToOnePointOnly) {
+  BoxOnGround scene;
+  scene.box->def.shape = Box{{0.2, 0.2, 0.002}};
+  const auto edge_on = [](Real lean) {
+    return Pose{Vec3(0, 0.1, 0), Quat(Eigen::AngleAxisd(lean, Vec3::UnitX()))};
+  };
+  PlacedManifold& edge = scene.find(edge_on(0.6), 0);
+  ASSERT_EQ(edge.manifold.count, 2u);
+  for (uint32_t k = 0; k < 2; ++k) edge.forces[k].last = 7 * Vec3::UnitX();
+  const PlacedManifold& flat = scene.find(edge_on(0), 0);
+  ASSERT_EQ(flat.manifold.count, 4u);
+  Real sum = 0;
+  for (uint32_t k = 0; k < 4; ++k) sum += world_force(flat, k).norm();
+  EXPECT_NEAR(sum, 14, 1e-12);
+}
+
 TEST(ContactPair, ForcesOfPointsThatAreGoneAreForgotten) {
   BoxOnGround scene;
   PlacedManifold& m = scene.find({Vec3(0, 0.1, 0)});
