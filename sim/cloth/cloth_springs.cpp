@@ -114,7 +114,8 @@ uint32_t ClothSprings::Stage::block_count() const {
 void ClothSprings::step(ClothPoints& points, std::span<Vec4> moves, Real h) {
   prepare(points, h);
   const uint32_t threads = spring_.size() < kWorthThreads ? 1 : available_threads();
-  run_stages(std::span(stages_), threads, [&](const Stage& stage, uint32_t block) {
+  const auto all = [](const Stage&) { return true; };
+  run_stages(std::span(stages_), threads, all, [&](const Stage& stage, uint32_t block) {
     const std::size_t begin = stage.begin + block * kBlock;
     const std::size_t end = stage.whole ? stage.end : std::min(begin + kBlock, stage.end);
     if (stage.kind == Stage::pull)

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <utility>
 
 #include "sim/contact/staged_loop.h"
 #include "sim/dynamics/force_field.h"
@@ -26,9 +25,10 @@ constexpr std::size_t kSerialBatches = 48;
 constexpr Real kBlow = 0.1;
 constexpr uint32_t kRepeats = 12;
 /// What lies under a load gives way only together: a push as far as kPress is passed on likewise, and then on
-/// to where it is but kPassedOn [m]. In heaps of 3000 boxes columns stayed 1 mm in each other for seconds while
-/// they lay still, now 0.6 mm; the sampled overlap was above 1 mm in 114 of 360 instants, now in 5. From less
-/// on it would do more, but a wall of 1000 bricks begins to sway by it: one that stands stays below.
+/// to where it is but kPassedOn [m]. In heaps of 3000 boxes columns stayed 1 mm in each other for seconds
+/// while they lay still, now 0.6 mm; the sampled overlap was above 1 mm in 114 of 360 instants, now in 5.
+/// From less on it would do more, but a wall of 1000 bricks begins to sway by it: one that stands stays
+/// below.
 constexpr Real kPress = 3e-4, kPassedOn = 1e-4;
 
 constexpr uint32_t kBatchesPerBlock = 8, kBodiesPerBlock = 128;
@@ -77,42 +77,65 @@ uint32_t relaxation_substeps(Real duration) {
 
 // Stages
 
-void RelaxationSolver::plan_colors(Stage stage, uint32_t substep) {
+/// One range for each colour, and one for what shares bodies within itself: it is done in order.
+void RelaxationSolver::plan_colors(Stage stage, uint32_t substep, bool backward) {
   const std::span<const uint32_t> begins = coloring_.begins();
-  for (std::size_t c = 0; c + 1 < begins.size(); ++c)
-    ranges_.push_back({stage, begins[c], begins[c + 1], kBatchesPerBlock, substep});
+  const auto first = static_cast<std::ptrdiff_t>(ranges_.size());
+  const auto add = [&](uint32_t begin, uint32_t end, uint32_t block_size) {
+    ranges_.push_back({stage, begin, end, block_size, substep, sweeps_, backward});
+  };
+  for (std::size_t c = 0; c + 1 < begins.size(); ++c) add(begins[c], begins[c + 1], kBatchesPerBlock);
   const auto end = static_cast<uint32_t>(batches_.size());
-  if (begins.back() < end) ranges_.push_back({stage, begins.back(), end, end - begins.back(), substep});
+  if (begins.back() < end) add(begins.back(), end, end - begins.back());
+  if (backward) std::reverse(ranges_.begin() + first, ranges_.end());
+}
+
+/// A sweep over all batches, and then over those that blows go on to: there and back, so that they go both
+/// ways.
+void RelaxationSolver::plan_sweeps(Stage first, Stage again, uint32_t substep) {
+  ++sweeps_;
+  plan_colors(first, substep);
+  for (uint32_t k = 0; k < kRepeats; ++k) {
+    ++sweeps_;
+    plan_colors(again, substep, k % 2 == 0);
+  }
 }
 
 void RelaxationSolver::plan(uint32_t substeps) {
   const auto bodies = static_cast<uint32_t>(bodies_.size());
   ranges_.clear();
+  sweeps_ = 0;
   ranges_.push_back({Stage::start, 0, bodies, kBodiesPerBlock});
   plan_colors(Stage::prepare);
   const uint32_t joints = joints_ ? joints_->count() : 0;
   if (joints > 0) ranges_.push_back({Stage::start_joints, 0, joints, 1});
   for (uint32_t i = 0; i < substeps; ++i) {
     if (i > 0) ranges_.push_back({Stage::extrapolate, 0, bodies, kBodiesPerBlock});
-    plan_colors(i > 0 ? Stage::solve_next : Stage::solve, i);
-    ranges_.push_back({Stage::repeat, 0, 1, 1, i});
+    plan_sweeps(i > 0 ? Stage::solve_next : Stage::solve, Stage::solve_again, i);
     if (joints > 0) ranges_.push_back({Stage::join, 0, joints, 1, i + 1});
     ranges_.push_back({Stage::advance, 0, bodies, kBodiesPerBlock});
   }
   // Contacts that closed in the last sub-step still have the velocity that closed them.
-  plan_colors(Stage::push);
-  ranges_.push_back({Stage::push_again, 0, 1, 1});
+  plan_sweeps(Stage::push, Stage::push_again, substeps);
+  ++sweeps_;
   plan_colors(Stage::solve, substeps);
   if (joints > 0) ranges_.push_back({Stage::join_last, 0, joints, 1, substeps});
   ranges_.push_back({Stage::finish, 0, bodies, kBodiesPerBlock});
   plan_colors(Stage::report, substeps);
+  strikes_.assign(sweeps_ + 1, 0);
+  struck_.assign(bodies + 1, 0);
+}
+
+bool RelaxationSolver::is_needed(const Range& range) const {
+  const bool again = range.stage == Stage::solve_again || range.stage == Stage::push_again;
+  return !again || strikes_[range.sweep - 1];
 }
 
 void RelaxationSolver::run(const Range& range, uint32_t block) {
   const uint32_t begin = range.begin + block * range.block_size,
                  end = std::min(begin + range.block_size, range.end);
-  const auto each = [begin, end](auto&& work) {
-    for (uint32_t i = begin; i < end; ++i) work(i);
+  const auto each = [&range, begin, end](auto&& work) {
+    for (uint32_t i = begin; i < end; ++i) work(range.backward ? begin + end - 1 - i : i);
   };
   switch (range.stage) {
     case Stage::start:
@@ -124,14 +147,16 @@ void RelaxationSolver::run(const Range& range, uint32_t block) {
     case Stage::extrapolate:
       return each([this](uint32_t i) { extrapolate(i); });
     case Stage::solve:
-      return each([&](uint32_t i) { solve(i, range.substep); });
+      return each([&](uint32_t i) { solve(i, range); });
     case Stage::solve_next:
       return each([&](uint32_t i) {
         begin_substep(batches_[i]);
-        solve(i, range.substep);
+        solve(i, range);
       });
-    case Stage::repeat:
-      return repeat([&](uint32_t i) { solve(i, range.substep); });
+    case Stage::solve_again:
+      return each([&](uint32_t i) {
+        if (is_struck(i, range.sweep - 1)) solve(i, range);
+      });
     case Stage::start_joints:
       return each([this](uint32_t i) { joints_->start(i, motions_); });
     case Stage::join:
@@ -144,10 +169,12 @@ void RelaxationSolver::run(const Range& range, uint32_t block) {
     case Stage::push:
       return each([&](uint32_t i) {
         end_substeps(batches_[i], substep_);
-        push(i, kPress);
+        push(i, range, kPress);
       });
     case Stage::push_again:
-      return repeat([this](uint32_t i) { push(i, kPassedOn); });
+      return each([&](uint32_t i) {
+        if (is_struck(i, range.sweep - 1)) push(i, range, kPassedOn);
+      });
     case Stage::finish:
       return each([this](uint32_t i) { finish(i); });
     case Stage::report:
@@ -171,24 +198,25 @@ void RelaxationSolver::extrapolate(uint32_t i) {
   last_[i] = now;
 }
 
-void RelaxationSolver::solve(uint32_t i, uint32_t substep) {
+void RelaxationSolver::solve(uint32_t i, const Range& range) {
   PatchBatch& p = batches_[i];
-  sweep(p, motions_, substep_, substep * substep_);
-  strike(p, p.residual, kBlow);
+  sweep(p, motions_, substep_, range.substep * substep_);
+  strike(p, range.sweep, p.residual, kBlow);
 }
 
-void RelaxationSolver::push(uint32_t i, Real threshold) {
+void RelaxationSolver::push(uint32_t i, const Range& range, Real threshold) {
   PatchBatch& p = batches_[i];
-  strike(p, push_out(p, motions_, {def_.duration, kPushShare, kMaxPush * def_.duration}), threshold);
+  const PushOut how{def_.duration, kPushShare, kMaxPush * def_.duration};
+  strike(p, range.sweep, push_out(p, motions_, how), threshold);
 }
 
 /// What the bodies of lanes with so much of a blow touch gets another sweep.
-void RelaxationSolver::strike(const PatchBatch& p, FloatLanes blow, Real threshold) {
+void RelaxationSolver::strike(const PatchBatch& p, uint32_t sweep, FloatLanes blow, Real threshold) {
   for (unsigned lane = 0; lane < ContactColoring::kLanes; ++lane) {
     if (!(blow[lane] > threshold)) continue;
-    if (p.moves_a[lane]) struck_[p.a[lane]] = sweep_;
-    if (p.moves_b[lane]) struck_[p.b[lane]] = sweep_;
-    std::atomic_ref(strikes_).store(true, std::memory_order_relaxed);
+    if (p.moves_a[lane]) struck_[p.a[lane]] = sweep;
+    if (p.moves_b[lane]) struck_[p.b[lane]] = sweep;
+    std::atomic_ref(strikes_[sweep]).store(1, std::memory_order_relaxed);
   }
 }
 
@@ -197,19 +225,6 @@ bool RelaxationSolver::is_struck(uint32_t i, uint32_t since) const {
   for (unsigned lane = 0; lane < ContactColoring::kLanes; ++lane)
     if (struck_[p.a[lane]] >= since || struck_[p.b[lane]] >= since) return true;
   return false;
-}
-
-template <class Again>
-void RelaxationSolver::repeat(Again&& again) {
-  for (uint32_t k = 0; k < kRepeats && std::exchange(strikes_, false); ++k) {
-    const uint32_t last = sweep_++;
-    const auto count = static_cast<uint32_t>(batches_.size());
-    for (uint32_t n = 0; n < count; ++n) {
-      const uint32_t i = k % 2 == 0 ? count - 1 - n : n;  // there and back: the blow goes both ways
-      if (is_struck(i, last)) again(i);
-    }
-  }
-  ++sweep_;
 }
 
 void RelaxationSolver::advance(uint32_t i) {
@@ -297,9 +312,6 @@ void RelaxationSolver::set_up() {
   motions_.back() = {};
   last_.resize(bodies_.size());
   late_.resize(bodies_.size());
-  sweep_ = 1;
-  struck_.assign(bodies_.size() + 1, 0);
-  strikes_ = false;
 }
 
 ContactWork RelaxationSolver::solve(std::span<RelaxedBody> bodies, std::span<ContactPatch> patches,
@@ -313,8 +325,9 @@ ContactWork RelaxationSolver::solve(std::span<RelaxedBody> bodies, std::span<Con
   set_up();
   plan(def.substeps);
   const uint32_t threads = batches_.size() < kSerialBatches ? 1 : available_threads();
-  run_stages(std::span<const Range>(ranges_), threads,
-             [this](const Range& range, uint32_t block) { run(range, block); });
+  run_stages(
+      std::span<const Range>(ranges_), threads, [this](const Range& range) { return is_needed(range); },
+      [this](const Range& range, uint32_t block) { run(range, block); });
   if (joints) joints->finish();
   ContactWork work{.solves = 1, .iterations = def.substeps + 1};
   for (const PatchBatch& p : batches_)

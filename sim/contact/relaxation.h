@@ -101,14 +101,14 @@ class RelaxationSolver {
     prepare,
     extrapolate,
     solve,
-    solve_next,  // in another sub-step
-    repeat,
+    solve_next,   // in another sub-step
+    solve_again,  // what the sweep before has struck
     start_joints,
     join,
     join_last,
     advance,
     push,
-    push_again,
+    push_again,  // likewise
     finish,
     report
   };
@@ -116,23 +116,24 @@ class RelaxationSolver {
   struct Range {
     Stage stage;
     uint32_t begin, end, block_size;
-    uint32_t substep = 0;
+    uint32_t substep = 0, sweep = 0;
+    bool backward = false;
 
     uint32_t block_count() const { return (end - begin + block_size - 1) / block_size; }
   };
 
   void set_up();
   void plan(uint32_t substeps);
-  void plan_colors(Stage stage, uint32_t substep = 0);
+  void plan_colors(Stage stage, uint32_t substep = 0, bool backward = false);
+  void plan_sweeps(Stage first, Stage again, uint32_t substep);
+  bool is_needed(const Range& range) const;
   void run(const Range& range, uint32_t block);
   void start(uint32_t body);
   void extrapolate(uint32_t body);
-  void solve(uint32_t batch, uint32_t substep);
-  void push(uint32_t batch, Real threshold);
-  void strike(const PatchBatch& batch, FloatLanes blow, Real threshold);
+  void solve(uint32_t batch, const Range& range);
+  void push(uint32_t batch, const Range& range, Real threshold);
+  void strike(const PatchBatch& batch, uint32_t sweep, FloatLanes blow, Real threshold);
   bool is_struck(uint32_t batch, uint32_t since) const;
-  template <class Again>
-  void repeat(Again&& again);
   void advance(uint32_t body);
   void finish(uint32_t body);
   void report(uint32_t batch);
@@ -151,10 +152,10 @@ class RelaxationSolver {
   std::vector<FloatLanes> last_;     // velocities of the sub-step before
   std::vector<Real> late_;           // by body: see finish() [s]
   std::vector<Range> ranges_;
-  // Sweeps are numbered; those that strike a body leave their number with it.
-  uint32_t sweep_ = 0;
-  std::vector<uint32_t> struck_;
-  bool strikes_ = false;  // some body, in the last sweep
+  // Sweeps are numbered from 1; those that strike a body leave their number with it.
+  uint32_t sweeps_ = 0;
+  std::vector<uint32_t> struck_;  // by body
+  std::vector<uint8_t> strikes_;  // by sweep: some body
 };
 
 }  // namespace offstage::sim

@@ -22,14 +22,17 @@ inline uint32_t available_threads() {
                   static_cast<uint32_t>(std::max(1, tbb::this_task_arena::max_concurrency())));
 }
 
-/// Calls run(stage, block) for each block of each stage, a stage's only when all before it are done.
-/// Stage has block_count(). Threads take the blocks of a stage as they come; one waits only for blocks that
-/// others are at, so that it ends even if it gets no thread but its own.
-template <class Stage, class Run>
-void run_stages(std::span<Stage> stages, uint32_t threads, Run&& run) {
+/// Calls run(stage, block) for each block of each stage that is_needed(stage), a stage's only when all before
+/// it are done. Stage has block_count(). What is needed may depend on the stages before, but not on its own
+/// blocks. Threads take the blocks of a stage as they come; one waits only for blocks that others are at, so
+/// that it ends even if it gets no thread but its own.
+template <class Stage, class IsNeeded, class Run>
+void run_stages(std::span<Stage> stages, uint32_t threads, IsNeeded&& is_needed, Run&& run) {
   if (threads == 1) {
-    for (Stage& stage : stages)
+    for (Stage& stage : stages) {
+      if (!is_needed(stage)) continue;
       for (uint32_t block = 0, count = stage.block_count(); block < count; ++block) run(stage, block);
+    }
     return;
   }
   struct alignas(64) Progress {
@@ -40,6 +43,7 @@ void run_stages(std::span<Stage> stages, uint32_t threads, Run&& run) {
       uint32_t{0}, threads, uint32_t{1},
       [&](uint32_t) {
         for (std::size_t s = 0; s < stages.size(); ++s) {
+          if (!is_needed(stages[s])) continue;
           const uint32_t count = stages[s].block_count();
           uint32_t mine = 0;
           for (uint32_t block; (block = progress[s].taken.fetch_add(1, std::memory_order_relaxed)) < count;
