@@ -20,10 +20,12 @@ constexpr Real kBoundedStiffness = 1e3;
 /// factorisations, a tenth of the fall-backs).
 constexpr int kSoftSteps = 4;
 constexpr Real kStiffen = 10, kFarOff = 1e-3;
-/// Without joints a guess that is far off starts that much softer, which changes fewer contacts in each
-/// iteration, and stiffens when the multipliers are what is slow (heaps of boxes: half of the factorisations,
-/// a seventh of the fall-backs).
-constexpr Real kSoft = 1e-2;
+/// Without joints a guess that is worse than none starts that much softer, which changes fewer contacts in
+/// each iteration, and stiffens when the multipliers are what is slow (heaps of boxes: half of the
+/// factorisations, a seventh of the fall-backs). Without any guess it starts stiff: redundant contacts then
+/// share their load in a way that the next steps can keep (a wall of 1000 takes 62 factorisations in 4 s for
+/// 3100).
+constexpr Real kSoft = 1e-2, kWrong = 1;
 constexpr Real kTolerance = 3e-8, kSmallest = 1e-11;  // of the velocities, and [m/s]
 constexpr Real kCoarse = 1e-5;
 constexpr uint32_t kPatience = 4;
@@ -88,15 +90,14 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
   bool solved = false;
   mixing_.clear();
   Real softness = 1;
-  if (left > kFarOff * speed) {
-    if (!joints.empty()) {
-      if (!come_near(contacts, tolerance, work)) return std::nullopt;
-    } else {
-      stiffen(softness = kSoft, 1);
-      evaluate(contacts);
-      gradient(contacts);
-      left = gradient_speed();
-    }
+  if (!joints.empty()) {
+    if (left > kFarOff * speed && !come_near(contacts, tolerance, work)) return std::nullopt;
+  } else if (left > kWrong * speed && std::any_of(points_.begin(), points_.end(),
+                                                  [](const Point& p) { return p.multiplier.x() > 0; })) {
+    stiffen(softness = kSoft, 1);
+    evaluate(contacts);
+    gradient(contacts);
+    left = gradient_speed();
   }
   Change change;
   uint32_t began = 0;
