@@ -12,12 +12,16 @@
 namespace offstage::sim {
 
 class Articulation;
+class CoupledSystem;
 
 /// Bodies that depend on each other, in slot order, and the pairs that join them or touch what does not move.
+/// In a sub-step they move together from the same time on.
 struct Island {
   std::vector<Body*> bodies;
   std::vector<ContactPair*> pairs;
   std::vector<Articulation*> articulations;
+  CoupledSystem* motion = nullptr;  ///< that moved it from the interval's start; knows the way back
+  Real from = 0;                    ///< since the sub-step's start [s]
 };
 
 class ContactGraph {
@@ -46,10 +50,11 @@ class ContactGraph {
   std::vector<Entry> entries_, next_;
 };
 
-/// Groups awake bodies, which must be in slot order, by links between them; each island is in the order of
-/// its first body and sets Body::island. Pairs without points join nothing and are left out.
-std::vector<Island> find_islands(std::span<Body* const> bodies, std::span<ContactPair* const> pairs,
-                                 std::span<const std::pair<Body*, Body*>> springs);
+/// Groups awake bodies, which must be in slot order, by links between them, and sets Body::island. The
+/// islands are in the order of their first bodies, without motion or articulations; what memory they had is
+/// used again. Pairs without points join nothing and are left out.
+void find_islands(std::span<Body* const> bodies, std::span<ContactPair* const> pairs,
+                  std::span<const std::pair<Body*, Body*>> springs, std::vector<Island>& islands);
 
 template <class BodyAt, class SurfaceOf>
 void ContactGraph::update(std::span<const IndexPair> candidates, BodyAt&& body_at, SurfaceOf&& surface_of) {

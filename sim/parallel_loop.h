@@ -2,6 +2,8 @@
 /// Loops over things that do not depend on each other.
 
 #include <cstddef>
+#include <cstdint>
+#include <vector>
 
 #include <oneapi/tbb/parallel_for.h>
 
@@ -19,6 +21,18 @@ void for_each_index(std::size_t count, Work&& work) {
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kBlock), [&](const auto& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) work(i);
   });
+}
+
+/// The numbers i below `count` for which is_wanted(i), in ascending order. It is called as for_each_index()
+/// would.
+template <class Predicate>
+std::vector<std::size_t> indices_where(std::size_t count, Predicate&& is_wanted) {
+  std::vector<uint8_t> wanted(count);
+  for_each_index(count, [&](std::size_t i) { wanted[i] = is_wanted(i); });
+  std::vector<std::size_t> result;
+  for (std::size_t i = 0; i < count; ++i)
+    if (wanted[i]) result.push_back(i);
+  return result;
 }
 
 }  // namespace offstage::sim

@@ -55,6 +55,11 @@ Aabb swept_bounds(const Body& body) {
   return box;
 }
 
+/// Whether its way is more than the broad phase has of it.
+bool leaves(const Body& body, const Aabb& way) {
+  return body.def.collides && !body.swept.contains(way);
+}
+
 }  // namespace
 
 PairSurface World::Impl::surface_of(const Body& a, const Body& b) const {
@@ -82,10 +87,9 @@ PairSurface World::Impl::surface_of(const Body& a, const Body& b) const {
   return s;
 }
 
-/// Gives a body's way to the broad phase, with some room, unless it is within what was given before; returns
-/// whether that was needed. In the same sub-step, what was given stays part of it.
-bool World::Impl::move_in_broad_phase(Body& body, Aabb way, bool again) {
-  if (!body.def.collides || body.swept.contains(way)) return false;
+/// Gives a body's way to the broad phase, with some room. In the same sub-step, what was given before stays
+/// part of it.
+void World::Impl::move_in_broad_phase(Body& body, Aabb way, bool again) {
   // Room for some more steps like this one.
   const Vec3 shift = kSteps * (body.pose.position - body.start_pose.position);
   const Vec3 room = Vec3::Constant(kRoom * body.extent);
@@ -95,11 +99,14 @@ bool World::Impl::move_in_broad_phase(Body& body, Aabb way, bool again) {
   body.swept = way;
   broad_phase.move(body.handle.index, way);
   pairs_changed = true;
-  return true;
 }
 
+/// The same unless its way is within what was given before; returns whether that was needed.
 bool World::Impl::move_in_broad_phase(Body& body, bool again) {
-  return move_in_broad_phase(body, swept_bounds(body), again);
+  const Aabb way = swept_bounds(body);
+  if (!leaves(body, way)) return false;
+  move_in_broad_phase(body, way, again);
+  return true;
 }
 
 /// The pairs of bodies whose ways come near each other.
@@ -119,35 +126,46 @@ void World::Impl::collect_pairs() {
 /// share of that, and so on.
 void World::Impl::foresee_blows(Real h) {
   if (def.solver == SolverKind::exact) return;  // it goes from one impact to the next
+  struct Approach {
+    Body *a, *b;
+    Real speed;
+  };
+  std::vector<Approach> approaches(active_pairs.size());
+  for_each_index(active_pairs.size(), [&](std::size_t i) {
+    ContactPair& pair = *active_pairs[i];
+    approaches[i] = {&pair.a(), &pair.b(), pair.speed_bound()};
+  });
   for (Body* body : awake) body->blow = 0;
   const auto strike = [](Body& body, Real speed) {
     if (body.is_awake()) body.blow = std::max(body.blow, speed);
   };
   Real fastest = 0;
-  for (const ContactPair* pair : active_pairs) {
-    const Real speed = pair->speed_bound();
-    strike(pair->a(), speed);
-    strike(pair->b(), speed);
+  for (const auto& [a, b, speed] : approaches) {
+    strike(*a, speed);
+    strike(*b, speed);
     fastest = std::max(fastest, speed);
   }
   for (uint32_t i = 0; i < kPassedOn && fastest * h > kMargin; ++i)
-    for (const ContactPair* pair : active_pairs) {
-      strike(pair->a(), kPassedShare * pair->b().blow);
-      strike(pair->b(), kPassedShare * pair->a().blow);
+    for (const auto& [a, b, speed] : approaches) {
+      strike(*a, kPassedShare * b->blow);
+      strike(*b, kPassedShare * a->blow);
     }
 }
 
 void World::Impl::update_pairs(Real h) {
   std::vector<Aabb> ways(awake.size());
-  for_each_index(awake.size(), [&](std::size_t i) { ways[i] = swept_bounds(*awake[i]); });
-  for (std::size_t i = 0; i < awake.size(); ++i) move_in_broad_phase(*awake[i], ways[i], false);
+  const std::vector<std::size_t> leaving = indices_where(awake.size(), [&](std::size_t i) {
+    ways[i] = swept_bounds(*awake[i]);
+    return leaves(*awake[i], ways[i]);
+  });
+  for (const std::size_t i : leaving) move_in_broad_phase(*awake[i], ways[i], false);
   for (Body* body : kinematic) move_in_broad_phase(*body, false);
   collect_pairs();
   foresee_blows(h);
   const auto find = [&](std::size_t i) {
     // They lie all over the memory.
-    if (i + 6 < active_pairs.size()) __builtin_prefetch(active_pairs[i + 6]);
-    if (i + 3 < active_pairs.size()) active_pairs[i + 3]->prefetch();
+    if (i + 6 < active_pairs.size()) active_pairs[i + 6]->prefetch();
+    if (i + 3 < active_pairs.size()) active_pairs[i + 3]->prefetch_manifold();
     active_pairs[i]->impacts = 0;
     active_pairs[i]->gave_up = active_pairs[i]->settled = false;
     find_points(*active_pairs[i], 0, h);
@@ -229,10 +247,8 @@ void World::Impl::find_moving_islands() {
       first[c] = body;
     }
   }
-  std::vector<Island> found = find_islands(awake, active_pairs, joined);
-  islands.clear();
-  islands.reserve(found.size());
-  for (Island& island : found) islands.push_back({std::move(island), motions.front().get(), 0});
+  find_islands(awake, active_pairs, joined, islands);
+  for (Island& island : islands) island.motion = motions.front().get();
   for (const auto& articulation : articulations)
     if (const Body& first = *articulation->bodies().front(); first.is_awake())
       islands[first.island].articulations.push_back(articulation.get());
@@ -240,21 +256,22 @@ void World::Impl::find_moving_islands() {
 
 void World::Impl::solve_islands(Real start, Real h, StepReport& report) {
   std::vector<Island*> all;
-  for (MovingIsland& island : islands)
+  for (Island& island : islands)
     if (has_forces(island)) all.push_back(&island);
   if (def.solver == SolverKind::automatic) patience.begin(all, h);
-  solve(all, h, start + h, Interval::whole, report);
+  solve(all, {.duration = h, .end = start + h, .is_whole = true}, report);
 }
 
 /// What contacts have added to the motion is not quite what joints allow.
 void World::Impl::settle_joints(const Island& island, Real end) {
-  for (Articulation* articulation : island.articulations) articulation->settle(end, joint_tally);
+  for (Articulation* articulation : island.articulations) {
+    articulation->settle(end, joint_tally);
+    for (Body* body : articulation->bodies()) body->pose = body->rigid.pose();
+  }
 }
 
-/// Contact forces of islands over an interval, to a time of the world: each by the solver that suits it.
-void World::Impl::solve(std::span<Island* const> group, Real duration, Real end, Interval kind,
-                        StepReport& report) {
-  const ContactInterval interval{duration, end, kTouching, kind == Interval::whole};
+/// Contact forces of islands over an interval: each by the solver that suits it.
+void World::Impl::solve(std::span<Island* const> group, const ContactInterval& interval, StepReport& report) {
   std::vector<const Island*> fast;
   std::vector<std::pair<Island*, SolverChoice*>> exact;
   for (Island* island : group) {
@@ -274,8 +291,9 @@ void World::Impl::solve(std::span<Island* const> group, Real duration, Real end,
   std::vector<uint8_t> solved(exact.size(), 0);
   const auto run = [&](std::size_t i) {
     const auto& [island, choice] = exact[i];
-    const Real budget = def.solver == SolverKind::exact ? std::numeric_limits<Real>::infinity()
-                                                        : choice->budget(*island, duration, patience);
+    const Real budget = def.solver == SolverKind::exact
+                            ? std::numeric_limits<Real>::infinity()
+                            : choice->budget(*island, interval.duration, patience);
     const auto result = choice->exact->solve(*island, interval, budget);
     solved[i] = result.has_value();
     if (result) work[i] = *result;
@@ -288,14 +306,11 @@ void World::Impl::solve(std::span<Island* const> group, Real duration, Real end,
   for (std::size_t i = 0; i < exact.size(); ++i) {
     const auto& [island, choice] = exact[i];
     report.exact.add(work[i]);
-    choice->learn(*island, duration, solved[i], patience);
+    choice->learn(*island, interval.duration, solved[i], patience);
     if (!solved[i]) fast.push_back(island);
   }
   if (!fast.empty()) report.fast.add(fast_contacts.solve(fast, interval));
-  for (Island* island : group) {
-    settle_joints(*island, end);
-    for (Body* body : island->bodies) body->pose = body->rigid.pose();
-  }
+  for (Island* island : group) settle_joints(*island, interval.end);
 }
 
 void World::Impl::count_contacts(StepReport& report) const {
@@ -303,13 +318,10 @@ void World::Impl::count_contacts(StepReport& report) const {
   report.bodies_awake = static_cast<uint32_t>(awake.size());
   report.bodies_asleep = static_cast<uint32_t>(asleep);
   report.contacts = 0;
-  for (const ContactPair* pair : active_pairs)
-    for (const PlacedManifold& m : pair->manifolds())
-      for (uint32_t k = 0; k < m.manifold.count; ++k) {
-        const Real separation = m.manifold.points[k].separation;
-        report.contacts += separation <= kTouching;
-        report.penetration = std::max(report.penetration, -separation);
-      }
+  for (const ContactPair* pair : active_pairs) {
+    report.contacts += pair->touching();
+    report.penetration = std::max(report.penetration, -pair->separation());
+  }
 }
 
 }  // namespace offstage::sim

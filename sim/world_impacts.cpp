@@ -9,6 +9,7 @@
 
 #include "sim/coupled_system.h"
 #include "sim/dynamics/free_body.h"
+#include "sim/parallel_loop.h"
 #include "sim/world_impl.h"
 
 namespace offstage::sim {
@@ -68,7 +69,7 @@ class Tumbling {
 /// When a pair's bodies, which do not touch yet, will on their ways as they are now; or do already,
 /// approaching.
 std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) const {
-  if (!pair.by_event || pair.gave_up) return std::nullopt;
+  if (pair.gave_up) return std::nullopt;
   const Body &a = pair.a(), &b = pair.b();
   const Real from = std::max(a.is_awake() ? a.from : 0, b.is_awake() ? b.from : 0);
   if (from >= h * (1 - kInstant)) return std::nullopt;
@@ -145,10 +146,17 @@ std::optional<Real> World::Impl::point_impact_time(const ContactPair& pair, Real
 
 void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
   std::vector<Impact> impacts;
-  const auto look = [&](ContactPair& pair) {
-    if (const auto time = impact_time(pair, h)) impacts.push_back({*time, &pair});
+  const auto look = [&](auto&& is_wanted) {
+    const std::vector<std::size_t> events = indices_where(active_pairs.size(), [&](std::size_t i) {
+      return active_pairs[i]->by_event && is_wanted(*active_pairs[i]);
+    });
+    std::vector<std::optional<Real>> times(events.size());
+    for_each_index(events.size(),
+                   [&](std::size_t i) { times[i] = impact_time(*active_pairs[events[i]], h); });
+    for (std::size_t i = 0; i < events.size(); ++i)
+      if (times[i]) impacts.push_back({*times[i], active_pairs[events[i]]});
   };
-  for (ContactPair* pair : active_pairs) look(*pair);
+  look([](const ContactPair&) { return true; });
 
   const std::size_t most = kMaxImpacts + kImpactsPerBody * awake.size();
   const std::size_t most_moved = std::max(kMovedAnew, kAllMovedAnew * awake.size());
@@ -180,8 +188,7 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
       return (p.a().is_awake() && p.a().island == island) || (p.b().is_awake() && p.b().island == island);
     };
     std::erase_if(impacts, [&](const Impact& i) { return involved(*i.pair); });
-    for (ContactPair* p : active_pairs)
-      if (involved(*p)) look(*p);
+    look(involved);
   }
 }
 
@@ -197,12 +204,13 @@ void World::Impl::settle_pairs(uint32_t island, StepReport& report) {
 }
 
 /// Takes an island from wherever it has been moved back to a time, under the contact forces until then.
-void World::Impl::bring_to(MovingIsland& island, Real start, Real time, StepReport& report) {
+void World::Impl::bring_to(Island& island, Real start, Real time, StepReport& report) {
   if (island.from >= time) return;
   island.motion->restore(island.bodies);
   move_some(island.bodies, start, island.from, time - island.from);
   Island* const one[] = {&island};
-  if (has_forces(island)) solve(one, time - island.from, start + time, Interval::part, report);
+  if (has_forces(island))
+    solve(one, {.duration = time - island.from, .end = start + time, .is_whole = false}, report);
   for (Body* body : island.bodies) {
     body->pose = body->rigid.pose();
     body->begin_interval(time);
@@ -213,7 +221,7 @@ void World::Impl::bring_to(MovingIsland& island, Real start, Real time, StepRepo
 /// Makes two islands, which must be at the same time, one.
 void World::Impl::join(uint32_t into, uint32_t other) {
   if (into == other) return;
-  MovingIsland &x = islands[into], &y = islands[other];
+  Island &x = islands[into], &y = islands[other];
   for (Body* body : y.bodies) body->island = into;
   x.bodies.insert(x.bodies.end(), y.bodies.begin(), y.bodies.end());
   x.pairs.insert(x.pairs.end(), y.pairs.begin(), y.pairs.end());
@@ -231,7 +239,7 @@ void World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepRe
   // Whatever they touch now comes along, with what that touches in turn.
   for (bool grown = true; grown;) {
     grown = false;
-    MovingIsland& island = islands[number];
+    Island& island = islands[number];
     island.pairs.clear();
     for (ContactPair* pair : active_pairs) {
       const bool has_a = pair->a().is_awake() && pair->a().island == number,
@@ -250,7 +258,7 @@ void World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepRe
       if (!pair->manifolds().empty()) island.pairs.push_back(pair);
     }
   }
-  MovingIsland& island = islands[number];
+  Island& island = islands[number];
   const CollisionSettings settings{start + time, kCluster, def.collision_speed, def.impact,
                                    def.solver == SolverKind::exact};
   report.collisions += resolve_collisions(island, settings, report.impacts);
@@ -260,7 +268,7 @@ void World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepRe
   for (ContactPair* pair : island.pairs) find_points(*pair, time, h);
   island.motion = &move_some(island.bodies, start, time, h - time);
   Island* const one[] = {&island};
-  if (has_forces(island)) solve(one, h - time, start + h, Interval::part, report);
+  if (has_forces(island)) solve(one, {.duration = h - time, .end = start + h, .is_whole = false}, report);
   find_pairs_again(number, start, h, report);
 }
 
@@ -276,7 +284,9 @@ void World::Impl::find_pairs_again(uint32_t number, Real start, Real h, StepRepo
   const std::vector<Body*> woken = wake_touched(start, h);
   if (woken.empty()) return;
   const auto added = static_cast<uint32_t>(islands.size());
-  islands.push_back({{woken, {}, {}}, motions.back().get(), 0});
+  islands.emplace_back();
+  islands[added].bodies = woken;
+  islands[added].motion = motions.back().get();
   for (Body* body : woken) body->island = added;
   for (const auto& articulation : articulations)
     if (articulation->bodies().front()->is_awake() && articulation->bodies().front()->island == added)
@@ -289,7 +299,7 @@ void World::Impl::find_pairs_again(uint32_t number, Real start, Real h, StepRepo
     if (pair->a().is_awake() || pair->b().is_awake()) islands[added].pairs.push_back(pair);
   }
   Island* const one[] = {&islands[added]};
-  if (has_forces(islands[added])) solve(one, h, start + h, Interval::whole, report);
+  if (has_forces(islands[added])) solve(one, {.duration = h, .end = start + h, .is_whole = true}, report);
 }
 
 }  // namespace offstage::sim

@@ -21,8 +21,6 @@
 
 namespace offstage::sim {
 
-class CoupledSystem;
-
 struct Spring {
   SpringDef def;
   Real rest_length;
@@ -50,15 +48,6 @@ struct WorldState {
   void remove_dead_springs();
 };
 
-/// Nearer than this bodies touch [m].
-constexpr Real kTouching = 2e-5;
-
-/// An island in a sub-step, whose bodies move together from the same time on.
-struct MovingIsland : Island {
-  CoupledSystem* motion = nullptr;  ///< that moved it from the interval's start; knows the way back
-  Real from = 0;                    ///< since the sub-step's start [s]
-};
-
 struct World::Impl : WorldState {
   StepReport step(Real sampling_time, const BeforeSubStep& before);
   void substep(Real start, Real end, StepReport& report);
@@ -71,22 +60,21 @@ struct World::Impl : WorldState {
   void move_bodies(Real start, Real h, StepReport& report);
   void move_all(Real start, Real h);
   CoupledSystem& move_some(std::span<Body* const> group, Real start, Real from, Real duration);
-  void keep_within_bounds(Body& body, StepReport& report);
+  bool is_within_bounds(const Body& body) const;
+  void retire(Body& body, StepReport& report);
 
   // Contacts (world_contacts.cpp)
   PairSurface surface_of(const Body& a, const Body& b) const;
   void foresee_blows(Real h);
   void update_pairs(Real h);
   void find_points(ContactPair& pair, Real time, Real h) const;
+  void move_in_broad_phase(Body& body, Aabb way, bool again);
   bool move_in_broad_phase(Body& body, bool again);
-  bool move_in_broad_phase(Body& body, Aabb way, bool again);
   void collect_pairs();
   std::vector<Body*> wake_touched(Real start, Real h);
   void find_moving_islands();
   void solve_islands(Real start, Real h, StepReport& report);
-  /// Of a sub-step, as nothing had hit anything, or before or after an impact.
-  enum class Interval : uint8_t { whole, part };
-  void solve(std::span<Island* const> group, Real duration, Real end, Interval kind, StepReport& report);
+  void solve(std::span<Island* const> group, const ContactInterval& interval, StepReport& report);
   void settle_joints(const Island& island, Real end);
   void count_contacts(StepReport& report) const;
 
@@ -100,7 +88,7 @@ struct World::Impl : WorldState {
   std::optional<Real> tumbling_impact_time(const ContactPair& pair, Real from, Real h, Real turn) const;
   std::optional<Real> point_impact_time(const ContactPair& pair, Real h) const;
   void settle_pairs(uint32_t island, StepReport& report);
-  void bring_to(MovingIsland& island, Real start, Real time, StepReport& report);
+  void bring_to(Island& island, Real start, Real time, StepReport& report);
   void join(uint32_t into, uint32_t island);
   void find_pairs_again(uint32_t island, Real start, Real h, StepReport& report);
   void collide(uint32_t island, Real start, Real time, Real h, StepReport& report);
@@ -164,7 +152,7 @@ struct World::Impl : WorldState {
   ContactGraph graph;
   tbb::task_arena serial{1};
   std::vector<ContactPair*> active_pairs;  // those of which a body can move
-  std::vector<MovingIsland> islands;
+  std::vector<Island> islands;
   std::map<uint32_t, SolverChoice> choices;  // by the slot of an island's first body
   SolverPatience patience;
   FastContacts fast_contacts;

@@ -87,7 +87,7 @@ void World::Impl::wake_pushed(Real time) {
 void World::Impl::put_to_sleep(Real start, Real h) {
   if (!def.sleep) return;
   for (Body* body : awake) body->quiet_time = fastest_point(*body) < kQuietSpeed ? body->quiet_time + h : 0;
-  for (const MovingIsland& island : islands) {
+  for (const Island& island : islands) {
     if (island.bodies.empty()) continue;
     const bool quiet = std::all_of(island.bodies.begin(), island.bodies.end(), [](const Body* body) {
       return body->quiet_time >= kQuietTime && body->is_dynamic();

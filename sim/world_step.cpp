@@ -46,7 +46,7 @@ StepReport World::Impl::step(Real sampling, const BeforeSubStep& before) {
   update_lists();
   stepped.assign(awake.begin(), awake.end());
   stepped.insert(stepped.end(), kinematic.begin(), kinematic.end());
-  for (Body* body : stepped) body->before_step = body->pose;
+  for_each_index(stepped.size(), [&](std::size_t i) { stepped[i]->before_step = stepped[i]->pose; });
   begin_cloths();
   report.substeps = substep_count(sampling, def.max_step);
   for (uint32_t i = 0; i < report.substeps; ++i) {
@@ -111,8 +111,10 @@ void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
     solve_islands(start, h, report);
     resolve_impacts(start, h, report);
   }
-  for (Body* body : awake) keep_within_bounds(*body, report);
-  for (Body* body : kinematic) keep_within_bounds(*body, report);
+  for (const std::vector<Body*>* moving : {&awake, &kinematic})
+    for (const std::size_t i :
+         indices_where(moving->size(), [&](std::size_t k) { return !is_within_bounds(*(*moving)[k]); }))
+      retire(*(*moving)[i], report);
   count_contacts(report);
   put_to_sleep(start, h);
 }
@@ -173,7 +175,7 @@ void World::Impl::move_all(Real start, Real h) {
   CoupledSystem& motion = *motions.back();
   motion.save();
   motion.step(integrator(def.integrator), start, h, def.integration_error);
-  for (Body* body : awake) body->pose = body->rigid.pose();
+  for_each_index(awake.size(), [&](std::size_t i) { awake[i]->pose = awake[i]->rigid.pose(); });
 }
 
 /// The same for some bodies and what springs join to them, from `from` on over `duration`.
@@ -186,10 +188,14 @@ CoupledSystem& World::Impl::move_some(std::span<Body* const> group, Real start, 
   return motion;
 }
 
+bool World::Impl::is_within_bounds(const Body& body) const {
+  if (!body.is_dynamic()) return def.bounds.contains(body.pose.position);
+  return is_finite(body.rigid) && def.bounds.contains(body.rigid.position);
+}
+
 /// Freezes a body that left the world or lost its numbers; the latter where it last was.
-void World::Impl::keep_within_bounds(Body& body, StepReport& report) {
-  const bool finite = !body.is_dynamic() || is_finite(body.rigid);
-  if (!finite) {
+void World::Impl::retire(Body& body, StepReport& report) {
+  if (body.is_dynamic() && !is_finite(body.rigid)) {
     if (report.finite) {
       const RigidBody& b = body.rigid;
       report.non_finite = {body.def.name, 0,          body.before_substep.position,
@@ -198,8 +204,6 @@ void World::Impl::keep_within_bounds(Body& body, StepReport& report) {
     report.finite = false;
     body.pose = body.before_substep;
     body.rigid.place(body.pose);
-  } else if (def.bounds.contains(body.is_dynamic() ? body.rigid.position : body.pose.position)) {
-    return;
   }
   body.rigid.momentum.setZero();
   body.rigid.angular_momentum.setZero();
@@ -277,10 +281,11 @@ void World::Impl::step_particles(Real start, Real h, const CoupledSystem& couple
 
 void World::Impl::collect_moved() {
   moved.clear();
-  for (const Body* body : stepped)
-    if (!same(body->pose, body->before_step)) moved.push_back({body->handle, body->pose});
-  std::sort(moved.begin(), moved.end(),
-            [](const MovedBody& a, const MovedBody& b) { return a.body.index < b.body.index; });
+  const auto has_moved = [&](std::size_t i) { return !same(stepped[i]->pose, stepped[i]->before_step); };
+  for (const std::size_t i : indices_where(stepped.size(), has_moved))
+    moved.push_back({stepped[i]->handle, stepped[i]->pose});
+  const auto in_order = [](const MovedBody& a, const MovedBody& b) { return a.body.index < b.body.index; };
+  if (!std::is_sorted(moved.begin(), moved.end(), in_order)) std::sort(moved.begin(), moved.end(), in_order);
 }
 
 }  // namespace offstage::sim

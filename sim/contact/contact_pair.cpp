@@ -85,9 +85,25 @@ Weights weights(const Manifold& m, const ContactFrame& frame, const Pose& a, con
 }  // namespace
 
 ContactPair::ContactPair(Body& a, Body& b, const PairSurface& surface)
-    : a_(&a), b_(&b), surface_(surface), has_sphere_(is_sphere_pair(a, b)) {}
+    : a_(&a),
+      b_(&b),
+      surface_(surface),
+      is_on_plane_(b.collision_shape().is_plane()),
+      has_sphere_(is_sphere_pair(a, b)) {}
 
 void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_within, bool turning) {
+  find_points(a, b, margin, reuse_within, turning);
+  separation_ = std::numeric_limits<Real>::infinity();
+  touching_ = 0;
+  for (const PlacedManifold& m : placed_)
+    for (uint32_t k = 0; k < m.manifold.count; ++k) {
+      const Real separation = m.manifold.points[k].separation;
+      separation_ = std::min(separation_, separation);
+      touching_ += separation <= kTouching;
+    }
+}
+
+void ContactPair::find_points(const Pose& a, const Pose& b, Real margin, Real reuse_within, bool turning) {
   const Real apart = a_->extent + b_->extent + margin;
   if ((a.position - b.position).squaredNorm() > apart * apart) {
     placed_.clear();
@@ -104,7 +120,7 @@ void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_wit
   const Pose a_from_b = between(a, b);
   before.clear();
   remember(before);
-  const Real reach_b = b_->collision_shape().is_plane() ? a_->extent + a_from_b.position.norm() : b_->extent;
+  const Real reach_b = is_on_plane_ ? a_->extent + a_from_b.position.norm() : b_->extent;
   if (found_margin_ >= margin && found_margin_ <= 4 * margin && reuse_within > 0 &&
       difference(a_from_b, a_from_b_, reach_b) <= reuse_within) {
     reuse(a, b, before);
@@ -253,13 +269,6 @@ void ContactPair::inherit(std::vector<Remembered>& points, const Pose& a) {
       m.forces[k].mean += shares[k] * frame_vector(frame, mean);
     }
   }
-}
-
-Real ContactPair::separation() const {
-  Real least = std::numeric_limits<Real>::infinity();
-  for (const PlacedManifold& m : placed_)
-    for (uint32_t k = 0; k < m.manifold.count; ++k) least = std::min(least, m.manifold.points[k].separation);
-  return least;
 }
 
 Real ContactPair::speed_bound() const {

@@ -3,11 +3,13 @@
 /// narrow phase's cache, and the forces at the points as the guess for the next solution.
 
 #include <array>
+#include <limits>
 #include <vector>
 
 #include "sim/body.h"
 #include "sim/collision/narrow_phase.h"
 #include "sim/contact/contact_frame.h"
+#include "sim/prefetch.h"
 
 namespace offstage::sim {
 
@@ -35,8 +37,23 @@ struct PlacedManifold {
   std::array<PointForce, 4> forces;
 };
 
-class ContactPair {
+/// Points nearer than this touch [m].
+constexpr Real kTouching = 2e-5;
+
+/// What the loops over all pairs ask for lies in the first cache line.
+class alignas(64) ContactPair {
+ private:
+  Body *a_, *b_;
+  std::vector<PlacedManifold> placed_;
+  Real separation_ = std::numeric_limits<Real>::infinity();
+  uint32_t touching_ = 0;
+
  public:
+  uint32_t impacts = 0;   ///< in this sub-step
+  bool gave_up = false;   ///< too many of them: no more trace-backs in this sub-step
+  bool settled = false;   ///< its points limit the approach in this sub-step even if it would bounce
+  bool by_event = false;  ///< an impact of this pair is traced back to; else its points limit the approach
+
   /// A plane can only be `b`. Not both are planes.
   ContactPair(Body& a, Body& b, const PairSurface& surface);
 
@@ -49,12 +66,10 @@ class ContactPair {
   /// see find_manifolds().
   void find(const Pose& a, const Pose& b, Real margin, Real reuse, bool turning);
 
-  /// Asks for the manifolds' memory, which find() will want.
-  void prefetch() const {
-    constexpr std::size_t kLine = 64, kFirstPoint = 512;
-    const char* data = reinterpret_cast<const char*>(placed_.data());
-    if (!placed_.empty())
-      for (std::size_t i = 0; i < kFirstPoint; i += kLine) __builtin_prefetch(data + i);
+  /// Asks for the memory that find() will want: of the pair, and a little later of the first manifold.
+  void prefetch() const { sim::prefetch(this, sizeof(ContactPair)); }
+  void prefetch_manifold() const {
+    if (!placed_.empty()) sim::prefetch(placed_.data(), sizeof(PlacedManifold));
   }
 
   /// Whether find() was never called.
@@ -64,18 +79,15 @@ class ContactPair {
   const std::vector<PlacedManifold>& manifolds() const { return placed_; }
 
   /// Least distance of the points found; infinite if there are none.
-  Real separation() const;
+  Real separation() const { return separation_; }
+  /// How many of the points found touch.
+  uint32_t touching() const { return touching_; }
   /// Greatest speed at which a point of the pair can come closer: of all points of both [m/s].
   Real speed_bound() const;
   /// Of it, by their turning alone.
   Real turning_speed() const { return a_->turning_speed() + b_->turning_speed(); }
   /// Velocity of a's point against b's at a place of the world, at the interval's start [m/s].
   Vec3 relative_velocity(const Vec3& point) const;
-
-  uint32_t impacts = 0;   ///< in this sub-step
-  bool gave_up = false;   ///< too many of them: no more trace-backs in this sub-step
-  bool settled = false;   ///< its points limit the approach in this sub-step even if it would bounce
-  bool by_event = false;  ///< an impact of this pair is traced back to; else its points limit the approach
 
  private:
   /// A point with its forces, all in a's frame.
@@ -86,6 +98,7 @@ class ContactPair {
     bool taken = false;  ///< by points that are there now
   };
   static PointForce recalled(const Remembered& p, const ContactFrame& frame, const Pose& a);
+  void find_points(const Pose& a, const Pose& b, Real margin, Real reuse, bool turning);
   void find_one_point(const Pose& a, const Pose& b, Real margin);
   void remember(std::vector<Remembered>& points) const;
   void recall(std::vector<Remembered>& points, const Pose& a);
@@ -93,8 +106,8 @@ class ContactPair {
   void reuse(const Pose& a, const Pose& b, const std::vector<Remembered>& points);
   void set_frame(PlacedManifold& m) const;
 
-  Body *a_, *b_;
   PairSurface surface_;
+  bool is_on_plane_;
   bool has_sphere_;  // then there is one point at most, as quick to find anew as to take over
   PairCache cache_;
   // In a's frame; filled only when they are first taken over: what moves has no use for the memory.
@@ -102,7 +115,6 @@ class ContactPair {
   Pose a_from_b_;  // when found
   Real found_margin_ = -1;
   Pose placed_at_;  // of a, when placed
-  std::vector<PlacedManifold> placed_;
 };
 
 }  // namespace offstage::sim

@@ -126,6 +126,7 @@ void displace(Body& body, const Vec3& shift, const Vec3& turn) {
   RigidBody& r = body.rigid;
   r.position += shift;
   if (turn != Vec3::Zero()) r.orientation = (rotation(turn) * r.orientation).normalized();
+  body.pose = r.pose();
 }
 
 }  // namespace
@@ -236,7 +237,7 @@ std::optional<ContactWork> ExactContacts::solve(const Island& island, const Cont
   joints_.tell(interval.duration);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     forces_[i]->now = contacts_[i].impulse / interval.duration;
-  if (interval.is_remembered)
+  if (interval.is_whole)
     for (PointForce* force : forces_) force->last = force->now;
   move_bodies(island, interval.duration);
   return work;
@@ -265,7 +266,7 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
   for (PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const ContactPoint& point = m.manifold.points[k];
-      const bool touches = point.separation <= interval.touching;
+      const bool touches = point.separation <= kTouching;
       if (pair.by_event && !touches) continue;
       const Vec3 place = (point.on_a + point.on_b) / 2;
       const Vec3 u = in_frame(m.frame, pair.relative_velocity(place) + surface);
@@ -430,11 +431,11 @@ void tell_forces(const ContactPatch& patch, const ContactInterval& interval, Pla
     PointForce& f = m.forces[k];
     f.now = Vec3(p.impulse, share * patch.friction_impulse.x(), share * patch.friction_impulse.y()) /
             interval.duration;
-    if (!interval.is_remembered) continue;
+    if (!interval.is_whole) continue;
     f.last = {p.force, share * patch.force_t, share * patch.force_k};
     f.mean = {p.mean_force, share * patch.mean_friction.x(), share * patch.mean_friction.y()};
   }
-  if (!interval.is_remembered) return;
+  if (!interval.is_whole) return;
   m.torque = patch.torque_n;
   m.mean_torque = patch.mean_friction.z();
 }
@@ -448,7 +449,7 @@ void move(Body& body, const RelaxedBody& b) {
 
 }  // namespace
 
-void FastContacts::collect(std::span<const Island* const> islands, Real touching) {
+void FastContacts::collect(std::span<const Island* const> islands) {
   members_.clear();
   origins_.clear();
   const auto add = [this](Body& body) {
@@ -460,7 +461,7 @@ void FastContacts::collect(std::span<const Island* const> islands, Real touching
   moved_ = members_.size();
   for (const Island* island : islands)
     for (ContactPair* pair : island->pairs) {
-      if (pair->by_event && pair->separation() > touching) continue;
+      if (pair->by_event && pair->separation() > kTouching) continue;
       const uint32_t a = pair->a().is_awake() ? pair->a().row : add(pair->a());
       const uint32_t b = pair->b().is_awake() ? pair->b().row : add(pair->b());
       for (PlacedManifold& m : pair->manifolds()) origins_.push_back({pair, &m, a, b});
@@ -469,7 +470,7 @@ void FastContacts::collect(std::span<const Island* const> islands, Real touching
 
 ContactWork FastContacts::solve(std::span<const Island* const> islands, const ContactInterval& interval) {
   const Real h = interval.duration;
-  collect(islands, interval.touching);
+  collect(islands);
   joints_.collect(islands, interval);
   if (origins_.empty() && joints_.bounded().empty()) return {};
   bodies_.resize(members_.size());

@@ -21,11 +21,10 @@ namespace offstage::sim {
 struct ContactInterval {
   Real duration;  ///< [s], > 0
   Real end;       ///< the world's time [s]
-  Real touching;  ///< points nearer than this touch [m]
-  /// Whether its forces are what the next one begins with. What stops a body in the moment before or after an
-  /// impact takes a force that would throw it far if it lasted, and an interval that is made anew after each
-  /// of many impacts would add to its forces each time.
-  bool is_remembered = true;
+  /// A sub-step as if nothing had hit anything: its forces are what the next one begins with. Else it is the
+  /// part before or after an impact. What stops a body in such a moment takes a force that would throw it far
+  /// if it lasted, and a part that is made anew after each of many impacts would add to its forces each time.
+  bool is_whole = true;
 };
 
 /// Whether anything but free motion happens in an island.
@@ -98,7 +97,7 @@ class FastContacts {
     PlacedManifold* manifold;
     uint32_t a, b;
   };
-  void collect(std::span<const Island* const> islands, Real touching);
+  void collect(std::span<const Island* const> islands);
 
   std::vector<Body*> members_;  // those that move first, then one for each contact with another
   std::size_t moved_ = 0;

@@ -6,6 +6,7 @@
 
 #include "sim/contact/staged_loop.h"
 #include "sim/dynamics/force_field.h"
+#include "sim/parallel_loop.h"
 
 namespace offstage::sim {
 namespace {
@@ -31,7 +32,7 @@ constexpr uint32_t kRepeats = 12;
 /// below.
 constexpr Real kPress = 3e-4, kPassedOn = 1e-4;
 
-constexpr uint32_t kBatchesPerBlock = 8, kBodiesPerBlock = 128;
+constexpr uint32_t kBatchesPerBlock = 4, kBodiesPerBlock = 128;
 
 Vec3 linear_part(FloatLanes x) {
   return {x[0], x[1], x[2]};
@@ -304,8 +305,10 @@ void RelaxationSolver::report(uint32_t i) {
 
 void RelaxationSolver::set_up() {
   const auto mover = [this](uint32_t i) { return bodies_[i].inverse_mass > 0 ? i : ContactColoring::kNone; };
-  links_.clear();
-  for (const ContactPatch& p : patches_) links_.push_back({mover(p.a), mover(p.b)});
+  links_.resize(patches_.size());
+  for_each_index(patches_.size(), [&](std::size_t i) {
+    links_[i] = {mover(patches_[i].a), mover(patches_[i].b)};
+  });
   coloring_.assign(static_cast<uint32_t>(bodies_.size()), links_);
   batches_.resize(coloring_.batches().size());
   motions_.resize(bodies_.size() + 1);
