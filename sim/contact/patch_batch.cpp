@@ -226,7 +226,9 @@ void set_patch(PatchBatch& p, unsigned lane, const ContactPatch& c, Real substep
   p.arm_b.set(lane, c.arm_b);
   p.friction_t[lane] = narrow(c.friction_t);
   p.friction_k[lane] = narrow(c.friction_k);
-  p.friction_impulse.set(lane, substep * Vec3(c.force_t, c.force_k, c.torque_n));
+  // One point has no torque of its own, and sweep_single() knows none.
+  const bool is_single = c.count == 1;
+  p.friction_impulse.set(lane, substep * Vec3(c.force_t, c.force_k, is_single ? 0 : c.torque_n));
   p.friction_mean.set(lane, substep * c.mean_friction);
   for (uint32_t i = 0; i < c.count; ++i) {
     PatchBatch::Point& q = p.points[i];

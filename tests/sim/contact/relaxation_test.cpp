@@ -230,6 +230,22 @@ TEST(Relaxation, ConveyorCarriesTheBox) {
   EXPECT_NEAR(s.bodies.back().pose.position.x(), 1 - reached / 2, 1e-3);
 }
 
+// A body turns about a point that it touches, as a manifold that has shrunk to this point remembers it: one
+// point has no torque, so what it would turn to is not hit.
+TEST(Relaxation, APointHasNoTorque) {
+  std::vector<RelaxedBody> bodies(2);
+  bodies[0].inverse_mass = 1;
+  bodies[0].inverse_inertia = 10 * Mat3::Identity();
+  std::vector<ContactPatch> patches(2);
+  patches[0] = {.a = 0, .b = 1, .frame = contact_frame(Vec3::UnitY()), .arm_a = -Vec3::UnitY(), .count = 1};
+  patches[0].torque_n = 50;
+  patches[1] = {.a = 0, .b = 1, .frame = contact_frame(Vec3::UnitZ()), .arm_a = Vec3::UnitX(), .count = 1};
+  RelaxationSolver().solve(bodies, patches, {.duration = kStep});
+  EXPECT_EQ(patches[1].points[0].impulse, 0);
+  EXPECT_EQ(bodies[0].velocity, Vec3::Zero());
+  EXPECT_EQ(bodies[0].angular_velocity, Vec3::Zero());
+}
+
 TEST(Relaxation, DegenerateInputGivesFiniteNumbers) {
   std::vector<RelaxedBody> bodies(3);
   bodies[0].velocity = Vec3(1, 2, 3);  // moved by nothing
