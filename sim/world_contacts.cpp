@@ -35,6 +35,8 @@ constexpr Real kPassedShare = 0.5;
 constexpr uint32_t kPassedOn = 3;
 /// Bodies turn if their turning moves their surfaces by more than this in an interval [m].
 constexpr Real kTurning = 2e-4;
+/// Bodies that move against each other by more than this in an interval may meet with other features [m].
+constexpr Real kForesee = 3e-3;
 
 Real smaller_extent(const Body& a, const Body& b) {
   return std::min(a.extent, b.extent);
@@ -204,6 +206,7 @@ void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
     pair.by_event = true;
     return;
   }
+  if (!exact && time == 0 && !pair.manifolds().empty() && pair.speed_bound() * h > kForesee) pair.foresee(h);
   if (!bounces || pair.settled) return;
   for (const PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k) {

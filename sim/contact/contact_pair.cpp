@@ -16,6 +16,9 @@ constexpr Real kSameFeature = 1.0 / 16;
 /// Cosine: a force that is not more inclined than this belongs to the normal. With a coefficient of friction
 /// of 1 it is 45 degrees away at most.
 constexpr Real kAlong = 0.7;
+/// What overlaps at an interval's end by less than kForeseen, or than a point tells that has a normal as
+/// alike as this cosine and is so near, is expected [m].
+constexpr Real kSameNormal = 0.999, kNear = 0.02, kForeseen = 2e-4;
 /// Of the spread of points, what makes it invertible.
 constexpr Real kFlat = 1e-6;
 
@@ -82,6 +85,15 @@ Weights weights(const Manifold& m, const ContactFrame& frame, const Pose& a, con
   return result;
 }
 
+/// Of the material point that is at a place of the world when the interval begins, without contacts: the mean
+/// of its ends.
+Vec3 free_velocity(const Body& body, const Vec3& place) {
+  if (!body.is_awake()) return body.start_velocity(place);
+  const Twist mean{(body.start_twist.velocity + body.rigid.velocity()) / 2,
+                   (body.start_twist.angular_velocity + body.rigid.angular_velocity()) / 2};
+  return mean.at(place - body.start.position);
+}
+
 }  // namespace
 
 ContactPair::ContactPair(Body& a, Body& b, const PairSurface& surface)
@@ -141,6 +153,50 @@ void ContactPair::find_points(const Pose& a, const Pose& b, Real margin, Real re
   inherit(before, a);
   placed_at_ = a;
   found_.clear();
+}
+
+Vec3 ContactPair::free_way(const Vec3& point, Real duration) const {
+  return duration * (free_velocity(*a_, point) - free_velocity(*b_, point));
+}
+
+bool ContactPair::is_expected(const Vec3& normal, const Vec3& on_a, Real separation, Real duration) const {
+  for (const PlacedManifold& m : placed_) {
+    if (m.frame.n.dot(normal) < kSameNormal) continue;
+    for (uint32_t k = 0; k < m.manifold.count; ++k) {
+      const ContactPoint& p = m.manifold.points[k];
+      if ((p.on_a - on_a).squaredNorm() > kNear * kNear) continue;
+      if (p.separation + m.frame.n.dot(free_way(p.on_a, duration)) < separation + kForeseen) return true;
+    }
+  }
+  return false;
+}
+
+void ContactPair::foresee(Real duration) {
+  if (has_sphere_) return;
+  static thread_local std::vector<Manifold> found;
+  const Pose &a = a_->start_pose, &b = b_->start_pose, end = between(a_->pose, b_->pose);
+  found.clear();
+  find_manifolds(a_->collision_shape(), b_->collision_shape(), end, 0, cache_, DistanceMethod::gjk, found);
+  for (const Manifold& at_end : found) {
+    PlacedManifold placed;
+    Manifold& m = placed.manifold;
+    place(at_end, a_->pose, m);
+    bool is_new = false;
+    for (uint32_t k = 0; k < m.count; ++k) {
+      const Real separation = at_end.points[k].separation;
+      const Vec3 on_a = a.point_to_world(at_end.points[k].on_a),
+                 on_b = b.point_to_world(end.point_to_body(at_end.points[k].on_b)),
+                 middle = (on_a + on_b) / 2;
+      is_new |= separation < -kForeseen && !is_expected(m.normal, on_a, separation, duration);
+      ContactPoint& p = m.points[k];
+      p.separation = separation - m.normal.dot(free_way(middle, duration));
+      p.on_a = middle + p.separation / 2 * m.normal;
+      p.on_b = middle - p.separation / 2 * m.normal;
+    }
+    if (!is_new) continue;
+    set_frame(placed);
+    placed_.push_back(placed);
+  }
 }
 
 /// Of a sphere. Its force stays as it is in the world, for the sphere turns under it when it rolls.

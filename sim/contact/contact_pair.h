@@ -66,6 +66,12 @@ class alignas(64) ContactPair {
   /// see find_manifolds().
   void find(const Pose& a, const Pose& b, Real margin, Real reuse, bool turning);
 
+  /// Adds to what find() found at the interval's start where the bodies would overlap at its end if nothing
+  /// stopped them, deeper than the points found tell: of bodies that turn or slide fast other features meet
+  /// than were near before. The distances of these points are such that the velocities at the start's arms,
+  /// over `duration` [s], bring them to what they are at the end.
+  void foresee(Real duration);
+
   /// Asks for the memory that find() will want: of the pair, and a little later of the first manifold.
   void prefetch() const { sim::prefetch(this, sizeof(ContactPair)); }
   void prefetch_manifold() const {
@@ -105,6 +111,10 @@ class alignas(64) ContactPair {
   void inherit(std::vector<Remembered>& points, const Pose& a);
   void reuse(const Pose& a, const Pose& b, const std::vector<Remembered>& points);
   void set_frame(PlacedManifold& m) const;
+  /// How far the free motion brings a's point away from b's, at a place of the world at the start [m].
+  Vec3 free_way(const Vec3& point, Real duration) const;
+  /// Whether the points found tell that there will be such an overlap.
+  bool is_expected(const Vec3& normal, const Vec3& on_a, Real separation, Real duration) const;
 
   PairSurface surface_;
   bool is_on_plane_;

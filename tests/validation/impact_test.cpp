@@ -272,5 +272,28 @@ TEST_P(Paddle, ABoxPushesAStackAlong) {
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, Paddle);
 
+// Of boxes that turn and slide fast, other corners meet in a step than were near when it began.
+TEST(FastSolver, BoxesThatTurnAsTheyMeetDoNotOverlap) {
+  const Scatter random{11};
+  Real deepest = 0;
+  for (uint64_t i = 0; i < 400; ++i) {
+    const auto u = [&](uint64_t k) { return 2 * random.uniform(i, k) - 1; };
+    const auto direction = [&](uint64_t k) { return Vec3(u(k), u(k + 1), u(k + 2)).normalized(); };
+    const auto turn = [&](uint64_t k) { return Quat(u(k), u(k + 1), u(k + 2), u(k + 3)).normalized(); };
+    World world({.gravity = Vec3::Zero(), .solver = SolverKind::fast});
+    const Vec3 from = direction(0);
+    for (const Real side : {-1.0, 1.0}) {
+      const uint64_t k = side < 0 ? 10 : 30;
+      world.add_body({.shape = Box{Vec3(1, 0.6, 0.8)},
+                      .pose = {side * 0.9 * from, turn(k)},
+                      .velocity = side * (-2.5 * from + 1.5 * direction(k + 4)),
+                      .angular_velocity = 9 * direction(k + 7),
+                      .restitution = 0});
+    }
+    for (int step = 0; step < 120; ++step) deepest = std::max(deepest, world.step(1.0 / 240).penetration);
+  }
+  EXPECT_LT(deepest, 1e-3);
+}
+
 }  // namespace
 }  // namespace offstage::sim
