@@ -78,17 +78,27 @@ uint32_t relaxation_substeps(Real duration) {
 
 // Stages
 
-/// One range for each colour, and one for what shares bodies within itself: it is done in order.
+/// One range for each colour, and one for what shares bodies within itself: it is done in order. Colours that
+/// are one block each are not worth a stage each: they are done in order, too.
 void RelaxationSolver::plan_colors(Stage stage, uint32_t substep, bool backward) {
   const std::span<const uint32_t> begins = coloring_.begins();
-  const auto first = static_cast<std::ptrdiff_t>(ranges_.size());
+  const std::size_t first = ranges_.size();
   const auto add = [&](uint32_t begin, uint32_t end, uint32_t block_size) {
     ranges_.push_back({stage, begin, end, block_size, substep, sweeps_, backward});
   };
-  for (std::size_t c = 0; c + 1 < begins.size(); ++c) add(begins[c], begins[c + 1], kBatchesPerBlock);
+  for (std::size_t c = 0; c + 1 < begins.size(); ++c) {
+    const bool is_small = begins[c + 1] - begins[c] <= kBatchesPerBlock;
+    Range* const last = ranges_.size() > first ? &ranges_.back() : nullptr;
+    if (is_small && last && last->block_count() == 1) {
+      last->end = begins[c + 1];
+      last->block_size = last->end - last->begin;
+    } else {
+      add(begins[c], begins[c + 1], kBatchesPerBlock);
+    }
+  }
   const auto end = static_cast<uint32_t>(batches_.size());
   if (begins.back() < end) add(begins.back(), end, end - begins.back());
-  if (backward) std::reverse(ranges_.begin() + first, ranges_.end());
+  if (backward) std::reverse(ranges_.begin() + static_cast<std::ptrdiff_t>(first), ranges_.end());
 }
 
 /// A sweep over all batches, and then over those that blows go on to: there and back, so that they go both
@@ -111,10 +121,9 @@ void RelaxationSolver::plan(uint32_t substeps) {
   const uint32_t joints = joints_ ? joints_->count() : 0;
   if (joints > 0) ranges_.push_back({Stage::start_joints, 0, joints, 1});
   for (uint32_t i = 0; i < substeps; ++i) {
-    if (i > 0) ranges_.push_back({Stage::extrapolate, 0, bodies, kBodiesPerBlock});
     plan_sweeps(i > 0 ? Stage::solve_next : Stage::solve, Stage::solve_again, i);
     if (joints > 0) ranges_.push_back({Stage::join, 0, joints, 1, i + 1});
-    ranges_.push_back({Stage::advance, 0, bodies, kBodiesPerBlock});
+    ranges_.push_back({i + 1 < substeps ? Stage::advance : Stage::advance_last, 0, bodies, kBodiesPerBlock});
   }
   // Contacts that closed in the last sub-step still have the velocity that closed them.
   plan_sweeps(Stage::push, Stage::push_again, substeps);
@@ -145,8 +154,6 @@ void RelaxationSolver::run(const Range& range, uint32_t block) {
       return each([this](uint32_t i) {
         sim::prepare(batches_[i], coloring_.batches()[i], patches_, bodies_, motions_, substep_);
       });
-    case Stage::extrapolate:
-      return each([this](uint32_t i) { extrapolate(i); });
     case Stage::solve:
       return each([&](uint32_t i) { solve(i, range); });
     case Stage::solve_next:
@@ -166,6 +173,11 @@ void RelaxationSolver::run(const Range& range, uint32_t block) {
         joints_->solve(i, motions_, range.substep * substep_, range.stage == Stage::join_last);
       });
     case Stage::advance:
+      return each([this](uint32_t i) {
+        advance(i);
+        extrapolate(i);
+      });
+    case Stage::advance_last:
       return each([this](uint32_t i) { advance(i); });
     case Stage::push:
       return each([&](uint32_t i) {

@@ -99,7 +99,6 @@ class RelaxationSolver {
   enum class Stage : uint8_t {
     start,
     prepare,
-    extrapolate,
     solve,
     solve_next,   // in another sub-step
     solve_again,  // what the sweep before has struck
@@ -107,6 +106,7 @@ class RelaxationSolver {
     join,
     join_last,
     advance,
+    advance_last,
     push,
     push_again,  // likewise
     finish,

@@ -23,7 +23,8 @@ inline uint32_t available_threads() {
 }
 
 /// The blocks of a stage that one thread begins with, and others take from when they have no more of theirs.
-/// One counter serves all stages, as they come in order.
+/// One counter serves all stages, as they come in order, and all that threads tell each other of a share is
+/// in one cache line: to hand that from core to core is what a stage costs besides its blocks.
 class alignas(64) BlockShare {
  public:
   /// How many of `count` blocks of a stage were taken before this call, which takes another one; `count` if
@@ -31,23 +32,43 @@ class alignas(64) BlockShare {
   uint32_t take(uint32_t stage, uint32_t count) {
     uint64_t now = state_.load(std::memory_order_relaxed);
     while (true) {
-      const auto at = static_cast<uint32_t>(now >> 32);
-      const uint32_t taken = at == stage ? static_cast<uint32_t>(now) : 0;
-      if (at > stage || taken >= count) return count;
-      if (state_.compare_exchange_weak(now, uint64_t{stage} << 32 | (taken + 1), std::memory_order_relaxed))
-        return taken;
+      const State state = unpacked(now);
+      const uint32_t taken = state.stage == stage ? state.taken : 0;
+      if (state.stage > stage || taken >= count) return count;
+      const uint64_t next = state.stage == stage ? now + kTaken : uint64_t{stage} << kStageBit | kTaken;
+      if (state_.compare_exchange_weak(now, next, std::memory_order_relaxed)) return taken;
     }
   }
 
+  /// A block that was taken is done.
+  void finish() { state_.fetch_add(kDone, std::memory_order_release); }
+
+  /// Whether all `count` blocks of a stage are done.
+  bool is_done(uint32_t stage, uint32_t count) const {
+    const State state = unpacked(state_.load(std::memory_order_acquire));
+    return count == 0 || state.stage > stage || (state.stage == stage && state.done == count);
+  }
+
  private:
-  std::atomic<uint64_t> state_{0};  // the stage, and how many of its blocks are taken
+  static constexpr uint32_t kBlockBits = 20, kStageBit = 2 * kBlockBits;
+  static constexpr uint64_t kDone = 1, kTaken = uint64_t{1} << kBlockBits;
+  struct State {
+    uint32_t stage, taken, done;
+  };
+  static State unpacked(uint64_t s) {
+    return {static_cast<uint32_t>(s >> kStageBit), static_cast<uint32_t>(s / kTaken % kTaken),
+            static_cast<uint32_t>(s % kTaken)};
+  }
+
+  std::atomic<uint64_t> state_{0};  // the stage, and how many of its blocks are taken, and done
 };
 
 /// Calls run(stage, block) for each block of each stage that is_needed(stage), a stage's only when all before
 /// it are done. Stage has block_count(). What is needed may depend on the stages before, but not on its own
 /// blocks. In each stage a thread begins with the same part of the blocks, of which its cache may still have
 /// what it was at before, and helps others when that is done; it waits only for blocks that others are at, so
-/// that it ends even if it gets no thread but its own.
+/// that it ends even if it gets no thread but its own. Up to 16 million stages of a million blocks for each
+/// thread.
 template <class Stage, class IsNeeded, class Run>
 void run_stages(std::span<Stage> stages, uint32_t threads, IsNeeded&& is_needed, Run&& run) {
   if (threads == 1) {
@@ -58,26 +79,21 @@ void run_stages(std::span<Stage> stages, uint32_t threads, IsNeeded&& is_needed,
     return;
   }
   std::vector<BlockShare> shares(threads);
-  struct alignas(64) {
-    std::atomic<uint64_t> blocks{0};
-  } done;  // of all stages so far
   const auto work = [&](uint32_t thread) {
-    uint64_t all = 0;
     for (uint32_t s = 0; s < stages.size(); ++s) {
       if (!is_needed(stages[s])) continue;
-      const uint32_t count = stages[s].block_count();
-      uint32_t mine = 0;
+      const uint64_t count = stages[s].block_count();
+      const auto begin = [&](uint32_t owner) { return static_cast<uint32_t>(count * owner / threads); };
       for (uint32_t i = 0; i < threads; ++i) {
-        const uint32_t owner = (thread + i) % threads;
-        const auto begin = static_cast<uint32_t>(uint64_t{count} * owner / threads),
-                   end = static_cast<uint32_t>(uint64_t{count} * (owner + 1) / threads);
-        for (uint32_t taken; (taken = shares[owner].take(s, end - begin)) < end - begin; ++mine)
-          run(stages[s], begin + taken);
+        const uint32_t owner = (thread + i) % threads, first = begin(owner), mine = begin(owner + 1) - first;
+        for (uint32_t taken; (taken = shares[owner].take(s, mine)) < mine;) {
+          run(stages[s], first + taken);
+          shares[owner].finish();
+        }
       }
-      if (mine > 0) done.blocks.fetch_add(mine, std::memory_order_release);
-      all += count;
-      for (uint32_t spins = 0; done.blocks.load(std::memory_order_acquire) < all; ++spins)
-        spins < 1000 ? __builtin_ia32_pause() : std::this_thread::yield();
+      for (uint32_t owner = 0; owner < threads; ++owner)
+        for (uint32_t spins = 0; !shares[owner].is_done(s, begin(owner + 1) - begin(owner)); ++spins)
+          spins < 1000 ? __builtin_ia32_pause() : std::this_thread::yield();
     }
   };
   tbb::parallel_for(uint32_t{0}, threads, uint32_t{1}, work, tbb::simple_partitioner());
