@@ -9,6 +9,8 @@
 #include "sim/contact/contact_frame.h"
 #include "sim/dynamics/force_field.h"
 #include "sim/dynamics/rigid_body.h"
+#include "sim/parallel_loop.h"
+#include "sim/prefetch.h"
 #include "sim/world.h"
 
 namespace offstage::sim {
@@ -46,6 +48,9 @@ struct Body {
   Wrench rest_push;       // asleep: what forces that change did to it when it fell asleep, about its centre
   BodyDef def;
   Solid solid;
+
+  /// Asks for the memory of what it is at the interval's start and now.
+  void prefetch_interval() const { prefetch(&start_pose, &before_substep); }
 
   bool is_dynamic() const { return type == MotionType::dynamic; }
   bool is_kinematic() const { return type == MotionType::kinematic; }
@@ -105,5 +110,16 @@ struct Body {
     turning = turns ? angular_velocity.norm() * reach : 0;
   }
 };
+
+/// Calls work(i) for each body i of many, as for_each_index() does, with the memory of its interval asked for
+/// a little before: bodies lie far from each other.
+template <class Work>
+void for_each_interval(std::span<Body* const> bodies, Work&& work) {
+  constexpr std::size_t kAhead = 3;
+  for_each_index(bodies.size(), [&](std::size_t i) {
+    if (i + kAhead < bodies.size()) bodies[i + kAhead]->prefetch_interval();
+    work(i);
+  });
+}
 
 }  // namespace offstage::sim

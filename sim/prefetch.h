@@ -5,10 +5,10 @@
 
 namespace offstage::sim {
 
-/// Asks for `size` bytes from `begin` on.
-inline void prefetch(const void* begin, std::size_t size) {
+/// Asks for the lines of the caches that lie from `begin` to `end`.
+inline void prefetch(const void* begin, const void* end) {
   constexpr std::size_t kLine = 64;
-  for (std::size_t i = 0; i < size; i += kLine) __builtin_prefetch(static_cast<const char*>(begin) + i);
+  for (auto* p = static_cast<const char*>(begin); p < end; p += kLine) __builtin_prefetch(p);
 }
 
 }  // namespace offstage::sim

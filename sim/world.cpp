@@ -89,8 +89,12 @@ void check_body(const std::string& object, const BodyDef& def) {
   check_restitution(object, def.restitution);
   check_finite(object, "friction_axis", def.friction_axis);
   check_finite(object, "surface_velocity", def.surface_velocity);
+  for (const Real friction : {def.static_friction, def.cross_friction})
+    if (!std::isfinite(friction)) refuse(object, "static_friction or cross_friction is not finite");
   if (def.cross_friction >= 0 && def.friction_axis == Vec3::Zero())
     refuse(object, "cross_friction needs a friction_axis, allowed is any but 0 0 0");
+  if (def.cross_friction > 0 && def.friction == 0)
+    refuse(object, "cross_friction needs a friction along the axis, too, allowed is any but 0");
   check_track(object, def.track);
 }
 

@@ -58,8 +58,11 @@ struct BodyDef {
   Real restitution = 0.5;                ///< of two the larger is used; in [0, 1]
   Real friction = 0.5;                   ///< Coulomb's coefficient of what slides; of two the geometric mean
   Real static_friction = -1;             ///< of what does not; negative: as `friction`
-  Real cross_friction = -1;              ///< of sliding across friction_axis; negative: as along it
-  Vec3 friction_axis = Vec3::Zero();     ///< the surface's grain, in the body's frame; zero: none
+  /// Of sliding across friction_axis; negative: as along it. What it is of `friction`, its square root is in
+  /// every pair, whatever a ContactRule says. Not beside a friction of 0.
+  Real cross_friction = -1;
+  Vec3 friction_axis = Vec3::Zero();  ///< the surface's grain, in the body's frame; zero: none. Of two bodies
+                                      ///< with a grain that of the one that was added first counts
   Vec3 surface_velocity =
       Vec3::Zero();      ///< of the surface against the body, as of a conveyor [m/s], its frame
   bool collides = true;  ///< takes part in collisions with bodies and particles

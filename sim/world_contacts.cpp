@@ -26,8 +26,10 @@ constexpr Real kFar = 0.25, kFarWithoutBounce = 1;
 constexpr Real kRoom = 0.03, kSteps = 2;
 /// Of the extent: a bow wider than this is of a turn by more than half a radian.
 constexpr Real kWide = 0.036;
-/// How far bodies may shift against each other before their points are found anew [m].
-constexpr Real kReuse = 1e-5, kExactReuse = 1e-8;
+/// How far bodies may shift against each other before their points are found anew, and no further than this
+/// share of the smaller body [m]. Until then the distances of the points are new in each step, right to the
+/// second order.
+constexpr Real kReuse = 1e-4, kReuseShare = 2e-4, kExactReuse = 1e-8;
 /// Of the speed of what strikes it, a body of the same mass gets this share if it does not bounce: then both
 /// go on together. So often a blow is passed on: the next one would have a sixteenth of its speed, and of
 /// less than 7.7 m/s that is within kMargin in a step of 1/240 s.
@@ -79,12 +81,13 @@ PairSurface World::Impl::surface_of(const Body& a, const Body& b) const {
     s.static_friction =
         rule->second.static_friction.value_or(rule->second.friction.value_or(s.static_friction));
   }
-  for (const Body* body : {&a, &b}) {
+  const bool a_is_first = a.handle.index < b.handle.index;
+  for (const Body* body : {a_is_first ? &a : &b, a_is_first ? &b : &a}) {
     const BodyDef& d = body->def;
     s.conveys |= d.surface_velocity != Vec3::Zero();
     if (d.cross_friction < 0 || d.friction_axis == Vec3::Zero() || s.grain) continue;
     s.grain = body;
-    s.cross = d.friction > 0 ? std::sqrt(d.cross_friction / d.friction) : 1;
+    s.cross = d.friction > 0 ? std::sqrt(d.cross_friction / d.friction) : 1;  // then both are 0
   }
   return s;
 }
@@ -197,8 +200,8 @@ void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
   const Real margin = base + std::min(std::max(2 * motion, blow), far);
   // A blow makes what it moves turn, too.
   const Real turning = pair.turning_speed() * left + (blow > kMargin ? blow : 0);
-  pair.find(pair.a().placed_at(time, h), pair.b().placed_at(time, h), margin, exact ? kExactReuse : kReuse,
-            turning > kTurning);
+  const Real reuse = exact ? kExactReuse : std::min(kReuse, kReuseShare * size);
+  pair.find(pair.a().placed_at(time, h), pair.b().placed_at(time, h), margin, reuse, turning > kTurning);
 
   pair.by_event = false;
   if (pair.gave_up) return;

@@ -121,7 +121,7 @@ void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
 
 /// Every body that moves begins a sub-step; kinematic ones are moved through it at once.
 void World::Impl::begin_bodies(Real end) {
-  for_each_index(awake.size(), [&](std::size_t i) {
+  for_each_interval(awake, [&](std::size_t i) {
     awake[i]->before_substep = awake[i]->pose;
     awake[i]->begin_interval(0);
   });

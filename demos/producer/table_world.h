@@ -96,7 +96,9 @@ struct Table<Material> {
         {"static_friction", &T::static_friction,
          "the same of what does not slide, between bodies; left out: `friction`", "", kNotNegative},
         {"cross_friction", &T::cross_friction,
-         "the same of sliding across the `friction_axis` of a body; left out: `friction`", "", kNotNegative},
+         "the same of sliding across the `friction_axis` of a body, which `friction` must then not be 0 along; "
+         "left out: `friction`",
+         "", kNotNegative},
     };
   }
 };
@@ -110,8 +112,10 @@ struct Table<ContactRule> {
     return {
         {"materials", &T::materials, "names of two materials, in any order; may be the same", kRequired},
         {"restitution", &T::restitution, "bounciness; left out: by the materials", "", kShare},
-        {"friction", &T::friction, "Coulomb's coefficient of what slides; left out: by the materials", "",
-         kNotNegative},
+        {"friction", &T::friction,
+         "Coulomb's coefficient of what slides, along a grain if there is one, and across it in the same "
+         "proportion as by the materials; left out: by the materials",
+         "", kNotNegative},
         {"static_friction", &T::static_friction,
          "of what does not slide; left out: `friction` if that is given, else by the materials", "",
          kNotNegative},
@@ -292,7 +296,7 @@ struct Table<Body> {
          kNotNegative},
         {"friction_axis", &T::friction_axis,
          "direction of the surface's grain in the body's frame, along which `friction` counts and across it "
-         "the material's `cross_friction`; zero: none"},
+         "the material's `cross_friction`; zero: none; of two bodies the grain of the first one counts"},
         {"surface_velocity", &T::surface_velocity,
          "of the surface against the body, as of a conveyor belt; in the body's frame", "m/s"},
         {"collides", &T::collides, "takes part in collisions"},

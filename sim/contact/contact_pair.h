@@ -73,9 +73,9 @@ class alignas(64) ContactPair {
   void foresee(Real duration);
 
   /// Asks for the memory that find() will want: of the pair, and a little later of the first manifold.
-  void prefetch() const { sim::prefetch(this, sizeof(ContactPair)); }
+  void prefetch() const { sim::prefetch(this, this + 1); }
   void prefetch_manifold() const {
-    if (!placed_.empty()) sim::prefetch(placed_.data(), sizeof(PlacedManifold));
+    if (!placed_.empty()) sim::prefetch(placed_.data(), placed_.data() + 1);
   }
 
   /// Whether find() was never called.

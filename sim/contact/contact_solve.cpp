@@ -475,7 +475,7 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
   if (origins_.empty() && joints_.bounded().empty()) return {};
   bodies_.resize(members_.size());
   patches_.resize(origins_.size());
-  for_each_index(bodies_.size(), [&](std::size_t i) { bodies_[i] = relaxed(*members_[i], h); });
+  for_each_interval(members_, [&](std::size_t i) { bodies_[i] = relaxed(*members_[i], h); });
   for_each_index(patches_.size(), [&](std::size_t i) {
     const auto& [pair, manifold, a, b] = origins_[i];
     patches_[i].a = a;
@@ -487,7 +487,8 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
   joints_.tell(h);
   for_each_index(patches_.size(),
                  [&](std::size_t i) { tell_forces(patches_[i], interval, *origins_[i].manifold); });
-  for_each_index(moved_, [&](std::size_t i) { move(*members_[i], bodies_[i]); });
+  for_each_interval(std::span(members_).first(moved_),
+                    [&](std::size_t i) { move(*members_[i], bodies_[i]); });
   return work;
 }
 

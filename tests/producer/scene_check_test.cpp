@@ -160,6 +160,10 @@ TEST(SceneCheck, FrictionAcrossAGrainTakesMaterialAndAxis) {
   EXPECT_EQ(warnings_of(R"({"materials": [{"name": "planks", "cross_friction": 1}],
     "bodies": [{"material": "planks", "friction_axis": [1, 0, 0]}]})"),
             "");
+  EXPECT_EQ(errors_of(R"({"materials": [{"name": "skate", "friction": 0, "cross_friction": 1}],
+    "bodies": [{"material": "skate", "friction_axis": [1, 0, 0]}]})"),
+            "/materials/0/cross_friction: takes a friction along the grain, too, of which it is a share; allowed "
+            "is any but 0, such as 0.001\n");
 }
 
 TEST(SceneCheck, ForcesActOnWhatThereIs) {
