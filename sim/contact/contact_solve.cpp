@@ -68,8 +68,15 @@ Real spin(const Body& body) {
 /// bodies:
 ///   n . (c_a'' - c_b'') + 2 n' . (c_a' - c_b') - |n'|^2 D
 /// with material points c on both bodies at a distance D along n. (Of two centres of spheres, this is
-/// n.c'' + n'.c', not twice the latter.) Tangentially, what turns with the bodies.
-Vec3 acceleration_bias(const ContactPair& pair, const PlacedManifold& placed, const ContactPoint& point) {
+/// n.c'' + n'.c', not twice the latter.) Tangentially, what turns with the bodies. Returned is what this makes
+/// of the relative velocity in an interval of length h, in the contact's frame.
+///
+/// The terms with n' hold while n turns little. Of sharp corners that slide past each other, and of edges that
+/// are almost parallel, it turns by any angle in no time; then as much of the sliding as there is has become
+/// parting, and no more. Of two points that pass each other with the velocity s, T = s^2 / D makes
+///   d/dt |(D, s t)| at h = T h / sqrt(1 + (T h / s)^2),
+/// which is used for all.
+Vec3 velocity_bias(const ContactPair& pair, const PlacedManifold& placed, const ContactPoint& point, Real h) {
   const Manifold& m = placed.manifold;
   if (is_face(m.source) && spin(pair.a()) < kNoSpin && spin(pair.b()) < kNoSpin) return Vec3::Zero();
   const Vec3 place_a = m.source == NormalSource::face_of_a ? point.on_a : core_point(pair.a(), point.on_a);
@@ -81,8 +88,11 @@ Vec3 acceleration_bias(const ContactPair& pair, const PlacedManifold& placed, co
           : normal_rate(m, point, twist(pair.a()), twist(pair.b()));
   const Vec3 velocity = a.velocity - b.velocity, acceleration = a.acceleration - b.acceleration;
   const Real distance = m.normal.dot(place_a - place_b);
-  return {m.normal.dot(acceleration) + 2 * n_rate.dot(velocity) - n_rate.squaredNorm() * distance,
-          placed.frame.t.dot(acceleration), placed.frame.k.dot(acceleration)};
+  const Real turned = h * (2 * n_rate.dot(velocity) - n_rate.squaredNorm() * distance);
+  const Real sliding2 = (velocity - m.normal.dot(velocity) * m.normal).squaredNorm();
+  const Real parting = turned == 0 ? 0 : turned * std::sqrt(sliding2 / (sliding2 + turned * turned));
+  return {h * m.normal.dot(acceleration) + parting, h * placed.frame.t.dot(acceleration),
+          h * placed.frame.k.dot(acceleration)};
 }
 
 /// Velocity that conveyor-like surfaces add.
@@ -274,7 +284,7 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       c.arm_a = place - origin(pair.a());
       c.arm_b = place - origin(pair.b());
       c.offset = in_frame(m.frame, surface);
-      if (touches) c.offset += h * acceleration_bias(pair, m, point);
+      if (touches) c.offset += velocity_bias(pair, m, point, h);
       c.target = touches ? std::min(-kPushOut * point.separation / h, kFastestPush) : -point.separation / h;
       std::tie(c.friction_t, c.friction_k) = friction(pair.surface(), u);
       c.impulse = h * m.forces[k].last;
