@@ -44,7 +44,7 @@ if [ "$tsan" = yes ]; then
   cmake --preset tsan
   cmake --build build-tsan --target test_sim test_validation test_producer
   TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp" build-tsan/test_sim --gtest_filter='StagedLoop.*' || failed=1
-  TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp" build-tsan/test_validation --gtest_filter='Determinism.*' || failed=1
+  TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp" build-tsan/test_validation --gtest_filter='*Determinism.*' || failed=1
   TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp" build-tsan/test_producer --gtest_filter='Pipeline.*' || failed=1
 fi
 
