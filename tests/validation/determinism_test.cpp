@@ -1,5 +1,5 @@
 /// One small scene with everything in it: the same bits for any number of threads, in every repeat and every
-/// build.
+/// build. Small scenes of bodies in contact: in every build.
 
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
@@ -53,10 +53,107 @@ TEST(Determinism, SameHashForAnyNumberOfThreadsAndEveryRepeat) {
   }
 }
 
-// Debug, release and sanitizer builds must all give this. It changes when the physics does, and then on
-// purpose.
+/// A box that slides to rest, one that bounces and tumbles, and one that slides down another.
+StateHash sliding() {
+  World world({.solver = SolverKind::exact});
+  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0.4, .friction = 0.3});
+  const Quat slope(0.96, 0, 0, -0.28);  // 32.5 degrees
+  world.add_body({.shape = Box{{4, 0.2, 1}},
+                  .motion = MotionType::fixed,
+                  .pose = {Vec3(0, 1, 3), slope},
+                  .friction = 0.4});
+  world.add_body({.shape = Box{{0.4, 0.1, 0.3}},
+                  .pose = {Vec3(0, 0.05, 0)},
+                  .velocity = {3, 0, 1},
+                  .angular_velocity = {0, 4, 0}});
+  world.add_body({.shape = Box{{0.2, 0.3, 0.1}},
+                  .pose = {Vec3(-1, 0.6, -1), Quat(0.9, 0.1, 0.3, 0.3).normalized()},
+                  .velocity = {1, -1, 0.5}});
+  world.add_body(
+      {.shape = Box{Vec3::Constant(0.2)}, .pose = {slope * Vec3(-1, 0.2, 0) + Vec3(0, 1, 3), slope}});
+  for (int i = 0; i < 60; ++i) world.step(1.0 / 60);
+  return world.state_hash();
+}
+
+/// Balls, a box and a capsule that fly into a row and bounce.
+StateHash bouncing(SolverKind solver) {
+  World world({.solver = solver});
+  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0.7});
+  for (int i = 0; i < 4; ++i)
+    world.add_body({.shape = i % 2 == 0 ? Shape(Sphere{0.1}) : Shape(Box{Vec3::Constant(0.2)}),
+                    .pose = {Vec3(0.25 * i, 0.1, 0)},
+                    .restitution = 0.8,
+                    .friction = 0.3});
+  world.add_body({.shape = Sphere{0.15},
+                  .pose = {Vec3(-1, 0.2, 0.02)},
+                  .velocity = {8, 0, 0},
+                  .angular_velocity = {0, 0, 20}});
+  world.add_body({.shape = Capsule{0.08, 0.2},
+                  .pose = {Vec3(0.3, 1, 0.05), Quat(0.8, 0.2, 0.1, 0.5).normalized()},
+                  .velocity = {0, -3, 0},
+                  .restitution = 0.6});
+  for (int i = 0; i < 45; ++i) world.step(1.0 / 60);
+  return world.state_hash();
+}
+
+StateHash heap() {
+  World world({.solver = SolverKind::fast});
+  const MeshHandle torus = world.add_mesh(torus_mesh(0.12, 0.05, 10, 6));
+  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0});
+  for (int i = 0; i < 15; ++i) {
+    const Shape shapes[] = {Box{{0.2, 0.15, 0.25}}, Cylinder{0.1, 0.2}, Box{Vec3::Constant(0.2)},
+                            MeshShape{torus}, Sphere{0.1}};
+    world.add_body({.shape = shapes[i % 5],
+                    .pose = {Vec3(0.15 * (i % 3), 0.2 + 0.2 * i, 0.1 * (i % 2)),
+                             Quat(1, 0.1 * (i % 4), 0.2, 0.05 * i).normalized()},
+                    .velocity = {0, -2, 0},
+                    .restitution = 0});
+  }
+  for (int i = 0; i < 60; ++i) world.step(1.0 / 60);
+  return world.state_hash();
+}
+
+/// A chain that falls on the ground aslant, hinges and balls in turns.
+StateHash chain(SolverKind solver) {
+  World world({.solver = solver});
+  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0.2});
+  BodyHandle last;
+  for (int i = 0; i < 5; ++i) {
+    const BodyHandle link = world.add_body({.shape = Box{{0.3, 0.06, 0.1}},
+                                            .pose = {Vec3(0.3 * i, 0.1, 0)},
+                                            .velocity = {0.5, 1.5 - 0.7 * i, 0.2}});
+    if (i > 0)
+      world.add_joint({.type = i % 2 == 0 ? JointType::revolute : JointType::spherical,
+                       .a = link,
+                       .b = last,
+                       .anchor = Vec3(0.3 * i - 0.15, 0.1, 0)});
+    last = link;
+  }
+  for (int i = 0; i < 30; ++i) world.step(1.0 / 60);
+  return world.state_hash();
+}
+
+// Debug, release and sanitizer builds must all give these. They change when the physics does, and then on
+// purpose: the test says what to.
+constexpr const char* kParticles = "76663b32c7063632965d2665316aa918";
+constexpr const char* kSlidingExact = "77ba48b2a28d59ae373943345f829a71";
+constexpr const char* kBouncingExact = "da9be8c008d9d1e67f9b7fe575b40c92";
+constexpr const char* kBouncingFast = "e9b96f5aa6f5a54f004b945d76793f20";
+constexpr const char* kHeapFast = "13838970323d3e7d6aec44917a27b8af";
+constexpr const char* kChainExact = "08239b5211491ec71022e2e456d0cb78";
+constexpr const char* kChainFast = "e1edf97c8bcd50a470f6622df0c4b0cb";
+
 TEST(Determinism, SameHashInEveryBuild) {
-  EXPECT_EQ(run().hex(), "76663b32c7063632965d2665316aa918");
+  EXPECT_EQ(run().hex(), kParticles);
+}
+
+TEST(Determinism, SameHashOfContactsInEveryBuild) {
+  EXPECT_EQ(sliding().hex(), kSlidingExact);
+  EXPECT_EQ(bouncing(SolverKind::exact).hex(), kBouncingExact);
+  EXPECT_EQ(bouncing(SolverKind::fast).hex(), kBouncingFast);
+  EXPECT_EQ(heap().hex(), kHeapFast);
+  EXPECT_EQ(chain(SolverKind::exact).hex(), kChainExact);
+  EXPECT_EQ(chain(SolverKind::fast).hex(), kChainFast);
 }
 
 }  // namespace

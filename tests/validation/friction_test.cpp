@@ -44,7 +44,7 @@ TEST_P(Incline, BoxSlidesAsComputedAbove) {
     const Real a = degrees * std::numbers::pi / 180, t = 2;
     const Vec3 s = way(Box{{0.4, 0.1, 0.3}}, 0.05, {.restitution = 0}, a, t);
     const Real expected = 0.5 * kGravity * (std::sin(a) - 0.5 * std::cos(a)) * t * t;
-    EXPECT_NEAR(s.x() / expected, 1, degrees > 30 ? 0.002 : 0.01) << degrees;
+    EXPECT_NEAR(s.x() / expected, 1, 0.002) << degrees;
     EXPECT_LT(std::abs(s.z()), 1e-6 * (1 + s.x())) << degrees;
     EXPECT_LT(std::abs(s.y()), 1e-4) << degrees;
   }
@@ -338,6 +338,65 @@ TEST_P(Rod, FallsFromUprightOnARoughAndOnASmoothFloor) {
   }
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, Rod);
+
+class Dome : public BothSolvers {
+ protected:
+  struct Flight {
+    Real cosine;   ///< of the polar angle where it left, by what it took along
+    Real touched;  ///< of where a force last acted
+    Real energy;   ///< lost, in units of m g (R + r)
+  };
+  /// A ball of 1 m goes down from near the top of a sphere of 9 m with the speed that it would have come
+  /// there with, rolling if there is friction. In flight the speed towards x stays what it was where the ball
+  /// left, so that v_x^2 = g (R + r) cos^3.
+  static Flight leave(Real max_step, Real friction, Real share) {
+    constexpr Real kSphere = 9, kBall = 1, kWay = kSphere + kBall, kStart = 0.1;
+    World world(def(max_step));
+    world.add_body(
+        {.shape = Sphere{kSphere}, .motion = MotionType::fixed, .restitution = 0, .friction = friction});
+    const Real speed = std::sqrt(2 * share * kGravity * kWay * (1 - std::cos(kStart)));
+    const auto ball = world.add_body({.shape = Sphere{kBall},
+                                      .pose = {kWay * Vec3(std::sin(kStart), std::cos(kStart), 0)},
+                                      .velocity = speed * Vec3(std::cos(kStart), -std::sin(kStart), 0),
+                                      .angular_velocity = {0, 0, friction > 0 ? -speed / kBall : 0},
+                                      .mass = 1,
+                                      .restitution = 0,
+                                      .friction = friction});
+    Flight flight{};
+    while (world.body(ball).centre.y() > 0 && world.time() < 10) {
+      world.step(max_step);
+      for (const ContactState& c : world.contacts())
+        if (c.force.norm() > 0) flight.touched = world.body(ball).centre.normalized().y();
+    }
+    const Real across = world.body(ball).velocity.x();
+    flight.cosine = std::cbrt(across * across / (kGravity * kWay));
+    flight.energy = 1 - world.energy().total() / (kGravity * kWay);
+    return flight;
+  }
+};
+
+// It leaves where v^2 = g (R + r) cos; and v^2 = 2 share g (R + r) (1 - cos), of which the turning of a ball
+// that rolls has two sevenths. With a friction of 50 it slips only from a cosine of 0.59 on. A tenth of the
+// size is nothing for the fast solver: the cosine is 1.3 % off, and 1.0 % at 1/960 s.
+TEST_P(Dome, BallLeavesWhereNothingPressesItOnAnyMore) {
+  struct Case {
+    Real friction, share, cosine;
+  };
+  for (const Case& c : {Case{0, 1, 2.0 / 3}, Case{50, 5.0 / 7, 10.0 / 17}})
+    for (const Real max_step : {1.0 / 240, 1.0 / 960}) {
+      const Flight f = leave(max_step, c.friction, c.share);
+      EXPECT_NEAR(f.cosine / c.cosine, 1, max_step > 1.0 / 900 ? 0.01 : 0.002)
+          << c.friction << ", " << max_step;
+      EXPECT_LT(std::abs(f.energy), 0.002) << c.friction << ", " << max_step;
+      // A step ends (v h)^2 / 2 (R + r) off the sphere. At 1/240 s that is 0.06 mm, which is not touching any
+      // more: near the end the ball skips along, the last time 2 to 3 % further down. So do balls of the fast
+      // solver at any step.
+      if (is_exact() && max_step < 1.0 / 900) {
+        EXPECT_NEAR(f.touched / c.cosine, 1, 0.002) << c.friction;
+      }
+    }
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, Dome);
 
 }  // namespace
 }  // namespace offstage::sim
