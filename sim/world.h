@@ -150,6 +150,9 @@ struct StepReport {
   uint64_t collisions = 0;       ///< contacts that met faster than WorldDef::collision_speed
   uint64_t tracebacks = 0;       ///< times that bodies were put back to a time of impact
   uint64_t cut_short = 0;        ///< pairs that were not traced back any more in a sub-step: too many impacts
+  uint64_t settled = 0;          ///< pairs in a pile that did not bounce any more in a sub-step, likewise
+  uint64_t foreseen = 0;         ///< contacts of the fast solver that were looked for at a step's end
+  uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
   ContactWork exact, fast;       ///< of the solvers of resting contact
   ContactWork impacts;           ///< of the solver of collisions
   IntegratorReport integration;  ///< of the free motion
@@ -182,7 +185,7 @@ struct ContactState {
   BodyHandle a, b;
   Vec3 point = Vec3::Zero();   ///< between both surfaces, world [m]
   Vec3 normal = Vec3::Zero();  ///< from b to a
-  /// On a: of the last sub-step, friction included [N]; by the fast solver, at its end.
+  /// On a: the mean over the last sub-step, or what an impact has left of it, friction included [N].
   Vec3 force = Vec3::Zero();
   Real separation = 0;  ///< [m], negative in penetration
 };

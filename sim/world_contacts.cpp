@@ -313,7 +313,9 @@ void World::Impl::solve(std::span<Island* const> group, const ContactInterval& i
     const auto& [island, choice] = exact[i];
     report.exact.add(work[i]);
     choice->learn(*island, interval.duration, solved[i], patience);
-    if (!solved[i]) fast.push_back(island);
+    if (solved[i]) continue;
+    ++report.exact.abandoned;
+    fast.push_back(island);
   }
   if (!fast.empty()) report.fast.add(fast_contacts.solve(fast, interval));
   for (Island* island : group) settle_joints(*island, interval.end);
@@ -326,6 +328,7 @@ void World::Impl::count_contacts(StepReport& report) const {
   report.contacts = 0;
   for (const ContactPair* pair : active_pairs) {
     report.contacts += pair->touching();
+    report.foreseen += pair->foreseen;
     report.penetration = std::max(report.penetration, -pair->separation());
   }
 }

@@ -199,7 +199,7 @@ void World::Impl::settle_pairs(uint32_t island, StepReport& report) {
   for (ContactPair* pair : active_pairs) {
     if (is_outside(pair->a()) || is_outside(pair->b()) || pair->settled) continue;
     pair->settled = true;
-    report.cut_short += pair->by_event;
+    report.settled += pair->by_event;
   }
 }
 

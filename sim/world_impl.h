@@ -135,7 +135,7 @@ struct World::Impl : WorldState {
   Real now = 0;
 
   std::vector<MovedBody> moved;
-  uint64_t born = 0;  // since the last report
+  uint64_t born = 0, bodies_woken = 0, bodies_put_to_sleep = 0;  // since the last report
 
   // Lists of bodies in slot order, made anew when one was added, removed, fell asleep or woke.
   bool lists_changed = true, pairs_changed = true, joints_changed = false;

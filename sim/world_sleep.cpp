@@ -38,6 +38,7 @@ void World::Impl::wake(Body& body) {
   body.quiet_time = 0;
   if (!body.asleep) return;
   const auto group = sleeping.find(body.island);
+  bodies_woken += group->second.size();
   for (Body* member : group->second) {
     member->asleep = false;
     member->quiet_time = 0;
@@ -106,6 +107,7 @@ void World::Impl::put_to_sleep(Real start, Real h) {
       body->rigid.momentum.setZero();
       body->rigid.angular_momentum.setZero();
     }
+    bodies_put_to_sleep += island.bodies.size();
     sleeping.emplace(sleeping_groups++, island.bodies);
     lists_changed = fixed_changed = true;
   }

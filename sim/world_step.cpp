@@ -57,6 +57,8 @@ StepReport World::Impl::step(Real sampling, const BeforeSubStep& before) {
   }
   ++samplings;
   report.particles_born = std::exchange(born, 0);
+  report.bodies_woken = std::exchange(bodies_woken, 0);
+  report.bodies_put_to_sleep = std::exchange(bodies_put_to_sleep, 0);
   report_cloths(report);
   collect_moved();
   return report;

@@ -301,6 +301,9 @@ Json json_of(const sim::ContactWork& work) {
           {"iterations", work.iterations},
           {"factorizations", work.factorizations},
           {"fallbacks", work.fallbacks},
+          {"abandoned", work.abandoned},
+          {"narrowed", work.narrowed},
+          {"softened", work.softened},
           {"residual", work.residual}};
 }
 Json json_of(const sim::IntegratorReport& report) {
@@ -322,6 +325,10 @@ void add_contact_figures(const SimulationTotals& t, Json& json) {
   json["collisions"] = t.collisions;
   json["tracebacks"] = t.tracebacks;
   json["cut_short"] = t.cut_short;
+  json["settled"] = t.settled;
+  json["foreseen"] = t.foreseen;
+  json["bodies_woken"] = t.bodies_woken;
+  json["bodies_put_to_sleep"] = t.bodies_put_to_sleep;
   json["joint_error"] = t.joint_error;
   json["joints_unsolved"] = t.joints_unsolved;
   json["broken_joints"] = t.broken_joints;

@@ -80,6 +80,10 @@ void SimulationTotals::add(const sim::StepReport& report) {
   collisions += report.collisions;
   tracebacks += report.tracebacks;
   cut_short += report.cut_short;
+  settled += report.settled;
+  foreseen += report.foreseen;
+  bodies_woken += report.bodies_woken;
+  bodies_put_to_sleep += report.bodies_put_to_sleep;
   joint_error = std::max(joint_error, report.joint_error);
   joints_unsolved += report.joints_unsolved;
   cloth_strain = std::max(cloth_strain, report.cloth_strain);

@@ -44,7 +44,8 @@ struct SimulationTotals {
   std::size_t contacts = 0;                                   ///< points where bodies touch, at the end
   std::size_t most_contacts = 0;                              ///< at the end of a frame
   sim::Real penetration = 0;                                  ///< greatest of the run [m]
-  uint64_t collisions = 0, tracebacks = 0, cut_short = 0;
+  uint64_t collisions = 0, tracebacks = 0, cut_short = 0, settled = 0, foreseen = 0;
+  uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
 
   // Of cloths: greatest of the run, at its end, and sums.
   sim::Real cloth_strain = 0, cloth_penetration = 0;

@@ -194,6 +194,7 @@ class Cluster {
     ContactWork work = solve_with(1);
     Real low = 0, high = 1;
     if (!adds_energy()) return work;
+    work.softened = 1;
     for (int k = 0; k < kSolves; ++k) {
       const Real middle = (low + high) / 2;
       work.add(solve_with(middle));
@@ -303,10 +304,13 @@ ContactWork collide_in_sequence(std::span<ContactBody> bodies, std::span<Contact
       sums.add_last();
       continue;
     }
-    const Vec3 p = collision_impulse(mobility(c, bodies), c.relative_velocity(bodies), restitution[next],
-                                     c.friction_t, c.friction_k);
+    const Vec3 u = c.relative_velocity(bodies);
+    const Vec3 p =
+        collision_impulse(mobility(c, bodies), u, restitution[next], c.friction_t, c.friction_k);
     c.impulse += p;
     apply(c, p, bodies);
+    const Real missing = -restitution[next] * u.x() - c.relative_velocity(bodies).x();
+    work.softened += missing > kGoodEnough * u.norm();
   }
   std::vector<Vec3> impulses;
   for (const Contact& c : contacts) impulses.push_back(c.impulse);

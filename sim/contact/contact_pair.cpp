@@ -107,6 +107,7 @@ void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_wit
   find_points(a, b, margin, reuse_within, turning);
   separation_ = std::numeric_limits<Real>::infinity();
   touching_ = 0;
+  foreseen = 0;
   for (const PlacedManifold& m : placed_)
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const Real separation = m.manifold.points[k].separation;
@@ -196,6 +197,7 @@ void ContactPair::foresee(Real duration) {
     if (!is_new) continue;
     set_frame(placed);
     placed_.push_back(placed);
+    ++foreseen;
   }
 }
 

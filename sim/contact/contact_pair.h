@@ -50,6 +50,7 @@ class alignas(64) ContactPair {
 
  public:
   uint32_t impacts = 0;   ///< in this sub-step
+  uint8_t foreseen = 0;   ///< manifolds that foresee() added
   bool gave_up = false;   ///< too many of them: no more trace-backs in this sub-step
   bool settled = false;   ///< its points limit the approach in this sub-step even if it would bounce
   bool by_event = false;  ///< an impact of this pair is traced back to; else its points limit the approach

@@ -73,6 +73,9 @@ struct ContactWork {
   uint64_t iterations = 0;      ///< pivots, Newton steps or sweeps
   uint64_t factorizations = 0;  ///< of the matrix, from the beginning
   uint64_t fallbacks = 0;       ///< problems that ended with projected Gauss-Seidel
+  uint64_t abandoned = 0;       ///< that became too dear for the exact solver and went to the fast one
+  uint64_t narrowed = 0;        ///< collisions of which what is far from the blow was left out
+  uint64_t softened = 0;        ///< collisions whose restitution was reduced to keep the energy
   Real residual = 0;            ///< greatest left over [m/s]
 
   void add(const ContactWork& w) {
@@ -80,6 +83,9 @@ struct ContactWork {
     iterations += w.iterations;
     factorizations += w.factorizations;
     fallbacks += w.fallbacks;
+    abandoned += w.abandoned;
+    narrowed += w.narrowed;
+    softened += w.softened;
     residual = residual < w.residual ? w.residual : residual;
   }
 };

@@ -493,7 +493,8 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
     set_patch(patches_[i], *pair, *manifold);
   });
   RelaxedJoints relaxed_joints(joints_.problem(), joints_.articulations(), joints_.bounded_ends());
-  const ContactWork work = solver_.solve(bodies_, patches_, {h, relaxation_substeps(h)}, &relaxed_joints);
+  ContactWork work = solver_.solve(bodies_, patches_, {h, relaxation_substeps(h)}, &relaxed_joints);
+  work.solves = islands.size();
   joints_.tell(h);
   for_each_index(patches_.size(),
                  [&](std::size_t i) { tell_forces(patches_[i], interval, *origins_[i].manifold); });
@@ -548,15 +549,16 @@ struct CollisionCluster {
   }
 
   /// Leaves out what is far from what bounces, if there is too much of it: first what shares no body with
-  /// that, then all the rest. What is left out blocks the way afterwards, as resting contact.
-  void narrow() {
-    if (contacts.size() <= kCluster) return;
+  /// that, then all the rest. What is left out blocks the way afterwards, as resting contact. Whether it did.
+  bool narrow() {
+    if (contacts.size() <= kCluster) return false;
     std::vector<uint8_t> involved(bodies.size(), 0);
     for (std::size_t i = 0; i < contacts.size(); ++i)
       if (bounces[i])
         for (uint32_t body : {contacts[i].a, contacts[i].b}) involved[body] |= bodies[body].is_moved();
     keep([&](std::size_t i) { return involved[contacts[i].a] || involved[contacts[i].b]; });
     if (contacts.size() > kCluster) keep([&](std::size_t i) { return bounces[i] != 0; });
+    return true;
   }
 
  private:
@@ -587,7 +589,7 @@ uint32_t resolve_collisions(const Island& island, const CollisionSettings& setti
   }
   for (const ContactPair* pair : island.pairs)
     cluster.add(*pair, settings.reach, settings.collision_speed, settings.law);
-  if (!settings.whole) cluster.narrow();
+  if (!settings.whole) work.narrowed += cluster.narrow();
   if (cluster.contacts.empty()) return 0;
   IslandJoints joints;
   joints.collect_for_collision(island, settings.time);

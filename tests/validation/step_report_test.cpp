@@ -1,0 +1,97 @@
+/// What the engine decides within a step is told in its report: none of it is silent.
+
+#include <gtest/gtest.h>
+
+#include "sim/world.h"
+#include "validation/both_solvers.h"
+
+namespace offstage::sim {
+namespace {
+
+struct Decisions {
+  uint64_t woken = 0, put_to_sleep = 0, foreseen = 0, settled = 0;
+  ContactWork exact, fast, impacts;
+
+  void add(const StepReport& r) {
+    woken += r.bodies_woken;
+    put_to_sleep += r.bodies_put_to_sleep;
+    foreseen += r.foreseen;
+    settled += r.settled;
+    exact.add(r.exact);
+    fast.add(r.fast);
+    impacts.add(r.impacts);
+  }
+};
+
+Decisions decisions(World& world, Real seconds) {
+  Decisions all;
+  const Real end = world.time() + seconds - 1.0 / 480;
+  while (world.time() < end) all.add(world.step(1.0 / 240));
+  return all;
+}
+
+void add_floor(World& world, Real restitution = 0) {
+  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = restitution});
+}
+
+TEST(StepReport, TellsWhoFellAsleepAndWhoWoke) {
+  World world(WorldDef{});
+  add_floor(world);
+  for (int i = 0; i < 2; ++i)
+    world.add_body({.shape = Box{{1, 1, 1}}, .pose = {Vec3(0, 0.5 + i, 0), Quat::Identity()}, .restitution = 0});
+  Decisions d = decisions(world, 2);
+  EXPECT_EQ(d.put_to_sleep, 2u);
+  EXPECT_EQ(d.woken, 0u);
+  world.add_body({.shape = Sphere{0.2}, .pose = {Vec3(0, 3, 0), Quat::Identity()}, .restitution = 0});
+  d = decisions(world, 4);
+  EXPECT_EQ(d.woken, 2u);
+  EXPECT_EQ(d.put_to_sleep, 3u);
+}
+
+// 80 boxes of six contacts and more, falling into a pit: blows of many at once.
+Decisions heap(SolverKind solver, Real restitution) {
+  World world(WorldDef{.solver = solver});
+  add_floor(world, restitution);
+  for (int side = 0; side < 4; ++side) {
+    const Real x = side == 0 ? 2.5 : side == 1 ? -2.5 : 0, z = side == 2 ? 2.5 : side == 3 ? -2.5 : 0;
+    world.add_body({.shape = Box{{x != 0 ? 1.0 : 6.0, 20, z != 0 ? 1.0 : 6.0}},
+                    .motion = MotionType::fixed,
+                    .pose = {Vec3(x, 10, z), Quat::Identity()},
+                    .restitution = restitution});
+  }
+  for (int i = 0; i < 80; ++i) {
+    const Quat turned(Eigen::AngleAxisd(0.3 * i, Vec3(1, i % 3, 0.5).normalized()));
+    world.add_body({.shape = Box{{0.8, 0.8, 0.8}},
+                    .pose = {Vec3(1.1 * (i % 3 - 1), 1 + 1.3 * (i / 9), 1.1 * (i / 3 % 3 - 1)), turned},
+                    .angular_velocity = {3, 1, i % 5 - 2.0},
+                    .restitution = restitution});
+  }
+  return decisions(world, 2);
+}
+
+TEST(StepReport, TellsOfEachSolversShortCuts) {
+  const Decisions fast = heap(SolverKind::fast, 0.3);
+  EXPECT_GT(fast.foreseen, 0u);
+  EXPECT_GT(fast.impacts.narrowed, 0u);
+  EXPECT_GT(fast.fast.solves, 0u);
+  EXPECT_EQ(fast.exact.solves + fast.exact.abandoned, 0u);
+  const Decisions automatic = heap(SolverKind::automatic, 0);
+  EXPECT_GT(automatic.exact.solves, 0u);
+  EXPECT_GT(automatic.fast.solves, 0u);
+  EXPECT_GT(automatic.exact.abandoned, 0u);
+  EXPECT_EQ(automatic.impacts.narrowed, 0u) << "nothing bounces";
+}
+
+TEST(StepReport, TheExactSolverTakesNoShortCuts) {
+  World world(WorldDef{.solver = SolverKind::exact});
+  add_floor(world, 0.5);
+  for (int i = 0; i < 12; ++i)
+    world.add_body({.shape = Box{{0.8, 0.8, 0.8}}, .pose = {Vec3(0.3 * (i % 2), 1 + i, 0), Quat::Identity()}, .restitution = 0.5});
+  const Decisions d = decisions(world, 1);
+  EXPECT_GT(d.impacts.solves, 0u);
+  EXPECT_EQ(d.foreseen + d.settled + d.impacts.narrowed + d.exact.abandoned, 0u);
+  EXPECT_EQ(d.fast.solves, 0u);
+}
+
+}  // namespace
+}  // namespace offstage::sim
