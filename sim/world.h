@@ -144,14 +144,14 @@ struct StepReport {
 
   // Contacts of bodies. Counts of the last sub-step, others of all.
   uint32_t bodies_awake = 0, bodies_asleep = 0;
-  uint32_t islands = 0;          ///< groups of bodies that touch, or are joined
-  uint32_t contacts = 0;         ///< points that touch
-  Real penetration = 0;          ///< greatest at the start of a sub-step [m]
-  uint64_t collisions = 0;       ///< contacts that met faster than WorldDef::collision_speed
-  uint64_t tracebacks = 0;       ///< times that bodies were put back to a time of impact
-  uint64_t cut_short = 0;        ///< pairs that were not traced back any more in a sub-step: too many impacts
-  uint64_t settled = 0;          ///< pairs in a pile that did not bounce any more in a sub-step, likewise
-  uint64_t foreseen = 0;         ///< contacts of the fast solver that were looked for at a step's end
+  uint32_t islands = 0;     ///< groups of bodies that touch, or are joined
+  uint32_t contacts = 0;    ///< points that touch
+  Real penetration = 0;     ///< greatest at the start of a sub-step [m]
+  uint64_t collisions = 0;  ///< contacts that met faster than WorldDef::collision_speed
+  uint64_t tracebacks = 0;  ///< times that bodies were put back to a time of impact
+  uint64_t cut_short = 0;   ///< pairs that were not traced back any more in a sub-step: too many impacts
+  uint64_t settled = 0;     ///< pairs in a pile that did not bounce any more in a sub-step, likewise
+  uint64_t foreseen = 0;    ///< contacts of the fast solver that were looked for at a step's end
   uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
   ContactWork exact, fast;       ///< of the solvers of resting contact
   ContactWork impacts;           ///< of the solver of collisions

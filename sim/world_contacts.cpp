@@ -265,7 +265,7 @@ void World::Impl::solve_islands(Real start, Real h, StepReport& report) {
   for (Island& island : islands)
     if (has_forces(island)) all.push_back(&island);
   if (def.solver == SolverKind::automatic) patience.begin(all, h);
-  solve(all, {.duration = h, .end = start + h, .is_whole = true}, report);
+  solve(all, {.duration = h, .end = start + h, .substep = h, .is_whole = true}, report);
 }
 
 /// What contacts have added to the motion is not quite what joints allow.

@@ -173,11 +173,11 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
     }
     const uint32_t island = pair.a().is_awake() ? pair.a().island : pair.b().island;
     if (pair.a().is_awake() && pair.b().is_awake()) {
-      bring_to(islands[pair.a().island], start, impact.time, report);
-      bring_to(islands[pair.b().island], start, impact.time, report);
+      bring_to(islands[pair.a().island], start, impact.time, h, report);
+      bring_to(islands[pair.b().island], start, impact.time, h, report);
       join(island, pair.b().island);
     } else {
-      bring_to(islands[island], start, impact.time, report);
+      bring_to(islands[island], start, impact.time, h, report);
     }
     ++report.tracebacks;
     moved_anew += islands[island].bodies.size();
@@ -204,13 +204,14 @@ void World::Impl::settle_pairs(uint32_t island, StepReport& report) {
 }
 
 /// Takes an island from wherever it has been moved back to a time, under the contact forces until then.
-void World::Impl::bring_to(Island& island, Real start, Real time, StepReport& report) {
+void World::Impl::bring_to(Island& island, Real start, Real time, Real h, StepReport& report) {
   if (island.from >= time) return;
   island.motion->restore(island.bodies);
   move_some(island.bodies, start, island.from, time - island.from);
   Island* const one[] = {&island};
   if (has_forces(island))
-    solve(one, {.duration = time - island.from, .end = start + time, .is_whole = false}, report);
+    solve(one, {.duration = time - island.from, .end = start + time, .substep = h, .is_whole = false},
+          report);
   for (Body* body : island.bodies) {
     body->pose = body->rigid.pose();
     body->begin_interval(time);
@@ -250,7 +251,7 @@ void World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepRe
       if (has_a != has_b && other->is_awake()) {
         if (pair->separation() > kTouching) continue;
         const uint32_t joined = other->island;
-        bring_to(islands[joined], start, time, report);
+        bring_to(islands[joined], start, time, h, report);
         join(number, joined);
         grown = true;
         break;
@@ -268,7 +269,8 @@ void World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepRe
   for (ContactPair* pair : island.pairs) find_points(*pair, time, h);
   island.motion = &move_some(island.bodies, start, time, h - time);
   Island* const one[] = {&island};
-  if (has_forces(island)) solve(one, {.duration = h - time, .end = start + h, .is_whole = false}, report);
+  if (has_forces(island))
+    solve(one, {.duration = h - time, .end = start + h, .substep = h, .is_whole = false}, report);
   find_pairs_again(number, start, h, report);
 }
 
@@ -299,7 +301,8 @@ void World::Impl::find_pairs_again(uint32_t number, Real start, Real h, StepRepo
     if (pair->a().is_awake() || pair->b().is_awake()) islands[added].pairs.push_back(pair);
   }
   Island* const one[] = {&islands[added]};
-  if (has_forces(islands[added])) solve(one, {.duration = h, .end = start + h, .is_whole = true}, report);
+  if (has_forces(islands[added]))
+    solve(one, {.duration = h, .end = start + h, .substep = h, .is_whole = true}, report);
 }
 
 }  // namespace offstage::sim

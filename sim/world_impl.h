@@ -88,7 +88,7 @@ struct World::Impl : WorldState {
   std::optional<Real> tumbling_impact_time(const ContactPair& pair, Real from, Real h, Real turn) const;
   std::optional<Real> point_impact_time(const ContactPair& pair, Real h) const;
   void settle_pairs(uint32_t island, StepReport& report);
-  void bring_to(Island& island, Real start, Real time, StepReport& report);
+  void bring_to(Island& island, Real start, Real time, Real h, StepReport& report);
   void join(uint32_t into, uint32_t island);
   void find_pairs_again(uint32_t island, Real start, Real h, StepReport& report);
   void collide(uint32_t island, Real start, Real time, Real h, StepReport& report);

@@ -167,7 +167,8 @@ class Checker {
            "has no effect: no body of this material has a friction_axis");
     if (any && material.cross_friction.value_or(0) > 0 && material.friction == 0)
       fail(material.where.path + "/cross_friction",
-           "takes a friction along the grain, too, of which it is a share; allowed is any but 0, such as 0.001");
+           "takes a friction along the grain, too, of which it is a share; allowed is any but 0, such as "
+           "0.001");
   }
   static bool has_grain(const Body& body) { return !body.friction_axis.isZero(0); }
 

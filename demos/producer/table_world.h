@@ -96,7 +96,8 @@ struct Table<Material> {
         {"static_friction", &T::static_friction,
          "the same of what does not slide, between bodies; left out: `friction`", "", kNotNegative},
         {"cross_friction", &T::cross_friction,
-         "the same of sliding across the `friction_axis` of a body, which `friction` must then not be 0 along; "
+         "the same of sliding across the `friction_axis` of a body, which `friction` must then not be 0 "
+         "along; "
          "left out: `friction`",
          "", kNotNegative},
     };

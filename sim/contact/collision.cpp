@@ -150,8 +150,8 @@ Real approach(const Contact& c, std::span<const ContactBody> bodies) {
   return std::max(0.0, -c.relative_velocity(bodies).x());
 }
 
-/// Few contacts by pivoting; many by sweeps, whose impulses the proximal method takes further if need be; with
-/// joints by that alone.
+/// Few contacts by pivoting; many by sweeps, whose impulses the proximal method takes further if need be;
+/// with joints by that alone.
 void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, const JointProblem& joints,
                     ContactWork& work) {
   if (!joints.empty()) {
@@ -256,7 +256,9 @@ class Cluster {
 class JointSums {
  public:
   explicit JointSums(const JointProblem& joints)
-      : joints_(joints), impulses_(joints.impulses.size(), Vec6::Zero()), bounded_(joints.bounded.size(), 0) {}
+      : joints_(joints),
+        impulses_(joints.impulses.size(), Vec6::Zero()),
+        bounded_(joints.bounded.size(), 0) {}
 
   void add_last() {
     for (std::size_t j = 0; j < impulses_.size(); ++j)
@@ -305,8 +307,7 @@ ContactWork collide_in_sequence(std::span<ContactBody> bodies, std::span<Contact
       continue;
     }
     const Vec3 u = c.relative_velocity(bodies);
-    const Vec3 p =
-        collision_impulse(mobility(c, bodies), u, restitution[next], c.friction_t, c.friction_k);
+    const Vec3 p = collision_impulse(mobility(c, bodies), u, restitution[next], c.friction_t, c.friction_k);
     c.impulse += p;
     apply(c, p, bodies);
     const Real missing = -restitution[next] * u.x() - c.relative_velocity(bodies).x();

@@ -68,12 +68,12 @@ Real spin(const Body& body) {
 /// bodies:
 ///   n . (c_a'' - c_b'') + 2 n' . (c_a' - c_b') - |n'|^2 D
 /// with material points c on both bodies at a distance D along n. (Of two centres of spheres, this is
-/// n.c'' + n'.c', not twice the latter.) Tangentially, what turns with the bodies. Returned is what this makes
-/// of the relative velocity in an interval of length h, in the contact's frame.
+/// n.c'' + n'.c', not twice the latter.) Tangentially, what turns with the bodies. Returned is what this
+/// makes of the relative velocity in an interval of length h, in the contact's frame.
 ///
-/// The terms with n' hold while n turns little. Of sharp corners that slide past each other, and of edges that
-/// are almost parallel, it turns by any angle in no time; then as much of the sliding as there is has become
-/// parting, and no more. Of two points that pass each other with the velocity s, T = s^2 / D makes
+/// The terms with n' hold while n turns little. Of sharp corners that slide past each other, and of edges
+/// that are almost parallel, it turns by any angle in no time; then as much of the sliding as there is has
+/// become parting, and no more. Of two points that pass each other with the velocity s, T = s^2 / D makes
 ///   d/dt |(D, s t)| at h = T h / sqrt(1 + (T h / s)^2),
 /// which is used for all.
 Vec3 velocity_bias(const ContactPair& pair, const PlacedManifold& placed, const ContactPoint& point, Real h) {
@@ -285,7 +285,10 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       c.arm_b = place - origin(pair.b());
       c.offset = in_frame(m.frame, surface);
       if (touches) c.offset += velocity_bias(pair, m, point, h);
-      c.target = touches ? std::min(-kPushOut * point.separation / h, kFastestPush) : -point.separation / h;
+      // In a moment that an impact has left of a sub-step, it would be pushed out as fast as the moment is
+      // short.
+      c.target = touches ? std::min(-kPushOut * point.separation / interval.substep, kFastestPush)
+                         : -point.separation / h;
       std::tie(c.friction_t, c.friction_k) = friction(pair.surface(), u);
       c.impulse = h * m.forces[k].last;
       c.is_guessed = m.forces[k].known;

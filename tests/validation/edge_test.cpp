@@ -1,5 +1,5 @@
-/// Contact of edges that are almost parallel: where they cross, and with it the normal, runs along them at any
-/// speed, and from one step to the next it is elsewhere (physics R9, R11).
+/// Contact of edges that are almost parallel: where they cross, and with it the normal, runs along them at
+/// any speed, and from one step to the next it is elsewhere (physics R9, R11).
 
 #include <algorithm>
 #include <numbers>
@@ -27,11 +27,12 @@ TEST_P(Edges, ADrumThatGoesOverOneGetsNoEnergyFromIt) {
                         .pose = {Vec3(0, -0.5, 0), Quat::Identity()},
                         .restitution = 0,
                         .friction = 0});
-        world.add_body({.shape = Cylinder{0.08, 0.2},
-                        .pose = {Vec3(0.45, 0.08, 0.1), Quat(Eigen::AngleAxisd(askew, Vec3::UnitY())) * lying},
-                        .velocity = {speed, 0, 0},
-                        .restitution = 0.1,
-                        .friction = 0.4});
+        world.add_body(
+            {.shape = Cylinder{0.08, 0.2},
+             .pose = {Vec3(0.45, 0.08, 0.1), Quat(Eigen::AngleAxisd(askew, Vec3::UnitY())) * lying},
+             .velocity = {speed, 0, 0},
+             .restitution = 0.1,
+             .friction = 0.4});
         world.add_body({.shape = Sphere{0.09},
                         .pose = {Vec3(0.275, 0.09, 0.12), Quat::Identity()},
                         .velocity = {speed, 0, 0},

@@ -38,7 +38,8 @@ TEST(StepReport, TellsWhoFellAsleepAndWhoWoke) {
   World world(WorldDef{});
   add_floor(world);
   for (int i = 0; i < 2; ++i)
-    world.add_body({.shape = Box{{1, 1, 1}}, .pose = {Vec3(0, 0.5 + i, 0), Quat::Identity()}, .restitution = 0});
+    world.add_body(
+        {.shape = Box{{1, 1, 1}}, .pose = {Vec3(0, 0.5 + i, 0), Quat::Identity()}, .restitution = 0});
   Decisions d = decisions(world, 2);
   EXPECT_EQ(d.put_to_sleep, 2u);
   EXPECT_EQ(d.woken, 0u);
@@ -86,7 +87,9 @@ TEST(StepReport, TheExactSolverTakesNoShortCuts) {
   World world(WorldDef{.solver = SolverKind::exact});
   add_floor(world, 0.5);
   for (int i = 0; i < 12; ++i)
-    world.add_body({.shape = Box{{0.8, 0.8, 0.8}}, .pose = {Vec3(0.3 * (i % 2), 1 + i, 0), Quat::Identity()}, .restitution = 0.5});
+    world.add_body({.shape = Box{{0.8, 0.8, 0.8}},
+                    .pose = {Vec3(0.3 * (i % 2), 1 + i, 0), Quat::Identity()},
+                    .restitution = 0.5});
   const Decisions d = decisions(world, 1);
   EXPECT_GT(d.impacts.solves, 0u);
   EXPECT_EQ(d.foreseen + d.settled + d.impacts.narrowed + d.exact.abandoned, 0u);
