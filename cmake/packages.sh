@@ -1,6 +1,6 @@
 # Sourced by demos/run.sh and tests/run.sh: installs what is missing from Debian 12.
 
-build_packages="g++ cmake ninja-build ccache pkg-config python3-glad libeigen3-dev libtbb-dev libosmesa6-dev libassimp-dev \
+build_packages="g++ cmake ninja-build ccache pkg-config python3-glad libeigen3-dev libtbb-dev libosmesa6 libegl1 libgl1-mesa-dri libassimp-dev \
 libstb-dev libdeflate-dev libopenexr-dev libqhull-dev libxxhash-dev libzstd-dev nlohmann-json3-dev libcli11-dev libfmt-dev ffmpeg"
 test_packages="libgtest-dev libbenchmark-dev librapidcheck-dev libfcl-dev libccd-dev libbullet-dev libvalijson-dev assimp-testmodels"
 

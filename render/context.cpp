@@ -3,19 +3,49 @@
 #include <array>
 #include <cstdlib>
 #include <mutex>
+#include <stdexcept>
+#include <tuple>
+#include <utility>
 
 #include "render/error.h"
-// glad must come before Mesa's own gl.h, which osmesa.h includes.
-// clang-format off
 #include "render/gl.h"
-#include <GL/osmesa.h>
-// clang-format on
+#include "render/gl_platform.h"
 
 namespace offstage::render {
 namespace {
 
-// Everything is drawn into framebuffer objects; OSMesa's own buffer is only what makes the context current.
-constexpr int kDummySize_px = 16;
+constexpr std::array<std::pair<std::string_view, GlPlatform>, 4> kPlatforms = {
+    {{"auto", GlPlatform::automatic},
+     {"osmesa", GlPlatform::osmesa},
+     {"egl", GlPlatform::egl},
+     {"egl:gpu", GlPlatform::egl_gpu}}};
+
+// One for the whole process: Mesa's environment and glad's function pointers are, too. The first context
+// replaces `automatic` by what works.
+std::mutex platform_mutex;
+GlPlatform chosen_platform = GlPlatform::automatic;
+
+std::unique_ptr<PlatformContext> make_context_of(GlPlatform platform) {
+  return platform == GlPlatform::osmesa ? make_osmesa_context()
+                                        : make_egl_context(platform == GlPlatform::egl_gpu);
+}
+
+/// A context of the chosen platform, current on this thread.
+std::pair<std::unique_ptr<PlatformContext>, GlPlatform> make_platform_context() {
+  const std::lock_guard lock(platform_mutex);
+  if (chosen_platform != GlPlatform::automatic) return {make_context_of(chosen_platform), chosen_platform};
+  std::string reasons;
+  for (const GlPlatform platform : {GlPlatform::osmesa, GlPlatform::egl}) {
+    try {
+      auto context = make_context_of(platform);
+      chosen_platform = platform;
+      return {std::move(context), platform};
+    } catch (const UnavailableError& error) {
+      reasons += std::string(reasons.empty() ? "" : "\n") + error.what();
+    }
+  }
+  throw UnavailableError("nothing here can draw; one of the two is enough:\n" + reasons);
+}
 
 std::string gl_string(GLenum name) {
   const GLubyte* text = glGetString(name);
@@ -23,70 +53,86 @@ std::string gl_string(GLenum name) {
 }
 
 // glad keeps its function pointers in globals; they are the same for every context of the process.
-void load_functions() {
+void load_functions(GlLookup lookup) {
   static std::once_flag once;
   static int version = 0;
-  std::call_once(once, [] { version = gladLoadGL(reinterpret_cast<GLADloadfunc>(OSMesaGetProcAddress)); });
-  if (version == 0) throw UnavailableError("OSMesa offers no GL functions; reinstall libosmesa6");
+  std::call_once(once, [&] { version = gladLoadGL(lookup); });
+  if (version == 0) throw UnavailableError("the driver offers no GL functions; reinstall Mesa");
+}
+
+void check(const ContextInfo& info) {
+  const std::string name(name_of(info.platform));
+  if (info.platform != GlPlatform::egl_gpu && !info.renderer.starts_with("llvmpipe"))
+    throw UnavailableError(name + " draws with \"" + info.renderer +
+                           "\" where llvmpipe is needed; install Mesa with llvmpipe");
+  GLint major = 0, minor = 0;
+  glGetIntegerv(GL_MAJOR_VERSION, &major);
+  glGetIntegerv(GL_MINOR_VERSION, &minor);
+  if (major * 10 + minor < 45)
+    throw UnavailableError(name + " offers OpenGL \"" + info.version +
+                           "\" where 4.5 is needed; upgrade the driver");
 }
 
 }  // namespace
 
-void pin_environment(int raster_threads) {
-  setenv("GALLIUM_DRIVER", "llvmpipe", 1);
+std::string_view name_of(GlPlatform platform) {
+  for (const auto& [name, value] : kPlatforms)
+    if (value == platform) return name;
+  throw std::logic_error("no name of a GL platform");
+}
+
+GlPlatform gl_platform(std::string_view name) {
+  std::string names;
+  for (const auto& [known, value] : kPlatforms) {
+    if (known == name) return value;
+    names += (names.empty() ? "" : ", ") + std::string(known);
+  }
+  throw std::invalid_argument("'" + std::string(name) + "' is no way to draw; there are " + names);
+}
+
+GlPlatform gl_platform_of_environment() {
+  const char* name = std::getenv("OFFSTAGE_GL");
+  return name == nullptr ? GlPlatform::automatic : gl_platform(name);
+}
+
+void pin_environment(int raster_threads, GlPlatform platform) {
+  const std::lock_guard lock(platform_mutex);
+  chosen_platform = platform;
+  const bool software = platform != GlPlatform::egl_gpu;
+  const auto set_if = [](bool set, const char* name, const std::string& value) {
+    if (set)
+      setenv(name, value.c_str(), 1);
+    else
+      unsetenv(name);
+  };
+  set_if(software, "GALLIUM_DRIVER", "llvmpipe");
+  set_if(software, "LIBGL_ALWAYS_SOFTWARE", "true");  // EGL would look for a GPU first
+  setenv("EGL_LOG_LEVEL", "fatal", 0);                // what fails is in the exceptions
   setenv("LP_NATIVE_VECTOR_WIDTH", "256", 1);
   setenv("LP_NUM_THREADS", std::to_string(raster_threads).c_str(), 1);
   setenv("MESA_SHADER_CACHE_DISABLE", "true", 1);
   for (const char* name :
        {"MESA_GL_VERSION_OVERRIDE", "MESA_GLES_VERSION_OVERRIDE", "MESA_GLSL_VERSION_OVERRIDE",
         "MESA_EXTENSION_OVERRIDE", "MESA_LOADER_DRIVER_OVERRIDE", "MESA_NO_ERROR", "MESA_DEBUG",
-        "LIBGL_ALWAYS_SOFTWARE", "LIBGL_DEBUG", "LP_PERF", "LP_DEBUG", "GALLIVM_PERF", "GALLIVM_DEBUG",
-        "GALLIUM_OVERRIDE_CPU_CAPS", "GALLIUM_NOSSE", "DRAW_USE_LLVM"}) {
+        "LIBGL_DEBUG", "LP_PERF", "LP_DEBUG", "GALLIVM_PERF", "GALLIVM_DEBUG", "GALLIUM_OVERRIDE_CPU_CAPS",
+        "GALLIUM_NOSSE", "DRAW_USE_LLVM", "EGL_PLATFORM"}) {
     unsetenv(name);
   }
 }
 
 struct Context::Impl {
-  OSMesaContext handle = nullptr;
-  std::array<GLubyte, kDummySize_px * kDummySize_px * 4> pixels{};
+  std::unique_ptr<PlatformContext> platform;
   ContextInfo info;
-
-  ~Impl() {
-    if (handle != nullptr) OSMesaDestroyContext(handle);
-  }
 };
 
 Context::Context() : impl_(std::make_unique<Impl>()) {
-  // clang-format off
-  const int attributes[] = {OSMESA_FORMAT, OSMESA_RGBA, OSMESA_DEPTH_BITS, 0, OSMESA_STENCIL_BITS, 0,
-                            OSMESA_ACCUM_BITS, 0, OSMESA_PROFILE, OSMESA_CORE_PROFILE,
-                            OSMESA_CONTEXT_MAJOR_VERSION, 4, OSMESA_CONTEXT_MINOR_VERSION, 5, 0};
-  // clang-format on
-  impl_->handle = OSMesaCreateContextAttribs(attributes, nullptr);
-  if (impl_->handle == nullptr) {
-    throw UnavailableError(
-        "OSMesa gives no OpenGL 4.5 core context; install libosmesa6 22.3 or newer (apt-get install "
-        "libosmesa6)");
-  }
-  if (!OSMesaMakeCurrent(impl_->handle, impl_->pixels.data(), GL_UNSIGNED_BYTE, kDummySize_px,
-                         kDummySize_px)) {
-    throw UnavailableError("OSMesa cannot make its context current; reinstall libosmesa6");
-  }
-  load_functions();
   ContextInfo& info = impl_->info;
-  info = {gl_string(GL_RENDERER), gl_string(GL_VERSION), gl_string(GL_SHADING_LANGUAGE_VERSION)};
-  if (!info.renderer.starts_with("llvmpipe")) {
-    throw UnavailableError(
-        "OSMesa draws with \"" + info.renderer +
-        "\" where llvmpipe is needed; install libosmesa6 with llvmpipe and unset GALLIUM_DRIVER");
-  }
-  GLint major = 0, minor = 0;
-  glGetIntegerv(GL_MAJOR_VERSION, &major);
-  glGetIntegerv(GL_MINOR_VERSION, &minor);
-  if (major * 10 + minor < 45) {
-    throw UnavailableError("OSMesa offers OpenGL \"" + info.version +
-                           "\" where 4.5 is needed; upgrade libosmesa6");
-  }
+  std::tie(impl_->platform, info.platform) = make_platform_context();
+  load_functions(impl_->platform->lookup());
+  info.renderer = gl_string(GL_RENDERER);
+  info.version = gl_string(GL_VERSION);
+  info.glsl = gl_string(GL_SHADING_LANGUAGE_VERSION);
+  check(info);
 }
 
 Context::~Context() = default;

@@ -18,6 +18,7 @@
 #include "producer/output.h"
 #include "producer/simulation.h"
 #include "producer/talk.h"
+#include "producer/version.h"
 #include "render/error.h"
 
 namespace offstage::producer {
@@ -89,6 +90,22 @@ void add_channels(CLI::App& app, SceneOptions& scene) {
       ->check(CLI::IsMember({"exr", "png"}));
 }
 
+void add_gl(CLI::App& command, render::GlPlatform& gl) {
+  const auto take = [&gl](const std::string& name) {
+    try {
+      gl = render::gl_platform(name);
+    } catch (const std::invalid_argument& error) {
+      throw CLI::ValidationError("--gl", error.what());
+    }
+  };
+  command
+      .add_option_function<std::string>(
+          "--gl", take,
+          "What draws: osmesa or egl, with the same pixels by llvmpipe; egl:gpu, a graphics card; auto, the\n"
+          "first of osmesa and egl that is installed")
+      ->envname("OFFSTAGE_GL");
+}
+
 void add_threads(CLI::App& command, int& threads) {
   command.add_option("--threads", threads, "Threads of the simulation (default: all available)")
       ->check(CLI::Range(1, 256));
@@ -106,6 +123,7 @@ CLI::App* add_sheet(CLI::App& app, SheetOptions& sheet) {
   add_small_picture(*command, sheet.scene);
   add_timing(*command, sheet.scene);
   add_threads(*command, sheet.threads);
+  add_gl(*command, sheet.gl);
   command->add_flag("--force", sheet.force, "Replace an existing file");
   add_talk(*command, sheet.talk);
   return command;
@@ -132,6 +150,7 @@ CLI::App* add_sweep(CLI::App& app, SweepOptions& sweep) {
   add_small_picture(*command, sweep.scene);
   add_timing(*command, sweep.scene);
   add_threads(*command, sweep.threads);
+  add_gl(*command, sweep.gl);
   command->add_option("--jobs", sweep.jobs, "Runs at the same time (default: as --threads, if memory allows)")
       ->check(CLI::Range(1, 64));
   auto* resume =
@@ -207,7 +226,7 @@ namespace {
 
 int dispatch(int argc, char** argv) {
   CLI::App app{"offstage turns a scene file into a physically simulated film, without a display or a GPU."};
-  app.set_version_flag("--version", OFFSTAGE_VERSION);
+  app.set_version_flag("--version", "offstage " + std::string(version_text()));
   app.require_subcommand(1);
   app.fallthrough(false);
   app.footer(kExitCodes);
@@ -229,6 +248,7 @@ int dispatch(int argc, char** argv) {
   render_app->add_option("--format", render.format, "Of standard output: rgba or y4m")
       ->check(CLI::IsMember({"rgba", "y4m"}));
   add_threads(*render_app, render.threads);
+  add_gl(*render_app, render.gl);
   render_app->add_option("--jobs", render.jobs, "Frames drawn at the same time (default: half of --threads)")
       ->check(CLI::Range(1, 64));
   auto* resume =
@@ -258,6 +278,7 @@ int dispatch(int argc, char** argv) {
   add_picture(*frame_app, frame.scene);
   add_timing(*frame_app, frame.scene);
   add_threads(*frame_app, frame.threads);
+  add_gl(*frame_app, frame.gl);
   add_channels(*frame_app, frame.scene);
   frame_app->add_flag("--force", frame.force, "Replace an existing file");
   add_talk(*frame_app, frame.talk);
@@ -319,6 +340,7 @@ int dispatch(int argc, char** argv) {
                           "Folder for expected, actual, difference and a page that shows them");
   add_overrides(*compare_app, compare.scene);
   add_threads(*compare_app, compare.threads);
+  add_gl(*compare_app, compare.gl);
 
   BlessOptions bless;
   bless.golden = "tests/golden";
@@ -327,6 +349,7 @@ int dispatch(int argc, char** argv) {
   bless_app->add_option("--golden", bless.golden, "Folder of the goldens")->capture_default_str();
   bless_app->add_option("--reason", bless.reason, "Why the pictures changed")->required();
   add_threads(*bless_app, bless.threads);
+  add_gl(*bless_app, bless.gl);
 
   auto* doctor_app = app.add_subcommand("doctor", "Say what this machine has: GL, encoders, processor");
 

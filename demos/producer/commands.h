@@ -7,11 +7,13 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
 #include <tbb/global_control.h>
 
 #include "producer/decomposition_cache.h"
 #include "producer/progress.h"
 #include "producer/scene_io.h"
+#include "render/context.h"
 
 namespace offstage::producer {
 
@@ -48,6 +50,7 @@ struct RenderOptions {
   int threads = 0;  ///< 0: all available
   int jobs = 0;     ///< 0: as `threads`
   bool resume = false, force = false, dry_run = false, watch = false;
+  render::GlPlatform gl = render::GlPlatform::automatic;
 };
 int render_command(const RenderOptions& options);
 /// Renders, and again whenever a file that the scene is made of changes, until a signal ends it. Every render
@@ -63,6 +66,7 @@ struct FrameOptions {
   std::optional<double> at;
   int threads = 0;
   bool force = false;
+  render::GlPlatform gl = render::GlPlatform::automatic;
 };
 int frame_command(const FrameOptions& options);
 
@@ -73,6 +77,7 @@ struct SheetOptions {
   int count = 12, columns = 0;  ///< columns 0: chosen by the count
   int threads = 0;
   bool force = false;
+  render::GlPlatform gl = render::GlPlatform::automatic;
 };
 int sheet_command(const SheetOptions& options);
 
@@ -84,6 +89,7 @@ struct SweepOptions {
   int columns = 0;         ///< 0: chosen by what varies
   int threads = 0, jobs = 0;
   bool resume = false, force = false, quiet = false;
+  render::GlPlatform gl = render::GlPlatform::automatic;
 };
 int sweep_command(const SweepOptions& options);
 
@@ -101,6 +107,7 @@ int schema_command(bool reference);
 /// All presets with a line each, or the text of one.
 int presets_command(const std::string& name);
 int info_command(const SceneOptions& options, bool json);
+/// GL by every platform, the devices of EGL, encoders, processor.
 int doctor_command();
 
 struct CompareOptions {
@@ -108,6 +115,7 @@ struct CompareOptions {
   std::string other;   ///< the second picture or folder
   std::string golden, report;
   int threads = 0;
+  render::GlPlatform gl = render::GlPlatform::automatic;
 };
 int compare_command(const CompareOptions& options);
 
@@ -115,6 +123,7 @@ struct BlessOptions {
   std::vector<std::string> scenes;
   std::string golden, reason;
   int threads = 0;
+  render::GlPlatform gl = render::GlPlatform::automatic;
 };
 int bless_command(const BlessOptions& options);
 
@@ -127,6 +136,8 @@ tbb::global_control simulation_threads(int threads);
 LoadedScene load(const SceneOptions& options, bool quiet,
                  const std::vector<std::string>& more_overrides = {});
 void print_warnings(const std::vector<Problem>& warnings);
+/// JSON as indented "key: value" lines.
+void print_readable(const nlohmann::ordered_json& json, int indent = 0);
 void write_text_file(const std::string& path, const std::string& text);
 
 /// Refuses, before the work, a file that could not or must not be written after it. An empty name is none.

@@ -75,7 +75,7 @@ int compare_with_golden(const CompareOptions& options) {
   const Golden expected = read_golden(options.golden, scene.scene.name);
   const int threads = threads_or_all(options.threads);
   const auto control = simulation_threads(options.threads);
-  render::pin_environment(threads);
+  render::pin_environment(threads, options.gl);
   const Golden actual = draw_golden(scene, threads);
   const Verdict verdict = judge(expected, actual);
   fmt::print("{}", verdict.text);
@@ -101,7 +101,7 @@ int bless_command(const BlessOptions& options) {
     throw std::invalid_argument("bless: --reason must say why the pictures changed");
   const int threads = threads_or_all(options.threads);
   const auto control = simulation_threads(options.threads);
-  render::pin_environment(threads);
+  render::pin_environment(threads, options.gl);
   for (const std::string& file : options.scenes) {
     const LoadedScene scene =
         load({.file = file, .set = {}, .quality = {}, .size = {}, .fps = {}, .duration = {}, .seed = {}},

@@ -1,11 +1,10 @@
-// validate, schema, info and doctor, and what the commands share.
+// validate, schema and info, and what the commands share.
 
 #include <algorithm>
 #include <map>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <sys/utsname.h>
 
 #include "producer/command_line.h"
 #include "producer/commands.h"
@@ -13,14 +12,8 @@
 #include "producer/scene_check_particles.h"
 #include "producer/simulation.h"
 #include "producer/talk.h"
-#include "render/context.h"
-#include "render/error.h"
 #include "render/image_io.h"
 #include "render/mesh_io.h"
-#include "render/primitives.h"
-#include "render/sink.h"
-#include "render/stage.h"
-#include "render/tone_map.h"
 #include "sim/geometry/mass_properties.h"
 #include "sim/geometry/mesh.h"
 
@@ -124,8 +117,9 @@ MostParticles most_particles(const Scene& scene) {
   return most;
 }
 
-/// JSON as indented "key: value" lines.
-void print_readable(const Json& json, int indent = 0) {
+}  // namespace
+
+void print_readable(const Json& json, int indent) {
   for (const auto& [key, value] : json.items()) {
     const bool nested =
         value.is_object() || (value.is_array() && !value.empty() && value.front().is_structured());
@@ -136,21 +130,6 @@ void print_readable(const Json& json, int indent = 0) {
       fmt::print("{}\n", value.is_string() ? value.get<std::string>() : value.dump());
   }
 }
-
-/// A lit ball on a plane, small: that it draws at all is most of the test, its hash the rest.
-std::string test_render_hash(render::Context& context) {
-  render::Stage stage(context, {.width_px = 128, .height_px = 72, .shadow_map_px = 512});
-  const auto material = stage.add_material({});
-  stage.add_instance(stage.add_mesh(render::make_sphere(1)), material);
-  const auto ground = stage.add_instance(stage.add_mesh(render::make_ground(100)), material, false);
-  stage.set_transform(ground, Eigen::Affine3f(Eigen::Translation3f(0, -1, 0)));
-  stage.set_camera({.eye = {0, 1.5f, 6}});
-  render::HdrImage sum;
-  stage.draw({}, sum);
-  return render::pixel_hash(render::tone_map(sum, {}));
-}
-
-}  // namespace
 
 std::vector<std::string> SceneOptions::overrides() const {
   std::vector<std::string> all;
@@ -265,37 +244,6 @@ int info_command(const SceneOptions& options, bool json) {
   else
     print_readable(info);
   return kOk;
-}
-
-int doctor_command() {
-  render::pin_environment(0);
-  Json json = {{"offstage", OFFSTAGE_VERSION}};
-  int code = kOk;
-  try {
-    render::Context context;
-    json["gl_renderer"] = context.info().renderer;
-    json["gl_version"] = context.info().version;
-    json["glsl"] = context.info().glsl;
-    json["test_render"] = test_render_hash(context);
-    json["fingerprint"] = fingerprint(context.info());
-  } catch (const render::UnavailableError& error) {
-    json["gl_error"] = error.what();
-    code = kUnavailable;
-  }
-  json["cpu"] = cpu_class();
-  json["threads"] = available_processors();
-  utsname system{};
-  uname(&system);
-  json["system"] = fmt::format("{} {} {}", system.sysname, system.release, system.machine);
-  const std::vector<std::string> encoders = render::available_encoders();
-  json["ffmpeg_encoders"] = encoders;
-  if (encoders.empty()) {
-    json["ffmpeg_error"] =
-        "ffmpeg was not found or has none of the encoders used; install the package ffmpeg";
-    code = kUnavailable;
-  }
-  print_readable(json);
-  return code;
 }
 
 }  // namespace offstage::producer

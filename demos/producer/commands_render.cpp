@@ -115,6 +115,7 @@ Plan make_plan(const RenderOptions& options, const ModelLibrary& models, LoadedS
   plan.frames = parse_frames(options.frames, plan.loaded.scene.frame_count());
   if (!options.chunk.empty()) plan.frames = chunk_of(plan.frames, options.chunk);
   plan.settings = settings_key(plan.loaded, models);
+  if (options.gl == render::GlPlatform::egl_gpu) plan.settings += "-gpu";  // other pixels
   plan.threads = threads_or_all(options.threads);
   // llvmpipe already draws one frame with all processors. On two, a second drawing thread takes about 100 MB
   // and more processor time, and saves some 2 % by the clock; with more of them, what is serial in a frame
@@ -285,7 +286,8 @@ int render_command(const RenderOptions& options) {
   }
 
   const auto threads = simulation_threads(options.threads);
-  render::pin_environment(plan.threads);
+  render::pin_environment(plan.threads, options.gl);
+  render::Context();  // a library that is missing is found before anything is written
   if (plan.target.kind == OutputKind::pipe) return render_to_pipe(plan, models, options);
   if (plan.target.kind == OutputKind::frames || plan.through_frames)
     return render_to_frames(plan, models, options);
@@ -321,7 +323,7 @@ int frame_command(const FrameOptions& options) {
   const ModelLibrary models(scene, loaded.folder, options.scene.decompositions(), warnings);
   if (!options.talk.quiet) print_warnings(warnings);
   const auto threads = simulation_threads(options.threads);
-  render::pin_environment(threads_or_all(options.threads));
+  render::pin_environment(threads_or_all(options.threads), options.gl);
   PictureSink sink(options.out);
   const RunStats stats = render_frames(
       loaded, models,

@@ -67,7 +67,7 @@ int sheet_command(const SheetOptions& options) {
   if (!options.talk.quiet) print_warnings(warnings);
   const auto threads = simulation_threads(options.threads);
   const int jobs = threads_or_all(options.threads);
-  render::pin_environment(jobs);
+  render::pin_environment(jobs, options.gl);
   CellSink sink(scene);
   ProgressPrinter printer(options.talk.quiet ? ProgressStyle::none : options.talk.progress);
   const RunStats stats = render_frames(loaded, models, {.frames = frames, .threads = jobs, .cache = {}}, sink,

@@ -343,7 +343,7 @@ int sweep_command(const SweepOptions& options) {
 
   const auto threads = simulation_threads(options.threads);
   const int all_threads = threads_or_all(options.threads);
-  render::pin_environment(all_threads);
+  render::pin_environment(all_threads, options.gl);
   std::error_code error;
   if (options.force) fs::remove_all(sweep.finished, error);
   fs::create_directories(sweep.finished, error);

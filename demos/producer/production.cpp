@@ -15,6 +15,7 @@
 #include "producer/picture.h"
 #include "producer/pipeline.h"
 #include "producer/trace.h"
+#include "producer/version.h"
 #include "render/context.h"
 
 namespace offstage::producer {
@@ -285,11 +286,11 @@ std::string simulation_key(const LoadedScene& loaded, const ModelLibrary& models
     scene.erase(key);
   if (scene.contains("output"))
     for (const char* key : {"channels", "channel_format"}) scene["output"].erase(key);
-  return text_hash(std::string(OFFSTAGE_VERSION) + scene.dump() + models.digest());
+  return text_hash(std::string(version()) + scene.dump() + models.digest());
 }
 
 std::string settings_key(const LoadedScene& loaded, const ModelLibrary& models) {
-  return text_hash(std::string(OFFSTAGE_VERSION) + loaded.canonical + models.digest());
+  return text_hash(std::string(version()) + loaded.canonical + models.digest());
 }
 
 namespace {

@@ -8,6 +8,8 @@
 
 #include <gtest/gtest.h>
 
+#include "render/error.h"
+#include "render/gl_platform.h"
 #include "render/tone_map.h"
 #include "tests/render/gl_fixture.h"
 
@@ -52,9 +54,10 @@ std::string hash_of_a_rich_scene(Context& context) {
   return pixel_hash(tone_map(sum, {.sample_weight = 0.5f}));
 }
 
-std::string hash_in_a_process_with(int raster_threads) {
+std::string hash_in_a_process_with(int raster_threads, std::string_view gl = "") {
   const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
-  const std::string command = std::string(kThreadsVariable) + "=" + std::to_string(raster_threads) + " '" +
+  const std::string platform = gl.empty() ? "" : "OFFSTAGE_GL=" + std::string(gl) + " ";
+  const std::string command = platform + kThreadsVariable + "=" + std::to_string(raster_threads) + " '" +
                               program + "' --gtest_filter=Context.DrawsTheSameSceneTwice";
   FILE* pipe = popen(command.c_str(), "r");
   if (pipe == nullptr) return "cannot run " + command;
@@ -123,6 +126,33 @@ TEST(Context, TheNumberOfRasterThreadsDoesNotChangeThePixels) {
   const std::string none = hash_in_a_process_with(0), two = hash_in_a_process_with(2);
   EXPECT_EQ(none.size(), 38u) << none;  // "hash ", 32 digits, end of line
   EXPECT_EQ(none, two);
+}
+
+TEST(Context, OsmesaAndEglDrawTheSamePixels) {
+  const std::string osmesa = hash_in_a_process_with(2, "osmesa"), egl = hash_in_a_process_with(2, "egl");
+  EXPECT_EQ(osmesa.size(), 38u) << osmesa;
+  EXPECT_EQ(osmesa, egl);
+}
+
+TEST(ContextPlatform, HasANameAndOthersAreRefusedWithTheList) {
+  for (const char* name : {"auto", "osmesa", "egl", "egl:gpu"}) EXPECT_EQ(name_of(gl_platform(name)), name);
+  try {
+    gl_platform("glx");
+    FAIL() << "taken";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "'glx' is no way to draw; there are auto, osmesa, egl, egl:gpu");
+  }
+}
+
+TEST(ContextPlatform, AMissingLibraryIsNamedWithItsPackage) {
+  try {
+    SharedLibrary({"libNoSuchMesa.so.8", "libNoSuchMesa.so"}, "libnosuchmesa8");
+    FAIL() << "loaded";
+  } catch (const UnavailableError& error) {
+    const std::string message = error.what();
+    EXPECT_NE(message.find("libNoSuchMesa.so.8"), std::string::npos) << message;
+    EXPECT_TRUE(message.ends_with("apt-get install libnosuchmesa8")) << message;
+  }
 }
 
 }  // namespace

@@ -37,5 +37,5 @@ only 'assimp/' 'render/mesh_import render/mesh_material'
 only 'stb_image' 'render/image_io'
 only 'libdeflate.h' 'render/png'
 only 'Imf' 'render/exr'
-only 'GL/osmesa.h' 'render/context'
+only 'dlfcn.h' 'render/gl_platform'
 exit $status

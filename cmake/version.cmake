@@ -1,0 +1,19 @@
+# Writes OUTPUT, a C++ file that defines version() and version_text(), from VERSION and the commit of SOURCE_DIR; leaves it
+# alone when nothing has changed. Run at every build.
+set(text "${VERSION}")
+find_program(GIT git)
+if(GIT AND EXISTS "${SOURCE_DIR}/.git")
+  execute_process(COMMAND ${GIT} -C ${SOURCE_DIR} describe --always --abbrev=12 --dirty=-modified --exclude=*
+    OUTPUT_VARIABLE commit OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+endif()
+if(commit)
+  string(APPEND text " (commit ${commit})")
+endif()
+file(CONFIGURE OUTPUT "${OUTPUT}" CONTENT "// Made by cmake/version.cmake.
+#include \"producer/version.h\"
+
+namespace offstage::producer {
+std::string_view version() { return \"${VERSION}\"; }
+std::string_view version_text() { return \"${text}\"; }
+}  // namespace offstage::producer
+")

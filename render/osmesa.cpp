@@ -1,0 +1,76 @@
+// OSMesa. Its few functions are declared here: GL/osmesa.h includes Mesa's gl.h, which does not go together
+// with glad's, and Mesa 25.1 and later have neither header nor library.
+
+#include <array>
+#include <cstdint>
+
+#include "render/error.h"
+#include "render/gl_platform.h"
+
+namespace offstage::render {
+namespace {
+
+// From the interface of libOSMesa 11.2 and later.
+constexpr int kRgba = 0x1908;               // GL_RGBA
+constexpr unsigned kUnsignedByte = 0x1401;  // GL_UNSIGNED_BYTE
+constexpr int kFormat = 0x22;
+constexpr int kDepthBits = 0x30, kStencilBits = 0x31, kAccumBits = 0x32;
+constexpr int kProfile = 0x33, kCoreProfile = 0x34;
+constexpr int kMajorVersion = 0x36, kMinorVersion = 0x37;
+using Handle = void*;
+
+// Everything is drawn into framebuffer objects; OSMesa's own buffer is only what makes the context current.
+constexpr int kDummySize_px = 16;
+
+struct Library {
+  Handle (*create)(const int* attributes, Handle shared) = nullptr;
+  unsigned char (*make_current)(Handle, void* buffer, unsigned type, int width, int height) = nullptr;
+  void (*destroy)(Handle) = nullptr;
+  void (*(*get_proc_address)(const char* name))() = nullptr;
+
+  Library() {
+    const SharedLibrary library({"libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"}, "libosmesa6");
+    library.find("OSMesaCreateContextAttribs", create);
+    library.find("OSMesaMakeCurrent", make_current);
+    library.find("OSMesaDestroyContext", destroy);
+    library.find("OSMesaGetProcAddress", get_proc_address);
+  }
+};
+
+const Library& osmesa() {
+  static const Library library;
+  return library;
+}
+
+class OsmesaContext : public PlatformContext {
+ public:
+  OsmesaContext() {
+    const int attributes[] = {kFormat,  kRgba,        kDepthBits,    0, kStencilBits,  0, kAccumBits, 0,
+                              kProfile, kCoreProfile, kMajorVersion, 4, kMinorVersion, 5, 0};
+    handle_ = osmesa().create(attributes, nullptr);
+    if (handle_ == nullptr)
+      throw UnavailableError(
+          "OSMesa gives no OpenGL 4.5 core context; install libosmesa6 22.3 or newer (apt-get install "
+          "libosmesa6)");
+    if (!osmesa().make_current(handle_, pixels_.data(), kUnsignedByte, kDummySize_px, kDummySize_px)) {
+      osmesa().destroy(handle_);
+      throw UnavailableError("OSMesa cannot make its context current; reinstall libosmesa6");
+    }
+  }
+  ~OsmesaContext() override { osmesa().destroy(handle_); }
+  OsmesaContext(const OsmesaContext&) = delete;
+  OsmesaContext& operator=(const OsmesaContext&) = delete;
+  GlLookup lookup() const override { return osmesa().get_proc_address; }
+
+ private:
+  Handle handle_ = nullptr;
+  std::array<uint8_t, kDummySize_px * kDummySize_px * 4> pixels_{};
+};
+
+}  // namespace
+
+std::unique_ptr<PlatformContext> make_osmesa_context() {
+  return std::make_unique<OsmesaContext>();
+}
+
+}  // namespace offstage::render
