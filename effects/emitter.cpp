@@ -21,7 +21,7 @@ std::string owner(const EmitterDef& def) {
   return "emitter \"" + def.name + "\"";
 }
 
-const EmitterDef& checked(const EmitterDef& def) {
+const EmitterDef& checked_emitter(const EmitterDef& def) {
   const auto verify = [&](const char* field, const Varying& v, const Limits& limits) {
     check(owner(def), field, v, limits);
   };
@@ -54,7 +54,7 @@ ReleaseSurface surface_of(const EmitterDef& def) {
 }  // namespace
 
 Emitter::Emitter(const EmitterDef& def, sim::ParticleSystemHandle target, Real origin)
-    : def_(checked(def)),
+    : def_(checked_emitter(def)),
       target_(target),
       origin_(origin),
       stopped_(std::numeric_limits<Real>::infinity()),

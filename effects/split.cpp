@@ -13,7 +13,7 @@ namespace {
 /// A particle at rest has no direction; its children take this one, and no speed.
 const Vec3 kNoDirection = Vec3::UnitY();
 
-const SplitDef& checked(const SplitDef& def) {
+const SplitDef& checked_split(const SplitDef& def) {
   const auto verify = [&](const char* field, const Varying& v, const Limits& limits) {
     check("split \"" + def.name + "\"", field, v, limits);
   };
@@ -32,7 +32,7 @@ const SplitDef& checked(const SplitDef& def) {
 }  // namespace
 
 Splitter::Splitter(const SplitDef& def, sim::ParticleSystemHandle parents, sim::ParticleSystemHandle children)
-    : def_(checked(def)), parents_(parents), children_(children), random_(def.seed, stream_id(def.name)) {}
+    : def_(checked_split(def)), parents_(parents), children_(children), random_(def.seed, stream_id(def.name)) {}
 
 void Splitter::emit(sim::World& world, Real start, Real end) {
   if (!def_.enabled || def_.depth == 0) return;

@@ -11,7 +11,7 @@
 namespace offstage::effects {
 namespace {
 
-const SubEmitterDef& checked(const SubEmitterDef& def) {
+const SubEmitterDef& checked_sub_emitter(const SubEmitterDef& def) {
   const std::string owner = "sub-emitter \"" + def.name + "\"";
   check(owner, "count", def.count, kCounts);
   check(owner, "velocity_percent", def.velocity_percent, kAnyNumber);
@@ -26,7 +26,7 @@ const SubEmitterDef& checked(const SubEmitterDef& def) {
 
 SubEmitter::SubEmitter(const SubEmitterDef& def, sim::ParticleSystemHandle parents,
                        sim::ParticleSystemHandle target)
-    : def_(checked(def)), parents_(parents), target_(target), random_(def.seed, stream_id(def.name)) {}
+    : def_(checked_sub_emitter(def)), parents_(parents), target_(target), random_(def.seed, stream_id(def.name)) {}
 
 void SubEmitter::emit(sim::World& world, Real start, Real end) {
   born_ = 0;

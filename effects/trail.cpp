@@ -10,7 +10,7 @@
 namespace offstage::effects {
 namespace {
 
-const TrailDef& checked(const TrailDef& def) {
+const TrailDef& checked_trail(const TrailDef& def) {
   const std::string owner = "trail \"" + def.name + "\"";
   check(owner, "rate", def.rate, kRates);
   check(owner, "velocity_percent", def.velocity_percent, kAnyNumber);
@@ -24,7 +24,7 @@ const TrailDef& checked(const TrailDef& def) {
 }  // namespace
 
 Trail::Trail(const TrailDef& def, sim::ParticleSystemHandle parents, sim::ParticleSystemHandle target)
-    : def_(checked(def)), parents_(parents), target_(target), random_(def.seed, stream_id(def.name)) {
+    : def_(checked_trail(def)), parents_(parents), target_(target), random_(def.seed, stream_id(def.name)) {
   if (parents && parents == target)
     throw std::invalid_argument("trail \"" + def.name + "\": a trail of trails would never end");
 }

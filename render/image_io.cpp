@@ -29,7 +29,7 @@ namespace offstage::render {
 namespace {
 
 constexpr int kMaxSide = 16384;  // OpenGL's limit here too
-constexpr uint64_t kMaxFileBytes = uint64_t{1} << 30;
+constexpr uint64_t kMaxImageBytes = uint64_t{1} << 30;
 
 bool is_opaque(const Image& image) {
   for (std::size_t i = 3; i < image.rgba.size(); i += 4) {
@@ -86,7 +86,7 @@ class TemporaryFile {
 }  // namespace
 
 Image read_image(const std::filesystem::path& path) {
-  return decode_image(read_file(path, kMaxFileBytes), path.string());
+  return decode_image(read_file(path, kMaxImageBytes), path.string());
 }
 
 Image decode_image(std::span<const uint8_t> bytes, const std::string& name) {
@@ -94,7 +94,7 @@ Image decode_image(std::span<const uint8_t> bytes, const std::string& name) {
     return FileError(name + ": cannot be read as an image: " + why);
   };
   if (bytes.empty()) throw fail("it is empty");
-  if (bytes.size() > kMaxFileBytes) throw fail("it is larger than 1 GiB");
+  if (bytes.size() > kMaxImageBytes) throw fail("it is larger than 1 GiB");
   const int size = static_cast<int>(bytes.size());
   int width = 0, height = 0, channels = 0;
   if (!stbi_info_from_memory(bytes.data(), size, &width, &height, &channels))

@@ -24,7 +24,7 @@
 namespace offstage::render {
 namespace {
 
-constexpr uint64_t kMaxFileBytes = uint64_t{2} << 30;
+constexpr uint64_t kMaxMeshBytes = uint64_t{2} << 30;
 constexpr rlim_t kMaxMemoryBytes = rlim_t{4} << 30;  // beyond what the process has mapped already
 constexpr int kModelExit = 40, kMessageExit = 41;    // other codes are not the child's
 
@@ -219,7 +219,7 @@ uint64_t checked_size(const std::filesystem::path& path) {
   const uint64_t size = std::filesystem::file_size(path, error);
   if (error) throw FileError(path.string() + ": cannot be read: " + error.message());
   if (size == 0) throw FileError(path.string() + ": is empty");
-  if (size > kMaxFileBytes) throw FileError(path.string() + ": is larger than 2 GiB");
+  if (size > kMaxMeshBytes) throw FileError(path.string() + ": is larger than 2 GiB");
   return size;
 }
 

@@ -6,7 +6,7 @@
 namespace offstage::render {
 namespace {
 
-constexpr int kCells = 72;            // along the longest side
+constexpr int kOpacityCells = 72;            // along the longest side
 constexpr float kCellsPerRadius = 2;  // of a typical puff, at most: finer cells would show single puffs
 
 // Corners of a tetrahedron: places within a puff that stand for all of it.
@@ -35,13 +35,13 @@ void OpacityGrid::fit(std::span<const Absorber> absorbers, const Vector3f& away)
     volume += static_cast<double>(a.radius) * static_cast<double>(a.radius) * static_cast<double>(a.radius);
   }
   const float typical = static_cast<float>(volume / area);
-  const float needed = std::max(box.sizes().maxCoeff() / (kCells - 4), typical / kCellsPerRadius);
+  const float needed = std::max(box.sizes().maxCoeff() / (kOpacityCells - 4), typical / kCellsPerRadius);
   // Sizes in steps and a corner on whole cells: the shadow does not swim while the smoke grows.
   cell_ = std::exp2(std::ceil(4 * std::log2(needed)) / 4);
   const Vector3f low = ((box.min() / cell_).array().floor() - 1).matrix();
   const Vector3f high = ((box.max() / cell_).array().ceil() + 1).matrix();
   origin_ = axes_.transpose() * (low * cell_);
-  const Eigen::Vector3i count = (high - low).cast<int>().cwiseMax(3).cwiseMin(2 * kCells);
+  const Eigen::Vector3i count = (high - low).cast<int>().cwiseMax(3).cwiseMin(2 * kOpacityCells);
   nx_ = count.x();
   ny_ = count.y();
   nz_ = count.z();

@@ -69,7 +69,7 @@ uint32_t mean(uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
   return result;
 }
 
-std::vector<uint32_t> half_of(const std::vector<uint32_t>& fine, int fine_size) {
+std::vector<uint32_t> half_float(const std::vector<uint32_t>& fine, int fine_size) {
   const int size = fine_size / 2;
   std::vector<uint32_t> result(static_cast<std::size_t>(size * size));
   for (int y = 0; y < size; ++y) {
@@ -123,7 +123,7 @@ PuffAtlas::Picture PuffAtlas::make_picture(Kind kind, uint32_t seed) {
       picture.levels[0][static_cast<std::size_t>(y * n + x)] = pack(1 - through, normal);
     }
   }
-  for (std::size_t k = 1; k < kLevels; ++k) picture.levels[k] = half_of(picture.levels[k - 1], n >> (k - 1));
+  for (std::size_t k = 1; k < kLevels; ++k) picture.levels[k] = half_float(picture.levels[k - 1], n >> (k - 1));
   return picture;
 }
 

@@ -39,7 +39,7 @@ TileRange tiles_of(const S& s, int nx, int ny) {
 typedef float Lanes __attribute__((vector_size(4 * kLanes)));
 typedef int32_t IntLanes __attribute__((vector_size(4 * kLanes)));
 
-inline Lanes clamped(Lanes x, float low, float high) {
+inline Lanes clamped_to(Lanes x, float low, float high) {
   const Lanes least = Lanes{} + low, most = Lanes{} + high;
   x = x > least ? x : least;
   return x < most ? x : most;
@@ -53,8 +53,8 @@ inline Lanes byte_of(IntLanes texel, int shift) {
 inline IntLanes texels_at(const Splat& s, float dx, float dy) {
   const Lanes x = dx + Lanes{0, 1, 2, 3, 4, 5, 6, 7};
   const float half = 0.5f * static_cast<float>(s.cell.size_px), last = static_cast<float>(s.cell.size_px - 1);
-  const Lanes u = clamped(half * (s.ux * x + (s.uy * dy + 1)), 0, last);
-  const Lanes v = clamped(half * (s.vx * x + (s.vy * dy + 1)), 0, last);
+  const Lanes u = clamped_to(half * (s.ux * x + (s.uy * dy + 1)), 0, last);
+  const Lanes v = clamped_to(half * (s.vx * x + (s.vy * dy + 1)), 0, last);
   const IntLanes index =
       __builtin_convertvector(v, IntLanes) * s.cell.size_px + __builtin_convertvector(u, IntLanes);
   IntLanes texel;
@@ -73,7 +73,7 @@ inline Lanes& lanes_of(std::array<float, kTilePixels>& plane, std::size_t at) {
 inline void draw_lanes(const Splat& s, float dx, float dy, std::size_t at, Tile& tile) {
   const IntLanes texel = texels_at(s, dx, dy);
   const Lanes nx = byte_of(texel, 8), ny = byte_of(texel, 16), nz = byte_of(texel, 24);
-  const Lanes in_front = clamped((lanes_of(tile.depth, at) - s.depth) * s.inverse_reach + 0.5f, 0, 1);
+  const Lanes in_front = clamped_to((lanes_of(tile.depth, at) - s.depth) * s.inverse_reach + 0.5f, 0, 1);
   Lanes& through = lanes_of(tile.through, at);
   const Lanes seen = through * (s.opacity * byte_of(texel, 0) * in_front);
   const auto add_light = [&](std::array<float, kTilePixels>& plane, const float* r) {
@@ -91,17 +91,17 @@ inline void draw_lanes(const StreakSplat& s, float dx, float dy, std::size_t at,
   const Lanes x = dx + Lanes{0, 1, 2, 3, 4, 5, 6, 7};
   const Lanes along = x * s.along_x + dy * s.along_y,
               across = (x * s.along_y - dy * s.along_x) * s.inverse_radius;
-  const Lanes past = (along - clamped(along, -s.half_length, s.half_length)) * s.inverse_radius;
+  const Lanes past = (along - clamped_to(along, -s.half_length, s.half_length)) * s.inverse_radius;
   const Lanes from_axis = square_root(past * past + across * across);
-  const Lanes rim = clamped((from_axis - (1 - s.softness)) * (1 / s.softness), 0, 1);
+  const Lanes rim = clamped_to((from_axis - (1 - s.softness)) * (1 / s.softness), 0, 1);
   const Lanes in_front =
-      clamped((lanes_of(tile.depth, at) - (s.depth + s.depth_slope * along)) * s.inverse_reach + 0.5f, 0, 1);
+      clamped_to((lanes_of(tile.depth, at) - (s.depth + s.depth_slope * along)) * s.inverse_reach + 0.5f, 0, 1);
   const Lanes head = along / (s.half_length + 1 / s.inverse_radius);
-  const Lanes tail = 1 - s.taper * (0.5f - 0.5f * clamped(head, -1, 1));
+  const Lanes tail = 1 - s.taper * (0.5f - 0.5f * clamped_to(head, -1, 1));
   Lanes& through = lanes_of(tile.through, at);
   const Lanes seen = through * (s.opacity * tail * in_front * (1 - rim * rim * (3 - 2 * rim)));
   // Fresnel's reflection by Schlick's approximation.
-  const Lanes side = clamped(across, -1, 1);
+  const Lanes side = clamped_to(across, -1, 1);
   const Lanes m = 1 - square_root(1 - side * side), m2 = m * m;
   const StreakLight& light = *s.light;
   const Lanes mirrored = 0.02f + 0.98f * (m2 * m2 * m);

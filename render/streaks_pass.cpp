@@ -7,7 +7,7 @@
 namespace offstage::render {
 namespace {
 
-constexpr float kNearest =
+constexpr float kNearestStreak =
     0.016f;  // radius from which a streak at the lens fades, as a share of half the picture
 constexpr float kThinnest_px = 0.6f;  // radius; what is thinner stays as wide and gets fainter
 
@@ -85,7 +85,7 @@ StreakSplat splat_of(const GpuPoint& point, const PointsDef& def, const View& vi
       std::min(point.color.w(), 1.0f) * (radius / drawn) * std::clamp(0.5f * room / drawn, 0.0f, 1.0f);
   // A drop at the lens would be a bar across the picture.
   const float apart = std::clamp(0.1f * distance / view.near_m - 1, 0.0f, 1.0f);
-  s.opacity *= std::max(apart, std::clamp(2 - radius_px / (kNearest * half_size.y()), 0.0f, 1.0f));
+  s.opacity *= std::max(apart, std::clamp(2 - radius_px / (kNearestStreak * half_size.y()), 0.0f, 1.0f));
   s.cover = def.additive ? 0.0f : 1.0f;
   s.softness = std::clamp(def.softness, 0.01f, 1.0f);
   s.taper = def.taper;

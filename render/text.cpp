@@ -17,11 +17,11 @@ std::string printable(std::string_view text) {
   return line;
 }
 
-struct Vertex {
+struct GlyphVertex {
   float x, y, z;
   uint8_t color[4];
 };
-static_assert(sizeof(Vertex) == 16);
+static_assert(sizeof(GlyphVertex) == 16);
 
 void fill(Image& image, int left, int top, int right, int bottom, const std::array<uint8_t, 3>& rgb) {
   for (int y = std::max(top, 0); y < std::min(bottom, image.height_px); ++y)
@@ -43,12 +43,12 @@ void draw_text(Image& image, int x_px, int y_px, std::string_view text, int scal
                const std::array<uint8_t, 3>& rgb) {
   constexpr std::size_t kMostQuads = 32;  // that one character is made of
   std::string line = printable(text);
-  std::vector<Vertex> corners(4 * kMostQuads * line.size());
+  std::vector<GlyphVertex> corners(4 * kMostQuads * line.size());
   const int quads = stb_easy_font_print(0, 0, line.data(), nullptr, corners.data(),
-                                        static_cast<int>(corners.size() * sizeof(Vertex)));
+                                        static_cast<int>(corners.size() * sizeof(GlyphVertex)));
   for (int i = 0; i < quads; ++i) {
-    const Vertex& first = corners[4 * static_cast<std::size_t>(i)];
-    const Vertex& last = corners[4 * static_cast<std::size_t>(i) + 2];
+    const GlyphVertex& first = corners[4 * static_cast<std::size_t>(i)];
+    const GlyphVertex& last = corners[4 * static_cast<std::size_t>(i) + 2];
     const auto at = [&](float v, int origin) { return origin + scale * static_cast<int>(v); };
     fill(image, at(first.x, x_px), at(first.y, y_px), at(last.x, x_px), at(last.y, y_px), rgb);
   }

@@ -27,7 +27,7 @@ double filmic(double x) {
   return x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14);
 }
 
-double encode(double linear) {
+double encode_srgb(double linear) {
   return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
 }
 
@@ -37,7 +37,7 @@ Table make_table(ToneCurve curve) {
     const auto low = std::bit_cast<float>((cell + kFirstCell) << kShift);
     const auto high = std::bit_cast<float>((cell + kFirstCell + 1) << kShift);
     const double x = 0.5 * (static_cast<double>(low) + static_cast<double>(high));
-    const double display = encode(std::clamp(curve == ToneCurve::filmic ? filmic(x) : x, 0.0, 1.0));
+    const double display = encode_srgb(std::clamp(curve == ToneCurve::filmic ? filmic(x) : x, 0.0, 1.0));
     table[static_cast<std::size_t>(cell) + 1] = static_cast<uint16_t>(std::lround(display * 255 * kStep));
   }
   return table;
@@ -70,7 +70,7 @@ inline uint8_t quantize(uint32_t value, uint32_t threshold) {
 }  // namespace
 
 float srgb_encode(float linear) {
-  return static_cast<float>(encode(static_cast<double>(linear)));
+  return static_cast<float>(encode_srgb(static_cast<double>(linear)));
 }
 
 float srgb_decode(float encoded) {

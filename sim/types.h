@@ -4,12 +4,16 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include <limits>
+
 namespace offstage::sim {
 
 using Real = double;
 using Vec3 = Eigen::Vector3d;
 using Mat3 = Eigen::Matrix3d;
 using Quat = Eigen::Quaterniond;
+
+inline constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 
 /// A rigid placement: maps body coordinates to world coordinates (world_from_body).
 struct Pose {

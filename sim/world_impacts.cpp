@@ -23,7 +23,7 @@ constexpr std::size_t kMovedAnew = 2000, kAllMovedAnew = 4;
 /// Points this near to each other when two bodies collide take part [m].
 constexpr Real kCluster = 1e-4;
 /// Bodies that turn by more in an interval are looked at in pieces of as much [rad]; at most so many.
-constexpr Real kTurn = 0.5, kMostPieces = 512;
+constexpr Real kImpactTurn = 0.5, kMostPieces = 512;
 /// What turns by more in an interval is soon elsewhere than where contact forces of its start are: it flies
 /// [rad].
 constexpr Real kWhirl = 3;
@@ -74,7 +74,7 @@ std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) co
   const Real from = std::max(a.is_awake() ? a.from : 0, b.is_awake() ? b.from : 0);
   if (from >= h * (1 - kInstant)) return std::nullopt;
   const Real turn = std::max(spin(a), spin(b)) * (h - from);
-  if (turn > kTurn) return tumbling_impact_time(pair, from, h, turn);
+  if (turn > kImpactTurn) return tumbling_impact_time(pair, from, h, turn);
   if (pair.separation() <= kTouching) return point_impact_time(pair, h);
   const auto path = [&](const Body& body) {
     if (!body.can_move()) return PosePath(body.start_pose);
@@ -93,7 +93,7 @@ std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, R
   const bool whirls = turn > kWhirl;
   Tumbling body_a(pair.a(), def, whirls, h), body_b(pair.b(), def, whirls, h);
   Pose begin_a = body_a.go_on(from), begin_b = body_b.go_on(from);
-  const auto pieces = static_cast<uint32_t>(std::min(std::ceil(turn / kTurn), kMostPieces));
+  const auto pieces = static_cast<uint32_t>(std::min(std::ceil(turn / kImpactTurn), kMostPieces));
   // What touches now has just met.
   const bool touches = pair.separation() <= kTouching;
   for (uint32_t i = 0; i < pieces; ++i) {
@@ -166,7 +166,7 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
                                         [](const Impact& x, const Impact& y) { return x.time < y.time; });
     const Impact impact = *first;
     ContactPair& pair = *impact.pair;
-    const bool tumbles = std::max(spin(pair.a()), spin(pair.b())) * h > kTurn;
+    const bool tumbles = std::max(spin(pair.a()), spin(pair.b())) * h > kImpactTurn;
     if (++pair.impacts > (tumbles ? kMaxOfTumblingPair : kMaxImpactsOfPair) || count >= most) {
       pair.gave_up = true;
       ++report.cut_short;

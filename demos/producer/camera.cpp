@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "sim/dynamics/keyframes.h"
+#include "producer/to_float.h"
 
 namespace offstage::producer {
 namespace {
@@ -12,10 +13,6 @@ namespace {
 using Eigen::Vector3f;
 
 constexpr Real kRadians = std::numbers::pi / 180;
-
-float f(Real value) {
-  return static_cast<float>(value);
-}
 
 Real vertical_fov_deg(const Lens& lens, const Eigen::Vector2i& size) {
   if (!lens.focal_mm) return lens.fov_deg;
@@ -50,7 +47,7 @@ Eigen::AlignedBox3f box_of(const Body& body, const ModelLibrary& models) {
 
 /// The value of keys that may leave it to the lens, as smooth as the camera's way.
 template <class Value>
-Vec3 follow(const std::vector<CameraKey>& keys, double time, Value&& value) {
+Vec3 follow_keys(const std::vector<CameraKey>& keys, double time, Value&& value) {
   sim::KeyframeTrack track;
   for (const CameraKey& key : keys) track.keys.push_back({key.time, {value(key), Quat::Identity()}});
   return track.at(time, {}).pose.position;
@@ -65,7 +62,7 @@ View view_of(const StaticCamera& c, const View& lens, double) {
   return {c.eye, c.target, lens.fov_deg, lens.focus};
 }
 View view_of(const KeyframedCamera& c, const View& lens, double time) {
-  const auto at = [&](auto&& value) { return follow(c.keyframes, time, value); };
+  const auto at = [&](auto&& value) { return follow_keys(c.keyframes, time, value); };
   const bool pulls_focus =
       std::ranges::any_of(c.keyframes, [](const CameraKey& k) { return k.focus.has_value(); });
   return {at([](const CameraKey& k) { return k.eye; }), at([](const CameraKey& k) { return k.target; }),
@@ -121,9 +118,9 @@ render::Camera CameraRig::at(double time, const BodyPlaces& places,
     view.focus = std::max((place(lens.focus_on) - view.eye).dot((view.target - view.eye).normalized()), 0.01);
   return {.eye = view.eye.cast<float>(),
           .target = view.target.cast<float>(),
-          .fov_deg = f(view.fov_deg),
-          .aperture = f(lens.aperture),
-          .focus = f(view.focus)};
+          .fov_deg = to_float(view.fov_deg),
+          .aperture = to_float(lens.aperture),
+          .focus = to_float(view.focus)};
 }
 
 }  // namespace offstage::producer

@@ -30,7 +30,7 @@ std::vector<ArticulationPreset> articulation_presets() {
 }
 
 /// As a scene would have it.
-std::string text_of(const ArticulationPreset& preset) {
+std::string preset_text(const ArticulationPreset& preset) {
   Scene scene;
   scene.articulations.push_back(preset.made);
   const Node written = write_scene(scene);
@@ -60,7 +60,7 @@ int presets_command(const std::string& name) {
   }
   for (const ArticulationPreset& preset : articulation_presets()) {
     if (preset.name != name) continue;
-    fmt::print("{}\n", text_of(preset));
+    fmt::print("{}\n", preset_text(preset));
     return kOk;
   }
   if (!name.empty()) {

@@ -12,7 +12,7 @@ namespace offstage::producer {
 namespace {
 
 /// A new version whenever decompose() answers differently.
-constexpr FileKind kKind = {"offparts", 1, "convex decomposition"};
+constexpr FileKind kPartsKind = {"offparts", 1, "convex decomposition"};
 
 using sim::ConvexDecomposition;
 using sim::ConvexPolyhedron;
@@ -33,7 +33,7 @@ std::vector<uint8_t> serialize(const ConvexDecomposition& d) {
       for (uint32_t v : part.face_vertices(f)) out.put(v);
     }
   }
-  return pack(kKind, out.bytes());
+  return pack(kPartsKind, out.bytes());
 }
 
 ConvexPolyhedron take_part(ByteReader& in) {
@@ -47,8 +47,8 @@ ConvexPolyhedron take_part(ByteReader& in) {
   return {std::move(vertices), faces};
 }
 
-ConvexDecomposition deserialize(std::span<const uint8_t> bytes, const std::string& source) {
-  const std::vector<uint8_t> payload = unpack(kKind, bytes, source);
+ConvexDecomposition decomposition_from(std::span<const uint8_t> bytes, const std::string& source) {
+  const std::vector<uint8_t> payload = unpack(kPartsKind, bytes, source);
   ByteReader in(payload, source);
   ConvexDecomposition d;
   d.method = static_cast<ConvexDecomposition::Method>(in.take<uint8_t>());
@@ -84,13 +84,13 @@ std::filesystem::path DecompositionCache::file(const sim::TriangleMesh& mesh) co
   XXH3_128bits_update(hash, mesh.triangles.data(), mesh.triangles.size() * sizeof(sim::Triangle));
   const XXH128_hash_t h = XXH3_128bits_digest(hash);
   XXH3_freeState(hash);
-  return folder_ / fmt::format("{:016x}{:016x}-{}.parts", h.high64, h.low64, kKind.version);
+  return folder_ / fmt::format("{:016x}{:016x}-{}.parts", h.high64, h.low64, kPartsKind.version);
 }
 
 std::optional<ConvexDecomposition> DecompositionCache::read(const std::filesystem::path& path) const {
   if (path.empty() || !std::filesystem::exists(path)) return std::nullopt;
   try {
-    return deserialize(read_file(path), path.string());
+    return decomposition_from(read_file(path), path.string());
   } catch (const render::FileError&) {
   } catch (const std::invalid_argument&) {  // faces that do not close
   }

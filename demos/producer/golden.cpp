@@ -36,7 +36,7 @@ fs::path picture_file(const fs::path& folder, const std::string& scene, int fram
   return folder / fmt::format("{}-{:04}.png", scene, frame);
 }
 
-void write_text(const fs::path& path, const std::string& text) {
+void write_golden_text(const fs::path& path, const std::string& text) {
   render::write_file_atomically(path, {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
 }
 
@@ -123,7 +123,7 @@ void write_golden(const fs::path& folder, const Golden& golden) {
     render::write_png(picture_file(folder, golden.scene, f.frame), f.image);
     frames.push_back({{"frame", f.frame}, {"state", f.state_hash}, {"pixels", f.pixel_hash}});
   }
-  write_text(folder / (golden.scene + ".json"), json.dump(2) + "\n");
+  write_golden_text(folder / (golden.scene + ".json"), json.dump(2) + "\n");
 }
 
 Verdict judge(const Golden& expected, const Golden& actual) {
@@ -165,7 +165,7 @@ fs::path write_report(const fs::path& folder, const Golden& expected, const Gold
         stem);
   }
   const fs::path page = folder / "index.html";
-  write_text(
+  write_golden_text(
       page,
       fmt::format("<!doctype html><meta charset=\"utf-8\"><title>{0}</title>\n"
                   "<style>body{{font:14px sans-serif}}img{{image-rendering:pixelated;width:384px}}</style>\n"

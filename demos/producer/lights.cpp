@@ -3,13 +3,10 @@
 #include <algorithm>
 
 #include "effects/distribution.h"
+#include "producer/to_float.h"
 
 namespace offstage::producer {
 namespace {
-
-float f(Real value) {
-  return static_cast<float>(value);
-}
 
 /// What the ground plane sends back of the light, if there is one that is seen.
 std::optional<Eigen::Vector3f> ground_albedo(const Scene& scene) {
@@ -20,7 +17,7 @@ std::optional<Eigen::Vector3f> ground_albedo(const Scene& scene) {
     const bool even = material->pattern == render::Pattern::checker;
     const float second = material->pattern == render::Pattern::none ? 0.f : even ? 0.5f : 0.2f;
     const Eigen::Vector3f a = material->color.rgb(), b = material->pattern_color.rgb();
-    return Eigen::Vector3f((1 - f(material->metallic)) * (a + second * (b - a)));
+    return Eigen::Vector3f((1 - to_float(material->metallic)) * (a + second * (b - a)));
   }
   return {};
 }
@@ -32,7 +29,7 @@ struct LampOf {
 
   render::Lamp base(const LampBase& l) const {
     return {.position = world(l, l.position),
-            .intensity = f(effects::mean(l.intensity, time)) * l.color.rgb(),
+            .intensity = to_float(effects::mean(l.intensity, time)) * l.color.rgb(),
             .shadows = l.shadows};
   }
   Eigen::Vector3f world(const LampBase& l, const Vec3& point) const {
@@ -46,15 +43,15 @@ struct LampOf {
   std::optional<render::Lamp> operator()(const SunLight&) const { return {}; }
   std::optional<render::Lamp> operator()(const PointLight& l) const {
     render::Lamp lamp = base(l);
-    lamp.radius = f(l.radius);
+    lamp.radius = to_float(l.radius);
     return lamp;
   }
   std::optional<render::Lamp> operator()(const SpotLight& l) const {
     render::Lamp lamp = base(l);
-    lamp.radius = f(l.radius);
+    lamp.radius = to_float(l.radius);
     lamp.direction = direction(l, l.target);
-    lamp.cone_deg = f(l.angle_deg);
-    lamp.softness = f(l.softness);
+    lamp.cone_deg = to_float(l.angle_deg);
+    lamp.softness = to_float(l.softness);
     return lamp;
   }
   std::optional<render::Lamp> operator()(const AreaLight& l) const {
@@ -73,8 +70,8 @@ render::Sun sun_of(const Scene& scene) {
     if (const auto* l = std::get_if<SunLight>(&light))
       return {.direction = l->direction.normalized().cast<float>(),
               .color = l->color.rgb(),
-              .intensity = f(l->intensity),
-              .size_deg = f(l->size_deg),
+              .intensity = to_float(l->intensity),
+              .size_deg = to_float(l->size_deg),
               .shadows = l->shadows};
   return {.intensity = 0, .shadows = false};
 }
@@ -83,15 +80,15 @@ render::Environment environment_of(const Scene& scene) {
   const EnvironmentSettings& e = scene.environment;
   render::Environment environment{.zenith = e.zenith.rgb(),
                                   .horizon = e.horizon.rgb(),
-                                  .intensity = f(e.intensity),
-                                  .clouds = f(e.clouds),
-                                  .fog = f(e.fog),
+                                  .intensity = to_float(e.intensity),
+                                  .clouds = to_float(e.clouds),
+                                  .fog = to_float(e.fog),
                                   .visible = e.background == Background::sky};
   if (e.ground)
     environment.ground = e.ground->rgb();
   else
     environment.ground_albedo = ground_albedo(scene);
-  if (e.occlusion) environment.occlusion_reach = f(*e.occlusion);
+  if (e.occlusion) environment.occlusion_reach = to_float(*e.occlusion);
   return environment;
 }
 

@@ -11,6 +11,7 @@
 #include "render/bloom.h"
 #include "render/primitives.h"
 #include "render/tone_map.h"
+#include "producer/to_float.h"
 
 namespace offstage::producer {
 namespace {
@@ -21,51 +22,47 @@ using Eigen::Vector3f;
 /// Half the edge of the square that stands for an infinite plane [m].
 constexpr float kGroundHalfSize = 1000;
 
-float f(Real value) {
-  return static_cast<float>(value);
-}
-
 Affine3f affine(const Vec3& position, const Quat& orientation, Real scale = 1) {
-  return Eigen::Translation3f(position.cast<float>()) * orientation.cast<float>() * Eigen::Scaling(f(scale));
+  return Eigen::Translation3f(position.cast<float>()) * orientation.cast<float>() * Eigen::Scaling(to_float(scale));
 }
 
 /// The mesh of a primitive, and the numbers that tell it from others. Boxes get a small bevel, so that their
 /// edges catch light.
 render::Mesh mesh_of(const sim::Sphere& s) {
-  return render::make_sphere(f(s.radius));
+  return render::make_sphere(to_float(s.radius));
 }
 render::Mesh mesh_of(const sim::Box& s) {
-  return render::make_box(s.size.cast<float>(), 0.04f * f(s.size.minCoeff()));
+  return render::make_box(s.size.cast<float>(), 0.04f * to_float(s.size.minCoeff()));
 }
 render::Mesh mesh_of(const sim::Capsule& s) {
-  return render::make_capsule(f(s.radius), f(s.height));
+  return render::make_capsule(to_float(s.radius), to_float(s.height));
 }
 render::Mesh mesh_of(const sim::Cylinder& s) {
-  return render::make_cylinder(f(s.radius), f(s.height));
+  return render::make_cylinder(to_float(s.radius), to_float(s.height));
 }
 render::Mesh mesh_of(const sim::Cone& s) {
-  return render::make_cone(f(s.radius), f(s.height));
+  return render::make_cone(to_float(s.radius), to_float(s.height));
 }
 render::Mesh mesh_of(const sim::Plane&) {
   return render::make_ground(kGroundHalfSize);
 }
 
-std::vector<float> key_of(const sim::Sphere& s) {
-  return {0, f(s.radius)};
+std::vector<float> shape_key(const sim::Sphere& s) {
+  return {0, to_float(s.radius)};
 }
-std::vector<float> key_of(const sim::Box& s) {
-  return {1, f(s.size.x()), f(s.size.y()), f(s.size.z())};
+std::vector<float> shape_key(const sim::Box& s) {
+  return {1, to_float(s.size.x()), to_float(s.size.y()), to_float(s.size.z())};
 }
-std::vector<float> key_of(const sim::Capsule& s) {
-  return {2, f(s.radius), f(s.height)};
+std::vector<float> shape_key(const sim::Capsule& s) {
+  return {2, to_float(s.radius), to_float(s.height)};
 }
-std::vector<float> key_of(const sim::Cylinder& s) {
-  return {3, f(s.radius), f(s.height)};
+std::vector<float> shape_key(const sim::Cylinder& s) {
+  return {3, to_float(s.radius), to_float(s.height)};
 }
-std::vector<float> key_of(const sim::Cone& s) {
-  return {4, f(s.radius), f(s.height)};
+std::vector<float> shape_key(const sim::Cone& s) {
+  return {4, to_float(s.radius), to_float(s.height)};
 }
-std::vector<float> key_of(const sim::Plane&) {
+std::vector<float> shape_key(const sim::Plane&) {
   return {5};
 }
 
@@ -120,7 +117,7 @@ Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context
   // In the order of Snapshot::rods.
   const auto add_rod = [&](const auto& rod) {
     rods_.push_back(rod.visible
-                        ? stage_.add_instance(stage_.add_mesh(render::make_cylinder(f(rod.radius), 1)),
+                        ? stage_.add_instance(stage_.add_mesh(render::make_cylinder(to_float(rod.radius), 1)),
                                               material(rod.material, models))
                         : render::InstanceHandle());
   };
@@ -158,14 +155,14 @@ render::Material Picture::material_named(const std::string& name, const ModelLib
   if (it != scene_.materials.end()) {
     m = {.name = it->name,
          .color = it->color.rgba,
-         .metallic = f(it->metallic),
-         .roughness = f(it->roughness),
-         .emission = it->emission.rgb() * f(it->emission_strength),
-         .transmission = f(it->transmission),
-         .refraction = f(it->refraction),
+         .metallic = to_float(it->metallic),
+         .roughness = to_float(it->roughness),
+         .emission = it->emission.rgb() * to_float(it->emission_strength),
+         .transmission = to_float(it->transmission),
+         .refraction = to_float(it->refraction),
          .pattern = it->pattern,
          .pattern_color = it->pattern_color.rgb(),
-         .pattern_scale = f(it->pattern_scale),
+         .pattern_scale = to_float(it->pattern_scale),
          .two_sided = it->two_sided};
     if (!it->texture.empty()) {
       textures.push_back(models.texture(it->texture));
@@ -193,11 +190,11 @@ render::MaterialHandle Picture::cloth_material(const Cloth& cloth, const ModelLi
     fabric.back_color.reset();  // that of another front
     if (const std::optional<FabricLook>& look = it->fabric) {
       fabric = {.weave = look->weave,
-                .thread = f(look->thread),
-                .relief = f(look->relief),
-                .sheen = f(look->sheen),
+                .thread = to_float(look->thread),
+                .relief = to_float(look->relief),
+                .sheen = to_float(look->sheen),
                 .sheen_color = look->sheen_color.rgb(),
-                .translucency = f(look->translucency)};
+                .translucency = to_float(look->translucency)};
       if (look->back_color) fabric.back_color = look->back_color->rgb();
     }
     m = material_named(cloth.material, models, textures);
@@ -217,7 +214,7 @@ void Picture::add_cloth(const Cloth& cloth, const ModelLibrary& models) {
     for (const Eigen::Vector2f& uv : drawn.uvs) box.extend(uv);
     drawn.cloth = stage_.add_cloth({.triangles = drawn.triangles,
                                     .uvs = drawn.uvs,
-                                    .thickness = f(flat.def.thickness),
+                                    .thickness = to_float(flat.def.thickness),
                                     .texture_size = box.sizes().cwiseMax(1e-6f),
                                     .casts_shadow = cloth.casts_shadow},
                                    cloth_material(cloth, models));
@@ -245,7 +242,7 @@ void Picture::add_model(const std::string& file, const Affine3f& body_from_model
 
 template <class Primitive>
 render::MeshHandle Picture::primitive(const Primitive& shape) {
-  render::MeshHandle& mesh = primitives_[key_of(shape)];
+  render::MeshHandle& mesh = primitives_[shape_key(shape)];
   if (!mesh) mesh = stage_.add_mesh(mesh_of(shape));
   return mesh;
 }
@@ -305,7 +302,7 @@ void Picture::add_overlay_lines() {
     overlays_.push_back(std::visit(
         [&]<class O>(const O& o) {
           if constexpr (std::is_base_of_v<LineLook, O>)
-            return stage_.add_lines({.width = f(o.width), .hidden = f(o.hidden)});
+            return stage_.add_lines({.width = to_float(o.width), .hidden = to_float(o.hidden)});
           else
             return render::LinesHandle();
         },
@@ -314,7 +311,7 @@ void Picture::add_overlay_lines() {
 }
 
 float Picture::exposure(double time, float sample_weight) const {
-  const float factor = f(effects::mean(scene_.render.exposure, time));
+  const float factor = to_float(effects::mean(scene_.render.exposure, time));
   return scene_.render.metering == Metering::fixed ? factor
                                                    : factor * render::metered_exposure(sum_, sample_weight);
 }
@@ -324,7 +321,7 @@ render::Channels Picture::channels(const Snapshot& previous, const Snapshot& cur
   place(previous, previous, 1, frame_time);
   stage_.remember();
   place(previous, current, 1, frame_time);
-  return stage_.channels(f(frame_time));
+  return stage_.channels(to_float(frame_time));
 }
 
 render::Image Picture::draw(const Snapshot& previous, const Snapshot& current) {
@@ -334,7 +331,7 @@ render::Image Picture::draw(const Snapshot& previous, const Snapshot& current) {
   for (int i = 0; i < n; ++i) {
     // Sub-frames sit in the middle of equal parts of the time the shutter is open, which ends with the frame.
     const float open =
-        f(scene_.render.shutter) * (1 - (static_cast<float>(i) + 0.5f) / static_cast<float>(n));
+        to_float(scene_.render.shutter) * (1 - (static_cast<float>(i) + 0.5f) / static_cast<float>(n));
     const float w = n == 1 || &previous == &current ? 1 : 1 - open;
     place(previous, current, w, frame_time);
     stage_.draw(render::sample_offsets(i, n), sum_);
@@ -342,7 +339,7 @@ render::Image Picture::draw(const Snapshot& previous, const Snapshot& current) {
   const float weight = 1 / static_cast<float>(n), exposed = exposure(current.time, weight);
   if (scene_.render.bloom > 0)
     render::add_bloom(sum_,
-                      {.strength = f(scene_.render.bloom), .exposure = exposed, .sample_weight = weight});
+                      {.strength = to_float(scene_.render.bloom), .exposure = exposed, .sample_weight = weight});
   render::Image image = render::tone_map(
       sum_, {.curve = scene_.render.tone_curve, .exposure = exposed, .sample_weight = weight});
   if (n == 1) render::filter_edges(image);

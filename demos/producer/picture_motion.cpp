@@ -6,16 +6,13 @@
 #include "effects/distribution.h"
 #include "producer/lights.h"
 #include "producer/picture.h"
+#include "producer/to_float.h"
 
 namespace offstage::producer {
 namespace {
 
 using Eigen::Affine3f;
 using Eigen::Vector3f;
-
-float f(Real value) {
-  return static_cast<float>(value);
-}
 
 Affine3f affine(const BodySample& s) {
   return Eigen::Translation3f(s.position) * s.orientation;
@@ -57,7 +54,7 @@ Vector3f interpolate(const Vector3f& a, const Vector3f& va, const Vector3f& b, c
 
 float Picture::subframe_time() const {
   const int n = subframes(scene_.render.quality);
-  return n == 1 ? 0 : f(scene_.render.shutter / scene_.output.fps) / static_cast<float>(n);
+  return n == 1 ? 0 : to_float(scene_.render.shutter / scene_.output.fps) / static_cast<float>(n);
 }
 
 void Picture::set_balls(std::size_t set, std::span<const render::Point> balls) {
@@ -78,7 +75,7 @@ void Picture::set_balls(std::size_t set, std::span<const render::Point> balls) {
 }
 
 void Picture::place_body(const DrawnBody& body, const Affine3f& world_from_body, double time) {
-  const float explode = body.overlay ? f(effects::mean(body.overlay->explode, time)) : 0;
+  const float explode = body.overlay ? to_float(effects::mean(body.overlay->explode, time)) : 0;
   for (const DrawnPart& part : body.parts)
     stage_.set_transform(
         part.instance, world_from_body * Eigen::Translation3f(explode * part.outwards) * part.body_from_part);
@@ -188,7 +185,7 @@ void Picture::place(const Snapshot& previous, const Snapshot& current, float w, 
   place_overlays(previous, current, w);
   stage_.set_camera(camera_.at(time, places_, samples));
   stage_.set_lamps(lamps_of(scene_, time, places_, samples));
-  stage_.set_time(f(time));
+  stage_.set_time(to_float(time));
 }
 
 }  // namespace offstage::producer

@@ -30,7 +30,7 @@ void erase(Node& node, std::string_view key) {
     std::erase_if(*object, [&](const Member& member) { return member.key == key; });
 }
 
-std::vector<std::string> names_in(const Node* list) {
+std::vector<std::string> preset_names_in(const Node* list) {
   std::vector<std::string> names;
   if (list && list->as<List>())
     for (const Node& item : *list->as<List>()) names.push_back(text_of(item.find("name")));
@@ -106,7 +106,7 @@ class Layer {
     if (!tree) return;
     const std::string part = slash == std::string::npos ? "" : name.substr(slash + 1);
     const Node* emitters = tree->find("emitters");
-    const std::vector<std::string> parts = names_in(emitters);
+    const std::vector<std::string> parts = preset_names_in(emitters);
     const auto it = part.empty() ? parts.begin() : std::ranges::find(parts, part);
     if (it == parts.end())
       return fail(*key, path + "/preset",
@@ -150,8 +150,8 @@ class Layer {
     parts.emitters = add_items(*tree, "emitters", overrides, unused);
     parts.forces = add_items(*tree, "forces", overrides, unused);
     all.push_back(parts);
-    std::vector<std::string> known = names_in(tree->find("emitters"));
-    for (const std::string& force : names_in(tree->find("forces"))) known.push_back(force);
+    std::vector<std::string> known = preset_names_in(tree->find("emitters"));
+    for (const std::string& force : preset_names_in(tree->find("forces"))) known.push_back(force);
     for (const std::string& wrong : unused)
       fail(*overrides->find(wrong), path + "/overrides/" + wrong,
            "the preset '" + name + "' has no such emitter or force" + suggestion(wrong, known));

@@ -82,7 +82,7 @@ void draw_shots(Pipeline& pipeline, const Scene& scene, const ModelLibrary& mode
 }
 
 /// Keeps what a report shows of a frame.
-void keep(const Print& print, double encode_ms, int total, RunStats& stats) {
+void keep_frame(const Print& print, double encode_ms, int total, RunStats& stats) {
   constexpr int kPictures = 12, kWidth_px = 320;
   const Snapshot& state = *print.shot.current;
   stats.figures.push_back({.frame = print.shot.frame,
@@ -122,7 +122,7 @@ void print_frames(Pipeline& pipeline, render::FrameSink& sink, const Scene& scen
     stats.particles = state.point_count();
     stats.most_particles = std::max(stats.most_particles, stats.particles);
     stats.state_hash = stats.frame_states[print->shot.frame] = state.state_hash.hex();
-    if (job.report) keep(*print, encode_ms, total, stats);
+    if (job.report) keep_frame(*print, encode_ms, total, stats);
     if (is_blank(print->image)) stats.blank_frames.push_back(print->shot.frame);
     if (progress)
       progress({.done = stats.frames,
@@ -297,7 +297,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json json_of(const sim::ContactWork& work) {
+Json report_json(const sim::ContactWork& work) {
   return {{"solves", work.solves},
           {"iterations", work.iterations},
           {"factorizations", work.factorizations},
@@ -307,7 +307,7 @@ Json json_of(const sim::ContactWork& work) {
           {"softened", work.softened},
           {"residual", work.residual}};
 }
-Json json_of(const sim::IntegratorReport& report) {
+Json report_json(const sim::IntegratorReport& report) {
   return {{"steps", report.steps},
           {"rejected", report.rejected},
           {"evaluations", report.evaluations},
@@ -333,10 +333,10 @@ void add_contact_figures(const SimulationTotals& t, Json& json) {
   json["joint_error"] = t.joint_error;
   json["joints_unsolved"] = t.joints_unsolved;
   json["broken_joints"] = t.broken_joints;
-  json["exact_solver"] = json_of(t.exact);
-  json["fast_solver"] = json_of(t.fast);
-  json["impact_solver"] = json_of(t.impacts);
-  json["integration"] = json_of(t.integration);
+  json["exact_solver"] = report_json(t.exact);
+  json["fast_solver"] = report_json(t.fast);
+  json["impact_solver"] = report_json(t.impacts);
+  json["integration"] = report_json(t.integration);
 }
 
 Json cloth_figures(const SimulationTotals& t) {

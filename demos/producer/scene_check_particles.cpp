@@ -18,7 +18,7 @@ constexpr Real kMostParticles = 2e7;
 constexpr Real kTolerance = 1.01;  // one that ends and one that begins at the same time are both counted
 constexpr Real kSmallest = 1e-6;   // radius [m]
 
-std::string step(std::size_t i) {
+std::string index_step(std::size_t i) {
   return "/" + std::to_string(i);
 }
 
@@ -27,7 +27,7 @@ Real film_end(const Scene& scene) {
 }
 
 /// The smallest width of a surface; infinite for a model, which is not read here.
-Real width_of(const EmitterSurface& surface) {
+Real spread_of(const EmitterSurface& surface) {
   return std::visit(
       []<class S>(const S& s) {
         if constexpr (std::is_same_v<S, PlaneSurface>)
@@ -86,7 +86,7 @@ class ParticleChecker {
   template <class V>
   void check_ages(const std::vector<std::pair<Real, V>>& ramp, const std::string& path) {
     for (std::size_t i = 1; i < ramp.size(); ++i)
-      if (ramp[i].first < ramp[i - 1].first) fail(path + step(i), "ages must not decrease");
+      if (ramp[i].first < ramp[i - 1].first) fail(path + index_step(i), "ages must not decrease");
   }
   void check_look(const ParticleLook& look, const std::string& path) {
     if (look.style == LookStyle::sphere) {
@@ -107,7 +107,7 @@ class ParticleChecker {
     check_drag(group.behaviour, group.mass, group.where.path);
     for (std::size_t i = 0; i < group.places.size(); ++i)
       if (const auto problem = outside(scene_, group.places[i].position))
-        fail(group.where.path + "/places" + step(i) + "/position", *problem);
+        fail(group.where.path + "/places" + index_step(i) + "/position", *problem);
   }
 
   // --- Emitters ---
@@ -131,7 +131,7 @@ class ParticleChecker {
   }
 
   void check_room(const Emitter& emitter) {
-    const Real room = width_of(emitter.surface), smallest = 2 * effects::lower_bound(emitter.radius);
+    const Real room = spread_of(emitter.surface), smallest = 2 * effects::lower_bound(emitter.radius);
     if (emitter.overlap) return;
     if (smallest > room) {
       fail(emitter.where.path + "/surface",
@@ -152,7 +152,7 @@ class ParticleChecker {
       fail(path + "/end", fmt::format("must be after the start, {} s", emitter.start));
     for (std::size_t i = 0; i < emitter.windows.size(); ++i)
       if (emitter.windows[i].end <= emitter.windows[i].start)
-        fail(path + "/windows" + step(i) + "/end", "must be after the start");
+        fail(path + "/windows" + index_step(i) + "/end", "must be after the start");
     check_count(emitter);
   }
 

@@ -58,7 +58,7 @@ ClothSample cloth_sample(const sim::ClothView& view) {
   return sample;
 }
 
-nlohmann::ordered_json json_of(const Vec3& v) {
+nlohmann::ordered_json stats_json(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
 }
 
@@ -374,11 +374,11 @@ std::string Simulation::state_dump(const sim::NonFinite& lost) const {
     const sim::BodyState s = world_.body(body.handle);
     bodies.push_back(
         {{"name", body.name},
-         {"position", json_of(s.pose.position)},
+         {"position", stats_json(s.pose.position)},
          {"orientation",
           {s.pose.orientation.w(), s.pose.orientation.x(), s.pose.orientation.y(), s.pose.orientation.z()}},
-         {"velocity", json_of(s.velocity)},
-         {"angular_velocity", json_of(s.angular_velocity)}});
+         {"velocity", stats_json(s.velocity)},
+         {"angular_velocity", stats_json(s.angular_velocity)}});
   }
   auto& systems = dump["particles"] = nlohmann::ordered_json::array();
   world_.for_each_particle_system([&](sim::ParticleSystemHandle handle) {

@@ -13,7 +13,7 @@ namespace {
 using Eigen::Vector3f;
 using Eigen::Vector4f;
 
-constexpr FileKind kKind = {"offsnap", 3, "snapshot"};
+constexpr FileKind kSnapshotKind = {"offsnap", 3, "snapshot"};
 
 constexpr std::size_t kBodyBytes = 7 * sizeof(float);
 constexpr std::size_t kRodBytes = 6 * sizeof(float);
@@ -30,14 +30,14 @@ void put(ByteWriter& out, const std::vector<uint32_t>& values) {
   for (const uint32_t v : values) out.put(v);
 }
 template <class T>
-void take(ByteReader& in, std::vector<T>& values) {
+void take_bytes(ByteReader& in, std::vector<T>& values) {
   values.resize(in.take_count(sizeof(T)));
   for (T& v : values) v = in.take<T>();
 }
 
 void write_manifest(const std::filesystem::path& folder, const std::string& key, int frames, bool complete) {
   const nlohmann::ordered_json manifest = {
-      {"offstage_cache", kKind.version}, {"key", key}, {"frames", frames}, {"complete", complete}};
+      {"offstage_cache", kSnapshotKind.version}, {"key", key}, {"frames", frames}, {"complete", complete}};
   const std::string text = manifest.dump(2) + "\n";
   render::write_file_atomically(folder / "cache.json",
                                 {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
@@ -98,11 +98,11 @@ std::vector<uint8_t> serialize(const Snapshot& snapshot) {
     }
   }
 
-  return pack(kKind, out.bytes());
+  return pack(kSnapshotKind, out.bytes());
 }
 
 Snapshot deserialize(std::span<const uint8_t> bytes, const std::string& source) {
-  const std::vector<uint8_t> payload = unpack(kKind, bytes, source);
+  const std::vector<uint8_t> payload = unpack(kSnapshotKind, bytes, source);
   ByteReader in(payload, source);
   Snapshot snapshot;
   snapshot.frame = in.take<int>();
@@ -134,11 +134,11 @@ Snapshot deserialize(std::span<const uint8_t> bytes, const std::string& source) 
   }
   snapshot.cloths.resize(in.take_count(kClothBytes));
   for (ClothSample& cloth : snapshot.cloths) {
-    take(in, cloth.points);
-    take(in, cloth.velocities);
+    take_bytes(in, cloth.points);
+    take_bytes(in, cloth.velocities);
     cloth.version = in.take<uint32_t>();
-    take(in, cloth.triangles);
-    take(in, cloth.sources);
+    take_bytes(in, cloth.triangles);
+    take_bytes(in, cloth.sources);
   }
   snapshot.overlays.resize(in.take_count(sizeof(uint64_t)));
   for (LineSet& set : snapshot.overlays) {
@@ -184,7 +184,7 @@ void SnapshotCache::check(const std::string& key, int frames) const {
                             folder_.string());
   const std::vector<uint8_t> bytes = read_file(path);
   const auto manifest = nlohmann::json::parse(bytes.begin(), bytes.end(), nullptr, false);
-  if (!manifest.is_object() || manifest.value("offstage_cache", 0u) != kKind.version)
+  if (!manifest.is_object() || manifest.value("offstage_cache", 0u) != kSnapshotKind.version)
     throw render::FileError(path.string() + ": not a cache of this version; simulate again");
   if (!manifest.value("complete", false))
     throw render::FileError(folder_.string() +

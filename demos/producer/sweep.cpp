@@ -17,7 +17,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-[[noreturn]] void refuse(const std::string& text, const std::string& what) {
+[[noreturn]] void refuse_sweep(const std::string& text, const std::string& what) {
   throw std::invalid_argument("--vary " + text + ": " + what);
 }
 
@@ -55,16 +55,16 @@ std::optional<std::vector<std::string>> range(const std::string& text, const std
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const std::optional<double> number = i < numbers.size() ? to_number(parts[i]) : std::nullopt;
     if (!number || parts.size() != numbers.size())
-      refuse(text, "a range is a:b:step with three numbers, such as 100:400:50");
+      refuse_sweep(text, "a range is a:b:step with three numbers, such as 100:400:50");
     numbers[i] = *number;
   }
   const auto [first, last, step] = numbers;
   if (step == 0 || (last - first) * step < 0)
-    refuse(text, "the step does not lead from the first to the last value");
+    refuse_sweep(text, "the step does not lead from the first to the last value");
   constexpr double kSlack = 1e-9;  // of a step: 0:1:0.1 has 11 values
   const double steps = std::floor((last - first) / step + kSlack);
   if (!(steps < static_cast<double>(kMostCombinations)))
-    refuse(text, fmt::format("has {:.0f} values; at most {} runs are made", steps + 1, kMostCombinations));
+    refuse_sweep(text, fmt::format("has {:.0f} values; at most {} runs are made", steps + 1, kMostCombinations));
   std::vector<std::string> all;
   constexpr double kZero = 1e-12;  // of a step: what rounding leaves of 0 in -1:1:0.1
   for (int i = 0; i <= static_cast<int>(steps); ++i) {
@@ -103,14 +103,14 @@ std::string cell(const std::string& text) {
 Variation parse_variation(const std::string& text) {
   const std::size_t equals = text.find('=');
   if (equals == 0 || equals == std::string::npos)
-    refuse(text, "must be path=a:b:step or path=x,y,z, such as emitters.0.rate=100:400:50");
+    refuse_sweep(text, "must be path=a:b:step or path=x,y,z, such as emitters.0.rate=100:400:50");
   const std::string values = text.substr(equals + 1);
   Variation variation{text.substr(0, equals), {}};
   if (const auto numbers = range(text, values))
     variation.values = *numbers;
   else
     variation.values = split_outside(values, ',');
-  if (std::ranges::find(variation.values, "") != variation.values.end()) refuse(text, "has an empty value");
+  if (std::ranges::find(variation.values, "") != variation.values.end()) refuse_sweep(text, "has an empty value");
   return variation;
 }
 

@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 constexpr std::chrono::milliseconds kPollingInterval{250};
 
 /// The bytes of a regular file, or nothing.
-std::string bytes_of(const fs::path& file) {
+std::string file_bytes(const fs::path& file) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return {};
   std::ifstream in(file, std::ios::binary);
@@ -88,11 +88,11 @@ std::vector<std::string> names_in_obj(const std::string& text) {
   return names;
 }
 
-std::vector<std::string> names_in(const fs::path& file) {
+std::vector<std::string> included_names(const fs::path& file) {
   std::string ending = file.extension().string();
   std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
-  if (ending == ".json" || ending == ".gltf") return strings_in_json(bytes_of(file), file);
-  if (ending == ".obj" || ending == ".mtl") return names_in_obj(bytes_of(file));
+  if (ending == ".json" || ending == ".gltf") return strings_in_json(file_bytes(file), file);
+  if (ending == ".obj" || ending == ".mtl") return names_in_obj(file_bytes(file));
   return {};
 }
 
@@ -114,7 +114,7 @@ std::set<fs::path> files_of_scene(const fs::path& scene, const std::vector<std::
     const fs::path file = unread.back();
     unread.pop_back();
     // Models are named relative to the scene even where an include names them, includes to their own file.
-    for (const std::string& name : names_in(file))
+    for (const std::string& name : included_names(file))
       for (const fs::path& folder : {file.parent_path(), scene.parent_path()}) add(name, folder);
   }
   return files;
@@ -123,7 +123,7 @@ std::set<fs::path> files_of_scene(const fs::path& scene, const std::vector<std::
 std::string contents_hash(const std::set<fs::path>& files) {
   std::string hashes;
   for (const fs::path& file : files)
-    hashes += file.string() + (fs::exists(file) ? " is " + text_hash(bytes_of(file)) : " is missing") + "\n";
+    hashes += file.string() + (fs::exists(file) ? " is " + text_hash(file_bytes(file)) : " is missing") + "\n";
   return text_hash(hashes);
 }
 

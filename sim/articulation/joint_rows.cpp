@@ -6,7 +6,7 @@
 namespace offstage::sim {
 namespace {
 
-Vec6 join(const Vec3& linear, const Vec3& angular) {
+Vec6 concatenate(const Vec3& linear, const Vec3& angular) {
   Vec6 v;
   v << linear, angular;
   return v;
@@ -19,7 +19,7 @@ JointRow slide_row(const JointPlace& p, const Vec3& t) {
   const Vec3 s = p.arm_b + p.apart;
   const Vec3 &wa = p.a.angular_velocity, &wb = p.b.angular_velocity;
   const Vec3 turning = wa.cross(p.arm_a), seen = p.a.velocity + turning - p.b.velocity - wb.cross(s);
-  return {join(t, p.arm_a.cross(t)), join(-t, -s.cross(t)), t.dot(p.apart),
+  return {concatenate(t, p.arm_a.cross(t)), concatenate(-t, -s.cross(t)), t.dot(p.apart),
           t.dot(wa.cross(turning) - wb.cross(wb.cross(s)) - 2 * wb.cross(seen))};
 }
 
@@ -45,7 +45,7 @@ void add_meeting_rows(const JointPlace& p, JointRows& rows) {
 JointRow perpendicular_row(const JointPlace& p, const Vec3& u, const Vec3& v) {
   const Vec3 n = u.cross(v), &wa = p.a.angular_velocity, &wb = p.b.angular_velocity;
   const Vec3 n_rate = wa.cross(u).cross(v) + u.cross(wb.cross(v));
-  return {join(Vec3::Zero(), n), join(Vec3::Zero(), -n), u.dot(v), n_rate.dot(wa - wb)};
+  return {concatenate(Vec3::Zero(), n), concatenate(Vec3::Zero(), -n), u.dot(v), n_rate.dot(wa - wb)};
 }
 
 /// |anchor a - anchor b| = length.
@@ -56,7 +56,7 @@ JointRow length_row(const JointPlace& p, Real length) {
   const Vec3 turning_a = wa.cross(p.arm_a), turning_b = wb.cross(p.arm_b);
   const Vec3 rate = p.a.velocity + turning_a - p.b.velocity - turning_b;
   const Real across = rate.squaredNorm() - std::pow(n.dot(rate), 2);
-  return {join(n, p.arm_a.cross(n)), join(-n, -p.arm_b.cross(n)), now - length,
+  return {concatenate(n, p.arm_a.cross(n)), concatenate(-n, -p.arm_b.cross(n)), now - length,
           n.dot(wa.cross(turning_a) - wb.cross(turning_b)) + (now > 0 ? across / now : 0)};
 }
 
@@ -121,7 +121,7 @@ void set_joint_rows(const JointDef& def, const JointPlace& p, Real length, Joint
 }
 
 JointRow turning_row(const Vec3& axis) {
-  return {join(Vec3::Zero(), axis), join(Vec3::Zero(), -axis)};
+  return {concatenate(Vec3::Zero(), axis), concatenate(Vec3::Zero(), -axis)};
 }
 
 JointRow free_row(JointType type, const JointPlace& p, Real length) {

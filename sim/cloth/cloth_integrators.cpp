@@ -11,7 +11,7 @@ constexpr int kMaxIterations = 300;
 /// Of the residual against the right side, in the preconditioner's norm, squared.
 constexpr Real kTolerance2 = 1e-12;
 
-using Run = std::vector<Vec4>;
+using SpringRun = std::vector<Vec4>;
 
 bool is_held(const ClothPoints& points, std::size_t i) {
   return !(points.inverse_mass[i] > 0);
@@ -23,7 +23,7 @@ Vec4 held_velocity(const ClothPoints& points, std::size_t i, Real h) {
 }
 
 /// Accelerations at positions and velocities of a run; 0 of what is held.
-void accelerate(const ClothPoints& points, const ClothRange& cloth, const Run& x, const Run& v, Run& a) {
+void accelerate(const ClothPoints& points, const ClothRange& cloth, const SpringRun& x, const SpringRun& v, SpringRun& a) {
   std::fill(a.begin(), a.end(), Vec4::Zero());
   for (const ClothSpring& s : cloth.springs) {
     const std::size_t i = s.a - cloth.begin, j = s.b - cloth.begin;
@@ -43,7 +43,7 @@ void accelerate(const ClothPoints& points, const ClothRange& cloth, const Run& x
 }
 
 /// What springs do to what is held, over the time h.
-void pass_on(ClothPoints& points, const ClothRange& cloth, const Run& x, const Run& v, Real h, Real dt) {
+void pass_on(ClothPoints& points, const ClothRange& cloth, const SpringRun& x, const SpringRun& v, Real h, Real dt) {
   for (const ClothSpring& s : cloth.springs) {
     const bool a = is_held(points, s.a), b = is_held(points, s.b);
     if (a == b) continue;
@@ -60,7 +60,7 @@ void pass_on(ClothPoints& points, const ClothRange& cloth, const Run& x, const R
 }
 
 /// Where a run starts, with the velocity of what is held.
-void begin(const ClothPoints& points, const ClothRange& cloth, Real h, Run& x, Run& v) {
+void begin(const ClothPoints& points, const ClothRange& cloth, Real h, SpringRun& x, SpringRun& v) {
   x.assign(points.start.begin() + static_cast<std::ptrdiff_t>(cloth.begin),
            points.start.begin() + static_cast<std::ptrdiff_t>(cloth.end));
   v.resize(x.size());
@@ -95,7 +95,7 @@ class ImplicitSystem {
   }
 
   /// y = A p, 0 where held.
-  void multiply(const Run& p, Run& y) const {
+  void multiply(const SpringRun& p, SpringRun& y) const {
     for (std::size_t i = 0; i < p.size(); ++i) y[i] = points_.mass[cloth_.begin + i] * p[i];
     for (std::size_t k = 0; k < links_.size(); ++k) {
       const ClothSpring& s = cloth_.springs[k];
@@ -110,7 +110,7 @@ class ImplicitSystem {
   }
 
   /// What the springs do to what is held, when all move with v through the step.
-  void pass_on(ClothPoints& points, const Run& v, Real h) const {
+  void pass_on(ClothPoints& points, const SpringRun& v, Real h) const {
     for (std::size_t k = 0; k < links_.size(); ++k) {
       const ClothSpring& s = cloth_.springs[k];
       const Link& link = links_[k];
@@ -122,13 +122,13 @@ class ImplicitSystem {
     }
   }
 
-  void precondition(const Run& r, Run& z) const {
+  void precondition(const SpringRun& r, SpringRun& z) const {
     for (std::size_t i = 0; i < r.size(); ++i) z[i] = padded(block_[i] * r[i].head<3>());
   }
 
   /// M v + h (spring forces + M a), 0 where held.
-  Run right_side(const Run& v, Real h) const {
-    Run b(v.size());
+  SpringRun right_side(const SpringRun& v, Real h) const {
+    SpringRun b(v.size());
     for (std::size_t i = 0; i < b.size(); ++i) {
       const std::size_t k = cloth_.begin + i;
       b[i] = points_.mass[k] * (v[i] + h * points_.acceleration[k]);
@@ -148,7 +148,7 @@ class ImplicitSystem {
     Real along, across, force;
   };
 
-  void clear_held(Run& y) const {
+  void clear_held(SpringRun& y) const {
     for (std::size_t i = 0; i < y.size(); ++i)
       if (is_held(points_, cloth_.begin + i)) y[i].setZero();
   }
@@ -159,21 +159,21 @@ class ImplicitSystem {
   std::vector<Mat3> block_;  // inverse
 };
 
-Real dot(const Run& a, const Run& b) {
+Real dot(const SpringRun& a, const SpringRun& b) {
   Real sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += a[i].dot(b[i]);
   return sum;
 }
 
 /// Preconditioned conjugate gradients from a guess v, whose held points keep it.
-bool solve(const ImplicitSystem& system, const Run& b, Run& v) {
-  Run r(v.size()), z(v.size()), y(v.size());
+bool solve(const ImplicitSystem& system, const SpringRun& b, SpringRun& v) {
+  SpringRun r(v.size()), z(v.size()), y(v.size());
   system.multiply(v, y);
   for (std::size_t i = 0; i < r.size(); ++i) r[i] = b[i] - y[i];
   system.precondition(b, z);
   const Real enough = kTolerance2 * dot(b, z);
   system.precondition(r, z);
-  Run p = z;
+  SpringRun p = z;
   Real rz = dot(r, z);
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
     if (!(rz > enough)) return true;
@@ -194,9 +194,9 @@ bool solve(const ImplicitSystem& system, const Run& b, Run& v) {
 }  // namespace
 
 void step_symplectic(ClothPoints& points, const ClothRange& cloth, Real h) {
-  Run x, v;
+  SpringRun x, v;
   begin(points, cloth, h, x, v);
-  Run a(x.size());
+  SpringRun a(x.size());
   accelerate(points, cloth, x, v, a);
   pass_on(points, cloth, x, v, h, h);
   for (std::size_t i = 0; i < x.size(); ++i)
@@ -204,11 +204,11 @@ void step_symplectic(ClothPoints& points, const ClothRange& cloth, Real h) {
 }
 
 void step_rk4(ClothPoints& points, const ClothRange& cloth, Real h, std::span<Vec4> kick) {
-  Run x, v;
+  SpringRun x, v;
   begin(points, cloth, h, x, v);
   const std::size_t n = x.size();
   const std::array<Real, 4> at = {0, h / 2, h / 2, h}, share = {h / 6, h / 3, h / 3, h / 6};
-  Run dx(v), dv(n, Vec4::Zero()), stage_x(n), stage_v(n), move(n, Vec4::Zero()), gain(n, Vec4::Zero());
+  SpringRun dx(v), dv(n, Vec4::Zero()), stage_x(n), stage_v(n), move(n, Vec4::Zero()), gain(n, Vec4::Zero());
   for (std::size_t k = 0; k < 4; ++k) {
     for (std::size_t i = 0; i < n; ++i) {
       stage_x[i] = x[i] + at[k] * dx[i];
@@ -231,10 +231,10 @@ void step_rk4(ClothPoints& points, const ClothRange& cloth, Real h, std::span<Ve
 }
 
 bool step_implicit(ClothPoints& points, const ClothRange& cloth, Real h) {
-  Run x, v;
+  SpringRun x, v;
   begin(points, cloth, h, x, v);
   const ImplicitSystem system(points, cloth, h);
-  const Run b = system.right_side(v, h);
+  const SpringRun b = system.right_side(v, h);
   const bool converged = solve(system, b, v);
   system.pass_on(points, v, h);
   for (std::size_t i = 0; i < x.size(); ++i)

@@ -19,7 +19,7 @@ constexpr std::size_t kFew = 3;
 /// What is near at rest in the cloth itself, is not pushed farther apart than this share of it.
 constexpr Real kRestShare = 0.8;
 /// Share of an overlap that is taken back per sub-step, so that layers do not fly apart.
-constexpr Real kRecovery = 0.05;
+constexpr Real kSelfRecovery = 0.05;
 /// What must be left of the distance, so that there always is a plane between. What is nearer than this share
 /// of its thickness comes no nearer: else its distance would soon be lost in rounding, and its side with it.
 constexpr Real kLeft = 0.1, kNearest = 0.02;
@@ -301,7 +301,7 @@ void SelfContacts::solve(ClothPoints& points) {
       mobility += c.weights[k] * c.weights[k] * points.inverse_mass[i];
     }
     const Real kept = c.distance >= pair.thickness ? pair.thickness
-                                                   : c.distance + kRecovery * (pair.thickness - c.distance);
+                                                   : c.distance + kSelfRecovery * (pair.thickness - c.distance);
     const Real push = kept - c.normal.dot(apart);
     if (!(push > 0) || !(mobility > 0)) continue;
     ++active_[points.cloth[pair.points[0]]];

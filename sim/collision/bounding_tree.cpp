@@ -83,7 +83,7 @@ template <class Volume>
 BoundingTree<Volume>::BoundingTree(std::span<const Aabb> boxes,
                                    TreeSplit split) requires std::same_as<Volume, Aabb> {
   build(box_items(boxes), split);
-  refit(boxes);
+  if constexpr (std::same_as<Volume, Aabb>) refit(boxes);
 }
 
 template <class Volume>
@@ -102,7 +102,8 @@ void BoundingTree<Volume>::refit(const TriangleMesh& mesh) {
 
 template <class Volume>
 void BoundingTree<Volume>::refit(std::span<const Aabb> boxes) requires std::same_as<Volume, Aabb> {
-  fit_boxes(*this, nodes_, [&](uint32_t i) -> const Aabb& { return boxes[i]; });
+  if constexpr (std::same_as<Volume, Aabb>)
+    fit_boxes(*this, nodes_, [&](uint32_t i) -> const Aabb& { return boxes[i]; });
 }
 
 template <class Volume>

@@ -11,7 +11,6 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 /// Sine: edges less inclined span no axis of their own; leaving it out is wrong by as much of their length.
 constexpr Real kNoAxis = 1e-10;
 /// Of the sizes: how far rounding may put the crossing of two edges, or the gap along their common

@@ -103,7 +103,7 @@ void BroadPhase::search(std::size_t jobs, Find&& find) {
   block_count_ += jobs;
   if (blocks_.size() < block_count_) blocks_.resize(block_count_);
   tbb::parallel_for(std::size_t{0}, jobs, [&](std::size_t job) {
-    Candidates& block = blocks_[first + job];
+    CandidatePairs& block = blocks_[first + job];
     block.meeting.clear();
     block.doubtful.clear();
     block.compared = 0;
@@ -116,7 +116,7 @@ void BroadPhase::search(std::size_t jobs, Find&& find) {
 
 void BroadPhase::find_among_moving() {
   for (const CellTable& table : moving_.tables())
-    search(jobs_of(table.bucket_count()), [&](uint32_t job, Candidates& out) {
+    search(jobs_of(table.bucket_count()), [&](uint32_t job, CandidatePairs& out) {
       table.find_pairs(job * kJob, std::min((job + 1) * kJob, table.bucket_count()), out);
     });
 }
@@ -127,7 +127,7 @@ void BroadPhase::find_with_resting() {
   for (std::size_t level = 0; level < moving_.tables().size(); ++level) {
     const CellTable &moving = moving_.tables()[level], &resting = resting_.tables()[level];
     if (!moving.built() || !resting.built()) continue;
-    search(jobs_of(moving.bucket_count()), [&](uint32_t job, Candidates& out) {
+    search(jobs_of(moving.bucket_count()), [&](uint32_t job, CandidatePairs& out) {
       moving.find_pairs_with(resting, job * kJob, std::min((job + 1) * kJob, moving.bucket_count()), out);
       std::erase_if(out.meeting, has_left);
       std::erase_if(out.doubtful, has_left);
@@ -140,7 +140,7 @@ void BroadPhase::find_large() {
   const auto size = static_cast<uint32_t>(states_.size());
   const auto is_large = [&](uint32_t i) { return sizes_.level(boxes_[i]) == CellSizes::kNone; };
   if (!moving_.large().empty())
-    search(jobs_of(size), [&](uint32_t job, Candidates& out) {
+    search(jobs_of(size), [&](uint32_t job, CandidatePairs& out) {
       for (uint32_t i = job * kJob; i < std::min((job + 1) * kJob, size); ++i)
         for (const uint32_t large : moving_.large())
           if (contains(i) && i != large && (i < large || is_settled(i) || !is_large(i)))
@@ -148,7 +148,7 @@ void BroadPhase::find_large() {
     });
   const auto ranges = moving_.ranges();
   if (!resting_.large().empty())
-    search(jobs_of(ranges.size()), [&](uint32_t job, Candidates& out) {
+    search(jobs_of(ranges.size()), [&](uint32_t job, CandidatePairs& out) {
       for (std::size_t i = job * kJob; i < std::min<std::size_t>((job + 1) * kJob, ranges.size()); ++i)
         for (const uint32_t large : resting_.large())
           if (is_settled(large)) out.doubtful.push_back(ordered(ranges[i].object, large));
@@ -157,17 +157,17 @@ void BroadPhase::find_large() {
 
 /// Sorts what was found, by counting, and merges it with the remembered pairs of settled objects.
 void BroadPhase::collect() {
-  const std::span<const Candidates> blocks(blocks_.data(), block_count_);
+  const std::span<const CandidatePairs> blocks(blocks_.data(), block_count_);
   // Counted two places up: placing the pairs of a then moves begin_[a + 1] from where they begin to where
   // they end.
   begin_.assign(states_.size() + 2, 0);
-  for (const Candidates& block : blocks) {
+  for (const CandidatePairs& block : blocks) {
     work_.compared += block.compared;
     for (const IndexPair& p : block.meeting) ++begin_[p.a + 2];
   }
   std::inclusive_scan(begin_.begin(), begin_.end(), begin_.begin());
   found_.resize(begin_.back());
-  for (const Candidates& block : blocks)
+  for (const CandidatePairs& block : blocks)
     for (const IndexPair& p : block.meeting) found_[begin_[p.a + 1]++] = p;
   tbb::parallel_for(std::size_t{0}, states_.size(), [&](std::size_t a) {
     std::sort(found_.begin() + begin_[a], found_.begin() + begin_[a + 1]);

@@ -67,7 +67,7 @@ class BroadPhase {
   Grid moving_, resting_;            // of the unsettled and of the settled objects
   std::size_t in_vain_ = 0;          // objects entered in vain since the last settling
 
-  std::vector<Candidates> blocks_;  // of parallel jobs
+  std::vector<CandidatePairs> blocks_;  // of parallel jobs
   std::size_t block_count_ = 0;
   std::vector<IndexPair> pairs_, found_, merged_;
   std::vector<uint32_t> begin_;  // of the pairs of each object in found_

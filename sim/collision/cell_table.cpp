@@ -11,17 +11,17 @@ namespace {
 
 namespace stdx = std::experimental;
 using Half = stdx::simd<float, stdx::simd_abi::deduce_t<float, 4>>;
-using Lanes = stdx::simd<float, stdx::simd_abi::deduce_t<float, 8>>;
+using CellLanes = stdx::simd<float, stdx::simd_abi::deduce_t<float, 8>>;
 
 constexpr uint32_t kAllAxes = 7;
 constexpr std::size_t kMinBuckets = 1024;
 
-Lanes lanes(const CellBox& box) {
-  return Lanes(box.bound.data(), stdx::vector_aligned);
+CellLanes lanes(const CellBox& box) {
+  return CellLanes(box.bound.data(), stdx::vector_aligned);
 }
 
 /// What the lanes of another box must not exceed for it to meet this one.
-Lanes limits(const CellBox& box) {
+CellLanes limits(const CellBox& box) {
   const Half low(box.bound.data(), stdx::vector_aligned),
       minus_high(box.bound.data() + 4, stdx::vector_aligned);
   return stdx::concat(-minus_high, -low);
@@ -141,10 +141,10 @@ void CellTable::enter(std::span<const CellRange> objects, std::size_t own_copies
 /// Compares a copy with the copies [first, end). To write down every index and count the right ones alone
 /// spares a branch that cannot be foretold.
 void CellTable::compare(const CellBox& box, uint32_t object, uint32_t first, uint32_t end,
-                        Candidates& out) const {
+                        CandidatePairs& out) const {
   constexpr uint32_t kBlock = 128;
   constexpr int kCellLanes = 2;
-  const Lanes limit = limits(box);
+  const CellLanes limit = limits(box);
   out.compared += end - first;
   std::array<uint32_t, kBlock> hits;
   for (; first < end; first += kBlock) {
@@ -164,13 +164,13 @@ void CellTable::compare(const CellBox& box, uint32_t object, uint32_t first, uin
   }
 }
 
-void CellTable::find_pairs(uint32_t first, uint32_t end, Candidates& out) const {
+void CellTable::find_pairs(uint32_t first, uint32_t end, CandidatePairs& out) const {
   for (uint32_t b = first; b < end; ++b)
     for (uint32_t i = begin_[b]; i < own_end_[b]; ++i)
       compare(boxes_[i], copies_[i].object, i + 1, begin_[b + 1], out);
 }
 
-void CellTable::find_pairs_with(const CellTable& other, uint32_t first, uint32_t end, Candidates& out) const {
+void CellTable::find_pairs_with(const CellTable& other, uint32_t first, uint32_t end, CandidatePairs& out) const {
   for (uint32_t b = first; b < end; ++b)
     for (uint32_t i = begin_[b]; i < begin_[b + 1]; ++i) {
       const uint32_t bucket = copies_[i].hash & other.mask_;

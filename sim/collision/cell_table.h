@@ -28,7 +28,7 @@ struct alignas(32) CellBox {
 };
 
 /// Pairs in the order in which they were found.
-struct Candidates {
+struct CandidatePairs {
   std::vector<IndexPair> meeting;   ///< their boxes meet
   std::vector<IndexPair> doubtful;  ///< they meet in single precision
   std::size_t compared = 0;         ///< boxes compared to find them
@@ -74,10 +74,10 @@ class CellTable {
   std::size_t copies() const { return copies_.size(); }
 
   /// Adds the pairs of the buckets [first, end).
-  void find_pairs(uint32_t first, uint32_t end, Candidates& out) const;
+  void find_pairs(uint32_t first, uint32_t end, CandidatePairs& out) const;
   /// Adds the pairs of what is in the buckets [first, end) with what is in the same level's table of other
   /// objects.
-  void find_pairs_with(const CellTable& other, uint32_t first, uint32_t end, Candidates& out) const;
+  void find_pairs_with(const CellTable& other, uint32_t first, uint32_t end, CandidatePairs& out) const;
 
  private:
   /// What is to be entered.
@@ -95,7 +95,7 @@ class CellTable {
   template <class Needed>
   void list(std::span<const CellRange> objects, std::size_t first, std::size_t end, Needed&& needed);
   void enter(std::span<const CellRange> objects, std::size_t own_copies);
-  void compare(const CellBox& box, uint32_t object, uint32_t first, uint32_t end, Candidates& out) const;
+  void compare(const CellBox& box, uint32_t object, uint32_t first, uint32_t end, CandidatePairs& out) const;
   bool has_own(uint32_t bucket) const { return own_end_[bucket] > begin_[bucket]; }
 
   int32_t level_ = 0;

@@ -9,7 +9,7 @@ namespace {
 constexpr Real kCells = 96;  // along the longest side
 constexpr int kPadding = 3;  // cells around the mesh, of which rounding may take one
 constexpr uint8_t kUnknown = 255, kOutside = 254;
-constexpr Real kRounding = 1e-9;  // of a cell
+constexpr Real kClearRounding = 1e-9;  // of a cell
 
 Aabb bounds(const TriangleMesh& mesh) {
   Aabb box;
@@ -74,7 +74,7 @@ void ClearCells::mark(const std::array<Vec3, 3>& triangle, std::vector<Cell>& su
       pieces.push_back({middle, b, c});
       continue;
     }
-    const Vec3 margin = Vec3::Constant(kRounding * cell_);
+    const Vec3 margin = Vec3::Constant(kClearRounding * cell_);
     const Cell low = cell_of(t[0].cwiseMin(t[1]).cwiseMin(t[2]) - margin),
                high = cell_of(t[0].cwiseMax(t[1]).cwiseMax(t[2]) + margin);
     for (int z = low[2]; z <= high[2]; ++z)

@@ -9,7 +9,6 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 
 using Vec2 = Eigen::Vector2d;
 

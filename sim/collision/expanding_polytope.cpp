@@ -8,15 +8,14 @@ namespace {
 
 constexpr std::size_t kMaxPoints = 128;
 constexpr std::size_t kMaxFaces = 2 * kMaxPoints;  // a closed surface of n points has 2 n - 4 triangles
-constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
-constexpr Real kTolerance = 64;           // in roundings of a point: of heights over a face
+constexpr Real kHeightTolerance = 64;           // in roundings of a point: of heights over a face
 constexpr Real kCurvedTolerance = 1e-10;  // of the size
 constexpr Real kDeep = 1e-6;              // of the size: depth from which a point tells the direction
-constexpr Real kAccepted = 1e-9;  // of the size: an early end with this gap of its bounds is an answer
+constexpr Real kAcceptedGap = 1e-9;  // of the size: an early end with this gap of its bounds is an answer
 
 using Index = uint16_t;
 
-struct Face {
+struct PolytopeFace {
   std::array<Index, 3> corner;     ///< counter-clockwise from outside
   std::array<Index, 3> neighbour;  ///< across the edge from corner k to the next
   Vec3 normal;                     ///< unit, outward
@@ -41,7 +40,7 @@ class ExpandingPolytope {
       : m_(m),
         rounding_(m.rounding()),
         size_(rounding_ / std::numeric_limits<Real>::epsilon()),
-        tolerance_(m.has_vertices() ? kTolerance * rounding_ : kCurvedTolerance * size_) {
+        tolerance_(m.has_vertices() ? kHeightTolerance * rounding_ : kCurvedTolerance * size_) {
     std::copy_n(tetrahedron.points.begin(), 4, points_.begin());
     const Vec3& p = points_[0].w;
     if ((points_[1].w - p).cross(points_[2].w - p).dot(points_[3].w - p) > 0)
@@ -61,7 +60,7 @@ class ExpandingPolytope {
     DeepestPoint best{.normal = Vec3::UnitY(), .distance = -kInfinity, .on_a = Vec3::Zero()};
     for (int iterations = 0;; ++iterations) {
       const Index nearest = nearest_face();
-      const Face& face = faces_[nearest];
+      const PolytopeFace& face = faces_[nearest];
       if (face.key == kInfinity) return best;  // nothing but slivers is left
       const SupportPoint p = m_.lowest(-face.normal, points_[face.corner[0]].from);
       const Real height = face.normal.dot(p.w), gap = height - face.offset;
@@ -75,12 +74,12 @@ class ExpandingPolytope {
  private:
   /// The depth along a face's normal. Rounding can leave faces nearly in one plane of which none is under the
   /// origin; then the edge nearest to it is, and on a deep one the direction is that of its point.
-  DeepestPoint answer(const Face& face, Real height, Simplex& corners) const {
+  DeepestPoint answer(const PolytopeFace& face, Real height, Simplex& corners) const {
     corners.size = 3;
     for (std::size_t k = 0; k < 3; ++k) corners.points[k] = points_[face.corner[k]];
     const SimplexPoint foot = nearest_point(corners);
     const Real depth = std::sqrt(foot.squared);
-    const bool converged = height - face.offset <= kAccepted * size_;
+    const bool converged = height - face.offset <= kAcceptedGap * size_;
     const bool beside = foot.size < 3 && face.offset > 0 && depth > kDeep * size_;
     return {.normal = beside ? Vec3(-foot.v / depth) : Vec3(-face.normal),
             .distance = beside ? -depth : -height,
@@ -101,7 +100,7 @@ class ExpandingPolytope {
       Index best = 0;
       for (std::size_t f = 1; f < face_count_; ++f)
         if (faces_[f].key < faces_[best].key) best = static_cast<Index>(f);
-      Face& face = faces_[best];
+      PolytopeFace& face = faces_[best];
       if (face.is_key_exact || face.key == kInfinity || face.offset < -face.slack) return best;
       const SimplexPoint foot = nearest_on_triangle(w(face.corner[0]), w(face.corner[1]), w(face.corner[2]));
       if (foot.size < 3) face.key = std::sqrt(foot.squared);
@@ -111,7 +110,7 @@ class ExpandingPolytope {
 
   const Vec3& w(Index i) const { return points_[i].w; }
 
-  void set_face(Face& f, const std::array<Index, 3>& corner) {
+  void set_face(PolytopeFace& f, const std::array<Index, 3>& corner) {
     f.corner = corner;
     f.alive = true;
     const Vec3 &p = w(corner[0]), e = w(corner[1]) - p, g = w(corner[2]) - p, n = e.cross(g);
@@ -158,7 +157,7 @@ class ExpandingPolytope {
   /// Coming over an edge into a face: kept, and then the edge is part of the outline, or removed with what is
   /// behind it.
   void visit(Edge e, const Vec3& p) {
-    const Face& f = faces_[e.face];
+    const PolytopeFace& f = faces_[e.face];
     if (!f.alive) return;
     if (f.normal.dot(p) <= f.offset) {
       horizon_[horizon_size_++] = e;
@@ -185,8 +184,8 @@ class ExpandingPolytope {
       slot[k] = dead_size_ > 0 ? dead_[--dead_size_] : static_cast<Index>(face_count_++);
     for (std::size_t k = 0; k < horizon_size_; ++k) {
       const Edge e = horizon_[k];
-      Face& kept = faces_[e.face];
-      Face& f = faces_[slot[k]];
+      PolytopeFace& kept = faces_[e.face];
+      PolytopeFace& f = faces_[slot[k]];
       const Index before = slot[k == 0 ? horizon_size_ - 1 : k - 1],
                   after = slot[k + 1 == horizon_size_ ? 0 : k + 1];
       kept.neighbour[e.side] = slot[k];
@@ -200,7 +199,7 @@ class ExpandingPolytope {
   Real rounding_, size_, tolerance_;
   std::size_t point_count_ = 0, face_count_ = 0, horizon_size_ = 0, dead_size_ = 0;
   std::array<SupportPoint, kMaxPoints> points_;
-  std::array<Face, kMaxFaces> faces_;
+  std::array<PolytopeFace, kMaxFaces> faces_;
   std::array<Edge, kMaxFaces> horizon_;
   std::array<Index, kMaxFaces> dead_;
 };
@@ -225,7 +224,7 @@ class TetrahedronMaker {
       span(have);
       if (s_.size > have && farthest_corner(have) > kWide * size) continue;
       s_.size = have;
-      if (farthest_support(have) <= kTolerance * m_.rounding()) return false;
+      if (farthest_support(have) <= kHeightTolerance * m_.rounding()) return false;
       ++s_.size;
     }
     return true;
@@ -287,7 +286,7 @@ DeepestPoint deepest_point(const MinkowskiDifference& m, Simplex& s, const Vec3&
   TetrahedronMaker maker(m, s);
   if (!maker.make()) {
     const Real distance = std::sqrt(nearest.squared);
-    const bool apart = distance > kTolerance * m.rounding();
+    const bool apart = distance > kHeightTolerance * m.rounding();
     return {.normal = apart ? Vec3(nearest.v / distance) : maker.across(sense),
             .distance = distance,
             .on_a = on_a};

@@ -7,11 +7,11 @@
 namespace offstage::sim {
 namespace {
 
-constexpr int kMaxIterations = 100;
+constexpr int kMaxGjkIterations = 100;
 constexpr Real kTolerance = 4;      // of the gap between the bounds of the distance, in roundings of a point
-constexpr Real kTouching = 64;      // roundings of a point; nearer cores have no direction between them
+constexpr Real kTouchingRoundings = 64;      // roundings of a point; nearer cores have no direction between them
 constexpr Real kNear = 1e-9;        // of the size: if GJK stalls this near, the expanding polytope decides
-constexpr Real kLevel = 1 + 1e-14;  // ratio of squares that differ by rounding
+constexpr Real kGjkLevel = 1 + 1e-14;  // ratio of squares that differ by rounding
 constexpr Real kAccepted = 1e-12;   // of the size: gap with which a stalled query is still an answer
 
 /// The last normal, or from the middle of B to that of A.
@@ -61,7 +61,7 @@ Separation overlapping(const MinkowskiDifference& m, Simplex& s, GjkCache& cache
 /// within rounding but in a face rather than on its edge, which has the better normal.
 bool is_progress(const SimplexPoint& nearer, const SimplexPoint& nearest) {
   return nearer.squared < nearest.squared ||
-         (nearer.size > nearest.size && nearer.squared <= kLevel * nearest.squared);
+         (nearer.size > nearest.size && nearer.squared <= kGjkLevel * nearest.squared);
 }
 
 }  // namespace
@@ -77,12 +77,12 @@ Separation gjk(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache&
   Real distance = 0;
   for (;;) {
     distance = std::sqrt(nearest.squared);
-    if (nearest.size == 4 || distance <= kTouching * rounding) return overlapping(m, s, cache, iterations);
+    if (nearest.size == 4 || distance <= kTouchingRoundings * rounding) return overlapping(m, s, cache, iterations);
     ++iterations;
     const SupportPoint p = m.lowest(nearest.v, s.points[0].from);
     const Real gap = distance - nearest.v.dot(p.w) / distance;
     converged = gap <= kTolerance * rounding;
-    if (converged || iterations == kMaxIterations) break;
+    if (converged || iterations == kMaxGjkIterations) break;
     s.points[s.size++] = p;
     const SimplexPoint nearer = nearest_point(s);
     if (!is_progress(nearer, nearest)) {
@@ -121,7 +121,7 @@ bool overlap(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache& c
     d = nearest.v;
   }
   VertexPair hint = cache.from[0];
-  for (int i = 0; i < kMaxIterations; ++i) {
+  for (int i = 0; i < kMaxGjkIterations; ++i) {
     const SupportPoint p = m.lowest(d, hint);
     hint = p.from;
     if (const Real along = d.dot(p.w); along > 0 && along * along > radius2 * d.squaredNorm()) {

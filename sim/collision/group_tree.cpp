@@ -5,7 +5,7 @@
 namespace offstage::sim {
 namespace {
 
-IndexPair ordered(uint32_t a, uint32_t b) {
+IndexPair ordered_members(uint32_t a, uint32_t b) {
   return {std::min(a, b), std::max(a, b)};
 }
 
@@ -51,7 +51,7 @@ void GroupTree::find_between(std::size_t node, const GroupTree& other, std::size
   if (!box.intersects(other_box)) return;
   const bool is_end = is_leaf(node), is_other_end = other.is_leaf(other_node);
   if (is_end && is_other_end) {
-    pairs.push_back(ordered(member(node), other.member(other_node)));
+    pairs.push_back(ordered_members(member(node), other.member(other_node)));
   } else if (is_other_end || (!is_end && box.sizes().sum() > other_box.sizes().sum())) {
     find_between(2 * node, other, other_node, pairs);
     find_between(2 * node + 1, other, other_node, pairs);
@@ -65,7 +65,7 @@ void GroupTree::find_pairs(uint32_t object, const Aabb& box, std::vector<IndexPa
   const auto visit = [&](const auto& self, std::size_t node) -> void {
     if (!boxes_[node].intersects(box)) return;
     if (is_leaf(node)) {
-      pairs.push_back(ordered(member(node), object));
+      pairs.push_back(ordered_members(member(node), object));
     } else {
       self(self, 2 * node);
       self(self, 2 * node + 1);

@@ -36,7 +36,7 @@ class PlacedTriangles {
 };
 
 template <class A, class B>
-Placement placement(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& a_from_b, Real margin = 0) {
+Placement mesh_placement(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& a_from_b, Real margin = 0) {
   return Placement(a_from_b, std::max(a.tree.reach(), b.tree.reach()), margin);
 }
 
@@ -44,7 +44,7 @@ Placement placement(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& a_fr
 
 template <class A, class B>
 bool surfaces_intersect(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& a_from_b) {
-  const Placement place = placement(a, b, a_from_b);
+  const Placement place = mesh_placement(a, b, a_from_b);
   PlacedTriangles triangles(a.mesh, b.mesh, place);
   return !for_each_pair(a.tree, b.tree, place, [&](uint32_t i, uint32_t j) {
     return !triangles_intersect(triangles.of_a(i), triangles.of_b(j));
@@ -54,7 +54,7 @@ bool surfaces_intersect(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& 
 template <class A, class B>
 void intersecting_triangles(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& a_from_b,
                             std::vector<TrianglePair>& pairs) {
-  const Placement place = placement(a, b, a_from_b);
+  const Placement place = mesh_placement(a, b, a_from_b);
   PlacedTriangles triangles(a.mesh, b.mesh, place);
   for_each_pair(a.tree, b.tree, place, [&](uint32_t i, uint32_t j) {
     if (triangles_intersect(triangles.of_a(i), triangles.of_b(j))) pairs.push_back({i, j});
@@ -64,7 +64,7 @@ void intersecting_triangles(const MeshTree<A>& a, const MeshTree<B>& b, const Po
 template <class A, class B>
 void close_triangles(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& a_from_b, Real tolerance,
                      std::vector<CloseTriangles>& pairs) {
-  const Placement place = placement(a, b, a_from_b, tolerance);
+  const Placement place = mesh_placement(a, b, a_from_b, tolerance);
   PlacedTriangles triangles(a.mesh, b.mesh, place);
   for_each_pair(a.tree, b.tree, place, [&](uint32_t i, uint32_t j) {
     const ClosestPoints points = closest_on_triangles(triangles.of_a(i), triangles.of_b(j));
@@ -76,7 +76,7 @@ template <class A, class B>
 std::optional<CloseTriangles> closest_triangles(const MeshTree<A>& a, const MeshTree<B>& b,
                                                 const Pose& a_from_b, std::optional<TrianglePair> start,
                                                 Real limit) {
-  const Placement place = placement(a, b, a_from_b);
+  const Placement place = mesh_placement(a, b, a_from_b);
   PlacedTriangles triangles(a.mesh, b.mesh, place);
   std::optional<CloseTriangles> best;
   const auto distance = [&](uint32_t i, uint32_t j) {

@@ -11,7 +11,6 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 
 Pose inverse(const Pose& p) {
   const Quat back = p.orientation.conjugate();

@@ -11,8 +11,7 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
-constexpr int kMaxAdvances = 2000;
+constexpr int kMaxMeshAdvances = 2000;
 /// How often touching shapes are looked at on their way.
 constexpr int kLooks = 32;
 
@@ -158,7 +157,7 @@ std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b,
     }
     if (impact.share + time >= 1) return std::nullopt;
     impact.share += time;
-    if (impact.advances == kMaxAdvances) break;
+    if (impact.advances == kMaxMeshAdvances) break;
   }
   impact.converged = false;
   PairCache none;

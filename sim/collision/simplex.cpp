@@ -10,16 +10,16 @@ constexpr Real kFlatAngle2 = 1e-24;  // squared sine of the angle of a triangle 
 constexpr Real kRounding = 1e-13;    // of a volume, relative to the edges it is made of
 
 /// A point with its place in the simplex.
-struct Corner {
+struct SimplexCorner {
   const Vec3& w;
   uint8_t place;
 };
 
-SimplexPoint at_corner(const Corner& i) {
+SimplexPoint at_corner(const SimplexCorner& i) {
   return {i.w, i.w.squaredNorm(), 1, {i.place}, {1}};
 }
 
-SimplexPoint on_segment(const Corner& i, const Corner& j) {
+SimplexPoint on_segment(const SimplexCorner& i, const SimplexCorner& j) {
   const Vec3 &p = i.w, e = j.w - p;
   const Real along = -e.dot(p), length2 = e.squaredNorm();
   if (!(along > 0)) return at_corner(i);
@@ -37,7 +37,7 @@ void keep_nearer(SimplexPoint& best, const SimplexPoint& p) {
 
 // With n normal to the triangle, the barycentric coordinates of the origin's foot are areas seen along n. The
 // nearest point of a triangle lies on an edge whose coordinate is negative, if there are any.
-SimplexPoint on_triangle(const Corner& i, const Corner& j, const Corner& k) {
+SimplexPoint on_triangle(const SimplexCorner& i, const SimplexCorner& j, const SimplexCorner& k) {
   const Vec3 &p = i.w, e = j.w - p, f = k.w - p, n = e.cross(f);
   const Real area2 = n.squaredNorm();
   SimplexPoint best;
@@ -63,7 +63,7 @@ SimplexPoint on_triangle(const Corner& i, const Corner& j, const Corner& k) {
 
 // Likewise one dimension up: a face whose coordinate is negative holds the nearest point. The coordinates of
 // a tetrahedron that is flat within rounding mean nothing: any of its faces may.
-SimplexPoint in_tetrahedron(const Corner& i, const Corner& j, const Corner& k, const Corner& l) {
+SimplexPoint in_tetrahedron(const SimplexCorner& i, const SimplexCorner& j, const SimplexCorner& k, const SimplexCorner& l) {
   const Vec3 &p = l.w, e = i.w - p, f = j.w - p, g = k.w - p;
   const Vec3 fg = f.cross(g), ge = g.cross(e), ef = e.cross(f);
   const Real volume = e.dot(fg);
@@ -92,7 +92,7 @@ Vec3 SimplexPoint::on_a(const Simplex& s) const {
 }
 
 SimplexPoint nearest_point(const Simplex& s) {
-  const Corner i{s.points[0].w, 0}, j{s.points[1].w, 1}, k{s.points[2].w, 2}, l{s.points[3].w, 3};
+  const SimplexCorner i{s.points[0].w, 0}, j{s.points[1].w, 1}, k{s.points[2].w, 2}, l{s.points[3].w, 3};
   switch (s.size) {
     case 1:
       return at_corner(i);

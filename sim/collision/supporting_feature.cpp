@@ -8,8 +8,7 @@
 namespace offstage::sim {
 namespace {
 
-using Feature = SupportingFeature;
-constexpr uint32_t kMaxCorners = Feature::kMaxCorners;
+constexpr uint32_t kMaxFeatureCorners = SupportingFeature::kMaxCorners;
 
 /// Of the solid's size: vertices so little below a face's plane belong to the face. Coordinates from files
 /// are seldom better, and what is meant to be flat comes as triangles that are not quite.
@@ -19,20 +18,20 @@ constexpr Real kFlat = 1e-5;
 constexpr Real kAcross = 1e-4;
 
 /// Tags of the ends of a round side's line; rims have the ones below.
-constexpr uint32_t kLineTag = 2 * kMaxCorners;
+constexpr uint32_t kLineTag = 2 * kMaxFeatureCorners;
 
 /// Directions around the circle. By halving the angle with square roots: the same bits on every machine.
-const std::array<Eigen::Vector2d, kMaxCorners>& circle() {
-  static const std::array<Eigen::Vector2d, kMaxCorners> points = [] {
+const std::array<Eigen::Vector2d, kMaxFeatureCorners>& circle() {
+  static const std::array<Eigen::Vector2d, kMaxFeatureCorners> points = [] {
     Real cosine = 0;  // of a quarter turn
-    for (uint32_t parts = 4; parts < kMaxCorners; parts *= 2) cosine = std::sqrt((1 + cosine) / 2);
+    for (uint32_t parts = 4; parts < kMaxFeatureCorners; parts *= 2) cosine = std::sqrt((1 + cosine) / 2);
     const Eigen::Matrix2d turn{{cosine, -std::sqrt(1 - cosine * cosine)},
                                {std::sqrt(1 - cosine * cosine), cosine}};
-    std::array<Eigen::Vector2d, kMaxCorners> result;
+    std::array<Eigen::Vector2d, kMaxFeatureCorners> result;
     result[0] = Eigen::Vector2d::UnitX();
-    for (uint32_t k = 1; k < kMaxCorners; ++k)
-      result[k] = k % (kMaxCorners / 4) == 0
-                      ? Eigen::Vector2d(-result[k - kMaxCorners / 4].y(), result[k - kMaxCorners / 4].x())
+    for (uint32_t k = 1; k < kMaxFeatureCorners; ++k)
+      result[k] = k % (kMaxFeatureCorners / 4) == 0
+                      ? Eigen::Vector2d(-result[k - kMaxFeatureCorners / 4].y(), result[k - kMaxFeatureCorners / 4].x())
                       : Eigen::Vector2d(turn * result[k - 1]);
     return result;
   }();
@@ -44,15 +43,15 @@ Real share_within(Real slack, Real rise) {
   return rise > slack ? slack / rise : 1;
 }
 
-Feature point_feature(const Vec3& p, uint32_t tag) {
-  Feature f;
+SupportingFeature point_feature(const Vec3& p, uint32_t tag) {
+  SupportingFeature f;
   f.add(p, tag);
   f.vertex = tag;
   return f;
 }
 
-Feature segment_feature(const Vec3& p, uint32_t p_tag, const Vec3& q, uint32_t q_tag, const Vec3& d) {
-  Feature f = point_feature(p, p_tag);
+SupportingFeature segment_feature(const Vec3& p, uint32_t p_tag, const Vec3& q, uint32_t q_tag, const Vec3& d) {
+  SupportingFeature f = point_feature(p, p_tag);
   f.add(q, q_tag);
   const Vec3 along = (q - p).normalized();
   if (std::abs(along.dot(d)) <= kAcross) f.edge = along;
@@ -67,7 +66,7 @@ Vec3 box_extent(const Vec3& half, const Vec3& d, Real slack) {
   return extent;
 }
 
-Feature box_face(const Convex& c, const Vec3& d, Real slack) {
+SupportingFeature box_face(const Convex& c, const Vec3& d, Real slack) {
   const Vec3 extent = box_extent(c.half, d, slack);
   int axis = 0;
   Real best = -1;
@@ -78,7 +77,7 @@ Feature box_face(const Convex& c, const Vec3& d, Real slack) {
     axis = i;
   }
   const uint32_t side = d[axis] > 0, i = static_cast<uint32_t>(axis), j = (i + 1) % 3, k = (i + 2) % 3;
-  Feature f;
+  SupportingFeature f;
   f.normal[axis] = side ? 1 : -1;
   for (uint32_t corner = 0; corner < 4; ++corner) {
     // Counter-clockwise about +axis: (-,-) (+,-) (+,+) (-,+).
@@ -91,7 +90,7 @@ Feature box_face(const Convex& c, const Vec3& d, Real slack) {
   return f;
 }
 
-Feature box_edge(const Convex& c, const Vec3& d, Real slack) {
+SupportingFeature box_edge(const Convex& c, const Vec3& d, Real slack) {
   const Vec3 extent = box_extent(c.half, d, slack);
   uint32_t corner = 0;
   c.support(d, corner);
@@ -108,13 +107,13 @@ Feature box_edge(const Convex& c, const Vec3& d, Real slack) {
 // Triangle
 
 /// The side of it that faces d; an edge if it has no area.
-Feature triangle_face(const Convex& c, const Vec3& d, Real slack) {
+SupportingFeature triangle_face(const Convex& c, const Vec3& d, Real slack) {
   const Vec3 &p = *c.corners[0], &q = *c.corners[1], &r = *c.corners[2];
   const Vec3 area = (q - p).cross(r - p);
   const Real longest2 = std::max({(q - p).squaredNorm(), (r - q).squaredNorm(), (p - r).squaredNorm()});
   if (!(area.norm() > kFlat * longest2)) return supporting_edge(c, d, slack, Vec3::Zero());
   const bool front = area.dot(d) > 0;
-  Feature f;
+  SupportingFeature f;
   f.normal = (front ? 1 : -1) * area.normalized();
   for (uint32_t k = 0; k < 3; ++k) {
     const uint32_t corner = front ? k : 2 - k;
@@ -124,14 +123,14 @@ Feature triangle_face(const Convex& c, const Vec3& d, Real slack) {
 }
 
 /// Of the two edges at the corner touched the one across d, or else the one of which most is within `slack`.
-Feature triangle_edge(const Convex& c, const Vec3& d, Real slack) {
+SupportingFeature triangle_edge(const Convex& c, const Vec3& d, Real slack) {
   uint32_t corner = 0;
   const Vec3 top = c.support(d, corner);
-  Feature best;
+  SupportingFeature best;
   Real best_length = -1;
   for (const uint32_t other : {(corner + 1) % 3, (corner + 2) % 3}) {
     const Vec3 edge = c.vertex(other) - top;
-    const Feature f = segment_feature(top, corner, c.vertex(other), other, d);
+    const SupportingFeature f = segment_feature(top, corner, c.vertex(other), other, d);
     const Real length = f.edge != Vec3::Zero() ? std::numeric_limits<Real>::infinity()
                                                : share_within(slack, -d.dot(edge)) * edge.norm();
     if (!(edge.squaredNorm() > 0) || length <= best_length) continue;
@@ -145,7 +144,7 @@ Feature triangle_edge(const Convex& c, const Vec3& d, Real slack) {
 
 /// The corners of a set of points of a plane that are farthest in as many directions: their hull but for
 /// corners so blunt that they fall between two directions.
-void spread_corners(Feature& f, const ConvexPolyhedron& p, std::span<const uint32_t> vertices,
+void spread_corners(SupportingFeature& f, const ConvexPolyhedron& p, std::span<const uint32_t> vertices,
                     const Vec3& u) {
   const Vec3 w = f.normal.cross(u);
   f.count = 0;
@@ -160,11 +159,11 @@ void spread_corners(Feature& f, const ConvexPolyhedron& p, std::span<const uint3
 }
 
 /// The face, together with the vertices around it that are all but in its plane.
-Feature flat_part(const ConvexPolyhedron& p, uint32_t face) {
+SupportingFeature flat_part(const ConvexPolyhedron& p, uint32_t face) {
   const ConvexPolyhedron::Plane& plane = p.plane(face);
   const std::span<const uint32_t> loop = p.face_vertices(face);
   const Vec3& along = p.edge_frame(p.face_edges(face)[0]).along;
-  Feature f;
+  SupportingFeature f;
   f.normal = plane.normal;
   f.on_face = p.vertex(loop[0]);
 
@@ -184,7 +183,7 @@ Feature flat_part(const ConvexPolyhedron& p, uint32_t face) {
         vertices[count++] = v;
     }
 
-  if (count == loop.size() && count <= kMaxCorners)
+  if (count == loop.size() && count <= kMaxFeatureCorners)
     for (uint32_t v : loop) f.add(p.vertex(v), v);
   else
     spread_corners(f, p, {vertices.data(), count}, along);
@@ -197,7 +196,7 @@ Vec3 part_within(const ConvexPolyhedron& p, uint32_t from, uint32_t to, const Ve
   return share_within(slack, -d.dot(edge)) * edge;
 }
 
-Feature polyhedron_edge(const ConvexPolyhedron& p, const Vec3& d, Real slack, uint32_t v) {
+SupportingFeature polyhedron_edge(const ConvexPolyhedron& p, const Vec3& d, Real slack, uint32_t v) {
   if (p.edges().empty()) return point_feature(p.vertex(v), v);
   const auto slope = [&](uint32_t e) { return std::abs(d.dot(p.edge_frame(e).along)); };
   const std::span<const uint32_t> edges = p.vertex_edges(v), ends = p.vertex_neighbours(v);
@@ -214,7 +213,7 @@ Feature polyhedron_edge(const ConvexPolyhedron& p, const Vec3& d, Real slack, ui
   return segment_feature(p.vertex(v), v, p.vertex(end), end, d);
 }
 
-Feature polyhedron_face(const ConvexPolyhedron& p, const Vec3& d, Real slack, uint32_t v) {
+SupportingFeature polyhedron_face(const ConvexPolyhedron& p, const Vec3& d, Real slack, uint32_t v) {
   if (p.dimension() < 2) return polyhedron_edge(p, d, slack, v);
   uint32_t face = kNoFace;
   Real best = -1;
@@ -240,13 +239,13 @@ Vec3 outward(const Vec3& d) {
   return rho > 0 ? Vec3(d.x() / rho, 0, d.z() / rho) : Vec3::UnitX();
 }
 
-Feature disc(Real radius, Real y, bool up) {
-  Feature f;
+SupportingFeature disc(Real radius, Real y, bool up) {
+  SupportingFeature f;
   f.normal = up ? Vec3::UnitY() : Vec3(-Vec3::UnitY());
-  for (uint32_t k = 0; k < kMaxCorners; ++k) {
+  for (uint32_t k = 0; k < kMaxFeatureCorners; ++k) {
     // From +X towards +Z is clockwise seen from +Y.
-    const uint32_t at = up ? kMaxCorners - 1 - k : k;
-    f.add({radius * circle()[at].x(), y, radius * circle()[at].y()}, at + (up ? kMaxCorners : 0));
+    const uint32_t at = up ? kMaxFeatureCorners - 1 - k : k;
+    f.add({radius * circle()[at].x(), y, radius * circle()[at].y()}, at + (up ? kMaxFeatureCorners : 0));
   }
   f.on_face = Vec3(0, y, 0);
   return f;
@@ -282,7 +281,7 @@ bool rests_on_disc(const Convex& c, const RoundSide& side, const Vec3& d, Real s
   return disc_within > line_within;
 }
 
-Feature revolved(const Convex& c, const Vec3& d, Real slack) {
+SupportingFeature revolved(const Convex& c, const Vec3& d, Real slack) {
   const RoundSide side = round_side(c, d);
   if (rests_on_disc(c, side, d, slack)) return disc(c.half.x(), std::copysign(c.half.y(), d.y()), d.y() > 0);
   return segment_feature(side.from, side.from_tag, side.to, side.to_tag, d);
@@ -290,9 +289,9 @@ Feature revolved(const Convex& c, const Vec3& d, Real slack) {
 
 /// A line of the round side where it is across d or, unless it rests on a disc, almost is; else the rim,
 /// whose tangent always is; else the apex.
-Feature revolved_edge(const Convex& c, const Vec3& d, Real slack, const Vec3& on_surface) {
+SupportingFeature revolved_edge(const Convex& c, const Vec3& d, Real slack, const Vec3& on_surface) {
   const RoundSide side = round_side(c, d);
-  Feature line = segment_feature(side.from, side.from_tag, side.to, side.to_tag, d);
+  SupportingFeature line = segment_feature(side.from, side.from_tag, side.to, side.to_tag, d);
   if (line.edge != Vec3::Zero()) {
     // On a cone the centre of curvature is where the normal meets the axis.
     line.rod = std::max(0.0, outward(d).dot(on_surface)) / side.normal.dot(outward(d));
@@ -324,7 +323,7 @@ SupportingFeature supporting_feature(const Convex& c, const Vec3& d, Real slack)
       return revolved(c, d, slack);
     case Convex::Core::polyhedron: {
       const uint32_t v = support_vertex(*c.polyhedron, d, 0);
-      Feature f = polyhedron_face(*c.polyhedron, d, slack, v);
+      SupportingFeature f = polyhedron_face(*c.polyhedron, d, slack, v);
       f.vertex = v;
       return f;
     }

@@ -8,7 +8,6 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 /// Far more than any pair needs whose rate bound is within a factor of a hundred of the truth.
 constexpr int kMaxAdvances = 2000;
 

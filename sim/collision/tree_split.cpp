@@ -11,7 +11,6 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 /// Fewer items are not worth a task of their own.
 constexpr uint32_t kTaskItems = 4096;
 
@@ -117,8 +116,8 @@ class Bins {
 std::size_t surface_area_split(std::span<TreeItem> items, const Aabb& midpoints) {
   Bins bins(midpoints);
   for (const TreeItem& item : items) bins.add(item);
-  const auto [axis, bin] = bins.best_split();
-  return partition(items, [&](const TreeItem& item) { return bins.bin_of(item, axis) < bin; });
+  const auto best = bins.best_split();
+  return partition(items, [&, axis = best.first, bin = best.second](const TreeItem& item) { return bins.bin_of(item, axis) < bin; });
 }
 
 /// Parts the items and returns where the second half starts; 0 if nothing separates them.

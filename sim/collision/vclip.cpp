@@ -16,9 +16,9 @@ constexpr uint32_t kNone = 0xffffffff;
 
 /// Of the coordinates' size: what a computed height over a plane may be wrong by. A feature is only left for
 /// a neighbour that is better by more, so that rounding seldom makes the walk circle.
-constexpr Real kRounding = 1e-14;
+constexpr Real kVClipRounding = 1e-14;
 /// Of the coordinates' size: closer than this the difference of two points says nothing about the normal.
-constexpr Real kTouching = 1e-12;
+constexpr Real kVClipTouching = 1e-12;
 
 enum class Step : uint8_t { moved, closest, overlapping };
 
@@ -304,7 +304,7 @@ Separation vclip(const ConvexPolyhedron& a, const ConvexPolyhedron& b, const Pos
                  VclipCache& cache) {
   const Mat3 rotation = a_from_b.orientation.toRotationMatrix();
   const Real scale = a.reach() + b.reach() + a_from_b.position.cwiseAbs().maxCoeff(),
-             slop = kRounding * scale;
+             slop = kVClipRounding * scale;
   Side at_a{a, rotation.transpose(), -(rotation.transpose() * a_from_b.position), cache.a, slop};
   Side at_b{b, rotation, a_from_b.position, cache.b, slop};
 
@@ -319,7 +319,7 @@ Separation vclip(const ConvexPolyhedron& a, const ConvexPolyhedron& b, const Pos
     if (*result == Step::closest)
       s = at_b.at.kind <= at_a.at.kind ? closest_points(at_b, at_a)
                                        : exchanged(closest_points(at_a, at_b), at_b);
-    if (*result == Step::overlapping || s.distance <= kTouching * scale)
+    if (*result == Step::overlapping || s.distance <= kVClipTouching * scale)
       s = penetration(convex(a), convex(b), a_from_b);
   }
   s.iterations += steps;

@@ -23,8 +23,8 @@ constexpr int kArcs = 64;           ///< of the circle of directions, each searc
 constexpr int kHalvings = 60;       ///< of a bisection: to the last bit
 constexpr int kSolves = 30;         ///< of a cluster, to find the restitution that keeps the energy
 constexpr std::size_t kDense = 24;  ///< contacts of a cluster that are solved by pivoting
-constexpr Real kGoodEnough = 1e-6;  // of the velocities, for an impact
-constexpr uint32_t kSweeps = 2000;
+constexpr Real kAcceptedResidual = 1e-6;  // of the velocities, for an impact
+constexpr uint32_t kCollisionSweeps = 2000;
 constexpr Real kResting = 1e-11;  ///< of the fastest approach: slower ones are left, equal ones are ties
 constexpr std::size_t kImpulses = 200;  ///< for each contact of a sequence
 
@@ -166,10 +166,10 @@ void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, 
     c.is_guessed = true;
     fastest = std::max(fastest, c.relative_velocity(bodies).cwiseAbs().maxCoeff());
   }
-  const uint32_t sweeps = relax(bodies, contacts, kSweeps, kRounding * fastest);
+  const uint32_t sweeps = relax(bodies, contacts, kCollisionSweeps, kRounding * fastest);
   const Real left = residual(bodies, contacts);
   work.add({.solves = 1, .iterations = sweeps, .residual = left});
-  if (left <= kGoodEnough * fastest) return;
+  if (left <= kAcceptedResidual * fastest) return;
   std::copy(before.begin(), before.end(), bodies.begin());
   work.add(*ProximalNewton().solve(bodies, contacts));
   --work.solves;
@@ -311,7 +311,7 @@ ContactWork collide_in_sequence(std::span<ContactBody> bodies, std::span<Contact
     c.impulse += p;
     apply(c, p, bodies);
     const Real missing = -restitution[next] * u.x() - c.relative_velocity(bodies).x();
-    work.softened += missing > kGoodEnough * u.norm();
+    work.softened += missing > kAcceptedResidual * u.norm();
   }
   std::vector<Vec3> impulses;
   for (const Contact& c : contacts) impulses.push_back(c.impulse);

@@ -14,7 +14,6 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 constexpr Real kSatisfied = 1e-11;  ///< of the greatest |b|
 constexpr Real kNoise = 1e-12;      ///< of the greatest rate: it is zero but for rounding
 constexpr Real kDependent = UpdatedCholesky::kDependent;

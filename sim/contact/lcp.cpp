@@ -12,12 +12,11 @@ namespace {
 
 using Eigen::Index;
 
-constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
-constexpr Real kSatisfied = 1e-11;  ///< of the greatest |b|
-constexpr Real kAccurate = 1e-9;    ///< likewise: with more than this left over, fall back
-constexpr Real kNoise = 1e-12;      ///< of a rate: it is zero but for rounding
-constexpr int kAttempts = 4;
-constexpr int kSweeps = 500;
+constexpr Real kLcpSatisfied = 1e-11;  ///< of the greatest |b|
+constexpr Real kAccurateLcp = 1e-9;    ///< likewise: with more than this left over, fall back
+constexpr Real kLcpNoise = 1e-12;      ///< of a rate: it is zero but for rounding
+constexpr int kLcpAttempts = 4;
+constexpr int kLcpSweeps = 500;
 
 /// waiting: not brought in, its a is not looked at. ZA: contact holds, a = 0. ZF: broken, f = 0.
 enum class Zone : uint8_t { waiting, ZA, ZF };
@@ -91,7 +90,7 @@ Dantzig::Block Dantzig::first_block(Index m, Real sign) const {
   if (sign < 0) consider(result_.f[m], m);
   for (std::size_t k = 0; k < active_.size(); ++k) {
     const Real rate = x_[static_cast<Index>(k)];
-    if (rate * length(active_[k]) < -kNoise * length(m)) consider(-result_.f[active_[k]] / rate, active_[k]);
+    if (rate * length(active_[k]) < -kLcpNoise * length(m)) consider(-result_.f[active_[k]] / rate, active_[k]);
   }
   for (Index i = 0; i < a_.size(); ++i)
     if (zones_[static_cast<std::size_t>(i)] == Zone::ZF &&
@@ -110,7 +109,7 @@ void Dantzig::advance(const Block& block, Index m, Real sign) {
     a_[active_[k]] = 0;
   }
   if (block.index == m && result_.f[m] > 0) a_[m] = 0;
-  if (block.step * length(m) * length(m) > kSatisfied * scale_)
+  if (block.step * length(m) * length(m) > kLcpSatisfied * scale_)
     std::fill(moves_.begin(), moves_.end(), uint8_t{0});
 }
 
@@ -142,7 +141,7 @@ void Dantzig::change_zone(Index i) {
 /// is gone or one of them leaves.
 Outcome Dantzig::bring_in(Index m) {
   std::fill(moves_.begin(), moves_.end(), uint8_t{0});
-  const Real zero = kSatisfied * scale_;
+  const Real zero = kLcpSatisfied * scale_;
   while (result_.pivots < max_pivots_) {
     const bool holds = result_.f[m] > 0 && std::abs(a_[m]) <= zero && enter(m);
     if (holds || (result_.f[m] == 0 && a_[m] >= -zero)) {
@@ -186,14 +185,14 @@ Real Dantzig::residual() const {
 
 /// Projected Gauss-Seidel from the current forces.
 void Dantzig::relax() {
-  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+  for (int sweep = 0; sweep < kLcpSweeps; ++sweep) {
     for (Index i = 0; i < a_.size(); ++i) {
       if (!(A_(i, i) > 0)) continue;
       const Real a = A_.col(i).dot(result_.f) + b_[i];
       result_.f[i] = std::max(0.0, result_.f[i] - a / A_(i, i));
     }
     a_ = A_ * result_.f + b_;
-    if (residual() <= kAccurate * scale_) return;
+    if (residual() <= kAccurateLcp * scale_) return;
   }
 }
 
@@ -209,11 +208,11 @@ LcpSolution Dantzig::solve() {
     queue.pop_front();
     const Outcome outcome = bring_in(visit.index);
     if (outcome == Outcome::unbounded) result_.unbounded.push_back(static_cast<uint32_t>(visit.index));
-    if (outcome == Outcome::postponed && visit.attempts + 1 < kAttempts)
+    if (outcome == Outcome::postponed && visit.attempts + 1 < kLcpAttempts)
       queue.push_back({visit.index, visit.attempts + 1});
   }
   refine();
-  if (residual() > kAccurate * scale_) {
+  if (residual() > kAccurateLcp * scale_) {
     result_.fell_back = true;
     relax();
   }

@@ -16,7 +16,7 @@ namespace {
 /// were enough. What holds takes one; a blow takes more, or some of the points would be pressed in. A patch
 /// without a guess is at first solved to the end, or it would slip until the sweeps have found one.
 constexpr float kSettled = 0.01F, kSolved = 1e-6F;
-constexpr uint32_t kRounds = 20;
+constexpr uint32_t kPatchRounds = 20;
 
 /// Of the difference between an impulse and its mean, the share that a sub-step takes from the impulse, and
 /// the share that it adds to the mean. Slow modes lose most if their frequencies are about the latter. A
@@ -407,7 +407,7 @@ void sweep_single(PatchBatch& p, std::span<BodyMotion> motions, Real substep, Re
   const Single before = u;
   Single change{};
   const float tolerance = std::exchange(p.tolerance, kSettled);
-  for (uint32_t i = 0; i < kRounds; ++i) {
+  for (uint32_t i = 0; i < kPatchRounds; ++i) {
     const Single last = u;
     change = change + solve_single_normal(p, u, gap);
     change = change + solve_single_friction(p, u);
@@ -478,7 +478,7 @@ void sweep(PatchBatch& p, std::span<BodyMotion> motions, Real substep, Real elap
   const Groups before = u;
   Groups change{};
   const float tolerance = std::exchange(p.tolerance, kSettled);
-  for (uint32_t i = 0; i < kRounds; ++i) {
+  for (uint32_t i = 0; i < kPatchRounds; ++i) {
     const Groups last = u;
     change.normal = change.normal + solve_normal(p, u, gaps);
     change.friction = change.friction + solve_friction(p, u);

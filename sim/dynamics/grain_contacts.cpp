@@ -11,7 +11,7 @@
 namespace offstage::sim {
 namespace {
 
-constexpr std::size_t kChunk = GrainSearch::kChunk;
+constexpr std::size_t kContactChunk = GrainSearch::kChunk;
 /// Normals with a larger cosine between them are those of one surface.
 constexpr Real kSameSurface = 0.95;
 
@@ -47,15 +47,15 @@ Vec3 admissible(const Vec3& impulse, const Vec3& normal, Real friction) {
 }  // namespace
 
 std::size_t GrainContacts::chunk_count() const {
-  return (grains_.size() + kChunk - 1) / kChunk;
+  return (grains_.size() + kContactChunk - 1) / kContactChunk;
 }
 
 /// Calls f(chunk, first, last) in parallel for runs of grains.
 template <class F>
 void GrainContacts::for_each_chunk(F&& f) const {
   tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
-    f(c, static_cast<uint32_t>(c * kChunk),
-      static_cast<uint32_t>(std::min(grains_.size(), (c + 1) * kChunk)));
+    f(c, static_cast<uint32_t>(c * kContactChunk),
+      static_cast<uint32_t>(std::min(grains_.size(), (c + 1) * kContactChunk)));
   });
 }
 

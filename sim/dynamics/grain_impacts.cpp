@@ -8,7 +8,7 @@
 namespace offstage::sim {
 namespace {
 
-constexpr std::size_t kChunk = 512;
+constexpr std::size_t kImpactChunk = 512;
 constexpr uint32_t kMaxImpactsOfGrain = 1000;
 /// Collisions of a sub-step that are taken one after the other.
 constexpr std::size_t kMaxImpacts = 5000;
@@ -54,8 +54,8 @@ void GrainImpacts::resolve(std::span<Grain> grains, const GrainSearch& search, c
 
 void GrainImpacts::count_neighbours() {
   neighbours_.assign(grains_.size(), 0);
-  tbb::parallel_for(std::size_t{0}, (grains_.size() + kChunk - 1) / kChunk, [&](std::size_t c) {
-    for (auto i = static_cast<uint32_t>(c * kChunk); i < std::min(grains_.size(), (c + 1) * kChunk); ++i)
+  tbb::parallel_for(std::size_t{0}, (grains_.size() + kImpactChunk - 1) / kImpactChunk, [&](std::size_t c) {
+    for (auto i = static_cast<uint32_t>(c * kImpactChunk); i < std::min(grains_.size(), (c + 1) * kImpactChunk); ++i)
       for (const uint32_t j : search_->partners(i)) {
         const Real reach = (1 + kNeighbourGap) * (grains_[i].radius + grains_[j].radius);
         if ((grains_[i].position - grains_[j].position).squaredNorm() > reach * reach) continue;
@@ -74,12 +74,12 @@ bool GrainImpacts::is_left(uint32_t i, uint32_t j, Real speed) const {
 /// The collisions on the ways as they are at the beginning.
 void GrainImpacts::find_first() {
   const std::size_t n = grains_.size();
-  found_.resize((n + kChunk - 1) / kChunk);
+  found_.resize((n + kImpactChunk - 1) / kImpactChunk);
   tbb::parallel_for(std::size_t{0}, found_.size(), [&](std::size_t c) {
     found_[c].clear();
     NearObstacles near(step_->fixed, step_->moving);
     const auto add = [&](const Impact& impact) { found_[c].push_back(impact); };
-    for (auto i = static_cast<uint32_t>(c * kChunk); i < std::min(n, (c + 1) * kChunk); ++i) {
+    for (auto i = static_cast<uint32_t>(c * kImpactChunk); i < std::min(n, (c + 1) * kImpactChunk); ++i) {
       for (const uint32_t j : search_->partners(i)) find_with(i, j, add);
       find_obstacle(i, near, add);
     }

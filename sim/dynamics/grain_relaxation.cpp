@@ -22,7 +22,7 @@ constexpr int kMaxSlides = 4;
 /// Parts of a slab that are gone through side by side: contacts that follow each other should not wait for
 /// each other's velocities.
 constexpr uint32_t kStreams = 4;
-constexpr std::size_t kChunk = GrainSearch::kChunk;
+constexpr std::size_t kRelaxationChunk = GrainSearch::kChunk;
 
 /// The impulse's change that brings a contact with relative velocity u to its target, within Coulomb's cone.
 template <class Contact>
@@ -70,7 +70,7 @@ void GrainContacts::for_each_contact(OnPair&& on_pair, OnSurface&& on_surface) {
 void GrainContacts::relax() {
   motion_.resize(grains_.size());
   tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
-    for (std::size_t i = c * kChunk; i < std::min(grains_.size(), (c + 1) * kChunk); ++i)
+    for (std::size_t i = c * kRelaxationChunk; i < std::min(grains_.size(), (c + 1) * kRelaxationChunk); ++i)
       motion_[i] = {grains_[i].velocity, 1 / grains_[i].mass};
   });
   const auto apply = [&](const Pair& c, const Vec3& impulse) {
@@ -125,7 +125,7 @@ void GrainContacts::displace(std::span<Vec3> end, std::span<uint8_t> touched) {
         if (c.acts()) press(c, c.grain, 1);
       });
   tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
-    for (std::size_t i = c * kChunk; i < std::min(grains_.size(), (c + 1) * kChunk); ++i)
+    for (std::size_t i = c * kRelaxationChunk; i < std::min(grains_.size(), (c + 1) * kRelaxationChunk); ++i)
       grains_[i].velocity = motion_[i].velocity;
   });
 }
@@ -151,7 +151,7 @@ void GrainContacts::keep_outside(std::span<Vec3> end, std::vector<Reaction>& rea
   const auto for_each = [&](auto&& f) {
     tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
       NearObstacles near(step_->fixed, step_->moving);
-      for (auto i = static_cast<uint32_t>(c * kChunk); i < std::min(grains_.size(), (c + 1) * kChunk); ++i)
+      for (auto i = static_cast<uint32_t>(c * kRelaxationChunk); i < std::min(grains_.size(), (c + 1) * kRelaxationChunk); ++i)
         f(i, near, found_[c]);
     });
   };

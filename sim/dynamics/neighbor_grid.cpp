@@ -9,7 +9,7 @@
 namespace offstage::sim {
 namespace {
 
-constexpr std::size_t kChunk = 4096;
+constexpr std::size_t kGridChunk = 4096;
 /// Points are parted by the first bits of their cells, then each part is sorted by itself.
 constexpr uint32_t kPartBits = 8;
 /// Fewer cells along an axis would make a neighbour twice.
@@ -17,7 +17,7 @@ constexpr uint32_t kMinBits = 2;
 
 Aabb bounding_box(std::span<const Vec3> points) {
   return tbb::parallel_reduce(
-      tbb::blocked_range<std::size_t>(0, points.size(), kChunk), Aabb(),
+      tbb::blocked_range<std::size_t>(0, points.size(), kGridChunk), Aabb(),
       [&](const auto& range, Aabb box) {
         for (std::size_t i = range.begin(); i < range.end(); ++i) box.extend(points[i]);
         return box;
@@ -56,10 +56,10 @@ void NeighborGrid::build(std::span<const Vec3> points, Real cell) {
   choose_torus(points);
   const uint32_t all_bits = bits_[0] + bits_[1] + bits_[2];
   const uint32_t shift = all_bits > kPartBits ? all_bits - kPartBits : 0, parts = 1u << (all_bits - shift);
-  const std::size_t chunks = (n + kChunk - 1) / kChunk;
+  const std::size_t chunks = (n + kGridChunk - 1) / kGridChunk;
   const auto for_chunks = [&](auto&& f) {
     tbb::parallel_for(std::size_t{0}, chunks,
-                      [&](std::size_t c) { f(c, c * kChunk, std::min(n, (c + 1) * kChunk)); });
+                      [&](std::size_t c) { f(c, c * kGridChunk, std::min(n, (c + 1) * kGridChunk)); });
   };
 
   bucket_.resize(n);

@@ -14,14 +14,14 @@ namespace offstage::sim {
 namespace {
 
 /// Particles per task.
-constexpr std::size_t kChunk = 32;
+constexpr std::size_t kPairChunk = 32;
 /// Squared distance below which a force without a length of its own does not grow any more [m^2].
 constexpr Real kLeastSquare = 1e-30;
 
-Real root(Real x) {
+Real root_node(Real x) {
   return std::sqrt(x);
 }
-Lanes root(Lanes x) {
+Lanes root_node(Lanes x) {
   return lane_sqrt(x);
 }
 Real greater(Real x, Real y) {
@@ -43,11 +43,11 @@ struct InverseDistance {
   template <class T>
   T factor(T r2) const {
     const T s = square(r2);
-    return constant / (s * root(s));
+    return constant / (s * root_node(s));
   }
   /// d factor / d r^2.
   Real slope(Real r2) const { return -1.5 * factor(r2) / square(r2); }
-  Real energy(Real r2) const { return constant / root(square(r2)); }
+  Real energy(Real r2) const { return constant / root_node(square(r2)); }
 };
 
 /// U = 4 e (q^2 - q), q = (sigma^2 / r^2)^3.
@@ -174,8 +174,8 @@ Vec3 force_by_near(const Kernel& kernel, const Cloud& c, std::size_t i) {
 
 template <class F>
 void for_each_parallel(std::size_t size, F&& f) {
-  tbb::parallel_for(std::size_t{0}, (size + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    for (std::size_t i = chunk * kChunk; i < std::min(size, (chunk + 1) * kChunk); ++i) f(i);
+  tbb::parallel_for(std::size_t{0}, (size + kPairChunk - 1) / kPairChunk, [&](std::size_t chunk) {
+    for (std::size_t i = chunk * kPairChunk; i < std::min(size, (chunk + 1) * kPairChunk); ++i) f(i);
   });
 }
 

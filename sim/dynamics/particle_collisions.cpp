@@ -8,15 +8,15 @@
 namespace offstage::sim {
 namespace {
 
-constexpr std::size_t kChunk = 1024;
+constexpr std::size_t kCollisionChunk = 1024;
 /// Thickness of the layers in greatest radii: partners in contact are in neighbouring ones unless they are
 /// fast.
 constexpr Real kLayer = 3;
 
 template <class F>
 void for_each_chunked(std::size_t n, F&& f) {
-  tbb::parallel_for(std::size_t{0}, (n + kChunk - 1) / kChunk, [&](std::size_t c) {
-    for (std::size_t i = c * kChunk; i < std::min(n, (c + 1) * kChunk); ++i) f(i);
+  tbb::parallel_for(std::size_t{0}, (n + kCollisionChunk - 1) / kCollisionChunk, [&](std::size_t c) {
+    for (std::size_t i = c * kCollisionChunk; i < std::min(n, (c + 1) * kCollisionChunk); ++i) f(i);
   });
 }
 

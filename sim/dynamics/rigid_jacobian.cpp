@@ -4,7 +4,7 @@ namespace offstage::sim {
 namespace {
 
 /// Where the parts of a body's state begin among its 13 numbers.
-constexpr int kTurn = 3, kMomentum = 7, kAngularMomentum = 10;
+constexpr int kTurnRow = 3, kMomentum = 7, kAngularMomentum = 10;
 
 /// The matrix of w -> (0, w) q, in the order x y z w.
 Eigen::Matrix<Real, 4, 3> left_product(const Eigen::Vector4d& q) {
@@ -38,7 +38,7 @@ RigidDerivative::RigidDerivative(const RigidStage& stage) : stage_(stage) {
   rotation_ = 2 / stage.turn.squaredNorm() * left_product(stage.turn).transpose();
   // dw = I^-1 dH + d_theta x w - I^-1 (d_theta x H)
   angular_velocity_.setZero();
-  angular_velocity_.middleCols<4>(kTurn) = (inverse_inertia_ * cross_matrix(stage.angular_momentum) -
+  angular_velocity_.middleCols<4>(kTurnRow) = (inverse_inertia_ * cross_matrix(stage.angular_momentum) -
                                             cross_matrix(stage.motion.angular_velocity)) *
                                            rotation_;
   angular_velocity_.middleCols<3>(kAngularMomentum) = inverse_inertia_;
@@ -47,14 +47,14 @@ RigidDerivative::RigidDerivative(const RigidStage& stage) : stage_(stage) {
 PointDerivative RigidDerivative::position(const Vec3& arm) const {
   PointDerivative d = PointDerivative::Zero();
   d.leftCols<3>().setIdentity();
-  d.middleCols<4>(kTurn) = -cross_matrix(arm) * rotation_;
+  d.middleCols<4>(kTurnRow) = -cross_matrix(arm) * rotation_;
   return d;
 }
 
 PointDerivative RigidDerivative::velocity(const Vec3& arm) const {
   const Mat3 by_arm = cross_matrix(arm);
   PointDerivative d = -by_arm * angular_velocity_;
-  d.middleCols<4>(kTurn) -= cross_matrix(stage_.motion.angular_velocity) * by_arm * rotation_;
+  d.middleCols<4>(kTurnRow) -= cross_matrix(stage_.motion.angular_velocity) * by_arm * rotation_;
   d.middleCols<3>(kMomentum).diagonal().array() += 1 / stage_.body.mass;
   return d;
 }
@@ -62,7 +62,7 @@ PointDerivative RigidDerivative::velocity(const Vec3& arm) const {
 PointDerivative RigidDerivative::torque(const Vec3& arm, const Vec3& force) const {
   // (d_theta x arm) x F
   PointDerivative d = PointDerivative::Zero();
-  d.middleCols<4>(kTurn) = cross_matrix(force) * cross_matrix(arm) * rotation_;
+  d.middleCols<4>(kTurnRow) = cross_matrix(force) * cross_matrix(arm) * rotation_;
   return d;
 }
 
@@ -70,8 +70,8 @@ Eigen::Matrix<Real, 13, 13> RigidDerivative::own_rates(const BodyForces& forces,
   const RigidBody& body = stage_.body;
   Eigen::Matrix<Real, 13, 13> d = Eigen::Matrix<Real, 13, 13>::Zero();
   d.block<3, 3>(0, kMomentum).diagonal().array() = 1 / body.mass;
-  d.middleRows<4>(kTurn) = 0.5 * left_product(stage_.turn) * angular_velocity_;
-  d.block<4, 4>(kTurn, kTurn) += 0.5 * turning(stage_.motion.angular_velocity);
+  d.middleRows<4>(kTurnRow) = 0.5 * left_product(stage_.turn) * angular_velocity_;
+  d.block<4, 4>(kTurnRow, kTurnRow) += 0.5 * turning(stage_.motion.angular_velocity);
   d.block<3, 3>(kMomentum, kMomentum).diagonal().array() -= body.linear_drag / body.mass;
   d.bottomRows<3>() = -body.angular_drag * angular_velocity_;
   for (const ActiveForce& f : forces.forces) {

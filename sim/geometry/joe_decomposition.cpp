@@ -13,9 +13,8 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kPi = std::numbers::pi;
 /// Angles that differ by less are equal [rad].
-constexpr Real kFlat = 1e-6;
+constexpr Real kFlatFace = 1e-6;
 /// Shares of the limits that are asked for in turn.
 constexpr std::array<Real, 5> kRelaxed = {1, 0.5, 0.25, 0.1, 0};
 /// Shares of the dihedral angle that cuts are tried at, after the planes of the neighbourhood (F.2).
@@ -38,15 +37,15 @@ Real mean_edge(const Polyhedron& p) {
 class Candidates {
  public:
   Candidates(const Polyhedron& p, uint32_t h, Real tolerance) : wedge_(wedge(p, h)) {
-    add(kPi);
-    add(wedge_.angle - kPi);
+    add(std::numbers::pi);
+    add(wedge_.angle - std::numbers::pi);
     for (uint32_t end : {h, p.half_edges[h].twin})
       p.for_each_leaving(end, [&](uint32_t k) {
         const Vec3 d = p.head_point(k) - p.origin_point(k);
         if (wedge_.along.cross(d).norm() <= tolerance) return;
         const Real theta = wedge_.angle_of(d);
         add(theta);
-        add(theta < kPi ? theta + kPi : theta - kPi);
+        add(theta < std::numbers::pi ? theta + std::numbers::pi : theta - std::numbers::pi);
       });
     for (Real share : kShares) add(share * wedge_.angle);
   }
@@ -56,9 +55,9 @@ class Candidates {
 
  private:
   void add(Real theta) {
-    if (theta < wedge_.angle - kPi - kFlat || theta > kPi + kFlat || angles_.size() == kMaxCandidates) return;
+    if (theta < wedge_.angle - std::numbers::pi - kFlatFace || theta > std::numbers::pi + kFlatFace || angles_.size() == kMaxCandidates) return;
     for (Real other : angles_)
-      if (std::abs(other - theta) < kFlat) return;
+      if (std::abs(other - theta) < kFlatFace) return;
     angles_.push_back(theta);
   }
 
@@ -92,10 +91,10 @@ std::optional<Merit> merit(const Polyhedron& p, const Cut& cut, Real tolerance) 
     m.dihedral = std::min({m.dihedral, above, below});
     measure_distances(p, cut, left, tolerance, m);
     measure_distances(p, cut, right, tolerance, m);
-    if (!c.across_face && inside.angle > kPi + kFlat && std::max(above, below) <= kPi + kFlat) ++m.resolved;
+    if (!c.across_face && inside.angle > std::numbers::pi + kFlatFace && std::max(above, below) <= std::numbers::pi + kFlatFace) ++m.resolved;
     if (c.on_edge && is_reflex(p, c.half_edge)) --m.resolved;
   }
-  if (m.dihedral < kFlat) return {};
+  if (m.dihedral < kFlatFace) return {};
   return m;
 }
 
@@ -105,7 +104,7 @@ struct RatedCut {
 };
 
 bool better(const Merit& a, const Merit& b) {
-  return a.resolved != b.resolved ? a.resolved > b.resolved : a.dihedral > b.dihedral + kFlat;
+  return a.resolved != b.resolved ? a.resolved > b.resolved : a.dihedral > b.dihedral + kFlatFace;
 }
 
 class Decomposer {
@@ -182,7 +181,7 @@ class Decomposer {
 bool is_reflex(const Polyhedron& p, uint32_t h) {
   const Real angle = wedge(p, h).angle;
   // A fin without thickness has an angle of 0 or, by rounding, a full turn.
-  return angle > kPi + kFlat && angle < 2 * kPi - kFlat;
+  return angle > std::numbers::pi + kFlatFace && angle < 2 * std::numbers::pi - kFlatFace;
 }
 
 uint32_t count_reflex_edges(const Polyhedron& p) {

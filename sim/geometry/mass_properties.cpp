@@ -10,7 +10,6 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kPi = std::numbers::pi;
 
 /// Integrals of 1, x and x x^T over a solid.
 struct Moments {
@@ -55,7 +54,7 @@ Mat3 diagonal(Real x, Real y, Real z) {
 }
 
 MassProperties closed_form(const Sphere& s) {
-  const Real volume = 4.0 / 3 * kPi * s.radius * s.radius * s.radius;
+  const Real volume = 4.0 / 3 * std::numbers::pi * s.radius * s.radius * s.radius;
   const Real i = 0.4 * volume * s.radius * s.radius;
   return {volume, Vec3::Zero(), diagonal(i, i, i)};
 }
@@ -67,7 +66,7 @@ MassProperties closed_form(const Box& b) {
 }
 
 MassProperties closed_form(const Cylinder& c) {
-  const Real r2 = c.radius * c.radius, volume = kPi * r2 * c.height;
+  const Real r2 = c.radius * c.radius, volume = std::numbers::pi * r2 * c.height;
   const Real across = volume * (3 * r2 + c.height * c.height) / 12;
   return {volume, Vec3::Zero(), diagonal(across, volume * r2 / 2, across)};
 }
@@ -83,7 +82,7 @@ MassProperties closed_form(const Capsule& c) {
 
 /// The centroid is a quarter of the height above the base.
 MassProperties closed_form(const Cone& c) {
-  const Real r2 = c.radius * c.radius, volume = kPi * r2 * c.height / 3;
+  const Real r2 = c.radius * c.radius, volume = std::numbers::pi * r2 * c.height / 3;
   const Real across = volume * 3 * (4 * r2 + c.height * c.height) / 80;
   return {volume, Vec3(0, -c.height / 4, 0), diagonal(across, volume * 3 * r2 / 10, across)};
 }

@@ -11,7 +11,7 @@ namespace {
 using Loop = std::vector<uint32_t>;
 
 /// Sine of the turn at a vertex below which the polygon counts as straight there [rad].
-constexpr Real kFlat = 1e-6;
+constexpr Real kFlatPolygon = 1e-6;
 
 Real cross(const Vec2& a, const Vec2& b) {
   return a.x() * b.y() - a.y() * b.x();
@@ -72,7 +72,7 @@ class Divider {
   Vec2 side_from(const Loop& loop, std::size_t k) const { return point(loop, k + 1) - point(loop, k); }
 
   bool is_reflex(const Loop& loop, std::size_t k) const {
-    return sine(side_into(loop, k), side_from(loop, k)) < -kFlat;
+    return sine(side_into(loop, k), side_from(loop, k)) < -kFlatPolygon;
   }
 
   std::size_t first_reflex(const Loop& loop) const {
@@ -83,14 +83,14 @@ class Divider {
 
   /// Whether a ray from a vertex starts into the polygon.
   bool starts_inside(const Loop& loop, std::size_t k, const Vec2& d) const {
-    const bool left_of_next = sine(side_from(loop, k), d) > kFlat;
-    const bool left_of_last = sine(side_into(loop, k), d) > kFlat;
+    const bool left_of_next = sine(side_from(loop, k), d) > kFlatPolygon;
+    const bool left_of_last = sine(side_into(loop, k), d) > kFlatPolygon;
     return is_reflex(loop, k) ? left_of_next || left_of_last : left_of_next && left_of_last;
   }
 
   /// Whether a ray from a vertex leaves no reflex angle on either side.
   bool straightens(const Loop& loop, std::size_t k, const Vec2& d) const {
-    return sine(side_from(loop, k), d) > -kFlat && sine(side_into(loop, k), d) > -kFlat;
+    return sine(side_from(loop, k), d) > -kFlatPolygon && sine(side_into(loop, k), d) > -kFlatPolygon;
   }
 
   bool is_diagonal(const Loop& loop, std::size_t i, std::size_t j) const {

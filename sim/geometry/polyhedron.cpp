@@ -13,7 +13,7 @@ using Plane = Polyhedron::Plane;
 
 constexpr uint32_t kNone = 0xffffffff;
 
-Vec3 doubled_area(const TriangleMesh& mesh, uint32_t face) {
+Vec3 doubled_area_of(const TriangleMesh& mesh, uint32_t face) {
   const Triangle& t = mesh.triangles[face];
   const Vec3& a = mesh.vertices[t[0]];
   return (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a);
@@ -33,7 +33,7 @@ Real thickness(const TriangleMesh& mesh, uint32_t face, Real area2) {
 std::vector<Plane> shared_planes(const TriangleMesh& mesh, const MeshTopology& topology, Real tolerance) {
   const auto n = static_cast<uint32_t>(mesh.triangles.size());
   std::vector<Real> area(n);
-  for (uint32_t f = 0; f < n; ++f) area[f] = doubled_area(mesh, f).norm();
+  for (uint32_t f = 0; f < n; ++f) area[f] = doubled_area_of(mesh, f).norm();
   std::vector<uint32_t> seeds(n);
   std::iota(seeds.begin(), seeds.end(), 0u);
   std::stable_sort(seeds.begin(), seeds.end(), [&](uint32_t a, uint32_t b) { return area[a] > area[b]; });

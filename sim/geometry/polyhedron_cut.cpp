@@ -15,7 +15,7 @@ namespace {
 
 using Plane = Polyhedron::Plane;
 
-constexpr uint32_t kNone = 0xffffffff;
+constexpr uint32_t kNoVertex = 0xffffffff;
 /// Angles below this are a full turn, and angles that differ by less are the same [rad].
 constexpr Real kNoTurn = 1e-7;
 
@@ -69,9 +69,9 @@ void add_cap(Polyhedron& p, std::span<const std::vector<uint32_t>> pieces, std::
     for (uint32_t k = 0; k < count; ++k) {
       const uint32_t a = piece[k], b = piece[(k + 1) % count], h = first + k;
       p.half_edges.push_back(
-          {origins[a], face, first + (k + 1) % count, first + (k + count - 1) % count, kNone});
+          {origins[a], face, first + (k + 1) % count, first + (k + count - 1) % count, kNoVertex});
       const uint32_t side = mirrored ? b : a;
-      uint32_t twin = kNone;
+      uint32_t twin = kNoVertex;
       if ((side + 1) % n == (mirrored ? a : b)) {
         twin = outline[side];
       } else if (const auto met = diagonals.find({b, a}); met != diagonals.end()) {
@@ -79,7 +79,7 @@ void add_cap(Polyhedron& p, std::span<const std::vector<uint32_t>> pieces, std::
       } else {
         diagonals[{a, b}] = h;
       }
-      if (twin == kNone) continue;
+      if (twin == kNoVertex) continue;
       p.half_edges[h].twin = twin;
       p.half_edges[twin].twin = h;
     }
@@ -119,7 +119,7 @@ class Tracer {
         if (!pass(seen_edge_, edge(at.half_edge))) return {};
       } else {
         seen_point_[p_.origin(at.half_edge)] = true;
-        if (!turn(at, last.point, last.across_face ? kNone : p_.half_edges[last.half_edge].twin)) return {};
+        if (!turn(at, last.point, last.across_face ? kNoVertex : p_.half_edges[last.half_edge].twin)) return {};
         if (at.half_edge == start) return closed(std::move(cut));
         if (!at.across_face && !pass(seen_edge_, edge(at.half_edge))) return {};
       }

@@ -193,9 +193,9 @@ struct Cluster {
   Real excess = 0;  ///< volume of the hull over that of the voxels [m^3]
 };
 
-class Decomposer {
+class VoxelDecomposer {
  public:
-  Decomposer(const TriangleMesh& mesh, const VoxelGrid& grid) : mesh_(mesh), grid_(grid) {}
+  VoxelDecomposer(const TriangleMesh& mesh, const VoxelGrid& grid) : mesh_(mesh), grid_(grid) {}
 
   std::vector<ConvexPolyhedron> run(std::size_t max_parts) {
     std::vector<uint32_t> all(mesh_.triangles.size());
@@ -367,7 +367,7 @@ VoxelDecomposition decompose_by_voxels(const TriangleMesh& mesh, uint32_t resolu
   const VoxelGrid grid(mesh, box, resolution);
   const std::size_t inside = grid.inside(grid.all()).size();
   if (inside == 0) return {};
-  return {Decomposer(mesh, grid).run(max_parts), grid.voxel_volume() * static_cast<Real>(inside)};
+  return {VoxelDecomposer(mesh, grid).run(max_parts), grid.voxel_volume() * static_cast<Real>(inside)};
 }
 
 }  // namespace offstage::sim

@@ -283,7 +283,7 @@ TEST(CellTable, LongBoxesAreFoundOnceAlthoughBucketsAreShared) {
     const std::array ranges = {sizes.range(0, beam, 0), sizes.range(1, block, 0)};
     CellTable table;
     table.build(0, ranges, 0, nullptr);
-    Candidates found;
+    CandidatePairs found;
     table.find_pairs(0, table.bucket_count(), found);
     ASSERT_TRUE(beam.intersects(block));
     ASSERT_EQ(found.meeting.size() + found.doubtful.size(), 1u);
