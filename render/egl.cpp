@@ -15,12 +15,12 @@ namespace {
 
 // From the Khronos registry of EGL.
 using Display = void*;
-using Handle = void*;
+using EglHandle = void*;
 using Device = void*;
 constexpr int kExtensions = 0x3055;           // EGL_EXTENSIONS
 constexpr int kNone = 0x3038;                 // EGL_NONE
 constexpr unsigned kOpenGlApi = 0x30A2;       // EGL_OPENGL_API
-constexpr int kMajorVersion = 0x3098;         // EGL_CONTEXT_MAJOR_VERSION
+constexpr int kEglMajorVersion = 0x3098;         // EGL_CONTEXT_MAJOR_VERSION
 constexpr int kMinorVersion = 0x30FB;         // EGL_CONTEXT_MINOR_VERSION
 constexpr int kProfileMask = 0x30FD;          // EGL_CONTEXT_OPENGL_PROFILE_MASK
 constexpr int kCoreProfile = 1;               // EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT
@@ -31,22 +31,22 @@ constexpr int kRenderer = 0x335F;             // EGL_RENDERER_EXT
 
 const std::string kPackages = "libegl1 libegl-mesa0 libgl1-mesa-dri";
 
-struct Library {
+struct EglLibrary {
   void (*(*get_proc_address)(const char* name))() = nullptr;
   int (*get_error)() = nullptr;
   unsigned (*initialize)(Display, int* major, int* minor) = nullptr;
   unsigned (*bind_api)(unsigned api) = nullptr;
   const char* (*query_string)(Display, int name) = nullptr;
-  Handle (*create_context)(Display, void* config, Handle shared, const int* attributes) = nullptr;
-  unsigned (*make_current)(Display, void* draw, void* read, Handle) = nullptr;
-  unsigned (*destroy_context)(Display, Handle) = nullptr;
+  EglHandle (*create_context)(Display, void* config, EglHandle shared, const int* attributes) = nullptr;
+  unsigned (*make_current)(Display, void* draw, void* read, EglHandle) = nullptr;
+  unsigned (*destroy_context)(Display, EglHandle) = nullptr;
   unsigned (*release_thread)() = nullptr;
   // Of extensions; nullptr where they are missing.
   Display (*get_platform_display)(unsigned platform, void* native, const int* attributes) = nullptr;
   unsigned (*query_devices)(int most, Device* devices, int* count) = nullptr;
   const char* (*query_device_string)(Device, int name) = nullptr;
 
-  Library() {
+  EglLibrary() {
     const SharedLibrary library({"libEGL.so.1", "libEGL.so"}, kPackages);
     library.find("eglGetProcAddress", get_proc_address);
     library.find("eglGetError", get_error);
@@ -69,8 +69,8 @@ struct Library {
   }
 };
 
-const Library& egl() {
-  static const Library library;
+const EglLibrary& egl() {
+  static const EglLibrary library;
   return library;
 }
 
@@ -122,7 +122,7 @@ Display initialised(unsigned platform, void* native) {
 class EglContext : public PlatformContext {
  public:
   explicit EglContext(Display display) : display_(display) {
-    const int attributes[] = {kMajorVersion, 4, kMinorVersion, 5, kProfileMask, kCoreProfile, kNone};
+    const int attributes[] = {kEglMajorVersion, 4, kMinorVersion, 5, kProfileMask, kCoreProfile, kNone};
     if (!egl().bind_api(kOpenGlApi)) throw UnavailableError("no OpenGL: " + error_code());
     handle_ = egl().create_context(display_, nullptr, nullptr, attributes);
     if (handle_ == nullptr) throw UnavailableError("no OpenGL 4.5 core context: " + error_code());
@@ -143,7 +143,7 @@ class EglContext : public PlatformContext {
 
  private:
   Display display_ = nullptr;
-  Handle handle_ = nullptr;
+  EglHandle handle_ = nullptr;
 };
 
 std::unique_ptr<PlatformContext> make_software_context() {

@@ -16,19 +16,19 @@ constexpr unsigned kUnsignedByte = 0x1401;  // GL_UNSIGNED_BYTE
 constexpr int kFormat = 0x22;
 constexpr int kDepthBits = 0x30, kStencilBits = 0x31, kAccumBits = 0x32;
 constexpr int kProfile = 0x33, kCoreProfile = 0x34;
-constexpr int kMajorVersion = 0x36, kMinorVersion = 0x37;
-using Handle = void*;
+constexpr int kOsMesaMajorVersion = 0x36, kMinorVersion = 0x37;
+using OsMesaHandle = void*;
 
 // Everything is drawn into framebuffer objects; OSMesa's own buffer is only what makes the context current.
 constexpr int kDummySize_px = 16;
 
-struct Library {
-  Handle (*create)(const int* attributes, Handle shared) = nullptr;
-  unsigned char (*make_current)(Handle, void* buffer, unsigned type, int width, int height) = nullptr;
-  void (*destroy)(Handle) = nullptr;
+struct OsMesaLibrary {
+  OsMesaHandle (*create)(const int* attributes, OsMesaHandle shared) = nullptr;
+  unsigned char (*make_current)(OsMesaHandle, void* buffer, unsigned type, int width, int height) = nullptr;
+  void (*destroy)(OsMesaHandle) = nullptr;
   void (*(*get_proc_address)(const char* name))() = nullptr;
 
-  Library() {
+  OsMesaLibrary() {
     const SharedLibrary library({"libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"}, "libosmesa6");
     library.find("OSMesaCreateContextAttribs", create);
     library.find("OSMesaMakeCurrent", make_current);
@@ -37,8 +37,8 @@ struct Library {
   }
 };
 
-const Library& osmesa() {
-  static const Library library;
+const OsMesaLibrary& osmesa() {
+  static const OsMesaLibrary library;
   return library;
 }
 
@@ -46,7 +46,7 @@ class OsmesaContext : public PlatformContext {
  public:
   OsmesaContext() {
     const int attributes[] = {kFormat,  kRgba,        kDepthBits,    0, kStencilBits,  0, kAccumBits, 0,
-                              kProfile, kCoreProfile, kMajorVersion, 4, kMinorVersion, 5, 0};
+                              kProfile, kCoreProfile, kOsMesaMajorVersion, 4, kMinorVersion, 5, 0};
     handle_ = osmesa().create(attributes, nullptr);
     if (handle_ == nullptr)
       throw UnavailableError(
@@ -63,7 +63,7 @@ class OsmesaContext : public PlatformContext {
   GlLookup lookup() const override { return osmesa().get_proc_address; }
 
  private:
-  Handle handle_ = nullptr;
+  OsMesaHandle handle_ = nullptr;
   std::array<uint8_t, kDummySize_px * kDummySize_px * 4> pixels_{};
 };
 
