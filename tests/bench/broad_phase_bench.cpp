@@ -153,4 +153,3 @@ BENCHMARK(fcl_spatial_hash)->Apply(slow_case);
 }  // namespace
 }  // namespace offstage::sim
 
-BENCHMARK_MAIN();

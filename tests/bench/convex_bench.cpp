@@ -59,7 +59,7 @@ const Motion& motion(int64_t which) {
 
 /// Calls a query, which returns its iterations, with one pose after the other.
 template <class Query>
-void run(benchmark::State& state, Query&& query) {
+void run_queries(benchmark::State& state, Query&& query) {
   const std::vector<Pose>& poses = motion(state.range(0)).poses;
   std::size_t k = 0;
   int64_t iterations = 0;
@@ -73,12 +73,12 @@ void run(benchmark::State& state, Query&& query) {
 void gjk_warm(benchmark::State& state) {
   const Motion& m = motion(state.range(0));
   GjkCache cache;
-  run(state, [&](const Pose& pose) { return gjk(convex(m.a), convex(m.b), pose, cache).iterations; });
+  run_queries(state, [&](const Pose& pose) { return gjk(convex(m.a), convex(m.b), pose, cache).iterations; });
 }
 
 void gjk_cold(benchmark::State& state) {
   const Motion& m = motion(state.range(0));
-  run(state, [&](const Pose& pose) {
+  run_queries(state, [&](const Pose& pose) {
     GjkCache cache;
     return gjk(convex(m.a), convex(m.b), pose, cache).iterations;
   });
@@ -87,12 +87,12 @@ void gjk_cold(benchmark::State& state) {
 void vclip_warm(benchmark::State& state) {
   const Motion& m = motion(state.range(0));
   VclipCache cache;
-  run(state, [&](const Pose& pose) { return vclip(m.a, m.b, pose, cache).iterations; });
+  run_queries(state, [&](const Pose& pose) { return vclip(m.a, m.b, pose, cache).iterations; });
 }
 
 void vclip_cold(benchmark::State& state) {
   const Motion& m = motion(state.range(0));
-  run(state, [&](const Pose& pose) {
+  run_queries(state, [&](const Pose& pose) {
     VclipCache cache;
     return vclip(m.a, m.b, pose, cache).iterations;
   });
@@ -101,7 +101,7 @@ void vclip_cold(benchmark::State& state) {
 void overlap_warm(benchmark::State& state) {
   const Motion& m = motion(state.range(0));
   GjkCache cache;
-  run(state, [&](const Pose& pose) { return int{overlap(convex(m.a), convex(m.b), pose, cache)}; });
+  run_queries(state, [&](const Pose& pose) { return int{overlap(convex(m.a), convex(m.b), pose, cache)}; });
 }
 
 /// What libccd passes to its support mapping: a placed hull and where it climbed to last.
@@ -138,7 +138,7 @@ void ccd_intersect(benchmark::State& state) {
   const Motion& m = motion(state.range(0));
   const ccd_t ccd = ccd_settings();
   CcdHull a{&m.a, {}}, b{&m.b, {}};
-  run(state, [&](const Pose& pose) {
+  run_queries(state, [&](const Pose& pose) {
     b.pose = pose;
     return ccdGJKIntersect(&a, &b, &ccd);
   });
@@ -148,7 +148,7 @@ void ccd_penetration(benchmark::State& state) {
   const Motion& m = motion(state.range(0));
   const ccd_t ccd = ccd_settings();
   CcdHull a{&m.a, {}}, b{&m.b, {}};
-  run(state, [&](const Pose& pose) {
+  run_queries(state, [&](const Pose& pose) {
     b.pose = pose;
     ccd_real_t depth = 0;
     ccd_vec3_t direction, position;
@@ -172,7 +172,7 @@ void fcl_distance(benchmark::State& state) {
   fcl::CollisionObjectd a(fcl_convex(m.a)), b(fcl_convex(m.b));
   fcl::DistanceRequestd request(true, state.range(0) == 2);
   request.distance_tolerance = 1e-9;
-  run(state, [&](const Pose& pose) {
+  run_queries(state, [&](const Pose& pose) {
     b.setTransform(pose.orientation, pose.position);
     fcl::DistanceResultd result;
     benchmark::DoNotOptimize(fcl::distance(&a, &b, request, result));
@@ -194,4 +194,3 @@ BENCHMARK(fcl_distance)->Arg(kApart)->Arg(kNear);
 }  // namespace
 }  // namespace offstage::sim
 
-BENCHMARK_MAIN();

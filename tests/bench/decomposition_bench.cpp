@@ -44,4 +44,3 @@ BENCHMARK(winding_number);
 }  // namespace
 }  // namespace offstage::sim
 
-BENCHMARK_MAIN();

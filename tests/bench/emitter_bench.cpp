@@ -9,7 +9,7 @@
 namespace offstage::effects {
 namespace {
 
-constexpr Real kStep = 1.0 / 240;
+constexpr Real kEmitterStep = 1.0 / 240;
 
 /// A million births a second, one by one (range 1: 0) or in a burst each sub-step (1), from a kind of surface
 /// (range 0).
@@ -26,7 +26,7 @@ void births(benchmark::State& state) {
     Emitter emitter({.surface = {.kind = kind, .size = {5, 5}, .radius = 3, .mesh = tetrahedron},
                      .rate = single ? 1e6 : 0.0,
                      .count = single ? 0.0 : 4167.0,
-                     .interval = kStep,
+                     .interval = kEmitterStep,
                      .speed = Normal{5, 2},
                      .spread_deg = Normal{0, 20},
                      .radius = Normal{0.01, 0.005},
@@ -37,7 +37,7 @@ void births(benchmark::State& state) {
                      .max_alive = 100'000'000},
                     system);
     state.ResumeTiming();
-    for (int i = 0; i < 120; ++i) emitter.emit(world, i * kStep, (i + 1) * kStep);
+    for (int i = 0; i < 120; ++i) emitter.emit(world, i * kEmitterStep, (i + 1) * kEmitterStep);
     born += emitter.report().released;
   }
   state.counters["births/s"] = benchmark::Counter(static_cast<double>(born), benchmark::Counter::kIsRate);
@@ -53,9 +53,9 @@ void trails(benchmark::State& state) {
     for (int i = 0; i < 10'000; ++i)
       world.add_particle(stars, {.position = {0, 100, 0.1 * i}, .velocity = {9, 9, 0}});
     Trail trail({.rate = 100.0, .max_alive = 100'000'000}, stars, target);
-    world.step(kStep, [&](Real start, Real end) { trail.emit(world, start, end); });
+    world.step(kEmitterStep, [&](Real start, Real end) { trail.emit(world, start, end); });
     state.ResumeTiming();
-    for (int i = 1; i < 60; ++i) trail.emit(world, kStep, 2 * kStep);
+    for (int i = 1; i < 60; ++i) trail.emit(world, kEmitterStep, 2 * kEmitterStep);
     born += trail.report().released;
   }
   state.counters["births/s"] = benchmark::Counter(static_cast<double>(born), benchmark::Counter::kIsRate);
@@ -70,4 +70,3 @@ BENCHMARK(trails)->Unit(benchmark::kMillisecond);
 }  // namespace
 }  // namespace offstage::effects
 
-BENCHMARK_MAIN();

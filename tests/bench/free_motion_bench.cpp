@@ -21,7 +21,7 @@ void fill(WorldState& world, int64_t count, const Vec3& moments, Real drag) {
   }
 }
 
-void run(benchmark::State& state, const Vec3& moments, Real drag, IntegratorKind kind) {
+void run_free_motion(benchmark::State& state, const Vec3& moments, Real drag, IntegratorKind kind) {
   const oneapi::tbb::global_control one(oneapi::tbb::global_control::max_allowed_parallelism, 1);
   WorldState world;
   fill(world, state.range(0), moments, drag);
@@ -30,16 +30,16 @@ void run(benchmark::State& state, const Vec3& moments, Real drag, IntegratorKind
 }
 
 void cubes(benchmark::State& state) {
-  run(state, Vec3::Ones(), 0, IntegratorKind::rk4);
+  run_free_motion(state, Vec3::Ones(), 0, IntegratorKind::rk4);
 }
 void bricks_rk4(benchmark::State& state) {
-  run(state, {1, 2, 3}, 0, IntegratorKind::rk4);
+  run_free_motion(state, {1, 2, 3}, 0, IntegratorKind::rk4);
 }
 void dragged_rk4(benchmark::State& state) {
-  run(state, Vec3::Ones(), 0.1, IntegratorKind::rk4);
+  run_free_motion(state, Vec3::Ones(), 0.1, IntegratorKind::rk4);
 }
 void dragged_dormand_prince(benchmark::State& state) {
-  run(state, Vec3::Ones(), 0.1, IntegratorKind::dormand_prince);
+  run_free_motion(state, Vec3::Ones(), 0.1, IntegratorKind::dormand_prince);
 }
 BENCHMARK(cubes)->Arg(100)->Arg(1000)->Arg(10000);
 BENCHMARK(bricks_rk4)->Arg(1000);
@@ -49,4 +49,3 @@ BENCHMARK(dragged_dormand_prince)->Arg(1000);
 }  // namespace
 }  // namespace offstage::sim
 
-BENCHMARK_MAIN();

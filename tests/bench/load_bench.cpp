@@ -59,4 +59,3 @@ BENCHMARK(read_model_whole)->Arg(400)->Unit(benchmark::kMillisecond)->UseRealTim
 }  // namespace
 }  // namespace offstage::render
 
-BENCHMARK_MAIN();

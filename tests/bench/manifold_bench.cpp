@@ -25,7 +25,7 @@ std::vector<Pose> poses(Real depth = 0.9999) {
 }
 
 template <class Query>
-void run(benchmark::State& state, const std::vector<Pose>& at, Query&& query) {
+void run_manifolds(benchmark::State& state, const std::vector<Pose>& at, Query&& query) {
   std::size_t k = 0;
   uint64_t points = 0;
   for (auto _ : state) {
@@ -43,7 +43,7 @@ void points_of(benchmark::State& state, const Shape& shape_a, const Shape& shape
     GjkCache fresh;
     separations.push_back(gjk(a, b, pose, fresh));
   }
-  run(state, at, [&](std::size_t k) { return manifold(a, b, at[k], separations[k], 0.01).count; });
+  run_manifolds(state, at, [&](std::size_t k) { return manifold(a, b, at[k], separations[k], 0.01).count; });
 }
 
 void boxes(benchmark::State& state) {
@@ -86,7 +86,7 @@ ConvexPolyhedron icosahedron() {
 void query(benchmark::State& state, const Body& a, const Body& b, const std::vector<Pose>& at) {
   PairCache cache;
   std::vector<Manifold> manifolds;
-  run(state, at, [&](std::size_t k) {
+  run_manifolds(state, at, [&](std::size_t k) {
     manifolds.clear();
     find_manifolds(a.collision, b.collision, at[k], 0.01, cache, DistanceMethod::gjk, manifolds);
     return manifolds.empty() ? 0 : manifolds[0].count;
@@ -114,7 +114,7 @@ void boxes_with_separation(benchmark::State& state) {
   const Convex box = convex(Box{Vec3::Ones()});
   const std::vector<Pose> at = poses();
   GjkCache cache;
-  run(state, at,
+  run_manifolds(state, at,
       [&](std::size_t k) { return manifold(box, box, at[k], gjk(box, box, at[k], cache), 0.01).count; });
 }
 void query_boxes(benchmark::State& state) {
@@ -194,7 +194,7 @@ void bullet(benchmark::State& state, Real depth) {
   }
   btDiscreteCollisionDetectorInterface::ClosestPointInput input;
   input.m_transformA.setIdentity();
-  run(state, poses(depth), [&](std::size_t k) {
+  run_manifolds(state, poses(depth), [&](std::size_t k) {
     Counter counter;
     input.m_transformB = transforms[k];
     detector.getClosestPoints(input, counter, nullptr);
@@ -231,4 +231,3 @@ BENCHMARK(query_icosahedron_over_ground);
 }  // namespace
 }  // namespace offstage::sim
 
-BENCHMARK_MAIN();

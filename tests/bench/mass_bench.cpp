@@ -52,4 +52,3 @@ BENCHMARK(registration)->Unit(benchmark::kMillisecond)->UseRealTime();
 }  // namespace
 }  // namespace offstage::sim
 
-BENCHMARK_MAIN();

@@ -12,7 +12,7 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kStep = 1.0 / 240;
+constexpr Real kForcesStep = 1.0 / 240;
 
 Vec3 random_point(std::size_t i, Real size) {
   const effects::RandomStream random(1, 0);
@@ -43,7 +43,7 @@ void turbulence(benchmark::State& state) {
 
 /// Particles that fall far above the ground.
 void step(benchmark::State& state, const std::vector<ForceDef>& forces) {
-  World world({.max_step = kStep});
+  World world({.max_step = kForcesStep});
   world.add_body({.name = "ground", .shape = Plane{}, .motion = MotionType::fixed});
   const auto system = world.add_particle_system({.linear_drag = 1e-3});
   for (std::size_t i = 0; i < static_cast<std::size_t>(state.range(0)); ++i)
@@ -52,7 +52,7 @@ void step(benchmark::State& state, const std::vector<ForceDef>& forces) {
     force.systems = {system};
     world.add_force(force);
   }
-  for (auto _ : state) world.step(kStep);
+  for (auto _ : state) world.step(kForcesStep);
   rates(state, "substeps/s");
 }
 void with_drag(benchmark::State& state) {
@@ -117,4 +117,3 @@ BENCHMARK(lennard_jones_of_near)
 }  // namespace
 }  // namespace offstage::sim
 
-BENCHMARK_MAIN();

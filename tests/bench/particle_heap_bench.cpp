@@ -11,12 +11,12 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kStep = 1.0 / 240, kRadius = 0.005;
+constexpr Real kHeapStep = 1.0 / 240, kRadius = 0.005;
 
-void run(benchmark::State& state, World& world, int warm_up) {
-  for (int i = 0; i < warm_up; ++i) world.step(kStep);
+void run_heap(benchmark::State& state, World& world, int warm_up) {
+  for (int i = 0; i < warm_up; ++i) world.step(kHeapStep);
   uint64_t collisions = 0;
-  for (auto _ : state) collisions += world.step(kStep).particle_collisions;
+  for (auto _ : state) collisions += world.step(kHeapStep).particle_collisions;
   const auto steps = static_cast<double>(state.iterations());
   state.SetItemsProcessed(state.iterations() * state.range(0));
   state.counters["substeps/s"] = benchmark::Counter(steps, benchmark::Counter::kIsRate);
@@ -26,7 +26,7 @@ void run(benchmark::State& state, World& world, int warm_up) {
 
 /// Grains in a lattice with some disorder, twice as high as it is wide, on rough ground.
 World column(std::size_t count) {
-  World world({.max_step = kStep});
+  World world({.max_step = kHeapStep});
   world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0});
   const auto system = world.add_particle_system({.internal = true});
   const effects::RandomStream random(1, 0);
@@ -45,16 +45,16 @@ World column(std::size_t count) {
 
 void heap_forming(benchmark::State& state) {
   World world = column(static_cast<std::size_t>(state.range(0)));
-  run(state, world, 48);
+  run_heap(state, world, 48);
 }
 void heap_at_rest(benchmark::State& state) {
   World world = column(static_cast<std::size_t>(state.range(0)));
-  run(state, world, 720);
+  run_heap(state, world, 720);
 }
 
 /// A thousandth of the space is filled.
 void ballistic(benchmark::State& state) {
-  World world({.max_step = kStep});
+  World world({.max_step = kHeapStep});
   const auto system = world.add_particle_system({.internal = true});
   const effects::RandomStream random(1, 0);
   const auto count = static_cast<std::size_t>(state.range(0));
@@ -66,7 +66,7 @@ void ballistic(benchmark::State& state) {
                                 .mass = 0.001,
                                 .radius = kRadius});
   }
-  run(state, world, 2);
+  run_heap(state, world, 2);
 }
 
 BENCHMARK(heap_forming)
@@ -86,4 +86,3 @@ BENCHMARK(ballistic)->Arg(10'000)->Arg(100'000)->Arg(1'000'000)->Unit(benchmark:
 }  // namespace
 }  // namespace offstage::sim
 
-BENCHMARK_MAIN();

@@ -10,11 +10,11 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kStep = 1.0 / 240;
+constexpr Real kParticlesStep = 1.0 / 240;
 
 /// `count` particles above a plane; the drop height says how soon they come to lie on it.
 World rain(std::size_t count, Real height, ParticleSystemHandle& system) {
-  World world({.max_step = kStep});
+  World world({.max_step = kParticlesStep});
   world.add_body({.name = "ground", .shape = Plane{}, .motion = MotionType::fixed});
   system = world.add_particle_system({.name = "rain", .linear_drag = 1e-5});
   const effects::RandomStream random(1, 0);
@@ -27,9 +27,9 @@ World rain(std::size_t count, Real height, ParticleSystemHandle& system) {
 }
 
 void time_steps(benchmark::State& state, World& world, int warm_up) {
-  for (int i = 0; i < warm_up; ++i) world.step(kStep);
+  for (int i = 0; i < warm_up; ++i) world.step(kParticlesStep);
   uint64_t collisions = 0;
-  for (auto _ : state) collisions += world.step(kStep).particle_collisions;
+  for (auto _ : state) collisions += world.step(kParticlesStep).particle_collisions;
   state.SetItemsProcessed(state.iterations() * state.range(0));
   state.counters["substeps/s"] =
       benchmark::Counter(static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
@@ -37,20 +37,20 @@ void time_steps(benchmark::State& state, World& world, int warm_up) {
       benchmark::Counter(static_cast<double>(collisions), benchmark::Counter::kAvgIterations);
 }
 
-void run(benchmark::State& state, Real height, int warm_up) {
+void run_particles(benchmark::State& state, Real height, int warm_up) {
   ParticleSystemHandle system;
   World world = rain(static_cast<std::size_t>(state.range(0)), height, system);
   time_steps(state, world, warm_up);
 }
 
 void falling(benchmark::State& state) {
-  run(state, 100, 0);
+  run_particles(state, 100, 0);
 }
 void bouncing(benchmark::State& state) {
-  run(state, 1, 60);
+  run_particles(state, 1, 60);
 }
 void at_rest(benchmark::State& state) {
-  run(state, 0, 480);
+  run_particles(state, 0, 480);
 }
 
 /// Into eddies of two sizes, past a torus of 18 432 triangles that stands in their midst.
@@ -79,4 +79,3 @@ BENCHMARK(on_mesh_in_eddies)
 }  // namespace
 }  // namespace offstage::sim
 
-BENCHMARK_MAIN();

@@ -39,4 +39,3 @@ BENCHMARK(encode_1080p)->ArgName("alpha")->Arg(255)->Arg(128)->Unit(benchmark::k
 
 }  // namespace
 
-BENCHMARK_MAIN();

@@ -51,4 +51,3 @@ BENCHMARK(pile)->Args({100, 1})->Args({1000, 1})->Args({1000, 2})->UseRealTime()
 }  // namespace
 }  // namespace offstage::sim
 
-BENCHMARK_MAIN();

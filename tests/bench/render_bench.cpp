@@ -173,4 +173,3 @@ BENCHMARK(BM_ToneMapAndEdges)->Arg(0)->Arg(1)->ArgName("edges")->Unit(benchmark:
 }  // namespace
 }  // namespace offstage::render
 
-BENCHMARK_MAIN();

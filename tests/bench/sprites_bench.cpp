@@ -11,9 +11,9 @@
 namespace offstage::render {
 namespace {
 
-const bool kPinned = (pin_environment(2), true);
+const bool kSpritesPinned = (pin_environment(2), true);
 
-float spread(uint64_t i, double step) {
+float spread_sprites(uint64_t i, double step) {
   const double x = static_cast<double>(i + 1) * step;
   return static_cast<float>(x - std::floor(x));
 }
@@ -27,8 +27,8 @@ void time_points(benchmark::State& state, const PointsDef& def, const Vector3f& 
   stage.add_instance(stage.add_mesh(make_ground(1000)), stage.add_material({.pattern = Pattern::checker}));
   std::vector<Point> values;
   for (uint64_t i = 0; i < static_cast<uint64_t>(state.range(0)); ++i) {
-    const Vector3f unit(spread(i, 0.8191725134) - 0.5f, spread(i, 0.6710436067),
-                        spread(i, 0.5497004779) - 0.5f);
+    const Vector3f unit(spread_sprites(i, 0.8191725134) - 0.5f, spread_sprites(i, 0.6710436067),
+                        spread_sprites(i, 0.5497004779) - 0.5f);
     values.push_back({.position = unit.cwiseProduct(size),
                       .velocity = {0.2f, -8, 0},
                       .radius = radius,
@@ -80,4 +80,3 @@ BENCHMARK(BM_Bloom)->Arg(0)->Arg(1)->ArgName("lights")->MeasureProcessCPUTime()-
 }  // namespace
 }  // namespace offstage::render
 
-BENCHMARK_MAIN();

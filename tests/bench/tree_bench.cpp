@@ -158,7 +158,7 @@ void fcl_collide(benchmark::State& state, std::size_t most, bool contacts) {
   state.counters["pairs"] = static_cast<double>(count);
 }
 
-void fcl_distance(benchmark::State& state) {
+void fcl_mesh_distance(benchmark::State& state) {
   const FclPair pair(situation(state.range(0)));
   double d = 0;
   for (auto _ : state) {
@@ -216,4 +216,3 @@ BENCHMARK(fcl_distance)->Unit(benchmark::kMicrosecond)->Arg(kApart);
 }  // namespace
 }  // namespace offstage::sim
 
-BENCHMARK_MAIN();

@@ -11,7 +11,7 @@
 namespace offstage::producer {
 namespace {
 
-std::string errors_of(const std::string& cloth, const std::string& rest = "") {
+std::string cloth_errors(const std::string& cloth, const std::string& rest = "") {
   try {
     parse_scene(R"({"cloths": [)" + cloth + "]" + rest + "}", "s", OFFSTAGE_SOURCE_DIR);
   } catch (const SceneError& error) {
@@ -56,33 +56,33 @@ TEST(Cloths, TopIsUpAndTheFrontTowardsTheViewerWhenTurnedByNinetyDegrees) {
 }
 
 TEST(Cloths, WhatCannotBeIsRefusedWithWhatCan) {
-  EXPECT_EQ(errors_of(R"({"fabric": "denin"})"),
+  EXPECT_EQ(cloth_errors(R"({"fabric": "denin"})"),
             "/cloths/0/fabric: there is no fabric 'denin'; did you mean 'denim'?\n");
   EXPECT_EQ(
-      errors_of(R"({"pins": [{"type": "box", "centre": [0, 5, 0]}]})"),
+      cloth_errors(R"({"pins": [{"type": "box", "centre": [0, 5, 0]}]})"),
       "/cloths/0/pins/0: holds no vertex of the cloth; in its own frame it reaches from (-0.5, 0, -0.5) to "
       "(0.5, 0, 0.5)\n");
   EXPECT_EQ(
-      errors_of(R"({"pins": [{"type": "corners", "body": "hand"}]})", R"(, "bodies": [{"name": "band"}])"),
+      cloth_errors(R"({"pins": [{"type": "corners", "body": "hand"}]})", R"(, "bodies": [{"name": "band"}])"),
       "/cloths/0/pins/0/body: there is no body 'hand'; did you mean 'band'?\n");
-  EXPECT_EQ(errors_of(R"({"shape": {"type": "grid", "cells": [900, 900]}})"),
+  EXPECT_EQ(cloth_errors(R"({"shape": {"type": "grid", "cells": [900, 900]}})"),
             "/cloths/0: has 811801 vertices; a cloth may have 250000 at most\n");
-  EXPECT_EQ(errors_of(R"({"seams": [{"type": "sides", "a": "left", "b": "top"}],
+  EXPECT_EQ(cloth_errors(R"({"seams": [{"type": "sides", "a": "left", "b": "top"}],
                           "shape": {"type": "grid", "cells": [4, 2]}})"),
             "/cloths/0: joins a side of 3 vertices to one of 5; they must be as many\n");
   EXPECT_EQ(
-      errors_of(R"({"shape": {"type": "mesh", "file": "none.glb"}})").find("/cloths/0/shape/file: there is"),
+      cloth_errors(R"({"shape": {"type": "mesh", "file": "none.glb"}})").find("/cloths/0/shape/file: there is"),
       0u);
-  EXPECT_EQ(errors_of("{}", R"(, "forces": [{"type": "wind", "cloths": ["cloth_1"]}])"),
+  EXPECT_EQ(cloth_errors("{}", R"(, "forces": [{"type": "wind", "cloths": ["cloth_1"]}])"),
             "/forces/0/cloths/0: there is no cloth 'cloth_1'; did you mean 'cloth_0'?\n");
 }
 
 TEST(Cloths, ExplicitIntegratorsNameTheSpringAndTheLongestStep) {
-  const std::string stiff = errors_of(R"({"integrator": "symplectic", "substep": 0.002, "stretch": 100000})");
+  const std::string stiff = cloth_errors(R"({"integrator": "symplectic", "substep": 0.002, "stretch": 100000})");
   EXPECT_EQ(stiff.find("/cloths/0: its springs are too stiff for an explicit integrator: the "), 0u) << stiff;
   EXPECT_NE(stiff.find(" spring between vertices "), std::string::npos) << stiff;
   EXPECT_NE(stiff.find("needs a substep less than"), std::string::npos);
-  EXPECT_EQ(errors_of(R"({"integrator": "symplectic", "substep": 1e-6})"), "");
+  EXPECT_EQ(cloth_errors(R"({"integrator": "symplectic", "substep": 1e-6})"), "");
 }
 
 TEST(Cloths, CopiesAreClothsOfTheirOwnAndForcesNameThemAll) {

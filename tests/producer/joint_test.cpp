@@ -17,7 +17,7 @@ LoadedScene parse(const std::string& text) {
   return parse_scene("{" + text + "}", "s", OFFSTAGE_SOURCE_DIR);
 }
 
-std::string errors_of(const std::string& text) {
+std::string joint_errors(const std::string& text) {
   try {
     parse(text);
   } catch (const SceneError& error) {
@@ -47,19 +47,19 @@ TEST(SceneJoints, AreCopiedWithTheirBodies) {
 
 TEST(SceneJoints, WhatCannotBeIsRefusedWithWhatCan) {
   const std::string bodies = R"("bodies": [{"name": "wall", "motion": "static"}, {"name": "door"}], )";
-  EXPECT_EQ(errors_of(bodies + R"("joints": [{"a": "dor"}])"),
+  EXPECT_EQ(joint_errors(bodies + R"("joints": [{"a": "dor"}])"),
             "/joints/0/a: there is no body 'dor'; did you mean 'door'?\n");
-  EXPECT_EQ(errors_of(bodies + R"("joints": [{"a": "wall"}])"),
+  EXPECT_EQ(joint_errors(bodies + R"("joints": [{"a": "wall"}])"),
             "/joints/0: joins nothing that forces can move: one of its bodies must be dynamic\n");
-  EXPECT_EQ(errors_of(bodies + R"("joints": [{"type": "revolute", "a": "door", "limits": [-1, 1]},
+  EXPECT_EQ(joint_errors(bodies + R"("joints": [{"type": "revolute", "a": "door", "limits": [-1, 1]},
                                              {"type": "revolute", "a": "door", "limits_deg": [10, 20]}])"),
             "/joints/0/limits: is for prismatic and distance joints; use \"limits_deg\"\n"
             "/joints/1/limits_deg: must be a range that contains 0, where the joint is at time 0\n");
-  EXPECT_EQ(errors_of(bodies + R"("joints": [{"a": "door", "motor": {}}])"),
+  EXPECT_EQ(joint_errors(bodies + R"("joints": [{"a": "door", "motor": {}}])"),
             "/joints/0/motor: drives revolute, prismatic and distance joints only\n");
-  EXPECT_EQ(errors_of(bodies + R"("articulations": [{"type": "chain", "end": "world"}])"),
+  EXPECT_EQ(joint_errors(bodies + R"("articulations": [{"type": "chain", "end": "world"}])"),
             "/articulations/0/sag: must be over 1.0005 if both ends are held still: a taut chain bears nothing across\n");
-  EXPECT_EQ(errors_of(bodies + R"("articulations": [{"type": "chain", "sag": 1.1, "end": "dor"}])"),
+  EXPECT_EQ(joint_errors(bodies + R"("articulations": [{"type": "chain", "sag": 1.1, "end": "dor"}])"),
             "/articulations/0/end: there is no body 'dor'; did you mean 'door'?\n");
 }
 
@@ -168,11 +168,11 @@ TEST(ModelTrees, AreTheNodesOfTheirFile) {
   EXPECT_LT((finger.anchor - Vec3(1, 2 * 2.135, 0.32)).norm(), 1e-6);
   EXPECT_EQ(scene.joints[0].b, "");
 
-  EXPECT_EQ(errors_of(R"("articulations": [)" + arm + R"({"node": "hnad"}, {"node": "hand", "type": "distance"}]}])"),
+  EXPECT_EQ(joint_errors(R"("articulations": [)" + arm + R"({"node": "hnad"}, {"node": "hand", "type": "distance"}]}])"),
             "/articulations/0/joints/0/node: assets/models/robot_arm.glb has no node 'hnad' with triangles; did you mean "
             "'hand'?\n/articulations/0/joints/1/type: must be another: a node and the one above it have no distance to "
             "keep\n");
-  EXPECT_NE(errors_of(R"("articulations": [{"type": "model", "file": "none.glb"}])").find("/articulations/0/file: "),
+  EXPECT_NE(joint_errors(R"("articulations": [{"type": "model", "file": "none.glb"}])").find("/articulations/0/file: "),
             std::string::npos);
 }
 

@@ -11,7 +11,7 @@ namespace {
 LoadedScene load(const std::string& text, const std::vector<std::string>& overrides = {}) {
   return parse_scene(text, "s", OFFSTAGE_SOURCE_DIR, overrides);
 }
-std::string errors_of(const std::string& text) {
+std::string preset_errors(const std::string& text) {
   std::string all;
   try {
     load(text);
@@ -72,7 +72,7 @@ TEST(Presets, AnEffectIsPlacedNamedAndDelayedAsAWhole) {
 }
 
 TEST(Presets, WhatIsNotThereIsNamedWithWhatIs) {
-  const std::string text = errors_of(R"({"emitters": [{"preset": "smoek"}, {"preset": "fire/smok"}],
+  const std::string text = preset_errors(R"({"emitters": [{"preset": "smoek"}, {"preset": "fire/smok"}],
     "effects": [{"preset": "fire", "overrides": {"flame": {}}}, {"preset": "rain", "overrides": {"rain": {"rat": 1}}}]})");
   EXPECT_NE(text.find("/emitters/0/preset: there is no preset 'smoek'; did you mean 'smoke'?"),
             std::string::npos);

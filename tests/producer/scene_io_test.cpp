@@ -12,12 +12,12 @@
 namespace offstage::producer {
 namespace {
 
-Scene scene_of(const std::string& text, const std::vector<std::string>& overrides = {}) {
+Scene loaded_scene(const std::string& text, const std::vector<std::string>& overrides = {}) {
   return parse_scene(text, "s", OFFSTAGE_SOURCE_DIR, overrides).scene;
 }
 
 /// All that is wrong with a scene, one problem a line.
-std::string errors_of(const std::string& text, const std::vector<std::string>& overrides = {}) {
+std::string load_errors(const std::string& text, const std::vector<std::string>& overrides = {}) {
   try {
     parse_scene(text, "s", OFFSTAGE_SOURCE_DIR, overrides);
   } catch (const SceneError& error) {
@@ -29,7 +29,7 @@ std::string errors_of(const std::string& text, const std::vector<std::string>& o
 // --- Reading ---
 
 TEST(SceneIo, AnEmptySceneIsAllDefaults) {
-  const Scene scene = scene_of("{}");
+  const Scene scene = loaded_scene("{}");
   EXPECT_EQ(scene.name, "s");
   EXPECT_EQ(scene.world.gravity, Vec3(0, -9.81, 0));
   EXPECT_EQ(scene.lights.size(), 1u);
@@ -38,7 +38,7 @@ TEST(SceneIo, AnEmptySceneIsAllDefaults) {
 }
 
 TEST(SceneIo, EveryPartOfTheSampleArrives) {
-  const Scene scene = scene_of(kSampleScene);
+  const Scene scene = loaded_scene(kSampleScene);
   EXPECT_EQ(scene.world.integrator, sim::IntegratorKind::midpoint);
   EXPECT_EQ(scene.world.seed, 42u);
   EXPECT_EQ(scene.bodies.size(), 3u + 12 + 5);
@@ -62,14 +62,14 @@ TEST(SceneIo, EveryPartOfTheSampleArrives) {
 
 TEST(SceneIo, ColoursAreSrgbTextOrLinearNumbers) {
   const Scene scene =
-      scene_of(R"({"materials": [{"color": "#ff8000"}, {"color": "#00000080"}, {"color": [2, 0.5, 0]},
+      loaded_scene(R"({"materials": [{"color": "#ff8000"}, {"color": "#00000080"}, {"color": [2, 0.5, 0]},
                                                  {"color": [0, 0, 0, 0.25]}]})");
   const Eigen::Vector4f orange(1, 0.21586050f, 0, 1);  // 0x80 / 255 decoded by IEC 61966-2-1
   EXPECT_LT((scene.materials[0].color.rgba - orange).cwiseAbs().maxCoeff(), 1e-6f);
   EXPECT_FLOAT_EQ(scene.materials[1].color.rgba[3], 128 / 255.f);
   EXPECT_EQ(scene.materials[2].color.rgba, Eigen::Vector4f(2, 0.5f, 0, 1));
   EXPECT_EQ(scene.materials[3].color.rgba, Eigen::Vector4f(0, 0, 0, 0.25f));
-  EXPECT_EQ(errors_of(R"({"materials": [{"color": "#ff80"}, {"color": "#ff80zz"}, {"color": "#+10203"},
+  EXPECT_EQ(load_errors(R"({"materials": [{"color": "#ff80"}, {"color": "#ff80zz"}, {"color": "#+10203"},
 {"color": [1, 1]}, {"color": [1, -1, 0]}, {"color": [0, 0, 0, 2]}]})"),
             "s:1:26: /materials/0/color: must be \"#rrggbb\", \"#rrggbbaa\" or a list of 3 or 4 numbers, got "
             "the string "
@@ -87,7 +87,7 @@ TEST(SceneIo, ColoursAreSrgbTextOrLinearNumbers) {
 }
 
 TEST(SceneIo, OrientationsAreQuaternionsOrAxisAndAngle) {
-  const Scene scene = scene_of(
+  const Scene scene = loaded_scene(
       R"({"bodies": [{"orientation": [2, 0, 0, 2]}, {"orientation": {"axis": [0, 0, 5], "angle_deg": 90}},
                                               {"orientation": {"axis": [0, 1, 0], "angle_deg": -720}}]})");
   const Quat quarter(std::sqrt(0.5), 0, 0, std::sqrt(0.5));
@@ -95,7 +95,7 @@ TEST(SceneIo, OrientationsAreQuaternionsOrAxisAndAngle) {
   EXPECT_LT((scene.bodies[1].orientation.coeffs() - quarter.coeffs()).norm(), 1e-15);
   EXPECT_LT(scene.bodies[2].orientation.angularDistance(Quat::Identity()), 1e-7);
   EXPECT_EQ(
-      errors_of(
+      load_errors(
           R"({"bodies": [{"orientation": [0, 0, 0, 0]}, {"orientation": {"axis": [0, 0, 0], "angle_deg": 1}},
 {"orientation": {"axis": [1, 0, 0], "angel_deg": 1}}, {"orientation": 90}]})"),
       "s:1:29: /bodies/0/orientation: must be a vector that is not zero, got [0,0,0,0]\n"
@@ -108,7 +108,7 @@ TEST(SceneIo, OrientationsAreQuaternionsOrAxisAndAngle) {
 
 TEST(SceneIo, WhatVariesMustStayInItsRange) {
   const auto radius = [](const std::string& value) {
-    return errors_of(R"({"emitters": [{"radius": )" + value + "}]}");
+    return load_errors(R"({"emitters": [{"radius": )" + value + "}]}");
   };
   EXPECT_EQ(radius(R"({"mean": 0.02, "deviation": 0.01})"), "");
   EXPECT_EQ(radius(R"({"mean": 0.02, "deviation": 0.03, "min": 0.001})"), "");
@@ -131,15 +131,15 @@ TEST(SceneIo, WhatVariesMustStayInItsRange) {
 
 TEST(SceneIo, ClosedLimitsCutOffANormalDistribution) {
   const Scene scene =
-      scene_of(R"({"emitters": [{"restitution": {"mean": 0.9, "deviation": 0.5, "clip": false}}]})");
+      loaded_scene(R"({"emitters": [{"restitution": {"mean": 0.9, "deviation": 0.5, "clip": false}}]})");
   const auto& normal = std::get<effects::Normal>(scene.emitters[0].restitution);
   EXPECT_EQ(normal.min, 0);
   EXPECT_EQ(normal.max, 1);
 }
 
 TEST(SceneIo, TypesLeftOutAreTheFirstWhereThatReadsNaturally) {
-  EXPECT_TRUE(std::holds_alternative<StaticCamera>(scene_of(R"({"camera": {"eye": [0, 1, 9]}})").camera));
-  EXPECT_EQ(errors_of(R"({"bodies": [{"shape": {"radius": 1}}]})"),
+  EXPECT_TRUE(std::holds_alternative<StaticCamera>(loaded_scene(R"({"camera": {"eye": [0, 1, 9]}})").camera));
+  EXPECT_EQ(load_errors(R"({"bodies": [{"shape": {"radius": 1}}]})"),
             "s:1:23: /bodies/0/shape/type: is required: one of \"sphere\", \"box\", \"capsule\", "
             "\"cylinder\", \"cone\", "
             "\"plane\" or \"mesh\"");
@@ -163,7 +163,7 @@ TEST(SceneIo, CanonicalDoesNotDependOnHowASceneIsWritten) {
 // --- Errors ---
 
 TEST(SceneIo, EveryProblemIsReportedAtOnceInOrder) {
-  EXPECT_EQ(errors_of(R"({
+  EXPECT_EQ(load_errors(R"({
   "bodies": [
     {"shape": {"type": "sphere", "raduis": 1}},
     {"motion": "dynamc"},
@@ -190,7 +190,7 @@ TEST(SceneIo, EveryProblemIsReportedAtOnceInOrder) {
 
 TEST(SceneIo, WhatIsRequiredIsMissed) {
   EXPECT_EQ(
-      errors_of(
+      load_errors(
           R"({"bodies": [{"shape": {"type": "mesh"}, "model": {"file": ""}}], "camera": {"type": "follow"}})"),
       "s:1:23: /bodies/0/shape/file: is required: model file, or FILE#NODE for one of its nodes\n"
       "s:1:59: /bodies/0/model/file: must not be empty\n"
@@ -198,8 +198,8 @@ TEST(SceneIo, WhatIsRequiredIsMissed) {
 }
 
 TEST(SceneIo, ASceneIsAnObject) {
-  EXPECT_EQ(errors_of("[1]"), "s:1:1: must be an object, got [1]");
-  EXPECT_EQ(errors_of(R"({"bodies": {}})"), "s:1:12: /bodies: must be a list, got an object");
+  EXPECT_EQ(load_errors("[1]"), "s:1:1: must be an object, got [1]");
+  EXPECT_EQ(load_errors(R"({"bodies": {}})"), "s:1:12: /bodies: must be a list, got an object");
 }
 
 TEST(SceneIo, AMissingFileAndAFolderAreNamed) {
@@ -296,7 +296,7 @@ TEST(SceneOverride, ReachesAnyKeyByIndexNameOrPointer) {
   const std::string text =
       R"({"emitters": [{"name": "rain", "rate": 5}, {"name": "a.b/c"}], "bodies": [{"position": [1, 2, 3]}]})";
   const Scene scene =
-      scene_of(text, {"emitters.rain.rate={\"mean\": 7, \"deviation\": 1}", "/emitters/a.b~1c/speed=3",
+      loaded_scene(text, {"emitters.rain.rate={\"mean\": 7, \"deviation\": 1}", "/emitters/a.b~1c/speed=3",
                       "emitters.1.look.lit=false", "bodies.0.position.1=9", "bodies.0.name=red ball",
                       "render.quality=final", "output.duration=2", "lights.0.intensity=9",
                       "camera.type=orbit", "camera.radius=12", "world.gravity.1=-1"});
@@ -314,7 +314,7 @@ TEST(SceneOverride, ReachesAnyKeyByIndexNameOrPointer) {
 
 TEST(SceneOverride, IsCheckedLikeTheFile) {
   const std::string text = R"({"emitters": [{"name": "rain", "rate": 5}]})";
-  const auto error = [&](const std::string& override) { return errors_of(text, {override}); };
+  const auto error = [&](const std::string& override) { return load_errors(text, {override}); };
   EXPECT_EQ(error("emitters.rani.rate=1"), "--set: /emitters: has no 'rani'; did you mean 'rain'?");
   EXPECT_EQ(error("emitters.3.rate=1"), "--set: /emitters: has no '3'; it has 1 items");
   EXPECT_EQ(error("emitters.0.raet=1"),

@@ -32,7 +32,7 @@ render::Image shown(const TextOverlay& overlay, double time = 1.5) {
 }
 
 /// Left, top, right and bottom of what differs from grey; the last two not included.
-std::array<int, 4> box_of(const render::Image& image) {
+std::array<int, 4> text_box(const render::Image& image) {
   std::array<int, 4> box = {kWidth, kHeight, 0, 0};
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x)
@@ -49,7 +49,7 @@ TEST(Texts, PlaceholdersStandForTheMoment) {
 }
 
 TEST(Texts, StandWhereTheyAreToldTo) {
-  const auto box = [](TextPlace place) { return box_of(shown({.text = "Here", .place = place})); };
+  const auto box = [](TextPlace place) { return text_box(shown({.text = "Here", .place = place})); };
   const auto [left, top, right, bottom] = box(TextPlace::top_left);
   EXPECT_LT(right, kWidth / 2);
   EXPECT_LT(bottom, kHeight / 2);
@@ -64,7 +64,7 @@ TEST(Texts, StandWhereTheyAreToldTo) {
 
 TEST(Texts, LinesAreOneBelowTheOtherAndGrowWithTheirSize) {
   const auto height = [](const TextOverlay& overlay) {
-    const auto box = box_of(shown(overlay));
+    const auto box = text_box(shown(overlay));
     return box[3] - box[1];
   };
   const int one = height({.text = "HH", .size = 0.05}), two = height({.text = "HH\nHH", .size = 0.05});

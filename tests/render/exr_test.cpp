@@ -16,7 +16,7 @@
 namespace offstage::render {
 namespace {
 
-Channels sample() {
+Channels exr_sample() {
   Channels c{.width_px = 3, .height_px = 2, .depth = {}, .normal = {}, .id = {}, .motion = {}};
   for (uint32_t i = 0; i < 6; ++i) {
     const auto x = static_cast<float>(i);
@@ -41,7 +41,7 @@ std::vector<T> read(const std::filesystem::path& path, const char* name, Imf::Pi
 
 TEST(Exr, KeepsEveryNumber) {
   const ScratchFolder folder;
-  const Channels c = sample();
+  const Channels c = exr_sample();
   write_exr(folder / "a.exr", c, {{Channel::depth, Channel::normal, Channel::id, Channel::motion}},
             {{16'000'001, "the box"}});
   EXPECT_EQ(read<float>(folder / "a.exr", "Z", Imf::FLOAT), c.depth);
@@ -58,7 +58,7 @@ TEST(Exr, KeepsEveryNumber) {
 
 TEST(Exr, HoldsOnlyWhatWasChosen) {
   const ScratchFolder folder;
-  write_exr(folder / "a.exr", sample(), {{Channel::motion}}, {});
+  write_exr(folder / "a.exr", exr_sample(), {{Channel::motion}}, {});
   Imf::InputFile file((folder / "a.exr").c_str());
   std::vector<std::string> names;
   for (auto i = file.header().channels().begin(); i != file.header().channels().end(); ++i)

@@ -15,7 +15,7 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kPi = std::numbers::pi, kG = 9.81;
+constexpr Real std::numbers::pi = std::numbers::pi, kG = 9.81;
 
 WorldDef quiet(Real max_step = 1.0 / 240) {
   return {.max_step = max_step, .sleep = false};
@@ -56,9 +56,9 @@ Real arithmetic_geometric_mean(Real a, Real b) {
 TEST(CompoundPendulum, HasThePeriodOfTheEllipticIntegral) {
   for (const Real degrees : {5.0, 90.0}) {
     World world(quiet());
-    const BodyHandle rod = add_pendulum(world, degrees * kPi / 180);
+    const BodyHandle rod = add_pendulum(world, degrees * std::numbers::pi / 180);
     const Real inertia = 1.0 / 3 + 0.02 * 0.02 / 12, w0 = std::sqrt(kG * 0.5 / inertia);
-    const Real period = 2 * kPi / (w0 * arithmetic_geometric_mean(1, std::cos(degrees * kPi / 360)));
+    const Real period = 2 * std::numbers::pi / (w0 * arithmetic_geometric_mean(1, std::cos(degrees * std::numbers::pi / 360)));
     std::vector<Real> crossings;
     Real before = world.body(rod).centre.x();
     while (crossings.size() < 9) {
@@ -116,7 +116,7 @@ TEST(DoublePendulum, FollowsItsMinimalCoordinatesForFiveSeconds) {
 
 // Steady precession at the rate W of a top that leans by theta: I1 W^2 cos(theta) - I3 w3 W + m g l = 0.
 TEST(HeavyTop, PrecessesSteadily) {
-  constexpr Real kLean = kPi / 3, kSpin = 200, radius = 0.1, height = 0.05, l = 0.1, mass = 1;
+  constexpr Real kLean = std::numbers::pi / 3, kSpin = 200, radius = 0.1, height = 0.05, l = 0.1, mass = 1;
   World world(quiet());
   const Quat turn = about_z(-kLean);
   BodyDef def;
@@ -317,7 +317,7 @@ TEST_P(Joints, SlideDownAnInclineWithoutTurning) {
 TEST_P(Joints, StopAtTheirLimits) {
   World world(def());
   // Falls from level, and stops 60 degrees further down.
-  const BodyHandle rod = add_pendulum(world, kPi / 2, 0.02, {.type = JointType::revolute, .lower = -kPi / 3});
+  const BodyHandle rod = add_pendulum(world, std::numbers::pi / 2, 0.02, {.type = JointType::revolute, .lower = -std::numbers::pi / 3});
   JointHandle joint;
   world.for_each_joint([&](JointHandle j) { joint = j; });
   Real lowest = 0;
@@ -325,8 +325,8 @@ TEST_P(Joints, StopAtTheirLimits) {
     world.step(1.0 / 240);
     lowest = std::min(lowest, world.joint(joint).coordinate);
   }
-  EXPECT_GT(lowest, -kPi / 3 - 0.01);
-  EXPECT_NEAR(world.joint(joint).coordinate, -kPi / 3, 2e-4);
+  EXPECT_GT(lowest, -std::numbers::pi / 3 - 0.01);
+  EXPECT_NEAR(world.joint(joint).coordinate, -std::numbers::pi / 3, 2e-4);
   EXPECT_LT(world.body(rod).angular_velocity.norm(), 1e-4);
 }
 

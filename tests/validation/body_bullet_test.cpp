@@ -11,7 +11,7 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kSpeed = 300, kThickness = 0.01;
+constexpr Real kBodySpeed = 300, kThickness = 0.01;
 
 class BodyBullet : public BothSolvers {
  protected:
@@ -27,7 +27,7 @@ class BodyBullet : public BothSolvers {
     const auto seen_from_plate = [&] {
       return world.body(plate).pose.point_to_body(world.body(bullet).centre);
     };
-    const Real behind = -5 * kThickness, end = world.time() + 4 / kSpeed + 2 * max_step;
+    const Real behind = -5 * kThickness, end = world.time() + 4 / kBodySpeed + 2 * max_step;
     for (Vec3 before = seen_from_plate(); world.time() < end - max_step / 2;) {
       world.step(max_step);
       const Vec3 now = seen_from_plate();
@@ -68,7 +68,7 @@ class BodyBullet : public BothSolvers {
       const Quat turn = Quat(u(10), u(11), u(12), u(13)).normalized();
       const auto bullet = world.add_body({.shape = bullets[i % 7],
                                           .pose = {target - (0.5 + random.uniform(i, 5) * 3) * way, turn},
-                                          .velocity = kSpeed * way,
+                                          .velocity = kBodySpeed * way,
                                           .angular_velocity = 100 * Vec3(u(6), u(7), u(8)),
                                           .density = 8000,
                                           .restitution = e});

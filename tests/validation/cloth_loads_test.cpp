@@ -12,7 +12,7 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kGravity = 9.81;
+constexpr Real kClothGravity = 9.81;
 
 const effects::Fabric& cotton() {
   return effects::find_fabric("cotton")->fabric;
@@ -29,14 +29,14 @@ TEST(ClothAir, AFlatSheetFallsAtItsTerminalSpeed) {
   World world;
   const ClothDef def = effects::grid_cloth({1, 1, 10, 10}, {}, cotton());
   const ClothHandle cloth = world.add_cloth(def);
-  const Real terminal = std::sqrt(2 * cotton().areal_density * kGravity / (1.2 * cotton().drag));
+  const Real terminal = std::sqrt(2 * cotton().areal_density * kClothGravity / (1.2 * cotton().drag));
   Real mass = 0;
   for (Real m : def.masses) mass += m;
   for (int frame = 1; frame <= 48; ++frame) {
     world.step(1.0 / 48);
     const Real speed = -momentum(def, world.cloth(cloth)).y() / mass;
     // Of first order in the world's step: 1/240 s of g / v_t is 0.026.
-    EXPECT_NEAR(speed, terminal * std::tanh(kGravity * frame / 48 / terminal), 0.01 * terminal) << frame;
+    EXPECT_NEAR(speed, terminal * std::tanh(kClothGravity * frame / 48 / terminal), 0.01 * terminal) << frame;
   }
 }
 

@@ -24,7 +24,7 @@ ClothDef sheet(Real size, uint32_t cells, const Vec3& place) {
 }
 
 /// Drops a cloth for some seconds; nothing may be inside of a body or cross itself at any frame.
-void drop(World& world, ClothHandle cloth, int frames) {
+void drop_cloth(World& world, ClothHandle cloth, int frames) {
   for (int i = 0; i < frames; ++i) {
     const StepReport report = world.step(1.0 / 24);
     ASSERT_TRUE(report.finite);
@@ -39,7 +39,7 @@ TEST(ClothValidation, ComesToRestOnASphere) {
   world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
   world.add_body({.shape = Sphere{0.5}, .motion = MotionType::fixed, .pose = {{0, 0.5, 0}}});
   const ClothHandle cloth = world.add_cloth(sheet(1.6, 24, {0.05, 1.1, 0}));
-  drop(world, cloth, 120);
+  drop_cloth(world, cloth, 120);
   EXPECT_LT(speed(world.cloth(cloth)), 0.1);
 }
 
@@ -48,7 +48,7 @@ TEST(ClothValidation, ComesToRestOnTheEdgeOfABox) {
   world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
   world.add_body({.shape = Box{{1, 0.5, 1}}, .motion = MotionType::fixed, .pose = {{0, 0.25, 0}}});
   const ClothHandle cloth = world.add_cloth(sheet(1.2, 24, {0.5, 0.7, 0}));
-  drop(world, cloth, 120);
+  drop_cloth(world, cloth, 120);
   EXPECT_LT(speed(world.cloth(cloth)), 0.1);
 }
 
@@ -58,9 +58,9 @@ TEST(ClothValidation, ADishRestsOnAClothOnATable) {
   const ClothHandle cloth = world.add_cloth(sheet(0.8, 24, {0, 0.51, 0}));
   const BodyHandle dish =
       world.add_body({.shape = Cylinder{0.12, 0.05}, .pose = {{0, 0.55, 0}}, .mass = 0.4});
-  drop(world, cloth, 72);
+  drop_cloth(world, cloth, 72);
   const Vec3 place = world.body(dish).centre;
-  drop(world, cloth, 24);
+  drop_cloth(world, cloth, 24);
   EXPECT_LT((world.body(dish).centre - place).norm(), 1e-3);  // it creeps by less than 1 mm in a second
   // The dish lies two thicknesses above the table, less the overlap that holds it.
   EXPECT_NEAR(place.y(), 0.5 + 0.025 + 2 * world.cloth_def(cloth).thickness, 2e-3);
@@ -82,10 +82,10 @@ TEST(ClothValidation, ExchangesMomentumWithABody) {
   for (int i = 0; i < 24; ++i) world.step(1.0 / 24);
   EXPECT_LT(world.body(ball).velocity.norm(), 1.99);
   // Overlaps are taken back without motion, which is what is lost here.
-  EXPECT_NEAR((momentum() - Vec3(0, -1, 0)).norm(), 0, 0.02);
+  EXPECT_NEAR((cloth_momentum() - Vec3(0, -1, 0)).norm(), 0, 0.02);
 }
 
-Vec3 momentum(const ClothDef& def, const ClothView& view) {
+Vec3 cloth_momentum(const ClothDef& def, const ClothView& view) {
   Vec3 sum = Vec3::Zero();
   for (std::size_t i = 0; i < view.points.size(); ++i) sum += def.masses[i] * view.velocities[i];
   return sum;
@@ -105,7 +105,7 @@ TEST(ClothValidation, AnExplosionGivesEachPointItsShareByMass) {
     expected += def.masses[i] / total * impulse(blast, def.vertices[i]);
   for (int i = 0; i < 6; ++i) world.step(1.0 / 24);
   EXPECT_GT(expected.y(), 0.1);
-  EXPECT_LT((momentum(def, world.cloth(cloth)) - expected).norm(), 1e-9 + 1e-3 * expected.norm());
+  EXPECT_LT((cloth_momentum(def, world.cloth(cloth)) - expected).norm(), 1e-9 + 1e-3 * expected.norm());
 }
 
 TEST(ClothValidation, ParticlesBounceOffClothAndPushIt) {
@@ -125,7 +125,7 @@ TEST(ClothValidation, ParticlesBounceOffClothAndPushIt) {
                                 .friction = 0});
   for (int i = 0; i < 3; ++i) world.step(1.0 / 24);
   const ParticleArrays& p = world.particles(grains);
-  Vec3 sum = momentum(def, world.cloth(cloth));
+  Vec3 sum = cloth_momentum(def, world.cloth(cloth));
   for (std::size_t i = 0; i < p.size(); ++i) {
     sum += p.mass[i] * p.velocity[i];
     EXPECT_GT(p.velocity[i].y(), -0.99 * kSpeed) << i;
@@ -155,7 +155,7 @@ TEST(ClothValidation, NoCornerOfABoxPokesThroughACoarseCloth) {
   const Vec3 centre(0.03, 0.2, 0.02);
   world.add_body({.shape = Box{{0.4, 0.4, 0.4}}, .motion = MotionType::fixed, .pose = {centre}});
   const ClothHandle cloth = world.add_cloth(sheet(1.4, 12, {0, 0.45, 0}));
-  drop(world, cloth, 72);
+  drop_cloth(world, cloth, 72);
   const ClothView view = world.cloth(cloth);
   for (Real x : {-0.2, 0.2})
     for (Real z : {-0.2, 0.2})

@@ -8,7 +8,7 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kGravity = 9.81;
+constexpr Real kFrictionGravity = 9.81;
 
 class Incline : public BothSolvers {
  protected:
@@ -43,7 +43,7 @@ TEST_P(Incline, BoxSlidesAsComputedAbove) {
   for (const Real degrees : {27.0, 35.0, 42.0}) {
     const Real a = degrees * std::numbers::pi / 180, t = 2;
     const Vec3 s = way(Box{{0.4, 0.1, 0.3}}, 0.05, {.restitution = 0}, a, t);
-    const Real expected = 0.5 * kGravity * (std::sin(a) - 0.5 * std::cos(a)) * t * t;
+    const Real expected = 0.5 * kFrictionGravity * (std::sin(a) - 0.5 * std::cos(a)) * t * t;
     EXPECT_NEAR(s.x() / expected, 1, 0.002) << degrees;
     EXPECT_LT(std::abs(s.z()), 1e-6 * (1 + s.x())) << degrees;
     EXPECT_LT(std::abs(s.y()), 1e-4) << degrees;
@@ -62,8 +62,8 @@ TEST_P(Incline, BoxFollowsTheGrainOfASurface) {
                          .friction_axis = axis};
     const Vec3 s = way(Box{{0.4, 0.1, 0.4}}, 0.05, ground, a, t);
     const Real pull_along = std::sin(a) * std::cos(phi), pull_across = std::sin(a) * std::sin(phi);
-    const Real along = 0.5 * kGravity * (pull_along - 0.2 * std::cos(a)) * t * t;
-    const Real aside = 0.5 * kGravity * std::max(pull_across - mu_across * std::cos(a), 0.0) * t * t;
+    const Real along = 0.5 * kFrictionGravity * (pull_along - 0.2 * std::cos(a)) * t * t;
+    const Real aside = 0.5 * kFrictionGravity * std::max(pull_across - mu_across * std::cos(a), 0.0) * t * t;
     EXPECT_NEAR(s.dot(axis) / along, 1, 0.005) << mu_across;
     EXPECT_NEAR(-s.dot(across), aside, 0.005 * along) << mu_across;
   }
@@ -79,8 +79,8 @@ TEST_P(Incline, CylinderRollsWithTwoThirdsOfThePull) {
   const Vec3 start = world.body(roller).centre;
   run(world, t);
   const Vec3 s = incline(a).vector_to_body(world.body(roller).centre - start);
-  EXPECT_NEAR(s.x() / (kGravity / 3 * std::sin(a) * t * t), 1, 0.005);
-  EXPECT_NEAR(world.body(roller).angular_velocity.z() * 0.1 / (-2.0 / 3 * kGravity * std::sin(a) * t), 1,
+  EXPECT_NEAR(s.x() / (kFrictionGravity / 3 * std::sin(a) * t * t), 1, 0.005);
+  EXPECT_NEAR(world.body(roller).angular_velocity.z() * 0.1 / (-2.0 / 3 * kFrictionGravity * std::sin(a) * t), 1,
               0.005);
   EXPECT_LT(std::abs(s.z()), 1e-3);
 }
@@ -99,7 +99,7 @@ TEST_P(Incline, BoxTipsIfFrictionHoldsMoreThanWidthOverHeight) {
   EXPECT_LT(stood.norm(), 1e-4);
   EXPECT_LT(stood_turning, 0.01);
   const auto [slid, slid_turning] = outcome(0.4, 0.25);
-  EXPECT_NEAR(slid.x() / (0.5 * kGravity * std::cos(std::atan(0.4)) * 0.15 * 0.49), 1, 0.01);
+  EXPECT_NEAR(slid.x() / (0.5 * kFrictionGravity * std::cos(std::atan(0.4)) * 0.15 * 0.49), 1, 0.01);
   EXPECT_LT(slid_turning, 0.01);
   const auto [tipped, tipped_turning] = outcome(0.4, 0.6);
   EXPECT_GT(tipped_turning, 1);
@@ -127,7 +127,7 @@ TEST_P(Level, SlidingBallRollsAfterTwoSeventhsAtFiveSevenths) {
                                     .velocity = {kSpeed, 0, 0},
                                     .restitution = 0,
                                     .friction = kMu});
-  const Real rolls = 2 * kSpeed / (7 * kMu * kGravity);
+  const Real rolls = 2 * kSpeed / (7 * kMu * kFrictionGravity);
   const auto slip = [&] {
     const BodyState s = world.body(ball);
     return s.velocity.x() + kRadius * s.angular_velocity.z();
@@ -156,15 +156,15 @@ TEST_P(Level, StaticFrictionHoldsUpToItsLimitThenTheDynamicOneDecides) {
                                      .restitution = 0,
                                      .friction = kDynamic,
                                      .static_friction = kStatic});
-    world.add_force({.effect = ConstantField{.force = {pull * kMass * kGravity, 0, 0}}});
+    world.add_force({.effect = ConstantField{.force = {pull * kMass * kFrictionGravity, 0, 0}}});
     run(world, 1);
     return world.body(box).centre.x();
   };
   EXPECT_LT(std::abs(slide(0.57, 0)), 1e-6);
   // The few steps that it takes to be seen to slide are those of the static limit.
-  EXPECT_NEAR(slide(0.63, 0) / (0.5 * kGravity * (0.63 - kDynamic)), 1, 0.02);
+  EXPECT_NEAR(slide(0.63, 0) / (0.5 * kFrictionGravity * (0.63 - kDynamic)), 1, 0.02);
   // What slides already is not held by what would hold it at rest.
-  EXPECT_NEAR(slide(0.5, 1) / (1 + 0.5 * kGravity * (0.5 - kDynamic)), 1, 0.005);
+  EXPECT_NEAR(slide(0.5, 1) / (1 + 0.5 * kFrictionGravity * (0.5 - kDynamic)), 1, 0.005);
 }
 
 TEST_P(Level, ConveyorBringsABoxToItsSpeed) {
@@ -178,7 +178,7 @@ TEST_P(Level, ConveyorBringsABoxToItsSpeed) {
                   .surface_velocity = {kBelt, 0, 0}});
   const auto box = world.add_body(
       {.shape = Box{{0.4, 0.1, 0.4}}, .pose = {Vec3(0, 0.05, 0)}, .restitution = 0, .friction = kMu});
-  const Real takes = kBelt / (kMu * kGravity);
+  const Real takes = kBelt / (kMu * kFrictionGravity);
   run(world, takes / 2, takes / 100);
   EXPECT_NEAR(world.body(box).velocity.x(), kBelt / 2, 0.005 * kBelt);
   run(world, 0.52 * takes, takes / 100);
@@ -205,9 +205,9 @@ TEST_P(Level, PlankPulledFromUnderABox) {
                                      .friction = kMu});
     world.add_force({.bodies = {plank}, .effect = ConstantField{.force = {pull, 0, 0}}});
     run(world, t);
-    const Real most = kMu * kBox * kGravity, common = pull / (kBox + kPlank);
-    const bool slips = common > kMu * kGravity;
-    EXPECT_NEAR(world.body(box).centre.x() / ((slips ? kMu * kGravity : common) * t * t / 2), 1, 0.005)
+    const Real most = kMu * kBox * kFrictionGravity, common = pull / (kBox + kPlank);
+    const bool slips = common > kMu * kFrictionGravity;
+    EXPECT_NEAR(world.body(box).centre.x() / ((slips ? kMu * kFrictionGravity : common) * t * t / 2), 1, 0.005)
         << pull;
     EXPECT_NEAR(world.body(plank).centre.x() / ((slips ? (pull - most) / kPlank : common) * t * t / 2), 1,
                 0.005)
@@ -232,7 +232,7 @@ TEST_P(Level, BoxPushedOnABox) {
                                      .friction = kMu});
     world.add_force({.bodies = {top}, .effect = ConstantField{.force = {push, 0, 0}}});
     run(world, t);
-    const Real most = kMu * kTop * kGravity, common = push / (kTop + kBottom);
+    const Real most = kMu * kTop * kFrictionGravity, common = push / (kTop + kBottom);
     const bool slips = common * kBottom > most;
     EXPECT_NEAR(world.body(top).centre.x() / ((slips ? (push - most) / kTop : common) * t * t / 2), 1, 0.005)
         << push;
@@ -271,7 +271,7 @@ TEST_P(Level, PusherDrivesARowOfBoxes) {
     }
   }
   EXPECT_NEAR(world.body(row[1]).velocity.x() / kAcceleration, 1, 0.005);
-  EXPECT_NEAR(between.x() / (kMass * (kAcceleration + kMu * kGravity)), 1, 0.05);
+  EXPECT_NEAR(between.x() / (kMass * (kAcceleration + kMu * kFrictionGravity)), 1, 0.05);
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, Level);
 
@@ -282,9 +282,9 @@ struct FallingRod {
 
   Real acceleration(Real phi, Real rate) const {
     const Real d = distance, s = std::sin(phi), c = std::cos(phi);
-    if (rough) return mass * kGravity * d * s / (inertia + mass * d * d);
+    if (rough) return mass * kFrictionGravity * d * s / (inertia + mass * d * d);
     // The centre goes straight down: T = (I + m d^2 sin^2 phi) phi'^2 / 2, V = m g d cos phi.
-    return mass * d * s * (kGravity - d * c * rate * rate) / (inertia + mass * d * d * s * s);
+    return mass * d * s * (kFrictionGravity - d * c * rate * rate) / (inertia + mass * d * d * s * s);
   }
   /// By RK4, from rest.
   Real angle(Real phi, Real seconds) const {
@@ -354,7 +354,7 @@ class Dome : public BothSolvers {
     World world(def(max_step));
     world.add_body(
         {.shape = Sphere{kSphere}, .motion = MotionType::fixed, .restitution = 0, .friction = friction});
-    const Real speed = std::sqrt(2 * share * kGravity * kWay * (1 - std::cos(kStart)));
+    const Real speed = std::sqrt(2 * share * kFrictionGravity * kWay * (1 - std::cos(kStart)));
     const auto ball = world.add_body({.shape = Sphere{kBall},
                                       .pose = {kWay * Vec3(std::sin(kStart), std::cos(kStart), 0)},
                                       .velocity = speed * Vec3(std::cos(kStart), -std::sin(kStart), 0),
@@ -369,8 +369,8 @@ class Dome : public BothSolvers {
         if (c.force.norm() > 0) flight.touched = world.body(ball).centre.normalized().y();
     }
     const Real across = world.body(ball).velocity.x();
-    flight.cosine = std::cbrt(across * across / (kGravity * kWay));
-    flight.energy = 1 - world.energy().total() / (kGravity * kWay);
+    flight.cosine = std::cbrt(across * across / (kFrictionGravity * kWay));
+    flight.energy = 1 - world.energy().total() / (kFrictionGravity * kWay);
     return flight;
   }
 };

@@ -10,7 +10,7 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kGravity = 9.81;
+constexpr Real kImpactGravity = 9.81;
 
 class BallDrop : public BothSolvers {
  protected:
@@ -32,7 +32,7 @@ class BallDrop : public BothSolvers {
       const BodyState s = world.body(ball);
       const Real y = s.centre.y() - kRadius, v = s.velocity.y();
       // Of the parabola, from any point of it.
-      if (last_v > 0 && v <= 0 && y > 1e-2) d.apexes.push_back(y + v * v / (2 * kGravity));
+      if (last_v > 0 && v <= 0 && y > 1e-2) d.apexes.push_back(y + v * v / (2 * kImpactGravity));
       last_v = v;
     }
     d.rest_height = world.body(ball).centre.y() - kRadius;
@@ -267,7 +267,7 @@ TEST_P(Paddle, ABoxPushesAStackAlong) {
   Vec3 push = Vec3::Zero();
   for (const ContactState& c : world.contacts())
     if (c.a == pusher || c.b == pusher) push += c.a == pusher ? -c.force : c.force;
-  const Real weight = 3 * world.body(stack[0]).mass * kGravity;
+  const Real weight = 3 * world.body(stack[0]).mass * kImpactGravity;
   EXPECT_NEAR(push.x() / (0.5 * (weight - push.y())), 1, 0.01);
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, Paddle);

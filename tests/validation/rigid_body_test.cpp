@@ -11,7 +11,6 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kPi = std::numbers::pi;
 
 /// Complete elliptic integral of the first kind by the arithmetic-geometric mean; m = k^2.
 Real elliptic_k(Real m) {
@@ -21,7 +20,7 @@ Real elliptic_k(Real m) {
     b = std::sqrt(a * b);
     a = mean;
   }
-  return kPi / (2 * a);
+  return std::numbers::pi / (2 * a);
 }
 
 // A box of three different moments I1 < I2 < I3, spun about the middle one, does what the T-handle does.
@@ -70,7 +69,7 @@ TEST(SymmetricTop, PrecessesFreelyAtTheClosedFormRate) {
   World world({.gravity = Vec3::Zero()});
   const auto top = world.add_body({.shape = Cylinder{0.2, 0.05}, .angular_velocity = {2, 20, 0}, .mass = 1});
   const Mat3 unit = mass_properties(Shape(Cylinder{0.2, 0.05})).inertia;
-  const Real across = unit(0, 0) / (kPi * 0.04 * 0.05);
+  const Real across = unit(0, 0) / (std::numbers::pi * 0.04 * 0.05);
   const Vec3 H = world.body(top).angular_momentum, axis = H.normalized();
   const Real rate = H.norm() / across;
   const Vec3 start = Vec3::UnitY();
@@ -108,10 +107,10 @@ void expect_second_order(const Exact& exact, const std::function<TriangleMesh(ui
 }
 
 TEST(MassProperties, SphereAndTorusMeshesConvergeWithTheSquareOfTheEdge) {
-  const Real volume = 4.0 / 3 * kPi;
+  const Real volume = 4.0 / 3 * std::numbers::pi;
   expect_second_order({volume, 0.4 * volume}, [](uint32_t n) { return sphere_mesh(1, 2 * n, n); });
   constexpr Real R = 1, r = 0.3;
-  const Real torus = 2 * kPi * kPi * R * r * r;
+  const Real torus = 2 * std::numbers::pi * std::numbers::pi * R * r * r;
   expect_second_order({torus, torus * (R * R + 0.75 * r * r)},
                       [](uint32_t n) { return torus_mesh(R, r, 2 * n, n); });
 }

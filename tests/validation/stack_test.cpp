@@ -12,7 +12,6 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kPi = std::numbers::pi;
 
 BodyHandle add_ground(World& world, Real friction = 0.5) {
   return world.add_body(
@@ -192,7 +191,7 @@ class Cards : public BothSolvers {
   /// Two cards lean against a post that stands between them. Post and cards are smooth, so that only the
   /// floor's friction keeps a card from sliding: m g (L/2 sin a - t/2 cos a) = mu m g L cos a about its foot.
   static Real height_after(Real share_of_bound, Real seconds) {
-    constexpr Real kLength = 0.4, kThick = 0.01, kTilt = 20 * kPi / 180, kPost = 0.02;
+    constexpr Real kLength = 0.4, kThick = 0.01, kTilt = 20 * std::numbers::pi / 180, kPost = 0.02;
     const Real bound =
         (kLength * std::sin(kTilt) - kThick * std::cos(kTilt)) / (2 * kLength * std::cos(kTilt));
     World world(def());
@@ -234,7 +233,7 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, Cards);
 /// springers.
 struct Arch {
   static constexpr int kWedges = 9;
-  static constexpr Real kInner = 1, kOuter = 1.5, kSpan = 75 * kPi / 180;
+  static constexpr Real kInner = 1, kOuter = 1.5, kSpan = 75 * std::numbers::pi / 180;
 
   /// Joint k at theta carries a thrust of horizontal part H and the weight between it and the crown, V ~
   /// theta; it slips unless the thrust is within phi of the joint's normal: V / tan(theta + phi) <= H <= V /
@@ -244,7 +243,7 @@ struct Arch {
     Real low = 0, high = 1e9;
     for (int k = kWedges / 2 + 1; k <= kWedges; ++k) {
       const Real theta = kSpan * (2 * k - kWedges) / kWedges;
-      if (theta + phi < kPi / 2) low = std::max(low, theta / std::tan(theta + phi));
+      if (theta + phi < std::numbers::pi / 2) low = std::max(low, theta / std::tan(theta + phi));
       if (theta > phi) high = std::min(high, theta / std::tan(theta - phi));
     }
     return low <= high;

@@ -50,7 +50,7 @@ TEST(StepReport, TellsWhoFellAsleepAndWhoWoke) {
 }
 
 // 80 boxes of six contacts and more, falling into a pit: blows of many at once.
-Decisions heap(SolverKind solver, Real restitution) {
+Decisions reported_heap(SolverKind solver, Real restitution) {
   World world(WorldDef{.solver = solver});
   add_floor(world, restitution);
   for (int side = 0; side < 4; ++side) {
@@ -71,12 +71,12 @@ Decisions heap(SolverKind solver, Real restitution) {
 }
 
 TEST(StepReport, TellsOfEachSolversShortCuts) {
-  const Decisions fast = heap(SolverKind::fast, 0.3);
+  const Decisions fast = reported_heap(SolverKind::fast, 0.3);
   EXPECT_GT(fast.foreseen, 0u);
   EXPECT_GT(fast.impacts.narrowed, 0u);
   EXPECT_GT(fast.fast.solves, 0u);
   EXPECT_EQ(fast.exact.solves + fast.exact.abandoned, 0u);
-  const Decisions automatic = heap(SolverKind::automatic, 0);
+  const Decisions automatic = reported_heap(SolverKind::automatic, 0);
   EXPECT_GT(automatic.exact.solves, 0u);
   EXPECT_GT(automatic.fast.solves, 0u);
   EXPECT_GT(automatic.exact.abandoned, 0u);

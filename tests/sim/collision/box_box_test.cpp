@@ -11,13 +11,13 @@
 namespace offstage::sim {
 namespace {
 
-std::set<uint32_t> ids(const Manifold& m) {
+std::set<uint32_t> point_ids(const Manifold& m) {
   std::set<uint32_t> result;
   for (uint32_t k = 0; k < m.count; ++k) result.insert(m.points[k].id);
   return result;
 }
 
-Real deepest(const Manifold& m) {
+Real deepest_point(const Manifold& m) {
   Real least = std::numeric_limits<Real>::infinity();
   for (uint32_t k = 0; k < m.count; ++k) least = std::min(least, m.points[k].separation);
   return least;
@@ -40,7 +40,7 @@ Quat turn(Dice& dice) {
   return q;
 }
 
-PlacedBoxes random_boxes(Dice& dice) {
+PlacedBoxes random_box_pair(Dice& dice) {
   const Real size = std::pow(10, dice.uniform(-3, 2)), other = size * std::pow(10, dice.uniform(-2, 0));
   const auto sizes = [&](Real s) { return Vec3(s * (Vec3::Constant(1.1) + dice.in_cube())); };
   PlacedBoxes pair{convex(Box{sizes(size)}), convex(Box{sizes(other)}), {}, size, 0.01 * other};
@@ -59,7 +59,7 @@ TEST(BoxBox, AgreesWithTheDistanceAndTheManifoldOfConvexSolids) {
   int answered = 0, unanswered_overlaps = 0, touching = 0, same = 0, same_points = 0;
   constexpr int kPairs = 20000;
   for (int k = 0; k < kPairs; ++k) {
-    const PlacedBoxes p = random_boxes(dice);
+    const PlacedBoxes p = random_box_pair(dice);
     GjkCache fresh;
     const Separation s = gjk(p.a, p.b, p.a_from_b, fresh);
     const Manifold expected = manifold(p.a, p.b, p.a_from_b, s, p.margin);
@@ -77,9 +77,9 @@ TEST(BoxBox, AgreesWithTheDistanceAndTheManifoldOfConvexSolids) {
     if (m.count == 0 || expected.count == 0) continue;
     ++touching;
     ASSERT_NEAR(m.normal.norm(), 1, 1e-12);
-    ASSERT_NEAR(deepest(m), deepest(expected), 0.06 * p.margin + rounding);
-    ASSERT_NEAR(deepest(m), s.distance, 0.06 * p.margin + rounding);
-    ASSERT_EQ(ids(m).size(), m.count);
+    ASSERT_NEAR(deepest_point(m), deepest_point(expected), 0.06 * p.margin + rounding);
+    ASSERT_NEAR(deepest_point(m), s.distance, 0.06 * p.margin + rounding);
+    ASSERT_EQ(point_ids(m).size(), m.count);
     for (uint32_t i = 0; i < m.count; ++i) {
       const ContactPoint& c = m.points[i];
       ASSERT_LE(c.separation, p.margin + rounding);
@@ -95,8 +95,8 @@ TEST(BoxBox, AgreesWithTheDistanceAndTheManifoldOfConvexSolids) {
       continue;
     }
     ++same;
-    ASSERT_NEAR(deepest(m), deepest(expected), 2e-3 * p.margin + rounding);
-    same_points += m.source == expected.source && ids(m) == ids(expected);
+    ASSERT_NEAR(deepest_point(m), deepest_point(expected), 2e-3 * p.margin + rounding);
+    same_points += m.source == expected.source && point_ids(m) == point_ids(expected);
   }
   EXPECT_GT(answered, 0.75 * kPairs);
   EXPECT_LT(unanswered_overlaps, 0.002 * kPairs);
@@ -104,7 +104,7 @@ TEST(BoxBox, AgreesWithTheDistanceAndTheManifoldOfConvexSolids) {
   EXPECT_GT(same_points, 0.99 * same);
 }
 
-const Convex& cube() {
+const Convex& unit_cube() {
   static const Convex box = convex(Box{Vec3::Ones()});
   return box;
 }
@@ -151,7 +151,7 @@ TEST(BoxBox, AStackAtRestKeepsItsPointsWithoutOtherHelp) {
   Dice dice(5);
   constexpr Real kMargin = 0.01;
   Manifold first;
-  ASSERT_TRUE(box_manifold(cube(), cube(), {Vec3(0, -1, 0), Quat::Identity()}, kMargin, first));
+  ASSERT_TRUE(box_manifold(unit_cube(), unit_cube(), {Vec3(0, -1, 0), Quat::Identity()}, kMargin, first));
   int unanswered = 0;
   constexpr int kPoses = 3000;
   for (int k = 0; k < kPoses; ++k) {
@@ -160,11 +160,11 @@ TEST(BoxBox, AStackAtRestKeepsItsPointsWithoutOtherHelp) {
     const Pose pose{Vec3(0, -1 - gap, 0) + 3e-6 * dice.uniform() * dice.in_cube(),
                     Quat(Eigen::AngleAxisd(tilt, dice.direction()))};
     Manifold m;
-    if (!box_manifold(cube(), cube(), pose, kMargin, m)) {
+    if (!box_manifold(unit_cube(), unit_cube(), pose, kMargin, m)) {
       ++unanswered;
       continue;
     }
-    ASSERT_EQ(ids(m), ids(first)) << "tilt " << tilt << " gap " << gap;
+    ASSERT_EQ(point_ids(m), point_ids(first)) << "tilt " << tilt << " gap " << gap;
     ASSERT_GT(std::abs(m.normal.y()), 1 - 1e-9);
   }
   EXPECT_LT(unanswered, 0.05 * kPoses);
@@ -178,7 +178,7 @@ TEST(BoxBox, TwistedBoxesKeepTheFacesNormalWhileTheyRock) {
   for (int k = 0; k < kPoses; ++k) {
     const Quat rock(Eigen::AngleAxisd(dice.uniform(0, 3e-4), dice.direction()));
     Manifold m;
-    if (!box_manifold(cube(), cube(), {{0, -1 + dice.uniform(-4e-4, 5e-4), 0}, rock * twist}, 0.01, m)) {
+    if (!box_manifold(unit_cube(), unit_cube(), {{0, -1 + dice.uniform(-4e-4, 5e-4), 0}, rock * twist}, 0.01, m)) {
       ++unanswered;
       continue;
     }
@@ -196,7 +196,7 @@ TEST(BoxBox, EdgesThatCrossMeetInOnePoint) {
     const Pose a{Vec3::Zero(), on_edge}, b{{0.1, -std::sqrt(2) - gap, 0.2}, across};
     const Pose a_from_b{a.point_to_body(b.position), a.orientation.conjugate() * b.orientation};
     Manifold m;
-    ASSERT_TRUE(box_manifold(cube(), cube(), a_from_b, 0.01, m));
+    ASSERT_TRUE(box_manifold(unit_cube(), unit_cube(), a_from_b, 0.01, m));
     ASSERT_EQ(m.count, 1u);
     EXPECT_EQ(m.source, NormalSource::edges);
     EXPECT_NEAR(m.points[0].separation, gap, 1e-14);

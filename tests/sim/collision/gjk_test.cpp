@@ -17,7 +17,7 @@ Quat turned(Real degrees, const Vec3& axis) {
   return Quat(Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis.normalized()));
 }
 
-Pose inverse(const Pose& p) {
+Pose inverse_of(const Pose& p) {
   return {p.vector_to_body(-p.position), p.orientation.conjugate()};
 }
 
@@ -227,7 +227,7 @@ TEST(GjkProperties, NormalsSupportTheDistanceOfPrimitives) {
 TEST(GjkProperties, SwappingTheSolidsTurnsTheNormal) {
   EXPECT_TRUE(rc::check([](uint64_t seed) {
     const Placed p = random_primitives(seed);
-    const Separation s = cold(p.a, p.b, p.a_from_b), t = cold(p.b, p.a, inverse(p.a_from_b));
+    const Separation s = cold(p.a, p.b, p.a_from_b), t = cold(p.b, p.a, inverse_of(p.a_from_b));
     RC_ASSERT(std::abs(s.distance - t.distance) <= 2e-9 * size_of(p));
     // The normal of overlapping solids is not unique; of others an excess e of the distance d turns it by
     // sqrt(2 e / d), and e is at most 1e-12 of the size.

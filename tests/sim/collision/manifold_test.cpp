@@ -18,7 +18,7 @@ namespace {
 
 constexpr Real kPi = std::numbers::pi;
 
-Pose pose(const Vec3& position, const Vec3& axis = Vec3::UnitX(), Real angle = 0) {
+Pose pose_at(const Vec3& position, const Vec3& axis = Vec3::UnitX(), Real angle = 0) {
   return {position, Quat(Eigen::AngleAxisd(angle, axis.normalized()))};
 }
 
@@ -113,7 +113,7 @@ TEST(Manifold, PointsLieOnBothSurfacesAlongTheNormalAndHoldTheDeepest) {
 TEST(Manifold, BoxesFaceToFaceMeetInTheRectangleTheyShare) {
   const Convex a = convex(Box{{2, 1, 2}}), b = convex(Box{{1, 1, 3}});
   for (Real gap : {0.01, 1e-9, 0.0, -1e-9, -0.01}) {
-    const Manifold m = manifold_of(a, b, pose({0.75, -1 - gap, 0.3}), 0.02);
+    const Manifold m = manifold_of(a, b, pose_at({0.75, -1 - gap, 0.3}), 0.02);
     ASSERT_EQ(m.count, 4u);
     EXPECT_LT((m.normal - Vec3::UnitY()).norm(), 1e-12);
     EXPECT_NEAR(deepest(m), gap, 1e-12);
@@ -123,7 +123,7 @@ TEST(Manifold, BoxesFaceToFaceMeetInTheRectangleTheyShare) {
 
 TEST(Manifold, OfAnOctagonFourCornersKeepTheLargestArea) {
   const Convex box = convex(Box{Vec3::Ones()});
-  const Manifold m = manifold_of(box, box, pose({0, -1, 0}, Vec3::UnitY(), kPi / 4), 0.01);
+  const Manifold m = manifold_of(box, box, pose_at({0, -1, 0}, Vec3::UnitY(), kPi / 4), 0.01);
   ASSERT_EQ(m.count, 4u);
   const Real corner = 0.5 / std::cos(kPi / 8);
   EXPECT_NEAR(area(m), 2 * corner * corner, 1e-4);
@@ -134,11 +134,11 @@ TEST(Manifold, ABoxThatRocksALittleKeepsItsFourPointsAndTheirNames) {
   const ConvexPolyhedron polyhedron = box_polyhedron(Vec3::Ones());
   Dice dice(3);
   for (const Convex& b : {box, convex(polyhedron)}) {
-    const std::set<uint32_t> names = ids(manifold_of(slab, b, pose({0.2, -1, 0.1}), 0.01));
+    const std::set<uint32_t> names = ids(manifold_of(slab, b, pose_at({0.2, -1, 0.1}), 0.01));
     ASSERT_EQ(names.size(), 4u);
     for (int k = 0; k < 500; ++k) {
       const Real tilt = std::pow(10, dice.uniform(-9, -3.5));
-      Pose rocked = pose({0.2, -1 + dice.uniform(-1e-4, 1e-4), 0.1}, dice.direction(), tilt);
+      Pose rocked = pose_at({0.2, -1 + dice.uniform(-1e-4, 1e-4), 0.1}, dice.direction(), tilt);
       const Manifold m = manifold_of(slab, b, rocked, 0.01);
       ASSERT_EQ(ids(m), names) << "tilt " << tilt;
       ASSERT_LT((m.normal - Vec3::UnitY()).norm(), 2e-3);
@@ -150,11 +150,11 @@ TEST(Manifold, ABoxThatRocksALittleKeepsItsFourPointsAndTheirNames) {
 TEST(Manifold, AStackOfEqualBoxesKeepsItsNamesWhileItCreeps) {
   const Convex box = convex(Box{Vec3::Ones()});
   Dice dice(5);
-  const std::set<uint32_t> names = ids(manifold_of(box, box, pose({0, -1, 0}), 0.01));
+  const std::set<uint32_t> names = ids(manifold_of(box, box, pose_at({0, -1, 0}), 0.01));
   ASSERT_EQ(names.size(), 4u);
   for (int k = 0; k < 500; ++k) {
     const Vec3 creep = 3e-6 * dice.in_cube();
-    ASSERT_EQ(ids(manifold_of(box, box, pose(Vec3(0, -1, 0) + creep, dice.direction(), 1e-6), 0.01)), names);
+    ASSERT_EQ(ids(manifold_of(box, box, pose_at(Vec3(0, -1, 0) + creep, dice.direction(), 1e-6), 0.01)), names);
   }
 }
 
@@ -175,7 +175,7 @@ TEST(Manifold, BoxesTwistedUponEachOtherKeepTheFacesNormalWhileTheyRock) {
 TEST(Manifold, AnEdgeOnAFaceHasTwoPointsAndAVertexOne) {
   const Convex box = convex(Box{Vec3::Ones()}), slab = convex(Box{{4, 1, 4}});
   const Manifold edge =
-      manifold_of(slab, box, pose({0, -0.5 - std::sqrt(0.5), 0}, Vec3::UnitX(), kPi / 4), 0.01);
+      manifold_of(slab, box, pose_at({0, -0.5 - std::sqrt(0.5), 0}, Vec3::UnitX(), kPi / 4), 0.01);
   ASSERT_EQ(edge.count, 2u);
   EXPECT_EQ(edge.source, NormalSource::face_of_a);
   EXPECT_NEAR((edge.points[0].on_a - edge.points[1].on_a).norm(), 1, 1e-12);
@@ -190,14 +190,14 @@ TEST(Manifold, EdgesMeetInTwoPointsAlongEachOtherAndInOneAcross) {
   const ConvexPolyhedron upright = box_polyhedron({3, 1, 1});
   std::vector<Vec3> corners;
   for (const Vec3& p : upright.vertices())
-    corners.push_back(pose(Vec3::Zero(), Vec3::UnitX(), kPi / 4).vector_to_world(p));
+    corners.push_back(pose_at(Vec3::Zero(), Vec3::UnitX(), kPi / 4).vector_to_world(p));
   const ConvexPolyhedron beam = convex_hull(corners);
   const Real y = -2 * std::sqrt(0.5) - 0.001;
-  const Manifold along = manifold_of(convex(beam), convex(beam), pose({1.5, y, 0}), 0.01);
+  const Manifold along = manifold_of(convex(beam), convex(beam), pose_at({1.5, y, 0}), 0.01);
   ASSERT_EQ(along.count, 2u);
   EXPECT_EQ(along.source, NormalSource::edge_of_b);
   EXPECT_NEAR((along.points[0].on_a - along.points[1].on_a).norm(), 1.5, 1e-9);
-  const Manifold across = manifold_of(convex(beam), convex(beam), pose({0.2, y, 0}, Vec3::UnitY(), 1), 0.01);
+  const Manifold across = manifold_of(convex(beam), convex(beam), pose_at({0.2, y, 0}, Vec3::UnitY(), 1), 0.01);
   ASSERT_EQ(across.count, 1u);
   EXPECT_EQ(across.source, NormalSource::edges);
   EXPECT_NEAR(across.points[0].separation, 0.001, 1e-12);
@@ -206,33 +206,33 @@ TEST(Manifold, EdgesMeetInTwoPointsAlongEachOtherAndInOneAcross) {
 TEST(Manifold, RoundSolidsRestOnTheirLinesAndDiscs) {
   const Convex slab = convex(Box{{4, 1, 4}}), cylinder = convex(Cylinder{0.4, 1.2}),
                capsule = convex(Capsule{0.3, 1}), cone = convex(Cone{0.5, 1}), ball = convex(Sphere{0.5});
-  const Manifold standing = manifold_of(slab, cylinder, pose({0, -1.1, 0}), 0.01);
+  const Manifold standing = manifold_of(slab, cylinder, pose_at({0, -1.1, 0}), 0.01);
   ASSERT_EQ(standing.count, 4u);
   EXPECT_NEAR(area(standing), 2 * 0.16, 1e-9);
-  const Manifold lying = manifold_of(slab, cylinder, pose({0, -0.9, 0}, Vec3::UnitX(), kPi / 2), 0.01);
+  const Manifold lying = manifold_of(slab, cylinder, pose_at({0, -0.9, 0}, Vec3::UnitX(), kPi / 2), 0.01);
   ASSERT_EQ(lying.count, 2u);
   EXPECT_NEAR((lying.points[0].on_a - lying.points[1].on_a).norm(), 1.2, 1e-12);
-  const Manifold stacked = manifold_of(cylinder, cylinder, pose({0, 1.2, 0}), 0.01);
+  const Manifold stacked = manifold_of(cylinder, cylinder, pose_at({0, 1.2, 0}), 0.01);
   ASSERT_EQ(stacked.count, 4u);
   EXPECT_NEAR(area(stacked), 2 * 0.16, 1e-9);
   const Manifold crossed =
       manifold_of(cylinder, cylinder, {{0, 0, 0.8}, Quat(Eigen::AngleAxisd(1, Vec3::UnitZ()))}, 0.01);
   ASSERT_EQ(crossed.count, 1u);
   EXPECT_EQ(crossed.source, NormalSource::edges);
-  const Manifold side_by_side = manifold_of(cylinder, capsule, pose({0.7, 0.4, 0}), 0.01);
+  const Manifold side_by_side = manifold_of(cylinder, capsule, pose_at({0.7, 0.4, 0}), 0.01);
   ASSERT_EQ(side_by_side.count, 2u);
   EXPECT_NEAR((side_by_side.points[0].on_a - side_by_side.points[1].on_a).norm(), 0.7, 1e-9);
-  EXPECT_EQ(manifold_of(slab, cone, pose({0, -1, 0}, Vec3::UnitX(), kPi), 0.01).count, 4u);
+  EXPECT_EQ(manifold_of(slab, cone, pose_at({0, -1, 0}, Vec3::UnitX(), kPi), 0.01).count, 4u);
   const Real slope = std::atan2(0.5, 1);  // half angle: the side line lies flat
   EXPECT_EQ(manifold_of(slab, cone,
-                        pose({0, -0.5 - 0.5 * std::sin(slope), 0}, Vec3::UnitX(), slope - kPi / 2), 0.01)
+                        pose_at({0, -0.5 - 0.5 * std::sin(slope), 0}, Vec3::UnitX(), slope - kPi / 2), 0.01)
                 .count,
             2u);
-  EXPECT_EQ(manifold_of(slab, cone, pose({0, -1, 0}), 0.01).count, 1u);
-  const Manifold sphere = manifold_of(slab, ball, pose({0.3, -1, 0.2}), 0.01);
+  EXPECT_EQ(manifold_of(slab, cone, pose_at({0, -1, 0}), 0.01).count, 1u);
+  const Manifold sphere = manifold_of(slab, ball, pose_at({0.3, -1, 0.2}), 0.01);
   ASSERT_EQ(sphere.count, 1u);
   EXPECT_LT((sphere.points[0].on_a - Vec3(0.3, -0.5, 0.2)).norm(), 1e-12);
-  EXPECT_EQ(manifold_of(ball, ball, pose({1, 0, 0}), 0.01).source, NormalSource::points);
+  EXPECT_EQ(manifold_of(ball, ball, pose_at({1, 0, 0}), 0.01).source, NormalSource::points);
 }
 
 // A flat bottom cut into triangles whose corners are rounded as in a file is still one face.
@@ -245,10 +245,10 @@ TEST(Manifold, AFloorOfAlmostCoplanarTrianglesIsOneFace) {
     points.push_back(1.2 * rim + Vec3::UnitY());
   }
   const ConvexPolyhedron drum = convex_hull(points);
-  const Manifold m = plane_manifold(convex(drum), pose({0, 1e-5, 0}), 0.01);
+  const Manifold m = plane_manifold(convex(drum), pose_at({0, 1e-5, 0}), 0.01);
   ASSERT_EQ(m.count, 4u);
   EXPECT_NEAR(area(m), 2, 0.02);
-  const Manifold on_slab = manifold_of(convex(drum), convex(Box{{4, 1, 4}}), pose({0, -0.5, 0}), 0.01);
+  const Manifold on_slab = manifold_of(convex(drum), convex(Box{{4, 1, 4}}), pose_at({0, -0.5, 0}), 0.01);
   ASSERT_EQ(on_slab.count, 4u);
   EXPECT_NEAR(area(on_slab), 2, 0.02);
 }
@@ -259,8 +259,8 @@ TEST(Manifold, ABladeStandsOnBothEndsOfItsEdge) {
   const std::vector<Vec3> points = {{-1, 0, 0},  {1, 0, 0},     {-3, 1, 0.1},
                                     {3, 1, 0.1}, {-3, 1, -0.1}, {3, 1, -0.1}};
   const ConvexPolyhedron blade = convex_hull(points);
-  EXPECT_EQ(plane_manifold(convex(blade), pose(Vec3::Zero()), 0.01).count, 2u);
-  EXPECT_EQ(manifold_of(convex(blade), convex(Box{{8, 1, 8}}), pose({0, -0.5, 0}), 0.01).count, 2u);
+  EXPECT_EQ(plane_manifold(convex(blade), pose_at(Vec3::Zero()), 0.01).count, 2u);
+  EXPECT_EQ(manifold_of(convex(blade), convex(Box{{8, 1, 8}}), pose_at({0, -0.5, 0}), 0.01).count, 2u);
 }
 
 TEST(Manifold, OnAPlaneTheLowestPointsAreExact) {
@@ -284,7 +284,7 @@ TEST(Manifold, OnAPlaneTheLowestPointsAreExact) {
       }
     }
   const Manifold box =
-      plane_manifold(convex(Box{{1, 1, 2}}), pose({5, 0.4999, 3}, Vec3::UnitX(), 1e-6), 0.01);
+      plane_manifold(convex(Box{{1, 1, 2}}), pose_at({5, 0.4999, 3}, Vec3::UnitX(), 1e-6), 0.01);
   ASSERT_EQ(box.count, 4u);
   EXPECT_NEAR(area(box), 2, 1e-6);
 }

@@ -7,7 +7,7 @@
 namespace offstage::sim {
 namespace {
 
-Pose random_pose(const Scatter& random, uint64_t i) {
+Pose random_start(const Scatter& random, uint64_t i) {
   const auto u = [&](uint64_t k) { return 2 * random.uniform(i, k) - 1; };
   return {Vec3(u(0), u(1), u(2)), Quat(u(3), u(4), u(5), u(6)).normalized()};
 }
@@ -15,7 +15,7 @@ Pose random_pose(const Scatter& random, uint64_t i) {
 TEST(PosePath, VelocitiesAreTheDerivativeOfTheWay) {
   const Scatter random{4};
   for (uint64_t i = 0; i < 100; ++i) {
-    const PosePath path(random_pose(random, 2 * i), random_pose(random, 2 * i + 1));
+    const PosePath path(random_start(random, 2 * i), random_start(random, 2 * i + 1));
     const Vec3 p(0.3, -0.4, 1.2);
     for (const Real s : {0.0, 0.1, 0.5, 0.8, 1.0}) {
       const Real h = 1e-6;

@@ -12,7 +12,7 @@ Pose inverse(const Pose& p) {
   return {p.point_to_body(Vec3::Zero()), p.orientation.conjugate()};
 }
 
-std::vector<Convex> solids(Real size) {
+std::vector<Convex> sphere_partners(Real size) {
   return {convex(Sphere{size}), convex(Capsule{0.3 * size, 1.2 * size}), convex(Capsule{0.4 * size, 0}),
           convex(Box{{size, 0.6 * size, 1.7 * size}})};
 }
@@ -29,7 +29,7 @@ TEST(SphereManifold, IsTheSeparationByGjk) {
   for (int k = 0; k < 20000; ++k) {
     const Real size = std::pow(10, dice.uniform(-3, 2)), margin = 0.1 * size;
     const Convex ball = convex(Sphere{size * std::pow(10, dice.uniform(-2, 0))});
-    const Convex other = solids(size)[dice.index(4)];
+    const Convex other = sphere_partners(size)[dice.index(4)];
     ASSERT_TRUE(is_sphere_pair(ball, other) && is_sphere_pair(other, ball));
     const Pose pose{1.5 * size * dice.in_cube(), dice.chance(0.2) ? Quat::Identity() : dice.rotation()};
     GjkCache fresh;
@@ -83,7 +83,7 @@ TEST(SphereManifold, TheNormalComesFromTheClosestFeature) {
 
 TEST(SphereManifold, CoincidentCentresHaveANormal) {
   const Convex ball = convex(Sphere{0.5});
-  for (const Convex& other : solids(1)) {
+  for (const Convex& other : sphere_partners(1)) {
     const Manifold m = found(other, ball, {}, 0.1);
     ASSERT_EQ(m.count, 1u);
     EXPECT_EQ(m.normal.norm(), 1);

@@ -11,7 +11,7 @@ namespace {
 
 constexpr Real kTolerance = 1e-6;
 
-Pose pose(const Vec3& position, Real angle = 0, const Vec3& axis = Vec3::UnitZ()) {
+Pose still_pose(const Vec3& position, Real angle = 0, const Vec3& axis = Vec3::UnitZ()) {
   return {position, Quat(Eigen::AngleAxisd(angle, axis.normalized()))};
 }
 
@@ -41,7 +41,7 @@ std::optional<Real> bisection(const MovingConvex& a, const MovingConvex& b, Real
 
 TEST(TimeOfImpact, FallingBoxOnABox) {
   const Convex box = convex(Box{Vec3(1, 1, 1)});
-  const PosePath falling(pose({0, 3, 0}), pose({0, 0, 0})), resting(pose({0.2, 0, 0}));
+  const PosePath falling(still_pose({0, 3, 0}), still_pose({0, 0, 0})), resting(still_pose({0.2, 0, 0}));
   const auto impact = time_of_impact({box, falling}, {box, resting}, kTolerance);
   ASSERT_TRUE(impact);
   EXPECT_NEAR(impact->share, 2.0 / 3, kTolerance);
@@ -52,9 +52,9 @@ TEST(TimeOfImpact, FallingBoxOnABox) {
 
 TEST(TimeOfImpact, SpheresThatGlanceAndThatMiss) {
   const Convex ball = convex(Sphere{0.5});
-  const PosePath resting(pose(Vec3::Zero()));
+  const PosePath resting(still_pose(Vec3::Zero()));
   for (const Real offset : {0.0, 0.5, 0.9, 0.999, 1.001, 1.5}) {
-    const PosePath flying(pose({-4, offset, 0}), pose({4, offset, 0}));
+    const PosePath flying(still_pose({-4, offset, 0}), still_pose({4, offset, 0}));
     const auto impact = time_of_impact({ball, flying}, {ball, resting}, kTolerance);
     ASSERT_EQ(impact.has_value(), offset < 1) << offset;
     if (!impact) continue;
@@ -67,7 +67,7 @@ TEST(TimeOfImpact, SpheresThatGlanceAndThatMiss) {
 TEST(TimeOfImpact, TurningRodMeetsThePlane) {
   // A rod of half length 1 about its middle, 0.5 above the plane: its end touches at 30 degrees.
   const Convex rod = convex(Box{Vec3(2, 1e-3, 1e-3)});
-  const Pose start = pose({0, 0.5, 0}), end = pose({0, 0.5, 0}, 1.2);
+  const Pose start = still_pose({0, 0.5, 0}), end = still_pose({0, 0.5, 0}, 1.2);
   const PosePath turning(start, end), ground{Pose{}};
   const auto impact = time_of_plane_impact({rod, turning}, ground, kTolerance);
   ASSERT_TRUE(impact);
@@ -81,19 +81,19 @@ TEST(TimeOfImpact, TurningRodMeetsThePlane) {
 TEST(TimeOfImpact, TiltingPlaneMeetsABall) {
   // A ball rests beside the pivot of a plane that swings up: it is touched when tan-free geometry says so.
   const Convex ball = convex(Sphere{0.1});
-  const PosePath resting(pose({2, 0.5, 0})), swinging(pose(Vec3::Zero()), pose(Vec3::Zero(), 1.0));
+  const PosePath resting(still_pose({2, 0.5, 0})), swinging(still_pose(Vec3::Zero()), still_pose(Vec3::Zero(), 1.0));
   const auto impact = time_of_plane_impact({ball, resting}, swinging, kTolerance);
   ASSERT_TRUE(impact);
   const Vec3 up = swinging.at(impact->share).vector_to_world(Vec3::UnitY());
   EXPECT_NEAR(up.dot(Vec3(2, 0.5, 0)), 0.1, 2 * kTolerance);
-  const PosePath sinking(pose(Vec3::Zero()), pose(Vec3(0, -1, 0), -1.0));
+  const PosePath sinking(still_pose(Vec3::Zero()), still_pose(Vec3(0, -1, 0), -1.0));
   EXPECT_FALSE(time_of_plane_impact({ball, resting}, sinking, kTolerance));
 }
 
 TEST(TimeOfImpact, TouchingAtTheStartIsAnImpactAtOnce) {
   const Convex box = convex(Box{Vec3(1, 1, 1)});
   for (const Real height : {1.0, 0.8}) {
-    const PosePath sliding(pose({0, height, 0}), pose({1, height, 0})), resting{Pose{}};
+    const PosePath sliding(still_pose({0, height, 0}), still_pose({1, height, 0})), resting{Pose{}};
     const auto impact = time_of_impact({box, sliding}, {box, resting}, kTolerance);
     ASSERT_TRUE(impact);
     EXPECT_EQ(impact->share, 0);

@@ -18,7 +18,7 @@ Pose at(const Vec3& position, const Quat& orientation = Quat::Identity()) {
   return {position, orientation};
 }
 
-Separation cold(const ConvexPolyhedron& a, const ConvexPolyhedron& b, const Pose& a_from_b) {
+Separation cold_start(const ConvexPolyhedron& a, const ConvexPolyhedron& b, const Pose& a_from_b) {
   VclipCache cache;
   return vclip(a, b, a_from_b, cache);
 }
@@ -92,7 +92,7 @@ TEST(Vclip, AVertexUnderAFaceEscapesToTheFaceItIsOver) {
 
 TEST(Vclip, AnEdgeThroughAFaceIsPenetration) {
   const ConvexPolyhedron slab = box_polyhedron({2, 0.2, 2}), spike = box_polyhedron({0.1, 6, 0.1});
-  const Separation s = cold(slab, spike, at({0.9, 0, 0}));
+  const Separation s = cold_start(slab, spike, at({0.9, 0, 0}));
   EXPECT_NEAR(s.distance, -0.15, 1e-12);
   EXPECT_LT((s.normal + Vec3::UnitX()).norm(), 1e-12);
 }
@@ -105,19 +105,19 @@ TEST(Vclip, PolygonsSegmentsAndPoints) {
   const Quat upright(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitZ())),
       aside(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitY()));
   for (const Real y : {0.25, -0.25}) {
-    EXPECT_NEAR(cold(square, square, at({0.5, y, 0.3})).distance, 0.25, 1e-15);
-    EXPECT_NEAR(cold(square, rod, at({0.5, y, 0.3})).distance, 0.25, 1e-15);
-    EXPECT_NEAR(cold(square, point, at({0.5, y, 0.3})).distance, 0.25, 1e-15);
-    EXPECT_NEAR(cold(rod, rod, at({0.5, y, 0.3}, aside)).distance, 0.25, 1e-15);
-    EXPECT_NEAR(cold(rod, point, at({0.5, y, 0})).distance, 0.25, 1e-15);
+    EXPECT_NEAR(cold_start(square, square, at({0.5, y, 0.3})).distance, 0.25, 1e-15);
+    EXPECT_NEAR(cold_start(square, rod, at({0.5, y, 0.3})).distance, 0.25, 1e-15);
+    EXPECT_NEAR(cold_start(square, point, at({0.5, y, 0.3})).distance, 0.25, 1e-15);
+    EXPECT_NEAR(cold_start(rod, rod, at({0.5, y, 0.3}, aside)).distance, 0.25, 1e-15);
+    EXPECT_NEAR(cold_start(rod, point, at({0.5, y, 0})).distance, 0.25, 1e-15);
   }
-  EXPECT_NEAR(cold(square, square, at({2.5, 0, 0})).distance, 0.5, 1e-15);  // in one plane
-  EXPECT_NEAR(cold(rod, rod, at({5, 0, 0})).distance, 1, 1e-15);            // in one line
-  EXPECT_NEAR(cold(point, point, at({3, 4, 0})).distance, 5, 1e-15);
-  EXPECT_NEAR(cold(square, rod, at({0.4, 0, 0.2}, upright)).distance, -0.6, 1e-12);
-  EXPECT_NEAR(cold(rod, rod, at({0.5, 0, 0}, aside)).distance, 0, 1e-12);
-  EXPECT_NEAR(cold(point, point, at(Vec3::Zero())).distance, 0, 1e-12);
-  EXPECT_NEAR(cold(square, point, at({1, 0, 1})).distance, 0, 1e-12);
+  EXPECT_NEAR(cold_start(square, square, at({2.5, 0, 0})).distance, 0.5, 1e-15);  // in one plane
+  EXPECT_NEAR(cold_start(rod, rod, at({5, 0, 0})).distance, 1, 1e-15);            // in one line
+  EXPECT_NEAR(cold_start(point, point, at({3, 4, 0})).distance, 5, 1e-15);
+  EXPECT_NEAR(cold_start(square, rod, at({0.4, 0, 0.2}, upright)).distance, -0.6, 1e-12);
+  EXPECT_NEAR(cold_start(rod, rod, at({0.5, 0, 0}, aside)).distance, 0, 1e-12);
+  EXPECT_NEAR(cold_start(point, point, at(Vec3::Zero())).distance, 0, 1e-12);
+  EXPECT_NEAR(cold_start(square, point, at({1, 0, 1})).distance, 0, 1e-12);
 }
 
 ConvexPolyhedron ball(Dice& dice, int vertices) {
@@ -137,7 +137,7 @@ TEST(Vclip, AlongASmoothMotionAStepIsAllItTakes) {
     const Pose pose = at({2.1 + 0.1 * std::sin(t), 0.3 * std::cos(0.7 * t), 0.2 * std::sin(1.3 * t)},
                          Quat(Eigen::AngleAxisd(0.3 * t, Vec3(1, 2, 3).normalized())));
     const Separation s = vclip(a, b, pose, cache);
-    ASSERT_NEAR(s.distance, cold(a, b, pose).distance, 1e-14);
+    ASSERT_NEAR(s.distance, cold_start(a, b, pose).distance, 1e-14);
     steps += s.iterations;
   }
   EXPECT_LT(steps, 1.2 * kSteps);
@@ -165,9 +165,9 @@ TEST(Vclip, IsSymmetricAndMovesWithTheSolids) {
   EXPECT_TRUE(rc::check("distance of B and A, and in another frame", [](uint64_t seed) {
     Dice dice(seed);
     const ConvexPair pair = random_pair(dice, 12);
-    const Separation s = cold(pair.a, pair.b, pair.a_from_b);
+    const Separation s = cold_start(pair.a, pair.b, pair.a_from_b);
     const Quat back = pair.a_from_b.orientation.conjugate();
-    const Separation t = cold(pair.b, pair.a, at(back * -pair.a_from_b.position, back));
+    const Separation t = cold_start(pair.b, pair.a, at(back * -pair.a_from_b.position, back));
     RC_ASSERT(std::abs(s.distance - t.distance) <= 1e-10 * pair.size());
 
     const Quat turn = dice.rotation();
@@ -176,7 +176,7 @@ TEST(Vclip, IsSymmetricAndMovesWithTheSolids) {
     std::vector<std::vector<uint32_t>> faces;
     for (uint32_t f = 0; f < pair.a.face_count(); ++f)
       faces.emplace_back(pair.a.face_vertices(f).begin(), pair.a.face_vertices(f).end());
-    const Separation u = cold({std::move(turned), faces}, pair.b,
+    const Separation u = cold_start({std::move(turned), faces}, pair.b,
                               at(turn * pair.a_from_b.position, turn * pair.a_from_b.orientation));
     RC_ASSERT(std::abs(s.distance - u.distance) <= 1e-10 * pair.size());
   }));

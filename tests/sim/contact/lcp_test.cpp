@@ -18,7 +18,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-MatrixXd random_matrix(Dice& dice, Index rows, Index columns) {
+MatrixXd random_lcp_matrix(Dice& dice, Index rows, Index columns) {
   MatrixXd m(rows, columns);
   for (Index i = 0; i < rows; ++i)
     for (Index j = 0; j < columns; ++j) m(i, j) = dice.uniform(-1, 1);
@@ -62,9 +62,9 @@ TEST(Lcp, RandomProblemsMatchEnumeration) {
   Dice dice(1);
   for (int trial = 0; trial < 400; ++trial) {
     const Index n = 1 + trial % 12;
-    const MatrixXd J = random_matrix(dice, n, n + 1);
+    const MatrixXd J = random_lcp_matrix(dice, n, n + 1);
     const MatrixXd A = J * J.transpose();
-    const VectorXd b = random_matrix(dice, n, 1);
+    const VectorXd b = random_lcp_matrix(dice, n, 1);
     const VectorXd f = enumerated(A, b);
     const LcpSolution s = solve_lcp(A, b);
     ASSERT_LT((s.f - f).norm(), 1e-9 * (1 + f.norm())) << n;
@@ -77,9 +77,9 @@ TEST(Lcp, ProblemsOfEveryRankAreSolved) {
   Dice dice(2);
   for (int trial = 0; trial < 2000; ++trial) {
     const Index n = 2 + trial % 30, rank = 1 + dice.index(static_cast<std::size_t>(n));
-    const MatrixXd J = random_matrix(dice, n, rank);
+    const MatrixXd J = random_lcp_matrix(dice, n, rank);
     const MatrixXd A = J * J.transpose();
-    const VectorXd b = J * random_matrix(dice, rank, 1);
+    const VectorXd b = J * random_lcp_matrix(dice, rank, 1);
     expect_solves(solve_lcp(A, b), A, b, 1e-9);
   }
 }
@@ -89,9 +89,9 @@ TEST(Lcp, DegenerateProblemsAreSolved) {
   Dice dice(3);
   for (int trial = 0; trial < 2000; ++trial) {
     const Index n = 2 + trial % 20, rank = 1 + dice.index(static_cast<std::size_t>(n));
-    const MatrixXd J = (1.5 * random_matrix(dice, n, rank)).array().round();
+    const MatrixXd J = (1.5 * random_lcp_matrix(dice, n, rank)).array().round();
     const MatrixXd A = J * J.transpose();
-    const VectorXd b = J * MatrixXd((1.5 * random_matrix(dice, rank, 1)).array().round());
+    const VectorXd b = J * MatrixXd((1.5 * random_lcp_matrix(dice, rank, 1)).array().round());
     if (b.isZero()) continue;
     expect_solves(solve_lcp(A, b), A, b, 1e-9);
   }
@@ -99,9 +99,9 @@ TEST(Lcp, DegenerateProblemsAreSolved) {
 
 TEST(Lcp, FiveHundredContactsHaveNoResidual) {
   Dice dice(4);
-  const MatrixXd J = random_matrix(dice, 500, 300);
+  const MatrixXd J = random_lcp_matrix(dice, 500, 300);
   const MatrixXd A = J * J.transpose();
-  const VectorXd b = J * random_matrix(dice, 300, 1);
+  const VectorXd b = J * random_lcp_matrix(dice, 300, 1);
   const LcpSolution s = solve_lcp(A, b);
   expect_solves(s, A, b, 1e-9);
   EXPECT_LT(s.residual, 1e-10 * b.cwiseAbs().maxCoeff());

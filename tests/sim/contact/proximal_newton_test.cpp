@@ -11,7 +11,7 @@ namespace offstage::sim {
 namespace {
 
 /// How far two answers lie apart, in the velocities of the bodies.
-Real difference(const ContactSample& x, const ContactSample& y) {
+Real largest_difference(const ContactSample& x, const ContactSample& y) {
   Real d = 0;
   for (std::size_t i = 0; i < x.bodies.size(); ++i)
     d = std::max({d, (x.bodies[i].velocity - y.bodies[i].velocity).norm(),
@@ -30,7 +30,7 @@ TEST(ProximalNewton, WithoutFrictionAgreesWithPivoting) {
     EXPECT_EQ(newton.fallbacks, 0u);
     if (residual(t.bodies, t.contacts) > 1e-8) continue;
     ++compared;
-    ASSERT_LT(difference(s, t), 1e-6) << round;
+    ASSERT_LT(largest_difference(s, t), 1e-6) << round;
   }
   EXPECT_GT(compared, 180);
 }
@@ -47,7 +47,7 @@ TEST(ProximalNewton, WithFrictionAgreesWithPivotingOnFewContacts) {
     solve_by_pivoting(t.bodies, t.contacts);
     if (residual(s.bodies, s.contacts) > 1e-8 || residual(t.bodies, t.contacts) > 1e-8) continue;
     ++compared;
-    agreed += difference(s, t) < 1e-6;
+    agreed += largest_difference(s, t) < 1e-6;
   }
   EXPECT_GT(compared, 150);
   EXPECT_GE(agreed, compared - compared / 50);
@@ -105,7 +105,7 @@ TEST(ProximalNewton, ConfirmsAGuessThatIsTheAnswer) {
   }
   const ContactWork work = *solver.solve(again.bodies, again.contacts);
   EXPECT_EQ(work.factorizations, 0u);
-  EXPECT_LT(difference(s, again), 1e-8);
+  EXPECT_LT(largest_difference(s, again), 1e-8);
 }
 
 TEST(ProximalNewton, ChangesNothingIfTheBudgetDoesNotDo) {
@@ -114,7 +114,7 @@ TEST(ProximalNewton, ChangesNothingIfTheBudgetDoesNotDo) {
   const ContactSample before = s;
   ProximalNewton solver;
   EXPECT_FALSE(solver.solve(s.bodies, s.contacts, {}, 1).has_value());
-  EXPECT_EQ(difference(s, before), 0);
+  EXPECT_EQ(largest_difference(s, before), 0);
   for (std::size_t i = 0; i < s.contacts.size(); ++i)
     EXPECT_EQ(s.contacts[i].impulse, before.contacts[i].impulse);
   ASSERT_TRUE(solver.solve(s.bodies, s.contacts).has_value());

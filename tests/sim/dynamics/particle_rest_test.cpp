@@ -8,9 +8,9 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kFrame = 1.0 / 60;
+constexpr Real kRestFrame = 1.0 / 60;
 
-Vec3 momentum(const World& world) {
+Vec3 total_momentum(const World& world) {
   Vec3 sum = Vec3::Zero();
   world.for_each_particle_system([&](ParticleSystemHandle system) {
     const ParticleArrays& p = world.particles(system);
@@ -41,13 +41,13 @@ Real greatest_overlap(const ParticleArrays& p) {
 }
 
 TEST(ParticleRest, AStackOfTenBeadsStandsAndItsForcesSumUp) {
-  World world({.max_step = kFrame});
+  World world({.max_step = kRestFrame});
   world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0});
   const auto system = world.add_particle_system({.internal = true});
   for (int i = 0; i < 10; ++i)
     world.add_particle(system,
                        {.position = {0, 0.01 + 0.02 * i, 0}, .mass = 0.1 + 0.1 * (i % 3), .restitution = 0});
-  for (int i = 0; i < 300; ++i) world.step(kFrame);
+  for (int i = 0; i < 300; ++i) world.step(kRestFrame);
   for (std::size_t i = 0; i < 10; ++i) {
     EXPECT_NEAR(world.particles(system).velocity[i].norm(), 0, 1e-6);
     EXPECT_NEAR(world.particles(system).position[i].y(), 0.01 + 0.02 * Real(i), 5e-4);
@@ -70,7 +70,7 @@ TEST(ParticleRest, SlidesByTheFrictionAlongAndAcrossTheGrain) {
       world.add_particle(
           system,
           {.position = v.normalized() + Vec3(0, 0.01, 0), .velocity = v, .restitution = 0, .friction = 0.4});
-    for (int i = 0; i < 120; ++i) world.step(kFrame);
+    for (int i = 0; i < 120; ++i) world.step(kRestFrame);
     const auto& at = world.particles(system).position;
     const Real across = 4 / (2 * 0.4 * 9.81), along = 4 / (2 * 0.2 * 9.81);
     EXPECT_NEAR(at[0].x(), 1 + across, 0.01 * across) << internal;
@@ -99,7 +99,7 @@ Heap heap(Real friction, int frames) {
                                     .radius = 0.01 - 0.0005 * random.uniform(k, 2),
                                     .restitution = 0,
                                     .friction = friction});
-  for (int i = 0; i < frames; ++i) world.step(kFrame);
+  for (int i = 0; i < frames; ++i) world.step(kRestFrame);
   const ParticleArrays& p = world.particles(system);
   Vec3 centre = Vec3::Zero();
   for (const Vec3& x : p.position) centre += x / static_cast<Real>(p.size());
@@ -144,12 +144,12 @@ TEST(ParticleRest, BeadsInATrayWeighOnTheBodyBeneathThem) {
                                 .radius = 0.012,
                                 .restitution = 0,
                                 .friction = 0.3});
-  for (int i = 0; i < 240; ++i) world.step(kFrame);
+  for (int i = 0; i < 240; ++i) world.step(kRestFrame);
   // What the plate presses on the ground with is its own weight and that of the beads.
   Real weight = 0;
   constexpr int kSamples = 60;
   for (int i = 0; i < kSamples; ++i) {
-    world.step(kFrame);
+    world.step(kRestFrame);
     for (const ContactState& c : world.contacts()) weight += (c.a == plate ? 1 : -1) * c.force.y() / kSamples;
   }
   EXPECT_NEAR(weight - 2 * 9.81, kCount * 0.01 * 9.81, 0.01 * kCount * 0.01 * 9.81);
@@ -159,7 +159,7 @@ TEST(ParticleBodies, AJetOnABoxKeepsMomentumAndWakesIt) {
   for (const bool internal : {false, true}) {
     World world({.gravity = Vec3::Zero()});
     const auto box = world.add_body({.shape = Box{{0.3, 0.3, 0.3}}, .mass = 2, .restitution = 0.3});
-    for (int i = 0; i < 60; ++i) world.step(kFrame);
+    for (int i = 0; i < 60; ++i) world.step(kRestFrame);
     EXPECT_TRUE(world.is_asleep(box));
     const auto jet = world.add_particle_system({.internal = internal});
     const Scatter random{8};
@@ -173,8 +173,8 @@ TEST(ParticleBodies, AJetOnABoxKeepsMomentumAndWakesIt) {
         world.add_particle(jet, p);
         given += p.mass * p.velocity;
       }
-      world.step(kFrame);
-      ASSERT_NEAR((momentum(world) - given).norm(), 0, 1e-9 * given.norm());
+      world.step(kRestFrame);
+      ASSERT_NEAR((total_momentum(world) - given).norm(), 0, 1e-9 * given.norm());
     }
     EXPECT_FALSE(world.is_asleep(box));
     EXPECT_GT(world.body(box).velocity.x(), 1);
@@ -191,7 +191,7 @@ TEST(ParticleBodies, AHeavyParticleHitsALightBodyByTheEffectiveMass) {
       world.add_particle(
           system,
           {.position = {-1, 0, 0}, .velocity = {2, 0, 0}, .mass = 10, .restitution = e, .friction = 0});
-      for (int i = 0; i < 30; ++i) world.step(kFrame);
+      for (int i = 0; i < 30; ++i) world.step(kRestFrame);
       EXPECT_NEAR(world.body(ball).velocity.x(), 2 * (1 + e) * 10 / 11, 0.02);
       EXPECT_NEAR(world.particles(system).velocity[0].x(), 2 - 2 * (1 + e) / 11, 0.01);
     }
