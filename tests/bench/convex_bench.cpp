@@ -33,11 +33,11 @@ ConvexPolyhedron round_hull(uint64_t seed, int points) {
   return convex_hull(cloud);
 }
 
-struct Motion {
+struct HullMotion {
   ConvexPolyhedron a = round_hull(1, 100), b = round_hull(2, 100);
   std::vector<Pose> poses;
 
-  explicit Motion(Real gap) {
+  explicit HullMotion(Real gap) {
     GjkCache cache;
     for (int k = 0; k < 10000; ++k) {
       const Real s = 0.01 * k;
@@ -52,8 +52,8 @@ struct Motion {
   }
 };
 
-const Motion& motion(int64_t which) {
-  static const Motion apart(0.1), near(0.001), overlapping(-0.001);
+const HullMotion& motion(int64_t which) {
+  static const HullMotion apart(0.1), near(0.001), overlapping(-0.001);
   return which == 0 ? apart : which == 1 ? near : overlapping;
 }
 
@@ -71,13 +71,13 @@ void run_queries(benchmark::State& state, Query&& query) {
 }
 
 void gjk_warm(benchmark::State& state) {
-  const Motion& m = motion(state.range(0));
+  const HullMotion& m = motion(state.range(0));
   GjkCache cache;
   run_queries(state, [&](const Pose& pose) { return gjk(convex(m.a), convex(m.b), pose, cache).iterations; });
 }
 
 void gjk_cold(benchmark::State& state) {
-  const Motion& m = motion(state.range(0));
+  const HullMotion& m = motion(state.range(0));
   run_queries(state, [&](const Pose& pose) {
     GjkCache cache;
     return gjk(convex(m.a), convex(m.b), pose, cache).iterations;
@@ -85,13 +85,13 @@ void gjk_cold(benchmark::State& state) {
 }
 
 void vclip_warm(benchmark::State& state) {
-  const Motion& m = motion(state.range(0));
+  const HullMotion& m = motion(state.range(0));
   VclipCache cache;
   run_queries(state, [&](const Pose& pose) { return vclip(m.a, m.b, pose, cache).iterations; });
 }
 
 void vclip_cold(benchmark::State& state) {
-  const Motion& m = motion(state.range(0));
+  const HullMotion& m = motion(state.range(0));
   run_queries(state, [&](const Pose& pose) {
     VclipCache cache;
     return vclip(m.a, m.b, pose, cache).iterations;
@@ -99,7 +99,7 @@ void vclip_cold(benchmark::State& state) {
 }
 
 void overlap_warm(benchmark::State& state) {
-  const Motion& m = motion(state.range(0));
+  const HullMotion& m = motion(state.range(0));
   GjkCache cache;
   run_queries(state, [&](const Pose& pose) { return int{overlap(convex(m.a), convex(m.b), pose, cache)}; });
 }
@@ -135,7 +135,7 @@ ccd_t ccd_settings() {
 }
 
 void ccd_intersect(benchmark::State& state) {
-  const Motion& m = motion(state.range(0));
+  const HullMotion& m = motion(state.range(0));
   const ccd_t ccd = ccd_settings();
   CcdHull a{&m.a, {}}, b{&m.b, {}};
   run_queries(state, [&](const Pose& pose) {
@@ -145,7 +145,7 @@ void ccd_intersect(benchmark::State& state) {
 }
 
 void ccd_penetration(benchmark::State& state) {
-  const Motion& m = motion(state.range(0));
+  const HullMotion& m = motion(state.range(0));
   const ccd_t ccd = ccd_settings();
   CcdHull a{&m.a, {}}, b{&m.b, {}};
   run_queries(state, [&](const Pose& pose) {
@@ -168,7 +168,7 @@ std::shared_ptr<fcl::Convexd> fcl_convex(const ConvexPolyhedron& p) {
 }
 
 void fcl_distance(benchmark::State& state) {
-  const Motion& m = motion(state.range(0));
+  const HullMotion& m = motion(state.range(0));
   fcl::CollisionObjectd a(fcl_convex(m.a)), b(fcl_convex(m.b));
   fcl::DistanceRequestd request(true, state.range(0) == 2);
   request.distance_tolerance = 1e-9;

@@ -211,7 +211,7 @@ BENCHMARK(distance<Obb>)->Apply(apart);
 BENCHMARK(distance<BoundingSphere>)->Apply(apart);
 BENCHMARK(warm_distance<Aabb>)->Apply(apart);
 BENCHMARK(warm_distance<Obb>)->Apply(apart);
-BENCHMARK(fcl_distance)->Unit(benchmark::kMicrosecond)->Arg(kApart);
+BENCHMARK(fcl_mesh_distance)->Unit(benchmark::kMicrosecond)->Arg(kApart);
 
 }  // namespace
 }  // namespace offstage::sim

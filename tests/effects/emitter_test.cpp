@@ -10,14 +10,14 @@ namespace {
 using namespace sim;
 
 /// A birth, as the state of the particle at its own birth.
-struct Birth {
+struct FirstState {
   Real time;
   Vec3 position, velocity;
   Real radius;
 };
 
 /// Births in order; nothing acts on the particles, so their first state follows from age.
-std::vector<Birth> births(const EmitterDef& def, Real seconds, int fps, Real max_step = 1.0 / 240,
+std::vector<FirstState> births(const EmitterDef& def, Real seconds, int fps, Real max_step = 1.0 / 240,
                           EmitterReport* report = nullptr) {
   World world({.gravity = Vec3::Zero(),
                .max_step = max_step,
@@ -28,7 +28,7 @@ std::vector<Birth> births(const EmitterDef& def, Real seconds, int fps, Real max
   for (int i = 0; i < frames; ++i)
     world.step(1.0 / fps, [&](Real start, Real end) { emitter.emit(world, start, end); });
   if (report) *report = emitter.report();
-  std::vector<Birth> out;
+  std::vector<FirstState> out;
   const ParticleArrays& p = world.particles(system);
   for (std::size_t i = 0; i < p.size(); ++i)
     out.push_back(

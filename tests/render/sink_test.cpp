@@ -39,12 +39,12 @@ void film(const VideoDef& def, int frames) {
 }
 
 /// Sets an environment variable for its own life.
-class Environment {
+class EnvironmentVariable {
  public:
-  Environment(const char* name, const std::string& value) : name_(name) { ::setenv(name, value.c_str(), 1); }
-  ~Environment() { ::unsetenv(name_); }
-  Environment(const Environment&) = delete;
-  Environment& operator=(const Environment&) = delete;
+  EnvironmentVariable(const char* name, const std::string& value) : name_(name) { ::setenv(name, value.c_str(), 1); }
+  ~EnvironmentVariable() { ::unsetenv(name_); }
+  EnvironmentVariable(const EnvironmentVariable&) = delete;
+  EnvironmentVariable& operator=(const EnvironmentVariable&) = delete;
 
  private:
   const char* name_;
@@ -177,7 +177,7 @@ TEST(VideoSink, DiscardsWhatIsPartialWithoutClose) {
 
 TEST(VideoSink, ShowsTheLastWordsOfAKilledEncoder) {
   const ScratchFolder folder;
-  const Environment ffmpeg("OFFSTAGE_FFMPEG",
+  const EnvironmentVariable ffmpeg("OFFSTAGE_FFMPEG",
                            fake_ffmpeg(folder,
                                        "head -c 5000 >/dev/null\n"
                                        "printf 'out of paint\\nreally' >&2\nkill -9 $$\n"));
@@ -192,7 +192,7 @@ TEST(VideoSink, ShowsTheLastWordsOfAKilledEncoder) {
 
 TEST(VideoSink, ReportsAnEncoderThatFailsAtTheEnd) {
   const ScratchFolder folder;
-  const Environment ffmpeg("OFFSTAGE_FFMPEG",
+  const EnvironmentVariable ffmpeg("OFFSTAGE_FFMPEG",
                            fake_ffmpeg(folder, "cat >/dev/null; echo no space >&2; exit 3\n"));
   const auto sink = make_video_sink({.path = folder / "a.mp4", .width_px = 32, .height_px = 32});
   sink->write(0, greys(32, 32, 0));
@@ -203,7 +203,7 @@ TEST(VideoSink, ReportsAnEncoderThatFailsAtTheEnd) {
 TEST(VideoSink, RunsTheEncoderInItsOwnProcessGroup) {
   const ScratchFolder folder;
   const auto report = folder / "group";
-  const Environment ffmpeg(
+  const EnvironmentVariable ffmpeg(
       "OFFSTAGE_FFMPEG",
       fake_ffmpeg(folder, "cut -d' ' -f5 /proc/$$/stat >" + report.string() + "; cat >/dev/null\n"));
   const auto sink = make_video_sink({.path = folder / "a.mp4", .width_px = 32, .height_px = 32});
@@ -224,7 +224,7 @@ TEST(VideoSink, NeedsAFolderItCanWriteToAndAFrame) {
 }
 
 TEST(CheckVideo, NamesThePackageOfAMissingFfmpeg) {
-  const Environment ffmpeg("OFFSTAGE_FFMPEG", "/nonexistent");
+  const EnvironmentVariable ffmpeg("OFFSTAGE_FFMPEG", "/nonexistent");
   const std::string message =
       message_of<UnavailableError>([] { check_video({.path = "a.mp4", .width_px = 32, .height_px = 32}); });
   EXPECT_NE(message.find("'/nonexistent' (No such file or directory)"), std::string::npos) << message;
@@ -236,7 +236,7 @@ TEST(CheckVideo, NamesAMissingEncoder) {
   const ScratchFolder folder;
   const auto script = folder.put("poor-ffmpeg", "#!/bin/sh\necho ' V....D gif   GIF'\n");
   ::chmod(script.c_str(), 0755);
-  const Environment ffmpeg("OFFSTAGE_FFMPEG", script);
+  const EnvironmentVariable ffmpeg("OFFSTAGE_FFMPEG", script);
   EXPECT_EQ(available_encoders(), std::vector<std::string>{"gif"});
   EXPECT_NO_THROW(check_video({.path = "a.gif", .width_px = 32, .height_px = 32, .fps = 25}));
   const std::string message =

@@ -15,7 +15,7 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real std::numbers::pi = std::numbers::pi, kG = 9.81;
+constexpr Real kG = 9.81;
 
 WorldDef quiet(Real max_step = 1.0 / 240) {
   return {.max_step = max_step, .sleep = false};

@@ -11,7 +11,7 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kBodySpeed = 300, kThickness = 0.01;
+constexpr Real kBodySpeed = 300, kPlate = 0.01;
 
 class BodyBullet : public BothSolvers {
  protected:
@@ -27,7 +27,7 @@ class BodyBullet : public BothSolvers {
     const auto seen_from_plate = [&] {
       return world.body(plate).pose.point_to_body(world.body(bullet).centre);
     };
-    const Real behind = -5 * kThickness, end = world.time() + 4 / kBodySpeed + 2 * max_step;
+    const Real behind = -5 * kPlate, end = world.time() + 4 / kBodySpeed + 2 * max_step;
     for (Vec3 before = seen_from_plate(); world.time() < end - max_step / 2;) {
       world.step(max_step);
       const Vec3 now = seen_from_plate();
@@ -49,8 +49,8 @@ class BodyBullet : public BothSolvers {
                              Cone{0.01, 0.03},
                              MeshShape{world.add_mesh(box_mesh(Vec3(0.02, 0.01, 0.01)))},
                              MeshShape{world.add_mesh(torus_mesh(0.02, 0.005, 8, 6))}};
-    const Shape plates[] = {Box{{2, kThickness, 2}}, Cylinder{1, kThickness}, Plane{},
-                            MeshShape{world.add_mesh(box_mesh(Vec3(2, kThickness, 2)))},
+    const Shape plates[] = {Box{{2, kPlate, 2}}, Cylinder{1, kPlate}, Plane{},
+                            MeshShape{world.add_mesh(box_mesh(Vec3(2, kPlate, 2)))},
                             MeshShape{world.add_mesh(sheet_mesh())}};
     const Scatter random{301};
     for (uint64_t i = 0; i < shots; ++i) {

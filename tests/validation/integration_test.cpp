@@ -48,12 +48,12 @@ TEST(FreeFall, WithoutDragTheHigherOrdersAreExactAndTheFirstOrdersAreOffByHalfAS
 }
 
 TEST(FreeFall, ErrorFallsWithTheOrderOfTheIntegrator) {
-  constexpr std::array kOrders = {1.0, 1.0, 2.0, 4.0};
+  constexpr std::array kExpected = {1.0, 1.0, 2.0, 4.0};
   for (std::size_t i = 0; i < kAllKinds.size(); ++i) {
     const auto error = [&](int steps) {
       return (particle_fall(kAllKinds[i], 3, steps, 2).position - exact_fall(3, 2).position).norm();
     };
-    EXPECT_NEAR(std::log2(error(80) / error(160)), kOrders[i], 0.1) << "integrator " << i;
+    EXPECT_NEAR(std::log2(error(80) / error(160)), kExpected[i], 0.1) << "integrator " << i;
   }
 }
 
