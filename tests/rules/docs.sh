@@ -1,0 +1,28 @@
+#!/usr/bin/env bash
+# Documents name files, tests and pages that exist:  docs.sh SOURCE_DIR
+# - relative links of every Markdown page lead to a file,
+# - source paths in docs/physics.md exist, and so does every test that it names.
+set -euo pipefail
+cd "$1"
+failed=0
+problem() { echo "$1" >&2; failed=1; }
+
+while read -r page; do
+  while read -r link; do
+    target=${link%%#*}
+    [ -z "$target" ] || [ -e "$(dirname "$page")/$target" ] || problem "$page: the link '$link' leads nowhere"
+  done < <(grep -oE '\]\([^)]+\)' "$page" | sed -E 's/^\]\(//; s/\)$//' | grep -vE '^[a-z]+:' || true)
+done < <(find . -name '*.md' -not -path './build*')
+
+while read -r path; do
+  [ -e "$path" ] || problem "docs/physics.md: there is no file '$path'"
+done < <(grep -oE '`(sim|effects|render|demos|tests)/[A-Za-z0-9_/.]+`' docs/physics.md | tr -d '`' | sort -u)
+
+tests=$(grep -rhoE '^(TEST|TEST_F|TEST_P|RC_GTEST_PROP)\([A-Za-z0-9_]+, *[A-Za-z0-9_]+' tests --include='*.cpp' | sed -E 's/^[A-Z_]+\(//; s/, */./')
+while read -r name; do
+  case $name in
+    *.\*) grep -qF "${name%\*}" <<<"$tests" || problem "docs/physics.md: there is no test suite '${name%.\*}'" ;;
+    *) grep -qx "$name" <<<"$tests" || problem "docs/physics.md: there is no test '$name'" ;;
+  esac
+done < <(grep -oE '`[A-Z][A-Za-z0-9]+\.(\*|[A-Z][A-Za-z0-9]+)`' docs/physics.md | tr -d '`' | sort -u)
+exit $failed
