@@ -1,29 +1,51 @@
-# Sourced by demos/run.sh and tests/run.sh: installs what is missing from Debian 12.
+# Sourced by demos/run.sh and tests/run.sh: installs what is missing, on Debian 12, Debian 13 and Ubuntu 24.04.
+# "a|b" is the first of them that the release has; "a?" is installed where the release has it.
 
-build_packages="g++ cmake ninja-build ccache pkg-config python3-glad libeigen3-dev libtbb-dev libosmesa6 libegl1 libgl1-mesa-dri libassimp-dev \
-libstb-dev libdeflate-dev libopenexr-dev libqhull-dev libxxhash-dev libzstd-dev nlohmann-json3-dev libcli11-dev libfmt-dev ffmpeg"
-test_packages="libgtest-dev libbenchmark-dev librapidcheck-dev libfcl-dev libccd-dev libbullet-dev libvalijson-dev assimp-testmodels"
+build_packages="g++ cmake ninja-build pkg-config python3-glad libeigen3-dev libtbb-dev libegl1 libgl1-mesa-dri libassimp-dev libstb-dev
+libdeflate-dev libopenexr-dev libqhull-dev libxxhash-dev libzstd-dev nlohmann-json3-dev libcli11-dev libfmt-dev ffmpeg
+libosmesa6? mold? ccache?"
+test_packages="libgtest-dev librapidcheck-dev libfcl-dev libccd-dev libbullet-dev libvalijson-dev assimp-testmodels"
+bench_packages="libbenchmark-dev"
 
-# install_packages NAME...: quick when all are there; sudo if not root; a clear message if neither.
-install_packages() {
-  local missing="" package
-  for package in "$@"; do
-    dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q '^install ok installed$' || missing="$missing $package"
+is_installed() { dpkg-query -W -f='${Status}' "$1" 2>/dev/null | grep -q '^install ok installed$'; }
+is_known() { apt-cache policy "$1" 2>/dev/null | grep -q 'Candidate: [^(]'; }
+
+# missing_packages PACKAGE...: those that are not installed, with one name for each choice.
+missing_packages() {
+  local wanted name names
+  for wanted in "$@"; do
+    names=${wanted%\?}
+    for name in ${names//|/ }; do is_installed "$name" && continue 2; done
+    for name in ${names//|/ }; do
+      is_known "$name" && echo "$name" && continue 2
+    done
+    [ "$wanted" != "$names" ] || echo "${names%%|*}"  # unknown: apt-get says so
   done
-  [ -z "$missing" ] && return 0
+}
+
+# install_packages PACKAGE...: quick when all are there; sudo if not root; a clear message if neither.
+install_packages() {
+  local name missing as_root="" required=()
+  [ -n "$(missing_packages "$@")" ] || return 0
+  for name in "$@"; do
+    [ "$name" != "${name%\?}" ] || required+=("$name")
+  done
+  missing=$(missing_packages "${required[@]}")
   if ! command -v apt-get >/dev/null; then
-    echo "These Debian 12 packages are needed, and there is no apt-get here to install them:$missing" >&2
-    return 1
+    [ -z "$missing" ] || echo "Needed, by their names in Debian, and there is no apt-get here to install them:" $missing >&2
+    [ -z "$missing" ]
+    return
   fi
-  local as_root=""
   if [ "$(id -u)" != 0 ]; then
+    [ -n "$missing" ] || return 0
     if ! command -v sudo >/dev/null; then
-      echo "Run this as root first: apt-get install$missing" >&2
+      echo "Run this as root first: apt-get install" $missing >&2
       return 1
     fi
     as_root=sudo
   fi
-  echo "Installing:$missing" >&2
-  $as_root env DEBIAN_FRONTEND=noninteractive apt-get update -q >&2 &&
-    $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends $missing >&2
+  $as_root env DEBIAN_FRONTEND=noninteractive apt-get update -q >&2 || return
+  missing=$(missing_packages "$@")  # by the names of this release, which are known only now
+  echo "Installing:" $missing >&2
+  $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends $missing >&2
 }

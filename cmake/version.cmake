@@ -1,4 +1,4 @@
-# Writes OUTPUT, a C++ file that defines version() and version_text(), from VERSION and the commit of SOURCE_DIR; leaves it
+# Writes OUTPUT, a C++ file that defines what producer/version.h declares, from VERSION and the commit of SOURCE_DIR; leaves it
 # alone when nothing has changed. Run at every build.
 set(text "${VERSION}")
 find_program(GIT git)
@@ -15,5 +15,6 @@ file(CONFIGURE OUTPUT "${OUTPUT}" CONTENT "// Made by cmake/version.cmake.
 namespace offstage::producer {
 std::string_view version() { return \"${VERSION}\"; }
 std::string_view version_text() { return \"${text}\"; }
+std::string_view source_folder() { return \"${SOURCE_DIR}\"; }
 }  // namespace offstage::producer
 ")

@@ -11,6 +11,8 @@ template <class... Fs>
 struct Overloaded : Fs... {
   using Fs::operator()...;
 };
+template <class... Fs>
+Overloaded(Fs...) -> Overloaded<Fs...>;  // Clang before 17 does not deduce it
 
 constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 /// Limits of this size are none.

@@ -25,9 +25,9 @@ struct EmitterReport {
 class Emitter {
  public:
   /// Throws std::invalid_argument if a parameter cannot be drawn from (radius <= 0, empty surface ...).
-  /// `origin` is the world's time at which the emitter's clock shows 0. What prewarming releases before the
-  /// world began has flown freely until then; to have it collide, too, let the world run for that long before
-  /// the first frame, and give that as origin.
+  /// `origin` is the world's time at which the emitter's clock shows 0. Call World::prewarm() for
+  /// as long as the emitter prewarms, so that what it releases before the world begins lives and collides until
+  /// then; without, the first emit() has it fly freely, through bodies.
   Emitter(const EmitterDef& def, sim::ParticleSystemHandle target, Real origin = 0);
 
   /// Adds to the world the particles born in (start, end], each with the time it has left in this sub-step.

@@ -7,7 +7,7 @@
 namespace offstage::render {
 namespace {
 
-constexpr GLuint kClothMaterialBlock = 1, kFirstTextureUnit = 1;
+constexpr GLuint kClothMaterialBlock = 1, kClothTextureUnit = 1;
 
 gl::VertexArray make_layout() {
   gl::VertexArray layout = gl::make_vertex_array();
@@ -51,7 +51,7 @@ void ClothPass::draw_triangles(const Cloth& cloth) {
 void ClothPass::bind(const Cloth& cloth, GLint texture_from_uv) {
   glBindBufferBase(GL_UNIFORM_BUFFER, kClothMaterialBlock, cloth.material->uniforms);
   if (cloth.material->textures[0] == 0) return;
-  glBindTextureUnit(kFirstTextureUnit, cloth.material->textures[0]);
+  glBindTextureUnit(kClothTextureUnit, cloth.material->textures[0]);
   glUniform2f(texture_from_uv, cloth.texture_from_uv.x(), cloth.texture_from_uv.y());
 }
 

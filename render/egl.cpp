@@ -18,12 +18,12 @@ using Display = void*;
 using EglHandle = void*;
 using Device = void*;
 constexpr int kExtensions = 0x3055;           // EGL_EXTENSIONS
-constexpr int kNone = 0x3038;                 // EGL_NONE
+constexpr int kEglNone = 0x3038;              // EGL_NONE
 constexpr unsigned kOpenGlApi = 0x30A2;       // EGL_OPENGL_API
-constexpr int kEglMajorVersion = 0x3098;         // EGL_CONTEXT_MAJOR_VERSION
-constexpr int kMinorVersion = 0x30FB;         // EGL_CONTEXT_MINOR_VERSION
-constexpr int kProfileMask = 0x30FD;          // EGL_CONTEXT_OPENGL_PROFILE_MASK
-constexpr int kCoreProfile = 1;               // EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT
+constexpr int kEglMajorVersion = 0x3098;      // EGL_CONTEXT_MAJOR_VERSION
+constexpr int kEglMinorVersion = 0x30FB;      // EGL_CONTEXT_MINOR_VERSION
+constexpr int kEglProfileMask = 0x30FD;       // EGL_CONTEXT_OPENGL_PROFILE_MASK
+constexpr int kEglCoreProfile = 1;            // EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT
 constexpr unsigned kSurfaceless = 0x31DD;     // EGL_PLATFORM_SURFACELESS_MESA
 constexpr unsigned kDevicePlatform = 0x313F;  // EGL_PLATFORM_DEVICE_EXT
 constexpr int kDrmDeviceFile = 0x3233;        // EGL_DRM_DEVICE_FILE_EXT
@@ -122,7 +122,8 @@ Display initialised(unsigned platform, void* native) {
 class EglContext : public PlatformContext {
  public:
   explicit EglContext(Display display) : display_(display) {
-    const int attributes[] = {kEglMajorVersion, 4, kMinorVersion, 5, kProfileMask, kCoreProfile, kNone};
+    const int attributes[] = {kEglMajorVersion, 4,       kEglMinorVersion, 5, kEglProfileMask,
+                              kEglCoreProfile,  kEglNone};
     if (!egl().bind_api(kOpenGlApi)) throw UnavailableError("no OpenGL: " + error_code());
     handle_ = egl().create_context(display_, nullptr, nullptr, attributes);
     if (handle_ == nullptr) throw UnavailableError("no OpenGL 4.5 core context: " + error_code());

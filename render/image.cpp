@@ -61,7 +61,7 @@ ImageDifference difference(const Image& a, const Image& b) {
 
 Image reduced(const Image& image, int width_px) {
   const int step = std::max(1, (image.width_px + width_px - 1) / width_px);
-  Image small{std::max(1, image.width_px / step), std::max(1, image.height_px / step), {}};
+  Image small{std::max(1, image.width_px / step), std::max(1, image.height_px / step), {}, image.transparent};
   small.rgba.reserve(4 * small.pixel_count());
   const int columns = std::min(step, image.width_px), rows = std::min(step, image.height_px);
   for (int y = 0; y < small.height_px; ++y)

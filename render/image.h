@@ -12,6 +12,7 @@ namespace offstage::render {
 struct Image {
   int width_px = 0, height_px = 0;
   std::vector<uint8_t> rgba;  ///< width * height * 4
+  bool transparent = false;   ///< its alpha matters; else files have no alpha channel
 
   std::size_t pixel_count() const {
     return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
@@ -21,7 +22,8 @@ struct Image {
 /// Linear light, RGBA float, premultiplied alpha.
 struct HdrImage {
   int width_px = 0, height_px = 0;
-  std::vector<float> rgba;  ///< width * height * 4
+  std::vector<float> rgba;   ///< width * height * 4
+  bool transparent = false;  ///< as of Image
 
   std::size_t pixel_count() const {
     return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);

@@ -31,13 +31,6 @@ namespace {
 constexpr int kMaxSide = 16384;  // OpenGL's limit here too
 constexpr uint64_t kMaxImageBytes = uint64_t{1} << 30;
 
-bool is_opaque(const Image& image) {
-  for (std::size_t i = 3; i < image.rgba.size(); i += 4) {
-    if (image.rgba[i] != 255) return false;
-  }
-  return true;
-}
-
 std::vector<uint8_t> without_alpha(const Image& image) {
   std::vector<uint8_t> rgb(image.rgba.size() / 4 * 3);
   const uint8_t* in = image.rgba.data();
@@ -111,16 +104,16 @@ Image decode_image(std::span<const uint8_t> bytes, const std::string& name) {
   if (!pixels) throw fail(stbi_failure_reason());
   Image image{width, height, {}};
   image.rgba.assign(pixels.get(), pixels.get() + image.pixel_count() * 4);
+  image.transparent = channels == 2 || channels == 4;
   return image;
 }
 
 std::vector<uint8_t> encode_png(const Image& image) {
-  const bool opaque = is_opaque(image);
-  const std::vector<uint8_t> rgb = opaque ? without_alpha(image) : std::vector<uint8_t>{};
+  const std::vector<uint8_t> rgb = image.transparent ? std::vector<uint8_t>{} : without_alpha(image);
   return encode_png(PngPixels{.width_px = image.width_px,
                               .height_px = image.height_px,
-                              .channels = opaque ? 3 : 4,
-                              .samples = opaque ? rgb : image.rgba});
+                              .channels = image.transparent ? 4 : 3,
+                              .samples = image.transparent ? image.rgba : rgb});
 }
 
 void write_file_atomically(const std::filesystem::path& path, std::span<const uint8_t> bytes) {

@@ -15,7 +15,7 @@ Image read_image(const std::filesystem::path& path);
 /// The same from memory (textures embedded in model files); `name` is used in messages.
 Image decode_image(std::span<const uint8_t> bytes, const std::string& name);
 
-/// PNG bytes; RGB when every pixel is opaque, else RGBA.
+/// PNG bytes: RGBA if the image is transparent, else RGB, whatever its pixels: so are all frames of a film.
 std::vector<uint8_t> encode_png(const Image& image);
 
 /// Writes through a temporary file in the same folder, flushed, then renamed: a file that is there is whole.

@@ -7,7 +7,7 @@
 namespace offstage::render {
 namespace {
 
-constexpr GLuint kShadowUnit = 10, kPlainUnit = 11;
+constexpr GLuint kLampShadowUnit = 10, kLampPlainUnit = 11;
 constexpr int kTile_px = 512, kRowWidth_px = 3 * kTile_px, kRowHeight_px = 2 * kTile_px;
 constexpr float kNear = 0.02f;  // of shaders/lamps.glsl
 
@@ -160,9 +160,9 @@ void LampPass::begin(const Tile& tile) const {
 }
 
 void LampPass::end() const {
-  glBindTextureUnit(kShadowUnit, depth_);
-  glBindTextureUnit(kPlainUnit, depth_);
-  glBindSampler(kPlainUnit, plain_);
+  glBindTextureUnit(kLampShadowUnit, depth_);
+  glBindTextureUnit(kLampPlainUnit, depth_);
+  glBindSampler(kLampPlainUnit, plain_);
 }
 
 }  // namespace offstage::render

@@ -121,7 +121,12 @@ GpuMesh::GpuMesh(const Mesh& source) : vertex_array(gl::make_vertex_array()) {
   center = box.isEmpty() ? Vector3f(0, 0, 0) : Vector3f(box.center());
   for (const Vector3f& p : mesh->positions) radius = std::max(radius, (p - center).norm());
   thickness = box.isEmpty() ? 0 : box.sizes().minCoeff();
+  boxy = std::ranges::all_of(mesh->positions, [this](const Vector3f& p) {
+    return ((p - center).array().abs() >= 0.4f * box.sizes().array()).all();
+  });
+  round = !box.isEmpty() && radius < 0.505f * box.sizes().minCoeff();
   closed = is_closed(*mesh);
+  endless = mesh->endless;
   if (!box.isEmpty()) {
     Eigen::Index axis = 0;
     flat = box.sizes().minCoeff(&axis) <= 1e-4f * box.sizes().maxCoeff();
@@ -213,14 +218,10 @@ void MeshPass::prepare(std::span<const Instance* const> instances, const View& v
     if (view.sees(ball.center, ball.radius)) seen.push_back(item);
     if (instance.casts_shadow && instance.material->casts && !instance.is_ground()) casting.push_back(item);
   }
-  const auto transparent = std::partition(seen.begin(), seen.end(),
-                                          [](const Item& item) { return !item.instance->material->blended; });
-  std::vector<Item> see_through(transparent, seen.end());
+  const auto transparent = std::stable_partition(
+      seen.begin(), seen.end(), [](const Item& item) { return !item.instance->material->lets_through(); });
+  const std::vector<Item> see_through(transparent, seen.end());
   seen.erase(transparent, seen.end());
-  const auto glassy = std::partition(seen.begin(), seen.end(),
-                                     [](const Item& item) { return !item.instance->material->glass; });
-  std::vector<Item> glass(glassy, seen.end());
-  seen.erase(glassy, seen.end());
   // What is cut out by its texture is opaque where the texture is, so it is drawn in both passes.
   const auto by_batch = [](const Item& a, const Item& b) {
     return std::tie(a.instance->batch_key, a.mirrored, a.depth, a.order) <
@@ -228,12 +229,6 @@ void MeshPass::prepare(std::span<const Instance* const> instances, const View& v
   };
   std::sort(seen.begin(), seen.end(), by_batch);
   std::sort(casting.begin(), casting.end(), by_batch);
-  const auto back_first = [](const Item& a, const Item& b) {
-    return std::tie(b.depth, a.order) < std::tie(a.depth, b.order);
-  };
-  std::sort(see_through.begin(), see_through.end(), back_first);
-  std::sort(glass.begin(), glass.end(), back_first);
-
   std::vector<Rows> rows, shadow_rows;
   const auto append = [](const std::vector<Item>& items, bool merge, std::vector<Rows>& out,
                          std::vector<Batch>& batches) {
@@ -253,11 +248,12 @@ void MeshPass::prepare(std::span<const Instance* const> instances, const View& v
   };
   seen_.clear();
   for (const Item& item : seen) seen_.push_back(item.instance);
+  see_through_.clear();
+  for (const Item& item : see_through) see_through_.push_back(item.instance);
   casting_.clear();
   for (const Item& item : casting) casting_.push_back(item.instance);
   append(seen, true, rows, opaque_);
-  append(glass, false, rows, glass_);
-  append(see_through, false, rows, blended_);
+  append(see_through, false, rows, translucent_);
   append(casting, true, shadow_rows, casters_);
   std::stable_sort(opaque_.begin(), opaque_.end(),
                    [](const Batch& a, const Batch& b) { return a.depth < b.depth; });
@@ -284,8 +280,10 @@ void MeshPass::draw(const Batch& batch, const gl::StreamBuffer& rows, Detail det
                                       batch.first);
 }
 
-gl::LazyProgram& MeshPass::surface_program(const GpuMaterial& material, Shading shading) {
-  const auto key = std::make_tuple(material.pattern, material.textured, material.glass, shading, features_);
+gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) {
+  const GpuMaterial& material = *batch.material;
+  const auto key = std::make_tuple(material.pattern, material.textured, material.glass, batch.mesh->endless,
+                                   shading, features_);
   const auto found = surface_programs_.find(key);
   if (found != surface_programs_.end()) return found->second;
   std::vector<std::string> defines = features_;
@@ -293,6 +291,7 @@ gl::LazyProgram& MeshPass::surface_program(const GpuMaterial& material, Shading 
   std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "light.glsl", "lamps.glsl",
                                             "material.glsl"};
   if (material.textured) defines.push_back("TEXTURED 1");
+  if (batch.mesh->endless) defines.push_back("ENDLESS 1");
   if (shading == Shading::unhidden) defines.push_back("UNHIDDEN 1");
   if (shading == Shading::mirror) {
     defines.push_back("MIRROR 1");
@@ -345,7 +344,7 @@ void MeshPass::draw_depth(const Matrix4f& clip_from_world) {
 
 void MeshPass::draw_batch(const Batch& batch, Shading shading) {
   constexpr float kOpaqueAlpha = 0.99f;
-  surface_program(*batch.material, shading).use();
+  surface_program(batch, shading).use();
   glUniform1f(0, kOpaqueAlpha);
   set_facing(batch, batch.material->two_sided);
   bind(*batch.material);
@@ -376,8 +375,8 @@ void MeshPass::draw_opaque(const View& view, const Hiding& hiding, int width_px,
     draw_within(0, high.y(), width_px, height_px, Shading::unhidden);
     glDisable(GL_SCISSOR_TEST);
   }
-  for (const Batch& batch : blended_) {
-    if (batch.material->textured) draw_batch(batch, Shading::whole);
+  for (const Batch& batch : translucent_) {
+    if (batch.material->blended && batch.material->textured) draw_batch(batch, Shading::whole);
   }
 }
 
@@ -498,7 +497,7 @@ bool MeshPass::find_mirrors(const View& view, float reach, std::span<const Eigen
 void MeshPass::draw_mirrors(float reach) {
   glEnable(GL_SCISSOR_TEST);
   for (const auto& [batch, area] : mirrors_) {
-    surface_program(*batch->material, Shading::mirror).use();
+    surface_program(*batch, Shading::mirror).use();
     glUniform1f(0, 0);
     glUniform2f(2, reach, kMirrorSteps);
     set_facing(*batch, batch->material->two_sided);
@@ -509,26 +508,22 @@ void MeshPass::draw_mirrors(float reach) {
   glDisable(GL_SCISSOR_TEST);
 }
 
-void MeshPass::draw_glass() {
-  for (const Batch& batch : glass_) {
-    surface_program(*batch.material).use();
-    glUniform1f(0, 0);
-    glUniform1f(1, batch.thickness);
-    set_facing(batch, batch.material->two_sided);
-    bind(*batch.material);
-    draw(batch, rows_);
-  }
+void MeshPass::draw_translucent(std::size_t k) {
+  constexpr float kVisibleAlpha = 1.0f / 512;
+  const Batch& batch = translucent_[k];
+  surface_program(batch).use();
+  glUniform1f(0, batch.material->glass ? 0 : kVisibleAlpha);
+  if (batch.material->glass) glUniform1f(1, batch.thickness);
+  set_facing(batch, batch.material->two_sided);
+  bind(*batch.material);
+  draw(batch, rows_);
 }
 
-void MeshPass::draw_blended() {
-  constexpr float kVisibleAlpha = 1.0f / 512;
-  for (const Batch& batch : blended_) {
-    surface_program(*batch.material).use();
-    glUniform1f(0, kVisibleAlpha);
-    set_facing(batch, batch.material->two_sided);
-    bind(*batch.material);
-    draw(batch, rows_);
-  }
+void MeshPass::draw_translucent_depth(std::size_t k, const Matrix4f& clip_from_world) {
+  opaque_shadow_.use();
+  glUniformMatrix4fv(0, 1, GL_FALSE, clip_from_world.data());
+  set_facing(translucent_[k], translucent_[k].material->two_sided);
+  draw(translucent_[k], rows_);
 }
 
 }  // namespace offstage::render

@@ -1,6 +1,6 @@
 #pragma once
 /// Private: draws the instances of meshes: opaque ones in batches of one mesh and material, front to back;
-/// those that are not opaque one by one, back to front; and casters into the shadow map.
+/// those that are not opaque one by one, in the order that PaintOrder finds; and casters into the shadow map.
 
 #include <array>
 #include <map>
@@ -25,8 +25,11 @@ struct GpuMesh {
   Eigen::AlignedBox3f box;
   Vector3f center;  ///< of the bounding ball
   float radius = 0;
-  float thickness = 0;  ///< the least side of the box around it
-  bool flat = false;    ///< lies in a plane along an axis
+  float thickness = 0;   ///< the least side of the box around it
+  bool flat = false;     ///< lies in a plane along an axis
+  bool endless = false;  ///< see Mesh::endless
+  bool round = false;    ///< a ball that fits its box
+  bool boxy = false;     ///< fills its box, but for a bevel
   Vector3f flat_normal = {0, 0, 0};
   bool closed = false;  ///< every edge has a triangle on either side, so that the front hides the back
 };
@@ -95,16 +98,18 @@ class MeshPass {
   /// Where opaque surfaces can hide the sky within `reach` [m]: around all but a plane. `others`: boxes
   /// around what is opaque besides the instances.
   ScreenArea occluded_area(const View& view, float reach, std::span<const Eigen::AlignedBox3f> others) const;
-  bool has_glass() const { return !glass_.empty(); }
+  /// What is not opaque, in the order of the instances.
+  std::span<const Instance* const> translucent() const { return see_through_; }
   /// Finds the surfaces that mirror something of the scene, and where in a picture of a size; false if there
   /// are none. `reach`: how far away things are looked for [m]. `others` as above.
   bool find_mirrors(const View& view, float reach, std::span<const Eigen::AlignedBox3f> others, int width_px,
                     int height_px);
   /// What those mirror, to be added to the picture, which is bound with its depth.
   void draw_mirrors(float reach);
-  /// Back to front, over a picture that is also bound to be seen through them.
-  void draw_glass();
-  void draw_blended();
+  /// One of `translucent`. A glass one looks up what is behind it in a copy of the picture that is bound.
+  void draw_translucent(std::size_t k);
+  /// Its depth alone, by the picture's matrix.
+  void draw_translucent_depth(std::size_t k, const Matrix4f& clip_from_world);
 
  private:
   struct Item;
@@ -121,7 +126,7 @@ class MeshPass {
   void draw(const Batch& batch, const gl::StreamBuffer& rows, Detail detail = Detail::full);
   void bind(const GpuMaterial& material);
   enum class Shading { whole, unhidden, mirror };
-  gl::LazyProgram& surface_program(const GpuMaterial& material, Shading shading = Shading::whole);
+  gl::LazyProgram& surface_program(const Batch& batch, Shading shading = Shading::whole);
   gl::LazyProgram& shadow_program(const GpuMaterial& material);
   static void set_facing(const Batch& batch, bool both_sides);
   void draw_batch(const Batch& batch, Shading shading);
@@ -130,15 +135,16 @@ class MeshPass {
   ScreenArea mirrored_area(const Batch& batch, const View& view, float reach,
                            std::span<const Eigen::AlignedBox3f> others) const;
 
-  std::map<std::tuple<Pattern, bool, bool, Shading, Features>, gl::LazyProgram>
-      surface_programs_;  ///< textured, glass
+  std::map<std::tuple<Pattern, bool, bool, bool, Shading, Features>, gl::LazyProgram>
+      surface_programs_;  ///< textured, glass, endless
   gl::LazyProgram opaque_shadow_, dithered_shadow_, textured_shadow_;
   Features features_;
   gl::Texture white_;
   gl::StreamBuffer rows_, shadow_rows_;
-  std::vector<Batch> opaque_, glass_, blended_, casters_;
-  std::vector<const Instance*> seen_;     ///< opaque ones, by rows
-  std::vector<const Instance*> casting_;  ///< by rows
+  std::vector<Batch> opaque_, translucent_, casters_;
+  std::vector<const Instance*> seen_;         ///< opaque ones, by rows
+  std::vector<const Instance*> see_through_;  ///< of translucent_
+  std::vector<const Instance*> casting_;      ///< by rows
   struct Mirror {
     const Batch* batch;
     Eigen::AlignedBox2i area_px;

@@ -27,6 +27,9 @@ struct Mesh {
   /// A coarser surface of the same vertices, just inside of the other and as closed, for shadows and depth;
   /// empty: no other.
   std::vector<uint32_t> coarse_indices;
+  /// It stands for a plane without end: near its horizon, where it is seen at a grazing angle, it goes over
+  /// into the sky.
+  bool endless = false;
 
   Eigen::AlignedBox3f bounds() const;
 };

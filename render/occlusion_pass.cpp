@@ -5,7 +5,7 @@
 namespace offstage::render {
 namespace {
 
-constexpr GLuint kSceneDepthUnit = 4, kOpennessUnit = 8;
+constexpr GLuint kDepthUnit = 4, kOpennessUnit = 8;
 constexpr float kWidest = 0.16f;  // share of the picture's height that is looked through
 constexpr int kFewSamples = 4;    // up to so many sub-frames, each is smoothed by itself
 
@@ -33,7 +33,7 @@ void OcclusionPass::draw(GLuint depth, const View& view, float reach, const Scre
   glDisable(GL_BLEND);
   glDisable(GL_CULL_FACE);
   glBindVertexArray(no_attributes_);
-  glBindTextureUnit(kSceneDepthUnit, depth);
+  glBindTextureUnit(kDepthUnit, depth);
   // The smoothing looks at the texels around.
   const Eigen::AlignedBox2i inside = area.pixels(width_px_, height_px_);
   const auto cover = [&](GLuint framebuffer, int around_px) {

@@ -15,8 +15,8 @@ constexpr int kRgba = 0x1908;               // GL_RGBA
 constexpr unsigned kUnsignedByte = 0x1401;  // GL_UNSIGNED_BYTE
 constexpr int kFormat = 0x22;
 constexpr int kDepthBits = 0x30, kStencilBits = 0x31, kAccumBits = 0x32;
-constexpr int kProfile = 0x33, kCoreProfile = 0x34;
-constexpr int kOsMesaMajorVersion = 0x36, kMinorVersion = 0x37;
+constexpr int kOsMesaProfile = 0x33, kOsMesaCoreProfile = 0x34;
+constexpr int kOsMesaMajorVersion = 0x36, kOsMesaMinorVersion = 0x37;
 using OsMesaHandle = void*;
 
 // Everything is drawn into framebuffer objects; OSMesa's own buffer is only what makes the context current.
@@ -45,8 +45,10 @@ const OsMesaLibrary& osmesa() {
 class OsmesaContext : public PlatformContext {
  public:
   OsmesaContext() {
-    const int attributes[] = {kFormat,  kRgba,        kDepthBits,    0, kStencilBits,  0, kAccumBits, 0,
-                              kProfile, kCoreProfile, kOsMesaMajorVersion, 4, kMinorVersion, 5, 0};
+    // clang-format off
+    const int attributes[] = {kFormat, kRgba, kDepthBits, 0, kStencilBits, 0, kAccumBits, 0,
+                              kOsMesaProfile, kOsMesaCoreProfile, kOsMesaMajorVersion, 4, kOsMesaMinorVersion, 5, 0};
+    // clang-format on
     handle_ = osmesa().create(attributes, nullptr);
     if (handle_ == nullptr)
       throw UnavailableError(

@@ -1,7 +1,5 @@
 #include <array>
 #include <cerrno>
-#include <cmath>
-#include <numeric>
 #include <stdexcept>
 
 #include <signal.h>
@@ -58,21 +56,13 @@ std::array<uint8_t, 3> yuv_from_rgb(const uint8_t* rgb) {
           static_cast<uint8_t>(128 + ((cr + half) >> 16))};
 }
 
-/// Frames per second as a fraction: whole numbers, 24000/1001 and its like exactly, others to a thousandth.
-std::string frame_rate(double fps) {
-  const auto whole = std::llround(fps), ntsc = std::llround(fps * 1.001);
-  if (std::abs(fps - static_cast<double>(whole)) < 1e-6) return std::to_string(whole) + ":1";
-  if (std::abs(fps * 1.001 - static_cast<double>(ntsc)) < 1e-3) return std::to_string(ntsc * 1000) + ":1001";
-  const auto thousandths = std::llround(fps * 1000), divisor = std::gcd(thousandths, 1000LL);
-  return std::to_string(thousandths / divisor) + ":" + std::to_string(1000 / divisor);
-}
-
 class PipeSink final : public FrameSink {
  public:
-  PipeSink(bool y4m, int width_px, int height_px, double fps)
+  PipeSink(bool y4m, int width_px, int height_px, FrameRate fps)
       : y4m_(y4m), width_px_(width_px), height_px_(height_px) {
     header_ = "YUV4MPEG2 W" + std::to_string(width_px) + " H" + std::to_string(height_px) + " F" +
-              frame_rate(fps) + " Ip A1:1 C444 XCOLORRANGE=LIMITED\n";
+              std::to_string(fps.numerator) + ":" + std::to_string(fps.denominator) +
+              " Ip A1:1 C444 XCOLORRANGE=LIMITED\n";
   }
 
   void write(int, const Image& image) override {
@@ -102,8 +92,9 @@ class PipeSink final : public FrameSink {
 
 }  // namespace
 
-std::unique_ptr<FrameSink> make_pipe_sink(bool y4m, int width_px, int height_px, double fps) {
-  if (width_px <= 0 || height_px <= 0 || !(fps > 0 && fps <= 1000)) {
+std::unique_ptr<FrameSink> make_pipe_sink(bool y4m, int width_px, int height_px, FrameRate fps) {
+  if (width_px <= 0 || height_px <= 0 || fps.numerator <= 0 || fps.denominator <= 0 ||
+      fps.per_second() > 1000) {
     throw std::invalid_argument("pipe sink: needs a size, and a frame rate in (0, 1000]");
   }
   if (::isatty(STDOUT_FILENO)) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/paint_order.h"
+
 namespace offstage::render {
 namespace {
 
@@ -27,7 +29,7 @@ void PointSet::assign(std::span<const Point> values) {
   box.setEmpty();
   std::vector<Point> by_id;
   const auto smaller_id = [](const Point& a, const Point& b) { return a.id < b.id; };
-  if (is_splatted() && !std::is_sorted(values.begin(), values.end(), smaller_id)) {
+  if (def.style != PointStyle::sphere && !std::is_sorted(values.begin(), values.end(), smaller_id)) {
     by_id.assign(values.begin(), values.end());
     std::stable_sort(by_id.begin(), by_id.end(), smaller_id);
     values = by_id;
@@ -76,15 +78,22 @@ PointsPass::Programs& PointsPass::programs(PointStyle style, const Features& fea
       .first->second;
 }
 
-PointsPass::PointsPass() : vertex_array_(gl::make_vertex_array()) {
-  gl::set_attribute(vertex_array_, 0, 0, 4, offsetof(GpuPoint, position));
-  gl::set_attribute(vertex_array_, 1, 0, 4, offsetof(GpuPoint, velocity));
-  gl::set_attribute(vertex_array_, 2, 0, 4, offsetof(GpuPoint, color));
-  glVertexArrayBindingDivisor(vertex_array_, 0, 1);
+PointsPass::PointsPass() : vertex_array_(gl::make_vertex_array()), blended_array_(gl::make_vertex_array()) {
+  for (const GLuint array : {GLuint{vertex_array_}, GLuint{blended_array_}}) {
+    gl::set_attribute(array, 0, 0, 4, offsetof(GpuPoint, position));
+    gl::set_attribute(array, 1, 0, 4, offsetof(GpuPoint, velocity));
+    gl::set_attribute(array, 2, 0, 4, offsetof(GpuPoint, color));
+    glVertexArrayBindingDivisor(array, 0, 1);
+  }
+  gl::set_attribute(blended_array_, 3, 0, 4, offsetof(BlendedPoint, style));
 }
 
 void PointsPass::prepare(PointSet& set, const View& view) {
-  const bool front_first = set.def.style == PointStyle::sphere;
+  set.unseen = 0;
+  if (set.def.style != PointStyle::sphere) {
+    if (set.def.casts_shadow) set.buffer.write(std::span<const GpuPoint>(set.points));
+    return;
+  }
   keys_.clear();
   ordered_.clear();
   for (uint32_t i = 0; i < set.points.size(); ++i) {
@@ -95,7 +104,7 @@ void PointsPass::prepare(PointSet& set, const View& view) {
       ordered_.push_back(set.points[i]);
       continue;
     }
-    keys_.emplace_back(front_first ? depth : -depth, i);
+    keys_.emplace_back(depth, i);
   }
   std::sort(keys_.begin(), keys_.end(), [&set](const auto& a, const auto& b) {
     return a.first != b.first ? a.first < b.first : set.ids[a.second] < set.ids[b.second];
@@ -103,6 +112,21 @@ void PointsPass::prepare(PointSet& set, const View& view) {
   set.unseen = ordered_.size();
   for (const auto& [depth, i] : keys_) ordered_.push_back(set.points[i]);
   set.buffer.write(std::span<const GpuPoint>(ordered_));
+}
+
+void PointsPass::prepare_blended(const PaintOrder& order) {
+  blended_.clear();
+  const auto append = [&](PaintOrder::Kind kind) {
+    const std::span<const uint64_t> keys = order.keys(kind);
+    for (std::size_t k = keys.size(); k-- > 0;) {
+      const PaintOrder::Place at = order.place(kind, keys[k]);
+      blended_.push_back({at.set->points[at.index], style_of(at.set->def)});
+    }
+    return static_cast<uint32_t>(keys.size());
+  };
+  sprites_ = append(PaintOrder::Kind::sprites);
+  flakes_ = append(PaintOrder::Kind::flakes);
+  if (!blended_.empty()) blended_buffer_.write(std::span<const BlendedPoint>(blended_));
 }
 
 void PointsPass::draw(const PointSet& set, std::size_t first) {
@@ -130,9 +154,13 @@ void PointsPass::draw_spheres(const PointSet& set, const Features& features) {
   draw(set, set.unseen);
 }
 
-void PointsPass::draw_blended(const PointSet& set, const Features& features) {
-  programs(set.def.style, features).seen.use();
-  draw(set, set.unseen);
+void PointsPass::draw_blended(PointStyle style, uint32_t first, uint32_t last, const Features& features) {
+  programs(style, features).seen.use();
+  const uint32_t begin = style == PointStyle::flake ? sprites_ + flakes_ - last : sprites_ - last;
+  const auto offset = static_cast<GLintptr>(begin * sizeof(BlendedPoint));
+  glVertexArrayVertexBuffer(blended_array_, 0, blended_buffer_, offset, sizeof(BlendedPoint));
+  glBindVertexArray(blended_array_);
+  glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(last - first));
 }
 
 }  // namespace offstage::render

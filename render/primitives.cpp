@@ -198,14 +198,15 @@ Mesh make_box(const Vector3f& size, float bevel) {
 }
 
 Mesh make_ground(float half_size) {
-  // Each ring of cells is twice as wide as the one inside it.
-  constexpr int kRings = 10;
+  // Each ring of cells is twice as wide as the one inside it, so that triangles near the middle are small.
+  const int rings = std::clamp(static_cast<int>(std::ceil(std::log2(half_size))), 0, 24);
   std::vector<float> lines;
-  for (int k = 0; k <= kRings; ++k) lines.push_back(-std::ldexp(half_size, -k));
+  for (int k = 0; k <= rings; ++k) lines.push_back(-std::ldexp(half_size, -k));
   lines.push_back(0);
-  for (int k = kRings; k >= 0; --k) lines.push_back(-lines[static_cast<std::size_t>(k)]);
+  for (int k = rings; k >= 0; --k) lines.push_back(-lines[static_cast<std::size_t>(k)]);
 
   Mesh mesh;
+  mesh.endless = true;
   for (const float z : lines) {
     for (const float x : lines) {
       mesh.positions.emplace_back(x, 0.0f, z);

@@ -13,7 +13,8 @@ Mesh make_capsule(float radius, float height, int segments = 48);
 Mesh make_cylinder(float radius, float height, int segments = 64);
 /// Base at -height/2, apex at +height/2.
 Mesh make_cone(float radius, float height, int segments = 64);
-/// A square in the plane y = 0, facing +Y, finer towards its centre so that distant ground costs little.
+/// A square in the plane y = 0, facing +Y, finer towards its centre so that distant ground costs little. It
+/// stands for an endless plane (see Mesh::endless).
 Mesh make_ground(float half_size);
 
 }  // namespace offstage::render

@@ -111,8 +111,7 @@ Vector3f PuffLight::lamps_around(const Vector3f& place) const {
 
 Vector4f PuffLight::fog_to(const Vector3f& place) const {
   const Vector3f ray = place - frame.eye.head<3>();
-  const float distance = ray.norm(), far = distance / 250;
-  const float transmittance = std::exp(-(frame.zenith.w() * distance + far * far));
+  const float transmittance = std::exp(-frame.zenith.w() * ray.norm());
   const Vector3f level = Vector3f(ray.x(), std::max(ray.y(), 0.0f), ray.z()).normalized();
   Vector4f result;
   result << sky_radiance(sky, level) * (1 - transmittance), transmittance;

@@ -1,7 +1,7 @@
 #include "render/puffs_pass.h"
 
 #include <algorithm>
-#include <bit>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -79,7 +79,7 @@ void PuffsPass::prepare(std::span<const PointSet* const> sets, const Sun& sun, F
     glTextureStorage3D(grid_texture_, 1, GL_R32F, size[0], size[1], size[2]);
     glTextureParameteri(grid_texture_, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
     glTextureParameteri(grid_texture_, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-    for (const GLenum axis : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, GL_TEXTURE_WRAP_R})
+    for (const auto axis : std::array<GLenum, 3>{GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, GL_TEXTURE_WRAP_R})
       glTextureParameteri(grid_texture_, axis, GL_CLAMP_TO_EDGE);
   }
   glTextureSubImage3D(grid_texture_, 0, 0, 0, 0, size[0], size[1], size[2], GL_RED, GL_FLOAT,
@@ -88,64 +88,43 @@ void PuffsPass::prepare(std::span<const PointSet* const> sets, const Sun& sun, F
   frame.smoke_from_world = grid_.texture_from_world();
 }
 
-int PuffsPass::sort_visible(std::span<const PointSet* const> sets, const View& view, float pixel_m) {
-  keys_.clear();
+void PuffsPass::measure(const PaintOrder& order, const View& view, float pixel_m) {
   farthest_m_ = 0;
-  uint32_t number = 0;
   double area = 0, volume = 0, area_px = 0, volume_px = 0;
-  for (const PointSet* set : sets) {
-    if (!set->is_puffs()) continue;
-    for (std::size_t i = 0; i < set->points.size(); ++i, ++number) {
-      const Vector3f center = set->points[i].position.head<3>();
-      const float depth = view.depth_of(center);
-      if (depth <= view.near_m || !view.sees(center, set->reach(i) + 0.01f * depth)) continue;
-      // Depth is positive, so its bits are in order; ties go by set and, in a set, by id.
-      keys_.push_back(uint64_t{std::bit_cast<uint32_t>(depth)} << 32 | number);
-      const auto r = static_cast<double>(set->points[i].position.w());
-      const double px = r / static_cast<double>(depth * pixel_m);
-      area += r * r;
-      volume += r * r * r;
-      area_px += px * px;
-      volume_px += px * px * px;
-      farthest_m_ = std::max(farthest_m_, depth + set->points[i].position.w());
-    }
+  for (const uint64_t key : order.keys(PaintOrder::Kind::puffs)) {
+    const PaintOrder::Place at = order.place(PaintOrder::Kind::puffs, key);
+    const Vector4f& ball = at.set->points[at.index].position;
+    const float depth = view.depth_of(ball.head<3>());
+    const auto r = static_cast<double>(ball.w());
+    const double px = r / static_cast<double>(depth * pixel_m);
+    area += r * r;
+    volume += r * r * r;
+    area_px += px * px;
+    volume_px += px * px * px;
+    farthest_m_ = std::max(farthest_m_, depth + ball.w());
   }
-  std::sort(keys_.begin(), keys_.end());
-  if (keys_.empty()) return 1;
   // In a picture of half or a quarter of the size, large puffs look the same and cost a fraction.
   typical_m_ = static_cast<float>(volume / area);
   const double typical_px = volume_px / area_px;
-  return typical_px < kHalf_px ? 1 : typical_px < kQuarter_px ? 2 : 4;
+  factor_ = typical_px < kHalf_px ? 1 : typical_px < kQuarter_px ? 2 : 4;
 }
 
-void PuffsPass::make_splats(std::span<const PointSet* const> sets, const View& view, const PuffLight& light,
-                            const ShadowMap& shadow_map, int factor) {
+void PuffsPass::make_splats(const PaintOrder& order, const View& view, const PuffLight& light,
+                            const ShadowMap& shadow_map) {
   const FrameUniforms& frame = light.frame;
-  struct Source {
-    const PointSet* set;
-    uint32_t first;
-  };
-  std::vector<Source> sources;
   Eigen::AlignedBox3f box;
-  uint32_t count = 0;
-  for (const PointSet* set : sets) {
-    if (!set->is_puffs()) continue;
-    sources.push_back({set, count});
-    count += static_cast<uint32_t>(set->points.size());
-    if (set->def.style == PointStyle::smoke && set->def.lit) box.extend(set->box);
-  }
+  for (const PaintOrder::Source& source : order.sources(PaintOrder::Kind::puffs))
+    if (source.set->def.style == PointStyle::smoke && source.set->def.lit) box.extend(source.set->box);
   SceneShadow shadow;
   if (!box.isEmpty()) shadow.read(shadow_map, frame, box);
-  const float pixel_m = frame.eye.w() * static_cast<float>(factor);
-  const Vector2f half_size(0.5f * static_cast<float>(width_px_) / static_cast<float>(factor),
-                           0.5f * static_cast<float>(height_px_) / static_cast<float>(factor));
+  const float pixel_m = frame.eye.w() * static_cast<float>(factor_);
+  const Vector2f half_size(0.5f * static_cast<float>(width_px_) / static_cast<float>(factor_),
+                           0.5f * static_cast<float>(height_px_) / static_cast<float>(factor_));
 
   const auto splat_of = [&](uint64_t key) {
-    const auto number = static_cast<uint32_t>(key);
-    auto source = sources.begin();
-    while (source + 1 != sources.end() && (source + 1)->first <= number) ++source;
-    const PointSet& set = *source->set;
-    const std::size_t i = number - source->first;
+    const PaintOrder::Place at = order.place(PaintOrder::Kind::puffs, key);
+    const PointSet& set = *at.set;
+    const std::size_t i = at.index;
     const GpuPoint& point = set.points[i];
     const Vector3f center = point.position.head<3>();
     const float radius = point.position.w();
@@ -216,23 +195,41 @@ void PuffsPass::make_splats(std::span<const PointSet* const> sets, const View& v
     }
     return s;
   };
-  splats_.resize(keys_.size());
+  const std::span<const uint64_t> keys = order.keys(PaintOrder::Kind::puffs);
+  splats_.resize(keys.size());
   constexpr std::size_t kBlock = 512;
-  tbb::parallel_for(std::size_t{0}, (keys_.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
-    for (std::size_t k = block * kBlock; k < std::min(keys_.size(), (block + 1) * kBlock); ++k)
-      splats_[k] = splat_of(keys_[k]);
+  tbb::parallel_for(std::size_t{0}, (keys.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
+    for (std::size_t k = block * kBlock; k < std::min(keys.size(), (block + 1) * kBlock); ++k)
+      splats_[k] = splat_of(keys[k]);
   });
 }
 
-void PuffsPass::read_depth(const FrameUniforms& frame, GLuint framebuffer, int factor) {
+namespace {
+
+Eigen::AlignedBox2f area_of(std::span<const Splat> splats) {
+  Eigen::AlignedBox2f area;
+  for (const Splat& s : splats)
+    area.extend(Vector2f(s.x - s.half_x, s.y - s.half_y)).extend(Vector2f(s.x + s.half_x, s.y + s.half_y));
+  return area;
+}
+
+}  // namespace
+
+Eigen::AlignedBox2i PuffsPass::area_px(uint32_t first, uint32_t last) const {
+  const Eigen::AlignedBox2f area = area_of(std::span(splats_).subspan(first, last - first));
+  const Eigen::Array2f most(static_cast<float>(width_px_), static_cast<float>(height_px_));
+  const auto factor = static_cast<float>(factor_);
+  return {(factor * (area.min().array() - 1)).max(0).min(most).floor().cast<int>().matrix(),
+          (factor * (area.max().array() + 1)).max(0).min(most).ceil().cast<int>().matrix()};
+}
+
+void PuffsPass::read_depth(std::span<const Splat> splats, const FrameUniforms& frame, GLuint framebuffer) {
+  const int factor = factor_;
   picture_.width_px = (width_px_ + factor - 1) / factor;
   picture_.height_px = (height_px_ + factor - 1) / factor;
   picture_.depth.assign(
       static_cast<std::size_t>(picture_.width_px) * static_cast<std::size_t>(picture_.height_px), 0);
-  Eigen::AlignedBox2f seen;
-  for (const Splat& s : splats_) {
-    seen.extend(Vector2f(s.x - s.half_x, s.y - s.half_y)).extend(Vector2f(s.x + s.half_x, s.y + s.half_y));
-  }
+  const Eigen::AlignedBox2f seen = area_of(splats);
   const auto low = [](float x, int limit) {
     return static_cast<int>(std::clamp(std::floor(x) - 1, 0.0f, static_cast<float>(limit)));
   };
@@ -267,7 +264,8 @@ void PuffsPass::read_depth(const FrameUniforms& frame, GLuint framebuffer, int f
   });
 }
 
-void PuffsPass::composite(GLuint framebuffer, int factor) {
+void PuffsPass::composite(GLuint framebuffer) {
+  const int factor = factor_;
   if (picture_.x0 >= picture_.x1) return;
   if (texture_factor_ != factor) {
     texture_factor_ = factor;
@@ -295,7 +293,7 @@ void PuffsPass::composite(GLuint framebuffer, int factor) {
   glScissor(picture_.x0 * factor, picture_.y0 * factor, (picture_.x1 - picture_.x0) * factor,
             (picture_.y1 - picture_.y0) * factor);
   program_.use();
-  glUniform3f(0, static_cast<float>(factor), kTolerance * typical_m_, farthest_m_);
+  glUniform3f(0, static_cast<float>(factor_), kTolerance * typical_m_, farthest_m_);
   glUniform4i(1, picture_.x0, picture_.y0, picture_.x1 - 1, picture_.y1 - 1);
   glBindVertexArray(no_attributes_);
   glDrawArrays(GL_TRIANGLES, 0, 3);
@@ -303,15 +301,19 @@ void PuffsPass::composite(GLuint framebuffer, int factor) {
   glEnable(GL_DEPTH_TEST);
 }
 
-void PuffsPass::draw(std::span<const PointSet* const> sets, const View& view, const PuffLight& light,
-                     const ShadowMap& shadow_map, GLuint framebuffer) {
-  const FrameUniforms& frame = light.frame;
-  const int factor = sort_visible(sets, view, frame.eye.w());
-  if (keys_.empty()) return;
-  make_splats(sets, view, light, shadow_map, factor);
-  read_depth(frame, framebuffer, factor);
-  draw_splats(std::span<const Splat>(splats_), picture_);
-  composite(framebuffer, factor);
+void PuffsPass::prepare_splats(const PaintOrder& order, const View& view, const PuffLight& light,
+                               const ShadowMap& shadow_map) {
+  splats_.clear();
+  if (order.keys(PaintOrder::Kind::puffs).empty()) return;
+  measure(order, view, light.frame.eye.w());
+  make_splats(order, view, light, shadow_map);
+}
+
+void PuffsPass::draw(uint32_t first, uint32_t last, const FrameUniforms& frame, GLuint framebuffer) {
+  const std::span<const Splat> splats = std::span<const Splat>(splats_).subspan(first, last - first);
+  read_depth(splats, frame, framebuffer);
+  draw_splats(splats, picture_);
+  composite(framebuffer);
 }
 
 }  // namespace offstage::render

@@ -5,7 +5,7 @@
 namespace offstage::render {
 namespace {
 
-constexpr GLuint kPlainUnit = 9, kNearestUnit = 13;
+constexpr GLuint kSunPlainUnit = 9, kSunNearestUnit = 13;
 constexpr int kCells = 64;  // a side of the coarse grid
 
 }  // namespace
@@ -106,7 +106,7 @@ void ShadowMap::mark(const ShadowFrame& frame, std::span<const Caster> balls,
     add(there);
   }
   glTextureSubImage2D(nearest_texture_, 0, 0, 0, kCells, kCells, GL_RED, GL_FLOAT, nearest_.data());
-  glBindTextureUnit(kNearestUnit, nearest_texture_);
+  glBindTextureUnit(kSunNearestUnit, nearest_texture_);
 }
 
 void ShadowMap::begin() const {
@@ -128,8 +128,8 @@ void ShadowMap::end() const {
   glDisable(GL_POLYGON_OFFSET_FILL);
   glDisable(GL_DEPTH_CLAMP);
   glBindTextureUnit(0, depth_);
-  glBindTextureUnit(kPlainUnit, depth_);
-  glBindSampler(kPlainUnit, plain_);
+  glBindTextureUnit(kSunPlainUnit, depth_);
+  glBindSampler(kSunPlainUnit, plain_);
 }
 
 void ShadowMap::read(int x, int y, int width, int height, std::vector<uint16_t>& depths) const {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "render/frame_rate.h"
 #include "render/image.h"
 
 namespace offstage::render {
@@ -28,9 +29,9 @@ std::unique_ptr<FrameSink> make_png_sink(const std::filesystem::path& pattern);
 
 struct VideoDef {
   std::filesystem::path
-      path;  ///< .mp4 .webm .mov .gif .webp .apng decide the encoder; .png is animated PNG here
+      path;  ///< .mp4 .webm .mov .mkv .gif .webp .apng decide the encoder; .png is animated PNG here
   int width_px = 0, height_px = 0;
-  double fps = 30;
+  FrameRate fps;
   bool alpha = false;  ///< .webm, .mov, .webp, .apng, .png keep it; others are refused
 };
 
@@ -47,7 +48,12 @@ std::unique_ptr<FrameSink> make_video_sink(const VideoDef& def);
 /// Raw top-down frames on standard output: rgba bytes, or yuv4mpeg (4:4:4, BT.709, limited range) if `y4m`. A
 /// closed pipe throws FileError. Throws std::invalid_argument for an impossible size or rate, and on a
 /// terminal.
-std::unique_ptr<FrameSink> make_pipe_sink(bool y4m, int width_px, int height_px, double fps);
+std::unique_ptr<FrameSink> make_pipe_sink(bool y4m, int width_px, int height_px, FrameRate fps);
+
+/// The endings of video files, with their dots.
+std::vector<std::string> video_endings();
+/// Whether a video of this ending keeps transparency; false for an ending that is none.
+bool keeps_alpha(const std::string& ending);
 
 /// Encoders ffmpeg offers among those used here, for `doctor`; empty if there is no ffmpeg.
 std::vector<std::string> available_encoders();

@@ -37,10 +37,10 @@ Vector3f sky_radiance(const SkyModel& sky, const Vector3f& direction) {
 std::array<Vector3f, 9> sky_irradiance(const SkyModel& sky) {
   // Squares of the constants of the real spherical harmonics times the cosine lobe's factors over pi (1, 2/3,
   // 1/4).
-  constexpr float kPi = std::numbers::pi_v<float>;
-  constexpr std::array<float, 9> kWeights = {1 / (4 * kPi),     0.5f / kPi,      0.5f / kPi,
-                                             0.5f / kPi,        3.75f / kPi / 4, 3.75f / kPi / 4,
-                                             0.3125f / kPi / 4, 3.75f / kPi / 4, 0.9375f / kPi / 4};
+  constexpr float pi = std::numbers::pi_v<float>;
+  constexpr std::array<float, 9> kWeights = {1 / (4 * pi),     0.5f / pi,      0.5f / pi,
+                                             0.5f / pi,        3.75f / pi / 4, 3.75f / pi / 4,
+                                             0.3125f / pi / 4, 3.75f / pi / 4, 0.9375f / pi / 4};
   constexpr int kBands = 32, kColumns = 48;
   std::array<Vector3f, 9> sum;
   sum.fill(Vector3f::Zero());
@@ -48,14 +48,14 @@ std::array<Vector3f, 9> sky_irradiance(const SkyModel& sky) {
     const float y = (static_cast<float>(band) + 0.5f) * 2 / kBands - 1;  // equal areas
     const float r = std::sqrt(1 - y * y);
     for (int column = 0; column < kColumns; ++column) {
-      const float angle = (static_cast<float>(column) + 0.5f) * 2 * kPi / kColumns;
+      const float angle = (static_cast<float>(column) + 0.5f) * 2 * pi / kColumns;
       const float x = r * std::cos(angle), z = r * std::sin(angle);
       const Vector3f radiance = sky_radiance(sky, {x, y, z});
       const std::array<float, 9> basis = {1, y, z, x, x * y, y * z, 3 * z * z - 1, x * z, x * x - y * y};
       for (std::size_t k = 0; k < 9; ++k) sum[k] += basis[k] * radiance;
     }
   }
-  constexpr float kSolidAngle = 4 * kPi / (kBands * kColumns);
+  constexpr float kSolidAngle = 4 * pi / (kBands * kColumns);
   // Light that went from surface to surface has lost some of the sky's blue.
   constexpr float kGrey = 0.35f;
   const Vector3f luminance(0.2126f, 0.7152f, 0.0722f);

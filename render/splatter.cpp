@@ -94,8 +94,8 @@ inline void draw_lanes(const StreakSplat& s, float dx, float dy, std::size_t at,
   const Lanes past = (along - clamped_to(along, -s.half_length, s.half_length)) * s.inverse_radius;
   const Lanes from_axis = square_root(past * past + across * across);
   const Lanes rim = clamped_to((from_axis - (1 - s.softness)) * (1 / s.softness), 0, 1);
-  const Lanes in_front =
-      clamped_to((lanes_of(tile.depth, at) - (s.depth + s.depth_slope * along)) * s.inverse_reach + 0.5f, 0, 1);
+  const Lanes in_front = clamped_to(
+      (lanes_of(tile.depth, at) - (s.depth + s.depth_slope * along)) * s.inverse_reach + 0.5f, 0, 1);
   const Lanes head = along / (s.half_length + 1 / s.inverse_radius);
   const Lanes tail = 1 - s.taper * (0.5f - 0.5f * clamped_to(head, -1, 1));
   Lanes& through = lanes_of(tile.through, at);
@@ -264,31 +264,52 @@ void StreakBands::sort(std::span<const StreakSplat> front_to_back, int width_px,
   streaks_ = front_to_back;
   width_px_ = width_px;
   sort_by_tiles(streaks_, width_px, height_px, tiles_);
+  ends_.assign(tiles_.begins.begin() + 1, tiles_.begins.end());
 }
 
-bool StreakBands::touches(int bottom) const {
-  return !tiles_.empty() && bottom < tiles_.y1 * kTileHeight_px &&
-         bottom + kRows > tiles_.y0 * kTileHeight_px;
+std::span<const uint32_t> StreakBands::rest_of(int tile_x, int tile_y, uint32_t first) const {
+  const auto t = static_cast<std::size_t>(tile_y * tiles_.columns + tile_x);
+  const std::span<const uint32_t> rest =
+      std::span(tiles_.order).subspan(tiles_.begins[t], ends_[t] - tiles_.begins[t]);
+  return rest.subspan(static_cast<std::size_t>(std::ranges::lower_bound(rest, first) - rest.begin()));
 }
 
-void StreakBands::lay_over(int bottom, int rows, std::span<const float> depth,
-                           const Eigen::Vector2f& distance, std::span<float> rgba) const {
-  const int columns = tiles_.x1 - tiles_.x0, first_row = bottom / kTileHeight_px;
-  const int tile_rows = (rows + kTileHeight_px - 1) / kTileHeight_px;
-  tbb::parallel_for(0, columns * tile_rows, [&](int k) {
-    const int tile_x = tiles_.x0 + k % columns, row = k / columns;
-    const std::span<const uint32_t> order = tiles_.of(tile_x, first_row + row);
+std::pair<int, int> StreakBands::columns_px(int left, int right) const {
+  const int first = std::max(left / kTileWidth_px, tiles_.x0),
+            last = std::min((right + kTileWidth_px - 1) / kTileWidth_px, tiles_.x1);
+  return {first * kTileWidth_px, std::min(last * kTileWidth_px, width_px_)};
+}
+
+bool StreakBands::any(int bottom, int left, int right, uint32_t first) const {
+  const int y0 = bottom / kTileHeight_px, y1 = (bottom + kRows) / kTileHeight_px;
+  const auto [x0, x1] = columns_px(left, right);
+  for (int y = std::max(y0, tiles_.y0); y < std::min(y1, tiles_.y1); ++y)
+    for (int x = x0; x < x1; x += kTileWidth_px)
+      if (!rest_of(x / kTileWidth_px, y, first).empty()) return true;
+  return false;
+}
+
+void StreakBands::lay_over(const Strip& strip, const Eigen::Vector2f& distance, uint32_t first) {
+  const auto [x0, x1] = columns_px(strip.left, strip.left + strip.width);
+  const int columns = (x1 - x0 + kTileWidth_px - 1) / kTileWidth_px, first_column = x0 / kTileWidth_px;
+  const int first_row = strip.bottom / kTileHeight_px,
+            last_row =
+                std::min((strip.bottom + strip.rows + kTileHeight_px - 1) / kTileHeight_px, tiles_.rows);
+  tbb::parallel_for(0, columns * (last_row - first_row), [&](int k) {
+    const int tile_x = first_column + k % columns, tile_y = first_row + k / columns;
+    const std::span<const uint32_t> order = rest_of(tile_x, tile_y, first);
     if (order.empty()) return;
-    const int x = tile_x * kTileWidth_px, y = row * kTileHeight_px;
+    ends_[static_cast<std::size_t>(tile_y * tiles_.columns + tile_x)] -= static_cast<uint32_t>(order.size());
+    const int x = tile_x * kTileWidth_px - strip.left, y = tile_y * kTileHeight_px - strip.bottom;
     Tile tile;
     float farthest = 0;
-    for_each_pixel(x, y, width_px_, rows, [&](std::size_t i, std::size_t at) {
-      tile.depth[at] = distance.x() / (depth[i] + distance.y());
+    for_each_pixel(x, y, strip.width, strip.rows, [&](std::size_t i, std::size_t at) {
+      tile.depth[at] = distance.x() / (strip.depth[i] + distance.y());
       farthest = std::max(farthest, tile.depth[at]);
     });
-    draw_tile(streaks_, order, x, bottom + y, farthest, tile);
-    for_each_pixel(x, y, width_px_, rows, [&](std::size_t i, std::size_t at) {
-      float* out = rgba.data() + 4 * i;
+    draw_tile(streaks_, order, tile_x * kTileWidth_px, tile_y * kTileHeight_px, farthest, tile);
+    for_each_pixel(x, y, strip.width, strip.rows, [&](std::size_t i, std::size_t at) {
+      float* out = strip.rgba.data() + 4 * i;
       const float through = tile.through[at];
       out[0] = tile.red[at] + through * out[0];
       out[1] = tile.green[at] + through * out[1];

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -70,23 +71,35 @@ struct SplatTiles {
 void draw_splats(std::span<const Splat> front_to_back, SplatPicture& picture);
 
 /// Streaks over a picture that is there by bands alone, as it is read back: it needs no other of its size.
+/// Each tile draws its streaks back to front in as many goes as other things come in between.
 class StreakBands {
  public:
   static constexpr int kRows = 32;  ///< of a band [px]
+  /// A part of a band. `bottom` is a multiple of kRows, `left` and the right end are those of tiles.
+  struct Strip {
+    int left, bottom, width, rows;
+    std::span<const float> depth;  ///< one a pixel, of the depth buffer
+    std::span<float> rgba;         ///< premultiplied
+  };
 
   /// Finds what each tile has to draw. The streaks must stay where they are.
   void sort(std::span<const StreakSplat> front_to_back, int width_px, int height_px);
-  bool touches(int bottom) const;
-  /// Lays streaks over a band of `rows` rows, `bottom` being a multiple of kRows. `depth`, one a pixel: of
-  /// the depth buffer, the distance along the view axis being x / (depth + y) of `distance`. `rgba`:
-  /// premultiplied.
-  void lay_over(int bottom, int rows, std::span<const float> depth, const Eigen::Vector2f& distance,
-                std::span<float> rgba) const;
+  /// The columns of tiles that have a streak and a pixel from `left` to `right`.
+  std::pair<int, int> columns_px(int left, int right) const;
+  /// Whether those tiles of a band have streaks, from number `first` on, that were not drawn.
+  bool any(int bottom, int left, int right, uint32_t first) const;
+  /// Lays the streaks from `first` on that were not drawn yet over a strip. The distance along the view axis
+  /// is x / (depth + y) of `distance`.
+  void lay_over(const Strip& strip, const Eigen::Vector2f& distance, uint32_t first);
 
  private:
+  std::span<const uint32_t> rest_of(int tile_x, int tile_y, uint32_t first) const;
+
   std::span<const StreakSplat> streaks_;
   int width_px_ = 0;
   SplatTiles tiles_;
+  std::vector<uint32_t>
+      ends_;  ///< of each tile, in the tiles' order: behind those that are still to be drawn
 };
 
 }  // namespace offstage::render

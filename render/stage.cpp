@@ -12,11 +12,14 @@
 #include "render/lines_pass.h"
 #include "render/mesh_pass.h"
 #include "render/occlusion_pass.h"
+#include "render/paint_order.h"
+#include "render/picture_copy.h"
 #include "render/points_pass.h"
 #include "render/puffs_pass.h"
 #include "render/shadow_map.h"
 #include "render/slots.h"
 #include "render/streaks_pass.h"
+#include "render/surface_probe.h"
 
 namespace offstage::render {
 namespace {
@@ -29,13 +32,26 @@ constexpr float kReach = 0.1f;        // how far things hide the sky, as a share
 struct Picture {
   gl::Texture color, depth;
   gl::Framebuffer framebuffer;
-  gl::Texture depth_copy;  ///< that particles read while they are drawn; made when there are some
-  gl::Texture behind;      ///< what is seen through glass and in mirrors; made when there is some
+  PictureCopy depth_copy;  ///< that particles and mirrors read
+  PictureCopy behind;      ///< what is seen through glass and in mirrors
+  gl::Framebuffer copies;  ///< of both; made when something is drawn in them alone
 
   Picture(int width_px, int height_px)
       : color(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)),
         depth(gl::make_target(GL_DEPTH_COMPONENT32F, width_px, height_px, GL_NEAREST)),
-        framebuffer(gl::make_framebuffer(color, depth)) {}
+        framebuffer(gl::make_framebuffer(color, depth)),
+        depth_copy(GL_DEPTH_COMPONENT32F, GL_NEAREST, kSceneDepthUnit, width_px, height_px),
+        behind(GL_RGBA32F, GL_LINEAR, kBehindUnit, width_px, height_px) {}
+};
+
+/// A body that something is seen through.
+struct TranslucentBody {
+  const Cloth* cloth = nullptr;  ///< none: an instance
+  std::size_t instance = 0;      ///< of MeshPass::translucent
+  bool glass = false;
+  bool fills_region = false;
+  Eigen::AlignedBox2i area_px;    ///< that it takes
+  Eigen::AlignedBox2i looked_px;  ///< that it shows, refracted
 };
 
 /// What a sub-frame must soften by itself, so that the mean of all is as soft as the sun's disc makes it.
@@ -73,8 +89,10 @@ struct Stage::Impl {
   MeshPass mesh_pass;
   ClothPass cloth_pass;
   PointsPass points_pass;
+  PaintOrder paint_order;
   PuffsPass puffs_pass;
   StreaksPass streaks_pass;
+  SurfaceProbe surface_probe;
   LinesPass lines_pass;
   std::optional<ChannelsPass> channels_pass;  ///< made when asked for
   gl::LazyProgram sky_program{
@@ -90,6 +108,7 @@ struct Stage::Impl {
         occlusion_pass(def.width_px, def.height_px),
         puffs_pass(def.width_px, def.height_px),
         streaks_pass(def.width_px, def.height_px),
+        surface_probe(def.width_px, def.height_px),
         strip(static_cast<std::size_t>(def.width_px) * StreakBands::kRows * 4) {
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
     gl::check_error("making the stage");
@@ -106,17 +125,21 @@ struct Stage::Impl {
                     FrameUniforms& frame, Hiding& hiding);
   void prepare_lamps(std::span<PointSet* const> sets, const SampleOffsets& offsets, FrameUniforms& frame);
   void draw_lamp_shadows(std::span<const Caster> casters, std::span<const Cloth* const> sheets);
-  void copy(GLuint from, GLuint to) const;
-  void copy_depth();
-  void copy_picture();
-  void draw_mirrors(const View& view, std::span<const Eigen::AlignedBox3f> others);
-  void draw_glass();
+  void draw_mirrors(std::span<const Cloth* const> sheets, const View& view,
+                    std::span<const Eigen::AlignedBox3f> others);
+  void draw_sheer_in_copies(std::span<const Cloth* const> sheets);
   void draw_depth(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view);
   void draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view,
                    const Hiding& hiding);
-  void draw_sheer(std::span<const Cloth* const> sheets);
-  void draw_blended(std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame,
-                    bool new_frame);
+  std::vector<TranslucentBody> find_bodies(std::span<const Cloth* const> sheets, const View& view,
+                                           std::vector<Region>& regions);
+  void draw_translucent(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets,
+                        const View& view, const FrameUniforms& frame, bool new_frame);
+  void probe_surfaces(std::span<const TranslucentBody> bodies, std::span<PointSet* const> sets,
+                      const View& view, const FrameUniforms& frame, std::vector<Region>& regions);
+  void draw_run(const PaintOrder::Run& run, const View& view, const FrameUniforms& frame);
+  void draw_body(const TranslucentBody& body, const FrameUniforms& frame);
+  void lay_streaks_behind(const Eigen::AlignedBox2i& area_px, const FrameUniforms& frame);
   void draw_lines(const View& view);
   void add_picture(const FrameUniforms& frame, HdrImage& sum);
 };
@@ -222,30 +245,28 @@ void Stage::Impl::draw_lamp_shadows(std::span<const Caster> casters, std::span<c
   lamp_pass.end();
 }
 
-void Stage::Impl::copy(GLuint from, GLuint to) const {
-  glCopyImageSubData(from, GL_TEXTURE_2D, 0, 0, 0, 0, to, GL_TEXTURE_2D, 0, 0, 0, 0, def.width_px,
-                     def.height_px, 1);
+// Mirrors show sheer cloth, too, which is not in the picture yet.
+void Stage::Impl::draw_sheer_in_copies(std::span<const Cloth* const> sheets) {
+  if (std::ranges::none_of(sheets, [](const Cloth* cloth) { return cloth->is_sheer(); })) return;
+  if (picture.copies == 0)
+    picture.copies = gl::make_framebuffer(picture.behind.texture(), picture.depth_copy.texture());
+  glBindFramebuffer(GL_FRAMEBUFFER, picture.copies);
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  for (const Cloth* cloth : sheets)
+    if (cloth->is_sheer()) cloth_pass.draw(*cloth, features);
+  glDisable(GL_BLEND);
+  glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
+  picture.depth_copy.change_all();
 }
 
-void Stage::Impl::copy_depth() {
-  if (picture.depth_copy == 0)
-    picture.depth_copy = gl::make_target(GL_DEPTH_COMPONENT32F, def.width_px, def.height_px, GL_NEAREST);
-  copy(picture.depth, picture.depth_copy);
-  glBindTextureUnit(kSceneDepthUnit, picture.depth_copy);
-}
-
-void Stage::Impl::copy_picture() {
-  if (picture.behind == 0)
-    picture.behind = gl::make_target(GL_RGBA32F, def.width_px, def.height_px, GL_LINEAR);
-  copy(picture.color, picture.behind);
-  glBindTextureUnit(kBehindUnit, picture.behind);
-}
-
-void Stage::Impl::draw_mirrors(const View& view, std::span<const Eigen::AlignedBox3f> others) {
+void Stage::Impl::draw_mirrors(std::span<const Cloth* const> sheets, const View& view,
+                               std::span<const Eigen::AlignedBox3f> others) {
   const float reach = kMirrorReach * (camera.target - camera.eye).norm();
   if (!mesh_pass.find_mirrors(view, reach, others, def.width_px, def.height_px)) return;
-  copy_depth();
-  copy_picture();
+  picture.depth_copy.update_all(picture.depth);
+  picture.behind.update_all(picture.color);
+  draw_sheer_in_copies(sheets);
   glDepthFunc(GL_GEQUAL);  // over themselves
   glDepthMask(GL_FALSE);
   glEnable(GL_BLEND);
@@ -254,12 +275,7 @@ void Stage::Impl::draw_mirrors(const View& view, std::span<const Eigen::AlignedB
   glDisable(GL_BLEND);
   glDepthMask(GL_TRUE);
   glDepthFunc(GL_GREATER);
-}
-
-void Stage::Impl::draw_glass() {
-  if (!mesh_pass.has_glass()) return;
-  copy_picture();
-  mesh_pass.draw_glass();
+  picture.behind.change_all();
 }
 
 void Stage::Impl::draw_depth(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets,
@@ -274,8 +290,8 @@ void Stage::Impl::draw_depth(std::span<const Cloth* const> sheets, std::span<Poi
   glClearNamedFramebufferfv(picture.framebuffer, GL_COLOR, 0, nothing);
   glClearNamedFramebufferfv(picture.framebuffer, GL_DEPTH, 0, nothing);
 
-  // A hair behind, and on steep faces by half of what a pixel's depth is, so that no rounding, of places in the
-  // picture either, hides a surface from its own shading.
+  // A hair behind, and on steep faces by half of what a pixel's depth is, so that no rounding, of places in
+  // the picture either, hides a surface from its own shading.
   glEnable(GL_POLYGON_OFFSET_FILL);
   glPolygonOffset(-0.5f, -4);
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
@@ -310,40 +326,143 @@ void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<Po
     glDrawArrays(GL_TRIANGLES, 0, 3);
   }
   glDepthFunc(GL_GREATER);
-  draw_sheer(sheets);
-  draw_mirrors(view, hiding.solid);
-  draw_glass();
+  picture.depth_copy.change_all();
+  picture.behind.change_all();
+  draw_mirrors(sheets, view, hiding.solid);
 }
 
-void Stage::Impl::draw_sheer(std::span<const Cloth* const> sheets) {
+std::vector<TranslucentBody> Stage::Impl::find_bodies(std::span<const Cloth* const> sheets, const View& view,
+                                                      std::vector<Region>& regions) {
+  std::vector<TranslucentBody> found;
+  std::vector<Region> places;
+  std::vector<Eigen::AlignedBox2i> areas;
+  const auto add = [&](TranslucentBody body, const Region& region, float refraction_m) {
+    const auto area_within = [&](float margin) {
+      ScreenArea area(view, margin);
+      for (const Vector3f& corner : region.corners()) area.add(corner);
+      if (area.empty()) return Eigen::AlignedBox2i();
+      const Eigen::AlignedBox2i pixels = area.pixels(def.width_px, def.height_px);
+      return Eigen::AlignedBox2i(pixels.min().array() - 1, pixels.max().array() + 1);
+    };
+    body.area_px = area_within(0);
+    if (body.area_px.isEmpty()) return;
+    body.looked_px = area_within(refraction_m);
+    areas.push_back(body.area_px);
+    places.push_back(region);
+    found.push_back(body);
+  };
+  const std::span<const Instance* const> see_through = mesh_pass.translucent();
+  for (std::size_t k = 0; k < see_through.size(); ++k) {
+    const Instance& instance = *see_through[k];
+    // Glass looks up what is behind it as far away as its thickness, twice.
+    const bool fills = instance.mesh->round || instance.mesh->boxy || instance.mesh->flat;
+    add({.instance = k, .glass = instance.material->glass, .fills_region = fills},
+        {instance.mesh->box, instance.world_from_mesh, instance.mesh->round, view},
+        2.5f * instance.mesh->thickness * instance.scale());
+  }
+  for (const Cloth* cloth : sheets) {
+    if (!cloth->is_sheer()) continue;
+    const Vector3f half = Vector3f::Constant(0.5f * cloth->thickness);
+    Eigen::AlignedBox3f box = cloth->surface.box();
+    add({.cloth = cloth}, {{box.min() - half, box.max() + half}, Eigen::Affine3f::Identity(), false, view},
+        0);
+  }
+  std::vector<TranslucentBody> ordered;
+  for (const uint32_t k : back_to_front(places, areas)) {
+    ordered.push_back(found[k]);
+    regions.push_back(places[k]);
+  }
+  return ordered;
+}
+
+// Of bodies that have particles around them, but in their box.
+void Stage::Impl::probe_surfaces(std::span<const TranslucentBody> bodies, std::span<PointSet* const> sets,
+                                 const View& view, const FrameUniforms& frame, std::vector<Region>& regions) {
+  const Eigen::AlignedBox2i all(Eigen::Vector2i(0, 0), Eigen::Vector2i(def.width_px, def.height_px));
+  const Vector2f size_px = all.sizes().cast<float>();
+  for (std::size_t k = 0; k < bodies.size(); ++k) {
+    const TranslucentBody& body = bodies[k];
+    const Eigen::AlignedBox2i area = body.area_px.intersection(all);
+    const bool apart = std::ranges::none_of(sets, [&](const PointSet* set) {
+      return set->def.style != PointStyle::sphere && set->box.intersects(regions[k].world_box());
+    });
+    if (body.fills_region || apart || area.isEmpty() || area.volume() == 0) continue;
+    regions[k].set_surface(area,
+                           surface_probe.distances(area, frame,
+                                                   [&] {
+                                                     glDisable(GL_CULL_FACE);
+                                                     if (body.cloth)
+                                                       cloth_pass.draw_depth(*body.cloth);
+                                                     else
+                                                       mesh_pass.draw_translucent_depth(body.instance,
+                                                                                        view.clip_from_world);
+                                                   }),
+                           size_px);
+  }
+}
+
+void Stage::Impl::lay_streaks_behind(const Eigen::AlignedBox2i& area_px, const FrameUniforms& frame) {
+  picture.behind.change(streaks_pass.lay_behind(area_px, frame, picture.color));
+}
+
+void Stage::Impl::draw_run(const PaintOrder::Run& run, const View& view, const FrameUniforms& frame) {
+  if (run.kind == PaintOrder::Kind::streaks) return streaks_pass.pass(run.first);
+  const bool puffs = run.kind == PaintOrder::Kind::puffs;
+  Eigen::AlignedBox2i area(Eigen::Vector2i(0, 0), Eigen::Vector2i(def.width_px, def.height_px));
+  if (paint_order.run_count() > 1)
+    area = puffs ? puffs_pass.area_px(run.first, run.last)
+                 : paint_order.area_px(run, view, def.width_px, def.height_px);
+  if (area.isEmpty()) return;
+  lay_streaks_behind(area, frame);
+  picture.depth_copy.update(picture.depth, area);
+  if (puffs)
+    puffs_pass.draw(run.first, run.last, frame, picture.framebuffer);
+  else
+    points_pass.draw_blended(run.kind == PaintOrder::Kind::sprites ? PointStyle::sprite : PointStyle::flake,
+                             run.first, run.last, features);
+  picture.behind.change(area);
+}
+
+void Stage::Impl::draw_body(const TranslucentBody& body, const FrameUniforms& frame) {
+  lay_streaks_behind(body.looked_px, frame);
+  if (body.glass) {
+    picture.behind.update(picture.color, body.looked_px);
+    glDisable(GL_BLEND);
+  }
+  const bool writes_depth = body.glass || body.cloth;
+  if (writes_depth) glDepthMask(GL_TRUE);
+  if (body.cloth)
+    cloth_pass.draw(*body.cloth, features);
+  else
+    mesh_pass.draw_translucent(body.instance);
+  if (writes_depth) picture.depth_copy.change(body.area_px);
+  picture.behind.change(body.area_px);
   glEnable(GL_BLEND);
-  glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
-  for (const Cloth* cloth : sheets)
-    if (cloth->is_sheer()) cloth_pass.draw(*cloth, features);
-  glDisable(GL_BLEND);
+  glDepthMask(GL_FALSE);
+  glDisable(GL_CULL_FACE);
 }
 
-void Stage::Impl::draw_blended(std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame,
-                               bool new_frame) {
-  streaks_pass.clear();
+void Stage::Impl::draw_translucent(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets,
+                                   const View& view, const FrameUniforms& frame, bool new_frame) {
+  std::vector<Region> regions;
+  const std::vector<TranslucentBody> bodies = find_bodies(sheets, view, regions);
+  probe_surfaces(bodies, sets, view, frame, regions);
+  paint_order.build(sets, regions, view);
+  const PuffLight light(puffs_pass.grid(), frame, sun.direction.normalized());
+  points_pass.prepare_blended(paint_order);
+  puffs_pass.prepare_splats(paint_order, view, light, shadow_map);
+  streaks_pass.prepare(paint_order, view, light, shadow_map, new_frame);
+
   // Premultiplied: what adds light has no alpha, so one blend function serves both.
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
   glDepthMask(GL_FALSE);
-  mesh_pass.draw_blended();
   glDisable(GL_CULL_FACE);
-
-  const auto blended = [](const PointSet* set) { return set->def.style != PointStyle::sphere; };
-  if (std::none_of(sets.begin(), sets.end(), blended)) return;
-  if (!std::ranges::all_of(
-          sets, [&](const PointSet* set) { return !blended(set) || set->def.style == PointStyle::streak; }))
-    copy_depth();
-  const PuffLight light(puffs_pass.grid(), frame, sun.direction.normalized());
-  puffs_pass.draw(sets, view, light, shadow_map, picture.framebuffer);
-  for (const PointSet* set : sets) {
-    if (blended(set) && !set->is_splatted()) points_pass.draw_blended(*set, features);
+  glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
+  for (std::size_t k = 0; k <= bodies.size(); ++k) {
+    for (const PaintOrder::Run& run : paint_order.runs_before(k)) draw_run(run, view, frame);
+    if (k < bodies.size()) draw_body(bodies[k], frame);
   }
-  streaks_pass.prepare(sets, view, light, shadow_map, new_frame);
 }
 
 void Stage::Impl::draw_lines(const View& view) {
@@ -521,6 +640,7 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
     sum = {s.def.width_px, s.def.height_px, {}};
     sum.rgba.assign(sum.pixel_count() * 4, 0.0f);
   }
+  sum.transparent = !s.environment.visible;
   const View view = make_view(s.camera, offsets, s.def.width_px, s.def.height_px);
   FrameUniforms frame = make_frame(view, s.sun, s.environment, offsets, s.def.height_px);
 
@@ -544,7 +664,7 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
                         s.mesh_pass.occluded_area(view, hiding.sky_reach_m, hiding.solid), offsets.count,
                         frame.shadow.w());
   s.draw_opaque(sheets, sets, view, hiding);
-  s.draw_blended(sets, view, frame, offsets.index == 0);
+  s.draw_translucent(sheets, sets, view, frame, offsets.index == 0);
   s.draw_lines(view);
 
   s.add_picture(frame, sum);

@@ -26,7 +26,7 @@ struct Camera {
   Vector3f target = Vector3f::Zero();
   Vector3f up = Vector3f::UnitY();
   float fov_deg = 40;  ///< vertical, in (0, 180)
-  float near_m = 0.05f, far_m = 2000;
+  float near_m = 0.05f, far_m = 1e6f;
   float aperture = 0;  ///< lens diameter [m]; 0: everything is sharp
   float focus = 0;     ///< distance in focus [m]; 0: the target's
 };
@@ -62,7 +62,8 @@ struct Environment {
   /// Of the ground that sends back the light of sun and sky, in place of `ground`.
   std::optional<Vector3f> ground_albedo = {};
   float clouds = 0;  ///< share of the sky that they cover
-  float fog = 0;     ///< density [1/m]; transmittance exp(-fog * distance)
+  /// Density [1/m]; transmittance exp(-fog * distance). 0: nothing fades with distance.
+  float fog = 0;
   /// How far away things hide the sky from each other [m]; 0: not at all; none: a tenth of the camera's
   /// distance to its target.
   std::optional<float> occlusion_reach = {};

@@ -1,6 +1,6 @@
 #include "render/streaks_pass.h"
 
-#include <bit>
+#include <algorithm>
 
 #include <tbb/parallel_for.h>
 
@@ -96,63 +96,65 @@ StreakSplat splat_of(const GpuPoint& point, const PointsDef& def, const View& vi
 
 StreaksPass::StreaksPass(int width_px, int height_px) : width_px_(width_px), height_px_(height_px) {}
 
-void StreaksPass::sort_visible(std::span<const PointSet* const> sets, const View& view) {
-  sources_.clear();
-  keys_.clear();
-  uint32_t number = 0;
-  for (const PointSet* set : sets) {
-    if (set->def.style != PointStyle::streak) continue;
-    sources_.push_back({set, number});
-    for (std::size_t i = 0; i < set->points.size(); ++i, ++number) {
-      const Vector3f center = set->points[i].position.head<3>();
-      const float depth = view.depth_of(center);
-      // The margin covers what is drawn a pixel wide because it is thinner.
-      if (depth <= view.near_m || !view.sees(center, set->reach(i) + 0.01f * depth)) continue;
-      // Depth is positive, so its bits are in order; ties go by set and, in a set, by id.
-      keys_.push_back(uint64_t{std::bit_cast<uint32_t>(depth)} << 32 | number);
-    }
-  }
-  std::sort(keys_.begin(), keys_.end());
-}
-
-void StreaksPass::prepare(std::span<const PointSet* const> sets, const View& view, const PuffLight& light,
+void StreaksPass::prepare(const PaintOrder& order, const View& view, const PuffLight& light,
                           const ShadowMap& shadow_map, bool new_frame) {
-  sort_visible(sets, view);
-  any_ = !keys_.empty();
-  if (!any_) return;
+  constexpr auto kKind = PaintOrder::Kind::streaks;
+  const std::span<const uint64_t> keys = order.keys(kKind);
+  splats_.resize(keys.size());
+  first_behind_ = static_cast<uint32_t>(keys.size());
+  if (keys.empty()) return;
   if (new_frame) lights_.clear();
-  lights_.resize(sources_.back().first + sources_.back().set->points.size());
+  lights_.resize(order.count(kKind));
   Eigen::AlignedBox3f box;
-  for (const Source& source : sources_)
+  for (const PaintOrder::Source& source : order.sources(kKind))
     if (source.set->def.lit) box.extend(source.set->box);
   if (new_frame && !box.isEmpty()) shadow_.read(shadow_map, light.frame, box);
 
   const Vector2f half_size(0.5f * static_cast<float>(width_px_), 0.5f * static_cast<float>(height_px_));
-  splats_.resize(keys_.size());
   constexpr std::size_t kBlock = 512;
-  tbb::parallel_for(std::size_t{0}, (keys_.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
-    for (std::size_t k = block * kBlock; k < std::min(keys_.size(), (block + 1) * kBlock); ++k) {
-      const auto number = static_cast<uint32_t>(keys_[k]);
-      auto source = sources_.end() - 1;
-      while (source->first > number) --source;
-      const PointSet& set = *source->set;
-      const std::size_t i = number - source->first;
+  tbb::parallel_for(std::size_t{0}, (keys.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
+    for (std::size_t k = block * kBlock; k < std::min(keys.size(), (block + 1) * kBlock); ++k) {
+      const auto [set, i] = order.place(kKind, keys[k]);
       StreakSplat& s = splats_[k];
-      s = splat_of(set.points[i], set.def, view, light.frame.eye.w(), half_size);
-      KnownLight& known = lights_[number];
-      if (known.id != set.ids[i])
-        known = {set.ids[i], light_of(set.points[i], set.def, view, light, shadow_, {s.along_x, s.along_y})};
+      s = splat_of(set->points[i], set->def, view, light.frame.eye.w(), half_size);
+      KnownLight& known = lights_[order.number(kKind, keys[k])];
+      if (known.id != set->ids[i])
+        known = {set->ids[i],
+                 light_of(set->points[i], set->def, view, light, shadow_, {s.along_x, s.along_y})};
       s.light = &known.light;
     }
   });
   bands_.sort(splats_, width_px_, height_px_);
 }
 
+Eigen::AlignedBox2i StreaksPass::lay_behind(const Eigen::AlignedBox2i& area_px, const FrameUniforms& frame,
+                                            GLuint color) {
+  Eigen::AlignedBox2i changed;
+  if (first_behind_ >= splats_.size() || area_px.isEmpty()) return changed;
+  const auto [left, right] = bands_.columns_px(area_px.min().x(), area_px.max().x());
+  if (left >= right) return changed;
+  constexpr int kRows = StreakBands::kRows;
+  const int width = right - left;
+  for (int bottom = area_px.min().y() / kRows * kRows; bottom < area_px.max().y(); bottom += kRows) {
+    const int rows = std::min(kRows, height_px_ - bottom);
+    if (!bands_.any(bottom, left, right, first_behind_)) continue;
+    const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(rows);
+    depth_.resize(std::max(depth_.size(), pixels));
+    rgba_.resize(std::max(rgba_.size(), 4 * pixels));
+    glReadPixels(left, bottom, width, rows, GL_DEPTH_COMPONENT, GL_FLOAT, depth_.data());
+    glReadPixels(left, bottom, width, rows, GL_RGBA, GL_FLOAT, rgba_.data());
+    bands_.lay_over({left, bottom, width, rows, depth_, rgba_}, frame.depth.head<2>(), first_behind_);
+    glTextureSubImage2D(color, 0, left, bottom, width, rows, GL_RGBA, GL_FLOAT, rgba_.data());
+    changed.extend(Eigen::Vector2i(left, bottom)).extend(Eigen::Vector2i(right, bottom + rows));
+  }
+  return changed;
+}
+
 void StreaksPass::lay_over(int bottom, int rows, const FrameUniforms& frame, std::span<float> rgba) {
-  if (!any_ || !bands_.touches(bottom)) return;
-  depth_.resize(static_cast<std::size_t>(width_px_) * StreakBands::kRows);
+  if (splats_.empty() || !bands_.any(bottom, 0, width_px_, 0)) return;
+  depth_.resize(std::max(depth_.size(), static_cast<std::size_t>(width_px_) * StreakBands::kRows));
   glReadPixels(0, bottom, width_px_, rows, GL_DEPTH_COMPONENT, GL_FLOAT, depth_.data());
-  bands_.lay_over(bottom, rows, depth_, frame.depth.head<2>(), rgba);
+  bands_.lay_over({0, bottom, width_px_, rows, depth_, rgba}, frame.depth.head<2>(), 0);
 }
 
 }  // namespace offstage::render

@@ -69,7 +69,8 @@ gl::Texture make_texture(const Image& image, TextureContent content) {
   GLuint name = 0;
   glCreateTextures(GL_TEXTURE_2D, 1, &name);
   gl::Texture texture(name);
-  const int levels = std::bit_width(static_cast<unsigned>(std::max(image.width_px, image.height_px)));
+  const auto levels =
+      static_cast<GLsizei>(std::bit_width(static_cast<unsigned>(std::max(image.width_px, image.height_px))));
   glTextureStorage2D(texture, levels, content == TextureContent::color ? GL_SRGB8_ALPHA8 : GL_RGBA8,
                      image.width_px, image.height_px);
   glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);

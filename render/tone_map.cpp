@@ -99,7 +99,7 @@ float metered_exposure(const HdrImage& sum, float sample_weight) {
 
 Image tone_map(const HdrImage& sum, const ToneMap& options) {
   constexpr float kOpaque = 0.9999f;  // of N summed ones times 1/N
-  Image image{sum.width_px, sum.height_px, std::vector<uint8_t>(sum.rgba.size())};
+  Image image{sum.width_px, sum.height_px, std::vector<uint8_t>(sum.rgba.size()), sum.transparent};
   const uint16_t* table = table_of(options.curve).data();
   const float weight = options.sample_weight;
   const float gain = options.exposure * weight;

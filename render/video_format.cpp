@@ -31,7 +31,9 @@ Options yuv(const std::string& pixel_format, Options options) {
 }
 
 std::vector<VideoFormat> make_formats() {
-  const Options h264 = {"-preset", "medium", "-crf", "18", "-movflags", "+faststart"};
+  const Options h264 = {"-preset", "medium", "-crf", "18"};
+  Options h264_mp4 = h264;
+  h264_mp4.insert(h264_mp4.end(), {"-movflags", "+faststart"});
   const Options vp9 = {"-crf",      "24", "-b:v",          "0", "-deadline", "good",
                        "-cpu-used", "4",  "-tile-columns", "2"};
   Options vp9_alpha = vp9;  // alternate reference frames cannot carry alpha
@@ -46,10 +48,11 @@ std::vector<VideoFormat> make_formats() {
   const Options apng = {"-pred", "up", "-plays", "0", "-pix_fmt", "rgb24"};
   const Options apng_alpha = {"-pred", "up", "-plays", "0", "-pix_fmt", "rgba"};
   return {
-      {".mp4", "libx264", "mp4", false, true, 1000, yuv("yuv420p", h264), {}},
+      {".mp4", "libx264", "mp4", false, true, 1000, yuv("yuv420p", h264_mp4), {}},
       {".webm", "libvpx-vp9", "webm", true, true, 1000, yuv("yuv420p", vp9), yuv("yuva420p", vp9_alpha)},
       {".mov", "prores_ks", "mov", true, false, 1000, yuv("yuv444p10le", prores),
        yuv("yuva444p10le", prores)},
+      {".mkv", "libx264", "matroska", false, true, 1000, yuv("yuv420p", h264), {}},
       {".gif", "gif", "gif", false, false, 50, gif, {}},
       {".webp", "libwebp_anim", "webp", true, false, 1000, webp, webp},
       {".apng", "apng", "apng", true, false, 1000, apng, apng_alpha},
@@ -70,6 +73,18 @@ std::span<const VideoFormat> video_formats() {
   return formats;
 }
 
+std::vector<std::string> video_endings() {
+  std::vector<std::string> endings;
+  for (const VideoFormat& format : video_formats()) endings.emplace_back(format.extension);
+  return endings;
+}
+
+bool keeps_alpha(const std::string& ending) {
+  const auto formats = video_formats();
+  return std::ranges::any_of(formats,
+                             [&](const VideoFormat& f) { return f.extension == ending && f.keeps_alpha; });
+}
+
 const VideoFormat& video_format(const VideoDef& def) {
   const std::string file = def.path.string();
   std::string extension = def.path.extension().string();
@@ -79,7 +94,9 @@ const VideoFormat& video_format(const VideoDef& def) {
   const auto format = std::find_if(formats.begin(), formats.end(),
                                    [&](const VideoFormat& f) { return extension == f.extension; });
   if (format == formats.end()) {
-    throw std::invalid_argument(file + ": no video format; use .mp4 .webm .mov .gif .webp .apng or .png");
+    std::string endings;
+    for (const VideoFormat& f : formats) endings += std::string(" ") + f.extension;
+    throw std::invalid_argument(file + ": no video format; use one of" + endings);
   }
   const std::string size = std::to_string(def.width_px) + "x" + std::to_string(def.height_px);
   if (def.width_px <= 0 || def.height_px <= 0 || def.width_px > 16384 || def.height_px > 16384) {
@@ -91,8 +108,9 @@ const VideoFormat& video_format(const VideoDef& def) {
     throw std::invalid_argument(file + ": " + extension + " needs an even width and height, not " + size +
                                 "; use " + even + ", or .mov, .webp or .apng");
   }
-  if (!(def.fps > 0) || def.fps > format->max_fps) {
-    throw std::invalid_argument(file + ": " + shortest(def.fps) + " frames per second is not in (0, " +
+  const bool positive = def.fps.numerator > 0 && def.fps.denominator > 0;
+  if (!positive || def.fps.per_second() > format->max_fps) {
+    throw std::invalid_argument(file + ": " + def.fps.text() + " frames per second is not in (0, " +
                                 shortest(format->max_fps) + "], the range of " + extension);
   }
   if (def.alpha && !format->keeps_alpha) {
@@ -116,7 +134,7 @@ std::vector<std::string> encoder_command(const std::string& ffmpeg, const VideoD
                      "-video_size",
                      std::to_string(def.width_px) + "x" + std::to_string(def.height_px),
                      "-framerate",
-                     shortest(def.fps),
+                     def.fps.text(),
                      "-i",
                      "pipe:0",
                      "-c:v",

@@ -28,6 +28,7 @@ struct Body {
   uint32_t surface = 0;  // number of its material, for rules
   uint32_t island = 0;   // awake: number among the islands of the sub-step; asleep: of the sleeping ones
   uint32_t row = 0;      // among the bodies of its island
+  uint32_t rank = 0;     // its place in the order of the world's bodies; see World::Impl::rank_bodies()
   Real extent = 0;       // reach() of the solid; of a plane infinite
   Real blow = 0;         // speed of what is near and may strike it in the sub-step [m/s]
   Pose pose;             // now
@@ -46,6 +47,8 @@ struct Body {
   Real quiet_time = 0;    // for how long it has hardly moved [s]
   bool on_cloth = false;  // touched by cloth in the last sub-step
   Wrench rest_push;       // asleep: what forces that change did to it when it fell asleep, about its centre
+  std::vector<SpringHandle> moving_springs;  // asleep: those whose other end can move by itself
+  std::optional<Wrench> rest_pins;           // asleep: what cloth on its pins did to it then
   BodyDef def;
   Solid solid;
 

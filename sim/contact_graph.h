@@ -14,7 +14,7 @@ namespace offstage::sim {
 class Articulation;
 class CoupledSystem;
 
-/// Bodies that depend on each other, in slot order, and the pairs that join them or touch what does not move.
+/// Bodies that depend on each other, by rank, and the pairs that join them or touch what does not move.
 /// In a sub-step they move together from the same time on.
 struct Island {
   std::vector<Body*> bodies;
@@ -50,9 +50,9 @@ class ContactGraph {
   std::vector<Entry> entries_, next_;
 };
 
-/// Groups awake bodies, which must be in slot order, by links between them, and sets Body::island. The
-/// islands are in the order of their first bodies, without motion or articulations; what memory they had is
-/// used again. Pairs without points join nothing and are left out.
+/// Groups awake bodies, which must be in the order of ranks, by links between them, and sets Body::island.
+/// The islands are in the order of their first bodies, without motion or articulations; what memory they had
+/// is used again. Pairs without points join nothing and are left out.
 void find_islands(std::span<Body* const> bodies, std::span<ContactPair* const> pairs,
                   std::span<const std::pair<Body*, Body*>> springs, std::vector<Island>& islands);
 
@@ -69,6 +69,7 @@ void ContactGraph::update(std::span<const IndexPair> candidates, BodyAt&& body_a
     }
     Body *a = body_at(low), *b = body_at(high);
     if (!a->is_dynamic() && !b->is_dynamic()) continue;
+    if (b->rank < a->rank) std::swap(a, b);
     if (a->collision_shape().is_plane()) std::swap(a, b);
     next_.push_back({low, high, std::make_unique<ContactPair>(*a, *b, surface_of(*a, *b))});
   }

@@ -84,7 +84,7 @@ SpringNetwork::End SpringNetwork::resolve(const WorldState& world, const Attachm
   if (const auto* w = std::get_if<WorldPoint>(&a)) return {.point = w->position};
   if (const auto* b = std::get_if<BodyPoint>(&a)) {
     const Body* body = world.bodies[b->body].get();
-    if (body->is_dynamic()) {
+    if (body->is_awake()) {
       assert(index.contains(body) && "what a spring joins must be in one network");
       return {End::Kind::dynamic, b->position - body->rigid.centre, body, index.at(body)};
     }
@@ -166,6 +166,16 @@ void SpringNetwork::force(Real t, std::span<const Real> x, std::span<const Real>
     apply(s.b, f.size * f.along, x, dp);
   }
   for (const Jointed& j : articulations_) add_joint_forces(j, t, x, p, dp);
+}
+
+/// Of particles that act on each other; springs and bodies depend on velocities in other ways.
+bool SpringNetwork::force_and_damping(Real t, std::span<const Real> x, std::span<const Real> p,
+                                      std::span<Real> dp, std::span<Real> damping) const {
+  if (!bodies_.empty() || !springs_.empty()) return false;
+  for (const Group& g : groups_)
+    FreeFlight(g.forces, g.mass).force_and_damping(t, g.part(x), g.part(p), g.part(dp), g.part(damping));
+  pair_forces_.accelerate(t, x, dp);
+  return true;
 }
 
 void SpringNetwork::add_joint_forces(const Jointed& jointed, Real t, std::span<const Real> x,

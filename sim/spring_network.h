@@ -45,6 +45,8 @@ class SpringNetwork final : public DynamicSystem {
 
   void velocity(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dx) const override;
   void force(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const override;
+  bool force_and_damping(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp,
+                         std::span<Real> damping) const override;
   void jacobian(Real t, std::span<const Real> x, std::span<const Real> p,
                 SparseEntries& entries) const override;
 

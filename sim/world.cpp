@@ -162,13 +162,17 @@ uint32_t World::Impl::surface_number(const std::string& material) {
   return static_cast<uint32_t>(at - materials.begin());
 }
 
-/// Whatever rests on a body that goes away wakes.
-void World::Impl::let_go(Body& body) {
-  wake(body);
+void World::Impl::wake_neighbours(Body& body) {
   graph.for_each([&](ContactPair& pair) {
     if (&pair.a() == &body) wake(pair.b());
     if (&pair.b() == &body) wake(pair.a());
   });
+}
+
+/// Whatever rests on a body that goes away wakes.
+void World::Impl::let_go(Body& body) {
+  wake(body);
+  wake_neighbours(body);
   graph.forget(body.handle.index);
   pairs_changed = true;
   std::erase(stepped, &body);
@@ -213,12 +217,18 @@ Vec3 WorldState::position(const Attachment& a) const {
   return std::get<WorldPoint>(a).position;
 }
 
-void WorldState::remove_dead_springs() {
+/// Springs that have lost an end are no more, and bodies at their other ends wake.
+void World::Impl::remove_dead_springs() {
   std::vector<SpringHandle> dead;
   springs.for_each([&](SpringHandle handle, const Spring& s) {
     if (!is_alive(s.def.a) || !is_alive(s.def.b)) dead.push_back(handle);
   });
-  for (SpringHandle handle : dead) springs.erase(handle);
+  for (SpringHandle handle : dead) {
+    const SpringDef& def_ = springs[handle].def;
+    for (const Attachment* end : {&def_.a, &def_.b})
+      if (const auto* point = std::get_if<BodyPoint>(end); point && is_alive(*end)) wake(*bodies[point->body]);
+    springs.erase(handle);
+  }
 }
 
 World::World(const WorldDef& def) : impl_(std::make_unique<Impl>()) {
@@ -276,7 +286,7 @@ BodyHandle World::add_body(const BodyDef& def) {
   body->extent =
       std::holds_alternative<Plane>(def.shape) ? std::numeric_limits<Real>::infinity() : reach(body->solid);
   body->surface = impl_->surface_number(def.material);
-  impl_->fixed_changed = impl_->lists_changed = true;
+  impl_->fixed_changed = impl_->lists_changed = impl_->ranks_changed = true;
   const BodyHandle handle = impl_->bodies.insert(std::move(body));
   impl_->bodies[handle]->handle = handle;
   if (const Body& added = *impl_->bodies[handle]; added.def.collides)
@@ -332,6 +342,7 @@ bool World::remove(BodyHandle body) {
   impl_->let_go(**found);
   impl_->let_go_of_cloths(body);
   impl_->let_go_of_joints(**found);
+  impl_->ranks_changed = true;
   impl_->bodies.erase(body);
   impl_->nudges.erase(body.index);
   if (impl_->broad_phase.contains(body.index)) impl_->broad_phase.remove(body.index);
@@ -371,6 +382,14 @@ uint64_t World::add_particle(ParticleSystemHandle system, const Particle& partic
   assert(particle.mass > 0 && particle.radius > 0);
   ++impl_->born;
   return impl_->systems[system].add(particle, elapsed);
+}
+
+StepReport World::prewarm(Real from, Real to, const BeforeSubStep& before) {
+  const bool goes_on = impl_->samplings == 0 && (impl_->now == 0 || impl_->now == from);
+  if (!(from <= to && to <= 0) || !std::isfinite(from) || !goes_on)
+    refuse("world", "prewarm goes from " + std::to_string(from) + " s to " + std::to_string(to) +
+                        " s, allowed is from <= to <= 0, before the first step");
+  return impl_->prewarm(from, to, before);
 }
 
 StepReport World::step(Real sampling_time, const BeforeSubStep& before) {

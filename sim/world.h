@@ -130,6 +130,12 @@ struct NonFinite {
   Vec3 position = Vec3::Zero(), velocity = Vec3::Zero();
 };
 
+/// Two bodies whose contact forces are approximate: of a group of contacts that the solver meant for it did not
+/// solve, the pair with the greatest error.
+struct RoughContact {
+  BodyHandle a, b;
+};
+
 /// What a step did. Numerical trouble is data here, never an exception.
 struct StepReport {
   uint32_t substeps = 0;
@@ -146,7 +152,7 @@ struct StepReport {
   uint32_t bodies_awake = 0, bodies_asleep = 0;
   uint32_t islands = 0;     ///< groups of bodies that touch, or are joined
   uint32_t contacts = 0;    ///< points that touch
-  Real penetration = 0;     ///< greatest at the start of a sub-step [m]
+  Real penetration = 0;     ///< greatest at the starts of sub-steps and at impacts [m]
   uint64_t collisions = 0;  ///< contacts that met faster than WorldDef::collision_speed
   uint64_t tracebacks = 0;  ///< times that bodies were put back to a time of impact
   uint64_t cut_short = 0;   ///< pairs that were not traced back any more in a sub-step: too many impacts
@@ -155,6 +161,7 @@ struct StepReport {
   uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
   ContactWork exact, fast;       ///< of the solvers of resting contact
   ContactWork impacts;           ///< of the solver of collisions
+  std::vector<RoughContact> rough_contacts;  ///< one for each fall-back of these, in their order
   IntegratorReport integration;  ///< of the free motion
 
   Real joint_error = 0;  ///< greatest that was left of a joint's constraint at the end of a motion [m], [rad]
@@ -264,10 +271,18 @@ class World {
   /// Called before each sub-step with its start and end time; emitters add their particles here.
   using BeforeSubStep = std::function<void(Real start, Real end)>;
 
+  /// Lets particles alone live from one time up to another, in sub-steps as step() has them, before the first
+  /// step(): from <= to <= 0 [s], and a further call goes on where the last one ended. time() is then `to`.
+  /// Particles collide with each other and with bodies. Dynamic bodies, cloths, springs and the particles that
+  /// were there before stand still, kinematic bodies follow their tracks, forces are those of time 0, and
+  /// forces between particles do not act. With from = to = 0, `before` is called once, and particles born at
+  /// that time exist from then on. Throws std::invalid_argument for other times.
+  StepReport prewarm(Real from, Real to, const BeforeSubStep& before = {});
+
   /// Advances by `sampling_time` in the fewest equal sub-steps not longer than WorldDef::max_step.
   StepReport step(Real sampling_time, const BeforeSubStep& before = {});
 
-  /// Time since the start [s].
+  /// Time since the start [s]; negative between calls of prewarm().
   Real time() const;
   const WorldDef& def() const;
 

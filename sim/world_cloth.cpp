@@ -104,19 +104,39 @@ void World::Impl::step_cloths(Real start, Real h) {
   std::vector<ClothBody> near = bodies_near_cloths(h);
   const std::vector<const ForceDef*> forces = active_forces();
   cloth_system.step({start, h, def.gravity, def.wind, forces}, near);
-  answer_cloths(near);
+  answer_cloths(near, start, h);
   hit_cloths(h);
 }
 
+/// Wakes sleeping bodies whose pins hold no cloth any more.
+void World::Impl::wake_unpinned(std::span<const ClothBody> near) {
+  std::vector<Body*> released;
+  for (const auto& [number, group] : sleeping)
+    for (Body* body : group) {
+      if (!body->rest_pins) continue;
+      const bool is_held = std::any_of(near.begin(), near.end(), [&](const ClothBody& at) {
+        return at.way().body == body->handle.index && at.pin_load();
+      });
+      if (!is_held) released.push_back(body);
+    }
+  for (Body* body : released) wake(*body);
+}
+
 /// What cloths did to bodies has moved them in this sub-step, and changes their velocities from the next on.
-void World::Impl::answer_cloths(std::span<const ClothBody> near) {
+void World::Impl::answer_cloths(std::span<const ClothBody> near, Real start, Real h) {
   std::vector<Reaction> reactions;
+  wake_unpinned(near);
   for (const ClothBody& at : near) {
     Body& body = *bodies[bodies.at_slot(at.way().body)];
     const bool left = std::exchange(body.on_cloth, at.touched) && !at.touched;
     if (!body.is_dynamic()) continue;
     // It sleeps while what it lies on is at rest, and wakes when that moves or goes.
     if (left || at.touching_speed > kClothRest) wake(body);
+    if (body.asleep && at.pin_load()) {
+      const Wrench pull{at.pin_load()->impulse / h, at.pin_load()->angular_impulse / h};
+      if (!body.rest_pins) body.rest_pins = pull;
+      if (is_pushed(body, pull, *body.rest_pins)) wake(body);
+    }
     if (!at.touched || body.asleep) continue;
     // It is where cloth met it: put back to where it would be without, it would drag cloth along each time.
     // Between two bodies cloth acts on velocities, and only a blow moves them.
@@ -126,7 +146,7 @@ void World::Impl::answer_cloths(std::span<const ClothBody> near) {
     }
     reactions.push_back(at.reaction());
   }
-  push_bodies(reactions);
+  push_bodies(reactions, start + h);
 }
 
 void World::Impl::report_cloths(StepReport& report) {

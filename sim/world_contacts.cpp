@@ -59,6 +59,30 @@ Aabb swept_bounds(const Body& body) {
   return box;
 }
 
+/// A pair by the ranks of its bodies.
+struct RankedPair {
+  uint32_t low, high;
+  ContactPair* pair;
+};
+
+/// In ascending order of ranks. There are many pairs, and few of one body.
+void sort_by_rank(std::span<const RankedPair> pairs, std::size_t bodies, std::vector<ContactPair*>& sorted) {
+  std::vector<uint32_t> ends(bodies, 0);
+  for (const RankedPair& p : pairs) ++ends[p.low];
+  for (std::size_t i = 1; i < bodies; ++i) ends[i] += ends[i - 1];
+  std::vector<RankedPair> order(pairs.size());
+  for (std::size_t i = pairs.size(); i-- > 0;) order[--ends[pairs[i].low]] = pairs[i];
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    const RankedPair moved = order[i];
+    std::size_t at = i;
+    for (; at > 0 && order[at - 1].low == moved.low && order[at - 1].high > moved.high; --at)
+      order[at] = order[at - 1];
+    order[at] = moved;
+  }
+  sorted.clear();
+  for (const RankedPair& p : order) sorted.push_back(p.pair);
+}
+
 /// Whether its way is more than the broad phase has of it.
 bool leaves(const Body& body, const Aabb& way) {
   return body.def.collides && !body.swept.contains(way);
@@ -120,11 +144,15 @@ void World::Impl::collect_pairs() {
   graph.update(
       broad_phase.pairs(), [&](uint32_t slot) { return bodies[bodies.at_slot(slot)].get(); },
       [&](const Body& a, const Body& b) { return surface_of(a, b); });
-  active_pairs.clear();
+  std::vector<RankedPair> ranked;
+  ranked.reserve(graph.size());
   graph.for_each([&](ContactPair& pair) {
-    if (are_jointed(pair.a(), pair.b())) return;
-    if (pair.a().can_move() || pair.b().can_move()) active_pairs.push_back(&pair);
+    const Body &a = pair.a(), &b = pair.b();
+    if (are_jointed(a, b)) return;
+    if (a.can_move() || b.can_move())
+      ranked.push_back({std::min(a.rank, b.rank), std::max(a.rank, b.rank), &pair});
   });
+  sort_by_rank(ranked, bodies.size(), active_pairs);
 }
 
 /// What strikes a body in the sub-step gives it a speed that it does not have yet, and what it touches then a
@@ -172,18 +200,31 @@ void World::Impl::update_pairs(Real h) {
     if (i + 6 < active_pairs.size()) active_pairs[i + 6]->prefetch();
     if (i + 3 < active_pairs.size()) active_pairs[i + 3]->prefetch_manifold();
     active_pairs[i]->impacts = 0;
+    active_pairs[i]->deepest = 0;
     active_pairs[i]->gave_up = active_pairs[i]->settled = false;
     find_points(*active_pairs[i], 0, h);
   };
-  constexpr std::size_t kParallel = 64, kBlock = 16;
-  if (active_pairs.size() < kParallel) {
+  constexpr std::size_t kManyPairs = 64, kPairsOfTask = 16;
+  if (active_pairs.size() < kManyPairs) {
     for (std::size_t i = 0; i < active_pairs.size(); ++i) find(i);
   } else {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, active_pairs.size(), kBlock),
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, active_pairs.size(), kPairsOfTask),
                       [&](const auto& range) {
                         for (std::size_t i = range.begin(); i < range.end(); ++i) find(i);
                       });
   }
+  remove_seams(active_pairs, 0, h);
+}
+
+/// How far a pair's bodies may move against each other in what is left of the sub-step, and how far their
+/// points tell [m].
+Real World::Impl::motion_bound(const ContactPair& pair, Real left) const {
+  return (pair.speed_bound() + 2 * def.gravity.norm() * left) * left;
+}
+Real World::Impl::motion_known(const ContactPair& pair) const {
+  const Real size = smaller_extent(pair.a(), pair.b());
+  const bool bounces = def.solver == SolverKind::exact || pair.surface().restitution > 0;
+  return std::max(std::min(kMargin, kMarginShare * size), (bounces ? kFar : kFarWithoutBounce) * size);
 }
 
 /// Where a pair's bodies touch at their interval's start, or may touch in what is left of the sub-step.
@@ -191,10 +232,8 @@ void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
   const Real left = h - time;
   const Real size = smaller_extent(pair.a(), pair.b());
   const Real base = std::min(kMargin, kMarginShare * size);
-  const Real motion = (pair.speed_bound() + 2 * def.gravity.norm() * left) * left;
+  const Real motion = motion_bound(pair, left), far = motion_known(pair);
   const bool exact = def.solver == SolverKind::exact;
-  const bool bounces = exact || pair.surface().restitution > 0;
-  const Real far = std::max(base, (bounces ? kFar : kFarWithoutBounce) * size);
   // A blow moves a body no faster than what strikes it.
   const Real blow = std::max(pair.a().blow, pair.b().blow) * left;
   const Real margin = base + std::min(std::max(2 * motion, blow), far);
@@ -203,14 +242,17 @@ void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
   const Real reuse = exact ? kExactReuse : std::min(kReuse, kReuseShare * size);
   pair.find(pair.a().placed_at(time, h), pair.b().placed_at(time, h), margin, reuse, turning > kTurning);
 
-  pair.by_event = false;
-  if (pair.gave_up) return;
-  if (motion > far) {
-    pair.by_event = true;
-    return;
-  }
-  if (!exact && time == 0 && !pair.manifolds().empty() && pair.speed_bound() * h > kForesee) pair.foresee(h);
-  if (!bounces || pair.settled) return;
+  const bool is_far = motion > far;
+  const bool is_quick = !exact && time == 0 && !pair.manifolds().empty() && pair.speed_bound() * h > kForesee;
+  if (is_quick && !is_far && !pair.gave_up) pair.foresee(h);
+  choose_event(pair, is_far, left);
+}
+
+/// Whether a pair's next impact is to be traced back to. `far`: it moves too far for its points to tell.
+void World::Impl::choose_event(ContactPair& pair, bool far, Real left) const {
+  pair.by_event = far && !pair.gave_up;
+  const bool bounces = def.solver == SolverKind::exact || pair.surface().restitution > 0;
+  if (far || pair.gave_up || !bounces || pair.settled) return;
   for (const PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const ContactPoint& point = m.manifold.points[k];
@@ -219,6 +261,12 @@ void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
           point.separation + 2 * (speed - def.gravity.norm() * left) * left < 0)
         pair.by_event = true;
     }
+}
+
+/// What is flush with something else stops nothing. Pairs found at the same time.
+void World::Impl::remove_seams(std::span<ContactPair* const> pairs, Real time, Real h) const {
+  for (ContactPair* pair : remove_seam_contacts(pairs, time, h))
+    choose_event(*pair, motion_bound(*pair, h - time) > motion_known(*pair), h - time);
 }
 
 /// Wakes what something that moves has come near, moves it through the sub-step, and returns it.
@@ -232,8 +280,7 @@ std::vector<Body*> World::Impl::wake_touched(Real start, Real h) {
   const std::size_t before = stepped.size();
   for (Body* body : touched) wake(*body);
   std::vector<Body*> woken(stepped.begin() + static_cast<std::ptrdiff_t>(before), stepped.end());
-  std::sort(woken.begin(), woken.end(),
-            [](const Body* a, const Body* b) { return a->handle.index < b->handle.index; });
+  std::sort(woken.begin(), woken.end(), [](const Body* a, const Body* b) { return a->rank < b->rank; });
   for (Body* body : woken) body->begin_interval(0);
   move_some(woken, start, 0, h);
   for (Body* body : woken) move_in_broad_phase(*body, false);
@@ -293,16 +340,13 @@ void World::Impl::solve(std::span<Island* const> group, const ContactInterval& i
     if (!choice.exact) choice.exact = std::make_unique<ExactContacts>();
     exact.emplace_back(island, &choice);
   }
-  std::vector<ContactWork> work(exact.size());
-  std::vector<uint8_t> solved(exact.size(), 0);
+  std::vector<ExactContacts::Outcome> outcomes(exact.size());
   const auto run = [&](std::size_t i) {
     const auto& [island, choice] = exact[i];
     const Real budget = def.solver == SolverKind::exact
                             ? std::numeric_limits<Real>::infinity()
                             : choice->budget(*island, interval.duration, patience);
-    const auto result = choice->exact->solve(*island, interval, budget);
-    solved[i] = result.has_value();
-    if (result) work[i] = *result;
+    outcomes[i] = choice->exact->solve(*island, interval, budget);
   };
   if (exact.size() < 2) {
     for (std::size_t i = 0; i < exact.size(); ++i) run(i);
@@ -311,14 +355,20 @@ void World::Impl::solve(std::span<Island* const> group, const ContactInterval& i
   }
   for (std::size_t i = 0; i < exact.size(); ++i) {
     const auto& [island, choice] = exact[i];
-    report.exact.add(work[i]);
-    choice->learn(*island, interval.duration, solved[i], patience);
-    if (solved[i]) continue;
-    ++report.exact.abandoned;
+    const ExactContacts::Outcome& outcome = outcomes[i];
+    report.exact.add(outcome.work);
+    add_rough(outcome.rough, report);
+    choice->learn(*island, interval.duration, outcome.is_applied, patience);
+    if (outcome.is_applied) continue;
+    report.exact.abandoned += outcome.work.fallbacks == 0;
     fast.push_back(island);
   }
   if (!fast.empty()) report.fast.add(fast_contacts.solve(fast, interval));
   for (Island* island : group) settle_joints(*island, interval.end);
+}
+
+void World::Impl::add_rough(const ContactPair* pair, StepReport& report) {
+  if (pair) report.rough_contacts.push_back({pair->a().handle, pair->b().handle});
 }
 
 void World::Impl::count_contacts(StepReport& report) const {
@@ -329,7 +379,7 @@ void World::Impl::count_contacts(StepReport& report) const {
   for (const ContactPair* pair : active_pairs) {
     report.contacts += pair->touching();
     report.foreseen += pair->foreseen;
-    report.penetration = std::max(report.penetration, -pair->separation());
+    report.penetration = std::max(report.penetration, pair->deepest);
   }
 }
 

@@ -1,8 +1,8 @@
 /// Impacts within a sub-step (physics E6, E7, R12): bodies are put back to the time of impact, with all that
 /// is connected to them, collide there, and go on for the rest. Others are not touched. The work is bounded:
 /// a pair that collides too often in a sub-step, or any when there are too many impacts, is left to the
-/// contact solver, which lets nothing through either. Where all need not be exact, so are slower meetings
-/// within a pile once blows have moved it anew often enough: they do not bounce in this sub-step.
+/// contact solver, which lets nothing through either. So are slower impacts within a pile once others have
+/// moved it often enough: they do not bounce in this sub-step.
 
 #include <algorithm>
 #include <cmath>
@@ -15,25 +15,83 @@
 namespace offstage::sim {
 namespace {
 
-constexpr uint32_t kMaxImpactsOfPair = 6, kMaxOfTumblingPair = 100;
+constexpr uint32_t kMaxImpactsOfPair = 40, kMaxOfTumblingPair = 100;
 constexpr std::size_t kMaxImpacts = 128, kImpactsPerBody = 4;
-/// Bodies that impacts of a sub-step may move anew, unless all is to be exact: so many, and all so often. In
-/// a pile each blow moves everything, and makes hundreds of others.
-constexpr std::size_t kMovedAnew = 2000, kAllMovedAnew = 4;
+/// What impacts of a sub-step may take, in contact points and bodies that are moved again, about 1 us each by
+/// the fast solver, and in us of their own solver; by the exact solver so many times more. In a pile each
+/// impact moves everything, and makes hundreds of others.
+constexpr std::size_t kImpactWork = 2500, kExactImpactWork = 8;
+/// Of it, what it takes to look when a pair meets, for each piece of its way; and after so many times of it
+/// no pair is looked at again in the sub-step.
+constexpr std::size_t kLookWork = 2, kLastWork = 4;
 /// Points this near to each other when two bodies collide take part [m].
 constexpr Real kCluster = 1e-4;
 /// Bodies that turn by more in an interval are looked at in pieces of as much [rad]; at most so many.
-constexpr Real kImpactTurn = 0.5, kMostPieces = 512;
+constexpr Real kImpactTurn = 0.5, kMostTurns = 512;
 /// What turns by more in an interval is soon elsewhere than where contact forces of its start are: it flies
 /// [rad].
 constexpr Real kWhirl = 3;
+
+/// A way that leaves its chord by more than kStraight [m] is looked at in pieces, at most so many. A force is
+/// steady if the place at the end is that of the mean velocity within this share of the velocity's change.
+constexpr Real kStraight = 1e-5, kMostArcs = 8, kSteady = 0.05;
+/// Shorter intervals are none [of the sub-step].
+constexpr Real kInstant = 1e-9;
 
 Real spin(const Body& body) {
   return body.is_awake() ? body.start_twist.angular_velocity.norm() : 0;
 }
 
-/// Shorter intervals are none [of the sub-step].
-constexpr Real kInstant = 1e-9;
+/// How fast one of a pair turns [rad/s].
+Real turn_of(const ContactPair& pair) {
+  return std::max(spin(pair.a()), spin(pair.b()));
+}
+
+/// In how many pieces a turn is looked at.
+uint32_t pieces_of(Real turn) {
+  return static_cast<uint32_t>(std::clamp(std::ceil(turn / kImpactTurn), 1.0, kMostTurns));
+}
+
+/// What an impact among them takes, see kImpactWork.
+std::size_t impact_work(const Island& island) {
+  std::size_t work = island.bodies.size();
+  for (const ContactPair* pair : island.pairs)
+    for (const PlacedManifold& m : pair->manifolds()) work += m.manifold.count;
+  return work;
+}
+
+/// What a body's velocity changes by in its interval if a steady force does that; zero if it was stopped on
+/// the way, which shows in where it is at the end [m/s].
+Vec3 bend(const Body& body, Real h) {
+  if (!body.is_awake()) return Vec3::Zero();
+  const Vec3 change = body.rigid.velocity() - body.start_twist.velocity;
+  const Vec3 mean = (body.rigid.position - body.start.position) / (h - body.from);
+  const bool steady = (body.start_twist.velocity + change / 2 - mean).norm() < kSteady * change.norm();
+  return steady ? change : Vec3(Vec3::Zero());
+}
+
+/// Its place at a time of its interval, on the parabola of a steady force.
+Pose on_arc(const Body& body, Real time, Real h) {
+  Pose pose = body.placed_at(time, h);
+  if (time > body.from)
+    pose.position -= (time - body.from) * (h - time) / (2 * (h - body.from)) * bend(body, h);
+  return pose;
+}
+
+/// When two bodies touch whose advancement has ended within its tolerance: the rest at the speed of the
+/// nearest points. Bounces that come early by the tolerance would add up.
+Real touching_share(const Impact& impact, const PosePath& a, const PosePath& b) {
+  const Separation& s = impact.separation;
+  if (impact.share == 0 || !(s.distance > 0)) return impact.share;
+  const Pose pose = a.at(impact.share);
+  const auto velocity = [&](const PosePath& path, const Vec3& local) {
+    const Vec3 arm = pose.point_to_world(local) - path.at(impact.share).position;
+    return Vec3(path.velocity() + path.angular_velocity(impact.share).cross(arm));
+  };
+  const Real closing = (velocity(b, s.on_b) - velocity(a, s.on_a)).dot(pose.vector_to_world(s.normal));
+  if (!(closing > 0)) return impact.share;
+  return impact.share + std::min(s.distance / closing, 1 - impact.share);
+}
 
 /// A body on its way through its interval, turning as nothing but its spin makes it.
 class Tumbling {
@@ -73,18 +131,21 @@ std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) co
   const Body &a = pair.a(), &b = pair.b();
   const Real from = std::max(a.is_awake() ? a.from : 0, b.is_awake() ? b.from : 0);
   if (from >= h * (1 - kInstant)) return std::nullopt;
-  const Real turn = std::max(spin(a), spin(b)) * (h - from);
+  const Real turn = turn_of(pair) * (h - from);
   if (turn > kImpactTurn) return tumbling_impact_time(pair, from, h, turn);
   if (pair.separation() <= kTouching) return point_impact_time(pair, h);
-  const auto path = [&](const Body& body) {
-    if (!body.can_move()) return PosePath(body.start_pose);
-    return PosePath(body.placed_at(from, h), body.pose);
-  };
-  const PosePath path_a = path(a), path_b = path(b);
-  const auto impact = time_of_impact(MovingShape{pair.a().collision_shape(), path_a},
-                                     MovingShape{pair.b().collision_shape(), path_b}, kTouching / 2);
-  if (!impact) return std::nullopt;
-  return from + impact->share * (h - from);
+  const Real bow = (bend(a, h) - bend(b, h)).norm() * (h - from) / 8;
+  const auto pieces =
+      static_cast<uint32_t>(std::clamp(std::ceil(std::sqrt(bow / kStraight)), 1.0, kMostArcs));
+  for (uint32_t i = 0; i < pieces; ++i) {
+    const Real begin = from + (h - from) * i / pieces, end = from + (h - from) * (i + 1) / pieces;
+    const PosePath path_a(on_arc(a, begin, h), on_arc(a, end, h)),
+        path_b(on_arc(b, begin, h), on_arc(b, end, h));
+    const auto impact = time_of_impact(MovingShape{pair.a().collision_shape(), path_a},
+                                       MovingShape{pair.b().collision_shape(), path_b}, kTouching / 2);
+    if (impact) return begin + touching_share(*impact, path_a, path_b) * (end - begin);
+  }
+  return std::nullopt;
 }
 
 /// A path knows no more than half a turn: what tumbles faster goes in pieces.
@@ -93,7 +154,7 @@ std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, R
   const bool whirls = turn > kWhirl;
   Tumbling body_a(pair.a(), def, whirls, h), body_b(pair.b(), def, whirls, h);
   Pose begin_a = body_a.go_on(from), begin_b = body_b.go_on(from);
-  const auto pieces = static_cast<uint32_t>(std::min(std::ceil(turn / kImpactTurn), kMostPieces));
+  const uint32_t pieces = pieces_of(turn);
   // What touches now has just met.
   const bool touches = pair.separation() <= kTouching;
   for (uint32_t i = 0; i < pieces; ++i) {
@@ -153,21 +214,25 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
     std::vector<std::optional<Real>> times(events.size());
     for_each_index(events.size(),
                    [&](std::size_t i) { times[i] = impact_time(*active_pairs[events[i]], h); });
-    for (std::size_t i = 0; i < events.size(); ++i)
+    std::size_t taken = 0;
+    for (std::size_t i = 0; i < events.size(); ++i) {
       if (times[i]) impacts.push_back({*times[i], active_pairs[events[i]]});
+      taken += kLookWork * pieces_of(turn_of(*active_pairs[events[i]]) * h);
+    }
+    return taken;
   };
-  look([](const ContactPair&) { return true; });
+  std::size_t work = look([](const ContactPair&) { return true; });
 
   const std::size_t most = kMaxImpacts + kImpactsPerBody * awake.size();
-  const std::size_t most_moved = std::max(kMovedAnew, kAllMovedAnew * awake.size());
-  std::size_t moved_anew = 0;
+  const std::size_t most_work = (def.solver == SolverKind::exact ? kExactImpactWork : 1) * kImpactWork;
   for (std::size_t count = 0; !impacts.empty(); ++count) {
     const auto first = std::min_element(impacts.begin(), impacts.end(),
                                         [](const Impact& x, const Impact& y) { return x.time < y.time; });
     const Impact impact = *first;
     ContactPair& pair = *impact.pair;
-    const bool tumbles = std::max(spin(pair.a()), spin(pair.b())) * h > kImpactTurn;
-    if (++pair.impacts > (tumbles ? kMaxOfTumblingPair : kMaxImpactsOfPair) || count >= most) {
+    const bool tumbles = turn_of(pair) * h > kImpactTurn;
+    if (++pair.impacts > (tumbles ? kMaxOfTumblingPair : kMaxImpactsOfPair) || count >= most ||
+        work > kLastWork * most_work) {
       pair.gave_up = true;
       ++report.cut_short;
     }
@@ -180,15 +245,15 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
       bring_to(islands[island], start, impact.time, h, report);
     }
     ++report.tracebacks;
-    moved_anew += islands[island].bodies.size();
-    if (moved_anew > most_moved && def.solver != SolverKind::exact) settle_pairs(island, report);
-    collide(island, start, impact.time, h, report);
+    work += impact_work(islands[island]);
+    if (work > most_work) settle_pairs(island, report);
+    work += collide(island, start, impact.time, h, report);
     // What was foreseen of these bodies is not what will be.
     const auto involved = [&](const ContactPair& p) {
       return (p.a().is_awake() && p.a().island == island) || (p.b().is_awake() && p.b().island == island);
     };
     std::erase_if(impacts, [&](const Impact& i) { return involved(*i.pair); });
-    look(involved);
+    work += look(involved);
   }
 }
 
@@ -227,8 +292,7 @@ void World::Impl::join(uint32_t into, uint32_t other) {
   x.bodies.insert(x.bodies.end(), y.bodies.begin(), y.bodies.end());
   x.pairs.insert(x.pairs.end(), y.pairs.begin(), y.pairs.end());
   x.articulations.insert(x.articulations.end(), y.articulations.begin(), y.articulations.end());
-  std::sort(x.bodies.begin(), x.bodies.end(),
-            [](const Body* a, const Body* b) { return a->handle.index < b->handle.index; });
+  std::sort(x.bodies.begin(), x.bodies.end(), [](const Body* a, const Body* b) { return a->rank < b->rank; });
   y.bodies.clear();
   y.pairs.clear();
   y.articulations.clear();
@@ -236,7 +300,8 @@ void World::Impl::join(uint32_t into, uint32_t other) {
 
 /// Collides an island's bodies with each other and with what they touch at a time, and moves them on from
 /// there.
-void World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepReport& report) {
+/// Returns what that took, see kImpactWork.
+std::size_t World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepReport& report) {
   // Whatever they touch now comes along, with what that touches in turn.
   for (bool grown = true; grown;) {
     grown = false;
@@ -260,18 +325,66 @@ void World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepRe
     }
   }
   Island& island = islands[number];
+  remove_seams(island.pairs, time, h);
   const CollisionSettings settings{start + time, kCluster, def.collision_speed, def.impact,
                                    def.solver == SolverKind::exact};
-  report.collisions += resolve_collisions(island, settings, report.impacts);
+  const CollisionOutcome outcome = resolve_collisions(island, settings);
+  report.collisions += outcome.bounces;
+  report.impacts.add(outcome.work);
+  add_rough(outcome.rough, report);
   for (Body* body : island.bodies) body->rigid.set_state(body->start);
-  if (time >= h * (1 - kInstant)) return;
-  // Velocities are others now: what may meet, and what limits whom, too.
-  for (ContactPair* pair : island.pairs) find_points(*pair, time, h);
-  island.motion = &move_some(island.bodies, start, time, h - time);
-  Island* const one[] = {&island};
-  if (has_forces(island))
+  if (time < h * (1 - kInstant)) go_on(number, start, time, h, report);
+  return static_cast<std::size_t>(outcome.cost / 1000);
+}
+
+/// Moves an island on from an impact to the end of the sub-step. Its velocities are others now: so are the
+/// bodies that it may meet, and the contacts that limit its way.
+void World::Impl::go_on(uint32_t number, Real start, Real time, Real h, StepReport& report) {
+  do {
+    islands[number].motion = &move_some(islands[number].bodies, start, time, h - time);
+    find_pairs_again(number, start, h, report);
+  } while (join_next(number, start, time, h, report));
+  Island* const one[] = {&islands[number]};
+  if (has_forces(islands[number]))
     solve(one, {.duration = h - time, .end = start + h, .substep = h, .is_whole = false}, report);
   find_pairs_again(number, start, h, report);
+}
+
+/// Finds the contacts of an island that goes on from `time`. If a body of another island is in its way, and
+/// their impact would not be an event, that island comes along, and has to be moved on as well: then it
+/// returns true.
+bool World::Impl::join_next(uint32_t number, Real start, Real time, Real h, StepReport& report) {
+  islands[number].pairs.clear();
+  bool joined = false;
+  for (std::size_t i = 0; i < active_pairs.size(); ++i) {
+    ContactPair& pair = *active_pairs[i];
+    const auto is_member = [&](const Body& body) { return body.is_awake() && body.island == number; };
+    const bool has_a = is_member(pair.a()), has_b = is_member(pair.b());
+    if (!has_a && !has_b) continue;
+    find_points(pair, time, h);
+    const Body& other = has_a ? pair.b() : pair.a();
+    if (has_a == has_b || !other.is_awake()) {
+      if (!pair.manifolds().empty()) islands[number].pairs.push_back(&pair);
+    } else if (!pair.by_event && closes(pair, h - time)) {
+      const uint32_t next = other.island;
+      bring_to(islands[next], start, time, h, report);
+      join(number, next);
+      joined = true;
+    }
+  }
+  if (!joined) remove_seams(islands[number].pairs, time, h);
+  return joined;
+}
+
+/// Whether points of a pair may meet within a time.
+bool World::Impl::closes(const ContactPair& pair, Real left) const {
+  for (const PlacedManifold& m : pair.manifolds())
+    for (uint32_t k = 0; k < m.manifold.count; ++k) {
+      const ContactPoint& point = m.manifold.points[k];
+      const Real speed = pair.relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n);
+      if (point.separation + 2 * (speed - def.gravity.norm() * left) * left < 0) return true;
+    }
+  return false;
 }
 
 /// Bodies that leave the boxes that the broad phase was given have new neighbours, which may have to be
@@ -281,8 +394,13 @@ void World::Impl::find_pairs_again(uint32_t number, Real start, Real h, StepRepo
   for (Body* body : islands[number].bodies) left |= move_in_broad_phase(*body, true);
   if (!left) return;
   collect_pairs();
-  for (ContactPair* pair : active_pairs)
-    if (pair->is_new()) find_points(*pair, std::max(pair->a().from, pair->b().from), h);
+  std::vector<ContactPair*> near = islands[number].pairs;
+  for (ContactPair* pair : active_pairs) {
+    if (!pair->is_new()) continue;
+    find_points(*pair, std::max(pair->a().from, pair->b().from), h);
+    near.push_back(pair);
+  }
+  remove_seams(near, islands[number].from, h);
   const std::vector<Body*> woken = wake_touched(start, h);
   if (woken.empty()) return;
   const auto added = static_cast<uint32_t>(islands.size());

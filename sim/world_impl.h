@@ -14,7 +14,9 @@
 #include "sim/collision/grouped_broad_phase.h"
 #include "sim/collision/obstacles.h"
 #include "sim/contact/contact_solve.h"
+#include "sim/contact/seams.h"
 #include "sim/contact_graph.h"
+#include "sim/dynamics/body_impulses.h"
 #include "sim/dynamics/particle_collisions.h"
 #include "sim/dynamics/particle_system.h"
 #include "sim/world.h"
@@ -25,6 +27,10 @@ struct Spring {
   SpringDef def;
   Real rest_length;
 };
+
+/// The fewest equal sub-steps of a duration that are not longer than `longest`. Rounding of a ratio that is
+/// meant to be whole adds none.
+uint32_t substep_count(Real duration, Real longest);
 
 /// The objects of a world.
 struct WorldState {
@@ -45,16 +51,16 @@ struct WorldState {
   /// Whether the object that an attachment names exists.
   bool is_alive(const Attachment& a) const;
   Vec3 position(const Attachment& a) const;
-  void remove_dead_springs();
 };
 
 struct World::Impl : WorldState {
   StepReport step(Real sampling_time, const BeforeSubStep& before);
   void substep(Real start, Real end, StepReport& report);
+  void begin_kinematic(Real start, Real end);
   void collect_moved();
 
   // Motion of bodies (world_step.cpp)
-  void begin_bodies(Real end);
+  void begin_bodies(Real start, Real end);
   void explode(Real start, Real end);
   std::vector<const ForceDef*> active_forces() const;
   void move_bodies(Real start, Real h, StepReport& report);
@@ -67,7 +73,11 @@ struct World::Impl : WorldState {
   PairSurface surface_of(const Body& a, const Body& b) const;
   void foresee_blows(Real h);
   void update_pairs(Real h);
+  Real motion_bound(const ContactPair& pair, Real left) const;
+  Real motion_known(const ContactPair& pair) const;
   void find_points(ContactPair& pair, Real time, Real h) const;
+  void choose_event(ContactPair& pair, bool far, Real left) const;
+  void remove_seams(std::span<ContactPair* const> pairs, Real time, Real h) const;
   void move_in_broad_phase(Body& body, Aabb way, bool again);
   bool move_in_broad_phase(Body& body, bool again);
   void collect_pairs();
@@ -76,6 +86,7 @@ struct World::Impl : WorldState {
   void solve_islands(Real start, Real h, StepReport& report);
   void solve(std::span<Island* const> group, const ContactInterval& interval, StepReport& report);
   void settle_joints(const Island& island, Real end);
+  static void add_rough(const ContactPair* pair, StepReport& report);
   void count_contacts(StepReport& report) const;
 
   // Impacts (world_impacts.cpp)
@@ -91,17 +102,26 @@ struct World::Impl : WorldState {
   void bring_to(Island& island, Real start, Real time, Real h, StepReport& report);
   void join(uint32_t into, uint32_t island);
   void find_pairs_again(uint32_t island, Real start, Real h, StepReport& report);
-  void collide(uint32_t island, Real start, Real time, Real h, StepReport& report);
+  std::size_t collide(uint32_t island, Real start, Real time, Real h, StepReport& report);
+  void go_on(uint32_t island, Real start, Real time, Real h, StepReport& report);
+  bool join_next(uint32_t island, Real start, Real time, Real h, StepReport& report);
+  bool closes(const ContactPair& pair, Real left) const;
 
   uint32_t surface_number(const std::string& material);
   void let_go(Body& body);
+  void remove_dead_springs();
+  void wake_neighbours(Body& body);
 
   // Rest (world_sleep.cpp)
   void wake(Body& body);
   void wake_all();
+  void watch_springs(std::span<Body* const> group);
+  Wrench spring_push(const Spring& spring, const Body& body, Real time) const;
   Wrench changing_push(const Body& body, Real time) const;
+  bool is_pushed(const Body& body, const Wrench& now, const Wrench& at_rest) const;
   void wake_pushed(Real time);
   void put_to_sleep(Real start, Real h);
+  void rank_bodies();
   void update_lists();
 
   // Joints (world_joints.cpp)
@@ -112,19 +132,22 @@ struct World::Impl : WorldState {
   bool are_jointed(const Body& a, const Body& b) const;
 
   // Particles
+  StepReport prewarm(Real from, Real to, const BeforeSubStep& before);
+  bool waits(ParticleSystemHandle system) const;
   void step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report);
   Obstacle way_of(const Body& body, Real h) const;
   void update_obstacles(Real h);
   void collide_particles(const ParticleStage& stage, const CoupledSystem& coupled);
   void add_events(std::vector<ParticleEvent>& events);
-  void push_bodies(std::span<const Reaction> reactions);
+  void push_bodies(std::span<const Reaction> reactions, Real time);
 
   // Cloths (world_cloth.cpp)
   void arrange_cloths();
   void begin_cloths();
   std::vector<ClothBody> bodies_near_cloths(Real h) const;
   void step_cloths(Real start, Real h);
-  void answer_cloths(std::span<const ClothBody> near);
+  void wake_unpinned(std::span<const ClothBody> near);
+  void answer_cloths(std::span<const ClothBody> near, Real start, Real h);
   void hit_cloths(Real h);
   void report_cloths(StepReport& report);
   void let_go_of_cloths(BodyHandle body);
@@ -137,8 +160,8 @@ struct World::Impl : WorldState {
   std::vector<MovedBody> moved;
   uint64_t born = 0, bodies_woken = 0, bodies_put_to_sleep = 0;  // since the last report
 
-  // Lists of bodies in slot order, made anew when one was added, removed, fell asleep or woke.
-  bool lists_changed = true, pairs_changed = true, joints_changed = false;
+  // Lists of bodies by rank, made anew when one was added, removed, fell asleep or woke.
+  bool ranks_changed = false, lists_changed = true, pairs_changed = true, joints_changed = false;
   JointTally joint_tally;  // of the sub-step, beside that of the motions
   std::vector<std::pair<uint32_t, uint32_t>>
       apart;                            // slots of bodies that do not collide, because of a joint
@@ -147,6 +170,7 @@ struct World::Impl : WorldState {
   std::map<uint32_t, std::vector<Body*>> sleeping;
   uint32_t sleeping_groups = 0;  // so far
   std::size_t asleep = 0;        // bodies
+  std::size_t watched = 0;       // springs of sleeping bodies whose other ends can move
 
   GroupedBroadPhase broad_phase;  // of the bodies that collide, by slot; articulations are groups
   ContactGraph graph;
@@ -165,7 +189,12 @@ struct World::Impl : WorldState {
   // (E9).
   Obstacles fixed_obstacles, moving_obstacles;
   bool fixed_changed = true;
+  bool prewarming = false;
+  std::vector<ParticleSystemHandle> waiting;  // systems that stand still while others are prewarmed
   ParticleCollisions particle_collisions;
+  BodyImpulses body_impulses;
+  std::vector<BodyImpulses::Link> links;       // by slot, of bodies that joints hold
+  std::vector<Articulation*> articulation_of;  // likewise
   std::vector<ParticleEvent> particle_events;  // of the last sub-step
   ClothSystem cloth_system;
   std::map<uint32_t, Reaction> nudges;  // too weak to wake the body, by its slot; they add up

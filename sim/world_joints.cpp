@@ -118,27 +118,33 @@ bool drives(const Joint& joint, Real time) {
 
 Real Motor::target(Real time) const {
   if (targets.empty()) return 0;
-  const auto after =
-      std::find_if(targets.begin(), targets.end(), [time](const Key& key) { return key.time > time; });
-  if (after == targets.begin()) return after->target;
-  const Key& before = *(after - 1);
-  if (after == targets.end()) return before.target;
-  const Real share = (time - before.time) / (after->time - before.time);
-  return before.target + (smooth ? share * share * (3 - 2 * share) : share) * (after->target - before.target);
+  if (time < targets.front().time) return targets.front().target;
+  if (time >= targets.back().time) return targets.back().target;
+  const auto key = [&](std::size_t k) -> CurveKey<1> {
+    const Key& at = targets[k];
+    return {at.time, Eigen::Array<Real, 1, 1>(at.target), at.interpolation};
+  };
+  const std::size_t i = segment_at(targets.size(), [&](std::size_t k) { return targets[k].time; }, time);
+  const Key &from = targets[i], &to = targets[i + 1];
+  if (smooth && from.interpolation == Interpolation::monotone) {
+    const Real share = (time - from.time) / (to.time - from.time);
+    return from.target + share * share * (3 - 2 * share) * (to.target - from.target);
+  }
+  return sample_segment<1>(targets.size(), key, false, i, time).value[0];
 }
 
 JointHandle World::add_joint(const JointDef& def) {
   check(def);
-  const auto body = [&](BodyHandle handle, const char* field) -> Body* {
+  const auto body = [&](BodyHandle handle, const char* missing) -> Body* {
     if (!handle) return nullptr;
     const auto* found = impl_->bodies.find(handle);
-    if (!found) refuse(def, std::string(field) + " does not exist");
+    if (!found) refuse(def, missing);
     return found->get();
   };
   auto joint = std::make_unique<Joint>();
   joint->def = def;
-  joint->a = body(def.a, "a");
-  joint->b = body(def.b, "b");
+  joint->a = body(def.a, "a does not exist");
+  joint->b = body(def.b, "b does not exist");
   if (!is_dynamic(joint->a) && !is_dynamic(joint->b))
     refuse(def, "at least one of its bodies must be dynamic");
   if (joint->a == joint->b) refuse(def, "a and b are the same");
@@ -203,6 +209,8 @@ void World::for_each_joint(const std::function<void(JointHandle)>& f) const {
 void World::Impl::update_articulations() {
   if (!std::exchange(joints_changed, false)) return;
   articulations.clear();
+  links.clear();
+  articulation_of.clear();
   apart.clear();
   std::vector<uint32_t> parent(bodies.slot_count());
   for (uint32_t i = 0; i < parent.size(); ++i) parent[i] = i;
@@ -238,6 +246,14 @@ void World::Impl::update_articulations() {
     articulations.push_back(std::make_unique<Articulation>(std::move(component)));
   }
   broad_phase.set_groups(groups);
+  links.assign(bodies.slot_count(), {});
+  articulation_of.assign(bodies.slot_count(), nullptr);
+  for (const auto& articulation : articulations)
+    for (uint32_t k = 0; k < articulation->bodies().size(); ++k) {
+      const uint32_t slot = articulation->bodies()[k]->handle.index;
+      links[slot] = {articulation.get(), k};
+      articulation_of[slot] = articulation.get();
+    }
   pairs_changed = true;
 }
 

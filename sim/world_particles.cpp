@@ -13,11 +13,49 @@ constexpr Real kNudge = 1e-4;
 
 }  // namespace
 
+/// Whether a system stands still because others are prewarmed.
+bool World::Impl::waits(ParticleSystemHandle system) const {
+  return prewarming && std::find(waiting.begin(), waiting.end(), system) != waiting.end();
+}
+
+StepReport World::Impl::prewarm(Real from, Real to, const BeforeSubStep& before) {
+  StepReport report;
+  if (now == 0)
+    systems.for_each([&](ParticleSystemHandle handle, const ParticleSystem& system) {
+      if (system.arrays.size() > 0) waiting.push_back(handle);
+    });
+  update_lists();
+  prewarming = fixed_changed = true;
+  now = from;
+  if (from == to && before) before(from, to);
+  const CoupledSystem still(*this, std::span<Body* const>{});
+  report.substeps = from < to ? substep_count(to - from, def.max_step) : 0;
+  for (uint32_t i = 0; i < report.substeps; ++i) {
+    const Real start = now, share = static_cast<Real>(i + 1) / report.substeps;
+    const Real end = i + 1 < report.substeps ? from + share * (to - from) : to;
+    if (before) before(start, end);
+    begin_kinematic(start, end);
+    update_obstacles(end - start);
+    step_particles(start, end - start, still, report);
+    now = end;
+  }
+  if (to == 0) {
+    systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
+      if (!waits(handle)) system.admit_newborn(forces(system));
+    });
+    waiting.clear();
+  }
+  prewarming = false;
+  fixed_changed = true;
+  report.particles_born = std::exchange(born, 0);
+  return report;
+}
+
 /// Particles that collide with particles fly and go through their collisions, of all systems together.
 void World::Impl::collide_particles(const ParticleStage& stage, const CoupledSystem& coupled) {
   std::vector<ParticleSystem*> colliding;
-  systems.for_each([&](ParticleSystemHandle, ParticleSystem& system) {
-    if (!system.hits_particles()) return;
+  systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
+    if (!system.hits_particles() || waits(handle)) return;
     system.fly_all(stage, forces(system), coupled.holds(system));
     colliding.push_back(&system);
   });
@@ -32,8 +70,10 @@ void World::Impl::add_events(std::vector<ParticleEvent>& events) {
   particle_events.insert(particle_events.end(), events.begin(), events.end());
 }
 
-/// What particles did to bodies changes their momenta from the next sub-step on.
-void World::Impl::push_bodies(std::span<const Reaction> reactions) {
+/// What particles and cloths did to bodies in a sub-step that ends at a time changes their momenta from the next
+/// one on, and through joints those of all that these hold.
+void World::Impl::push_bodies(std::span<const Reaction> reactions, Real time) {
+  std::vector<uint32_t> pushed;
   for (const Reaction& r : reactions) {
     Reaction& sum = nudges.try_emplace(r.body, Reaction{r.body, Vec3::Zero(), Vec3::Zero()}).first->second;
     sum.impulse += r.impulse;
@@ -49,8 +89,15 @@ void World::Impl::push_bodies(std::span<const Reaction> reactions) {
     if (body->asleep) wake(*body);
     body->rigid.momentum += sum.impulse;
     body->rigid.angular_momentum += sum.angular_impulse;
+    pushed.push_back(sum.body);
     return true;
   });
+  for (const uint32_t slot : pushed) {
+    Articulation* articulation = slot < articulation_of.size() ? articulation_of[slot] : nullptr;
+    if (!articulation) continue;
+    articulation->pass_on_blows(time, joint_tally);
+    for (Body* link : articulation->bodies()) link->pose = link->rigid.pose();
+  }
 }
 
 }  // namespace offstage::sim

@@ -14,13 +14,6 @@ namespace {
 constexpr Real kMaxSubsteps = 1e6;
 constexpr std::size_t kWorthThreads = 200;
 
-/// The fewest equal sub-steps not longer than `longest`. Rounding of a ratio that is meant to be whole adds
-/// none.
-uint32_t substep_count(Real sampling_time, Real longest) {
-  const Real ratio = sampling_time / longest;
-  return static_cast<uint32_t>(std::clamp(std::ceil(ratio * (1 - 1e-12)), 1.0, kMaxSubsteps));
-}
-
 bool is_finite(const RigidBody& b) {
   return b.position.allFinite() && b.orientation.coeffs().allFinite() && b.momentum.allFinite() &&
          b.angular_momentum.allFinite();
@@ -31,6 +24,11 @@ bool same(const Pose& a, const Pose& b) {
 }
 
 }  // namespace
+
+uint32_t substep_count(Real duration, Real longest) {
+  const Real ratio = duration / longest;
+  return static_cast<uint32_t>(std::clamp(std::ceil(ratio * (1 - 1e-12)), 1.0, kMaxSubsteps));
+}
 
 StepReport World::Impl::step(Real sampling, const BeforeSubStep& before) {
   assert(sampling > 0 && std::isfinite(sampling));
@@ -71,7 +69,7 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
   explode(start, end);
   update_articulations();
   update_lists();
-  begin_bodies(end);
+  begin_bodies(start, end);
   motions.clear();
   if (awake.empty() && kinematic.empty() && springs.empty() && systems.empty()) {
     islands.clear();
@@ -112,6 +110,11 @@ void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
     find_moving_islands();
     solve_islands(start, h, report);
     resolve_impacts(start, h, report);
+  } else {
+    // Those of the last sub-step in which something was awake must not fall asleep once more.
+    islands.clear();
+    active_pairs.clear();
+    pairs_changed = true;
   }
   for (const std::vector<Body*>* moving : {&awake, &kinematic})
     for (const std::size_t i :
@@ -122,15 +125,25 @@ void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
 }
 
 /// Every body that moves begins a sub-step; kinematic ones are moved through it at once.
-void World::Impl::begin_bodies(Real end) {
+void World::Impl::begin_bodies(Real start, Real end) {
   for_each_interval(awake, [&](std::size_t i) {
     awake[i]->before_substep = awake[i]->pose;
     awake[i]->begin_interval(0);
   });
+  begin_kinematic(start, end);
+}
+
+void World::Impl::begin_kinematic(Real start, Real end) {
   for (Body* body : kinematic) {
+    const Motion motion = body->def.track.at(end, body->def.pose);
+    if (body->def.track.jumps(start, end)) {
+      // It is gone from where it was and stands at the new place: nothing is swept along in between.
+      wake_neighbours(*body);
+      body->pose = motion.pose;
+    }
     body->before_substep = body->pose;
     body->begin_interval(0);
-    body->drive_to(body->def.track.at(end, body->def.pose));
+    body->drive_to(motion);
   }
 }
 
@@ -223,12 +236,14 @@ Obstacle World::Impl::way_of(const Body& body, Real h) const {
     o.fibre = body.def.friction_axis;
     o.cross_friction = std::sqrt(body.def.cross_friction / body.def.friction);
   }
-  if (!body.is_dynamic()) return o;
+  if (!body.is_dynamic() || prewarming) return o;
   const RigidBody& rigid = body.rigid;
   const Mat3 axes = rigid.orientation.toRotationMatrix();
   o.inverse_mass = 1 / rigid.mass;
   o.inverse_inertia = axes * rigid.inverse_inertia * axes.transpose();
   o.centre = rigid.centre;
+  o.end_velocity = rigid.velocity();
+  o.end_spin = rigid.angular_velocity();
   return o;
 }
 
@@ -236,7 +251,7 @@ void World::Impl::update_obstacles(Real h) {
   std::vector<Obstacle> fixed, moving;
   bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& body) {
     if (!body->def.collides) return;
-    if (body->can_move())
+    if (body->can_move() && !(prewarming && body->is_dynamic()))
       moving.push_back(way_of(*body, h));
     else if (fixed_changed)
       fixed.push_back(way_of(*body, h));
@@ -247,13 +262,15 @@ void World::Impl::update_obstacles(Real h) {
 }
 
 void World::Impl::step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report) {
-  const ParticleStage stage{start, h, fixed_obstacles, moving_obstacles, def.bounds};
+  for (const auto& articulation : articulations) articulation->begin_impulses(start + h);
+  body_impulses.begin(links);
+  const ParticleStage stage{start, h, fixed_obstacles, moving_obstacles, def.bounds, body_impulses};
   collide_particles(stage, coupled);
   auto collided = particle_collisions.outcomes().begin();
-  std::vector<Reaction> reactions;
   bool removed_any = false;
   particle_events.clear();
-  systems.for_each([&](ParticleSystemHandle, ParticleSystem& system) {
+  systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
+    if (waits(handle)) return;
     ParticleTally tally;
     if (system.hits_particles()) {
       tally = std::move(collided->tally);
@@ -263,7 +280,6 @@ void World::Impl::step_particles(Real start, Real h, const CoupledSystem& couple
       tally = system.step(stage, forces(system), coupled.holds(system));
     }
     add_events(tally.events);
-    reactions.insert(reactions.end(), tally.reactions.begin(), tally.reactions.end());
     report.particles_expired += tally.expired;
     report.particles_retired += tally.retired;
     report.particles_ejected += tally.ejected;
@@ -278,7 +294,7 @@ void World::Impl::step_particles(Real start, Real h, const CoupledSystem& couple
     report.finite &= !tally.lost;
   });
   if (removed_any) remove_dead_springs();
-  push_bodies(reactions);
+  push_bodies(body_impulses.sums(), start + h);
 }
 
 void World::Impl::collect_moved() {

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds offstage and runs its tests:  tests/run.sh [--long] [--tsan] [CTEST OPTIONS...]
-#   --long  also the long cases (label "long"), for which scanned models are fetched
+#   --long  also the long cases (label "long"), for which scanned models are fetched, and the benchmarks are built
 #   --tsan  also the threaded tests under ThreadSanitizer
 # The unit tests and the model importer run a second time under AddressSanitizer and UndefinedBehaviorSanitizer.
 set -euo pipefail
@@ -8,10 +8,11 @@ cd "$(dirname "$0")/.."
 . cmake/packages.sh
 
 long=(-LE long)
+bench=OFF
 tsan=no
 while [ $# -gt 0 ]; do
   case $1 in
-    --long) long=() ;;
+    --long) long=() bench=ON ;;
     --tsan) tsan=yes ;;
     *) break ;;
   esac
@@ -19,6 +20,7 @@ while [ $# -gt 0 ]; do
 done
 
 install_packages $build_packages $test_packages
+[ $bench = OFF ] || install_packages $bench_packages debootstrap
 cores=$(nproc)
 failed=0
 
@@ -26,14 +28,14 @@ failed=0
 peers=()
 [ -d ../shared/peers ] && peers=("-DOFFSTAGE_PEERS=$(realpath ../shared/peers)")
 
-cmake --preset release -DOFFSTAGE_WERROR=ON -DOFFSTAGE_TESTS=ON "${peers[@]}"
+cmake --preset release -DOFFSTAGE_WERROR=ON -DOFFSTAGE_TESTS=ON -DOFFSTAGE_BENCH=$bench "${peers[@]}"
 cmake --build build
 
 cmake --preset asan
 cmake --build build-asan --target sanitized_tests
 export UBSAN_OPTIONS=print_stacktrace=1:halt_on_error=1
 ctest --test-dir build-asan -L unit -j "$cores" --output-on-failure "$@" || failed=1
-build-asan/test_validation --gtest_filter='Determinism.SameHash*InEveryBuild' --gtest_brief=1 || failed=1
+build-asan/test_determinism --gtest_filter='*InEveryBuild' --gtest_brief=1 || failed=1
 
 if [ ${#long[@]} = 0 ]; then
   tests/meshes.sh build/meshes
@@ -42,9 +44,10 @@ fi
 
 if [ "$tsan" = yes ]; then
   cmake --preset tsan
-  cmake --build build-tsan --target test_sim test_validation test_producer
+  cmake --build build-tsan --target test_sim test_validation test_determinism test_producer
   TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp" build-tsan/test_sim --gtest_filter='StagedLoop.*' || failed=1
   TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp" build-tsan/test_validation --gtest_filter='*Determinism.*' || failed=1
+  TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp" build-tsan/test_determinism || failed=1
   TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp" build-tsan/test_producer --gtest_filter='Pipeline.*' || failed=1
 fi
 

@@ -89,7 +89,8 @@ void add_copies(const Joint& joint, const Scene& scene, Scene& flat) {
 sim::Motor motor_def(const JointMotor& motor, Real unit) {
   sim::Motor m{.mode = motor.mode, .smooth = motor.smooth, .stiffness = motor.stiffness, .damping = motor.damping};
   if (motor.max_effort) m.max_effort = *motor.max_effort;
-  for (const MotorKey& key : motor.keys) m.targets.push_back({key.time, unit * key.target});
+  for (const MotorKey& key : motor.keys) 
+    m.targets.push_back({key.time, unit * key.target, key.interpolation.value_or(motor.interpolation)});
   if (m.targets.empty()) m.targets.push_back({0, unit * motor.target});
   return m;
 }

@@ -45,11 +45,12 @@ Eigen::AlignedBox3f box_of(const Body& body, const ModelLibrary& models) {
   return {(body.position - reach).cast<float>(), (body.position + reach).cast<float>()};
 }
 
-/// The value of keys that may leave it to the lens, as smooth as the camera's way.
+/// The value of keys that may leave it to the lens.
 template <class Value>
-Vec3 follow_keys(const std::vector<CameraKey>& keys, double time, Value&& value) {
-  sim::KeyframeTrack track;
-  for (const CameraKey& key : keys) track.keys.push_back({key.time, {value(key), Quat::Identity()}});
+Vec3 follow_keys(const KeyframedCamera& camera, double time, Value&& value) {
+  sim::KeyframeTrack track{.keys = {}, .interpolation = camera.interpolation};
+  for (const CameraKey& key : camera.keyframes)
+    track.keys.push_back({key.time, {value(key), Quat::Identity()}, key.interpolation});
   return track.at(time, {}).pose.position;
 }
 
@@ -62,7 +63,7 @@ View view_of(const StaticCamera& c, const View& lens, double) {
   return {c.eye, c.target, lens.fov_deg, lens.focus};
 }
 View view_of(const KeyframedCamera& c, const View& lens, double time) {
-  const auto at = [&](auto&& value) { return follow_keys(c.keyframes, time, value); };
+  const auto at = [&](auto&& value) { return follow_keys(c, time, value); };
   const bool pulls_focus =
       std::ranges::any_of(c.keyframes, [](const CameraKey& k) { return k.focus.has_value(); });
   return {at([](const CameraKey& k) { return k.eye; }), at([](const CameraKey& k) { return k.target; }),

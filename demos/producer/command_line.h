@@ -1,6 +1,7 @@
 #pragma once
-/// The command line: offstage render | frame | sheet | sweep | simulate | validate | schema | info | compare
-/// | bless | doctor.
+/// The command line: offstage new | render | encode | frame | sheet | sweep | simulate | validate | schema |
+/// presets | info | compare | bless | doctor | man | completion; and offstage SCENE.json, which renders
+/// SCENE.mp4.
 
 namespace offstage::producer {
 

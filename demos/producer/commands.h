@@ -11,8 +11,11 @@
 #include <tbb/global_control.h>
 
 #include "producer/decomposition_cache.h"
+#include "producer/golden.h"
+#include "producer/models.h"
 #include "producer/progress.h"
 #include "producer/scene_io.h"
+#include "producer/scene_source.h"
 #include "render/context.h"
 
 namespace offstage::producer {
@@ -22,7 +25,8 @@ struct SceneOptions {
   std::string file;
   std::vector<std::string> set;
   std::optional<std::string> quality, size;
-  std::optional<double> fps, duration;
+  std::optional<std::string> fps;  ///< a number, or a fraction such as 30000/1001
+  std::optional<double> duration;
   std::optional<uint64_t> seed;
   std::vector<std::string> channels;  ///< depth, normal, id, motion; empty: as the scene says
   std::optional<std::string> channel_format;
@@ -31,8 +35,9 @@ struct SceneOptions {
   DecompositionCache decompositions() const {
     return no_cache ? DecompositionCache() : DecompositionCache::of_user();
   }
-  /// The shorthands as overrides, then `set`.
+  /// The shorthands as overrides, then `set`. Throws std::invalid_argument for one that cannot be read.
   std::vector<std::string> overrides() const;
+  bool from_standard_input() const { return file == kStandardInput; }
 };
 
 struct TalkOptions {
@@ -53,6 +58,9 @@ struct RenderOptions {
   render::GlPlatform gl = render::GlPlatform::automatic;
 };
 int render_command(const RenderOptions& options);
+/// Where the film of a scene goes if nobody says: SCENE.mp4 in the current folder. Throws OutputError for
+/// standard input.
+std::string default_film(const std::string& scene_file);
 /// Renders, and again whenever a file that the scene is made of changes, until a signal ends it. Every render
 /// runs in a process of its own; what a whole one made replaces the output, a failed one leaves the last good
 /// result. `render` is the render command that reports its errors itself.
@@ -102,7 +110,13 @@ struct SimulateOptions {
 };
 int simulate_command(const SimulateOptions& options);
 
-int validate_command(const SceneOptions& options, bool json);
+struct ValidateOptions {
+  SceneOptions scene;
+  bool json = false;
+  bool no_estimate = false;  ///< without the cost, which takes a short trial
+  render::GlPlatform gl = render::GlPlatform::automatic;
+};
+int validate_command(const ValidateOptions& options);
 int schema_command(bool reference);
 /// All presets with a line each, or the text of one.
 int presets_command(const std::string& name);
@@ -110,10 +124,28 @@ int info_command(const SceneOptions& options, bool json);
 /// GL by every platform, the devices of EGL, encoders, processor.
 int doctor_command();
 
+struct EncodeOptions {
+  std::vector<std::string> frames;  ///< one pattern
+  TalkOptions talk;
+  std::string out;
+  std::optional<std::string> fps;  ///< left out: of the manifest beside the frames, or 30
+  bool allow_gaps = false, force = false;
+};
+/// A video of frames that are there already.
+int encode_command(const EncodeOptions& options);
+
+struct NewOptions {
+  std::string name, from;  ///< file and template; empty template: of that name, or "basic"
+  bool list = false, force = false;
+};
+/// Writes a scene to begin with, or lists the templates.
+int new_command(const NewOptions& options);
+
 struct CompareOptions {
   SceneOptions scene;  ///< `file` may also be a picture or a folder of frames
   std::string other;   ///< the second picture or folder
   std::string golden, report;
+  GoldenStates states;
   int threads = 0;
   render::GlPlatform gl = render::GlPlatform::automatic;
 };
@@ -136,8 +168,16 @@ tbb::global_control simulation_threads(int threads);
 LoadedScene load(const SceneOptions& options, bool quiet,
                  const std::vector<std::string>& more_overrides = {});
 void print_warnings(const std::vector<Problem>& warnings);
+/// Reads the models of a scene, and shows what takes long on the way and what took long. Prints warnings
+/// unless quiet. Throws Interrupted between two models, and what ModelLibrary throws.
+ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const TalkOptions& talk);
+/// The same with the warnings added to `warnings` instead.
+ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const TalkOptions& talk,
+                         std::vector<Problem>& warnings);
 /// JSON as indented "key: value" lines.
 void print_readable(const nlohmann::ordered_json& json, int indent = 0);
+/// What is wrong with a text that is no frame rate.
+std::string wrong_frame_rate(const std::string& text);
 void write_text_file(const std::string& path, const std::string& text);
 
 /// Refuses, before the work, a file that could not or must not be written after it. An empty name is none.

@@ -9,6 +9,7 @@
 #include "producer/commands.h"
 #include "producer/fingerprint.h"
 #include "producer/golden.h"
+#include "producer/talk.h"
 #include "render/context.h"
 #include "render/error.h"
 #include "render/image_io.h"
@@ -70,13 +71,37 @@ int compare_pictures(const CompareOptions& options) {
   return same ? kOk : kImagesDiffer;
 }
 
+Golden drawn_with_progress(const LoadedScene& scene, int threads, const GoldenStates& states = {}) {
+  ProgressPrinter printer(ProgressStyle::automatic);
+  Golden golden = draw_golden(scene, threads, states, std::ref(printer));
+  printer.finish();
+  return golden;
+}
+
+void refuse_standard_input(const std::string& command, const std::string& file) {
+  if (file == kStandardInput)
+    throw std::invalid_argument(
+        command + ": a golden belongs to a scene file; standard input has no name to find it by");
+}
+
 int compare_with_golden(const CompareOptions& options) {
+  refuse_standard_input("compare", options.scene.file);
   const LoadedScene scene = load(options.scene, true, golden_overrides());
-  const Golden expected = read_golden(options.golden, scene.scene.name);
+  const GoldenPlace place = find_golden(options.golden, scene, options.scene.file);
+  if (!place.exists)
+    throw render::FileError(
+        fmt::format("{}: no golden for {}; make one with: offstage bless {} --golden {} "
+                    "--reason \"...\"",
+                    options.golden, options.scene.file, options.scene.file, options.golden));
+  if (!place.moved_from.empty())
+    say("note: the golden was made of {}, which is gone; it is taken for {}, moved\n",
+        (fs::path(options.golden) / place.moved_from).lexically_normal().string(), options.scene.file);
+  const Golden expected = read_golden(options.golden, place.name);
   const int threads = threads_or_all(options.threads);
   const auto control = simulation_threads(options.threads);
   render::pin_environment(threads, options.gl);
-  const Golden actual = draw_golden(scene, threads);
+  Golden actual = drawn_with_progress(scene, threads, options.states);
+  actual.scene = place.name;
   const Verdict verdict = judge(expected, actual);
   fmt::print("{}", verdict.text);
   if (verdict.pass) return kOk;
@@ -99,17 +124,25 @@ int bless_command(const BlessOptions& options) {
         "bless: goldens are not renewed in CI; run it by hand and look at the pictures");
   if (options.reason.find_first_not_of(" \t") == std::string::npos)
     throw std::invalid_argument("bless: --reason must say why the pictures changed");
+  for (const std::string& file : options.scenes) refuse_standard_input("bless", file);
   const int threads = threads_or_all(options.threads);
   const auto control = simulation_threads(options.threads);
   render::pin_environment(threads, options.gl);
+  std::set<std::string> taken;  // by scenes of this command
   for (const std::string& file : options.scenes) {
     const LoadedScene scene =
         load({.file = file, .set = {}, .quality = {}, .size = {}, .fps = {}, .duration = {}, .seed = {}},
              true, golden_overrides());
-    Golden golden = draw_golden(scene, threads);
+    const GoldenPlace place = find_golden(options.golden, scene, file, taken);
+    Golden golden = drawn_with_progress(scene, threads);
+    golden.scene = place.name;
+    golden.source = place.source;
     golden.reason = options.reason;
     write_golden(options.golden, golden);
-    fmt::print("{}: {} frames\n", golden.scene, golden.frames.size());
+    taken.insert(place.name);
+    const std::string asked = scene.scene.name;
+    fmt::print("{}: {} frames{}\n", golden.scene, golden.frames.size(),
+               asked == golden.scene ? "" : fmt::format(" (of {})", file));
   }
   return kOk;
 }

@@ -1,6 +1,5 @@
-// validate, schema and info, and what the commands share.
+// schema and info, and what the commands share.
 
-#include <algorithm>
 #include <map>
 
 #include <fmt/format.h>
@@ -9,7 +8,8 @@
 #include "producer/command_line.h"
 #include "producer/commands.h"
 #include "producer/fingerprint.h"
-#include "producer/scene_check_particles.h"
+#include "producer/interrupt.h"
+#include "producer/output.h"
 #include "producer/simulation.h"
 #include "producer/talk.h"
 #include "render/image_io.h"
@@ -64,6 +64,8 @@ Json describe_model(const std::filesystem::path& path, const DecompositionCache&
     const sim::PrincipalInertia principal = sim::diagonalise(mass.inertia);
     json["principal_moments_per_density"] = json_of(principal.moments);
   }
+  const StepNotice notice(ProgressStyle::automatic, fmt::format("cutting {} ({} triangles) into convex parts",
+                                                                path.string(), model.triangle_count()));
   json["convex_parts"] = describe(cache.decompose(mesh));
   Json nodes = Json::array();
   for (const render::Model::Node& node : model.nodes) {
@@ -97,24 +99,10 @@ Json describe_scene(const LoadedScene& loaded, const DecompositionCache& cache) 
           {"cloths", scene.cloths.size()},
           {"materials", scene.materials.size()},
           {"frames", scene.frame_count()},
-          {"fps", scene.output.fps},
+          {"fps", fps_json(scene.output.fps)},
           {"duration", scene.output.duration},
           {"size", {scene.render.size.x(), scene.render.size.y()}},
           {"settings", settings_key(loaded, models)}};
-}
-
-/// How many particles a scene can have at most, in all and of each name.
-struct MostParticles {
-  uint64_t alive = 0;
-  Json by_name = Json::object();
-};
-MostParticles most_particles(const Scene& scene) {
-  MostParticles most;
-  for (const ParticleBound& bound : particle_bounds(scene)) {
-    most.alive += bound.alive;
-    most.by_name[bound.name] = bound.alive;
-  }
-  return most;
 }
 
 }  // namespace
@@ -140,7 +128,11 @@ std::vector<std::string> SceneOptions::overrides() const {
       throw std::invalid_argument("size: '" + *size + "' is not WxH, such as 1280x720");
     all.push_back("/render/size=[" + size->substr(0, x) + "," + size->substr(x + 1) + "]");
   }
-  if (fps) all.push_back(fmt::format("/output/fps={}", *fps));
+  if (fps) {
+    const auto rate = render::parse_frame_rate(*fps);
+    if (!rate) throw std::invalid_argument(wrong_frame_rate(*fps));
+    all.push_back("/output/fps=" + rate->text());
+  }
   if (duration) all.push_back(fmt::format("/output/duration={}", *duration));
   if (seed) all.push_back(fmt::format("/world/seed={}", *seed));
   if (!channels.empty())
@@ -170,63 +162,35 @@ LoadedScene load(const SceneOptions& options, bool quiet, const std::vector<std:
   return loaded;
 }
 
+ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const TalkOptions& talk,
+                         std::vector<Problem>& warnings) {
+  const ProgressStyle style = talk.quiet ? ProgressStyle::none : talk.progress;
+  std::optional<StepNotice> notice;
+  ModelLibrary models(loaded.scene, loaded.folder, options.decompositions(), warnings,
+                      [&](const std::string& step) {
+                        notice.reset();
+                        if (interrupt_signal()) throw Interrupted(interrupt_signal());
+                        if (!step.empty()) notice.emplace(style, step);
+                      });
+  constexpr double kLong_s = 10;
+  for (const ModelLibrary::Decomposed& part : models.decomposed())
+    if (part.seconds > kLong_s && !talk.quiet)
+      say("note: it took {} to cut '{}' ({} triangles) into {} convex parts{}; a simpler model, or a "
+          "primitive or a hull as its shape, is faster in every run\n",
+          duration_text(part.seconds), part.file, part.triangles, part.parts,
+          options.no_cache ? "" : ", which are kept for later runs");
+  return models;
+}
+
+ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const TalkOptions& talk) {
+  std::vector<Problem> warnings;
+  ModelLibrary models = load_models(loaded, options, talk, warnings);
+  if (!talk.quiet) print_warnings(warnings);
+  return models;
+}
+
 void write_text_file(const std::string& path, const std::string& text) {
   render::write_file_atomically(path, {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
-}
-
-/// Bodies that begin in each other, the deepest first: they will be pushed apart, which moves them.
-void add_overlaps(const Scene& scene, const Simulation& simulation, std::vector<Problem>& warnings) {
-  constexpr double kVisible = 1e-3;
-  constexpr std::size_t kMost = 5;
-  const sim::World& world = simulation.world();
-  std::vector<sim::BodyOverlap> overlaps = world.overlaps(kVisible);
-  std::ranges::stable_sort(overlaps, std::ranges::greater{}, &sim::BodyOverlap::depth);
-  const auto place = [&](const std::string& name) {
-    const auto body = std::ranges::find(scene.bodies, name, &Body::name);
-    return body == scene.bodies.end() ? Where{} : body->where;
-  };
-  for (std::size_t i = 0; i < std::min(overlaps.size(), kMost); ++i) {
-    const auto& [a, b, depth] = overlaps[i];
-    const std::string &name = world.body_def(a).name, &other = world.body_def(b).name;
-    warnings.push_back(
-        {place(name), fmt::format("\"{}\" begins {:.3g} mm inside \"{}\"", name, 1e3 * depth, other)});
-  }
-  if (overlaps.size() > kMost)
-    warnings.back().what += fmt::format(", and {} more pairs of bodies overlap", overlaps.size() - kMost);
-}
-
-int validate_command(const SceneOptions& options, bool json) {
-  Json result = {
-      {"file", options.file}, {"valid", true}, {"errors", Json::array()}, {"warnings", Json::array()}};
-  const auto list = [](const Problem& p) {
-    return Json{{"file", p.where.file},
-                {"line", p.where.line},
-                {"column", p.where.column},
-                {"path", p.where.path},
-                {"message", p.what}};
-  };
-  try {
-    LoadedScene loaded = load_scene(options.file, options.overrides());
-    const ModelLibrary models(loaded.scene, loaded.folder, options.decompositions(), loaded.warnings);
-    const Simulation simulation(loaded.scene, models);  // what only building shows
-    add_overlaps(loaded.scene, simulation, loaded.warnings);
-    for (const Problem& warning : loaded.warnings) result["warnings"].push_back(list(warning));
-    const MostParticles most = most_particles(loaded.scene);
-    result["most_particles"] = most.alive;
-    result["most_particles_by_name"] = most.by_name;
-    if (!json) {
-      print_warnings(loaded.warnings);
-      fmt::print("{}: valid, {} frames, {} bodies, {} emitters, at most {} particles at once\n", options.file,
-                 loaded.scene.frame_count(), loaded.scene.bodies.size(), loaded.scene.emitters.size(),
-                 most.alive);
-    }
-  } catch (const SceneError& error) {
-    if (!json) throw;
-    result["valid"] = false;
-    for (const Problem& problem : error.problems()) result["errors"].push_back(list(problem));
-  }
-  if (json) fmt::print("{}\n", result.dump(2));
-  return result["valid"].get<bool>() ? kOk : kSceneInvalid;
 }
 
 int schema_command(bool reference) {
@@ -235,7 +199,8 @@ int schema_command(bool reference) {
 }
 
 int info_command(const SceneOptions& options, bool json) {
-  const bool is_scene = std::filesystem::path(options.file).extension() == ".json";
+  const bool is_scene =
+      options.from_standard_input() || std::filesystem::path(options.file).extension() == ".json";
   const DecompositionCache cache = options.decompositions();
   const Json info =
       is_scene ? describe_scene(load(options, false), cache) : describe_model(options.file, cache);

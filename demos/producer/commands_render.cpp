@@ -16,6 +16,7 @@
 #include "producer/interrupt.h"
 #include "producer/output.h"
 #include "producer/production.h"
+#include "producer/run_progress.h"
 #include "producer/run_report.h"
 #include "producer/talk.h"
 #include "render/context.h"
@@ -27,6 +28,20 @@ namespace offstage::producer {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// Names the body that was concerned most often.
+void report_rough_contacts(const SimulationTotals& t) {
+  if (t.rough_bodies.empty()) return;
+  const auto& [name, count] =
+      *std::ranges::max_element(t.rough_bodies, {}, [](const auto& entry) { return entry.second; });
+  const std::size_t others = t.rough_bodies.size() - 1;
+  say("warning: body '{}'{}: contact forces are approximate {} times, first at {:.2f} s, because the solver "
+      "found "
+      "no exact ones; the body may sink in, slide or tremble there. Reduce world.step (now {:g} s), or make "
+      "thin "
+      "shapes thicker\n",
+      name, others > 0 ? fmt::format(" (and {} more)", others) : "", count, t.first_rough_s, t.step_s);
+}
 
 void report_run(const RunStats& stats, const TalkOptions& talk, const std::string& stats_file) {
   if (!stats_file.empty()) write_text_file(stats_file, to_json(stats));
@@ -46,12 +61,12 @@ void report_run(const RunStats& stats, const TalkOptions& talk, const std::strin
   if (t.waiting) say("note: {} particles had to wait for room on their emitter\n", t.waiting);
   if (t.removed) say("warning: {} particles were inside a body and had to be removed\n", t.removed);
   if (t.truncated) say("note: {} particles hit more often in one step than is followed\n", t.truncated);
-  if (t.fallbacks())
-    say("warning: {} groups of contacts were solved only roughly (fallbacks in the figures)\n",
-        t.fallbacks());
+  report_rough_contacts(t);
   if (t.cut_short)
-    say("warning: {} times bodies met more often in one step than is followed; use a smaller world.step\n",
-        t.cut_short);
+    say("warning: {} times a pair of bodies reached the limit of collisions per sub-step; it stopped "
+        "bouncing "
+        "until the next. Reduce world.step (now {:g} s)\n",
+        t.cut_short, t.step_s);
   if (!talk.verbose) return;
   for (const auto& [name, times] : {std::pair("simulate", &stats.sim), std::pair("draw", &stats.render),
                                     std::pair("encode", &stats.encode)}) {
@@ -99,7 +114,7 @@ int print_plan(const Plan& plan) {
       {"first_frame", plan.frames.empty() ? 0 : plan.frames.front()},
       {"last_frame", plan.frames.empty() ? 0 : plan.frames.back()},
       {"size", {scene.render.size.x(), scene.render.size.y()}},
-      {"fps", scene.output.fps},
+      {"fps", fps_json(scene.output.fps)},
       {"subframes", subframes(scene.render.quality)},
       {"threads", plan.threads},
       {"jobs", plan.jobs},
@@ -145,14 +160,14 @@ bool assemble_video(const Plan& plan) {
 
 RunStats draw(const Plan& plan, const ModelLibrary& models, const RenderOptions& options,
               std::vector<int> frames, render::FrameSink& sink) {
-  ProgressPrinter printer(options.talk.quiet ? ProgressStyle::none : options.talk.progress);
+  RunProgress progress(plan.loaded.scene, models, options.talk);
   RenderJob job{
       .frames = std::move(frames), .threads = plan.jobs, .cache = {}, .report = !options.report.empty()};
   if (!options.cache.empty()) job.cache = options.cache;
   job.channels = plan.channels.choice;
   job.channels_stem = plan.channels.stem;
-  RunStats stats = render_frames(plan.loaded, models, job, sink, std::ref(printer));
-  printer.finish();
+  RunStats stats = render_frames(plan.loaded, models, job, sink, std::ref(progress));
+  progress.finish();
   if (job.report) write_text_file(options.report, run_report(plan.loaded, plan.settings, stats));
   return stats;
 }
@@ -227,7 +242,7 @@ int checked_frame(const Scene& scene, double wanted) {
   if (wanted >= 1 && wanted <= count) return static_cast<int>(wanted);
   throw std::invalid_argument(
       fmt::format("frame {} is outside the film; it has frames 1-{}, times {:g} to {:g} s", wanted, count,
-                  scene.output.start, scene.output.start + (count - 1) / scene.output.fps));
+                  scene.output.start, scene.output.time_of(count)));
 }
 
 }  // namespace
@@ -255,14 +270,18 @@ void check_png(const std::string& file) {
 }
 
 int frame_at(const Scene& scene, double time) {
-  return checked_frame(scene, 1 + std::round((time - scene.output.start) * scene.output.fps));
+  return checked_frame(scene, 1 + std::round((time - scene.output.start) * scene.output.fps.per_second()));
+}
+
+std::string default_film(const std::string& scene_file) {
+  if (scene_file == kStandardInput)
+    throw OutputError("a scene from standard input has no name for its film; give one with -o FILM.mp4");
+  return fs::path(scene_file).stem().string() + ".mp4";
 }
 
 int render_command(const RenderOptions& options) {
   LoadedScene loaded = load(options.scene, options.talk.quiet);
-  std::vector<Problem> warnings;
-  const ModelLibrary models(loaded.scene, loaded.folder, options.scene.decompositions(), warnings);
-  if (!options.talk.quiet) print_warnings(warnings);
+  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
   const Plan plan = make_plan(options, models, std::move(loaded));
   if (plan.target.kind == OutputKind::video) {
     render::check_video(video_def(plan));
@@ -319,15 +338,16 @@ int frame_command(const FrameOptions& options) {
    private:
     fs::path path_;
   };
-  std::vector<Problem> warnings;
-  const ModelLibrary models(scene, loaded.folder, options.scene.decompositions(), warnings);
-  if (!options.talk.quiet) print_warnings(warnings);
+  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
   const auto threads = simulation_threads(options.threads);
   render::pin_environment(threads_or_all(options.threads), options.gl);
   PictureSink sink(options.out);
+  RunProgress progress(scene, models, options.talk);
   const RunStats stats = render_frames(
       loaded, models,
-      {.frames = {frame}, .threads = 1, .cache = {}, .channels = channels, .channels_stem = stem}, sink, {});
+      {.frames = {frame}, .threads = 1, .cache = {}, .channels = channels, .channels_stem = stem}, sink,
+      std::ref(progress));
+  progress.finish();
   report_run(stats, options.talk, "");
   if (stats.interrupted_by) return interrupted(stats, 1, "");
   fmt::print("{}\n", options.out);
@@ -336,9 +356,7 @@ int frame_command(const FrameOptions& options) {
 
 int simulate_command(const SimulateOptions& options) {
   const LoadedScene loaded = load(options.scene, options.talk.quiet);
-  std::vector<Problem> warnings;
-  const ModelLibrary models(loaded.scene, loaded.folder, options.scene.decompositions(), warnings);
-  if (!options.talk.quiet) print_warnings(warnings);
+  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
   const std::array files = {options.stats, options.trace, options.contacts, options.cloths, options.joints};
   for (std::size_t i = 0; i < files.size(); ++i) {
     check_file(files[i], options.force);
@@ -357,9 +375,9 @@ int simulate_command(const SimulateOptions& options) {
   if (!options.contacts.empty()) job.contacts = options.contacts;
   if (!options.cloths.empty()) job.cloths = options.cloths;
   if (!options.joints.empty()) job.joints = options.joints;
-  ProgressPrinter printer(options.talk.quiet ? ProgressStyle::none : options.talk.progress);
-  const RunStats stats = simulate_frames(loaded, models, job, std::ref(printer));
-  printer.finish();
+  RunProgress progress(loaded.scene, models, options.talk);
+  const RunStats stats = simulate_frames(loaded, models, job, std::ref(progress));
+  progress.finish();
   report_run(stats, options.talk, options.stats);
   if (stats.interrupted_by) return interrupted(stats, loaded.scene.frame_count(), "");
   if (options.stats.empty()) fmt::print("{}", to_json(stats));

@@ -10,6 +10,7 @@
 #include "producer/contact_sheet.h"
 #include "producer/output.h"
 #include "producer/production.h"
+#include "producer/run_progress.h"
 #include "producer/talk.h"
 #include "render/context.h"
 #include "render/image_io.h"
@@ -31,7 +32,7 @@ class CellSink : public render::FrameSink {
  public:
   explicit CellSink(const Scene& scene) : scene_(scene) {}
   void write(int frame, const render::Image& image) override {
-    const double time = scene_.output.start + (frame - 1) / scene_.output.fps;
+    const double time = scene_.output.time_of(frame);
     cells.push_back({{fmt::format("{}  frame {}", time_code(time), frame)}, image});
   }
   void close() override {}
@@ -62,23 +63,21 @@ int sheet_command(const SheetOptions& options) {
   const int columns = options.columns > 0 ? options.columns : columns_for(frames.size());
   check_sheet_size(frames.size(), columns, scene.render.size.x(), scene.render.size.y());
 
-  std::vector<Problem> warnings;
-  const ModelLibrary models(scene, loaded.folder, options.scene.decompositions(), warnings);
-  if (!options.talk.quiet) print_warnings(warnings);
+  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
   const auto threads = simulation_threads(options.threads);
   const int jobs = threads_or_all(options.threads);
   render::pin_environment(jobs, options.gl);
   CellSink sink(scene);
-  ProgressPrinter printer(options.talk.quiet ? ProgressStyle::none : options.talk.progress);
+  RunProgress progress(scene, models, options.talk);
   const RunStats stats = render_frames(loaded, models, {.frames = frames, .threads = jobs, .cache = {}}, sink,
-                                       std::ref(printer));
-  printer.finish();
+                                       std::ref(progress));
+  progress.finish();
   if (stats.interrupted_by) {
     say("interrupted: {} of {} pictures done; nothing was written\n", stats.frames, frames.size());
     return 128 + stats.interrupted_by;
   }
   const std::string heading =
-      fmt::format("{}  {:g} s, {:g} frames/s", scene.name, scene.output.duration, scene.output.fps);
+      fmt::format("{}  {:g} s, {} frames/s", scene.name, scene.output.duration, scene.output.fps.text());
   render::write_png(options.out,
                     contact_sheet({heading}, sink.cells, std::min(columns, static_cast<int>(frames.size()))));
   fmt::print("{}\n", options.out);

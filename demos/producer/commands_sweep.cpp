@@ -63,13 +63,12 @@ std::vector<int> frames_of(const Scene& scene, const std::vector<double>& times)
   std::vector<int> frames;
   for (const double time : times) frames.push_back(frame_at(scene, time));
   std::ranges::sort(frames);
-  const auto repeated = std::ranges::unique(frames);
-  frames.erase(repeated.begin(), repeated.end());
+  frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
   return frames;
 }
 
 /// Problems of the scenes of a sweep: those of values it sets are its own, and each is told once.
-class Findings {
+class SweepFindings {
  public:
   void add(const std::vector<Problem>& problems) {
     for (Problem problem : problems) {
@@ -89,7 +88,7 @@ void load_runs(const SweepOptions& options, Sweep& sweep) {
   SceneOptions base = options.scene;
   const LoadedScene unvaried = load(base, options.quiet);
   if (!base.size) base.size = small_size(unvaried.scene, kSmallSide_px);
-  Findings errors, warnings;
+  SweepFindings errors, warnings;
   for (const auto& values : combinations(sweep.variations)) {
     SceneOptions one = base;
     for (std::size_t i = 0; i < values.size(); ++i)
@@ -289,8 +288,7 @@ class Crew {
 // --- After the work ---
 
 double time_of(const Run& run, int frame) {
-  const OutputSettings& output = run.scene.scene.output;
-  return output.start + (frame - 1) / output.fps;
+  return run.scene.scene.output.time_of(frame);
 }
 
 render::Image draw_sheet(const SweepOptions& options, const Sweep& sweep) {

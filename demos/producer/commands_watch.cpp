@@ -118,6 +118,8 @@ class Watcher {
  public:
   Watcher(const RenderOptions& options, const Renderer& render)
       : options_(options), render_(render), target_(parse_output(options.out)) {
+    if (options.scene.from_standard_input())
+      throw OutputError("--watch needs a scene file that can change; standard input cannot");
     if (target_.kind == OutputKind::pipe)
       throw OutputError("--watch needs an output that can be replaced; standard output cannot");
     if (target_.kind == OutputKind::video) {

@@ -32,6 +32,31 @@ Node abridged(const Node& node) {
   return type ? Object{{"type", *type}} : Object{};
 }
 
+/// Adds a key to its object's entry: the description of its value, and what is said of it.
+void describe_key(const Spec& spec, Description value, const std::optional<Node>& initial,
+                  ObjectEntry& entry) {
+  Row row{spec.key, value.type, spec.unit, spec.limits.range(), "none", spec.help};
+  value.schema.push_back({"description", spec.help + (spec.unit.empty() ? "" : " [" + spec.unit + "]")});
+  if (spec.required) {
+    row.initial = "required";
+    entry.required.push_back(spec.key);
+  } else if (initial) {
+    const Node shown = abridged(*initial);
+    row.initial = "`" + to_text(shown) + "`";
+    value.schema.push_back({"default", shown});
+  }
+  entry.rows.push_back(std::move(row));
+  entry.properties.push_back({spec.key, std::move(value.schema)});
+}
+
+/// Adds the key "type" of an object that is one of a choice.
+void describe_tag(const std::string& tag, bool required, ObjectEntry& entry) {
+  const std::string value = "`\"" + tag + "\"`";
+  entry.rows.push_back({"type", value, "", "", required ? "required" : value, "tells which object this is"});
+  entry.properties.push_back({"type", Object{{"const", tag}}});
+  if (required) entry.required.push_back("type");
+}
+
 }  // namespace
 
 std::string Limits::range() const {
@@ -192,27 +217,35 @@ Node ObjectEntry::definition() const {
   return schema;
 }
 
-void describe_key(const Spec& spec, Description value, const std::optional<Node>& initial,
-                  ObjectEntry& entry) {
-  Row row{spec.key, value.type, spec.unit, spec.limits.range(), "none", spec.help};
-  value.schema.push_back({"description", spec.help + (spec.unit.empty() ? "" : " [" + spec.unit + "]")});
-  if (spec.required) {
-    row.initial = "required";
-    entry.required.push_back(spec.key);
-  } else if (initial) {
-    const Node shown = abridged(*initial);
-    row.initial = "`" + to_text(shown) + "`";
-    value.schema.push_back({"default", shown});
-  }
-  entry.rows.push_back(std::move(row));
-  entry.properties.push_back({spec.key, std::move(value.schema)});
+Key::Key(const char* key, const char* help, const char* unit, Limits limits, bool required,
+         const ValueKind& value_kind, std::ptrdiff_t value_offset)
+    : spec{key, help, unit, limits, required}, kind(&value_kind), offset(value_offset) {}
+
+void append(std::vector<Key>& keys, std::span<const Key> part, std::ptrdiff_t offset) {
+  for (const Key& key : part) keys.emplace_back(key).offset += offset;
 }
 
-void describe_tag(const std::string& tag, bool required, ObjectEntry& entry) {
-  const std::string value = "`\"" + tag + "\"`";
-  entry.rows.push_back({"type", value, "", "", required ? "required" : value, "tells which object this is"});
-  entry.properties.push_back({"type", Object{{"const", tag}}});
-  if (required) entry.required.push_back("type");
+void read_object(Reader& in, const Node& node, std::string_view name, std::span<const Key> keys, bool tagged,
+                 void* object) {
+  std::vector<const Spec*> specs;
+  for (const Key& key : keys) specs.push_back(&key.spec);
+  in.keys(node, name, specs, tagged,
+          [&](std::size_t i, const Node& value) { keys[i].read(in, value, object); });
+}
+
+Node write_object(std::span<const Key> keys, const std::string& tag, const void* object) {
+  Object written;
+  if (!tag.empty()) written.push_back({"type", tag});
+  for (const Key& key : keys)
+    if (std::optional<Node> value = key.write(object)) written.push_back({key.spec.key, std::move(*value)});
+  return written;
+}
+
+void describe_object(Catalogue& all, std::span<const Key> keys, const std::string& tag, bool tag_required,
+                     const void* initial, ObjectEntry& entry) {
+  if (!tag.empty()) describe_tag(tag, tag_required, entry);
+  for (const Key& key : keys)
+    describe_key(key.spec, key.kind->describe(all, key.spec), key.write(initial), entry);
 }
 
 std::vector<std::string> strings(std::span<const char* const> names) {

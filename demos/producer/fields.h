@@ -3,9 +3,10 @@
 /// all follow.
 ///
 /// Table<T> lists the keys of a struct T as Fields<T>; Codec<V> knows how a value of type V stands in JSON. A
-/// new key is one line in scene_table.cpp; a new kind of value is one Codec. Those of plain values are in
+/// new key is one line in a table_*.h; a new kind of value is one Codec. Those of plain values are in
 /// values.h.
 
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -163,119 +164,129 @@ concept Tabled = requires {
   Table<T>::kName;
 };
 
-/// A key of objects of type T.
-template <class T>
-struct Field {
-  Spec spec;
-  std::function<void(Reader&, const Node&, T&)> read;
-  std::function<std::optional<Node>(const T&)> write;
-  std::function<Description(Catalogue&)> describe;
+/// The codec of one type, for a value at some address. What follows knows the types of values and of objects
+/// no further: two hundred keys would otherwise be as many classes of functions to compile.
+struct ValueKind {
+  void (*read)(Reader&, const Node&, const Spec&, void* out);
+  std::optional<Node> (*write)(const void* value);
+  Description (*describe)(Catalogue&, const Spec&);
+};
+template <class V>
+inline constexpr ValueKind kValueKind = {
+    [](Reader& in, const Node& node, const Spec& spec, void* out) {
+      Codec<V>::read(in, node, spec, *static_cast<V*>(out));
+    },
+    [](const void* value) -> std::optional<Node> { return Codec<V>::write(*static_cast<const V*>(value)); },
+    [](Catalogue& all, const Spec& spec) { return Codec<V>::describe(all, spec); }};
 
+/// A key of an object: what is said of it, and where its value lies in the object.
+struct Key {
+  Spec spec;
+  const ValueKind* kind;
+  std::ptrdiff_t offset;  ///< of the value in the object [bytes]
+
+  Key(const char* key, const char* help, const char* unit, Limits limits, bool required,
+      const ValueKind& value_kind, std::ptrdiff_t value_offset);
+
+  void read(Reader& in, const Node& node, void* object) const {
+    kind->read(in, node, spec, static_cast<std::byte*>(object) + offset);
+  }
+  std::optional<Node> write(const void* object) const {
+    return kind->write(static_cast<const std::byte*>(object) + offset);
+  }
+};
+
+/// An object of type T with the defaults of all its keys.
+template <class T>
+const T& initial_object() {
+  static const T object{};
+  return object;
+}
+/// Where a part of the initial object lies in it [bytes].
+template <class T, class Part>
+std::ptrdiff_t offset_in(const Part& part) {
+  return reinterpret_cast<const std::byte*>(&part) - reinterpret_cast<const std::byte*>(&initial_object<T>());
+}
+
+/// A key of objects of type T, from one of its members.
+template <class T>
+struct Field : Key {
   template <class M, class C>
   requires std::is_base_of_v<C, T> Field(const char* key, M C::*member, const char* help,
                                          const char* unit = "", Limits limits = {})
-      : Field(
-            Spec{key, help, unit, limits}, [member](auto& owner) -> auto& { return owner.*member; },
-            Codec<M>()) {}
+      : Field(key, member, help, unit, limits, false) {}
   template <class M, class C>
-  Field(const char* key, M C::*member, const char* help, Required)
-      : Field(
-            Spec{key, help, "", {}, true}, [member](auto& owner) -> auto& { return owner.*member; },
-            Codec<M>()) {}
-
-  /// A key of a part of T that stands directly in T.
-  template <class Part, class Project>
-  Field(const Field<Part>& inner, Project part)
-      : spec(inner.spec),
-        read([=](Reader& in, const Node& node, T& owner) { inner.read(in, node, part(owner)); }),
-        write([=](const T& owner) { return inner.write(part(owner)); }),
-        describe(inner.describe) {}
+  Field(const char* key, M C::*member, const char* help, Required) : Field(key, member, help, "", {}, true) {}
 
  private:
-  template <class Project, class ValueCodec>
-  Field(Spec s, Project value, ValueCodec)
-      : spec(s),
-        read([=](Reader& in, const Node& node, T& owner) { ValueCodec::read(in, node, s, value(owner)); }),
-        write([=](const T& owner) -> std::optional<Node> { return ValueCodec::write(value(owner)); }),
-        describe([=](Catalogue& all) { return ValueCodec::describe(all, s); }) {}
+  template <class M, class C>
+  Field(const char* key, M C::*member, const char* help, const char* unit, Limits limits, bool required)
+      : Key(key, help, unit, limits, required, kValueKind<M>, offset_in<T>(initial_object<T>().*member)) {}
 };
+
+/// Adds the keys of a part that lies at `offset` in the object.
+void append(std::vector<Key>& keys, std::span<const Key> part, std::ptrdiff_t offset);
 
 /// The keys of T, in the order of the reference.
 template <class T>
-struct Fields : std::vector<Field<T>> {
-  Fields(std::initializer_list<Field<T>> own) : std::vector<Field<T>>(own) {}
+class Fields {
+ public:
+  Fields(std::initializer_list<Field<T>> own) {
+    for (const Field<T>& field : own) keys_.push_back(field);
+  }
+
+  std::span<const Key> keys() const { return keys_; }
 
   /// Adds more keys of its own.
-  Fields then(std::initializer_list<Field<T>> more) && {
-    this->insert(this->end(), more);
-    return std::move(*this);
-  }
+  Fields then(const Fields& more) && { return std::move(*this).add(more, 0); }
   /// Adds the keys of a member, or of a base, that stand directly in T.
   template <class Part>
   Fields with(Part T::*part) && {
-    return std::move(*this).add(
-        Table<Part>::fields(), [part](auto& owner) -> auto& { return owner.*part; });
+    return std::move(*this).add(Table<Part>::fields(), offset_in<T>(initial_object<T>().*part));
   }
   template <class Base>
   Fields with_base() && {
-    return std::move(*this).add(
-        Table<Base>::fields(), [](auto& owner) -> auto& { return owner; });
+    return std::move(*this).add(Table<Base>::fields(), offset_in<T, Base>(initial_object<T>()));
   }
 
  private:
-  template <class Part, class Project>
-  Fields add(const Fields<Part>& part, Project project) && {
-    for (const Field<Part>& field : part) this->emplace_back(field, project);
+  std::vector<Key> keys_;
+
+  template <class Part>
+  Fields add(const Fields<Part>& part, std::ptrdiff_t offset) && {
+    append(keys_, part.keys(), offset);
     return std::move(*this);
   }
 };
 
-/// Adds a key to its object's entry: the description of its value, and what is said of it.
-void describe_key(const Spec& spec, Description value, const std::optional<Node>& initial,
-                  ObjectEntry& entry);
-/// Adds the key "type" of an object that is one of a choice.
-void describe_tag(const std::string& tag, bool required, ObjectEntry& entry);
+void read_object(Reader& in, const Node& node, std::string_view name, std::span<const Key> keys, bool tagged,
+                 void* object);
+Node write_object(std::span<const Key> keys, const std::string& tag, const void* object);
+/// `initial` is an object with the defaults of all keys.
+void describe_object(Catalogue& all, std::span<const Key> keys, const std::string& tag, bool tag_required,
+                     const void* initial, ObjectEntry& entry);
 
 /// Objects.
 template <Tabled T>
 struct Codec<T> {
   static void read(Reader& in, const Node& node, const Spec&, T& out, bool tagged = false) {
     if constexpr (requires { out.where; }) out.where = in.where(node.at);
-    in.keys(node, Table<T>::kName, specs(), tagged,
-            [&](std::size_t i, const Node& value) { fields()[i].read(in, value, out); });
+    read_object(in, node, Table<T>::kName, keys(), tagged, &out);
   }
 
-  static Node write(const T& value, const std::string& tag = "") {
-    Object object;
-    if (!tag.empty()) object.push_back({"type", tag});
-    for (const Field<T>& field : fields())
-      if (std::optional<Node> written = field.write(value))
-        object.push_back({field.spec.key, std::move(*written)});
-    return object;
-  }
+  static Node write(const T& value, const std::string& tag = "") { return write_object(keys(), tag, &value); }
 
   static Description describe(Catalogue& all, const Spec&, const std::string& tag = "",
                               bool tag_required = false) {
     return all.refer(Table<T>::kName, Table<T>::kHelp, [&](ObjectEntry& entry) {
-      const T initial;
-      if (!tag.empty()) describe_tag(tag, tag_required, entry);
-      for (const Field<T>& field : fields())
-        describe_key(field.spec, field.describe(all), field.write(initial), entry);
+      describe_object(all, keys(), tag, tag_required, &initial_object<T>(), entry);
     });
   }
 
  private:
-  static const Fields<T>& fields() {
+  static std::span<const Key> keys() {
     static const Fields<T> all = Table<T>::fields();
-    return all;
-  }
-  static const std::vector<const Spec*>& specs() {
-    static const std::vector<const Spec*> all = [] {
-      std::vector<const Spec*> pointers;
-      for (const Field<T>& field : fields()) pointers.push_back(&field.spec);
-      return pointers;
-    }();
-    return all;
+    return all.keys();
   }
 };
 
@@ -345,7 +356,7 @@ struct Codec<std::vector<V>> {
   static void read(Reader& in, const Node& node, const Spec& spec, std::vector<V>& out) {
     const List* list = in.list(node, "a list");
     if (!list) return;
-    out.assign(list->size(), V{});
+    out = std::vector<V>(list->size());
     for (std::size_t i = 0; i < list->size(); ++i)
       in.within(std::to_string(i), [&] { Codec<V>::read(in, (*list)[i], spec, out[i]); });
   }

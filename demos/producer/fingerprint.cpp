@@ -17,7 +17,9 @@ std::string cpu_class() {
       vendor = line.substr(line.find(':') + 2);
       break;
     }
-  return (__builtin_cpu_supports("x86-64-v3") ? "x86-64-v3 " : "other ") + vendor;
+  const bool v3 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") &&
+                  __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("fma");
+  return (v3 ? "x86-64-v3 " : "other ") + vendor;
 }
 
 std::string fingerprint(const render::ContextInfo& context) {

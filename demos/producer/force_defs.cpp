@@ -45,8 +45,9 @@ sim::LennardJones effect_of(const LennardJonesForce& f) {
 sim::Grab effect_of(const Grab& f) {
   sim::Grab grab{
       .point = f.point, .track = {}, .stiffness = f.stiffness, .damping = f.damping, .reach = f.reach};
+  grab.track.interpolation = f.interpolation;
   for (const HandKey& key : f.keyframes)
-    grab.track.keys.push_back({key.time, {key.position, Quat::Identity()}});
+    grab.track.keys.push_back({key.time, {key.position, Quat::Identity()}, key.interpolation});
   return grab;
 }
 sim::Explosion effect_of(const Explosion& f) {

@@ -1,5 +1,7 @@
 #include "producer/golden.h"
 
+#include <algorithm>
+#include <cctype>
 #include <fstream>
 
 #include <fmt/format.h>
@@ -7,7 +9,6 @@
 
 #include "producer/fingerprint.h"
 #include "producer/interrupt.h"
-#include "producer/production.h"
 #include "render/context.h"
 #include "render/error.h"
 #include "render/image_io.h"
@@ -46,6 +47,36 @@ std::string escape_html(const std::string& text) {
   return out;
 }
 
+/// What a golden says it was made of; empty if it does not, or is none.
+std::string source_of(const fs::path& golden) {
+  std::ifstream in(golden);
+  const auto json = nlohmann::json::parse(in, nullptr, false);
+  if (!json.is_object() || !json.contains("source") || !json["source"].is_string()) return {};
+  return json["source"].get<std::string>();
+}
+
+/// A name as a file name: it stays in its folder, and needs no quotes.
+std::string file_name_of(const std::string& name) {
+  std::string out;
+  for (const char c : name) {
+    const bool plain = std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-' || c == '+' ||
+                       (c == '.' && !out.empty()) || static_cast<unsigned char>(c) >= 0x80;
+    out += plain ? c : '_';
+  }
+  return out.empty() ? "scene" : out;
+}
+
+/// The golden in the folder that was made of a source.
+std::optional<std::string> golden_made_of(const fs::path& folder, const std::string& source) {
+  std::vector<std::string> names;
+  if (!fs::is_directory(folder)) return {};
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.path().extension() == ".json" && source_of(entry.path()) == source)
+      names.push_back(entry.path().stem().string());
+  if (names.empty()) return {};
+  return *std::ranges::min_element(names);
+}
+
 /// One frame's line of the verdict; sets `pass`.
 std::string judge_frame(const GoldenFrame& expected, const GoldenFrame& actual, bool same_class, bool& pass) {
   const bool same_state = expected.state_hash == actual.state_hash;
@@ -73,34 +104,72 @@ std::vector<std::string> golden_overrides() {
   return {"/render/size=[256,144]", "/render/quality=preview", "/render/shadow_map=1024"};
 }
 
-Golden draw_golden(const LoadedScene& scene, int threads) {
+GoldenPlace find_golden(const fs::path& folder, const LoadedScene& scene, const fs::path& scene_file,
+                        const std::set<std::string>& taken) {
+  const fs::path base = fs::weakly_canonical(fs::absolute(folder)), file = fs::weakly_canonical(scene_file);
+  GoldenPlace place{.name = file_name_of(scene.scene.name),
+                    .source = file.lexically_relative(base).generic_string(),
+                    .moved_from = {}};
+  if (const auto known = golden_made_of(base, place.source)) {
+    place.name = *known;
+    place.exists = true;
+    return place;
+  }
+  const auto is_free = [&](const std::string& name) {
+    return !taken.contains(name) && !fs::exists(base / (name + ".json"));
+  };
+  if (is_free(place.name)) return place;
+  if (!taken.contains(place.name)) {
+    const std::string owner = source_of(base / (place.name + ".json"));
+    if (owner.empty() || !fs::exists(base / owner)) {
+      place.exists = true;
+      place.moved_from = owner;
+      return place;
+    }
+  }
+  // The name belongs to another scene: folders are put in front until it is one of its own.
+  std::string name = file_name_of(file.stem().string());
+  for (fs::path above = file.parent_path(); above.has_relative_path(); above = above.parent_path()) {
+    name = file_name_of(above.filename().string()) + "-" + name;
+    if (!is_free(name)) continue;
+    place.name = name;
+    return place;
+  }
+  throw render::FileError(folder.string() + ": every name for a golden of " + scene_file.string() +
+                          " is taken");
+}
+
+Golden draw_golden(const LoadedScene& scene, int threads, const GoldenStates& states,
+                   const ProgressCallback& progress) {
   Golden golden;
   golden.scene = scene.scene.name;
   const int count = scene.scene.frame_count();
-  RenderJob job{
-      .frames = {std::max(1, count / 5), std::max(1, count * 3 / 5)}, .threads = threads, .cache = {}};
+  RenderJob job{.frames = {std::max(1, count / 5), std::max(1, count * 3 / 5)},
+                .threads = threads,
+                .cache = {},
+                .keep = {}};
+  if (!states.keep.empty()) job.keep = states.keep;
+  if (!states.from.empty()) job.cache = states.from;
   if (job.frames[0] == job.frames[1]) job.frames.pop_back();
   std::vector<Problem> warnings;
   const ModelLibrary models(scene.scene, scene.folder, DecompositionCache(),
                             warnings);  // nothing from outside
   MemorySink sink(golden.frames);
-  const RunStats stats = render_frames(scene, models, job, sink, {});
+  const RunStats stats = render_frames(scene, models, job, sink, progress);
   if (stats.interrupted_by) throw Interrupted(stats.interrupted_by);
   for (GoldenFrame& frame : golden.frames) frame.state_hash = stats.frame_states.at(frame.frame);
   golden.fingerprint = fingerprint(render::Context().info());
   return golden;
 }
 
-Golden read_golden(const fs::path& folder, const std::string& scene) {
-  const fs::path path = folder / (scene + ".json");
+Golden read_golden(const fs::path& folder, const std::string& name) {
+  const fs::path path = folder / (name + ".json");
   std::ifstream in(path);
-  if (!in)
-    throw render::FileError(
-        path.string() + ": no golden for this scene; make one with: offstage bless SCENE --reason \"...\"");
   const auto json = nlohmann::json::parse(in, nullptr, false);
   if (!json.is_object() || !json.contains("frames"))
     throw render::FileError(path.string() + ": not a golden");
-  Golden golden{.scene = scene,
+  Golden golden{.scene = name,
+                .source = source_of(path),
                 .reason = json.value("reason", ""),
                 .fingerprint = json.value("fingerprint", ""),
                 .frames = {}};
@@ -109,15 +178,17 @@ Golden read_golden(const fs::path& folder, const std::string& scene) {
     golden.frames.push_back({.frame = frame,
                              .state_hash = f.value("state", ""),
                              .pixel_hash = f.value("pixels", ""),
-                             .image = render::read_image(picture_file(folder, scene, frame))});
+                             .image = render::read_image(picture_file(folder, name, frame))});
   }
   return golden;
 }
 
 void write_golden(const fs::path& folder, const Golden& golden) {
   fs::create_directories(folder);
-  nlohmann::ordered_json json = {
-      {"scene", golden.scene}, {"reason", golden.reason}, {"fingerprint", golden.fingerprint}};
+  nlohmann::ordered_json json = {{"scene", golden.scene},
+                                 {"source", golden.source},
+                                 {"reason", golden.reason},
+                                 {"fingerprint", golden.fingerprint}};
   auto& frames = json["frames"] = nlohmann::ordered_json::array();
   for (const GoldenFrame& f : golden.frames) {
     render::write_png(picture_file(folder, golden.scene, f.frame), f.image);

@@ -4,9 +4,11 @@
 /// pixels differ, it is the renderer that changed.
 
 #include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "producer/production.h"
 #include "producer/scene_io.h"
 #include "render/image.h"
 
@@ -22,16 +24,39 @@ struct GoldenFrame {
 };
 
 struct Golden {
-  std::string scene, reason, fingerprint;
+  std::string scene;   ///< the name, which its files begin with
+  std::string source;  ///< the scene's file, relative to the folder of goldens; empty: not recorded
+  std::string reason, fingerprint;
   std::vector<GoldenFrame> frames;
 };
 
+/// Where states of a simulation are kept between two drawings of a golden; empty: nowhere.
+struct GoldenStates {
+  std::string keep;  ///< folder that the states of the golden frames are written to
+  std::string from;  ///< folder that they are read from, instead of simulating
+};
+
+/// Which golden of a folder belongs to a scene file. A golden records the file it was made of, so two scenes
+/// of one name in different folders have two goldens: the second is named after its folder and file, too.
+struct GoldenPlace {
+  std::string name;        ///< of the golden's files
+  std::string source;      ///< of the scene, relative to the folder, with links resolved
+  bool exists = false;     ///< it is there and belongs to this scene
+  std::string moved_from;  ///< the golden's source, if that is gone: it is taken for this scene moved
+};
+/// Finds it by its source, else by the scene's name if the golden there records no source or one that is
+/// gone. Else a name for a new golden that no other has. `taken` are names that are already given away.
+/// Throws FileError for a folder that cannot be read, or if no name is free.
+GoldenPlace find_golden(const std::filesystem::path& folder, const LoadedScene& scene,
+                        const std::filesystem::path& scene_file, const std::set<std::string>& taken = {});
+
 /// Draws the golden frames of a scene that was loaded with golden_overrides(): one early, one late. Throws
 /// Interrupted.
-Golden draw_golden(const LoadedScene& scene, int threads);
+Golden draw_golden(const LoadedScene& scene, int threads, const GoldenStates& states = {},
+                   const ProgressCallback& progress = {});
 
-/// Reads and writes FOLDER/<scene>.json and its pictures FOLDER/<scene>-####.png. Throws FileError.
-Golden read_golden(const std::filesystem::path& folder, const std::string& scene);
+/// Reads and writes FOLDER/<name>.json and its pictures FOLDER/<name>-####.png. Throws FileError.
+Golden read_golden(const std::filesystem::path& folder, const std::string& name);
 void write_golden(const std::filesystem::path& folder, const Golden& golden);
 
 struct Verdict {

@@ -26,10 +26,10 @@ using Object = std::vector<Member>;  ///< in the order of the file, keys unique
 /// A JSON value and where it starts.
 struct Node {
   using Value = std::variant<std::nullptr_t, bool, int64_t, double, std::string, List, Object>;
-  Value value = nullptr;
+  Value value;  ///< null at first
   Position at;
 
-  Node() = default;
+  Node();
   template <class T>
   requires(!std::is_same_v<std::remove_cvref_t<T>, Node> && std::is_constructible_v<Value, T>)
       Node(T&& v, Position p = {})
@@ -54,6 +54,8 @@ struct Member {
   Node value;
   Position at = {};
 };
+
+inline Node::Node() = default;  // here, where Member is complete
 
 inline constexpr int kMaxDepth = 64;  ///< of nested lists and objects
 

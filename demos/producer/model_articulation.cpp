@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "producer/articulation_builder.h"
+#include "producer/shipped_files.h"
 #include "render/error.h"
 #include "render/mesh_io.h"
 
@@ -13,7 +14,7 @@ void read_links(Scene& scene, const std::filesystem::path& folder, std::vector<P
     auto* tree = std::get_if<ModelTree>(&articulation);
     if (!tree || tree->file.empty()) continue;
     try {
-      for (const render::Model::Node& node : render::read_model(folder / tree->file).nodes)
+      for (const render::Model::Node& node : render::read_model(model_file(tree->file, folder)).nodes)
         tree->links.push_back(
             {node.name, node.parent, {node.position.cast<Real>(), node.orientation.cast<Real>().normalized()}});
     } catch (const render::FileError& error) {

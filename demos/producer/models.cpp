@@ -1,11 +1,13 @@
 #include "producer/models.h"
 
 #include <algorithm>
+#include <chrono>
 #include <set>
 
 #include <fmt/format.h>
 #include <xxhash.h>
 
+#include "producer/shipped_files.h"
 #include "render/error.h"
 #include "render/image_io.h"
 #include "render/mesh_io.h"
@@ -107,14 +109,16 @@ std::map<std::string, Where> bodies_in_parts(const Scene& scene) {
 }  // namespace
 
 ModelLibrary::ModelLibrary(const Scene& scene, const std::filesystem::path& folder,
-                           const DecompositionCache& cache, std::vector<Problem>& warnings) {
+                           const DecompositionCache& cache, std::vector<Problem>& warnings,
+                           const StepCallback& on_step) {
   std::vector<Problem> problems;
   XXH3_state_t* hash = XXH3_createState();
   XXH3_128bits_reset(hash);
   const Files files = files_of(scene);
   for (const auto& [file, where] : files.models) {
     try {
-      const render::Model& model = models_.emplace(file, render::read_model(folder / file)).first->second;
+      const render::Model& model =
+          models_.emplace(file, render::read_model(model_file(file, folder))).first->second;
       for (const std::string& warning : model.warnings) warnings.push_back({where, file + ": " + warning});
       add_to(hash, model);
     } catch (const render::FileError& error) {
@@ -131,19 +135,28 @@ ModelLibrary::ModelLibrary(const Scene& scene, const std::filesystem::path& fold
   digest_ = hex(XXH3_128bits_digest(hash));
   XXH3_freeState(hash);
   if (!problems.empty()) throw SceneError(std::move(problems));
-  decompose_models(scene, cache, warnings);
+  decompose_models(scene, cache, warnings, on_step);
 }
 
 void ModelLibrary::decompose_models(const Scene& scene, const DecompositionCache& cache,
-                                    std::vector<Problem>& warnings) {
+                                    std::vector<Problem>& warnings, const StepCallback& on_step) {
   const std::map<std::string, Where> needed = bodies_in_parts(scene);
   std::set<std::string> warned;
   for (const Body& body : scene.bodies) {
     const auto* mesh = std::get_if<MeshFile>(&body.shape);
     const auto need = needed.find(body.name);
     if (!mesh || need == needed.end()) continue;
-    if (!parts_.contains(mesh->file))
-      parts_.emplace(mesh->file, cache.decompose(sim::weld(collision_mesh(model(mesh->file), 1))));
+    if (!parts_.contains(mesh->file)) {
+      const std::size_t triangles = model(mesh->file).triangle_count();
+      if (on_step) on_step(fmt::format("cutting {} ({} triangles) into convex parts", mesh->file, triangles));
+      const auto start = std::chrono::steady_clock::now();
+      const auto& parts =
+          parts_.emplace(mesh->file, cache.decompose(sim::weld(collision_mesh(model(mesh->file), 1))))
+              .first->second;
+      const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start;
+      decomposed_.push_back({mesh->file, triangles, parts.parts.size(), time.count()});
+      if (on_step) on_step("");
+    }
     const sim::ConvexDecomposition& parts = parts_.at(mesh->file);
     // What stands still collides with its triangles then.
     const bool matters = body.motion == sim::MotionType::dynamic;

@@ -2,6 +2,7 @@
 /// The model and texture files of a scene, each read once and shared by the simulation and every stage.
 
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -17,11 +18,15 @@ namespace offstage::producer {
 class ModelLibrary {
  public:
   ModelLibrary() = default;
-  /// Reads every model and texture that the (flat) scene names, relative to `folder`, and cuts models into
-  /// convex parts where collisions of bodies or an overlay need that. Throws SceneError with every file that
-  /// cannot be used; what was repaired in a model or is only approximately right is added to `warnings`.
+  /// Told what the next step of some seconds is, and "" at its end. May throw to stop the work.
+  using StepCallback = std::function<void(const std::string& step)>;
+
+  /// Reads every model and texture that the (flat) scene names, relative to `folder` (or see `model_file`),
+  /// and cuts models into convex parts where collisions of bodies or an overlay need that. Throws SceneError
+  /// with every file that cannot be used; what was repaired in a model or is only approximately right is
+  /// added to `warnings`.
   ModelLibrary(const Scene& scene, const std::filesystem::path& folder, const DecompositionCache& cache,
-               std::vector<Problem>& warnings);
+               std::vector<Problem>& warnings, const StepCallback& on_step = {});
 
   const render::Model& model(const std::string& file) const { return models_.at(file); }
   /// The convex parts of a model at its own scale, or null if nothing needs them.
@@ -30,15 +35,25 @@ class ModelLibrary {
     return it == parts_.end() ? nullptr : &it->second;
   }
   const render::Image& texture(const std::string& file) const { return textures_.at(file); }
+  /// A model that was cut into convex parts, and the time that this took (little if they were kept on disk).
+  struct Decomposed {
+    std::string file;
+    std::size_t triangles = 0, parts = 0;
+    double seconds = 0;
+  };
+  const std::vector<Decomposed>& decomposed() const { return decomposed_; }
+
   /// Digest of everything that was read, so that a run knows when a file changed.
   const std::string& digest() const { return digest_; }
 
  private:
-  void decompose_models(const Scene& scene, const DecompositionCache& cache, std::vector<Problem>& warnings);
+  void decompose_models(const Scene& scene, const DecompositionCache& cache, std::vector<Problem>& warnings,
+                        const StepCallback& on_step);
 
   std::map<std::string, render::Model> models_;
   std::map<std::string, render::Image> textures_;
   std::map<std::string, sim::ConvexDecomposition> parts_;
+  std::vector<Decomposed> decomposed_;
   std::string digest_;
 };
 

@@ -5,6 +5,7 @@
 #include <cctype>
 #include <cstring>
 #include <fstream>
+#include <regex>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -18,7 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kMostFrames = 10'000'000;  // that a manifest can make us look for
-constexpr std::array kVideoEndings = {".mp4", ".webm", ".mov", ".gif", ".webp", ".apng", ".png"};
 
 nlohmann::ordered_json to_json(const Manifest& m, const fs::path& pattern) {
   return {{"pattern", pattern.filename().string()},
@@ -27,7 +27,7 @@ nlohmann::ordered_json to_json(const Manifest& m, const fs::path& pattern) {
           {"width", m.width_px},
           {"height", m.height_px},
           {"frames", m.frames},
-          {"fps", m.fps}};
+          {"fps", fps_json(m.fps)}};
 }
 
 void remove_channels_of(const fs::path& stem, int count) {
@@ -64,16 +64,40 @@ std::vector<fs::path> all_channel_files(const fs::path& stem, int frame) {
   return files;
 }
 
+nlohmann::ordered_json fps_json(const render::FrameRate& fps) {
+  if (fps.denominator == 1) return fps.per_second();
+  return fps.text();
+}
+
+std::string hash_pattern(const std::string& pattern) {
+  // printf's %d and %04d, Houdini's $F4, Python's {:04d} and {frame:04}
+  static const std::regex number(R"(%0?(\d*)[diu]|\$F(\d*)|\{\w*(?::0?(\d*)d?)?\})");
+  std::smatch found;
+  const std::size_t slash = pattern.rfind('/');
+  const std::string folder = slash == std::string::npos ? "" : pattern.substr(0, slash + 1),
+                    name = pattern.substr(folder.size());
+  if (!std::regex_search(name, found, number)) return {};
+  std::string digits;
+  for (std::size_t group = 1; group < found.size(); ++group) digits += found[group].str();
+  constexpr std::size_t kUsual = 1, kMost = 9;
+  const std::size_t width = digits.empty() || digits.size() > 2 ? kUsual : std::stoul(digits);
+  return folder + found.prefix().str() + std::string(std::clamp(width, kUsual, kMost), '#') +
+         found.suffix().str();
+}
+
 OutputTarget parse_output(const std::string& out) {
   if (out == "-") return {OutputKind::pipe, {}};
-  const auto is_ending = [](const std::string& text) {
-    return std::ranges::find(kVideoEndings, text) != kVideoEndings.end();
+  const std::vector<std::string> endings = render::video_endings();
+  const auto is_ending = [&](const std::string& text) {
+    return std::ranges::find(endings, text) != endings.end();
   };
   if (out.empty() || is_ending(fs::path(out).filename().string()))
     throw OutputError("'" + out + "': the output has no name");
   const fs::path path = out;
   if (out.ends_with('/') || fs::is_directory(path)) return {OutputKind::frames, path / "####.png"};
   const std::string ending = path.extension().string();
+  if (const std::string meant = hash_pattern(out); !meant.empty() && (ending.empty() || ending == ".png"))
+    throw OutputError(out + ": the numbers of frames are written as #; did you mean '" + meant + "'?");
   if (path.filename().string().find('#') != std::string::npos) {
     if (ending != ".png")
       throw OutputError(out + ": frames are PNG files; give a pattern such as frames/####.png");
@@ -83,7 +107,7 @@ OutputTarget parse_output(const std::string& out) {
   if (!is_ending(ending))
     throw OutputError(out +
                       ": unknown kind of output; give a folder, a pattern such as frames/####.png, one of " +
-                      fmt::format("{}", fmt::join(kVideoEndings, " ")) + ", or - for standard output");
+                      fmt::format("{}", fmt::join(endings, " ")) + ", or - for standard output");
   return {OutputKind::video, path};
 }
 

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "producer/scene_io.h"
 #include "render/channels.h"
 #include "render/sink.h"
@@ -20,7 +22,7 @@ class OutputError : public std::runtime_error {
 
 enum class OutputKind {
   frames,  ///< a pattern with #, or a folder: one PNG per frame
-  video,   ///< .mp4 .webm .mov .gif .webp .apng .png
+  video,   ///< .mp4 .webm .mov .mkv .gif .webp .apng .png
   pipe,    ///< "-": raw frames on standard output
 };
 
@@ -29,15 +31,22 @@ struct OutputTarget {
   std::filesystem::path path;  ///< the pattern of frames, or the video
 };
 
-/// Throws OutputError for an ending that is none of the known ones.
+/// Throws OutputError for an ending that is none of the known ones, and for the number patterns of other
+/// programs (f%04d.png), with the pattern that is meant.
 OutputTarget parse_output(const std::string& out);
+
+/// The pattern with # that a pattern of another program means: %04d of C, $F4, {:04}. Empty if it is none.
+std::string hash_pattern(const std::string& pattern);
 
 /// What identifies the frames in a folder.
 struct Manifest {
   std::string scene, settings;  ///< name; settings_key()
   int width_px = 0, height_px = 0, frames = 0;
-  double fps = 30;
+  render::FrameRate fps;
 };
+
+/// A frame rate as it stands in JSON: a number if it is whole, else a fraction such as "30000/1001".
+nlohmann::ordered_json fps_json(const render::FrameRate& fps);
 
 /// Files with channels: which, and how their names begin, with '#' as in render::frame_path.
 struct ChannelFiles {

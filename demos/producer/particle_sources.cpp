@@ -39,7 +39,7 @@ effects::ColorRamp glow_of(const std::vector<std::pair<Real, Real>>& kelvin) {
 
 /// Runs `add`, turning the library's refusal into a problem at the place in the scene.
 template <class F>
-void at_place(const Where& where, F&& add) {
+void at_source(const Where& where, F&& add) {
   try {
     add();
   } catch (const std::invalid_argument& error) {
@@ -99,7 +99,7 @@ void ParticleSources::add(const Emitter& emitter, const ModelLibrary& models, si
     const auto system = world.add_particle_system(system_def(name, source));
     handles[&source] = system;
     systems_.push_back({name, system, LookRamps(source.look, seed, name)});
-    at_place(source.where, [&] {
+    at_source(source.where, [&] {
       if (!parent) {
         effects::EmitterDef def = emitter_def(emitter, seed);
         def.body = body(emitter.body);
@@ -114,6 +114,13 @@ void ParticleSources::add(const Emitter& emitter, const ModelLibrary& models, si
       if (source.split) splitters_.emplace_back(split_def(source, name, seed), system, system);
     });
   });
+}
+
+Real ParticleSources::prewarm() const {
+  Real longest = 0;
+  for (const effects::Emitter& emitter : emitters_)
+    longest = std::max(longest, emitter.def().prewarm - emitter.def().start);
+  return longest;
 }
 
 void ParticleSources::emit(sim::World& world, Real start, Real end) {

@@ -42,6 +42,9 @@ class ParticleSources {
   /// Throws SceneError for an emitter that cannot emit.
   ParticleSources(const Scene& scene, const ModelLibrary& models, sim::World& world, const FindBody& body);
 
+  /// How long before time 0 the first particles are born [s].
+  Real prewarm() const;
+
   /// To be called before each sub-step.
   void emit(sim::World& world, Real start, Real end);
 

@@ -19,8 +19,10 @@ namespace {
 using Eigen::Affine3f;
 using Eigen::Vector3f;
 
-/// Half the edge of the square that stands for an infinite plane [m].
-constexpr float kGroundHalfSize = 1000;
+/// Half the edge of the square that stands for an infinite plane [m]: from 300 m up, it still reaches to where its
+/// horizon hides it.
+constexpr float kGroundHalfSize = 256'000;
+constexpr float kGroundTexture_m = 2000;  // of one copy of its texture
 
 Affine3f affine(const Vec3& position, const Quat& orientation, Real scale = 1) {
   return Eigen::Translation3f(position.cast<float>()) * orientation.cast<float>() * Eigen::Scaling(to_float(scale));
@@ -44,7 +46,10 @@ render::Mesh mesh_of(const sim::Cone& s) {
   return render::make_cone(to_float(s.radius), to_float(s.height));
 }
 render::Mesh mesh_of(const sim::Plane&) {
-  return render::make_ground(kGroundHalfSize);
+  render::Mesh ground = render::make_ground(kGroundHalfSize);
+  for (Eigen::Vector2f& uv : ground.uvs)
+    uv = (uv.array() - 0.5f) * (2 * kGroundHalfSize / kGroundTexture_m) + 0.5f;
+  return ground;
 }
 
 std::vector<float> shape_key(const sim::Sphere& s) {
@@ -317,7 +322,7 @@ float Picture::exposure(double time, float sample_weight) const {
 }
 
 render::Channels Picture::channels(const Snapshot& previous, const Snapshot& current) {
-  const double frame_time = &previous == &current ? 0 : 1 / scene_.output.fps;
+  const double frame_time = &previous == &current ? 0 : scene_.output.fps.seconds(1);
   place(previous, previous, 1, frame_time);
   stage_.remember();
   place(previous, current, 1, frame_time);
@@ -326,7 +331,7 @@ render::Channels Picture::channels(const Snapshot& previous, const Snapshot& cur
 
 render::Image Picture::draw(const Snapshot& previous, const Snapshot& current) {
   const int n = subframes(scene_.render.quality);
-  const double frame_time = 1 / scene_.output.fps;
+  const double frame_time = scene_.output.fps.seconds(1);
   std::ranges::fill(sum_.rgba, 0.f);
   for (int i = 0; i < n; ++i) {
     // Sub-frames sit in the middle of equal parts of the time the shutter is open, which ends with the frame.

@@ -54,7 +54,7 @@ Vector3f interpolate(const Vector3f& a, const Vector3f& va, const Vector3f& b, c
 
 float Picture::subframe_time() const {
   const int n = subframes(scene_.render.quality);
-  return n == 1 ? 0 : to_float(scene_.render.shutter / scene_.output.fps) / static_cast<float>(n);
+  return n == 1 ? 0 : to_float(scene_.render.shutter / scene_.output.fps.per_second()) / static_cast<float>(n);
 }
 
 void Picture::set_balls(std::size_t set, std::span<const render::Point> balls) {

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "producer/json.h"
+#include "producer/shipped_files.h"
 #include "producer/suggest.h"
 
 namespace offstage::producer {
@@ -205,16 +206,10 @@ void place(Force& force, const Effect& effect, const std::string& prefix) {
 }  // namespace
 
 fs::path presets_folder() {
-  std::vector<fs::path> places;
-  if (const char* given = std::getenv("OFFSTAGE_PRESETS")) places.emplace_back(given);
   std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  if (!error) places.push_back(program.parent_path().parent_path() / "share/offstage/presets");
-  // Where this was compiled, for a program that was not installed.
-  places.emplace_back(OFFSTAGE_PRESETS_SOURCE);
-  for (const fs::path& place : places)
-    if (fs::is_directory(place, error)) return place;
-  return {};
+  if (const char* given = std::getenv("OFFSTAGE_PRESETS"); given && fs::is_directory(given, error))
+    return given;
+  return shipped_folder("presets", "effects/presets");
 }
 
 std::vector<std::string> preset_names() {

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <exception>
 #include <fstream>
+#include <mutex>
 #include <sstream>
 #include <thread>
 
@@ -27,6 +28,65 @@ double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
+/// Keeps count of simulated and finished frames for the progress of a run; the two threads that do them share
+/// it.
+class ProgressMeter {
+ public:
+  /// `drawing_ms`: a guess at what a frame takes to draw, until there is one.
+  ProgressMeter(const ProgressCallback& callback, int frames, int frames_to_simulate, double drawing_ms)
+      : callback_(callback), guess_ms_(drawing_ms) {
+    latest_.total = frames;
+    latest_.frames_to_simulate = frames_to_simulate;
+  }
+  void simulated_one() {
+    const std::lock_guard lock(mutex_);
+    if (!callback_ || latest_.frames_simulated >= latest_.frames_to_simulate) return;
+    ++latest_.frames_simulated;
+    simulation_ms_ += ms_since(simulating_since_);
+    latest_.frame_finished = false;
+    report();
+    simulating_since_ = Clock::now();
+  }
+  /// The simulation goes on now, after it waited for the drawing.
+  void simulation_goes_on() { simulating_since_ = Clock::now(); }
+  void finished_one(double sim_ms, double render_ms, double encode_ms, uint64_t particles) {
+    const std::lock_guard lock(mutex_);
+    if (!callback_) return;
+    ++latest_.done;
+    drawing_ms_ += render_ms + encode_ms;
+    latest_.sim_ms = sim_ms;
+    latest_.render_ms = render_ms;
+    latest_.encode_ms = encode_ms;
+    latest_.particles = particles;
+    latest_.frame_finished = true;
+    report();
+  }
+
+ private:
+  /// Simulated and finished frames count by what they take on average.
+  void report() {
+    constexpr double kKnown = 0.02;  // share of the work after which the rest can be estimated
+    const auto mean = [](double sum, int count, double guess) { return count > 0 ? sum / count : guess; };
+    const double simulating = mean(simulation_ms_, latest_.frames_simulated, 0),
+                 drawing = mean(drawing_ms_, latest_.done, guess_ms_);
+    const double done = simulating * latest_.frames_simulated + drawing * latest_.done,
+                 all = simulating * latest_.frames_to_simulate + drawing * latest_.total;
+    latest_.fraction = latest_.done == latest_.total ? 1 : all > 0 ? std::min(1.0, done / all) : 0;
+    latest_.simulating_s = simulation_ms_ / 1000;
+    latest_.drawing_s = drawing_ms_ / 1000;
+    latest_.eta_s = latest_.fraction > kKnown ? ms_since(start_) / 1000 * (1 / latest_.fraction - 1) : 0;
+    callback_(latest_);
+  }
+
+  const ProgressCallback& callback_;
+  const double guess_ms_;
+  std::mutex mutex_;
+  Progress latest_;
+  double simulation_ms_ = 0, drawing_ms_ = 0;
+  const Clock::time_point start_ = Clock::now();
+  Clock::time_point simulating_since_ = start_;  // of the simulating thread
+};
+
 /// Where snapshots come from: the simulation or a cache.
 class SnapshotSource {
  public:
@@ -39,10 +99,17 @@ class SnapshotSource {
 
 class LiveSource : public SnapshotSource {
  public:
-  explicit LiveSource(Simulation& simulation) : simulation_(simulation) {}
+  LiveSource(Simulation& simulation, ProgressMeter& meter, const SnapshotCache* kept)
+      : simulation_(simulation), meter_(meter), kept_(kept) {}
   Snapshot at(int frame, const std::function<bool()>& stop) override {
-    while (simulation_.frame() < frame && !stop()) simulation_.advance();
-    return simulation_.snapshot();
+    meter_.simulation_goes_on();
+    while (simulation_.frame() < frame && !stop()) {
+      simulation_.advance();
+      meter_.simulated_one();
+    }
+    Snapshot snapshot = simulation_.snapshot();
+    if (kept_) kept_->write(snapshot);
+    return snapshot;
   }
   void describe(Shot& shot) const override {
     shot.contacts = simulation_.world().contacts().size();
@@ -51,6 +118,8 @@ class LiveSource : public SnapshotSource {
 
  private:
   Simulation& simulation_;
+  ProgressMeter& meter_;
+  const SnapshotCache* kept_;  ///< where to write what was asked for; may be null
 };
 
 class CachedSource : public SnapshotSource {
@@ -101,8 +170,7 @@ void keep_frame(const Print& print, double encode_ms, int total, RunStats& stats
 }
 
 void print_frames(Pipeline& pipeline, render::FrameSink& sink, const Scene& scene, const RenderJob& job,
-                  RunStats& stats, const ProgressCallback& progress) {
-  const auto start = Clock::now();
+                  RunStats& stats, ProgressMeter& meter) {
   const auto total = static_cast<int>(job.frames.size());
   const bool numbered = job.channels_stem.filename().string().find('#') != std::string::npos;
   const render::ObjectNames objects = object_names(scene);
@@ -124,14 +192,7 @@ void print_frames(Pipeline& pipeline, render::FrameSink& sink, const Scene& scen
     stats.state_hash = stats.frame_states[print->shot.frame] = state.state_hash.hex();
     if (job.report) keep_frame(*print, encode_ms, total, stats);
     if (is_blank(print->image)) stats.blank_frames.push_back(print->shot.frame);
-    if (progress)
-      progress({.done = stats.frames,
-                .total = total,
-                .sim_ms = print->shot.sim_ms,
-                .render_ms = print->render_ms,
-                .encode_ms = encode_ms,
-                .particles = stats.particles,
-                .eta_s = ms_since(start) / 1000 / stats.frames * (total - stats.frames)});
+    meter.finished_one(print->shot.sim_ms, print->render_ms, encode_ms, stats.particles);
   }
 }
 
@@ -178,16 +239,24 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
   const auto start = Clock::now();
   RunStats stats;
   std::optional<Simulation> simulation;
+  std::optional<SnapshotCache> kept;
   std::unique_ptr<SnapshotSource> source;
+  std::optional<ProgressMeter> meter;
+  constexpr double kDrawing_ms = 300;
+  const auto frames = static_cast<int>(job.frames.size());
   if (job.cache) {
     SnapshotCache cache(*job.cache);
     cache.check(simulation_key(loaded, models), loaded.scene.frame_count());
+    meter.emplace(progress, frames, 0, kDrawing_ms);
     source = std::make_unique<CachedSource>(std::move(cache));
   } else {
     simulation.emplace(loaded.scene, models);
     stats.bodies = simulation->body_count();
     stats.energy_start = simulation->world().energy();
-    source = std::make_unique<LiveSource>(*simulation);
+    if (job.keep)
+      kept.emplace(*job.keep).create(simulation_key(loaded, models), loaded.scene.frame_count(), true);
+    meter.emplace(progress, frames, frames > 0 ? simulation->advances_to(job.frames.back()) : 0, kDrawing_ms);
+    source = std::make_unique<LiveSource>(*simulation, *meter, kept ? &*kept : nullptr);
   }
 
   Pipeline pipeline(job.threads + 2);
@@ -195,7 +264,7 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
     guarded(pipeline, [&] { draw_shots(pipeline, loaded.scene, models, job.channels.any()); });
   };
   const auto print = [&] {
-    guarded(pipeline, [&] { print_frames(pipeline, sink, loaded.scene, job, stats, progress); });
+    guarded(pipeline, [&] { print_frames(pipeline, sink, loaded.scene, job, stats, *meter); });
   };
   {
     std::vector<std::jthread> crew;
@@ -209,8 +278,9 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
   }
   pipeline.rethrow_failure();
 
-  if (stats.frames < static_cast<int>(job.frames.size())) stats.interrupted_by = interrupt_signal();
+  if (stats.frames < frames) stats.interrupted_by = interrupt_signal();
   if (stats.frames > 0) sink.close();
+  if (kept && !stats.interrupted_by) kept->finish(simulation_key(loaded, models), loaded.scene.frame_count());
   if (simulation) {
     stats.totals = simulation->totals();
     stats.energy_end = simulation->world().energy();
@@ -247,11 +317,17 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
   stats.bodies = simulation.body_count();
   stats.energy_start = simulation.world().energy();
 
+  ProgressMeter meter(progress, total, simulation.advances_to(total), 0);
   for (int frame = 1; frame <= total; ++frame) {
     const auto step_start = Clock::now();
-    while (simulation.frame() < frame && !interrupt_signal()) simulation.advance();
+    meter.simulation_goes_on();
+    while (simulation.frame() < frame && !interrupt_signal()) {
+      simulation.advance();
+      meter.simulated_one();
+    }
     if (simulation.frame() < frame) break;  // interrupted
     stats.sim.add(ms_since(step_start));
+    const double sim_ms = ms_since(step_start);
     const auto write_start = Clock::now();
     if (cache) cache->write(simulation.snapshot());
     const bool at_step = job.trace_every_step && frame < total;  // that state is the next sub-step's start
@@ -260,12 +336,7 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
     ++stats.frames;
     stats.particles = simulation.world().particle_count();
     stats.most_particles = std::max(stats.most_particles, stats.particles);
-    if (progress)
-      progress({.done = frame,
-                .total = total,
-                .sim_ms = ms_since(step_start),
-                .particles = stats.particles,
-                .eta_s = ms_since(start) / 1000 / frame * (total - frame)});
+    meter.finished_one(sim_ms, 0, ms_since(write_start), stats.particles);
   }
   if (stats.frames < total) stats.interrupted_by = interrupt_signal();
   if (cache && stats.frames == total) cache->finish(key, total);
@@ -298,14 +369,10 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json report_json(const sim::ContactWork& work) {
-  return {{"solves", work.solves},
-          {"iterations", work.iterations},
-          {"factorizations", work.factorizations},
-          {"fallbacks", work.fallbacks},
-          {"abandoned", work.abandoned},
-          {"narrowed", work.narrowed},
-          {"softened", work.softened},
-          {"residual", work.residual}};
+  return {
+      {"solves", work.solves},       {"iterations", work.iterations}, {"factorizations", work.factorizations},
+      {"fallbacks", work.fallbacks}, {"abandoned", work.abandoned},   {"narrowed", work.narrowed},
+      {"softened", work.softened},   {"residual", work.residual}};
 }
 Json report_json(const sim::IntegratorReport& report) {
   return {{"steps", report.steps},
@@ -336,6 +403,7 @@ void add_contact_figures(const SimulationTotals& t, Json& json) {
   json["exact_solver"] = report_json(t.exact);
   json["fast_solver"] = report_json(t.fast);
   json["impact_solver"] = report_json(t.impacts);
+  json["rough_bodies"] = t.rough_bodies;
   json["integration"] = report_json(t.integration);
 }
 

@@ -66,12 +66,17 @@ struct RunStats {
 /// One JSON object.
 std::string to_json(const RunStats& stats);
 
-/// Told after every finished frame, from one thread.
+/// How far a run is. Reported after every simulated and every finished frame, by one thread at a time.
 struct Progress {
-  int done = 0, total = 0;
-  double sim_ms = 0, render_ms = 0, encode_ms = 0;  ///< of the latest frames
-  uint64_t particles = 0;
-  double eta_s = 0;
+  int done = 0, total = 0;                          ///< finished frames
+  double sim_ms = 0, render_ms = 0, encode_ms = 0;  ///< of the latest finished frame
+  uint64_t particles = 0;                           ///< in that frame
+  double eta_s = 0;                                 ///< time left [s]; 0: not known yet
+  double fraction = 0;                              ///< of the work of simulation and drawing, 0 .. 1
+  /// Of the simulation, which also runs what the film skips; both 0 without one.
+  int frames_simulated = 0, frames_to_simulate = 0;
+  bool frame_finished = true;              ///< false: reported for a simulated frame
+  double simulating_s = 0, drawing_s = 0;  ///< spent so far; drawing with encoding, of all threads together
 };
 using ProgressCallback = std::function<void(const Progress&)>;
 
@@ -79,8 +84,9 @@ struct RenderJob {
   std::vector<int> frames;                     ///< to draw, ascending
   int threads = 1;                             ///< that draw, each with a context of its own
   std::optional<std::filesystem::path> cache;  ///< read states from here instead of simulating
-  bool report = false;                         ///< keep figures and pictures
-  render::ChannelChoice channels;              ///< to write ...
+  std::optional<std::filesystem::path> keep;  ///< write the states that are drawn here, to be read as `cache`
+  bool report = false;                        ///< keep figures and pictures
+  render::ChannelChoice channels;             ///< to write ...
   std::filesystem::path channels_stem;  ///< ... as these; '#' as in render::frame_path, or for one frame
 };
 

@@ -142,8 +142,7 @@ std::string sheet(const Scene& scene, const RunStats& stats) {
     html += fmt::format(
         "<figure><img alt=\"frame {0}\" src=\"data:image/png;base64,{1}\"><figcaption>{2}, frame "
         "{0}</figcaption></figure>\n",
-        frame, base64(render::encode_png(picture)),
-        time_code(scene.output.start + (frame - 1) / scene.output.fps));
+        frame, base64(render::encode_png(picture)), time_code(scene.output.time_of(frame)));
   return html + "</div>\n";
 }
 
@@ -162,11 +161,11 @@ std::string run_report(const LoadedScene& loaded, const std::string& settings, c
   std::string html = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta "
       "charset=\"utf-8\"><title>{0}</title>\n{1}</head><body>\n"
-      "<h1>{0}</h1>\n<p>{2}</p>\n<p>{3} frames of {4} x {5} pixels, {6:g} a second; {7} bodies, at most {8} "
+      "<h1>{0}</h1>\n<p>{2}</p>\n<p>{3} frames of {4} x {5} pixels, {6} a second; {7} bodies, at most {8} "
       "particles; "
       "made in {9:.1f} s.</p>\n",
       escaped(scene.name), kStyle, escaped(scene.description), stats.frames, scene.render.size.x(),
-      scene.render.size.y(), scene.output.fps, stats.bodies, stats.most_particles, stats.wall_s);
+      scene.render.size.y(), scene.output.fps.text(), stats.bodies, stats.most_particles, stats.wall_s);
   html += sheet(scene, stats);
   html += "<h2>Plots</h2>\n" + plots(stats.figures);
   html += "<h2>Figures</h2>\n<pre>" + escaped(to_json(stats)) + "</pre>\n";

@@ -17,7 +17,7 @@ int subframes(Quality quality) {
 }
 
 int Scene::frame_count() const {
-  return static_cast<int>(std::lround(output.duration * output.fps));
+  return static_cast<int>(std::lround(output.duration * output.fps.per_second()));
 }
 
 }  // namespace offstage::producer

@@ -19,6 +19,7 @@
 #include "producer/scene_joint.h"
 #include "producer/scene_particles.h"
 #include "producer/scene_values.h"
+#include "render/frame_rate.h"
 #include "render/channels.h"
 #include "render/model.h"
 #include "render/stage.h"
@@ -102,6 +103,7 @@ struct BodyKey {
   Real time = 0;
   std::optional<Vec3> position;     ///< default: the body's
   std::optional<Quat> orientation;  ///< default: the body's
+  std::optional<sim::Interpolation> interpolation;  ///< to the next key; default: the body's
 };
 
 struct Body {
@@ -125,7 +127,7 @@ struct Body {
   bool visible = true;
   bool casts_shadow = true;
   std::vector<BodyKey> keyframes;
-  sim::Interpolation interpolation = sim::Interpolation::smooth;
+  sim::Interpolation interpolation = sim::Interpolation::monotone;
   bool loop = false;
   Vec3 spin = Vec3::Zero();
   Placement placement;  ///< its three keys stand directly in the body
@@ -259,9 +261,11 @@ struct CameraKey {
   Vec3 eye = {4, 2.5, 6};
   Vec3 target = Vec3::Zero();
   std::optional<Real> fov_deg, focus;  ///< default: the camera's
+  std::optional<sim::Interpolation> interpolation;  ///< to the next key; default: the camera's
 };
 struct KeyframedCamera : Lens {
   std::vector<CameraKey> keyframes;
+  sim::Interpolation interpolation = sim::Interpolation::monotone;
 };
 struct OrbitCamera : Lens {
   Vec3 target = Vec3::Zero();
@@ -340,12 +344,15 @@ struct RenderSettings {
 };
 
 struct OutputSettings {
-  Real fps = 30;
+  render::FrameRate fps;  ///< frames per second
   Real duration = 5;
   Real start =
       0;  ///< time of frame 1: what happens before is simulated and not shown (a fountain already running)
   std::vector<render::Channel> channels;  ///< numbers for each pixel, in files beside the frames or the video
   render::ChannelFormat channel_format = render::ChannelFormat::exr;
+
+  /// The time that frame k shows [s], k from 1.
+  Real time_of(int frame) const { return start + fps.seconds(frame - 1); }
 };
 
 struct Scene {

@@ -13,6 +13,7 @@
 #include "producer/scene_check_cloths.h"
 #include "producer/scene_check_joints.h"
 #include "producer/scene_check_particles.h"
+#include "producer/shipped_files.h"
 #include "producer/suggest.h"
 #include "sim/geometry/mass_properties.h"
 
@@ -143,6 +144,12 @@ class Checker {
     if (!file.empty() && !std::filesystem::is_regular_file(folder_ / file, error))
       fail(path, "there is no file '" + (folder_ / file).string() + "'");
   }
+  /// Of a model: beside the scene, or one that comes with offstage.
+  void check_model(const std::string& path, const std::string& file) {
+    std::error_code error;
+    if (!file.empty() && !std::filesystem::is_regular_file(model_file(file, folder_), error))
+      fail(path, "there is no file '" + (folder_ / file).string() + "'");
+  }
   void check_materials() {
     for (const Material& material : scene_.materials)
       check_file(material.where.path + "/texture", material.texture);
@@ -204,8 +211,8 @@ class Checker {
     const bool dynamic = body.motion == sim::MotionType::dynamic,
                kinematic = body.motion == sim::MotionType::kinematic;
     if (const MeshFile* mesh = std::get_if<MeshFile>(&body.shape))
-      check_file(path + "/shape/file", mesh->file);
-    if (body.model) check_file(path + "/model/file", body.model->file);
+      check_model(path + "/shape/file", mesh->file);
+    if (body.model) check_model(path + "/model/file", body.model->file);
     if (dynamic && std::holds_alternative<sim::Plane>(body.shape))
       fail(path + "/shape", "a plane cannot be dynamic; give the body \"motion\": \"static\"");
     if (!kinematic && !body.keyframes.empty())
@@ -238,7 +245,7 @@ class Checker {
     const std::string& path = emitter.where.path;
     if (!emitter.body.empty()) check_body_name(path + "/body", emitter.body);
     if (const auto* mesh = std::get_if<MeshSurface>(&emitter.surface))
-      check_file(path + "/surface/file", mesh->file);
+      check_model(path + "/surface/file", mesh->file);
   }
 
   // --- Springs ---
@@ -294,7 +301,7 @@ class Checker {
   void check_stiffness(Real stiffness, Real damping, Real mass, const std::string& path,
                        const std::string& what) {
     const Real largest = largest_stable_step(scene_.world.integrator, stiffness, damping, mass);
-    const Real used = std::min(scene_.world.step, 1 / scene_.output.fps);
+    const Real used = std::min(scene_.world.step, scene_.output.fps.seconds(1));
     if (used >= largest)
       fail(path, fmt::format("{} is too stiff for the step: /world/step must be less than "
                              "{:.3g} s, is {:.3g} s",
@@ -507,7 +514,7 @@ class Checker {
       warn("/render/size", "is odd: most video formats need even numbers");
     if (scene_.frame_count() < 1)
       fail("/output/duration",
-           fmt::format("is too short for a single frame at {} frames per second", scene_.output.fps));
+           fmt::format("is too short for a single frame at {} frames per second", scene_.output.fps.text()));
   }
 
   const Scene& scene_;
@@ -527,7 +534,7 @@ Findings check_scene(const Scene& scene, const Scene& flat, const std::filesyste
 
 Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real c, Real m) {
   // x'' = -(k/m) x and v' = -(c/m) v: the ends of the stability region on the imaginary and on the negative
-  // real axis. The Euler methods and the midpoint rule share 2; Runge-Kutta 4 has 2 sqrt(2) and 2.785. The
+  // real axis. The Euler methods, the leapfrog and the midpoint rule share 2; Runge-Kutta 4 has 2 sqrt(2) and 2.785. The
   // implicit method has no end, and the others, from there on, find their own step.
   if (integrator >= sim::IntegratorKind::implicit_euler) return kUnlimited;
   const bool rk4 = integrator == sim::IntegratorKind::rk4;
@@ -539,7 +546,7 @@ Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real c, Real m)
 std::optional<std::string> too_much_drag(const Scene& scene, sim::IntegratorKind integrator, Real drag,
                                          Real m) {
   const Real largest = largest_stable_step(integrator, 0, drag, m),
-             used = std::min(scene.world.step, 1 / scene.output.fps);
+             used = std::min(scene.world.step, scene.output.fps.seconds(1));
   if (drag <= 0 || used < largest) return {};
   return fmt::format(
       "is too much for the step and so small a mass: /world/step must be less than {:.3g} s, is {:.3g} s",

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "producer/cloth_defs.h"
+#include "producer/shipped_files.h"
 #include "producer/suggest.h"
 
 namespace offstage::producer {
@@ -27,7 +28,7 @@ class ClothChecker {
     for (const ClothPin& pin : cloth.pins) check_body(scope_of(pin));
     if (const auto* mesh = std::get_if<MeshFile>(&cloth.shape)) {
       std::error_code error;
-      if (!mesh->file.empty() && !std::filesystem::is_regular_file(folder_ / mesh->file, error))
+      if (!mesh->file.empty() && !std::filesystem::is_regular_file(model_file(mesh->file, folder_), error))
         fail(path + "/shape/file", "there is no file '" + (folder_ / mesh->file).string() + "'");
       return;
     }
@@ -86,7 +87,7 @@ void check_cloths(const Scene& scene, const Scene& flat, const std::filesystem::
 
 std::optional<std::string> too_stiff(const Scene& scene, const sim::ClothDef& cloth) {
   const sim::StableStep stable = sim::largest_stable_step(cloth);
-  const Real used = std::min({cloth.substep, scene.world.step, 1 / scene.output.fps});
+  const Real used = std::min({cloth.substep, scene.world.step, scene.output.fps.seconds(1)});
   if (used < stable.step) return {};
   const sim::ClothSpring& spring = cloth.springs[stable.spring];
   return fmt::format(

@@ -77,6 +77,7 @@ class ParticleChecker {
   }
 
   void check_drag(const ParticleBehaviour& behaviour, Real mass, const std::string& path) {
+    if (behaviour.integrator == sim::IntegratorKind::leapfrog) return;  // damps as fast as drag can
     if (const auto problem = too_much_drag(scene_, behaviour.integrator, behaviour.linear_drag, mass))
       fail(path + "/linear_drag", *problem);
   }
@@ -123,11 +124,30 @@ class ParticleChecker {
                               : effects::lower_bound(source.density) * 4 / 3 * std::numbers::pi * smallest *
                                     smallest * smallest;
     if (lightest > 0) check_drag(source.behaviour, lightest, path);
+    check_lifespan(source);
     const ParticleBehaviour& b = source.behaviour;
     const bool hits = b.collides || b.internal || b.external;
     if (!source.on_collision.empty() && !hits)
       warn(path + "/on_collision", "has no effect: its particles do not collide");
     if (b.dies_on_hit && !hits) warn(path + "/dies_on_hit", "has no effect: its particles do not collide");
+  }
+
+  /// What is to happen at an age that no particle reaches never happens.
+  void check_lifespan(const ParticleSource& source) {
+    const std::string& path = source.where.path;
+    const Real longest = effects::upper_bound(source.lifespan);
+    const auto check_age = [&](Real age, const std::string& where, const char* what) {
+      if (age >= longest)
+        fail(path + where, fmt::format("is {:g} s, but particles live {:g} s at most and never {}; allowed is "
+                                       "less than the lifespan",
+                                       age, longest, what));
+    };
+    if (source.split && source.split->enabled && effects::upper_bound(source.split->count) >= 0.5)
+      check_age(effects::lower_bound(source.split->age), "/split/age", "split");
+    for (std::size_t i = 0; i < source.trails.size(); ++i)
+      check_age(source.trails[i].start_age, "/trails" + index_step(i) + "/start_age", "leave a trail");
+    for (std::size_t i = 0; i < source.on_age.size(); ++i)
+      check_age(source.on_age[i].age, "/on_age" + index_step(i) + "/age", "reach that age");
   }
 
   void check_room(const Emitter& emitter) {

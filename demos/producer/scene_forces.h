@@ -2,11 +2,13 @@
 /// The forces of a scene; see scene.h. Those that can act on many have the names of what they act on; none:
 /// all dynamic bodies, all cloths and no particles.
 
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "producer/scene_values.h"
+#include "sim/dynamics/interpolation.h"
 #include "sim/dynamics/pair_law.h"
 #include "sim/dynamics/region.h"
 #include "sim/dynamics/turbulence.h"
@@ -83,6 +85,7 @@ struct LennardJonesForce : PairScope {
 struct HandKey {
   Real time = 0;
   Vec3 position = Vec3::Zero();
+  std::optional<sim::Interpolation> interpolation;  ///< to the next key; default: the grab's
 };
 /// A damped spring of no length from a body or from particles to a point that moves, as of a hand.
 struct Grab : NamedForce {
@@ -91,6 +94,7 @@ struct Grab : NamedForce {
   std::vector<std::string> cloths;
   Vec3 point = Vec3::Zero();  ///< of the body, in its frame
   std::vector<HandKey> keyframes;
+  sim::Interpolation interpolation = sim::Interpolation::monotone;
   Real stiffness = 100;
   Real damping = 10;
   Real reach = 1e30;  ///< of particles and of points of cloths

@@ -20,7 +20,8 @@ void name_objects(std::vector<T>& objects, const std::string& kind) {
 }
 
 void name_everything(Scene& scene, const std::string& file) {
-  if (scene.name.empty()) scene.name = std::filesystem::path(file).stem().string();
+  if (scene.name.empty())
+    scene.name = file == kStandardInputName ? "stdin" : std::filesystem::path(file).stem().string();
   name_objects(scene.materials, "material");
   name_objects(scene.bodies, "body");
   name_objects(scene.particles, "particles");
@@ -81,6 +82,7 @@ LoadedScene parse_scene(std::string_view text, const std::string& name, const st
 }
 
 LoadedScene load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
+  if (file == kStandardInput) return parse_scene(standard_input(), kStandardInputName, "", overrides);
   return parse_scene(read_text(file), file.string(), file.parent_path(), overrides);
 }
 

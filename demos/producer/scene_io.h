@@ -20,7 +20,7 @@ struct LoadedScene {
 };
 
 /// Reads a scene file and its includes, applies `overrides` ("path=value", path as a JSON pointer or dotted),
-/// checks all of it. Throws SceneError with every problem.
+/// checks all of it. The file "-" is standard input. Throws SceneError with every problem.
 LoadedScene load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides = {});
 
 /// The same from text; `name` stands for the file in messages.

@@ -16,13 +16,15 @@ namespace offstage::producer {
 struct MotorKey {
   Real time = 0;
   Real target = 0;
+  std::optional<sim::Interpolation> interpolation;  ///< to the next key; default: the motor's
 };
 
 struct JointMotor {
   sim::Motor::Mode mode = sim::Motor::Mode::speed;
   Real target = 0;             ///< without keys
   std::vector<MotorKey> keys;  ///< in order of time
-  bool smooth = false;         ///< between keys
+  sim::Interpolation interpolation = sim::Interpolation::monotone;
+  bool smooth = false;  ///< stops at every key
   std::optional<Real> max_effort;
   Real stiffness = 0, damping = 0;
 };

@@ -49,7 +49,7 @@ struct ParticleBehaviour {
   bool internal = false;  ///< with each other
   bool external = false;  ///< with those of other systems that have this, too
   bool dies_on_hit = false;
-  sim::IntegratorKind integrator = sim::IntegratorKind::symplectic_euler;
+  sim::IntegratorKind integrator = sim::IntegratorKind::leapfrog;
 };
 
 struct ParticlePlace {

@@ -35,7 +35,8 @@ with file, line, column and path.
   simulation is made for.
 - **Frames** are numbered from 1; frame k shows the time start + (k - 1) / fps. There are duration * fps of
   them, rounded.
-- **Files** (models, textures) are sought in the folder of the scene file.
+- **Files** (models, textures) are sought in the folder of the scene file; those of a scene from standard input
+  (`-` in place of the file) in the current folder.
 - **Names** may be left out; an object without one is called after its kind and index, like `body_3`.
 - **Editors** complete and check a scene that starts with `"$schema": "scene.schema.json"`, the output of
   `offstage schema`.
@@ -46,8 +47,8 @@ with file, line, column and path.
 
 ## Colours
 
-`"#rrggbb"` or `"#rrggbbaa"` in sRGB, as picture editors show them, or linear `[r, g, b]` or `[r, g, b, a]`,
-where values above 1 glow. Alpha is straight: 0 is transparent, 1 opaque.
+`"#rrggbb"` or `"#rrggbbaa"` in sRGB, as picture editors show them (in short `"#rgb"` or `"#rgba"`: `#f80` is
+`#ff8800`), or linear `[r, g, b]` or `[r, g, b, a]`, where values above 1 glow. Alpha is straight: 0 is transparent, 1 opaque.
 
 ## Numbers that vary
 

@@ -1,12 +1,19 @@
 #include "producer/scene_source.h"
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
 #include <charconv>
 #include <fstream>
 #include <iterator>
 #include <optional>
 
+#include <poll.h>
+#include <unistd.h>
+
+#include "producer/interrupt.h"
 #include "producer/suggest.h"
+#include "producer/talk.h"
 
 namespace offstage::producer {
 namespace {
@@ -224,6 +231,28 @@ std::string read_text(const fs::path& file) {
   if (!stream)
     throw SceneError({file.string(), 0, 0, {}}, fs::exists(file, error) ? "cannot be read" : "no such file");
   return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+const std::string& standard_input() {
+  static const std::string text = [] {
+    constexpr std::size_t kMostBytes = 256 << 20;
+    if (isatty(STDIN_FILENO)) say("reading the scene from the keyboard; Ctrl-D ends it\n");
+    std::string all;
+    std::array<char, 1 << 16> part{};
+    while (true) {
+      pollfd input{STDIN_FILENO, POLLIN, 0};
+      constexpr int kWait_ms = 200;
+      const int ready = ::poll(&input, 1, kWait_ms);  // so that a signal ends the wait
+      if (interrupt_signal()) throw Interrupted(interrupt_signal());
+      if (ready == 0 || (ready < 0 && errno == EINTR)) continue;
+      const ssize_t got = ::read(STDIN_FILENO, part.data(), part.size());
+      if (got < 0) throw SceneError({kStandardInputName, 0, 0, {}}, "cannot be read");
+      if (got == 0) return all;
+      all.append(part.data(), static_cast<std::size_t>(got));
+      if (all.size() > kMostBytes) throw SceneError({kStandardInputName, 0, 0, {}}, "is longer than 256 MiB");
+    }
+  }();
+  return text;
 }
 
 SceneSource read_source(std::string_view text, const std::string& name, const fs::path& folder) {

@@ -20,8 +20,16 @@ struct SceneSource {
   Where locate(const std::string& path) const;
 };
 
+/// Stands for standard input where the command line names a scene file, and what messages call it.
+inline constexpr std::string_view kStandardInput = "-";
+inline constexpr const char* kStandardInputName = "<stdin>";
+
 /// The text of a file. Throws SceneError if it cannot be read.
 std::string read_text(const std::filesystem::path& file);
+
+/// All of standard input, which is read once and kept. Throws SceneError if it cannot be read or is longer
+/// than 256 MiB.
+const std::string& standard_input();
 
 /// Parses `text` and what it includes. Included files are sought beside the file that names them (`folder`
 /// for `text`). Objects are merged key by key and the including file wins; lists at the top are joined,

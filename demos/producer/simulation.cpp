@@ -26,7 +26,9 @@ sim::KeyframeTrack track_of(const Body& body) {
       .keys = {}, .interpolation = body.interpolation, .loop = body.loop, .spin = body.spin};
   for (const BodyKey& key : body.keyframes)
     track.keys.push_back(
-        {key.time, {key.position.value_or(body.position), key.orientation.value_or(body.orientation)}});
+        {key.time,
+         {key.position.value_or(body.position), key.orientation.value_or(body.orientation)},
+         key.interpolation});
   return track;
 }
 
@@ -132,6 +134,9 @@ Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
   std::map<std::string, sim::ClothHandle> cloths;
   for (const auto& [name, handle] : cloths_) cloths.emplace(name, handle);
   overlays_.emplace(scene, world_, bodies_, cloths);
+  prewarm_pieces_ = static_cast<int>(std::ceil(sources_->prewarm() * scene.output.fps.per_second()));
+  // What is born at time 0 exists then.
+  if (prewarm_pieces_ == 0) prewarm(0, 0);
 }
 
 void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
@@ -282,12 +287,30 @@ sim::BodyHandle Simulation::body_named(const std::string& name) const {
   return it == bodies_.end() ? sim::BodyHandle{} : it->second;
 }
 
+void Simulation::prewarm(double from, double to) {
+  note(world_.prewarm(from, to, [&](Real start, Real end) { sources_->emit(world_, start, end); }));
+}
+
+SimulationTotals Simulation::totals() const {
+  constexpr Real kRounding = 1e-9;
+  SimulationTotals all = totals_;
+  all.step_s = scene_.world.step;
+  for (const sim::BodyOverlap& overlap : world_.overlaps(kRounding))
+    all.penetration = std::max(all.penetration, overlap.depth);
+  return all;
+}
+
 void Simulation::step(double sampling_time) {
   const sim::StepReport report = world_.step(sampling_time, [&](Real start, Real end) {
     if (on_substep_) on_substep_(start);
     overlays_->record(world_);
     sources_->emit(world_, start, end);
   });
+  for (const sim::MovedBody& moved : world_.moved()) moving_poses_[slot_of_.at(moved.body)] = moved.pose;
+  note(report);
+}
+
+void Simulation::note(const sim::StepReport& report) {
   totals_.add(report);
   totals_.contacts = world_.contacts().size();
   totals_.most_contacts = std::max(totals_.most_contacts, totals_.contacts);
@@ -298,7 +321,11 @@ void Simulation::step(double sampling_time) {
     totals_.broken_joints.push_back(world_.joint_def(broken).name);
   for (const sim::BodyHandle lost : report.bodies_retired)
     totals_.lost_bodies.push_back(world_.body_def(lost).name);
-  for (const sim::MovedBody& moved : world_.moved()) moving_poses_[slot_of_.at(moved.body)] = moved.pose;
+  for (const sim::RoughContact& rough : report.rough_contacts) {
+    if (totals_.rough_bodies.empty()) totals_.first_rough_s = world_.time();
+    const sim::BodyDef &a = world_.body_def(rough.a), &b = world_.body_def(rough.b);
+    ++totals_.rough_bodies[a.motion == sim::MotionType::dynamic ? a.name : b.name];
+  }
 
   if (!report.finite)
     throw DivergedError(
@@ -308,22 +335,31 @@ void Simulation::step(double sampling_time) {
         state_dump(report.non_finite));
 }
 
+int Simulation::skipped_pieces() const {
+  return static_cast<int>(std::ceil(scene_.output.start * scene_.output.fps.per_second()));
+}
+
 void Simulation::advance() {
   // What comes before frame 1 is stepped in frame-sized pieces too, so that a caller can stop in between.
-  const int pieces = static_cast<int>(std::ceil(scene_.output.start * scene_.output.fps));
+  if (prewarmed_pieces_ < prewarm_pieces_) {
+    const double piece = sources_->prewarm() / prewarm_pieces_;
+    const int left = prewarm_pieces_ - ++prewarmed_pieces_;
+    return prewarm(-piece * (left + 1), -piece * left);
+  }
+  const int pieces = skipped_pieces();
   if (skipped_pieces_ < pieces) {
     step(scene_.output.start / pieces);
     ++skipped_pieces_;
     return;
   }
-  if (frame_ > 0) step(1 / scene_.output.fps);
+  if (frame_ > 0) step(scene_.output.fps.seconds(1));
   ++frame_;
 }
 
 Snapshot Simulation::snapshot() const {
   Snapshot snapshot;
   snapshot.frame = frame_;
-  snapshot.time = scene_.output.start + (frame_ - 1) / scene_.output.fps;
+  snapshot.time = scene_.output.time_of(frame_);
   for (const sim::Pose& pose : moving_poses_)
     snapshot.bodies.push_back({pose.position.cast<float>(), pose.orientation.cast<float>()});
 

@@ -34,16 +34,16 @@ class DivergedError : public std::runtime_error {
 struct SimulationTotals {
   uint64_t substeps = 0, born = 0, expired = 0, retired = 0, ejected = 0, removed = 0,
            particle_collisions = 0, truncated = 0;
-  uint64_t waiting = 0, skipped = 0;     ///< of the emitters
+  uint64_t waiting = 0, skipped = 0;       ///< of the emitters
   std::vector<std::string> broken_joints;  ///< in the order in which they broke
   sim::Real joint_error = 0;               ///< greatest that was left of a constraint [m], [rad]
   uint64_t joints_unsolved = 0;            ///< times that joints could not be put back together
-  std::vector<std::string> lost_bodies;  ///< left the world's bounds and were frozen there
+  std::vector<std::string> lost_bodies;    ///< left the world's bounds and were frozen there
 
   uint32_t bodies_awake = 0, bodies_asleep = 0, islands = 0;  ///< at the end
   std::size_t contacts = 0;                                   ///< points where bodies touch, at the end
   std::size_t most_contacts = 0;                              ///< at the end of a frame
-  sim::Real penetration = 0;                                  ///< greatest of the run [m]
+  sim::Real penetration = 0;                                  ///< greatest of the run and at its end [m]
   uint64_t collisions = 0, tracebacks = 0, cut_short = 0, settled = 0, foreseen = 0;
   uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
 
@@ -53,10 +53,12 @@ struct SimulationTotals {
   uint64_t cloth_moves_limited = 0, cloth_moves_held_back = 0, cloth_crossings = 0, cloth_springs_torn = 0,
            cloth_unconverged = 0;
   sim::ContactWork exact, fast, impacts;
+  /// Bodies with approximate contact forces, and how often a solver had to fall back on them.
+  std::map<std::string, uint64_t> rough_bodies;
+  double first_rough_s = 0;  ///< the first time that one did [s]
+  double step_s = 0;         ///< longest internal step [s]
   sim::IntegratorReport integration;
 
-  /// Problems of contacts that the solvers meant for them did not solve.
-  uint64_t fallbacks() const { return exact.fallbacks + fast.fallbacks + impacts.fallbacks; }
   void add(const sim::StepReport& report);
 };
 
@@ -69,15 +71,17 @@ class Simulation {
   /// Called at the start of every internal step, with its time, if set: for traces.
   void on_substep(std::function<void(double time)> callback) { on_substep_ = std::move(callback); }
 
-  /// Advances by one frame. What `output.start` skips takes several calls, during which frame() is 0. Throws
-  /// DivergedError.
+  /// Advances by one frame. Prewarming and what `output.start` skips take several calls, during which frame()
+  /// is 0. Throws DivergedError.
   void advance();
   int frame() const { return frame_; }
+  /// How many calls of advance() it takes from the beginning to a frame.
+  int advances_to(int frame) const { return prewarm_pieces_ + skipped_pieces() + frame; }
 
   Snapshot snapshot() const;
 
   const sim::World& world() const { return world_; }
-  const SimulationTotals& totals() const { return totals_; }
+  SimulationTotals totals() const;
   std::size_t body_count() const { return world_.body_count(); }
 
   struct NamedBody {
@@ -111,7 +115,10 @@ class Simulation {
   void add_forces(const Scene& scene);
   sim::BodyHandle body_named(const std::string& name) const;
   sim::ParticleSystemHandle system_named(const std::string& name) const;
+  void prewarm(double from, double to);
   void step(double sampling_time);
+  int skipped_pieces() const;  // in which output.start is simulated
+  void note(const sim::StepReport& report);
 
   const Scene& scene_;
   sim::World world_;
@@ -128,7 +135,7 @@ class Simulation {
   std::optional<Overlays> overlays_;
   std::function<void(double)> on_substep_;
   SimulationTotals totals_;
-  int frame_ = 0, skipped_pieces_ = 0;
+  int frame_ = 0, skipped_pieces_ = 0, prewarm_pieces_ = 0, prewarmed_pieces_ = 0;
 };
 
 }  // namespace offstage::producer

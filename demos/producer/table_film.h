@@ -47,15 +47,18 @@ struct Table<CameraKey> {
         {"target", &CameraKey::target, "where it looks", "m"},
         {"fov_deg", &CameraKey::fov_deg, "field of view then; default: the camera's", "degrees",
          inside(0, 180)},
-        {"focus", &CameraKey::focus, "distance that is sharp then; default: the camera's", "m", kPositive}};
+        {"focus", &CameraKey::focus, "distance that is sharp then; default: the camera's", "m", kPositive},
+        {"interpolation", &CameraKey::interpolation, "from this key to the next; left out: the camera's"}};
   }
 };
 template <>
 struct Table<KeyframedCamera> {
   static constexpr const char* kName = "keyframed_camera";
-  static constexpr const char* kHelp = "A camera that moves smoothly through given views.";
+  static constexpr const char* kHelp = "A camera that moves through given views.";
   static Fields<KeyframedCamera> fields() {
-    return Fields<KeyframedCamera>{{"keyframes", &KeyframedCamera::keyframes, "at least one"}}
+    return Fields<KeyframedCamera>{
+        {"keyframes", &KeyframedCamera::keyframes, "at least one"},
+        {"interpolation", &KeyframedCamera::interpolation, kInterpolationHelp}}
         .with_base<Lens>();
   }
 };
@@ -182,14 +185,20 @@ struct Table<EnvironmentSettings> {
         {"ground", &T::ground,
          "below the horizon, and light from below; default: what sun and sky let the ground plane send back"},
         {"intensity", &T::intensity, "factor of sky and ambient light", "", kNotNegative},
-        {"fog", &T::fog, "density; a share exp(-fog * distance) of the light comes through", "1/m",
-         kNotNegative},
+        {"fog", &T::fog,
+         "density; a share exp(-fog * distance) of the light comes through. 0: nothing fades with distance, "
+         "except that an infinite plane goes over into the sky in the last quarter of a degree below its "
+         "horizon",
+         "1/m", kNotNegative},
         {"clouds", &T::clouds, "share of the sky that clouds cover", "", kShare},
         {"occlusion", &T::occlusion,
          "how far away things hide the sky from each other; 0: not at all; default: a tenth of the camera's "
          "distance",
          "m", kNotNegative},
-        {"background", &T::background, "the sky, or nothing: pictures with an alpha channel"}};
+        {"background", &T::background,
+         "the sky, or nothing. Frames of a scene with the sky have no alpha channel, those of a "
+         "`transparent` one "
+         "all have one"}};
   }
 };
 template <>
@@ -238,7 +247,8 @@ struct Table<OutputSettings> {
   static Fields<OutputSettings> fields() {
     using T = OutputSettings;
     return {
-        {"fps", &T::fps, "frames per second", "1/s", between(1, 1000)},
+        {"fps", &T::fps, "frames per second: a number, or an exact fraction such as \"30000/1001\"", "1/s",
+         between(1, 1000)},
         {"duration", &T::duration, "length of the film", "s", over(0, 86400)},
         {"start", &T::start, "time of the first frame; what happens before is simulated and not shown", "s",
          between(0, 86400)},

@@ -136,7 +136,8 @@ struct Table<HandKey> {
   static constexpr const char* kHelp = "Where a hand is at a time.";
   static Fields<HandKey> fields() {
     return {{"time", &HandKey::time, "when; times must increase", "s"},
-            {"position", &HandKey::position, "where", "m"}};
+            {"position", &HandKey::position, "where", "m"},
+            {"interpolation", &HandKey::interpolation, "from this key to the next; left out: the grab's"}};
   }
 };
 template <>
@@ -153,7 +154,8 @@ struct Table<Grab> {
             {"particles", &T::particles, kParticlesHelp},
             {"cloths", &T::cloths, "names of cloths"},
             {"point", &T::point, "where it is held, in the body's frame", "m"},
-            {"keyframes", &T::keyframes, "places of the hand, smooth in between; at least one"},
+            {"keyframes", &T::keyframes, "places of the hand; at least one"},
+            {"interpolation", &T::interpolation, kInterpolationHelp},
             {"stiffness", &T::stiffness, "force per distance", "N/m", kNotNegative},
             {"damping", &T::damping, "force per speed against the hand", "N s/m", kNotNegative},
             {"reach", &T::reach, "particles and points of cloths farther away than this are left alone", "m",

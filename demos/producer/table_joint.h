@@ -22,7 +22,8 @@ struct Table<MotorKey> {
   static constexpr const char* kHelp = "A target at a time.";
   static Fields<MotorKey> fields() {
     return {{"time", &MotorKey::time, "when; times must increase", "s"},
-            {"target", &MotorKey::target, "as that of the motor"}};
+            {"target", &MotorKey::target, "as that of the motor"},
+            {"interpolation", &MotorKey::interpolation, "from this key to the next; left out: the motor's"}};
   }
 };
 template <>
@@ -34,7 +35,8 @@ struct Table<JointMotor> {
     return {{"mode", &T::mode, "what it works towards: a speed, or a position counted from that at time 0"},
             {"target", &T::target, "degrees or metres, or these per second; `keys` come before it"},
             {"keys", &T::keys, "targets over time"},
-            {"smooth", &T::smooth, "whether targets speed up and slow down between keys; else they change evenly"},
+            {"interpolation", &T::interpolation, kInterpolationHelp},
+            {"smooth", &T::smooth, "whether a `monotone` curve stands still at every key"},
             {"max_effort", &T::max_effort, "greatest torque or force; left out: whatever it takes", "N m or N",
              kNotNegative},
             {"stiffness", &T::stiffness, "of a position, per radian or metre; 0: firm", "N m or N/m", kNotNegative},

@@ -76,7 +76,8 @@ struct Table<ParticleBehaviour> {
         {"internal", &T::internal, "its particles collide with each other"},
         {"external", &T::external, "its particles collide with those of others that have this, too"},
         {"dies_on_hit", &T::dies_on_hit, "is removed at its first collision"},
-        {"integrator", &T::integrator, "method, for particles without springs"},
+        {"integrator", &T::integrator, "method, for particles without springs; `leapfrog` is of second order at the cost of one evaluation of the "
+         "forces, and stable for any drag"},
     };
   }
 };
@@ -163,15 +164,13 @@ struct Table<ParticleSource> {
 /// What is born from particles, of whatever kind they are.
 template <class T>
 Fields<T> with_offspring(Fields<T> fields) {
-  const Fields<T> offspring{
+  return std::move(fields).then({
       {"split", &T::split, "its particles throw off others of the same kind"},
       {"trails", &T::trails, "other particles that each of them leaves behind"},
       {"on_age", &T::on_age, "other particles born when one reaches an age"},
       {"on_collision", &T::on_collision, "other particles born where one hits something"},
       {"on_death", &T::on_death, "other particles born where one ends of age"},
-  };
-  fields.insert(fields.end(), offspring.begin(), offspring.end());
-  return fields;
+  });
 }
 template <>
 struct Table<TrailSource> {
@@ -217,10 +216,9 @@ struct Table<EventSource> {
   static constexpr const char* kHelp = "Particles that answer something that happens to a parent.";
   static Fields<EventSource> fields() {
     using T = EventSource;
-    Fields<T> all{{"name", &T::name,
-                   "follows the parent's and a slash; empty: on_collision_ or on_death_ and its index"}};
-    for (const Field<T>& field : event_fields<T>()) all.push_back(field);
-    return all;
+    return Fields<T>{{"name", &T::name,
+                      "follows the parent's and a slash; empty: on_collision_ or on_death_ and its index"}}
+        .then(event_fields<T>());
   }
 };
 template <>
@@ -229,10 +227,9 @@ struct Table<AgeSource> {
   static constexpr const char* kHelp = "Particles that are born when a parent reaches an age.";
   static Fields<AgeSource> fields() {
     using T = AgeSource;
-    Fields<T> all{{"name", &T::name, "follows the parent's and a slash; empty: on_age_ and its index"},
-                  {"age", &T::age, "of the parent", "s", kNotNegative}};
-    for (const Field<T>& field : event_fields<T>()) all.push_back(field);
-    return all;
+    return Fields<T>{{"name", &T::name, "follows the parent's and a slash; empty: on_age_ and its index"},
+                     {"age", &T::age, "of the parent", "s", kNotNegative}}
+        .then(event_fields<T>());
   }
 };
 
@@ -334,8 +331,9 @@ struct Table<Emitter> {
         {"end", &T::end, "of everything; the living live on", "s", kNotNegative},
         {"windows", &T::windows, "when `rate` and `count` release; empty: always"},
         {"prewarm", &T::prewarm,
-         "how long before `start` it has begun already; what is born before time 0 has flown freely "
-         "until then, past bodies",
+         "how long before `start` it has begun already; until time 0 particles live and collide while dynamic "
+         "bodies, cloths and particle groups stand still, kinematic bodies follow their keys, and forces are "
+         "those of time 0",
          "s", kNotNegative},
     }
                               .with_base<ParticleSource>()

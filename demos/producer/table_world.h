@@ -15,7 +15,7 @@ namespace offstage::producer {
 template <>
 struct Names<sim::IntegratorKind> {
   static constexpr std::array kNames = {
-      "explicit_euler", "symplectic_euler",  "midpoint",     "rk4",           "implicit_euler",
+      "explicit_euler", "symplectic_euler", "leapfrog", "midpoint", "rk4", "implicit_euler",
       "adaptive_euler", "adaptive_midpoint", "adaptive_rk4", "dormand_prince"};
 };
 template <>
@@ -179,7 +179,10 @@ struct Table<MeshFile> {
   static constexpr const char* kName = "mesh";
   static constexpr const char* kHelp = "A model file as a shape: its triangles collide and give the mass.";
   static Fields<MeshFile> fields() {
-    return {{"file", &MeshFile::file, "model file, or FILE#NODE for one of its nodes", kRequired},
+    return {{"file", &MeshFile::file,
+             "model file relative to the scene, or the name of one that comes with offstage; FILE#NODE is "
+             "one of its nodes",
+             kRequired},
             {"scale", &MeshFile::scale, "factor of its size", "", kPositive}};
   }
 };
@@ -249,10 +252,6 @@ struct Names<sim::MotionType> {
   static constexpr std::array kNames = {"static", "kinematic", "dynamic"};
 };
 template <>
-struct Names<sim::Interpolation> {
-  static constexpr std::array kNames = {"linear", "smooth"};
-};
-template <>
 struct Table<ModelLook> {
   static constexpr const char* kName = "model";
   static constexpr const char* kHelp = "A model file drawn instead of the body's shape.";
@@ -270,7 +269,8 @@ struct Table<BodyKey> {
   static Fields<BodyKey> fields() {
     return {{"time", &BodyKey::time, "when; times must increase", "s"},
             {"position", &BodyKey::position, "where; left out: the body's own", "m"},
-            {"orientation", &BodyKey::orientation, "how it is turned; left out: the body's own"}};
+            {"orientation", &BodyKey::orientation, "how it is turned; left out: the body's own"},
+            {"interpolation", &BodyKey::interpolation, "from this key to the next; left out: the body's"}};
   }
 };
 template <>
@@ -304,7 +304,7 @@ struct Table<Body> {
         {"visible", &T::visible, "is drawn"},
         {"casts_shadow", &T::casts_shadow, "throws a shadow"},
         {"keyframes", &T::keyframes, "poses over time; kinematic bodies only"},
-        {"interpolation", &T::interpolation, "between keyframes"},
+        {"interpolation", &T::interpolation, kInterpolationHelp},
         {"loop", &T::loop, "repeat the keyframes for ever; else hold the last"},
         {"spin", &T::spin, "constant rotation about the body's own axes; kinematic bodies only", "rad/s"},
     }

@@ -125,6 +125,30 @@ Description Codec<uint64_t>::describe(Catalogue&, const Spec& spec) {
   return describe_whole<uint64_t>(spec);
 }
 
+void Codec<render::FrameRate>::read(Reader& in, const Node& node, const Spec& spec, render::FrameRate& out) {
+  const std::string* text = node.as<std::string>();
+  if (!text && !node.as<int64_t>() && !node.as<double>())
+    return in.refuse(node, "a number or a fraction such as \"30000/1001\"");
+  if (!text) {
+    if (const auto v = in.number(node, spec)) out = render::frame_rate_of(*v);
+    return;
+  }
+  const auto rate = text->find('/') == std::string::npos ? std::nullopt : render::parse_frame_rate(*text);
+  if (!rate) return in.refuse(node, "a number or a fraction such as \"30000/1001\"");
+  if (!spec.limits.allows(rate->per_second())) return in.refuse(node, spec.limits.rule(spec.unit));
+  out = *rate;
+}
+Node Codec<render::FrameRate>::write(const render::FrameRate& value) {
+  if (value.denominator == 1) return value.per_second();
+  return value.text();
+}
+Description Codec<render::FrameRate>::describe(Catalogue&, const Spec& spec) {
+  Object number = {{"type", "number"}};
+  spec.limits.add_to(number);
+  const Object fraction = {{"type", "string"}, {"pattern", "^[0-9]{1,10}/[0-9]{1,7}$"}};
+  return {{{"oneOf", List{number, fraction}}}, "number or `\"n/d\"`"};
+}
+
 // --- vectors, orientations, colours ---
 
 Description describe_tuple(Description item, std::size_t size) {
@@ -211,10 +235,13 @@ float hex_share(std::string_view digits) {
 }
 
 std::optional<Eigen::Vector4f> parse_hex(std::string_view text) {
-  if (!text.starts_with('#') || (text.size() != 7 && text.size() != 9)) return {};
+  const bool brief = text.size() == 4 || text.size() == 5;  // one digit stands for two equal ones
+  if (!text.starts_with('#') || (!brief && text.size() != 7 && text.size() != 9)) return {};
+  const std::size_t digits = brief ? 1 : 2;
   Eigen::Vector4f rgba(0, 0, 0, 1);
-  for (std::size_t i = 0; 2 * i + 1 < text.size(); ++i) {
-    const float share = hex_share(text.substr(2 * i + 1, 2));
+  for (std::size_t i = 0; digits * i + 1 < text.size(); ++i) {
+    const std::string_view value = text.substr(digits * i + 1, digits);
+    const float share = hex_share(brief ? std::string(2, value.front()) : std::string(value));
     if (share < 0) return {};
     rgba[static_cast<Eigen::Index>(i)] = i < 3 ? render::srgb_decode(share) : share;
   }
@@ -224,7 +251,8 @@ std::optional<Eigen::Vector4f> parse_hex(std::string_view text) {
 }  // namespace
 
 void Codec<Color>::read(Reader& in, const Node& node, const Spec&, Color& out) {
-  constexpr std::string_view kAllowed = "\"#rrggbb\", \"#rrggbbaa\" or a list of 3 or 4 numbers";
+  constexpr std::string_view kAllowed =
+      "\"#rrggbb\", \"#rrggbbaa\", \"#rgb\", \"#rgba\" or a list of 3 or 4 numbers";
   if (const std::string* text = node.as<std::string>()) {
     if (const auto rgba = parse_hex(*text))
       out.rgba = *rgba;
@@ -252,7 +280,7 @@ Node Codec<Color>::write(const Color& color) {
   return list;
 }
 Description Codec<Color>::describe(Catalogue& all, const Spec&) {
-  const Object hex = {{"type", "string"}, {"pattern", "^#([0-9a-fA-F]{6}|[0-9a-fA-F]{8})$"}};
+  const Object hex = {{"type", "string"}, {"pattern", "^#([0-9a-fA-F]{3,4}|[0-9a-fA-F]{6}|[0-9a-fA-F]{8})$"}};
   Object light = {{"type", "number"}}, alpha = {{"type", "number"}};
   between(0, 1e6).add_to(light);
   kShare.add_to(alpha);

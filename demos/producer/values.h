@@ -57,11 +57,18 @@ struct Codec<Quat> {
   static Node write(const Quat& value);
   static Description describe(Catalogue& all, const Spec& spec);
 };
-/// "#rrggbb" or "#rrggbbaa" in sRGB, or [r, g, b] or [r, g, b, a], linear.
+/// "#rrggbb" or "#rrggbbaa" in sRGB, in short "#rgb" or "#rgba", or [r, g, b] or [r, g, b, a], linear.
 template <>
 struct Codec<Color> {
   static void read(Reader& in, const Node& node, const Spec& spec, Color& out);
   static Node write(const Color& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+/// A number, or a fraction such as "30000/1001".
+template <>
+struct Codec<render::FrameRate> {
+  static void read(Reader& in, const Node& node, const Spec& spec, render::FrameRate& out);
+  static Node write(const render::FrameRate& value);
   static Description describe(Catalogue& all, const Spec& spec);
 };
 /// A number, {"mean", "deviation", "min", "max", "clip"}, {"range": [a, b]} or {"curve": [[time, value],
@@ -72,6 +79,15 @@ struct Codec<Varying> {
   static Node write(const Varying& value);
   static Description describe(Catalogue& all, const Spec& spec);
 };
+
+template <>
+struct Names<sim::Interpolation> {
+  static constexpr std::array kNames = {"monotone", "smooth", "linear", "step"};
+};
+inline constexpr const char* kInterpolationHelp =
+    "between keys: `monotone` is a smooth curve of which each component stays between the values of its two "
+    "keys, and holds where these are equal; `smooth` (Catmull-Rom) is rounder and may swing beyond them; "
+    "`linear` has a constant velocity; `step` holds, and jumps at the next key";
 
 Description describe_vector(Description item, int size, bool nonzero);
 

@@ -65,10 +65,10 @@ Curve read_curve(Reader& in, const Node& node, const Spec& spec) {
   const auto read_key = [&](const Node& item) {
     const List* pair = in.list(item, "a pair of time and value", 2, 2);
     if (!pair) return;
-    auto& [t, v] = curve.keys.emplace_back();
-    in.within("0", [&] { Codec<Real>::read(in, (*pair)[0], time, t); });
-    in.within("1", [&] { Codec<Real>::read(in, (*pair)[1], key, v); });
-    if (const std::size_t n = curve.keys.size(); n > 1 && t <= curve.keys[n - 2].first)
+    std::pair<Real, Real>& added = curve.keys.emplace_back();
+    in.within("0", [&] { Codec<Real>::read(in, (*pair)[0], time, added.first); });
+    in.within("1", [&] { Codec<Real>::read(in, (*pair)[1], key, added.second); });
+    if (const std::size_t n = curve.keys.size(); n > 1 && added.first <= curve.keys[n - 2].first)
       in.fail(item.at, "times must increase");
   };
   in.keys(node, "curve", std::array{&key}, false, [&](std::size_t, const Node& value) {

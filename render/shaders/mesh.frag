@@ -43,11 +43,17 @@ void main() {
   s.emission *= texture(emission_texture, uv).rgb;
 #endif
   if (alpha < min_alpha) discard;
+  if (min_alpha > 0.5) alpha = 1.0;  // the opaque pass leaves no holes
   s.roughness = filtered_roughness(s.roughness, n);
+#ifdef ENDLESS
+  vec4 fog = fog_to(position, horizon_haze(smooth_normal, view));
+#else
+  vec4 fog = fog_to(position);
+#endif
 #ifdef MIRROR
   // Added to what was drawn already.
   vec4 scene = seen_in_mirror(position, n, view, s.roughness);
-  color = vec4(mirror_gain(s, n, view, open_sky(1.0 / gl_FragCoord.w), scene) * fog_to(position).w, 0.0);
+  color = vec4(mirror_gain(s, n, view, open_sky(1.0 / gl_FragCoord.w), scene) * fog.w, 0.0);
 #else
   vec3 albedo = s.albedo;
 #ifdef GLASS
@@ -60,7 +66,6 @@ void main() {
 #ifdef GLASS
   radiance += albedo * (material.glass.x * seen_through(position, n, view));
 #endif
-  radiance = apply_fog(radiance, position);
-  color = vec4(radiance * alpha, alpha);
+  color = vec4((radiance * fog.w + fog.rgb) * alpha, alpha);
 #endif
 }

@@ -1,11 +1,11 @@
-// Sprites and flakes, blended over the finished opaque picture.
+// Sprites and flakes, blended over what is behind them.
 layout(location = 0) in vec3 place;
 layout(location = 1) in vec4 light;
 layout(location = 2) in float reach;
 #if STYLE == 5
 layout(location = 3) flat in vec2 lobe;
 #endif
-layout(location = 1) uniform vec4 style;  // softness, stretch [s], lit, additive
+layout(location = 4) flat in vec2 rim;  // softness, additive
 layout(binding = 4) uniform sampler2D scene_depth;
 layout(location = 0) out vec4 color;
 
@@ -20,12 +20,12 @@ void main() {
 #if STYLE == 5
   // Three blunt corners, more or less.
   float c = dot(place.xy, lobe) * inversesqrt(dot(place.xy, place.xy) + 1e-6);
-  float alpha = light.a * coverage(place * (1.15 - 0.15 * c * (4.0 * c * c - 3.0)), style.x);
+  float alpha = light.a * coverage(place * (1.15 - 0.15 * c * (4.0 * c * c - 3.0)), rim.x);
 #else
-  float alpha = light.a * coverage(place, style.x);
+  float alpha = light.a * coverage(place, rim.x);
 #endif
 #if STYLE == 0
   alpha *= depth_fade(reach);
 #endif
-  color = vec4(radiance * alpha, alpha * (1.0 - style.w));
+  color = vec4(radiance * alpha, alpha * (1.0 - rim.y));
 }

@@ -5,7 +5,12 @@ layout(location = 2) in vec4 in_color;
 #ifdef SHADOW
 layout(location = 0) uniform mat4 shadow_clip_from_world;
 #endif
-layout(location = 1) uniform vec4 style;  // softness, stretch [s], lit, additive
+// Softness, stretch [s], lit, additive: sprites and flakes of several sets are drawn together.
+#if defined(SHADOW) || STYLE == 2
+layout(location = 1) uniform vec4 style;
+#else
+layout(location = 3) in vec4 style;
+#endif
 
 // The place on the quad in radii: across, up, and for a flake half the length of its axis, which up runs along.
 layout(location = 0) out vec3 place;
@@ -24,6 +29,7 @@ layout(location = 2) out float reach;        // radius
 #if STYLE == 5
 layout(location = 3) flat out vec2 lobe;     // direction of a flake's first corner
 #endif
+layout(location = 4) flat out vec2 rim;      // softness, additive
 #endif
 
 // The vector between viewer and particle, unit, and the width of a pixel or texel there.
@@ -118,6 +124,7 @@ void main() {
   // What comes close to the lens fades out before it is cut.
   light = vec4(in_color.rgb, alpha * saturate(0.5 * (gl_Position.w - uniforms.depth.z) / drawn));
   reach = drawn;
+  rim = vec2(style.x, style.w);
   if (style.z != 0.0) {
 #if STYLE == 0
     vec3 shine = puff_light(p, normalize(u * corner.x + w * corner.y + 0.7 * viewer.xyz), u, viewer.xyz, drawn);

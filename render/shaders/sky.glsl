@@ -32,14 +32,21 @@ vec3 horizon_color(vec3 direction) {
   return sky_gradient(level.y) + frame.glow.rgb * glow_profile(level);
 }
 
-// Light added on the way from a place to the eye, and in w the share of its own light that arrives: fog, and a haze that
-// only matters beyond a hundred metres, where it hides the ground's edge.
-vec4 fog_to(vec3 position) {
+// Light added on the way from a place to the eye, and in w the share of its own light that arrives, through fog and
+// another optical depth.
+vec4 fog_to(vec3 position, float more) {
   vec3 ray = position - frame.eye.xyz;
   float distance = length(ray);
-  float far = distance * (1.0 / 250.0);
-  float transmittance = exp(-(frame.zenith.w * distance + far * far));
+  float transmittance = exp(-(frame.zenith.w * distance + more));
   return vec4(horizon_color(ray / max(distance, 1e-6)) * (1.0 - transmittance), transmittance);
+}
+vec4 fog_to(vec3 position) { return fog_to(position, 0.0); }
+
+// The optical depth that hides the last quarter of a degree of an endless plane below its horizon, so that it meets the sky
+// without an edge and its pattern does not shimmer there. It depends on directions alone: scenes of any size look alike.
+float horizon_haze(vec3 normal, vec3 view) {
+  float near_horizon = 0.004 / max(abs(dot(normal, view)), 1e-6);
+  return near_horizon * near_horizon;
 }
 
 vec3 apply_fog(vec3 color, vec3 position) {

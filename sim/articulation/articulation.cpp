@@ -210,6 +210,45 @@ void Articulation::add_blows(std::span<const Vec6> impulses) {
   for (std::size_t j = 0; j < joints_.size(); ++j) joints_[j]->blow += wrench(j, impulses[j], motion_);
 }
 
+void Articulation::begin_impulses(Real time) {
+  response_time_ = time;
+  is_placed_ = false;
+}
+
+/// Of all links, to an impulse on one: what it does to that alone, and what the joints make of it.
+void Articulation::find_response(uint32_t link, const Vec6& impulse) {
+  if (!is_placed_) {
+    place(response_time_);
+    link_mobility_.assign(bodies_.size(), std::nullopt);
+    is_placed_ = true;
+  }
+  response_.assign(bodies_.size(), Vec6::Zero());
+  response_[link] = mobility_[link].velocity(impulse);
+  system_.relative(response_, change_);
+  for (Vec6& c : change_) c = -c;
+  system_.correct(change_, impulses_, response_);
+}
+
+Mat6 Articulation::link_mobility(uint32_t link) {
+  const std::lock_guard lock(responding_);
+  if (is_placed_ && link_mobility_[link]) return *link_mobility_[link];
+  Mat6 mobility;
+  for (Eigen::Index k = 0; k < 6; ++k) {
+    find_response(link, Vec6::Unit(k));
+    mobility.col(k) = response_[link];
+  }
+  // Rounding leaves it not quite symmetric, and then an impulse could gain energy.
+  const Mat6 symmetric = (mobility + mobility.transpose()) / 2;
+  link_mobility_[link] = symmetric;
+  return symmetric;
+}
+
+void Articulation::respond(uint32_t link, const Vec6& impulse, std::span<Vec6> velocities) {
+  const std::lock_guard lock(responding_);
+  find_response(link, impulse);
+  for (std::size_t i = 0; i < velocities.size(); ++i) velocities[i] += response_[i];
+}
+
 void Articulation::count_turns(Real time) {
   if (std::none_of(joints_.begin(), joints_.end(), [](const Joint* j) { return counts_turns(*j); })) return;
   LinkMotion still_a, still_b;

@@ -4,11 +4,14 @@
 
 #include <array>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "sim/articulation/joint_system.h"
 #include "sim/body.h"
+#include "sim/dynamics/body_impulses.h"
 #include "sim/dynamics/force_field.h"
 
 namespace offstage::sim {
@@ -55,7 +58,7 @@ LinkMotion link_motion(const Body* body, Real time);
 /// Where a joint is on a body, from the point that link_motion() tells of.
 JointFrame link_frame(const Body* body, const JointFrame& in_body);
 
-class Articulation {
+class Articulation final : public JointedBodies {
  public:
   /// All joints of one connected component, of which each joins at least one dynamic body.
   explicit Articulation(std::vector<Joint*> joints);
@@ -91,6 +94,14 @@ class Articulation {
   void add_loads(std::span<const Vec6> impulses, Real duration);
   /// Or all at once.
   void add_blows(std::span<const Vec6> impulses);
+
+  /// A sub-step ends at this time; impulses on links are then those on the bodies as they are now. The system is
+  /// factored once, when the first link is asked for.
+  void begin_impulses(Real time);
+  Mat6 link_mobility(uint32_t link) override;
+  void respond(uint32_t link, const Vec6& impulse, std::span<Vec6> velocities) override;
+  std::size_t link_count() const override { return bodies_.size(); }
+
   /// Brings the coordinates that count whole turns up to date; at least once in half a turn.
   void count_turns(Real time);
 
@@ -122,6 +133,13 @@ class Articulation {
   std::vector<LinkMotion> motion_;
   std::vector<LinkMobility> mobility_;
   std::vector<Vec6> velocities_, change_, impulses_;
+
+  void find_response(uint32_t link, const Vec6& impulse);
+  std::mutex responding_;
+  std::vector<std::optional<Mat6>> link_mobility_;  // since begin_impulses(), of the links asked for
+  Real response_time_ = 0;
+  bool is_placed_ = false;  // since begin_impulses()
+  std::vector<Vec6> response_;
 };
 
 }  // namespace offstage::sim

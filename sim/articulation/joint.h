@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "sim/dynamics/interpolation.h"
 #include "sim/handle.h"
 #include "sim/types.h"
 
@@ -34,10 +35,11 @@ struct Motor {
   struct Key {
     Real time = 0;    ///< [s]
     Real target = 0;  ///< [rad/s] or [m/s], or [rad] or [m]
+    Interpolation interpolation = Interpolation::monotone;  ///< to the next key
   };
   Mode mode = Mode::none;
   std::vector<Key> targets = {};  ///< strictly increasing times; none: 0
-  bool smooth = false;  ///< between two of them it changes like a cubic that is at rest at both; else evenly
+  bool smooth = false;  ///< stops at every key: between two it changes like a cubic that is at rest at both
   Real max_effort = std::numeric_limits<Real>::infinity();  ///< [N m] or [N]
   /// Of a position: effort = stiffness (target - position) - damping speed. Stiffness 0: it is held, as firmly
   /// as max_effort allows.

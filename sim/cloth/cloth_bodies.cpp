@@ -62,6 +62,12 @@ void ClothBody::push(const Vec3& impulse, const Vec3& p) {
   gained_spin_ += dw;
 }
 
+void ClothBody::load(const Vec3& impulse, const Vec3& p) {
+  if (!pin_load_) pin_load_ = Reaction{way_.body, Vec3::Zero(), Vec3::Zero()};
+  pin_load_->impulse += impulse;
+  pin_load_->angular_impulse += (p - centre_).cross(impulse);
+}
+
 void ClothBody::pull(const Vec3& impulse, const Vec3& p, Real share) {
   const Vec3 gained = gained_, gained_spin = gained_spin_;
   push(impulse, p);

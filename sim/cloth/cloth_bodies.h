@@ -4,6 +4,7 @@
 /// on (as for particles, P8).
 
 #include <algorithm>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -42,6 +43,11 @@ class ClothBody {
   /// what the gain of velocity does in one. A body that followed later than it was pulled would gain energy.
   void pull(const Vec3& impulse, const Vec3& p, Real share);
 
+  /// What hangs on a pin pulls at a body that it does not move: one that is asleep.
+  void load(const Vec3& impulse, const Vec3& p);
+  /// Impulse and angular impulse of all that, in this sub-step of the world; empty: no pin.
+  const std::optional<Reaction>& pin_load() const { return pin_load_; }
+
   const Reaction& reaction() const { return reaction_; }
   /// A point of cloth touches it, which moves at this speed against it [m/s].
   void touch(Real speed) {
@@ -65,6 +71,7 @@ class ClothBody {
   Pose start_, end_;                                         // of that sub-step
   Real dt_ = 0, to_ = 0;                                     // of cloth's sub-step
   Reaction reaction_;
+  std::optional<Reaction> pin_load_;
 };
 
 }  // namespace offstage::sim

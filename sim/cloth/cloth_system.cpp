@@ -442,13 +442,17 @@ void ClothSystem::end_substep(Real dt) {
 /// start of the sub-step at once, by those of its end from the next on, by those between half.
 void ClothSystem::pull_bodies(Real dt) {
   for (const Held& held : held_) {
-    if (!held.body || !held.body->is_dynamic()) continue;
+    if (!held.body) continue;
     const ClothIntegrator integrator = cloths_[points_.cloth[held.point]]->def.integrator;
     const Real share = integrator == ClothIntegrator::implicit ? 0
                        : integrator == ClothIntegrator::rk4    ? 0.5
                                                                : 1;
     const Vec4 weight = dt * points_.mass[held.point] * points_.acceleration[held.point];
-    held.body->pull((points_.pull[held.point] / dt + weight).head<3>(), points_.at(held.point), share);
+    const Vec3 impulse = (points_.pull[held.point] / dt + weight).head<3>();
+    if (held.body->is_dynamic())
+      held.body->pull(impulse, points_.at(held.point), share);
+    else
+      held.body->load(impulse, points_.at(held.point));
   }
 }
 

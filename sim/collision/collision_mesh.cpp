@@ -10,6 +10,7 @@ namespace offstage::sim {
 CollisionMesh::CollisionMesh(TriangleMesh welded, std::optional<ConvexDecomposition> known)
     : mesh(std::move(welded)),
       topology(mesh),
+      surface(mesh, topology),
       mass(mass_properties(mesh)),
       tree(mesh),
       hull(convex_hull(mesh.vertices)),

@@ -8,6 +8,7 @@
 #include "sim/collision/bounding_tree.h"
 #include "sim/collision/clear_cells.h"
 #include "sim/collision/convex.h"
+#include "sim/collision/mesh_surface.h"
 #include "sim/geometry/convex_decomposition.h"
 #include "sim/geometry/mass_properties.h"
 #include "sim/geometry/mesh.h"
@@ -21,6 +22,7 @@ class CollisionMesh {
 
   TriangleMesh mesh;
   MeshTopology topology;
+  MeshSurface surface;  ///< around each triangle
   MassProperties mass;
   AabbTree tree;          ///< of the triangles
   ConvexPolyhedron hull;  ///< of the vertices

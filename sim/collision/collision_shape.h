@@ -29,6 +29,8 @@ class CollisionShape {
   /// Whether the pieces are triangles that bound a solid: then something can be inside of it that touches
   /// none.
   bool is_hollow() const { return triangles_ && solid_.mesh->solid; }
+  /// The mesh of which the pieces are the triangles; null if they are something else.
+  const CollisionMesh* surface() const { return triangles_ ? solid_.mesh : nullptr; }
   /// A convex solid around all pieces, as tight as can be. Not of a plane.
   const Convex& hull() const { return hull_; }
 

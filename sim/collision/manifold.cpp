@@ -63,38 +63,20 @@ struct Polygon {
 class Clipping {
  public:
   Clipping(const Body& reference_body, const SupportingFeature& reference, const Body& incident_body,
-           const SupportingFeature& incident, Real slop)
+           const SupportingFeature& incident)
       : reference_body_(reference_body),
         reference_(reference),
         incident_body_(incident_body),
         incident_(incident) {
     for (uint32_t k = 0; k < incident.count; ++k)
       part_.add({incident.corners[k].point, vertex_id(incident_body.name, incident.corners[k].tag), k});
-    for (uint32_t k = 0; k < reference.count && part_.count > 0; ++k) cut(k, slop);
   }
 
-  std::span<const Corner> corners() const { return {part_.corners.data(), part_.count}; }
-
- private:
-  uint32_t tag_of(const SupportingFeature& f, uint32_t corner) const {
-    return f.corners[corner % f.count].tag;
+  /// At all sides, beyond which points may be by `slop`.
+  void cut_all(Real slop) {
+    for (uint32_t k = 0; k < reference_.count && part_.count > 0; ++k) cut(k, slop);
   }
-  uint32_t side_id(const SupportingFeature& f, uint32_t k) const {
-    return edge_id(tag_of(f, k), tag_of(f, k + 1));
-  }
-
-  /// Two neighbouring sides of the reference face meet in its vertex.
-  uint32_t id_of_crossing(uint32_t side, uint32_t reference_side) const {
-    const uint32_t cut = side_id(reference_, reference_side);
-    if (side < kMaxCorners) return crossing_id(incident_body_.name, side_id(incident_, side), cut);
-    const uint32_t other = side - kMaxCorners;
-    if ((other + 1) % reference_.count == reference_side)
-      return vertex_id(reference_body_.name, tag_of(reference_, reference_side));
-    if ((reference_side + 1) % reference_.count == other)
-      return vertex_id(reference_body_.name, tag_of(reference_, other));
-    return mixed(side_id(reference_, other), cut);
-  }
-
+  /// At the k-th side.
   void cut(uint32_t k, Real slop) {
     const Vec3& corner = reference_.corners[k].point;
     const Vec3& next = reference_.corners[(k + 1) % reference_.count].point;
@@ -120,6 +102,28 @@ class Clipping {
     }
   }
 
+  std::span<const Corner> corners() const { return {part_.corners.data(), part_.count}; }
+
+ private:
+  uint32_t tag_of(const SupportingFeature& f, uint32_t corner) const {
+    return f.corners[corner % f.count].tag;
+  }
+  uint32_t side_id(const SupportingFeature& f, uint32_t k) const {
+    return edge_id(tag_of(f, k), tag_of(f, k + 1));
+  }
+
+  /// Two neighbouring sides of the reference face meet in its vertex.
+  uint32_t id_of_crossing(uint32_t side, uint32_t reference_side) const {
+    const uint32_t cut = side_id(reference_, reference_side);
+    if (side < kMaxCorners) return crossing_id(incident_body_.name, side_id(incident_, side), cut);
+    const uint32_t other = side - kMaxCorners;
+    if ((other + 1) % reference_.count == reference_side)
+      return vertex_id(reference_body_.name, tag_of(reference_, reference_side));
+    if ((reference_side + 1) % reference_.count == other)
+      return vertex_id(reference_body_.name, tag_of(reference_, other));
+    return mixed(side_id(reference_, other), cut);
+  }
+
   const Body& reference_body_;
   const SupportingFeature& reference_;
   const Body& incident_body_;
@@ -142,15 +146,27 @@ Real tilt(const Body& reference, const SupportingFeature& f, const Body& inciden
   return s.distance - gap <= tolerance ? sine : kNever;
 }
 
+/// Whether a solid's surface turns through its contact when it rolls.
+bool is_round(const Convex& c) {
+  using Core = Convex::Core;
+  return c.core == Core::point || c.core == Core::segment || c.core == Core::cylinder || c.core == Core::cone;
+}
+
 /// The incident feature over a face, which gives the normal. `closest` is the separation's point on the
-/// incident solid: of a rim it may be deeper than the corners that stand for it.
-void face_manifold(Manifold& m, const Body& reference, const SupportingFeature& face, const Body& incident,
-                   const SupportingFeature& other, const Vec3& closest, Real margin, Real slop,
+/// incident solid: of a rim it may be deeper than the corners that stand for it. A round solid is over the
+/// face where it faces it, and else has no points: the line that is nearest to the face's edge would be
+/// pushed along the face's normal although it rolls down to the face.
+void face_manifold(Manifold& m, const Body& reference, const SupportingFeature& face, Body incident,
+                   SupportingFeature other, const Vec3& closest, Real margin, Real slack, Real slop,
                    Manifold* more) {
   const Vec3 n = face.normal;
-  const bool on_a = reference.name == 0;
+  const bool on_a = reference.name == 0, round = is_round(incident.convex);
   m.normal = on_a ? Vec3(-n) : n;
   m.source = on_a ? NormalSource::face_of_a : NormalSource::face_of_b;
+  if (round) {
+    incident.outward = -n;
+    other = incident.feature(slack);
+  }
   const Real offset = n.dot(face.on_face) + reference.convex.radius;
   Candidates candidates;
   const auto add = [&](const Vec3& on_incident, uint32_t id) {
@@ -160,9 +176,11 @@ void face_manifold(Manifold& m, const Body& reference, const SupportingFeature& 
     candidates.add(on_a ? Candidate{on_reference, on_incident, separation, id}
                         : Candidate{on_incident, on_reference, separation, id});
   };
-  const Clipping part(reference, face, incident, other, slop);
+  Clipping part(reference, face, incident, other);
+  part.cut_all(slop);
   for (const Corner& c : part.corners()) add(c.point - incident.convex.radius * n, c.id);
-  if (candidates.count == 0 || n.dot(closest) - offset < candidates.least_separation() - slop)
+  const bool none = candidates.count == 0;
+  if (none ? !round : n.dot(closest) - offset < candidates.least_separation() - slop)
     add(closest, closest_id(incident.name));
   reduce(m, candidates, slop, more);
 }
@@ -246,19 +264,69 @@ Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const 
   if (std::min(tilt_a, tilt_b) <= kMaxTilt) {
     Manifold* const left_out = more ? &more->manifolds[0] : nullptr;
     if (by_a)
-      face_manifold(m, body_a, of_a, body_b, of_b, s.on_b, margin, slop, left_out);
+      face_manifold(m, body_a, of_a, body_b, of_b, s.on_b, margin, slack, slop, left_out);
     else
-      face_manifold(m, body_b, of_b, body_a, of_a, s.on_a, margin, slop, left_out);
-    return m;
+      face_manifold(m, body_b, of_b, body_a, of_a, s.on_a, margin, slack, slop, left_out);
+    if (m.count > 0) return m;
+    m = {};
+    m.normal = s.normal;
   }
   edge_manifold(m, body_a, body_b, s, margin, slack, tolerance);
   if (!more) return m;
   auto& [face, left_out] = more->manifolds;
   if (is_near(body_a, of_a) && (by_a || !is_near(body_b, of_b)))
-    face_manifold(face, body_a, of_a, body_b, of_b, s.on_b, margin, slop, &left_out);
+    face_manifold(face, body_a, of_a, body_b, of_b, s.on_b, margin, slack, slop, &left_out);
   else if (is_near(body_b, of_b))
-    face_manifold(face, body_b, of_b, body_a, of_a, s.on_a, margin, slop, &left_out);
+    face_manifold(face, body_b, of_b, body_a, of_a, s.on_a, margin, slack, slop, &left_out);
   for (Manifold& near : more->manifolds) drop_below(near, std::min(0.0, s.distance) + slop);
+  return m;
+}
+
+Manifold triangle_face_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, bool of_b,
+                                const Vec3& up, const std::array<Real, 3>& beyond, Real margin) {
+  Manifold m;
+  m.normal = of_b ? up : Vec3(-up);
+  m.source = of_b ? NormalSource::face_of_b : NormalSource::face_of_a;
+  const Body body_a{a, Mat3::Identity(), Vec3::Zero(), -m.normal, 0};
+  const Body body_b{b, a_from_b.orientation.toRotationMatrix(), a_from_b.position, m.normal, 1};
+  const Body &reference = of_b ? body_b : body_a, &incident = of_b ? body_a : body_b;
+  const Real rounding = kSeparationRounding * (a.reach() + b.reach()), slop = kRim * margin + rounding;
+  const SupportingFeature face = reference.feature(0), other = incident.feature(margin + rounding);
+  if (!face.is_face()) return m;
+
+  // The edges that the sides are, as seen from this side of the triangle.
+  std::array<Real, 3> room;
+  for (uint32_t k = 0; k < 3; ++k) {
+    const uint32_t from = face.corners[k].tag, to = face.corners[(k + 1) % 3].tag;
+    room[k] = slop + beyond[to == (from + 1) % 3 ? from : to];
+  }
+  const Real offset = up.dot(face.on_face);
+  const Vec3 deepest = incident.support(-up, other.vertex);
+  const Real level = up.dot(deepest) - offset + slop;
+  Candidates candidates;
+  const auto add = [&](const Vec3& p, uint32_t id, bool is_corner) {
+    const Real separation = up.dot(p) - offset;
+    if (separation > (is_corner ? margin : std::min(margin, level))) return;
+    const Vec3 on_face = p - separation * up;
+    candidates.add(of_b ? Candidate{p, on_face, separation, id} : Candidate{on_face, p, separation, id});
+  };
+  Clipping part(reference, face, incident, other);
+  bool is_before = true;
+  for (uint32_t k = 0; k < 3; ++k) {
+    part.cut(k, room[k]);
+    const Vec3& corner = face.corners[k].point;
+    const Vec3 inward = up.cross(face.corners[(k + 1) % 3].point - corner).normalized();
+    is_before &= inward.dot(deepest - corner) + room[k] >= 0;
+  }
+  for (const Corner& c : part.corners()) {
+    bool is_corner = false;
+    for (uint32_t k = 0; k < other.count; ++k)
+      is_corner |= c.id == vertex_id(incident.name, other.corners[k].tag);
+    add(c.point - incident.convex.radius * up, c.id, is_corner);
+  }
+  if (is_before && level - slop < candidates.least_separation() - slop)
+    add(deepest, closest_id(incident.name), true);
+  reduce(m, candidates, slop);
   return m;
 }
 

@@ -37,6 +37,10 @@ struct Manifold {
   /// axis, of a sharp edge or vertex nothing [m]. 0 for faces.
   Real radius_a = 0, radius_b = 0;
   uint32_t count = 0;
+  uint32_t piece_a = 0, piece_b = 0;  ///< of the shapes (CollisionShape::piece())
+  /// Whether the surface of A, of B is known to go on around the points as the normal says. Else other pieces
+  /// or bodies may be flush with it.
+  bool continues_a = false, continues_b = false;
   std::array<ContactPoint, 4> points;  ///< the deepest first
 };
 
@@ -60,6 +64,13 @@ struct MoreManifolds {
 /// `more`, if there is one, gets what of solids that turn may touch next and would otherwise go unseen.
 Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const Separation& s, Real margin,
                   MoreManifolds* more = nullptr);
+
+/// The manifold of a triangle whose face gives the normal, `up`, unit and away from the triangle, in A's
+/// frame, and of the other solid: of its supporting feature the corners that are before the face, and more of
+/// it as far as it lies level with its deepest point. `of_b`: the triangle is B. `beyond`: by how much the
+/// points may be outside of the edges (0,1), (1,2), (2,0) [m]. May have no points.
+Manifold triangle_face_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, bool of_b,
+                                const Vec3& up, const std::array<Real, 3>& beyond, Real margin);
 
 /// The same manifold in another frame, for instance world_from_a's.
 Manifold placed(const Manifold& m, const Pose& pose);

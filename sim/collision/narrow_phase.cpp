@@ -7,10 +7,11 @@
 #include "sim/collision/box_box.h"
 #include "sim/collision/sphere_manifold.h"
 #include "sim/collision/tree_pair.h"
+#include "sim/collision/triangle_contact.h"
+#include "sim/geometry/closest_points.h"
 
 namespace offstage::sim {
 namespace {
-
 
 Pose inverse(const Pose& p) {
   const Quat back = p.orientation.conjugate();
@@ -39,19 +40,151 @@ Separation plane_separation(const Convex& a, const Pose& a_from_plane) {
   return s;
 }
 
-/// The manifold of two pieces, in the quickest way there is for their cores.
-void find_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin, DistanceMethod method,
-                   PairCache& cache, std::pair<uint32_t, uint32_t> pieces, Manifold& m, MoreManifolds* more) {
-  using Core = Convex::Core;
-  if (is_sphere_pair(a, b)) {
-    sphere_manifold(a, Pose{}, b, a_from_b, margin, m);
-    return;
-  }
-  const bool boxes = a.core == Core::box && b.core == Core::box && a.radius == 0 && b.radius == 0;
-  if (boxes && box_manifold(a, b, a_from_b, margin, m, more)) return;
-  const Separation s = measure(a, b, a_from_b, method, cache.of(pieces.first, pieces.second));
-  if (s.distance <= margin) m = manifold(a, b, a_from_b, s, margin, more);
+/// On which side of a triangle the other piece is. As long as they are apart it is where the piece is seen
+/// from the triangle; `height`, of the piece's middle over its front, says so. One that penetrates it is
+/// where it was, or else where it is of the triangles around.
+template <class SideOfFace>
+int side_of(const SurfaceTriangle& t, Real height, bool apart, int before, SideOfFace&& side_of_face) {
+  const int seen = height >= 0 ? 1 : -1;
+  if (apart) return seen;
+  if (before != 0) return before;
+  for (const uint32_t next : t.mesh->surface.across(t.face))
+    if (const int side = next == kNoFace ? 0 : side_of_face(next)) return side;
+  return seen;
 }
+
+/// Two pieces of two shapes that are near each other, on their way to a manifold.
+class PiecePair {
+ public:
+  PiecePair(const CollisionShape& shape_a, uint32_t i, const CollisionShape& shape_b, uint32_t j,
+            const Pose& a_from_b, PairCache& cache)
+      : shape_a_(shape_a),
+        shape_b_(shape_b),
+        i_(i),
+        j_(j),
+        a_from_b_(a_from_b),
+        cache_(cache),
+        a_(shape_a.piece(i)),
+        b_(shape_b.piece(j)) {}
+
+  /// Finds the manifolds in the quickest way there is for the pieces' cores.
+  void find(Real margin, DistanceMethod method, bool turning, std::vector<Manifold>& found) {
+    const std::size_t before = found.size();
+    const CollisionMesh *mesh_a = shape_a_.surface(), *mesh_b = shape_b_.surface();
+    if (mesh_b && !mesh_a && a_.core == Convex::Core::point)
+      find_sphere({mesh_b, j_}, a_, Vec3::Zero(), a_from_b_, true, margin, found);
+    else if (mesh_a && !mesh_b && b_.core == Convex::Core::point)
+      find_sphere({mesh_a, i_}, b_, a_from_b_.position, Pose{}, false, margin, found);
+    else if (mesh_a || mesh_b)
+      find_triangles(margin, method, turning, found);
+    else
+      find_solids(margin, method, turning, found);
+    for (std::size_t k = before; k < found.size(); ++k) {
+      found[k].piece_a = i_;
+      found[k].piece_b = j_;
+      found[k].continues_a = continues(shape_a_, i_);
+      found[k].continues_b = continues(shape_b_, j_);
+    }
+  }
+
+ private:
+  /// A round surface, and the inside of one that is all known, has no seams.
+  static bool continues(const CollisionShape& shape, uint32_t piece) {
+    if (const CollisionMesh* mesh = shape.surface()) return !mesh->surface.is_at_border(piece);
+    return std::holds_alternative<Sphere>(*shape.solid().shape) ||
+           std::holds_alternative<Capsule>(*shape.solid().shape);
+  }
+
+  void find_solids(Real margin, DistanceMethod method, bool turning, std::vector<Manifold>& found) {
+    using Core = Convex::Core;
+    std::optional<MoreManifolds> more;
+    if (turning) more.emplace();
+    Manifold& m = found.emplace_back();
+    if (is_sphere_pair(a_, b_)) {
+      sphere_manifold(a_, Pose{}, b_, a_from_b_, margin, m);
+    } else {
+      const bool boxes = a_.core == Core::box && b_.core == Core::box && a_.radius == 0 && b_.radius == 0;
+      if (!boxes || !box_manifold(a_, b_, a_from_b_, margin, m, more ? &*more : nullptr)) {
+        const Separation s = measure(a_, b_, a_from_b_, method, cache_.of(i_, j_));
+        if (s.distance <= margin) m = manifold(a_, b_, a_from_b_, s, margin, more ? &*more : nullptr);
+      }
+    }
+    if (m.count == 0) found.pop_back();
+    if (!more) return;
+    for (const Manifold& extra : more->manifolds)
+      if (extra.count > 0) found.push_back(extra);
+  }
+
+  int known_side_of_a(uint32_t face) const {
+    const PairCache::Entry* e = cache_.find(face, j_);
+    return e ? e->side_of_a : 0;
+  }
+  int known_side_of_b(uint32_t face) const {
+    const PairCache::Entry* e = cache_.find(i_, face);
+    return e ? e->side_of_b : 0;
+  }
+
+  /// `centre` of the sphere and `mesh_pose` in A's frame.
+  void find_sphere(SurfaceTriangle triangle, const Convex& sphere, const Vec3& centre, const Pose& mesh_pose,
+                   bool of_b, Real margin, std::vector<Manifold>& found) {
+    if (triangle.mesh->surface.is_sliver(triangle.face)) return;
+    const Vec3 p = mesh_pose.point_to_body(centre);
+    const TrianglePoint nearest =
+        closest_on_triangle(p, triangle.corner(0), triangle.corner(1), triangle.corner(2));
+    const Real distance2 = (p - nearest.point).squaredNorm();
+    if (distance2 > (sphere.radius + margin) * (sphere.radius + margin)) return;
+    const Real height = triangle.normal().dot(p - triangle.corner(0));
+    triangle.side = height >= 0 ? 1 : -1;
+    if (distance2 < sphere.radius * sphere.radius) {
+      const auto known = [&](uint32_t face) { return of_b ? known_side_of_b(face) : known_side_of_a(face); };
+      triangle.side = side_of(triangle, height, false, known(triangle.face), known);
+      PairCache::Entry& e = cache_.of(i_, j_);
+      if (cache_.keeps_sides) (of_b ? e.side_of_b : e.side_of_a) = static_cast<int8_t>(triangle.side);
+    }
+    Manifold& m = found.emplace_back();
+    sphere_triangle_manifold(centre, sphere.radius, triangle, mesh_pose, of_b, margin, m);
+    if (m.count == 0) found.pop_back();
+  }
+
+  void find_triangles(Real margin, DistanceMethod method, bool turning, std::vector<Manifold>& found) {
+    PairTriangles triangles;
+    if (shape_a_.surface()) triangles.a.emplace(SurfaceTriangle{shape_a_.surface(), i_});
+    if (shape_b_.surface()) triangles.b.emplace(SurfaceTriangle{shape_b_.surface(), j_});
+    for (const auto* t : {&triangles.a, &triangles.b})
+      if (*t && (*t)->mesh->surface.is_sliver((*t)->face)) return;
+    PairCache::Entry& entry = cache_.of(i_, j_);
+    const Separation s = measure(a_, b_, a_from_b_, method, entry);
+    const bool apart = s.distance > 0;
+    // Of a normal along the triangle it is the middle of the other piece that says on which side it is.
+    const auto height = [&](const SurfaceTriangle& t, const Vec3& outward, const Vec3& middle) {
+      constexpr Real kAlongside = 0.01;
+      const Real lean = outward.dot(t.normal());
+      return apart && std::abs(lean) > kAlongside ? lean : t.normal().dot(middle - t.corner(0));
+    };
+    if (triangles.b) {
+      const Real h =
+          height(*triangles.b, a_from_b_.vector_to_body(s.normal), a_from_b_.point_to_body(a_.centre()));
+      triangles.b->side =
+          side_of(*triangles.b, h, apart, entry.side_of_b, [&](uint32_t f) { return known_side_of_b(f); });
+    }
+    if (triangles.a) {
+      const Real h = height(*triangles.a, -s.normal, a_from_b_.point_to_world(b_.centre()));
+      triangles.a->side =
+          side_of(*triangles.a, h, apart, entry.side_of_a, [&](uint32_t f) { return known_side_of_a(f); });
+    }
+    if (cache_.keeps_sides) {
+      if (triangles.a) entry.side_of_a = static_cast<int8_t>(triangles.a->side);
+      if (triangles.b) entry.side_of_b = static_cast<int8_t>(triangles.b->side);
+    }
+    find_triangle_manifolds(a_, b_, triangles, a_from_b_, s, margin, turning, found);
+  }
+
+  const CollisionShape &shape_a_, &shape_b_;
+  uint32_t i_, j_;
+  const Pose& a_from_b_;
+  PairCache& cache_;
+  Convex a_, b_;
+};
 
 /// How deep a shape is inside a hollow one that none of its pieces touches, as seen from the hollow one's
 /// frame: it is pushed out whole along the way that its centre has to the surface. None if it is outside.
@@ -95,16 +228,25 @@ std::optional<Separation> containment(const CollisionShape& a, const CollisionSh
 
 }  // namespace
 
+std::vector<PairCache::Used>::const_iterator PairCache::place_of(uint32_t piece_a, uint32_t piece_b) const {
+  return std::lower_bound(entries_.begin(), entries_.end(), std::pair(piece_a, piece_b),
+                          [](const Used& e, const std::pair<uint32_t, uint32_t>& key) {
+                            return std::pair(e.piece_a, e.piece_b) < key;
+                          });
+}
+
+const PairCache::Entry* PairCache::find(uint32_t piece_a, uint32_t piece_b) const {
+  const auto at = place_of(piece_a, piece_b);
+  return at != entries_.end() && at->piece_a == piece_a && at->piece_b == piece_b ? &*at : nullptr;
+}
+
 PairCache::Entry& PairCache::of(uint32_t piece_a, uint32_t piece_b) {
-  const auto at = std::lower_bound(entries_.begin(), entries_.end(), std::pair(piece_a, piece_b),
-                                   [](const Used& e, const std::pair<uint32_t, uint32_t>& key) {
-                                     return std::pair(e.piece_a, e.piece_b) < key;
-                                   });
+  const auto at = entries_.begin() + (place_of(piece_a, piece_b) - entries_.cbegin());
   if (at != entries_.end() && at->piece_a == piece_a && at->piece_b == piece_b) {
     at->used = true;
     return *at;
   }
-  return *entries_.insert(at, Used{{piece_a, piece_b, {}, {}}});
+  return *entries_.insert(at, Used{{.piece_a = piece_a, .piece_b = piece_b}});
 }
 
 void PairCache::forget_unused() {
@@ -153,14 +295,7 @@ void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose
   }
   const std::size_t before = manifolds.size();
   const auto visit = [&](uint32_t i, uint32_t j) {
-    std::optional<MoreManifolds> more;
-    if (turning) more.emplace();
-    find_manifold(a.piece(i), b.piece(j), a_from_b, margin, method, cache, {i, j}, manifolds.emplace_back(),
-                  more ? &*more : nullptr);
-    if (manifolds.back().count == 0) manifolds.pop_back();
-    if (!more) return;
-    for (const Manifold& m : more->manifolds)
-      if (m.count > 0) manifolds.push_back(m);
+    PiecePair(a, i, b, j, a_from_b, cache).find(margin, method, turning, manifolds);
   };
   if (a.piece_count() == 1 && b.piece_count() == 1)
     visit(0, 0);

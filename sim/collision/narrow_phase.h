@@ -28,16 +28,25 @@ class PairCache {
     uint32_t piece_a, piece_b;
     GjkCache gjk;
     VclipCache vclip;
+    /// Of pieces that are triangles: on which side of it the other piece is (SurfaceTriangle::side); 0 if it
+    /// is not known. What penetrates a triangle stays on the side from which it came.
+    int8_t side_of_a = 0, side_of_b = 0;
   };
   /// The entry of a pair of pieces, fresh if there was none. Valid until the next call.
   Entry& of(uint32_t piece_a, uint32_t piece_b);
+  /// The same if there is one, else null.
+  const Entry* find(uint32_t piece_a, uint32_t piece_b) const;
   /// Forgets the pieces that were not asked for since the last call.
   void forget_unused();
+
+  /// Whether the shapes are where they really were: only then are sides kept.
+  bool keeps_sides = true;
 
  private:
   struct Used : Entry {
     bool used = true;
   };
+  std::vector<Used>::const_iterator place_of(uint32_t piece_a, uint32_t piece_b) const;
   std::vector<Used> entries_;  // ascending by pieces
 };
 

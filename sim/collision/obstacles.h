@@ -52,6 +52,8 @@ struct Obstacle {
   Mat3 inverse_inertia =
       Mat3::Zero();  ///< about the centre of mass, world axes at the end of the sub-step [1/(kg m^2)]
   Vec3 centre = Vec3::Zero();  ///< of mass, in the solid's frame
+  /// Of a dynamic one: velocity of the centre of mass and angular velocity at the end of the sub-step, world.
+  Vec3 end_velocity = Vec3::Zero(), end_spin = Vec3::Zero();
 };
 
 /// What a particle did to a body.

@@ -119,6 +119,7 @@ SupportingFeature triangle_face(const Convex& c, const Vec3& d, Real slack) {
     const uint32_t corner = front ? k : 2 - k;
     f.add(*c.corners[corner], corner);
   }
+  f.on_face = f.corners[0].point;
   return f;
 }
 

@@ -12,21 +12,31 @@
 
 #include "sim/contact/friction_lcp.h"
 #include "sim/contact/proximal_newton.h"
+#include "sim/contact/rough_collision.h"
 
 namespace offstage::sim {
 namespace {
 
 using Eigen::Vector2d;
 
-constexpr Real kRounding = 1e-13;   ///< of products of impulses and velocities
-constexpr int kArcs = 64;           ///< of the circle of directions, each searched for a change of sign
-constexpr int kHalvings = 60;       ///< of a bisection: to the last bit
-constexpr int kSolves = 30;         ///< of a cluster, to find the restitution that keeps the energy
-constexpr std::size_t kDense = 24;  ///< contacts of a cluster that are solved by pivoting
-constexpr Real kAcceptedResidual = 1e-6;  // of the velocities, for an impact
-constexpr uint32_t kCollisionSweeps = 2000;
-constexpr Real kResting = 1e-11;  ///< of the fastest approach: slower ones are left, equal ones are ties
-constexpr std::size_t kImpulses = 200;  ///< for each contact of a sequence
+constexpr Real kRounding = 1e-13;         ///< of products of impulses and velocities
+constexpr int kArcs = 64;                 ///< of the circle of directions, each searched for a change of sign
+constexpr int kHalvings = 60;             ///< of a bisection: to the last bit
+constexpr int kSolves = 20;               ///< of a cluster, to find the restitution that keeps the energy
+constexpr Real kKeptEnergy = 1e-9;        ///< of what restitution would add: so much may be lost instead
+constexpr std::size_t kDense = 24;        ///< contacts of a cluster that are solved by pivoting
+constexpr Real kAcceptedResidual = 1e-6;  ///< of the velocities, for an impact
+constexpr Real kRoughResidual = 1e-3;     ///< likewise: an answer with more than this left over is none
+constexpr uint32_t kCollisionSweeps = 200, kPlasticSweeps = 400;
+/// With a bounded effort: contacts that are still solved by pivoting; updates of single contacts, by sweeps
+/// or in a sequence (60 ns each); solutions to find the restitution; what one with joints may take [ns].
+constexpr std::size_t kFewContacts = 8, kUpdates = 6'000;
+constexpr int kBoundedSolves = 3;
+constexpr Real kJointBudget = 1e6;
+constexpr Real kResting = 1e-11;  ///< of the fastest approach of all: slower ones are left
+constexpr Real kTie = 1e-6;  ///< of the fastest approach left: contacts as fast but for this collide together
+/// For each contact of a sequence; with joints, where each takes a solution of the whole system.
+constexpr std::size_t kImpulses = 200, kJointedImpulses = 12;
 
 /// The impulse with normal part du_n and friction at its limit against the direction `d`; none if friction
 /// then pulls the points together faster than the normal impulse parts them.
@@ -150,15 +160,22 @@ Real approach(const Contact& c, std::span<const ContactBody> bodies) {
   return std::max(0.0, -c.relative_velocity(bodies).x());
 }
 
-/// Few contacts by pivoting; many by sweeps, whose impulses the proximal method takes further if need be;
-/// with joints by that alone.
+/// How much a solution may take: what it needs, or a bounded number of operations.
+enum class Effort : uint8_t { full, bounded };
+
+/// Few contacts by pivoting; many by sweeps, whose impulses the proximal method takes further if need be and
+/// if there is time; with joints by that alone.
 void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, const JointProblem& joints,
-                    ContactWork& work) {
+                    Effort effort, ContactWork& work) {
+  const bool is_bounded = effort == Effort::bounded;
   if (!joints.empty()) {
     for (Contact& c : contacts) c.is_guessed = false;
-    return work.add(*ProximalNewton().solve(bodies, contacts, joints));
+    const auto solved = ProximalNewton().solve(bodies, contacts, joints, is_bounded ? kJointBudget : kInfinity);
+    if (solved) return work.add(*solved);
+    for (Contact& c : contacts) c.impulse.setZero();
+    return work.add({.solves = 1, .fallbacks = 1, .residual = kInfinity});
   }
-  if (contacts.size() <= kDense) return work.add(solve_by_pivoting(bodies, contacts));
+  if (contacts.size() <= (is_bounded ? kFewContacts : kDense)) return work.add(solve_by_pivoting(bodies, contacts));
   const std::vector<ContactBody> before(bodies.begin(), bodies.end());
   Real fastest = 0;
   for (Contact& c : contacts) {
@@ -166,10 +183,11 @@ void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, 
     c.is_guessed = true;
     fastest = std::max(fastest, c.relative_velocity(bodies).cwiseAbs().maxCoeff());
   }
-  const uint32_t sweeps = relax(bodies, contacts, kCollisionSweeps, kRounding * fastest);
+  const auto most = is_bounded ? static_cast<uint32_t>(kUpdates / contacts.size()) : kCollisionSweeps;
+  const uint32_t sweeps = relax(bodies, contacts, most, kRounding * fastest);
   const Real left = residual(bodies, contacts);
   work.add({.solves = 1, .iterations = sweeps, .residual = left});
-  if (left <= kAcceptedResidual * fastest) return;
+  if (is_bounded || left <= kAcceptedResidual * fastest) return;
   std::copy(before.begin(), before.end(), bodies.begin());
   work.add(*ProximalNewton().solve(bodies, contacts));
   --work.solves;
@@ -179,51 +197,101 @@ void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, 
 class Cluster {
  public:
   Cluster(std::span<ContactBody> bodies, std::span<Contact> contacts, std::span<const Real> restitution,
-          const JointProblem& joints)
+          const JointProblem& joints, Effort effort)
       : bodies_(bodies),
         contacts_(contacts),
         restitution_(restitution),
         joints_(joints),
+        effort_(effort),
         before_(bodies.begin(), bodies.end()) {
     for (const Contact& c : contacts) velocities_.push_back(c.relative_velocity(bodies));
   }
 
-  // Without restitution p.u+ <= 0 at each contact, and then the sum of p.(u + u+) / 2 is negative: the
-  // bisection has a lower end.
   ContactWork solve() {
     ContactWork work = solve_with(1);
-    Real low = 0, high = 1;
-    if (!adds_energy()) return work;
-    work.softened = 1;
-    for (int k = 0; k < kSolves; ++k) {
-      const Real middle = (low + high) / 2;
-      work.add(solve_with(middle));
-      (adds_energy() ? high : low) = middle;
-    }
-    work.add(solve_with(low));
-    work.solves = 1;
-    if (adds_energy()) shrink();
+    if (!is_solved(work)) return solve_plastic(work);
+    if (const Real energy = added_energy(); energy > 0) return soften(work, energy);
     return work;
   }
 
  private:
   ContactWork solve_with(Real factor) {
     std::copy(before_.begin(), before_.end(), bodies_.begin());
-    for (std::size_t i = 0; i < contacts_.size(); ++i)
+    fastest_ = 0;
+    for (std::size_t i = 0; i < contacts_.size(); ++i) {
       contacts_[i].target = std::max(0.0, -factor * restitution_[i] * velocities_[i].x());
+      fastest_ = std::max(fastest_, velocities_[i].norm());
+    }
     ContactWork work;
-    solve_together(bodies_, contacts_, joints_, work);
+    solve_together(bodies_, contacts_, joints_, effort_, work);
     return work;
   }
 
-  bool adds_energy() const {
-    Real energy = 0, size = 0;
-    for (std::size_t i = 0; i < contacts_.size(); ++i) {
-      const Vec3 &p = contacts_[i].impulse, &u = velocities_[i];
-      energy += p.dot(u + contacts_[i].relative_velocity(bodies_)) / 2;
-      size += p.norm() * u.norm();
+  /// What a bounded number of sweeps leaves is no failure: the contacts that still approach collide again.
+  bool is_solved(const ContactWork& work) const {
+    return work.residual <= kRoughResidual * fastest_ ||
+           (effort_ == Effort::bounded && joints_.empty() && contacts_.size() > kFewContacts);
+  }
+
+  /// With restitutions scaled down to where the energy stays: `energy` is what they add as they are. Without
+  /// restitution p.u+ <= 0 at each contact, and then the sum of p.(u + u+) / 2 is negative: the search has a
+  /// lower end. While the same contacts close and slide the energy is a parabola of the factor, which false
+  /// position finds the zero of in a few steps; halving the weight of an end that stays (the Illinois rule)
+  /// keeps it from creeping.
+  ContactWork soften(ContactWork work, Real energy) {
+    work.softened = 1;
+    struct End {
+      Real factor, energy;
+    } low{0, 0}, high{1, energy};
+    const Real enough = kKeptEnergy * energy;
+    Real factor = 0;
+    bool was_low = false, was_high = false;
+    for (int k = 0; k < (effort_ == Effort::bounded ? kBoundedSolves : kSolves); ++k) {
+      const ContactWork one = solve_with(factor);
+      work.add(one);
+      const Real added = added_energy();
+      if (!is_solved(one) || (k == 0 && added > 0)) return solve_plastic(work);
+      if (added <= 0) {
+        if (was_low) high.energy /= 2;
+        low = {factor, added};
+        if (added >= -enough) break;
+      } else {
+        if (was_high) low.energy /= 2;
+        high = {factor, added};
+      }
+      was_low = k > 0 && added <= 0;
+      was_high = added > 0;
+      factor = low.factor + (high.factor - low.factor) * low.energy / (low.energy - high.energy);
     }
-    return energy > kRounding * static_cast<Real>(kDense) * size;
+    if (factor != low.factor) work.add(solve_with(low.factor));
+    work.solves = 1;
+    if (added_energy() > 0) shrink();
+    return work;
+  }
+
+  /// Targets may contradict each other: a body cannot bounce off one face and be stopped by the opposite one.
+  /// Those of a plastic impact never do among bodies that are not driven; and whatever projected Gauss-Seidel
+  /// leaves of it from no impulses on, each of its steps dissipates.
+  ContactWork solve_plastic(ContactWork work) {
+    work.add(solve_with(0));
+    work.solves = work.fallbacks = 1;
+    work.residual = 0;
+    if (joints_.empty() && (residual(bodies_, contacts_) > kRoughResidual * fastest_ || added_energy() > 0)) {
+      std::copy(before_.begin(), before_.end(), bodies_.begin());
+      for (Contact& c : contacts_) c.impulse.setZero();
+      work.iterations += relax(bodies_, contacts_, kPlasticSweeps, kRounding * fastest_);
+    }
+    if (added_energy() > 0) shrink();
+    work.residual = residual(bodies_, contacts_);
+    return work;
+  }
+
+  /// What the impulses add to the kinetic energy, beyond rounding [J].
+  Real added_energy() const {
+    Real size = 0;
+    for (std::size_t i = 0; i < contacts_.size(); ++i)
+      size += contacts_[i].impulse.norm() * velocities_[i].norm();
+    return sim::added_energy(before_, bodies_, contacts_) - kRounding * static_cast<Real>(kDense) * size;
   }
 
   /// For an inexact answer: the energy of s p is s (p.u + s p.(u+ - u) / 2), zero at the largest s allowed.
@@ -248,8 +316,10 @@ class Cluster {
   std::span<Contact> contacts_;
   std::span<const Real> restitution_;
   const JointProblem& joints_;
+  Effort effort_;
   std::vector<ContactBody> before_;
   std::vector<Vec3> velocities_;
+  Real fastest_ = 0;  ///< of the velocities [m/s]
 };
 
 /// Sums up what several solutions do to the joints.
@@ -277,51 +347,108 @@ class JointSums {
   std::vector<Real> bounded_;
 };
 
-/// Impulses one at a time, the fastest approach first; those as fast but for rounding in order.
-ContactWork collide_in_sequence(std::span<ContactBody> bodies, std::span<Contact> contacts,
-                                std::span<const Real> restitution, const JointProblem& joints) {
-  ContactWork work{.solves = 1};
-  JointSums sums(joints);
-  Real still = 0;
-  for (Contact& c : contacts) {
-    still = std::max(still, kResting * approach(c, bodies));
-    c.impulse.setZero();
-    c.target = 0;
-  }
-  for (std::size_t count = 0; count < kImpulses * contacts.size(); ++count, ++work.iterations) {
-    Real fastest = 0;
-    std::size_t next = contacts.size();
-    for (std::size_t i = 0; i < contacts.size(); ++i)
-      if (approach(contacts[i], bodies) > fastest + still) fastest = approach(contacts[next = i], bodies);
-    if (next == contacts.size()) {
-      sums.write();
-      return work;
-    }
-    Contact& c = contacts[next];
-    if (!joints.empty()) {
-      const Vec3 before = c.impulse;
-      work.add(Cluster(bodies, std::span(&c, 1), restitution.subspan(next, 1), joints).solve());
-      c.impulse += before;
+/// Impulses in the order of the approaching speeds, the fastest first. Contacts that approach equally fast
+/// collide together, so that mirror images stay so and the order of the list does not matter.
+class Sequence {
+ public:
+  Sequence(std::span<ContactBody> bodies, std::span<Contact> contacts, std::span<const Real> restitution,
+           const JointProblem& joints, Effort effort)
+      : bodies_(bodies),
+        contacts_(contacts),
+        restitution_(restitution),
+        joints_(joints),
+        effort_(effort),
+        sums_(joints) {
+    for (Contact& c : contacts) {
+      still_ = std::max(still_, kResting * approach(c, bodies));
+      c.impulse.setZero();
       c.target = 0;
-      sums.add_last();
-      continue;
     }
-    const Vec3 u = c.relative_velocity(bodies);
-    const Vec3 p = collision_impulse(mobility(c, bodies), u, restitution[next], c.friction_t, c.friction_k);
-    c.impulse += p;
-    apply(c, p, bodies);
-    const Real missing = -restitution[next] * u.x() - c.relative_velocity(bodies).x();
-    work.softened += missing > kAcceptedResidual * u.norm();
   }
-  std::vector<Vec3> impulses;
-  for (const Contact& c : contacts) impulses.push_back(c.impulse);
-  solve_together(bodies, contacts, joints, work);
-  work.solves = 1;
-  sums.add_last();
-  sums.write();
-  for (std::size_t i = 0; i < contacts.size(); ++i) contacts[i].impulse += impulses[i];
-  return work;
-}
+
+  ContactWork solve() {
+    std::size_t most = (joints_.empty() ? kImpulses : kJointedImpulses) * contacts_.size();
+    if (effort_ == Effort::bounded) most = std::min(most, joints_.empty() ? kUpdates : kDense);
+    for (std::size_t count = 0; count < most; count += next_.size()) {
+      find_next();
+      if (next_.empty()) {
+        sums_.write();
+        return work_;
+      }
+      work_.iterations += next_.size();
+      if (joints_.empty() && are_apart())
+        for (const std::size_t i : next_) collide_alone(i);
+      else
+        collide_together();
+    }
+    end_at_once();
+    return work_;
+  }
+
+ private:
+  void find_next() {
+    next_.clear();
+    Real fastest = still_;
+    for (const Contact& c : contacts_) fastest = std::max(fastest, approach(c, bodies_));
+    if (!(fastest > still_)) return;
+    for (std::size_t i = 0; i < contacts_.size(); ++i)
+      if (approach(contacts_[i], bodies_) >= (1 - kTie) * fastest) next_.push_back(i);
+  }
+
+  /// Whether no two of the next contacts share a body that they move: then each is solved in closed form.
+  bool are_apart() {
+    hit_.clear();
+    for (const std::size_t i : next_)
+      for (const uint32_t body : {contacts_[i].a, contacts_[i].b})
+        if (bodies_[body].is_moved()) hit_.push_back(body);
+    std::sort(hit_.begin(), hit_.end());
+    return std::adjacent_find(hit_.begin(), hit_.end()) == hit_.end();
+  }
+
+  void collide_alone(std::size_t i) {
+    Contact& c = contacts_[i];
+    const Vec3 u = c.relative_velocity(bodies_);
+    const Vec3 p = collision_impulse(mobility(c, bodies_), u, restitution_[i], c.friction_t, c.friction_k);
+    c.impulse += p;
+    apply(c, p, bodies_);
+    const Real missing = -restitution_[i] * u.x() - c.relative_velocity(bodies_).x();
+    work_.softened += missing > kAcceptedResidual * u.norm();
+  }
+
+  void collide_together() {
+    std::vector<Contact> contacts;
+    std::vector<Real> restitution;
+    for (const std::size_t i : next_) {
+      contacts.push_back(contacts_[i]);
+      restitution.push_back(restitution_[i]);
+    }
+    work_.add(Cluster(bodies_, contacts, restitution, joints_, effort_).solve());
+    for (std::size_t k = 0; k < next_.size(); ++k) contacts_[next_[k]].impulse += contacts[k].impulse;
+    sums_.add_last();
+  }
+
+  /// A sequence without an end is cut off by a plastic impact of all contacts.
+  void end_at_once() {
+    std::vector<Vec3> impulses;
+    for (const Contact& c : contacts_) impulses.push_back(c.impulse);
+    const std::vector<Real> plastic(contacts_.size(), 0);
+    work_.add(Cluster(bodies_, contacts_, plastic, joints_, effort_).solve());
+    sums_.add_last();
+    sums_.write();
+    for (std::size_t i = 0; i < contacts_.size(); ++i) contacts_[i].impulse += impulses[i];
+  }
+
+  std::span<ContactBody> bodies_;
+  std::span<Contact> contacts_;
+  std::span<const Real> restitution_;
+  const JointProblem& joints_;
+  Effort effort_;
+  JointSums sums_;
+  ContactWork work_;
+  Real still_ = 0;
+  std::vector<std::size_t> next_;
+  std::vector<uint32_t> hit_;
+};
 
 }  // namespace
 
@@ -337,11 +464,30 @@ Vec3 collision_impulse(const Mat3& K, const Vec3& u, Real restitution, Real mu_t
   return impulse_for(K, u, low, mu_t, mu_k);
 }
 
+namespace {
+
+ContactWork collide_with(std::span<ContactBody> bodies, std::span<Contact> contacts,
+                         std::span<const Real> restitution, ImpactLaw law, const JointProblem& joints,
+                         Effort effort) {
+  if (contacts.empty()) return {};
+  ContactWork work = law == ImpactLaw::sequential
+                         ? Sequence(bodies, contacts, restitution, joints, effort).solve()
+                         : Cluster(bodies, contacts, restitution, joints, effort).solve();
+  work.solves = 1;
+  work.fallbacks = std::min<uint64_t>(work.fallbacks, 1);
+  return work;
+}
+
+}  // namespace
+
 ContactWork collide(std::span<ContactBody> bodies, std::span<Contact> contacts,
                     std::span<const Real> restitution, ImpactLaw law, const JointProblem& joints) {
-  if (contacts.empty()) return {};
-  if (law == ImpactLaw::sequential) return collide_in_sequence(bodies, contacts, restitution, joints);
-  return Cluster(bodies, contacts, restitution, joints).solve();
+  return collide_with(bodies, contacts, restitution, law, joints, Effort::full);
+}
+
+ContactWork collide_roughly(std::span<ContactBody> bodies, std::span<Contact> contacts,
+                            std::span<const Real> restitution, ImpactLaw law, const JointProblem& joints) {
+  return collide_with(bodies, contacts, restitution, law, joints, Effort::bounded);
 }
 
 }  // namespace offstage::sim

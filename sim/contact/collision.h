@@ -14,7 +14,9 @@ namespace offstage::sim {
 /// How the contacts of a cluster act on each other.
 enum class ImpactLaw : uint8_t {
   simultaneous,  ///< all impulses together, P_n >= 0 complementary to u_n >= -e u_n(before)
-  sequential     ///< one contact after the other, the fastest approach first: passes through Newton's cradle
+  /// One contact after the other, the fastest approach first, equally fast ones together: passes through
+  /// Newton's cradle.
+  sequential
 };
 
 /// The impulse on body a in the contact's frame (n, t, k) [N s] of a contact with mobility `K` [1/kg] whose

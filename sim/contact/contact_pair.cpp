@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "sim/collision/sphere_manifold.h"
+#include "sim/contact/contact_motion.h"
 
 namespace offstage::sim {
 namespace {
@@ -38,6 +40,11 @@ bool is_sphere_pair(Body& a, Body& b) {
   return is_sphere_pair(p.piece(0), q.piece(0));
 }
 
+/// A surface without edges.
+bool is_round(const Body& body) {
+  return std::holds_alternative<Sphere>(body.def.shape) || std::holds_alternative<Capsule>(body.def.shape);
+}
+
 Vec3 world_vector(const ContactFrame& f, const Vec3& v) {
   return v.x() * f.n + v.y() * f.t + v.z() * f.k;
 }
@@ -54,6 +61,10 @@ void place(const Manifold& local, const Pose& pose, Manifold& m) {
   m.radius_a = local.radius_a;
   m.radius_b = local.radius_b;
   m.count = local.count;
+  m.piece_a = local.piece_a;
+  m.piece_b = local.piece_b;
+  m.continues_a = local.continues_a;
+  m.continues_b = local.continues_b;
   for (uint32_t k = 0; k < local.count; ++k) {
     const ContactPoint& p = local.points[k];
     m.points[k] = {pose.point_to_world(p.on_a), pose.point_to_world(p.on_b), p.separation, p.id};
@@ -85,16 +96,102 @@ Weights weights(const Manifold& m, const ContactFrame& frame, const Pose& a, con
   return result;
 }
 
-/// Of the material point that is at a place of the world when the interval begins, without contacts: the mean
-/// of its ends.
-Vec3 free_velocity(const Body& body, const Vec3& place) {
-  if (!body.is_awake()) return body.start_velocity(place);
-  const Twist mean{(body.start_twist.velocity + body.rigid.velocity()) / 2,
-                   (body.start_twist.angular_velocity + body.rigid.angular_velocity()) / 2};
-  return mean.at(place - body.start.position);
+/// A rim over a face. A manifold has a disc as a polygon; where the disc leans, its lowest point is between
+/// two corners, and the corner that stands for it would make the contact jump along the rim. And the corners
+/// beside it get down by the contact's running along the rim, not by going on as they move at the start.
+class LeaningRim {
+ public:
+  /// `core` is the shape's frame in the manifold's, `out` the direction towards the face.
+  LeaningRim(const Shape& shape, const Pose& core, const Vec3& out) : core_(core) {
+    if (!std::holds_alternative<Cylinder>(shape) && !std::holds_alternative<Cone>(shape)) return;
+    const Vec3 facing = core.vector_to_body(out);
+    const Real lean = std::hypot(facing.x(), facing.z());
+    if (lean > kLeast) facing_ = {facing.x() / lean, facing.z() / lean};
+  }
+  bool leans() const { return facing_ != Eigen::Vector2d::Zero(); }
+
+  /// Points next to the meridian that faces the other body are moved there.
+  Vec3 lowered(const Vec3& place) const {
+    const Vec3 local = core_.point_to_body(place);
+    const Real radius = std::hypot(local.x(), local.z());
+    if (towards(local) < kNearest * radius) return place;
+    return core_.point_to_world({radius * facing_.x(), local.y(), radius * facing_.y()});
+  }
+  /// Whether a point is beside the lowest one of the same rim.
+  bool is_beside(const Vec3& place, const Vec3& lowest) const {
+    const Vec3 local = core_.point_to_body(place), low = core_.point_to_body(lowest);
+    const Real radius = std::hypot(low.x(), low.z());
+    return towards(low) > kNearest * radius && towards(local) > 0 &&
+           std::abs(local.y() - low.y()) < kSameHeight * radius &&
+           (local - low).norm() > kSameHeight * radius;
+  }
+
+ private:
+  /// Cosine of half the angle between corners; sine of the least lean; of the radius.
+  static constexpr Real kNearest = 0.9951847, kLeast = 0.02, kSameHeight = 1e-6;
+  Real towards(const Vec3& local) const { return local.x() * facing_.x() + local.z() * facing_.y(); }
+
+  Pose core_;
+  Eigen::Vector2d facing_ = Eigen::Vector2d::Zero();
+};
+
+/// Of a manifold in a's frame.
+void follow_rims(Manifold& m, const Body& a, const Body& b, const Pose& a_from_b) {
+  const bool on_a = m.source == NormalSource::face_of_b, on_b = m.source == NormalSource::face_of_a;
+  if (!on_a && !on_b) return;
+  const LeaningRim rim =
+      on_a ? LeaningRim(a.def.shape, Pose{}, -m.normal) : LeaningRim(b.def.shape, a_from_b, m.normal);
+  if (!rim.leans()) return;
+  const auto on_rim = [on_a](ContactPoint& p) -> Vec3& { return on_a ? p.on_a : p.on_b; };
+  uint32_t lowest = 0;
+  for (uint32_t k = 0; k < m.count; ++k) {
+    ContactPoint& p = m.points[k];
+    const Vec3 moved = rim.lowered(on_rim(p));
+    // The face is flat: what the point goes along the normal, the separation changes by.
+    p.separation += (on_a ? 1 : -1) * m.normal.dot(moved - on_rim(p));
+    on_rim(p) = moved;
+    (on_a ? p.on_b : p.on_a) =
+        on_a ? Vec3(moved - p.separation * m.normal) : Vec3(moved + p.separation * m.normal);
+    if (p.separation < m.points[lowest].separation) lowest = k;
+  }
+  const Vec3 low = m.count > 0 ? on_rim(m.points[lowest]) : Vec3(Vec3::Zero());
+  const uint32_t count = std::exchange(m.count, 0);
+  for (uint32_t k = 0; k < count; ++k)
+    if (!rim.is_beside(on_rim(m.points[k]), low)) m.points[m.count++] = m.points[k];
 }
 
+/// Of the material point at an arm, without contacts: the mean of its ends.
+Vec3 free_velocity(const Body& body, const Vec3& arm) {
+  if (!body.is_awake()) return body.is_kinematic() ? body.drive.at(arm) : Vec3(Vec3::Zero());
+  const Twist mean{(body.start_twist.velocity + body.rigid.velocity()) / 2,
+                   (body.start_twist.angular_velocity + body.rigid.angular_velocity()) / 2};
+  return mean.at(arm);
+}
+
+/// Where a body is when the interval begins and, if it moves freely, when it ends. The position is that of
+/// start_centre().
+struct Ends {
+  explicit Ends(const Body& body)
+      : start{start_centre(body), body.is_awake() ? body.start.orientation : body.start_pose.orientation},
+        end{body.is_awake() ? body.rigid.position : body.pose.position, body.pose.orientation} {}
+
+  Pose start, end;
+};
+
 }  // namespace
+
+bool is_narrow(const Manifold& m) {
+  if (m.count < 3) return true;
+  constexpr Real kNarrow = 5e-3;  // [m]
+  Real area = 0, longest2 = 0;
+  for (uint32_t k = 1; k < m.count; ++k) {
+    const Vec3 arm = m.points[k].on_a - m.points[0].on_a;
+    longest2 = std::max(longest2, arm.squaredNorm());
+    for (uint32_t i = k + 1; i < m.count; ++i)
+      area = std::max(area, std::abs(m.normal.dot(arm.cross(m.points[i].on_a - m.points[0].on_a))));
+  }
+  return area <= kNarrow * std::sqrt(longest2);
+}
 
 ContactPair::ContactPair(Body& a, Body& b, const PairSurface& surface)
     : a_(&a),
@@ -108,12 +205,39 @@ void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_wit
   separation_ = std::numeric_limits<Real>::infinity();
   touching_ = 0;
   foreseen = 0;
-  for (const PlacedManifold& m : placed_)
+  at_end_.clear();
+  has_narrow_ = false;
+  for (const PlacedManifold& m : placed_) {
+    has_narrow_ |= !(m.manifold.continues_a && m.manifold.continues_b) && is_narrow(m.manifold);
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const Real separation = m.manifold.points[k].separation;
       separation_ = std::min(separation_, separation);
       touching_ += separation <= kTouching;
     }
+  }
+  deepest = std::max(deepest, -separation_);
+}
+
+void ContactPair::replace(uint32_t i, const Manifold& m) {
+  placed_[i].manifold = m;
+  if (i < found_.size()) place(m, between(placed_at_, Pose{}), found_[i]);
+  if (m.count == 0) return;
+  set_frame(placed_[i]);
+  placed_[i].forces = {};
+}
+
+void ContactPair::drop_empty() {
+  const auto is_empty = [](const Manifold& m) { return m.count == 0; };
+  const std::size_t known = placed_.size() - foreseen;
+  for (std::size_t i = 0, kept = 0; i < foreseen; ++i)
+    if (!is_empty(placed_[known + i].manifold)) at_end_[kept++] = at_end_[i];
+  const auto foreseen_left = static_cast<std::size_t>(
+      std::count_if(placed_.begin() + static_cast<std::ptrdiff_t>(known), placed_.end(),
+                    [&](const PlacedManifold& m) { return !is_empty(m.manifold); }));
+  foreseen = static_cast<uint8_t>(foreseen_left);
+  at_end_.resize(foreseen);
+  std::erase_if(found_, is_empty);
+  std::erase_if(placed_, [&](const PlacedManifold& m) { return is_empty(m.manifold); });
 }
 
 void ContactPair::find_points(const Pose& a, const Pose& b, Real margin, Real reuse_within, bool turning) {
@@ -125,6 +249,7 @@ void ContactPair::find_points(const Pose& a, const Pose& b, Real margin, Real re
   }
   if (has_sphere_) {
     found_margin_ = margin;
+    placed_at_ = a;
     return find_one_point(a, b, margin);
   }
   // Pairs are found side by side; what they need for a moment is each thread's own.
@@ -143,6 +268,7 @@ void ContactPair::find_points(const Pose& a, const Pose& b, Real margin, Real re
   find_manifolds(a_->collision_shape(), b_->collision_shape(), a_from_b, margin, cache_, DistanceMethod::gjk,
                  found, turning);
   cache_.forget_unused();
+  for (Manifold& m : found) follow_rims(m, *a_, *b_, a_from_b);
   a_from_b_ = a_from_b;
   found_margin_ = margin;
   placed_.resize(found.size());
@@ -156,48 +282,86 @@ void ContactPair::find_points(const Pose& a, const Pose& b, Real margin, Real re
   found_.clear();
 }
 
-Vec3 ContactPair::free_way(const Vec3& point, Real duration) const {
-  return duration * (free_velocity(*a_, point) - free_velocity(*b_, point));
+Real ContactPair::free_way(const PlacedManifold& m, const Vec3& place, Real duration) const {
+  const ContactMotion motion = contact_motion(*a_, *b_, m.manifold, m.frame, place, duration, duration);
+  const Vec3 velocity = free_velocity(*a_, motion.middle.arm_a) - free_velocity(*b_, motion.middle.arm_b);
+  return duration * motion.frame.n.dot(velocity);
 }
 
-bool ContactPair::is_expected(const Vec3& normal, const Vec3& on_a, Real separation, Real duration) const {
+/// The contact of a wheel stays below it while its rim turns: a point found at the end is the same as one of
+/// the start if it lies where that one's feature gets to, on either body.
+bool ContactPair::is_expected(const Vec3& normal, const ContactPoint& at_end, Real duration) const {
+  const auto is_near = [&](const Body& body, const Vec3& before, const Vec3& after, const Vec3& out_before,
+                           const Vec3& out_after) {
+    const Ends ends(body);
+    const auto distance2 = [&](const Vec3& arm) { return (ends.end.position + arm - after).squaredNorm(); };
+    const Vec3 arm = before - ends.start.position;
+    return distance2(turned_arm(body, arm, ends.start.orientation, out_before, ends.end.orientation,
+                                out_after)) < kNear * kNear;
+  };
   for (const PlacedManifold& m : placed_) {
-    if (m.frame.n.dot(normal) < kSameNormal) continue;
+    const Vec3& n = m.frame.n;
+    if (n.dot(normal) < kSameNormal) continue;
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const ContactPoint& p = m.manifold.points[k];
-      if ((p.on_a - on_a).squaredNorm() > kNear * kNear) continue;
-      if (p.separation + m.frame.n.dot(free_way(p.on_a, duration)) < separation + kForeseen) return true;
+      if (!is_near(*a_, p.on_a, at_end.on_a, -n, -normal) && !is_near(*b_, p.on_b, at_end.on_b, n, normal))
+        continue;
+      if (p.separation + free_way(m, (p.on_a + p.on_b) / 2, duration) < at_end.separation + kForeseen)
+        return true;
     }
   }
   return false;
 }
 
+/// What meets at the interval's end, as it is at its start if each feature goes with its body.
+PlacedManifold ContactPair::brought_back(const Manifold& at_end, Real duration) const {
+  const Ends a(*a_), b(*b_);
+  const auto back = [](const Ends& body, const Vec3& v) {
+    return Vec3(body.start.vector_to_world(body.end.vector_to_body(v)));
+  };
+  PlacedManifold placed;
+  Manifold& m = placed.manifold;
+  m = at_end;
+  m.edge_a = back(a, at_end.edge_a);
+  m.edge_b = back(b, at_end.edge_b);
+  if (m.source == NormalSource::face_of_a) m.normal = back(a, at_end.normal);
+  if (m.source == NormalSource::face_of_b) m.normal = back(b, at_end.normal);
+  set_frame(placed);
+  const auto arm = [&](const Body& body, const Ends& ends, const Vec3& place, Real side) {
+    return turned_arm(body, place - ends.end.position, ends.end.orientation, side * at_end.normal,
+                      ends.start.orientation, side * m.normal);
+  };
+  for (uint32_t k = 0; k < m.count; ++k) {
+    ContactPoint& p = m.points[k];
+    const Vec3 middle =
+        (a.start.position + arm(*a_, a, p.on_a, -1) + b.start.position + arm(*b_, b, p.on_b, 1)) / 2;
+    p.separation -= free_way(placed, middle, duration);
+    p.on_a = middle + p.separation / 2 * m.normal;
+    p.on_b = middle - p.separation / 2 * m.normal;
+  }
+  return placed;
+}
+
 void ContactPair::foresee(Real duration) {
   if (has_sphere_) return;
   static thread_local std::vector<Manifold> found;
-  const Pose &a = a_->start_pose, &b = b_->start_pose, end = between(a_->pose, b_->pose);
   found.clear();
-  find_manifolds(a_->collision_shape(), b_->collision_shape(), end, 0, cache_, DistanceMethod::gjk, found);
-  for (const Manifold& at_end : found) {
-    PlacedManifold placed;
-    Manifold& m = placed.manifold;
-    place(at_end, a_->pose, m);
-    bool is_new = false;
-    for (uint32_t k = 0; k < m.count; ++k) {
-      const Real separation = at_end.points[k].separation;
-      const Vec3 on_a = a.point_to_world(at_end.points[k].on_a),
-                 on_b = b.point_to_world(end.point_to_body(at_end.points[k].on_b)),
-                 middle = (on_a + on_b) / 2;
-      is_new |= separation < -kForeseen && !is_expected(m.normal, on_a, separation, duration);
-      ContactPoint& p = m.points[k];
-      p.separation = separation - m.normal.dot(free_way(middle, duration));
-      p.on_a = middle + p.separation / 2 * m.normal;
-      p.on_b = middle - p.separation / 2 * m.normal;
-    }
-    if (!is_new) continue;
-    set_frame(placed);
-    placed_.push_back(placed);
+  cache_.keeps_sides = false;
+  find_manifolds(a_->collision_shape(), b_->collision_shape(), between(a_->pose, b_->pose), 0, cache_,
+                 DistanceMethod::gjk, found);
+  cache_.keeps_sides = true;
+  for (Manifold& local : found) {
+    follow_rims(local, *a_, *b_, between(a_->pose, b_->pose));
+    Manifold at_end;
+    place(local, a_->pose, at_end);
+    const auto is_new = [&](const ContactPoint& p) {
+      return p.separation < -kForeseen && !is_expected(at_end.normal, p, duration);
+    };
+    if (std::none_of(at_end.points.begin(), at_end.points.begin() + at_end.count, is_new)) continue;
+    placed_.push_back(brought_back(at_end, duration));
     ++foreseen;
+    at_end_.push_back(at_end);
+    has_narrow_ |= is_narrow(placed_.back().manifold);
   }
 }
 
@@ -206,6 +370,8 @@ void ContactPair::find_one_point(const Pose& a, const Pose& b, Real margin) {
   const bool known = !placed_.empty();
   placed_.resize(1);
   PlacedManifold& m = placed_.front();
+  m.manifold.continues_a = is_round(*a_);
+  m.manifold.continues_b = is_round(*b_);
   sphere_manifold(a_->collision_shape().piece(0), a, b_->collision_shape().piece(0), b, margin, m.manifold);
   if (m.manifold.count == 0) return placed_.clear();
   const ContactFrame before = m.frame;
@@ -216,9 +382,15 @@ void ContactPair::find_one_point(const Pose& a, const Pose& b, Real margin) {
   f = {last, last, frame_vector(m.frame, world_vector(before, f.mean)), true};
 }
 
+/// What acted along the normal does so along the new one, however far the bodies have turned: they may roll.
 PointForce ContactPair::recalled(const Remembered& p, const ContactFrame& frame, const Pose& a) {
-  const Vec3 last = frame_vector(frame, a.vector_to_world(p.last));
-  return {last, last, frame_vector(frame, a.vector_to_world(p.mean)), true};
+  const auto force = [&](const Vec3& before) -> Vec3 {
+    const Real normal = before.dot(p.normal);
+    const Vec3 tangential = a.vector_to_world(before - normal * p.normal);
+    return {normal, frame.t.dot(tangential), frame.k.dot(tangential)};
+  };
+  const Vec3 last = force(p.last);
+  return {last, last, force(p.mean), true};
 }
 
 /// The points stay where they are on their bodies; the normal stays with a.
@@ -270,8 +442,8 @@ void ContactPair::remember(std::vector<Remembered>& points) const {
       const ContactPoint& p = m.manifold.points[k];
       points.push_back({placed_at_.point_to_body(p.on_a),
                         placed_at_.vector_to_body(world_vector(m.frame, m.forces[k].last)),
-                        placed_at_.vector_to_body(world_vector(m.frame, m.forces[k].mean)), m.torque,
-                        m.mean_torque, p.id, false});
+                        placed_at_.vector_to_body(world_vector(m.frame, m.forces[k].mean)),
+                        placed_at_.vector_to_body(m.frame.n), m.torque, m.mean_torque, p.id, false});
     }
 }
 

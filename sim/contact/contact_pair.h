@@ -40,6 +40,9 @@ struct PlacedManifold {
 /// Points nearer than this touch [m].
 constexpr Real kTouching = 2e-5;
 
+/// Whether the points of a manifold are all near one line.
+bool is_narrow(const Manifold& m);
+
 /// What the loops over all pairs ask for lies in the first cache line.
 class alignas(64) ContactPair {
  private:
@@ -47,12 +50,14 @@ class alignas(64) ContactPair {
   std::vector<PlacedManifold> placed_;
   Real separation_ = std::numeric_limits<Real>::infinity();
   uint32_t touching_ = 0;
+  bool has_narrow_ = false;
 
  public:
   uint32_t impacts = 0;   ///< in this sub-step
   uint8_t foreseen = 0;   ///< manifolds that foresee() added
   bool gave_up = false;   ///< too many of them: no more trace-backs in this sub-step
   bool settled = false;   ///< its points limit the approach in this sub-step even if it would bounce
+  Real deepest = 0;       ///< overlap that find() has seen in this sub-step [m]
   bool by_event = false;  ///< an impact of this pair is traced back to; else its points limit the approach
 
   /// A plane can only be `b`. Not both are planes.
@@ -79,6 +84,15 @@ class alignas(64) ContactPair {
     if (!placed_.empty()) sim::prefetch(placed_.data(), placed_.data() + 1);
   }
 
+  /// Whether some contact found is a line or a point (is_narrow()), at which there may be a seam.
+  bool has_narrow() const { return has_narrow_; }
+  /// The i-th manifold that foresee() added, with its points where they are at the interval's end.
+  const Manifold& at_end(std::size_t i) const { return at_end_[i]; }
+  /// Puts another manifold, placed in the world, in the place of the i-th; one without points takes it away
+  /// at the next drop_empty(). The separation remains that of the bodies.
+  void replace(uint32_t i, const Manifold& m);
+  void drop_empty();
+
   /// Whether find() was never called.
   bool is_new() const { return found_margin_ < 0; }
 
@@ -99,7 +113,7 @@ class alignas(64) ContactPair {
  private:
   /// A point with its forces, all in a's frame.
   struct Remembered {
-    Vec3 on_a, last, mean;
+    Vec3 on_a, last, mean, normal;
     Real torque, mean_torque;
     uint32_t id;
     bool taken = false;  ///< by points that are there now
@@ -112,10 +126,11 @@ class alignas(64) ContactPair {
   void inherit(std::vector<Remembered>& points, const Pose& a);
   void reuse(const Pose& a, const Pose& b, const std::vector<Remembered>& points);
   void set_frame(PlacedManifold& m) const;
-  /// How far the free motion brings a's point away from b's, at a place of the world at the start [m].
-  Vec3 free_way(const Vec3& point, Real duration) const;
-  /// Whether the points found tell that there will be such an overlap.
-  bool is_expected(const Vec3& normal, const Vec3& on_a, Real separation, Real duration) const;
+  /// How far the free motion brings a away from b along the normal, at a contact of the start [m].
+  Real free_way(const PlacedManifold& m, const Vec3& place, Real duration) const;
+  /// Whether the points found tell that there will be such an overlap, in the world at the end.
+  bool is_expected(const Vec3& normal, const ContactPoint& at_end, Real duration) const;
+  PlacedManifold brought_back(const Manifold& at_end, Real duration) const;
 
   PairSurface surface_;
   bool is_on_plane_;
@@ -123,7 +138,8 @@ class alignas(64) ContactPair {
   PairCache cache_;
   // In a's frame; filled only when they are first taken over: what moves has no use for the memory.
   std::vector<Manifold> found_;
-  Pose a_from_b_;  // when found
+  std::vector<Manifold> at_end_;  // of the foreseen ones
+  Pose a_from_b_;                 // when found
   Real found_margin_ = -1;
   Pose placed_at_;  // of a, when placed
 };

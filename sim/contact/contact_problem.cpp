@@ -8,16 +8,25 @@
 namespace offstage::sim {
 namespace {
 
-Mat3 cross_matrix(const Vec3& r) {
+Mat3 cross_of(const Vec3& r) {
   Mat3 m;
   m << 0, -r.z(), r.y(), r.z(), 0, -r.x(), -r.y(), r.x(), 0;
   return m;
 }
 
+/// p is the solution where it is its own projection after a step against u: the natural residual.
+Real violation(const Contact& c, std::span<const ContactBody> bodies) {
+  const Real k = mobility(c, bodies).diagonal().maxCoeff();
+  Vec3 u = c.relative_velocity(bodies);
+  u.x() -= c.target;
+  const Vec3 p = projected(c, c.impulse - u / k, std::max(c.impulse.x(), 0.0));
+  return k * (p - c.impulse).cwiseAbs().maxCoeff();
+}
+
 }  // namespace
 
 Mat3 mobility(const ContactBody& body, const Vec3& arm) {
-  const Mat3 x = cross_matrix(arm);
+  const Mat3 x = cross_of(arm);
   return body.inverse_mass * Mat3::Identity() - x * body.inverse_inertia * x;
 }
 
@@ -35,15 +44,28 @@ void apply(const Contact& c, const Vec3& impulse, std::span<ContactBody> bodies)
 
 Real residual(std::span<const ContactBody> bodies, std::span<const Contact> contacts) {
   Real worst = 0;
-  for (const Contact& c : contacts) {
-    // p is the solution where it is its own projection after a step against u: the natural residual.
-    const Real k = mobility(c, bodies).diagonal().maxCoeff();
-    Vec3 u = c.relative_velocity(bodies);
-    u.x() -= c.target;
-    const Vec3 p = projected(c, c.impulse - u / k, std::max(c.impulse.x(), 0.0));
-    worst = std::max(worst, k * (p - c.impulse).cwiseAbs().maxCoeff());
-  }
+  for (const Contact& c : contacts) worst = std::max(worst, violation(c, bodies));
   return worst;
+}
+
+std::optional<std::size_t> worst_contact(std::span<const ContactBody> bodies,
+                                         std::span<const Contact> contacts) {
+  std::optional<std::size_t> worst;
+  Real greatest = -1;
+  for (std::size_t i = 0; i < contacts.size(); ++i)
+    if (const Real v = violation(contacts[i], bodies); v > greatest) {
+      greatest = v;
+      worst = i;
+    }
+  return worst;
+}
+
+Real added_energy(std::span<const ContactBody> before, std::span<const ContactBody> after,
+                  std::span<const Contact> contacts) {
+  Real energy = 0;
+  for (const Contact& c : contacts)
+    energy += c.impulse.dot((c.relative_velocity(before) + c.relative_velocity(after)) / 2 - c.bias);
+  return energy;
 }
 
 uint32_t relax(std::span<ContactBody> bodies, std::span<Contact> contacts, uint32_t max_sweeps,

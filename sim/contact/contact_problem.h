@@ -11,6 +11,7 @@
 /// contact forces, and (u - u(now)) / h the relative accelerations of R9.
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -39,6 +40,7 @@ struct Contact {
   ContactFrame frame;                               ///< n from b to a
   Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();  ///< from the centres of mass to the point, world [m]
   Vec3 offset = Vec3::Zero();  ///< added to the relative velocity: moving surfaces, turning frames [m/s]
+  Vec3 bias = Vec3::Zero();    ///< the part of `offset` that no surface has: velocity terms of R9 [m/s]
   Real target = 0;             ///< least normal velocity afterwards [m/s]
   /// Coulomb's coefficients along t and k. Equal ones make the round cone, |p_tk| <= mu p_n; with different
   /// ones each axis has its own limit (R6).
@@ -67,12 +69,22 @@ void apply(const Contact& contact, const Vec3& impulse, std::span<ContactBody> b
 /// by the velocities that they mean, |K| p.
 Real residual(std::span<const ContactBody> bodies, std::span<const Contact> contacts);
 
+/// The contact that violates the conditions above most; none without contacts.
+std::optional<std::size_t> worst_contact(std::span<const ContactBody> bodies,
+                                         std::span<const Contact> contacts);
+
+/// Kinetic energy that the contacts' impulses add to bodies that have the velocities `before` without them
+/// and `after` with them [J]. The work of surfaces that move by themselves is not part of it. A solution
+/// without targets and biases adds none: friction and plastic impacts dissipate.
+Real added_energy(std::span<const ContactBody> before, std::span<const ContactBody> after,
+                  std::span<const Contact> contacts);
+
 /// What a solver did: figures for StepReport.
 struct ContactWork {
   uint64_t solves = 0;          ///< problems, one per island or cluster
   uint64_t iterations = 0;      ///< pivots, Newton steps or sweeps
   uint64_t factorizations = 0;  ///< of the matrix, from the beginning
-  uint64_t fallbacks = 0;       ///< problems that ended with projected Gauss-Seidel
+  uint64_t fallbacks = 0;       ///< problems that the solver meant for them did not solve
   uint64_t abandoned = 0;       ///< that became too dear for the exact solver and went to the fast one
   uint64_t narrowed = 0;        ///< collisions of which what is far from the blow was left out
   uint64_t softened = 0;        ///< collisions whose restitution was reduced to keep the energy

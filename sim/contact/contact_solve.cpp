@@ -5,6 +5,8 @@
 #include <limits>
 #include <tuple>
 
+#include "sim/contact/contact_motion.h"
+#include "sim/contact/rough_collision.h"
 #include "sim/parallel_loop.h"
 
 namespace offstage::sim {
@@ -14,8 +16,19 @@ namespace {
 constexpr Real kPushOut = 0.2, kFastestPush = 0.5;
 /// Points that meet faster than this have come together in the interval, not before [m/s].
 constexpr Real kClosing = 1e-3;
+/// Of the normal velocity that turning makes in half an interval, what a contact that holds may be off by.
+constexpr Real kTurningShare = 0.5;
+/// A blocked body blocks its neighbours, and these theirs, so many times, where they would overlap by more
+/// [m].
+constexpr int kBlockPasses = 20;
+constexpr Real kOverlap = 1e-6;
 /// What slides slower than this is at rest, to static friction [m/s].
 constexpr Real kSlip = 1e-3;
+/// A fall-back with more than this left over [m/s], or with more energy than before but for rounding, is
+/// none.
+constexpr Real kRough = 1e-2, kEnergyRounding = 1e-9;
+/// Of the kinetic energy, what the velocity terms of a solution may add in a step.
+constexpr Real kTermsShare = 0.02;
 
 /// The material point of a round body that stands for a point of its surface: on the axis, or at the centre.
 /// The surface turns through the contact, these do not.
@@ -132,6 +145,14 @@ Quat rotation(const Vec3& v) {
   return Quat(cosine, sine * v.x() / 2, sine * v.y() / 2, sine * v.z() / 2);
 }
 
+/// The inverse, as exact: of the turn from one orientation to another.
+Vec3 rotation_vector(const Quat& from, const Quat& to) {
+  const Quat turn = to * from.conjugate();
+  const Vec3 sine = turn.w() < 0 ? Vec3(-turn.vec()) : Vec3(turn.vec());
+  const Real s = sine.squaredNorm();
+  return 2 * (1 + s / 6 * (1 + 9 * s / 20 * (1 + 25 * s / 42))) * sine;
+}
+
 void displace(Body& body, const Vec3& shift, const Vec3& turn) {
   RigidBody& r = body.rigid;
   r.position += shift;
@@ -224,10 +245,11 @@ void IslandJoints::tell(Real duration) {
 
 // Exact
 
-std::optional<ContactWork> ExactContacts::solve(const Island& island, const ContactInterval& interval,
-                                                Real budget) {
+ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactInterval& interval,
+                                            Real budget) {
   bodies_.clear();
   contacts_.clear();
+  pairs_.clear();
   forces_.clear();
   approach_.clear();
   for (Body* body : island.bodies) {
@@ -237,20 +259,55 @@ std::optional<ContactWork> ExactContacts::solve(const Island& island, const Cont
   for (ContactPair* pair : island.pairs) add_points(*pair, interval);
   const Island* const one[] = {&island};
   joints_.collect(one, interval);
-  if (contacts_.empty() && joints_.bounded().empty()) return ContactWork{};
+  if (contacts_.empty() && joints_.bounded().empty()) return {.is_applied = true, .work = {}};
 
-  free_.resize(bodies_.size());
-  for (std::size_t i = 0; i < bodies_.size(); ++i)
-    free_[i] << bodies_[i].velocity, bodies_[i].angular_velocity;
+  free_ = bodies_;
   const std::optional<ContactWork> work = newton_.solve(bodies_, contacts_, joints_.problem(), budget);
-  if (!work) return work;
+  if (!work) return {};
+  Outcome outcome{.is_applied = is_safe(*work), .work = *work};
+  if (!outcome.is_applied) outcome.work.fallbacks = 1;
+  if (outcome.work.fallbacks > 0)
+    if (const auto worst = worst_contact(bodies_, contacts_)) outcome.rough = pairs_[*worst];
+  if (!outcome.is_applied) return outcome;
   joints_.tell(interval.duration);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     forces_[i]->now = contacts_[i].impulse / interval.duration;
   if (interval.is_whole)
     for (PointForce* force : forces_) force->last = force->now;
   move_bodies(island, interval.duration);
-  return work;
+  return outcome;
+}
+
+/// Contacts that push out of overlaps from two sides have no solution; then impulses without bounds cancel
+/// but for what throws bodies away. And the velocity terms of R9 are wrong where a thin body turns far in a
+/// step. Surfaces that drive, motors and friction in joints may do work; all else may only take energy, but
+/// for the speed at which overlaps are pushed out, and a small share for those terms.
+bool ExactContacts::is_safe(const ContactWork& work) const {
+  if (work.fallbacks > 0 && work.residual > kRough) return false;
+  Real energy = added_energy(free_, bodies_, contacts_);
+  const auto power = [](const BoundedRow& r, std::span<const ContactBody> bodies) {
+    Real u = r.offset;
+    for (const auto& [body, on] : {std::pair(r.a, &r.on_a), std::pair(r.b, &r.on_b)})
+      if (body != kUnmoved)
+        u += on->head<3>().dot(bodies[body].velocity) + on->tail<3>().dot(bodies[body].angular_velocity);
+    return r.impulse * u;
+  };
+  for (const BoundedRow& r : joints_.bounded())
+    if (!std::isfinite(r.lower) || !std::isfinite(r.upper))
+      energy += (power(r, free_) + power(r, bodies_)) / 2;
+  if (energy <= 0) return true;
+
+  Real push = 0, kinetic = 0, mass = 0;
+  for (const Contact& c : contacts_)
+    if (c.impulse.x() > 0) push = std::max(push, c.target);
+  for (const ContactBody& body : free_) {
+    if (!body.is_moved()) continue;
+    mass += 1 / body.inverse_mass;
+    kinetic += body.velocity.squaredNorm() / body.inverse_mass / 2 +
+               body.angular_velocity.dot(body.inverse_inertia.inverse() * body.angular_velocity) / 2;
+  }
+  if (work.fallbacks > 0) return energy <= kEnergyRounding * kinetic;
+  return energy <= kTermsShare * kinetic + mass * push * push / 2;
 }
 
 uint32_t ExactContacts::add_body(Body& body) {
@@ -280,11 +337,14 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       if (pair.by_event && !touches) continue;
       const Vec3 place = (point.on_a + point.on_b) / 2;
       const Vec3 u = in_frame(m.frame, pair.relative_velocity(place) + surface);
-      Contact c{.a = a, .b = b, .frame = m.frame};
-      c.arm_a = place - origin(pair.a());
-      c.arm_b = place - origin(pair.b());
-      c.offset = in_frame(m.frame, surface);
-      if (touches) c.offset += velocity_bias(pair, m, point, h);
+      const ContactMotion motion =
+          contact_motion(pair.a(), pair.b(), m.manifold, m.frame, place, h, interval.substep);
+      Contact c{.a = a, .b = b, .frame = motion.frame};
+      c.arm_a = motion.middle.arm_a;
+      c.arm_b = motion.middle.arm_b;
+      c.offset = in_frame(c.frame, surface);
+      if (touches) c.bias = motion.turns ? Vec3(motion.gain + motion.bow) : velocity_bias(pair, m, point, h);
+      c.offset += c.bias;
       // In a moment that an impact has left of a sub-step, it would be pushed out as fast as the moment is
       // short.
       c.target = touches ? std::min(-kPushOut * point.separation / interval.substep, kFastestPush)
@@ -293,8 +353,10 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       c.impulse = h * m.forces[k].last;
       c.is_guessed = m.forces[k].known;
       contacts_.push_back(c);
+      pairs_.push_back(&pair);
       forces_.push_back(&m.forces[k]);
-      approach_.push_back(u.x());
+      // What turns meets by a little more or less than the prediction of how it turns has it.
+      approach_.push_back(std::max(0.0, std::abs(u.x()) - kTurningShare * std::abs(motion.gain.x())));
     }
 }
 
@@ -304,13 +366,14 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
 void ExactContacts::move_bodies(const Island& island, Real duration) {
   closing_.assign(bodies_.size(), 0);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
-    if (std::abs(approach_[i]) > kClosing && contacts_[i].impulse.x() > 0)
+    if (approach_[i] > kClosing && contacts_[i].impulse.x() > 0)
       closing_[contacts_[i].a] = closing_[contacts_[i].b] = 1;
   close_stops();
+  close_neighbors(island, duration);
   for (std::size_t i = 0; i < island.bodies.size(); ++i) {
     Body& body = *island.bodies[i];
-    const Vec3 free_v = free_[i].head<3>(), free_w = free_[i].tail<3>();
-    Vec3 dv = bodies_[i].velocity - free_v, dw = bodies_[i].angular_velocity - free_w;
+    Vec3 dv = bodies_[i].velocity - free_[i].velocity,
+         dw = bodies_[i].angular_velocity - free_[i].angular_velocity;
     body.rigid.momentum += body.rigid.mass * dv;
     body.rigid.angular_momentum += body.rigid.spin_momentum(body.rigid.orientation, dw);
     if (closing_[i]) {
@@ -318,6 +381,27 @@ void ExactContacts::move_bodies(const Island& island, Real duration) {
       dw += bodies_[i].angular_velocity - body.start_twist.angular_velocity;
     }
     displace(body, duration / 2 * dv, duration / 2 * dw);
+  }
+}
+
+/// A blocked body gets less far than one that moves on, whose new velocity is the same: by half of what
+/// forces change that in the interval. Where this would be an overlap the other one is blocked as well.
+void ExactContacts::close_neighbors(const Island& island, Real duration) {
+  const auto way = [&](uint32_t i, const Vec3& arm) {
+    const Vec3 end = bodies_[i].velocity_at(arm);
+    if (i >= island.bodies.size() || closing_[i]) return Vec3(duration * end);
+    return Vec3(duration / 2 * (end + island.bodies[i]->start_twist.at(arm)));
+  };
+  bool changed = true;
+  for (int pass = 0; changed && pass < kBlockPasses; ++pass) {
+    changed = false;
+    for (const Contact& c : contacts_) {
+      if (closing_[c.a] == closing_[c.b]) continue;
+      const Real separation = std::max(0.0, -c.target * duration);
+      if (separation + c.frame.n.dot(way(c.a, c.arm_a) - way(c.b, c.arm_b)) > -kOverlap) continue;
+      closing_[c.a] = closing_[c.b] = 1;
+      changed = true;
+    }
   }
 }
 
@@ -331,77 +415,17 @@ void ExactContacts::close_stops() {
   }
 }
 
-// Which of the two
-
-namespace {
-
-/// So few bodies are always worth it in a world where the fast solver takes less than this [ns].
-constexpr std::size_t kFew = 6;
-constexpr Real kSmall = 1e5;
-/// Of the fast solver, per point and sub-step [ns].
-constexpr Real kFastPoint = 60;
-/// Of the fast solver, per joint and sub-step [ns].
-constexpr Real kFastJoint = 200;
-/// How much dearer than the fast solver the exact one may be in the long run: it is worth that. What it takes
-/// beyond counts as a debt, of which it may have as much as so many steps of the fast solver: it is dear
-/// where an island is new, and cheap from then on.
-constexpr Real kWorth = 2.5, kCredit = 120;
-/// After that it waits until its debt is but this share of what the fast solver has taken.
-constexpr Real kShare = 0.25, kLongestWait = 2400;
-/// With so little of the credit left, only what is known to be cheap is tried.
-constexpr Real kLittle = 0.05;
-
-Real fast_cost(const Island& island, Real duration) {
-  Real points = 0;
-  for (const ContactPair* pair : island.pairs)
-    for (const PlacedManifold& m : pair->manifolds()) points += m.manifold.count;
-  Real joints = 0;
-  for (const Articulation* a : island.articulations) joints += static_cast<Real>(a->joints().size());
-  return (points * kFastPoint + joints * kFastJoint) * relaxation_substeps(duration);
-}
-
-}  // namespace
-
-void SolverPatience::begin(std::span<Island* const> islands, Real duration) {
-  Real fast = 0;
-  for (const Island* island : islands) fast += fast_cost(*island, duration);
-  small_ = fast < kSmall;
-  debt_ = std::max(0.0, debt_ - kShare * fast);
-  left_ = std::max(0.0, 1 - debt_ / (kCredit * std::max(fast, kSmall)));
-}
-
-bool SolverChoice::is_exact_worth(const Island& island, const SolverPatience& patience) {
-  if (patience.is_small() && island.bodies.size() <= kFew) return true;
-  if (wait_ == 0) return proven_ || patience.left() > kLittle;
-  --wait_;
-  return false;
-}
-
-Real SolverChoice::budget(const Island& island, Real duration, const SolverPatience& patience) const {
-  if (patience.is_small() && island.bodies.size() <= kFew) return std::numeric_limits<Real>::infinity();
-  return kCredit * fast_cost(island, duration) * (proven_ ? 1 : patience.left());
-}
-
-void SolverChoice::learn(const Island& island, Real duration, bool solved, SolverPatience& patience) {
-  if (patience.is_small() && island.bodies.size() <= kFew) return;
-  const Real fast = fast_cost(island, duration), excess = exact->cost() - kWorth * fast;
-  proven_ = solved && excess <= 0;
-  patience.spend(excess);
-  debt_ = std::max(0.0, debt_ + excess);
-  if (solved && debt_ <= kCredit * fast) return;
-  wait_ = static_cast<uint32_t>(std::clamp(debt_ / (kShare * fast), 1.0, kLongestWait));
-  debt_ = 0;
-}
-
 // Fast
 
 namespace {
 
-RelaxedBody relaxed(const Body& body, Real duration) {
+RelaxedBody relaxed(const Body& body, const ContactInterval& interval) {
   RelaxedBody b;
+  const Real duration = interval.duration;
   if (body.is_awake()) {
     b.inverse_mass = 1 / body.rigid.mass;
-    b.inverse_inertia = inverse_inertia(body.rigid, body.start.orientation);
+    // At the end, so that velocities and momenta agree there.
+    b.inverse_inertia = inverse_inertia(body.rigid, body.rigid.orientation);
     b.velocity = body.start_twist.velocity;
     b.angular_velocity = body.start_twist.angular_velocity;
     b.free_acceleration = (body.rigid.velocity() - b.velocity) / duration;
@@ -409,16 +433,50 @@ RelaxedBody relaxed(const Body& body, Real duration) {
   } else if (body.is_kinematic()) {
     b.velocity = body.drive.velocity;
     b.angular_velocity = body.drive.angular_velocity;
+    if (!interval.is_whole) return b;
+    // Evenly accelerated, so that it gets to where it gets with the velocity that it has there.
+    const Vec3 mean = (body.pose.position - body.start_pose.position) / duration;
+    const Vec3 mean_spin = rotation_vector(body.start_pose.orientation, body.pose.orientation) / duration;
+    b.free_acceleration = 2 / duration * (b.velocity - mean);
+    b.free_angular_acceleration = 2 / duration * (b.angular_velocity - mean_spin);
+    b.velocity = 2 * mean - b.velocity;
+    b.angular_velocity = 2 * mean_spin - b.angular_velocity;
   }
   return b;
 }
 
+/// How the contact at its centre moves. The points go with the body that carries it.
+void set_motion(ContactPatch& patch, const ContactMotion& motion) {
+  patch.arm_a = motion.middle.arm_a;
+  patch.arm_b = motion.middle.arm_b;
+  patch.turns = motion.turns;
+  if (!motion.turns) return;
+  for (uint32_t i = 0; i < patch.count; ++i) {
+    ContactPatch::Point& p = patch.points[i];
+    const Vec3 arm = motion.middle.turn * (p.t * patch.frame.t + p.k * patch.frame.k);
+    p.t = motion.frame.t.dot(arm);
+    p.k = motion.frame.k.dot(arm);
+  }
+  patch.frame = motion.frame;
+  patch.gain = motion.gain;
+  patch.bow = motion.bow;
+  patch.gain_along_t = motion.gain_along_t;
+  patch.gain_along_k = motion.gain_along_k;
+}
+
 /// Of a manifold, with the forces that it begins with. What the patch was in another step does not matter.
-void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifold& m) {
-  const Vec3 centre_a = origin(pair.a()), surface = surface_velocity(pair);
-  set_points(patch, m.manifold, m.frame, centre_a, origin(pair.b()));
-  const Vec3 u = in_frame(m.frame, pair.relative_velocity(centre_a + patch.arm_a) + surface);
-  patch.offset = in_frame(m.frame, surface);
+void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifold& m,
+               const ContactInterval& interval) {
+  const Real duration = interval.duration;
+  const Vec3 centre_a = start_centre(pair.a()), surface = surface_velocity(pair);
+  // What else of a rim is near does not say where on it the contact is.
+  const bool runs = runs_along(pair.a(), duration) || runs_along(pair.b(), duration);
+  set_points(patch, m.manifold, m.frame, centre_a, start_centre(pair.b()), runs);
+  const Vec3 place = centre_a + patch.arm_a;
+  const Vec3 u = in_frame(m.frame, pair.relative_velocity(place) + surface);
+  set_motion(patch,
+             contact_motion(pair.a(), pair.b(), m.manifold, m.frame, place, duration, interval.substep));
+  patch.offset = in_frame(patch.frame, surface);
   std::tie(patch.friction_t, patch.friction_k) = friction(pair.surface(), u);
   Vec3 last(0, 0, m.torque), mean(0, 0, m.mean_torque);
   for (uint32_t k = 0; k < patch.count; ++k) {
@@ -488,12 +546,12 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
   if (origins_.empty() && joints_.bounded().empty()) return {};
   bodies_.resize(members_.size());
   patches_.resize(origins_.size());
-  for_each_interval(members_, [&](std::size_t i) { bodies_[i] = relaxed(*members_[i], h); });
+  for_each_interval(members_, [&](std::size_t i) { bodies_[i] = relaxed(*members_[i], interval); });
   for_each_index(patches_.size(), [&](std::size_t i) {
     const auto& [pair, manifold, a, b] = origins_[i];
     patches_[i].a = a;
     patches_[i].b = b;
-    set_patch(patches_[i], *pair, *manifold);
+    set_patch(patches_[i], *pair, *manifold, interval);
   });
   RelaxedJoints relaxed_joints(joints_.problem(), joints_.articulations(), joints_.bounded_ends());
   ContactWork work = solver_.solve(bodies_, patches_, {h, relaxation_substeps(h)}, &relaxed_joints);
@@ -510,15 +568,27 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
 
 namespace {
 
-/// More contacts than this are not solved together unless asked for.
-constexpr std::size_t kCluster = 24;
+/// So many contacts always collide together; more than kCluster, or after more than kGrowths extensions, only
+/// when asked for.
+constexpr std::size_t kSmallCluster = 40, kCluster = 100;
+constexpr int kGrowths = 2;
+/// What an update of a contact, and a product of a dense factorization take [ns].
+constexpr Real kContactUpdate = 60, kDenseProduct = 0.7;
+
+std::vector<std::size_t> indices_of(std::span<const uint8_t> marks) {
+  std::vector<std::size_t> marked;
+  for (std::size_t i = 0; i < marks.size(); ++i)
+    if (marks[i]) marked.push_back(i);
+  return marked;
+}
 
 /// Contacts of an island that collide together, with the bodies' velocities before.
 struct CollisionCluster {
   std::vector<ContactBody> bodies;
   std::vector<Contact> contacts;
   std::vector<Real> restitution;
-  std::vector<uint8_t> bounces;  // by contact
+  std::vector<uint8_t> bounces;           // by contact
+  std::vector<const ContactPair*> pairs;  // by contact
 
   void add(const ContactPair& pair, Real reach, Real collision_speed, ImpactLaw law) {
     const auto row = [&](const Body& body) {
@@ -544,6 +614,7 @@ struct CollisionCluster {
         const Vec3 u = c.relative_velocity(bodies);
         std::tie(c.friction_t, c.friction_k) = friction(pair.surface(), u);
         contacts.push_back(c);
+        pairs.push_back(&pair);
         bounces.push_back(u.x() < -collision_speed);
         // In sequence, a contact at rest may be hit by the impulse of another.
         restitution.push_back(bounces.back() || law == ImpactLaw::sequential ? pair.surface().restitution
@@ -551,39 +622,59 @@ struct CollisionCluster {
       }
   }
 
-  /// Leaves out what is far from what bounces, if there is too much of it: first what shares no body with
-  /// that, then all the rest. What is left out blocks the way afterwards, as resting contact. Whether it did.
-  bool narrow() {
-    if (contacts.size() <= kCluster) return false;
+  /// Adds contacts to those that collide together, and all that share a moved body with one of them.
+  void take(std::span<const std::size_t> wanted, std::vector<uint8_t>& taken) const {
     std::vector<uint8_t> involved(bodies.size(), 0);
+    for (const std::size_t i : wanted)
+      for (const uint32_t body : {contacts[i].a, contacts[i].b}) involved[body] |= bodies[body].is_moved();
     for (std::size_t i = 0; i < contacts.size(); ++i)
-      if (bounces[i])
-        for (uint32_t body : {contacts[i].a, contacts[i].b}) involved[body] |= bodies[body].is_moved();
-    keep([&](std::size_t i) { return involved[contacts[i].a] || involved[contacts[i].b]; });
-    if (contacts.size() > kCluster) keep([&](std::size_t i) { return bounces[i] != 0; });
-    return true;
-  }
-
- private:
-  template <class Wanted>
-  void keep(Wanted&& wanted) {
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < contacts.size(); ++i) {
-      if (!wanted(i)) continue;
-      contacts[kept] = contacts[i];
-      restitution[kept] = restitution[i];
-      bounces[kept] = bounces[i];
-      ++kept;
-    }
-    contacts.resize(kept);
-    restitution.resize(kept);
-    bounces.resize(kept);
+      if (involved[contacts[i].a] || involved[contacts[i].b]) taken[i] = 1;
   }
 };
 
+/// Collides the contacts of a large cluster that the impact reaches: those around what bounces, then also
+/// those that their impulses make approach faster than `speed` and all around these, until nothing else does.
+/// What is left out has no impulse, which is then its solution. A cluster that grows beyond kCluster
+/// contacts, or too often, is cut off; what is left out of it blocks the way afterwards, as resting contact.
+ContactWork collide_reached(CollisionCluster& cluster, Real speed, ImpactLaw law,
+                            const JointProblem& joints) {
+  std::vector<uint8_t> taken(cluster.contacts.size(), 0);
+  std::vector<std::size_t> wanted = indices_of(cluster.bounces);
+  const std::vector<ContactBody> before = cluster.bodies;
+  ContactWork work;
+  for (int round = 0; !wanted.empty(); ++round) {
+    cluster.take(wanted, taken);
+    const std::vector<std::size_t> together = indices_of(taken);
+    std::vector<Contact> contacts;
+    std::vector<Real> restitution;
+    for (const std::size_t i : together) {
+      contacts.push_back(cluster.contacts[i]);
+      restitution.push_back(cluster.restitution[i]);
+    }
+    cluster.bodies = before;
+    const ContactWork one = collide_roughly(cluster.bodies, contacts, restitution, law, joints);
+    work.add(one);
+    work.solves = 1;
+    work.fallbacks = one.fallbacks;
+    work.residual = one.residual;
+    for (std::size_t k = 0; k < together.size(); ++k)
+      cluster.contacts[together[k]].impulse = contacts[k].impulse;
+    wanted.clear();
+    for (std::size_t i = 0; i < taken.size(); ++i)
+      if (!taken[i] && cluster.contacts[i].relative_velocity(cluster.bodies).x() < -speed)
+        wanted.push_back(i);
+    if (wanted.empty()) break;
+    if (together.size() > kCluster || round == kGrowths) {
+      work.narrowed = 1;
+      break;
+    }
+  }
+  return work;
+}
+
 }  // namespace
 
-uint32_t resolve_collisions(const Island& island, const CollisionSettings& settings, ContactWork& work) {
+CollisionOutcome resolve_collisions(const Island& island, const CollisionSettings& settings) {
   CollisionCluster cluster;
   for (Body* body : island.bodies) {
     body->row = static_cast<uint32_t>(cluster.bodies.size());
@@ -592,17 +683,32 @@ uint32_t resolve_collisions(const Island& island, const CollisionSettings& setti
   }
   for (const ContactPair* pair : island.pairs)
     cluster.add(*pair, settings.reach, settings.collision_speed, settings.law);
-  if (!settings.whole) work.narrowed += cluster.narrow();
-  if (cluster.contacts.empty()) return 0;
+  CollisionOutcome outcome;
+  if (cluster.contacts.empty()) return outcome;
   IslandJoints joints;
   joints.collect_for_collision(island, settings.time);
-  work.add(collide(cluster.bodies, cluster.contacts, cluster.restitution, settings.law, joints.problem()));
+  const JointProblem problem = joints.problem();
+  if (settings.whole)
+    outcome.work = collide(cluster.bodies, cluster.contacts, cluster.restitution, settings.law, problem);
+  else if (cluster.contacts.size() <= kSmallCluster)
+    outcome.work =
+        collide_roughly(cluster.bodies, cluster.contacts, cluster.restitution, settings.law, problem);
+  else
+    outcome.work = collide_reached(cluster, settings.collision_speed, settings.law, problem);
+  outcome.cost = static_cast<Real>(outcome.work.iterations * cluster.contacts.size()) * kContactUpdate +
+                 static_cast<Real>(outcome.work.factorizations) *
+                     std::pow(3.0 * static_cast<Real>(std::min(cluster.contacts.size(), kSmallCluster)), 3) *
+                     kDenseProduct;
+  if (outcome.work.fallbacks > 0)
+    if (const auto worst = worst_contact(cluster.bodies, cluster.contacts))
+      outcome.rough = cluster.pairs[*worst];
   for (Body* body : island.bodies) {
     const ContactBody& b = cluster.bodies[body->row];
     body->set_start_velocity(b.velocity, b.angular_velocity);
   }
   joints.tell_blows();
-  return static_cast<uint32_t>(std::count(cluster.bounces.begin(), cluster.bounces.end(), 1));
+  outcome.bounces = static_cast<uint32_t>(std::count(cluster.bounces.begin(), cluster.bounces.end(), 1));
+  return outcome;
 }
 
 }  // namespace offstage::sim

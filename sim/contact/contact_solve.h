@@ -66,23 +66,32 @@ class IslandJoints {
 /// from their `start` to `rigid`; what the contacts add is put on top. Keep one per island.
 class ExactContacts {
  public:
-  /// None, and nothing changed, if that took more than `budget` [ns, see SolverChoice].
-  std::optional<ContactWork> solve(const Island& island, const ContactInterval& interval, Real budget);
+  struct Outcome {
+    bool is_applied = false;  ///< else nothing changed: over budget, or `rough` and not safe
+    ContactWork work;
+    const ContactPair* rough = nullptr;  ///< after a fall-back: the pair with the greatest error
+  };
+  /// Gives up beyond `budget` [ns, see SolverChoice]. The result of a fall-back is applied only if its error
+  /// is small and it adds no kinetic energy; else the island is one for the fast solver, which always ends.
+  Outcome solve(const Island& island, const ContactInterval& interval, Real budget);
   /// What the last solve() took.
   Real cost() const { return newton_.cost(); }
 
  private:
   uint32_t add_body(Body& body);
   void add_points(ContactPair& pair, const ContactInterval& interval);
+  bool is_safe(const ContactWork& work) const;
   void move_bodies(const Island& island, Real duration);
   void close_stops();
+  void close_neighbors(const Island& island, Real duration);
 
-  std::vector<ContactBody> bodies_;
+  std::vector<ContactBody> bodies_, free_;  // the latter without contacts
   std::vector<Contact> contacts_;
-  std::vector<PointForce*> forces_;  // of the contacts, in their pairs
-  std::vector<Real> approach_;       // of the contacts at the start [m/s]
-  std::vector<uint8_t> closing_;     // by body: some contact came together in the interval
-  std::vector<Vec6> free_;           // by body: velocities without contacts
+  std::vector<const ContactPair*> pairs_;  // of the contacts
+  std::vector<PointForce*> forces_;        // of the contacts, in their pairs
+  std::vector<Real>
+      approach_;  // of the contacts at the start, either way, beyond what turning explains [m/s]
+  std::vector<uint8_t> closing_;  // by body: some contact came together in the interval
   IslandJoints joints_;
   ProximalNewton newton_;
 };
@@ -155,8 +164,14 @@ struct CollisionSettings {
   bool whole;  ///< all contacts of the island together, however many; else those around what bounces
 };
 
+struct CollisionOutcome {
+  uint32_t bounces = 0;  ///< contacts that approached faster than CollisionSettings::collision_speed
+  ContactWork work;
+  Real cost = 0;                       ///< by the number of its operations [ns]
+  const ContactPair* rough = nullptr;  ///< after a fall-back: the pair with the greatest error
+};
+
 /// Resolves the collisions among an island's pairs at its bodies' `start`: changes the velocities there.
-/// Returns how many contacts bounced.
-uint32_t resolve_collisions(const Island& island, const CollisionSettings& settings, ContactWork& work);
+CollisionOutcome resolve_collisions(const Island& island, const CollisionSettings& settings);
 
 }  // namespace offstage::sim

@@ -5,9 +5,8 @@
 #include <cmath>
 #include <vector>
 
-#include <Eigen/QR>
-
 #include "sim/contact/friction_pivoting.h"
+#include "sim/contact/least_squares.h"
 #include "sim/contact/proximal_newton.h"
 
 namespace offstage::sim {
@@ -28,7 +27,7 @@ constexpr Real kRank = 1e-11;       ///< of the greatest pivot: redundant contac
 /// Of the diagonal, added to it for pivoting: redundant contacts then share their load in one way only.
 constexpr Real kSoftness = 1e-7;
 constexpr std::size_t kRounds = 4;  ///< of pivoting, with other tangents and another order
-constexpr int kNewtonSteps = 25, kStepsInVain = 10, kHalvings = 6, kFallbacks = 12;
+constexpr int kNewtonSteps = 25, kStepsInVain = 10, kStepHalvings = 6, kFallbacks = 4;
 constexpr uint32_t kSweeps = 200;
 
 /// A side of a contact: its u is J (v, w) of the body.
@@ -228,15 +227,13 @@ Real FrictionSolver::polish(VectorXd& best, ContactWork& work) {
   int last = 0;
   for (int k = 0; k < std::min(kNewtonSteps, last + kStepsInVain) && worst > kAccurate * scale_; ++k) {
     evaluate(p, true);
-    Eigen::CompleteOrthogonalDecomposition<MatrixXd> qr;
-    qr.setThreshold(kRank);
-    qr.compute(jacobian_);
-    const VectorXd step = qr.solve(-r_);
+    const VectorXd step = shortest_least_squares(jacobian_, -r_, kRank);
     ++work.factorizations;
     ++work.iterations;
     const Real whole = evaluate(p + step, false);
     Real length = 1, next = whole;
-    for (int h = 0; h < kHalvings && !(next < worst); ++h) next = evaluate(p + (length /= 2) * step, false);
+    for (int h = 0; h < kStepHalvings && !(next < worst); ++h)
+      next = evaluate(p + (length /= 2) * step, false);
     if (!std::isfinite(whole)) break;
     p += (next < worst ? length : 1) * step;
     worst = next < worst ? next : whole;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "sim/contact/contact_coloring.h"
+#include "sim/contact/patch_friction.h"
 #include "sim/contact/relaxation.h"
 
 namespace offstage::sim {
@@ -174,15 +175,33 @@ void set_full_mobility(PatchBatch& p) {
   }
 }
 
+Symmetric inverse(const Symmetric& m) {
+  const FloatLanes xx = m.yy * m.zz - m.yz * m.yz, xy = m.xz * m.yz - m.xy * m.zz,
+                   xz = m.xy * m.yz - m.xz * m.yy;
+  const FloatLanes scale = lane_inverse(m.xx * xx + m.xy * xy + m.xz * xz);
+  return {scale * xx,
+          scale * xy,
+          scale * xz,
+          scale * (m.xx * m.zz - m.xz * m.xz),
+          scale * (m.xy * m.xz - m.xx * m.yz),
+          scale * (m.xx * m.yy - m.xy * m.xy)};
+}
+
 void set_mobility(PatchBatch& p) {
   if (p.count == 1)
     set_single_mobility(p);
   else
     set_full_mobility(p);
   const Symmetric& K = p.friction_mobility;
-  p.inverse_determinant = lane_inverse(K.xx * K.yy - K.xy * K.xy);
-  p.inverse_bound = lane_inverse(lane_max(K.xx, K.yy) + lane_abs(K.xy));
-  p.inverse_spin = lane_inverse(K.zz);
+  if (p.count == 1) {
+    const FloatLanes inverse = lane_inverse(K.xx * K.yy - K.xy * K.xy);
+    p.friction_stiffness.xx = inverse * K.yy;
+    p.friction_stiffness.xy = -inverse * K.xy;
+    p.friction_stiffness.yy = inverse * K.xx;
+    p.friction_stiffness.zz = lane_inverse(lane_max(K.xx, K.yy) + lane_abs(K.xy));
+  } else {
+    p.friction_stiffness = inverse(K);
+  }
 }
 
 // Filling
@@ -215,6 +234,14 @@ void set_approach(PatchBatch& p, unsigned lane, const ContactPatch& c, const Rel
   p.approach.normal.set(lane, {n.dot(linear) + c.offset.x(), t.dot(angular), k.dot(angular)});
   p.approach.friction.set(lane, {t.dot(linear) + c.offset.y(), k.dot(linear) + c.offset.z(), n.dot(angular)});
   p.conveyed[lane] = static_cast<float>(c.offset.x());
+  if (!c.turns) return;
+  if (!std::exchange(p.turns, true)) {
+    p.gain = PatchGroups{};
+    p.bow = Vector{};
+  }
+  p.bow.set(lane, c.bow);
+  p.gain.normal.set(lane, {c.gain.x(), c.gain_along_k, -c.gain_along_t});
+  p.gain.friction.set(lane, {c.gain.y(), c.gain.z(), 0});
 }
 
 void set_patch(PatchBatch& p, unsigned lane, const ContactPatch& c, Real substep) {
@@ -256,48 +283,23 @@ Vector normal_wrench(const PatchBatch& p) {
 
 // Solving
 
-/// Coulomb's limits of the impulses along t and k, and of the angular one about n: as if every point's
-/// friction were across its arm from the centre.
-Vector friction_limits(const PatchBatch& p) {
-  FloatLanes force{}, moment{};
-  for (uint32_t i = 0; i < p.count; ++i) {
-    const PatchBatch::Point& q = p.points[i];
-    force += q.impulse;
-    moment += q.impulse * lane_sqrt(q.x * q.x + q.y * q.y);
-  }
-  return {p.friction_t * force, p.friction_k * force, lane_min(p.friction_t, p.friction_k) * moment};
-}
-
-/// The impulses along t and k from the velocities u: those that stop the sliding if they are within the
-/// limits. Otherwise a step against the velocity, as long as keeps the iteration convergent, and back to the
-/// limits; its fixed point opposes the sliding exactly.
-Vector coulomb_impulse(const PatchBatch& p, const Vector& u, const Vector& limits) {
-  const Symmetric& K = p.friction_mobility;
-  const Vector& old = p.friction_impulse;
-  const FloatLanes stick_t = old.x - p.inverse_determinant * (K.yy * u.x - K.xy * u.y);
-  const FloatLanes stick_k = old.y - p.inverse_determinant * (K.xx * u.y - K.xy * u.x);
-  const FloatLanes slide_t = old.x - p.inverse_bound * u.x, slide_k = old.y - p.inverse_bound * u.y;
-  const FloatLanes slide = lane_sqrt(slide_t * slide_t + slide_k * slide_k);
-  const FloatLanes scale = slide > limits.x ? limits.x / slide : float_lanes(1);
-  const auto round = p.friction_t == p.friction_k;
-  const auto sticks = round ? stick_t * stick_t + stick_k * stick_k <= limits.x * limits.x
-                            : (lane_abs(stick_t) <= limits.x) & (lane_abs(stick_k) <= limits.y);
-  const FloatLanes held_t = round ? scale * slide_t : lane_clamp(slide_t, limits.x);
-  const FloatLanes held_k = round ? scale * slide_k : lane_clamp(slide_k, limits.y);
-  return {sticks ? stick_t : held_t, sticks ? stick_k : held_k, FloatLanes{}};
-}
-
 /// Changes the friction impulses and the twist `u` by them. Returns the change.
 Vector solve_friction(PatchBatch& p, Groups& u) {
+  Vector next = p.friction_impulse - p.friction_stiffness * u.friction;
   const Vector limits = friction_limits(p);
-  Vector next = coulomb_impulse(p, u.friction, limits);
-  const Symmetric& K = p.friction_mobility;
-  const FloatLanes spin =
-      u.friction.z + K.xz * (next.x - p.friction_impulse.x) + K.yz * (next.y - p.friction_impulse.y);
-  next.z = lane_clamp(p.friction_impulse.z - p.inverse_spin * spin, limits.z);
+  const FloatLanes size2 = next.x * next.x + next.y * next.y;
+  const auto within = p.friction_t == p.friction_k
+                          ? size2 <= limits.x * limits.x
+                          : (lane_abs(next.x) <= limits.x) & (lane_abs(next.y) <= limits.y);
+  const auto slides = ~(within & (lane_abs(next.z) <= limits.z));
+  p.holds = size2 < kHolds * limits.x * limits.y ? float_lanes(1) : FloatLanes{};
+  if (_mm256_movemask_ps(FloatLanes(slides)) != 0) {
+    const Vector slide = sliding_impulse(p, u.friction, limits);
+    next = {slides ? slide.x : next.x, slides ? slide.y : next.y, slides ? slide.z : next.z};
+  }
   const Vector change = next - p.friction_impulse;
   p.friction_impulse = next;
-  u.friction = u.friction + K * change;
+  u.friction = u.friction + p.friction_mobility * change;
   u.normal = u.normal + transposed_product(p.coupling, change);
   return change;
 }
@@ -338,10 +340,7 @@ Groups return_to_mean(PatchBatch& p) {
     change.normal = change.normal + point_wrench(q, d);
   }
   // What slides has its friction from the law, which knows no mean.
-  const Vector& f = p.friction_impulse;
-  const FloatLanes holds =
-      f.x * f.x + f.y * f.y < kHolds * limits.x * limits.y ? float_lanes(1) : FloatLanes{};
-  p.friction_mean = p.friction_impulse + holds * (p.friction_mean - p.friction_impulse);
+  p.friction_mean = p.friction_impulse + p.holds * (p.friction_mean - p.friction_impulse);
   const Vector difference = p.friction_mean - p.friction_impulse;
   change.friction =
       float_lanes(kReturn) * Vector{lane_clamp(difference.x, limits.x), lane_clamp(difference.y, limits.y),
@@ -382,38 +381,98 @@ Single solve_single_friction(PatchBatch& p, Single& u) {
                                       {p.friction_t * force, p.friction_k * force, FloatLanes{}});
   const FloatLanes t = next.x - p.friction_impulse.x, k = next.y - p.friction_impulse.y;
   p.friction_impulse = next;
+  p.holds = next.x * next.x + next.y * next.y < kHolds * p.friction_t * p.friction_k * force * force
+                ? float_lanes(1)
+                : FloatLanes{};
   const Symmetric& K = p.friction_mobility;
   u = u + Single{p.coupling.x.x * t + p.coupling.y.x * k, K.xx * t + K.xy * k, K.xy * t + K.yy * k};
   return {FloatLanes{}, t, k};
 }
 
-/// How far the points have come together since the start, in the normal group's terms.
-Vector moved_normal(const PatchBatch& p, std::span<const BodyMotion> motions, Real elapsed) {
-  const LaneTwist a = gather<&BodyMotion::shift>(motions, p.a), b = gather<&BodyMotion::shift>(motions, p.b);
-  const FloatLanes time = float_lanes(elapsed);
-  const Vector& v = p.approach.normal;
-  return relative(p, a, b).normal + time * Vector{v.x - p.conveyed, v.y, v.z};
+/// What turning arms and frames add to the twist at the end of a sub-step, and to the way before.
+Groups turning_velocity(const PatchBatch& p, const SubstepTime& time) {
+  const FloatLanes s = _mm256_set1_ps(time.s), s2 = s * s;
+  return {s * p.gain.normal + Vector{s2 * p.bow.x, FloatLanes{}, FloatLanes{}},
+          s * p.gain.friction + Vector{s2 * p.bow.y, s2 * p.bow.z, FloatLanes{}}};
+}
+Vector turning_way(const PatchBatch& p, const SubstepTime& time) {
+  return _mm256_set1_ps(time.s_sum) * p.gain.normal +
+         Vector{_mm256_set1_ps(time.s2_sum) * p.bow.x, FloatLanes{}, FloatLanes{}};
 }
 
-void sweep_single(PatchBatch& p, std::span<BodyMotion> motions, Real substep, Real elapsed) {
+/// The relative twist at the end of a sub-step.
+Groups relative_now(const PatchBatch& p, const LaneTwist& a, const LaneTwist& b, const SubstepTime& time) {
+  Groups u = relative(p, a, b);
+  u.normal = u.normal + p.approach.normal;
+  u.friction = u.friction + p.approach.friction;
+  if (!p.turns) return u;
+  const Groups gain = turning_velocity(p, time);
+  return {u.normal + gain.normal, u.friction + gain.friction};
+}
+
+/// Of bodies that roll the normal and the friction depend on each other so much that taking turns converges
+/// slowly: where the point neither parts nor slides, all three impulses come from one system. Returns the
+/// change, and sets `all` if that was everywhere.
+Single solve_single_rolling(PatchBatch& p, Single& u, FloatLanes gap, bool& all) {
+  const Symmetric& F = p.friction_mobility;
+  const Symmetric K{p.normal_mobility.xx, p.coupling.x.x, p.coupling.y.x, F.xx, F.xy, F.yy};
+  FloatLanes& force = p.points[0].impulse;
+  Vector& friction = p.friction_impulse;
+  const Single wanted = inverse(K) * Single{u.x + gap, u.y, u.z};
+  const FloatLanes n = force - wanted.x, t = friction.x - wanted.y, k = friction.y - wanted.z;
+  const FloatLanes limit_t = p.friction_t * n, limit_k = p.friction_k * n;
+  const auto round = p.friction_t == p.friction_k;
+  const auto sticks =
+      round ? t * t + k * k <= limit_t * limit_t : (lane_abs(t) <= limit_t) & (lane_abs(k) <= limit_k);
+  const auto holds = (n >= 0) & sticks;
+  all = _mm256_movemask_ps(FloatLanes(holds)) == 0xFF;
+  const FloatLanes zero{};
+  const Single d{holds ? -wanted.x : zero, holds ? -wanted.y : zero, holds ? -wanted.z : zero};
+  force += d.x;
+  friction.x += d.y;
+  friction.y += d.z;
+  p.holds = holds & (t * t + k * k < kHolds * limit_t * limit_k) ? float_lanes(1) : zero;
+  u = u + K * d;
+  return d;
+}
+
+/// How far the points have come together since the start, in the normal group's terms.
+Vector moved_normal(const PatchBatch& p, std::span<const BodyMotion> motions, const SubstepTime& time) {
+  const LaneTwist a = gather<&BodyMotion::shift>(motions, p.a), b = gather<&BodyMotion::shift>(motions, p.b);
+  const Vector& v = p.approach.normal;
+  const Vector moved =
+      relative(p, a, b).normal + float_lanes(time.elapsed) * Vector{v.x - p.conveyed, v.y, v.z};
+  return p.turns ? moved + turning_way(p, time) : moved;
+}
+
+void sweep_single(PatchBatch& p, std::span<BodyMotion> motions, const SubstepTime& time) {
   const LaneTwist moved_a = gather<&BodyMotion::shift>(motions, p.a),
                   moved_b = gather<&BodyMotion::shift>(motions, p.b);
-  const FloatLanes separation = p.points[0].start + dot(p.n, relative_velocity(p, moved_a, moved_b)) +
-                                float_lanes(elapsed) * (p.approach.normal.x - p.conveyed);
-  const FloatLanes gap = float_lanes(1 / substep) * lane_max(separation, FloatLanes{});
+  FloatLanes separation = p.points[0].start + dot(p.n, relative_velocity(p, moved_a, moved_b)) +
+                          float_lanes(time.elapsed) * (p.approach.normal.x - p.conveyed);
+  if (p.turns) separation += turning_way(p, time).x;
+  const FloatLanes gap = float_lanes(1 / time.substep) * lane_max(separation, FloatLanes{});
   LaneTwist a = gather<&BodyMotion::velocity>(motions, p.a), b = gather<&BodyMotion::velocity>(motions, p.b);
   Single u = in_frame(p, relative_velocity(p, a, b)) +
              Single{p.approach.normal.x, p.approach.friction.x, p.approach.friction.y};
-  const Single before = u;
-  Single change{};
-  const float tolerance = std::exchange(p.tolerance, kSettled);
-  for (uint32_t i = 0; i < kPatchRounds; ++i) {
-    const Single last = u;
-    change = change + solve_single_normal(p, u, gap);
-    change = change + solve_single_friction(p, u);
-    if (is_below(greatest(u - last), tolerance)) break;
+  if (p.turns) {
+    const Groups gain = turning_velocity(p, time);
+    u = u + Single{gain.normal.x, gain.friction.x, gain.friction.y};
   }
-  change = change + solve_single_normal(p, u, gap);
+  const Single before = u;
+  bool all = false;
+  Single change{};
+  if (p.turns) change = solve_single_rolling(p, u, gap, all);
+  const float tolerance = std::exchange(p.tolerance, kSettled);
+  if (!all) {
+    for (uint32_t i = 0; i < kPatchRounds; ++i) {
+      const Single last = u;
+      change = change + solve_single_normal(p, u, gap);
+      change = change + solve_single_friction(p, u);
+      if (is_below(greatest(u - last), tolerance)) break;
+    }
+    change = change + solve_single_normal(p, u, gap);
+  }
   p.residual = greatest(u - before);
   const Groups back = return_to_mean(p);
   change = change + Single{back.normal.x, back.friction.x, back.friction.y};
@@ -427,6 +486,16 @@ void sweep_single(PatchBatch& p, std::span<BodyMotion> motions, Real substep, Re
 }
 
 }  // namespace
+
+// With s = 2 t / h - 1 at the sub-steps' ends t.
+SubstepTime::SubstepTime(Real substep_, uint32_t index, Real duration_)
+    : substep(substep_), elapsed(index * substep_), duration(duration_) {
+  const Real e = elapsed, first = e * (e + substep) / duration,
+             second = 2 * first * (2 * e + substep) / (3 * duration);
+  s = static_cast<float>(2 * std::min(e + substep, duration) / duration - 1);
+  s_sum = static_cast<float>(first - e);
+  s2_sum = static_cast<float>(second - 2 * first + e);
+}
 
 void prepare(PatchBatch& p, const PatchBatch::Index& patches, std::span<const ContactPatch> all,
              std::span<const RelaxedBody> bodies, std::span<BodyMotion> motions, Real substep) {
@@ -464,17 +533,15 @@ void begin_substep(PatchBatch& p) {
 
 // The friction sees the normal impulses of this sweep, and what it does to the normal velocities is made
 // good.
-void sweep(PatchBatch& p, std::span<BodyMotion> motions, Real substep, Real elapsed) {
-  if (p.count == 1) return sweep_single(p, motions, substep, elapsed);
-  const Vector moved = moved_normal(p, motions, elapsed);
+void sweep(PatchBatch& p, std::span<BodyMotion> motions, const SubstepTime& time) {
+  if (p.count == 1) return sweep_single(p, motions, time);
+  const Vector moved = moved_normal(p, motions, time);
   Gaps gaps;
   for (uint32_t i = 0; i < p.count; ++i)
-    gaps[i] =
-        float_lanes(1 / substep) * lane_max(p.points[i].start + point_part(p.points[i], moved), FloatLanes{});
+    gaps[i] = float_lanes(1 / time.substep) *
+              lane_max(p.points[i].start + point_part(p.points[i], moved), FloatLanes{});
   LaneTwist a = gather<&BodyMotion::velocity>(motions, p.a), b = gather<&BodyMotion::velocity>(motions, p.b);
-  Groups u = relative(p, a, b);
-  u.normal = u.normal + p.approach.normal;
-  u.friction = u.friction + p.approach.friction;
+  Groups u = relative_now(p, a, b, time);
   const Groups before = u;
   Groups change{};
   const float tolerance = std::exchange(p.tolerance, kSettled);
@@ -482,8 +549,7 @@ void sweep(PatchBatch& p, std::span<BodyMotion> motions, Real substep, Real elap
     const Groups last = u;
     change.normal = change.normal + solve_normal(p, u, gaps);
     change.friction = change.friction + solve_friction(p, u);
-    const FloatLanes change_now =
-        lane_max(greatest(u.normal - last.normal), greatest(u.friction - last.friction));
+    FloatLanes change_now = lane_max(greatest(u.normal - last.normal), greatest(u.friction - last.friction));
     if (is_below(change_now, tolerance)) break;
   }
   change.normal = change.normal + solve_normal(p, u, gaps);
@@ -506,7 +572,7 @@ void end_substeps(PatchBatch& p, Real substep) {
 
 FloatLanes push_out(PatchBatch& p, std::span<BodyMotion> motions, const PushOut& push) {
   LaneTwist a = gather<&BodyMotion::shift>(motions, p.a), b = gather<&BodyMotion::shift>(motions, p.b);
-  Vector moved = moved_normal(p, motions, push.elapsed);
+  Vector moved = moved_normal(p, motions, push.time);
   Vector change{};
   FloatLanes farthest{};
   for (uint32_t i = 0; i < p.count; ++i) {

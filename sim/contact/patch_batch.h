@@ -61,16 +61,32 @@ struct PatchBatch {
   /// friction group by the normal group's wrench.
   Symmetric normal_mobility, friction_mobility;
   LaneMatrix<Lanes> coupling;
-  /// Of the friction group: 1 / determinant of the part along t and k, 1 / a bound on its eigenvalues, and
-  /// 1 / that about n.
-  Lanes inverse_determinant, inverse_bound, inverse_spin;
+  /// The inverse of friction_mobility. Of patches of one point, which has no torque, that of the part along t
+  /// and k, and in zz 1 / a bound on its eigenvalues.
+  Symmetric friction_stiffness;
   PatchGroups approach;  ///< the twist that the velocities at the start make, moving surfaces included
   Lanes conveyed;        ///< of that, what surfaces add along n [m/s]
   Lanes friction_t, friction_k;
   Vector friction_impulse, friction_mean, friction_before, friction_shift;  ///< along t, k, about n, likewise
+  Lanes holds;     ///< all ones where friction was well within its limit in the last sweep, else 0
   Lanes renewal;   ///< share of the difference that means follow their impulses by
   Lanes residual;  ///< by how much the last sweep changed the velocity of the centre [m/s]
+  bool turns;      ///< whether `gain` counts
   std::array<Point, 4> points;
+  PatchGroups gain;  ///< of the approach by turning arms and frames, see ContactPatch
+  Vector bow;        ///< likewise, of the centre along n, t, k
+};
+
+/// When a sub-step is.
+struct SubstepTime {
+  Real substep;   ///< its length [s]
+  Real elapsed;   ///< since the step's start, when it begins [s]
+  Real duration;  ///< of the step [s]
+  /// What turning arms and frames add at its end, see ContactPatch: the s of then, and the sums of s and of
+  /// s^2 over the sub-steps before, times their length [s].
+  float s, s_sum, s2_sum;
+
+  SubstepTime(Real substep_, uint32_t index, Real duration_);
 };
 
 /// Fills a batch and gives the bodies the impulses that the patches' forces make in `substep` [s]. Of
@@ -82,17 +98,17 @@ void prepare(PatchBatch& batch, const PatchBatch::Index& patches, std::span<cons
 void begin_substep(PatchBatch& batch);
 
 /// Solves each patch once, for velocities. Where a gap is open, the approach is limited to what closes it in
-/// `substep` [s], `elapsed` [s] after the start.
-void sweep(PatchBatch& batch, std::span<BodyMotion> motions, Real substep, Real elapsed);
+/// the sub-step.
+void sweep(PatchBatch& batch, std::span<BodyMotion> motions, const SubstepTime& time);
 
 /// The last sub-step has moved the bodies: from now on Point::shift counts ways, and pushes begin.
 void end_substeps(PatchBatch& batch, Real substep);
 
 /// How penetration is taken away.
 struct PushOut {
-  Real elapsed;  ///< since the start [s]
-  Real share;    ///< of the depth that a push takes away
-  Real limit;    ///< the farthest that pushes move in a step [m]
+  SubstepTime time;  ///< of what would be the next sub-step
+  Real share;        ///< of the depth that a push takes away
+  Real limit;        ///< the farthest that pushes move in a step [m]
 };
 /// Moves the bodies, but not their velocities, apart where they overlap, and takes back of what it did before
 /// where that opened a gap, as far as it did. Returns by lanes the farthest way that it wanted [m].

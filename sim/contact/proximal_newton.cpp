@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "sim/contact/least_squares.h"
+
 namespace offstage::sim {
 namespace {
 
@@ -612,7 +614,7 @@ void ProximalNewton::mix_lifts(bool slow) {
     of_lift.col(k) = lift - before.lift;
     of_rise.col(k) = rise - before.rise;
   }
-  const Eigen::VectorXd share = of_rise.colPivHouseholderQr().solve(rise);
+  const Eigen::VectorXd share = least_squares(of_rise, rise);
   if (!share.allFinite()) return;
   const Eigen::VectorXd mixed = lift - of_lift * share;
   for (Eigen::Index i = 0; i < n; ++i) points_[static_cast<std::size_t>(i)].lift = std::max(mixed[i], 0.0);

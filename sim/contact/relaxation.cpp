@@ -32,6 +32,12 @@ constexpr uint32_t kRepeats = 12;
 /// below.
 constexpr Real kPress = 3e-4, kPassedOn = 1e-4;
 
+/// Of the step: velocities that change evenly bring a body so near to where it gets.
+constexpr Real kUneven = 0.25;
+
+/// Points that are no farther from the deepest along the normal are as deep [m].
+constexpr Real kAsDeep = 5e-5;
+
 constexpr uint32_t kBatchesPerBlock = 4, kBodiesPerBlock = 128;
 
 Vec3 linear_part(FloatLanes x) {
@@ -45,25 +51,41 @@ FloatLanes joined(const Vec3& linear, const Vec3& angular) {
   return FloatLanes{v.x(), v.y(), v.z(), 0, w.x(), w.y(), w.z(), 0};
 }
 
-/// Whether a body's velocity changed by more than steady forces would: twice what the free motion has,
-/// counted as kinetic energy. Then it hit something.
-bool jumps(const RelaxedBody& b, const Vec3& dv, const Vec3& dw, Real duration) {
+/// Whether a body hit something: its velocity changed by more than steady forces would, which is twice what
+/// the free motion has, counted as kinetic energy; and not evenly, so that it got elsewhere than steady
+/// forces in `substeps` would have brought it. (The torque of the load turns a rolling coin's spin more than
+/// gravity.)
+bool jumps(const RelaxedBody& b, const BodyMotion& m, const RelaxationDef& def) {
   const Real inertia = b.inverse_inertia.trace() > 0 ? 3 * b.inverse_mass / b.inverse_inertia.trace() : 0;
-  const Real steady = b.free_acceleration.squaredNorm() + inertia * b.free_angular_acceleration.squaredNorm();
-  return dv.squaredNorm() + inertia * dw.squaredNorm() > 4 * duration * duration * steady;
+  const auto size2 = [inertia](const Vec3& linear, const Vec3& angular) {
+    return linear.squaredNorm() + inertia * angular.squaredNorm();
+  };
+  const Vec3 dv = linear_part(m.velocity), dw = angular_part(m.velocity);
+  const Real h = def.duration, change2 = size2(dv, dw);
+  if (change2 <= 4 * h * h * size2(b.free_acceleration, b.free_angular_acceleration)) return false;
+  const Real even = h * (def.substeps + 1) / (2 * def.substeps);
+  return size2(linear_part(m.shift) - even * dv, angular_part(m.shift) - even * dw) >
+         kUneven * kUneven * h * h * change2;
 }
 
 }  // namespace
 
 void set_points(ContactPatch& p, const Manifold& m, const ContactFrame& frame, const Vec3& centre_a,
-                const Vec3& centre_b) {
+                const Vec3& centre_b, bool at_deepest) {
   p.frame = frame;
   p.count = m.count;
   if (m.count == 0) return;
   const auto middle = [&m](uint32_t i) { return Vec3((m.points[i].on_a + m.points[i].on_b) / 2); };
-  Vec3 centre = middle(0);
-  for (uint32_t i = 1; i < m.count; ++i) centre += middle(i);
-  centre /= m.count;
+  Real least = kInfinity;
+  for (uint32_t i = 0; i < m.count; ++i) least = std::min(least, m.points[i].separation);
+  Vec3 centre = Vec3::Zero();
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < m.count; ++i) {
+    if (at_deepest && m.points[i].separation > least + kAsDeep) continue;
+    centre += middle(i);
+    ++count;
+  }
+  centre /= count;
   p.arm_a = centre - centre_a;
   p.arm_b = centre - centre_b;
   for (uint32_t i = 0; i < m.count; ++i) {
@@ -113,6 +135,8 @@ void RelaxationSolver::plan_sweeps(Stage first, Stage again, uint32_t substep) {
 }
 
 void RelaxationSolver::plan(uint32_t substeps) {
+  times_.clear();
+  for (uint32_t i = 0; i <= substeps; ++i) times_.emplace_back(substep_, i, def_.duration);
   const auto bodies = static_cast<uint32_t>(bodies_.size());
   ranges_.clear();
   sweeps_ = 0;
@@ -213,13 +237,13 @@ void RelaxationSolver::extrapolate(uint32_t i) {
 
 void RelaxationSolver::solve(uint32_t i, const Range& range) {
   PatchBatch& p = batches_[i];
-  sweep(p, motions_, substep_, range.substep * substep_);
+  sweep(p, motions_, times_[range.substep]);
   strike(p, range.sweep, p.residual, kBlow);
 }
 
 void RelaxationSolver::push(uint32_t i, const Range& range, Real threshold) {
   PatchBatch& p = batches_[i];
-  const PushOut how{def_.duration, kPushShare, kMaxPush * def_.duration};
+  const PushOut how{times_.back(), kPushShare, kMaxPush * def_.duration};
   strike(p, range.sweep, push_out(p, motions_, how), threshold);
 }
 
@@ -254,7 +278,7 @@ void RelaxationSolver::finish(uint32_t i) {
   const BodyMotion& m = motions_[i];
   const Real h = def_.duration;
   const Vec3 dv = linear_part(m.velocity), dw = angular_part(m.velocity);
-  late_[i] = jumps(b, dv, dw, h) ? 0 : substep_ / 2;
+  late_[i] = jumps(b, m, def_) ? 0 : substep_ / 2;
   b.impulse = b.angular_impulse = b.displacement = b.rotation_vector = Vec3::Zero();
   if (!has_joints()) {  // report() adds what contacts do
     b.velocity += h * b.free_acceleration;

@@ -48,7 +48,8 @@ struct RelaxedBody {
   Vec3 displacement = Vec3::Zero(), rotation_vector = Vec3::Zero();
 };
 
-/// Up to four points where the bodies a and b touch or may soon. Its frame stays as it is during the step.
+/// Up to four points where the bodies a and b touch or may soon. Its frame and its arms stay as they are
+/// during the step; what their turning adds to the velocities is `gain`.
 struct ContactPatch {
   struct Point {
     Real t = 0, k = 0;    ///< coordinates along the tangents, from the patch's centre [m]
@@ -62,6 +63,12 @@ struct ContactPatch {
   ContactFrame frame;                               ///< n from b to a
   Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();  ///< from the centres of mass to the patch's centre [m]
   Vec3 offset = Vec3::Zero();  ///< (n, t, k), added to the relative velocity: moving surfaces [m/s]
+  /// What turning arms and frames add to the relative velocity at the centre, in (n, t, k): gain s + bow s^2,
+  /// where s goes evenly from -1 at the step's start to 1 at its end; and to the normal one per metre along t
+  /// and k, growing like s [m/s], [1/s].
+  Vec3 gain = Vec3::Zero(), bow = Vec3::Zero();
+  Real gain_along_t = 0, gain_along_k = 0;
+  bool turns = false;  ///< whether there is any
   /// Coulomb's coefficients. Equal ones make the round cone, with different ones each axis has its own limit.
   Real friction_t = 0, friction_k = 0;
   uint32_t count = 0;
@@ -74,9 +81,10 @@ struct ContactPatch {
 };
 
 /// Gives a patch the points of a manifold, which is in world axes like the frame, whose n is its normal; the
-/// bodies have these centres of mass. The points stay in the manifold's order.
+/// bodies have these centres of mass. The points stay in the manifold's order. The patch's centre is that of
+/// all points, or of the deepest alone.
 void set_points(ContactPatch& patch, const Manifold& m, const ContactFrame& frame, const Vec3& centre_a,
-                const Vec3& centre_b);
+                const Vec3& centre_b, bool at_deepest = false);
 
 /// As many sub-steps as make them 1/1920 s or shorter; at least four. Each costs one sweep over the patches.
 uint32_t relaxation_substeps(Real duration);
@@ -151,6 +159,7 @@ class RelaxationSolver {
   std::vector<BodyMotion> motions_;  // one more than bodies: of unused lanes
   std::vector<FloatLanes> last_;     // velocities of the sub-step before
   std::vector<Real> late_;           // by body: see finish() [s]
+  std::vector<SubstepTime> times_;   // and one of what would follow the last
   std::vector<Range> ranges_;
   // Sweeps are numbered from 1; those that strike a body leave their number with it.
   uint32_t sweeps_ = 0;

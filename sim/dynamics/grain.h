@@ -8,6 +8,7 @@
 
 #include "sim/collision/obstacles.h"
 #include "sim/contact/collision.h"
+#include "sim/dynamics/body_impulses.h"
 #include "sim/dynamics/particles.h"
 #include "sim/types.h"
 
@@ -27,13 +28,19 @@ struct Grain {
   Vec3 at(Real t) const { return position + (t - from) * path_velocity; }
   /// A collision at time t of a sub-step of length h changes its velocity; it goes on under the same forces.
   void strike(Real t, Real h, const Vec3& change) {
+    const Vec3 after = arrival(t, h) + change;
     position = at(t);
-    const Vec3 after = velocity_at(t, h) + change;
     velocity = after + (h - t) * acceleration;
     path_velocity = after + (h - t) / 2 * acceleration;
     from = t;
   }
   Vec3 velocity_at(Real t, Real h) const { return velocity - (h - t) * acceleration; }
+  /// The same with the energy that it has at(t), which is on a straight way.
+  Vec3 arrival(Real t, Real h) const {
+    const Vec3 v = velocity_at(t, h);
+    const Vec3 shift = (t - from) * (path_velocity - (velocity_at(from, h) + v) / 2);
+    return velocity_after_shift(v, acceleration, shift);
+  }
 };
 
 inline bool may_collide(const Grain& a, const Grain& b) {
@@ -71,6 +78,7 @@ struct GrainStep {
   const Obstacles& moving;
   ImpactLaw law;
   Real collision_speed;  ///< what meets slower does not bounce [m/s]
+  BodyImpulses& impulses;  ///< on dynamic bodies
 };
 
 /// An approach as slow as what forces make within a sub-step belongs to resting contact, and so does what is

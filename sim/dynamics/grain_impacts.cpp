@@ -25,11 +25,10 @@ constexpr std::size_t kMaxUnsorted = 128;
 }  // namespace
 
 void GrainImpacts::resolve(std::span<Grain> grains, const GrainSearch& search, const GrainStep& step,
-                           std::vector<Reaction>& reactions, std::vector<GrainStrike>& strikes) {
+                           std::vector<GrainStrike>& strikes) {
   grains_ = grains;
   search_ = &search;
   step_ = &step;
-  reactions_ = &reactions;
   strikes_ = &strikes;
   stamp_.assign(grains.size(), 0);
   struck_body_.assign(grains.size(), kNone);
@@ -133,13 +132,19 @@ void GrainImpacts::collide_with_obstacle(const Impact& impact) {
   const Obstacle& o = *impact.obstacle;
   const Grain& g = grains_[impact.a];
   const Real fraction = impact.time / step_->h;
-  const Vec3 contact = g.at(impact.time) - g.radius * impact.normal;
-  const Vec3 u = g.velocity_at(impact.time, step_->h) - o.velocity_at(contact, fraction);
-  const Vec3 impulse = collision_impulse(o, contact, fraction, g.mass, u, impact.normal,
-                                         std::max(g.restitution, o.restitution),
-                                         pair_friction(g.friction, o.friction), o.is_dynamic());
+  const Vec3 contact = g.at(impact.time) - g.radius * impact.normal, arm = contact - o.centre_at(fraction);
+  const Vec3 surface =
+      o.is_dynamic() ? step_->impulses.velocity(o, arm) : o.velocity_at(contact, fraction);
+  const Vec3 u = g.arrival(impact.time, step_->h) - surface;
+  // What is struck may move away by now; then it is only in the way until it does.
+  const Vec3 impulse =
+      u.dot(impact.normal) < 0
+          ? collision_impulse(o, fraction, g.mass, u, impact.normal, std::max(g.restitution, o.restitution),
+                              pair_friction(g.friction, o.friction),
+                              o.is_dynamic() ? step_->impulses.mobility(o, arm) : Mat3(Mat3::Zero()))
+          : Vec3(Vec3::Zero());
   if (o.is_dynamic()) {
-    reactions_->push_back(reaction(o, contact, fraction, impulse));
+    step_->impulses.push(reaction(o, contact, fraction, impulse));
     struck_body_[impact.a] = o.body;
   }
   strike(impact.a, impact.time, impulse / g.mass, impact.normal);
@@ -150,7 +155,7 @@ void GrainImpacts::collide_grains(const Impact& impact) {
   const std::vector<uint32_t> members = cluster(impact);
   if (members.size() > 2) return collide_cluster(members, impact.time);
   const Grain &a = grains_[impact.a], &b = grains_[impact.b];
-  const Vec3 u = a.velocity_at(impact.time, step_->h) - b.velocity_at(impact.time, step_->h);
+  const Vec3 u = a.arrival(impact.time, step_->h) - b.arrival(impact.time, step_->h);
   const Vec3 impulse = collision_impulse(a.mass * b.mass / (a.mass + b.mass), u, impact.normal,
                                          pair_restitution(a, b), pair_friction(a.friction, b.friction));
   strike(impact.a, impact.time, impulse / a.mass, impact.normal);
@@ -182,7 +187,7 @@ void GrainImpacts::collide_cluster(std::span<const uint32_t> members, Real time)
   std::vector<Real> restitution;
   for (const uint32_t m : members)
     bodies.push_back(
-        {.inverse_mass = 1 / grains_[m].mass, .velocity = grains_[m].velocity_at(time, step_->h)});
+        {.inverse_mass = 1 / grains_[m].mass, .velocity = grains_[m].arrival(time, step_->h)});
   for (uint32_t i = 0; i < members.size(); ++i)
     for (uint32_t j = i + 1; j < members.size(); ++j) {
       const Grain &a = grains_[members[i]], &b = grains_[members[j]];
@@ -206,7 +211,7 @@ void GrainImpacts::collide_cluster(std::span<const uint32_t> members, Real time)
     if (normal[c.b] == Vec3::Zero()) normal[c.b] = -c.frame.n;
   }
   for (std::size_t m = 0; m < members.size(); ++m) {
-    const Vec3 change = bodies[m].velocity - grains_[members[m]].velocity_at(time, step_->h);
+    const Vec3 change = bodies[m].velocity - grains_[members[m]].arrival(time, step_->h);
     strike(members[m], time, change, normal[m]);
   }
   for (const uint32_t m : members) find_again(m);

@@ -19,11 +19,10 @@ class GrainImpacts {
  public:
   static constexpr uint32_t kNone = ~0u;
 
-  /// Takes the grains through their collisions. `search` must have sorted them and listed
-  /// their partners. Appends what bodies and
-  /// grains got.
+  /// Takes the grains through their collisions. `search` must have sorted them and listed their partners. Bodies
+  /// get theirs by the step's impulses; appends what grains got.
   void resolve(std::span<Grain> grains, const GrainSearch& search, const GrainStep& step,
-               std::vector<Reaction>& reactions, std::vector<GrainStrike>& strikes);
+               std::vector<GrainStrike>& strikes);
 
   /// The grains that collided.
   std::span<const uint32_t> changed() const { return changed_; }
@@ -63,7 +62,6 @@ class GrainImpacts {
   std::span<Grain> grains_;
   const GrainSearch* search_ = nullptr;
   const GrainStep* step_ = nullptr;
-  std::vector<Reaction>* reactions_ = nullptr;
   std::vector<GrainStrike>* strikes_ = nullptr;
   std::priority_queue<Impact, std::vector<Impact>, std::greater<>> queue_;
   std::vector<std::vector<Impact>> found_;  // by chunk

@@ -184,7 +184,10 @@ void GrainContacts::keep_outside(uint32_t i, NearObstacles& near, Vec3& end, Fou
       end = from;
       return;
     }
-    if (behind < 0) end -= behind * hit.normal;
+    if (behind < 0) {
+      end -= behind * hit.normal;
+      g.velocity = velocity_after_shift(g.velocity, g.acceleration, -behind * hit.normal);
+    }
     const Real approach = (surface - g.velocity).dot(hit.normal);
     if (approach <= 0 || o.body == impacts_->struck_body(i)) continue;
     g.velocity += approach * hit.normal;

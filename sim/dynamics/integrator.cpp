@@ -43,6 +43,35 @@ class SymplecticEuler final : public Integrator {
   }
 };
 
+class Leapfrog final : public Integrator {
+ public:
+  void step(const DynamicSystem& system, Real t, Real h, std::span<Real> x, std::span<Real> p,
+            IntegratorWorkspace& work) const override {
+    for (auto* v : {&work.x, &work.dx}) v->resize(x.size());
+    for (auto* v : {&work.p, &work.dp, &work.damping}) v->resize(p.size());
+    system.velocity(t, x, p, work.dx);
+    array(work.x) = array(x) + h / 2 * array(work.dx);
+    // work.p becomes the mean of p over the step.
+    if (system.force_and_damping(t + h / 2, work.x, p, work.dp, work.damping)) {
+      for (std::size_t i = 0; i < p.size(); ++i) {
+        const DampedKick kick(h, work.damping[i]);
+        work.p[i] = p[i] + kick.mean * work.dp[i];
+        p[i] += kick.end * work.dp[i];
+      }
+      count(work, 1);
+    } else {
+      system.force(t, x, p, work.dp);
+      array(work.p) = array(p) + h / 2 * array(work.dp);
+      system.force(t + h / 2, work.x, work.p, work.dp);
+      array(work.p) = array(p) + h / 2 * array(work.dp);
+      array(p) += h * array(work.dp);
+      count(work, 2);
+    }
+    system.velocity(t + h / 2, work.x, work.p, work.dx);
+    array(x) += h * array(work.dx);
+  }
+};
+
 class Midpoint final : public Integrator {
  public:
   void step(const DynamicSystem& system, Real t, Real h, std::span<Real> x, std::span<Real> p,
@@ -94,6 +123,11 @@ class RungeKutta4 final : public Integrator {
 
 }  // namespace
 
+bool DynamicSystem::force_and_damping(Real, std::span<const Real>, std::span<const Real>, std::span<Real>,
+                                      std::span<Real>) const {
+  return false;
+}
+
 void DynamicSystem::jacobian(Real t, std::span<const Real> x, std::span<const Real> p,
                              SparseEntries& entries) const {
   const std::size_t n = x.size(), size = n + p.size();
@@ -120,6 +154,7 @@ void DynamicSystem::jacobian(Real t, std::span<const Real> x, std::span<const Re
 const Integrator& integrator(IntegratorKind kind) {
   static const ExplicitEuler explicit_euler;
   static const SymplecticEuler symplectic_euler;
+  static const Leapfrog leapfrog;
   static const Midpoint midpoint;
   static const RungeKutta4 rk4;
   static const ImplicitEuler implicit_euler;
@@ -131,6 +166,8 @@ const Integrator& integrator(IntegratorKind kind) {
       return explicit_euler;
     case IntegratorKind::symplectic_euler:
       return symplectic_euler;
+    case IntegratorKind::leapfrog:
+      return leapfrog;
     case IntegratorKind::midpoint:
       return midpoint;
     case IntegratorKind::rk4:

@@ -25,6 +25,11 @@ class DynamicSystem {
                         std::span<Real> dx) const = 0;
   /// dp = dp/dt at time t.
   virtual void force(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const = 0;
+  /// The same, and in `damping` for each p the rate at which drag takes it away [1/s]: minus the derivative of
+  /// dp by p, where that couples no two of them. False, and nothing is written: forces depend on p in other
+  /// ways, or this is not known. Here false.
+  virtual bool force_and_damping(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp,
+                                 std::span<Real> damping) const;
   /// Appends the derivatives of (dx, dp) by (x, p), for implicit integration: row and column i are x_i, or
   /// p_(i - |x|). The places must not depend on the state. Small parts may be left out: the result is the
   /// same, found in more iterations. Here by differences, which suits small systems only.
@@ -59,14 +64,18 @@ struct IntegratorWorkspace {
   Real next_step = 0;
   IntegratorReport report;  ///< summed over all calls
 
-  std::vector<Real> x, p, dx, dp, sum_x, sum_p;
+  std::vector<Real> x, p, dx, dp, damping, sum_x, sum_p;
   std::vector<Real> next_x, next_p, error_x, error_p;
   std::vector<std::vector<Real>> stages_x, stages_p;
 };
 
 enum class IntegratorKind {
   explicit_euler,     ///< N1, order 1
-  symplectic_euler,   ///< order 1, keeps energy bounded; one force evaluation: the default for effects
+  symplectic_euler,   ///< order 1, keeps energy bounded; one force evaluation
+  /// Order 2: forces act at the middle of the step (drift, kick, drift). Symplectic without drag; drag damps as
+  /// 1 / (1 + z + z^2 / 2), z = h k / m, stable for any step. One evaluation of the forces where they depend on
+  /// the rates by drag alone (DynamicSystem::force_and_damping), else two. The default for particles.
+  leapfrog,
   midpoint,           ///< N3, RK2, order 2
   rk4,                ///< N4, order 4
   implicit_euler,     ///< N2, backward, order 1: stable for any stiffness, and damps what it cannot follow
@@ -74,6 +83,17 @@ enum class IntegratorKind {
   adaptive_midpoint,  ///< N5, step doubling
   adaptive_rk4,       ///< N5, step doubling
   dormand_prince,     ///< N5, embedded pair of orders 5 and 4
+};
+
+/// What an acceleration a at the start of a step of length h comes to where drag takes the velocity away at
+/// the rate k: v + end a at its end, v + mean a in its mean. To second order in h k, without overshoot for any.
+struct DampedKick {
+  DampedKick(Real h, Real k) {
+    const Real z = h * k, share = h / (1 + z + z * z / 2);
+    end = share * (1 + z / 2);
+    mean = share * (1 + z) / 2;
+  }
+  Real end, mean;
 };
 
 /// Advances (x, p) from t to t + h in place. The adaptive ones step inside by their own clock.

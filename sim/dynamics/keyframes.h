@@ -1,9 +1,11 @@
 #pragma once
-/// Keyframed motion of kinematic bodies (physics E8, N6): positions linear or smooth, orientations by slerp,
-/// and the velocities that belong to the interpolation.
+/// Keyframed motion of kinematic bodies (physics E8, N6): positions by one of the interpolations, orientations
+/// by slerp, and the velocities that belong to them.
 
+#include <optional>
 #include <vector>
 
+#include "sim/dynamics/interpolation.h"
 #include "sim/types.h"
 
 namespace offstage::sim {
@@ -11,11 +13,7 @@ namespace offstage::sim {
 struct Keyframe {
   Real time = 0;  ///< [s]
   Pose pose;
-};
-
-enum class Interpolation {
-  linear,  ///< constant velocity between keys
-  smooth,  ///< cubic Hermite through the keys with Catmull-Rom tangents: continuous velocity
+  std::optional<Interpolation> interpolation = {};  ///< to the next key; default: the track's
 };
 
 /// A pose with the velocities of the motion through it.
@@ -29,13 +27,17 @@ struct Motion {
 /// many).
 struct KeyframeTrack {
   std::vector<Keyframe> keys;  ///< strictly increasing times; empty: rests at the body's initial pose
-  Interpolation interpolation = Interpolation::smooth;
+  Interpolation interpolation = Interpolation::monotone;  ///< of positions; orientations turn at a constant
+                                                          ///< rate between two keys, or step
   bool loop = false;  ///< repeat with the period keys.back().time - keys.front().time; else hold the ends
   Vec3 spin = Vec3::Zero();  ///< extra rotation about the body's origin, body axes [rad/s]
 
   bool moves() const { return !keys.empty() || !spin.isZero(); }
   /// Pose and exact derivative at time t; `rest` is the pose where there are no keys.
   Motion at(Real t, const Pose& rest) const;
+  /// Whether the pose jumps after `from` and not after `to`, by a step or at the end of a loop that does not
+  /// close.
+  bool jumps(Real from, Real to) const;
 };
 
 }  // namespace offstage::sim

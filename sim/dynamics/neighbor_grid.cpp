@@ -33,7 +33,7 @@ void NeighborGrid::choose_torus(std::span<const Vec3> points) {
   std::array<Real, 3> extent;
   for (int k = 0; k < 3; ++k)
     extent[static_cast<std::size_t>(k)] =
-        static_cast<Real>(coordinate(box.max()[k]) - coordinate(box.min()[k]) + 1);
+        points.empty() ? 1 : static_cast<Real>(coordinate(box.max()[k]) - coordinate(box.min()[k]) + 1);
   axis_ = {0, 1, 2};
   std::stable_sort(axis_.begin(), axis_.end(), [&](Eigen::Index a, Eigen::Index b) {
     return extent[static_cast<std::size_t>(a)] > extent[static_cast<std::size_t>(b)];
@@ -52,9 +52,9 @@ void NeighborGrid::build(std::span<const Vec3> points, Real cell) {
   inverse_ = 1 / cell;
   index_.resize(n);
   for (std::vector<Real>* of_axis : {&x_, &y_, &z_}) of_axis->resize(n + kLanes);
-  if (n == 0) return;
   choose_torus(points);
   const uint32_t all_bits = bits_[0] + bits_[1] + bits_[2];
+  if (n == 0) return begin_.assign((std::size_t{1} << all_bits) + 1, 0);
   const uint32_t shift = all_bits > kPartBits ? all_bits - kPartBits : 0, parts = 1u << (all_bits - shift);
   const std::size_t chunks = (n + kGridChunk - 1) / kGridChunk;
   const auto for_chunks = [&](auto&& f) {

@@ -12,6 +12,9 @@ constexpr std::size_t kCollisionChunk = 1024;
 /// Thickness of the layers in greatest radii: partners in contact are in neighbouring ones unless they are
 /// fast.
 constexpr Real kLayer = 3;
+/// What a change of the ways adds to how near two must come to be partners: the middle and half the length of
+/// each way change by half as much at most, and by as much again where one was born within the sub-step.
+constexpr Real kSlack = 3;
 
 template <class F>
 void for_each_chunked(std::size_t n, F&& f) {
@@ -32,22 +35,23 @@ void ParticleCollisions::step(std::span<ParticleSystem* const> systems, const Pa
   sort();
   match();
 
-  const GrainStep step{stage.h, stage.fixed, stage.moving, law, collision_speed};
-  Real largest = 0;
-  for (const Grain& g : grains_) largest = std::max(largest, g.radius);
-  const Real margin = GrainContacts::kMargin * largest;
-  search_.build(grains_, stage.h, margin);
-  search_.list_partners(grains_);
-  impacts_.resolve(grains_, search_, step, reactions_, strikes_);
-
-  // Resting contact moves by the velocities at the end.
-  for (const uint32_t i : impacts_.changed()) end_[i] = grains_[i].at(stage.h);
-  bool moved = !impacts_.changed().empty();
-  for (Grain& g : grains_) {
-    moved |= g.path_velocity != g.velocity;
-    g.path_velocity = g.velocity;
+  const GrainStep step{stage.h, stage.fixed, stage.moving, law, collision_speed, stage.impulses};
+  // Resting contact moves by the velocities at the end. The partners found by the mean velocities serve for that,
+  // too, unless grains speed up by much in a sub-step.
+  Real largest = 0, change = 0;
+  for (const Grain& g : grains_) {
+    largest = std::max(largest, g.radius);
+    change = std::max(change, (stage.h - g.from) * (g.velocity - g.path_velocity).norm());
   }
-  if (moved) {
+  const Real margin = GrainContacts::kMargin * largest;
+  const bool changes_little = change < margin;
+  search_.build(grains_, stage.h, changes_little ? margin + kSlack * change : margin);
+  search_.list_partners(grains_);
+  impacts_.resolve(grains_, search_, step, strikes_);
+
+  for (const uint32_t i : impacts_.changed()) end_[i] = grains_[i].at(stage.h);
+  for (Grain& g : grains_) g.path_velocity = g.velocity;
+  if (!changes_little || !impacts_.changed().empty()) {
     search_.build(grains_, stage.h, margin);
     search_.list_partners(grains_);
   }
@@ -190,7 +194,7 @@ void ParticleCollisions::scatter(const ParticleStage& stage) {
       tally.events.push_back(
           system.collision_event(stage, source.index, {s.time / stage.h, s.position, s.velocity, s.normal}));
   }
-  if (!outcomes_.empty()) outcomes_.front().tally.reactions = reactions_;
+  for (const Reaction& r : reactions_) stage.impulses.push(r);
 }
 
 }  // namespace offstage::sim

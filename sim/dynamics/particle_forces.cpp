@@ -14,11 +14,15 @@ struct Run {
   std::span<const Real> x, v, mass;
   Real own_drag;
   std::span<Real> dv;
+  std::span<Real> damping;  // by particle; may be empty
 
   std::size_t size() const { return mass.size(); }
   Eigen::Map<const Vec3> position(std::size_t i) const { return vec3(x, 3 * i); }
   Eigen::Map<const Vec3> velocity(std::size_t i) const { return vec3(v, 3 * i); }
   void push(std::size_t i, const Vec3& force) const { vec3(dv, 3 * i) += 1 / mass[i] * force; }
+  void damp(std::size_t i, Real drag) const {
+    if (!damping.empty()) damping[i] += drag / mass[i];
+  }
 
   Run part(std::size_t begin, std::size_t count) const {
     return {time,
@@ -26,7 +30,8 @@ struct Run {
             v.subspan(3 * begin, 3 * count),
             mass.subspan(begin, count),
             own_drag,
-            dv.subspan(3 * begin, 3 * count)};
+            dv.subspan(3 * begin, 3 * count),
+            damping.empty() ? damping : damping.subspan(begin, count)};
   }
 };
 
@@ -62,9 +67,11 @@ void add_air(const Field& f, const Run& run, Blow&& blow) {
   for_each_block(f, run, [&](const Run& b, std::span<const Real> share) {
     std::array<Real, 3 * kBlock> air;
     blow(b, std::span(air).first(3 * b.size()));
-    for (std::size_t i = 0; i < b.size(); ++i)
+    for (std::size_t i = 0; i < b.size(); ++i) {
       b.push(i,
              share[i] * air_drag(f.drag, b.own_drag, vec3(std::span<const Real>(air), 3 * i), b.velocity(i)));
+      b.damp(i, share[i] * f.drag);
+    }
   });
 }
 void add(const WindField& f, const Run& run) {
@@ -86,7 +93,9 @@ void add(const Grab& f, const Run& run) {
   const Motion hand = f.track.at(run.time, Pose{});
   for (std::size_t i = 0; i < run.size(); ++i) {
     const Vec3 gap = run.position(i) - hand.pose.position;
-    if (gap.norm() < f.reach) run.push(i, -f.stiffness * gap - f.damping * (run.velocity(i) - hand.velocity));
+    if (!(gap.norm() < f.reach)) continue;
+    run.push(i, -f.stiffness * gap - f.damping * (run.velocity(i) - hand.velocity));
+    run.damp(i, f.damping);
   }
 }
 template <class Other>
@@ -112,12 +121,32 @@ Stiffness stiffness(const Effect& f, Real, const Vec3& x) {
 }  // namespace
 
 void ParticleForces::accelerate(Real t, std::span<const Real> x, std::span<const Real> v,
-                                std::span<const Real> mass, std::span<Real> dv) const {
+                                std::span<const Real> mass, std::span<Real> dv,
+                                std::span<Real> damping) const {
   for (std::size_t i = 0; i < mass.size(); ++i) vec3(dv, 3 * i) = acceleration(vec3(v, 3 * i), mass[i]);
-  const Run run{t, x, v, mass, drag, dv};
+  for (std::size_t i = 0; i < damping.size(); ++i) damping[i] = drag / mass[i];
+  const Run run{t, x, v, mass, drag, dv, damping};
   for (const ForceDef* field : fields) {
     if (field->is_on(t)) std::visit([&](const auto& effect) { add(effect, run); }, field->effect);
   }
+}
+
+void ParticleForces::leap(Real h, std::span<Vec3> x, std::span<Vec3> v, std::span<const Real> mass) const {
+  for (std::size_t i = 0; i < mass.size(); ++i) {
+    const Vec3 a = acceleration(v[i], mass[i]);
+    const DampedKick kick(h, drag / mass[i]);
+    x[i] += h * (v[i] + kick.mean * a);
+    v[i] += kick.end * a;
+  }
+}
+
+bool FreeFlight::force_and_damping(Real t, std::span<const Real> x, std::span<const Real> p,
+                                   std::span<Real> dp, std::span<Real> damping) const {
+  // One rate for each particle, then spread over its three coordinates, the last first.
+  const std::size_t count = mass_.size();
+  forces_.accelerate(t, x, p, mass_, dp, damping.first(count));
+  for (std::size_t i = count; i-- > 0;) std::fill_n(damping.begin() + static_cast<std::ptrdiff_t>(3 * i), 3, Real(damping[i]));
+  return true;
 }
 
 void ParticleForces::jacobian(Real t, std::span<const Real> x, std::span<const Real> mass, int at_x, int at_v,

@@ -26,9 +26,12 @@ struct ParticleForces {
   Vec3 acceleration(const Vec3& v, Real mass) const {
     return gravity + (force - drag * (v - wind)) * (1 / mass);
   }
-  /// By everything, of a run of particles: x, v and dv have x y z after each other.
+  /// By everything, of a run of particles: x, v and dv have x y z after each other. `damping`, if not empty,
+  /// has for each particle the rate at which drag takes its velocity away [1/s].
   void accelerate(Real t, std::span<const Real> x, std::span<const Real> v, std::span<const Real> mass,
-                  std::span<Real> dv) const;
+                  std::span<Real> dv, std::span<Real> damping = {}) const;
+  /// A step of IntegratorKind::leapfrog of a run of particles that no field acts on.
+  void leap(Real h, std::span<Vec3> x, std::span<Vec3> v, std::span<const Real> mass) const;
   /// Appends the derivatives of (dx/dt, dv/dt) of a run of particles by (x, v), which begin at the rows and
   /// columns `at_x` and `at_v`. Left out is how fields change from place to place: it does not make a system
   /// stiff.
@@ -51,6 +54,8 @@ class FreeFlight final : public DynamicSystem {
   void force(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const override {
     forces_.accelerate(t, x, p, mass_, dp);
   }
+  bool force_and_damping(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp,
+                         std::span<Real> damping) const override;
   void jacobian(Real t, std::span<const Real> x, std::span<const Real>,
                 SparseEntries& entries) const override {
     forces_.jacobian(t, x, mass_, 0, static_cast<int>(x.size()), entries);

@@ -44,7 +44,7 @@ SweepOutcome ParticleSweep::operator()(ParticlePath& path, Real born, const Vec3
     const ObstacleHit hit = near_.first_hit(path.start, path.end, path.radius, from);
     if (!hit.obstacle) return outcome;
     outcome.hit = true;
-    respond(path, hit, from, extra, outcome);
+    if (!respond(path, hit, from, extra, outcome)) return outcome;
     from = hit.fraction;
     if (hits + 1 == kMaxHits) break;
     near_.find(path.start, path.end, path.radius);
@@ -122,37 +122,56 @@ bool ParticleSweep::was_struck(const Obstacle& o) const {
                      [&](const Contact& c) { return c.gives_way && c.obstacle == &o; });
 }
 
-/// Velocity after free flight: the midpoint rule, exact for constant forces.
+/// Velocity after free flight: to second order in the drag, exact for constant forces.
 Vec3 ParticleSweep::fly(const Vec3& v, Real mass, Real duration, const Vec3& extra) const {
-  const Vec3 middle = v + duration / 2 * (forces_.acceleration(v, mass) + extra);
-  return v + duration * (forces_.acceleration(middle, mass) + extra);
+  return v + DampedKick(duration, forces_.drag / mass).end * (forces_.acceleration(v, mass) + extra);
 }
 
 /// Puts the particle at the hit with its velocity after the impulse (P5), and integrates the rest of its
-/// path.
-void ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real from, const Vec3& extra,
+/// path. False: it strikes a body, and others may do so before it.
+bool ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real from, const Vec3& extra,
                             SweepOutcome& outcome) {
   const Obstacle& o = *hit.obstacle;
   const Real friction = std::sqrt(path.friction * o.friction);
   log_.reactions.resize(reactions_before_finish_);
-  Vec3 v = fly(path.start_velocity, path.mass, (hit.fraction - from) * h_, extra);
+  const Real duration = (hit.fraction - from) * h_;
+  Vec3 v = fly(path.start_velocity, path.mass, duration, extra);
+  const Vec3 acceleration = forces_.acceleration(v, path.mass) + extra;
+  v = velocity_after_shift(v, acceleration,
+                           hit.position - path.start - duration / 2 * (path.start_velocity + v));
 
-  const Vec3 u = v - o.velocity_at(hit.position, hit.fraction);
-  const Real approach = -u.dot(hit.normal);
-  const Real pressing = -(forces_.acceleration(v, path.mass) + extra).dot(hit.normal);
+  Vec3 u = v - o.velocity_at(hit.position, hit.fraction);
+  Real approach = -u.dot(hit.normal);
+  const Real pressing = -acceleration.dot(hit.normal);
   const Real gain = pressing * h_;  // approach speed that the forces would restore within one sub-step
   Real restitution = std::max(path.restitution, o.restitution);
-  // A bounce lasts 2 e u / a. One that ends within the sub-step is the tail of an infinite series (E6, Zeno).
-  if (2 * restitution * approach < gain) restitution = 0;
   const bool strikes = approach > std::max(gain, 0.0);
   // Only what strikes moves the obstacle: what rests on it is held by what holds the obstacle.
   const bool moves_it = strikes && o.is_dynamic(), moved_it = was_struck(o);
+  const Vec3 contact = hit.position - path.radius * hit.normal;
+  Mat3 mobility = Mat3::Zero();
+  if (moves_it && !moved_it) {
+    if (!impulses_) {
+      outcome.strikes_body = true;
+      outcome.time = hit.fraction;
+      return false;
+    }
+    const Vec3 arm = contact - o.centre_at(hit.fraction);
+    u = v - impulses_->velocity(o, arm);
+    approach = -u.dot(hit.normal);
+    mobility = impulses_->mobility(o, arm);
+  }
+  // A bounce lasts 2 e u / a. One that ends within the sub-step is the tail of an infinite series (E6, Zeno).
+  if (2 * restitution * approach < gain) restitution = 0;
   if (approach > 0 && !moved_it) {
-    const Vec3 contact = hit.position - path.radius * hit.normal;
-    const Vec3 impulse = collision_impulse(o, contact, hit.fraction, path.mass, u, hit.normal, restitution,
-                                           friction, moves_it);
+    const Vec3 impulse =
+        collision_impulse(o, hit.fraction, path.mass, u, hit.normal, restitution, friction, mobility);
     v += impulse / path.mass;
-    if (o.is_dynamic()) log_.reactions.push_back(reaction(o, contact, hit.fraction, impulse));
+    const Reaction back = reaction(o, contact, hit.fraction, impulse);
+    if (moves_it)
+      impulses_->push(back);
+    else if (o.is_dynamic())
+      log_.reactions.push_back(back);
   }
   if (strikes && !moved_it) {
     ++outcome.collisions;
@@ -163,6 +182,7 @@ void ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real fro
   path.start_velocity = v;
   reactions_before_finish_ = log_.reactions.size();
   finish(path, (1 - hit.fraction) * h_, extra);
+  return true;
 }
 
 /// The oldest contact gives way: it matters least where the particle is now.
@@ -185,7 +205,7 @@ void ParticleSweep::finish(ParticlePath& path, Real duration, const Vec3& extra)
     const Vec3 u = v - c.obstacle->velocity_at(predicted, 1);
     if (u.dot(c.normal) >= 0) return false;
     const Vec3 impulse =
-        collision_impulse(*c.obstacle, predicted, 1, path.mass, u, c.normal, 0, c.friction, false);
+        collision_impulse(*c.obstacle, 1, path.mass, u, c.normal, 0, c.friction, Mat3::Zero());
     v += impulse / path.mass;
     if (c.obstacle->is_dynamic())
       log_.reactions.push_back(
@@ -203,20 +223,23 @@ void ParticleSweep::finish(ParticlePath& path, Real duration, const Vec3& extra)
     const Contact& c = contacts_[i];
     if (!c.gives_way) continue;
     const Vec3 behind = duration * c.obstacle->velocity_at(path.start, 1) - (path.end - path.start);
-    if (behind.dot(c.normal) > 0) path.end += behind.dot(c.normal) * c.normal;
+    if (!(behind.dot(c.normal) > 0)) continue;
+    const Vec3 shift = behind.dot(c.normal) * c.normal;
+    path.end += shift;
+    path.end_velocity = velocity_after_shift(
+        path.end_velocity, forces_.acceleration(path.end_velocity, path.mass) + extra, shift);
   }
 }
 
-Vec3 collision_impulse(const Obstacle& o, const Vec3& contact, Real fraction, Real particle_mass,
-                       const Vec3& u, const Vec3& n, Real restitution, Real friction, bool moves_it) {
+Vec3 collision_impulse(const Obstacle& o, Real fraction, Real particle_mass, const Vec3& u, const Vec3& n,
+                       Real restitution, Real friction, const Mat3& mobility) {
   const Vec3 fibre = o.fibre_on(n, fraction);
   const bool isotropic = fibre.isZero();
-  if (!moves_it && isotropic) return collision_impulse(particle_mass, u, n, restitution, friction);
+  if (mobility.isZero(0) && isotropic) return collision_impulse(particle_mass, u, n, restitution, friction);
   const ContactFrame f = isotropic ? contact_frame(n) : ContactFrame{n, fibre, n.cross(fibre)};
   Mat3 axes;
   axes << f.n, f.t, f.k;
-  Mat3 K = Mat3::Identity() / particle_mass;
-  if (moves_it) K += o.mobility(contact - o.centre_at(fraction));
+  const Mat3 K = Mat3::Identity() / particle_mass + mobility;
   return axes * collision_impulse(Mat3(axes.transpose() * K * axes), Vec3(axes.transpose() * u), restitution,
                                   friction, isotropic ? friction : o.cross_friction * friction);
 }

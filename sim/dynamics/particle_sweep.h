@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "sim/collision/obstacles.h"
+#include "sim/dynamics/body_impulses.h"
 #include "sim/dynamics/particle_forces.h"
 
 namespace offstage::sim {
@@ -27,6 +28,8 @@ struct SweepOutcome {
   bool ejected = false;     ///< found inside a body, projected out (P4)
   bool trapped = false;     ///< found inside a body, could not be projected out (P4)
   bool truncated = false;   ///< used up its hits
+  bool strikes_body = false;  ///< left as it was before, because it strikes a dynamic body ...
+  Real time = 0;              ///< ... at this fraction of the sub-step
 };
 
 /// A collision of a particle, after it.
@@ -51,12 +54,11 @@ struct ObstacleHit {
   Vec3 normal;        ///< of the obstacle
 };
 
-/// Impulse on a particle that meets an obstacle at its surface point `contact`, at a fraction of the
-/// sub-step, with the relative velocity u, u.n < 0 (P5, P8); `moves_it`: an obstacle that gives way.
-/// `friction` counts along the obstacle's fibre; across it `cross_friction` of that, and each sticks or
-/// slides by itself.
-Vec3 collision_impulse(const Obstacle& o, const Vec3& contact, Real fraction, Real particle_mass,
-                       const Vec3& u, const Vec3& n, Real restitution, Real friction, bool moves_it);
+/// Impulse on a particle that meets an obstacle at a fraction of the sub-step with the relative velocity u,
+/// u.n < 0 (P5, P8); `mobility`: of the obstacle at the contact, zero if it does not give way. `friction` counts
+/// along the obstacle's fibre; across it `cross_friction` of that, and each sticks or slides by itself.
+Vec3 collision_impulse(const Obstacle& o, Real fraction, Real particle_mass, const Vec3& u, const Vec3& n,
+                       Real restitution, Real friction, const Mat3& mobility);
 /// What an impulse on a particle does to the obstacle.
 Reaction reaction(const Obstacle& o, const Vec3& contact, Real fraction, const Vec3& impulse_on_particle);
 
@@ -88,10 +90,12 @@ class NearObstacles {
 
 class ParticleSweep {
  public:
-  /// `fixed` and `moving` are the obstacles of a sub-step of length h [s].
+  /// `fixed` and `moving` are the obstacles of a sub-step of length h [s]. Those that strike dynamic bodies change
+  /// `impulses`, one after the other; without, as where many sweep at the same time, they are left as they were
+  /// and reported (SweepOutcome::strikes_body).
   ParticleSweep(const Obstacles& fixed, const Obstacles& moving, const ParticleForces& forces, Real h,
-                SweepLog& log)
-      : near_(fixed, moving), forces_(forces), h_(h), log_(log) {}
+                SweepLog& log, BodyImpulses* impulses = nullptr)
+      : near_(fixed, moving), forces_(forces), h_(h), log_(log), impulses_(impulses) {}
 
   /// The particle lives from fraction `born` of the sub-step to its end. `extra` is the mean acceleration by
   /// forces beyond ParticleForces (springs).
@@ -110,7 +114,7 @@ class ParticleSweep {
   };
 
   bool was_struck(const Obstacle& o) const;
-  void respond(ParticlePath& path, const ObstacleHit& hit, Real from, const Vec3& extra,
+  bool respond(ParticlePath& path, const ObstacleHit& hit, Real from, const Vec3& extra,
                SweepOutcome& outcome);
   void finish(ParticlePath& path, Real duration, const Vec3& extra);
   void add_contact(const Contact& contact);
@@ -120,6 +124,7 @@ class ParticleSweep {
   const ParticleForces& forces_;
   Real h_;
   SweepLog& log_;
+  BodyImpulses* impulses_;
   std::size_t reactions_before_finish_ = 0;
   std::array<Contact, 4> contacts_;
   std::size_t contact_count_ = 0;

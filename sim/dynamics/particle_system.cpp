@@ -16,6 +16,8 @@ namespace {
 constexpr std::size_t kChunk = 1024;
 /// Steps a second of what was born long ago, and how many at most.
 constexpr Real kStepsBefore = 120, kMostStepsBefore = 10000;
+/// Durations that come of rounding alone [s].
+constexpr Real kRounding = 1e-11;
 
 std::size_t chunk_count(std::size_t n) {
   return (n + kChunk - 1) / kChunk;
@@ -34,6 +36,14 @@ struct ParticleSystem::Scratch {
   std::vector<Vec3> position, velocity;  // at the start of the sub-step
 };
 
+/// A particle that strikes a body, and its flight so far.
+struct ParticleSystem::Striker {
+  Real time;  // as a fraction of the sub-step
+  std::size_t particle;
+  Flight flight;
+  bool integrated;
+};
+
 ParticleTally& ParticleTally::operator+=(const ParticleTally& t) {
   expired += t.expired;
   retired += t.retired;
@@ -42,7 +52,6 @@ ParticleTally& ParticleTally::operator+=(const ParticleTally& t) {
   collisions += t.collisions;
   truncated += t.truncated;
   if (!lost) lost = t.lost;
-  reactions.insert(reactions.end(), t.reactions.begin(), t.reactions.end());
   events.insert(events.end(), t.events.begin(), t.events.end());
   return *this;
 }
@@ -73,25 +82,35 @@ void ParticleSystem::begin_coupled() {
   start_velocity_ = arrays.velocity;
 }
 
-/// Free flight of a run of particles, its start kept in `scratch`.
+/// Free flight of a run of particles, its start kept in `scratch`. Before the world begins forces are those of
+/// its first moment.
 void ParticleSystem::fly(const ParticleForces& forces, Real t, Real h, std::size_t begin, std::size_t end,
                          Scratch& scratch) {
   const auto x = part(arrays.position, begin, end), v = part(arrays.velocity, begin, end);
   scratch.position.assign(x.begin(), x.end());
   scratch.velocity.assign(v.begin(), v.end());
+  const auto mass = part(arrays.mass, begin, end);
+  t = std::max(t, 0.0);
+  if (def.integrator == IntegratorKind::leapfrog && forces.fields.empty()) return forces.leap(h, x, v, mass);
   scratch.integrator.next_step = 0;  // whose step it was depends on the threads
-  integrator(def.integrator)
-      .step(FreeFlight(forces, part(arrays.mass, begin, end)), t, h, flat(x), flat(v), scratch.integrator);
+  integrator(def.integrator).step(FreeFlight(forces, mass), t, h, flat(x), flat(v), scratch.integrator);
 }
 
 /// What was born before the world began, or long before this sub-step, has flown freely until it begins.
-void ParticleSystem::fly_before(const ParticleForces& forces, const ParticleStage& stage, std::size_t i,
-                                Real duration, Scratch& scratch) {
+void ParticleSystem::fly_before(const ParticleForces& forces, Real t, std::size_t i, Real duration,
+                                Scratch& scratch) {
   duration = std::min(duration, arrays.lifespan[i]);
-  if (!(duration > 1e-9 * stage.h)) return;  // nothing but rounding
+  if (!(duration > kRounding)) return;
   const Real steps = std::clamp(std::ceil(duration * kStepsBefore), 1.0, kMostStepsBefore);
-  for (Real k = 0; k < steps; ++k) fly(forces, stage.time, duration / steps, i, i + 1, scratch);
+  for (Real k = 0; k < steps; ++k) fly(forces, t, duration / steps, i, i + 1, scratch);
   arrays.age[i] += duration;
+}
+
+void ParticleSystem::admit_newborn(const ParticleForces& forces) {
+  Scratch scratch;
+  const std::size_t old = arrays.size() - newborn.size();
+  for (std::size_t i = old; i < arrays.size(); ++i) fly_before(forces, 0, i, newborn[i - old], scratch);
+  newborn.clear();
 }
 
 /// Flies every particle, and calls make_landing(chunk)(i, flight, integrated) when it has flown; `integrated`
@@ -119,7 +138,7 @@ void ParticleSystem::fly_each(const ParticleStage& stage, const ParticleForces& 
     Scratch& scratch = scratches.local();
     for (std::size_t i = begin; i < end; ++i) {
       const bool integrated = coupled && whole_step(i);
-      fly_before(forces, stage, i, newborn[i - old] - stage.h, scratch);
+      fly_before(forces, stage.time, i, newborn[i - old] - stage.h, scratch);
       const Real duration = whole_step(i) ? stage.h : std::min(newborn[i - old], stage.h);
       if (!integrated) fly(forces, stage.time + (stage.h - duration), duration, i, i + 1, scratch);
       const Vec3 x0 = integrated ? start_position_[i] : scratch.position[0];
@@ -149,6 +168,7 @@ SweepOutcome ParticleSystem::sweep(const ParticleStage& stage, const ParticleFor
                                  forces.acceleration((flight.velocity + v) / 2, path.mass))
                           : Vec3(Vec3::Zero());
   const SweepOutcome outcome = sweep(path, 1 - flight.duration / stage.h, extra);
+  if (outcome.strikes_body) return outcome;
   x = path.end;
   v = path.end_velocity;
   return outcome;
@@ -204,6 +224,7 @@ ParticleTally ParticleSystem::step(const ParticleStage& stage, const ParticleFor
   fate_.resize(arrays.size());
   std::vector<ParticleTally> tallies(chunk_count(old) + chunk_count(newborn.size()));
   std::vector<SweepLog> logs(tallies.size());
+  std::vector<std::vector<Striker>> strikers(tallies.size());
   fly_each(stage, forces, coupled, [&](std::size_t chunk) {
     logs[chunk].wants_strikes = def.report_collisions;
     return [&, chunk, &log = logs[chunk],
@@ -216,19 +237,54 @@ ParticleTally ParticleSystem::step(const ParticleStage& stage, const ParticleFor
         return;
       }
       SweepOutcome outcome;
-      if (def.collides && flight.duration > 0)
+      if (def.collides && flight.duration > 0) {
+        const std::size_t reactions = log.reactions.size();
         outcome = sweep(stage, forces, obstacles, i, flight, integrated);
-      tally.collisions += outcome.collisions;
-      tally.ejected += outcome.ejected;
-      tally.truncated += outcome.truncated;
-      for (const Strike& strike : log.strikes) tally.events.push_back(collision_event(stage, i, strike));
-      log.strikes.clear();
-      end(stage, i, outcome.hit && def.dies_on_hit, outcome.trapped, tally);
+        if (outcome.strikes_body) {
+          log.reactions.resize(reactions);
+          log.strikes.clear();
+          strikers[chunk].push_back({outcome.time, i, flight, integrated});
+          return;
+        }
+      }
+      conclude(stage, i, outcome, log, tally);
     };
   });
-  for (std::size_t chunk = 0; chunk < logs.size(); ++chunk)
-    tallies[chunk].reactions = std::move(logs[chunk].reactions);
+  std::vector<Striker> all;
+  for (std::size_t chunk = 0; chunk < logs.size(); ++chunk) {
+    for (const Reaction& r : logs[chunk].reactions) stage.impulses.push(r);
+    all.insert(all.end(), strikers[chunk].begin(), strikers[chunk].end());
+  }
+  if (!all.empty()) strike_bodies(stage, forces, std::move(all), tallies.front());
   return sum_up(tallies);
+}
+
+/// Those that strike dynamic bodies do so one after the other, in the order of time: each meets a body with the
+/// velocity that the ones before it have left it.
+void ParticleSystem::strike_bodies(const ParticleStage& stage, const ParticleForces& forces,
+                                   std::vector<Striker> strikers, ParticleTally& tally) {
+  std::sort(strikers.begin(), strikers.end(), [](const Striker& a, const Striker& b) {
+    return a.time != b.time ? a.time < b.time : a.particle < b.particle;
+  });
+  SweepLog log;
+  log.wants_strikes = def.report_collisions;
+  ParticleSweep obstacles(stage.fixed, stage.moving, forces, stage.h, log, &stage.impulses);
+  for (const Striker& s : strikers) {
+    const SweepOutcome outcome = sweep(stage, forces, obstacles, s.particle, s.flight, s.integrated);
+    for (const Reaction& r : log.reactions) stage.impulses.push(r);
+    log.reactions.clear();
+    conclude(stage, s.particle, outcome, log, tally);
+  }
+}
+
+void ParticleSystem::conclude(const ParticleStage& stage, std::size_t i, const SweepOutcome& outcome,
+                              SweepLog& log, ParticleTally& tally) {
+  tally.collisions += outcome.collisions;
+  tally.ejected += outcome.ejected;
+  tally.truncated += outcome.truncated;
+  for (const Strike& strike : log.strikes) tally.events.push_back(collision_event(stage, i, strike));
+  log.strikes.clear();
+  end(stage, i, outcome.hit && def.dies_on_hit, outcome.trapped, tally);
 }
 
 void ParticleSystem::fly_all(const ParticleStage& stage, const ParticleForces& forces, bool coupled) {

@@ -20,7 +20,6 @@ struct ParticleTally {
   uint64_t expired = 0, retired = 0, ejected = 0, removed = 0, collisions = 0, truncated = 0;
   std::optional<NonFinite>
       lost;  ///< the first particle that stopped being finite; `object` is left to the world
-  std::vector<Reaction> reactions;    ///< on bodies
   std::vector<ParticleEvent> events;  ///< if the system reports them
 
   ParticleTally& operator+=(const ParticleTally& t);
@@ -32,6 +31,7 @@ struct ParticleStage {
   const Obstacles& fixed;
   const Obstacles& moving;
   const Aabb& bounds;
+  BodyImpulses& impulses;  ///< on dynamic bodies
 };
 
 struct ParticleSystem {
@@ -53,6 +53,9 @@ struct ParticleSystem {
     return i < old || newborn[i - old] < 0;
   }
 
+  /// Takes in those added since the last sub-step as they are now: each flies for as long as it has lived, and
+  /// lives through the whole coming sub-step.
+  void admit_newborn(const ParticleForces& forces);
   /// Keeps the state at the start of the sub-step, for those that integrate the whole system themselves.
   void begin_coupled();
   bool hits_particles() const { return def.internal || def.external; }
@@ -81,13 +84,17 @@ struct ParticleSystem {
   void fly_each(const ParticleStage& stage, const ParticleForces& forces, bool coupled,
                 MakeLanding&& make_landing);
   bool is_lost(std::size_t i, const Flight& flight, ParticleTally& tally) const;
+  struct Striker;
+  void strike_bodies(const ParticleStage& stage, const ParticleForces& forces, std::vector<Striker> strikers,
+                     ParticleTally& tally);
+  void conclude(const ParticleStage& stage, std::size_t i, const SweepOutcome& outcome, SweepLog& log,
+                ParticleTally& tally);
   void end(const ParticleStage& stage, std::size_t i, bool spent, bool trapped, ParticleTally& tally);
   ParticleTally sum_up(std::span<const ParticleTally> tallies);
 
   void fly(const ParticleForces& forces, Real t, Real h, std::size_t begin, std::size_t end,
            Scratch& scratch);
-  void fly_before(const ParticleForces& forces, const ParticleStage& stage, std::size_t i, Real duration,
-                  Scratch& scratch);
+  void fly_before(const ParticleForces& forces, Real t, std::size_t i, Real duration, Scratch& scratch);
   SweepOutcome sweep(const ParticleStage& stage, const ParticleForces& forces, ParticleSweep& sweep,
                      std::size_t i, const Flight& flight, bool integrated);
   void remove_dead();

@@ -1,5 +1,6 @@
 #include "sim/dynamics/particles.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace offstage::sim {
@@ -11,6 +12,11 @@ Vec3 collision_impulse(Real m12, const Vec3& u, const Vec3& n, Real restitution,
   const Real to_stick = m12 * sliding.norm(), limit = friction * normal_impulse;
   const Real share = to_stick > limit ? limit / to_stick : 1;
   return normal_impulse * n - share * m12 * sliding;
+}
+
+Vec3 velocity_after_shift(const Vec3& v, const Vec3& a, const Vec3& shift) {
+  const Real speed2 = v.squaredNorm();
+  return speed2 > 0 ? Vec3(std::sqrt(std::max(0.0, 1 + 2 * a.dot(shift) / speed2)) * v) : v;
 }
 
 std::optional<Real> meeting_time(const Vec3& d, const Vec3& u, Real distance) {

@@ -38,7 +38,7 @@ struct ParticleSystemDef {
   bool dies_on_hit = false;        ///< removed at its first collision
   bool report_collisions = false;  ///< as ParticleEvent
   bool report_deaths = false;      ///< of age, as ParticleEvent
-  IntegratorKind integrator = IntegratorKind::symplectic_euler;
+  IntegratorKind integrator = IntegratorKind::leapfrog;
 };
 
 /// Something that happened to a particle in the last sub-step, for effects to answer to.
@@ -67,6 +67,11 @@ struct ParticleArrays {
 /// v2 and unit normal n, u.n < 0 (P5): restitution e along n; sticks tangentially if the friction cone
 /// allows, else slides with |P_t| = mu P_n against the sliding direction.
 Vec3 collision_impulse(Real m12, const Vec3& u, const Vec3& n, Real restitution, Real friction);
+
+/// A velocity scaled so that it has the energy of having come by `shift` farther than its time allows under an
+/// acceleration a: |v|^2 + 2 a.shift. Where a hit, found on a straight path, or a surface in the way puts a
+/// particle beside its parabola, the energy that this would take is kept so. At rest it stays at rest.
+Vec3 velocity_after_shift(const Vec3& v, const Vec3& a, const Vec3& shift);
 
 /// When two spheres come to touch whose centres are `distance` apart when they do (P3): d and u are the
 /// present difference of their centres and of their velocities. Zero if they overlap and approach; none if

@@ -11,7 +11,7 @@
 namespace offstage::sim {
 namespace {
 
-using Vec2 = Eigen::Vector2d;
+using Eigen::Vector2d;
 
 /// The signs of three values, as -1, 0, 1.
 using Signs = std::array<int, 3>;
@@ -34,7 +34,7 @@ bool all_zero(const Signs& s) {
   return s == Signs{0, 0, 0};
 }
 
-Vec2 project(const Vec3& p, int dropped) {
+Vector2d project(const Vec3& p, int dropped) {
   return {p[(dropped + 1) % 3], p[(dropped + 2) % 3]};
 }
 
@@ -49,7 +49,7 @@ Aabb box_of(std::span<const Vec3> points) {
 bool edge_separates(std::span<const Vec3> a, std::span<const Vec3> b, int dropped) {
   for (std::size_t i = 0; i < a.size(); ++i)
     for (std::size_t j = i + 1; j < a.size(); ++j) {
-      const Vec2 p = project(a[i], dropped), q = project(a[j], dropped);
+      const Vector2d p = project(a[i], dropped), q = project(a[j], dropped);
       const auto side = [&](const Vec3& x) { return sign(orient2d(p, q, project(x, dropped))); };
       const int far = side(b[0]);
       if (far != 0 && std::all_of(b.begin(), b.end(), [&](const Vec3& x) { return side(x) == far; }) &&

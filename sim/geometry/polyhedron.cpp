@@ -9,7 +9,7 @@
 namespace offstage::sim {
 namespace {
 
-using Plane = Polyhedron::Plane;
+using FacePlane = Polyhedron::Plane;
 
 constexpr uint32_t kNone = 0xffffffff;
 
@@ -30,7 +30,7 @@ Real thickness(const TriangleMesh& mesh, uint32_t face, Real area2) {
 
 /// The plane of each triangle, shared by neighbours that lie in one. Grown from the largest triangles, whose
 /// normals are the surest; slivers, which have none, go along with their neighbours.
-std::vector<Plane> shared_planes(const TriangleMesh& mesh, const MeshTopology& topology, Real tolerance) {
+std::vector<FacePlane> shared_planes(const TriangleMesh& mesh, const MeshTopology& topology, Real tolerance) {
   const auto n = static_cast<uint32_t>(mesh.triangles.size());
   std::vector<Real> area(n);
   for (uint32_t f = 0; f < n; ++f) area[f] = doubled_area_of(mesh, f).norm();
@@ -38,9 +38,9 @@ std::vector<Plane> shared_planes(const TriangleMesh& mesh, const MeshTopology& t
   std::iota(seeds.begin(), seeds.end(), 0u);
   std::stable_sort(seeds.begin(), seeds.end(), [&](uint32_t a, uint32_t b) { return area[a] > area[b]; });
 
-  std::vector<Plane> planes(n);
+  std::vector<FacePlane> planes(n);
   std::vector<bool> done(n, false);
-  const auto lies_in = [&](uint32_t f, const Plane& plane) {
+  const auto lies_in = [&](uint32_t f, const FacePlane& plane) {
     for (uint32_t v : mesh.triangles[f])
       if (std::abs(plane.normal.dot(mesh.vertices[v]) - plane.offset) > tolerance) return false;
     return topology.face_normal(f).dot(plane.normal) > 0.5 || thickness(mesh, f, area[f]) <= tolerance;
@@ -49,7 +49,7 @@ std::vector<Plane> shared_planes(const TriangleMesh& mesh, const MeshTopology& t
   for (uint32_t seed : seeds) {
     if (done[seed]) continue;
     const Vec3& normal = topology.face_normal(seed);
-    const Plane plane{normal, normal.dot(mesh.vertices[mesh.triangles[seed][0]])};
+    const FacePlane plane{normal, normal.dot(mesh.vertices[mesh.triangles[seed][0]])};
     done[seed] = true;
     front = {seed};
     while (!front.empty()) {
@@ -122,7 +122,7 @@ Wedge wedge(const Polyhedron& p, uint32_t h) {
 }
 
 std::vector<Polyhedron> boundaries(const TriangleMesh& mesh, const MeshTopology& topology, Real tolerance) {
-  const std::vector<Plane> planes = shared_planes(mesh, topology, tolerance);
+  const std::vector<FacePlane> planes = shared_planes(mesh, topology, tolerance);
   Polyhedron all;
   all.points = mesh.vertices;
   std::vector<uint32_t> first_side(topology.edges().size(), kNone);

@@ -13,7 +13,7 @@
 namespace offstage::sim {
 namespace {
 
-using Plane = Polyhedron::Plane;
+using CutPlane = Polyhedron::Plane;
 
 constexpr uint32_t kNoVertex = 0xffffffff;
 /// Angles below this are a full turn, and angles that differ by less are the same [rad].
@@ -57,7 +57,7 @@ uint32_t split_face(Polyhedron& p, uint32_t from, uint32_t to) {
 /// Closes one side of a cut. `outline[k]` runs from corner k to corner k + 1 if the cap is on its right, back
 /// if `mirrored`.
 void add_cap(Polyhedron& p, std::span<const std::vector<uint32_t>> pieces, std::span<const uint32_t> origins,
-             std::span<const uint32_t> outline, const Plane& plane, bool mirrored) {
+             std::span<const uint32_t> outline, const CutPlane& plane, bool mirrored) {
   const auto n = static_cast<uint32_t>(outline.size());
   std::map<std::pair<uint32_t, uint32_t>, uint32_t> diagonals;
   for (std::vector<uint32_t> piece : pieces) {
@@ -89,7 +89,7 @@ void add_cap(Polyhedron& p, std::span<const std::vector<uint32_t>> pieces, std::
 /// Follows the outline of a cut face.
 class Tracer {
  public:
-  Tracer(const Polyhedron& p, const Plane& plane, Real tolerance)
+  Tracer(const Polyhedron& p, const CutPlane& plane, Real tolerance)
       : p_(p),
         plane_(plane),
         tolerance_(tolerance),
@@ -119,7 +119,8 @@ class Tracer {
         if (!pass(seen_edge_, edge(at.half_edge))) return {};
       } else {
         seen_point_[p_.origin(at.half_edge)] = true;
-        if (!turn(at, last.point, last.across_face ? kNoVertex : p_.half_edges[last.half_edge].twin)) return {};
+        if (!turn(at, last.point, last.across_face ? kNoVertex : p_.half_edges[last.half_edge].twin))
+          return {};
         if (at.half_edge == start) return closed(std::move(cut));
         if (!at.across_face && !pass(seen_edge_, edge(at.half_edge))) return {};
       }
@@ -219,7 +220,7 @@ class Tracer {
   }
 
   const Polyhedron& p_;
-  Plane plane_;
+  CutPlane plane_;
   Real tolerance_;
   Vec3 origin_, x_axis_, y_axis_;
   std::vector<Real> height_;  // over the plane; 0 within the tolerance, once and for all
@@ -228,7 +229,7 @@ class Tracer {
 
 }  // namespace
 
-std::optional<Cut> trace_cut(const Polyhedron& p, uint32_t half_edge, const Plane& plane, Real tolerance) {
+std::optional<Cut> trace_cut(const Polyhedron& p, uint32_t half_edge, const CutPlane& plane, Real tolerance) {
   return Tracer(p, plane, tolerance).trace(half_edge);
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <sstream>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -355,6 +356,45 @@ TEST(Commands, SchemaIsJsonAndNamesEverySection) {
   for (const char* section : {"world", "materials", "bodies", "particles", "emitters", "springs", "contacts",
                               "forces", "overlays", "camera", "lights", "environment", "render", "output"})
     EXPECT_TRUE(schema["properties"].contains(section)) << section;
+}
+
+TEST(Commands, ManualAndCompletionsHaveEveryCommandAndOption) {
+  const TemporaryFolder folder;
+  std::vector<std::string> texts;
+  for (const char* command : {"man", "completion bash", "completion zsh", "completion fish"}) {
+    const Outcome run = offstage(command, folder.path());
+    ASSERT_EQ(run.code, 0) << command << run.err;
+    texts.push_back(run.out);
+  }
+  std::erase(texts[0], '\\');  // of "\-"
+  for (const std::string command : {"render", "simulate", "compare", "bless", "doctor", "completion"}) {
+    for (const std::string& text : texts) EXPECT_NE(text.find(command), std::string::npos) << command;
+    std::istringstream help(offstage(command + " --help", folder.path()).out);
+    for (std::string line; std::getline(help, line);) {
+      const std::size_t dashes = line.find("--");  // as in "  -o,--output TEXT REQUIRED"
+      if (!line.starts_with("  -") || dashes > 5) continue;
+      const std::string name = line.substr(dashes + 2, line.find(' ', dashes) - dashes - 2);
+      for (std::size_t i = 0; i < texts.size(); ++i)
+        EXPECT_NE(texts[i].find((i == 3 ? "-l " : "--") + name), std::string::npos)
+            << command << " --" << name;
+    }
+  }
+  EXPECT_EQ(offstage("completion tcsh", folder.path()).code, 2);
+}
+
+TEST(Commands, AModelWithoutAFolderIsBesideTheSceneOrOneOfThoseThatComeWithTheProgram) {
+  const TemporaryFolder folder;
+  const auto with = [&](const std::string& file) {
+    write_file(folder / "s.json",
+               R"({"version": 1, "bodies": [{"motion": "static", "shape": {"type": "mesh", "file": ")" +
+                   file + R"("}}], "output": {"duration": 0.1}})");
+    return offstage("simulate s.json", folder.path());
+  };
+  EXPECT_EQ(with("duck.glb").code, 0) << "of assets/models";
+  write_file(folder / "duck.glb", "not a model");
+  EXPECT_EQ(with("duck.glb").code, 3) << "its own comes first";
+  EXPECT_EQ(with("./rock.glb").code, 3) << "a folder is meant as it stands";
+  EXPECT_EQ(with("no_such.glb").code, 3);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // A test of the image tests: a golden must notice a parameter changed by one percent, and a single pixel.
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "cli/program.h"
 
@@ -27,6 +28,15 @@ TEST_F(Golden, UnchangedSceneIsIdentical) {
   EXPECT_EQ(run.code, 0) << run.out;
   EXPECT_NE(run.out.find("identical"), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "report"));
+}
+
+TEST_F(Golden, StatesKeptByOneComparisonAreDrawnByAnother) {
+  ASSERT_EQ(compare("--keep-states kept").code, 0);
+  const Outcome run = compare("--states kept");
+  EXPECT_EQ(run.code, 0) << run.out << run.err;
+  EXPECT_NE(run.out.find("identical"), std::string::npos);
+  EXPECT_EQ(compare("--states kept --set world.gravity=[0,-9.9081,0]").code, 1)
+      << "those of another simulation";
 }
 
 TEST_F(Golden, OnePercentOfAPhysicalParameterIsAChangeOfTheSimulation) {
@@ -67,6 +77,50 @@ TEST_F(Golden, PicturesCompareByPixels) {
   ASSERT_EQ(offstage(frame + "-n 3 -o c.png", folder_.path()).code, 0);
   EXPECT_EQ(offstage("compare a.png b.png", folder_.path()).code, 0);
   EXPECT_EQ(offstage("compare a.png c.png", folder_.path()).code, 6);
+}
+
+/// A scene that falls at its own pace, 64 x 36 pixels.
+std::string falling_ball(double speed) {
+  return R"({"version": 1, "bodies": [{"shape": {"type": "sphere"}, "velocity": [0, )" +
+         std::to_string(speed) +
+         R"(, 0]}], "render": {"size": [64, 36], "quality": "draft"}, "output": {"fps": 10, "duration": 0.6}})";
+}
+
+TEST(GoldenNames, ScenesOfOneNameInDifferentFoldersHaveGoldensOfTheirOwn) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "sub");
+  write_file(folder / "rain.json", falling_ball(1));
+  write_file(folder / "sub/rain.json", falling_ball(2));
+  const std::string in = "env -u CI";
+  const Outcome bless = offstage("bless rain.json sub/rain.json --golden g --reason new", folder.path(), in);
+  ASSERT_EQ(bless.code, 0) << bless.err;
+  EXPECT_NE(bless.out.find("sub-rain: 2 frames (of sub/rain.json)"), std::string::npos) << bless.out;
+  for (const char* scene : {"rain.json", "sub/rain.json", "./sub/../rain.json"})
+    EXPECT_EQ(offstage(std::string("compare ") + scene + " --golden g", folder.path()).code, 0) << scene;
+
+  // One alone must not be taken for the other.
+  EXPECT_EQ(offstage("bless sub/rain.json --golden h --reason new", folder.path(), in).code, 0);
+  const Outcome other = offstage("compare rain.json --golden h", folder.path());
+  EXPECT_EQ(other.code, 1);
+  EXPECT_NE(other.err.find("no golden for rain.json"), std::string::npos) << other.err;
+
+  // A scene that moved keeps its golden, and says so.
+  std::filesystem::create_directories(folder / "new");
+  std::filesystem::rename(folder / "sub/rain.json", folder / "new/rain.json");
+  const Outcome moved = offstage("compare new/rain.json --golden h", folder.path());
+  EXPECT_EQ(moved.code, 0) << moved.err;
+  EXPECT_NE(moved.err.find("is gone"), std::string::npos) << moved.err;
+}
+
+TEST(GoldenNames, AGoldenWithoutASourceServesTheSceneOfItsName) {
+  const TemporaryFolder folder;
+  write_file(folder / "rain.json", falling_ball(1));
+  ASSERT_EQ(offstage("bless rain.json --golden g --reason new", folder.path(), "env -u CI").code, 0);
+  auto golden = nlohmann::json::parse(read_file(folder / "g/rain.json"));
+  EXPECT_EQ(golden["source"], "../rain.json");
+  golden.erase("source");
+  write_file(folder / "g/rain.json", golden.dump());
+  EXPECT_EQ(offstage("compare rain.json --golden g", folder.path()).code, 0);
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ TEST_P(LongClothScene, KeepsClothOutOfBodiesAndOfItself) {
   LoadedScene loaded = load_scene(OFFSTAGE_SOURCE_DIR "/demos/scenes/" + GetParam() + ".json");
   const ModelLibrary models(loaded.scene, loaded.folder, DecompositionCache(), loaded.warnings);
   Simulation simulation(loaded.scene, models);
-  const int frames = static_cast<int>(10 * loaded.scene.output.fps);
+  const int frames = static_cast<int>(10 * loaded.scene.output.fps.per_second());
   for (int i = 0; i < frames; ++i) {
     simulation.advance();
     std::size_t inside = 0;

@@ -205,6 +205,20 @@ TEST(SceneCheck, GrabsAndWindsTooStrongForTheStepAreRefusedUnlessTheIntegratorFo
     EXPECT_EQ(errors_of(scene(integrator)), "");
 }
 
+TEST(SceneCheck, WhatIsToHappenAtAnAgeThatNoParticleReachesIsAnError) {
+  const auto scene = [](const std::string& more) {
+    return R"({"emitters": [{"lifespan": {"mean": 1, "deviation": 0.2}, )" + more + "}]}";
+  };
+  EXPECT_EQ(errors_of(scene(R"("split": {"age": 1.5})")),
+            "/emitters/0/split/age: is 1.5 s, but particles live 1.2 s at most and never split; allowed is less "
+            "than the lifespan\n");
+  EXPECT_NE(errors_of(scene(R"("trails": [{"start_age": 1.2}])")), "");
+  EXPECT_NE(errors_of(scene(R"("on_age": [{"age": 2}])")), "");
+  EXPECT_NE(errors_of(scene(R"("on_death": [{"lifespan": 0.3, "split": {"age": 0.3}}])")), "");
+  EXPECT_EQ(errors_of(scene(R"("split": {"age": 1.1}, "trails": [{"start_age": 1}], "on_age": [{"age": 1.1}])")), "");
+  EXPECT_EQ(errors_of(scene(R"("split": {"age": 1.5, "enabled": false})")), "");
+}
+
 // --- Springs ---
 
 /// Steps x'' = -k x - c x' from rest at 1; whether it stays bounded.
@@ -333,12 +347,12 @@ TEST(SceneCheck, DragThatWouldBlowUpIsRefused) {
   // m/k = 0.01 s: explicit steps diverge from 0.02 s on (0.02785 s for Runge-Kutta).
   const auto group = [](double step) {
     return R"({"world": {"step": )" + std::to_string(step) +
-           R"(}, "particles": [{"mass": 0.01, "linear_drag": 1, "places": [{}]}]})";
+           R"(}, "particles": [{"integrator": "symplectic", "mass": 0.01, "linear_drag": 1, "places": [{}]}]})";
   };
   EXPECT_EQ(errors_of(group(0.019)), "");
   EXPECT_NE(errors_of(group(0.021)).find("/particles/0/linear_drag: is too much for the step"),
             std::string::npos);
-  const std::string drops = R"({"emitters": [{"radius": 0.002, "linear_drag": 0.02}]})";
+  const std::string drops = R"({"emitters": [{"integrator": "symplectic", "radius": 0.002, "linear_drag": 0.02}]})";
   EXPECT_NE(errors_of(drops).find("/emitters/0/linear_drag"), std::string::npos);
   const std::string body = R"({"bodies": [{"mass": 1, "linear_drag": 1000}]})";
   EXPECT_NE(errors_of(body).find("/bodies/0/linear_drag"), std::string::npos);

@@ -71,16 +71,13 @@ TEST(SceneIo, ColoursAreSrgbTextOrLinearNumbers) {
   EXPECT_EQ(scene.materials[3].color.rgba, Eigen::Vector4f(0, 0, 0, 0.25f));
   EXPECT_EQ(load_errors(R"({"materials": [{"color": "#ff80"}, {"color": "#ff80zz"}, {"color": "#+10203"},
 {"color": [1, 1]}, {"color": [1, -1, 0]}, {"color": [0, 0, 0, 2]}]})"),
-            "s:1:26: /materials/0/color: must be \"#rrggbb\", \"#rrggbbaa\" or a list of 3 or 4 numbers, got "
-            "the string "
-            "\"#ff80\"\n"
-            "s:1:46: /materials/1/color: must be \"#rrggbb\", \"#rrggbbaa\" or a list of 3 or 4 numbers, got "
+            "s:1:46: /materials/1/color: must be \"#rrggbb\", \"#rrggbbaa\", \"#rgb\", \"#rgba\" or a list of 3 or 4 numbers, got "
             "the string "
             "\"#ff80zz\"\n"
-            "s:1:68: /materials/2/color: must be \"#rrggbb\", \"#rrggbbaa\" or a list of 3 or 4 numbers, got "
+            "s:1:68: /materials/2/color: must be \"#rrggbb\", \"#rrggbbaa\", \"#rgb\", \"#rgba\" or a list of 3 or 4 numbers, got "
             "the string "
             "\"#+10203\"\n"
-            "s:2:11: /materials/3/color: must be \"#rrggbb\", \"#rrggbbaa\" or a list of 3 or 4 numbers, got "
+            "s:2:11: /materials/3/color: must be \"#rrggbb\", \"#rrggbbaa\", \"#rgb\", \"#rgba\" or a list of 3 or 4 numbers, got "
             "2 items\n"
             "s:2:34: /materials/4/color/1: must be between 0 and 1000000, got -1\n"
             "s:2:63: /materials/5/color/3: must be between 0 and 1, got 2");
@@ -192,7 +189,7 @@ TEST(SceneIo, WhatIsRequiredIsMissed) {
   EXPECT_EQ(
       load_errors(
           R"({"bodies": [{"shape": {"type": "mesh"}, "model": {"file": ""}}], "camera": {"type": "follow"}})"),
-      "s:1:23: /bodies/0/shape/file: is required: model file, or FILE#NODE for one of its nodes\n"
+      "s:1:23: /bodies/0/shape/file: is required: model file relative to the scene, or the name of one that comes with offstage; FILE#NODE is one of its nodes\n"
       "s:1:59: /bodies/0/model/file: must not be empty\n"
       "s:1:76: /camera/body: is required: name of the body");
 }
@@ -297,9 +294,9 @@ TEST(SceneOverride, ReachesAnyKeyByIndexNameOrPointer) {
       R"({"emitters": [{"name": "rain", "rate": 5}, {"name": "a.b/c"}], "bodies": [{"position": [1, 2, 3]}]})";
   const Scene scene =
       loaded_scene(text, {"emitters.rain.rate={\"mean\": 7, \"deviation\": 1}", "/emitters/a.b~1c/speed=3",
-                      "emitters.1.look.lit=false", "bodies.0.position.1=9", "bodies.0.name=red ball",
-                      "render.quality=final", "output.duration=2", "lights.0.intensity=9",
-                      "camera.type=orbit", "camera.radius=12", "world.gravity.1=-1"});
+                          "emitters.1.look.lit=false", "bodies.0.position.1=9", "bodies.0.name=red ball",
+                          "render.quality=final", "output.duration=2", "lights.0.intensity=9",
+                          "camera.type=orbit", "camera.radius=12", "world.gravity.1=-1"});
   EXPECT_EQ(std::get<effects::Normal>(scene.emitters[0].rate).mean, 7);
   EXPECT_EQ(std::get<Real>(scene.emitters[1].speed), 3);
   EXPECT_EQ(scene.emitters[1].look.lit, false);
@@ -376,6 +373,21 @@ TEST(SceneIo, DamagedTextIsRefusedOrReadButNothingElseHappens) {
   }
   EXPECT_GT(refused, 2000);
   EXPECT_LT(refused, 4000);
+}
+
+TEST(SceneIo, ShortColoursDoubleTheirDigits) {
+  const auto color_of = [](const std::string& text) {
+    return loaded_scene(R"({"materials": [{"name": "m", "color": ")" + text + "\"}]}")
+        .materials[0]
+        .color.rgba;
+  };
+  EXPECT_EQ(color_of("#f80"), color_of("#ff8800"));
+  EXPECT_EQ(color_of("#F80c"), color_of("#ff8800cc"));
+  EXPECT_EQ(color_of("#fff"), Eigen::Vector4f(1, 1, 1, 1));
+  for (const char* wrong : {"#ff", "#fffff", "#ggg", "fff", "#+ff", "# ff"}) {
+    const std::string errors = load_errors(R"({"materials": [{"color": ")" + std::string(wrong) + "\"}]}");
+    EXPECT_NE(errors.find("#rgb"), std::string::npos) << wrong << errors;
+  }
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ class Simulated {
       if (body.name == name) return simulation_.world().body(body.handle);
     throw std::out_of_range(name);
   }
-  const SimulationTotals& totals() const { return simulation_.totals(); }
+  SimulationTotals totals() const { return simulation_.totals(); }
 
  private:
   LoadedScene loaded_;

@@ -11,7 +11,7 @@ namespace offstage::render {
 
 Context& shared_context();
 
-/// A stage with little going on: no haze to speak of, plain sky, the camera on the Z axis looking at the
+/// A stage with little going on: no fog, no sky, the camera on the Z axis looking at the
 /// origin.
 struct SmallStage {
   explicit SmallStage(int width_px = 96, int height_px = 64)

@@ -20,6 +20,7 @@ Image test_image(int width, int height, uint8_t alpha = 255) {
     }
   }
   image.rgba[3] = alpha;
+  image.transparent = alpha != 255;
   return image;
 }
 
@@ -42,10 +43,16 @@ TEST(EncodePng, ComesBackUnchanged) {
   }
 }
 
-TEST(EncodePng, StoresAlphaOnlyIfAPixelNeedsIt) {
+TEST(EncodePng, StoresAlphaIfTheImageIsTransparentWhateverItsPixelsAre) {
   constexpr std::size_t kColorType = 25;  // in the IHDR chunk: 2 is RGB, 6 is RGBA
-  EXPECT_EQ(encode_png(test_image(4, 4)).at(kColorType), 2);
-  EXPECT_EQ(encode_png(test_image(4, 4, 254)).at(kColorType), 6);
+  for (const uint8_t alpha : {uint8_t{255}, uint8_t{254}}) {
+    Image image = test_image(4, 4, alpha);
+    image.transparent = false;
+    EXPECT_EQ(encode_png(image).at(kColorType), 2);
+    image.transparent = true;
+    EXPECT_EQ(encode_png(image).at(kColorType), 6);
+    EXPECT_TRUE(decode_image(encode_png(image), "image").transparent);
+  }
 }
 
 TEST(EncodePng, RefusesPixelsThatDoNotFillTheImage) {

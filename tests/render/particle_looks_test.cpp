@@ -137,7 +137,7 @@ TEST(Splatter, StreakCoversAsMuchAsItsStroke) {
     for (int bottom = 0; bottom < 120; bottom += StreakBands::kRows) {
       const int rows = std::min(StreakBands::kRows, 120 - bottom);
       std::vector<float> rgba(150 * StreakBands::kRows * 4, 0.0f);
-      if (bands.touches(bottom)) bands.lay_over(bottom, rows, depth, {9, 0}, rgba);
+      bands.lay_over({0, bottom, 150, rows, depth, rgba}, {9, 0}, 0);
       for (std::size_t i = 3; i < rgba.size(); i += 4) area += static_cast<double>(rgba[i]);
     }
     // Its soft rim counts half: 2 * 60 * 2.25, and the ends.

@@ -102,7 +102,7 @@ TEST_P(VideoSinkFormat, HoldsEveryFrameAtItsSizeAndOnlyUnderItsNameOnceClosed) {
             "64,48,12\n");
 }
 INSTANTIATE_TEST_SUITE_P(All, VideoSinkFormat,
-                         testing::Values(".mp4", ".webm", ".mov", ".gif", ".webp", ".apng", ".png"));
+                         testing::Values(".mp4", ".webm", ".mov", ".mkv", ".gif", ".webp", ".apng", ".png"));
 
 TEST(VideoSink, KnownGreysComeBackThroughMp4AndAreTagged) {
   const ScratchFolder folder;
@@ -256,7 +256,7 @@ TEST(CheckVideo, RefusesWhatAFormatCannotHoldWithAdvice) {
             std::string::npos);
   EXPECT_NE(advice({.path = "a.avi", .width_px = 64, .height_px = 48}).find(".mp4 .webm"), std::string::npos);
   EXPECT_NE(advice({.path = "a.mp4", .width_px = 0, .height_px = 48}), "");
-  EXPECT_NE(advice({.path = "a.mp4", .width_px = 64, .height_px = 48, .fps = std::nan("")}), "");
+  EXPECT_NE(advice({.path = "a.mp4", .width_px = 64, .height_px = 48, .fps = {0, 1}}), "");
   EXPECT_EQ(advice({.path = "a.mov", .width_px = 65, .height_px = 49, .alpha = true}), "");
 }
 
@@ -266,7 +266,7 @@ std::string piped(bool y4m, const Image& image) {
   const std::string file = (folder / "out").string();
   const int status = status_of_child([&] {
     ::dup2(::open(file.c_str(), O_WRONLY | O_CREAT, 0600), STDOUT_FILENO);
-    const auto sink = make_pipe_sink(y4m, image.width_px, image.height_px, 29.97);
+    const auto sink = make_pipe_sink(y4m, image.width_px, image.height_px, {30000, 1001});
     sink->write(0, image);
     sink->write(1, image);
     sink->close();

@@ -54,8 +54,72 @@ TEST(Stage, UnlitGreyComesBackThroughTheLinearCurve) {
   s.stage.set_points(points, std::array{point_at({0, 0, 0}, 1, {0.5f, 0.5f, 0.5f, 1})});
   const Image shown = tone_map(s.draw(), {.curve = ToneCurve::linear, .dither = false});
   const std::size_t center = 4 * (32 * 96 + 48);
-  EXPECT_NEAR(shown.rgba[center], 188, 1);  // sRGB of one half; the haze of 4 m is less than a step
+  EXPECT_NEAR(shown.rgba[center], 188, 1);  // sRGB of one half
   EXPECT_EQ(shown.rgba[center + 3], 255);
+}
+
+TEST(Stage, WithoutFogNothingFadesWithDistance) {
+  SmallStage s;
+  s.stage.set_environment({.clouds = 0, .fog = 0});
+  const InstanceHandle box = s.add(make_box({1, 1, 1}), glowing({1, 0, 0}));
+  const PointsHandle sprite = s.stage.add_points({.lit = false, .softness = 0.01f}),
+                     puff = s.stage.add_points({.style = PointStyle::smoke, .lit = false});
+  const auto shown_at = [&](float distance, float half) {
+    s.stage.set_transform(box, Eigen::Translation3f(-2 * half, 0, 5 - distance) * Eigen::Scaling(2 * half));
+    s.stage.set_points(sprite, std::array{point_at({0, 0, 5 - distance}, half, {0, 1, 0, 1})});
+    s.stage.set_points(puff, std::array{point_at({2 * half, 0, 5 - distance}, half, {0, 0, 1, 1})});
+    const HdrImage picture = s.draw();
+    return std::array{pixel(picture, 48 - 18, 32), pixel(picture, 48, 32), pixel(picture, 48 + 18, 32)};
+  };
+  const auto near = shown_at(5, 0.5f), far = shown_at(5000, 500);
+  EXPECT_GT(near[0].x(), 0.99f);
+  EXPECT_GT(near[1].y(), 0.99f);
+  EXPECT_GT(near[2].z(), 0.3f);
+  for (std::size_t k = 0; k < near.size(); ++k) EXPECT_LT((near[k] - far[k]).norm(), 1e-3f) << k;
+}
+
+TEST(Stage, EndlessPlaneKeepsItsColorUntilItMeetsTheSkyAtItsHorizonAtEveryScale) {
+  // The camera looks along the plane: the horizon is in the middle of the picture, 1.6 rows to a degree.
+  std::array<Vector4f, 3> first;
+  for (const float height : {0.1f, 1.5f, 100.0f}) {
+    SmallStage s(16, 512);
+    s.stage.set_environment({});
+    s.stage.set_camera({.eye = {0, height, 0}, .target = {0, height, -1}, .fov_deg = 10});
+    s.add(make_ground(256'000), glowing({1, 0, 1}));
+    const HdrImage picture = s.draw();
+    const float px_per_rad = 256 / std::tan(0.0872665f);
+    const int near_row = 256 + static_cast<int>(0.05f * px_per_rad);  // 3 degrees down
+    EXPECT_GT(pixel(picture, 8, near_row).x() - pixel(picture, 8, near_row).y(), 0.97f) << height;
+    EXPECT_LT((pixel(picture, 8, 258) - pixel(picture, 8, 252)).head<3>().norm(), 0.05f) << height;
+    for (int y = 1; y < 512; ++y)  // no edge anywhere
+      ASSERT_LT((pixel(picture, 8, y) - pixel(picture, 8, y - 1)).norm(), 0.12f) << height << ' ' << y;
+    const std::array rows{pixel(picture, 8, 262), pixel(picture, 8, 270), pixel(picture, 8, 300)};
+    if (height == 0.1f) first = rows;
+    for (std::size_t k = 0; k < rows.size(); ++k) EXPECT_LT((rows[k] - first[k]).norm(), 0.01f) << height;
+  }
+}
+
+TEST(Stage, BlendedTextureOfAlphaNearOneLeavesNoHoles) {
+  SmallStage s;
+  s.stage.set_environment({});
+  Image image{64, 1, {}};
+  for (int i = 0; i < 64; ++i)
+    image.rgba.insert(image.rgba.end(), {200, 100, 50, static_cast<uint8_t>(192 + i)});
+  Material look{.roughness = 1};
+  look.base_color_texture = 0;
+  const MaterialHandle material = s.stage.add_material(look, std::array{image});
+  Mesh quad = make_box({4, 3, 0.1f});
+  for (std::size_t i = 0; i < quad.uvs.size(); ++i)
+    quad.uvs[i] = {0.25f * quad.positions[i].x() + 0.5f, 0.5f};
+  const InstanceHandle pane = s.stage.add_instance(s.stage.add_mesh(quad), material);
+  const HdrImage opaque = s.draw();
+  for (std::size_t i = 3; i < opaque.rgba.size(); i += 4) ASSERT_FLOAT_EQ(opaque.rgba[i], 1);
+  EXPECT_FALSE(opaque.transparent);
+
+  s.stage.set_environment({.visible = false});
+  EXPECT_TRUE(s.draw().transparent);
+  s.stage.set_visible(pane, false);
+  EXPECT_TRUE(tone_map(s.draw(), {}).transparent);
 }
 
 TEST(Stage, WhiteSurfaceFacingTheSunHasTheSunsRadianceInItsDiffusePart) {

@@ -9,7 +9,7 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kSpeed = 300, kStep = 1.0 / 60, kThickness = 0.01;
+constexpr Real kBulletSpeed = 300, kBulletStep = 1.0 / 60, kThickness = 0.01;
 constexpr uint64_t kShots = 10'000;
 
 struct Body {
@@ -54,7 +54,7 @@ TEST(Bullet, NeverPassesAPlate) {
     const Vec3 target(0.6 * u(0), 0, 0.6 * u(1)),
         direction = Vec3(u(2), -0.3 - std::abs(u(3)), u(4)).normalized();
     const Real share = 0.02 + 0.96 * random.uniform(i, 5);
-    const Vec3 way = kSpeed * kStep * direction;
+    const Vec3 way = kBulletSpeed * kBulletStep * direction;
     const PosePath flight({target - share * way, turned(10)}, {target + (1 - share) * way, turned(14)});
     const bool moving = i % 2 == 1;
     const Pose rest;

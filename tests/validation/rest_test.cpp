@@ -137,6 +137,63 @@ TEST_P(Sleep, AForceThatBeginsLaterAHandThatPullsAndTheEndOfASupportWakeIt) {
   EXPECT_NEAR(held.body(ball).velocity.y(), 0.2 * sleepy.gravity.y(), 0.05);
 }
 
+// Whatever the other end is: a body on keys, of which one may jump, or a particle that flies away.
+TEST_P(Sleep, ASpringWhoseOtherEndMovesWakesIt) {
+  for (const Interpolation kind : {Interpolation::monotone, Interpolation::step}) {
+    Scene s = sleeping_stack();
+    const Real now = s.world.time();
+    const Vec3 top = s.world.body(s.stack[2]).centre, side = top + Vec3(1, 0, 0);
+    const BodyHandle hand = s.world.add_body(
+        {.shape = Sphere{0.1},
+         .motion = MotionType::kinematic,
+         .pose = {side},
+         .collides = false,
+         .track = {.keys = {{now, {side}}, {now + 1, {side}, kind}, {now + 1.2, {side + Vec3(2, 0, 0)}}}}});
+    s.world.add_spring(
+        {.a = BodyPoint{s.stack[2]}, .b = BodyPoint{hand}, .stiffness = 2000, .damping = 50});
+    run(s.world, 0.95);
+    EXPECT_TRUE(s.world.is_asleep(s.stack[2]));
+    EXPECT_EQ(s.world.step(1.0 / 240).bodies_awake, 0u);  // and costs nothing until then
+    run(s.world, 1);
+    EXPECT_GT(s.world.body(s.stack[2]).centre.x(), 0.5);
+  }
+}
+
+TEST_P(Sleep, ASpringToAParticleThatMovesOffOrIsGoneWakesIt) {
+  Scene s = sleeping_stack();
+  const Vec3 top = s.world.body(s.stack[2]).centre;
+  const auto system = s.world.add_particle_system({.gravity = false, .collides = false});
+  const uint64_t id =
+      s.world.add_particle(system, {.position = top + Vec3(0, 1, 0), .mass = 5, .lifespan = 4});
+  s.world.add_spring(
+      {.a = BodyPoint{s.stack[2]}, .b = ParticlePoint{system, id}, .stiffness = 20, .damping = 5});
+  run(s.world, 1);
+  EXPECT_TRUE(s.world.is_asleep(s.stack[2]));
+  s.world.add_force({.systems = {system}, .start = s.world.time() + 1, .effect = ConstantField{.force = {20, 0, 0}}});
+  run(s.world, 0.9);
+  EXPECT_TRUE(s.world.is_asleep(s.stack[2]));
+  run(s.world, 0.8);
+  EXPECT_FALSE(s.world.is_asleep(s.stack[2]));
+}
+
+TEST_P(Sleep, LosingASpringWithTheBodyAtItsOtherEndWakesIt) {
+  WorldDef sleepy = def();
+  sleepy.sleep = true;
+  World world(sleepy);
+  const BodyHandle hook = world.add_body({.shape = Sphere{0.1}, .motion = MotionType::fixed, .pose = {Vec3(0, 3, 0)}});
+  const BodyHandle ball = world.add_body({.shape = Sphere{0.1}, .pose = {Vec3(0, 2, 0)}, .mass = 1});
+  world.add_spring({.a = BodyPoint{hook},
+                    .b = BodyPoint{ball},
+                    .stiffness = 1000,
+                    .damping = 60,
+                    .rest_length = 1 - kGravity / 1000});
+  run(world, 1);
+  ASSERT_TRUE(world.is_asleep(ball));
+  world.remove(hook);
+  run(world, 0.5);
+  EXPECT_LT(world.body(ball).centre.y(), 1.5);
+}
+
 TEST_P(Sleep, AKinematicBodyThatComesAlongWakesIt) {
   Scene s = sleeping_stack();
   const Real t = s.world.time();

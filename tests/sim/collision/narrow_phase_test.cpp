@@ -257,6 +257,84 @@ TEST(NarrowPhase, OpenSurfacesAreTwoSided) {
   }
 }
 
+/// Two squares along x that meet at x = 0, of which the second rises by `rise` per metre; at a height.
+TriangleMesh folded_sheet(Real rise, Real height) {
+  TriangleMesh m;
+  for (const Real x : {-1.0, 0.0, 1.0})
+    for (const Real z : {-1.0, 1.0}) m.vertices.emplace_back(x, height + std::max(0.0, x * rise), z);
+  m.triangles = {{0, 1, 2}, {1, 3, 2}, {2, 3, 4}, {3, 5, 4}};
+  return m;
+}
+
+std::vector<Manifold> manifolds_on(const TriangleMesh& mesh, const Piece& piece, const Pose& at,
+                                   Real margin) {
+  const Piece sheet(mesh, false);
+  PairCache cache;
+  std::vector<Manifold> found;
+  find_manifolds(piece.collision, sheet.collision, between(at, {}), margin, cache, DistanceMethod::gjk,
+                 found);
+  for (Manifold& m : found) m = placed(m, at);
+  return found;
+}
+
+TEST(NarrowPhase, ATriangleGivesItsNormalAtAnyHeightInItsMesh) {
+  const Piece box(Box{Vec3::Constant(0.5)});
+  for (const Real height : {-1.0, 0.0, 1.0}) {
+    uint32_t points = 0;
+    for (const Manifold& m :
+         manifolds_on(folded_sheet(0, height), box, pose({-0.5, height + 0.2501, 0}), 1e-3)) {
+      EXPECT_EQ(m.source, NormalSource::face_of_b) << height;
+      EXPECT_NEAR(m.normal.y(), 1, 1e-15) << height;
+      for (uint32_t k = 0; k < m.count; ++k) EXPECT_NEAR(m.points[k].separation, 1e-4, 1e-12) << height;
+      points += m.count;
+    }
+    EXPECT_GE(points, 4u) << height;
+  }
+}
+
+TEST(NarrowPhase, AnEdgeOfASheetHasTheNormalsBetweenItsFacesAlone) {
+  const Piece box(Box{Vec3::Constant(0.5)}), ball(Sphere{0.25}), drum(Cylinder{0.25, 0.5});
+  for (const Piece* piece : {&box, &ball, &drum}) {
+    // Before the edge, by less than the margin: the triangles beyond it are near, but in the same plane.
+    for (const Manifold& m : manifolds_on(folded_sheet(0, 0), *piece, pose({-0.255, 0.25, 0}), 0.02))
+      EXPECT_NEAR(m.normal.y(), 1, 1e-15);
+    // In a valley, too, it is the slope's face that comes next, not the edge.
+    const Vec3 slope = Vec3(-0.5, 1, 0).normalized();
+    for (const Manifold& m : manifolds_on(folded_sheet(0.5, 0), *piece, pose({-0.255, 0.25, 0}), 0.02))
+      EXPECT_GT(std::max(m.normal.y(), m.normal.dot(slope)), 1 - 1e-12);
+  }
+  // At the border there is nothing beyond.
+  const auto beside = manifolds_on(folded_sheet(0, 0), ball, pose({1.2, 0.1, 0.3}), 0.02);
+  ASSERT_FALSE(beside.empty());
+  for (const Manifold& m : beside) EXPECT_GT(m.normal.x(), 0.8);
+}
+
+TEST(NarrowPhase, WhatSinksIntoASheetStaysOnItsSide) {
+  const Piece ball(Sphere{0.1}), box(Box{Vec3::Constant(0.2)}), capsule(Capsule{0.1, 0.2}),
+      drum(Cylinder{0.1, 0.2});
+  const Piece sheet(folded_sheet(0, 0), false);
+  for (const Piece* piece : {&ball, &box, &capsule, &drum})
+    for (const Real side : {1.0, -1.0}) {
+      PairCache cache;
+      for (const Real height : {0.101, 0.05, 0.001, -0.001, -0.05, -0.09}) {
+        const Pose at = pose({0.3 * height, side * height, 0.1});
+        std::vector<Manifold> found;
+        find_manifolds(piece->collision, sheet.collision, between(at, {}), 1e-2, cache, DistanceMethod::gjk,
+                       found);
+        cache.forget_unused();
+        ASSERT_FALSE(found.empty()) << height;
+        Real deepest = 1;
+        for (const Manifold& m : found) {
+          EXPECT_NEAR(m.normal.y(), side, 1e-9) << height;
+          for (uint32_t k = 0; k < m.count; ++k) deepest = std::min(deepest, m.points[k].separation);
+        }
+        if (piece != &capsule) {
+          EXPECT_NEAR(deepest, height - 0.1, 1e-9);
+        }
+      }
+    }
+}
+
 /// Looks at many shares, then halves: what tests compare with.
 std::optional<Real> first_contact(const MovingShape& a, const MovingShape& b, Real tolerance, int looks) {
   const auto near = [&](Real share) {

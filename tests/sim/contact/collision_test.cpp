@@ -148,6 +148,41 @@ TEST(Collision, SimultaneousCradleMovesAsOne) {
   for (std::size_t i = 1; i < 5; ++i) EXPECT_NEAR(s.bodies[i].velocity.x(), 0.4, 1e-12);
 }
 
+// Equally fast contacts collide together: which of them comes first in the list is no matter.
+TEST(Collision, ASequenceDoesNotDependOnTheOrderOfTheList) {
+  // One ball hits two that touch each other, which lie to either side of its way.
+  const auto broken = [](bool reversed) {
+    ContactSample s;
+    const Vec3 right = Vec3(std::sqrt(3), 1, 0) / 2, left = Vec3(std::sqrt(3), -1, 0) / 2;
+    s.bodies = {sphere_body(1, 0.1), sphere_body(1, 0.1), sphere_body(1, 0.1)};
+    s.bodies[0].velocity = Vec3(4, 0, 0);
+    s.contacts = {contact_between(1, 0, right, -0.1 * right, 0.1 * right, 0.3),
+                  contact_between(2, 0, left, -0.1 * left, 0.1 * left, 0.3),
+                  contact_between(1, 2, Vec3::UnitY(), -0.1 * Vec3::UnitY(), 0.1 * Vec3::UnitY(), 0.3)};
+    if (reversed) std::reverse(s.contacts.begin(), s.contacts.end());
+    collide(s.bodies, s.contacts, std::vector<Real>(3, 0.9), ImpactLaw::sequential);
+    return s.bodies;
+  };
+  const std::vector<ContactBody> a = broken(false), b = broken(true);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_LT((a[i].velocity - b[i].velocity).norm(), 1e-9) << i;
+  EXPECT_NEAR(a[1].velocity.x(), a[2].velocity.x(), 1e-9);
+  EXPECT_NEAR(a[1].velocity.y(), -a[2].velocity.y(), 1e-9);
+}
+
+// A body between two faces cannot bounce off one and be stopped by the other: it stops, and gains nothing.
+TEST(Collision, TargetsThatContradictEachOtherEndInAPlasticImpact) {
+  ContactSample s;
+  s.bodies = {sphere_body(1, 0.1), ContactBody{}};
+  s.bodies[0].velocity = Vec3(-3, 0.5, 0);
+  s.contacts = {contact_between(0, 1, Vec3::UnitX(), -0.1 * Vec3::UnitX(), Vec3::Zero(), 0.3),
+                contact_between(0, 1, -Vec3::UnitX(), 0.1 * Vec3::UnitX(), Vec3::Zero(), 0.3)};
+  const Real energy = s.kinetic_energy();
+  const ContactWork work = collide(s.bodies, s.contacts, std::vector<Real>(2, 0.5), ImpactLaw::simultaneous);
+  EXPECT_EQ(work.fallbacks, 1u);
+  EXPECT_NEAR(s.bodies[0].velocity.x(), 0, 1e-6);
+  EXPECT_LT(s.kinetic_energy(), energy);
+}
+
 // A box that falls flat bounces flat, though four contacts are one too many for its three motions.
 TEST(Collision, BoxFallsFlatAndBouncesFlat) {
   ContactSample s = stacked_boxes(1, Vec3(0, -2, 0), 0.5);

@@ -17,7 +17,7 @@ KeyframeTrack track(Interpolation interpolation, bool loop) {
 }
 
 TEST(Keyframes, PassThroughTheKeys) {
-  for (auto kind : {Interpolation::linear, Interpolation::smooth}) {
+  for (auto kind : {Interpolation::monotone, Interpolation::smooth, Interpolation::linear, Interpolation::step}) {
     KeyframeTrack t = track(kind, false);
     t.spin.setZero();
     for (const Keyframe& k : t.keys) {
@@ -31,7 +31,7 @@ TEST(Keyframes, PassThroughTheKeys) {
 // Central differences of the pose; their error is of order d^2.
 TEST(Keyframes, VelocitiesAreTheDerivativeOfThePose) {
   constexpr Real kD = 1e-5;
-  for (auto kind : {Interpolation::linear, Interpolation::smooth})
+  for (auto kind : {Interpolation::monotone, Interpolation::linear, Interpolation::smooth, Interpolation::step})
     for (bool loop : {false, true}) {
       const KeyframeTrack t = track(kind, loop);
       for (Real time : {0.1, 0.49, 0.7, 1.9, 2.3, 3.3, 7.1}) {
@@ -43,10 +43,12 @@ TEST(Keyframes, VelocitiesAreTheDerivativeOfThePose) {
     }
 }
 
-TEST(Keyframes, SmoothVelocityIsContinuousAtKeysAndAcrossTheLoop) {
-  const KeyframeTrack t = track(Interpolation::smooth, true);
-  for (Real key : {0.5, 2.0, 2.7})
-    EXPECT_NEAR((t.at(key - 1e-9, {}).velocity - t.at(key + 1e-9, {}).velocity).norm(), 0, 1e-6);
+TEST(Keyframes, VelocityIsContinuousAtKeysAndAcrossTheLoop) {
+  for (auto kind : {Interpolation::monotone, Interpolation::smooth}) {
+    const KeyframeTrack t = track(kind, true);
+    for (Real key : {0.5, 2.0, 2.7})
+      EXPECT_NEAR((t.at(key - 1e-9, {}).velocity - t.at(key + 1e-9, {}).velocity).norm(), 0, 1e-6);
+  }
 }
 
 TEST(Keyframes, SmoothMotionReproducesAParabolaOverUnevenKeys) {
@@ -54,6 +56,49 @@ TEST(Keyframes, SmoothMotionReproducesAParabolaOverUnevenKeys) {
   const auto position = [](Real x) { return Vec3(x * x, 3 * x, 1 - 2 * x * x); };
   for (Real x : {0.0, 0.3, 1.0, 1.4, 3.0}) t.keys.push_back({x, {position(x)}});
   for (Real x : {0.35, 0.7, 1.2}) EXPECT_NEAR((t.at(x, {}).pose.position - position(x)).norm(), 0, 1e-14);
+}
+
+// "Hold for 5 s, then move 3 m in 0.1 s" swung out to -21.8 m.
+TEST(Keyframes, AComponentStaysBetweenItsKeysAndHoldsWhereTheyAreEqual) {
+  const KeyframeTrack t{.keys = {{0, {Vec3(0, 0, 0)}},
+                                 {5, {Vec3(0, 1, 0)}},
+                                 {5.1, {Vec3(3, 1, -2)}},
+                                 {8, {Vec3(3, 2, 0.5)}},
+                                 {9, {Vec3(2.9, 7, 0.5)}}}};
+  for (std::size_t k = 0; k + 1 < t.keys.size(); ++k) {
+    const Keyframe &from = t.keys[k], &to = t.keys[k + 1];
+    Vec3 before = from.pose.position;
+    for (int i = 1; i <= 200; ++i) {
+      const Motion m = t.at(from.time + (to.time - from.time) * i / 200, {});
+      for (int c = 0; c < 3; ++c) {
+        const Real way = to.pose.position[c] - from.pose.position[c];
+        EXPECT_GE((m.pose.position[c] - before[c]) * (way < 0 ? -1 : 1), -1e-12) << k << ' ' << c;
+        EXPECT_GE(m.velocity[c] * (way < 0 ? -1 : 1), -1e-12);
+        if (way == 0) {
+          EXPECT_EQ(m.pose.position[c], from.pose.position[c]);
+        }
+      }
+      before = m.pose.position;
+    }
+  }
+}
+
+TEST(Keyframes, AKeySaysHowItGoesOnToTheNext) {
+  KeyframeTrack t{.keys = {{0, {Vec3(0, 0, 0)}, Interpolation::linear},
+                           {1, {Vec3(1, 0, 0), Quat(Eigen::AngleAxisd(1, Vec3::UnitY()))}, Interpolation::step},
+                           {2, {Vec3(5, 0, 0)}},
+                           {3, {Vec3(6, 0, 0)}}}};
+  EXPECT_DOUBLE_EQ(t.at(0.25, {}).pose.position.x(), 0.25);
+  EXPECT_EQ(t.at(1.999, {}).pose.position.x(), 1);
+  EXPECT_EQ(t.at(1.999, {}).pose.orientation.coeffs(), t.keys[1].pose.orientation.coeffs());
+  EXPECT_TRUE(t.at(1.5, {}).velocity.isZero(0) && t.at(1.5, {}).angular_velocity.isZero(0));
+  EXPECT_EQ(t.at(2, {}).pose.position.x(), 5);
+  EXPECT_TRUE(t.jumps(1.9, 2.1));
+  EXPECT_FALSE(t.jumps(0.9, 1.1));
+  EXPECT_FALSE(t.jumps(2, 2.5));
+  t.loop = true;
+  EXPECT_TRUE(t.jumps(2.9, 3.1));  // from the last key to the first
+  EXPECT_TRUE(t.jumps(4.9, 5.1));
 }
 
 TEST(Keyframes, HoldTheEndsAndRestWithoutKeys) {

@@ -202,6 +202,23 @@ TEST(ParticlePairs, FlagsSayWhichSystemsCollide) {
     }
 }
 
+// At first, in between, and after all have died; the grid must not remember the places of before.
+TEST(ParticlePairs, SystemsMayBeEmptyAtAnyTime) {
+  World world({.gravity = Vec3::Zero(), .max_step = kFrame});
+  world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
+  const auto a = world.add_particle_system({.internal = true});
+  world.add_particle_system({.external = true});
+  EXPECT_EQ(world.step(kFrame).particle_collisions, 0u);
+  for (const std::size_t count : {300u, 0u, 2u, 0u, 5000u, 0u}) {
+    for (std::size_t i = 0; i < count; ++i)
+      world.add_particle(a, {.position = {0.1 * static_cast<Real>(i), 1, 0}, .lifespan = 1.5 * kFrame});
+    world.step(kFrame);
+    EXPECT_EQ(world.particles(a).size(), count);
+    world.step(kFrame);
+    EXPECT_EQ(world.particles(a).size(), 0u);
+  }
+}
+
 TEST(ParticlePairs, EventsTellOfCollisionsAndDeathsInOrder) {
   World world({.gravity = Vec3::Zero(), .max_step = kFrame});
   world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 1, .friction = 0});

@@ -1,0 +1,12 @@
+# Writes OUTPUT, a C++ file that defines NAMESPACE::FUNCTION(): the files in INPUTS as pairs of a name without ending and a text.
+set(text "// Made by cmake/embed_texts.cmake.\n#include <span>\n#include <string_view>\n#include <utility>\n\n")
+string(APPEND text "namespace ${NAMESPACE} {\nusing EmbeddedText = std::pair<std::string_view, std::string_view>;\n")
+string(APPEND text "std::span<const EmbeddedText> ${FUNCTION}();\nstd::span<const EmbeddedText> ${FUNCTION}() {\n")
+string(APPEND text "  static constexpr EmbeddedText kTexts[] = {\n")
+foreach(file IN LISTS INPUTS)
+  get_filename_component(name "${file}" NAME_WE)
+  file(READ "${file}" source)
+  string(APPEND text "      {\"${name}\", R\"TEXT(${source})TEXT\"},\n")
+endforeach()
+string(APPEND text "  };\n  return kTexts;\n}\n}  // namespace ${NAMESPACE}\n")
+file(WRITE "${OUTPUT}" "${text}")

@@ -1,0 +1,60 @@
+#pragma once
+/// Which contact normals the surface of a triangle mesh allows. A contact at an edge or a vertex pushes only
+/// along the directions of that feature's Voronoi region: those in which no other triangle around it is
+/// nearer. An edge between triangles of one plane has no direction but theirs, and one in a valley none at
+/// all, so that neither stops what slides over it.
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "sim/geometry/mesh.h"
+
+namespace offstage::sim {
+
+/// What contacts ask about the surroundings of each triangle of a mesh; found once.
+class MeshSurface {
+ public:
+  MeshSurface(const TriangleMesh& mesh, const MeshTopology& topology);
+
+  /// The triangles across the edges (0,1), (1,2), (2,0) of a face, past any without an area; kNoFace at a
+  /// border.
+  const std::array<uint32_t, 3>& across(uint32_t face) const { return faces_[face].across; }
+  /// Whether one of its vertices is at a border: what lies beyond is not known here.
+  bool is_at_border(uint32_t face) const { return faces_[face].at_border; }
+  /// Whether it is so thin that it has no reliable normal.
+  bool is_sliver(uint32_t face) const { return faces_[face].sliver; }
+
+ private:
+  struct Face {
+    std::array<uint32_t, 3> across;
+    bool at_border, sliver;
+  };
+  std::vector<Face> faces_;
+};
+
+class CollisionMesh;
+
+/// One side of a triangle of a mesh.
+struct SurfaceTriangle {
+  const CollisionMesh* mesh = nullptr;
+  uint32_t face = 0;
+  int side = 1;  ///< 1: the front, from where its vertices are counter-clockwise; -1: the back
+
+  /// Unit, on this side; zero if it has no area.
+  Vec3 normal() const;
+  /// The corner, 0 to 2.
+  const Vec3& corner(std::size_t k) const;
+  /// How steeply the surface falls beyond the edge (k, k + 1), as the sine of the angle from the triangle's
+  /// plane: positive at a ridge, negative in a valley, 0 where it is flat or ends.
+  Real fall(std::size_t k) const;
+  /// Whether a contact at a point of the triangle can push along `n`, unit, on this side of it. `guard`, 0 to
+  /// 1: normals outside of a ridge's region by less than this share of its fall are allowed, too.
+  bool allows(const Vec3& point, const Vec3& n, Real guard = 0) const;
+
+ private:
+  bool edge_allows(std::size_t k, const Vec3& n, Real guard) const;
+  bool vertex_allows(uint32_t vertex, const Vec3& n, Real guard) const;
+};
+
+}  // namespace offstage::sim

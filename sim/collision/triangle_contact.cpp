@@ -1,0 +1,145 @@
+#include "sim/collision/triangle_contact.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sim/collision/collision_mesh.h"
+#include "sim/collision/contact_candidates.h"
+#include "sim/geometry/closest_points.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Of a ridge's fall: a face that comes down on it may be off by this share, for it may turn into the ridge's
+/// region within the step.
+constexpr Real kGuard = 0.5;
+/// Sine: a valley is where the surface rises by more than this.
+constexpr Real kValley = 1e-3;
+
+/// By how much the other solid may be outside of a triangle's sides and still be before its face. The plane
+/// of a face goes on beneath the surface on the other side of a valley, and is what stops the solid next.
+std::array<Real, 3> room_beyond(const SurfaceTriangle& t, Real margin) {
+  std::array<Real, 3> room{};
+  for (std::size_t k = 0; k < 3; ++k)
+    if (t.fall(k) < -kValley) room[k] = margin;
+  return room;
+}
+
+/// A triangle as one of the two pieces.
+struct TriangleSide {
+  SurfaceTriangle triangle;
+  Pose a_from_mesh;
+  bool of_b;
+
+  bool gives_normal(const Manifold& m) const {
+    return m.source == (of_b ? NormalSource::face_of_b : NormalSource::face_of_a);
+  }
+  /// Of the other piece's face.
+  bool takes_normal(const Manifold& m) const {
+    return m.source == (of_b ? NormalSource::face_of_a : NormalSource::face_of_b);
+  }
+  /// The normal away from the triangle, in the mesh's frame.
+  Vec3 outward(const Vec3& normal) const { return a_from_mesh.vector_to_body(of_b ? normal : Vec3(-normal)); }
+
+  /// Leaves out the points at which the surface does not allow the normal; whether there were any.
+  bool restrict(Manifold& m) const {
+    const Vec3 n = outward(m.normal);
+    const uint32_t count = m.count;
+    if (gives_normal(m)) {
+      if (n.dot(triangle.normal()) < 0) m.count = 0;
+      return m.count < count;
+    }
+    m.count = 0;
+    if (n.dot(triangle.normal()) < -kNearFace) return true;
+    for (uint32_t k = 0; k < count; ++k) {
+      const Vec3 point = a_from_mesh.point_to_body(of_b ? m.points[k].on_b : m.points[k].on_a);
+      if (triangle.allows(point, n, takes_normal(m) ? kGuard : 0)) m.points[m.count++] = m.points[k];
+    }
+    return m.count < count;
+  }
+};
+
+}  // namespace
+
+void sphere_triangle_manifold(const Vec3& centre, Real radius, const SurfaceTriangle& triangle,
+                              const Pose& mesh_pose, bool of_b, Real margin, Manifold& m) {
+  m.count = 0;
+  const Vec3 p = mesh_pose.point_to_body(centre), up = triangle.normal();
+  const TrianglePoint nearest =
+      closest_on_triangle(p, triangle.corner(0), triangle.corner(1), triangle.corner(2));
+  const Vec3 away = p - nearest.point;
+  const Real distance = away.norm(), height = up.dot(p - triangle.corner(0));
+  if (distance - radius > margin) return;
+
+  std::size_t excluded = 0, without = 0,
+              with = 0;  // vertices of weight 0; the last of them, and of the others
+  for (std::size_t k = 0; k < 3; ++k) {
+    (nearest.weights[k] == 0 ? without : with) = k;
+    excluded += nearest.weights[k] == 0;
+  }
+  // Through the surface, the centre sees its other side.
+  const bool through = height < 0 && distance < radius;
+  const SurfaceTriangle seen{triangle.mesh, triangle.face, height < 0 ? -triangle.side : triangle.side};
+  Vec3 outward = up;
+  Real separation = height - radius;
+  Vec3 edge = Vec3::Zero();
+  m.source = of_b ? NormalSource::face_of_b : NormalSource::face_of_a;
+  m.radius_a = m.radius_b = 0;
+  if (excluded > 0 && distance > 0) {
+    const Vec3 direction = away / distance;
+    if (seen.allows(nearest.point, direction)) {
+      outward = through ? Vec3(-direction) : direction;
+      separation = through ? -distance - radius : distance - radius;
+      if (excluded == 1) edge = (triangle.corner(without + 2) - triangle.corner(without + 1)).normalized();
+      m.source = excluded == 2 ? NormalSource::points
+                 : of_b        ? NormalSource::edge_of_b
+                               : NormalSource::edge_of_a;
+      (of_b ? m.radius_a : m.radius_b) = radius;
+    } else {
+      // Before the plane of a face beyond a valley.
+      const std::array<Real, 3> room = room_beyond(triangle, margin);
+      const std::size_t k = excluded == 1 ? (without + 1) % 3 : room[with] > 0 ? with : (with + 2) % 3;
+      if ((away - height * up).squaredNorm() > room[k] * room[k] || !(separation <= margin)) return;
+    }
+  }
+  const Vec3 n = mesh_pose.vector_to_world(outward);
+  m.normal = of_b ? n : Vec3(-n);
+  const Vec3 along = mesh_pose.vector_to_world(edge);
+  m.edge_a = of_b ? Vec3(Vec3::Zero()) : along;
+  m.edge_b = of_b ? along : Vec3(Vec3::Zero());
+  const Vec3 on_sphere = centre - radius * n, on_mesh = on_sphere - separation * n;
+  m.points[m.count++] = {of_b ? on_sphere : on_mesh, of_b ? on_mesh : on_sphere, separation,
+                         vertex_id(of_b ? 0 : 1, 0)};
+}
+
+void find_triangle_manifolds(const Convex& a, const Convex& b, const PairTriangles& triangles,
+                             const Pose& a_from_b, const Separation& s, Real margin, bool turning,
+                             std::vector<Manifold>& found) {
+  if (!(s.distance <= margin)) return;
+  std::array<TriangleSide, 2> sides;
+  std::size_t count = 0;
+  if (triangles.b) sides[count++] = {*triangles.b, a_from_b, true};
+  if (triangles.a) sides[count++] = {*triangles.a, Pose{}, false};
+
+  const std::size_t before = found.size();
+  std::optional<MoreManifolds> more;
+  if (turning) more.emplace();
+  found.push_back(manifold(a, b, a_from_b, s, margin, more ? &*more : nullptr));
+  if (more)
+    for (const Manifold& m : more->manifolds)
+      if (m.count > 0) found.push_back(m);
+  for (std::size_t i = 0; i < count; ++i) {
+    const TriangleSide& side = sides[i];
+    bool restricted = false;
+    for (std::size_t k = before; k < found.size(); ++k) restricted |= side.restrict(found[k]);
+    if (!restricted) continue;
+    const Vec3 up = side.a_from_mesh.vector_to_world(side.triangle.normal());
+    found.push_back(
+        triangle_face_manifold(a, b, a_from_b, side.of_b, up, room_beyond(side.triangle, margin), margin));
+  }
+  found.erase(std::remove_if(found.begin() + static_cast<std::ptrdiff_t>(before), found.end(),
+                             [](const Manifold& m) { return m.count == 0; }),
+              found.end());
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,320 @@
+#include "sim/contact/contact_motion.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sim/dynamics/free_body.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Bodies that turn by less in an interval carry their arms as they are [rad].
+constexpr Real kStraight = 2e-4;
+/// And so far a corner's way is nearly straight, and the velocity at it changes evenly [rad].
+constexpr Real kEven = 0.1;
+/// Bodies that turn by more in a sub-step are not followed: where their contacts get is beyond a prediction
+/// from the start [rad].
+constexpr Real kMostTurn = 1;
+/// Cosine of the greatest turn of a normal within an interval that is predicted.
+constexpr Real kPredictable = 0.8;
+/// Sine between an axis of revolution and the contact's direction: below it the direction around the axis is
+/// not defined well enough to follow.
+constexpr Real kUpright = 0.02;
+/// Cosine: points of a surface of revolution that are not nearer than this to the meridian that faces the
+/// other body go with the body.
+constexpr Real kFacing = 0.97;
+/// Of lines that are less inclined, the crossing is not defined [sine].
+constexpr Real kParallel = 0.05;
+
+using Vec2 = Eigen::Vector2d;
+
+/// Round about its axis of revolution: the cylinder's and the cone's side and rims.
+bool is_revolved(const Shape& shape) {
+  return std::holds_alternative<Cylinder>(shape) || std::holds_alternative<Cone>(shape);
+}
+/// Of a sphere or capsule, the radius around its core; else 0.
+Real round_radius(const Shape& shape) {
+  if (const auto* sphere = std::get_if<Sphere>(&shape)) return sphere->radius;
+  if (const auto* capsule = std::get_if<Capsule>(&shape)) return capsule->radius;
+  return 0;
+}
+
+/// How a body is at a time after the interval's start, by its velocities then.
+struct Carried {
+  Vec3 shift = Vec3::Zero();  // of the centre of mass, or of the origin
+  Quat orientation, turn = Quat::Identity();
+};
+
+const Quat& start_orientation(const Body& body) {
+  return body.is_awake() ? body.start.orientation : body.start_pose.orientation;
+}
+
+Twist twist_of(const Body& body) {
+  return body.is_awake() ? body.start_twist : body.is_kinematic() ? body.drive : Twist{};
+}
+
+Carried carried(const Body& body, Real time) {
+  Carried c;
+  const Twist twist = twist_of(body);
+  c.shift = time * twist.velocity;
+  if (time * time * twist.angular_velocity.squaredNorm() > kStraight * kStraight)
+    c.turn = rotation(twist.angular_velocity, time);
+  c.orientation = c.turn * start_orientation(body);
+  return c;
+}
+
+/// Everything about a contact at the interval's start.
+struct Start {
+  const Body &a, &b;
+  const Manifold& m;
+  Vec3 arm_a, arm_b;
+  Vec3 sliding;  // velocity of a's material there against b's
+};
+
+bool has_lines(NormalSource s) {
+  return s == NormalSource::edges || s == NormalSource::edge_of_a || s == NormalSource::edge_of_b;
+}
+
+/// The direction of a line of a body after a turn. A rim's tangent stays where the rim faces the other body;
+/// the line of a round side goes with the axis either way.
+Vec3 turned_edge(const Body& body, const Vec3& edge, const Carried& now, const Vec3& arm, const Vec3& out) {
+  const Quat& from = start_orientation(body);
+  if (!is_revolved(body.def.shape)) return now.turn * edge;
+  const Vec3 axis = from * Vec3::UnitY();
+  if (std::abs(axis.dot(edge)) > 0.5) return now.turn * edge;
+  const Vec3 radial = turned_arm(body, arm, from, out, now.orientation, out);
+  const Vec3 tangent = (now.orientation * Vec3::UnitY()).cross(radial);
+  const Real length = tangent.norm();
+  if (length < 1e-12) return now.turn * edge;
+  return tangent.dot(now.turn * edge) < 0 ? Vec3(-tangent / length) : Vec3(tangent / length);
+}
+
+struct Lines {
+  Vec3 of_a, of_b;
+};
+
+/// The normal after a time, by what it comes from; not unit and of no meaning if the directions fail.
+Vec3 turned_normal(const Start& s, const Carried& a, const Carried& b, const Lines& lines) {
+  const Vec3& n = s.m.normal;
+  switch (s.m.source) {
+    case NormalSource::face_of_a:
+      return a.turn * n;
+    case NormalSource::face_of_b:
+      return b.turn * n;
+    case NormalSource::edges: {
+      const Vec3 cross = lines.of_a.cross(lines.of_b);
+      if (cross.norm() < kParallel) return Vec3::Zero();
+      return cross.dot(n) < 0 ? Vec3(-cross.normalized()) : Vec3(cross.normalized());
+    }
+    default:
+      break;
+  }
+  // From the point or line of B behind the surface to that of A.
+  const Vec3 core_a = s.arm_a + s.m.radius_a * n, core_b = s.arm_b - s.m.radius_b * n;
+  const Real distance = s.m.radius_a + s.m.radius_b;
+  Vec3 between = distance * n + (a.turn * core_a - core_a) - (b.turn * core_b - core_b) + a.shift - b.shift;
+  if (s.m.source != NormalSource::points) {
+    const Vec3& line = s.m.source == NormalSource::edge_of_a ? lines.of_a : lines.of_b;
+    between -= line * line.dot(between);
+  }
+  const Real length = between.norm();
+  return length > 0.5 * distance && distance > 0 ? Vec3(between / length) : Vec3(Vec3::Zero());
+}
+
+/// The point of line A that is nearest to line B, across the normal; from A's centre.
+Vec3 crossing(const Vec3& on_a, const Vec3& from_b_to_a, const Lines& lines, const Vec3& n) {
+  const Real area = lines.of_a.cross(lines.of_b).dot(n);
+  return on_a - from_b_to_a.cross(lines.of_b).dot(n) / area * lines.of_a;
+}
+
+/// The contact after a time; none if its normal cannot be predicted.
+bool place_after(const Start& s, Real time, ContactPlace& place) {
+  const Carried a = carried(s.a, time), b = carried(s.b, time);
+  const Vec3& n = s.m.normal;
+  Lines lines;
+  if (has_lines(s.m.source))
+    lines = {turned_edge(s.a, s.m.edge_a, a, s.arm_a, -n), turned_edge(s.b, s.m.edge_b, b, s.arm_b, n)};
+  place.normal = turned_normal(s, a, b, lines);
+  if (!(place.normal.dot(n) > kPredictable)) return false;
+  const Quat &from_a = start_orientation(s.a), &from_b = start_orientation(s.b);
+  const auto arm_of_a = [&] {
+    return turned_arm(s.a, s.arm_a, from_a, -n, a.orientation, Vec3(-place.normal));
+  };
+  const auto arm_of_b = [&] { return turned_arm(s.b, s.arm_b, from_b, n, b.orientation, place.normal); };
+  // The contact goes with the material of the other body, too, but for its running along the first and for
+  // what the one slides over the other.
+  const Vec3 slide = time * s.sliding;
+  const bool by_b = s.m.source == NormalSource::face_of_a || s.m.source == NormalSource::edge_of_a;
+  place.turn = by_b ? b.turn : a.turn;
+  if (by_b) {
+    place.arm_b = arm_of_b();
+    place.arm_a = a.turn * s.arm_a + (place.arm_b - b.turn * s.arm_b) - slide;
+    return true;
+  }
+  place.arm_a = arm_of_a();
+  if (s.m.source == NormalSource::edges) {
+    const Vec3 core_a = place.arm_a + s.m.radius_a * place.normal,
+               core_b = arm_of_b() - s.m.radius_b * place.normal;
+    // Both lines begin at one place.
+    const Vec3 from_b_to_a = core_a - core_b - (s.arm_a - s.arm_b) - b.shift + a.shift;
+    place.arm_a = crossing(core_a, from_b_to_a, lines, place.normal) - s.m.radius_a * place.normal;
+  }
+  place.arm_b = b.turn * s.arm_b + (place.arm_a - a.turn * s.arm_a) + slide;
+  return true;
+}
+
+/// The frame turned by the shortest way to another normal.
+ContactFrame turned_frame(const ContactFrame& f, const Vec3& n) {
+  if (n == f.n) return f;
+  const auto turn = [&](const Vec3& tangent) {
+    return Vec3(tangent - tangent.dot(n) / (1 + f.n.dot(n)) * (f.n + n));
+  };
+  return {n, turn(f.t), turn(f.k)};
+}
+
+Vec3 components(const ContactFrame& f, const Vec3& v) {
+  return {f.n.dot(v), f.t.dot(v), f.k.dot(v)};
+}
+
+/// What a change of place makes of the relative velocity, in the frame of the middle.
+struct Gain {
+  Vec3 velocity;
+  Real along_t, along_k;
+};
+
+Gain gain(const Start& s, const ContactMotion& motion, const ContactPlace& place) {
+  const Twist a = twist_of(s.a), b = twist_of(s.b);
+  const Vec3 &wa = a.angular_velocity, &wb = b.angular_velocity;
+  const ContactPlace& middle = motion.middle;
+  const Vec3 velocity = a.velocity + wa.cross(place.arm_a) - b.velocity - wb.cross(place.arm_b);
+  Vec3 by_turning =
+      components(motion.frame, wa.cross(place.arm_a - middle.arm_a) - wb.cross(place.arm_b - middle.arm_b));
+  by_turning.x() += (place.normal - middle.normal).dot(velocity);
+  const Vec3 spin = wa - wb;
+  const Quat turn = place.turn * middle.turn.conjugate();
+  const auto along = [&](const Vec3& tangent) {
+    return spin.dot((turn * tangent).cross(place.normal)) - spin.dot(tangent.cross(middle.normal));
+  };
+  return {by_turning, along(motion.frame.t), along(motion.frame.k)};
+}
+
+/// Through the three of the start, the middle and the end, which is 0.
+void set_gain(const Start& s, const ContactPlace& start, const ContactPlace& end, ContactMotion& motion) {
+  const Gain first = gain(s, motion, start), last = gain(s, motion, end);
+  motion.gain = (last.velocity - first.velocity) / 2;
+  motion.bow = (last.velocity + first.velocity) / 2;
+  motion.gain_along_t = (last.along_t - first.along_t) / 2;
+  motion.gain_along_k = (last.along_k - first.along_k) / 2;
+  motion.turns = true;
+}
+
+/// An arm at a time, while its end goes with a body and slides by `sliding`.
+struct Arm {
+  Vec3 start, rate, curve;
+
+  Arm(const Vec3& arm, const Vec3& w, const Vec3& sliding)
+      : start(arm), rate(w.cross(arm)), curve(w.cross(rate)) {
+    rate += sliding;
+  }
+};
+
+/// The same for a corner or an edge of one body over a face of the other, if both turn little: to the second
+/// order, without rotations. In a heap almost all contacts are such, and each has this done in each step.
+void set_even_motion(const Start& s, const ContactFrame& frame, Real duration, ContactMotion& motion) {
+  const Vec3 wa = twist_of(s.a).angular_velocity, wb = twist_of(s.b).angular_velocity, &n = frame.n;
+  const bool by_b = s.m.source == NormalSource::face_of_a;
+  const Vec3 &carrier = by_b ? wb : wa, n_rate = (by_b ? wa : wb).cross(n);
+  const Arm a(s.arm_a, wa, by_b ? Vec3(-s.sliding) : Vec3(Vec3::Zero())),
+      b(s.arm_b, wb, by_b ? Vec3(Vec3::Zero()) : s.sliding);
+  const Real half = duration / 2, square = duration * duration / 8;
+  motion.middle.arm_a += half * a.rate + square * a.curve;
+  motion.middle.arm_b += half * b.rate + square * b.curve;
+  motion.middle.turn =
+      Quat(1, half / 2 * carrier.x(), half / 2 * carrier.y(), half / 2 * carrier.z()).normalized();
+  if (n_rate != Vec3::Zero()) {
+    motion.middle.normal = (n + half * n_rate).normalized();
+    motion.frame = turned_frame(frame, motion.middle.normal);
+  }
+  const Vec3 bow = wa.cross(a.curve) - wb.cross(b.curve), spin = wa - wb;
+  motion.gain = components(frame, half * (wa.cross(a.rate) - wb.cross(b.rate)) + 2 * square * bow);
+  motion.gain.x() += half * n_rate.dot(s.sliding);
+  motion.bow = square * components(frame, bow);
+  const auto along = [&](const Vec3& tangent) {
+    return half * spin.dot(carrier.cross(tangent).cross(n) + tangent.cross(n_rate));
+  };
+  motion.gain_along_t = along(frame.t);
+  motion.gain_along_k = along(frame.k);
+  motion.turns = true;
+}
+
+}  // namespace
+
+Vec3 start_centre(const Body& body) {
+  return body.is_awake() ? body.start.position : body.start_pose.position;
+}
+
+bool runs_along(const Body& body, Real duration) {
+  const Vec3 turn = duration * twist_of(body).angular_velocity;
+  return is_revolved(body.def.shape) && turn.squaredNorm() > kStraight * kStraight;
+}
+
+Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3& out_from, const Quat& to,
+                const Vec3& out_to) {
+  const Shape& shape = body.def.shape;
+  const auto with_body = [&](const Vec3& r) { return Vec3(to * (from.conjugate() * r)); };
+  if (const Real radius = round_radius(shape); radius > 0)
+    return with_body(arm - radius * out_from) + radius * out_to;
+  if (!is_revolved(shape)) return with_body(arm);
+  const Vec3 centre = body.is_awake() ? body.rigid.centre : Vec3(Vec3::Zero());
+  const Vec3 local = from.conjugate() * arm + centre;
+  const auto radial = [](const Vec3& v) { return Vec2(v.x(), v.z()); };
+  const Vec2 spoke = radial(local), facing = radial(from.conjugate() * out_from),
+             next = radial(to.conjugate() * out_to);
+  const Real length = spoke.norm();
+  if (facing.norm() < kUpright || next.norm() < kUpright ||
+      spoke.dot(facing) < kFacing * length * facing.norm())
+    return with_body(arm);
+  // The angle from the meridian that faces the other body stays, which is but what the manifold is off.
+  const Real c = spoke.dot(facing), t = facing.x() * spoke.y() - facing.y() * spoke.x();
+  const Vec2 turned =
+      Vec2(c * next.x() - t * next.y(), t * next.x() + c * next.y()) / (facing.norm() * next.norm());
+  return to * (Vec3(turned.x(), local.y(), turned.y()) - centre);
+}
+
+ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, const ContactFrame& frame,
+                             const Vec3& place, Real duration, Real substep) {
+  const Twist twist_a = twist_of(a), twist_b = twist_of(b);
+  const Vec3 arm_a = place - start_centre(a), arm_b = place - start_centre(b);
+  const Start start{a, b, m, arm_a, arm_b, twist_a.at(arm_a) - twist_b.at(arm_b)};
+  ContactMotion motion;
+  motion.frame = frame;
+  const bool is_face = m.source == NormalSource::face_of_a || m.source == NormalSource::face_of_b;
+  const auto turn2 = [duration](const Body& body) {
+    return duration * duration * twist_of(body).angular_velocity.squaredNorm();
+  };
+  const Real most2 = std::max(turn2(a), turn2(b));
+  const ContactPlace at_start{m.normal, start.arm_a, start.arm_b, Quat::Identity()};
+  motion.middle = at_start;
+  if (const Real share = duration / substep; most2 > share * share * kMostTurn * kMostTurn) return motion;
+  if (is_face && most2 < kStraight * kStraight) {
+    // The one slides along the other's face.
+    if (m.source == NormalSource::face_of_b)
+      motion.middle.arm_b += duration / 2 * start.sliding;
+    else
+      motion.middle.arm_a -= duration / 2 * start.sliding;
+    return motion;
+  }
+  const Shape& carrier = (m.source == NormalSource::face_of_a ? b : a).def.shape;
+  if (is_face && most2 < kEven * kEven && !is_revolved(carrier) && round_radius(carrier) == 0) {
+    set_even_motion(start, frame, duration, motion);
+    return motion;
+  }
+  ContactPlace middle, end;
+  if (!place_after(start, duration / 2, middle) || !place_after(start, duration, end)) return motion;
+  motion.middle = middle;
+  motion.frame = turned_frame(frame, middle.normal);
+  set_gain(start, at_start, end, motion);
+  return motion;
+}
+
+}  // namespace offstage::sim

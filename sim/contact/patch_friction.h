@@ -1,0 +1,120 @@
+#pragma once
+/// Friction of contact patches in SIMD lanes, for the sweeps of the fast solver (patch_batch.h).
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "sim/contact/patch_batch.h"
+
+namespace offstage::sim {
+
+using PatchVector = PatchBatch::Vector;
+using PatchSymmetric = PatchBatch::Symmetric;
+
+/// Points that slide no faster than this count as sliding so fast [m/s].
+inline constexpr float kSlowestSliding = 1e-6F;
+
+/// Coulomb's limits of the impulses along t and k, and of the angular one about n: as if every point's
+/// friction were across its arm from the centre.
+inline PatchVector friction_limits(const PatchBatch& p) {
+  FloatLanes force{}, moment{};
+  for (uint32_t i = 0; i < p.count; ++i) {
+    const PatchBatch::Point& q = p.points[i];
+    force += q.impulse;
+    moment += q.impulse * lane_sqrt(q.x * q.x + q.y * q.y);
+  }
+  return {p.friction_t * force, p.friction_k * force, lane_min(p.friction_t, p.friction_k) * moment};
+}
+
+/// The impulses of a patch of one point, along t and k, from the velocities u: those that stop the sliding if
+/// they are within the limits. Otherwise a step against the velocity, as long as keeps the iteration
+/// convergent, and back to the limits; its fixed point opposes the sliding exactly.
+inline PatchVector coulomb_impulse(const PatchBatch& p, const PatchVector& u, const PatchVector& limits) {
+  const PatchSymmetric& S = p.friction_stiffness;
+  const PatchVector& old = p.friction_impulse;
+  const FloatLanes stick_t = old.x - (S.xx * u.x + S.xy * u.y);
+  const FloatLanes stick_k = old.y - (S.xy * u.x + S.yy * u.y);
+  const FloatLanes slide_t = old.x - S.zz * u.x, slide_k = old.y - S.zz * u.y;
+  const FloatLanes slide = lane_sqrt(slide_t * slide_t + slide_k * slide_k);
+  const FloatLanes scale = slide > limits.x ? limits.x / slide : float_lanes(1);
+  const auto round = p.friction_t == p.friction_k;
+  const auto sticks = round ? stick_t * stick_t + stick_k * stick_k <= limits.x * limits.x
+                            : (lane_abs(stick_t) <= limits.x) & (lane_abs(stick_k) <= limits.y);
+  const FloatLanes held_t = round ? scale * slide_t : lane_clamp(slide_t, limits.x);
+  const FloatLanes held_k = round ? scale * slide_k : lane_clamp(slide_k, limits.y);
+  return {sticks ? stick_t : held_t, sticks ? stick_k : held_k, FloatLanes{}};
+}
+
+/// x of A x = b, for a positive definite A.
+inline PatchVector solution_of(const PatchSymmetric& A, const PatchVector& b) {
+  const FloatLanes first = lane_inverse(A.xx), y_x = first * A.xy, z_x = first * A.xz;
+  const FloatLanes yy = A.yy - y_x * A.xy, yz = A.yz - y_x * A.xz;
+  const FloatLanes second = lane_inverse(yy), z_y = second * yz;
+  const FloatLanes third = lane_inverse(A.zz - z_x * A.xz - z_y * yz);
+  const FloatLanes b_y = b.y - y_x * b.x, b_z = b.z - z_x * b.x - z_y * b_y;
+  const FloatLanes z = third * b_z, y = second * b_y - z_y * z;
+  return {first * b.x - y_x * y - z_x * z, y, z};
+}
+
+/// The friction of a patch if sliding and spinning had nothing to do with each other: against the sliding up
+/// to its limit, and then against the spin.
+inline PatchVector separate_impulse(const PatchBatch& p, const PatchVector& u, const PatchVector& limits) {
+  const PatchSymmetric& K = p.friction_mobility;
+  const PatchVector& old = p.friction_impulse;
+  const FloatLanes step = lane_inverse(lane_max(K.xx, K.yy) + lane_abs(K.xy));
+  const FloatLanes t = old.x - step * u.x, k = old.y - step * u.y, size = lane_sqrt(t * t + k * k);
+  const FloatLanes scale = size > limits.x ? limits.x / size : float_lanes(1);
+  const auto round = p.friction_t == p.friction_k;
+  const FloatLanes held_t = round ? scale * t : lane_clamp(t, limits.x),
+                   held_k = round ? scale * k : lane_clamp(k, limits.y);
+  const FloatLanes spin = u.z + K.xz * (held_t - old.x) + K.yz * (held_k - old.y);
+  return {held_t, held_k, lane_clamp(old.z - lane_inverse(K.zz) * spin, limits.z)};
+}
+
+/// The friction of a patch that slides or spins, which moves with `twist` now: at each point Coulomb's,
+/// against that point's own velocity, so that sliding lengthens the spin and the spin the slide. A point's
+/// friction is taken as viscous with the coefficient limit / speed, which makes one linear system of the
+/// patch; the speeds are those that separate laws would leave, which is right where nothing spins.
+inline PatchVector sliding_impulse(const PatchBatch& p, const PatchVector& twist, const PatchVector& limits) {
+  std::array<FloatLanes, 4> viscous_t, viscous_k;
+  const auto round = p.friction_t == p.friction_k;
+  const FloatLanes slowest = float_lanes(kSlowestSliding);
+  const auto at = [&p](uint32_t i, const PatchVector& v) {
+    const PatchBatch::Point& q = p.points[i];
+    return std::pair(v.x - q.y * v.z, v.y + q.x * v.z);
+  };
+  PatchSymmetric A = p.friction_stiffness;
+  const PatchVector u =
+      twist + p.friction_mobility * (separate_impulse(p, twist, limits) - p.friction_impulse);
+  for (uint32_t i = 0; i < p.count; ++i) {
+    const PatchBatch::Point& q = p.points[i];
+    const auto [t, k] = at(i, u);
+    const FloatLanes speed = lane_sqrt(t * t + k * k);
+    viscous_t[i] = q.impulse * p.friction_t / lane_max(round ? speed : lane_abs(t), slowest);
+    viscous_k[i] = q.impulse * p.friction_k / lane_max(round ? speed : lane_abs(k), slowest);
+    const FloatLanes x = viscous_k[i] * q.x, y = viscous_t[i] * q.y;
+    A.xx += viscous_t[i];
+    A.xz -= y;
+    A.yy += viscous_k[i];
+    A.yz += x;
+    A.zz += x * q.x + y * q.y;
+  }
+  const PatchVector next = solution_of(A, p.friction_stiffness * twist - p.friction_impulse);
+  PatchVector impulse{};
+  for (uint32_t i = 0; i < p.count; ++i) {
+    const PatchBatch::Point& q = p.points[i];
+    const auto [t, k] = at(i, next);
+    FloatLanes f = viscous_t[i] * t, g = viscous_k[i] * k;
+    // What has become faster has no more than its limit.
+    const FloatLanes limit_t = q.impulse * p.friction_t, limit_k = q.impulse * p.friction_k;
+    const FloatLanes size = lane_sqrt(f * f + g * g);
+    const FloatLanes scale = size > limit_t ? limit_t / size : float_lanes(1);
+    f = round ? scale * f : lane_clamp(f, limit_t);
+    g = round ? scale * g : lane_clamp(g, limit_k);
+    impulse = impulse - PatchVector{f, g, q.x * g - q.y * f};
+  }
+  return impulse;
+}
+
+}  // namespace offstage::sim

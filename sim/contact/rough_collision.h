@@ -1,0 +1,13 @@
+#pragma once
+/// Collisions of clusters within a bounded effort, for the fast solver and heaps.
+
+#include "sim/contact/collision.h"
+
+namespace offstage::sim {
+
+/// As collide(), but with at most some ten thousand operations: contacts of a large cluster may still
+/// approach afterwards. It never adds kinetic energy either.
+ContactWork collide_roughly(std::span<ContactBody> bodies, std::span<Contact> contacts,
+                            std::span<const Real> restitution, ImpactLaw law, const JointProblem& joints);
+
+}  // namespace offstage::sim

@@ -1,0 +1,298 @@
+#include "sim/contact/seams.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "sim/collision/distance.h"
+#include "sim/collision/gjk.h"
+#include "sim/geometry/closest_points.h"
+#include "sim/parallel_loop.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Cosine: normals that are more alike are the same.
+constexpr Real kSameWay = 1 - 1e-10;
+/// Of the body's extent: clipping lets points be outside of their surface by no more.
+constexpr Real kClipped = 2e-3;
+/// Cosines: a surface goes on along a face if its own normal is so alike; and a contact pushes along the
+/// surface's own normal if that is so alike.
+constexpr Real kGoesOn = 0.999, kOwnNormal = 0.9;
+/// How far over a face the surface beside it is looked at, of the height of steps that count.
+constexpr Real kLookOver = 3;
+/// More contacts of a body are not compared with each other.
+constexpr std::size_t kMostContacts = 512;
+/// Contacts of a slope are looked for this far beyond the contact that they replace [m].
+constexpr Real kSlopeMargin = 2e-3;
+
+/// How far a point is from a convex piece of a shape, and along which direction that grows; in the shape's
+/// frame.
+SurfaceDistance piece_distance(const CollisionShape& shape, uint32_t piece, const Vec3& p) {
+  if (shape.is_plane()) return {p.y(), Vec3::UnitY()};
+  if (!shape.solid().mesh) return signed_distance(shape.solid(), p);
+  const Convex convex = shape.piece(piece);
+  if (convex.core == Convex::Core::triangle) {
+    const Vec3 away =
+        p - closest_on_triangle(p, *convex.corners[0], *convex.corners[1], *convex.corners[2]).point;
+    const Real distance = away.norm();
+    if (distance > 0) return {distance, away / distance};
+    return {0, shape.solid().mesh->topology.face_normal(piece)};
+  }
+  const ConvexPolyhedron& polyhedron = *convex.polyhedron;
+  SurfaceDistance inside{-std::numeric_limits<Real>::infinity(), Vec3::UnitY()};
+  for (uint32_t f = 0; f < polyhedron.face_count(); ++f) {
+    const ConvexPolyhedron::Plane& plane = polyhedron.plane(f);
+    if (const Real d = plane.normal.dot(p) - plane.offset; d > inside.distance) inside = {d, plane.normal};
+  }
+  if (inside.distance <= 0) return inside;
+  GjkCache fresh;
+  const Separation s = gjk(Convex{}, convex, {-p, Quat::Identity()}, fresh);
+  return {s.distance, s.normal};
+}
+
+/// One manifold as the body X sees it that it has in common with others; Y is the other body.
+struct View {
+  ContactPair* pair;
+  uint32_t index;
+  bool x_is_a, foreseen;
+  const Manifold* m;
+
+  Body& x() const { return x_is_a ? pair->a() : pair->b(); }
+  Body& y() const { return x_is_a ? pair->b() : pair->a(); }
+  uint32_t x_piece() const { return x_is_a ? m->piece_a : m->piece_b; }
+  uint32_t y_piece() const { return x_is_a ? m->piece_b : m->piece_a; }
+  Vec3 normal() const { return x_is_a ? m->normal : Vec3(-m->normal); }  ///< towards X
+  const Vec3& on_y(uint32_t k) const { return x_is_a ? m->points[k].on_b : m->points[k].on_a; }
+  bool continues() const { return x_is_a ? m->continues_b : m->continues_a; }
+  bool is_face() const { return m->source == (x_is_a ? NormalSource::face_of_b : NormalSource::face_of_a); }
+  uint32_t deepest() const {
+    uint32_t best = 0;
+    for (uint32_t k = 1; k < m->count; ++k)
+      if (m->points[k].separation < m->points[best].separation) best = k;
+    return best;
+  }
+  /// A seam is a line, or a point of it.
+  bool may_be_at_seam() const {
+    if (continues() || y().collision_shape().is_plane() || !is_narrow(*m)) return false;
+    return !is_face() || !std::holds_alternative<Sphere>(x().def.shape);
+  }
+};
+
+/// What becomes of a contact: it goes, or another comes in its place.
+struct Verdict {
+  ContactPair* pair;
+  uint32_t index;
+  Manifold instead;
+};
+
+/// The contacts of one body X at a time.
+class BodyContacts {
+ public:
+  BodyContacts(const Body& x, std::span<ContactPair* const> pairs, Real time, Real h)
+      : x_(x), time_(time), h_(h) {
+    for (ContactPair* pair : pairs) {
+      const std::vector<PlacedManifold>& all = pair->manifolds();
+      const std::size_t found = all.size() - pair->foreseen;
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        const bool foreseen = i >= found;
+        views_.push_back({pair, static_cast<uint32_t>(i), &pair->a() == &x, foreseen,
+                          foreseen ? &pair->at_end(i - found) : &all[i].manifold});
+      }
+    }
+    flush_ = std::min(kFlush, kFlushShare * x.extent);
+  }
+
+  std::vector<Verdict> judge() const {
+    std::vector<Verdict> verdicts;
+    if (views_.size() > kMostContacts) return verdicts;
+    struct Hidden {
+      std::size_t contact, by;
+      Vec3 normal;  // of the surface there
+    };
+    std::vector<Hidden> hidden;
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      if (!views_[i].may_be_at_seam()) continue;
+      for (std::size_t k = 0; k < views_.size(); ++k)
+        if (k != i && !views_[k].foreseen)
+          if (const auto normal = normal_instead(views_[i], views_[k])) hidden.push_back({i, k, *normal});
+    }
+    const auto is_hidden = [&](std::size_t i) {
+      return std::any_of(hidden.begin(), hidden.end(), [&](const Hidden& x) { return x.contact == i; });
+    };
+    std::size_t last = views_.size();
+    for (const auto& [contact, by, normal] : hidden) {
+      // Of two that hide each other both are kept.
+      if (contact == last || is_hidden(by)) continue;
+      last = contact;
+      const View& v = views_[contact];
+      verdicts.push_back({v.pair, v.index, {}});
+      if (normal != views_[by].normal() && !v.foreseen)
+        verdicts.back().instead = on_slope(v, views_[by], normal);
+    }
+    return verdicts;
+  }
+
+ private:
+  Pose pose(const Body& body, bool at_end) const { return at_end ? body.pose : body.placed_at(time_, h_); }
+
+  static Vec3 middle(const View& v) {
+    Vec3 sum = Vec3::Zero();
+    for (uint32_t k = 0; k < v.m->count; ++k) sum += v.on_y(k);
+    return sum / v.m->count;
+  }
+
+  /// The point of a contact that is highest over a face.
+  static Vec3 highest(const View& v, const Vec3& up) {
+    Vec3 best = v.on_y(0);
+    for (uint32_t k = 1; k < v.m->count; ++k)
+      if (up.dot(v.on_y(k) - best) > 0) best = v.on_y(k);
+    return best;
+  }
+
+  /// If a contact is on or below the face by which another holds the same piece, and its own surface does not
+  /// push as it says when seen from above the face: how it does push; the face's normal if it just goes on
+  /// from there.
+  std::optional<Vec3> normal_instead(const View& v, const View& face) const {
+    const Vec3 n = v.normal(), up = face.normal();
+    if (v.x_piece() != face.x_piece() || n.dot(up) > kSameWay) return std::nullopt;
+    // Two convex pieces have no seam between them: what they touch with next is theirs, too.
+    if (v.pair == face.pair && v.y_piece() == face.y_piece()) return std::nullopt;
+    const uint32_t deepest = face.deepest();
+    const Vec3& on_face = face.on_y(deepest);
+    const Real clipped = kClipped * x_.extent;
+    Real low = std::min(0.0, face.m->points[deepest].separation) - flush_ - clipped;
+    if (v.foreseen) low -= std::abs(up.dot(x_.pose.position - x_.start_pose.position));
+    for (uint32_t k = 0; k < v.m->count; ++k)
+      if (const Real height = up.dot(v.on_y(k) - on_face); height < low || height > flush_ + clipped)
+        return std::nullopt;
+    Vec3 top = on_surface(v, 0);
+    for (uint32_t k = 0; k < v.m->count; ++k) {
+      const Vec3 place = on_surface(v, k);
+      if (const Real height = up.dot(place - on_face); height < low || height > flush_) return std::nullopt;
+      if (up.dot(place - top) > 0) top = place;
+    }
+    const Vec3 over = kLookOver * flush_ * up;
+    if (distance(face, middle(face) + over).normal.dot(up) < kGoesOn) return std::nullopt;
+    const Vec3 own = distance(v, top + std::max(0.0, up.dot(on_face - top)) * up + over).normal;
+    if (own.dot(n) > kSameWay) return std::nullopt;
+    if (own.dot(up) > kGoesOn) return up;
+    const bool is_slope = own.dot(up) > 0 && own.dot(n) > 0 && own.dot(n) < kOwnNormal;
+    return is_slope ? std::optional(own) : std::nullopt;
+  }
+
+  /// A point of a contact on Y's piece. Clipping lets it be a little outside.
+  Vec3 on_surface(const View& v, uint32_t k) const {
+    const SurfaceDistance off = distance(v, v.on_y(k));
+    return v.on_y(k) - std::max(0.0, off.distance) * off.normal;
+  }
+
+  /// Of Y's piece, at a place of the world.
+  SurfaceDistance distance(const View& v, const Vec3& place) const {
+    const Pose y = pose(v.y(), v.foreseen);
+    SurfaceDistance d = piece_distance(v.y().collision_shape(), v.y_piece(), y.point_to_body(place));
+    d.normal = y.vector_to_world(d.normal);
+    return d;
+  }
+  /// The contact of X's piece with the slope that begins where a contact is.
+  Manifold on_slope(const View& v, const View& face, const Vec3& normal) const {
+    const Pose plane{highest(v, face.normal()), Quat::FromTwoVectors(Vec3::UnitY(), normal)};
+    const Pose x = pose(v.x(), false), y = pose(v.y(), false);
+    const Pose plane_from_x{plane.point_to_body(x.position), plane.orientation.conjugate() * x.orientation};
+    const Real margin = std::max(0.0, v.m->points[v.deepest()].separation) + kSlopeMargin;
+    const Manifold on_plane =
+        placed(plane_manifold(v.x().collision_shape().piece(v.x_piece()), plane_from_x, margin), plane);
+    Manifold m = *v.m;
+    m.normal = v.x_is_a ? normal : Vec3(-normal);
+    m.source = v.x_is_a ? NormalSource::face_of_b : NormalSource::face_of_a;
+    m.edge_a = m.edge_b = Vec3::Zero();
+    m.radius_a = m.radius_b = 0;
+    m.count = 0;
+    // It stands on the face, not in the slope: else what is seen is a corner of something flush.
+    const Real least =
+        std::min({0.0, v.m->points[v.deepest()].separation, face.m->points[face.deepest()].separation}) -
+        flush_;
+    for (uint32_t k = 0; k < on_plane.count; ++k) {
+      const ContactPoint& p = on_plane.points[k];
+      if (p.separation < least) return {};
+      if (piece_distance(v.y().collision_shape(), v.y_piece(), y.point_to_body(p.on_b)).distance > margin)
+        continue;
+      m.points[m.count++] = v.x_is_a ? p : ContactPoint{p.on_b, p.on_a, p.separation, p.id};
+    }
+    return m;
+  }
+
+  const Body& x_;
+  Real time_, h_, flush_;
+  std::vector<View> views_;
+};
+
+/// Pairs by a body that they share.
+struct Group {
+  Body* x;
+  std::vector<ContactPair*> pairs;
+};
+
+/// Those of the bodies that can move and have a contact that may be at a seam; and pairs of other bodies with
+/// ones of several pieces, by themselves.
+std::vector<Group> groups_with_seams(std::span<ContactPair* const> pairs) {
+  std::vector<Group> groups;
+  std::vector<std::pair<Body*, std::size_t>> numbers;  // by slot
+  const auto group_of = [&](Body& x) -> std::size_t {
+    const auto at =
+        std::lower_bound(numbers.begin(), numbers.end(), x.handle.index,
+                         [](const auto& e, uint32_t slot) { return e.first->handle.index < slot; });
+    return at != numbers.end() && at->first == &x ? at->second : groups.size();
+  };
+  std::vector<Body*> bodies;
+  for (ContactPair* pair : pairs) {
+    if (!pair->has_narrow()) continue;
+    for (const auto& [x, y] : {std::pair(&pair->a(), &pair->b()), std::pair(&pair->b(), &pair->a())}) {
+      if (x->is_awake() || x->is_kinematic())
+        bodies.push_back(x);
+      else if (y->collision_shape().piece_count() > 1)
+        groups.push_back({x, {pair}});
+    }
+  }
+  std::sort(bodies.begin(), bodies.end(), [](Body* a, Body* b) { return a->handle.index < b->handle.index; });
+  bodies.erase(std::unique(bodies.begin(), bodies.end()), bodies.end());
+  for (Body* x : bodies) {
+    numbers.emplace_back(x, groups.size());
+    groups.push_back({x, {}});
+  }
+  for (ContactPair* pair : pairs) {
+    if (pair->manifolds().empty()) continue;
+    for (Body* x : {&pair->a(), &pair->b()})
+      if (const std::size_t g = group_of(*x); g < groups.size()) groups[g].pairs.push_back(pair);
+  }
+  return groups;
+}
+
+}  // namespace
+
+std::vector<ContactPair*> remove_seam_contacts(std::span<ContactPair* const> pairs, Real time, Real h) {
+  const bool none = std::none_of(pairs.begin(), pairs.end(), [](ContactPair* p) { return p->has_narrow(); });
+  if (none) return {};
+  const std::vector<Group> groups = groups_with_seams(pairs);
+  std::vector<std::vector<Verdict>> verdicts(groups.size());
+  for_each_index(groups.size(), [&](std::size_t i) {
+    verdicts[i] = BodyContacts(*groups[i].x, groups[i].pairs, time, h).judge();
+  });
+  std::vector<ContactPair*> changed;
+  for (const std::vector<Verdict>& of_body : verdicts)
+    for (const Verdict& v : of_body) {
+      v.pair->replace(v.index, v.instead);
+      changed.push_back(v.pair);
+    }
+  if (changed.empty()) return changed;
+  std::vector<ContactPair*> in_order;
+  std::sort(changed.begin(), changed.end());
+  for (ContactPair* pair : pairs) {
+    if (!std::binary_search(changed.begin(), changed.end(), pair)) continue;
+    pair->drop_empty();
+    in_order.push_back(pair);
+  }
+  return in_order;
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,69 @@
+/// Whether an island is for the exact or the fast solver.
+
+#include <algorithm>
+#include <limits>
+
+#include "sim/contact/contact_solve.h"
+
+namespace offstage::sim {
+namespace {
+
+/// So few bodies are always worth it in a world where the fast solver takes less than this [ns].
+constexpr std::size_t kFew = 6;
+constexpr Real kSmall = 1e5;
+/// Of the fast solver, per point and sub-step [ns].
+constexpr Real kFastPoint = 60;
+/// Of the fast solver, per joint and sub-step [ns].
+constexpr Real kFastJoint = 200;
+/// How much dearer than the fast solver the exact one may be in the long run: it is worth that. What it takes
+/// beyond counts as a debt, of which it may have as much as so many steps of the fast solver: it is dear
+/// where an island is new, and cheap from then on.
+constexpr Real kWorth = 2.5, kCredit = 120;
+/// After that it waits until its debt is but this share of what the fast solver has taken.
+constexpr Real kShare = 0.25, kLongestWait = 2400;
+/// With so little of the credit left, only what is known to be cheap is tried.
+constexpr Real kLittle = 0.05;
+
+Real fast_cost(const Island& island, Real duration) {
+  Real points = 0;
+  for (const ContactPair* pair : island.pairs)
+    for (const PlacedManifold& m : pair->manifolds()) points += m.manifold.count;
+  Real joints = 0;
+  for (const Articulation* a : island.articulations) joints += static_cast<Real>(a->joints().size());
+  return (points * kFastPoint + joints * kFastJoint) * relaxation_substeps(duration);
+}
+
+}  // namespace
+
+void SolverPatience::begin(std::span<Island* const> islands, Real duration) {
+  Real fast = 0;
+  for (const Island* island : islands) fast += fast_cost(*island, duration);
+  small_ = fast < kSmall;
+  debt_ = std::max(0.0, debt_ - kShare * fast);
+  left_ = std::max(0.0, 1 - debt_ / (kCredit * std::max(fast, kSmall)));
+}
+
+bool SolverChoice::is_exact_worth(const Island& island, const SolverPatience& patience) {
+  if (patience.is_small() && island.bodies.size() <= kFew) return true;
+  if (wait_ == 0) return proven_ || patience.left() > kLittle;
+  --wait_;
+  return false;
+}
+
+Real SolverChoice::budget(const Island& island, Real duration, const SolverPatience& patience) const {
+  if (patience.is_small() && island.bodies.size() <= kFew) return std::numeric_limits<Real>::infinity();
+  return kCredit * fast_cost(island, duration) * (proven_ ? 1 : patience.left());
+}
+
+void SolverChoice::learn(const Island& island, Real duration, bool solved, SolverPatience& patience) {
+  if (patience.is_small() && island.bodies.size() <= kFew) return;
+  const Real fast = fast_cost(island, duration), excess = exact->cost() - kWorth * fast;
+  proven_ = solved && excess <= 0;
+  patience.spend(excess);
+  debt_ = std::max(0.0, debt_ + excess);
+  if (solved && debt_ <= kCredit * fast) return;
+  wait_ = static_cast<uint32_t>(std::clamp(debt_ / (kShare * fast), 1.0, kLongestWait));
+  debt_ = 0;
+}
+
+}  // namespace offstage::sim

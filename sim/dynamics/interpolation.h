@@ -1,0 +1,96 @@
+#pragma once
+/// Interpolation between keys over time, the same for poses, cameras, hands and motors.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "sim/types.h"
+
+namespace offstage::sim {
+
+/// How a value goes from one key to the next.
+enum class Interpolation : uint8_t {
+  monotone,  ///< cubic Hermite with limited tangents: each component stays between the values of its two
+             ///< keys, and holds where both are equal
+  smooth,  ///< cubic Hermite with Catmull-Rom tangents: rounder, but may swing beyond the keys
+  linear,  ///< constant velocity
+  step,    ///< holds the first key's value, and jumps at the second key
+};
+
+/// N numbers at a time, and how they go on to the next key.
+template <int N>
+struct CurveKey {
+  Real time;  ///< [s]
+  Eigen::Array<Real, N, 1> value;
+  Interpolation interpolation = Interpolation::monotone;
+};
+
+/// A value and its derivative in time.
+template <int N>
+struct CurveSample {
+  Eigen::Array<Real, N, 1> value = Eigen::Array<Real, N, 1>::Zero();
+  Eigen::Array<Real, N, 1> rate = Eigen::Array<Real, N, 1>::Zero();
+};
+
+/// Tangent at a key between segments with the mean rates `before` and `after` that last h0 and h1: that of
+/// the parabola through the three keys (Catmull-Rom over uneven times). Limited, each component is zero at an
+/// extremum and else at most three times the smaller mean rate, so that the cubic is monotone (de Boor and
+/// Swartz 1977; Fritsch and Carlson 1980).
+template <int N>
+Eigen::Array<Real, N, 1> key_tangent(const Eigen::Array<Real, N, 1>& before, Real h0,
+                                     const Eigen::Array<Real, N, 1>& after, Real h1, bool limited) {
+  Eigen::Array<Real, N, 1> tangent = (h1 * before + h0 * after) / (h0 + h1);
+  if (!limited) return tangent;
+  for (Eigen::Index k = 0; k < N; ++k) {
+    const Real most = before[k] * after[k] > 0 ? 3 * std::min(std::abs(before[k]), std::abs(after[k])) : 0;
+    tangent[k] = std::clamp(tangent[k], -most, most);
+  }
+  return tangent;
+}
+
+/// The curve at a time in segment i, between keys i and i + 1 of `count`; `key(i)` gives a CurveKey<N>. At an
+/// open end the tangent is the segment's mean rate; a `loop` wraps.
+template <int N, class Key>
+CurveSample<N> sample_segment(std::size_t count, Key&& key, bool loop, std::size_t i, Real t) {
+  using Value = Eigen::Array<Real, N, 1>;
+  const CurveKey<N> a = key(i), b = key(i + 1);
+  const Real span = b.time - a.time, s = (t - a.time) / span;
+  if (a.interpolation == Interpolation::step) return {a.value, Value::Zero()};
+  const Value mean = (b.value - a.value) / span;
+  if (a.interpolation == Interpolation::linear) return {a.value + (t - a.time) * mean, mean};
+
+  const bool limited = a.interpolation == Interpolation::monotone;
+  const std::size_t segments = count - 1;
+  // A jump has no rate: what comes before it and after it is at rest there.
+  const auto rate = [&](std::size_t segment) -> Value {
+    const CurveKey<N> from = key(segment), to = key(segment + 1);
+    if (from.interpolation == Interpolation::step) return Value::Zero();
+    return (to.value - from.value) / (to.time - from.time);
+  };
+  const auto duration = [&](std::size_t segment) { return key(segment + 1).time - key(segment).time; };
+  const auto tangent = [&](std::size_t before, std::size_t after) {
+    return key_tangent<N>(rate(before), duration(before), rate(after), duration(after), limited);
+  };
+  const Value m0 = i > 0 || loop ? tangent((i + segments - 1) % segments, i) : mean;
+  const Value m1 = i + 1 < segments || loop ? tangent(i, (i + 1) % segments) : mean;
+  const Real s2 = s * s, s3 = s2 * s;
+  // In a form that holds equal values to the last bit.
+  return {a.value + (3 * s2 - 2 * s3) * (b.value - a.value) + (s3 - 2 * s2 + s) * span * m0 +
+              (s3 - s2) * span * m1,
+          (6 * s2 - 6 * s) / span * (a.value - b.value) + (3 * s2 - 4 * s + 1) * m0 + (3 * s2 - 2 * s) * m1};
+}
+
+/// The segment that a time from the first key up to the last is in; `time(i)` is that of key i.
+template <class Time>
+std::size_t segment_at(std::size_t count, Time&& time, Real t) {
+  std::size_t low = 0, high = count - 1;  // time(low) <= t < time(high)
+  while (high - low > 1) {
+    const std::size_t middle = (low + high) / 2;
+    (time(middle) <= t ? low : high) = middle;
+  }
+  return low;
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,490 @@
+#include "tests/generator/random_scene.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <sstream>
+
+#include "effects/cloth.h"
+#include "tests/convex_samples.h"
+#include "tests/meshes.h"
+#include "tests/solids.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr Real kWall = 1;          ///< thickness of the walls [m]
+constexpr Real kGap = 0.01;        ///< between bodies at the start [m]
+constexpr int kTries = 40;         ///< to find a free place
+constexpr Real kFrame = 1.0 / 60;  ///< sampling time [s]
+
+/// Makes one scene, in the order in which the dice are thrown.
+class Generator {
+ public:
+  explicit Generator(uint64_t seed) : dice_(seed) { scene_.seed = seed; }
+
+  RandomScene make(Parts parts) {
+    make_rules();
+    if (scene_.room > 0) make_room();
+    const uint32_t count = 2 + dice_.index(11);
+    for (uint32_t i = 0; i < count; ++i) add_body();
+    if (parts == Parts::bodies) return std::move(scene_);
+    if (dice_.chance(0.35)) add_joints();
+    if (dice_.chance(0.25)) add_springs();
+    if (scene_.room > 0 && dice_.chance(0.15)) add_drive();
+    if (scene_.room > 0 && dice_.chance(0.2)) add_particles();
+    if (scene_.room > 0 && dice_.chance(0.12)) add_cloth();
+    return std::move(scene_);
+  }
+
+ private:
+  template <class T, std::size_t N>
+  T pick(const T (&values)[N]) {
+    return values[dice_.index(N)];
+  }
+
+  void make_rules() {
+    WorldDef& w = scene_.world;
+    w.solver = pick({SolverKind::exact, SolverKind::fast, SolverKind::automatic});
+    w.max_step = pick({1.0 / 240, 1.0 / 240, 1.0 / 120, 1.0 / 60});
+    w.impact = dice_.chance(0.7) ? ImpactLaw::simultaneous : ImpactLaw::sequential;
+    w.integrator = dice_.chance(0.8) ? IntegratorKind::rk4 : IntegratorKind::dormand_prince;
+    w.sleep = dice_.chance(0.5);
+    scene_.room = dice_.chance(0.8) ? dice_.uniform(0.8, 2) : 0;
+    if (scene_.room == 0) w.gravity = Vec3::Zero();
+    size_ = dice_.uniform(0.08, 0.3);
+    restitution_ = pick({0.0, 0.3, 0.5, 0.9, 1.0});
+    friction_ = pick({0.0, 0.1, 0.3, 0.5, 1.0});
+    thin_ = dice_.chance(0.4);
+  }
+
+  BodyDef surface() {
+    return {.restitution = dice_.chance(0.8) ? restitution_ : 0.0,
+            .friction = dice_.chance(0.8) ? friction_ : 0.5};
+  }
+
+  void make_room() {
+    const Real r = scene_.room, all = 2 * r + 2 * kWall;
+    for (int axis = 0; axis < 3; ++axis)
+      for (const Real side : {-1.0, 1.0}) {
+        Vec3 size = Vec3::Constant(all);
+        size[axis] = kWall;
+        RandomScene::Body wall{surface(), {}};
+        wall.def.name = "wall" + std::to_string(scene_.bodies.size());
+        wall.def.motion = MotionType::fixed;
+        wall.def.shape = Box{size};
+        wall.def.pose.position = side * (r + kWall / 2) * Vec3::Unit(axis);
+        scene_.bodies.push_back(wall);
+      }
+  }
+
+  /// Whatever is not in the way of others; without a place there is one body less.
+  std::optional<Vec3> free_place(Real reach) {
+    const Real half = (scene_.room > 0 ? scene_.room : 1.2) - reach - kGap;
+    if (half <= 0) return std::nullopt;
+    for (int i = 0; i < kTries; ++i) {
+      const Vec3 at = half * dice_.in_cube();
+      if (std::all_of(taken_.begin(), taken_.end(),
+                      [&](const Taken& t) { return (t.at - at).norm() > t.reach + reach + kGap; })) {
+        taken_.push_back({at, reach});
+        return at;
+      }
+    }
+    return std::nullopt;
+  }
+
+  /// Extents of a body: compact, or as thin as a fiftieth of its length.
+  Vec3 extents() {
+    Vec3 e = size_ * Vec3(dice_.uniform(0.5, 1.5), dice_.uniform(0.5, 1.5), dice_.uniform(0.5, 1.5));
+    if (!thin_ || dice_.chance(0.5)) return e;
+    const int axis = static_cast<int>(dice_.index(3));
+    if (dice_.chance(0.5)) {  // a plate
+      e *= 1.5;
+      e[axis] *= dice_.uniform(0.03, 0.2);
+    } else {  // a rod
+      e *= dice_.uniform(0.05, 0.3);
+      e[axis] = size_ * dice_.uniform(1, 3);
+    }
+    return e;
+  }
+
+  void add_body() {
+    const Vec3 e = extents();
+    RandomScene::Body body{surface(), {}};
+    BodyDef& d = body.def;
+    Real reach = e.norm() / 2;
+    switch (dice_.index(7)) {
+      case 0:
+        d.shape = Sphere{e.x() / 2};
+        reach = e.x() / 2;
+        break;
+      case 1:
+        d.shape = Capsule{e.x() / 2, e.y()};
+        reach = e.x() / 2 + e.y() / 2;
+        break;
+      case 2:
+        d.shape = Cylinder{e.x() / 2, e.y()};
+        break;
+      case 3:
+        d.shape = Cone{e.x() / 2, e.y()};
+        break;
+      case 4:
+        body.mesh = add_mesh(e);
+        reach *= 1.1;
+        break;
+      default:
+        d.shape = Box{e};
+    }
+    const auto place = free_place(reach);
+    if (!place) return;
+    d.name = "body" + std::to_string(scene_.bodies.size());
+    d.pose = {*place, dice_.rotation()};
+    d.mass = std::pow(10, dice_.uniform(-1.5, 1.5));
+    d.velocity = dice_.uniform(0, 6) * dice_.direction();
+    d.angular_velocity = dice_.uniform(0, 10) * dice_.direction();
+    scene_.bodies.push_back(body);
+    movable_.push_back(scene_.bodies.size() - 1);
+  }
+
+  /// A box or an L about its middle, welded of triangles.
+  std::size_t add_mesh(const Vec3& e) {
+    TriangleMesh mesh = dice_.chance(0.5)
+                            ? box_mesh(Vec3::Ones())
+                            : cubes(2, 2, 1, [](int i, int j, int) { return i == 0 || j == 0; });
+    const bool is_box = mesh.vertices.size() == 8;
+    for (Vec3& v : mesh.vertices)
+      v = is_box ? Vec3(v.cwiseProduct(e)) : Vec3((v - Vec3(1, 1, 0.5)).cwiseProduct(e) / 2);
+    scene_.meshes.push_back(std::move(mesh));
+    return scene_.meshes.size() - 1;
+  }
+
+  std::size_t any_body() { return movable_[dice_.index(movable_.size())]; }
+
+  /// A chain of bodies that are there, each joined to the one before half-way between.
+  void add_joints() {
+    const std::size_t count = std::min<std::size_t>(movable_.size(), 2 + dice_.index(3));
+    for (std::size_t i = 1; i < count; ++i) {
+      RandomScene::Joint joint;
+      joint.a = movable_[i - 1];
+      joint.b = movable_[i];
+      JointDef& d = joint.def;
+      d.name = "joint" + std::to_string(i);
+      d.type = pick({JointType::spherical, JointType::revolute, JointType::prismatic, JointType::fixed,
+                     JointType::universal, JointType::distance});
+      const Vec3 a = scene_.bodies[joint.a].def.pose.position, b = scene_.bodies[*joint.b].def.pose.position;
+      d.anchor = d.type == JointType::distance ? a : Vec3((a + b) / 2);
+      d.anchor_b = b;
+      d.axis = dice_.direction();
+      d.second_axis = d.axis.cross(dice_.direction()).normalized();
+      if (d.has_free_coordinate()) {
+        if (dice_.chance(0.5)) d.damping = dice_.uniform(0, 0.02);
+        if (dice_.chance(0.3)) d.friction = dice_.uniform(0, 0.1);
+      }
+      if (dice_.chance(0.4) && (d.type == JointType::revolute || d.type == JointType::prismatic)) {
+        d.lower = -dice_.uniform(0.1, 1);
+        d.upper = dice_.uniform(0.1, 1);
+      }
+      scene_.joints.push_back(joint);
+    }
+  }
+
+  /// Between centres, no stiffer than the integrators can follow at the longest step.
+  void add_springs() {
+    const uint32_t count = 1 + dice_.index(3);
+    for (uint32_t i = 0; i < count && !movable_.empty(); ++i) {
+      RandomScene::Spring spring;
+      spring.a = any_body();
+      if (movable_.size() > 1 && (scene_.room == 0 || dice_.chance(0.7))) do
+          spring.b = any_body();
+        while (*spring.b == spring.a);
+      Real mass = scene_.bodies[spring.a].def.mass;
+      if (spring.b) mass = std::min(mass, scene_.bodies[*spring.b].def.mass);
+      const Real omega = dice_.uniform(3, 15);
+      spring.def.name = "spring" + std::to_string(i);
+      spring.def.stiffness = mass * omega * omega;
+      spring.def.damping = dice_.chance(0.5) ? 0.2 * mass * omega : 0;
+      if (!spring.b) spring.def.b = WorldPoint{0.5 * scene_.room * dice_.in_cube()};
+      scene_.springs.push_back(spring);
+    }
+  }
+
+  /// A paddle that turns or a box that goes to and fro in the middle of the room's floor.
+  void add_drive() {
+    scene_.is_driven = true;
+    RandomScene::Body drive{surface(), {}};
+    BodyDef& d = drive.def;
+    d.name = "drive";
+    d.motion = MotionType::kinematic;
+    const Real r = scene_.room;
+    d.pose.position = Vec3(0, -r + 0.08, 0);
+    d.shape = Box{Vec3(r, 0.1, 0.1)};
+    if (dice_.chance(0.5)) {
+      d.track.spin = Vec3(0, dice_.uniform(0.5, 4), 0);
+    } else {
+      const Pose at = d.pose, to{at.position + Vec3(0, 0, 0.6 * r), at.orientation};
+      d.track.keys = {{0, at}, {dice_.uniform(0.5, 2), to}};
+    }
+    const Real reach = std::hypot(r, 0.1) / 2 + 0.6 * r;
+    const bool is_free = std::all_of(taken_.begin(), taken_.end(), [&](const Taken& t) {
+      return (t.at - d.pose.position).norm() > t.reach + reach + kGap;
+    });
+    if (is_free) scene_.bodies.push_back(drive);
+  }
+
+  void add_particles() {
+    ParticleSystemDef& d = scene_.particle_system;
+    d.name = "particles";
+    d.internal = dice_.chance(0.3);
+    const uint32_t count = 5 + dice_.index(40);
+    const Real radius = 0.02;
+    for (uint32_t i = 0; i < count; ++i)
+      if (const auto place = free_place(radius))
+        scene_.particles.push_back({.position = *place,
+                                    .velocity = dice_.uniform(0, 4) * dice_.direction(),
+                                    .mass = 0.01,
+                                    .radius = radius,
+                                    .restitution = restitution_,
+                                    .friction = friction_});
+  }
+
+  void add_cloth() {
+    const Real side = 0.4;
+    const auto place = free_place(side);
+    if (!place) return;
+    const effects::GridSize grid{side, side, 8, 8};
+    scene_.cloth =
+        effects::grid_cloth(grid, {*place, dice_.rotation()}, effects::find_fabric("cotton")->fabric);
+    scene_.cloth->name = "cloth";
+    scene_.cloth->air.density = 0;
+    if (dice_.chance(0.5))
+      for (const uint32_t column : {0u, 8u}) {
+        const uint32_t vertex = effects::grid_vertex(grid, column, 0);
+        scene_.cloth->pins.push_back({.vertex = vertex, .position = scene_.cloth->vertices[vertex]});
+      }
+  }
+
+  struct Taken {
+    Vec3 at;
+    Real reach;
+  };
+  Dice dice_;
+  RandomScene scene_;
+  std::vector<Taken> taken_;
+  std::vector<std::size_t> movable_;
+  Real size_ = 0, restitution_ = 0, friction_ = 0;
+  bool thin_ = false;
+};
+
+std::string text(const Vec3& v) {
+  std::ostringstream out;
+  out.precision(17);
+  out << '[' << v.x() << ", " << v.y() << ", " << v.z() << ']';
+  return out.str();
+}
+
+std::string text(const Quat& q) {
+  std::ostringstream out;
+  out.precision(17);
+  out << '[' << q.w() << ", " << q.x() << ", " << q.y() << ", " << q.z() << ']';
+  return out.str();
+}
+
+std::string text(const Shape& shape) {
+  std::ostringstream out;
+  out.precision(17);
+  const auto round = [&](const char* name, Real radius, Real height) {
+    out << "{\"type\": \"" << name << "\", \"radius\": " << radius << ", \"height\": " << height << '}';
+  };
+  if (const auto* box = std::get_if<Box>(&shape))
+    out << "{\"type\": \"box\", \"size\": " << text(box->size) << '}';
+  if (const auto* s = std::get_if<Sphere>(&shape))
+    out << "{\"type\": \"sphere\", \"radius\": " << s->radius << '}';
+  if (const auto* s = std::get_if<Capsule>(&shape)) round("capsule", s->radius, s->height);
+  if (const auto* s = std::get_if<Cylinder>(&shape)) round("cylinder", s->radius, s->height);
+  if (const auto* s = std::get_if<Cone>(&shape)) round("cone", s->radius, s->height);
+  return out.str();
+}
+
+const char* name_of(SolverKind kind) {
+  return kind == SolverKind::exact ? "exact" : kind == SolverKind::fast ? "fast" : "auto";
+}
+
+const char* name_of(JointType type) {
+  constexpr std::array kNames = {"spherical", "fixed", "revolute", "prismatic", "universal", "distance"};
+  return kNames[static_cast<std::size_t>(type)];
+}
+
+/// Least extent of a body, and the greatest speed in the scene's reach.
+Real thinnest(const RandomScene& scene) {
+  Real least = 1;
+  for (const RandomScene::Body& body : scene.bodies) {
+    if (body.def.motion != MotionType::dynamic) continue;
+    if (const auto* s = std::get_if<Box>(&body.def.shape)) least = std::min(least, s->size.minCoeff());
+    if (const auto* s = std::get_if<Sphere>(&body.def.shape)) least = std::min(least, 2 * s->radius);
+    if (const auto* s = std::get_if<Capsule>(&body.def.shape)) least = std::min(least, 2 * s->radius);
+    if (const auto* s = std::get_if<Cylinder>(&body.def.shape))
+      least = std::min({least, 2 * s->radius, s->height});
+    if (const auto* s = std::get_if<Cone>(&body.def.shape))
+      least = std::min({least, 2 * s->radius, s->height});
+  }
+  return least;
+}
+
+}  // namespace
+
+RandomScene random_scene(uint64_t seed, Parts parts) {
+  return Generator(seed).make(parts);
+}
+
+std::string text(const RandomScene& scene) {
+  std::ostringstream out;
+  out.precision(17);
+  const WorldDef& w = scene.world;
+  out << "// seed " << scene.seed << ", " << scene.duration << " s"
+      << (scene.room > 0 ? ", room of " + std::to_string(2 * scene.room) + " m" : std::string(", no room"))
+      << '\n'
+      << "\"world\": {\"solver\": \"" << name_of(w.solver) << "\", \"step\": " << w.max_step
+      << ", \"gravity\": " << text(w.gravity) << ", \"impact\": \""
+      << (w.impact == ImpactLaw::sequential ? "sequential" : "simultaneous")
+      << "\", \"sleep\": " << (w.sleep ? "true" : "false") << "}\n";
+  for (const RandomScene::Body& body : scene.bodies) {
+    const BodyDef& d = body.def;
+    out << "{\"name\": \"" << d.name << "\", \"motion\": \""
+        << (d.motion == MotionType::fixed       ? "static"
+            : d.motion == MotionType::kinematic ? "kinematic"
+                                                : "dynamic")
+        << "\", \"shape\": " << (body.mesh ? "mesh " + std::to_string(*body.mesh) : text(d.shape))
+        << ", \"position\": " << text(d.pose.position) << ", \"orientation\": " << text(d.pose.orientation)
+        << ", \"mass\": " << d.mass << ", \"velocity\": " << text(d.velocity)
+        << ", \"angular_velocity\": " << text(d.angular_velocity) << ", \"restitution\": " << d.restitution
+        << ", \"friction\": " << d.friction << "}\n";
+  }
+  for (const RandomScene::Joint& joint : scene.joints)
+    out << "{\"name\": \"" << joint.def.name << "\", \"type\": \"" << name_of(joint.def.type)
+        << "\", \"a\": \"" << scene.bodies[joint.a].def.name << "\", \"b\": \""
+        << (joint.b ? scene.bodies[*joint.b].def.name : "") << "\", \"anchor\": " << text(joint.def.anchor)
+        << ", \"axis\": " << text(joint.def.axis) << ", \"lower\": " << joint.def.lower
+        << ", \"upper\": " << joint.def.upper << "}\n";
+  for (const RandomScene::Spring& spring : scene.springs)
+    out << "{\"name\": \"" << spring.def.name << "\", \"a\": \"" << scene.bodies[spring.a].def.name
+        << "\", \"b\": \"" << (spring.b ? scene.bodies[*spring.b].def.name : "")
+        << "\", \"stiffness\": " << spring.def.stiffness << ", \"damping\": " << spring.def.damping << "}\n";
+  out << "// " << scene.particles.size() << " particles, " << (scene.cloth ? 1 : 0) << " cloths\n";
+  return out.str();
+}
+
+World make_world(const RandomScene& scene) {
+  World world(scene.world);
+  std::vector<MeshHandle> meshes;
+  for (const TriangleMesh& mesh : scene.meshes) meshes.push_back(world.add_mesh(mesh));
+  std::vector<BodyHandle> bodies;
+  for (const RandomScene::Body& body : scene.bodies) {
+    BodyDef def = body.def;
+    if (body.mesh) def.shape = MeshShape{meshes[*body.mesh]};
+    bodies.push_back(world.add_body(def));
+  }
+  for (const RandomScene::Joint& joint : scene.joints) {
+    JointDef def = joint.def;
+    def.a = bodies[joint.a];
+    if (joint.b) def.b = bodies[*joint.b];
+    world.add_joint(def);
+  }
+  for (const RandomScene::Spring& spring : scene.springs) {
+    SpringDef def = spring.def;
+    def.a = BodyPoint{bodies[spring.a]};
+    if (spring.b) def.b = BodyPoint{bodies[*spring.b]};
+    world.add_spring(def);
+  }
+  if (!scene.particles.empty()) {
+    const ParticleSystemHandle system = world.add_particle_system(scene.particle_system);
+    for (const Particle& particle : scene.particles) world.add_particle(system, particle);
+  }
+  if (scene.cloth) world.add_cloth(*scene.cloth);
+  return world;
+}
+
+namespace {
+
+/// Sums over all that moves, with the sizes of their parts.
+struct Momenta {
+  Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
+  Real linear_size = 0, angular_size = 0;
+
+  explicit Momenta(const World& world) {
+    world.for_each_body([&](BodyHandle handle) {
+      const BodyState s = world.body(handle);
+      linear += s.mass * s.velocity;
+      angular += s.centre.cross(s.mass * s.velocity) + s.angular_momentum;
+      linear_size += s.mass * s.velocity.norm();
+      angular_size += s.centre.norm() * s.mass * s.velocity.norm() + s.angular_momentum.norm();
+    });
+  }
+};
+
+/// What a step took, in operations of a solver on the contacts of the scene.
+uint64_t counted_work(const StepReport& r) {
+  return r.exact.iterations + r.exact.factorizations + r.impacts.iterations + r.impacts.factorizations +
+         50 * r.tracebacks;
+}
+
+}  // namespace
+
+Findings simulate(const RandomScene& scene) {
+  World world = make_world(scene);
+  Findings found;
+  const Momenta before(world);
+  Real least = world.energy().total(), mass = 0;
+  for (const RandomScene::Body& body : scene.bodies)
+    if (body.def.motion == MotionType::dynamic) mass += body.def.mass;
+  found.energy_scale = world.energy().kinetic + mass * scene.world.gravity.norm() * 2 * scene.room;
+  while (world.time() < scene.duration - kFrame / 2 && found.finite) {
+    const StepReport r = world.step(kFrame);
+    found.finite = r.finite;
+    for (const BodyHandle lost : r.bodies_retired) found.lost.push_back(world.body_def(lost).name);
+    const Real energy = world.energy().total();
+    least = std::min(least, energy);
+    if (energy - least > found.energy_gain) {
+      found.energy_gain = energy - least;
+      found.gained_at = world.time();
+    }
+    found.penetration = std::max(found.penetration, r.penetration);
+    found.work = std::max(found.work, counted_work(r));
+    found.rough += r.rough_contacts.size();
+  }
+  if (scene.room > 0)
+    world.for_each_body([&](BodyHandle handle) {
+      const BodyDef& def = world.body_def(handle);
+      if (def.motion == MotionType::dynamic &&
+          world.body(handle).centre.cwiseAbs().maxCoeff() > scene.room + kWall / 4)
+        found.lost.push_back(def.name);
+    });
+  const Momenta after(world);
+  found.momentum_error = (after.linear - before.linear).norm() / std::max(before.linear_size, 1e-9);
+  found.angular_momentum_error =
+      (after.angular - before.angular).norm() / std::max(before.angular_size, 1e-9);
+  // As far as bodies get in a step: by the default one, a quarter of the thinnest of them.
+  found.allowed_penetration = (8e-3 + 0.25 * thinnest(scene)) * 240 * scene.world.max_step;
+  found.allowed_work = 100'000 * static_cast<uint64_t>(std::ceil(kFrame / scene.world.max_step - 1e-9));
+  found.hash = world.state_hash();
+  return found;
+}
+
+std::string faults(const RandomScene& scene, const Findings& f) {
+  constexpr Real kEnergy = 5e-3, kMomentum = 1e-7;
+  std::ostringstream out;
+  if (!f.finite) out << "not finite; ";
+  for (const std::string& name : f.lost) out << name << " left; ";
+  if (!scene.is_driven && !(f.energy_gain <= kEnergy * f.energy_scale))
+    out << "energy grew by " << f.energy_gain << " J of " << f.energy_scale << " J before " << f.gained_at
+        << " s; ";
+  if (!(f.penetration <= f.allowed_penetration))
+    out << "overlap of " << f.penetration << " m, allowed " << f.allowed_penetration << " m; ";
+  if (scene.room == 0 && !(f.momentum_error <= kMomentum))
+    out << "momentum off by " << f.momentum_error << "; ";
+  if (scene.room == 0 && !(f.angular_momentum_error <= 1e-3))
+    out << "angular momentum off by " << f.angular_momentum_error << "; ";
+  if (f.work > f.allowed_work) out << "work " << f.work << ", allowed " << f.allowed_work << "; ";
+  return out.str();
+}
+
+}  // namespace offstage::sim

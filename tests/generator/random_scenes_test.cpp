@@ -1,0 +1,77 @@
+/// Whatever a scene is made of, nothing in it explodes, leaves, sinks in or takes for ever. To see one again:
+///   OFFSTAGE_SEED=1234 build/test_generator --gtest_filter='*Replays*'
+/// and with OFFSTAGE_BODIES=1 if it is one of bodies alone.
+
+#include <cstdlib>
+#include <iostream>
+
+#include <gtest/gtest.h>
+#include <oneapi/tbb/global_control.h>
+
+#include "tests/generator/random_scene.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Every so many scenes are run a second time with other numbers of threads.
+constexpr uint64_t kThreadsEvery = 10;
+
+Findings with_threads(const RandomScene& scene, std::size_t threads) {
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+  return simulate(scene);
+}
+
+void check(uint64_t seed, Parts parts) {
+  const RandomScene scene = random_scene(seed, parts);
+  const Findings found = simulate(scene);
+  EXPECT_EQ(faults(scene, found), "")
+      << "seed " << seed << "; see it with " << (parts == Parts::bodies ? "OFFSTAGE_BODIES=1 " : "")
+      << "OFFSTAGE_SEED=" << seed << " test_generator --gtest_filter='*Replays*'";
+  if (seed % kThreadsEvery != 0) return;
+  for (const std::size_t threads : {1, 3})
+    EXPECT_EQ(with_threads(scene, threads).hash, found.hash)
+        << "seed " << seed << ", " << threads << " threads";
+}
+
+/// Scenes by seeds, a hundred each.
+class RandomScenes : public testing::TestWithParam<uint64_t> {
+ protected:
+  static void check_block(Parts parts) {
+    constexpr uint64_t kBlock = 100;
+    for (uint64_t seed = GetParam() * kBlock; seed < (GetParam() + 1) * kBlock; ++seed) check(seed, parts);
+  }
+};
+class RandomBodies : public RandomScenes {};
+
+TEST_P(RandomBodies, KeepEnergyMomentumBoundsAndTime) {
+  check_block(Parts::bodies);
+}
+INSTANTIATE_TEST_SUITE_P(Some, RandomBodies, testing::Range<uint64_t>(2, 3));
+INSTANTIATE_TEST_SUITE_P(LongFirst, RandomBodies, testing::Range<uint64_t>(0, 2));
+INSTANTIATE_TEST_SUITE_P(Long, RandomBodies, testing::Range<uint64_t>(3, 50));
+
+TEST_P(RandomScenes, KeepEnergyMomentumBoundsAndTime) {
+  check_block(Parts::all);
+}
+INSTANTIATE_TEST_SUITE_P(Long, RandomScenes, testing::Range<uint64_t>(0, 50));
+
+TEST(RandomScene, ReplaysASeed) {
+  const char* seed = std::getenv("OFFSTAGE_SEED");
+  if (!seed) GTEST_SKIP() << "set OFFSTAGE_SEED to the seed to replay";
+  const Parts parts = std::getenv("OFFSTAGE_BODIES") ? Parts::bodies : Parts::all;
+  const RandomScene scene = random_scene(std::strtoull(seed, nullptr, 10), parts);
+  const Findings f = simulate(scene);
+  std::cout << text(scene) << "energy gain " << f.energy_gain << " J of " << f.energy_scale << " J before "
+            << f.gained_at << " s; overlap " << f.penetration << " m; momentum off by " << f.momentum_error
+            << ", " << f.angular_momentum_error << "; work " << f.work << "; " << f.rough << " fall-backs\n";
+  EXPECT_EQ(faults(scene, f), "");
+}
+
+// The same seed is the same scene, or a failure could not be seen again.
+TEST(RandomScene, DependsOnItsSeedAlone) {
+  EXPECT_EQ(text(random_scene(42, Parts::all)), text(random_scene(42, Parts::all)));
+  EXPECT_NE(text(random_scene(42, Parts::all)), text(random_scene(43, Parts::all)));
+}
+
+}  // namespace
+}  // namespace offstage::sim

@@ -1,0 +1,64 @@
+// The line that a terminal shows, and how times are said.
+
+#include "producer/progress.h"
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+namespace offstage::producer {
+namespace {
+
+Progress halfway() {
+  return {.done = 75,
+          .total = 150,
+          .sim_ms = 12,
+          .render_ms = 340,
+          .encode_ms = 8,
+          .particles = 20000,
+          .eta_s = 80,
+          .fraction = 0.5};
+}
+
+TEST(Progress, DurationsAreSaidInTheUnitsOfAClock) {
+  EXPECT_EQ(duration_text(0.2), "1 s");
+  EXPECT_EQ(duration_text(59), "59 s");
+  EXPECT_EQ(duration_text(125), "2 min 05 s");
+  EXPECT_EQ(duration_text(4800), "1 h 20 min");
+  EXPECT_NO_THROW(duration_text(1e300));
+}
+
+TEST(Progress, TheLineFitsATerminalOfAnyWidth) {
+  for (int width = 1; width <= 200; ++width) {
+    const std::string line = progress_bar(halfway(), width);
+    EXPECT_LT(static_cast<int>(line.size()), std::max(width, 9)) << line;
+    EXPECT_EQ(line.find_first_of("\n\r\033"), std::string::npos);
+    EXPECT_TRUE(width < 10 || line.find("50 %") != std::string::npos) << width;
+    EXPECT_TRUE(width < 60 || line.find("1 min 20 s left") != std::string::npos) << line;
+  }
+  const std::string wide = progress_bar(halfway(), 120);
+  EXPECT_NE(wide.find("frame 75/150"), std::string::npos) << wide;
+  EXPECT_NE(wide.find("draw 340 ms"), std::string::npos) << wide;
+}
+
+TEST(Progress, TheBarGrowsWithTheWork) {
+  long before = -1;
+  for (const double fraction : {0.0, 0.1, 0.5, 0.9, 1.0}) {
+    Progress p = halfway();
+    p.fraction = fraction;
+    const std::string line = progress_bar(p, 100);
+    const long filled = std::ranges::count(line, '=');
+    EXPECT_GT(filled, before);
+    before = filled;
+  }
+  EXPECT_EQ(before, 25);
+}
+
+TEST(Progress, BeforeTheFirstFrameItSaysWhatIsSimulated) {
+  const std::string line = progress_bar(
+      {.done = 0, .total = 1, .fraction = 0.3, .frames_simulated = 270, .frames_to_simulate = 900}, 100);
+  EXPECT_NE(line.find("simulating frame 270/900"), std::string::npos) << line;
+}
+
+}  // namespace
+}  // namespace offstage::producer

@@ -1,0 +1,194 @@
+/// Many impacts at once or one after the other in a sub-step: columns that rebound into each other, the break
+/// of a rack, thousands of bounces; and bodies that no contact forces can free.
+
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "tests/validation/both_solvers.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr std::array kAllSolvers = {SolverKind::exact, SolverKind::fast, SolverKind::automatic};
+constexpr std::array kBothSteps = {1.0 / 240, 1.0 / 60};
+
+std::string named(SolverKind solver, Real step) {
+  const char* name = solver == SolverKind::exact ? "exact" : solver == SolverKind::fast ? "fast" : "auto";
+  return name + std::string(" at 1/") + std::to_string(std::lround(1 / step)) + " s";
+}
+
+/// Balls of 1 m above each other over a floor.
+struct BallColumn {
+  World world;
+  std::vector<BodyHandle> balls;
+
+  BallColumn(SolverKind solver, Real step, int count, Real e, Real gap, Real drop)
+      : world({.max_step = step, .solver = solver, .sleep = false}) {
+    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = e, .friction = 0});
+    for (int i = 0; i < count; ++i)
+      balls.push_back(world.add_body({.shape = Sphere{0.5},
+                                      .pose = {Vec3(0, 0.5 + drop + (1 + gap) * i, 0)},
+                                      .mass = 10,
+                                      .restitution = e,
+                                      .friction = 0}));
+  }
+  Real overlap() const {
+    Real deepest = 0.5 - world.body(balls.front()).centre.y();
+    for (std::size_t i = 1; i < balls.size(); ++i)
+      deepest =
+          std::max(deepest, 1 - (world.body(balls[i]).centre.y() - world.body(balls[i - 1]).centre.y()));
+    return deepest;
+  }
+};
+
+// The lowest comes back up at 5 to 10 m/s into one that still falls, within the same sub-step.
+TEST(ManyImpacts, BallsOfAColumnThatReboundIntoEachOtherDoNotOverlap) {
+  for (const SolverKind solver : kAllSolvers)
+    for (const Real step : kBothSteps)
+      for (const int count : {2, 3, 10})
+        for (const Real e : {0.5, 1.0})
+          for (const Real gap : {0.0, 0.005, 0.02}) {
+            BallColumn column(solver, step, count, e, gap, 5);
+            const Real energy = column.world.energy().total();
+            Real deepest = 0, greatest = 0;
+            while (column.world.time() < 2) {
+              column.world.step(step);
+              deepest = std::max(deepest, column.overlap());
+              greatest = std::max(greatest, column.world.energy().total());
+            }
+            EXPECT_LT(deepest, 1e-4) << named(solver, step) << ", " << count << " balls, e " << e << ", gap "
+                                     << gap;
+            EXPECT_LT(greatest, energy * (1 + 1e-9)) << named(solver, step);
+          }
+}
+
+// Overlaps are seen when they are, not only when nothing has met since.
+TEST(ManyImpacts, ThePenetrationOfAStepIsTheGreatestInIt) {
+  World world({.gravity = Vec3::Zero(), .sleep = false});
+  world.add_body({.shape = Sphere{0.5}, .pose = {Vec3(0, 0, 0)}, .restitution = 1});
+  world.add_body(
+      {.shape = Sphere{0.5}, .pose = {Vec3(0, 0.95, 0)}, .velocity = {0, -20, 0}, .restitution = 1});
+  EXPECT_GE(world.step(1.0 / 240).penetration, 0.05 - 1e-12) << "though the balls have parted since";
+}
+
+/// Fifteen touching balls in a triangle, and one that comes in along its axis. Ball i's mirror image is
+/// mirror(i).
+struct Rack {
+  World world;
+  std::array<BodyHandle, 15> balls;
+  BodyHandle cue;
+
+  Rack(SolverKind solver, Real step, ImpactLaw law, bool reversed)
+      : world({.gravity = Vec3::Zero(), .max_step = step, .solver = solver, .impact = law, .sleep = false}) {
+    constexpr Real kRadius = 0.02858, kApart = kRadius * (1 + 1e-7);
+    const auto ball = [&](const Vec3& at, Real speed) {
+      return world.add_body({.shape = Sphere{kRadius},
+                             .pose = {at},
+                             .velocity = {speed, 0, 0},
+                             .mass = 0.17,
+                             .restitution = 0.95,
+                             .friction = 0});
+    };
+    for (std::size_t i = 0; i < 15; ++i) {
+      const std::size_t k = reversed ? 14 - i : i, row = row_of(k);
+      balls[k] =
+          ball({Real(row) * std::sqrt(3) * kApart, 0, (2 * Real(k - first_of(row)) - Real(row)) * kApart}, 0);
+    }
+    cue = ball({-0.5, 0, 0}, 8);
+  }
+  static std::size_t first_of(std::size_t row) { return row * (row + 1) / 2; }
+  static std::size_t row_of(std::size_t i) {
+    std::size_t row = 0;
+    while (first_of(row + 1) <= i) ++row;
+    return row;
+  }
+  static std::size_t mirror(std::size_t i) { return 2 * first_of(row_of(i)) + row_of(i) - i; }
+};
+
+// By the complementarity of all 31 contacts at once (P >= 0, u+ >= -e u-): the cue ball stops at -5.817 m/s
+// of its 8, the corners leave at 1.544 m/s, and 0.9136 of the energy is kept.
+TEST(ManyImpacts, ARackBreaksAlikeByAllSolvers) {
+  for (const SolverKind solver : kAllSolvers)
+    for (const Real step : kBothSteps) {
+      Rack rack(solver, step, ImpactLaw::simultaneous, false);
+      const Real energy = rack.world.energy().total();
+      run(rack.world, 0.08, step);
+      EXPECT_NEAR(rack.world.body(rack.balls[14]).velocity.norm(), 1.544, 1e-3) << named(solver, step);
+      EXPECT_NEAR(rack.world.body(rack.cue).velocity.x(), -5.8171, 1e-3) << named(solver, step);
+      EXPECT_NEAR(rack.world.energy().total() / energy, 0.9136, 1e-4) << named(solver, step);
+    }
+}
+
+TEST(ManyImpacts, MirrorImagesOfARackStayMirrorImages) {
+  for (const ImpactLaw law : {ImpactLaw::sequential, ImpactLaw::simultaneous})
+    for (const SolverKind solver : kAllSolvers)
+      for (const Real step : kBothSteps) {
+        Rack rack(solver, step, law, false), reversed(solver, step, law, true);
+        run(rack.world, 0.4, step);
+        run(reversed.world, 0.4, step);
+        for (std::size_t i = 0; i < 15; ++i) {
+          const Vec3 at = rack.world.body(rack.balls[i]).centre,
+                     there = rack.world.body(rack.balls[Rack::mirror(i)]).centre;
+          EXPECT_LT((at - Vec3(there.x(), there.y(), -there.z())).norm(), 1e-9)
+              << named(solver, step) << ' ' << i;
+          EXPECT_LT((at - reversed.world.body(reversed.balls[i]).centre).norm(), 1e-9)
+              << named(solver, step) << " in the reverse order of the list " << i;
+        }
+      }
+}
+
+// A bounce that comes early by the tolerance of its time makes the next early, too.
+TEST(ManyImpacts, TenThousandElasticBouncesBetweenWallsAreAsMany) {
+  constexpr Real kRadius = 0.005, kRoom = 0.01, kSpeed = 2;
+  for (const SolverKind solver : kAllSolvers)
+    for (const Real step : kBothSteps) {
+      World world({.gravity = Vec3::Zero(), .max_step = step, .solver = solver, .sleep = false});
+      for (const Real side : {-1.0, 1.0})
+        world.add_body({.shape = Box{{1, 1, 1}},
+                        .motion = MotionType::fixed,
+                        .pose = {Vec3(side * (0.5 + kRadius + kRoom / 2), 0, 0)},
+                        .restitution = 1,
+                        .friction = 0});
+      const auto ball = world.add_body(
+          {.shape = Sphere{kRadius}, .velocity = {kSpeed, 0, 0}, .restitution = 1, .friction = 0});
+      const Tally all = run(world, 10'000 * kRoom / kSpeed, 1.0 / 60);
+      EXPECT_NEAR(static_cast<Real>(all.collisions), 10'000, 1) << named(solver, step);
+      EXPECT_NEAR(std::abs(world.body(ball).velocity.x()), kSpeed, 1e-9) << named(solver, step);
+    }
+}
+
+// A bar between jaws that are closer than it is thick: both push it out, which has no solution. It may stay
+// or be squeezed out slowly, never be shot away.
+TEST(ManyImpacts, ContactsThatContradictEachOtherAddNoEnergyAndAreReported) {
+  for (const SolverKind solver : kAllSolvers)
+    for (const Real step : kBothSteps) {
+      World world({.max_step = step, .solver = solver, .sleep = false});
+      world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
+      for (const Real side : {-1.0, 1.0})
+        world.add_body(
+            {.shape = Box{{0.5, 1, 1}},
+             .motion = MotionType::fixed,
+             .pose = {Vec3(side * 0.259, 0.5, 0), Quat(Eigen::AngleAxisd(side * 0.01, Vec3::UnitZ()))}});
+      const auto bar = world.add_body(
+          {.name = "bar",
+           .shape = Box{{0.02, 0.6, 0.02}},
+           .pose = {Vec3(0, 0.5, 0), Quat(Eigen::AngleAxisd(0.01, Vec3(1, 1, 1).normalized()))}});
+      // What pushes out does so at half a metre per second at most.
+      const Real most = world.energy().total() + world.body(bar).mass * (0.125 + 9.81 * 0.005);
+      std::size_t rough = 0;
+      for (int i = 0; i < 240; ++i) {
+        for (const RoughContact& contact : world.step(1.0 / 240).rough_contacts) {
+          EXPECT_TRUE(contact.a == bar || contact.b == bar);
+          ++rough;
+        }
+        EXPECT_LT(world.energy().total(), most) << named(solver, step) << " at " << world.time();
+      }
+      if (solver == SolverKind::exact) {
+        EXPECT_GT(rough, 0u);
+      }
+    }
+}
+
+}  // namespace
+}  // namespace offstage::sim

@@ -1,0 +1,165 @@
+/// Particles that hit bodies: what bodies on joints, and bodies that many hit at once, take from them
+/// (physics P8, A3), against closed forms and invariants.
+
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "sim/world.h"
+#include "tests/random.h"
+
+namespace offstage::sim {
+namespace {
+
+const Vec3 kSize(1, 0.2, 1);
+constexpr Real kHitMass = 2, kHitArm = 0.45, kHitSpeed = 3;
+
+BodyHandle add_plate(World& world, const Vec3& position = Vec3::Zero()) {
+  return world.add_body(
+      {.shape = Box{kSize}, .pose = {position}, .mass = kHitMass, .restitution = 1, .friction = 0});
+}
+
+World weightless(Real max_step = 1.0 / 240) {
+  return World({.gravity = Vec3::Zero(), .max_step = max_step, .sleep = false});
+}
+
+/// A particle falls onto a plate's end and bounces; its velocity then.
+Real rebound(World& world, bool internal) {
+  const auto system = world.add_particle_system({.internal = internal});
+  world.add_particle(system, {.position = {kHitArm, 0.5, 0},
+                              .velocity = {0, -kHitSpeed, 0},
+                              .mass = 0.5,
+                              .radius = 0.02,
+                              .restitution = 1,
+                              .friction = 0});
+  const Real before = world.energy().kinetic;
+  for (int i = 0; i < 30; ++i) world.step(1.0 / 60);
+  EXPECT_NEAR(world.energy().kinetic, before, 1e-9 * before);
+  return world.particles(system).velocity[0].y();
+}
+
+/// Of an elastic impact on a body of this effective mass.
+Real rebound_from(Real mass) {
+  return kHitSpeed * (mass - 0.5) / (mass + 0.5);
+}
+
+TEST(ParticlesAndJoints, AParticleMeetsTheInertiaOfAHingedPlateAndTheMassOfARailedOne) {
+  for (const bool internal : {false, true}) {
+    World hinged = weightless();
+    hinged.add_joint({.type = JointType::revolute, .a = add_plate(hinged), .anchor = {-0.5, 0, 0}});
+    const Real inertia = kHitMass * ((1 + 0.04) / 12 + 0.25), reach = kHitArm + 0.5;
+    EXPECT_NEAR(rebound(hinged, internal), rebound_from(inertia / (reach * reach)), 1e-9);
+
+    World railed = weightless();
+    railed.add_joint({.type = JointType::prismatic, .a = add_plate(railed), .axis = Vec3::UnitY()});
+    EXPECT_NEAR(rebound(railed, internal), rebound_from(kHitMass), 1e-9);
+
+    World fixed = weightless();
+    fixed.add_joint({.type = JointType::fixed, .a = add_plate(fixed)});
+    EXPECT_NEAR(rebound(fixed, internal), kHitSpeed, 1e-9);
+  }
+}
+
+// The plate's far end hangs on a second plate by a hinge, which moves at once, too.
+TEST(ParticlesAndJoints, AnImpulseReachesEveryLinkAndTheJointsHold) {
+  World world = weightless();
+  const BodyHandle first = add_plate(world), second = add_plate(world, {-1, 0, 0}),
+                   third = add_plate(world, {-2, 0, 0});
+  const JointHandle near =
+      world.add_joint({.type = JointType::revolute, .a = first, .b = second, .anchor = {-0.5, 0, 0}});
+  world.add_joint({.type = JointType::revolute, .a = second, .b = third, .anchor = {-1.5, 0, 0}});
+  const auto system = world.add_particle_system({});
+  world.add_particle(system, {.position = {0, 0.2, 0},
+                              .velocity = {0, -kHitSpeed, 0},
+                              .mass = 0.5,
+                              .radius = 0.02,
+                              .restitution = 1,
+                              .friction = 0});
+  const Real before = world.energy().kinetic;
+  for (int i = 0; i < 12; ++i) world.step(1.0 / 240);
+  EXPECT_GT(world.particles(system).velocity[0].y(), 0);
+  EXPECT_NEAR(world.energy().kinetic, before, 1e-6 * before);
+  Vec3 momentum = 0.5 * world.particles(system).velocity[0];
+  for (const BodyHandle b : {first, second, third}) {
+    momentum += kHitMass * world.body(b).velocity;
+    EXPECT_GT(world.body(b).angular_velocity.norm(), 0.05);
+  }
+  EXPECT_NEAR((momentum - Vec3(0, -0.5 * kHitSpeed, 0)).norm(), 0, 1e-9);
+  EXPECT_LT(world.joint(near).error, 1e-9);
+}
+
+// A hundred particles that weigh more than the plate together: each for itself would give it its own share.
+TEST(ParticlesAndBodies, ManyThatHitALightBodyInOneStepKeepMomentumAndEnergy) {
+  for (const bool internal : {false, true})
+    for (const bool railed : {false, true}) {
+      World world = weightless(1.0 / 60);
+      const BodyHandle plate = add_plate(world);
+      if (railed) world.add_joint({.type = JointType::prismatic, .a = plate, .axis = Vec3::UnitY()});
+      const auto jet = world.add_particle_system({.internal = internal});
+      for (int i = 0; i < 10; ++i)
+        for (int k = 0; k < 10; ++k)
+          world.add_particle(jet,
+                             {.position = {0.08 * i - 0.4, 0.15 + 0.0003 * (i + 10 * k), 0.08 * k - 0.36},
+                              .velocity = {0, -kHitSpeed, 0},
+                              .mass = 0.05,
+                              .radius = 0.01,
+                              .restitution = 1,
+                              .friction = 0});
+      const Real energy = world.energy().kinetic;
+      for (int i = 0; i < 6; ++i) world.step(1.0 / 60);
+      Real momentum = kHitMass * world.body(plate).velocity.y();
+      for (const Vec3& v : world.particles(jet).velocity) momentum += 0.05 * v.y();
+      EXPECT_NEAR(world.energy().kinetic, energy, 1e-9 * energy) << internal << railed;
+      EXPECT_NEAR(momentum, -5 * kHitSpeed, 1e-9) << internal << railed;
+    }
+}
+
+/// An elastic gas in a shaft under a lid, which has weight; its greatest relative change of energy.
+Real gas_drift(bool joined, bool internal, Real max_step, Real seconds) {
+  World world({.max_step = max_step, .sleep = false});
+  const auto wall = [&](const Vec3& at, const Vec3& normal) {
+    world.add_body({.shape = Plane{},
+                    .motion = MotionType::fixed,
+                    .pose = {at, Quat::FromTwoVectors(Vec3::UnitY(), normal)},
+                    .restitution = 1,
+                    .friction = 0});
+  };
+  wall(Vec3::Zero(), Vec3::UnitY());
+  for (const Real side : {-1.0, 1.0}) {
+    wall({0.5 * side, 0, 0}, {-side, 0, 0});
+    wall({0, 0, 0.5 * side}, {0, 0, -side});
+  }
+  const BodyHandle lid = world.add_body(
+      {.shape = Box{{0.98, 0.1, 0.98}}, .pose = {Vec3(0, 1, 0)}, .mass = 2, .restitution = 1, .friction = 0});
+  if (joined)
+    world.add_joint({.type = JointType::prismatic, .a = lid, .anchor = {0, 1, 0}, .axis = Vec3::UnitY()});
+  const auto gas = world.add_particle_system({.internal = internal});
+  const Scatter random{5};
+  for (uint64_t i = 0; i < 20; ++i)
+    world.add_particle(gas, {.position = {random.uniform(i, 0) * 0.9 - 0.45, 0.1 + 0.8 * random.uniform(i, 1),
+                                          random.uniform(i, 2) * 0.9 - 0.45},
+                             .velocity = 8 * Vec3(random.uniform(i, 3) - 0.5, random.uniform(i, 4) - 0.5,
+                                                  random.uniform(i, 5) - 0.5),
+                             .mass = 0.2,
+                             .radius = 0.02,
+                             .restitution = 1,
+                             .friction = 0});
+  const Real before = world.energy().total();
+  Real greatest = 0;
+  for (int i = 0; i < seconds * 60; ++i) {
+    world.step(1.0 / 60);
+    greatest = std::max(greatest, std::abs(world.energy().total() / before - 1));
+  }
+  EXPECT_EQ(world.particle_count(), 20u);
+  return greatest;
+}
+
+TEST(ParticlesAndJoints, AGasUnderARailedLidKeepsItsEnergy) {
+  EXPECT_LT(gas_drift(true, false, 1.0 / 240, 10), 1e-3);
+  EXPECT_LT(gas_drift(true, true, 1.0 / 240, 10), 1e-3);
+}
+
+}  // namespace
+}  // namespace offstage::sim
