@@ -11,6 +11,7 @@
 #include "convex_oracle.h"
 #include "random.h"
 #include "sim/geometry/convex_hull.h"
+#include "sim/rotation.h"
 
 namespace offstage::sim {
 
@@ -71,11 +72,11 @@ inline Quat feature_rotation(const ConvexPair& pair, Dice& dice) {
   const auto &a = pair.a, &b = pair.b;
   const uint32_t choice = dice.index(5);
   if (choice == 0 && a.face_count() > 0 && b.face_count() > 0)
-    return Quat::FromTwoVectors(b.plane(dice.index(b.face_count())).normal,
+    return rotation_between(b.plane(dice.index(b.face_count())).normal,
                                 -a.plane(dice.index(a.face_count())).normal);
   if (choice == 1 && !a.edges().empty() && !b.edges().empty()) {
     const auto e = a.edge(dice.index(a.edges().size())), f = b.edge(dice.index(b.edges().size()));
-    return Quat::FromTwoVectors(b.vertex(f.head) - b.vertex(f.tail), a.vertex(e.head) - a.vertex(e.tail));
+    return rotation_between(b.vertex(f.head) - b.vertex(f.tail), a.vertex(e.head) - a.vertex(e.tail));
   }
   return choice == 2 ? Quat::Identity() : dice.rotation();
 }

@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include "producer/articulation_builder.h"
+#include "sim/rotation.h"
 
 namespace offstage::producer {
 namespace {
@@ -51,7 +52,7 @@ Parts build(const Chain& chain) {
     const auto k = static_cast<std::size_t>(i);
     b.shape = sim::Capsule{chain.radius, std::max(side - 2 * chain.radius, 0.0)};
     b.position = (nodes[k] + nodes[k + 1]) / 2;
-    b.orientation = Quat::FromTwoVectors(Vec3::UnitY(), nodes[k + 1] - nodes[k]);
+    b.orientation = sim::rotation_between(Vec3::UnitY(), nodes[k + 1] - nodes[k]);
     b.density = chain.density;
   }
   const auto join = [&](int i, const std::string& a, const std::string& b) {

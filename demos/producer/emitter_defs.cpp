@@ -1,4 +1,5 @@
 #include "producer/emitter_defs.h"
+#include "sim/rotation.h"
 
 #include <algorithm>
 #include <limits>
@@ -34,7 +35,7 @@ effects::EmitterSurface surface_of(const SphereSurface& s) {
 }
 effects::EmitterSurface surface_of(const DiscSurface& s) {
   return {.kind = effects::SurfaceKind::disc,
-          .pose = {s.position, Quat::FromTwoVectors(Vec3::UnitY(), s.direction)},
+          .pose = {s.position, sim::rotation_between(Vec3::UnitY(), s.direction)},
           .radius = s.radius};
 }
 effects::EmitterSurface surface_of(const MeshSurface& s) {

@@ -7,6 +7,7 @@
 #include "producer/lights.h"
 #include "producer/picture.h"
 #include "producer/to_float.h"
+#include "sim/rotation.h"
 
 namespace offstage::producer {
 namespace {
@@ -90,7 +91,7 @@ void Picture::place_rods(const Snapshot& previous, const Snapshot& current, floa
     stage_.set_visible(rods_[i], drawn);
     if (drawn)
       stage_.set_transform(rods_[i], Eigen::Translation3f(0.5f * (a + b)) *
-                                            Eigen::Quaternionf::FromTwoVectors(Vector3f::UnitY(), d) *
+                                            sim::rotation_between(Vector3f::UnitY(), d) *
                                             Eigen::Scaling(1.f, d.norm(), 1.f));
   }
 }

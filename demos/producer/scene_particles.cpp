@@ -1,4 +1,5 @@
 #include "producer/scene_particles.h"
+#include "sim/rotation.h"
 
 #include <numbers>
 
@@ -70,7 +71,7 @@ EventSource::EventSource() {
 
 Quat PlaneSurface::orientation() const {
   const Quat turned(Eigen::AngleAxisd(turn_deg * std::numbers::pi / 180, Vec3::UnitY()));
-  return Quat::FromTwoVectors(Vec3::UnitY(), direction) * turned;
+  return sim::rotation_between(Vec3::UnitY(), direction) * turned;
 }
 
 Vec3& position_of(EmitterSurface& surface) {

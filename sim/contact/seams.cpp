@@ -8,6 +8,7 @@
 #include "sim/collision/gjk.h"
 #include "sim/geometry/closest_points.h"
 #include "sim/parallel_loop.h"
+#include "sim/rotation.h"
 
 namespace offstage::sim {
 namespace {
@@ -196,7 +197,7 @@ class BodyContacts {
   }
   /// The contact of X's piece with the slope that begins where a contact is.
   Manifold on_slope(const View& v, const View& face, const Vec3& normal) const {
-    const Pose plane{highest(v, face.normal()), Quat::FromTwoVectors(Vec3::UnitY(), normal)};
+    const Pose plane{highest(v, face.normal()), rotation_between(Vec3::UnitY(), normal)};
     const Pose x = pose(v.x(), false), y = pose(v.y(), false);
     const Pose plane_from_x{plane.point_to_body(x.position), plane.orientation.conjugate() * x.orientation};
     const Real margin = std::max(0.0, v.m->points[v.deepest()].separation) + kSlopeMargin;

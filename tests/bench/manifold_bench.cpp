@@ -11,6 +11,7 @@
 
 #include "sim/collision/narrow_phase.h"
 #include "sim/geometry/convex_hull.h"
+#include "sim/rotation.h"
 
 namespace offstage::sim {
 namespace {
@@ -78,7 +79,7 @@ ConvexPolyhedron icosahedron() {
         Vec3 p = Vec3::Zero();
         p[k] = x;
         p[(k + 1) % 3] = y;
-        points.push_back(0.5 * (Quat::FromTwoVectors(Vec3::Ones(), Vec3::UnitY()) * p.normalized()));
+        points.push_back(0.5 * (rotation_between(Vec3::Ones(), Vec3::UnitY()) * p.normalized()));
       }
   return convex_hull(points);
 }

@@ -347,12 +347,12 @@ TEST(SceneCheck, DragThatWouldBlowUpIsRefused) {
   // m/k = 0.01 s: explicit steps diverge from 0.02 s on (0.02785 s for Runge-Kutta).
   const auto group = [](double step) {
     return R"({"world": {"step": )" + std::to_string(step) +
-           R"(}, "particles": [{"integrator": "symplectic", "mass": 0.01, "linear_drag": 1, "places": [{}]}]})";
+           R"(}, "particles": [{"integrator": "symplectic_euler", "mass": 0.01, "linear_drag": 1, "places": [{}]}]})";
   };
   EXPECT_EQ(errors_of(group(0.019)), "");
   EXPECT_NE(errors_of(group(0.021)).find("/particles/0/linear_drag: is too much for the step"),
             std::string::npos);
-  const std::string drops = R"({"emitters": [{"integrator": "symplectic", "radius": 0.002, "linear_drag": 0.02}]})";
+  const std::string drops = R"({"emitters": [{"integrator": "symplectic_euler", "radius": 0.002, "linear_drag": 0.02}]})";
   EXPECT_NE(errors_of(drops).find("/emitters/0/linear_drag"), std::string::npos);
   const std::string body = R"({"bodies": [{"mass": 1, "linear_drag": 1000}]})";
   EXPECT_NE(errors_of(body).find("/bodies/0/linear_drag"), std::string::npos);

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Documents name files, tests and pages that exist:  docs.sh SOURCE_DIR
 # - relative links of every Markdown page lead to a file,
+# - a code block below a comment `<!-- file: PATH -->` is the text of that file,
 # - source paths in docs/physics.md exist, and so does every test that it names.
 set -euo pipefail
 cd "$1"
@@ -11,8 +12,13 @@ while read -r page; do
   while read -r link; do
     target=${link%%#*}
     [ -z "$target" ] || [ -e "$(dirname "$page")/$target" ] || problem "$page: the link '$link' leads nowhere"
-  done < <(grep -oE '\]\([^)]+\)' "$page" | sed -E 's/^\]\(//; s/\)$//' | grep -vE '^[a-z]+:' || true)
+  done < <(sed '/^```/,/^```/d' "$page" | grep -oE '\]\([^)]+\)' | sed -E 's/^\]\(//; s/\)$//' | grep -vE '^[a-z]+:' || true)
 done < <(find . -name '*.md' -not -path './build*')
+
+while IFS=: read -r page line path; do
+  path=$(sed -E 's/.*file: (.*) -->.*/\1/' <<<"$path")
+  cmp -s "$path" <(tail -n "+$((line + 2))" "$page" | sed '/^```$/,$d') || problem "$page:$line: the code differs from '$path'"
+done < <(grep -rnE '^<!-- file: .* -->' docs README.md --include='*.md' || true)
 
 while read -r path; do
   [ -e "$path" ] || problem "docs/physics.md: there is no file '$path'"

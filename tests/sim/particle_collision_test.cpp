@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "sim/rotation.h"
 #include "sim/world.h"
 #include "tests/meshes.h"
 #include "tests/random.h"
@@ -110,7 +111,7 @@ TEST(ParticleCollision, ComesToRestInACornerWithoutTruncatedSweeps) {
   for (const Vec3& n : {Vec3(-1, 0, 0), Vec3(0, 0, -1)})
     world.add_body({.shape = Plane{},
                     .motion = MotionType::fixed,
-                    .pose = {-n, Quat::FromTwoVectors(Vec3::UnitY(), n)}});
+                    .pose = {-n, rotation_between(Vec3::UnitY(), n)}});
   const auto system = world.add_particle_system({.linear_drag = 0.05});
   world.add_particle(system, {.position = {0.5, 0.5, 0.3}, .mass = 0.01, .radius = 0.01, .friction = 0.1});
   for (int i = 0; i < 600; ++i) world.step(kFrame);
@@ -156,7 +157,7 @@ TEST(ParticleCollision, IsRemovedAndCountedWhereThereIsNoWayOut) {
   for (const Vec3& n : {Vec3(0, 1, 0), Vec3(0, -1, 0)})  // a slot narrower than the particle
     world.add_body({.shape = Plane{},
                     .motion = MotionType::fixed,
-                    .pose = {-0.01 * n, Quat::FromTwoVectors(Vec3::UnitY(), n)}});
+                    .pose = {-0.01 * n, rotation_between(Vec3::UnitY(), n)}});
   const auto system = world.add_particle_system({});
   world.add_particle(system, {.radius = 0.05});
   EXPECT_EQ(world.step(kFrame).particles_removed, 1u);

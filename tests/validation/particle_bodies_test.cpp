@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "sim/rotation.h"
 #include "sim/world.h"
 #include "tests/random.h"
 
@@ -122,7 +123,7 @@ Real gas_drift(bool joined, bool internal, Real max_step, Real seconds) {
   const auto wall = [&](const Vec3& at, const Vec3& normal) {
     world.add_body({.shape = Plane{},
                     .motion = MotionType::fixed,
-                    .pose = {at, Quat::FromTwoVectors(Vec3::UnitY(), normal)},
+                    .pose = {at, rotation_between(Vec3::UnitY(), normal)},
                     .restitution = 1,
                     .friction = 0});
   };

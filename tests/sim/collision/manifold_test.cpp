@@ -11,6 +11,7 @@
 
 #include "sim/collision/distance.h"
 #include "sim/collision/gjk.h"
+#include "sim/rotation.h"
 #include "tests/convex_samples.h"
 
 namespace offstage::sim {
@@ -179,7 +180,7 @@ TEST(Manifold, AnEdgeOnAFaceHasTwoPointsAndAVertexOne) {
   ASSERT_EQ(edge.count, 2u);
   EXPECT_EQ(edge.source, NormalSource::face_of_a);
   EXPECT_NEAR((edge.points[0].on_a - edge.points[1].on_a).norm(), 1, 1e-12);
-  const Pose on_corner{Vec3(0, -0.5 - std::sqrt(0.75), 0), Quat::FromTwoVectors(Vec3::Ones(), Vec3::UnitY())};
+  const Pose on_corner{Vec3(0, -0.5 - std::sqrt(0.75), 0), rotation_between(Vec3::Ones(), Vec3::UnitY())};
   const Manifold vertex = manifold_of(slab, box, on_corner, 0.01);
   ASSERT_EQ(vertex.count, 1u);
   EXPECT_NEAR(vertex.points[0].separation, 0, 1e-12);

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
+#include "sim/rotation.h"
 #include "tests/convex_samples.h"
 
 namespace offstage::sim {
@@ -46,7 +47,7 @@ TEST(Vclip, FindsTheFeaturesAndTheirDistance) {
         Case{face, corner, Kind::vertex, Kind::face},
         Case{Vec3(0.5, 0, 0.5), edge, Kind::edge, Kind::edge}}) {
     const Vec3 n = c.to.normalized();
-    const Quat turn = Quat(Eigen::AngleAxisd(0.3, n)) * Quat::FromTwoVectors(c.from, -n);
+    const Quat turn = Quat(Eigen::AngleAxisd(0.3, n)) * rotation_between(c.from, -n);
     const Vec3 gap = 0.1 * n;
     VclipCache cache;
     const Separation s = vclip(cube, cube, at(c.to + gap - turn * c.from, turn), cache);

@@ -10,6 +10,7 @@
 
 #include "sim/collision/gjk.h"
 #include "sim/collision/vclip.h"
+#include "sim/rotation.h"
 #include "tests/convex_samples.h"
 
 namespace offstage::sim {
@@ -111,12 +112,12 @@ std::vector<Pair> pairs() {
   static const ConvexPolyhedron cube = box_polyhedron(Vec3::Ones());
   const Convex box = convex(cube), ball = convex(Sphere{0.3}), capsule = convex(Capsule{0.2, 1}),
                cylinder = convex(Cylinder{0.4, 1}), cone = convex(Cone{0.5, 1});
-  const Quat tip = Quat::FromTwoVectors(Vec3::Ones(), Vec3(0.1, 1, 0.05));
-  const Quat away = Quat::FromTwoVectors(Vec3::Ones(), -Vec3::Ones());
+  const Quat tip = rotation_between(Vec3::Ones(), Vec3(0.1, 1, 0.05));
+  const Quat away = rotation_between(Vec3::Ones(), -Vec3::Ones());
   const Real corner = std::sqrt(0.75);
   return {
       {"vertex on face", box, box,
-       at({0, 0.52 + corner, 0}, Quat::FromTwoVectors(Vec3::Ones(), Vec3(0.1, -1, 0.05))), at(kOrigin),
+       at({0, 0.52 + corner, 0}, rotation_between(Vec3::Ones(), Vec3(0.1, -1, 0.05))), at(kOrigin),
        NormalSource::face_of_b},
       {"face on vertex", box, box, at(kOrigin), at({0.1, 0.53 + corner, 0}, tip), NormalSource::face_of_a},
       {"edge across edge", box, box, at({0, 1.5, 0}, turn(kPi / 4, 0, 0.1)),
@@ -124,9 +125,9 @@ std::vector<Pair> pairs() {
       {"vertex on vertex", box, box, at({0.9, 0.93, 0.96}), at({-0.2, -0.2, -0.2}, away),
        NormalSource::points},
       {"vertex by edge", box, box, at(kOrigin),
-       at({1.2, 0, 1.23}, Quat::FromTwoVectors(Vec3::Ones(), Vec3(-1, 0.2, -1.1))), NormalSource::edge_of_a},
+       at({1.2, 0, 1.23}, rotation_between(Vec3::Ones(), Vec3(-1, 0.2, -1.1))), NormalSource::edge_of_a},
       {"edge by vertex", box, box,
-       at({1.2, 0, 1.23}, Quat::FromTwoVectors(Vec3::Ones(), Vec3(-1, 0.2, -1.1))), at(kOrigin),
+       at({1.2, 0, 1.23}, rotation_between(Vec3::Ones(), Vec3(-1, 0.2, -1.1))), at(kOrigin),
        NormalSource::edge_of_b},
       {"ball on ball", ball, ball, at({0.3, 0.5, 0.1}), at(kOrigin), NormalSource::points},
       {"ball on face", ball, box, at({0.3, 0.79, 0.1}), at(kOrigin), NormalSource::face_of_b},

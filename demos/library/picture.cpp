@@ -1,6 +1,6 @@
-// The library in sixty lines, without JSON: a box in free flight and a bouncing ball, simulated and drawn.
+// Simulates a box in free flight and a bouncing ball, and draws the last moment to a PNG file.
 //
-//   build/hello hello.png
+//   build/picture picture.png
 
 #include <cstdio>
 #include <exception>
@@ -16,7 +16,7 @@ using namespace offstage;
 
 int main(int argc, char** argv) try {
   if (argc != 2) {
-    std::fprintf(stderr, "usage: hello PICTURE.png\n");
+    std::fprintf(stderr, "usage: picture FILE.png\n");
     return 2;
   }
   // The simulation: a spinning box in free flight over the ground, and one bouncing particle.
@@ -30,7 +30,7 @@ int main(int argc, char** argv) try {
   const auto balls = world.add_particle_system({.name = "balls"});
   world.add_particle(balls, {.position = {1, 2, 0}, .mass = 0.5, .radius = 0.3, .restitution = 0.8});
 
-  // The stage: what the simulation moves has a handle here, and nothing else in common with it.
+  // The stage: each drawn object has a handle. Simulation and stage share nothing else.
   render::pin_environment(2);
   render::Context context;
   render::Stage stage(context, {.width_px = 960, .height_px = 540});
@@ -42,7 +42,7 @@ int main(int argc, char** argv) try {
   const auto drawn_balls = stage.add_points({.style = render::PointStyle::sphere});
   stage.set_camera({.eye = {1.5f, 1.6f, 6}, .target = {0, 1, 0}});
 
-  // The loop: step by the sampling time, move what moved.
+  // The loop: one step per frame, then new transforms for the bodies that moved.
   for (int frame = 0; frame < 24; ++frame) {
     world.step(1.0 / 30);
     for (const sim::MovedBody& moved : world.moved())
@@ -63,6 +63,6 @@ int main(int argc, char** argv) try {
   for (int i = 0; i < kSubframes; ++i) stage.draw(render::sample_offsets(i, kSubframes), sum);
   render::write_png(argv[1], render::tone_map(sum, {.sample_weight = 1.f / kSubframes}));
 } catch (const std::exception& error) {
-  std::fprintf(stderr, "hello: %s\n", error.what());
+  std::fprintf(stderr, "picture: %s\n", error.what());
   return 1;
 }
