@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Draws a picture of every scene and writes demos/README.md around them, and docs/gallery.jpg, the strip of the README:
-#   demos/gallery.sh [NAME...]     only these scenes are drawn anew
+#   demos/gallery.sh [NAME...]     draws only these scenes again
 # Needs build/offstage and ffmpeg. The words are those at the head of each scene file.
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -10,7 +10,7 @@ namespace offstage::effects {
 
 class Spacing {
  public:
-  /// Begins anew, for up to `count` balls none of which is larger than `diameter` [m].
+  /// Starts again, for up to `count` balls none of which is larger than `diameter` [m].
   void reset(uint64_t count, Real diameter);
   /// Takes the ball in unless it overlaps one that is in.
   bool add(const Vec3& centre, Real radius);

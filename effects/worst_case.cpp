@@ -106,7 +106,7 @@ WorstCase bounded_children(const WorstCase& parents, Real children, Real after, 
 WorstCase worst_case(const EmitterDef& def, Real duration) {
   const Real start = def.start - def.prewarm, end = std::min(def.end, duration);
   const Real lifespan = upper_bound(def.lifespan), born = most_released(def, start, end, kEver);
-  // What waits may come together with what is born later.
+  // Waiting particles may be released together with later ones.
   if (can_wait(def)) return bounded(born, lifespan, born, 0, def.max_alive);
   Real at_once = 1 + most(def.count),
        rate = highest_rate(def.rate) + most(def.count) / lower_bound(def.interval);

@@ -79,7 +79,7 @@ Sampler make_depth_sampler();
 /// Throws UnavailableError if it is not complete. A texture of 0 leaves that attachment empty.
 Framebuffer make_framebuffer(GLuint color, GLuint depth);
 
-/// A buffer written anew each frame; it grows and is never shrunk.
+/// A buffer that is rewritten each frame. It grows and never shrinks.
 class StreamBuffer {
  public:
   template <class T>

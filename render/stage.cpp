@@ -25,7 +25,7 @@ namespace offstage::render {
 namespace {
 
 constexpr GLuint kFrameBlock = 0, kSceneDepthUnit = 4, kBehindUnit = 12;
-constexpr float kMirrorReach = 0.6f;  // how far away mirrors look for the scene, likewise
+constexpr float kMirrorReach = 0.6f;  // how far away mirrors look for the scene, in the same unit
 constexpr float kReach = 0.1f;        // how far things hide the sky, as a share of the distance to the target
 
 /// Colour and depth of the picture.

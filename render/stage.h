@@ -176,7 +176,7 @@ class Stage {
   void set_sun(const Sun& sun);
   void set_environment(const Environment& environment);
   void set_lamps(std::span<const Lamp> lamps);
-  /// Of what moves by itself: ripples, clouds [s].
+  /// The time of self-animated things such as ripples and clouds [s].
   void set_time(float time);
 
   /// Draws one sub-frame and adds it to `sum`, which is sized and cleared first if it does not have the

@@ -136,7 +136,7 @@ void check_outputs(const SweepOptions& options, const Sweep& sweep) {
   const bool begun = fs::exists(sweep.finished);
   if (begun && !options.resume && !options.force)
     throw OutputError(sweep.finished.string() +
-                      ": holds an unfinished sweep; go on with --resume, or start anew with --force");
+                      ": holds an unfinished sweep; continue with --resume, or start again with --force");
   const bool replace = options.force || (options.resume && begun);
   check_file(options.out, replace);
   check_file(sweep.csv, replace);

@@ -1,5 +1,5 @@
 #pragma once
-/// Emitters of a scene, and what is born from their particles, as definitions of the effects library.
+/// Emitters of a scene, and their child particles, as definitions of the effects library.
 
 #include <cstdint>
 #include <functional>

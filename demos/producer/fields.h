@@ -307,7 +307,7 @@ struct Codec<E> {
   static Description describe(Catalogue&, const Spec&) { return describe_names(Names<E>::kNames); }
 };
 
-/// Objects told apart by "type": `kName`, `kHelp`, `kTags` for each alternative, `kRequired` or else the
+/// Objects distinguished by "type": `kName`, `kHelp`, `kTags` for each alternative, `kRequired` or else the
 /// first if absent.
 template <class V>
 struct Tags;

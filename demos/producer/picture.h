@@ -97,7 +97,7 @@ class Picture {
   std::vector<render::InstanceHandle> rods_;  // null where invisible
   std::vector<render::PointsHandle> points_;
   std::vector<render::PointStyle> styles_;    // of the same
-  std::vector<render::PointsHandle> smears_;  // of balls, what moves too far in a sub-frame; or null
+  std::vector<render::PointsHandle> smears_;  // motion blur of balls that move too far in a sub-frame; or null
   std::map<std::string, render::MaterialHandle> fabrics_;  // by fabric and material
   std::vector<DrawnCloth> cloths_;
   std::vector<render::LinesHandle> overlays_;  // null for those without lines

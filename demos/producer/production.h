@@ -58,7 +58,7 @@ struct RunStats {
   std::string state_hash;                               ///< after the last frame
   std::map<int, std::string> frame_states;              ///< state hash of every drawn frame
   std::vector<FrameFigures> figures;                    ///< if the job asks for them
-  std::vector<std::pair<int, render::Image>> pictures;  ///< small ones of about a dozen frames, likewise
+  std::vector<std::pair<int, render::Image>> pictures;  ///< thumbnails of about a dozen frames
   std::vector<int> blank_frames;                        ///< all pixels equal: something is probably wrong
   int interrupted_by = 0;                               ///< signal, or 0
 };

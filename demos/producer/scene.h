@@ -347,7 +347,7 @@ struct OutputSettings {
   render::FrameRate fps;  ///< frames per second
   Real duration = 5;
   Real start =
-      0;  ///< time of frame 1: what happens before is simulated and not shown (a fountain already running)
+      0;  ///< time of frame 1: earlier times are simulated but not shown (a fountain already running)
   std::vector<render::Channel> channels;  ///< numbers for each pixel, in files beside the frames or the video
   render::ChannelFormat channel_format = render::ChannelFormat::exr;
 

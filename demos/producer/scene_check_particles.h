@@ -1,5 +1,5 @@
 #pragma once
-/// Checks of particle groups and emitters, with what is born from particles, for scene_check.h.
+/// Checks of particle groups, emitters and child particles, for scene_check.h.
 
 #include <cstdint>
 #include <string>
@@ -12,7 +12,7 @@ namespace offstage::producer {
 /// Adds what is wrong with the particles of a scene as described; `flat`: with its placements expanded.
 void check_particles(const Scene& scene, const Scene& flat, Findings& findings);
 
-/// The names of all particle systems: of groups, of emitters, and of what is born from their particles.
+/// The names of all particle systems: of groups, of emitters, and of their child particles.
 std::vector<std::string> particle_names(const Scene& scene);
 
 /// How many particles of one name there can be at once.

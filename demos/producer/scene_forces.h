@@ -22,7 +22,7 @@ struct NamedForce {
 /// Whom it acts on, and when.
 struct ForceScope : NamedForce {
   std::vector<std::string> bodies;
-  std::vector<std::string> particles;  ///< names of groups, of emitters, or of what is born from those
+  std::vector<std::string> particles;  ///< names of groups, of emitters, or of their child particles
   std::vector<std::string> cloths;
   Real start = 0;
   Real end = 1e30;

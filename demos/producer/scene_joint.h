@@ -29,7 +29,7 @@ struct JointMotor {
   Real stiffness = 0, damping = 0;
 };
 
-/// How a joint moves, and what moves it.
+/// How a joint moves, and its motor.
 struct JointBehaviour {
   sim::JointType type = sim::JointType::spherical;
   Vec3 axis = Vec3::UnitZ();
@@ -51,7 +51,7 @@ struct Joint {
   Vec3 anchor_b = Vec3::Zero();  ///< of a rod
   bool collide = false;
   bool visible = true;  ///< of a rod or rope
-  Real radius = 0.01;   ///< likewise
+  Real radius = 0.01;   ///< of the drawn rod or rope [m]
   std::string material;
 };
 
@@ -66,7 +66,7 @@ struct Chain {
   Real density = 7800;
   std::string material;
   std::string start = "world";  ///< what holds the first link: a body, "world", or nothing
-  std::string end;              ///< likewise the last
+  std::string end;              ///< the last one
   Real swing_deg = 180;
   Real friction = 0, damping = 0;
   std::optional<Real> max_force;

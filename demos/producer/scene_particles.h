@@ -1,5 +1,5 @@
 #pragma once
-/// The particles of a scene: how they look and behave, groups of them, emitters, and what is born from
+/// The particles of a scene: how they look and behave, groups of them, emitters, and child
 /// particles. See scene.h.
 
 #include <array>
@@ -90,7 +90,7 @@ struct TrailSource;
 struct EventSource;
 struct AgeSource;
 
-/// What all that brings forth particles has: what they are like, and what is born from them in turn. Each
+/// The keys common to all sources of particles: the particles' properties, and their child particles. Each
 /// has a particle system of its own.
 struct ParticleSource {
   Where where;

@@ -135,7 +135,7 @@ Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
   for (const auto& [name, handle] : cloths_) cloths.emplace(name, handle);
   overlays_.emplace(scene, world_, bodies_, cloths);
   prewarm_pieces_ = static_cast<int>(std::ceil(sources_->prewarm() * scene.output.fps.per_second()));
-  // What is born at time 0 exists then.
+  // Particles released at time 0 exist at time 0.
   if (prewarm_pieces_ == 0) prewarm(0, 0);
 }
 

@@ -250,7 +250,7 @@ struct Table<OutputSettings> {
         {"fps", &T::fps, "frames per second: a number, or an exact fraction such as \"30000/1001\"", "1/s",
          between(1, 1000)},
         {"duration", &T::duration, "length of the film", "s", over(0, 86400)},
-        {"start", &T::start, "time of the first frame; what happens before is simulated and not shown", "s",
+        {"start", &T::start, "time of the first frame; earlier times are simulated but not shown", "s",
          between(0, 86400)},
         {"channels", &T::channels,
          "numbers for each pixel, beside each frame (or in FILM.channels beside a video): depth [m], normal, "

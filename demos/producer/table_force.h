@@ -48,7 +48,7 @@ inline constexpr Limits kDropRate = between(0, 16);
 inline constexpr const char* kDropRateHelp =
     "power of its fall from the middle of the region to nothing at the edge; 0: the same throughout";
 inline constexpr const char* kParticlesHelp =
-    "names of groups, of emitters, or of what is born from their particles, such as rain/splash";
+    "names of groups, of emitters, or of child particles, such as rain/splash";
 inline constexpr const char* kClothsHelp =
     "names of cloths, of one or of all copies; moving air acts on their triangles, other forces as on the "
     "whole cloth, spread over it by mass";

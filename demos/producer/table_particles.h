@@ -1,5 +1,5 @@
 #pragma once
-/// The keys of particles: looks, groups, emitters, what is born from particles, and effects.
+/// The keys of particles: looks, groups, emitters, child particles, and effects.
 
 #include <array>
 
@@ -161,7 +161,7 @@ struct Table<ParticleSource> {
         .with(&T::behaviour);
   }
 };
-/// What is born from particles, of whatever kind they are.
+/// Child particles of any kind of parent.
 template <class T>
 Fields<T> with_offspring(Fields<T> fields) {
   return std::move(fields).then({
