@@ -283,7 +283,8 @@ std::vector<Body*> World::Impl::wake_touched(Real start, Real h) {
   std::sort(woken.begin(), woken.end(), [](const Body* a, const Body* b) { return a->rank < b->rank; });
   for (Body* body : woken) body->begin_interval(0);
   move_some(woken, start, 0, h);
-  for (Body* body : woken) move_in_broad_phase(*body, false);
+  // Pairs that impacts and islands know of in this sub-step must last: a box may grow, but not shrink.
+  for (Body* body : woken) move_in_broad_phase(*body, true);
   update_lists();
   return woken;
 }
