@@ -393,7 +393,7 @@ void World::Impl::find_pairs_again(uint32_t number, Real start, Real h, StepRepo
   bool left = false;
   for (Body* body : islands[number].bodies) left |= move_in_broad_phase(*body, true);
   if (!left) return;
-  collect_pairs();
+  collect_pairs(true);
   std::vector<ContactPair*> near = islands[number].pairs;
   for (ContactPair* pair : active_pairs) {
     if (!pair->is_new()) continue;
@@ -411,7 +411,7 @@ void World::Impl::find_pairs_again(uint32_t number, Real start, Real h, StepRepo
   for (const auto& articulation : articulations)
     if (articulation->bodies().front()->is_awake() && articulation->bodies().front()->island == added)
       islands[added].articulations.push_back(articulation.get());
-  collect_pairs();
+  collect_pairs(true);
   for (ContactPair* pair : active_pairs) {
     if (pair->is_new()) find_points(*pair, std::max(pair->a().from, pair->b().from), h);
     const auto outside = [&](const Body& body) { return body.is_awake() && body.island != added; };
