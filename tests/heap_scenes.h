@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "random.h"
+#include "tests/random.h"
 #include "sim/world.h"
 
 namespace offstage::sim {

@@ -155,6 +155,7 @@ TEST_P(InternalEdges, DoNotStopWhatSlides) {
           EXPECT_LT((end.pose.position - expected).norm(), tolerance()) << about();
           EXPECT_LT((end.velocity - Vec3(speed, 0, 0)).norm(), tolerance() * speed) << about();
         }
+      }
 }
 
 TEST_P(InternalEdges, DoNotStopWhatRolls) {
