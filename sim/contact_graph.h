@@ -27,9 +27,10 @@ struct Island {
 class ContactGraph {
  public:
   /// Makes the pairs those that the broad phase found, of which at least one is dynamic: new ones are made by
-  /// `surface_of(a, b)`, those of before are kept, others forgotten. `body_at` gives the body in a slot.
+  /// `surface_of(a, b)`, those of before are kept, others forgotten unless `adds`. `body_at` gives the body in a
+  /// slot.
   template <class BodyAt, class SurfaceOf>
-  void update(std::span<const IndexPair> candidates, BodyAt&& body_at, SurfaceOf&& surface_of);
+  void update(std::span<const IndexPair> candidates, bool adds, BodyAt&& body_at, SurfaceOf&& surface_of);
 
   void forget(uint32_t slot);  ///< all pairs of a body
   void forget_all() { entries_.clear(); }
@@ -57,12 +58,16 @@ void find_islands(std::span<Body* const> bodies, std::span<ContactPair* const> p
                   std::span<const std::pair<Body*, Body*>> springs, std::vector<Island>& islands);
 
 template <class BodyAt, class SurfaceOf>
-void ContactGraph::update(std::span<const IndexPair> candidates, BodyAt&& body_at, SurfaceOf&& surface_of) {
+void ContactGraph::update(std::span<const IndexPair> candidates, bool adds, BodyAt&& body_at,
+                          SurfaceOf&& surface_of) {
   next_.clear();
   std::size_t old = 0;
+  const auto pass = [&] {
+    if (adds) next_.push_back(std::move(entries_[old]));
+    ++old;
+  };
   for (const auto& [low, high] : candidates) {
-    while (old < entries_.size() && std::pair(entries_[old].low, entries_[old].high) < std::pair(low, high))
-      ++old;
+    while (old < entries_.size() && std::pair(entries_[old].low, entries_[old].high) < std::pair(low, high)) pass();
     if (old < entries_.size() && entries_[old].low == low && entries_[old].high == high) {
       next_.push_back(std::move(entries_[old++]));
       continue;
@@ -73,6 +78,7 @@ void ContactGraph::update(std::span<const IndexPair> candidates, BodyAt&& body_a
     if (a->collision_shape().is_plane()) std::swap(a, b);
     next_.push_back({low, high, std::make_unique<ContactPair>(*a, *b, surface_of(*a, *b))});
   }
+  while (old < entries_.size()) pass();
   std::swap(entries_, next_);
 }
 

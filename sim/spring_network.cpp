@@ -8,7 +8,7 @@ namespace {
 
 /// Pieces in which the motion of what joints hold is integrated: of its turning, and of the phase of its fastest
 /// swinging [rad]; and the most of them.
-constexpr Real kTurn = 0.12, kSwing = 1, kMostPieces = 64;
+constexpr Real kTurn = 0.12, kSwing = 1, kWhirl = 1, kMostPieces = 64;
 
 }  // namespace
 
@@ -202,14 +202,15 @@ void SpringNetwork::add_joint_forces(const Jointed& jointed, Real t, std::span<c
 
 /// No integrator of a fixed step follows what turns by much more in it, or swings: links that are pulled tight
 /// are the masses of a string.
-Real SpringNetwork::joint_pieces(Real h) const {
-  Real fastest = 0, tightest = 0;
+Real SpringNetwork::pieces(Real h) const {
+  Real fastest = 0, tightest = 0, whirling = 0;
+  for (const Body* body : bodies_) whirling = std::max(whirling, greatest_spin(body->rigid));
   for (const Jointed& j : articulations_) {
     for (const Body* body : j.articulation->bodies())
       fastest = std::max(fastest, body->rigid.angular_velocity().norm());
     tightest = std::max(tightest, j.articulation->greatest_frequency());
   }
-  return std::clamp(std::ceil(std::max(fastest / kTurn, tightest / kSwing) * h), 1.0, kMostPieces);
+  return std::clamp(std::ceil(std::max({fastest / kTurn, tightest / kSwing, whirling / kWhirl}) * h), 1.0, kMostPieces);
 }
 
 void SpringNetwork::load(std::span<Real> x, std::span<Real> p) const {
@@ -243,12 +244,12 @@ void SpringNetwork::step(const Integrator& integrator, Real t, Real h, Integrato
   const bool particles_only = bodies_.empty() && springs_.empty();
   const Integrator& chosen =
       particles_only ? sim::integrator(groups_.front().system->def.integrator) : integrator;
-  const Real pieces = joint_pieces(h);
-  for (Real i = 0; i < pieces; ++i) {
-    const Real duration = h / pieces, begin = t + i * duration;
+  const Real count = pieces(h);
+  for (Real i = 0; i < count; ++i) {
+    const Real duration = h / count, begin = t + i * duration;
     for (const Jointed& j : articulations_) j.articulation->begin_motion(begin, duration);
     chosen.step(*this, begin, duration, x_, p_, work);
-    if (articulations_.empty()) break;
+    if (articulations_.empty()) continue;
     store(x_, p_);
     for (const Jointed& j : articulations_) j.articulation->settle(begin + duration, joint_tally_);
     load(x_, p_);

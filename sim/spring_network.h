@@ -105,7 +105,7 @@ class SpringNetwork final : public DynamicSystem {
   void add_articulation(Articulation& articulation, const BodyIndex& index);
   void add_joint_forces(const Jointed& jointed, Real t, std::span<const Real> x, std::span<const Real> p,
                         std::span<Real> dp) const;
-  Real joint_pieces(Real h) const;
+  Real pieces(Real h) const;
   void add_group(const WorldState& world, ParticleSystem& system);
   void add_pair_forces(const WorldState& world);
   void add_springs(const WorldState& world, std::span<const Spring* const> springs, const BodyIndex& index);

@@ -138,11 +138,12 @@ bool World::Impl::move_in_broad_phase(Body& body, bool again) {
   return true;
 }
 
-/// The pairs of bodies whose ways come near each other.
-void World::Impl::collect_pairs() {
+/// The pairs of bodies whose ways come near each other. `again` in a sub-step: impacts and islands know of pairs,
+/// which must last until its end.
+void World::Impl::collect_pairs(bool again) {
   if (!std::exchange(pairs_changed, false)) return;
   graph.update(
-      broad_phase.pairs(), [&](uint32_t slot) { return bodies[bodies.at_slot(slot)].get(); },
+      broad_phase.pairs(), again, [&](uint32_t slot) { return bodies[bodies.at_slot(slot)].get(); },
       [&](const Body& a, const Body& b) { return surface_of(a, b); });
   std::vector<RankedPair> ranked;
   ranked.reserve(graph.size());
@@ -193,7 +194,7 @@ void World::Impl::update_pairs(Real h) {
   });
   for (const std::size_t i : leaving) move_in_broad_phase(*awake[i], ways[i], false);
   for (Body* body : kinematic) move_in_broad_phase(*body, false);
-  collect_pairs();
+  collect_pairs(false);
   foresee_blows(h);
   const auto find = [&](std::size_t i) {
     // They lie all over the memory.

@@ -21,9 +21,11 @@ constexpr std::size_t kMaxImpacts = 128, kImpactsPerBody = 4;
 /// the fast solver, and in us of their own solver; by the exact solver so many times more. In a pile each
 /// impact moves everything, and makes hundreds of others.
 constexpr std::size_t kImpactWork = 2500, kExactImpactWork = 8;
-/// Of it, what it takes to look when a pair meets, for each piece of its way; and after so many times of it
-/// no pair is looked at again in the sub-step.
-constexpr std::size_t kLookWork = 2, kLastWork = 4;
+/// How often an impact goes over its island: back to it, through it and on from it. And what it takes to look when
+/// a pair meets, for each piece of its way.
+constexpr std::size_t kPasses = 3, kLookWork = 2;
+/// After so many times the work no pair is traced back any more in the sub-step.
+constexpr std::size_t kLastWork = 4;
 /// Points this near to each other when two bodies collide take part [m].
 constexpr Real kCluster = 1e-4;
 /// Bodies that turn by more in an interval are looked at in pieces of as much [rad]; at most so many.
@@ -231,11 +233,14 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
     const Impact impact = *first;
     ContactPair& pair = *impact.pair;
     const bool tumbles = turn_of(pair) * h > kImpactTurn;
-    if (++pair.impacts > (tumbles ? kMaxOfTumblingPair : kMaxImpactsOfPair) || count >= most ||
-        work > kLastWork * most_work) {
+    if (++pair.impacts > (tumbles ? kMaxOfTumblingPair : kMaxImpactsOfPair)) {
       pair.gave_up = true;
       ++report.cut_short;
     }
+    // Then what is left are the islands of the impacts that are known, each once.
+    if (count >= most || work > kLastWork * most_work)
+      for (ContactPair* left : active_pairs)
+        if (!std::exchange(left->gave_up, true)) report.cut_short += left->by_event;
     const uint32_t island = pair.a().is_awake() ? pair.a().island : pair.b().island;
     if (pair.a().is_awake() && pair.b().is_awake()) {
       bring_to(islands[pair.a().island], start, impact.time, h, report);
@@ -245,7 +250,7 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
       bring_to(islands[island], start, impact.time, h, report);
     }
     ++report.tracebacks;
-    work += impact_work(islands[island]);
+    work += kPasses * impact_work(islands[island]);
     if (work > most_work) settle_pairs(island, report);
     work += collide(island, start, impact.time, h, report);
     // What was foreseen of these bodies is not what will be.
@@ -393,7 +398,7 @@ void World::Impl::find_pairs_again(uint32_t number, Real start, Real h, StepRepo
   bool left = false;
   for (Body* body : islands[number].bodies) left |= move_in_broad_phase(*body, true);
   if (!left) return;
-  collect_pairs();
+  collect_pairs(true);
   std::vector<ContactPair*> near = islands[number].pairs;
   for (ContactPair* pair : active_pairs) {
     if (!pair->is_new()) continue;
@@ -411,7 +416,7 @@ void World::Impl::find_pairs_again(uint32_t number, Real start, Real h, StepRepo
   for (const auto& articulation : articulations)
     if (articulation->bodies().front()->is_awake() && articulation->bodies().front()->island == added)
       islands[added].articulations.push_back(articulation.get());
-  collect_pairs();
+  collect_pairs(true);
   for (ContactPair* pair : active_pairs) {
     if (pair->is_new()) find_points(*pair, std::max(pair->a().from, pair->b().from), h);
     const auto outside = [&](const Body& body) { return body.is_awake() && body.island != added; };

@@ -80,7 +80,7 @@ struct World::Impl : WorldState {
   void remove_seams(std::span<ContactPair* const> pairs, Real time, Real h) const;
   void move_in_broad_phase(Body& body, Aabb way, bool again);
   bool move_in_broad_phase(Body& body, bool again);
-  void collect_pairs();
+  void collect_pairs(bool again);
   std::vector<Body*> wake_touched(Real start, Real h);
   void find_moving_islands();
   void solve_islands(Real start, Real h, StepReport& report);

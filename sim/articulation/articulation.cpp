@@ -4,6 +4,10 @@
 #include <cmath>
 #include <numbers>
 
+#include <Eigen/Cholesky>
+
+#include "sim/articulation/joint_limits.h"
+#include "sim/contact/lcp.h"
 #include "sim/dynamics/free_body.h"
 
 namespace offstage::sim {
@@ -18,6 +22,8 @@ constexpr Real kTogether = 1e-12;
 constexpr Real kFarApart = 0.1;
 constexpr Real kSmall = 1e-4;
 constexpr int kVelocitySteps = 2;
+/// A joint that moves off its limit faster than this is free [m/s], [rad/s].
+constexpr Real kLeaving = 1e-6;
 /// Velocities that fit together less than this have been changed from outside [m/s].
 constexpr Real kDisturbed = 1e-7;
 
@@ -215,23 +221,86 @@ void Articulation::begin_impulses(Real time) {
   is_placed_ = false;
 }
 
-/// Of all links, to an impulse on one: what it does to that alone, and what the joints make of it.
-void Articulation::find_response(uint32_t link, const Vec6& impulse) {
-  if (!is_placed_) {
-    place(response_time_);
-    link_mobility_.assign(bodies_.size(), std::nullopt);
-    is_placed_ = true;
-  }
-  response_.assign(bodies_.size(), Vec6::Zero());
-  response_[link] = mobility_[link].velocity(impulse);
-  system_.relative(response_, change_);
-  for (Vec6& c : change_) c = -c;
-  system_.correct(change_, impulses_, response_);
+Real Articulation::Stop::speed(std::span<const Vec6> velocities) const {
+  return (a != JointSystem::kDriven ? on_a.dot(velocities[a]) : 0) +
+         (b != JointSystem::kDriven ? on_b.dot(velocities[b]) : 0);
 }
 
-Mat6 Articulation::link_mobility(uint32_t link) {
+void Articulation::place_for_impulses() {
+  if (std::exchange(is_placed_, true)) return;
+  place(response_time_);
+  link_mobility_.assign(bodies_.size(), std::nullopt);
+  find_stops();
+}
+
+void Articulation::find_stops() {
+  stops_.clear();
+  for (uint32_t i = 0; i < bodies_.size(); ++i) bodies_[i]->row = i;
+  std::vector<BoundedRow> rows;
+  std::vector<BoundedOrigin> origins;
+  collect_stops(*this, response_time_, rows, origins);
+  for (const BoundedRow& row : rows) {
+    const Real side = row.upper > 0 ? 1 : -1;
+    Stop stop{row.a, row.b, side * row.on_a, side * row.on_b, std::vector<Vec6>(bodies_.size(), Vec6::Zero())};
+    if (stop.speed(velocities_) + side * row.offset > kLeaving) continue;
+    for (const auto& [link, on] : {std::pair(stop.a, &stop.on_a), std::pair(stop.b, &stop.on_b)})
+      if (link != JointSystem::kDriven) stop.response[link] = mobility_[link].velocity(*on);
+    pass_on(stop.response);
+    stops_.push_back(std::move(stop));
+  }
+}
+
+/// What the joints make of velocities that impulses have given to single links.
+void Articulation::pass_on(std::span<Vec6> velocities) {
+  system_.relative(velocities, change_);
+  for (Vec6& c : change_) c = -c;
+  system_.correct(change_, impulses_, velocities);
+}
+
+/// Of all links, to an impulse on one; limits do not count.
+void Articulation::find_response(uint32_t link, const Vec6& impulse) {
+  response_.assign(bodies_.size(), Vec6::Zero());
+  response_[link] = mobility_[link].velocity(impulse);
+  pass_on(response_);
+}
+
+/// Of the limits, so that no response passes them.
+Eigen::VectorXd Articulation::stop_impulses() const {
+  const auto n = static_cast<Eigen::Index>(stops_.size());
+  Eigen::MatrixXd mobility(n, n);
+  Eigen::VectorXd speed(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Stop& stop = stops_[static_cast<std::size_t>(i)];
+    speed[i] = stop.speed(response_);
+    for (Eigen::Index k = 0; k < n; ++k) mobility(i, k) = stop.speed(stops_[static_cast<std::size_t>(k)].response);
+  }
+  return solve_lcp((mobility + mobility.transpose()) / 2, speed).f;
+}
+
+/// With the limits that a push presses on as constraints.
+Mat6 Articulation::link_mobility(uint32_t link, const Vec6& push) {
   const std::lock_guard lock(responding_);
-  if (is_placed_ && link_mobility_[link]) return *link_mobility_[link];
+  place_for_impulses();
+  const Mat6 free = free_mobility(link);
+  if (stops_.empty()) return free;
+  find_response(link, push);
+  const Eigen::VectorXd impulses = stop_impulses();
+  std::vector<const Stop*> pressed;
+  for (std::size_t i = 0; i < stops_.size(); ++i)
+    if (impulses[static_cast<Eigen::Index>(i)] > 0) pressed.push_back(&stops_[i]);
+  const auto n = static_cast<Eigen::Index>(pressed.size());
+  Eigen::MatrixXd among(n, n), on_link(6, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    on_link.col(i) = pressed[static_cast<std::size_t>(i)]->response[link];
+    for (Eigen::Index k = 0; k < n; ++k)
+      among(i, k) = pressed[static_cast<std::size_t>(i)]->speed(pressed[static_cast<std::size_t>(k)]->response);
+  }
+  const Mat6 held = on_link * among.ldlt().solve(on_link.transpose());
+  return free - (held + held.transpose()) / 2;
+}
+
+Mat6 Articulation::free_mobility(uint32_t link) {
+  if (link_mobility_[link]) return *link_mobility_[link];
   Mat6 mobility;
   for (Eigen::Index k = 0; k < 6; ++k) {
     find_response(link, Vec6::Unit(k));
@@ -245,7 +314,12 @@ Mat6 Articulation::link_mobility(uint32_t link) {
 
 void Articulation::respond(uint32_t link, const Vec6& impulse, std::span<Vec6> velocities) {
   const std::lock_guard lock(responding_);
+  place_for_impulses();
   find_response(link, impulse);
+  const Eigen::VectorXd impulses = stop_impulses();
+  for (std::size_t k = 0; k < stops_.size(); ++k)
+    for (std::size_t i = 0; i < response_.size(); ++i)
+      response_[i] += impulses[static_cast<Eigen::Index>(k)] * stops_[k].response[i];
   for (std::size_t i = 0; i < velocities.size(); ++i) velocities[i] += response_[i];
 }
 

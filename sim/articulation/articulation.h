@@ -98,7 +98,7 @@ class Articulation final : public JointedBodies {
   /// A sub-step ends at this time; impulses on links are then those on the bodies as they are now. The system is
   /// factored once, when the first link is asked for.
   void begin_impulses(Real time);
-  Mat6 link_mobility(uint32_t link) override;
+  Mat6 link_mobility(uint32_t link, const Vec6& push) override;
   void respond(uint32_t link, const Vec6& impulse, std::span<Vec6> velocities) override;
   std::size_t link_count() const override { return bodies_.size(); }
 
@@ -134,7 +134,22 @@ class Articulation final : public JointedBodies {
   std::vector<LinkMobility> mobility_;
   std::vector<Vec6> velocities_, change_, impulses_;
 
+  /// A limit that a joint has reached and does not leave. Its row is such that the speed away from it is positive.
+  struct Stop {
+    uint32_t a, b;  // links; kDriven: none that moves
+    Vec6 on_a, on_b;
+    std::vector<Vec6> response;  // of the links to its unit impulse
+
+    Real speed(std::span<const Vec6> velocities) const;
+  };
+
+  void place_for_impulses();
+  void find_stops();
+  void pass_on(std::span<Vec6> velocities);
   void find_response(uint32_t link, const Vec6& impulse);
+  Mat6 free_mobility(uint32_t link);
+  Eigen::VectorXd stop_impulses() const;
+  std::vector<Stop> stops_;  // since begin_impulses()
   std::mutex responding_;
   std::vector<std::optional<Mat6>> link_mobility_;  // since begin_impulses(), of the links asked for
   Real response_time_ = 0;

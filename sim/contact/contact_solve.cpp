@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "sim/contact/contact_motion.h"
+#include "sim/contact/energy_guard.h"
 #include "sim/contact/rough_collision.h"
 #include "sim/parallel_loop.h"
 
@@ -559,6 +560,15 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
   joints_.tell(h);
   for_each_index(patches_.size(),
                  [&](std::size_t i) { tell_forces(patches_[i], interval, *origins_[i].manifold); });
+  std::size_t first = 0;
+  for (const Island* island : islands) {
+    const std::span<RelaxedBody> own = std::span(bodies_).subspan(first, island->bodies.size());
+    first += own.size();
+    const Real share = kept_share(*island, own);
+    if (share == 1) continue;
+    ++work.softened;
+    for (RelaxedBody& b : own) b.scale(share);
+  }
   for_each_interval(std::span(members_).first(moved_),
                     [&](std::size_t i) { move(*members_[i], bodies_[i]); });
   return work;

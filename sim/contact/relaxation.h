@@ -46,6 +46,14 @@ struct RelaxedBody {
   /// Out: what contacts add to the free motion of the step [m], [rad]: position = free position +
   /// displacement, orientation = exp(rotation_vector) free orientation.
   Vec3 displacement = Vec3::Zero(), rotation_vector = Vec3::Zero();
+
+  /// Of what contacts and joints add, takes a share.
+  void scale(Real share) {
+    impulse *= share;
+    angular_impulse *= share;
+    displacement *= share;
+    rotation_vector *= share;
+  }
 };
 
 /// Up to four points where the bodies a and b touch or may soon. Its frame and its arms stay as they are

@@ -1,7 +1,6 @@
 /// Whether an island is for the exact or the fast solver.
 
 #include <algorithm>
-#include <limits>
 
 #include "sim/contact/contact_solve.h"
 
@@ -23,6 +22,16 @@ constexpr Real kWorth = 2.5, kCredit = 120;
 constexpr Real kShare = 0.25, kLongestWait = 2400;
 /// With so little of the credit left, only what is known to be cheap is tried.
 constexpr Real kLittle = 0.05;
+/// The most that an attempt may take: in a world where no solver takes long, and, as multiples of the fast solver, on
+/// bodies that move. Those at rest, none of which is faster than kQuiet, may use all of the credit: they will go on as
+/// they are, and what their solution takes then is little [ns], [m/s].
+constexpr Real kMostOfFew = 2e6, kMostOfMoving = 3, kQuiet = 0.1;
+
+bool is_quiet(const Island& island) {
+  return std::all_of(island.bodies.begin(), island.bodies.end(), [](const Body* body) {
+    return body->start_twist.velocity.norm() + body->turning_speed() < kQuiet;
+  });
+}
 
 Real fast_cost(const Island& island, Real duration) {
   Real points = 0;
@@ -51,8 +60,9 @@ bool SolverChoice::is_exact_worth(const Island& island, const SolverPatience& pa
 }
 
 Real SolverChoice::budget(const Island& island, Real duration, const SolverPatience& patience) const {
-  if (patience.is_small() && island.bodies.size() <= kFew) return std::numeric_limits<Real>::infinity();
-  return kCredit * fast_cost(island, duration) * (proven_ ? 1 : patience.left());
+  if (patience.is_small() && island.bodies.size() <= kFew) return kMostOfFew;
+  const Real fast = fast_cost(island, duration), credit = kCredit * fast * (proven_ ? 1 : patience.left());
+  return is_quiet(island) ? credit : std::min(credit, kMostOfMoving * std::max(fast, kSmall));
 }
 
 void SolverChoice::learn(const Island& island, Real duration, bool solved, SolverPatience& patience) {

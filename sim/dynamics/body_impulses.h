@@ -20,9 +20,10 @@ class JointedBodies {
  public:
   virtual ~JointedBodies() = default;
   /// The velocity that each unit impulse and angular impulse on a link gives to that link, through the
-  /// joints; 6 x 6. May be called from several threads at the same time.
-  virtual Mat6 link_mobility(uint32_t link) = 0;
-  /// What an impulse on a link adds to the velocities of all links.
+  /// joints; 6 x 6. For impulses in about the direction of `push`: limits that are reached hold against those
+  /// that press on them. May be called from several threads at the same time.
+  virtual Mat6 link_mobility(uint32_t link, const Vec6& push) = 0;
+  /// What an impulse on a link adds to the velocities of all links, limits included.
   virtual void respond(uint32_t link, const Vec6& impulse, std::span<Vec6> velocities) = 0;
   virtual std::size_t link_count() const = 0;
 };
@@ -40,9 +41,9 @@ class BodyImpulses {
   void begin(std::span<const Link> links);
 
   /// K of P8: the velocity that a unit impulse at `arm` from the centre of mass gives to the point there,
-  /// world axes [1/kg]; zero of what is not dynamic. May be called from several threads while nothing is
-  /// pushed.
-  Mat3 mobility(const Obstacle& o, const Vec3& arm) const;
+  /// world axes [1/kg]; zero of what is not dynamic. `push` is the direction from which it comes, unit: a
+  /// joint at its limit gives way to one side only. May be called from several threads while nothing is pushed.
+  Mat3 mobility(const Obstacle& o, const Vec3& arm, const Vec3& push) const;
   /// Velocity of the point at `arm` from the centre of mass, as the impulses so far leave it [m/s].
   Vec3 velocity(const Obstacle& o, const Vec3& arm) const;
   void push(const Reaction& reaction);

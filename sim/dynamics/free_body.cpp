@@ -4,14 +4,21 @@
 #include <array>
 #include <cmath>
 
+#include <Eigen/Eigenvalues>
+
 #include "sim/dynamics/flat.h"
 #include "sim/dynamics/rigid_jacobian.h"
 
 namespace offstage::sim {
 namespace {
 
-/// Pieces in which the free rotation of a sub-step is integrated [rad], and the most of them.
-constexpr Real kTurn = 0.5, kMostPieces = 1000;
+/// Pieces in which the free rotation of a sub-step is integrated, by the fastest spin that its angular momentum
+/// allows [rad], and the most of them: a thin body that turns across its length may come to spin about it.
+constexpr Real kTurn = 0.5, kMostPieces = 8;
+/// Beyond these, pieces by the angle of a kick of SplitRotation and by its nutation [rad], and the most of them.
+constexpr Real kKick = 0.05, kNutation = 0.2, kMostKicks = 1000;
+/// Of the energy of a free rotation, which does not change: what may be off.
+constexpr Real kRotationEnergy = 1e-3;
 
 /// The four numbers of the orientation in a body's coordinates.
 Eigen::Map<Eigen::Vector4d> turn_of(std::span<Real> x) {
@@ -49,6 +56,64 @@ void integrate(RigidBody& body, const BodyForces& forces, const Integrator& inte
   body.next_step = work.next_step;
   store(x, p, body);
 }
+
+}  // namespace
+
+namespace {
+
+/// The free rotation of a body that turns by many radians in a sub-step, or could. Its kinetic energy is that of a
+/// symmetric top, whose motion has a closed form, and a rest of one axis that is also exact by itself; of both in
+/// turns (Touma and Wisdom, "Lie-Poisson integrators for rigid body dynamics in the solar system", 1994). The angular
+/// momentum is kept exactly, and the energy does not drift.
+class SplitRotation {
+ public:
+  explicit SplitRotation(const RigidBody& body) : H_(body.angular_momentum) {
+    const Eigen::SelfAdjointEigenSolver<Mat3> solver(body.inertia);
+    Mat3 axes = solver.eigenvectors();
+    if (axes.determinant() < 0) axes.col(0) = -axes.col(0);
+    body_from_principal_ = Quat(axes).normalized();
+    inverse_ = solver.eigenvalues().cwiseInverse();
+    // The two axes that are most alike make the symmetric top.
+    const bool is_flat = inverse_[0] - inverse_[1] < inverse_[1] - inverse_[2];
+    own_ = is_flat ? 2 : 0;
+    kicked_ = is_flat ? 0 : 2;
+  }
+
+  /// Over a time h.
+  void advance(RigidBody& body, Real h) const {
+    const Real momentum = H_.norm(), kick = std::abs(inverse_[kicked_] - inverse_[1]) * momentum,
+               nutation = std::sqrt(kick * momentum * inverse_[0]);
+    const Real pieces = std::clamp(std::ceil(h * std::max(kick / kKick, nutation / kNutation)), 1.0, kMostKicks);
+    const Real before = energy(body.orientation);
+    Quat q = body.orientation * body_from_principal_;
+    for (Real i = 0; i < pieces; ++i) {
+      turn(q, kicked_, h / pieces / 2);
+      turn(q, own_, h / pieces);
+      q = (rotation(inverse_[1] * H_, h / pieces) * q).normalized();
+      turn(q, kicked_, h / pieces / 2);
+    }
+    q = (q * body_from_principal_.conjugate()).normalized();
+    // Where even this cannot follow, a turn about the angular momentum keeps the energy.
+    if (!(std::abs(energy(q) - before) <= kRotationEnergy * before))
+      q = (rotation(inverse_[1] * H_, h) * body.orientation).normalized();
+    body.orientation = q;
+  }
+
+ private:
+  /// What an axis has beyond the middle one.
+  void turn(Quat& q, int axis, Real h) const {
+    const Real along = (q.conjugate() * H_)[axis];
+    q = q * rotation(along * (inverse_[axis] - inverse_[1]) * Vec3::Unit(axis), h);
+  }
+  Real energy(const Quat& orientation) const {
+    const Vec3 local = (orientation * body_from_principal_).conjugate() * H_;
+    return local.cwiseAbs2().dot(inverse_) / 2;
+  }
+
+  Vec3 H_, inverse_;
+  Quat body_from_principal_;
+  int own_, kicked_;
+};
 
 }  // namespace
 
@@ -110,6 +175,10 @@ void FreeBody::jacobian(Real t, std::span<const Real> x, std::span<const Real> p
   add_block(d.own_rates(forces_, t), at, at, entries);
 }
 
+Real greatest_spin(const RigidBody& body) {
+  return body.angular_momentum.norm() * body.inverse_inertia.norm();
+}
+
 Quat rotation(const Vec3& w, Real h) {
   // With a = h |w| / 2: (cos a, sin a / a * h w / 2), both even series in a. A large angle is halved until
   // the series are short, and the result squared as often.
@@ -142,9 +211,9 @@ void fly(RigidBody& body, const BodyForces& forces, const Integrator& integrator
       body.orientation.coeffs() = (1.5 - 0.5 * turned.squaredNorm()) * turned.coeffs();
     } else {
       // No integrator of a fixed step follows what turns by much more than this in it.
-      const Real turn = body.angular_velocity().norm() * h;
-      const Real pieces = std::clamp(std::ceil(turn / kTurn), 1.0, kMostPieces);
-      for (Real i = 0; i < pieces; ++i)
+      const Real pieces = std::max(std::ceil(greatest_spin(body) * h / kTurn), 1.0);
+      if (!(pieces <= kMostPieces)) SplitRotation(body).advance(body, h);
+      for (Real i = 0; i < pieces && pieces <= kMostPieces; ++i)
         integrate(body, {Vec3::Zero(), {}}, integrator, t + i * h / pieces, h / pieces, work);
     }
   }

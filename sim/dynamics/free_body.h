@@ -51,6 +51,9 @@ class FreeBody final : public DynamicSystem {
   const BodyForces& forces_;
 };
 
+/// A bound on the spin that a body can come to have while it turns freely, by its angular momentum [rad/s].
+Real greatest_spin(const RigidBody& body);
+
 /// exp(h w / 2): the rotation by a constant angular velocity w over a time h, by a series that gives the same
 /// bits everywhere.
 Quat rotation(const Vec3& w, Real h);

@@ -172,7 +172,8 @@ void GrainContacts::add_surface(uint32_t i, const Obstacle& o, const Vec3& norma
   if (s.is_impact) {
     // The body gives way, but only later: the grain is left with the velocity that it then has.
     const Vec3 arm = g.at(time) - g.radius * normal - o.centre_at(time / step_->h);
-    const Real yielding = o.is_dynamic() ? g.mass * normal.dot(step_->impulses.mobility(o, arm) * normal) : 0;
+    const Real yielding =
+        o.is_dynamic() ? g.mass * normal.dot(step_->impulses.mobility(o, arm, -normal) * normal) : 0;
     target = speed * ((1 + std::max(g.restitution, o.restitution)) / (1 + yielding) - 1);
   }
   s.target = static_cast<float>(target);

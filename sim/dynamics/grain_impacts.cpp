@@ -141,7 +141,7 @@ void GrainImpacts::collide_with_obstacle(const Impact& impact) {
       u.dot(impact.normal) < 0
           ? collision_impulse(o, fraction, g.mass, u, impact.normal, std::max(g.restitution, o.restitution),
                               pair_friction(g.friction, o.friction),
-                              o.is_dynamic() ? step_->impulses.mobility(o, arm) : Mat3(Mat3::Zero()))
+                              o.is_dynamic() ? step_->impulses.mobility(o, arm, -impact.normal) : Mat3(Mat3::Zero()))
           : Vec3(Vec3::Zero());
   if (o.is_dynamic()) {
     step_->impulses.push(reaction(o, contact, fraction, impulse));

@@ -159,7 +159,7 @@ bool ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real fro
     const Vec3 arm = contact - o.centre_at(hit.fraction);
     u = v - impulses_->velocity(o, arm);
     approach = -u.dot(hit.normal);
-    mobility = impulses_->mobility(o, arm);
+    mobility = impulses_->mobility(o, arm, -hit.normal);
   }
   // A bounce lasts 2 e u / a. One that ends within the sub-step is the tail of an infinite series (E6, Zeno).
   if (2 * restitution * approach < gain) restitution = 0;

@@ -142,6 +142,27 @@ TEST(Render, InterruptedVideoNeverLooksWhole) {
   EXPECT_FALSE(fs::exists(folder / "film.mp4.frames"));
 }
 
+// What lived before the film does so in every part of it.
+TEST(Render, APrewarmedSceneIsTheSameInChunksFromACacheAndResumed) {
+  const TemporaryFolder folder;
+  const std::string scene = tiny_scene() + " -q --set emitters.fountain.prewarm=1.1 --set output.start=0.2 ";
+  const auto run = [&](const std::string& args) { EXPECT_EQ(offstage(args, folder.path()).code, 0) << args; };
+  run("render " + scene + "-o whole/");
+  const auto whole = frames(folder / "whole");
+  ASSERT_EQ(whole.size(), 12u);
+  run("simulate " + scene + "--cache cache");
+  for (const char* chunk : {"2/3", "1/3", "3/3"}) {
+    run("render " + scene + "-o chunks/ --chunk " + chunk);
+    run("render " + scene + "--cache cache -o cached/ --chunk " + chunk);
+  }
+  EXPECT_EQ(frames(folder / "chunks"), whole);
+  EXPECT_EQ(frames(folder / "cached"), whole);
+  for (const char* lost : {"0001.png", "0006.png", "0012.png"}) fs::remove(folder / "whole" / lost);
+  ASSERT_EQ(frames(folder / "whole").size(), 9u);
+  run("render " + scene + "-o whole/ --resume");
+  EXPECT_EQ(frames(folder / "whole"), whole);
+}
+
 /// `offstage render scene.json -o out/ --watch` in the background; it ends with the object.
 class WatchedRender {
  public:

@@ -16,6 +16,7 @@ struct RandomScene {
   struct Body {
     BodyDef def;
     std::optional<std::size_t> mesh;  ///< in place of the shape
+    Real reach = 0;                   ///< of a ball around its centre that it is in [m]
   };
   struct Joint {
     JointDef def;
@@ -59,8 +60,8 @@ struct Findings {
   Real energy_gain = 0;                                 ///< greatest rise above the least so far [J]
   Real energy_scale = 1;                                ///< what the scene's energies are about [J]
   Real gained_at = 0;                                   ///< when it was greatest [s]
-  Real penetration = 0;                                 ///< greatest of bodies [m]
-  Real allowed_penetration = 0;                         ///< [m]
+  Real penetration = 0;                                 ///< of bodies, where it exceeds what is allowed most [m]
+  Real allowed_penetration = 0;                         ///< then, see Overlap in random_scene.cpp [m]
   Real momentum_error = 0, angular_momentum_error = 0;  ///< of the greatest sizes of their parts
   uint64_t work = 0, allowed_work = 0;                  ///< greatest of a step, counted
   uint64_t rough = 0;                                   ///< fall-backs of contact solvers

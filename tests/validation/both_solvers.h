@@ -12,7 +12,7 @@
 namespace offstage::sim {
 
 inline std::string solver_name(const testing::TestParamInfo<SolverKind>& info) {
-  return info.param == SolverKind::exact ? "exact" : "fast";
+  return info.param == SolverKind::exact ? "exact" : info.param == SolverKind::fast ? "fast" : "auto";
 }
 
 class BothSolvers : public testing::TestWithParam<SolverKind> {
@@ -30,6 +30,11 @@ class BothSolvers : public testing::TestWithParam<SolverKind> {
 /// Instances of a suite for both solvers; `kind` is Solvers, or Long for what takes minutes.
 #define OFFSTAGE_BOTH_SOLVERS(kind, suite) \
   INSTANTIATE_TEST_SUITE_P(kind, suite, testing::Values(SolverKind::exact, SolverKind::fast), solver_name)
+
+/// The same, and for what chooses between them.
+#define OFFSTAGE_ALL_SOLVERS(kind, suite)                                                                     \
+  INSTANTIATE_TEST_SUITE_P(kind, suite,                                                                       \
+                           testing::Values(SolverKind::exact, SolverKind::fast, SolverKind::automatic), solver_name)
 
 /// What many steps reported: counts summed, the greatest of the rest.
 struct Tally {

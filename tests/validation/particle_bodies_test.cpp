@@ -63,6 +63,25 @@ TEST(ParticlesAndJoints, AParticleMeetsTheInertiaOfAHingedPlateAndTheMassOfARail
   }
 }
 
+// Its hinge can turn to one side alone: from there it is a wall, from the other side a plate on a hinge.
+TEST(ParticlesAndJoints, AJointAtItsLimitGivesWayToOneSideOnly) {
+  const Real inertia = kHitMass * ((1 + 0.04) / 12 + 0.25), reach = kHitArm + 0.5;
+  for (const bool internal : {false, true})
+    for (const bool opens : {false, true}) {
+      World world = weightless();
+      JointDef hinge{.type = JointType::revolute, .a = add_plate(world), .anchor = {-0.5, 0, 0}};
+      (opens ? hinge.upper : hinge.lower) = 0;  // a blow from above turns it clockwise
+      world.add_joint(hinge);
+      EXPECT_NEAR(rebound(world, internal), opens ? rebound_from(inertia / (reach * reach)) : kHitSpeed, 1e-9);
+
+      World railed = weightless();
+      JointDef rail{.type = JointType::prismatic, .a = add_plate(railed), .axis = Vec3::UnitY()};
+      (opens ? rail.upper : rail.lower) = 0;
+      railed.add_joint(rail);
+      EXPECT_NEAR(rebound(railed, internal), opens ? rebound_from(kHitMass) : kHitSpeed, 1e-9);
+    }
+}
+
 // The plate's far end hangs on a second plate by a hinge, which moves at once, too.
 TEST(ParticlesAndJoints, AnImpulseReachesEveryLinkAndTheJointsHold) {
   World world = weightless();

@@ -1,0 +1,44 @@
+#include "sim/contact/energy_guard.h"
+
+#include <algorithm>
+
+#include "sim/articulation/articulation.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Of the kinetic energy, what the velocity terms may add in a step.
+constexpr Real kAdded = 0.02;
+
+bool is_driven(const Island& island) {
+  const auto drives = [](const Body* body) { return body && body->is_kinematic() && body->def.track.moves(); };
+  return std::any_of(island.pairs.begin(), island.pairs.end(),
+                     [&](const ContactPair* p) {
+                       return drives(&p->a()) || drives(&p->b()) || p->surface().conveys;
+                     }) ||
+         std::any_of(island.articulations.begin(), island.articulations.end(), [&](const Articulation* a) {
+           return std::any_of(a->joints().begin(), a->joints().end(), [&](const Joint* j) {
+             return j->def.motor.mode != Motor::Mode::none || drives(j->a) || drives(j->b);
+           });
+         });
+}
+
+}  // namespace
+
+Real kept_share(const Island& island, std::span<const RelaxedBody> relaxed) {
+  Real kinetic = 0, first = 0, second = 0;  // of s times the impulses: kinetic + first s + second s^2
+  for (std::size_t i = 0; i < island.bodies.size(); ++i) {
+    const RigidBody& body = island.bodies[i]->rigid;
+    const RelaxedBody& r = relaxed[i];
+    const Vec3 v = body.velocity(), w = body.angular_velocity();
+    kinetic += (v.dot(body.momentum) + w.dot(body.angular_momentum)) / 2;
+    first += v.dot(r.impulse) + w.dot(r.angular_impulse);
+    second += (r.inverse_mass * r.impulse.squaredNorm() +
+               r.angular_impulse.dot(body.angular_velocity(body.orientation, r.angular_impulse))) /
+              2;
+  }
+  if (!(first + second > kAdded * kinetic) || is_driven(island)) return 1;
+  return first < 0 ? -first / second : 0;
+}
+
+}  // namespace offstage::sim

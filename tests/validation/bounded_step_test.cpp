@@ -1,0 +1,26 @@
+/// What a step may cost, counted in what the solvers do, on heaps that come down: see tests/bench for times.
+
+#include <gtest/gtest.h>
+
+#include "heap_scenes.h"
+
+namespace offstage::sim {
+namespace {
+
+// The exact solver's attempts are bounded by their counted work, and the impacts of a sub-step by theirs.
+TEST(BoundedStep, OfHeapsTakesFewTraceBacksAndFactorisations) {
+  for (const Heap heap : kHeaps) {
+    World world = heap_scene(heap);
+    for (int step = 0; step < 600; ++step) {
+      const StepReport r = world.step(1.0 / 240);
+      ASSERT_TRUE(r.finite) << name_of(heap);
+      ASSERT_LE(r.tracebacks, 60u) << name_of(heap) << ", step " << step;
+      ASSERT_LE(r.impacts.iterations, 6000u) << name_of(heap) << ", step " << step;
+      ASSERT_LE(r.exact.iterations, 2500u) << name_of(heap) << ", step " << step;
+      ASSERT_LE(r.exact.factorizations, 600u) << name_of(heap) << ", step " << step;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace offstage::sim
