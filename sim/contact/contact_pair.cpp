@@ -15,8 +15,7 @@ namespace {
 constexpr Real kSame = 5e-3;
 /// Of squared distances: points of the same features count as so much nearer.
 constexpr Real kSameFeature = 1.0 / 16;
-/// Cosine: a force that is not more inclined than this belongs to the normal. With a coefficient of friction
-/// of 1 it is 45 degrees away at most.
+/// Cosine: contacts whose normals are not more inclined to each other than this may follow one another.
 constexpr Real kAlong = 0.7;
 /// What overlaps at an interval's end by less than kForeseen, or than a point tells that has a normal as
 /// alike as this cosine and is so near, is expected [m].
@@ -484,11 +483,18 @@ void ContactPair::inherit(std::vector<Remembered>& points, const Pose& a) {
     Vec3 force = Vec3::Zero(), mean = Vec3::Zero(), moment = Vec3::Zero();
     Real pressure = 0;
     for (Remembered& p : points) {
-      const Real normal = p.last.dot(frame.n);
-      if (p.taken || !(normal > kAlong * p.last.norm())) continue;
+      // In the world the directions stay, however far a body that rolls has turned.
+      const Vec3 before = placed_at_.vector_to_world(p.normal);
+      if (p.taken || !(before.dot(m.frame.n) > kAlong)) continue;
+      const auto along_normal = [&](const Vec3& f) {
+        const Real normal = f.dot(p.normal);
+        return Vec3(normal * frame.n +
+                    a.vector_to_body(placed_at_.vector_to_world(Vec3(f - normal * p.normal))));
+      };
       p.taken = true;
-      force += p.last;
-      mean += p.mean;
+      force += along_normal(p.last);
+      mean += along_normal(p.mean);
+      const Real normal = p.last.dot(p.normal);
       moment += normal * p.on_a;
       pressure += normal;
     }
