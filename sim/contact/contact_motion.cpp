@@ -71,6 +71,10 @@ struct Start {
   Vec3 sliding;  // velocity of a's material there against b's
 };
 
+bool is_sphere(const Body& body) {
+  return std::holds_alternative<Sphere>(body.def.shape);
+}
+
 bool has_lines(NormalSource s) {
   return s == NormalSource::edges || s == NormalSource::edge_of_a || s == NormalSource::edge_of_b;
 }
@@ -190,6 +194,7 @@ Gain gain(const Start& s, const ContactMotion& motion, const ContactPlace& place
   Vec3 by_turning =
       components(motion.frame, wa.cross(place.arm_a - middle.arm_a) - wb.cross(place.arm_b - middle.arm_b));
   by_turning.x() += (place.normal - middle.normal).dot(velocity);
+  if (s.m.count == 1) return {by_turning, 0, 0};  // nothing is beside it
   const Vec3 spin = wa - wb;
   const Quat turn = place.turn * middle.turn.conjugate();
   const auto along = [&](const Vec3& tangent) {
@@ -206,6 +211,15 @@ void set_gain(const Start& s, const ContactPlace& start, const ContactPlace& end
   motion.gain_along_t = (last.along_t - first.along_t) / 2;
   motion.gain_along_k = (last.along_k - first.along_k) / 2;
   motion.turns = true;
+}
+
+/// Between two spheres, whose own turning moves no contact: in a heap of balls all contacts are such.
+ContactPlace between_spheres(const Start& s, Real time) {
+  const Vec3 between =
+      (s.m.radius_a + s.m.radius_b) * s.m.normal + time * (twist_of(s.a).velocity - twist_of(s.b).velocity);
+  const Vec3 n = between.normalized();
+  return {n, s.arm_a + s.m.radius_a * (s.m.normal - n), s.arm_b + s.m.radius_b * (n - s.m.normal),
+          Quat::Identity()};
 }
 
 /// An arm at a time, while its end goes with a body and slides by `sliding`.
@@ -302,6 +316,30 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
       motion.middle.arm_b += duration / 2 * start.sliding;
     else
       motion.middle.arm_a -= duration / 2 * start.sliding;
+    return motion;
+  }
+  if (m.source == NormalSource::points && is_sphere(a) && is_sphere(b)) {
+    const Vec3 way = duration * (twist_a.velocity - twist_b.velocity);
+    const Real distance = m.radius_a + m.radius_b, along = m.normal.dot(way), least = kStraight * distance;
+    if (way.squaredNorm() - along * along < least * least) return motion;
+    const ContactPlace end = between_spheres(start, duration);
+    if (!(end.normal.dot(m.normal) > kPredictable)) return motion;
+    motion.middle = between_spheres(start, duration / 2);
+    motion.frame = turned_frame(frame, motion.middle.normal);
+    set_gain(start, at_start, end, motion);
+    return motion;
+  }
+  const bool by_a = m.source == NormalSource::face_of_b;
+  if (is_face && is_sphere(by_a ? a : b) && turn2(by_a ? b : a) < kStraight * kStraight) {
+    // A ball on a face that does not turn: only its centre moves the contact.
+    const Vec3 way =
+        duration / 2 *
+        (start.sliding -
+         (by_a ? 1 : -1) * (by_a ? twist_a : twist_b).angular_velocity.cross(by_a ? arm_a : arm_b));
+    if (by_a)
+      motion.middle.arm_b += way;
+    else
+      motion.middle.arm_a -= way;
     return motion;
   }
   const Shape& carrier = (m.source == NormalSource::face_of_a ? b : a).def.shape;

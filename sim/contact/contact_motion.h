@@ -43,8 +43,8 @@ bool runs_along(const Body& body, Real duration);
 
 /// For a contact of a manifold whose frame is `frame`, at a place of the world at the interval's start;
 /// `duration` is that of the interval and `substep` that of the whole sub-step [s]: a body that turns by more
-/// than a radian in a sub-step tumbles, and is not followed. A normal that turns too fast to be predicted (sharp corners that
-/// pass each other) stays as it is, with the arms of the start.
+/// than a radian in a sub-step tumbles, and is not followed. A normal that turns too fast to be predicted
+/// (sharp corners that pass each other) stays as it is, with the arms of the start.
 ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, const ContactFrame& frame,
                              const Vec3& place, Real duration, Real substep);
 

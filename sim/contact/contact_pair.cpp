@@ -15,8 +15,7 @@ namespace {
 constexpr Real kSame = 5e-3;
 /// Of squared distances: points of the same features count as so much nearer.
 constexpr Real kSameFeature = 1.0 / 16;
-/// Cosine: a force that is not more inclined than this belongs to the normal. With a coefficient of friction
-/// of 1 it is 45 degrees away at most.
+/// Cosine: contacts whose normals are not more inclined to each other than this may follow one another.
 constexpr Real kAlong = 0.7;
 /// What overlaps at an interval's end by less than kForeseen, or than a point tells that has a normal as
 /// alike as this cosine and is so near, is expected [m].
@@ -52,12 +51,33 @@ Vec3 frame_vector(const ContactFrame& f, const Vec3& v) {
   return {f.n.dot(v), f.t.dot(v), f.k.dot(v)};
 }
 
+/// A pose for many vectors: the rotation is a matrix, which is made once.
+struct Frame {
+  explicit Frame(const Pose& pose) : position(pose.position), axes(pose.orientation.toRotationMatrix()) {}
+
+  Vec3 point_to_world(const Vec3& p) const { return axes * p + position; }
+  Vec3 point_to_body(const Vec3& p) const { return axes.transpose() * (p - position); }
+  Vec3 vector_to_world(const Vec3& v) const { return axes * v; }
+  Vec3 vector_to_body(const Vec3& v) const { return axes.transpose() * v; }
+
+  Vec3 position;
+  Mat3 axes;
+};
+
+/// Most normals come from faces, and then no line is named.
+void turn_lines(const Manifold& local, const Mat3& axes, Manifold& m) {
+  const bool of_a = local.source == NormalSource::edges || local.source == NormalSource::edge_of_a;
+  const bool of_b = local.source == NormalSource::edges || local.source == NormalSource::edge_of_b;
+  m.edge_a = of_a ? Vec3(axes * local.edge_a) : Vec3(Vec3::Zero());
+  m.edge_b = of_b ? Vec3(axes * local.edge_b) : Vec3(Vec3::Zero());
+}
+
 /// Copies no more than the points that there are.
-void place(const Manifold& local, const Pose& pose, Manifold& m) {
+void place(const Manifold& local, const Pose& from, Manifold& m) {
+  const Frame pose(from);
   m.normal = pose.vector_to_world(local.normal);
   m.source = local.source;
-  m.edge_a = pose.vector_to_world(local.edge_a);
-  m.edge_b = pose.vector_to_world(local.edge_b);
+  turn_lines(local, pose.axes, m);
   m.radius_a = local.radius_a;
   m.radius_b = local.radius_b;
   m.count = local.count;
@@ -383,10 +403,10 @@ void ContactPair::find_one_point(const Pose& a, const Pose& b, Real margin) {
 }
 
 /// What acted along the normal does so along the new one, however far the bodies have turned: they may roll.
-PointForce ContactPair::recalled(const Remembered& p, const ContactFrame& frame, const Pose& a) {
+PointForce ContactPair::recalled(const Remembered& p, const ContactFrame& frame, const Mat3& a_axes) {
   const auto force = [&](const Vec3& before) -> Vec3 {
     const Real normal = before.dot(p.normal);
-    const Vec3 tangential = a.vector_to_world(before - normal * p.normal);
+    const Vec3 tangential = a_axes * (before - normal * p.normal);
     return {normal, frame.t.dot(tangential), frame.k.dot(tangential)};
   };
   const Vec3 last = force(p.last);
@@ -400,24 +420,24 @@ void ContactPair::reuse(const Pose& a, const Pose& b, const std::vector<Remember
     const Pose to_a = between(placed_at_, Pose{});
     for (std::size_t i = 0; i < placed_.size(); ++i) place(placed_[i].manifold, to_a, found_[i]);
   }
+  const Frame frame_a(a), frame_b(b), from_b(a_from_b_);
   std::size_t next = 0;
   for (std::size_t i = 0; i < found_.size(); ++i) {
     const Manifold& local = found_[i];
     PlacedManifold& placed = placed_[i];
     Manifold& m = placed.manifold;
-    m.normal = a.vector_to_world(local.normal);
-    m.edge_a = a.vector_to_world(local.edge_a);
-    m.edge_b = a.vector_to_world(local.edge_b);
+    m.normal = frame_a.vector_to_world(local.normal);
+    turn_lines(local, frame_a.axes, m);
     set_frame(placed);
     for (uint32_t k = 0; k < local.count; ++k) {
-      const Vec3 on_a = a.point_to_world(local.points[k].on_a);
-      const Vec3 on_b = b.point_to_world(a_from_b_.point_to_body(local.points[k].on_b));
+      const Vec3 on_a = frame_a.point_to_world(local.points[k].on_a);
+      const Vec3 on_b = frame_b.point_to_world(from_b.point_to_body(local.points[k].on_b));
       m.points[k].separation = m.normal.dot(on_a - on_b);
       // Both on one line along the normal, halfway between what each body says.
       const Vec3 middle = (on_a + on_b) / 2;
       m.points[k].on_a = middle + m.points[k].separation / 2 * m.normal;
       m.points[k].on_b = middle - m.points[k].separation / 2 * m.normal;
-      placed.forces[k] = recalled(points[next++], placed.frame, a);
+      placed.forces[k] = recalled(points[next++], placed.frame, frame_a.axes);
     }
   }
   placed_at_ = a;
@@ -437,19 +457,23 @@ void ContactPair::set_frame(PlacedManifold& m) const {
 
 /// Forces turn with body a. (A frame's tangents can jump while its normal hardly moves.)
 void ContactPair::remember(std::vector<Remembered>& points) const {
-  for (const PlacedManifold& m : placed_)
+  if (placed_.empty()) return;
+  const Frame at(placed_at_);
+  for (const PlacedManifold& m : placed_) {
+    const Vec3 normal = at.vector_to_body(m.frame.n);
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const ContactPoint& p = m.manifold.points[k];
-      points.push_back({placed_at_.point_to_body(p.on_a),
-                        placed_at_.vector_to_body(world_vector(m.frame, m.forces[k].last)),
-                        placed_at_.vector_to_body(world_vector(m.frame, m.forces[k].mean)),
-                        placed_at_.vector_to_body(m.frame.n), m.torque, m.mean_torque, p.id, false});
+      points.push_back({at.point_to_body(p.on_a), at.vector_to_body(world_vector(m.frame, m.forces[k].last)),
+                        at.vector_to_body(world_vector(m.frame, m.forces[k].mean)), normal, m.torque,
+                        m.mean_torque, p.id, false});
     }
+  }
 }
 
 /// Points that were there before keep their forces: those of the same features, or else nearby. Each force
 /// goes to one point, or the forces of a pair that is found anew again and again would grow without end.
-void ContactPair::recall(std::vector<Remembered>& points, const Pose& a) {
+void ContactPair::recall(std::vector<Remembered>& points, const Pose& pose) {
+  const Frame a(pose);
   for (PlacedManifold& m : placed_) {
     m.torque = m.mean_torque = 0;
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
@@ -466,7 +490,7 @@ void ContactPair::recall(std::vector<Remembered>& points, const Pose& a) {
       }
       if (!best) continue;
       best->taken = true;
-      m.forces[k] = recalled(*best, m.frame, a);
+      m.forces[k] = recalled(*best, m.frame, a.axes);
       m.torque = best->torque;
       m.mean_torque = best->mean_torque;
     }
@@ -478,17 +502,25 @@ void ContactPair::recall(std::vector<Remembered>& points, const Pose& a) {
 /// manifold along whose normal it is, each point gets a share, so that the sum acts where it did, as far as
 /// the points reach.
 void ContactPair::inherit(std::vector<Remembered>& points, const Pose& a) {
+  if (std::all_of(points.begin(), points.end(), [](const Remembered& p) { return p.taken; })) return;
   for (PlacedManifold& m : placed_) {
     const ContactFrame frame{a.vector_to_body(m.frame.n), a.vector_to_body(m.frame.t),
                              a.vector_to_body(m.frame.k)};
     Vec3 force = Vec3::Zero(), mean = Vec3::Zero(), moment = Vec3::Zero();
     Real pressure = 0;
     for (Remembered& p : points) {
-      const Real normal = p.last.dot(frame.n);
-      if (p.taken || !(normal > kAlong * p.last.norm())) continue;
+      // In the world the directions stay, however far a body that rolls has turned.
+      const Vec3 before = placed_at_.vector_to_world(p.normal);
+      if (p.taken || !(before.dot(m.frame.n) > kAlong)) continue;
+      const auto along_normal = [&](const Vec3& f) {
+        const Real normal = f.dot(p.normal);
+        return Vec3(normal * frame.n +
+                    a.vector_to_body(placed_at_.vector_to_world(Vec3(f - normal * p.normal))));
+      };
       p.taken = true;
-      force += p.last;
-      mean += p.mean;
+      force += along_normal(p.last);
+      mean += along_normal(p.mean);
+      const Real normal = p.last.dot(p.normal);
       moment += normal * p.on_a;
       pressure += normal;
     }

@@ -118,7 +118,7 @@ class alignas(64) ContactPair {
     uint32_t id;
     bool taken = false;  ///< by points that are there now
   };
-  static PointForce recalled(const Remembered& p, const ContactFrame& frame, const Pose& a);
+  static PointForce recalled(const Remembered& p, const ContactFrame& frame, const Mat3& a_axes);
   void find_points(const Pose& a, const Pose& b, Real margin, Real reuse, bool turning);
   void find_one_point(const Pose& a, const Pose& b, Real margin);
   void remember(std::vector<Remembered>& points) const;

@@ -1,6 +1,7 @@
 #include "sim/contact/patch_batch.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <type_traits>
@@ -23,8 +24,11 @@ constexpr uint32_t kPatchRounds = 20;
 /// the share that it adds to the mean. Slow modes lose most if their frequencies are about the latter. A
 /// patch without a guess has no past: its means are the impulses.
 constexpr float kReturn = 0.03F, kRenewal = 0.01F;
-/// Friction up to this share of its limit, squared, holds.
-constexpr float kHolds = 0.96F;
+/// Friction up to this share of its limit, squared, holds; and from this share on it slides.
+constexpr float kHolds = 0.96F, kSlides = 0.999F;
+/// The friction of what slides grows by no more than this with what the normal impulses have become after it
+/// was found: it must not turn the sliding round.
+constexpr float kMostGrowth = 1.1F;
 
 using Vector = PatchBatch::Vector;
 using Symmetric = PatchBatch::Symmetric;
@@ -261,6 +265,7 @@ void set_patch(PatchBatch& p, unsigned lane, const ContactPatch& c, Real substep
     PatchBatch::Point& q = p.points[i];
     q.x[lane] = narrow(c.points[i].t);
     q.y[lane] = narrow(c.points[i].k);
+    q.radius[lane] = narrow(std::hypot(c.points[i].t, c.points[i].k));
     q.mass[lane] = 1;
     q.start[lane] = narrow(c.points[i].separation);
     q.impulse[lane] = narrow(substep * c.points[i].force);
@@ -293,6 +298,7 @@ Vector solve_friction(PatchBatch& p, Groups& u) {
                           : (lane_abs(next.x) <= limits.x) & (lane_abs(next.y) <= limits.y);
   const auto slides = ~(within & (lane_abs(next.z) <= limits.z));
   p.holds = size2 < kHolds * limits.x * limits.y ? float_lanes(1) : FloatLanes{};
+  p.pressure = slides ? pressure(p) : FloatLanes{};
   if (_mm256_movemask_ps(FloatLanes(slides)) != 0) {
     const Vector slide = sliding_impulse(p, u.friction, limits);
     next = {slides ? slide.x : next.x, slides ? slide.y : next.y, slides ? slide.z : next.z};
@@ -326,8 +332,9 @@ Vector solve_normal(PatchBatch& p, Groups& u, const Gaps& gaps) {
 }
 
 /// Takes the impulses a little back towards their means, which follow. No impulse changes by more than that
-/// share of itself, or of Coulomb's limit: the mean of a blow must not lift what it has stopped. Returns the
-/// change.
+/// share of itself, or of Coulomb's limit: the mean of a blow must not lift what it has stopped. The friction
+/// of what slides is brought to the limit of the normal impulses as they are now, so that the sums of both
+/// over the sub-steps keep to Coulomb's law however the load goes from point to point. Returns the change.
 Groups return_to_mean(PatchBatch& p) {
   Groups change{};
   const Vector limits = friction_limits(p);
@@ -342,9 +349,12 @@ Groups return_to_mean(PatchBatch& p) {
   // What slides has its friction from the law, which knows no mean.
   p.friction_mean = p.friction_impulse + p.holds * (p.friction_mean - p.friction_impulse);
   const Vector difference = p.friction_mean - p.friction_impulse;
+  const FloatLanes growth = lane_min(pressure(p) * lane_inverse(p.pressure), float_lanes(kMostGrowth));
+  const FloatLanes scale = p.pressure > FloatLanes{} ? growth - float_lanes(1) : FloatLanes{};
   change.friction =
-      float_lanes(kReturn) * Vector{lane_clamp(difference.x, limits.x), lane_clamp(difference.y, limits.y),
-                                    lane_clamp(difference.z, limits.z)};
+      scale * p.friction_impulse + float_lanes(kReturn) * Vector{lane_clamp(difference.x, limits.x),
+                                                                 lane_clamp(difference.y, limits.y),
+                                                                 lane_clamp(difference.z, limits.z)};
   p.friction_impulse = p.friction_impulse + change.friction;
   p.friction_mean = p.friction_mean - p.renewal * difference;
   return change;
@@ -381,9 +391,10 @@ Single solve_single_friction(PatchBatch& p, Single& u) {
                                       {p.friction_t * force, p.friction_k * force, FloatLanes{}});
   const FloatLanes t = next.x - p.friction_impulse.x, k = next.y - p.friction_impulse.y;
   p.friction_impulse = next;
-  p.holds = next.x * next.x + next.y * next.y < kHolds * p.friction_t * p.friction_k * force * force
-                ? float_lanes(1)
-                : FloatLanes{};
+  const FloatLanes size2 = next.x * next.x + next.y * next.y,
+                   limit2 = p.friction_t * p.friction_k * force * force;
+  p.holds = size2 < kHolds * limit2 ? float_lanes(1) : FloatLanes{};
+  p.pressure = size2 > kSlides * limit2 ? force : FloatLanes{};
   const Symmetric& K = p.friction_mobility;
   u = u + Single{p.coupling.x.x * t + p.coupling.y.x * k, K.xx * t + K.xy * k, K.xy * t + K.yy * k};
   return {FloatLanes{}, t, k};
@@ -431,6 +442,7 @@ Single solve_single_rolling(PatchBatch& p, Single& u, FloatLanes gap, bool& all)
   force += d.x;
   friction.x += d.y;
   friction.y += d.z;
+  p.pressure = zero;
   p.holds = holds & (t * t + k * k < kHolds * limit_t * limit_k) ? float_lanes(1) : zero;
   u = u + K * d;
   return d;

@@ -41,7 +41,7 @@ struct PatchBatch {
   using Index = ContactColoring::Batch;  ///< by lane
 
   struct Point {
-    Lanes x, y;           ///< along t and k [m]
+    Lanes x, y, radius;   ///< along t and k, and from the centre [m]
     Lanes mass;           ///< effective [kg], 0 in lanes that have no such point
     Lanes start;          ///< separation at the start of the step [m]
     Lanes impulse, mean;  ///< of a sub-step, and over the time before [N s]
@@ -68,6 +68,8 @@ struct PatchBatch {
   Lanes conveyed;        ///< of that, what surfaces add along n [m/s]
   Lanes friction_t, friction_k;
   Vector friction_impulse, friction_mean, friction_before, friction_shift;  ///< along t, k, about n, likewise
+  Lanes pressure;  ///< sum of the normal impulses that friction was found with, if the patch slides; else 0
+                   ///< [N s]
   Lanes holds;     ///< all ones where friction was well within its limit in the last sweep, else 0
   Lanes renewal;   ///< share of the difference that means follow their impulses by
   Lanes residual;  ///< by how much the last sweep changed the velocity of the centre [m/s]

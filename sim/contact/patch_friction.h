@@ -15,6 +15,13 @@ using PatchSymmetric = PatchBatch::Symmetric;
 /// Points that slide no faster than this count as sliding so fast [m/s].
 inline constexpr float kSlowestSliding = 1e-6F;
 
+/// Sum of a patch's normal impulses.
+inline FloatLanes pressure(const PatchBatch& p) {
+  FloatLanes sum{};
+  for (uint32_t i = 0; i < p.count; ++i) sum += p.points[i].impulse;
+  return sum;
+}
+
 /// Coulomb's limits of the impulses along t and k, and of the angular one about n: as if every point's
 /// friction were across its arm from the centre.
 inline PatchVector friction_limits(const PatchBatch& p) {
@@ -22,7 +29,7 @@ inline PatchVector friction_limits(const PatchBatch& p) {
   for (uint32_t i = 0; i < p.count; ++i) {
     const PatchBatch::Point& q = p.points[i];
     force += q.impulse;
-    moment += q.impulse * lane_sqrt(q.x * q.x + q.y * q.y);
+    moment += q.impulse * q.radius;
   }
   return {p.friction_t * force, p.friction_k * force, lane_min(p.friction_t, p.friction_k) * moment};
 }

@@ -32,8 +32,8 @@ constexpr uint32_t kRepeats = 12;
 /// below.
 constexpr Real kPress = 3e-4, kPassedOn = 1e-4;
 
-/// Of the step: velocities that change evenly bring a body so near to where it gets.
-constexpr Real kUneven = 0.25;
+/// A sub-step with more than this many times the mean change of velocity has an impact in it.
+constexpr Real kUneven = 2.5;
 
 /// Points that are no farther from the deepest along the normal are as deep [m].
 constexpr Real kAsDeep = 5e-5;
@@ -52,20 +52,18 @@ FloatLanes joined(const Vec3& linear, const Vec3& angular) {
 }
 
 /// Whether a body hit something: its velocity changed by more than steady forces would, which is twice what
-/// the free motion has, counted as kinetic energy; and not evenly, so that it got elsewhere than steady
-/// forces in `substeps` would have brought it. (The torque of the load turns a rolling coin's spin more than
-/// gravity.)
-bool jumps(const RelaxedBody& b, const BodyMotion& m, const RelaxationDef& def) {
+/// the free motion has, counted as kinetic energy; and not evenly, but most of it in few sub-steps. (The
+/// torque of the load turns a rolling coin's spin more than gravity.) `greatest`: by components, the greatest
+/// change of velocity in a sub-step.
+bool jumps(const RelaxedBody& b, const BodyMotion& m, FloatLanes greatest, const RelaxationDef& def) {
   const Real inertia = b.inverse_inertia.trace() > 0 ? 3 * b.inverse_mass / b.inverse_inertia.trace() : 0;
   const auto size2 = [inertia](const Vec3& linear, const Vec3& angular) {
     return linear.squaredNorm() + inertia * angular.squaredNorm();
   };
-  const Vec3 dv = linear_part(m.velocity), dw = angular_part(m.velocity);
-  const Real h = def.duration, change2 = size2(dv, dw);
+  const Real h = def.duration, change2 = size2(linear_part(m.velocity), angular_part(m.velocity));
   if (change2 <= 4 * h * h * size2(b.free_acceleration, b.free_angular_acceleration)) return false;
-  const Real even = h * (def.substeps + 1) / (2 * def.substeps);
-  return size2(linear_part(m.shift) - even * dv, angular_part(m.shift) - even * dw) >
-         kUneven * kUneven * h * h * change2;
+  const Real even = kUneven / def.substeps;
+  return size2(linear_part(greatest), angular_part(greatest)) > even * even * change2;
 }
 
 }  // namespace
@@ -221,7 +219,7 @@ void RelaxationSolver::run(const Range& range, uint32_t block) {
 
 void RelaxationSolver::start(uint32_t i) {
   const RelaxedBody& b = bodies_[i];
-  last_[i] = FloatLanes{};
+  last_[i] = greatest_[i] = FloatLanes{};
   motions_[i] = {joined(substep_ * b.free_acceleration, substep_ * b.free_angular_acceleration),
                  FloatLanes{}};
 }
@@ -231,8 +229,10 @@ void RelaxationSolver::start(uint32_t i) {
 void RelaxationSolver::extrapolate(uint32_t i) {
   FloatLanes& v = motions_[i].velocity;
   const FloatLanes now = v;
-  v += now - last_[i];
+  const FloatLanes change = now - last_[i];
+  v += change;
   last_[i] = now;
+  greatest_[i] = lane_max(greatest_[i], lane_abs(change));
 }
 
 void RelaxationSolver::solve(uint32_t i, const Range& range) {
@@ -278,7 +278,8 @@ void RelaxationSolver::finish(uint32_t i) {
   const BodyMotion& m = motions_[i];
   const Real h = def_.duration;
   const Vec3 dv = linear_part(m.velocity), dw = angular_part(m.velocity);
-  late_[i] = jumps(b, m, def_) ? 0 : substep_ / 2;
+  const FloatLanes greatest = lane_max(greatest_[i], lane_abs(m.velocity - last_[i]));
+  late_[i] = jumps(b, m, greatest, def_) ? 0 : substep_ / 2;
   b.impulse = b.angular_impulse = b.displacement = b.rotation_vector = Vec3::Zero();
   if (!has_joints()) {  // report() adds what contacts do
     b.velocity += h * b.free_acceleration;
@@ -350,6 +351,7 @@ void RelaxationSolver::set_up() {
   motions_.resize(bodies_.size() + 1);
   motions_.back() = {};
   last_.resize(bodies_.size());
+  greatest_.resize(bodies_.size());
   late_.resize(bodies_.size());
 }
 

@@ -164,10 +164,11 @@ class RelaxationSolver {
   std::vector<ContactColoring::Link> links_;
   ContactColoring coloring_;
   std::vector<PatchBatch> batches_;
-  std::vector<BodyMotion> motions_;  // one more than bodies: of unused lanes
-  std::vector<FloatLanes> last_;     // velocities of the sub-step before
-  std::vector<Real> late_;           // by body: see finish() [s]
-  std::vector<SubstepTime> times_;   // and one of what would follow the last
+  std::vector<BodyMotion> motions_;   // one more than bodies: of unused lanes
+  std::vector<FloatLanes> last_;      // velocities of the sub-step before
+  std::vector<FloatLanes> greatest_;  // by components, the greatest change of velocity in a sub-step
+  std::vector<Real> late_;            // by body: see finish() [s]
+  std::vector<SubstepTime> times_;    // and one of what would follow the last
   std::vector<Range> ranges_;
   // Sweeps are numbered from 1; those that strike a body leave their number with it.
   uint32_t sweeps_ = 0;
