@@ -171,6 +171,10 @@ Session::Json Session::state() {
   Json json = document();
   json["file"] = document_.file().string();
   json["writer"] = tabs_.writer();
+  {
+    const std::lock_guard events(events_mutex_);
+    json["film_state"] = latest_film_;
+  }
   json["cache"] = {{"bytes", engine_->bytes()}, {"most", engine_->most_bytes()}};
   return json;
 }
@@ -357,6 +361,10 @@ Reply Session::sweep(const nlohmann::json& request) {
 // --- From the engine and the disk ---
 
 void Session::on_event(const EngineEvent& event) {
+  if (const auto* film = std::get_if<FilmEvent>(&event)) {
+    const std::lock_guard lock(events_mutex_);
+    latest_film_ = event_json(*film);
+  }
   std::visit([this](const auto& e) { tabs_.post(kind_of(e), dump(event_json(e))); }, event);
 }
 

@@ -92,6 +92,8 @@ class Session {
   std::set<std::string> muted_;
   Json pinned_;
   std::optional<std::string> theirs_;  // the file has changed outside, to this
+  mutable std::mutex events_mutex_;
+  Json latest_film_;  // how far it is, for tabs that come later
   std::unique_ptr<Engine> engine_;
   std::atomic<bool> closing_ = false;
   std::thread watcher_;  // last

@@ -1,7 +1,7 @@
 // Brings the page up, and what belongs to no part of it alone: the bar and the keyboard.
 
 import {byId, el} from './dom.js';
-import {store, on, emit, get, listen, takeDocument, undo, redo, isWriter, tellView, frameCount} from './store.js';
+import {store, on, emit, get, listen, takeDocument, takeFilm, undo, redo, isWriter, tellView, frameCount} from './store.js';
 import {setSchema} from './schema.js';
 import {present, seek, setPlaying, fit} from './viewer.js';
 import './scrub.js';
@@ -89,11 +89,13 @@ async function start() {
   store.file = state.file;
   store.writer = state.writer;
   takeDocument(state);
+  takeFilm(state.film_state);
   let greeted = false;
   on('connected', async () => {
     const now = await get('api/state');
     store.writer = now.writer;
     takeDocument(now);
+    takeFilm(now.film_state);
     emit('writer');
     if (!greeted) offerDraft();
     greeted = true;

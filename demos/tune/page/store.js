@@ -154,6 +154,13 @@ export function tellView() {
   view({frame: store.frame, playing: store.playing});
 }
 
+/** How far the film is. */
+export function takeFilm(state) {
+  if (!state || state.film !== store.doc?.film) return;
+  Object.assign(store.film, state);
+  emit('film', state);
+}
+
 /** The long connection: what happens on the server. */
 export function listen(port) {
   const stream = new EventSource(`http://${location.hostname}:${port}${store.base}stream?tab=${store.tab}`);
@@ -161,11 +168,7 @@ export function listen(port) {
     document: takeDocument,
     frame: f => { if (f.run >= (store.doc?.run ?? 0) && f.film === store.doc?.film) emit('frame', f); },
     other_frame: f => emit('other-frame', f),
-    film: f => {
-      if (f.film !== store.doc?.film) return;
-      Object.assign(store.film, f);
-      emit('film', f);
-    },
+    film: takeFilm,
     cell: c => emit('cell', c),
     writer: w => { store.writer = w.writer; emit('writer'); },
     note: n => toast(n.text, {label: 'Undo', run: undo}),
