@@ -30,6 +30,7 @@ SCENE = '''// A small fountain, with comments that must stay.
   ],
   "emitters": [
     {"name": "jet", "rate": 4.0e2, "speed": {"mean": 4, "deviation": 0.5}, "radius": 0.03,
+     "overlap": true, "surface": {"type": "disc", "position": [0, 0.1, 1.2], "radius": 0.05},
      "look": {"color": "#4080ff"}}
   ],
   "camera": {"type": "static", "eye": [0, 1.5, 5], "target": [0, 0.8, 0]},
@@ -182,7 +183,7 @@ class Editing(Case):
         wait(lambda: page.all('[data-preset="fountain"]'))
         page.click('[data-preset="fountain"]')
         wait(lambda: page.js('return tuneStore.value.effects?.[0]?.preset') == 'fountain')
-        page.js('[...document.querySelectorAll("#controls details")].find(d => d.textContent.includes("Jet")).open = true')
+        wait(lambda: page.js('const d = [...document.querySelectorAll("#controls details")].find(d => d.textContent.includes("Jet")); if (d) d.open = true; return !!d'))
         wait(lambda: page.all('[data-path="/effects/0/overrides/jet/rate"]'))
         page.type_value('rate', 'rate', 500)
         self.assertIn('"overrides": {"jet": {"rate": 500}}', page.text())
