@@ -106,6 +106,7 @@ on('document', () => {
 });
 byId('camera-reset').addEventListener('click', () => tellServer({camera: null}));
 byId('camera-write').addEventListener('click', async () => {
+  if (!store.doc.camera) return;
   const now = store.value.camera ?? {}, keep = ['fov_deg', 'focal_mm', 'aperture', 'focus', 'focus_on'];
   const camera = {type: 'static', eye: tidy(store.doc.camera.eye), target: tidy(store.doc.camera.target), ...Object.fromEntries(keep.filter(k => k in now).map(k => [k, now[k]]))};
   if (await edit([{set: '/camera', value: toText(camera)}], 'camera', ['/camera'])) { tellServer({camera: null}); toast('The scene has this camera now.'); }
@@ -130,7 +131,7 @@ function shareAt(event) {
 /** The selected object whose mark is under the pointer. */
 function grabbed(event) {
   const [x, y] = shareAt(event), box = canvas.getBoundingClientRect();
-  return store.selection.find(path => {
+  return view.camera && store.selection.find(path => {
     const place = placeOf(path), at = place?.free && project(worldPlace(path), view.camera);
     return at && Math.hypot((at[0] - x) * box.width, (at[1] - y) * box.height) < 14;
   });
@@ -142,6 +143,7 @@ stage.addEventListener('pointerdown', event => {
   stage.focus({preventScroll: true});
   stage.setPointerCapture(event.pointerId);
   const camera = {...view.camera}, start = [event.clientX, event.clientY], held = event.button === 0 && isWriter() ? grabbed(event) : null;
+  if (!camera.eye) return;
   const mover = held ? objectMover(held, camera) : null;
   let moved = false;
   const move = e => {
