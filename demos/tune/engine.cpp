@@ -164,7 +164,7 @@ void Engine::work_with(const Workshop& workshop) {
 
 bool Engine::step(const Workshop& workshop) {
   if (take_orders(workshop)) return true;
-  return answer_picks() || advance_film() || refine_frame() || advance_sweep(workshop) ||
+  return answer_picks() || advance_sweep(workshop) || refine_frame() || advance_film() ||
          advance_pinned(workshop);
 }
 
@@ -285,7 +285,7 @@ bool Engine::refine_frame() {
     playing = playing_;
     changed = changed_;
   }
-  if (playing || !film_->has_state(frame)) return false;
+  if (playing || !film_->has_state(frame) || !film_->has_draft(frame)) return false;
   for (const auto& [detail, quiet] : {std::pair(Detail::preview, kQuiet), std::pair(Detail::final, kVeryQuiet)}) {
     if (frames_.has(film_->def().film, frame, detail)) continue;
     if (Clock::now() - changed < quiet) return false;

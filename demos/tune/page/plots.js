@@ -74,7 +74,7 @@ function drawFacts() {
   if (!doc?.scene) return;
   const now = store.figures[store.frame - 1], film = store.film, last = film.statistics?.state_hash;
   const hash = (text, title) => el('code', {class: 'hash', title: `${title}: ${text}. Click to copy`, onclick: () => navigator.clipboard.writeText(text).then(() => toast('Copied.'))}, text.slice(0, 12));
-  const progress = film.phase === 'complete' || last ? 'Film complete' : film.phase === 'failed' ? 'Stopped' : film.phase === 'loading' ? film.message || 'Loading' : film.simulated ? `Simulated ${film.simulated} of ${frameCount()}` : `Before the film: ${Math.round((film.lead_in ?? 0) * 100)} %`;
+  const progress = film.phase === 'complete' || last ? 'Film complete' : film.phase === 'failed' ? 'Stopped' : film.phase === 'loading' ? film.message || 'Loading' : Math.max(film.simulated, store.figures.length) ? `Simulated ${Math.max(film.simulated, store.figures.length)} of ${frameCount()}` : `Before the film: ${Math.round((film.lead_in ?? 0) * 100)} %`;
   const facts = el('div', {class: 'facts-line'}, el('span', {class: 'fact', id: 'progress'}, progress),
     now ? el('span', {class: 'fact'}, 'State ', hash(now.state, `state of frame ${store.frame}`)) : null,
     last ? el('span', {class: 'fact', id: 'final-state', 'data-hash': last}, 'Final state ', hash(last, 'state after the last frame, as `offstage simulate` prints it')) : null,
