@@ -70,7 +70,8 @@ bool Document::change(std::string text, std::string label, std::vector<std::stri
                       const std::string& group) {
   if (text == this->text()) return false;
   history_.resize(now_ + 1);
-  Version version{++ids_, std::move(label), std::move(paths), std::chrono::system_clock::now(), std::move(text)};
+  Version version{++ids_, std::move(label), std::move(paths), std::chrono::system_clock::now(),
+                  std::move(text)};
   const bool same_step = !group.empty() && group == group_ && now_ > 0;
   group_ = group;
   if (same_step) {

@@ -1,5 +1,6 @@
 #pragma once
-/// The text of a scene while it is tuned: the file it came from, undo and redo, and the versions of the sitting.
+/// The text of a scene while it is tuned: the file it came from, undo and redo, and the versions of the
+/// sitting.
 
 #include <chrono>
 #include <cstdint>
@@ -14,8 +15,8 @@ namespace offstage::tune {
 /// A state of the text that was on show.
 struct Version {
   uint64_t id = 0;
-  std::string label;                          ///< what was done: "rate", "pasted text"
-  std::vector<std::string> paths;             ///< of the values that were changed
+  std::string label;               ///< what was done: "rate", "pasted text"
+  std::vector<std::string> paths;  ///< of the values that were changed
   std::chrono::system_clock::time_point time;
   std::string text;
 };
@@ -37,8 +38,8 @@ class Document {
   /// What the file held when it was last read or written.
   const std::string& saved() const { return saved_; }
 
-  /// Makes a new version. Several changes of one `group` (a drag, a burst of typing) are one undo step; an empty
-  /// group is a step of its own. False if the text is what it was.
+  /// Makes a new version. Several changes of one `group` (a drag, a burst of typing) are one undo step; an
+  /// empty group is a step of its own. False if the text is what it was.
   bool change(std::string text, std::string label, std::vector<std::string> paths, const std::string& group);
   bool undo();
   bool redo();
@@ -48,14 +49,14 @@ class Document {
   std::string undo_label() const { return can_undo() ? history_[now_].label : ""; }
   std::string redo_label() const { return can_redo() ? history_[now_ + 1].label : ""; }
 
-  /// Versions of this sitting, oldest first, also those that an undo left behind; the oldest go when they take
-  /// too much memory.
+  /// Versions of this sitting, oldest first, also those that an undo left behind; the oldest go when they
+  /// take too much memory.
   const std::deque<Version>& versions() const { return versions_; }
   /// Null if there is none of that number.
   const Version* find(uint64_t id) const;
 
-  /// Writes the text to the file in one step. Throws FileConflict, and writes nothing, if the file is not what it
-  /// was when it was last read; FileError if it cannot be written.
+  /// Writes the text to the file in one step. Throws FileConflict, and writes nothing, if the file is not
+  /// what it was when it was last read; FileError if it cannot be written.
   void save();
   /// What the file holds now, if that is not what it held when it was last read.
   std::optional<std::string> changed_outside() const;

@@ -218,8 +218,8 @@ std::shared_ptr<const ModelLibrary> Engine::models_for(const FilmDef& def) {
   const auto on_step = [&](const std::string& step) {
     if (!step.empty()) report_film(FilmEvent::Phase::loading, step);
   };
-  models_ = std::make_shared<const ModelLibrary>(def.loaded->scene, def.loaded->folder, settings_.decompositions,
-                                                 warnings, on_step);
+  models_ = std::make_shared<const ModelLibrary>(def.loaded->scene, def.loaded->folder,
+                                                 settings_.decompositions, warnings, on_step);
   models_key_ = key;
   return models_;
 }
@@ -265,7 +265,8 @@ bool Engine::advance_film() {
   if (film_->simulated_to() > 0) {
     const std::lock_guard lock(mutex_);
     figures_ = film_->physics().figures;
-  } else if (Clock::now() - lead_in_shown_ > kGlimpse && film_->lead_in() < 1 && film_->first_missing() == 1) {
+  } else if (Clock::now() - lead_in_shown_ > kGlimpse && film_->lead_in() < 1 &&
+             film_->first_missing() == 1) {
     film_->draw_lead_in();
     report_frame(0, Detail::draft);
     report_film(FilmEvent::Phase::lead_in);
@@ -286,7 +287,8 @@ bool Engine::refine_frame() {
     changed = changed_;
   }
   if (playing || !film_->has_state(frame) || !film_->has_draft(frame)) return false;
-  for (const auto& [detail, quiet] : {std::pair(Detail::preview, kQuiet), std::pair(Detail::final, kVeryQuiet)}) {
+  for (const auto& [detail, quiet] :
+       {std::pair(Detail::preview, kQuiet), std::pair(Detail::final, kVeryQuiet)}) {
     if (frames_.has(film_->def().film, frame, detail)) continue;
     if (Clock::now() - changed < quiet) return false;
     if (film_->refine(frame, detail, [this] { return is_stale(); })) report_frame(frame, detail);
@@ -362,8 +364,13 @@ bool Engine::advance_sweep(const Workshop& workshop) {
 void Engine::report_frame(int frame, Detail detail) {
   const auto picture = frames_.get(film_->def().film, frame, detail);
   if (!picture) return;
-  FrameEvent event{.run = run_, .film = film_->def().film, .frame = frame, .detail = detail,
-                   .draw_ms = picture->draw_ms, .figures = {}, .camera = picture->camera};
+  FrameEvent event{.run = run_,
+                   .film = film_->def().film,
+                   .frame = frame,
+                   .detail = detail,
+                   .draw_ms = picture->draw_ms,
+                   .figures = {},
+                   .camera = picture->camera};
   event.time = frame > 0 ? film_->scene().output.time_of(frame) : film_->lead_in_time();
   const auto& figures = film_->physics().figures;
   if (frame > 0 && static_cast<std::size_t>(frame) <= figures.size())

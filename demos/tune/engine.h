@@ -1,7 +1,7 @@
 #pragma once
-/// Scene in, frames and figures out. One thread simulates and draws; what is asked of it meanwhile takes effect
-/// within one frame. The latest version of the scene is all that counts: an older run ends where it is, and what
-/// it made stays in memory of a stated size.
+/// Scene in, frames and figures out. One thread simulates and draws; what is asked of it meanwhile takes
+/// effect within one frame. The latest version of the scene is all that counts: an older run ends where it
+/// is, and what it made stays in memory of a stated size.
 
 #include <atomic>
 #include <condition_variable>

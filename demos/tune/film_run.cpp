@@ -175,7 +175,8 @@ bool FilmRun::refine(int frame, Detail detail, const Stop& stop) {
     refined_->picture.emplace(refined_->scene, *models_, workshop_.context);
     if (stop()) return false;
   }
-  refined_->scene.render.quality = detail == Detail::final ? producer::Quality::final : producer::Quality::preview;
+  refined_->scene.render.quality =
+      detail == Detail::final ? producer::Quality::final : producer::Quality::preview;
   const auto start = Clock::now();
   const render::Image image = refined_->picture->draw(previous(frame), state(frame), stop);
   if (image.rgba.empty()) return false;

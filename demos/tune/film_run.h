@@ -1,6 +1,6 @@
 #pragma once
-/// One version of a scene on its way to a film: simulated frame by frame, drawn small, and single frames drawn
-/// well. Everything happens on the calling thread, which owns the GL context, in pieces of one frame.
+/// One version of a scene on its way to a film: simulated frame by frame, drawn small, and single frames
+/// drawn well. Everything happens on the calling thread, which owns the GL context, in pieces of one frame.
 
 #include <functional>
 #include <memory>
@@ -72,8 +72,8 @@ class FilmRun {
   void draw_lead_in();
   /// Draws a frame whose state is there at full size; false if `stop` said so on the way.
   bool refine(int frame, Detail detail, const Stop& stop);
-  /// What is seen at a place of a frame, by name, or empty. The place is a share of width and height, from the top
-  /// left corner. The state must be there.
+  /// What is seen at a place of a frame, by name, or empty. The place is a share of width and height, from
+  /// the top left corner. The state must be there.
   std::string pick(int frame, double x, double y);
   /// A small picture for a sheet; the state must be there.
   render::Image small_picture(int frame) { return draft_picture().draw(previous(frame), state(frame)); }
@@ -112,6 +112,5 @@ class FilmRun {
   int advances_ = 0;
   int missing_hint_ = 1;
 };
-
 
 }  // namespace offstage::tune

@@ -26,8 +26,8 @@ struct StoredFrame {
   render::Camera camera;  ///< that it was seen by
 };
 
-/// Pictures by film and frame; a better one replaces a draft's place when it is asked for, and the draft stays
-/// for playing. Any thread may call.
+/// Pictures by film and frame; a better one replaces a draft's place when it is asked for, and the draft
+/// stays for playing. Any thread may call.
 class FrameStore {
  public:
   explicit FrameStore(std::size_t most_bytes) : most_bytes_(most_bytes) {}

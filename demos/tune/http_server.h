@@ -2,9 +2,9 @@
 /// The page and its sitting over HTTP, on this machine alone.
 ///
 /// One server has the page, the pictures and the changes; two more have the streams of the tabs, four each,
-/// because browsers keep at most six connections to one of them. Every address begins with a random token. The
-/// Host of every request and the Origin of those that have one must be ours, so that no other page in the same
-/// browser can read or change anything, even by a name that it makes lead here.
+/// because browsers keep at most six connections to one of them. Every address begins with a random token.
+/// The Host of every request and the Origin of those that have one must be ours, so that no other page in the
+/// same browser can read or change anything, even by a name that it makes lead here.
 
 #include <memory>
 #include <string>

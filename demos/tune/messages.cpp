@@ -14,11 +14,16 @@ const char* name_of(Detail detail) {
 
 const char* name_of(FilmEvent::Phase phase) {
   switch (phase) {
-    case FilmEvent::Phase::loading: return "loading";
-    case FilmEvent::Phase::lead_in: return "lead_in";
-    case FilmEvent::Phase::running: return "running";
-    case FilmEvent::Phase::complete: return "complete";
-    case FilmEvent::Phase::failed: break;
+    case FilmEvent::Phase::loading:
+      return "loading";
+    case FilmEvent::Phase::lead_in:
+      return "lead_in";
+    case FilmEvent::Phase::running:
+      return "running";
+    case FilmEvent::Phase::complete:
+      return "complete";
+    case FilmEvent::Phase::failed:
+      break;
   }
   return "failed";
 }
@@ -39,7 +44,8 @@ Eigen::Vector3d vector_of(const nlohmann::json& json) {
 
 Json version_json(const Version& version, const std::map<uint64_t, std::string>& films) {
   const auto film = films.find(version.id);
-  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(version.time.time_since_epoch()).count();
+  const auto ms =
+      std::chrono::duration_cast<std::chrono::milliseconds>(version.time.time_since_epoch()).count();
   return {{"id", version.id},
           {"label", version.label},
           {"paths", version.paths},
@@ -51,26 +57,32 @@ Json problems_json(const std::vector<Problem>& problems, const std::string& file
   Json list = Json::array();
   for (const Problem& problem : problems) {
     const bool here = problem.where.file.empty() || problem.where.file == file;
-    list.push_back({{"line", here ? problem.where.line : 0},
-                    {"column", here ? problem.where.column : 0},
-                    {"path", problem.where.path},
-                    {"what", here ? problem.what : fmt::format("{}:{}: {}", problem.where.file, problem.where.line, problem.what)}});
+    list.push_back(
+        {{"line", here ? problem.where.line : 0},
+         {"column", here ? problem.where.column : 0},
+         {"path", problem.where.path},
+         {"what", here ? problem.what
+                       : fmt::format("{}:{}: {}", problem.where.file, problem.where.line, problem.what)}});
   }
   return list;
 }
 
 Json figures_json(const producer::FrameFigures& figures) {
-  Json json = {{"frame", figures.frame},   {"time", figures.time},         {"sim_ms", figures.sim_ms},
-               {"particles", figures.particles}, {"contacts", figures.contacts}, {"state", figures.state_hash}};
+  Json json = {{"frame", figures.frame},       {"time", figures.time},
+               {"sim_ms", figures.sim_ms},     {"particles", figures.particles},
+               {"contacts", figures.contacts}, {"state", figures.state_hash}};
   if (figures.energy)
     json["energy"] = {figures.energy->kinetic, figures.energy->potential, figures.energy->elastic};
   return json;
 }
 
 Json event_json(const FrameEvent& event) {
-  Json json = {{"run", event.run},   {"film", event.film},
-               {"frame", event.frame}, {"time", event.time},
-               {"detail", name_of(event.detail)}, {"draw_ms", event.draw_ms}};
+  Json json = {{"run", event.run},
+               {"film", event.film},
+               {"frame", event.frame},
+               {"time", event.time},
+               {"detail", name_of(event.detail)},
+               {"draw_ms", event.draw_ms}};
   if (event.figures) json["figures"] = figures_json(*event.figures);
   json["camera"] = {{"eye", vector_json(event.camera.eye.cast<double>())},
                     {"target", vector_json(event.camera.target.cast<double>())},
@@ -87,7 +99,8 @@ Json event_json(const FilmEvent& event) {
 }
 
 Json event_json(const CellEvent& event) {
-  return {{"sweep", event.sweep}, {"index", event.index}, {"fault", event.fault}, {"particles", event.particles}};
+  return {
+      {"sweep", event.sweep}, {"index", event.index}, {"fault", event.fault}, {"particles", event.particles}};
 }
 
 std::string kind_of(const FrameEvent& event) {
@@ -107,7 +120,8 @@ std::string with_muted(const std::string& path, const std::vector<std::string>& 
   if (slash == std::string::npos) return path;
   const std::size_t end = std::min(path.find('/', slash + 1), path.size());
   const std::string list = path.substr(0, slash + 1), step = path.substr(slash + 1, end - slash - 1);
-  if (step.empty() || step.size() > 8 || step.find_first_not_of("0123456789") != std::string::npos) return path;
+  if (step.empty() || step.size() > 8 || step.find_first_not_of("0123456789") != std::string::npos)
+    return path;
   std::size_t index = std::stoul(step);
   std::vector<std::size_t> gone;
   for (const std::string& item : muted)

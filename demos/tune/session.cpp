@@ -27,7 +27,8 @@ std::optional<std::size_t> item_of(const producer::List& list, const std::string
     const std::string* text = name ? name->as<std::string>() : nullptr;
     if (text && *text == step) return i;
   }
-  const bool digits = !step.empty() && step.find_first_not_of("0123456789") == std::string::npos && step.size() < 9;
+  const bool digits =
+      !step.empty() && step.find_first_not_of("0123456789") == std::string::npos && step.size() < 9;
   if (digits && std::stoul(step) < list.size()) return std::stoul(step);
   return {};
 }
@@ -52,7 +53,8 @@ std::vector<std::string> strings_in(const nlohmann::json& request, const char* k
 
 /// One change of the text by its paths.
 std::string changed_by(const std::string& text, const nlohmann::json& op) {
-  if (op.contains("set")) return set_value(text, op.at("set").get<std::string>(), op.at("value").get<std::string>());
+  if (op.contains("set"))
+    return set_value(text, op.at("set").get<std::string>(), op.at("value").get<std::string>());
   if (op.contains("remove")) return remove_value(text, op.at("remove").get<std::string>());
   return rename_key(text, op.at("rename").get<std::string>(), op.at("to").get<std::string>());
 }
@@ -60,7 +62,8 @@ std::string changed_by(const std::string& text, const nlohmann::json& op) {
 }  // namespace
 
 Session::Session(const std::string& file, EngineSettings settings) : document_(file) {
-  engine_ = std::make_unique<Engine>(std::move(settings), [this](const EngineEvent& event) { on_event(event); });
+  engine_ =
+      std::make_unique<Engine>(std::move(settings), [this](const EngineEvent& event) { on_event(event); });
   const std::lock_guard lock(mutex_);
   show();
   watcher_ = std::thread([this] { watch_files(); });
@@ -101,8 +104,8 @@ Session::Parsed Session::parse(const std::string& text, bool with_view) const {
     if (with_view) muted = muted_paths(text);
     if (with_view && !overlays_.empty()) overrides.push_back(overlays_override(text, overlays_));
     const std::string seen = muted.empty() ? text : blank_out(text, muted);
-    parsed.loaded = std::make_shared<const producer::LoadedScene>(producer::parse_scene(
-        seen, document_.file().string(), document_.file().parent_path(), overrides));
+    parsed.loaded = std::make_shared<const producer::LoadedScene>(
+        producer::parse_scene(seen, document_.file().string(), document_.file().parent_path(), overrides));
   } catch (const SceneError& error) {
     parsed.errors = error.problems();
   } catch (const std::exception& error) {
@@ -136,7 +139,8 @@ Session::Json Session::document() const {
   json["warnings"] = problems_json(warnings_, document_.file().string());
   json["run"] = run_.number;
   json["film"] = run_.film;
-  json["camera"] = camera_ ? Json{{"eye", vector_json(camera_->eye)}, {"target", vector_json(camera_->target)}} : Json();
+  json["camera"] =
+      camera_ ? Json{{"eye", vector_json(camera_->eye)}, {"target", vector_json(camera_->target)}} : Json();
   json["overlays"] = overlays_;
   json["muted"] = muted_;
   json["pinned"] = pinned_;
@@ -202,12 +206,11 @@ Session::Json Session::version_text(uint64_t id) {
 
 Reply Session::post(const std::string& what, const nlohmann::json& request, const std::string& tab) {
   static const std::map<std::string, Handler> handlers = {
-      {"edit", &Session::edit},       {"text", &Session::text}, {"undo", &Session::undo},
-      {"redo", &Session::redo},       {"view", &Session::view}, {"restore", &Session::restore},
-      {"pin", &Session::pin},         {"pick", &Session::pick}, {"save", &Session::save},
-      {"reload", &Session::reload},   {"keep", &Session::keep}, {"sweep", &Session::sweep}};
-  if (what == "write")
-    return tabs_.take_over(tab) ? Reply{} : refused(409, "this tab has no stream");
+      {"edit", &Session::edit},     {"text", &Session::text}, {"undo", &Session::undo},
+      {"redo", &Session::redo},     {"view", &Session::view}, {"restore", &Session::restore},
+      {"pin", &Session::pin},       {"pick", &Session::pick}, {"save", &Session::save},
+      {"reload", &Session::reload}, {"keep", &Session::keep}, {"sweep", &Session::sweep}};
+  if (what == "write") return tabs_.take_over(tab) ? Reply{} : refused(409, "this tab has no stream");
   const auto handler = handlers.find(what);
   if (handler == handlers.end()) return refused(404, "there is no " + what);
   if (what != "pick" && tabs_.writer() != tab)
@@ -265,7 +268,8 @@ Reply Session::restore(const nlohmann::json& request) {
 Reply Session::view(const nlohmann::json& request) {
   const std::lock_guard lock(mutex_);
   bool changed = false;
-  if (request.contains("frame")) engine_->look_at(request["frame"].get<int>(), request.value("playing", false));
+  if (request.contains("frame"))
+    engine_->look_at(request["frame"].get<int>(), request.value("playing", false));
   if (request.contains("camera")) {
     std::optional<ViewCamera> camera;
     if (!request["camera"].is_null())
@@ -308,8 +312,8 @@ Reply Session::pin(const nlohmann::json& request) {
 }
 
 Reply Session::pick(const nlohmann::json& request) {
-  std::future<std::string> name =
-      engine_->pick(request.at("frame").get<int>(), request.at("x").get<double>(), request.at("y").get<double>());
+  std::future<std::string> name = engine_->pick(request.at("frame").get<int>(), request.at("x").get<double>(),
+                                                request.at("y").get<double>());
   constexpr std::chrono::seconds kLongest{10};
   if (name.wait_for(kLongest) != std::future_status::ready) return refused(503, "the frame is not ready");
   return {200, {{"name", name.get()}}};

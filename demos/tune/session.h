@@ -1,6 +1,6 @@
 #pragma once
-/// A sitting: one scene file, its text, the engine that shows it, and the tabs that look on. Speaks JSON, knows
-/// nothing of HTTP.
+/// A sitting: one scene file, its text, the engine that shows it, and the tabs that look on. Speaks JSON,
+/// knows nothing of HTTP.
 
 #include <atomic>
 #include <map>
@@ -42,7 +42,8 @@ class Session {
   Json versions();
   /// The text of a version; null if it is forgotten.
   Json version_text(uint64_t id);
-  /// A change: `what` is the last part of the address, such as "edit". Only the writing tab may change the scene.
+  /// A change: `what` is the last part of the address, such as "edit". Only the writing tab may change the
+  /// scene.
   Reply post(const std::string& what, const nlohmann::json& request, const std::string& tab);
 
   Tabs& tabs() { return tabs_; }

@@ -35,7 +35,8 @@ void Tabs::close_all() {
 void Tabs::choose_writer() {
   if (tabs_.contains(writer_)) return;
   const std::string before = writer_;
-  const auto first = std::ranges::min_element(tabs_, {}, [](const auto& entry) { return entry.second.since; });
+  const auto first =
+      std::ranges::min_element(tabs_, {}, [](const auto& entry) { return entry.second.since; });
   writer_ = first == tabs_.end() ? "" : first->first;
   if (writer_ == before) return;
   for (auto& [name, tab] : tabs_) put(tab, "writer", "{\"writer\":\"" + writer_ + "\"}");

@@ -1,6 +1,6 @@
 #pragma once
-/// The browser tabs that watch a sitting. Each has one stream and a mailbox that holds the latest message of each
-/// kind: a slow tab misses what was replaced and never makes anything wait or grow.
+/// The browser tabs that watch a sitting. Each has one stream and a mailbox that holds the latest message of
+/// each kind: a slow tab misses what was replaced and never makes anything wait or grow.
 
 #include <chrono>
 #include <condition_variable>
@@ -23,8 +23,8 @@ class Tabs {
     std::string json;
   };
 
-  /// Opens the stream of a tab and returns its ticket; an earlier stream of the same tab ends. Nothing if there
-  /// are kMostTabs others. The first tab is the writer.
+  /// Opens the stream of a tab and returns its ticket; an earlier stream of the same tab ends. Nothing if
+  /// there are kMostTabs others. The first tab is the writer.
   std::optional<uint64_t> open(const std::string& tab);
   /// Ends a stream, if it is still that of the tab. The writer's role goes to the tab that is open longest.
   void close(const std::string& tab, uint64_t ticket);

@@ -178,7 +178,8 @@ std::optional<std::size_t> rest_of_line(std::string_view text, std::size_t at) {
     }
     if (text.substr(at, 2) != "/*") return {};
     const std::size_t end = text.find("*/", at);
-    if (end == std::string_view::npos || text.substr(at, end - at).find('\n') != std::string_view::npos) return {};
+    if (end == std::string_view::npos || text.substr(at, end - at).find('\n') != std::string_view::npos)
+      return {};
     at = end + 2;
   }
   return at;
@@ -267,7 +268,8 @@ std::string set_value(std::string_view text, std::string_view path, std::string_
     std::string result(text);
     return result.replace(way.end->value.begin, way.end->value.end - way.end->value.begin, value);
   }
-  for (std::size_t i = steps.size(); i > way.taken + 1; --i)  // what the missing objects hold, from the inside
+  for (std::size_t i = steps.size(); i > way.taken + 1;
+       --i)  // what the missing objects hold, from the inside
     value = steps[i - 1] == "0" ? "[" + value + "]" : "{" + quoted(steps[i - 1]) + ": " + value + "}";
   const std::string& step = steps[way.taken];
   if (way.end->list && index_of_step(step) == way.end->parts.size()) return append_to(text, *way.end, value);
@@ -295,7 +297,8 @@ std::string rename_key(std::string_view text, std::string_view path, const std::
   if (way.end->key != key && child_of(*way.parent, key))
     throw std::invalid_argument("there is a key \"" + key + "\" already");
   std::string result(text);
-  return result.replace(way.end->key_range.begin, way.end->key_range.end - way.end->key_range.begin, quoted(key));
+  return result.replace(way.end->key_range.begin, way.end->key_range.end - way.end->key_range.begin,
+                        quoted(key));
 }
 
 std::string blank_out(std::string_view text, const std::vector<std::string>& paths) {
@@ -309,7 +312,8 @@ std::string blank_out(std::string_view text, const std::vector<std::string>& pat
   for (const std::string& path : paths) {
     const std::vector<std::string> steps = steps_of(path);
     const Way way = follow(root, steps);
-    if (way.taken == steps.size() && way.parent && way.parent->list) items.emplace_back(way.parent, way.index);
+    if (way.taken == steps.size() && way.parent && way.parent->list)
+      items.emplace_back(way.parent, way.index);
   }
   for (const auto& [list, index] : items) blank(list->parts[index].value);
   // Of the commas of a list, those stay that stand between two items that stay.
@@ -317,7 +321,9 @@ std::string blank_out(std::string_view text, const std::vector<std::string>& pat
   for (const auto& item : items)
     if (std::ranges::find(lists, item.first) == lists.end()) lists.push_back(item.first);
   for (const Part* list : lists) {
-    const auto stays = [&](std::size_t i) { return std::ranges::find(items, std::pair(list, i)) == items.end(); };
+    const auto stays = [&](std::size_t i) {
+      return std::ranges::find(items, std::pair(list, i)) == items.end();
+    };
     std::size_t left = 0;
     for (std::size_t i = 0; i < list->parts.size(); ++i) left += stays(i);
     for (std::size_t i = 0; i < list->parts.size(); ++i) {

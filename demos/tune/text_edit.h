@@ -25,16 +25,16 @@ std::string set_value(std::string_view text, std::string_view path, std::string_
 /// same line goes as well. Nothing happens if there is no such value. Throws SceneError if `text` is no JSON.
 std::string remove_value(std::string_view text, std::string_view path);
 
-/// Replaces the key at a path. Throws SceneError if `text` is no JSON, and std::invalid_argument if there is no
-/// such key, or the object has the new one already.
+/// Replaces the key at a path. Throws SceneError if `text` is no JSON, and std::invalid_argument if there is
+/// no such key, or the object has the new one already.
 std::string rename_key(std::string_view text, std::string_view path, const std::string& key);
 
 /// Overwrites items of lists with blanks, each with one comma, so that everything else keeps its line and
 /// column. Paths that lead nowhere are ignored. `text` must be valid JSON with comments.
 std::string blank_out(std::string_view text, const std::vector<std::string>& paths);
 
-/// Where the value at a path stands. Throws SceneError if `text` is no JSON, and std::invalid_argument if there
-/// is no such value.
+/// Where the value at a path stands. Throws SceneError if `text` is no JSON, and std::invalid_argument if
+/// there is no such value.
 ByteRange range_of(std::string_view text, std::string_view path);
 
 }  // namespace offstage::tune

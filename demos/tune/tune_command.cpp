@@ -37,8 +37,8 @@ void open_browser(const std::string& address) {
 
 Eigen::Vector2i size_of(const std::string& text) {
   int width = 0, height = 0, end = 0;
-  if (std::sscanf(text.c_str(), "%dx%d%n", &width, &height, &end) != 2 || text[static_cast<std::size_t>(end)] ||
-      width < 64 || height < 64 || width > 1920 || height > 1920)
+  if (std::sscanf(text.c_str(), "%dx%d%n", &width, &height, &end) != 2 ||
+      text[static_cast<std::size_t>(end)] || width < 64 || height < 64 || width > 1920 || height > 1920)
     throw std::invalid_argument("--size must be WIDTHxHEIGHT from 64x64 to 1920x1920, got " + text);
   return {width, height};
 }

@@ -17,9 +17,11 @@ using producer::parse_json;
 using producer::to_text;
 
 TEST(TextEdit, ReplacesTheBytesOfAValueAlone) {
-  const std::string text = "{\r\n  \"a\" : 1.50, // one\r\n  /* two */ \"b\":[1e3,  2 ,{\"c\": \"x // no comment\"}]\r\n}\r\n";
-  EXPECT_EQ(set_value(text, "/a", "0.1"),
-            "{\r\n  \"a\" : 0.1, // one\r\n  /* two */ \"b\":[1e3,  2 ,{\"c\": \"x // no comment\"}]\r\n}\r\n");
+  const std::string text =
+      "{\r\n  \"a\" : 1.50, // one\r\n  /* two */ \"b\":[1e3,  2 ,{\"c\": \"x // no comment\"}]\r\n}\r\n";
+  EXPECT_EQ(
+      set_value(text, "/a", "0.1"),
+      "{\r\n  \"a\" : 0.1, // one\r\n  /* two */ \"b\":[1e3,  2 ,{\"c\": \"x // no comment\"}]\r\n}\r\n");
   EXPECT_EQ(set_value(text, "/b/2/c", "\"y\""),
             "{\r\n  \"a\" : 1.50, // one\r\n  /* two */ \"b\":[1e3,  2 ,{\"c\": \"y\"}]\r\n}\r\n");
 }
@@ -28,7 +30,8 @@ TEST(TextEdit, AddsAKeyInTheMannerOfTheObject) {
   EXPECT_EQ(set_value("{}", "/a", "1"), "{\"a\": 1}");
   EXPECT_EQ(set_value("{\"a\":1,\"b\":2}", "/c", "3"), "{\"a\":1,\"b\":2,\"c\":3}");
   EXPECT_EQ(set_value("{\"a\": 1}", "/b", "2"), "{\"a\": 1, \"b\": 2}");
-  EXPECT_EQ(set_value("{\n\t\"a\": 1  // the first\n}", "/b", "2"), "{\n\t\"a\": 1,  // the first\n\t\"b\": 2\n}");
+  EXPECT_EQ(set_value("{\n\t\"a\": 1  // the first\n}", "/b", "2"),
+            "{\n\t\"a\": 1,  // the first\n\t\"b\": 2\n}");
   EXPECT_EQ(set_value("{\r\n  \"a\": 1\r\n}", "/b/c", "2"), "{\r\n  \"a\": 1,\r\n  \"b\": {\"c\": 2}\r\n}");
   EXPECT_EQ(set_value("{\"a\": [1, 2]}", "/a/2", "3"), "{\"a\": [1, 2, 3]}");
   EXPECT_EQ(set_value("{\"a\": 1}", "/list/0", "{}"), "{\"a\": 1, \"list\": [{}]}");
@@ -38,7 +41,8 @@ TEST(TextEdit, RemovesOneCommaWithAValue) {
   EXPECT_EQ(remove_value("{\"a\": 1, \"b\": 2, \"c\": 3}", "/b"), "{\"a\": 1, \"c\": 3}");
   EXPECT_EQ(remove_value("{\"a\": 1, \"b\": 2}", "/b"), "{\"a\": 1}");
   EXPECT_EQ(remove_value("{\"a\": 1}", "/a"), "{}");
-  EXPECT_EQ(remove_value("{\n  \"a\": 1,  // gone with it\n  // stays\n  \"b\": 2\n}", "/a"), "{\n  // stays\n  \"b\": 2\n}");
+  EXPECT_EQ(remove_value("{\n  \"a\": 1,  // gone with it\n  // stays\n  \"b\": 2\n}", "/a"),
+            "{\n  // stays\n  \"b\": 2\n}");
   EXPECT_EQ(remove_value("[\n  1,\n  2\n]", "/1"), "[\n  1\n]");
   EXPECT_EQ(remove_value("{\"a\": 1}", "/none"), "{\"a\": 1}");
 }
@@ -69,9 +73,11 @@ class Writer {
   static void collect(const Node& node, const std::string& path, std::vector<std::string>& paths) {
     if (!path.empty()) paths.push_back(path);
     if (const List* list = node.as<List>())
-      for (std::size_t i = 0; i < list->size(); ++i) collect((*list)[i], path + "/" + std::to_string(i), paths);
+      for (std::size_t i = 0; i < list->size(); ++i)
+        collect((*list)[i], path + "/" + std::to_string(i), paths);
     if (const Object* object = node.as<Object>())
-      for (const auto& member : *object) collect(member.value, path + producer::pointer_step(member.key), paths);
+      for (const auto& member : *object)
+        collect(member.value, path + producer::pointer_step(member.key), paths);
   }
   std::size_t below(std::size_t n) { return random_() % n; }
 
@@ -81,7 +87,8 @@ class Writer {
     return kGaps[below(std::size(kGaps))];
   }
   std::string value(int depth) {
-    static const char* const kPlain[] = {"1", "-2.50e-3", "true", "null", "\"a, \\\"b\\\" // c\"", "0.1", "1E5"};
+    static const char* const kPlain[] = {"1",   "-2.50e-3", "true", "null", "\"a, \\\"b\\\" // c\"",
+                                         "0.1", "1E5"};
     const std::size_t kind = depth == 0 ? 0 : depth > 3 ? 2 : below(4);
     if (kind > 1) return kPlain[below(std::size(kPlain))];
     const std::size_t size = below(4) + (depth == 0);
@@ -89,7 +96,8 @@ class Writer {
     for (std::size_t i = 0; i < size; ++i) {
       if (i > 0) text += ",";
       text += gap();
-      if (kind == 0) text += "\"k" + std::to_string(i) + (below(5) == 0 ? "/~" : "") + "\"" + gap() + ":" + gap();
+      if (kind == 0)
+        text += "\"k" + std::to_string(i) + (below(5) == 0 ? "/~" : "") + "\"" + gap() + ":" + gap();
       text += value(depth + 1) + gap();
     }
     return text + (kind == 0 ? "}" : "]");
