@@ -3,11 +3,12 @@
 #include <malloc.h>
 
 #include "producer/command_line.h"
+#include "tune/tune_command.h"
 
 int main(int argc, char** argv) {
   // Each frame makes pictures of the same sizes: memory that goes back to the system in between costs a
   // twentieth of a draft, as each page is cleared again.
   mallopt(M_MMAP_THRESHOLD, 32 << 20);
   mallopt(M_TRIM_THRESHOLD, 256 << 20);
-  return offstage::producer::run(argc, argv);
+  return offstage::producer::run(argc, argv, offstage::tune::tune_command);
 }

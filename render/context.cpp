@@ -135,7 +135,9 @@ Context::Context() : impl_(std::make_unique<Impl>()) {
   check(info);
 }
 
-Context::~Context() = default;
+Context::~Context() {
+  gl::delete_shared_programs();
+}
 
 const ContextInfo& Context::info() const {
   return impl_->info;

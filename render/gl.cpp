@@ -1,6 +1,8 @@
 #include "render/gl.h"
 
 #include <algorithm>
+#include <map>
+#include <string>
 
 #include "render/error.h"
 
@@ -122,6 +124,28 @@ Program make_program(std::span<const std::string_view> vertex, std::span<const s
                            " does not link: " + info_log(program, glGetProgramiv, glGetProgramInfoLog));
   }
   return program;
+}
+
+namespace {
+
+thread_local std::map<std::string, Program> shared_programs;  // a thread has one context
+
+}  // namespace
+
+GLuint shared_program(std::span<const std::string_view> vertex, std::span<const std::string_view> fragment,
+                      std::span<const std::string> defines) {
+  std::string key;
+  for (const std::string_view file : vertex) key.append(file).append(" ");
+  key += "| ";
+  for (const std::string_view file : fragment) key.append(file).append(" ");
+  for (const std::string& define : defines) key += "| " + define;
+  const auto known = shared_programs.find(key);
+  if (known != shared_programs.end()) return known->second;
+  return shared_programs.emplace(key, make_program(vertex, fragment, defines)).first->second;
+}
+
+void delete_shared_programs() {
+  shared_programs.clear();
 }
 
 void check_error(const char* where) {

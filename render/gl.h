@@ -103,6 +103,13 @@ void set_attribute(GLuint vertex_array, GLuint attribute, GLuint binding, int co
 Program make_program(std::span<const std::string_view> vertex, std::span<const std::string_view> fragment,
                      std::span<const std::string> defines = {});
 
+/// The same, built once for the context of this thread and shared by all stages: what the driver makes of a
+/// program takes longer than a frame. Whoever uses it sets all of its uniforms before each draw.
+GLuint shared_program(std::span<const std::string_view> vertex, std::span<const std::string_view> fragment,
+                      std::span<const std::string> defines = {});
+/// Deletes the shared programs; the context, which is about to end, must be current.
+void delete_shared_programs();
+
 /// A program that is built when first used: start-up pays only for what a scene draws.
 class LazyProgram {
  public:
@@ -111,14 +118,14 @@ class LazyProgram {
       : vertex_(std::move(vertex)), fragment_(std::move(fragment)), defines_(std::move(defines)) {}
   /// Makes it current.
   void use() {
-    if (program_ == 0) program_ = make_program(vertex_, fragment_, defines_);
+    if (program_ == 0) program_ = shared_program(vertex_, fragment_, defines_);
     glUseProgram(program_);
   }
 
  private:
   std::vector<std::string_view> vertex_, fragment_;
   std::vector<std::string> defines_;
-  Program program_;
+  GLuint program_ = 0;
 };
 
 /// Throws UnavailableError if GL has an error pending; `where` is part of the message.

@@ -171,6 +171,21 @@ CLI::App* add_new(CLI::App& app, NewOptions& options) {
   return command;
 }
 
+CLI::App* add_tune(CLI::App& app, TuneOptions& tune) {
+  CLI::App* command = app.add_subcommand(
+      "tune", "Change a scene in the browser and see the film at once; prints the address of the page");
+  command->add_option("scene", tune.scene.file, "Scene file")->required();
+  command->add_option("--port", tune.port, "Port on this machine (default: any that is free)")
+      ->check(CLI::Range(1, 65535));
+  command->add_option("--size", tune.size, "Size WxH that drafts fit into")->capture_default_str();
+  command->add_flag("!--no-open", tune.open, "Only print the address and open no browser");
+  command->add_flag("--no-cache", tune.scene.no_cache,
+                    "Cut models into convex parts each time instead of keeping them in ~/.cache/offstage");
+  add_threads(*command, tune.threads);
+  add_gl(*command, tune.gl);
+  return command;
+}
+
 CLI::App* add_encode(CLI::App& app, EncodeOptions& encode) {
   CLI::App* command = app.add_subcommand("encode", "Make a video of PNG frames that are there already");
   command->add_option("frames", encode.frames, "Pattern such as 'frames/####.png', or a folder")->required();
@@ -366,14 +381,14 @@ int reported(const std::function<int()>& command) {
   }
 }
 
-int dispatch(int argc, char** argv);
+int dispatch(int argc, char** argv, const TuneCommand& tune);
 
 }  // namespace
 
-int run(int argc, char** argv) {
+int run(int argc, char** argv, const TuneCommand& tune) {
   open_standard_streams();
   install_signal_handlers();
-  return flushed(dispatch(argc, argv));
+  return flushed(dispatch(argc, argv, tune));
 }
 
 namespace {
@@ -408,10 +423,10 @@ std::string wrong_command(const std::vector<const char*>& arguments,
 }
 
 constexpr std::array kCommandNames = {"render", "frame",   "sheet",    "sweep",  "simulate",
-                                      "new",    "encode",  "validate", "schema", "presets",
+                                      "new",    "tune",     "encode",  "validate", "schema", "presets",
                                       "info",   "compare", "bless",    "doctor", "man", "completion"};
 
-int dispatch(int argc, char** argv) {
+int dispatch(int argc, char** argv, const TuneCommand& tune) {
   std::vector<const char*> arguments(argv, argv + argc);
   const std::vector<std::string> commands(kCommandNames.begin(), kCommandNames.end());
   const bool bare = lacks_command(arguments, commands);
@@ -430,6 +445,8 @@ int dispatch(int argc, char** argv) {
   auto* render_app = add_render(app, render, bare);
   NewOptions create;
   auto* new_app = add_new(app, create);
+  TuneOptions tuning;
+  auto* tune_app = add_tune(app, tuning);
   EncodeOptions encode;
   auto* encode_app = add_encode(app, encode);
 
@@ -486,6 +503,7 @@ int dispatch(int argc, char** argv) {
           render, [](const RenderOptions& once) { return reported([&] { return render_command(once); }); });
     if (*render_app) return render_command(render);
     if (*new_app) return new_command(create);
+    if (*tune_app) return tune(tuning);
     if (*encode_app) return encode_command(encode);
     if (*frame_app) return frame_command(frame);
     if (*sheet_app) return sheet_command(sheet);

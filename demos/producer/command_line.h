@@ -1,7 +1,9 @@
 #pragma once
-/// The command line: offstage new | render | encode | frame | sheet | sweep | simulate | validate | schema |
-/// presets | info | compare | bless | doctor | man | completion; and offstage SCENE.json, which renders
+/// The command line: offstage new | tune | render | encode | frame | sheet | sweep | simulate | validate |
+/// schema | presets | info | compare | bless | doctor | man | completion; and offstage SCENE.json, which renders
 /// SCENE.mp4.
+
+#include "producer/commands.h"
 
 namespace offstage::producer {
 
@@ -17,6 +19,6 @@ enum ExitCode {
 };
 
 /// Parses, runs, reports; returns the exit code. Results go to standard output, talk to standard error.
-int run(int argc, char** argv);
+int run(int argc, char** argv, const TuneCommand& tune);
 
 }  // namespace offstage::producer

@@ -159,6 +159,17 @@ struct BlessOptions {
 };
 int bless_command(const BlessOptions& options);
 
+struct TuneOptions {
+  SceneOptions scene;
+  int port = 0;                 ///< 0: any that is free
+  std::string size = "640x360";  ///< of drafts
+  bool open = true;             ///< the page in a browser
+  int threads = 0;
+  render::GlPlatform gl = render::GlPlatform::automatic;
+};
+/// The tuning page, which is a library of its own above this one: see tune/tune_command.h.
+using TuneCommand = std::function<int(const TuneOptions&)>;
+
 /// As asked for, or every processor that may be used.
 int threads_or_all(int threads);
 /// Limits the simulation to so many threads while it lives.

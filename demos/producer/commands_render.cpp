@@ -16,6 +16,7 @@
 #include "producer/interrupt.h"
 #include "producer/output.h"
 #include "producer/production.h"
+#include "producer/run_notes.h"
 #include "producer/run_progress.h"
 #include "producer/run_report.h"
 #include "producer/talk.h"
@@ -29,44 +30,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Names the body that was concerned most often.
-void report_rough_contacts(const SimulationTotals& t) {
-  if (t.rough_bodies.empty()) return;
-  const auto& [name, count] =
-      *std::ranges::max_element(t.rough_bodies, {}, [](const auto& entry) { return entry.second; });
-  const std::size_t others = t.rough_bodies.size() - 1;
-  say("warning: body '{}'{}: contact forces are approximate {} times, first at {:.2f} s, because the solver "
-      "found "
-      "no exact ones; the body may sink in, slide or tremble there. Reduce world.step (now {:g} s), or make "
-      "thin "
-      "shapes thicker\n",
-      name, others > 0 ? fmt::format(" (and {} more)", others) : "", count, t.first_rough_s, t.step_s);
-}
-
 void report_run(const RunStats& stats, const TalkOptions& talk, const std::string& stats_file) {
   if (!stats_file.empty()) write_text_file(stats_file, to_json(stats));
   if (talk.quiet) return;
   if (!stats.blank_frames.empty())
     say("warning: frame {} is blank: all of its pixels are equal{}\n", stats.blank_frames.front(),
         stats.blank_frames.size() > 1 ? fmt::format(" (and {} more)", stats.blank_frames.size() - 1) : "");
-  const SimulationTotals& t = stats.totals;
-  for (const std::string& body : t.lost_bodies)
-    say("warning: the body '{}' left the world (world.bounds) and stays where it left\n", body);
-  for (const std::string& joint : t.broken_joints) say("note: the joint '{}' broke\n", joint);
-  if (t.joints_unsolved)
-    say("warning: joints could not be put back together {} times; use a smaller world.step\n",
-        t.joints_unsolved);
-  if (t.retired) say("note: {} particles left the world (world.bounds)\n", t.retired);
-  if (t.skipped) say("warning: {} particles were not released: max_alive was reached\n", t.skipped);
-  if (t.waiting) say("note: {} particles had to wait for room on their emitter\n", t.waiting);
-  if (t.removed) say("warning: {} particles were inside a body and had to be removed\n", t.removed);
-  if (t.truncated) say("note: {} particles hit more often in one step than is followed\n", t.truncated);
-  report_rough_contacts(t);
-  if (t.cut_short)
-    say("warning: {} times a pair of bodies reached the limit of collisions per sub-step; it stopped "
-        "bouncing "
-        "until the next. Reduce world.step (now {:g} s)\n",
-        t.cut_short, t.step_s);
+  for (const std::string& note : notes_of(stats.totals)) say("{}\n", note);
   if (!talk.verbose) return;
   for (const auto& [name, times] : {std::pair("simulate", &stats.sim), std::pair("draw", &stats.render),
                                     std::pair("encode", &stats.encode)}) {

@@ -329,11 +329,13 @@ render::Channels Picture::channels(const Snapshot& previous, const Snapshot& cur
   return stage_.channels(to_float(frame_time));
 }
 
-render::Image Picture::draw(const Snapshot& previous, const Snapshot& current) {
+render::Image Picture::draw(const Snapshot& previous, const Snapshot& current,
+                            const std::function<bool()>& stop) {
   const int n = subframes(scene_.render.quality);
   const double frame_time = scene_.output.fps.seconds(1);
   std::ranges::fill(sum_.rgba, 0.f);
   for (int i = 0; i < n; ++i) {
+    if (i > 0 && stop && stop()) return {};
     // Sub-frames sit in the middle of equal parts of the time the shutter is open, which ends with the frame.
     const float open =
         to_float(scene_.render.shutter) * (1 - (static_cast<float>(i) + 0.5f) / static_cast<float>(n));

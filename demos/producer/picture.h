@@ -3,6 +3,7 @@
 /// two states of a pair it interpolates (slerp for bodies, cubic for particles and cloths), so that
 /// sub-frames at different times give motion blur.
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -29,8 +30,11 @@ class Picture {
   Picture(const Scene& scene, const ModelLibrary& models, render::Context& context);
 
   /// The frame at `current`; the shutter is open during the end of the interval from `previous`, the frame
-  /// before it (or the same snapshot for the first frame, which has no motion blur).
-  render::Image draw(const Snapshot& previous, const Snapshot& current);
+  /// before it (or the same snapshot for the first frame, which has no motion blur). The camera is that of the
+  /// scene as it is now. If `stop` says so between two sub-frames, the image has no pixels.
+  render::Image draw(const Snapshot& previous, const Snapshot& current, const std::function<bool()>& stop = {});
+  /// The camera of the latest picture.
+  const render::Camera& camera() const { return latest_camera_; }
 
   /// Depth, normals, ids and motion at `current`; motion since `previous`, both as for `draw`.
   render::Channels channels(const Snapshot& previous, const Snapshot& current);
@@ -93,6 +97,7 @@ class Picture {
   std::map<std::vector<float>, render::MeshHandle> primitives_;  // by kind and sizes
   BodyPlaces places_;
   CameraRig camera_;
+  render::Camera latest_camera_;
   std::vector<DrawnBody> bodies_;
   std::vector<render::InstanceHandle> rods_;  // null where invisible
   std::vector<render::PointsHandle> points_;

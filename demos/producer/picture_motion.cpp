@@ -184,7 +184,8 @@ void Picture::place(const Snapshot& previous, const Snapshot& current, float w, 
   place_points(previous, current, w, frame_time);
   place_cloths(previous, current, w, frame_time);
   place_overlays(previous, current, w);
-  stage_.set_camera(camera_.at(time, places_, samples));
+  latest_camera_ = camera_.at(time, places_, samples);
+  stage_.set_camera(latest_camera_);
   stage_.set_lamps(lamps_of(scene_, time, places_, samples));
   stage_.set_time(to_float(time));
 }

@@ -18,6 +18,7 @@ json='nlohmann|CLI/|valijson'
 forbid sim "render/|effects/|producer/|$json|assimp|glad|GL/|stb|libdeflate" "sim includes more than std, Eigen, oneTBB, Qhull and xxhash"
 forbid effects "render/|producer/|$json|assimp|glad|GL/|stb|libdeflate" "effects includes more than sim"
 forbid render "sim/|effects/|producer/|$json" "render knows something of physics or JSON"
+forbid demos/producer "tune/" "producer includes what is built on it"
 public=$(grep -L 'Private' render/*.h)
 for header in $public; do
   forbid "$header" 'assimp|glad|GL/|stb|libdeflate' "a public header shows a library behind it"
@@ -37,5 +38,7 @@ only 'assimp/' 'render/mesh_import render/mesh_material'
 only 'stb_image' 'render/image_io'
 only 'libdeflate.h' 'render/png'
 only 'Imf' 'render/exr'
+only 'httplib.h' 'demos/tune/http_server'
+only 'turbojpeg.h' 'demos/tune/jpeg'
 only 'dlfcn.h' 'render/gl_platform'
 exit $status

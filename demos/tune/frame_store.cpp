@@ -1,0 +1,127 @@
+#include "tune/frame_store.h"
+
+#include <algorithm>
+
+namespace offstage::tune {
+namespace {
+
+std::size_t bytes_of(const producer::Snapshot& state) {
+  std::size_t bytes = sizeof state + state.bodies.size() * sizeof(producer::BodySample) +
+                      state.rods.size() * sizeof(producer::RodSample);
+  for (const producer::PointSet& set : state.point_sets)
+    bytes += set.points.size() * sizeof(render::Point) + set.ages.size() * sizeof(float);
+  for (const producer::ClothSample& cloth : state.cloths)
+    bytes += (cloth.points.size() + cloth.velocities.size()) * sizeof(Eigen::Vector3f) +
+             (cloth.triangles.size() + cloth.sources.size()) * sizeof(uint32_t);
+  for (const producer::LineSet& lines : state.overlays)
+    bytes += lines.lines.size() * (sizeof(render::Line) + sizeof(uint64_t));
+  return bytes;
+}
+
+}  // namespace
+
+void FrameStore::put(const std::string& film, int frame, StoredFrame picture) {
+  const std::lock_guard lock(mutex_);
+  Film& entry = films_[film];
+  entry.used = ++clock_;
+  StoredFrame& place = entry.frames[{frame, picture.detail}];
+  const std::size_t before = place.jpeg ? place.jpeg->size() : 0;
+  place = std::move(picture);
+  entry.bytes += place.jpeg->size() - before;
+  bytes_ += place.jpeg->size() - before;
+  make_room();
+}
+
+std::optional<StoredFrame> FrameStore::get(const std::string& film, int frame, Detail most) {
+  const std::lock_guard lock(mutex_);
+  const auto entry = films_.find(film);
+  if (entry == films_.end()) return {};
+  entry->second.used = ++clock_;
+  for (int detail = static_cast<int>(most); detail >= 0; --detail)
+    if (const auto it = entry->second.frames.find({frame, static_cast<Detail>(detail)});
+        it != entry->second.frames.end())
+      return it->second;
+  return {};
+}
+
+bool FrameStore::has(const std::string& film, int frame, Detail detail) const {
+  const std::lock_guard lock(mutex_);
+  const auto entry = films_.find(film);
+  return entry != films_.end() && entry->second.frames.contains({frame, detail});
+}
+
+std::vector<std::pair<int, int>> FrameStore::ranges(const std::string& film) const {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::pair<int, int>> ranges;
+  const auto entry = films_.find(film);
+  if (entry == films_.end()) return ranges;
+  for (const auto& [place, picture] : entry->second.frames) {
+    if (place.second != Detail::draft) continue;
+    if (!ranges.empty() && ranges.back().second == place.first - 1)
+      ++ranges.back().second;
+    else
+      ranges.emplace_back(place.first, place.first);
+  }
+  return ranges;
+}
+
+void FrameStore::protect(std::vector<std::string> films) {
+  const std::lock_guard lock(mutex_);
+  protected_ = std::move(films);
+}
+
+std::size_t FrameStore::bytes() const {
+  const std::lock_guard lock(mutex_);
+  return bytes_;
+}
+
+void FrameStore::make_room() {
+  while (bytes_ > most_bytes_ && !films_.empty()) {
+    // The film that was used longest ago; of those on show the first frames, when nothing else is left.
+    const auto rank = [&](const auto& entry) {
+      return std::pair(std::ranges::find(protected_, entry.first) != protected_.end(), entry.second.used);
+    };
+    const auto oldest = std::ranges::min_element(films_, {}, rank);
+    Film& film = oldest->second;
+    const auto frame = film.frames.begin();
+    film.bytes -= frame->second.jpeg->size();
+    bytes_ -= frame->second.jpeg->size();
+    film.frames.erase(frame);
+    if (film.frames.empty()) films_.erase(oldest);
+  }
+}
+
+std::shared_ptr<Physics> PhysicsStore::open(const std::string& key) {
+  const auto it = std::ranges::find(entries_, key, &Entry::key);
+  if (it != entries_.end()) {
+    entries_.splice(entries_.begin(), entries_, it);
+  } else {
+    constexpr std::size_t kMostSimulations = 64;
+    entries_.push_front({key, std::make_shared<Physics>(), 0});
+    if (entries_.size() > kMostSimulations) {
+      bytes_ -= entries_.back().bytes;
+      entries_.pop_back();
+    }
+  }
+  return entries_.front().physics;
+}
+
+void PhysicsStore::keep(const std::string& key, int frame, std::shared_ptr<const producer::Snapshot> state) {
+  const auto entry = std::ranges::find(entries_, key, &Entry::key);
+  if (entry == entries_.end()) return;
+  const std::size_t bytes = bytes_of(*state);
+  while (bytes_ + bytes > most_bytes_ && &entries_.back() != &*entry) {
+    bytes_ -= entries_.back().bytes;
+    entries_.pop_back();
+  }
+  if (bytes_ + bytes > most_bytes_) return;
+  const auto place = static_cast<std::size_t>(frame - 1);
+  auto& states = entry->physics->states;
+  if (states.size() <= place) states.resize(place + 1);
+  if (states[place]) return;
+  states[place] = std::move(state);
+  entry->bytes += bytes;
+  bytes_ += bytes;
+}
+
+}  // namespace offstage::tune

@@ -1,0 +1,33 @@
+#pragma once
+/// The page and its sitting over HTTP, on this machine alone.
+///
+/// One server has the page, the pictures and the changes; two more have the streams of the tabs, four each,
+/// because browsers keep at most six connections to one of them. Every address begins with a random token.
+/// The Host of every request and the Origin of those that have one must be ours, so that no other page in the
+/// same browser can read or change anything, even by a name that it makes lead here.
+
+#include <memory>
+#include <string>
+
+#include "tune/session.h"
+
+namespace offstage::tune {
+
+class HttpServer {
+ public:
+  /// Binds to 127.0.0.1; port 0 is any that is free. Throws std::runtime_error if the port is taken.
+  HttpServer(Session& session, int port);
+  /// Ends the streams and the requests.
+  ~HttpServer();
+  HttpServer(const HttpServer&) = delete;
+  HttpServer& operator=(const HttpServer&) = delete;
+
+  /// The address to open, with the token.
+  std::string address() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace offstage::tune

@@ -1,0 +1,26 @@
+#pragma once
+/// JPEG of frames, for a browser.
+
+#include <memory>
+#include <string>
+
+#include "render/image.h"
+
+namespace offstage::tune {
+
+/// One per thread: it keeps its memory from picture to picture.
+class JpegWriter {
+ public:
+  JpegWriter();
+  ~JpegWriter();
+  JpegWriter(const JpegWriter&) = delete;
+  JpegWriter& operator=(const JpegWriter&) = delete;
+
+  /// The bytes of a JPEG file; `quality` from 1 to 100. Throws std::runtime_error.
+  std::string write(const render::Image& image, int quality);
+
+ private:
+  void* handle_;
+};
+
+}  // namespace offstage::tune

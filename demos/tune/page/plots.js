@@ -1,0 +1,106 @@
+// Figures over the film's time, and the facts of the run.
+
+import {byId, el, clamp, oncePerFrame, toast} from './dom.js';
+import {store, on, get, setValue, frameCount, timeOf, isWriter} from './store.js';
+import {seek} from './viewer.js';
+import {reveal} from './controls.js';
+import {objectPaths, nameOf} from './tree.js';
+
+const kPlots = [
+  {name: 'Particles', lines: [{of: f => f.particles, colour: '--plot1'}], digits: 0},
+  {name: 'Contacts', lines: [{of: f => f.contacts, colour: '--plot2'}], digits: 0},
+  {name: 'Energy', unit: 'J', lines: [{of: f => f.energy?.[0], colour: '--plot1', name: 'kinetic'}, {of: f => f.energy?.[1], colour: '--plot2', name: 'potential'}, {of: f => f.energy?.[2], colour: '--plot3', name: 'elastic'}], digits: 3},
+  {name: 'Time per frame', unit: 'ms', lines: [{of: f => f.sim_ms, colour: '--plot1', name: 'simulate'}, {of: f => f.draw_ms, colour: '--plot2', name: 'draw'}], digits: 1},
+];
+
+const boxes = kPlots.map(plot => {
+  const canvas = el('canvas', {'aria-label': `${plot.name} over time`, role: 'img'}), value = el('span', {class: 'value'});
+  const names = plot.lines.filter(l => l.name).map(l => el('span', {class: 'legend', style: `--c:var(${l.colour})`}, l.name));
+  const box = el('figure', {}, el('figcaption', {}, el('span', {}, plot.name), names, value), canvas);
+  const at = e => { const r = canvas.getBoundingClientRect(); seek(clamp((e.clientX - r.left) / r.width, 0, 1) * (frameCount() - 1) + 1); };
+  canvas.addEventListener('pointerdown', e => { at(e); canvas.setPointerCapture(e.pointerId); canvas.onpointermove = at; canvas.onpointerup = () => { canvas.onpointermove = null; }; });
+  byId('plots').append(box);
+  return {plot, canvas, value};
+});
+
+function short(x, digits) {
+  if (x === undefined || x === null) return '–';
+  const size = Math.abs(x);
+  if (size >= 1e6) return (x / 1e6).toFixed(2) + ' M';
+  if (size >= 1e4) return (x / 1e3).toFixed(1) + ' k';
+  return digits === 0 ? String(x) : Number(x.toPrecision(3)).toString();
+}
+
+const draw = oncePerFrame(() => {
+  const style = getComputedStyle(document.documentElement), ratio = devicePixelRatio || 1, n = frameCount();
+  for (const {plot, canvas, value} of boxes) {
+    const size = canvas.getBoundingClientRect();
+    if (!size.width) continue;
+    canvas.width = size.width * ratio;
+    canvas.height = size.height * ratio;
+    const pen = canvas.getContext('2d'), w = canvas.width, h = canvas.height;
+    const series = plot.lines.map(l => store.figures.map(f => f && l.of(f)));
+    const all = series.flat().filter(Number.isFinite);
+    const low = Math.min(0, ...all), high = Math.max(low + 1e-9, ...all);
+    pen.lineWidth = 1.4 * ratio;
+    series.forEach((values, i) => {
+      pen.strokeStyle = style.getPropertyValue(plot.lines[i].colour);
+      pen.beginPath();
+      let up = true;
+      values.forEach((y, f) => {
+        if (!Number.isFinite(y)) { up = true; return; }
+        const px = n > 1 ? f / (n - 1) * w : 0, py = h - 2 - (y - low) / (high - low) * (h - 6);
+        up ? pen.moveTo(px, py) : pen.lineTo(px, py);
+        up = false;
+      });
+      pen.stroke();
+    });
+    const x = n > 1 ? (store.frame - 1) / (n - 1) * w : 0;
+    pen.fillStyle = style.getPropertyValue('--accent');
+    pen.fillRect(x - ratio / 2, 0, ratio, h);
+    const now = store.figures[store.frame - 1];
+    value.textContent = now ? plot.lines.map(l => short(l.of(now), plot.digits)).join(' / ') + (plot.unit ? ' ' + plot.unit : '') : '–';
+  }
+});
+
+/** The object that a sentence of the simulation names in quotes. */
+function objectIn(text) {
+  const name = /'([^']+)'/.exec(text)?.[1];
+  return name && objectPaths().find(p => nameOf(p) === name || name.startsWith(nameOf(p) + '_') || name.startsWith(nameOf(p) + '/'));
+}
+
+function drawFacts() {
+  const doc = store.doc;
+  if (!doc?.scene) return;
+  const now = store.figures[store.frame - 1], film = store.film, last = film.statistics?.state_hash;
+  const hash = (text, title) => el('code', {class: 'hash', title: `${title}: ${text}. Click to copy`, onclick: () => navigator.clipboard.writeText(text).then(() => toast('Copied.'))}, text.slice(0, 12));
+  const progress = film.phase === 'complete' || last ? 'Film complete' : film.phase === 'failed' ? 'Stopped' : film.phase === 'loading' ? film.message || 'Loading' : Math.max(film.simulated, store.figures.length) ? `Simulated ${Math.max(film.simulated, store.figures.length)} of ${frameCount()}` : `Before the film: ${Math.round((film.lead_in ?? 0) * 100)} %`;
+  const facts = el('div', {class: 'facts-line'}, el('span', {class: 'fact', id: 'progress'}, progress),
+    now ? el('span', {class: 'fact'}, 'State ', hash(now.state, `state of frame ${store.frame}`)) : null,
+    last ? el('span', {class: 'fact', id: 'final-state', 'data-hash': last}, 'Final state ', hash(last, 'state after the last frame, as `offstage simulate` prints it')) : null,
+    el('span', {class: 'fact'}, `Seed ${doc.scene.seed} `, el('button', {class: 'quiet', id: 'new-seed', disabled: !isWriter(), title: 'Another draw of everything random', onclick: () => setValue('/world/seed', Math.floor(Math.random() * 1e6) + 1, 'new seed')}, 'New seed')),
+    film.statistics ? el('button', {class: 'quiet', onclick: event => showStatistics(event.currentTarget)}, 'Statistics') : null);
+  const notes = [...(film.phase === 'failed' ? [{what: film.message, bad: true}] : []), ...(doc.warnings ?? []).map(w => ({what: w.what, path: w.path})), ...(film.notes ?? []).map(t => ({what: t.replace(/^(warning|note): /, ''), path: objectIn(t)}))];
+  byId('facts').replaceChildren(facts, notes.length ? el('ul', {class: 'notes'}, notes.map(n => el('li', {class: n.bad ? 'bad' : ''}, n.path ? el('button', {class: 'problem', onclick: () => reveal(n.path)}, n.what) : n.what))) : '');
+}
+
+async function showStatistics(anchor) {
+  const {popover} = await import('./dom.js');
+  const rows = [], walk = (value, name) => {
+    if (value && typeof value === 'object' && !Array.isArray(value)) for (const [k, v] of Object.entries(value)) walk(v, name ? `${name}.${k}` : k);
+    else rows.push(el('tr', {}, el('td', {}, name), el('td', {}, Array.isArray(value) ? value.join(', ') || '–' : typeof value === 'number' ? short(value, 3) : String(value))));
+  };
+  walk(store.film.statistics, '');
+  popover(anchor, 'Statistics of the whole film', el('div', {class: 'scroll'}, el('table', {class: 'statistics'}, rows)), true);
+}
+
+const redraw = oncePerFrame(() => { draw(); drawFacts(); });
+on('figures playhead film document', redraw);
+new ResizeObserver(draw).observe(byId('plots'));
+matchMedia('(prefers-color-scheme: dark)').addEventListener('change', draw);
+
+/** Figures of frames that were drawn before this page was opened. */
+export async function loadFigures() {
+  for (const f of await get('api/figures')) store.figures[f.frame - 1] = {...f, draw_ms: store.figures[f.frame - 1]?.draw_ms};
+  redraw();
+}

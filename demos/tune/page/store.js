@@ -1,0 +1,181 @@
+// What the page knows, and who wants to hear of it. Everything that changes the scene goes to the server, and comes
+// back as the document.
+
+import * as jsonc from './jsonc.js';
+import {toast} from './dom.js';
+
+export const store = {
+  tab: [...crypto.getRandomValues(new Uint8Array(8))].map(b => b.toString(16).padStart(2, '0')).join(''),
+  base: location.pathname.replace(/[^/]*$/, ''),
+  doc: null,        // as the server sent it last
+  root: null,       // tree of the latest text that is JSON
+  value: {},        // its plain value
+  selection: [],    // paths of objects; the last one is shown
+  frame: 1, playing: false,
+  film: {phase: 'loading', lead_in: 0, simulated: 0, notes: [], statistics: null, message: ''},
+  figures: [],      // by frame - 1
+  presets: [],
+  writer: '',
+};
+window.tuneStore = store;  // for the tests
+
+const listeners = new Map();
+export function on(name, f) {
+  for (const one of name.split(' ')) listeners.set(one, [...(listeners.get(one) ?? []), f]);
+}
+export function emit(name, ...all) {
+  for (const f of listeners.get(name) ?? []) f(...all);
+}
+
+export async function get(what) {
+  const answer = await fetch(store.base + what);
+  if (!answer.ok) throw new Error(await answer.text());
+  return answer.json();
+}
+
+export async function send(what, body = {}) {
+  const answer = await fetch(store.base + 'api/' + what, {
+    method: 'POST', headers: {'Content-Type': 'application/json', 'X-Tab': store.tab}, body: JSON.stringify(body)});
+  return {status: answer.status, body: await answer.json()};
+}
+
+export const isWriter = () => store.writer === store.tab;
+
+/** Takes a document from the server. */
+export function takeDocument(doc) {
+  if (store.doc && doc.run < store.doc.run) return;
+  const before = store.doc;
+  store.doc = doc;
+  if (!before || before.text !== doc.text) {
+    const root = jsonc.parse(doc.text);
+    if (root?.type === 'object') {
+      store.root = root;
+      store.value = jsonc.valueOf(root);
+    }
+    store.textValid = root?.type === 'object';
+  }
+  if (!before || before.film !== doc.film || before.run !== doc.run) {
+    if (!before || before.film !== doc.film) {
+      store.figures = [];
+      store.film = {phase: 'lead_in', lead_in: 0, simulated: 0, notes: [], statistics: null, message: '', ready: doc.ranges ?? []};
+    }
+    emit('film-changed');
+  }
+  store.selection = store.selection.filter(p => jsonc.find(store.root, p));
+  emit('document', before);
+}
+
+async function change(what, body) {
+  const {status, body: answer} = await send(what, body);
+  if (status === 200) { if (answer.version) takeDocument(answer); return true; }
+  if (status === 409 && answer.version) { takeDocument(answer); return false; }
+  toast(answer.error ?? `The server answered ${status}.`, status === 423 ? {label: 'Edit here', run: () => send('write')} : null);
+  if (store.doc) emit('document', store.doc);
+  return false;
+}
+
+// Changes go out one at a time; of several of one group that wait, the latest counts.
+let busy = false;
+const waiting = [];
+function enqueue(what, body) {
+  return new Promise(done => {
+    const last = waiting.at(-1);
+    if (what === 'edit' && last?.what === 'edit' && body.group && last.body.group === body.group) {
+      last.done(true);
+      waiting.pop();
+    }
+    if (what === 'view' && last?.what === 'view') {  // only where one looks last counts
+      last.done(true);
+      body = {...waiting.pop().body, ...body};
+    }
+    waiting.push({what, body, done});
+    drain();
+  });
+}
+async function drain() {
+  if (busy) return;
+  busy = true;
+  while (waiting.length) {
+    const job = waiting.shift();
+    try {
+      job.done(await change(job.what, job.body));
+    } catch (error) {
+      job.done(false);
+      emit('lost', error);
+    }
+  }
+  busy = false;
+}
+export const isIdle = () => !busy && waiting.length === 0;
+window.tuneIdle = isIdle;
+
+/** ops: [{set: path, value: JSON text} | {remove: path}]. */
+export const edit = (ops, label, paths, group = '') => enqueue('edit', {ops, label, paths, group});
+export const setText = (text, group, label = 'text') => enqueue('text', {text, group, label});
+export const undo = () => enqueue('undo', {});
+export const redo = () => enqueue('redo', {});
+export const restore = id => enqueue('restore', {id});
+export const save = () => enqueue('save', {});
+export const reload = () => enqueue('reload', {});
+export const keepOwn = () => enqueue('keep', {});
+export const pin = id => enqueue('pin', {id});
+export const view = body => enqueue('view', body);
+
+/** Sets values in all selected objects of the same kind as the one shown. */
+export function setValue(path, value, label, group = '') {
+  const paths = alike(path);
+  return edit(paths.map(p => ({set: p, value: jsonc.toText(value, 0, 110)})), label, paths, group);
+}
+export function removeValue(path, label) {
+  const paths = alike(path);
+  return edit(paths.map(p => ({remove: p})), label, paths);
+}
+/** The same key in every selected object of the same list. */
+function alike(path) {
+  const shown = store.selection.at(-1);
+  if (!shown || store.selection.length < 2 || !path.startsWith(shown + '/')) return [path];
+  const list = shown.slice(0, shown.lastIndexOf('/'));
+  return store.selection.filter(p => p.startsWith(list + '/')).map(p => p + path.slice(shown.length));
+}
+
+export function select(paths) {
+  store.selection = paths;
+  emit('selection');
+}
+
+export const frameCount = () => store.doc?.scene?.frames ?? 1;
+export const timeOf = frame => (store.doc?.scene?.start ?? 0) + (frame - 1) / (store.doc?.scene?.fps ?? 30);
+
+let viewed = '';
+export function tellView() {
+  const now = `${store.frame} ${store.playing}`;
+  if (now === viewed || !isWriter()) return;
+  viewed = now;
+  view({frame: store.frame, playing: store.playing});
+}
+
+/** How far the film is. */
+export function takeFilm(state) {
+  if (!state || state.film !== store.doc?.film) return;
+  Object.assign(store.film, state);
+  emit('film', state);
+}
+
+/** The long connection: what happens on the server. */
+export function listen(port) {
+  const stream = new EventSource(`http://${location.hostname}:${port}${store.base}stream?tab=${store.tab}`);
+  const kinds = {
+    document: takeDocument,
+    frame: f => { if (f.run >= (store.doc?.run ?? 0) && f.film === store.doc?.film) emit('frame', f); },
+    other_frame: f => emit('other-frame', f),
+    film: takeFilm,
+    cell: c => emit('cell', c),
+    writer: w => { store.writer = w.writer; emit('writer'); },
+    note: n => toast(n.text, {label: 'Undo', run: undo}),
+  };
+  for (const [kind, take] of Object.entries(kinds)) stream.addEventListener(kind, event => take(JSON.parse(event.data)));
+  stream.addEventListener('hello', async () => { emit('connected'); });
+  stream.addEventListener('error', () => emit('lost'));
+  addEventListener('pagehide', () => stream.close());
+  return stream;
+}

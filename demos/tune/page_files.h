@@ -1,0 +1,17 @@
+#pragma once
+/// The files of demos/tune/page, embedded at build time.
+
+#include <span>
+#include <string_view>
+
+namespace offstage::tune {
+
+struct PageFile {
+  std::string_view name;  ///< relative to the folder
+  std::string_view bytes;
+};
+
+/// Made by cmake/embed_files.cmake.
+std::span<const PageFile> page_files();
+
+}  // namespace offstage::tune

@@ -1,0 +1,11 @@
+#pragma once
+/// What the page offers to add to a scene.
+
+#include <nlohmann/json.hpp>
+
+namespace offstage::tune {
+
+/// Presets of effects: name, description, and names of the emitters and forces.
+nlohmann::ordered_json presets_list();
+
+}  // namespace offstage::tune

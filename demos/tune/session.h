@@ -1,0 +1,103 @@
+#pragma once
+/// A sitting: one scene file, its text, the engine that shows it, and the tabs that look on. Speaks JSON,
+/// knows nothing of HTTP.
+
+#include <atomic>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "producer/error.h"
+#include "tune/document.h"
+#include "tune/engine.h"
+#include "tune/tabs.h"
+
+namespace offstage::tune {
+
+/// What a request comes to: a status of HTTP, and an object.
+struct Reply {
+  int status = 200;
+  nlohmann::ordered_json body = nlohmann::ordered_json::object();
+};
+
+class Session {
+ public:
+  using Json = nlohmann::ordered_json;
+
+  /// Throws SceneError if the file cannot be read; a text that is no valid scene is shown with its errors.
+  Session(const std::string& file, EngineSettings settings);
+  ~Session();
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  /// Everything that a tab needs to begin.
+  Json state();
+  Json figures() const;
+  Json versions();
+  /// The text of a version; null if it is forgotten.
+  Json version_text(uint64_t id);
+  /// A change: `what` is the last part of the address, such as "edit". Only the writing tab may change the
+  /// scene.
+  Reply post(const std::string& what, const nlohmann::json& request, const std::string& tab);
+
+  Tabs& tabs() { return tabs_; }
+  Engine& engine() { return *engine_; }
+  /// Ends the streams and the watching of files.
+  void close();
+
+ private:
+  struct Parsed {
+    Engine::Loaded loaded;
+    std::vector<Problem> errors;
+  };
+  using Handler = Reply (Session::*)(const nlohmann::json&);
+
+  Reply edit(const nlohmann::json& request);
+  Reply text(const nlohmann::json& request);
+  Reply undo(const nlohmann::json& request);
+  Reply redo(const nlohmann::json& request);
+  Reply restore(const nlohmann::json& request);
+  Reply view(const nlohmann::json& request);
+  Reply pin(const nlohmann::json& request);
+  Reply pick(const nlohmann::json& request);
+  Reply save(const nlohmann::json& request);
+  Reply reload(const nlohmann::json& request);
+  Reply keep(const nlohmann::json& request);
+  Reply sweep(const nlohmann::json& request);
+
+  Parsed parse(const std::string& text, bool with_view) const;
+  std::vector<std::string> muted_paths(const std::string& text) const;
+  void show();
+  Reply shown();
+  Json document() const;
+  void post_document();
+  void on_event(const EngineEvent& event);
+  void watch_files();
+  void files_changed(const std::string& hash_before, const std::string& hash_now);
+
+  mutable std::mutex mutex_;
+  Document document_;
+  Tabs tabs_;
+  Engine::Loaded shown_;  // the latest valid version
+  std::vector<Problem> errors_, warnings_;
+  Engine::Run run_;
+  std::map<uint64_t, std::string> films_;  // of versions
+  std::optional<ViewCamera> camera_;
+  Json overlays_ = Json::array();
+  std::set<std::string> muted_;
+  Json pinned_;
+  std::optional<std::string> theirs_;  // the file has changed outside, to this
+  mutable std::mutex events_mutex_;
+  Json latest_film_;  // how far it is, for tabs that come later
+  std::unique_ptr<Engine> engine_;
+  std::atomic<bool> closing_ = false;
+  std::thread watcher_;  // last
+};
+
+}  // namespace offstage::tune

@@ -1,0 +1,132 @@
+#include "tune/engine.h"
+
+#include <condition_variable>
+#include <mutex>
+
+#include <gtest/gtest.h>
+
+#include "producer/production.h"
+#include "producer/scene_io.h"
+
+namespace offstage::tune {
+namespace {
+
+using producer::LoadedScene;
+
+/// A few particles and a falling ball; `rate` makes versions of it.
+Engine::Loaded fountain(int rate, double duration = 0.5) {
+  const std::string text =
+      R"({"bodies": [{"name": "ball", "position": [0, 2, 0], "shape": {"type": "sphere", "radius": 0.3}}],
+    "emitters": [{"rate": )" +
+      std::to_string(rate) + R"(, "overlap": true}], "render": {"size": [160, 90]},
+    "output": {"fps": 20, "duration": )" +
+      std::to_string(duration) + "}}";
+  return std::make_shared<const LoadedScene>(producer::parse_scene(text, "fountain", ""));
+}
+
+/// The events of an engine, to be waited for.
+class Events {
+ public:
+  void operator()(const EngineEvent& event) {
+    const std::lock_guard lock(mutex_);
+    events_.push_back(event);
+    changed_.notify_all();
+  }
+  /// Until an event of a kind satisfies the condition; false after a minute.
+  template <class Event, class Condition>
+  bool wait_for(Condition&& condition) {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, std::chrono::minutes(1), [&] {
+      return std::ranges::any_of(events_, [&](const EngineEvent& event) {
+        const Event* e = std::get_if<Event>(&event);
+        return e && condition(*e);
+      });
+    });
+  }
+  bool wait_until_complete(uint64_t run) {
+    return wait_for<FilmEvent>(
+        [&](const FilmEvent& e) { return e.run == run && e.phase == FilmEvent::Phase::complete; });
+  }
+  std::vector<EngineEvent> all() {
+    const std::lock_guard lock(mutex_);
+    return events_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<EngineEvent> events_;
+};
+
+EngineSettings small_settings() {
+  EngineSettings settings;
+  settings.draft_px = {160, 90};
+  return settings;
+}
+
+class Engines : public testing::Test {
+ protected:
+  Events events_;
+  Engine engine_{small_settings(), std::ref(events_)};
+};
+
+TEST_F(Engines, EndWithTheStateThatASimulationHas) {
+  const Engine::Loaded scene = fountain(200);
+  const Engine::Run run = engine_.show(scene, {});
+  ASSERT_TRUE(events_.wait_until_complete(run.number));
+  const producer::RunStats stats = producer::simulate_frames(*scene, producer::ModelLibrary(), {}, {});
+  EXPECT_EQ(engine_.figures().back().state_hash, stats.state_hash);
+  EXPECT_EQ(engine_.ranges(run.film), (std::vector<std::pair<int, int>>{{1, 10}}));
+}
+
+TEST_F(Engines, EndAnOldRunWithinOneFrame) {
+  const Engine::Run slow = engine_.show(fountain(2000, 30), {});
+  ASSERT_TRUE(events_.wait_for<FrameEvent>([&](const FrameEvent& e) { return e.run == slow.number; }));
+  const Engine::Run next = engine_.show(fountain(100), {});
+  const std::size_t before = events_.all().size();
+  ASSERT_TRUE(events_.wait_until_complete(next.number));
+  std::size_t late = 0;
+  const std::vector<EngineEvent> all = events_.all();
+  for (std::size_t i = before; i < all.size(); ++i)
+    if (const auto* frame = std::get_if<FrameEvent>(&all[i])) late += frame->run == slow.number;
+  EXPECT_LE(late, 1u);
+}
+
+TEST_F(Engines, KeepTheFramesOfEarlierVersions) {
+  const Engine::Run first = engine_.show(fountain(100), {});
+  ASSERT_TRUE(events_.wait_until_complete(first.number));
+  const std::shared_ptr<const std::string> frame = engine_.frame(first.film, 10, Detail::draft)->jpeg;
+  ASSERT_TRUE(events_.wait_until_complete(engine_.show(fountain(300), {}).number));
+  const Engine::Run again = engine_.show(fountain(100), {});
+  EXPECT_EQ(again.film, first.film);
+  EXPECT_EQ(engine_.frame(again.film, 10, Detail::draft)->jpeg, frame);
+}
+
+TEST_F(Engines, SeeTheSameStatesByAnotherCamera) {
+  const Engine::Loaded scene = fountain(100);
+  ASSERT_TRUE(events_.wait_until_complete(engine_.show(scene, {}).number));
+  const std::string state = engine_.figures().back().state_hash;
+  const Engine::Run other = engine_.show(scene, ViewCamera{{0, 1, 3}, {0, 1, 0}});
+  ASSERT_TRUE(events_.wait_until_complete(other.number));
+  EXPECT_EQ(engine_.figures().back().state_hash, state);
+  EXPECT_TRUE(engine_.frame(other.film, 10));
+}
+
+TEST_F(Engines, NameWhatIsSeen) {
+  const Engine::Run run = engine_.show(fountain(1), ViewCamera{{0, 2, 3}, {0, 2, 0}});
+  ASSERT_TRUE(events_.wait_until_complete(run.number));
+  EXPECT_EQ(engine_.pick(1, 0.5, 0.5).get(), "ball");
+  EXPECT_EQ(engine_.pick(1, 0.02, 0.02).get(), "");
+}
+
+TEST_F(Engines, DrawASheetOfVersionsAndSayWhichAreNone) {
+  const auto sheet = engine_.sweep({fountain(50), nullptr}, 3);
+  ASSERT_TRUE(events_.wait_for<CellEvent>(
+      [&](const CellEvent& e) { return e.sweep == sheet && e.index == 0 && e.fault.empty(); }));
+  ASSERT_TRUE(
+      events_.wait_for<CellEvent>([&](const CellEvent& e) { return e.index == 1 && !e.fault.empty(); }));
+  EXPECT_TRUE(engine_.cell(sheet, 0));
+}
+
+}  // namespace
+}  // namespace offstage::tune

@@ -1,0 +1,421 @@
+#!/usr/bin/python3
+"""The tuning page in a real browser. usage: page_test.py PROGRAM SOURCE_DIR [unittest arguments]"""
+
+import json
+import os
+import pathlib
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+import urllib.error
+import urllib.request
+
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.keys import Keys
+
+from sitting import Page, Server, browser, set_size, wait
+
+PROGRAM, SOURCE = sys.argv[1], pathlib.Path(sys.argv[2])
+
+SCENE = '''// A small fountain, with comments that must stay.
+{
+  "version": 1,
+  "bodies": [
+    {"name": "ground", "motion": "static", "shape": {"type": "plane"}},   // the floor
+    {"name": "ball", "shape": {"type": "sphere", "radius": 0.4}, "position": [0.0, 0.40, 0]}
+  ],
+  "emitters": [
+    {"name": "jet", "rate": 4.0e2, "speed": {"mean": 4, "deviation": 0.5}, "radius": 0.03,
+     "overlap": true, "surface": {"type": "disc", "position": [0, 0.1, 1.2], "radius": 0.05},
+     "look": {"color": "#4080ff"}}
+  ],
+  "camera": {"type": "static", "eye": [0, 1.5, 5], "target": [0, 0.8, 0]},
+  "render": {"size": [640, 360]},
+  "output": {"fps": 20, "duration": 1}
+}
+'''
+
+
+def get(address, headers=None):
+    """Status and text of a request."""
+    try:
+        with urllib.request.urlopen(urllib.request.Request(address, headers=headers or {}), timeout=10) as answer:
+            return answer.status, answer.read().decode('utf-8', 'replace')
+    except urllib.error.HTTPError as error:
+        return error.code, error.read().decode('utf-8', 'replace')
+
+
+class Case(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.driver = browser()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.driver.quit()
+
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix='offstage-tune-'))
+        self.scene = self.folder / 'fountain.json'
+        self.scene.write_bytes(SCENE.encode())
+        self.server = Server(PROGRAM, self.scene)
+        self.page = Page(self.driver, self.server.address)
+        wait(lambda: self.page.js('return tuneStore.writer === tuneStore.tab'), what='the right to write')
+
+    def tearDown(self):
+        self.driver.get('about:blank')
+        self.server.kill()
+        shutil.rmtree(self.folder)
+
+    def keys(self, *keys):
+        ActionChains(self.driver).send_keys(*keys).perform()
+
+    def command(self, *keys):
+        actions = ActionChains(self.driver).key_down(Keys.CONTROL)
+        for key in keys[:-1]:
+            actions.key_down(key)
+        actions.send_keys(keys[-1])
+        for key in keys[:-1]:
+            actions.key_up(key)
+        actions.key_up(Keys.CONTROL).perform()
+        time.sleep(0.1)
+        self.page.idle()
+
+
+class Editing(Case):
+    def test_a_typed_value_changes_the_picture_and_only_its_own_bytes(self):
+        page = self.page
+        page.wait_for_frame(1)
+        page.js('document.getElementById("scrub").focus()')
+        self.keys(Keys.END)
+        page.wait_for_frame(20)
+        before = page.pixels()
+        page.select('/emitters/0')
+        page.type_value('rate', 'rate', 2500)
+        page.wait_for_frame(20)
+        self.assertNotEqual(before, page.pixels())
+        self.assertEqual(page.text(), SCENE.replace('4.0e2', '2500'))
+        self.assertEqual(self.scene.read_text(), SCENE, 'nothing is saved before it is asked for')
+        self.command('s')
+        self.assertEqual(self.scene.read_bytes(), SCENE.replace('4.0e2', '2500').encode())
+        self.assertEqual(page.errors(), [])
+
+    def test_a_key_that_is_missing_goes_in_with_the_objects_indentation(self):
+        self.page.select('/emitters/0')
+        self.page.type_value('lifespan', 'lifespan', 1.5)
+        self.assertIn('     "look": {"color": "#4080ff"},\n     "lifespan": 1.5}', self.page.text())
+        self.page.click('#controls .row[data-key="lifespan"] .reset')
+        self.page.idle()
+        self.assertEqual(self.page.text(), SCENE)
+
+    def test_one_drag_is_one_undo_step_and_undo_brings_the_frames_back_at_once(self):
+        page = self.page
+        page.wait_for_frame(1)
+        film = page.film()
+        page.select('/emitters/0')
+        track = page.find('#controls .row[data-key="rate"] .track')
+        page.js('arguments[0].scrollIntoView({block: "center"})', track)
+        actions = ActionChains(self.driver).move_to_element(track).click_and_hold()
+        for _ in range(6):
+            actions.move_by_offset(6, 0)
+        actions.release().perform()
+        page.idle()
+        self.assertNotEqual(page.text(), SCENE)
+        self.command('z')
+        self.assertEqual(page.text(), SCENE)
+        self.assertEqual(page.film(), film)
+        page.wait_for_frame(1, seconds=1)
+        self.command(Keys.SHIFT, 'z')
+        self.assertNotEqual(page.text(), SCENE)
+
+    def test_an_arrow_key_moves_a_slider_by_one_step(self):
+        self.page.select('/emitters/0')
+        track = self.page.find('#controls .row[data-key="rate"] .track')
+        self.page.js('arguments[0].focus()', track)
+        self.keys(Keys.ARROW_RIGHT)
+        time.sleep(0.1)
+        self.page.idle()
+        self.assertIn('"rate": 420,', self.page.text())
+
+    def test_text_with_an_error_keeps_the_last_film_and_says_where(self):
+        page = self.page
+        page.wait_for_frame(1)
+        film = page.film()
+        page.set_text(SCENE.replace('"radius": 0.03', '"radius": -1'))
+        self.assertEqual(page.film(), film)
+        self.assertIn('line 9', page.find('#problems').text)
+        self.assertEqual(page.all('.gutter .bad')[0].text, '9')
+        page.select('/emitters/0')
+        self.assertIn('greater than 0', page.find('#controls .row[data-key="radius"] .error').text)
+        page.set_text(SCENE.replace('"radius": 0.03', '"radius": 0.03,,'))
+        self.assertTrue(page.find('#problems').is_displayed())
+        page.set_text(SCENE)
+        self.assertFalse(page.find('#problems').is_displayed())
+        self.assertEqual(page.all('.gutter .bad'), [])
+
+    def test_objects_are_duplicated_renamed_muted_and_deleted(self):
+        page = self.page
+        page.select('/emitters/0')
+        page.js('document.querySelector("#tree .chosen").focus()')
+        self.command('d')
+        wait(lambda: page.js('return tuneStore.value.emitters.length') == 2)
+        self.assertEqual(page.js('return tuneStore.value.emitters[1].name'), 'jet_2')
+        wait(lambda: page.js('return tuneStore.selection[0]') == '/emitters/1')
+        page.js('document.querySelector("#tree .chosen").focus()')
+        self.keys(Keys.F2)
+        self.keys('second', Keys.ENTER)
+        wait(lambda: page.js('return tuneStore.value.emitters[1].name') == 'second')
+        film = page.film()
+        page.js('document.querySelector(`[data-path="/emitters/1"] button`).click()')
+        wait(lambda: page.film() != film, what='a film without the muted emitter')
+        self.assertEqual(page.js('return tuneStore.doc.muted'), ['emitters/second'])
+        page.js('document.querySelector("#tree .chosen").focus()')
+        self.keys(Keys.DELETE)
+        wait(lambda: page.text() == SCENE, what='the text as it was')
+
+    def test_a_preset_is_added_and_its_parts_can_be_changed(self):
+        page = self.page
+        page.click('#add-button')
+        wait(lambda: page.all('[data-preset="fountain"]'))
+        page.click('[data-preset="fountain"]')
+        wait(lambda: page.js('return tuneStore.value.effects?.[0]?.preset') == 'fountain')
+        wait(lambda: page.js('const d = [...document.querySelectorAll("#controls details")].find(d => d.textContent.includes("Jet")); if (d) d.open = true; return !!d'))
+        wait(lambda: page.all('[data-path="/effects/0/overrides/jet/rate"]'))
+        page.type_value('rate', 'rate', 500)
+        self.assertIn('"overrides": {"jet": {"rate": 500}}', page.text())
+        self.assertEqual(page.js('return tuneStore.doc.errors'), [])
+
+
+class Looking(Case):
+    def test_the_state_on_the_page_is_that_of_simulate(self):
+        page = self.page
+        wait(lambda: page.all('#final-state'), 60, 'the whole film')
+        told = subprocess.run([PROGRAM, 'simulate', str(self.scene), '-q'], capture_output=True, check=True, text=True)
+        self.assertEqual(page.find('#final-state').get_attribute('data-hash'), json.loads(told.stdout)['state_hash'])
+
+    def test_the_frame_that_is_looked_at_becomes_better_when_nothing_changes(self):
+        wait(lambda: self.page.js('return document.getElementById("film").dataset.detail') == 'preview', 60)
+        wait(lambda: self.page.js('return document.getElementById("film").dataset.detail') == 'final', 60)
+
+    def test_playing_and_stepping_are_no_undo_steps(self):
+        page = self.page
+        wait(lambda: page.js('return tuneStore.film.phase') == 'complete', 60)
+        page.js('document.getElementById("stage").focus()')
+        self.keys(Keys.ARROW_RIGHT, Keys.ARROW_RIGHT)
+        page.wait_for_frame(3)
+        self.keys(' ')
+        wait(lambda: page.js('return tuneStore.frame') > 5)
+        self.keys(' ')
+        self.assertFalse(page.js('return tuneStore.playing'))
+        self.assertFalse(page.find('#undo').is_enabled())
+
+    def test_a_click_selects_what_is_seen(self):
+        page = self.page
+        page.wait_for_frame(1)
+        box = page.find('#film').rect
+        ball = (0.5, 0.5 + (0.8 - 0.4) / 5 / (2 * 0.36397))  # where the camera sees the ball
+        ActionChains(self.driver).move_to_element_with_offset(
+            page.find('#film'), int((ball[0] - 0.5) * box['width']), int((ball[1] - 0.5) * box['height'])).click().perform()
+        wait(lambda: page.js('return tuneStore.selection') == ['/bodies/1'], 10, 'the ball')
+
+    def test_orbiting_is_a_view_until_it_is_written_to_the_scene(self):
+        page = self.page
+        page.wait_for_frame(1)
+        before = page.pixels()
+        film = page.film()
+        stage = page.find('#stage')
+        ActionChains(self.driver).move_to_element_with_offset(stage, -200, 40).click_and_hold().move_by_offset(80, 10).release().perform()
+        wait(lambda: page.film() != film)
+        page.wait_for_frame(1)
+        wait(lambda: page.pixels() != before, what='another view')
+        self.assertEqual(page.text(), SCENE)
+        self.assertTrue(page.js('return tuneStore.doc.saved'))
+        page.click('#camera-write')
+        wait(lambda: page.text() != SCENE)
+        self.assertNotEqual(page.js('return tuneStore.value.camera.eye'), [0, 1.5, 5])
+
+    def test_versions_are_compared_side_by_side_as_a_wipe_and_in_turns(self):
+        page = self.page
+        page.wait_for_frame(1)
+        page.click('#pin')
+        wait(lambda: page.js('return tuneStore.doc.pinned'))
+        page.set_text(SCENE.replace('[0, 1.5, 5]', '[0, 3, 3]'))
+        page.wait_for_frame(1)
+        page.click('[data-mode="off"]')
+        alone = wait(page.pixels)
+        page.click('[data-mode="wipe"]')
+        wait(lambda: page.pixels() != alone, 10, 'the wipe')
+        page.click('[data-mode="side"]')
+        wait(lambda: page.js('return document.getElementById("film").width') == 1280)
+        page.click('[data-mode="turns"]')
+        seen = set()
+        wait(lambda: seen.add(page.pixels()) or len(seen) > 1, 10, 'both in turns')
+        page.click('#versions-button')
+        wait(lambda: len(page.all('.version')) == 2)
+
+    def test_overlays_are_drawn_and_leave_the_scene_alone(self):
+        page = self.page
+        wait(lambda: page.js('return tuneStore.film.phase') == 'complete', 60)
+        film = page.film()
+        page.click('#overlays-button')
+        page.click('[data-overlay="velocities"]')
+        wait(lambda: page.film() != film)
+        page.click('[data-overlay="emitters"]')
+        wait(lambda: page.all('#marks .emitter'))
+        self.assertEqual(page.text(), SCENE)
+
+    def test_a_sweep_shows_values_and_takes_the_one_that_is_clicked(self):
+        page = self.page
+        page.wait_for_frame(1)
+        page.select('/emitters/0')
+        page.js('document.querySelector(`#controls .row[data-key="rate"] [aria-label^=Sweep]`).click()')
+        field = page.find('#popover .text')
+        field.clear()
+        field.send_keys('100, 900', Keys.ENTER)
+        wait(lambda: len(page.all('.cell img')) == 2, 60, 'two pictures')
+        page.all('.cell')[1].click()
+        wait(lambda: page.text() == SCENE.replace('4.0e2', '900'))
+
+
+class TheFile(Case):
+    def test_an_edit_from_outside_is_taken_when_nothing_is_lost(self):
+        other = SCENE.replace('4.0e2', '77')
+        new = self.folder / 'new'
+        new.write_text(other)
+        os.replace(new, self.scene)  # as editors do
+        wait(lambda: self.page.text() == other, 10)
+        self.assertTrue(self.page.js('return tuneStore.doc.saved'))
+
+    def test_an_edit_from_outside_beside_own_changes_is_never_overwritten(self):
+        page = self.page
+        page.set_text(SCENE.replace('4.0e2', '500'))
+        other = SCENE.replace('4.0e2', '77')
+        self.scene.write_text(other)
+        wait(lambda: page.find('#banner').is_displayed(), 10)
+        self.command('s')
+        self.assertEqual(self.scene.read_text(), other)
+        page.click('#show-both')
+        self.assertIn('500', page.find('.both .differs').text)
+        self.keys(Keys.ESCAPE)
+        page.click('#keep-own')
+        page.idle()
+        self.command('s')
+        self.assertEqual(self.scene.read_text(), SCENE.replace('4.0e2', '500'))
+
+    def test_line_ends_of_windows_stay(self):
+        crlf = SCENE.replace('\n', '\r\n').encode()
+        self.scene.write_bytes(crlf)
+        wait(lambda: '\r\n' in self.page.text(), 10)
+        self.page.select('/emitters/0')
+        self.page.type_value('rate', 'rate', 12)
+        self.command('s')
+        self.assertEqual(self.scene.read_bytes(), crlf.replace(b'4.0e2', b'12'))
+
+
+class Connections(Case):
+    def test_a_second_tab_looks_on_until_it_takes_over(self):
+        first = self.driver.current_window_handle
+        self.driver.switch_to.new_window('tab')
+        second = Page(self.driver, self.server.address)
+        wait(lambda: second.find('#banner').is_displayed())
+        status = second.js('''return fetch(tuneStore.base + 'api/undo', {method: 'POST', body: '{}', headers: {'Content-Type': 'application/json', 'X-Tab': tuneStore.tab}}).then(r => r.status)''')
+        self.assertEqual(status, 423)
+        second.click('#banner button')
+        wait(lambda: second.js('return tuneStore.writer === tuneStore.tab'))
+        second.set_text(SCENE.replace('4.0e2', '60'))
+        self.driver.switch_to.window(first)
+        wait(lambda: self.page.text() == SCENE.replace('4.0e2', '60'))
+        self.driver.switch_to.window(self.driver.window_handles[1])
+        self.driver.close()
+        self.driver.switch_to.window(first)
+
+    def test_eight_tabs_work_and_a_ninth_is_refused(self):
+        first = self.driver.current_window_handle
+        for _ in range(7):
+            self.driver.switch_to.new_window('tab')
+            Page(self.driver, self.server.address)
+            wait(lambda: self.driver.execute_script('return tuneStore.writer !== ""'))
+        self.driver.switch_to.new_window('tab')
+        self.driver.get(self.server.address)
+        self.assertIn('room for no more', self.driver.page_source)
+        for handle in self.driver.window_handles:
+            if handle != first:
+                self.driver.switch_to.window(handle)
+                self.driver.close()
+        self.driver.switch_to.window(first)
+        wait(lambda: get(self.server.address)[0] == 200, 10, 'room after tabs were closed')
+
+    def test_twenty_reloads_leave_one_stream(self):
+        for _ in range(20):
+            self.driver.refresh()
+        wait(lambda: self.page.js('return document.body.dataset.ready'))
+        wait(lambda: self.page.js('return tuneStore.writer === tuneStore.tab'), 10)
+        self.page.wait_for_frame(1)
+
+    def test_the_end_of_the_server_is_told_and_unsaved_text_comes_back(self):
+        port = self.server.address.split(':')[2].split('/')[0]
+        changed = SCENE.replace('4.0e2', '61')
+        self.page.set_text(changed)
+        self.server.kill()
+        wait(lambda: self.page.find('#gone').is_displayed(), 15)
+        self.server = Server(PROGRAM, self.scene, '--port', port)
+        self.page.open(self.server.address)
+        wait(lambda: self.page.all('.toast button'), 10)
+        self.page.click('.toast button')
+        wait(lambda: self.page.text() == changed)
+
+    def test_ctrl_c_while_frames_stream_ends_everything(self):
+        self.page.set_text(SCENE.replace('4.0e2', '3000'))
+        self.assertEqual(self.server.children(), [])
+        start = time.monotonic()
+        self.assertEqual(self.server.interrupt(), 130)
+        self.assertLess(time.monotonic() - start, 5)
+
+
+class Safety(Case):
+    def test_the_token_the_host_and_the_origin_are_checked(self):
+        address = self.server.address
+        port = address.split(':')[2].split('/')[0]
+        self.assertEqual(get(f'http://127.0.0.1:{port}/')[0], 403)
+        self.assertEqual(get(f'http://127.0.0.1:{port}/{"0" * 32}/api/state')[0], 403)
+        self.assertEqual(get(address + 'api/state', {'Host': f'evil.example:{port}'})[0], 403)
+        self.assertEqual(get(address + 'api/state', {'Origin': 'http://evil.example'})[0], 403)
+        self.assertEqual(get(address + 'api/state')[0], 200)
+        self.assertEqual(get(address + 'page/../../../etc/passwd')[0], 404)
+        self.assertEqual(get(address + 'api/undo')[0], 404, 'a GET changes nothing')
+
+    def test_changes_need_json(self):
+        request = urllib.request.Request(self.server.address + 'api/undo', data=b'{}', headers={'Content-Type': 'text/plain'})
+        with self.assertRaises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(request, timeout=10)
+        self.assertEqual(refused.exception.code, 415)
+
+    def test_nothing_listens_beyond_this_machine(self):
+        with socket.socket() as other:
+            other.settimeout(2)
+            outside = subprocess.run(['hostname', '-I'], capture_output=True, text=True).stdout.split()
+            outside = [a for a in outside if not a.startswith('127.') and ':' not in a]
+            if not outside:
+                self.skipTest('this machine has no other address')
+            port = int(self.server.address.split(':')[2].split('/')[0])
+            self.assertNotEqual(other.connect_ex((outside[0], port)), 0)
+
+
+class Narrow(Case):
+    def test_a_narrow_window_shows_one_panel_at_a_time(self):
+        set_size(self.driver, 480, 900)
+        try:
+            self.page.click('[data-show="text"]')
+            self.assertTrue(self.page.find('#right').is_displayed())
+            self.assertFalse(self.page.find('#left').is_displayed())
+            self.assertLessEqual(self.page.js('return document.documentElement.scrollWidth'), 480)
+        finally:
+            set_size(self.driver, 1280, 800)
+
+
+if __name__ == '__main__':
+    unittest.main(argv=[sys.argv[0], *sys.argv[3:]], verbosity=2)

@@ -1,0 +1,141 @@
+"""A sitting of `offstage tune` and a headless browser that looks at it, for the tests and the benchmark."""
+
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+
+from selenium import webdriver
+from selenium.webdriver.chrome.options import Options
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.by import By
+
+
+def wait(condition, seconds=30, what='a condition'):
+    """The first true value of condition(); fails after so many seconds."""
+    end = time.monotonic() + seconds
+    while True:
+        value = condition()
+        if value:
+            return value
+        if time.monotonic() > end:
+            raise AssertionError(f'{what} did not come true in {seconds} s')
+        time.sleep(0.03)
+
+
+class Server:
+    """`offstage tune SCENE` as a child."""
+
+    def __init__(self, program, scene, *options):
+        self.process = subprocess.Popen([program, 'tune', str(scene), '--no-open', *options], stdout=subprocess.PIPE,
+                                        stderr=subprocess.PIPE, text=True)
+        self.address = self.process.stdout.readline().strip()
+        if not self.address:
+            raise AssertionError(self.process.stderr.read())
+
+    def memory_mb(self):
+        with open(f'/proc/{self.process.pid}/status') as status:
+            return next(int(line.split()[1]) / 1024 for line in status if line.startswith('VmRSS'))
+
+    def children(self):
+        with open(f'/proc/{self.process.pid}/task/{self.process.pid}/children') as children:
+            return children.read().split()
+
+    def interrupt(self, seconds=10):
+        self.process.send_signal(signal.SIGINT)
+        return self.process.wait(seconds)
+
+    def kill(self):
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+        self.process.stdout.close()
+        self.process.stderr.close()
+
+
+def browser(width=1280, height=800, dark=False):
+    options = Options()
+    options.binary_location = shutil.which('chromium') or shutil.which('chromium-browser') or ''
+    for argument in ('--headless=new', '--no-sandbox', '--disable-dev-shm-usage', '--disable-gpu', '--hide-scrollbars',
+                     '--force-device-scale-factor=1', f'--window-size={width},{height}', '--remote-debugging-pipe',
+                     '--user-data-dir=' + tempfile.mkdtemp(prefix='offstage-chromium-')):
+        options.add_argument(argument)
+    if dark:
+        options.add_argument('--force-dark-mode')
+    options.set_capability('goog:loggingPrefs', {'browser': 'ALL'})
+    driver = webdriver.Chrome(service=Service(shutil.which('chromedriver')), options=options)
+    driver.set_script_timeout(30)
+    set_size(driver, width, height)
+    return driver
+
+
+def set_size(driver, width, height):
+    driver.execute_cdp_cmd('Emulation.setDeviceMetricsOverride',
+                           {'width': width, 'height': height, 'deviceScaleFactor': 1, 'mobile': False})
+
+
+def set_dark(driver, dark):
+    driver.execute_cdp_cmd('Emulation.setEmulatedMedia',
+                           {'features': [{'name': 'prefers-color-scheme', 'value': 'dark' if dark else 'light'}]})
+
+
+class Page:
+    """The page in a tab, by what a person sees and does."""
+
+    def __init__(self, driver, address):
+        self.driver = driver
+        self.open(address)
+
+    def open(self, address):
+        self.driver.get(address)
+        wait(lambda: self.js('return document.body.dataset.ready'), what='the page')
+
+    def js(self, script, *arguments):
+        return self.driver.execute_script(script, *arguments)
+
+    def find(self, selector):
+        return self.driver.find_element(By.CSS_SELECTOR, selector)
+
+    def all(self, selector):
+        return self.driver.find_elements(By.CSS_SELECTOR, selector)
+
+    def click(self, selector):
+        self.find(selector).click()
+
+    def idle(self):
+        wait(lambda: self.js('return window.tuneIdle()'), what='the end of the requests')
+
+    def text(self):
+        return self.js('return tuneStore.doc.text')
+
+    def film(self):
+        return self.js('return tuneStore.doc.film')
+
+    def pixels(self):
+        """A sum over the canvas that differs for other pictures."""
+        return self.js('''const c = document.getElementById('film'); const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+            let a = 0; for (let i = 0; i < d.length; i += 4) a = (a * 31 + d[i] * 7 + d[i + 1] * 3 + d[i + 2]) % 4294967291; return a;''')
+
+    def wait_for_frame(self, frame=None, seconds=60, film=None):
+        """Until the canvas shows this frame (or any) of the version that is edited."""
+        wait(lambda: self.js('''const c = document.getElementById('film').dataset;
+            return c.film === (arguments[1] ?? tuneStore.doc.film) && (arguments[0] === null ? c.frame > 0 : Number(c.frame) === arguments[0]);''', frame, film),
+            seconds, f'frame {frame}')
+
+    def select(self, path):
+        self.js('document.querySelector(`#tree [data-path="${arguments[0]}"]`).click()', path)
+
+    def type_value(self, key, name, value):
+        field = self.find(f'#controls .row[data-key="{key}"] input[aria-label="{name}"]')
+        self.js('arguments[0].scrollIntoView({block: "center"}); arguments[0].focus(); arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event("change"))', field, str(value))
+        self.idle()
+
+    def set_text(self, text):
+        self.js('const t = document.getElementById("text"); t.value = arguments[0]; t.dispatchEvent(new Event("input"))', text)
+        wait(lambda: self.text() == text, what='the text')
+
+    def errors(self):
+        """What the browser complains of."""
+        return [entry for entry in self.driver.get_log('browser') if entry['level'] == 'SEVERE']
