@@ -21,9 +21,8 @@ constexpr std::size_t kMaxImpacts = 128, kImpactsPerBody = 4;
 /// the fast solver, and in us of their own solver; by the exact solver so many times more. In a pile each
 /// impact moves everything, and makes hundreds of others.
 constexpr std::size_t kImpactWork = 2500, kExactImpactWork = 8;
-/// How often an impact goes over its island: back to it, through it and on from it. And what it takes to look when
-/// a pair meets, for each piece of its way.
-constexpr std::size_t kPasses = 3, kLookWork = 2;
+/// Of it, what it takes to look when a pair meets, for each piece of its way.
+constexpr std::size_t kLookWork = 2;
 /// After so many times the work no pair is traced back any more in the sub-step.
 constexpr std::size_t kLastWork = 4;
 /// Points this near to each other when two bodies collide take part [m].
@@ -250,7 +249,7 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
       bring_to(islands[island], start, impact.time, h, report);
     }
     ++report.tracebacks;
-    work += kPasses * impact_work(islands[island]);
+    work += impact_work(islands[island]);
     if (work > most_work) settle_pairs(island, report);
     work += collide(island, start, impact.time, h, report);
     // What was foreseen of these bodies is not what will be.

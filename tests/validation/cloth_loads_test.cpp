@@ -277,36 +277,6 @@ TEST(ClothHanging, AStripHangsInACatenary) {
   }
 }
 
-// A box sleeps on the floor at the lower edge of a sheet. What moves it is the sheet, whose upper edge a hand lifts
-// or, later, a gust blows at.
-TEST(ClothPins, WakeASleepingBodyWhenTheClothPullsAtIt) {
-  for (const bool by_wind : {false, true}) {
-    World world({.max_step = 1.0 / 120});
-    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0});
-    const Vec3 place(0, 0.05, 0), grip(0, 0.9, 0);
-    const BodyHandle box =
-        world.add_body({.shape = Box{{0.5, 0.1, 0.1}}, .pose = {place}, .mass = 0.1, .restitution = 0});
-    BodyDef hand{.shape = Sphere{0.02}, .motion = MotionType::kinematic, .pose = {grip}, .collides = false};
-    const Vec3 lift = by_wind ? Vec3(Vec3::Zero()) : Vec3(0, 0.5, 0);
-    hand.track.keys = {{0, {grip}}, {3, {grip}}, {4, {grip + lift}}};
-    const BodyHandle holder = world.add_body(hand);
-    ClothDef def = effects::grid_cloth({0.5, 0.8, 5, 8}, {}, cotton());
-    for (Vec3& v : def.vertices) v = Vec3(v.x(), 0.5 - v.z(), 0);  // hangs, from 0.9 to 0.1
-    for (uint32_t c = 0; c <= 5; ++c) {
-      const uint32_t low = 8 * 6 + c;
-      def.pins.push_back({.vertex = c, .body = holder, .position = def.vertices[c] - grip});
-      def.pins.push_back({.vertex = low, .body = box, .position = def.vertices[low] - place});
-    }
-    const ClothHandle cloth = world.add_cloth(def);
-    if (by_wind) world.add_force({.cloths = {cloth}, .start = 3, .effect = ConstantField{.force = {0, 0, 8}}});
-    for (int i = 0; i < 34; ++i) world.step(1.0 / 12);
-    EXPECT_TRUE(world.is_asleep(box)) << by_wind;
-    for (int i = 0; i < 24; ++i) world.step(1.0 / 12);
-    const Vec3 moved = world.body(box).centre - place;
-    EXPECT_GT(by_wind ? moved.z() : moved.y(), by_wind ? 0.02 : 0.3) << by_wind;
-  }
-}
-
 TEST(ClothPins, AClothCarriedByABodyHandsBlowsOnToIt) {
   // A frame in free space carries a taut cloth; a ball flies into it. Nothing else can take up momentum.
   World world({.gravity = Vec3::Zero()});
