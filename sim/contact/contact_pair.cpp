@@ -39,6 +39,10 @@ bool is_sphere_pair(Body& a, Body& b) {
   return is_sphere_pair(p.piece(0), q.piece(0));
 }
 
+bool is_ball(const Body& body) {
+  return std::holds_alternative<Sphere>(body.def.shape);
+}
+
 /// A surface without edges.
 bool is_round(const Body& body) {
   return std::holds_alternative<Sphere>(body.def.shape) || std::holds_alternative<Capsule>(body.def.shape);
@@ -228,7 +232,10 @@ void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_wit
   at_end_.clear();
   has_narrow_ = false;
   for (const PlacedManifold& m : placed_) {
-    has_narrow_ |= !(m.manifold.continues_a && m.manifold.continues_b) && is_narrow(m.manifold);
+    // No edge of a face acts on a ball that lies on it.
+    const bool on_face = (m.manifold.source == NormalSource::face_of_b && is_ball(*a_)) ||
+                         (m.manifold.source == NormalSource::face_of_a && is_ball(*b_));
+    has_narrow_ |= !on_face && !(m.manifold.continues_a && m.manifold.continues_b) && is_narrow(m.manifold);
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const Real separation = m.manifold.points[k].separation;
       separation_ = std::min(separation_, separation);

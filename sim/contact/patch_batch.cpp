@@ -265,7 +265,7 @@ void set_patch(PatchBatch& p, unsigned lane, const ContactPatch& c, Real substep
     PatchBatch::Point& q = p.points[i];
     q.x[lane] = narrow(c.points[i].t);
     q.y[lane] = narrow(c.points[i].k);
-    q.radius[lane] = narrow(std::hypot(c.points[i].t, c.points[i].k));
+    q.radius[lane] = narrow(std::sqrt(c.points[i].t * c.points[i].t + c.points[i].k * c.points[i].k));
     q.mass[lane] = 1;
     q.start[lane] = narrow(c.points[i].separation);
     q.impulse[lane] = narrow(substep * c.points[i].force);
@@ -300,7 +300,9 @@ Vector solve_friction(PatchBatch& p, Groups& u) {
   p.holds = size2 < kHolds * limits.x * limits.y ? float_lanes(1) : FloatLanes{};
   p.pressure = slides ? pressure(p) : FloatLanes{};
   if (_mm256_movemask_ps(FloatLanes(slides)) != 0) {
-    const Vector slide = sliding_impulse(p, u.friction, limits);
+    const bool isotropic = _mm256_movemask_ps(FloatLanes(p.friction_t == p.friction_k)) == 0xFF;
+    const Vector slide = isotropic ? sliding_impulse<true>(p, u.friction, limits)
+                                   : sliding_impulse<false>(p, u.friction, limits);
     next = {slides ? slide.x : next.x, slides ? slide.y : next.y, slides ? slide.z : next.z};
   }
   const Vector change = next - p.friction_impulse;
@@ -421,6 +423,13 @@ Groups relative_now(const PatchBatch& p, const LaneTwist& a, const LaneTwist& b,
   return {u.normal + gain.normal, u.friction + gain.friction};
 }
 
+/// Whether in some lane friction changes the normal velocity noticeably. Between balls it does not.
+bool is_coupled(const PatchBatch& p) {
+  constexpr float kNoticeable = 1e-4F;  // squared share
+  const FloatLanes &x = p.coupling.x.x, &y = p.coupling.y.x, &K = p.normal_mobility.xx;
+  return _mm256_movemask_ps(FloatLanes(x * x + y * y > kNoticeable * K * K)) != 0;
+}
+
 /// Of bodies that roll the normal and the friction depend on each other so much that taking turns converges
 /// slowly: where the point neither parts nor slides, all three impulses come from one system. Returns the
 /// change, and sets `all` if that was everywhere.
@@ -474,7 +483,7 @@ void sweep_single(PatchBatch& p, std::span<BodyMotion> motions, const SubstepTim
   const Single before = u;
   bool all = false;
   Single change{};
-  if (p.turns) change = solve_single_rolling(p, u, gap, all);
+  if (p.turns && is_coupled(p)) change = solve_single_rolling(p, u, gap, all);
   const float tolerance = std::exchange(p.tolerance, kSettled);
   if (!all) {
     for (uint32_t i = 0; i < kPatchRounds; ++i) {

@@ -83,7 +83,9 @@ inline PatchVector separate_impulse(const PatchBatch& p, const PatchVector& u, c
 /// against that point's own velocity, so that sliding lengthens the spin and the spin the slide. A point's
 /// friction is taken as viscous with the coefficient limit / speed, which makes one linear system of the
 /// patch; the speeds are those that separate laws would leave, which is right where nothing spins.
-inline PatchVector sliding_impulse(const PatchBatch& p, const PatchVector& twist, const PatchVector& limits) {
+/// `kIsotropic`: in all lanes friction_t is friction_k, which takes fewer operations.
+template <bool kIsotropic>
+PatchVector sliding_impulse(const PatchBatch& p, const PatchVector& twist, const PatchVector& limits) {
   std::array<FloatLanes, 4> viscous_t, viscous_k;
   const auto round = p.friction_t == p.friction_k;
   const FloatLanes slowest = float_lanes(kSlowestSliding);
@@ -98,8 +100,12 @@ inline PatchVector sliding_impulse(const PatchBatch& p, const PatchVector& twist
     const PatchBatch::Point& q = p.points[i];
     const auto [t, k] = at(i, u);
     const FloatLanes speed = lane_sqrt(t * t + k * k);
-    viscous_t[i] = q.impulse * p.friction_t / lane_max(round ? speed : lane_abs(t), slowest);
-    viscous_k[i] = q.impulse * p.friction_k / lane_max(round ? speed : lane_abs(k), slowest);
+    if constexpr (kIsotropic) {
+      viscous_t[i] = viscous_k[i] = q.impulse * p.friction_t / lane_max(speed, slowest);
+    } else {
+      viscous_t[i] = q.impulse * p.friction_t / lane_max(round ? speed : lane_abs(t), slowest);
+      viscous_k[i] = q.impulse * p.friction_k / lane_max(round ? speed : lane_abs(k), slowest);
+    }
     const FloatLanes x = viscous_k[i] * q.x, y = viscous_t[i] * q.y;
     A.xx += viscous_t[i];
     A.xz -= y;
@@ -117,8 +123,13 @@ inline PatchVector sliding_impulse(const PatchBatch& p, const PatchVector& twist
     const FloatLanes limit_t = q.impulse * p.friction_t, limit_k = q.impulse * p.friction_k;
     const FloatLanes size = lane_sqrt(f * f + g * g);
     const FloatLanes scale = size > limit_t ? limit_t / size : float_lanes(1);
-    f = round ? scale * f : lane_clamp(f, limit_t);
-    g = round ? scale * g : lane_clamp(g, limit_k);
+    if constexpr (kIsotropic) {
+      f *= scale;
+      g *= scale;
+    } else {
+      f = round ? scale * f : lane_clamp(f, limit_t);
+      g = round ? scale * g : lane_clamp(g, limit_k);
+    }
     impulse = impulse - PatchVector{f, g, q.x * g - q.y * f};
   }
   return impulse;
