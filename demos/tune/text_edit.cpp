@@ -268,9 +268,20 @@ std::string set_value(std::string_view text, std::string_view path, std::string_
     std::string result(text);
     return result.replace(way.end->value.begin, way.end->value.end - way.end->value.begin, value);
   }
-  for (std::size_t i = steps.size(); i > way.taken + 1;
-       --i)  // what the missing objects hold, from the inside
-    value = steps[i - 1] == "0" ? "[" + value + "]" : "{" + quoted(steps[i - 1]) + ": " + value + "}";
+  // What the missing objects and lists hold, from the inside. A list in an object whose keys have lines of
+  // their own has its first item on one, too.
+  const auto indent = way.end->object && !way.end->parts.empty()
+                          ? own_line_indent(text, way.end->parts.back().begin())
+                          : std::nullopt;
+  const std::string line(line_end(text));
+  for (std::size_t i = steps.size(); i > way.taken + 1; --i) {
+    if (steps[i - 1] != "0")
+      value = "{" + quoted(steps[i - 1]) + ": " + value + "}";
+    else if (indent && i == way.taken + 2)
+      value = "[" + line + *indent + "  " + value + line + *indent + "]";
+    else
+      value = "[" + value + "]";
+  }
   const std::string& step = steps[way.taken];
   if (way.end->list && index_of_step(step) == way.end->parts.size()) return append_to(text, *way.end, value);
   if (!way.end->object) refuse_path(path);

@@ -1,6 +1,6 @@
 """A sitting of `offstage tune` and a headless browser that looks at it, for the tests and the benchmark."""
 
-import os
+import atexit
 import shutil
 import signal
 import subprocess
@@ -56,11 +56,13 @@ class Server:
 
 
 def browser(width=1280, height=800, dark=False):
+    profile = tempfile.mkdtemp(prefix='offstage-chromium-')
+    atexit.register(shutil.rmtree, profile, ignore_errors=True)
     options = Options()
     options.binary_location = shutil.which('chromium') or shutil.which('chromium-browser') or ''
     for argument in ('--headless=new', '--no-sandbox', '--disable-dev-shm-usage', '--disable-gpu', '--hide-scrollbars',
                      '--force-device-scale-factor=1', f'--window-size={width},{height}', '--remote-debugging-pipe',
-                     '--user-data-dir=' + tempfile.mkdtemp(prefix='offstage-chromium-')):
+                     '--user-data-dir=' + profile):
         options.add_argument(argument)
     if dark:
         options.add_argument('--force-dark-mode')

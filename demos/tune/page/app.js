@@ -37,7 +37,7 @@ function drawFilmState() {
     waiting.classList.remove('failed');
     waiting.hidden = !!byId('film').dataset.film;
   }
-  if (!store.doc?.scene) { text.textContent = 'The text is no valid scene yet: see the errors below it.'; waiting.classList.add('failed'); }
+  if (!store.doc?.scene) { text.textContent = 'The text is not a valid scene yet. Its errors are listed below the text.'; waiting.classList.add('failed'); }
 }
 
 function bind() {
