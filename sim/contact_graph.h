@@ -27,8 +27,8 @@ struct Island {
 class ContactGraph {
  public:
   /// Makes the pairs those that the broad phase found, of which at least one is dynamic: new ones are made by
-  /// `surface_of(a, b)`, those of before are kept, others forgotten unless `adds`. `body_at` gives the body in a
-  /// slot.
+  /// `surface_of(a, b)`, those of before are kept, others forgotten unless `adds`. `body_at` gives the body
+  /// in a slot.
   template <class BodyAt, class SurfaceOf>
   void update(std::span<const IndexPair> candidates, bool adds, BodyAt&& body_at, SurfaceOf&& surface_of);
 
@@ -67,7 +67,8 @@ void ContactGraph::update(std::span<const IndexPair> candidates, bool adds, Body
     ++old;
   };
   for (const auto& [low, high] : candidates) {
-    while (old < entries_.size() && std::pair(entries_[old].low, entries_[old].high) < std::pair(low, high)) pass();
+    while (old < entries_.size() && std::pair(entries_[old].low, entries_[old].high) < std::pair(low, high))
+      pass();
     if (old < entries_.size() && entries_[old].low == low && entries_[old].high == high) {
       next_.push_back(std::move(entries_[old++]));
       continue;

@@ -6,8 +6,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Pieces in which the motion of what joints hold is integrated: of its turning, and of the phase of its fastest
-/// swinging [rad]; and the most of them.
+/// Pieces in which the motion of what joints hold is integrated: of its turning, and of the phase of its
+/// fastest swinging [rad]; and the most of them.
 constexpr Real kTurn = 0.12, kSwing = 1, kWhirl = 1, kMostPieces = 64;
 
 }  // namespace
@@ -200,8 +200,8 @@ void SpringNetwork::add_joint_forces(const Jointed& jointed, Real t, std::span<c
   }
 }
 
-/// No integrator of a fixed step follows what turns by much more in it, or swings: links that are pulled tight
-/// are the masses of a string.
+/// No integrator of a fixed step follows what turns by much more in it, or swings: links that are pulled
+/// tight are the masses of a string.
 Real SpringNetwork::pieces(Real h) const {
   Real fastest = 0, tightest = 0, whirling = 0;
   for (const Body* body : bodies_) whirling = std::max(whirling, greatest_spin(body->rigid));
@@ -210,7 +210,8 @@ Real SpringNetwork::pieces(Real h) const {
       fastest = std::max(fastest, body->rigid.angular_velocity().norm());
     tightest = std::max(tightest, j.articulation->greatest_frequency());
   }
-  return std::clamp(std::ceil(std::max({fastest / kTurn, tightest / kSwing, whirling / kWhirl}) * h), 1.0, kMostPieces);
+  return std::clamp(std::ceil(std::max({fastest / kTurn, tightest / kSwing, whirling / kWhirl}) * h), 1.0,
+                    kMostPieces);
 }
 
 void SpringNetwork::load(std::span<Real> x, std::span<Real> p) const {

@@ -232,14 +232,11 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
     const Impact impact = *first;
     ContactPair& pair = *impact.pair;
     const bool tumbles = turn_of(pair) * h > kImpactTurn;
-    if (++pair.impacts > (tumbles ? kMaxOfTumblingPair : kMaxImpactsOfPair)) {
+    if (++pair.impacts > (tumbles ? kMaxOfTumblingPair : kMaxImpactsOfPair) || count >= most ||
+        work > kLastWork * most_work) {
       pair.gave_up = true;
       ++report.cut_short;
     }
-    // Then what is left are the islands of the impacts that are known, each once.
-    if (count >= most || work > kLastWork * most_work)
-      for (ContactPair* left : active_pairs)
-        if (!std::exchange(left->gave_up, true)) report.cut_short += left->by_event;
     const uint32_t island = pair.a().is_awake() ? pair.a().island : pair.b().island;
     if (pair.a().is_awake() && pair.b().is_awake()) {
       bring_to(islands[pair.a().island], start, impact.time, h, report);

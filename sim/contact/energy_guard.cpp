@@ -11,7 +11,9 @@ namespace {
 constexpr Real kAdded = 0.02;
 
 bool is_driven(const Island& island) {
-  const auto drives = [](const Body* body) { return body && body->is_kinematic() && body->def.track.moves(); };
+  const auto drives = [](const Body* body) {
+    return body && body->is_kinematic() && body->def.track.moves();
+  };
   return std::any_of(island.pairs.begin(), island.pairs.end(),
                      [&](const ContactPair* p) {
                        return drives(&p->a()) || drives(&p->b()) || p->surface().conveys;

@@ -22,9 +22,9 @@ constexpr Real kWorth = 2.5, kCredit = 120;
 constexpr Real kShare = 0.25, kLongestWait = 2400;
 /// With so little of the credit left, only what is known to be cheap is tried.
 constexpr Real kLittle = 0.05;
-/// The most that an attempt may take: in a world where no solver takes long, and, as multiples of the fast solver, on
-/// bodies that move. Those at rest, none of which is faster than kQuiet, may use all of the credit: they will go on as
-/// they are, and what their solution takes then is little [ns], [m/s].
+/// The most that an attempt may take: in a world where no solver takes long, and, as multiples of the fast
+/// solver, on bodies that move. Those at rest, none of which is faster than kQuiet, may use all of the
+/// credit: they will go on as they are, and what their solution takes then is little [ns], [m/s].
 constexpr Real kMostOfFew = 2e6, kMostOfMoving = 3, kQuiet = 0.1;
 
 bool is_quiet(const Island& island) {

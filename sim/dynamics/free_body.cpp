@@ -12,10 +12,12 @@
 namespace offstage::sim {
 namespace {
 
-/// Pieces in which the free rotation of a sub-step is integrated, by the fastest spin that its angular momentum
-/// allows [rad], and the most of them: a thin body that turns across its length may come to spin about it.
+/// Pieces in which the free rotation of a sub-step is integrated, by the fastest spin that its angular
+/// momentum allows [rad], and the most of them: a thin body that turns across its length may come to spin
+/// about it.
 constexpr Real kTurn = 0.5, kMostPieces = 8;
-/// Beyond these, pieces by the angle of a kick of SplitRotation and by its nutation [rad], and the most of them.
+/// Beyond these, pieces by the angle of a kick of SplitRotation and by its nutation [rad], and the most of
+/// them.
 constexpr Real kKick = 0.05, kNutation = 0.2, kMostKicks = 1000;
 /// Of the energy of a free rotation, which does not change: what may be off.
 constexpr Real kRotationEnergy = 1e-3;
@@ -61,10 +63,10 @@ void integrate(RigidBody& body, const BodyForces& forces, const Integrator& inte
 
 namespace {
 
-/// The free rotation of a body that turns by many radians in a sub-step, or could. Its kinetic energy is that of a
-/// symmetric top, whose motion has a closed form, and a rest of one axis that is also exact by itself; of both in
-/// turns (Touma and Wisdom, "Lie-Poisson integrators for rigid body dynamics in the solar system", 1994). The angular
-/// momentum is kept exactly, and the energy does not drift.
+/// The free rotation of a body that turns by many radians in a sub-step, or could. Its kinetic energy is that
+/// of a symmetric top, whose motion has a closed form, and a rest of one axis that is also exact by itself;
+/// of both in turns (Touma and Wisdom, "Lie-Poisson integrators for rigid body dynamics in the solar system",
+/// 1994). The angular momentum is kept exactly, and the energy does not drift.
 class SplitRotation {
  public:
   explicit SplitRotation(const RigidBody& body) : H_(body.angular_momentum) {
@@ -83,7 +85,8 @@ class SplitRotation {
   void advance(RigidBody& body, Real h) const {
     const Real momentum = H_.norm(), kick = std::abs(inverse_[kicked_] - inverse_[1]) * momentum,
                nutation = std::sqrt(kick * momentum * inverse_[0]);
-    const Real pieces = std::clamp(std::ceil(h * std::max(kick / kKick, nutation / kNutation)), 1.0, kMostKicks);
+    const Real pieces =
+        std::clamp(std::ceil(h * std::max(kick / kKick, nutation / kNutation)), 1.0, kMostKicks);
     const Real before = energy(body.orientation);
     Quat q = body.orientation * body_from_principal_;
     for (Real i = 0; i < pieces; ++i) {
