@@ -178,7 +178,8 @@ CLI::App* add_tune(CLI::App& app, TuneOptions& tune) {
   command->add_option("--port", tune.port, "Port on this machine (default: any that is free)")
       ->check(CLI::Range(1, 65535));
   command->add_option("--size", tune.size, "Size WxH that drafts fit into")->capture_default_str();
-  command->add_flag("!--no-open", tune.open, "Only print the address and open no browser");
+  command->add_flag_callback(
+      "--no-open", [&tune] { tune.open = false; }, "Only print the address and open no browser");
   command->add_flag("--no-cache", tune.scene.no_cache,
                     "Cut models into convex parts each time instead of keeping them in ~/.cache/offstage");
   add_threads(*command, tune.threads);
