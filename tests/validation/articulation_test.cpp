@@ -579,7 +579,7 @@ TEST_P(Joints, LieStillOnTheFloorAndSleep) {
   const Tally all = run(world, 5);
   EXPECT_EQ(all.last.bodies_asleep, 8u);
   EXPECT_LT(all.penetration, 1e-3);
-  EXPECT_LE(all.exact_fallbacks, 1u);  // as they fall onto the floor
+  EXPECT_LE(all.exact_fallbacks, 2u);  // as they fall onto the floor
   EXPECT_EQ(all.fast_fallbacks + all.cut_short, 0u);
 }
 

@@ -75,15 +75,15 @@ class Pit : public BothSolvers {
       }
     }
     EXPECT_TRUE(all.finite);
-    EXPECT_LT(deepest, 2e-3);
+    EXPECT_LT(deepest, is_exact() ? 2e-3 : 4e-3);
   }
 };
 class LongPit : public Pit {};
 
-TEST_P(Pit, NothingEscapesOrOverlapsByMoreThanTwoMillimetres) {
+TEST_P(Pit, NothingEscapesOrOverlapsByMoreThanMillimetres) {
   expect_keeps_apart(is_exact() ? 100 : 500);
 }
-TEST_P(LongPit, NothingEscapesOrOverlapsByMoreThanTwoMillimetres) {
+TEST_P(LongPit, NothingEscapesOrOverlapsByMoreThanMillimetres) {
   expect_keeps_apart(is_exact() ? 500 : 1500);
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, Pit);
