@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdlib>
 #include <mutex>
+#include <optional>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -123,6 +124,7 @@ void pin_environment(int raster_threads, GlPlatform platform) {
 struct Context::Impl {
   std::unique_ptr<PlatformContext> platform;
   ContextInfo info;
+  std::optional<gl::SharedPrograms> programs;  // they end before the context
 };
 
 Context::Context() : impl_(std::make_unique<Impl>()) {
@@ -133,11 +135,10 @@ Context::Context() : impl_(std::make_unique<Impl>()) {
   info.version = gl_string(GL_VERSION);
   info.glsl = gl_string(GL_SHADING_LANGUAGE_VERSION);
   check(info);
+  impl_->programs.emplace();
 }
 
-Context::~Context() {
-  gl::delete_shared_programs();
-}
+Context::~Context() = default;
 
 const ContextInfo& Context::info() const {
   return impl_->info;

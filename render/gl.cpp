@@ -128,9 +128,17 @@ Program make_program(std::span<const std::string_view> vertex, std::span<const s
 
 namespace {
 
-thread_local std::map<std::string, Program> shared_programs;  // a thread has one context
+thread_local SharedPrograms* thread_programs = nullptr;  // a thread has one context
 
 }  // namespace
+
+SharedPrograms::SharedPrograms() {
+  thread_programs = this;
+}
+
+SharedPrograms::~SharedPrograms() {
+  thread_programs = nullptr;
+}
 
 GLuint shared_program(std::span<const std::string_view> vertex, std::span<const std::string_view> fragment,
                       std::span<const std::string> defines) {
@@ -139,13 +147,10 @@ GLuint shared_program(std::span<const std::string_view> vertex, std::span<const 
   key += "| ";
   for (const std::string_view file : fragment) key.append(file).append(" ");
   for (const std::string& define : defines) key += "| " + define;
-  const auto known = shared_programs.find(key);
-  if (known != shared_programs.end()) return known->second;
-  return shared_programs.emplace(key, make_program(vertex, fragment, defines)).first->second;
-}
-
-void delete_shared_programs() {
-  shared_programs.clear();
+  auto& programs = thread_programs->programs_;
+  const auto known = programs.find(key);
+  if (known != programs.end()) return known->second;
+  return programs.emplace(key, make_program(vertex, fragment, defines)).first->second;
 }
 
 void check_error(const char* where) {

@@ -3,6 +3,7 @@
 /// .cpp files of render/ sees GL.
 
 #include <cstddef>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -107,8 +108,20 @@ Program make_program(std::span<const std::string_view> vertex, std::span<const s
 /// program takes longer than a frame. Whoever uses it sets all of its uniforms before each draw.
 GLuint shared_program(std::span<const std::string_view> vertex, std::span<const std::string_view> fragment,
                       std::span<const std::string> defines = {});
-/// Deletes the shared programs; the context, which is about to end, must be current.
-void delete_shared_programs();
+
+/// Owns what shared_program() of this thread builds, from construction to destruction; a context has one.
+class SharedPrograms {
+ public:
+  SharedPrograms();
+  ~SharedPrograms();
+  SharedPrograms(const SharedPrograms&) = delete;
+  SharedPrograms& operator=(const SharedPrograms&) = delete;
+
+ private:
+  friend GLuint shared_program(std::span<const std::string_view> vertex,
+                               std::span<const std::string_view> fragment, std::span<const std::string> defines);
+  std::map<std::string, Program> programs_;
+};
 
 /// A program that is built when first used: start-up pays only for what a scene draws.
 class LazyProgram {
