@@ -128,7 +128,7 @@ class Editing(Case):
         self.command('z')
         self.assertEqual(page.text(), SCENE)
         self.assertEqual(page.film(), film)
-        page.wait_for_frame(1, seconds=1)
+        page.wait_for_frame(1, seconds=10)
         self.command(Keys.SHIFT, 'z')
         self.assertNotEqual(page.text(), SCENE)
 
