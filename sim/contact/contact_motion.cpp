@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "sim/dynamics/free_body.h"
+#include "sim/unfused.h"
 
 namespace offstage::sim {
 namespace {
@@ -272,7 +273,7 @@ bool runs_along(const Body& body, Real duration) {
   return is_revolved(body.def.shape) && turn.squaredNorm() > kStraight * kStraight;
 }
 
-Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3& out_from, const Quat& to,
+OFFSTAGE_UNFUSED Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3& out_from, const Quat& to,
                 const Vec3& out_to) {
   const Shape& shape = body.def.shape;
   const auto with_body = [&](const Vec3& r) { return Vec3(to * (from.conjugate() * r)); };
