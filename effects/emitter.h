@@ -26,8 +26,8 @@ class Emitter {
  public:
   /// Throws std::invalid_argument if a parameter cannot be drawn from (radius <= 0, empty surface ...).
   /// `origin` is the world's time at which the emitter's clock shows 0. Call World::prewarm() for
-  /// as long as the emitter prewarms, so that what it releases before the world begins lives and collides until
-  /// then; without, the first emit() has it fly freely, through bodies.
+  /// as long as the emitter prewarms, so that what it releases before the world begins lives and collides
+  /// until then; without, the first emit() has it fly freely, through bodies.
   Emitter(const EmitterDef& def, sim::ParticleSystemHandle target, Real origin = 0);
 
   /// Adds to the world the particles born in (start, end], each with the time it has left in this sub-step.

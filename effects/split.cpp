@@ -32,7 +32,10 @@ const SplitDef& checked_split(const SplitDef& def) {
 }  // namespace
 
 Splitter::Splitter(const SplitDef& def, sim::ParticleSystemHandle parents, sim::ParticleSystemHandle children)
-    : def_(checked_split(def)), parents_(parents), children_(children), random_(def.seed, stream_id(def.name)) {}
+    : def_(checked_split(def)),
+      parents_(parents),
+      children_(children),
+      random_(def.seed, stream_id(def.name)) {}
 
 void Splitter::emit(sim::World& world, Real start, Real end) {
   if (!def_.enabled || def_.depth == 0) return;

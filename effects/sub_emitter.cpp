@@ -26,7 +26,10 @@ const SubEmitterDef& checked_sub_emitter(const SubEmitterDef& def) {
 
 SubEmitter::SubEmitter(const SubEmitterDef& def, sim::ParticleSystemHandle parents,
                        sim::ParticleSystemHandle target)
-    : def_(checked_sub_emitter(def)), parents_(parents), target_(target), random_(def.seed, stream_id(def.name)) {}
+    : def_(checked_sub_emitter(def)),
+      parents_(parents),
+      target_(target),
+      random_(def.seed, stream_id(def.name)) {}
 
 void SubEmitter::emit(sim::World& world, Real start, Real end) {
   born_ = 0;

@@ -12,7 +12,8 @@ class FileError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// OSMesa and EGL, a GL feature, ffmpeg or an encoder is missing or failed; the message names the Debian package.
+/// OSMesa and EGL, a GL feature, ffmpeg or an encoder is missing or failed; the message names the Debian
+/// package.
 class UnavailableError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -119,7 +119,8 @@ class SharedPrograms {
 
  private:
   friend GLuint shared_program(std::span<const std::string_view> vertex,
-                               std::span<const std::string_view> fragment, std::span<const std::string> defines);
+                               std::span<const std::string_view> fragment,
+                               std::span<const std::string> defines);
   std::map<std::string, Program> programs_;
 };
 

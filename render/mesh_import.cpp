@@ -188,7 +188,8 @@ class NodeNames {
   std::string next(const aiNode& node) {
     const std::string name = node.mName.length > 0 ? node.mName.C_Str() : "node";
     std::string unique = name;
-    for (int& count = counts_[name]; !taken_.insert(unique).second;) unique = name + "_" + std::to_string(++count + 1);
+    for (int& count = counts_[name]; !taken_.insert(unique).second;)
+      unique = name + "_" + std::to_string(++count + 1);
     return unique;
   }
 
@@ -204,8 +205,8 @@ Affine3d turned_and_moved(const Affine3d& m) {
   return Eigen::Translation3d(m.translation()) * rotation;
 }
 
-/// Lists the nodes that have meshes, and adds the meshes of all of them, or of the one that is `wanted`. Depth first
-/// with a stack of its own: the depth is the file's choice.
+/// Lists the nodes that have meshes, and adds the meshes of all of them, or of the one that is `wanted`.
+/// Depth first with a stack of its own: the depth is the file's choice.
 void place_nodes(const aiScene& scene, const std::string& wanted, PartBuilder& builder, Model& model) {
   struct Item {
     const aiNode* node;
@@ -232,7 +233,8 @@ void place_nodes(const aiScene& scene, const std::string& wanted, PartBuilder& b
           builder.add(node.mMeshes[i], rigid.inverse() * world_from_node);
       }
     }
-    for (unsigned i = node.mNumChildren; i-- > 0;) stack.push_back({node.mChildren[i], world_from_node, item.parent});
+    for (unsigned i = node.mNumChildren; i-- > 0;)
+      stack.push_back({node.mChildren[i], world_from_node, item.parent});
   }
 }
 
@@ -260,7 +262,8 @@ Model import_model(const std::filesystem::path& path, const std::string& node) {
   place_nodes(*scene, node, builder, model);
   if (!node.empty() && std::ranges::find(model.nodes, node, &Model::Node::name) == model.nodes.end()) {
     std::string why = path.string() + ": has no node '" + node + "' with triangles; known:";
-    for (std::size_t i = 0; i < std::min<std::size_t>(model.nodes.size(), 20); ++i) why += " '" + model.nodes[i].name + "'";
+    for (std::size_t i = 0; i < std::min<std::size_t>(model.nodes.size(), 20); ++i)
+      why += " '" + model.nodes[i].name + "'";
     throw FileError(why);
   }
   std::erase_if(model.parts, [](const Model::Part& part) { return part.mesh.indices.empty(); });

@@ -11,8 +11,8 @@ struct aiScene;
 
 namespace offstage::render {
 
-/// One part per material; those whose file has no normals have none. Of a `node` its own triangles alone, seen from
-/// where it is; empty: all. Throws FileError.
+/// One part per material; those whose file has no normals have none. Of a `node` its own triangles alone,
+/// seen from where it is; empty: all. Throws FileError.
 Model import_model(const std::filesystem::path& path, const std::string& node);
 
 /// Fills `materials` and `textures`, with a warning for each texture that is not found. Textures are looked

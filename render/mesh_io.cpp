@@ -174,8 +174,8 @@ void limit_this_process(uint64_t file_bytes) {
 }
 
 /// The child: leaves a model or a message in the memory file.
-[[noreturn]] void import_and_exit(const std::filesystem::path& path, const std::string& node, uint64_t file_bytes,
-                                  int memory) {
+[[noreturn]] void import_and_exit(const std::filesystem::path& path, const std::string& node,
+                                  uint64_t file_bytes, int memory) {
   std::string message;
   try {
     limit_this_process(file_bytes);

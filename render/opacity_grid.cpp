@@ -6,7 +6,7 @@
 namespace offstage::render {
 namespace {
 
-constexpr int kOpacityCells = 72;            // along the longest side
+constexpr int kOpacityCells = 72;     // along the longest side
 constexpr float kCellsPerRadius = 2;  // of a typical puff, at most: finer cells would show single puffs
 
 // Corners of a tetrahedron: places within a puff that stand for all of it.

@@ -123,7 +123,8 @@ PuffAtlas::Picture PuffAtlas::make_picture(Kind kind, uint32_t seed) {
       picture.levels[0][static_cast<std::size_t>(y * n + x)] = pack(1 - through, normal);
     }
   }
-  for (std::size_t k = 1; k < kLevels; ++k) picture.levels[k] = half_float(picture.levels[k - 1], n >> (k - 1));
+  for (std::size_t k = 1; k < kLevels; ++k)
+    picture.levels[k] = half_float(picture.levels[k - 1], n >> (k - 1));
   return picture;
 }
 

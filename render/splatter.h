@@ -17,9 +17,10 @@ namespace offstage::render {
 /// One puff on the screen, in pixels of the picture it is drawn in, y upwards: an affine picture of an
 /// atlas's cell, lit by its normals. It fades where the scene cuts through it.
 struct Splat {
-  float x, y;                  ///< of the centre
-  float half_x, half_y;        ///< half-size of the rectangle around it
-  float ux, uy, vx, vy;        ///< place in the atlas's cell, in [-1, 1]: u = ux * dx + uy * dy, v = vx * dx + vy * dy
+  float x, y;            ///< of the centre
+  float half_x, half_y;  ///< half-size of the rectangle around it
+  float ux, uy, vx,
+      vy;  ///< place in the atlas's cell, in [-1, 1]: u = ux * dx + uy * dy, v = vx * dx + vy * dy
   float depth, inverse_reach;  ///< along the view axis [m]; 1 / (2 * radius)
   float opacity;               ///< where the cell covers all
   float cover;                 ///< of its opacity that hides what is behind: 1 smoke, 0 only adds light

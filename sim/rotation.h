@@ -9,12 +9,13 @@
 
 namespace offstage::sim {
 
-/// The smallest rotation that turns direction `from` into direction `to`; neither may be zero, lengths do not matter.
-/// Opposite directions are a half turn about the axis perpendicular to `from` that is closest to Z (for a `from` near
-/// Z: to X). Eigen's FromTwoVectors does the same with a singular value decomposition, which takes five seconds to
-/// compile in every file that calls it.
+/// The smallest rotation that turns direction `from` into direction `to`; neither may be zero, lengths do not
+/// matter. Opposite directions are a half turn about the axis perpendicular to `from` that is closest to Z
+/// (for a `from` near Z: to X). Eigen's FromTwoVectors does the same with a singular value decomposition,
+/// which takes five seconds to compile in every file that calls it.
 template <typename A, typename B>
-Eigen::Quaternion<typename A::Scalar> rotation_between(const Eigen::MatrixBase<A>& from, const Eigen::MatrixBase<B>& to) {
+Eigen::Quaternion<typename A::Scalar> rotation_between(const Eigen::MatrixBase<A>& from,
+                                                       const Eigen::MatrixBase<B>& to) {
   using Scalar = typename A::Scalar;
   using Vector = Eigen::Matrix<Scalar, 3, 1>;
   const Vector f = from.normalized(), t = to.normalized();

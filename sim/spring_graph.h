@@ -1,6 +1,6 @@
 #pragma once
-/// What springs, joints and forces between particles join (physics E7): dynamic bodies and particle systems that are
-/// connected through them, however far, form a component. A particle system counts as one object.
+/// What springs, joints and forces between particles join (physics E7): dynamic bodies and particle systems
+/// that are connected through them, however far, form a component. A particle system counts as one object.
 
 #include <span>
 #include <utility>

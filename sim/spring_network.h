@@ -1,6 +1,6 @@
 #pragma once
-/// Bodies and particles that springs, joints and forces between particles join, as one dynamic system (physics
-/// R1, R2, A1, P2).
+/// Bodies and particles that springs, joints and forces between particles join, as one dynamic system
+/// (physics R1, R2, A1, P2).
 ///
 /// Layout: per body x = [position 3, quaternion x y z w], p = [L 3, H 3]; then per particle x = position, p =
 /// velocity.

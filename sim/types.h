@@ -1,10 +1,10 @@
 #pragma once
 /// The number, vector and pose types of the simulation. SI units, right-handed frames, Y up.
 
+#include <limits>
+
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-
-#include <limits>
 
 namespace offstage::sim {
 

@@ -226,7 +226,8 @@ void World::Impl::remove_dead_springs() {
   for (SpringHandle handle : dead) {
     const SpringDef& def_ = springs[handle].def;
     for (const Attachment* end : {&def_.a, &def_.b})
-      if (const auto* point = std::get_if<BodyPoint>(end); point && is_alive(*end)) wake(*bodies[point->body]);
+      if (const auto* point = std::get_if<BodyPoint>(end); point && is_alive(*end))
+        wake(*bodies[point->body]);
     springs.erase(handle);
   }
 }

@@ -130,8 +130,8 @@ struct NonFinite {
   Vec3 position = Vec3::Zero(), velocity = Vec3::Zero();
 };
 
-/// Two bodies whose contact forces are approximate: of a group of contacts that the solver meant for it did not
-/// solve, the pair with the greatest error.
+/// Two bodies whose contact forces are approximate: of a group of contacts that the solver meant for it did
+/// not solve, the pair with the greatest error.
 struct RoughContact {
   BodyHandle a, b;
 };
@@ -159,10 +159,10 @@ struct StepReport {
   uint64_t settled = 0;     ///< pairs in a pile that did not bounce any more in a sub-step, likewise
   uint64_t foreseen = 0;    ///< contacts of the fast solver that were looked for at a step's end
   uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
-  ContactWork exact, fast;       ///< of the solvers of resting contact
-  ContactWork impacts;           ///< of the solver of collisions
+  ContactWork exact, fast;                   ///< of the solvers of resting contact
+  ContactWork impacts;                       ///< of the solver of collisions
   std::vector<RoughContact> rough_contacts;  ///< one for each fall-back of these, in their order
-  IntegratorReport integration;  ///< of the free motion
+  IntegratorReport integration;              ///< of the free motion
 
   Real joint_error = 0;  ///< greatest that was left of a joint's constraint at the end of a motion [m], [rad]
   uint64_t joints_unsolved = 0;            ///< times that joints could not be put back together
@@ -273,10 +273,10 @@ class World {
 
   /// Lets particles alone live from one time up to another, in sub-steps as step() has them, before the first
   /// step(): from <= to <= 0 [s], and a further call goes on where the last one ended. time() is then `to`.
-  /// Particles collide with each other and with bodies. Dynamic bodies, cloths, springs and the particles that
-  /// were there before stand still, kinematic bodies follow their tracks, forces are those of time 0, and
-  /// forces between particles do not act. With from = to = 0, `before` is called once, and particles born at
-  /// that time exist from then on. Throws std::invalid_argument for other times.
+  /// Particles collide with each other and with bodies. Dynamic bodies, cloths, springs and the particles
+  /// that were there before stand still, kinematic bodies follow their tracks, forces are those of time 0,
+  /// and forces between particles do not act. With from = to = 0, `before` is called once, and particles born
+  /// at that time exist from then on. Throws std::invalid_argument for other times.
   StepReport prewarm(Real from, Real to, const BeforeSubStep& before = {});
 
   /// Advances by `sampling_time` in the fewest equal sub-steps not longer than WorldDef::max_step.

@@ -138,8 +138,8 @@ bool World::Impl::move_in_broad_phase(Body& body, bool again) {
   return true;
 }
 
-/// The pairs of bodies whose ways come near each other. `again` in a sub-step: impacts and islands know of pairs,
-/// which must last until its end.
+/// The pairs of bodies whose ways come near each other. `again` in a sub-step: impacts and islands know of
+/// pairs, which must last until its end.
 void World::Impl::collect_pairs(bool again) {
   if (!std::exchange(pairs_changed, false)) return;
   graph.update(

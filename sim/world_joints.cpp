@@ -124,7 +124,8 @@ Real Motor::target(Real time) const {
     const Key& at = targets[k];
     return {at.time, Eigen::Array<Real, 1, 1>(at.target), at.interpolation};
   };
-  const std::size_t i = segment_at(targets.size(), [&](std::size_t k) { return targets[k].time; }, time);
+  const std::size_t i = segment_at(
+      targets.size(), [&](std::size_t k) { return targets[k].time; }, time);
   const Key &from = targets[i], &to = targets[i + 1];
   if (smooth && from.interpolation == Interpolation::monotone) {
     const Real share = (time - from.time) / (to.time - from.time);

@@ -70,8 +70,8 @@ void World::Impl::add_events(std::vector<ParticleEvent>& events) {
   particle_events.insert(particle_events.end(), events.begin(), events.end());
 }
 
-/// What particles and cloths did to bodies in a sub-step that ends at a time changes their momenta from the next
-/// one on, and through joints those of all that these hold.
+/// What particles and cloths did to bodies in a sub-step that ends at a time changes their momenta from the
+/// next one on, and through joints those of all that these hold.
 void World::Impl::push_bodies(std::span<const Reaction> reactions, Real time) {
   std::vector<uint32_t> pushed;
   for (const Reaction& r : reactions) {

@@ -73,7 +73,7 @@ inline Quat feature_rotation(const ConvexPair& pair, Dice& dice) {
   const uint32_t choice = dice.index(5);
   if (choice == 0 && a.face_count() > 0 && b.face_count() > 0)
     return rotation_between(b.plane(dice.index(b.face_count())).normal,
-                                -a.plane(dice.index(a.face_count())).normal);
+                            -a.plane(dice.index(a.face_count())).normal);
   if (choice == 1 && !a.edges().empty() && !b.edges().empty()) {
     const auto e = a.edge(dice.index(a.edges().size())), f = b.edge(dice.index(b.edges().size()));
     return rotation_between(b.vertex(f.head) - b.vertex(f.tail), a.vertex(e.head) - a.vertex(e.tail));

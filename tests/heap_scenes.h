@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "tests/random.h"
 #include "sim/world.h"
+#include "tests/random.h"
 
 namespace offstage::sim {
 
@@ -31,7 +31,9 @@ inline TriangleMesh silo_mesh() {
       const Real angle = 2 * std::numbers::pi * i / kAround;
       mesh.vertices.emplace_back(radius * std::cos(angle), height, radius * std::sin(angle));
     }
-  const auto at = [](std::size_t ring, uint32_t i) { return static_cast<uint32_t>(1 + ring * kAround + i % kAround); };
+  const auto at = [](std::size_t ring, uint32_t i) {
+    return static_cast<uint32_t>(1 + ring * kAround + i % kAround);
+  };
   for (uint32_t i = 0; i < kAround; ++i) {
     mesh.triangles.push_back({0, at(0, i + 1), at(0, i)});
     for (std::size_t ring = 0; ring + 1 < kProfile.size(); ++ring) {
@@ -71,9 +73,10 @@ inline void add_ragdoll(World& world, const Pose& at) {
                 at.orientation * Quat::FromTwoVectors(Vec3::UnitY(), to - from)};
     return world.add_body(def);
   };
-  const auto join = [&](JointType type, BodyHandle a, BodyHandle b, const Vec3& anchor, const Vec3& axis, Real lower,
-                        Real upper) {
-    JointDef def{.type = type, .a = a, .b = b, .anchor = at.point_to_world(anchor), .axis = at.vector_to_world(axis)};
+  const auto join = [&](JointType type, BodyHandle a, BodyHandle b, const Vec3& anchor, const Vec3& axis,
+                        Real lower, Real upper) {
+    JointDef def{
+        .type = type, .a = a, .b = b, .anchor = at.point_to_world(anchor), .axis = at.vector_to_world(axis)};
     if (type == JointType::revolute) {
       def.lower = lower;
       def.upper = upper;
@@ -83,7 +86,8 @@ inline void add_ragdoll(World& world, const Pose& at) {
     def.friction = 0.5;
     world.add_joint(def);
   };
-  const BodyHandle hips = limb({0, 0, -0.08}, {0, 0, 0.08}, 0.1, 12), chest = limb({0.3, 0, -0.1}, {0.3, 0, 0.1}, 0.12, 20),
+  const BodyHandle hips = limb({0, 0, -0.08}, {0, 0, 0.08}, 0.1, 12),
+                   chest = limb({0.3, 0, -0.1}, {0.3, 0, 0.1}, 0.12, 20),
                    head = limb({0.52, 0, 0}, {0.68, 0, 0}, 0.08, 4);
   join(JointType::spherical, chest, hips, {0.14, 0, 0}, Vec3::UnitX(), 0, 0.6);
   join(JointType::spherical, head, chest, {0.47, 0, 0}, Vec3::UnitX(), 0, 0.7);
@@ -109,10 +113,12 @@ inline World heap_scene(Heap heap, SolverKind solver = SolverKind::automatic, Re
   };
   switch (heap) {
     case Heap::spheres_in_a_silo:
-      world.add_body({.shape = MeshShape{world.add_mesh(silo_mesh())}, .motion = MotionType::fixed, .restitution = 0.3});
+      world.add_body(
+          {.shape = MeshShape{world.add_mesh(silo_mesh())}, .motion = MotionType::fixed, .restitution = 0.3});
       for (int i = 0; i < 180; ++i)
         world.add_body({.shape = Sphere{0.06 + 0.02 * u(i, 0)},
-                        .pose = {Vec3(0.2 * (i % 3 - 1) + 0.04 * u(i, 1), 0.8 + 0.2 * (i / 9), 0.2 * (i / 3 % 3 - 1) + 0.04 * u(i, 2))},
+                        .pose = {Vec3(0.2 * (i % 3 - 1) + 0.04 * u(i, 1), 0.8 + 0.2 * (i / 9),
+                                      0.2 * (i / 3 % 3 - 1) + 0.04 * u(i, 2))},
                         .restitution = 0.3,
                         .friction = 0.4});
       break;
@@ -120,7 +126,9 @@ inline World heap_scene(Heap heap, SolverKind solver = SolverKind::automatic, Re
       world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0.5, .friction = 0.6});
       for (int i = 0; i < 180; ++i)
         world.add_body({.shape = Box{Vec3::Constant(0.2)},
-                        .pose = {Vec3(0.32 * (i % 3 - 1) + 0.05 * u(i, 1), 0.5 + 0.35 * (i / 9), 0.32 * (i / 3 % 3 - 1) + 0.05 * u(i, 2)), turn(i)},
+                        .pose = {Vec3(0.32 * (i % 3 - 1) + 0.05 * u(i, 1), 0.5 + 0.35 * (i / 9),
+                                      0.32 * (i / 3 % 3 - 1) + 0.05 * u(i, 2)),
+                                 turn(i)},
                         .angular_velocity = 4 * Vec3(u(i, 8) - 0.5, u(i, 9) - 0.5, u(i, 10) - 0.5),
                         .restitution = 0.5,
                         .friction = 0.3 + 0.7 * u(i, 3)});
@@ -129,12 +137,16 @@ inline World heap_scene(Heap heap, SolverKind solver = SolverKind::automatic, Re
       world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0, .friction = 0.6});
       for (int i = 0; i < 6; ++i)
         add_ragdoll(world, {Vec3(0.1 * u(i, 1), 0.6 + 0.5 * i, 0.1 * u(i, 2)),
-                            Quat(Eigen::AngleAxisd(1.1 * i, Vec3::UnitY())) * Quat(Eigen::AngleAxisd(0.4 * u(i, 3), Vec3::UnitZ()))});
+                            Quat(Eigen::AngleAxisd(1.1 * i, Vec3::UnitY())) *
+                                Quat(Eigen::AngleAxisd(0.4 * u(i, 3), Vec3::UnitZ()))});
       break;
     case Heap::bodies_on_terrain:
       world.add_body({.shape = MeshShape{world.add_mesh(terrain_mesh())}, .motion = MotionType::fixed});
-      world.add_body({.shape = Box{{2.5, 0.01, 2.5}}, .pose = {Vec3(0, 2, 0), turn(1)}, .velocity = {1, 0, 0.5}});
-      world.add_body({.shape = Box{{0.02, 1.5, 0.02}}, .pose = {Vec3(1, 3, -1), turn(2)}, .angular_velocity = {3, 0, 5}});
+      world.add_body(
+          {.shape = Box{{2.5, 0.01, 2.5}}, .pose = {Vec3(0, 2, 0), turn(1)}, .velocity = {1, 0, 0.5}});
+      world.add_body({.shape = Box{{0.02, 1.5, 0.02}},
+                      .pose = {Vec3(1, 3, -1), turn(2)},
+                      .angular_velocity = {3, 0, 5}});
       break;
   }
   return world;

@@ -12,7 +12,8 @@
 using namespace offstage;
 
 int main() try {
-  // Two rods of 0.5 m and 1 kg, horizontal at first. Each hangs from its left end by a hinge about the Z axis.
+  // Two rods of 0.5 m and 1 kg, horizontal at first. Each hangs from its left end by a hinge about the Z
+  // axis.
   constexpr double kLength = 0.5;
   sim::World world({.max_step = 1.0 / 960});
   sim::BodyHandle upper, lower;

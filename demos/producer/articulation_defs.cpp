@@ -46,7 +46,8 @@ void add_copies(const Template& original, uint64_t seed, Scene& flat, std::vecto
     moved.name += copy.suffix;
     moved.position = copy.motion.point_to_world(original.position);
     moved.orientation = copy.motion.orientation * original.orientation;
-    if constexpr (requires { moved.velocity; }) moved.velocity = copy.motion.vector_to_world(original.velocity);
+    if constexpr (requires { moved.velocity; })
+      moved.velocity = copy.motion.vector_to_world(original.velocity);
     scale(moved, copy.scale);
     add(build(moved), flat);
   }
@@ -79,7 +80,8 @@ void add_copies(const Joint& joint, const Scene& scene, Scene& flat) {
     moved.a += copy.suffix;
     if (has_copies(b)) moved.b += copy.suffix;
     moved.anchor = copy.motion.point_to_world(joint.anchor);
-    moved.anchor_b = has_copies(b) || joint.b.empty() ? copy.motion.point_to_world(joint.anchor_b) : joint.anchor_b;
+    moved.anchor_b =
+        has_copies(b) || joint.b.empty() ? copy.motion.point_to_world(joint.anchor_b) : joint.anchor_b;
     moved.behaviour.axis = copy.motion.vector_to_world(joint.behaviour.axis);
     moved.behaviour.second_axis = copy.motion.vector_to_world(joint.behaviour.second_axis);
     flat.joints.push_back(std::move(moved));
@@ -87,9 +89,10 @@ void add_copies(const Joint& joint, const Scene& scene, Scene& flat) {
 }
 
 sim::Motor motor_def(const JointMotor& motor, Real unit) {
-  sim::Motor m{.mode = motor.mode, .smooth = motor.smooth, .stiffness = motor.stiffness, .damping = motor.damping};
+  sim::Motor m{
+      .mode = motor.mode, .smooth = motor.smooth, .stiffness = motor.stiffness, .damping = motor.damping};
   if (motor.max_effort) m.max_effort = *motor.max_effort;
-  for (const MotorKey& key : motor.keys) 
+  for (const MotorKey& key : motor.keys)
     m.targets.push_back({key.time, unit * key.target, key.interpolation.value_or(motor.interpolation)});
   if (m.targets.empty()) m.targets.push_back({0, unit * motor.target});
   return m;

@@ -119,8 +119,8 @@ Parts build(const Ragdoll& doll) {
   const auto limb = [&](Real top, Real bottom, Real radius) {
     return sim::Capsule{H * radius, H * (top - bottom - 2 * radius)};
   };
-  // The volume of all parts is kVolume H^3. A limp joint's dry friction bears that share of what would hold the
-  // whole figure out by its feet.
+  // The volume of all parts is kVolume H^3. A limp joint's dry friction bears that share of what would hold
+  // the whole figure out by its feet.
   constexpr Real kVolume = 0.0098, kLimp = 0.004, kGravity = 9.81;
   const Real torque = doll.stiffness * kLimp * kVolume * doll.density * H * H * H * kGravity * H;
   const auto join = [&](const std::string& a, const std::string& b, const Vec3& anchor, const Vec3& axis,

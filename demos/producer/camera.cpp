@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "sim/dynamics/keyframes.h"
 #include "producer/to_float.h"
+#include "sim/dynamics/keyframes.h"
 
 namespace offstage::producer {
 namespace {

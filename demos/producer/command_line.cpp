@@ -423,9 +423,9 @@ std::string wrong_command(const std::vector<const char*>& arguments,
          " (--help lists all)";
 }
 
-constexpr std::array kCommandNames = {"render", "frame",   "sheet",    "sweep",  "simulate",
-                                      "new",    "tune",     "encode",  "validate", "schema", "presets",
-                                      "info",   "compare", "bless",    "doctor", "man", "completion"};
+constexpr std::array kCommandNames = {"render",  "frame",  "sheet",    "sweep",  "simulate",  "new",
+                                      "tune",    "encode", "validate", "schema", "presets",   "info",
+                                      "compare", "bless",  "doctor",   "man",    "completion"};
 
 int dispatch(int argc, char** argv, const TuneCommand& tune) {
   std::vector<const char*> arguments(argv, argv + argc);

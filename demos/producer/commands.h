@@ -161,9 +161,9 @@ int bless_command(const BlessOptions& options);
 
 struct TuneOptions {
   SceneOptions scene;
-  int port = 0;                 ///< 0: any that is free
+  int port = 0;                  ///< 0: any that is free
   std::string size = "640x360";  ///< of drafts
-  bool open = true;             ///< the page in a browser
+  bool open = true;              ///< the page in a browser
   int threads = 0;
   render::GlPlatform gl = render::GlPlatform::automatic;
 };

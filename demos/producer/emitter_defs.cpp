@@ -1,9 +1,10 @@
 #include "producer/emitter_defs.h"
-#include "sim/rotation.h"
 
 #include <algorithm>
 #include <limits>
 #include <map>
+
+#include "sim/rotation.h"
 
 namespace offstage::producer {
 namespace {

@@ -11,7 +11,8 @@ constexpr Real kGravity = 9.81;
 constexpr Real kDegrees = 180 / std::numbers::pi;
 
 /// A motor that follows keys smoothly and firmly, or as firmly as its effort allows.
-JointMotor follow(sim::Motor::Mode mode, const std::vector<MotorKey>& keys, std::optional<Real> max_effort = {}) {
+JointMotor follow(sim::Motor::Mode mode, const std::vector<MotorKey>& keys,
+                  std::optional<Real> max_effort = {}) {
   return {.mode = mode, .keys = keys, .smooth = true, .max_effort = max_effort};
 }
 
@@ -41,7 +42,8 @@ class MachineBuilder {
     b.density = mass / volume;
     return b;
   }
-  Body& box(const std::string& name, const std::string& material, const Vec3& size, Real mass, const Vec3& centre) {
+  Body& box(const std::string& name, const std::string& material, const Vec3& size, Real mass,
+            const Vec3& centre) {
     return part(name, material, sim::Box{size}, size.prod(), mass, centre);
   }
   Joint& join(sim::JointType type, const std::string& name, const std::string& a, const std::string& b,
@@ -62,8 +64,8 @@ class MachineBuilder {
 
 }  // namespace
 
-/// The chassis is low and narrow, for the wheels to turn beside it; the body is over them. Each wheel hangs on a hub
-/// that slides up and down on a spring, the front ones with a knuckle between that steers.
+/// The chassis is low and narrow, for the wheels to turn beside it; the body is over them. Each wheel hangs
+/// on a hub that slides up and down on a spring, the front ones with a knuckle between that steers.
 Parts build(const Vehicle& car) {
   using enum sim::JointType;
   MachineBuilder make(car);
@@ -112,13 +114,13 @@ Parts build(const Vehicle& car) {
         };
         steering.behaviour.motor = follow(sim::Motor::Mode::position, mapped(car.steer, angle));
       }
-      make.part(wheel, car.tyre, sim::Cylinder{r, tread}, std::numbers::pi * r * r * tread, wheel_mass, centre,
-                Quat(Eigen::AngleAxisd(-std::numbers::pi / 2, Vec3::UnitZ())));
+      make.part(wheel, car.tyre, sim::Cylinder{r, tread}, std::numbers::pi * r * r * tread, wheel_mass,
+                centre, Quat(Eigen::AngleAxisd(-std::numbers::pi / 2, Vec3::UnitZ())));
       Joint& axle = make.join(revolute, wheel, wheel, front ? knuckle : hub, centre, Vec3::UnitX());
       if (!front && !car.speed.empty())
-        axle.behaviour.motor = follow(sim::Motor::Mode::speed,
-                                      mapped(car.speed, [&](Real speed) { return kDegrees * speed / r; }),
-                                      car.max_torque);
+        axle.behaviour.motor =
+            follow(sim::Motor::Mode::speed,
+                   mapped(car.speed, [&](Real speed) { return kDegrees * speed / r; }), car.max_torque);
     }
   return std::move(make.make.parts);
 }

@@ -15,8 +15,9 @@ void read_links(Scene& scene, const std::filesystem::path& folder, std::vector<P
     if (!tree || tree->file.empty()) continue;
     try {
       for (const render::Model::Node& node : render::read_model(model_file(tree->file, folder)).nodes)
-        tree->links.push_back(
-            {node.name, node.parent, {node.position.cast<Real>(), node.orientation.cast<Real>().normalized()}});
+        tree->links.push_back({node.name,
+                               node.parent,
+                               {node.position.cast<Real>(), node.orientation.cast<Real>().normalized()}});
     } catch (const render::FileError& error) {
       Where where = tree->where;
       where.path += "/file";
@@ -36,7 +37,8 @@ Parts build(const ModelTree& tree) {
     body.density = tree.density;
     body.collides = tree.collides;
     if (link.parent < 0 && tree.base.empty()) continue;
-    const std::string above = link.parent >= 0      ? make.own(tree.links[static_cast<std::size_t>(link.parent)].name)
+    const std::string above = link.parent >= 0
+                                  ? make.own(tree.links[static_cast<std::size_t>(link.parent)].name)
                               : tree.base == "world" ? ""
                                                      : tree.base;
     const Quat orientation = body.orientation;

@@ -189,7 +189,8 @@ struct Overlays::Builder {
   Source operator()(const JointsOverlay& overlay) const {
     JointLines lines{&overlay, {}};
     world.for_each_joint([&](sim::JointHandle joint) {
-      if (overlay.joint.empty() || overlay.joint == world.joint_def(joint).name) lines.joints.push_back(joint);
+      if (overlay.joint.empty() || overlay.joint == world.joint_def(joint).name)
+        lines.joints.push_back(joint);
     });
     return lines;
   }

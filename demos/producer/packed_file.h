@@ -1,7 +1,7 @@
 #pragma once
 /// Binary files of our own, compressed and checksummed: a header with a magic word and a format version, then
-/// the zstd-compressed payload. What is damaged, cut short or of another kind or version is distinguished from
-/// what is whole.
+/// the zstd-compressed payload. What is damaged, cut short or of another kind or version is distinguished
+/// from what is whole.
 
 #include <cstdint>
 #include <cstring>

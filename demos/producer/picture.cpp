@@ -8,10 +8,10 @@
 #include "producer/line_sketch.h"
 #include "producer/particle_sources.h"
 #include "producer/texts.h"
+#include "producer/to_float.h"
 #include "render/bloom.h"
 #include "render/primitives.h"
 #include "render/tone_map.h"
-#include "producer/to_float.h"
 
 namespace offstage::producer {
 namespace {
@@ -19,13 +19,14 @@ namespace {
 using Eigen::Affine3f;
 using Eigen::Vector3f;
 
-/// Half the edge of the square that stands for an infinite plane [m]: from 300 m up, it still reaches to where its
-/// horizon hides it.
+/// Half the edge of the square that stands for an infinite plane [m]: from 300 m up, it still reaches to
+/// where its horizon hides it.
 constexpr float kGroundHalfSize = 256'000;
 constexpr float kGroundTexture_m = 2000;  // of one copy of its texture
 
 Affine3f affine(const Vec3& position, const Quat& orientation, Real scale = 1) {
-  return Eigen::Translation3f(position.cast<float>()) * orientation.cast<float>() * Eigen::Scaling(to_float(scale));
+  return Eigen::Translation3f(position.cast<float>()) * orientation.cast<float>() *
+         Eigen::Scaling(to_float(scale));
 }
 
 /// The mesh of a primitive, and the numbers that tell it from others. Boxes get a small bevel, so that their
@@ -345,8 +346,8 @@ render::Image Picture::draw(const Snapshot& previous, const Snapshot& current,
   }
   const float weight = 1 / static_cast<float>(n), exposed = exposure(current.time, weight);
   if (scene_.render.bloom > 0)
-    render::add_bloom(sum_,
-                      {.strength = to_float(scene_.render.bloom), .exposure = exposed, .sample_weight = weight});
+    render::add_bloom(
+        sum_, {.strength = to_float(scene_.render.bloom), .exposure = exposed, .sample_weight = weight});
   render::Image image = render::tone_map(
       sum_, {.curve = scene_.render.tone_curve, .exposure = exposed, .sample_weight = weight});
   if (n == 1) render::filter_edges(image);

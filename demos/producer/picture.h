@@ -30,9 +30,10 @@ class Picture {
   Picture(const Scene& scene, const ModelLibrary& models, render::Context& context);
 
   /// The frame at `current`; the shutter is open during the end of the interval from `previous`, the frame
-  /// before it (or the same snapshot for the first frame, which has no motion blur). The camera is that of the
-  /// scene as it is now. If `stop` says so between two sub-frames, the image has no pixels.
-  render::Image draw(const Snapshot& previous, const Snapshot& current, const std::function<bool()>& stop = {});
+  /// before it (or the same snapshot for the first frame, which has no motion blur). The camera is that of
+  /// the scene as it is now. If `stop` says so between two sub-frames, the image has no pixels.
+  render::Image draw(const Snapshot& previous, const Snapshot& current,
+                     const std::function<bool()>& stop = {});
   /// The camera of the latest picture.
   const render::Camera& camera() const { return latest_camera_; }
 
@@ -101,8 +102,9 @@ class Picture {
   std::vector<DrawnBody> bodies_;
   std::vector<render::InstanceHandle> rods_;  // null where invisible
   std::vector<render::PointsHandle> points_;
-  std::vector<render::PointStyle> styles_;    // of the same
-  std::vector<render::PointsHandle> smears_;  // motion blur of balls that move too far in a sub-frame; or null
+  std::vector<render::PointStyle> styles_;  // of the same
+  std::vector<render::PointsHandle>
+      smears_;  // motion blur of balls that move too far in a sub-frame; or null
   std::map<std::string, render::MaterialHandle> fabrics_;  // by fabric and material
   std::vector<DrawnCloth> cloths_;
   std::vector<render::LinesHandle> overlays_;  // null for those without lines

@@ -55,7 +55,8 @@ Vector3f interpolate(const Vector3f& a, const Vector3f& va, const Vector3f& b, c
 
 float Picture::subframe_time() const {
   const int n = subframes(scene_.render.quality);
-  return n == 1 ? 0 : to_float(scene_.render.shutter / scene_.output.fps.per_second()) / static_cast<float>(n);
+  return n == 1 ? 0
+                : to_float(scene_.render.shutter / scene_.output.fps.per_second()) / static_cast<float>(n);
 }
 
 void Picture::set_balls(std::size_t set, std::span<const render::Point> balls) {
@@ -91,8 +92,8 @@ void Picture::place_rods(const Snapshot& previous, const Snapshot& current, floa
     stage_.set_visible(rods_[i], drawn);
     if (drawn)
       stage_.set_transform(rods_[i], Eigen::Translation3f(0.5f * (a + b)) *
-                                            sim::rotation_between(Vector3f::UnitY(), d) *
-                                            Eigen::Scaling(1.f, d.norm(), 1.f));
+                                         sim::rotation_between(Vector3f::UnitY(), d) *
+                                         Eigen::Scaling(1.f, d.norm(), 1.f));
   }
 }
 

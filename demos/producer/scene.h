@@ -19,8 +19,8 @@
 #include "producer/scene_joint.h"
 #include "producer/scene_particles.h"
 #include "producer/scene_values.h"
-#include "render/frame_rate.h"
 #include "render/channels.h"
+#include "render/frame_rate.h"
 #include "render/model.h"
 #include "render/stage.h"
 #include "render/tone_map.h"
@@ -101,8 +101,8 @@ struct ModelLook {
 
 struct BodyKey {
   Real time = 0;
-  std::optional<Vec3> position;     ///< default: the body's
-  std::optional<Quat> orientation;  ///< default: the body's
+  std::optional<Vec3> position;                     ///< default: the body's
+  std::optional<Quat> orientation;                  ///< default: the body's
   std::optional<sim::Interpolation> interpolation;  ///< to the next key; default: the body's
 };
 
@@ -260,7 +260,7 @@ struct CameraKey {
   Real time = 0;
   Vec3 eye = {4, 2.5, 6};
   Vec3 target = Vec3::Zero();
-  std::optional<Real> fov_deg, focus;  ///< default: the camera's
+  std::optional<Real> fov_deg, focus;               ///< default: the camera's
   std::optional<sim::Interpolation> interpolation;  ///< to the next key; default: the camera's
 };
 struct KeyframedCamera : Lens {

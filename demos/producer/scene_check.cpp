@@ -534,8 +534,8 @@ Findings check_scene(const Scene& scene, const Scene& flat, const std::filesyste
 
 Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real c, Real m) {
   // x'' = -(k/m) x and v' = -(c/m) v: the ends of the stability region on the imaginary and on the negative
-  // real axis. The Euler methods, the leapfrog and the midpoint rule share 2; Runge-Kutta 4 has 2 sqrt(2) and 2.785. The
-  // implicit method has no end, and the others, from there on, find their own step.
+  // real axis. The Euler methods, the leapfrog and the midpoint rule share 2; Runge-Kutta 4 has 2 sqrt(2)
+  // and 2.785. The implicit method has no end, and the others, from there on, find their own step.
   if (integrator >= sim::IntegratorKind::implicit_euler) return kUnlimited;
   const bool rk4 = integrator == sim::IntegratorKind::rk4;
   const Real by_stiffness = (rk4 ? 2 * std::sqrt(2.0) : 2) * std::sqrt(m / k),

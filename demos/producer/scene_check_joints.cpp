@@ -39,7 +39,8 @@ class JointChecker {
     std::set<std::string> names;
     for (const Joint& joint : flat_.joints)
       if (!names.insert(joint.name).second)
-        return fail(joint.where.path + "/name", "the name '" + joint.name + "' is already that of another joint");
+        return fail(joint.where.path + "/name",
+                    "the name '" + joint.name + "' is already that of another joint");
   }
 
   const Body* body(const std::string& path, const std::string& name) {
@@ -67,7 +68,8 @@ class JointChecker {
   void check(const std::string& path, const JointBehaviour& joint) {
     using enum sim::JointType;
     const bool slides = joint.type == prismatic || joint.type == distance;
-    if (joint.limits && !slides) fail(path + "/limits", "is for prismatic and distance joints; use \"limits_deg\"");
+    if (joint.limits && !slides)
+      fail(path + "/limits", "is for prismatic and distance joints; use \"limits_deg\"");
     if (joint.limits_deg && slides) fail(path + "/limits_deg", "is for joints that turn; use \"limits\"");
     check_limits(path + "/limits", joint.limits);
     check_limits(path + "/limits_deg", joint.limits_deg);
@@ -80,9 +82,11 @@ class JointChecker {
     if (!joint_def(whole).has_free_coordinate())
       for (const auto& [key, value] : {std::pair("/friction", joint.friction), {"/damping", joint.damping}})
         if (value > 0)
-          fail(path + key, "acts where a joint may move: not on a fixed one, nor on a rod without limits and motor");
+          fail(path + key,
+               "acts where a joint may move: not on a fixed one, nor on a rod without limits and motor");
     if (!joint.motor) return;
-    if (joint.type != revolute && !slides) fail(path + "/motor", "drives revolute, prismatic and distance joints only");
+    if (joint.type != revolute && !slides)
+      fail(path + "/motor", "drives revolute, prismatic and distance joints only");
     check_keys(path + "/motor/keys", joint.motor->keys);
   }
 
@@ -104,7 +108,8 @@ class JointChecker {
       return end == "world" || (it != flat_.bodies.end() && it->motion != sim::MotionType::dynamic);
     };
     if (is_still(chain.start) && is_still(chain.end) && chain.sag < 1.0005)
-      fail(chain.where.path + "/sag", "must be over 1.0005 if both ends are held still: a taut chain bears nothing across");
+      fail(chain.where.path + "/sag",
+           "must be over 1.0005 if both ends are held still: a taut chain bears nothing across");
     for (const auto& [key, end] : {std::pair("/start", &chain.start), {"/end", &chain.end}})
       if (!end->empty() && *end != "world") body(chain.where.path + key, *end);
   }
@@ -126,7 +131,8 @@ class JointChecker {
   }
   void check(const Crane& crane) {
     const std::string& path = crane.where.path;
-    for (const auto& [key, keys] : {std::pair("/slew", &crane.slew), {"/trolley", &crane.trolley}, {"/hoist", &crane.hoist}})
+    for (const auto& [key, keys] :
+         {std::pair("/slew", &crane.slew), {"/trolley", &crane.trolley}, {"/hoist", &crane.hoist}})
       check_keys(path + key, *keys);
     if (!(crane.load_size <= 0.25 * std::min(crane.height, crane.reach)))
       fail(path + "/load_size", "must be at most a quarter of the height and of the reach");
@@ -140,7 +146,8 @@ class JointChecker {
     for (const NodeJoint& joint : tree.joints) {
       check(joint.where.path, joint.behaviour);
       if (joint.behaviour.type == sim::JointType::distance)
-        fail(joint.where.path + "/type", "must be another: a node and the one above it have no distance to keep");
+        fail(joint.where.path + "/type",
+             "must be another: a node and the one above it have no distance to keep");
       if (!names.empty() && std::ranges::find(names, joint.node) == names.end())
         fail(joint.where.path + "/node",
              tree.file + " has no node '" + joint.node + "' with triangles" + suggestion(joint.node, names));

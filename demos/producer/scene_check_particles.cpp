@@ -138,9 +138,10 @@ class ParticleChecker {
     const Real longest = effects::upper_bound(source.lifespan);
     const auto check_age = [&](Real age, const std::string& where, const char* what) {
       if (age >= longest)
-        fail(path + where, fmt::format("is {:g} s, but particles live {:g} s at most and never {}; allowed is "
-                                       "less than the lifespan",
-                                       age, longest, what));
+        fail(path + where,
+             fmt::format("is {:g} s, but particles live {:g} s at most and never {}; allowed is "
+                         "less than the lifespan",
+                         age, longest, what));
     };
     if (source.split && source.split->enabled && effects::upper_bound(source.split->count) >= 0.5)
       check_age(effects::lower_bound(source.split->age), "/split/age", "split");

@@ -1,5 +1,6 @@
 #pragma once
-/// The joints and articulations of a scene; see scene.h. Places and directions are those of the world at time 0.
+/// The joints and articulations of a scene; see scene.h. Places and directions are those of the world at time
+/// 0.
 
 #include <array>
 #include <optional>
@@ -81,7 +82,7 @@ struct Ragdoll {
   Vec3 velocity = Vec3::Zero();
   Real height = 1.75;
   Real density = 1000;
-  Real stiffness = 1;            ///< of the joints' dry friction: 1 is a limp grown-up
+  Real stiffness = 1;                 ///< of the joints' dry friction: 1 is a limp grown-up
   std::string skin, shirt, trousers;  ///< names of materials
   Placement placement;
 };
@@ -109,10 +110,10 @@ struct Vehicle {
   Vec3 velocity = Vec3::Zero();
   Real length = 4, width = 1.8, wheel_radius = 0.36;
   Real mass = 1200;
-  Real suspension_hz = 1.6;  ///< of its bouncing
-  std::vector<MotorKey> speed;  ///< [m/s]
-  std::vector<MotorKey> steer;  ///< of the middle of the front axle [degrees], left positive
-  Real max_torque = 900;        ///< of each rear wheel
+  Real suspension_hz = 1.6;       ///< of its bouncing
+  std::vector<MotorKey> speed;    ///< [m/s]
+  std::vector<MotorKey> steer;    ///< of the middle of the front axle [degrees], left positive
+  Real max_torque = 900;          ///< of each rear wheel
   std::string paint, trim, tyre;  ///< names of materials
   Placement placement;
 };

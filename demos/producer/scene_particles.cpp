@@ -1,7 +1,8 @@
 #include "producer/scene_particles.h"
-#include "sim/rotation.h"
 
 #include <numbers>
+
+#include "sim/rotation.h"
 
 namespace offstage::producer {
 namespace {

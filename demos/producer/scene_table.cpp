@@ -1,9 +1,9 @@
 #include "producer/scene_table.h"
 
 #include "producer/table_cloth.h"
-#include "producer/table_joint.h"
 #include "producer/table_film.h"
 #include "producer/table_force.h"
+#include "producer/table_joint.h"
 #include "producer/table_overlay.h"
 #include "producer/table_particles.h"
 #include "producer/table_world.h"

@@ -18,8 +18,8 @@ using sim::Quat;
 using sim::Real;
 using sim::Vec3;
 
-/// Linear colour with straight alpha. In files "#rrggbb", "#rrggbbaa", "#rgb", "#rgba" (sRGB) or linear [r, g, b] or [r, g, b,
-/// a].
+/// Linear colour with straight alpha. In files "#rrggbb", "#rrggbbaa", "#rgb", "#rgba" (sRGB) or linear [r,
+/// g, b] or [r, g, b, a].
 struct Color {
   Eigen::Vector4f rgba = {1, 1, 1, 1};
   Eigen::Vector3f rgb() const { return rgba.head<3>(); }

@@ -25,10 +25,9 @@ sim::KeyframeTrack track_of(const Body& body) {
   sim::KeyframeTrack track{
       .keys = {}, .interpolation = body.interpolation, .loop = body.loop, .spin = body.spin};
   for (const BodyKey& key : body.keyframes)
-    track.keys.push_back(
-        {key.time,
-         {key.position.value_or(body.position), key.orientation.value_or(body.orientation)},
-         key.interpolation});
+    track.keys.push_back({key.time,
+                          {key.position.value_or(body.position), key.orientation.value_or(body.orientation)},
+                          key.interpolation});
   return track;
 }
 

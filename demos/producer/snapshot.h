@@ -49,12 +49,12 @@ struct LineSet {
 
 struct Snapshot {
   int frame = 1;
-  double time = 0;                    ///< [s]
-  std::vector<BodySample> bodies;     ///< moving bodies, in scene order
-  std::vector<RodSample> rods;        ///< springs, then distance joints, in scene order
-  std::vector<PointSet> point_sets;   ///< particle groups, then emitters, in scene order
-  std::vector<ClothSample> cloths;    ///< in scene order
-  std::vector<LineSet> overlays;      ///< in scene order; empty for those that draw no lines
+  double time = 0;                   ///< [s]
+  std::vector<BodySample> bodies;    ///< moving bodies, in scene order
+  std::vector<RodSample> rods;       ///< springs, then distance joints, in scene order
+  std::vector<PointSet> point_sets;  ///< particle groups, then emitters, in scene order
+  std::vector<ClothSample> cloths;   ///< in scene order
+  std::vector<LineSet> overlays;     ///< in scene order; empty for those that draw no lines
   sim::StateHash state_hash;
 
   uint64_t point_count() const;

@@ -64,7 +64,8 @@ std::optional<std::vector<std::string>> range(const std::string& text, const std
   constexpr double kSlack = 1e-9;  // of a step: 0:1:0.1 has 11 values
   const double steps = std::floor((last - first) / step + kSlack);
   if (!(steps < static_cast<double>(kMostCombinations)))
-    refuse_sweep(text, fmt::format("has {:.0f} values; at most {} runs are made", steps + 1, kMostCombinations));
+    refuse_sweep(text,
+                 fmt::format("has {:.0f} values; at most {} runs are made", steps + 1, kMostCombinations));
   std::vector<std::string> all;
   constexpr double kZero = 1e-12;  // of a step: what rounding leaves of 0 in -1:1:0.1
   for (int i = 0; i <= static_cast<int>(steps); ++i) {
@@ -110,7 +111,8 @@ Variation parse_variation(const std::string& text) {
     variation.values = *numbers;
   else
     variation.values = split_outside(values, ',');
-  if (std::ranges::find(variation.values, "") != variation.values.end()) refuse_sweep(text, "has an empty value");
+  if (std::ranges::find(variation.values, "") != variation.values.end())
+    refuse_sweep(text, "has an empty value");
   return variation;
 }
 

@@ -56,9 +56,8 @@ struct Table<KeyframedCamera> {
   static constexpr const char* kName = "keyframed_camera";
   static constexpr const char* kHelp = "A camera that moves through given views.";
   static Fields<KeyframedCamera> fields() {
-    return Fields<KeyframedCamera>{
-        {"keyframes", &KeyframedCamera::keyframes, "at least one"},
-        {"interpolation", &KeyframedCamera::interpolation, kInterpolationHelp}}
+    return Fields<KeyframedCamera>{{"keyframes", &KeyframedCamera::keyframes, "at least one"},
+                                   {"interpolation", &KeyframedCamera::interpolation, kInterpolationHelp}}
         .with_base<Lens>();
   }
 };

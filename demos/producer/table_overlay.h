@@ -117,15 +117,17 @@ template <>
 struct Table<JointsOverlay> {
   static constexpr const char* kName = "joints_overlay";
   static constexpr const char* kHelp =
-      "Joints that hold: lines to the centres of their bodies, a ring about the axis of those that turn or slide, and "
+      "Joints that hold: lines to the centres of their bodies, a ring about the axis of those that turn or "
+      "slide, and "
       "as arrows what they bear.";
   static Fields<JointsOverlay> fields() {
     using T = JointsOverlay;
-    return Fields<T>{{"joint", &T::joint, "name of a joint; empty: all"},
-                     {"size", &T::size, "radius of the rings; axes are four times as long", "m", kPositive},
-                     {"force_scale", &T::force_scale, "length of arrows per force; 0: none", "m/N", kNotNegative},
-                     {"color", &T::color, "of lines and rings"},
-                     {"force_color", &T::force_color, "of arrows"}}
+    return Fields<T>{
+        {"joint", &T::joint, "name of a joint; empty: all"},
+        {"size", &T::size, "radius of the rings; axes are four times as long", "m", kPositive},
+        {"force_scale", &T::force_scale, "length of arrows per force; 0: none", "m/N", kNotNegative},
+        {"color", &T::color, "of lines and rings"},
+        {"force_color", &T::force_color, "of arrows"}}
         .with_base<LineLook>();
   }
 };

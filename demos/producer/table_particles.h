@@ -76,7 +76,9 @@ struct Table<ParticleBehaviour> {
         {"internal", &T::internal, "its particles collide with each other"},
         {"external", &T::external, "its particles collide with those of others that have this, too"},
         {"dies_on_hit", &T::dies_on_hit, "is removed at its first collision"},
-        {"integrator", &T::integrator, "method, for particles without springs; `leapfrog` is of second order at the cost of one evaluation of the "
+        {"integrator", &T::integrator,
+         "method, for particles without springs; `leapfrog` is of second order at the cost of one evaluation "
+         "of the "
          "forces, and stable for any drag"},
     };
   }
@@ -331,7 +333,8 @@ struct Table<Emitter> {
         {"end", &T::end, "of everything; the living live on", "s", kNotNegative},
         {"windows", &T::windows, "when `rate` and `count` release; empty: always"},
         {"prewarm", &T::prewarm,
-         "how long before `start` it has begun already; until time 0 particles live and collide while dynamic "
+         "how long before `start` it has begun already; until time 0 particles live and collide while "
+         "dynamic "
          "bodies, cloths and particle groups stand still, kinematic bodies follow their keys, and forces are "
          "those of time 0",
          "s", kNotNegative},

@@ -15,8 +15,8 @@ namespace offstage::producer {
 template <>
 struct Names<sim::IntegratorKind> {
   static constexpr std::array kNames = {
-      "explicit_euler", "symplectic_euler", "leapfrog", "midpoint", "rk4", "implicit_euler",
-      "adaptive_euler", "adaptive_midpoint", "adaptive_rk4", "dormand_prince"};
+      "explicit_euler", "symplectic_euler", "leapfrog",          "midpoint",     "rk4",
+      "implicit_euler", "adaptive_euler",   "adaptive_midpoint", "adaptive_rk4", "dormand_prince"};
 };
 template <>
 struct Names<sim::SolverKind> {

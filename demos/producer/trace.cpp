@@ -104,7 +104,8 @@ void ClothTrace::record(double time) {
 }
 
 JointTrace::JointTrace(const std::filesystem::path& path, const Simulation& simulation)
-    : file_(path, "time,joint,x,y,z,fx,fy,fz,tx,ty,tz,coordinate,speed,error,broken"), simulation_(simulation) {}
+    : file_(path, "time,joint,x,y,z,fx,fy,fz,tx,ty,tz,coordinate,speed,error,broken"),
+      simulation_(simulation) {}
 
 void JointTrace::record(double time) {
   const sim::World& world = simulation_.world();
@@ -113,8 +114,8 @@ void JointTrace::record(double time) {
     const sim::JointState j = world.joint(handle);
     const sim::Vec3 &p = j.anchor_a, &f = j.force, &t = j.torque;
     fmt::format_to(std::back_inserter(rows), "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", time,
-                   world.joint_def(handle).name, p.x(), p.y(), p.z(), f.x(), f.y(), f.z(), t.x(), t.y(), t.z(),
-                   j.coordinate, j.speed, j.error, j.broken ? 1 : 0);
+                   world.joint_def(handle).name, p.x(), p.y(), p.z(), f.x(), f.y(), f.z(), t.x(), t.y(),
+                   t.z(), j.coordinate, j.speed, j.error, j.broken ? 1 : 0);
   });
   file_.write(rows);
 }

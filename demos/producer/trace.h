@@ -60,8 +60,8 @@ class ClothTrace {
   const Simulation& simulation_;
 };
 
-/// How joints stood and what they bore: time, joint, anchor on a, force and torque on a, the free coordinate and its
-/// speed, how far the anchors are apart, 1 if it is broken.
+/// How joints stood and what they bore: time, joint, anchor on a, force and torque on a, the free coordinate
+/// and its speed, how far the anchors are apart, 1 if it is broken.
 class JointTrace {
  public:
   JointTrace(const std::filesystem::path& path, const Simulation& simulation);

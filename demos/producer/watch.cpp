@@ -123,7 +123,8 @@ std::set<fs::path> files_of_scene(const fs::path& scene, const std::vector<std::
 std::string contents_hash(const std::set<fs::path>& files) {
   std::string hashes;
   for (const fs::path& file : files)
-    hashes += file.string() + (fs::exists(file) ? " is " + text_hash(file_bytes(file)) : " is missing") + "\n";
+    hashes +=
+        file.string() + (fs::exists(file) ? " is " + text_hash(file_bytes(file)) : " is missing") + "\n";
   return text_hash(hashes);
 }
 

@@ -241,7 +241,8 @@ void Articulation::find_stops() {
   collect_stops(*this, response_time_, rows, origins);
   for (const BoundedRow& row : rows) {
     const Real side = row.upper > 0 ? 1 : -1;
-    Stop stop{row.a, row.b, side * row.on_a, side * row.on_b, std::vector<Vec6>(bodies_.size(), Vec6::Zero())};
+    Stop stop{row.a, row.b, side * row.on_a, side * row.on_b,
+              std::vector<Vec6>(bodies_.size(), Vec6::Zero())};
     if (stop.speed(velocities_) + side * row.offset > kLeaving) continue;
     for (const auto& [link, on] : {std::pair(stop.a, &stop.on_a), std::pair(stop.b, &stop.on_b)})
       if (link != JointSystem::kDriven) stop.response[link] = mobility_[link].velocity(*on);
@@ -272,7 +273,8 @@ Eigen::VectorXd Articulation::stop_impulses() const {
   for (Eigen::Index i = 0; i < n; ++i) {
     const Stop& stop = stops_[static_cast<std::size_t>(i)];
     speed[i] = stop.speed(response_);
-    for (Eigen::Index k = 0; k < n; ++k) mobility(i, k) = stop.speed(stops_[static_cast<std::size_t>(k)].response);
+    for (Eigen::Index k = 0; k < n; ++k)
+      mobility(i, k) = stop.speed(stops_[static_cast<std::size_t>(k)].response);
   }
   return solve_lcp((mobility + mobility.transpose()) / 2, speed).f;
 }
@@ -293,7 +295,8 @@ Mat6 Articulation::link_mobility(uint32_t link, const Vec6& push) {
   for (Eigen::Index i = 0; i < n; ++i) {
     on_link.col(i) = pressed[static_cast<std::size_t>(i)]->response[link];
     for (Eigen::Index k = 0; k < n; ++k)
-      among(i, k) = pressed[static_cast<std::size_t>(i)]->speed(pressed[static_cast<std::size_t>(k)]->response);
+      among(i, k) =
+          pressed[static_cast<std::size_t>(i)]->speed(pressed[static_cast<std::size_t>(k)]->response);
   }
   const Mat6 held = on_link * among.ldlt().solve(on_link.transpose());
   return free - (held + held.transpose()) / 2;

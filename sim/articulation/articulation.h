@@ -28,7 +28,7 @@ struct Joint {
   Articulation* articulation = nullptr;
 
   bool is_broken = false;
-  Real coordinate = 0;                               ///< of joints that count turns
+  Real coordinate = 0;  ///< of joints that count turns
   // What it does to a, about the anchor.
   Wrench load;                       ///< in the last motion, with the contacts in it [N], [N m]
   Wrench blow;                       ///< impulses of collisions in this sub-step [N s], [N m s]
@@ -70,18 +70,18 @@ class Articulation final : public JointedBodies {
   Real greatest_frequency() const;
   /// A motion from t to t + h begins.
   void begin_motion(Real t, Real h);
-  /// At a time within: adds the joint forces to `forces` [force, torque] of the links, which are about to move
-  /// from `motion` under these.
+  /// At a time within: adds the joint forces to `forces` [force, torque] of the links, which are about to
+  /// move from `motion` under these.
   void add_forces(Real t, std::span<const LinkMotion> motion, std::span<const LinkMobility> mobility,
                   std::span<Vec6> forces);
   /// Passes on, through the joints, what has pushed single bodies since they were settled last.
   void pass_on_blows(Real time, JointTally& tally);
-  /// Puts the bodies' `rigid` back together at a time: positions by the shortest way, weighted with the masses,
-  /// then velocities.
+  /// Puts the bodies' `rigid` back together at a time: positions by the shortest way, weighted with the
+  /// masses, then velocities.
   void settle(Real time, JointTally& tally);
 
-  /// Takes the constraints of the bodies as `rigid` has them, for what impulses of contacts add to their motion;
-  /// or as they were at their interval's `start`.
+  /// Takes the constraints of the bodies as `rigid` has them, for what impulses of contacts add to their
+  /// motion; or as they were at their interval's `start`.
   void place(Real time, bool at_start = false);
   /// Where a joint is, since place().
   JointPlace joint_place(std::size_t j, Real time, LinkMotion& still_a, LinkMotion& still_b) const {
@@ -95,8 +95,8 @@ class Articulation final : public JointedBodies {
   /// Or all at once.
   void add_blows(std::span<const Vec6> impulses);
 
-  /// A sub-step ends at this time; impulses on links are then those on the bodies as they are now. The system is
-  /// factored once, when the first link is asked for.
+  /// A sub-step ends at this time; impulses on links are then those on the bodies as they are now. The system
+  /// is factored once, when the first link is asked for.
   void begin_impulses(Real time);
   Mat6 link_mobility(uint32_t link, const Vec6& push) override;
   void respond(uint32_t link, const Vec6& impulse, std::span<Vec6> velocities) override;
@@ -134,7 +134,8 @@ class Articulation final : public JointedBodies {
   std::vector<LinkMobility> mobility_;
   std::vector<Vec6> velocities_, change_, impulses_;
 
-  /// A limit that a joint has reached and does not leave. Its row is such that the speed away from it is positive.
+  /// A limit that a joint has reached and does not leave. Its row is such that the speed away from it is
+  /// positive.
   struct Stop {
     uint32_t a, b;  // links; kDriven: none that moves
     Vec6 on_a, on_b;

@@ -8,7 +8,8 @@ namespace offstage::sim {
 namespace {
 
 constexpr Real kInfinite = std::numeric_limits<Real>::infinity();
-/// Of what a limit is exceeded by, the share that a step takes back, and the fastest that it does [rad/s], [m/s].
+/// Of what a limit is exceeded by, the share that a step takes back, and the fastest that it does [rad/s],
+/// [m/s].
 constexpr Real kPushOut = 0.2, kFastestPush = 2;
 /// Limits nearer than this have a row, and those that are reached take part in collisions [rad], [m].
 constexpr Real kNear = 0.02, kReached = 1e-4;
@@ -82,8 +83,8 @@ class RowMaker {
   Real at_start(const JointRow& row) const {
     Real sum = speed(row);
     const auto add_end = [&](const Body* body, const LinkMotion& motion, const Vec6& on) {
-      const Twist& t = body && body->is_dynamic() ? body->start_twist
-                                                  : Twist{motion.velocity, motion.angular_velocity};
+      const Twist& t =
+          body && body->is_dynamic() ? body->start_twist : Twist{motion.velocity, motion.angular_velocity};
       sum += on.head<3>().dot(t.velocity) + on.tail<3>().dot(t.angular_velocity);
     };
     add_end(joint_.a, place_.a, row.on_a);
@@ -105,7 +106,9 @@ class RowMaker {
     const Real u = speed(row), start = at_start(row);
     const Real reach = kNear + 2 * h_ * std::abs(u);
     BoundedRow r = bounded(row);
-    const auto towards = [&](Real gap) { return gap > 0 ? gap / h_ : std::max(gap * kPushOut / h_, -kFastestPush); };
+    const auto towards = [&](Real gap) {
+      return gap > 0 ? gap / h_ : std::max(gap * kPushOut / h_, -kFastestPush);
+    };
     const Real below = row.error - lower, above = upper - row.error;
     if (std::min(below, above) > reach) {
       joint_.efforts[slot] = 0;
@@ -205,7 +208,8 @@ void collect_stops(const Articulation& articulation, Real time, std::vector<Boun
                    std::vector<BoundedOrigin>& origins) {
   if (!articulation.has_bounded_rows()) return;
   for (std::size_t j = 0; j < articulation.joints().size(); ++j)
-    if (articulation.joints()[j]->has_bounded_rows()) RowMaker(articulation, j, 1, time).add_stops(rows, origins);
+    if (articulation.joints()[j]->has_bounded_rows())
+      RowMaker(articulation, j, 1, time).add_stops(rows, origins);
 }
 
 }  // namespace offstage::sim

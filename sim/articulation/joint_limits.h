@@ -17,8 +17,8 @@ struct BoundedOrigin {
   bool is_stop;
 };
 
-/// The rows of an articulation, after its place(), for an interval of a length that ends at `time`. Its bodies
-/// have the indices Body::row. Appends.
+/// The rows of an articulation, after its place(), for an interval of a length that ends at `time`. Its
+/// bodies have the indices Body::row. Appends.
 void collect_bounded_rows(const Articulation& articulation, Real duration, Real time,
                           std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins);
 

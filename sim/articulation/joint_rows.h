@@ -66,8 +66,8 @@ uint32_t constraint_count(const JointDef& def);
 /// `length` of a rod.
 void set_joint_rows(const JointDef& def, const JointPlace& place, Real length, JointRows& rows);
 
-/// The free coordinate of a revolute, prismatic or distance joint, the first of a universal one, the twist of a
-/// spherical one, with its row; `error` is the coordinate, of angles within half a turn.
+/// The free coordinate of a revolute, prismatic or distance joint, the first of a universal one, the twist of
+/// a spherical one, with its row; `error` is the coordinate, of angles within half a turn.
 JointRow free_row(JointType type, const JointPlace& place, Real length);
 /// How far the axis of a spherical joint leans, or the second angle of a universal one.
 JointRow swing_row(JointType type, const JointPlace& place);

@@ -7,9 +7,9 @@ namespace {
 
 /// Links of more joints than this get rows of their own.
 constexpr uint32_t kFewJoints = 3;
-/// Of the diagonal, where the matrix is not plain; then more each time that it is not enough. At the stages of an
-/// integrator, where loops do not quite close, constraints that depend on each other disagree by about the square
-/// of that: the part must be above it, or they would fight.
+/// Of the diagonal, where the matrix is not plain; then more each time that it is not enough. At the stages
+/// of an integrator, where loops do not quite close, constraints that depend on each other disagree by about
+/// the square of that: the part must be above it, or they would fight.
 constexpr Real kRegularization = 1e-6, kMore = 100;
 constexpr int kAttempts = 3, kRefinements = 8;
 /// Refinement ends at this share of what was asked.
@@ -22,9 +22,8 @@ JointSystem::JointSystem(uint32_t links, std::vector<Topology> joints) : joints_
   for (const Topology& j : joints_)
     for (uint32_t link : {j.a, j.b})
       if (link != kDriven) ++degree[link];
-  const auto grounded = static_cast<uint32_t>(
-      std::count_if(joints_.begin(), joints_.end(),
-                    [](const Topology& j) { return j.a == kDriven || j.b == kDriven; }));
+  const auto grounded = static_cast<uint32_t>(std::count_if(
+      joints_.begin(), joints_.end(), [](const Topology& j) { return j.a == kDriven || j.b == kDriven; }));
   // All that is driven counts as one node, if there is any.
   has_loops_ = joints_.size() > links - (grounded == 0 ? 1u : 0u);
   hub_row_.assign(links, kDriven);
@@ -57,8 +56,8 @@ void JointSystem::find_couplings() {
   std::sort(pairs_.begin(), pairs_.end());
   pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
   for (Coupling& c : couplings_)
-    c.pair = static_cast<uint32_t>(std::lower_bound(pairs_.begin(), pairs_.end(), std::pair(c.first, c.second)) -
-                                   pairs_.begin());
+    c.pair = static_cast<uint32_t>(
+        std::lower_bound(pairs_.begin(), pairs_.end(), std::pair(c.first, c.second)) - pairs_.begin());
   kinds_.resize(joints_.size() + hubs_.size());
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     const auto is_low = [&](uint32_t link) { return link != kDriven && !is_hub(link); };
@@ -113,7 +112,8 @@ bool JointSystem::factorize(Matrix<N>& m) {
       continue;
     }
     const Mat6& response = joints_[c.second].a == c.link ? response_a_[c.second] : response_b_[c.second];
-    m.off[c.pair].noalias() += on(c.first).template leftCols<N>().transpose() * response.template leftCols<N>();
+    m.off[c.pair].noalias() +=
+        on(c.first).template leftCols<N>().transpose() * response.template leftCols<N>();
   }
   if constexpr (N == 6)
     for (std::size_t h = 0; h < hubs_.size(); ++h) {
@@ -127,8 +127,7 @@ bool JointSystem::factorize(Matrix<N>& m) {
   needs_refinement_ = true;
   Real share = kRegularization;
   for (int attempt = 0; attempt < kAttempts; ++attempt, share *= kMore) {
-    for (std::size_t j = 0; j < joints_.size(); ++j)
-      m.diagonal[j].diagonal() *= 1 + share;
+    for (std::size_t j = 0; j < joints_.size(); ++j) m.diagonal[j].diagonal() *= 1 + share;
     if (m.factor.factorize(m.diagonal, m.off)) return true;
   }
   return false;
@@ -191,8 +190,8 @@ void JointSystem::refine(std::span<const Vec6> change, std::span<Vec6> impulses)
     before = now;
     multiply(p, q);
     const Real curvature = dot(p, q);
-    // What the constraints can hardly do is left, rather than blown up: rows that depend on each other and disagree,
-    // as of a straight chain held at both ends.
+    // What the constraints can hardly do is left, rather than blown up: rows that depend on each other and
+    // disagree, as of a straight chain held at both ends.
     const Real length = now / curvature;
     if (!(curvature > 0) || length > kLongest) return;
     for (std::size_t j = 0; j < p.size(); ++j) {
@@ -202,7 +201,8 @@ void JointSystem::refine(std::span<const Vec6> change, std::span<Vec6> impulses)
   }
 }
 
-void JointSystem::correct(std::span<const Vec6> change, std::span<Vec6> impulses, std::span<Vec6> velocities) {
+void JointSystem::correct(std::span<const Vec6> change, std::span<Vec6> impulses,
+                          std::span<Vec6> velocities) {
   std::fill(impulses.begin(), impulses.end(), Vec6::Zero());
   if (!is_factored_) return;
   std::copy(change.begin(), change.end(), impulses.begin());

@@ -1,9 +1,9 @@
 #pragma once
 /// The linear system of an articulation's joints (physics A1): with M the masses of its links and J its
-/// constraints, A = J M^-1 J^T has a block row for each joint and couples those that share a link. Links of many
-/// joints, which would couple all of them with each other, stay in the system as rows of their own, so that any
-/// tree costs O(n). Where joints form loops, rows may depend on each other: then a small part of the diagonal is
-/// added, and what that takes away is given back by conjugate gradients.
+/// constraints, A = J M^-1 J^T has a block row for each joint and couples those that share a link. Links of
+/// many joints, which would couple all of them with each other, stay in the system as rows of their own, so
+/// that any tree costs O(n). Where joints form loops, rows may depend on each other: then a small part of the
+/// diagonal is added, and what that takes away is given back by conjugate gradients.
 
 #include <array>
 #include <cstdint>
@@ -26,18 +26,18 @@ class JointSystem {
   /// The joints must connect all links.
   JointSystem(uint32_t links, std::vector<Topology> joints);
 
-  /// Factors the system of rows that the caller keeps. False, and nothing can be solved, if the constraints are
-  /// degenerate beyond help.
+  /// Factors the system of rows that the caller keeps. False, and nothing can be solved, if the constraints
+  /// are degenerate beyond help.
   bool factorize(std::span<const JointRows> rows, std::span<const LinkMobility> links);
 
-  /// Takes constraints that are near those of the last factorize(), whose factor goes on to serve: correct() is
-  /// then to be repeated.
+  /// Takes constraints that are near those of the last factorize(), whose factor goes on to serve: correct()
+  /// is then to be repeated.
   void update(std::span<const JointRows> rows) { rows_ = rows; }
 
   /// J v of the joints; driven links count as still.
   void relative(std::span<const Vec6> velocities, std::span<Vec6> result) const;
-  /// The impulses p that change J v by `change`, and what they do: velocities += M^-1 J^T p. Without success of
-  /// factorize() nothing.
+  /// The impulses p that change J v by `change`, and what they do: velocities += M^-1 J^T p. Without success
+  /// of factorize() nothing.
   void correct(std::span<const Vec6> change, std::span<Vec6> impulses, std::span<Vec6> velocities);
 
   std::span<const Topology> joints() const { return joints_; }

@@ -23,7 +23,8 @@ Vec4 held_velocity(const ClothPoints& points, std::size_t i, Real h) {
 }
 
 /// Accelerations at positions and velocities of a run; 0 of what is held.
-void accelerate(const ClothPoints& points, const ClothRange& cloth, const SpringRun& x, const SpringRun& v, SpringRun& a) {
+void accelerate(const ClothPoints& points, const ClothRange& cloth, const SpringRun& x, const SpringRun& v,
+                SpringRun& a) {
   std::fill(a.begin(), a.end(), Vec4::Zero());
   for (const ClothSpring& s : cloth.springs) {
     const std::size_t i = s.a - cloth.begin, j = s.b - cloth.begin;
@@ -43,7 +44,8 @@ void accelerate(const ClothPoints& points, const ClothRange& cloth, const Spring
 }
 
 /// What springs do to what is held, over the time h.
-void pass_on(ClothPoints& points, const ClothRange& cloth, const SpringRun& x, const SpringRun& v, Real h, Real dt) {
+void pass_on(ClothPoints& points, const ClothRange& cloth, const SpringRun& x, const SpringRun& v, Real h,
+             Real dt) {
   for (const ClothSpring& s : cloth.springs) {
     const bool a = is_held(points, s.a), b = is_held(points, s.b);
     if (a == b) continue;

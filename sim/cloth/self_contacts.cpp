@@ -300,8 +300,9 @@ void SelfContacts::solve(ClothPoints& points) {
       moved += c.weights[k] * (points.position[i] - points.start[i]);
       mobility += c.weights[k] * c.weights[k] * points.inverse_mass[i];
     }
-    const Real kept = c.distance >= pair.thickness ? pair.thickness
-                                                   : c.distance + kSelfRecovery * (pair.thickness - c.distance);
+    const Real kept = c.distance >= pair.thickness
+                          ? pair.thickness
+                          : c.distance + kSelfRecovery * (pair.thickness - c.distance);
     const Real push = kept - c.normal.dot(apart);
     if (!(push > 0) || !(mobility > 0)) continue;
     ++active_[points.cloth[pair.points[0]]];

@@ -13,7 +13,6 @@
 namespace offstage::sim {
 namespace {
 
-
 constexpr int kDirections = kSmallHullPoints / 2;
 using Heights = Eigen::Array<Real, kDirections, 1>;
 

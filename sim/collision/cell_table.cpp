@@ -170,7 +170,8 @@ void CellTable::find_pairs(uint32_t first, uint32_t end, CandidatePairs& out) co
       compare(boxes_[i], copies_[i].object, i + 1, begin_[b + 1], out);
 }
 
-void CellTable::find_pairs_with(const CellTable& other, uint32_t first, uint32_t end, CandidatePairs& out) const {
+void CellTable::find_pairs_with(const CellTable& other, uint32_t first, uint32_t end,
+                                CandidatePairs& out) const {
   for (uint32_t b = first; b < end; ++b)
     for (uint32_t i = begin_[b]; i < begin_[b + 1]; ++i) {
       const uint32_t bucket = copies_[i].hash & other.mask_;

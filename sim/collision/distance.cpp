@@ -9,7 +9,6 @@
 namespace offstage::sim {
 namespace {
 
-
 using Vec2 = Eigen::Vector2d;
 
 /// v / |v|, or `fallback` where there is no direction.

@@ -8,9 +8,9 @@ namespace {
 
 constexpr std::size_t kMaxPoints = 128;
 constexpr std::size_t kMaxFaces = 2 * kMaxPoints;  // a closed surface of n points has 2 n - 4 triangles
-constexpr Real kHeightTolerance = 64;           // in roundings of a point: of heights over a face
-constexpr Real kCurvedTolerance = 1e-10;  // of the size
-constexpr Real kDeep = 1e-6;              // of the size: depth from which a point tells the direction
+constexpr Real kHeightTolerance = 64;              // in roundings of a point: of heights over a face
+constexpr Real kCurvedTolerance = 1e-10;           // of the size
+constexpr Real kDeep = 1e-6;         // of the size: depth from which a point tells the direction
 constexpr Real kAcceptedGap = 1e-9;  // of the size: an early end with this gap of its bounds is an answer
 
 using Index = uint16_t;

@@ -8,11 +8,11 @@ namespace offstage::sim {
 namespace {
 
 constexpr int kMaxGjkIterations = 100;
-constexpr Real kTolerance = 4;      // of the gap between the bounds of the distance, in roundings of a point
-constexpr Real kTouchingRoundings = 64;      // roundings of a point; nearer cores have no direction between them
-constexpr Real kNear = 1e-9;        // of the size: if GJK stalls this near, the expanding polytope decides
+constexpr Real kTolerance = 4;  // of the gap between the bounds of the distance, in roundings of a point
+constexpr Real kTouchingRoundings = 64;  // roundings of a point; nearer cores have no direction between them
+constexpr Real kNear = 1e-9;           // of the size: if GJK stalls this near, the expanding polytope decides
 constexpr Real kGjkLevel = 1 + 1e-14;  // ratio of squares that differ by rounding
-constexpr Real kAccepted = 1e-12;   // of the size: gap with which a stalled query is still an answer
+constexpr Real kAccepted = 1e-12;      // of the size: gap with which a stalled query is still an answer
 
 /// The last normal, or from the middle of B to that of A.
 Vec3 start_direction(const MinkowskiDifference& m, const GjkCache& cache) {
@@ -77,7 +77,8 @@ Separation gjk(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache&
   Real distance = 0;
   for (;;) {
     distance = std::sqrt(nearest.squared);
-    if (nearest.size == 4 || distance <= kTouchingRoundings * rounding) return overlapping(m, s, cache, iterations);
+    if (nearest.size == 4 || distance <= kTouchingRoundings * rounding)
+      return overlapping(m, s, cache, iterations);
     ++iterations;
     const SupportPoint p = m.lowest(nearest.v, s.points[0].from);
     const Real gap = distance - nearest.v.dot(p.w) / distance;

@@ -11,7 +11,8 @@ IndexPair ordered_members(uint32_t a, uint32_t b) {
 
 }  // namespace
 
-GroupTree::GroupTree(std::span<const uint32_t> members) : members_(members.size()), boxes_(2 * members.size()) {
+GroupTree::GroupTree(std::span<const uint32_t> members)
+    : members_(members.size()), boxes_(2 * members.size()) {
   place(1, members, 0);
 }
 

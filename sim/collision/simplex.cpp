@@ -63,7 +63,8 @@ SimplexPoint on_triangle(const SimplexCorner& i, const SimplexCorner& j, const S
 
 // Likewise one dimension up: a face whose coordinate is negative holds the nearest point. The coordinates of
 // a tetrahedron that is flat within rounding mean nothing: any of its faces may.
-SimplexPoint in_tetrahedron(const SimplexCorner& i, const SimplexCorner& j, const SimplexCorner& k, const SimplexCorner& l) {
+SimplexPoint in_tetrahedron(const SimplexCorner& i, const SimplexCorner& j, const SimplexCorner& k,
+                            const SimplexCorner& l) {
   const Vec3 &p = l.w, e = i.w - p, f = j.w - p, g = k.w - p;
   const Vec3 fg = f.cross(g), ge = g.cross(e), ef = e.cross(f);
   const Real volume = e.dot(fg);

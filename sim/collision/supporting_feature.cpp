@@ -30,9 +30,9 @@ const std::array<Eigen::Vector2d, kMaxFeatureCorners>& circle() {
     std::array<Eigen::Vector2d, kMaxFeatureCorners> result;
     result[0] = Eigen::Vector2d::UnitX();
     for (uint32_t k = 1; k < kMaxFeatureCorners; ++k)
-      result[k] = k % (kMaxFeatureCorners / 4) == 0
-                      ? Eigen::Vector2d(-result[k - kMaxFeatureCorners / 4].y(), result[k - kMaxFeatureCorners / 4].x())
-                      : Eigen::Vector2d(turn * result[k - 1]);
+      result[k] = k % (kMaxFeatureCorners / 4) == 0 ? Eigen::Vector2d(-result[k - kMaxFeatureCorners / 4].y(),
+                                                                      result[k - kMaxFeatureCorners / 4].x())
+                                                    : Eigen::Vector2d(turn * result[k - 1]);
     return result;
   }();
   return points;
@@ -50,7 +50,8 @@ SupportingFeature point_feature(const Vec3& p, uint32_t tag) {
   return f;
 }
 
-SupportingFeature segment_feature(const Vec3& p, uint32_t p_tag, const Vec3& q, uint32_t q_tag, const Vec3& d) {
+SupportingFeature segment_feature(const Vec3& p, uint32_t p_tag, const Vec3& q, uint32_t q_tag,
+                                  const Vec3& d) {
   SupportingFeature f = point_feature(p, p_tag);
   f.add(q, q_tag);
   const Vec3 along = (q - p).normalized();

@@ -117,7 +117,9 @@ std::size_t surface_area_split(std::span<TreeItem> items, const Aabb& midpoints)
   Bins bins(midpoints);
   for (const TreeItem& item : items) bins.add(item);
   const auto best = bins.best_split();
-  return partition(items, [&, axis = best.first, bin = best.second](const TreeItem& item) { return bins.bin_of(item, axis) < bin; });
+  return partition(items, [&, axis = best.first, bin = best.second](const TreeItem& item) {
+    return bins.bin_of(item, axis) < bin;
+  });
 }
 
 /// Parts the items and returns where the second half starts; 0 if nothing separates them.

@@ -83,7 +83,8 @@ void BlockCholesky<N>::order(uint32_t rows) {
   }
 }
 
-/// To right after the last of them: after the first the pivot may be zero still, if that one is held by others.
+/// To right after the last of them: after the first the pivot may be zero still, if that one is held by
+/// others.
 template <int N>
 void BlockCholesky<N>::put_empty_rows_after_neighbours() {
   std::vector<uint32_t> last = place_;

@@ -1,12 +1,12 @@
 #pragma once
 /// Cholesky factorisation L S L^T of a sparse symmetric matrix of N x N blocks, one row of blocks for each
 /// body or joint; S has a sign for each row: all are positive if the matrix is definite. Rows are eliminated
-/// in an order of approximate minimum degree, so that a stack or a chain of n costs O(n), a wall about O(n^1.5)
-/// (physics N11, A1).
+/// in an order of approximate minimum degree, so that a stack or a chain of n costs O(n), a wall about
+/// O(n^1.5) (physics N11, A1).
 ///
 /// With bodies as positive rows and what joins them as negative ones the matrix is quasi-definite (Vanderbei,
-/// "Symmetric quasidefinite matrices", 1995): it has this factorisation in any order of elimination in which a
-/// row with a zero on the diagonal comes after its neighbours.
+/// "Symmetric quasidefinite matrices", 1995): it has this factorisation in any order of elimination in which
+/// a row with a zero on the diagonal comes after its neighbours.
 
 #include <cstdint>
 #include <span>
@@ -34,13 +34,13 @@ class BlockCholesky {
   using Vector = Eigen::Matrix<Real, N, 1>;
 
   /// Prepares for matrices whose blocks off the diagonal are at the given pairs of rows, first < second, each
-  /// once and in ascending order; no kinds: all rows are positive. Does nothing if that is what it is prepared
-  /// for.
+  /// once and in ascending order; no kinds: all rows are positive. Does nothing if that is what it is
+  /// prepared for.
   void analyze(uint32_t rows, std::span<const std::pair<uint32_t, uint32_t>> pairs,
                std::span<const BlockRowKind> kinds = {});
 
-  /// Blocks (first, second) of the upper triangle, in the order of the pairs. False if a pivot has not its sign
-  /// to rounding; then there is nothing to solve with.
+  /// Blocks (first, second) of the upper triangle, in the order of the pairs. False if a pivot has not its
+  /// sign to rounding; then there is nothing to solve with.
   bool factorize(std::span<const Block> diagonal, std::span<const Block> pairs);
 
   /// x := A^-1 x.
@@ -59,7 +59,7 @@ class BlockCholesky {
 
   std::vector<std::pair<uint32_t, uint32_t>> pairs_;
   std::vector<BlockRowKind> kinds_;
-  std::vector<Real> sign_;  // in the order of elimination
+  std::vector<Real> sign_;               // in the order of elimination
   std::vector<uint32_t> order_, place_;  // order_[k]: the row eliminated k-th; place_: its inverse
   std::vector<uint32_t> begin_, row_;  // columns of L under the diagonal, in order of elimination, ascending
   std::vector<uint32_t> pair_at_;      // where in row_ the block of each pair goes

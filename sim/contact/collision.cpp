@@ -170,12 +170,14 @@ void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, 
   const bool is_bounded = effort == Effort::bounded;
   if (!joints.empty()) {
     for (Contact& c : contacts) c.is_guessed = false;
-    const auto solved = ProximalNewton().solve(bodies, contacts, joints, is_bounded ? kJointBudget : kInfinity);
+    const auto solved =
+        ProximalNewton().solve(bodies, contacts, joints, is_bounded ? kJointBudget : kInfinity);
     if (solved) return work.add(*solved);
     for (Contact& c : contacts) c.impulse.setZero();
     return work.add({.solves = 1, .fallbacks = 1, .residual = kInfinity});
   }
-  if (contacts.size() <= (is_bounded ? kFewContacts : kDense)) return work.add(solve_by_pivoting(bodies, contacts));
+  if (contacts.size() <= (is_bounded ? kFewContacts : kDense))
+    return work.add(solve_by_pivoting(bodies, contacts));
   const std::vector<ContactBody> before(bodies.begin(), bodies.end());
   Real fastest = 0;
   for (Contact& c : contacts) {

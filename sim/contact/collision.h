@@ -25,8 +25,8 @@ enum class ImpactLaw : uint8_t {
 Vec3 collision_impulse(const Mat3& K, const Vec3& u, Real restitution, Real friction_t, Real friction_k);
 
 /// Resolves a cluster: changes the bodies' velocities, and sets the contacts' targets and total impulses.
-/// `restitution` [0, 1] of each contact; contacts that do not approach have none, but do carry impulses. Joints
-/// pass the impulses on in the same system (A3).
+/// `restitution` [0, 1] of each contact; contacts that do not approach have none, but do carry impulses.
+/// Joints pass the impulses on in the same system (A3).
 ContactWork collide(std::span<ContactBody> bodies, std::span<Contact> contacts,
                     std::span<const Real> restitution, ImpactLaw law, const JointProblem& joints = {});
 

@@ -273,8 +273,8 @@ bool runs_along(const Body& body, Real duration) {
   return is_revolved(body.def.shape) && turn.squaredNorm() > kStraight * kStraight;
 }
 
-OFFSTAGE_UNFUSED Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3& out_from, const Quat& to,
-                const Vec3& out_to) {
+OFFSTAGE_UNFUSED Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3& out_from,
+                                 const Quat& to, const Vec3& out_to) {
   const Shape& shape = body.def.shape;
   const auto with_body = [&](const Vec3& r) { return Vec3(to * (from.conjugate() * r)); };
   if (const Real radius = round_radius(shape); radius > 0)

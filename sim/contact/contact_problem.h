@@ -87,8 +87,9 @@ struct ContactWork {
   uint64_t fallbacks = 0;       ///< problems that the solver meant for them did not solve
   uint64_t abandoned = 0;       ///< that became too dear for the exact solver and went to the fast one
   uint64_t narrowed = 0;        ///< collisions of which what is far from the blow was left out
-  uint64_t softened = 0;        ///< collisions with less restitution, steps with smaller impulses, to keep the energy
-  Real residual = 0;            ///< greatest left over [m/s]
+  uint64_t softened =
+      0;              ///< collisions with less restitution, steps with smaller impulses, to keep the energy
+  Real residual = 0;  ///< greatest left over [m/s]
 
   void add(const ContactWork& w) {
     solves += w.solves;

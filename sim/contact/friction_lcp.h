@@ -1,6 +1,6 @@
 #pragma once
-/// Contacts with Coulomb friction by pivoting on the dense matrix of a small cluster (physics N10): it resolves
-/// collisions of up to some twenty contacts.
+/// Contacts with Coulomb friction by pivoting on the dense matrix of a small cluster (physics N10): it
+/// resolves collisions of up to some twenty contacts.
 
 #include <span>
 

@@ -1,7 +1,7 @@
 #pragma once
-/// What joints add to a contact problem (physics A3, A4): constraints, which any impulses of contacts leave as
-/// they are, and rows for limits, motors and friction, whose impulses have bounds. Bodies are indexed as by the
-/// contacts.
+/// What joints add to a contact problem (physics A3, A4): constraints, which any impulses of contacts leave
+/// as they are, and rows for limits, motors and friction, whose impulses have bounds. Bodies are indexed as
+/// by the contacts.
 
 #include <span>
 
@@ -18,8 +18,8 @@ struct JointConstraint {
   const JointRows* rows;
 };
 
-/// u = on_a . v_a + on_b . v_b + offset becomes `target` - softness p, if p is within the bounds; else p is the
-/// bound in that direction.
+/// u = on_a . v_a + on_b . v_b + offset becomes `target` - softness p, if p is within the bounds; else p is
+/// the bound in that direction.
 struct BoundedRow {
   uint32_t a = kUnmoved, b = kUnmoved;
   Vec6 on_a = Vec6::Zero(), on_b = Vec6::Zero();

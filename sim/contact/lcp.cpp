@@ -90,7 +90,8 @@ Dantzig::Block Dantzig::first_block(Index m, Real sign) const {
   if (sign < 0) consider(result_.f[m], m);
   for (std::size_t k = 0; k < active_.size(); ++k) {
     const Real rate = x_[static_cast<Index>(k)];
-    if (rate * length(active_[k]) < -kLcpNoise * length(m)) consider(-result_.f[active_[k]] / rate, active_[k]);
+    if (rate * length(active_[k]) < -kLcpNoise * length(m))
+      consider(-result_.f[active_[k]] / rate, active_[k]);
   }
   for (Index i = 0; i < a_.size(); ++i)
     if (zones_[static_cast<std::size_t>(i)] == Zone::ZF &&

@@ -1,7 +1,8 @@
 #pragma once
 /// Joints in the sub-steps of the fast solver: after the contacts' sweep, each articulation's constraints are
-/// satisfied all at once by its sparse system, so that neither long chains nor great ratios of masses stretch it;
-/// then its rows with bounds, one after the other, each by what its impulse does to the whole articulation.
+/// satisfied all at once by its sparse system, so that neither long chains nor great ratios of masses stretch
+/// it; then its rows with bounds, one after the other, each by what its impulse does to the whole
+/// articulation.
 
 #include <span>
 #include <vector>
@@ -16,8 +17,8 @@ struct RelaxedBody;
 
 class RelaxedJoints {
  public:
-  /// `constraints` and `bounded` hold those of the first articulation first, and so on; of its `bounded` the i-th
-  /// articulation ends at `bounded_ends[i]`.
+  /// `constraints` and `bounded` hold those of the first articulation first, and so on; of its `bounded` the
+  /// i-th articulation ends at `bounded_ends[i]`.
   RelaxedJoints(const JointProblem& problem, std::span<Articulation* const> articulations,
                 std::span<const uint32_t> bounded_ends);
 
@@ -34,11 +35,11 @@ class RelaxedJoints {
 
  private:
   struct Row {
-    Real inverse_stiffness;         // by how much a unit of impulse changes u, softness included
-    Real impulse, lower, upper;     // of a sub-step
-    Real softness, sum = 0;         // for that; of the whole step
-    std::vector<Vec6> response;     // of the links; none: of its own two, in `response_a` and `response_b`
-    std::vector<Vec6> reaction;     // of the joints to that, likewise
+    Real inverse_stiffness;      // by how much a unit of impulse changes u, softness included
+    Real impulse, lower, upper;  // of a sub-step
+    Real softness, sum = 0;      // for that; of the whole step
+    std::vector<Vec6> response;  // of the links; none: of its own two, in `response_a` and `response_b`
+    std::vector<Vec6> reaction;  // of the joints to that, likewise
     Vec6 response_a, response_b;
   };
   struct Part {

@@ -42,7 +42,8 @@ class BodyImpulses {
 
   /// K of P8: the velocity that a unit impulse at `arm` from the centre of mass gives to the point there,
   /// world axes [1/kg]; zero of what is not dynamic. `push` is the direction from which it comes, unit: a
-  /// joint at its limit gives way to one side only. May be called from several threads while nothing is pushed.
+  /// joint at its limit gives way to one side only. May be called from several threads while nothing is
+  /// pushed.
   Mat3 mobility(const Obstacle& o, const Vec3& arm, const Vec3& push) const;
   /// Velocity of the point at `arm` from the centre of mass, as the impulses so far leave it [m/s].
   Vec3 velocity(const Obstacle& o, const Vec3& arm) const;

@@ -54,7 +54,8 @@ void GrainImpacts::resolve(std::span<Grain> grains, const GrainSearch& search, c
 void GrainImpacts::count_neighbours() {
   neighbours_.assign(grains_.size(), 0);
   tbb::parallel_for(std::size_t{0}, (grains_.size() + kImpactChunk - 1) / kImpactChunk, [&](std::size_t c) {
-    for (auto i = static_cast<uint32_t>(c * kImpactChunk); i < std::min(grains_.size(), (c + 1) * kImpactChunk); ++i)
+    for (auto i = static_cast<uint32_t>(c * kImpactChunk);
+         i < std::min(grains_.size(), (c + 1) * kImpactChunk); ++i)
       for (const uint32_t j : search_->partners(i)) {
         const Real reach = (1 + kNeighbourGap) * (grains_[i].radius + grains_[j].radius);
         if ((grains_[i].position - grains_[j].position).squaredNorm() > reach * reach) continue;
@@ -133,15 +134,15 @@ void GrainImpacts::collide_with_obstacle(const Impact& impact) {
   const Grain& g = grains_[impact.a];
   const Real fraction = impact.time / step_->h;
   const Vec3 contact = g.at(impact.time) - g.radius * impact.normal, arm = contact - o.centre_at(fraction);
-  const Vec3 surface =
-      o.is_dynamic() ? step_->impulses.velocity(o, arm) : o.velocity_at(contact, fraction);
+  const Vec3 surface = o.is_dynamic() ? step_->impulses.velocity(o, arm) : o.velocity_at(contact, fraction);
   const Vec3 u = g.arrival(impact.time, step_->h) - surface;
   // What is struck may move away by now; then it is only in the way until it does.
   const Vec3 impulse =
       u.dot(impact.normal) < 0
-          ? collision_impulse(o, fraction, g.mass, u, impact.normal, std::max(g.restitution, o.restitution),
-                              pair_friction(g.friction, o.friction),
-                              o.is_dynamic() ? step_->impulses.mobility(o, arm, -impact.normal) : Mat3(Mat3::Zero()))
+          ? collision_impulse(
+                o, fraction, g.mass, u, impact.normal, std::max(g.restitution, o.restitution),
+                pair_friction(g.friction, o.friction),
+                o.is_dynamic() ? step_->impulses.mobility(o, arm, -impact.normal) : Mat3(Mat3::Zero()))
           : Vec3(Vec3::Zero());
   if (o.is_dynamic()) {
     step_->impulses.push(reaction(o, contact, fraction, impulse));
@@ -186,8 +187,7 @@ void GrainImpacts::collide_cluster(std::span<const uint32_t> members, Real time)
   std::vector<Contact> contacts;
   std::vector<Real> restitution;
   for (const uint32_t m : members)
-    bodies.push_back(
-        {.inverse_mass = 1 / grains_[m].mass, .velocity = grains_[m].arrival(time, step_->h)});
+    bodies.push_back({.inverse_mass = 1 / grains_[m].mass, .velocity = grains_[m].arrival(time, step_->h)});
   for (uint32_t i = 0; i < members.size(); ++i)
     for (uint32_t j = i + 1; j < members.size(); ++j) {
       const Grain &a = grains_[members[i]], &b = grains_[members[j]];

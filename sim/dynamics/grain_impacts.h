@@ -19,8 +19,8 @@ class GrainImpacts {
  public:
   static constexpr uint32_t kNone = ~0u;
 
-  /// Takes the grains through their collisions. `search` must have sorted them and listed their partners. Bodies
-  /// get theirs by the step's impulses; appends what grains got.
+  /// Takes the grains through their collisions. `search` must have sorted them and listed their partners.
+  /// Bodies get theirs by the step's impulses; appends what grains got.
   void resolve(std::span<Grain> grains, const GrainSearch& search, const GrainStep& step,
                std::vector<GrainStrike>& strikes);
 

@@ -151,7 +151,8 @@ void GrainContacts::keep_outside(std::span<Vec3> end, std::vector<Reaction>& rea
   const auto for_each = [&](auto&& f) {
     tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
       NearObstacles near(step_->fixed, step_->moving);
-      for (auto i = static_cast<uint32_t>(c * kRelaxationChunk); i < std::min(grains_.size(), (c + 1) * kRelaxationChunk); ++i)
+      for (auto i = static_cast<uint32_t>(c * kRelaxationChunk);
+           i < std::min(grains_.size(), (c + 1) * kRelaxationChunk); ++i)
         f(i, near, found_[c]);
     });
   };

@@ -25,9 +25,9 @@ class DynamicSystem {
                         std::span<Real> dx) const = 0;
   /// dp = dp/dt at time t.
   virtual void force(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const = 0;
-  /// The same, and in `damping` for each p the rate at which drag takes it away [1/s]: minus the derivative of
-  /// dp by p, where that couples no two of them. False, and nothing is written: forces depend on p in other
-  /// ways, or this is not known. Here false.
+  /// The same, and in `damping` for each p the rate at which drag takes it away [1/s]: minus the derivative
+  /// of dp by p, where that couples no two of them. False, and nothing is written: forces depend on p in
+  /// other ways, or this is not known. Here false.
   virtual bool force_and_damping(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp,
                                  std::span<Real> damping) const;
   /// Appends the derivatives of (dx, dp) by (x, p), for implicit integration: row and column i are x_i, or
@@ -70,11 +70,12 @@ struct IntegratorWorkspace {
 };
 
 enum class IntegratorKind {
-  explicit_euler,     ///< N1, order 1
-  symplectic_euler,   ///< order 1, keeps energy bounded; one force evaluation
-  /// Order 2: forces act at the middle of the step (drift, kick, drift). Symplectic without drag; drag damps as
-  /// 1 / (1 + z + z^2 / 2), z = h k / m, stable for any step. One evaluation of the forces where they depend on
-  /// the rates by drag alone (DynamicSystem::force_and_damping), else two. The default for particles.
+  explicit_euler,    ///< N1, order 1
+  symplectic_euler,  ///< order 1, keeps energy bounded; one force evaluation
+  /// Order 2: forces act at the middle of the step (drift, kick, drift). Symplectic without drag; drag damps
+  /// as 1 / (1 + z + z^2 / 2), z = h k / m, stable for any step. One evaluation of the forces where they
+  /// depend on the rates by drag alone (DynamicSystem::force_and_damping), else two. The default for
+  /// particles.
   leapfrog,
   midpoint,           ///< N3, RK2, order 2
   rk4,                ///< N4, order 4
@@ -86,7 +87,8 @@ enum class IntegratorKind {
 };
 
 /// What an acceleration a at the start of a step of length h comes to where drag takes the velocity away at
-/// the rate k: v + end a at its end, v + mean a in its mean. To second order in h k, without overshoot for any.
+/// the rate k: v + end a at its end, v + mean a in its mean. To second order in h k, without overshoot for
+/// any.
 struct DampedKick {
   DampedKick(Real h, Real k) {
     const Real z = h * k, share = h / (1 + z + z * z / 2);

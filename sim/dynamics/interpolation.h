@@ -14,9 +14,9 @@ namespace offstage::sim {
 enum class Interpolation : uint8_t {
   monotone,  ///< cubic Hermite with limited tangents: each component stays between the values of its two
              ///< keys, and holds where both are equal
-  smooth,  ///< cubic Hermite with Catmull-Rom tangents: rounder, but may swing beyond the keys
-  linear,  ///< constant velocity
-  step,    ///< holds the first key's value, and jumps at the second key
+  smooth,    ///< cubic Hermite with Catmull-Rom tangents: rounder, but may swing beyond the keys
+  linear,    ///< constant velocity
+  step,      ///< holds the first key's value, and jumps at the second key
 };
 
 /// N numbers at a time, and how they go on to the next key.

@@ -46,7 +46,10 @@ Motion on_keys(const KeyframeTrack& track, Real t, const Pose& rest) {
   if (track.loop) t = keys.front().time + (t - round_start(track, t));
   if (t < keys.front().time) return {.pose = keys.front().pose};
   if (t >= keys.back().time) return {.pose = keys.back().pose};
-  return on_segment(track, segment_at(keys.size(), [&](std::size_t k) { return keys[k].time; }, t), t);
+  return on_segment(track,
+                    segment_at(
+                        keys.size(), [&](std::size_t k) { return keys[k].time; }, t),
+                    t);
 }
 
 /// Up to what rounding makes of the numbers in a scene.

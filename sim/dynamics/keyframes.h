@@ -1,6 +1,6 @@
 #pragma once
-/// Keyframed motion of kinematic bodies (physics E8, N6): positions by one of the interpolations, orientations
-/// by slerp, and the velocities that belong to them.
+/// Keyframed motion of kinematic bodies (physics E8, N6): positions by one of the interpolations,
+/// orientations by slerp, and the velocities that belong to them.
 
 #include <optional>
 #include <vector>

@@ -36,8 +36,8 @@ void ParticleCollisions::step(std::span<ParticleSystem* const> systems, const Pa
   match();
 
   const GrainStep step{stage.h, stage.fixed, stage.moving, law, collision_speed, stage.impulses};
-  // Resting contact moves by the velocities at the end. The partners found by the mean velocities serve for that,
-  // too, unless grains speed up by much in a sub-step.
+  // Resting contact moves by the velocities at the end. The partners found by the mean velocities serve for
+  // that, too, unless grains speed up by much in a sub-step.
   Real largest = 0, change = 0;
   for (const Grain& g : grains_) {
     largest = std::max(largest, g.radius);

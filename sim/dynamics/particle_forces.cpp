@@ -145,7 +145,8 @@ bool FreeFlight::force_and_damping(Real t, std::span<const Real> x, std::span<co
   // One rate for each particle, then spread over its three coordinates, the last first.
   const std::size_t count = mass_.size();
   forces_.accelerate(t, x, p, mass_, dp, damping.first(count));
-  for (std::size_t i = count; i-- > 0;) std::fill_n(damping.begin() + static_cast<std::ptrdiff_t>(3 * i), 3, Real(damping[i]));
+  for (std::size_t i = count; i-- > 0;)
+    std::fill_n(damping.begin() + static_cast<std::ptrdiff_t>(3 * i), 3, Real(damping[i]));
   return true;
 }
 

@@ -23,11 +23,11 @@ struct ParticlePath {
 };
 
 struct SweepOutcome {
-  uint32_t collisions = 0;  ///< impacts; a resting contact is not one
-  bool hit = false;         ///< touched anything
-  bool ejected = false;     ///< found inside a body, projected out (P4)
-  bool trapped = false;     ///< found inside a body, could not be projected out (P4)
-  bool truncated = false;   ///< used up its hits
+  uint32_t collisions = 0;    ///< impacts; a resting contact is not one
+  bool hit = false;           ///< touched anything
+  bool ejected = false;       ///< found inside a body, projected out (P4)
+  bool trapped = false;       ///< found inside a body, could not be projected out (P4)
+  bool truncated = false;     ///< used up its hits
   bool strikes_body = false;  ///< left as it was before, because it strikes a dynamic body ...
   Real time = 0;              ///< ... at this fraction of the sub-step
 };
@@ -55,8 +55,9 @@ struct ObstacleHit {
 };
 
 /// Impulse on a particle that meets an obstacle at a fraction of the sub-step with the relative velocity u,
-/// u.n < 0 (P5, P8); `mobility`: of the obstacle at the contact, zero if it does not give way. `friction` counts
-/// along the obstacle's fibre; across it `cross_friction` of that, and each sticks or slides by itself.
+/// u.n < 0 (P5, P8); `mobility`: of the obstacle at the contact, zero if it does not give way. `friction`
+/// counts along the obstacle's fibre; across it `cross_friction` of that, and each sticks or slides by
+/// itself.
 Vec3 collision_impulse(const Obstacle& o, Real fraction, Real particle_mass, const Vec3& u, const Vec3& n,
                        Real restitution, Real friction, const Mat3& mobility);
 /// What an impulse on a particle does to the obstacle.
@@ -90,9 +91,9 @@ class NearObstacles {
 
 class ParticleSweep {
  public:
-  /// `fixed` and `moving` are the obstacles of a sub-step of length h [s]. Those that strike dynamic bodies change
-  /// `impulses`, one after the other; without, as where many sweep at the same time, they are left as they were
-  /// and reported (SweepOutcome::strikes_body).
+  /// `fixed` and `moving` are the obstacles of a sub-step of length h [s]. Those that strike dynamic bodies
+  /// change `impulses`, one after the other; without, as where many sweep at the same time, they are left as
+  /// they were and reported (SweepOutcome::strikes_body).
   ParticleSweep(const Obstacles& fixed, const Obstacles& moving, const ParticleForces& forces, Real h,
                 SweepLog& log, BodyImpulses* impulses = nullptr)
       : near_(fixed, moving), forces_(forces), h_(h), log_(log), impulses_(impulses) {}

@@ -82,8 +82,8 @@ void ParticleSystem::begin_coupled() {
   start_velocity_ = arrays.velocity;
 }
 
-/// Free flight of a run of particles, its start kept in `scratch`. Before the world begins forces are those of
-/// its first moment.
+/// Free flight of a run of particles, its start kept in `scratch`. Before the world begins forces are those
+/// of its first moment.
 void ParticleSystem::fly(const ParticleForces& forces, Real t, Real h, std::size_t begin, std::size_t end,
                          Scratch& scratch) {
   const auto x = part(arrays.position, begin, end), v = part(arrays.velocity, begin, end);
@@ -259,8 +259,8 @@ ParticleTally ParticleSystem::step(const ParticleStage& stage, const ParticleFor
   return sum_up(tallies);
 }
 
-/// Those that strike dynamic bodies do so one after the other, in the order of time: each meets a body with the
-/// velocity that the ones before it have left it.
+/// Those that strike dynamic bodies do so one after the other, in the order of time: each meets a body with
+/// the velocity that the ones before it have left it.
 void ParticleSystem::strike_bodies(const ParticleStage& stage, const ParticleForces& forces,
                                    std::vector<Striker> strikers, ParticleTally& tally) {
   std::sort(strikers.begin(), strikers.end(), [](const Striker& a, const Striker& b) {

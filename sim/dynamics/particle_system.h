@@ -53,8 +53,8 @@ struct ParticleSystem {
     return i < old || newborn[i - old] < 0;
   }
 
-  /// Takes in those added since the last sub-step as they are now: each flies for as long as it has lived, and
-  /// lives through the whole coming sub-step.
+  /// Takes in those added since the last sub-step as they are now: each flies for as long as it has lived,
+  /// and lives through the whole coming sub-step.
   void admit_newborn(const ParticleForces& forces);
   /// Keeps the state at the start of the sub-step, for those that integrate the whole system themselves.
   void begin_coupled();

@@ -68,9 +68,9 @@ struct ParticleArrays {
 /// allows, else slides with |P_t| = mu P_n against the sliding direction.
 Vec3 collision_impulse(Real m12, const Vec3& u, const Vec3& n, Real restitution, Real friction);
 
-/// A velocity scaled so that it has the energy of having come by `shift` farther than its time allows under an
-/// acceleration a: |v|^2 + 2 a.shift. Where a hit, found on a straight path, or a surface in the way puts a
-/// particle beside its parabola, the energy that this would take is kept so. At rest it stays at rest.
+/// A velocity scaled so that it has the energy of having come by `shift` farther than its time allows under
+/// an acceleration a: |v|^2 + 2 a.shift. Where a hit, found on a straight path, or a surface in the way puts
+/// a particle beside its parabola, the energy that this would take is kept so. At rest it stays at rest.
 Vec3 velocity_after_shift(const Vec3& v, const Vec3& a, const Vec3& shift);
 
 /// When two spheres come to touch whose centres are `distance` apart when they do (P3): d and u are the

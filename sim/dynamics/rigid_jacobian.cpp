@@ -39,8 +39,8 @@ RigidDerivative::RigidDerivative(const RigidStage& stage) : stage_(stage) {
   // dw = I^-1 dH + d_theta x w - I^-1 (d_theta x H)
   angular_velocity_.setZero();
   angular_velocity_.middleCols<4>(kTurnRow) = (inverse_inertia_ * cross_matrix(stage.angular_momentum) -
-                                            cross_matrix(stage.motion.angular_velocity)) *
-                                           rotation_;
+                                               cross_matrix(stage.motion.angular_velocity)) *
+                                              rotation_;
   angular_velocity_.middleCols<3>(kAngularMomentum) = inverse_inertia_;
 }
 

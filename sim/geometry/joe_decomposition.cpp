@@ -55,7 +55,9 @@ class Candidates {
 
  private:
   void add(Real theta) {
-    if (theta < wedge_.angle - std::numbers::pi - kFlatFace || theta > std::numbers::pi + kFlatFace || angles_.size() == kMaxCandidates) return;
+    if (theta < wedge_.angle - std::numbers::pi - kFlatFace || theta > std::numbers::pi + kFlatFace ||
+        angles_.size() == kMaxCandidates)
+      return;
     for (Real other : angles_)
       if (std::abs(other - theta) < kFlatFace) return;
     angles_.push_back(theta);
@@ -91,7 +93,9 @@ std::optional<Merit> merit(const Polyhedron& p, const Cut& cut, Real tolerance) 
     m.dihedral = std::min({m.dihedral, above, below});
     measure_distances(p, cut, left, tolerance, m);
     measure_distances(p, cut, right, tolerance, m);
-    if (!c.across_face && inside.angle > std::numbers::pi + kFlatFace && std::max(above, below) <= std::numbers::pi + kFlatFace) ++m.resolved;
+    if (!c.across_face && inside.angle > std::numbers::pi + kFlatFace &&
+        std::max(above, below) <= std::numbers::pi + kFlatFace)
+      ++m.resolved;
     if (c.on_edge && is_reflex(p, c.half_edge)) --m.resolved;
   }
   if (m.dihedral < kFlatFace) return {};

@@ -10,7 +10,6 @@
 namespace offstage::sim {
 namespace {
 
-
 /// Integrals of 1, x and x x^T over a solid.
 struct Moments {
   Real volume = 0;

@@ -152,4 +152,3 @@ BENCHMARK(fcl_spatial_hash)->Apply(slow_case);
 
 }  // namespace
 }  // namespace offstage::sim
-

@@ -193,4 +193,3 @@ BENCHMARK(fcl_distance)->Arg(kApart)->Arg(kNear);
 
 }  // namespace
 }  // namespace offstage::sim
-

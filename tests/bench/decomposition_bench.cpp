@@ -43,4 +43,3 @@ BENCHMARK(winding_number);
 
 }  // namespace
 }  // namespace offstage::sim
-

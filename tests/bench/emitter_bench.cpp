@@ -69,4 +69,3 @@ BENCHMARK(trails)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace offstage::effects
-

@@ -48,4 +48,3 @@ BENCHMARK(dragged_dormand_prince)->Arg(1000);
 
 }  // namespace
 }  // namespace offstage::sim
-

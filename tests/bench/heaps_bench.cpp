@@ -1,5 +1,5 @@
-/// Steps of heaps that come down, by the solver `auto`: CPU time of a step over the first four seconds, its mean and
-/// the worst.
+/// Steps of heaps that come down, by the solver `auto`: CPU time of a step over the first four seconds, its
+/// mean and the worst.
 
 #include <algorithm>
 #include <ctime>

@@ -58,4 +58,3 @@ BENCHMARK(read_model_whole)->Arg(400)->Unit(benchmark::kMillisecond)->UseRealTim
 
 }  // namespace
 }  // namespace offstage::render
-

@@ -115,8 +115,9 @@ void boxes_with_separation(benchmark::State& state) {
   const Convex box = convex(Box{Vec3::Ones()});
   const std::vector<Pose> at = poses();
   GjkCache cache;
-  run_manifolds(state, at,
-      [&](std::size_t k) { return manifold(box, box, at[k], gjk(box, box, at[k], cache), 0.01).count; });
+  run_manifolds(state, at, [&](std::size_t k) {
+    return manifold(box, box, at[k], gjk(box, box, at[k], cache), 0.01).count;
+  });
 }
 void query_boxes(benchmark::State& state) {
   query(state, unit_box(), unit_box(), poses());
@@ -231,4 +232,3 @@ BENCHMARK(query_icosahedron_over_ground);
 
 }  // namespace
 }  // namespace offstage::sim
-

@@ -51,4 +51,3 @@ BENCHMARK(registration)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 }  // namespace
 }  // namespace offstage::sim
-

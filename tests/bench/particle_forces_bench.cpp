@@ -116,4 +116,3 @@ BENCHMARK(lennard_jones_of_near)
 
 }  // namespace
 }  // namespace offstage::sim
-

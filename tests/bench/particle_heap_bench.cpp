@@ -85,4 +85,3 @@ BENCHMARK(ballistic)->Arg(10'000)->Arg(100'000)->Arg(1'000'000)->Unit(benchmark:
 
 }  // namespace
 }  // namespace offstage::sim
-

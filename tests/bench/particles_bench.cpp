@@ -78,4 +78,3 @@ BENCHMARK(on_mesh_in_eddies)
 
 }  // namespace
 }  // namespace offstage::sim
-

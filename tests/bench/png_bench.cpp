@@ -38,4 +38,3 @@ void encode_1080p(benchmark::State& state) {
 BENCHMARK(encode_1080p)->ArgName("alpha")->Arg(255)->Arg(128)->Unit(benchmark::kMillisecond);
 
 }  // namespace
-

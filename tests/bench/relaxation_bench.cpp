@@ -50,4 +50,3 @@ BENCHMARK(pile)->Args({100, 1})->Args({1000, 1})->Args({1000, 2})->UseRealTime()
 
 }  // namespace
 }  // namespace offstage::sim
-

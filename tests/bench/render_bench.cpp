@@ -172,4 +172,3 @@ BENCHMARK(BM_ToneMapAndEdges)->Arg(0)->Arg(1)->ArgName("edges")->Unit(benchmark:
 
 }  // namespace
 }  // namespace offstage::render
-

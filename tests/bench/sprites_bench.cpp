@@ -79,4 +79,3 @@ BENCHMARK(BM_Bloom)->Arg(0)->Arg(1)->ArgName("lights")->MeasureProcessCPUTime()-
 
 }  // namespace
 }  // namespace offstage::render
-

@@ -215,4 +215,3 @@ BENCHMARK(fcl_mesh_distance)->Unit(benchmark::kMicrosecond)->Arg(kApart);
 
 }  // namespace
 }  // namespace offstage::sim
-

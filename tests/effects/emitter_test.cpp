@@ -18,7 +18,7 @@ struct FirstState {
 
 /// Births in order; nothing acts on the particles, so their first state follows from age.
 std::vector<FirstState> births(const EmitterDef& def, Real seconds, int fps, Real max_step = 1.0 / 240,
-                          EmitterReport* report = nullptr) {
+                               EmitterReport* report = nullptr) {
   World world({.gravity = Vec3::Zero(),
                .max_step = max_step,
                .bounds = Aabb(Vec3::Constant(-1e6), Vec3::Constant(1e6))});

@@ -406,12 +406,13 @@ struct Momenta {
   }
 };
 
-/// How far bodies may be in each other, derived from how they move. Both solvers know where two bodies touch, or
-/// may touch, as points that move evenly, and stop these, to kSolved. A point at a distance R of a body that turns
-/// by the angle w h in a sub-step leaves its tangent by R (w h)^2 / 2, up to what is looked at in pieces: a quarter
-/// of the body; for as much, two bodies may get into each other. Overlaps are pushed out by a fifth in each
-/// sub-step, so that what the sub-steps before have left adds up. Where the bounded number of trace-backs in a
-/// sub-step was used up, or the bodies whirl, two may get as far as they move against each other.
+/// How far bodies may be in each other, derived from how they move. Both solvers know where two bodies touch,
+/// or may touch, as points that move evenly, and stop these, to kSolved. A point at a distance R of a body
+/// that turns by the angle w h in a sub-step leaves its tangent by R (w h)^2 / 2, up to what is looked at in
+/// pieces: a quarter of the body; for as much, two bodies may get into each other. Overlaps are pushed out by
+/// a fifth in each sub-step, so that what the sub-steps before have left adds up. Where the bounded number of
+/// trace-backs in a sub-step was used up, or the bodies whirl, two may get as far as they move against each
+/// other.
 class Overlap {
  public:
   Overlap(const RandomScene& scene, std::span<const BodyHandle> bodies) : scene_(scene), bodies_(bodies) {}
@@ -426,9 +427,11 @@ class Overlap {
       const Motion motion = world.body_motion(bodies_[i], world.time());
       const Real angle = h * motion.angular_velocity.norm();
       const bool is_ball = !body.mesh && std::holds_alternative<Sphere>(body.def.shape);
-      now.add(is_ball ? 0 : body.reach * std::min(angle * angle / 2, kPiece), motion.velocity.norm() + angle / h * body.reach);
+      now.add(is_ball ? 0 : body.reach * std::min(angle * angle / 2, kPiece),
+              motion.velocity.norm() + angle / h * body.reach);
     }
-    const Real turning = std::max(now.turning(), before_.turning()), speed = std::max(now.speed(), before_.speed());
+    const Real turning = std::max(now.turning(), before_.turning()),
+               speed = std::max(now.speed(), before_.speed());
     before_ = now;
     Real added = kSolved + turning;
     if (report.cut_short + report.settled > 0) added += h * speed;

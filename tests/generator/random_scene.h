@@ -56,12 +56,12 @@ World make_world(const RandomScene& scene);
 /// What a run showed.
 struct Findings {
   bool finite = true;
-  std::vector<std::string> lost;                        ///< bodies that left the world, or the room
-  Real energy_gain = 0;                                 ///< greatest rise above the least so far [J]
-  Real energy_scale = 1;                                ///< what the scene's energies are about [J]
-  Real gained_at = 0;                                   ///< when it was greatest [s]
-  Real penetration = 0;                                 ///< of bodies, where it exceeds what is allowed most [m]
-  Real allowed_penetration = 0;                         ///< then, see Overlap in random_scene.cpp [m]
+  std::vector<std::string> lost;  ///< bodies that left the world, or the room
+  Real energy_gain = 0;           ///< greatest rise above the least so far [J]
+  Real energy_scale = 1;          ///< what the scene's energies are about [J]
+  Real gained_at = 0;             ///< when it was greatest [s]
+  Real penetration = 0;           ///< of bodies, where it exceeds what is allowed most [m]
+  Real allowed_penetration = 0;   ///< then, see Overlap in random_scene.cpp [m]
   Real momentum_error = 0, angular_momentum_error = 0;  ///< of the greatest sizes of their parts
   uint64_t work = 0, allowed_work = 0;                  ///< greatest of a step, counted
   uint64_t rough = 0;                                   ///< fall-backs of contact solvers

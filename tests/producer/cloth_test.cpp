@@ -70,15 +70,16 @@ TEST(Cloths, WhatCannotBeIsRefusedWithWhatCan) {
   EXPECT_EQ(cloth_errors(R"({"seams": [{"type": "sides", "a": "left", "b": "top"}],
                           "shape": {"type": "grid", "cells": [4, 2]}})"),
             "/cloths/0: joins a side of 3 vertices to one of 5; they must be as many\n");
-  EXPECT_EQ(
-      cloth_errors(R"({"shape": {"type": "mesh", "file": "none.glb"}})").find("/cloths/0/shape/file: there is"),
-      0u);
+  EXPECT_EQ(cloth_errors(R"({"shape": {"type": "mesh", "file": "none.glb"}})")
+                .find("/cloths/0/shape/file: there is"),
+            0u);
   EXPECT_EQ(cloth_errors("{}", R"(, "forces": [{"type": "wind", "cloths": ["cloth_1"]}])"),
             "/forces/0/cloths/0: there is no cloth 'cloth_1'; did you mean 'cloth_0'?\n");
 }
 
 TEST(Cloths, ExplicitIntegratorsNameTheSpringAndTheLongestStep) {
-  const std::string stiff = cloth_errors(R"({"integrator": "symplectic", "substep": 0.002, "stretch": 100000})");
+  const std::string stiff =
+      cloth_errors(R"({"integrator": "symplectic", "substep": 0.002, "stretch": 100000})");
   EXPECT_EQ(stiff.find("/cloths/0: its springs are too stiff for an explicit integrator: the "), 0u) << stiff;
   EXPECT_NE(stiff.find(" spring between vertices "), std::string::npos) << stiff;
   EXPECT_NE(stiff.find("needs a substep less than"), std::string::npos);

@@ -58,7 +58,8 @@ TEST(SceneJoints, WhatCannotBeIsRefusedWithWhatCan) {
   EXPECT_EQ(joint_errors(bodies + R"("joints": [{"a": "door", "motor": {}}])"),
             "/joints/0/motor: drives revolute, prismatic and distance joints only\n");
   EXPECT_EQ(joint_errors(bodies + R"("articulations": [{"type": "chain", "end": "world"}])"),
-            "/articulations/0/sag: must be over 1.0005 if both ends are held still: a taut chain bears nothing across\n");
+            "/articulations/0/sag: must be over 1.0005 if both ends are held still: a taut chain bears "
+            "nothing across\n");
   EXPECT_EQ(joint_errors(bodies + R"("articulations": [{"type": "chain", "sag": 1.1, "end": "dor"}])"),
             "/articulations/0/end: there is no body 'dor'; did you mean 'door'?\n");
 }
@@ -101,7 +102,8 @@ sim::BodyHandle handle_of(const Simulation& simulation, const std::string& name)
   throw std::out_of_range(name);
 }
 
-// The speed of its rear wheels, half of it in the mean of a smooth start; turning, a circle of L / tan(angle).
+// The speed of its rear wheels, half of it in the mean of a smooth start; turning, a circle of L /
+// tan(angle).
 TEST(Vehicle, DrivesAsFastAsItsWheelsAndTurnsAsItIsSteered) {
   const LoadedScene loaded = parse(R"(
     "output": {"fps": 30, "duration": 8}, "world": {"solver": "fast"},
@@ -150,7 +152,8 @@ TEST(Crane, BearsItsLoadAndMovesItByItsMotors) {
 }
 
 TEST(ModelTrees, AreTheNodesOfTheirFile) {
-  const std::string arm = R"({"type": "model", "name": "arm", "file": "assets/models/robot_arm.glb", "position": [1, 0, 0],
+  const std::string arm =
+      R"({"type": "model", "name": "arm", "file": "assets/models/robot_arm.glb", "position": [1, 0, 0],
       "orientation": {"axis": [0, 1, 0], "angle_deg": 90}, "scale": 2, "joints": [)";
   const LoadedScene loaded = parse(R"("articulations": [)" + arm + R"({"node": "base", "type": "fixed"},
       {"node": "finger_left", "type": "prismatic", "axis": [1, 0, 0], "limits": [0, 0.1]}]}])");
@@ -168,11 +171,15 @@ TEST(ModelTrees, AreTheNodesOfTheirFile) {
   EXPECT_LT((finger.anchor - Vec3(1, 2 * 2.135, 0.32)).norm(), 1e-6);
   EXPECT_EQ(scene.joints[0].b, "");
 
-  EXPECT_EQ(joint_errors(R"("articulations": [)" + arm + R"({"node": "hnad"}, {"node": "hand", "type": "distance"}]}])"),
-            "/articulations/0/joints/0/node: assets/models/robot_arm.glb has no node 'hnad' with triangles; did you mean "
-            "'hand'?\n/articulations/0/joints/1/type: must be another: a node and the one above it have no distance to "
+  EXPECT_EQ(joint_errors(R"("articulations": [)" + arm +
+                         R"({"node": "hnad"}, {"node": "hand", "type": "distance"}]}])"),
+            "/articulations/0/joints/0/node: assets/models/robot_arm.glb has no node 'hnad' with triangles; "
+            "did you mean "
+            "'hand'?\n/articulations/0/joints/1/type: must be another: a node and the one above it have no "
+            "distance to "
             "keep\n");
-  EXPECT_NE(joint_errors(R"("articulations": [{"type": "model", "file": "none.glb"}])").find("/articulations/0/file: "),
+  EXPECT_NE(joint_errors(R"("articulations": [{"type": "model", "file": "none.glb"}])")
+                .find("/articulations/0/file: "),
             std::string::npos);
 }
 

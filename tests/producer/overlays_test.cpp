@@ -233,7 +233,8 @@ TEST(Overlays, DoNotTouchTheState) {
   EXPECT_EQ(with.simulation.snapshot().state_hash, without.simulation.snapshot().state_hash);
 }
 
-// A weight of 2 kg that hangs on a hinge: its axis, a line to the centre, and an arrow for what the hinge bears.
+// A weight of 2 kg that hangs on a hinge: its axis, a line to the centre, and an arrow for what the hinge
+// bears.
 TEST(JointsOverlay, ShowsTheHingeAndWhatItBears) {
   Shown shown(R"({"bodies": [{"name": "arm", "shape": {"type": "box", "size": [0.1, 1, 0.1]}, "density": 200,
                               "position": [0, 0.5, 0]}],

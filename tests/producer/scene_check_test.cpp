@@ -160,10 +160,11 @@ TEST(SceneCheck, FrictionAcrossAGrainTakesMaterialAndAxis) {
   EXPECT_EQ(warnings_of(R"({"materials": [{"name": "planks", "cross_friction": 1}],
     "bodies": [{"material": "planks", "friction_axis": [1, 0, 0]}]})"),
             "");
-  EXPECT_EQ(errors_of(R"({"materials": [{"name": "skate", "friction": 0, "cross_friction": 1}],
+  EXPECT_EQ(
+      errors_of(R"({"materials": [{"name": "skate", "friction": 0, "cross_friction": 1}],
     "bodies": [{"material": "skate", "friction_axis": [1, 0, 0]}]})"),
-            "/materials/0/cross_friction: takes a friction along the grain, too, of which it is a share; allowed "
-            "is any but 0, such as 0.001\n");
+      "/materials/0/cross_friction: takes a friction along the grain, too, of which it is a share; allowed "
+      "is any but 0, such as 0.001\n");
 }
 
 TEST(SceneCheck, ForcesActOnWhatThereIs) {
@@ -209,13 +210,16 @@ TEST(SceneCheck, WhatIsToHappenAtAnAgeThatNoParticleReachesIsAnError) {
   const auto scene = [](const std::string& more) {
     return R"({"emitters": [{"lifespan": {"mean": 1, "deviation": 0.2}, )" + more + "}]}";
   };
-  EXPECT_EQ(errors_of(scene(R"("split": {"age": 1.5})")),
-            "/emitters/0/split/age: is 1.5 s, but particles live 1.2 s at most and never split; allowed is less "
-            "than the lifespan\n");
+  EXPECT_EQ(
+      errors_of(scene(R"("split": {"age": 1.5})")),
+      "/emitters/0/split/age: is 1.5 s, but particles live 1.2 s at most and never split; allowed is less "
+      "than the lifespan\n");
   EXPECT_NE(errors_of(scene(R"("trails": [{"start_age": 1.2}])")), "");
   EXPECT_NE(errors_of(scene(R"("on_age": [{"age": 2}])")), "");
   EXPECT_NE(errors_of(scene(R"("on_death": [{"lifespan": 0.3, "split": {"age": 0.3}}])")), "");
-  EXPECT_EQ(errors_of(scene(R"("split": {"age": 1.1}, "trails": [{"start_age": 1}], "on_age": [{"age": 1.1}])")), "");
+  EXPECT_EQ(
+      errors_of(scene(R"("split": {"age": 1.1}, "trails": [{"start_age": 1}], "on_age": [{"age": 1.1}])")),
+      "");
   EXPECT_EQ(errors_of(scene(R"("split": {"age": 1.5, "enabled": false})")), "");
 }
 
@@ -352,7 +356,8 @@ TEST(SceneCheck, DragThatWouldBlowUpIsRefused) {
   EXPECT_EQ(errors_of(group(0.019)), "");
   EXPECT_NE(errors_of(group(0.021)).find("/particles/0/linear_drag: is too much for the step"),
             std::string::npos);
-  const std::string drops = R"({"emitters": [{"integrator": "symplectic_euler", "radius": 0.002, "linear_drag": 0.02}]})";
+  const std::string drops =
+      R"({"emitters": [{"integrator": "symplectic_euler", "radius": 0.002, "linear_drag": 0.02}]})";
   EXPECT_NE(errors_of(drops).find("/emitters/0/linear_drag"), std::string::npos);
   const std::string body = R"({"bodies": [{"mass": 1, "linear_drag": 1000}]})";
   EXPECT_NE(errors_of(body).find("/bodies/0/linear_drag"), std::string::npos);

@@ -71,13 +71,16 @@ TEST(SceneIo, ColoursAreSrgbTextOrLinearNumbers) {
   EXPECT_EQ(scene.materials[3].color.rgba, Eigen::Vector4f(0, 0, 0, 0.25f));
   EXPECT_EQ(load_errors(R"({"materials": [{"color": "#ff80"}, {"color": "#ff80zz"}, {"color": "#+10203"},
 {"color": [1, 1]}, {"color": [1, -1, 0]}, {"color": [0, 0, 0, 2]}]})"),
-            "s:1:46: /materials/1/color: must be \"#rrggbb\", \"#rrggbbaa\", \"#rgb\", \"#rgba\" or a list of 3 or 4 numbers, got "
+            "s:1:46: /materials/1/color: must be \"#rrggbb\", \"#rrggbbaa\", \"#rgb\", \"#rgba\" or a list "
+            "of 3 or 4 numbers, got "
             "the string "
             "\"#ff80zz\"\n"
-            "s:1:68: /materials/2/color: must be \"#rrggbb\", \"#rrggbbaa\", \"#rgb\", \"#rgba\" or a list of 3 or 4 numbers, got "
+            "s:1:68: /materials/2/color: must be \"#rrggbb\", \"#rrggbbaa\", \"#rgb\", \"#rgba\" or a list "
+            "of 3 or 4 numbers, got "
             "the string "
             "\"#+10203\"\n"
-            "s:2:11: /materials/3/color: must be \"#rrggbb\", \"#rrggbbaa\", \"#rgb\", \"#rgba\" or a list of 3 or 4 numbers, got "
+            "s:2:11: /materials/3/color: must be \"#rrggbb\", \"#rrggbbaa\", \"#rgb\", \"#rgba\" or a list "
+            "of 3 or 4 numbers, got "
             "2 items\n"
             "s:2:34: /materials/4/color/1: must be between 0 and 1000000, got -1\n"
             "s:2:63: /materials/5/color/3: must be between 0 and 1, got 2");
@@ -189,7 +192,8 @@ TEST(SceneIo, WhatIsRequiredIsMissed) {
   EXPECT_EQ(
       load_errors(
           R"({"bodies": [{"shape": {"type": "mesh"}, "model": {"file": ""}}], "camera": {"type": "follow"}})"),
-      "s:1:23: /bodies/0/shape/file: is required: model file relative to the scene, or the name of one that comes with offstage; FILE#NODE is one of its nodes\n"
+      "s:1:23: /bodies/0/shape/file: is required: model file relative to the scene, or the name of one that "
+      "comes with offstage; FILE#NODE is one of its nodes\n"
       "s:1:59: /bodies/0/model/file: must not be empty\n"
       "s:1:76: /camera/body: is required: name of the body");
 }

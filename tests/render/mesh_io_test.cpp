@@ -99,12 +99,12 @@ TEST(ReadModel, PlacesInstancesByTheirNodes) {
 
 TEST(ReadModel, ListsTheNodesWithTrianglesAndReadsOneOfThem) {
   const ScratchFolder folder;
-  const std::filesystem::path file = folder.put(
-      "a.gltf", gltf(R"([{"name":"root","children":[1],"translation":[10,0,0]},
+  const std::filesystem::path file =
+      folder.put("a.gltf", gltf(R"([{"name":"root","children":[1],"translation":[10,0,0]},
                          {"name":"arm","mesh":0,"scale":[2,2,2],"translation":[0,1,0],"children":[2]},
                          {"children":[3],"translation":[1,0,0]},
                          {"name":"arm","mesh":0,"rotation":[0,0,0.70710678,0.70710678]}])",
-                     R"(,"materials":[{}])"));
+                                R"(,"materials":[{}])"));
   const Model whole = read_model(file);
   ASSERT_EQ(whole.nodes.size(), 2u);
   EXPECT_EQ(whole.nodes[0].name, "arm");

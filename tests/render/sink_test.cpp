@@ -41,7 +41,9 @@ void film(const VideoDef& def, int frames) {
 /// Sets an environment variable for its own life.
 class EnvironmentVariable {
  public:
-  EnvironmentVariable(const char* name, const std::string& value) : name_(name) { ::setenv(name, value.c_str(), 1); }
+  EnvironmentVariable(const char* name, const std::string& value) : name_(name) {
+    ::setenv(name, value.c_str(), 1);
+  }
   ~EnvironmentVariable() { ::unsetenv(name_); }
   EnvironmentVariable(const EnvironmentVariable&) = delete;
   EnvironmentVariable& operator=(const EnvironmentVariable&) = delete;
@@ -178,9 +180,9 @@ TEST(VideoSink, DiscardsWhatIsPartialWithoutClose) {
 TEST(VideoSink, ShowsTheLastWordsOfAKilledEncoder) {
   const ScratchFolder folder;
   const EnvironmentVariable ffmpeg("OFFSTAGE_FFMPEG",
-                           fake_ffmpeg(folder,
-                                       "head -c 5000 >/dev/null\n"
-                                       "printf 'out of paint\\nreally' >&2\nkill -9 $$\n"));
+                                   fake_ffmpeg(folder,
+                                               "head -c 5000 >/dev/null\n"
+                                               "printf 'out of paint\\nreally' >&2\nkill -9 $$\n"));
   const std::string message = message_of<FileError>([&] {
     const auto sink = make_video_sink({.path = folder / "a.mp4", .width_px = 640, .height_px = 480});
     for (int f = 0; f < 10; ++f) sink->write(f, greys(640, 480, f));
@@ -193,7 +195,7 @@ TEST(VideoSink, ShowsTheLastWordsOfAKilledEncoder) {
 TEST(VideoSink, ReportsAnEncoderThatFailsAtTheEnd) {
   const ScratchFolder folder;
   const EnvironmentVariable ffmpeg("OFFSTAGE_FFMPEG",
-                           fake_ffmpeg(folder, "cat >/dev/null; echo no space >&2; exit 3\n"));
+                                   fake_ffmpeg(folder, "cat >/dev/null; echo no space >&2; exit 3\n"));
   const auto sink = make_video_sink({.path = folder / "a.mp4", .width_px = 32, .height_px = 32});
   sink->write(0, greys(32, 32, 0));
   const std::string message = message_of<FileError>([&] { sink->close(); });

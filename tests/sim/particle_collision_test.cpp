@@ -109,9 +109,8 @@ TEST(ParticleCollision, ComesToRestInACornerWithoutTruncatedSweeps) {
   World world({.wind = {3, 0, 3}});
   world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
   for (const Vec3& n : {Vec3(-1, 0, 0), Vec3(0, 0, -1)})
-    world.add_body({.shape = Plane{},
-                    .motion = MotionType::fixed,
-                    .pose = {-n, rotation_between(Vec3::UnitY(), n)}});
+    world.add_body(
+        {.shape = Plane{}, .motion = MotionType::fixed, .pose = {-n, rotation_between(Vec3::UnitY(), n)}});
   const auto system = world.add_particle_system({.linear_drag = 0.05});
   world.add_particle(system, {.position = {0.5, 0.5, 0.3}, .mass = 0.01, .radius = 0.01, .friction = 0.1});
   for (int i = 0; i < 600; ++i) world.step(kFrame);

@@ -33,8 +33,7 @@ TEST(TextEdit, AddsAKeyInTheMannerOfTheObject) {
   EXPECT_EQ(set_value("{\n\t\"a\": 1  // the first\n}", "/b", "2"),
             "{\n\t\"a\": 1,  // the first\n\t\"b\": 2\n}");
   EXPECT_EQ(set_value("{\r\n  \"a\": 1\r\n}", "/b/c", "2"), "{\r\n  \"a\": 1,\r\n  \"b\": {\"c\": 2}\r\n}");
-  EXPECT_EQ(set_value("{\n  \"a\": 1\n}", "/b/0", "{}"),
-            "{\n  \"a\": 1,\n  \"b\": [\n    {}\n  ]\n}");
+  EXPECT_EQ(set_value("{\n  \"a\": 1\n}", "/b/0", "{}"), "{\n  \"a\": 1,\n  \"b\": [\n    {}\n  ]\n}");
   EXPECT_EQ(set_value("{\"a\": [1, 2]}", "/a/2", "3"), "{\"a\": [1, 2, 3]}");
   EXPECT_EQ(set_value("{\"a\": 1}", "/list/0", "{}"), "{\"a\": 1, \"list\": [{}]}");
 }

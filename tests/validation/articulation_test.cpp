@@ -1,5 +1,5 @@
-/// Bodies joined by joints against closed forms and minimal coordinates (physics A1-A6, specification's rows on
-/// articulations).
+/// Bodies joined by joints against closed forms and minimal coordinates (physics A1-A6, specification's rows
+/// on articulations).
 
 #include <array>
 #include <cmath>
@@ -36,7 +36,8 @@ Quat about_z(Real angle) {
 }
 
 /// A rod of length 1 that hangs at the origin, turned by an angle from hanging down.
-BodyHandle add_pendulum(World& world, Real angle, Real width = 0.02, JointDef joint = {.type = JointType::revolute}) {
+BodyHandle add_pendulum(World& world, Real angle, Real width = 0.02,
+                        JointDef joint = {.type = JointType::revolute}) {
   const Quat turn = about_z(angle);
   joint.a = add_box(world, {width, 1, width}, 2, turn * Vec3(0, -0.5, 0), turn);
   world.add_joint(joint);
@@ -58,7 +59,8 @@ TEST(CompoundPendulum, HasThePeriodOfTheEllipticIntegral) {
     World world(quiet());
     const BodyHandle rod = add_pendulum(world, degrees * std::numbers::pi / 180);
     const Real inertia = 1.0 / 3 + 0.02 * 0.02 / 12, w0 = std::sqrt(kG * 0.5 / inertia);
-    const Real period = 2 * std::numbers::pi / (w0 * arithmetic_geometric_mean(1, std::cos(degrees * std::numbers::pi / 360)));
+    const Real period = 2 * std::numbers::pi /
+                        (w0 * arithmetic_geometric_mean(1, std::cos(degrees * std::numbers::pi / 360)));
     std::vector<Real> crossings;
     Real before = world.body(rod).centre.x();
     while (crossings.size() < 9) {
@@ -91,7 +93,8 @@ std::array<Real, 4> double_pendulum(std::array<Real, 4> y, Real time) {
   constexpr int kSteps = 100000;
   const Real h = time / kSteps;
   for (int i = 0; i < kSteps; ++i) {
-    const auto k1 = rate(y), k2 = rate(plus(y, h / 2, k1)), k3 = rate(plus(y, h / 2, k2)), k4 = rate(plus(y, h, k3));
+    const auto k1 = rate(y), k2 = rate(plus(y, h / 2, k1)), k3 = rate(plus(y, h / 2, k2)),
+               k4 = rate(plus(y, h, k3));
     for (std::size_t k = 0; k < 4; ++k) y[k] += h / 6 * (k1[k] + 2 * k2[k] + 2 * k3[k] + k4[k]);
   }
   return y;
@@ -103,14 +106,15 @@ TEST(DoublePendulum, FollowsItsMinimalCoordinatesForFiveSeconds) {
     const Real first = 1.2, second = 0.4;
     const Vec3 elbow(std::sin(first), -std::cos(first), 0);
     const BodyHandle upper = add_box(world, {0.05, 1, 0.05}, 1, elbow / 2, about_z(first));
-    const BodyHandle lower =
-        add_box(world, {0.05, 1, 0.05}, 1, elbow + Vec3(std::sin(second), -std::cos(second), 0) / 2, about_z(second));
+    const BodyHandle lower = add_box(
+        world, {0.05, 1, 0.05}, 1, elbow + Vec3(std::sin(second), -std::cos(second), 0) / 2, about_z(second));
     world.add_joint({.type = type, .a = upper});
     world.add_joint({.type = type, .a = lower, .b = upper, .anchor = elbow});
     for (int i = 0; i < 5 * 240; ++i) world.step(1.0 / 240);
     const auto y = double_pendulum({first, second, 0, 0}, 5);
     const Vec3 tip = world.body(lower).pose.point_to_world({0, -0.5, 0});
-    EXPECT_LT((tip - Vec3(std::sin(y[0]) + std::sin(y[1]), -std::cos(y[0]) - std::cos(y[1]), 0)).norm(), 1e-3);
+    EXPECT_LT((tip - Vec3(std::sin(y[0]) + std::sin(y[1]), -std::cos(y[0]) - std::cos(y[1]), 0)).norm(),
+              1e-3);
   }
 }
 
@@ -139,7 +143,8 @@ TEST(HeavyTop, PrecessesSteadily) {
     world.step(1.0 / 240);
     const Vec3 now = world.body(top).pose.orientation * Vec3::UnitY();
     // About +y, from +z towards +x.
-    turned += std::atan2(before.z() * now.x() - before.x() * now.z(), before.x() * now.x() + before.z() * now.z());
+    turned +=
+        std::atan2(before.z() * now.x() - before.x() * now.z(), before.x() * now.x() + before.z() * now.z());
     before = now;
     ASSERT_NEAR(std::acos(now.y()), kLean, 0.01);
   }
@@ -238,8 +243,10 @@ TEST(FourBarLoop, StaysClosedForAMinute) {
   }
   std::vector<JointHandle> joints;
   joints.push_back(world.add_joint({.type = JointType::revolute, .a = bars[0], .anchor = corners[0]}));
-  joints.push_back(world.add_joint({.type = JointType::revolute, .a = bars[1], .b = bars[0], .anchor = corners[1]}));
-  joints.push_back(world.add_joint({.type = JointType::revolute, .a = bars[2], .b = bars[1], .anchor = corners[2]}));
+  joints.push_back(
+      world.add_joint({.type = JointType::revolute, .a = bars[1], .b = bars[0], .anchor = corners[1]}));
+  joints.push_back(
+      world.add_joint({.type = JointType::revolute, .a = bars[2], .b = bars[1], .anchor = corners[2]}));
   joints.push_back(world.add_joint({.type = JointType::revolute, .a = bars[2], .anchor = corners[3]}));
   const Real start = world.energy().total();
   for (int i = 0; i < 60 * 240; ++i) {
@@ -291,7 +298,8 @@ TEST(SliderCrank, FollowsADrivenCrank) {
   const BodyHandle slider = add_box(world, {0.2, 0.2, 0.2}, 5, {r + l, 0, 0});
   world.add_joint({.type = JointType::revolute, .a = rod, .b = wheel, .anchor = {r, 0, 0}});
   world.add_joint({.type = JointType::revolute, .a = slider, .b = rod, .anchor = {r + l, 0, 0}});
-  world.add_joint({.type = JointType::prismatic, .a = slider, .anchor = {r + l, 0, 0}, .axis = Vec3::UnitX()});
+  world.add_joint(
+      {.type = JointType::prismatic, .a = slider, .anchor = {r + l, 0, 0}, .axis = Vec3::UnitX()});
   for (int i = 1; i <= 600; ++i) {
     world.step(1.0 / 240);
     const Real angle = kSpeed * i / 240;
@@ -306,8 +314,10 @@ TEST_P(Joints, SlideDownAnInclineWithoutTurning) {
   constexpr Real kAngle = 0.5;
   World world(def());
   const BodyHandle box = add_box(world, {0.2, 0.2, 0.2}, 1, Vec3::Zero());
-  const JointHandle rail = world.add_joint(
-      {.type = JointType::prismatic, .a = box, .axis = {std::cos(kAngle), -std::sin(kAngle), 0}, .friction = 1});
+  const JointHandle rail = world.add_joint({.type = JointType::prismatic,
+                                            .a = box,
+                                            .axis = {std::cos(kAngle), -std::sin(kAngle), 0},
+                                            .friction = 1});
   run(world, 1);
   // Dry friction takes 1 N of the weight's part along the rail.
   EXPECT_NEAR(world.joint(rail).coordinate, 0.5 * (kG * std::sin(kAngle) - 1), 1e-3);
@@ -317,7 +327,8 @@ TEST_P(Joints, SlideDownAnInclineWithoutTurning) {
 TEST_P(Joints, StopAtTheirLimits) {
   World world(def());
   // Falls from level, and stops 60 degrees further down.
-  const BodyHandle rod = add_pendulum(world, std::numbers::pi / 2, 0.02, {.type = JointType::revolute, .lower = -std::numbers::pi / 3});
+  const BodyHandle rod = add_pendulum(world, std::numbers::pi / 2, 0.02,
+                                      {.type = JointType::revolute, .lower = -std::numbers::pi / 3});
   JointHandle joint;
   world.for_each_joint([&](JointHandle j) { joint = j; });
   Real lowest = 0;
@@ -449,7 +460,8 @@ TEST_P(Joints, LetARopeBeShorterButNotLonger) {
 TEST_P(Joints, WindTheRopeOfAWinch) {
   World world(def());
   JointDef winch{.type = JointType::distance, .anchor_b = {0, 3, 0}};
-  winch.motor = {.mode = Motor::Mode::position, .targets = {{0, 0}, {1, 0, Interpolation::linear}, {3, -1.5}}};
+  winch.motor = {.mode = Motor::Mode::position,
+                 .targets = {{0, 0}, {1, 0, Interpolation::linear}, {3, -1.5}}};
   winch.a = add_box(world, {0.1, 0.1, 0.1}, 2, Vec3::Zero());
   const JointHandle joint = world.add_joint(winch);
   run(world, 2);
@@ -588,8 +600,12 @@ TEST_P(Joints, SleepWhenTheLastKeyOfTheirMotorsIsPast) {
   WorldDef sleepy = def();
   sleepy.sleep = true;
   World world(sleepy);
-  JointDef hinge{.type = JointType::revolute, .a = add_box(world, {1, 0.1, 0.1}, 1, {0.5, 0, 0}), .axis = Vec3::UnitZ()};
-  hinge.motor = {.mode = Motor::Mode::position, .targets = {{0, 0}, {3, 0}, {3.5, 0.5}}, .stiffness = 900, .damping = 60};
+  JointDef hinge{
+      .type = JointType::revolute, .a = add_box(world, {1, 0.1, 0.1}, 1, {0.5, 0, 0}), .axis = Vec3::UnitZ()};
+  hinge.motor = {.mode = Motor::Mode::position,
+                 .targets = {{0, 0}, {3, 0}, {3.5, 0.5}},
+                 .stiffness = 900,
+                 .damping = 60};
   const JointHandle joint = world.add_joint(hinge);
   run(world, 2.9);
   EXPECT_FALSE(world.is_asleep(hinge.a));
@@ -642,12 +658,14 @@ TEST(JointDefs, SayWhatIsWrongWithThem) {
     }
     return "";
   };
-  EXPECT_NE(message({}).find("joint \"hinge\": at least one of its bodies must be dynamic"), std::string::npos);
+  EXPECT_NE(message({}).find("joint \"hinge\": at least one of its bodies must be dynamic"),
+            std::string::npos);
   EXPECT_NE(message({.a = body, .b = body}).find("a and b are the same"), std::string::npos);
   EXPECT_NE(message({.a = body, .axis = Vec3::Zero()}).find("axis is 0 0 0"), std::string::npos);
   EXPECT_NE(message({.a = body, .lower = 0.1}).find("contains 0"), std::string::npos);
   EXPECT_NE(message({.a = body, .friction = -1}).find("friction is -1"), std::string::npos);
-  EXPECT_NE(message({.a = body, .motor = {.mode = Motor::Mode::speed}}).find("a motor drives"), std::string::npos);
+  EXPECT_NE(message({.a = body, .motor = {.mode = Motor::Mode::speed}}).find("a motor drives"),
+            std::string::npos);
   EXPECT_EQ(message({.a = body}), "");
 }
 

@@ -32,9 +32,9 @@ class BothSolvers : public testing::TestWithParam<SolverKind> {
   INSTANTIATE_TEST_SUITE_P(kind, suite, testing::Values(SolverKind::exact, SolverKind::fast), solver_name)
 
 /// The same, and for what chooses between them.
-#define OFFSTAGE_ALL_SOLVERS(kind, suite)                                                                     \
-  INSTANTIATE_TEST_SUITE_P(kind, suite,                                                                       \
-                           testing::Values(SolverKind::exact, SolverKind::fast, SolverKind::automatic), solver_name)
+#define OFFSTAGE_ALL_SOLVERS(kind, suite) \
+  INSTANTIATE_TEST_SUITE_P(               \
+      kind, suite, testing::Values(SolverKind::exact, SolverKind::fast, SolverKind::automatic), solver_name)
 
 /// What many steps reported: counts summed, the greatest of the rest.
 struct Tally {

@@ -80,8 +80,8 @@ TEST_P(Incline, CylinderRollsWithTwoThirdsOfThePull) {
   run(world, t);
   const Vec3 s = incline(a).vector_to_body(world.body(roller).centre - start);
   EXPECT_NEAR(s.x() / (kFrictionGravity / 3 * std::sin(a) * t * t), 1, 0.005);
-  EXPECT_NEAR(world.body(roller).angular_velocity.z() * 0.1 / (-2.0 / 3 * kFrictionGravity * std::sin(a) * t), 1,
-              0.005);
+  EXPECT_NEAR(world.body(roller).angular_velocity.z() * 0.1 / (-2.0 / 3 * kFrictionGravity * std::sin(a) * t),
+              1, 0.005);
   EXPECT_LT(std::abs(s.z()), 1e-3);
 }
 
@@ -207,7 +207,8 @@ TEST_P(Level, PlankPulledFromUnderABox) {
     run(world, t);
     const Real most = kMu * kBox * kFrictionGravity, common = pull / (kBox + kPlank);
     const bool slips = common > kMu * kFrictionGravity;
-    EXPECT_NEAR(world.body(box).centre.x() / ((slips ? kMu * kFrictionGravity : common) * t * t / 2), 1, 0.005)
+    EXPECT_NEAR(world.body(box).centre.x() / ((slips ? kMu * kFrictionGravity : common) * t * t / 2), 1,
+                0.005)
         << pull;
     EXPECT_NEAR(world.body(plank).centre.x() / ((slips ? (pull - most) / kPlank : common) * t * t / 2), 1,
                 0.005)

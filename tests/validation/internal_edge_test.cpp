@@ -143,7 +143,9 @@ TEST_P(InternalEdges, DoNotStopWhatSlides) {
       for (const Real step : {1.0 / 240, 1.0 / 60}) {
         for (const Real speed : {5.0, 15.0}) {
           // The rim of a cone still trips over meshes side by side where it moves far in a step.
-          if (speed * step > 0.05 && std::string(floor) == "tiles of mesh" && std::string(mover.name) == "cone") continue;
+          if (speed * step > 0.05 && std::string(floor) == "tiles of mesh" &&
+              std::string(mover.name) == "cone")
+            continue;
           World world(def(step));
           add_flat_floor(world, floor, 0);
           const BodyHandle body = world.add_body(moving_body(mover, speed, 0));
@@ -216,10 +218,11 @@ TEST_P(InternalEdges, DoNotStopWhatAConveyorCarries) {
 // Two planes that meet at the bottom, of many triangles each: what lies in both goes along.
 TEST_P(InternalEdges, OfAValleyDoNotStopWhatGoesAlongIt) {
   const Real slope = std::tan(0.5), radius = 0.1;
-  const Mover movers[] = {
-      {"ball", Sphere{radius}, radius / std::cos(0.5)},
-      {"capsule", Capsule{radius, 0.4}, radius / std::cos(0.5), Quat(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitZ()))},
-      {"cylinder", Cylinder{radius, 0.4}, radius / std::cos(0.5), Quat(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitZ()))}};
+  const Mover movers[] = {{"ball", Sphere{radius}, radius / std::cos(0.5)},
+                          {"capsule", Capsule{radius, 0.4}, radius / std::cos(0.5),
+                           Quat(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitZ()))},
+                          {"cylinder", Cylinder{radius, 0.4}, radius / std::cos(0.5),
+                           Quat(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitZ()))}};
   for (const Mover& mover : movers)
     for (const Real step : {1.0 / 240, 1.0 / 60}) {
       World world(def(step));
@@ -248,7 +251,8 @@ TriangleMesh cone_mesh(Real radius, Real height, uint32_t around, uint32_t rings
   for (uint32_t k = 1; k <= rings; ++k)
     for (uint32_t i = 0; i < around; ++i) {
       const Real angle = 2 * std::numbers::pi * i / around, share = static_cast<Real>(k) / rings;
-      m.vertices.emplace_back(share * radius * std::cos(angle), (1 - share) * height, share * radius * std::sin(angle));
+      m.vertices.emplace_back(share * radius * std::cos(angle), (1 - share) * height,
+                              share * radius * std::sin(angle));
     }
   const auto at = [&](uint32_t ring, uint32_t i) { return 1 + (ring - 1) * around + i % around; };
   for (uint32_t i = 0; i < around; ++i) {
@@ -261,8 +265,8 @@ TriangleMesh cone_mesh(Real radius, Real height, uint32_t around, uint32_t rings
   return m;
 }
 
-// A sphere of radius 2 of 96 x 48 triangles: its edges turn by 0.065 rad, and what slides over them loses the speed
-// that it has across the next face.
+// A sphere of radius 2 of 96 x 48 triangles: its edges turn by 0.065 rad, and what slides over them loses the
+// speed that it has across the next face.
 TEST_P(RoundMeshes, LetThingsSlideDownASphereAsTheSmoothOneDoes) {
   const Real radius = 2, from = 0.3;
   const Vec3 up(std::sin(from), std::cos(from), 0);
@@ -275,7 +279,8 @@ TEST_P(RoundMeshes, LetThingsSlideDownASphereAsTheSmoothOneDoes) {
       std::array<Motion, 2> ends;
       for (const bool is_mesh : {false, true}) {
         World world(def(step));
-        const Shape ground = is_mesh ? Shape(MeshShape{world.add_mesh(sphere_mesh(radius, 96, 48))}) : Shape(Sphere{radius});
+        const Shape ground =
+            is_mesh ? Shape(MeshShape{world.add_mesh(sphere_mesh(radius, 96, 48))}) : Shape(Sphere{radius});
         world.add_body(fixed_body(ground, Vec3::Zero(), 0));
         BodyDef moving = moving_body(mover, 0, 0);
         moving.pose.position = (radius + mover.height) * up;
@@ -283,8 +288,10 @@ TEST_P(RoundMeshes, LetThingsSlideDownASphereAsTheSmoothOneDoes) {
         run(world, 0.7, step);
         ends[is_mesh] = world.body_motion(body, world.time());
       }
-      EXPECT_LT((ends[0].pose.position - ends[1].pose.position).norm(), 0.025) << mover.name << ", step " << step;
-      EXPECT_LT((ends[0].velocity - ends[1].velocity).norm(), 0.065 * ends[0].velocity.norm()) << mover.name << ", step " << step;
+      EXPECT_LT((ends[0].pose.position - ends[1].pose.position).norm(), 0.025)
+          << mover.name << ", step " << step;
+      EXPECT_LT((ends[0].velocity - ends[1].velocity).norm(), 0.065 * ends[0].velocity.norm())
+          << mover.name << ", step " << step;
     }
 }
 
@@ -293,7 +300,8 @@ TEST_P(RoundMeshes, LetThingsSlideDownACone) {
   const Real radius = 4, height = 3, steepness = std::atan2(height, radius), middle = std::numbers::pi / 24;
   const Real flat = radius * std::cos(middle);  // of the faces' middles
   const Real angle = std::atan2(height, flat);
-  const Vec3 along = Quat(Eigen::AngleAxisd(-middle, Vec3::UnitY())) * Vec3(std::cos(angle), -std::sin(angle), 0),
+  const Vec3 along =
+                 Quat(Eigen::AngleAxisd(-middle, Vec3::UnitY())) * Vec3(std::cos(angle), -std::sin(angle), 0),
              up = Quat(Eigen::AngleAxisd(-middle, Vec3::UnitY())) * Vec3(std::sin(angle), std::cos(angle), 0);
   ASSERT_NEAR(steepness, angle, 0.01);
   Mat3 axes;
@@ -301,13 +309,15 @@ TEST_P(RoundMeshes, LetThingsSlideDownACone) {
   const Quat lying(axes);
   const Mover movers[] = {{"box", Box{{0.2, 0.1, 0.05}}, 0.05, lying},
                           {"ball", Sphere{0.1}, 0.1},
-                          {"capsule", Capsule{0.1, 0.2}, 0.1, lying * Quat(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitZ()))},
+                          {"capsule", Capsule{0.1, 0.2}, 0.1,
+                           lying * Quat(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitZ()))},
                           {"cylinder", Cylinder{0.05, 0.1}, 0.05, lying},
                           {"cone", Cone{0.05, 0.1}, 0.05, lying}};
   for (const Mover& mover : movers)
     for (const Real step : {1.0 / 240, 1.0 / 60}) {
       World world(def(step));
-      world.add_body(fixed_body(MeshShape{world.add_mesh(cone_mesh(radius, height, 24, 40))}, Vec3::Zero(), 0));
+      world.add_body(
+          fixed_body(MeshShape{world.add_mesh(cone_mesh(radius, height, 24, 40))}, Vec3::Zero(), 0));
       BodyDef moving = moving_body(mover, 0, 0);
       const Vec3 start = Vec3(0, height, 0) + along + mover.height * up;
       moving.pose.position = start;
@@ -317,7 +327,8 @@ TEST_P(RoundMeshes, LetThingsSlideDownACone) {
       const Real t = world.time(), pull = kFallAcceleration * std::sin(angle);
       EXPECT_LT((end.pose.position - start - pull * t * t / 2 * along).norm(), is_exact() ? 1e-5 : 2e-3)
           << mover.name << ", step " << step;
-      EXPECT_LT((end.velocity - pull * t * along).norm(), (is_exact() ? 1e-5 : 2e-3) * pull * t) << mover.name << ", step " << step;
+      EXPECT_LT((end.velocity - pull * t * along).norm(), (is_exact() ? 1e-5 : 2e-3) * pull * t)
+          << mover.name << ", step " << step;
     }
 }
 
@@ -381,8 +392,8 @@ TEST_P(RealEdges, ABallIsThrownOffARidge) {
               speed * sine * std::cos(std::numbers::pi / 8), 0.1);
 }
 
-// A wheel rolls at 1 m/s against a kerb of 2 cm and sticks to its corner, over which it turns: its moment about the
-// corner stays as it is, then its energy.
+// A wheel rolls at 1 m/s against a kerb of 2 cm and sticks to its corner, over which it turns: its moment
+// about the corner stays as it is, then its energy.
 TEST_P(RealEdges, AWheelClimbsAKerb) {
   const Real radius = 0.3, kerb = 0.02, spin = 1 / radius;
   const Real inertia = 1.5 * radius * radius;  // by mass, about the rim
@@ -408,7 +419,8 @@ TEST_P(RealEdges, AWheelClimbsAKerb) {
       run(world, 2.5, step);
       const Motion end = world.body_motion(body, world.time());
       EXPECT_GT(end.pose.position.x(), 1.5) << (is_mesh ? "mesh" : "boxes") << ", step " << step;
-      EXPECT_NEAR(end.pose.position.y(), radius + kerb, 2e-3) << (is_mesh ? "mesh" : "boxes") << ", step " << step;
+      EXPECT_NEAR(end.pose.position.y(), radius + kerb, 2e-3)
+          << (is_mesh ? "mesh" : "boxes") << ", step " << step;
       EXPECT_NEAR(end.velocity.x(), left, 0.04) << (is_mesh ? "mesh" : "boxes") << ", step " << step;
     }
 }
@@ -421,7 +433,8 @@ TEST_P(RealEdges, ABallInARidgeIsPushedOffTheRidge) {
     World world(weightless());
     world.add_body(fixed_body(MeshShape{world.add_mesh(roof)}, Vec3::Zero(), 0));
     const Real lean = std::numbers::pi / 16;
-    BodyDef ball = fixed_body(Sphere{0.1}, (0.1 - depth) * Vec3(std::sin(lean), std::cos(lean), 0) + Vec3(0, 0, 0.05), 0);
+    BodyDef ball = fixed_body(Sphere{0.1},
+                              (0.1 - depth) * Vec3(std::sin(lean), std::cos(lean), 0) + Vec3(0, 0, 0.05), 0);
     ball.motion = MotionType::dynamic;
     world.add_body(ball);
     world.step(1.0 / 240);

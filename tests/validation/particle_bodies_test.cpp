@@ -72,7 +72,8 @@ TEST(ParticlesAndJoints, AJointAtItsLimitGivesWayToOneSideOnly) {
       JointDef hinge{.type = JointType::revolute, .a = add_plate(world), .anchor = {-0.5, 0, 0}};
       (opens ? hinge.upper : hinge.lower) = 0;  // a blow from above turns it clockwise
       world.add_joint(hinge);
-      EXPECT_NEAR(rebound(world, internal), opens ? rebound_from(inertia / (reach * reach)) : kHitSpeed, 1e-9);
+      EXPECT_NEAR(rebound(world, internal), opens ? rebound_from(inertia / (reach * reach)) : kHitSpeed,
+                  1e-9);
 
       World railed = weightless();
       JointDef rail{.type = JointType::prismatic, .a = add_plate(railed), .axis = Vec3::UnitY()};

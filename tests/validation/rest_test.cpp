@@ -149,8 +149,7 @@ TEST_P(Sleep, ASpringWhoseOtherEndMovesWakesIt) {
          .pose = {side},
          .collides = false,
          .track = {.keys = {{now, {side}}, {now + 1, {side}, kind}, {now + 1.2, {side + Vec3(2, 0, 0)}}}}});
-    s.world.add_spring(
-        {.a = BodyPoint{s.stack[2]}, .b = BodyPoint{hand}, .stiffness = 2000, .damping = 50});
+    s.world.add_spring({.a = BodyPoint{s.stack[2]}, .b = BodyPoint{hand}, .stiffness = 2000, .damping = 50});
     run(s.world, 0.95);
     EXPECT_TRUE(s.world.is_asleep(s.stack[2]));
     EXPECT_EQ(s.world.step(1.0 / 240).bodies_awake, 0u);  // and costs nothing until then
@@ -169,7 +168,8 @@ TEST_P(Sleep, ASpringToAParticleThatMovesOffOrIsGoneWakesIt) {
       {.a = BodyPoint{s.stack[2]}, .b = ParticlePoint{system, id}, .stiffness = 20, .damping = 5});
   run(s.world, 1);
   EXPECT_TRUE(s.world.is_asleep(s.stack[2]));
-  s.world.add_force({.systems = {system}, .start = s.world.time() + 1, .effect = ConstantField{.force = {20, 0, 0}}});
+  s.world.add_force(
+      {.systems = {system}, .start = s.world.time() + 1, .effect = ConstantField{.force = {20, 0, 0}}});
   run(s.world, 0.9);
   EXPECT_TRUE(s.world.is_asleep(s.stack[2]));
   run(s.world, 0.8);
@@ -180,7 +180,8 @@ TEST_P(Sleep, LosingASpringWithTheBodyAtItsOtherEndWakesIt) {
   WorldDef sleepy = def();
   sleepy.sleep = true;
   World world(sleepy);
-  const BodyHandle hook = world.add_body({.shape = Sphere{0.1}, .motion = MotionType::fixed, .pose = {Vec3(0, 3, 0)}});
+  const BodyHandle hook =
+      world.add_body({.shape = Sphere{0.1}, .motion = MotionType::fixed, .pose = {Vec3(0, 3, 0)}});
   const BodyHandle ball = world.add_body({.shape = Sphere{0.1}, .pose = {Vec3(0, 2, 0)}, .mass = 1});
   world.add_spring({.a = BodyPoint{hook},
                     .b = BodyPoint{ball},

@@ -11,7 +11,6 @@
 namespace offstage::sim {
 namespace {
 
-
 /// Complete elliptic integral of the first kind by the arithmetic-geometric mean; m = k^2.
 Real elliptic_k(Real m) {
   Real a = 1, b = std::sqrt(1 - m);

@@ -12,7 +12,6 @@
 namespace offstage::sim {
 namespace {
 
-
 BodyHandle add_ground(World& world, Real friction = 0.5) {
   return world.add_body(
       {.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0, .friction = friction});

@@ -60,7 +60,8 @@ void expect_solves(uint32_t links, const std::vector<Topology>& joints, uint64_t
   system.relative(velocities, result);
   Real scale = 0;
   for (const Vec6& c : change) scale = std::max(scale, c.norm());
-  for (std::size_t j = 0; j < joints.size(); ++j) EXPECT_LT((result[j] - change[j]).norm(), tolerance * scale);
+  for (std::size_t j = 0; j < joints.size(); ++j)
+    EXPECT_LT((result[j] - change[j]).norm(), tolerance * scale);
   for (std::size_t j = 0; j < joints.size(); ++j) {
     const Topology& t = joints[j];
     if (t.a != kDriven) by_impulses[t.a] += mobility[t.a].velocity(rows[j].on_a * impulses[j]);

@@ -178,7 +178,8 @@ TEST(BoxBox, TwistedBoxesKeepTheFacesNormalWhileTheyRock) {
   for (int k = 0; k < kPoses; ++k) {
     const Quat rock(Eigen::AngleAxisd(dice.uniform(0, 3e-4), dice.direction()));
     Manifold m;
-    if (!box_manifold(unit_cube(), unit_cube(), {{0, -1 + dice.uniform(-4e-4, 5e-4), 0}, rock * twist}, 0.01, m)) {
+    if (!box_manifold(unit_cube(), unit_cube(), {{0, -1 + dice.uniform(-4e-4, 5e-4), 0}, rock * twist}, 0.01,
+                      m)) {
       ++unanswered;
       continue;
     }

@@ -155,7 +155,8 @@ TEST(Manifold, AStackOfEqualBoxesKeepsItsNamesWhileItCreeps) {
   ASSERT_EQ(names.size(), 4u);
   for (int k = 0; k < 500; ++k) {
     const Vec3 creep = 3e-6 * dice.in_cube();
-    ASSERT_EQ(ids(manifold_of(box, box, pose_at(Vec3(0, -1, 0) + creep, dice.direction(), 1e-6), 0.01)), names);
+    ASSERT_EQ(ids(manifold_of(box, box, pose_at(Vec3(0, -1, 0) + creep, dice.direction(), 1e-6), 0.01)),
+              names);
   }
 }
 
@@ -198,7 +199,8 @@ TEST(Manifold, EdgesMeetInTwoPointsAlongEachOtherAndInOneAcross) {
   ASSERT_EQ(along.count, 2u);
   EXPECT_EQ(along.source, NormalSource::edge_of_b);
   EXPECT_NEAR((along.points[0].on_a - along.points[1].on_a).norm(), 1.5, 1e-9);
-  const Manifold across = manifold_of(convex(beam), convex(beam), pose_at({0.2, y, 0}, Vec3::UnitY(), 1), 0.01);
+  const Manifold across =
+      manifold_of(convex(beam), convex(beam), pose_at({0.2, y, 0}, Vec3::UnitY(), 1), 0.01);
   ASSERT_EQ(across.count, 1u);
   EXPECT_EQ(across.source, NormalSource::edges);
   EXPECT_NEAR(across.points[0].separation, 0.001, 1e-12);

@@ -81,7 +81,8 @@ TEST(TimeOfImpact, TurningRodMeetsThePlane) {
 TEST(TimeOfImpact, TiltingPlaneMeetsABall) {
   // A ball rests beside the pivot of a plane that swings up: it is touched when tan-free geometry says so.
   const Convex ball = convex(Sphere{0.1});
-  const PosePath resting(still_pose({2, 0.5, 0})), swinging(still_pose(Vec3::Zero()), still_pose(Vec3::Zero(), 1.0));
+  const PosePath resting(still_pose({2, 0.5, 0})),
+      swinging(still_pose(Vec3::Zero()), still_pose(Vec3::Zero(), 1.0));
   const auto impact = time_of_plane_impact({ball, resting}, swinging, kTolerance);
   ASSERT_TRUE(impact);
   const Vec3 up = swinging.at(impact->share).vector_to_world(Vec3::UnitY());

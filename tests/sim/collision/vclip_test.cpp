@@ -178,7 +178,7 @@ TEST(Vclip, IsSymmetricAndMovesWithTheSolids) {
     for (uint32_t f = 0; f < pair.a.face_count(); ++f)
       faces.emplace_back(pair.a.face_vertices(f).begin(), pair.a.face_vertices(f).end());
     const Separation u = cold_start({std::move(turned), faces}, pair.b,
-                              at(turn * pair.a_from_b.position, turn * pair.a_from_b.orientation));
+                                    at(turn * pair.a_from_b.position, turn * pair.a_from_b.orientation));
     RC_ASSERT(std::abs(s.distance - u.distance) <= 1e-10 * pair.size());
   }));
 }

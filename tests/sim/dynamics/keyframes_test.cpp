@@ -17,7 +17,8 @@ KeyframeTrack track(Interpolation interpolation, bool loop) {
 }
 
 TEST(Keyframes, PassThroughTheKeys) {
-  for (auto kind : {Interpolation::monotone, Interpolation::smooth, Interpolation::linear, Interpolation::step}) {
+  for (auto kind :
+       {Interpolation::monotone, Interpolation::smooth, Interpolation::linear, Interpolation::step}) {
     KeyframeTrack t = track(kind, false);
     t.spin.setZero();
     for (const Keyframe& k : t.keys) {
@@ -31,7 +32,8 @@ TEST(Keyframes, PassThroughTheKeys) {
 // Central differences of the pose; their error is of order d^2.
 TEST(Keyframes, VelocitiesAreTheDerivativeOfThePose) {
   constexpr Real kD = 1e-5;
-  for (auto kind : {Interpolation::monotone, Interpolation::linear, Interpolation::smooth, Interpolation::step})
+  for (auto kind :
+       {Interpolation::monotone, Interpolation::linear, Interpolation::smooth, Interpolation::step})
     for (bool loop : {false, true}) {
       const KeyframeTrack t = track(kind, loop);
       for (Real time : {0.1, 0.49, 0.7, 1.9, 2.3, 3.3, 7.1}) {
@@ -84,10 +86,11 @@ TEST(Keyframes, AComponentStaysBetweenItsKeysAndHoldsWhereTheyAreEqual) {
 }
 
 TEST(Keyframes, AKeySaysHowItGoesOnToTheNext) {
-  KeyframeTrack t{.keys = {{0, {Vec3(0, 0, 0)}, Interpolation::linear},
-                           {1, {Vec3(1, 0, 0), Quat(Eigen::AngleAxisd(1, Vec3::UnitY()))}, Interpolation::step},
-                           {2, {Vec3(5, 0, 0)}},
-                           {3, {Vec3(6, 0, 0)}}}};
+  KeyframeTrack t{
+      .keys = {{0, {Vec3(0, 0, 0)}, Interpolation::linear},
+               {1, {Vec3(1, 0, 0), Quat(Eigen::AngleAxisd(1, Vec3::UnitY()))}, Interpolation::step},
+               {2, {Vec3(5, 0, 0)}},
+               {3, {Vec3(6, 0, 0)}}}};
   EXPECT_DOUBLE_EQ(t.at(0.25, {}).pose.position.x(), 0.25);
   EXPECT_EQ(t.at(1.999, {}).pose.position.x(), 1);
   EXPECT_EQ(t.at(1.999, {}).pose.orientation.coeffs(), t.keys[1].pose.orientation.coeffs());
