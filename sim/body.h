@@ -30,7 +30,7 @@ struct Body {
   uint32_t row = 0;      // among the bodies of its island
   uint32_t rank = 0;     // its place in the order of the world's bodies; see World::Impl::rank_bodies()
   Real extent = 0;       // reach() of the solid; of a plane infinite
-  Real blow = 0;         // speed of what is near and may strike it in the sub-step [m/s]
+  Real impact_speed_bound = 0;  // greatest speed of a body near it that may hit it in the sub-step [m/s]
   Pose pose;             // now
 
   // The interval in which it moves at the moment: a whole sub-step, or what an impact has left of it.

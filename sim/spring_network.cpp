@@ -8,7 +8,7 @@ namespace {
 
 /// Pieces in which the motion of what joints hold is integrated: of its turning, and of the phase of its
 /// fastest swinging [rad]; and the most of them.
-constexpr Real kTurn = 0.12, kSwing = 1, kWhirl = 1, kMostPieces = 64;
+constexpr Real kTurn = 0.12, kSwing = 1, kFastSpin = 1, kMostPieces = 64;
 
 }  // namespace
 
@@ -203,14 +203,14 @@ void SpringNetwork::add_joint_forces(const Jointed& jointed, Real t, std::span<c
 /// No integrator of a fixed step follows what turns by much more in it, or swings: links that are pulled
 /// tight are the masses of a string.
 Real SpringNetwork::pieces(Real h) const {
-  Real fastest = 0, tightest = 0, whirling = 0;
-  for (const Body* body : bodies_) whirling = std::max(whirling, greatest_spin(body->rigid));
+  Real fastest = 0, tightest = 0, spin = 0;
+  for (const Body* body : bodies_) spin = std::max(spin, greatest_spin(body->rigid));
   for (const Jointed& j : articulations_) {
     for (const Body* body : j.articulation->bodies())
       fastest = std::max(fastest, body->rigid.angular_velocity().norm());
     tightest = std::max(tightest, j.articulation->greatest_frequency());
   }
-  return std::clamp(std::ceil(std::max({fastest / kTurn, tightest / kSwing, whirling / kWhirl}) * h), 1.0,
+  return std::clamp(std::ceil(std::max({fastest / kTurn, tightest / kSwing, spin / kFastSpin}) * h), 1.0,
                     kMostPieces);
 }
 
@@ -235,7 +235,7 @@ void SpringNetwork::store(std::span<const Real> x, std::span<const Real> p) {
 }
 
 void SpringNetwork::step(const Integrator& integrator, Real t, Real h, IntegratorWorkspace& work) {
-  for (const Jointed& j : articulations_) j.articulation->pass_on_blows(t, joint_tally_);
+  for (const Jointed& j : articulations_) j.articulation->transmit_impulses(t, joint_tally_);
   load(x_, p_);
   // The most careful member leads; without bodies there is none to remember.
   work.next_step = 0;

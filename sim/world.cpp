@@ -170,7 +170,7 @@ void World::Impl::wake_neighbours(Body& body) {
 }
 
 /// Whatever rests on a body that goes away wakes.
-void World::Impl::let_go(Body& body) {
+void World::Impl::detach(Body& body) {
   wake(body);
   wake_neighbours(body);
   graph.forget(body.handle.index);
@@ -340,12 +340,12 @@ void World::add_contact_rule(const ContactRule& rule) {
 bool World::remove(BodyHandle body) {
   const auto* found = impl_->bodies.find(body);
   if (!found) return false;
-  impl_->let_go(**found);
-  impl_->let_go_of_cloths(body);
-  impl_->let_go_of_joints(**found);
+  impl_->detach(**found);
+  impl_->detach_cloths(body);
+  impl_->detach_joints(**found);
   impl_->ranks_changed = true;
   impl_->bodies.erase(body);
-  impl_->nudges.erase(body.index);
+  impl_->pending_impulses.erase(body.index);
   if (impl_->broad_phase.contains(body.index)) impl_->broad_phase.remove(body.index);
   std::erase_if(impl_->moved, [&](const MovedBody& m) { return m.body == body; });
   impl_->fixed_changed = impl_->lists_changed = true;

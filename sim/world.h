@@ -155,9 +155,9 @@ struct StepReport {
   Real penetration = 0;     ///< greatest at the starts of sub-steps and at impacts [m]
   uint64_t collisions = 0;  ///< contacts that met faster than WorldDef::collision_speed
   uint64_t tracebacks = 0;  ///< times that bodies were put back to a time of impact
-  uint64_t cut_short = 0;   ///< pairs that were not traced back any more in a sub-step: too many impacts
-  uint64_t settled = 0;     ///< pairs in a pile that did not bounce any more in a sub-step, likewise
-  uint64_t foreseen = 0;    ///< contacts of the fast solver that were looked for at a step's end
+  uint64_t toi_limit_reached = 0;   ///< pairs that were not traced back any more in a sub-step: too many impacts
+  uint64_t restitution_suppressed = 0;     ///< pairs in a pile that were too many to bounce any more in a sub-step
+  uint64_t speculative_contacts = 0;    ///< contacts of the fast solver expected at a step's end
   uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
   ContactWork exact, fast;                   ///< of the solvers of resting contact
   ContactWork impacts;                       ///< of the solver of collisions
@@ -170,7 +170,7 @@ struct StepReport {
 
   uint64_t cloth_contacts = 0;  ///< at the end, of all cloths; the others as ClothReport has them
   uint64_t cloth_self_contacts = 0;
-  uint64_t cloth_springs_softened = 0;  ///< at the end, too
+  uint64_t cloth_springs_clamped = 0;  ///< at the end, too
   Real cloth_strain = 0;                ///< greatest
   Real cloth_penetration = 0;           ///< deepest [m]
   uint64_t cloth_moves_limited = 0, cloth_moves_held_back = 0, cloth_crossings = 0, cloth_springs_torn = 0;

@@ -11,8 +11,8 @@ namespace {
 
 /// Cloth under a body that moves slower than this is at rest [m/s].
 constexpr Real kClothRest = 0.05;
-/// A change of speed in a sub-step that is a blow; gravity's is a fifth of it [m/s].
-constexpr Real kBlow = 0.2;
+/// A change of speed in a sub-step that is an impact; gravity's is a fifth of it [m/s].
+constexpr Real kImpact = 0.2;
 
 }  // namespace
 
@@ -60,7 +60,7 @@ void World::Impl::arrange_cloths() {
 }
 
 /// What is pinned to a body that goes away, hangs free.
-void World::Impl::let_go_of_cloths(BodyHandle body) {
+void World::Impl::detach_cloths(BodyHandle body) {
   cloths.for_each([&](ClothHandle, std::unique_ptr<Cloth>& cloth) {
     std::erase_if(cloth->pins, [&](const ClothPin& pin) { return pin.body == body; });
   });
@@ -82,7 +82,7 @@ std::vector<ClothBody> World::Impl::bodies_near_cloths(Real h) const {
   std::vector<ClothBody> near;
   bodies.for_each([&](BodyHandle handle, const std::unique_ptr<Body>& body) {
     if (!body->def.collides && !holds[handle.index]) return;
-    Obstacle way = way_of(*body, h);
+    Obstacle way = swept_obstacle(*body, h);
     if (!holds[handle.index] && !std::holds_alternative<Plane>(*way.solid.shape) &&
         !way.swept_bounds().intersects(around))
       return;
@@ -139,8 +139,8 @@ void World::Impl::answer_cloths(std::span<const ClothBody> near, Real start, Rea
     }
     if (!at.touched || body.asleep) continue;
     // It is where cloth met it: put back to where it would be without, it would drag cloth along each time.
-    // Between two bodies cloth acts on velocities, and only a blow moves them.
-    if (!at.pinches || at.reaction().impulse.norm() > kBlow * body.rigid.mass) {
+    // Between two bodies cloth acts on velocities, and only an impact moves them.
+    if (!at.pinches || at.reaction().impulse.norm() > kImpact * body.rigid.mass) {
       body.pose = at.end();
       body.rigid.place(body.pose);
     }
@@ -155,7 +155,7 @@ void World::Impl::report_cloths(StepReport& report) {
     const ClothReport& r = cloth->report;
     report.cloth_contacts += r.contacts;
     report.cloth_self_contacts += r.self_contacts;
-    report.cloth_springs_softened += r.softened;
+    report.cloth_springs_clamped += r.clamped;
     report.cloth_strain = std::max(report.cloth_strain, r.max_strain);
     report.cloth_penetration = std::max(report.cloth_penetration, r.penetration);
     report.cloth_moves_limited += r.limited;

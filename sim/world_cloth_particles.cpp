@@ -104,10 +104,10 @@ void World::Impl::hit_cloths(Real h) {
       }
       p.position[i] += hit.overlap * hit.normal;
       if (velocity.dot(hit.normal) >= 0) continue;
-      const Vec3 blow = collision_impulse(1 / mobility, velocity, hit.normal, p.restitution[i],
+      const Vec3 impulse = collision_impulse(1 / mobility, velocity, hit.normal, p.restitution[i],
                                           std::sqrt(p.friction[i] * cloth.def.friction));
-      p.velocity[i] += blow / p.mass[i];
-      for (std::size_t k = 0; k < 3; ++k) cloth.velocities[hit.triangle->corners[k]] -= gain[k] * blow;
+      p.velocity[i] += impulse / p.mass[i];
+      for (std::size_t k = 0; k < 3; ++k) cloth.velocities[hit.triangle->corners[k]] -= gain[k] * impulse;
       ++cloth.report.particle_hits;
       if (system.def.report_collisions)
         particle_events.push_back({ParticleEvent::Kind::collision, handle, p.id[i], now + hit.fraction * h,

@@ -31,14 +31,14 @@ constexpr Real kWide = 0.036;
 /// second order.
 constexpr Real kReuse = 1e-4, kReuseShare = 2e-4, kExactReuse = 1e-8;
 /// Of the speed of what strikes it, a body of the same mass gets this share if it does not bounce: then both
-/// go on together. So often a blow is passed on: the next one would have a sixteenth of its speed, and of
+/// go on together. So often an impact is passed on: the next one would have a sixteenth of its speed, and of
 /// less than 7.7 m/s that is within kMargin in a step of 1/240 s.
 constexpr Real kPassedShare = 0.5;
 constexpr uint32_t kPassedOn = 3;
 /// Bodies turn if their turning moves their surfaces by more than this in an interval [m].
 constexpr Real kTurning = 2e-4;
 /// Bodies that move against each other by more than this in an interval may meet with other features [m].
-constexpr Real kForesee = 3e-3;
+constexpr Real kFastPair = 3e-3;
 
 Real smaller_extent(const Body& a, const Body& b) {
   return std::min(a.extent, b.extent);
@@ -158,7 +158,7 @@ void World::Impl::collect_pairs(bool again) {
 
 /// What strikes a body in the sub-step gives it a speed that it does not have yet, and what it touches then a
 /// share of that, and so on.
-void World::Impl::foresee_blows(Real h) {
+void World::Impl::propagate_impact_speeds(Real h) {
   if (def.solver == SolverKind::exact) return;  // it goes from one impact to the next
   struct Approach {
     Body *a, *b;
@@ -169,9 +169,9 @@ void World::Impl::foresee_blows(Real h) {
     ContactPair& pair = *active_pairs[i];
     approaches[i] = {&pair.a(), &pair.b(), pair.speed_bound()};
   });
-  for (Body* body : awake) body->blow = 0;
+  for (Body* body : awake) body->impact_speed_bound = 0;
   const auto strike = [](Body& body, Real speed) {
-    if (body.is_awake()) body.blow = std::max(body.blow, speed);
+    if (body.is_awake()) body.impact_speed_bound = std::max(body.impact_speed_bound, speed);
   };
   Real fastest = 0;
   for (const auto& [a, b, speed] : approaches) {
@@ -181,8 +181,8 @@ void World::Impl::foresee_blows(Real h) {
   }
   for (uint32_t i = 0; i < kPassedOn && fastest * h > kMargin; ++i)
     for (const auto& [a, b, speed] : approaches) {
-      strike(*a, kPassedShare * b->blow);
-      strike(*b, kPassedShare * a->blow);
+      strike(*a, kPassedShare * b->impact_speed_bound);
+      strike(*b, kPassedShare * a->impact_speed_bound);
     }
 }
 
@@ -195,14 +195,14 @@ void World::Impl::update_pairs(Real h) {
   for (const std::size_t i : leaving) move_in_broad_phase(*awake[i], ways[i], false);
   for (Body* body : kinematic) move_in_broad_phase(*body, false);
   collect_pairs(false);
-  foresee_blows(h);
+  propagate_impact_speeds(h);
   const auto find = [&](std::size_t i) {
     // They lie all over the memory.
     if (i + 6 < active_pairs.size()) active_pairs[i + 6]->prefetch();
     if (i + 3 < active_pairs.size()) active_pairs[i + 3]->prefetch_manifold();
     active_pairs[i]->impacts = 0;
     active_pairs[i]->deepest = 0;
-    active_pairs[i]->gave_up = active_pairs[i]->settled = false;
+    active_pairs[i]->toi_exhausted = active_pairs[i]->restitution_suppressed = false;
     find_points(*active_pairs[i], 0, h);
   };
   constexpr std::size_t kManyPairs = 64, kPairsOfTask = 16;
@@ -235,32 +235,32 @@ void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
   const Real base = std::min(kMargin, kMarginShare * size);
   const Real motion = motion_bound(pair, left), far = motion_known(pair);
   const bool exact = def.solver == SolverKind::exact;
-  // A blow moves a body no faster than what strikes it.
-  const Real blow = std::max(pair.a().blow, pair.b().blow) * left;
-  const Real margin = base + std::min(std::max(2 * motion, blow), far);
-  // A blow makes what it moves turn, too.
-  const Real turning = pair.turning_speed() * left + (blow > kMargin ? blow : 0);
+  // An impact moves a body no faster than the body that hits it.
+  const Real impact = std::max(pair.a().impact_speed_bound, pair.b().impact_speed_bound) * left;
+  const Real margin = base + std::min(std::max(2 * motion, impact), far);
+  // An impact also makes the body turn.
+  const Real turning = pair.turning_speed() * left + (impact > kMargin ? impact : 0);
   const Real reuse = exact ? kExactReuse : std::min(kReuse, kReuseShare * size);
   pair.find(pair.a().placed_at(time, h), pair.b().placed_at(time, h), margin, reuse, turning > kTurning);
 
   const bool is_far = motion > far;
-  const bool is_quick = !exact && time == 0 && !pair.manifolds().empty() && pair.speed_bound() * h > kForesee;
-  if (is_quick && !is_far && !pair.gave_up) pair.foresee(h);
+  const bool is_quick = !exact && time == 0 && !pair.manifolds().empty() && pair.speed_bound() * h > kFastPair;
+  if (is_quick && !is_far && !pair.toi_exhausted) pair.add_speculative_contacts(h);
   choose_event(pair, is_far, left);
 }
 
 /// Whether a pair's next impact is to be traced back to. `far`: it moves too far for its points to tell.
 void World::Impl::choose_event(ContactPair& pair, bool far, Real left) const {
-  pair.by_event = far && !pair.gave_up;
+  pair.needs_toi = far && !pair.toi_exhausted;
   const bool bounces = def.solver == SolverKind::exact || pair.surface().restitution > 0;
-  if (far || pair.gave_up || !bounces || pair.settled) return;
+  if (far || pair.toi_exhausted || !bounces || pair.restitution_suppressed) return;
   for (const PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const ContactPoint& point = m.manifold.points[k];
       const Real speed = pair.relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n);
       if (speed < -def.collision_speed &&
           point.separation + 2 * (speed - def.gravity.norm() * left) * left < 0)
-        pair.by_event = true;
+        pair.needs_toi = true;
     }
 }
 
@@ -276,7 +276,7 @@ std::vector<Body*> World::Impl::wake_touched(Real start, Real h) {
   std::vector<Body*> touched;
   for (ContactPair* pair : active_pairs)
     for (Body* body : {&pair->a(), &pair->b()})
-      if (body->asleep && (!pair->manifolds().empty() || pair->by_event)) touched.push_back(body);
+      if (body->asleep && (!pair->manifolds().empty() || pair->needs_toi)) touched.push_back(body);
   if (touched.empty()) return {};
   const std::size_t before = stepped.size();
   for (Body* body : touched) wake(*body);
@@ -361,7 +361,7 @@ void World::Impl::solve(std::span<Island* const> group, const ContactInterval& i
     add_rough(outcome.rough, report);
     choice->learn(*island, interval.duration, outcome.is_applied, patience);
     if (outcome.is_applied) continue;
-    report.exact.abandoned += outcome.work.fallbacks == 0;
+    report.exact.over_budget += outcome.work.fallbacks == 0;
     fast.push_back(island);
   }
   if (!fast.empty()) report.fast.add(fast_contacts.solve(fast, interval));
@@ -379,7 +379,7 @@ void World::Impl::count_contacts(StepReport& report) const {
   report.contacts = 0;
   for (const ContactPair* pair : active_pairs) {
     report.contacts += pair->touching();
-    report.foreseen += pair->foreseen;
+    report.speculative_contacts += pair->speculative;
     report.penetration = std::max(report.penetration, pair->deepest);
   }
 }

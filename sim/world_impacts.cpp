@@ -31,7 +31,7 @@ constexpr Real kCluster = 1e-4;
 constexpr Real kImpactTurn = 0.5, kMostTurns = 512;
 /// What turns by more in an interval is soon elsewhere than where contact forces of its start are: it flies
 /// [rad].
-constexpr Real kWhirl = 3;
+constexpr Real kFastSpin = 3;
 
 /// A way that leaves its chord by more than kStraight [m] is looked at in pieces, at most so many. A force is
 /// steady if the place at the end is that of the mean velocity within this share of the velocity's change.
@@ -97,16 +97,16 @@ Real touching_share(const Impact& impact, const PosePath& a, const PosePath& b) 
 /// A body on its way through its interval, turning as nothing but its spin makes it.
 class Tumbling {
  public:
-  /// One that whirls flies under gravity, another goes straight to where forces take it.
-  Tumbling(const Body& body, const WorldDef& def, bool whirls, Real h)
-      : body_(body), def_(def), whirls_(whirls), h_(h), turning_(body.at_start()), now_(body.from) {}
+  /// A body that spins fast flies under gravity, another goes straight to where forces take it.
+  Tumbling(const Body& body, const WorldDef& def, bool spins_fast, Real h)
+      : body_(body), def_(def), spins_fast_(spins_fast), h_(h), turning_(body.at_start()), now_(body.from) {}
 
   /// Its place at a time of the sub-step of length h, not before the last.
   Pose go_on(Real time) {
     if (!body_.is_awake()) return body_.placed_at(time, h_);
     fly(turning_, {def_.gravity, {}}, integrator(def_.integrator), now_, time - now_, work_);
     now_ = time;
-    if (!whirls_) {
+    if (!spins_fast_) {
       const Real share = (time - body_.from) / (h_ - body_.from);
       turning_.position = body_.start.position + share * (body_.rigid.position - body_.start.position);
     }
@@ -116,7 +116,7 @@ class Tumbling {
  private:
   const Body& body_;
   const WorldDef& def_;
-  bool whirls_;
+  bool spins_fast_;
   Real h_;
   RigidBody turning_;
   Real now_;
@@ -128,7 +128,7 @@ class Tumbling {
 /// When a pair's bodies, which do not touch yet, will on their ways as they are now; or do already,
 /// approaching.
 std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) const {
-  if (pair.gave_up) return std::nullopt;
+  if (pair.toi_exhausted) return std::nullopt;
   const Body &a = pair.a(), &b = pair.b();
   const Real from = std::max(a.is_awake() ? a.from : 0, b.is_awake() ? b.from : 0);
   if (from >= h * (1 - kInstant)) return std::nullopt;
@@ -152,8 +152,8 @@ std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) co
 /// A path knows no more than half a turn: what tumbles faster goes in pieces.
 std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, Real from, Real h,
                                                       Real turn) const {
-  const bool whirls = turn > kWhirl;
-  Tumbling body_a(pair.a(), def, whirls, h), body_b(pair.b(), def, whirls, h);
+  const bool spins_fast = turn > kFastSpin;
+  Tumbling body_a(pair.a(), def, spins_fast, h), body_b(pair.b(), def, spins_fast, h);
   Pose begin_a = body_a.go_on(from), begin_b = body_b.go_on(from);
   const uint32_t pieces = pieces_of(turn);
   // What touches now has just met.
@@ -169,7 +169,7 @@ std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, R
         (i == 0 && touches) || ((impact = time_of_impact(a, b, kTouching / 2)) && impact->share == 0);
     if (met) impact = time_of_next_impact(a, b, kTouching / 2, def.collision_speed * (end - begin));
     if (impact) return begin + impact->share * (end - begin);
-    if (whirls && touches) return end;  // what the contact did by then is over, or to be found anew
+    if (spins_fast && touches) return end;  // what the contact did by then is over, or has to be found again
   }
   return std::nullopt;
 }
@@ -210,7 +210,7 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
   std::vector<Impact> impacts;
   const auto look = [&](auto&& is_wanted) {
     const std::vector<std::size_t> events = indices_where(active_pairs.size(), [&](std::size_t i) {
-      return active_pairs[i]->by_event && is_wanted(*active_pairs[i]);
+      return active_pairs[i]->needs_toi && is_wanted(*active_pairs[i]);
     });
     std::vector<std::optional<Real>> times(events.size());
     for_each_index(events.size(),
@@ -234,8 +234,8 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
     const bool tumbles = turn_of(pair) * h > kImpactTurn;
     if (++pair.impacts > (tumbles ? kMaxOfTumblingPair : kMaxImpactsOfPair) || count >= most ||
         work > kLastWork * most_work) {
-      pair.gave_up = true;
-      ++report.cut_short;
+      pair.toi_exhausted = true;
+      ++report.toi_limit_reached;
     }
     const uint32_t island = pair.a().is_awake() ? pair.a().island : pair.b().island;
     if (pair.a().is_awake() && pair.b().is_awake()) {
@@ -247,9 +247,9 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
     }
     ++report.tracebacks;
     work += impact_work(islands[island]);
-    if (work > most_work) settle_pairs(island, report);
+    if (work > most_work) suppress_restitution(island, report);
     work += collide(island, start, impact.time, h, report);
-    // What was foreseen of these bodies is not what will be.
+    // The speculative contacts of these bodies no longer hold.
     const auto involved = [&](const ContactPair& p) {
       return (p.a().is_awake() && p.a().island == island) || (p.b().is_awake() && p.b().island == island);
     };
@@ -260,12 +260,12 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
 
 /// No pair within an island bounces any more in this sub-step, unless it is so fast that only its impact
 /// shows where it meets.
-void World::Impl::settle_pairs(uint32_t island, StepReport& report) {
+void World::Impl::suppress_restitution(uint32_t island, StepReport& report) {
   const auto is_outside = [&](const Body& body) { return body.is_awake() && body.island != island; };
   for (ContactPair* pair : active_pairs) {
-    if (is_outside(pair->a()) || is_outside(pair->b()) || pair->settled) continue;
-    pair->settled = true;
-    report.settled += pair->by_event;
+    if (is_outside(pair->a()) || is_outside(pair->b()) || pair->restitution_suppressed) continue;
+    pair->restitution_suppressed = true;
+    report.restitution_suppressed += pair->needs_toi;
   }
 }
 
@@ -366,7 +366,7 @@ bool World::Impl::join_next(uint32_t number, Real start, Real time, Real h, Step
     const Body& other = has_a ? pair.b() : pair.a();
     if (has_a == has_b || !other.is_awake()) {
       if (!pair.manifolds().empty()) islands[number].pairs.push_back(&pair);
-    } else if (!pair.by_event && closes(pair, h - time)) {
+    } else if (!pair.needs_toi && closes(pair, h - time)) {
       const uint32_t next = other.island;
       bring_to(islands[next], start, time, h, report);
       join(number, next);

@@ -13,8 +13,10 @@
 #include "sim/cloth/cloth_system.h"
 #include "sim/collision/grouped_broad_phase.h"
 #include "sim/collision/obstacles.h"
-#include "sim/contact/contact_solve.h"
+#include "sim/contact/fast_contacts.h"
+#include "sim/contact/island_impacts.h"
 #include "sim/contact/seams.h"
+#include "sim/contact/solver_choice.h"
 #include "sim/contact_graph.h"
 #include "sim/dynamics/body_impulses.h"
 #include "sim/dynamics/particle_collisions.h"
@@ -71,7 +73,7 @@ struct World::Impl : WorldState {
 
   // Contacts (world_contacts.cpp)
   PairSurface surface_of(const Body& a, const Body& b) const;
-  void foresee_blows(Real h);
+  void propagate_impact_speeds(Real h);
   void update_pairs(Real h);
   Real motion_bound(const ContactPair& pair, Real left) const;
   Real motion_known(const ContactPair& pair) const;
@@ -98,7 +100,7 @@ struct World::Impl : WorldState {
   std::optional<Real> impact_time(const ContactPair& pair, Real h) const;
   std::optional<Real> tumbling_impact_time(const ContactPair& pair, Real from, Real h, Real turn) const;
   std::optional<Real> point_impact_time(const ContactPair& pair, Real h) const;
-  void settle_pairs(uint32_t island, StepReport& report);
+  void suppress_restitution(uint32_t island, StepReport& report);
   void bring_to(Island& island, Real start, Real time, Real h, StepReport& report);
   void join(uint32_t into, uint32_t island);
   void find_pairs_again(uint32_t island, Real start, Real h, StepReport& report);
@@ -108,7 +110,7 @@ struct World::Impl : WorldState {
   bool closes(const ContactPair& pair, Real left) const;
 
   uint32_t surface_number(const std::string& material);
-  void let_go(Body& body);
+  void detach(Body& body);
   void remove_dead_springs();
   void wake_neighbours(Body& body);
 
@@ -127,7 +129,7 @@ struct World::Impl : WorldState {
   // Joints (world_joints.cpp)
   void update_articulations();
   void break_joints(Real h, StepReport& report);
-  void let_go_of_joints(const Body& body);
+  void detach_joints(const Body& body);
   bool is_driven(const Island& island, Real time) const;
   bool are_jointed(const Body& a, const Body& b) const;
 
@@ -135,7 +137,7 @@ struct World::Impl : WorldState {
   StepReport prewarm(Real from, Real to, const BeforeSubStep& before);
   bool waits(ParticleSystemHandle system) const;
   void step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report);
-  Obstacle way_of(const Body& body, Real h) const;
+  Obstacle swept_obstacle(const Body& body, Real h) const;
   void update_obstacles(Real h);
   void collide_particles(const ParticleStage& stage, const CoupledSystem& coupled);
   void add_events(std::vector<ParticleEvent>& events);
@@ -150,7 +152,7 @@ struct World::Impl : WorldState {
   void answer_cloths(std::span<const ClothBody> near, Real start, Real h);
   void hit_cloths(Real h);
   void report_cloths(StepReport& report);
-  void let_go_of_cloths(BodyHandle body);
+  void detach_cloths(BodyHandle body);
 
   // Time is a base plus a whole number of equal samplings: no sum of rounded steps.
   Real base_time = 0, sampling_time = 0;
@@ -178,7 +180,7 @@ struct World::Impl : WorldState {
   std::vector<ContactPair*> active_pairs;  // those of which a body can move
   std::vector<Island> islands;
   std::map<uint32_t, SolverChoice> choices;  // by the slot of an island's first body
-  SolverPatience patience;
+  ExactSolverBudget patience;
   FastContacts fast_contacts;
   std::vector<std::unique_ptr<CoupledSystem>> motions;  // of the sub-step
 
@@ -197,7 +199,7 @@ struct World::Impl : WorldState {
   std::vector<Articulation*> articulation_of;  // likewise
   std::vector<ParticleEvent> particle_events;  // of the last sub-step
   ClothSystem cloth_system;
-  std::map<uint32_t, Reaction> nudges;  // too weak to wake the body, by its slot; they add up
+  std::map<uint32_t, Reaction> pending_impulses;  // too weak to wake the body, by its slot; they add up
 };
 
 }  // namespace offstage::sim

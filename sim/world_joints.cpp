@@ -263,8 +263,8 @@ void World::Impl::break_joints(Real h, StepReport& report) {
   for (const auto& articulation : articulations) {
     if (!articulation->bodies().front()->is_awake()) continue;
     for (Joint* joint : articulation->joints()) {
-      const Wrench blow = std::exchange(joint->blow, {});
-      joint->borne = {joint->load.force + blow.force / h, joint->load.torque + blow.torque / h};
+      const Wrench impact = std::exchange(joint->impact_impulse, {});
+      joint->borne = {joint->load.force + impact.force / h, joint->load.torque + impact.torque / h};
       if (!(joint->borne.force.norm() > joint->def.max_force) &&
           !(joint->borne.torque.norm() > joint->def.max_torque))
         continue;
@@ -275,7 +275,7 @@ void World::Impl::break_joints(Real h, StepReport& report) {
 }
 
 /// A body that goes away takes its joints with it.
-void World::Impl::let_go_of_joints(const Body& body) {
+void World::Impl::detach_joints(const Body& body) {
   std::vector<JointHandle> gone;
   joints.for_each([&](JointHandle handle, const std::unique_ptr<Joint>& joint) {
     if (joint->a == &body || joint->b == &body) gone.push_back(handle);

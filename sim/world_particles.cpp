@@ -75,11 +75,11 @@ void World::Impl::add_events(std::vector<ParticleEvent>& events) {
 void World::Impl::push_bodies(std::span<const Reaction> reactions, Real time) {
   std::vector<uint32_t> pushed;
   for (const Reaction& r : reactions) {
-    Reaction& sum = nudges.try_emplace(r.body, Reaction{r.body, Vec3::Zero(), Vec3::Zero()}).first->second;
+    Reaction& sum = pending_impulses.try_emplace(r.body, Reaction{r.body, Vec3::Zero(), Vec3::Zero()}).first->second;
     sum.impulse += r.impulse;
     sum.angular_impulse += r.angular_impulse;
   }
-  std::erase_if(nudges, [&](const auto& entry) {
+  std::erase_if(pending_impulses, [&](const auto& entry) {
     const Reaction& sum = entry.second;
     const std::unique_ptr<Body>& body = bodies[bodies.at_slot(sum.body)];
     if (!body->is_dynamic()) return true;
@@ -95,7 +95,7 @@ void World::Impl::push_bodies(std::span<const Reaction> reactions, Real time) {
   for (const uint32_t slot : pushed) {
     Articulation* articulation = slot < articulation_of.size() ? articulation_of[slot] : nullptr;
     if (!articulation) continue;
-    articulation->pass_on_blows(time, joint_tally);
+    articulation->transmit_impulses(time, joint_tally);
     for (Body* link : articulation->bodies()) link->pose = link->rigid.pose();
   }
 }

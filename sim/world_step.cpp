@@ -155,11 +155,11 @@ void World::Impl::explode(Real start, Real end) {
     bodies.for_each([&](BodyHandle handle, const std::unique_ptr<Body>& body) {
       if (!body->is_dynamic()) return;
       if (!def_.acts_on(handle)) return;
-      const Wrench blow = impulse(explosion, body->solid, body->pose, body->rigid.position);
-      if (blow.force == Vec3::Zero() && blow.torque == Vec3::Zero()) return;
+      const Wrench impact = impulse(explosion, body->solid, body->pose, body->rigid.position);
+      if (impact.force == Vec3::Zero() && impact.torque == Vec3::Zero()) return;
       wake(*body);
-      body->rigid.momentum += blow.force;
-      body->rigid.angular_momentum += blow.torque;
+      body->rigid.momentum += impact.force;
+      body->rigid.angular_momentum += impact.torque;
     });
     systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
       if (!def_.acts_on(handle)) return;
@@ -169,7 +169,7 @@ void World::Impl::explode(Real start, Real end) {
     });
     cloths.for_each([&](ClothHandle handle, const std::unique_ptr<Cloth>& cloth) {
       if (!def_.acts_on(handle)) return;
-      // Each point gets its share of a blow on the whole, by mass.
+      // Each point gets its share of an impact on the whole, by mass.
       const Real total = std::accumulate(cloth->masses.begin(), cloth->masses.end(), 0.0);
       for (std::size_t i = 0; i < cloth->points.size(); ++i)
         cloth->velocities[i] += impulse(explosion, cloth->points[i]) / total;
@@ -228,12 +228,12 @@ void World::Impl::retire(Body& body, StepReport& report) {
 }
 
 /// A body on its way through the sub-step of length h.
-Obstacle World::Impl::way_of(const Body& body, Real h) const {
+Obstacle World::Impl::swept_obstacle(const Body& body, Real h) const {
   const Pose& from = body.can_move() ? body.before_substep : body.pose;
   Obstacle o(body.solid, from, body.pose, h, body.def.restitution, body.def.friction);
   o.body = body.handle.index;
   if (body.def.cross_friction >= 0 && body.def.friction > 0) {
-    o.fibre = body.def.friction_axis;
+    o.friction_axis = body.def.friction_axis;
     o.cross_friction = std::sqrt(body.def.cross_friction / body.def.friction);
   }
   if (!body.is_dynamic() || prewarming) return o;
@@ -252,9 +252,9 @@ void World::Impl::update_obstacles(Real h) {
   bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& body) {
     if (!body->def.collides) return;
     if (body->can_move() && !(prewarming && body->is_dynamic()))
-      moving.push_back(way_of(*body, h));
+      moving.push_back(swept_obstacle(*body, h));
     else if (fixed_changed)
-      fixed.push_back(way_of(*body, h));
+      fixed.push_back(swept_obstacle(*body, h));
   });
   moving_obstacles = Obstacles(std::move(moving));
   if (fixed_changed) fixed_obstacles = Obstacles(std::move(fixed));

@@ -232,11 +232,11 @@ CLI::App* add_simulate(CLI::App& app, SimulateOptions& simulate) {
   CLI::App* command = app.add_subcommand("simulate", "Run the physics alone; prints its figures as JSON");
   add_scene(*command, simulate.scene);
   add_timing(*command, simulate.scene);
-  command->add_option("--trace", simulate.trace, "CSV of position, orientation and velocities of what moves");
+  command->add_option("--trace", simulate.trace, "CSV of position, orientation and velocities of moving objects");
   command->add_option("--contacts", simulate.contacts,
-                      "CSV of the points where bodies touch, with the forces there");
+                      "CSV of the contact points of bodies, with their forces");
   command->add_option("--cloths", simulate.cloths, "CSV of strain and contacts of cloths");
-  command->add_option("--joints", simulate.joints, "CSV of what joints bear and how they stand");
+  command->add_option("--joints", simulate.joints, "CSV of the loads and positions of joints");
   command->add_option("--trace-every", simulate.trace_every, "frame or step, of all of these")
       ->check(CLI::IsMember({"frame", "step"}));
   command->add_option("--cache", simulate.cache, "Folder for one snapshot per frame, for `render --cache`");

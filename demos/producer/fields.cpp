@@ -52,7 +52,7 @@ void describe_key(const Spec& spec, Description value, const std::optional<Node>
 /// Adds the key "type" of an object that is one of a choice.
 void describe_tag(const std::string& tag, bool required, ObjectEntry& entry) {
   const std::string value = "`\"" + tag + "\"`";
-  entry.rows.push_back({"type", value, "", "", required ? "required" : value, "tells which object this is"});
+  entry.rows.push_back({"type", value, "", "", required ? "required" : value, "the kind of this object"});
   entry.properties.push_back({"type", Object{{"const", tag}}});
   if (required) entry.required.push_back("type");
 }

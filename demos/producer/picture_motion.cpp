@@ -35,7 +35,7 @@ Vector3f interpolate(const render::Point& a, const render::Point& b, float w, fl
          dt * ((w3 - 2 * w2 + w) * a.velocity + (w3 - w2) * b.velocity);
 }
 
-/// A point of a cloth between two states, by the cubic through both. Where a blow came between, the
+/// A point of a cloth between two states, by the cubic through both. Where an impact came between, the
 /// velocities at both ends say little about the way: what they are off the mean one counts up to half of
 /// that.
 Vector3f interpolate(const Vector3f& a, const Vector3f& va, const Vector3f& b, const Vector3f& vb, float w,

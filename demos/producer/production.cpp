@@ -371,8 +371,8 @@ using Json = nlohmann::ordered_json;
 Json report_json(const sim::ContactWork& work) {
   return {
       {"solves", work.solves},       {"iterations", work.iterations}, {"factorizations", work.factorizations},
-      {"fallbacks", work.fallbacks}, {"abandoned", work.abandoned},   {"narrowed", work.narrowed},
-      {"softened", work.softened},   {"residual", work.residual}};
+      {"fallbacks", work.fallbacks}, {"over_budget", work.over_budget},   {"cluster_truncated", work.cluster_truncated},
+      {"restitution_reduced", work.restitution_reduced},   {"residual", work.residual}};
 }
 Json report_json(const sim::IntegratorReport& report) {
   return {{"steps", report.steps},
@@ -392,9 +392,9 @@ void add_contact_figures(const SimulationTotals& t, Json& json) {
   json["penetration"] = t.penetration;
   json["collisions"] = t.collisions;
   json["tracebacks"] = t.tracebacks;
-  json["cut_short"] = t.cut_short;
-  json["settled"] = t.settled;
-  json["foreseen"] = t.foreseen;
+  json["toi_limit_reached"] = t.toi_limit_reached;
+  json["restitution_suppressed"] = t.restitution_suppressed;
+  json["speculative_contacts"] = t.speculative_contacts;
   json["bodies_woken"] = t.bodies_woken;
   json["bodies_put_to_sleep"] = t.bodies_put_to_sleep;
   json["joint_error"] = t.joint_error;
@@ -412,7 +412,7 @@ Json cloth_figures(const SimulationTotals& t) {
           {"penetration", t.cloth_penetration},
           {"contacts", t.cloth_contacts},
           {"self_contacts", t.cloth_self_contacts},
-          {"springs_softened", t.cloth_springs_softened},
+          {"springs_clamped", t.cloth_springs_clamped},
           {"moves_limited", t.cloth_moves_limited},
           {"moves_held_back", t.cloth_moves_held_back},
           {"crossings", t.cloth_crossings},

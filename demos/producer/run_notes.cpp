@@ -43,12 +43,12 @@ std::vector<std::string> notes_of(const SimulationTotals& t) {
   add(t.removed, "warning: {} particles were inside a body and had to be removed");
   add(t.truncated, "note: {} particles hit more often in one step than is followed");
   if (!t.rough_bodies.empty()) notes.push_back(note_of_rough_contacts(t));
-  if (t.cut_short)
+  if (t.toi_limit_reached)
     notes.push_back(
         fmt::format("warning: {} times a pair of bodies reached the limit of collisions per sub-step; it "
                     "stopped bouncing "
                     "until the next. Reduce world.step (now {:g} s)",
-                    t.cut_short, t.step_s));
+                    t.toi_limit_reached, t.step_s));
   return notes;
 }
 

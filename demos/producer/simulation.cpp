@@ -80,9 +80,9 @@ void SimulationTotals::add(const sim::StepReport& report) {
   penetration = std::max(penetration, report.penetration);
   collisions += report.collisions;
   tracebacks += report.tracebacks;
-  cut_short += report.cut_short;
-  settled += report.settled;
-  foreseen += report.foreseen;
+  toi_limit_reached += report.toi_limit_reached;
+  restitution_suppressed += report.restitution_suppressed;
+  speculative_contacts += report.speculative_contacts;
   bodies_woken += report.bodies_woken;
   bodies_put_to_sleep += report.bodies_put_to_sleep;
   joint_error = std::max(joint_error, report.joint_error);
@@ -91,7 +91,7 @@ void SimulationTotals::add(const sim::StepReport& report) {
   cloth_penetration = std::max(cloth_penetration, report.cloth_penetration);
   cloth_contacts = report.cloth_contacts;
   cloth_self_contacts = report.cloth_self_contacts;
-  cloth_springs_softened = report.cloth_springs_softened;
+  cloth_springs_clamped = report.cloth_springs_clamped;
   cloth_moves_limited += report.cloth_moves_limited;
   cloth_moves_held_back += report.cloth_moves_held_back;
   cloth_crossings += report.cloth_crossings;

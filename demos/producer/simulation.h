@@ -44,12 +44,12 @@ struct SimulationTotals {
   std::size_t contacts = 0;                                   ///< points where bodies touch, at the end
   std::size_t most_contacts = 0;                              ///< at the end of a frame
   sim::Real penetration = 0;                                  ///< greatest of the run and at its end [m]
-  uint64_t collisions = 0, tracebacks = 0, cut_short = 0, settled = 0, foreseen = 0;
+  uint64_t collisions = 0, tracebacks = 0, toi_limit_reached = 0, restitution_suppressed = 0, speculative_contacts = 0;
   uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
 
   // Of cloths: greatest of the run, at its end, and sums.
   sim::Real cloth_strain = 0, cloth_penetration = 0;
-  uint64_t cloth_contacts = 0, cloth_self_contacts = 0, cloth_springs_softened = 0;
+  uint64_t cloth_contacts = 0, cloth_self_contacts = 0, cloth_springs_clamped = 0;
   uint64_t cloth_moves_limited = 0, cloth_moves_held_back = 0, cloth_crossings = 0, cloth_springs_torn = 0,
            cloth_unconverged = 0;
   sim::ContactWork exact, fast, impacts;

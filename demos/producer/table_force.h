@@ -168,7 +168,7 @@ template <>
 struct Table<Explosion> {
   static constexpr const char* kName = "explosion";
   static constexpr const char* kHelp =
-      "A blow away from a point, at one time. It hits each body at its nearest point.";
+      "An impulse away from a point, at one time. It hits each body at its nearest point.";
   static Fields<Explosion> fields() {
     using T = Explosion;
     return {

@@ -45,7 +45,7 @@ struct Table<WorldSettings> {
          "of resting contact: `exact` finds contact forces to rounding and collisions at their very times, "
          "`fast` takes a bounded amount of work, `auto` the exact one where that is not slower"},
         {"impact", &T::impact,
-         "of collisions at the same time: all solved together, or one after the other, which lets a blow "
+         "of collisions at the same time: all solved together, or one after the other, which lets an impact "
          "pass "
          "through a row of balls"},
         {"collision_speed", &T::collision_speed, "bodies that meet slower than this do not bounce", "m/s",

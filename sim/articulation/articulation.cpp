@@ -212,8 +212,8 @@ void Articulation::add_loads(std::span<const Vec6> impulses, Real duration) {
     joints_[j]->load += wrench(j, impulses[j] / duration, motion_);
 }
 
-void Articulation::add_blows(std::span<const Vec6> impulses) {
-  for (std::size_t j = 0; j < joints_.size(); ++j) joints_[j]->blow += wrench(j, impulses[j], motion_);
+void Articulation::add_impact_impulses(std::span<const Vec6> impulses) {
+  for (std::size_t j = 0; j < joints_.size(); ++j) joints_[j]->impact_impulse += wrench(j, impulses[j], motion_);
 }
 
 void Articulation::begin_impulses(Real time) {
@@ -370,7 +370,7 @@ void Articulation::residual(Real time, std::span<const Vec6> velocities, std::sp
   }
 }
 
-void Articulation::pass_on_blows(Real time, JointTally& tally) {
+void Articulation::transmit_impulses(Real time, JointTally& tally) {
   const bool is_settled =
       std::equal(bodies_.begin(), bodies_.end(), settled_.begin(), settled_.end(),
                  [](const Body* body, const Momenta& m) {
@@ -439,7 +439,7 @@ void Articulation::settle(Real time, JointTally& tally) {
     }
     if (fastest <= kTogether) break;
     system_.correct(change_, impulses_, velocities_);
-    add_blows(impulses_);
+    add_impact_impulses(impulses_);
   }
   for (std::size_t i = 0; i < bodies_.size(); ++i)
     bodies_[i]->rigid.set_velocity(velocities_[i].head<3>(), velocities_[i].tail<3>());

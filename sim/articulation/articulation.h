@@ -31,8 +31,8 @@ struct Joint {
   Real coordinate = 0;  ///< of joints that count turns
   // What it does to a, about the anchor.
   Wrench load;                       ///< in the last motion, with the contacts in it [N], [N m]
-  Wrench blow;                       ///< impulses of collisions in this sub-step [N s], [N m s]
-  Wrench borne;                      ///< load and blows of the last sub-step together [N], [N m]
+  Wrench impact_impulse;             ///< impulses of collisions in this sub-step [N s], [N m s]
+  Wrench borne;                      ///< load and impacts of the last sub-step together [N], [N m]
   Vec6 reaction = Vec6::Zero();      ///< to contacts, by its constraints, as a guess
   std::array<Real, 9> efforts = {};  ///< of its rows with bounds, as a guess (joint_limits.h)
 
@@ -75,7 +75,7 @@ class Articulation final : public JointedBodies {
   void add_forces(Real t, std::span<const LinkMotion> motion, std::span<const LinkMobility> mobility,
                   std::span<Vec6> forces);
   /// Passes on, through the joints, what has pushed single bodies since they were settled last.
-  void pass_on_blows(Real time, JointTally& tally);
+  void transmit_impulses(Real time, JointTally& tally);
   /// Puts the bodies' `rigid` back together at a time: positions by the shortest way, weighted with the
   /// masses, then velocities.
   void settle(Real time, JointTally& tally);
@@ -93,7 +93,7 @@ class Articulation final : public JointedBodies {
   /// The joints bear these impulses of their constraints over a duration, besides the forces of the motion.
   void add_loads(std::span<const Vec6> impulses, Real duration);
   /// Or all at once.
-  void add_blows(std::span<const Vec6> impulses);
+  void add_impact_impulses(std::span<const Vec6> impulses);
 
   /// A sub-step ends at this time; impulses on links are then those on the bodies as they are now. The system
   /// is factored once, when the first link is asked for.

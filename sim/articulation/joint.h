@@ -84,7 +84,7 @@ struct JointDef {
 struct JointState {
   Vec3 anchor_a = Vec3::Zero(), anchor_b = Vec3::Zero();  ///< world [m]
   Vec3 axis = Vec3::UnitZ();                              ///< world, with b
-  /// On a at its anchor, on average over the last sub-step, with the blows of collisions [N], [N m].
+  /// On a at its anchor, on average over the last sub-step, impacts included [N], [N m].
   Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
   Real coordinate = 0;  ///< of the free one; 0 for joints that have none
   Real speed = 0;       ///< of the free one

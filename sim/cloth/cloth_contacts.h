@@ -25,7 +25,7 @@ class ClothContacts {
   /// What points can meet in a sub-step of the world of length h. `collides` says it of each point.
   void find(const ClothPoints& points, std::span<const uint8_t> collides, std::span<ClothBody> bodies,
             Real h);
-  /// Looks again for points that came farther than was foreseen.
+  /// Looks again for points that moved farther than predicted.
   void find_runaways(const ClothPoints& points);
   /// Puts points out of the bodies, in a sub-step of cloth of length dt, one of `parts` of the world's.
   /// Appends to `cuts`.

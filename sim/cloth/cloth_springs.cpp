@@ -134,12 +134,12 @@ void ClothSprings::prepare(const ClothPoints& points, Real step) {
   if (h == prepared_for_ && points.inverse_mass == inverse_mass_) return;
   prepared_for_ = h;
   inverse_mass_ = points.inverse_mass;
-  softened_.assign(points.cloth.empty() ? 0 : points.cloth.back() + 1, 0);
+  clamped_.assign(points.cloth.empty() ? 0 : points.cloth.back() + 1, 0);
   for (std::size_t i = 0; i < spring_.size(); ++i) {
     Spring& s = spring_[i];
     const Material& material = material_[i];
     const Real mobility = inverse_mass_[s.a] + inverse_mass_[s.b];
-    softened_[points.cloth[s.a]] += h * h * material.stiffness * mobility > material.most;
+    clamped_[points.cloth[s.a]] += h * h * material.stiffness * mobility > material.most;
     s.stiffness = std::min(h * h * material.stiffness, material.most / std::max(mobility, kNoMobility));
     const Real resists = s.stiffness + h * material.damping, forget = 1 / (1 + resists * mobility);
     link_[i] = {Eigen::Vector4f(0, 0, 0, static_cast<float>(resists * forget)), static_cast<float>(forget), 0,

@@ -25,7 +25,7 @@ class ClothSprings {
   void step(ClothPoints& points, std::span<Vec4> moves, Real h);
 
   /// How many springs counted as softer in the last step, by cloth; empty before the first.
-  std::span<const uint64_t> softened() const { return softened_; }
+  std::span<const uint64_t> clamped() const { return clamped_; }
 
  private:
   struct Spring {
@@ -62,7 +62,7 @@ class ClothSprings {
   std::vector<Stage> stages_;             // of any step
   std::vector<Real> inverse_mass_;        // that springs were prepared for
   Real prepared_for_ = -1;                // step [s]; < 0: none
-  std::vector<uint64_t> softened_;
+  std::vector<uint64_t> clamped_;
 };
 
 }  // namespace offstage::sim

@@ -145,7 +145,7 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
   Real longest = weather.h;
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     longest = std::min(longest, cloths_[c]->def.substep);
-    for (std::size_t i = 0; i < cloths_[c]->points.size(); ++i)  // blows may have changed them
+    for (std::size_t i = 0; i < cloths_[c]->points.size(); ++i)  // impacts may have changed them
       points_.velocity[first_[c] + i] = padded(cloths_[c]->velocities[i]);
     add_outer_forces(*cloths_[c], first_[c], weather, points_);
   }
@@ -488,7 +488,7 @@ void ClothSystem::count_penetration() {
 void ClothSystem::measure() {
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     Cloth& cloth = *cloths_[c];
-    if (!changed_ && c < springs_.softened().size()) cloth.report.softened = springs_.softened()[c];
+    if (!changed_ && c < springs_.clamped().size()) cloth.report.clamped = springs_.clamped()[c];
     Eigen::ArrayXd length2(cloth.springs.size()), rest(cloth.springs.size());
     Eigen::Index count = 0;
     for (const ClothSpring& s : cloth.springs) {

@@ -10,9 +10,9 @@ namespace offstage::sim {
 namespace {
 
 /// Pairs are sought this much farther than they touch, in thicknesses; half of it is how far points may stray
-/// from the ways foreseen.
+/// from the predicted paths.
 constexpr Real kMargin = 0.8;
-/// The same of pairs sought while others keep their ways foreseen, of which these may stray by a quarter now.
+/// The same of pairs sought while others keep their predicted paths, of which these may stray by a quarter now.
 constexpr Real kStrayMargin = 1.5 * kMargin;
 /// Up to this part of all points are sought again alone.
 constexpr std::size_t kFew = 3;
@@ -114,8 +114,8 @@ void SelfContacts::assign(std::vector<Triangle> triangles, const ClothPoints& po
   travel_.assign(points.size(), 0);
   move_.assign(points.size(), 0);
   still_.assign(points.size(), Vec4::Zero());
-  for (auto* foreseen : {&foreseen_from_, &foreseen_to_, &foreseen_velocity_})
-    foreseen->assign(points.size(), Vec4::Zero());
+  for (auto* predicted : {&predicted_from_, &predicted_to_, &predicted_velocity_})
+    predicted->assign(points.size(), Vec4::Zero());
   margin_.resize(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) margin_[i] = points.thickness[i] * (1 + kMargin) / 2;
   horizon_ = -1;
@@ -144,12 +144,12 @@ void SelfContacts::add(const ClothPoints& points, const std::array<uint32_t, 4>&
     if (std::ranges::find(second, i) != second.end()) return;
   Real thickness = (points.thickness[p[0]] + points.thickness[p[3]]) / 2;
   const Real near = thickness * (1 + slack);
-  if (boxes_apart(points.start, foreseen_to_, p, edges, near)) return;
+  if (boxes_apart(points.start, predicted_to_, p, edges, near)) return;
   Real longest2 = 0;  // of the ways of one relative to the other
   for (uint32_t i : first)
     for (uint32_t j : second)
       longest2 = std::max(
-          longest2, (foreseen_to_[i] - points.start[i] - foreseen_to_[j] + points.start[j]).squaredNorm());
+          longest2, (predicted_to_[i] - points.start[i] - predicted_to_[j] + points.start[j]).squaredNorm());
   const Real reach = near + std::sqrt(longest2);
   if (planes_apart(points.start, p, edges, reach)) return;
   const Closest c = closest(points.start, p, edges);
@@ -167,18 +167,18 @@ void SelfContacts::add(const ClothPoints& points, const std::array<uint32_t, 4>&
 }
 
 /// That a point goes on until the horizon at the velocity that it has in this sub-step.
-void SelfContacts::foresee(const ClothPoints& points, std::size_t i, Real dt) {
+void SelfContacts::predict(const ClothPoints& points, std::size_t i, Real dt) {
   const Vec4 velocity = (points.position[i] - points.start[i]) / dt;
-  foreseen_velocity_[i] = velocity;
-  foreseen_from_[i] = points.start[i] - since_ * velocity;
-  foreseen_to_[i] = points.start[i] + (horizon_ - since_) * velocity;
+  predicted_velocity_[i] = velocity;
+  predicted_from_[i] = points.start[i] - since_ * velocity;
+  predicted_to_[i] = points.start[i] + (horizon_ - since_) * velocity;
 }
 
 void SelfContacts::search(const ClothPoints& points, Real dt, Real horizon) {
   since_ = 0;
   horizon_ = std::max(horizon, dt);
-  for (std::size_t i = 0; i < points.size(); ++i) foresee(points, i, dt);
-  tree_.fit(foreseen_from_, foreseen_to_, margin_);
+  for (std::size_t i = 0; i < points.size(); ++i) predict(points, i, dt);
+  tree_.fit(predicted_from_, predicted_to_, margin_);
   std::fill(travel_.begin(), travel_.end(), 0.0);
   pairs_.clear();
   tree_.pairs(points.start, [&](uint32_t ta, uint32_t tb) {
@@ -190,12 +190,12 @@ bool SelfContacts::expired(Real dt) const {
   return since_ + dt > horizon_ * (1 + 1e-9);
 }
 
-/// How far a point is from the way foreseen for it.
+/// How far a point is from its predicted path.
 Vec4 SelfContacts::off_course(const ClothPoints& points, std::size_t i, Real dt) const {
-  return points.position[i] - foreseen_from_[i] - (since_ + dt) * foreseen_velocity_[i];
+  return points.position[i] - predicted_from_[i] - (since_ + dt) * predicted_velocity_[i];
 }
 
-/// Whether any point is farther from the way foreseen for it than the pairs known are good for.
+/// Whether any point is farther from its predicted path than the pairs known are good for.
 bool SelfContacts::strayed(const ClothPoints& points, Real dt) const {
   if (expired(dt)) return true;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -219,14 +219,14 @@ void SelfContacts::search_again(const ClothPoints& points, Real dt, Real horizon
   if (count > points.size() / kFew) return search(points, dt, horizon);
 
   for (std::size_t i = 0; i < points.size(); ++i)
-    if (strays[i]) foresee(points, i, dt);
+    if (strays[i]) predict(points, i, dt);
   const auto is_stray = [&](const auto& p) {
     return std::ranges::any_of(p, [&](uint32_t i) { return strays[i] != 0; });
   };
   std::vector<uint32_t> seeking;
   for (uint32_t t = 0; t < triangles_.size(); ++t)
     if (is_stray(triangles_[t])) seeking.push_back(t);
-  tree_.refit(seeking, foreseen_from_, foreseen_to_, margin_);
+  tree_.refit(seeking, predicted_from_, predicted_to_, margin_);
   std::erase_if(pairs_, [&](const Pair& pair) { return is_stray(pair.points); });
   tree_.pairs(points.start,
               [&](uint32_t ta, uint32_t tb) { add_pairs(points, ta, tb, kStrayMargin, is_stray); });

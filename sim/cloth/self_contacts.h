@@ -69,7 +69,7 @@ class SelfContacts {
     bool pushes;                  // else its neighbours do so
   };
 
-  void foresee(const ClothPoints& points, std::size_t i, Real dt);
+  void predict(const ClothPoints& points, std::size_t i, Real dt);
   void search(const ClothPoints& points, Real dt, Real horizon);
   template <class Wanted>
   void add_pairs(const ClothPoints& points, uint32_t ta, uint32_t tb, Real slack, Wanted&& wanted);
@@ -96,9 +96,9 @@ class SelfContacts {
   std::vector<uint64_t> active_;
   std::vector<uint32_t> held_back_, crossed_;
 
-  // Since the last search: ways foreseen, and the paths made.
+  // Since the last search: predicted paths, and the paths made.
   Real since_ = 0, horizon_ = -1;
-  std::vector<Vec4> foreseen_from_, foreseen_to_, foreseen_velocity_;
+  std::vector<Vec4> predicted_from_, predicted_to_, predicted_velocity_;
   std::vector<Real> travel_, margin_;
   std::vector<Vec4> still_;  // no drifts
   std::vector<Real> move_;   // of each point in the sub-step

@@ -45,7 +45,7 @@ CellBox in_cell(CellBox box, float cell) {
 }
 
 /// Calls visit(hash, cell lane, axes along which this is the object's low cell) for the cells of a range, two
-/// by two by two: as nearly every object has one or two cells along an axis and no branch can foretell which,
+/// by two by two: as nearly every object has one or two cells along an axis and no branch can be predicted,
 /// a single loop over those of the eight cells that are within the range is quicker than three nested ones.
 template <class Visit>
 void for_each_cell(const CellRange& range, Visit&& visit) {

@@ -35,9 +35,9 @@ Pose Obstacle::at(Real fraction) const {
   return pose;
 }
 
-Vec3 Obstacle::fibre_on(const Vec3& n, Real fraction) const {
-  if (cross_friction == 1 || fibre.isZero()) return Vec3::Zero();
-  const Vec3 axis = at(fraction).vector_to_world(fibre), along = axis - n.dot(axis) * n;
+Vec3 Obstacle::friction_axis_on(const Vec3& n, Real fraction) const {
+  if (cross_friction == 1 || friction_axis.isZero()) return Vec3::Zero();
+  const Vec3 axis = at(fraction).vector_to_world(friction_axis), along = axis - n.dot(axis) * n;
   const Real length = along.norm();
   if (length < 1e-6 * axis.norm()) return Vec3::Zero();  // it stands on the surface
   return along / length;

@@ -24,9 +24,9 @@ struct Obstacle {
   }
   /// Where its centre of mass is at a fraction of the sub-step.
   Vec3 centre_at(Real fraction) const { return at(fraction).point_to_world(centre); }
-  /// Unit direction of the fibre where the surface has the normal n (world) at a fraction of the sub-step;
+  /// Unit direction of the friction axis where the surface has the normal n (world) at a fraction of the sub-step;
   /// zero where friction is the same in all directions.
-  Vec3 fibre_on(const Vec3& n, Real fraction) const;
+  Vec3 friction_axis_on(const Vec3& n, Real fraction) const;
   /// K of P8: the velocity that a unit impulse at `arm` from the centre of mass gives to the point there,
   /// world axes [1/kg].
   Mat3 mobility(const Vec3& arm) const;
@@ -45,8 +45,8 @@ struct Obstacle {
   Real turn = 0;                                                  ///< angle turned [rad]
   Real extent;                                                    ///< reach() of the solid
   Real restitution, friction;
-  Real cross_friction = 1;    ///< across the fibre over that along it
-  Vec3 fibre = Vec3::Zero();  ///< direction of the surface's fibre, in the solid's frame; zero: none
+  Real cross_friction = 1;    ///< across the friction axis over that along it
+  Vec3 friction_axis = Vec3::Zero();  ///< direction of the surface's friction axis, in the solid's frame; zero: none
   uint32_t body = 0;          ///< a number of the world's for it
   Real inverse_mass = 0;      ///< [1/kg]; 0: particles do not move it
   Mat3 inverse_inertia =

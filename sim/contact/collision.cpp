@@ -241,7 +241,7 @@ class Cluster {
   /// position finds the zero of in a few steps; halving the weight of an end that stays (the Illinois rule)
   /// keeps it from creeping.
   ContactWork soften(ContactWork work, Real energy) {
-    work.softened = 1;
+    work.restitution_reduced = 1;
     struct End {
       Real factor, energy;
     } low{0, 0}, high{1, energy};
@@ -414,7 +414,7 @@ class Sequence {
     c.impulse += p;
     apply(c, p, bodies_);
     const Real missing = -restitution_[i] * u.x() - c.relative_velocity(bodies_).x();
-    work_.softened += missing > kAcceptedResidual * u.norm();
+    work_.restitution_reduced += missing > kAcceptedResidual * u.norm();
   }
 
   void collide_together() {

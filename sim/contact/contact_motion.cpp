@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "sim/dynamics/free_body.h"
-#include "sim/unfused.h"
 
 namespace offstage::sim {
 namespace {
@@ -273,8 +272,8 @@ bool runs_along(const Body& body, Real duration) {
   return is_revolved(body.def.shape) && turn.squaredNorm() > kStraight * kStraight;
 }
 
-OFFSTAGE_UNFUSED Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3& out_from,
-                                 const Quat& to, const Vec3& out_to) {
+Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3& out_from, const Quat& to,
+                const Vec3& out_to) {
   const Shape& shape = body.def.shape;
   const auto with_body = [&](const Vec3& r) { return Vec3(to * (from.conjugate() * r)); };
   if (const Real radius = round_radius(shape); radius > 0)

@@ -17,9 +17,9 @@ constexpr Real kSame = 5e-3;
 constexpr Real kSameFeature = 1.0 / 16;
 /// Cosine: contacts whose normals are not more inclined to each other than this may follow one another.
 constexpr Real kAlong = 0.7;
-/// What overlaps at an interval's end by less than kForeseen, or than a point tells that has a normal as
+/// What overlaps at an interval's end by less than kExpected, or than a point tells that has a normal as
 /// alike as this cosine and is so near, is expected [m].
-constexpr Real kSameNormal = 0.999, kNear = 0.02, kForeseen = 2e-4;
+constexpr Real kSameNormal = 0.999, kNear = 0.02, kExpected = 2e-4;
 /// Of the spread of points, what makes it invertible.
 constexpr Real kFlat = 1e-6;
 
@@ -228,7 +228,7 @@ void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_wit
   find_points(a, b, margin, reuse_within, turning);
   separation_ = std::numeric_limits<Real>::infinity();
   touching_ = 0;
-  foreseen = 0;
+  speculative = 0;
   at_end_.clear();
   has_narrow_ = false;
   for (const PlacedManifold& m : placed_) {
@@ -255,14 +255,14 @@ void ContactPair::replace(uint32_t i, const Manifold& m) {
 
 void ContactPair::drop_empty() {
   const auto is_empty = [](const Manifold& m) { return m.count == 0; };
-  const std::size_t known = placed_.size() - foreseen;
-  for (std::size_t i = 0, kept = 0; i < foreseen; ++i)
+  const std::size_t known = placed_.size() - speculative;
+  for (std::size_t i = 0, kept = 0; i < speculative; ++i)
     if (!is_empty(placed_[known + i].manifold)) at_end_[kept++] = at_end_[i];
-  const auto foreseen_left = static_cast<std::size_t>(
+  const auto speculative_left = static_cast<std::size_t>(
       std::count_if(placed_.begin() + static_cast<std::ptrdiff_t>(known), placed_.end(),
                     [&](const PlacedManifold& m) { return !is_empty(m.manifold); }));
-  foreseen = static_cast<uint8_t>(foreseen_left);
-  at_end_.resize(foreseen);
+  speculative = static_cast<uint8_t>(speculative_left);
+  at_end_.resize(speculative);
   std::erase_if(found_, is_empty);
   std::erase_if(placed_, [&](const PlacedManifold& m) { return is_empty(m.manifold); });
 }
@@ -333,7 +333,7 @@ bool ContactPair::is_expected(const Vec3& normal, const ContactPoint& at_end, Re
       const ContactPoint& p = m.manifold.points[k];
       if (!is_near(*a_, p.on_a, at_end.on_a, -n, -normal) && !is_near(*b_, p.on_b, at_end.on_b, n, normal))
         continue;
-      if (p.separation + free_way(m, (p.on_a + p.on_b) / 2, duration) < at_end.separation + kForeseen)
+      if (p.separation + free_way(m, (p.on_a + p.on_b) / 2, duration) < at_end.separation + kExpected)
         return true;
     }
   }
@@ -369,7 +369,7 @@ PlacedManifold ContactPair::brought_back(const Manifold& at_end, Real duration) 
   return placed;
 }
 
-void ContactPair::foresee(Real duration) {
+void ContactPair::add_speculative_contacts(Real duration) {
   if (has_sphere_) return;
   static thread_local std::vector<Manifold> found;
   found.clear();
@@ -382,11 +382,11 @@ void ContactPair::foresee(Real duration) {
     Manifold at_end;
     place(local, a_->pose, at_end);
     const auto is_new = [&](const ContactPoint& p) {
-      return p.separation < -kForeseen && !is_expected(at_end.normal, p, duration);
+      return p.separation < -kExpected && !is_expected(at_end.normal, p, duration);
     };
     if (std::none_of(at_end.points.begin(), at_end.points.begin() + at_end.count, is_new)) continue;
     placed_.push_back(brought_back(at_end, duration));
-    ++foreseen;
+    ++speculative;
     at_end_.push_back(at_end);
     has_narrow_ |= is_narrow(placed_.back().manifold);
   }
@@ -478,7 +478,7 @@ void ContactPair::remember(std::vector<Remembered>& points) const {
 }
 
 /// Points that were there before keep their forces: those of the same features, or else nearby. Each force
-/// goes to one point, or the forces of a pair that is found anew again and again would grow without end.
+/// goes to one point, or the forces of a pair that is found again and again would grow without end.
 void ContactPair::recall(std::vector<Remembered>& points, const Pose& pose) {
   const Frame a(pose);
   for (PlacedManifold& m : placed_) {

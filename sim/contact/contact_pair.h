@@ -54,11 +54,11 @@ class alignas(64) ContactPair {
 
  public:
   uint32_t impacts = 0;   ///< in this sub-step
-  uint8_t foreseen = 0;   ///< manifolds that foresee() added
-  bool gave_up = false;   ///< too many of them: no more trace-backs in this sub-step
-  bool settled = false;   ///< its points limit the approach in this sub-step even if it would bounce
+  uint8_t speculative = 0;   ///< manifolds that add_speculative_contacts() added
+  bool toi_exhausted = false;   ///< too many of them: no more trace-backs in this sub-step
+  bool restitution_suppressed = false;   ///< its points limit the approach in this sub-step even if it would bounce
   Real deepest = 0;       ///< overlap that find() has seen in this sub-step [m]
-  bool by_event = false;  ///< an impact of this pair is traced back to; else its points limit the approach
+  bool needs_toi = false;  ///< an impact of this pair is traced back to; else its points limit the approach
 
   /// A plane can only be `b`. Not both are planes.
   ContactPair(Body& a, Body& b, const PairSurface& surface);
@@ -76,7 +76,7 @@ class alignas(64) ContactPair {
   /// stopped them, deeper than the points found tell: of bodies that turn or slide fast other features meet
   /// than were near before. The distances of these points are such that the velocities at the start's arms,
   /// over `duration` [s], bring them to what they are at the end.
-  void foresee(Real duration);
+  void add_speculative_contacts(Real duration);
 
   /// Asks for the memory that find() will want: of the pair, and a little later of the first manifold.
   void prefetch() const { sim::prefetch(this, this + 1); }
@@ -86,7 +86,7 @@ class alignas(64) ContactPair {
 
   /// Whether some contact found is a line or a point (is_narrow()), at which there may be a seam.
   bool has_narrow() const { return has_narrow_; }
-  /// The i-th manifold that foresee() added, with its points where they are at the interval's end.
+  /// The i-th manifold that add_speculative_contacts() added, with its points where they are at the interval's end.
   const Manifold& at_end(std::size_t i) const { return at_end_[i]; }
   /// Puts another manifold, placed in the world, in the place of the i-th; one without points takes it away
   /// at the next drop_empty(). The separation remains that of the bodies.
@@ -138,7 +138,7 @@ class alignas(64) ContactPair {
   PairCache cache_;
   // In a's frame; filled only when they are first taken over: what moves has no use for the memory.
   std::vector<Manifold> found_;
-  std::vector<Manifold> at_end_;  // of the foreseen ones
+  std::vector<Manifold> at_end_;  // of the speculative ones
   Pose a_from_b_;                 // when found
   Real found_margin_ = -1;
   Pose placed_at_;  // of a, when placed

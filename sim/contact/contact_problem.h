@@ -85,9 +85,9 @@ struct ContactWork {
   uint64_t iterations = 0;      ///< pivots, Newton steps or sweeps
   uint64_t factorizations = 0;  ///< of the matrix, from the beginning
   uint64_t fallbacks = 0;       ///< problems that the solver meant for them did not solve
-  uint64_t abandoned = 0;       ///< that became too dear for the exact solver and went to the fast one
-  uint64_t narrowed = 0;        ///< collisions of which what is far from the blow was left out
-  uint64_t softened =
+  uint64_t over_budget = 0;       ///< that became too dear for the exact solver and went to the fast one
+  uint64_t cluster_truncated = 0;        ///< collisions of which contacts far from the impact were left out
+  uint64_t restitution_reduced =
       0;              ///< collisions with less restitution, steps with smaller impulses, to keep the energy
   Real residual = 0;  ///< greatest left over [m/s]
 
@@ -96,9 +96,9 @@ struct ContactWork {
     iterations += w.iterations;
     factorizations += w.factorizations;
     fallbacks += w.fallbacks;
-    abandoned += w.abandoned;
-    narrowed += w.narrowed;
-    softened += w.softened;
+    over_budget += w.over_budget;
+    cluster_truncated += w.cluster_truncated;
+    restitution_reduced += w.restitution_reduced;
     residual = residual < w.residual ? w.residual : residual;
   }
 };

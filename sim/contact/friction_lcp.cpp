@@ -8,7 +8,6 @@
 #include "sim/contact/friction_pivoting.h"
 #include "sim/contact/least_squares.h"
 #include "sim/contact/proximal_newton.h"
-#include "sim/unfused.h"
 
 namespace offstage::sim {
 namespace {
@@ -118,7 +117,7 @@ FrictionSolver::FrictionSolver(std::span<ContactBody> bodies, std::span<Contact>
 }
 
 /// Turns the tangents of a contact, so that t becomes what was `direction` in them.
-OFFSTAGE_UNFUSED void FrictionSolver::turn(std::size_t i, const Vector2d& direction) {
+void FrictionSolver::turn(std::size_t i, const Vector2d& direction) {
   const Real length = direction.norm();
   if (!(length > 0)) return;
   const Vector2d d = direction / length;

@@ -15,7 +15,7 @@ namespace offstage::sim {
 namespace {
 
 /// A sweep goes over a patch in rounds, until one changes its velocities by less than this [m/s] or there
-/// were enough. What holds takes one; a blow takes more, or some of the points would be pressed in. A patch
+/// were enough. What holds takes one; an impact takes more, or some of the points would be pressed in. A patch
 /// without a guess is at first solved to the end, or it would slip until the sweeps have found one.
 constexpr float kSettled = 0.01F, kSolved = 1e-6F;
 constexpr uint32_t kPatchRounds = 20;
@@ -334,7 +334,7 @@ Vector solve_normal(PatchBatch& p, Groups& u, const Gaps& gaps) {
 }
 
 /// Takes the impulses a little back towards their means, which follow. No impulse changes by more than that
-/// share of itself, or of Coulomb's limit: the mean of a blow must not lift what it has stopped. The friction
+/// share of itself, or of Coulomb's limit: the mean of an impact must not lift what it has stopped. The friction
 /// of what slides is brought to the limit of the normal impulses as they are now, so that the sums of both
 /// over the sub-steps keep to Coulomb's law however the load goes from point to point. Returns the change.
 Groups return_to_mean(PatchBatch& p) {

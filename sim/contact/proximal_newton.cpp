@@ -93,10 +93,10 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
   mixing_.clear();
   Real softness = 1;
   if (!joints.empty()) {
-    if (left > kFarOff * speed && !come_near(contacts, tolerance, work)) return std::nullopt;
+    if (left > kFarOff * speed && !ramp_penalties(contacts, tolerance, work)) return std::nullopt;
   } else if (left > kWrong * speed && std::any_of(points_.begin(), points_.end(),
                                                   [](const Point& p) { return p.multiplier.x() > 0; })) {
-    stiffen(softness = kSoft, 1);
+    scale_penalties(softness = kSoft, 1);
     evaluate(contacts);
     gradient(contacts);
     left = gradient_speed();
@@ -114,16 +114,16 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
         left <= std::min(tolerance * std::pow(10, (outer - began) / kPatience), tolerance + kCoarse * speed);
     if (solved && softness == 1) break;
     if (solved) {  // the last digits are the stiff ones'
-      stiffen(1 / std::exchange(softness, 1), 1);
+      scale_penalties(1 / std::exchange(softness, 1), 1);
       evaluate(contacts);
       gradient(contacts);
       began = outer + 1;
       continue;
     }
     mix_lifts(left > kSlow * before);
-    if (outer == 2 * kPatience) stiffen(1, kStiffness / kBoundedStiffness);
+    if (outer == 2 * kPatience) scale_penalties(1, kStiffness / kBoundedStiffness);
     if (softness < 1 && change.multipliers > std::max(kSlow * multipliers_before, left / 2)) {
-      stiffen(kStiffen, 1);
+      scale_penalties(kStiffen, 1);
       softness *= kStiffen;
     }
     evaluate(contacts);
@@ -222,7 +222,7 @@ uint32_t ProximalNewton::pair_of(uint32_t row, uint32_t other) const {
 }
 
 /// Multiplies the penalties.
-void ProximalNewton::stiffen(Real contacts, Real bounded) {
+void ProximalNewton::scale_penalties(Real contacts, Real bounded) {
   if (contacts == 1 && bounded_.empty()) return;
   for (Point& p : points_) p.rho *= contacts;
   for (Bounded& p : bounded_) p.rho *= bounded;
@@ -230,17 +230,17 @@ void ProximalNewton::stiffen(Real contacts, Real bounded) {
 }
 
 /// Towards the solution from a guess that is far from it; false if the budget is spent.
-bool ProximalNewton::come_near(std::span<const Contact> contacts, Real tolerance, ContactWork& work) {
+bool ProximalNewton::ramp_penalties(std::span<const Contact> contacts, Real tolerance, ContactWork& work) {
   Real softness = 1;
   for (int k = 0; k < kSoftSteps; ++k) softness /= kStiffen;
-  stiffen(softness, softness);
+  scale_penalties(softness, softness);
   for (int k = 0; k < kSoftSteps; ++k) {
     evaluate(contacts);
     gradient(contacts);
     minimize(contacts, std::max(tolerance / 4, gradient_speed() / 20), work);
     if (cost_ > budget_) return false;
     update_multipliers(contacts);
-    stiffen(kStiffen, kStiffen);
+    scale_penalties(kStiffen, kStiffen);
   }
   evaluate(contacts);
   gradient(contacts);

@@ -88,8 +88,8 @@ class ProximalNewton {
   uint32_t pair_of(uint32_t row, uint32_t other) const;
   void set_points(std::span<const ContactBody> bodies, std::span<const Contact> contacts);
   void set_joints();
-  void stiffen(Real contacts, Real bounded);
-  bool come_near(std::span<const Contact> contacts, Real tolerance, ContactWork& work);
+  void scale_penalties(Real contacts, Real bounded);
+  bool ramp_penalties(std::span<const Contact> contacts, Real tolerance, ContactWork& work);
   Real constraint_speed() const;
   Vec6 violation(std::size_t j) const;
   void satisfy_constraints();

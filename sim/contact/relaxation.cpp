@@ -23,7 +23,7 @@ constexpr std::size_t kSerialBatches = 48;
 /// touch gets another sweep before they move, or it would be pressed in; and so on, so many times at most. In
 /// a sub-step of 1/1920 s such a speed presses in 0.05 mm. (At half and at twice of it the greatest overlap
 /// of 1000 boxes that fall on a heap was 0.5 and 0.7 mm for 0.8, which is how it scatters, in the same time.)
-constexpr Real kBlow = 0.1;
+constexpr Real kImpact = 0.1;
 constexpr uint32_t kRepeats = 12;
 /// What lies under a load gives way only together: a push as far as kPress is passed on likewise, and then on
 /// to where it is but kPassedOn [m]. In heaps of 3000 boxes columns stayed 1 mm in each other for seconds
@@ -121,7 +121,7 @@ void RelaxationSolver::plan_colors(Stage stage, uint32_t substep, bool backward)
   if (backward) std::reverse(ranges_.begin() + static_cast<std::ptrdiff_t>(first), ranges_.end());
 }
 
-/// A sweep over all batches, and then over those that blows go on to: there and back, so that they go both
+/// A sweep over all batches, and then over those that impacts reach: there and back, so that they go both
 /// ways.
 void RelaxationSolver::plan_sweeps(Stage first, Stage again, uint32_t substep) {
   ++sweeps_;
@@ -238,7 +238,7 @@ void RelaxationSolver::extrapolate(uint32_t i) {
 void RelaxationSolver::solve(uint32_t i, const Range& range) {
   PatchBatch& p = batches_[i];
   sweep(p, motions_, times_[range.substep]);
-  strike(p, range.sweep, p.residual, kBlow);
+  strike(p, range.sweep, p.residual, kImpact);
 }
 
 void RelaxationSolver::push(uint32_t i, const Range& range, Real threshold) {
@@ -247,10 +247,10 @@ void RelaxationSolver::push(uint32_t i, const Range& range, Real threshold) {
   strike(p, range.sweep, push_out(p, motions_, how), threshold);
 }
 
-/// What the bodies of lanes with so much of a blow touch gets another sweep.
-void RelaxationSolver::strike(const PatchBatch& p, uint32_t sweep, FloatLanes blow, Real threshold) {
+/// Contacts of bodies in lanes with so strong an impact get another sweep.
+void RelaxationSolver::strike(const PatchBatch& p, uint32_t sweep, FloatLanes impact, Real threshold) {
   for (unsigned lane = 0; lane < ContactColoring::kLanes; ++lane) {
-    if (!(blow[lane] > threshold)) continue;
+    if (!(impact[lane] > threshold)) continue;
     if (p.moves_a[lane]) struck_[p.a[lane]] = sweep;
     if (p.moves_b[lane]) struck_[p.b[lane]] = sweep;
     std::atomic_ref(strikes_[sweep]).store(1, std::memory_order_relaxed);

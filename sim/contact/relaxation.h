@@ -148,7 +148,7 @@ class RelaxationSolver {
   void extrapolate(uint32_t body);
   void solve(uint32_t batch, const Range& range);
   void push(uint32_t batch, const Range& range, Real threshold);
-  void strike(const PatchBatch& batch, uint32_t sweep, FloatLanes blow, Real threshold);
+  void strike(const PatchBatch& batch, uint32_t sweep, FloatLanes impact, Real threshold);
   bool is_struck(uint32_t batch, uint32_t since) const;
   void advance(uint32_t body);
   void finish(uint32_t body);

@@ -56,7 +56,7 @@ SurfaceDistance piece_distance(const CollisionShape& shape, uint32_t piece, cons
 struct View {
   ContactPair* pair;
   uint32_t index;
-  bool x_is_a, foreseen;
+  bool x_is_a, speculative;
   const Manifold* m;
 
   Body& x() const { return x_is_a ? pair->a() : pair->b(); }
@@ -94,11 +94,11 @@ class BodyContacts {
       : x_(x), time_(time), h_(h) {
     for (ContactPair* pair : pairs) {
       const std::vector<PlacedManifold>& all = pair->manifolds();
-      const std::size_t found = all.size() - pair->foreseen;
+      const std::size_t found = all.size() - pair->speculative;
       for (std::size_t i = 0; i < all.size(); ++i) {
-        const bool foreseen = i >= found;
-        views_.push_back({pair, static_cast<uint32_t>(i), &pair->a() == &x, foreseen,
-                          foreseen ? &pair->at_end(i - found) : &all[i].manifold});
+        const bool speculative = i >= found;
+        views_.push_back({pair, static_cast<uint32_t>(i), &pair->a() == &x, speculative,
+                          speculative ? &pair->at_end(i - found) : &all[i].manifold});
       }
     }
     flush_ = std::min(kFlush, kFlushShare * x.extent);
@@ -115,7 +115,7 @@ class BodyContacts {
     for (std::size_t i = 0; i < views_.size(); ++i) {
       if (!views_[i].may_be_at_seam()) continue;
       for (std::size_t k = 0; k < views_.size(); ++k)
-        if (k != i && !views_[k].foreseen)
+        if (k != i && !views_[k].speculative)
           if (const auto normal = normal_instead(views_[i], views_[k])) hidden.push_back({i, k, *normal});
     }
     const auto is_hidden = [&](std::size_t i) {
@@ -128,7 +128,7 @@ class BodyContacts {
       last = contact;
       const View& v = views_[contact];
       verdicts.push_back({v.pair, v.index, {}});
-      if (normal != views_[by].normal() && !v.foreseen)
+      if (normal != views_[by].normal() && !v.speculative)
         verdicts.back().instead = on_slope(v, views_[by], normal);
     }
     return verdicts;
@@ -163,7 +163,7 @@ class BodyContacts {
     const Vec3& on_face = face.on_y(deepest);
     const Real clipped = kClipped * x_.extent;
     Real low = std::min(0.0, face.m->points[deepest].separation) - flush_ - clipped;
-    if (v.foreseen) low -= std::abs(up.dot(x_.pose.position - x_.start_pose.position));
+    if (v.speculative) low -= std::abs(up.dot(x_.pose.position - x_.start_pose.position));
     for (uint32_t k = 0; k < v.m->count; ++k)
       if (const Real height = up.dot(v.on_y(k) - on_face); height < low || height > flush_ + clipped)
         return std::nullopt;
@@ -190,7 +190,7 @@ class BodyContacts {
 
   /// Of Y's piece, at a place of the world.
   SurfaceDistance distance(const View& v, const Vec3& place) const {
-    const Pose y = pose(v.y(), v.foreseen);
+    const Pose y = pose(v.y(), v.speculative);
     SurfaceDistance d = piece_distance(v.y().collision_shape(), v.y_piece(), y.point_to_body(place));
     d.normal = y.vector_to_world(d.normal);
     return d;

@@ -1,8 +1,8 @@
 /// Whether an island is for the exact or the fast solver.
 
-#include <algorithm>
+#include "sim/contact/solver_choice.h"
 
-#include "sim/contact/contact_solve.h"
+#include <algorithm>
 
 namespace offstage::sim {
 namespace {
@@ -44,7 +44,7 @@ Real fast_cost(const Island& island, Real duration) {
 
 }  // namespace
 
-void SolverPatience::begin(std::span<Island* const> islands, Real duration) {
+void ExactSolverBudget::begin(std::span<Island* const> islands, Real duration) {
   Real fast = 0;
   for (const Island* island : islands) fast += fast_cost(*island, duration);
   small_ = fast < kSmall;
@@ -52,20 +52,20 @@ void SolverPatience::begin(std::span<Island* const> islands, Real duration) {
   left_ = std::max(0.0, 1 - debt_ / (kCredit * std::max(fast, kSmall)));
 }
 
-bool SolverChoice::is_exact_worth(const Island& island, const SolverPatience& patience) {
+bool SolverChoice::is_exact_worth(const Island& island, const ExactSolverBudget& patience) {
   if (patience.is_small() && island.bodies.size() <= kFew) return true;
   if (wait_ == 0) return proven_ || patience.left() > kLittle;
   --wait_;
   return false;
 }
 
-Real SolverChoice::budget(const Island& island, Real duration, const SolverPatience& patience) const {
+Real SolverChoice::budget(const Island& island, Real duration, const ExactSolverBudget& patience) const {
   if (patience.is_small() && island.bodies.size() <= kFew) return kMostOfFew;
   const Real fast = fast_cost(island, duration), credit = kCredit * fast * (proven_ ? 1 : patience.left());
   return is_quiet(island) ? credit : std::min(credit, kMostOfMoving * std::max(fast, kSmall));
 }
 
-void SolverChoice::learn(const Island& island, Real duration, bool solved, SolverPatience& patience) {
+void SolverChoice::learn(const Island& island, Real duration, bool solved, ExactSolverBudget& patience) {
   if (patience.is_small() && island.bodies.size() <= kFew) return;
   const Real fast = fast_cost(island, duration), excess = exact->cost() - kWorth * fast;
   proven_ = solved && excess <= 0;

@@ -201,9 +201,9 @@ Wrench impulse(const Explosion& explosion, const Solid& solid, const Pose& pose,
   // Inside of the body no side is nearer in a way that matters: it is thrown off as a whole.
   if (surface.distance <= 0) return {size * direction(centre - explosion.point), Vec3::Zero()};
   // The gradient of the distance points from the body to the source.
-  const Vec3 blow = -size * pose.vector_to_world(surface.normal);
+  const Vec3 push = -size * pose.vector_to_world(surface.normal);
   const Vec3 hit = pose.point_to_world(source - surface.distance * surface.normal);
-  return {blow, (hit - centre).cross(blow)};
+  return {push, (hit - centre).cross(push)};
 }
 
 Vec3 impulse(const Explosion& explosion, const Vec3& point) {

@@ -79,7 +79,7 @@ struct Grab {
   Real reach = std::numeric_limits<Real>::infinity();
 };
 
-/// A blow away from a point, at the force's start. It hits each body at its nearest point, so that it also
+/// An impulse away from a point, at the force's start. It hits each body at its nearest point, so that it also
 /// turns those that it does not hit square.
 struct Explosion {
   Vec3 point = Vec3::Zero();

@@ -8,7 +8,6 @@
 
 #include "sim/dynamics/flat.h"
 #include "sim/dynamics/rigid_jacobian.h"
-#include "sim/unfused.h"
 
 namespace offstage::sim {
 namespace {
@@ -201,8 +200,8 @@ Quat rotation(const Vec3& w, Real h) {
   return q;
 }
 
-OFFSTAGE_UNFUSED void fly(RigidBody& body, const BodyForces& forces, const Integrator& integrator, Real t,
-                          Real h, IntegratorWorkspace& work) {
+void fly(RigidBody& body, const BodyForces& forces, const Integrator& integrator, Real t, Real h,
+         IntegratorWorkspace& work) {
   if (body.linear_drag != 0 || body.angular_drag != 0 || is_pulled(body, forces.forces, t, t + h))
     return integrate(body, forces, integrator, t, h, work);
   const Vec3 velocity = body.velocity();

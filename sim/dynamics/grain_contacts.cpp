@@ -162,7 +162,7 @@ void GrainContacts::add_surface(uint32_t i, const Obstacle& o, const Vec3& norma
   const Vec3 velocity = o.velocity_at(g.at(step_->h) - g.radius * normal, 1);
   s.normal_single = normal.cast<float>();
   s.velocity = velocity;
-  s.fibre = o.fibre_on(normal, 1);
+  s.friction_axis = o.friction_axis_on(normal, 1);
   s.friction = static_cast<float>(pair_friction(g.friction, o.friction));
   s.mass = static_cast<float>(g.mass);
   const Real speed = (velocity - g.velocity).dot(normal);

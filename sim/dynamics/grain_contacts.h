@@ -76,14 +76,14 @@ class GrainContacts {
     uint32_t body;
     const Obstacle* obstacle;
     Vec3 velocity;  // of the surface
-    Vec3 fibre;     // Obstacle::fibre_on the surface
+    Vec3 friction_axis;     // Obstacle::friction_axis_on the surface
 
-    /// Along and across the fibre each for itself.
+    /// Along and across the friction_axis each for itself.
     Vec3 held(const Vec3& along, Real limit) const {
-      if (fibre.isZero()) return Contact::held(along, limit);
-      const Vec3 across = normal().cross(fibre);
+      if (friction_axis.isZero()) return Contact::held(along, limit);
+      const Vec3 across = normal().cross(friction_axis);
       const Real most = limit * obstacle->cross_friction;
-      return std::clamp(fibre.dot(along), -limit, limit) * fibre +
+      return std::clamp(friction_axis.dot(along), -limit, limit) * friction_axis +
              std::clamp(across.dot(along), -most, most) * across;
     }
   };
@@ -126,7 +126,7 @@ class GrainContacts {
   void relax();
   void displace(std::span<Vec3> end, std::span<uint8_t> touched);
   void push_apart(std::span<Vec3> end);
-  // grain_passing.cpp
+  // tunneling_guard.cpp
   void stop_passing(std::span<Vec3> end);
   bool set_out(std::span<const Vec3> end);
   void find_passing();

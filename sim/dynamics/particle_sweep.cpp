@@ -233,10 +233,10 @@ void ParticleSweep::finish(ParticlePath& path, Real duration, const Vec3& extra)
 
 Vec3 collision_impulse(const Obstacle& o, Real fraction, Real particle_mass, const Vec3& u, const Vec3& n,
                        Real restitution, Real friction, const Mat3& mobility) {
-  const Vec3 fibre = o.fibre_on(n, fraction);
-  const bool isotropic = fibre.isZero();
+  const Vec3 friction_axis = o.friction_axis_on(n, fraction);
+  const bool isotropic = friction_axis.isZero();
   if (mobility.isZero(0) && isotropic) return collision_impulse(particle_mass, u, n, restitution, friction);
-  const ContactFrame f = isotropic ? contact_frame(n) : ContactFrame{n, fibre, n.cross(fibre)};
+  const ContactFrame f = isotropic ? contact_frame(n) : ContactFrame{n, friction_axis, n.cross(friction_axis)};
   Mat3 axes;
   axes << f.n, f.t, f.k;
   const Mat3 K = Mat3::Identity() / particle_mass + mobility;

@@ -56,7 +56,7 @@ struct ObstacleHit {
 
 /// Impulse on a particle that meets an obstacle at a fraction of the sub-step with the relative velocity u,
 /// u.n < 0 (P5, P8); `mobility`: of the obstacle at the contact, zero if it does not give way. `friction`
-/// counts along the obstacle's fibre; across it `cross_friction` of that, and each sticks or slides by
+/// counts along the obstacle's friction axis; across it `cross_friction` of that, and each sticks or slides by
 /// itself.
 Vec3 collision_impulse(const Obstacle& o, Real fraction, Real particle_mass, const Vec3& u, const Vec3& n,
                        Real restitution, Real friction, const Mat3& mobility);

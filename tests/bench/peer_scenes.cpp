@@ -84,7 +84,7 @@ class Engine {
                  " fall-backs; fast: %" PRIu64 " solves; impacts: %" PRIu64 ", %" PRIu64
                  " fall-backs, %" PRIu64 " trace-backs, %" PRIu64 " cut short\n",
                  r.exact.solves, r.exact.iterations, r.exact.factorizations, r.exact.fallbacks, r.fast.solves,
-                 r.impacts.solves, r.impacts.fallbacks, r.tracebacks, r.cut_short);
+                 r.impacts.solves, r.impacts.fallbacks, r.tracebacks, r.toi_limit_reached);
   }
   void step() {
     const StepReport r = world_.step(dt_);
@@ -92,7 +92,7 @@ class Engine {
     report_.fast.add(r.fast);
     report_.impacts.add(r.impacts);
     report_.tracebacks += r.tracebacks;
-    report_.cut_short += r.cut_short;
+    report_.toi_limit_reached += r.toi_limit_reached;
   }
   void sync() {}
   peer::State state(int i) const {

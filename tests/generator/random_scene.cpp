@@ -411,7 +411,7 @@ struct Momenta {
 /// that turns by the angle w h in a sub-step leaves its tangent by R (w h)^2 / 2, up to what is looked at in
 /// pieces: a quarter of the body; for as much, two bodies may get into each other. Overlaps are pushed out by
 /// a fifth in each sub-step, so that what the sub-steps before have left adds up. Where the bounded number of
-/// trace-backs in a sub-step was used up, or the bodies whirl, two may get as far as they move against each
+/// trace-backs in a sub-step was used up, or the bodies spin fast, two may get as far as they move against each
 /// other.
 class Overlap {
  public:
@@ -434,7 +434,7 @@ class Overlap {
                speed = std::max(now.speed(), before_.speed());
     before_ = now;
     Real added = kSolved + turning;
-    if (report.cut_short + report.settled > 0) added += h * speed;
+    if (report.toi_limit_reached + report.restitution_suppressed > 0) added += h * speed;
     for (uint32_t i = 0; i < report.substeps; ++i) left_ = (1 - kPushedOut) * left_ + added;
   }
   Real allowed() const { return left_; }

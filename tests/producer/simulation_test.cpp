@@ -89,7 +89,7 @@ TEST(Simulation, WindCarriesBodiesAlong) {
 }
 
 TEST(Simulation, AnExplosionThrowsByDistance) {
-  // Its blow falls linearly from 6 N s to nothing 4 m away; the nearest point of the ball is 1 m away.
+  // Its impulse falls linearly from 6 N s to nothing 4 m away; the nearest point of the ball is 1 m away.
   const Simulated run(balls({1.5, 20}, R"("forces": [
     {"type": "explosion", "time": 0.5, "point": [0, 0, 0], "impulse": 6, "radius": 4}])"));
   EXPECT_TRUE(run.body("body_0").velocity.isApprox(Vec3(6 * 0.75 / 2, 0, 0), 1e-9));

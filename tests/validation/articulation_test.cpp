@@ -484,8 +484,8 @@ TEST_P(Joints, TellWhatTheyBear) {
   EXPECT_LT(world.joint(joint).force.head<1>().norm() + world.joint(joint).torque.head<2>().norm(), 1e-2);
 }
 
-// The ball alone could hang on it; its blow cannot.
-TEST_P(Joints, BreakByABlow) {
+// The ball alone could hang on it; its impact cannot.
+TEST_P(Joints, BreakByAnImpact) {
   for (const Real height : {0.0, 1.0}) {
     World world(def());
     JointDef wall{.type = JointType::fixed, .max_force = 200};
@@ -592,7 +592,7 @@ TEST_P(Joints, LieStillOnTheFloorAndSleep) {
   EXPECT_EQ(all.last.bodies_asleep, 8u);
   EXPECT_LT(all.penetration, 1e-3);
   EXPECT_LE(all.exact_fallbacks, 2u);  // as they fall onto the floor
-  EXPECT_EQ(all.fast_fallbacks + all.cut_short, 0u);
+  EXPECT_EQ(all.fast_fallbacks + all.toi_limit_reached, 0u);
 }
 
 // Between two keys a motor holds still for longer than bodies take to fall asleep.

@@ -39,7 +39,7 @@ class BothSolvers : public testing::TestWithParam<SolverKind> {
 /// What many steps reported: counts summed, the greatest of the rest.
 struct Tally {
   Real penetration = 0;
-  uint64_t collisions = 0, tracebacks = 0, cut_short = 0, exact_fallbacks = 0, fast_fallbacks = 0;
+  uint64_t collisions = 0, tracebacks = 0, toi_limit_reached = 0, exact_fallbacks = 0, fast_fallbacks = 0;
   bool finite = true;
   StepReport last;
 
@@ -47,7 +47,7 @@ struct Tally {
     penetration = std::max(penetration, r.penetration);
     collisions += r.collisions;
     tracebacks += r.tracebacks;
-    cut_short += r.cut_short;
+    toi_limit_reached += r.toi_limit_reached;
     exact_fallbacks += r.exact.fallbacks + r.impacts.fallbacks;
     fast_fallbacks += r.fast.fallbacks;
     finite &= r.finite;

@@ -319,9 +319,9 @@ class Pile : public BothSolvers {
     return {.shape = Box{size}, .pose = {at, turn}, .restitution = 0.1};
   }
 
-  /// Boxes dropped into a pit of 1.6 m. On the way a blow can press in a corner that was not near before; it
+  /// Boxes dropped into a pit of 1.6 m. On the way an impact can press in a corner that was not near before; it
   /// is pushed out at once.
-  static void expect_settles(uint64_t count, Real seconds, Real angular_drag, Real blow) {
+  static void expect_settles(uint64_t count, Real seconds, Real angular_drag, Real deepest) {
     WorldDef sleepy = def();
     sleepy.sleep = true;
     World world(sleepy);
@@ -337,7 +337,7 @@ class Pile : public BothSolvers {
     }
     const Tally t = run(world, seconds, 1.0 / 60);
     EXPECT_TRUE(t.finite);
-    EXPECT_LT(t.penetration, blow);
+    EXPECT_LT(t.penetration, deepest);
     EXPECT_LT(t.last.penetration, 1e-3);
     EXPECT_EQ(t.last.bodies_asleep, count);
     EXPECT_LT(t.exact_fallbacks, 20 * seconds);

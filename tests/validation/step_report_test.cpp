@@ -9,14 +9,14 @@ namespace offstage::sim {
 namespace {
 
 struct Decisions {
-  uint64_t woken = 0, put_to_sleep = 0, foreseen = 0, settled = 0;
+  uint64_t woken = 0, put_to_sleep = 0, speculative_contacts = 0, restitution_suppressed = 0;
   ContactWork exact, fast, impacts;
 
   void add(const StepReport& r) {
     woken += r.bodies_woken;
     put_to_sleep += r.bodies_put_to_sleep;
-    foreseen += r.foreseen;
-    settled += r.settled;
+    speculative_contacts += r.speculative_contacts;
+    restitution_suppressed += r.restitution_suppressed;
     exact.add(r.exact);
     fast.add(r.fast);
     impacts.add(r.impacts);
@@ -49,7 +49,7 @@ TEST(StepReport, TellsWhoFellAsleepAndWhoWoke) {
   EXPECT_EQ(d.put_to_sleep, 3u);
 }
 
-// 80 boxes of six contacts and more, falling into a pit: blows of many at once.
+// 80 boxes of six contacts and more, falling into a pit: many impacts at once.
 Decisions reported_heap(SolverKind solver, Real restitution) {
   World world(WorldDef{.solver = solver});
   add_floor(world, restitution);
@@ -72,15 +72,15 @@ Decisions reported_heap(SolverKind solver, Real restitution) {
 
 TEST(StepReport, TellsOfEachSolversShortCuts) {
   const Decisions fast = reported_heap(SolverKind::fast, 0.3);
-  EXPECT_GT(fast.foreseen, 0u);
-  EXPECT_GT(fast.impacts.narrowed, 0u);
+  EXPECT_GT(fast.speculative_contacts, 0u);
+  EXPECT_GT(fast.impacts.cluster_truncated, 0u);
   EXPECT_GT(fast.fast.solves, 0u);
-  EXPECT_EQ(fast.exact.solves + fast.exact.abandoned, 0u);
+  EXPECT_EQ(fast.exact.solves + fast.exact.over_budget, 0u);
   const Decisions automatic = reported_heap(SolverKind::automatic, 0);
   EXPECT_GT(automatic.exact.solves, 0u);
   EXPECT_GT(automatic.fast.solves, 0u);
-  EXPECT_GT(automatic.exact.abandoned, 0u);
-  EXPECT_EQ(automatic.impacts.narrowed, 0u) << "nothing bounces";
+  EXPECT_GT(automatic.exact.over_budget, 0u);
+  EXPECT_EQ(automatic.impacts.cluster_truncated, 0u) << "nothing bounces";
 }
 
 TEST(StepReport, TheExactSolverTakesNoShortCuts) {
@@ -92,7 +92,7 @@ TEST(StepReport, TheExactSolverTakesNoShortCuts) {
                     .restitution = 0.5});
   const Decisions d = decisions(world, 1);
   EXPECT_GT(d.impacts.solves, 0u);
-  EXPECT_EQ(d.foreseen, 0u);
+  EXPECT_EQ(d.speculative_contacts, 0u);
   EXPECT_EQ(d.fast.solves, 0u);
 }
 

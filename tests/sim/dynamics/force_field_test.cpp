@@ -96,7 +96,7 @@ TEST(ActiveForce, ActsOnTheNamedBodiesOnly) {
   EXPECT_FALSE((ActiveForce{&named, {}}.acts_on(a)));  // the named one is gone
 }
 
-// Under the middle of a face the blow is square: no spin. Off the middle it turns the box, and the far side
+// Under the middle of a face the push is square: no spin. Off the middle it turns the box, and the far side
 // of a ball none ever.
 TEST(Explosion, BlowsAwayFromItsPointAndSpinsTheExposedSide) {
   const Shape box = Box{{2, 1, 1}}, ball = Sphere{0.5};

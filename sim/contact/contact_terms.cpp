@@ -1,0 +1,138 @@
+#include "sim/contact/contact_terms.h"
+
+#include <cmath>
+
+namespace offstage::sim {
+namespace {
+
+/// What slides slower than this is at rest, to static friction [m/s].
+constexpr Real kSlip = 1e-3;
+
+/// The material point of a round body that stands for a point of its surface: on the axis, or at the centre.
+/// The surface turns through the contact, these do not.
+Vec3 core_point(const Body& body, const Vec3& place) {
+  const Shape& shape = body.def.shape;
+  if (std::holds_alternative<Sphere>(shape)) return body.start_pose.position;
+  if (!std::holds_alternative<Capsule>(shape) && !std::holds_alternative<Cylinder>(shape) &&
+      !std::holds_alternative<Cone>(shape))
+    return place;
+  const Vec3 local = body.start_pose.point_to_body(place);
+  return body.start_pose.point_to_world(Vec3(0, local.y(), 0));
+}
+
+struct PointRates {
+  Vec3 velocity, acceleration;  ///< of a material point at the start; the latter without forces: w x (w x r)
+};
+
+PointRates rates(const Body& body, const Vec3& place) {
+  if (body.is_awake()) {
+    const Vec3 &w = body.start_twist.angular_velocity, wr = w.cross(place - body.start.position);
+    return {body.start_twist.velocity + wr, w.cross(wr)};
+  }
+  // The velocities of kinematic bodies are those of the interval's end, so nothing is missing from them.
+  return {body.start_velocity(place), Vec3::Zero()};
+}
+
+Twist twist(const Body& body) {
+  // At the origin of the world's axes.
+  if (body.is_awake()) {
+    const Vec3& w = body.start_twist.angular_velocity;
+    return {body.start_twist.velocity - w.cross(body.start.position), w};
+  }
+  if (!body.is_kinematic()) return {};
+  const Vec3& w = body.drive.angular_velocity;
+  return {body.drive.velocity - w.cross(body.pose.position), w};
+}
+
+bool is_face(NormalSource s) {
+  return s == NormalSource::face_of_a || s == NormalSource::face_of_b;
+}
+
+/// Square of the angular velocity [1/s^2]. Below this, faces do not turn in a step.
+constexpr Real kNoSpin = 1e-14;
+Real spin(const Body& body) {
+  if (body.is_awake()) return body.start_twist.angular_velocity.squaredNorm();
+  return body.is_kinematic() ? body.drive.angular_velocity.squaredNorm() : 0;
+}
+
+/// The rotation by a vector of angle times axis: exact enough by series for what contacts turn in a step, and
+/// without trigonometry, whose last bits differ between libraries.
+Quat rotation(const Vec3& v) {
+  const Real s = v.squaredNorm() / 4;
+  const Real sine = 1 - s / 6 * (1 - s / 20 * (1 - s / 42)), cosine = 1 - s / 2 * (1 - s / 12 * (1 - s / 30));
+  return Quat(cosine, sine * v.x() / 2, sine * v.y() / 2, sine * v.z() / 2);
+}
+
+}  // namespace
+
+/// What the relative acceleration of R9 has besides the part that is linear in the accelerations of the
+/// bodies:
+///   n . (c_a'' - c_b'') + 2 n' . (c_a' - c_b') - |n'|^2 D
+/// with material points c on both bodies at a distance D along n. (Of two centres of spheres, this is
+/// n.c'' + n'.c', not twice the latter.) Tangentially, what turns with the bodies. Returned is what this
+/// makes of the relative velocity in an interval of length h, in the contact's frame.
+///
+/// The terms with n' hold while n turns little. Of sharp corners that slide past each other, and of edges
+/// that are almost parallel, it turns by any angle in no time; then as much of the sliding as there is has
+/// become parting, and no more. Of two points that pass each other with the velocity s, T = s^2 / D makes
+///   d/dt |(D, s t)| at h = T h / sqrt(1 + (T h / s)^2),
+/// which is used for all.
+Vec3 velocity_bias(const ContactPair& pair, const PlacedManifold& placed, const ContactPoint& point, Real h) {
+  const Manifold& m = placed.manifold;
+  if (is_face(m.source) && spin(pair.a()) < kNoSpin && spin(pair.b()) < kNoSpin) return Vec3::Zero();
+  const Vec3 place_a = m.source == NormalSource::face_of_a ? point.on_a : core_point(pair.a(), point.on_a);
+  const Vec3 place_b = m.source == NormalSource::face_of_b ? point.on_b : core_point(pair.b(), point.on_b);
+  const PointRates a = rates(pair.a(), place_a), b = rates(pair.b(), place_b);
+  const Vec3 n_rate =
+      is_face(m.source)
+          ? twist(m.source == NormalSource::face_of_a ? pair.a() : pair.b()).angular_velocity.cross(m.normal)
+          : normal_rate(m, point, twist(pair.a()), twist(pair.b()));
+  const Vec3 velocity = a.velocity - b.velocity, acceleration = a.acceleration - b.acceleration;
+  const Real distance = m.normal.dot(place_a - place_b);
+  const Real turned = h * (2 * n_rate.dot(velocity) - n_rate.squaredNorm() * distance);
+  const Real sliding2 = (velocity - m.normal.dot(velocity) * m.normal).squaredNorm();
+  const Real parting = turned == 0 ? 0 : turned * std::sqrt(sliding2 / (sliding2 + turned * turned));
+  return {h * m.normal.dot(acceleration) + parting, h * placed.frame.t.dot(acceleration),
+          h * placed.frame.k.dot(acceleration)};
+}
+
+Vec3 surface_velocity(const ContactPair& pair) {
+  if (!pair.surface().conveys) return Vec3::Zero();
+  return pair.a().start_pose.vector_to_world(pair.a().def.surface_velocity) -
+         pair.b().start_pose.vector_to_world(pair.b().def.surface_velocity);
+}
+
+Vec3 in_frame(const ContactFrame& f, const Vec3& v) {
+  return {f.n.dot(v), f.t.dot(v), f.k.dot(v)};
+}
+
+std::pair<Real, Real> friction(const PairSurface& surface, const Vec3& u) {
+  const bool slips = u.y() * u.y() + u.z() * u.z() > kSlip * kSlip;
+  const Real mu = slips ? surface.friction : surface.static_friction;
+  return {mu, mu * surface.cross};
+}
+
+Vec3 origin(const Body& body) {
+  return body.is_awake() ? body.start.position : body.pose.position;
+}
+
+Mat3 inverse_inertia(const RigidBody& body, const Quat& orientation) {
+  const Mat3 R = orientation.toRotationMatrix();
+  return R * body.inverse_inertia * R.transpose();
+}
+
+Vec3 rotation_vector(const Quat& from, const Quat& to) {
+  const Quat turn = to * from.conjugate();
+  const Vec3 sine = turn.w() < 0 ? Vec3(-turn.vec()) : Vec3(turn.vec());
+  const Real s = sine.squaredNorm();
+  return 2 * (1 + s / 6 * (1 + 9 * s / 20 * (1 + 25 * s / 42))) * sine;
+}
+
+void displace(Body& body, const Vec3& shift, const Vec3& turn) {
+  RigidBody& r = body.rigid;
+  r.position += shift;
+  if (turn != Vec3::Zero()) r.orientation = (rotation(turn) * r.orientation).normalized();
+  body.pose = r.pose();
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,203 @@
+#include "sim/contact/exact_contacts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <tuple>
+
+#include "sim/contact/contact_motion.h"
+#include "sim/contact/contact_terms.h"
+#include "sim/contact/rough_collision.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Of a penetration, the share that a step takes back, and the fastest that it does so [m/s].
+constexpr Real kPushOut = 0.2, kFastestPush = 0.5;
+/// Points that meet faster than this have come together in the interval, not before [m/s].
+constexpr Real kClosing = 1e-3;
+/// Of the normal velocity that turning makes in half an interval, what a contact that holds may be off by.
+constexpr Real kTurningShare = 0.5;
+/// A blocked body blocks its neighbours, and these theirs, so many times, where they would overlap by more
+/// [m].
+constexpr int kBlockPasses = 20;
+constexpr Real kOverlap = 1e-6;
+/// A fall-back with more than this left over [m/s], or with more energy than before but for rounding, is
+/// none.
+constexpr Real kRough = 1e-2, kEnergyRounding = 1e-9;
+/// Of the kinetic energy, what the velocity terms of a solution may add in a step.
+constexpr Real kTermsShare = 0.02;
+
+}  // namespace
+
+ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactInterval& interval,
+                                            Real budget) {
+  bodies_.clear();
+  contacts_.clear();
+  pairs_.clear();
+  forces_.clear();
+  approach_.clear();
+  for (Body* body : island.bodies) {
+    body->row = static_cast<uint32_t>(bodies_.size());
+    add_body(*body);
+  }
+  for (ContactPair* pair : island.pairs) add_points(*pair, interval);
+  const Island* const one[] = {&island};
+  joints_.collect(one, interval);
+  if (contacts_.empty() && joints_.bounded().empty()) return {.is_applied = true, .work = {}};
+
+  free_ = bodies_;
+  const std::optional<ContactWork> work = newton_.solve(bodies_, contacts_, joints_.problem(), budget);
+  if (!work) return {};
+  Outcome outcome{.is_applied = is_safe(*work), .work = *work};
+  if (!outcome.is_applied) outcome.work.fallbacks = 1;
+  if (outcome.work.fallbacks > 0)
+    if (const auto worst = worst_contact(bodies_, contacts_)) outcome.rough = pairs_[*worst];
+  if (!outcome.is_applied) return outcome;
+  joints_.store_impulses(interval.duration);
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    forces_[i]->now = contacts_[i].impulse / interval.duration;
+  if (interval.is_whole)
+    for (PointForce* force : forces_) force->last = force->now;
+  move_bodies(island, interval.duration);
+  return outcome;
+}
+
+/// Contacts that push out of overlaps from two sides have no solution; then impulses without bounds cancel
+/// but for what throws bodies away. And the velocity terms of R9 are wrong where a thin body turns far in a
+/// step. Surfaces that drive, motors and friction in joints may do work; all else may only take energy, but
+/// for the speed at which overlaps are pushed out, and a small share for those terms.
+bool ExactContacts::is_safe(const ContactWork& work) const {
+  if (work.fallbacks > 0 && work.residual > kRough) return false;
+  Real energy = added_energy(free_, bodies_, contacts_);
+  const auto power = [](const BoundedRow& r, std::span<const ContactBody> bodies) {
+    Real u = r.offset;
+    for (const auto& [body, on] : {std::pair(r.a, &r.on_a), std::pair(r.b, &r.on_b)})
+      if (body != kUnmoved)
+        u += on->head<3>().dot(bodies[body].velocity) + on->tail<3>().dot(bodies[body].angular_velocity);
+    return r.impulse * u;
+  };
+  for (const BoundedRow& r : joints_.bounded())
+    if (!std::isfinite(r.lower) || !std::isfinite(r.upper))
+      energy += (power(r, free_) + power(r, bodies_)) / 2;
+  if (energy <= 0) return true;
+
+  Real push = 0, kinetic = 0, mass = 0;
+  for (const Contact& c : contacts_)
+    if (c.impulse.x() > 0) push = std::max(push, c.target);
+  for (const ContactBody& body : free_) {
+    if (!body.is_moved()) continue;
+    mass += 1 / body.inverse_mass;
+    kinetic += body.velocity.squaredNorm() / body.inverse_mass / 2 +
+               body.angular_velocity.dot(body.inverse_inertia.inverse() * body.angular_velocity) / 2;
+  }
+  if (work.fallbacks > 0) return energy <= kEnergyRounding * kinetic;
+  return energy <= kTermsShare * kinetic + mass * push * push / 2;
+}
+
+uint32_t ExactContacts::add_body(Body& body) {
+  ContactBody b;
+  if (body.is_awake()) {
+    b.inverse_mass = 1 / body.rigid.mass;
+    b.inverse_inertia = inverse_inertia(body.rigid, body.rigid.orientation);
+    b.velocity = body.rigid.velocity();
+    b.angular_velocity = body.rigid.angular_velocity();
+  } else if (body.is_kinematic()) {
+    b.velocity = body.drive.velocity;
+    b.angular_velocity = body.drive.angular_velocity;
+  }
+  bodies_.push_back(b);
+  return static_cast<uint32_t>(bodies_.size() - 1);
+}
+
+void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interval) {
+  const Real h = interval.duration;
+  const uint32_t a = pair.a().is_awake() ? pair.a().row : add_body(pair.a());
+  const uint32_t b = pair.b().is_awake() ? pair.b().row : add_body(pair.b());
+  const Vec3 surface = surface_velocity(pair);
+  for (PlacedManifold& m : pair.manifolds())
+    for (uint32_t k = 0; k < m.manifold.count; ++k) {
+      const ContactPoint& point = m.manifold.points[k];
+      const bool touches = point.separation <= kTouching;
+      if (pair.needs_toi && !touches) continue;
+      const Vec3 place = (point.on_a + point.on_b) / 2;
+      const Vec3 u = in_frame(m.frame, pair.relative_velocity(place) + surface);
+      const ContactMotion motion =
+          contact_motion(pair.a(), pair.b(), m.manifold, m.frame, place, h, interval.substep);
+      Contact c{.a = a, .b = b, .frame = motion.frame};
+      c.arm_a = motion.middle.arm_a;
+      c.arm_b = motion.middle.arm_b;
+      c.offset = in_frame(c.frame, surface);
+      if (touches) c.bias = motion.turns ? Vec3(motion.gain + motion.bow) : velocity_bias(pair, m, point, h);
+      c.offset += c.bias;
+      // In a moment that an impact has left of a sub-step, it would be pushed out as fast as the moment is
+      // short.
+      c.target = touches ? std::min(-kPushOut * point.separation / interval.substep, kFastestPush)
+                         : -point.separation / h;
+      std::tie(c.friction_t, c.friction_k) = friction(pair.surface(), u);
+      c.impulse = h * m.forces[k].last;
+      c.is_guessed = m.forces[k].known;
+      contacts_.push_back(c);
+      pairs_.push_back(&pair);
+      forces_.push_back(&m.forces[k]);
+      // What turns meets by a little more or less than the prediction of how it turns has it.
+      approach_.push_back(std::max(0.0, std::abs(u.x()) - kTurningShare * std::abs(motion.gain.x())));
+    }
+}
+
+/// Forces that act throughout the interval move bodies by half of what they change the velocity times the
+/// time. A body of which a contact closed in the interval, or parted and came back, is blocked from some time
+/// in it on: it gets as far as its new velocity brings it, which is what the contact's target speaks of.
+void ExactContacts::move_bodies(const Island& island, Real duration) {
+  closing_.assign(bodies_.size(), 0);
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    if (approach_[i] > kClosing && contacts_[i].impulse.x() > 0)
+      closing_[contacts_[i].a] = closing_[contacts_[i].b] = 1;
+  close_stops();
+  close_neighbors(island, duration);
+  for (std::size_t i = 0; i < island.bodies.size(); ++i) {
+    Body& body = *island.bodies[i];
+    Vec3 dv = bodies_[i].velocity - free_[i].velocity,
+         dw = bodies_[i].angular_velocity - free_[i].angular_velocity;
+    body.rigid.momentum += body.rigid.mass * dv;
+    body.rigid.angular_momentum += body.rigid.spin_momentum(body.rigid.orientation, dw);
+    if (closing_[i]) {
+      dv += bodies_[i].velocity - body.start_twist.velocity;
+      dw += bodies_[i].angular_velocity - body.start_twist.angular_velocity;
+    }
+    displace(body, duration / 2 * dv, duration / 2 * dw);
+  }
+}
+
+/// A blocked body gets less far than one that moves on, whose new velocity is the same: by half of what
+/// forces change that in the interval. Where this would be an overlap the other one is blocked as well.
+void ExactContacts::close_neighbors(const Island& island, Real duration) {
+  const auto way = [&](uint32_t i, const Vec3& arm) {
+    const Vec3 end = bodies_[i].velocity_at(arm);
+    if (i >= island.bodies.size() || closing_[i]) return Vec3(duration * end);
+    return Vec3(duration / 2 * (end + island.bodies[i]->start_twist.at(arm)));
+  };
+  bool changed = true;
+  for (int pass = 0; changed && pass < kBlockPasses; ++pass) {
+    changed = false;
+    for (const Contact& c : contacts_) {
+      if (closing_[c.a] == closing_[c.b]) continue;
+      const Real separation = std::max(0.0, -c.target * duration);
+      if (separation + c.frame.n.dot(way(c.a, c.arm_a) - way(c.b, c.arm_b)) > -kOverlap) continue;
+      closing_[c.a] = closing_[c.b] = 1;
+      changed = true;
+    }
+  }
+}
+
+/// Joints that got to where they stop block their bodies likewise.
+void ExactContacts::close_stops() {
+  for (std::size_t i = 0; i < joints_.bounded().size(); ++i) {
+    const BoundedRow& row = joints_.bounded()[i];
+    if (!joints_.origins()[i].is_stop || row.impulse == 0) continue;
+    for (uint32_t body : {row.a, row.b})
+      if (body != kUnmoved) closing_[body] = 1;
+  }
+}
+
+}  // namespace offstage::sim

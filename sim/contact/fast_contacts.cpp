@@ -1,0 +1,167 @@
+#include "sim/contact/fast_contacts.h"
+
+#include <tuple>
+
+#include "sim/contact/contact_motion.h"
+#include "sim/contact/contact_terms.h"
+#include "sim/contact/energy_guard.h"
+#include "sim/parallel_loop.h"
+
+namespace offstage::sim {
+namespace {
+
+RelaxedBody relaxed(const Body& body, const ContactInterval& interval) {
+  RelaxedBody b;
+  const Real duration = interval.duration;
+  if (body.is_awake()) {
+    b.inverse_mass = 1 / body.rigid.mass;
+    // At the end, so that velocities and momenta agree there.
+    b.inverse_inertia = inverse_inertia(body.rigid, body.rigid.orientation);
+    b.velocity = body.start_twist.velocity;
+    b.angular_velocity = body.start_twist.angular_velocity;
+    b.free_acceleration = (body.rigid.velocity() - b.velocity) / duration;
+    b.free_angular_acceleration = (body.rigid.angular_velocity() - b.angular_velocity) / duration;
+  } else if (body.is_kinematic()) {
+    b.velocity = body.drive.velocity;
+    b.angular_velocity = body.drive.angular_velocity;
+    if (!interval.is_whole) return b;
+    // Evenly accelerated, so that it gets to where it gets with the velocity that it has there.
+    const Vec3 mean = (body.pose.position - body.start_pose.position) / duration;
+    const Vec3 mean_spin = rotation_vector(body.start_pose.orientation, body.pose.orientation) / duration;
+    b.free_acceleration = 2 / duration * (b.velocity - mean);
+    b.free_angular_acceleration = 2 / duration * (b.angular_velocity - mean_spin);
+    b.velocity = 2 * mean - b.velocity;
+    b.angular_velocity = 2 * mean_spin - b.angular_velocity;
+  }
+  return b;
+}
+
+/// How the contact at its centre moves. The points go with the body that carries it.
+void set_motion(ContactPatch& patch, const ContactMotion& motion) {
+  patch.arm_a = motion.middle.arm_a;
+  patch.arm_b = motion.middle.arm_b;
+  patch.turns = motion.turns;
+  if (!motion.turns) return;
+  for (uint32_t i = 0; i < patch.count; ++i) {
+    ContactPatch::Point& p = patch.points[i];
+    const Vec3 arm = motion.middle.turn * (p.t * patch.frame.t + p.k * patch.frame.k);
+    p.t = motion.frame.t.dot(arm);
+    p.k = motion.frame.k.dot(arm);
+  }
+  patch.frame = motion.frame;
+  patch.gain = motion.gain;
+  patch.bow = motion.bow;
+  patch.gain_along_t = motion.gain_along_t;
+  patch.gain_along_k = motion.gain_along_k;
+}
+
+/// Of a manifold, with the forces that it begins with. What the patch was in another step does not matter.
+void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifold& m,
+               const ContactInterval& interval) {
+  const Real duration = interval.duration;
+  const Vec3 centre_a = start_centre(pair.a()), surface = surface_velocity(pair);
+  // What else of a rim is near does not say where on it the contact is.
+  const bool runs = runs_along(pair.a(), duration) || runs_along(pair.b(), duration);
+  set_points(patch, m.manifold, m.frame, centre_a, start_centre(pair.b()), runs);
+  const Vec3 place = centre_a + patch.arm_a;
+  const Vec3 u = in_frame(m.frame, pair.relative_velocity(place) + surface);
+  set_motion(patch,
+             contact_motion(pair.a(), pair.b(), m.manifold, m.frame, place, duration, interval.substep));
+  patch.offset = in_frame(patch.frame, surface);
+  std::tie(patch.friction_t, patch.friction_k) = friction(pair.surface(), u);
+  Vec3 last(0, 0, m.torque), mean(0, 0, m.mean_torque);
+  for (uint32_t k = 0; k < patch.count; ++k) {
+    const PointForce& f = m.forces[k];
+    patch.points[k].force = f.last.x();
+    patch.points[k].mean_force = f.mean.x();
+    last.head<2>() += f.last.tail<2>();
+    mean.head<2>() += f.mean.tail<2>();
+  }
+  patch.force_t = last.x();
+  patch.force_k = last.y();
+  patch.torque_n = last.z();
+  patch.mean_friction = mean;
+}
+
+/// The patch's friction is shared out by the points' normal forces.
+void store_forces(const ContactPatch& patch, const ContactInterval& interval, PlacedManifold& m) {
+  Real sum = 0;
+  for (uint32_t k = 0; k < patch.count; ++k) sum += patch.points[k].force;
+  for (uint32_t k = 0; k < patch.count; ++k) {
+    const ContactPatch::Point& p = patch.points[k];
+    const Real share = sum > 0 ? p.force / sum : 1.0 / patch.count;
+    PointForce& f = m.forces[k];
+    f.now = Vec3(p.impulse, share * patch.friction_impulse.x(), share * patch.friction_impulse.y()) /
+            interval.duration;
+    if (!interval.is_whole) continue;
+    f.last = {p.force, share * patch.force_t, share * patch.force_k};
+    f.mean = {p.mean_force, share * patch.mean_friction.x(), share * patch.mean_friction.y()};
+  }
+  if (!interval.is_whole) return;
+  m.torque = patch.torque_n;
+  m.mean_torque = patch.mean_friction.z();
+}
+
+void move(Body& body, const RelaxedBody& b) {
+  displace(body, b.displacement, b.rotation_vector);
+  RigidBody& r = body.rigid;
+  r.momentum += b.impulse;
+  r.angular_momentum += b.angular_impulse;
+}
+
+}  // namespace
+
+void FastContacts::collect(std::span<const Island* const> islands) {
+  members_.clear();
+  origins_.clear();
+  const auto add = [this](Body& body) {
+    members_.push_back(&body);
+    return static_cast<uint32_t>(members_.size() - 1);
+  };
+  for (const Island* island : islands)
+    for (Body* body : island->bodies) body->row = add(*body);
+  moved_ = members_.size();
+  for (const Island* island : islands)
+    for (ContactPair* pair : island->pairs) {
+      if (pair->needs_toi && pair->separation() > kTouching) continue;
+      const uint32_t a = pair->a().is_awake() ? pair->a().row : add(pair->a());
+      const uint32_t b = pair->b().is_awake() ? pair->b().row : add(pair->b());
+      for (PlacedManifold& m : pair->manifolds()) origins_.push_back({pair, &m, a, b});
+    }
+}
+
+ContactWork FastContacts::solve(std::span<const Island* const> islands, const ContactInterval& interval) {
+  const Real h = interval.duration;
+  collect(islands);
+  joints_.collect(islands, interval);
+  if (origins_.empty() && joints_.bounded().empty()) return {};
+  bodies_.resize(members_.size());
+  patches_.resize(origins_.size());
+  for_each_interval(members_, [&](std::size_t i) { bodies_[i] = relaxed(*members_[i], interval); });
+  for_each_index(patches_.size(), [&](std::size_t i) {
+    const auto& [pair, manifold, a, b] = origins_[i];
+    patches_[i].a = a;
+    patches_[i].b = b;
+    set_patch(patches_[i], *pair, *manifold, interval);
+  });
+  RelaxedJoints relaxed_joints(joints_.problem(), joints_.articulations(), joints_.bounded_ends());
+  ContactWork work = solver_.solve(bodies_, patches_, {h, relaxation_substeps(h)}, &relaxed_joints);
+  work.solves = islands.size();
+  joints_.store_impulses(h);
+  for_each_index(patches_.size(),
+                 [&](std::size_t i) { store_forces(patches_[i], interval, *origins_[i].manifold); });
+  std::size_t first = 0;
+  for (const Island* island : islands) {
+    const std::span<RelaxedBody> own = std::span(bodies_).subspan(first, island->bodies.size());
+    first += own.size();
+    const Real share = kept_share(*island, own);
+    if (share == 1) continue;
+    ++work.restitution_reduced;
+    for (RelaxedBody& b : own) b.scale(share);
+  }
+  for_each_interval(std::span(members_).first(moved_),
+                    [&](std::size_t i) { move(*members_[i], bodies_[i]); });
+  return work;
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,35 @@
+#pragma once
+/// Contacts of several islands at once, by the fast solver (physics N12).
+
+#include <span>
+#include <vector>
+
+#include "sim/contact/island_joints.h"
+#include "sim/contact/relaxation.h"
+#include "sim/contact/relaxed_joints.h"
+
+namespace offstage::sim {
+
+/// Several islands at once by the fast solver.
+class FastContacts {
+ public:
+  ContactWork solve(std::span<const Island* const> islands, const ContactInterval& interval);
+
+ private:
+  struct Origin {
+    ContactPair* pair;
+    PlacedManifold* manifold;
+    uint32_t a, b;
+  };
+  void collect(std::span<const Island* const> islands);
+
+  std::vector<Body*> members_;  // those that move first, then one for each contact with another
+  std::size_t moved_ = 0;
+  std::vector<RelaxedBody> bodies_;
+  std::vector<Origin> origins_;  // of the patches
+  std::vector<ContactPatch> patches_;
+  IslandJoints joints_;
+  RelaxationSolver solver_;
+};
+
+}  // namespace offstage::sim

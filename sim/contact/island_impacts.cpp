@@ -1,0 +1,158 @@
+#include "sim/contact/island_impacts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <vector>
+
+#include "sim/contact/contact_terms.h"
+#include "sim/contact/island_joints.h"
+#include "sim/contact/rough_collision.h"
+
+namespace offstage::sim {
+namespace {
+
+/// So many contacts always collide together; more than kCluster, or after more than kGrowths extensions, only
+/// when asked for.
+constexpr std::size_t kSmallCluster = 40, kCluster = 100;
+constexpr int kGrowths = 2;
+/// What an update of a contact, and a product of a dense factorization take [ns].
+constexpr Real kContactUpdate = 60, kDenseProduct = 0.7;
+
+std::vector<std::size_t> indices_of(std::span<const uint8_t> marks) {
+  std::vector<std::size_t> marked;
+  for (std::size_t i = 0; i < marks.size(); ++i)
+    if (marks[i]) marked.push_back(i);
+  return marked;
+}
+
+/// Contacts of an island that collide together, with the bodies' velocities before.
+struct CollisionCluster {
+  std::vector<ContactBody> bodies;
+  std::vector<Contact> contacts;
+  std::vector<Real> restitution;
+  std::vector<uint8_t> bounces;           // by contact
+  std::vector<const ContactPair*> pairs;  // by contact
+
+  void add(const ContactPair& pair, Real reach, Real collision_speed, ImpactLaw law) {
+    const auto row = [&](const Body& body) {
+      if (body.is_awake()) return body.row;
+      bodies.push_back({});
+      if (body.is_kinematic()) {
+        bodies.back().velocity = body.drive.velocity;
+        bodies.back().angular_velocity = body.drive.angular_velocity;
+      }
+      return static_cast<uint32_t>(bodies.size() - 1);
+    };
+    const uint32_t a = row(pair.a()), b = row(pair.b());
+    const Vec3 surface = surface_velocity(pair);
+    for (const PlacedManifold& m : pair.manifolds())
+      for (uint32_t k = 0; k < m.manifold.count; ++k) {
+        const ContactPoint& point = m.manifold.points[k];
+        if (point.separation > reach) continue;
+        const Vec3 place = (point.on_a + point.on_b) / 2;
+        Contact c{.a = a, .b = b, .frame = m.frame};
+        c.arm_a = place - origin(pair.a());
+        c.arm_b = place - origin(pair.b());
+        c.offset = in_frame(m.frame, surface);
+        const Vec3 u = c.relative_velocity(bodies);
+        std::tie(c.friction_t, c.friction_k) = friction(pair.surface(), u);
+        contacts.push_back(c);
+        pairs.push_back(&pair);
+        bounces.push_back(u.x() < -collision_speed);
+        // In sequence, a contact at rest may be hit by the impulse of another.
+        restitution.push_back(bounces.back() || law == ImpactLaw::sequential ? pair.surface().restitution
+                                                                             : 0);
+      }
+  }
+
+  /// Adds contacts to those that collide together, and all that share a moved body with one of them.
+  void take(std::span<const std::size_t> wanted, std::vector<uint8_t>& taken) const {
+    std::vector<uint8_t> involved(bodies.size(), 0);
+    for (const std::size_t i : wanted)
+      for (const uint32_t body : {contacts[i].a, contacts[i].b}) involved[body] |= bodies[body].is_moved();
+    for (std::size_t i = 0; i < contacts.size(); ++i)
+      if (involved[contacts[i].a] || involved[contacts[i].b]) taken[i] = 1;
+  }
+};
+
+/// Collides the contacts of a large cluster that the impact reaches: those around what bounces, then also
+/// those that their impulses make approach faster than `speed` and all around these, until nothing else does.
+/// What is left out has no impulse, which is then its solution. A cluster that grows beyond kCluster
+/// contacts, or too often, is cut off; what is left out of it blocks the way afterwards, as resting contact.
+ContactWork collide_reached(CollisionCluster& cluster, Real speed, ImpactLaw law,
+                            const JointProblem& joints) {
+  std::vector<uint8_t> taken(cluster.contacts.size(), 0);
+  std::vector<std::size_t> wanted = indices_of(cluster.bounces);
+  const std::vector<ContactBody> before = cluster.bodies;
+  ContactWork work;
+  for (int round = 0; !wanted.empty(); ++round) {
+    cluster.take(wanted, taken);
+    const std::vector<std::size_t> together = indices_of(taken);
+    std::vector<Contact> contacts;
+    std::vector<Real> restitution;
+    for (const std::size_t i : together) {
+      contacts.push_back(cluster.contacts[i]);
+      restitution.push_back(cluster.restitution[i]);
+    }
+    cluster.bodies = before;
+    const ContactWork one = collide_roughly(cluster.bodies, contacts, restitution, law, joints);
+    work.add(one);
+    work.solves = 1;
+    work.fallbacks = one.fallbacks;
+    work.residual = one.residual;
+    for (std::size_t k = 0; k < together.size(); ++k)
+      cluster.contacts[together[k]].impulse = contacts[k].impulse;
+    wanted.clear();
+    for (std::size_t i = 0; i < taken.size(); ++i)
+      if (!taken[i] && cluster.contacts[i].relative_velocity(cluster.bodies).x() < -speed)
+        wanted.push_back(i);
+    if (wanted.empty()) break;
+    if (together.size() > kCluster || round == kGrowths) {
+      work.cluster_truncated = 1;
+      break;
+    }
+  }
+  return work;
+}
+
+}  // namespace
+
+CollisionOutcome resolve_collisions(const Island& island, const CollisionSettings& settings) {
+  CollisionCluster cluster;
+  for (Body* body : island.bodies) {
+    body->row = static_cast<uint32_t>(cluster.bodies.size());
+    cluster.bodies.push_back({1 / body->rigid.mass, inverse_inertia(body->rigid, body->start.orientation),
+                              body->start_twist.velocity, body->start_twist.angular_velocity});
+  }
+  for (const ContactPair* pair : island.pairs)
+    cluster.add(*pair, settings.reach, settings.collision_speed, settings.law);
+  CollisionOutcome outcome;
+  if (cluster.contacts.empty()) return outcome;
+  IslandJoints joints;
+  joints.collect_for_collision(island, settings.time);
+  const JointProblem problem = joints.problem();
+  if (settings.whole)
+    outcome.work = collide(cluster.bodies, cluster.contacts, cluster.restitution, settings.law, problem);
+  else if (cluster.contacts.size() <= kSmallCluster)
+    outcome.work =
+        collide_roughly(cluster.bodies, cluster.contacts, cluster.restitution, settings.law, problem);
+  else
+    outcome.work = collide_reached(cluster, settings.collision_speed, settings.law, problem);
+  outcome.cost = static_cast<Real>(outcome.work.iterations * cluster.contacts.size()) * kContactUpdate +
+                 static_cast<Real>(outcome.work.factorizations) *
+                     std::pow(3.0 * static_cast<Real>(std::min(cluster.contacts.size(), kSmallCluster)), 3) *
+                     kDenseProduct;
+  if (outcome.work.fallbacks > 0)
+    if (const auto worst = worst_contact(cluster.bodies, cluster.contacts))
+      outcome.rough = cluster.pairs[*worst];
+  for (Body* body : island.bodies) {
+    const ContactBody& b = cluster.bodies[body->row];
+    body->set_start_velocity(b.velocity, b.angular_velocity);
+  }
+  joints.store_impact_impulses();
+  outcome.bounces = static_cast<uint32_t>(std::count(cluster.bounces.begin(), cluster.bounces.end(), 1));
+  return outcome;
+}
+
+}  // namespace offstage::sim

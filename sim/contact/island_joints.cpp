@@ -1,0 +1,86 @@
+#include "sim/contact/island_joints.h"
+
+#include <algorithm>
+
+namespace offstage::sim {
+
+bool has_forces(const Island& island) {
+  return !island.pairs.empty() || std::any_of(island.articulations.begin(), island.articulations.end(),
+                                              [](const Articulation* a) { return a->has_bounded_rows(); });
+}
+
+void IslandJoints::collect_constraints(const Island& island, Real time, bool at_start) {
+  const auto row = [](const Articulation& a, uint32_t link) {
+    return link == JointSystem::kDriven ? kUnmoved : a.bodies()[link]->row;
+  };
+  for (Articulation* a : island.articulations) {
+    a->place(time, at_start);
+    articulations_.push_back(a);
+    const JointSystem& system = a->system();
+    for (std::size_t j = 0; j < system.joints().size(); ++j)
+      constraints_.push_back(
+          {row(*a, system.joints()[j].a), row(*a, system.joints()[j].b), &system.rows()[j]});
+  }
+}
+
+void IslandJoints::collect(std::span<const Island* const> islands, const ContactInterval& interval) {
+  articulations_.clear();
+  constraints_.clear();
+  bounded_.clear();
+  origins_.clear();
+  bounded_ends_.clear();
+  impulses_.clear();
+  for (const Island* island : islands) {
+    const std::size_t first = articulations_.size();
+    collect_constraints(*island, interval.end, false);
+    for (std::size_t i = first; i < articulations_.size(); ++i) {
+      collect_bounded_rows(*articulations_[i], interval.duration, interval.end, bounded_, origins_);
+      bounded_ends_.push_back(static_cast<uint32_t>(bounded_.size()));
+      for (const Joint* joint : articulations_[i]->joints())
+        impulses_.push_back(interval.duration * joint->reaction);
+    }
+  }
+}
+
+void IslandJoints::collect_for_collision(const Island& island, Real time) {
+  articulations_.clear();
+  constraints_.clear();
+  bounded_.clear();
+  origins_.clear();
+  collect_constraints(island, time, true);
+  for (const Articulation* a : articulations_) collect_stops(*a, time, bounded_, origins_);
+  impulses_.assign(constraints_.size(), Vec6::Zero());
+}
+
+/// What a row with bounds does to its joint.
+Wrench IslandJoints::wrench(std::size_t i, Real impulse) const {
+  const Vec6 on_a = impulse * bounded_[i].on_a;
+  return {on_a.head<3>(), on_a.tail<3>() - origins_[i].arm.cross(on_a.head<3>())};
+}
+
+void IslandJoints::store_impact_impulses() {
+  for (std::size_t i = 0; i < bounded_.size(); ++i) origins_[i].joint->impact_impulse += wrench(i, bounded_[i].impulse);
+  std::size_t first = 0;
+  for (Articulation* a : articulations_) {
+    a->add_impact_impulses(std::span(impulses_).subspan(first, a->joints().size()));
+    first += a->joints().size();
+  }
+}
+
+void IslandJoints::store_impulses(Real duration) {
+  for (std::size_t i = 0; i < bounded_.size(); ++i) {
+    const Real effort = bounded_[i].impulse / duration;
+    origins_[i].joint->efforts[origins_[i].slot] = effort;
+    origins_[i].joint->load += wrench(i, effort);
+  }
+  std::size_t first = 0;
+  for (Articulation* a : articulations_) {
+    const std::span of_articulation = std::span(impulses_).subspan(first, a->joints().size());
+    a->add_loads(of_articulation, duration);
+    for (std::size_t j = 0; j < of_articulation.size(); ++j)
+      a->joints()[j]->reaction = of_articulation[j] / duration;
+    first += of_articulation.size();
+  }
+}
+
+}  // namespace offstage::sim
