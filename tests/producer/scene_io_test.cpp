@@ -42,7 +42,7 @@ TEST(SceneIo, EveryPartOfTheSampleArrives) {
   EXPECT_EQ(scene.world.integrator, sim::IntegratorKind::midpoint);
   EXPECT_EQ(scene.world.seed, 42u);
   EXPECT_EQ(scene.bodies.size(), 3u + 12 + 5);
-  EXPECT_EQ(scene.bodies[0].motion, sim::MotionType::fixed);
+  EXPECT_EQ(scene.bodies[0].motion, sim::MotionType::static_body);
   EXPECT_EQ(scene.bodies[2].keyframes[1].position, Vec3(1, 1, 0));
   EXPECT_EQ(scene.particles[0].places[1].color->rgba, Eigen::Vector4f(1, 0, 0, 1));
   const Emitter& rain = scene.emitters[0];

@@ -177,7 +177,7 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
       return world_.add_body(def);
     });
     bodies_[body.name] = handle;
-    if (body.motion == sim::MotionType::fixed) continue;
+    if (body.motion == sim::MotionType::static_body) continue;
     slot_of_[handle] = moving_.size();
     moving_.push_back({body.name, handle});
     moving_poses_.push_back(world_.body(handle).pose);

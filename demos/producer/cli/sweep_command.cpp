@@ -241,9 +241,9 @@ class Crew {
     const double spare = available_memory_mb() / peak_rss_mb();
     const auto most = static_cast<std::size_t>(std::min<double>(jobs, 1 + std::floor(spare)));
     {
-      std::vector<std::jthread> crew;
+      std::vector<std::jthread> workers;
       for (std::size_t i = 1; i < std::min(most, sweep_.runs.size()); ++i)
-        crew.emplace_back([this] { work_through(sweep_.runs.size()); });
+        workers.emplace_back([this] { work_through(sweep_.runs.size()); });
       work_through(sweep_.runs.size());
     }
     if (failure_) std::rethrow_exception(failure_);

@@ -434,7 +434,7 @@ class Checker {
   void check_overlay(const VelocitiesOverlay& overlay) {
     const std::string path = overlay.where.path + "/body";
     const Body* body = overlay.body.empty() ? nullptr : named_body(path, overlay.body);
-    if (body && body->motion == sim::MotionType::fixed)
+    if (body && body->motion == sim::MotionType::static_body)
       warn(path, "shows nothing: the body '" + overlay.body + "' is static");
   }
   void check_overlay(const IslandsOverlay&) {}
