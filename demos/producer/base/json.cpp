@@ -134,7 +134,7 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
                                             [&](const Token& token) { return token.offset < offset; });
     const std::string what = error.what();
     if (after == tokens_.begin() || what.find("unexpected end of input") != std::string::npos) {
-      return fail(end_, tokens_.empty() ? "the file is empty" : "the text ends too early" + expected(what));
+      return fail(end_, tokens_.empty() ? "the file is empty" : "the file ends too early" + expected(what));
     }
     const auto bad = after - 1;
     const bool closes = bad->first == '}' || bad->first == ']';
@@ -286,7 +286,7 @@ const Node* Node::find(std::string_view key) const {
 Node parse_json(std::string_view text, const std::string& name, int file) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   if (text.find('\0') != std::string_view::npos)
-    throw SceneError({name, 0, 0, {}}, "not a text: it has a zero byte");
+    throw SceneError({name, 0, 0, {}}, "is not a text file: it contains a zero byte");
   TreeBuilder builder(text, name, file);
   nlohmann::json::sax_parse(text, &builder, nlohmann::json::input_format_t::json, true, true);
   if (!builder.problems.empty()) throw SceneError(std::move(builder.problems));

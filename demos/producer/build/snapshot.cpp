@@ -168,9 +168,9 @@ void SnapshotCache::create(const std::string& key, int frames, bool force) const
   if (error) throw render::FileError(folder_.string() + ": " + error.message());
   const bool occupied = std::filesystem::exists(folder_ / "cache.json");
   if (occupied && !force)
-    throw render::FileError(folder_.string() + ": holds a cache already; --force replaces it");
+    throw render::FileError(folder_.string() + ": already contains a cache; replace it with --force");
   if (!occupied && !std::filesystem::is_empty(folder_))
-    throw render::FileError(folder_.string() + ": is not empty and holds no cache; give a folder of its own");
+    throw render::FileError(folder_.string() + ": is not empty and is not a cache; choose an empty folder");
   for (const auto& entry : std::filesystem::directory_iterator(folder_))
     if (entry.path().extension() == ".snap") std::filesystem::remove(entry.path());
   write_manifest(folder_, key, frames, false);
@@ -180,19 +180,19 @@ void SnapshotCache::check(const std::string& key, int frames) const {
   const auto path = folder_ / "cache.json";
   if (!std::filesystem::exists(path))
     throw render::FileError(folder_.string() +
-                            ": no cache here; make one with: offstage simulate SCENE --cache " +
+                            ": contains no cache; create one with: offstage simulate SCENE --cache " +
                             folder_.string());
   const std::vector<uint8_t> bytes = read_file(path);
   const auto manifest = nlohmann::json::parse(bytes.begin(), bytes.end(), nullptr, false);
   if (!manifest.is_object() || manifest.value("offstage_cache", 0u) != kSnapshotKind.version)
-    throw render::FileError(path.string() + ": not a cache of this version; simulate again");
+    throw render::FileError(path.string() + ": is a cache of another version; simulate again");
   if (!manifest.value("complete", false))
     throw render::FileError(folder_.string() +
                             ": the simulation of this cache did not finish; simulate again");
   if (manifest.value("key", std::string()) != key || manifest.value("frames", 0) != frames)
     throw render::FileError(
         folder_.string() +
-        ": the cache belongs to another scene or other settings; simulate again with --force");
+        ": the cache was made with another scene or other settings; simulate again with --force");
 }
 
 void SnapshotCache::finish(const std::string& key, int frames) const {
@@ -207,7 +207,8 @@ Snapshot SnapshotCache::read(int frame) const {
   const auto path = file(frame);
   Snapshot snapshot = deserialize(read_file(path), path.string());
   if (snapshot.frame != frame)
-    throw render::FileError(fmt::format("{}: holds frame {}, not {}", path.string(), snapshot.frame, frame));
+    throw render::FileError(
+        fmt::format("{}: contains frame {} instead of {}", path.string(), snapshot.frame, frame));
   return snapshot;
 }
 

@@ -236,7 +236,7 @@ std::string read_text(const fs::path& file) {
 const std::string& standard_input() {
   static const std::string text = [] {
     constexpr std::size_t kMostBytes = 256 << 20;
-    if (isatty(STDIN_FILENO)) log("reading the scene from the keyboard; Ctrl-D ends it\n");
+    if (isatty(STDIN_FILENO)) log("reading the scene from the keyboard; end it with Ctrl-D\n");
     std::string all;
     std::array<char, 1 << 16> part{};
     while (true) {

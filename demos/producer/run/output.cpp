@@ -97,7 +97,7 @@ OutputTarget parse_output(const std::string& out) {
   if (out.ends_with('/') || fs::is_directory(path)) return {OutputKind::frames, path / "####.png"};
   const std::string ending = path.extension().string();
   if (const std::string meant = hash_pattern(out); !meant.empty() && (ending.empty() || ending == ".png"))
-    throw OutputError(out + ": the numbers of frames are written as #; did you mean '" + meant + "'?");
+    throw OutputError(out + ": write the frame number as #; did you mean '" + meant + "'?");
   if (path.filename().string().find('#') != std::string::npos) {
     if (ending != ".png")
       throw OutputError(out + ": frames are PNG files; give a pattern such as frames/####.png");
@@ -132,7 +132,7 @@ std::vector<int> prepare_frames(const fs::path& pattern, const ChannelFiles& cha
   const fs::path manifest_path = folder / "manifest.json";
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error) throw render::FileError(folder.string() + ": cannot make the folder: " + error.message());
+  if (error) throw render::FileError(folder.string() + ": cannot create the folder: " + error.message());
 
   bool same_settings = false;  // without a manifest nobody knows what the frames there are
   if (std::ifstream in(manifest_path); in) {
@@ -140,10 +140,9 @@ std::vector<int> prepare_frames(const fs::path& pattern, const ChannelFiles& cha
     same_settings = old.is_object() && old.value("settings", std::string()) == manifest.settings &&
                     old.value("pattern", std::string()) == pattern.filename().string();
     if (!same_settings && existing != Existing::replace)
-      throw OutputError(
-          folder.string() +
-          ": holds frames of another scene or other settings; choose another folder, or replace them with "
-          "--force");
+      throw OutputError(folder.string() +
+                        ": contains frames of another scene or other settings; choose another folder, or "
+                        "replace them with --force");
     if (!same_settings && old.is_object()) {
       const fs::path old_name = old.value("pattern", pattern.filename().string());
       const int count = std::min(old.value("frames", 0), kMostFrames);
@@ -158,7 +157,7 @@ std::vector<int> prepare_frames(const fs::path& pattern, const ChannelFiles& cha
     const bool there = fs::exists(path);
     if (there && existing == Existing::refuse)
       throw OutputError(path.string() +
-                        ": exists already; keep finished frames with --resume, or replace them with --force");
+                        ": already exists; keep finished frames with --resume, or replace them with --force");
     const bool keep =
         there && same_settings && existing == Existing::keep &&
         is_whole_png(path, manifest.width_px, manifest.height_px) &&
@@ -188,9 +187,9 @@ void prepare_channels(const fs::path& folder, bool replace) {
   if (replace) remove_channels(folder);
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error) throw render::FileError(folder.string() + ": cannot make the folder: " + error.message());
+  if (error) throw render::FileError(folder.string() + ": cannot create the folder: " + error.message());
   if (!replace && !fs::is_empty(folder))
-    throw OutputError(folder.string() + ": holds channels already; replace them with --force");
+    throw OutputError(folder.string() + ": already contains channels; replace them with --force");
 }
 
 }  // namespace offstage::producer
