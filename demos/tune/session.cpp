@@ -130,6 +130,7 @@ void Session::show() {
 
 Session::Json Session::document() const {
   Json json;
+  json["revision"] = revision_;
   json["version"] = version_json(document_.version(), films_);
   json["text"] = document_.text();
   json["saved"] = document_.is_saved();
@@ -144,6 +145,8 @@ Session::Json Session::document() const {
   json["overlays"] = overlays_;
   json["muted"] = muted_;
   json["pinned"] = pinned_;
+  if (pinned_.is_object())
+    json["pinned"]["ranges"] = ranges_json(engine_->ranges(pinned_["film"].get<std::string>()));
   json["theirs"] = theirs_ ? Json(*theirs_) : Json();
   if (shown_) {
     const producer::Scene& scene = shown_->scene;
@@ -153,14 +156,13 @@ Session::Json Session::document() const {
                      {"start", scene.output.start},
                      {"seed", scene.world.seed},
                      {"size", {scene.render.size.x(), scene.render.size.y()}}};
-    Json ranges = Json::array();
-    for (const auto& [first, last] : engine_->ranges(run_.film)) ranges.push_back({first, last});
-    json["ranges"] = std::move(ranges);
+    json["ranges"] = ranges_json(engine_->ranges(run_.film));
   }
   return json;
 }
 
 void Session::post_document() {
+  ++revision_;
   tabs_.post("document", dump(document()));
 }
 
@@ -215,6 +217,8 @@ Reply Session::post(const std::string& what, const nlohmann::json& request, cons
   if (handler == handlers.end()) return refused(404, "there is no " + what);
   if (what != "pick" && tabs_.writer() != tab)
     return refused(423, "another tab is editing this scene; take over to edit it here");
+  std::optional<Engine::Hold> hold;
+  if (what != "pick" && what != "save") hold.emplace(*engine_);
   try {
     return (this->*handler->second)(request);
   } catch (const nlohmann::json::exception& error) {
@@ -369,7 +373,15 @@ void Session::on_event(const EngineEvent& event) {
     const std::lock_guard lock(events_mutex_);
     latest_film_ = event_json(*film);
   }
-  std::visit([this](const auto& e) { tabs_.post(kind_of(e), dump(event_json(e))); }, event);
+  std::visit(
+      [this](const auto& e) {
+        Json json = event_json(e);
+        // A tab that was too slow for the message of a frame learns of the frame by the next one.
+        if constexpr (std::is_same_v<std::decay_t<decltype(e)>, FrameEvent>)
+          json["ranges"] = ranges_json(engine_->ranges(e.film));
+        tabs_.post(kind_of(e), dump(json));
+      },
+      event);
 }
 
 void Session::watch_files() {
