@@ -4,11 +4,11 @@
 
 #include <fmt/format.h>
 
-#include "producer/interrupt.h"
-#include "producer/json.h"
-#include "producer/scene_io.h"
-#include "producer/scene_source.h"
-#include "producer/watch.h"
+#include "producer/base/interrupt.h"
+#include "producer/base/json.h"
+#include "producer/format/scene_io.h"
+#include "producer/format/scene_source.h"
+#include "producer/run/watch.h"
 #include "render/error.h"
 #include "tune/messages.h"
 #include "tune/text_edit.h"
@@ -115,7 +115,7 @@ Session::Parsed Session::parse(const std::string& text, bool with_view) const {
   return parsed;
 }
 
-/// Shows the text as it is now; if it is no valid scene, the latest valid version stays.
+/// Shows the text as it is now; if it is not a valid scene, the latest valid version stays.
 void Session::show() {
   Parsed parsed = parse(document_.text(), true);
   errors_ = std::move(parsed.errors);
@@ -212,7 +212,7 @@ Reply Session::post(const std::string& what, const nlohmann::json& request, cons
       {"redo", &Session::redo},     {"view", &Session::view}, {"restore", &Session::restore},
       {"pin", &Session::pin},       {"pick", &Session::pick}, {"save", &Session::save},
       {"reload", &Session::reload}, {"keep", &Session::keep}, {"sweep", &Session::sweep}};
-  if (what == "write") return tabs_.take_over(tab) ? Reply{} : refused(409, "this tab has no stream");
+  if (what == "write") return tabs_.take_over(tab) ? Reply{} : refused(409, "this tab is not connected");
   const auto handler = handlers.find(what);
   if (handler == handlers.end()) return refused(404, "there is no " + what);
   if (what != "pick" && tabs_.writer() != tab)
@@ -264,7 +264,7 @@ Reply Session::restore(const nlohmann::json& request) {
   const std::lock_guard lock(mutex_);
   const Version* version = document_.find(request.at("id").get<uint64_t>());
   if (!version) return refused(404, "this version is no longer kept");
-  document_.change(version->text, fmt::format("back to version {}", version->id), {}, "");
+  document_.change(version->text, fmt::format("go back to version {}", version->id), {}, "");
   return shown();
 }
 
@@ -279,7 +279,7 @@ Reply Session::view(const nlohmann::json& request) {
     if (!request["camera"].is_null())
       camera = ViewCamera{vector_of(request["camera"].at("eye")), vector_of(request["camera"].at("target"))};
     if (camera && !((camera->eye - camera->target).norm() > 1e-6))
-      return refused(422, "a camera cannot be where it looks to");
+      return refused(422, "the camera's eye and target must differ");
     changed |= camera != camera_;
     camera_ = camera;
   }
@@ -305,7 +305,7 @@ Reply Session::pin(const nlohmann::json& request) {
     const Version* version = document_.find(request["id"].get<uint64_t>());
     if (!version) return refused(404, "this version is no longer kept");
     loaded = parse(version->text, true).loaded;
-    if (!loaded) return refused(422, "this version is no valid scene");
+    if (!loaded) return refused(422, "this version is not a valid scene");
     pinned_ = version_json(*version, films_);
     pinned_["film"] = engine_->film_of(*loaded);
     pinned_["frames"] = loaded->scene.frame_count();
@@ -416,7 +416,7 @@ void Session::files_changed(const std::string& hash_before, const std::string& h
     document_.reload(*theirs);
     show();
     post_document();
-    tabs_.post("note", dump({{"text", "The file was changed by another program, and was read again."}}));
+    tabs_.post("note", dump({{"text", "Another program changed the file. The page has loaded it."}}));
     return;
   }
   if (!theirs && !theirs_ && !models) return;

@@ -10,12 +10,12 @@
 namespace offstage::sim {
 namespace {
 
-/// The clear cells of the meshes that were asked for last, in any world of the process: a tuning session
-/// builds the same world again for every change of a number, and filling the cells is most of that. What is
-/// kept is a function of the mesh alone, so it makes no difference to results. At most 26 MB.
-class RecentCells {
+/// Keeps the clearance grids of the latest meshes for all worlds of the process. The tuning page builds a
+/// world for every change of a number, and most of that time would go into the same grids again. A grid is a
+/// function of its mesh alone, so keeping it changes no result. Holds at most 26 MB.
+class RecentGrids {
  public:
-  ClearCells of(const TriangleMesh& mesh, bool solid) {
+  ClearanceGrid of(const TriangleMesh& mesh, bool solid) {
     {
       const std::lock_guard lock(mutex_);
       const auto known = std::ranges::find_if(entries_, [&](const Entry& e) {
@@ -23,15 +23,15 @@ class RecentCells {
       });
       if (known != entries_.end()) {
         entries_.splice(entries_.begin(), entries_, known);
-        return known->cells;
+        return known->grid;
       }
     }
-    ClearCells cells(mesh, solid);
-    if (mesh.triangles.size() > kMostTriangles) return cells;
+    ClearanceGrid grid(mesh, solid);
+    if (mesh.triangles.size() > kMostTriangles) return grid;
     const std::lock_guard lock(mutex_);
-    entries_.push_front({mesh, solid, cells});
+    entries_.push_front({mesh, solid, grid});
     if (entries_.size() > kMostEntries) entries_.pop_back();
-    return cells;
+    return grid;
   }
 
  private:
@@ -39,15 +39,15 @@ class RecentCells {
   struct Entry {
     TriangleMesh mesh;
     bool solid;
-    ClearCells cells;
+    ClearanceGrid grid;
   };
   std::mutex mutex_;
   std::list<Entry> entries_;  // latest first
 };
 
-ClearCells recent_cells(const TriangleMesh& mesh, bool solid) {
-  static RecentCells cells;
-  return cells.of(mesh, solid);
+ClearanceGrid recent_grid(const TriangleMesh& mesh, bool solid) {
+  static RecentGrids grids;
+  return grids.of(mesh, solid);
 }
 
 }  // namespace
@@ -81,8 +81,8 @@ const AabbTree& CollisionMesh::part_tree() const {
   return part_tree_;
 }
 
-const ClearCells& CollisionMesh::clear_cells() const {
-  std::call_once(clear_once_, [this] { clear_cells_ = recent_cells(mesh, solid); });
+const ClearanceGrid& CollisionMesh::clearance_grid() const {
+  std::call_once(clear_once_, [this] { clear_cells_ = recent_grid(mesh, solid); });
   return *clear_cells_;
 }
 
