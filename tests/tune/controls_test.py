@@ -213,7 +213,7 @@ class Choices(Case):
         page.js('document.body.focus()')
         page.js('const s = document.getElementById("search"); s.value = "linear drag"; s.dispatchEvent(new Event("input"))')
         self.assertEqual([r.get_attribute('data-key') for r in page.all('#controls .row')], ['linear_drag'])
-        self.assertEqual(page.js('return [...document.querySelectorAll("#tree .item")].map(i => i.dataset.path)'), ['/emitters/0'])
+        self.assertEqual(page.js('return [...document.querySelectorAll("#tree .item")].map(i => i.dataset.path)'), ['/emitters/0', '/bodies/0', '/bodies/1'])
 
 
 class Objects(Case):

@@ -30,10 +30,13 @@ export function togglePin() {
 }
 
 // --- Add ---
+/** A sentence of the reference without its marks of code. */
+const plain = text => text.replace(/`/g, '');
+
 export function showAdd(anchor) {
-  const cards = store.presets.map(p => el('button', {class: 'card', 'data-preset': p.name, title: p.preset.description ?? '', onclick: () => { close(); addTo('effects', {preset: p.name, position: [0, 0, 0]}, `add ${p.name}`); }},
-    el('img', {src: `page/presets/${p.name}.jpg`, alt: '', onerror: event => event.target.replaceWith(el('span', {class: 'no-picture'}))}), el('strong', {}, p.name.replace(/_/g, ' ')), el('small', {}, p.preset.description ?? '')));
-  const objects = kNew.map(([text, list, value]) => el('button', {class: 'quiet', onclick: () => { close(); addTo(list, fresh(list, value), `add ${text.toLowerCase()}`); }}, text));
+  const cards = store.presets.map(p => el('button', {class: 'card', 'data-preset': p.name, title: plain(p.preset.description ?? ''), onclick: () => { close(); addTo('effects', {preset: p.name, position: [0, 0, 0]}, `add ${p.name}`); }},
+    el('img', {src: `page/presets/${p.name}.jpg`, alt: '', onerror: event => event.target.replaceWith(el('span', {class: 'no-picture'}))}), el('strong', {}, p.name.replace(/_/g, ' ')), el('small', {}, plain(p.preset.description ?? ''))));
+  const objects = kNew.map(([text, list, value]) => el('button', {onclick: () => { close(); addTo(list, fresh(list, value), `add ${text.toLowerCase()}`); }}, text));
   const close = popover(anchor, 'Add', el('div', {class: 'stack'}, el('h3', {}, 'Objects'), el('div', {class: 'chips'}, objects), el('h3', {}, 'Effects from presets'), el('div', {class: 'cards'}, cards)), true);
 }
 const kNew = [

@@ -29,7 +29,7 @@ function short(x, digits) {
   const size = Math.abs(x);
   if (size >= 1e6) return (x / 1e6).toFixed(2) + ' M';
   if (size >= 1e4) return (x / 1e3).toFixed(1) + ' k';
-  return digits === 0 ? String(x) : Number(x.toPrecision(3)).toString();
+  return digits === 0 ? String(x) : digits === 1 ? x.toFixed(1) : Number(x.toPrecision(3)).toString();
 }
 
 const draw = oncePerFrame(() => {
