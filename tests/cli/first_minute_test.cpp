@@ -82,7 +82,7 @@ TEST(BareScene, ASlipOfACommandGetsAMessageOfItsOwn) {
   EXPECT_EQ(slip.code, 2);
   EXPECT_NE(slip.err.find("no command 'rendr'; did you mean 'render'?"), std::string::npos) << slip.err;
   write_file(folder / "film.txt", "");
-  EXPECT_NE(offstage("film.txt", folder.path()).err.find("film.txt is no scene"), std::string::npos);
+  EXPECT_NE(offstage("film.txt", folder.path()).err.find("film.txt is not a scene"), std::string::npos);
   EXPECT_EQ(offstage("nowhere.json", folder.path()).code, 3);
 }
 
@@ -164,8 +164,8 @@ TEST_F(Encode, KeepsTransparencyWhereTheFormatDoesAndSaysWhereNot) {
   EXPECT_EQ(read_file(folder_ / "t.apng"), read_file(folder_ / "direct.apng"));
   const Outcome opaque = encode("t/ -o t.mp4");
   EXPECT_EQ(opaque.code, 0);
-  EXPECT_NE(opaque.err.find("laid over black"), std::string::npos) << opaque.err;
-  EXPECT_EQ(encode("f/ -o f.mp4").err.find("laid over black"), std::string::npos)
+  EXPECT_NE(opaque.err.find("composited over black"), std::string::npos) << opaque.err;
+  EXPECT_EQ(encode("f/ -o f.mp4").err.find("composited over black"), std::string::npos)
       << "opaque frames need no note";
 }
 
