@@ -1,8 +1,9 @@
 #pragma once
-/// The simulation's front door: objects go in as plain definitions, step() advances them by a sampling time,
-/// and moved() says where they went. The world knows nothing of drawing (physics E1-E5, E8, E9).
+/// Public interface of the simulation. Objects are added as plain definitions, step() advances them by a
+/// sampling time, and moved() returns their new poses. The world does not depend on rendering (physics E1-E5,
+/// E8, E9).
 ///
-/// Valid ranges: sizes 0.001-100 m, speeds under 300 m/s. The state after step() is the same bits for any
+/// Valid ranges: sizes 0.001-100 m, speeds under 300 m/s. The state after step() is bitwise identical for any
 /// number of threads.
 
 #include <cstdint>
@@ -34,7 +35,7 @@ namespace offstage::sim {
 
 class CollisionMesh;
 
-/// Where a spring ends: a point of the world, a point of a body (body frame), or a particle by its id.
+/// End of a spring: a point of the world, a point of a body (body frame), or a particle given by its id.
 struct WorldPoint {
   Vec3 position = Vec3::Zero();
 };
@@ -48,8 +49,8 @@ struct ParticlePoint {
 };
 using Attachment = std::variant<WorldPoint, BodyPoint, ParticlePoint>;
 
-/// Damped spring between two points (P2, R2): F = -[k (|d| - L) + c (d'.d)/|d|] d/|d|. A spring whose
-/// particle died is removed with it.
+/// Damped spring between two points (P2, R2): F = -[k (|d| - L) + c (d'.d)/|d|] d/|d|. A spring attached to a
+/// particle is removed when the particle dies.
 struct SpringDef {
   std::string name;
   Attachment a, b;
@@ -58,7 +59,7 @@ struct SpringDef {
   Real rest_length = -1;  ///< L [m]; negative: the distance at creation
 };
 
-/// What two materials do to each other, in place of what would follow from each (see BodyDef).
+/// Contact parameters of a pair of materials. They replace those combined from the two bodies (see BodyDef).
 struct ContactRule {
   std::string a, b;  ///< materials, in any order
   std::optional<Real> restitution, friction, static_friction;
@@ -66,80 +67,84 @@ struct ContactRule {
 
 /// How resting contact is computed (physics N11, N12).
 enum class SolverKind {
-  exact,  ///< collisions at their very times, contact forces to rounding: slow where hundreds of bodies pile
-          ///< up
-  fast,   ///< time stepping on velocities: a bounded amount of work, errors far below a millimetre
-  automatic,  ///< exact where it costs less than fast or the group is small, by the work of steps before
+  exact,      ///< each collision at its own time, contact forces to rounding: slow for piles of hundreds of
+              ///< bodies
+  fast,       ///< time stepping on velocities: a bounded amount of work, errors far below a millimetre
+  automatic,  ///< exact for small islands and where it costs less than fast, judged by the work of previous
+              ///< steps
 };
 
 struct WorldDef {
   Vec3 gravity = {0, -9.81, 0};                     ///< [m/s^2]
   Vec3 wind = Vec3::Zero();                         ///< air velocity felt by drag [m/s]
   Real max_step = 1.0 / 240;                        ///< longest internal step [s]
-  IntegratorKind integrator = IntegratorKind::rk4;  ///< of bodies and of everything joined by springs
-  Real integration_error = 1e-6;  ///< per step, of the adaptive integrators: of any coordinate [m]
+  IntegratorKind integrator = IntegratorKind::rk4;  ///< of bodies and of everything connected by springs
+  Real integration_error = 1e-6;  ///< largest error of a coordinate per step of the adaptive integrators [m]
   SolverKind solver = SolverKind::automatic;
   ImpactLaw impact = ImpactLaw::simultaneous;
   Real collision_speed = 0.05;  ///< bodies that meet slower than this do not bounce [m/s], > 0
-  bool sleep = true;            ///< groups of bodies at rest are left alone until something happens to them
-  Aabb bounds =
-      Aabb(Vec3::Constant(-1000), Vec3::Constant(1000));  ///< what leaves is retired and reported (E3)
+  bool sleep = true;            ///< islands at rest are not simulated until something reaches them
+  Aabb bounds = Aabb(Vec3::Constant(-1000),
+                     Vec3::Constant(1000));  ///< objects that leave are retired and reported (E3)
 };
 
-/// Two bodies whose contact forces are approximate: of a group of contacts that the solver meant for it did
-/// not solve, the pair with the greatest error.
+/// Two bodies whose contact forces are approximate: the pair with the greatest error in a group of contacts
+/// that fell back from its intended solver.
 struct RoughContact {
   BodyHandle a, b;
 };
 
-/// What a step did. Numerical trouble is data here, never an exception.
+/// Statistics of a step. Numerical trouble is reported here, never as an exception.
 struct StepReport {
   uint32_t substeps = 0;
   uint64_t particles_born = 0;
-  uint64_t particles_expired = 0;  ///< reached their lifespan or died on a hit
+  uint64_t particles_expired = 0;  ///< reached their lifespan or died in a collision
   uint64_t particles_retired = 0;  ///< left the world's bounds
   uint64_t particles_ejected = 0;  ///< found inside a body and projected out (P4)
   uint64_t particles_removed = 0;  ///< found inside a body and could not be projected out (P4)
   uint64_t particle_collisions = 0;
-  uint64_t truncated_sweeps = 0;  ///< particles that used up their bounded number of hits within one sub-step
+  uint64_t truncated_sweeps = 0;           ///< particles that reached the limit of collisions in one sub-step
   std::vector<BodyHandle> bodies_retired;  ///< left the world's bounds: frozen from here on
 
-  // Contacts of bodies. Counts of the last sub-step, others of all.
+  // Contacts of bodies. Those of type uint32_t are counts of the last sub-step; the others cover all
+  // sub-steps.
   uint32_t bodies_awake = 0, bodies_asleep = 0;
-  uint32_t islands = 0;     ///< groups of bodies that touch, or are joined
-  uint32_t contacts = 0;    ///< points that touch
-  Real penetration = 0;     ///< greatest at the starts of sub-steps and at impacts [m]
-  uint64_t collisions = 0;  ///< contacts that met faster than WorldDef::collision_speed
-  uint64_t tracebacks = 0;  ///< times that bodies were put back to a time of impact
-  uint64_t toi_limit_reached =
-      0;  ///< pairs that were not traced back any more in a sub-step: too many impacts
+  uint32_t islands = 0;            ///< groups of bodies connected by contacts or joints
+  uint32_t contacts = 0;           ///< contact points
+  Real penetration = 0;            ///< greatest penetration at the starts of sub-steps and at impacts [m]
+  uint64_t collisions = 0;         ///< contacts whose speed of approach exceeded WorldDef::collision_speed
+  uint64_t tracebacks = 0;         ///< trace-backs of islands to a time of impact
+  uint64_t toi_limit_reached = 0;  ///< pairs that reached the limit of time-of-impact events in a sub-step;
+                                   ///< their later impacts were not traced back
   uint64_t restitution_suppressed =
-      0;                              ///< pairs in a pile that were too many to bounce any more in a sub-step
-  uint64_t speculative_contacts = 0;  ///< contacts of the fast solver expected at a step's end
+      0;  ///< pairs whose restitution was suppressed in a sub-step because their pile had too many impacts
+  uint64_t speculative_contacts = 0;  ///< speculative contacts of the fast solver
   uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
-  ContactWork exact, fast;                   ///< of the solvers of resting contact
-  ContactWork impacts;                       ///< of the solver of collisions
-  std::vector<RoughContact> rough_contacts;  ///< one for each fall-back of these, in their order
-  IntegratorReport integration;              ///< of the free motion
+  ContactWork exact, fast;  ///< work of the solvers of resting contact
+  ContactWork impacts;      ///< work of the solver of collisions
+  std::vector<RoughContact>
+      rough_contacts;            ///< one for each fall-back of these solvers, in the order of occurrence
+  IntegratorReport integration;  ///< of the motion without contacts
 
-  Real joint_error = 0;  ///< greatest that was left of a joint's constraint at the end of a motion [m], [rad]
-  uint64_t joints_unsolved = 0;            ///< times that joints could not be put back together
-  std::vector<JointHandle> joints_broken;  ///< by too great a force, in this step
+  Real joint_error = 0;  ///< greatest residual of a joint's constraint at the end of a motion [m], [rad]
+  uint64_t joints_unsolved = 0;  ///< times that joint projection failed
+  std::vector<JointHandle>
+      joints_broken;  ///< joints that exceeded their breaking force or torque in this step
 
-  uint64_t cloth_contacts = 0;  ///< at the end, of all cloths; the others as ClothReport has them
+  uint64_t cloth_contacts = 0;  ///< of all cloths at the end of the step; for the others see ClothReport
   uint64_t cloth_self_contacts = 0;
-  uint64_t cloth_springs_clamped = 0;  ///< at the end, too
+  uint64_t cloth_springs_clamped = 0;  ///< at the end of the step
   Real cloth_strain = 0;               ///< greatest
   Real cloth_penetration = 0;          ///< deepest [m]
   uint64_t cloth_moves_limited = 0, cloth_moves_held_back = 0, cloth_crossings = 0, cloth_springs_torn = 0;
   uint64_t cloth_unconverged = 0;
 
-  bool finite = true;    ///< false: something became NaN or infinite
+  bool finite = true;    ///< false: a quantity became NaN or infinite
   NonFinite non_finite;  ///< the first such object, if not finite
 };
 
-/// Mechanical energy [J]: kinetic, gravitational (zero at y = 0) with that of the forces between particles
-/// (zero far out), and elastic.
+/// Mechanical energy [J]: kinetic, potential and elastic. The potential energy is that of gravity (zero at y
+/// = 0) and of the forces between particles (zero at infinity).
 struct Energy {
   Real kinetic = 0, potential = 0, elastic = 0;
   Real total() const { return kinetic + potential + elastic; }
@@ -150,12 +155,13 @@ struct ContactState {
   BodyHandle a, b;
   Vec3 point = Vec3::Zero();   ///< between both surfaces, world [m]
   Vec3 normal = Vec3::Zero();  ///< from b to a
-  /// On a: the mean over the last sub-step, or what an impact has left of it, friction included [N].
+  /// Force on a, friction included: the mean over the last sub-step, or over the part of it after the last
+  /// impact [N].
   Vec3 force = Vec3::Zero();
   Real separation = 0;  ///< [m], negative in penetration
 };
 
-/// Two bodies that collide with each other and are in each other.
+/// Two bodies that collide with each other and overlap.
 struct BodyOverlap {
   BodyHandle a, b;
   Real depth;  ///< [m]
@@ -166,9 +172,9 @@ struct MovedBody {
   Pose pose;
 };
 
-/// Everything that can be asked of a body.
+/// State of a body at the end of the last step.
 struct BodyState {
-  Pose pose;              ///< of the body's own frame, as given at creation
+  Pose pose;              ///< pose of the body's own frame, as given at creation
   Vec3 centre;            ///< of mass, world [m]
   Vec3 velocity;          ///< of the centre of mass [m/s]
   Vec3 angular_velocity;  ///< world [rad/s]
@@ -176,7 +182,7 @@ struct BodyState {
   Real mass = 0;          ///< [kg]; 0 unless dynamic
 };
 
-/// 128 bits over the whole state: equal states have equal hashes.
+/// 128-bit hash of the whole state. Equal states have equal hashes.
 struct StateHash {
   uint64_t low = 0, high = 0;
   friend bool operator==(const StateHash&, const StateHash&) = default;
@@ -191,50 +197,53 @@ class World {
   World& operator=(World&&) noexcept;
 
   /// Registers a mesh: welds it, then computes topology, mass properties, hull and bounding tree once (E2).
-  /// The convex decomposition, which is slow, is made when a body first needs it, unless the one that
-  /// decompose() made of the welded mesh is given. Throws std::invalid_argument for an index out of range, a
-  /// non-finite vertex or no face at all.
+  /// `decomposition` is the result of decompose() for the welded mesh; if it is not given, it is computed
+  /// when a body first needs it, which is slow. Throws std::invalid_argument for an index out of range, a
+  /// non-finite vertex or a mesh without faces.
   MeshHandle add_mesh(const TriangleMesh& mesh, std::optional<ConvexDecomposition> decomposition = {});
   const MeshTopology& topology(MeshHandle mesh) const;
   const TriangleMesh& mesh(MeshHandle mesh) const;  ///< as registered (welded)
   const CollisionMesh& collision_mesh(MeshHandle mesh) const;
 
-  /// Throws std::invalid_argument, saying which field and what is allowed, for a size, mass or density out of
-  /// range; a dynamic body needs a solid: a plane or an open or inverted mesh is refused.
+  /// Adds a body. Throws std::invalid_argument, naming the field and its allowed values, for a size, mass or
+  /// density out of range, and for a dynamic body whose shape is a plane or an open or inverted mesh.
   BodyHandle add_body(const BodyDef& def);
   ParticleSystemHandle add_particle_system(const ParticleSystemDef& def);
   SpringHandle add_spring(const SpringDef& def);
-  /// Throws std::invalid_argument for bodies of which none is dynamic, and for fields out of range.
+  /// Adds a joint. Throws std::invalid_argument if neither body is dynamic or a field is out of range.
   JointHandle add_joint(const JointDef& def);
   ClothHandle add_cloth(const ClothDef& def);
   ForceHandle add_force(const ForceDef& def);
-  /// Of two rules for the same materials the later counts.
+  /// Adds a rule for a pair of materials. It replaces an earlier rule for the same pair.
   void add_contact_rule(const ContactRule& rule);
 
-  bool remove(BodyHandle body);  ///< springs and joints at it go too; false if the handle is stale
+  /// Removes an object. Returns false if the handle is stale. Removing a body also removes its springs and
+  /// joints.
+  bool remove(BodyHandle body);
   bool remove(ParticleSystemHandle system);
   bool remove(SpringHandle spring);
   bool remove(JointHandle joint);
   bool remove(ClothHandle cloth);
   bool remove(ForceHandle force);
 
-  /// Gives a dynamic body another velocity of its centre of mass [m/s] and angular velocity [rad/s].
+  /// Sets the velocity of a dynamic body's centre of mass [m/s] and its angular velocity [rad/s].
   void set_velocity(BodyHandle body, const Vec3& velocity, const Vec3& angular_velocity);
 
-  /// Adds a particle. `elapsed` is how long before the end of the coming sub-step it was born: it is
-  /// integrated over just that part of it, and freely, through bodies, over what is longer. Negative: it
-  /// exists now and is stepped in full. Returns its id.
+  /// Adds a particle and returns its id. `elapsed` is the time from its birth to the end of the coming
+  /// sub-step [s]; the particle is integrated over that part only. If `elapsed` is longer than the sub-step,
+  /// the particle ignores bodies during the time before the sub-step. If it is negative, the particle exists
+  /// now and is advanced through the whole sub-step.
   uint64_t add_particle(ParticleSystemHandle system, const Particle& particle, Real elapsed = -1);
 
   /// Called before each sub-step with its start and end time; emitters add their particles here.
   using BeforeSubStep = std::function<void(Real start, Real end)>;
 
-  /// Lets particles alone live from one time up to another, in sub-steps as step() has them, before the first
-  /// step(): from <= to <= 0 [s], and a further call goes on where the last one ended. time() is then `to`.
-  /// Particles collide with each other and with bodies. Dynamic bodies, cloths, springs and the particles
-  /// that were there before stand still, kinematic bodies follow their tracks, forces are those of time 0,
-  /// and forces between particles do not act. With from = to = 0, `before` is called once, and particles born
-  /// at that time exist from then on. Throws std::invalid_argument for other times.
+  /// Advances only particles from one time to another before the first step(), in the same sub-steps as
+  /// step(): from <= to <= 0 [s]. A further call continues where the last one ended. Afterwards time() is
+  /// `to`. Particles collide with each other and with bodies. Dynamic bodies, cloths, springs and the
+  /// particles that existed before do not move. Kinematic bodies follow their tracks. Forces are those of
+  /// time 0, and forces between particles do not act. With from = to = 0, `before` is called once, and
+  /// particles born at that time exist from then on. Throws std::invalid_argument for other times.
   StepReport prewarm(Real from, Real to, const BeforeSubStep& before = {});
 
   /// Advances by `sampling_time` in the fewest equal sub-steps not longer than WorldDef::max_step.
@@ -249,15 +258,15 @@ class World {
   BodyState body(BodyHandle body) const;
   const BodyDef& body_def(BodyHandle body) const;
   /// Motion of a point of a body (world position at its current pose) at a time inside the current sub-step:
-  /// exact for kinematic bodies, extrapolated for dynamic ones.
+  /// exact for kinematic bodies, extrapolated for dynamic bodies.
   Motion body_motion(BodyHandle body, Real time) const;
-  JointState joint(JointHandle joint) const;  ///< of one that broke: as it was then
+  JointState joint(JointHandle joint) const;  ///< of a broken joint: its state when it broke
   const JointDef& joint_def(JointHandle joint) const;
   void for_each_joint(const std::function<void(JointHandle)>& f) const;
   const ParticleArrays& particles(ParticleSystemHandle system) const;
   const ParticleSystemDef& particle_system_def(ParticleSystemHandle system) const;
-  /// What happened to the particles of systems that report it, in the last sub-step; in the order of system
-  /// and id, of one particle in the order of time.
+  /// Events of the last sub-step, for the particle systems that report them. They are ordered by system, then
+  /// by particle id, then by time.
   std::span<const ParticleEvent> particle_events() const;
   ClothView cloth(ClothHandle cloth) const;
   const ClothDef& cloth_def(ClothHandle cloth) const;
@@ -268,11 +277,11 @@ class World {
   void for_each_particle_system(const std::function<void(ParticleSystemHandle)>& f) const;
   /// The contact points at the end of the last step, in the order of their bodies.
   std::vector<ContactState> contacts() const;
-  /// Bodies that overlap where they are now by more than `least` [m], > 0, in the order of slots; `a` is
-  /// dynamic. What begins so is pushed apart.
+  /// Pairs of bodies whose current overlap is deeper than `least` [m], > 0, in the order of slots. `a` is
+  /// dynamic. The contact solvers push such bodies apart during the next steps.
   std::vector<BodyOverlap> overlaps(Real least) const;
-  /// The group of touching bodies that a body belongs to, numbered in the order of their first bodies; none
-  /// for fixed and kinematic bodies.
+  /// Number of the island that a body belongs to; islands are numbered in the order of their first bodies.
+  /// Empty for static and kinematic bodies.
   std::optional<uint32_t> island(BodyHandle body) const;
   bool is_asleep(BodyHandle body) const;
   std::size_t body_count() const;

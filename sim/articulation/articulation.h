@@ -1,6 +1,6 @@
 #pragma once
-/// Bodies that joints hold together (physics A1, A4, A5): the joint forces of their motion, so that they stay
-/// together to the integrator's accuracy, and the removal of what it leaves.
+/// Bodies connected by joints (physics A1, A4, A5). An articulation computes the joint forces, which keep the
+/// joints connected to the integrator's accuracy, and then projects away the remaining error.
 
 #include <array>
 #include <memory>
@@ -29,21 +29,22 @@ struct Joint {
 
   bool is_broken = false;
   Real coordinate = 0;  ///< of joints that count turns
-  // What it does to a, about the anchor.
-  Wrench load;                       ///< in the last motion, with the contacts in it [N], [N m]
-  Wrench impact_impulse;             ///< impulses of collisions in this sub-step [N s], [N m s]
-  Wrench borne;                      ///< load and impacts of the last sub-step together [N], [N m]
-  Vec6 reaction = Vec6::Zero();      ///< to contacts, by its constraints, as a guess
-  std::array<Real, 9> efforts = {};  ///< of its rows with bounds, as a guess (joint_limits.h)
+  // Loads of the joint on body a, about the anchor.
+  Wrench load;                   ///< during the last motion, including its contacts [N], [N m]
+  Wrench impact_impulse;         ///< impulses of collisions in this sub-step [N s], [N m s]
+  Wrench borne;                  ///< load and impacts of the last sub-step together [N], [N m]
+  Vec6 reaction = Vec6::Zero();  ///< of its constraints to contacts; initial guess of the next solution
+  std::array<Real, 9> efforts =
+      {};  ///< of its rows with bounds (joint_limits.h); initial guess of the next solution
 
-  /// Whether it does more than hold its bodies together.
+  /// Whether the joint has a limit, a motor, friction or damping.
   bool has_bounded_rows() const;
 };
 
-/// What joints did in a step: figures for StepReport.
+/// Statistics of joints in a step, for StepReport.
 struct JointTally {
-  uint64_t unsolved = 0;  ///< systems that could not be factored, or positions that did not come together
-  Real error = 0;         ///< greatest that was left of a constraint [m], of angles [rad]
+  uint64_t unsolved = 0;  ///< systems that could not be factored, or failed joint projections
+  Real error = 0;         ///< greatest residual of a constraint [m], of angles [rad]
 
   void add(const JointTally& t) {
     unsolved += t.unsolved;
@@ -51,58 +52,61 @@ struct JointTally {
   }
 };
 
-/// Whether its coordinate is an angle that can go round and round; then Joint::coordinate counts its turns.
+/// Whether the joint's coordinate is an angle without bounds; then Joint::coordinate counts whole turns.
 bool counts_turns(const Joint& joint);
 /// Motion of a body's centre of mass, or origin if it is not dynamic, at a time.
 LinkMotion link_motion(const Body* body, Real time);
-/// Where a joint is on a body, from the point that link_motion() tells of.
+/// Frame of a joint on a body, relative to the point whose motion link_motion() returns.
 JointFrame link_frame(const Body* body, const JointFrame& in_body);
 
 class Articulation final : public JointedBodies {
  public:
-  /// All joints of one connected component, of which each joins at least one dynamic body.
+  /// Constructs the articulation of all joints of one connected component. Each joint must have at least one
+  /// dynamic body.
   explicit Articulation(std::vector<Joint*> joints);
 
   std::span<Body* const> bodies() const { return bodies_; }  ///< the dynamic ones, in slot order
   std::span<Joint* const> joints() const { return joints_; }
 
-  /// An estimate of the fastest swinging of links under the forces that their joints had last [rad/s].
+  /// Estimates the highest angular frequency at which links swing under the last forces of their joints
+  /// [rad/s].
   Real greatest_frequency() const;
   /// A motion from t to t + h begins.
   void begin_motion(Real t, Real h);
-  /// At a time within: adds the joint forces to `forces` [force, torque] of the links, which are about to
-  /// move from `motion` under these.
+  /// Adds the joint forces at a time within the motion to `forces` [force, torque] of the links. `motion` is
+  /// the state of the links, and `forces` holds all other forces on entry.
   void add_forces(Real t, std::span<const LinkMotion> motion, std::span<const LinkMobility> mobility,
                   std::span<Vec6> forces);
-  /// Passes on, through the joints, what has pushed single bodies since they were settled last.
+  /// Propagates impulses that acted on single bodies since the last settle() through the joints.
   void transmit_impulses(Real time, JointTally& tally);
-  /// Puts the bodies' `rigid` back together at a time: positions by the shortest way, weighted with the
-  /// masses, then velocities.
+  /// Projects the bodies' `rigid` states onto the joint constraints at a time: first the positions, by the
+  /// smallest mass-weighted displacement, then the velocities.
   void settle(Real time, JointTally& tally);
 
-  /// Takes the constraints of the bodies as `rigid` has them, for what impulses of contacts add to their
-  /// motion; or as they were at their interval's `start`.
+  /// Evaluates the constraints for the contact solver, at the bodies' current `rigid` states or, if
+  /// `at_start`, at those of their interval's start.
   void place(Real time, bool at_start = false);
-  /// Where a joint is, since place().
+  /// Place of a joint as of the last place().
   JointPlace joint_place(std::size_t j, Real time, LinkMotion& still_a, LinkMotion& still_b) const {
     return place_of(j, time, motion_, still_a, still_b);
   }
   bool has_bounded_rows() const { return has_bounded_rows_; }
   const JointSystem& system() const { return system_; }
   JointSystem& system() { return system_; }
-  /// The joints bear these impulses of their constraints over a duration, besides the forces of the motion.
+  /// Adds the constraint impulses of an interval of this duration [s] to the loads of the joints, which
+  /// already contain the forces of the motion.
   void add_loads(std::span<const Vec6> impulses, Real duration);
-  /// Or all at once.
+  /// Adds constraint impulses of a collision to the loads of the joints.
   void add_impact_impulses(std::span<const Vec6> impulses);
 
-  /// A sub-step ends at this time; impulses on links are then those on the bodies as they are now. The system
-  /// is factored once, when the first link is asked for.
+  /// Prepares impulses on links at the end of a sub-step, at this time and the bodies' current poses. The
+  /// system is factored once, when a link is first used.
   void begin_impulses(Real time);
   Mat6 link_mobility(uint32_t link, const Vec6& push) override;
   void respond(uint32_t link, const Vec6& impulse, std::span<Vec6> velocities) override;
   std::size_t link_count() const override { return bodies_.size(); }
 
-  /// Brings the coordinates that count whole turns up to date; at least once in half a turn.
+  /// Updates the coordinates that count whole turns. It must be called at least once per half turn.
   void count_turns(Real time);
 
  private:
@@ -134,12 +138,12 @@ class Articulation final : public JointedBodies {
   std::vector<LinkMobility> mobility_;
   std::vector<Vec6> velocities_, change_, impulses_;
 
-  /// A limit that a joint has reached and does not leave. Its row is such that the speed away from it is
-  /// positive.
+  /// A limit that a joint has reached and is not leaving. The speed along its row is positive away from the
+  /// limit.
   struct Stop {
-    uint32_t a, b;  // links; kDriven: none that moves
+    uint32_t a, b;  // links; kDriven: no movable link
     Vec6 on_a, on_b;
-    std::vector<Vec6> response;  // of the links to its unit impulse
+    std::vector<Vec6> response;  // velocity changes of the links due to a unit impulse of the row
 
     Real speed(std::span<const Vec6> velocities) const;
   };

@@ -23,15 +23,15 @@ enum class JointType : uint8_t {
   revolute,   ///< turns about the axis
   prismatic,  ///< slides along the axis, without turning
   universal,  ///< turns about the axis, fixed in a, and about the second one, fixed in b
-  distance,  ///< the anchors stay as far apart as they are: a massless rod; with limits or a motor its length
-             ///< may change: a rope, a winch
+  distance,   ///< the anchors keep their distance, as a massless rod does; with limits or a motor the length
+              ///< may change, as that of a rope or a winch
 };
 
-/// What drives the free coordinate of a joint: the angle of a revolute one [rad], the way of a prismatic one
-/// [m], the length of a rod [m]; each 0 as the joint was made.
+/// Motor that drives the free coordinate of a joint: the angle of a revolute joint [rad], the displacement of
+/// a prismatic joint [m], or the length change of a rod [m]. Each is 0 when the joint is created.
 struct Motor {
   enum class Mode : uint8_t { none, speed, position };
-  /// A target at a time; before the first and after the last it stays.
+  /// A target at a time. It is constant before the first key and after the last one.
   struct Key {
     Real time = 0;                                          ///< [s]
     Real target = 0;                                        ///< [rad/s] or [m/s], or [rad] or [m]
@@ -39,56 +39,59 @@ struct Motor {
   };
   Mode mode = Mode::none;
   std::vector<Key> targets = {};  ///< strictly increasing times; none: 0
-  bool smooth = false;  ///< stops at every key: between two it changes like a cubic that is at rest at both
+  bool smooth = false;            ///< interpolates by a cubic whose rate is zero at every key
   Real max_effort = std::numeric_limits<Real>::infinity();  ///< [N m] or [N]
-  /// Of a position: effort = stiffness (target - position) - damping speed. Stiffness 0: it is held, as
-  /// firmly as max_effort allows.
+  /// For a position target: effort = stiffness (target - position) - damping speed. With stiffness 0 the
+  /// target is held rigidly within max_effort.
   Real stiffness = 0, damping = 0;
 
   Real target(Real time) const;
 };
 
-/// In world coordinates as the bodies stand when the joint is made, which is where its coordinates are 0.
+/// Definition of a joint, in world coordinates at the bodies' poses when the joint is created. Its
+/// coordinates are 0 in these poses.
 struct JointDef {
   static constexpr Real kFree = std::numeric_limits<Real>::infinity();
 
   std::string name = {};
   JointType type = JointType::spherical;
-  BodyHandle a = {}, b = {};         ///< b may be null: the world
-  Vec3 anchor = Vec3::Zero();        ///< where they are joined [m]
-  Vec3 anchor_b = Vec3::Zero();      ///< of a rod: its other end, on b [m]
-  Vec3 axis = Vec3::UnitZ();         ///< of turning or sliding; of a spherical joint, of its twist
-  Vec3 second_axis = Vec3::UnitX();  ///< of a universal joint; not along the axis
-  /// Of the free coordinate, in which b is at rest: the angle of a revolute joint, the way of a prismatic
-  /// one, what a rod may be longer or shorter (a rope: lower is minus infinity), the twist of a spherical
-  /// one, the angle about the axis of a universal one.
+  BodyHandle a = {}, b = {};     ///< b may be null: the world
+  Vec3 anchor = Vec3::Zero();    ///< common point of both bodies [m]
+  Vec3 anchor_b = Vec3::Zero();  ///< of a rod: its other end, on b [m]
+  Vec3 axis = Vec3::UnitZ();     ///< axis of rotation or sliding; of a spherical joint, the axis of its twist
+  Vec3 second_axis = Vec3::UnitX();  ///< second axis of a universal joint; not parallel to `axis`
+  /// Limits of the free coordinate of a relative to b: the angle of a revolute joint, the displacement of a
+  /// prismatic joint, the length change of a rod (a rope has lower = minus infinity), the twist of a
+  /// spherical joint, or the angle of a universal joint about `axis`.
   Real lower = -kFree, upper = kFree;
-  Real swing =
-      kFree;  ///< how far a spherical joint's axis may lean, a universal joint turn about its second [rad]
-  Real friction = 0;  ///< dry: greatest torque or force against motion in each free direction [N m] or [N]
-  Real damping = 0;   ///< viscous, in each free direction [N m s] or [N s/m]
-  Motor motor = {};   ///< of revolute, prismatic and distance joints
-  Real max_force = kFree;   ///< breaks beyond [N]
-  Real max_torque = kFree;  ///< breaks beyond: what keeps the axes together, limits, motor and friction [N m]
-  bool collide = false;     ///< whether the two bodies also collide with each other
+  Real swing = kFree;  ///< greatest tilt of a spherical joint's axis, or angle of a universal joint about its
+                       ///< second axis [rad]
+  Real friction =
+      0;  ///< dry friction: greatest torque or force against motion in each free direction [N m] or [N]
+  Real damping = 0;        ///< viscous, in each free direction [N m s] or [N s/m]
+  Motor motor = {};        ///< of revolute, prismatic and distance joints
+  Real max_force = kFree;  ///< breaks beyond [N]
+  Real max_torque =
+      kFree;  ///< breaks beyond this torque of constraints, limits, motor and friction together [N m]
+  bool collide = false;  ///< whether the two bodies also collide with each other
 
   bool has_limits() const { return lower > -kFree || upper < kFree; }
-  /// Whether there is a coordinate that limits, motor and friction can act on.
+  /// Whether the joint has a coordinate that limits, motor and friction can act on.
   bool has_free_coordinate() const {
     return type != JointType::fixed &&
            (type != JointType::distance || has_limits() || motor.mode != Motor::Mode::none);
   }
 };
 
-/// What can be asked of a joint.
+/// State of a joint.
 struct JointState {
   Vec3 anchor_a = Vec3::Zero(), anchor_b = Vec3::Zero();  ///< world [m]
   Vec3 axis = Vec3::UnitZ();                              ///< world, with b
-  /// On a at its anchor, on average over the last sub-step, impacts included [N], [N m].
+  /// Load on a at its anchor: the mean over the last sub-step, impacts included [N], [N m].
   Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
   Real coordinate = 0;  ///< of the free one; 0 for joints that have none
   Real speed = 0;       ///< of the free one
-  Real error = 0;       ///< how far the anchors are apart that should not be [m]
+  Real error = 0;       ///< unwanted distance of the anchors [m]
   bool broken = false;
 };
 

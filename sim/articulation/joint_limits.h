@@ -13,16 +13,16 @@ struct BoundedOrigin {
   Joint* joint;
   std::size_t slot;  ///< in Joint::efforts
   Vec3 arm;          ///< from the centre of the joint's body a to the anchor, world [m]
-  /// It says where the joint may be at the interval's end, not how it moves until then.
+  /// The row limits the coordinate at the interval's end, not the velocity during the interval.
   bool is_stop;
 };
 
-/// The rows of an articulation, after its place(), for an interval of a length that ends at `time`. Its
-/// bodies have the indices Body::row. Appends.
+/// Appends the bounded rows of an articulation, after its place(), for an interval that ends at `time`. Its
+/// bodies have the indices Body::row.
 void collect_bounded_rows(const Articulation& articulation, Real duration, Real time,
                           std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins);
 
-/// Those of limits that are reached, for a collision at `time`.
+/// Appends the rows of reached limits, for a collision at `time`.
 void collect_stops(const Articulation& articulation, Real time, std::vector<BoundedRow>& rows,
                    std::vector<BoundedOrigin>& origins);
 

@@ -1,7 +1,7 @@
 #pragma once
-/// What joints add to a contact problem (physics A3, A4): constraints, which any impulses of contacts leave
-/// as they are, and rows for limits, motors and friction, whose impulses have bounds. Bodies are indexed as
-/// by the contacts.
+/// The part of a contact problem that comes from joints (physics A3, A4): constraints, which hold for any
+/// contact impulses, and rows for limits, motors and friction, whose impulses have bounds. Bodies have the
+/// same indices as in the contacts.
 
 #include <span>
 
@@ -9,10 +9,10 @@
 
 namespace offstage::sim {
 
-/// In place of a body: one that no impulse moves.
+/// Index in place of a body that no impulse moves.
 constexpr uint32_t kUnmoved = UINT32_MAX;
 
-/// J (v+ - v) = 0: the velocities that come in already are as the joint wants them.
+/// J (v+ - v) = 0: the velocities on entry already satisfy the constraint.
 struct JointConstraint {
   uint32_t a, b;
   const JointRows* rows;
@@ -23,8 +23,8 @@ struct JointConstraint {
 struct BoundedRow {
   uint32_t a = kUnmoved, b = kUnmoved;
   Vec6 on_a = Vec6::Zero(), on_b = Vec6::Zero();
-  Real offset = 0;            ///< what links that are driven add [m/s] or [rad/s]
-  Real target = 0;            ///< likewise
+  Real offset = 0;            ///< contribution of driven links [m/s] or [rad/s]
+  Real target = 0;            ///< [m/s] or [rad/s]
   Real softness = 0;          ///< [1/kg] or [1/(kg m^2)], >= 0
   Real lower = 0, upper = 0;  ///< of the impulse [N s] or [N m s]
   Real impulse = 0;           ///< in: a guess; out: the solution

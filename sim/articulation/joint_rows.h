@@ -1,7 +1,7 @@
 #pragma once
-/// The kinematics of joints: each is a number of scalar constraints C(x) = 0, with dC/dt = J v and
-/// d2C/dt2 = J a + bias, where v and a are the velocities and accelerations of both links, [linear, angular]
-/// about their centres, in world axes (physics A1, A6).
+/// Kinematics of joints. A joint consists of scalar constraints C(x) = 0, with dC/dt = J v and d2C/dt2 = J a
+/// + bias, where v and a are the velocities and accelerations of both links, [linear, angular] about their
+/// centres, in world axes (physics A1, A6).
 
 #include <cstdint>
 
@@ -10,14 +10,14 @@
 
 namespace offstage::sim {
 
-/// How a link moves at a moment: about its centre of mass, or the origin of one that is driven.
+/// Motion of a link at a time: of its centre of mass, or of its origin if it is driven.
 struct LinkMotion {
   Vec3 position = Vec3::Zero();
   Mat3 axes = Mat3::Identity();  ///< world from body
   Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
 };
 
-/// What impulses do to a link: [1/kg], and world axes [1/(kg m^2)].
+/// Inverse mass [1/kg] and inverse inertia of a link, in world axes [1/(kg m^2)].
 struct LinkMobility {
   Real inverse_mass = 0;
   Mat3 inverse_inertia = Mat3::Zero();
@@ -29,8 +29,8 @@ struct LinkMobility {
   }
 };
 
-/// Where a joint is on a link: from its centre, in its axes. Columns of `axes`: the second axis, what makes a
-/// right-handed frame, the axis.
+/// Frame of a joint on a link, relative to the link's centre and in its axes. The columns of `axes` are the
+/// second axis, their cross product for a right-handed frame, and the axis.
 struct JointFrame {
   Vec3 point = Vec3::Zero();
   Mat3 axes = Mat3::Identity();
@@ -52,7 +52,7 @@ struct JointRow {
   Real error = 0, bias = 0;
 };
 
-/// What keeps a joint together, up to six constraints; those beyond `count` are zero.
+/// The constraints of a joint, up to six. Rows beyond `count` are zero.
 struct JointRows {
   uint32_t count = 0;
   Mat6 on_a = Mat6::Zero(), on_b = Mat6::Zero();  ///< J^T: a column for each
@@ -61,17 +61,17 @@ struct JointRows {
   void add(const JointRow& row);
 };
 
-/// Of a distance joint only if it is a rod, which has a length to keep.
+/// Number of constraints. A distance joint has one only if it is a rod.
 uint32_t constraint_count(const JointDef& def);
 /// `length` of a rod.
 void set_joint_rows(const JointDef& def, const JointPlace& place, Real length, JointRows& rows);
 
-/// The free coordinate of a revolute, prismatic or distance joint, the first of a universal one, the twist of
-/// a spherical one, with its row; `error` is the coordinate, of angles within half a turn.
+/// Row of the free coordinate of a revolute, prismatic or distance joint, the first angle of a universal
+/// joint, or the twist of a spherical joint. `error` is the coordinate; angles are within half a turn.
 JointRow free_row(JointType type, const JointPlace& place, Real length);
-/// How far the axis of a spherical joint leans, or the second angle of a universal one.
+/// Row of the tilt of a spherical joint's axis, or of the second angle of a universal joint.
 JointRow swing_row(JointType type, const JointPlace& place);
-/// Turning of a against b about a world axis.
+/// Row of the rotation of a relative to b about a world axis.
 JointRow turning_row(const Vec3& axis);
 
 /// The angle of (x, y) from the x axis, in [-pi, pi], with the same bits everywhere.

@@ -2,8 +2,8 @@
 /// The linear system of an articulation's joints (physics A1): with M the masses of its links and J its
 /// constraints, A = J M^-1 J^T has a block row for each joint and couples those that share a link. Links of
 /// many joints, which would couple all of them with each other, stay in the system as rows of their own, so
-/// that any tree costs O(n). Where joints form loops, rows may depend on each other: then a small part of the
-/// diagonal is added, and what that takes away is given back by conjugate gradients.
+/// that any tree costs O(n). Where joints form loops, rows may be linearly dependent. A small part of the
+/// diagonal is then added, and conjugate gradients remove the error that this causes.
 
 #include <array>
 #include <cstdint>
@@ -17,7 +17,7 @@ namespace offstage::sim {
 
 class JointSystem {
  public:
-  static constexpr uint32_t kDriven = UINT32_MAX;  ///< in place of a link: none that forces move
+  static constexpr uint32_t kDriven = UINT32_MAX;  ///< index in place of a link that forces do not move
   struct Topology {
     uint32_t a, b;  ///< links, or kDriven
     uint32_t rows;  ///< constraints
@@ -26,18 +26,18 @@ class JointSystem {
   /// The joints must connect all links.
   JointSystem(uint32_t links, std::vector<Topology> joints);
 
-  /// Factors the system of rows that the caller keeps. False, and nothing can be solved, if the constraints
-  /// are degenerate beyond help.
+  /// Factors the system of the rows, which the caller must keep. Returns false if the constraints are too
+  /// degenerate; correct() then has no effect.
   bool factorize(std::span<const JointRows> rows, std::span<const LinkMobility> links);
 
-  /// Takes constraints that are near those of the last factorize(), whose factor goes on to serve: correct()
-  /// is then to be repeated.
+  /// Replaces the constraints by ones near those of the last factorize(), whose factor is kept. correct()
+  /// must then be iterated.
   void update(std::span<const JointRows> rows) { rows_ = rows; }
 
-  /// J v of the joints; driven links count as still.
+  /// J v of the joints. Driven links count as motionless.
   void relative(std::span<const Vec6> velocities, std::span<Vec6> result) const;
-  /// The impulses p that change J v by `change`, and what they do: velocities += M^-1 J^T p. Without success
-  /// of factorize() nothing.
+  /// Computes the impulses p that change J v by `change` and applies them: velocities += M^-1 J^T p. Does
+  /// nothing if factorize() failed.
   void correct(std::span<const Vec6> change, std::span<Vec6> impulses, std::span<Vec6> velocities);
 
   std::span<const Topology> joints() const { return joints_; }
@@ -53,7 +53,7 @@ class JointSystem {
     std::vector<Eigen::Matrix<Real, N, 1>> x;
     BlockCholesky<N> factor;
   };
-  /// Two joints at a link, or a joint and a link that has a row of its own.
+  /// Off-diagonal block: two joints that share a link, or a joint and a link with a row of its own.
   struct Coupling {
     uint32_t first, second;  // rows
     uint32_t link;
@@ -68,7 +68,7 @@ class JointSystem {
   void solve(std::span<Vec6> x);
   void refine(std::span<const Vec6> change, std::span<Vec6> impulses);
   void apply(std::span<const Vec6> impulses, std::span<Vec6> velocities) const;
-  /// Positive definite by far: no refinement is needed.
+  /// Whether the matrix is well-conditioned and positive definite, so that no refinement is needed.
   bool is_plain() const { return !has_loops_ && hubs_.empty(); }
   bool is_hub(uint32_t link) const { return hub_row_[link] != kDriven; }
 

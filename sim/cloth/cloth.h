@@ -1,7 +1,7 @@
 #pragma once
-/// Cloth as the world takes it and shows it (physics F6-F8): points with mass, springs of three kinds between
-/// them, and triangles over them that collide, feel the air and are drawn. effects/cloth.h makes definitions
-/// from fabrics, grids and meshes.
+/// Public definitions and views of cloth (physics F6-F8). A cloth consists of points with mass, three kinds
+/// of springs between them, and triangles that collide, feel the air and are drawn. effects/cloth.h makes
+/// definitions from fabrics, grids and meshes.
 
 #include <cstdint>
 #include <limits>
@@ -35,12 +35,12 @@ struct ClothSpring {
   SpringKind kind = SpringKind::stretch;
 };
 
-/// Holds a vertex at a point of the world or of a body, which feels its pull.
+/// Holds a vertex at a point of the world or of a body. The body feels the pull of the cloth.
 struct ClothPin {
   uint32_t vertex = 0;
   BodyHandle body;                                     ///< null: the world
   Vec3 position = Vec3::Zero();                        ///< in the body's frame, or of the world [m]
-  Real until = std::numeric_limits<Real>::infinity();  ///< lets go at this time [s]
+  Real until = std::numeric_limits<Real>::infinity();  ///< the pin is released at this time [s]
 };
 
 /// Draws two vertices together, and then holds them.
@@ -48,24 +48,24 @@ struct ClothSeam {
   uint32_t a = 0, b = 0;
 };
 
-/// How the springs are stepped.
+/// Integration of the springs.
 enum class ClothIntegrator : uint8_t {
-  /// Backward Euler, linearised once and solved by one symmetric Gauss-Seidel sweep: true to every static
-  /// load, quick, and stable, because springs too stiff for it have their stiffness clamped
+  /// Backward Euler, linearised once and solved by one symmetric Gauss-Seidel sweep. It is exact under static
+  /// loads, fast, and stable, because the stiffness of springs that are too stiff for it is clamped
   /// (ClothReport::clamped).
   relaxed,
   /// Backward Euler, linearised once (Baraff and Witkin, "Large Steps in Cloth Simulation", 1998) and solved.
   implicit,
   symplectic,  ///< explicit: unstable beyond largest_stable_step()
-  rk4,         ///< explicit, of fourth order between collisions: likewise
+  rk4,         ///< explicit, of fourth order between collisions: unstable beyond largest_stable_step()
 };
 
-/// What the air does to each triangle. With the relative air velocity u, the unit normal n and the area A:
-/// F = rho A / 2 |u| ((C_D - C_L) u + C_L (u.n) n): C_D of air that comes square, C_D - C_L of what comes
-/// along.
+/// Aerodynamic force on each triangle. With the relative air velocity u, the unit normal n and the area A: F
+/// = rho A / 2 |u| ((C_D - C_L) u + C_L (u.n) n): C_D acts on air across the triangle, C_D - C_L on air along
+/// it.
 struct ClothAir {
   Real drag = 1;       ///< C_D, >= 0
-  Real lift = 0.9;     ///< C_L, >= 0, <= C_D, or it would drive itself
+  Real lift = 0.9;     ///< C_L, >= 0, <= C_D, because a larger lift would add energy
   Real density = 1.2;  ///< rho [kg/m^3], >= 0; 0: no air
 };
 
@@ -78,48 +78,50 @@ struct ClothDef {
   std::vector<Real> masses;  ///< of the vertices [kg], > 0
   std::vector<ClothPin> pins;
   std::vector<ClothSeam> seams;
-  Real seam_time = 1;  ///< in which seams close [s], > 0
+  Real seam_time = 1;  ///< time in which seams close [s], > 0
 
   Vec3 velocity = Vec3::Zero();  ///< at the start [m/s]
 
   bool collides = true;        ///< with bodies and particles
-  bool self_collision = true;  ///< with itself and with other cloths that have this
+  bool self_collision = true;  ///< with itself and with other cloths that have this flag
   Real thickness = 0.005;      ///< distance kept from bodies, and between two layers [m], > 0
-  Real friction = 0.5;         ///< on bodies: with theirs by the geometric mean, as between bodies
-  Real self_friction = 0.3;    ///< of cloth on cloth
+  Real friction =
+      0.5;  ///< on bodies: combined with the body's friction by the geometric mean, as between bodies
+  Real self_friction = 0.3;  ///< of cloth on cloth
 
   Real max_stretch = 0;  ///< greatest length of stretch springs over their rest length, > 1; 0: no limit (F7)
   Real max_shear = 0;    ///< the same of shear springs
-  /// Length over rest length at which a stretch spring tears, > 1; 0: never. max_stretch counts as 1.2 of
-  /// it, if it is less.
+  /// Length over rest length at which a stretch spring tears, > 1; 0: never. If it is less than max_stretch,
+  /// max_stretch counts as 1.2 of it.
   Real tear = 0;
 
   ClothAir air;
-  /// Over-pressure inside of a closed cloth [Pa]: at its rest volume V0; at the volume V it is
-  /// pressure V0 / V, as that of a gas that keeps its temperature. 0: none.
+  /// Overpressure inside a closed cloth at its rest volume V0 [Pa]. At the volume V it is pressure V0 / V, as
+  /// in an isothermal gas. 0: none.
   Real pressure = 0;
-  /// Of an open cloth that catches the air, as a parachute: which share of the stagnation pressure rho
-  /// (u.m)^2 / 2 of the air that comes in at its mouth builds up inside, on the side its normals point away
-  /// from. 0: none.
+  /// For an open cloth such as a parachute: share of the stagnation pressure rho (u.m)^2 / 2 of the air
+  /// entering at its mouth that builds up inside, on the side that its normals point away from. 0: none.
   Real ram_pressure = 0;
 
   ClothIntegrator integrator = ClothIntegrator::relaxed;
-  Real substep = 1.0 / 960;  ///< longest step of its own [s], > 0; never longer than the world's
+  Real substep = 1.0 / 960;  ///< longest sub-step of the cloth [s], > 0; never longer than that of the world
 };
 
-/// What is wrong with a definition: the field, the place, what is allowed. Empty: nothing.
+/// Describes the first error of a definition: the field, the place and the allowed values. Empty if there is
+/// none.
 std::string problem(const ClothDef& def);
 
-/// The longest step at which an explicit integrator is stable, by the springs alone, and the spring that sets
-/// it: around it stiffness is greatest against mass.
+/// The longest step at which an explicit integrator is stable, considering the springs alone, and the spring
+/// that limits it: the one with the greatest ratio of stiffness to mass.
 struct StableStep {
   Real step = std::numeric_limits<Real>::infinity();  ///< [s]
   uint32_t spring = 0;                                ///< of the definition
 };
-/// Only of `symplectic` and `rk4`; for the others infinite.
+/// Largest stable step of a definition. It is infinite unless the integrator is `symplectic` or `rk4`.
 StableStep largest_stable_step(const ClothDef& def);
 
-/// How a cloth is doing. Counts are of all sub-steps of the last step, others of its end.
+/// Statistics of a cloth. Counts are sums over the sub-steps of the last step; other values are those at its
+/// end.
 struct ClothReport {
   uint64_t contacts = 0;       ///< of vertices and bodies' corners with bodies, at the end
   uint64_t self_contacts = 0;  ///< at the end
@@ -127,21 +129,21 @@ struct ClothReport {
   Real max_strain = 0;         ///< of stretch springs, greatest (|d| - L) / L
   Real mean_strain = 0;        ///< of stretch springs, mean |(|d| - L) / L|
   Real penetration = 0;        ///< deepest, of a vertex behind a body's surface, 0 while it is outside [m]
-  uint64_t limited = 0;        ///< moves shortened, to keep max_stretch and max_shear or for the next reason
-  uint64_t held_back = 0;    ///< times that a move was shortened because cloth would have gone through cloth
-  uint64_t crossings = 0;    ///< pairs that had to be let go: the guarantee against crossing is lost there
-  uint64_t clamped = 0;      ///< springs too stiff for the `relaxed` integrator at its step, at the end
-  uint64_t torn = 0;         ///< springs
-  uint64_t unconverged = 0;  ///< solves of the implicit integrator that ended at their bound
-  bool finite = true;        ///< false: it stopped being finite, and was stopped where it last was
+  uint64_t limited = 0;        ///< moves shortened to keep max_stretch and max_shear, or because of held_back
+  uint64_t held_back = 0;      ///< moves shortened because cloth would have passed through cloth
+  uint64_t crossings = 0;  ///< pairs that could not be kept from crossing; cloth may pass through cloth there
+  uint64_t clamped = 0;    ///< springs whose stiffness the `relaxed` integrator clamped, at the end
+  uint64_t torn = 0;       ///< springs
+  uint64_t unconverged = 0;  ///< solves of the implicit integrator that reached the limit of iterations
+  bool finite = true;        ///< false: the cloth became non-finite and stays at its last finite state
 };
 
-/// What is to be seen of a cloth; valid until the next step.
+/// Read-only view of a cloth; valid until the next step.
 struct ClothView {
   std::span<const Vec3> points;      ///< [m]
   std::span<const Vec3> velocities;  ///< [m/s]
   std::span<const Triangle> triangles;
-  /// Of each point the vertex of the definition that it comes from: points are added where cloth tears.
+  /// For each point, the vertex of the definition that it comes from. Points are added where cloth tears.
   std::span<const uint32_t> sources;
   uint32_t version = 0;  ///< grows when triangles or the number of points change
 };

@@ -1,7 +1,7 @@
 #pragma once
-/// Bodies as cloths meet them in a sub-step of the world: on the ways that the world gave them, moved besides
-/// by what cloth does to them. That is returned as reactions and counts for the world from its next sub-step
-/// on (as for particles, P8).
+/// Bodies as obstacles of cloth in a sub-step of the world. They follow the paths that the world gave them,
+/// plus the displacement due to cloth. Their reactions are returned to the world, which applies them from its
+/// next sub-step on (as for particles, P8).
 
 #include <algorithm>
 #include <optional>
@@ -19,7 +19,8 @@ class ClothBody {
   ClothBody(const Obstacle& way, Real h, const Vec3& velocity, const Vec3& angular_velocity,
             const Vec3& surface_velocity);
 
-  /// A sub-step of cloth begins: from and to which fraction of the world's, dt [s] long.
+  /// Begins a sub-step of cloth, which covers the fractions `from` to `to` of the world's sub-step and lasts
+  /// dt [s].
   void begin(Real from, Real to, Real dt);
   Real duration() const { return dt_; }         ///< of that sub-step [s]
   const Pose& start() const { return start_; }  ///< of that sub-step
@@ -27,29 +28,33 @@ class ClothBody {
   const Solid& solid() const { return way_.solid; }
   const Obstacle& way() const { return way_; }
   bool is_dynamic() const { return way_.is_dynamic(); }
-  /// [kg]; infinite of what nothing moves.
+  /// Mass [kg]; infinite for immovable bodies.
   Real mass() const { return 1 / way_.inverse_mass; }
   const Vec3& centre() const { return centre_; }  ///< of mass, at the end of the cloth's sub-step
 
-  /// How far its surface moves in the sub-step of cloth, where the point `p` (world) is at its end.
+  /// Displacement of the surface during the sub-step of cloth, at the point that is at `p` (world) at its
+  /// end.
   Vec3 surface_motion(const Vec3& p) const;
-  /// Velocity of its material point at `p` at the end of the world's sub-step, as cloth has changed it.
+  /// Velocity of the body's material point at `p` at the end of the world's sub-step, including the changes
+  /// due to cloth.
   Vec3 velocity(const Vec3& p) const { return velocity_ + angular_velocity_.cross(p - centre_); }
   /// Velocity that a unit impulse along n (unit) at p gives to the point there, along n [1/kg].
   Real mobility(const Vec3& p, const Vec3& n) const;
-  /// An impulse at a point [N s].
+  /// Applies an impulse at a point [N s].
   void push(const Vec3& impulse, const Vec3& p);
-  /// The same by what hangs on a pin, which moves the body in this sub-step of cloth already: by `share` of
-  /// what the gain of velocity does in one. A body that followed later than it was pulled would gain energy.
+  /// Applies the impulse of a pin. It moves the body already in this sub-step of cloth, by `share` of the
+  /// displacement that its change of velocity causes in one sub-step. A delayed response of the body would
+  /// gain energy.
   void pull(const Vec3& impulse, const Vec3& p, Real share);
 
-  /// What hangs on a pin pulls at a body that it does not move: one that is asleep.
+  /// Records the impulse of a pin on a sleeping body, which it does not move.
   void load(const Vec3& impulse, const Vec3& p);
-  /// Impulse and angular impulse of all that, in this sub-step of the world; empty: no pin.
+  /// Sum of the impulses and angular impulses of pins in this sub-step of the world; empty if no pin holds
+  /// the body.
   const std::optional<Reaction>& pin_load() const { return pin_load_; }
 
   const Reaction& reaction() const { return reaction_; }
-  /// A point of cloth touches it, which moves at this speed against it [m/s].
+  /// Records that a point of cloth touches the body, with this relative speed [m/s].
   void touch(Real speed) {
     touched = true;
     touching_speed = std::max(touching_speed, speed);
@@ -57,8 +62,8 @@ class ClothBody {
 
   bool touched = false;     ///< by cloth, in this sub-step of the world
   Real touching_speed = 0;  ///< greatest [m/s]
-  bool pinches = false;     ///< cloth against another body, in this sub-step of the world
-  bool collides = true;     ///< else it only holds pins
+  bool pinches = false;     ///< whether it pinches cloth against another body in this sub-step of the world
+  bool collides = true;     ///< false: it only holds pins
 
  private:
   Obstacle way_;

@@ -1,8 +1,8 @@
 #pragma once
 /// Contact of the points of cloths with bodies. Points near a body are found once per sub-step of the world;
-/// in each sub-step of cloth those that are too near are put back to the cloth's thickness, by sweeping where
-/// they are fast, with Coulomb friction and with the impulse on the body. A point between two bodies hands
-/// the push of one on to the other.
+/// in each sub-step of cloth, points that are too close are moved back to the cloth's thickness, with Coulomb
+/// friction and a reaction on the body. Fast points are swept. A point between two bodies transmits impulses
+/// from one to the other.
 
 #include <cstdint>
 #include <span>
@@ -14,7 +14,7 @@
 
 namespace offstage::sim {
 
-/// A part of a point's move that was not motion: it was put out of what it was already in.
+/// A part of a point's move that must not count as velocity: the correction of an existing penetration.
 struct VelocityCut {
   uint32_t point;
   Vec4 move;  // [m]
@@ -22,33 +22,34 @@ struct VelocityCut {
 
 class ClothContacts {
  public:
-  /// What points can meet in a sub-step of the world of length h. `collides` says it of each point.
+  /// Finds the bodies that points can touch in a sub-step of the world of length h. `collides` tells for each
+  /// point whether it collides.
   void find(const ClothPoints& points, std::span<const uint8_t> collides, std::span<ClothBody> bodies,
             Real h);
-  /// Looks again for points that moved farther than predicted.
+  /// Repeats the search for points that moved farther than predicted.
   void find_runaways(const ClothPoints& points);
-  /// Puts points out of the bodies, in a sub-step of cloth of length dt, one of `parts` of the world's.
-  /// Appends to `cuts`.
+  /// Moves points out of the bodies in a sub-step of cloth of length dt, which is one of `parts` equal parts
+  /// of the world's sub-step. Appends to `cuts`.
   void solve(ClothPoints& points, Real dt, Real parts, std::vector<VelocityCut>& cuts);
-  /// After moves were shortened, those of points that are not 0 in `shortened`: cloth that can get no farther
-  /// stops the bodies that press into it. `recoil` is the inverse mass of what is behind each point's cloth:
-  /// 0 if it hangs on the world. Returns by cloth the impulse that it takes up [N s].
+  /// Stops bodies that press into cloth whose moves were shortened, which are those of points with a non-zero
+  /// `shortened`. `recoil` is the inverse mass of the piece of cloth of each point: 0 if it is pinned to the
+  /// world. Returns for each cloth the impulse that it absorbs [N s].
   std::vector<Vec3> stop_bodies(const ClothPoints& points, std::span<const uint8_t> shortened,
                                 std::span<const Real> recoil);
 
-  /// Whether a point was so near to another body in the last solve() that it may touch that soon.
+  /// Whether a point was so close to a body other than `body` in the last solve() that it may soon touch it.
   bool is_near_other_than(std::size_t point, const ClothBody* body) const {
     return point < near_to_.size() && near_to_[point] && (near_to_[point] != body || near_several_[point]);
   }
-  bool any_dynamic() const { return any_dynamic_; }  ///< whether a body that can be pushed touches cloth
+  bool any_dynamic() const { return any_dynamic_; }             ///< whether a dynamic body touches cloth
   std::span<const uint64_t> active() const { return active_; }  ///< contacts of the last solve(), by cloth
-  /// Raises, by cloth, how deep any of its points is behind a surface, at the end of a sub-step.
+  /// Raises the greatest penetration of each cloth's points to that at the end of a sub-step [m].
   void measure(const ClothPoints& points, std::span<Real> penetration) const;
 
  private:
   struct Near {
     uint32_t point, body;
-    Vec3 place;        // in the body's frame where last looked at
+    Vec3 place;        // in the body's frame at the last search
     Real distance;     // from the surface there
     Real pressed = 0;  // impulse along the normal in this sub-step of the world, of a pinched point [N s]
   };
@@ -71,12 +72,12 @@ class ClothContacts {
   Real h_ = 0;
   bool any_dynamic_ = false;
   std::vector<Near> near_;  // by point
-  // Of each point: a body that it is near to, and whether it is to others.
+  // For each point, a body that it is near, and whether it is near several.
   std::vector<const ClothBody*> near_to_;
   std::vector<uint8_t> near_several_;
   std::vector<Vec3> seen_at_;
-  std::vector<Real> seen_reach_;  // how far each point may move before it must be looked at again
-  std::vector<Aabb> boxes_;       // of the bodies' ways
+  std::vector<Real> seen_reach_;  // distance that each point may move before its search must be repeated
+  std::vector<Aabb> boxes_;       // of the bodies' paths
   std::vector<uint64_t> active_;
   std::vector<Touch> touches_;  // of one point
 };

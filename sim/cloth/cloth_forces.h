@@ -1,6 +1,6 @@
 #pragma once
-/// What acts on cloth from outside: gravity, fields, moving air on its triangles, pressure within (physics
-/// F8, P2).
+/// External forces on cloth: gravity, fields, aerodynamic forces on its triangles and internal pressure
+/// (physics F8, P2).
 
 #include <span>
 
@@ -10,15 +10,15 @@
 
 namespace offstage::sim {
 
-/// The weather of a sub-step of the world.
+/// Fields and air of a sub-step of the world.
 struct ClothWeather {
   Real time, h;
   Vec3 gravity, wind;
   std::span<const ForceDef* const> forces;
 };
 
-/// Sets the accelerations of a cloth's points, those from `first` on. The drag of the air is taken at most so
-/// strong that within h it brings a triangle to rest in the air, which keeps the step stable.
+/// Sets the accelerations of a cloth's points, which begin at index `first`. The drag of the air is limited
+/// so that it at most brings a triangle to rest relative to the air within h, which keeps the step stable.
 void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather& weather,
                       ClothPoints& points);
 

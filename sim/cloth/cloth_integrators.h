@@ -1,7 +1,7 @@
 #pragma once
 /// Moves the points of a cloth by its springs and outer accelerations through a sub-step of length h, without
-/// contacts: the other ways beside the sweep of cloth_springs.h. Points that are held have been moved
-/// already.
+/// contacts. These are the alternatives to the sweep of cloth_springs.h. Pinned points have already been
+/// moved.
 
 #include <span>
 
@@ -10,7 +10,7 @@
 
 namespace offstage::sim {
 
-/// A cloth among the points of all.
+/// The points and springs of one cloth.
 struct ClothRange {
   std::size_t begin, end;
   std::span<const ClothSpring> springs;  ///< between points of all cloths
@@ -18,12 +18,13 @@ struct ClothRange {
 
 void step_symplectic(ClothPoints& points, const ClothRange& cloth, Real h);
 
-/// Classical Runge-Kutta. The velocity at the end is not that of the move: `kick` gets the difference.
+/// Classical Runge-Kutta. The velocity at the end differs from the mean velocity of the move; `kick` gets the
+/// difference.
 void step_rk4(ClothPoints& points, const ClothRange& cloth, Real h, std::span<Vec4> kick);
 
 /// Backward Euler, linearised once. A spring that is compressed does not push sideways in it, which keeps the
-/// system positive definite (Choi and Ko, "Stable but Responsive Cloth", 2002). Conjugate gradients with the
-/// blocks of the diagonal as preconditioner; false if they ended at their bound.
+/// system positive definite (Choi and Ko, "Stable but Responsive Cloth", 2002). Conjugate gradients with a
+/// block-diagonal preconditioner. Returns false if they reached the limit of iterations.
 bool step_implicit(ClothPoints& points, const ClothRange& cloth, Real h);
 
 }  // namespace offstage::sim

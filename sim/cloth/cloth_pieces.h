@@ -1,5 +1,5 @@
 #pragma once
-/// Which points of cloths hang together: for good by springs, and for a while by what else joins them.
+/// Connected pieces of cloth: points connected permanently by springs, and temporarily by other connections.
 
 #include <algorithm>
 #include <cstdint>
@@ -10,7 +10,7 @@ namespace offstage::sim {
 
 class ClothPieces {
  public:
-  /// Every point for itself.
+  /// Makes every point a piece of its own.
   void assign(std::size_t points) {
     number_.resize(points);
     parent_.resize(points);
@@ -21,7 +21,7 @@ class ClothPieces {
     const uint32_t a = of(point), b = of(other);
     parent_[std::max(a, b)] = std::min(a, b);
   }
-  /// What is joined now is so for good, and pieces are numbered anew; what is joined later, until forget().
+  /// Makes the current connections permanent and renumbers the pieces. Later connections last until forget().
   void keep() {
     std::vector<uint32_t> number(parent_.size());
     uint32_t count = 0;

@@ -24,9 +24,9 @@ struct ClothPoints {
   std::vector<Vec4> velocity;      ///< mean of the last sub-step of the cloth
   std::vector<Vec4> acceleration;  ///< by everything but springs and contacts
   std::vector<Vec4> rest;          ///< in the unstrained cloth
-  std::vector<Vec4> pull;          ///< impulse times the sub-step, that springs gave what pins hold [kg m]
+  std::vector<Vec4> pull;          ///< impulse of the springs on pinned points, times the sub-step [kg m]
   std::vector<Real> mass;          ///< [kg]
-  std::vector<Real> inverse_mass;  ///< 0 of what pins hold
+  std::vector<Real> inverse_mass;  ///< 0 for pinned points
   std::vector<ClothBody*> holder;  ///< the body whose pin holds it; null: none, or the world
   std::vector<Real> thickness, friction, self_friction;
   std::vector<uint32_t> cloth;  ///< which it belongs to

@@ -1,10 +1,10 @@
 #pragma once
 /// The springs of cloths by backward Euler, linearised once (Baraff and Witkin, "Large Steps in Cloth
-/// Simulation", 1998), and relaxed: from the explicit step, which has every force as it is, a few symmetric
-/// Gauss-Seidel sweeps take out what springs and damping do not allow. At rest nothing is left for the sweeps
-/// to do, so that what hangs or carries a load has its true length, however few they are.
+/// Simulation", 1998), and solved approximately. A few symmetric Gauss-Seidel sweeps correct the explicit
+/// step, which contains every force exactly. In equilibrium the residual is zero, so cloth under a static
+/// load has its true length for any number of sweeps.
 ///
-/// Springs of a colour share no point, so that a sweep gives the same bits on any number of threads.
+/// Springs of one colour share no point, so a sweep gives identical bits on any number of threads.
 
 #include <cstdint>
 #include <span>
@@ -17,27 +17,27 @@ namespace offstage::sim {
 
 class ClothSprings {
  public:
-  /// Springs between points of all cloths; their order decides about colours.
+  /// Springs between points of all cloths; their order determines the colours.
   void assign(std::span<const ClothSpring> springs, const ClothPoints& points);
 
-  /// Changes `moves`, which points would make from their start in a step of length h, by the springs. Those
-  /// of what pins hold stay, and what pulls at them is added to their `pull`.
+  /// Applies the springs to `moves`, the displacements of points in a step of length h. The moves of pinned
+  /// points are kept, and the impulses on them are added to their `pull`.
   void step(ClothPoints& points, std::span<Vec4> moves, Real h);
 
-  /// How many springs counted as softer in the last step, by cloth; empty before the first.
+  /// Number of springs of each cloth whose stiffness was clamped in the last step; empty before the first.
   std::span<const uint64_t> clamped() const { return clamped_; }
 
  private:
   struct Spring {
     uint32_t a, b;
-    Real rest, stiffness;  // the latter times h^2, and as soft as it must be
+    Real rest, stiffness;  // stiffness times h^2, clamped if necessary
   };
   struct Material {
     Real stiffness, damping;
     Real most;  // of h^2 k (1/m_a + 1/m_b)
   };
-  /// A spring in the step, small because all of them pass through memory in every sweep. Moves d apart along
-  /// the direction are resisted by the impulse `along` d, less `forget` of that of the sweeps before.
+  /// A spring in the step. It is small because every sweep reads all of them. A relative move d along the
+  /// axis is resisted by the impulse `along` d, less the share `forget` of the impulse of previous sweeps.
   struct Link {
     Eigen::Vector4f axis;  // unit, from b to a; the fourth is `along`
     float forget, impulse;

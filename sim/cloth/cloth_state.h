@@ -24,14 +24,14 @@ struct Cloth {
   Real rest_volume = 0;              ///< inside of a closed one [m^3]
   Real age = 0;                      ///< [s]
   uint32_t version = 0;
-  bool stopped = false;  ///< lost its numbers: is left where it was
+  bool stopped = false;  ///< it became non-finite and is no longer stepped
   ClothReport report;
 };
 
 /// Volume inside of a closed surface by the divergence theorem [m^3].
 Real enclosed_volume(std::span<const Vec3> points, std::span<const Triangle> triangles);
 
-/// Of its springs [J].
+/// Elastic energy of its springs [J].
 Real elastic_energy(const Cloth& cloth);
 
 }  // namespace offstage::sim

@@ -1,8 +1,8 @@
 #pragma once
-/// All cloths of a world at work. In a sub-step of the world: outer forces, what can touch, then sub-steps of
-/// cloth, in each of which every cloth moves by its integrator, then its stretch limit, its contacts with
-/// cloth and those with bodies are solved, and at last moves are shortened until nothing is too long and no
-/// cloth went through cloth.
+/// Steps all cloths of a world. A sub-step of the world computes the external forces and the possible
+/// contacts, then runs sub-steps of cloth. In each of these the integrator moves every cloth; the stretch
+/// limit, contacts with cloth and contacts with bodies are solved; and moves are shortened until no spring is
+/// too long and no cloth has passed through cloth.
 
 #include <span>
 #include <vector>
@@ -22,16 +22,17 @@ namespace offstage::sim {
 
 class ClothSystem {
  public:
-  /// The cloths to step, which must stay where they are until the next call.
+  /// Sets the cloths to step. Their addresses must stay valid until the next call.
   void assign(std::vector<Cloth*> cloths);
 
-  /// Takes them through a sub-step of the world. `bodies` are those that may be touched or hold pins.
+  /// Advances the cloths through a sub-step of the world. `bodies` are those that may touch cloth or hold
+  /// pins.
   void step(const ClothWeather& weather, std::span<ClothBody> bodies);
 
   /// Writes strains and counts of contacts into the cloths' reports.
   void measure();
 
-  /// Around all points and where they may come to within h.
+  /// Box around all points and the positions that they may reach within h.
   Aabb reach(Real h) const;
 
  private:
@@ -41,12 +42,12 @@ class ClothSystem {
     Vec3 position;
     Vec4 from = Vec4::Zero();  // where the sub-step began
   };
-  /// In which frame a point's move was shortened.
+  /// Frame in which a point's move was shortened.
   enum Shortened : uint8_t { kWhole, kInPiece, kInWorld };
-  /// Of a piece of cloth with all that it may cross, in which its moves are shortened.
+  /// Frame of a piece of cloth and everything it may cross, in which its moves are shortened.
   struct Frame {
     bool rests = false;  // in the world
-    bool met = false;    // what is not of the piece, in the world's frame
+    bool met = false;    // the piece met something outside it, in the world's frame
     const ClothBody* holder = nullptr;
     Vec4 move = Vec4::Zero(), momentum = Vec4::Zero();  // of its points, or of its pins; of a free piece
     Real mass = 0;                                      // of the same
@@ -97,8 +98,9 @@ class ClothSystem {
   ClothContacts contacts_;
   CornerContacts corner_contacts_;
   SelfContacts self_contacts_;
-  std::vector<Vec4> span_start_, free_;  // positions when the span of self-contact began; before its pushes
-  uint32_t span_ = 0;                    // sub-steps of cloth since then
+  std::vector<Vec4> span_start_,
+      free_;           // positions at the start of the span of self-contact; positions before its corrections
+  uint32_t span_ = 0;  // sub-steps of cloth since then
   std::vector<uint8_t> collides_;
   std::vector<Held> held_;
   std::vector<Seam> seams_;
@@ -107,7 +109,7 @@ class ClothSystem {
   std::vector<Vec4> drift_;  // the move of the frame in which each point's move is shortened
   MoveShares shares_;
   std::vector<Frame> frames_;       // of the pieces
-  std::vector<uint8_t> shortened_;  // how a point's move was, in the sub-step
+  std::vector<uint8_t> shortened_;  // how each point's move was shortened in the sub-step
   std::vector<uint32_t> lowered_;   // points whose shares were lowered in a round
   std::span<ClothBody> bodies_;
 };

@@ -1,10 +1,10 @@
 #pragma once
-/// Tree of boxes over the triangles of all cloths, refitted as they move, that finds which may touch each
-/// other. A connected patch whose normals all lean to one side, and whose outline seen from there does not
-/// cross itself, cannot cross itself and is passed over whole (Volino and Magnenat-Thalmann, "Efficient
-/// self-collision detection on smoothly discretized surface animations using geometrical shape regularity",
-/// 1994). So are the triangles around one point whose normals lean to one side, unless their angles there
-/// could add up to more than a full turn as seen from that side.
+/// Tree of boxes over the triangles of all cloths, refitted as they move. It finds the pairs of triangles
+/// that may touch. A connected patch cannot cross itself if its normals all lie in one half-space and its
+/// outline, seen from there, does not cross itself; such a patch is skipped as a whole (Volino and
+/// Magnenat-Thalmann, "Efficient self-collision detection on smoothly discretized surface animations using
+/// geometrical shape regularity", 1994). The triangles around one point are skipped in the same case, unless
+/// their angles at the point could add up to more than a full turn as seen from that side.
 
 #include <array>
 #include <bit>
@@ -19,21 +19,21 @@ namespace offstage::sim {
 
 class ClothTree {
  public:
-  /// Triangles that may touch others, over the points of the unstrained cloths.
+  /// Builds the tree over triangles that may touch others, at the points of the unstrained cloths.
   void build(std::span<const Triangle> triangles, std::span<const Vec4> rest);
-  /// Fits boxes around the triangles at `from`, larger by each point's `margin`, with the bounds of their
-  /// ways to `to`.
+  /// Fits boxes around the triangles at `from`, enlarged by each point's `margin`, and bounds of their paths
+  /// to `to`.
   void fit(std::span<const Vec4> from, std::span<const Vec4> to, std::span<const Real> margin);
-  /// The same of a few triangles.
+  /// The same for some of the triangles.
   void refit(std::span<const uint32_t> triangles, std::span<const Vec4> from, std::span<const Vec4> to,
              std::span<const Real> margin);
 
-  /// Calls visit(a, b) for pairs of triangles whose boxes meet on their ways, each once, in an order that
-  /// depends on the tree and the boxes alone; only for pairs of which one was fitted in the last call of
-  /// fit() or refit(). `points` as fitted.
+  /// Calls visit(a, b) once for each pair of triangles whose boxes meet on their paths, if one of the two was
+  /// fitted in the last call of fit() or refit(). The order depends on the tree and the boxes alone. `points`
+  /// must be those of that call.
   template <class Visit>
   void pairs(std::span<const Vec4> points, Visit&& visit) const;
-  /// Calls visit(triangle) for those that meet a box that stays where it is.
+  /// Calls visit(triangle) for triangles whose moving boxes meet a box at rest.
   template <class Visit>
   void overlapping(const Aabb& bounds, Visit&& visit) const;
 
@@ -43,17 +43,17 @@ class ClothTree {
     Vec4 normal_low, normal_high;  // of the unit normals
     uint32_t first, count;         // triangles, in order_
     uint32_t second;               // node; the first child is the next one. 0: a leaf
-    uint32_t leaf = 0;             // then: in leaves_
+    uint32_t leaf = 0;             // of a leaf: its index in leaves_
     uint32_t fresh = 0;            // lanes of a leaf that were fitted last; else whether any below
     bool connected = false;        // all of it one piece
-    bool leans = false;            // that, and all normals to one side
+    bool leans = false;            // connected, and all normals lie in one half-space
   };
 
   /// All triangles around a point.
   struct Star {
     uint32_t first, count;  // places in order_, in around_
     bool simple;            // one fan, that does not overlap itself as long as its normals lean enough
-    bool leans = false;     // that, and they do
+    bool leans = false;     // simple, and its normals lie in one half-space
   };
 
   void build_stars(std::span<const Vec4> rest);
@@ -109,7 +109,7 @@ void ClothTree::within(std::span<const Vec4> points, uint32_t at, Visit& visit) 
   for (uint32_t i = 0; i < node.count; ++i) look(node, i, node, ~1u << i, visit);
 }
 
-/// A triangle of a leaf at those of a leaf that are in `lanes`.
+/// Visits the pairs of one triangle with the triangles of a leaf that are in `lanes`.
 template <class Visit>
 void ClothTree::look(const Node& own, uint32_t lane, const Node& other, uint32_t lanes, Visit& visit) const {
   if ((own.fresh >> lane & 1) == 0) lanes &= other.fresh;

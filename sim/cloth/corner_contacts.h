@@ -1,7 +1,7 @@
 #pragma once
 /// Contact of the sharp features of bodies with triangles of cloth: corners and edges of boxes, rims of
-/// cylinders and cones, vertices of meshes' hulls. Points of cloth keep out of bodies by themselves
-/// (cloth_contacts.h); here what is between them does.
+/// cylinders and cones, vertices of meshes' hulls. cloth_contacts.h keeps the points of cloth out of bodies;
+/// these contacts keep the triangles between the points out.
 
 #include <span>
 #include <vector>
@@ -16,16 +16,16 @@ class CornerContacts {
  public:
   /// Triangles of the cloths that collide with bodies.
   void assign(std::vector<Triangle> triangles, const ClothPoints& points);
-  /// What can meet in a sub-step of the world of length h.
+  /// Finds the features and triangles that can meet in a sub-step of the world of length h.
   void find(const ClothPoints& points, std::span<ClothBody> bodies, Real h);
-  /// Pushes apart in a sub-step of cloth of length dt. Appends to `cuts`.
+  /// Separates features and triangles in a sub-step of cloth of length dt. Appends to `cuts`.
   void solve(ClothPoints& points, Real dt, std::vector<VelocityCut>& cuts);
 
  private:
   /// A sample of a feature, in the body's frame.
   struct Corner {
     Vec3 place, outward;
-    Real depth;  // how far behind it cloth is still taken to have come from outside [m]
+    Real depth;  // greatest depth at which cloth behind the feature still counts as coming from outside [m]
   };
   struct Near {
     Corner corner;

@@ -15,7 +15,7 @@ struct MovingBox {
   using Corner = Eigen::Array4f;    // x y z 0
   std::array<Corner, 2> low, high;  ///< at the start and at the end
 
-  /// Corners of what is around bounds at the start and at the end.
+  /// Box around bounds at the start and at the end.
   static MovingBox around(const Vec4& low_start, const Vec4& high_start, const Vec4& low_end,
                           const Vec4& high_end) {
     return {{below(low_start), below(low_end)}, {above(high_start), above(high_end)}};
@@ -26,7 +26,7 @@ struct MovingBox {
       high[end] = high[end].max(b.high[end]);
     }
   }
-  /// False only if along an axis one is above the other all the way.
+  /// Returns false only if the boxes stay separate along one axis during the whole motion.
   bool meets(const MovingBox& b) const {
     const Corner over = (low[0] - b.high[0]).min(low[1] - b.high[1]);
     const Corner under = (b.low[0] - high[0]).min(b.low[1] - high[1]);
@@ -50,7 +50,7 @@ class EightBoxes {
  public:
   static constexpr uint32_t kCount = 8;
 
-  /// None of them; meets nothing.
+  /// Makes all boxes empty.
   void clear() {
     constexpr float kFar = std::numeric_limits<float>::max();
     for (auto& end : low_) end.fill(_mm256_set1_ps(kFar));
@@ -63,7 +63,7 @@ class EightBoxes {
         high_[end][axis][lane] = box.high[end][static_cast<Eigen::Index>(axis)];
       }
   }
-  /// A bit for each that the box meets.
+  /// Bit mask of the boxes that `box` meets.
   uint32_t meeting(const MovingBox& box) const {
     __m256 apart = gap(box, 0);
     for (std::size_t axis : {1u, 2u}) apart = _mm256_max_ps(apart, gap(box, axis));

@@ -2,10 +2,9 @@
 /// Contact of cloth with cloth: of points with triangles, and of edges with edges, at the cloths' thickness
 /// and with friction.
 ///
-/// Nothing that was not through another goes through: pairs whose moves together are shorter than their
-/// distance cannot have crossed; for the others there is a plane between the two at the start of the
-/// sub-step, and unless a plane with the same normal still is between them at its end, their moves are
-/// shortened.
+/// Cloth that was not crossing stays so. Pairs whose moves together are shorter than their distance cannot
+/// have crossed. For the others a plane separates the two at the start of the sub-step; if no plane with the
+/// same normal separates them at its end, their moves are shortened.
 
 #include <array>
 #include <cstdint>
@@ -25,13 +24,14 @@ class SelfContacts {
   void assign(std::vector<Triangle> triangles, const ClothPoints& points);
   bool empty() const { return triangles_.empty(); }
 
-  /// After points moved freely in a sub-step of length dt: finds pairs if those known no longer suffice, and
-  /// those that may touch in the sub-step. `horizon` is how long pairs are meant to suffice [s].
+  /// Finds the pairs that may touch, after points moved freely in a sub-step of length dt. The search is
+  /// repeated only if the known pairs no longer suffice. `horizon` is the time for which a search is meant to
+  /// suffice [s].
   void find(const ClothPoints& points, Real dt, Real horizon);
-  /// Pushes apart what is nearer than its thickness.
+  /// Separates pairs that are closer than their thickness.
   void solve(ClothPoints& points);
-  /// Finds the pairs that may have crossed by the moves that are made now, or would by a part of any beyond
-  /// the drift of the point; what hangs together drifts together.
+  /// Finds the pairs that may have crossed with the current moves, or may cross if any move is shortened
+  /// towards the drift of its point. Points of one piece have a common drift.
   void find_doubtful(const ClothPoints& points, Real dt, Real horizon, std::span<const Vec4> drift);
   void find_none() { contacts_.clear(); }
   /// Calls visit(points) for the pairs found: four, of which the first and the last are of one each.
@@ -39,9 +39,10 @@ class SelfContacts {
   void for_doubtful(Visit&& visit) const {
     for (const Contact& c : contacts_) visit(pairs_[c.pair].points);
   }
-  /// Lowers the shares of moves of those that did, and adds their points to `lowered`; whether any.
+  /// Lowers the shares of the moves of pairs that crossed, and adds their points to `lowered`. Returns
+  /// whether there were any.
   bool shorten(const ClothPoints& points, MoveShares& shares, std::vector<uint32_t>& lowered);
-  /// After the sub-step: how far points have come.
+  /// Records the moves of points at the end of the sub-step.
   void end_substep(const ClothPoints& points, Real dt);
 
   std::span<const uint64_t> active() const { return active_; }  ///< contacts of the last solve(), by cloth
@@ -56,7 +57,7 @@ class SelfContacts {
     std::array<uint32_t, 4> points;
     bool edges;
     Real thickness;
-    Real nearest;            // comes no nearer than this, if it is not yet
+    Real nearest;            // the pair is kept at least this far apart, unless it is already closer
     Real distance;           // when last looked at
     Real travel;             // of all four together until then
     Eigen::Vector3f normal;  // from the second to the first then
@@ -66,7 +67,7 @@ class SelfContacts {
     std::array<Real, 4> weights;  // of the difference of both closest points
     Vec4 normal;                  // from the second to the first
     Real distance;                // at the start of the sub-step
-    bool pushes;                  // else its neighbours do so
+    bool pushes;                  // false: its neighbours do so
   };
 
   void predict(const ClothPoints& points, std::size_t i, Real dt);

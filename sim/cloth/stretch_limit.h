@@ -1,6 +1,6 @@
 #pragma once
-/// The greatest length of springs (physics F7): first what is too long is drawn together in a few sweeps,
-/// which keeps the cloth lively; then moves are shortened until every limit holds, which makes it sure.
+/// The greatest length of springs (physics F7): a few sweeps first shorten springs that are too long, which
+/// preserves the motion of the cloth; then moves are shortened until every limit holds, which guarantees it.
 
 #include <cstdint>
 #include <span>
@@ -10,7 +10,7 @@
 
 namespace offstage::sim {
 
-/// Which share of its move of a sub-step each point makes.
+/// Share of its move of a sub-step that each point makes.
 using MoveShares = std::vector<Real>;
 
 class StretchLimit {
@@ -20,23 +20,25 @@ class StretchLimit {
     Real rest, longest;  // [m]
   };
 
-  /// Ties, as seams are, are drawn together with the limits, but no move is shortened because one is too
-  /// long: its ends make the same share of their moves, so that none opens.
+  /// Sets the limits and the ties, such as seams. Ties are shortened together with the limits, but no move is
+  /// shortened because a tie is too long. Both ends of a tie make the same share of their moves, so that no
+  /// tie opens.
   void assign(std::vector<Limit> limits, std::vector<Limit> ties, std::size_t point_count);
   bool empty() const { return limits_.empty(); }
-  /// What a tie measured at the start of the sub-step, and the length that it may have from now on [m].
+  /// Length of a tie at the start of the sub-step, and its allowed length from now on [m].
   Real tie_length(std::size_t tie, const ClothPoints& points) const {
     return (points.start[ties_[tie].a] - points.start[ties_[tie].b]).norm();
   }
   void set_tie(std::size_t tie, Real length) { ties_[tie].rest = ties_[tie].longest = length; }
 
-  /// Draws together what is too long; whether anything was. It may not suffice.
+  /// Shortens springs that are too long. Returns whether there were any. Some may stay too long.
   bool project(ClothPoints& points) const;
 
-  /// Lowers shares of moves where a limit does not hold; whether it did. If both ends made none, the lengths
-  /// would be those at the start, which held. What pins hold always makes its whole move. Looks at the limits
-  /// of the points in `lowered`, whose shares were lowered since they were looked at last, and leaves there
-  /// those that it lowered itself. While all shares are 1, at all limits.
+  /// Lowers shares of moves where a limit does not hold, and returns whether it did. This ends, because with
+  /// shares of 0 the lengths are those at the start, where the limits held. Pinned points always make their
+  /// whole move. On entry `lowered` holds the points whose shares were lowered since their last check, and
+  /// only their limits are checked; while all shares are 1, all limits are. On return it holds the points
+  /// that this call lowered.
   bool shorten(const ClothPoints& points, MoveShares& shares, std::vector<uint32_t>& lowered);
   bool shorten_whole_moves(const ClothPoints& points, MoveShares& shares,
                            std::vector<uint32_t>& lowered) const;

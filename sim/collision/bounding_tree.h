@@ -1,7 +1,6 @@
 #pragma once
 /// Binary trees of bounding volumes over the triangles of a mesh or, with axis-aligned boxes, over any items
-/// that have one (physics H1-H3). Everything is in the frame of the mesh; only the root is ever placed, by
-/// those who ask.
+/// that have one (physics H1-H3). All volumes are in the frame of the mesh; queries transform the root only.
 
 #include <algorithm>
 #include <concepts>
@@ -48,9 +47,9 @@ class BoundingTree {
   const Node& first_child(const Node& branch) const { return *(&branch + 1); }
   const Node& second_child(const Node& branch) const { return *(&branch + 1 + first_child(branch).size); }
 
-  /// Volume of everything; an empty box, or a point at the origin, if there are no items.
+  /// Volume of all items; an empty box, or a point at the origin, if there are none.
   Volume bounds() const { return nodes_.empty() ? Volume() : nodes_.front().volume; }
-  /// An upper bound of the distance of everything from the frame's origin [m].
+  /// Upper bound of the distance of all items from the frame's origin [m].
   Real reach() const;
 
   /// Calls visit(level, volume, is_leaf) for every node in depth-first order; the root is at level 0.

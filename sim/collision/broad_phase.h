@@ -1,11 +1,11 @@
 #pragma once
 /// Broad phase (physics H5, H6, E9): the pairs of objects whose boxes meet, by a uniform or multi-level Grid.
 ///
-/// Objects that stand still are settled: the grid that holds them is left alone, pairs of them are remembered
-/// as they were found, and a step costs what the others cost, which are entered in a grid of their own every
-/// time. Those of them that had not moved were entered in vain; once this has cost as much as settling all
-/// that stand still, they are settled together. So the work is a small multiple of the least possible,
-/// whatever moves when, and static objects come to cost nothing.
+/// Objects at rest are settled: their grid and their pairs are kept, so a step costs only as much as the
+/// other objects, which are inserted in a second grid at every step. Inserting an unsettled object that did
+/// not move is wasted work. Once this waste equals the cost of settling all objects at rest, they are settled
+/// together. The work is therefore within a small factor of the optimum for any motion, and static objects
+/// eventually cost nothing.
 
 #include <cstdint>
 #include <span>
@@ -19,25 +19,26 @@ class BroadPhase {
  public:
   explicit BroadPhase(GridKind kind = GridKind::multilevel) { sizes_.kind = kind; }
 
-  /// Adds an object under an index of the caller's, below CellTable::kMaxObjects; memory goes with the
-  /// greatest. The box is that of the bounding sphere, or a tighter or swept one. It may be a point and may
-  /// reach to infinity, but is neither empty nor NaN.
+  /// Adds an object under an index chosen by the caller, below CellTable::kMaxObjects; memory is proportional
+  /// to the greatest index. The box is that of the bounding sphere, or a tighter or swept one. It may be a
+  /// point or infinite, but not empty or NaN.
   void insert(uint32_t object, const Aabb& box, bool is_static = false);
-  /// Gives an object another box. One that did not move needs no call. Static ones may move, too.
+  /// Changes the box of an object. Objects that did not move need no call. Static objects may move, too.
   void move(uint32_t object, const Aabb& box);
   void remove(uint32_t object);
   bool contains(uint32_t object) const { return object < states_.size() && (states_[object] & kLive); }
 
-  /// All pairs whose boxes have a point in common and that are not both static, each once and in ascending
-  /// order: they depend on the boxes alone, not on threads nor on the past. Valid until the next call.
+  /// Returns all pairs of objects, not both static, whose boxes have a common point, each once and in
+  /// ascending order. The result depends on the boxes alone, not on threads or earlier calls. Valid until the
+  /// next call.
   std::span<const IndexPair> pairs();
 
-  /// What the last pairs() did.
+  /// Work of the last call of pairs().
   struct Work {
     std::size_t entered = 0;   ///< objects entered because they may have moved
     std::size_t copies = 0;    ///< in how many cells
     std::size_t compared = 0;  ///< boxes compared
-    std::size_t settled = 0;   ///< objects in the grid that was made anew for those at rest; 0 if none was
+    std::size_t settled = 0;   ///< objects in the rebuilt grid of objects at rest; 0 if it was not rebuilt
   };
   const Work& work() const { return work_; }
 

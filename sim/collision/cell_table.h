@@ -1,8 +1,8 @@
 #pragma once
-/// One level of a broad-phase grid: equal cubic cells in a hash table (physics H5, H6). What falls into one
-/// bucket lies there side by side with a copy of its box, so that a bucket is read straight through; empty
-/// space takes no memory. A table is built as a whole by counting sort, which is quicker than changing cells
-/// one by one as soon as more than a few objects move.
+/// One level of a broad-phase grid: equal cubic cells in a hash table (physics H5, H6). The objects of a
+/// bucket are stored contiguously with copies of their boxes, so that a bucket is read sequentially; empty
+/// space takes no memory. A table is built as a whole by counting sort, which is faster than updating cells
+/// one by one if more than a few objects move.
 
 #include <array>
 #include <cstdint>
@@ -21,8 +21,8 @@ struct IndexPair {
 
 /// A box as a point of eight dimensions: A meets B exactly if low(A) <= high(B) and -high(A) <= -low(B),
 /// which is one comparison of eight lanes. Rounding to single precision keeps order, so boxes that meet still
-/// do, and those that meet with no lane equal met before. The fourth axis tells cells apart: copies that were
-/// entered in different cells do not meet.
+/// do, and those that meet with no lane equal met before. The fourth axis distinguishes cells: copies in
+/// different cells do not meet.
 struct alignas(32) CellBox {
   std::array<float, 8> bound;  ///< low x y z, cell, minus high x y z, minus cell
 };
@@ -51,18 +51,18 @@ struct CellRange {
 /// Every pair is found once. The cells that two objects share are a box of cells. Its low corner is, along
 /// each axis, the low cell of the one or of the other object, and it is the only shared cell of which that is
 /// true. Each copy of an object remembers along which axes its cell is the object's low one: a pair counts
-/// where the two copies together have all three axes. Other cells in the same bucket do not disturb: the cell
-/// lanes are equal only for cells that are the same or a multiple of 256 apart, and no object spans more than
-/// kMaxSpan.
+/// where the two copies together have all three axes. Other cells in the same bucket cause no false pairs:
+/// the cell lanes are equal only for cells that are the same or a multiple of 256 apart, and no object spans
+/// more than kMaxSpan.
 class CellTable {
  public:
   static constexpr uint32_t kMaxObjects = 1u << 29;
   static constexpr int32_t kMaxSpan = 64;
 
-  /// Enters objects, which are given from the finest level to this one, whose own begin at `first_own`;
-  /// ranges are at their objects' levels. If `other`, the same level's table of other objects, is given
-  /// (built or not), then finer objects are left out of buckets in which neither table has an own object:
-  /// there is no partner for them.
+  /// Inserts objects, which are ordered from the finest level to this one; the level's own begin at
+  /// `first_own`. Ranges are at their objects' levels. If `other`, the same level's table of other objects,
+  /// is given (built or not), then finer objects are left out of buckets in which neither table has an own
+  /// object: there is no partner for them.
   void build(int32_t level, std::span<const CellRange> objects, std::size_t first_own,
              const CellTable* other);
   /// Forgets the objects; keeps the memory.
@@ -70,17 +70,17 @@ class CellTable {
 
   bool built() const { return !own_end_.empty(); }
   uint32_t bucket_count() const { return static_cast<uint32_t>(own_end_.size()); }
-  /// In how many cells objects were entered.
+  /// Number of copies of objects in cells.
   std::size_t copies() const { return copies_.size(); }
 
   /// Adds the pairs of the buckets [first, end).
   void find_pairs(uint32_t first, uint32_t end, CandidatePairs& out) const;
-  /// Adds the pairs of what is in the buckets [first, end) with what is in the same level's table of other
+  /// Adds the pairs of objects in the buckets [first, end) with those of the same level's table of other
   /// objects.
   void find_pairs_with(const CellTable& other, uint32_t first, uint32_t end, CandidatePairs& out) const;
 
  private:
-  /// What is to be entered.
+  /// An object to be inserted.
   struct Listed {
     uint32_t hash;
     uint32_t range;  // index

@@ -1,6 +1,6 @@
 #pragma once
-/// How far the space around a mesh is clear of it, in cells: one look-up tells that a small sphere touches
-/// nothing, where a search for the nearest triangle would take hundreds of times as long.
+/// Grid of clearances around a mesh, in cells. One look-up can show that a small sphere does not touch the
+/// mesh; a search for the nearest triangle takes hundreds of times as long.
 
 #include <array>
 #include <cstdint>
@@ -15,10 +15,11 @@ class ClearanceGrid {
   /// `solid`: the mesh has an inside, which is not clear.
   ClearanceGrid(const TriangleMesh& mesh, bool solid);
 
-  /// Whether a sphere (mesh frame) surely neither touches the surface nor is inside of it; may be false for
-  /// one that does not, too, if that is within three cells of the surface.
+  /// Returns true only if a sphere (mesh frame) neither touches the surface nor is inside it. The test is
+  /// conservative: it may return false for a clear sphere within three cells of the surface.
   bool is_clear(const Vec3& centre, Real radius) const;
-  /// Whether a point is surely not inside; may be false for one that is not, if the surface is in its cell.
+  /// Returns true only if a point is not inside. It may return false for an outside point whose cell contains
+  /// the surface.
   bool is_outside(const Vec3& p) const { return steps_[index(cell_of(p))] > 0; }
   /// Edge of a cell [m].
   Real cell() const { return cell_; }
@@ -41,8 +42,8 @@ class ClearanceGrid {
   Vec3 origin_;
   Real cell_ = 1;
   Cell count_{};
-  /// 0: the surface is in the cell, or the cell is inside; else how many cells away the nearest of the
-  /// surface is, as a king walks on a chessboard.
+  /// 0: the surface is in the cell, or the cell is inside; else the Chebyshev distance to the nearest cell
+  /// with the surface, in cells.
   std::vector<uint8_t> steps_;
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-/// A registered mesh with what registration computes once, in the mesh's own frame (physics E2).
+/// A registered mesh with the data that registration computes once, in the mesh's own frame (physics E2).
 
 #include <memory>
 #include <mutex>
@@ -17,7 +17,7 @@ namespace offstage::sim {
 
 class CollisionMesh {
  public:
-  /// `known`: the mesh's decomposition, if somebody has kept it; else it is made when it is first asked for.
+  /// `known` is the mesh's decomposition, if the caller has it; else it is computed when first needed.
   explicit CollisionMesh(TriangleMesh welded, std::optional<ConvexDecomposition> known = {});
 
   TriangleMesh mesh;
@@ -32,7 +32,7 @@ class CollisionMesh {
   const ConvexDecomposition& decomposition() const;
   /// Tree over the boxes of the decomposition's parts, whose items are their indices.
   const AabbTree& part_tree() const;
-  /// The space around it that is clear of it. Computed at the first call, which takes some 10 ms; safe from
+  /// Grid of the free space around the mesh. Computed at the first call, which takes about 10 ms; safe from
   /// several threads.
   const ClearanceGrid& clearance_grid() const;
 

@@ -1,7 +1,7 @@
 #pragma once
 /// A body's shape as the narrow phase sees it: convex pieces, and a tree over their boxes. A primitive is one
-/// piece. A mesh is the parts of its convex decomposition, or its triangles: where it has no inside, and
-/// where its decomposition is only approximate and the body does not need one (see CollisionShape's
+/// piece. A mesh is represented by the parts of its convex decomposition, or by its triangles if it has no
+/// inside or if its decomposition is only approximate and the body does not need one (see CollisionShape's
 /// constructor). The half-space under a plane has no pieces.
 
 #include <optional>
@@ -14,9 +14,9 @@ namespace offstage::sim {
 
 class CollisionShape {
  public:
-  /// `solid` and what it points to must outlive the shape. A body that moves by forces sets `needs_volume`:
-  /// against it other bodies' depth must be known, so that a mesh is its parts even if they only approximate
-  /// it; for others the exact surface is preferred.
+  /// `solid` and the data it points to must outlive the shape. Dynamic bodies set `needs_volume`: contacts
+  /// with them need a penetration depth, so a mesh is represented by its parts even if these are approximate.
+  /// For other bodies the exact surface is preferred.
   CollisionShape(const Solid& solid, bool needs_volume);
 
   const Solid& solid() const { return solid_; }
@@ -26,12 +26,12 @@ class CollisionShape {
   Convex piece(uint32_t index) const;
   /// Its items are the indices of the pieces.
   const AabbTree& tree() const { return mesh_tree_ ? *mesh_tree_ : own_tree_; }
-  /// Whether the pieces are triangles that bound a solid: then something can be inside of it that touches
-  /// none.
+  /// Whether the pieces are triangles that bound a solid. An object can then be inside it without touching a
+  /// piece.
   bool is_hollow() const { return triangles_ && solid_.mesh->solid; }
-  /// The mesh of which the pieces are the triangles; null if they are something else.
+  /// The mesh whose triangles are the pieces; null if the pieces are not triangles.
   const CollisionMesh* surface() const { return triangles_ ? solid_.mesh : nullptr; }
-  /// A convex solid around all pieces, as tight as can be. Not of a plane.
+  /// The convex hull of all pieces. Not available for a plane.
   const Convex& hull() const { return hull_; }
 
  private:

@@ -11,23 +11,25 @@
 
 namespace offstage::sim {
 
-/// Shares of the margin, which says how close counts as touching. By kTilt the gap along a face's normal may
-/// be shorter than the separation, and parallel edges may pass each other; by kRim a point may lie outside a
+/// Shares of the margin within which solids count as touching. By kTilt the gap along a face's normal may be
+/// shorter than the separation, and parallel edges may pass each other; by kRim a point may lie outside a
 /// face, and the true deepest point of a rim be deeper than the polygon's that stands for it.
 inline constexpr Real kTilt = 0.05, kRim = 0.001;
 /// Of the solids' size: what separations are found to.
 inline constexpr Real kSeparationRounding = 1e-9;
-/// Sine: a face further from across the separation's normal never gives the normal.
+/// Sine: a face whose normal is tilted more than this from the separation's normal never gives the contact
+/// normal.
 inline constexpr Real kMaxTilt = 0.05;
-/// Cosine: a face more inclined to the separation's normal is not near to anything.
+/// Cosine: a face whose normal is inclined more than this to the separation's normal is not near the other
+/// solid.
 inline constexpr Real kNearFace = 0.9;
-/// Sine: what is less inclined is parallel.
+/// Sine: directions inclined less than this count as parallel.
 inline constexpr Real kParallel = 1e-6;
 
-/// Sine: of two faces so nearly alike inclined the larger solid's gives the normal, or A's of solids of one
-/// size, lest the points change their names while the solids rock.
+/// Sine: if the inclinations of two faces differ by less than this, the larger solid's face gives the normal,
+/// or A's for solids of equal size. This keeps the ids of points constant while the solids rock.
 inline constexpr Real kAlike = 1e-3;
-/// By the tilts and the sizes of both.
+/// Whether A's face gives the normal, judged by the tilts and the sizes of both.
 inline bool a_gives_normal(Real tilt_a, Real tilt_b, Real reach_a, Real reach_b) {
   return reach_a >= reach_b ? tilt_a <= tilt_b + kAlike : tilt_a + kAlike < tilt_b;
 }
@@ -44,11 +46,11 @@ inline uint32_t vertex_id(uint32_t body, uint32_t tag) {
 inline uint32_t edge_id(uint32_t tag, uint32_t other_tag) {
   return mixed(std::min(tag, other_tag) + 2, std::max(tag, other_tag));
 }
-/// Of an edge of one body and an edge of the other.
+/// Id of the crossing of an edge of one body with an edge of the other.
 inline uint32_t crossing_id(uint32_t body_x, uint32_t edge_x, uint32_t edge_y) {
   return body_x == 0 ? mixed(edge_x, edge_y) : mixed(edge_y, edge_x);
 }
-/// Of the closest point of a body where it is none of its corners.
+/// Id of a body's closest point that is not one of its corners.
 inline uint32_t closest_id(uint32_t body) {
   return mixed(2, body);
 }
@@ -80,10 +82,11 @@ struct Candidates {
 
 /// Gives the manifold, whose normal is known, at most four of the points: all of them, or the deepest, the
 /// farthest from it, the one that spans the largest triangle with both, and the one that adds most to it.
-/// What is level within `slop` is equally deep. `more`, if there is one, gets four of those left out.
+/// Depths that differ by less than `slop` count as equal. `more`, if not null, gets four of the points left
+/// out.
 void reduce(Manifold& m, const Candidates& c, Real slop, Manifold* more = nullptr);
 
-/// Leaves out the points that are not farther apart than `least` [m].
+/// Removes the points whose separation is not greater than `least` [m].
 void drop_below(Manifold& m, Real least);
 
 }  // namespace offstage::sim

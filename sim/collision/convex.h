@@ -1,7 +1,7 @@
 #pragma once
-/// A convex solid as GJK, the penetration test and the advancement see it: the support mapping of a core, and
-/// a radius around the core. A sphere is a point with a radius, a capsule a segment with one; so the smooth
-/// shapes have exact distances.
+/// Convex solid for GJK, the penetration test and conservative advancement: the support mapping of a core,
+/// and a radius around the core. A sphere is a point with a radius, a capsule a segment with one; so the
+/// smooth shapes have exact distances.
 
 #include <array>
 #include <cstdint>
@@ -23,14 +23,14 @@ struct Convex {
   const ConvexPolyhedron* polyhedron = nullptr;
   std::array<const Vec3*, 3> corners{};  ///< of a triangle
 
-  /// The farthest point of the core along `d`, which need not be unit. For a polyhedron `vertex` says where
-  /// to start climbing and, afterwards, which vertex it is; for a box likewise, by the bits of its signs; for
-  /// a segment which end, for a triangle which corner. Other cores leave it alone.
+  /// The farthest point of the core along `d`, which need not be unit. For a polyhedron `vertex` is the
+  /// vertex to start climbing from on entry, and the vertex found on return. For a box it holds the sign bits
+  /// of the corner, for a segment the end, for a triangle the corner. Other cores do not use it.
   Vec3 support(const Vec3& d, uint32_t& vertex) const;
-  /// Whether support points are vertices, which a number brings back.
+  /// Whether support points are vertices that can be identified by a number.
   bool has_vertices() const { return core != Core::cylinder && core != Core::cone; }
-  /// The vertex of the core with this number, as support() gives it; a number that is none stands for
-  /// another.
+  /// The vertex of the core with this number, as support() gives it; an invalid number is mapped to a valid
+  /// vertex.
   Vec3 vertex(uint32_t number) const;
   /// A point inside the core.
   Vec3 centre() const;
@@ -41,11 +41,12 @@ struct Convex {
 /// The convex solid of a primitive; MeshShape and Plane have none and are not accepted.
 Convex convex(const Shape& primitive);
 Convex convex(const ConvexPolyhedron& polyhedron, Real radius = 0);
-/// A triangle of vertices that stay where they are; without area it is a segment or a point.
+/// A triangle that refers to its vertices, which must outlive it. Without area it acts as a segment or a
+/// point.
 Convex convex_triangle(const Vec3& a, const Vec3& b, const Vec3& c);
 
-/// A vertex of a polyhedron that is farthest along `d`. Climbs from `start` along the edges; where neighbours
-/// are level within rounding (the top may then be further on) and on small polyhedra it looks at all
+/// A vertex of a polyhedron that is farthest along `d`. Climbs from `start` along the edges; if neighbours
+/// are level within rounding (the top may then be further away), and on small polyhedra, it checks all
 /// vertices.
 uint32_t support_vertex(const ConvexPolyhedron& p, const Vec3& d, uint32_t start);
 

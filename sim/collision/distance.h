@@ -29,11 +29,12 @@ SurfaceDistance signed_distance(const Capsule& c, const Vec3& p);
 SurfaceDistance signed_distance(const Cylinder& c, const Vec3& p);
 SurfaceDistance signed_distance(const Cone& c, const Vec3& p);
 SurfaceDistance signed_distance(const Plane&, const Vec3& p);
-/// A mesh that is not solid has positive distances on both sides; inside or outside of a solid one is decided
-/// by the pseudonormal of the nearest feature.
+/// A mesh that is not solid has positive distances on both sides; for a solid mesh, the pseudonormal of the
+/// nearest feature decides whether the point is inside.
 SurfaceDistance signed_distance(const CollisionMesh& m, const Vec3& p);
 SurfaceDistance signed_distance(const Solid& s, const Vec3& p);
-/// The same where the distance is less than `limit` [m], >= 0; else any that is not. Far cheaper off a mesh.
+/// Signed distance if it is less than `limit` [m], >= 0; otherwise any value not less than `limit`. It is
+/// much faster away from a mesh.
 SurfaceDistance signed_distance_below(const Solid& s, const Vec3& p, Real limit);
 
 /// Support function: the largest n.x over the points x of a solid; infinite for a plane unless n is +Y.

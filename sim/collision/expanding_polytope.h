@@ -2,8 +2,7 @@
 /// Penetration depth by the expanding polytope: van den Bergen, "Proximity queries and penetration depth
 /// computation on 3D game objects" (2001). A polytope inside A - B grows by support points beyond its face
 /// nearest to the origin until that face is one of A - B. Distances of faces are signed, so touching is no
-/// special case: an origin outside by rounding, or by little, gets a small positive distance along the same
-/// normal.
+/// special case: an origin slightly outside gets a small positive distance along the same normal.
 
 #include "sim/collision/simplex.h"
 
@@ -19,7 +18,8 @@ struct DeepestPoint {
   bool converged = true;
 };
 
-/// Starts from the simplex that holds the origin or its nearest point, and leaves the final face there. If A
+/// Starts from the simplex that contains the origin or its nearest point, and replaces it by the final face.
+/// If A
 /// - B is flat, the distance is 0 within rounding and the normal is across it, on the side of `sense`.
 DeepestPoint deepest_point(const MinkowskiDifference& m, Simplex& s, const Vec3& sense);
 

@@ -14,18 +14,18 @@
 
 namespace offstage::sim {
 
-/// Where the last query of a pair ended; empty before the first. Any content is safe: it only decides how
-/// soon the answer is found, never what it is (beyond rounding and the choice between equal ones).
+/// Final state of the last query of a pair; empty before the first. Any content is safe: it affects only the
+/// speed of the query, not its result, except for rounding and the choice between equivalent results.
 struct GjkCache {
   uint32_t size = 0;                 ///< of the simplex, in `from`; not used with curved cores
-  std::array<VertexPair, 4> from{};  ///< also where supports start to climb
+  std::array<VertexPair, 4> from{};  ///< also the start of the support climb
   Vec3 direction = Vec3::Zero();     ///< last normal, in A's frame; zero before the first query
 };
 
 /// Signed distance of A and B. Exact to rounding between cores with vertices, whatever their position; with a
-/// cylinder or a cone to 1e-12 of the size when apart and 1e-10 in penetration (some 0.5 % of those are a
-/// little worse, and say so by `converged`). Cores that overlap or touch are handed to deepest_point(), which
-/// has the normal of a face of A - B; so it does not depend on how near to touching they are.
+/// cylinder or a cone to 1e-12 of the size when apart and 1e-10 in penetration (about 0.5 % of those are
+/// slightly worse, which `converged` reports). Cores that overlap or touch are passed to deepest_point(),
+/// whose normal is that of a face of A - B, so the normal is robust near touching.
 Separation gjk(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache& cache);
 
 /// The same without a cache: for solids known to overlap, the depth and direction of the least translation

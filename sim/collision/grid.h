@@ -4,12 +4,12 @@
 ///
 /// An object of the multi-level grid with diameter d belongs to the level whose cells are L wide with
 /// kMinInCell <= d/L < 2 kMinInCell. L is a power of two of a metre, where the book has one of d_min/k_min:
-/// so neither the level of an object nor the cells of a level change with the smallest object, levels come
-/// and go with their objects alone, and coarser cells follow from finer ones by a shift of bits. Objects are
-/// entered at their own and every coarser level, as in the book; those that move only where they can find a
-/// partner. (To enter each at its own level alone and look up the coarser cells took a tenth longer when all
-/// moves, and twice as long where much rests: what lies side by side is compared quickest.) The uniform grid
-/// is the case of a single level whose width is given.
+/// so neither the level of an object nor the cells of a level depend on the smallest object, levels exist
+/// only while they have objects, and coarser cells follow from finer ones by a bit shift. Objects are
+/// inserted at their own and every coarser level, as in the book; moving objects only where they can find a
+/// partner. (Inserting each object at its own level alone and looking up coarser cells took a tenth longer if
+/// all objects move, and twice as long if many are at rest, because contiguous data are compared fastest.)
+/// The uniform grid is the case of a single level whose width is given.
 
 #include <array>
 #include <cstdint>
@@ -25,7 +25,7 @@ enum class GridKind {
   multilevel,  ///< levels of cells, each twice as wide as the level below
 };
 
-/// How wide cells are and where a box belongs. A box's diameter is its longest side.
+/// Cell widths, and the level of a box. A box's diameter is its longest side.
 struct CellSizes {
   /// Width of a cell of the uniform grid in mean diameters (the book's k).
   static constexpr Real kMeansInCell = 2;
@@ -34,9 +34,9 @@ struct CellSizes {
   static constexpr Real kMinInCell = 0.25;
   /// Levels count from 0 to kLevels - 1, from the width 2^kFinest m, good for objects of a micrometre.
   static constexpr int32_t kFinest = -18, kLevels = 64;
-  /// Farther out there are no cells [m].
+  /// Greatest distance of cells from the origin [m].
   static constexpr Real kMaxReach = 0x1p40;
-  /// In place of a level: for objects too large or too far out for cells.
+  /// In place of a level: for objects too large or too far away for cells.
   static constexpr int32_t kNone = -1;
 
   GridKind kind = GridKind::multilevel;
@@ -52,7 +52,7 @@ struct CellSizes {
 
 class Grid {
  public:
-  /// Takes the objects, given by their indices in `boxes`; enters none in cells as yet.
+  /// Assigns the objects, given by their indices in `boxes`, without inserting them in cells.
   void assign(const CellSizes& sizes, std::span<const uint32_t> objects, std::span<const Aabb> boxes);
 
   /// Those that cells can hold, from the finest to the coarsest level.
@@ -60,14 +60,14 @@ class Grid {
   /// The others.
   std::span<const uint32_t> large() const { return large_; }
 
-  /// For a grid at rest: builds the tables that pairs with the objects of `moving` need and that are not
-  /// built yet, with everything in them. Returns in how many cells objects were entered.
+  /// For a grid at rest: builds the complete tables that are needed for pairs with the objects of `moving`
+  /// and do not exist yet. Returns the number of copies of objects in cells.
   std::size_t enter_to_stay(const Grid& moving);
   /// For a moving grid: builds all tables, for pairs among its objects and with those of `resting`. Returns
-  /// in how many cells objects were entered.
+  /// the number of copies of objects in cells.
   std::size_t enter_to_pair(const Grid& resting);
 
-  /// By level; those are not built where there is nothing to find.
+  /// Tables by level. Tables that cannot contain a pair are not built.
   const std::array<CellTable, CellSizes::kLevels>& tables() const { return tables_; }
 
  private:

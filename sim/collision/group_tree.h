@@ -1,7 +1,7 @@
 #pragma once
-/// The bounding tree of a group of objects, as the links of an articulation (physics A2): a balanced
-/// hierarchy of boxes whose leaves are those of the objects, in an order that has neighbours next to each
-/// other, so that its branches are parts of the group. It is refitted as the objects move, and never rebuilt.
+/// Bounding tree of a group of objects, such as the links of an articulation (physics A2). It is a balanced
+/// hierarchy whose leaves are the boxes of the objects, ordered so that neighbours are adjacent and branches
+/// are connected parts of the group. It is refitted as the objects move, and never rebuilt.
 
 #include <span>
 #include <vector>
@@ -17,11 +17,11 @@ class GroupTree {
   explicit GroupTree(std::span<const uint32_t> members);
 
   std::span<const uint32_t> members() const { return members_; }
-  /// Takes the boxes of the members as they are now, by object.
+  /// Updates the tree to the current boxes, which are indexed by object.
   void refit(std::span<const Aabb> boxes);
   const Aabb& bounds() const { return boxes_[1]; }
 
-  // Each appends the pairs whose boxes have a point in common, the lesser object first.
+  // These functions append the pairs whose boxes have a common point, the lesser object first.
   void find_own_pairs(std::vector<IndexPair>& pairs) const;
   void find_pairs(uint32_t object, const Aabb& box, std::vector<IndexPair>& pairs) const;
   void find_pairs(const GroupTree& other, std::vector<IndexPair>& pairs) const;

@@ -1,7 +1,7 @@
 #pragma once
-/// A broad phase of two levels (physics A2): groups of objects, as the links of articulations, have one box
-/// in the grid, and a tree below it, which finds their pairs with what meets that box and with each other.
-/// What does not belong to a group is in the grid itself.
+/// A broad phase of two levels (physics A2): each group of objects, such as the links of an articulation, has
+/// one box in the grid and a tree below it, which finds the pairs among its members and with objects that
+/// meet the group's box. Other objects are in the grid itself.
 
 #include <cstdint>
 #include <span>
@@ -14,13 +14,14 @@ namespace offstage::sim {
 
 class GroupedBroadPhase {
  public:
-  /// As of BroadPhase, whichever level an object is on.
+  /// As the functions of BroadPhase, for objects of both levels.
   void insert(uint32_t object, const Aabb& box, bool is_static = false);
   void move(uint32_t object, const Aabb& box);
   void remove(uint32_t object);
   bool contains(uint32_t object) const { return object < group_of_.size() && group_of_[object] != kAbsent; }
 
-  /// The groups from now on: objects that it contains, none of them static, each in one group at most.
+  /// Sets the groups. Their objects must be in the broad phase, must not be static, and are each in one group
+  /// at most.
   void set_groups(std::span<const std::vector<uint32_t>> groups);
 
   /// The pairs that BroadPhase::pairs() would give.
@@ -31,7 +32,7 @@ class GroupedBroadPhase {
   /// In the grid under its first member.
   struct Group {
     GroupTree tree;
-    bool is_whole = true;  // no member has been removed; otherwise it is a group no longer
+    bool is_whole = true;  // no member has been removed; otherwise it is no longer treated as a group
     bool moved = true;
     std::vector<IndexPair> own_pairs = {};
   };

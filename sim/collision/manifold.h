@@ -1,6 +1,6 @@
 #pragma once
 /// Contact manifolds (physics R5): up to four points that represent where two convex solids touch, or would
-/// touch if they came closer.
+/// touch if they were closer.
 
 #include <array>
 #include <cstdint>
@@ -14,12 +14,12 @@ namespace offstage::sim {
 struct ContactPoint {
   Vec3 on_a = Vec3::Zero(), on_b = Vec3::Zero();  ///< on the surfaces; on_a - on_b = separation * normal
   Real separation = 0;                            ///< [m], negative in penetration
-  /// Of the two features that meet here, a vertex and the other solid or an edge and an edge: the same from
-  /// step to step while they do.
+  /// Identifies the two features that meet here: a vertex and the other solid, or two edges. It is constant
+  /// from step to step while they meet.
   uint32_t id = 0;
 };
 
-/// Which features the normal comes from: it decides how the normal turns with the bodies (contact_frame.h).
+/// Features that define the normal. They determine how the normal turns with the bodies (contact_frame.h).
 enum class NormalSource : uint8_t {
   face_of_a,  ///< the normal is fixed in A
   face_of_b,  ///< the normal is fixed in B
@@ -33,42 +33,42 @@ struct Manifold {
   Vec3 normal = Vec3::UnitY();  ///< unit, from B to A
   NormalSource source = NormalSource::points;
   Vec3 edge_a = Vec3::Zero(), edge_b = Vec3::Zero();  ///< unit directions of the lines that `source` names
-  /// How far behind the surfaces those lines and points lie: of a sphere its centre, of a cylinder's side its
-  /// axis, of a sharp edge or vertex nothing [m]. 0 for faces.
+  /// Depth of those lines and points behind the surfaces [m]: the radius for a sphere's centre or the axis of
+  /// a cylinder's side, 0 for a sharp edge, a vertex or a face.
   Real radius_a = 0, radius_b = 0;
   uint32_t count = 0;
   uint32_t piece_a = 0, piece_b = 0;  ///< of the shapes (CollisionShape::piece())
-  /// Whether the surface of A, of B is known to go on around the points as the normal says. Else other pieces
-  /// or bodies may be flush with it.
+  /// Whether the surface of A (of B) is known to continue around the points in the plane across the normal.
+  /// Otherwise other pieces or bodies may be flush with it.
   bool continues_a = false, continues_b = false;
   std::array<ContactPoint, 4> points;  ///< the deepest first
 };
 
-/// Of solids that turn: points left out of more than four; and where an edge or a vertex touches, what comes
-/// near a face besides, with those left out of it.
+/// Further manifolds of solids that turn: the points that did not fit into four; and where an edge or a
+/// vertex touches, the points near a face, with those that did not fit.
 struct MoreManifolds {
   std::array<Manifold, 2> manifolds;
 };
 
 /// The manifold of two solids around their closest (or deepest) points, in A's frame: the features of both
-/// that face each other along the normal, one clipped against the other, keeping what is within `margin` [m]
-/// of touching; of more than four points those that keep the deepest and the area. At least one point if the
-/// separation itself is within the margin, none otherwise. Points of a radius around an inclined core are
-/// below the core's: what is not the deepest lies a little inside the solid.
+/// that face each other along the normal, one clipped against the other, keeping points within `margin` [m]
+/// of touching. Of more than four points, the deepest and those that span the greatest area are kept. At
+/// least one point if the separation itself is within the margin, none otherwise. Points on the radius around
+/// an inclined core are placed below the core's points, so all but the deepest are slightly inside the solid.
 ///
 /// A face that is almost across the separation's normal gives the normal instead of it: where the gap along
-/// the face's normal is less than a twentieth of the margin shorter. So solids that rest on each other keep
-/// their normal and their points while they rock by that little. Of a face of each the less inclined one
-/// gives it; if they are alike (to a thousandth) the larger solid's, or A's.
+/// the face's normal is less than a twentieth of the margin shorter. Solids at rest on each other therefore
+/// keep their normal and their points while they rock slightly. If both solids have such a face, the less
+/// inclined one gives the normal; if they are equal (to a thousandth), that of the larger solid, or A's.
 ///
-/// `more`, if there is one, gets what of solids that turn may touch next and would otherwise go unseen.
+/// `more`, if not null, gets the points of turning solids that may touch next and would otherwise be missed.
 Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const Separation& s, Real margin,
                   MoreManifolds* more = nullptr);
 
 /// The manifold of a triangle whose face gives the normal, `up`, unit and away from the triangle, in A's
-/// frame, and of the other solid: of its supporting feature the corners that are before the face, and more of
-/// it as far as it lies level with its deepest point. `of_b`: the triangle is B. `beyond`: by how much the
-/// points may be outside of the edges (0,1), (1,2), (2,0) [m]. May have no points.
+/// frame, and of the other solid: the corners of its supporting feature that are in front of the face, and
+/// further points of the feature that are level with its deepest point. `of_b`: the triangle is B. `beyond`:
+/// by how much the points may be outside of the edges (0,1), (1,2), (2,0) [m]. May have no points.
 Manifold triangle_face_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, bool of_b,
                                 const Vec3& up, const std::array<Real, 3>& beyond, Real margin);
 

@@ -1,8 +1,8 @@
 #pragma once
-/// Which contact normals the surface of a triangle mesh allows. A contact at an edge or a vertex pushes only
+/// Contact normals that the surface of a triangle mesh allows. A contact at an edge or a vertex pushes only
 /// along the directions of that feature's Voronoi region: those in which no other triangle around it is
-/// nearer. An edge between triangles of one plane has no direction but theirs, and one in a valley none at
-/// all, so that neither stops what slides over it.
+/// nearer. An edge between coplanar triangles allows only their normal, and a concave edge allows none, so
+/// neither stops objects that slide over it.
 
 #include <array>
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace offstage::sim {
 
-/// What contacts ask about the surroundings of each triangle of a mesh; found once.
+/// Neighbourhood of each triangle of a mesh; computed once.
 class MeshSurface {
  public:
   MeshSurface(const TriangleMesh& mesh, const MeshTopology& topology);
@@ -20,9 +20,9 @@ class MeshSurface {
   /// The triangles across the edges (0,1), (1,2), (2,0) of a face, past any without an area; kNoFace at a
   /// border.
   const std::array<uint32_t, 3>& across(uint32_t face) const { return faces_[face].across; }
-  /// Whether one of its vertices is at a border: what lies beyond is not known here.
+  /// Whether one of its vertices is at a border, beyond which the surface is unknown.
   bool is_at_border(uint32_t face) const { return faces_[face].at_border; }
-  /// Whether it is so thin that it has no reliable normal.
+  /// Whether the triangle is too thin to have a reliable normal.
   bool is_sliver(uint32_t face) const { return faces_[face].sliver; }
 
  private:

@@ -16,7 +16,7 @@ struct VertexPair {
   bool operator==(const VertexPair&) const = default;
 };
 
-/// A point of A - B that is extreme in some direction.
+/// A support point of A - B.
 struct SupportPoint {
   Vec3 w;  ///< the point
   Vec3 a;  ///< the point of A's core which it comes from
@@ -28,7 +28,7 @@ class MinkowskiDifference {
   MinkowskiDifference(const Convex& a, const Convex& b, const Pose& a_from_b)
       : a_(a), b_(b), R_(a_from_b.orientation.toRotationMatrix()), t_(a_from_b.position) {}
 
-  /// The point that is least along `d`, not necessarily unit; vertices are climbed from `hint`.
+  /// The point of A - B that is lowest along `d`, which need not be unit. Vertices are climbed from `hint`.
   SupportPoint lowest(const Vec3& d, VertexPair hint) const {
     SupportPoint p;
     p.from = hint;
@@ -41,11 +41,11 @@ class MinkowskiDifference {
     const Vec3 a = a_.vertex(from.a);
     return {a - place(b_.vertex(from.b)), a, from};
   }
-  /// Whether vertices tell all points of lowest().
+  /// Whether all points of lowest() are differences of vertices.
   bool has_vertices() const { return a_.has_vertices() && b_.has_vertices(); }
   /// A point inside.
   Vec3 centre() const { return a_.centre() - place(b_.centre()); }
-  /// The rounding error of its points, a bound up to a small factor [m].
+  /// Approximate bound of the rounding error of its points [m].
   Real rounding() const {
     return std::numeric_limits<Real>::epsilon() * (a_.reach() + b_.reach() + t_.norm());
   }

@@ -1,8 +1,8 @@
 #pragma once
-/// Narrow phase: what happens between two placed shapes of any kind (physics R3-R5, R12). Pairs of their
-/// convex pieces are found tree against tree, and each is put to GJK or V-Clip. Everything is reported in the
-/// frame of the first shape, A, with normals from B to A. A plane can only be the second, and not both can be
-/// planes.
+/// Narrow phase: distance, contacts and time of impact of two shapes of any kind at given poses (physics
+/// R3-R5, R12). Pairs of their convex pieces are found by traversing both trees, and each pair is measured by
+/// GJK or V-Clip. Everything is reported in the frame of the first shape, A, with normals from B to A. Only
+/// the second shape can be a plane.
 
 #include <cstdint>
 #include <limits>
@@ -17,29 +17,29 @@
 
 namespace offstage::sim {
 
-/// Which algorithm measures pairs of polyhedra; both give the same answers. Round pieces always go to GJK.
+/// Algorithm that measures pairs of polyhedra. Both give the same results. Round pieces always use GJK.
 enum class DistanceMethod : uint8_t { gjk, vclip };
 
-/// What is remembered of a pair of shapes from one query to the next. It makes the next quick and changes no
-/// answer beyond rounding.
+/// Data of a pair of shapes kept between queries. It makes the next query faster and does not change results
+/// beyond rounding.
 class PairCache {
  public:
   struct Entry {
     uint32_t piece_a, piece_b;
     GjkCache gjk;
     VclipCache vclip;
-    /// Of pieces that are triangles: on which side of it the other piece is (SurfaceTriangle::side); 0 if it
-    /// is not known. What penetrates a triangle stays on the side from which it came.
+    /// For pieces that are triangles: the side on which the other piece is (SurfaceTriangle::side); 0 if
+    /// unknown. A piece that penetrates a triangle keeps the side from which it came.
     int8_t side_of_a = 0, side_of_b = 0;
   };
-  /// The entry of a pair of pieces, fresh if there was none. Valid until the next call.
+  /// The entry of a pair of pieces, which is created if necessary. Valid until the next call.
   Entry& of(uint32_t piece_a, uint32_t piece_b);
-  /// The same if there is one, else null.
+  /// The entry of a pair of pieces if it exists, else null.
   const Entry* find(uint32_t piece_a, uint32_t piece_b) const;
-  /// Forgets the pieces that were not asked for since the last call.
+  /// Removes the entries that were not used since the last call.
   void forget_unused();
 
-  /// Whether the shapes are where they really were: only then are sides kept.
+  /// Whether the shapes are at their actual, not predicted, poses. Sides are stored only then.
   bool keeps_sides = true;
 
  private:
@@ -50,8 +50,8 @@ class PairCache {
   std::vector<Used> entries_;  // ascending by pieces
 };
 
-/// Signed distance of the closest, or deepest, two pieces; none if all are farther than `limit` [m].
-/// Something inside a hollow shape is in penetration, too.
+/// Signed distance of the closest, or deepest, two pieces; none if all are farther than `limit` [m]. A piece
+/// inside a hollow shape counts as penetrating, too.
 std::optional<Separation> separation(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b,
                                      PairCache& cache, DistanceMethod method = DistanceMethod::gjk,
                                      Real limit = std::numeric_limits<Real>::infinity());
@@ -60,30 +60,30 @@ std::optional<Separation> separation(const CollisionShape& a, const CollisionSha
 bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b);
 
 /// Appends the manifolds of all pairs of pieces within `margin` [m] of each other, in an order that depends
-/// on the shapes alone. Whatever the method, two boxes have the separating axis test, and spheres closed
-/// forms. Of shapes that turn against each other it tells also what may touch next, as further manifolds
-/// (`more` of manifold()).
+/// on the shapes alone. For every method, two boxes use the separating axis test, and spheres use closed
+/// forms. If the shapes turn relative to each other (`turning`), points that may touch next are added as
+/// further manifolds (`more` of manifold()).
 void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b, Real margin,
                     PairCache& cache, DistanceMethod method, std::vector<Manifold>& manifolds,
                     bool turning = false);
 
-/// A shape on its way.
+/// A moving shape.
 struct MovingShape {
   const CollisionShape& shape;
   const PosePath& path;
 };
 
-/// A share of the step at which the shapes are within `tolerance` [m], > 0, of each other, and before which
-/// they are never within half of it; none if they stay more than half of it apart. Shapes that begin within
+/// Share of the step at which the shapes are within `tolerance` [m], > 0, of each other. Before it they are
+/// never within half of that distance. None if they stay more than half of it apart. Shapes that begin within
 /// it, or one inside the other, have their impact at share 0. Conservative advancement over both trees at
 /// once, with a bound on the motion per node: Tang, Kim, Manocha, "C2A: controlled conservative advancement
 /// for continuous collision detection of polygonal models" (2009).
 std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance);
 
-/// The same of shapes that are within the tolerance at the start, and may stay so or part: when their
-/// nearest, or deepest, points approach each other faster than `speed` [m per step], > 0, and than the rate
-/// of the turn is off even. As there is always something near, these are looked at here and there on the way,
-/// up to where the shapes are apart.
+/// Time of the next impact of shapes that are within the tolerance at the start and may stay so or separate.
+/// An impact is where their nearest or deepest points approach faster than `speed` [m per step], > 0, and
+/// faster than the deviation of the turn from a constant rate. The points are sampled along the motion until
+/// the shapes are separate, because conservative advancement makes no progress within the tolerance.
 std::optional<Impact> time_of_next_impact(const MovingShape& a, const MovingShape& b, Real tolerance,
                                           Real speed);
 

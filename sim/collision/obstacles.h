@@ -1,6 +1,6 @@
 #pragma once
-/// The bodies that particles can hit, as they move during one sub-step, arranged for quick rejection. Their
-/// ways are given: what particles do to a body counts from the next sub-step on (P8).
+/// The bodies that particles can hit, with their motion during one sub-step, stored for fast rejection tests.
+/// Their motion is given: the effect of particles on a body begins in the next sub-step (P8).
 
 #include <algorithm>
 #include <span>
@@ -22,19 +22,20 @@ struct Obstacle {
   Vec3 velocity_at(const Vec3& p, Real fraction) const {
     return velocity + angular_velocity.cross(p - start.position - fraction * (end.position - start.position));
   }
-  /// Where its centre of mass is at a fraction of the sub-step.
+  /// Position of its centre of mass at a fraction of the sub-step.
   Vec3 centre_at(Real fraction) const { return at(fraction).point_to_world(centre); }
-  /// Unit direction of the friction axis where the surface has the normal n (world) at a fraction of the sub-step;
-  /// zero where friction is the same in all directions.
+  /// Unit direction of the friction axis where the surface has the normal n (world) at a fraction of the
+  /// sub-step; zero where friction is the same in all directions.
   Vec3 friction_axis_on(const Vec3& n, Real fraction) const;
   /// K of P8: the velocity that a unit impulse at `arm` from the centre of mass gives to the point there,
   /// world axes [1/kg].
   Mat3 mobility(const Vec3& arm) const;
   bool is_dynamic() const { return inverse_mass > 0; }
-  /// In the frame of a turning solid a straight path is curved. Into how many straight pieces it must be cut
-  /// so that they deviate from it by no more than kChordError of the particle's radius; bounded.
+  /// Number of straight pieces into which a particle's path is divided. In the frame of a turning solid a
+  /// straight path is curved; the pieces deviate from it by at most kChordError of the particle's radius. The
+  /// number is bounded.
   int pieces(Real particle_radius) const;
-  /// Around all places of the sub-step, in the world.
+  /// Box in the world around all its positions during the sub-step.
   Aabb swept_bounds() const;
 
   static constexpr Real kChordError = 0.02;
@@ -45,10 +46,11 @@ struct Obstacle {
   Real turn = 0;                                                  ///< angle turned [rad]
   Real extent;                                                    ///< reach() of the solid
   Real restitution, friction;
-  Real cross_friction = 1;    ///< across the friction axis over that along it
-  Vec3 friction_axis = Vec3::Zero();  ///< direction of the surface's friction axis, in the solid's frame; zero: none
-  uint32_t body = 0;          ///< a number of the world's for it
-  Real inverse_mass = 0;      ///< [1/kg]; 0: particles do not move it
+  Real cross_friction = 1;  ///< across the friction axis over that along it
+  Vec3 friction_axis =
+      Vec3::Zero();       ///< direction of the surface's friction axis, in the solid's frame; zero: none
+  uint32_t body = 0;      ///< the world's index of the body
+  Real inverse_mass = 0;  ///< [1/kg]; 0: particles do not move it
   Mat3 inverse_inertia =
       Mat3::Zero();  ///< about the centre of mass, world axes at the end of the sub-step [1/(kg m^2)]
   Vec3 centre = Vec3::Zero();  ///< of mass, in the solid's frame
@@ -56,7 +58,7 @@ struct Obstacle {
   Vec3 end_velocity = Vec3::Zero(), end_spin = Vec3::Zero();
 };
 
-/// What a particle did to a body.
+/// Impulse of a particle on a body.
 struct Reaction {
   uint32_t body;         ///< Obstacle::body
   Vec3 impulse;          ///< [N s]
@@ -71,8 +73,8 @@ class Obstacles {
 
   std::span<const Obstacle> all() const { return obstacles_; }
 
-  /// Calls visit(obstacle) for those that a sphere may touch on its way from a to b (world), wherever in the
-  /// sub-step.
+  /// Calls visit(obstacle) for the obstacles that a sphere may touch on its path from a to b (world) at any
+  /// time of the sub-step.
   template <class Visit>
   void near_path(const Vec3& a, const Vec3& b, Real radius, Visit&& visit) const {
     for (const PlanePath& plane : planes_)
@@ -94,7 +96,7 @@ class Obstacles {
     Real start_offset, end_offset;
     uint32_t obstacle;
 
-    /// Least height of either point over either plane.
+    /// Least height of the two points above the two planes.
     Real height(const Vec3& a, const Vec3& b) const {
       return std::min(std::min(start_normal.dot(a), start_normal.dot(b)) - start_offset,
                       std::min(end_normal.dot(a), end_normal.dot(b)) - end_offset);

@@ -1,6 +1,6 @@
 #pragma once
-/// How a solid gets from one pose to another during a step: its frame's origin goes straight and at constant
-/// speed, and its orientation along the shortest arc, as the normalised linear interpolation of the two
+/// Path of a solid from one pose to another during a step. Its frame's origin moves on a straight line at
+/// constant speed. Its orientation follows the shortest arc, by normalised linear interpolation of the two
 /// quaternions. That turns about a fixed axis and needs no trigonometry; its rate is within 6 % of constant
 /// for a quarter turn and 1 + angle^2 / 48 for small ones. Time is the share of the step, from 0 to 1, so
 /// velocities are per step.
@@ -12,7 +12,7 @@ namespace offstage::sim {
 class PosePath {
  public:
   PosePath(const Pose& start, const Pose& end);
-  /// Stays where it is.
+  /// A path that stays at a pose.
   explicit PosePath(const Pose& pose) : PosePath(pose, pose) {}
 
   Pose at(Real share) const;
@@ -26,7 +26,7 @@ class PosePath {
   /// Whether the orientations differ, and the angle between them, 0 to pi [rad].
   bool turns() const { return sine_ > 0; }
   Real turn() const;
-  /// No point within `reach` of the origin has an acceleration beyond this at any time [m per step^2].
+  /// Upper bound of the acceleration of all points within `reach` of the origin [m per step^2].
   Real max_acceleration(Real reach) const { return reach * max_acceleration_; }
 
  private:

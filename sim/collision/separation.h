@@ -1,5 +1,5 @@
 #pragma once
-/// What a distance query of two convex solids answers, whichever algorithm finds it.
+/// Result of a distance query of two convex solids, for all algorithms.
 
 #include "sim/core/types.h"
 

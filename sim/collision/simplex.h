@@ -1,8 +1,8 @@
 #pragma once
-/// The simplices that GJK walks on and its distance sub-algorithm, by signed volumes: the signs of the
-/// origin's barycentric coordinates say which faces can hold the nearest point (after Montanari, Petrinic,
-/// Barbieri, 2017). Nothing but differences from one corner enters, so a small simplex far away is as exact
-/// as its corners.
+/// Simplices of GJK and its distance sub-algorithm by signed volumes: the signs of the origin's barycentric
+/// coordinates determine the faces that can contain the nearest point (after Montanari, Petrinic, Barbieri,
+/// 2017). Only differences from one corner are used, so a small simplex far from the origin is as exact as
+/// its corners.
 
 #include <array>
 
@@ -16,7 +16,7 @@ struct Simplex {
   std::array<SupportPoint, 4> points;
 };
 
-/// The point of a simplex nearest to the origin, as the mean of the corners that it needs.
+/// The point of a simplex nearest to the origin, as a weighted mean of the corners of its face.
 struct SimplexPoint {
   Vec3 v = Vec3::Zero();
   Real squared = std::numeric_limits<Real>::infinity();  ///< |v|^2
@@ -33,7 +33,7 @@ struct SimplexPoint {
 SimplexPoint nearest_point(const Simplex& s);
 SimplexPoint nearest_on_triangle(const Vec3& p, const Vec3& q, const Vec3& r);
 
-/// Drops the corners that the point does not need; its corners become 0, 1, ...
+/// Removes the corners without weight; the others become 0, 1, ...
 void reduce(Simplex& s, SimplexPoint& p);
 
 }  // namespace offstage::sim

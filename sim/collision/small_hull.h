@@ -1,7 +1,7 @@
 #pragma once
 /// The convex hull of a few points, for fitting oriented boxes to the hundred thousands of nodes of a tree,
-/// where Qhull would take minutes. Only the directions of the boxes depend on it, never what they hold, so it
-/// does not defend itself against rounding beyond staying within its bounds; convex_hull.h does.
+/// where Qhull would take minutes. Only the directions of the boxes depend on it, not their contents, so it
+/// is not robust against rounding beyond staying within its bounds; convex_hull.h is.
 
 #include <array>
 #include <cstdint>

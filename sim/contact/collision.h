@@ -1,7 +1,7 @@
 #pragma once
-/// Collisions of bodies: the impulse of one contact in closed form, and of a cluster of simultaneous ones
-/// (physics R6, R7, P5, P6; Coutinho, 4.6 to 4.9). Friction opposes the sliding that is left after the
-/// impact, and a collision never adds kinetic energy.
+/// Collisions of bodies: the impulse of one contact in closed form, and the impulses of a cluster of
+/// simultaneous contacts (physics R6, R7, P5, P6; Coutinho, 4.6 to 4.9). Friction opposes the sliding that
+/// remains after the impact, and a collision never adds kinetic energy.
 
 #include <cstdint>
 #include <span>
@@ -14,19 +14,19 @@ namespace offstage::sim {
 /// How the contacts of a cluster act on each other.
 enum class ImpactLaw : uint8_t {
   simultaneous,  ///< all impulses together, P_n >= 0 complementary to u_n >= -e u_n(before)
-  /// One contact after the other, the fastest approach first, equally fast ones together: passes through
-  /// Newton's cradle.
+  /// One contact after the other, the fastest approach first and equally fast ones together. Impulses
+  /// propagate through Newton's cradle.
   sequential
 };
 
 /// The impulse on body a in the contact's frame (n, t, k) [N s] of a contact with mobility `K` [1/kg] whose
-/// points have the relative velocity `u` [m/s]; zero if they do not approach. Equal coefficients make the
-/// round cone, |P_tk| = mu P_n against the sliding; else each axis sticks or slides by itself.
+/// points have the relative velocity `u` [m/s]; zero if they do not approach. Equal coefficients give the
+/// round friction cone, |P_tk| = mu P_n against the sliding; otherwise each axis sticks or slides separately.
 Vec3 collision_impulse(const Mat3& K, const Vec3& u, Real restitution, Real friction_t, Real friction_k);
 
 /// Resolves a cluster: changes the bodies' velocities, and sets the contacts' targets and total impulses.
-/// `restitution` [0, 1] of each contact; contacts that do not approach have none, but do carry impulses.
-/// Joints pass the impulses on in the same system (A3).
+/// `restitution` [0, 1] of each contact; contacts that do not approach have no restitution but may have
+/// impulses. Joints transmit impulses within the same system (A3).
 ContactWork collide(std::span<ContactBody> bodies, std::span<Contact> contacts,
                     std::span<const Real> restitution, ImpactLaw law, const JointProblem& joints = {});
 

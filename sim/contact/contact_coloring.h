@@ -1,6 +1,7 @@
 #pragma once
 /// Colours of the contact graph: patches of one colour share no body that contacts move, so that they can be
-/// solved at the same time. Greedy in the order of the patches, so it depends on that order alone.
+/// solved at the same time. The colouring is greedy in the order of the patches and depends on that order
+/// alone.
 
 #include <array>
 #include <cstdint>
@@ -12,21 +13,21 @@ namespace offstage::sim {
 class ContactColoring {
  public:
   static constexpr uint32_t kLanes = 8, kNone = UINT32_MAX;
-  /// Patches of one colour, kNone in lanes that are not used.
+  /// Patches of one colour; kNone in unused lanes.
   using Batch = std::array<uint32_t, kLanes>;
   /// kNone for a body that contacts do not move: it may be in many patches of a colour.
   struct Link {
     uint32_t a, b;
   };
 
-  /// Links are those of the patches, with bodies below `bodies`.
+  /// Computes the colouring. `links` has one entry per patch, with body indices below `bodies`.
   void assign(uint32_t bodies, std::span<const Link> links);
 
   std::span<const Batch> batches() const { return batches_; }
   /// The batches of colour c begin at begins()[c] and end at begins()[c + 1].
   std::span<const uint32_t> begins() const { return begins_; }
-  /// Batches from here on have one patch each and have to be solved one after the other: of bodies with more
-  /// partners than there are colours.
+  /// Batches from this index on have one patch each and must be solved one after the other. They belong to
+  /// bodies with more partners than there are colours.
   uint32_t serial_begin() const { return begins_.back(); }
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
-/// Which bodies are near each other, where they touch, and the islands that they form: bodies joined,
-/// directly or by others, by contacts or springs. Islands are independent of each other (physics E6, E7, P6).
+/// Pairs of bodies near each other, their contacts, and their islands: bodies connected, directly or through
+/// other bodies, by contacts or springs. Islands are independent of each other (physics E6, E7, P6).
 
 #include <memory>
 #include <span>
@@ -14,21 +14,22 @@ namespace offstage::sim {
 class Articulation;
 class CoupledSystem;
 
-/// Bodies that depend on each other, by rank, and the pairs that join them or touch what does not move.
-/// In a sub-step they move together from the same time on.
+/// Connected bodies, ordered by rank, and the pairs among them or with bodies that are not dynamic. Within a
+/// sub-step all bodies of an island are at the same time.
 struct Island {
   std::vector<Body*> bodies;
   std::vector<ContactPair*> pairs;
   std::vector<Articulation*> articulations;
-  CoupledSystem* motion = nullptr;  ///< that moved it from the interval's start; knows the way back
-  Real from = 0;                    ///< since the sub-step's start [s]
+  CoupledSystem* motion =
+      nullptr;    ///< system that moved it from the interval's start and can restore its state
+  Real from = 0;  ///< since the sub-step's start [s]
 };
 
 class ContactGraph {
  public:
-  /// Makes the pairs those that the broad phase found, of which at least one is dynamic: new ones are made by
-  /// `surface_of(a, b)`, those of before are kept, others forgotten unless `adds`. `body_at` gives the body
-  /// in a slot.
+  /// Updates the pairs to those of the broad phase of which at least one body is dynamic. Existing pairs are
+  /// kept, and new pairs get their surface from `surface_of(a, b)`. Pairs that the broad phase no longer
+  /// reports are removed, unless `adds`. `body_at` returns the body in a slot.
   template <class BodyAt, class SurfaceOf>
   void update(std::span<const IndexPair> candidates, bool adds, BodyAt&& body_at, SurfaceOf&& surface_of);
 
@@ -52,8 +53,8 @@ class ContactGraph {
 };
 
 /// Groups awake bodies, which must be in the order of ranks, by links between them, and sets Body::island.
-/// The islands are in the order of their first bodies, without motion or articulations; what memory they had
-/// is used again. Pairs without points join nothing and are left out.
+/// The islands are in the order of their first bodies, without motion or articulations; their memory is
+/// reused. Pairs without contact points connect nothing and are omitted.
 void find_islands(std::span<Body* const> bodies, std::span<ContactPair* const> pairs,
                   std::span<const std::pair<Body*, Body*>> springs, std::vector<Island>& islands);
 

@@ -5,14 +5,16 @@
 
 namespace offstage::sim {
 
-/// What all solutions of an interval share.
+/// Parameters common to all solutions of an interval.
 struct ContactInterval {
   Real duration;  ///< [s], > 0
   Real end;       ///< the world's time [s]
-  Real substep;   ///< of which the interval is all or a part [s]; penetration is pushed out at its pace
-  /// A sub-step as if nothing had hit anything: its forces are what the next one begins with. Else it is the
-  /// part before or after an impact. What stops a body in such a moment takes a force that would throw it far
-  /// if it lasted, and a part that is made anew after each of many impacts would add to its forces each time.
+  Real substep;   ///< the sub-step of which the interval is all or a part [s]; it sets the rate at which
+                  ///< penetration is removed
+  /// Whether the interval is a whole sub-step without impacts. Only the forces of whole sub-steps are stored
+  /// as the initial guess of the next one. The force that stops a body in a short part before or after an
+  /// impact would be far too large for a whole sub-step, and forces would accumulate if a part were solved
+  /// again after each of many impacts.
   bool is_whole = true;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-/// Two bodies that are near each other: where they touch, and what is kept from step to step, which is the
-/// narrow phase's cache, and the forces at the points as the guess for the next solution.
+/// A pair of bodies near each other: their contact points, and the data kept between steps, which are the
+/// narrow phase's cache and the forces at the points as initial guess of the next solution.
 
 #include <array>
 #include <limits>
@@ -13,37 +13,38 @@
 
 namespace offstage::sim {
 
-/// How the surfaces of two bodies act on each other.
+/// Combined surface parameters of two bodies.
 struct PairSurface {
   Real restitution = 0, friction = 0, static_friction = 0;
-  Real cross = 1;               ///< friction across the grain over that along it
-  const Body* grain = nullptr;  ///< whose axis the grain is; null: isotropic
-  bool conveys = false;         ///< a surface moves along the body
+  Real cross = 1;               ///< friction across the friction axis over friction along it
+  const Body* grain = nullptr;  ///< body that defines the friction axis; null: isotropic
+  bool conveys = false;         ///< a surface is a conveyor
 };
 
-/// What acts at a point of a manifold, on body a, in the manifold's frame.
+/// Force at a point of a manifold on body a, in the manifold's frame.
 struct PointForce {
   Vec3 now = Vec3::Zero();   ///< mean over the interval [N]
-  Vec3 last = Vec3::Zero();  ///< at its end, what the next one begins with [N]
-  Vec3 mean = Vec3::Zero();  ///< over the intervals before; the fast solver's [N]
-  bool known = false;        ///< whether the point was there in the interval before
+  Vec3 last = Vec3::Zero();  ///< at its end; initial guess of the next interval [N]
+  Vec3 mean = Vec3::Zero();  ///< over previous intervals; used by the fast solver [N]
+  bool known = false;        ///< whether the point existed in the previous interval
 };
 
 /// A manifold placed in the world, with the forces that acted at its points.
 struct PlacedManifold {
-  ContactFrame frame;                ///< isotropic friction's, or along the grain
-  Real torque = 0, mean_torque = 0;  ///< about the normal, of all points together; the fast solver's [N m]
-  Manifold manifold;                 ///< world
+  ContactFrame frame;  ///< contact_frame() of the normal, or t along the friction axis
+  Real torque = 0,
+       mean_torque = 0;  ///< about the normal, of all points together; used by the fast solver [N m]
+  Manifold manifold;     ///< world
   std::array<PointForce, 4> forces;
 };
 
-/// Points nearer than this touch [m].
+/// Points with a smaller separation count as touching [m].
 constexpr Real kTouching = 2e-5;
 
-/// Whether the points of a manifold are all near one line.
+/// Whether all points of a manifold are near one line.
 bool is_narrow(const Manifold& m);
 
-/// What the loops over all pairs ask for lies in the first cache line.
+/// The members that loops over all pairs read are in the first cache line.
 class alignas(64) ContactPair {
  private:
   Body *a_, *b_;
@@ -55,43 +56,44 @@ class alignas(64) ContactPair {
  public:
   uint32_t impacts = 0;        ///< in this sub-step
   uint8_t speculative = 0;     ///< manifolds that add_speculative_contacts() added
-  bool toi_exhausted = false;  ///< too many of them: no more trace-backs in this sub-step
+  bool toi_exhausted = false;  ///< it reached the limit of impacts: no more trace-backs in this sub-step
   bool restitution_suppressed =
-      false;               ///< its points limit the approach in this sub-step even if it would bounce
-  Real deepest = 0;        ///< overlap that find() has seen in this sub-step [m]
-  bool needs_toi = false;  ///< an impact of this pair is traced back to; else its points limit the approach
+      false;         ///< its contacts have no restitution in this sub-step: they only limit the approach
+  Real deepest = 0;  ///< overlap that find() has seen in this sub-step [m]
+  bool needs_toi =
+      false;  ///< impacts of this pair are traced back to; otherwise its points limit the approach
 
-  /// A plane can only be `b`. Not both are planes.
+  /// Only `b` may be a plane.
   ContactPair(Body& a, Body& b, const PairSurface& surface);
 
   Body& a() const { return *a_; }
   Body& b() const { return *b_; }
   const PairSurface& surface() const { return surface_; }
 
-  /// Finds where the bodies, placed, are within `margin` [m] of each other. If they are placed as before to
-  /// each other, within `reuse` [m], the points are taken over and only their distances are new. `turning`:
-  /// see find_manifolds().
+  /// Finds the contact points where the bodies at these poses are within `margin` [m] of each other. If their
+  /// relative pose has changed by less than `reuse` [m], the points are reused and only their separations are
+  /// updated. `turning`: see find_manifolds().
   void find(const Pose& a, const Pose& b, Real margin, Real reuse, bool turning);
 
-  /// Adds to what find() found at the interval's start where the bodies would overlap at its end if nothing
-  /// stopped them, deeper than the points found tell: of bodies that turn or slide fast other features meet
-  /// than were near before. The distances of these points are such that the velocities at the start's arms,
-  /// over `duration` [s], bring them to what they are at the end.
+  /// Adds speculative contacts to those of find() at the interval's start. They are where the freely moving
+  /// bodies would overlap at the interval's end by more than the existing points predict, because fast
+  /// turning or sliding brings other features together. Their separations are chosen such that the velocities
+  /// at the arms of the start, over `duration` [s], give the separations at the end.
   void add_speculative_contacts(Real duration);
 
-  /// Asks for the memory that find() will want: of the pair, and a little later of the first manifold.
+  /// Prefetches memory for find(): first that of the pair, and a little later that of the first manifold.
   void prefetch() const { sim::prefetch(this, this + 1); }
   void prefetch_manifold() const {
     if (!placed_.empty()) sim::prefetch(placed_.data(), placed_.data() + 1);
   }
 
-  /// Whether some contact found is a line or a point (is_narrow()), at which there may be a seam.
+  /// Whether some manifold is a line or a point (is_narrow()), where there may be a seam.
   bool has_narrow() const { return has_narrow_; }
   /// The i-th manifold that add_speculative_contacts() added, with its points where they are at the
   /// interval's end.
   const Manifold& at_end(std::size_t i) const { return at_end_[i]; }
-  /// Puts another manifold, placed in the world, in the place of the i-th; one without points takes it away
-  /// at the next drop_empty(). The separation remains that of the bodies.
+  /// Replaces the i-th manifold by another one in world coordinates. A manifold without points is removed at
+  /// the next drop_empty(). The separation remains that of the bodies.
   void replace(uint32_t i, const Manifold& m);
   void drop_empty();
 
@@ -101,15 +103,15 @@ class alignas(64) ContactPair {
   std::vector<PlacedManifold>& manifolds() { return placed_; }
   const std::vector<PlacedManifold>& manifolds() const { return placed_; }
 
-  /// Least distance of the points found; infinite if there are none.
+  /// Least separation of the contact points; infinite if there are none.
   Real separation() const { return separation_; }
-  /// How many of the points found touch.
+  /// Number of touching points.
   uint32_t touching() const { return touching_; }
-  /// Greatest speed at which a point of the pair can come closer: of all points of both [m/s].
+  /// Upper bound of the speed at which points of the two bodies can approach each other [m/s].
   Real speed_bound() const;
-  /// Of it, by their turning alone.
+  /// Part of speed_bound() that is due to rotation [m/s].
   Real turning_speed() const { return a_->turning_speed() + b_->turning_speed(); }
-  /// Velocity of a's point against b's at a place of the world, at the interval's start [m/s].
+  /// Velocity of a relative to b at a point of the world, at the interval's start [m/s].
   Vec3 relative_velocity(const Vec3& point) const;
 
  private:
@@ -118,7 +120,7 @@ class alignas(64) ContactPair {
     Vec3 on_a, last, mean, normal;
     Real torque, mean_torque;
     uint32_t id;
-    bool taken = false;  ///< by points that are there now
+    bool taken = false;  ///< it was matched with a current point
   };
   static PointForce recalled(const Remembered& p, const ContactFrame& frame, const Mat3& a_axes);
   void find_points(const Pose& a, const Pose& b, Real margin, Real reuse, bool turning);
@@ -128,17 +130,17 @@ class alignas(64) ContactPair {
   void inherit(std::vector<Remembered>& points, const Pose& a);
   void reuse(const Pose& a, const Pose& b, const std::vector<Remembered>& points);
   void set_frame(PlacedManifold& m) const;
-  /// How far the free motion brings a away from b along the normal, at a contact of the start [m].
+  /// Displacement of a away from b along the normal due to the free motion, at a contact of the start [m].
   Real free_way(const PlacedManifold& m, const Vec3& place, Real duration) const;
-  /// Whether the points found tell that there will be such an overlap, in the world at the end.
+  /// Whether the existing points already predict an overlap at this point of the world at the end.
   bool is_expected(const Vec3& normal, const ContactPoint& at_end, Real duration) const;
   PlacedManifold brought_back(const Manifold& at_end, Real duration) const;
 
   PairSurface surface_;
   bool is_on_plane_;
-  bool has_sphere_;  // then there is one point at most, as quick to find anew as to take over
+  bool has_sphere_;  // such a pair has at most one point, which is found as quickly as it is reused
   PairCache cache_;
-  // In a's frame; filled only when they are first taken over: what moves has no use for the memory.
+  // Manifolds in a's frame. Filled when they are first reused, to save memory for moving pairs.
   std::vector<Manifold> found_;
   std::vector<Manifold> at_end_;  // of the speculative ones
   Pose a_from_b_;                 // when found

@@ -1,11 +1,11 @@
 #pragma once
-/// What every solver of contacts is given and gives back: bodies, and points where two of them touch. It is a
-/// problem on velocities, and serves collisions (R6, R7) and resting contact (R8, R9) alike: found are the
-/// impulses p_i at the contacts, in the frames of these, such that with
+/// Input and output of all contact solvers: bodies and their contact points. The problem is formulated on
+/// velocities, for both collisions (R6, R7) and resting contact (R8, R9). The unknowns are the impulses p_i
+/// at the contacts, in the contacts' frames, such that with
 ///   v+ = v + M^-1 sum_i J_i^T p_i,   u_i = J_i v+ + offset_i
 /// each contact has
 ///   0 <= p_n,  0 <= u_n - target,  p_n (u_n - target) = 0,
-///   (p_t, p_k) in the friction limits given by p_n, against (u_t, u_k) with the greatest dissipation.
+///   (p_t, p_k) within the friction limits given by p_n, with the greatest dissipation against (u_t, u_k).
 /// For a collision v are the velocities before it, and target = -e u_n of those. For resting contact over a
 /// time h, v are the velocities that the bodies would have after h without contacts; then p / h are the
 /// contact forces, and (u - u(now)) / h the relative accelerations of R9.
@@ -46,7 +46,7 @@ struct Contact {
   /// ones each axis has its own limit (R6).
   Real friction_t = 0, friction_k = 0;
   Vec3 impulse = Vec3::Zero();  ///< in: a guess; out: the solution [N s]
-  bool is_guessed = false;      ///< whether the guess means anything
+  bool is_guessed = false;      ///< whether there is a guess
 
   bool is_isotropic() const { return friction_t == friction_k; }
   Vec3 to_world(const Vec3& p) const { return p.x() * frame.n + p.y() * frame.t + p.z() * frame.k; }
@@ -57,7 +57,7 @@ struct Contact {
   }
 };
 
-/// K_i of R6: the velocity that a unit impulse at `arm` gives to the point there [1/kg], world axes.
+/// K_i of R6: the velocity that a unit impulse at `arm` gives to the body's point there [1/kg], world axes.
 Mat3 mobility(const ContactBody& body, const Vec3& arm);
 /// K = K_a + K_b in the contact's frame.
 Mat3 mobility(const Contact& contact, std::span<const ContactBody> bodies);
@@ -65,31 +65,32 @@ Mat3 mobility(const Contact& contact, std::span<const ContactBody> bodies);
 /// Adds a contact's impulse to its bodies.
 void apply(const Contact& contact, const Vec3& impulse, std::span<ContactBody> bodies);
 
-/// How far an answer is from being one: the greatest violation of the conditions above [m/s]. Impulses count
-/// by the velocities that they mean, |K| p.
+/// Residual of an approximate solution: the greatest violation of the conditions above [m/s]. Impulses are
+/// converted to velocities by |K| p.
 Real residual(std::span<const ContactBody> bodies, std::span<const Contact> contacts);
 
-/// The contact that violates the conditions above most; none without contacts.
+/// The contact with the greatest violation of the conditions above; none if there are no contacts.
 std::optional<std::size_t> worst_contact(std::span<const ContactBody> bodies,
                                          std::span<const Contact> contacts);
 
-/// Kinetic energy that the contacts' impulses add to bodies that have the velocities `before` without them
-/// and `after` with them [J]. The work of surfaces that move by themselves is not part of it. A solution
-/// without targets and biases adds none: friction and plastic impacts dissipate.
+/// Kinetic energy that the contacts' impulses add to bodies, whose velocities are `before` without and
+/// `after` with the impulses [J]. The work of conveyors is not included. A solution without targets and
+/// biases adds none: friction and plastic impacts dissipate.
 Real added_energy(std::span<const ContactBody> before, std::span<const ContactBody> after,
                   std::span<const Contact> contacts);
 
-/// What a solver did: figures for StepReport.
+/// Statistics of a solver, for StepReport.
 struct ContactWork {
-  uint64_t solves = 0;             ///< problems, one per island or cluster
-  uint64_t iterations = 0;         ///< pivots, Newton steps or sweeps
-  uint64_t factorizations = 0;     ///< of the matrix, from the beginning
-  uint64_t fallbacks = 0;          ///< problems that the solver meant for them did not solve
-  uint64_t over_budget = 0;        ///< that became too dear for the exact solver and went to the fast one
-  uint64_t cluster_truncated = 0;  ///< collisions of which contacts far from the impact were left out
+  uint64_t solves = 0;          ///< problems, one per island or cluster
+  uint64_t iterations = 0;      ///< pivots, Newton steps or sweeps
+  uint64_t factorizations = 0;  ///< full factorizations of the matrix
+  uint64_t fallbacks = 0;       ///< problems that the intended solver did not solve
+  uint64_t over_budget =
+      0;  ///< problems that exceeded the budget of the exact solver and went to the fast one
+  uint64_t cluster_truncated = 0;  ///< collisions solved without the contacts far from the impact
   uint64_t restitution_reduced =
-      0;              ///< collisions with less restitution, steps with smaller impulses, to keep the energy
-  Real residual = 0;  ///< greatest left over [m/s]
+      0;  ///< collisions with reduced restitution, and steps with reduced impulses, to avoid a gain of energy
+  Real residual = 0;  ///< greatest residual [m/s]
 
   void add(const ContactWork& w) {
     solves += w.solves;
@@ -103,9 +104,10 @@ struct ContactWork {
   }
 };
 
-/// Projected Gauss-Seidel from the impulses that the contacts hold, which the bodies' velocities must already
-/// contain: sweeps in order, each contact solved by itself, until a sweep changes no velocity by more than
-/// `tolerance` [m/s]. Returns the number of sweeps. The fall-back of the other solvers.
+/// Solves the problem by projected Gauss-Seidel, starting at the contacts' impulses, which the bodies'
+/// velocities must already contain. Each sweep solves the contacts one by one in order, until no velocity
+/// changes by more than `tolerance` [m/s]. Returns the number of sweeps. It is the fall-back of the other
+/// solvers.
 uint32_t projected_gauss_seidel(std::span<ContactBody> bodies, std::span<Contact> contacts,
                                 uint32_t max_sweeps, Real tolerance);
 

@@ -13,17 +13,17 @@ namespace offstage::sim {
 /// does not depend on the forces: the velocity terms of the relative acceleration (R9).
 Vec3 velocity_bias(const ContactPair& pair, const PlacedManifold& placed, const ContactPoint& point, Real h);
 
-/// Velocity that conveyor-like surfaces add to that of a against b [m/s], world axes.
+/// Velocity that conveyors add to the velocity of a relative to b [m/s], world axes.
 Vec3 surface_velocity(const ContactPair& pair);
 
 /// Components along n, t and k.
 Vec3 in_frame(const ContactFrame& f, const Vec3& v);
 
-/// Coefficients of friction along t and k at a relative velocity u (contact's frame): static if nothing
-/// slides yet.
+/// Coefficients of friction along t and k at a relative velocity u (contact's frame): the static coefficients
+/// if the contact does not slide yet.
 std::pair<Real, Real> friction(const PairSurface& surface, const Vec3& u);
 
-/// The point that a body's velocities refer to: of kinematic bodies at the interval's end.
+/// Reference point of a body's velocities. For kinematic bodies it is that of the interval's end.
 Vec3 origin(const Body& body);
 
 /// The inverse inertia in world axes at an orientation.

@@ -1,5 +1,5 @@
 #pragma once
-/// What keeps an approximate solution of contacts from adding energy.
+/// Limit on the energy that an approximate solution of contacts may add.
 
 #include <span>
 
@@ -8,11 +8,11 @@
 
 namespace offstage::sim {
 
-/// The share of an island's contact and joint impulses that adds no kinetic energy to its free motion, which
-/// is that of Body::rigid: 1 unless they add more than a fiftieth of it. Contacts and joints take energy, but
-/// for the part of their velocity terms that a step does not follow; where a thin body turns far in a step
-/// that part has no bound. Impulses scaled by one factor keep the momenta. Of an island that is driven, by a
-/// body on keys, a surface that moves or a motor, 1.
+/// Factor for an island's contact and joint impulses with which they add no kinetic energy to its free
+/// motion, which is in Body::rigid. It is 1 unless they add more than a fiftieth of that energy. Contacts and
+/// joints dissipate energy, except for the error of their velocity terms over a step, which is unbounded for
+/// a thin body that turns far in a step. Scaling all impulses by one factor conserves the momenta. It is 1
+/// for an island driven by a kinematic body, a conveyor or a motor.
 Real kept_share(const Island& island, std::span<const RelaxedBody> relaxed);
 
 }  // namespace offstage::sim

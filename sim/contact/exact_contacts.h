@@ -1,5 +1,5 @@
 #pragma once
-/// Contacts of one island, by the exact solver (physics R8, R9, N11).
+/// Solution of the contacts of one island by the exact solver (physics R8, R9, N11).
 
 #include <vector>
 
@@ -8,19 +8,21 @@
 
 namespace offstage::sim {
 
-/// One island's contacts as a problem, solved to rounding. The bodies have moved freely through the interval
-/// from their `start` to `rigid`; what the contacts add is put on top. Keep one per island.
+/// Solves one island's contacts to rounding. The bodies have moved freely through the interval from their
+/// `start` to `rigid`; the effect of the contacts is added to this motion. Keep one object per island.
 class ExactContacts {
  public:
   struct Outcome {
-    bool is_applied = false;  ///< else nothing changed: over budget, or `rough` and not safe
+    bool is_applied = false;  ///< false: nothing changed, because it was over budget, or because the result
+                              ///< of a fall-back was unsafe
     ContactWork work;
     const ContactPair* rough = nullptr;  ///< after a fall-back: the pair with the greatest error
   };
-  /// Gives up beyond `budget` [ns, see SolverChoice]. The result of a fall-back is applied only if its error
-  /// is small and it adds no kinetic energy; else the island is one for the fast solver, which always ends.
+  /// Solves the contacts and applies the result. It stops when the cost exceeds `budget` [ns, see
+  /// SolverChoice]. The result of a fall-back is applied only if its error is small and it adds no kinetic
+  /// energy; otherwise the fast solver, whose work is bounded, must solve the island.
   Outcome solve(const Island& island, const ContactInterval& interval, Real budget);
-  /// What the last solve() took.
+  /// Cost of the last solve() [ns].
   Real cost() const { return newton_.cost(); }
 
  private:
@@ -36,8 +38,8 @@ class ExactContacts {
   std::vector<const ContactPair*> pairs_;  // of the contacts
   std::vector<PointForce*> forces_;        // of the contacts, in their pairs
   std::vector<Real>
-      approach_;  // of the contacts at the start, either way, beyond what turning explains [m/s]
-  std::vector<uint8_t> closing_;  // by body: some contact came together in the interval
+      approach_;  // of the contacts at the start, of either sign, less the part due to rotation [m/s]
+  std::vector<uint8_t> closing_;  // by body: some contact closed in the interval
   IslandJoints joints_;
   ProximalNewton newton_;
 };

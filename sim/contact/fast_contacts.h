@@ -10,7 +10,7 @@
 
 namespace offstage::sim {
 
-/// Several islands at once by the fast solver.
+/// Solves the contacts of several islands at once by the fast solver.
 class FastContacts {
  public:
   ContactWork solve(std::span<const Island* const> islands, const ContactInterval& interval);
@@ -23,7 +23,8 @@ class FastContacts {
   };
   void collect(std::span<const Island* const> islands);
 
-  std::vector<Body*> members_;  // those that move first, then one for each contact with another
+  std::vector<Body*>
+      members_;  // movable bodies first, then one entry for each contact with an immovable body
   std::size_t moved_ = 0;
   std::vector<RelaxedBody> bodies_;
   std::vector<Origin> origins_;  // of the patches

@@ -1,6 +1,6 @@
 #pragma once
-/// The cone of a contact's impulses, (p_t, p_k) within what p_n allows, as a set to project on: round for
-/// isotropic friction, a pyramid where each axis has its own limit.
+/// The cone of a contact's impulses, (p_t, p_k) within what p_n allows, as a convex set for projections. It
+/// is a round cone for isotropic friction, and a pyramid if each axis has its own limit.
 
 #include <cstdint>
 
@@ -8,12 +8,12 @@
 
 namespace offstage::sim {
 
-/// Where a point lies to a cone: which part of it is nearest.
+/// Part of a cone that is nearest to a point.
 enum class ConeRegion : uint8_t {
-  apex,     ///< nothing of it remains
-  inside,   ///< it stays as it is
+  apex,     ///< the projection is zero
+  inside,   ///< the projection is the point itself
   surface,  ///< on the round cone
-  // Of the pyramid: on a face or an edge, by the signs of the limits that are reached.
+  // Of the pyramid: on a face or an edge, by the signs of the active limits.
   low_t,
   high_t,
   low_k,
@@ -29,14 +29,14 @@ struct ConeProjection {
   ConeRegion region;
 };
 
-/// The nearest point of the cone of a contact. Of the apex and the inside, which the corner belongs to both,
-/// it is the inside: so that a stack at rest is closed all at once, not from the bottom up.
+/// Projects a point on the cone of a contact. The apex itself counts as inside, so that all contacts of a
+/// stack at rest close at once and not from the bottom up.
 ConeProjection project_on_cone(const Contact& c, const Vec3& q);
 
-/// The derivative of the projection, symmetric and between 0 and 1, of a point that was projected.
+/// Derivative of the projection at a point q. It is symmetric, with eigenvalues between 0 and 1.
 Mat3 cone_derivative(const Contact& c, const Vec3& q, const ConeProjection& projection);
 
-/// mu |u_t| of De Saxce and Feng; of a pyramid mu_t |u_t| + mu_k |u_k|.
+/// Shift mu |u_t| of the normal velocity (De Saxce and Feng); for a pyramid mu_t |u_t| + mu_k |u_k|.
 Real cone_lift(const Contact& c, const Vec3& u);
 
 }  // namespace offstage::sim

@@ -1,6 +1,6 @@
 #pragma once
-/// Contacts with Coulomb friction by pivoting on the dense matrix of a small cluster (physics N10): it
-/// resolves collisions of up to some twenty contacts.
+/// Contacts with Coulomb friction by pivoting on the dense matrix of a small cluster (physics N10). It solves
+/// collisions of up to about twenty contacts.
 
 #include <span>
 
@@ -8,10 +8,11 @@
 
 namespace offstage::sim {
 
-/// Solves the problem of contact_problem.h from zero impulses, whatever the contacts hold: sets the contacts'
-/// impulses and adds to the bodies' velocities. Isotropic contacts end on the round cone: their tangents are
-/// turned along the sliding between the solutions by pivoting, and Newton's method on the cone itself does
-/// the rest. If that leaves more than rounding, projected Gauss-Seidel goes on from there.
+/// Solves the problem of contact_problem.h from zero impulses, ignoring the contacts' guesses. It sets the
+/// contacts' impulses and adds their effect to the bodies' velocities. Isotropic contacts use the round cone:
+/// their tangents are aligned with the sliding between successive pivoting solutions, and Newton's method on
+/// the cone refines the result. If the residual exceeds rounding, projected Gauss-Seidel continues from that
+/// point.
 ContactWork solve_by_pivoting(std::span<ContactBody> bodies, std::span<Contact> contacts);
 
 }  // namespace offstage::sim

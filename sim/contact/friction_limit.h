@@ -1,6 +1,7 @@
 #pragma once
-/// Coulomb's limits of a contact's impulse as a set to project on: p_n >= 0 and the tangential part in a disc
-/// (isotropic friction) or a rectangle (each axis by itself), whose size a given normal impulse decides.
+/// Coulomb's limits of a contact's impulse as a convex set for projections: p_n >= 0, and the tangential part
+/// in a disc (isotropic friction) or a rectangle (one limit per axis), whose size is given by a normal
+/// impulse.
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 #pragma once
 /// Baraff's pivoting on contacts with friction (physics N10; "Fast contact force computation for
-/// nonpenetrating rigid bodies", 1994), in matrix form: normals and tangents are brought in one at a time,
-/// and what was brought in stays solved. It is not sure to end well: see PivotingResult.
+/// nonpenetrating rigid bodies", 1994), in matrix form. Normals and tangents are added one at a time, and
+/// their conditions stay satisfied afterwards. Success is not guaranteed: see PivotingResult.
 
 #include <cstdint>
 #include <vector>
@@ -13,12 +13,12 @@
 namespace offstage::sim {
 
 /// Contacts as a linear system on impulses: u = A p + b, three rows (n, t, k) for each contact, with the
-/// least normal velocities taken off b.
+/// target normal velocities subtracted from b.
 struct DenseContacts {
   Eigen::MatrixXd A;                      ///< J M^-1 J^T, symmetric, positive semidefinite [1/kg]
   Eigen::VectorXd b;                      ///< [m/s]
   std::vector<Eigen::Vector2d> friction;  ///< of each contact, along t and k
-  /// Dynamic friction: p_t = -mu p_n and p_k = 0 whatever the tangential velocities become.
+  /// Dynamic friction: p_t = -mu p_n and p_k = 0 for any tangential velocities.
   std::vector<uint8_t> slides;
 
   std::size_t count() const { return friction.size(); }
@@ -26,13 +26,13 @@ struct DenseContacts {
 
 struct PivotingResult {
   uint32_t pivots = 0;
-  /// False after an unbounded step (the contact jams or pulls itself in), endless exchange, a singular matrix
-  /// or too many pivots: the impulses are then allowed ones, but not the solution.
+  /// False after an unbounded step (the contact jams), cycling, a singular matrix or too many pivots. The
+  /// impulses then satisfy their limits but are not the solution.
   bool solved = true;
 };
 
-/// The impulses from zero on, each tangent with its own limit. Contacts are brought in in order from `first`
-/// on, those before it last: where one order ends badly, another may not.
+/// Computes the impulses from zero, with a separate limit for each tangent. Contacts are added in cyclic
+/// order beginning with `first`, because a different order may succeed where one fails.
 PivotingResult pivot(const DenseContacts& contacts, std::size_t first, Eigen::VectorXd& p);
 
 }  // namespace offstage::sim

@@ -11,24 +11,24 @@
 
 namespace offstage::sim {
 
-/// Whether anything but free motion happens in an island.
+/// Whether contacts or joints act in an island.
 bool has_forces(const Island& island);
 
 /// The joints of islands as part of a problem: their bodies have the indices Body::row.
 class IslandJoints {
  public:
-  /// For an interval.
+  /// Collects the joints' constraints and rows for an interval.
   void collect(std::span<const Island* const> islands, const ContactInterval& interval);
-  /// For a collision at the bodies' start.
+  /// Collects those for a collision at the bodies' `start` states.
   void collect_for_collision(const Island& island, Real time);
-  /// After a collision: adds its impulses to the loads of the joints.
+  /// Adds the impulses of a collision to the loads of the joints.
   void store_impact_impulses();
   JointProblem problem() { return {constraints_, bounded_, impulses_}; }
-  /// After the solution: stores the forces of the joints, which are also the next guess.
+  /// Stores the joints' forces after the solution. They are also the next initial guess.
   void store_impulses(Real duration);
 
   std::span<Articulation* const> articulations() const { return articulations_; }
-  /// Where the rows with bounds of each articulation end.
+  /// End of the bounded rows of each articulation.
   std::span<const uint32_t> bounded_ends() const { return bounded_ends_; }
   std::span<const BoundedRow> bounded() const { return bounded_; }
   std::span<const BoundedOrigin> origins() const { return origins_; }

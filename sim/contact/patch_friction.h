@@ -12,7 +12,7 @@ namespace offstage::sim {
 using PatchVector = PatchBatch::Vector;
 using PatchSymmetric = PatchBatch::Symmetric;
 
-/// Points that slide no faster than this count as sliding so fast [m/s].
+/// Lower bound of the sliding speed of points [m/s].
 inline constexpr float kSlowestSliding = 1e-6F;
 
 /// Sum of a patch's normal impulses.
@@ -22,8 +22,8 @@ inline FloatLanes pressure(const PatchBatch& p) {
   return sum;
 }
 
-/// Coulomb's limits of the impulses along t and k, and of the angular one about n: as if every point's
-/// friction were across its arm from the centre.
+/// Coulomb's limits of the impulses along t and k, and of the angular impulse about n. The latter assumes
+/// that every point's friction is perpendicular to its arm from the centre.
 inline PatchVector friction_limits(const PatchBatch& p) {
   FloatLanes force{}, moment{};
   for (uint32_t i = 0; i < p.count; ++i) {
@@ -35,8 +35,8 @@ inline PatchVector friction_limits(const PatchBatch& p) {
 }
 
 /// The impulses of a patch of one point, along t and k, from the velocities u: those that stop the sliding if
-/// they are within the limits. Otherwise a step against the velocity, as long as keeps the iteration
-/// convergent, and back to the limits; its fixed point opposes the sliding exactly.
+/// they are within the limits. Otherwise it is a projected gradient step: a step against the velocity, short
+/// enough for convergence, projected on the limits. Its fixed point opposes the sliding exactly.
 inline PatchVector coulomb_impulse(const PatchBatch& p, const PatchVector& u, const PatchVector& limits) {
   const PatchSymmetric& S = p.friction_stiffness;
   const PatchVector& old = p.friction_impulse;
@@ -64,8 +64,8 @@ inline PatchVector solution_of(const PatchSymmetric& A, const PatchVector& b) {
   return {first * b.x - y_x * y - z_x * z, y, z};
 }
 
-/// The friction of a patch if sliding and spinning had nothing to do with each other: against the sliding up
-/// to its limit, and then against the spin.
+/// Friction of a patch with sliding and spinning treated separately: first against the sliding up to its
+/// limit, then against the spin.
 inline PatchVector separate_impulse(const PatchBatch& p, const PatchVector& u, const PatchVector& limits) {
   const PatchSymmetric& K = p.friction_mobility;
   const PatchVector& old = p.friction_impulse;
@@ -79,11 +79,11 @@ inline PatchVector separate_impulse(const PatchBatch& p, const PatchVector& u, c
   return {held_t, held_k, lane_clamp(old.z - lane_inverse(K.zz) * spin, limits.z)};
 }
 
-/// The friction of a patch that slides or spins, which moves with `twist` now: at each point Coulomb's,
-/// against that point's own velocity, so that sliding lengthens the spin and the spin the slide. A point's
-/// friction is taken as viscous with the coefficient limit / speed, which makes one linear system of the
-/// patch; the speeds are those that separate laws would leave, which is right where nothing spins.
-/// `kIsotropic`: in all lanes friction_t is friction_k, which takes fewer operations.
+/// Friction of a patch that slides or spins with the relative `twist`. Each point has Coulomb friction
+/// against its own velocity, so sliding reduces the friction against spin and vice versa. The friction of a
+/// point is linearised as viscous with the coefficient limit / speed, which gives one linear system per
+/// patch. The speeds are those after separate_impulse(), which is exact without spin. `kIsotropic`:
+/// friction_t equals friction_k in all lanes, which takes fewer operations.
 template <bool kIsotropic>
 PatchVector sliding_impulse(const PatchBatch& p, const PatchVector& twist, const PatchVector& limits) {
   std::array<FloatLanes, 4> viscous_t, viscous_k;
@@ -119,7 +119,7 @@ PatchVector sliding_impulse(const PatchBatch& p, const PatchVector& twist, const
     const PatchBatch::Point& q = p.points[i];
     const auto [t, k] = at(i, next);
     FloatLanes f = viscous_t[i] * t, g = viscous_k[i] * k;
-    // What has become faster has no more than its limit.
+    // A component whose speed increased is clamped to its limit.
     const FloatLanes limit_t = q.impulse * p.friction_t, limit_k = q.impulse * p.friction_k;
     const FloatLanes size = lane_sqrt(f * f + g * g);
     const FloatLanes scale = size > limit_t ? limit_t / size : float_lanes(1);

@@ -3,21 +3,21 @@
 /// are solved by a semismooth Newton method on the velocities of the bodies, with the true friction cone.
 ///
 /// Coulomb's law is p in the cone C, u~ = u + mu |u_t| n in its dual, p . u~ = 0 (De Saxce and Feng, "The
-/// bipotential method", 1998). With g = mu |u_t| held for now, multipliers q and penalties rho, the impulses
+/// bipotential method", 1998). With g = mu |u_t| held constant, multipliers q and penalties rho, the impulses
 ///   p(v) = projection of q - rho (u(v) - target + g n) on C
-/// make M (v - v0) = J^T p(v) the stationarity of a smooth, strongly convex function of v, which Newton's
-/// method with line search minimises whatever the contacts are like: redundant ones leave the matrix
+/// make M (v - v0) = J^T p(v) the stationarity condition of a smooth, strongly convex function of v. Newton's
+/// method with line search minimises it for any contacts: even with redundant contacts the matrix
 ///   H = M + sum J^T rho (dp/dq) J
-/// positive definite, and it has the sparsity of the graph of bodies. Then q := p and g := mu |u_t|, until
-/// neither changes; where nothing slides g is 0 and only q is left to converge. The multipliers of the last
-/// step are the guess for the next: at rest they are the answer, which one look confirms without any
+/// is positive definite, and it has the sparsity of the graph of bodies. Then q := p and g := mu |u_t|, until
+/// neither changes. Without sliding g is 0 and only q must converge. The multipliers of the last step are the
+/// initial guess for the next: at rest they are the solution, which one evaluation confirms without a
 /// factorisation. See Rockafellar, "Monotone operators and the proximal point algorithm" (1976); Alart and
 /// Curnier, "A mixed formulation for frictional contact problems prone to Newton like solution methods"
 /// (1991).
 ///
-/// Joints are constraints J (v - v0) = 0 of that minimisation: Newton's steps come from the quasi-definite
-/// system of H and J, so that all velocities on the way satisfy them. Rows with bounds are treated like
-/// contacts, with an interval in place of the cone.
+/// Joints are constraints J (v - v0) = 0 of that minimisation: Newton's steps solve the quasi-definite system
+/// of H and J, so all iterates satisfy the constraints. Rows with bounds are treated like contacts, with an
+/// interval in place of the cone.
 
 #include <cmath>
 #include <limits>
@@ -33,24 +33,24 @@
 
 namespace offstage::sim {
 
-/// Keep one per island from step to step: a matrix of nearly the same contacts still serves to converge.
+/// Keep one object per island between steps: the factored matrix of nearly the same contacts is reused.
 class ProximalNewton {
  public:
   /// Solves to a residual of 1e-7 of the velocities (1e-11 m/s at least). Starts from the contacts' impulses,
-  /// which the bodies' velocities must not contain yet. If the bounded iterations do not get there, projected
-  /// Gauss-Seidel goes on from where they ended.
-  /// If that would take more than `budget` [ns, as cost() counts], there is no result and nothing is changed.
+  /// which the bodies' velocities must not contain yet. If the bounded iterations do not converge, projected
+  /// Gauss-Seidel continues from their result. If the cost would exceed `budget` [ns, as cost()], there is no
+  /// result and nothing is changed.
   std::optional<ContactWork> solve(std::span<ContactBody> bodies, std::span<Contact> contacts,
                                    const JointProblem& joints = {},
                                    Real budget = std::numeric_limits<Real>::infinity());
 
-  /// What the last solve() took by the number of its operations, on a machine of 2020 [ns].
+  /// Cost of the last solve(), estimated from the number of its operations for a machine of 2020 [ns].
   Real cost() const { return cost_; }
 
  private:
   struct Point {
-    Vec3 multiplier, impulse, shifted;  // q, p(v), what p(v) is the projection of
-    Real rho, lift, rise;               // lift: g; rise: what g lacks
+    Vec3 multiplier, impulse, shifted;  // q, p(v), and the argument of the projection
+    Real rho, lift, rise;               // lift: g; rise: the change of g that is still needed
     uint32_t a, b, pair;                // rows of the matrix; kNone for bodies that are not moved
     ConeRegion region;
   };
@@ -69,11 +69,12 @@ class ProximalNewton {
   struct Mixed {
     Eigen::VectorXd lift, rise;
   };
-  /// What an iteration changed, as velocities [m/s].
+  /// Changes of an iteration, as velocities [m/s].
   struct Change {
     Real multipliers = 0, lifts = 0;
   };
-  /// The function that is minimised, and the sum of its terms' sizes, of which rounding is a share.
+  /// Value of the minimised function, and the sum of the magnitudes of its terms, which bounds the rounding
+  /// error.
   struct Merit {
     Real value = 0, size = 0;
     void add(Real term) {
@@ -112,7 +113,7 @@ class ProximalNewton {
   std::vector<std::pair<uint32_t, uint32_t>> pairs_;
   std::vector<Point> points_;
   std::vector<Vec6> free_, velocity_, trial_, gradient_, direction_;
-  std::vector<Vec3> fixed_;  // relative velocity that unmoved bodies and offsets add, less the target
+  std::vector<Vec3> fixed_;  // relative velocity due to unmoved bodies and offsets, less the target
   std::vector<Mat6> mass_;   // of each row
   std::vector<LinkMobility> mobility_;
   std::vector<Mat6> diagonal_, off_;  // H

@@ -1,8 +1,8 @@
 #pragma once
-/// Joints in the sub-steps of the fast solver: after the contacts' sweep, each articulation's constraints are
-/// satisfied all at once by its sparse system, so that neither long chains nor great ratios of masses stretch
-/// it; then its rows with bounds, one after the other, each by what its impulse does to the whole
-/// articulation.
+/// Joints in the sub-steps of the fast solver: after the contacts' sweep, the sparse system of each
+/// articulation satisfies all its constraints at once, so that neither long chains nor large mass ratios
+/// stretch it. Its bounded rows are then solved one after the other, each using the response of the whole
+/// articulation to its impulse.
 
 #include <span>
 #include <vector>
@@ -17,16 +17,16 @@ struct RelaxedBody;
 
 class RelaxedJoints {
  public:
-  /// `constraints` and `bounded` hold those of the first articulation first, and so on; of its `bounded` the
-  /// i-th articulation ends at `bounded_ends[i]`.
+  /// `constraints` and `bounded` of the problem are ordered by articulation; the bounded rows of the i-th
+  /// articulation end at `bounded_ends[i]`.
   RelaxedJoints(const JointProblem& problem, std::span<Articulation* const> articulations,
                 std::span<const uint32_t> bounded_ends);
 
-  /// How many parts solve() has, which share no body.
+  /// Number of parts of solve(). Parts share no body.
   uint32_t count() const { return static_cast<uint32_t>(parts_.size()); }
 
   void begin(std::span<const RelaxedBody> bodies, Real duration, uint32_t substeps);
-  /// The first sub-step begins: what acted before goes on.
+  /// Begins the first sub-step with the impulses of the last step.
   void start(uint32_t part, std::span<BodyMotion> motions);
   /// At the end of a sub-step that is `elapsed` after the start.
   void solve(uint32_t part, std::span<BodyMotion> motions, Real elapsed, bool is_last);
@@ -35,11 +35,12 @@ class RelaxedJoints {
 
  private:
   struct Row {
-    Real inverse_stiffness;      // by how much a unit of impulse changes u, softness included
+    Real inverse_stiffness;      // change of u per unit impulse, softness included
     Real impulse, lower, upper;  // of a sub-step
-    Real softness, sum = 0;      // for that; of the whole step
-    std::vector<Vec6> response;  // of the links; none: of its own two, in `response_a` and `response_b`
-    std::vector<Vec6> reaction;  // of the joints to that, likewise
+    Real softness, sum = 0;      // softness; impulse of the whole step
+    std::vector<Vec6> response;  // of the links to a unit impulse; empty: only its own two links, in
+                                 // `response_a` and `response_b`
+    std::vector<Vec6> reaction;  // of the joints to a unit impulse
     Vec6 response_a, response_b;
   };
   struct Part {

@@ -5,8 +5,8 @@
 
 namespace offstage::sim {
 
-/// As collide(), but with at most some ten thousand operations: contacts of a large cluster may still
-/// approach afterwards. It never adds kinetic energy either.
+/// As collide(), but with at most about ten thousand operations, so that contacts of a large cluster may
+/// still approach afterwards. Like collide(), it never adds kinetic energy.
 ContactWork collide_roughly(std::span<ContactBody> bodies, std::span<Contact> contacts,
                             std::span<const Real> restitution, ImpactLaw law, const JointProblem& joints);
 

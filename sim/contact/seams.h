@@ -1,8 +1,8 @@
 #pragma once
-/// Seams: edges and side faces that are flush with other pieces or bodies, which nothing can run into.
-/// Between triangles of one mesh the narrow phase knows them (mesh_surface.h); here are those between bodies
-/// side by side, between the convex parts of one body, and between triangles that do not share their
-/// vertices.
+/// Seams: edges and side faces that are flush with neighbouring pieces or bodies, so that no object can
+/// collide with them. The narrow phase handles seams between triangles of one mesh (mesh_surface.h). This
+/// file handles seams between adjacent bodies, between the convex parts of one body, and between triangles
+/// that do not share vertices.
 
 #include <span>
 #include <vector>
@@ -11,14 +11,14 @@
 
 namespace offstage::sim {
 
-/// Steps between two surfaces that are lower than this are none, and do not stop anything [m]; of bodies
-/// smaller than a decimetre, than this share of their extent.
+/// Greatest height of a step between two surfaces that still counts as flush and stops nothing [m]. For
+/// bodies smaller than a decimetre it is this share of their extent.
 constexpr Real kFlush = 1e-4, kFlushShare = 1e-3;
 
-/// Removes from pairs found at one time of a sub-step of length h the contacts at seams: those of a convex
-/// piece that it would have with something on or below a face on which it already lies, and which does not
-/// rise above that face. A contact at the foot of a slope gets the slope's normal instead. Pairs that share a
-/// body must be given together. Returns the pairs that have changed, in the order given.
+/// Removes the contacts at seams from pairs whose contacts were found at one time of a sub-step of length h
+/// [s]. A contact of a convex piece is at a seam if the piece already lies on a face and the other piece does
+/// not rise above that face. A contact at the foot of a slope gets the slope's normal instead. Pairs that
+/// share a body must be given together. Returns the pairs that have changed, in the order given.
 std::vector<ContactPair*> remove_seam_contacts(std::span<ContactPair* const> pairs, Real time, Real h);
 
 }  // namespace offstage::sim

@@ -1,5 +1,5 @@
 #pragma once
-/// Whether an island is for the exact or the fast solver.
+/// Choice of the exact or the fast solver for an island.
 
 #include <memory>
 #include <span>
@@ -9,17 +9,17 @@
 
 namespace offstage::sim {
 
-/// What the exact solver may take beyond the fast one, over all islands of a world: in a heap that comes down
-/// there is a new island in every sub-step, each of which would be dear.
+/// Budget of the exact solver beyond the cost of the fast one, for all islands of a world. A collapsing heap
+/// creates new islands in every sub-step, and each would be expensive.
 class ExactSolverBudget {
  public:
-  /// A sub-step with these islands begins.
+  /// Begins a sub-step with these islands.
   void begin(std::span<Island* const> islands, Real duration);
-  /// An attempt on an island took so much more than it is worth [ns].
+  /// Records the excess cost of an attempt on an island [ns].
   void spend(Real cost) { debt_ += cost; }
-  /// How much of the credit is left, from 0 to 1.
+  /// Remaining share of the credit, from 0 to 1.
   Real left() const { return left_; }
-  /// Whether the world is so small that no solver takes long.
+  /// Whether the world is so small that every solver is fast.
   bool is_small() const { return small_; }
 
  private:
@@ -27,16 +27,17 @@ class ExactSolverBudget {
   bool small_ = true;
 };
 
-/// Whether an island is for the exact or the fast solver, by what the exact one cost on islands like it
-/// before. Costs are counted work times what the operations take on a machine of 2020 [ns], so that the
-/// choice is the same in every run.
+/// Chooses the exact or the fast solver for an island, judged by the exact solver's cost on similar islands
+/// before. Costs are computed from counted operations and their times on a machine of 2020 [ns], so that the
+/// choice is deterministic.
 class SolverChoice {
  public:
   /// Whether to try the exact solver now.
   bool is_exact_worth(const Island& island, const ExactSolverBudget& patience);
-  /// What the attempt may cost, so that all attempts together take but a share of what the fast solver takes.
+  /// Greatest allowed cost of the attempt [ns]. It keeps the cost of all attempts below a share of the fast
+  /// solver's cost.
   Real budget(const Island& island, Real duration, const ExactSolverBudget& patience) const;
-  /// What became of the attempt.
+  /// Records the result of the attempt.
   void learn(const Island& island, Real duration, bool solved, ExactSolverBudget& patience);
 
   std::unique_ptr<ExactContacts> exact;
