@@ -1,5 +1,6 @@
 #pragma once
-/// Private: draws depth, normals, ids and motion (see channels.h), one sample a pixel, without sub-frames.
+/// Private: draws depth, normals, ids and motion (see channels.h) with one sample per pixel and no
+/// sub-frames.
 
 #include <span>
 
@@ -16,7 +17,8 @@ class ChannelsPass {
   void begin(const Matrix4f& clip_from_world, const Matrix4f& clip_before_from_world);
   void draw(const Instance& instance);
   void draw(const Cloth& cloth);
-  /// Balls; the pass must have prepared them. Where they were follows from their velocity over `time` [s].
+  /// Draws balls that PointsPass has prepared. Their previous positions follow from their velocity over
+  /// `time` [s].
   void draw_balls(PointsPass& pass, const PointSet& set, float time);
   void end(Channels& result);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Private: draws cloths, from both sides, and into the shadow map.
+/// Private: draws cloths from both sides, and draws them into the shadow map.
 
 #include <map>
 #include <span>
@@ -13,7 +13,7 @@
 
 namespace offstage::render {
 
-/// A cloth as the stage holds it.
+/// A cloth as stored in the stage.
 struct Cloth {
   const GpuMaterial* material = nullptr;
   float thickness = 0;
@@ -21,13 +21,13 @@ struct Cloth {
   bool casts_shadow = true;
   ClothSurface surface;
   uint32_t object = 0;           ///< id in Channels
-  std::vector<Vector3f> before;  ///< where its vertices were at Stage::store_previous_transforms
+  std::vector<Vector3f> before;  ///< vertex positions at Stage::store_previous_transforms
 
   gl::StreamBuffer vertices, indices;
-  uint32_t uploaded = 0;  ///< version of the indices
+  uint32_t uploaded = 0;  ///< version of the uploaded indices
   gl::VertexArray vertex_array;
 
-  /// Something is seen through it.
+  /// Whether objects behind the cloth are visible through it.
   bool is_translucent() const { return material->lets_through(); }
   bool is_seen() const { return !surface.vertices().empty() && !surface.indices().empty(); }
 };
@@ -35,10 +35,10 @@ struct Cloth {
 class ClothPass {
  public:
   ClothPass();
-  /// Uploads a cloth as it is now.
+  /// Uploads the current state of a cloth.
   void prepare(Cloth& cloth);
   void draw_shadow(const Cloth& cloth, const Matrix4f& shadow_clip_from_world);
-  /// The depth of an opaque one in the picture, of the very surface that `draw` shades.
+  /// Draws the depth of an opaque cloth into the picture. It is exactly the surface that `draw` shades.
   void draw_depth(const Cloth& cloth);
   void draw(const Cloth& cloth, const Features& features);
 
@@ -47,7 +47,8 @@ class ClothPass {
   static void draw_triangles(const Cloth& cloth);
   gl::LazyProgram& program(const GpuMaterial& material, const Features& features);
 
-  std::map<std::tuple<Weave, Pattern, bool, bool, Features>, gl::LazyProgram> programs_;  ///< textured, sheer
+  std::map<std::tuple<Weave, Pattern, bool, bool, Features>, gl::LazyProgram>
+      programs_;  ///< keyed also by textured, sheer
   gl::LazyProgram shadow_, sheer_shadow_, textured_sheer_shadow_, depth_;
 };
 

@@ -1,7 +1,7 @@
 #pragma once
-/// Private: the surface that is drawn of a cloth. Its mesh is subdivided until it is fine, so that contact
-/// creases are round; normals are smooth; a rim as wide as the cloth is thick closes its boundary; and how
-/// far each place lies in a fold darkens what the sky does not reach.
+/// Private: the surface that is drawn for a cloth. The simulated mesh is subdivided until contact creases
+/// look round, and gets smooth normals. A rim as wide as the cloth is thick closes its boundary. The depth of
+/// folds is estimated at each vertex, because folds receive less light from the sky.
 
 #include <cstdint>
 #include <span>
@@ -13,26 +13,26 @@
 namespace offstage::render {
 
 struct ClothVertex {
-  Vector3f position;  ///< of the middle layer; of rims on the surface
-  float hollow;       ///< depth of the fold it lies in over its width: positive in hollows of the front
-  Vector3f normal;    ///< of the front; of rims outwards
-  float lift;         ///< half the thickness [m]; 0 of rims
-  Vector2f uv;        ///< [m] along the cloth
+  Vector3f position;  ///< on the middle layer; rim vertices lie on the surface
+  float hollow;       ///< depth over width of the surrounding fold; positive in hollows of the front
+  Vector3f normal;    ///< normal of the front; rim normals point outwards
+  float lift;         ///< half the thickness [m]; 0 for rim vertices
+  Vector2f uv;        ///< position along the cloth [m]
 };
 static_assert(sizeof(ClothVertex) == 40);
 
 class ClothSurface {
  public:
-  /// Throws std::invalid_argument for an index out of range, or if there is not one texture coordinate for
-  /// each vertex.
+  /// Sets triangles and texture coordinates. Throws std::invalid_argument for an index out of range, or if
+  /// the number of texture coordinates is not the number of vertices.
   void set_mesh(std::span<const uint32_t> triangles, std::span<const Vector2f> uvs);
-  /// One position for each vertex of the mesh, else std::invalid_argument. Nothing is drawn if one is not
-  /// finite.
+  /// Sets one position per vertex of the mesh; throws std::invalid_argument for another number. The cloth is
+  /// not drawn if a position is not finite.
   void set_positions(std::span<const Vector3f> positions, float thickness);
 
   std::span<const ClothVertex> vertices() const { return vertices_; }
   const std::vector<uint32_t>& indices() const { return indices_; }
-  /// Counts set_mesh: tells whether `indices` are those that were uploaded.
+  /// Number of calls of set_mesh; shows whether uploaded `indices` are current.
   uint32_t version() const { return version_; }
   const Eigen::AlignedBox3f& box() const { return box_; }
   int levels() const { return static_cast<int>(subdivisions_.size()); }

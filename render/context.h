@@ -26,7 +26,7 @@ GlPlatform gl_platform(std::string_view name);
 /// std::invalid_argument.
 GlPlatform gl_platform_of_environment();
 
-/// What draws; part of a golden image's fingerprint.
+/// Describes the GL implementation in use; part of a golden image's fingerprint.
 struct ContextInfo {
   std::string renderer;  ///< GL_RENDERER, such as "llvmpipe (LLVM 15.0.6, 256 bits)"
   std::string version;   ///< GL_VERSION, such as "4.5 (Core Profile) Mesa 22.3.6"
@@ -40,9 +40,8 @@ struct ContextInfo {
 /// starts: it uses setenv. Mesa reads the variables at the first context.
 void pin_environment(int raster_threads, GlPlatform platform = gl_platform_of_environment());
 
-/// Owns the context, current on the thread that made it; use it from that thread only, and make no
-/// second one there while it lives. Throws
-/// UnavailableError.
+/// Owns an OpenGL context, which is current on the thread that created it. Use it from that thread only, and
+/// create no second one there during its lifetime. Throws UnavailableError.
 class Context {
  public:
   Context();
@@ -57,15 +56,16 @@ class Context {
   std::unique_ptr<Impl> impl_;
 };
 
-/// A device that EGL lists.
+/// A device that EGL enumerates.
 struct EglDevice {
   bool software = false;   ///< llvmpipe rather than a GPU
-  std::string name;        ///< of the vendor's driver, if it has one: "NVIDIA H100 80GB HBM3"
+  std::string name;        ///< name from the vendor's driver, such as "NVIDIA H100 80GB HBM3"; may be empty
   std::string file;        ///< device file, such as /dev/dri/card0; empty if there is none
   std::string extensions;  ///< EGL_EXTENSIONS of the device
 };
 
-/// All devices of EGL, in its order. Throws UnavailableError if libEGL is missing or cannot list devices.
+/// Lists all devices of EGL, in its order. Throws UnavailableError if libEGL is missing or cannot list
+/// devices.
 std::vector<EglDevice> egl_devices();
 
 }  // namespace offstage::render

@@ -1,6 +1,6 @@
 #pragma once
-/// Private: the numbers that every shader of one sub-frame shares, worked out on the CPU from camera, sun and
-/// sky.
+/// Private: the uniforms that all shaders of one sub-frame share. They are computed on the CPU from camera,
+/// sun and sky.
 
 #include <array>
 #include <cmath>
@@ -16,19 +16,19 @@ namespace offstage::render {
 
 using Eigen::Matrix4f;
 
-/// A lamp of a sub-frame, as shaders/lamps.glsl reads it.
+/// A lamp of a sub-frame, in the layout that shaders/lamps.glsl reads.
 struct LampUniforms {
   Vector4f position = Vector4f::Zero();   ///< w: radius
   Vector4f intensity = Vector4f::Zero();  ///< w: 0 no shadow, 1 shadow in a cone, 2 all around
-  Vector4f direction = Vector4f::Zero();  ///< w: what the cosine to it counts
-  Vector4f right =
-      Vector4f::Zero();            ///< w: what is added; the sum, in [0, 1], is the share that shines there
-  Vector4f up = Vector4f::Zero();  ///< w: tangent of half the angle of a tile of the shadow map
+  Vector4f direction = Vector4f::Zero();  ///< w: factor of the cosine to this direction
+  Vector4f right = Vector4f::Zero();      ///< w: offset; factor * cosine + offset, clamped to [0, 1], is the
+                                          ///< share of light in that direction
+  Vector4f up = Vector4f::Zero();         ///< w: tangent of half the angle of a tile of the shadow map
   Vector4f block = Vector4f::Zero();  ///< first corner in the shadow map, size of a tile, texels of a tile
 };
 
-/// The uniform block of shaders/frame.glsl, in its std140 layout. Matrices come first: Eigen aligns them
-/// more.
+/// The uniform block of shaders/frame.glsl, in std140 layout. Matrices come first because Eigen aligns them
+/// more strictly.
 struct FrameUniforms {
   Matrix4f clip_from_world;
   Matrix4f smoke_from_world;
@@ -49,10 +49,10 @@ struct FrameUniforms {
 
 static_assert(offsetof(FrameUniforms, lamps) == 32 * sizeof(Vector4f));
 
-/// Defines of the shaders that light depends on, such as "SMOKE 1".
+/// Defines of the shaders that depend on the lighting, such as "SMOKE 1".
 using Features = std::vector<std::string>;
 
-/// The eye of one sub-frame: moved in the lens, looking along `forward`.
+/// The eye of one sub-frame: offset within the lens, looking along `forward`.
 struct View {
   Matrix4f clip_from_world;
   Vector3f eye, right, up, forward;
@@ -60,21 +60,21 @@ struct View {
   Vector2f shear;     ///< shift of the image in half-sizes, by lens and pixel offsets
   float near_m = 0, far_m = 0;
 
-  /// False only if the ball is outside one plane of the frustum.
+  /// Whether a ball may be in view; false only if it is outside one plane of the frustum.
   bool sees(const Vector3f& center, float radius) const;
   float depth_of(const Vector3f& point) const { return forward.dot(point - eye); }
-  /// The corners of the frustum cut at a distance; four near, then four far.
+  /// Corners of the frustum, cut at a distance; four near ones, then four far ones.
   std::array<Vector3f, 8> corners(float far_distance) const;
 };
 
-/// The rectangle of a picture that places take, each with a margin around it [m].
+/// The rectangle of the picture that covers a set of points, each with a margin around it [m].
 class ScreenArea {
  public:
   ScreenArea(const View& view, float margin) : view_(view), margin_(margin) {}
   void add(const Vector3f& place);
   void add_all();
   bool empty() const;
-  /// From the lower left corner, in a picture of a size.
+  /// The rectangle in pixels from the lower left corner, for a picture of the given size.
   Eigen::AlignedBox2i pixels(int width_px, int height_px) const;
 
  private:
@@ -83,16 +83,17 @@ class ScreenArea {
   Eigen::AlignedBox2f area_;  ///< in [-1, 1]
 };
 
-/// Depth runs from 1 at the near plane to 0 at the far one: with floats that keeps precision far away.
+/// Creates the view of a sub-frame. Depth runs from 1 at the near plane to 0 at the far one, which keeps
+/// float precision at large distances.
 View make_view(const Camera& camera, const SampleOffsets& offsets, int width_px, int height_px);
 
-/// The square [-0.5, 0.5]^2 to the unit disc, keeping areas (Shirley and Chiu, 1997).
+/// Maps the square [-0.5, 0.5]^2 to the unit disc with equal areas (Shirley and Chiu, 1997).
 Vector2f square_to_disc(const Vector2f& p);
 
-/// The direction towards a place of the sun's disc.
+/// The direction towards a point of the sun's disc.
 Vector3f jittered_sun(const Sun& sun, const Vector2f& offset);
 
-/// Fills everything but the fields of the shadow map and of smoke.
+/// Fills all fields except those of the shadow map and of smoke.
 FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& environment,
                          const SampleOffsets& offsets, int height_px);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Frames per second as a fraction, so that 30000/1001 stays what it is from the scene to the video file.
+/// Frames per second as a fraction, so that 30000/1001 stays exact from the scene to the video file.
 
 #include <cstdint>
 #include <optional>
@@ -15,8 +15,7 @@ struct FrameRate {
   bool operator==(const FrameRate&) const = default;
 
   double per_second() const { return static_cast<double>(numerator) / denominator; }
-  /// The time that so many frames take [s], rounded once: the product is exact, so a long film does not
-  /// drift.
+  /// Duration of a number of frames [s], rounded once. The product is exact, so a long film does not drift.
   double seconds(int64_t frames) const {
     return static_cast<double>(frames * denominator) / static_cast<double>(numerator);
   }
@@ -24,13 +23,13 @@ struct FrameRate {
   std::string text() const;
 };
 
-/// The simplest fraction that rounds to a number: 29.97 becomes 2997/100, 1/0.0625 becomes 16. Denominators
-/// go to 1 000 000; a number between two such fractions becomes the nearer convergent, which differs by less
-/// than 1e-12. The number must be in (0, 2000].
+/// Finds the simplest fraction that rounds to a number: 29.97 becomes 2997/100, 1/0.0625 becomes 16.
+/// Denominators go up to 1 000 000. A number between two such fractions becomes the nearer convergent, which
+/// differs by less than 1e-12. The number must be in (0, 2000].
 FrameRate frame_rate_of(double per_second);
 
-/// Reads "30", "29.97" or "30000/1001". Nothing if the text is something else, is not positive, or a part of
-/// a fraction does not fit (up to 1 000 000 000 over up to 1 000 000).
+/// Parses "30", "29.97" or "30000/1001". Returns nothing for other text, for a rate that is not positive, or
+/// if a part of a fraction is too large (above 1 000 000 000 over 1 000 000).
 std::optional<FrameRate> parse_frame_rate(std::string_view text);
 
 }  // namespace offstage::render

@@ -1,6 +1,6 @@
 #pragma once
-/// Private: owning wrappers of GL names, and programs built from the embedded shaders. Nothing outside the
-/// .cpp files of render/ sees GL.
+/// Private: owning wrappers of GL names, and programs built from the embedded shaders. GL is used only in the
+/// .cpp files of render/.
 
 #include <cstddef>
 #include <map>
@@ -19,7 +19,7 @@ std::string_view shader_source(std::string_view name);
 
 namespace gl {
 
-/// Owns one GL name, made and deleted by Traits; 0 when empty.
+/// Owns one GL name, created and deleted by Traits; 0 when empty.
 template <class Traits>
 class Object {
  public:
@@ -66,7 +66,7 @@ using Program = Object<ProgramTraits>;
 
 Buffer make_buffer();
 VertexArray make_vertex_array();
-/// A buffer that never changes.
+/// Creates an immutable buffer.
 template <class T>
 Buffer make_buffer(std::span<const T> values) {
   Buffer buffer = make_buffer();
@@ -75,12 +75,13 @@ Buffer make_buffer(std::span<const T> values) {
 }
 /// A 2D texture of one level, clamped to its edges.
 Texture make_target(GLenum format, int width_px, int height_px, GLenum filter);
-/// Reads depths of a texture that compares as they are.
+/// Creates a sampler that reads depths without comparison, for a texture that otherwise compares.
 Sampler make_depth_sampler();
-/// Throws UnavailableError if it is not complete. A texture of 0 leaves that attachment empty.
+/// Creates a framebuffer. Throws UnavailableError if it is not complete. A texture of 0 leaves that
+/// attachment empty.
 Framebuffer make_framebuffer(GLuint color, GLuint depth);
 
-/// A buffer that is rewritten each frame. It grows and never shrinks.
+/// A buffer that is rewritten each frame. It grows but never shrinks.
 class StreamBuffer {
  public:
   template <class T>
@@ -104,12 +105,13 @@ void set_attribute(GLuint vertex_array, GLuint attribute, GLuint binding, int co
 Program make_program(std::span<const std::string_view> vertex, std::span<const std::string_view> fragment,
                      std::span<const std::string> defines = {});
 
-/// The same, built once for the context of this thread and shared by all stages: what the driver makes of a
-/// program takes longer than a frame. Whoever uses it sets all of its uniforms before each draw.
+/// Returns a program built as above, once for the context of this thread, and shared by all stages. Compiling
+/// a program takes longer than a frame. Callers set all uniforms before each draw, because other stages
+/// change them.
 GLuint shared_program(std::span<const std::string_view> vertex, std::span<const std::string_view> fragment,
                       std::span<const std::string> defines = {});
 
-/// Owns what shared_program() of this thread builds, from construction to destruction; a context has one.
+/// Owns the programs built by shared_program() on this thread, during its lifetime. Each context has one.
 class SharedPrograms {
  public:
   SharedPrograms();
@@ -124,13 +126,13 @@ class SharedPrograms {
   std::map<std::string, Program> programs_;
 };
 
-/// A program that is built when first used: start-up pays only for what a scene draws.
+/// A program that is built on first use, so that start-up builds only the programs a scene needs.
 class LazyProgram {
  public:
   LazyProgram(std::vector<std::string_view> vertex, std::vector<std::string_view> fragment,
               std::vector<std::string> defines = {})
       : vertex_(std::move(vertex)), fragment_(std::move(fragment)), defines_(std::move(defines)) {}
-  /// Makes it current.
+  /// Makes the program current.
   void use() {
     if (program_ == 0) program_ = shared_program(vertex_, fragment_, defines_);
     glUseProgram(program_);
@@ -142,7 +144,7 @@ class LazyProgram {
   GLuint program_ = 0;
 };
 
-/// Throws UnavailableError if GL has an error pending; `where` is part of the message.
+/// Throws UnavailableError if a GL error is pending; `where` is part of the message.
 void check_error(const char* where);
 
 }  // namespace gl

@@ -12,7 +12,7 @@ namespace offstage::render {
 struct Image {
   int width_px = 0, height_px = 0;
   std::vector<uint8_t> rgba;  ///< width * height * 4
-  bool transparent = false;   ///< its alpha matters; else files have no alpha channel
+  bool transparent = false;   ///< alpha is used; otherwise files have no alpha channel
 
   std::size_t pixel_count() const {
     return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
@@ -23,14 +23,14 @@ struct Image {
 struct HdrImage {
   int width_px = 0, height_px = 0;
   std::vector<float> rgba;   ///< width * height * 4
-  bool transparent = false;  ///< as of Image
+  bool transparent = false;  ///< same as Image::transparent
 
   std::size_t pixel_count() const {
     return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
   }
 };
 
-/// XXH3-128 of size and pixels as 32 hexadecimal digits; never of a file's bytes.
+/// XXH3-128 of size and pixels as 32 hexadecimal digits. It does not depend on the encoding of a file.
 std::string pixel_hash(const Image& image);
 
 /// How two images of one size differ. `max_delta` and `mean_delta` are over the RGBA channels in 8-bit steps.
@@ -47,7 +47,7 @@ struct ImageDifference {
 };
 /// Throws std::invalid_argument if the sizes differ.
 ImageDifference difference(const Image& a, const Image& b);
-/// A copy so many pixels wide or less, each pixel the mean of those it stands for.
+/// Returns a copy at most `width_px` wide. Each pixel is the mean of the original pixels that it covers.
 Image reduced(const Image& image, int width_px);
 /// The absolute difference times `gain`, opaque.
 Image amplified_difference(const Image& a, const Image& b, int gain = 16);

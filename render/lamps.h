@@ -1,6 +1,6 @@
 #pragma once
-/// Private: lamps and their shadows. All shadow maps share one texture: a block of two rows of three tiles
-/// for a lamp that shines all around, one larger tile for a cone.
+/// Private: lamps and their shadows. All shadow maps share one texture. A lamp that shines in all directions
+/// has a block of two rows of three tiles; a cone has one larger tile.
 
 #include <span>
 #include <vector>
@@ -12,22 +12,23 @@
 
 namespace offstage::render {
 
-/// A lamp in the middle of a fire, as bright as its flames.
+/// Creates a lamp in the middle of a fire, as bright as its flames.
 Lamp lamp_of_fire(const PointSet& flames);
 
-/// Radiance of a white surface that faces a lamp, and the unit vector to it: as in shaders/lamps.glsl.
+/// Radiance of a white surface that faces a lamp, and the unit vector to the lamp, computed as in
+/// shaders/lamps.glsl.
 Vector3f lamp_radiance(const LampUniforms& lamp, const Vector3f& place, Vector3f& towards);
 
 class LampPass {
  public:
-  /// Chooses the lamps of a sub-frame and where in them it is lit from.
+  /// Selects the lamps of a sub-frame, and the point of each that emits in this sub-frame.
   void prepare(std::span<const Lamp> lamps, const SampleOffsets& offsets, FrameUniforms& frame);
-  /// One picture for a shadow map.
+  /// One view of a shadow map.
   struct Tile {
     Matrix4f clip_from_world;
     int x_px, y_px, size_px;
     Vector3f eye, forward;
-    float slope;  ///< tangent of half its angle, to the corners
+    float slope;  ///< tangent of half its angle, towards the corners
 
     bool sees(const Caster& caster) const;
   };

@@ -1,6 +1,6 @@
 #pragma once
-/// Private: draws lines. Every line is one quad that faces the eye, drawn instanced and blended back to front
-/// over the finished picture: first what is hidden, faintly, then what is not.
+/// Private: draws lines. Every line is one quad that faces the eye. Lines are drawn instanced and blended
+/// back to front over the finished picture: first the hidden parts, faintly, then the visible ones.
 
 #include <span>
 #include <vector>
@@ -11,15 +11,15 @@
 namespace offstage::render {
 
 struct GpuLine {
-  Vector4f a, b;  ///< w: width there
+  Vector4f a, b;  ///< w: width at that end
   Vector4f color;
 };
 
 struct LineSet {
   LinesDef def;
   std::vector<Line> lines;
-  gl::StreamBuffer buffer;  ///< what the view sees of them, in drawing order
-  GLsizei drawn = 0;        ///< how many those are
+  gl::StreamBuffer buffer;  ///< visible lines, in drawing order
+  GLsizei drawn = 0;        ///< number of lines in the buffer
 
   void assign(std::span<const Line> values);
 };
@@ -27,7 +27,7 @@ struct LineSet {
 class LinesPass {
  public:
   LinesPass();
-  /// Cuts lines off at the near plane and uploads them back to front for this view.
+  /// Clips lines at the near plane and uploads them back to front for this view.
   void prepare(LineSet& set, const View& view);
   void draw(const LineSet& set, int width_px, int height_px);
 

@@ -1,7 +1,7 @@
 #pragma once
 /// Loop's subdivision of triangle meshes (C. Loop, 1987; weights of J. Warren, 1995): every triangle becomes
-/// four, and the surface smoother. What depends on the triangles alone is worked out once; positions that
-/// change every frame are then weighted sums of the coarse ones.
+/// four, and the surface becomes smoother. The weights depend on the triangles alone and are computed once.
+/// Positions that change every frame are then weighted sums of the coarse ones.
 
 #include <array>
 #include <cstdint>
@@ -12,25 +12,25 @@
 
 namespace offstage::render {
 
-/// Two vertices that one triangle alone joins, in the order of that triangle.
+/// An edge that belongs to exactly one triangle, in the order of that triangle.
 using BoundaryEdge = std::array<uint32_t, 2>;
 
-/// Edges of one triangle only: the mesh's rim.
+/// Edges of exactly one triangle: the boundary of the mesh.
 std::vector<BoundaryEdge> boundary_edges(std::span<const uint32_t> triangles);
 
-/// One step of subdivision. Boundaries become cubic B-splines; where a boundary turns by more than 60 degrees
-/// is a corner, which stays, as does a vertex where more than two boundaries meet.
+/// One step of subdivision. Boundaries become cubic B-splines. A boundary vertex stays in place where the
+/// boundary turns by more than 60 degrees, or where more than two boundary edges meet.
 class LoopSubdivision {
  public:
-  /// `triangles`: three indices each, below the number of `places`, which are where the vertices lie along
-  /// the flat sheet. An edge of more than two triangles counts as boundary.
+  /// `triangles`: three indices each, below the size of `places`. `places`: positions of the vertices on the
+  /// flat sheet. An edge of more than two triangles counts as boundary.
   LoopSubdivision(std::span<const uint32_t> triangles, std::span<const Eigen::Vector2f> places);
 
-  /// Of the finer mesh: the coarse vertices come first, then one for each edge.
+  /// Triangles of the finer mesh: the coarse vertices come first, then one vertex per edge.
   const std::vector<uint32_t>& triangles() const { return triangles_; }
   std::size_t vertex_count() const { return first_term_.size() - 1; }
 
-  /// Values at the finer mesh's vertices from those at the coarse one's.
+  /// Computes values at the vertices of the finer mesh from those at the coarse vertices.
   template <class V>
   void refine(std::span<const V> coarse, std::vector<V>& fine) const {
     fine.resize(vertex_count());
@@ -48,7 +48,7 @@ class LoopSubdivision {
     float weight;
   };
   std::vector<uint32_t> triangles_;
-  std::vector<uint32_t> first_term_;  // of each vertex, and the end
+  std::vector<uint32_t> first_term_;  // first term of each vertex, then the end
   std::vector<Term> terms_;
 };
 

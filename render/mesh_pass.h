@@ -1,6 +1,7 @@
 #pragma once
-/// Private: draws the instances of meshes: opaque ones in batches of one mesh and material, front to back;
-/// those that are not opaque one by one, in the order that PaintOrder finds; and casters into the shadow map.
+/// Private: draws the instances of meshes, and casters into the shadow map. Opaque instances are drawn front
+/// to back in batches of one mesh and material; translucent ones are drawn one by one in the order of
+/// PaintOrder.
 
 #include <array>
 #include <map>
@@ -21,17 +22,17 @@ struct GpuMesh {
   gl::Buffer vertices, indices;
   gl::VertexArray vertex_array;
   GLsizei index_count = 0;
-  GLsizei coarse_count = 0;  ///< of the indices behind those, of Mesh::coarse_indices
+  GLsizei coarse_count = 0;  ///< number of indices of Mesh::coarse_indices, which follow the others
   Eigen::AlignedBox3f box;
-  Vector3f center;  ///< of the bounding ball
+  Vector3f center;  ///< centre of the bounding ball
   float radius = 0;
-  float thickness = 0;   ///< the least side of the box around it
-  bool flat = false;     ///< lies in a plane along an axis
+  float thickness = 0;   ///< smallest side of the bounding box
+  bool flat = false;     ///< lies in an axis-aligned plane
   bool endless = false;  ///< see Mesh::endless
-  bool round = false;    ///< a ball that fits its box
-  bool boxy = false;     ///< fills its box, but for a bevel
+  bool round = false;    ///< fills the ball inscribed in its box
+  bool boxy = false;     ///< fills its box, except for a bevel
   Vector3f flat_normal = {0, 0, 0};
-  bool closed = false;  ///< every edge has a triangle on either side, so that the front hides the back
+  bool closed = false;  ///< every edge has two triangles, so the front faces hide the back faces
 };
 
 /// The uniform block of shaders/material.glsl.
@@ -41,7 +42,7 @@ struct MaterialUniforms {
 
 struct GpuMaterial {
   gl::Buffer uniforms;
-  std::array<gl::Texture, 3> textures;  ///< base colour, metallic and roughness, emission
+  std::array<gl::Texture, 3> textures;  ///< base colour; metallic and roughness; emission
   Pattern pattern = Pattern::none;
   Weave weave = Weave::plain;
   bool textured = false;
@@ -49,10 +50,10 @@ struct GpuMaterial {
   bool blended = false;
   bool casts = true;    ///< false if fully transparent
   bool glass = false;   ///< light goes through and is refracted
-  bool smooth = false;  ///< enough to show the scene in it
+  bool smooth = false;  ///< smooth enough to mirror the scene
   bool metal = false;
 
-  /// Something is seen through it.
+  /// Whether objects behind the surface are visible through it.
   bool lets_through() const { return blended || glass; }
 };
 
@@ -61,54 +62,58 @@ GpuMaterial make_gpu_material(const Material& material, std::span<const Image> t
 struct Instance {
   const GpuMesh* mesh = nullptr;
   const GpuMaterial* material = nullptr;
-  std::pair<uint32_t, uint32_t> batch_key;  ///< of material and mesh, for sorting
+  std::pair<uint32_t, uint32_t> batch_key;  ///< material and mesh, for sorting
   Eigen::Affine3f world_from_mesh = Eigen::Affine3f::Identity();
   bool casts_shadow = true;
   bool visible = true;
   uint32_t object = 0;                    ///< id in Channels
-  std::optional<Eigen::Affine3f> before;  ///< where it was at Stage::store_previous_transforms
+  std::optional<Eigen::Affine3f> before;  ///< pose at Stage::store_previous_transforms
 
   float scale() const;
   Caster ball() const;
-  /// Ground shadows nothing that the film shows, and would stretch the shadow map over all of it.
+  /// Whether this is ground. Ground casts no visible shadow, and would stretch the shadow map over its whole
+  /// area.
   bool is_ground() const;
 };
 
-/// What can hide light from surfaces, and from how far away; nothing does from no distance.
+/// Objects that can hide light from surfaces, and the distance at which they do; 0 disables the effect.
 struct Occluders {
   float sky_reach_m = 0;
-  std::vector<Eigen::AlignedBox3f> solid;  ///< boxes around what hides the sky besides the instances
+  std::vector<Eigen::AlignedBox3f>
+      solid;  ///< boxes around other objects that hide the sky, in addition to the instances
   Vector3f to_sun = Vector3f::UnitY();
-  float shadow_reach_m = 0;                  ///< across the light
-  std::vector<Eigen::AlignedBox3f> casting;  ///< boxes around what casts shadows besides the instances
+  float shadow_reach_m = 0;  ///< reach of shadows, measured across the light
+  std::vector<Eigen::AlignedBox3f>
+      casting;  ///< boxes around other objects that cast shadows, in addition to the instances
 };
 
 class MeshPass {
  public:
   MeshPass();
-  /// Sorts what is visible for this view. The instances must stay where they are until it is drawn.
+  /// Sorts the visible instances for this view. The instances must stay in memory until the view is drawn.
   void prepare(std::span<const Instance* const> instances, const View& view, const Features& features);
-  /// `front_only`: of closed opaque meshes only the side that the light falls on; the matrix must not mirror.
+  /// Draws casters into a shadow map. `front_only`: of closed opaque meshes, only the faces that the light
+  /// reaches; the matrix must then not mirror.
   void draw_shadows(const Matrix4f& shadow_clip_from_world, bool front_only);
-  /// Depth alone of what is wholly opaque, so that only what is seen is shaded.
+  /// Draws only the depth of fully opaque instances, so that hidden surfaces are not shaded.
   void draw_depth(const Matrix4f& clip_from_world);
-  /// A plane is shaded without looking for what hides light from it where nothing can, if that is much of a
-  /// picture of this size.
+  /// Draws the opaque instances. Parts of a plane where nothing can hide light are shaded by a simpler
+  /// program, if they cover enough of a picture of this size.
   void draw_opaque(const View& view, const Occluders& occluders, int width_px, int height_px);
-  /// Where opaque surfaces can hide the sky within `reach` [m]: around all but a plane. `others`: boxes
-  /// around what is opaque besides the instances.
+  /// The area of the picture where opaque surfaces can hide the sky within `reach` [m]: around all of them
+  /// except planes. `others`: boxes around opaque objects in addition to the instances.
   ScreenArea occluded_area(const View& view, float reach, std::span<const Eigen::AlignedBox3f> others) const;
-  /// What is not opaque, in the order of the instances.
+  /// Translucent instances, in the order of the instances.
   std::span<const Instance* const> translucent() const { return see_through_; }
-  /// Finds the surfaces that mirror something of the scene, and where in a picture of a size; false if there
-  /// are none. `reach`: how far away things are looked for [m]. `others` as above.
+  /// Finds the surfaces that mirror parts of the scene, and their area in a picture of the given size.
+  /// Returns false if there are none. `reach`: largest distance of mirrored objects [m]. `others` as above.
   bool find_mirrors(const View& view, float reach, std::span<const Eigen::AlignedBox3f> others, int width_px,
                     int height_px);
-  /// What those mirror, to be added to the picture, which is bound with its depth.
+  /// Adds the mirrored light to the picture, whose framebuffer and depth are bound.
   void draw_mirrors(float reach);
-  /// One of `translucent`. A glass one looks up what is behind it in a copy of the picture that is bound.
+  /// Draws one of `translucent`. Glass reads the scene behind it from a copy of the picture that is bound.
   void draw_translucent(std::size_t k);
-  /// Its depth alone, by the picture's matrix.
+  /// Draws only the depth of one of `translucent`, by the picture's matrix.
   void draw_translucent_depth(std::size_t k, const Matrix4f& clip_from_world);
 
  private:
@@ -119,9 +124,9 @@ class MeshPass {
     const GpuMaterial* material;
     bool mirrored;
     float depth;
-    GLuint first;  ///< of its instances' rows
+    GLuint first;  ///< first row of its instances
     GLsizei count;
-    float thickness;  ///< in the world, of the first
+    float thickness;  ///< thickness of its first instance, in the world
   };
   void draw(const Batch& batch, const gl::StreamBuffer& rows, Detail detail = Detail::full);
   void bind(const GpuMaterial& material);
@@ -136,15 +141,15 @@ class MeshPass {
                            std::span<const Eigen::AlignedBox3f> others) const;
 
   std::map<std::tuple<Pattern, bool, bool, bool, Shading, Features>, gl::LazyProgram>
-      surface_programs_;  ///< textured, glass, endless
+      surface_programs_;  ///< keyed by textured, glass, endless
   gl::LazyProgram opaque_shadow_, dithered_shadow_, textured_shadow_;
   Features features_;
   gl::Texture white_;
   gl::StreamBuffer rows_, shadow_rows_;
   std::vector<Batch> opaque_, translucent_, casters_;
-  std::vector<const Instance*> seen_;         ///< opaque ones, by rows
-  std::vector<const Instance*> see_through_;  ///< of translucent_
-  std::vector<const Instance*> casting_;      ///< by rows
+  std::vector<const Instance*> seen_;         ///< opaque instances, in the order of the rows
+  std::vector<const Instance*> see_through_;  ///< instances of translucent_
+  std::vector<const Instance*> casting_;      ///< casters, in the order of the rows
   struct Mirror {
     const Batch* batch;
     Eigen::AlignedBox2i area_px;

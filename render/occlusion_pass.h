@@ -1,7 +1,7 @@
 #pragma once
-/// Private: how much of the sky near things hide from each place in the picture, found on the screen from the
-/// depth of what is opaque, in a picture of half the size. Each sub-frame looks at a few places; their mean
-/// is smooth.
+/// Private: computes how much of the sky nearby objects hide from each pixel (ambient occlusion). It works in
+/// screen space on the depth of the opaque objects, at half resolution. Each sub-frame takes a few samples;
+/// the mean over the sub-frames is smooth.
 
 #include "render/frame.h"
 #include "render/gl.h"
@@ -11,8 +11,9 @@ namespace offstage::render {
 class OcclusionPass {
  public:
   OcclusionPass(int width_px, int height_px);
-  /// Reads the texture `depth` and leaves the result bound for shading. `reach`: how far away things are
-  /// looked for [m]; 0: all is open, as it is outside of `area`. `count`: of sub-frames, `seed` of this one.
+  /// Reads the texture `depth` and leaves the result bound for shading. `reach`: largest distance of
+  /// occluders [m]; 0 disables occlusion. Pixels outside `area` count as unoccluded. `count`: number of
+  /// sub-frames; `seed`: number of this one.
   void draw(GLuint depth, const View& view, float reach, const ScreenArea& area, int count, float seed);
 
  private:

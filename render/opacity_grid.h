@@ -1,7 +1,7 @@
 #pragma once
-/// Private: how much smoke lies between the sun and a place. Puffs are spread into a coarse grid whose Z axis
-/// runs away from the sun; sums along it are the optical depth, as in deep opacity maps (Yuksel and Keyser,
-/// 2008). The transmittance is exp(-depth).
+/// Private: computes how much smoke lies between the sun and a point. Puffs are spread into a coarse grid
+/// whose Z axis points away from the sun. Sums along Z are the optical depth, as in deep opacity maps (Yuksel
+/// and Keyser, 2008). The transmittance is exp(-depth).
 
 #include <array>
 #include <span>
@@ -17,20 +17,21 @@ class OpacityGrid {
  public:
   struct Absorber {
     Vector3f position;
-    float radius;   ///< over which it is spread [m]
+    float radius;   ///< radius over which the absorber is spread [m]
     float section;  ///< optical depth times area [m^2]
   };
-  /// `away` is the unit direction in which the light goes. Clears the grid if there is nothing to absorb.
+  /// Builds the grid. `away` is the unit direction in which the light travels. Clears the grid if there are
+  /// no absorbers.
   void build(std::span<const Absorber> absorbers, const Vector3f& away);
 
   bool empty() const { return sums_.empty(); }
-  /// Optical depth between the light and a place; it grows along the light.
+  /// Optical depth between the light and a point; it increases along the light.
   float depth(const Vector3f& place) const;
   /// Optical depth per metre.
   float density(const Vector3f& place) const;
   float cell_m() const { return cell_; }
 
-  /// What a 3D texture needs: sums with their size, x fastest, and the map from the world to [0, 1]^3.
+  /// Data for a 3D texture: the sums with their size, x fastest, and the map from the world to [0, 1]^3.
   std::span<const float> sums() const { return sums_; }
   std::array<int, 3> size() const { return {nx_, ny_, nz_ + 1}; }
   Eigen::Matrix4f texture_from_world() const;
@@ -41,8 +42,8 @@ class OpacityGrid {
   float trilinear(const std::vector<float>& values, int slices, Vector3f cell_place) const;
   Vector3f local(const Vector3f& place) const { return axes_ * (place - origin_) / cell_; }
 
-  Eigen::Matrix3f axes_ = Eigen::Matrix3f::Identity();  ///< light from world
-  Vector3f origin_ = Vector3f::Zero();                  ///< of the grid's first corner, in the world
+  Eigen::Matrix3f axes_ = Eigen::Matrix3f::Identity();  ///< light space from world
+  Vector3f origin_ = Vector3f::Zero();                  ///< position of the grid's first corner in the world
   float cell_ = 1;
   int nx_ = 0, ny_ = 0, nz_ = 0;
   std::vector<float> amounts_, sums_;

@@ -1,6 +1,6 @@
 #pragma once
-/// Private: the order in which translucent things are drawn, back to front: bodies (glass, blended meshes,
-/// sheer cloth) and, between them, the blended particles of all sets.
+/// Private: the back-to-front order of translucent objects: bodies (glass, blended meshes, sheer cloth) and,
+/// between them, the blended particles of all sets.
 
 #include <array>
 #include <cstdint>
@@ -12,24 +12,24 @@
 
 namespace offstage::render {
 
-/// The part of space that a translucent body takes: a box along axes of its own, or a ball in that box.
+/// The space that a translucent body occupies: an oriented box, or the ball inscribed in it.
 class Region {
  public:
-  /// `round`: the body is the ball that fits the box, which is a cube then.
+  /// `round`: the body is the ball inscribed in the box, which is then a cube.
   Region(const Eigen::AlignedBox3f& box, const Eigen::Affine3f& world_from_box, bool round, const View& view);
 
   /// Whether the body can hide a place in the world, at this depth along the view axis, and the place cannot
   /// hide the body. A place within the body is behind its surface. Of places on one line of sight, all from
   /// one on are behind.
   bool hides(const Vector3f& place, float depth) const;
-  /// Whether this body can hide the other one: by the faces of either box that part the two, else by their
-  /// centres.
+  /// Whether this body can hide the other one. Decided by a face of either box that separates the two, else
+  /// by the distance of their centres.
   bool is_in_front_of(const Region& other) const;
   bool contains(const Vector3f& place) const;
 
-  /// What a body that fills its box badly, such as a wavy cloth, looks like: the depth of its nearest surface
-  /// along the view axis for each pixel of `area_px`, by rows, infinite where there is none. Decides for
-  /// places within the box.
+  /// Sets the visible surface of a body that fills its box badly, such as a wavy cloth: the depth along the
+  /// view axis of its nearest surface for each pixel of `area_px`, by rows, infinite where there is none. The
+  /// surface then decides for points within the box.
   void set_surface(const Eigen::AlignedBox2i& area_px, std::vector<float> depths, const Vector2f& size_px);
 
   const std::array<Vector3f, 8>& corners() const { return corners_; }
@@ -38,7 +38,7 @@ class Region {
 
  private:
   enum class Side { before, behind, neither };
-  /// Of a body with these corners, by the faces of this one's box.
+  /// On which side of this box's faces a body with these corners lies.
   Side side_of(const Region& other) const;
   bool surface_hides(const Vector3f& place, float depth) const;
 
@@ -47,44 +47,44 @@ class Region {
   std::array<Vector3f, 8> corners_;  ///< in the world
   Vector3f eye_;                     ///< in the box's frame
   Vector3f center_, world_eye_;
-  float radius_ = 0;                  ///< of a ball; else 0
-  float nearest_ = 0, farthest_ = 0;  ///< along the view axis
-  float depth_ = 0;                   ///< of the centre
+  float radius_ = 0;                  ///< radius of a ball; 0 for a box
+  float nearest_ = 0, farthest_ = 0;  ///< range of depth along the view axis
+  float depth_ = 0;                   ///< depth of the centre
   Eigen::Matrix4f clip_from_world_;
   Eigen::AlignedBox2i surface_px_;
   Vector2f size_px_ = {0, 0};
   std::vector<float> surface_;
 };
 
-/// Numbers of the bodies, back to front. Where each of several hides the next in a circle, the farthest comes
-/// first. `areas_px`: what they take of the picture; bodies that share no pixel have no order but that of
-/// their depth.
+/// Orders bodies back to front and returns their indices. In a cycle of bodies that hide each other, the
+/// farthest comes first. `areas_px`: the pixels that the bodies cover; bodies that share no pixel are ordered
+/// by depth only.
 std::vector<uint32_t> back_to_front(std::span<const Region> bodies,
                                     std::span<const Eigen::AlignedBox2i> areas_px);
 
-/// The order of the particles of a sub-frame, among each other and between bodies.
+/// The order of the particles of a sub-frame, among each other and relative to the bodies.
 class PaintOrder {
  public:
   enum class Kind : uint8_t { puffs, sprites, flakes, streaks };
   static constexpr std::size_t kKinds = 4;
-  /// Particles of one kind that are drawn in one go.
+  /// Consecutive particles of one kind, drawn together.
   struct Run {
     Kind kind;
-    uint32_t first, last;  ///< in keys(kind), the last one not included
+    uint32_t first, last;  ///< range in keys(kind); `last` is excluded
   };
   struct Source {
     const PointSet* set;
-    uint32_t first;  ///< number of its first point among those of its kind
+    uint32_t first;  ///< index of its first point among all points of its kind
   };
   struct Place {
     const PointSet* set;
     std::size_t index;
   };
 
-  /// `bodies` back to front. The sets must stay until the next call.
+  /// Builds the order. `bodies` are back to front. The sets must stay in memory until the next call.
   void build(std::span<const PointSet* const> sets, std::span<const Region> bodies, const View& view);
 
-  /// Of each visible particle of a kind, nearest first: of equal depth, by set and id.
+  /// Keys of the visible particles of a kind, nearest first; equal depths are ordered by set and id.
   std::span<const uint64_t> keys(Kind kind) const { return keys_[index(kind)]; }
   std::span<const Source> sources(Kind kind) const { return sources_[index(kind)]; }
   /// Number of points of a kind, visible or not.
@@ -92,10 +92,11 @@ class PaintOrder {
   uint32_t number(Kind kind, uint64_t key) const;
   Place place(Kind kind, uint64_t key) const;
 
-  /// Back to front: particles that are drawn before body `k`; behind the last body, those in front of all.
+  /// Runs, back to front, of the particles that are drawn before body `k`; for k = number of bodies, those in
+  /// front of all bodies.
   std::span<const Run> runs_before(std::size_t body) const;
   std::size_t run_count() const { return runs_.size(); }
-  /// The pixels that sprites or flakes of a run can change.
+  /// The pixels that the sprites or flakes of a run can change.
   Eigen::AlignedBox2i area_px(const Run& run, const View& view, int width_px, int height_px) const;
 
  private:
@@ -107,9 +108,11 @@ class PaintOrder {
   std::array<std::vector<uint64_t>, kKinds> keys_;
   std::array<std::vector<Source>, kKinds> sources_;
   std::array<uint32_t, kKinds> counts_{};
-  std::size_t group_ = 1;             ///< bodies between which particles are not looked for
-  std::vector<Run> runs_;             ///< back to front
-  std::vector<uint32_t> run_begins_;  ///< of each body; then of those in front of all; then the end
+  std::size_t group_ =
+      1;  ///< number of bodies per group; particles are not inserted between the bodies of a group
+  std::vector<Run> runs_;  ///< back to front
+  std::vector<uint32_t>
+      run_begins_;  ///< first run of each body, then of the particles in front of all, then the end
 };
 
 }  // namespace offstage::render

@@ -11,16 +11,15 @@ namespace offstage::render {
 
 class PictureCopy {
  public:
-  /// `unit`: the texture unit it is bound to. The texture is made when first needed.
+  /// `unit`: texture unit that the copy is bound to. The texture is created on first use.
   PictureCopy(GLenum format, GLenum filter, GLuint unit, int width_px, int height_px);
-  /// The picture has changed there.
+  /// Marks an area of the picture as changed.
   void change(const Eigen::AlignedBox2i& area_px);
   void change_all() { change(all_px_); }
-  /// Copies what has changed and lies in one piece with the area, at most once for each change, and binds the
-  /// copy.
+  /// Copies the changed areas that are connected with `area_px`, at most once per change, and binds the copy.
   void update(GLuint picture, const Eigen::AlignedBox2i& area_px);
   void update_all(GLuint picture) { update(picture, all_px_); }
-  /// 0 before the first update.
+  /// The texture of the copy; 0 before the first update.
   GLuint texture() const { return texture_; }
 
  private:

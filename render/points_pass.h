@@ -1,6 +1,6 @@
 #pragma once
-/// Private: draws balls, sprites and flakes. Every particle is one quad, drawn instanced: sprites and flakes
-/// of all sets blended back to front over the picture, balls ray-cast with depth among the opaque things.
+/// Private: draws balls, sprites and flakes. Every particle is one instanced quad. Sprites and flakes of all
+/// sets are blended back to front over the picture; balls are ray-cast with depth among the opaque objects.
 
 #include <cstdint>
 #include <map>
@@ -15,7 +15,7 @@ struct GpuPoint {
   Vector4f position, velocity, color;
 };
 
-/// A sprite or flake, of whichever set.
+/// A sprite or flake of any set.
 struct BlendedPoint {
   GpuPoint point;
   Vector4f style;
@@ -23,21 +23,23 @@ struct BlendedPoint {
 
 struct PointSet {
   PointsDef def;
-  std::vector<GpuPoint> points;  ///< w of position: radius; w of velocity: a number of its own in [0, 1)
+  std::vector<GpuPoint>
+      points;  ///< w of position: radius; w of velocity: a pseudo-random number per particle in [0, 1)
   std::vector<uint64_t> ids;
   std::vector<float> ages;
-  Eigen::AlignedBox3f box;  ///< of what can be seen of them, streaks at full length
-  gl::StreamBuffer buffer;  ///< of balls: first those that only throw shadows into the view, then by depth
-  std::size_t unseen = 0;   ///< how many those are
+  Eigen::AlignedBox3f box;  ///< bounds of the drawn particles, streaks at full length
+  gl::StreamBuffer buffer;  ///< balls: first those outside the view whose shadows fall into it, then the
+                            ///< visible ones by depth
+  std::size_t unseen = 0;   ///< number of balls outside the view
   uint32_t object = 0;      ///< id in Channels
 
   void assign(std::span<const Point> values);
   /// Smoke and fire, which PuffsPass draws; StreaksPass draws streaks.
   bool is_puffs() const { return def.style == PointStyle::smoke || def.style == PointStyle::fire; }
   bool is_splatted() const { return is_puffs() || def.style == PointStyle::streak; }
-  /// Whether points are drawn out along their motion.
+  /// Whether points are stretched along their motion.
   bool is_stretched() const { return def.style != PointStyle::sprite && def.style != PointStyle::sphere; }
-  /// Radius of the ball around all that is drawn of a point [m].
+  /// Radius of the ball around everything drawn for a point [m].
   float reach(std::size_t i) const;
 };
 
@@ -46,17 +48,17 @@ class PaintOrder;
 class PointsPass {
  public:
   PointsPass();
-  /// Uploads what the shadow map shows, and balls in drawing order.
+  /// Uploads the points for the shadow map, and balls in drawing order.
   void prepare(PointSet& set, const View& view);
   /// Uploads the sprites and flakes of all sets.
   void prepare_blended(const PaintOrder& order);
   void draw_shadow(const PointSet& set, const Matrix4f& shadow_clip_from_world);
-  /// Depth alone of balls.
+  /// Draws only the depth of balls.
   void draw_depth(const PointSet& set);
   void draw_spheres(const PointSet& set, const Features& features);
-  /// Sprites or flakes from `first` to `last` of their keys in the PaintOrder.
+  /// Draws sprites or flakes; `first` and `last` are their keys in the PaintOrder.
   void draw_blended(PointStyle style, uint32_t first, uint32_t last, const Features& features);
-  /// Balls with channels_ball.frag, whose uniforms are set in between.
+  /// Makes the program of channels_ball.frag current, so that its uniforms can be set before the draw.
   void use_channels() { channels_.use(); }
   void draw_channels(const PointSet& set) { draw(set, set.unseen); }
 
@@ -76,7 +78,7 @@ class PointsPass {
   std::vector<GpuPoint> ordered_;
   gl::StreamBuffer blended_buffer_;
   std::vector<BlendedPoint> blended_;  ///< sprites, then flakes, each back to front
-  uint32_t sprites_ = 0, flakes_ = 0;  ///< how many those are
+  uint32_t sprites_ = 0, flakes_ = 0;  ///< number of each
   std::vector<std::pair<float, uint32_t>> keys_;
 };
 

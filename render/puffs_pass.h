@@ -1,8 +1,8 @@
 #pragma once
-/// Private: draws smoke and fire. All puffs of all sets are lit once per puff, sorted together, and splatted
-/// on the CPU, in a smaller picture where they are large; that is laid over the scene with an eye on its
-/// depth, at once or, where other translucent things are between puffs, in several runs. What the sun loses
-/// in the smoke is a grid, which also shadows the scene.
+/// Private: draws smoke and fire. The puffs of all sets are lit once per puff, sorted together and splatted
+/// on the CPU, at reduced resolution where they are large. The result is composited over the scene with
+/// regard to its depth, in one go, or in several runs where other translucent objects lie between puffs. The
+/// attenuation of sunlight in smoke is a grid, which also shadows the scene.
 
 #include <span>
 #include <vector>
@@ -22,19 +22,19 @@ namespace offstage::render {
 class PuffsPass {
  public:
   PuffsPass(int width_px, int height_px) : width_px_(width_px), height_px_(height_px) {}
-  /// Finds what smoke and drops of these sets take from the sun and, if it shades the scene, sets the frame's
-  /// field and binds the grid.
+  /// Computes the attenuation of sunlight by the smoke and drops of these sets. If it shades the scene, sets
+  /// the frame's smoke fields and binds the grid.
   void prepare(std::span<const PointSet* const> sets, const Sun& sun, FrameUniforms& frame);
   const OpacityGrid& grid() const { return grid_; }
   /// Whether the scene must look up the smoke's shadow.
   bool shades() const { return !grid_.empty(); }
-  /// Lights the puffs of a sub-frame. The order must stay until they are drawn.
+  /// Lights the puffs of a sub-frame. The order must stay in memory until they are drawn.
   void prepare_splats(const PaintOrder& order, const View& view, const PuffLight& light,
                       const ShadowMap& shadow_map);
-  /// The pixels that the puffs from `first` to `last` of their keys in the PaintOrder can change.
+  /// The pixels that puffs `first` to `last` (keys in the PaintOrder) can change.
   Eigen::AlignedBox2i area_px(uint32_t first, uint32_t last) const;
-  /// Draws those over the picture in `framebuffer`, whose depth is also in the texture unit
-  /// `kSceneDepthUnit`.
+  /// Draws these puffs over the picture in `framebuffer`. The depth of the picture must also be bound to the
+  /// texture unit `kSceneDepthUnit`.
   void draw(uint32_t first, uint32_t last, const FrameUniforms& frame, GLuint framebuffer);
 
  private:
@@ -45,14 +45,15 @@ class PuffsPass {
   void composite(GLuint framebuffer);
 
   int width_px_, height_px_;
-  std::unique_ptr<const PuffAtlas> atlas_;  ///< made when first needed
+  std::unique_ptr<const PuffAtlas> atlas_;  ///< created on first use
   OpacityGrid grid_;
   gl::Texture grid_texture_;
   std::array<int, 3> grid_size_{};
 
-  float typical_m_ = 0;        ///< radius
-  float farthest_m_ = 0;       ///< depth behind which no puff is
-  int factor_ = 1;             ///< by which the picture of this many and large puffs can be smaller
+  float typical_m_ = 0;   ///< typical radius of a puff
+  float farthest_m_ = 0;  ///< depth of the farthest puff
+  int factor_ =
+      1;  ///< factor by which the resolution of the puffs is reduced; depends on their number and size
   std::vector<Splat> splats_;  ///< nearest first
   std::vector<float> depths_;
   SplatPicture picture_;

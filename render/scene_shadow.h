@@ -1,6 +1,6 @@
 #pragma once
-/// Private: the part of the sun that the scene leaves over a particle lit on the CPU, from a copy of the
-/// shadow map.
+/// Private: the share of sunlight that the scene lets through to a particle that is lit on the CPU. Uses a
+/// copy of the shadow map.
 
 #include <algorithm>
 #include <cmath>

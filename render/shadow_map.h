@@ -1,7 +1,7 @@
 #pragma once
-/// Private: the sun's shadow map. Its orthographic frame covers the part of the view in which a caster can
-/// shadow anything, so no texel is spent on the far horizon; it sits on a grid of whole texels and its size
-/// goes in steps, so that shadows do not swim when the camera or things move.
+/// Private: the sun's shadow map. Its orthographic frame covers only the part of the view that can be in
+/// shadow, so no texels are spent on the far horizon. The frame is aligned to whole texels and its size
+/// changes in steps, so that shadows do not swim when the camera or objects move.
 
 #include <cstdint>
 #include <span>
@@ -14,7 +14,7 @@
 
 namespace offstage::render {
 
-/// A ball that bounds something that casts a shadow.
+/// A ball that bounds a shadow caster.
 struct Caster {
   Vector3f center;
   float radius;
@@ -22,19 +22,19 @@ struct Caster {
 
 struct ShadowFrame {
   Matrix4f clip_from_world;
-  float texel_m = 0;  ///< 0: nothing in view can be in a shadow
-  float depth_m = 0;  ///< along the light, from 0 to 1 in the map
+  float texel_m = 0;  ///< 0: nothing in view can be in shadow
+  float depth_m = 0;  ///< range along the light that maps to 0 to 1
 };
 
-/// The furthest from a place that its shadow is searched for [texels].
+/// Largest distance from a point in which its shadow is searched [texels].
 inline constexpr float kWidestPenumbra_px = 24;
 
-/// `pixel_m`: width of a pixel of the picture at distance 1.
+/// Fits the frame to the view. `pixel_m`: width of a pixel of the picture at distance 1.
 ShadowFrame fit_shadow(std::span<const Caster> casters, const View& view, const Vector3f& sun_direction,
                        float pixel_m, int size_px);
 
-/// How far beside a caster something of its shadow is found, across the light: the search's reach, its four
-/// texels at once, and what a place is moved off its surface.
+/// Largest distance beside a caster at which its shadow is still found, across the light: the reach of the
+/// search, the four texels of one lookup, and the offset of a point from its surface.
 inline float search_m(const ShadowFrame& frame) {
   return (kWidestPenumbra_px + 6) * frame.texel_m;
 }
@@ -43,15 +43,15 @@ class ShadowMap {
  public:
   explicit ShadowMap(int size_px);
   int size_px() const { return size_px_; }
-  /// Says where casters are, so that shading only searches the map where one may be in front: the rest of the
-  /// ground is lit at the cost of one look.
+  /// Stores where casters are, so that shading searches the map only where one may be in front. Other points
+  /// cost a single lookup.
   void mark(const ShadowFrame& frame, std::span<const Caster> balls,
             std::span<const Eigen::AlignedBox3f> boxes);
   /// Binds and clears the map and sets the state for drawing casters into it.
   void begin() const;
   /// Ends drawing and leaves the map bound for shading.
   void end() const;
-  /// Depths of a rectangle of texels, row by row, for what is lit on the CPU; 65535 is 1.
+  /// Reads the depths of a rectangle of texels, row by row, for lighting on the CPU; 65535 stands for 1.
   void read(int x, int y, int width, int height, std::vector<uint16_t>& depths) const;
 
  private:
@@ -59,7 +59,8 @@ class ShadowMap {
   gl::Texture depth_;
   gl::Framebuffer framebuffer_;
   gl::Sampler plain_;
-  std::vector<float> nearest_;  ///< depth of the casters around each cell of a coarse grid over the map
+  std::vector<float>
+      nearest_;  ///< smallest depth of the casters around each cell of a coarse grid over the map
   gl::Texture nearest_texture_;
 };
 

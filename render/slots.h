@@ -1,6 +1,6 @@
 #pragma once
-/// Private: the table behind a handle type. A slot's generation changes when its value is removed, so a
-/// handle that outlived its value is recognised.
+/// Private: the table behind a handle type. A slot's generation changes when its value is removed, so that
+/// stale handles are detected.
 
 #include <optional>
 #include <stdexcept>
@@ -30,7 +30,7 @@ class Slots {
     return {index, slots_[index].generation};
   }
 
-  /// Throws std::logic_error if the handle is null or stale.
+  /// Returns the value. Throws std::logic_error if the handle is null or stale.
   T& operator[](Handle<Tag> handle) {
     if (handle.index >= slots_.size() || slots_[handle.index].generation != handle.generation ||
         !slots_[handle.index].value) {
@@ -47,7 +47,7 @@ class Slots {
     free_.push_back(handle.index);
   }
 
-  /// Calls `visit(value)` in order of index, which is what makes drawing order reproducible.
+  /// Calls `visit(value)` in order of index, so that the drawing order is reproducible.
   template <class Visit>
   void for_each(Visit&& visit) {
     for (Slot& slot : slots_) {
