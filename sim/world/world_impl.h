@@ -61,7 +61,7 @@ struct World::Impl : WorldState {
   void begin_kinematic(Real start, Real end);
   void collect_moved();
 
-  // Motion of bodies (world_step.cpp)
+  // Motion of bodies (step.cpp)
   void begin_bodies(Real start, Real end);
   void explode(Real start, Real end);
   std::vector<const ForceDef*> active_forces() const;
@@ -71,7 +71,7 @@ struct World::Impl : WorldState {
   bool is_within_bounds(const Body& body) const;
   void retire(Body& body, StepReport& report);
 
-  // Contacts (world_contacts.cpp)
+  // Contacts (contact_stage.cpp)
   PairSurface surface_of(const Body& a, const Body& b) const;
   void propagate_impact_speeds(Real h);
   void update_pairs(Real h);
@@ -91,7 +91,7 @@ struct World::Impl : WorldState {
   static void add_rough(const ContactPair* pair, StepReport& report);
   void count_contacts(StepReport& report) const;
 
-  // Impacts (world_impacts.cpp)
+  // Impacts (impact_stage.cpp)
   struct Impact {
     Real time;  ///< since the sub-step's start [s]
     ContactPair* pair;
@@ -114,7 +114,7 @@ struct World::Impl : WorldState {
   void remove_dead_springs();
   void wake_neighbours(Body& body);
 
-  // Rest (world_sleep.cpp)
+  // Rest (sleep_stage.cpp)
   void wake(Body& body);
   void wake_all();
   void watch_springs(std::span<Body* const> group);
@@ -126,7 +126,7 @@ struct World::Impl : WorldState {
   void rank_bodies();
   void update_lists();
 
-  // Joints (world_joints.cpp)
+  // Joints (joint_stage.cpp)
   void update_articulations();
   void break_joints(Real h, StepReport& report);
   void detach_joints(const Body& body);
@@ -143,7 +143,7 @@ struct World::Impl : WorldState {
   void add_events(std::vector<ParticleEvent>& events);
   void push_bodies(std::span<const Reaction> reactions, Real time);
 
-  // Cloths (world_cloth.cpp)
+  // Cloths (cloth_stage.cpp)
   void arrange_cloths();
   void begin_cloths();
   std::vector<ClothBody> bodies_near_cloths(Real h) const;
