@@ -298,8 +298,7 @@ TEST(SceneCheck, ASplitThatExplodesIsRefused) {
            std::to_string(depth) + "}}]}";
   };
   EXPECT_EQ(errors_of(scene(2)), "");
-  EXPECT_NE(errors_of(scene(9)).find("/emitters/0: could have 5e+10 particles at once"),
-            std::string::npos)
+  EXPECT_NE(errors_of(scene(9)).find("/emitters/0: could have 5e+10 particles at once"), std::string::npos)
       << errors_of(scene(9));
 }
 

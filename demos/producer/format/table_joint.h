@@ -138,17 +138,17 @@ struct Table<Ragdoll> {
       "upper_arm_left and so on, with joints that bend as those of people.";
   static Fields<Ragdoll> fields() {
     using T = Ragdoll;
-    return Fields<T>{
-        {"name", &T::name, "unique name; empty: articulation_ and its index"},
-        {"position", &T::position, "point on the ground between the feet", "m"},
-        {"orientation", &T::orientation, "orientation of the figure, about `position`"},
-        {"velocity", &T::velocity, "velocity of the figure at time 0", "m/s"},
-        {"height", &T::height, "height of the figure", "m", between(0.1, 10)},
-        {"density", &T::density, "density of the body parts", "kg/m^3", kPositive},
-        {"stiffness", &T::stiffness, "dry friction of the joints: 0 rotates freely, 1 is a limp adult", "", kNotNegative},
-        {"skin", &T::skin, "name of the material of head, hands and feet; empty: grey"},
-        {"shirt", &T::shirt, "name of the material of trunk and arms; empty: grey"},
-        {"trousers", &T::trousers, "name of the material of pelvis and legs; empty: grey"}}
+    return Fields<T>{{"name", &T::name, "unique name; empty: articulation_ and its index"},
+                     {"position", &T::position, "point on the ground between the feet", "m"},
+                     {"orientation", &T::orientation, "orientation of the figure, about `position`"},
+                     {"velocity", &T::velocity, "velocity of the figure at time 0", "m/s"},
+                     {"height", &T::height, "height of the figure", "m", between(0.1, 10)},
+                     {"density", &T::density, "density of the body parts", "kg/m^3", kPositive},
+                     {"stiffness", &T::stiffness,
+                      "dry friction of the joints: 0 rotates freely, 1 is a limp adult", "", kNotNegative},
+                     {"skin", &T::skin, "name of the material of head, hands and feet; empty: grey"},
+                     {"shirt", &T::shirt, "name of the material of trunk and arms; empty: grey"},
+                     {"trousers", &T::trousers, "name of the material of pelvis and legs; empty: grey"}}
         .with(&T::placement);
   }
 };
