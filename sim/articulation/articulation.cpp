@@ -8,8 +8,8 @@
 
 #include "sim/articulation/joint_energy.h"
 #include "sim/articulation/joint_limits.h"
-#include "sim/contact/lcp.h"
 #include "sim/dynamics/free_body.h"
+#include "sim/linear/lcp.h"
 
 namespace offstage::sim {
 namespace {
