@@ -3,18 +3,20 @@
 #include <algorithm>
 
 #include "producer/articulation_builder.h"
+#include "producer/interrupt.h"
 #include "producer/shipped_files.h"
 #include "render/error.h"
 #include "render/mesh_io.h"
 
 namespace offstage::producer {
 
-void read_links(Scene& scene, const std::filesystem::path& folder, std::vector<Problem>& errors) {
+void read_links(Scene& scene, const SceneFolder& folder, std::vector<Problem>& errors) {
   for (ArticulationTemplate& articulation : scene.articulations) {
     auto* tree = std::get_if<ModelTree>(&articulation);
     if (!tree || tree->file.empty()) continue;
     try {
-      for (const render::Model::Node& node : render::read_model(model_file(tree->file, folder)).nodes)
+      for (const render::Model::Node& node :
+           render::read_model(model_file(tree->file, folder), folder.inputs(), interrupt_signal).nodes)
         tree->links.push_back({node.name,
                                node.parent,
                                {node.position.cast<Real>(), node.orientation.cast<Real>().normalized()}});

@@ -44,7 +44,8 @@ struct SimulationTotals {
   std::size_t contacts = 0;                                   ///< points where bodies touch, at the end
   std::size_t most_contacts = 0;                              ///< at the end of a frame
   sim::Real penetration = 0;                                  ///< greatest of the run and at its end [m]
-  uint64_t collisions = 0, tracebacks = 0, toi_limit_reached = 0, restitution_suppressed = 0, speculative_contacts = 0;
+  uint64_t collisions = 0, tracebacks = 0, toi_limit_reached = 0, restitution_suppressed = 0,
+           speculative_contacts = 0;
   uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
 
   // Of cloths: greatest of the run, at its end, and sums.
@@ -81,6 +82,10 @@ class Simulation {
   Snapshot snapshot() const;
 
   const sim::World& world() const { return world_; }
+  /// Of the world. Throws DivergedError if it is not finite.
+  sim::Energy energy() const;
+  /// Throws DivergedError with the state now and what is wrong with it.
+  [[noreturn]] void fail(const std::string& what) const;
   SimulationTotals totals() const;
   std::size_t body_count() const { return world_.body_count(); }
 
