@@ -1,6 +1,5 @@
 #pragma once
-/// Takes rights away from the calling process for good. Private to render, for the child that reads the files
-/// of strangers.
+/// Takes rights away from the calling process for good: for the child that reads the files of strangers.
 
 #include <cstdint>
 #include <filesystem>

@@ -308,13 +308,15 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
   if (job.cloths) cloths.emplace(*job.cloths, simulation);
   std::optional<JointTrace> joints;
   if (job.joints) joints.emplace(*job.joints, simulation);
-  const auto record = [&](double time) try {
-    if (trace) trace->record(time);
-    if (contacts) contacts->record(time);
-    if (cloths) cloths->record(time);
-    if (joints) joints->record(time);
-  } catch (const CsvFile::NotFinite& error) {
-    simulation.fail(error.what());
+  const auto record = [&](double time) {
+    try {
+      if (trace) trace->record(time);
+      if (contacts) contacts->record(time);
+      if (cloths) cloths->record(time);
+      if (joints) joints->record(time);
+    } catch (const CsvFile::NotFinite& error) {
+      simulation.fail(error.what());
+    }
   };
   if (job.trace_every_step) simulation.on_substep(record);
   stats.bodies = simulation.body_count();
