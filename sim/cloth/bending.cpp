@@ -12,11 +12,11 @@
 namespace offstage::sim {
 namespace {
 
-/// Greatest weight of a gradient times the size of the fan: beyond it, its points lie so near to a conic that they do not
-/// determine a quadratic polynomial.
+/// Greatest weight of a gradient times the size of the fan: beyond it, its points lie so near to a conic that
+/// they do not determine a quadratic polynomial.
 constexpr Real kLargestWeight = 4;
-/// Of the second derivatives by the jumps of gradients against those by recovered gradients: holds what the latter do
-/// not see, which alternates from point to point.
+/// Of the second derivatives by the jumps of gradients against those by recovered gradients: holds what the
+/// latter do not see, which alternates from point to point.
 constexpr Real kStabilization = 0.05;
 constexpr int kMaxIterations = 80;
 /// Of the residual against the right side, squared.
@@ -41,7 +41,8 @@ struct FlatTriangle {
 };
 
 /// Adds scale times the gradient of the linear function on a triangle.
-void add_gradient(const Triangle& t, const std::array<Vec2, 3>& corners, Real scale, GradientWeights& weights) {
+void add_gradient(const Triangle& t, const std::array<Vec2, 3>& corners, Real scale,
+                  GradientWeights& weights) {
   const Vec2 b = corners[1] - corners[0], c = corners[2] - corners[0];
   const Real doubled = b.x() * c.y() - b.y() * c.x();
   for (std::size_t k = 0; k < 3; ++k) {
@@ -53,7 +54,8 @@ void add_gradient(const Triangle& t, const std::array<Vec2, 3>& corners, Real sc
 /// The cloth, and its triangles unfolded into the plane of any of them.
 class Unfolding {
  public:
-  Unfolding(std::span<const Vec3> rest, std::span<const Triangle> triangles) : rest_(rest), triangles_(triangles) {
+  Unfolding(std::span<const Vec3> rest, std::span<const Triangle> triangles)
+      : rest_(rest), triangles_(triangles) {
     std::map<std::pair<uint32_t, uint32_t>, std::vector<uint32_t>> edges;
     first_at_.assign(rest.size(), kNone);
     for (uint32_t t = 0; t < triangles.size(); ++t)
@@ -134,8 +136,8 @@ struct Recovered {
   GradientWeights weights;
 };
 
-/// The weights of points in the gradient at the first of the quadratic polynomial nearest to all; none if they do not
-/// determine one.
+/// The weights of points in the gradient at the first of the quadratic polynomial nearest to all; none if
+/// they do not determine one.
 std::optional<GradientWeights> polynomial_gradient(std::span<const FlatPoint> points) {
   if (points.size() < 6) return {};
   Real size = 0;
@@ -156,8 +158,8 @@ std::optional<GradientWeights> polynomial_gradient(std::span<const FlatPoint> po
 }
 
 /// `clamped` of each triangle. At a clamped triangle the gradient is its own: of the others none counts.
-Recovered recover(const Unfolding& unfolding, std::span<const Triangle> triangles, std::span<const uint8_t> clamped,
-                  uint32_t point) {
+Recovered recover(const Unfolding& unfolding, std::span<const Triangle> triangles,
+                  std::span<const uint8_t> clamped, uint32_t point) {
   Recovered result{unfolding.fan(point, false), {}};
   const auto average = [&](auto&& counts) {
     Real sum = 0;
@@ -196,7 +198,8 @@ void add_outer_product(const Vec2& a, const Vec2& b, uint32_t point, HessianWeig
 }
 
 /// Second derivatives on a triangle: of the linear function between the gradients recovered at its corners.
-HessianWeights recovered_hessian(const FlatTriangle& own, const Triangle& t, std::span<const Recovered> recovered) {
+HessianWeights recovered_hessian(const FlatTriangle& own, const Triangle& t,
+                                 std::span<const Recovered> recovered) {
   HessianWeights weights;
   GradientWeights shape;
   add_gradient(t, own.corners, 1, shape);
@@ -215,9 +218,10 @@ HessianWeights recovered_hessian(const FlatTriangle& own, const Triangle& t, std
   return weights;
 }
 
-/// The same by the jumps of the gradients of the triangles: the boundary integral of the means of both sides over the
-/// area (Onate and Zarate, "Rotation-free triangular plate and shell elements", 2000).
-HessianWeights jump_hessian(const Unfolding& unfolding, const FlatTriangle& own, std::span<const Triangle> triangles) {
+/// The same by the jumps of the gradients of the triangles: the boundary integral of the means of both sides
+/// over the area (Onate and Zarate, "Rotation-free triangular plate and shell elements", 2000).
+HessianWeights jump_hessian(const Unfolding& unfolding, const FlatTriangle& own,
+                            std::span<const Triangle> triangles) {
   HessianWeights weights;
   const Vec2 b = own.corners[1] - own.corners[0], c = own.corners[2] - own.corners[0];
   const Real doubled = b.x() * c.y() - b.y() * c.x();
@@ -227,7 +231,6 @@ HessianWeights jump_hessian(const Unfolding& unfolding, const FlatTriangle& own,
     const Vec2 edge = own.corners[(k + 1) % 3] - own.corners[k], outward(edge.y(), -edge.x());
     GradientWeights jump;
     const FlatTriangle other = unfolding.unfold(u, own, k);
-    // The other side may be wound the other way.
     add_gradient(triangles[u], other.corners, 1 / doubled, jump);
     add_gradient(triangles[own.triangle], own.corners, -1 / doubled, jump);
     for (const auto& [point, w] : jump) add_outer_product(outward, w, point, weights);
@@ -243,8 +246,8 @@ Real dot(std::span<const Vec4> a, std::span<const Vec4> b) {
 
 }  // namespace
 
-void ClothBending::assign(std::span<const Vec3> rest, std::span<const Triangle> triangles, std::span<const Real> masses,
-                          Real rigidity, Real damping, Real rest_share) {
+void ClothBending::assign(std::span<const Vec3> rest, std::span<const Triangle> triangles,
+                          std::span<const Real> masses, Real rigidity, Real damping, Real rest_share) {
   *this = {};
   rigidity_ = rigidity;
   damping_ = damping;
@@ -275,7 +278,8 @@ void ClothBending::build() {
   curved_ = false;
   const Unfolding unfolding(rest_, triangles_);
   std::vector<Recovered> recovered;
-  for (uint32_t i = 0; i < rest_.size(); ++i) recovered.push_back(recover(unfolding, triangles_, clamped_, i));
+  for (uint32_t i = 0; i < rest_.size(); ++i)
+    recovered.push_back(recover(unfolding, triangles_, clamped_, i));
   const auto add_patch = [&](const Patch& patch, const HessianWeights& weights) {
     patches_.push_back(patch);
     patches_.back().first = static_cast<uint32_t>(points_.size());

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "sim/core/handle.h"
+#include "sim/core/types.h"
 #include "sim/geometry/mesh.h"
-#include "sim/handle.h"
-#include "sim/types.h"
 
 namespace offstage::sim {
 
@@ -51,9 +51,8 @@ struct ClothSeam {
 /// How the springs are stepped.
 enum class ClothIntegrator : uint8_t {
   /// Backward Euler, linearised once and solved by one symmetric Gauss-Seidel sweep: true to every static
-  /// load, and quick. It is stable up to a stiffness: each sub-step is divided into as many steps of the
-  /// springs as the
-  /// stiffest of them needs, but no shorter than kShortestSpringStep.
+  /// load, and quick. It is stable up to a stiffness: each sub-step is divided into as many steps of
+  /// the springs as the stiffest of them needs, but none is shorter than kShortestSpringStep.
   relaxed,
   /// Backward Euler, linearised once (Baraff and Witkin, "Large Steps in Cloth Simulation", 1998) and solved.
   implicit,

@@ -6,8 +6,8 @@
 #include <cstring>
 #include <limits>
 
-#include "sim/collision/lanes.h"
-#include "sim/contact/staged_loop.h"
+#include "sim/core/staged_loop.h"
+#include "sim/linear/lanes.h"
 
 namespace offstage::sim {
 namespace {

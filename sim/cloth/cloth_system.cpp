@@ -214,9 +214,9 @@ void ClothSystem::push_apart(Real dt) {
 void ClothSystem::touch_bodies(Real dt) {
   contacts_.find_runaways(points_);
   corner_contacts_.solve(points_, dt, cuts_);
-  contacts_.solve(points_, dt, parts_, cuts_);
+  contacts_.solve(points_, dt, parts_, kick_, cuts_);
   for (int round = 1; round < kMaxTurns && contacts_.any_dynamic() && limit_.project(points_); ++round)
-    contacts_.solve(points_, dt, parts_, cuts_);
+    contacts_.solve(points_, dt, parts_, kick_, cuts_);
 }
 
 void ClothSystem::move_held() {

@@ -55,7 +55,9 @@ TriangleMesh strip(Mesh kind, uint32_t cells, Real length, Real width) {
   TriangleMesh mesh;
   const uint32_t rows = std::max(2u, static_cast<uint32_t>(std::lround(cells * width / length)));
   const Scatter scatter{7};
-  const auto jitter = [&](uint32_t r, uint32_t c, uint32_t axis) { return 0.6 * scatter.uniform(r * 1000 + c, axis) - 0.3; };
+  const auto jitter = [&](uint32_t r, uint32_t c, uint32_t axis) {
+    return 0.6 * scatter.uniform(r * 1000 + c, axis) - 0.3;
+  };
   for (uint32_t r = 0; r <= rows; ++r)
     for (uint32_t c = 0; c <= cells; ++c) {
       Vec3 p(length * c / cells, 0, width * r / rows);
@@ -100,7 +102,8 @@ TEST_P(ClothCantilever, SagsByItsFlexuralRigidity) {
   def.air.density = 0;
   def.integrator = integrator;
   for (uint32_t i = 0; i < def.vertices.size(); ++i)
-    if (def.vertices[i].x() < 1.5 * kLength / kCells) def.pins.push_back({.vertex = i, .position = def.vertices[i]});
+    if (def.vertices[i].x() < 1.5 * kLength / kCells)
+      def.pins.push_back({.vertex = i, .position = def.vertices[i]});
   World world;
   const ClothHandle cloth = world.add_cloth(def);
   for (int i = 0; i < 24; ++i) world.step(1.0 / 24);
@@ -116,7 +119,8 @@ TEST_P(ClothCantilever, SagsByItsFlexuralRigidity) {
 
 INSTANTIATE_TEST_SUITE_P(Meshes, ClothCantilever,
                          testing::Combine(testing::Values(Mesh::alternating, Mesh::diagonal, Mesh::random),
-                                          testing::Values(ClothIntegrator::relaxed, ClothIntegrator::implicit)));
+                                          testing::Values(ClothIntegrator::relaxed,
+                                                          ClothIntegrator::implicit)));
 
 }  // namespace
 }  // namespace offstage::sim
