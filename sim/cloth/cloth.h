@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -132,6 +133,15 @@ struct StableStep {
 /// Only of `symplectic` and `rk4`; for the others infinite.
 StableStep largest_stable_step(const ClothDef& def);
 
+/// The thread of a cloth that tore first.
+struct ClothTear {
+  Real time = 0;              ///< of the end of the sub-step [s]
+  Vec3 place = Vec3::Zero();  ///< [m]
+  Real stretch = 0;           ///< its length over its rest length
+  bool by_pressure = false;   ///< of a closed cloth under pressure
+  bool touches_body = false;  ///< the cloth touched a body in that sub-step
+};
+
 /// How a cloth is doing. Counts are of all sub-steps of the last step, others of its end.
 struct ClothReport {
   uint64_t contacts = 0;       ///< of vertices and bodies' corners with bodies, at the end
@@ -148,7 +158,8 @@ struct ClothReport {
   uint32_t spring_steps = 1;  ///< of the springs in each sub-step, `relaxed`
   uint64_t torn = 0;          ///< springs
   uint64_t unconverged = 0;   ///< solves of the implicit integrator that ended at their bound
-  bool finite = true;         ///< false: it stopped being finite, and was stopped where it last was
+  std::optional<ClothTear> first_tear;  ///< of its life, from the step on in which it happened
+  bool finite = true;                   ///< false: it stopped being finite, and was stopped where it last was
 };
 
 /// What is to be seen of a cloth; valid until the next step.

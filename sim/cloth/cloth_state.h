@@ -27,6 +27,7 @@ struct Cloth {
   uint32_t version = 0;
   bool stopped = false;  ///< lost its numbers: is left where it was
   ClothBending bending;  ///< of the triangles
+  std::optional<ClothTear> first_tear;
   ClothReport report;
 
   /// After triangles changed.

@@ -21,6 +21,8 @@ constexpr Real kMaxParts = 1000;
 constexpr Real kBeyondTear = 1.2;
 /// How long a span is, at most [s].
 constexpr Real kSpan = 1.0 / 480;
+/// A point that is faster has lost its numbers [m/s]: waves along a thread are ten times slower.
+constexpr Real kLostSpeed = 5000;
 /// For how long pairs of cloth with cloth are sought at a time [s].
 constexpr Real kHorizon = 1.0 / 80;
 
@@ -167,6 +169,7 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
   const Real dt = weather.h / parts;
   parts_ = parts;
   dt_ = dt;
+  time_ = weather.time + weather.h;
   find_held(weather.time, bodies);
   contacts_.find(points_, collides_, bodies, weather.h);
   corner_contacts_.find(points_, bodies, weather.h);
@@ -187,6 +190,7 @@ void ClothSystem::substep(Real from, Real to, Real dt, bool ends_span) {
   cuts_.clear();
   move_held();
   integrate(dt);
+  stop_lost(dt);
   close_seams(dt);
   limit_.project(points_);
   if (ends_span && !self_contacts_.empty()) push_apart(dt);
@@ -488,10 +492,29 @@ void ClothSystem::write_back() {
       cloth.points[i] = points_.at(first_[c] + i);
       cloth.velocities[i] = points_.velocity[first_[c] + i].head<3>();
     }
-    const uint32_t torn = tear(cloth);
+    const uint32_t torn = tear_at(c, time_);
     cloth.report.torn += torn;
     changed_ |= torn > 0;
   }
+}
+
+/// Tears the threads that are too long, and notes the first.
+uint32_t ClothSystem::tear_at(std::size_t c, Real time) {
+  Cloth& cloth = *cloths_[c];
+  if (cloth.def.tear > 0 && !cloth.first_tear) {
+    ClothTear first{.time = time};
+    for (const ClothSpring& s : cloth.springs) {
+      const Real stretch = (cloth.points[s.a] - cloth.points[s.b]).norm() / s.rest_length;
+      if (s.kind != SpringKind::stretch || stretch <= std::max(first.stretch, cloth.def.tear)) continue;
+      first.stretch = stretch;
+      first.place = (cloth.points[s.a] + cloth.points[s.b]) / 2;
+    }
+    first.by_pressure = cloth.def.pressure != 0;
+    first.touches_body = c < contacts_.active().size() && contacts_.active()[c] > 0;
+    if (first.stretch > 0) cloth.first_tear = first;
+  }
+  cloth.report.first_tear = cloth.first_tear;
+  return tear(cloth);
 }
 
 void ClothSystem::count_penetration() {
@@ -524,6 +547,20 @@ void ClothSystem::measure() {
   }
 }
 
+/// Stops cloths that diverge before their contacts are sought: those of threads that reach everywhere are as
+/// many as there are pairs of triangles.
+void ClothSystem::stop_lost(Real dt) {
+  const Real farthest2 = kLostSpeed * kLostSpeed * dt * dt;
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    if (cloths_[c]->stopped) continue;
+    bool lost = false;
+    for (std::size_t i = first_[c], end = i + cloths_[c]->points.size(); i < end; ++i)
+      lost |= points_.inverse_mass[i] > 0 &&
+              !((points_.position[i] - points_.start[i]).squaredNorm() <= farthest2);
+    if (lost) stop(*cloths_[c], first_[c]);
+  }
+}
+
 /// A cloth that lost its numbers stays where it last was.
 void ClothSystem::stop(Cloth& cloth, std::size_t first) {
   cloth.stopped = true;
@@ -532,6 +569,9 @@ void ClothSystem::stop(Cloth& cloth, std::size_t first) {
     cloth.velocities[i].setZero();
     points_.position[first + i] = padded(cloth.points[i]);
     points_.velocity[first + i].setZero();
+    points_.start[first + i] = points_.position[first + i];
+    points_.inverse_mass[first + i] = 0;
+    kick_[first + i].setZero();
   }
   changed_ = true;
 }

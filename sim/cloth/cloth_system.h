@@ -85,7 +85,9 @@ class ClothSystem {
   void end_substep(Real dt);
   void pull_bodies(Real dt);
   void write_back();
+  uint32_t tear_at(std::size_t cloth, Real time);
   void stop(Cloth& cloth, std::size_t first);
+  void stop_lost(Real dt);
   void count_penetration();
 
   std::vector<Cloth*> cloths_;
@@ -95,6 +97,7 @@ class ClothSystem {
   std::vector<Vec4> kick_;                 // of velocities at the end of a sub-step, beside their moves
   bool changed_ = false;
   Real dt_ = 0;     // sub-step of cloth [s]
+  Real time_ = 0;   // at the end of the world's sub-step [s]
   Real parts_ = 1;  // sub-steps of cloth in one of the world
 
   ClothPoints points_;
