@@ -17,13 +17,13 @@ namespace {
 constexpr Real kLargestWeight = 4;
 /// Of the second derivatives by the jumps of gradients against those by recovered gradients: holds what the
 /// latter do not see, which alternates from point to point.
-constexpr Real kStabilization = 0.05;
-constexpr int kMaxIterations = 80;
+constexpr Real kJumpShare = 0.05;
+constexpr int kFilterIterations = 80;
 /// Of the residual against the right side, squared.
-constexpr Real kTolerance2 = 1e-14;
+constexpr Real kFilterTolerance2 = 1e-14;
 /// Curvature times size below which a triangle is flat at rest.
-constexpr Real kFlat = 1e-7;
-constexpr uint32_t kNone = ~0u;
+constexpr Real kFlatAtRest = 1e-7;
+constexpr uint32_t kNoTriangle = ~0u;
 
 using Vec2 = Eigen::Vector2d;
 /// Weights of points in a gradient or in second derivatives (xx, yy, sqrt(2) xy).
@@ -57,13 +57,13 @@ class Unfolding {
   Unfolding(std::span<const Vec3> rest, std::span<const Triangle> triangles)
       : rest_(rest), triangles_(triangles) {
     std::map<std::pair<uint32_t, uint32_t>, std::vector<uint32_t>> edges;
-    first_at_.assign(rest.size(), kNone);
+    first_at_.assign(rest.size(), kNoTriangle);
     for (uint32_t t = 0; t < triangles.size(); ++t)
       for (std::size_t k = 0; k < 3; ++k) {
         edges[std::minmax(triangles[t][k], triangles[t][(k + 1) % 3])].push_back(t);
-        if (first_at_[triangles[t][k]] == kNone) first_at_[triangles[t][k]] = t;
+        if (first_at_[triangles[t][k]] == kNoTriangle) first_at_[triangles[t][k]] = t;
       }
-    neighbours_.assign(triangles.size(), {kNone, kNone, kNone});
+    neighbours_.assign(triangles.size(), {kNoTriangle, kNoTriangle, kNoTriangle});
     for (uint32_t t = 0; t < triangles.size(); ++t)
       for (std::size_t k = 0; k < 3; ++k) {
         const auto& beside = edges[std::minmax(triangles[t][k], triangles[t][(k + 1) % 3])];
@@ -83,14 +83,15 @@ class Unfolding {
   /// The triangles around a point in the plane of the first of them, and those around their points if `wide`.
   std::vector<FlatTriangle> fan(uint32_t point, bool wide) const {
     std::vector<FlatTriangle> found;
-    if (first_at_[point] == kNone) return found;
+    if (first_at_[point] == kNoTriangle) return found;
     std::vector<uint32_t> around = {point};
     found.push_back(own_plane(first_at_[point]));
     for (int ring = 0; ring < (wide ? 2 : 1); ++ring) {
       for (std::size_t i = 0; i < found.size(); ++i)
         for (std::size_t k = 0; k < 3; ++k) {
           const uint32_t u = neighbours_[found[i].triangle][k];
-          if (u == kNone || std::ranges::find(found, u, &FlatTriangle::triangle) != found.end()) continue;
+          if (u == kNoTriangle || std::ranges::find(found, u, &FlatTriangle::triangle) != found.end())
+            continue;
           const auto is_near = [&](uint32_t p) { return std::ranges::find(around, p) != around.end(); };
           if (std::ranges::none_of(triangles_[u], is_near)) continue;
           found.push_back(unfold(u, found[i], k));
@@ -227,7 +228,7 @@ HessianWeights jump_hessian(const Unfolding& unfolding, const FlatTriangle& own,
   const Real doubled = b.x() * c.y() - b.y() * c.x();
   for (std::size_t k = 0; k < 3; ++k) {
     const uint32_t u = unfolding.neighbour(own.triangle, k);
-    if (u == kNone) continue;
+    if (u == kNoTriangle) continue;
     const Vec2 edge = own.corners[(k + 1) % 3] - own.corners[k], outward(edge.y(), -edge.x());
     GradientWeights jump;
     const FlatTriangle other = unfolding.unfold(u, own, k);
@@ -238,7 +239,7 @@ HessianWeights jump_hessian(const Unfolding& unfolding, const FlatTriangle& own,
   return weights;
 }
 
-Real dot(std::span<const Vec4> a, std::span<const Vec4> b) {
+Real filter_dot(std::span<const Vec4> a, std::span<const Vec4> b) {
   Real sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += a[i].dot(b[i]);
   return sum;
@@ -298,12 +299,12 @@ void ClothBending::build() {
     const HessianWeights smooth = recovered_hessian(flat, own, recovered);
     for (const auto& [point, w] : smooth)
       patch.rest += rest_share_ * normal.normalized().dot(rest_[point] - rest_[own[0]]) * w;
-    if (patch.rest.norm() * std::sqrt(patch.area) < kFlat) patch.rest.setZero();
+    if (patch.rest.norm() * std::sqrt(patch.area) < kFlatAtRest) patch.rest.setZero();
     curved_ |= patch.rest != Vec3::Zero();
     add_patch(patch, smooth);
     HessianWeights rough = jump_hessian(unfolding, flat, triangles_);
     for (const auto& [point, w] : smooth) rough.try_emplace(point, Vec3::Zero()).first->second -= w;
-    for (auto& [point, w] : rough) w *= std::sqrt(kStabilization);
+    for (auto& [point, w] : rough) w *= std::sqrt(kJumpShare);
     patch.rest.setZero();
     add_patch(patch, rough);
   }
@@ -412,13 +413,13 @@ bool ClothBending::filter(std::span<const Real> masses, std::span<const Real> in
     rr += residual_[i].dot(direction_[i]);
     scale += masses[i] * moves[i].squaredNorm();
   }
-  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-    if (!(rr > kTolerance2 * scale)) return true;
+  for (int iteration = 0; iteration < kFilterIterations; ++iteration) {
+    if (!(rr > kFilterTolerance2 * scale)) return true;
     for (std::size_t i = 0; i < n; ++i) image_[i] = masses[i] * direction_[i];
     multiply(direction_, stiff, image_);
     for (std::size_t i = 0; i < n; ++i)
       if (!(inverse_masses[i] > 0)) image_[i].setZero();
-    const Real step = rr / dot(direction_, image_);
+    const Real step = rr / filter_dot(direction_, image_);
     Real next = 0;
     for (std::size_t i = 0; i < n; ++i) {
       moves[i] += step * direction_[i];
