@@ -191,9 +191,9 @@ class Looking(Case):
         page = self.page
         page.wait_for_frame(1)
         page.select('/bodies/1')
-        ring = wait(lambda: page.all('#marks .handle'))[0]
-        box, stage = ring.rect, page.find('#stage').rect
-        at = [int(box['x'] + box['width'] / 2 - stage['x'] - stage['width'] / 2), int(box['y'] + box['height'] / 2 - stage['y'] - stage['height'] / 2)]
+        # The marks are made anew with each frame, hence the place alone.
+        at = wait(lambda: page.js('''const ring = document.querySelector("#marks .handle")?.getBoundingClientRect(), stage = document.getElementById("stage").getBoundingClientRect();
+            return ring && [ring, stage].map(r => [r.x + r.width / 2, r.y + r.height / 2]).reduce((a, b) => [Math.round(a[0] - b[0]), Math.round(a[1] - b[1])])'''))
         ActionChains(self.driver).move_to_element_with_offset(page.find('#stage'), *at).click_and_hold() \
             .move_by_offset(40, 0).move_by_offset(40, 0).release().perform()
         self.settle()
@@ -228,12 +228,15 @@ class Looking(Case):
         page = self.page
         page.set_text(SCENE.replace('"version": 1,', '"version": 1, "materials": [{"name": "unused"}],')
                       .replace('"radius": 0.4}, "position"', '"radius": 0.4}, "velocity": [3e4, 0, 0], "position"'))
-        shown = wait(lambda: len(page.all('#facts .notes .problem')) == 2 and page.all('#facts .notes .problem'), 60, 'the warnings')
-        self.assertIn("line 3", shown[0].text)
-        self.assertIn("'unused'", shown[0].text)
-        self.assertIn('line 6', shown[1].text)
-        self.assertIn("'ball'", shown[1].text)
-        page.js('arguments[0].click()', shown[1])
+        # The list is made anew with each frame, hence its texts alone.
+        texts = 'return [...document.querySelectorAll("#facts .notes .problem")].map(p => p.textContent)'
+        wait(lambda: len(page.js(texts)) == 2, 60, 'the warnings')
+        shown = page.js(texts)
+        self.assertIn('line 3', shown[0])
+        self.assertIn("'unused'", shown[0])
+        self.assertIn('line 6', shown[1])
+        self.assertIn("'ball'", shown[1])
+        page.js('document.querySelectorAll("#facts .notes .problem")[1].click()')
         self.assertEqual(page.js('return tuneStore.selection'), ['/bodies/1'])
 
     def test_a_version_is_gone_back_to_and_shows_its_picture(self):
