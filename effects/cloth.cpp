@@ -30,7 +30,6 @@ void check(const Fabric& f) {
   check("shear", f.shear, true);
   check("bend", f.bend, true);
   check("damping", f.damping, true);
-  check("bend_damping", f.bend_damping, true);
 }
 
 ClothDef with_fabric(const Fabric& f) {
@@ -41,10 +40,6 @@ ClothDef with_fabric(const Fabric& f) {
   def.max_stretch = f.max_stretch;
   def.max_shear = f.max_shear;
   def.air = {.drag = f.drag, .lift = f.lift};
-  if (f.bend_model == BendModel::plate) {
-    def.bend = f.bend;
-    def.bend_damping = f.bend_damping;
-  }
   return def;
 }
 
@@ -110,7 +105,6 @@ ClothDef grid_cloth(const GridSize& size, const sim::Pose& pose, const Fabric& f
         add_spring(def, at(c, r), at(c + 1, r), fabric.stretch * wz / dx, damping, SpringKind::stretch);
       if (r < nz)
         add_spring(def, at(c, r), at(c, r + 1), fabric.stretch * wx / dz, damping, SpringKind::stretch);
-      if (fabric.bend_model != BendModel::springs) continue;
       if (c + 2 <= nx)
         add_spring(def, at(c, r), at(c + 2, r), bend_stiffness(fabric.bend, wz, dx), damping,
                    SpringKind::bend);
@@ -161,7 +155,6 @@ ClothDef mesh_cloth(const sim::TriangleMesh& mesh, const sim::Pose& pose, const 
     const Real width = 2 * sides.area / (3 * length) * 1.5;
     add_spring(def, edge.first, edge.second, fabric.stretch * width / length, fabric.damping,
                SpringKind::stretch);
-    if (fabric.bend_model != BendModel::springs) continue;
     if (sides.opposite.size() != 2 || sides.opposite[0] == sides.opposite[1]) continue;
     const Real across = (def.vertices[sides.opposite[0]] - def.vertices[sides.opposite[1]]).norm();
     if (!(across > 0)) continue;

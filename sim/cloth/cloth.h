@@ -5,7 +5,6 @@
 
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -52,8 +51,8 @@ struct ClothSeam {
 /// How the springs are stepped.
 enum class ClothIntegrator : uint8_t {
   /// Backward Euler, linearised once and solved by one symmetric Gauss-Seidel sweep: true to every static
-  /// load, and quick. It is stable up to a stiffness: each sub-step is divided into as many steps of
-  /// the springs as the stiffest of them needs, but none is shorter than kShortestSpringStep.
+  /// load, quick, and stable, because springs too stiff for it have their stiffness clamped
+  /// (ClothReport::clamped).
   relaxed,
   /// Backward Euler, linearised once (Baraff and Witkin, "Large Steps in Cloth Simulation", 1998) and solved.
   implicit,
@@ -76,12 +75,6 @@ struct ClothDef {
   std::vector<Vec3> rest_vertices;  ///< of the unstrained cloth [m]; empty: as `vertices`
   std::vector<Triangle> triangles;
   std::vector<ClothSpring> springs;
-  /// Flexural rigidity B of the triangles [N m], >= 0: moment per width at a curvature of 1/m (bending.h).
-  Real bend = 0;
-  /// Time tau in which bending is damped [s], >= 0: the moment is B (kappa + tau d kappa/dt).
-  Real bend_damping = 0;
-  /// Share of the curvature of the unstrained cloth that is without stress, 0 to 1.
-  Real rest_curvature = 1;
   std::vector<Real> masses;  ///< of the vertices [kg], > 0
   std::vector<ClothPin> pins;
   std::vector<ClothSeam> seams;
@@ -112,13 +105,7 @@ struct ClothDef {
 
   ClothIntegrator integrator = ClothIntegrator::relaxed;
   Real substep = 1.0 / 960;  ///< longest step of its own [s], > 0; never longer than the world's
-  /// Of `relaxed`: springs that are too stiff for `substep` count as softer (ClothReport::clamped). Else such
-  /// a cloth takes as many steps of its springs in each sub-step as they need.
-  bool soften = false;
 };
-
-/// The shortest step of the springs of a `relaxed` cloth [s]. What is too stiff for it counts as softer.
-inline constexpr Real kShortestSpringStep = 1e-5;
 
 /// What is wrong with a definition: the field, the place, what is allowed. Empty: nothing.
 std::string problem(const ClothDef& def);
@@ -128,19 +115,9 @@ std::string problem(const ClothDef& def);
 struct StableStep {
   Real step = std::numeric_limits<Real>::infinity();  ///< [s]
   uint32_t spring = 0;                                ///< of the definition
-  bool bending = false;                               ///< it is not a spring but bending that sets it
 };
 /// Only of `symplectic` and `rk4`; for the others infinite.
 StableStep largest_stable_step(const ClothDef& def);
-
-/// The thread of a cloth that tore first.
-struct ClothTear {
-  Real time = 0;              ///< of the end of the sub-step [s]
-  Vec3 place = Vec3::Zero();  ///< [m]
-  Real stretch = 0;           ///< its length over its rest length
-  bool by_pressure = false;   ///< of a closed cloth under pressure
-  bool touches_body = false;  ///< the cloth touched a body in that sub-step
-};
 
 /// How a cloth is doing. Counts are of all sub-steps of the last step, others of its end.
 struct ClothReport {
@@ -151,15 +128,12 @@ struct ClothReport {
   Real mean_strain = 0;        ///< of stretch springs, mean |(|d| - L) / L|
   Real penetration = 0;        ///< deepest, of a vertex behind a body's surface, 0 while it is outside [m]
   uint64_t limited = 0;        ///< moves shortened, to keep max_stretch and max_shear or for the next reason
-  uint64_t held_back = 0;     ///< times that a move was shortened because cloth would have gone through cloth
-  uint64_t crossings = 0;     ///< pairs that had to be let go: the guarantee against crossing is lost there
-  uint64_t clamped = 0;       ///< springs too stiff for the `relaxed` integrator at its step, at the end
-  Real least_stiffness = 1;   ///< least share of its stiffness that any of them has left
-  uint32_t spring_steps = 1;  ///< of the springs in each sub-step, `relaxed`
-  uint64_t torn = 0;          ///< springs
-  uint64_t unconverged = 0;   ///< solves of the implicit integrator that ended at their bound
-  std::optional<ClothTear> first_tear;  ///< of its life, from the step on in which it happened
-  bool finite = true;                   ///< false: it stopped being finite, and was stopped where it last was
+  uint64_t held_back = 0;    ///< times that a move was shortened because cloth would have gone through cloth
+  uint64_t crossings = 0;    ///< pairs that had to be let go: the guarantee against crossing is lost there
+  uint64_t clamped = 0;      ///< springs too stiff for the `relaxed` integrator at its step, at the end
+  uint64_t torn = 0;         ///< springs
+  uint64_t unconverged = 0;  ///< solves of the implicit integrator that ended at their bound
+  bool finite = true;        ///< false: it stopped being finite, and was stopped where it last was
 };
 
 /// What is to be seen of a cloth; valid until the next step.

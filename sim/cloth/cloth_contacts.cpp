@@ -116,8 +116,7 @@ bool ClothContacts::touch(const ClothPoints& points, Near& near, Touch& t) const
   return t.gap < 0;
 }
 
-void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::span<Vec4> kicks,
-                          std::vector<VelocityCut>& cuts) {
+void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<VelocityCut>& cuts) {
   std::fill(active_.begin(), active_.end(), 0);
   near_to_.assign(points.size(), nullptr);
   near_several_.assign(points.size(), 0);
@@ -148,7 +147,7 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::span<Ve
                           std::min(touches_[a].body->way().friction, touches_[b].body->way().friction)));
       }
       if (points.inverse_mass[point] == 0) block(touches_[a], points.holder[point]);
-      press(points, touches_[a], dt, parts, supported && touches_[a].body->is_dynamic(), kicks[point], cuts);
+      press(points, touches_[a], dt, parts, supported && touches_[a].body->is_dynamic(), cuts);
     }
   }
 }
@@ -233,7 +232,7 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
 }
 
 /// Puts a point out of one body; `supported`: another body holds it from behind, and pinch() moved this one.
-void ClothContacts::press(ClothPoints& points, Touch& t, Real dt, Real parts, bool supported, Vec4& kick,
+void ClothContacts::press(ClothPoints& points, Touch& t, Real dt, Real parts, bool supported,
                           std::vector<VelocityCut>& cuts) {
   const uint32_t i = t.near->point;
   const Vec3& n = t.normal;
@@ -242,10 +241,6 @@ void ClothContacts::press(ClothPoints& points, Touch& t, Real dt, Real parts, bo
   body.touch((points.velocity[i].head<3>() - body.velocity(t.on_body)).norm());
   const Real w = points.inverse_mass[i];
   if (!(w > 0)) return;
-  if (const Real inward = n.dot(kick.head<3>()); inward < 0) {
-    kick -= padded(inward * n);
-    body.push(points.mass[i] * inward * n, t.on_body);
-  }
   const Real already = std::min(t.gap - n.dot(motion), 0.0);  // gap at the start
   Real pressed = t.near->pressed / parts * dt;                // [kg m]
   Vec3 correction = Vec3::Zero(), recovery = Vec3::Zero();

@@ -29,8 +29,7 @@ class ClothContacts {
   void find_runaways(const ClothPoints& points);
   /// Puts points out of the bodies, in a sub-step of cloth of length dt, one of `parts` of the world's.
   /// Appends to `cuts`.
-  /// `kicks`: of the points' velocities beside their moves; none goes into a body.
-  void solve(ClothPoints& points, Real dt, Real parts, std::span<Vec4> kicks, std::vector<VelocityCut>& cuts);
+  void solve(ClothPoints& points, Real dt, Real parts, std::vector<VelocityCut>& cuts);
   /// After moves were shortened, those of points that are not 0 in `shortened`: cloth that can get no farther
   /// stops the bodies that press into it. `recoil` is the inverse mass of what is behind each point's cloth:
   /// 0 if it hangs on the world. Returns by cloth the impulse that it takes up [N s].
@@ -64,7 +63,7 @@ class ClothContacts {
   bool touch(const ClothPoints& points, Near& near, Touch& t) const;
   void pinch(Touch& a, Touch& b, Real friction);
   void block(Touch& t, ClothBody* holder);
-  void press(ClothPoints& points, Touch& t, Real dt, Real parts, bool supported, Vec4& kick,
+  void press(ClothPoints& points, Touch& t, Real dt, Real parts, bool supported,
              std::vector<VelocityCut>& cuts);
 
   std::span<ClothBody> bodies_;

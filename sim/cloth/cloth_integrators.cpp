@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
 
 namespace offstage::sim {
 namespace {
@@ -11,9 +10,6 @@ namespace {
 constexpr int kMaxIterations = 300;
 /// Of the residual against the right side, in the preconditioner's norm, squared.
 constexpr Real kTolerance2 = 1e-12;
-/// Of a step squared times the square of the fastest frequency of bending, damping included: up to this,
-/// bending is as stable as an explicit force.
-constexpr Real kSoftBending = 0.25;
 
 using SpringRun = std::vector<Vec4>;
 
@@ -30,10 +26,6 @@ Vec4 held_velocity(const ClothPoints& points, std::size_t i, Real h) {
 void accelerate(const ClothPoints& points, const ClothRange& cloth, const SpringRun& x, const SpringRun& v,
                 SpringRun& a) {
   std::fill(a.begin(), a.end(), Vec4::Zero());
-  if (!cloth.bending.empty()) {
-    cloth.bending.add_forces(x, 1, a);
-    if (cloth.bending.damping() > 0) cloth.bending.multiply(v, -cloth.bending.damping(), a);
-  }
   for (const ClothSpring& s : cloth.springs) {
     const std::size_t i = s.a - cloth.begin, j = s.b - cloth.begin;
     const Vec4 d = x[i] - x[j];
@@ -54,13 +46,6 @@ void accelerate(const ClothPoints& points, const ClothRange& cloth, const Spring
 /// What springs do to what is held, over the time h.
 void pass_on(ClothPoints& points, const ClothRange& cloth, const SpringRun& x, const SpringRun& v, Real h,
              Real dt) {
-  if (!cloth.bending.empty()) {
-    SpringRun force(x.size(), Vec4::Zero());
-    cloth.bending.add_forces(x, 1, force);
-    if (cloth.bending.damping() > 0) cloth.bending.multiply(v, -cloth.bending.damping(), force);
-    for (std::size_t i = 0; i < force.size(); ++i)
-      if (is_held(points, cloth.begin + i)) points.pull[cloth.begin + i] += h * dt * force[i];
-  }
   for (const ClothSpring& s : cloth.springs) {
     const bool a = is_held(points, s.a), b = is_held(points, s.b);
     if (a == b) continue;
@@ -87,19 +72,14 @@ void begin(const ClothPoints& points, const ClothRange& cloth, Real h, SpringRun
   }
 }
 
-/// The matrix of backward Euler: of each spring alpha u u^T + beta 1 between its ends, that of bending, and
-/// the masses.
+/// The matrix of backward Euler: of each spring alpha u u^T + beta 1 between its ends, and the masses.
 class ImplicitSystem {
  public:
   ImplicitSystem(const ClothPoints& points, const ClothRange& cloth, Real h)
-      : points_(points),
-        cloth_(cloth),
-        bending_(cloth.bending.empty() ? 0 : h * (h + cloth.bending.damping())) {
+      : points_(points), cloth_(cloth) {
     block_.assign(cloth.end - cloth.begin, Mat3::Zero());
     for (std::size_t i = 0; i < block_.size(); ++i)
-      block_[i].diagonal().setConstant(
-          points.mass[cloth.begin + i] +
-          (bending_ > 0 ? bending_ * cloth.bending.diagonal(static_cast<uint32_t>(i)) : 0));
+      block_[i].diagonal().setConstant(points.mass[cloth.begin + i]);
     for (const ClothSpring& s : cloth.springs) {
       const Vec4 d = points.start[s.a] - points.start[s.b];
       const Real length = d.norm();
@@ -128,19 +108,11 @@ class ImplicitSystem {
       y[a] += f;
       y[b] -= f;
     }
-    if (bending_ > 0) cloth_.bending.multiply(p, bending_, y);
     clear_held(y);
   }
 
   /// What the springs do to what is held, when all move with v through the step.
   void pass_on(ClothPoints& points, const SpringRun& v, Real h) const {
-    if (bending_ > 0) {
-      SpringRun force(v.size(), Vec4::Zero());
-      cloth_.bending.add_forces(cloth_.part(points.start), h * h, force);
-      cloth_.bending.multiply(v, -h * bending_, force);
-      for (std::size_t i = 0; i < force.size(); ++i)
-        if (is_held(points, cloth_.begin + i)) points.pull[cloth_.begin + i] += force[i];
-    }
     for (std::size_t k = 0; k < links_.size(); ++k) {
       const ClothSpring& s = cloth_.springs[k];
       const Link& link = links_[k];
@@ -168,7 +140,6 @@ class ImplicitSystem {
       b[cloth_.springs[k].a - cloth_.begin] -= f;
       b[cloth_.springs[k].b - cloth_.begin] += f;
     }
-    if (bending_ > 0) cloth_.bending.add_forces(cloth_.part(points_.start), h, b);
     clear_held(b);
     return b;
   }
@@ -186,7 +157,6 @@ class ImplicitSystem {
 
   const ClothPoints& points_;
   const ClothRange& cloth_;
-  Real bending_;  // factor of its matrix
   std::vector<Link> links_;
   std::vector<Mat3> block_;  // inverse
 };
@@ -223,103 +193,7 @@ bool solve(const ImplicitSystem& system, const SpringRun& b, SpringRun& v) {
   return false;
 }
 
-/// Bending in a sub-step of step_relaxed().
-class RelaxedBending {
- public:
-  RelaxedBending(const ClothPoints& points, const ClothRange& cloth, Real dt, Real h)
-      : cloth_(cloth), damping_(cloth.bending.damping()), h_(h) {
-    const ClothBending& bending = cloth.bending;
-    is_stiff_ = dt * (dt + damping_) * bending.fastest() > kSoftBending;
-    force_.assign(cloth.end - cloth.begin, Vec4::Zero());
-    if (is_stiff_) return;
-    // Once for the whole sub-step.
-    bending.add_forces(cloth.part(points.start), 1, force_);
-    if (damping_ > 0) bending.multiply(cloth.part(points.velocity), -damping_, force_);
-  }
-  bool is_stiff() const { return is_stiff_; }
-
-  /// Adds what it does in a step to the moves, and to the pull of what is held.
-  void pull(ClothPoints& points, std::span<Vec4> moves) {
-    if (is_stiff_) {
-      std::fill(force_.begin(), force_.end(), Vec4::Zero());
-      cloth_.bending.add_forces(cloth_.part(points.start), 1, force_);
-    }
-    give(points, moves);
-  }
-
-  /// Takes out of the moves what stiff bending does not allow; whether to tolerance.
-  bool filter(ClothPoints& points, std::span<Vec4> moves) {
-    const Real stiff = h_ * (h_ + damping_);
-    const std::span<Vec4> own = moves.subspan(cloth_.begin, force_.size());
-    const bool done =
-        cloth_.bending.filter(cloth_.part(points.mass), cloth_.part(points.inverse_mass), stiff, own);
-    std::fill(force_.begin(), force_.end(), Vec4::Zero());
-    cloth_.bending.multiply(own, -stiff, force_);
-    for (std::size_t i = 0; i < force_.size(); ++i)
-      if (is_held(points, cloth_.begin + i)) points.pull[cloth_.begin + i] += force_[i];
-    return done;
-  }
-
- private:
-  void give(ClothPoints& points, std::span<Vec4> moves) const {
-    for (std::size_t i = 0; i < force_.size(); ++i) {
-      const std::size_t k = cloth_.begin + i;
-      const Vec4 impulse = h_ * h_ * force_[i];
-      is_held(points, k) ? points.pull[k] += impulse : moves[k] += points.inverse_mass[k] * impulse;
-    }
-  }
-
-  const ClothRange& cloth_;
-  Real damping_, h_;
-  bool is_stiff_;
-  SpringRun force_;
-};
-
 }  // namespace
-
-bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& springs, uint32_t steps,
-                  Real dt, std::span<Vec4> kick) {
-  const Real h = dt / steps;
-  const std::size_t n = cloth.end - cloth.begin;
-  SpringRun from(n), velocity(n);  // velocity times the step
-  for (std::size_t i = 0; i < n; ++i) {
-    const std::size_t k = cloth.begin + i;
-    from[i] = points.start[k];
-    velocity[i] = is_held(points, k) ? Vec4((points.position[k] - points.start[k]) / steps)
-                                     : Vec4(h * points.velocity[k]);
-  }
-  const bool bends = !cloth.bending.empty();
-  std::optional<RelaxedBending> bending;
-  if (bends) bending.emplace(points, cloth, dt, h);
-  std::vector<Vec4>& moves = points.moves;
-  springs.begin(points, h);
-  bool solved = true;
-  for (uint32_t step = 0; step < steps; ++step) {
-    for (std::size_t i = 0; i < n; ++i) {
-      const std::size_t k = cloth.begin + i;
-      moves[k] = is_held(points, k) ? velocity[i] : Vec4(velocity[i] + h * h * points.acceleration[k]);
-    }
-    if (bends) bending->pull(points, moves);
-    springs.pull(points, moves);
-    if (bends && bending->is_stiff()) solved &= bending->filter(points, moves);
-    springs.relax(points, moves);
-    for (std::size_t i = 0; i < n; ++i) {
-      velocity[i] = moves[cloth.begin + i];
-      points.start[cloth.begin + i] += velocity[i];
-    }
-  }
-  for (std::size_t i = 0; i < n; ++i) {
-    const std::size_t k = cloth.begin + i;
-    if (is_held(points, k)) {
-      points.pull[k] *= steps;  // impulses times the whole sub-step
-    } else {
-      points.position[k] = points.start[k];
-      if (steps > 1) kick[k] = velocity[i] / h - (points.position[k] - from[i]) / dt;
-    }
-    points.start[k] = from[i];
-  }
-  return solved;
-}
 
 void step_symplectic(ClothPoints& points, const ClothRange& cloth, Real h) {
   SpringRun x, v;

@@ -24,7 +24,6 @@ struct ClothPoints {
   std::vector<Vec4> velocity;      ///< mean of the last sub-step of the cloth
   std::vector<Vec4> acceleration;  ///< by everything but springs and contacts
   std::vector<Vec4> rest;          ///< in the unstrained cloth
-  std::vector<Vec4> moves;         ///< of a step of the springs
   std::vector<Vec4> pull;          ///< impulse times the sub-step, that springs gave what pins hold [kg m]
   std::vector<Real> mass;          ///< [kg]
   std::vector<Real> inverse_mass;  ///< 0 of what pins hold

@@ -17,22 +17,15 @@ namespace offstage::sim {
 
 class ClothSprings {
  public:
-  /// Springs of one cloth, between points of all; their order decides about colours.
+  /// Springs between points of all cloths; their order decides about colours.
   void assign(std::span<const ClothSpring> springs, const ClothPoints& points);
 
-  /// The longest step at which no spring counts as softer [s].
-  Real longest_step() const { return longest_step_; }
-  /// Before steps of length h.
-  void begin(const ClothPoints& points, Real h);
-  /// Changes `moves`, which points would make from their start in a step, by the forces of the springs at the
-  /// start. What pulls at what pins hold is added to their `pull`.
-  void pull(ClothPoints& points, std::span<Vec4> moves);
-  /// Then takes out of the moves what springs and damping do not allow.
-  void relax(ClothPoints& points, std::span<Vec4> moves);
+  /// Changes `moves`, which points would make from their start in a step of length h, by the springs. Those
+  /// of what pins hold stay, and what pulls at them is added to their `pull`.
+  void step(ClothPoints& points, std::span<Vec4> moves, Real h);
 
-  /// How many springs count as softer, and the least share of its stiffness that any has left.
-  uint64_t clamped() const { return clamped_; }
-  Real least_stiffness() const { return least_stiffness_; }
+  /// How many springs counted as softer in the last step, by cloth; empty before the first.
+  std::span<const uint64_t> clamped() const { return clamped_; }
 
  private:
   struct Spring {
@@ -58,7 +51,7 @@ class ClothSprings {
     uint32_t block_count() const;
   };
 
-  void run(std::span<const Stage> stages, ClothPoints& points, std::span<Vec4> moves);
+  void prepare(const ClothPoints& points, Real step);
   void pull(ClothPoints& points, std::span<Vec4> moves, std::size_t begin, std::size_t end);
   void relax(ClothPoints& points, std::span<Vec4> moves, std::size_t spring);
 
@@ -66,11 +59,10 @@ class ClothSprings {
   std::vector<Material> material_;        // of each
   std::vector<std::size_t> color_start_;  // and the end
   std::vector<Link> link_;                // of the step
-  std::vector<Stage> pull_, relax_;       // of any step
+  std::vector<Stage> stages_;             // of any step
   std::vector<Real> inverse_mass_;        // that springs were prepared for
   Real prepared_for_ = -1;                // step [s]; < 0: none
-  Real longest_step_ = 0, least_stiffness_ = 1;
-  uint64_t clamped_ = 0;
+  std::vector<uint64_t> clamped_;
 };
 
 }  // namespace offstage::sim

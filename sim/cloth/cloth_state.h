@@ -1,7 +1,6 @@
 #pragma once
 /// One cloth of a world between steps.
 
-#include "sim/cloth/bending.h"
 #include "sim/cloth/cloth.h"
 
 namespace offstage::sim {
@@ -26,12 +25,7 @@ struct Cloth {
   Real age = 0;                      ///< [s]
   uint32_t version = 0;
   bool stopped = false;  ///< lost its numbers: is left where it was
-  ClothBending bending;  ///< of the triangles
-  std::optional<ClothTear> first_tear;
   ClothReport report;
-
-  /// After triangles changed.
-  void assign_bending();
 };
 
 /// Volume inside of a closed surface by the divergence theorem [m^3].

@@ -21,8 +21,6 @@ constexpr Real kMaxParts = 1000;
 constexpr Real kBeyondTear = 1.2;
 /// How long a span is, at most [s].
 constexpr Real kSpan = 1.0 / 480;
-/// A point that is faster has lost its numbers [m/s]: waves along a thread are ten times slower.
-constexpr Real kLostSpeed = 5000;
 /// For how long pairs of cloth with cloth are sought at a time [s].
 constexpr Real kHorizon = 1.0 / 80;
 
@@ -42,11 +40,11 @@ void ClothSystem::assemble() {
   seams_.clear();
   all_springs_.clear();
   first_spring_.clear();
+  std::vector<ClothSpring> swept;
   std::vector<StretchLimit::Limit> limits, ties;
   std::vector<Triangle> colliding, touching;  // cloth; bodies
   for (uint32_t c = 0; c < cloths_.size(); ++c) {
-    Cloth& cloth = *cloths_[c];
-    cloth.assign_bending();
+    const Cloth& cloth = *cloths_[c];
     const auto first = static_cast<uint32_t>(points_.size());
     first_.push_back(first);
     for (std::size_t i = 0; i < cloth.points.size(); ++i) {
@@ -65,6 +63,7 @@ void ClothSystem::assemble() {
       s.a += first;
       s.b += first;
       all_springs_.push_back(s);
+      if (cloth.def.integrator == ClothIntegrator::relaxed) swept.push_back(s);
       Real limit = s.kind == SpringKind::stretch ? cloth.def.max_stretch
                    : s.kind == SpringKind::shear ? cloth.def.max_shear
                                                  : 0;
@@ -84,14 +83,11 @@ void ClothSystem::assemble() {
   }
   first_spring_.push_back(all_springs_.size());
   kick_.assign(points_.size(), Vec4::Zero());
-  points_.moves.assign(points_.size(), Vec4::Zero());
+  moves_.assign(points_.size(), Vec4::Zero());
   points_.start = points_.position;
   points_.acceleration.assign(points_.size(), Vec4::Zero());
   points_.pull.assign(points_.size(), Vec4::Zero());
-  springs_.clear();
-  springs_.resize(cloths_.size());
-  for (std::size_t c = 0; c < cloths_.size(); ++c)
-    if (cloths_[c]->def.integrator == ClothIntegrator::relaxed) springs_[c].assign(springs_of(c), points_);
+  springs_.assign(swept, points_);
   drift_.assign(points_.size(), Vec4::Zero());
   pieces_.assign(points_.size());
   for (const ClothSpring& s : all_springs_) pieces_.join(s.a, s.b);
@@ -135,22 +131,10 @@ void ClothSystem::find_held(Real time, std::span<ClothBody> bodies) {
       points_.holder[point] = body;
       held_.push_back({point, body, pin.position});
     }
-    set_clamps(c);
     if (cloth.stopped)
       std::fill_n(points_.inverse_mass.begin() + static_cast<std::ptrdiff_t>(first_[c]), cloth.points.size(),
                   0.0);
   }
-}
-
-/// Triangles between pins of one body are clamped.
-void ClothSystem::set_clamps(std::size_t c) {
-  Cloth& cloth = *cloths_[c];
-  if (cloth.bending.empty()) return;
-  std::vector<uint32_t> clamp(cloth.points.size(), 0);
-  for (const Held& held : held_)
-    if (points_.cloth[held.point] == c)
-      clamp[held.point - first_[c]] = held.body ? 2 + held.body->way().body : 1;
-  cloth.bending.set_clamps(clamp);
 }
 
 void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies) {
@@ -168,8 +152,6 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
   const Real parts = std::clamp(std::ceil(weather.h / longest * (1 - 1e-12)), 1.0, kMaxParts);
   const Real dt = weather.h / parts;
   parts_ = parts;
-  dt_ = dt;
-  time_ = weather.time + weather.h;
   find_held(weather.time, bodies);
   contacts_.find(points_, collides_, bodies, weather.h);
   corner_contacts_.find(points_, bodies, weather.h);
@@ -190,7 +172,6 @@ void ClothSystem::substep(Real from, Real to, Real dt, bool ends_span) {
   cuts_.clear();
   move_held();
   integrate(dt);
-  stop_lost(dt);
   close_seams(dt);
   limit_.project(points_);
   if (ends_span && !self_contacts_.empty()) push_apart(dt);
@@ -218,9 +199,9 @@ void ClothSystem::push_apart(Real dt) {
 void ClothSystem::touch_bodies(Real dt) {
   contacts_.find_runaways(points_);
   corner_contacts_.solve(points_, dt, cuts_);
-  contacts_.solve(points_, dt, parts_, kick_, cuts_);
+  contacts_.solve(points_, dt, parts_, cuts_);
   for (int round = 1; round < kMaxTurns && contacts_.any_dynamic() && limit_.project(points_); ++round)
-    contacts_.solve(points_, dt, parts_, kick_, cuts_);
+    contacts_.solve(points_, dt, parts_, cuts_);
 }
 
 void ClothSystem::move_held() {
@@ -232,29 +213,30 @@ void ClothSystem::move_held() {
   }
 }
 
-/// Into how many steps of the springs a sub-step of a `relaxed` cloth is divided.
-uint32_t ClothSystem::spring_steps(std::size_t cloth, Real dt) const {
-  if (cloths_[cloth]->def.soften) return 1;
-  const Real longest = std::max(springs_[cloth].longest_step(), kShortestSpringStep);
-  return static_cast<uint32_t>(std::max(1.0, std::ceil(dt / longest * (1 - 1e-6))));
-}
-
 void ClothSystem::integrate(Real dt) {
   // Springs begin where bodies are, which they have pulled since points were put on them.
   for (const Held& held : held_)
     if (held.body) points_.start[held.point] = padded(held.body->start().point_to_world(held.position));
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     const ClothIntegrator integrator = cloths_[c]->def.integrator;
-    const ClothRange range{first_[c], first_[c] + cloths_[c]->points.size(), springs_of(c),
-                           cloths_[c]->bending};
+    const std::span springs(all_springs_);
+    const ClothRange range{first_[c], first_[c] + cloths_[c]->points.size(),
+                           springs.subspan(first_spring_[c], first_spring_[c + 1] - first_spring_[c])};
     if (integrator == ClothIntegrator::symplectic) step_symplectic(points_, range, dt);
     if (integrator == ClothIntegrator::rk4) step_rk4(points_, range, dt, kick_);
     if (integrator == ClothIntegrator::implicit && !step_implicit(points_, range, dt))
       ++cloths_[c]->report.unconverged;
-    if (integrator == ClothIntegrator::relaxed &&
-        !step_relaxed(points_, range, springs_[c], spring_steps(c, dt), dt, kick_))
-      ++cloths_[c]->report.unconverged;
+    if (integrator != ClothIntegrator::relaxed) continue;
+    for (std::size_t i = range.begin; i < range.end; ++i)
+      moves_[i] = points_.inverse_mass[i] > 0
+                      ? Vec4(dt * (points_.velocity[i] + dt * points_.acceleration[i]))
+                      : Vec4(points_.position[i] - points_.start[i]);
   }
+  springs_.step(points_, moves_, dt);
+  for (std::size_t c = 0; c < cloths_.size(); ++c)
+    if (cloths_[c]->def.integrator == ClothIntegrator::relaxed)
+      for (std::size_t i = first_[c], end = i + cloths_[c]->points.size(); i < end; ++i)
+        if (points_.inverse_mass[i] > 0) points_.position[i] = points_.start[i] + moves_[i];
   for (const Held& held : held_) points_.start[held.point] = held.from;
 }
 
@@ -461,12 +443,10 @@ void ClothSystem::end_substep(Real dt) {
 void ClothSystem::pull_bodies(Real dt) {
   for (const Held& held : held_) {
     if (!held.body) continue;
-    const uint32_t cloth = points_.cloth[held.point];
-    const ClothIntegrator integrator = cloths_[cloth]->def.integrator;
-    const Real share = integrator == ClothIntegrator::implicit  ? 0
-                       : integrator == ClothIntegrator::rk4     ? 0.5
-                       : integrator == ClothIntegrator::relaxed ? 0.5 + 0.5 / spring_steps(cloth, dt)
-                                                                : 1;
+    const ClothIntegrator integrator = cloths_[points_.cloth[held.point]]->def.integrator;
+    const Real share = integrator == ClothIntegrator::implicit ? 0
+                       : integrator == ClothIntegrator::rk4    ? 0.5
+                                                               : 1;
     const Vec4 weight = dt * points_.mass[held.point] * points_.acceleration[held.point];
     const Vec3 impulse = (points_.pull[held.point] / dt + weight).head<3>();
     if (held.body->is_dynamic())
@@ -492,29 +472,10 @@ void ClothSystem::write_back() {
       cloth.points[i] = points_.at(first_[c] + i);
       cloth.velocities[i] = points_.velocity[first_[c] + i].head<3>();
     }
-    const uint32_t torn = tear_at(c, time_);
+    const uint32_t torn = tear(cloth);
     cloth.report.torn += torn;
     changed_ |= torn > 0;
   }
-}
-
-/// Tears the threads that are too long, and notes the first.
-uint32_t ClothSystem::tear_at(std::size_t c, Real time) {
-  Cloth& cloth = *cloths_[c];
-  if (cloth.def.tear > 0 && !cloth.first_tear) {
-    ClothTear first{.time = time};
-    for (const ClothSpring& s : cloth.springs) {
-      const Real stretch = (cloth.points[s.a] - cloth.points[s.b]).norm() / s.rest_length;
-      if (s.kind != SpringKind::stretch || stretch <= std::max(first.stretch, cloth.def.tear)) continue;
-      first.stretch = stretch;
-      first.place = (cloth.points[s.a] + cloth.points[s.b]) / 2;
-    }
-    first.by_pressure = cloth.def.pressure != 0;
-    first.touches_body = c < contacts_.active().size() && contacts_.active()[c] > 0;
-    if (first.stretch > 0) cloth.first_tear = first;
-  }
-  cloth.report.first_tear = cloth.first_tear;
-  return tear(cloth);
 }
 
 void ClothSystem::count_penetration() {
@@ -527,11 +488,7 @@ void ClothSystem::count_penetration() {
 void ClothSystem::measure() {
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     Cloth& cloth = *cloths_[c];
-    if (!changed_ && c < springs_.size() && cloth.def.integrator == ClothIntegrator::relaxed) {
-      cloth.report.clamped = springs_[c].clamped();
-      cloth.report.least_stiffness = springs_[c].least_stiffness();
-      cloth.report.spring_steps = spring_steps(c, dt_);
-    }
+    if (!changed_ && c < springs_.clamped().size()) cloth.report.clamped = springs_.clamped()[c];
     Eigen::ArrayXd length2(cloth.springs.size()), rest(cloth.springs.size());
     Eigen::Index count = 0;
     for (const ClothSpring& s : cloth.springs) {
@@ -547,20 +504,6 @@ void ClothSystem::measure() {
   }
 }
 
-/// Stops cloths that diverge before their contacts are sought: those of threads that reach everywhere are as
-/// many as there are pairs of triangles.
-void ClothSystem::stop_lost(Real dt) {
-  const Real farthest2 = kLostSpeed * kLostSpeed * dt * dt;
-  for (std::size_t c = 0; c < cloths_.size(); ++c) {
-    if (cloths_[c]->stopped) continue;
-    bool lost = false;
-    for (std::size_t i = first_[c], end = i + cloths_[c]->points.size(); i < end; ++i)
-      lost |= points_.inverse_mass[i] > 0 &&
-              !((points_.position[i] - points_.start[i]).squaredNorm() <= farthest2);
-    if (lost) stop(*cloths_[c], first_[c]);
-  }
-}
-
 /// A cloth that lost its numbers stays where it last was.
 void ClothSystem::stop(Cloth& cloth, std::size_t first) {
   cloth.stopped = true;
@@ -569,9 +512,6 @@ void ClothSystem::stop(Cloth& cloth, std::size_t first) {
     cloth.velocities[i].setZero();
     points_.position[first + i] = padded(cloth.points[i]);
     points_.velocity[first + i].setZero();
-    points_.start[first + i] = points_.position[first + i];
-    points_.inverse_mass[first + i] = 0;
-    kick_[first + i].setZero();
   }
   changed_ = true;
 }

@@ -60,12 +60,6 @@ class ClothSystem {
 
   void assemble();
   void find_held(Real time, std::span<ClothBody> bodies);
-  void set_clamps(std::size_t cloth);
-  uint32_t spring_steps(std::size_t cloth, Real dt) const;
-  std::span<const ClothSpring> springs_of(std::size_t cloth) const {
-    return std::span(all_springs_)
-        .subspan(first_spring_[cloth], first_spring_[cloth + 1] - first_spring_[cloth]);
-  }
   void substep(Real from, Real to, Real dt, bool ends_span);
   void push_apart(Real dt);
   void move_held();
@@ -85,23 +79,20 @@ class ClothSystem {
   void end_substep(Real dt);
   void pull_bodies(Real dt);
   void write_back();
-  uint32_t tear_at(std::size_t cloth, Real time);
   void stop(Cloth& cloth, std::size_t first);
-  void stop_lost(Real dt);
   void count_penetration();
 
   std::vector<Cloth*> cloths_;
   std::vector<std::size_t> first_;         // point of each cloth
   std::vector<ClothSpring> all_springs_;   // by cloth, between points of all
   std::vector<std::size_t> first_spring_;  // of each cloth, and the end
+  std::vector<Vec4> moves_;                // of a sub-step, by outer forces and springs
   std::vector<Vec4> kick_;                 // of velocities at the end of a sub-step, beside their moves
   bool changed_ = false;
-  Real dt_ = 0;     // sub-step of cloth [s]
-  Real time_ = 0;   // at the end of the world's sub-step [s]
   Real parts_ = 1;  // sub-steps of cloth in one of the world
 
   ClothPoints points_;
-  std::vector<ClothSprings> springs_;  // of each `relaxed` cloth
+  ClothSprings springs_;
   StretchLimit limit_;
   ClothContacts contacts_;
   CornerContacts corner_contacts_;

@@ -143,17 +143,15 @@ void CornerContacts::press(ClothPoints& points, const Near& near, Real dt, std::
     const Real friction = std::sqrt(points.friction[t[0]] * body.way().friction);
     impulse -= std::min(length, friction * push) / (total * length) * slip;
   }
-  // What is taken back of the overlap at the start moves the cloth alone, and is no motion of either.
-  const Real recovered = std::max(std::min(push, -kRecovery * before), 0.0);
-  const Vec3 exchanged = impulse - recovered / total * n;
+  const Real recovered = std::min(push, -kRecovery * before);
   for (std::size_t k = 0; k < 3; ++k) {
     const Real w = points.inverse_mass[t[k]];
     points.position[t[k]] += padded(w * weights[k] * impulse);
-    if (w == 0) points.pull[t[k]] += padded(weights[k] * exchanged);
+    if (w == 0) points.pull[t[k]] += padded(weights[k] * impulse);
     if (recovered > 0) cuts.push_back({t[k], padded(w * weights[k] * recovered / total * n)});
   }
   body.touch(0);
-  body.pull(-exchanged / dt, p, 1);
+  body.pull(-impulse / dt, p, 1);
 }
 
 }  // namespace offstage::sim

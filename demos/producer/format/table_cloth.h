@@ -28,10 +28,6 @@ struct Tags<ClothShape> {
   static constexpr bool kRequired = false;
 };
 template <>
-struct Names<effects::BendModel> {
-  static constexpr std::array kNames = {"plate", "springs"};
-};
-template <>
 struct Table<FabricChanges> {
   static Fields<FabricChanges> fields() {
     using T = FabricChanges;
@@ -40,13 +36,7 @@ struct Table<FabricChanges> {
          "kg/m^2", kPositive},
         {"stretch", &T::stretch, "force per width at a strain of 1, along the threads", "N/m", kPositive},
         {"shear", &T::shear, "the same across them", "N/m", kNotNegative},
-        {"bend", &T::bend, "flexural rigidity: moment per width at a curvature of 1/m", "N m", kNotNegative},
-        {"bend_damping", &T::bend_damping, "the bending moment grows by this time times its rate of change",
-         "s", kNotNegative},
-        {"bend_model", &T::bend_model,
-         "`plate`: a thin plate, whose rigidity is `bend` on any mesh; `springs`: the book's springs to "
-         "second "
-         "neighbours, which resist folds but hardly a slight curvature"},
+        {"bend", &T::bend, "moment per width at a curvature of 1/m", "N m", kNotNegative},
         {"damping", &T::damping, "share of the critical damping of a spring", "", between(0, 10)},
         {"friction", &T::friction, "on bodies; of two the geometric mean counts", "", kNotNegative},
         {"self_friction", &T::self_friction, "of cloth on cloth", "", kNotNegative},
@@ -190,15 +180,8 @@ struct Table<Cloth> {
             {"air_density", &T::air_density, "of the air it moves in; 0: none", "kg/m^3", kNotNegative},
             {"integrator", &T::integrator,
              "how its springs are stepped; the last two are explicit, for soft cloth and short steps"},
-            {"substep", &T::substep,
-             "longest time between two looks at its contacts, never longer than the world's step. With the "
-             "integrator "
-             "`relaxed` the springs take as many steps in it as their stiffness needs",
-             "s", over(0, 1)},
-            {"soften", &T::soften,
-             "`relaxed` only: springs too stiff for one step in `substep` count as softer, which is quicker; "
-             "a warning "
-             "says how soft they are"},
+            {"substep", &T::substep, "longest step of its own, never longer than the world's", "s",
+             over(0, 1)},
             {"visible", &T::visible, "is drawn"},
             {"casts_shadow", &T::casts_shadow, "throws a shadow"},
         })

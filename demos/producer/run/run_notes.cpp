@@ -34,21 +34,6 @@ std::vector<std::string> notes_of(const SimulationTotals& t) {
     notes.push_back(
         fmt::format("warning: joints could not be put back together {} times; use a smaller world.step",
                     t.joints_unsolved));
-  for (const auto& [cloth, share] : t.softened_cloths)
-    notes.push_back(fmt::format(
-        "warning: cloth '{}': springs have only {:.2g} of their stiffness, because they are too stiff for "
-        "their step; the cloth stretches by {:.2g} times what its figures say. Remove \"soften\", make "
-        "\"substep\" shorter or use \"integrator\": \"implicit\"",
-        cloth, share, 1 / share));
-  for (const auto& [cloth, tear] : t.first_tears)
-    notes.push_back(
-        fmt::format("note: cloth '{}' tore first at {:.3f} s at ({:.3g}, {:.3g}, {:.3g}): a thread was "
-                    "{:.3g} times as long as at "
-                    "rest, under {}",
-                    cloth, tear.time, tear.place.x(), tear.place.y(), tear.place.z(), tear.stretch,
-                    tear.touches_body  ? "the load of a body that it touched"
-                    : tear.by_pressure ? "its pressure"
-                                       : "its own load"));
   const auto add = [&](uint64_t count, const char* what) {
     if (count) notes.push_back(fmt::format(fmt::runtime(what), count));
   };
