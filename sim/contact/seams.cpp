@@ -216,10 +216,9 @@ class BodyContacts {
   /// is: that alone does not make a face.
   bool is_flat(const View& v, const Vec3& over, const Vec3& up, const Vec3& along) const {
     const CollisionShape& shape = v.y().collision_shape();
-    if (!shape.is_plane() && shape.solid().mesh && shape.piece(v.y_piece()).core == Convex::Core::triangle) {
-      const Vec3 normal = shape.solid().mesh->topology.face_normal(v.y_piece());
-      return pose(v.y(), v.speculative).vector_to_world(normal).dot(up) > kGoesOn;
-    }
+    const bool is_triangle =
+        !shape.is_plane() && shape.solid().mesh && shape.piece(v.y_piece()).core == Convex::Core::triangle;
+    if (is_triangle) return true;  // its neighbours go on from it
     const Vec3 aside = kLookBeside * flush_ * along;
     return distance(v, over - aside).normal.dot(up) > kGoesOn ||
            distance(v, over + aside).normal.dot(up) > kGoesOn;
