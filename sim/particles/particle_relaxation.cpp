@@ -209,9 +209,10 @@ void ParticleContacts::keep_outside(std::span<Vec3> end, std::vector<Reaction>& 
   for (const Surface& s : surfaces_)
     if (s.acts() && s.obstacle->is_dynamic()) loads.try_emplace(s.body, Load{s.obstacle});
   if (loads.empty()) return;
-  std::vector<Vec3> momentum(grains_.size());  // before the contacts acted
-  std::vector<uint8_t> acts(grains_.size(), 0);
-  for (std::size_t i = 0; i < grains_.size(); ++i) momentum[i] = grains_[i].mass * grains_[i].velocity;
+  std::vector<Vec3> momentum(particles_.size());  // before the contacts acted
+  std::vector<uint8_t> acts(particles_.size(), 0);
+  for (std::size_t i = 0; i < particles_.size(); ++i)
+    momentum[i] = particles_[i].mass * particles_[i].velocity;
   const auto take_back = [&](const Contact& c, uint32_t i, Real sign) {
     momentum[i] -= sign * c.impulse();
     acts[i] |= c.acts();
@@ -220,11 +221,11 @@ void ParticleContacts::keep_outside(std::span<Vec3> end, std::vector<Reaction>& 
     take_back(c, c.a, 1);
     take_back(c, c.b, -1);
   }
-  for (const Surface& c : surfaces_) take_back(c, c.grain, 1);
+  for (const Surface& c : surfaces_) take_back(c, c.particle, 1);
   Real brought = 0, mass = 0;
-  for (std::size_t i = 0; i < grains_.size(); ++i) {
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
     brought += acts[i] ? momentum[i].norm() : 0;
-    mass += acts[i] ? grains_[i].mass : 0;
+    mass += acts[i] ? particles_[i].mass : 0;
   }
   limit_loads(std::span(reactions).subspan(first), loads, brought, mass);
 }
