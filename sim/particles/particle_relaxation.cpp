@@ -211,7 +211,8 @@ void ParticleContacts::keep_outside(std::span<Vec3> end, std::vector<Reaction>& 
   if (loads.empty()) return;
   std::vector<Vec3> momentum(particles_.size());  // before the contacts acted
   std::vector<uint8_t> acts(particles_.size(), 0);
-  for (std::size_t i = 0; i < particles_.size(); ++i) momentum[i] = particles_[i].mass * particles_[i].velocity;
+  for (std::size_t i = 0; i < particles_.size(); ++i)
+    momentum[i] = particles_[i].mass * particles_[i].velocity;
   const auto take_back = [&](const Contact& c, uint32_t i, Real sign) {
     momentum[i] -= sign * c.impulse();
     acts[i] |= c.acts();
