@@ -1,4 +1,4 @@
-# Writes OUTPUT, a C++ file that defines what producer/version.h declares, from VERSION and the commit of SOURCE_DIR; leaves it
+# Writes OUTPUT, a C++ file that defines what producer/base/version.h declares, from VERSION and the commit of SOURCE_DIR; leaves it
 # alone when nothing has changed. Run at every build.
 set(text "${VERSION}")
 find_program(GIT git)
@@ -10,7 +10,7 @@ if(commit)
   string(APPEND text " (commit ${commit})")
 endif()
 file(CONFIGURE OUTPUT "${OUTPUT}" CONTENT "// Made by cmake/version.cmake.
-#include \"producer/version.h\"
+#include \"producer/base/version.h\"
 
 namespace offstage::producer {
 std::string_view version() { return \"${VERSION}\"; }

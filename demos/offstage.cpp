@@ -1,8 +1,8 @@
-// The command line program; see producer/command_line.h.
+// The command line program; see producer/cli/command_line.h.
 
 #include <malloc.h>
 
-#include "producer/command_line.h"
+#include "producer/cli/command_line.h"
 #include "tune/tune_command.h"
 
 int main(int argc, char** argv) {

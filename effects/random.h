@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "sim/types.h"
+#include "sim/core/types.h"
 
 namespace offstage::effects {
 

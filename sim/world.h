@@ -17,57 +17,22 @@
 #include "sim/articulation/joint.h"
 #include "sim/cloth/cloth.h"
 #include "sim/contact/collision.h"
+#include "sim/core/handle.h"
+#include "sim/core/non_finite.h"
+#include "sim/core/types.h"
+#include "sim/dynamics/body_def.h"
 #include "sim/dynamics/force_field.h"
 #include "sim/dynamics/integrator.h"
 #include "sim/dynamics/keyframes.h"
-#include "sim/dynamics/particles.h"
 #include "sim/geometry/convex_decomposition.h"
 #include "sim/geometry/mass_properties.h"
 #include "sim/geometry/mesh.h"
-#include "sim/handle.h"
-#include "sim/shape.h"
-#include "sim/types.h"
+#include "sim/geometry/shape.h"
+#include "sim/particles/particles.h"
 
 namespace offstage::sim {
 
 class CollisionMesh;
-
-struct BodyTag {};
-struct SpringTag {};
-using BodyHandle = Handle<BodyTag>;
-using SpringHandle = Handle<SpringTag>;
-
-enum class MotionType {
-  fixed,      ///< never moves, costs nothing per step
-  kinematic,  ///< follows its keyframes, pushes others with infinite mass
-  dynamic,    ///< moved by forces
-};
-
-struct BodyDef {
-  std::string name;
-  Shape shape = Sphere{};
-  MotionType motion = MotionType::dynamic;
-  Pose pose;                     ///< at time 0; kinematic bodies with keys take the keys' pose instead
-  Vec3 velocity = Vec3::Zero();  ///< of the centre of mass [m/s]
-  Vec3 angular_velocity = Vec3::Zero();  ///< world axes [rad/s]
-  Real density = 1000;                   ///< [kg/m^3], > 0; ignored if mass > 0
-  Real mass = 0;                         ///< [kg]; 0: from density and volume
-  Real linear_drag = 0;                  ///< k_v of F = -k_v v [kg/s]
-  Real angular_drag = 0;                 ///< k_w of tau = -k_w w [kg m^2/s]
-  std::string material;                  ///< of the surface: what ContactRule names; may be empty
-  Real restitution = 0.5;                ///< of two the larger is used; in [0, 1]
-  Real friction = 0.5;                   ///< Coulomb's coefficient of what slides; of two the geometric mean
-  Real static_friction = -1;             ///< of what does not; negative: as `friction`
-  /// Of sliding across friction_axis; negative: as along it. What it is of `friction`, its square root is in
-  /// every pair, whatever a ContactRule says. Not beside a friction of 0.
-  Real cross_friction = -1;
-  Vec3 friction_axis = Vec3::Zero();  ///< the surface's grain, in the body's frame; zero: none. Of two bodies
-                                      ///< with a grain that of the one that was added first counts
-  Vec3 surface_velocity =
-      Vec3::Zero();      ///< of the surface against the body, as of a conveyor [m/s], its frame
-  bool collides = true;  ///< takes part in collisions with bodies and particles
-  KeyframeTrack track;   ///< for kinematic bodies
-};
 
 /// Where a spring ends: a point of the world, a point of a body (body frame), or a particle by its id.
 struct WorldPoint {
@@ -121,15 +86,6 @@ struct WorldDef {
       Aabb(Vec3::Constant(-1000), Vec3::Constant(1000));  ///< what leaves is retired and reported (E3)
 };
 
-/// Something that stopped being finite: what it was just before, and what became of it. Bodies: centre of
-/// mass; the velocity before is not kept.
-struct NonFinite {
-  std::string object;     ///< name of the body, the particle system or the cloth
-  uint64_t particle = 0;  ///< its id, in a system; the point of a cloth
-  Vec3 position_before = Vec3::Zero(), velocity_before = Vec3::Zero();
-  Vec3 position = Vec3::Zero(), velocity = Vec3::Zero();
-};
-
 /// Two bodies whose contact forces are approximate: of a group of contacts that the solver meant for it did
 /// not solve, the pair with the greatest error.
 struct RoughContact {
@@ -155,9 +111,11 @@ struct StepReport {
   Real penetration = 0;     ///< greatest at the starts of sub-steps and at impacts [m]
   uint64_t collisions = 0;  ///< contacts that met faster than WorldDef::collision_speed
   uint64_t tracebacks = 0;  ///< times that bodies were put back to a time of impact
-  uint64_t toi_limit_reached = 0;   ///< pairs that were not traced back any more in a sub-step: too many impacts
-  uint64_t restitution_suppressed = 0;     ///< pairs in a pile that were too many to bounce any more in a sub-step
-  uint64_t speculative_contacts = 0;    ///< contacts of the fast solver expected at a step's end
+  uint64_t toi_limit_reached =
+      0;  ///< pairs that were not traced back any more in a sub-step: too many impacts
+  uint64_t restitution_suppressed =
+      0;                              ///< pairs in a pile that were too many to bounce any more in a sub-step
+  uint64_t speculative_contacts = 0;  ///< contacts of the fast solver expected at a step's end
   uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
   ContactWork exact, fast;                   ///< of the solvers of resting contact
   ContactWork impacts;                       ///< of the solver of collisions
@@ -171,8 +129,8 @@ struct StepReport {
   uint64_t cloth_contacts = 0;  ///< at the end, of all cloths; the others as ClothReport has them
   uint64_t cloth_self_contacts = 0;
   uint64_t cloth_springs_clamped = 0;  ///< at the end, too
-  Real cloth_strain = 0;                ///< greatest
-  Real cloth_penetration = 0;           ///< deepest [m]
+  Real cloth_strain = 0;               ///< greatest
+  Real cloth_penetration = 0;          ///< deepest [m]
   uint64_t cloth_moves_limited = 0, cloth_moves_held_back = 0, cloth_crossings = 0, cloth_springs_torn = 0;
   uint64_t cloth_unconverged = 0;
 

@@ -15,7 +15,7 @@
 #include "sim/collision/gjk.h"
 #include "sim/collision/manifold.h"
 #include "sim/contact/relaxation.h"
-#include "sim/shape.h"
+#include "sim/geometry/shape.h"
 
 namespace offstage::sim {
 

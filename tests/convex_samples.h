@@ -10,8 +10,8 @@
 
 #include "convex_oracle.h"
 #include "random.h"
+#include "sim/core/rotation.h"
 #include "sim/geometry/convex_hull.h"
-#include "sim/rotation.h"
 
 namespace offstage::sim {
 

@@ -8,7 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "producer/scene_source.h"
+#include "producer/format/scene_source.h"
 #include "render/error.h"
 
 namespace offstage::tune {

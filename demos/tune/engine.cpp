@@ -4,8 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "producer/error.h"
-#include "producer/production.h"
+#include "producer/base/error.h"
+#include "producer/run/production.h"
 
 namespace offstage::tune {
 namespace {

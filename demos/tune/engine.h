@@ -14,7 +14,7 @@
 #include <variant>
 #include <vector>
 
-#include "producer/decomposition_cache.h"
+#include "producer/build/decomposition_cache.h"
 #include "tune/film_run.h"
 #include "tune/frame_store.h"
 

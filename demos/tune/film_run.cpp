@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "producer/run_notes.h"
+#include "producer/run/run_notes.h"
 
 namespace offstage::tune {
 namespace {

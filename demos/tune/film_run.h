@@ -7,10 +7,10 @@
 #include <optional>
 #include <string>
 
-#include "producer/models.h"
-#include "producer/picture.h"
-#include "producer/scene_io.h"
-#include "producer/simulation.h"
+#include "producer/build/models.h"
+#include "producer/build/picture.h"
+#include "producer/build/simulation.h"
+#include "producer/format/scene_io.h"
 #include "render/context.h"
 #include "tune/frame_store.h"
 #include "tune/jpeg.h"

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "producer/production.h"
-#include "producer/snapshot.h"
+#include "producer/build/snapshot.h"
+#include "producer/run/production.h"
 
 namespace offstage::tune {
 

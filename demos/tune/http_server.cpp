@@ -9,7 +9,7 @@
 #include <httplib.h>
 #include <sys/random.h>
 
-#include "producer/scene_io.h"
+#include "producer/format/scene_io.h"
 #include "tune/messages.h"
 #include "tune/page_files.h"
 #include "tune/presets_list.h"

@@ -8,8 +8,8 @@
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
 
-#include "producer/error.h"
-#include "producer/production.h"
+#include "producer/base/error.h"
+#include "producer/run/production.h"
 #include "tune/document.h"
 #include "tune/engine.h"
 

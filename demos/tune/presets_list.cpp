@@ -1,9 +1,9 @@
 #include "tune/presets_list.h"
 
-#include "producer/error.h"
-#include "producer/json.h"
-#include "producer/presets.h"
-#include "producer/scene_source.h"
+#include "producer/base/error.h"
+#include "producer/base/json.h"
+#include "producer/format/presets.h"
+#include "producer/format/scene_source.h"
 
 namespace offstage::tune {
 

@@ -4,11 +4,11 @@
 
 #include <fmt/format.h>
 
-#include "producer/interrupt.h"
-#include "producer/json.h"
-#include "producer/scene_io.h"
-#include "producer/scene_source.h"
-#include "producer/watch.h"
+#include "producer/base/interrupt.h"
+#include "producer/base/json.h"
+#include "producer/format/scene_io.h"
+#include "producer/format/scene_source.h"
+#include "producer/run/watch.h"
 #include "render/error.h"
 #include "tune/messages.h"
 #include "tune/text_edit.h"

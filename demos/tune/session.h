@@ -13,7 +13,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "producer/error.h"
+#include "producer/base/error.h"
 #include "tune/document.h"
 #include "tune/engine.h"
 #include "tune/tabs.h"

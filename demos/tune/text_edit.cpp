@@ -5,7 +5,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "producer/json.h"
+#include "producer/base/json.h"
 
 namespace offstage::tune {
 namespace {

@@ -9,9 +9,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "producer/command_line.h"
-#include "producer/interrupt.h"
-#include "producer/talk.h"
+#include "producer/base/interrupt.h"
+#include "producer/base/log.h"
+#include "producer/cli/command_line.h"
 #include "render/context.h"
 #include "tune/http_server.h"
 #include "tune/session.h"
@@ -58,7 +58,7 @@ int tune_command(const producer::TuneOptions& options) {
   const HttpServer server(session, options.port);
   fmt::print("{}\n", server.address());
   std::fflush(stdout);
-  producer::say("tuning {}; Ctrl-C ends\n", options.scene.file);
+  producer::log("tuning {}; Ctrl-C ends\n", options.scene.file);
   if (options.open) open_browser(server.address());
   while (!producer::interrupt_signal()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
   return 128 + producer::interrupt_signal();

@@ -1,7 +1,7 @@
 #pragma once
 /// `offstage tune`: the tuning page.
 
-#include "producer/commands.h"
+#include "producer/cli/commands.h"
 
 namespace offstage::tune {
 

@@ -7,8 +7,8 @@
 #include <Eigen/Cholesky>
 
 #include "sim/articulation/joint_limits.h"
-#include "sim/contact/lcp.h"
 #include "sim/dynamics/free_body.h"
+#include "sim/linear/lcp.h"
 
 namespace offstage::sim {
 namespace {
@@ -213,7 +213,8 @@ void Articulation::add_loads(std::span<const Vec6> impulses, Real duration) {
 }
 
 void Articulation::add_impact_impulses(std::span<const Vec6> impulses) {
-  for (std::size_t j = 0; j < joints_.size(); ++j) joints_[j]->impact_impulse += wrench(j, impulses[j], motion_);
+  for (std::size_t j = 0; j < joints_.size(); ++j)
+    joints_[j]->impact_impulse += wrench(j, impulses[j], motion_);
 }
 
 void Articulation::begin_impulses(Real time) {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "sim/articulation/joint_system.h"
-#include "sim/body.h"
+#include "sim/dynamics/body.h"
 #include "sim/dynamics/body_impulses.h"
 #include "sim/dynamics/force_field.h"
 

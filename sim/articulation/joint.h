@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "sim/core/handle.h"
+#include "sim/core/types.h"
 #include "sim/dynamics/interpolation.h"
-#include "sim/handle.h"
-#include "sim/types.h"
 
 namespace offstage::sim {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "sim/articulation/articulation.h"
-#include "sim/contact/joint_problem.h"
+#include "sim/articulation/joint_problem.h"
 
 namespace offstage::sim {
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "sim/articulation/joint.h"
-#include "sim/contact/block_cholesky.h"
+#include "sim/linear/block_cholesky.h"
 
 namespace offstage::sim {
 

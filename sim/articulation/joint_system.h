@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "sim/articulation/joint_rows.h"
-#include "sim/contact/block_cholesky.h"
+#include "sim/linear/block_cholesky.h"
 
 namespace offstage::sim {
 

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "sim/core/handle.h"
+#include "sim/core/types.h"
 #include "sim/geometry/mesh.h"
-#include "sim/handle.h"
-#include "sim/types.h"
 
 namespace offstage::sim {
 
@@ -51,7 +51,8 @@ struct ClothSeam {
 /// How the springs are stepped.
 enum class ClothIntegrator : uint8_t {
   /// Backward Euler, linearised once and solved by one symmetric Gauss-Seidel sweep: true to every static
-  /// load, quick, and stable, because springs too stiff for it have their stiffness clamped (ClothReport::clamped).
+  /// load, quick, and stable, because springs too stiff for it have their stiffness clamped
+  /// (ClothReport::clamped).
   relaxed,
   /// Backward Euler, linearised once (Baraff and Witkin, "Large Steps in Cloth Simulation", 1998) and solved.
   implicit,
@@ -129,7 +130,7 @@ struct ClothReport {
   uint64_t limited = 0;        ///< moves shortened, to keep max_stretch and max_shear or for the next reason
   uint64_t held_back = 0;    ///< times that a move was shortened because cloth would have gone through cloth
   uint64_t crossings = 0;    ///< pairs that had to be let go: the guarantee against crossing is lost there
-  uint64_t clamped = 0;     ///< springs too stiff for the `relaxed` integrator at its step, at the end
+  uint64_t clamped = 0;      ///< springs too stiff for the `relaxed` integrator at its step, at the end
   uint64_t torn = 0;         ///< springs
   uint64_t unconverged = 0;  ///< solves of the implicit integrator that ended at their bound
   bool finite = true;        ///< false: it stopped being finite, and was stopped where it last was

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "sim/core/types.h"
 #include "sim/geometry/mesh.h"
-#include "sim/types.h"
 
 namespace offstage::sim {
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "sim/collision/lanes.h"
-#include "sim/contact/staged_loop.h"
+#include "sim/core/staged_loop.h"
+#include "sim/linear/lanes.h"
 
 namespace offstage::sim {
 namespace {

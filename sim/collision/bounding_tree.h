@@ -13,8 +13,8 @@
 
 #include "sim/collision/bounding_volume.h"
 #include "sim/collision/tree_split.h"
+#include "sim/core/types.h"
 #include "sim/geometry/mesh.h"
-#include "sim/types.h"
 
 namespace offstage::sim {
 

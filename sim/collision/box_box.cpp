@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "sim/collision/contact_candidates.h"
-#include "sim/collision/lanes.h"
+#include "sim/linear/lanes.h"
 
 namespace offstage::sim {
 namespace {

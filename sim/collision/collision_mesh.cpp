@@ -36,7 +36,7 @@ const AabbTree& CollisionMesh::part_tree() const {
   return part_tree_;
 }
 
-const ClearCells& CollisionMesh::clear_cells() const {
+const ClearanceGrid& CollisionMesh::clearance_grid() const {
   std::call_once(clear_once_, [this] { clear_cells_.emplace(mesh, solid); });
   return *clear_cells_;
 }

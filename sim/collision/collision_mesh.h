@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "sim/collision/bounding_tree.h"
-#include "sim/collision/clear_cells.h"
+#include "sim/collision/clearance_grid.h"
 #include "sim/collision/convex.h"
 #include "sim/collision/mesh_surface.h"
 #include "sim/geometry/convex_decomposition.h"
@@ -34,7 +34,7 @@ class CollisionMesh {
   const AabbTree& part_tree() const;
   /// The space around it that is clear of it. Computed at the first call, which takes some 10 ms; safe from
   /// several threads.
-  const ClearCells& clear_cells() const;
+  const ClearanceGrid& clearance_grid() const;
 
  private:
   void decompose_once() const;
@@ -43,7 +43,7 @@ class CollisionMesh {
   mutable std::optional<ConvexDecomposition> decomposition_;
   mutable AabbTree part_tree_;
   mutable std::once_flag clear_once_;
-  mutable std::optional<ClearCells> clear_cells_;
+  mutable std::optional<ClearanceGrid> clear_cells_;
 };
 
 }  // namespace offstage::sim

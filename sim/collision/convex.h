@@ -6,9 +6,9 @@
 #include <array>
 #include <cstdint>
 
+#include "sim/core/types.h"
 #include "sim/geometry/convex_polyhedron.h"
-#include "sim/shape.h"
-#include "sim/types.h"
+#include "sim/geometry/shape.h"
 
 namespace offstage::sim {
 

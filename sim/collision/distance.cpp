@@ -162,7 +162,7 @@ SurfaceDistance signed_distance(const CollisionMesh& m, const Vec3& p) {
 
 SurfaceDistance signed_distance_below(const Solid& s, const Vec3& p, Real limit) {
   // What is not known to be outside may be deep inside.
-  const bool outside = s.mesh && (!s.mesh->solid || s.mesh->clear_cells().is_outside(p));
+  const bool outside = s.mesh && (!s.mesh->solid || s.mesh->clearance_grid().is_outside(p));
   return outside ? mesh_distance(*s.mesh, p, limit * limit) : signed_distance(s, p);
 }
 

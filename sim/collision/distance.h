@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "sim/collision/collision_mesh.h"
-#include "sim/shape.h"
-#include "sim/types.h"
+#include "sim/core/types.h"
+#include "sim/geometry/shape.h"
 
 namespace offstage::sim {
 

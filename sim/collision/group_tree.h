@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "sim/collision/cell_table.h"
-#include "sim/types.h"
+#include "sim/core/types.h"
 
 namespace offstage::sim {
 

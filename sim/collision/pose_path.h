@@ -5,7 +5,7 @@
 /// for a quarter turn and 1 + angle^2 / 48 for small ones. Time is the share of the step, from 0 to 1, so
 /// velocities are per step.
 
-#include "sim/types.h"
+#include "sim/core/types.h"
 
 namespace offstage::sim {
 

@@ -1,7 +1,7 @@
 #pragma once
 /// What a distance query of two convex solids answers, whichever algorithm finds it.
 
-#include "sim/types.h"
+#include "sim/core/types.h"
 
 namespace offstage::sim {
 

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <span>
 
-#include "sim/types.h"
+#include "sim/core/types.h"
 
 namespace offstage::sim {
 

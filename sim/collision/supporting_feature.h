@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "sim/collision/convex.h"
-#include "sim/types.h"
+#include "sim/core/types.h"
 
 namespace offstage::sim {
 

@@ -8,7 +8,7 @@
 #include <type_traits>
 
 #include "sim/collision/bounding_volume.h"
-#include "sim/collision/lanes.h"
+#include "sim/linear/lanes.h"
 
 namespace offstage::sim {
 

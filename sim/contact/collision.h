@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <span>
 
+#include "sim/articulation/joint_problem.h"
 #include "sim/contact/contact_problem.h"
-#include "sim/contact/joint_problem.h"
 
 namespace offstage::sim {
 

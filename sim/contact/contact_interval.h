@@ -1,7 +1,7 @@
 #pragma once
 /// The interval that contacts are solved for.
 
-#include "sim/types.h"
+#include "sim/core/types.h"
 
 namespace offstage::sim {
 

@@ -9,9 +9,9 @@
 /// its end. Impulse and angular momentum then agree to the second order, for bodies that move by the mean of
 /// old and new velocity.
 
-#include "sim/body.h"
+#include "sim/collision/contact_frame.h"
 #include "sim/collision/manifold.h"
-#include "sim/contact/contact_frame.h"
+#include "sim/dynamics/body.h"
 
 namespace offstage::sim {
 

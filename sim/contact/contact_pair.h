@@ -6,10 +6,10 @@
 #include <limits>
 #include <vector>
 
-#include "sim/body.h"
+#include "sim/collision/contact_frame.h"
 #include "sim/collision/narrow_phase.h"
-#include "sim/contact/contact_frame.h"
-#include "sim/prefetch.h"
+#include "sim/core/prefetch.h"
+#include "sim/dynamics/body.h"
 
 namespace offstage::sim {
 
@@ -53,11 +53,12 @@ class alignas(64) ContactPair {
   bool has_narrow_ = false;
 
  public:
-  uint32_t impacts = 0;   ///< in this sub-step
-  uint8_t speculative = 0;   ///< manifolds that add_speculative_contacts() added
-  bool toi_exhausted = false;   ///< too many of them: no more trace-backs in this sub-step
-  bool restitution_suppressed = false;   ///< its points limit the approach in this sub-step even if it would bounce
-  Real deepest = 0;       ///< overlap that find() has seen in this sub-step [m]
+  uint32_t impacts = 0;        ///< in this sub-step
+  uint8_t speculative = 0;     ///< manifolds that add_speculative_contacts() added
+  bool toi_exhausted = false;  ///< too many of them: no more trace-backs in this sub-step
+  bool restitution_suppressed =
+      false;               ///< its points limit the approach in this sub-step even if it would bounce
+  Real deepest = 0;        ///< overlap that find() has seen in this sub-step [m]
   bool needs_toi = false;  ///< an impact of this pair is traced back to; else its points limit the approach
 
   /// A plane can only be `b`. Not both are planes.
@@ -86,7 +87,8 @@ class alignas(64) ContactPair {
 
   /// Whether some contact found is a line or a point (is_narrow()), at which there may be a seam.
   bool has_narrow() const { return has_narrow_; }
-  /// The i-th manifold that add_speculative_contacts() added, with its points where they are at the interval's end.
+  /// The i-th manifold that add_speculative_contacts() added, with its points where they are at the
+  /// interval's end.
   const Manifold& at_end(std::size_t i) const { return at_end_[i]; }
   /// Puts another manifold, placed in the world, in the place of the i-th; one without points takes it away
   /// at the next drop_empty(). The separation remains that of the bodies.

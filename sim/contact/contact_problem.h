@@ -15,8 +15,8 @@
 #include <span>
 #include <vector>
 
-#include "sim/contact/contact_frame.h"
-#include "sim/types.h"
+#include "sim/collision/contact_frame.h"
+#include "sim/core/types.h"
 
 namespace offstage::sim {
 
@@ -81,12 +81,12 @@ Real added_energy(std::span<const ContactBody> before, std::span<const ContactBo
 
 /// What a solver did: figures for StepReport.
 struct ContactWork {
-  uint64_t solves = 0;          ///< problems, one per island or cluster
-  uint64_t iterations = 0;      ///< pivots, Newton steps or sweeps
-  uint64_t factorizations = 0;  ///< of the matrix, from the beginning
-  uint64_t fallbacks = 0;       ///< problems that the solver meant for them did not solve
-  uint64_t over_budget = 0;       ///< that became too dear for the exact solver and went to the fast one
-  uint64_t cluster_truncated = 0;        ///< collisions of which contacts far from the impact were left out
+  uint64_t solves = 0;             ///< problems, one per island or cluster
+  uint64_t iterations = 0;         ///< pivots, Newton steps or sweeps
+  uint64_t factorizations = 0;     ///< of the matrix, from the beginning
+  uint64_t fallbacks = 0;          ///< problems that the solver meant for them did not solve
+  uint64_t over_budget = 0;        ///< that became too dear for the exact solver and went to the fast one
+  uint64_t cluster_truncated = 0;  ///< collisions of which contacts far from the impact were left out
   uint64_t restitution_reduced =
       0;              ///< collisions with less restitution, steps with smaller impulses, to keep the energy
   Real residual = 0;  ///< greatest left over [m/s]

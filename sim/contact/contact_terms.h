@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "sim/contact/contact_frame.h"
+#include "sim/collision/contact_frame.h"
 #include "sim/contact/contact_pair.h"
 
 namespace offstage::sim {

@@ -3,8 +3,8 @@
 
 #include <span>
 
+#include "sim/contact/contact_graph.h"
 #include "sim/contact/relaxation.h"
-#include "sim/contact_graph.h"
 
 namespace offstage::sim {
 

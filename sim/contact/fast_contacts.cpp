@@ -5,7 +5,7 @@
 #include "sim/contact/contact_motion.h"
 #include "sim/contact/contact_terms.h"
 #include "sim/contact/energy_guard.h"
-#include "sim/parallel_loop.h"
+#include "sim/core/parallel_loop.h"
 
 namespace offstage::sim {
 namespace {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "sim/contact/friction_pivoting.h"
-#include "sim/contact/least_squares.h"
 #include "sim/contact/proximal_newton.h"
+#include "sim/linear/least_squares.h"
 
 namespace offstage::sim {
 namespace {

@@ -5,8 +5,8 @@
 #include <deque>
 #include <limits>
 
-#include "sim/contact/updated_cholesky.h"
-#include "sim/contact/updated_qr.h"
+#include "sim/linear/updated_cholesky.h"
+#include "sim/linear/updated_qr.h"
 
 namespace offstage::sim {
 namespace {

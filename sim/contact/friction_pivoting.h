@@ -8,7 +8,7 @@
 
 #include <Eigen/Core>
 
-#include "sim/types.h"
+#include "sim/core/types.h"
 
 namespace offstage::sim {
 

@@ -2,7 +2,7 @@
 /// Impacts among the pairs of an island, at an instant (physics R6, R7, N10).
 
 #include "sim/contact/collision.h"
-#include "sim/contact_graph.h"
+#include "sim/contact/contact_graph.h"
 
 namespace offstage::sim {
 

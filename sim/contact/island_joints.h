@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "sim/articulation/joint_limits.h"
+#include "sim/articulation/joint_problem.h"
+#include "sim/contact/contact_graph.h"
 #include "sim/contact/contact_interval.h"
-#include "sim/contact/joint_problem.h"
-#include "sim/contact_graph.h"
 
 namespace offstage::sim {
 

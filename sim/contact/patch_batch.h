@@ -15,7 +15,7 @@
 #include <span>
 
 #include "sim/contact/contact_coloring.h"
-#include "sim/contact/lane_vector.h"
+#include "sim/linear/lane_vector.h"
 
 namespace offstage::sim {
 

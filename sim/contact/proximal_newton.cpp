@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "sim/contact/least_squares.h"
+#include "sim/linear/least_squares.h"
 
 namespace offstage::sim {
 namespace {

@@ -26,10 +26,10 @@
 #include <utility>
 #include <vector>
 
-#include "sim/contact/block_cholesky.h"
+#include "sim/articulation/joint_problem.h"
 #include "sim/contact/contact_problem.h"
 #include "sim/contact/friction_cone.h"
-#include "sim/contact/joint_problem.h"
+#include "sim/linear/block_cholesky.h"
 
 namespace offstage::sim {
 

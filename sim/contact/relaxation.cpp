@@ -4,9 +4,9 @@
 #include <atomic>
 #include <cmath>
 
-#include "sim/contact/staged_loop.h"
+#include "sim/core/parallel_loop.h"
+#include "sim/core/staged_loop.h"
 #include "sim/dynamics/force_field.h"
-#include "sim/parallel_loop.h"
 
 namespace offstage::sim {
 namespace {

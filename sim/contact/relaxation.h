@@ -22,13 +22,13 @@
 #include <span>
 #include <vector>
 
+#include "sim/collision/contact_frame.h"
 #include "sim/collision/manifold.h"
 #include "sim/contact/contact_coloring.h"
-#include "sim/contact/contact_frame.h"
 #include "sim/contact/contact_problem.h"
 #include "sim/contact/patch_batch.h"
 #include "sim/contact/relaxed_joints.h"
-#include "sim/types.h"
+#include "sim/core/types.h"
 
 namespace offstage::sim {
 

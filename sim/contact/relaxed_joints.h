@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "sim/articulation/articulation.h"
-#include "sim/contact/joint_problem.h"
+#include "sim/articulation/joint_problem.h"
 #include "sim/contact/patch_batch.h"
 
 namespace offstage::sim {

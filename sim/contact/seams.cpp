@@ -6,9 +6,9 @@
 
 #include "sim/collision/distance.h"
 #include "sim/collision/gjk.h"
+#include "sim/core/parallel_loop.h"
+#include "sim/core/rotation.h"
 #include "sim/geometry/closest_points.h"
-#include "sim/parallel_loop.h"
-#include "sim/rotation.h"
 
 namespace offstage::sim {
 namespace {

@@ -4,8 +4,8 @@
 #include <memory>
 #include <span>
 
+#include "sim/contact/contact_graph.h"
 #include "sim/contact/exact_contacts.h"
-#include "sim/contact_graph.h"
 
 namespace offstage::sim {
 

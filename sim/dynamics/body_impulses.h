@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "sim/collision/obstacles.h"
-#include "sim/contact/block_cholesky.h"
+#include "sim/linear/block_cholesky.h"
 
 namespace offstage::sim {
 

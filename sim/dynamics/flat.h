@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "sim/types.h"
+#include "sim/core/types.h"
 
 namespace offstage::sim {
 

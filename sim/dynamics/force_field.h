@@ -10,13 +10,14 @@
 #include <variant>
 #include <vector>
 
+#include "sim/core/handle.h"
+#include "sim/core/twist.h"
+#include "sim/core/types.h"
 #include "sim/dynamics/keyframes.h"
 #include "sim/dynamics/pair_law.h"
 #include "sim/dynamics/region.h"
 #include "sim/dynamics/rigid_body.h"
 #include "sim/dynamics/turbulence.h"
-#include "sim/handle.h"
-#include "sim/types.h"
 
 namespace offstage::sim {
 
@@ -79,8 +80,8 @@ struct Grab {
   Real reach = std::numeric_limits<Real>::infinity();
 };
 
-/// An impulse away from a point, at the force's start. It hits each body at its nearest point, so that it also
-/// turns those that it does not hit square.
+/// An impulse away from a point, at the force's start. It hits each body at its nearest point, so that it
+/// also turns those that it does not hit square.
 struct Explosion {
   Vec3 point = Vec3::Zero();
   Real impulse = 1;  ///< on a body or a particle right at the point [N s]
@@ -120,18 +121,6 @@ struct ForceDef {
 
 /// What is wrong with a definition: the field, and what is allowed. Empty: nothing.
 std::string problem(const ForceDef& def);
-
-/// A force and a torque about the centre of mass unless said otherwise, or an impulse and an angular impulse;
-/// world axes.
-struct Wrench {
-  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
-
-  Wrench& operator+=(const Wrench& w) {
-    force += w.force;
-    torque += w.torque;
-    return *this;
-  }
-};
 
 /// A body at a stage of an integration.
 struct RigidMotion {

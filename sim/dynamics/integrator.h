@@ -9,7 +9,7 @@
 
 #include <Eigen/SparseCore>
 
-#include "sim/types.h"
+#include "sim/core/types.h"
 
 namespace offstage::sim {
 

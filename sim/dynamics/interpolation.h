@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "sim/types.h"
+#include "sim/core/types.h"
 
 namespace offstage::sim {
 

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
+#include "sim/core/types.h"
 #include "sim/dynamics/interpolation.h"
-#include "sim/types.h"
 
 namespace offstage::sim {
 

@@ -6,9 +6,9 @@
 
 #include <oneapi/tbb/parallel_for.h>
 
-#include "sim/contact/lane_vector.h"
 #include "sim/dynamics/flat.h"
 #include "sim/dynamics/neighbor_grid.h"
+#include "sim/linear/lane_vector.h"
 
 namespace offstage::sim {
 namespace {

@@ -2,7 +2,7 @@
 /// State and equations of motion of a rigid body (physics R1). Integration works on (x, q) and the momenta
 /// (L, H): torque-free motion then keeps the angular momentum exactly.
 
-#include "sim/types.h"
+#include "sim/core/types.h"
 
 namespace offstage::sim {
 

@@ -5,7 +5,7 @@
 
 #include <immintrin.h>
 
-#include "sim/collision/lanes.h"
+#include "sim/linear/lanes.h"
 
 namespace offstage::sim {
 namespace {

@@ -7,8 +7,8 @@
 
 #include <array>
 
+#include "sim/core/types.h"
 #include "sim/geometry/intersection.h"
-#include "sim/types.h"
 
 namespace offstage::sim {
 

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "sim/core/types.h"
 #include "sim/geometry/mesh.h"
-#include "sim/types.h"
 
 namespace offstage::sim {
 

@@ -8,7 +8,7 @@
 
 #include <array>
 
-#include "sim/types.h"
+#include "sim/core/types.h"
 
 namespace offstage::sim {
 

@@ -3,9 +3,9 @@
 /// the sum of the signed tetrahedra between its faces and a point; the same values as the surface integrals
 /// of Mirtich, "Fast and accurate computation of polyhedral mass properties" (1996).
 
+#include "sim/core/types.h"
 #include "sim/geometry/mesh.h"
-#include "sim/shape.h"
-#include "sim/types.h"
+#include "sim/geometry/shape.h"
 
 namespace offstage::sim {
 

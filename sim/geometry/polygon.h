@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "sim/types.h"
+#include "sim/core/types.h"
 
 namespace offstage::sim {
 

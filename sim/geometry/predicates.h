@@ -5,7 +5,7 @@
 /// fast robust geometric predicates" (1997). Exact unless a product of three coordinates under- or overflows
 /// (below 1e-90, above 1e90).
 
-#include "sim/types.h"
+#include "sim/core/types.h"
 
 namespace offstage::sim {
 

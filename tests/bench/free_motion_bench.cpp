@@ -3,7 +3,7 @@
 #include <benchmark/benchmark.h>
 #include <oneapi/tbb/global_control.h>
 
-#include "sim/coupled_system.h"
+#include "sim/world/coupled_system.h"
 
 namespace offstage::sim {
 namespace {

@@ -10,8 +10,8 @@
 #include <benchmark/benchmark.h>
 
 #include "sim/collision/narrow_phase.h"
+#include "sim/core/rotation.h"
 #include "sim/geometry/convex_hull.h"
-#include "sim/rotation.h"
 
 namespace offstage::sim {
 namespace {

@@ -1,4 +1,4 @@
-/// Particles that collide with each other: sub-steps per second of a column of grains that comes down to a
+/// Particles that collide with each other: sub-steps per second of a column of particles that comes down to a
 /// heap, of one that stands, and of a thin cloud in free flight, by their number.
 
 #include <cmath>
@@ -24,7 +24,7 @@ void run_heap(benchmark::State& state, World& world, int warm_up) {
       benchmark::Counter(static_cast<double>(collisions), benchmark::Counter::kAvgIterations);
 }
 
-/// Grains in a lattice with some disorder, twice as high as it is wide, on rough ground.
+/// Particles in a lattice with some disorder, twice as high as it is wide, on rough ground.
 World column(std::size_t count) {
   World world({.max_step = kHeapStep});
   world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0});

@@ -1,4 +1,4 @@
-#include "producer/camera.h"
+#include "producer/build/camera.h"
 
 #include <cmath>
 #include <numbers>

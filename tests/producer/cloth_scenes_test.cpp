@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "cloth_crossings.h"
-#include "producer/scene_io.h"
-#include "producer/simulation.h"
+#include "producer/build/simulation.h"
+#include "producer/format/scene_io.h"
 #include "sim/collision/distance.h"
 
 namespace offstage::producer {

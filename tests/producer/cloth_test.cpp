@@ -4,9 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include "producer/cloth_defs.h"
-#include "producer/scene_io.h"
-#include "producer/simulation.h"
+#include "producer/build/cloth_defs.h"
+#include "producer/build/simulation.h"
+#include "producer/format/scene_io.h"
 
 namespace offstage::producer {
 namespace {

@@ -1,12 +1,12 @@
 // How the work of a scene spreads over its objects.
 
-#include "producer/cost.h"
+#include "producer/run/cost.h"
 
 #include <algorithm>
 
 #include <gtest/gtest.h>
 
-#include "producer/scene_templates.h"
+#include "producer/format/scene_templates.h"
 
 namespace offstage::producer {
 namespace {

@@ -1,4 +1,4 @@
-#include "producer/decomposition_cache.h"
+#include "producer/build/decomposition_cache.h"
 
 #include <algorithm>
 #include <fstream>

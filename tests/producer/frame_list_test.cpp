@@ -1,4 +1,4 @@
-#include "producer/frame_list.h"
+#include "producer/run/frame_list.h"
 
 #include <stdexcept>
 

@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "producer/scene_io.h"
-#include "producer/simulation.h"
+#include "producer/build/simulation.h"
+#include "producer/format/scene_io.h"
 
 namespace offstage::producer {
 namespace {

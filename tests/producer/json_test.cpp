@@ -1,4 +1,4 @@
-#include "producer/json.h"
+#include "producer/base/json.h"
 
 #include <cmath>
 #include <cstring>
@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "effects/random.h"
-#include "producer/error.h"
+#include "producer/base/error.h"
 
 namespace offstage::producer {
 namespace {

@@ -1,6 +1,6 @@
 // What overlays show, against what is known of the bodies they show.
 
-#include "producer/overlays.h"
+#include "producer/build/overlays.h"
 
 #include <algorithm>
 #include <array>
@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "producer/scene_io.h"
-#include "producer/simulation.h"
+#include "producer/build/simulation.h"
+#include "producer/format/scene_io.h"
 
 namespace offstage::producer {
 namespace {

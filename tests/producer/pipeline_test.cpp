@@ -1,7 +1,7 @@
 // The hand-over between the threads of a render: order, bounds, and that a failure anywhere ends it for
 // everyone.
 
-#include "producer/pipeline.h"
+#include "producer/run/pipeline.h"
 
 #include <algorithm>
 #include <atomic>

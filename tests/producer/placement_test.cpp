@@ -1,11 +1,11 @@
-#include "producer/placement.h"
+#include "producer/build/placement.h"
 
 #include <numbers>
 #include <set>
 
 #include <gtest/gtest.h>
 
-#include "producer/scene_io.h"
+#include "producer/format/scene_io.h"
 
 namespace offstage::producer {
 namespace {

@@ -1,9 +1,9 @@
-#include "producer/presets.h"
+#include "producer/format/presets.h"
 
 #include <gtest/gtest.h>
 
-#include "producer/scene_io.h"
-#include "producer/simulation.h"
+#include "producer/build/simulation.h"
+#include "producer/format/scene_io.h"
 
 namespace offstage::producer {
 namespace {

@@ -1,6 +1,6 @@
 // The line that a terminal shows, and how times are said.
 
-#include "producer/progress.h"
+#include "producer/run/progress.h"
 
 #include <algorithm>
 

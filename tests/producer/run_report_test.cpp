@@ -1,6 +1,6 @@
 // The page about a run: whole by itself, and its plots and tables show the figures they are given.
 
-#include "producer/run_report.h"
+#include "producer/run/run_report.h"
 
 #include <regex>
 

@@ -1,11 +1,11 @@
-#include "producer/scene_check.h"
+#include "producer/format/scene_check.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "producer/scene_check_particles.h"
-#include "producer/scene_io.h"
+#include "producer/format/scene_check_particles.h"
+#include "producer/format/scene_io.h"
 
 namespace offstage::producer {
 namespace {

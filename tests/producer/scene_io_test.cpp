@@ -1,4 +1,4 @@
-#include "producer/scene_io.h"
+#include "producer/format/scene_io.h"
 
 #include <cmath>
 #include <filesystem>

@@ -13,8 +13,8 @@
 #include <valijson/validator.hpp>
 
 #include "effects/random.h"
+#include "producer/format/scene_io.h"
 #include "producer/sample_scene.h"
-#include "producer/scene_io.h"
 
 namespace offstage::producer {
 namespace {

@@ -1,14 +1,14 @@
 // That what a scene says of bodies, their contacts and the forces on them reaches the simulation: against
 // closed forms that each of the keys decides.
 
-#include "producer/simulation.h"
+#include "producer/build/simulation.h"
 
 #include <cmath>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
 
-#include "producer/scene_io.h"
+#include "producer/format/scene_io.h"
 
 namespace offstage::producer {
 namespace {

@@ -1,4 +1,4 @@
-#include "producer/snapshot.h"
+#include "producer/build/snapshot.h"
 
 #include <gtest/gtest.h>
 

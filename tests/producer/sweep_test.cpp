@@ -1,13 +1,13 @@
 // What a sweep runs, and the table it makes.
 
-#include "producer/sweep.h"
+#include "producer/run/sweep.h"
 
 #include <stdexcept>
 
 #include <gtest/gtest.h>
 
-#include "producer/contact_sheet.h"
-#include "producer/production.h"
+#include "producer/run/contact_sheet.h"
+#include "producer/run/production.h"
 
 namespace offstage::producer {
 namespace {

@@ -1,10 +1,10 @@
 // Words on the picture: what they say, where they stand, and when.
 
-#include "producer/texts.h"
+#include "producer/build/texts.h"
 
 #include <gtest/gtest.h>
 
-#include "producer/contact_sheet.h"
+#include "producer/run/contact_sheet.h"
 #include "render/text.h"
 
 namespace offstage::producer {

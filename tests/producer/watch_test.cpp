@@ -1,6 +1,6 @@
 // Which files a scene is made of, and that their changes are seen.
 
-#include "producer/watch.h"
+#include "producer/run/watch.h"
 
 #include <chrono>
 #include <fstream>

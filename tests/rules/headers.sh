@@ -5,7 +5,7 @@
 cd "$1" || exit 2
 flags=("${@:3}" -std=c++20 -march=x86-64-v3 -Wall -Wextra -Werror -Wno-missing-field-initializers)
 compiler=$2
-bases="producer/scene.h render/stage.h sim/world.h sim/types.h Eigen/Core"
+bases="producer/scene/scene.h render/stage.h sim/world.h sim/core/types.h Eigen/Core"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 

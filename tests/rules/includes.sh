@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The dependency rule: sim <- effects <- demos/producer, render <- demos/producer; sim and render never meet.
+# The dependency rules. Between libraries: sim <- effects <- demos/producer, render <- demos/producer; sim and render never meet.
 # usage: includes.sh SOURCE_DIR
 cd "$1" || exit 2
 status=0
@@ -19,6 +19,29 @@ forbid sim "render/|effects/|producer/|$json|assimp|glad|GL/|stb|libdeflate" "si
 forbid effects "render/|producer/|$json|assimp|glad|GL/|stb|libdeflate" "effects includes more than sim"
 forbid render "sim/|effects/|producer/|$json" "render knows something of physics or JSON"
 forbid demos/producer "tune/" "producer includes what is built on it"
+# Floors: within a library, a folder includes itself and the folders before it in the list.
+# floors FOLDER PREFIX FLOOR...; "." is the folder's own files.
+floors() {
+  local base=$1 prefix=$2 above=() floor rest files
+  shift 2
+  rest=("$@")
+  for floor in "$@"; do
+    rest=("${rest[@]:1}")
+    files=$base/$floor
+    [ "$floor" != . ] || files=$(find "$base" -maxdepth 1 -name '*.h' -o -maxdepth 1 -name '*.cpp')
+    above=()
+    for name in "${rest[@]}"; do
+      [ "$name" = . ] && above+=("[a-z_]+\\.h") || above+=("$name/")
+    done
+    [ ${#above[@]} = 0 ] || forbid "$files" "$prefix/($(IFS='|'; echo "${above[*]}"))" "$base/$floor includes a folder above it"
+  done
+  for floor in $(ls -d $base/*/ | xargs -n1 basename); do
+    [[ " $* " == *" $floor "* ]] || { echo "$base/$floor has no place among the floors of tests/rules/includes.sh"; status=1; }
+  done
+}
+floors sim sim core linear geometry collision dynamics articulation contact particles cloth . world
+floors demos/producer producer base scene build format run cli
+
 public=$(grep -L 'Private' render/*.h)
 for header in $public; do
   forbid "$header" 'assimp|glad|GL/|stb|libdeflate' "a public header shows a library behind it"

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "producer/production.h"
-#include "producer/scene_io.h"
+#include "producer/format/scene_io.h"
+#include "producer/run/production.h"
 
 namespace offstage::tune {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "producer/error.h"
-#include "producer/json.h"
+#include "producer/base/error.h"
+#include "producer/base/json.h"
 
 namespace offstage::tune {
 namespace {

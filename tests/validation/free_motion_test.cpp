@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "sim/coupled_system.h"
+#include "sim/world/coupled_system.h"
 
 namespace offstage::sim {
 namespace {

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "sim/rotation.h"
+#include "sim/core/rotation.h"
 #include "sim/world.h"
 #include "tests/random.h"
 

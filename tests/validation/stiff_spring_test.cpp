@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "sim/coupled_system.h"
 #include "sim/world.h"
+#include "sim/world/coupled_system.h"
 
 namespace offstage::sim {
 namespace {

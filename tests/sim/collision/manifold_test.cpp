@@ -11,7 +11,7 @@
 
 #include "sim/collision/distance.h"
 #include "sim/collision/gjk.h"
-#include "sim/rotation.h"
+#include "sim/core/rotation.h"
 #include "tests/convex_samples.h"
 
 namespace offstage::sim {

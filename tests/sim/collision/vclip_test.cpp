@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
-#include "sim/rotation.h"
+#include "sim/core/rotation.h"
 #include "tests/convex_samples.h"
 
 namespace offstage::sim {

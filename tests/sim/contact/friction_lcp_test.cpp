@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "sim/contact/friction_pivoting.h"
-#include "sim/contact/updated_qr.h"
+#include "sim/linear/updated_qr.h"
 #include "tests/sim/contact/contact_samples.h"
 
 namespace offstage::sim {

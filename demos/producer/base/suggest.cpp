@@ -1,0 +1,52 @@
+#include "producer/base/suggest.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace offstage::producer {
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  // Optimal string alignment: row i of the table from the two rows before it.
+  std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    before.swap(last);
+    last.swap(row);
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (a[i - 1] != b[j - 1])});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+        row[j] = std::min(row[j], before[j - 2] + 1);
+    }
+  }
+  return row[b.size()];
+}
+
+std::string nearest(std::string_view word, std::span<const std::string> candidates) {
+  constexpr std::size_t kLongestWord = 100;
+  if (word.size() > kLongestWord) return {};
+  std::size_t best = std::max<std::size_t>(1, word.size() / 3) + 1;
+  std::string found;
+  for (const std::string& candidate : candidates) {
+    if (candidate.size() > word.size() + best || word.size() > candidate.size() + best) continue;
+    const std::size_t distance = edit_distance(word, candidate);
+    if (distance >= best) continue;
+    best = distance;
+    found = candidate;
+  }
+  return found;
+}
+
+std::string suggestion(std::string_view word, std::span<const std::string> candidates,
+                       std::string_view if_none) {
+  if (candidates.empty()) return std::string(if_none);
+  if (const std::string near = nearest(word, candidates); !near.empty())
+    return "; did you mean '" + near + "'?";
+  constexpr std::size_t kMost = 50;
+  std::string text = "; known: ";
+  for (std::size_t i = 0; i < std::min(candidates.size(), kMost); ++i)
+    text += (i > 0 ? ", '" : "'") + candidates[i] + "'";
+  return candidates.size() > kMost ? text + " ..." : text;
+}
+
+}  // namespace offstage::producer

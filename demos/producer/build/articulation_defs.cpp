@@ -1,0 +1,143 @@
+#include "producer/build/articulation_defs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "producer/build/articulation_builder.h"
+#include "producer/build/placement.h"
+
+namespace offstage::producer {
+namespace {
+
+constexpr Real kDegree = std::numbers::pi / 180;
+
+void add(Parts parts, Scene& flat) {
+  std::move(parts.bodies.begin(), parts.bodies.end(), std::back_inserter(flat.bodies));
+  std::move(parts.joints.begin(), parts.joints.end(), std::back_inserter(flat.joints));
+}
+
+void scale(Ragdoll& doll, Real factor) {
+  doll.height *= factor;
+}
+void scale(Vehicle& vehicle, Real factor) {
+  for (Real* size : {&vehicle.length, &vehicle.width, &vehicle.wheel_radius}) *size *= factor;
+  vehicle.mass *= factor * factor * factor;
+}
+void scale(Crane& crane, Real factor) {
+  for (Real* size : {&crane.height, &crane.reach, &crane.load_size}) *size *= factor;
+  crane.load_mass *= factor * factor * factor;
+}
+void scale(ModelTree& tree, Real factor) {
+  tree.scale *= factor;
+}
+
+template <class Template>
+void add_copies(const Template& original, uint64_t seed, Scene& flat, std::vector<Problem>& errors,
+                std::vector<Problem>& warnings) {
+  if (copy_count(original.placement) > kMaxCopies) {
+    errors.push_back({original.where, "asks for more than " + std::to_string(kMaxCopies) +
+                                          " copies: repeat, grid and scatter multiply"});
+    return;
+  }
+  const Copies copies = expand(original.placement, original.position, seed, original.name);
+  for (const PlacedCopy& copy : copies.placed) {
+    Template moved = original;
+    moved.name += copy.suffix;
+    moved.position = copy.motion.point_to_world(original.position);
+    moved.orientation = copy.motion.orientation * original.orientation;
+    if constexpr (requires { moved.velocity; })
+      moved.velocity = copy.motion.vector_to_world(original.velocity);
+    scale(moved, copy.scale);
+    add(build(moved), flat);
+  }
+  if (copies.left_out == 0) return;
+  Where where = original.where;
+  where.path += "/scatter";
+  warnings.push_back({where, std::to_string(copies.left_out) +
+                                 " copies found no place: make min_distance smaller or size larger"});
+}
+
+const Body* named(const std::vector<Body>& bodies, const std::string& name) {
+  const auto it = std::ranges::find(bodies, name, &Body::name);
+  return it == bodies.end() ? nullptr : &*it;
+}
+
+bool has_copies(const Body* body) {
+  return body && (body->placement.repeat || body->placement.grid || body->placement.scatter);
+}
+
+/// One joint for each copy of its first body.
+void add_copies(const Joint& joint, const Scene& scene, Scene& flat) {
+  const Body *a = named(scene.bodies, joint.a), *b = named(scene.bodies, joint.b);
+  if (!has_copies(a) || copy_count(a->placement) > kMaxCopies) {
+    flat.joints.push_back(joint);
+    return;
+  }
+  for (const PlacedCopy& copy : expand(a->placement, a->position, scene.world.seed, a->name).placed) {
+    Joint moved = joint;
+    moved.name += copy.suffix;
+    moved.a += copy.suffix;
+    if (has_copies(b)) moved.b += copy.suffix;
+    moved.anchor = copy.motion.point_to_world(joint.anchor);
+    moved.anchor_b =
+        has_copies(b) || joint.b.empty() ? copy.motion.point_to_world(joint.anchor_b) : joint.anchor_b;
+    moved.behaviour.axis = copy.motion.vector_to_world(joint.behaviour.axis);
+    moved.behaviour.second_axis = copy.motion.vector_to_world(joint.behaviour.second_axis);
+    flat.joints.push_back(std::move(moved));
+  }
+}
+
+sim::Motor motor_def(const JointMotor& motor, Real unit) {
+  sim::Motor m{
+      .mode = motor.mode, .smooth = motor.smooth, .stiffness = motor.stiffness, .damping = motor.damping};
+  if (motor.max_effort) m.max_effort = *motor.max_effort;
+  for (const MotorKey& key : motor.keys)
+    m.targets.push_back({key.time, unit * key.target, key.interpolation.value_or(motor.interpolation)});
+  if (m.targets.empty()) m.targets.push_back({0, unit * motor.target});
+  return m;
+}
+
+}  // namespace
+
+void expand_joints(const Scene& scene, Scene& flat, std::vector<Problem>& errors,
+                   std::vector<Problem>& warnings) {
+  flat.joints.clear();
+  for (const Joint& joint : scene.joints) add_copies(joint, scene, flat);
+  for (const ArticulationTemplate& articulation : scene.articulations)
+    std::visit(
+        [&](const auto& a) {
+          if (a.where.path.empty()) return;  // its type was wrong, and none was read
+          if constexpr (requires { a.placement; })
+            add_copies(a, scene.world.seed, flat, errors, warnings);
+          else
+            add(build(a), flat);
+        },
+        articulation);
+}
+
+sim::JointDef joint_def(const Joint& joint) {
+  const JointBehaviour& how = joint.behaviour;
+  const bool slides = how.type == sim::JointType::prismatic || how.type == sim::JointType::distance;
+  const Real unit = slides ? 1 : kDegree;
+  sim::JointDef def{.name = joint.name,
+                    .type = how.type,
+                    .anchor = joint.anchor,
+                    .anchor_b = joint.anchor_b,
+                    .axis = how.axis,
+                    .second_axis = how.second_axis,
+                    .friction = how.friction,
+                    .damping = how.damping,
+                    .collide = joint.collide};
+  if (const auto& limits = slides ? how.limits : how.limits_deg) {
+    def.lower = unit * (*limits)[0];
+    def.upper = unit * (*limits)[1];
+  }
+  if (how.swing_deg) def.swing = kDegree * *how.swing_deg;
+  if (how.motor) def.motor = motor_def(*how.motor, unit);
+  if (how.max_force) def.max_force = *how.max_force;
+  if (how.max_torque) def.max_torque = *how.max_torque;
+  return def;
+}
+
+}  // namespace offstage::producer

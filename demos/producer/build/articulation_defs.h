@@ -1,0 +1,18 @@
+#pragma once
+/// Ready-made articulations as bodies and joints, and joints as the simulation has them.
+
+#include <vector>
+
+#include "producer/scene/scene.h"
+
+namespace offstage::producer {
+
+/// Adds the bodies and joints of the articulations of `scene` to `flat`, and a copy of each joint for the
+/// copies of its bodies. Problems with the number of copies go to `errors` and `warnings`.
+void expand_joints(const Scene& scene, Scene& flat, std::vector<Problem>& errors,
+                   std::vector<Problem>& warnings);
+
+/// Without the bodies.
+sim::JointDef joint_def(const Joint& joint);
+
+}  // namespace offstage::producer

@@ -1,0 +1,23 @@
+#pragma once
+/// From a scene's camera to the view of a moment.
+
+#include <vector>
+
+#include "producer/build/body_places.h"
+#include "producer/build/models.h"
+#include "producer/scene/scene.h"
+#include "render/stage.h"
+
+namespace offstage::producer {
+
+class CameraRig {
+ public:
+  CameraRig(const Scene& scene, const ModelLibrary& models);
+  render::Camera at(double time, const BodyPlaces& places, const std::vector<BodySample>& moving) const;
+
+ private:
+  const Scene& scene_;
+  Eigen::AlignedBox3f fitted_;  ///< of the bodies that are to fill the picture; empty: none are
+};
+
+}  // namespace offstage::producer

@@ -1,0 +1,209 @@
+#include "producer/build/emitter_defs.h"
+
+#include <algorithm>
+#include <limits>
+#include <map>
+
+#include "sim/core/rotation.h"
+
+namespace offstage::producer {
+namespace {
+
+/// What all definitions of newborns have in common.
+template <class Def>
+Def newborn_def(const ParticleSource& source, const std::string& name, uint64_t seed) {
+  Def def;
+  def.name = name;
+  def.seed = seed;
+  def.speed = source.speed;
+  def.spread_deg = source.spread_deg;
+  def.radius = source.radius;
+  def.density = source.density;
+  def.mass = source.mass;
+  def.lifespan = source.lifespan;
+  def.restitution = source.restitution;
+  def.friction = source.friction;
+  def.charge = source.charge;
+  def.max_alive = static_cast<uint64_t>(source.max_alive);
+  return def;
+}
+
+effects::EmitterSurface surface_of(const PlaneSurface& s) {
+  return {.kind = effects::SurfaceKind::plane, .pose = {s.position, s.orientation()}, .size = s.size};
+}
+effects::EmitterSurface surface_of(const SphereSurface& s) {
+  return {.kind = effects::SurfaceKind::sphere, .pose = {s.position, Quat::Identity()}, .radius = s.radius};
+}
+effects::EmitterSurface surface_of(const DiscSurface& s) {
+  return {.kind = effects::SurfaceKind::disc,
+          .pose = {s.position, sim::rotation_between(Vec3::UnitY(), s.direction)},
+          .radius = s.radius};
+}
+effects::EmitterSurface surface_of(const MeshSurface& s) {
+  return {.kind = effects::SurfaceKind::mesh, .pose = {s.position, s.orientation}, .mesh = {}};
+}
+
+// --- Bounds ---
+
+/// An unclipped normal distribution cut off far out, so that it has ends.
+void bound(Varying& v) {
+  constexpr Real kDeviations = 4;
+  auto* normal = std::get_if<effects::Normal>(&v);
+  if (!normal || normal->clip) return;
+  normal->min = std::max(normal->min, normal->mean - kDeviations * normal->deviation);
+  normal->max = std::min(normal->max, normal->mean + kDeviations * normal->deviation);
+}
+constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max();
+
+/// How often a particle hits something in its life, as a guess.
+Real expected_hits(const ParticleSource& source) {
+  return source.behaviour.dies_on_hit ? 1 : 4;
+}
+
+/// Both with and without the limits on the living.
+struct Bounds {
+  effects::WorstCase possible, limited;
+};
+
+template <class Def, class... More>
+Bounds bounds_of(Def def, const Bounds* parents, More... more) {
+  const auto of = [&](const Def& d, const effects::WorstCase* from) {
+    if constexpr (std::is_same_v<Def, effects::EmitterDef>)
+      return effects::worst_case(d, more...);
+    else
+      return effects::worst_case(d, *from, more...);
+  };
+  const effects::WorstCase limited = of(def, parents ? &parents->limited : nullptr);
+  def.max_alive = kNoLimit;
+  return {of(def, parents ? &parents->possible : nullptr), limited};
+}
+
+effects::WorstCase sum(const effects::WorstCase& a, const effects::WorstCase& b) {
+  const auto add = [](uint64_t x, uint64_t y) { return x > kNoLimit - y ? kNoLimit : x + y; };
+  return {add(a.born, b.born), add(a.alive, b.alive), std::max(a.lifespan, b.lifespan), a.at_once + b.at_once,
+          a.rate + b.rate};
+}
+
+Bounds bounds_of_emitter(const Emitter& emitter, Real film_end) {
+  effects::EmitterDef def = emitter_def(emitter, 0);
+  for (Varying* v : {&def.rate, &def.count, &def.interval, &def.lifespan, &def.radius}) bound(*v);
+  for (effects::Burst& burst : def.bursts) bound(burst.count);
+  // The triangles of a model are not read yet. As for the count, newborns on one may have to wait.
+  if (def.surface.kind == effects::SurfaceKind::mesh)
+    def.surface = {.kind = effects::SurfaceKind::sphere, .radius = 1e-9};
+  return bounds_of(def, nullptr, film_end);
+}
+
+Bounds bounds_of_child(const ParticleSource& parent, const Birth& birth, const Bounds& parents) {
+  if (birth.trail) {
+    effects::TrailDef def = trail_def(*birth.trail, "", 0);
+    for (Varying* v : {&def.rate, &def.lifespan}) bound(*v);
+    return bounds_of(def, &parents);
+  }
+  effects::SubEmitterDef def = event_def(birth, "", 0);
+  for (Varying* v : {&def.count, &def.lifespan}) bound(*v);
+
+  return bounds_of(def, &parents, expected_hits(parent));
+}
+
+void add_split(const ParticleSource& source, Bounds& all) {
+  if (!source.split) return;
+  effects::SplitDef def = split_def(source, "", 0);
+  for (Varying* v : {&def.count, &def.age, &def.delay, &def.lifespan_percent}) bound(*v);
+  const Bounds children = bounds_of(def, &all, true);
+  all = {sum(all.possible, children.possible), sum(all.limited, children.limited)};
+  all.limited.alive = std::min(all.limited.alive, static_cast<uint64_t>(source.max_alive));
+}
+
+}  // namespace
+
+sim::ParticleSystemDef system_def(const std::string& name, const ParticleBehaviour& b) {
+  return {.name = name,
+          .linear_drag = b.linear_drag,
+          .gravity = b.gravity,
+          .force = b.force,
+          .collides = b.collides,
+          .internal = b.internal,
+          .external = b.external,
+          .dies_on_hit = b.dies_on_hit,
+          .integrator = b.integrator};
+}
+
+sim::ParticleSystemDef system_def(const std::string& name, const ParticleSource& source) {
+  sim::ParticleSystemDef def = system_def(name, source.behaviour);
+  def.report_collisions = !source.on_collision.empty();
+  def.report_deaths = !source.on_death.empty();
+  return def;
+}
+
+effects::EmitterDef emitter_def(const Emitter& emitter, uint64_t seed) {
+  auto def = newborn_def<effects::EmitterDef>(emitter, emitter.name, seed);
+  def.surface = std::visit([](const auto& s) { return surface_of(s); }, emitter.surface);
+  def.overlap = emitter.overlap;
+  def.rate = emitter.rate;
+  def.count = emitter.count;
+  def.interval = emitter.interval;
+  for (const EmitterBurst& b : emitter.bursts) def.bursts.push_back({b.time, b.count, b.cycles, b.interval});
+  def.start = emitter.start;
+  def.end = emitter.end;
+  def.windows = emitter.windows;
+  def.prewarm = emitter.prewarm;
+  def.direction = emitter.direction;
+  return def;
+}
+
+effects::SplitDef split_def(const ParticleSource& source, const std::string& name, uint64_t seed) {
+  const Split& s = *source.split;
+  return {.name = name + "/split",
+          .seed = seed,
+          .enabled = s.enabled,
+          .count = s.count,
+          .age = s.age,
+          .delay = s.delay,
+          .depth = s.depth,
+          .velocity_percent = s.velocity_percent,
+          .spread_deg = s.spread_deg,
+          .radius_percent = s.radius_percent,
+          .mass_percent = s.mass_percent,
+          .lifespan_percent = s.lifespan_percent,
+          .max_alive = static_cast<uint64_t>(source.max_alive)};
+}
+
+effects::TrailDef trail_def(const TrailSource& trail, const std::string& name, uint64_t seed) {
+  auto def = newborn_def<effects::TrailDef>(trail, name, seed);
+  def.rate = trail.rate;
+  def.start_age = trail.start_age;
+  def.end_age = trail.end_age;
+  def.velocity_percent = trail.velocity_percent;
+  return def;
+}
+
+effects::SubEmitterDef event_def(const Birth& birth, const std::string& name, uint64_t seed) {
+  const EventSource& event = *birth.event;
+  auto def = newborn_def<effects::SubEmitterDef>(event, name, seed);
+  def.trigger = birth.trigger;
+  def.age = birth.age;
+  def.probability = event.probability;
+  def.min_speed = event.min_speed;
+  def.count = event.count;
+  def.axis = event.axis;
+  def.velocity_percent = event.velocity_percent;
+  def.max_per_step = static_cast<uint64_t>(event.max_per_step);
+  return def;
+}
+
+void bound_sources(
+    const Emitter& emitter, Real film_end,
+    const std::function<void(const ParticleSource&, const std::string&, const SourceBound&)>& visit) {
+  std::map<const ParticleSource*, Bounds> known;
+  for_each_source(emitter, [&](const ParticleSource& source, const ParticleSource* parent,
+                               const std::string& name, const Birth& birth) {
+    Bounds all =
+        parent ? bounds_of_child(*parent, birth, known.at(parent)) : bounds_of_emitter(emitter, film_end);
+    add_split(source, all);
+    known[&source] = all;
+    visit(source, name, {all.possible, all.limited.alive});
+  });
+}
+
+}  // namespace offstage::producer

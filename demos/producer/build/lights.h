@@ -1,0 +1,19 @@
+#pragma once
+/// From a scene's lights and air to those of the stage.
+
+#include <vector>
+
+#include "producer/build/body_places.h"
+#include "producer/scene/scene.h"
+#include "render/stage.h"
+
+namespace offstage::producer {
+
+/// The sun, or none: a sun without light.
+render::Sun sun_of(const Scene& scene);
+render::Environment environment_of(const Scene& scene);
+/// The other lights at a time, in scene order.
+std::vector<render::Lamp> lamps_of(const Scene& scene, double time, const BodyPlaces& places,
+                                   const std::vector<BodySample>& moving);
+
+}  // namespace offstage::producer

@@ -1,0 +1,59 @@
+#include "producer/build/model_articulation.h"
+
+#include <algorithm>
+
+#include "producer/base/shipped_files.h"
+#include "producer/build/articulation_builder.h"
+#include "render/error.h"
+#include "render/mesh_io.h"
+
+namespace offstage::producer {
+
+void read_links(Scene& scene, const std::filesystem::path& folder, std::vector<Problem>& errors) {
+  for (ArticulationTemplate& articulation : scene.articulations) {
+    auto* tree = std::get_if<ModelTree>(&articulation);
+    if (!tree || tree->file.empty()) continue;
+    try {
+      for (const render::Model::Node& node : render::read_model(model_file(tree->file, folder)).nodes)
+        tree->links.push_back({node.name,
+                               node.parent,
+                               {node.position.cast<Real>(), node.orientation.cast<Real>().normalized()}});
+    } catch (const render::FileError& error) {
+      Where where = tree->where;
+      where.path += "/file";
+      errors.push_back({where, error.what()});
+    }
+  }
+}
+
+Parts build(const ModelTree& tree) {
+  ArticulationBuilder make(tree.where, tree.name);
+  for (const ModelTree::Link& link : tree.links) {
+    Body& body = make.body(link.name, tree.material);
+    body.shape = MeshFile{tree.file + "#" + link.name, tree.scale};
+    body.position = tree.position + tree.orientation * (tree.scale * link.pose.position);
+    body.orientation = (tree.orientation * link.pose.orientation).normalized();
+    body.velocity = tree.velocity;
+    body.density = tree.density;
+    body.collides = tree.collides;
+    if (link.parent < 0 && tree.base.empty()) continue;
+    const std::string above = link.parent >= 0
+                                  ? make.own(tree.links[static_cast<std::size_t>(link.parent)].name)
+                              : tree.base == "world" ? ""
+                                                     : tree.base;
+    const Quat orientation = body.orientation;
+    Joint& joint = make.joint(link.name, body.name, above, body.position);
+    const auto own = std::ranges::find(tree.joints, link.name, &NodeJoint::node);
+    if (own != tree.joints.end()) {
+      joint.behaviour = own->behaviour;
+      joint.behaviour.axis = orientation * own->behaviour.axis;
+      joint.behaviour.second_axis = orientation * own->behaviour.second_axis;
+    } else {
+      joint.behaviour.friction = tree.friction;
+      joint.behaviour.damping = tree.damping;
+    }
+  }
+  return std::move(make.parts);
+}
+
+}  // namespace offstage::producer

@@ -1,0 +1,15 @@
+#pragma once
+/// Articulations from the node trees of model files.
+
+#include <filesystem>
+#include <vector>
+
+#include "producer/scene/scene.h"
+
+namespace offstage::producer {
+
+/// Reads the links of the scene's model trees from their files, relative to `folder`. What cannot be read
+/// goes to `errors`.
+void read_links(Scene& scene, const std::filesystem::path& folder, std::vector<Problem>& errors);
+
+}  // namespace offstage::producer

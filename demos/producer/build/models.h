@@ -1,0 +1,68 @@
+#pragma once
+/// The model and texture files of a scene, each read once and shared by the simulation and every stage.
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "producer/build/decomposition_cache.h"
+#include "producer/scene/scene.h"
+#include "render/model.h"
+#include "sim/geometry/convex_decomposition.h"
+#include "sim/geometry/mesh.h"
+
+namespace offstage::producer {
+
+class ModelLibrary {
+ public:
+  ModelLibrary() = default;
+  /// Told what the next step of some seconds is, and "" at its end. May throw to stop the work.
+  using StepCallback = std::function<void(const std::string& step)>;
+
+  /// Reads every model and texture that the (flat) scene names, relative to `folder` (or see `model_file`),
+  /// and cuts models into convex parts where collisions of bodies or an overlay need that. Throws SceneError
+  /// with every file that cannot be used; what was repaired in a model or is only approximately right is
+  /// added to `warnings`.
+  ModelLibrary(const Scene& scene, const std::filesystem::path& folder, const DecompositionCache& cache,
+               std::vector<Problem>& warnings, const StepCallback& on_step = {});
+
+  const render::Model& model(const std::string& file) const { return models_.at(file); }
+  /// The convex parts of a model at its own scale, or null if nothing needs them.
+  const sim::ConvexDecomposition* parts(const std::string& file) const {
+    const auto it = parts_.find(file);
+    return it == parts_.end() ? nullptr : &it->second;
+  }
+  const render::Image& texture(const std::string& file) const { return textures_.at(file); }
+  /// A model that was cut into convex parts, and the time that this took (little if they were kept on disk).
+  struct Decomposed {
+    std::string file;
+    std::size_t triangles = 0, parts = 0;
+    double seconds = 0;
+  };
+  const std::vector<Decomposed>& decomposed() const { return decomposed_; }
+
+  /// Digest of everything that was read, so that a run knows when a file changed.
+  const std::string& digest() const { return digest_; }
+
+ private:
+  void decompose_models(const Scene& scene, const DecompositionCache& cache, std::vector<Problem>& warnings,
+                        const StepCallback& on_step);
+
+  std::map<std::string, render::Model> models_;
+  std::map<std::string, render::Image> textures_;
+  std::map<std::string, sim::ConvexDecomposition> parts_;
+  std::vector<Decomposed> decomposed_;
+  std::string digest_;
+};
+
+/// All triangles of a model as one mesh for the simulation, scaled.
+sim::TriangleMesh collision_mesh(const render::Model& model, double scale);
+/// A model's convex parts as those of its scaled mesh.
+sim::ConvexDecomposition scaled(sim::ConvexDecomposition decomposition, double scale);
+
+/// XXH3-128 in hexadecimal of a text.
+std::string text_hash(const std::string& text);
+
+}  // namespace offstage::producer

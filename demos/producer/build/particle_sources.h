@@ -1,0 +1,82 @@
+#pragma once
+/// The emitters of a simulation at work, with all that is born from their particles: builds their systems,
+/// releases particles, and gives the points to draw.
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "effects/emitter.h"
+#include "effects/split.h"
+#include "effects/sub_emitter.h"
+#include "effects/trail.h"
+#include "producer/build/models.h"
+#include "producer/build/snapshot.h"
+#include "producer/scene/scene.h"
+#include "sim/world.h"
+
+namespace offstage::producer {
+
+/// Colour and size of a look, made ready for many particles.
+class LookRamps {
+ public:
+  LookRamps(const ParticleLook& look, uint64_t seed, const std::string& name);
+
+  /// How the particles look now. `places`: those of a group, which may have colours of their own.
+  PointSet points(const sim::ParticleArrays& particles, const std::vector<ParticlePlace>* places) const;
+
+ private:
+  effects::StartColor start_;
+  effects::RandomStream random_;
+  std::optional<effects::Ramp<effects::Rgba>> color_, glow_;
+  std::optional<effects::Ramp<float>> size_;
+};
+
+class ParticleSources {
+ public:
+  /// Finds the body of that name; null for an empty one.
+  using FindBody = std::function<sim::BodyHandle(const std::string&)>;
+
+  /// Throws SceneError for an emitter that cannot emit.
+  ParticleSources(const Scene& scene, const ModelLibrary& models, sim::World& world, const FindBody& body);
+
+  /// How long before time 0 the first particles are born [s].
+  Real prewarm() const;
+
+  /// To be called before each sub-step.
+  void emit(sim::World& world, Real start, Real end);
+
+  struct Counts {
+    uint64_t waiting = 0;  ///< particles that had to wait for room
+    uint64_t skipped = 0;  ///< not released because of a limit
+  };
+  Counts counts() const;
+
+  /// One set for each source, in the order of for_each_source() over the emitters.
+  void add_points(const sim::World& world, std::vector<PointSet>& sets) const;
+  /// The system of a source, by its full name; null if there is none.
+  sim::ParticleSystemHandle system(const std::string& name) const;
+
+ private:
+  struct System {
+    std::string name;
+    sim::ParticleSystemHandle handle;
+    LookRamps look;
+  };
+
+  void add(const Emitter& emitter, const ModelLibrary& models, sim::World& world, const FindBody& body,
+           uint64_t seed);
+
+  std::vector<System> systems_;
+  std::deque<effects::Emitter> emitters_;
+  std::deque<effects::Splitter> splitters_;
+  std::deque<effects::Trail> trails_;
+  std::deque<effects::SubEmitter> sub_emitters_;
+};
+
+/// The looks of a scene's point sets, in their order: groups, then sources.
+std::vector<const ParticleLook*> looks_of(const Scene& scene);
+
+}  // namespace offstage::producer

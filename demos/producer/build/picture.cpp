@@ -1,0 +1,358 @@
+#include "producer/build/picture.h"
+
+#include <algorithm>
+
+#include "effects/distribution.h"
+#include "producer/base/to_float.h"
+#include "producer/build/cloth_defs.h"
+#include "producer/build/lights.h"
+#include "producer/build/line_sketch.h"
+#include "producer/build/particle_sources.h"
+#include "producer/build/texts.h"
+#include "render/bloom.h"
+#include "render/primitives.h"
+#include "render/tone_map.h"
+
+namespace offstage::producer {
+namespace {
+
+using Eigen::Affine3f;
+using Eigen::Vector3f;
+
+/// Half the edge of the square that stands for an infinite plane [m]: from 300 m up, it still reaches to
+/// where its horizon hides it.
+constexpr float kGroundHalfSize = 256'000;
+constexpr float kGroundTexture_m = 2000;  // of one copy of its texture
+
+Affine3f affine(const Vec3& position, const Quat& orientation, Real scale = 1) {
+  return Eigen::Translation3f(position.cast<float>()) * orientation.cast<float>() *
+         Eigen::Scaling(to_float(scale));
+}
+
+/// The mesh of a primitive, and the numbers that tell it from others. Boxes get a small bevel, so that their
+/// edges catch light.
+render::Mesh mesh_of(const sim::Sphere& s) {
+  return render::make_sphere(to_float(s.radius));
+}
+render::Mesh mesh_of(const sim::Box& s) {
+  return render::make_box(s.size.cast<float>(), 0.04f * to_float(s.size.minCoeff()));
+}
+render::Mesh mesh_of(const sim::Capsule& s) {
+  return render::make_capsule(to_float(s.radius), to_float(s.height));
+}
+render::Mesh mesh_of(const sim::Cylinder& s) {
+  return render::make_cylinder(to_float(s.radius), to_float(s.height));
+}
+render::Mesh mesh_of(const sim::Cone& s) {
+  return render::make_cone(to_float(s.radius), to_float(s.height));
+}
+render::Mesh mesh_of(const sim::Plane&) {
+  render::Mesh ground = render::make_ground(kGroundHalfSize);
+  for (Eigen::Vector2f& uv : ground.uvs)
+    uv = (uv.array() - 0.5f) * (2 * kGroundHalfSize / kGroundTexture_m) + 0.5f;
+  return ground;
+}
+
+std::vector<float> shape_key(const sim::Sphere& s) {
+  return {0, to_float(s.radius)};
+}
+std::vector<float> shape_key(const sim::Box& s) {
+  return {1, to_float(s.size.x()), to_float(s.size.y()), to_float(s.size.z())};
+}
+std::vector<float> shape_key(const sim::Capsule& s) {
+  return {2, to_float(s.radius), to_float(s.height)};
+}
+std::vector<float> shape_key(const sim::Cylinder& s) {
+  return {3, to_float(s.radius), to_float(s.height)};
+}
+std::vector<float> shape_key(const sim::Cone& s) {
+  return {4, to_float(s.radius), to_float(s.height)};
+}
+std::vector<float> shape_key(const sim::Plane&) {
+  return {5};
+}
+
+/// The parts overlay of a body, or null.
+const PartsOverlay* parts_overlay(const Scene& scene, const std::string& body) {
+  for (const Overlay& overlay : scene.overlays)
+    if (const auto* parts = std::get_if<PartsOverlay>(&overlay); parts && parts->body == body) return parts;
+  return nullptr;
+}
+
+render::Mesh mesh_of(const sim::ConvexPolyhedron& part) {
+  const sim::TriangleMesh triangles = part.triangles();
+  render::Mesh mesh;
+  for (const Vec3& v : triangles.vertices) mesh.positions.push_back(v.cast<float>());
+  for (const sim::Triangle& t : triangles.triangles)
+    mesh.indices.insert(mesh.indices.end(), t.begin(), t.end());
+  render::compute_normals(mesh, 20);
+  return mesh;
+}
+
+std::string name_or(const std::string& name, const char* kind, uint32_t id) {
+  return name.empty() ? kind + (" " + std::to_string(id)) : name;
+}
+
+}  // namespace
+
+render::ObjectNames object_names(const Scene& scene) {
+  render::ObjectNames names;
+  uint32_t id = 0;
+  const auto add = [&](const std::string& name, const char* kind) {
+    ++id;
+    names[id] = name_or(name, kind, id);
+  };
+  for (const Body& body : scene.bodies) add(body.name, "body");
+  for (const Cloth& cloth : scene.cloths) add(cloth.name, "cloth");
+  for (const ParticleGroup& group : scene.particles) add(group.name, "particles");
+  for (const Emitter& emitter : scene.emitters)
+    for_each_source(emitter, [&](const ParticleSource&, const ParticleSource*, const std::string& name,
+                                 const Birth&) { add(name, "particles"); });
+  return names;
+}
+
+Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context& context)
+    : scene_(scene),
+      stage_(context, {.width_px = scene.render.size.x(),
+                       .height_px = scene.render.size.y(),
+                       .shadow_map_px = scene.render.shadow_map}),
+      camera_(scene, models) {
+  std::size_t slot = 0;
+  uint32_t object = 0;
+  for (const Body& body : scene.bodies) add_body(body, models, slot, ++object);
+  // In the order of Snapshot::rods.
+  const auto add_rod = [&](const auto& rod) {
+    rods_.push_back(rod.visible
+                        ? stage_.add_instance(stage_.add_mesh(render::make_cylinder(to_float(rod.radius), 1)),
+                                              material(rod.material, models))
+                        : render::InstanceHandle());
+  };
+  for (const Spring& spring : scene.springs) add_rod(spring);
+  for (const Joint& joint : scene.joints)
+    if (joint.behaviour.type == sim::JointType::distance) add_rod(joint);
+  for (const Cloth& cloth : scene.cloths) {
+    add_cloth(cloth, models);
+    ++object;
+    if (cloths_.back().cloth) stage_.set_object(cloths_.back().cloth, object);
+  }
+  for (const ParticleLook* look : looks_of(scene)) {
+    points_.push_back(stage_.add_points(points_def(*look)));
+    stage_.set_object(points_.back(), ++object);
+    styles_.push_back(points_def(*look).style);
+    smears_.push_back(add_smears(*look));
+  }
+  add_overlay_lines();
+  stage_.set_sun(sun_of(scene));
+  stage_.set_environment(environment_of(scene));
+}
+
+render::PointsHandle Picture::add_smears(const ParticleLook& look) {
+  render::PointsDef def = points_def(look);
+  if (def.style != render::PointStyle::sphere || subframe_time() == 0) return {};
+  def.style = render::PointStyle::streak;
+  def.stretch_s = subframe_time();
+  return stage_.add_points(def);
+}
+
+render::Material Picture::material_named(const std::string& name, const ModelLibrary& models,
+                                         std::vector<render::Image>& textures) const {
+  render::Material m;
+  const auto it = std::ranges::find(scene_.materials, name, &Material::name);
+  if (it != scene_.materials.end()) {
+    m = {.name = it->name,
+         .color = it->color.rgba,
+         .metallic = to_float(it->metallic),
+         .roughness = to_float(it->roughness),
+         .emission = it->emission.rgb() * to_float(it->emission_strength),
+         .transmission = to_float(it->transmission),
+         .refraction = to_float(it->refraction),
+         .pattern = it->pattern,
+         .pattern_color = it->pattern_color.rgb(),
+         .pattern_scale = to_float(it->pattern_scale),
+         .two_sided = it->two_sided};
+    if (!it->texture.empty()) {
+      textures.push_back(models.texture(it->texture));
+      m.base_color_texture = 0;
+    }
+  }
+  return m;
+}
+
+render::MaterialHandle Picture::material(const std::string& name, const ModelLibrary& models) {
+  if (const auto it = materials_.find(name); it != materials_.end()) return it->second;
+  std::vector<render::Image> textures;
+  const render::Material m = material_named(name, models, textures);
+  return materials_[name] = stage_.add_material(m, textures);
+}
+
+render::MaterialHandle Picture::cloth_material(const Cloth& cloth, const ModelLibrary& models) {
+  render::MaterialHandle& known = fabrics_[cloth.fabric + "/" + cloth.material];
+  if (known) return known;
+  render::Material m = fabric_look(cloth.fabric);
+  std::vector<render::Image> textures;
+  if (const auto it = std::ranges::find(scene_.materials, cloth.material, &Material::name);
+      it != scene_.materials.end()) {
+    render::Fabric fabric = m.fabric;
+    fabric.back_color.reset();  // that of another front
+    if (const std::optional<FabricLook>& look = it->fabric) {
+      fabric = {.weave = look->weave,
+                .thread = to_float(look->thread),
+                .relief = to_float(look->relief),
+                .sheen = to_float(look->sheen),
+                .sheen_color = look->sheen_color.rgb(),
+                .translucency = to_float(look->translucency)};
+      if (look->back_color) fabric.back_color = look->back_color->rgb();
+    }
+    m = material_named(cloth.material, models, textures);
+    m.fabric = fabric;
+  }
+  return known = stage_.add_material(m, textures);
+}
+
+void Picture::add_cloth(const Cloth& cloth, const ModelLibrary& models) {
+  DrawnCloth drawn;
+  if (cloth.visible) {
+    const auto* mesh = std::get_if<MeshFile>(&cloth.shape);
+    FlatCloth flat = flat_cloth(cloth, mesh ? &models.model(mesh->file) : nullptr);
+    drawn.triangles = flat.triangles();
+    drawn.uvs = std::move(flat.uvs);
+    Eigen::AlignedBox2f box;
+    for (const Eigen::Vector2f& uv : drawn.uvs) box.extend(uv);
+    drawn.cloth = stage_.add_cloth({.triangles = drawn.triangles,
+                                    .uvs = drawn.uvs,
+                                    .thickness = to_float(flat.def.thickness),
+                                    .texture_size = box.sizes().cwiseMax(1e-6f),
+                                    .casts_shadow = cloth.casts_shadow},
+                                   cloth_material(cloth, models));
+  }
+  cloths_.push_back(std::move(drawn));
+}
+
+void Picture::add_model(const std::string& file, const Affine3f& body_from_model, const Body& body,
+                        const ModelLibrary& models, std::vector<DrawnPart>& parts) {
+  const render::Model& model = models.model(file);
+  const auto [it, is_new] = models_.try_emplace(file);
+  auto& [meshes, own_materials] = it->second;
+  if (is_new) {
+    for (const render::Model::Part& part : model.parts) meshes.push_back(stage_.add_mesh(part.mesh));
+    for (const render::Material& m : model.materials)
+      own_materials.push_back(stage_.add_material(m, model.textures));
+  }
+  for (std::size_t i = 0; i < model.parts.size(); ++i) {
+    const auto look = body.material.empty() && !own_materials.empty()
+                          ? own_materials[static_cast<std::size_t>(model.parts[i].material)]
+                          : material(body.material, models);
+    parts.push_back({stage_.add_instance(meshes[i], look, body.casts_shadow), body_from_model});
+  }
+}
+
+template <class Primitive>
+render::MeshHandle Picture::primitive(const Primitive& shape) {
+  render::MeshHandle& mesh = primitives_[shape_key(shape)];
+  if (!mesh) mesh = stage_.add_mesh(mesh_of(shape));
+  return mesh;
+}
+
+void Picture::add_shape(const Body& body, const ModelLibrary& models, std::vector<DrawnPart>& parts) {
+  std::visit(
+      [&](const auto& shape) {
+        using S = std::decay_t<decltype(shape)>;
+        if constexpr (std::is_same_v<S, MeshFile>) {
+          add_model(shape.file, affine(Vec3::Zero(), Quat::Identity(), shape.scale), body, models, parts);
+        } else {
+          // A plane is the ground: it takes shadows and throws none.
+          const bool casts = body.casts_shadow && !std::is_same_v<S, sim::Plane>;
+          parts.push_back({stage_.add_instance(primitive(shape), material(body.material, models), casts),
+                           Affine3f::Identity()});
+        }
+      },
+      body.shape);
+}
+
+void Picture::add_convex_parts(const MeshFile& mesh, const Body& body, const ModelLibrary& models,
+                               std::vector<DrawnPart>& parts) {
+  const std::vector<sim::ConvexPolyhedron>& convex = models.parts(mesh.file)->parts;
+  sim::Aabb box;
+  for (const sim::ConvexPolyhedron& part : convex) box.extend(part.box());
+  for (std::size_t i = 0; i < convex.size(); ++i) {
+    render::Material look{.roughness = 0.45f};
+    look.color.head<3>() = distinct_color(i);
+    const Vec3 outwards = mesh.scale * (convex[i].centre() - box.center());
+    parts.push_back({stage_.add_instance(stage_.add_mesh(mesh_of(convex[i])), stage_.add_material(look),
+                                         body.casts_shadow),
+                     affine(Vec3::Zero(), Quat::Identity(), mesh.scale), outwards.cast<float>()});
+  }
+}
+
+void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t& slot, uint32_t object) {
+  DrawnBody drawn{{}, affine(body.position, body.orientation), parts_overlay(scene_, body.name), {}};
+  if (drawn.overlay)
+    add_convex_parts(std::get<MeshFile>(body.shape), body, models, drawn.parts);
+  else if (body.visible && body.model)
+    add_model(body.model->file, affine(body.model->position, body.model->orientation, body.model->scale),
+              body, models, drawn.parts);
+  else if (body.visible)
+    add_shape(body, models, drawn.parts);
+
+  for (const DrawnPart& part : drawn.parts) stage_.set_object(part.instance, object);
+  place_body(drawn, drawn.world_from_body, 0);
+  if (body.motion == sim::MotionType::fixed)
+    places_.add_fixed(body.name, drawn.world_from_body);
+  else
+    places_.add_moving(body.name, *(drawn.slot = slot++));
+  if (drawn.slot || drawn.overlay) bodies_.push_back(std::move(drawn));
+}
+
+void Picture::add_overlay_lines() {
+  for (const Overlay& overlay : scene_.overlays) {
+    overlays_.push_back(std::visit(
+        [&]<class O>(const O& o) {
+          if constexpr (std::is_base_of_v<LineLook, O>)
+            return stage_.add_lines({.width = to_float(o.width), .hidden = to_float(o.hidden)});
+          else
+            return render::LinesHandle();
+        },
+        overlay));
+  }
+}
+
+float Picture::exposure(double time, float sample_weight) const {
+  const float factor = to_float(effects::mean(scene_.render.exposure, time));
+  return scene_.render.metering == Metering::fixed ? factor
+                                                   : factor * render::metered_exposure(sum_, sample_weight);
+}
+
+render::Channels Picture::channels(const Snapshot& previous, const Snapshot& current) {
+  const double frame_time = &previous == &current ? 0 : scene_.output.fps.seconds(1);
+  place(previous, previous, 1, frame_time);
+  stage_.remember();
+  place(previous, current, 1, frame_time);
+  return stage_.channels(to_float(frame_time));
+}
+
+render::Image Picture::draw(const Snapshot& previous, const Snapshot& current,
+                            const std::function<bool()>& stop) {
+  const int n = subframes(scene_.render.quality);
+  const double frame_time = scene_.output.fps.seconds(1);
+  std::ranges::fill(sum_.rgba, 0.f);
+  for (int i = 0; i < n; ++i) {
+    if (i > 0 && stop && stop()) return {};
+    // Sub-frames sit in the middle of equal parts of the time the shutter is open, which ends with the frame.
+    const float open =
+        to_float(scene_.render.shutter) * (1 - (static_cast<float>(i) + 0.5f) / static_cast<float>(n));
+    const float w = n == 1 || &previous == &current ? 1 : 1 - open;
+    place(previous, current, w, frame_time);
+    stage_.draw(render::sample_offsets(i, n), sum_);
+  }
+  const float weight = 1 / static_cast<float>(n), exposed = exposure(current.time, weight);
+  if (scene_.render.bloom > 0)
+    render::add_bloom(
+        sum_, {.strength = to_float(scene_.render.bloom), .exposure = exposed, .sample_weight = weight});
+  render::Image image = render::tone_map(
+      sum_, {.curve = scene_.render.tone_curve, .exposure = exposed, .sample_weight = weight});
+  if (n == 1) render::filter_edges(image);
+  write_texts(scene_, current, image);
+  return image;
+}
+
+}  // namespace offstage::producer

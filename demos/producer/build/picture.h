@@ -1,0 +1,117 @@
+#pragma once
+/// The drawing side of a scene: builds a stage and turns pairs of snapshots into finished frames. Between the
+/// two states of a pair it interpolates (slerp for bodies, cubic for particles and cloths), so that
+/// sub-frames at different times give motion blur.
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "producer/build/body_places.h"
+#include "producer/build/camera.h"
+#include "producer/build/models.h"
+#include "producer/build/snapshot.h"
+#include "producer/scene/scene.h"
+#include "render/channels.h"
+#include "render/image.h"
+#include "render/stage.h"
+
+namespace offstage::producer {
+
+/// What the ids of Channels stand for: bodies, cloths, particles, in scene order from 1.
+render::ObjectNames object_names(const Scene& scene);
+
+class Picture {
+ public:
+  /// The context must be current on this thread and outlive the picture.
+  Picture(const Scene& scene, const ModelLibrary& models, render::Context& context);
+
+  /// The frame at `current`; the shutter is open during the end of the interval from `previous`, the frame
+  /// before it (or the same snapshot for the first frame, which has no motion blur). The camera is that of
+  /// the scene as it is now. If `stop` says so between two sub-frames, the image has no pixels.
+  render::Image draw(const Snapshot& previous, const Snapshot& current,
+                     const std::function<bool()>& stop = {});
+  /// The camera of the latest picture.
+  const render::Camera& camera() const { return latest_camera_; }
+
+  /// Depth, normals, ids and motion at `current`; motion since `previous`, both as for `draw`.
+  render::Channels channels(const Snapshot& previous, const Snapshot& current);
+
+ private:
+  struct DrawnPart {
+    render::InstanceHandle instance;
+    Eigen::Affine3f body_from_part;
+    Eigen::Vector3f outwards =
+        Eigen::Vector3f::Zero();  // where an explosion of 1 moves it, in the body's frame
+  };
+  struct DrawnBody {
+    std::optional<std::size_t> slot;  // in Snapshot::bodies; none: it never moves
+    Eigen::Affine3f world_from_body;  // at time 0
+    const PartsOverlay* overlay;      // it is drawn as convex parts; or null
+    std::vector<DrawnPart> parts;
+  };
+
+  /// A cloth, its places along the flat one, and which triangles the stage has of it.
+  struct DrawnCloth {
+    render::ClothHandle cloth;  // null where invisible
+    std::vector<uint32_t> triangles;
+    std::vector<Eigen::Vector2f> uvs;
+    uint32_t version = 0;
+  };
+
+  render::Material material_named(const std::string& name, const ModelLibrary& models,
+                                  std::vector<render::Image>& textures) const;
+  render::MaterialHandle material(const std::string& name, const ModelLibrary& models);
+  void add_body(const Body& body, const ModelLibrary& models, std::size_t& slot, uint32_t object);
+  void add_model(const std::string& file, const Eigen::Affine3f& body_from_model, const Body& body,
+                 const ModelLibrary& models, std::vector<DrawnPart>& parts);
+  void add_shape(const Body& body, const ModelLibrary& models, std::vector<DrawnPart>& parts);
+  void add_convex_parts(const MeshFile& mesh, const Body& body, const ModelLibrary& models,
+                        std::vector<DrawnPart>& parts);
+  template <class Primitive>
+  render::MeshHandle primitive(const Primitive& shape);
+  void add_cloth(const Cloth& cloth, const ModelLibrary& models);
+  render::MaterialHandle cloth_material(const Cloth& cloth, const ModelLibrary& models);
+  render::PointsHandle add_smears(const ParticleLook& look);
+  void add_overlay_lines();
+
+  void place(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
+  void place_body(const DrawnBody& body, const Eigen::Affine3f& world_from_body, double time);
+  void place_rods(const Snapshot& previous, const Snapshot& current, float w);
+  void place_points(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
+  /// Between two sub-frames; 0 if there is one alone [s].
+  float subframe_time() const;
+  void set_balls(std::size_t set, std::span<const render::Point> balls);
+  void place_cloths(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
+  void give_mesh(DrawnCloth& drawn, const ClothSample& sample);
+  void place_overlays(const Snapshot& previous, const Snapshot& current, float w);
+  float exposure(double time, float sample_weight) const;
+
+  const Scene& scene_;
+  render::Stage stage_;
+  std::map<std::string, render::MaterialHandle> materials_;
+  std::map<std::string, std::pair<std::vector<render::MeshHandle>, std::vector<render::MaterialHandle>>>
+      models_;
+  std::map<std::vector<float>, render::MeshHandle> primitives_;  // by kind and sizes
+  BodyPlaces places_;
+  CameraRig camera_;
+  render::Camera latest_camera_;
+  std::vector<DrawnBody> bodies_;
+  std::vector<render::InstanceHandle> rods_;  // null where invisible
+  std::vector<render::PointsHandle> points_;
+  std::vector<render::PointStyle> styles_;  // of the same
+  std::vector<render::PointsHandle>
+      smears_;  // motion blur of balls that move too far in a sub-frame; or null
+  std::map<std::string, render::MaterialHandle> fabrics_;  // by fabric and material
+  std::vector<DrawnCloth> cloths_;
+  std::vector<render::LinesHandle> overlays_;  // null for those without lines
+  std::vector<render::Point> scratch_, scratch_smears_;
+  std::vector<Eigen::Vector3f> scratch_places_;
+  std::vector<render::Line> scratch_lines_;
+  render::HdrImage sum_;
+};
+
+}  // namespace offstage::producer

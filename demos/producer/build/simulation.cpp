@@ -1,0 +1,425 @@
+#include "producer/build/simulation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "producer/build/articulation_defs.h"
+#include "producer/build/cloth_defs.h"
+#include "producer/build/emitter_defs.h"
+#include "producer/build/force_defs.h"
+
+namespace offstage::producer {
+namespace {
+
+const Material* find_material(const Scene& scene, const std::string& name) {
+  const auto it = std::ranges::find(scene.materials, name, &Material::name);
+  return it == scene.materials.end() ? nullptr : &*it;
+}
+
+sim::KeyframeTrack track_of(const Body& body) {
+  sim::KeyframeTrack track{
+      .keys = {}, .interpolation = body.interpolation, .loop = body.loop, .spin = body.spin};
+  for (const BodyKey& key : body.keyframes)
+    track.keys.push_back({key.time,
+                          {key.position.value_or(body.position), key.orientation.value_or(body.orientation)},
+                          key.interpolation});
+  return track;
+}
+
+/// Runs `add`, turning the simulation's refusal into a problem at the place in the scene.
+template <class F>
+auto at_place(const Where& where, F&& add) {
+  try {
+    return add();
+  } catch (const std::invalid_argument& error) {
+    throw SceneError(where, error.what());
+  }
+}
+
+std::size_t index_of(const sim::ParticleArrays& particles, uint64_t id) {
+  const auto it = std::ranges::lower_bound(particles.id, id);
+  return it != particles.id.end() && *it == id ? static_cast<std::size_t>(it - particles.id.begin())
+                                               : particles.size();
+}
+
+ClothSample cloth_sample(const sim::ClothView& view) {
+  ClothSample sample;
+  for (const Vec3& p : view.points) sample.points.push_back(p.cast<float>());
+  for (const Vec3& v : view.velocities) sample.velocities.push_back(v.cast<float>());
+  sample.version = view.version;
+  if (view.version == 0) return sample;
+  for (const sim::Triangle& t : view.triangles)
+    sample.triangles.insert(sample.triangles.end(), t.begin(), t.end());
+  sample.sources.assign(view.sources.begin(), view.sources.end());
+  return sample;
+}
+
+nlohmann::ordered_json stats_json(const Vec3& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+}  // namespace
+
+void SimulationTotals::add(const sim::StepReport& report) {
+  substeps += report.substeps;
+  born += report.particles_born;
+  expired += report.particles_expired;
+  retired += report.particles_retired;
+  ejected += report.particles_ejected;
+  removed += report.particles_removed;
+  particle_collisions += report.particle_collisions;
+  truncated += report.truncated_sweeps;
+  bodies_awake = report.bodies_awake;
+  bodies_asleep = report.bodies_asleep;
+  islands = report.islands;
+  penetration = std::max(penetration, report.penetration);
+  collisions += report.collisions;
+  tracebacks += report.tracebacks;
+  toi_limit_reached += report.toi_limit_reached;
+  restitution_suppressed += report.restitution_suppressed;
+  speculative_contacts += report.speculative_contacts;
+  bodies_woken += report.bodies_woken;
+  bodies_put_to_sleep += report.bodies_put_to_sleep;
+  joint_error = std::max(joint_error, report.joint_error);
+  joints_unsolved += report.joints_unsolved;
+  cloth_strain = std::max(cloth_strain, report.cloth_strain);
+  cloth_penetration = std::max(cloth_penetration, report.cloth_penetration);
+  cloth_contacts = report.cloth_contacts;
+  cloth_self_contacts = report.cloth_self_contacts;
+  cloth_springs_clamped = report.cloth_springs_clamped;
+  cloth_moves_limited += report.cloth_moves_limited;
+  cloth_moves_held_back += report.cloth_moves_held_back;
+  cloth_crossings += report.cloth_crossings;
+  cloth_springs_torn += report.cloth_springs_torn;
+  cloth_unconverged += report.cloth_unconverged;
+  exact.add(report.exact);
+  fast.add(report.fast);
+  impacts.add(report.impacts);
+  integration.add(report.integration);
+}
+
+Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
+    : scene_(scene),
+      world_({.gravity = scene.world.gravity,
+              .wind = scene.world.wind,
+              .max_step = scene.world.step,
+              .integrator = scene.world.integrator,
+              .integration_error = scene.world.integration_error,
+              .solver = scene.world.solver,
+              .impact = scene.world.impact,
+              .collision_speed = scene.world.collision_speed,
+              .sleep = scene.world.sleep,
+              .bounds = sim::Aabb(Vec3::Constant(-scene.world.bounds), Vec3::Constant(scene.world.bounds))}) {
+  add_bodies(scene, models);
+  for (const ContactRule& rule : scene.contacts)
+    at_place(rule.where, [&] {
+      world_.add_contact_rule({.a = rule.materials[0],
+                               .b = rule.materials[1],
+                               .restitution = rule.restitution,
+                               .friction = rule.friction,
+                               .static_friction = rule.static_friction});
+    });
+  add_particle_groups(scene);
+  add_springs(scene);
+  add_joints(scene);
+  add_cloths(scene, models);
+  sources_.emplace(scene, models, world_, [this](const std::string& name) { return body_named(name); });
+  add_forces(scene);
+  std::map<std::string, sim::ClothHandle> cloths;
+  for (const auto& [name, handle] : cloths_) cloths.emplace(name, handle);
+  overlays_.emplace(scene, world_, bodies_, cloths);
+  prewarm_pieces_ = static_cast<int>(std::ceil(sources_->prewarm() * scene.output.fps.per_second()));
+  // Particles released at time 0 exist at time 0.
+  if (prewarm_pieces_ == 0) prewarm(0, 0);
+}
+
+void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
+  std::map<std::pair<std::string, Real>, sim::MeshHandle> meshes;
+  for (const Body& body : scene.bodies) {
+    sim::BodyDef def{.name = body.name,
+                     .motion = body.motion,
+                     .pose = {body.position, body.orientation},
+                     .velocity = body.velocity,
+                     .angular_velocity = body.angular_velocity,
+                     .density = body.density,
+                     .mass = body.mass,
+                     .linear_drag = body.linear_drag,
+                     .angular_drag = body.angular_drag,
+                     .material = body.material,
+                     .surface_velocity = body.surface_velocity,
+                     .collides = body.collides,
+                     .track = track_of(body)};
+    if (const Material* material = find_material(scene, body.material)) {
+      def.restitution = material->restitution;
+      def.friction = material->friction;
+      def.static_friction = material->static_friction.value_or(def.static_friction);
+      if (material->cross_friction && !body.friction_axis.isZero(0)) {
+        def.cross_friction = *material->cross_friction;
+        def.friction_axis = body.friction_axis;
+      }
+    }
+    const sim::BodyHandle handle = at_place(body.where, [&] {
+      std::visit(
+          [&](const auto& shape) {
+            if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, MeshFile>) {
+              sim::MeshHandle& mesh = meshes[{shape.file, shape.scale}];
+              if (!mesh) mesh = add_mesh(shape, models);
+              def.shape = sim::MeshShape{mesh};
+            } else {
+              def.shape = shape;
+            }
+          },
+          body.shape);
+      return world_.add_body(def);
+    });
+    bodies_[body.name] = handle;
+    if (body.motion == sim::MotionType::fixed) continue;
+    slot_of_[handle] = moving_.size();
+    moving_.push_back({body.name, handle});
+    moving_poses_.push_back(world_.body(handle).pose);
+  }
+}
+
+sim::MeshHandle Simulation::add_mesh(const MeshFile& file, const ModelLibrary& models) {
+  const sim::ConvexDecomposition* parts = models.parts(file.file);
+  return world_.add_mesh(collision_mesh(models.model(file.file), file.scale),
+                         parts ? std::optional(scaled(*parts, file.scale)) : std::nullopt);
+}
+
+void Simulation::add_particle_groups(const Scene& scene) {
+  for (const ParticleGroup& group : scene.particles) {
+    const auto system = world_.add_particle_system(system_def(group.name, group.behaviour));
+    for (const ParticlePlace& place : group.places)
+      world_.add_particle(system, {.position = place.position,
+                                   .velocity = place.velocity,
+                                   .mass = group.mass,
+                                   .radius = group.radius,
+                                   .restitution = group.restitution,
+                                   .friction = group.friction,
+                                   .charge = group.charge});
+    groups_.push_back({group.name, system});
+    group_looks_.emplace_back(group.look, scene.world.seed, group.name);
+  }
+}
+
+void Simulation::add_springs(const Scene& scene) {
+  const auto attachment = [&](const SpringEnd& end) -> sim::Attachment {
+    if (!end.body.empty()) return sim::BodyPoint{body_named(end.body), end.position};
+    if (!end.particles.empty()) {
+      const auto group = std::ranges::find(groups_, end.particles, &NamedGroup::name);
+      return sim::ParticlePoint{group->handle,
+                                world_.particles(group->handle).id[static_cast<std::size_t>(end.index)]};
+    }
+    return sim::WorldPoint{end.position};
+  };
+  for (const Spring& spring : scene.springs) {
+    springs_.push_back({.name = spring.name,
+                        .a = attachment(spring.a),
+                        .b = attachment(spring.b),
+                        .stiffness = spring.stiffness,
+                        .damping = spring.damping,
+                        .rest_length = spring.rest_length});
+    at_place(spring.where, [&] { world_.add_spring(springs_.back()); });
+  }
+}
+
+void Simulation::add_joints(const Scene& scene) {
+  for (const Joint& joint : scene.joints) {
+    sim::JointDef def = joint_def(joint);
+    def.a = body_named(joint.a);
+    def.b = body_named(joint.b);
+    at_place(joint.where, [&] {
+      const sim::JointHandle handle = world_.add_joint(def);
+      if (def.type == sim::JointType::distance) rods_.push_back(handle);
+    });
+  }
+}
+
+void Simulation::add_cloths(const Scene& scene, const ModelLibrary& models) {
+  for (const Cloth& cloth : scene.cloths) {
+    const auto* mesh = std::get_if<MeshFile>(&cloth.shape);
+    FlatCloth flat =
+        at_place(cloth.where, [&] { return flat_cloth(cloth, mesh ? &models.model(mesh->file) : nullptr); });
+    for (const ClothPin& pin : cloth.pins) {
+      const PinScope& scope = scope_of(pin);
+      const std::vector<uint32_t> held =
+          at_place(scope.where, [&] { return pinned_vertices(pin, cloth, flat); });
+      if (held.empty()) throw SceneError(scope.where, "holds no vertex of the cloth");
+      const sim::BodyHandle body = body_named(scope.body);
+      for (const uint32_t vertex : held) {
+        const Vec3& p = flat.def.vertices[vertex];
+        flat.def.pins.push_back({.vertex = vertex,
+                                 .body = body,
+                                 .position = body ? world_.body(body).pose.point_to_body(p) : p,
+                                 .until = scope.until});
+      }
+    }
+    if (const auto what = too_stiff(scene, flat.def)) throw SceneError(cloth.where, *what);
+    at_place(cloth.where, [&] { cloths_.push_back({cloth.name, world_.add_cloth(flat.def)}); });
+  }
+}
+
+void Simulation::add_forces(const Scene& scene) {
+  for (const Force& force : scene.forces) {
+    sim::ForceDef def = force_def(force);
+    const ForceTargets targets = targets_of(force);
+    for (const std::string& name : targets.bodies) def.bodies.push_back(body_named(name));
+    for (const std::string& name : targets.particles) def.systems.push_back(system_named(name));
+    for (const std::string& name : targets.cloths)
+      def.cloths.push_back(std::ranges::find(cloths_, name, &NamedCloth::name)->handle);
+    at_place(named(force).where, [&] { world_.add_force(def); });
+  }
+}
+
+sim::ParticleSystemHandle Simulation::system_named(const std::string& name) const {
+  const auto group = std::ranges::find(groups_, name, &NamedGroup::name);
+  return group == groups_.end() ? sources_->system(name) : group->handle;
+}
+
+sim::BodyHandle Simulation::body_named(const std::string& name) const {
+  const auto it = bodies_.find(name);
+  return it == bodies_.end() ? sim::BodyHandle{} : it->second;
+}
+
+void Simulation::prewarm(double from, double to) {
+  note(world_.prewarm(from, to, [&](Real start, Real end) { sources_->emit(world_, start, end); }));
+}
+
+SimulationTotals Simulation::totals() const {
+  constexpr Real kRounding = 1e-9;
+  SimulationTotals all = totals_;
+  all.step_s = scene_.world.step;
+  for (const sim::BodyOverlap& overlap : world_.overlaps(kRounding))
+    all.penetration = std::max(all.penetration, overlap.depth);
+  return all;
+}
+
+void Simulation::step(double sampling_time) {
+  const sim::StepReport report = world_.step(sampling_time, [&](Real start, Real end) {
+    if (on_substep_) on_substep_(start);
+    overlays_->record(world_);
+    sources_->emit(world_, start, end);
+  });
+  for (const sim::MovedBody& moved : world_.moved()) moving_poses_[slot_of_.at(moved.body)] = moved.pose;
+  note(report);
+}
+
+void Simulation::note(const sim::StepReport& report) {
+  totals_.add(report);
+  totals_.contacts = world_.contacts().size();
+  totals_.most_contacts = std::max(totals_.most_contacts, totals_.contacts);
+  const ParticleSources::Counts counts = sources_->counts();
+  totals_.waiting = counts.waiting;
+  totals_.skipped = counts.skipped;
+  for (const sim::JointHandle broken : report.joints_broken)
+    totals_.broken_joints.push_back(world_.joint_def(broken).name);
+  for (const sim::BodyHandle lost : report.bodies_retired)
+    totals_.lost_bodies.push_back(world_.body_def(lost).name);
+  for (const sim::RoughContact& rough : report.rough_contacts) {
+    if (totals_.rough_bodies.empty()) totals_.first_rough_s = world_.time();
+    const sim::BodyDef &a = world_.body_def(rough.a), &b = world_.body_def(rough.b);
+    ++totals_.rough_bodies[a.motion == sim::MotionType::dynamic ? a.name : b.name];
+  }
+
+  if (!report.finite)
+    throw DivergedError(
+        fmt::format("the simulation diverged at {:.4f} s: '{}' is no longer finite; use a smaller "
+                    "world.step or weaker forces",
+                    world_.time(), report.non_finite.object),
+        state_dump(report.non_finite));
+}
+
+int Simulation::skipped_pieces() const {
+  return static_cast<int>(std::ceil(scene_.output.start * scene_.output.fps.per_second()));
+}
+
+void Simulation::advance() {
+  // What comes before frame 1 is stepped in frame-sized pieces too, so that a caller can stop in between.
+  if (prewarmed_pieces_ < prewarm_pieces_) {
+    const double piece = sources_->prewarm() / prewarm_pieces_;
+    const int left = prewarm_pieces_ - ++prewarmed_pieces_;
+    return prewarm(-piece * (left + 1), -piece * left);
+  }
+  const int pieces = skipped_pieces();
+  if (skipped_pieces_ < pieces) {
+    step(scene_.output.start / pieces);
+    ++skipped_pieces_;
+    return;
+  }
+  if (frame_ > 0) step(scene_.output.fps.seconds(1));
+  ++frame_;
+}
+
+Snapshot Simulation::snapshot() const {
+  Snapshot snapshot;
+  snapshot.frame = frame_;
+  snapshot.time = scene_.output.time_of(frame_);
+  for (const sim::Pose& pose : moving_poses_)
+    snapshot.bodies.push_back({pose.position.cast<float>(), pose.orientation.cast<float>()});
+
+  const auto end_point = [&](const sim::Attachment& attachment) -> Eigen::Vector3f {
+    if (const auto* body = std::get_if<sim::BodyPoint>(&attachment))
+      return world_.body(body->body).pose.point_to_world(body->position).cast<float>();
+    if (const auto* particle = std::get_if<sim::ParticlePoint>(&attachment)) {
+      const sim::ParticleArrays& particles = world_.particles(particle->system);
+      const std::size_t i = index_of(particles, particle->id);
+      return i < particles.size()
+                 ? Eigen::Vector3f(particles.position[i].cast<float>())
+                 : Eigen::Vector3f(Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
+    }
+    return std::get<sim::WorldPoint>(attachment).position.cast<float>();
+  };
+  for (const sim::SpringDef& spring : springs_)
+    snapshot.rods.push_back({end_point(spring.a), end_point(spring.b)});
+  for (const sim::JointHandle rod : rods_) {
+    const sim::JointState state = world_.joint(rod);
+    const Eigen::Vector3f a = state.anchor_a.cast<float>();
+    snapshot.rods.push_back({a, state.broken ? a : Eigen::Vector3f(state.anchor_b.cast<float>())});
+  }
+
+  for (std::size_t i = 0; i < groups_.size(); ++i)
+    snapshot.point_sets.push_back(
+        group_looks_[i].points(world_.particles(groups_[i].handle), &scene_.particles[i].places));
+  sources_->add_points(world_, snapshot.point_sets);
+  for (const NamedCloth& cloth : cloths_) snapshot.cloths.push_back(cloth_sample(world_.cloth(cloth.handle)));
+  snapshot.overlays = overlays_->lines(world_);
+  snapshot.state_hash = world_.state_hash();
+  return snapshot;
+}
+
+std::string Simulation::state_dump(const sim::NonFinite& lost) const {
+  // Numbers that are not finite have no form in JSON, hence text.
+  const auto text = [](const Vec3& v) { return fmt::format("{} {} {}", v.x(), v.y(), v.z()); };
+  nlohmann::ordered_json dump;
+  dump["time"] = world_.time();
+  dump["frame"] = frame_;
+  dump["not_finite"] = {{"object", lost.object},
+                        {"particle", lost.particle},
+                        {"position_before", text(lost.position_before)},
+                        {"velocity_before", text(lost.velocity_before)},
+                        {"position", text(lost.position)},
+                        {"velocity", text(lost.velocity)}};
+  auto& bodies = dump["bodies"] = nlohmann::ordered_json::array();
+  for (const NamedBody& body : moving_) {
+    const sim::BodyState s = world_.body(body.handle);
+    bodies.push_back(
+        {{"name", body.name},
+         {"position", stats_json(s.pose.position)},
+         {"orientation",
+          {s.pose.orientation.w(), s.pose.orientation.x(), s.pose.orientation.y(), s.pose.orientation.z()}},
+         {"velocity", stats_json(s.velocity)},
+         {"angular_velocity", stats_json(s.angular_velocity)}});
+  }
+  auto& systems = dump["particles"] = nlohmann::ordered_json::array();
+  world_.for_each_particle_system([&](sim::ParticleSystemHandle handle) {
+    const sim::ParticleArrays& p = world_.particles(handle);
+    systems.push_back({{"name", world_.particle_system_def(handle).name}, {"count", p.size()}});
+  });
+  return dump.dump(2) + "\n";
+}
+
+}  // namespace offstage::producer

@@ -1,0 +1,142 @@
+#pragma once
+/// The simulation side of a scene: builds the world and its emitters, advances them frame by frame, and takes
+/// the snapshots that the drawing needs. The order of bodies, springs and point sets in a snapshot is that of
+/// the scene; picture.h relies on it.
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "producer/build/models.h"
+#include "producer/build/overlays.h"
+#include "producer/build/particle_sources.h"
+#include "producer/build/snapshot.h"
+#include "producer/scene/scene.h"
+#include "sim/world.h"
+
+namespace offstage::producer {
+
+/// The physics cannot go on: something became non-finite. Carries the state as JSON text, to be saved.
+class DivergedError : public std::runtime_error {
+ public:
+  DivergedError(const std::string& what, std::string state)
+      : std::runtime_error(what), state_(std::move(state)) {}
+  const std::string& state() const { return state_; }
+
+ private:
+  std::string state_;
+};
+
+/// What the step reports of a run come to.
+struct SimulationTotals {
+  uint64_t substeps = 0, born = 0, expired = 0, retired = 0, ejected = 0, removed = 0,
+           particle_collisions = 0, truncated = 0;
+  uint64_t waiting = 0, skipped = 0;       ///< of the emitters
+  std::vector<std::string> broken_joints;  ///< in the order in which they broke
+  sim::Real joint_error = 0;               ///< greatest that was left of a constraint [m], [rad]
+  uint64_t joints_unsolved = 0;            ///< times that joints could not be put back together
+  std::vector<std::string> lost_bodies;    ///< left the world's bounds and were frozen there
+
+  uint32_t bodies_awake = 0, bodies_asleep = 0, islands = 0;  ///< at the end
+  std::size_t contacts = 0;                                   ///< points where bodies touch, at the end
+  std::size_t most_contacts = 0;                              ///< at the end of a frame
+  sim::Real penetration = 0;                                  ///< greatest of the run and at its end [m]
+  uint64_t collisions = 0, tracebacks = 0, toi_limit_reached = 0, restitution_suppressed = 0,
+           speculative_contacts = 0;
+  uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
+
+  // Of cloths: greatest of the run, at its end, and sums.
+  sim::Real cloth_strain = 0, cloth_penetration = 0;
+  uint64_t cloth_contacts = 0, cloth_self_contacts = 0, cloth_springs_clamped = 0;
+  uint64_t cloth_moves_limited = 0, cloth_moves_held_back = 0, cloth_crossings = 0, cloth_springs_torn = 0,
+           cloth_unconverged = 0;
+  sim::ContactWork exact, fast, impacts;
+  /// Bodies with approximate contact forces, and how often a solver had to fall back on them.
+  std::map<std::string, uint64_t> rough_bodies;
+  double first_rough_s = 0;  ///< the first time that one did [s]
+  double step_s = 0;         ///< longest internal step [s]
+  sim::IntegratorReport integration;
+
+  void add(const sim::StepReport& report);
+};
+
+class Simulation {
+ public:
+  /// Throws SceneError for what only building shows: an open mesh as a dynamic body, an emitter that cannot
+  /// emit.
+  Simulation(const Scene& scene, const ModelLibrary& models);
+
+  /// Called at the start of every internal step, with its time, if set: for traces.
+  void on_substep(std::function<void(double time)> callback) { on_substep_ = std::move(callback); }
+
+  /// Advances by one frame. Prewarming and what `output.start` skips take several calls, during which frame()
+  /// is 0. Throws DivergedError.
+  void advance();
+  int frame() const { return frame_; }
+  /// How many calls of advance() it takes from the beginning to a frame.
+  int advances_to(int frame) const { return prewarm_pieces_ + skipped_pieces() + frame; }
+
+  Snapshot snapshot() const;
+
+  const sim::World& world() const { return world_; }
+  SimulationTotals totals() const;
+  std::size_t body_count() const { return world_.body_count(); }
+
+  struct NamedBody {
+    std::string name;
+    sim::BodyHandle handle;
+  };
+  /// Bodies that can move, in scene order.
+  const std::vector<NamedBody>& moving_bodies() const { return moving_; }
+  struct NamedGroup {
+    std::string name;
+    sim::ParticleSystemHandle handle;
+  };
+  const std::vector<NamedGroup>& particle_groups() const { return groups_; }
+  struct NamedCloth {
+    std::string name;
+    sim::ClothHandle handle;
+  };
+  /// In scene order.
+  const std::vector<NamedCloth>& cloths() const { return cloths_; }
+
+  /// What stopped being finite, and the state of the rest, as JSON text: what is saved when a run diverges.
+  std::string state_dump(const sim::NonFinite& lost) const;
+
+ private:
+  void add_bodies(const Scene& scene, const ModelLibrary& models);
+  sim::MeshHandle add_mesh(const MeshFile& file, const ModelLibrary& models);
+  void add_particle_groups(const Scene& scene);
+  void add_springs(const Scene& scene);
+  void add_joints(const Scene& scene);
+  void add_cloths(const Scene& scene, const ModelLibrary& models);
+  void add_forces(const Scene& scene);
+  sim::BodyHandle body_named(const std::string& name) const;
+  sim::ParticleSystemHandle system_named(const std::string& name) const;
+  void prewarm(double from, double to);
+  void step(double sampling_time);
+  int skipped_pieces() const;  // in which output.start is simulated
+  void note(const sim::StepReport& report);
+
+  const Scene& scene_;
+  sim::World world_;
+  std::optional<ParticleSources> sources_;
+  std::vector<NamedBody> moving_;
+  std::vector<NamedGroup> groups_;
+  std::vector<NamedCloth> cloths_;
+  std::vector<LookRamps> group_looks_;
+  std::map<std::string, sim::BodyHandle> bodies_;
+  std::vector<sim::Pose> moving_poses_;             // kept up to date from World::moved()
+  std::map<sim::BodyHandle, std::size_t> slot_of_;  // handle -> place in `moving_`
+  std::vector<sim::SpringDef> springs_;
+  std::vector<sim::JointHandle> rods_;  // distance joints
+  std::optional<Overlays> overlays_;
+  std::function<void(double)> on_substep_;
+  SimulationTotals totals_;
+  int frame_ = 0, skipped_pieces_ = 0, prewarm_pieces_ = 0, prewarmed_pieces_ = 0;
+};
+
+}  // namespace offstage::producer

@@ -1,0 +1,530 @@
+#include "producer/cli/command_line.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <new>
+
+#include <CLI/CLI.hpp>
+#include <fcntl.h>
+#include <fmt/format.h>
+
+#include "producer/base/error.h"
+#include "producer/base/interrupt.h"
+#include "producer/base/log.h"
+#include "producer/base/suggest.h"
+#include "producer/base/version.h"
+#include "producer/build/simulation.h"
+#include "producer/cli/command_texts.h"
+#include "producer/cli/commands.h"
+#include "producer/run/output.h"
+#include "render/error.h"
+
+namespace offstage::producer {
+namespace {
+
+constexpr const char* kFooter =
+    "A first film: offstage new rain && offstage rain.json   (SCENE.json alone renders SCENE.mp4)\n"
+    "A scene named - is read from standard input.\n\n"
+    "Exit codes: 0 ok, 1 run failed, 2 usage, 3 scene invalid, 4 GL or encoder unavailable, 5 simulation "
+    "diverged,\n"
+    "6 images differ, 130 interrupted (Ctrl-C), 143 terminated.";
+
+const std::map<std::string, ProgressStyle> kProgressStyles = {{"auto", ProgressStyle::automatic},
+                                                              {"bar", ProgressStyle::bar},
+                                                              {"plain", ProgressStyle::plain},
+                                                              {"json", ProgressStyle::json},
+                                                              {"none", ProgressStyle::none}};
+
+void add_overrides(CLI::App& command, SceneOptions& scene) {
+  command
+      .add_option("--set", scene.set,
+                  "Override a value of the scene: path=value, such as emitters.0.rate=200")
+      ->allow_extra_args(false);
+  command.add_option("--seed", scene.seed, "Seed of everything random");
+  command.add_flag("--no-cache", scene.no_cache,
+                   "Cut models into convex parts each time instead of keeping them in ~/.cache/offstage");
+}
+
+void add_scene(CLI::App& command, SceneOptions& scene) {
+  command.add_option("scene", scene.file, "Scene file; - for standard input")->required();
+  add_overrides(command, scene);
+}
+
+void add_timing(CLI::App& command, SceneOptions& scene) {
+  command.add_option("--fps", scene.fps, "Frames per second: 24, 29.97, 30000/1001");
+  command.add_option("--duration", scene.duration, "Length of the film in seconds");
+}
+
+void add_quality(CLI::App& command, SceneOptions& scene) {
+  command
+      .add_option("--quality", scene.quality,
+                  "Sub-frames per frame: draft 1, preview 4, final 16 (the physics stays)")
+      ->check(CLI::IsMember({"draft", "preview", "final"}));
+}
+
+void add_picture(CLI::App& command, SceneOptions& scene) {
+  add_quality(command, scene);
+  command.add_option("--size", scene.size, "Picture size WxH, such as 1280x720");
+}
+
+void add_small_picture(CLI::App& command, SceneOptions& scene) {
+  add_quality(command, scene);
+  command.add_option("--size", scene.size,
+                     "Size of each picture WxH (default: 320 pixels on the longer side)");
+}
+
+void add_talk(CLI::App& command, TalkOptions& talk) {
+  command
+      .add_option("--progress", talk.progress,
+                  "auto: a bar on a terminal, lines in a log file, nothing on a pipe; bar, plain, json, none")
+      ->transform(CLI::CheckedTransformer(kProgressStyles).description(""));
+  command.add_flag("-q,--quiet", talk.quiet, "Say nothing but errors");
+  command.add_flag("-v,--verbose", talk.verbose, "Say more: stage times, memory");
+}
+
+void add_channels(CLI::App& app, SceneOptions& scene) {
+  app.add_option("--channels", scene.channels,
+                 "Also write numbers for each pixel beside every frame, or in FILM.channels beside a video:\n"
+                 "depth [m], normal, id, motion [px since the frame before]; several with commas")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"depth", "normal", "id", "motion"}));
+  app.add_option("--channel-format", scene.channel_format,
+                 "exr: FRAME.exr with all numbers as they are; png: FRAME.depth.png and so on, scaled")
+      ->check(CLI::IsMember({"exr", "png"}));
+}
+
+void add_gl(CLI::App& command, render::GlPlatform& gl) {
+  const auto take = [&gl](const std::string& name) {
+    try {
+      gl = render::gl_platform(name);
+    } catch (const std::invalid_argument& error) {
+      throw CLI::ValidationError("--gl", error.what());
+    }
+  };
+  command
+      .add_option_function<std::string>(
+          "--gl", take,
+          "What draws: osmesa or egl, with the same pixels by llvmpipe; egl:gpu, a graphics card; auto, the\n"
+          "first of osmesa and egl that is installed")
+      ->envname("OFFSTAGE_GL");
+}
+
+void add_threads(CLI::App& command, int& threads) {
+  command.add_option("--threads", threads, "Threads of the simulation (default: all available)")
+      ->check(CLI::Range(1, 256));
+}
+
+/// `bare`: the command is left out, and -o with it.
+CLI::App* add_render(CLI::App& app, RenderOptions& render, bool bare) {
+  CLI::App* command = app.add_subcommand("render", "Simulate a scene and draw it: frames or a video");
+  add_scene(*command, render.scene);
+  command
+      ->add_option(
+          "-o,--output", render.out,
+          "frames/####.png or a folder; .mp4 .webm .mov .mkv .gif .webp .apng .png; - for standard output")
+      ->required(!bare);
+  add_picture(*command, render.scene);
+  add_timing(*command, render.scene);
+  command->add_option("--frames", render.frames, "Which frames: 1-30,40,50-90x2 (negative from the end)");
+  command->add_option("--chunk", render.chunk, "i/n: the i-th of n parts of the frames");
+  command->add_option("--cache", render.cache,
+                      "Draw from the snapshots of `simulate --cache` instead of simulating");
+  command->add_option("--format", render.format, "Of standard output: rgba or y4m")
+      ->check(CLI::IsMember({"rgba", "y4m"}));
+  add_threads(*command, render.threads);
+  add_gl(*command, render.gl);
+  command->add_option("--jobs", render.jobs, "Frames drawn at the same time (default: half of --threads)")
+      ->check(CLI::Range(1, 64));
+  auto* resume =
+      command->add_flag("--resume", render.resume, "Keep finished frames that have the same settings");
+  add_channels(*command, render.scene);
+  command->add_flag("--force", render.force, "Replace existing output")->excludes(resume);
+  auto* dry_run = command->add_flag("--dry-run", render.dry_run, "Print the plan as JSON and write nothing");
+  command
+      ->add_flag("--watch", render.watch,
+                 "Render again whenever the scene, an include, a model or a texture changes, until Ctrl-C;\n"
+                 "only whole results replace the output, and errors of the scene keep the last one")
+      ->excludes(resume)
+      ->excludes(dry_run);
+  command->add_option("--stats", render.stats, "Write figures of the run to this JSON file");
+  command->add_option("--report", render.report,
+                      "Write pictures, plots, settings and hashes of the run to this HTML file");
+  add_talk(*command, render.talk);
+  return command;
+}
+
+CLI::App* add_new(CLI::App& app, NewOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "new",
+      "Write a commented scene to begin with, which renders at once; without NAME: list the templates");
+  command->add_option("name", options.name, "NAME or NAME.json; - for standard output");
+  command->add_option("--template", options.from,
+                      "Which scene (default: that of the name, as in `new rain`, or else `basic`)");
+  command->add_flag("--list", options.list, "List the templates");
+  command->add_flag("--force", options.force, "Replace an existing file");
+  return command;
+}
+
+CLI::App* add_tune(CLI::App& app, TuneOptions& tune) {
+  CLI::App* command = app.add_subcommand(
+      "tune", "Change a scene in the browser and see the film at once; prints the address of the page");
+  command->add_option("scene", tune.scene.file, "Scene file")->required();
+  command->add_option("--port", tune.port, "Port on this machine (default: any that is free)")
+      ->check(CLI::Range(1, 65535));
+  command->add_option("--size", tune.size, "Size WxH that drafts fit into")->capture_default_str();
+  command->add_flag_callback(
+      "--no-open", [&tune] { tune.open = false; }, "Only print the address and open no browser");
+  command->add_flag("--no-cache", tune.scene.no_cache,
+                    "Cut models into convex parts each time instead of keeping them in ~/.cache/offstage");
+  add_threads(*command, tune.threads);
+  add_gl(*command, tune.gl);
+  return command;
+}
+
+CLI::App* add_encode(CLI::App& app, EncodeOptions& encode) {
+  CLI::App* command = app.add_subcommand("encode", "Make a video of PNG frames that are there already");
+  command->add_option("frames", encode.frames, "Pattern such as 'frames/####.png', or a folder")->required();
+  command->add_option("-o,--output", encode.out, "Video: .mp4 .webm .mov .mkv .gif .webp .apng .png")
+      ->required();
+  command->add_option("--fps", encode.fps,
+                      "Frames per second: 24, 29.97, 30000/1001 (default: as rendered, or 30)");
+  command->add_flag("--allow-gaps", encode.allow_gaps, "Leave out numbers that have no frame");
+  command->add_flag("--force", encode.force, "Replace an existing file");
+  add_talk(*command, encode.talk);
+  return command;
+}
+
+CLI::App* add_validate(CLI::App& app, ValidateOptions& validate) {
+  CLI::App* command =
+      app.add_subcommand("validate", "Check a scene, report every problem, and estimate what it costs");
+  add_scene(*command, validate.scene);
+  command->add_flag("--json", validate.json, "Print the result as JSON");
+  command->add_flag("--no-estimate,--quick", validate.no_estimate,
+                    "Leave out the estimate, which takes about two seconds");
+  add_gl(*command, validate.gl);
+  return command;
+}
+
+CLI::App* add_frame(CLI::App& app, FrameOptions& frame) {
+  CLI::App* command = app.add_subcommand("frame", "Draw one frame to a PNG");
+  add_scene(*command, frame.scene);
+  command->add_option("-o,--output", frame.out, "PNG file")->required();
+  auto* number =
+      command->add_option("-n,--frame", frame.frame, "Number of the frame (negative from the end)");
+  command->add_option("--at", frame.at, "Time in seconds instead")->excludes(number);
+  add_picture(*command, frame.scene);
+  add_timing(*command, frame.scene);
+  add_threads(*command, frame.threads);
+  add_gl(*command, frame.gl);
+  add_channels(*command, frame.scene);
+  command->add_flag("--force", frame.force, "Replace an existing file");
+  add_talk(*command, frame.talk);
+  return command;
+}
+
+CLI::App* add_simulate(CLI::App& app, SimulateOptions& simulate) {
+  CLI::App* command = app.add_subcommand("simulate", "Run the physics alone; prints its figures as JSON");
+  add_scene(*command, simulate.scene);
+  add_timing(*command, simulate.scene);
+  command->add_option("--trace", simulate.trace,
+                      "CSV of position, orientation and velocities of moving objects");
+  command->add_option("--contacts", simulate.contacts,
+                      "CSV of the contact points of bodies, with their forces");
+  command->add_option("--cloths", simulate.cloths, "CSV of strain and contacts of cloths");
+  command->add_option("--joints", simulate.joints, "CSV of the loads and positions of joints");
+  command->add_option("--trace-every", simulate.trace_every, "frame or step, of all of these")
+      ->check(CLI::IsMember({"frame", "step"}));
+  command->add_option("--cache", simulate.cache, "Folder for one snapshot per frame, for `render --cache`");
+  command->add_option("--stats", simulate.stats, "Write the figures to this JSON file instead");
+  add_threads(*command, simulate.threads);
+  command->add_flag("--force", simulate.force, "Replace existing output");
+  add_talk(*command, simulate.talk);
+  return command;
+}
+
+CLI::App* add_compare(CLI::App& app, CompareOptions& compare) {
+  compare.golden = "tests/golden";
+  CLI::App* command =
+      app.add_subcommand("compare", "Compare a scene with its golden, or two pictures or folders of frames");
+  command->add_option("a", compare.scene.file, "Scene, picture or folder")->required();
+  command->add_option("b", compare.other, "Second picture or folder");
+  command->add_option("--golden", compare.golden, "Folder of the goldens")->capture_default_str();
+  command->add_option("--report", compare.report,
+                      "Folder for expected, actual, difference and a page that shows them");
+  CLI::Option* keep =
+      command->add_option("--keep-states", compare.states.keep,
+                          "Folder that the simulated states of the golden's frames are written to");
+  command
+      ->add_option(
+          "--states", compare.states.from,
+          "Draw the states that an earlier --keep-states wrote instead of simulating: by another --gl")
+      ->excludes(keep);
+  add_overrides(*command, compare.scene);
+  add_threads(*command, compare.threads);
+  add_gl(*command, compare.gl);
+  return command;
+}
+
+CLI::App* add_bless(CLI::App& app, BlessOptions& bless) {
+  bless.golden = "tests/golden";
+  CLI::App* command = app.add_subcommand("bless", "Renew the goldens of scenes");
+  command->add_option("scenes", bless.scenes, "Scene files")->required();
+  command->add_option("--golden", bless.golden, "Folder of the goldens")->capture_default_str();
+  command->add_option("--reason", bless.reason, "Why the pictures changed")->required();
+  add_threads(*command, bless.threads);
+  add_gl(*command, bless.gl);
+  return command;
+}
+
+CLI::App* add_sheet(CLI::App& app, SheetOptions& sheet) {
+  CLI::App* command =
+      app.add_subcommand("sheet", "Draw frames of the whole film small, in one PNG with time codes");
+  add_scene(*command, sheet.scene);
+  command->add_option("-o,--output", sheet.out, "PNG file")->required();
+  command->add_option("--count", sheet.count, "How many frames, evenly from the first to the last")
+      ->check(CLI::Range(1, 400))
+      ->capture_default_str();
+  command->add_option("--columns", sheet.columns, "Pictures in a row")->check(CLI::Range(1, 100));
+  add_small_picture(*command, sheet.scene);
+  add_timing(*command, sheet.scene);
+  add_threads(*command, sheet.threads);
+  add_gl(*command, sheet.gl);
+  command->add_flag("--force", sheet.force, "Replace an existing file");
+  add_talk(*command, sheet.talk);
+  return command;
+}
+
+CLI::App* add_sweep(CLI::App& app, SweepOptions& sweep) {
+  CLI::App* command = app.add_subcommand(
+      "sweep", "Run a scene with different values: one labelled PNG of all, a CSV of their figures");
+  add_scene(*command, sweep.scene);
+  command
+      ->add_option("--vary", sweep.vary,
+                   "What varies: path=a:b:step or path=x,y,z, such as emitters.0.rate=100:400:50; given\n"
+                   "several times, every combination is run (at most 256)")
+      ->required()
+      ->allow_extra_args(false);
+  command
+      ->add_option("--at", sweep.at, "Times of the pictures in seconds: 1 or 0.5,1,2 (default: the middle)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command->add_option("-o,--output", sweep.out, "PNG file")->required();
+  command->add_option("--csv", sweep.csv,
+                      "Figures of every run at the last of the times (default: beside the PNG)");
+  command->add_option("--columns", sweep.columns, "Pictures in a row")->check(CLI::Range(1, 100));
+  add_small_picture(*command, sweep.scene);
+  add_timing(*command, sweep.scene);
+  add_threads(*command, sweep.threads);
+  add_gl(*command, sweep.gl);
+  command->add_option("--jobs", sweep.jobs, "Runs at the same time (default: as --threads, if memory allows)")
+      ->check(CLI::Range(1, 64));
+  auto* resume =
+      command->add_flag("--resume", sweep.resume, "Keep the finished runs of an interrupted sweep");
+  command->add_flag("--force", sweep.force, "Replace existing output")->excludes(resume);
+  command->add_flag("-q,--quiet", sweep.quiet, "Say nothing but errors and failed runs");
+  return command;
+}
+
+/// A program started with a standard stream closed would otherwise find its own files under that number.
+void open_standard_streams() {
+  for (int fd = 0; fd <= 2; ++fd)
+    if (fcntl(fd, F_GETFD) < 0)
+      open("/dev/null", fd == 0 ? O_RDONLY : O_WRONLY);  // takes the lowest free number
+}
+
+/// Results that could not be written are a failure, whatever the command did.
+int flushed(int code) {
+  if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
+  log("offstage: standard output: {}\n", std::strerror(errno));
+  return code == kOk ? kRunFailed : code;
+}
+
+/// The exit code of a command; what it throws becomes a message and a code of its own.
+int reported(const std::function<int()>& command) {
+  try {
+    return command();
+  } catch (const SceneError& error) {
+    log("{}\n", error.what());
+    return kSceneInvalid;
+  } catch (const OutputError& error) {
+    log("offstage: {}\n", error.what());
+    return kUsage;
+  } catch (const std::invalid_argument& error) {
+    log("offstage: {}\n", error.what());
+    return kUsage;
+  } catch (const render::UnavailableError& error) {
+    log("offstage: {}\n", error.what());
+    return kUnavailable;
+  } catch (const DivergedError& error) {
+    const std::string file = "offstage-diverged.json";
+    log("offstage: {}\n", error.what());
+    try {
+      write_text_file(file, error.state());
+      log("the state was saved to {}\n", file);
+    } catch (const render::FileError& unsaved) {
+      log("the state could not be saved: {}\n", unsaved.what());
+    }
+    return kDiverged;
+  } catch (const Interrupted& interrupted) {
+    log("interrupted\n");
+    return 128 + interrupted.signal();
+  } catch (const std::bad_alloc&) {
+    log("offstage: out of memory\n");
+    return kRunFailed;
+  } catch (const std::exception& error) {
+    log("offstage: {}\n", error.what());
+    return kRunFailed;
+  }
+}
+
+int dispatch(int argc, char** argv, const TuneCommand& tune);
+
+}  // namespace
+
+int run(int argc, char** argv, const TuneCommand& tune) {
+  open_standard_streams();
+  install_signal_handlers();
+  return flushed(dispatch(argc, argv, tune));
+}
+
+namespace {
+
+bool is_scene_name(std::string_view argument) {
+  return argument == kStandardInput || argument.ends_with(".json");
+}
+
+/// Whether the arguments name a scene where a command should be: then it is rendered.
+bool lacks_command(const std::vector<const char*>& arguments, const std::vector<std::string>& commands) {
+  if (arguments.size() < 2) return false;
+  const std::string_view first = arguments[1];
+  if (!first.starts_with('-') || first == kStandardInput) return is_scene_name(first);
+  const auto is_command = [&](const char* argument) {
+    return std::ranges::find(commands, argument) != commands.end();
+  };
+  return std::none_of(arguments.begin() + 1, arguments.end(), is_command) &&
+         std::any_of(arguments.begin() + 1, arguments.end(), is_scene_name);
+}
+
+/// What is wrong with a word that is no command; empty if there is none.
+std::string wrong_command(const std::vector<const char*>& arguments,
+                          const std::vector<std::string>& commands) {
+  if (arguments.size() < 2 || std::string_view(arguments[1]).starts_with('-')) return {};
+  const std::string word = arguments[1];
+  if (std::ranges::find(commands, word) != commands.end()) return {};
+  if (std::error_code error; std::filesystem::is_regular_file(word, error))
+    return word + " is no scene: a scene is a .json file, or - for standard input";
+  const std::string near = nearest(word, commands);
+  return "there is no command '" + word + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") +
+         " (--help lists all)";
+}
+
+constexpr std::array kCommandNames = {"render",  "frame",  "sheet",    "sweep",  "simulate",  "new",
+                                      "tune",    "encode", "validate", "schema", "presets",   "info",
+                                      "compare", "bless",  "doctor",   "man",    "completion"};
+
+int dispatch(int argc, char** argv, const TuneCommand& tune) {
+  std::vector<const char*> arguments(argv, argv + argc);
+  const std::vector<std::string> commands(kCommandNames.begin(), kCommandNames.end());
+  const bool bare = lacks_command(arguments, commands);
+  if (bare) arguments.insert(arguments.begin() + 1, "render");
+  if (const std::string wrong = wrong_command(arguments, commands); !wrong.empty()) {
+    log("offstage: {}\n", wrong);
+    return kUsage;
+  }
+  CLI::App app{"offstage turns a scene file into a physically simulated film, without a display or a GPU."};
+  app.set_version_flag("--version", "offstage " + std::string(version_text()));
+  app.require_subcommand(1);
+  app.fallthrough(false);
+  app.footer(kFooter);
+
+  RenderOptions render;
+  auto* render_app = add_render(app, render, bare);
+  NewOptions create;
+  auto* new_app = add_new(app, create);
+  TuneOptions tuning;
+  auto* tune_app = add_tune(app, tuning);
+  EncodeOptions encode;
+  auto* encode_app = add_encode(app, encode);
+
+  FrameOptions frame;
+  auto* frame_app = add_frame(app, frame);
+  SheetOptions sheet;
+  auto* sheet_app = add_sheet(app, sheet);
+  SweepOptions sweep;
+  auto* sweep_app = add_sweep(app, sweep);
+
+  SimulateOptions simulate;
+  auto* simulate_app = add_simulate(app, simulate);
+  ValidateOptions validate;
+  auto* validate_app = add_validate(app, validate);
+
+  bool reference = false;
+  auto* schema_app = app.add_subcommand("schema", "Print the JSON Schema of the scene format");
+  schema_app->add_flag("--reference", reference, "Print the reference in Markdown instead");
+
+  std::string preset;
+  auto* presets_app = app.add_subcommand(
+      "presets", "List the effects, fabrics and articulations that scenes can name, or print one");
+  presets_app->add_option("name", preset, "Preset, fabric or articulation to print");
+
+  SceneOptions info;
+  bool info_json = false;
+  auto* info_app = app.add_subcommand("info", "Describe a scene or a model file");
+  info_app->add_option("file", info.file, "Scene (.json) or model file")->required();
+  add_overrides(*info_app, info);
+  info_app->add_flag("--json", info_json, "Print as JSON");
+
+  CompareOptions compare;
+  auto* compare_app = add_compare(app, compare);
+  BlessOptions bless;
+  auto* bless_app = add_bless(app, bless);
+  auto* doctor_app = app.add_subcommand("doctor", "Say what this machine has: GL, encoders, processor");
+  auto* man_app = app.add_subcommand("man", "Print the manual page, for `man -l -`");
+  std::string shell;
+  auto* completion_app = app.add_subcommand("completion", "Print the completion script of a shell");
+  completion_app->add_option("shell", shell, "bash, zsh or fish")
+      ->required()
+      ->check(CLI::IsMember({"bash", "zsh", "fish"}));
+
+  try {
+    app.parse(static_cast<int>(arguments.size()), arguments.data());
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kOk : kUsage;
+  }
+
+  return reported([&] {
+    if (bare && render.out.empty()) render.out = default_film(render.scene.file);
+    if (*render_app && render.watch)
+      return watch_command(
+          render, [](const RenderOptions& once) { return reported([&] { return render_command(once); }); });
+    if (*render_app) return render_command(render);
+    if (*new_app) return new_command(create);
+    if (*tune_app) return tune(tuning);
+    if (*encode_app) return encode_command(encode);
+    if (*frame_app) return frame_command(frame);
+    if (*sheet_app) return sheet_command(sheet);
+    if (*sweep_app) return sweep_command(sweep);
+    if (*simulate_app) return simulate_command(simulate);
+    if (*validate_app) return validate_command(validate);
+    if (*schema_app) return schema_command(reference);
+    if (*info_app) return info_command(info, info_json);
+    if (*presets_app) return presets_command(preset);
+    if (*compare_app) return compare_command(compare);
+    if (*bless_app) return bless_command(bless);
+    if (*man_app || *completion_app) {
+      fmt::print("{}", *man_app ? manual_page(app) : shell_completion(app, shell));
+      return static_cast<int>(kOk);
+    }
+    return *doctor_app ? doctor_command() : static_cast<int>(kUsage);
+  });
+}
+
+}  // namespace
+
+}  // namespace offstage::producer

@@ -1,0 +1,159 @@
+// encode: a video of frames that are there already.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <optional>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "producer/base/interrupt.h"
+#include "producer/base/log.h"
+#include "producer/cli/command_line.h"
+#include "producer/cli/commands.h"
+#include "producer/run/frame_sequence.h"
+#include "producer/run/output.h"
+#include "producer/run/progress.h"
+#include "render/error.h"
+#include "render/image_io.h"
+#include "render/sink.h"
+#include "render/tone_map.h"
+
+namespace offstage::producer {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The frame rate that the manifest beside the frames records, if it is of these frames.
+std::optional<render::FrameRate> rate_of_manifest(const fs::path& pattern) {
+  std::ifstream in(pattern.parent_path() / "manifest.json");
+  const auto manifest = nlohmann::json::parse(in, nullptr, false);
+  if (!manifest.is_object() || !manifest.contains("fps") || !manifest.contains("pattern") ||
+      manifest["pattern"] != pattern.filename().string())
+    return {};
+  const auto& fps = manifest["fps"];
+  return render::parse_frame_rate(fps.is_string() ? fps.get<std::string>() : fps.dump());
+}
+
+render::FrameRate rate_of(const EncodeOptions& options, const FrameSequence& sequence) {
+  if (!options.fps) return rate_of_manifest(sequence.pattern).value_or(render::FrameRate());
+  const auto rate = render::parse_frame_rate(*options.fps);
+  if (!rate) throw std::invalid_argument(wrong_frame_rate(*options.fps));
+  return *rate;
+}
+
+bool is_transparent(const render::Image& image) {
+  for (std::size_t i = 3; i < image.rgba.size(); i += 4)
+    if (image.rgba[i] != 255) return true;
+  return false;
+}
+
+/// Whether the frames have to keep an alpha channel. An alpha channel that is opaque throughout has no need.
+bool any_transparent(const FrameSequence& sequence) {
+  return sequence.may_be_transparent && std::ranges::any_of(sequence.frames, [](const SequenceFrame& frame) {
+           if (interrupt_signal()) throw Interrupted(interrupt_signal());
+           return is_transparent(render::read_image(frame.path));
+         });
+}
+
+/// Lays a picture with straight alpha over black, in linear light.
+void lay_over_black(render::Image& image) {
+  static const std::array<float, 256> linear = [] {
+    std::array<float, 256> table{};
+    for (std::size_t i = 0; i < table.size(); ++i)
+      table[i] = render::srgb_decode(static_cast<float>(i) / 255);
+    return table;
+  }();
+  for (std::size_t i = 0; i < image.rgba.size(); i += 4) {
+    const uint8_t alpha = image.rgba[i + 3];
+    if (alpha == 255) continue;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float light = linear[image.rgba[i + c]] * static_cast<float>(alpha) / 255;
+      image.rgba[i + c] = static_cast<uint8_t>(std::lround(255 * render::srgb_encode(light)));
+    }
+    image.rgba[i + 3] = 255;
+  }
+}
+
+void check_not_a_frame(const EncodeOptions& options, const FrameSequence& sequence) {
+  for (const SequenceFrame& frame : sequence.frames)
+    if (fs::exists(options.out) && fs::equivalent(options.out, frame.path))
+      throw OutputError(options.out + ": is one of the frames");
+}
+
+/// Encodes all frames; how many were done when a signal ended it, or all.
+std::size_t encode(const FrameSequence& sequence, const render::VideoDef& def, const TalkOptions& talk) {
+  const auto sink = render::make_video_sink(def);
+  ProgressPrinter printer(talk.quiet ? ProgressStyle::none : talk.progress);
+  const auto start = std::chrono::steady_clock::now();
+  const auto total = static_cast<int>(sequence.frames.size());
+  bool told = false;
+  int done = 0;
+  for (const SequenceFrame& frame : sequence.frames) {
+    if (interrupt_signal()) return static_cast<std::size_t>(done);
+    render::Image image = render::read_image(frame.path);
+    if (!def.alpha && is_transparent(image)) {
+      if (!std::exchange(told, true) && !talk.quiet)
+        log("note: {} has no transparency: transparent frames are laid over black; .webm, .mov, .webp and "
+            ".apng keep it\n",
+            def.path.extension().string());
+      lay_over_black(image);
+    }
+    const auto encode_start = std::chrono::steady_clock::now();
+    sink->write(frame.number, image);
+    const auto now = std::chrono::steady_clock::now();
+    const double elapsed = std::chrono::duration<double>(now - start).count();
+    ++done;
+    printer({.done = done,
+             .total = total,
+             .encode_ms = std::chrono::duration<double, std::milli>(now - encode_start).count(),
+             .eta_s = elapsed / done * (total - done),
+             .fraction = static_cast<double>(done) / total});
+  }
+  sink->close();
+  printer.finish();
+  return sequence.frames.size();
+}
+
+}  // namespace
+
+std::string wrong_frame_rate(const std::string& text) {
+  return "fps: '" + text +
+         "' is not a frame rate; give a number such as 24 or 29.97, or a fraction such as 30000/1001";
+}
+
+int encode_command(const EncodeOptions& options) {
+  if (options.frames.size() != 1)
+    throw std::invalid_argument(
+        "encode: give one pattern in quotes, such as 'frames/####.png', rather than the files");
+  const OutputTarget target = parse_output(options.out);
+  if (target.kind != OutputKind::video)
+    throw OutputError(options.out + ": encode makes a video; give a file name that ends in one of " +
+                      fmt::format("{}", fmt::join(render::video_endings(), " ")));
+  const FrameSequence sequence = find_sequence(options.frames.front(), options.allow_gaps);
+  check_not_a_frame(options, sequence);
+  render::VideoDef def{.path = target.path,
+                       .width_px = sequence.width_px,
+                       .height_px = sequence.height_px,
+                       .fps = rate_of(options, sequence)};
+  render::check_video(def);
+  check_file(target.path.string(), options.force);
+  def.alpha = render::keeps_alpha(target.path.extension().string()) && any_transparent(sequence);
+  if (sequence.left_out > 0 && !options.talk.quiet)
+    log("note: {} frames are missing between {} and {} and are left out\n", sequence.left_out,
+        sequence.frames.front().number, sequence.frames.back().number);
+  const std::size_t done = encode(sequence, def, options.talk);
+  if (done < sequence.frames.size()) {
+    log("interrupted: {} of {} frames encoded; nothing was written\n", done, sequence.frames.size());
+    return 128 + interrupt_signal();
+  }
+  if (!options.talk.quiet)
+    log("{} frames, {} per second, {:.3f} s\n", sequence.frames.size(), def.fps.text(),
+        def.fps.seconds(static_cast<int64_t>(sequence.frames.size())));
+  fmt::print("{}\n", target.path.string());
+  return kOk;
+}
+
+}  // namespace offstage::producer

@@ -1,0 +1,214 @@
+// schema and info, and what the commands share.
+
+#include <map>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "producer/base/interrupt.h"
+#include "producer/base/log.h"
+#include "producer/build/simulation.h"
+#include "producer/cli/command_line.h"
+#include "producer/cli/commands.h"
+#include "producer/run/fingerprint.h"
+#include "producer/run/output.h"
+#include "render/image_io.h"
+#include "render/mesh_io.h"
+#include "sim/geometry/mass_properties.h"
+#include "sim/geometry/mesh.h"
+
+namespace offstage::producer {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+template <class V>
+Json json_of(const V& v) {
+  Json array = Json::array();
+  for (Eigen::Index i = 0; i < v.size(); ++i) array.push_back(v[i]);
+  return array;
+}
+
+Json describe(const sim::ConvexDecomposition& decomposition) {
+  using Method = sim::ConvexDecomposition::Method;
+  static const std::map<Method, const char*> names = {{Method::convex, "convex"},
+                                                      {Method::exact, "exact"},
+                                                      {Method::approximate, "approximate"},
+                                                      {Method::none, "none"}};
+  Json json = {{"method", names.at(decomposition.method)}, {"count", decomposition.parts.size()}};
+  if (decomposition.method == Method::approximate) json["volume_error"] = decomposition.volume_error;
+  if (!decomposition.note.empty()) json["note"] = decomposition.note;
+  return json;
+}
+
+Json describe_model(const std::filesystem::path& path, const DecompositionCache& cache) {
+  const render::Model model = render::read_model(path);
+  const sim::TriangleMesh mesh = sim::weld(collision_mesh(model, 1));
+  const sim::MeshTopology topology(mesh);
+  const sim::MassProperties mass = sim::mass_properties(mesh);
+  const auto bounds = model.bounds();
+  const std::string defects = topology.defects().describe();
+  Json json = {{"file", path.string()},
+               {"parts", model.parts.size()},
+               {"triangles", model.triangle_count()},
+               {"vertices", model.vertex_count()},
+               {"welded_vertices", mesh.vertices.size()},
+               {"materials", model.materials.size()},
+               {"textures", model.textures.size()},
+               {"bounds", {json_of(bounds.min()), json_of(bounds.max())}},
+               {"closed", topology.defects().closed()},
+               {"defects", defects.empty() ? "none" : defects}};
+  if (topology.defects().closed()) {
+    json["volume"] = mass.volume;
+    json["centre"] = json_of(mass.centre);
+    const sim::PrincipalInertia principal = sim::diagonalise(mass.inertia);
+    json["principal_moments_per_density"] = json_of(principal.moments);
+  }
+  const StepNotice notice(ProgressStyle::automatic, fmt::format("cutting {} ({} triangles) into convex parts",
+                                                                path.string(), model.triangle_count()));
+  json["convex_parts"] = describe(cache.decompose(mesh));
+  Json nodes = Json::array();
+  for (const render::Model::Node& node : model.nodes) {
+    nodes.push_back({{"name", node.name}, {"position", json_of(node.position)}});
+    if (node.parent >= 0) nodes.back()["parent"] = model.nodes[static_cast<std::size_t>(node.parent)].name;
+  }
+  json["nodes"] = nodes;
+  json["warnings"] = model.warnings;
+  return json;
+}
+
+Json describe_scene(const LoadedScene& loaded, const DecompositionCache& cache) {
+  const Scene& scene = loaded.scene;
+  std::vector<Problem> warnings;
+  const ModelLibrary models(scene, loaded.folder, cache, warnings);
+  const Simulation simulation(scene, models);
+  std::size_t placed = 0;
+  for (const ParticleGroup& group : scene.particles) placed += group.places.size();
+  Json moving = Json::array();
+  for (const auto& [name, handle] : simulation.moving_bodies()) {
+    const sim::BodyState s = simulation.world().body(handle);
+    moving.push_back({{"name", name}, {"position", json_of(s.pose.position)}, {"mass", s.mass}});
+  }
+  return {{"scene", scene.name},
+          {"description", scene.description},
+          {"bodies", scene.bodies.size()},
+          {"moving", moving},
+          {"particles", placed},
+          {"emitters", scene.emitters.size()},
+          {"springs", scene.springs.size()},
+          {"cloths", scene.cloths.size()},
+          {"materials", scene.materials.size()},
+          {"frames", scene.frame_count()},
+          {"fps", fps_json(scene.output.fps)},
+          {"duration", scene.output.duration},
+          {"size", {scene.render.size.x(), scene.render.size.y()}},
+          {"settings", settings_key(loaded, models)}};
+}
+
+}  // namespace
+
+void print_readable(const Json& json, int indent) {
+  for (const auto& [key, value] : json.items()) {
+    const bool nested =
+        value.is_object() || (value.is_array() && !value.empty() && value.front().is_structured());
+    fmt::print("{:{}}{}:{}", "", indent, key, nested ? "\n" : " ");
+    if (nested)
+      print_readable(value, indent + 2);
+    else
+      fmt::print("{}\n", value.is_string() ? value.get<std::string>() : value.dump());
+  }
+}
+
+std::vector<std::string> SceneOptions::overrides() const {
+  std::vector<std::string> all;
+  if (quality) all.push_back("/render/quality=" + *quality);
+  if (size) {
+    const std::size_t x = size->find('x');
+    if (x == std::string::npos)
+      throw std::invalid_argument("size: '" + *size + "' is not WxH, such as 1280x720");
+    all.push_back("/render/size=[" + size->substr(0, x) + "," + size->substr(x + 1) + "]");
+  }
+  if (fps) {
+    const auto rate = render::parse_frame_rate(*fps);
+    if (!rate) throw std::invalid_argument(wrong_frame_rate(*fps));
+    all.push_back("/output/fps=" + rate->text());
+  }
+  if (duration) all.push_back(fmt::format("/output/duration={}", *duration));
+  if (seed) all.push_back(fmt::format("/world/seed={}", *seed));
+  if (!channels.empty())
+    all.push_back(fmt::format("/output/channels=[\"{}\"]", fmt::join(channels, "\",\"")));
+  if (channel_format) all.push_back("/output/channel_format=" + *channel_format);
+  all.insert(all.end(), set.begin(), set.end());
+  return all;
+}
+
+int threads_or_all(int threads) {
+  return threads > 0 ? threads : available_processors();
+}
+
+tbb::global_control simulation_threads(int threads) {
+  return {tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads_or_all(threads))};
+}
+
+void print_warnings(const std::vector<Problem>& warnings) {
+  for (const Problem& warning : warnings) log("warning: {}\n", warning.describe());
+}
+
+LoadedScene load(const SceneOptions& options, bool quiet, const std::vector<std::string>& more_overrides) {
+  std::vector<std::string> overrides = options.overrides();
+  overrides.insert(overrides.begin(), more_overrides.begin(), more_overrides.end());
+  LoadedScene loaded = load_scene(options.file, overrides);
+  if (!quiet) print_warnings(loaded.warnings);
+  return loaded;
+}
+
+ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const TalkOptions& talk,
+                         std::vector<Problem>& warnings) {
+  const ProgressStyle style = talk.quiet ? ProgressStyle::none : talk.progress;
+  std::optional<StepNotice> notice;
+  ModelLibrary models(loaded.scene, loaded.folder, options.decompositions(), warnings,
+                      [&](const std::string& step) {
+                        notice.reset();
+                        if (interrupt_signal()) throw Interrupted(interrupt_signal());
+                        if (!step.empty()) notice.emplace(style, step);
+                      });
+  constexpr double kLong_s = 10;
+  for (const ModelLibrary::Decomposed& part : models.decomposed())
+    if (part.seconds > kLong_s && !talk.quiet)
+      log("note: it took {} to cut '{}' ({} triangles) into {} convex parts{}; a simpler model, or a "
+          "primitive or a hull as its shape, is faster in every run\n",
+          duration_text(part.seconds), part.file, part.triangles, part.parts,
+          options.no_cache ? "" : ", which are kept for later runs");
+  return models;
+}
+
+ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const TalkOptions& talk) {
+  std::vector<Problem> warnings;
+  ModelLibrary models = load_models(loaded, options, talk, warnings);
+  if (!talk.quiet) print_warnings(warnings);
+  return models;
+}
+
+void write_text_file(const std::string& path, const std::string& text) {
+  render::write_file_atomically(path, {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
+}
+
+int schema_command(bool reference) {
+  fmt::print("{}", reference ? scene_reference() : scene_schema());
+  return kOk;
+}
+
+int info_command(const SceneOptions& options, bool json) {
+  const bool is_scene =
+      options.from_standard_input() || std::filesystem::path(options.file).extension() == ".json";
+  const DecompositionCache cache = options.decompositions();
+  const Json info =
+      is_scene ? describe_scene(load(options, false), cache) : describe_model(options.file, cache);
+  if (json)
+    fmt::print("{}\n", info.dump(2));
+  else
+    print_readable(info);
+  return kOk;
+}
+
+}  // namespace offstage::producer

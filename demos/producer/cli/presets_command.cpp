@@ -1,0 +1,84 @@
+// presets: what there is to name in a scene.
+
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "effects/fabric.h"
+#include "producer/cli/command_line.h"
+#include "producer/cli/commands.h"
+#include "producer/format/presets.h"
+#include "producer/format/scene_table.h"
+#include "producer/format/table_joint.h"
+
+namespace offstage::producer {
+namespace {
+
+struct ArticulationPreset {
+  std::string name, help;
+  ArticulationTemplate made;  ///< with every default
+};
+
+std::vector<ArticulationPreset> articulation_presets() {
+  std::vector<ArticulationPreset> presets;
+  const auto add = [&]<class... T>(std::variant<T...>*) {
+    (presets.push_back({Tags<ArticulationTemplate>::kTags[presets.size()], Table<T>::kHelp, T{}}), ...);
+  };
+  add(static_cast<ArticulationTemplate*>(nullptr));
+  return presets;
+}
+
+/// As a scene would have it.
+std::string preset_text(const ArticulationPreset& preset) {
+  Scene scene;
+  scene.articulations.push_back(preset.made);
+  const Node written = write_scene(scene);
+  const Node& all = *written.find("articulations");
+  return to_text(all.as<List>()->front(), 2);
+}
+
+}  // namespace
+
+int presets_command(const std::string& name) {
+  if (const effects::FabricPreset* preset = effects::find_fabric(name)) {
+    const effects::Fabric& f = preset->fabric;
+    const nlohmann::ordered_json figures = {{"areal_density", f.areal_density},
+                                            {"stretch", f.stretch},
+                                            {"shear", f.shear},
+                                            {"bend", f.bend},
+                                            {"damping", f.damping},
+                                            {"friction", f.friction},
+                                            {"self_friction", f.self_friction},
+                                            {"thickness", f.thickness},
+                                            {"drag", f.drag},
+                                            {"lift", f.lift},
+                                            {"max_stretch", f.max_stretch},
+                                            {"max_shear", f.max_shear}};
+    fmt::print("{}\n", figures.dump(2));
+    return kOk;
+  }
+  for (const ArticulationPreset& preset : articulation_presets()) {
+    if (preset.name != name) continue;
+    fmt::print("{}\n", preset_text(preset));
+    return kOk;
+  }
+  if (!name.empty()) {
+    fmt::print("{}", read_text(preset_file(name)));
+    return kOk;
+  }
+  const std::vector<std::string> names = preset_names();
+  std::size_t width = 0;
+  for (const std::string& preset : names) width = std::max(width, preset.size());
+  for (const std::string& preset : names)
+    fmt::print("{:{}}  {}\n", preset, width, preset_description(preset));
+  fmt::print("\nFabrics, for the key \"fabric\" of cloths:\n");
+  for (const effects::FabricPreset& fabric : effects::fabric_presets())
+    fmt::print("{:{}}  {}\n", fabric.name, width, fabric.help);
+  fmt::print("\nReady-made bodies with their joints, for the key \"articulations\":\n");
+  for (const ArticulationPreset& preset : articulation_presets())
+    fmt::print("{:{}}  {}\n", preset.name, width, preset.help.substr(0, preset.help.find_first_of(".:")));
+  return kOk;
+}
+
+}  // namespace offstage::producer

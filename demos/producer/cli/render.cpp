@@ -1,0 +1,357 @@
+// render, frame and simulate.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <tbb/global_control.h>
+
+#include "producer/base/interrupt.h"
+#include "producer/base/log.h"
+#include "producer/cli/command_line.h"
+#include "producer/cli/commands.h"
+#include "producer/cli/run_progress.h"
+#include "producer/run/fingerprint.h"
+#include "producer/run/frame_list.h"
+#include "producer/run/output.h"
+#include "producer/run/production.h"
+#include "producer/run/run_notes.h"
+#include "producer/run/run_report.h"
+#include "render/context.h"
+#include "render/error.h"
+#include "render/image_io.h"
+#include "render/sink.h"
+
+namespace offstage::producer {
+namespace {
+
+namespace fs = std::filesystem;
+
+void report_run(const RunStats& stats, const TalkOptions& talk, const std::string& stats_file) {
+  if (!stats_file.empty()) write_text_file(stats_file, to_json(stats));
+  if (talk.quiet) return;
+  if (!stats.blank_frames.empty())
+    log("warning: frame {} is blank: all of its pixels are equal{}\n", stats.blank_frames.front(),
+        stats.blank_frames.size() > 1 ? fmt::format(" (and {} more)", stats.blank_frames.size() - 1) : "");
+  for (const std::string& note : notes_of(stats.totals)) log("{}\n", note);
+  if (!talk.verbose) return;
+  for (const auto& [name, times] : {std::pair("simulate", &stats.sim), std::pair("draw", &stats.render),
+                                    std::pair("encode", &stats.encode)}) {
+    const StageTimes::Summary s = times->summary();
+    log("{:9} {:8.2f} ms mean  {:8.2f} p50  {:8.2f} p95  {:8.2f} max\n", name, s.mean, s.p50, s.p95, s.max);
+  }
+  log("{} frames in {:.2f} s, first after {:.2f} s, {:.0f} MB\n", stats.frames, stats.wall_s, stats.startup_s,
+      peak_rss_mb());
+}
+
+/// The exit code of a run that was interrupted, after saying how to go on.
+int interrupted(const RunStats& stats, int total, const std::string& advice) {
+  log("interrupted: {} of {} frames done{}\n", stats.frames + stats.frames_kept, total, advice);
+  return 128 + stats.interrupted_by;
+}
+
+struct Plan {
+  LoadedScene loaded;
+  OutputTarget target;
+  std::vector<int> frames;
+  std::string settings;
+  int threads = 1, jobs = 1;
+  bool through_frames = false;  // a video that can be resumed: frames first, then the video
+  fs::path frames_pattern;      // where frames go, if they do
+  ChannelFiles channels;
+};
+
+render::VideoDef video_def(const Plan& plan) {
+  const Scene& scene = plan.loaded.scene;
+  return {.path = plan.target.path,
+          .width_px = scene.render.size.x(),
+          .height_px = scene.render.size.y(),
+          .fps = scene.output.fps,
+          .alpha = scene.environment.background == Background::transparent};
+}
+
+int print_plan(const Plan& plan) {
+  const Scene& scene = plan.loaded.scene;
+  const double pixels = double(scene.render.size.x()) * scene.render.size.y();
+  constexpr double kPngBytesPerPixel = 0.8;  // measured over the gallery
+  const nlohmann::ordered_json json = {
+      {"scene", scene.name},
+      {"output", plan.target.kind == OutputKind::pipe ? "-" : plan.target.path.string()},
+      {"frames", plan.frames.size()},
+      {"first_frame", plan.frames.empty() ? 0 : plan.frames.front()},
+      {"last_frame", plan.frames.empty() ? 0 : plan.frames.back()},
+      {"size", {scene.render.size.x(), scene.render.size.y()}},
+      {"fps", fps_json(scene.output.fps)},
+      {"subframes", subframes(scene.render.quality)},
+      {"threads", plan.threads},
+      {"jobs", plan.jobs},
+      {"png_mb_estimate",
+       std::round(pixels * kPngBytesPerPixel * static_cast<double>(plan.frames.size()) / 1e5) / 10},
+      {"settings", plan.settings}};
+  fmt::print("{}\n", json.dump(2));
+  return kOk;
+}
+
+Plan make_plan(const RenderOptions& options, const ModelLibrary& models, LoadedScene loaded) {
+  Plan plan{.loaded = std::move(loaded), .target = parse_output(options.out)};
+  plan.frames = parse_frames(options.frames, plan.loaded.scene.frame_count());
+  if (!options.chunk.empty()) plan.frames = chunk_of(plan.frames, options.chunk);
+  plan.settings = settings_key(plan.loaded, models);
+  if (options.gl == render::GlPlatform::egl_gpu) plan.settings += "-gpu";  // other pixels
+  plan.threads = threads_or_all(options.threads);
+  // llvmpipe already draws one frame with all processors. On two, a second drawing thread takes about 100 MB
+  // and more processor time, and saves some 2 % by the clock; with more of them, what is serial in a frame
+  // leaves some idle.
+  plan.jobs = options.jobs > 0 ? options.jobs : std::max(1, plan.threads / 2);
+  plan.through_frames = plan.target.kind == OutputKind::video && options.resume;
+  plan.frames_pattern =
+      plan.through_frames ? fs::path(plan.target.path.string() + ".frames") / "####.png" : plan.target.path;
+  const OutputSettings& output = plan.loaded.scene.output;
+  plan.channels = {{output.channels, output.channel_format},
+                   plan.target.kind == OutputKind::frames ? fs::path(plan.frames_pattern).replace_extension()
+                                                          : channels_folder(plan.target.path) / "####"};
+  return plan;
+}
+
+/// Finished frames on disk become the video; the frames go when it is there. False if interrupted.
+bool assemble_video(const Plan& plan) {
+  auto video = render::make_video_sink(video_def(plan));
+  for (const int frame : plan.frames) {
+    if (interrupt_signal()) return false;
+    video->write(frame, render::read_image(render::frame_path(plan.frames_pattern, frame)));
+  }
+  video->close();
+  fs::remove_all(plan.frames_pattern.parent_path());
+  return true;
+}
+
+RunStats draw(const Plan& plan, const ModelLibrary& models, const RenderOptions& options,
+              std::vector<int> frames, render::FrameSink& sink) {
+  RunProgress progress(plan.loaded.scene, models, options.talk);
+  RenderJob job{
+      .frames = std::move(frames), .threads = plan.jobs, .cache = {}, .report = !options.report.empty()};
+  if (!options.cache.empty()) job.cache = options.cache;
+  job.channels = plan.channels.choice;
+  job.channels_stem = plan.channels.stem;
+  RunStats stats = render_frames(plan.loaded, models, job, sink, std::ref(progress));
+  progress.finish();
+  if (job.report) write_text_file(options.report, run_report(plan.loaded, plan.settings, stats));
+  return stats;
+}
+
+int render_to_frames(const Plan& plan, const ModelLibrary& models, const RenderOptions& options) {
+  const Scene& scene = plan.loaded.scene;
+  const Existing existing = options.force    ? Existing::replace
+                            : options.resume ? Existing::keep
+                                             : Existing::refuse;
+  if (plan.through_frames && plan.channels.choice.any())
+    fs::create_directories(plan.channels.stem.parent_path());
+  const std::vector<int> missing = prepare_frames(plan.frames_pattern, plan.channels, plan.frames,
+                                                  {.scene = scene.name,
+                                                   .settings = plan.settings,
+                                                   .width_px = scene.render.size.x(),
+                                                   .height_px = scene.render.size.y(),
+                                                   .frames = scene.frame_count(),
+                                                   .fps = scene.output.fps},
+                                                  existing);
+  RunStats stats;
+  if (!missing.empty()) {
+    auto sink = render::make_png_sink(plan.frames_pattern);
+    stats = draw(plan, models, options, missing, *sink);
+  }
+  stats.frames_kept = static_cast<int>(plan.frames.size() - missing.size());
+  if (plan.through_frames && !stats.interrupted_by) {
+    if (!assemble_video(plan)) stats.interrupted_by = interrupt_signal();
+  }
+  report_run(stats, options.talk, options.stats);
+  if (stats.interrupted_by)
+    return interrupted(stats, static_cast<int>(plan.frames.size()),
+                       options.force ? "; go on with the same command and --resume instead of --force"
+                                     : "; go on with the same command and --resume");
+  fmt::print("{}\n", plan.target.path.string());
+  return kOk;
+}
+
+int render_to_video(const Plan& plan, const ModelLibrary& models, const RenderOptions& options) {
+  // A part of a film must not look like the whole, nor replace a whole one: it gets the name when it has all
+  // frames.
+  render::VideoDef def = video_def(plan);
+  const fs::path partial = def.path.replace_extension(".partial" + plan.target.path.extension().string());
+  if (plan.channels.choice.any()) prepare_channels(plan.channels.stem.parent_path(), options.force);
+  auto sink = render::make_video_sink(def);
+  const RunStats stats = draw(plan, models, options, plan.frames, *sink);
+  if (!stats.interrupted_by) {
+    fs::rename(partial, plan.target.path);
+    if (!plan.channels.choice.any())
+      remove_channels(channels_folder(plan.target.path));  // of an earlier film
+  }
+  report_run(stats, options.talk, options.stats);
+  if (!stats.interrupted_by) {
+    fmt::print("{}\n", plan.target.path.string());
+    return kOk;
+  }
+  return interrupted(stats, static_cast<int>(plan.frames.size()),
+                     (stats.frames > 0 ? "; they are in " + partial.string() : std::string()) +
+                         "; to be able to go on, start a video with --resume");
+}
+
+int render_to_pipe(const Plan& plan, const ModelLibrary& models, const RenderOptions& options) {
+  const Scene& scene = plan.loaded.scene;
+  auto sink = render::make_pipe_sink(options.format == "y4m", scene.render.size.x(), scene.render.size.y(),
+                                     scene.output.fps);
+  const RunStats stats = draw(plan, models, options, plan.frames, *sink);
+  report_run(stats, options.talk, options.stats);
+  return stats.interrupted_by ? interrupted(stats, static_cast<int>(plan.frames.size()), "") : kOk;
+}
+
+int checked_frame(const Scene& scene, double wanted) {
+  const int count = scene.frame_count();
+  if (wanted >= 1 && wanted <= count) return static_cast<int>(wanted);
+  throw std::invalid_argument(
+      fmt::format("frame {} is outside the film; it has frames 1-{}, times {:g} to {:g} s", wanted, count,
+                  scene.output.start, scene.output.time_of(count)));
+}
+
+}  // namespace
+
+void check_file(const std::string& file, bool force) {
+  if (file.empty()) return;
+  const fs::path folder = fs::path(file).parent_path();
+  std::error_code error;
+  if (!folder.empty() && !fs::is_directory(folder, error))
+    throw OutputError(file + ": there is no folder " + folder.string());
+  const fs::file_status status = fs::status(file, error);
+  if (status.type() == fs::file_type::not_found) return;
+  if (status.type() != fs::file_type::regular) throw OutputError(file + ": is not a regular file");
+  if (!force) throw OutputError(file + ": exists already; replace it with --force");
+}
+
+void check_distinct(const std::string& a, const std::string& b) {
+  if (!a.empty() && fs::path(a).lexically_normal() == fs::path(b).lexically_normal())
+    throw OutputError(a + ": is named for two outputs");
+}
+
+void check_png(const std::string& file) {
+  if (fs::path(file).extension() != ".png")
+    throw OutputError(file + ": a picture is a PNG file; give a name ending in .png");
+}
+
+int frame_at(const Scene& scene, double time) {
+  return checked_frame(scene, 1 + std::round((time - scene.output.start) * scene.output.fps.per_second()));
+}
+
+std::string default_film(const std::string& scene_file) {
+  if (scene_file == kStandardInput)
+    throw OutputError("a scene from standard input has no name for its film; give one with -o FILM.mp4");
+  return fs::path(scene_file).stem().string() + ".mp4";
+}
+
+int render_command(const RenderOptions& options) {
+  LoadedScene loaded = load(options.scene, options.talk.quiet);
+  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
+  const Plan plan = make_plan(options, models, std::move(loaded));
+  if (plan.target.kind == OutputKind::video) {
+    render::check_video(video_def(plan));
+    if (fs::exists(plan.target.path)) check_file(plan.target.path.string(), options.force);
+    const fs::path stale = channels_folder(plan.target.path);
+    if (!plan.channels.choice.any() && !options.force && holds_channels(stale))
+      throw OutputError(stale.string() +
+                        ": holds channels of an earlier film; remove it, or let --force do so");
+  }
+  check_file(options.stats, options.force || options.resume);
+  check_distinct(options.stats, options.out);
+  check_file(options.report, options.force || options.resume);
+  check_distinct(options.report, options.out);
+  check_distinct(options.report, options.stats);
+  if (plan.channels.choice.any() && plan.target.kind == OutputKind::pipe)
+    throw OutputError("-: channels are files beside frames or a video; name a folder or a file");
+  if (options.dry_run) return print_plan(plan);
+  if (plan.frames.empty()) {
+    log("note: this chunk has no frames: there are fewer frames than chunks\n");
+    return kOk;
+  }
+
+  const auto threads = simulation_threads(options.threads);
+  render::pin_environment(plan.threads, options.gl);
+  render::Context();  // a library that is missing is found before anything is written
+  if (plan.target.kind == OutputKind::pipe) return render_to_pipe(plan, models, options);
+  if (plan.target.kind == OutputKind::frames || plan.through_frames)
+    return render_to_frames(plan, models, options);
+  return render_to_video(plan, models, options);
+}
+
+int frame_command(const FrameOptions& options) {
+  const LoadedScene loaded = load(options.scene, options.talk.quiet);
+  const Scene& scene = loaded.scene;
+  int frame = 0;
+  if (options.at) {
+    frame = frame_at(scene, *options.at);
+  } else {
+    const double wanted = options.frame.value_or(1);
+    frame = checked_frame(scene, wanted < 0 ? wanted + scene.frame_count() + 1 : wanted);
+  }
+  check_png(options.out);
+  check_file(options.out, options.force);
+  const render::ChannelChoice channels{scene.output.channels, scene.output.channel_format};
+  const fs::path stem = fs::path(options.out).replace_extension();
+  for (const fs::path& file : render::channel_files(stem, channels)) check_file(file.string(), options.force);
+
+  class PictureSink : public render::FrameSink {
+   public:
+    explicit PictureSink(fs::path path) : path_(std::move(path)) {}
+    void write(int, const render::Image& image) override { render::write_png(path_, image); }
+    void close() override {}
+
+   private:
+    fs::path path_;
+  };
+  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
+  const auto threads = simulation_threads(options.threads);
+  render::pin_environment(threads_or_all(options.threads), options.gl);
+  PictureSink sink(options.out);
+  RunProgress progress(scene, models, options.talk);
+  const RunStats stats = render_frames(
+      loaded, models,
+      {.frames = {frame}, .threads = 1, .cache = {}, .channels = channels, .channels_stem = stem}, sink,
+      std::ref(progress));
+  progress.finish();
+  report_run(stats, options.talk, "");
+  if (stats.interrupted_by) return interrupted(stats, 1, "");
+  fmt::print("{}\n", options.out);
+  return kOk;
+}
+
+int simulate_command(const SimulateOptions& options) {
+  const LoadedScene loaded = load(options.scene, options.talk.quiet);
+  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
+  const std::array files = {options.stats, options.trace, options.contacts, options.cloths, options.joints};
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    check_file(files[i], options.force);
+    for (std::size_t k = 0; k < i; ++k) check_distinct(files[k], files[i]);
+  }
+  const auto threads = simulation_threads(options.threads);
+  SimulateJob job{.cache = {},
+                  .force = options.force,
+                  .trace = {},
+                  .contacts = {},
+                  .cloths = {},
+                  .joints = {},
+                  .trace_every_step = options.trace_every == "step"};
+  if (!options.cache.empty()) job.cache = options.cache;
+  if (!options.trace.empty()) job.trace = options.trace;
+  if (!options.contacts.empty()) job.contacts = options.contacts;
+  if (!options.cloths.empty()) job.cloths = options.cloths;
+  if (!options.joints.empty()) job.joints = options.joints;
+  RunProgress progress(loaded.scene, models, options.talk);
+  const RunStats stats = simulate_frames(loaded, models, job, std::ref(progress));
+  progress.finish();
+  report_run(stats, options.talk, options.stats);
+  if (stats.interrupted_by) return interrupted(stats, loaded.scene.frame_count(), "");
+  if (options.stats.empty()) fmt::print("{}", to_json(stats));
+  return kOk;
+}
+
+}  // namespace offstage::producer

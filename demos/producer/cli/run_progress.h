@@ -1,0 +1,30 @@
+#pragma once
+/// What a run of the command line says while it works: its progress, and once that it takes long and why.
+
+#include <chrono>
+
+#include "producer/cli/commands.h"
+#include "producer/run/progress.h"
+
+namespace offstage::producer {
+
+/// A ProgressCallback. The scene and the models must outlive it.
+class RunProgress {
+ public:
+  RunProgress(const Scene& scene, const ModelLibrary& models, const TalkOptions& talk);
+  void operator()(const Progress& progress);
+  /// Ends the terminal's line.
+  void finish() { printer_.finish(); }
+
+ private:
+  void warn_of_long_run(const Progress& progress);
+
+  const Scene& scene_;
+  const ModelLibrary& models_;
+  const bool quiet_;
+  ProgressPrinter printer_;
+  bool told_ = false;
+  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace offstage::producer

@@ -1,0 +1,88 @@
+// sheet.
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "producer/base/log.h"
+#include "producer/base/time_code.h"
+#include "producer/cli/command_line.h"
+#include "producer/cli/commands.h"
+#include "producer/cli/run_progress.h"
+#include "producer/run/contact_sheet.h"
+#include "producer/run/output.h"
+#include "producer/run/production.h"
+#include "render/context.h"
+#include "render/image_io.h"
+
+namespace offstage::producer {
+namespace {
+
+/// So many frames from the first to the last, evenly; the one in the middle if it is one.
+std::vector<int> spread_frames(int count, int total) {
+  count = std::min(count, total);
+  if (count == 1) return {(total + 1) / 2};
+  std::vector<int> frames;
+  for (int i = 0; i < count; ++i)
+    frames.push_back(1 + static_cast<int>(std::lround(i * (total - 1.0) / (count - 1))));
+  return frames;
+}
+
+class CellSink : public render::FrameSink {
+ public:
+  explicit CellSink(const Scene& scene) : scene_(scene) {}
+  void write(int frame, const render::Image& image) override {
+    const double time = scene_.output.time_of(frame);
+    cells.push_back({{fmt::format("{}  frame {}", time_code(time), frame)}, image});
+  }
+  void close() override {}
+
+  std::vector<SheetCell> cells;
+
+ private:
+  const Scene& scene_;
+};
+
+}  // namespace
+
+std::string small_size(const Scene& scene, int longer_side_px) {
+  const Eigen::Vector2i size = scene.render.size;
+  const double scale = double(longer_side_px) / size.maxCoeff();
+  const auto side = [&](int full) { return std::max(1, static_cast<int>(std::lround(full * scale))); };
+  return fmt::format("{}x{}", side(size.x()), side(size.y()));
+}
+
+int sheet_command(const SheetOptions& options) {
+  check_png(options.out);
+  check_file(options.out, options.force);
+  SceneOptions scene_options = options.scene;
+  if (!scene_options.size) scene_options.size = small_size(load(options.scene, true).scene, kSmallSide_px);
+  const LoadedScene loaded = load(scene_options, options.talk.quiet);
+  const Scene& scene = loaded.scene;
+  const std::vector<int> frames = spread_frames(options.count, scene.frame_count());
+  const int columns = options.columns > 0 ? options.columns : columns_for(frames.size());
+  check_sheet_size(frames.size(), columns, scene.render.size.x(), scene.render.size.y());
+
+  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
+  const auto threads = simulation_threads(options.threads);
+  const int jobs = threads_or_all(options.threads);
+  render::pin_environment(jobs, options.gl);
+  CellSink sink(scene);
+  RunProgress progress(scene, models, options.talk);
+  const RunStats stats = render_frames(loaded, models, {.frames = frames, .threads = jobs, .cache = {}}, sink,
+                                       std::ref(progress));
+  progress.finish();
+  if (stats.interrupted_by) {
+    log("interrupted: {} of {} pictures done; nothing was written\n", stats.frames, frames.size());
+    return 128 + stats.interrupted_by;
+  }
+  const std::string heading =
+      fmt::format("{}  {:g} s, {} frames/s", scene.name, scene.output.duration, scene.output.fps.text());
+  render::write_png(options.out,
+                    contact_sheet({heading}, sink.cells, std::min(columns, static_cast<int>(frames.size()))));
+  fmt::print("{}\n", options.out);
+  return kOk;
+}
+
+}  // namespace offstage::producer

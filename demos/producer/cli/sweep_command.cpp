@@ -1,0 +1,366 @@
+// sweep.
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <fstream>
+#include <mutex>
+#include <set>
+#include <thread>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "producer/base/interrupt.h"
+#include "producer/base/log.h"
+#include "producer/base/time_code.h"
+#include "producer/cli/command_line.h"
+#include "producer/cli/commands.h"
+#include "producer/run/contact_sheet.h"
+#include "producer/run/output.h"
+#include "producer/run/production.h"
+#include "producer/run/sweep.h"
+#include "render/context.h"
+#include "render/error.h"
+#include "render/image_io.h"
+
+namespace offstage::producer {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+/// One combination of values, and what came of it.
+struct Run {
+  std::vector<std::string> values;
+  LoadedScene scene;
+  std::vector<int> frames;
+  Figures figures;
+  std::vector<render::Image> pictures;  // one per frame; none if it failed
+  std::string fault;
+  int code = kOk;
+};
+
+struct Sweep {
+  std::vector<Variation> variations;
+  std::vector<Run> runs;
+  std::string csv;
+  fs::path finished;  // folder of the runs that are done, until all are
+};
+
+/// "emitters.0.rate=200, world.seed=3"
+std::string name_of(const Sweep& sweep, const Run& run) {
+  std::string name;
+  for (std::size_t i = 0; i < run.values.size(); ++i)
+    name += fmt::format("{}{}={}", i > 0 ? ", " : "", sweep.variations[i].path, run.values[i]);
+  return name;
+}
+
+// --- Before the work ---
+
+/// The frames at the times asked for, each once; the middle one if there are none.
+std::vector<int> frames_of(const Scene& scene, const std::vector<double>& times) {
+  if (times.empty()) return {(scene.frame_count() + 1) / 2};
+  std::vector<int> frames;
+  for (const double time : times) frames.push_back(frame_at(scene, time));
+  std::ranges::sort(frames);
+  frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+  return frames;
+}
+
+/// Problems of the scenes of a sweep: those of values it sets are its own, and each is told once.
+class SweepFindings {
+ public:
+  void add(const std::vector<Problem>& problems) {
+    for (Problem problem : problems) {
+      if (problem.where.file == "--set") problem.where.file = "--vary";
+      if (told_.insert(problem.describe()).second) found_.push_back(std::move(problem));
+    }
+  }
+  const std::vector<Problem>& found() const { return found_; }
+
+ private:
+  std::set<std::string> told_;
+  std::vector<Problem> found_;
+};
+
+/// Loads the scene of every combination. Throws SceneError with the problems of all of them.
+void load_runs(const SweepOptions& options, Sweep& sweep) {
+  SceneOptions base = options.scene;
+  const LoadedScene unvaried = load(base, options.quiet);
+  if (!base.size) base.size = small_size(unvaried.scene, kSmallSide_px);
+  SweepFindings errors, warnings;
+  for (const auto& values : combinations(sweep.variations)) {
+    SceneOptions one = base;
+    for (std::size_t i = 0; i < values.size(); ++i)
+      one.set.push_back(sweep.variations[i].path + "=" + values[i]);
+    try {
+      Run run{.values = values,
+              .scene = load(one, true),
+              .frames = {},
+              .figures = {},
+              .pictures = {},
+              .fault = {}};
+      run.frames = frames_of(run.scene.scene, options.at);
+      warnings.add(run.scene.warnings);
+      sweep.runs.push_back(std::move(run));
+    } catch (const SceneError& error) {
+      errors.add(error.problems());
+    }
+  }
+  if (!errors.found().empty()) throw SceneError(errors.found());
+  if (!options.quiet && unvaried.warnings.empty()) print_warnings(warnings.found());
+}
+
+int columns_of(const SweepOptions& options, const Sweep& sweep) {
+  if (options.columns > 0) return options.columns;
+  constexpr std::size_t kMostInRow = 10;
+  const std::size_t times = sweep.runs.front().frames.size();
+  const std::size_t series = times > 1 ? times : sweep.variations.back().values.size();
+  const bool table = times > 1 || sweep.variations.size() > 1;
+  return table && series <= kMostInRow ? static_cast<int>(series) : columns_for(times * sweep.runs.size());
+}
+
+void check_size(const SweepOptions& options, const Sweep& sweep) {
+  Eigen::Vector2i size(1, 1);
+  std::size_t pictures = 0;
+  for (const Run& run : sweep.runs) {
+    size = size.cwiseMax(run.scene.scene.render.size);
+    pictures += run.frames.size();
+  }
+  check_sheet_size(pictures, columns_of(options, sweep), size.x(), size.y());
+}
+
+void check_outputs(const SweepOptions& options, const Sweep& sweep) {
+  check_png(options.out);
+  check_distinct(options.out, sweep.csv);
+  const bool begun = fs::exists(sweep.finished);
+  if (begun && !options.resume && !options.force)
+    throw OutputError(sweep.finished.string() +
+                      ": holds an unfinished sweep; continue with --resume, or start again with --force");
+  const bool replace = options.force || (options.resume && begun);
+  check_file(options.out, replace);
+  check_file(sweep.csv, replace);
+}
+
+// --- Finished runs on disk ---
+
+/// Under a name made of all that the result depends on, so that only what is still true is found again.
+std::string key_of(const Run& run, const ModelLibrary& models) {
+  return text_hash(settings_key(run.scene, models) + fmt::format(" {}", fmt::join(run.frames, ",")));
+}
+
+fs::path picture_path(const fs::path& folder, const std::string& key, int frame) {
+  return folder / fmt::format("{}-{}.png", key, frame);
+}
+
+void keep(const Run& run, const fs::path& folder, const std::string& key) {
+  for (std::size_t i = 0; i < run.pictures.size(); ++i)
+    render::write_png(picture_path(folder, key, run.frames[i]), run.pictures[i]);
+  const Json json = {{"figures", run.figures}, {"fault", run.fault}, {"code", run.code}};
+  write_text_file((folder / (key + ".json")).string(), json.dump() + "\n");  // last: then it is whole
+}
+
+bool restore(Run& run, const fs::path& folder, const std::string& key) {
+  std::ifstream in(folder / (key + ".json"));
+  const Json json = Json::parse(in, nullptr, false);
+  if (!json.is_object()) return false;
+  try {
+    run.figures = json.at("figures").get<Figures>();
+    run.fault = json.at("fault").get<std::string>();
+    run.code = json.at("code").get<int>();
+    for (const int frame : run.frames)
+      if (run.fault.empty()) run.pictures.push_back(render::read_image(picture_path(folder, key, frame)));
+  } catch (const std::exception&) {  // damaged: run it again
+    run.pictures.clear();
+    return false;
+  }
+  return true;
+}
+
+// --- The work ---
+
+class Album : public render::FrameSink {
+ public:
+  explicit Album(std::vector<render::Image>& pictures) : pictures_(pictures) {}
+  void write(int, const render::Image& image) override { pictures_.push_back(image); }
+  void close() override {}
+
+ private:
+  std::vector<render::Image>& pictures_;
+};
+
+void fail(Run& run, const std::string& fault, int code) {
+  run.fault = fault;
+  run.code = code;
+  run.figures.clear();
+  run.pictures.clear();
+}
+
+/// Simulates and draws one combination. That its physics or its models are impossible is a result too. False
+/// if it was interrupted.
+bool produce(Run& run, const SweepOptions& options, const fs::path& folder) {
+  try {
+    std::vector<Problem> warnings;
+    const ModelLibrary models(run.scene.scene, run.scene.folder, options.scene.decompositions(), warnings);
+    const std::string key = key_of(run, models);
+    if (options.resume && restore(run, folder, key)) return true;
+    try {
+      Album album(run.pictures);
+      const RunStats stats =
+          render_frames(run.scene, models, {.frames = run.frames, .threads = 1, .cache = {}}, album, {});
+      if (stats.interrupted_by) return false;
+      run.figures = figures_of(stats);
+    } catch (const DivergedError& error) {
+      fail(run, error.what(), kDiverged);
+    } catch (const SceneError& error) {
+      fail(run, error.what(), kSceneInvalid);
+    }
+    keep(run, folder, key);
+  } catch (const SceneError& error) {  // a model that cannot be read
+    fail(run, error.what(), kSceneInvalid);
+  }
+  return true;
+}
+
+double available_memory_mb() {
+  std::ifstream in("/proc/meminfo");
+  for (std::string name, rest; in >> name && std::getline(in, rest);)
+    if (name == "MemAvailable:") return std::stod(rest) / 1024;
+  return INFINITY;
+}
+
+/// Works through the runs on several threads; the first one alone, which shows how much memory one takes.
+class Crew {
+ public:
+  Crew(Sweep& sweep, const SweepOptions& options) : sweep_(sweep), options_(options) {}
+
+  /// How many runs are done.
+  std::size_t work(int jobs) {
+    work_through(1);
+    const double spare = available_memory_mb() / peak_rss_mb();
+    const auto most = static_cast<std::size_t>(std::min<double>(jobs, 1 + std::floor(spare)));
+    {
+      std::vector<std::jthread> crew;
+      for (std::size_t i = 1; i < std::min(most, sweep_.runs.size()); ++i)
+        crew.emplace_back([this] { work_through(sweep_.runs.size()); });
+      work_through(sweep_.runs.size());
+    }
+    if (failure_) std::rethrow_exception(failure_);
+    return done_;
+  }
+
+ private:
+  void work_through(std::size_t end) {
+    try {
+      while (!stop_ && !interrupt_signal()) {
+        std::size_t i = next_.load();
+        while (i < end && !next_.compare_exchange_weak(i, i + 1)) {
+        }
+        if (i >= end) return;
+        const auto start = std::chrono::steady_clock::now();
+        if (!produce(sweep_.runs[i], options_, sweep_.finished)) return;
+        report(sweep_.runs[i],
+               std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+      }
+    } catch (...) {
+      const std::lock_guard lock(mutex_);
+      if (!failure_) failure_ = std::current_exception();
+      stop_ = true;
+    }
+  }
+  void report(const Run& run, double seconds) {
+    const std::lock_guard lock(mutex_);
+    ++done_;
+    if (!run.fault.empty()) log("warning: {}: {}\n", name_of(sweep_, run), run.fault);
+    if (!options_.quiet)
+      log("run {}/{}  {}  {:.1f} s\n", done_, sweep_.runs.size(), name_of(sweep_, run), seconds);
+  }
+
+  Sweep& sweep_;
+  const SweepOptions& options_;
+  std::atomic<std::size_t> next_ = 0;
+  std::atomic<bool> stop_ = false;
+  std::mutex mutex_;
+  std::size_t done_ = 0;
+  std::exception_ptr failure_;
+};
+
+// --- After the work ---
+
+double time_of(const Run& run, int frame) {
+  return run.scene.scene.output.time_of(frame);
+}
+
+render::Image draw_sheet(const SweepOptions& options, const Sweep& sweep) {
+  const std::size_t times = sweep.runs.front().frames.size();
+  std::vector<SheetCell> cells;
+  for (const Run& run : sweep.runs)
+    for (std::size_t i = 0; i < run.frames.size(); ++i) {
+      SheetCell cell{.label = {}, .picture = {}, .fault = run.fault};
+      for (std::size_t k = 0; k < run.values.size(); ++k)
+        cell.label.push_back(sweep.variations[k].path + "=" + run.values[k]);
+      if (times > 1) cell.label.push_back(time_code(time_of(run, run.frames[i])));
+      if (i < run.pictures.size()) cell.picture = run.pictures[i];
+      cells.push_back(std::move(cell));
+    }
+  const Run& first = sweep.runs.front();
+  std::vector<std::string> heading = {
+      fmt::format("{}  at {}", first.scene.scene.name, time_code(time_of(first, first.frames.front())))};
+  for (std::size_t i = 1; i < times; ++i)
+    heading.front() += ", " + time_code(time_of(first, first.frames[i]));
+  for (const Variation& variation : sweep.variations)
+    heading.push_back(fmt::format("{} = {}", variation.path, fmt::join(variation.values, ", ")));
+  return contact_sheet(heading, cells, columns_of(options, sweep));
+}
+
+std::string table(const Sweep& sweep) {
+  std::vector<Figures> rows;
+  for (std::size_t i = 0; i < sweep.runs.size(); ++i) {
+    const Run& run = sweep.runs[i];
+    Figures row = {{"run", std::to_string(i + 1)}};
+    for (std::size_t k = 0; k < run.values.size(); ++k)
+      row.emplace_back(sweep.variations[k].path, run.values[k]);
+    row.emplace_back("time", fmt::format("{}", time_of(run, run.frames.back())));
+    row.insert(row.end(), run.figures.begin(), run.figures.end());
+    row.emplace_back("fault", run.fault);
+    rows.push_back(std::move(row));
+  }
+  return to_csv(rows);
+}
+
+}  // namespace
+
+int sweep_command(const SweepOptions& options) {
+  Sweep sweep;
+  for (const std::string& text : options.vary) sweep.variations.push_back(parse_variation(text));
+  sweep.csv = options.csv.empty() ? fs::path(options.out).replace_extension(".csv").string() : options.csv;
+  sweep.finished = options.out + ".runs";
+  load_runs(options, sweep);
+  check_size(options, sweep);
+  check_outputs(options, sweep);
+
+  const auto threads = simulation_threads(options.threads);
+  const int all_threads = threads_or_all(options.threads);
+  render::pin_environment(all_threads, options.gl);
+  std::error_code error;
+  if (options.force) fs::remove_all(sweep.finished, error);
+  fs::create_directories(sweep.finished, error);
+  if (error)
+    throw render::FileError(sweep.finished.string() + ": cannot make the folder: " + error.message());
+  const std::size_t done = Crew(sweep, options).work(options.jobs > 0 ? options.jobs : all_threads);
+  if (done < sweep.runs.size()) {
+    log("interrupted: {} of {} runs done; go on with the same command and --resume{}\n", done,
+        sweep.runs.size(), options.force ? " instead of --force" : "");
+    return 128 + interrupt_signal();
+  }
+  write_text_file(sweep.csv, table(sweep));
+  render::write_png(options.out, draw_sheet(options, sweep));
+  fs::remove_all(sweep.finished, error);
+  fmt::print("{}\n{}\n", options.out, sweep.csv);
+  int code = kOk;
+  for (const Run& run : sweep.runs) code = std::max(code, run.code);
+  return code;
+}
+
+}  // namespace offstage::producer

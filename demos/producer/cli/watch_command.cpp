@@ -1,0 +1,212 @@
+// render --watch.
+
+#include <csignal>
+#include <cstdio>
+#include <fstream>
+#include <optional>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "producer/base/interrupt.h"
+#include "producer/base/log.h"
+#include "producer/cli/commands.h"
+#include "producer/run/output.h"
+#include "producer/run/watch.h"
+#include "render/error.h"
+#include "render/sink.h"
+
+namespace offstage::producer {
+namespace {
+
+namespace fs = std::filesystem;
+using Renderer = std::function<int(const RenderOptions&)>;
+using std::chrono::milliseconds;
+
+constexpr milliseconds kStill{120};  // that files keep before they are read
+
+/// A render in a process of its own, which can be given up at any time and cannot take the watch with it.
+class RenderProcess {
+ public:
+  RenderProcess(const RenderOptions& options, const Renderer& render) {
+    std::fflush(stdout);
+    const pid_t parent = getpid();
+    pid_ = fork();
+    if (pid_ < 0) throw render::FileError("the render could not be started");
+    if (pid_ == 0) become_render(options, render, parent);
+  }
+  ~RenderProcess() {
+    if (pid_ <= 0) return;
+    kill(pid_, SIGKILL);
+    waitpid(pid_, nullptr, 0);
+  }
+  RenderProcess(const RenderProcess&) = delete;
+  RenderProcess& operator=(const RenderProcess&) = delete;
+
+  /// Its exit code, or -1 if it crashed; nothing while it works.
+  std::optional<int> result() {
+    int status = 0;
+    if (waitpid(pid_, &status, WNOHANG) != pid_) return {};
+    pid_ = -1;
+    if (WIFEXITED(status)) return WEXITSTATUS(status);
+    log("offstage: the render ended by signal {}\n", WTERMSIG(status));
+    return -1;
+  }
+
+ private:
+  [[noreturn]] static void become_render(const RenderOptions& options, const Renderer& render, pid_t parent) {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (getppid() != parent) _exit(1);
+    // The watch gets the Ctrl-C and ends this process; what it prints as its result is a temporary name.
+    std::signal(SIGINT, SIG_IGN);
+    std::signal(SIGTERM, SIG_IGN);
+    if (const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC); nowhere >= 0)
+      dup2(nowhere, STDOUT_FILENO);
+    const int code = render(options);
+    std::fflush(stdout);
+    _exit(code);
+  }
+
+  pid_t pid_ = -1;
+};
+
+/// A hidden folder beside the output for the result that is being made; it goes with the object.
+class Workshop {
+ public:
+  explicit Workshop(const fs::path& output) {
+    static int number = 0;
+    const fs::path beside = output.has_parent_path() ? output.parent_path() : ".";
+    fs::create_directories(beside);
+    folder_ = beside / fmt::format(".{}.watch-{}-{}", output.filename().string(), getpid(), ++number);
+    fs::create_directory(folder_);
+  }
+  ~Workshop() {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
+  Workshop(const Workshop&) = delete;
+  Workshop& operator=(const Workshop&) = delete;
+
+  const fs::path& folder() const { return folder_; }
+
+ private:
+  fs::path folder_;
+};
+
+/// The frames that the manifest of a folder lists, with their channels, and that are there.
+std::set<fs::path> frames_in(const fs::path& pattern) {
+  std::set<fs::path> frames;
+  std::ifstream in(pattern.parent_path() / "manifest.json");
+  const auto manifest = nlohmann::json::parse(in, nullptr, false);
+  if (!manifest.is_object() || manifest.value("pattern", std::string()) != pattern.filename().string())
+    return frames;
+  const fs::path stem = fs::path(pattern).replace_extension();
+  for (int frame = 1; frame <= manifest.value("frames", 0); ++frame) {
+    std::vector<fs::path> files = all_channel_files(stem, frame);
+    files.push_back(render::frame_path(pattern, frame));
+    for (const fs::path& path : files)
+      if (fs::exists(path)) frames.insert(path);
+  }
+  return frames;
+}
+
+class Watcher {
+ public:
+  Watcher(const RenderOptions& options, const Renderer& render)
+      : options_(options), render_(render), target_(parse_output(options.out)) {
+    if (options.scene.from_standard_input())
+      throw OutputError("--watch needs a scene file that can change; standard input cannot");
+    if (target_.kind == OutputKind::pipe)
+      throw OutputError("--watch needs an output that can be replaced; standard output cannot");
+    if (target_.kind == OutputKind::video) {
+      check_file(target_.path.string(), options.force);
+    } else if (!options.force && fs::exists(folder() / "manifest.json")) {
+      throw OutputError(folder().string() + ": holds frames already; let them be replaced with --force");
+    }
+    check_file(options.stats, options.force);
+  }
+
+  int run() {
+    while (!interrupt_signal()) {
+      FileWatch watch(files_of_scene(options_.scene.file, options_.scene.overrides()));
+      watch.settle(kStill);
+      if (watch.changed()) continue;  // and now it may be made of other files
+      const std::string hash = contents_hash(files_of_scene(options_.scene.file, options_.scene.overrides()));
+      if (hash != rendered_) render_once(watch, hash);
+      while (!watch.changed() && !interrupt_signal()) watch.wait(milliseconds(1000));
+    }
+    if (!options_.talk.quiet) log("the watch has ended\n");
+    return 128 + interrupt_signal();
+  }
+
+ private:
+  /// Renders unless the files change meanwhile: then the result would be late.
+  void render_once(FileWatch& watch, const std::string& hash) {
+    const Workshop workshop(target_.kind == OutputKind::frames ? folder() : target_.path);
+    RenderOptions options = options_;
+    options.watch = false;
+    options.force = true;
+    options.out = (workshop.folder() / target_.path.filename()).string();
+    const auto start = std::chrono::steady_clock::now();
+    RenderProcess process(options, render_);
+    std::optional<int> code;
+    while (!(code = process.result())) {
+      watch.wait(milliseconds(20));
+      if (interrupt_signal() || watch.changed()) return;
+    }
+    rendered_ = hash;
+    if (*code == 0) publish(workshop.folder());
+    if (options_.talk.quiet) return;
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+    if (*code == 0)
+      log("rendered in {:.1f} s; waiting for changes of the scene (Ctrl-C ends)\n", seconds.count());
+    else
+      log("{}; waiting for changes of the scene (Ctrl-C ends)\n",
+          published_ ? "kept the last good result" : "there is no result yet");
+  }
+
+  fs::path folder() const { return target_.path.has_parent_path() ? target_.path.parent_path() : "."; }
+
+  /// Gives the finished files their names; those of an earlier, longer film go.
+  void publish(const fs::path& made) {
+    if (target_.kind == OutputKind::video) {
+      // The video, and its folder of channels if it has any; those of an earlier film go.
+      remove_channels(channels_folder(target_.path));
+      for (const auto& entry : fs::directory_iterator(made)) {
+        const fs::path place = folder() / entry.path().filename();
+        if (entry.is_directory()) fs::remove_all(place);
+        fs::rename(entry.path(), place);
+      }
+    } else {
+      fs::create_directories(folder());
+      std::set<fs::path> stale = frames_in(target_.path);
+      for (const auto& entry : fs::directory_iterator(made)) {
+        const fs::path place = target_.path.parent_path() / entry.path().filename();
+        fs::rename(entry.path(), place);
+        stale.erase(place);
+      }
+      for (const fs::path& path : stale) fs::remove(path);
+    }
+    published_ = true;
+    fmt::print("{}\n", target_.path.string());
+    std::fflush(stdout);
+  }
+
+  const RenderOptions& options_;
+  const Renderer& render_;
+  OutputTarget target_;
+  std::string rendered_;    // hash of the files of the last render, good or not
+  bool published_ = false;  // by this watch
+};
+
+}  // namespace
+
+int watch_command(const RenderOptions& options, const std::function<int(const RenderOptions&)>& render) {
+  return Watcher(options, render).run();
+}
+
+}  // namespace offstage::producer

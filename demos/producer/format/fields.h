@@ -1,0 +1,373 @@
+#pragma once
+/// One description of each key of the scene format, from which reading, writing, the schema and the reference
+/// all follow.
+///
+/// Table<T> lists the keys of a struct T as Fields<T>; Codec<V> knows how a value of type V stands in JSON. A
+/// new key is one line in a table_*.h; a new kind of value is one Codec. Those of plain values are in
+/// values.h.
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <initializer_list>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "producer/base/error.h"
+#include "producer/base/json.h"
+#include "sim/core/types.h"
+
+namespace offstage::producer {
+
+using sim::Real;
+
+inline constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
+
+/// What a number may be: also each component of a vector, and every value that a varying number can take.
+struct Limits {
+  Real low = -kInfinity, high = kInfinity;
+  bool open_low = false, open_high = false;  ///< the bound itself is excluded
+  bool nonzero = false;                      ///< of a vector: it needs a direction
+
+  bool bounded() const { return low > -kInfinity || high < kInfinity; }
+  bool allows(Real v) const { return (open_low ? v > low : v >= low) && (open_high ? v < high : v <= high); }
+  std::string range() const;                      ///< for a table: "> 0", "0 .. 1"
+  std::string rule(std::string_view unit) const;  ///< for a sentence: "greater than 0 m"
+  void add_to(Object& schema) const;              ///< as minimum, exclusiveMaximum ...
+};
+inline constexpr Limits kPositive{.low = 0, .open_low = true};
+inline constexpr Limits kNotNegative{.low = 0};
+inline constexpr Limits kShare{.low = 0, .high = 1};
+inline constexpr Limits kDirection{.nonzero = true};
+constexpr Limits between(Real low, Real high) {
+  return {.low = low, .high = high};
+}
+constexpr Limits inside(Real low, Real high) {
+  return {.low = low, .high = high, .open_low = true, .open_high = true};
+}
+/// Greater than `low` and at most `high`.
+constexpr Limits over(Real low, Real high) {
+  return {.low = low, .high = high, .open_low = true};
+}
+
+struct Required {};
+inline constexpr Required kRequired;
+
+/// What is said of one key.
+struct Spec {
+  std::string key, help, unit;
+  Limits limits;
+  bool required = false;
+};
+
+/// Reads on past every problem and keeps them all.
+class Reader {
+ public:
+  /// `files` are the names that positions refer to.
+  explicit Reader(std::span<const std::string> files) : files_(files) {}
+
+  /// Runs f one step further down the path that messages name.
+  template <class F>
+  void within(std::string_view step, F&& f) {
+    const std::size_t length = path_.size();
+    path_ += pointer_step(step);
+    f();
+    path_.resize(length);
+  }
+  Where where(Position at) const;
+  void fail(Position at, std::string what) { problems_.push_back({where(at), std::move(what)}); }
+  /// "must be a number, got true"
+  void refuse(const Node& node, std::string_view allowed);
+
+  /// The number in `node` if it is one, within the limits.
+  std::optional<Real> number(const Node& node, const Spec& spec);
+  /// The same for a whole number; 1e6 and 3.0 are whole.
+  std::optional<int64_t> integer(const Node& node, const Spec& spec);
+  /// The list in `node` if it is one and has from `least` to `most` items.
+  const List* list(const Node& node, std::string_view allowed, std::size_t least = 0,
+                   std::size_t most = SIZE_MAX);
+  /// Which of `names` the string in `node` is.
+  std::optional<std::size_t> choice(const Node& node, std::span<const std::string> names);
+  /// Which of `names` the key "type" of an object is; without that key the first, unless it is required.
+  std::optional<std::size_t> type(const Node& node, std::span<const std::string> names, bool required);
+  /// Calls read(i, value) for each key of an object that is specs[i], at that key's path. Reports unknown
+  /// keys (other than "type" if the object is `tagged`) and required ones that are missing. `name` is what
+  /// messages call the object.
+  void keys(const Node& node, std::string_view name, std::span<const Spec* const> specs, bool tagged,
+            const std::function<void(std::size_t, const Node&)>& read);
+
+  const std::vector<Problem>& problems() const { return problems_; }
+
+ private:
+  std::span<const std::string> files_;
+  std::string path_;
+  std::vector<Problem> problems_;
+};
+
+/// How a kind of value is described: as JSON Schema, and in a word for the reference.
+struct Description {
+  Object schema;
+  std::string type;
+};
+
+/// One row of the reference.
+struct Row {
+  std::string key, type, unit, range, initial, help;
+};
+/// An object of the format with its keys, or a choice between several objects.
+struct ObjectEntry {
+  std::string name, help;
+  std::vector<Row> rows;
+  Object properties;                      ///< key to JSON Schema
+  List required;                          ///< keys
+  std::vector<std::string> alternatives;  ///< names of the objects to choose from
+
+  Node definition() const;  ///< JSON Schema
+};
+/// Every object of the format, each after the first that refers to it.
+class Catalogue {
+ public:
+  /// A reference to the named object; `describe` fills in its entry the first time.
+  Description refer(const std::string& name, std::string_view help,
+                    const std::function<void(ObjectEntry&)>& describe);
+  /// A reference to a schema that many keys share.
+  Object share(const std::string& name, const Node& schema);
+
+  const std::deque<ObjectEntry>& objects() const { return objects_; }
+  const Object& shared() const { return shared_; }
+
+ private:
+  std::deque<ObjectEntry> objects_;
+  Object shared_;
+};
+
+/// How a value of type V is read, written and described, by three static functions:
+/// - `void read(Reader&, const Node&, const Spec&, V& out)` leaves a usable `out` if the value is wrong;
+/// - `Node write(const V&)`, or `std::optional<Node>` where a value can be absent;
+/// - `Description describe(Catalogue&, const Spec&)`.
+template <class V>
+struct Codec;
+
+/// The keys of T: `kName`, `kHelp` and `static Fields<T> fields()`.
+template <class T>
+struct Table;
+template <class T>
+concept Tabled = requires {
+  Table<T>::kName;
+};
+
+/// The codec of one type, for a value at some address. What follows knows the types of values and of objects
+/// no further: two hundred keys would otherwise be as many classes of functions to compile.
+struct ValueKind {
+  void (*read)(Reader&, const Node&, const Spec&, void* out);
+  std::optional<Node> (*write)(const void* value);
+  Description (*describe)(Catalogue&, const Spec&);
+};
+template <class V>
+inline constexpr ValueKind kValueKind = {
+    [](Reader& in, const Node& node, const Spec& spec, void* out) {
+      Codec<V>::read(in, node, spec, *static_cast<V*>(out));
+    },
+    [](const void* value) -> std::optional<Node> { return Codec<V>::write(*static_cast<const V*>(value)); },
+    [](Catalogue& all, const Spec& spec) { return Codec<V>::describe(all, spec); }};
+
+/// A key of an object: what is said of it, and where its value lies in the object.
+struct Key {
+  Spec spec;
+  const ValueKind* kind;
+  std::ptrdiff_t offset;  ///< of the value in the object [bytes]
+
+  Key(const char* key, const char* help, const char* unit, Limits limits, bool required,
+      const ValueKind& value_kind, std::ptrdiff_t value_offset);
+
+  void read(Reader& in, const Node& node, void* object) const {
+    kind->read(in, node, spec, static_cast<std::byte*>(object) + offset);
+  }
+  std::optional<Node> write(const void* object) const {
+    return kind->write(static_cast<const std::byte*>(object) + offset);
+  }
+};
+
+/// An object of type T with the defaults of all its keys.
+template <class T>
+const T& initial_object() {
+  static const T object{};
+  return object;
+}
+/// Where a part of the initial object lies in it [bytes].
+template <class T, class Part>
+std::ptrdiff_t offset_in(const Part& part) {
+  return reinterpret_cast<const std::byte*>(&part) - reinterpret_cast<const std::byte*>(&initial_object<T>());
+}
+
+/// A key of objects of type T, from one of its members.
+template <class T>
+struct Field : Key {
+  template <class M, class C>
+  requires std::is_base_of_v<C, T> Field(const char* key, M C::*member, const char* help,
+                                         const char* unit = "", Limits limits = {})
+      : Field(key, member, help, unit, limits, false) {}
+  template <class M, class C>
+  Field(const char* key, M C::*member, const char* help, Required) : Field(key, member, help, "", {}, true) {}
+
+ private:
+  template <class M, class C>
+  Field(const char* key, M C::*member, const char* help, const char* unit, Limits limits, bool required)
+      : Key(key, help, unit, limits, required, kValueKind<M>, offset_in<T>(initial_object<T>().*member)) {}
+};
+
+/// Adds the keys of a part that lies at `offset` in the object.
+void append(std::vector<Key>& keys, std::span<const Key> part, std::ptrdiff_t offset);
+
+/// The keys of T, in the order of the reference.
+template <class T>
+class Fields {
+ public:
+  Fields(std::initializer_list<Field<T>> own) {
+    for (const Field<T>& field : own) keys_.push_back(field);
+  }
+
+  std::span<const Key> keys() const { return keys_; }
+
+  /// Adds more keys of its own.
+  Fields then(const Fields& more) && { return std::move(*this).add(more, 0); }
+  /// Adds the keys of a member, or of a base, that stand directly in T.
+  template <class Part>
+  Fields with(Part T::*part) && {
+    return std::move(*this).add(Table<Part>::fields(), offset_in<T>(initial_object<T>().*part));
+  }
+  template <class Base>
+  Fields with_base() && {
+    return std::move(*this).add(Table<Base>::fields(), offset_in<T, Base>(initial_object<T>()));
+  }
+
+ private:
+  std::vector<Key> keys_;
+
+  template <class Part>
+  Fields add(const Fields<Part>& part, std::ptrdiff_t offset) && {
+    append(keys_, part.keys(), offset);
+    return std::move(*this);
+  }
+};
+
+void read_object(Reader& in, const Node& node, std::string_view name, std::span<const Key> keys, bool tagged,
+                 void* object);
+Node write_object(std::span<const Key> keys, const std::string& tag, const void* object);
+/// `initial` is an object with the defaults of all keys.
+void describe_object(Catalogue& all, std::span<const Key> keys, const std::string& tag, bool tag_required,
+                     const void* initial, ObjectEntry& entry);
+
+/// Objects.
+template <Tabled T>
+struct Codec<T> {
+  static void read(Reader& in, const Node& node, const Spec&, T& out, bool tagged = false) {
+    if constexpr (requires { out.where; }) out.where = in.where(node.at);
+    read_object(in, node, Table<T>::kName, keys(), tagged, &out);
+  }
+
+  static Node write(const T& value, const std::string& tag = "") { return write_object(keys(), tag, &value); }
+
+  static Description describe(Catalogue& all, const Spec&, const std::string& tag = "",
+                              bool tag_required = false) {
+    return all.refer(Table<T>::kName, Table<T>::kHelp, [&](ObjectEntry& entry) {
+      describe_object(all, keys(), tag, tag_required, &initial_object<T>(), entry);
+    });
+  }
+
+ private:
+  static std::span<const Key> keys() {
+    static const Fields<T> all = Table<T>::fields();
+    return all.keys();
+  }
+};
+
+/// Names of an enumeration's values, in their order: `static constexpr std::array kNames`.
+template <class E>
+struct Names;
+
+std::vector<std::string> strings(std::span<const char* const> names);
+Description describe_names(std::span<const char* const> names);
+
+template <class E>
+requires std::is_enum_v<E>
+struct Codec<E> {
+  static void read(Reader& in, const Node& node, const Spec&, E& out) {
+    if (const auto i = in.choice(node, strings(Names<E>::kNames))) out = static_cast<E>(*i);
+  }
+  static Node write(E value) { return Names<E>::kNames.at(static_cast<std::size_t>(value)); }
+  static Description describe(Catalogue&, const Spec&) { return describe_names(Names<E>::kNames); }
+};
+
+/// Objects distinguished by "type": `kName`, `kHelp`, `kTags` for each alternative, `kRequired` or else the
+/// first if absent.
+template <class V>
+struct Tags;
+
+template <class... T>
+struct Codec<std::variant<T...>> {
+  using V = std::variant<T...>;
+
+  static void read(Reader& in, const Node& node, const Spec& spec, V& out) {
+    const auto which = in.type(node, strings(Tags<V>::kTags), Tags<V>::kRequired);
+    if (!which) return;
+    std::size_t i = 0;
+    ((i++ == *which ? Codec<T>::read(in, node, spec, out.template emplace<T>(), true) : void()), ...);
+  }
+  static Node write(const V& value) {
+    return std::visit(
+        [&]<class A>(const A& alternative) {
+          return Codec<A>::write(alternative, Tags<V>::kTags[value.index()]);
+        },
+        value);
+  }
+  static Description describe(Catalogue& all, const Spec& spec) {
+    return all.refer(Tags<V>::kName, Tags<V>::kHelp, [&](ObjectEntry& entry) {
+      entry.alternatives = {Table<T>::kName...};
+      std::size_t i = 0;
+      (..., (Codec<T>::describe(all, spec, Tags<V>::kTags[i], i > 0 || Tags<V>::kRequired), ++i));
+    });
+  }
+};
+
+template <class V>
+struct Codec<std::optional<V>> {
+  static void read(Reader& in, const Node& node, const Spec& spec, std::optional<V>& out) {
+    Codec<V>::read(in, node, spec, out.emplace());
+  }
+  static std::optional<Node> write(const std::optional<V>& value) {
+    return value ? std::optional<Node>(Codec<V>::write(*value)) : std::nullopt;
+  }
+  static Description describe(Catalogue& all, const Spec& spec) { return Codec<V>::describe(all, spec); }
+};
+
+Description describe_list(const Description& item);
+
+template <class V>
+struct Codec<std::vector<V>> {
+  static void read(Reader& in, const Node& node, const Spec& spec, std::vector<V>& out) {
+    const List* list = in.list(node, "a list");
+    if (!list) return;
+    out = std::vector<V>(list->size());
+    for (std::size_t i = 0; i < list->size(); ++i)
+      in.within(std::to_string(i), [&] { Codec<V>::read(in, (*list)[i], spec, out[i]); });
+  }
+  static Node write(const std::vector<V>& values) {
+    List list;
+    for (const V& value : values) list.push_back(Codec<V>::write(value));
+    return list;
+  }
+  static Description describe(Catalogue& all, const Spec& spec) {
+    return describe_list(Codec<V>::describe(all, spec));
+  }
+};
+
+}  // namespace offstage::producer

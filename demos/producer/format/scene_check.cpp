@@ -1,0 +1,562 @@
+#include "producer/format/scene_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "producer/base/shipped_files.h"
+#include "producer/base/suggest.h"
+#include "producer/format/scene_check_cloths.h"
+#include "producer/format/scene_check_joints.h"
+#include "producer/format/scene_check_particles.h"
+#include "sim/geometry/mass_properties.h"
+
+namespace offstage::producer {
+namespace {
+
+constexpr Real kUnlimited = std::numeric_limits<Real>::infinity();
+
+template <class T>
+std::vector<std::string> names_of(const std::vector<T>& objects) {
+  std::vector<std::string> names;
+  for (const T& object : objects) names.push_back(object.name);
+  return names;
+}
+
+template <class T>
+const T* find_named(const std::vector<T>& objects, const std::string& name) {
+  const auto it = std::find_if(objects.begin(), objects.end(), [&](const T& o) { return o.name == name; });
+  return it == objects.end() ? nullptr : &*it;
+}
+
+std::string step(std::size_t i) {
+  return "/" + std::to_string(i);
+}
+
+/// The mass that resists a force; infinite for what does not move; nothing for a mesh, which is not read
+/// here.
+std::optional<Real> mass_of(const Body& body) {
+  if (body.motion != sim::MotionType::dynamic) return kUnlimited;
+  if (body.mass > 0) return body.mass;
+  return std::visit(
+      [&]<class T>(const T& shape) -> std::optional<Real> {
+        if constexpr (std::is_same_v<T, MeshFile>)
+          return std::nullopt;
+        else
+          return body.density * sim::mass_properties(sim::Shape(shape)).volume;
+      },
+      body.shape);
+}
+
+class Checker {
+ public:
+  Checker(const Scene& scene, const Scene& flat, const std::filesystem::path& folder)
+      : scene_(scene), flat_(flat), folder_(folder) {
+    for (const Body& body : flat.bodies) bodies_.emplace(body.name, &body);
+    systems_ = particle_names(flat);
+    for (const std::string& name : particle_names(scene))
+      if (std::ranges::find(systems_, name) == systems_.end()) systems_.push_back(name);
+  }
+
+  Findings run() {
+    check_names();
+    check_materials();
+    check_contact_rules();
+    for (const Body& body : scene_.bodies) check_body(body);
+    check_particles(scene_, flat_, findings_);
+    check_cloths(scene_, flat_, folder_, findings_);
+    check_joints(scene_, flat_, findings_);
+    for (const Emitter& emitter : scene_.emitters) check_emitter(emitter);
+    for (const Spring& spring : scene_.springs) check_spring(spring);
+    for (const Force& force : scene_.forces)
+      std::visit(
+          [&](const auto& f) {
+            if (!f.where.path.empty()) check_force(f);  // else its type was wrong, and none was read
+          },
+          force);
+    for (const Overlay& overlay : scene_.overlays)
+      std::visit(
+          [&](const auto& o) {
+            if (!o.where.path.empty()) check_overlay(o);  // else its type was wrong, and none was read
+          },
+          overlay);
+    std::visit(
+        [&](const auto& camera) {
+          check_camera(camera);
+          check_lens(camera);
+        },
+        scene_.camera);
+    check_lights();
+    check_film();
+    return std::move(findings_);
+  }
+
+ private:
+  void fail(std::string path, std::string what) {
+    findings_.errors.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
+  }
+  void warn(std::string path, std::string what) {
+    findings_.warnings.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
+  }
+
+  // --- Names and references ---
+
+  template <class T>
+  void check_unique(const std::vector<T>& objects) {
+    std::map<std::string, std::string> owners;
+    std::set<std::string> reported;
+    for (const T& object : objects) {
+      const auto [it, fresh] = owners.emplace(object.name, object.where.path);
+      if (fresh || !reported.insert(object.where.path).second) continue;
+      fail(object.where.path + "/name", "the name '" + object.name + "' is already that of " + it->second);
+    }
+  }
+  void check_names() {
+    check_unique(scene_.materials);
+    check_unique(flat_.bodies);
+
+    check_unique(scene_.springs);
+    check_unique(flat_.cloths);
+    std::vector<NamedForce> forces;
+    for (const Force& force : scene_.forces) forces.push_back(named(force));
+    check_unique(forces);
+  }
+
+  void check_body_name(const std::string& path, const std::string& name) {
+    if (bodies_.contains(name)) return;
+    if (find_named(scene_.bodies, name))
+      return fail(path, "the body '" + name + "' has copies; name one of them, such as '" + name + "_0'");
+    fail(path, "there is no body '" + name + "'" + suggestion(name, names_of(flat_.bodies)));
+  }
+  void check_material_name(const std::string& path, const std::string& name) {
+    used_materials_.insert(name);
+    if (!name.empty() && !find_named(scene_.materials, name))
+      fail(path, "there is no material '" + name + "'" + suggestion(name, names_of(scene_.materials)));
+  }
+  void check_file(const std::string& path, const std::string& file) {
+    std::error_code error;
+    if (!file.empty() && !std::filesystem::is_regular_file(folder_ / file, error))
+      fail(path, "there is no file '" + (folder_ / file).string() + "'");
+  }
+  /// Of a model: beside the scene, or one that comes with offstage.
+  void check_model(const std::string& path, const std::string& file) {
+    std::error_code error;
+    if (!file.empty() && !std::filesystem::is_regular_file(model_file(file, folder_), error))
+      fail(path, "there is no file '" + (folder_ / file).string() + "'");
+  }
+  void check_materials() {
+    for (const Material& material : scene_.materials)
+      check_file(material.where.path + "/texture", material.texture);
+    for (const Body& body : scene_.bodies) check_material_name(body.where.path + "/material", body.material);
+    for (const Spring& spring : scene_.springs)
+      check_material_name(spring.where.path + "/material", spring.material);
+    for (const Cloth& cloth : scene_.cloths)
+      check_material_name(cloth.where.path + "/material", cloth.material);
+    check_materials_of_articulations();
+    for (const Material& material : scene_.materials)
+      if (!used_materials_.contains(material.name))
+        warn(material.where.path, "the material '" + material.name + "' is not used");
+      else
+        check_grain(material);
+  }
+  /// Friction across a grain takes a material that has it and a body that says which way the grain goes.
+  void check_grain(const Material& material) {
+    bool any = false;
+    for (const Body& body : scene_.bodies) any = any || (body.material == material.name && has_grain(body));
+    if (material.cross_friction && !any)
+      warn(material.where.path + "/cross_friction",
+           "has no effect: no body of this material has a friction_axis");
+    if (any && material.cross_friction.value_or(0) > 0 && material.friction == 0)
+      fail(material.where.path + "/cross_friction",
+           "takes a friction along the grain, too, of which it is a share; allowed is any but 0, such as "
+           "0.001");
+  }
+  static bool has_grain(const Body& body) { return !body.friction_axis.isZero(0); }
+
+  void check_contact_rules() {
+    std::map<std::pair<std::string, std::string>, std::string> owners;
+    for (const ContactRule& rule : scene_.contacts) {
+      const std::string& path = rule.where.path;
+      const auto& [a, b] = rule.materials;
+      if (a.empty() || b.empty()) continue;  // reported as what they are
+      for (std::size_t i = 0; i < 2; ++i)
+        if (const std::string& name = rule.materials[i]; !find_named(scene_.materials, name))
+          fail(path + "/materials" + step(i),
+               "there is no material '" + name + "'" + suggestion(name, names_of(scene_.materials)));
+      const auto [it, fresh] = owners.emplace(std::minmax(a, b), path);
+      if (!fresh) fail(path + "/materials", "are already those of " + it->second);
+      if (!rule.restitution && !rule.friction && !rule.static_friction)
+        warn(path, "has no effect: gives neither restitution nor friction");
+    }
+  }
+
+  template <class Key>
+  void check_times(const std::vector<Key>& keys, const std::string& path) {
+    for (std::size_t i = 1; i < keys.size(); ++i)
+      if (keys[i].time <= keys[i - 1].time)
+        fail(path + step(i) + "/time",
+             fmt::format("times must increase, got {} after {}", keys[i].time, keys[i - 1].time));
+  }
+
+  // --- Bodies ---
+
+  void check_body(const Body& body) {
+    const std::string& path = body.where.path;
+    const bool dynamic = body.motion == sim::MotionType::dynamic,
+               kinematic = body.motion == sim::MotionType::kinematic;
+    if (const MeshFile* mesh = std::get_if<MeshFile>(&body.shape))
+      check_model(path + "/shape/file", mesh->file);
+    if (body.model) check_model(path + "/model/file", body.model->file);
+    if (dynamic && std::holds_alternative<sim::Plane>(body.shape))
+      fail(path + "/shape", "a plane cannot be dynamic; give the body \"motion\": \"static\"");
+    if (!kinematic && !body.keyframes.empty())
+      fail(path + "/keyframes", "only a kinematic body follows keyframes; give it \"motion\": \"kinematic\"");
+    if (!kinematic && !body.spin.isZero(0))
+      fail(path + "/spin", "only a kinematic body spins by itself; give it \"motion\": \"kinematic\"");
+    check_times(body.keyframes, path + "/keyframes");
+    check_place(body.position, path + "/position");
+    if (const auto mass = mass_of(body); dynamic && mass && *mass > 0)
+      check_drag(scene_.world.integrator, body.linear_drag, *mass, path + "/linear_drag");
+    if (!dynamic && !body.velocity.isZero(0))
+      warn(path + "/velocity", "has no effect: the body is not dynamic");
+    if (!dynamic && !body.angular_velocity.isZero(0))
+      warn(path + "/angular_velocity", "has no effect: the body is not dynamic");
+    if (body.mass > 0 && body.density != Body{}.density)
+      warn(path + "/density", "has no effect: the mass is given");
+    const Material* material = find_named(scene_.materials, body.material);
+    if (has_grain(body) && !(material && material->cross_friction))
+      warn(path + "/friction_axis", "has no effect: the body's material has no cross_friction");
+  }
+
+  void check_place(const Vec3& position, const std::string& path) {
+    if (const auto problem = outside(scene_, position)) fail(path, *problem);
+  }
+  void check_drag(sim::IntegratorKind integrator, Real drag, Real m, const std::string& path) {
+    if (const auto problem = too_much_drag(scene_, integrator, drag, m)) fail(path, *problem);
+  }
+
+  void check_emitter(const Emitter& emitter) {
+    const std::string& path = emitter.where.path;
+    if (!emitter.body.empty()) check_body_name(path + "/body", emitter.body);
+    if (const auto* mesh = std::get_if<MeshSurface>(&emitter.surface))
+      check_model(path + "/surface/file", mesh->file);
+  }
+
+  // --- Springs ---
+
+  /// The mass at an end; nothing if it is not known or wrong.
+  std::optional<Real> check_end(const SpringEnd& end, const std::string& path) {
+    if (!end.body.empty() && !end.particles.empty()) {
+      fail(path, "must be on a body or a particle, not both");
+      return {};
+    }
+    if (end.particles.empty()) {
+      if (end.index != 0) warn(path + "/index", "has no effect: this end is not on a particle");
+      if (end.body.empty()) return kUnlimited;
+      check_body_name(path + "/body", end.body);
+      const auto body = bodies_.find(end.body);
+      return body == bodies_.end() ? std::nullopt : mass_of(*body->second);
+    }
+    if (!end.position.isZero(0)) warn(path + "/position", "has no effect: the particle has its own");
+    const ParticleGroup* group = find_named(scene_.particles, end.particles);
+    if (!group) {
+      fail(path + "/particles", "there are no particles '" + end.particles + "'" +
+                                    suggestion(end.particles, names_of(scene_.particles)));
+      return {};
+    }
+    if (static_cast<std::size_t>(end.index) < group->places.size()) return group->mass;
+    fail(path + "/index", fmt::format("must be less than {}, the number of particles of '{}', got {}",
+                                      group->places.size(), group->name, end.index));
+    return {};
+  }
+
+  /// Their bodies are in the flat scene only.
+  void check_materials_of_articulations() {
+    std::set<std::pair<std::string, std::string>> seen;
+    for (const Body& body : flat_.bodies)
+      if (body.where.path.starts_with("/articulations/") && !body.material.empty() &&
+          seen.emplace(body.where.path, body.material).second)
+        check_material_name(body.where.path, body.material);
+  }
+
+  void check_spring(const Spring& spring) {
+    const std::string& path = spring.where.path;
+    const auto a = check_end(spring.a, path + "/a"), b = check_end(spring.b, path + "/b");
+    if (!spring.a.particles.empty() && spring.a.particles == spring.b.particles &&
+        spring.a.index == spring.b.index)
+      fail(path, "has the same particle at both ends");
+    if (!a || !b || *a <= 0 || *b <= 0) return;
+    if (std::isinf(*a) && std::isinf(*b)) return warn(path, "has no effect: neither end can move");
+    // One spring alone on a point of each mass: further springs, and ends away from a centre of mass, only
+    // shorten the step it needs, so what fails here fails in the scene.
+    const Real reduced = 1 / (1 / *a + 1 / *b);
+    check_stiffness(spring.stiffness, spring.damping, reduced, path, "the spring '" + spring.name + "'");
+  }
+  void check_stiffness(Real stiffness, Real damping, Real mass, const std::string& path,
+                       const std::string& what) {
+    const Real largest = largest_stable_step(scene_.world.integrator, stiffness, damping, mass);
+    const Real used = std::min(scene_.world.step, scene_.output.fps.seconds(1));
+    if (used >= largest)
+      fail(path, fmt::format("{} is too stiff for the step: /world/step must be less than "
+                             "{:.3g} s, is {:.3g} s",
+                             what, 0.995 * largest, used));
+  }
+
+  // --- Forces ---
+
+  void check_pushed(const std::string& path, const std::string& name, const Body* body) {
+    if (body && body->motion != sim::MotionType::dynamic)
+      warn(path, "has no effect: the body '" + name + "' is not dynamic");
+  }
+  void check_pushed(const NamedForce& force, const std::vector<std::string>& bodies) {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const Body* all_copies = find_named(scene_.bodies, bodies[i]);
+      const std::string path = force.where.path + "/bodies" + step(i);
+      check_pushed(path, bodies[i], all_copies ? all_copies : named_body(path, bodies[i]));
+    }
+  }
+  void check_period(const NamedForce& force, Real start, Real end) {
+    if (end <= start) fail(force.where.path + "/end", fmt::format("must be after the start, {} s", start));
+  }
+  void check_systems(const NamedForce& force, const std::vector<std::string>& particles) {
+    for (std::size_t i = 0; i < particles.size(); ++i)
+      if (std::ranges::find(systems_, particles[i]) == systems_.end())
+        fail(force.where.path + "/particles" + step(i),
+             "there are no particles '" + particles[i] + "'" + suggestion(particles[i], systems_));
+  }
+  void check_cloth_names(const NamedForce& force, const std::vector<std::string>& cloths) {
+    for (std::size_t i = 0; i < cloths.size(); ++i)
+      if (!find_named(scene_.cloths, cloths[i]) && !find_named(flat_.cloths, cloths[i]))
+        fail(force.where.path + "/cloths" + step(i),
+             "there is no cloth '" + cloths[i] + "'" + suggestion(cloths[i], names_of(flat_.cloths)));
+  }
+  void check_region(const std::string& path, const sim::Region& region, int drop_rate) {
+    if (drop_rate > 0 && std::holds_alternative<sim::Everywhere>(region))
+      warn(path + "/drop_rate", "has no effect without a region");
+  }
+  void check_scope(const FieldScope& field) {
+    check_pushed(field, field.bodies);
+    check_systems(field, field.particles);
+    check_cloth_names(field, field.cloths);
+    check_period(field, field.start, field.end);
+    check_region(field.where.path, field.region, field.drop_rate);
+  }
+  /// Whether a list names a body, or what it is a copy of.
+  bool names(const std::vector<std::string>& bodies, const Body& body) const {
+    return std::ranges::any_of(bodies, [&](const std::string& name) {
+      const Body* original = find_named(scene_.bodies, name);
+      return name == body.name || (original && original->where.path == body.where.path);
+    });
+  }
+  void check_force(const ConstantField& field) { check_scope(field); }
+  void check_force(const PointField& field) { check_scope(field); }
+  void check_force(const VortexField& vortex) { check_scope(vortex); }
+  void check_force(const TurbulenceField& turbulence) { check_scope(turbulence); }
+  void check_force(const PairScope& force) {
+    check_systems(force, force.particles);
+    check_period(force, force.start, force.end);
+    check_region(force.where.path, force.region, force.drop_rate);
+    if (force.particles.empty() && !force.where.path.empty())
+      warn(force.where.path + "/particles", "has no effect: names none");
+  }
+  void check_force(const WindField& wind) {
+    check_scope(wind);
+    Real lightest = kUnlimited;
+    for (const Body& body : flat_.bodies)
+      if (names(wind.bodies, body) || (wind.bodies.empty() && wind.particles.empty() && wind.cloths.empty()))
+        lightest = std::min(lightest, mass_of(body).value_or(kUnlimited));
+    if (lightest > 0) check_drag(scene_.world.integrator, wind.drag, lightest, wind.where.path + "/drag");
+  }
+  void check_force(const Grab& grab) {
+    const std::string& path = grab.where.path;
+    check_systems(grab, grab.particles);
+    check_cloth_names(grab, grab.cloths);
+    if (grab.body.empty() && grab.particles.empty() && grab.cloths.empty())
+      fail(path, "needs a \"body\", \"particles\" or \"cloths\" to hold");
+    if (!grab.body.empty()) check_pushed(path + "/body", grab.body, named_body(path + "/body", grab.body));
+    check_period(grab, grab.start, grab.end);
+    if (grab.keyframes.empty()) fail(path, "needs at least one of \"keyframes\"");
+    check_times(grab.keyframes, path + "/keyframes");
+    const auto body = bodies_.find(grab.body);
+    const auto mass = body == bodies_.end() ? std::nullopt : mass_of(*body->second);
+    if (mass && *mass > 0 && std::isfinite(*mass))
+      check_stiffness(grab.stiffness, grab.damping, *mass, path, "the grab '" + grab.name + "'");
+  }
+  void check_force(const Explosion& explosion) {
+    check_pushed(explosion, explosion.bodies);
+    check_systems(explosion, explosion.particles);
+    check_cloth_names(explosion, explosion.cloths);
+  }
+
+  // --- Overlays ---
+
+  /// The body of that name; reports if there is none.
+  const Body* named_body(const std::string& path, const std::string& name) {
+    check_body_name(path, name);
+    const auto body = bodies_.find(name);
+    return body == bodies_.end() ? nullptr : body->second;
+  }
+  void check_mesh_body(const std::string& path, const std::string& name) {
+    const Body* body = named_body(path, name);
+    if (body && !std::holds_alternative<MeshFile>(body->shape))
+      fail(path, "the body '" + name + "' has no mesh");
+  }
+  void check_pair(const std::string& path, const std::string& a, const std::string& b) {
+    const Body *first = named_body(path + "/a", a), *second = named_body(path + "/b", b);
+    if (a == b) return fail(path + "/b", "is the same body as a");
+    const auto is_plane = [](const Body* body) {
+      return body && std::holds_alternative<sim::Plane>(body->shape);
+    };
+    if (is_plane(first) && is_plane(second)) fail(path, "two planes have no contact that could be shown");
+  }
+  void check_not_random(const std::string& path, const Varying& v) {
+    if (!std::holds_alternative<Real>(v) && !std::holds_alternative<effects::Curve>(v))
+      fail(path, "must be a number or a curve over time: nothing here is random");
+  }
+  void check_overlay(const TreeOverlay& overlay) {
+    check_mesh_body(overlay.where.path + "/body", overlay.body);
+    check_not_random(overlay.where.path + "/level", overlay.level);
+  }
+  void check_overlay(const PartsOverlay& overlay) {
+    check_mesh_body(overlay.where.path + "/body", overlay.body);
+    check_not_random(overlay.where.path + "/explode", overlay.explode);
+  }
+  void check_overlay(const ClosestOverlay& overlay) { check_pair(overlay.where.path, overlay.a, overlay.b); }
+  void check_overlay(const ContactsOverlay& overlay) {
+    if (!overlay.a.empty() || !overlay.b.empty()) check_pair(overlay.where.path, overlay.a, overlay.b);
+  }
+  void check_overlay(const VelocitiesOverlay& overlay) {
+    const std::string path = overlay.where.path + "/body";
+    const Body* body = overlay.body.empty() ? nullptr : named_body(path, overlay.body);
+    if (body && body->motion == sim::MotionType::fixed)
+      warn(path, "shows nothing: the body '" + overlay.body + "' is static");
+  }
+  void check_overlay(const IslandsOverlay&) {}
+  void check_overlay(const TrailsOverlay& overlay) {
+    if (!overlay.body.empty()) named_body(overlay.where.path + "/body", overlay.body);
+  }
+  void check_overlay(const TextOverlay& overlay) {
+    if (overlay.until && *overlay.until <= overlay.from)
+      fail(overlay.where.path + "/until", "must be later than from");
+  }
+  void check_overlay(const JointsOverlay& overlay) {
+    if (!overlay.joint.empty() && !find_named(flat_.joints, overlay.joint))
+      fail(overlay.where.path + "/joint",
+           "there is no joint '" + overlay.joint + "'" + suggestion(overlay.joint, names_of(flat_.joints)));
+  }
+  void check_overlay(const ClothOverlay& overlay) {
+    if (!overlay.cloth.empty() && !find_named(flat_.cloths, overlay.cloth))
+      fail(overlay.where.path + "/cloth",
+           "there is no cloth '" + overlay.cloth + "'" + suggestion(overlay.cloth, names_of(flat_.cloths)));
+  }
+
+  // --- Camera, light, film ---
+
+  void check_view(const Vec3& eye, const Vec3& target, const std::string& path) {
+    if (eye == target) fail(path, "the camera is where it looks at");
+  }
+  void check_camera(const StaticCamera& camera) { check_view(camera.eye, camera.target, "/camera"); }
+  void check_camera(const KeyframedCamera& camera) {
+    if (camera.keyframes.empty()) fail("/camera", "needs at least one of \"keyframes\"");
+    check_times(camera.keyframes, "/camera/keyframes");
+    for (std::size_t i = 0; i < camera.keyframes.size(); ++i)
+      check_view(camera.keyframes[i].eye, camera.keyframes[i].target, "/camera/keyframes" + step(i));
+  }
+  void check_camera(const OrbitCamera&) {}
+  void check_camera(const FollowCamera& camera) {
+    if (!camera.body.empty()) check_body_name("/camera/body", camera.body);
+    check_view(camera.offset, camera.look_offset, "/camera");
+  }
+
+  void check_lens(const Lens& lens) {
+    if (!lens.focus_on.empty()) check_body_name("/camera/focus_on", lens.focus_on);
+    if (!lens.look_at.empty()) check_body_name("/camera/look_at", lens.look_at);
+    for (std::size_t i = 0; i < lens.fit.size(); ++i) check_body_name("/camera/fit" + step(i), lens.fit[i]);
+  }
+
+  void check_light(const SunLight& sun, const std::string& path) {
+    if (sun.direction.y() <= 0)
+      fail(path + "/direction", "the sun must be above the horizon: y must be greater than 0");
+  }
+  void check_lamp(const LampBase& lamp, const std::string& path) {
+    if (!lamp.body.empty()) check_body_name(path + "/body", lamp.body);
+    check_not_random(path + "/intensity", lamp.intensity);
+  }
+  void check_light(const PointLight& light, const std::string& path) { check_lamp(light, path); }
+  template <class Directed>
+  void check_light(const Directed& light, const std::string& path) {
+    check_lamp(light, path);
+    if (light.target == light.position) fail(path + "/target", "is where the light is");
+  }
+  void check_lights() {
+    constexpr std::size_t kMostLamps = 8;
+    std::size_t suns = 0, lamps = 0;
+    for (std::size_t i = 0; i < scene_.lights.size(); ++i) {
+      const std::string path = "/lights" + step(i);
+      ++(std::holds_alternative<SunLight>(scene_.lights[i]) ? suns : lamps);
+      if (suns > 1) fail(path, "there can be only one sun");
+      if (lamps > kMostLamps)
+        fail(path, fmt::format("there can be only {} lights besides the sun", kMostLamps));
+      std::visit([&](const auto& light) { check_light(light, path); }, scene_.lights[i]);
+    }
+  }
+
+  void check_film() {
+    check_not_random("/render/exposure", scene_.render.exposure);
+    const auto& size = scene_.render.size;
+    if (size.x() % 2 != 0 || size.y() % 2 != 0)
+      warn("/render/size", "is odd: most video formats need even numbers");
+    if (scene_.frame_count() < 1)
+      fail("/output/duration",
+           fmt::format("is too short for a single frame at {} frames per second", scene_.output.fps.text()));
+  }
+
+  const Scene& scene_;
+  const Scene& flat_;
+  std::filesystem::path folder_;
+  std::map<std::string, const Body*> bodies_;  // with their copies, by name
+  std::vector<std::string> systems_;           // of particles
+  std::set<std::string> used_materials_;
+  Findings findings_;
+};
+
+}  // namespace
+
+Findings check_scene(const Scene& scene, const Scene& flat, const std::filesystem::path& folder) {
+  return Checker(scene, flat, folder).run();
+}
+
+Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real c, Real m) {
+  // x'' = -(k/m) x and v' = -(c/m) v: the ends of the stability region on the imaginary and on the negative
+  // real axis. The Euler methods, the leapfrog and the midpoint rule share 2; Runge-Kutta 4 has 2 sqrt(2)
+  // and 2.785. The implicit method has no end, and the others, from there on, find their own step.
+  if (integrator >= sim::IntegratorKind::implicit_euler) return kUnlimited;
+  const bool rk4 = integrator == sim::IntegratorKind::rk4;
+  const Real by_stiffness = (rk4 ? 2 * std::sqrt(2.0) : 2) * std::sqrt(m / k),
+             by_damping = (rk4 ? 2.785 : 2) * m / c;
+  return std::min(by_stiffness, by_damping);
+}
+
+std::optional<std::string> too_much_drag(const Scene& scene, sim::IntegratorKind integrator, Real drag,
+                                         Real m) {
+  const Real largest = largest_stable_step(integrator, 0, drag, m),
+             used = std::min(scene.world.step, scene.output.fps.seconds(1));
+  if (drag <= 0 || used < largest) return {};
+  return fmt::format(
+      "is too much for the step and so small a mass: /world/step must be less than {:.3g} s, is {:.3g} s",
+      0.995 * largest, used);
+}
+
+std::optional<std::string> outside(const Scene& scene, const Vec3& position) {
+  if (position.cwiseAbs().maxCoeff() < scene.world.bounds) return {};
+  return fmt::format("is outside the world, which ends {:g} m from the origin; see /world/bounds",
+                     scene.world.bounds);
+}
+
+}  // namespace offstage::producer

@@ -1,0 +1,85 @@
+#include "producer/format/scene_check_cloths.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "producer/base/shipped_files.h"
+#include "producer/base/suggest.h"
+#include "producer/build/cloth_defs.h"
+
+namespace offstage::producer {
+namespace {
+
+class ClothChecker {
+ public:
+  ClothChecker(const Scene& scene, const Scene& flat, const std::filesystem::path& folder, Findings& findings)
+      : scene_(scene), flat_(flat), folder_(folder), findings_(findings) {}
+
+  void check(const Cloth& cloth) {
+    const std::string& path = cloth.where.path;
+    if (!effects::find_fabric(cloth.fabric))
+      return fail(path + "/fabric",
+                  "there is no fabric '" + cloth.fabric + "'" + suggestion(cloth.fabric, fabric_names()));
+    for (const ClothPin& pin : cloth.pins) check_body(scope_of(pin));
+    if (const auto* mesh = std::get_if<MeshFile>(&cloth.shape)) {
+      std::error_code error;
+      if (!mesh->file.empty() && !std::filesystem::is_regular_file(model_file(mesh->file, folder_), error))
+        fail(path + "/shape/file", "there is no file '" + (folder_ / mesh->file).string() + "'");
+      return;
+    }
+    try {
+      check_grid(cloth, flat_cloth(cloth, nullptr));
+    } catch (const std::invalid_argument& error) {
+      fail(path, error.what());
+    }
+  }
+
+ private:
+  void fail(std::string path, std::string what) {
+    findings_.errors.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
+  }
+
+  void check_body(const PinScope& pin) {
+    if (pin.body.empty() || std::ranges::find(flat_.bodies, pin.body, &Body::name) != flat_.bodies.end())
+      return;
+    std::vector<std::string> names;
+    for (const Body& body : flat_.bodies) names.push_back(body.name);
+    fail(pin.where.path + "/body", "there is no body '" + pin.body + "'" + suggestion(pin.body, names));
+  }
+
+  void check_grid(const Cloth& cloth, FlatCloth flat) {
+    for (const ClothPin& pin : cloth.pins) {
+      const PinScope& scope = scope_of(pin);
+      if (scope.where.path.empty()) continue;  // its type was wrong, and none was read
+      const std::vector<uint32_t> held = pinned_vertices(pin, cloth, flat);
+      if (held.empty()) fail(scope.where.path, "holds no vertex of the cloth; " + extent(flat));
+    }
+    if (const std::string what = sim::problem(flat.def); !what.empty()) return fail(cloth.where.path, what);
+    if (const auto what = too_stiff(scene_, flat.def)) fail(cloth.where.path, *what);
+  }
+
+  static std::string extent(const FlatCloth& flat) {
+    sim::Aabb box;
+    for (const Vec3& p : flat.places) box.extend(p);
+    const auto &a = box.min(), &b = box.max();
+    return fmt::format("in its own frame it reaches from ({:g}, {:g}, {:g}) to ({:g}, {:g}, {:g})", a.x(),
+                       a.y(), a.z(), b.x(), b.y(), b.z());
+  }
+
+  const Scene& scene_;
+  const Scene& flat_;
+  std::filesystem::path folder_;
+  Findings& findings_;
+};
+
+}  // namespace
+
+void check_cloths(const Scene& scene, const Scene& flat, const std::filesystem::path& folder,
+                  Findings& findings) {
+  ClothChecker checker(scene, flat, folder, findings);
+  for (const Cloth& cloth : scene.cloths) checker.check(cloth);
+}
+
+}  // namespace offstage::producer

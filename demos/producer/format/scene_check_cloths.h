@@ -1,0 +1,15 @@
+#pragma once
+/// Checks of cloths, for scene_check.h.
+
+#include <filesystem>
+
+#include "producer/format/scene_check.h"
+
+namespace offstage::producer {
+
+/// Adds what is wrong with the cloths of a scene as described; `flat`: with its placements expanded. What
+/// takes the triangles of a file, only the simulation finds out.
+void check_cloths(const Scene& scene, const Scene& flat, const std::filesystem::path& folder,
+                  Findings& findings);
+
+}  // namespace offstage::producer

@@ -1,0 +1,169 @@
+#include "producer/format/scene_check_joints.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "producer/base/suggest.h"
+#include "producer/build/articulation_defs.h"
+
+namespace offstage::producer {
+namespace {
+
+constexpr Real kMostSteering = 35;  // [degrees]
+
+class JointChecker {
+ public:
+  JointChecker(const Scene& scene, const Scene& flat, Findings& findings)
+      : scene_(scene), flat_(flat), findings_(findings) {}
+
+  void run() {
+    check_unique();
+    for (const Joint& joint : scene_.joints) check(joint);
+    for (const ArticulationTemplate& articulation : scene_.articulations)
+      std::visit(
+          [this](const auto& a) {
+            if (!a.where.path.empty()) check(a);  // else its type was wrong, and none was read
+          },
+          articulation);
+  }
+
+ private:
+  void fail(std::string path, std::string what) {
+    findings_.errors.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
+  }
+
+  void check_unique() {
+    std::set<std::string> names;
+    for (const Joint& joint : flat_.joints)
+      if (!names.insert(joint.name).second)
+        return fail(joint.where.path + "/name",
+                    "the name '" + joint.name + "' is already that of another joint");
+  }
+
+  const Body* body(const std::string& path, const std::string& name) {
+    for (const std::vector<Body>* bodies : {&flat_.bodies, &scene_.bodies}) {
+      const auto it = std::ranges::find(*bodies, name, &Body::name);
+      if (it != bodies->end()) return &*it;
+    }
+    std::vector<std::string> names;
+    for (const Body& b : flat_.bodies) names.push_back(b.name);
+    fail(path, "there is no body '" + name + "'" + suggestion(name, names));
+    return nullptr;
+  }
+
+  void check(const Joint& joint) {
+    const std::string& path = joint.where.path;
+    const Body* a = joint.a.empty() ? nullptr : body(path + "/a", joint.a);
+    const Body* b = joint.b.empty() ? nullptr : body(path + "/b", joint.b);
+    if (!joint.a.empty() && joint.a == joint.b) fail(path + "/b", "is the same body as \"a\"");
+    const auto moves = [](const Body* body) { return body && body->motion == sim::MotionType::dynamic; };
+    if (a && (joint.b.empty() || b) && !moves(a) && !moves(b))
+      fail(path, "joins nothing that forces can move: one of its bodies must be dynamic");
+    check(path, joint.behaviour);
+  }
+
+  void check(const std::string& path, const JointBehaviour& joint) {
+    using enum sim::JointType;
+    const bool slides = joint.type == prismatic || joint.type == distance;
+    if (joint.limits && !slides)
+      fail(path + "/limits", "is for prismatic and distance joints; use \"limits_deg\"");
+    if (joint.limits_deg && slides) fail(path + "/limits_deg", "is for joints that turn; use \"limits\"");
+    check_limits(path + "/limits", joint.limits);
+    check_limits(path + "/limits_deg", joint.limits_deg);
+    if (joint.limits_deg && joint.type == fixed)
+      fail(path + "/limits_deg", "is for joints that turn; a fixed one does not");
+    if (joint.swing_deg && joint.type != spherical && joint.type != universal)
+      fail(path + "/swing_deg", "is for spherical and universal joints");
+    Joint whole;
+    whole.behaviour = joint;
+    if (!joint_def(whole).has_free_coordinate())
+      for (const auto& [key, value] : {std::pair("/friction", joint.friction), {"/damping", joint.damping}})
+        if (value > 0)
+          fail(path + key,
+               "acts where a joint may move: not on a fixed one, nor on a rod without limits and motor");
+    if (!joint.motor) return;
+    if (joint.type != revolute && !slides)
+      fail(path + "/motor", "drives revolute, prismatic and distance joints only");
+    check_keys(path + "/motor/keys", joint.motor->keys);
+  }
+
+  void check_limits(const std::string& path, const std::optional<std::array<Real, 2>>& limits) {
+    if (limits && !((*limits)[0] <= 0 && (*limits)[1] >= 0))
+      fail(path, "must be a range that contains 0, where the joint is at time 0");
+  }
+
+  void check_keys(const std::string& path, const std::vector<MotorKey>& keys) {
+    for (std::size_t i = 1; i < keys.size(); ++i)
+      if (!(keys[i].time > keys[i - 1].time))
+        fail(path + "/" + std::to_string(i) + "/time", "must be later than that of the key before");
+  }
+
+  void check(const Chain& chain) {
+    if ((chain.to - chain.from).norm() < 1e-6) fail(chain.where.path + "/to", "is where \"from\" is");
+    const auto is_still = [this](const std::string& end) {
+      const auto it = std::ranges::find(flat_.bodies, end, &Body::name);
+      return end == "world" || (it != flat_.bodies.end() && it->motion != sim::MotionType::dynamic);
+    };
+    if (is_still(chain.start) && is_still(chain.end) && chain.sag < 1.0005)
+      fail(chain.where.path + "/sag",
+           "must be over 1.0005 if both ends are held still: a taut chain bears nothing across");
+    for (const auto& [key, end] : {std::pair("/start", &chain.start), {"/end", &chain.end}})
+      if (!end->empty() && *end != "world") body(chain.where.path + key, *end);
+  }
+  void check(const Bridge& bridge) {
+    const Vec3 across = bridge.to - bridge.from;
+    if (across.cross(Vec3::UnitY()).norm() < 1e-3 * across.norm() || across.norm() < 1e-6)
+      fail(bridge.where.path + "/to", "must be away from \"from\", not straight above or below it");
+  }
+  void check(const Ragdoll&) {}
+  void check(const Vehicle& vehicle) {
+    const std::string& path = vehicle.where.path;
+    check_keys(path + "/speed", vehicle.speed);
+    check_keys(path + "/steer", vehicle.steer);
+    for (std::size_t i = 0; i < vehicle.steer.size(); ++i)
+      if (!(std::abs(vehicle.steer[i].target) <= kMostSteering))
+        fail(path + "/steer/" + std::to_string(i) + "/target", "must be from -35 to 35 degrees");
+    if (!(vehicle.wheel_radius <= 0.2 * std::min(vehicle.length, 2 * vehicle.width)))
+      fail(path + "/wheel_radius", "must be at most a fifth of the length and two fifths of the width");
+  }
+  void check(const Crane& crane) {
+    const std::string& path = crane.where.path;
+    for (const auto& [key, keys] :
+         {std::pair("/slew", &crane.slew), {"/trolley", &crane.trolley}, {"/hoist", &crane.hoist}})
+      check_keys(path + key, *keys);
+    if (!(crane.load_size <= 0.25 * std::min(crane.height, crane.reach)))
+      fail(path + "/load_size", "must be at most a quarter of the height and of the reach");
+  }
+  void check(const ModelTree& tree) {
+    const std::string& path = tree.where.path;
+    if (!tree.base.empty() && tree.base != "world") body(path + "/base", tree.base);
+    std::vector<std::string> names;
+    for (const ModelTree::Link& link : tree.links) names.push_back(link.name);
+    std::set<std::string> seen;
+    for (const NodeJoint& joint : tree.joints) {
+      check(joint.where.path, joint.behaviour);
+      if (joint.behaviour.type == sim::JointType::distance)
+        fail(joint.where.path + "/type",
+             "must be another: a node and the one above it have no distance to keep");
+      if (!names.empty() && std::ranges::find(names, joint.node) == names.end())
+        fail(joint.where.path + "/node",
+             tree.file + " has no node '" + joint.node + "' with triangles" + suggestion(joint.node, names));
+      else if (!seen.insert(joint.node).second)
+        fail(joint.where.path + "/node", "has a joint already");
+    }
+  }
+
+  const Scene &scene_, &flat_;
+  Findings& findings_;
+};
+
+}  // namespace
+
+void check_joints(const Scene& scene, const Scene& flat, Findings& findings) {
+  JointChecker(scene, flat, findings).run();
+}
+
+}  // namespace offstage::producer

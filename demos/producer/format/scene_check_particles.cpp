@@ -1,0 +1,252 @@
+#include "producer/format/scene_check_particles.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "producer/build/emitter_defs.h"
+#include "producer/build/placement.h"
+
+namespace offstage::producer {
+namespace {
+
+constexpr Real kMostParticles = 2e7;
+constexpr Real kTolerance = 1.01;  // one that ends and one that begins at the same time are both counted
+constexpr Real kSmallest = 1e-6;   // radius [m]
+
+std::string index_step(std::size_t i) {
+  return "/" + std::to_string(i);
+}
+
+Real film_end(const Scene& scene) {
+  return scene.output.start + scene.output.duration;
+}
+
+/// The smallest width of a surface; infinite for a model, which is not read here.
+Real spread_of(const EmitterSurface& surface) {
+  return std::visit(
+      []<class S>(const S& s) {
+        if constexpr (std::is_same_v<S, PlaneSurface>)
+          return s.size.minCoeff();
+        else if constexpr (requires { s.radius; })
+          return 2 * s.radius;
+        else
+          return std::numeric_limits<Real>::infinity();
+      },
+      surface);
+}
+
+class ParticleChecker {
+ public:
+  ParticleChecker(const Scene& scene, const Scene& flat, Findings& findings)
+      : scene_(scene), flat_(flat), findings_(findings) {}
+
+  void run() {
+    for (const ParticleGroup& group : scene_.particles) check_group(group);
+    for (const Emitter& emitter : scene_.emitters) check_emitter(emitter);
+    check_names();
+    if (!too_many_) check_sum();
+  }
+
+ private:
+  void fail(std::string path, std::string what) {
+    findings_.errors.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
+  }
+  void warn(std::string path, std::string what) {
+    findings_.warnings.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
+  }
+
+  /// Groups and sources have one space of names, since forces name either.
+  void check_names() {
+    std::map<std::string, std::string> owners;
+    std::set<std::string> reported;
+    const auto claim = [&](const std::string& name, const std::string& path) {
+      const auto [it, fresh] = owners.emplace(name, path);
+      if (!fresh && it->second != path && reported.insert(path).second)
+        fail(path + "/name", "the name '" + name + "' is already that of " + it->second);
+    };
+    for (const ParticleGroup& group : scene_.particles) claim(group.name, group.where.path);
+    for (const Emitter& emitter : flat_.emitters)
+      for_each_source(emitter,
+                      [&](const ParticleSource& source, const ParticleSource*, const std::string& name,
+                          const Birth&) { claim(name, source.where.path); });
+  }
+
+  void check_drag(const ParticleBehaviour& behaviour, Real mass, const std::string& path) {
+    if (behaviour.integrator == sim::IntegratorKind::leapfrog) return;  // damps as fast as drag can
+    if (const auto problem = too_much_drag(scene_, behaviour.integrator, behaviour.linear_drag, mass))
+      fail(path + "/linear_drag", *problem);
+  }
+
+  // --- Looks and groups ---
+
+  template <class V>
+  void check_ages(const std::vector<std::pair<Real, V>>& ramp, const std::string& path) {
+    for (std::size_t i = 1; i < ramp.size(); ++i)
+      if (ramp[i].first < ramp[i - 1].first) fail(path + index_step(i), "ages must not decrease");
+  }
+  void check_look(const ParticleLook& look, const std::string& path) {
+    if (look.style == LookStyle::sphere) {
+      const bool fades =
+          look.color.rgba.w() < 1 ||
+          std::ranges::any_of(look.color_over_age, [](const auto& key) { return key.second.rgba.w() < 1; });
+      if (fades) warn(path + "/color", "alpha has no effect: spheres are opaque");
+      if (look.additive.value_or(false)) warn(path + "/additive", "has no effect: spheres are opaque");
+    } else if (look.metallic || look.roughness) {
+      warn(path + (look.metallic ? "/metallic" : "/roughness"), "has no effect: only spheres have it");
+    }
+    check_ages(look.color_over_age, path + "/color_over_age");
+    check_ages(look.temperature_over_age, path + "/temperature_over_age");
+    check_ages(look.size_over_age, path + "/size_over_age");
+  }
+  void check_group(const ParticleGroup& group) {
+    check_look(group.look, group.where.path + "/look");
+    check_drag(group.behaviour, group.mass, group.where.path);
+    for (std::size_t i = 0; i < group.places.size(); ++i)
+      if (const auto problem = outside(scene_, group.places[i].position))
+        fail(group.where.path + "/places" + index_step(i) + "/position", *problem);
+  }
+
+  // --- Emitters ---
+
+  void check_source(const ParticleSource& source) {
+    const std::string& path = source.where.path;
+    check_look(source.look, path + "/look");
+    const Real smallest = effects::lower_bound(source.radius);
+    if (effects::upper_bound(source.radius) < kSmallest)
+      fail(path + "/radius", fmt::format("must be at least {:g} m", kSmallest));
+    const Real lightest = effects::upper_bound(source.mass) > 0
+                              ? effects::lower_bound(source.mass)
+                              : effects::lower_bound(source.density) * 4 / 3 * std::numbers::pi * smallest *
+                                    smallest * smallest;
+    if (lightest > 0) check_drag(source.behaviour, lightest, path);
+    check_lifespan(source);
+    const ParticleBehaviour& b = source.behaviour;
+    const bool hits = b.collides || b.internal || b.external;
+    if (!source.on_collision.empty() && !hits)
+      warn(path + "/on_collision", "has no effect: its particles do not collide");
+    if (b.dies_on_hit && !hits) warn(path + "/dies_on_hit", "has no effect: its particles do not collide");
+  }
+
+  /// What is to happen at an age that no particle reaches never happens.
+  void check_lifespan(const ParticleSource& source) {
+    const std::string& path = source.where.path;
+    const Real longest = effects::upper_bound(source.lifespan);
+    const auto check_age = [&](Real age, const std::string& where, const char* what) {
+      if (age >= longest)
+        fail(path + where,
+             fmt::format("is {:g} s, but particles live {:g} s at most and never {}; allowed is "
+                         "less than the lifespan",
+                         age, longest, what));
+    };
+    if (source.split && source.split->enabled && effects::upper_bound(source.split->count) >= 0.5)
+      check_age(effects::lower_bound(source.split->age), "/split/age", "split");
+    for (std::size_t i = 0; i < source.trails.size(); ++i)
+      check_age(source.trails[i].start_age, "/trails" + index_step(i) + "/start_age", "leave a trail");
+    for (std::size_t i = 0; i < source.on_age.size(); ++i)
+      check_age(source.on_age[i].age, "/on_age" + index_step(i) + "/age", "reach that age");
+  }
+
+  void check_room(const Emitter& emitter) {
+    const Real room = spread_of(emitter.surface), smallest = 2 * effects::lower_bound(emitter.radius);
+    if (emitter.overlap) return;
+    if (smallest > room) {
+      fail(emitter.where.path + "/surface",
+           fmt::format("is too small for a single particle: it is {} m wide and the smallest particle {:.3g} "
+                       "m; or let newborns \"overlap\"",
+                       room, smallest));
+    } else if (2 * effects::upper_bound(emitter.radius) > room) {
+      warn(emitter.where.path + "/surface",
+           fmt::format("is only {} m wide: too small for the largest particles", room));
+    }
+  }
+
+  void check_emitter(const Emitter& emitter) {
+    const std::string& path = emitter.where.path;
+    for_each_source(emitter, [&](const ParticleSource& source, const auto&...) { check_source(source); });
+    check_room(emitter);
+    if (emitter.end <= emitter.start)
+      fail(path + "/end", fmt::format("must be after the start, {} s", emitter.start));
+    for (std::size_t i = 0; i < emitter.windows.size(); ++i)
+      if (emitter.windows[i].end <= emitter.windows[i].start)
+        fail(path + "/windows" + index_step(i) + "/end", "must be after the start");
+    check_count(emitter);
+  }
+
+  void check_count(const Emitter& emitter) {
+    const int copies = copy_count(emitter.placement);
+    bool refused = false;  // what comes from too many is too many as well
+    bound_sources(emitter, film_end(scene_),
+                  [&](const ParticleSource& source, const std::string&, const SourceBound& bound) {
+                    if (!refused) refused = check_bound(emitter, source, bound, copies);
+                  });
+    too_many_ = too_many_ || refused;
+  }
+
+  /// Whether it is refused.
+  bool check_bound(const Emitter& emitter, const ParticleSource& source, const SourceBound& bound,
+                   int copies) {
+    const std::string& path = source.where.path;
+    const bool is_emitter = &source == static_cast<const ParticleSource*>(&emitter);
+    const auto possible = static_cast<Real>(bound.possible.alive);
+    if (possible * copies > kMostParticles) {
+      fail(path, fmt::format("could have {:.3g} particles alive at once, more than {:.3g}; lower {}",
+                             possible * copies, kMostParticles,
+                             source.split ? "the count or depth of its split, rate, count or lifespan"
+                                          : "rate, count or lifespan"));
+      return true;
+    }
+    if (is_emitter && bound.possible.born == 0)
+      warn(path, "releases no particles: rate, count and bursts are zero, or never in the film");
+    else if (possible > kTolerance * static_cast<Real>(source.max_alive))
+      warn(path + "/max_alive",
+           fmt::format("may hold back particles: {:.3g} could be alive at once, {} are allowed", possible,
+                       source.max_alive));
+    return false;
+  }
+
+  void check_sum() {
+    Real sum = 0;
+    for (const ParticleBound& bound : particle_bounds(flat_)) sum += static_cast<Real>(bound.alive);
+    if (sum > kMostParticles)
+      fail("/emitters", fmt::format("could have {:.3g} particles alive at once together, more than {:.3g}",
+                                    sum, kMostParticles));
+  }
+
+  const Scene& scene_;
+  const Scene& flat_;
+  Findings& findings_;
+  bool too_many_ = false;
+};
+
+}  // namespace
+
+void check_particles(const Scene& scene, const Scene& flat, Findings& findings) {
+  ParticleChecker(scene, flat, findings).run();
+}
+
+std::vector<std::string> particle_names(const Scene& scene) {
+  std::vector<std::string> names;
+  for (const ParticleGroup& group : scene.particles) names.push_back(group.name);
+  for (const Emitter& emitter : scene.emitters)
+    for_each_source(emitter, [&](const ParticleSource&, const ParticleSource*, const std::string& name,
+                                 const Birth&) { names.push_back(name); });
+  return names;
+}
+
+std::vector<ParticleBound> particle_bounds(const Scene& scene) {
+  std::vector<ParticleBound> bounds;
+  for (const ParticleGroup& group : scene.particles) bounds.push_back({group.name, group.places.size()});
+  for (const Emitter& emitter : scene.emitters)
+    bound_sources(emitter, film_end(scene),
+                  [&](const ParticleSource&, const std::string& name, const SourceBound& bound) {
+                    bounds.push_back({name, bound.alive});
+                  });
+  return bounds;
+}
+
+}  // namespace offstage::producer

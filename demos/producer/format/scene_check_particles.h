@@ -1,0 +1,26 @@
+#pragma once
+/// Checks of particle groups, emitters and child particles, for scene_check.h.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "producer/format/scene_check.h"
+
+namespace offstage::producer {
+
+/// Adds what is wrong with the particles of a scene as described; `flat`: with its placements expanded.
+void check_particles(const Scene& scene, const Scene& flat, Findings& findings);
+
+/// The names of all particle systems: of groups, of emitters, and of their child particles.
+std::vector<std::string> particle_names(const Scene& scene);
+
+/// How many particles of one name there can be at once.
+struct ParticleBound {
+  std::string name;
+  uint64_t alive = 0;
+};
+/// For each particle system of a flat scene.
+std::vector<ParticleBound> particle_bounds(const Scene& scene);
+
+}  // namespace offstage::producer

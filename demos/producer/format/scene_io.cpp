@@ -1,0 +1,89 @@
+#include "producer/format/scene_io.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "producer/build/model_articulation.h"
+#include "producer/build/placement.h"
+#include "producer/format/presets.h"
+#include "producer/format/scene_check.h"
+#include "producer/format/scene_source.h"
+#include "producer/format/scene_table.h"
+
+namespace offstage::producer {
+namespace {
+
+template <class T>
+void name_objects(std::vector<T>& objects, const std::string& kind) {
+  for (std::size_t i = 0; i < objects.size(); ++i)
+    if (objects[i].name.empty()) objects[i].name = kind + "_" + std::to_string(i);
+}
+
+void name_everything(Scene& scene, const std::string& file) {
+  if (scene.name.empty())
+    scene.name = file == kStandardInputName ? "stdin" : std::filesystem::path(file).stem().string();
+  name_objects(scene.materials, "material");
+  name_objects(scene.bodies, "body");
+  name_objects(scene.particles, "particles");
+  name_objects(scene.emitters, "emitter");
+  name_objects(scene.springs, "spring");
+  name_objects(scene.joints, "joint");
+  name_objects(scene.cloths, "cloth");
+  for (std::size_t i = 0; i < scene.articulations.size(); ++i)
+    std::visit(
+        [i](auto& a) {
+          if (a.name.empty()) a.name = "articulation_" + std::to_string(i);
+        },
+        scene.articulations[i]);
+  for (std::size_t i = 0; i < scene.forces.size(); ++i)
+    if (std::string& name = named(scene.forces[i]).name; name.empty()) name = "force_" + std::to_string(i);
+}
+
+void append(std::vector<Problem>& all, const std::vector<Problem>& more, const SceneSource& source) {
+  for (const Problem& problem : more) all.push_back({source.locate(problem.where.path), problem.what});
+}
+
+void sort_by_place(std::vector<Problem>& problems) {
+  std::stable_sort(problems.begin(), problems.end(), [](const Problem& a, const Problem& b) {
+    const Where &x = a.where, &y = b.where;
+    return std::tie(x.file, x.line, x.column, x.path) < std::tie(y.file, y.line, y.column, y.path);
+  });
+}
+
+}  // namespace
+
+LoadedScene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& folder,
+                        const std::vector<std::string>& overrides) {
+  SceneSource source = read_source(text, name, folder);
+  std::vector<Problem> errors;
+  const Node defaults = write_scene({});
+  for (const std::string& override : overrides) apply_override(source, override, defaults, errors);
+  const std::vector<EffectParts> from_effects = lay_presets(source, folder, errors);
+
+  Scene described;
+  Reader reader(source.files);
+  read_scene(reader, source.root, described);
+  errors.insert(errors.end(), reader.problems().begin(), reader.problems().end());
+  place_effects(described, from_effects);
+  name_everything(described, name);
+
+  std::vector<Problem> misplaced, crowded;
+  read_links(described, folder, misplaced);
+  LoadedScene loaded{expand(described, misplaced, crowded), folder, {}, to_text(write_scene(described))};
+  const Findings findings = check_scene(described, loaded.scene, folder);
+  append(errors, misplaced, source);
+  append(errors, findings.errors, source);
+  append(loaded.warnings, crowded, source);
+  append(loaded.warnings, findings.warnings, source);
+  sort_by_place(errors);
+  sort_by_place(loaded.warnings);
+  if (!errors.empty()) throw SceneError(std::move(errors));
+  return loaded;
+}
+
+LoadedScene load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
+  if (file == kStandardInput) return parse_scene(standard_input(), kStandardInputName, "", overrides);
+  return parse_scene(read_text(file), file.string(), file.parent_path(), overrides);
+}
+
+}  // namespace offstage::producer

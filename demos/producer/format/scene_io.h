@@ -1,0 +1,36 @@
+#pragma once
+/// Scene files: reading with every problem reported at once, the schema and the reference made from the same
+/// table.
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "producer/base/error.h"
+#include "producer/scene/scene.h"
+
+namespace offstage::producer {
+
+struct LoadedScene {
+  Scene scene;
+  std::filesystem::path folder;  ///< relative files are sought here
+  std::vector<Problem> warnings;
+  std::string canonical;  ///< the effective scene with every default, as compact JSON: what a run depends on
+};
+
+/// Reads a scene file and its includes, applies `overrides` ("path=value", path as a JSON pointer or dotted),
+/// checks all of it. The file "-" is standard input. Throws SceneError with every problem.
+LoadedScene load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides = {});
+
+/// The same from text; `name` stands for the file in messages.
+LoadedScene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& folder,
+                        const std::vector<std::string>& overrides = {});
+
+/// JSON Schema, draft 07.
+std::string scene_schema();
+
+/// The reference of the format in Markdown: one table per object.
+std::string scene_reference();
+
+}  // namespace offstage::producer

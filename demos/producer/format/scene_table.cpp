@@ -1,0 +1,61 @@
+#include "producer/format/scene_table.h"
+
+#include "producer/format/table_cloth.h"
+#include "producer/format/table_film.h"
+#include "producer/format/table_force.h"
+#include "producer/format/table_joint.h"
+#include "producer/format/table_overlay.h"
+#include "producer/format/table_particles.h"
+#include "producer/format/table_world.h"
+
+namespace offstage::producer {
+
+template <>
+struct Table<Scene> {
+  static constexpr const char* kName = "scene";
+  static constexpr const char* kHelp = "The whole file.";
+  static Fields<Scene> fields() {
+    using T = Scene;
+    return {
+        {"version", &T::version, "of this format", "", between(1, 1)},
+        {"name", &T::name, "empty: the file's name"},
+        {"description", &T::description, "what there is to see"},
+        {"world", &T::world, "what holds for everything that is simulated"},
+        {"materials", &T::materials, "looks and contact behaviours, used by name"},
+        {"contacts", &T::contacts, "what two materials do to each other"},
+        {"bodies", &T::bodies, "rigid bodies"},
+        {"particles", &T::particles, "groups of particles placed one by one"},
+        {"emitters", &T::emitters, "sources of particles"},
+        {"effects", &T::effects, "presets of emitters and forces, at some place"},
+        {"springs", &T::springs, "damped springs"},
+        {"joints", &T::joints, "what holds bodies together"},
+        {"articulations", &T::articulations, "ready-made bodies with their joints"},
+        {"cloths", &T::cloths, "cloths"},
+        {"forces", &T::forces, "fields, moving air, hands, explosions, forces between particles"},
+        {"overlays", &T::overlays, "what shows how the simulation sees the scene"},
+        {"camera", &T::camera, "where the film is seen from"},
+        {"lights", &T::lights, "the sun"},
+        {"environment", &T::environment, "sky, ambient light, fog"},
+        {"render", &T::render, "the picture"},
+        {"output", &T::output, "the film's time"},
+    };
+  }
+};
+
+// --- The whole ---
+
+void read_scene(Reader& in, const Node& node, Scene& out) {
+  Codec<Scene>::read(in, node, {}, out);
+}
+
+Node write_scene(const Scene& scene) {
+  return Codec<Scene>::write(scene);
+}
+
+Catalogue scene_catalogue() {
+  Catalogue all;
+  Codec<Scene>::describe(all, {});
+  return all;
+}
+
+}  // namespace offstage::producer

@@ -1,0 +1,162 @@
+#pragma once
+/// How plain values stand in a scene file: numbers, text, vectors, orientations, colours, numbers that vary,
+/// keys over age.
+
+#include <array>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "producer/format/fields.h"
+#include "producer/scene/scene.h"
+
+namespace offstage::producer {
+
+template <>
+struct Codec<bool> {
+  static void read(Reader& in, const Node& node, const Spec& spec, bool& out);
+  static Node write(const bool& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+template <>
+struct Codec<std::string> {
+  static void read(Reader& in, const Node& node, const Spec& spec, std::string& out);
+  static Node write(const std::string& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+template <>
+struct Codec<Real> {
+  static void read(Reader& in, const Node& node, const Spec& spec, Real& out);
+  static Node write(const Real& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+template <>
+struct Codec<int> {
+  static void read(Reader& in, const Node& node, const Spec& spec, int& out);
+  static Node write(const int& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+template <>
+struct Codec<int64_t> {
+  static void read(Reader& in, const Node& node, const Spec& spec, int64_t& out);
+  static Node write(const int64_t& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+template <>
+struct Codec<uint64_t> {
+  static void read(Reader& in, const Node& node, const Spec& spec, uint64_t& out);
+  static Node write(const uint64_t& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+/// [w, x, y, z], or {"axis": [x, y, z], "angle_deg": a}. Normalised; zero is refused.
+template <>
+struct Codec<Quat> {
+  static void read(Reader& in, const Node& node, const Spec& spec, Quat& out);
+  static Node write(const Quat& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+/// "#rrggbb" or "#rrggbbaa" in sRGB, in short "#rgb" or "#rgba", or [r, g, b] or [r, g, b, a], linear.
+template <>
+struct Codec<Color> {
+  static void read(Reader& in, const Node& node, const Spec& spec, Color& out);
+  static Node write(const Color& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+/// A number, or a fraction such as "30000/1001".
+template <>
+struct Codec<render::FrameRate> {
+  static void read(Reader& in, const Node& node, const Spec& spec, render::FrameRate& out);
+  static Node write(const render::FrameRate& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+/// A number, {"mean", "deviation", "min", "max", "clip"}, {"range": [a, b]} or {"curve": [[time, value],
+/// ...]}. All that it can be must lie within the limits; a closed limit also cuts off a normal distribution.
+template <>
+struct Codec<Varying> {
+  static void read(Reader& in, const Node& node, const Spec& spec, Varying& out);
+  static Node write(const Varying& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+
+template <>
+struct Names<sim::Interpolation> {
+  static constexpr std::array kNames = {"monotone", "smooth", "linear", "step"};
+};
+inline constexpr const char* kInterpolationHelp =
+    "between keys: `monotone` is a smooth curve of which each component stays between the values of its two "
+    "keys, and holds where these are equal; `smooth` (Catmull-Rom) is rounder and may swing beyond them; "
+    "`linear` has a constant velocity; `step` holds, and jumps at the next key";
+
+Description describe_vector(Description item, int size, bool nonzero);
+
+/// [x, y, z]; limits hold for each component.
+template <class S, int N>
+struct Codec<Eigen::Matrix<S, N, 1>> {
+  using V = Eigen::Matrix<S, N, 1>;
+
+  static void read(Reader& in, const Node& node, const Spec& spec, V& out) {
+    const List* list = in.list(node, "a list of " + std::to_string(N) + " numbers", N, N);
+    if (!list) return;
+    V value = out;
+    for (int i = 0; i < N; ++i)
+      in.within(std::to_string(i),
+                [&] { Codec<S>::read(in, (*list)[static_cast<std::size_t>(i)], spec, value[i]); });
+    if (spec.limits.nonzero && value.isZero(0)) return in.refuse(node, "a vector that is not zero");
+    out = value;
+  }
+  static Node write(const V& value) {
+    List list;
+    for (const S& component : value) list.push_back(Codec<S>::write(component));
+    return list;
+  }
+  static Description describe(Catalogue& all, const Spec& spec) {
+    return describe_vector(Codec<S>::describe(all, spec), N, spec.limits.nonzero);
+  }
+};
+
+Description describe_tuple(Description item, std::size_t size);
+
+/// A list of so many values of one kind.
+template <class V, std::size_t N>
+struct Codec<std::array<V, N>> {
+  static void read(Reader& in, const Node& node, const Spec& spec, std::array<V, N>& out) {
+    const List* list = in.list(node, "a list of " + std::to_string(N) + " values", N, N);
+    if (!list) return;
+    for (std::size_t i = 0; i < N; ++i)
+      in.within(std::to_string(i), [&] { Codec<V>::read(in, (*list)[i], spec, out[i]); });
+  }
+  static Node write(const std::array<V, N>& values) {
+    List list;
+    for (const V& value : values) list.push_back(Codec<V>::write(value));
+    return list;
+  }
+  static Description describe(Catalogue& all, const Spec& spec) {
+    return describe_tuple(Codec<V>::describe(all, spec), N);
+  }
+};
+
+Description describe_age_key(const Description& age, const Description& value);
+
+/// [age, value] with age in [0, 1]; limits hold for the value.
+template <class V>
+struct Codec<std::pair<Real, V>> {
+  static void read(Reader& in, const Node& node, const Spec& spec, std::pair<Real, V>& out) {
+    const List* list = in.list(node, "a pair of age and value", 2, 2);
+    if (!list) return;
+    in.within("0", [&] { Codec<Real>::read(in, (*list)[0], kAge, out.first); });
+    in.within("1", [&] { Codec<V>::read(in, (*list)[1], spec, out.second); });
+  }
+  static Node write(const std::pair<Real, V>& value) {
+    return List{value.first, Codec<V>::write(value.second)};
+  }
+  static Description describe(Catalogue& all, const Spec& spec) {
+    return describe_age_key(Codec<Real>::describe(all, kAge), Codec<V>::describe(all, spec));
+  }
+
+ private:
+  static inline const Spec kAge{"", "", "", kShare};
+};
+
+}  // namespace offstage::producer

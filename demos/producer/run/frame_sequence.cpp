@@ -1,0 +1,153 @@
+#include "producer/run/frame_sequence.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "producer/run/output.h"
+#include "render/error.h"
+#include "render/sink.h"
+
+namespace offstage::producer {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The number in a file name that a pattern gives; nothing for other files.
+std::optional<int> number_of(const fs::path& pattern, const fs::path& file) {
+  const std::string shape = pattern.filename().string(), name = file.filename().string();
+  const std::size_t last = shape.find_last_of('#'), before = shape.find_last_not_of('#', last);
+  const std::size_t begin = before == std::string::npos ? 0 : before + 1, after = shape.size() - last - 1;
+  if (name.size() <= begin + after) return {};
+  const std::string_view digits = std::string_view(name).substr(begin, name.size() - begin - after);
+  int number = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+  if (error != std::errc() || end != digits.data() + digits.size() || number < 0) return {};
+  if (render::frame_path(pattern, number) != file) return {};
+  return number;
+}
+
+/// "shot_####.png" for shot_0007.png: the last run of digits as #. Empty if there is none.
+std::string pattern_of(const std::string& name) {
+  const auto is_digit = [](unsigned char c) { return std::isdigit(c) != 0; };
+  const auto last = std::find_if(name.rbegin(), name.rend(), is_digit);
+  if (last == name.rend()) return {};
+  const auto first = std::find_if_not(last, name.rend(), is_digit);
+  std::string pattern = name;
+  std::fill(pattern.begin() + (name.rend() - first), pattern.begin() + (name.rend() - last), '#');
+  return pattern;
+}
+
+/// The pattern that most PNG files of a folder have, for advice.
+std::string usual_pattern(const fs::path& folder) {
+  std::map<std::string, int> counts;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error))
+    if (entry.path().extension() == ".png")
+      if (const std::string pattern = pattern_of(entry.path().filename().string()); !pattern.empty())
+        ++counts[pattern];
+  const auto most = std::ranges::max_element(counts, {}, [](const auto& count) { return count.second; });
+  return most == counts.end() ? "" : most->first;
+}
+
+fs::path checked_pattern(const std::string& text) {
+  if (const std::string meant = hash_pattern(text); !meant.empty())
+    throw OutputError(text + ": the numbers of frames are written as #; did you mean '" + meant + "'?");
+  if (text.ends_with('/') || fs::is_directory(text)) return fs::path(text) / "####.png";
+  const fs::path path = text;
+  if (path.extension() != ".png")
+    throw OutputError(text + ": frames are PNG files; give a pattern such as 'frames/####.png'");
+  const std::string name = path.filename().string();
+  if (name.find('#') == std::string::npos) {
+    const std::string pattern = name.find('*') != std::string::npos ? "####.png" : pattern_of(name);
+    throw OutputError(
+        fmt::format("{}: the numbers of frames are written as #; {} '{}'{}", text,
+                    pattern.empty() ? "give a pattern such as" : "did you mean",
+                    pattern.empty() ? "frames/####.png" : (path.parent_path() / pattern).string(),
+                    pattern.empty() ? "" : "?"));
+  }
+  return path;
+}
+
+struct PngHead {
+  int width_px = 0, height_px = 0;
+  bool alpha = false;
+};
+
+/// Size and kind of a PNG file. Throws FileError unless it is whole.
+PngHead read_png_head(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::array<uint8_t, 26> head{};
+  if (!in) throw render::FileError(path.string() + ": cannot be read");
+  in.read(reinterpret_cast<char*>(head.data()), head.size());
+  if (!in || std::memcmp(head.data(), "\x89PNG\r\n\x1a\n", 8) != 0)
+    throw render::FileError(path.string() + ": is not a PNG file");
+  const auto number = [&](std::size_t at) {
+    return (head[at] << 24) | (head[at + 1] << 16) | (head[at + 2] << 8) | head[at + 3];
+  };
+  const int width = number(16), height = number(20);
+  if (!is_whole_png(path, width, height))
+    throw render::FileError(path.string() + ": is not a whole PNG file");
+  constexpr int kPalette = 3;  // may have a table of alpha
+  const int kind = head[25];
+  return {width, height, (kind & 4) != 0 || kind == kPalette};
+}
+
+void check_gaps(const FrameSequence& sequence) {
+  const auto& frames = sequence.frames;
+  for (std::size_t i = 1; i < frames.size(); ++i) {
+    if (frames[i].number == frames[i - 1].number + 1) continue;
+    const std::string missing = render::frame_path(sequence.pattern, frames[i - 1].number + 1).string();
+    const int more = sequence.left_out - 1;
+    throw render::FileError(
+        fmt::format("{}: frame {} is missing{}; the frames go from {} to {}. --allow-gaps "
+                    "leaves out what is missing",
+                    missing, frames[i - 1].number + 1, more > 0 ? fmt::format(" (and {} more)", more) : "",
+                    frames.front().number, frames.back().number));
+  }
+}
+
+}  // namespace
+
+FrameSequence find_sequence(const std::string& text, bool allow_gaps) {
+  FrameSequence sequence{.pattern = checked_pattern(text), .frames = {}};
+  const fs::path folder = sequence.pattern.has_parent_path() ? sequence.pattern.parent_path() : ".";
+  if (!fs::is_directory(folder)) throw render::FileError(folder.string() + ": there is no such folder");
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const fs::path file = sequence.pattern.parent_path() / entry.path().filename();
+    if (const auto number = number_of(sequence.pattern, file)) sequence.frames.push_back({*number, file});
+  }
+  if (sequence.frames.empty()) {
+    const std::string usual = usual_pattern(folder);
+    throw render::FileError(fmt::format(
+        "{}: no file fits this pattern{}", sequence.pattern.string(),
+        usual.empty() ? "" : "; did you mean '" + (sequence.pattern.parent_path() / usual).string() + "'?"));
+  }
+  std::ranges::sort(sequence.frames, {}, &SequenceFrame::number);
+  sequence.left_out = sequence.frames.back().number - sequence.frames.front().number + 1 -
+                      static_cast<int>(sequence.frames.size());
+  if (!allow_gaps) check_gaps(sequence);
+  for (const SequenceFrame& frame : sequence.frames) {
+    const PngHead head = read_png_head(frame.path);
+    if (sequence.width_px == 0) {
+      sequence.width_px = head.width_px;
+      sequence.height_px = head.height_px;
+    }
+    if (head.width_px != sequence.width_px || head.height_px != sequence.height_px)
+      throw render::FileError(
+          fmt::format("{}: is {}x{}, but frame {} is {}x{}; all frames of a video have one size",
+                      frame.path.string(), head.width_px, head.height_px, sequence.frames.front().number,
+                      sequence.width_px, sequence.height_px));
+    sequence.may_be_transparent |= head.alpha;
+  }
+  return sequence;
+}
+
+}  // namespace offstage::producer

@@ -1,0 +1,488 @@
+#include "producer/run/production.h"
+
+#include <algorithm>
+#include <cstring>
+#include <exception>
+#include <fstream>
+#include <mutex>
+#include <sstream>
+#include <thread>
+
+#include <nlohmann/json.hpp>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include "producer/base/interrupt.h"
+#include "producer/base/version.h"
+#include "producer/build/picture.h"
+#include "producer/run/pipeline.h"
+#include "producer/run/trace.h"
+#include "render/context.h"
+
+namespace offstage::producer {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double ms_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+/// Keeps count of simulated and finished frames for the progress of a run; the two threads that do them share
+/// it.
+class ProgressMeter {
+ public:
+  /// `drawing_ms`: a guess at what a frame takes to draw, until there is one.
+  ProgressMeter(const ProgressCallback& callback, int frames, int frames_to_simulate, double drawing_ms)
+      : callback_(callback), guess_ms_(drawing_ms) {
+    latest_.total = frames;
+    latest_.frames_to_simulate = frames_to_simulate;
+  }
+  void simulated_one() {
+    const std::lock_guard lock(mutex_);
+    if (!callback_ || latest_.frames_simulated >= latest_.frames_to_simulate) return;
+    ++latest_.frames_simulated;
+    simulation_ms_ += ms_since(simulating_since_);
+    latest_.frame_finished = false;
+    report();
+    simulating_since_ = Clock::now();
+  }
+  /// The simulation goes on now, after it waited for the drawing.
+  void simulation_goes_on() { simulating_since_ = Clock::now(); }
+  void finished_one(double sim_ms, double render_ms, double encode_ms, uint64_t particles) {
+    const std::lock_guard lock(mutex_);
+    if (!callback_) return;
+    ++latest_.done;
+    drawing_ms_ += render_ms + encode_ms;
+    latest_.sim_ms = sim_ms;
+    latest_.render_ms = render_ms;
+    latest_.encode_ms = encode_ms;
+    latest_.particles = particles;
+    latest_.frame_finished = true;
+    report();
+  }
+
+ private:
+  /// Simulated and finished frames count by what they take on average.
+  void report() {
+    constexpr double kKnown = 0.02;  // share of the work after which the rest can be estimated
+    const auto mean = [](double sum, int count, double guess) { return count > 0 ? sum / count : guess; };
+    const double simulating = mean(simulation_ms_, latest_.frames_simulated, 0),
+                 drawing = mean(drawing_ms_, latest_.done, guess_ms_);
+    const double done = simulating * latest_.frames_simulated + drawing * latest_.done,
+                 all = simulating * latest_.frames_to_simulate + drawing * latest_.total;
+    latest_.fraction = latest_.done == latest_.total ? 1 : all > 0 ? std::min(1.0, done / all) : 0;
+    latest_.simulating_s = simulation_ms_ / 1000;
+    latest_.drawing_s = drawing_ms_ / 1000;
+    latest_.eta_s = latest_.fraction > kKnown ? ms_since(start_) / 1000 * (1 / latest_.fraction - 1) : 0;
+    callback_(latest_);
+  }
+
+  const ProgressCallback& callback_;
+  const double guess_ms_;
+  std::mutex mutex_;
+  Progress latest_;
+  double simulation_ms_ = 0, drawing_ms_ = 0;
+  const Clock::time_point start_ = Clock::now();
+  Clock::time_point simulating_since_ = start_;  // of the simulating thread
+};
+
+/// Where snapshots come from: the simulation or a cache.
+class SnapshotSource {
+ public:
+  virtual ~SnapshotSource() = default;
+  /// The state at a frame, or an earlier one if `stop` said so on the way; asked for in ascending order.
+  virtual Snapshot at(int frame, const std::function<bool()>& stop) = 0;
+  /// Adds what is known besides of the latest state.
+  virtual void describe(Shot&) const {}
+};
+
+class LiveSource : public SnapshotSource {
+ public:
+  LiveSource(Simulation& simulation, ProgressMeter& meter, const SnapshotCache* kept)
+      : simulation_(simulation), meter_(meter), kept_(kept) {}
+  Snapshot at(int frame, const std::function<bool()>& stop) override {
+    meter_.simulation_goes_on();
+    while (simulation_.frame() < frame && !stop()) {
+      simulation_.advance();
+      meter_.simulated_one();
+    }
+    Snapshot snapshot = simulation_.snapshot();
+    if (kept_) kept_->write(snapshot);
+    return snapshot;
+  }
+  void describe(Shot& shot) const override {
+    shot.contacts = simulation_.world().contacts().size();
+    shot.energy = simulation_.world().energy();
+  }
+
+ private:
+  Simulation& simulation_;
+  ProgressMeter& meter_;
+  const SnapshotCache* kept_;  ///< where to write what was asked for; may be null
+};
+
+class CachedSource : public SnapshotSource {
+ public:
+  explicit CachedSource(SnapshotCache cache) : cache_(std::move(cache)) {}
+  Snapshot at(int frame, const std::function<bool()>&) override { return cache_.read(frame); }
+
+ private:
+  SnapshotCache cache_;
+};
+
+bool is_blank(const render::Image& image) {
+  const auto* first = image.rgba.data();
+  for (std::size_t i = 1; i < image.pixel_count(); ++i)
+    if (std::memcmp(first, first + 4 * i, 4) != 0) return false;
+  return true;
+}
+
+void draw_shots(Pipeline& pipeline, const Scene& scene, const ModelLibrary& models, bool channels) {
+  render::Context context;
+  Picture picture(scene, models, context);
+  while (auto shot = pipeline.take_shot()) {
+    const auto start = Clock::now();
+    render::Image image = picture.draw(*shot->previous, *shot->current);
+    render::Channels data;
+    if (channels) data = picture.channels(*shot->previous, *shot->current);
+    pipeline.give_print({std::move(*shot), std::move(image), ms_since(start), std::move(data)});
+  }
+}
+
+/// Keeps what a report shows of a frame.
+void keep_frame(const Print& print, double encode_ms, int total, RunStats& stats) {
+  constexpr int kPictures = 12, kWidth_px = 320;
+  const Snapshot& state = *print.shot.current;
+  stats.figures.push_back({.frame = print.shot.frame,
+                           .time = state.time,
+                           .sim_ms = print.shot.sim_ms,
+                           .render_ms = print.render_ms,
+                           .encode_ms = encode_ms,
+                           .particles = state.point_count(),
+                           .contacts = print.shot.contacts,
+                           .energy = print.shot.energy,
+                           .state_hash = state.state_hash.hex(),
+                           .pixel_hash = render::pixel_hash(print.image)});
+  const int every = std::max(1, (total + kPictures - 1) / kPictures);
+  if (print.shot.index % every == 0)
+    stats.pictures.emplace_back(print.shot.frame, render::reduced(print.image, kWidth_px));
+}
+
+void print_frames(Pipeline& pipeline, render::FrameSink& sink, const Scene& scene, const RenderJob& job,
+                  RunStats& stats, ProgressMeter& meter) {
+  const auto total = static_cast<int>(job.frames.size());
+  const bool numbered = job.channels_stem.filename().string().find('#') != std::string::npos;
+  const render::ObjectNames objects = object_names(scene);
+  while (auto print = pipeline.take_print()) {
+    const auto encode_start = Clock::now();
+    sink.write(print->shot.frame, print->image);
+    if (job.channels.any())
+      render::write_channels(
+          numbered ? render::frame_path(job.channels_stem, print->shot.frame) : job.channels_stem,
+          print->channels, job.channels, objects);
+    const double encode_ms = ms_since(encode_start);
+    if (stats.frames++ == 0) stats.startup_s = process_age_s();
+    stats.sim.add(print->shot.sim_ms);
+    stats.render.add(print->render_ms);
+    stats.encode.add(encode_ms);
+    const Snapshot& state = *print->shot.current;
+    stats.particles = state.point_count();
+    stats.most_particles = std::max(stats.most_particles, stats.particles);
+    stats.state_hash = stats.frame_states[print->shot.frame] = state.state_hash.hex();
+    if (job.report) keep_frame(*print, encode_ms, total, stats);
+    if (is_blank(print->image)) stats.blank_frames.push_back(print->shot.frame);
+    meter.finished_one(print->shot.sim_ms, print->render_ms, encode_ms, stats.particles);
+  }
+}
+
+/// Produces the shots on the calling thread.
+void shoot(Pipeline& pipeline, SnapshotSource& source, const std::vector<int>& frames, bool needs_previous,
+           bool report) {
+  const auto stop = [&] { return interrupt_signal() != 0 || pipeline.failed(); };
+  std::shared_ptr<const Snapshot> last;
+  for (std::size_t i = 0; i < frames.size() && !stop(); ++i) {
+    const auto start = Clock::now();
+    const int frame = frames[i];
+    std::shared_ptr<const Snapshot> previous;
+    if (needs_previous && frame > 1)
+      previous = last && last->frame == frame - 1
+                     ? last
+                     : std::make_shared<const Snapshot>(source.at(frame - 1, stop));
+    auto current = std::make_shared<const Snapshot>(source.at(frame, stop));
+    if (current->frame != frame) break;  // stopped on the way
+    if (!previous) previous = current;
+    last = current;
+    Shot shot{static_cast<int>(i), frame, std::move(previous), std::move(current), ms_since(start), 0, {}};
+    if (report) source.describe(shot);
+    if (!pipeline.push(std::move(shot))) return;
+  }
+  pipeline.no_more_shots();
+}
+
+}  // namespace
+
+StageTimes::Summary StageTimes::summary() const {
+  if (ms_.empty()) return {};
+  std::vector<double> sorted = ms_;
+  std::ranges::sort(sorted);
+  double sum = 0;
+  for (const double ms : sorted) sum += ms;
+  const auto quantile = [&](double q) {
+    return sorted[static_cast<std::size_t>(q * static_cast<double>(sorted.size() - 1) + 0.5)];
+  };
+  return {sum / static_cast<double>(sorted.size()), quantile(0.5), quantile(0.95), sorted.back()};
+}
+
+RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, const RenderJob& job,
+                       render::FrameSink& sink, const ProgressCallback& progress) {
+  const auto start = Clock::now();
+  RunStats stats;
+  std::optional<Simulation> simulation;
+  std::optional<SnapshotCache> kept;
+  std::unique_ptr<SnapshotSource> source;
+  std::optional<ProgressMeter> meter;
+  constexpr double kDrawing_ms = 300;
+  const auto frames = static_cast<int>(job.frames.size());
+  if (job.cache) {
+    SnapshotCache cache(*job.cache);
+    cache.check(simulation_key(loaded, models), loaded.scene.frame_count());
+    meter.emplace(progress, frames, 0, kDrawing_ms);
+    source = std::make_unique<CachedSource>(std::move(cache));
+  } else {
+    simulation.emplace(loaded.scene, models);
+    stats.bodies = simulation->body_count();
+    stats.energy_start = simulation->world().energy();
+    if (job.keep)
+      kept.emplace(*job.keep).create(simulation_key(loaded, models), loaded.scene.frame_count(), true);
+    meter.emplace(progress, frames, frames > 0 ? simulation->advances_to(job.frames.back()) : 0, kDrawing_ms);
+    source = std::make_unique<LiveSource>(*simulation, *meter, kept ? &*kept : nullptr);
+  }
+
+  Pipeline pipeline(job.threads + 2);
+  const auto draw = [&] {
+    guarded(pipeline, [&] { draw_shots(pipeline, loaded.scene, models, job.channels.any()); });
+  };
+  const auto print = [&] {
+    guarded(pipeline, [&] { print_frames(pipeline, sink, loaded.scene, job, stats, *meter); });
+  };
+  {
+    std::vector<std::jthread> crew;
+    // A thread that cannot be started must fail the run before the others are waited for.
+    guarded(pipeline, [&] {
+      for (int i = 0; i < job.threads; ++i) crew.emplace_back(draw);
+      crew.emplace_back(print);
+      shoot(pipeline, *source, job.frames, subframes(loaded.scene.render.quality) > 1 || job.channels.any(),
+            job.report);
+    });
+  }
+  pipeline.rethrow_failure();
+
+  if (stats.frames < frames) stats.interrupted_by = interrupt_signal();
+  if (stats.frames > 0) sink.close();
+  if (kept && !stats.interrupted_by) kept->finish(simulation_key(loaded, models), loaded.scene.frame_count());
+  if (simulation) {
+    stats.totals = simulation->totals();
+    stats.energy_end = simulation->world().energy();
+  }
+  stats.wall_s = ms_since(start) / 1000;
+  return stats;
+}
+
+RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, const SimulateJob& job,
+                         const ProgressCallback& progress) {
+  const auto start = Clock::now();
+  RunStats stats;
+  const Scene& scene = loaded.scene;
+  const int total = scene.frame_count();
+  const std::string key = simulation_key(loaded, models);
+  Simulation simulation(scene, models);
+  std::optional<SnapshotCache> cache;
+  if (job.cache) cache.emplace(*job.cache).create(key, total, job.force);
+  std::optional<Trace> trace;
+  std::optional<ContactTrace> contacts;
+  std::optional<ClothTrace> cloths;
+  if (job.trace) trace.emplace(*job.trace, simulation);
+  if (job.contacts) contacts.emplace(*job.contacts, simulation);
+  if (job.cloths) cloths.emplace(*job.cloths, simulation);
+  std::optional<JointTrace> joints;
+  if (job.joints) joints.emplace(*job.joints, simulation);
+  const auto record = [&](double time) {
+    if (trace) trace->record(time);
+    if (contacts) contacts->record(time);
+    if (cloths) cloths->record(time);
+    if (joints) joints->record(time);
+  };
+  if (job.trace_every_step) simulation.on_substep(record);
+  stats.bodies = simulation.body_count();
+  stats.energy_start = simulation.world().energy();
+
+  ProgressMeter meter(progress, total, simulation.advances_to(total), 0);
+  for (int frame = 1; frame <= total; ++frame) {
+    const auto step_start = Clock::now();
+    meter.simulation_goes_on();
+    while (simulation.frame() < frame && !interrupt_signal()) {
+      simulation.advance();
+      meter.simulated_one();
+    }
+    if (simulation.frame() < frame) break;  // interrupted
+    stats.sim.add(ms_since(step_start));
+    const double sim_ms = ms_since(step_start);
+    const auto write_start = Clock::now();
+    if (cache) cache->write(simulation.snapshot());
+    const bool at_step = job.trace_every_step && frame < total;  // that state is the next sub-step's start
+    if (!at_step) record(simulation.world().time());
+    stats.encode.add(ms_since(write_start));
+    ++stats.frames;
+    stats.particles = simulation.world().particle_count();
+    stats.most_particles = std::max(stats.most_particles, stats.particles);
+    meter.finished_one(sim_ms, 0, ms_since(write_start), stats.particles);
+  }
+  if (stats.frames < total) stats.interrupted_by = interrupt_signal();
+  if (cache && stats.frames == total) cache->finish(key, total);
+  if (trace && stats.frames == total) trace->close();
+  if (contacts && stats.frames == total) contacts->close();
+  if (cloths && stats.frames == total) cloths->close();
+  if (joints && stats.frames == total) joints->close();
+  stats.totals = simulation.totals();
+  stats.energy_end = simulation.world().energy();
+  stats.state_hash = simulation.world().state_hash().hex();
+  stats.wall_s = ms_since(start) / 1000;
+  return stats;
+}
+
+std::string simulation_key(const LoadedScene& loaded, const ModelLibrary& models) {
+  auto scene = nlohmann::ordered_json::parse(loaded.canonical);
+  for (const char* key : {"name", "description", "camera", "lights", "environment", "render"})
+    scene.erase(key);
+  if (scene.contains("output"))
+    for (const char* key : {"channels", "channel_format"}) scene["output"].erase(key);
+  return text_hash(std::string(version()) + scene.dump() + models.digest());
+}
+
+std::string settings_key(const LoadedScene& loaded, const ModelLibrary& models) {
+  return text_hash(std::string(version()) + loaded.canonical + models.digest());
+}
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json report_json(const sim::ContactWork& work) {
+  return {{"solves", work.solves},
+          {"iterations", work.iterations},
+          {"factorizations", work.factorizations},
+          {"fallbacks", work.fallbacks},
+          {"over_budget", work.over_budget},
+          {"cluster_truncated", work.cluster_truncated},
+          {"restitution_reduced", work.restitution_reduced},
+          {"residual", work.residual}};
+}
+Json report_json(const sim::IntegratorReport& report) {
+  return {{"steps", report.steps},
+          {"rejected", report.rejected},
+          {"evaluations", report.evaluations},
+          {"iterations", report.iterations},
+          {"missed", report.missed}};
+}
+
+/// What bodies do to each other, and what it took.
+void add_contact_figures(const SimulationTotals& t, Json& json) {
+  json["bodies_awake"] = t.bodies_awake;
+  json["bodies_asleep"] = t.bodies_asleep;
+  json["islands"] = t.islands;
+  json["contacts"] = t.contacts;
+  json["most_contacts"] = t.most_contacts;
+  json["penetration"] = t.penetration;
+  json["collisions"] = t.collisions;
+  json["tracebacks"] = t.tracebacks;
+  json["toi_limit_reached"] = t.toi_limit_reached;
+  json["restitution_suppressed"] = t.restitution_suppressed;
+  json["speculative_contacts"] = t.speculative_contacts;
+  json["bodies_woken"] = t.bodies_woken;
+  json["bodies_put_to_sleep"] = t.bodies_put_to_sleep;
+  json["joint_error"] = t.joint_error;
+  json["joints_unsolved"] = t.joints_unsolved;
+  json["broken_joints"] = t.broken_joints;
+  json["exact_solver"] = report_json(t.exact);
+  json["fast_solver"] = report_json(t.fast);
+  json["impact_solver"] = report_json(t.impacts);
+  json["rough_bodies"] = t.rough_bodies;
+  json["integration"] = report_json(t.integration);
+}
+
+Json cloth_figures(const SimulationTotals& t) {
+  return {{"strain", t.cloth_strain},
+          {"penetration", t.cloth_penetration},
+          {"contacts", t.cloth_contacts},
+          {"self_contacts", t.cloth_self_contacts},
+          {"springs_clamped", t.cloth_springs_clamped},
+          {"moves_limited", t.cloth_moves_limited},
+          {"moves_held_back", t.cloth_moves_held_back},
+          {"crossings", t.cloth_crossings},
+          {"springs_torn", t.cloth_springs_torn},
+          {"unconverged", t.cloth_unconverged}};
+}
+
+}  // namespace
+
+std::string to_json(const RunStats& stats) {
+  Json json;
+  json["frames"] = stats.frames;
+  json["frames_kept"] = stats.frames_kept;
+  json["wall_s"] = stats.wall_s;
+  json["startup_s"] = stats.startup_s;
+  for (const auto& [name, times] : {std::pair("sim_ms", &stats.sim), std::pair("render_ms", &stats.render),
+                                    std::pair("encode_ms", &stats.encode)}) {
+    const StageTimes::Summary s = times->summary();
+    json[name] = {{"mean", s.mean}, {"p50", s.p50}, {"p95", s.p95}, {"max", s.max}};
+  }
+  json["peak_rss_mb"] = peak_rss_mb();
+  json["bodies"] = stats.bodies;
+  json["particles"] = stats.particles;
+  json["most_particles"] = stats.most_particles;
+  const SimulationTotals& t = stats.totals;
+  json["substeps"] = t.substeps;
+  json["particle_collisions"] = t.particle_collisions;
+  json["born"] = t.born;
+  json["expired"] = t.expired;
+  json["retired"] = t.retired;
+  json["lost_bodies"] = t.lost_bodies;
+  json["ejected"] = t.ejected;
+  json["removed"] = t.removed;
+  json["truncated_sweeps"] = t.truncated;
+  json["emitter_waits"] = t.waiting;
+  json["emitter_skips"] = t.skipped;
+  add_contact_figures(t, json);
+  json["cloth"] = cloth_figures(t);
+  for (const auto& [name, energy] :
+       {std::pair("energy_start", &stats.energy_start), std::pair("energy_end", &stats.energy_end)})
+    if (*energy)
+      json[name] = {{"kinetic", (*energy)->kinetic},
+                    {"potential", (*energy)->potential},
+                    {"elastic", (*energy)->elastic}};
+  json["state_hash"] = stats.state_hash;
+  json["blank_frames"] = stats.blank_frames;
+  if (stats.interrupted_by) json["interrupted_by"] = stats.interrupted_by;
+  return json.dump(2) + "\n";
+}
+
+double process_age_s() {
+  // Field 22 of /proc/self/stat is the start in clock ticks since boot; the name in field 2 may hold blanks.
+  std::ifstream in("/proc/self/stat");
+  std::string stat{std::istreambuf_iterator<char>(in), {}};
+  std::istringstream fields(stat.substr(stat.rfind(')') + 1));
+  std::string field;
+  for (int i = 3; i <= 22; ++i) fields >> field;
+  double uptime = 0;
+  std::ifstream("/proc/uptime") >> uptime;
+  return uptime - std::stod(field) / static_cast<double>(sysconf(_SC_CLK_TCK));
+}
+
+double peak_rss_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024;
+}
+
+}  // namespace offstage::producer

@@ -1,0 +1,14 @@
+#pragma once
+/// What went wrong or is remarkable in a simulation, as sentences.
+
+#include <string>
+#include <vector>
+
+#include "producer/build/simulation.h"
+
+namespace offstage::producer {
+
+/// One sentence each, beginning with "warning: " or "note: " and naming the object concerned.
+std::vector<std::string> notes_of(const SimulationTotals& totals);
+
+}  // namespace offstage::producer

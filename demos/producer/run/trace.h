@@ -1,0 +1,92 @@
+#pragma once
+/// CSV of what happened in a simulation. Values are written with all their digits, so that a trace can be
+/// checked against closed forms.
+
+#include <cstdio>
+#include <filesystem>
+#include <string>
+
+#include "producer/build/simulation.h"
+
+namespace offstage::producer {
+
+/// A table that grows row by row. It appears under its name on close(); one that ends before that is kept
+/// with .partial behind its name.
+class CsvFile {
+ public:
+  /// Throws render::FileError, as do the others.
+  CsvFile(const std::filesystem::path& path, const std::string& header);
+  ~CsvFile();
+  CsvFile(const CsvFile&) = delete;
+  CsvFile& operator=(const CsvFile&) = delete;
+
+  /// Whole rows, each with its end of line.
+  void write(const std::string& rows);
+  void close();
+
+ private:
+  void fail();
+
+  std::filesystem::path path_, temporary_;
+  std::FILE* file_ = nullptr;
+};
+
+/// Where everything went: time, object, position, orientation, velocities.
+class Trace {
+ public:
+  Trace(const std::filesystem::path& path, const Simulation& simulation);
+
+  /// One row per moving body, per cloth (its centre of mass and mean velocity) and per placed particle
+  /// ("group/id").
+  void record(double time);
+  void close() { file_.close(); }
+
+ private:
+  CsvFile file_;
+  const Simulation& simulation_;
+};
+
+/// How cloths did: time, cloth, points, strain, contacts and what had to be held back.
+class ClothTrace {
+ public:
+  ClothTrace(const std::filesystem::path& path, const Simulation& simulation);
+
+  /// One row per cloth.
+  void record(double time);
+  void close() { file_.close(); }
+
+ private:
+  CsvFile file_;
+  const Simulation& simulation_;
+};
+
+/// How joints stood and what they bore: time, joint, anchor on a, force and torque on a, the free coordinate
+/// and its speed, how far the anchors are apart, 1 if it is broken.
+class JointTrace {
+ public:
+  JointTrace(const std::filesystem::path& path, const Simulation& simulation);
+
+  /// One row per joint.
+  void record(double time);
+  void close() { file_.close(); }
+
+ private:
+  CsvFile file_;
+  const Simulation& simulation_;
+};
+
+/// Where bodies touched: time, the two bodies, point, normal from b to a, force on a, separation.
+class ContactTrace {
+ public:
+  ContactTrace(const std::filesystem::path& path, const Simulation& simulation);
+
+  /// One row per contact point.
+  void record(double time);
+  void close() { file_.close(); }
+
+ private:
+  CsvFile file_;
+  const Simulation& simulation_;
+};
+
+}  // namespace offstage::producer

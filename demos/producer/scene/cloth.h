@@ -1,0 +1,94 @@
+#pragma once
+/// The cloths of a scene; see scene.h. Where a pin or a seam asks for a place, it is one of the flat cloth in
+/// its own frame, so that copies of a cloth are pinned alike.
+
+#include <array>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "producer/scene/values.h"
+#include "sim/cloth/cloth.h"
+
+namespace offstage::producer {
+
+/// A rectangle in the plane y = 0 of the cloth's frame, its front towards +Y: left to right along x, top to
+/// bottom along z.
+struct GridShape {
+  Eigen::Vector2d size = {1, 1};
+  Eigen::Vector2i cells = {40, 40};
+};
+using ClothShape = std::variant<GridShape, MeshFile>;
+
+/// What a cloth has of its own instead of its fabric's.
+struct FabricChanges {
+  std::optional<Real> areal_density, stretch, shear, bend, damping, friction, self_friction, thickness, drag,
+      lift, max_stretch, max_shear;
+};
+
+enum class Side { left, right, top, bottom };
+enum class Corner { top_left, top_right, bottom_left, bottom_right };
+
+/// What holds the vertices that a pin selects.
+struct PinScope {
+  Where where;
+  std::string body;  ///< name; empty: they stay where they are
+  Real until = 1e30;
+};
+struct CornerPin : PinScope {
+  std::vector<Corner> corners = {Corner::top_left, Corner::top_right, Corner::bottom_left,
+                                 Corner::bottom_right};
+};
+struct SidePin : PinScope {
+  Side side = Side::top;
+  int every = 1;  ///< of its vertices each so-manieth, from the first
+};
+struct NearestPin : PinScope {
+  Vec3 point = Vec3::Zero();
+};
+struct BoxPin : PinScope {
+  Vec3 centre = Vec3::Zero();
+  Vec3 size = Vec3::Ones();
+};
+using ClothPin = std::variant<CornerPin, SidePin, NearestPin, BoxPin>;
+
+/// Two sides of a grid that are sewn together, vertex by vertex.
+struct SideSeam {
+  Where where;
+  Side a = Side::left, b = Side::right;
+  bool reversed = false;  ///< the first vertex of one meets the last of the other
+};
+/// The vertices nearest to two points.
+struct PointSeam {
+  Where where;
+  Vec3 a = Vec3::Zero(), b = Vec3::Zero();
+};
+using ClothSeam = std::variant<SideSeam, PointSeam>;
+
+struct Cloth {
+  Where where;
+  std::string name;
+  ClothShape shape = GridShape{};
+  std::string fabric = "cotton";
+  FabricChanges changes;  ///< its keys stand directly in the cloth
+  std::string material;   ///< name; empty: the fabric's own look
+  Vec3 position = Vec3::Zero();
+  Quat orientation = Quat::Identity();
+  Vec3 velocity = Vec3::Zero();
+  std::vector<ClothPin> pins;
+  std::vector<ClothSeam> seams;
+  Real seam_time = 1;
+  bool collides = true;
+  bool self_collision = true;
+  Real tear = 0;
+  Real pressure = 0, ram_pressure = 0;
+  Real air_density = 1.2;
+  sim::ClothIntegrator integrator = sim::ClothIntegrator::relaxed;
+  Real substep = 1.0 / 960;
+  bool visible = true;
+  bool casts_shadow = true;
+  Placement placement;  ///< its three keys stand directly in the cloth
+};
+
+}  // namespace offstage::producer

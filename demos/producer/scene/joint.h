@@ -1,0 +1,170 @@
+#pragma once
+/// The joints and articulations of a scene; see scene.h. Places and directions are those of the world at time
+/// 0.
+
+#include <array>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "producer/scene/values.h"
+#include "sim/articulation/joint.h"
+
+namespace offstage::producer {
+
+/// A target of a motor at a time: degrees or metres, or the same per second.
+struct MotorKey {
+  Real time = 0;
+  Real target = 0;
+  std::optional<sim::Interpolation> interpolation;  ///< to the next key; default: the motor's
+};
+
+struct JointMotor {
+  sim::Motor::Mode mode = sim::Motor::Mode::speed;
+  Real target = 0;             ///< without keys
+  std::vector<MotorKey> keys;  ///< in order of time
+  sim::Interpolation interpolation = sim::Interpolation::monotone;
+  bool smooth = false;  ///< stops at every key
+  std::optional<Real> max_effort;
+  Real stiffness = 0, damping = 0;
+};
+
+/// How a joint moves, and its motor.
+struct JointBehaviour {
+  sim::JointType type = sim::JointType::spherical;
+  Vec3 axis = Vec3::UnitZ();
+  Vec3 second_axis = Vec3::UnitX();
+  std::optional<std::array<Real, 2>> limits;      ///< of sliding and lengths [m]
+  std::optional<std::array<Real, 2>> limits_deg;  ///< of turning
+  std::optional<Real> swing_deg;
+  Real friction = 0, damping = 0;
+  std::optional<JointMotor> motor;
+  std::optional<Real> max_force, max_torque;
+};
+
+struct Joint {
+  Where where;
+  std::string name;
+  JointBehaviour behaviour;
+  std::string a, b;  ///< names of bodies; b empty: the world
+  Vec3 anchor = Vec3::Zero();
+  Vec3 anchor_b = Vec3::Zero();  ///< of a rod
+  bool collide = false;
+  bool visible = true;  ///< of a rod or rope
+  Real radius = 0.01;   ///< of the drawn rod or rope [m]
+  std::string material;
+};
+
+/// Links between two points: capsules end to end.
+struct Chain {
+  Where where;
+  std::string name;
+  Vec3 from = Vec3::Zero(), to = Vec3::UnitX();
+  int links = 10;
+  Real sag = 1;  ///< length of the chain over the distance
+  Real radius = 0.03;
+  Real density = 7800;
+  std::string material;
+  std::string start = "world";  ///< what holds the first link: a body, "world", or nothing
+  std::string end;              ///< the last one
+  Real swing_deg = 180;
+  Real friction = 0, damping = 0;
+  std::optional<Real> max_force;
+};
+
+/// A person of capsules and boxes, standing, arms at the sides.
+struct Ragdoll {
+  Where where;
+  std::string name;
+  Vec3 position = Vec3::Zero();  ///< of the soles
+  Quat orientation = Quat::Identity();
+  Vec3 velocity = Vec3::Zero();
+  Real height = 1.75;
+  Real density = 1000;
+  Real stiffness = 1;                 ///< of the joints' dry friction: 1 is a limp grown-up
+  std::string skin, shirt, trousers;  ///< names of materials
+  Placement placement;
+};
+
+/// A deck of planks, hinged one to the next.
+struct Bridge {
+  Where where;
+  std::string name;
+  Vec3 from = Vec3::Zero(), to = Vec3::UnitX();
+  int planks = 12;
+  Real width = 1, thickness = 0.05;
+  Real density = 600;
+  std::string material;
+  Real sag = 1.02;  ///< length of the deck over the distance
+  Real damping = 0;
+  std::optional<Real> max_force;
+};
+
+/// A car on springs: driven by its rear wheels, steered by the front ones. Forwards is +Z, left +X.
+struct Vehicle {
+  Where where;
+  std::string name;
+  Vec3 position = Vec3::Zero();  ///< on the ground in the middle of its wheels
+  Quat orientation = Quat::Identity();
+  Vec3 velocity = Vec3::Zero();
+  Real length = 4, width = 1.8, wheel_radius = 0.36;
+  Real mass = 1200;
+  Real suspension_hz = 1.6;       ///< of its bouncing
+  std::vector<MotorKey> speed;    ///< [m/s]
+  std::vector<MotorKey> steer;    ///< of the middle of the front axle [degrees], left positive
+  Real max_torque = 900;          ///< of each rear wheel
+  std::string paint, trim, tyre;  ///< names of materials
+  Placement placement;
+};
+
+/// A tower crane with a load on its rope. The jib points along +X.
+struct Crane {
+  Where where;
+  std::string name;
+  Vec3 position = Vec3::Zero();  ///< the foot of its mast
+  Quat orientation = Quat::Identity();
+  Real height = 8, reach = 6;
+  Real load_mass = 400, load_size = 0.9;
+  std::vector<MotorKey> slew;     ///< turning of the jib [degrees]
+  std::vector<MotorKey> trolley;  ///< way outwards [m]
+  std::vector<MotorKey> hoist;    ///< way of the load upwards [m]
+  std::string frame, load;        ///< names of materials
+  Placement placement;
+};
+
+/// The joint above a node of a model.
+struct NodeJoint {
+  Where where;
+  std::string node;
+  JointBehaviour behaviour;  ///< axes as the node has them
+};
+/// The nodes of a model file that have triangles as links, each joined to the one above it where it is.
+struct ModelTree {
+  Where where;
+  std::string name;
+  std::string file;
+  Vec3 position = Vec3::Zero();
+  Quat orientation = Quat::Identity();
+  Vec3 velocity = Vec3::Zero();
+  Real scale = 1;
+  Real density = 1000;
+  std::string base = "world";  ///< what holds the uppermost nodes: a body, "world", or nothing
+  std::string material;        ///< empty: those of the file
+  bool collides = true;
+  Real friction = 0, damping = 0;  ///< of the joints that are not in `joints`, which are spherical
+  std::vector<NodeJoint> joints;
+  Placement placement;
+
+  /// A node as read from the file; see render::Model::Node.
+  struct Link {
+    std::string name;
+    int parent;
+    sim::Pose pose;
+  };
+  std::vector<Link> links;  ///< empty if the file could not be read
+};
+
+using ArticulationTemplate = std::variant<Chain, Ragdoll, Bridge, Vehicle, Crane, ModelTree>;
+
+}  // namespace offstage::producer

@@ -1,0 +1,85 @@
+#include "producer/scene/particles.h"
+
+#include <numbers>
+
+#include "sim/core/rotation.h"
+
+namespace offstage::producer {
+namespace {
+
+/// The defaults of a style. Light that is not lit is its own, so it throws no shadow.
+render::PointsDef usual_look(LookStyle style) {
+  using render::PointStyle;
+  switch (style) {
+    case LookStyle::sprite:
+      return {.style = PointStyle::sprite};
+    case LookStyle::streak:
+      return {.style = PointStyle::streak};
+    case LookStyle::sphere:
+      return {.style = PointStyle::sphere};
+    case LookStyle::smoke:
+      return {.style = PointStyle::smoke, .stretch_s = 0};
+    case LookStyle::fire:
+      return {.style = PointStyle::fire,
+              .additive = true,
+              .lit = false,
+              .casts_shadow = false,
+              .stretch_s = 0.1f};
+    case LookStyle::flake:
+      return {.style = PointStyle::flake, .casts_shadow = false, .stretch_s = 0.004f};
+    case LookStyle::drop:
+      return {.style = PointStyle::streak, .casts_shadow = false, .stretch_s = 1.0f / 60};
+    case LookStyle::spark:
+      return {.style = PointStyle::streak,
+              .additive = true,
+              .lit = false,
+              .casts_shadow = false,
+              .stretch_s = 1.0f / 40,
+              .taper = 1};
+  }
+  return {};
+}
+
+}  // namespace
+
+render::PointsDef points_def(const ParticleLook& look) {
+  render::PointsDef def = usual_look(look.style);
+  const auto take = [](const std::optional<Real>& given, float& value) {
+    if (given) value = static_cast<float>(*given);
+  };
+  def.additive = look.additive.value_or(def.additive);
+  def.lit = look.lit.value_or(def.lit);
+  def.casts_shadow = look.casts_shadow.value_or(def.casts_shadow);
+  take(look.softness, def.softness);
+  take(look.stretch, def.stretch_s);
+  take(look.taper, def.taper);
+  take(look.metallic, def.metallic);
+  take(look.roughness, def.roughness);
+  return def;
+}
+
+TrailSource::TrailSource() {
+  speed = 0.0;
+  radius = 0.005;
+  lifespan = 1.0;
+}
+
+EventSource::EventSource() {
+  spread_deg = 30.0;
+  radius = 0.005;
+  lifespan = 1.0;
+}
+
+Quat PlaneSurface::orientation() const {
+  const Quat turned(Eigen::AngleAxisd(turn_deg * std::numbers::pi / 180, Vec3::UnitY()));
+  return sim::rotation_between(Vec3::UnitY(), direction) * turned;
+}
+
+Vec3& position_of(EmitterSurface& surface) {
+  return std::visit([](auto& s) -> Vec3& { return s.position; }, surface);
+}
+const Vec3& position_of(const EmitterSurface& surface) {
+  return std::visit([](const auto& s) -> const Vec3& { return s.position; }, surface);
+}
+
+}  // namespace offstage::producer

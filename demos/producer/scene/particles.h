@@ -1,0 +1,243 @@
+#pragma once
+/// The particles of a scene: how they look and behave, groups of them, emitters, and child
+/// particles. See scene.h.
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "effects/color.h"
+#include "effects/emitter_def.h"
+#include "effects/sub_emitter.h"
+#include "producer/scene/values.h"
+#include "render/stage.h"
+#include "sim/dynamics/integrator.h"
+
+namespace offstage::producer {
+
+enum class LookStyle { sprite, streak, sphere, smoke, fire, flake, drop, spark };
+
+/// How particles are drawn. What is left out is as the style has it; see points_def().
+struct ParticleLook {
+  LookStyle style = LookStyle::sprite;
+  Color color;
+  std::vector<std::pair<Real, Color>> color_over_age;       ///< [age 0..1, colour]; multiplies `color`
+  std::vector<std::pair<Real, Real>> temperature_over_age;  ///< [age 0..1, K]; multiplies both
+  std::vector<std::pair<Real, Real>> size_over_age;         ///< [age 0..1, factor]
+  effects::RampKind ramp = effects::RampKind::linear;
+  Real color_deviation = 0;                                     ///< of brightness, per particle
+  Eigen::Vector4d channel_deviation = Eigen::Vector4d::Zero();  ///< of red, green, blue, alpha, per particle
+  std::optional<bool> additive, lit, casts_shadow;
+  std::optional<Real> softness, stretch, taper, metallic, roughness;
+};
+
+/// The look as the stage wants it, with the defaults of its style.
+render::PointsDef points_def(const ParticleLook& look);
+
+/// What particles of a group or an emitter feel and do, other than their own parameters.
+struct ParticleBehaviour {
+  Real linear_drag = 0;
+  bool gravity = true;
+  Vec3 force = Vec3::Zero();
+  bool collides = true;   ///< with bodies
+  bool internal = false;  ///< with each other
+  bool external = false;  ///< with those of other systems that have this, too
+  bool dies_on_hit = false;
+  sim::IntegratorKind integrator = sim::IntegratorKind::leapfrog;
+};
+
+struct ParticlePlace {
+  Vec3 position = Vec3::Zero();
+  Vec3 velocity = Vec3::Zero();
+  std::optional<Color> color;  ///< default: the look's
+};
+
+/// Particles placed one by one.
+struct ParticleGroup {
+  Where where;
+  std::string name;
+  std::vector<ParticlePlace> places;
+  Real radius = 0.05;
+  Real mass = 1;
+  Real restitution = 0.5;
+  Real friction = 0.5;
+  Real charge = 0;
+  ParticleBehaviour behaviour;  ///< its keys stand directly in the group
+  ParticleLook look;
+};
+
+/// Particles that throw off others of the same kind, from some age on. Percentages are of the parent's.
+struct Split {
+  bool enabled = true;
+  Varying count = 2.0;
+  Varying age = 1.0;
+  Varying delay = 0.5;
+  int depth = 1;
+  Varying velocity_percent = 100.0;
+  Varying spread_deg = 0.0;
+  Varying radius_percent = 50.0;
+  Varying mass_percent = 0.0;
+  Varying lifespan_percent = 100.0;
+};
+
+struct TrailSource;
+struct EventSource;
+struct AgeSource;
+
+/// The keys common to all sources of particles: the particles' properties, and their child particles. Each
+/// has a particle system of its own.
+struct ParticleSource {
+  Where where;
+  std::string name;
+  Varying speed = 1.0;
+  Varying spread_deg = 0.0;
+  Varying radius = 0.01;
+  Varying density = 1000.0;
+  Varying mass = 0.0;
+  Varying lifespan = 5.0;
+  Varying restitution = 0.3;
+  Varying friction = 0.5;
+  Varying charge = 0.0;
+  int64_t max_alive = 1'000'000;
+  ParticleBehaviour behaviour;  ///< its keys stand directly in the source
+  ParticleLook look;
+  std::optional<Split> split;
+  std::vector<TrailSource> trails;
+  std::vector<AgeSource> on_age;
+  std::vector<EventSource> on_collision, on_death;
+};
+
+/// Particles that every parent leaves behind.
+struct TrailSource : ParticleSource {
+  Varying rate = 60.0;
+  Real start_age = 0;
+  Real end_age = 1e30;
+  Varying velocity_percent = 0.0;
+  TrailSource();
+};
+
+/// Particles that answer something that happens to a parent.
+struct EventSource : ParticleSource {
+  Real probability = 1;
+  Real min_speed = 0;
+  Varying count = 5.0;
+  effects::Axis axis = effects::Axis::normal;
+  Varying velocity_percent = 0.0;
+  int64_t max_per_step = 10'000;
+  EventSource();
+};
+struct AgeSource : EventSource {
+  Real age = 1;
+};
+
+/// A rectangle that particles leave along `direction`.
+struct PlaneSurface {
+  Vec3 position = Vec3::Zero();
+  Vec3 direction = Vec3::UnitY();
+  Real turn_deg = 0;  ///< of the rectangle about its direction
+  Eigen::Vector2d size = {0.1, 0.1};
+
+  /// Takes +Y to the direction by the shortest rotation, after the turn.
+  Quat orientation() const;
+};
+struct SphereSurface {
+  Vec3 position = Vec3::Zero();
+  Real radius = 0.1;
+};
+struct DiscSurface {
+  Vec3 position = Vec3::Zero();
+  Vec3 direction = Vec3::UnitY();
+  Real radius = 0.1;
+};
+struct MeshSurface {
+  std::string file;
+  Real scale = 1;
+  Vec3 position = Vec3::Zero();
+  Quat orientation = Quat::Identity();
+};
+using EmitterSurface = std::variant<PlaneSurface, SphereSurface, DiscSurface, MeshSurface>;
+
+/// Where a surface is.
+Vec3& position_of(EmitterSurface& surface);
+const Vec3& position_of(const EmitterSurface& surface);
+
+struct EmitterBurst {
+  Real time = 0;
+  Varying count = 10.0;
+  int cycles = 1;
+  Real interval = 1;
+};
+
+struct Emitter : ParticleSource {
+  std::string preset;  ///< already laid under the emitter when a scene is read
+  std::string body;    ///< name of the body it moves with; empty: fixed in the world
+  EmitterSurface surface = PlaneSurface{};
+  Vec3 direction = Vec3::Zero();  ///< zero: the surface's normal
+  bool overlap = false;
+  Varying rate = 100.0;
+  Varying count = 0.0;
+  Varying interval = 0.1;
+  std::vector<EmitterBurst> bursts;
+  Real start = 0;
+  Real end = 1e30;
+  std::vector<effects::TimeWindow> windows;
+  Real prewarm = 0;
+  Placement placement;
+};
+
+/// How a particle comes into being.
+struct Birth {
+  const TrailSource* trail = nullptr;
+  const EventSource* event = nullptr;
+  effects::Trigger trigger = effects::Trigger::collision;
+  Real age = 0;  ///< of the trigger `age`
+};
+
+namespace detail {
+
+template <class List, class F>
+void visit_list(const std::string& parent, const char* kind, const List& list, F&& visit) {
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const std::string own = list[i].name.empty() ? kind + ("_" + std::to_string(i)) : list[i].name;
+    visit(list[i], parent + "/" + own);
+  }
+}
+
+template <class F>
+void visit_tree(const ParticleSource& source, const ParticleSource* parent, const std::string& name,
+                const Birth& birth, F& visit) {
+  using effects::Trigger;
+  visit(source, parent, name, birth);
+  visit_list(name, "trails", source.trails, [&](const TrailSource& child, const std::string& full) {
+    visit_tree(child, &source, full, Birth{.trail = &child}, visit);
+  });
+  visit_list(name, "on_age", source.on_age, [&](const AgeSource& child, const std::string& full) {
+    visit_tree(child, &source, full, Birth{.event = &child, .trigger = Trigger::age, .age = child.age},
+               visit);
+  });
+  visit_list(name, "on_collision", source.on_collision,
+             [&](const EventSource& child, const std::string& full) {
+               visit_tree(child, &source, full, Birth{.event = &child, .trigger = Trigger::collision}, visit);
+             });
+  visit_list(name, "on_death", source.on_death, [&](const EventSource& child, const std::string& full) {
+    visit_tree(child, &source, full, Birth{.event = &child, .trigger = Trigger::death}, visit);
+  });
+}
+
+}  // namespace detail
+
+/// Calls visit(source, parent, name, birth) for an emitter and all that is born from its particles, parents
+/// first; the name of a child is that of its parent, a slash, and its own. This is also the order of their
+/// point sets.
+template <class F>
+void for_each_source(const Emitter& emitter, F&& visit) {
+  detail::visit_tree(emitter, nullptr, emitter.name, {}, visit);
+}
+
+}  // namespace offstage::producer

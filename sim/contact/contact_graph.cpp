@@ -1,0 +1,94 @@
+#include "sim/contact/contact_graph.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "sim/core/parallel_loop.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+
+/// Of two bodies, the rows of those that are awake.
+struct Link {
+  uint32_t a = kNone, b = kNone;
+
+  bool moves() const { return a != kNone || b != kNone; }
+};
+
+/// Disjoint sets of numbers, each named by its least.
+class Sets {
+ public:
+  explicit Sets(std::size_t size) : parent_(size) {
+    for (uint32_t i = 0; i < size; ++i) parent_[i] = i;
+  }
+  uint32_t find(uint32_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  void join(const Link& link) {
+    if (link.a == kNone || link.b == kNone) return;
+    const uint32_t i = find(link.a), j = find(link.b);
+    parent_[std::max(i, j)] = std::min(i, j);
+  }
+
+ private:
+  std::vector<uint32_t> parent_;
+};
+
+}  // namespace
+
+void ContactGraph::forget(uint32_t slot) {
+  std::erase_if(entries_, [slot](const Entry& e) { return e.low == slot || e.high == slot; });
+}
+
+void find_islands(std::span<Body* const> bodies, std::span<ContactPair* const> pairs,
+                  std::span<const std::pair<Body*, Body*>> springs, std::vector<Island>& islands) {
+  // Bodies and pairs lie all over the memory: they are asked side by side, and what is done in order has but
+  // their numbers.
+  for_each_index(bodies.size(), [&](std::size_t i) { bodies[i]->row = static_cast<uint32_t>(i); });
+  const auto link = [](const Body& a, const Body& b) {
+    return Link{a.is_awake() ? a.row : kNone, b.is_awake() ? b.row : kNone};
+  };
+  std::vector<Link> links(pairs.size());
+  for_each_index(pairs.size(), [&](std::size_t i) {
+    if (!pairs[i]->manifolds().empty()) links[i] = link(pairs[i]->a(), pairs[i]->b());
+  });
+  Sets sets(bodies.size());
+  for (const Link& l : links) sets.join(l);
+  for (const auto& [a, b] : springs) sets.join(link(*a, *b));
+
+  struct Size {
+    uint32_t bodies = 0, pairs = 0;
+  };
+  std::vector<Size> sizes;
+  std::vector<uint32_t> number(bodies.size());
+  for (uint32_t i = 0; i < bodies.size(); ++i) {
+    const uint32_t root = sets.find(i);
+    if (root == i) sizes.emplace_back();
+    number[i] = root == i ? static_cast<uint32_t>(sizes.size() - 1) : number[root];
+    ++sizes[number[i]].bodies;
+  }
+  const auto island_of = [&](const Link& l) { return number[l.a != kNone ? l.a : l.b]; };
+  for (const Link& l : links)
+    if (l.moves()) ++sizes[island_of(l)].pairs;
+
+  islands.resize(sizes.size());
+  for (std::size_t i = 0; i < islands.size(); ++i) {
+    Island& island = islands[i];
+    island.bodies.clear();
+    island.bodies.reserve(sizes[i].bodies);
+    island.pairs.clear();
+    island.pairs.reserve(sizes[i].pairs);
+    island.articulations.clear();
+    island.motion = nullptr;
+    island.from = 0;
+  }
+  for (std::size_t i = 0; i < bodies.size(); ++i) islands[number[i]].bodies.push_back(bodies[i]);
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    if (links[i].moves()) islands[island_of(links[i])].pairs.push_back(pairs[i]);
+  for_each_index(bodies.size(), [&](std::size_t i) { bodies[i]->island = number[i]; });
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,27 @@
+#pragma once
+/// Rigid motions, and forces with torques.
+
+#include "sim/core/types.h"
+
+namespace offstage::sim {
+
+/// A rigid motion: velocity of the material point at the frame's origin [m/s], and angular velocity [rad/s].
+struct Twist {
+  Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
+
+  Vec3 at(const Vec3& p) const { return velocity + angular_velocity.cross(p); }
+};
+
+/// A force and a torque about the centre of mass unless said otherwise, or an impulse and an angular impulse;
+/// world axes.
+struct Wrench {
+  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
+
+  Wrench& operator+=(const Wrench& w) {
+    force += w.force;
+    torque += w.torque;
+    return *this;
+  }
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,44 @@
+#pragma once
+/// Shapes a body can have. Primitives keep their exact implicit form; a mesh shape refers to a mesh that was
+/// registered with the World. All are given in the body's own frame, whose origin need not be the centre of
+/// mass for meshes (registration finds it); primitives are centred, axes of revolution along Y.
+
+#include <variant>
+
+#include "sim/core/handle.h"
+#include "sim/core/types.h"
+
+namespace offstage::sim {
+
+struct MeshTag {};
+using MeshHandle = Handle<MeshTag>;
+
+struct Sphere {
+  Real radius = 0.5;  ///< [m], > 0
+};
+struct Box {
+  Vec3 size = Vec3::Ones();  ///< full edge lengths [m], > 0
+};
+/// A cylinder of the given height between the centres of its two hemispherical caps.
+struct Capsule {
+  Real radius = 0.25;  ///< [m], > 0
+  Real height = 0.5;   ///< distance of the cap centres [m], >= 0
+};
+struct Cylinder {
+  Real radius = 0.5;  ///< [m], > 0
+  Real height = 1;    ///< [m], > 0
+};
+/// Base circle at y = -height/2, apex at y = +height/2.
+struct Cone {
+  Real radius = 0.5;  ///< of the base [m], > 0
+  Real height = 1;    ///< [m], > 0
+};
+/// The half-space y <= 0 of the body's frame; only for bodies that are not dynamic.
+struct Plane {};
+struct MeshShape {
+  MeshHandle mesh;
+};
+
+using Shape = std::variant<Sphere, Box, Capsule, Cylinder, Cone, Plane, MeshShape>;
+
+}  // namespace offstage::sim

@@ -1,0 +1,36 @@
+#pragma once
+/// The QR factorisation of a square matrix that gains, loses and changes rows and columns (Golub and Van
+/// Loan, Matrix Computations, 6.5): for pivoting on matrices without symmetry, as sliding friction makes them
+/// (N10).
+
+#include <Eigen/Core>
+
+#include "sim/core/types.h"
+
+namespace offstage::sim {
+
+/// Q R, with Q itself kept, each change by Givens rotations in O(n^2).
+class UpdatedQr {
+ public:
+  explicit UpdatedQr(Eigen::Index capacity) : q_(capacity, capacity), r_(capacity, capacity) {}
+
+  Eigen::Index size() const { return size_; }
+  /// Appends a last row and column, which meet at `corner`.
+  void append(const Eigen::VectorXd& row, const Eigen::VectorXd& column, Real corner);
+  /// Removes a row and a column; those after it move up.
+  void remove(Eigen::Index row, Eigen::Index column);
+  /// Removes a column; those after it move up, and the new one becomes the last.
+  void replace(Eigen::Index column, const Eigen::VectorXd& by);
+  /// Replaces a right-hand side by the solution. False, and x of no use, if the matrix is singular.
+  bool solve(Eigen::VectorXd& x) const;
+
+ private:
+  void rotate(Eigen::Index upper, Eigen::Index lower, Eigen::Index from, Real x, Real y);
+  void drop_column(Eigen::Index column);
+
+  Eigen::MatrixXd q_;
+  Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> r_;
+  Eigen::Index size_ = 0;
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,101 @@
+#pragma once
+/// A particle among those that collide with particles (physics P3), on its straight way through what is left
+/// of a sub-step.
+
+#include <cmath>
+#include <cstdint>
+#include <optional>
+
+#include "sim/collision/obstacles.h"
+#include "sim/contact/collision.h"
+#include "sim/core/types.h"
+#include "sim/dynamics/body_impulses.h"
+#include "sim/particles/particles.h"
+
+namespace offstage::sim {
+
+struct CollidingParticle {
+  Vec3 position;       ///< where its way begins
+  Vec3 path_velocity;  ///< mean along its way
+  Vec3 velocity;       ///< at the end of the sub-step
+  Vec3 acceleration;   ///< mean, by forces
+  Real from;           ///< when its way begins, since the sub-step's start [s]
+  Real mass, radius, restitution, friction;
+  uint32_t system;          ///< number of its system
+  bool internal, external;  ///< as ParticleSystemDef has them
+  bool hits_bodies;
+
+  Vec3 at(Real t) const { return position + (t - from) * path_velocity; }
+  /// A collision at time t of a sub-step of length h changes its velocity; it goes on under the same forces.
+  void strike(Real t, Real h, const Vec3& change) {
+    const Vec3 after = arrival(t, h) + change;
+    position = at(t);
+    velocity = after + (h - t) * acceleration;
+    path_velocity = after + (h - t) / 2 * acceleration;
+    from = t;
+  }
+  Vec3 velocity_at(Real t, Real h) const { return velocity - (h - t) * acceleration; }
+  /// The same with the energy that it has at(t), which is on a straight way.
+  Vec3 arrival(Real t, Real h) const {
+    const Vec3 v = velocity_at(t, h);
+    const Vec3 shift = (t - from) * (path_velocity - (velocity_at(from, h) + v) / 2);
+    return velocity_after_shift(v, acceleration, shift);
+  }
+};
+
+inline bool may_collide(const CollidingParticle& a, const CollidingParticle& b) {
+  return a.system == b.system ? a.internal : a.external && b.external;
+}
+
+/// How the surfaces of two particles act on each other: as those of bodies do.
+inline Real pair_restitution(const CollidingParticle& a, const CollidingParticle& b) {
+  return std::max(a.restitution, b.restitution);
+}
+inline Real pair_friction(Real a, Real b) {
+  return std::sqrt(a * b);
+}
+
+/// When two particles meet on their ways before the sub-step's end; n from b to a.
+struct Meeting {
+  Real time;
+  Vec3 normal;
+};
+inline std::optional<Meeting> meeting(const CollidingParticle& a, const CollidingParticle& b, Real h) {
+  const Real from = std::max(a.from, b.from);
+  const Vec3 d = a.at(from) - b.at(from), u = a.path_velocity - b.path_velocity;
+  const auto after = meeting_time(d, u, a.radius + b.radius);
+  if (!after || from + *after > h) return std::nullopt;
+  const Vec3 apart = d + *after * u;
+  const Real distance = apart.norm();
+  if (!(distance > 0)) return Meeting{from, -u.normalized()};
+  return Meeting{from + *after, apart / distance};
+}
+
+/// A sub-step as its collisions see it.
+struct ParticleStep {
+  Real h;  ///< its length [s]
+  const Obstacles& fixed;
+  const Obstacles& moving;
+  ImpactLaw law;
+  Real collision_speed;    ///< what meets slower does not bounce [m/s]
+  BodyImpulses& impulses;  ///< on dynamic bodies
+};
+
+/// An approach as slow as what forces make within a sub-step belongs to resting contact, and so does what is
+/// slow anyway. Force is not only what acts on the two themselves: contacts hand it on. `acceleration` is the
+/// greater of both.
+inline bool is_impact(Real speed, Real acceleration, const ParticleStep& step) {
+  return speed > step.collision_speed + acceleration * step.h;
+}
+inline Real greater_acceleration(const CollidingParticle& a, const CollidingParticle& b) {
+  return std::sqrt(std::max(a.acceleration.squaredNorm(), b.acceleration.squaredNorm()));
+}
+
+/// A collision of a particle, for those who ask.
+struct ParticleStrike {
+  uint32_t particle;
+  Real time;  ///< since the sub-step's start [s]
+  Vec3 position, velocity, normal;
+};
+
+}  // namespace offstage::sim

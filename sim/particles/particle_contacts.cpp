@@ -1,0 +1,266 @@
+#include "sim/particles/particle_contacts.h"
+
+#include <algorithm>
+#include <limits>
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include "sim/collision/distance.h"
+#include "sim/geometry/closest_points.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr std::size_t kContactChunk = ParticleSearch::kChunk;
+/// Normals with a larger cosine between them are those of one surface.
+constexpr Real kSameSurface = 0.95;
+
+/// Calls f(distance, normal) for the places of a solid's surface that are within `reach` of p, its own frame:
+/// the nearest one, of a mesh that of each triangle.
+template <class F>
+void for_each_surface(const Solid& solid, const Vec3& p, Real reach, F&& f) {
+  if (!solid.mesh) {
+    const SurfaceDistance s = signed_distance(solid, p);
+    if (s.distance < reach) f(s.distance, s.normal);
+    return;
+  }
+  const CollisionMesh& m = *solid.mesh;
+  const Aabb box(p - Vec3::Constant(reach), p + Vec3::Constant(reach));
+  m.tree.overlapping(box, [&](uint32_t face) {
+    const Triangle& t = m.mesh.triangles[face];
+    const auto& v = m.mesh.vertices;
+    const Vec3 away = p - closest_on_triangle(p, v[t[0]], v[t[1]], v[t[2]]).point;
+    const Real distance = away.norm();
+    if (distance > 0 && distance < reach) f(distance, Vec3(away / distance));
+  });
+}
+
+/// What of an impulse a contact can carry along its normal as it is now.
+Vec3 admissible(const Vec3& impulse, const Vec3& normal, Real friction) {
+  const Real pressing = impulse.dot(normal);
+  if (!(pressing > 0)) return Vec3::Zero();
+  const Vec3 across = impulse - pressing * normal;
+  const Real size = across.norm(), limit = friction * pressing;
+  return pressing * normal + (size > limit ? Real(limit / size) : 1) * across;
+}
+
+}  // namespace
+
+std::size_t ParticleContacts::chunk_count() const {
+  return (particles_.size() + kContactChunk - 1) / kContactChunk;
+}
+
+/// Calls f(chunk, first, last) in parallel for runs of particles.
+template <class F>
+void ParticleContacts::for_each_chunk(F&& f) const {
+  tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
+    f(c, static_cast<uint32_t>(c * kContactChunk),
+      static_cast<uint32_t>(std::min(particles_.size(), (c + 1) * kContactChunk)));
+  });
+}
+
+void ParticleContacts::find() {
+  found_.resize(chunk_count());
+  for_each_chunk([&](std::size_t c, uint32_t begin, uint32_t end) {
+    Found& found = found_[c];
+    found.pairs.clear();
+    found.surfaces.clear();
+    found.reactions.clear();
+    found.strikes.clear();
+    NearObstacles near(step_->fixed, step_->moving);
+    for (uint32_t i = begin; i < end; ++i) {
+      // Relative to the chunk's first, until collect().
+      pair_begin_[i] = static_cast<uint32_t>(found.pairs.size());
+      surface_begin_[i] = static_cast<uint32_t>(found.surfaces.size());
+      find_pairs(i, found);
+      find_surfaces(i, near, found);
+    }
+  });
+  collect();
+}
+
+void ParticleContacts::find_pairs(uint32_t i, Found& found) const {
+  const CollidingParticle& a = particles_[i];
+  const Real h = step_->h;
+  for (const uint32_t j : search_->partners(i)) {
+    const CollidingParticle& b = particles_[j];
+    Pair pair;
+    Vec3 normal;
+    Real target, time;
+    const Vec3 u = a.velocity - b.velocity;
+    if (const auto met = meeting(a, b, h)) {
+      const Real speed = -u.dot(met->normal);
+      pair.is_impact = is_impact(speed, greater_acceleration(a, b), *step_);
+      // What is no impact acts all the time, because what presses does, and closes the gap by the end.
+      const Real from = std::max(a.from, b.from);
+      target = pair.is_impact ? pair_restitution(a, b) * speed : -speed * (met->time - from) / h;
+      normal = met->normal;
+      time = pair.is_impact ? met->time : from;
+    } else {
+      // The normal half-way does not turn over for those that press into each other. Those that fly past each
+      // other have to be looked at where they are.
+      const Real from = std::max(a.from, b.from), reach = a.radius + b.radius;
+      const Vec3 d = a.at(h) - b.at(h), way = (h - from) * u;
+      const Vec3 middle = way.squaredNorm() < reach * reach / 64 ? Vec3(d - way / 2) : d;
+      const Real size = middle.norm();
+      if (!(size > 0)) continue;
+      normal = middle / size;
+      const Real gap = d.dot(normal) - reach;
+      if (gap > kMargin / 2 * reach) continue;
+      pair.is_impact = false;
+      target = std::min(0.0, u.dot(normal) - gap / h);
+      time = std::max(a.from, b.from);
+    }
+    pair.a = i & kIndex;
+    pair.b = j & kIndex;
+    pair.normal_single = normal.cast<float>();
+    pair.mass = static_cast<float>(a.mass * b.mass / (a.mass + b.mass));
+    pair.target = static_cast<float>(target);
+    pair.time = static_cast<float>(time);
+    pair.friction = static_cast<float>(pair_friction(a.friction, b.friction));
+    const uint32_t apart = order_.layer[i] - order_.layer[j];
+    const auto layers = static_cast<uint32_t>(order_.layer_begin.size() - 1);
+    pair.is_far = !(apart + 1 <= 2 || apart == layers - 1 || apart + layers == 1);
+    recall(pair);
+    found.pairs.push_back(pair);
+  }
+}
+
+void ParticleContacts::find_surfaces(uint32_t i, NearObstacles& near, Found& found) const {
+  const CollidingParticle& g = particles_[i];
+  if (!g.hits_bodies) return;
+  const Real h = step_->h, margin = kMargin * g.radius;
+  const Vec3 end = g.at(h);
+  near.find(g.position, end, g.radius + margin);
+  const std::size_t first = found.surfaces.size();
+  for (const Obstacle* o : near.all()) {
+    if (o->body == impacts_->struck_body(i)) continue;
+    if (g.from < h) {
+      const ObstacleHit hit = NearObstacles::hit(*o, g.position, end, g.radius, g.from / h,
+                                                 std::numeric_limits<Real>::infinity());
+      if (hit.obstacle) add_surface(i, *o, hit.normal, 0, hit.fraction * h, true, first, found);
+    }
+    for_each_surface(o->solid, o->end.point_to_body(end), g.radius + margin,
+                     [&](Real distance, const Vec3& normal) {
+                       add_surface(i, *o, o->end.vector_to_world(normal), distance - g.radius, g.from, false,
+                                   first, found);
+                     });
+  }
+}
+
+/// Adds the contact of particle i with a surface that it meets, or that is `gap` away at the end; once per
+/// surface, of which those from `first` on were found before.
+void ParticleContacts::add_surface(uint32_t i, const Obstacle& o, const Vec3& normal, Real gap, Real time,
+                                   bool meets, std::size_t first, Found& found) const {
+  for (std::size_t k = first; k < found.surfaces.size(); ++k)
+    if (found.surfaces[k].obstacle == &o && found.surfaces[k].normal().dot(normal) > kSameSurface) return;
+  const CollidingParticle& g = particles_[i];
+  Surface s;
+  s.particle = i;
+  s.obstacle = &o;
+  s.body = o.body;
+  const Vec3 velocity = o.velocity_at(g.at(step_->h) - g.radius * normal, 1);
+  s.normal_single = normal.cast<float>();
+  s.velocity = velocity;
+  s.friction_axis = o.friction_axis_on(normal, 1);
+  s.friction = static_cast<float>(pair_friction(g.friction, o.friction));
+  s.mass = static_cast<float>(g.mass);
+  const Real speed = (velocity - g.velocity).dot(normal);
+  s.is_impact = meets && is_impact(speed, g.acceleration.norm(), *step_);
+  Real target = meets ? -speed * (time - g.from) / step_->h : std::min(0.0, -speed - gap / step_->h);
+  s.time = static_cast<float>(s.is_impact ? time : g.from);
+  if (s.is_impact) {
+    // The body gives way, but only later: the particle is left with the velocity that it then has.
+    const Vec3 arm = g.at(time) - g.radius * normal - o.centre_at(time / step_->h);
+    const Real yielding =
+        o.is_dynamic() ? g.mass * normal.dot(step_->impulses.mobility(o, arm, -normal) * normal) : 0;
+    target = speed * ((1 + std::max(g.restitution, o.restitution)) / (1 + yielding) - 1);
+  }
+  s.target = static_cast<float>(target);
+  recall(s);
+  found.surfaces.push_back(s);
+}
+
+/// The impulse of the sub-step before as the guess.
+void ParticleContacts::recall(Pair& pair) const {
+  pair.impulse_single.setZero();
+  const uint32_t a = order_.before[pair.a], b = order_.before[pair.b];
+  if (a == kNone || b == kNone || pair.is_impact) return;
+  const auto look = [&](uint32_t from, uint32_t to, Real sign) {
+    for (uint32_t k = pair_begin_before_[from]; k < pair_begin_before_[from + 1]; ++k) {
+      if (pairs_before_[k].b != to) continue;
+      const Vec3 impulse = sign * step_->h / h_before_ * pairs_before_[k].impulse();
+      pair.impulse_single = admissible(impulse, pair.normal(), pair.friction).cast<float>();
+      return true;
+    }
+    return false;
+  };
+  if (!look(a, b, 1)) look(b, a, -1);
+}
+
+void ParticleContacts::recall(Surface& s) const {
+  s.impulse_single.setZero();
+  const uint32_t i = order_.before[s.particle];
+  if (i == kNone || s.is_impact) return;
+  for (uint32_t k = surface_begin_before_[i]; k < surface_begin_before_[i + 1]; ++k) {
+    const Surface& old = surfaces_before_[k];
+    if (old.body != s.body || old.normal().dot(s.normal()) < kSameSurface) continue;
+    s.impulse_single = admissible(step_->h / h_before_ * old.impulse(), s.normal(), s.friction).cast<float>();
+    return;
+  }
+}
+
+/// Brings what the chunks found together.
+void ParticleContacts::collect() {
+  std::size_t pairs = 0, surfaces = 0;
+  std::vector<std::pair<std::size_t, std::size_t>> offset;
+  for (const Found& found : found_) {
+    offset.emplace_back(pairs, surfaces);
+    pairs += found.pairs.size();
+    surfaces += found.surfaces.size();
+  }
+  pairs_.resize(pairs);
+  surfaces_.resize(surfaces);
+  pair_begin_.back() = static_cast<uint32_t>(pairs);
+  surface_begin_.back() = static_cast<uint32_t>(surfaces);
+  for_each_chunk([&](std::size_t c, uint32_t begin, uint32_t end) {
+    const auto [first_pair, first_surface] = offset[c];
+    std::copy(found_[c].pairs.begin(), found_[c].pairs.end(),
+              pairs_.begin() + static_cast<std::ptrdiff_t>(first_pair));
+    std::copy(found_[c].surfaces.begin(), found_[c].surfaces.end(),
+              surfaces_.begin() + static_cast<std::ptrdiff_t>(first_surface));
+    for (uint32_t i = begin; i < end; ++i) {
+      pair_begin_[i] += static_cast<uint32_t>(first_pair);
+      surface_begin_[i] += static_cast<uint32_t>(first_surface);
+    }
+  });
+  far_.clear();
+  for (std::size_t k = 0; k < pairs; ++k)
+    if (pairs_[k].is_far) far_.push_back(static_cast<uint32_t>(k));
+}
+
+void ParticleContacts::solve(std::span<CollidingParticle> particles, const Order& order,
+                             const ParticleSearch& search, const ParticleImpacts& impacts,
+                             const ParticleStep& step, std::span<Vec3> end, std::span<uint8_t> touched,
+                             std::vector<Reaction>& reactions, std::vector<ParticleStrike>& strikes) {
+  particles_ = particles;
+  order_ = order;
+  search_ = &search;
+  impacts_ = &impacts;
+  step_ = &step;
+  std::swap(pairs_, pairs_before_);
+  std::swap(surfaces_, surfaces_before_);
+  std::swap(pair_begin_, pair_begin_before_);
+  std::swap(surface_begin_, surface_begin_before_);
+  pair_begin_.resize(particles.size() + 1);
+  surface_begin_.resize(particles.size() + 1);
+  find();
+  relax();
+  displace(end, touched);
+  push_apart(end);
+  stop_passing(end);
+  keep_outside(end, reactions, strikes);
+  h_before_ = step.h;
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,170 @@
+#pragma once
+/// Resting contact of particles with each other and with bodies, and whatever ParticleImpacts left (physics
+/// P6, P7, P8, R10): a complementarity problem on the velocities at the end of the sub-step with Coulomb's
+/// round cone, as of bodies (contact_problem.h). Particles do not turn, so a contact's mobility is a number
+/// and its solution closed. It is relaxed by projected Gauss-Seidel from the impulses of the sub-step before:
+/// a heap at rest is its own solution. Particles lie in layers (NeighborGrid), two to a slab, and a slab's
+/// contacts reach no farther than the layers beside it: all even slabs may be relaxed at the same time, then
+/// all odd ones.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <tuple>
+#include <vector>
+
+#include "sim/particles/colliding_particle.h"
+#include "sim/particles/particle_impacts.h"
+#include "sim/particles/particle_search.h"
+#include "sim/particles/particle_sweep.h"
+
+namespace offstage::sim {
+
+class ParticleContacts {
+ public:
+  static constexpr uint32_t kNone = ~0u;
+  /// Gaps below this share of the radii count as contact: what impulses of a sub-step may close.
+  static constexpr Real kMargin = 0.1;
+
+  /// The particles, in an order by layers.
+  struct Order {
+    std::span<const uint32_t> layer_begin;  ///< of each layer, an even number, and the end
+    std::span<const uint32_t> layer;        ///< of each particle
+    std::span<const uint32_t> before;       ///< index of each in the solution before, or kNone
+  };
+
+  /// Moves the particles to the end of their sub-step: `end` gets their positions, the particles their
+  /// velocities, `touched` whether they press on anything. Appends what bodies and particles got.
+  void solve(std::span<CollidingParticle> particles, const Order& order, const ParticleSearch& search,
+             const ParticleImpacts& impacts, const ParticleStep& step, std::span<Vec3> end,
+             std::span<uint8_t> touched, std::vector<Reaction>& reactions,
+             std::vector<ParticleStrike>& strikes);
+
+  std::size_t contacts() const { return pairs_.size() + surfaces_.size(); }
+  uint32_t sweeps() const { return sweeps_; }
+
+ private:
+  static constexpr Real kNever = std::numeric_limits<Real>::infinity();
+
+  /// Of a contact: how it acts, in single precision, because the time of a sweep is that of reading the
+  /// contacts. What two particles give each other is equal and opposite all the same, and velocities are
+  /// double.
+  struct Contact {
+    Eigen::Vector3f normal_single;
+    Eigen::Vector3f impulse_single;
+    float target;    // least normal velocity at the end [m/s]
+    float friction;  // Coulomb's coefficient
+    float mass;      // effective [kg]
+    float time;      // since when [s]
+
+    Vec3 normal() const { return normal_single.cast<Real>(); }
+    Vec3 impulse() const { return impulse_single.cast<Real>(); }  // on the first particle, world [N s]
+    /// What is left of an impulse along the surface that friction can hold no more of than `limit`.
+    Vec3 held(const Vec3& along, Real limit) const {
+      const Real size2 = along.squaredNorm();
+      return size2 > limit * limit ? Vec3(limit / std::sqrt(size2) * along) : along;
+    }
+    bool acts() const { return impulse_single != Eigen::Vector3f::Zero(); }
+  };
+  static constexpr uint32_t kIndex = 0x7fffffff;  // all bits of a particle's number
+  struct Pair : Contact {
+    uint32_t a : 31, is_impact : 1;
+    uint32_t b : 31, is_far : 1;  // far: not in neighbouring layers
+  };
+  struct Surface : Contact {
+    uint32_t particle;
+    bool is_impact;
+    uint32_t body;
+    const Obstacle* obstacle;
+    Vec3 velocity;       // of the surface
+    Vec3 friction_axis;  // Obstacle::friction_axis_on the surface
+
+    /// Along and across the friction_axis each for itself.
+    Vec3 held(const Vec3& along, Real limit) const {
+      if (friction_axis.isZero()) return Contact::held(along, limit);
+      const Vec3 across = normal().cross(friction_axis);
+      const Real most = limit * obstacle->cross_friction;
+      return std::clamp(friction_axis.dot(along), -limit, limit) * friction_axis +
+             std::clamp(across.dot(along), -most, most) * across;
+    }
+  };
+  struct Motion {
+    Vec3 velocity;
+    Real inverse_mass;
+  };
+  /// Two particles that would pass through each other.
+  struct Passing {
+    Real time;
+    uint32_t a, b;
+    bool a_stands, b_stands;  // by then
+
+    bool operator>(const Passing& o) const { return std::tie(time, a, b) > std::tie(o.time, o.a, o.b); }
+  };
+  struct Found {
+    std::vector<Pair> pairs;
+    std::vector<Surface> surfaces;
+    std::vector<Reaction> reactions;
+    std::vector<ParticleStrike> strikes;
+    std::vector<Passing> passing;
+  };
+
+  std::size_t chunk_count() const;
+  template <class F>
+  void for_each_chunk(F&& f) const;
+  template <class OnPair, class OnSurface>
+  void for_each_contact(OnPair&& on_pair, OnSurface&& on_surface);
+
+  // particle_contacts.cpp
+  void find();
+  void find_pairs(uint32_t i, Found& found) const;
+  void find_surfaces(uint32_t i, NearObstacles& near, Found& found) const;
+  void add_surface(uint32_t i, const Obstacle& o, const Vec3& normal, Real target_or_gap, Real time,
+                   bool meets, std::size_t first, Found& found) const;
+  void recall(Pair& pair) const;
+  void recall(Surface& surface) const;
+  void collect();
+  // particle_relaxation.cpp
+  void relax();
+  void displace(std::span<Vec3> end, std::span<uint8_t> touched);
+  void push_apart(std::span<Vec3> end);
+  // tunneling_guard.cpp
+  void stop_passing(std::span<Vec3> end);
+  bool set_out(std::span<const Vec3> end);
+  void find_passing();
+  void list_near();
+  template <class Add>
+  void find_passing(uint32_t i, uint32_t j, Real after, Add&& add) const;
+  void stop(const Passing& passing);
+  bool stands(uint32_t i) const { return stop_[i] < kNever; }
+  // particle_relaxation.cpp
+  void keep_outside(std::span<Vec3> end, std::vector<Reaction>& reactions,
+                    std::vector<ParticleStrike>& strikes);
+  void keep_outside(uint32_t i, NearObstacles& near, Vec3& end, Found& found);
+  void report(uint32_t i, const Vec3& end, Found& found) const;
+
+  std::span<CollidingParticle> particles_;
+  Order order_;
+  const ParticleSearch* search_ = nullptr;
+  const ParticleImpacts* impacts_ = nullptr;
+  const ParticleStep* step_ = nullptr;
+  std::vector<Found> found_;  // by chunk
+  std::vector<Pair> pairs_, pairs_before_;
+  std::vector<Surface> surfaces_, surfaces_before_;
+  // Where a particle's contacts begin; of a pair it is the first one's.
+  std::vector<uint32_t> pair_begin_, surface_begin_, pair_begin_before_, surface_begin_before_;
+  std::vector<uint32_t> far_;
+  std::vector<Motion> motion_;
+  std::vector<Real> slab_change2_;
+  // The ways as contact made them, whether they are long, and when those that end early do.
+  std::vector<CollidingParticle> ways_;
+  std::vector<uint8_t> is_long_;
+  std::vector<Real> stop_;
+  ParticleSearch way_search_;
+  // Of each particle those whose ways may come near its own, if one of the two is long.
+  std::vector<uint32_t> near_begin_, near_;
+  Real h_before_ = 0;
+  uint32_t sweeps_ = 0;
+};
+
+}  // namespace offstage::sim

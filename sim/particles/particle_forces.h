@@ -1,0 +1,69 @@
+#pragma once
+/// The forces that act on each particle of a system alone: gravity, viscous drag, a constant force, and the
+/// world's fields, moving air and hands (physics P2).
+
+#include <algorithm>
+#include <span>
+#include <vector>
+
+#include "sim/dynamics/flat.h"
+#include "sim/dynamics/force_field.h"
+#include "sim/dynamics/integrator.h"
+#include "sim/particles/particles.h"
+
+namespace offstage::sim {
+
+struct ParticleForces {
+  ParticleForces(const ParticleSystemDef& def, const Vec3& world_gravity, const Vec3& air,
+                 std::vector<const ForceDef*> acting = {})
+      : gravity(def.gravity ? world_gravity : Vec3::Zero()),
+        force(def.force),
+        wind(air),
+        drag(def.linear_drag),
+        fields(std::move(acting)) {}
+
+  /// By what is the same everywhere: without `fields`.
+  Vec3 acceleration(const Vec3& v, Real mass) const {
+    return gravity + (force - drag * (v - wind)) * (1 / mass);
+  }
+  /// By everything, of a run of particles: x, v and dv have x y z after each other. `damping`, if not empty,
+  /// has for each particle the rate at which drag takes its velocity away [1/s].
+  void accelerate(Real t, std::span<const Real> x, std::span<const Real> v, std::span<const Real> mass,
+                  std::span<Real> dv, std::span<Real> damping = {}) const;
+  /// A step of IntegratorKind::leapfrog of a run of particles that no field acts on.
+  void leap(Real h, std::span<Vec3> x, std::span<Vec3> v, std::span<const Real> mass) const;
+  /// Appends the derivatives of (dx/dt, dv/dt) of a run of particles by (x, v), which begin at the rows and
+  /// columns `at_x` and `at_v`. Left out is how fields change from place to place: it does not make a system
+  /// stiff.
+  void jacobian(Real t, std::span<const Real> x, std::span<const Real> mass, int at_x, int at_v,
+                SparseEntries& entries) const;
+
+  Vec3 gravity, force, wind;
+  Real drag;
+  std::vector<const ForceDef*> fields;  ///< those of the world that act on the system
+};
+
+/// A run of particles in free flight. The state is position and velocity, x y z after each other.
+class FreeFlight final : public DynamicSystem {
+ public:
+  FreeFlight(const ParticleForces& forces, std::span<const Real> mass) : forces_(forces), mass_(mass) {}
+
+  void velocity(Real, std::span<const Real>, std::span<const Real> p, std::span<Real> dx) const override {
+    std::copy(p.begin(), p.end(), dx.begin());
+  }
+  void force(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const override {
+    forces_.accelerate(t, x, p, mass_, dp);
+  }
+  bool force_and_damping(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp,
+                         std::span<Real> damping) const override;
+  void jacobian(Real t, std::span<const Real> x, std::span<const Real>,
+                SparseEntries& entries) const override {
+    forces_.jacobian(t, x, mass_, 0, static_cast<int>(x.size()), entries);
+  }
+
+ private:
+  const ParticleForces& forces_;
+  std::span<const Real> mass_;
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,247 @@
+#include "sim/particles/particle_impacts.h"
+
+#include <algorithm>
+#include <atomic>
+
+#include <oneapi/tbb/parallel_for.h>
+
+namespace offstage::sim {
+namespace {
+
+constexpr std::size_t kImpactChunk = 512;
+constexpr uint32_t kMaxImpactsOfParticle = 1000;
+/// Collisions of a sub-step that are taken one after the other.
+constexpr std::size_t kMaxImpacts = 5000;
+/// A particle with so many neighbours, at gaps below this share of the radii, is in a crowd.
+constexpr uint32_t kCrowd = 4;
+constexpr Real kNeighbourGap = 0.1;
+/// Particles touch if the gap is below this, of the distance of their centres.
+constexpr Real kTouching = 1e-6;
+/// A larger cluster is left to resting contact.
+constexpr std::size_t kMaxCluster = 16;
+/// Changed particles that are looked through one by one before they are sorted.
+constexpr std::size_t kMaxUnsorted = 128;
+
+}  // namespace
+
+void ParticleImpacts::resolve(std::span<CollidingParticle> particles, const ParticleSearch& search,
+                              const ParticleStep& step, std::vector<ParticleStrike>& strikes) {
+  particles_ = particles;
+  search_ = &search;
+  step_ = &step;
+  strikes_ = &strikes;
+  stamp_.assign(particles.size(), 0);
+  struck_body_.assign(particles.size(), kNone);
+  sorted_stamp_.assign(particles.size(), 0);
+  changed_.clear();
+  unsorted_.clear();
+  changed_search_.build(particles, {}, step.h, 0);
+  count_ = 0;
+  queue_ = {};
+  count_neighbours();
+  find_first();
+  if (queue_.size() > kMaxImpacts) return;
+  while (!queue_.empty() && count_ < kMaxImpacts) {
+    const Impact impact = queue_.top();
+    queue_.pop();
+    if (impact.stamp_a != stamp_[impact.a] || (impact.b != kNone && impact.stamp_b != stamp_[impact.b]))
+      continue;
+    ++count_;
+    impact.b == kNone ? collide_with_obstacle(impact) : collide_particles(impact);
+  }
+}
+
+void ParticleImpacts::count_neighbours() {
+  neighbours_.assign(particles_.size(), 0);
+  tbb::parallel_for(
+      std::size_t{0}, (particles_.size() + kImpactChunk - 1) / kImpactChunk, [&](std::size_t c) {
+        for (auto i = static_cast<uint32_t>(c * kImpactChunk);
+             i < std::min(particles_.size(), (c + 1) * kImpactChunk); ++i)
+          for (const uint32_t j : search_->partners(i)) {
+            const Real reach = (1 + kNeighbourGap) * (particles_[i].radius + particles_[j].radius);
+            if ((particles_[i].position - particles_[j].position).squaredNorm() > reach * reach) continue;
+            std::atomic_ref(neighbours_[i]).fetch_add(1, std::memory_order_relaxed);
+            std::atomic_ref(neighbours_[j]).fetch_add(1, std::memory_order_relaxed);
+          }
+      });
+}
+
+/// Whether a collision is one of a crowd, and slow enough that all of them may be solved at once.
+bool ParticleImpacts::is_left(uint32_t i, uint32_t j, Real speed) const {
+  return std::max(neighbours_[i], neighbours_[j]) >= kCrowd &&
+         speed * step_->h < particles_[i].radius + particles_[j].radius;
+}
+
+/// The collisions on the ways as they are at the beginning.
+void ParticleImpacts::find_first() {
+  const std::size_t n = particles_.size();
+  found_.resize((n + kImpactChunk - 1) / kImpactChunk);
+  tbb::parallel_for(std::size_t{0}, found_.size(), [&](std::size_t c) {
+    found_[c].clear();
+    NearObstacles near(step_->fixed, step_->moving);
+    const auto add = [&](const Impact& impact) { found_[c].push_back(impact); };
+    for (auto i = static_cast<uint32_t>(c * kImpactChunk); i < std::min(n, (c + 1) * kImpactChunk); ++i) {
+      for (const uint32_t j : search_->partners(i)) find_with(i, j, add);
+      find_obstacle(i, near, add);
+    }
+  });
+  for (const auto& found : found_)
+    for (const Impact& impact : found) queue_.push(impact);
+}
+
+template <class Add>
+void ParticleImpacts::find_with(uint32_t i, uint32_t j, Add&& add) const {
+  const CollidingParticle &a = particles_[i], &b = particles_[j];
+  if (!may_collide(a, b)) return;
+  const auto met = meeting(a, b, step_->h);
+  if (!met) return;
+  const Real speed =
+      -(a.velocity_at(met->time, step_->h) - b.velocity_at(met->time, step_->h)).dot(met->normal);
+  if (!is_impact(speed, greater_acceleration(a, b), *step_) || is_left(i, j, speed)) return;
+  add(Impact{met->time, i, j, stamp_[i], stamp_[j], met->normal, nullptr});
+}
+
+template <class Add>
+void ParticleImpacts::find_obstacle(uint32_t i, NearObstacles& near, Add&& add) const {
+  const CollidingParticle& g = particles_[i];
+  if (!g.hits_bodies || g.from >= step_->h) return;
+  const Vec3 end = g.at(step_->h);
+  near.find(g.position, end, g.radius);
+  if (near.all().empty()) return;
+  const ObstacleHit hit = near.first_hit(g.position, end, g.radius, g.from / step_->h);
+  if (!hit.obstacle || hit.obstacle->body == struck_body_[i]) return;
+  const Real time = hit.fraction * step_->h;
+  const Vec3 u = g.velocity_at(time, step_->h) - hit.obstacle->velocity_at(hit.position, hit.fraction);
+  const Real speed = -u.dot(hit.normal);
+  if (!is_impact(speed, g.acceleration.norm(), *step_) || is_left(i, i, speed)) return;
+  add(Impact{time, i, kNone, stamp_[i], 0, hit.normal, hit.obstacle});
+}
+
+/// The particles, unchanged or changed, that may come near a particle's way.
+template <class F>
+void ParticleImpacts::for_each_near(const CollidingParticle& particle, F&& f) const {
+  search_->for_each_near(particle, [&](uint32_t k) {
+    if (stamp_[k] == 0) f(k);
+  });
+  changed_search_.for_each_near(particle, [&](uint32_t k) {
+    if (stamp_[k] == sorted_stamp_[k]) f(k);
+  });
+  for (const uint32_t k : unsorted_)
+    if (stamp_[k] != sorted_stamp_[k]) f(k);
+}
+
+void ParticleImpacts::collide_with_obstacle(const Impact& impact) {
+  const Obstacle& o = *impact.obstacle;
+  const CollidingParticle& g = particles_[impact.a];
+  const Real fraction = impact.time / step_->h;
+  const Vec3 contact = g.at(impact.time) - g.radius * impact.normal, arm = contact - o.centre_at(fraction);
+  const Vec3 surface = o.is_dynamic() ? step_->impulses.velocity(o, arm) : o.velocity_at(contact, fraction);
+  const Vec3 u = g.arrival(impact.time, step_->h) - surface;
+  // What is struck may move away by now; then it is only in the way until it does.
+  const Vec3 impulse =
+      u.dot(impact.normal) < 0
+          ? collision_impulse(
+                o, fraction, g.mass, u, impact.normal, std::max(g.restitution, o.restitution),
+                pair_friction(g.friction, o.friction),
+                o.is_dynamic() ? step_->impulses.mobility(o, arm, -impact.normal) : Mat3(Mat3::Zero()))
+          : Vec3(Vec3::Zero());
+  if (o.is_dynamic()) {
+    step_->impulses.push(reaction(o, contact, fraction, impulse));
+    struck_body_[impact.a] = o.body;
+  }
+  strike(impact.a, impact.time, impulse / g.mass, impact.normal);
+  find_again(impact.a);
+}
+
+void ParticleImpacts::collide_particles(const Impact& impact) {
+  const std::vector<uint32_t> members = cluster(impact);
+  if (members.size() > 2) return collide_cluster(members, impact.time);
+  const CollidingParticle &a = particles_[impact.a], &b = particles_[impact.b];
+  const Vec3 u = a.arrival(impact.time, step_->h) - b.arrival(impact.time, step_->h);
+  const Vec3 impulse = collision_impulse(a.mass * b.mass / (a.mass + b.mass), u, impact.normal,
+                                         pair_restitution(a, b), pair_friction(a.friction, b.friction));
+  strike(impact.a, impact.time, impulse / a.mass, impact.normal);
+  strike(impact.b, impact.time, -impulse / b.mass, -impact.normal);
+  find_again(impact.a);
+  find_again(impact.b);
+}
+
+/// The two particles and all that touch them, and so on, at the time.
+std::vector<uint32_t> ParticleImpacts::cluster(const Impact& impact) const {
+  std::vector<uint32_t> members = {impact.a, impact.b};
+  for (std::size_t m = 0; m < members.size(); ++m) {
+    const CollidingParticle& g = particles_[members[m]];
+    const Vec3 place = g.at(impact.time);
+    for_each_near(g, [&](uint32_t k) {
+      const CollidingParticle& other = particles_[k];
+      if (other.from > impact.time || members.size() > kMaxCluster || !may_collide(g, other)) return;
+      if ((place - other.at(impact.time)).norm() > (g.radius + other.radius) * (1 + kTouching)) return;
+      if (std::find(members.begin(), members.end(), k) == members.end()) members.push_back(k);
+    });
+    if (members.size() > kMaxCluster) return {impact.a, impact.b};
+  }
+  return members;
+}
+
+void ParticleImpacts::collide_cluster(std::span<const uint32_t> members, Real time) {
+  std::vector<ContactBody> bodies;
+  std::vector<Contact> contacts;
+  std::vector<Real> restitution;
+  for (const uint32_t m : members)
+    bodies.push_back(
+        {.inverse_mass = 1 / particles_[m].mass, .velocity = particles_[m].arrival(time, step_->h)});
+  for (uint32_t i = 0; i < members.size(); ++i)
+    for (uint32_t j = i + 1; j < members.size(); ++j) {
+      const CollidingParticle &a = particles_[members[i]], &b = particles_[members[j]];
+      const Vec3 d = a.at(time) - b.at(time);
+      const Real distance = d.norm();
+      if (!may_collide(a, b) || !(distance > 0) || distance > (a.radius + b.radius) * (1 + kTouching))
+        continue;
+      const Real friction = pair_friction(a.friction, b.friction);
+      contacts.push_back({.a = i,
+                          .b = j,
+                          .frame = contact_frame(d / distance),
+                          .friction_t = friction,
+                          .friction_k = friction});
+      restitution.push_back(pair_restitution(a, b));
+    }
+  collide(bodies, contacts, restitution, step_->law);
+  std::vector<Vec3> normal(members.size(), Vec3::Zero());
+  for (const Contact& c : contacts) {
+    if (c.impulse == Vec3::Zero()) continue;
+    if (normal[c.a] == Vec3::Zero()) normal[c.a] = c.frame.n;
+    if (normal[c.b] == Vec3::Zero()) normal[c.b] = -c.frame.n;
+  }
+  for (std::size_t m = 0; m < members.size(); ++m) {
+    const Vec3 change = bodies[m].velocity - particles_[members[m]].arrival(time, step_->h);
+    strike(members[m], time, change, normal[m]);
+  }
+  for (const uint32_t m : members) find_again(m);
+}
+
+void ParticleImpacts::strike(uint32_t i, Real time, const Vec3& change, const Vec3& normal) {
+  CollidingParticle& g = particles_[i];
+  g.strike(time, step_->h, change);
+  if (stamp_[i]++ == 0) changed_.push_back(i);
+  unsorted_.push_back(i);
+  if (normal != Vec3::Zero())
+    strikes_->push_back({i, time, g.position, g.velocity_at(time, step_->h), normal});
+}
+
+/// The collisions that are ahead of a particle that has collided.
+void ParticleImpacts::find_again(uint32_t i) {
+  if (unsorted_.size() > kMaxUnsorted) {
+    changed_search_.build(particles_, changed_, step_->h, 0);
+    for (const uint32_t k : changed_) sorted_stamp_[k] = stamp_[k];
+    unsorted_.clear();
+  }
+  if (stamp_[i] >= kMaxImpactsOfParticle) return;
+  const auto add = [&](const Impact& impact) { queue_.push(impact); };
+  for_each_near(particles_[i], [&](uint32_t k) {
+    if (k != i && stamp_[k] < kMaxImpactsOfParticle) find_with(i, k, add);
+  });
+  NearObstacles near(step_->fixed, step_->moving);
+  find_obstacle(i, near, add);
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,79 @@
+#pragma once
+/// Collisions of particles with particles and bodies, one after the other in the order of time, at their very
+/// times (physics E6, P3, P5, P6). Particles that touch when one of them is hit make a cluster and are solved
+/// together. The work is bounded: a particle that collides too often within a sub-step, and everything where
+/// collisions are too many, is left to resting contact (particle_contacts.h), which lets nothing through
+/// either. So are slow collisions in a crowd, of which there is no end and where each depends on all.
+
+#include <queue>
+#include <span>
+#include <vector>
+
+#include "sim/particles/colliding_particle.h"
+#include "sim/particles/particle_search.h"
+#include "sim/particles/particle_sweep.h"
+
+namespace offstage::sim {
+
+class ParticleImpacts {
+ public:
+  static constexpr uint32_t kNone = ~0u;
+
+  /// Takes the particles through their collisions. `search` must have sorted them and listed their partners.
+  /// Bodies get theirs by the step's impulses; appends what particles got.
+  void resolve(std::span<CollidingParticle> particles, const ParticleSearch& search, const ParticleStep& step,
+               std::vector<ParticleStrike>& strikes);
+
+  /// The particles that collided.
+  std::span<const uint32_t> changed() const { return changed_; }
+  /// Obstacle::body of the dynamic body that a particle struck last; it gives way in the next sub-step only.
+  uint32_t struck_body(uint32_t particle) const { return struck_body_[particle]; }
+  uint64_t count() const { return count_; }
+
+ private:
+  struct Impact {
+    Real time;
+    uint32_t a, b;  // b: kNone if it is with an obstacle
+    uint32_t stamp_a, stamp_b;
+    Vec3 normal;  // towards a
+    const Obstacle* obstacle;
+
+    bool operator>(const Impact& o) const {
+      return time != o.time ? time > o.time : a != o.a ? a > o.a : b > o.b;
+    }
+  };
+
+  void count_neighbours();
+  bool is_left(uint32_t i, uint32_t j, Real speed) const;
+  void find_first();
+  template <class Add>
+  void find_with(uint32_t i, uint32_t j, Add&& add) const;
+  template <class Add>
+  void find_obstacle(uint32_t i, NearObstacles& near, Add&& add) const;
+  template <class F>
+  void for_each_near(const CollidingParticle& particle, F&& f) const;
+  void collide_with_obstacle(const Impact& impact);
+  void collide_particles(const Impact& impact);
+  std::vector<uint32_t> cluster(const Impact& impact) const;
+  void collide_cluster(std::span<const uint32_t> members, Real time);
+  void strike(uint32_t i, Real time, const Vec3& change, const Vec3& normal);
+  void find_again(uint32_t i);
+
+  std::span<CollidingParticle> particles_;
+  const ParticleSearch* search_ = nullptr;
+  const ParticleStep* step_ = nullptr;
+  std::vector<ParticleStrike>* strikes_ = nullptr;
+  std::priority_queue<Impact, std::vector<Impact>, std::greater<>> queue_;
+  std::vector<std::vector<Impact>> found_;  // by chunk
+  std::vector<uint32_t> stamp_;             // collisions of each particle so far
+  std::vector<uint32_t> neighbours_;        // that nearly touch, of each particle
+  std::vector<uint32_t> struck_body_;
+  std::vector<uint32_t> changed_;
+  // Where the changed ones are: those sorted lately, and those changed since.
+  ParticleSearch changed_search_;
+  std::vector<uint32_t> sorted_stamp_;
+  std::vector<uint32_t> unsorted_;
+  uint64_t count_ = 0;
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,223 @@
+/// The solution of ParticleContacts and what follows from it.
+
+#include <algorithm>
+#include <array>
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include "sim/particles/particle_contacts.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Sweeps of Gauss-Seidel end when one changes no velocity by more than this [m/s], or after so much work:
+/// few contacts are solved exactly, many go on from the sub-step before.
+constexpr Real kTolerance = 1e-7;
+constexpr std::size_t kMaxContactVisits = 1'000'000;
+constexpr std::size_t kMinSweeps = 30, kMaxSweeps = 1000;
+/// Overlap of particles below this share of their radii is left, and of more this share is taken away in a
+/// sub-step: by moving them, so that velocities do not know of it.
+constexpr Real kSlop = 0.002, kPush = 0.2;
+constexpr int kMaxSlides = 4;
+/// Parts of a slab that are gone through side by side: contacts that follow each other should not wait for
+/// each other's velocities.
+constexpr uint32_t kStreams = 4;
+constexpr std::size_t kRelaxationChunk = ParticleSearch::kChunk;
+
+/// The impulse's change that brings a contact with relative velocity u to its target, within Coulomb's cone.
+template <class Contact>
+Vec3 correct(Contact& c, const Vec3& u) {
+  const Vec3 before = c.impulse(), normal = c.normal();
+  const Vec3 wanted = before - c.mass * (u - c.target * normal);
+  const Real pressing = wanted.dot(normal);
+  if (pressing > 0) {
+    const Vec3 along = c.held(wanted - pressing * normal, c.friction * pressing);
+    c.impulse_single = (pressing * normal + along).template cast<float>();
+  } else {
+    c.impulse_single.setZero();
+  }
+  return c.impulse() - before;
+}
+
+}  // namespace
+
+/// Calls on_pair for every pair and on_surface for every contact with a body; those that share a particle
+/// never at the same time, and always in the same order.
+template <class OnPair, class OnSurface>
+void ParticleContacts::for_each_contact(OnPair&& on_pair, OnSurface&& on_surface) {
+  const std::size_t slabs = (order_.layer_begin.size() - 1) / 2;
+  for (std::size_t color = 0; color < 2; ++color)
+    tbb::parallel_for(std::size_t{0}, slabs / 2, [&](std::size_t k) {
+      const std::size_t slab = 2 * k + color;
+      const uint32_t begin = order_.layer_begin[2 * slab], end = order_.layer_begin[2 * slab + 2];
+      std::array<uint32_t, kStreams + 1> next;
+      for (uint32_t s = 0; s <= kStreams; ++s) next[s] = pair_begin_[begin + (end - begin) * s / kStreams];
+      const std::array<uint32_t, kStreams + 1> first = next;
+      for (bool more = true; more;) {
+        more = false;
+        for (uint32_t s = 0; s < kStreams; ++s) {
+          if (next[s] == first[s + 1]) continue;
+          Pair& c = pairs_[next[s]++];
+          if (!c.is_far) on_pair(c, slab);
+          more = true;
+        }
+      }
+      for (uint32_t c = surface_begin_[begin]; c < surface_begin_[end]; ++c) on_surface(surfaces_[c], slab);
+    });
+  for (const uint32_t c : far_) on_pair(pairs_[c], 0);
+}
+
+void ParticleContacts::relax() {
+  motion_.resize(particles_.size());
+  tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
+    for (std::size_t i = c * kRelaxationChunk; i < std::min(particles_.size(), (c + 1) * kRelaxationChunk);
+         ++i)
+      motion_[i] = {particles_[i].velocity, 1 / particles_[i].mass};
+  });
+  const auto apply = [&](const Pair& c, const Vec3& impulse) {
+    motion_[c.a].velocity += motion_[c.a].inverse_mass * impulse;
+    motion_[c.b].velocity -= motion_[c.b].inverse_mass * impulse;
+  };
+  const auto press = [&](const Surface& c, const Vec3& impulse) {
+    motion_[c.particle].velocity += motion_[c.particle].inverse_mass * impulse;
+  };
+  for_each_contact([&](const Pair& c, std::size_t) { apply(c, c.impulse()); },
+                   [&](const Surface& c, std::size_t) { press(c, c.impulse()); });
+  const std::size_t slabs = (order_.layer_begin.size() - 1) / 2;
+  const std::size_t most =
+      std::clamp(kMaxContactVisits / std::max(contacts(), std::size_t{1}), kMinSweeps, kMaxSweeps);
+  Real change2 = 1;
+  for (sweeps_ = 0; sweeps_ < most && change2 > kTolerance * kTolerance; ++sweeps_) {
+    slab_change2_.assign(slabs, 0);
+    const auto note = [&](std::size_t slab, const Vec3& impulse, Real mass) {
+      const Real size2 = impulse.squaredNorm(), mass2 = mass * mass;
+      if (size2 > slab_change2_[slab] * mass2) slab_change2_[slab] = size2 / mass2;
+    };
+    for_each_contact(
+        [&](Pair& c, std::size_t slab) {
+          const Vec3 more = correct(c, motion_[c.a].velocity - motion_[c.b].velocity);
+          apply(c, more);
+          note(slab, more, c.mass);
+        },
+        [&](Surface& c, std::size_t slab) {
+          const Vec3 more = correct(c, motion_[c.particle].velocity - c.velocity);
+          press(c, more);
+          note(slab, more, c.mass);
+        });
+    change2 = *std::max_element(slab_change2_.begin(), slab_change2_.end());
+  }
+}
+
+/// Where the impulses bring the particles, each from its time on.
+void ParticleContacts::displace(std::span<Vec3> end, std::span<uint8_t> touched) {
+  const Real h = step_->h;
+  const auto press = [&](const Contact& c, uint32_t i, Real sign) {
+    if (!touched[i]) end[i] = particles_[i].at(h);
+    touched[i] = 1;
+    end[i] += sign * (h - c.time) / particles_[i].mass * c.impulse();
+  };
+  for_each_contact(
+      [&](const Pair& c, std::size_t) {
+        if (!c.acts()) return;
+        press(c, c.a, 1);
+        press(c, c.b, -1);
+      },
+      [&](const Surface& c, std::size_t) {
+        if (c.acts()) press(c, c.particle, 1);
+      });
+  tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
+    for (std::size_t i = c * kRelaxationChunk; i < std::min(particles_.size(), (c + 1) * kRelaxationChunk);
+         ++i)
+      particles_[i].velocity = motion_[i].velocity;
+  });
+}
+
+/// Takes some of the overlap away.
+void ParticleContacts::push_apart(std::span<Vec3> end) {
+  for_each_contact(
+      [&](const Pair& c, std::size_t) {
+        const Vec3 d = end[c.a] - end[c.b];
+        const Real reach = particles_[c.a].radius + particles_[c.b].radius, distance = d.norm();
+        const Real excess = reach * (1 - kSlop) - distance;
+        if (excess <= 0 || !(distance > 0)) return;
+        const Vec3 push = kPush * excess / distance * c.mass * d;
+        end[c.a] += push / particles_[c.a].mass;
+        end[c.b] -= push / particles_[c.b].mass;
+      },
+      [](const Surface&, std::size_t) {});
+}
+
+/// No particle ends its sub-step inside a body or beyond it.
+void ParticleContacts::keep_outside(std::span<Vec3> end, std::vector<Reaction>& reactions,
+                                    std::vector<ParticleStrike>& strikes) {
+  const auto for_each = [&](auto&& f) {
+    tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
+      NearObstacles near(step_->fixed, step_->moving);
+      for (auto i = static_cast<uint32_t>(c * kRelaxationChunk);
+           i < std::min(particles_.size(), (c + 1) * kRelaxationChunk); ++i)
+        f(i, near, found_[c]);
+    });
+  };
+  for_each([&](uint32_t i, NearObstacles& near, Found& found) {
+    if (particles_[i].hits_bodies) keep_outside(i, near, end[i], found);
+  });
+  for_each([&](uint32_t i, NearObstacles&, Found& found) { report(i, end[i], found); });
+  for (const Found& found : found_) {
+    reactions.insert(reactions.end(), found.reactions.begin(), found.reactions.end());
+    strikes.insert(strikes.end(), found.strikes.begin(), found.strikes.end());
+  }
+}
+
+void ParticleContacts::keep_outside(uint32_t i, NearObstacles& near, Vec3& end, Found& found) {
+  CollidingParticle& g = particles_[i];
+  const Real h = step_->h;
+  near.find(g.position, end, g.radius);
+  if (near.all().empty()) return;
+  Vec3 from = g.position;
+  Real fraction = g.from / h;
+  for (int slide = 0;; ++slide) {
+    const ObstacleHit hit = near.first_hit(from, end, g.radius, fraction);
+    if (!hit.obstacle) return;
+    from = hit.position;
+    fraction = hit.fraction;
+    const Obstacle& o = *hit.obstacle;
+    const Vec3 surface = o.velocity_at(from, fraction);
+    const Real behind = (end - from - (1 - fraction) * h * surface).dot(hit.normal);
+    if (slide == kMaxSlides) {
+      end = from;
+      return;
+    }
+    if (behind < 0) {
+      end -= behind * hit.normal;
+      g.velocity = velocity_after_shift(g.velocity, g.acceleration, -behind * hit.normal);
+    }
+    const Real approach = (surface - g.velocity).dot(hit.normal);
+    if (approach <= 0 || o.body == impacts_->struck_body(i)) continue;
+    g.velocity += approach * hit.normal;
+    if (o.is_dynamic())
+      found.reactions.push_back(
+          reaction(o, from - g.radius * hit.normal, fraction, g.mass * approach * hit.normal));
+  }
+}
+
+/// Tells of what a particle got by its contacts; those of pairs tell both.
+void ParticleContacts::report(uint32_t i, const Vec3& end, Found& found) const {
+  const auto strike = [&](const auto& c, uint32_t particle, const Vec3& normal) {
+    if (c.is_impact && c.acts())
+      found.strikes.push_back(
+          {particle, c.time, particles_[particle].at(c.time), particles_[particle].velocity, normal});
+  };
+  for (uint32_t k = pair_begin_[i]; k < pair_begin_[i + 1]; ++k) {
+    strike(pairs_[k], pairs_[k].a, pairs_[k].normal());
+    strike(pairs_[k], pairs_[k].b, -pairs_[k].normal());
+  }
+  for (uint32_t k = surface_begin_[i]; k < surface_begin_[i + 1]; ++k) {
+    const Surface& s = surfaces_[k];
+    strike(s, i, s.normal());
+    if (s.obstacle->is_dynamic() && s.acts())
+      found.reactions.push_back(
+          reaction(*s.obstacle, end - particles_[i].radius * s.normal(), s.time / step_->h, s.impulse()));
+  }
+}
+
+}  // namespace offstage::sim

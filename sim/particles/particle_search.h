@@ -1,0 +1,87 @@
+#pragma once
+/// Which particles come near each other on their ways. Each has a ball around its way, in a frame that moves
+/// with the mean of all; balls are sorted by size into classes, each a factor two wide, with a grid each, so
+/// that neither the large nor the fast make cells too wide for the others.
+
+#include <span>
+#include <vector>
+
+#include "sim/dynamics/neighbor_grid.h"
+#include "sim/particles/colliding_particle.h"
+
+namespace offstage::sim {
+
+class ParticleSearch {
+ public:
+  static constexpr std::size_t kChunk = 512;
+
+  /// Sorts the particles, or of them the `members`. `margin` is how near counts [m].
+  void build(std::span<const CollidingParticle> particles, Real h, Real margin);
+  void build(std::span<const CollidingParticle> particles, std::span<const uint32_t> members, Real h,
+             Real margin);
+
+  /// Calls f(index) for the particles whose ways may come near that of `particle`, which may be in another
+  /// state than when it was sorted, and for itself.
+  template <class F>
+  void for_each_near(const CollidingParticle& particle, F&& f) const {
+    const Ball b = ball(particle);
+    for (const SizeClass& c : classes_)
+      c.grid.for_each_near(b.centre, b.radius + c.radius, [&](uint32_t k) {
+        if (meets(b, c.balls[k])) f(c.member[k]);
+      });
+  }
+
+  /// Lists for each particle, of which all must have been sorted, those it may collide with and whose ways
+  /// may come near its own; of a pair one lists the other.
+  void list_partners(std::span<const CollidingParticle> particles);
+  /// The same for pairs of which at least one is among the `chosen`, a flag for each particle; that one lists
+  /// the other.
+  void list_partners(std::span<const CollidingParticle> particles, std::span<const uint8_t> chosen);
+  std::span<const uint32_t> partners(uint32_t i) const {
+    const List& list = lists_[i];
+    return std::span(partners_[list.chunk]).subspan(list.first, list.count);
+  }
+
+ private:
+  struct Ball {
+    Vec3 centre;
+    Real radius;
+  };
+  struct SizeClass {
+    int size = 0;
+    Real radius = 0;  // of the largest ball
+    NeighborGrid grid;
+    std::vector<uint32_t> member;
+    std::vector<Ball> balls;
+    std::vector<Vec3> centres;
+  };
+
+  /// The partners of a particle, among those of its chunk.
+  struct List {
+    uint32_t chunk = 0, first = 0, count = 0;
+  };
+
+  template <class ForEachPartner>
+  void list(std::span<const CollidingParticle> particles, ForEachPartner&& for_each_partner);
+
+  static bool meets(const Ball& a, const Ball& b) {
+    const Real reach = a.radius + b.radius;
+    return (a.centre - b.centre).squaredNorm() <= reach * reach;
+  }
+  Ball ball(const CollidingParticle& g) const {
+    const Vec3 way = (h_ - g.from) / 2 * (g.path_velocity - drift_);
+    return {g.position - g.from * drift_ + way, way.norm() + g.radius + margin_ / 2};
+  }
+  int size_class(Real radius) const { return std::ilogb(radius / unit_); }
+
+  Vec3 drift_ = Vec3::Zero();
+  Real h_ = 0, margin_ = 0, unit_ = 1;
+  std::vector<SizeClass> classes_;  // finer ones first
+  std::vector<uint32_t> all_;
+  std::vector<Ball> balls_;
+  std::vector<int> size_class_;
+  std::vector<std::vector<uint32_t>> partners_;  // by chunk
+  std::vector<List> lists_;                      // by particle
+};
+
+}  // namespace offstage::sim

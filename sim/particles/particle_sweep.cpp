@@ -1,0 +1,252 @@
+#include "sim/particles/particle_sweep.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "sim/collision/sphere_sweep.h"
+#include "sim/contact/collision.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Particles are kept this far off surfaces [m], far above rounding (1e-13 at 1000 m) and far below anything
+/// seen. A hit is declared at half of it, so that sliding along a surface, exact up to rounding, is not a
+/// hit.
+constexpr Real kSkin = 1e-10;
+constexpr int kMaxHits = 8;
+/// Rounds of projection out of bodies; each clears one layer of overlapping bodies.
+constexpr int kMaxEjections = 4;
+/// Overlap, relative to the radius, that only the straightening of paths around turning bodies can make.
+constexpr Real kDriftDepth = Obstacle::kChordError;
+/// Passes over simultaneous contacts; two at right angles need one.
+constexpr int kContactPasses = 8;
+
+/// Whether a sphere, in the solid's frame, surely does not touch it.
+bool is_clear(const Solid& solid, const Vec3& centre, Real radius) {
+  return solid.mesh && solid.mesh->clearance_grid().is_clear(centre, radius);
+}
+
+}  // namespace
+
+SweepOutcome ParticleSweep::operator()(ParticlePath& path, Real born, const Vec3& extra) {
+  SweepOutcome outcome;
+  contact_count_ = 0;
+  reactions_before_finish_ = log_.reactions.size();
+  near_.find(path.start, path.end, path.radius);
+  if (near_.all().empty()) return outcome;
+  if (!near_.eject(path.start, path.end, path.radius, born, outcome.ejected)) {
+    outcome.trapped = true;
+    return outcome;
+  }
+  Real from = born;
+  for (int hits = 0;; ++hits) {
+    const ObstacleHit hit = near_.first_hit(path.start, path.end, path.radius, from);
+    if (!hit.obstacle) return outcome;
+    outcome.hit = true;
+    if (!respond(path, hit, from, extra, outcome)) return outcome;
+    from = hit.fraction;
+    if (hits + 1 == kMaxHits) break;
+    near_.find(path.start, path.end, path.radius);
+  }
+  outcome.truncated = true;
+  path.end = path.start;
+  return outcome;
+}
+
+void NearObstacles::find(const Vec3& a, const Vec3& b, Real radius) {
+  near_.clear();
+  const auto add = [&](const Obstacle& o) { near_.push_back(&o); };
+  const Real reach = radius + kSkin + (b - a).norm();
+  fixed_.near_path(a, b, radius + kSkin, [&](const Obstacle& o) {
+    if (!is_clear(o.solid, o.start.point_to_body(a), reach)) add(o);
+  });
+  moving_.near_path(a, b, radius + kSkin, add);
+}
+
+bool NearObstacles::eject(Vec3& start, Vec3& end, Real radius, Real fraction, bool& deep) {
+  for (int round = 0; round <= kMaxEjections; ++round) {
+    bool clear = true;
+    for (const Obstacle* o : near_) {
+      const Pose pose = o->at(fraction);
+      const Vec3 centre = pose.point_to_body(start);
+      if (is_clear(o->solid, centre, radius)) continue;
+      const SurfaceDistance s = signed_distance_below(o->solid, centre, radius);
+      if (s.distance >= radius) continue;
+      if (round == kMaxEjections) return false;
+      clear = false;
+      deep |= radius - s.distance > kDriftDepth * radius;
+      const Vec3 out = (radius + kSkin - s.distance) * pose.vector_to_world(s.normal);
+      start += out;
+      end += out;
+    }
+    if (clear) return true;
+    find(start, end, radius);
+  }
+  return false;
+}
+
+ObstacleHit NearObstacles::first_hit(const Vec3& a, const Vec3& b, Real radius, Real from) const {
+  ObstacleHit first;
+  for (const Obstacle* o : near_) {
+    const ObstacleHit found =
+        hit(*o, a, b, radius, from, first.obstacle ? first.fraction : std::numeric_limits<Real>::infinity());
+    if (found.obstacle) first = found;
+  }
+  return first;
+}
+
+ObstacleHit NearObstacles::hit(const Obstacle& o, const Vec3& a, const Vec3& b, Real radius, Real from,
+                               Real latest) {
+  const int pieces = o.pieces(radius);
+  const Vec3 way = b - a;
+  Vec3 p = o.at(from).point_to_body(a);
+  for (int k = 0; k < pieces; ++k) {
+    const Real share = static_cast<Real>(k + 1) / pieces, before = static_cast<Real>(k) / pieces;
+    const Vec3 q = o.at(from + share * (1 - from)).point_to_body(a + share * way);
+    if (const auto hit = sweep_sphere(o.solid, p, q, radius + kSkin / 2)) {
+      const Real fraction = from + (before + hit->fraction / pieces) * (1 - from);
+      if (fraction >= latest) return {};
+      const Pose pose = o.at(fraction);
+      const Vec3 local = p + hit->fraction * (q - p) + (radius + kSkin - hit->distance) * hit->normal;
+      return {&o, fraction, pose.point_to_world(local), pose.vector_to_world(hit->normal)};
+    }
+    p = q;
+  }
+  return {};
+}
+
+/// Whether the particle moved it before in this sub-step: it then moves away, but not before the next one.
+bool ParticleSweep::was_struck(const Obstacle& o) const {
+  return std::any_of(contacts_.begin(), contacts_.begin() + static_cast<std::ptrdiff_t>(contact_count_),
+                     [&](const Contact& c) { return c.gives_way && c.obstacle == &o; });
+}
+
+/// Velocity after free flight: to second order in the drag, exact for constant forces.
+Vec3 ParticleSweep::fly(const Vec3& v, Real mass, Real duration, const Vec3& extra) const {
+  return v + DampedKick(duration, forces_.drag / mass).end * (forces_.acceleration(v, mass) + extra);
+}
+
+/// Puts the particle at the hit with its velocity after the impulse (P5), and integrates the rest of its
+/// path. False: it strikes a body, and others may do so before it.
+bool ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real from, const Vec3& extra,
+                            SweepOutcome& outcome) {
+  const Obstacle& o = *hit.obstacle;
+  const Real friction = std::sqrt(path.friction * o.friction);
+  log_.reactions.resize(reactions_before_finish_);
+  const Real duration = (hit.fraction - from) * h_;
+  Vec3 v = fly(path.start_velocity, path.mass, duration, extra);
+  const Vec3 acceleration = forces_.acceleration(v, path.mass) + extra;
+  v = velocity_after_shift(v, acceleration,
+                           hit.position - path.start - duration / 2 * (path.start_velocity + v));
+
+  Vec3 u = v - o.velocity_at(hit.position, hit.fraction);
+  Real approach = -u.dot(hit.normal);
+  const Real pressing = -acceleration.dot(hit.normal);
+  const Real gain = pressing * h_;  // approach speed that the forces would restore within one sub-step
+  Real restitution = std::max(path.restitution, o.restitution);
+  const bool strikes = approach > std::max(gain, 0.0);
+  // Only what strikes moves the obstacle: what rests on it is held by what holds the obstacle.
+  const bool moves_it = strikes && o.is_dynamic(), moved_it = was_struck(o);
+  const Vec3 contact = hit.position - path.radius * hit.normal;
+  Mat3 mobility = Mat3::Zero();
+  if (moves_it && !moved_it) {
+    if (!impulses_) {
+      outcome.strikes_body = true;
+      outcome.time = hit.fraction;
+      return false;
+    }
+    const Vec3 arm = contact - o.centre_at(hit.fraction);
+    u = v - impulses_->velocity(o, arm);
+    approach = -u.dot(hit.normal);
+    mobility = impulses_->mobility(o, arm, -hit.normal);
+  }
+  // A bounce lasts 2 e u / a. One that ends within the sub-step is the tail of an infinite series (E6, Zeno).
+  if (2 * restitution * approach < gain) restitution = 0;
+  if (approach > 0 && !moved_it) {
+    const Vec3 impulse =
+        collision_impulse(o, hit.fraction, path.mass, u, hit.normal, restitution, friction, mobility);
+    v += impulse / path.mass;
+    const Reaction back = reaction(o, contact, hit.fraction, impulse);
+    if (moves_it)
+      impulses_->push(back);
+    else if (o.is_dynamic())
+      log_.reactions.push_back(back);
+  }
+  if (strikes && !moved_it) {
+    ++outcome.collisions;
+    if (log_.wants_strikes) log_.strikes.push_back({hit.fraction, hit.position, v, hit.normal});
+  }
+  if (restitution == 0 || moves_it) add_contact({hit.normal, &o, friction, hit.fraction, moves_it});
+  path.start = hit.position;
+  path.start_velocity = v;
+  reactions_before_finish_ = log_.reactions.size();
+  finish(path, (1 - hit.fraction) * h_, extra);
+  return true;
+}
+
+/// The oldest contact gives way: it matters least where the particle is now.
+void ParticleSweep::add_contact(const Contact& contact) {
+  if (contact_count_ == contacts_.size()) {
+    std::move(contacts_.begin() + 1, contacts_.end(), contacts_.begin());
+    --contact_count_;
+  }
+  contacts_[contact_count_++] = contact;
+}
+
+/// Moves over the remaining time. What the forces would press into surfaces that the particle rests on, these
+/// take up again with an impulse of no restitution: over the time it is the normal force and Coulomb's
+/// friction.
+void ParticleSweep::finish(ParticlePath& path, Real duration, const Vec3& extra) {
+  Vec3 v = fly(path.start_velocity, path.mass, duration, extra);
+  const Vec3 predicted = path.start + duration * path.start_velocity;
+  const auto press = [&](const Contact& c) {
+    if (c.gives_way) return false;
+    const Vec3 u = v - c.obstacle->velocity_at(predicted, 1);
+    if (u.dot(c.normal) >= 0) return false;
+    const Vec3 impulse =
+        collision_impulse(*c.obstacle, 1, path.mass, u, c.normal, 0, c.friction, Mat3::Zero());
+    v += impulse / path.mass;
+    if (c.obstacle->is_dynamic())
+      log_.reactions.push_back(
+          reaction(*c.obstacle, path.start - path.radius * c.normal, c.fraction, impulse));
+    return true;
+  };
+  for (int pass = 0; pass < kContactPasses; ++pass) {
+    bool pressed = false;
+    for (std::size_t i = 0; i < contact_count_; ++i) pressed |= press(contacts_[i]);
+    if (!pressed || contact_count_ == 1) break;
+  }
+  path.end_velocity = v;
+  path.end = path.start + duration / 2 * (path.start_velocity + v);
+  for (std::size_t i = 0; i < contact_count_; ++i) {
+    const Contact& c = contacts_[i];
+    if (!c.gives_way) continue;
+    const Vec3 behind = duration * c.obstacle->velocity_at(path.start, 1) - (path.end - path.start);
+    if (!(behind.dot(c.normal) > 0)) continue;
+    const Vec3 shift = behind.dot(c.normal) * c.normal;
+    path.end += shift;
+    path.end_velocity = velocity_after_shift(
+        path.end_velocity, forces_.acceleration(path.end_velocity, path.mass) + extra, shift);
+  }
+}
+
+Vec3 collision_impulse(const Obstacle& o, Real fraction, Real particle_mass, const Vec3& u, const Vec3& n,
+                       Real restitution, Real friction, const Mat3& mobility) {
+  const Vec3 friction_axis = o.friction_axis_on(n, fraction);
+  const bool isotropic = friction_axis.isZero();
+  if (mobility.isZero(0) && isotropic) return collision_impulse(particle_mass, u, n, restitution, friction);
+  const ContactFrame f =
+      isotropic ? contact_frame(n) : ContactFrame{n, friction_axis, n.cross(friction_axis)};
+  Mat3 axes;
+  axes << f.n, f.t, f.k;
+  const Mat3 K = Mat3::Identity() / particle_mass + mobility;
+  return axes * collision_impulse(Mat3(axes.transpose() * K * axes), Vec3(axes.transpose() * u), restitution,
+                                  friction, isotropic ? friction : o.cross_friction * friction);
+}
+
+Reaction reaction(const Obstacle& o, const Vec3& contact, Real fraction, const Vec3& impulse_on_particle) {
+  return {o.body, -impulse_on_particle, (o.centre_at(fraction) - contact).cross(impulse_on_particle)};
+}
+
+}  // namespace offstage::sim

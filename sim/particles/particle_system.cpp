@@ -1,0 +1,336 @@
+#include "sim/particles/particle_system.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_invoke.h>
+
+#include "sim/dynamics/flat.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Particles per task; a chunk's state stays in the second-level cache between integration and sweep.
+constexpr std::size_t kChunk = 1024;
+/// Steps a second of what was born long ago, and how many at most.
+constexpr Real kStepsBefore = 120, kMostStepsBefore = 10000;
+/// Durations that come of rounding alone [s].
+constexpr Real kRounding = 1e-11;
+
+std::size_t chunk_count(std::size_t n) {
+  return (n + kChunk - 1) / kChunk;
+}
+
+/// The part of an array that a range of indices covers.
+template <class T>
+std::span<T> part(std::vector<T>& v, std::size_t begin, std::size_t end) {
+  return std::span(v).subspan(begin, end - begin);
+}
+
+}  // namespace
+
+struct ParticleSystem::Scratch {
+  IntegratorWorkspace integrator;
+  std::vector<Vec3> position, velocity;  // at the start of the sub-step
+};
+
+/// A particle that strikes a body, and its flight so far.
+struct ParticleSystem::Striker {
+  Real time;  // as a fraction of the sub-step
+  std::size_t particle;
+  Flight flight;
+  bool integrated;
+};
+
+ParticleTally& ParticleTally::operator+=(const ParticleTally& t) {
+  expired += t.expired;
+  retired += t.retired;
+  ejected += t.ejected;
+  removed += t.removed;
+  collisions += t.collisions;
+  truncated += t.truncated;
+  if (!lost) lost = t.lost;
+  events.insert(events.end(), t.events.begin(), t.events.end());
+  return *this;
+}
+
+uint64_t ParticleSystem::add(const Particle& p, Real elapsed) {
+  arrays.position.push_back(p.position);
+  arrays.velocity.push_back(p.velocity);
+  arrays.mass.push_back(p.mass);
+  arrays.radius.push_back(p.radius);
+  arrays.age.push_back(0);
+  arrays.lifespan.push_back(p.lifespan);
+  arrays.restitution.push_back(p.restitution);
+  arrays.friction.push_back(p.friction);
+  arrays.charge.push_back(p.charge);
+  arrays.id.push_back(next_id);
+  newborn.push_back(elapsed);
+  return next_id++;
+}
+
+std::optional<std::size_t> ParticleSystem::find(uint64_t id) const {
+  const auto it = std::lower_bound(arrays.id.begin(), arrays.id.end(), id);
+  if (it == arrays.id.end() || *it != id) return std::nullopt;
+  return static_cast<std::size_t>(it - arrays.id.begin());
+}
+
+void ParticleSystem::begin_coupled() {
+  start_position_ = arrays.position;
+  start_velocity_ = arrays.velocity;
+}
+
+/// Free flight of a run of particles, its start kept in `scratch`. Before the world begins forces are those
+/// of its first moment.
+void ParticleSystem::fly(const ParticleForces& forces, Real t, Real h, std::size_t begin, std::size_t end,
+                         Scratch& scratch) {
+  const auto x = part(arrays.position, begin, end), v = part(arrays.velocity, begin, end);
+  scratch.position.assign(x.begin(), x.end());
+  scratch.velocity.assign(v.begin(), v.end());
+  const auto mass = part(arrays.mass, begin, end);
+  t = std::max(t, 0.0);
+  if (def.integrator == IntegratorKind::leapfrog && forces.fields.empty()) return forces.leap(h, x, v, mass);
+  scratch.integrator.next_step = 0;  // whose step it was depends on the threads
+  integrator(def.integrator).step(FreeFlight(forces, mass), t, h, flat(x), flat(v), scratch.integrator);
+}
+
+/// What was born before the world began, or long before this sub-step, has flown freely until it begins.
+void ParticleSystem::fly_before(const ParticleForces& forces, Real t, std::size_t i, Real duration,
+                                Scratch& scratch) {
+  duration = std::min(duration, arrays.lifespan[i]);
+  if (!(duration > kRounding)) return;
+  const Real steps = std::clamp(std::ceil(duration * kStepsBefore), 1.0, kMostStepsBefore);
+  for (Real k = 0; k < steps; ++k) fly(forces, t, duration / steps, i, i + 1, scratch);
+  arrays.age[i] += duration;
+}
+
+void ParticleSystem::admit_newborn(const ParticleForces& forces) {
+  Scratch scratch;
+  const std::size_t old = arrays.size() - newborn.size();
+  for (std::size_t i = old; i < arrays.size(); ++i) fly_before(forces, 0, i, newborn[i - old], scratch);
+  newborn.clear();
+}
+
+/// Flies every particle, and calls make_landing(chunk)(i, flight, integrated) when it has flown; `integrated`
+/// says that it was before, by a network of springs. Calls of a chunk are in order, those of different chunks
+/// at the same time.
+template <class MakeLanding>
+void ParticleSystem::fly_each(const ParticleStage& stage, const ParticleForces& forces, bool coupled,
+                              MakeLanding&& make_landing) {
+  const std::size_t count = arrays.size(), old = count - newborn.size();
+  tbb::enumerable_thread_specific<Scratch> scratches;
+  tbb::parallel_for(std::size_t{0}, chunk_count(old), [&](std::size_t chunk) {
+    const std::size_t begin = chunk * kChunk, end = std::min(old, begin + kChunk);
+    auto land = make_landing(chunk);
+    Scratch& scratch = scratches.local();
+    if (!coupled) fly(forces, stage.time, stage.h, begin, end, scratch);
+    const Vec3* x0 = coupled ? &start_position_[begin] : scratch.position.data();
+    const Vec3* v0 = coupled ? &start_velocity_[begin] : scratch.velocity.data();
+    for (std::size_t i = begin; i < end; ++i) land(i, Flight{x0[i - begin], v0[i - begin], stage.h}, coupled);
+  });
+
+  // Each newborn has its own time to fly.
+  tbb::parallel_for(std::size_t{0}, chunk_count(newborn.size()), [&](std::size_t chunk) {
+    const std::size_t begin = old + chunk * kChunk, end = std::min(count, begin + kChunk);
+    auto land = make_landing(chunk_count(old) + chunk);
+    Scratch& scratch = scratches.local();
+    for (std::size_t i = begin; i < end; ++i) {
+      const bool integrated = coupled && whole_step(i);
+      fly_before(forces, stage.time, i, newborn[i - old] - stage.h, scratch);
+      const Real duration = whole_step(i) ? stage.h : std::min(newborn[i - old], stage.h);
+      if (!integrated) fly(forces, stage.time + (stage.h - duration), duration, i, i + 1, scratch);
+      const Vec3 x0 = integrated ? start_position_[i] : scratch.position[0];
+      const Vec3 v0 = integrated ? start_velocity_[i] : scratch.velocity[0];
+      land(i, Flight{x0, v0, duration}, integrated);
+    }
+  });
+}
+
+bool ParticleSystem::is_lost(std::size_t i, const Flight& flight, ParticleTally& tally) const {
+  const Vec3 &x = arrays.position[i], &v = arrays.velocity[i];
+  if (x.allFinite() && v.allFinite()) return false;
+  if (!tally.lost) tally.lost = NonFinite{{}, arrays.id[i], flight.position, flight.velocity, x, v};
+  ++tally.retired;
+  return true;
+}
+
+/// Takes a particle that has flown through its collisions with bodies.
+SweepOutcome ParticleSystem::sweep(const ParticleStage& stage, const ParticleForces& forces,
+                                   ParticleSweep& sweep, std::size_t i, const Flight& flight,
+                                   bool integrated) {
+  Vec3 &x = arrays.position[i], &v = arrays.velocity[i];
+  ParticlePath path{flight.position,       flight.velocity,   x, v, arrays.mass[i], arrays.radius[i],
+                    arrays.restitution[i], arrays.friction[i]};
+  const bool more = integrated || !forces.fields.empty();
+  const Vec3 extra = more ? Vec3((v - flight.velocity) / flight.duration -
+                                 forces.acceleration((flight.velocity + v) / 2, path.mass))
+                          : Vec3(Vec3::Zero());
+  const SweepOutcome outcome = sweep(path, 1 - flight.duration / stage.h, extra);
+  if (outcome.strikes_body) return outcome;
+  x = path.end;
+  v = path.end_velocity;
+  return outcome;
+}
+
+/// The end of a particle's sub-step; `spent` if it collided and that was its death.
+void ParticleSystem::end(const ParticleStage& stage, std::size_t i, bool spent, bool trapped,
+                         ParticleTally& tally) {
+  tally.removed += trapped;
+  tally.expired += spent;
+  bool dead = trapped || spent;
+  if (!dead && arrays.age[i] >= arrays.lifespan[i]) {
+    ++tally.expired;
+    dead = true;
+    if (def.report_deaths) {
+      const Real over = arrays.age[i] - arrays.lifespan[i];
+      tally.events.push_back({ParticleEvent::Kind::death, handle, arrays.id[i], stage.time + stage.h - over,
+                              arrays.position[i] - over * arrays.velocity[i], arrays.velocity[i],
+                              Vec3::Zero(), arrays.mass[i], arrays.radius[i], arrays.lifespan[i]});
+    }
+  }
+  if (!dead && !stage.bounds.contains(arrays.position[i])) {
+    ++tally.retired;
+    dead = true;
+  }
+  fate_[i] = dead ? Fate::dead : Fate::alive;
+}
+
+ParticleEvent ParticleSystem::collision_event(const ParticleStage& stage, std::size_t i,
+                                              const Strike& strike) const {
+  return {ParticleEvent::Kind::collision,
+          handle,
+          arrays.id[i],
+          stage.time + strike.fraction * stage.h,
+          strike.position,
+          strike.velocity,
+          strike.normal,
+          arrays.mass[i],
+          arrays.radius[i],
+          arrays.age[i] - (1 - strike.fraction) * stage.h};
+}
+
+ParticleTally ParticleSystem::sum_up(std::span<const ParticleTally> tallies) {
+  newborn.clear();
+  ParticleTally sum;
+  for (const ParticleTally& t : tallies) sum += t;
+  if (sum.expired + sum.retired + sum.removed > 0) remove_dead();
+  return sum;
+}
+
+ParticleTally ParticleSystem::step(const ParticleStage& stage, const ParticleForces& forces, bool coupled) {
+  const std::size_t old = arrays.size() - newborn.size();
+  fate_.resize(arrays.size());
+  std::vector<ParticleTally> tallies(chunk_count(old) + chunk_count(newborn.size()));
+  std::vector<SweepLog> logs(tallies.size());
+  std::vector<std::vector<Striker>> strikers(tallies.size());
+  fly_each(stage, forces, coupled, [&](std::size_t chunk) {
+    logs[chunk].wants_strikes = def.report_collisions;
+    return [&, chunk, &log = logs[chunk],
+            obstacles = ParticleSweep(stage.fixed, stage.moving, forces, stage.h, logs[chunk])](
+               std::size_t i, const Flight& flight, bool integrated) mutable {
+      ParticleTally& tally = tallies[chunk];
+      arrays.age[i] += flight.duration;
+      if (is_lost(i, flight, tally)) {
+        fate_[i] = Fate::dead;
+        return;
+      }
+      SweepOutcome outcome;
+      if (def.collides && flight.duration > 0) {
+        const std::size_t reactions = log.reactions.size();
+        outcome = sweep(stage, forces, obstacles, i, flight, integrated);
+        if (outcome.strikes_body) {
+          log.reactions.resize(reactions);
+          log.strikes.clear();
+          strikers[chunk].push_back({outcome.time, i, flight, integrated});
+          return;
+        }
+      }
+      conclude(stage, i, outcome, log, tally);
+    };
+  });
+  std::vector<Striker> all;
+  for (std::size_t chunk = 0; chunk < logs.size(); ++chunk) {
+    for (const Reaction& r : logs[chunk].reactions) stage.impulses.push(r);
+    all.insert(all.end(), strikers[chunk].begin(), strikers[chunk].end());
+  }
+  if (!all.empty()) strike_bodies(stage, forces, std::move(all), tallies.front());
+  return sum_up(tallies);
+}
+
+/// Those that strike dynamic bodies do so one after the other, in the order of time: each meets a body with
+/// the velocity that the ones before it have left it.
+void ParticleSystem::strike_bodies(const ParticleStage& stage, const ParticleForces& forces,
+                                   std::vector<Striker> strikers, ParticleTally& tally) {
+  std::sort(strikers.begin(), strikers.end(), [](const Striker& a, const Striker& b) {
+    return a.time != b.time ? a.time < b.time : a.particle < b.particle;
+  });
+  SweepLog log;
+  log.wants_strikes = def.report_collisions;
+  ParticleSweep obstacles(stage.fixed, stage.moving, forces, stage.h, log, &stage.impulses);
+  for (const Striker& s : strikers) {
+    const SweepOutcome outcome = sweep(stage, forces, obstacles, s.particle, s.flight, s.integrated);
+    for (const Reaction& r : log.reactions) stage.impulses.push(r);
+    log.reactions.clear();
+    conclude(stage, s.particle, outcome, log, tally);
+  }
+}
+
+void ParticleSystem::conclude(const ParticleStage& stage, std::size_t i, const SweepOutcome& outcome,
+                              SweepLog& log, ParticleTally& tally) {
+  tally.collisions += outcome.collisions;
+  tally.ejected += outcome.ejected;
+  tally.truncated += outcome.truncated;
+  for (const Strike& strike : log.strikes) tally.events.push_back(collision_event(stage, i, strike));
+  log.strikes.clear();
+  end(stage, i, outcome.hit && def.dies_on_hit, outcome.trapped, tally);
+}
+
+void ParticleSystem::fly_all(const ParticleStage& stage, const ParticleForces& forces, bool coupled) {
+  start_position_.resize(arrays.size());
+  start_velocity_.resize(arrays.size());
+  duration_.resize(arrays.size());
+  fly_each(stage, forces, coupled, [&](std::size_t) {
+    return [&](std::size_t i, const Flight& flight, bool) {
+      start_position_[i] = flight.position;
+      start_velocity_[i] = flight.velocity;
+      duration_[i] = flight.duration;
+      arrays.age[i] += flight.duration;
+    };
+  });
+}
+
+ParticleTally ParticleSystem::end_step(const ParticleStage& stage, std::span<const uint8_t> touched,
+                                       std::span<const uint8_t> trapped) {
+  const std::size_t count = arrays.size();
+  fate_.resize(count);
+  std::vector<ParticleTally> tallies(chunk_count(count));
+  tbb::parallel_for(std::size_t{0}, tallies.size(), [&](std::size_t chunk) {
+    for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
+      if (is_lost(i, flight(i), tallies[chunk]))
+        fate_[i] = Fate::dead;
+      else
+        end(stage, i, touched[i] && def.dies_on_hit, trapped[i], tallies[chunk]);
+    }
+  });
+  return sum_up(tallies);
+}
+
+void ParticleSystem::remove_dead() {
+  const auto first_dead = std::find(fate_.begin(), fate_.end(), Fate::dead);
+  const auto first = static_cast<std::size_t>(first_dead - fate_.begin());
+  const auto compact = [&](auto& array) {
+    std::size_t to = first;
+    for (std::size_t i = first; i < array.size(); ++i)
+      if (fate_[i] == Fate::alive) array[to++] = array[i];
+    array.resize(to);
+  };
+  tbb::parallel_invoke([&] { compact(arrays.position); }, [&] { compact(arrays.velocity); },
+                       [&] { compact(arrays.mass); }, [&] { compact(arrays.radius); },
+                       [&] { compact(arrays.age); }, [&] { compact(arrays.lifespan); },
+                       [&] { compact(arrays.restitution); }, [&] { compact(arrays.friction); },
+                       [&] { compact(arrays.charge); }, [&] { compact(arrays.id); });
+}
+
+}  // namespace offstage::sim

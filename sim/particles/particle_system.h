@@ -1,0 +1,107 @@
+#pragma once
+/// A particle system at work: its arrays, the newborns of the coming sub-step, and the stages of a sub-step.
+/// They run over chunks in parallel, and their results do not depend on the chunks. Particles that collide
+/// with particles fly first, are then taken through their collisions together (particle_collisions.h), and
+/// end their sub-step last.
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "sim/collision/obstacles.h"
+#include "sim/core/non_finite.h"
+#include "sim/particles/particle_forces.h"
+#include "sim/particles/particle_sweep.h"
+
+namespace offstage::sim {
+
+/// What became of a system's particles in a sub-step.
+struct ParticleTally {
+  uint64_t expired = 0, retired = 0, ejected = 0, removed = 0, collisions = 0, truncated = 0;
+  std::optional<NonFinite>
+      lost;  ///< the first particle that stopped being finite; `object` is left to the world
+  std::vector<ParticleEvent> events;  ///< if the system reports them
+
+  ParticleTally& operator+=(const ParticleTally& t);
+};
+
+/// A sub-step as all particle systems see it.
+struct ParticleStage {
+  Real time, h;
+  const Obstacles& fixed;
+  const Obstacles& moving;
+  const Aabb& bounds;
+  BodyImpulses& impulses;  ///< on dynamic bodies
+};
+
+struct ParticleSystem {
+  ParticleSystemHandle handle;
+  ParticleSystemDef def;
+  ParticleArrays arrays;
+  uint64_t next_id = 0;
+  /// For the last particles of the arrays, those added since the last sub-step: how long before its end each
+  /// was born; negative: it was there from its start.
+  std::vector<Real> newborn;
+
+  uint64_t add(const Particle& p, Real elapsed);
+  /// Place of a particle in the arrays; empty if it is no more.
+  std::optional<std::size_t> find(uint64_t id) const;
+
+  /// Whether a particle lives through the whole coming sub-step.
+  bool whole_step(std::size_t i) const {
+    const std::size_t old = arrays.size() - newborn.size();
+    return i < old || newborn[i - old] < 0;
+  }
+
+  /// Takes in those added since the last sub-step as they are now: each flies for as long as it has lived,
+  /// and lives through the whole coming sub-step.
+  void admit_newborn(const ParticleForces& forces);
+  /// Keeps the state at the start of the sub-step, for those that integrate the whole system themselves.
+  void begin_coupled();
+  bool hits_particles() const { return def.internal || def.external; }
+  /// Of particles that do not collide with particles: integrates, sweeps against bodies, ages and removes. Of
+  /// a `coupled` system the particles of whole_step() are already integrated.
+  ParticleTally step(const ParticleStage& stage, const ParticleForces& forces, bool coupled);
+
+  /// Of the others: integrates alone, and keeps how it began.
+  void fly_all(const ParticleStage& stage, const ParticleForces& forces, bool coupled);
+  /// A particle's flight: from where and for how long.
+  struct Flight {
+    Vec3 position, velocity;
+    Real duration;
+  };
+  Flight flight(std::size_t i) const { return {start_position_[i], start_velocity_[i], duration_[i]}; }
+  /// Ages and removes. `touched` and `trapped` say what collisions did to each particle.
+  ParticleTally end_step(const ParticleStage& stage, std::span<const uint8_t> touched,
+                         std::span<const uint8_t> trapped);
+  ParticleEvent collision_event(const ParticleStage& stage, std::size_t i, const Strike& strike) const;
+
+ private:
+  enum class Fate : uint8_t { alive, dead };
+  struct Scratch;
+
+  template <class MakeLanding>
+  void fly_each(const ParticleStage& stage, const ParticleForces& forces, bool coupled,
+                MakeLanding&& make_landing);
+  bool is_lost(std::size_t i, const Flight& flight, ParticleTally& tally) const;
+  struct Striker;
+  void strike_bodies(const ParticleStage& stage, const ParticleForces& forces, std::vector<Striker> strikers,
+                     ParticleTally& tally);
+  void conclude(const ParticleStage& stage, std::size_t i, const SweepOutcome& outcome, SweepLog& log,
+                ParticleTally& tally);
+  void end(const ParticleStage& stage, std::size_t i, bool spent, bool trapped, ParticleTally& tally);
+  ParticleTally sum_up(std::span<const ParticleTally> tallies);
+
+  void fly(const ParticleForces& forces, Real t, Real h, std::size_t begin, std::size_t end,
+           Scratch& scratch);
+  void fly_before(const ParticleForces& forces, Real t, std::size_t i, Real duration, Scratch& scratch);
+  SweepOutcome sweep(const ParticleStage& stage, const ParticleForces& forces, ParticleSweep& sweep,
+                     std::size_t i, const Flight& flight, bool integrated);
+  void remove_dead();
+
+  std::vector<Vec3> start_position_, start_velocity_;  // of a coupled system, or after fly_all()
+  std::vector<Real> duration_;                         // after fly_all()
+  std::vector<Fate> fate_;
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,124 @@
+/// What ParticleContacts does about particles that its solution sends through each other. It knows of those
+/// that come near each other on their ways as they were before: contact may turn a fast particle towards
+/// others. So the ways that it made are swept once more, in the order of time, and two particles that would
+/// pass stop for the rest of the sub-step. What stops stays clear of what has not come yet, so nothing
+/// passes, and each particle stops once at most.
+
+#include <algorithm>
+#include <queue>
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include "sim/particles/particle_contacts.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Two whose ways are shorter than this share of their radii cannot pass each other.
+constexpr Real kShort = 0.5;
+/// So near, of the distance they had or of that at which they touch, they stop: nearer than contact lets them
+/// come.
+constexpr Real kNearest = 0.992;
+
+}  // namespace
+
+/// Makes the ways to the ends; whether any is long, in the frame that moves with the mean.
+bool ParticleContacts::set_out(std::span<const Vec3> end) {
+  const std::size_t n = particles_.size();
+  const Real h = step_->h;
+  ways_.resize(n);
+  is_long_.resize(n);
+  Vec3 drift = Vec3::Zero();
+  for (std::size_t i = 0; i < n; ++i) drift += (end[i] - particles_[i].position) / static_cast<Real>(n);
+  tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
+    for (std::size_t i = c * ParticleSearch::kChunk; i < std::min(n, (c + 1) * ParticleSearch::kChunk); ++i) {
+      CollidingParticle& g = ways_[i] = particles_[i];
+      const Vec3 way = end[i] - g.position;
+      g.path_velocity = g.from < h ? Vec3(way / (h - g.from)) : Vec3::Zero();
+      is_long_[i] = (way - drift).norm() > kShort * g.radius;
+    }
+  });
+  return std::find(is_long_.begin(), is_long_.end(), 1) != is_long_.end();
+}
+
+/// When two particles come too near each other after a time, as far as is known where they stop.
+template <class Add>
+void ParticleContacts::find_passing(uint32_t i, uint32_t j, Real after, Add&& add) const {
+  const CollidingParticle &a = ways_[i], &b = ways_[j];
+  if (!may_collide(a, b)) return;
+  const Real from = std::max({a.from, b.from, after});
+  const Vec3 d = a.at(std::min(from, stop_[i])) - b.at(std::min(from, stop_[j]));
+  const Vec3 u = (stands(i) ? 0 : 1) * a.path_velocity - (stands(j) ? 0 : 1) * b.path_velocity;
+  const Real first = std::max(a.from, b.from), reach = a.radius + b.radius;
+  const Real nearest = std::min(kNearest * std::min(reach, (a.at(first) - b.at(first)).norm()), d.norm());
+  const auto met = meeting_time(d, u, nearest);
+  if (met && from + *met < step_->h) add(Passing{from + *met, i, j, stands(i), stands(j)});
+}
+
+void ParticleContacts::find_passing() {
+  stop_.assign(particles_.size(), kNever);
+  tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
+    std::vector<Passing>& passing = found_[c].passing;
+    passing.clear();
+    const auto add = [&](const Passing& p) { passing.push_back(p); };
+    const std::size_t end = std::min(particles_.size(), (c + 1) * ParticleSearch::kChunk);
+    for (auto i = static_cast<uint32_t>(c * ParticleSearch::kChunk); i < end; ++i)
+      for (const uint32_t j : way_search_.partners(i)) find_passing(i, j, 0, add);
+  });
+}
+
+void ParticleContacts::list_near() {
+  const auto n = static_cast<uint32_t>(particles_.size());
+  near_begin_.assign(n + 1, 0);
+  const auto for_each = [&](auto&& f) {
+    for (uint32_t i = 0; i < n; ++i)
+      for (const uint32_t j : way_search_.partners(i)) f(i, j);
+  };
+  for_each([&](uint32_t i, uint32_t j) { ++near_begin_[i], ++near_begin_[j]; });
+  uint32_t sum = 0;
+  for (uint32_t& begin : near_begin_) begin = sum += begin;
+  near_.resize(sum);
+  for_each([&](uint32_t i, uint32_t j) {
+    near_[--near_begin_[i]] = j;
+    near_[--near_begin_[j]] = i;
+  });
+}
+
+/// Both stop, and no longer approach each other.
+void ParticleContacts::stop(const Passing& p) {
+  stop_[p.a] = std::min(stop_[p.a], p.time);
+  stop_[p.b] = std::min(stop_[p.b], p.time);
+  CollidingParticle &a = particles_[p.a], &b = particles_[p.b];
+  const Vec3 d = ways_[p.a].at(stop_[p.a]) - ways_[p.b].at(stop_[p.b]);
+  const Real approach = -(a.velocity - b.velocity).dot(d);
+  if (!(approach > 0)) return;
+  const Vec3 impulse = a.mass * b.mass / (a.mass + b.mass) * approach / d.squaredNorm() * d;
+  a.velocity += impulse / a.mass;
+  b.velocity -= impulse / b.mass;
+}
+
+void ParticleContacts::stop_passing(std::span<Vec3> end) {
+  if (!set_out(end)) return;
+  way_search_.build(ways_, step_->h, 0);
+  way_search_.list_partners(ways_, is_long_);
+  find_passing();
+  list_near();
+  std::priority_queue<Passing, std::vector<Passing>, std::greater<>> queue;
+  for (const Found& found : found_)
+    for (const Passing& p : found.passing) queue.push(p);
+  const auto add = [&](const Passing& p) { queue.push(p); };
+  while (!queue.empty()) {
+    const Passing p = queue.top();
+    queue.pop();
+    if (stands(p.a) != p.a_stands || stands(p.b) != p.b_stands) continue;
+    stop(p);
+    for (const uint32_t i : {p.a, p.b}) {
+      if (i == p.a ? p.a_stands : p.b_stands) continue;
+      end[i] = ways_[i].at(p.time);
+      for (uint32_t n = near_begin_[i]; n < near_begin_[i + 1]; ++n)
+        if (!stands(near_[n])) find_passing(i, near_[n], p.time, add);
+    }
+  }
+}
+
+}  // namespace offstage::sim

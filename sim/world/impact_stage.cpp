@@ -1,0 +1,427 @@
+/// Impacts within a sub-step (physics E6, E7, R12): bodies are put back to the time of impact, with all that
+/// is connected to them, collide there, and go on for the rest. Others are not touched. The work is bounded:
+/// a pair that collides too often in a sub-step, or any when there are too many impacts, is left to the
+/// contact solver, which lets nothing through either. So are slower impacts within a pile once others have
+/// moved it often enough: they do not bounce in this sub-step.
+
+#include <algorithm>
+#include <cmath>
+
+#include "sim/core/parallel_loop.h"
+#include "sim/dynamics/free_body.h"
+#include "sim/world/coupled_system.h"
+#include "sim/world/world_impl.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr uint32_t kMaxImpactsOfPair = 40, kMaxOfTumblingPair = 100;
+constexpr std::size_t kMaxImpacts = 128, kImpactsPerBody = 4;
+/// What impacts of a sub-step may take, in contact points and bodies that are moved again, about 1 us each by
+/// the fast solver, and in us of their own solver; by the exact solver so many times more. In a pile each
+/// impact moves everything, and makes hundreds of others.
+constexpr std::size_t kImpactWork = 2500, kExactImpactWork = 8;
+/// Of it, what it takes to look when a pair meets, for each piece of its way.
+constexpr std::size_t kLookWork = 2;
+/// After so many times the work no pair is traced back any more in the sub-step.
+constexpr std::size_t kLastWork = 4;
+/// Points this near to each other when two bodies collide take part [m].
+constexpr Real kCluster = 1e-4;
+/// Bodies that turn by more in an interval are looked at in pieces of as much [rad]; at most so many.
+constexpr Real kImpactTurn = 0.5, kMostTurns = 512;
+/// What turns by more in an interval is soon elsewhere than where contact forces of its start are: it flies
+/// [rad].
+constexpr Real kFastSpin = 3;
+
+/// A way that leaves its chord by more than kStraight [m] is looked at in pieces, at most so many. A force is
+/// steady if the place at the end is that of the mean velocity within this share of the velocity's change.
+constexpr Real kStraight = 1e-5, kMostArcs = 8, kSteady = 0.05;
+/// Shorter intervals are none [of the sub-step].
+constexpr Real kInstant = 1e-9;
+
+Real spin(const Body& body) {
+  return body.is_awake() ? body.start_twist.angular_velocity.norm() : 0;
+}
+
+/// How fast one of a pair turns [rad/s].
+Real turn_of(const ContactPair& pair) {
+  return std::max(spin(pair.a()), spin(pair.b()));
+}
+
+/// In how many pieces a turn is looked at.
+uint32_t pieces_of(Real turn) {
+  return static_cast<uint32_t>(std::clamp(std::ceil(turn / kImpactTurn), 1.0, kMostTurns));
+}
+
+/// What an impact among them takes, see kImpactWork.
+std::size_t impact_work(const Island& island) {
+  std::size_t work = island.bodies.size();
+  for (const ContactPair* pair : island.pairs)
+    for (const PlacedManifold& m : pair->manifolds()) work += m.manifold.count;
+  return work;
+}
+
+/// What a body's velocity changes by in its interval if a steady force does that; zero if it was stopped on
+/// the way, which shows in where it is at the end [m/s].
+Vec3 bend(const Body& body, Real h) {
+  if (!body.is_awake()) return Vec3::Zero();
+  const Vec3 change = body.rigid.velocity() - body.start_twist.velocity;
+  const Vec3 mean = (body.rigid.position - body.start.position) / (h - body.from);
+  const bool steady = (body.start_twist.velocity + change / 2 - mean).norm() < kSteady * change.norm();
+  return steady ? change : Vec3(Vec3::Zero());
+}
+
+/// Its place at a time of its interval, on the parabola of a steady force.
+Pose on_arc(const Body& body, Real time, Real h) {
+  Pose pose = body.placed_at(time, h);
+  if (time > body.from)
+    pose.position -= (time - body.from) * (h - time) / (2 * (h - body.from)) * bend(body, h);
+  return pose;
+}
+
+/// When two bodies touch whose advancement has ended within its tolerance: the rest at the speed of the
+/// nearest points. Bounces that come early by the tolerance would add up.
+Real touching_share(const Impact& impact, const PosePath& a, const PosePath& b) {
+  const Separation& s = impact.separation;
+  if (impact.share == 0 || !(s.distance > 0)) return impact.share;
+  const Pose pose = a.at(impact.share);
+  const auto velocity = [&](const PosePath& path, const Vec3& local) {
+    const Vec3 arm = pose.point_to_world(local) - path.at(impact.share).position;
+    return Vec3(path.velocity() + path.angular_velocity(impact.share).cross(arm));
+  };
+  const Real closing = (velocity(b, s.on_b) - velocity(a, s.on_a)).dot(pose.vector_to_world(s.normal));
+  if (!(closing > 0)) return impact.share;
+  return impact.share + std::min(s.distance / closing, 1 - impact.share);
+}
+
+/// A body on its way through its interval, turning as nothing but its spin makes it.
+class Tumbling {
+ public:
+  /// A body that spins fast flies under gravity, another goes straight to where forces take it.
+  Tumbling(const Body& body, const WorldDef& def, bool spins_fast, Real h)
+      : body_(body), def_(def), spins_fast_(spins_fast), h_(h), turning_(body.at_start()), now_(body.from) {}
+
+  /// Its place at a time of the sub-step of length h, not before the last.
+  Pose go_on(Real time) {
+    if (!body_.is_awake()) return body_.placed_at(time, h_);
+    fly(turning_, {def_.gravity, {}}, integrator(def_.integrator), now_, time - now_, work_);
+    now_ = time;
+    if (!spins_fast_) {
+      const Real share = (time - body_.from) / (h_ - body_.from);
+      turning_.position = body_.start.position + share * (body_.rigid.position - body_.start.position);
+    }
+    return turning_.pose();
+  }
+
+ private:
+  const Body& body_;
+  const WorldDef& def_;
+  bool spins_fast_;
+  Real h_;
+  RigidBody turning_;
+  Real now_;
+  IntegratorWorkspace work_;
+};
+
+}  // namespace
+
+/// When a pair's bodies, which do not touch yet, will on their ways as they are now; or do already,
+/// approaching.
+std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) const {
+  if (pair.toi_exhausted) return std::nullopt;
+  const Body &a = pair.a(), &b = pair.b();
+  const Real from = std::max(a.is_awake() ? a.from : 0, b.is_awake() ? b.from : 0);
+  if (from >= h * (1 - kInstant)) return std::nullopt;
+  const Real turn = turn_of(pair) * (h - from);
+  if (turn > kImpactTurn) return tumbling_impact_time(pair, from, h, turn);
+  if (pair.separation() <= kTouching) return point_impact_time(pair, h);
+  const Real bow = (bend(a, h) - bend(b, h)).norm() * (h - from) / 8;
+  const auto pieces =
+      static_cast<uint32_t>(std::clamp(std::ceil(std::sqrt(bow / kStraight)), 1.0, kMostArcs));
+  for (uint32_t i = 0; i < pieces; ++i) {
+    const Real begin = from + (h - from) * i / pieces, end = from + (h - from) * (i + 1) / pieces;
+    const PosePath path_a(on_arc(a, begin, h), on_arc(a, end, h)),
+        path_b(on_arc(b, begin, h), on_arc(b, end, h));
+    const auto impact = time_of_impact(MovingShape{pair.a().collision_shape(), path_a},
+                                       MovingShape{pair.b().collision_shape(), path_b}, kTouching / 2);
+    if (impact) return begin + touching_share(*impact, path_a, path_b) * (end - begin);
+  }
+  return std::nullopt;
+}
+
+/// A path knows no more than half a turn: what tumbles faster goes in pieces.
+std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, Real from, Real h,
+                                                      Real turn) const {
+  const bool spins_fast = turn > kFastSpin;
+  Tumbling body_a(pair.a(), def, spins_fast, h), body_b(pair.b(), def, spins_fast, h);
+  Pose begin_a = body_a.go_on(from), begin_b = body_b.go_on(from);
+  const uint32_t pieces = pieces_of(turn);
+  // What touches now has just met.
+  const bool touches = pair.separation() <= kTouching;
+  for (uint32_t i = 0; i < pieces; ++i) {
+    const Real begin = from + (h - from) * i / pieces, end = from + (h - from) * (i + 1) / pieces;
+    const PosePath path_a(begin_a, body_a.go_on(end)), path_b(begin_b, body_b.go_on(end));
+    begin_a = path_a.end();
+    begin_b = path_b.end();
+    const MovingShape a{pair.a().collision_shape(), path_a}, b{pair.b().collision_shape(), path_b};
+    std::optional<sim::Impact> impact;
+    const bool met =
+        (i == 0 && touches) || ((impact = time_of_impact(a, b, kTouching / 2)) && impact->share == 0);
+    if (met) impact = time_of_next_impact(a, b, kTouching / 2, def.collision_speed * (end - begin));
+    if (impact) return begin + impact->share * (end - begin);
+    if (spins_fast && touches) return end;  // what the contact did by then is over, or has to be found again
+  }
+  return std::nullopt;
+}
+
+/// The same of bodies that touch somewhere: by those of the points known that do not.
+std::optional<Real> World::Impl::point_impact_time(const ContactPair& pair, Real h) const {
+  const Body &a = pair.a(), &b = pair.b();
+  const Real from = std::max(a.is_awake() ? a.from : 0, b.is_awake() ? b.from : 0);
+  std::optional<Real> first;
+  for (const PlacedManifold& m : pair.manifolds())
+    for (uint32_t k = 0; k < m.manifold.count; ++k) {
+      const ContactPoint& point = m.manifold.points[k];
+      const Real speed = pair.relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n);
+      if (speed >= -def.collision_speed) continue;
+      if (point.separation <= kTouching) return from;
+      // Both points go with their bodies, the normal with the one whose it is.
+      const bool with_b = m.manifold.source == NormalSource::face_of_b;
+      const Pose pose_a = a.placed_at(from, h), pose_b = b.placed_at(from, h);
+      const Vec3 on_a = pose_a.point_to_body(point.on_a), on_b = pose_b.point_to_body(point.on_b);
+      const Vec3 n = with_b ? pose_b.vector_to_body(m.frame.n) : pose_a.vector_to_body(m.frame.n);
+      const auto gap = [&](Real time) {
+        const Pose p = a.placed_at(time, h), q = b.placed_at(time, h);
+        const Vec3 normal = with_b ? q.vector_to_world(n) : p.vector_to_world(n);
+        return normal.dot(p.point_to_world(on_a) - q.point_to_world(on_b));
+      };
+      Real early = from, late = first.value_or(h);
+      if (gap(late) > kTouching / 2) continue;
+      for (int i = 0; i < 40 && late - early > kInstant * h; ++i) {
+        const Real middle = (early + late) / 2;
+        (gap(middle) > kTouching / 2 ? early : late) = middle;
+      }
+      first = late;
+    }
+  return first;
+}
+
+void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
+  std::vector<Impact> impacts;
+  const auto look = [&](auto&& is_wanted) {
+    const std::vector<std::size_t> events = indices_where(active_pairs.size(), [&](std::size_t i) {
+      return active_pairs[i]->needs_toi && is_wanted(*active_pairs[i]);
+    });
+    std::vector<std::optional<Real>> times(events.size());
+    for_each_index(events.size(),
+                   [&](std::size_t i) { times[i] = impact_time(*active_pairs[events[i]], h); });
+    std::size_t taken = 0;
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      if (times[i]) impacts.push_back({*times[i], active_pairs[events[i]]});
+      taken += kLookWork * pieces_of(turn_of(*active_pairs[events[i]]) * h);
+    }
+    return taken;
+  };
+  std::size_t work = look([](const ContactPair&) { return true; });
+
+  const std::size_t most = kMaxImpacts + kImpactsPerBody * awake.size();
+  const std::size_t most_work = (def.solver == SolverKind::exact ? kExactImpactWork : 1) * kImpactWork;
+  for (std::size_t count = 0; !impacts.empty(); ++count) {
+    const auto first = std::min_element(impacts.begin(), impacts.end(),
+                                        [](const Impact& x, const Impact& y) { return x.time < y.time; });
+    const Impact impact = *first;
+    ContactPair& pair = *impact.pair;
+    const bool tumbles = turn_of(pair) * h > kImpactTurn;
+    if (++pair.impacts > (tumbles ? kMaxOfTumblingPair : kMaxImpactsOfPair) || count >= most ||
+        work > kLastWork * most_work) {
+      pair.toi_exhausted = true;
+      ++report.toi_limit_reached;
+    }
+    const uint32_t island = pair.a().is_awake() ? pair.a().island : pair.b().island;
+    if (pair.a().is_awake() && pair.b().is_awake()) {
+      bring_to(islands[pair.a().island], start, impact.time, h, report);
+      bring_to(islands[pair.b().island], start, impact.time, h, report);
+      join(island, pair.b().island);
+    } else {
+      bring_to(islands[island], start, impact.time, h, report);
+    }
+    ++report.tracebacks;
+    work += impact_work(islands[island]);
+    if (work > most_work) suppress_restitution(island, report);
+    work += collide(island, start, impact.time, h, report);
+    // The speculative contacts of these bodies no longer hold.
+    const auto involved = [&](const ContactPair& p) {
+      return (p.a().is_awake() && p.a().island == island) || (p.b().is_awake() && p.b().island == island);
+    };
+    std::erase_if(impacts, [&](const Impact& i) { return involved(*i.pair); });
+    work += look(involved);
+  }
+}
+
+/// No pair within an island bounces any more in this sub-step, unless it is so fast that only its impact
+/// shows where it meets.
+void World::Impl::suppress_restitution(uint32_t island, StepReport& report) {
+  const auto is_outside = [&](const Body& body) { return body.is_awake() && body.island != island; };
+  for (ContactPair* pair : active_pairs) {
+    if (is_outside(pair->a()) || is_outside(pair->b()) || pair->restitution_suppressed) continue;
+    pair->restitution_suppressed = true;
+    report.restitution_suppressed += pair->needs_toi;
+  }
+}
+
+/// Takes an island from wherever it has been moved back to a time, under the contact forces until then.
+void World::Impl::bring_to(Island& island, Real start, Real time, Real h, StepReport& report) {
+  if (island.from >= time) return;
+  island.motion->restore(island.bodies);
+  move_some(island.bodies, start, island.from, time - island.from);
+  Island* const one[] = {&island};
+  if (has_forces(island))
+    solve(one, {.duration = time - island.from, .end = start + time, .substep = h, .is_whole = false},
+          report);
+  for (Body* body : island.bodies) {
+    body->pose = body->rigid.pose();
+    body->begin_interval(time);
+  }
+  island.from = time;
+}
+
+/// Makes two islands, which must be at the same time, one.
+void World::Impl::join(uint32_t into, uint32_t other) {
+  if (into == other) return;
+  Island &x = islands[into], &y = islands[other];
+  for (Body* body : y.bodies) body->island = into;
+  x.bodies.insert(x.bodies.end(), y.bodies.begin(), y.bodies.end());
+  x.pairs.insert(x.pairs.end(), y.pairs.begin(), y.pairs.end());
+  x.articulations.insert(x.articulations.end(), y.articulations.begin(), y.articulations.end());
+  std::sort(x.bodies.begin(), x.bodies.end(), [](const Body* a, const Body* b) { return a->rank < b->rank; });
+  y.bodies.clear();
+  y.pairs.clear();
+  y.articulations.clear();
+}
+
+/// Collides an island's bodies with each other and with what they touch at a time, and moves them on from
+/// there.
+/// Returns what that took, see kImpactWork.
+std::size_t World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepReport& report) {
+  // Whatever they touch now comes along, with what that touches in turn.
+  for (bool grown = true; grown;) {
+    grown = false;
+    Island& island = islands[number];
+    island.pairs.clear();
+    for (ContactPair* pair : active_pairs) {
+      const bool has_a = pair->a().is_awake() && pair->a().island == number,
+                 has_b = pair->b().is_awake() && pair->b().island == number;
+      if (!has_a && !has_b) continue;
+      find_points(*pair, time, h);
+      Body* other = has_a ? &pair->b() : &pair->a();
+      if (has_a != has_b && other->is_awake()) {
+        if (pair->separation() > kTouching) continue;
+        const uint32_t joined = other->island;
+        bring_to(islands[joined], start, time, h, report);
+        join(number, joined);
+        grown = true;
+        break;
+      }
+      if (!pair->manifolds().empty()) island.pairs.push_back(pair);
+    }
+  }
+  Island& island = islands[number];
+  remove_seams(island.pairs, time, h);
+  const CollisionSettings settings{start + time, kCluster, def.collision_speed, def.impact,
+                                   def.solver == SolverKind::exact};
+  const CollisionOutcome outcome = resolve_collisions(island, settings);
+  report.collisions += outcome.bounces;
+  report.impacts.add(outcome.work);
+  add_rough(outcome.rough, report);
+  for (Body* body : island.bodies) body->rigid.set_state(body->start);
+  if (time < h * (1 - kInstant)) go_on(number, start, time, h, report);
+  return static_cast<std::size_t>(outcome.cost / 1000);
+}
+
+/// Moves an island on from an impact to the end of the sub-step. Its velocities are others now: so are the
+/// bodies that it may meet, and the contacts that limit its way.
+void World::Impl::go_on(uint32_t number, Real start, Real time, Real h, StepReport& report) {
+  do {
+    islands[number].motion = &move_some(islands[number].bodies, start, time, h - time);
+    find_pairs_again(number, start, h, report);
+  } while (join_next(number, start, time, h, report));
+  Island* const one[] = {&islands[number]};
+  if (has_forces(islands[number]))
+    solve(one, {.duration = h - time, .end = start + h, .substep = h, .is_whole = false}, report);
+  find_pairs_again(number, start, h, report);
+}
+
+/// Finds the contacts of an island that goes on from `time`. If a body of another island is in its way, and
+/// their impact would not be an event, that island comes along, and has to be moved on as well: then it
+/// returns true.
+bool World::Impl::join_next(uint32_t number, Real start, Real time, Real h, StepReport& report) {
+  islands[number].pairs.clear();
+  bool joined = false;
+  for (std::size_t i = 0; i < active_pairs.size(); ++i) {
+    ContactPair& pair = *active_pairs[i];
+    const auto is_member = [&](const Body& body) { return body.is_awake() && body.island == number; };
+    const bool has_a = is_member(pair.a()), has_b = is_member(pair.b());
+    if (!has_a && !has_b) continue;
+    find_points(pair, time, h);
+    const Body& other = has_a ? pair.b() : pair.a();
+    if (has_a == has_b || !other.is_awake()) {
+      if (!pair.manifolds().empty()) islands[number].pairs.push_back(&pair);
+    } else if (!pair.needs_toi && closes(pair, h - time)) {
+      const uint32_t next = other.island;
+      bring_to(islands[next], start, time, h, report);
+      join(number, next);
+      joined = true;
+    }
+  }
+  if (!joined) remove_seams(islands[number].pairs, time, h);
+  return joined;
+}
+
+/// Whether points of a pair may meet within a time.
+bool World::Impl::closes(const ContactPair& pair, Real left) const {
+  for (const PlacedManifold& m : pair.manifolds())
+    for (uint32_t k = 0; k < m.manifold.count; ++k) {
+      const ContactPoint& point = m.manifold.points[k];
+      const Real speed = pair.relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n);
+      if (point.separation + 2 * (speed - def.gravity.norm() * left) * left < 0) return true;
+    }
+  return false;
+}
+
+/// Bodies that leave the boxes that the broad phase was given have new neighbours, which may have to be
+/// woken.
+void World::Impl::find_pairs_again(uint32_t number, Real start, Real h, StepReport& report) {
+  bool left = false;
+  for (Body* body : islands[number].bodies) left |= move_in_broad_phase(*body, true);
+  if (!left) return;
+  collect_pairs(true);
+  std::vector<ContactPair*> near = islands[number].pairs;
+  for (ContactPair* pair : active_pairs) {
+    if (!pair->is_new()) continue;
+    find_points(*pair, std::max(pair->a().from, pair->b().from), h);
+    near.push_back(pair);
+  }
+  remove_seams(near, islands[number].from, h);
+  const std::vector<Body*> woken = wake_touched(start, h);
+  if (woken.empty()) return;
+  const auto added = static_cast<uint32_t>(islands.size());
+  islands.emplace_back();
+  islands[added].bodies = woken;
+  islands[added].motion = motions.back().get();
+  for (Body* body : woken) body->island = added;
+  for (const auto& articulation : articulations)
+    if (articulation->bodies().front()->is_awake() && articulation->bodies().front()->island == added)
+      islands[added].articulations.push_back(articulation.get());
+  collect_pairs(true);
+  for (ContactPair* pair : active_pairs) {
+    if (pair->is_new()) find_points(*pair, std::max(pair->a().from, pair->b().from), h);
+    const auto outside = [&](const Body& body) { return body.is_awake() && body.island != added; };
+    if (outside(pair->a()) || outside(pair->b()) || pair->manifolds().empty()) continue;
+    if (pair->a().is_awake() || pair->b().is_awake()) islands[added].pairs.push_back(pair);
+  }
+  Island* const one[] = {&islands[added]};
+  if (has_forces(islands[added]))
+    solve(one, {.duration = h, .end = start + h, .substep = h, .is_whole = true}, report);
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,280 @@
+#include "sim/world/spring_network.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace offstage::sim {
+namespace {
+
+/// Pieces in which the motion of what joints hold is integrated: of its turning, and of the phase of its
+/// fastest swinging [rad]; and the most of them.
+constexpr Real kTurn = 0.12, kSwing = 1, kFastSpin = 1, kMostPieces = 64;
+
+}  // namespace
+
+SpringNetwork::SpringNetwork(const WorldState& world, NetworkMembers members, const BodyForces& forces)
+    : forces_(forces), bodies_(std::move(members.bodies)) {
+  for (ParticleSystem* system : members.systems) add_group(world, *system);
+  x_.resize(particle_x(particles_));
+  p_.resize(particle_p(particles_));
+  BodyIndex index;
+  for (std::size_t i = 0; i < bodies_.size(); ++i) index[bodies_[i]] = i;
+  add_springs(world, members.springs, index);
+  for (Articulation* a : members.articulations) add_articulation(*a, index);
+  add_pair_forces(world);
+}
+
+void SpringNetwork::add_group(const WorldState& world, ParticleSystem& system) {
+  Group group{&system, world.forces(system), {}, {}, particles_};
+  for (std::size_t i = 0; i < system.arrays.size(); ++i)
+    if (system.whole_step(i)) {
+      group.members.push_back(i);
+      group.mass.push_back(system.arrays.mass[i]);
+    }
+  particles_ += group.members.size();
+  groups_.push_back(std::move(group));
+}
+
+/// Newborns take part from the next sub-step on.
+void SpringNetwork::add_pair_forces(const WorldState& world) {
+  world.force_defs.for_each([&](ForceHandle, const ForceDef& def) {
+    if (!def.is_pairwise()) return;
+    std::vector<PairMember> members;
+    for (const Group& g : groups_) {
+      if (!def.acts_on(g.system->handle)) continue;
+      for (std::size_t k = 0; k < g.members.size(); ++k)
+        members.push_back({g.offset + k, g.mass[k], g.system->arrays.charge[g.members[k]]});
+    }
+    if (!members.empty()) pair_forces_.add(def, std::move(members));
+  });
+}
+
+bool SpringNetwork::holds(const ParticleSystem& system) const {
+  return std::any_of(groups_.begin(), groups_.end(), [&](const Group& g) { return g.system == &system; });
+}
+
+void SpringNetwork::begin_substep() const {
+  for (const Group& g : groups_) g.system->begin_coupled();
+}
+
+void SpringNetwork::add_springs(const WorldState& world, std::span<const Spring* const> springs,
+                                const BodyIndex& index) {
+  // A spring at a newborn waits until that has lived up to the end of the sub-step.
+  const auto ready = [&](const Attachment& a) {
+    const auto* p = std::get_if<ParticlePoint>(&a);
+    if (!p) return true;
+    const ParticleSystem& system = world.systems[p->system];
+    const auto i = system.find(p->id);
+    return i && system.whole_step(*i);
+  };
+  for (const Spring* spring : springs)
+    if (const SpringDef& def = spring->def; ready(def.a) && ready(def.b))
+      springs_.push_back({resolve(world, def.a, index), resolve(world, def.b, index), def.stiffness,
+                          def.damping, spring->rest_length});
+}
+
+void SpringNetwork::add_articulation(Articulation& articulation, const BodyIndex& index) {
+  Jointed jointed{&articulation, {}};
+  for (const Body* body : articulation.bodies()) jointed.links.push_back(index.at(body));
+  articulations_.push_back(std::move(jointed));
+}
+
+SpringNetwork::End SpringNetwork::resolve(const WorldState& world, const Attachment& a,
+                                          const BodyIndex& index) const {
+  if (const auto* w = std::get_if<WorldPoint>(&a)) return {.point = w->position};
+  if (const auto* b = std::get_if<BodyPoint>(&a)) {
+    const Body* body = world.bodies[b->body].get();
+    if (body->is_awake()) {
+      assert(index.contains(body) && "what a spring joins must be in one network");
+      return {End::Kind::dynamic, b->position - body->rigid.centre, body, index.at(body)};
+    }
+    if (body->can_move()) return {End::Kind::kinematic, b->position, body};
+    return {.point = body->pose.point_to_world(b->position)};
+  }
+  const auto& p = std::get<ParticlePoint>(a);
+  const ParticleSystem& system = world.systems[p.system];
+  const std::size_t i = *system.find(p.id);
+  const Group& group =
+      *std::find_if(groups_.begin(), groups_.end(), [&](const Group& g) { return g.system == &system; });
+  const auto member = std::lower_bound(group.members.begin(), group.members.end(), i) - group.members.begin();
+  return {End::Kind::particle, Vec3::Zero(), nullptr, group.offset + static_cast<std::size_t>(member),
+          system.arrays.mass[i]};
+}
+
+SpringNetwork::PointMotion SpringNetwork::motion(const End& end, Real t, std::span<const Real> x,
+                                                 std::span<const Real> p) const {
+  switch (end.kind) {
+    case End::Kind::still:
+      break;
+    case End::Kind::kinematic: {
+      const Motion m = end.body->def.track.at(t, end.body->def.pose);
+      const Vec3 arm = m.pose.vector_to_world(end.point);
+      return {m.pose.position + arm, m.velocity + m.angular_velocity.cross(arm)};
+    }
+    case End::Kind::dynamic: {
+      const RigidMotion m = stage(end.index, x, p).motion;
+      const Vec3 arm = m.orientation * end.point;
+      return {m.position + arm, m.velocity + m.angular_velocity.cross(arm)};
+    }
+    case End::Kind::particle:
+      return {vec3(x, particle_x(end.index)), vec3(p, particle_p(end.index))};
+  }
+  return {end.point, Vec3::Zero()};
+}
+
+SpringNetwork::Pull SpringNetwork::pull(const ActiveSpring& s, Real t, std::span<const Real> x,
+                                        std::span<const Real> p) const {
+  const PointMotion a = motion(s.a, t, x, p), b = motion(s.b, t, x, p);
+  const Vec3 d = a.position - b.position;
+  const Real length = d.norm();
+  if (length == 0) return {};
+  const Vec3 along = d / length, velocity = a.velocity - b.velocity;
+  return {along, length, s.stiffness * (length - s.rest_length) + s.damping * velocity.dot(along), velocity};
+}
+
+void SpringNetwork::apply(const End& end, const Vec3& force, std::span<const Real> x,
+                          std::span<Real> dp) const {
+  if (end.kind == End::Kind::dynamic) {
+    const std::size_t at = kBodyP * end.index;
+    const Eigen::Map<const Eigen::Vector4d> turn(&x[kBodyX * end.index + 3]);
+    vec3(dp, at) += force;
+    vec3(dp, at + 3) += (Quat(turn).normalized() * end.point).cross(force);
+  } else if (end.kind == End::Kind::particle) {
+    vec3(dp, particle_p(end.index)) += force / end.mass;
+  }
+}
+
+void SpringNetwork::velocity(Real, std::span<const Real> x, std::span<const Real> p,
+                             std::span<Real> dx) const {
+  for (std::size_t i = 0; i < bodies_.size(); ++i) stage(i, x, p).velocity(dx.subspan(kBodyX * i, kBodyX));
+  const auto particles = p.subspan(particle_p(0));
+  std::copy(particles.begin(), particles.end(), dx.begin() + static_cast<std::ptrdiff_t>(particle_x(0)));
+}
+
+void SpringNetwork::force(Real t, std::span<const Real> x, std::span<const Real> p,
+                          std::span<Real> dp) const {
+  for (std::size_t i = 0; i < bodies_.size(); ++i)
+    stage(i, x, p).force(forces_, t, dp.subspan(kBodyP * i, kBodyP));
+  const auto particles_x = x.subspan(particle_x(0)), particles_v = p.subspan(particle_p(0));
+  const auto particles_dv = dp.subspan(particle_p(0));
+  for (const Group& g : groups_)
+    g.forces.accelerate(t, g.part(particles_x), g.part(particles_v), g.mass, g.part(particles_dv));
+  pair_forces_.accelerate(t, particles_x, particles_dv);
+  for (const ActiveSpring& s : springs_) {
+    const Pull f = pull(s, t, x, p);
+    apply(s.a, -f.size * f.along, x, dp);
+    apply(s.b, f.size * f.along, x, dp);
+  }
+  for (const Jointed& j : articulations_) add_joint_forces(j, t, x, p, dp);
+}
+
+/// Of particles that act on each other; springs and bodies depend on velocities in other ways.
+bool SpringNetwork::force_and_damping(Real t, std::span<const Real> x, std::span<const Real> p,
+                                      std::span<Real> dp, std::span<Real> damping) const {
+  if (!bodies_.empty() || !springs_.empty()) return false;
+  for (const Group& g : groups_)
+    FreeFlight(g.forces, g.mass).force_and_damping(t, g.part(x), g.part(p), g.part(dp), g.part(damping));
+  pair_forces_.accelerate(t, x, dp);
+  return true;
+}
+
+void SpringNetwork::add_joint_forces(const Jointed& jointed, Real t, std::span<const Real> x,
+                                     std::span<const Real> p, std::span<Real> dp) const {
+  const std::size_t count = jointed.links.size();
+  std::vector<LinkMotion> motion(count);
+  std::vector<LinkMobility> mobility(count);
+  std::vector<Vec6> forces(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t i = jointed.links[k];
+    const RigidStage s = stage(i, x, p);
+    const Mat3 axes = s.motion.orientation.toRotationMatrix();
+    motion[k] = {s.motion.position, axes, s.motion.velocity, s.motion.angular_velocity};
+    mobility[k] = {1 / s.body.mass, axes * s.body.inverse_inertia * axes.transpose()};
+    forces[k] << vec3(dp, kBodyP * i), vec3(dp, kBodyP * i + 3);
+  }
+  jointed.articulation->add_forces(t, motion, mobility, forces);
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t at = kBodyP * jointed.links[k];
+    vec3(dp, at) = forces[k].head<3>();
+    vec3(dp, at + 3) = forces[k].tail<3>();
+  }
+}
+
+/// No integrator of a fixed step follows what turns by much more in it, or swings: links that are pulled
+/// tight are the masses of a string.
+Real SpringNetwork::pieces(Real h) const {
+  Real fastest = 0, tightest = 0, spin = 0;
+  for (const Body* body : bodies_) spin = std::max(spin, greatest_spin(body->rigid));
+  for (const Jointed& j : articulations_) {
+    for (const Body* body : j.articulation->bodies())
+      fastest = std::max(fastest, body->rigid.angular_velocity().norm());
+    tightest = std::max(tightest, j.articulation->greatest_frequency());
+  }
+  return std::clamp(std::ceil(std::max({fastest / kTurn, tightest / kSwing, spin / kFastSpin}) * h), 1.0,
+                    kMostPieces);
+}
+
+void SpringNetwork::load(std::span<Real> x, std::span<Real> p) const {
+  for (std::size_t i = 0; i < bodies_.size(); ++i)
+    sim::load(bodies_[i]->rigid, x.subspan(kBodyX * i, kBodyX), p.subspan(kBodyP * i, kBodyP));
+  for (const Group& g : groups_)
+    for (std::size_t k = 0; k < g.members.size(); ++k) {
+      vec3(x, particle_x(g.offset + k)) = g.system->arrays.position[g.members[k]];
+      vec3(p, particle_p(g.offset + k)) = g.system->arrays.velocity[g.members[k]];
+    }
+}
+
+void SpringNetwork::store(std::span<const Real> x, std::span<const Real> p) {
+  for (std::size_t i = 0; i < bodies_.size(); ++i)
+    sim::store(x.subspan(kBodyX * i, kBodyX), p.subspan(kBodyP * i, kBodyP), bodies_[i]->rigid);
+  for (const Group& g : groups_)
+    for (std::size_t k = 0; k < g.members.size(); ++k) {
+      g.system->arrays.position[g.members[k]] = vec3(x, particle_x(g.offset + k));
+      g.system->arrays.velocity[g.members[k]] = vec3(p, particle_p(g.offset + k));
+    }
+}
+
+void SpringNetwork::step(const Integrator& integrator, Real t, Real h, IntegratorWorkspace& work) {
+  for (const Jointed& j : articulations_) j.articulation->transmit_impulses(t, joint_tally_);
+  load(x_, p_);
+  // The most careful member leads; without bodies there is none to remember.
+  work.next_step = 0;
+  for (const Body* body : bodies_)
+    if (const Real next = body->rigid.next_step; next > 0)
+      work.next_step = work.next_step > 0 ? std::min(work.next_step, next) : next;
+  const bool particles_only = bodies_.empty() && springs_.empty();
+  const Integrator& chosen =
+      particles_only ? sim::integrator(groups_.front().system->def.integrator) : integrator;
+  const Real count = pieces(h);
+  for (Real i = 0; i < count; ++i) {
+    const Real duration = h / count, begin = t + i * duration;
+    for (const Jointed& j : articulations_) j.articulation->begin_motion(begin, duration);
+    chosen.step(*this, begin, duration, x_, p_, work);
+    if (articulations_.empty()) continue;
+    store(x_, p_);
+    for (const Jointed& j : articulations_) j.articulation->settle(begin + duration, joint_tally_);
+    load(x_, p_);
+  }
+  for (Body* body : bodies_) body->rigid.next_step = work.next_step;
+  store(x_, p_);
+}
+
+void SpringNetwork::save() {
+  saved_x_.resize(x_.size());
+  saved_p_.resize(p_.size());
+  load(saved_x_, saved_p_);
+  saved_steps_.clear();
+  for (const Body* body : bodies_) saved_steps_.push_back(body->rigid.next_step);
+}
+
+void SpringNetwork::restore() {
+  store(saved_x_, saved_p_);
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    RigidBody& body = bodies_[i]->rigid;
+    body.next_step = saved_steps_[i];
+    // To the bit: normalising again might change the last one.
+    body.orientation.coeffs() = Eigen::Map<const Eigen::Vector4d>(&saved_x_[kBodyX * i + 3]);
+  }
+}
+
+}  // namespace offstage::sim

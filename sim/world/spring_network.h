@@ -1,0 +1,134 @@
+#pragma once
+/// Bodies and particles that springs, joints and forces between particles join, as one dynamic system
+/// (physics R1, R2, A1, P2).
+///
+/// Layout: per body x = [position 3, quaternion x y z w], p = [L 3, H 3]; then per particle x = position, p =
+/// velocity.
+
+#include <unordered_map>
+#include <vector>
+
+#include "sim/articulation/articulation.h"
+#include "sim/dynamics/free_body.h"
+#include "sim/dynamics/pair_forces.h"
+#include "sim/world/world_impl.h"
+
+namespace offstage::sim {
+
+/// What a network consists of: a component of the SpringGraph, or several.
+struct NetworkMembers {
+  std::vector<Body*> bodies;
+  std::vector<ParticleSystem*> systems;
+  std::vector<const Spring*> springs;
+  std::vector<Articulation*> articulations;
+};
+
+class SpringNetwork final : public DynamicSystem {
+ public:
+  /// `forces` must outlive the network, and the world must not gain or lose anything as long.
+  SpringNetwork(const WorldState& world, NetworkMembers members, const BodyForces& forces);
+
+  std::span<Body* const> bodies() const { return bodies_; }
+  bool holds(const ParticleSystem& system) const;
+
+  /// Tells the particle systems that a sub-step begins.
+  void begin_substep() const;
+  /// Advances the members from t to t + h. Where only forces between particles join them, the integrator is
+  /// that of the first system.
+  void step(const Integrator& integrator, Real t, Real h, IntegratorWorkspace& work);
+
+  const JointTally& joint_tally() const { return joint_tally_; }
+
+  /// Keeps the state, and takes the members back to the one kept last.
+  void save();
+  void restore();
+
+  void velocity(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dx) const override;
+  void force(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const override;
+  bool force_and_damping(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp,
+                         std::span<Real> damping) const override;
+  void jacobian(Real t, std::span<const Real> x, std::span<const Real> p,
+                SparseEntries& entries) const override;
+
+ private:
+  struct Group {
+    ParticleSystem* system;
+    ParticleForces forces;
+    std::vector<std::size_t> members;  // the particles that live through the whole sub-step
+    std::vector<Real> mass;            // of these
+    std::size_t offset;                // of the first in units of 3, after the bodies
+
+    /// The part of these in all particles' coordinates or velocities.
+    template <class T>
+    std::span<T> part(std::span<T> particles) const {
+      return particles.subspan(3 * offset, 3 * members.size());
+    }
+  };
+  /// A spring's end, resolved to where it is in the state.
+  struct End {
+    enum class Kind { still, kinematic, dynamic, particle } kind = Kind::still;
+    Vec3 point =
+        Vec3::Zero();  // still: world; bodies: from the centre of mass (dynamic) or the origin, body axes
+    const Body* body = nullptr;
+    std::size_t index = 0;  // of the body or the particle in the state
+    Real mass = 1;          // of the particle
+
+    bool is_moved() const { return kind == Kind::dynamic || kind == Kind::particle; }
+  };
+  /// An articulation, whose links are these of the bodies.
+  struct Jointed {
+    Articulation* articulation;
+    std::vector<std::size_t> links;
+  };
+  struct PointMotion {
+    Vec3 position, velocity;
+  };
+  struct ActiveSpring {
+    End a, b;
+    Real stiffness, damping, rest_length;
+  };
+  /// The force of a spring at a moment.
+  struct Pull {
+    Vec3 along = Vec3::Zero();  // from b to a; zero if they are at the same place: no direction to push in
+    Real length = 0;
+    Real size = 0;                 // on a against `along`, on b along it
+    Vec3 velocity = Vec3::Zero();  // of a against b
+  };
+  struct EndDerivative;
+  using BodyIndex = std::unordered_map<const Body*, std::size_t>;
+
+  std::size_t particle_x(std::size_t i) const { return kBodyX * bodies_.size() + 3 * i; }
+  std::size_t particle_p(std::size_t i) const { return kBodyP * bodies_.size() + 3 * i; }
+  RigidStage stage(std::size_t body, std::span<const Real> x, std::span<const Real> p) const {
+    return {bodies_[body]->rigid, x.subspan(kBodyX * body, kBodyX), p.subspan(kBodyP * body, kBodyP)};
+  }
+  void add_articulation(Articulation& articulation, const BodyIndex& index);
+  void add_joint_forces(const Jointed& jointed, Real t, std::span<const Real> x, std::span<const Real> p,
+                        std::span<Real> dp) const;
+  Real pieces(Real h) const;
+  void add_group(const WorldState& world, ParticleSystem& system);
+  void add_pair_forces(const WorldState& world);
+  void add_springs(const WorldState& world, std::span<const Spring* const> springs, const BodyIndex& index);
+  End resolve(const WorldState& world, const Attachment& a, const BodyIndex& index) const;
+  PointMotion motion(const End& end, Real t, std::span<const Real> x, std::span<const Real> p) const;
+  Pull pull(const ActiveSpring& spring, Real t, std::span<const Real> x, std::span<const Real> p) const;
+  void apply(const End& end, const Vec3& force, std::span<const Real> x, std::span<Real> dp) const;
+  EndDerivative derivative(const End& end, const Vec3& force, std::span<const Real> x,
+                           std::span<const Real> p) const;
+  void add_derivatives(const ActiveSpring& spring, Real t, std::span<const Real> x, std::span<const Real> p,
+                       SparseEntries& entries) const;
+  void load(std::span<Real> x, std::span<Real> p) const;
+  void store(std::span<const Real> x, std::span<const Real> p);
+
+  const BodyForces& forces_;
+  std::vector<Body*> bodies_;
+  std::vector<Group> groups_;
+  std::vector<ActiveSpring> springs_;
+  std::vector<Jointed> articulations_;
+  JointTally joint_tally_;
+  PairForces pair_forces_;
+  std::size_t particles_ = 0;
+  std::vector<Real> x_, p_, saved_x_, saved_p_, saved_steps_;
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,543 @@
+#include "sim/world.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "sim/dynamics/pair_forces.h"
+#include "sim/world/coupled_system.h"
+#include "sim/world/world_impl.h"
+
+namespace offstage::sim {
+namespace {
+
+[[noreturn]] void refuse(const std::string& object, const std::string& what) {
+  throw std::invalid_argument(object + ": " + what);
+}
+
+std::string quoted(const char* kind, const std::string& name) {
+  return name.empty() ? std::string(kind) : std::string(kind) + " \"" + name + '"';
+}
+
+void check_positive(const std::string& object, const char* field, Real value) {
+  if (!(value > 0) || !std::isfinite(value))
+    refuse(object, std::string(field) + " is " + std::to_string(value) + ", allowed is a finite number > 0");
+}
+
+void check_not_negative(const std::string& object, const char* field, Real value) {
+  if (!(value >= 0) || !std::isfinite(value))
+    refuse(object, std::string(field) + " is " + std::to_string(value) + ", allowed is a finite number >= 0");
+}
+
+void check_finite(const std::string& object, const char* field, const Vec3& value) {
+  if (!value.allFinite()) refuse(object, std::string(field) + " is not finite");
+}
+
+void check_pose(const std::string& object, const char* field, const Pose& pose) {
+  check_finite(object, field, pose.position);
+  const Real norm = pose.orientation.norm();
+  if (!(std::abs(norm - 1) < 1e-6))
+    refuse(object,
+           std::string(field) + " has a quaternion of length " + std::to_string(norm) + ", allowed is 1");
+}
+
+void check_size(const std::string& o, const Sphere& s) {
+  check_positive(o, "radius", s.radius);
+}
+void check_size(const std::string& o, const Box& b) {
+  for (int i = 0; i < 3; ++i) check_positive(o, "size", b.size[i]);
+}
+void check_size(const std::string& o, const Capsule& c) {
+  check_positive(o, "radius", c.radius);
+  check_not_negative(o, "height", c.height);
+}
+void check_size(const std::string& o, const Cylinder& c) {
+  check_positive(o, "radius", c.radius);
+  check_positive(o, "height", c.height);
+}
+void check_size(const std::string& o, const Cone& c) {
+  check_positive(o, "radius", c.radius);
+  check_positive(o, "height", c.height);
+}
+void check_size(const std::string&, const Plane&) {}
+void check_size(const std::string&, const MeshShape&) {}
+
+void check_track(const std::string& object, const KeyframeTrack& track) {
+  check_finite(object, "track.spin", track.spin);
+  for (std::size_t i = 0; i < track.keys.size(); ++i) {
+    check_pose(object, "track.keys", track.keys[i].pose);
+    if (!std::isfinite(track.keys[i].time) || (i > 0 && track.keys[i].time <= track.keys[i - 1].time))
+      refuse(object, "track.keys: times must be finite and strictly increasing");
+  }
+}
+
+void check_restitution(const std::string& object, Real e) {
+  if (!(e >= 0 && e <= 1)) refuse(object, "restitution is " + std::to_string(e) + ", allowed is 0 to 1");
+}
+
+void check_body(const std::string& object, const BodyDef& def) {
+  std::visit([&](const auto& shape) { check_size(object, shape); }, def.shape);
+  check_pose(object, "pose", def.pose);
+  check_finite(object, "velocity", def.velocity);
+  check_finite(object, "angular_velocity", def.angular_velocity);
+  check_not_negative(object, "mass", def.mass);
+  if (def.mass == 0) check_positive(object, "density", def.density);
+  check_not_negative(object, "linear_drag", def.linear_drag);
+  check_not_negative(object, "angular_drag", def.angular_drag);
+  check_not_negative(object, "friction", def.friction);
+  check_restitution(object, def.restitution);
+  check_finite(object, "friction_axis", def.friction_axis);
+  check_finite(object, "surface_velocity", def.surface_velocity);
+  for (const Real friction : {def.static_friction, def.cross_friction})
+    if (!std::isfinite(friction)) refuse(object, "static_friction or cross_friction is not finite");
+  if (def.cross_friction >= 0 && def.friction_axis == Vec3::Zero())
+    refuse(object, "cross_friction needs a friction_axis, allowed is any but 0 0 0");
+  if (def.cross_friction > 0 && def.friction == 0)
+    refuse(object, "cross_friction needs a friction along the axis, too, allowed is any but 0");
+  check_track(object, def.track);
+}
+
+RigidBody make_rigid_body(const std::string& object, const BodyDef& def, const Solid& solid) {
+  if (solid.mesh && !solid.mesh->solid)
+    refuse(object,
+           "a dynamic body needs a closed mesh, this one has: " + solid.mesh->topology.defects().describe());
+  const MassProperties unit = solid.mesh ? solid.mesh->mass : mass_properties(def.shape);
+  if (!(unit.volume > 0)) refuse(object, "a dynamic body needs a solid shape, this one has no volume");
+  RigidBody rigid;
+  rigid.mass = def.mass > 0 ? def.mass : def.density * unit.volume;
+  rigid.centre = unit.centre;
+  rigid.inertia = rigid.mass / unit.volume * unit.inertia;
+  rigid.inverse_inertia = rigid.inertia.inverse();
+  rigid.linear_drag = def.linear_drag;
+  rigid.angular_drag = def.angular_drag;
+  rigid.place(def.pose);
+  rigid.set_velocity(def.velocity, def.angular_velocity);
+  return rigid;
+}
+
+/// Of the particles that act on each other.
+Real pair_energy(const WorldState& world, Real time) {
+  Real energy = 0;
+  world.force_defs.for_each([&](ForceHandle, const ForceDef& def) {
+    if (!def.is_pairwise()) return;
+    std::vector<Real> x;
+    std::vector<PairMember> members;
+    world.systems.for_each([&](ParticleSystemHandle handle, const ParticleSystem& system) {
+      if (!def.acts_on(handle)) return;
+      const ParticleArrays& p = system.arrays;
+      for (std::size_t i = 0; i < p.size(); ++i) {
+        members.push_back({members.size(), p.mass[i], p.charge[i]});
+        x.insert(x.end(), p.position[i].begin(), p.position[i].end());
+      }
+    });
+    PairForces forces;
+    forces.add(def, std::move(members));
+    energy += forces.potential_energy(time, x);
+  });
+  return energy;
+}
+
+}  // namespace
+
+Motion Body::motion(Real now, Real time) const {
+  if (is_kinematic()) return def.track.at(time, def.pose);
+  if (!is_dynamic()) return {.pose = pose};
+  // Extrapolated along the present velocities.
+  const Real dt = time - now;
+  const Vec3 v = rigid.velocity(), w = rigid.angular_velocity();
+  const Real rate = w.norm();
+  RigidBody later = rigid;
+  later.position += dt * v;
+  if (rate > 0)
+    later.orientation = (Quat(Eigen::AngleAxisd(rate * dt, w / rate)) * rigid.orientation).normalized();
+  const Vec3 arm = -(later.orientation * rigid.centre);
+  return {later.pose(), v + w.cross(arm), w};
+}
+
+uint32_t World::Impl::surface_number(const std::string& material) {
+  const auto at = std::find(materials.begin(), materials.end(), material);
+  if (at == materials.end())
+    return materials.push_back(material), static_cast<uint32_t>(materials.size() - 1);
+  return static_cast<uint32_t>(at - materials.begin());
+}
+
+void World::Impl::wake_neighbours(Body& body) {
+  graph.for_each([&](ContactPair& pair) {
+    if (&pair.a() == &body) wake(pair.b());
+    if (&pair.b() == &body) wake(pair.a());
+  });
+}
+
+/// Whatever rests on a body that goes away wakes.
+void World::Impl::detach(Body& body) {
+  wake(body);
+  wake_neighbours(body);
+  graph.forget(body.handle.index);
+  pairs_changed = true;
+  std::erase(stepped, &body);
+  active_pairs.clear();
+  islands.clear();
+}
+
+const CollisionShape& Body::collision_shape() {
+  if (!collision_shape_) collision_shape_.emplace(solid, def.motion == MotionType::dynamic);
+  return *collision_shape_;
+}
+
+bool WorldState::is_alive(const Attachment& a) const {
+  if (const auto* b = std::get_if<BodyPoint>(&a)) return bodies.find(b->body) != nullptr;
+  if (const auto* p = std::get_if<ParticlePoint>(&a)) {
+    const ParticleSystem* system = systems.find(p->system);
+    return system && system->find(p->id);
+  }
+  return true;
+}
+
+ParticleForces WorldState::forces(const ParticleSystem& system) const {
+  std::vector<const ForceDef*> acting;
+  force_defs.for_each([&](ForceHandle, const ForceDef& f) {
+    if (!f.is_explosion() && !f.is_pairwise() && f.acts_on(system.handle)) acting.push_back(&f);
+  });
+  return {system.def, def.gravity, def.wind, std::move(acting)};
+}
+
+bool WorldState::has_pair_forces() const {
+  bool any = false;
+  force_defs.for_each([&](ForceHandle, const ForceDef& f) { any |= f.is_pairwise(); });
+  return any;
+}
+
+Vec3 WorldState::position(const Attachment& a) const {
+  if (const auto* b = std::get_if<BodyPoint>(&a)) return bodies[b->body]->pose.point_to_world(b->position);
+  if (const auto* p = std::get_if<ParticlePoint>(&a)) {
+    const ParticleSystem& system = systems[p->system];
+    return system.arrays.position[*system.find(p->id)];
+  }
+  return std::get<WorldPoint>(a).position;
+}
+
+/// Springs that have lost an end are no more, and bodies at their other ends wake.
+void World::Impl::remove_dead_springs() {
+  std::vector<SpringHandle> dead;
+  springs.for_each([&](SpringHandle handle, const Spring& s) {
+    if (!is_alive(s.def.a) || !is_alive(s.def.b)) dead.push_back(handle);
+  });
+  for (SpringHandle handle : dead) {
+    const SpringDef& def_ = springs[handle].def;
+    for (const Attachment* end : {&def_.a, &def_.b})
+      if (const auto* point = std::get_if<BodyPoint>(end); point && is_alive(*end))
+        wake(*bodies[point->body]);
+    springs.erase(handle);
+  }
+}
+
+World::World(const WorldDef& def) : impl_(std::make_unique<Impl>()) {
+  check_positive("world", "max_step", def.max_step);
+  check_finite("world", "gravity", def.gravity);
+  check_finite("world", "wind", def.wind);
+  check_positive("world", "collision_speed", def.collision_speed);
+  check_positive("world", "integration_error", def.integration_error);
+  if (def.bounds.isEmpty()) refuse("world", "bounds are empty");
+  impl_->def = def;
+}
+World::~World() = default;
+World::World(World&&) noexcept = default;
+World& World::operator=(World&&) noexcept = default;
+
+MeshHandle World::add_mesh(const TriangleMesh& mesh, std::optional<ConvexDecomposition> decomposition) {
+  for (const Vec3& v : mesh.vertices) check_finite("mesh", "a vertex", v);
+  for (const Triangle& t : mesh.triangles)
+    for (uint32_t v : t)
+      if (v >= mesh.vertices.size())
+        refuse("mesh", "vertex index " + std::to_string(v) + " of " + std::to_string(mesh.vertices.size()) +
+                           " vertices");
+  TriangleMesh welded = weld(mesh);
+  if (welded.triangles.empty()) refuse("mesh", "it has no face");
+  return impl_->meshes.insert(std::make_unique<CollisionMesh>(std::move(welded), std::move(decomposition)));
+}
+
+const MeshTopology& World::topology(MeshHandle mesh) const {
+  return impl_->meshes[mesh]->topology;
+}
+const TriangleMesh& World::mesh(MeshHandle mesh) const {
+  return impl_->meshes[mesh]->mesh;
+}
+
+const CollisionMesh& World::collision_mesh(MeshHandle mesh) const {
+  return *impl_->meshes[mesh];
+}
+
+BodyHandle World::add_body(const BodyDef& def) {
+  const std::string object = quoted("body", def.name);
+  check_body(object, def);
+  auto body = std::make_unique<Body>();
+  body->def = def;
+  body->type = def.motion;
+  body->solid.shape = &body->def.shape;
+  if (const auto* shape = std::get_if<MeshShape>(&def.shape)) {
+    const auto* mesh = impl_->meshes.find(shape->mesh);
+    if (!mesh) refuse(object, "its mesh is not registered");
+    body->solid.mesh = mesh->get();
+  }
+  body->pose = {def.pose.position, def.pose.orientation.normalized()};
+  if (def.motion == MotionType::dynamic) body->rigid = make_rigid_body(object, def, body->solid);
+  if (def.motion == MotionType::kinematic) body->pose = def.track.at(impl_->now, def.pose).pose;
+  body->before_step = body->before_substep = body->start_pose = body->pose;
+  body->extent =
+      std::holds_alternative<Plane>(def.shape) ? std::numeric_limits<Real>::infinity() : reach(body->solid);
+  body->surface = impl_->surface_number(def.material);
+  impl_->fixed_changed = impl_->lists_changed = impl_->ranks_changed = true;
+  const BodyHandle handle = impl_->bodies.insert(std::move(body));
+  impl_->bodies[handle]->handle = handle;
+  if (const Body& added = *impl_->bodies[handle]; added.def.collides)
+    impl_->broad_phase.insert(handle.index, bounds(added.solid, added.pose), !added.is_dynamic());
+  return handle;
+}
+
+ParticleSystemHandle World::add_particle_system(const ParticleSystemDef& def) {
+  const std::string object = quoted("particle system", def.name);
+  check_not_negative(object, "linear_drag", def.linear_drag);
+  check_finite(object, "force", def.force);
+  ParticleSystem system;
+  system.def = def;
+  const ParticleSystemHandle handle = impl_->systems.insert(std::move(system));
+  impl_->systems[handle].handle = handle;
+  return handle;
+}
+
+SpringHandle World::add_spring(const SpringDef& def) {
+  const std::string object = quoted("spring", def.name);
+  check_not_negative(object, "stiffness", def.stiffness);
+  check_not_negative(object, "damping", def.damping);
+  if (!impl_->is_alive(def.a) || !impl_->is_alive(def.b))
+    refuse(object, "an end is attached to nothing that exists");
+  const Real rest =
+      def.rest_length >= 0 ? def.rest_length : (impl_->position(def.a) - impl_->position(def.b)).norm();
+  for (const Attachment* end : {&def.a, &def.b})
+    if (const auto* point = std::get_if<BodyPoint>(end)) impl_->wake(*impl_->bodies[point->body]);
+  return impl_->springs.insert({def, rest});
+}
+
+ForceHandle World::add_force(const ForceDef& def) {
+  const std::string wrong = problem(def);
+  if (!wrong.empty()) refuse(quoted("force", def.name), wrong);
+  impl_->wake_all();
+  return impl_->force_defs.insert(def);
+}
+
+void World::add_contact_rule(const ContactRule& rule) {
+  const std::string object = "contact rule of \"" + rule.a + "\" and \"" + rule.b + '"';
+  if (rule.restitution) check_restitution(object, *rule.restitution);
+  if (rule.friction) check_not_negative(object, "friction", *rule.friction);
+  if (rule.static_friction) check_not_negative(object, "static_friction", *rule.static_friction);
+  impl_->rules[std::minmax(impl_->surface_number(rule.a), impl_->surface_number(rule.b))] = rule;
+  impl_->graph.forget_all();
+  impl_->pairs_changed = true;
+  impl_->wake_all();
+}
+
+bool World::remove(BodyHandle body) {
+  const auto* found = impl_->bodies.find(body);
+  if (!found) return false;
+  impl_->detach(**found);
+  impl_->detach_cloths(body);
+  impl_->detach_joints(**found);
+  impl_->ranks_changed = true;
+  impl_->bodies.erase(body);
+  impl_->pending_impulses.erase(body.index);
+  if (impl_->broad_phase.contains(body.index)) impl_->broad_phase.remove(body.index);
+  std::erase_if(impl_->moved, [&](const MovedBody& m) { return m.body == body; });
+  impl_->fixed_changed = impl_->lists_changed = true;
+  impl_->remove_dead_springs();
+  return true;
+}
+
+bool World::remove(ForceHandle force) {
+  impl_->wake_all();
+  return impl_->force_defs.erase(force);
+}
+
+void World::set_velocity(BodyHandle handle, const Vec3& velocity, const Vec3& angular_velocity) {
+  Body& body = *impl_->bodies[handle];
+  if (!body.is_dynamic()) return;
+  impl_->wake(body);
+  body.rigid.set_velocity(velocity, angular_velocity);
+}
+
+bool World::remove(ParticleSystemHandle system) {
+  if (!impl_->systems.erase(system)) return false;
+  std::erase_if(impl_->particle_events, [&](const ParticleEvent& e) { return e.system == system; });
+  impl_->remove_dead_springs();
+  return true;
+}
+
+bool World::remove(SpringHandle spring) {
+  if (const Spring* s = impl_->springs.find(spring))
+    for (const Attachment* end : {&s->def.a, &s->def.b})
+      if (const auto* point = std::get_if<BodyPoint>(end)) impl_->wake(*impl_->bodies[point->body]);
+  return impl_->springs.erase(spring);
+}
+
+uint64_t World::add_particle(ParticleSystemHandle system, const Particle& particle, Real elapsed) {
+  assert(particle.mass > 0 && particle.radius > 0);
+  ++impl_->born;
+  return impl_->systems[system].add(particle, elapsed);
+}
+
+StepReport World::prewarm(Real from, Real to, const BeforeSubStep& before) {
+  const bool goes_on = impl_->samplings == 0 && (impl_->now == 0 || impl_->now == from);
+  if (!(from <= to && to <= 0) || !std::isfinite(from) || !goes_on)
+    refuse("world", "prewarm goes from " + std::to_string(from) + " s to " + std::to_string(to) +
+                        " s, allowed is from <= to <= 0, before the first step");
+  return impl_->prewarm(from, to, before);
+}
+
+StepReport World::step(Real sampling_time, const BeforeSubStep& before) {
+  return impl_->step(sampling_time, before);
+}
+
+Real World::time() const {
+  return impl_->now;
+}
+const WorldDef& World::def() const {
+  return impl_->def;
+}
+std::span<const MovedBody> World::moved() const {
+  return impl_->moved;
+}
+const BodyDef& World::body_def(BodyHandle body) const {
+  return impl_->bodies[body]->def;
+}
+const ParticleArrays& World::particles(ParticleSystemHandle system) const {
+  return impl_->systems[system].arrays;
+}
+const ParticleSystemDef& World::particle_system_def(ParticleSystemHandle system) const {
+  return impl_->systems[system].def;
+}
+std::span<const ParticleEvent> World::particle_events() const {
+  return impl_->particle_events;
+}
+Motion World::body_motion(BodyHandle body, Real time) const {
+  return impl_->bodies[body]->motion(impl_->now, time);
+}
+
+BodyState World::body(BodyHandle handle) const {
+  const Body& body = *impl_->bodies[handle];
+  const RigidBody& rigid = body.rigid;
+  if (body.def.motion == MotionType::dynamic)
+    return {body.pose, rigid.position, rigid.velocity(), rigid.angular_velocity(), rigid.angular_momentum,
+            rigid.mass};
+  const Motion motion = body.motion(impl_->now, impl_->now);
+  const Vec3 centre = body.solid.mesh ? body.solid.mesh->mass.centre
+                      : std::holds_alternative<Plane>(body.def.shape)
+                          ? Vec3(Vec3::Zero())
+                          : mass_properties(body.def.shape).centre;
+  const Vec3 arm = body.pose.vector_to_world(centre);
+  return {body.pose,
+          body.pose.position + arm,
+          motion.velocity + motion.angular_velocity.cross(arm),
+          motion.angular_velocity,
+          Vec3::Zero(),
+          0};
+}
+
+void World::for_each_body(const std::function<void(BodyHandle)>& f) const {
+  impl_->bodies.for_each([&](BodyHandle handle, const auto&) { f(handle); });
+}
+
+void World::for_each_particle_system(const std::function<void(ParticleSystemHandle)>& f) const {
+  impl_->systems.for_each([&](ParticleSystemHandle handle, const auto&) { f(handle); });
+}
+
+std::vector<ContactState> World::contacts() const {
+  std::vector<ContactState> states;
+  impl_->graph.for_each([&](const ContactPair& pair) {
+    for (const PlacedManifold& m : pair.manifolds())
+      for (uint32_t k = 0; k < m.manifold.count; ++k) {
+        const ContactPoint& p = m.manifold.points[k];
+        if (p.separation > kTouching && m.forces[k].now.x() == 0) continue;
+        const Vec3& f = m.forces[k].now;
+        states.push_back({pair.a().handle, pair.b().handle, (p.on_a + p.on_b) / 2, m.frame.n,
+                          f.x() * m.frame.n + f.y() * m.frame.t + f.z() * m.frame.k, p.separation});
+      }
+  });
+  return states;
+}
+
+std::vector<BodyOverlap> World::overlaps(Real least) const {
+  impl_->update_articulations();  // joined bodies pass through each other
+  BroadPhase boxes;
+  impl_->bodies.for_each([&](BodyHandle handle, const auto& body) {
+    if (body->def.collides) boxes.insert(handle.index, bounds(body->solid, body->pose), !body->is_dynamic());
+  });
+  std::vector<BodyOverlap> found;
+  for (const IndexPair& pair : boxes.pairs()) {
+    Body* a = impl_->bodies[impl_->bodies.at_slot(pair.a)].get();
+    Body* b = impl_->bodies[impl_->bodies.at_slot(pair.b)].get();
+    if (impl_->are_jointed(*a, *b)) continue;
+    if (a->collision_shape().is_plane()) std::swap(a, b);
+    const Pose a_from_b{a->pose.point_to_body(b->pose.position),
+                        a->pose.orientation.conjugate() * b->pose.orientation};
+    PairCache none;
+    // Trees are searched down to a limit, which bounds that touch are at 0 of: so it is above that.
+    const auto s =
+        separation(a->collision_shape(), b->collision_shape(), a_from_b, none, DistanceMethod::gjk, least);
+    if (!s || -s->distance <= least) continue;
+    if (!a->is_dynamic()) std::swap(a, b);
+    found.push_back({a->handle, b->handle, -s->distance});
+  }
+  return found;
+}
+
+std::optional<uint32_t> World::island(BodyHandle handle) const {
+  const Body& body = *impl_->bodies[handle];
+  if (!body.is_dynamic()) return std::nullopt;
+  return body.asleep ? static_cast<uint32_t>(impl_->islands.size()) + body.island : body.island;
+}
+
+bool World::is_asleep(BodyHandle body) const {
+  return impl_->bodies[body]->asleep;
+}
+
+std::size_t World::body_count() const {
+  return impl_->bodies.size();
+}
+
+std::size_t World::particle_count() const {
+  std::size_t count = 0;
+  impl_->systems.for_each([&](auto, const ParticleSystem& s) { count += s.arrays.size(); });
+  return count;
+}
+
+Energy World::energy() const {
+  Energy e;
+  const Vec3& g = impl_->def.gravity;
+  impl_->bodies.for_each([&](auto, const std::unique_ptr<Body>& body) {
+    if (!body->is_dynamic()) return;
+    const RigidBody& r = body->rigid;
+    e.kinetic += r.momentum.squaredNorm() / (2 * r.mass) + r.angular_velocity().dot(r.angular_momentum) / 2;
+    e.potential -= r.mass * g.dot(r.position);
+  });
+  impl_->systems.for_each([&](auto, const ParticleSystem& s) {
+    for (std::size_t i = 0; i < s.arrays.size(); ++i) {
+      e.kinetic += s.arrays.mass[i] * s.arrays.velocity[i].squaredNorm() / 2;
+      if (s.def.gravity) e.potential -= s.arrays.mass[i] * g.dot(s.arrays.position[i]);
+    }
+  });
+  impl_->springs.for_each([&](auto, const Spring& s) {
+    const Real stretch = (impl_->position(s.def.a) - impl_->position(s.def.b)).norm() - s.rest_length;
+    e.elastic += s.def.stiffness * stretch * stretch / 2;
+  });
+  e.potential += pair_energy(*impl_, impl_->now);
+  impl_->cloths.for_each([&](auto, const std::unique_ptr<Cloth>& cloth) {
+    for (std::size_t i = 0; i < cloth->points.size(); ++i) {
+      e.kinetic += cloth->masses[i] * cloth->velocities[i].squaredNorm() / 2;
+      e.potential -= cloth->masses[i] * g.dot(cloth->points[i]);
+    }
+    e.elastic += elastic_energy(*cloth);
+  });
+  return e;
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,205 @@
+#pragma once
+/// The inside of the World, shared by the files that implement it.
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <oneapi/tbb/task_arena.h>
+
+#include "sim/articulation/articulation.h"
+#include "sim/cloth/cloth_system.h"
+#include "sim/collision/grouped_broad_phase.h"
+#include "sim/collision/obstacles.h"
+#include "sim/contact/contact_graph.h"
+#include "sim/contact/fast_contacts.h"
+#include "sim/contact/island_impacts.h"
+#include "sim/contact/seams.h"
+#include "sim/contact/solver_choice.h"
+#include "sim/dynamics/body.h"
+#include "sim/dynamics/body_impulses.h"
+#include "sim/particles/particle_collisions.h"
+#include "sim/particles/particle_system.h"
+#include "sim/world.h"
+
+namespace offstage::sim {
+
+struct Spring {
+  SpringDef def;
+  Real rest_length;
+};
+
+/// The fewest equal sub-steps of a duration that are not longer than `longest`. Rounding of a ratio that is
+/// meant to be whole adds none.
+uint32_t substep_count(Real duration, Real longest);
+
+/// The objects of a world.
+struct WorldState {
+  WorldDef def;
+  SlotMap<std::unique_ptr<CollisionMesh>, MeshTag> meshes;
+  SlotMap<std::unique_ptr<Body>, BodyTag> bodies;
+  SlotMap<ParticleSystem, ParticleSystemTag> systems;
+  SlotMap<Spring, SpringTag> springs;
+  SlotMap<ForceDef, ForceTag> force_defs;
+  SlotMap<std::unique_ptr<Cloth>, ClothTag> cloths;
+  SlotMap<std::unique_ptr<Joint>, JointTag> joints;
+  std::vector<std::unique_ptr<Articulation>> articulations;  // of the joints that hold, as components
+
+  /// What acts on each particle of a system alone.
+  ParticleForces forces(const ParticleSystem& system) const;
+  /// Whether particles act on each other.
+  bool has_pair_forces() const;
+  /// Whether the object that an attachment names exists.
+  bool is_alive(const Attachment& a) const;
+  Vec3 position(const Attachment& a) const;
+};
+
+struct World::Impl : WorldState {
+  StepReport step(Real sampling_time, const BeforeSubStep& before);
+  void substep(Real start, Real end, StepReport& report);
+  void begin_kinematic(Real start, Real end);
+  void collect_moved();
+
+  // Motion of bodies (world_step.cpp)
+  void begin_bodies(Real start, Real end);
+  void explode(Real start, Real end);
+  std::vector<const ForceDef*> active_forces() const;
+  void move_bodies(Real start, Real h, StepReport& report);
+  void move_all(Real start, Real h);
+  CoupledSystem& move_some(std::span<Body* const> group, Real start, Real from, Real duration);
+  bool is_within_bounds(const Body& body) const;
+  void retire(Body& body, StepReport& report);
+
+  // Contacts (world_contacts.cpp)
+  PairSurface surface_of(const Body& a, const Body& b) const;
+  void propagate_impact_speeds(Real h);
+  void update_pairs(Real h);
+  Real motion_bound(const ContactPair& pair, Real left) const;
+  Real motion_known(const ContactPair& pair) const;
+  void find_points(ContactPair& pair, Real time, Real h) const;
+  void choose_event(ContactPair& pair, bool far, Real left) const;
+  void remove_seams(std::span<ContactPair* const> pairs, Real time, Real h) const;
+  void move_in_broad_phase(Body& body, Aabb way, bool again);
+  bool move_in_broad_phase(Body& body, bool again);
+  void collect_pairs(bool again);
+  std::vector<Body*> wake_touched(Real start, Real h);
+  void find_moving_islands();
+  void solve_islands(Real start, Real h, StepReport& report);
+  void solve(std::span<Island* const> group, const ContactInterval& interval, StepReport& report);
+  void settle_joints(const Island& island, Real end);
+  static void add_rough(const ContactPair* pair, StepReport& report);
+  void count_contacts(StepReport& report) const;
+
+  // Impacts (world_impacts.cpp)
+  struct Impact {
+    Real time;  ///< since the sub-step's start [s]
+    ContactPair* pair;
+  };
+  void resolve_impacts(Real start, Real h, StepReport& report);
+  std::optional<Real> impact_time(const ContactPair& pair, Real h) const;
+  std::optional<Real> tumbling_impact_time(const ContactPair& pair, Real from, Real h, Real turn) const;
+  std::optional<Real> point_impact_time(const ContactPair& pair, Real h) const;
+  void suppress_restitution(uint32_t island, StepReport& report);
+  void bring_to(Island& island, Real start, Real time, Real h, StepReport& report);
+  void join(uint32_t into, uint32_t island);
+  void find_pairs_again(uint32_t island, Real start, Real h, StepReport& report);
+  std::size_t collide(uint32_t island, Real start, Real time, Real h, StepReport& report);
+  void go_on(uint32_t island, Real start, Real time, Real h, StepReport& report);
+  bool join_next(uint32_t island, Real start, Real time, Real h, StepReport& report);
+  bool closes(const ContactPair& pair, Real left) const;
+
+  uint32_t surface_number(const std::string& material);
+  void detach(Body& body);
+  void remove_dead_springs();
+  void wake_neighbours(Body& body);
+
+  // Rest (world_sleep.cpp)
+  void wake(Body& body);
+  void wake_all();
+  void watch_springs(std::span<Body* const> group);
+  Wrench spring_push(const Spring& spring, const Body& body, Real time) const;
+  Wrench changing_push(const Body& body, Real time) const;
+  bool is_pushed(const Body& body, const Wrench& now, const Wrench& at_rest) const;
+  void wake_pushed(Real time);
+  void put_to_sleep(Real start, Real h);
+  void rank_bodies();
+  void update_lists();
+
+  // Joints (world_joints.cpp)
+  void update_articulations();
+  void break_joints(Real h, StepReport& report);
+  void detach_joints(const Body& body);
+  bool is_driven(const Island& island, Real time) const;
+  bool are_jointed(const Body& a, const Body& b) const;
+
+  // Particles
+  StepReport prewarm(Real from, Real to, const BeforeSubStep& before);
+  bool waits(ParticleSystemHandle system) const;
+  void step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report);
+  Obstacle swept_obstacle(const Body& body, Real h) const;
+  void update_obstacles(Real h);
+  void collide_particles(const ParticleStage& stage, const CoupledSystem& coupled);
+  void add_events(std::vector<ParticleEvent>& events);
+  void push_bodies(std::span<const Reaction> reactions, Real time);
+
+  // Cloths (world_cloth.cpp)
+  void arrange_cloths();
+  void begin_cloths();
+  std::vector<ClothBody> bodies_near_cloths(Real h) const;
+  void step_cloths(Real start, Real h);
+  void wake_unpinned(std::span<const ClothBody> near);
+  void answer_cloths(std::span<const ClothBody> near, Real start, Real h);
+  void hit_cloths(Real h);
+  void report_cloths(StepReport& report);
+  void detach_cloths(BodyHandle body);
+
+  // Time is a base plus a whole number of equal samplings: no sum of rounded steps.
+  Real base_time = 0, sampling_time = 0;
+  uint64_t samplings = 0, substeps = 0;
+  Real now = 0;
+
+  std::vector<MovedBody> moved;
+  uint64_t born = 0, bodies_woken = 0, bodies_put_to_sleep = 0;  // since the last report
+
+  // Lists of bodies by rank, made anew when one was added, removed, fell asleep or woke.
+  bool ranks_changed = false, lists_changed = true, pairs_changed = true, joints_changed = false;
+  JointTally joint_tally;  // of the sub-step, beside that of the motions
+  std::vector<std::pair<uint32_t, uint32_t>>
+      apart;                            // slots of bodies that do not collide, because of a joint
+  std::vector<Body*> awake, kinematic;  // dynamic ones; kinematic ones that move
+  std::vector<Body*> stepped;           // all that may have moved in this step
+  std::map<uint32_t, std::vector<Body*>> sleeping;
+  uint32_t sleeping_groups = 0;  // so far
+  std::size_t asleep = 0;        // bodies
+  std::size_t watched = 0;       // springs of sleeping bodies whose other ends can move
+
+  GroupedBroadPhase broad_phase;  // of the bodies that collide, by slot; articulations are groups
+  ContactGraph graph;
+  tbb::task_arena serial{1};
+  std::vector<ContactPair*> active_pairs;  // those of which a body can move
+  std::vector<Island> islands;
+  std::map<uint32_t, SolverChoice> choices;  // by the slot of an island's first body
+  ExactSolverBudget patience;
+  FastContacts fast_contacts;
+  std::vector<std::unique_ptr<CoupledSystem>> motions;  // of the sub-step
+
+  std::vector<std::string> materials;  // names; bodies have their numbers
+  std::map<std::pair<uint32_t, uint32_t>, ContactRule> rules;
+
+  // What particles can hit in the current sub-step. What cannot move is arranged anew only when it changed
+  // (E9).
+  Obstacles fixed_obstacles, moving_obstacles;
+  bool fixed_changed = true;
+  bool prewarming = false;
+  std::vector<ParticleSystemHandle> waiting;  // systems that stand still while others are prewarmed
+  ParticleCollisions particle_collisions;
+  BodyImpulses body_impulses;
+  std::vector<BodyImpulses::Link> links;       // by slot, of bodies that joints hold
+  std::vector<Articulation*> articulation_of;  // likewise
+  std::vector<ParticleEvent> particle_events;  // of the last sub-step
+  ClothSystem cloth_system;
+  std::map<uint32_t, Reaction> pending_impulses;  // too weak to wake the body, by its slot; they add up
+};
+
+}  // namespace offstage::sim
