@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "producer/base/time_code.h"
 #include "producer/run/contact_sheet.h"
 #include "producer/run/production.h"
 

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "producer/base/time_code.h"
 #include "producer/run/contact_sheet.h"
 #include "render/text.h"
 

@@ -183,7 +183,7 @@ struct Table<MeshFile> {
              "model file relative to the scene, or the name of one that comes with offstage; FILE#NODE is "
              "one of its nodes",
              kRequired},
-            {"scale", &MeshFile::scale, "factor of its size", "", kPositive}};
+            {"scale", &MeshFile::scale, "factor of its size", "", kScale}};
   }
 };
 template <>
@@ -232,7 +232,7 @@ struct Table<Scatter> {
             {"min_distance", &Scatter::min_distance, "between copies; those that find no place are left out",
              "m", kNotNegative},
             {"turn", &Scatter::turn, "turn each copy about its vertical at random"},
-            {"scale", &Scatter::scale, "factor of the size of a body's shape and model", "", kPositive},
+            {"scale", &Scatter::scale, "factor of the size of a body's shape and model", "", kScale},
             {"seed", &Scatter::seed, "another seed, another arrangement", "", kNotNegative}};
   }
 };
@@ -257,7 +257,7 @@ struct Table<ModelLook> {
   static constexpr const char* kHelp = "A model file drawn instead of the body's shape.";
   static Fields<ModelLook> fields() {
     return {{"file", &ModelLook::file, "model file", kRequired},
-            {"scale", &ModelLook::scale, "factor of its size", "", kPositive},
+            {"scale", &ModelLook::scale, "factor of its size", "", kScale},
             {"position", &ModelLook::position, "of the model's origin in the body's frame", "m"},
             {"orientation", &ModelLook::orientation, "of the model in the body's frame"}};
   }

@@ -11,7 +11,7 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kFrame = 1.0 / 60;
+constexpr Real kFilmFrame = 1.0 / 60;
 
 Vec3 momentum(const World& world) {
   Vec3 sum = Vec3::Zero();
@@ -59,7 +59,7 @@ TEST(ParticlePairs, HeadOnAndObliqueCollisionsHaveTheClosedForm) {
       world.add_particle(
           system,
           {.position = {0.1, 0, 0}, .velocity = {-1, 0, 0}, .mass = m2, .restitution = e, .friction = 0});
-      for (int i = 0; i < 12; ++i) world.step(kFrame);
+      for (int i = 0; i < 12; ++i) world.step(kFilmFrame);
       const Vec3 n = Vec3(-std::sqrt(R * R - offset * offset), offset, 0) / R;
       const Real P = (1 + e) * m1 * m2 / (m1 + m2) * -Vec3(3, 0, 0).dot(n);
       const auto& p = world.particles(system);
@@ -82,7 +82,7 @@ std::vector<Real> cradle(ImpactLaw law, int hitting) {
                                 .restitution = 1,
                                 .friction = 0});
   }
-  for (int i = 0; i < 3; ++i) world.step(kFrame);
+  for (int i = 0; i < 3; ++i) world.step(kFilmFrame);
   std::vector<Real> v;
   for (const Vec3& velocity : world.particles(system).velocity) v.push_back(velocity.x());
   return v;
@@ -118,11 +118,11 @@ World gas(ParticleSystemHandle& system, std::size_t count, Real e, Real friction
 TEST(ParticlePairs, AGasKeepsMomentumAndWithElasticCollisionsEnergy) {
   ParticleSystemHandle system;
   World elastic = gas(system, 300, 1, 0);
-  elastic.step(kFrame);  // those that overlapped come apart
+  elastic.step(kFilmFrame);  // those that overlapped come apart
   const Real energy = elastic.energy().kinetic;
   const Vec3 before = momentum(elastic);
   uint64_t collisions = 0;
-  for (int i = 0; i < 12; ++i) collisions += elastic.step(kFrame).particle_collisions;
+  for (int i = 0; i < 12; ++i) collisions += elastic.step(kFilmFrame).particle_collisions;
   EXPECT_GT(collisions, 100u);
   EXPECT_NEAR(elastic.energy().kinetic, energy, 1e-9 * energy);
   EXPECT_NEAR((momentum(elastic) - before).norm(), 0, 1e-10);
@@ -131,7 +131,7 @@ TEST(ParticlePairs, AGasKeepsMomentumAndWithElasticCollisionsEnergy) {
   const Vec3 first = momentum(rough);
   Real last = rough.energy().kinetic;
   for (int i = 0; i < 12; ++i) {
-    rough.step(kFrame);
+    rough.step(kFilmFrame);
     ASSERT_LE(rough.energy().kinetic, last * (1 + 1e-12));
     last = rough.energy().kinetic;
   }
@@ -153,7 +153,7 @@ TEST(ParticlePairs, FastOnesInALineNeverPassEachOther) {
                                 .restitution = random.uniform(i, 2)});
   uint64_t collisions = 0;
   for (int i = 0; i < 20; ++i) {
-    collisions += world.step(kFrame).particle_collisions;
+    collisions += world.step(kFilmFrame).particle_collisions;
     const auto& x = world.particles(system).position;
     for (std::size_t k = 1; k < x.size(); ++k)
       ASSERT_GT(x[k].x() - x[k - 1].x(), 0.99 * 2 * kRadius) << "step " << i;
@@ -179,7 +179,7 @@ TEST(ParticlePairs, FastSmallOnesInACloudNeverOverlap) {
                         .restitution = 0.3});
   }
   for (int i = 0; i < 4; ++i) {
-    world.step(kFrame);
+    world.step(kFilmFrame);
     const auto& x = world.particles(system).position;
     for (std::size_t k = 0; k < x.size(); ++k)
       for (std::size_t j = 0; j < k; ++j) ASSERT_GT((x[k] - x[j]).norm(), 0.98 * 2 * kRadius) << "step " << i;
@@ -196,7 +196,7 @@ TEST(ParticlePairs, FlagsSayWhichSystemsCollide) {
       world.add_particle(a, {.position = {0.05, 0, 0}, .velocity = {-1, 0, 0}});
       world.add_particle(a, {.position = {-0.05, 1, 0}, .velocity = {1, 0, 0}});
       world.add_particle(b, {.position = {0.05, 1, 0}, .velocity = {-1, 0, 0}});
-      for (int i = 0; i < 10; ++i) world.step(kFrame);
+      for (int i = 0; i < 10; ++i) world.step(kFilmFrame);
       EXPECT_EQ(world.particles(a).velocity[0].x() < 0, internal);
       EXPECT_EQ(world.particles(a).velocity[2].x() < 0, external);
     }
@@ -204,23 +204,23 @@ TEST(ParticlePairs, FlagsSayWhichSystemsCollide) {
 
 // At first, in between, and after all have died; the grid must not remember the places of before.
 TEST(ParticlePairs, SystemsMayBeEmptyAtAnyTime) {
-  World world({.gravity = Vec3::Zero(), .max_step = kFrame});
+  World world({.gravity = Vec3::Zero(), .max_step = kFilmFrame});
   world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
   const auto a = world.add_particle_system({.internal = true});
   world.add_particle_system({.external = true});
-  EXPECT_EQ(world.step(kFrame).particle_collisions, 0u);
+  EXPECT_EQ(world.step(kFilmFrame).particle_collisions, 0u);
   for (const std::size_t count : {300u, 0u, 2u, 0u, 5000u, 0u}) {
     for (std::size_t i = 0; i < count; ++i)
-      world.add_particle(a, {.position = {0.1 * static_cast<Real>(i), 1, 0}, .lifespan = 1.5 * kFrame});
-    world.step(kFrame);
+      world.add_particle(a, {.position = {0.1 * static_cast<Real>(i), 1, 0}, .lifespan = 1.5 * kFilmFrame});
+    world.step(kFilmFrame);
     EXPECT_EQ(world.particles(a).size(), count);
-    world.step(kFrame);
+    world.step(kFilmFrame);
     EXPECT_EQ(world.particles(a).size(), 0u);
   }
 }
 
 TEST(ParticlePairs, EventsTellOfCollisionsAndDeathsInOrder) {
-  World world({.gravity = Vec3::Zero(), .max_step = kFrame});
+  World world({.gravity = Vec3::Zero(), .max_step = kFilmFrame});
   world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 1, .friction = 0});
   const auto pairs = world.add_particle_system({.internal = true, .report_collisions = true});
   const auto rain = world.add_particle_system({.report_collisions = true, .report_deaths = true});
@@ -228,7 +228,7 @@ TEST(ParticlePairs, EventsTellOfCollisionsAndDeathsInOrder) {
   world.add_particle(pairs, {.position = {0.015, 1, 0}, .velocity = {-1, 0, 0}, .restitution = 1});
   world.add_particle(rain,
                      {.position = {0, 0.02, 0}, .velocity = {0, -1, 0}, .lifespan = 0.015, .friction = 0});
-  world.step(kFrame);
+  world.step(kFilmFrame);
   const auto events = world.particle_events();
   ASSERT_EQ(events.size(), 4u);
   EXPECT_EQ(events[0].id, 0u);
@@ -247,7 +247,7 @@ TEST(ParticlePairs, EventsTellOfCollisionsAndDeathsInOrder) {
   EXPECT_NEAR((events[2].velocity - Vec3(0, 1, 0)).norm(), 0, 1e-12);
   EXPECT_EQ(events[3].kind, ParticleEvent::Kind::death);
   EXPECT_NEAR(events[3].time, 0.015, 1e-12);
-  world.step(kFrame);
+  world.step(kFilmFrame);
   EXPECT_TRUE(world.particle_events().empty());
 }
 
@@ -267,7 +267,7 @@ TEST(ParticlePairs, StateIsTheSameForAnyNumberOfThreads) {
                                        0.6 * random.uniform(i, 2) - 0.3},
                           .mass = 0.001,
                           .radius = 0.01});
-    for (int i = 0; i < 20; ++i) world.step(kFrame);
+    for (int i = 0; i < 20; ++i) world.step(kFilmFrame);
     hashes.push_back(world.state_hash());
   }
   EXPECT_EQ(hashes[0].hex(), hashes[1].hex());
