@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds offstage and runs its tests:  tests/run.sh [--long] [--tsan] [CTEST OPTIONS...]
-#   --long  also the long cases (label "long"), for which scanned models are fetched, and the benchmarks are built
+#   --long  also the long cases (label "long"), for which scanned models are fetched, the benchmarks, and the fuzz targets
 #   --tsan  also the threaded tests under ThreadSanitizer
 # The unit tests and the model importer run a second time with libraries under AddressSanitizer and UndefinedBehaviorSanitizer
 # (label "sanitized").
@@ -21,7 +21,7 @@ while [ $# -gt 0 ]; do
 done
 
 install_packages $build_packages $test_packages
-[ $bench = OFF ] || install_packages $bench_packages debootstrap
+[ $bench = OFF ] || install_packages $bench_packages $fuzz_packages debootstrap
 cores=$(nproc)
 failed=0
 
@@ -36,6 +36,9 @@ cmake --build build
 if [ ${#long[@]} = 0 ]; then
   tests/meshes.sh build/meshes
   export OFFSTAGE_MESHES=$PWD/build/meshes
+  cmake --preset fuzz
+  cmake --build build-fuzz
+  ctest --test-dir build-fuzz -L fuzz -LE long -j "$cores" --output-on-failure || failed=1
 fi
 
 if [ "$tsan" = yes ]; then
