@@ -16,6 +16,7 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kQuiet{500};       // before a frame is refined
 constexpr milliseconds kVeryQuiet{2500};  // before it is drawn as well as possible
+constexpr int kBusy = 4;                  // times as long while the film is not complete: it comes first
 constexpr milliseconds kGlimpse{60};      // between two pictures of the lead-in
 
 /// What decides which model files a scene reads and what is made of them: everything but its numbers.
@@ -47,6 +48,12 @@ Engine::~Engine() {
     woken_.notify_all();
   }
   thread_.join();
+}
+
+Engine::Hold::~Hold() {
+  const std::lock_guard lock(engine_.mutex_);
+  --engine_.holds_;
+  engine_.woken_.notify_all();
 }
 
 // --- Orders ---
@@ -150,7 +157,7 @@ void Engine::work_with(const Workshop& workshop) {
   while (!ending_) {
     bool busy = false;
     try {
-      busy = step(workshop);
+      busy = holds_ == 0 && step(workshop);
     } catch (const std::exception& error) {  // of the scene, the models, the physics, GL
       fail(error.what());
       busy = true;
@@ -158,7 +165,7 @@ void Engine::work_with(const Workshop& workshop) {
     if (busy) continue;
     std::unique_lock lock(mutex_);
     // Refining begins after a while without orders, hence the limit.
-    woken_.wait_for(lock, milliseconds(100), [&] { return ending_ || ordered_ != taken_; });
+    woken_.wait_for(lock, milliseconds(100), [&] { return ending_ || (holds_ == 0 && ordered_ != taken_); });
   }
 }
 
@@ -275,6 +282,10 @@ bool Engine::advance_film() {
   return true;
 }
 
+bool Engine::is_film_drawn() {
+  return film_->is_simulated() && film_->first_missing() > film_->frames();
+}
+
 bool Engine::refine_frame() {
   if (!film_ || failed_) return false;
   int frame = 0;
@@ -287,10 +298,11 @@ bool Engine::refine_frame() {
     changed = changed_;
   }
   if (playing || !film_->has_state(frame) || !film_->has_draft(frame)) return false;
+  const int factor = is_film_drawn() ? 1 : kBusy;
   for (const auto& [detail, quiet] :
        {std::pair(Detail::preview, kQuiet), std::pair(Detail::final, kVeryQuiet)}) {
     if (frames_.has(film_->def().film, frame, detail)) continue;
-    if (Clock::now() - changed < quiet) return false;
+    if (Clock::now() - changed < quiet * factor) return false;
     if (film_->refine(frame, detail, [this] { return is_stale(); })) report_frame(frame, detail);
     return true;
   }

@@ -64,7 +64,7 @@ class Engine {
   using OnEvent = std::function<void(const EngineEvent&)>;
   using Loaded = std::shared_ptr<const producer::LoadedScene>;
 
-  /// `on_event` is called on the engine's thread and must not call the engine.
+  /// `on_event` is called on the engine's thread; of the engine it may call `frame` and `ranges` alone.
   Engine(EngineSettings settings, OnEvent on_event);
   /// Ends the run within one frame.
   ~Engine();
@@ -75,6 +75,19 @@ class Engine {
     uint64_t number = 0;
     std::string film;
   };
+  /// While one of these lives, the engine begins nothing new and leaves the processors to what is about to
+  /// give it an order: between the arrival of a change and show() every piece of work would be for nothing.
+  class Hold {
+   public:
+    explicit Hold(Engine& engine) : engine_(engine) { ++engine_.holds_; }
+    ~Hold();
+    Hold(const Hold&) = delete;
+    Hold& operator=(const Hold&) = delete;
+
+   private:
+    Engine& engine_;
+  };
+
   /// Shows this version from now on. The number rises with every call.
   Run show(Loaded scene, const std::optional<ViewCamera>& camera);
   /// The key of a version's pictures by the scene's own camera.
@@ -125,13 +138,14 @@ class Engine {
   bool answer_picks();
   bool advance_film();
   bool refine_frame();
+  bool is_film_drawn();
   bool advance_pinned(const Workshop& workshop);
   bool advance_sweep(const Workshop& workshop);
   std::shared_ptr<const producer::ModelLibrary> models_for(const FilmDef& def);
   void report_frame(int frame, Detail detail);
   void report_film(FilmEvent::Phase phase, const std::string& message = "");
   void fail(const std::string& what);
-  bool is_stale() const { return ending_ || ordered_ != taken_; }
+  bool is_stale() const { return ending_ || holds_ > 0 || ordered_ != taken_; }
 
   const EngineSettings settings_;
   const OnEvent on_event_;
@@ -142,6 +156,7 @@ class Engine {
   std::condition_variable woken_;
   std::atomic<uint64_t> ordered_ = 0;  // rises with every order that the thread has to look at
   std::atomic<bool> ending_ = false;
+  std::atomic<int> holds_ = 0;
   uint64_t runs_ = 0, sweeps_ = 0, models_generation_ = 0;
   std::optional<FilmDef> wanted_, wanted_pinned_;
   bool pinned_changed_ = false;

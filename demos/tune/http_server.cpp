@@ -101,7 +101,7 @@ struct HttpServer::Impl {
                  !request.get_header_value("Content-Type").starts_with("application/json")) {
         refuse(response, 415, "Changes are sent as application/json.");
       } else if (request.method != "GET" && request.method != "POST") {
-        refuse(response, 405, "GET and POST are what there is.");
+        refuse(response, 405, "Only GET and POST are allowed.");
       } else {
         return Handled::Unhandled;
       }

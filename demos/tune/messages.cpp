@@ -67,6 +67,12 @@ Json problems_json(const std::vector<Problem>& problems, const std::string& file
   return list;
 }
 
+Json ranges_json(const std::vector<std::pair<int, int>>& ranges) {
+  Json json = Json::array();
+  for (const auto& [first, last] : ranges) json.push_back({first, last});
+  return json;
+}
+
 Json figures_json(const producer::FrameFigures& figures) {
   Json json = {{"frame", figures.frame},       {"time", figures.time},
                {"sim_ms", figures.sim_ms},     {"particles", figures.particles},

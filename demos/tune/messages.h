@@ -26,6 +26,8 @@ Eigen::Vector3d vector_of(const nlohmann::json& json);
 Json version_json(const Version& version, const std::map<uint64_t, std::string>& films);
 /// `file` is the scene's own: problems elsewhere name theirs.
 Json problems_json(const std::vector<Problem>& problems, const std::string& file);
+/// Runs of neighbours as pairs of the first and the last.
+Json ranges_json(const std::vector<std::pair<int, int>>& ranges);
 Json figures_json(const producer::FrameFigures& figures);
 Json event_json(const FrameEvent& event);
 Json event_json(const FilmEvent& event);

@@ -115,7 +115,7 @@ Session::Parsed Session::parse(const std::string& text, bool with_view) const {
   return parsed;
 }
 
-/// Shows the text as it is now; if it is no valid scene, the latest valid version stays.
+/// Shows the text as it is now; if it is not a valid scene, the latest valid version stays.
 void Session::show() {
   Parsed parsed = parse(document_.text(), true);
   errors_ = std::move(parsed.errors);
@@ -130,6 +130,7 @@ void Session::show() {
 
 Session::Json Session::document() const {
   Json json;
+  json["revision"] = revision_;
   json["version"] = version_json(document_.version(), films_);
   json["text"] = document_.text();
   json["saved"] = document_.is_saved();
@@ -144,6 +145,8 @@ Session::Json Session::document() const {
   json["overlays"] = overlays_;
   json["muted"] = muted_;
   json["pinned"] = pinned_;
+  if (pinned_.is_object())
+    json["pinned"]["ranges"] = ranges_json(engine_->ranges(pinned_["film"].get<std::string>()));
   json["theirs"] = theirs_ ? Json(*theirs_) : Json();
   if (shown_) {
     const producer::Scene& scene = shown_->scene;
@@ -153,14 +156,13 @@ Session::Json Session::document() const {
                      {"start", scene.output.start},
                      {"seed", scene.world.seed},
                      {"size", {scene.render.size.x(), scene.render.size.y()}}};
-    Json ranges = Json::array();
-    for (const auto& [first, last] : engine_->ranges(run_.film)) ranges.push_back({first, last});
-    json["ranges"] = std::move(ranges);
+    json["ranges"] = ranges_json(engine_->ranges(run_.film));
   }
   return json;
 }
 
 void Session::post_document() {
+  ++revision_;
   tabs_.post("document", dump(document()));
 }
 
@@ -210,11 +212,13 @@ Reply Session::post(const std::string& what, const nlohmann::json& request, cons
       {"redo", &Session::redo},     {"view", &Session::view}, {"restore", &Session::restore},
       {"pin", &Session::pin},       {"pick", &Session::pick}, {"save", &Session::save},
       {"reload", &Session::reload}, {"keep", &Session::keep}, {"sweep", &Session::sweep}};
-  if (what == "write") return tabs_.take_over(tab) ? Reply{} : refused(409, "this tab has no stream");
+  if (what == "write") return tabs_.take_over(tab) ? Reply{} : refused(409, "this tab is not connected");
   const auto handler = handlers.find(what);
   if (handler == handlers.end()) return refused(404, "there is no " + what);
   if (what != "pick" && tabs_.writer() != tab)
     return refused(423, "another tab is editing this scene; take over to edit it here");
+  std::optional<Engine::Hold> hold;
+  if (what != "pick" && what != "save") hold.emplace(*engine_);
   try {
     return (this->*handler->second)(request);
   } catch (const nlohmann::json::exception& error) {
@@ -260,7 +264,7 @@ Reply Session::restore(const nlohmann::json& request) {
   const std::lock_guard lock(mutex_);
   const Version* version = document_.find(request.at("id").get<uint64_t>());
   if (!version) return refused(404, "this version is no longer kept");
-  document_.change(version->text, fmt::format("back to version {}", version->id), {}, "");
+  document_.change(version->text, fmt::format("go back to version {}", version->id), {}, "");
   return shown();
 }
 
@@ -275,7 +279,7 @@ Reply Session::view(const nlohmann::json& request) {
     if (!request["camera"].is_null())
       camera = ViewCamera{vector_of(request["camera"].at("eye")), vector_of(request["camera"].at("target"))};
     if (camera && !((camera->eye - camera->target).norm() > 1e-6))
-      return refused(422, "a camera cannot be where it looks to");
+      return refused(422, "the camera's eye and target must differ");
     changed |= camera != camera_;
     camera_ = camera;
   }
@@ -301,7 +305,7 @@ Reply Session::pin(const nlohmann::json& request) {
     const Version* version = document_.find(request["id"].get<uint64_t>());
     if (!version) return refused(404, "this version is no longer kept");
     loaded = parse(version->text, true).loaded;
-    if (!loaded) return refused(422, "this version is no valid scene");
+    if (!loaded) return refused(422, "this version is not a valid scene");
     pinned_ = version_json(*version, films_);
     pinned_["film"] = engine_->film_of(*loaded);
     pinned_["frames"] = loaded->scene.frame_count();
@@ -369,7 +373,15 @@ void Session::on_event(const EngineEvent& event) {
     const std::lock_guard lock(events_mutex_);
     latest_film_ = event_json(*film);
   }
-  std::visit([this](const auto& e) { tabs_.post(kind_of(e), dump(event_json(e))); }, event);
+  std::visit(
+      [this](const auto& e) {
+        Json json = event_json(e);
+        // A tab that was too slow for the message of a frame learns of the frame by the next one.
+        if constexpr (std::is_same_v<std::decay_t<decltype(e)>, FrameEvent>)
+          json["ranges"] = ranges_json(engine_->ranges(e.film));
+        tabs_.post(kind_of(e), dump(json));
+      },
+      event);
 }
 
 void Session::watch_files() {
@@ -404,7 +416,7 @@ void Session::files_changed(const std::string& hash_before, const std::string& h
     document_.reload(*theirs);
     show();
     post_document();
-    tabs_.post("note", dump({{"text", "The file was changed by another program, and was read again."}}));
+    tabs_.post("note", dump({{"text", "Another program changed the file. The page has loaded it."}}));
     return;
   }
   if (!theirs && !theirs_ && !models) return;

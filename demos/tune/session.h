@@ -86,6 +86,7 @@ class Session {
   Tabs tabs_;
   Engine::Loaded shown_;  // the latest valid version
   std::vector<Problem> errors_, warnings_;
+  uint64_t revision_ = 0;  // rises when the document that the tabs know is no longer the latest
   Engine::Run run_;
   std::map<uint64_t, std::string> films_;  // of versions
   std::optional<ViewCamera> camera_;

@@ -6,6 +6,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "sim/articulation/joint_energy.h"
 #include "sim/articulation/joint_limits.h"
 #include "sim/dynamics/free_body.h"
 #include "sim/linear/lcp.h"
@@ -388,6 +389,8 @@ void Articulation::transmit_impulses(Real time, JointTally& tally) {
 }
 
 void Articulation::settle(Real time, JointTally& tally) {
+  const std::optional<CommonMotion> common =
+      is_held(*this) ? std::nullopt : std::optional(common_motion(bodies_));
   Real apart = 0;
   std::vector<Pose> before(bodies_.size());  // of the centres
   for (int step = 0; step < kMostSteps; ++step) {
@@ -444,6 +447,7 @@ void Articulation::settle(Real time, JointTally& tally) {
   }
   for (std::size_t i = 0; i < bodies_.size(); ++i)
     bodies_[i]->rigid.set_velocity(velocities_[i].head<3>(), velocities_[i].tail<3>());
+  if (common) keep_angular_momentum(bodies_, *common);
   settled_.clear();
   for (const Body* body : bodies_) settled_.push_back({body->rigid.momentum, body->rigid.angular_momentum});
 }

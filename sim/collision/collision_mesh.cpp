@@ -1,11 +1,56 @@
 #include "sim/collision/collision_mesh.h"
 
+#include <algorithm>
+#include <list>
 #include <utility>
 #include <vector>
 
 #include "sim/geometry/convex_hull.h"
 
 namespace offstage::sim {
+namespace {
+
+/// Keeps the clearance grids of the latest meshes for all worlds of the process. The tuning page builds a
+/// world for every change of a number, and most of that time would go into the same grids again. A grid is a
+/// function of its mesh alone, so keeping it changes no result. Holds at most 26 MB.
+class RecentGrids {
+ public:
+  ClearanceGrid of(const TriangleMesh& mesh, bool solid) {
+    {
+      const std::lock_guard lock(mutex_);
+      const auto known = std::ranges::find_if(entries_, [&](const Entry& e) {
+        return e.solid == solid && e.mesh.vertices == mesh.vertices && e.mesh.triangles == mesh.triangles;
+      });
+      if (known != entries_.end()) {
+        entries_.splice(entries_.begin(), entries_, known);
+        return known->grid;
+      }
+    }
+    ClearanceGrid grid(mesh, solid);
+    if (mesh.triangles.size() > kMostTriangles) return grid;
+    const std::lock_guard lock(mutex_);
+    entries_.push_front({mesh, solid, grid});
+    if (entries_.size() > kMostEntries) entries_.pop_back();
+    return grid;
+  }
+
+ private:
+  static constexpr std::size_t kMostEntries = 16, kMostTriangles = 20'000;
+  struct Entry {
+    TriangleMesh mesh;
+    bool solid;
+    ClearanceGrid grid;
+  };
+  std::mutex mutex_;
+  std::list<Entry> entries_;  // latest first
+};
+
+ClearanceGrid recent_grid(const TriangleMesh& mesh, bool solid) {
+  static RecentGrids grids;
+  return grids.of(mesh, solid);
+}
+
+}  // namespace
 
 CollisionMesh::CollisionMesh(TriangleMesh welded, std::optional<ConvexDecomposition> known)
     : mesh(std::move(welded)),
@@ -37,7 +82,7 @@ const AabbTree& CollisionMesh::part_tree() const {
 }
 
 const ClearanceGrid& CollisionMesh::clearance_grid() const {
-  std::call_once(clear_once_, [this] { clear_cells_.emplace(mesh, solid); });
+  std::call_once(clear_once_, [this] { clear_cells_ = recent_grid(mesh, solid); });
   return *clear_cells_;
 }
 

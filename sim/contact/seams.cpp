@@ -24,6 +24,9 @@ constexpr Real kGoesOn = 0.999, kOwnNormal = 0.9;
 constexpr Real kLookOver = 3;
 /// More contacts of a body are not compared with each other.
 constexpr std::size_t kMostContacts = 512;
+/// How far beside a place the surface is looked at, of the height of steps that count: with kLookOver the
+/// direction from an edge to there is 18 degrees from upright.
+constexpr Real kLookBeside = 1;
 /// Contacts of a slope are looked for this far beyond the contact that they replace [m].
 constexpr Real kSlopeMargin = 2e-3;
 
@@ -174,12 +177,25 @@ class BodyContacts {
       if (up.dot(place - top) > 0) top = place;
     }
     const Vec3 over = kLookOver * flush_ * up;
-    if (distance(face, middle(face) + over).normal.dot(up) < kGoesOn) return std::nullopt;
-    const Vec3 own = distance(v, top + std::max(0.0, up.dot(on_face - top)) * up + over).normal;
+    const Vec3 across = (n - n.dot(up) * up).normalized(), over_face = middle(face) + over;
+    if (distance(face, over_face).normal.dot(up) < kGoesOn) return std::nullopt;
+    if (!face.is_face() &&
+        !(is_flat(face, over_face, up, across) && is_flat(face, over_face, up, up.cross(across))))
+      return std::nullopt;
+    const Vec3 over_top = top + std::max(0.0, up.dot(on_face - top)) * up + over;
+    const Vec3 own = distance(v, over_top).normal;
     if (own.dot(n) > kSameWay) return std::nullopt;
-    if (own.dot(up) > kGoesOn) return up;
+    if (own.dot(up) > kGoesOn) return is_flat(v, over_top, up, across) ? std::optional(up) : std::nullopt;
     const bool is_slope = own.dot(up) > 0 && own.dot(n) > 0 && own.dot(n) < kOwnNormal;
-    return is_slope ? std::optional(own) : std::nullopt;
+    return is_slope && is_ramp(v, top, up, across) ? std::optional(own) : std::nullopt;
+  }
+
+  /// Whether Y is part of the ground, or lies on a face of its own as a wedge does. In a heap a box may stand
+  /// on another one with an edge: that is no foot of a slope, and it would change from step to step.
+  bool is_ramp(const View& v, const Vec3& foot, const Vec3& up, const Vec3& across) const {
+    if (!v.y().is_dynamic()) return true;
+    const Real look = kLookOver * flush_;
+    return distance(v, foot - look * up - 2 * look * across).normal.dot(up) < -kGoesOn;
   }
 
   /// A point of a contact on Y's piece. Clipping lets it be a little outside.
@@ -195,6 +211,19 @@ class BodyContacts {
     d.normal = y.vector_to_world(d.normal);
     return d;
   }
+  /// Whether Y's surface below a place is a face towards `up`, at least on one side along a direction. Over a
+  /// convex edge or a corner the nearest point of Y is the edge itself, straight below, whichever way `up`
+  /// is: that alone does not make a face.
+  bool is_flat(const View& v, const Vec3& over, const Vec3& up, const Vec3& along) const {
+    const CollisionShape& shape = v.y().collision_shape();
+    const bool is_triangle =
+        !shape.is_plane() && shape.solid().mesh && shape.piece(v.y_piece()).core == Convex::Core::triangle;
+    if (is_triangle) return true;  // its neighbours go on from it
+    const Vec3 aside = kLookBeside * flush_ * along;
+    return distance(v, over - aside).normal.dot(up) > kGoesOn ||
+           distance(v, over + aside).normal.dot(up) > kGoesOn;
+  }
+
   /// The contact of X's piece with the slope that begins where a contact is.
   Manifold on_slope(const View& v, const View& face, const Vec3& normal) const {
     const Pose plane{highest(v, face.normal()), rotation_between(Vec3::UnitY(), normal)};

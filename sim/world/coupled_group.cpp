@@ -3,12 +3,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/articulation/joint_energy.h"
+
 namespace offstage::sim {
 namespace {
 
 /// Pieces in which the motion of what joints hold is integrated: of its turning, and of the phase of its
 /// fastest swinging [rad]; and the most of them.
 constexpr Real kTurn = 0.12, kSwing = 1, kFastSpin = 1, kMostPieces = 64;
+/// A piece is halved if it leaves joints farther apart [m], [rad], or if the energy differs from the work of
+/// the forces by more than these shares of the kinetic energy and of the work. At most so often in a
+/// sub-step.
+constexpr Real kGap = 1e-4, kEnergyShare = 1e-4, kWorkShare = 1e-2;
+constexpr int kMostHalvings = 128;
 
 }  // namespace
 
@@ -152,6 +159,13 @@ void CoupledGroup::velocity(Real, std::span<const Real> x, std::span<const Real>
 }
 
 void CoupledGroup::force(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const {
+  set_free_forces(t, x, p, dp);
+  for (const Jointed& j : articulations_) add_joint_forces(j, t, x, p, dp);
+}
+
+/// Sets `dp` to all forces but those of joints.
+void CoupledGroup::set_free_forces(Real t, std::span<const Real> x, std::span<const Real> p,
+                                   std::span<Real> dp) const {
   for (std::size_t i = 0; i < bodies_.size(); ++i)
     stage(i, x, p).force(forces_, t, dp.subspan(kBodyP * i, kBodyP));
   const auto particles_x = x.subspan(particle_x(0)), particles_v = p.subspan(particle_p(0));
@@ -164,7 +178,6 @@ void CoupledGroup::force(Real t, std::span<const Real> x, std::span<const Real> 
     apply(s.a, -f.size * f.along, x, dp);
     apply(s.b, f.size * f.along, x, dp);
   }
-  for (const Jointed& j : articulations_) add_joint_forces(j, t, x, p, dp);
 }
 
 /// Of particles that act on each other; springs and bodies depend on velocities in other ways.
@@ -244,18 +257,88 @@ void CoupledGroup::step(const Integrator& integrator, Real t, Real h, Integrator
   const bool particles_only = bodies_.empty() && springs_.empty();
   const Integrator& chosen =
       particles_only ? sim::integrator(groups_.front().system->def.integrator) : integrator;
-  const Real count = pieces(h);
+  const Real count = pieces(h), duration = h / count;
+  int halvings = kMostHalvings;
   for (Real i = 0; i < count; ++i) {
-    const Real duration = h / count, begin = t + i * duration;
-    for (const Jointed& j : articulations_) j.articulation->begin_motion(begin, duration);
-    chosen.step(*this, begin, duration, x_, p_, work);
-    if (articulations_.empty()) continue;
-    store(x_, p_);
-    for (const Jointed& j : articulations_) j.articulation->settle(begin + duration, joint_tally_);
-    load(x_, p_);
+    const Real begin = t + i * duration;
+    if (articulations_.empty())
+      chosen.step(*this, begin, duration, x_, p_, work);
+    else
+      advance(chosen, begin, duration, halvings, work);
   }
   for (Body* body : bodies_) body->rigid.next_step = work.next_step;
   store(x_, p_);
+}
+
+CoupledGroup::Balance CoupledGroup::balance(Real t, IntegratorWorkspace& work) const {
+  const std::span<const Real> x = x_, p = p_;
+  work.dp.resize(p.size());
+  set_free_forces(t, x, p, work.dp);
+  const std::span<const Real> dp = work.dp;
+  Balance sum;
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    const RigidMotion m = stage(i, x, p).motion;
+    const std::size_t at = kBodyP * i;
+    sum.kinetic += (m.velocity.dot(vec3(p, at)) + m.angular_velocity.dot(vec3(p, at + 3))) / 2;
+    sum.power += m.velocity.dot(vec3(dp, at)) + m.angular_velocity.dot(vec3(dp, at + 3));
+  }
+  for (const Group& g : groups_)
+    for (std::size_t k = 0; k < g.members.size(); ++k) {
+      const std::size_t at = particle_p(g.offset + k);
+      sum.kinetic += g.mass[k] * vec3(p, at).squaredNorm() / 2;
+      sum.power += g.mass[k] * vec3(p, at).dot(vec3(dp, at));
+    }
+  return sum;
+}
+
+/// Advances by a piece from t to t + h and puts the joints back together. Joints can make a link turn far
+/// faster than the speeds at the start show: a universal joint whose axes and arm come into one plane turns a
+/// light link over at once. Then the piece is divided. What no division follows must not gain energy.
+void CoupledGroup::advance(const Integrator& integrator, Real t, Real h, int& halvings,
+                           IntegratorWorkspace& work) {
+  const std::vector<Real> x = x_, p = p_;
+  for (const Jointed& j : articulations_) j.articulation->begin_motion(t, h);
+  const Balance before = balance(t, work);
+  integrator.step(*this, t, h, x_, p_, work);
+  const Balance after = balance(t + h, work);
+  store(x_, p_);
+  Real gap = 0;
+  bool is_driven = false;
+  for (const Jointed& j : articulations_) {
+    gap = std::max(gap, joint_gap(*j.articulation, t + h));
+    is_driven |= has_kinematic_end(*j.articulation);
+  }
+  const Real done = h / 2 * (before.power + after.power);
+  const Real allowed = kEnergyShare * before.kinetic +
+                       kWorkShare * h * std::max(std::abs(before.power), std::abs(after.power));
+  const bool keeps_energy = is_driven || std::abs(after.kinetic - before.kinetic - done) <= allowed;
+  const bool is_finite = after.kinetic <= kInfinity;
+  if (!is_finite || ((gap > kGap || !keeps_energy) && halvings > 0)) {
+    x_ = x;
+    p_ = p;
+    store(x_, p_);
+    if (halvings-- > 0) {
+      advance(integrator, t, h / 2, halvings, work);
+      return advance(integrator, t + h / 2, h / 2, halvings, work);
+    }
+    ++joint_tally_.unsolved;  // they stand still for this piece
+  }
+  for (const Jointed& j : articulations_) j.articulation->settle(t + h, joint_tally_);
+  load(x_, p_);
+  if (!is_driven) limit_energy(before.kinetic + std::max(done, 0.0) + allowed);
+}
+
+/// Slows the links of each articulation against each other until the kinetic energy is `most` at most.
+void CoupledGroup::limit_energy(Real most) {
+  IntegratorWorkspace unused;
+  const Real excess = balance(0, unused).kinetic - most;
+  if (!(excess > 0)) return;
+  Real internal = 0;
+  for (const Jointed& j : articulations_) internal += internal_energy(*j.articulation);
+  const Real share = std::sqrt(std::max(0.0, 1 - excess / internal));
+  for (const Jointed& j : articulations_) slow_down(*j.articulation, share);
+  load(x_, p_);
+  ++joint_tally_.unsolved;
 }
 
 void CoupledGroup::save() {

@@ -2,6 +2,7 @@
 
 #include <condition_variable>
 #include <mutex>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -90,6 +91,25 @@ TEST_F(Engines, EndAnOldRunWithinOneFrame) {
   for (std::size_t i = before; i < all.size(); ++i)
     if (const auto* frame = std::get_if<FrameEvent>(&all[i])) late += frame->run == slow.number;
   EXPECT_LE(late, 1u);
+}
+
+TEST_F(Engines, BeginNothingWhileAChangeIsOnItsWay) {
+  const Engine::Run run = engine_.show(fountain(100, 60), {});
+  ASSERT_TRUE(events_.wait_for<FrameEvent>([&](const FrameEvent& e) { return e.run == run.number; }));
+  std::size_t before = 0;
+  {
+    const Engine::Hold hold(engine_);
+    bool still = false;  // after the piece of work that was begun, of the film's 1200 frames
+    for (int i = 0; i < 10 && !still; ++i) {
+      before = events_.all().size();
+      std::this_thread::sleep_for(std::chrono::milliseconds(500));
+      still = events_.all().size() == before;
+    }
+    EXPECT_TRUE(still);
+  }
+  const auto frame_after = [&] { return events_.all().size() > before; };
+  for (int i = 0; i < 600 && !frame_after(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  EXPECT_TRUE(frame_after());
 }
 
 TEST_F(Engines, KeepTheFramesOfEarlierVersions) {

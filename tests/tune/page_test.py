@@ -3,12 +3,9 @@
 
 import json
 import os
-import pathlib
-import shutil
 import socket
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
 import urllib.error
@@ -17,27 +14,8 @@ import urllib.request
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
-from sitting import Page, Server, browser, set_size, wait
-
-PROGRAM, SOURCE = sys.argv[1], pathlib.Path(sys.argv[2])
-
-SCENE = '''// A small fountain, with comments that must stay.
-{
-  "version": 1,
-  "bodies": [
-    {"name": "ground", "motion": "static", "shape": {"type": "plane"}},   // the floor
-    {"name": "ball", "shape": {"type": "sphere", "radius": 0.4}, "position": [0.0, 0.40, 0]}
-  ],
-  "emitters": [
-    {"name": "jet", "rate": 4.0e2, "speed": {"mean": 4, "deviation": 0.5}, "radius": 0.03,
-     "overlap": true, "surface": {"type": "disc", "position": [0, 0.1, 1.2], "radius": 0.05},
-     "look": {"color": "#4080ff"}}
-  ],
-  "camera": {"type": "static", "eye": [0, 1.5, 5], "target": [0, 0.8, 0]},
-  "render": {"size": [640, 360]},
-  "output": {"fps": 20, "duration": 1}
-}
-'''
+from page_case import Case, PROGRAM, SCENE
+from sitting import Page, Server, set_size, wait
 
 
 def get(address, headers=None):
@@ -47,43 +25,6 @@ def get(address, headers=None):
             return answer.status, answer.read().decode('utf-8', 'replace')
     except urllib.error.HTTPError as error:
         return error.code, error.read().decode('utf-8', 'replace')
-
-
-class Case(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.driver = browser()
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.driver.quit()
-
-    def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix='offstage-tune-'))
-        self.scene = self.folder / 'fountain.json'
-        self.scene.write_bytes(SCENE.encode())
-        self.server = Server(PROGRAM, self.scene)
-        self.page = Page(self.driver, self.server.address)
-        wait(lambda: self.page.js('return tuneStore.writer === tuneStore.tab'), what='the right to write')
-
-    def tearDown(self):
-        self.driver.get('about:blank')
-        self.server.kill()
-        shutil.rmtree(self.folder)
-
-    def keys(self, *keys):
-        ActionChains(self.driver).send_keys(*keys).perform()
-
-    def command(self, *keys):
-        actions = ActionChains(self.driver).key_down(Keys.CONTROL)
-        for key in keys[:-1]:
-            actions.key_down(key)
-        actions.send_keys(keys[-1])
-        for key in keys[:-1]:
-            actions.key_up(key)
-        actions.key_up(Keys.CONTROL).perform()
-        time.sleep(0.1)
-        self.page.idle()
 
 
 class Editing(Case):
@@ -132,15 +73,6 @@ class Editing(Case):
         self.command(Keys.SHIFT, 'z')
         self.assertNotEqual(page.text(), SCENE)
 
-    def test_an_arrow_key_moves_a_slider_by_one_step(self):
-        self.page.select('/emitters/0')
-        track = self.page.find('#controls .row[data-key="rate"] .track')
-        self.page.js('arguments[0].focus()', track)
-        self.keys(Keys.ARROW_RIGHT)
-        time.sleep(0.1)
-        self.page.idle()
-        self.assertIn('"rate": 420,', self.page.text())
-
     def test_text_with_an_error_keeps_the_last_film_and_says_where(self):
         page = self.page
         page.wait_for_frame(1)
@@ -157,26 +89,6 @@ class Editing(Case):
         self.assertFalse(page.find('#problems').is_displayed())
         self.assertEqual(page.all('.gutter .bad'), [])
 
-    def test_objects_are_duplicated_renamed_muted_and_deleted(self):
-        page = self.page
-        page.select('/emitters/0')
-        page.js('document.querySelector("#tree .chosen").focus()')
-        self.command('d')
-        wait(lambda: page.js('return tuneStore.value.emitters.length') == 2)
-        self.assertEqual(page.js('return tuneStore.value.emitters[1].name'), 'jet_2')
-        wait(lambda: page.js('return tuneStore.selection[0]') == '/emitters/1')
-        page.js('document.querySelector("#tree .chosen").focus()')
-        self.keys(Keys.F2)
-        self.keys('second', Keys.ENTER)
-        wait(lambda: page.js('return tuneStore.value.emitters[1].name') == 'second')
-        film = page.film()
-        page.js('document.querySelector(`[data-path="/emitters/1"] button`).click()')
-        wait(lambda: page.film() != film, what='a film without the muted emitter')
-        self.assertEqual(page.js('return tuneStore.doc.muted'), ['emitters/second'])
-        page.js('document.querySelector("#tree .chosen").focus()')
-        self.keys(Keys.DELETE)
-        wait(lambda: page.text() == SCENE, what='the text as it was')
-
     def test_a_preset_is_added_and_its_parts_can_be_changed(self):
         page = self.page
         page.click('#add-button')
@@ -188,6 +100,24 @@ class Editing(Case):
         page.type_value('rate', 'rate', 500)
         self.assertIn('"overrides": {"jet": {"rate": 500}}', page.text())
         self.assertEqual(page.js('return tuneStore.doc.errors'), [])
+
+
+class EmptyStage(Case):
+    scene_text = '{\n  "version": 1\n}\n'
+
+    def test_a_fountain_is_built_from_a_preset_on_an_empty_stage(self):
+        page = self.page
+        self.assertIn('The stage is empty', page.find('#controls').text)
+        page.wait_for_frame(1)
+        page.js('document.querySelector("#controls .empty button").click()')
+        self.assertTrue(wait(lambda: page.js('return document.querySelector(`[data-preset="fountain"] img`)?.naturalWidth')), 'its picture')
+        page.click('[data-preset="fountain"]')
+        wait(lambda: page.value('/effects/0/preset') == 'fountain')
+        wait(lambda: page.js('return tuneStore.selection[0]') == '/effects/0')
+        page.wait_for_frame(1)
+        self.command('s')
+        self.assertEqual(json.loads(self.scene.read_text()), {'version': 1, 'effects': [{'preset': 'fountain', 'position': [0, 0, 0]}]})
+        self.assertEqual(page.errors(), [])
 
 
 class Looking(Case):
@@ -256,6 +186,69 @@ class Looking(Case):
         wait(lambda: seen.add(page.pixels()) or len(seen) > 1, 10, 'both in turns')
         page.click('#versions-button')
         wait(lambda: len(page.all('.version')) == 2)
+
+    def test_a_selected_object_is_dragged_in_its_plane(self):
+        page = self.page
+        page.wait_for_frame(1)
+        page.select('/bodies/1')
+        # The marks are made anew with each frame, hence the place alone.
+        at = wait(lambda: page.js('''const ring = document.querySelector("#marks .handle")?.getBoundingClientRect(), stage = document.getElementById("stage").getBoundingClientRect();
+            return ring && [ring, stage].map(r => [r.x + r.width / 2, r.y + r.height / 2]).reduce((a, b) => [Math.round(a[0] - b[0]), Math.round(a[1] - b[1])])'''))
+        ActionChains(self.driver).move_to_element_with_offset(page.find('#stage'), *at).click_and_hold() \
+            .move_by_offset(40, 0).move_by_offset(40, 0).release().perform()
+        self.settle()
+        x, y, z = page.value('/bodies/1/position')
+        self.assertGreater(x, 0.3)
+        self.assertAlmostEqual(y, 0.4, delta=1e-3)
+        self.command('z')
+        self.assertEqual(page.text(), SCENE, 'one drag is one undo step')
+
+    def test_a_newer_change_ends_the_older_run(self):
+        page = self.page
+        page.set_text(SCENE.replace('"duration": 1', '"duration": 60').replace('4.0e2', '9000'))
+        page.wait_for_frame(1)
+        page.set_text(SCENE.replace('4.0e2', '30'))
+        wait(lambda: page.js('return tuneStore.film.phase') == 'complete', 60)
+        told = subprocess.run([PROGRAM, 'simulate', '-', '-q'], input=page.text(), capture_output=True, check=True, text=True)
+        self.assertEqual(page.find('#final-state').get_attribute('data-hash'), json.loads(told.stdout)['state_hash'])
+
+    def test_figures_follow_the_playhead_and_a_click_on_a_plot_seeks(self):
+        page = self.page
+        wait(lambda: page.js('return tuneStore.film.phase') == 'complete', 60)
+        particles = page.find('#plots figure')
+        ActionChains(self.driver).move_to_element(particles.find_element('css selector', 'canvas')).click().perform()
+        frame = wait(lambda: page.js('return tuneStore.frame > 5 && tuneStore.frame'))
+        told = page.js('return fetch(tuneStore.base + "api/figures").then(r => r.json())')[frame - 1]
+        self.assertGreater(told['particles'], 0)
+        wait(lambda: particles.find_element('css selector', '.value').text == str(told['particles']), 10)
+        page.js('[...document.querySelectorAll("#facts button")].find(b => b.textContent === "Statistics").click()')
+        self.assertIn('state_hash', page.find('#popover .statistics').text)
+
+    def test_a_warning_leads_to_its_object_and_line(self):
+        page = self.page
+        page.set_text(SCENE.replace('"version": 1,', '"version": 1, "materials": [{"name": "unused"}],')
+                      .replace('"radius": 0.4}, "position"', '"radius": 0.4}, "velocity": [3e4, 0, 0], "position"'))
+        # The list is made anew with each frame, hence its texts alone.
+        texts = 'return [...document.querySelectorAll("#facts .notes .problem")].map(p => p.textContent)'
+        wait(lambda: len(page.js(texts)) == 2, 60, 'the warnings')
+        shown = page.js(texts)
+        self.assertIn('line 3', shown[0])
+        self.assertIn("'unused'", shown[0])
+        self.assertIn('line 6', shown[1])
+        self.assertIn("'ball'", shown[1])
+        page.js('document.querySelectorAll("#facts .notes .problem")[1].click()')
+        self.assertEqual(page.js('return tuneStore.selection'), ['/bodies/1'])
+
+    def test_a_version_is_gone_back_to_and_shows_its_picture(self):
+        page = self.page
+        page.wait_for_frame(1)
+        page.set_text(SCENE.replace('4.0e2', '90'))
+        page.wait_for_frame(1)
+        page.click('#versions-button')
+        first = wait(lambda: len(page.all('.version')) == 2 and page.all('.version')[1])
+        wait(lambda: page.js('return arguments[0].querySelector("img")?.naturalWidth', first) == 640, 10, 'its picture')
+        page.js('arguments[0].querySelector("button").click()', first)
+        wait(lambda: page.text() == SCENE)
 
     def test_overlays_are_drawn_and_leave_the_scene_alone(self):
         page = self.page

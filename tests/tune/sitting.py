@@ -1,6 +1,7 @@
 """A sitting of `offstage tune` and a headless browser that looks at it, for the tests and the benchmark."""
 
 import atexit
+import os
 import shutil
 import signal
 import subprocess
@@ -38,6 +39,12 @@ class Server:
     def memory_mb(self):
         with open(f'/proc/{self.process.pid}/status') as status:
             return next(int(line.split()[1]) / 1024 for line in status if line.startswith('VmRSS'))
+
+    def cpu_s(self):
+        """Processor time of the server so far."""
+        with open(f'/proc/{self.process.pid}/stat') as stat:
+            fields = stat.read().rsplit(')', 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
 
     def children(self):
         with open(f'/proc/{self.process.pid}/task/{self.process.pid}/children') as children:
@@ -133,6 +140,23 @@ class Page:
         field = self.find(f'#controls .row[data-key="{key}"] input[aria-label="{name}"]')
         self.js('arguments[0].scrollIntoView({block: "center"}); arguments[0].focus(); arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event("change"))', field, str(value))
         self.idle()
+
+    def row(self, key):
+        """The row of a key among the controls, in view."""
+        row = wait(lambda: self.all(f'#controls .row[data-key="{key}"]'), what=f'the control of {key}')[0]
+        self.js('arguments[0].scrollIntoView({block: "center"})', row)
+        return row
+
+    def open_group(self, path):
+        """Opens a group of keys, and those around it."""
+        steps = path.split('/')
+        for i in range(4, len(steps) + 1):
+            group = '/'.join(steps[:i])
+            self.js('const d = document.querySelector(`#controls details[data-path="${arguments[0]}"]`); if (d && !d.open) d.open = true', group)
+            wait(lambda: self.js('return document.querySelector(`#controls details[data-path="${arguments[0]}"]`)?.open', group), what=group)
+
+    def value(self, path):
+        return self.js('return arguments[0].slice(1).split("/").reduce((v, s) => v?.[s], tuneStore.value)', path)
 
     def set_text(self, text):
         self.js('const t = document.getElementById("text"); t.value = arguments[0]; t.dispatchEvent(new Event("input"))', text)

@@ -9,7 +9,6 @@ namespace offstage::producer {
 
 /// Adds what is wrong with the cloths of a scene as described; `flat`: with its placements expanded. What
 /// takes the triangles of a file, only the simulation finds out.
-void check_cloths(const Scene& scene, const Scene& flat, const std::filesystem::path& folder,
-                  Findings& findings);
+void check_cloths(const Scene& scene, const Scene& flat, const SceneFolder& folder, Findings& findings);
 
 }  // namespace offstage::producer

@@ -217,7 +217,7 @@ struct Table<TurbulenceField> {
         {"octaves", &T::octaves, "number of eddy sizes, each half of the previous one", "", between(1, 8)},
         {"lifetime", &T::lifetime, "lifetime of the largest eddies; 0: their turnover time, scale / speed",
          "s", kNotNegative},
-        {"drift", &T::drift, "velocity at which the eddies move; the mean wind is not part of this force", "m/s"},
+        {"drift", &T::drift, "velocity of the eddies; equal to the wind that carries them", "m/s"},
         {"seed", &T::seed, "another seed gives other eddies", "", between(0, 1e9)},
         {"drag", &T::drag, kAirDragHelp, "kg/s", kNotNegative}}
         .with_base<FieldScope>();

@@ -145,7 +145,7 @@ struct Table<Ragdoll> {
         {"velocity", &T::velocity, "velocity of the figure at time 0", "m/s"},
         {"height", &T::height, "height of the figure", "m", between(0.1, 10)},
         {"density", &T::density, "density of the body parts", "kg/m^3", kPositive},
-        {"stiffness", &T::stiffness, "dry friction of the joints: 0 rotates freely, 1 is a limp adult", "", kNotNegative},
+        {"stiffness", &T::stiffness, "friction of the joints: 0 rotates freely, 1 is limp", "", kNotNegative},
         {"skin", &T::skin, "name of the material of head, hands and feet; empty: grey"},
         {"shirt", &T::shirt, "name of the material of trunk and arms; empty: grey"},
         {"trousers", &T::trousers, "name of the material of pelvis and legs; empty: grey"}}

@@ -62,12 +62,17 @@ function bind() {
   });
 }
 
+/** What is typed in a control counts before an undo; the text keeps its caret. */
+function commitField() {
+  if (document.activeElement?.id !== 'text') document.activeElement?.blur?.();
+}
+
 const isTyping = target => target.closest?.('input:not([type=checkbox]):not([type=color]), textarea, select');
 addEventListener('keydown', event => {
   const command = event.ctrlKey || event.metaKey, key = event.key.toLowerCase();
   if (command && key === 's') { event.preventDefault(); saveFile(); return; }
-  if (command && key === 'z') { event.preventDefault(); document.activeElement?.blur?.(); event.shiftKey ? redo() : undo(); return; }
-  if (command && key === 'y') { event.preventDefault(); redo(); return; }
+  if (command && key === 'z') { event.preventDefault(); commitField(); event.shiftKey ? redo() : undo(); return; }
+  if (command && key === 'y') { event.preventDefault(); commitField(); redo(); return; }
   if (command || event.altKey || isTyping(event.target)) return;
   if (event.key === ' ' && !event.target.closest?.('button')) { event.preventDefault(); setPlaying(!store.playing); }
   if (event.target.closest?.('[role=slider]:not(#scrub), [role=tree], .curve, .ramp')) return;

@@ -1,9 +1,9 @@
 // In the picture: look around, click to select, drag what is selected, and marks of emitters and positions.
 
 import {byId, el, oncePerFrame, newGroup, toast} from './dom.js';
-import {store, on, send, view as tellServer, select, edit, setValue, isWriter} from './store.js';
+import {store, on, send, view as tellServer, select, edit, isWriter, listOf} from './store.js';
 import {find, valueOf, stepsOf, toText} from './jsonc.js';
-import {view} from './viewer.js';
+import {view, comparing} from './viewer.js';
 import {objectPaths, nameOf} from './tree.js';
 
 const stage = byId('stage'), canvas = byId('film'), marks = byId('marks');
@@ -18,11 +18,17 @@ const length = a => Math.hypot(...a);
 const unit = a => { const n = length(a) || 1; return a.map(x => x / n); };
 const tidy = a => a.map(x => Number(x.toFixed(3)));
 
+/** Where the picture of the edited version is on the screen: side by side it is the right one. */
+function pictureBox() {
+  const box = canvas.getBoundingClientRect(), half = box.width / 2;
+  return comparing() === 'side' ? new DOMRect(box.left + half, box.top, half, box.height) : box;
+}
+
 function frameOf(camera) {
   const forward = unit(sub(camera.target, camera.eye));
   const up = Math.abs(forward[1]) > 0.999 ? [0, 0, -1] : [0, 1, 0];
   const right = unit(cross(forward, up));
-  return {forward, right, up: cross(right, forward), scale: Math.tan(camera.fov * Math.PI / 360), shape: canvas.width / canvas.height};
+  return {forward, right, up: cross(right, forward), scale: Math.tan(camera.fov * Math.PI / 360), shape: canvas.width / canvas.height / (comparing() === 'side' ? 2 : 1)};
 }
 /** A place of the world as shares of the picture; null behind the camera. */
 function project(point, camera) {
@@ -55,16 +61,16 @@ function worldPlace(path) {
   const place = placeOf(path);
   if (!place) return null;
   const owner = valueOf(find(store.root, path))?.body;
-  const body = owner && store.value.bodies?.find(b => b.name === owner);
+  const body = owner && listOf('bodies').find(b => b?.name === owner);
   return body ? add(place.at, body.position ?? [0, 0, 0]) : place.at;
 }
 
 export const drawMarks = oncePerFrame(() => {
-  const camera = view.camera, box = canvas.getBoundingClientRect(), shapes = [];
-  marks.setAttribute('viewBox', `0 0 ${box.width} ${box.height}`);
-  const screen = p => { const q = camera && project(p, camera); return q && [q[0] * box.width, q[1] * box.height]; };
+  const camera = view.camera, whole = canvas.getBoundingClientRect(), box = pictureBox(), shapes = [];
+  marks.setAttribute('viewBox', `0 0 ${whole.width} ${whole.height}`);
+  const screen = p => { const q = camera && project(p, camera); return q && [box.left - whole.left + q[0] * box.width, q[1] * box.height]; };
   if (camera && local.emitters)
-    (store.value.emitters ?? []).forEach((e, i) => shapes.push(...emitterMark(e, `/emitters/${i}`, screen)));
+    listOf('emitters').forEach((e, i) => shapes.push(...emitterMark(e, `/emitters/${i}`, screen)));
   for (const path of store.selection) {
     const place = worldPlace(path), at = place && screen(place);
     if (!at) continue;
@@ -118,19 +124,19 @@ function orbit(start, dx, dy) {
   return {target: start.target, eye: add(start.target, [Math.sin(angle) * Math.cos(pitch) * r, Math.sin(pitch) * r, Math.cos(angle) * Math.cos(pitch) * r])};
 }
 function pan(start, dx, dy) {
-  const f = frameOf(start), size = canvas.getBoundingClientRect(), step = 2 * f.scale * length(sub(start.target, start.eye)) / size.height;
+  const f = frameOf(start), size = pictureBox(), step = 2 * f.scale * length(sub(start.target, start.eye)) / size.height;
   const by = add(f.right.map(x => -x * dx * step), f.up, dy * step);
   return {eye: add(start.eye, by), target: add(start.target, by)};
 }
 
 function shareAt(event) {
-  const box = canvas.getBoundingClientRect();
+  const box = pictureBox();
   return [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
 }
 
 /** The selected object whose mark is under the pointer. */
 function grabbed(event) {
-  const [x, y] = shareAt(event), box = canvas.getBoundingClientRect();
+  const [x, y] = shareAt(event), box = pictureBox();
   return view.camera && store.selection.find(path => {
     const place = placeOf(path), at = place?.free && project(worldPlace(path), view.camera);
     return at && Math.hypot((at[0] - x) * box.width, (at[1] - y) * box.height) < 14;
@@ -172,15 +178,18 @@ stage.addEventListener('wheel', event => {
   look({target: camera.target, eye: add(camera.target, sub(camera.eye, camera.target), scale)});
 }, {passive: false});
 
-/** Moves an object in the level plane through it; with Alt in the upright one that faces the camera. */
+/** Moves an object, and those selected with it, in the level plane through it; with Alt in the upright one that faces the camera. */
 function objectMover(path, camera) {
-  const place = placeOf(path), start = place.at, group = newGroup();
+  const start = placeOf(path).at, group = newGroup();
+  const moved = store.selection.map(p => ({path: p, place: placeOf(p)})).filter(m => m.place?.free);
   const facing = unit([camera.eye[0] - start[0], 0, camera.eye[2] - start[2]]);
   const level = Math.abs(dot(unit(sub(start, camera.eye)), [0, 1, 0])) > 0.08;
   return event => {
     const [x, y] = shareAt(event), normal = event.altKey || !level ? facing : [0, 1, 0];
     const at = onPlane(rayAt(x, y, camera), camera.eye, start, normal);
-    if (at && length(sub(at, start)) < 200) setValue(place.path, tidy(at), 'position', group);
+    if (!at || length(sub(at, start)) > 200) return;
+    const by = sub(at, start), ops = moved.map(m => ({set: m.place.path, value: toText(tidy(add(m.place.at, by)))}));
+    edit(ops, 'position', ops.map(op => op.set), group);
   };
 }
 
@@ -199,7 +208,7 @@ async function pick(event) {
 const escapeRegex = s => s.replace(/[.*+?^${}()|[\]\\]/g, '\\$&');
 const isGround = path => valueOf(find(store.root, path))?.shape?.type === 'plane';
 function nearestMark(x, y) {
-  const box = canvas.getBoundingClientRect();
+  const box = pictureBox();
   const near = objectPaths().filter(p => /^\/(emitters|effects)\//.test(p)).map(p => {
     const place = worldPlace(p), at = place && project(place, view.camera);
     return {p, d: at ? Math.hypot((at[0] - x) * box.width, (at[1] - y) * box.height) : Infinity};

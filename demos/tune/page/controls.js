@@ -1,17 +1,18 @@
 // The controls of what is selected, made from the schema.
 
 import {byId, el, newGroup, toast} from './dom.js';
-import {store, on, emit, setValue, removeValue, select, edit} from './store.js';
+import {store, on, emit, setValue, removeValue, select, listOf} from './store.js';
 import {find, valueOf, stepsOf, joined, toText} from './jsonc.js';
 import * as schema from './schema.js';
 import {fieldFor, modeOf} from './fields.js';
-import {nameOf, setKeySearch} from './tree.js';
+import {nameOf, setKeySearch, setRowValue} from './tree.js';
 import {openSweep} from './sweep.js';
 
 const panel = byId('controls');
 const open = new Set();  // paths of the groups that are open
 let rows = [], signature = '', shownPath = null;
 
+setRowValue(path => valueOf(find(store.root, path)) ?? rows.find(r => r.path === path)?.usual);
 setKeySearch((path, query) => {
   const description = schema.at(stepsOf(path), store.value);
   const value = valueOf(find(store.root, path));
@@ -70,7 +71,7 @@ export function drawControls(force = false) {
 function drawEmpty() {
   signature = '';
   rows = [];
-  const empty = store.root && !schema.kLists.some(l => (store.value[l] ?? []).length);
+  const empty = store.root && !schema.kLists.some(l => listOf(l).length);
   panel.replaceChildren(el('div', {class: 'empty'}, empty
     ? el('div', {}, el('p', {}, 'The stage is empty.'), el('button', {class: 'primary', onclick: () => byId('add-button').click()}, 'Add something'))
     : el('p', {}, 'Select an object above, in the picture or in the text to see its controls.')));
@@ -103,7 +104,7 @@ function objectRows(path, description, below, query = '') {
 }
 
 function group(path, d, below) {
-  const box = el('details', {class: 'group', open: open.has(path)});
+  const box = el('details', {class: 'group', open: open.has(path), 'data-path': path});
   const value = () => valueOf(find(store.root, path));
   const now = value(), mark = el('span', {class: 'summary'}, summaryOf(d, now ?? below));
   box.append(el('summary', {title: d.help}, el('span', {class: 'label'}, schema.label(d.key)), mark));
@@ -145,7 +146,7 @@ export function sample(d) {
   if (d.kind === 'enum') return d.values[0];
   if (d.kind === 'names' || d.kind === 'numbers' || d.kind === 'list') return [];
   if (d.kind === 'object') return d.choices ? {type: schema.typesOf(d)[0]} : {};
-  return d.targets?.length ? store.value[d.targets[0]]?.[0]?.name ?? '' : '';
+  return d.targets?.length ? listOf(d.targets[0])[0]?.name ?? '' : '';
 }
 
 function summaryOf(d, value) {
@@ -165,15 +166,17 @@ function fieldRow(path, d, below) {
   const change = (value, g) => setValue(path, value, d.key, g ?? newGroup());
   const current = () => valueOf(find(store.root, path)) ?? below ?? d.fallback;
   const field = fieldFor(d, current(), {change, path, sample: () => sample(d)});
+  const usual = below ?? d.fallback;
   const tools = el('span', {class: 'row-tools'});
-  if ((d.kind === 'number' || d.kind === 'varying') && !path.includes('/overrides/'))
-    tools.append(el('button', {class: 'icon quiet', title: 'Try several values (sweep)', 'aria-label': `Sweep ${d.key}`, onclick: event => openSweep(event.currentTarget, path, d, current())}, '▦'));
+  const quaternion = d.kind === 'orientation' && Array.isArray(current());
+  if (['number', 'varying', 'vector', 'orientation'].includes(d.kind) && !quaternion)
+    tools.append(el('button', {class: 'icon quiet', title: 'Try several values (sweep)', 'aria-label': `Sweep ${d.key}`, onclick: event => openSweep(event.currentTarget, path, d, current() ?? sample(d))}, '▦'));
   tools.append(resetButton(path, d));
   const error = el('p', {class: 'error', hidden: true});
   row.append(el('div', {class: 'row-head'}, name, tools), field.element, el('p', {class: 'help'}, d.help + (d.unit ? ` [${d.unit}]` : '')), error);
-  rows.push({path, element: row, error, set: value => {
+  rows.push({path, element: row, error, usual, set: value => {
     row.classList.toggle('default', value === undefined);
-    field.set(value ?? below ?? d.fallback);
+    field.set(value ?? usual);
   }});
   return row;
 }

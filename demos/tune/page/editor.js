@@ -1,6 +1,6 @@
 // The text of the scene: a plain text field with colours behind it, line numbers, and errors at their lines.
 
-import {byId, el, newGroup} from './dom.js';
+import {byId, el, newGroup, toast} from './dom.js';
 import {store, on, setText, select, isIdle} from './store.js';
 import {find, pathAt, stepsOf} from './jsonc.js';
 import {reveal} from './controls.js';
@@ -41,7 +41,7 @@ function drawProblems() {
   list.hidden = !errors.length;
   list.replaceChildren(...errors.slice(0, 20).map(p => el('li', {}, el('button', {class: 'problem', onclick: () => { showLine(p.line, p.column); reveal(p.path); }},
     p.line ? el('span', {class: 'where'}, `line ${p.line}`) : null, p.path ? el('code', {}, p.path) : null, ' ' + p.what))));
-  byId('text-state').textContent = errors.length ? `${errors.length === 1 ? '1 error' : errors.length + ' errors'}; the film is that of the last valid text` : '';
+  byId('text-state').textContent = errors.length ? `${errors.length === 1 ? '1 error' : errors.length + ' errors'}. The film shows the last valid text.` : '';
   byId('text-state').className = errors.length ? 'bad' : '';
   document.body.classList.toggle('has-errors', errors.length > 0);
 }
@@ -66,7 +66,7 @@ export function markPath(path, scroll = true) {
   if (scroll) byId('editor').scrollTop = Math.max(0, (before - 4) * lineHeight());
 }
 
-let group = newGroup(), lastKey = 0, timer = 0, pending = false;
+let group = newGroup(), lastKey = 0, timer = 0, pending = false, base = 0;  // base: the version that the text was made from
 area.addEventListener('input', () => {
   if (performance.now() - lastKey > 1500) group = newGroup();
   lastKey = performance.now();
@@ -79,8 +79,11 @@ export function sendNow() {
   if (!pending) return;
   clearTimeout(timer);
   pending = false;
-  setText(area.value, group);
+  setText(area.value, group, 'text', () => base);
 }
+on('flush', sendNow);
+on('text-taken', id => { base = id; });
+on('text-refused', ({text, group}) => toast('The file changed while you were typing.', {label: 'Use what I typed', run: () => setText(text, group)}));
 area.addEventListener('keydown', event => {
   if (event.key === 'Tab' && !event.shiftKey && !event.ctrlKey) {
     event.preventDefault();
@@ -112,14 +115,15 @@ function take() {
     area.setSelectionRange(moved, moved);
     colour();
   }
+  if (area.value === store.doc.text) base = store.doc.version.id;
   drawGutter();
   drawProblems();
   markPath(store.selection.at(-1), false);
 }
-export const hasPendingText = () => pending;
+window.tuneIdle = () => isIdle() && !pending;  // for the tests
 export const ownText = () => area.value;
 
-on('document', take);
+on('document idle', take);
 on('selection', () => markPath(store.selection.at(-1), !following));
 on('show-text', path => { const node = find(store.root, path); if (node) showLine(area.value.slice(0, node.start).split('\n').length); });
 new ResizeObserver(() => colour()).observe(byId('editor'));

@@ -1,14 +1,28 @@
 // A control for each kind of value. Each is {element, set(value)} and calls change(value, group).
 
 import {el, newGroup} from './dom.js';
-import {store} from './store.js';
+import {store, listOf} from './store.js';
 import {numberField} from './number.js';
 import {colourField} from './colour.js';
 import {curveField, rampField} from './curve.js';
 import {parse, valueOf, toText} from './jsonc.js';
 
+const isNumber = v => typeof v === 'number', isList = (v, item, size) => Array.isArray(v) && v.every(item) && (size === undefined || v.length === size);
+const isColour = v => typeof v === 'string' || isList(v, isNumber) && (v.length === 3 || v.length === 4);
+const isPair = item => k => Array.isArray(k) && k.length === 2 && isNumber(k[0]) && item(k[1]);
+const isPlain = v => !!v && typeof v === 'object' && !Array.isArray(v);
+const kFits = {
+  number: isNumber, boolean: v => typeof v === 'boolean', string: v => typeof v === 'string', names: v => isList(v, x => typeof x === 'string'),
+  enum: (v, d) => d.values.includes(v), vector: (v, d) => isList(v, isNumber, d.size), colour: isColour, curve: v => isList(v, isPair(isNumber)), colour_ramp: v => isList(v, isPair(isColour)),
+  orientation: v => isList(v, isNumber, 4) || isPlain(v) && isList(v.axis, isNumber, 3) && isNumber(v.angle_deg),
+  varying: v => isNumber(v) || isPlain(v) && (isList(v.range, isNumber, 2) || isList(v.curve, isPair(isNumber)) && v.curve.length > 0 || isNumber(v.mean) && Object.values(v).every(isNumber)),
+};
+/** Whether a value has the form that its control shows; one that has not, an error in the text, is shown as JSON. */
+export const fits = (d, value) => value === undefined || (kFits[d.kind]?.(value, d) ?? true);
+
 /** In which of its forms a value stands; a control is made anew when that changes. */
 export function modeOf(d, value) {
+  if (!fits(d, value)) return 'other';
   if (d.kind === 'varying') return varyingMode(value);
   if (d.kind === 'orientation') return Array.isArray(value) ? 'quaternion' : 'axis';
   if (d.kind === 'curve' || d.kind === 'colour_ramp' || d.kind === 'colour') return value === undefined || value?.length === 0 ? 'none' : 'some';
@@ -19,7 +33,7 @@ export function modeOf(d, value) {
 const varyingMode = value => typeof value === 'number' ? 'constant' : value?.range ? 'range' : value?.curve ? 'curve' : value === undefined ? 'none' : 'spread';
 
 export function fieldFor(d, value, context) {
-  const make = {
+  const make = !fits(d, value) ? jsonField : {
     number: numberKind, varying: varyingField, boolean: booleanField, enum: enumField, string: stringField, names: namesField, vector: vectorField,
     orientation: orientationField, colour: colourKind, curve: curveKind, colour_ramp: rampKind, rate: rateField,
   }[d.kind] ?? jsonField;
@@ -45,7 +59,7 @@ function enumField(d, value, {change}) {
   return {element: box, set(v) { if (v !== undefined) box.value = v; }};
 }
 
-const namesIn = targets => targets.flatMap(list => (store.value[list] ?? []).map((o, i) => o.name || `${list.slice(0, -1).replace(/ie$/, 'y')}_${i}`));
+const namesIn = targets => targets.flatMap(list => listOf(list).map((o, i) => o?.name || `${list.slice(0, -1).replace(/ie$/, 'y')}_${i}`));
 
 function stringField(d, value, {change}) {
   if (!d.targets.length) {

@@ -3,14 +3,17 @@
 import {el, clamp, drag, newGroup} from './dom.js';
 import {numberText} from './jsonc.js';
 
-const kDecades = 50;  // a range whose ends differ by more is shown logarithmically
+const kDecades = 50;   // a slider without ends reaches from a value / 50 to 50 times it
+const kLogFrom = 100;  // a range whose ends differ by more is shown logarithmically
 
 /** The slider's scale for a value within limits. */
 export function scaleFor(value, limits, whole) {
   const {min, max} = limits;
   const size = Math.abs(value) || 1;
-  if (Number.isFinite(min) && Number.isFinite(max) && max - min <= 1000)
-    return linear(min, max, whole);
+  if (Number.isFinite(min) && Number.isFinite(max)) {
+    if (min > 0 && max / min >= kLogFrom) return logarithmic(min, max, whole);
+    if (max - min <= 1000) return linear(min, max, whole);
+  }
   if (value > 0 && min >= 0) {
     const low = min > 0 ? Math.max(min, value / kDecades) : value / kDecades;
     return logarithmic(low, Number.isFinite(max) ? Math.min(max, value * kDecades) : value * kDecades, whole);

@@ -1,7 +1,7 @@
 // The panels behind the buttons: versions, adding, overlays; and what the page says about the file and the server.
 
 import {byId, el, popover, toast} from './dom.js';
-import {store, on, get, emit, restore, pin, view, send, save, reload, keepOwn, setText, select, isWriter} from './store.js';
+import {store, on, get, emit, restore, pin, view, send, save, reload, keepOwn, setText, select, isWriter, listOf} from './store.js';
 import {stepsOf} from './jsonc.js';
 import * as schema from './schema.js';
 import {sample} from './controls.js';
@@ -13,13 +13,13 @@ const clock = ms => new Date(ms).toLocaleTimeString([], {hour: '2-digit', minute
 
 export async function showVersions(anchor) {
   const list = el('div', {class: 'versions'});
-  popover(anchor, 'Versions of this sitting', list, true);
+  popover(anchor, 'Versions of this session', list, true);
   const all = (await get('api/versions')).reverse();
   list.append(...all.map(v => {
     const now = v.id === store.doc.version.id, picture = v.film ? el('img', {src: `${store.base}thumb/${v.film}`, alt: '', loading: 'lazy', onerror: event => event.target.replaceWith(el('span', {class: 'no-picture'}))}) : el('span', {class: 'no-picture'});
     const keys = v.paths.length > 3 ? `${v.paths.slice(0, 3).join(', ')} …` : v.paths.join(', ');
     return el('div', {class: 'version' + (now ? ' now' : ''), 'data-id': v.id}, picture,
-      el('div', {class: 'what'}, el('strong', {}, v.label), el('code', {}, keys), el('small', {}, clock(v.time_ms) + (now ? ', on show' : ''))),
+      el('div', {class: 'what'}, el('strong', {}, v.label), el('code', {}, keys), el('small', {}, clock(v.time_ms) + (now ? ', shown' : ''))),
       el('div', {class: 'inline'}, el('button', {class: 'quiet', disabled: now, onclick: () => restore(v.id).then(() => showVersions(anchor))}, 'Go back'),
         el('button', {class: 'quiet', onclick: () => pin(v.id)}, 'Pin as A')));
   }));
@@ -30,10 +30,13 @@ export function togglePin() {
 }
 
 // --- Add ---
+/** A sentence of the reference without its marks of code. */
+const plain = text => text.replace(/`/g, '');
+
 export function showAdd(anchor) {
-  const cards = store.presets.map(p => el('button', {class: 'card', 'data-preset': p.name, title: p.preset.description ?? '', onclick: () => { close(); addTo('effects', {preset: p.name, position: [0, 0, 0]}, `add ${p.name}`); }},
-    el('img', {src: `page/presets/${p.name}.jpg`, alt: '', onerror: event => event.target.replaceWith(el('span', {class: 'no-picture'}))}), el('strong', {}, p.name.replace(/_/g, ' ')), el('small', {}, p.preset.description ?? '')));
-  const objects = kNew.map(([text, list, value]) => el('button', {class: 'quiet', onclick: () => { close(); addTo(list, fresh(list, value), `add ${text.toLowerCase()}`); }}, text));
+  const cards = store.presets.map(p => el('button', {class: 'card', 'data-preset': p.name, title: plain(p.preset.description ?? ''), onclick: () => { close(); addTo('effects', {preset: p.name, position: [0, 0, 0]}, `add ${p.name}`); }},
+    el('img', {src: `page/presets/${p.name}.jpg`, alt: '', onerror: event => event.target.replaceWith(el('span', {class: 'no-picture'}))}), el('strong', {}, p.name.replace(/_/g, ' ')), el('small', {}, plain(p.preset.description ?? ''))));
+  const objects = kNew.map(([text, list, value]) => el('button', {onclick: () => { close(); addTo(list, fresh(list, value), `add ${text.toLowerCase()}`); }}, text));
   const close = popover(anchor, 'Add', el('div', {class: 'stack'}, el('h3', {}, 'Objects'), el('div', {class: 'chips'}, objects), el('h3', {}, 'Effects from presets'), el('div', {class: 'cards'}, cards)), true);
 }
 const kNew = [
@@ -47,8 +50,7 @@ const kNew = [
   ['Lamp', 'lights', {type: 'point', position: [2, 3, 2]}],
 ];
 function fresh(list, value) {
-  const object = structuredClone(value), taken = new Set((store.value[list] ?? []).map(o => o.name));
-  if (object.name && taken.has(object.name)) for (let i = 2; ; i++) if (!taken.has(`${value.name}_${i}`)) { object.name = `${value.name}_${i}`; break; }
+  const object = structuredClone(value);
   const description = schema.itemOf(schema.rootKey(list)), known = schema.keysOf(schema.objectFor(description, object));
   for (const k of schema.requiredOf(schema.objectFor(description, object))) if (!(k in object) && k !== 'type') object[k] = sample(known.find(d => d.key === k));
   for (const k of Object.keys(object)) if (k !== 'type' && !known.some(d => d.key === k)) delete object[k];
@@ -57,13 +59,13 @@ function fresh(list, value) {
 
 // --- Overlays ---
 const kOverlays = [
-  ['contacts', 'Contacts', 'where bodies touch, and which way they push', () => ({type: 'contacts'})],
-  ['velocities', 'Velocities', 'how fast bodies move', () => ({type: 'velocities'})],
-  ['joints', 'Joints', 'where joints are, and the axes that they leave free', () => ({type: 'joints'})],
+  ['contacts', 'Contacts', 'points where bodies touch, and their normals', () => ({type: 'contacts'})],
+  ['velocities', 'Velocities', 'arrows in the direction of motion', () => ({type: 'velocities'})],
+  ['joints', 'Joints', 'positions of joints and their free axes', () => ({type: 'joints'})],
   ['islands', 'Islands', 'groups of bodies that touch each other', () => ({type: 'islands'})],
-  ['trails', 'Trails', 'where bodies have been', () => ({type: 'trails'})],
+  ['trails', 'Trails', 'paths of bodies', () => ({type: 'trails'})],
   ['cloth', 'Strain of cloth', 'blue at rest, red where it is stretched', () => ({type: 'cloth'})],
-  ['tree', 'Bounding tree', 'of the selected body with a mesh', () => { const [list, i] = stepsOf(store.selection.at(-1) ?? ''); const b = list === 'bodies' && store.value.bodies[i]; return b?.shape?.type === 'mesh' && b.name ? {type: 'tree', body: b.name} : null; }],
+  ['tree', 'Bounding tree', 'of the selected body with a mesh', () => { const [list, i] = stepsOf(store.selection.at(-1) ?? ''); const b = list === 'bodies' && listOf('bodies')[i]; return b?.shape?.type === 'mesh' && b.name ? {type: 'tree', body: b.name} : null; }],
 ];
 export function showOverlays(anchor) {
   const on_ = type => (store.doc.overlays ?? []).some(o => o.type === type);
@@ -73,14 +75,12 @@ export function showOverlays(anchor) {
     view({overlays: made ? [...others, made] : others});
   };
   const row = (id, text, help, checked, run) => { const box = el('input', {type: 'checkbox', checked, 'data-overlay': id, 'aria-label': text, onchange: () => run(box)}); return el('label', {class: 'option'}, box, el('span', {}, text, el('small', {}, help))); };
-  popover(anchor, 'Overlays', el('div', {class: 'menu'}, row('emitters', 'Emitters', 'their surfaces and directions', local.emitters, box => { local.emitters = box.checked; drawMarks(); }),
-    kOverlays.map(([type, text, help, make]) => row(type, text, help, on_(type), box => toggle(type, make, box))), el('p', {class: 'help'}, 'Only here: the scene stays as it is.')));
+  popover(anchor, 'Overlays', el('div', {class: 'menu'}, row('emitters', 'Emitters', 'surfaces and directions of emission', local.emitters, box => { local.emitters = box.checked; drawMarks(); }),
+    kOverlays.map(([type, text, help, make]) => row(type, text, help, on_(type), box => toggle(type, make, box))), el('p', {class: 'help'}, 'Overlays belong to the view. They do not change the scene.')));
 }
 
 // --- The file ---
 export async function saveFile() {
-  const {hasPendingText, sendNow} = await import('./editor.js');
-  if (hasPendingText()) sendNow();
   if (await save() && store.doc.saved) toast('Saved.');
 }
 
@@ -89,18 +89,18 @@ function drawBanner() {
   box.hidden = !(doc?.theirs || !mine);
   if (box.hidden) return;
   if (!mine) {
-    box.replaceChildren(el('span', {}, 'Another tab edits this scene; this one looks on.'), el('button', {onclick: () => send('write')}, 'Edit here'));
+    box.replaceChildren(el('span', {}, 'Another tab is editing this scene. This tab is read-only.'), el('button', {onclick: () => send('write')}, 'Edit here'));
     return;
   }
-  box.replaceChildren(el('span', {}, 'Another program has changed the file, and you have changes too. Nothing was overwritten.'),
-    el('button', {id: 'reload-theirs', title: 'Your version stays in the list of versions', onclick: reload}, 'Take the file’s'), el('button', {id: 'show-both', onclick: event => showBoth(event.currentTarget)}, 'Show both'),
-    el('button', {id: 'keep-own', title: 'Saving will replace what the file holds now', onclick: keepOwn}, 'Keep mine'));
+  box.replaceChildren(el('span', {}, 'Another program changed the file, and you have unsaved changes. Nothing was overwritten.'),
+    el('button', {id: 'reload-theirs', title: 'Your text stays in the list of versions', onclick: reload}, 'Load the file'), el('button', {id: 'show-both', onclick: event => showBoth(event.currentTarget)}, 'Show both'),
+    el('button', {id: 'keep-own', title: 'Saving will then replace the file', onclick: keepOwn}, 'Keep mine'));
 }
 
 function showBoth(anchor) {
   const mine = store.doc.text.split('\n'), theirs = store.doc.theirs.split('\n');
   const rows = diff(mine, theirs).map(([kind, a, b]) => el('tr', {class: kind}, el('td', {}, a ?? ''), el('td', {}, b ?? '')));
-  popover(anchor, 'Yours, and the file’s', el('div', {class: 'scroll'}, el('table', {class: 'both'}, el('tr', {}, el('th', {}, 'Yours'), el('th', {}, 'In the file')), rows)), true);
+  popover(anchor, 'Your text and the file', el('div', {class: 'scroll'}, el('table', {class: 'both'}, el('tr', {}, el('th', {}, 'Your text'), el('th', {}, 'In the file')), rows)), true);
 }
 /** Lines side by side: what both have stands in one row. */
 function diff(a, b) {
@@ -123,15 +123,15 @@ on('lost', () => {
     if (answer?.ok) return;
     const other = answer?.status === 403, text = (await import('./editor.js')).ownText();
     box.hidden = false;
-    box.replaceChildren(el('div', {class: 'gone-box'}, el('h2', {}, other ? 'offstage was started again' : 'offstage has ended'),
-      el('p', {}, other ? 'This page belongs to the sitting before. Open the address that `offstage tune` printed now.' : 'Start `offstage tune` again and open the address that it prints.'),
-      store.doc && !store.doc.saved ? el('p', {}, 'The text has changes that the file does not have. ', el('button', {class: 'primary', onclick: () => navigator.clipboard.writeText(text).then(() => toast('Copied.'))}, 'Copy the text')) : null));
+    box.replaceChildren(el('div', {class: 'gone-box'}, el('h2', {}, other ? 'offstage was restarted' : 'offstage has stopped'),
+      el('p', {}, other ? 'This page belongs to an earlier session. Open the address that `offstage tune` printed last.' : 'Start `offstage tune` again and open the address that it prints.'),
+      store.doc && !store.doc.saved ? el('p', {}, 'The text has unsaved changes. ', el('button', {class: 'primary', onclick: () => navigator.clipboard.writeText(text).then(() => toast('Copied.'))}, 'Copy the text')) : null));
     keepDraft();
   }, 1300);
 });
 on('connected', () => { lostAt = 0; byId('gone').hidden = true; });
 
-/** A text that was not saved when the server ended is offered in the next sitting. */
+/** A text that was not saved when the server ended is offered in the next session. */
 const draftKey = () => 'offstage:' + store.file;
 function keepDraft() {
   if (store.doc && !store.doc.saved) localStorage.setItem(draftKey(), store.doc.text);
@@ -141,7 +141,7 @@ export function offerDraft() {
   const draft = localStorage.getItem(draftKey());
   if (!draft || !isWriter()) return;
   if (draft === store.doc.text || !store.doc.saved) return localStorage.removeItem(draftKey());
-  toast('An earlier sitting ended with changes that were not saved.', {label: 'Bring them back', run: () => setText(draft, '', 'unsaved text of an earlier sitting')});
+  toast('An earlier session ended with unsaved changes.', {label: 'Restore them', run: () => setText(draft, '', 'unsaved text of an earlier session')});
   localStorage.removeItem(draftKey());
 }
 

@@ -1,7 +1,8 @@
 // Figures over the film's time, and the facts of the run.
 
 import {byId, el, clamp, oncePerFrame, toast} from './dom.js';
-import {store, on, get, setValue, frameCount, timeOf, isWriter} from './store.js';
+import {find} from './jsonc.js';
+import {store, on, emit, get, setValue, frameCount, timeOf, isWriter} from './store.js';
 import {seek} from './viewer.js';
 import {reveal} from './controls.js';
 import {objectPaths, nameOf} from './tree.js';
@@ -28,7 +29,7 @@ function short(x, digits) {
   const size = Math.abs(x);
   if (size >= 1e6) return (x / 1e6).toFixed(2) + ' M';
   if (size >= 1e4) return (x / 1e3).toFixed(1) + ' k';
-  return digits === 0 ? String(x) : Number(x.toPrecision(3)).toString();
+  return digits === 0 ? String(x) : digits === 1 ? x.toFixed(1) : Number(x.toPrecision(3)).toString();
 }
 
 const draw = oncePerFrame(() => {
@@ -69,19 +70,44 @@ function objectIn(text) {
   return name && objectPaths().find(p => nameOf(p) === name || name.startsWith(nameOf(p) + '_') || name.startsWith(nameOf(p) + '/'));
 }
 
+/** The line of the text that a value begins in. */
+function lineOf(path) {
+  const node = find(store.root, path);
+  return node ? store.doc.text.slice(0, node.start).split('\n').length : '–';
+}
+
 function drawFacts() {
   const doc = store.doc;
   if (!doc?.scene) return;
   const now = store.figures[store.frame - 1], film = store.film, last = film.statistics?.state_hash;
   const hash = (text, title) => el('code', {class: 'hash', title: `${title}: ${text}. Click to copy`, onclick: () => navigator.clipboard.writeText(text).then(() => toast('Copied.'))}, text.slice(0, 12));
-  const progress = film.phase === 'complete' || last ? 'Film complete' : film.phase === 'failed' ? 'Stopped' : film.phase === 'loading' ? film.message || 'Loading' : Math.max(film.simulated, store.figures.length) ? `Simulated ${Math.max(film.simulated, store.figures.length)} of ${frameCount()}` : `Before the film: ${Math.round((film.lead_in ?? 0) * 100)} %`;
-  const facts = el('div', {class: 'facts-line'}, el('span', {class: 'fact', id: 'progress'}, progress),
-    now ? el('span', {class: 'fact'}, 'State ', hash(now.state, `state of frame ${store.frame}`)) : null,
-    last ? el('span', {class: 'fact', id: 'final-state', 'data-hash': last}, 'Final state ', hash(last, 'state after the last frame, as `offstage simulate` prints it')) : null,
-    el('span', {class: 'fact'}, `Seed ${doc.scene.seed} `, el('button', {class: 'quiet', id: 'new-seed', disabled: !isWriter(), title: 'Another draw of everything random', onclick: () => setValue('/world/seed', Math.floor(Math.random() * 1e6) + 1, 'new seed')}, 'New seed')),
-    film.statistics ? el('button', {class: 'quiet', onclick: event => showStatistics(event.currentTarget)}, 'Statistics') : null);
-  const notes = [...(film.phase === 'failed' ? [{what: film.message, bad: true}] : []), ...(doc.warnings ?? []).map(w => ({what: w.what, path: w.path})), ...(film.notes ?? []).map(t => ({what: t.replace(/^(warning|note): /, ''), path: objectIn(t)}))];
-  byId('facts').replaceChildren(facts, notes.length ? el('ul', {class: 'notes'}, notes.map(n => el('li', {class: n.bad ? 'bad' : ''}, n.path ? el('button', {class: 'problem', onclick: () => reveal(n.path)}, n.what) : n.what))) : '');
+  const progress = film.phase === 'complete' || last ? 'Film complete' : film.phase === 'failed' ? 'Stopped' : film.phase === 'loading' ? film.message || 'Loading' : Math.max(film.simulated, store.figures.length) ? `Simulated ${Math.max(film.simulated, store.figures.length)} of ${frameCount()}` : `Before frame 1: ${Math.round((film.lead_in ?? 0) * 100)} %`;
+  const notes = [...(film.phase === 'failed' ? [{what: film.message, bad: true, path: objectIn(film.message)}] : []), ...(doc.warnings ?? []).map(w => ({what: w.what, path: w.path})), ...(film.notes ?? []).map(t => ({what: t.replace(/^(warning|note): /, ''), path: objectIn(t)}))]
+    .map(n => ({...n, line: n.path && lineOf(n.path)}));
+  const mine = isWriter();
+  const parts = [
+    fact('progress', progress, () => el('span', {class: 'fact', id: 'progress'}, progress)),
+    now && fact('state', store.frame + now.state, () => el('span', {class: 'fact'}, 'State ', hash(now.state, `state of frame ${store.frame}`))),
+    last && fact('last', last, () => el('span', {class: 'fact', id: 'final-state', 'data-hash': last}, 'Final state ', hash(last, 'state after the last frame, as `offstage simulate` prints it'))),
+    fact('seed', doc.scene.seed + ' ' + mine, () => el('span', {class: 'fact'}, `Seed ${doc.scene.seed} `, el('button', {class: 'quiet', id: 'new-seed', disabled: !mine, title: 'Use another random seed', onclick: () => setValue('/world/seed', Math.floor(Math.random() * 1e6) + 1, 'new seed')}, 'New seed'))),
+    film.statistics && fact('statistics', '', () => el('button', {class: 'quiet', onclick: event => showStatistics(event.currentTarget)}, 'Statistics')),
+  ];
+  keepIn(factsLine, parts.filter(Boolean));
+  keepIn(byId('facts'), [factsLine, notes.length ? fact('notes', JSON.stringify(notes), () => el('ul', {class: 'notes'}, notes.map(noteItem))) : null].filter(Boolean));
+}
+const factsLine = el('div', {class: 'facts-line'});
+const noteItem = n => el('li', {class: n.bad ? 'bad' : ''}, n.path ? el('button', {class: 'problem', title: 'Show it in the controls and in the text', onclick: () => { reveal(n.path); emit('show-text', n.path); }}, el('span', {class: 'where'}, `line ${n.line}`), n.what) : n.what);
+
+// A fact is made anew only when it changes: a click on a button that is replaced between press and release would be lost.
+const made = new Map();
+function fact(key, signature, make) {
+  if (made.get(key)?.signature !== signature) made.set(key, {signature, element: make()});
+  return made.get(key).element;
+}
+/** Makes these the children of a box; those that are there already stay in place. */
+function keepIn(box, children) {
+  for (const child of [...box.children]) if (!children.includes(child)) child.remove();
+  children.forEach((child, i) => { if (box.children[i] !== child) box.insertBefore(child, box.children[i] ?? null); });
 }
 
 async function showStatistics(anchor) {
@@ -98,6 +124,12 @@ const redraw = oncePerFrame(() => { draw(); drawFacts(); });
 on('figures playhead film document', redraw);
 new ResizeObserver(draw).observe(byId('plots'));
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', draw);
+
+// A tab that was too slow for some frames gets their figures together.
+on('film', () => {
+  const known = store.figures.filter(Boolean).length;
+  if (store.film.simulated > known + 20 || store.film.phase === 'complete' && store.film.simulated > known) loadFigures().catch(() => {});
+});
 
 /** Figures of frames that were drawn before this page was opened. */
 export async function loadFigures() {

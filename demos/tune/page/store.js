@@ -41,16 +41,18 @@ export async function send(what, body = {}) {
 
 export const isWriter = () => store.writer === store.tab;
 
-/** Takes a document from the server. */
+/** Takes a document from the server. It comes twice, as the answer to a request and by the stream; an older one is dropped. */
 export function takeDocument(doc) {
-  if (store.doc && doc.run < store.doc.run) return;
+  if (store.doc && doc.revision < store.doc.revision) return;
   const before = store.doc;
   store.doc = doc;
   if (!before || before.text !== doc.text) {
     const root = jsonc.parse(doc.text);
     if (root?.type === 'object') {
+      const old = store.value;
       store.root = root;
       store.value = jsonc.valueOf(root);
+      store.selection = [...new Set(store.selection.map(p => moved(p, old)))];
     }
     store.textValid = root?.type === 'object';
   }
@@ -65,19 +67,37 @@ export function takeDocument(doc) {
   emit('document', before);
 }
 
+/** Where an object of an earlier value stands now: a named one is followed when its list grows or shrinks before it. */
+function moved(path, old) {
+  const [list, index] = jsonc.stepsOf(path), name = old[list]?.[index]?.name;
+  if (!name || !Array.isArray(store.value[list]) || store.value[list][index]?.name === name) return path;
+  const now = store.value[list].findIndex(o => o?.name === name);
+  return now < 0 ? path : `/${list}/${now}`;
+}
+
 async function change(what, body) {
   const {status, body: answer} = await send(what, body);
-  if (status === 200) { if (answer.version) takeDocument(answer); return true; }
-  if (status === 409 && answer.version) { takeDocument(answer); return false; }
+  if (status === 200) {
+    if (what === 'text') emit('text-taken', answer.version.id);
+    if (answer.version) takeDocument(answer);
+    return true;
+  }
+  if (status === 409 && answer.version) {
+    takeDocument(answer);
+    if (what === 'text') emit('text-refused', body);
+    return false;
+  }
   toast(answer.error ?? `The server answered ${status}.`, status === 423 ? {label: 'Edit here', run: () => send('write')} : null);
   if (store.doc) emit('document', store.doc);
   return false;
 }
 
-// Changes go out one at a time; of several of one group that wait, the latest counts.
+// Changes go out one at a time; of several of one group that wait, the latest counts. A body may be a function, which is
+// called when the request goes out: what it makes of the document then holds whatever waited before it.
 let busy = false;
 const waiting = [];
 function enqueue(what, body) {
+  if (what !== 'text' && what !== 'view') emit('flush');  // what is typed but not sent yet goes first, as a step of its own
   return new Promise(done => {
     const last = waiting.at(-1);
     if (what === 'edit' && last?.what === 'edit' && body.group && last.body.group === body.group) {
@@ -98,20 +118,24 @@ async function drain() {
   while (waiting.length) {
     const job = waiting.shift();
     try {
-      job.done(await change(job.what, job.body));
+      const body = typeof job.body === 'function' ? job.body() : job.body;
+      job.done(body ? await change(job.what, body) : false);
     } catch (error) {
       job.done(false);
       emit('lost', error);
     }
   }
   busy = false;
+  emit('idle');
 }
 export const isIdle = () => !busy && waiting.length === 0;
-window.tuneIdle = isIdle;
 
 /** ops: [{set: path, value: JSON text} | {remove: path}]. */
 export const edit = (ops, label, paths, group = '') => enqueue('edit', {ops, label, paths, group});
-export const setText = (text, group, label = 'text') => enqueue('text', {text, group, label});
+/** `make` gives {ops, label, paths} from the document as it is when the change is made, or null. */
+export const editLater = make => enqueue('edit', make);
+/** `base()`: the version that the text was made from; the server refuses it if another has come in between. */
+export const setText = (text, group, label = 'text', base = () => undefined) => enqueue('text', () => ({text, group, label, base: base()}));
 export const undo = () => enqueue('undo', {});
 export const redo = () => enqueue('redo', {});
 export const restore = id => enqueue('restore', {id});
@@ -131,7 +155,7 @@ export function removeValue(path, label) {
   return edit(paths.map(p => ({remove: p})), label, paths);
 }
 /** The same key in every selected object of the same list. */
-function alike(path) {
+export function alike(path) {
   const shown = store.selection.at(-1);
   if (!shown || store.selection.length < 2 || !path.startsWith(shown + '/')) return [path];
   const list = shown.slice(0, shown.lastIndexOf('/'));
@@ -142,6 +166,9 @@ export function select(paths) {
   store.selection = paths;
   emit('selection');
 }
+
+/** The objects of a list of the scene; the text may hold something else there for a while. */
+export const listOf = list => Array.isArray(store.value[list]) ? store.value[list] : [];
 
 export const frameCount = () => store.doc?.scene?.frames ?? 1;
 export const timeOf = frame => (store.doc?.scene?.start ?? 0) + (frame - 1) / (store.doc?.scene?.fps ?? 30);

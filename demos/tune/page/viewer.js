@@ -32,6 +32,7 @@ on('document', before => {
   mark(have, doc.ranges);
   store.frame = clamp(store.frame, 1, frameCount());
   if (before?.pinned?.film !== doc.pinned?.film) pinnedChanged();
+  mark(havePinned, doc.pinned?.ranges);
   present();
   emit('playhead');
 });
@@ -46,7 +47,7 @@ function pinnedChanged() {
 on('frame', event => {
   if (event.film !== film) return;
   if (event.frame > 0 && event.detail === 'draft') {
-    if (event.frame < have.length) have[event.frame] = 1;
+    mark(have, event.ranges);
     if (event.figures) store.figures[event.frame - 1] = {...event.figures, draw_ms: event.draw_ms};
     emit('figures');
   }
@@ -58,7 +59,7 @@ on('frame', event => {
 });
 on('other-frame', event => {
   if (event.film !== store.doc?.pinned?.film) return;
-  if (event.frame < havePinned.length) havePinned[event.frame] = 1;
+  mark(havePinned, event.ranges);
   if (event.frame === store.frame) present();
 });
 
@@ -70,7 +71,7 @@ async function glimpse(frame, time) {
   const of = film, found = await picture(of, frame, 'draft').catch(() => null);
   if (found && of === film && !hasFrame(store.frame)) {
     paint(found, frame, 'draft');
-    badge(frame === 0 ? `before the film: ${time.toFixed(2)} s` : `frame ${frame}`);
+    badge(frame === 0 ? `${time.toFixed(2)} s, before frame 1` : `frame ${frame}`);
   }
   glimpsing = false;
   if (nextGlimpse) { const next = nextGlimpse; nextGlimpse = null; glimpse(...next); }
@@ -96,7 +97,7 @@ async function presentOnce() {
   if (!of) return;
   if (compare !== 'off' && store.doc.pinned) {
     const other = Math.min(frame, store.doc.pinned.frames);
-    latestA = await picture(store.doc.pinned.film, other, 'draft') ?? latestA;
+    if (havePinned[other]) latestA = await picture(store.doc.pinned.film, other, 'draft') ?? latestA;
   }
   if (!hasFrame(frame)) { repaint(); return; }
   const detail = !store.playing && wantedBetter ? wantedBetter : 'draft';
