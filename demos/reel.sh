@@ -1,7 +1,42 @@
 #!/usr/bin/env bash
 # Cuts out/reel.mp4, a minute of the gallery with titles: demos/reel.sh [RENDER OPTIONS...]. Finished shots are kept in out/reel.
+# Cuts docs/reel.webp, the moving picture of the README:  demos/reel.sh --readme [RENDER OPTIONS...]. Finished frames are kept in
+# out/readme.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+
+# scene|from [s]|length [s]: the moments with the most motion, and hard cuts between them.
+readme_shots='wall|1.2|1.25
+glass|1.6|1.5
+fountain|3|1.5
+drape|0.25|0.85
+explosion|0.9167|1.3333
+fireworks|7.5|1.75'
+
+readme_reel() {
+  local number=0 scene from length shot
+  rm -rf out/readme/cut
+  mkdir -p out/readme/cut
+  while IFS='|' read -r scene from length; do
+    number=$((number + 1))
+    shot=out/readme/$scene
+    cat >"$shot.json" <<END
+{"version": 1, "include": ["../../demos/scenes/$scene.json"],
+ "output": {"start": $from, "duration": $length, "fps": 12}}
+END
+    build/offstage render "$shot.json" -o "$shot/####.png" --size 480x270 --resume "$@"
+    for frame in "$shot"/*.png; do cp "$frame" "out/readme/cut/${number}_$(basename "$frame")"; done
+  done <<<"$readme_shots"
+  ffmpeg -y -loglevel error -framerate 12 -pattern_type glob -i 'out/readme/cut/*.png' -c:v libwebp_anim -quality 60 \
+    -compression_level 4 -loop 0 docs/reel.webp
+  echo docs/reel.webp
+}
+if [ "${1:-}" = --readme ]; then
+  shift
+  readme_reel "$@"
+  exit
+fi
+
 mkdir -p out/reel
 options=("$@")
 [[ " $* " == *" --size "* ]] || options+=(--size 1280x720)
