@@ -35,7 +35,8 @@ struct Channels {
   std::vector<float> depth;             ///< along the view axis [m]
   std::vector<Eigen::Vector3f> normal;  ///< unit, in the world, on the side that is seen
   std::vector<uint32_t> id;             ///< as set_object says; 0: none
-  std::vector<Eigen::Vector2f> motion;  ///< in the picture since Stage::remember [px], x to the right, y down
+  std::vector<Eigen::Vector2f>
+      motion;  ///< in the picture since Stage::store_previous_transforms [px], x to the right, y down
 };
 
 /// What the ids stand for.

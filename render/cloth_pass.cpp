@@ -56,7 +56,7 @@ void ClothPass::bind(const Cloth& cloth, GLint texture_from_uv) {
 }
 
 void ClothPass::draw_shadow(const Cloth& cloth, const Matrix4f& shadow_clip_from_world) {
-  if (!cloth.is_sheer()) {
+  if (!cloth.is_translucent()) {
     shadow_.use();
   } else {
     (cloth.material->textures[0] != 0 ? textured_sheer_shadow_ : sheer_shadow_).use();

@@ -21,14 +21,14 @@ struct Cloth {
   bool casts_shadow = true;
   ClothSurface surface;
   uint32_t object = 0;           ///< id in Channels
-  std::vector<Vector3f> before;  ///< where its vertices were at Stage::remember
+  std::vector<Vector3f> before;  ///< where its vertices were at Stage::store_previous_transforms
 
   gl::StreamBuffer vertices, indices;
   uint32_t uploaded = 0;  ///< version of the indices
   gl::VertexArray vertex_array;
 
   /// Something is seen through it.
-  bool is_sheer() const { return material->lets_through(); }
+  bool is_translucent() const { return material->lets_through(); }
   bool is_seen() const { return !surface.vertices().empty() && !surface.indices().empty(); }
 };
 

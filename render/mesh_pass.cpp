@@ -351,10 +351,10 @@ void MeshPass::draw_batch(const Batch& batch, Shading shading) {
   draw(batch, rows_);
 }
 
-void MeshPass::draw_opaque(const View& view, const Hiding& hiding, int width_px, int height_px) {
+void MeshPass::draw_opaque(const View& view, const Occluders& occluders, int width_px, int height_px) {
   for (const Batch& batch : opaque_) {
     const Eigen::AlignedBox2i hidden =
-        around(hidden_area(batch, view, hiding), kOpennessReach_px, width_px, height_px);
+        around(hidden_area(batch, view, occluders), kOpennessReach_px, width_px, height_px);
     const int inside_px = hidden.isEmpty() ? 0 : hidden.sizes().prod();
     if (width_px * height_px - inside_px < kManyPixels) {
       draw_batch(batch, Shading::whole);
@@ -402,17 +402,17 @@ ScreenArea MeshPass::occluded_area(const View& view, float reach,
 }
 
 // Of a plane; of anything else all of the picture.
-ScreenArea MeshPass::hidden_area(const Batch& batch, const View& view, const Hiding& hiding) const {
+ScreenArea MeshPass::hidden_area(const Batch& batch, const View& view, const Occluders& occluders) const {
   ScreenArea area(view, 0);
   const auto flat = [](const Instance* instance) { return instance->mesh->flat; };
-  const bool alone = hiding.sky_reach_m <= 0 || std::ranges::count_if(seen_, flat) == 1;
+  const bool alone = occluders.sky_reach_m <= 0 || std::ranges::count_if(seen_, flat) == 1;
   const Instance& plane = *seen_[batch.first];
   const Vector3f normal =
       (plane.world_from_mesh.linear().inverse().transpose() * batch.mesh->flat_normal).normalized();
   const Vector3f place = plane.world_from_mesh * batch.mesh->center;
-  const float slant = normal.dot(hiding.to_sun);
+  const float slant = normal.dot(occluders.to_sun);
   if (!batch.mesh->flat || batch.count > 1 || !alone ||
-      (hiding.shadow_reach_m > 0 && std::abs(slant) < kGrazing)) {
+      (occluders.shadow_reach_m > 0 && std::abs(slant) < kGrazing)) {
     area.add_all();
     return area;
   }
@@ -431,9 +431,9 @@ ScreenArea MeshPass::hidden_area(const Batch& batch, const View& view, const Hid
   const auto hide_sky = [&](const Corners& corners) {
     const auto is_far = [&](float side) {
       return std::ranges::all_of(corners,
-                                 [&](const Vector3f& p) { return side * height(p) > hiding.sky_reach_m; });
+                                 [&](const Vector3f& p) { return side * height(p) > occluders.sky_reach_m; });
     };
-    if (!is_far(1) && !is_far(-1)) add_around(corners, normal, hiding.sky_reach_m);
+    if (!is_far(1) && !is_far(-1)) add_around(corners, normal, occluders.sky_reach_m);
   };
   const auto corners_of = [](const Instance& instance) {
     Corners corners;
@@ -446,16 +446,16 @@ ScreenArea MeshPass::hidden_area(const Batch& batch, const View& view, const Hid
     for (int k = 0; k < 8; ++k) corners[static_cast<std::size_t>(k)] = corner(box, k);
     return corners;
   };
-  if (hiding.sky_reach_m > 0) {
+  if (occluders.sky_reach_m > 0) {
     for (const Instance* instance : seen_)
       if (instance != &plane) hide_sky(corners_of(*instance));
-    for (const Eigen::AlignedBox3f& box : hiding.solid) hide_sky(corners_of_box(box));
+    for (const Eigen::AlignedBox3f& box : occluders.solid) hide_sky(corners_of_box(box));
   }
-  if (hiding.shadow_reach_m > 0) {
-    const float reach = hiding.shadow_reach_m / std::abs(slant);
-    for (const Instance* instance : casting_) add_around(corners_of(*instance), hiding.to_sun, reach);
-    for (const Eigen::AlignedBox3f& box : hiding.casting)
-      add_around(corners_of_box(box), hiding.to_sun, reach);
+  if (occluders.shadow_reach_m > 0) {
+    const float reach = occluders.shadow_reach_m / std::abs(slant);
+    for (const Instance* instance : casting_) add_around(corners_of(*instance), occluders.to_sun, reach);
+    for (const Eigen::AlignedBox3f& box : occluders.casting)
+      add_around(corners_of_box(box), occluders.to_sun, reach);
   }
   return area;
 }

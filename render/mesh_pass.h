@@ -66,7 +66,7 @@ struct Instance {
   bool casts_shadow = true;
   bool visible = true;
   uint32_t object = 0;                    ///< id in Channels
-  std::optional<Eigen::Affine3f> before;  ///< where it was at Stage::remember
+  std::optional<Eigen::Affine3f> before;  ///< where it was at Stage::store_previous_transforms
 
   float scale() const;
   Caster ball() const;
@@ -75,7 +75,7 @@ struct Instance {
 };
 
 /// What can hide light from surfaces, and from how far away; nothing does from no distance.
-struct Hiding {
+struct Occluders {
   float sky_reach_m = 0;
   std::vector<Eigen::AlignedBox3f> solid;  ///< boxes around what hides the sky besides the instances
   Vector3f to_sun = Vector3f::UnitY();
@@ -94,7 +94,7 @@ class MeshPass {
   void draw_depth(const Matrix4f& clip_from_world);
   /// A plane is shaded without looking for what hides light from it where nothing can, if that is much of a
   /// picture of this size.
-  void draw_opaque(const View& view, const Hiding& hiding, int width_px, int height_px);
+  void draw_opaque(const View& view, const Occluders& occluders, int width_px, int height_px);
   /// Where opaque surfaces can hide the sky within `reach` [m]: around all but a plane. `others`: boxes
   /// around what is opaque besides the instances.
   ScreenArea occluded_area(const View& view, float reach, std::span<const Eigen::AlignedBox3f> others) const;
@@ -131,7 +131,7 @@ class MeshPass {
   static void set_facing(const Batch& batch, bool both_sides);
   void draw_batch(const Batch& batch, Shading shading);
   static bool mirrors(const Batch& batch);
-  ScreenArea hidden_area(const Batch& batch, const View& view, const Hiding& hiding) const;
+  ScreenArea hidden_area(const Batch& batch, const View& view, const Occluders& occluders) const;
   ScreenArea mirrored_area(const Batch& batch, const View& view, float reach,
                            std::span<const Eigen::AlignedBox3f> others) const;
 

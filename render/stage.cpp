@@ -122,7 +122,7 @@ struct Stage::Impl {
   std::vector<const Cloth*> prepare_cloths();
   void draw_shadows(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
                     std::span<PointSet* const> sets, const View& view, const SampleOffsets& offsets,
-                    FrameUniforms& frame, Hiding& hiding);
+                    FrameUniforms& frame, Occluders& occluders);
   void prepare_lamps(std::span<PointSet* const> sets, const SampleOffsets& offsets, FrameUniforms& frame);
   void draw_lamp_shadows(std::span<const Caster> casters, std::span<const Cloth* const> sheets);
   void draw_mirrors(std::span<const Cloth* const> sheets, const View& view,
@@ -130,7 +130,7 @@ struct Stage::Impl {
   void draw_sheer_in_copies(std::span<const Cloth* const> sheets);
   void draw_depth(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view);
   void draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view,
-                   const Hiding& hiding);
+                   const Occluders& occluders);
   std::vector<TranslucentBody> find_bodies(std::span<const Cloth* const> sheets, const View& view,
                                            std::vector<Region>& regions);
   void draw_translucent(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets,
@@ -166,7 +166,7 @@ std::vector<const Cloth*> Stage::Impl::prepare_cloths() {
 
 void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
                                std::span<PointSet* const> sets, const View& view,
-                               const SampleOffsets& offsets, FrameUniforms& frame, Hiding& hiding) {
+                               const SampleOffsets& offsets, FrameUniforms& frame, Occluders& occluders) {
   std::vector<Caster> casters;
   for (const Instance* instance : shown) {
     if (instance->visible && instance->casts_shadow && instance->mesh->index_count > 0 &&
@@ -175,7 +175,7 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
     }
   }
   const std::size_t balls = casters.size();
-  std::vector<Eigen::AlignedBox3f>& boxes = hiding.casting;
+  std::vector<Eigen::AlignedBox3f>& boxes = occluders.casting;
   for (const Cloth* cloth : sheets) {
     if (cloth->casts_shadow) boxes.push_back(cloth->surface.box());
   }
@@ -206,8 +206,8 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
   upload(frame);
   draw_lamp_shadows(casters, sheets);
   if (shadow.texel_m == 0) return;
-  hiding.to_sun = frame.sun_direction.head<3>();
-  hiding.shadow_reach_m = search_m(shadow);
+  occluders.to_sun = frame.sun_direction.head<3>();
+  occluders.shadow_reach_m = search_m(shadow);
 
   shadow_map.begin();
   mesh_pass.draw_shadows(shadow.clip_from_world, true);
@@ -247,14 +247,14 @@ void Stage::Impl::draw_lamp_shadows(std::span<const Caster> casters, std::span<c
 
 // Mirrors show sheer cloth, too, which is not in the picture yet.
 void Stage::Impl::draw_sheer_in_copies(std::span<const Cloth* const> sheets) {
-  if (std::ranges::none_of(sheets, [](const Cloth* cloth) { return cloth->is_sheer(); })) return;
+  if (std::ranges::none_of(sheets, [](const Cloth* cloth) { return cloth->is_translucent(); })) return;
   if (picture.copies == 0)
     picture.copies = gl::make_framebuffer(picture.behind.texture(), picture.depth_copy.texture());
   glBindFramebuffer(GL_FRAMEBUFFER, picture.copies);
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
   for (const Cloth* cloth : sheets)
-    if (cloth->is_sheer()) cloth_pass.draw(*cloth, features);
+    if (cloth->is_translucent()) cloth_pass.draw(*cloth, features);
   glDisable(GL_BLEND);
   glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
   picture.depth_copy.change_all();
@@ -297,7 +297,7 @@ void Stage::Impl::draw_depth(std::span<const Cloth* const> sheets, std::span<Poi
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
   glDisable(GL_CULL_FACE);
   for (const Cloth* cloth : sheets)
-    if (!cloth->is_sheer()) cloth_pass.draw_depth(*cloth);
+    if (!cloth->is_translucent()) cloth_pass.draw_depth(*cloth);
   mesh_pass.draw_depth(view.clip_from_world);
   glDisable(GL_CULL_FACE);
   for (const PointSet* set : sets) {
@@ -308,13 +308,13 @@ void Stage::Impl::draw_depth(std::span<const Cloth* const> sheets, std::span<Poi
 }
 
 void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets,
-                              const View& view, const Hiding& hiding) {
+                              const View& view, const Occluders& occluders) {
   glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
   glViewport(0, 0, def.width_px, def.height_px);
   glDepthFunc(GL_GEQUAL);
   for (const Cloth* cloth : sheets)
-    if (!cloth->is_sheer()) cloth_pass.draw(*cloth, features);
-  mesh_pass.draw_opaque(view, hiding, def.width_px, def.height_px);
+    if (!cloth->is_translucent()) cloth_pass.draw(*cloth, features);
+  mesh_pass.draw_opaque(view, occluders, def.width_px, def.height_px);
   glDisable(GL_CULL_FACE);
   for (const PointSet* set : sets) {
     if (set->def.style == PointStyle::sphere) points_pass.draw_spheres(*set, features);
@@ -328,7 +328,7 @@ void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<Po
   glDepthFunc(GL_GREATER);
   picture.depth_copy.change_all();
   picture.behind.change_all();
-  draw_mirrors(sheets, view, hiding.solid);
+  draw_mirrors(sheets, view, occluders.solid);
 }
 
 std::vector<TranslucentBody> Stage::Impl::find_bodies(std::span<const Cloth* const> sheets, const View& view,
@@ -361,7 +361,7 @@ std::vector<TranslucentBody> Stage::Impl::find_bodies(std::span<const Cloth* con
         2.5f * instance.mesh->thickness * instance.scale());
   }
   for (const Cloth* cloth : sheets) {
-    if (!cloth->is_sheer()) continue;
+    if (!cloth->is_translucent()) continue;
     const Vector3f half = Vector3f::Constant(0.5f * cloth->thickness);
     Eigen::AlignedBox3f box = cloth->surface.box();
     add({.cloth = cloth}, {{box.min() - half, box.max() + half}, Eigen::Affine3f::Identity(), false, view},
@@ -597,7 +597,7 @@ void Stage::set_object(PointsHandle points, uint32_t id) {
   impl_->point_sets[points]->object = id;
 }
 
-void Stage::remember() {
+void Stage::store_previous_transforms() {
   Impl& s = *impl_;
   s.camera_before = s.camera;
   s.instances.for_each([](const std::unique_ptr<Instance>& i) { i->before = i->world_from_mesh; });
@@ -651,19 +651,19 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   s.prepare_lamps(sets, offsets, frame);
   s.mesh_pass.prepare(shown, view, s.features);
   const std::vector<const Cloth*> sheets = s.prepare_cloths();
-  Hiding hiding;
-  s.draw_shadows(shown, sheets, sets, view, offsets, frame, hiding);
+  Occluders occluders;
+  s.draw_shadows(shown, sheets, sets, view, offsets, frame, occluders);
   s.draw_depth(sheets, sets, view);
   for (const Cloth* cloth : sheets)
-    if (!cloth->is_sheer()) hiding.solid.push_back(cloth->surface.box());
+    if (!cloth->is_translucent()) occluders.solid.push_back(cloth->surface.box());
   for (const PointSet* set : sets)
-    if (set->def.style == PointStyle::sphere) hiding.solid.push_back(set->box);
-  hiding.sky_reach_m =
+    if (set->def.style == PointStyle::sphere) occluders.solid.push_back(set->box);
+  occluders.sky_reach_m =
       s.environment.occlusion_reach.value_or(kReach * (s.camera.target - s.camera.eye).norm());
-  s.occlusion_pass.draw(s.picture.depth, view, hiding.sky_reach_m,
-                        s.mesh_pass.occluded_area(view, hiding.sky_reach_m, hiding.solid), offsets.count,
-                        frame.shadow.w());
-  s.draw_opaque(sheets, sets, view, hiding);
+  s.occlusion_pass.draw(s.picture.depth, view, occluders.sky_reach_m,
+                        s.mesh_pass.occluded_area(view, occluders.sky_reach_m, occluders.solid),
+                        offsets.count, frame.shadow.w());
+  s.draw_opaque(sheets, sets, view, occluders);
   s.draw_translucent(sheets, sets, view, frame, offsets.index == 0);
   s.draw_lines(view);
 

@@ -188,9 +188,9 @@ class Stage {
   void set_object(ClothHandle cloth, uint32_t id);
   void set_object(PointsHandle points, uint32_t id);
   /// Motion is measured from where everything is now, camera included.
-  void remember();
-  /// Depth, normals, ids and motion of what is in place. `time`: since `remember` [s], by which balls moved
-  /// on with their velocity.
+  void store_previous_transforms();
+  /// Depth, normals, ids and motion of what is in place. `time`: since `store_previous_transforms` [s], by
+  /// which balls moved on with their velocity.
   Channels channels(float time);
 
  private:

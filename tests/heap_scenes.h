@@ -113,8 +113,9 @@ inline World heap_scene(Heap heap, SolverKind solver = SolverKind::automatic, Re
   };
   switch (heap) {
     case Heap::spheres_in_a_silo:
-      world.add_body(
-          {.shape = MeshShape{world.add_mesh(silo_mesh())}, .motion = MotionType::fixed, .restitution = 0.3});
+      world.add_body({.shape = MeshShape{world.add_mesh(silo_mesh())},
+                      .motion = MotionType::static_body,
+                      .restitution = 0.3});
       for (int i = 0; i < 180; ++i)
         world.add_body({.shape = Sphere{0.06 + 0.02 * u(i, 0)},
                         .pose = {Vec3(0.2 * (i % 3 - 1) + 0.04 * u(i, 1), 0.8 + 0.2 * (i / 9),
@@ -123,7 +124,8 @@ inline World heap_scene(Heap heap, SolverKind solver = SolverKind::automatic, Re
                         .friction = 0.4});
       break;
     case Heap::poured_cubes:
-      world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0.5, .friction = 0.6});
+      world.add_body(
+          {.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0.5, .friction = 0.6});
       for (int i = 0; i < 180; ++i)
         world.add_body({.shape = Box{Vec3::Constant(0.2)},
                         .pose = {Vec3(0.32 * (i % 3 - 1) + 0.05 * u(i, 1), 0.5 + 0.35 * (i / 9),
@@ -134,14 +136,15 @@ inline World heap_scene(Heap heap, SolverKind solver = SolverKind::automatic, Re
                         .friction = 0.3 + 0.7 * u(i, 3)});
       break;
     case Heap::ragdolls:
-      world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0, .friction = 0.6});
+      world.add_body(
+          {.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = 0.6});
       for (int i = 0; i < 6; ++i)
         add_ragdoll(world, {Vec3(0.1 * u(i, 1), 0.6 + 0.5 * i, 0.1 * u(i, 2)),
                             Quat(Eigen::AngleAxisd(1.1 * i, Vec3::UnitY())) *
                                 Quat(Eigen::AngleAxisd(0.4 * u(i, 3), Vec3::UnitZ()))});
       break;
     case Heap::bodies_on_terrain:
-      world.add_body({.shape = MeshShape{world.add_mesh(terrain_mesh())}, .motion = MotionType::fixed});
+      world.add_body({.shape = MeshShape{world.add_mesh(terrain_mesh())}, .motion = MotionType::static_body});
       world.add_body(
           {.shape = Box{{2.5, 0.01, 2.5}}, .pose = {Vec3(0, 2, 0), turn(1)}, .velocity = {1, 0, 0.5}});
       world.add_body({.shape = Box{{0.02, 1.5, 0.02}},

@@ -13,7 +13,7 @@ using namespace offstage;
 
 int main() try {
   sim::World world;
-  world.add_body({.name = "ground", .shape = sim::Plane{}, .motion = sim::MotionType::fixed});
+  world.add_body({.name = "ground", .shape = sim::Plane{}, .motion = sim::MotionType::static_body});
 
   // The world owns the particles; the emitter decides when, where and how fast each one starts.
   const auto drops = world.add_particle_system({.name = "drops"});

@@ -26,7 +26,7 @@ int main(int argc, char** argv) try {
                                    .pose = {.position = {-1.2, 1, 0}},
                                    .velocity = {0.8, 4.5, 0},
                                    .angular_velocity = {1, 3, 5}});
-  world.add_body({.name = "ground", .shape = sim::Plane{}, .motion = sim::MotionType::fixed});
+  world.add_body({.name = "ground", .shape = sim::Plane{}, .motion = sim::MotionType::static_body});
   const auto balls = world.add_particle_system({.name = "balls"});
   world.add_particle(balls, {.position = {1, 2, 0}, .mass = 0.5, .radius = 0.3, .restitution = 0.8});
 

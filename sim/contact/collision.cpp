@@ -186,7 +186,7 @@ void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, 
     fastest = std::max(fastest, c.relative_velocity(bodies).cwiseAbs().maxCoeff());
   }
   const auto most = is_bounded ? static_cast<uint32_t>(kUpdates / contacts.size()) : kCollisionSweeps;
-  const uint32_t sweeps = relax(bodies, contacts, most, kRounding * fastest);
+  const uint32_t sweeps = projected_gauss_seidel(bodies, contacts, most, kRounding * fastest);
   const Real left = residual(bodies, contacts);
   work.add({.solves = 1, .iterations = sweeps, .residual = left});
   if (is_bounded || left <= kAcceptedResidual * fastest) return;
@@ -281,7 +281,7 @@ class Cluster {
     if (joints_.empty() && (residual(bodies_, contacts_) > kRoughResidual * fastest_ || added_energy() > 0)) {
       std::copy(before_.begin(), before_.end(), bodies_.begin());
       for (Contact& c : contacts_) c.impulse.setZero();
-      work.iterations += relax(bodies_, contacts_, kPlasticSweeps, kRounding * fastest_);
+      work.iterations += projected_gauss_seidel(bodies_, contacts_, kPlasticSweeps, kRounding * fastest_);
     }
     if (added_energy() > 0) shrink();
     work.residual = residual(bodies_, contacts_);

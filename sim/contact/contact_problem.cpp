@@ -68,8 +68,8 @@ Real added_energy(std::span<const ContactBody> before, std::span<const ContactBo
   return energy;
 }
 
-uint32_t relax(std::span<ContactBody> bodies, std::span<Contact> contacts, uint32_t max_sweeps,
-               Real tolerance) {
+uint32_t projected_gauss_seidel(std::span<ContactBody> bodies, std::span<Contact> contacts,
+                                uint32_t max_sweeps, Real tolerance) {
   std::vector<Mat3> mobilities(contacts.size());
   for (std::size_t i = 0; i < contacts.size(); ++i) mobilities[i] = mobility(contacts[i], bodies);
   for (uint32_t sweep = 1; sweep <= max_sweeps; ++sweep) {

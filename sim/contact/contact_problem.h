@@ -106,7 +106,7 @@ struct ContactWork {
 /// Projected Gauss-Seidel from the impulses that the contacts hold, which the bodies' velocities must already
 /// contain: sweeps in order, each contact solved by itself, until a sweep changes no velocity by more than
 /// `tolerance` [m/s]. Returns the number of sweeps. The fall-back of the other solvers.
-uint32_t relax(std::span<ContactBody> bodies, std::span<Contact> contacts, uint32_t max_sweeps,
-               Real tolerance);
+uint32_t projected_gauss_seidel(std::span<ContactBody> bodies, std::span<Contact> contacts,
+                                uint32_t max_sweeps, Real tolerance);
 
 }  // namespace offstage::sim

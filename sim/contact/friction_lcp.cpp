@@ -308,7 +308,7 @@ void FrictionSolver::solve_by_newton(ContactWork& work) {
 void FrictionSolver::fall_back(ContactWork& work) {
   ++work.fallbacks;
   for (int k = 0; k < kFallbacks && residual(bodies_, contacts_) > kAccepted * scale_; ++k) {
-    work.iterations += relax(bodies_, contacts_, kSweeps, kAccurate * scale_);
+    work.iterations += projected_gauss_seidel(bodies_, contacts_, kSweeps, kAccurate * scale_);
     VectorXd p = impulses();
     const Real before = evaluate(p, false);
     if (polish(p, work) < before) set_impulses(p);

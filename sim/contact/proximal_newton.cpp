@@ -142,7 +142,7 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
     apply(contacts[i], contacts[i].impulse, bodies);
   }
   if (!solved) {
-    work.iterations += relax(bodies, contacts, kMaxSweeps, tolerance);
+    work.iterations += projected_gauss_seidel(bodies, contacts, kMaxSweeps, tolerance);
     ++work.fallbacks;
     left = residual(bodies, contacts);
   }

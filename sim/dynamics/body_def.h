@@ -16,9 +16,9 @@ using BodyHandle = Handle<BodyTag>;
 using SpringHandle = Handle<SpringTag>;
 
 enum class MotionType {
-  fixed,      ///< never moves, costs nothing per step
-  kinematic,  ///< follows its keyframes, pushes others with infinite mass
-  dynamic,    ///< moved by forces
+  static_body,  ///< never moves, costs nothing per step
+  kinematic,    ///< follows its keyframes, pushes others with infinite mass
+  dynamic,      ///< moved by forces
 };
 
 struct BodyDef {

@@ -9,7 +9,7 @@
 
 #include "sim/core/parallel_loop.h"
 #include "sim/world/coupled_system.h"
-#include "sim/world/spring_graph.h"
+#include "sim/world/coupling_graph.h"
 #include "sim/world/world_impl.h"
 
 namespace offstage::sim {
@@ -293,11 +293,11 @@ std::vector<Body*> World::Impl::wake_touched(Real start, Real h) {
 void World::Impl::find_moving_islands() {
   std::vector<std::pair<Body*, Body*>> joined;
   if (!springs.empty() || !articulations.empty()) {
-    const SpringGraph connections(*this);
+    const CouplingGraph connections(*this);
     std::vector<Body*> first(connections.size(), nullptr);
     for (Body* body : awake) {
       const std::size_t c = connections.component(*body);
-      if (c == SpringGraph::kNone) continue;
+      if (c == CouplingGraph::kNone) continue;
       if (first[c]) joined.emplace_back(first[c], body);
       first[c] = body;
     }

@@ -5,7 +5,7 @@
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
 
-#include "sim/world/spring_graph.h"
+#include "sim/world/coupling_graph.h"
 
 namespace offstage::sim {
 namespace {
@@ -52,12 +52,12 @@ void CoupledSystem::gather(WorldState& world, std::span<Body* const> bodies, boo
     lone_.assign(bodies.begin(), bodies.end());
     return;
   }
-  const SpringGraph graph(world);
+  const CouplingGraph graph(world);
   // Networks in the order in which their first members come, which does not depend on addresses.
-  std::vector<std::size_t> index(graph.size(), SpringGraph::kNone);
-  std::vector<NetworkMembers> networks;
-  const auto has_network = [&](std::size_t component) { return index[component] != SpringGraph::kNone; };
-  const auto network = [&](std::size_t component) -> NetworkMembers& {
+  std::vector<std::size_t> index(graph.size(), CouplingGraph::kNone);
+  std::vector<GroupMembers> networks;
+  const auto has_network = [&](std::size_t component) { return index[component] != CouplingGraph::kNone; };
+  const auto network = [&](std::size_t component) -> GroupMembers& {
     if (!has_network(component)) {
       index[component] = networks.size();
       networks.emplace_back();
@@ -65,36 +65,36 @@ void CoupledSystem::gather(WorldState& world, std::span<Body* const> bodies, boo
     return networks[index[component]];
   };
   for (Body* body : bodies) {
-    if (const std::size_t c = graph.component(*body); c != SpringGraph::kNone)
+    if (const std::size_t c = graph.component(*body); c != CouplingGraph::kNone)
       network(c).bodies.push_back(body);
     else
       lone_.push_back(body);
   }
   world.systems.for_each([&](ParticleSystemHandle, ParticleSystem& system) {
     const std::size_t c = graph.component(system);
-    if (c != SpringGraph::kNone && (all_systems || has_network(c))) network(c).systems.push_back(&system);
+    if (c != CouplingGraph::kNone && (all_systems || has_network(c))) network(c).systems.push_back(&system);
   });
   world.springs.for_each([&](SpringHandle, const Spring& spring) {
     const std::size_t c = graph.component(spring);
-    if (c != SpringGraph::kNone && has_network(c)) network(c).springs.push_back(&spring);
+    if (c != CouplingGraph::kNone && has_network(c)) network(c).springs.push_back(&spring);
   });
   for (const auto& articulation : world.articulations) {
     const std::size_t c = graph.component(*articulation);
     if (has_network(c)) network(c).articulations.push_back(articulation.get());
   }
   networks_.reserve(networks.size());
-  for (NetworkMembers& members : networks) networks_.emplace_back(world, std::move(members), forces_);
+  for (GroupMembers& members : networks) networks_.emplace_back(world, std::move(members), forces_);
 }
 
 JointTally CoupledSystem::joint_tally() const {
   JointTally sum;
-  for (const SpringNetwork& n : networks_) sum.add(n.joint_tally());
+  for (const CoupledGroup& n : networks_) sum.add(n.joint_tally());
   return sum;
 }
 
 bool CoupledSystem::holds(const ParticleSystem& system) const {
   return std::any_of(networks_.begin(), networks_.end(),
-                     [&](const SpringNetwork& n) { return n.holds(system); });
+                     [&](const CoupledGroup& n) { return n.holds(system); });
 }
 
 void CoupledSystem::step(const Integrator& integrator, Real t, Real h, Real tolerance) {
@@ -131,12 +131,12 @@ void CoupledSystem::save() {
   kept_.clear();
   kept_.reserve(lone_.size());
   for (const Body* body : lone_) kept_.push_back(body->rigid.state());
-  for (SpringNetwork& n : networks_) n.save();
+  for (CoupledGroup& n : networks_) n.save();
 }
 
 void CoupledSystem::restore() {
   for (std::size_t i = 0; i < lone_.size(); ++i) lone_[i]->rigid.set_state(kept_[i]);
-  for (SpringNetwork& n : networks_) n.restore();
+  for (CoupledGroup& n : networks_) n.restore();
 }
 
 void CoupledSystem::restore(std::span<Body* const> bodies) {
@@ -148,7 +148,7 @@ void CoupledSystem::restore(std::span<Body* const> bodies) {
     const auto at = std::lower_bound(lone_index_.begin(), lone_index_.end(), std::pair(body, std::size_t{0}));
     if (at != lone_index_.end() && at->first == body) lone_[at->second]->rigid.set_state(kept_[at->second]);
   }
-  for (SpringNetwork& n : networks_)
+  for (CoupledGroup& n : networks_)
     if (std::find_first_of(n.bodies().begin(), n.bodies().end(), bodies.begin(), bodies.end()) !=
         n.bodies().end())
       n.restore();

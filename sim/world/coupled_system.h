@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "sim/world/spring_network.h"
+#include "sim/world/coupled_group.h"
 
 namespace offstage::sim {
 
@@ -48,7 +48,7 @@ class CoupledSystem {
   std::vector<ActiveForce> active_;
   BodyForces forces_;
   std::vector<Body*> lone_;
-  std::vector<SpringNetwork> networks_;
+  std::vector<CoupledGroup> networks_;
   std::vector<RigidState> kept_;                                 // of the lone bodies
   std::vector<std::pair<const Body*, std::size_t>> lone_index_;  // by address; made when first needed
   IntegratorReport report_;

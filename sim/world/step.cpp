@@ -223,7 +223,7 @@ void World::Impl::retire(Body& body, StepReport& report) {
   }
   body.rigid.momentum.setZero();
   body.rigid.angular_momentum.setZero();
-  body.type = MotionType::fixed;
+  body.type = MotionType::static_body;
   fixed_changed = lists_changed = joints_changed = true;
   report.bodies_retired.push_back(body.handle);
 }

@@ -31,8 +31,8 @@ void run(uint32_t cells, bool self_collision, Real rate) {
   def.self_collision = self_collision;
   if (rate > 0) def.substep = 1 / rate;
   World world;
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
-  world.add_body({.shape = Sphere{1}, .motion = MotionType::fixed, .pose = {{0, 1, 0}}});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
+  world.add_body({.shape = Sphere{1}, .motion = MotionType::static_body, .pose = {{0, 1, 0}}});
   const ClothHandle cloth = world.add_cloth(def);
   constexpr int kFrames = 72;
   double total = 0, worst = 0;
@@ -71,7 +71,8 @@ void run_peer(uint32_t nodes, Real rate) {
   for (uint32_t corner : {0u, cells})
     def.pins.push_back({.vertex = corner, .position = def.vertices[corner]});
   World world;
-  world.add_body({.shape = Sphere{0.4}, .motion = MotionType::fixed, .pose = {{0, 1.2, 0}}, .friction = 0.5});
+  world.add_body(
+      {.shape = Sphere{0.4}, .motion = MotionType::static_body, .pose = {{0, 1.2, 0}}, .friction = 0.5});
   const ClothHandle cloth = world.add_cloth(def);
   constexpr int kSteps = 960;
   const double before = cpu_seconds();

@@ -44,7 +44,7 @@ void turbulence(benchmark::State& state) {
 /// Particles that fall far above the ground.
 void step(benchmark::State& state, const std::vector<ForceDef>& forces) {
   World world({.max_step = kForcesStep});
-  world.add_body({.name = "ground", .shape = Plane{}, .motion = MotionType::fixed});
+  world.add_body({.name = "ground", .shape = Plane{}, .motion = MotionType::static_body});
   const auto system = world.add_particle_system({.linear_drag = 1e-3});
   for (std::size_t i = 0; i < static_cast<std::size_t>(state.range(0)); ++i)
     world.add_particle(system, {.position = random_point(i, 50) + Vec3(0, 500, 0), .mass = 0.001});

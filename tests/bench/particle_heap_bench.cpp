@@ -27,7 +27,7 @@ void run_heap(benchmark::State& state, World& world, int warm_up) {
 /// Particles in a lattice with some disorder, twice as high as it is wide, on rough ground.
 World column(std::size_t count) {
   World world({.max_step = kHeapStep});
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0});
   const auto system = world.add_particle_system({.internal = true});
   const effects::RandomStream random(1, 0);
   const auto side = static_cast<std::size_t>(std::ceil(std::cbrt(static_cast<Real>(count) / 2)));

@@ -15,7 +15,7 @@ constexpr Real kParticlesStep = 1.0 / 240;
 /// `count` particles above a plane; the drop height says how soon they come to lie on it.
 World rain(std::size_t count, Real height, ParticleSystemHandle& system) {
   World world({.max_step = kParticlesStep});
-  world.add_body({.name = "ground", .shape = Plane{}, .motion = MotionType::fixed});
+  world.add_body({.name = "ground", .shape = Plane{}, .motion = MotionType::static_body});
   system = world.add_particle_system({.name = "rain", .linear_drag = 1e-5});
   const effects::RandomStream random(1, 0);
   for (std::size_t i = 0; i < count; ++i)
@@ -59,7 +59,7 @@ void on_mesh_in_eddies(benchmark::State& state) {
   World world = rain(static_cast<std::size_t>(state.range(0)), 5, system);
   world.add_body({.name = "torus",
                   .shape = MeshShape{world.add_mesh(torus_mesh(2, 0.8, 144, 64))},
-                  .motion = MotionType::fixed,
+                  .motion = MotionType::static_body,
                   .pose = {.position = {5, 2.5, 5}}});
   world.add_force(
       {.systems = {system}, .effect = Turbulence{.speed = 3, .scale = 2, .octaves = 2, .drag = 1e-3}});

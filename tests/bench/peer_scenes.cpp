@@ -51,7 +51,7 @@ class Engine {
         dt_(dt) {
     MeshHandle hull;
     for (const peer::Body& b : scene.bodies) {
-      BodyDef def{.motion = b.mass > 0 ? MotionType::dynamic : MotionType::fixed,
+      BodyDef def{.motion = b.mass > 0 ? MotionType::dynamic : MotionType::static_body,
                   .pose = {vec(b.pos), Quat(b.rot.w, b.rot.x, b.rot.y, b.rot.z)},
                   .velocity = vec(b.vel),
                   .mass = b.mass,

@@ -84,7 +84,9 @@ TEST(Commands, ValidateWarnsOfBodiesThatBeginInEachOther) {
     {"name": "ghost", "position": [3, 0.5, 0], "collides": false, "shape": {"type": "box", "size": [1, 1, 1]}}]})");
   const Outcome run = offstage("validate s.json", folder.path());
   EXPECT_EQ(run.code, 0);
-  EXPECT_NE(run.err.find("/bodies/2: \"sunk\" begins 10 mm inside \"floor\""), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("/bodies/2: body 'sunk' overlaps body 'floor' by 10 mm at time 0"),
+            std::string::npos)
+      << run.err;
   EXPECT_EQ(run.err.find("rests"), std::string::npos) << run.err;
   EXPECT_EQ(run.err.find("ghost"), std::string::npos) << run.err;
 }

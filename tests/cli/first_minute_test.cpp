@@ -141,7 +141,7 @@ TEST_F(Encode, NamesTheFrameThatIsWrongAndWritesNothing) {
   fails_with("'f/####.png' -o a.mp4", "f/0005.png: is 64x36, but frame 3 is 96x54");
   const std::string whole = read_file(folder_ / "0005.png");
   write_file(folder_ / "f/0005.png", whole.substr(0, whole.size() / 2));
-  fails_with("'f/####.png' -o a.mp4", "f/0005.png: is not a whole PNG file");
+  fails_with("'f/####.png' -o a.mp4", "f/0005.png: is not a complete PNG file");
   fails_with("'f/###.png' -o a.mp4", "did you mean 'f/####.png'?");
   fails_with("f/0003.png -o a.mp4", "did you mean 'f/####.png'?");
   fails_with("f/*.png -o a.mp4", "in quotes");

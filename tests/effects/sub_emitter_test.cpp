@@ -69,7 +69,7 @@ struct Rain {
 Rain rain(int threads, const SubEmitterDef& def) {
   tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
   World world;
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
   const auto drops = world.add_particle_system({.dies_on_hit = true, .report_collisions = true}),
              splash = world.add_particle_system({});
   Emitter emitter({.surface = {.kind = SurfaceKind::disc,
@@ -125,7 +125,7 @@ TEST(SubEmitter, AnswersItsPartOfTheHitsAndNoMoreThanItMay) {
 
 TEST(SubEmitter, FliesAboutTheNormalOfTheHitFromItsPoint) {
   World world({.gravity = Vec3::Zero()});
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
   const auto drops = world.add_particle_system({.dies_on_hit = true, .report_collisions = true}),
              splash = world.add_particle_system({});
   world.add_particle(drops, {.position = {0, 1, 0}, .velocity = {3, -9, 0}, .radius = 0.1});

@@ -71,7 +71,7 @@ class Generator {
         size[axis] = kWall;
         RandomScene::Body wall{surface(), {}};
         wall.def.name = "wall" + std::to_string(scene_.bodies.size());
-        wall.def.motion = MotionType::fixed;
+        wall.def.motion = MotionType::static_body;
         wall.def.shape = Box{size};
         wall.def.pose.position = side * (r + kWall / 2) * Vec3::Unit(axis);
         scene_.bodies.push_back(wall);
@@ -335,7 +335,7 @@ std::string text(const RandomScene& scene) {
   for (const RandomScene::Body& body : scene.bodies) {
     const BodyDef& d = body.def;
     out << "{\"name\": \"" << d.name << "\", \"motion\": \""
-        << (d.motion == MotionType::fixed       ? "static"
+        << (d.motion == MotionType::static_body ? "static"
             : d.motion == MotionType::kinematic ? "kinematic"
                                                 : "dynamic")
         << "\", \"shape\": " << (body.mesh ? "mesh " + std::to_string(*body.mesh) : text(d.shape))
@@ -411,8 +411,8 @@ struct Momenta {
 /// that turns by the angle w h in a sub-step leaves its tangent by R (w h)^2 / 2, up to what is looked at in
 /// pieces: a quarter of the body; for as much, two bodies may get into each other. Overlaps are pushed out by
 /// a fifth in each sub-step, so that what the sub-steps before have left adds up. Where the bounded number of
-/// trace-backs in a sub-step was used up, or the bodies spin fast, two may get as far as they move against each
-/// other.
+/// trace-backs in a sub-step was used up, or the bodies spin fast, two may get as far as they move against
+/// each other.
 class Overlap {
  public:
   Overlap(const RandomScene& scene, std::span<const BodyHandle> bodies) : scene_(scene), bodies_(bodies) {}
@@ -423,7 +423,7 @@ class Overlap {
     Motions now;
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
       const RandomScene::Body& body = scene_.bodies[i];
-      if (body.def.motion == MotionType::fixed) continue;
+      if (body.def.motion == MotionType::static_body) continue;
       const Motion motion = world.body_motion(bodies_[i], world.time());
       const Real angle = h * motion.angular_velocity.norm();
       const bool is_ball = !body.mesh && std::holds_alternative<Sphere>(body.def.shape);

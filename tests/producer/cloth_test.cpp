@@ -58,18 +58,17 @@ TEST(Cloths, TopIsUpAndTheFrontTowardsTheViewerWhenTurnedByNinetyDegrees) {
 TEST(Cloths, WhatCannotBeIsRefusedWithWhatCan) {
   EXPECT_EQ(cloth_errors(R"({"fabric": "denin"})"),
             "/cloths/0/fabric: there is no fabric 'denin'; did you mean 'denim'?\n");
-  EXPECT_EQ(
-      cloth_errors(R"({"pins": [{"type": "box", "centre": [0, 5, 0]}]})"),
-      "/cloths/0/pins/0: holds no vertex of the cloth; in its own frame it reaches from (-0.5, 0, -0.5) to "
-      "(0.5, 0, 0.5)\n");
+  EXPECT_EQ(cloth_errors(R"({"pins": [{"type": "box", "centre": [0, 5, 0]}]})"),
+            "/cloths/0/pins/0: selects no vertex of the cloth; in its own frame the cloth extends from "
+            "(-0.5, 0, -0.5) to (0.5, 0, 0.5)\n");
   EXPECT_EQ(
       cloth_errors(R"({"pins": [{"type": "corners", "body": "hand"}]})", R"(, "bodies": [{"name": "band"}])"),
       "/cloths/0/pins/0/body: there is no body 'hand'; did you mean 'band'?\n");
   EXPECT_EQ(cloth_errors(R"({"shape": {"type": "grid", "cells": [900, 900]}})"),
-            "/cloths/0: has 811801 vertices; a cloth may have 250000 at most\n");
+            "/cloths/0: has 811801 vertices; a cloth has at most 250000\n");
   EXPECT_EQ(cloth_errors(R"({"seams": [{"type": "sides", "a": "left", "b": "top"}],
                           "shape": {"type": "grid", "cells": [4, 2]}})"),
-            "/cloths/0: joins a side of 3 vertices to one of 5; they must be as many\n");
+            "/cloths/0: joins a side of 3 vertices to a side of 5; the numbers must be equal\n");
   EXPECT_EQ(cloth_errors(R"({"shape": {"type": "mesh", "file": "none.glb"}})")
                 .find("/cloths/0/shape/file: there is"),
             0u);

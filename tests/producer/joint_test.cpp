@@ -50,16 +50,16 @@ TEST(SceneJoints, WhatCannotBeIsRefusedWithWhatCan) {
   EXPECT_EQ(joint_errors(bodies + R"("joints": [{"a": "dor"}])"),
             "/joints/0/a: there is no body 'dor'; did you mean 'door'?\n");
   EXPECT_EQ(joint_errors(bodies + R"("joints": [{"a": "wall"}])"),
-            "/joints/0: joins nothing that forces can move: one of its bodies must be dynamic\n");
+            "/joints/0: has no dynamic body: at least one of \"a\" and \"b\" must be dynamic\n");
   EXPECT_EQ(joint_errors(bodies + R"("joints": [{"type": "revolute", "a": "door", "limits": [-1, 1]},
                                              {"type": "revolute", "a": "door", "limits_deg": [10, 20]}])"),
             "/joints/0/limits: is for prismatic and distance joints; use \"limits_deg\"\n"
-            "/joints/1/limits_deg: must be a range that contains 0, where the joint is at time 0\n");
+            "/joints/1/limits_deg: must be a range that contains 0, the position of the joint at time 0\n");
   EXPECT_EQ(joint_errors(bodies + R"("joints": [{"a": "door", "motor": {}}])"),
             "/joints/0/motor: drives revolute, prismatic and distance joints only\n");
   EXPECT_EQ(joint_errors(bodies + R"("articulations": [{"type": "chain", "end": "world"}])"),
-            "/articulations/0/sag: must be over 1.0005 if both ends are held still: a taut chain bears "
-            "nothing across\n");
+            "/articulations/0/sag: must be above 1.0005 if both ends are fixed: a taut chain cannot carry a "
+            "sideways load\n");
   EXPECT_EQ(joint_errors(bodies + R"("articulations": [{"type": "chain", "sag": 1.1, "end": "dor"}])"),
             "/articulations/0/end: there is no body 'dor'; did you mean 'door'?\n");
 }
@@ -171,13 +171,12 @@ TEST(ModelTrees, AreTheNodesOfTheirFile) {
   EXPECT_LT((finger.anchor - Vec3(1, 2 * 2.135, 0.32)).norm(), 1e-6);
   EXPECT_EQ(scene.joints[0].b, "");
 
-  EXPECT_EQ(joint_errors(R"("articulations": [)" + arm +
-                         R"({"node": "hnad"}, {"node": "hand", "type": "distance"}]}])"),
-            "/articulations/0/joints/0/node: assets/models/robot_arm.glb has no node 'hnad' with triangles; "
-            "did you mean "
-            "'hand'?\n/articulations/0/joints/1/type: must be another: a node and the one above it have no "
-            "distance to "
-            "keep\n");
+  EXPECT_EQ(
+      joint_errors(R"("articulations": [)" + arm +
+                   R"({"node": "hnad"}, {"node": "hand", "type": "distance"}]}])"),
+      "/articulations/0/joints/0/node: assets/models/robot_arm.glb has no node 'hnad' with triangles; did "
+      "you mean 'hand'?\n"
+      "/articulations/0/joints/1/type: must not be \"distance\": the joint is at the origin of the node\n");
   EXPECT_NE(joint_errors(R"("articulations": [{"type": "model", "file": "none.glb"}])")
                 .find("/articulations/0/file: "),
             std::string::npos);

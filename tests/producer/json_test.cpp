@@ -72,7 +72,7 @@ TEST(Json, SyntaxErrorsSayWhatAndWhere) {
   EXPECT_EQ(error_of("{\n\"a\": 1,\n}"), "f:2:7: trailing comma before '}'; remove it");
   EXPECT_EQ(error_of(""), "f:1:1: the file is empty");
   EXPECT_EQ(error_of("// nothing\n"), "f:2:1: the file is empty");
-  EXPECT_EQ(error_of("{\"a\": 1"), "f:1:8: the text ends too early; expected '}'");
+  EXPECT_EQ(error_of("{\"a\": 1"), "f:1:8: the file ends too early; expected '}'");
   EXPECT_EQ(error_of("[1 2]"), "f:1:4: unexpected number literal; expected ']'");
   EXPECT_EQ(error_of("{a: 1}"), "f:1:2: invalid literal; expected string literal");
   EXPECT_EQ(error_of("{\"a\" 1}"), "f:1:6: unexpected number literal; expected ':'");
@@ -101,7 +101,7 @@ TEST(Json, NestingIsBounded) {
 }
 
 TEST(Json, ZeroBytesAreNoText) {
-  EXPECT_EQ(error_of(std::string("{}\0{", 4)), "f: not a text: it has a zero byte");
+  EXPECT_EQ(error_of(std::string("{}\0{", 4)), "f:1:3: is not a text file: it contains a zero byte");
 }
 
 TEST(Json, NumbersAreWrittenSoThatTheyReadBackBitForBit) {

@@ -28,22 +28,22 @@ struct Relay {
     Pipeline pipeline(window);
     std::atomic<int> pushed = 0, taken = 0;
     {
-      std::vector<std::jthread> crew;
+      std::vector<std::jthread> workers;
       for (int i = 0; i < drawers; ++i)
-        crew.emplace_back([&] {
+        workers.emplace_back([&] {
           guarded(pipeline, [&] {
-            while (auto shot = pipeline.take_shot()) {
-              if (shot->index == throw_in_draw) throw std::runtime_error("draw");
-              if (shot->index % 7 == 0) std::this_thread::yield();
-              pipeline.give_print({std::move(*shot), {}, 0});
+            while (auto frame_job = pipeline.take_job()) {
+              if (frame_job->index == throw_in_draw) throw std::runtime_error("draw");
+              if (frame_job->index % 7 == 0) std::this_thread::yield();
+              pipeline.give_rendered({std::move(*frame_job), {}, 0});
             }
           });
         });
-      crew.emplace_back([&] {
+      workers.emplace_back([&] {
         guarded(pipeline, [&] {
-          while (auto print = pipeline.take_print()) {
-            if (print->shot.index == throw_in_print) throw std::runtime_error("print");
-            printed.push_back(print->shot.index);
+          while (auto rendered = pipeline.take_rendered()) {
+            if (rendered->frame_job.index == throw_in_print) throw std::runtime_error("print");
+            printed.push_back(rendered->frame_job.index);
             ++taken;
           }
         });
@@ -54,7 +54,7 @@ struct Relay {
           if (!pipeline.push({.index = i, .frame = i + 1})) return;
           most_ahead = std::max(most_ahead, ++pushed - taken);
         }
-        pipeline.no_more_shots();
+        pipeline.no_more_jobs();
       });
     }
     try {
@@ -82,7 +82,7 @@ TEST(Pipeline, AFailureOfAnyStageEndsAllAndIsTheOneReported) {
     shoot(), draw(), print();
     EXPECT_EQ(shoot.failure, "shoot");
     EXPECT_EQ(draw.failure, "draw");
-    EXPECT_EQ(print.failure, "print");
+    EXPECT_EQ(rendered.failure, "print");
     EXPECT_LE(draw.printed.size(), static_cast<std::size_t>(at)) << "nothing after the missing frame";
   }
 }
@@ -94,7 +94,7 @@ TEST(Pipeline, EndsWithoutShotsAndWithoutDrawers) {
 
   // As when no drawing thread could be started: the failure reaches those that wait.
   Pipeline pipeline(2);
-  std::jthread sink([&] { EXPECT_FALSE(pipeline.take_print()); });
+  std::jthread sink([&] { EXPECT_FALSE(pipeline.take_rendered()); });
   std::jthread shooter([&] {
     for (int i = 0; pipeline.push({.index = i, .frame = i + 1}); ++i)
       ASSERT_LT(i, 2) << "the window was ignored";

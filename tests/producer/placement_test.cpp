@@ -113,7 +113,7 @@ TEST(Placement, CopiesThatFindNoPlaceAreLeftOutWithAWarning) {
   ASSERT_EQ(loaded.warnings.size(), 1u);
   EXPECT_EQ(loaded.warnings[0].describe(),
             "s:1:41: /bodies/0/scatter: " + std::to_string(50 - loaded.scene.bodies.size()) +
-                " copies found no place: make min_distance smaller or size larger");
+                " copies found no free place: reduce min_distance or enlarge size");
 }
 
 TEST(Placement, KindsMultiplyAndEachGroupScattersByItself) {
@@ -143,9 +143,9 @@ TEST(Placement, TooManyCopiesAreAnErrorWhateverTheProduct) {
     scene_of(scene);
     FAIL();
   } catch (const SceneError& error) {
-    EXPECT_STREQ(
-        error.what(),
-        "scene:1:13: /bodies/0: asks for more than 100000 copies: repeat, grid and scatter multiply");
+    EXPECT_STREQ(error.what(),
+                 "scene:1:13: /bodies/0: asks for more than 100000 copies: the counts of repeat, grid and "
+                 "scatter multiply");
   }
 }
 

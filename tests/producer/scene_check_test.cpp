@@ -31,11 +31,11 @@ std::string warnings_of(const std::string& text) {
 
 TEST(SceneCheck, NamesAreUniqueWithinASection) {
   EXPECT_EQ(errors_of(R"({"bodies": [{"name": "a"}, {"name": "a"}], "particles": [{"name": "a"}]})"),
-            "/bodies/1/name: the name 'a' is already that of /bodies/0\n");
+            "/bodies/1/name: the name 'a' is already used by /bodies/0\n");
   EXPECT_EQ(errors_of(R"({"bodies": [{}, {"name": "body_0"}]})"),
-            "/bodies/1/name: the name 'body_0' is already that of /bodies/0\n");
+            "/bodies/1/name: the name 'body_0' is already used by /bodies/0\n");
   EXPECT_EQ(errors_of(R"({"bodies": [{"name": "a", "repeat": {"count": 2}}, {"name": "a_1"}]})"),
-            "/bodies/1/name: the name 'a_1' is already that of /bodies/0\n");
+            "/bodies/1/name: the name 'a_1' is already used by /bodies/0\n");
 }
 
 TEST(SceneCheck, NamesLeadSomewhere) {
@@ -70,11 +70,11 @@ TEST(SceneCheck, OverlaysShowWhatThereIs) {
       {"type": "closest", "a": "rock", "b": "floor"}]})"),
             "/overlays/0/body: the body 'ball' has no mesh\n"
             "/overlays/1/body: there is no body 'rokc'; did you mean 'rock'?\n"
-            "/overlays/2/level: must be a number or a curve over time: nothing here is random\n"
-            "/overlays/3/explode: must be a number or a curve over time: nothing here is random\n"
-            "/overlays/4/b: is the same body as a\n"
+            "/overlays/2/level: must be a number or a curve over time, not a random distribution\n"
+            "/overlays/3/explode: must be a number or a curve over time, not a random distribution\n"
+            "/overlays/4/b: is the same body as \"a\"\n"
             "/overlays/5/b: there is no body ''; known: 'ball', 'floor', 'wall', 'rock'\n"
-            "/overlays/6: two planes have no contact that could be shown\n");
+            "/overlays/6: two planes never have a contact\n");
   EXPECT_EQ(errors_of(R"({"overlays": [{"type": "tree", "body": "a", "level": -1}, {"body": "a"}]})"),
             "/overlays/0/body: there is no body 'a'\n"
             "/overlays/0/level: must be between 0 and 16, got -1\n"
@@ -96,8 +96,8 @@ TEST(SceneCheck, OnlyKinematicBodiesFollowKeysAndPlanesDoNotMove) {
       errors_of(
           R"({"bodies": [{"keyframes": [{}]}, {"motion": "static", "spin": [0, 1, 0]}, {"shape": {"type": "plane"}},
                                      {"motion": "kinematic", "keyframes": [{"time": 1}, {"time": 1}, {"time": 0}]}]})"),
-      "/bodies/0/keyframes: only a kinematic body follows keyframes; give it \"motion\": \"kinematic\"\n"
-      "/bodies/1/spin: only a kinematic body spins by itself; give it \"motion\": \"kinematic\"\n"
+      "/bodies/0/keyframes: only kinematic bodies follow keyframes; give the body \"motion\": \"kinematic\"\n"
+      "/bodies/1/spin: only kinematic bodies have a spin; give the body \"motion\": \"kinematic\"\n"
       "/bodies/2/shape: a plane cannot be dynamic; give the body \"motion\": \"static\"\n"
       "/bodies/3/keyframes/1/time: times must increase, got 1 after 1\n"
       "/bodies/3/keyframes/2/time: times must increase, got 0 after 1\n");
@@ -107,16 +107,16 @@ TEST(SceneCheck, CameraAndSunCanBeUsed) {
   EXPECT_EQ(
       errors_of(
           R"({"camera": {"eye": [1, 1, 1], "target": [1, 1, 1]}, "lights": [{"direction": [1, 0, 0]}, {}]})"),
-      "/camera: the camera is where it looks at\n"
+      "/camera: the camera is at the point that it looks at\n"
       "/lights/0/direction: the sun must be above the horizon: y must be greater than 0\n"
-      "/lights/1: there can be only one sun\n");
+      "/lights/1: a scene has at most one sun\n");
   EXPECT_EQ(errors_of(R"({"camera": {"type": "keyframes"}})"),
             "/camera: needs at least one of \"keyframes\"\n");
 }
 
 TEST(SceneCheck, AFilmHasAtLeastOneFrame) {
   EXPECT_EQ(errors_of(R"({"output": {"fps": 10, "duration": 0.04}})"),
-            "/output/duration: is too short for a single frame at 10 frames per second\n");
+            "/output/duration: is shorter than one frame at 10 frames per second\n");
   EXPECT_EQ(errors_of(R"({"output": {"fps": 10, "duration": 0.06}})"), "");
 }
 
@@ -129,10 +129,11 @@ TEST(SceneCheck, WhatHasNoEffectIsWarnedOf) {
     "render": {"size": [321, 180]}})"),
             "/materials/0: the material 'lone' is not used\n"
             "/bodies/0/velocity: has no effect: the body is not dynamic\n"
-            "/bodies/1/density: has no effect: the mass is given\n"
-            "/emitters/0: releases no particles: rate, count and bursts are zero, or never in the film\n"
+            "/bodies/1/density: has no effect: \"mass\" is given\n"
+            "/emitters/0: releases no particles: rate, count and bursts are zero, or their times are outside "
+            "the film\n"
             "/springs/0: has no effect: neither end can move\n"
-            "/render/size: is odd: most video formats need even numbers\n");
+            "/render/size: is odd; most video formats need an even width and height\n");
 }
 
 TEST(SceneCheck, ContactRulesNameTwoMaterialsOnce) {
@@ -141,7 +142,7 @@ TEST(SceneCheck, ContactRulesNameTwoMaterialsOnce) {
     "contacts": [{"materials": ["ice", "steel"], "friction": 0.02}, {"materials": ["steel", "ice"], "friction": 1},
                  {"materials": ["ice", "stele"], "restitution": 1}, {"materials": ["ice"]}, {"friction": 1},
                  {"materials": ["ice", ""], "restitution": 2}]})"),
-            "/contacts/1/materials: are already those of /contacts/0\n"
+            "/contacts/1/materials: are the same pair as in /contacts/0\n"
             "/contacts/2/materials/1: there is no material 'stele'; did you mean 'steel'?\n"
             "/contacts/3/materials: must be a list of 2 values, got 1 items\n"
             "/contacts/4/materials: is required: names of two materials, in any order; may be the same\n"
@@ -149,7 +150,7 @@ TEST(SceneCheck, ContactRulesNameTwoMaterialsOnce) {
             "/contacts/5/restitution: must be between 0 and 1, got 2\n");
   EXPECT_EQ(warnings_of(R"({"materials": [{"name": "ice"}], "bodies": [{"material": "ice"}],
                            "contacts": [{"materials": ["ice", "ice"]}]})"),
-            "/contacts/0: has no effect: gives neither restitution nor friction\n");
+            "/contacts/0: has no effect: it has neither restitution nor friction\n");
 }
 
 TEST(SceneCheck, FrictionAcrossAGrainTakesMaterialAndAxis) {
@@ -163,8 +164,7 @@ TEST(SceneCheck, FrictionAcrossAGrainTakesMaterialAndAxis) {
   EXPECT_EQ(
       errors_of(R"({"materials": [{"name": "skate", "friction": 0, "cross_friction": 1}],
     "bodies": [{"material": "skate", "friction_axis": [1, 0, 0]}]})"),
-      "/materials/0/cross_friction: takes a friction along the grain, too, of which it is a share; allowed "
-      "is any but 0, such as 0.001\n");
+      "/materials/0/cross_friction: needs a \"friction\" above 0, which it is relative to, such as 0.001\n");
 }
 
 TEST(SceneCheck, ForcesActOnWhatThereIs) {
@@ -174,10 +174,10 @@ TEST(SceneCheck, ForcesActOnWhatThereIs) {
                {"type": "grab", "body": "ball", "keyframes": [{"time": 1}, {"time": 1}]},
                {"type": "explosion", "name": "force_0"}, {"type": "field"}]})"),
             "/forces/0/bodies/1: there is no body 'bal'; did you mean 'ball'?\n"
-            "/forces/1/end: must be after the start, 0 s\n"
+            "/forces/1/end: must be later than the start, 0 s\n"
             "/forces/2: needs at least one of \"keyframes\"\n"
             "/forces/3/keyframes/1/time: times must increase, got 1 after 1\n"
-            "/forces/4/name: the name 'force_0' is already that of /forces/0\n"
+            "/forces/4/name: the name 'force_0' is already used by /forces/0\n"
             "/forces/5/type: must be one of \"constant\", \"point\", \"wind\", \"grab\", \"explosion\", "
             "\"vortex\", \"turbulence\", \"gravitation\", \"coulomb\" or \"lennard_jones\", got the string "
             "\"field\"\n");
@@ -195,13 +195,11 @@ TEST(SceneCheck, GrabsAndWindsTooStrongForTheStepAreRefusedUnlessTheIntegratorFo
                  {"type": "grab", "body": "ball", "keyframes": [{}], "stiffness": 90000, "damping": 0}]})";
   };
   // 2.785 m / c = 0.0093 s, and 2.83 sqrt(m / k) = 0.0094 s.
-  EXPECT_EQ(
-      errors_of(scene("rk4")),
-      "/forces/0/drag: is too much for the step and so small a mass: /world/step must be less than 0.00924 "
-      "s, "
-      "is 0.01 s\n"
-      "/forces/1: the grab 'force_1' is too stiff for the step: /world/step must be less than 0.00938 s, is "
-      "0.01 s\n");
+  EXPECT_EQ(errors_of(scene("rk4")),
+            "/forces/0/drag: is too large for this mass and sub-step: /world/step must be less than 0.00924 "
+            "s, is 0.01 s\n"
+            "/forces/1: the grab 'force_1' is too stiff for this sub-step: /world/step must be less than "
+            "0.00938 s, is 0.01 s\n");
   for (const char* integrator : {"implicit_euler", "adaptive_rk4", "dormand_prince"})
     EXPECT_EQ(errors_of(scene(integrator)), "");
 }
@@ -210,10 +208,9 @@ TEST(SceneCheck, WhatIsToHappenAtAnAgeThatNoParticleReachesIsAnError) {
   const auto scene = [](const std::string& more) {
     return R"({"emitters": [{"lifespan": {"mean": 1, "deviation": 0.2}, )" + more + "}]}";
   };
-  EXPECT_EQ(
-      errors_of(scene(R"("split": {"age": 1.5})")),
-      "/emitters/0/split/age: is 1.5 s, but particles live 1.2 s at most and never split; allowed is less "
-      "than the lifespan\n");
+  EXPECT_EQ(errors_of(scene(R"("split": {"age": 1.5})")),
+            "/emitters/0/split/age: is 1.5 s, but the lifespan is at most 1.2 s, so particles never split; "
+            "it must be less than the lifespan\n");
   EXPECT_NE(errors_of(scene(R"("trails": [{"start_age": 1.2}])")), "");
   EXPECT_NE(errors_of(scene(R"("on_age": [{"age": 2}])")), "");
   EXPECT_NE(errors_of(scene(R"("on_death": [{"lifespan": 0.3, "split": {"age": 0.3}}])")), "");
@@ -270,8 +267,8 @@ TEST(SceneCheck, ASpringTooStiffForItsStepIsNamedWithTheStepItNeeds) {
   // Reduced mass 1 kg: 2 sqrt(1 / k) = 0.01 s at k = 40000 N/m, 2.83 sqrt(1 / k) at k = 80000.
   EXPECT_EQ(errors_of(scene(39000, "symplectic_euler")), "");
   EXPECT_EQ(errors_of(scene(41000, "symplectic_euler")),
-            "/springs/0: the spring 'tie' is too stiff for the step: /world/step must be less than 0.00983 "
-            "s, is 0.01 s\n");
+            "/springs/0: the spring 'tie' is too stiff for this sub-step: /world/step must be less than "
+            "0.00983 s, is 0.01 s\n");
   EXPECT_EQ(errors_of(scene(79000, "rk4")), "");
   EXPECT_NE(errors_of(scene(81000, "rk4")), "");
 }
@@ -279,20 +276,20 @@ TEST(SceneCheck, ASpringTooStiffForItsStepIsNamedWithTheStepItNeeds) {
 TEST(SceneCheck, ASpringEndMustBeOneThing) {
   EXPECT_EQ(errors_of(R"({"bodies": [{"name": "b"}], "particles": [{"name": "p", "places": [{}]}],
     "springs": [{"a": {"body": "b", "particles": "p"}}, {"a": {"particles": "p"}, "b": {"particles": "p"}}]})"),
-            "/springs/0/a: must be on a body or a particle, not both\n"
+            "/springs/0/a: must name a body or a particle, not both\n"
             "/springs/1: has the same particle at both ends\n");
 }
 
 // --- Emitters ---
 
 TEST(SceneCheck, TooManyParticlesAreAnErrorAndHeldBackOnesAWarning) {
-  EXPECT_EQ(
-      warnings_of(R"({"emitters": [{"rate": 1000, "lifespan": 2, "max_alive": 1900}]})"),
-      "/emitters/0/max_alive: may hold back particles: 2e+03 could be alive at once, 1900 are allowed\n");
+  EXPECT_EQ(warnings_of(R"({"emitters": [{"rate": 1000, "lifespan": 2, "max_alive": 1900}]})"),
+            "/emitters/0/max_alive: may prevent releases: up to 2e+03 particles could exist at once, 1900 "
+            "are allowed\n");
   EXPECT_EQ(warnings_of(R"({"emitters": [{"rate": 1000, "lifespan": 2, "max_alive": 2000}]})"), "");
   EXPECT_EQ(errors_of(R"({"emitters": [{"rate": 1.1e7, "lifespan": 2}]})"),
-            "/emitters/0: could have 2.2e+07 particles alive at once, more than 2e+07; lower rate, count or "
-            "lifespan\n");
+            "/emitters/0: could have 2.2e+07 particles at once, more than the limit of 2e+07; reduce rate, "
+            "count or lifespan\n");
 }
 
 TEST(SceneCheck, ASplitThatExplodesIsRefused) {
@@ -327,23 +324,24 @@ TEST(SceneCheck, ForcesNameParticles) {
                {"type": "vortex", "particles": ["rain/spalsh"]}, {"type": "grab", "keyframes": [{}]},
                {"type": "coulomb"}]})"),
       "/forces/1/particles/0: there are no particles 'rain/spalsh'; did you mean 'rain/splash'?\n"
-      "/forces/2: needs a \"body\", \"particles\" or \"cloths\" to hold\n"
+      "/forces/2: needs a \"body\", \"particles\" or \"cloths\"\n"
       "/forces/3/particles: is required: names of groups and emitters whose particles act on each other\n");
 }
 
 TEST(SceneCheck, ASurfaceHasRoomForAParticle) {
   EXPECT_EQ(errors_of(R"({"emitters": [{"radius": 0.06}]})"),
-            "/emitters/0/surface: is too small for a single particle: it is 0.1 m wide and the smallest "
-            "particle 0.12 m; or let newborns \"overlap\"\n");
+            "/emitters/0/surface: is 0.1 m wide, too small for the smallest particle, 0.12 m; make it "
+            "larger, or set \"overlap\" to true\n");
   EXPECT_EQ(warnings_of(R"({"emitters": [{"radius": {"range": [0.04, 0.06]}}]})"),
-            "/emitters/0/surface: is only 0.1 m wide: too small for the largest particles\n");
+            "/emitters/0/surface: is 0.1 m wide, too small for the largest particles, which will be released "
+            "late or not at all\n");
 }
 
 TEST(SceneCheck, AgesDoNotDecreaseAndEmittersEndAfterTheyStart) {
   EXPECT_EQ(
       errors_of(
           R"({"emitters": [{"start": 2, "end": 1, "look": {"size_over_age": [[0, 1], [0.5, 2], [0.4, 1]]}}]})"),
-      "/emitters/0/end: must be after the start, 2 s\n"
+      "/emitters/0/end: must be later than the start, 2 s\n"
       "/emitters/0/look/size_over_age/2: ages must not decrease\n");
 }
 

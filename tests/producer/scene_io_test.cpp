@@ -42,7 +42,7 @@ TEST(SceneIo, EveryPartOfTheSampleArrives) {
   EXPECT_EQ(scene.world.integrator, sim::IntegratorKind::midpoint);
   EXPECT_EQ(scene.world.seed, 42u);
   EXPECT_EQ(scene.bodies.size(), 3u + 12 + 5);
-  EXPECT_EQ(scene.bodies[0].motion, sim::MotionType::fixed);
+  EXPECT_EQ(scene.bodies[0].motion, sim::MotionType::static_body);
   EXPECT_EQ(scene.bodies[2].keyframes[1].position, Vec3(1, 1, 0));
   EXPECT_EQ(scene.particles[0].places[1].color->rgba, Eigen::Vector4f(1, 0, 0, 1));
   const Emitter& rain = scene.emitters[0];
@@ -100,7 +100,7 @@ TEST(SceneIo, OrientationsAreQuaternionsOrAxisAndAngle) {
 {"orientation": {"axis": [1, 0, 0], "angel_deg": 1}}, {"orientation": 90}]})"),
       "s:1:29: /bodies/0/orientation: must be a vector that is not zero, got [0,0,0,0]\n"
       "s:1:69: /bodies/1/orientation/axis: must be a vector that is not zero, got [0,0,0]\n"
-      "s:2:17: /bodies/2/orientation/angle_deg: is required: angle about it\n"
+      "s:2:17: /bodies/2/orientation/angle_deg: is required: angle of rotation about the axis\n"
       "s:2:37: /bodies/2/orientation/angel_deg: unknown key in orientation; did you mean 'angle_deg'?\n"
       "s:2:71: /bodies/3/orientation: must be [w, x, y, z] or {\"axis\": [x, y, z], \"angle_deg\": a}, got "
       "90");
@@ -119,7 +119,7 @@ TEST(SceneIo, WhatVariesMustStayInItsRange) {
   EXPECT_EQ(radius(R"({"range": [0, 1]})"),
             "s:1:37: /emitters/0/radius/range/0: must be greater than 0 m, got 0");
   EXPECT_EQ(radius(R"({"range": [0.02, 0.01]})"),
-            "s:1:36: /emitters/0/radius/range: must go from the smaller to the larger value");
+            "s:1:36: /emitters/0/radius/range: must have the smaller value first");
   EXPECT_EQ(radius(R"({"curve": [[0, 0.01], [1, 0.02], [1, 0.03]]})"),
             "s:1:59: /emitters/0/radius/curve/2: times must increase");
   EXPECT_EQ(radius(R"({"curve": []})"),
@@ -192,8 +192,8 @@ TEST(SceneIo, WhatIsRequiredIsMissed) {
   EXPECT_EQ(
       load_errors(
           R"({"bodies": [{"shape": {"type": "mesh"}, "model": {"file": ""}}], "camera": {"type": "follow"}})"),
-      "s:1:23: /bodies/0/shape/file: is required: model file relative to the scene, or the name of one that "
-      "comes with offstage; FILE#NODE is one of its nodes\n"
+      "s:1:23: /bodies/0/shape/file: is required: model file relative to the scene, or the name of a model "
+      "that comes with offstage; FILE#NODE selects one node\n"
       "s:1:59: /bodies/0/model/file: must not be empty\n"
       "s:1:76: /camera/body: is required: name of the body");
 }

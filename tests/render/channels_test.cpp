@@ -94,7 +94,7 @@ float pixels_per_m(float distance) {
 TEST(StageChannels, MotionIsThatOfTheBodyInPixels) {
   SmallStage s;
   const InstanceHandle box = s.add(make_box({1, 1, 1}), {}, {0, 0, 0});
-  s.stage.remember();
+  s.stage.store_previous_transforms();
   s.stage.set_transform(box, Eigen::Affine3f(Eigen::Translation3f(0.1f, -0.05f, 0)));
   const Channels c = s.stage.channels(0.1f);
   const Vector2f way = c.motion[middle(c)];
@@ -109,7 +109,7 @@ TEST(StageChannels, BallsMoveWithTheirVelocityAndTheCameraMovesEverything) {
       balls,
       std::array{Point{
           .position = {0, 0, 0}, .velocity = {1, 0, 0}, .radius = 0.5f, .color = {1, 1, 1, 1}, .id = 1}});
-  s.stage.remember();
+  s.stage.store_previous_transforms();
   Channels c = s.stage.channels(0.1f);
   EXPECT_NEAR(c.motion[middle(c)].x(), 0.1f * pixels_per_m(4.5f), 0.05f);
   s.stage.set_camera({.eye = {0.1f, 0, 5}, .target = {0.1f, 0, 0}});  // along with it
@@ -125,7 +125,7 @@ TEST(StageChannels, ClothsMoveByTheirVertices) {
                                     Vector3f(-1, 1, 0)};
   s.stage.set_cloth(cloth, places);
   s.stage.set_object(cloth, 9);
-  s.stage.remember();
+  s.stage.store_previous_transforms();
   for (Vector3f& p : places) p.y() += 0.1f;
   s.stage.set_cloth(cloth, places);
   const Channels c = s.stage.channels(0.1f);

@@ -508,7 +508,7 @@ TEST_P(Joints, HoldAThousandTimesTheirLinksMass) {
   World world(def());
   BodyDef floor;
   floor.shape = Plane{};
-  floor.motion = MotionType::fixed;
+  floor.motion = MotionType::static_body;
   floor.pose.position = {0, -6, 0};
   world.add_body(floor);
   std::vector<JointHandle> joints;
@@ -576,7 +576,7 @@ TEST_P(Joints, LieStillOnTheFloorAndSleep) {
   World world(sleepy);
   BodyDef floor;
   floor.shape = Plane{};
-  floor.motion = MotionType::fixed;
+  floor.motion = MotionType::static_body;
   world.add_body(floor);
   JointDef joint{.lower = -0.5, .upper = 0.5, .swing = 0.8, .friction = 0.02};
   BodyHandle last{};
@@ -621,7 +621,7 @@ TEST_P(Joints, MoveTheSameWayForAnyNumberOfThreads) {
     World world(def());
     BodyDef floor;
     floor.shape = Plane{};
-    floor.motion = MotionType::fixed;
+    floor.motion = MotionType::static_body;
     world.add_body(floor);
     // Chains in a heap.
     for (int chain = 0; chain < 4; ++chain) {

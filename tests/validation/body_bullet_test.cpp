@@ -60,7 +60,7 @@ class BodyBullet : public BothSolvers {
       const bool free = !planar && i % 3 == 0;  // a plate that is hit and moves off
       const Real e = 0.5 * Real(i % 4 % 3);
       const auto plate = world.add_body({.shape = plate_shape,
-                                         .motion = free ? MotionType::dynamic : MotionType::fixed,
+                                         .motion = free ? MotionType::dynamic : MotionType::static_body,
                                          .density = 5000,
                                          .restitution = e});
       const Vec3 target(0.6 * u(0), 0, 0.6 * u(1)),

@@ -20,7 +20,7 @@ class BodyDeterminism : public testing::TestWithParam<SolverKind> {
   /// Several heaps of all shapes, some of which bounce, with a ball that rolls in.
   static StateHash heaps(int per_heap, Real restitution) {
     World world({.solver = GetParam()});
-    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0});
+    world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0});
     const Scatter random{5};
     for (int heap = 0; heap < 4; ++heap)
       for (int i = 0; i < per_heap; ++i) {
@@ -67,7 +67,7 @@ class CrowdDeterminism : public BodyDeterminism {
     World world({.max_step = 1.0 / 120, .solver = GetParam(), .collision_speed = 0.4});
     const MeshHandle angle = world.add_mesh(placed_at_random(l_solid(), 0.09, 3));
     const MeshHandle crystal = world.add_mesh(sphere_mesh(0.1, 6, 4));
-    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0});
+    world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0});
     const Scatter random{11};
     uint64_t number = 0;
     const auto add = [&](const Vec3& at, const Vec3& velocity, bool bounces) {

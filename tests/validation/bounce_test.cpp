@@ -20,7 +20,7 @@ struct Drop {
 Drop drop(const Shape& shape, Real depth, Real e, Real seconds) {
   World world;
   world.add_body(
-      {.shape = shape, .motion = MotionType::fixed, .pose = {Vec3(0, -depth, 0)}, .restitution = e});
+      {.shape = shape, .motion = MotionType::static_body, .pose = {Vec3(0, -depth, 0)}, .restitution = e});
   const auto system = world.add_particle_system({.integrator = IntegratorKind::rk4});
   world.add_particle(system, {.position = {0, 1 + kRadius, 0}, .radius = kRadius, .restitution = e});
   Drop result;
@@ -67,7 +67,7 @@ TEST(ObliqueImpact, StickAndSlideThroughTheWorld) {
   const Real critical = 2 / ((1 + kE) * 3);
   for (Real mu : {0.5 * critical, 1.5 * critical}) {
     World world({.gravity = Vec3::Zero()});
-    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0, .friction = mu});
+    world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = mu});
     const auto system = world.add_particle_system({});
     world.add_particle(system,
                        {.position = {0, 0.1, 0}, .velocity = {2, -3, 0}, .restitution = kE, .friction = mu});

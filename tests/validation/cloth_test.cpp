@@ -36,8 +36,8 @@ void drop_cloth(World& world, ClothHandle cloth, int frames) {
 
 TEST(ClothValidation, ComesToRestOnASphere) {
   World world;
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
-  world.add_body({.shape = Sphere{0.5}, .motion = MotionType::fixed, .pose = {{0, 0.5, 0}}});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
+  world.add_body({.shape = Sphere{0.5}, .motion = MotionType::static_body, .pose = {{0, 0.5, 0}}});
   const ClothHandle cloth = world.add_cloth(sheet(1.6, 24, {0.05, 1.1, 0}));
   drop_cloth(world, cloth, 120);
   EXPECT_LT(speed(world.cloth(cloth)), 0.1);
@@ -45,8 +45,8 @@ TEST(ClothValidation, ComesToRestOnASphere) {
 
 TEST(ClothValidation, ComesToRestOnTheEdgeOfABox) {
   World world;
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
-  world.add_body({.shape = Box{{1, 0.5, 1}}, .motion = MotionType::fixed, .pose = {{0, 0.25, 0}}});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
+  world.add_body({.shape = Box{{1, 0.5, 1}}, .motion = MotionType::static_body, .pose = {{0, 0.25, 0}}});
   const ClothHandle cloth = world.add_cloth(sheet(1.2, 24, {0.5, 0.7, 0}));
   drop_cloth(world, cloth, 120);
   EXPECT_LT(speed(world.cloth(cloth)), 0.1);
@@ -54,7 +54,7 @@ TEST(ClothValidation, ComesToRestOnTheEdgeOfABox) {
 
 TEST(ClothValidation, ADishRestsOnAClothOnATable) {
   World world;
-  world.add_body({.shape = Box{{1, 0.5, 1}}, .motion = MotionType::fixed, .pose = {{0, 0.25, 0}}});
+  world.add_body({.shape = Box{{1, 0.5, 1}}, .motion = MotionType::static_body, .pose = {{0, 0.25, 0}}});
   const ClothHandle cloth = world.add_cloth(sheet(0.8, 24, {0, 0.51, 0}));
   const BodyHandle dish =
       world.add_body({.shape = Cylinder{0.12, 0.05}, .pose = {{0, 0.55, 0}}, .mass = 0.4});
@@ -151,9 +151,9 @@ TEST(ClothValidation, AFastBallDoesNotGoThroughAPinnedCloth) {
 
 TEST(ClothValidation, NoCornerOfABoxPokesThroughACoarseCloth) {
   World world;
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
   const Vec3 centre(0.03, 0.2, 0.02);
-  world.add_body({.shape = Box{{0.4, 0.4, 0.4}}, .motion = MotionType::fixed, .pose = {centre}});
+  world.add_body({.shape = Box{{0.4, 0.4, 0.4}}, .motion = MotionType::static_body, .pose = {centre}});
   const ClothHandle cloth = world.add_cloth(sheet(1.4, 12, {0, 0.45, 0}));
   drop_cloth(world, cloth, 72);
   const ClothView view = world.cloth(cloth);
@@ -187,7 +187,7 @@ TEST(ClothValidation, IsTheSameBitsForAnyNumberOfThreads) {
   for (std::size_t threads : {1, 2}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     World world;
-    world.add_body({.shape = Sphere{0.5}, .motion = MotionType::fixed, .pose = {{0, 0.5, 0}}});
+    world.add_body({.shape = Sphere{0.5}, .motion = MotionType::static_body, .pose = {{0, 0.5, 0}}});
     world.add_cloth(sheet(2, 48, {0, 1.05, 0}));
     for (int i = 0; i < 24; ++i) world.step(1.0 / 24);
     hashes[threads - 1] = world.state_hash();

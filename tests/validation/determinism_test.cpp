@@ -16,8 +16,8 @@ using namespace sim;
 StateHash run() {
   World world({.wind = {1, 0, 0.5}});
   const MeshHandle torus = world.add_mesh(torus_mesh(0.6, 0.2, 16, 10));
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .friction = 0.3});
-  world.add_body({.shape = MeshShape{torus}, .motion = MotionType::fixed, .pose = {Vec3(0, 0.5, 0)}});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .friction = 0.3});
+  world.add_body({.shape = MeshShape{torus}, .motion = MotionType::static_body, .pose = {Vec3(0, 0.5, 0)}});
   const auto arm = world.add_body({.shape = Box{{1.2, 0.1, 0.1}},
                                    .motion = MotionType::kinematic,
                                    .pose = {Vec3(0, 1.2, 0)},
@@ -56,10 +56,10 @@ TEST(Determinism, SameHashForAnyNumberOfThreadsAndEveryRepeat) {
 /// A box that slides to rest, one that bounces and tumbles, and one that slides down another.
 StateHash sliding() {
   World world({.solver = SolverKind::exact});
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0.4, .friction = 0.3});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0.4, .friction = 0.3});
   const Quat slope(0.96, 0, 0, -0.28);  // 32.5 degrees
   world.add_body({.shape = Box{{4, 0.2, 1}},
-                  .motion = MotionType::fixed,
+                  .motion = MotionType::static_body,
                   .pose = {Vec3(0, 1, 3), slope},
                   .friction = 0.4});
   world.add_body({.shape = Box{{0.4, 0.1, 0.3}},
@@ -78,7 +78,7 @@ StateHash sliding() {
 /// Balls, a box and a capsule that fly into a row and bounce.
 StateHash bouncing(SolverKind solver) {
   World world({.solver = solver});
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0.7});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0.7});
   for (int i = 0; i < 4; ++i)
     world.add_body({.shape = i % 2 == 0 ? Shape(Sphere{0.1}) : Shape(Box{Vec3::Constant(0.2)}),
                     .pose = {Vec3(0.25 * i, 0.1, 0)},
@@ -99,7 +99,7 @@ StateHash bouncing(SolverKind solver) {
 StateHash heap() {
   World world({.solver = SolverKind::fast});
   const MeshHandle torus = world.add_mesh(torus_mesh(0.12, 0.05, 10, 6));
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0});
   for (int i = 0; i < 15; ++i) {
     const Shape shapes[] = {Box{{0.2, 0.15, 0.25}}, Cylinder{0.1, 0.2}, Box{Vec3::Constant(0.2)},
                             MeshShape{torus}, Sphere{0.1}};
@@ -116,7 +116,7 @@ StateHash heap() {
 /// A chain that falls on the ground aslant, hinges and balls in turns.
 StateHash chain(SolverKind solver) {
   World world({.solver = solver});
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0.2});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0.2});
   BodyHandle last;
   for (int i = 0; i < 5; ++i) {
     const BodyHandle link = world.add_body({.shape = Box{{0.3, 0.06, 0.1}},

@@ -23,7 +23,7 @@ TEST_P(Edges, ADrumThatGoesOverOneGetsNoEnergyFromIt) {
       for (const Real step : {1.0 / 240, 1.0 / 500}) {
         World world(def(step));
         world.add_body({.shape = Box{{1, 1, 2}},
-                        .motion = MotionType::fixed,
+                        .motion = MotionType::static_body,
                         .pose = {Vec3(0, -0.5, 0), Quat::Identity()},
                         .restitution = 0,
                         .friction = 0});

@@ -103,7 +103,7 @@ TEST(EmitterStatistics, CountsFollowTheMeanRateAndTheMeanRelease) {
 // Height v^2 cos^2 / 2g, reach v^2 sin(2 spread) / g, both from the surface at y = 0.
 TEST(Sprinkler, HeightAndReach) {
   World world;
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
   const auto water = world.add_particle_system({.dies_on_hit = true, .integrator = IntegratorKind::midpoint});
   Emitter emitter({.surface = {.size = {0.001, 0.001}},
                    .rate = 200.0,

@@ -18,7 +18,7 @@ class Incline : public BothSolvers {
     World world(def());
     BodyDef plane = ground;
     plane.shape = Plane{};
-    plane.motion = MotionType::fixed;
+    plane.motion = MotionType::static_body;
     plane.pose = incline(angle);
     world.add_body(plane);
     const auto body = world.add_body({.shape = shape, .pose = over_incline(angle, height), .restitution = 0});
@@ -72,7 +72,7 @@ TEST_P(Incline, BoxFollowsTheGrainOfASurface) {
 TEST_P(Incline, CylinderRollsWithTwoThirdsOfThePull) {
   const Real a = 0.3, t = 2;
   World world(def());
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .pose = incline(a), .restitution = 0});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .pose = incline(a), .restitution = 0});
   const Quat lying(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitX()));
   const auto roller =
       world.add_body({.shape = Cylinder{0.1, 0.3}, .pose = over_incline(a, 0.1, lying), .restitution = 0});
@@ -111,7 +111,7 @@ class Level : public BothSolvers {
  protected:
   static BodyHandle add_floor(World& world, Real mu, Real mu_static = -1) {
     return world.add_body({.shape = Plane{},
-                           .motion = MotionType::fixed,
+                           .motion = MotionType::static_body,
                            .restitution = 0,
                            .friction = mu,
                            .static_friction = mu_static});
@@ -171,7 +171,7 @@ TEST_P(Level, ConveyorBringsABoxToItsSpeed) {
   constexpr Real kBelt = 1.5, kMu = 0.4;
   World world(def());
   world.add_body({.shape = Box{{20, 1, 2}},
-                  .motion = MotionType::fixed,
+                  .motion = MotionType::static_body,
                   .pose = {Vec3(0, -0.5, 0)},
                   .restitution = 0,
                   .friction = kMu,
@@ -311,7 +311,7 @@ TEST_P(Rod, FallsFromUprightOnARoughAndOnASmoothFloor) {
   for (const bool rough : {true, false}) {
     World world(def());
     world.add_body(
-        {.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0, .friction = rough ? 8.0 : 0});
+        {.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = rough ? 8.0 : 0});
     // Leaning to +x, over its edge at the origin; phi = kStart.
     const Quat turn(Eigen::AngleAxisd(-(kStart + lean), Vec3::UnitZ()));
     const Vec3 edge(kWidth / 2, -kLength / 2, 0);
@@ -353,8 +353,10 @@ class Dome : public BothSolvers {
   static Flight leave(Real max_step, Real friction, Real share) {
     constexpr Real kSphere = 9, kBall = 1, kWay = kSphere + kBall, kStart = 0.1;
     World world(def(max_step));
-    world.add_body(
-        {.shape = Sphere{kSphere}, .motion = MotionType::fixed, .restitution = 0, .friction = friction});
+    world.add_body({.shape = Sphere{kSphere},
+                    .motion = MotionType::static_body,
+                    .restitution = 0,
+                    .friction = friction});
     const Real speed = std::sqrt(2 * share * kFrictionGravity * kWay * (1 - std::cos(kStart)));
     const auto ball = world.add_body({.shape = Sphere{kBall},
                                       .pose = {kWay * Vec3(std::sin(kStart), std::cos(kStart), 0)},

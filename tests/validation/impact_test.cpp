@@ -22,7 +22,7 @@ class BallDrop : public BothSolvers {
   static Drop drop(Real e, Real max_step, Real seconds) {
     constexpr Real kRadius = 0.05;
     World world(def(max_step));
-    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = e});
+    world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = e});
     const auto ball =
         world.add_body({.shape = Sphere{kRadius}, .pose = {Vec3(0, 1 + kRadius, 0)}, .restitution = e});
     Drop d;
@@ -81,7 +81,7 @@ TEST_P(ObliqueBall, SticksOrSlidesOnEitherSideOfTheCriticalFriction) {
   for (const Real ratio : {0.0, 0.5, 0.999, 1.001, 2.0}) {
     const Real mu = ratio * critical;
     World world(weightless());
-    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0, .friction = mu});
+    world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = mu});
     const auto ball = world.add_body({.shape = Sphere{kRadius},
                                       .pose = {Vec3(0, 0.2, 0)},
                                       .velocity = {kAcross, -kDown, 0},
@@ -244,7 +244,7 @@ TEST_P(Paddle, ATurningBatHitsWithTheVelocityOfWhereItHits) {
 
 TEST_P(Paddle, ABoxPushesAStackAlong) {
   World world(def());
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
   const auto pusher =
       world.add_body({.shape = Box{{0.2, 0.18, 0.4}},
                       .motion = MotionType::kinematic,

@@ -84,7 +84,7 @@ TEST(LinearDrag, TheDefaultEndsAtTheTerminalVelocityHoweverGreatTheDrag) {
 TEST(Fountain, ReachesAsFarAsItsParabolaAtAnyStep) {
   for (const Real step : {1.0 / 240, 1.0 / 60}) {
     World world({.max_step = step});
-    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0, .friction = 1e6});
+    world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = 1e6});
     const auto jet = world.add_particle_system({.dies_on_hit = true, .report_collisions = true});
     world.add_particle(jet, {.position = {0, 0.01, 0}, .velocity = {3, 8, 0}, .radius = 0.01});
     Real reach = 0;

@@ -23,7 +23,7 @@ constexpr Real kFallAcceleration = 9.81;
 
 BodyDef fixed_body(const Shape& shape, const Vec3& at, Real friction) {
   return {.shape = shape,
-          .motion = MotionType::fixed,
+          .motion = MotionType::static_body,
           .pose = {at, Quat::Identity()},
           .restitution = 0,
           .friction = friction};

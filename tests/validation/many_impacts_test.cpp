@@ -25,7 +25,7 @@ struct BallColumn {
 
   BallColumn(SolverKind solver, Real step, int count, Real e, Real gap, Real drop)
       : world({.max_step = step, .solver = solver, .sleep = false}) {
-    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = e, .friction = 0});
+    world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = e, .friction = 0});
     for (int i = 0; i < count; ++i)
       balls.push_back(world.add_body({.shape = Sphere{0.5},
                                       .pose = {Vec3(0, 0.5 + drop + (1 + gap) * i, 0)},
@@ -146,7 +146,7 @@ TEST(ManyImpacts, TenThousandElasticBouncesBetweenWallsAreAsMany) {
       World world({.gravity = Vec3::Zero(), .max_step = step, .solver = solver, .sleep = false});
       for (const Real side : {-1.0, 1.0})
         world.add_body({.shape = Box{{1, 1, 1}},
-                        .motion = MotionType::fixed,
+                        .motion = MotionType::static_body,
                         .pose = {Vec3(side * (0.5 + kRadius + kRoom / 2), 0, 0)},
                         .restitution = 1,
                         .friction = 0});
@@ -164,11 +164,11 @@ TEST(ManyImpacts, ContactsThatContradictEachOtherAddNoEnergyAndAreReported) {
   for (const SolverKind solver : kAllSolvers)
     for (const Real step : kBothSteps) {
       World world({.max_step = step, .solver = solver, .sleep = false});
-      world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
+      world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
       for (const Real side : {-1.0, 1.0})
         world.add_body(
             {.shape = Box{{0.5, 1, 1}},
-             .motion = MotionType::fixed,
+             .motion = MotionType::static_body,
              .pose = {Vec3(side * 0.259, 0.5, 0), Quat(Eigen::AngleAxisd(side * 0.01, Vec3::UnitZ()))}});
       const auto bar = world.add_body(
           {.name = "bar",

@@ -142,7 +142,7 @@ Real gas_drift(bool joined, bool internal, Real max_step, Real seconds) {
   World world({.max_step = max_step, .sleep = false});
   const auto wall = [&](const Vec3& at, const Vec3& normal) {
     world.add_body({.shape = Plane{},
-                    .motion = MotionType::fixed,
+                    .motion = MotionType::static_body,
                     .pose = {at, rotation_between(Vec3::UnitY(), normal)},
                     .restitution = 1,
                     .friction = 0});

@@ -49,7 +49,7 @@ class Pit : public BothSolvers {
     const Real wide = scene.bodies.front().size.x() / 2 - 2;  // of the floor, which is 2 m wider all round
     for (const BoxBody& b : scene.bodies) {
       bodies.push_back(world.add_body({.shape = Box{b.size},
-                                       .motion = b.mass == 0 ? MotionType::fixed : MotionType::dynamic,
+                                       .motion = b.mass == 0 ? MotionType::static_body : MotionType::dynamic,
                                        .pose = b.pose,
                                        .mass = b.mass,
                                        .restitution = 0}));

@@ -23,9 +23,9 @@ class Sleep : public BothSolvers {
     WorldDef sleepy = def();
     sleepy.sleep = true;
     Scene s{World(sleepy), {}, {}};
-    s.world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0});
+    s.world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0});
     s.support = s.world.add_body({.shape = Box{{1, 0.5, 1}},
-                                  .motion = MotionType::fixed,
+                                  .motion = MotionType::static_body,
                                   .pose = {Vec3(0, 0.25, 0)},
                                   .restitution = 0});
     for (int i = 0; i < 3; ++i)
@@ -181,7 +181,7 @@ TEST_P(Sleep, LosingASpringWithTheBodyAtItsOtherEndWakesIt) {
   sleepy.sleep = true;
   World world(sleepy);
   const BodyHandle hook =
-      world.add_body({.shape = Sphere{0.1}, .motion = MotionType::fixed, .pose = {Vec3(0, 3, 0)}});
+      world.add_body({.shape = Sphere{0.1}, .motion = MotionType::static_body, .pose = {Vec3(0, 3, 0)}});
   const BodyHandle ball = world.add_body({.shape = Sphere{0.1}, .pose = {Vec3(0, 2, 0)}, .mass = 1});
   world.add_spring({.a = BodyPoint{hook},
                     .b = BodyPoint{ball},
@@ -213,7 +213,7 @@ class Overlap : public BothSolvers {};
 TEST_P(Overlap, IsPushedApartGently) {
   for (const Real depth : {0.005, 0.05}) {
     World world(def());
-    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0.5});
+    world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0.5});
     const auto box = world.add_body({.shape = Box{Vec3::Constant(0.4)}, .pose = {Vec3(0, 0.2 - depth, 0)}});
     const auto above =
         world.add_body({.shape = Box{Vec3::Constant(0.4)}, .pose = {Vec3(0, 0.6 - 2 * depth, 0)}});
@@ -246,7 +246,7 @@ TEST_P(Bounds, BodiesThatLeaveInContactAreRetiredOnceEach) {
   WorldDef small = def();
   small.bounds = Aabb(Vec3(-2, -2, -2), Vec3(2, 2, 2));
   World world(small);
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0, .friction = 0});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = 0});
   std::vector<BodyHandle> stack;
   for (int i = 0; i < 3; ++i)
     stack.push_back(world.add_body({.shape = Box{Vec3::Constant(0.2)},
@@ -273,7 +273,7 @@ TEST_P(Joined, APendulumOnAStiffSpringHandsItsSpeedOver) {
   WorldDef light = def();
   World world(light);
   world.add_body({.shape = Box{{0.04, 1, 0.04}},
-                  .motion = MotionType::fixed,
+                  .motion = MotionType::static_body,
                   .pose = {Vec3(2 * kRadius, -0.5 - kRadius, 0)},
                   .restitution = 0,
                   .friction = 0});
@@ -303,7 +303,7 @@ TEST_P(Joined, APendulumOnAStiffSpringHandsItsSpeedOver) {
 TEST_P(Joined, BodiesOnASpringAreTracedBackTogether) {
   const auto finish = [](Real max_step) {
     World world(weightless(max_step));
-    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 1, .friction = 0});
+    world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 1, .friction = 0});
     const auto ball = [&](Real y) {
       return world.add_body({.shape = Sphere{0.1},
                              .pose = {Vec3(0, y, 0)},
@@ -332,7 +332,7 @@ class Rain : public BothSolvers {};
 // Particles fall on a stack while it falls itself: none gets inside, and the stack lands as without them.
 TEST_P(Rain, OnBodiesThatMove) {
   World world(def());
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0});
   std::vector<BodyHandle> boxes;
   for (int i = 0; i < 3; ++i)
     boxes.push_back(world.add_body(

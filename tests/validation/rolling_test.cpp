@@ -22,7 +22,7 @@ class MovingContact : public testing::TestWithParam<std::tuple<SolverKind, int>>
   static Real step() { return 1.0 / std::get<1>(GetParam()); }
   static World world() { return World(WorldDef{.max_step = step(), .solver = solver(), .sleep = false}); }
   static BodyDef ground(Real friction) {
-    return {.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0, .friction = friction};
+    return {.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = friction};
   }
   static void run(World& world, Real seconds) {
     const int frames = static_cast<int>(std::lround(60 * seconds));
@@ -141,7 +141,7 @@ struct Coin {
 /// The share of its energy that a coin gains in two seconds.
 Real gain(const Coin& coin, const WorldDef& def, Real friction) {
   World w(def);
-  w.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0, .friction = friction});
+  w.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = friction});
   coin.add_to(w, friction);
   const Real before = w.energy().total();
   for (int i = 0; i < 120; ++i) w.step(1.0 / 60);
@@ -246,7 +246,7 @@ INSTANTIATE_TEST_SUITE_P(Solvers, MovingContact,
 std::vector<Pose> heap_after(SolverKind solver, std::size_t first, std::size_t stride) {
   constexpr std::size_t kCount = 19;
   World w(WorldDef{.solver = solver});
-  w.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0.2, .friction = 0.5});
+  w.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0.2, .friction = 0.5});
   std::vector<BodyHandle> bodies(kCount);
   for (std::size_t n = 0; n < kCount; ++n) {
     const std::size_t i = (first + n * stride) % kCount;

@@ -14,7 +14,7 @@ namespace {
 
 BodyHandle add_ground(World& world, Real friction = 0.5) {
   return world.add_body(
-      {.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0, .friction = friction});
+      {.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = friction});
 }
 
 /// Boxes of 0.2 m on each other, the k-th of `mass(k)`.
@@ -100,7 +100,7 @@ TEST_P(Table, StandsOnMoreLegsThanItNeeds) {
     add_ground(world);
     const auto box = [&](const Vec3& size, const Vec3& centre, Real mass, bool moves = true) {
       return world.add_body({.shape = Box{size},
-                             .motion = moves ? MotionType::dynamic : MotionType::fixed,
+                             .motion = moves ? MotionType::dynamic : MotionType::static_body,
                              .pose = {centre},
                              .mass = mass,
                              .restitution = 0});
@@ -276,7 +276,7 @@ class Masonry : public BothSolvers {
     for (int k = -1; k <= Arch::kWedges; ++k) {
       const bool fixed = k < 0 || k == Arch::kWedges;
       const auto stone = world.add_body({.shape = MeshShape{world.add_mesh(Arch::wedge(k))},
-                                         .motion = fixed ? MotionType::fixed : MotionType::dynamic,
+                                         .motion = fixed ? MotionType::static_body : MotionType::dynamic,
                                          .density = 2000,
                                          .restitution = 0,
                                          .friction = mu});
@@ -302,7 +302,7 @@ class Pile : public BothSolvers {
   static void add_pit(World& world, Real width) {
     constexpr Real kHigh = 6;
     const auto wall = [&](const Vec3& size, const Vec3& at) {
-      world.add_body({.shape = Box{size}, .motion = MotionType::fixed, .pose = {at}, .restitution = 0});
+      world.add_body({.shape = Box{size}, .motion = MotionType::static_body, .pose = {at}, .restitution = 0});
     };
     wall({3, 0.2, 3}, {0, -0.1, 0});
     for (const Real side : {-1.0, 1.0}) {
@@ -319,8 +319,8 @@ class Pile : public BothSolvers {
     return {.shape = Box{size}, .pose = {at, turn}, .restitution = 0.1};
   }
 
-  /// Boxes dropped into a pit of 1.6 m. On the way an impact can press in a corner that was not near before; it
-  /// is pushed out at once.
+  /// Boxes dropped into a pit of 1.6 m. On the way an impact can press in a corner that was not near before;
+  /// it is pushed out at once.
   static void expect_settles(uint64_t count, Real seconds, Real angular_drag, Real deepest) {
     WorldDef sleepy = def();
     sleepy.sleep = true;

@@ -31,7 +31,7 @@ Decisions decisions(World& world, Real seconds) {
 }
 
 void add_floor(World& world, Real restitution = 0) {
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = restitution});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = restitution});
 }
 
 TEST(StepReport, TellsWhoFellAsleepAndWhoWoke) {
@@ -56,7 +56,7 @@ Decisions reported_heap(SolverKind solver, Real restitution) {
   for (int side = 0; side < 4; ++side) {
     const Real x = side == 0 ? 2.5 : side == 1 ? -2.5 : 0, z = side == 2 ? 2.5 : side == 3 ? -2.5 : 0;
     world.add_body({.shape = Box{{x != 0 ? 1.0 : 6.0, 20, z != 0 ? 1.0 : 6.0}},
-                    .motion = MotionType::fixed,
+                    .motion = MotionType::static_body,
                     .pose = {Vec3(x, 10, z), Quat::Identity()},
                     .restitution = restitution});
   }

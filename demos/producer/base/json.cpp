@@ -134,7 +134,7 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
                                             [&](const Token& token) { return token.offset < offset; });
     const std::string what = error.what();
     if (after == tokens_.begin() || what.find("unexpected end of input") != std::string::npos) {
-      return fail(end_, tokens_.empty() ? "the file is empty" : "the text ends too early" + expected(what));
+      return fail(end_, tokens_.empty() ? "the file is empty" : "the file ends too early" + expected(what));
     }
     const auto bad = after - 1;
     const bool closes = bad->first == '}' || bad->first == ']';
@@ -289,7 +289,7 @@ Node parse_json(std::string_view text, const std::string& name, int file) {
     const std::string_view before = text.substr(0, zero);
     const auto line = static_cast<int>(std::count(before.begin(), before.end(), '\n')) + 1;
     const auto column = static_cast<int>(zero - (before.rfind('\n') + 1)) + 1;  // npos + 1 is 0
-    throw SceneError({name, line, column, {}}, "not a text: it has a zero byte");
+    throw SceneError({name, line, column, {}}, "is not a text file: it contains a zero byte");
   }
   TreeBuilder builder(text, name, file);
   nlohmann::json::sax_parse(text, &builder, nlohmann::json::input_format_t::json, true, true);

@@ -49,8 +49,8 @@ std::vector<uint8_t> unpack(const FileKind& kind, std::span<const uint8_t> bytes
   if (std::memcmp(header.magic, expected.magic, sizeof header.magic) != 0)
     refuse(fmt::format("not a {}", kind.name));
   if (header.version != kind.version)
-    refuse(fmt::format("{} of format {}, this program reads {}; make it again", kind.name, header.version,
-                       kind.version));
+    refuse(fmt::format("{} has format {}, but this program reads format {}; create it again", kind.name,
+                       header.version, kind.version));
   const std::string damaged = fmt::format("damaged {} ", kind.name);
   if (header.payload_size > kMaxPayload) refuse(damaged + "(size)");
   const auto packed = bytes.subspan(sizeof header);

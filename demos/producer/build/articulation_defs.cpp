@@ -37,7 +37,7 @@ void add_copies(const Template& original, uint64_t seed, Scene& flat, std::vecto
                 std::vector<Problem>& warnings) {
   if (copy_count(original.placement) > kMaxCopies) {
     errors.push_back({original.where, "asks for more than " + std::to_string(kMaxCopies) +
-                                          " copies: repeat, grid and scatter multiply"});
+                                          " copies: the counts of repeat, grid and scatter multiply"});
     return;
   }
   const Copies copies = expand(original.placement, original.position, seed, original.name);
@@ -55,7 +55,7 @@ void add_copies(const Template& original, uint64_t seed, Scene& flat, std::vecto
   Where where = original.where;
   where.path += "/scatter";
   warnings.push_back({where, std::to_string(copies.left_out) +
-                                 " copies found no place: make min_distance smaller or size larger"});
+                                 " copies found no free place: reduce min_distance or enlarge size"});
 }
 
 const Body* named(const std::vector<Body>& bodies, const std::string& name) {

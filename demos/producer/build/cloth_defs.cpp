@@ -29,7 +29,7 @@ effects::GridSize grid_size(const GridShape& grid) {
 const GridShape& grid_of(const Cloth& cloth, const char* what) {
   if (const auto* grid = std::get_if<GridShape>(&cloth.shape)) return *grid;
   throw std::invalid_argument(
-      fmt::format("only a grid has {}; of a mesh select by \"nearest\" or \"box\"", what));
+      fmt::format("only a grid has {}; for a mesh, select vertices by \"nearest\" or \"box\"", what));
 }
 
 std::vector<uint32_t> side_vertices(const GridShape& grid, Side side) {
@@ -132,7 +132,7 @@ FlatCloth flat_cloth(const Cloth& cloth, const render::Model* model) {
            : model->vertex_count();
   if (vertices > kMaxClothVertices)
     throw std::invalid_argument(
-        fmt::format("has {} vertices; a cloth may have {} at most", vertices, kMaxClothVertices));
+        fmt::format("has {} vertices; a cloth has at most {}", vertices, kMaxClothVertices));
   flat.def =
       grid ? effects::grid_cloth(grid_size(*grid), pose, fabric)
            : effects::mesh_cloth(collision_mesh(*model, std::get<MeshFile>(cloth.shape).scale), pose, fabric);
@@ -193,7 +193,8 @@ std::vector<uint32_t> pinned_vertices(const ClothPin& pin, const Cloth& cloth, c
 std::vector<sim::ClothSeam> sewn_vertices(const ClothSeam& seam, const Cloth& cloth, const FlatCloth& flat) {
   if (const auto* points = std::get_if<PointSeam>(&seam)) {
     const uint32_t a = nearest_vertex(flat.places, points->a), b = nearest_vertex(flat.places, points->b);
-    if (a == b) throw std::invalid_argument("joins a vertex to itself: both points are nearest to the same");
+    if (a == b)
+      throw std::invalid_argument("joins a vertex to itself: both points have the same nearest vertex");
     return {{a, b}};
   }
   const auto& sides = std::get<SideSeam>(seam);
@@ -201,8 +202,8 @@ std::vector<sim::ClothSeam> sewn_vertices(const ClothSeam& seam, const Cloth& cl
   const std::vector<uint32_t> a = side_vertices(grid, sides.a);
   std::vector<uint32_t> b = side_vertices(grid, sides.b);
   if (a.size() != b.size())
-    throw std::invalid_argument(
-        fmt::format("joins a side of {} vertices to one of {}; they must be as many", a.size(), b.size()));
+    throw std::invalid_argument(fmt::format(
+        "joins a side of {} vertices to a side of {}; the numbers must be equal", a.size(), b.size()));
   if (sides.reversed) std::ranges::reverse(b);
   std::vector<sim::ClothSeam> pairs;
   for (std::size_t i = 0; i < a.size(); ++i)

@@ -130,7 +130,7 @@ Parts build(const Crane& crane) {
   MachineBuilder make(crane);
   const Real H = crane.height, R = crane.reach, beam = 0.045 * H;
   Body& mast = make.box("mast", crane.frame, {1.3 * beam, H, 1.3 * beam}, 1, {0, H / 2, 0});
-  mast.motion = sim::MotionType::fixed;
+  mast.motion = sim::MotionType::static_body;
   const Real back = 0.35 * R, jib_length = R + back, top = H + beam / 2;
   make.box("jib", crane.frame, {jib_length, beam, beam}, crane.load_mass, {(R - back) / 2, top, 0});
   Joint& slew = make.join(revolute, "slew", "jib", "mast", {0, H, 0});

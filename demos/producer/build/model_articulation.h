@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "producer/base/scene_folder.h"
 #include "producer/scene/scene.h"
 
 namespace offstage::producer {

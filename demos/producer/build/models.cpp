@@ -152,7 +152,8 @@ void ModelLibrary::decompose_models(const Scene& scene, const DecompositionCache
     if (!mesh || need == needed.end()) continue;
     if (!parts_.contains(mesh->file)) {
       const std::size_t triangles = model(mesh->file).triangle_count();
-      if (on_step) on_step(fmt::format("cutting {} ({} triangles) into convex parts", mesh->file, triangles));
+      if (on_step)
+        on_step(fmt::format("decomposing {} ({} triangles) into convex parts", mesh->file, triangles));
       const auto start = std::chrono::steady_clock::now();
       const auto& parts =
           parts_.emplace(mesh->file, cache.decompose(sim::weld(collision_mesh(model(mesh->file), 1))))
@@ -165,7 +166,7 @@ void ModelLibrary::decompose_models(const Scene& scene, const DecompositionCache
     // What stands still collides with its triangles then.
     const bool matters = body.motion == sim::MotionType::dynamic;
     if (matters && !parts.note.empty() && warned.insert(mesh->file).second)
-      warnings.push_back({need->second, mesh->file + ": its convex parts are not exact: " + parts.note});
+      warnings.push_back({need->second, mesh->file + ": the convex parts are approximate: " + parts.note});
   }
 }
 

@@ -172,7 +172,7 @@ struct Overlays::Builder {
   Source operator()(const VelocitiesOverlay& overlay) const {
     VelocityLines velocities{&overlay, {}};
     for (const Body& body : scene.bodies)
-      if (overlay.body.empty() ? body.motion != sim::MotionType::fixed : body.name == overlay.body)
+      if (overlay.body.empty() ? body.motion != sim::MotionType::static_body : body.name == overlay.body)
         velocities.bodies.push_back(bodies.at(body.name));
     return velocities;
   }

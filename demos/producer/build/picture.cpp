@@ -139,14 +139,14 @@ Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context
     points_.push_back(stage_.add_points(points_def(*look)));
     stage_.set_object(points_.back(), ++object);
     styles_.push_back(points_def(*look).style);
-    smears_.push_back(add_smears(*look));
+    blur_streaks_.push_back(add_blur_streaks(*look));
   }
   add_overlay_lines();
   stage_.set_sun(sun_of(scene));
   stage_.set_environment(environment_of(scene));
 }
 
-render::PointsHandle Picture::add_smears(const ParticleLook& look) {
+render::PointsHandle Picture::add_blur_streaks(const ParticleLook& look) {
   render::PointsDef def = points_def(look);
   if (def.style != render::PointStyle::sphere || subframe_time() == 0) return {};
   def.style = render::PointStyle::streak;
@@ -296,7 +296,7 @@ void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t
 
   for (const DrawnPart& part : drawn.parts) stage_.set_object(part.instance, object);
   place_body(drawn, drawn.world_from_body, 0);
-  if (body.motion == sim::MotionType::fixed)
+  if (body.motion == sim::MotionType::static_body)
     places_.add_fixed(body.name, drawn.world_from_body);
   else
     places_.add_moving(body.name, *(drawn.slot = slot++));
@@ -325,7 +325,7 @@ float Picture::exposure(double time, float sample_weight) const {
 render::Channels Picture::channels(const Snapshot& previous, const Snapshot& current) {
   const double frame_time = &previous == &current ? 0 : scene_.output.fps.seconds(1);
   place(previous, previous, 1, frame_time);
-  stage_.remember();
+  stage_.store_previous_transforms();
   place(previous, current, 1, frame_time);
   return stage_.channels(to_float(frame_time));
 }

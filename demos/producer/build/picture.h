@@ -75,7 +75,7 @@ class Picture {
   render::MeshHandle primitive(const Primitive& shape);
   void add_cloth(const Cloth& cloth, const ModelLibrary& models);
   render::MaterialHandle cloth_material(const Cloth& cloth, const ModelLibrary& models);
-  render::PointsHandle add_smears(const ParticleLook& look);
+  render::PointsHandle add_blur_streaks(const ParticleLook& look);
   void add_overlay_lines();
 
   void place(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
@@ -104,11 +104,11 @@ class Picture {
   std::vector<render::PointsHandle> points_;
   std::vector<render::PointStyle> styles_;  // of the same
   std::vector<render::PointsHandle>
-      smears_;  // motion blur of balls that move too far in a sub-frame; or null
+      blur_streaks_;  // motion blur of balls that move too far in a sub-frame; or null
   std::map<std::string, render::MaterialHandle> fabrics_;  // by fabric and material
   std::vector<DrawnCloth> cloths_;
   std::vector<render::LinesHandle> overlays_;  // null for those without lines
-  std::vector<render::Point> scratch_, scratch_smears_;
+  std::vector<render::Point> scratch_, scratch_blur_streaks_;
   std::vector<Eigen::Vector3f> scratch_places_;
   std::vector<render::Line> scratch_lines_;
   render::HdrImage sum_;

@@ -62,18 +62,18 @@ float Picture::subframe_time() const {
 void Picture::set_balls(std::size_t set, std::span<const render::Point> balls) {
   // A ball that moves by more than its radius from one sub-frame to the next would be seen as a row of balls.
   std::vector<render::Point> still;
-  scratch_smears_.clear();
+  scratch_blur_streaks_.clear();
   for (const render::Point& ball : balls) {
     const float way = subframe_time() * ball.velocity.norm();
     if (way < ball.radius) {
       still.push_back(ball);
       continue;
     }
-    scratch_smears_.push_back(ball);
-    scratch_smears_.back().color.w() *= 1 / (1 + way * 2 / (std::numbers::pi_v<float> * ball.radius));
+    scratch_blur_streaks_.push_back(ball);
+    scratch_blur_streaks_.back().color.w() *= 1 / (1 + way * 2 / (std::numbers::pi_v<float> * ball.radius));
   }
   stage_.set_points(points_[set], still);
-  stage_.set_points(smears_[set], scratch_smears_);
+  stage_.set_points(blur_streaks_[set], scratch_blur_streaks_);
 }
 
 void Picture::place_body(const DrawnBody& body, const Affine3f& world_from_body, double time) {
@@ -104,7 +104,7 @@ void Picture::place_points(const Snapshot& previous, const Snapshot& current, fl
     const PointSet &before = previous.point_sets[set], &now = current.point_sets[set];
     // A streak is its own motion blur: it stays where the frame ends and is as long as its style says.
     const auto show = [&](std::span<const render::Point> points) {
-      smears_[set] ? set_balls(set, points) : stage_.set_points(points_[set], points);
+      blur_streaks_[set] ? set_balls(set, points) : stage_.set_points(points_[set], points);
     };
     if (w == 1 || styles_[set] == render::PointStyle::streak) {
       show(now.points);

@@ -201,7 +201,7 @@ std::vector<T> expand_all(const std::vector<T>& originals, uint64_t seed, std::v
     }
     if (copy_count(original.placement) > kMaxCopies) {
       errors.push_back({original.where, "asks for more than " + std::to_string(kMaxCopies) +
-                                            " copies: repeat, grid and scatter multiply"});
+                                            " copies: the counts of repeat, grid and scatter multiply"});
       all.push_back(original);
       continue;
     }
@@ -211,7 +211,7 @@ std::vector<T> expand_all(const std::vector<T>& originals, uint64_t seed, std::v
       Where where = original.where;
       where.path += "/scatter";
       warnings.push_back({where, std::to_string(copies.left_out) +
-                                     " copies found no place: make min_distance smaller or size larger"});
+                                     " copies found no free place: reduce min_distance or enlarge size"});
     }
   }
   return all;

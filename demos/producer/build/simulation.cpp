@@ -177,7 +177,7 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
       return world_.add_body(def);
     });
     bodies_[body.name] = handle;
-    if (body.motion == sim::MotionType::fixed) continue;
+    if (body.motion == sim::MotionType::static_body) continue;
     slot_of_[handle] = moving_.size();
     moving_.push_back({body.name, handle});
     moving_poses_.push_back(world_.body(handle).pose);
@@ -248,7 +248,7 @@ void Simulation::add_cloths(const Scene& scene, const ModelLibrary& models) {
       const PinScope& scope = scope_of(pin);
       const std::vector<uint32_t> held =
           at_place(scope.where, [&] { return pinned_vertices(pin, cloth, flat); });
-      if (held.empty()) throw SceneError(scope.where, "holds no vertex of the cloth");
+      if (held.empty()) throw SceneError(scope.where, "selects no vertex of the cloth");
       const sim::BodyHandle body = body_named(scope.body);
       for (const uint32_t vertex : held) {
         const Vec3& p = flat.def.vertices[vertex];
@@ -326,11 +326,10 @@ void Simulation::note(const sim::StepReport& report) {
   }
 
   if (!report.finite)
-    throw DivergedError(
-        fmt::format("the simulation diverged at {:.4f} s: '{}' is no longer finite; use a smaller "
-                    "world.step or weaker forces",
-                    world_.time(), report.non_finite.object),
-        state_dump(report.non_finite));
+    throw DivergedError(fmt::format("the simulation diverged at {:.4f} s: '{}' has a position or velocity "
+                                    "that is not finite. Reduce world.step or the forces",
+                                    world_.time(), report.non_finite.object),
+                        state_dump(report.non_finite));
 }
 
 sim::Energy Simulation::energy() const {

@@ -55,10 +55,10 @@ void add_overrides(CLI::App& command, SceneOptions& scene) {
       .add_option("--set", scene.set,
                   "Override a value of the scene: path=value, such as emitters.0.rate=200")
       ->allow_extra_args(false);
-  command.add_option("--seed", scene.seed, "Seed of everything random");
+  command.add_option("--seed", scene.seed, "Seed of all random numbers");
   add_allow(command, scene.allow);
   command.add_flag("--no-cache", scene.no_cache,
-                   "Cut models into convex parts each time instead of keeping them in ~/.cache/offstage");
+                   "Do not use the cache of convex decompositions in ~/.cache/offstage");
 }
 
 void add_scene(CLI::App& command, SceneOptions& scene) {
@@ -74,7 +74,7 @@ void add_timing(CLI::App& command, SceneOptions& scene) {
 void add_quality(CLI::App& command, SceneOptions& scene) {
   command
       .add_option("--quality", scene.quality,
-                  "Sub-frames per frame: draft 1, preview 4, final 16 (the physics stays)")
+                  "Sub-frames per frame: draft 1, preview 4, final 16 (does not change the simulation)")
       ->check(CLI::IsMember({"draft", "preview", "final"}));
 }
 
@@ -94,18 +94,19 @@ void add_talk(CLI::App& command, TalkOptions& talk) {
       .add_option("--progress", talk.progress,
                   "auto: a bar on a terminal, lines in a log file, nothing on a pipe; bar, plain, json, none")
       ->transform(CLI::CheckedTransformer(kProgressStyles).description(""));
-  command.add_flag("-q,--quiet", talk.quiet, "Say nothing but errors");
-  command.add_flag("-v,--verbose", talk.verbose, "Say more: stage times, memory");
+  command.add_flag("-q,--quiet", talk.quiet, "Print errors only");
+  command.add_flag("-v,--verbose", talk.verbose, "Print more: stage times, memory");
 }
 
 void add_channels(CLI::App& app, SceneOptions& scene) {
   app.add_option("--channels", scene.channels,
-                 "Also write numbers for each pixel beside every frame, or in FILM.channels beside a video:\n"
-                 "depth [m], normal, id, motion [px since the frame before]; several with commas")
+                 "Also write channels beside every frame, or into FILM.channels beside a video:\ndepth [m], "
+                 "normal, id, motion [px since the previous frame]; several with commas")
       ->delimiter(',')
       ->check(CLI::IsMember({"depth", "normal", "id", "motion"}));
-  app.add_option("--channel-format", scene.channel_format,
-                 "exr: FRAME.exr with all numbers as they are; png: FRAME.depth.png and so on, scaled")
+  app.add_option(
+         "--channel-format", scene.channel_format,
+         "exr: FRAME.exr with all channels as floating-point numbers; png: FRAME.depth.png and so on, scaled")
       ->check(CLI::IsMember({"exr", "png"}));
 }
 
@@ -120,8 +121,8 @@ void add_gl(CLI::App& command, render::GlPlatform& gl) {
   command
       .add_option_function<std::string>(
           "--gl", take,
-          "What draws: osmesa or egl, with the same pixels by llvmpipe; egl:gpu, a graphics card; auto, the\n"
-          "first of osmesa and egl that is installed")
+          "OpenGL backend: osmesa or egl, which draw the same pixels with llvmpipe; egl:gpu uses a graphics "
+          "card;\nauto uses the first of osmesa and egl that is installed")
       ->envname("OFFSTAGE_GL");
 }
 
@@ -141,11 +142,12 @@ CLI::App* add_render(CLI::App& app, RenderOptions& render, bool bare) {
       ->required(!bare);
   add_picture(*command, render.scene);
   add_timing(*command, render.scene);
-  command->add_option("--frames", render.frames, "Which frames: 1-30,40,50-90x2 (negative from the end)");
-  command->add_option("--chunk", render.chunk, "i/n: the i-th of n parts of the frames");
+  command->add_option("--frames", render.frames,
+                      "Frames to render: 1-30,40,50-90x2 (negative numbers count from the end)");
+  command->add_option("--chunk", render.chunk, "i/n: render the i-th of n parts of the frames");
   command->add_option("--cache", render.cache,
                       "Draw from the snapshots of `simulate --cache` instead of simulating");
-  command->add_option("--format", render.format, "Of standard output: rgba or y4m")
+  command->add_option("--format", render.format, "Format on standard output: rgba or y4m")
       ->check(CLI::IsMember({"rgba", "y4m"}));
   add_threads(*command, render.threads);
   add_gl(*command, render.gl);
@@ -158,11 +160,11 @@ CLI::App* add_render(CLI::App& app, RenderOptions& render, bool bare) {
   auto* dry_run = command->add_flag("--dry-run", render.dry_run, "Print the plan as JSON and write nothing");
   command
       ->add_flag("--watch", render.watch,
-                 "Render again whenever the scene, an include, a model or a texture changes, until Ctrl-C;\n"
-                 "only whole results replace the output, and errors of the scene keep the last one")
+                 "Render again whenever the scene, an include, a model or a texture changes, until "
+                 "Ctrl-C;\nthe output is replaced only by a complete result, never after an error")
       ->excludes(resume)
       ->excludes(dry_run);
-  command->add_option("--stats", render.stats, "Write figures of the run to this JSON file");
+  command->add_option("--stats", render.stats, "Write statistics of the run to this JSON file");
   command->add_option("--report", render.report,
                       "Write pictures, plots, settings and hashes of the run to this HTML file");
   add_talk(*command, render.talk);
@@ -170,12 +172,12 @@ CLI::App* add_render(CLI::App& app, RenderOptions& render, bool bare) {
 }
 
 CLI::App* add_new(CLI::App& app, NewOptions& options) {
-  CLI::App* command = app.add_subcommand(
-      "new",
-      "Write a commented scene to begin with, which renders at once; without NAME: list the templates");
+  CLI::App* command = app.add_subcommand("new",
+                                         "Write a commented scene to start from, which can be rendered at "
+                                         "once; without NAME: list the templates");
   command->add_option("name", options.name, "NAME or NAME.json; - for standard output");
   command->add_option("--template", options.from,
-                      "Which scene (default: that of the name, as in `new rain`, or else `basic`)");
+                      "Template to use (default: the one called NAME, as in `new rain`, or else `basic`)");
   command->add_flag("--list", options.list, "List the templates");
   command->add_flag("--force", options.force, "Replace an existing file");
   return command;
@@ -183,7 +185,7 @@ CLI::App* add_new(CLI::App& app, NewOptions& options) {
 
 CLI::App* add_tune(CLI::App& app, TuneOptions& tune) {
   CLI::App* command = app.add_subcommand(
-      "tune", "Change a scene in the browser and see the film at once; prints the address of the page");
+      "tune", "Edit a scene in the browser with a live preview; prints the address of the page");
   command->add_option("scene", tune.scene.file, "Scene file")->required();
   command->add_option("--port", tune.port, "Port on this machine (default: any that is free)")
       ->check(CLI::Range(1, 65535));
@@ -192,20 +194,20 @@ CLI::App* add_tune(CLI::App& app, TuneOptions& tune) {
       "--no-open", [&tune] { tune.open = false; }, "Only print the address and open no browser");
   add_allow(*command, tune.scene.allow);
   command->add_flag("--no-cache", tune.scene.no_cache,
-                    "Cut models into convex parts each time instead of keeping them in ~/.cache/offstage");
+                    "Do not use the cache of convex decompositions in ~/.cache/offstage");
   add_threads(*command, tune.threads);
   add_gl(*command, tune.gl);
   return command;
 }
 
 CLI::App* add_encode(CLI::App& app, EncodeOptions& encode) {
-  CLI::App* command = app.add_subcommand("encode", "Make a video of PNG frames that are there already");
+  CLI::App* command = app.add_subcommand("encode", "Encode existing PNG frames as a video");
   command->add_option("frames", encode.frames, "Pattern such as 'frames/####.png', or a folder")->required();
   command->add_option("-o,--output", encode.out, "Video: .mp4 .webm .mov .mkv .gif .webp .apng .png")
       ->required();
   command->add_option("--fps", encode.fps,
                       "Frames per second: 24, 29.97, 30000/1001 (default: as rendered, or 30)");
-  command->add_flag("--allow-gaps", encode.allow_gaps, "Leave out numbers that have no frame");
+  command->add_flag("--allow-gaps", encode.allow_gaps, "Skip missing frame numbers");
   command->add_flag("--force", encode.force, "Replace an existing file");
   add_talk(*command, encode.talk);
   return command;
@@ -213,11 +215,11 @@ CLI::App* add_encode(CLI::App& app, EncodeOptions& encode) {
 
 CLI::App* add_validate(CLI::App& app, ValidateOptions& validate) {
   CLI::App* command =
-      app.add_subcommand("validate", "Check a scene, report every problem, and estimate what it costs");
+      app.add_subcommand("validate", "Check a scene, report every problem, and estimate the rendering time");
   add_scene(*command, validate.scene);
   command->add_flag("--json", validate.json, "Print the result as JSON");
   command->add_flag("--no-estimate,--quick", validate.no_estimate,
-                    "Leave out the estimate, which takes about two seconds");
+                    "Skip the estimate, which takes about two seconds");
   add_gl(*command, validate.gl);
   return command;
 }
@@ -226,9 +228,10 @@ CLI::App* add_frame(CLI::App& app, FrameOptions& frame) {
   CLI::App* command = app.add_subcommand("frame", "Draw one frame to a PNG");
   add_scene(*command, frame.scene);
   command->add_option("-o,--output", frame.out, "PNG file")->required();
-  auto* number =
-      command->add_option("-n,--frame", frame.frame, "Number of the frame (negative from the end)");
-  command->add_option("--at", frame.at, "Time in seconds instead")->excludes(number);
+  auto* number = command->add_option("-n,--frame", frame.frame,
+                                     "Number of the frame (negative numbers count from the end)");
+  command->add_option("--at", frame.at, "Time of the frame in seconds, instead of its number")
+      ->excludes(number);
   add_picture(*command, frame.scene);
   add_timing(*command, frame.scene);
   add_threads(*command, frame.threads);
@@ -240,7 +243,7 @@ CLI::App* add_frame(CLI::App& app, FrameOptions& frame) {
 }
 
 CLI::App* add_simulate(CLI::App& app, SimulateOptions& simulate) {
-  CLI::App* command = app.add_subcommand("simulate", "Run the physics alone; prints its figures as JSON");
+  CLI::App* command = app.add_subcommand("simulate", "Simulate without drawing; prints statistics as JSON");
   add_scene(*command, simulate.scene);
   add_timing(*command, simulate.scene);
   command->add_option("--trace", simulate.trace,
@@ -249,10 +252,11 @@ CLI::App* add_simulate(CLI::App& app, SimulateOptions& simulate) {
                       "CSV of the contact points of bodies, with their forces");
   command->add_option("--cloths", simulate.cloths, "CSV of strain and contacts of cloths");
   command->add_option("--joints", simulate.joints, "CSV of the loads and positions of joints");
-  command->add_option("--trace-every", simulate.trace_every, "frame or step, of all of these")
+  command->add_option("--trace-every", simulate.trace_every, "Interval of the CSV rows: frame or step")
       ->check(CLI::IsMember({"frame", "step"}));
   command->add_option("--cache", simulate.cache, "Folder for one snapshot per frame, for `render --cache`");
-  command->add_option("--stats", simulate.stats, "Write the figures to this JSON file instead");
+  command->add_option("--stats", simulate.stats,
+                      "Write the statistics to this JSON file instead of standard output");
   add_threads(*command, simulate.threads);
   command->add_flag("--force", simulate.force, "Replace existing output");
   add_talk(*command, simulate.talk);
@@ -267,14 +271,13 @@ CLI::App* add_compare(CLI::App& app, CompareOptions& compare) {
   command->add_option("b", compare.other, "Second picture or folder");
   command->add_option("--golden", compare.golden, "Folder of the goldens")->capture_default_str();
   command->add_option("--report", compare.report,
-                      "Folder for expected, actual, difference and a page that shows them");
-  CLI::Option* keep =
-      command->add_option("--keep-states", compare.states.keep,
-                          "Folder that the simulated states of the golden's frames are written to");
+                      "Folder for the expected and actual pictures, their difference and an HTML page");
+  CLI::Option* keep = command->add_option("--keep-states", compare.states.keep,
+                                          "Write the simulated states of the golden's frames to this folder");
   command
       ->add_option(
           "--states", compare.states.from,
-          "Draw the states that an earlier --keep-states wrote instead of simulating: by another --gl")
+          "Draw the states written by --keep-states instead of simulating, for example with another --gl")
       ->excludes(keep);
   add_overrides(*command, compare.scene);
   add_threads(*command, compare.threads);
@@ -284,7 +287,7 @@ CLI::App* add_compare(CLI::App& app, CompareOptions& compare) {
 
 CLI::App* add_bless(CLI::App& app, BlessOptions& bless) {
   bless.golden = "tests/golden";
-  CLI::App* command = app.add_subcommand("bless", "Renew the goldens of scenes");
+  CLI::App* command = app.add_subcommand("bless", "Record the goldens of scenes again");
   command->add_option("scenes", bless.scenes, "Scene files")->required();
   command->add_option("--golden", bless.golden, "Folder of the goldens")->capture_default_str();
   command->add_option("--reason", bless.reason, "Why the pictures changed")->required();
@@ -295,11 +298,11 @@ CLI::App* add_bless(CLI::App& app, BlessOptions& bless) {
 }
 
 CLI::App* add_sheet(CLI::App& app, SheetOptions& sheet) {
-  CLI::App* command =
-      app.add_subcommand("sheet", "Draw frames of the whole film small, in one PNG with time codes");
+  CLI::App* command = app.add_subcommand(
+      "sheet", "Draw a contact sheet: small frames of the whole film in one PNG, with time codes");
   add_scene(*command, sheet.scene);
   command->add_option("-o,--output", sheet.out, "PNG file")->required();
-  command->add_option("--count", sheet.count, "How many frames, evenly from the first to the last")
+  command->add_option("--count", sheet.count, "Number of frames, evenly from the first to the last")
       ->check(CLI::Range(1, 400))
       ->capture_default_str();
   command->add_option("--columns", sheet.columns, "Pictures in a row")->check(CLI::Range(1, 100));
@@ -314,12 +317,13 @@ CLI::App* add_sheet(CLI::App& app, SheetOptions& sheet) {
 
 CLI::App* add_sweep(CLI::App& app, SweepOptions& sweep) {
   CLI::App* command = app.add_subcommand(
-      "sweep", "Run a scene with different values: one labelled PNG of all, a CSV of their figures");
+      "sweep",
+      "Render a scene with different values: one PNG with labelled pictures, and a CSV of statistics");
   add_scene(*command, sweep.scene);
   command
       ->add_option("--vary", sweep.vary,
-                   "What varies: path=a:b:step or path=x,y,z, such as emitters.0.rate=100:400:50; given\n"
-                   "several times, every combination is run (at most 256)")
+                   "Values to try: path=a:b:step or path=x,y,z, such as emitters.0.rate=100:400:50; if "
+                   "given\nseveral times, every combination is run (at most 256)")
       ->required()
       ->allow_extra_args(false);
   command
@@ -327,8 +331,9 @@ CLI::App* add_sweep(CLI::App& app, SweepOptions& sweep) {
       ->delimiter(',')
       ->allow_extra_args(false);
   command->add_option("-o,--output", sweep.out, "PNG file")->required();
-  command->add_option("--csv", sweep.csv,
-                      "Figures of every run at the last of the times (default: beside the PNG)");
+  command->add_option(
+      "--csv", sweep.csv,
+      "CSV with the statistics of every run at the last of the times (default: beside the PNG)");
   command->add_option("--columns", sweep.columns, "Pictures in a row")->check(CLI::Range(1, 100));
   add_small_picture(*command, sweep.scene);
   add_timing(*command, sweep.scene);
@@ -339,7 +344,7 @@ CLI::App* add_sweep(CLI::App& app, SweepOptions& sweep) {
   auto* resume =
       command->add_flag("--resume", sweep.resume, "Keep the finished runs of an interrupted sweep");
   command->add_flag("--force", sweep.force, "Replace existing output")->excludes(resume);
-  command->add_flag("-q,--quiet", sweep.quiet, "Say nothing but errors and failed runs");
+  command->add_flag("-q,--quiet", sweep.quiet, "Print errors and failed runs only");
   return command;
 }
 
@@ -378,9 +383,10 @@ int reported(const std::function<int()>& command) {
   } catch (const DivergedError& error) {
     log("offstage: {}\n", error.what());
     try {
-      log("the state was saved to {}\n", write_numbered_file("offstage-diverged", ".json", error.state()));
+      log("the last state was saved to {}\n",
+          write_numbered_file("offstage-diverged", ".json", error.state()));
     } catch (const render::FileError& unsaved) {
-      log("the state could not be saved: {}\n", unsaved.what());
+      log("the last state could not be saved: {}\n", unsaved.what());
     }
     return kDiverged;
   } catch (const render::StoppedError&) {
@@ -433,7 +439,7 @@ std::string wrong_command(const std::vector<const char*>& arguments,
   const std::string word = arguments[1];
   if (std::ranges::find(commands, word) != commands.end()) return {};
   if (std::error_code error; std::filesystem::is_regular_file(word, error))
-    return word + " is no scene: a scene is a .json file, or - for standard input";
+    return word + " is not a scene: a scene is a .json file, or - for standard input";
   const std::string near = nearest(word, commands);
   return "there is no command '" + word + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") +
          " (--help lists all)";
@@ -481,11 +487,11 @@ int dispatch(int argc, char** argv, const TuneCommand& tune) {
 
   bool reference = false;
   auto* schema_app = app.add_subcommand("schema", "Print the JSON Schema of the scene format");
-  schema_app->add_flag("--reference", reference, "Print the reference in Markdown instead");
+  schema_app->add_flag("--reference", reference, "Print the scene reference in Markdown instead");
 
   std::string preset;
   auto* presets_app = app.add_subcommand(
-      "presets", "List the effects, fabrics and articulations that scenes can name, or print one");
+      "presets", "List the presets, fabrics and articulations for scenes, or print one of them");
   presets_app->add_option("name", preset, "Preset, fabric or articulation to print");
 
   SceneOptions info;
@@ -499,7 +505,8 @@ int dispatch(int argc, char** argv, const TuneCommand& tune) {
   auto* compare_app = add_compare(app, compare);
   BlessOptions bless;
   auto* bless_app = add_bless(app, bless);
-  auto* doctor_app = app.add_subcommand("doctor", "Say what this machine has: GL, encoders, processor");
+  auto* doctor_app =
+      app.add_subcommand("doctor", "Report OpenGL backends, video encoders and processor of this machine");
   auto* man_app = app.add_subcommand("man", "Print the manual page, for `man -l -`");
   std::string shell;
   auto* completion_app = app.add_subcommand("completion", "Print the completion script of a shell");

@@ -76,9 +76,9 @@ Json describe_egl_devices() {
 Json in_child(const std::function<Json()>& describe) {
   constexpr std::chrono::seconds kLimit{60};
   std::array<int, 2> ends{};
-  if (pipe(ends.data()) != 0) throw std::runtime_error("doctor: no pipe can be made");
+  if (pipe(ends.data()) != 0) throw std::runtime_error("doctor: cannot create a pipe");
   const pid_t child = fork();
-  if (child < 0) throw std::runtime_error("doctor: no process can be started");
+  if (child < 0) throw std::runtime_error("doctor: cannot start a process");
   if (child == 0) {
     close(ends[0]);
     const std::string text = describe().dump();
@@ -107,7 +107,7 @@ Json in_child(const std::function<Json()>& describe) {
   int status = 0;
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
-  if (hangs) return {{"error", fmt::format("the driver gave no answer within {} s", kLimit.count())}};
+  if (hangs) return {{"error", fmt::format("the driver did not respond within {} s", kLimit.count())}};
   Json result = Json::parse(text, nullptr, false);
   if (!result.is_discarded()) return result;
   return {{"error", WIFSIGNALED(status) ? fmt::format("the driver crashed with signal {}", WTERMSIG(status))
@@ -141,8 +141,7 @@ int doctor_command() {
   const std::vector<std::string> encoders = render::available_encoders();
   json["ffmpeg_encoders"] = encoders;
   if (encoders.empty()) {
-    json["ffmpeg_error"] =
-        "ffmpeg was not found or has none of the encoders used; install the package ffmpeg";
+    json["ffmpeg_error"] = "ffmpeg was not found or lacks the required encoders; install the package ffmpeg";
     code = kUnavailable;
   }
   print_readable(json);

@@ -93,8 +93,8 @@ std::size_t encode(const FrameSequence& sequence, const render::VideoDef& def, c
     render::Image image = render::read_image(frame.path);
     if (!def.alpha && is_transparent(image)) {
       if (!std::exchange(told, true) && !talk.quiet)
-        log("note: {} has no transparency: transparent frames are laid over black; .webm, .mov, .webp and "
-            ".apng keep it\n",
+        log("note: {} has no transparency; transparent frames are composited over black. Use .webm, .mov, "
+            ".webp or .apng to keep it\n",
             def.path.extension().string());
       lay_over_black(image);
     }
@@ -124,7 +124,7 @@ std::string wrong_frame_rate(const std::string& text) {
 int encode_command(const EncodeOptions& options) {
   if (options.frames.size() != 1)
     throw std::invalid_argument(
-        "encode: give one pattern in quotes, such as 'frames/####.png', rather than the files");
+        "encode: give one pattern in quotes, such as 'frames/####.png', instead of a list of files");
   const OutputTarget target = parse_output(options.out);
   if (target.kind != OutputKind::video)
     throw OutputError(options.out + ": encode makes a video; give a file name that ends in one of " +
@@ -141,7 +141,7 @@ int encode_command(const EncodeOptions& options) {
   const OutputLock lock(OutputLock::beside(target.path), target.path.string());
   def.alpha = render::keeps_alpha(target.path.extension().string()) && any_transparent(sequence);
   if (sequence.left_out > 0 && !options.talk.quiet)
-    log("note: {} frames are missing between {} and {} and are left out\n", sequence.left_out,
+    log("note: {} frames are missing between {} and {}; the video skips them\n", sequence.left_out,
         sequence.frames.front().number, sequence.frames.back().number);
   const std::size_t done = encode(sequence, def, options.talk);
   if (done < sequence.frames.size()) {

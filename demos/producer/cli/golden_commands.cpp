@@ -81,7 +81,8 @@ Golden drawn_with_progress(const LoadedScene& scene, int threads, const GoldenSt
 void refuse_standard_input(const std::string& command, const std::string& file) {
   if (file == kStandardInput)
     throw std::invalid_argument(
-        command + ": a golden belongs to a scene file; standard input has no name to find it by");
+        command +
+        ": needs a scene file, because a golden is found by the file's name; standard input has none");
 }
 
 int compare_with_golden(const CompareOptions& options) {
@@ -94,7 +95,7 @@ int compare_with_golden(const CompareOptions& options) {
                     "--reason \"...\"",
                     options.golden, options.scene.file, options.scene.file, options.golden));
   if (!place.moved_from.empty())
-    log("note: the golden was made of {}, which is gone; it is taken for {}, moved\n",
+    log("note: the golden was recorded for {}, which no longer exists; it is used for {} as its moved file\n",
         (fs::path(options.golden) / place.moved_from).lexically_normal().string(), options.scene.file);
   const Golden expected = read_golden(options.golden, place.name);
   const int threads = threads_or_all(options.threads);
@@ -106,7 +107,7 @@ int compare_with_golden(const CompareOptions& options) {
   fmt::print("{}", verdict.text);
   if (verdict.pass) return kOk;
   const std::string folder = options.report.empty() ? "golden-report/" + actual.scene : options.report;
-  fmt::print("see {}\nif this is what you want: offstage bless {} --golden {} --reason \"...\"\n",
+  fmt::print("see {}\nto accept the new pictures: offstage bless {} --golden {} --reason \"...\"\n",
              fs::absolute(write_report(folder, expected, actual, verdict)).string(), options.scene.file,
              options.golden);
   return kImagesDiffer;
@@ -120,10 +121,9 @@ int compare_command(const CompareOptions& options) {
 
 int bless_command(const BlessOptions& options) {
   if (std::getenv("CI"))
-    throw std::invalid_argument(
-        "bless: goldens are not renewed in CI; run it by hand and look at the pictures");
+    throw std::invalid_argument("bless: does not run in CI; run it by hand and look at the pictures");
   if (options.reason.find_first_not_of(" \t") == std::string::npos)
-    throw std::invalid_argument("bless: --reason must say why the pictures changed");
+    throw std::invalid_argument("bless: --reason must state why the pictures changed");
   for (const std::string& file : options.scenes) refuse_standard_input("bless", file);
   const int threads = threads_or_all(options.threads);
   const auto control = simulation_threads(options.threads);

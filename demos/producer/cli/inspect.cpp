@@ -68,8 +68,9 @@ Json describe_model(const std::filesystem::path& path, const DecompositionCache&
     const sim::PrincipalInertia principal = sim::diagonalise(mass.inertia);
     json["principal_moments_per_density"] = json_of(principal.moments);
   }
-  const StepNotice notice(ProgressStyle::automatic, fmt::format("cutting {} ({} triangles) into convex parts",
-                                                                path.string(), model.triangle_count()));
+  const StepNotice notice(
+      ProgressStyle::automatic,
+      fmt::format("decomposing {} ({} triangles) into convex parts", path.string(), model.triangle_count()));
   json["convex_parts"] = describe(cache.decompose(mesh));
   Json nodes = Json::array();
   for (const render::Model::Node& node : model.nodes) {
@@ -179,10 +180,10 @@ ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
   constexpr double kLong_s = 10;
   for (const ModelLibrary::Decomposed& part : models.decomposed())
     if (part.seconds > kLong_s && !talk.quiet)
-      log("note: it took {} to cut '{}' ({} triangles) into {} convex parts{}; a simpler model, or a "
-          "primitive or a hull as its shape, is faster in every run\n",
+      log("note: it took {} to decompose '{}' ({} triangles) into {} convex parts{}; a simpler model, or a "
+          "primitive as its shape, makes every run faster\n",
           duration_text(part.seconds), part.file, part.triangles, part.parts,
-          options.no_cache ? "" : ", which are kept for later runs");
+          options.no_cache ? "" : ", which are cached for later runs");
   return models;
 }
 

@@ -35,7 +35,8 @@ void report_run(const RunStats& stats, const TalkOptions& talk, const std::strin
   if (!stats_file.empty()) write_text_file(stats_file, to_json(stats));
   if (talk.quiet) return;
   if (!stats.blank_frames.empty())
-    log("warning: frame {} is blank: all of its pixels are equal{}\n", stats.blank_frames.front(),
+    log("warning: frame {}{} is blank: all pixels are equal. Check the camera, the lights and the exposure\n",
+        stats.blank_frames.front(),
         stats.blank_frames.size() > 1 ? fmt::format(" (and {} more)", stats.blank_frames.size() - 1) : "");
   for (const std::string& note : notes_of(stats.totals)) log("{}\n", note);
   if (!talk.verbose) return;
@@ -188,8 +189,8 @@ int render_to_frames(const Plan& plan, const ModelLibrary& models, const RenderO
   report_run(stats, options.talk, options.stats);
   if (stats.interrupted_by)
     return interrupted(stats, static_cast<int>(plan.frames.size()),
-                       options.force ? "; go on with the same command and --resume instead of --force"
-                                     : "; go on with the same command and --resume");
+                       options.force ? "; continue with the same command and --resume instead of --force"
+                                     : "; continue with the same command and --resume");
   fmt::print("{}\n", plan.target.path.string());
   return kOk;
 }
@@ -215,7 +216,7 @@ int render_to_video(const Plan& plan, const ModelLibrary& models, const RenderOp
   }
   return interrupted(stats, static_cast<int>(plan.frames.size()),
                      (stats.frames > 0 ? "; they are in " + partial.string() : std::string()) +
-                         "; to be able to go on, start a video with --resume");
+                         "; to be able to continue a video, start it with --resume");
 }
 
 int render_to_pipe(const Plan& plan, const ModelLibrary& models, const RenderOptions& options) {
@@ -254,7 +255,7 @@ void check_file(const std::string& file, bool force) {
 
 void check_distinct(const std::string& a, const std::string& b) {
   if (!a.empty() && fs::path(a).lexically_normal() == fs::path(b).lexically_normal())
-    throw OutputError(a + ": is named for two outputs");
+    throw OutputError(a + ": is used for two outputs");
 }
 
 void check_png(const std::string& file) {
@@ -268,7 +269,7 @@ int frame_at(const Scene& scene, double time) {
 
 std::string default_film(const std::string& scene_file) {
   if (scene_file == kStandardInput)
-    throw OutputError("a scene from standard input has no name for its film; give one with -o FILM.mp4");
+    throw OutputError("a scene from standard input has no file name; name the film with -o FILM.mp4");
   return fs::path(scene_file).stem().string() + ".mp4";
 }
 
@@ -287,7 +288,7 @@ int render_command(const RenderOptions& options) {
     const fs::path stale = channels_folder(plan.target.path);
     if (!plan.channels.choice.any() && !options.force && holds_channels(stale))
       throw OutputError(stale.string() +
-                        ": holds channels of an earlier film; remove it, or let --force do so");
+                        ": contains channels of an earlier film; remove it, or replace it with --force");
   }
   check_file(options.stats, options.force || options.resume);
   check_distinct(options.stats, options.out);
@@ -295,7 +296,7 @@ int render_command(const RenderOptions& options) {
   check_distinct(options.report, options.out);
   check_distinct(options.report, options.stats);
   if (plan.channels.choice.any() && plan.target.kind == OutputKind::pipe)
-    throw OutputError("-: channels are files beside frames or a video; name a folder or a file");
+    throw OutputError("-: channels are files beside frames or a video; choose a folder or a file as output");
   if (options.dry_run) return print_plan(plan);
   if (plan.frames.empty()) {
     log("note: this chunk has no frames: there are fewer frames than chunks\n");

@@ -33,8 +33,8 @@ void RunProgress::warn_of_long_run(const Progress& progress) {
   const auto costliest = std::ranges::max_element(objects, {}, work);
   std::string advice;
   if (costliest != objects.end() && (*costliest).*work > 0)
-    advice = fmt::format(" The most expensive object is the {}: {} makes it faster.", describe(*costliest),
-                         costliest->advice);
+    advice = fmt::format(" The most expensive object is the {}; {} would make it faster.",
+                         describe(*costliest), costliest->advice);
   log("note: this takes about {}, most of it for the {}.{}\n", duration_text(all),
       simulating ? "simulation" : "drawing", advice);
 }

@@ -140,7 +140,7 @@ void check_outputs(const SweepOptions& options, const Sweep& sweep) {
   const bool begun = fs::exists(sweep.finished);
   if (begun && !options.resume && !options.force)
     throw OutputError(sweep.finished.string() +
-                      ": holds an unfinished sweep; continue with --resume, or start again with --force");
+                      ": contains an unfinished sweep; continue with --resume, or start again with --force");
   const bool replace = options.force || (options.resume && begun);
   check_file(options.out, replace);
   check_file(sweep.csv, replace);
@@ -258,9 +258,9 @@ class Crew {
     const double spare = available_memory_mb() / peak_rss_mb();
     const auto most = static_cast<std::size_t>(std::min<double>(jobs, 1 + std::floor(spare)));
     {
-      std::vector<std::jthread> crew;
+      std::vector<std::jthread> workers;
       for (std::size_t i = 1; i < std::min(most, sweep_.runs.size()); ++i)
-        crew.emplace_back([this] { work_through(sweep_.runs.size()); });
+        workers.emplace_back([this] { work_through(sweep_.runs.size()); });
       work_through(sweep_.runs.size());
     }
     if (failure_) std::rethrow_exception(failure_);
@@ -368,7 +368,7 @@ int sweep_command(const SweepOptions& options) {
     throw render::FileError(sweep.finished.string() + ": cannot make the folder: " + error.message());
   const std::size_t done = Crew(sweep, options).work(options.jobs > 0 ? options.jobs : all_threads);
   if (done < sweep.runs.size()) {
-    log("interrupted: {} of {} runs done; go on with the same command and --resume{}\n", done,
+    log("interrupted: {} of {} runs done; continue with the same command and --resume{}\n", done,
         sweep.runs.size(), options.force ? " instead of --force" : "");
     return 128 + interrupt_signal();
   }

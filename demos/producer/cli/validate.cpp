@@ -34,7 +34,7 @@ MostParticles most_particles(const Scene& scene) {
   return most;
 }
 
-/// Bodies that begin in each other, the deepest first: they will be pushed apart, which moves them.
+/// Bodies that begin in each other, the deepest first. The simulation pushes them apart, which moves them.
 void add_overlaps(const Scene& scene, const Simulation& simulation, std::vector<Problem>& warnings) {
   constexpr double kVisible = 1e-3;
   constexpr std::size_t kMost = 5;
@@ -48,8 +48,9 @@ void add_overlaps(const Scene& scene, const Simulation& simulation, std::vector<
   for (std::size_t i = 0; i < std::min(overlaps.size(), kMost); ++i) {
     const auto& [a, b, depth] = overlaps[i];
     const std::string &name = world.body_def(a).name, &other = world.body_def(b).name;
-    warnings.push_back(
-        {place(name), fmt::format("\"{}\" begins {:.3g} mm inside \"{}\"", name, 1e3 * depth, other)});
+    warnings.push_back({place(name), fmt::format("body '{}' overlaps body '{}' by {:.3g} mm at time 0; they "
+                                                 "are pushed apart. Move one of them",
+                                                 name, other, 1e3 * depth)});
   }
   if (overlaps.size() > kMost)
     warnings.back().what += fmt::format(", and {} more pairs of bodies overlap", overlaps.size() - kMost);
@@ -92,7 +93,7 @@ std::string film_text(const CostEstimate& cost) {
 }
 
 void print_cost(const Scene& scene, const CostEstimate& cost) {
-  fmt::print("cost on this machine, by a trial of {:.3g} s of film:\n", cost.trial_film_s);
+  fmt::print("time on this machine, from a trial of {:.3g} s of film:\n", cost.trial_film_s);
   fmt::print("  simulation  {:.3g} s per second of film\n", cost.simulation_s_per_s);
   if (cost.frame_s)
     fmt::print("  drawing     {:.3g} s per frame\n", *cost.frame_s);
@@ -124,7 +125,7 @@ void print_models(const ModelLibrary& models) {
   constexpr double kSlow_s = 1;
   for (const ModelLibrary::Decomposed& model : models.decomposed())
     if (model.seconds > kSlow_s)
-      fmt::print("  it took {:.1f} s to cut {} ({} triangles) into {} convex parts\n", model.seconds,
+      fmt::print("  it took {:.1f} s to decompose {} ({} triangles) into {} convex parts\n", model.seconds,
                  model.file, model.triangles, model.parts);
 }
 

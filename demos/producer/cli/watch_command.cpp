@@ -51,7 +51,7 @@ class RenderProcess {
     if (waitpid(pid_, &status, WNOHANG) != pid_) return {};
     pid_ = -1;
     if (WIFEXITED(status)) return WEXITSTATUS(status);
-    log("offstage: the render ended by signal {}\n", WTERMSIG(status));
+    log("offstage: the render was ended by signal {}\n", WTERMSIG(status));
     return -1;
   }
 
@@ -119,7 +119,7 @@ class Watcher {
     if (target_.kind == OutputKind::video) {
       check_file(target_.path.string(), options.force);
     } else if (!options.force && fs::exists(folder() / "manifest.json")) {
-      throw OutputError(folder().string() + ": holds frames already; let them be replaced with --force");
+      throw OutputError(folder().string() + ": already contains frames; replace them with --force");
     }
     check_file(options.stats, options.force);
   }
@@ -157,9 +157,9 @@ class Watcher {
     if (options_.talk.quiet) return;
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
     if (*code == 0)
-      log("rendered in {:.1f} s; waiting for changes of the scene (Ctrl-C ends)\n", seconds.count());
+      log("rendered in {:.1f} s; waiting for changes of the scene (Ctrl-C quits)\n", seconds.count());
     else
-      log("{}; waiting for changes of the scene (Ctrl-C ends)\n",
+      log("{}; waiting for changes of the scene (Ctrl-C quits)\n",
           published_ ? "kept the last good result" : "there is no result yet");
   }
 

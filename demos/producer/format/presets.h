@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "producer/base/error.h"
+#include "producer/base/scene_folder.h"
 #include "producer/format/scene_source.h"
 #include "producer/scene/scene.h"
 

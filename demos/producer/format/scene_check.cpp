@@ -114,7 +114,7 @@ class Checker {
     for (const T& object : objects) {
       const auto [it, fresh] = owners.emplace(object.name, object.where.path);
       if (fresh || !reported.insert(object.where.path).second) continue;
-      fail(object.where.path + "/name", "the name '" + object.name + "' is already that of " + it->second);
+      fail(object.where.path + "/name", "the name '" + object.name + "' is already used by " + it->second);
     }
   }
   void check_names() {
@@ -172,8 +172,7 @@ class Checker {
            "has no effect: no body of this material has a friction_axis");
     if (any && material.cross_friction.value_or(0) > 0 && material.friction == 0)
       fail(material.where.path + "/cross_friction",
-           "takes a friction along the grain, too, of which it is a share; allowed is any but 0, such as "
-           "0.001");
+           "needs a \"friction\" above 0, which it is relative to, such as 0.001");
   }
   static bool has_grain(const Body& body) { return !body.friction_axis.isZero(0); }
 
@@ -188,9 +187,9 @@ class Checker {
           fail(path + "/materials" + step(i),
                "there is no material '" + name + "'" + suggestion(name, names_of(scene_.materials)));
       const auto [it, fresh] = owners.emplace(std::minmax(a, b), path);
-      if (!fresh) fail(path + "/materials", "are already those of " + it->second);
+      if (!fresh) fail(path + "/materials", "are the same pair as in " + it->second);
       if (!rule.restitution && !rule.friction && !rule.static_friction)
-        warn(path, "has no effect: gives neither restitution nor friction");
+        warn(path, "has no effect: it has neither restitution nor friction");
     }
   }
 
@@ -214,9 +213,10 @@ class Checker {
     if (dynamic && std::holds_alternative<sim::Plane>(body.shape))
       fail(path + "/shape", "a plane cannot be dynamic; give the body \"motion\": \"static\"");
     if (!kinematic && !body.keyframes.empty())
-      fail(path + "/keyframes", "only a kinematic body follows keyframes; give it \"motion\": \"kinematic\"");
+      fail(path + "/keyframes",
+           "only kinematic bodies follow keyframes; give the body \"motion\": \"kinematic\"");
     if (!kinematic && !body.spin.isZero(0))
-      fail(path + "/spin", "only a kinematic body spins by itself; give it \"motion\": \"kinematic\"");
+      fail(path + "/spin", "only kinematic bodies have a spin; give the body \"motion\": \"kinematic\"");
     check_times(body.keyframes, path + "/keyframes");
     check_place(body.position, path + "/position");
     if (const auto mass = mass_of(body); dynamic && mass && *mass > 0)
@@ -226,7 +226,7 @@ class Checker {
     if (!dynamic && !body.angular_velocity.isZero(0))
       warn(path + "/angular_velocity", "has no effect: the body is not dynamic");
     if (body.mass > 0 && body.density != Body{}.density)
-      warn(path + "/density", "has no effect: the mass is given");
+      warn(path + "/density", "has no effect: \"mass\" is given");
     const Material* material = find_named(scene_.materials, body.material);
     if (has_grain(body) && !(material && material->cross_friction))
       warn(path + "/friction_axis", "has no effect: the body's material has no cross_friction");
@@ -251,17 +251,18 @@ class Checker {
   /// The mass at an end; nothing if it is not known or wrong.
   std::optional<Real> check_end(const SpringEnd& end, const std::string& path) {
     if (!end.body.empty() && !end.particles.empty()) {
-      fail(path, "must be on a body or a particle, not both");
+      fail(path, "must name a body or a particle, not both");
       return {};
     }
     if (end.particles.empty()) {
-      if (end.index != 0) warn(path + "/index", "has no effect: this end is not on a particle");
+      if (end.index != 0) warn(path + "/index", "has no effect: this end is not at a particle");
       if (end.body.empty()) return kUnlimited;
       check_body_name(path + "/body", end.body);
       const auto body = bodies_.find(end.body);
       return body == bodies_.end() ? std::nullopt : mass_of(*body->second);
     }
-    if (!end.position.isZero(0)) warn(path + "/position", "has no effect: the particle has its own");
+    if (!end.position.isZero(0))
+      warn(path + "/position", "has no effect: this end is at a particle, which has its own position");
     const ParticleGroup* group = find_named(scene_.particles, end.particles);
     if (!group) {
       fail(path + "/particles", "there are no particles '" + end.particles + "'" +
@@ -301,9 +302,9 @@ class Checker {
     const Real largest = largest_stable_step(scene_.world.integrator, stiffness, damping, mass);
     const Real used = std::min(scene_.world.step, scene_.output.fps.seconds(1));
     if (used >= largest)
-      fail(path, fmt::format("{} is too stiff for the step: /world/step must be less than "
-                             "{:.3g} s, is {:.3g} s",
-                             what, 0.995 * largest, used));
+      fail(path, fmt::format(
+                     "{} is too stiff for this sub-step: /world/step must be less than {:.3g} s, is {:.3g} s",
+                     what, 0.995 * largest, used));
   }
 
   // --- Forces ---
@@ -320,7 +321,8 @@ class Checker {
     }
   }
   void check_period(const NamedForce& force, Real start, Real end) {
-    if (end <= start) fail(force.where.path + "/end", fmt::format("must be after the start, {} s", start));
+    if (end <= start)
+      fail(force.where.path + "/end", fmt::format("must be later than the start, {} s", start));
   }
   void check_systems(const NamedForce& force, const std::vector<std::string>& particles) {
     for (std::size_t i = 0; i < particles.size(); ++i)
@@ -361,7 +363,7 @@ class Checker {
     check_period(force, force.start, force.end);
     check_region(force.where.path, force.region, force.drop_rate);
     if (force.particles.empty() && !force.where.path.empty())
-      warn(force.where.path + "/particles", "has no effect: names none");
+      warn(force.where.path + "/particles", "has no effect: the list is empty");
   }
   void check_force(const WindField& wind) {
     check_scope(wind);
@@ -376,7 +378,7 @@ class Checker {
     check_systems(grab, grab.particles);
     check_cloth_names(grab, grab.cloths);
     if (grab.body.empty() && grab.particles.empty() && grab.cloths.empty())
-      fail(path, "needs a \"body\", \"particles\" or \"cloths\" to hold");
+      fail(path, "needs a \"body\", \"particles\" or \"cloths\"");
     if (!grab.body.empty()) check_pushed(path + "/body", grab.body, named_body(path + "/body", grab.body));
     check_period(grab, grab.start, grab.end);
     if (grab.keyframes.empty()) fail(path, "needs at least one of \"keyframes\"");
@@ -407,15 +409,15 @@ class Checker {
   }
   void check_pair(const std::string& path, const std::string& a, const std::string& b) {
     const Body *first = named_body(path + "/a", a), *second = named_body(path + "/b", b);
-    if (a == b) return fail(path + "/b", "is the same body as a");
+    if (a == b) return fail(path + "/b", "is the same body as \"a\"");
     const auto is_plane = [](const Body* body) {
       return body && std::holds_alternative<sim::Plane>(body->shape);
     };
-    if (is_plane(first) && is_plane(second)) fail(path, "two planes have no contact that could be shown");
+    if (is_plane(first) && is_plane(second)) fail(path, "two planes never have a contact");
   }
   void check_not_random(const std::string& path, const Varying& v) {
     if (!std::holds_alternative<Real>(v) && !std::holds_alternative<effects::Curve>(v))
-      fail(path, "must be a number or a curve over time: nothing here is random");
+      fail(path, "must be a number or a curve over time, not a random distribution");
   }
   void check_overlay(const TreeOverlay& overlay) {
     check_mesh_body(overlay.where.path + "/body", overlay.body);
@@ -432,7 +434,7 @@ class Checker {
   void check_overlay(const VelocitiesOverlay& overlay) {
     const std::string path = overlay.where.path + "/body";
     const Body* body = overlay.body.empty() ? nullptr : named_body(path, overlay.body);
-    if (body && body->motion == sim::MotionType::fixed)
+    if (body && body->motion == sim::MotionType::static_body)
       warn(path, "shows nothing: the body '" + overlay.body + "' is static");
   }
   void check_overlay(const IslandsOverlay&) {}
@@ -441,7 +443,7 @@ class Checker {
   }
   void check_overlay(const TextOverlay& overlay) {
     if (overlay.until && *overlay.until <= overlay.from)
-      fail(overlay.where.path + "/until", "must be later than from");
+      fail(overlay.where.path + "/until", "must be later than \"from\"");
   }
   void check_overlay(const JointsOverlay& overlay) {
     if (!overlay.joint.empty() && !find_named(flat_.joints, overlay.joint))
@@ -457,7 +459,7 @@ class Checker {
   // --- Camera, light, film ---
 
   void check_view(const Vec3& eye, const Vec3& target, const std::string& path) {
-    if (eye == target) fail(path, "the camera is where it looks at");
+    if (eye == target) fail(path, "the camera is at the point that it looks at");
   }
   void check_camera(const StaticCamera& camera) { check_view(camera.eye, camera.target, "/camera"); }
   void check_camera(const KeyframedCamera& camera) {
@@ -490,7 +492,7 @@ class Checker {
   template <class Directed>
   void check_light(const Directed& light, const std::string& path) {
     check_lamp(light, path);
-    if (light.target == light.position) fail(path + "/target", "is where the light is");
+    if (light.target == light.position) fail(path + "/target", "is at the position of the light");
   }
   void check_lights() {
     constexpr std::size_t kMostLamps = 8;
@@ -498,9 +500,9 @@ class Checker {
     for (std::size_t i = 0; i < scene_.lights.size(); ++i) {
       const std::string path = "/lights" + step(i);
       ++(std::holds_alternative<SunLight>(scene_.lights[i]) ? suns : lamps);
-      if (suns > 1) fail(path, "there can be only one sun");
+      if (suns > 1) fail(path, "a scene has at most one sun");
       if (lamps > kMostLamps)
-        fail(path, fmt::format("there can be only {} lights besides the sun", kMostLamps));
+        fail(path, fmt::format("a scene has at most {} lights besides the sun", kMostLamps));
       std::visit([&](const auto& light) { check_light(light, path); }, scene_.lights[i]);
     }
   }
@@ -509,10 +511,10 @@ class Checker {
     check_not_random("/render/exposure", scene_.render.exposure);
     const auto& size = scene_.render.size;
     if (size.x() % 2 != 0 || size.y() % 2 != 0)
-      warn("/render/size", "is odd: most video formats need even numbers");
+      warn("/render/size", "is odd; most video formats need an even width and height");
     if (scene_.frame_count() < 1)
       fail("/output/duration",
-           fmt::format("is too short for a single frame at {} frames per second", scene_.output.fps.text()));
+           fmt::format("is shorter than one frame at {} frames per second", scene_.output.fps.text()));
   }
 
   const Scene& scene_;
@@ -547,13 +549,13 @@ std::optional<std::string> too_much_drag(const Scene& scene, sim::IntegratorKind
              used = std::min(scene.world.step, scene.output.fps.seconds(1));
   if (drag <= 0 || used < largest) return {};
   return fmt::format(
-      "is too much for the step and so small a mass: /world/step must be less than {:.3g} s, is {:.3g} s",
+      "is too large for this mass and sub-step: /world/step must be less than {:.3g} s, is {:.3g} s",
       0.995 * largest, used);
 }
 
 std::optional<std::string> outside(const Scene& scene, const Vec3& position) {
   if (position.cwiseAbs().maxCoeff() < scene.world.bounds) return {};
-  return fmt::format("is outside the world, which ends {:g} m from the origin; see /world/bounds",
+  return fmt::format("is outside the world, which reaches {:g} m from the origin; enlarge /world/bounds",
                      scene.world.bounds);
 }
 

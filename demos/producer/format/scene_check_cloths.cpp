@@ -53,7 +53,7 @@ class ClothChecker {
       const PinScope& scope = scope_of(pin);
       if (scope.where.path.empty()) continue;  // its type was wrong, and none was read
       const std::vector<uint32_t> held = pinned_vertices(pin, cloth, flat);
-      if (held.empty()) fail(scope.where.path, "holds no vertex of the cloth; " + extent(flat));
+      if (held.empty()) fail(scope.where.path, "selects no vertex of the cloth; " + extent(flat));
     }
     if (const std::string what = sim::problem(flat.def); !what.empty()) return fail(cloth.where.path, what);
     if (const auto what = too_stiff(scene_, flat.def)) fail(cloth.where.path, *what);
@@ -63,8 +63,8 @@ class ClothChecker {
     sim::Aabb box;
     for (const Vec3& p : flat.places) box.extend(p);
     const auto &a = box.min(), &b = box.max();
-    return fmt::format("in its own frame it reaches from ({:g}, {:g}, {:g}) to ({:g}, {:g}, {:g})", a.x(),
-                       a.y(), a.z(), b.x(), b.y(), b.z());
+    return fmt::format("in its own frame the cloth extends from ({:g}, {:g}, {:g}) to ({:g}, {:g}, {:g})",
+                       a.x(), a.y(), a.z(), b.x(), b.y(), b.z());
   }
 
   const Scene& scene_;

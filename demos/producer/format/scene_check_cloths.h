@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "producer/base/scene_folder.h"
 #include "producer/format/scene_check.h"
 
 namespace offstage::producer {

@@ -40,7 +40,7 @@ class JointChecker {
     for (const Joint& joint : flat_.joints)
       if (!names.insert(joint.name).second)
         return fail(joint.where.path + "/name",
-                    "the name '" + joint.name + "' is already that of another joint");
+                    "the name '" + joint.name + "' is already used by another joint");
   }
 
   const Body* body(const std::string& path, const std::string& name) {
@@ -61,7 +61,7 @@ class JointChecker {
     if (!joint.a.empty() && joint.a == joint.b) fail(path + "/b", "is the same body as \"a\"");
     const auto moves = [](const Body* body) { return body && body->motion == sim::MotionType::dynamic; };
     if (a && (joint.b.empty() || b) && !moves(a) && !moves(b))
-      fail(path, "joins nothing that forces can move: one of its bodies must be dynamic");
+      fail(path, "has no dynamic body: at least one of \"a\" and \"b\" must be dynamic");
     check(path, joint.behaviour);
   }
 
@@ -70,11 +70,11 @@ class JointChecker {
     const bool slides = joint.type == prismatic || joint.type == distance;
     if (joint.limits && !slides)
       fail(path + "/limits", "is for prismatic and distance joints; use \"limits_deg\"");
-    if (joint.limits_deg && slides) fail(path + "/limits_deg", "is for joints that turn; use \"limits\"");
+    if (joint.limits_deg && slides) fail(path + "/limits_deg", "is for joints that rotate; use \"limits\"");
     check_limits(path + "/limits", joint.limits);
     check_limits(path + "/limits_deg", joint.limits_deg);
     if (joint.limits_deg && joint.type == fixed)
-      fail(path + "/limits_deg", "is for joints that turn; a fixed one does not");
+      fail(path + "/limits_deg", "has no meaning for a fixed joint");
     if (joint.swing_deg && joint.type != spherical && joint.type != universal)
       fail(path + "/swing_deg", "is for spherical and universal joints");
     Joint whole;
@@ -92,24 +92,24 @@ class JointChecker {
 
   void check_limits(const std::string& path, const std::optional<std::array<Real, 2>>& limits) {
     if (limits && !((*limits)[0] <= 0 && (*limits)[1] >= 0))
-      fail(path, "must be a range that contains 0, where the joint is at time 0");
+      fail(path, "must be a range that contains 0, the position of the joint at time 0");
   }
 
   void check_keys(const std::string& path, const std::vector<MotorKey>& keys) {
     for (std::size_t i = 1; i < keys.size(); ++i)
       if (!(keys[i].time > keys[i - 1].time))
-        fail(path + "/" + std::to_string(i) + "/time", "must be later than that of the key before");
+        fail(path + "/" + std::to_string(i) + "/time", "must be later than that of the previous key");
   }
 
   void check(const Chain& chain) {
-    if ((chain.to - chain.from).norm() < 1e-6) fail(chain.where.path + "/to", "is where \"from\" is");
+    if ((chain.to - chain.from).norm() < 1e-6) fail(chain.where.path + "/to", "must differ from \"from\"");
     const auto is_still = [this](const std::string& end) {
       const auto it = std::ranges::find(flat_.bodies, end, &Body::name);
       return end == "world" || (it != flat_.bodies.end() && it->motion != sim::MotionType::dynamic);
     };
     if (is_still(chain.start) && is_still(chain.end) && chain.sag < 1.0005)
       fail(chain.where.path + "/sag",
-           "must be over 1.0005 if both ends are held still: a taut chain bears nothing across");
+           "must be above 1.0005 if both ends are fixed: a taut chain cannot carry a sideways load");
     for (const auto& [key, end] : {std::pair("/start", &chain.start), {"/end", &chain.end}})
       if (!end->empty() && *end != "world") body(chain.where.path + key, *end);
   }
@@ -146,13 +146,12 @@ class JointChecker {
     for (const NodeJoint& joint : tree.joints) {
       check(joint.where.path, joint.behaviour);
       if (joint.behaviour.type == sim::JointType::distance)
-        fail(joint.where.path + "/type",
-             "must be another: a node and the one above it have no distance to keep");
+        fail(joint.where.path + "/type", "must not be \"distance\": the joint is at the origin of the node");
       if (!names.empty() && std::ranges::find(names, joint.node) == names.end())
         fail(joint.where.path + "/node",
              tree.file + " has no node '" + joint.node + "' with triangles" + suggestion(joint.node, names));
       else if (!seen.insert(joint.node).second)
-        fail(joint.where.path + "/node", "has a joint already");
+        fail(joint.where.path + "/node", "already has a joint");
     }
   }
 

@@ -67,7 +67,7 @@ class ParticleChecker {
     const auto claim = [&](const std::string& name, const std::string& path) {
       const auto [it, fresh] = owners.emplace(name, path);
       if (!fresh && it->second != path && reported.insert(path).second)
-        fail(path + "/name", "the name '" + name + "' is already that of " + it->second);
+        fail(path + "/name", "the name '" + name + "' is already used by " + it->second);
     };
     for (const ParticleGroup& group : scene_.particles) claim(group.name, group.where.path);
     for (const Emitter& emitter : flat_.emitters)
@@ -97,7 +97,7 @@ class ParticleChecker {
       if (fades) warn(path + "/color", "alpha has no effect: spheres are opaque");
       if (look.additive.value_or(false)) warn(path + "/additive", "has no effect: spheres are opaque");
     } else if (look.metallic || look.roughness) {
-      warn(path + (look.metallic ? "/metallic" : "/roughness"), "has no effect: only spheres have it");
+      warn(path + (look.metallic ? "/metallic" : "/roughness"), "has no effect: it is for spheres only");
     }
     check_ages(look.color_over_age, path + "/color_over_age");
     check_ages(look.temperature_over_age, path + "/temperature_over_age");
@@ -138,10 +138,9 @@ class ParticleChecker {
     const Real longest = effects::upper_bound(source.lifespan);
     const auto check_age = [&](Real age, const std::string& where, const char* what) {
       if (age >= longest)
-        fail(path + where,
-             fmt::format("is {:g} s, but particles live {:g} s at most and never {}; allowed is "
-                         "less than the lifespan",
-                         age, longest, what));
+        fail(path + where, fmt::format("is {:g} s, but the lifespan is at most {:g} s, so particles never "
+                                       "{}; it must be less than the lifespan",
+                                       age, longest, what));
     };
     if (source.split && source.split->enabled && effects::upper_bound(source.split->count) >= 0.5)
       check_age(effects::lower_bound(source.split->age), "/split/age", "split");
@@ -156,12 +155,14 @@ class ParticleChecker {
     if (emitter.overlap) return;
     if (smallest > room) {
       fail(emitter.where.path + "/surface",
-           fmt::format("is too small for a single particle: it is {} m wide and the smallest particle {:.3g} "
-                       "m; or let newborns \"overlap\"",
+           fmt::format("is {} m wide, too small for the smallest particle, {:.3g} m; make it larger, or set "
+                       "\"overlap\" to true",
                        room, smallest));
     } else if (2 * effects::upper_bound(emitter.radius) > room) {
       warn(emitter.where.path + "/surface",
-           fmt::format("is only {} m wide: too small for the largest particles", room));
+           fmt::format(
+               "is {} m wide, too small for the largest particles, which will be released late or not at all",
+               room));
     }
   }
 
@@ -170,10 +171,10 @@ class ParticleChecker {
     for_each_source(emitter, [&](const ParticleSource& source, const auto&...) { check_source(source); });
     check_room(emitter);
     if (emitter.end <= emitter.start)
-      fail(path + "/end", fmt::format("must be after the start, {} s", emitter.start));
+      fail(path + "/end", fmt::format("must be later than the start, {} s", emitter.start));
     for (std::size_t i = 0; i < emitter.windows.size(); ++i)
       if (emitter.windows[i].end <= emitter.windows[i].start)
-        fail(path + "/windows" + index_step(i) + "/end", "must be after the start");
+        fail(path + "/windows" + index_step(i) + "/end", "must be later than the start");
     check_count(emitter);
   }
 
@@ -194,18 +195,19 @@ class ParticleChecker {
     const bool is_emitter = &source == static_cast<const ParticleSource*>(&emitter);
     const auto possible = static_cast<Real>(bound.possible.alive);
     if (possible * copies > kMostParticles) {
-      fail(path, fmt::format("could have {:.3g} particles alive at once, more than {:.3g}; lower {}",
+      fail(path, fmt::format("could have {:.3g} particles at once, more than the limit of {:.3g}; reduce {}",
                              possible * copies, kMostParticles,
-                             source.split ? "the count or depth of its split, rate, count or lifespan"
+                             source.split ? "the count or depth of the split, rate, count or lifespan"
                                           : "rate, count or lifespan"));
       return true;
     }
     if (is_emitter && bound.possible.born == 0)
-      warn(path, "releases no particles: rate, count and bursts are zero, or never in the film");
+      warn(path,
+           "releases no particles: rate, count and bursts are zero, or their times are outside the film");
     else if (possible > kTolerance * static_cast<Real>(source.max_alive))
       warn(path + "/max_alive",
-           fmt::format("may hold back particles: {:.3g} could be alive at once, {} are allowed", possible,
-                       source.max_alive));
+           fmt::format("may prevent releases: up to {:.3g} particles could exist at once, {} are allowed",
+                       possible, source.max_alive));
     return false;
   }
 
@@ -213,8 +215,9 @@ class ParticleChecker {
     Real sum = 0;
     for (const ParticleBound& bound : particle_bounds(flat_)) sum += static_cast<Real>(bound.alive);
     if (sum > kMostParticles)
-      fail("/emitters", fmt::format("could have {:.3g} particles alive at once together, more than {:.3g}",
-                                    sum, kMostParticles));
+      fail("/emitters",
+           fmt::format("together could have {:.3g} particles at once, more than the limit of {:.3g}", sum,
+                       kMostParticles));
   }
 
   const Scene& scene_;

@@ -8,7 +8,7 @@ namespace {
 
 constexpr const char* kIntroduction = R"(# Scene format
 
-A scene is a JSON file. It says what there is, how it moves, and how it is filmed:
+A scene is a JSON file. It describes objects, their motion, and the film that is made of them:
 
 ```json
 {
@@ -25,21 +25,21 @@ A scene is a JSON file. It says what there is, how it moves, and how it is filme
 }
 ```
 
-Every key has a default, except where its row says "required". A key that is not known, a value of the wrong
-type or out of its range, and a name that leads nowhere are errors; all of them are reported at once, each
-with file, line, column and path.
+Every key has a default, except where its row says "required". Unknown keys, values of the wrong type or out of
+range, and names that do not exist are errors. offstage reports all of them at once, each with file, line,
+column and path.
 
 - **Comments** are `// to the end of the line` and `/* between */`.
-- **Units** are metres, kilograms, seconds and radians. What is in degrees says so in its name (`fov_deg`).
-  Axes are right-handed and Y is up. Sizes from 0.001 to 100 m and speeds below 300 m/s are what the
-  simulation is made for.
-- **Frames** are numbered from 1; frame k shows the time start + (k - 1) / fps. There are duration * fps of
-  them, rounded.
-- **Files** (models, textures) are sought in the folder of the scene file; those of a scene from standard input
-  (`-` in place of the file) in the current folder.
-- **Names** may be left out; an object without one is called after its kind and index, like `body_3`.
-- **Editors** complete and check a scene that starts with `"$schema": "scene.schema.json"`, the output of
-  `offstage schema`.
+- **Units** are metres, kilograms, seconds and radians. Keys in degrees have a name that ends in `_deg`.
+  Axes are right-handed and Y is up. The simulation is designed for sizes from 0.001 to 100 m and speeds below
+  300 m/s.
+- **Frames** are numbered from 1; frame k shows the time start + (k - 1) / fps. A film has
+  duration * fps frames, rounded.
+- **Files** (models, textures) are searched in the folder of the scene file. If the scene is read from standard
+  input (`-` instead of a file), they are searched in the current folder.
+- **Names** are optional; an object without a name is called after its kind and index, such as `body_3`.
+- **Editors** complete and check a scene that starts with `"$schema": "scene.schema.json"`, a file that
+  `offstage schema` prints.
 
 ## Orientations
 
@@ -47,42 +47,43 @@ with file, line, column and path.
 
 ## Colours
 
-`"#rrggbb"` or `"#rrggbbaa"` in sRGB, as picture editors show them (in short `"#rgb"` or `"#rgba"`: `#f80` is
-`#ff8800`), or linear `[r, g, b]` or `[r, g, b, a]`, where values above 1 glow. Alpha is straight: 0 is transparent, 1 opaque.
+`"#rrggbb"` or `"#rrggbbaa"` in sRGB, as picture editors show them (short form `"#rgb"` or `"#rgba"`: `#f80` is
+`#ff8800`), or linear `[r, g, b]` or `[r, g, b, a]`, where values above 1 glow. Alpha is not premultiplied: 0 is
+transparent, 1 is opaque.
 
 ## Numbers that vary
 
-A key of type *varying* takes one of
+A key of type *varying* accepts one of these values:
 
 | value | meaning |
 | --- | --- |
-| `3` | always the same |
-| `{"mean": 4, "deviation": 2}` | normal distribution, cut off at mean - deviation and mean + deviation |
-| `{"mean": 4, "deviation": 2, "clip": false, "min": 0}` | normal distribution that is not cut off there, but at `min` and `max` |
+| `3` | a constant |
+| `{"mean": 4, "deviation": 2}` | normal distribution, truncated at mean - deviation and mean + deviation |
+| `{"mean": 4, "deviation": 2, "clip": false, "min": 0}` | normal distribution, truncated only at `min` and `max` |
 | `{"range": [1, 2]}` | uniform distribution |
-| `{"curve": [[0, 1], [2, 5]]}` | over time: `[time, value]` with increasing times, linear between them, held at the ends |
+| `{"curve": [[0, 1], [2, 5]]}` | curve over time: pairs `[time, value]` with increasing times, linear between them, constant before the first and after the last |
 
-All that it can become must lie in the key's range.
+All possible values must lie in the key's range.
 
 ## Copies
 
-Bodies and emitters may have `repeat`, `grid` and `scatter`. They multiply: a repeat of a grid of a scatter.
-A copy is the original moved as a whole, with its velocities and keyframes; copies of `rock` are called
-`rock_0`, `rock_1` and so on, and other objects refer to them by these names; in the list of what a force
-acts on, `rock` is all of them. One object has at most 100000 copies.
+Bodies and emitters may have `repeat`, `grid` and `scatter`. The three can be combined; their counts multiply.
+A copy is the original moved as a whole, with its velocities and keyframes. Copies of `rock` are called
+`rock_0`, `rock_1` and so on, and other objects refer to them by these names. In the lists of objects that a
+force acts on, `rock` selects all copies. One object has at most 100000 copies.
 
 ## Including files
 
-`"include": ["stage.json"]` at the top reads other scene files first, sought beside the file that names
-them. Lists at the top (`materials`, `bodies` ...) are joined, the included ones first; other objects are
-merged key by key, and the including file wins. An object that names its `type` replaces one of another
-type.
+The top-level key `"include": ["stage.json"]` reads other scene files first; their paths are relative to the
+including file. Top-level lists (`materials`, `bodies` ...) are concatenated, included entries first. Other
+objects are merged key by key, and keys of the including file override included ones. An object with a `type`
+replaces an object of another type.
 
 ## Overrides
 
 `--set path=value` on the command line changes or adds a key: `--set emitters.0.rate=50`, `--set
-/emitters/0/rate=50`, or by name `--set emitters.rain.rate=50`. The value is JSON, or else text. It is
-checked like the file.
+/emitters/0/rate=50`, or by name `--set emitters.rain.rate=50`. The value is JSON;
+anything else is taken as a string. The result is checked like the file.
 )";
 
 std::string table_of(const ObjectEntry& object) {

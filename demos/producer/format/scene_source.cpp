@@ -244,7 +244,7 @@ std::string read_text(const fs::path& file) {
 
 const std::string& standard_input() {
   static const std::string text = [] {
-    if (isatty(STDIN_FILENO)) log("reading the scene from the keyboard; Ctrl-D ends it\n");
+    if (isatty(STDIN_FILENO)) log("reading the scene from the keyboard; end it with Ctrl-D\n");
     std::string all;
     std::array<char, 1 << 16> part{};
     while (true) {

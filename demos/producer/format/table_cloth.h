@@ -13,8 +13,8 @@ template <>
 struct Table<GridShape> {
   static constexpr const char* kName = "cloth_grid";
   static constexpr const char* kHelp =
-      "A rectangle in the plane y = 0 of the cloth's frame, its front towards +Y: left to right along x, top "
-      "to bottom along z.";
+      "A rectangle in the plane y = 0 of the cloth's frame, with its front towards +Y: left to right is "
+      "along x, top to bottom along z.";
   static Fields<GridShape> fields() {
     return {{"size", &GridShape::size, "lengths along x and z", "m", kPositive},
             {"cells", &GridShape::cells, "number of cells along x and z", "", between(1, 1000)}};
@@ -32,20 +32,27 @@ struct Table<FabricChanges> {
   static Fields<FabricChanges> fields() {
     using T = FabricChanges;
     return {
-        {"areal_density", &T::areal_density, "mass per area; this and the next: left out, the fabric's",
-         "kg/m^2", kPositive},
+        {"areal_density", &T::areal_density,
+         "mass per area; default of this and the next keys: the value of the fabric", "kg/m^2", kPositive},
         {"stretch", &T::stretch, "force per width at a strain of 1, along the threads", "N/m", kPositive},
-        {"shear", &T::shear, "the same across them", "N/m", kNotNegative},
+        {"shear", &T::shear, "force per width at a strain of 1, diagonally to the threads", "N/m",
+         kNotNegative},
         {"bend", &T::bend, "moment per width at a curvature of 1/m", "N m", kNotNegative},
         {"damping", &T::damping, "share of the critical damping of a spring", "", between(0, 10)},
-        {"friction", &T::friction, "on bodies; of two the geometric mean counts", "", kNotNegative},
-        {"self_friction", &T::self_friction, "of cloth on cloth", "", kNotNegative},
-        {"thickness", &T::thickness, "distance kept from bodies and between layers", "m", over(0, 1)},
-        {"drag", &T::drag, "coefficient of the pressure of air that comes square", "", kNotNegative},
-        {"lift", &T::lift, "of the force across air that comes aslant; at most `drag`", "", kNotNegative},
-        {"max_stretch", &T::max_stretch, "greatest length along the threads over that at rest; 0: no limit",
-         "", kNotNegative},
-        {"max_shear", &T::max_shear, "the same across them", "", kNotNegative},
+        {"friction", &T::friction,
+         "coefficient of friction against bodies; of cloth and body the geometric mean is used", "",
+         kNotNegative},
+        {"self_friction", &T::self_friction, "coefficient of friction between cloths", "", kNotNegative},
+        {"thickness", &T::thickness, "distance that cloth keeps from bodies and from other layers", "m",
+         over(0, 1)},
+        {"drag", &T::drag, "pressure coefficient of air flow perpendicular to the cloth", "", kNotNegative},
+        {"lift", &T::lift, "coefficient of the force across an oblique air flow; at most `drag`", "",
+         kNotNegative},
+        {"max_stretch", &T::max_stretch,
+         "largest length along the threads relative to the rest length; 0: no limit", "", kNotNegative},
+        {"max_shear", &T::max_shear,
+         "largest length diagonally to the threads relative to the rest length; 0: no limit", "",
+         kNotNegative},
     };
   }
 };
@@ -63,9 +70,10 @@ struct Names<Corner> {
 template <>
 struct Table<PinScope> {
   static Fields<PinScope> fields() {
-    return {{"body", &PinScope::body,
-             "name of the body they are fastened to, where they are at time 0; empty: the world"},
-            {"until", &PinScope::until, "when it lets go", "s", kNotNegative}};
+    return {
+        {"body", &PinScope::body,
+         "name of the body that the vertices are attached to, at their places at time 0; empty: the world"},
+        {"until", &PinScope::until, "time at which the pin is released", "s", kNotNegative}};
   }
 };
 template <>
@@ -73,7 +81,7 @@ struct Table<CornerPin> {
   static constexpr const char* kName = "corner_pin";
   static constexpr const char* kHelp = "Holds corners of a grid.";
   static Fields<CornerPin> fields() {
-    return Fields<CornerPin>{{"corners", &CornerPin::corners, "which"}}.with_base<PinScope>();
+    return Fields<CornerPin>{{"corners", &CornerPin::corners, "corners to hold"}}.with_base<PinScope>();
   }
 };
 template <>
@@ -82,8 +90,9 @@ struct Table<SidePin> {
   static constexpr const char* kHelp = "Holds a side of a grid.";
   static Fields<SidePin> fields() {
     return Fields<SidePin>{
-        {"side", &SidePin::side, "which"},
-        {"every", &SidePin::every, "of its vertices each so-manieth, from the first", "", between(1, 1000)}}
+        {"side", &SidePin::side, "side to hold"},
+        {"every", &SidePin::every, "holds every n-th vertex of the side, starting with the first", "",
+         between(1, 1000)}}
         .with_base<PinScope>();
   }
 };
@@ -92,7 +101,7 @@ struct Table<NearestPin> {
   static constexpr const char* kName = "nearest_pin";
   static constexpr const char* kHelp = "Holds the vertex nearest to a point.";
   static Fields<NearestPin> fields() {
-    return Fields<NearestPin>{{"point", &NearestPin::point, "in the cloth's frame", "m"}}
+    return Fields<NearestPin>{{"point", &NearestPin::point, "point in the cloth's frame", "m"}}
         .with_base<PinScope>();
   }
 };
@@ -102,15 +111,16 @@ struct Table<BoxPin> {
   static constexpr const char* kHelp = "Holds all vertices in a box.";
   static Fields<BoxPin> fields() {
     return Fields<BoxPin>{
-        {"centre", &BoxPin::centre, "of the box, in the cloth's frame", "m"},
-        {"size", &BoxPin::size, "full lengths of its edges, along the axes of that frame", "m", kPositive}}
+        {"centre", &BoxPin::centre, "centre of the box, in the cloth's frame", "m"},
+        {"size", &BoxPin::size, "full lengths of the box's edges, along the axes of the cloth's frame", "m",
+         kPositive}}
         .with_base<PinScope>();
   }
 };
 template <>
 struct Tags<ClothPin> {
   static constexpr const char* kName = "cloth_pin";
-  static constexpr const char* kHelp = "Holds vertices where they are, in the world or on a body.";
+  static constexpr const char* kHelp = "Vertices held at a place in the world or on a body.";
   static constexpr std::array kTags = {"corners", "side", "nearest", "box"};
   static constexpr bool kRequired = true;
 };
@@ -120,8 +130,9 @@ struct Table<SideSeam> {
   static constexpr const char* kHelp = "Two sides of a grid that are sewn together, vertex by vertex.";
   static Fields<SideSeam> fields() {
     return {{"a", &SideSeam::a, "one side"},
-            {"b", &SideSeam::b, "the other, of as many vertices"},
-            {"reversed", &SideSeam::reversed, "the first vertex of one meets the last of the other"}};
+            {"b", &SideSeam::b, "the other side, with the same number of vertices"},
+            {"reversed", &SideSeam::reversed,
+             "connects the first vertex of one side to the last vertex of the other"}};
   }
 };
 template <>
@@ -129,14 +140,14 @@ struct Table<PointSeam> {
   static constexpr const char* kName = "point_seam";
   static constexpr const char* kHelp = "Two vertices that are sewn together: those nearest to two points.";
   static Fields<PointSeam> fields() {
-    return {{"a", &PointSeam::a, "in the cloth's frame", "m"},
-            {"b", &PointSeam::b, "in the cloth's frame", "m"}};
+    return {{"a", &PointSeam::a, "first point, in the cloth's frame", "m"},
+            {"b", &PointSeam::b, "second point, in the cloth's frame", "m"}};
   }
 };
 template <>
 struct Tags<ClothSeam> {
   static constexpr const char* kName = "cloth_seam";
-  static constexpr const char* kHelp = "What is drawn together, and then holds.";
+  static constexpr const char* kHelp = "Vertices that are pulled together and then stay connected.";
   static constexpr std::array kTags = {"sides", "points"};
   static constexpr bool kRequired = true;
 };
@@ -150,40 +161,43 @@ struct Names<sim::ClothIntegrator> {
 template <>
 struct Table<Cloth> {
   static constexpr const char* kName = "cloth";
-  static constexpr const char* kHelp = "Cloth: vertices joined by springs, and triangles between them.";
+  static constexpr const char* kHelp = "Cloth: vertices connected by springs, with triangles between them.";
   static Fields<Cloth> fields() {
     using T = Cloth;
     return Fields<T>{
-        {"name", &T::name, "unique; empty: cloth_ and its index"},
-        {"shape", &T::shape, "of the flat cloth"},
-        {"fabric", &T::fabric, "name of what it is made of; `offstage presets` lists them"},
+        {"name", &T::name, "unique name; empty: cloth_ and its index"},
+        {"shape", &T::shape, "shape of the flat cloth"},
+        {"fabric", &T::fabric, "name of the fabric; `offstage presets` lists them"},
     }
         .with(&T::changes)
         .then({
-            {"material", &T::material, "name of a material; empty: the fabric's own look"},
-            {"position", &T::position, "of the cloth's frame at time 0", "m"},
-            {"orientation", &T::orientation, "of its axes at time 0"},
-            {"velocity", &T::velocity, "at time 0", "m/s"},
-            {"pins", &T::pins, "what is held"},
-            {"seams", &T::seams, "what is sewn together"},
-            {"seam_time", &T::seam_time, "in which seams close", "s", kPositive},
+            {"material", &T::material, "name of a material; empty: the appearance of the fabric"},
+            {"position", &T::position, "position of the cloth's origin at time 0", "m"},
+            {"orientation", &T::orientation, "orientation of the cloth at time 0"},
+            {"velocity", &T::velocity, "velocity at time 0", "m/s"},
+            {"pins", &T::pins, "vertices that are held"},
+            {"seams", &T::seams, "vertices that are sewn together"},
+            {"seam_time", &T::seam_time, "time in which seams close", "s", kPositive},
             {"collides", &T::collides, "takes part in collisions with bodies and particles"},
-            {"self_collision", &T::self_collision, "collides with itself, and with other cloths that do"},
-            {"tear", &T::tear, "length over that at rest at which threads tear, above 1; 0: never", "",
-             kNotNegative},
-            {"pressure", &T::pressure, "inside of a closed cloth, over that of the air, at its first volume",
-             "Pa"},
-            {"ram_pressure", &T::ram_pressure,
-             "share of the stagnation pressure of the air that comes in at the mouth of an open cloth, which "
-             "builds up inside: about 1 for a parachute",
+            {"self_collision", &T::self_collision,
+             "collides with itself, and with other cloths that have `self_collision`"},
+            {"tear", &T::tear, "length relative to the rest length at which threads tear, above 1; 0: never",
              "", kNotNegative},
-            {"air_density", &T::air_density, "of the air it moves in; 0: none", "kg/m^3", kNotNegative},
+            {"pressure", &T::pressure,
+             "pressure inside a closed cloth above that of the air, at the initial volume", "Pa"},
+            {"ram_pressure", &T::ram_pressure,
+             "share of the stagnation pressure of the air at the mouth of an open cloth that builds up "
+             "inside: about 1 for a parachute",
+             "", kNotNegative},
+            {"air_density", &T::air_density, "density of the surrounding air; 0: no air", "kg/m^3",
+             kNotNegative},
             {"integrator", &T::integrator,
-             "how its springs are stepped; the last two are explicit, for soft cloth and short steps"},
-            {"substep", &T::substep, "longest step of its own, never longer than the world's", "s",
+             "integration method of the springs; `symplectic` and `rk4` are explicit, for soft cloth and "
+             "short sub-steps"},
+            {"substep", &T::substep, "longest step of the cloth, at most one sub-step of the world", "s",
              over(0, 1)},
             {"visible", &T::visible, "is drawn"},
-            {"casts_shadow", &T::casts_shadow, "throws a shadow"},
+            {"casts_shadow", &T::casts_shadow, "casts a shadow"},
         })
         .with(&T::placement);
   }

@@ -12,18 +12,19 @@ namespace offstage::producer {
 template <>
 struct Table<Lens> {
   static Fields<Lens> fields() {
-    return {{"fov_deg", &Lens::fov_deg, "vertical field of view", "degrees", inside(0, 180)},
-            {"focal_mm", &Lens::focal_mm,
-             "focal length for a picture 36 mm wide, in place of fov_deg: 24 is wide, 50 normal, 100 long",
-             "mm", between(1, 2000)},
-            {"aperture", &Lens::aperture, "diameter of the lens; 0: everything is sharp", "m", kNotNegative},
-            {"focus", &Lens::focus, "distance that is sharp; 0: the target's", "m", kNotNegative},
-            {"focus_on", &Lens::focus_on, "name of a body that is sharp, wherever it goes"},
-            {"look_at", &Lens::look_at, "name of a body that is looked at, wherever it goes"},
-            {"fit", &Lens::fit,
-             "names of bodies that fill the picture: the camera keeps its direction and goes as near as all "
-             "of them, "
-             "where they begin, allow"}};
+    return {
+        {"fov_deg", &Lens::fov_deg, "vertical field of view", "degrees", inside(0, 180)},
+        {"focal_mm", &Lens::focal_mm,
+         "focal length for a picture 36 mm wide, instead of fov_deg: 24 is wide, 50 is normal, 100 is long",
+         "mm", between(1, 2000)},
+        {"aperture", &Lens::aperture, "diameter of the lens opening; 0: everything is in focus", "m",
+         kNotNegative},
+        {"focus", &Lens::focus, "focus distance; 0: the distance of the target", "m", kNotNegative},
+        {"focus_on", &Lens::focus_on, "name of a body that is kept in focus"},
+        {"look_at", &Lens::look_at, "name of a body that the camera keeps turning to"},
+        {"fit", &Lens::fit,
+         "names of bodies that fill the picture: the camera keeps its direction and moves as close as it can "
+         "while all of them are visible at time 0"}};
   }
 };
 template <>
@@ -31,8 +32,8 @@ struct Table<StaticCamera> {
   static constexpr const char* kName = "static_camera";
   static constexpr const char* kHelp = "A camera on a tripod.";
   static Fields<StaticCamera> fields() {
-    return Fields<StaticCamera>{{"eye", &StaticCamera::eye, "where it is", "m"},
-                                {"target", &StaticCamera::target, "where it looks", "m"}}
+    return Fields<StaticCamera>{{"eye", &StaticCamera::eye, "position of the camera", "m"},
+                                {"target", &StaticCamera::target, "point that the camera looks at", "m"}}
         .with_base<Lens>();
   }
 };
@@ -41,14 +42,14 @@ struct Table<CameraKey> {
   static constexpr const char* kName = "camera_key";
   static constexpr const char* kHelp = "A view at a time.";
   static Fields<CameraKey> fields() {
-    return {
-        {"time", &CameraKey::time, "when; times must increase", "s"},
-        {"eye", &CameraKey::eye, "where the camera is", "m"},
-        {"target", &CameraKey::target, "where it looks", "m"},
-        {"fov_deg", &CameraKey::fov_deg, "field of view then; default: the camera's", "degrees",
-         inside(0, 180)},
-        {"focus", &CameraKey::focus, "distance that is sharp then; default: the camera's", "m", kPositive},
-        {"interpolation", &CameraKey::interpolation, "from this key to the next; left out: the camera's"}};
+    return {{"time", &CameraKey::time, "time of the key; times must increase", "s"},
+            {"eye", &CameraKey::eye, "position of the camera", "m"},
+            {"target", &CameraKey::target, "point that the camera looks at", "m"},
+            {"fov_deg", &CameraKey::fov_deg, "vertical field of view at this key; default: the camera's",
+             "degrees", inside(0, 180)},
+            {"focus", &CameraKey::focus, "focus distance at this key; default: the camera's", "m", kPositive},
+            {"interpolation", &CameraKey::interpolation,
+             "interpolation from this key to the next; default: the camera's"}};
   }
 };
 template <>
@@ -56,8 +57,9 @@ struct Table<KeyframedCamera> {
   static constexpr const char* kName = "keyframed_camera";
   static constexpr const char* kHelp = "A camera that moves through given views.";
   static Fields<KeyframedCamera> fields() {
-    return Fields<KeyframedCamera>{{"keyframes", &KeyframedCamera::keyframes, "at least one"},
-                                   {"interpolation", &KeyframedCamera::interpolation, kInterpolationHelp}}
+    return Fields<KeyframedCamera>{
+        {"keyframes", &KeyframedCamera::keyframes, "views over time; at least one"},
+        {"interpolation", &KeyframedCamera::interpolation, kInterpolationHelp}}
         .with_base<Lens>();
   }
 };
@@ -67,31 +69,32 @@ struct Table<OrbitCamera> {
   static constexpr const char* kHelp = "A camera that circles around a point.";
   static Fields<OrbitCamera> fields() {
     using T = OrbitCamera;
-    return Fields<T>{{"target", &T::target, "where it looks: the centre of the circle", "m"},
-                     {"radius", &T::radius, "of the circle", "m", kPositive},
-                     {"height", &T::height, "of the circle above the target", "m"},
+    return Fields<T>{{"target", &T::target, "point that the camera looks at, the centre of the circle", "m"},
+                     {"radius", &T::radius, "radius of the circle", "m", kPositive},
+                     {"height", &T::height, "height of the circle above the target", "m"},
                      {"start_deg", &T::start_deg, "angle at time 0, from +Z towards +X", "degrees"},
-                     {"turn_deg_per_s", &T::turn_deg_per_s, "angular speed", "degrees/s"}}
+                     {"turn_deg_per_s", &T::turn_deg_per_s, "angular speed of the camera", "degrees/s"}}
         .with_base<Lens>();
   }
 };
 template <>
 struct Table<FollowCamera> {
   static constexpr const char* kName = "follow_camera";
-  static constexpr const char* kHelp = "A camera that goes along with a body without turning with it.";
+  static constexpr const char* kHelp = "A camera that moves with a body but does not turn with it.";
   static Fields<FollowCamera> fields() {
     using T = FollowCamera;
     return Fields<T>{
         {"body", &T::body, "name of the body", kRequired},
-        {"offset", &T::offset, "of the camera from the body, world axes", "m"},
-        {"look_offset", &T::look_offset, "of the point it looks at from the body, world axes", "m"}}
+        {"offset", &T::offset, "position of the camera relative to the body, in world axes", "m"},
+        {"look_offset", &T::look_offset,
+         "point that the camera looks at, relative to the body, in world axes", "m"}}
         .with_base<Lens>();
   }
 };
 template <>
 struct Tags<Camera> {
   static constexpr const char* kName = "camera";
-  static constexpr const char* kHelp = "Where the film is seen from. Up is +Y.";
+  static constexpr const char* kHelp = "The camera. Up is +Y.";
   static constexpr std::array kTags = {"static", "keyframes", "orbit", "follow"};
   static constexpr bool kRequired = false;
 };
@@ -99,28 +102,31 @@ struct Tags<Camera> {
 template <>
 struct Table<SunLight> {
   static constexpr const char* kName = "sun";
-  static constexpr const char* kHelp = "Parallel light; at most one.";
+  static constexpr const char* kHelp = "Parallel light. A scene has at most one sun.";
   static Fields<SunLight> fields() {
     using T = SunLight;
-    return {{"direction", &T::direction, "towards the sun, above the horizon", "", kDirection},
-            {"color", &T::color, "colour of its light"},
-            {"intensity", &T::intensity, "brightness of a white surface facing it", "", kNotNegative},
-            {"size_deg", &T::size_deg, "diameter of its disc: the softness of shadows", "degrees",
-             between(0, 90)},
-            {"shadows", &T::shadows, "throws shadows"}};
+    return {
+        {"direction", &T::direction, "direction towards the sun, above the horizon", "", kDirection},
+        {"color", &T::color, "colour of the light"},
+        {"intensity", &T::intensity, "brightness of a white surface that faces the sun", "", kNotNegative},
+        {"size_deg", &T::size_deg, "angular diameter of the sun's disc; larger: softer shadows", "degrees",
+         between(0, 90)},
+        {"shadows", &T::shadows, "casts shadows"}};
   }
 };
 template <>
 struct Table<LampBase> {
   static Fields<LampBase> fields() {
     using T = LampBase;
-    return {{"body", &T::body, "name of the body that carries it, in whose frame it then is; empty: none"},
-            {"position", &T::position, "where it is", "m"},
-            {"color", &T::color, "colour of its light"},
-            {"intensity", &T::intensity,
-             "brightness of a white surface 1 m away that faces it; a number or a curve over time", "",
-             kNotNegative},
-            {"shadows", &T::shadows, "throws shadows"}};
+    return {
+        {"body", &T::body,
+         "name of the body that carries the light; position and target are then in its frame; empty: none"},
+        {"position", &T::position, "position of the light", "m"},
+        {"color", &T::color, "colour of the light"},
+        {"intensity", &T::intensity,
+         "brightness of a white surface that faces the light 1 m away; a number or a curve over time", "",
+         kNotNegative},
+        {"shadows", &T::shadows, "casts shadows"}};
   }
 };
 template <>
@@ -129,7 +135,7 @@ struct Table<PointLight> {
   static constexpr const char* kHelp = "A glowing ball: a bulb, a fire.";
   static Fields<PointLight> fields() {
     using T = PointLight;
-    return Fields<T>{{"radius", &T::radius, "of the ball: the softness of shadows", "m", kPositive}}
+    return Fields<T>{{"radius", &T::radius, "radius of the ball; larger: softer shadows", "m", kPositive}}
         .with_base<LampBase>();
   }
 };
@@ -139,10 +145,10 @@ struct Table<SpotLight> {
   static constexpr const char* kHelp = "A cone of light.";
   static Fields<SpotLight> fields() {
     using T = SpotLight;
-    return Fields<T>{{"target", &T::target, "where it points", "m"},
-                     {"angle_deg", &T::angle_deg, "of the whole cone", "degrees", between(1, 150)},
+    return Fields<T>{{"target", &T::target, "point that the light aims at", "m"},
+                     {"angle_deg", &T::angle_deg, "full angle of the cone", "degrees", between(1, 150)},
                      {"softness", &T::softness, "share of the cone over which its edge fades", "", kShare},
-                     {"radius", &T::radius, "of the lamp: the softness of shadows", "m", kPositive}}
+                     {"radius", &T::radius, "radius of the lamp; larger: softer shadows", "m", kPositive}}
         .with_base<LampBase>();
   }
 };
@@ -152,8 +158,8 @@ struct Table<AreaLight> {
   static constexpr const char* kHelp = "A glowing rectangle: a window, a lamp with a large screen.";
   static Fields<AreaLight> fields() {
     using T = AreaLight;
-    return Fields<T>{{"target", &T::target, "where it points", "m"},
-                     {"size", &T::size, "width and height: the softness of shadows", "m", kPositive}}
+    return Fields<T>{{"target", &T::target, "point that the light aims at", "m"},
+                     {"size", &T::size, "width and height; larger: softer shadows", "m", kPositive}}
         .with_base<LampBase>();
   }
 };
@@ -161,7 +167,7 @@ template <>
 struct Tags<Light> {
   static constexpr const char* kName = "light";
   static constexpr const char* kHelp =
-      "A source of light besides the sky. An empty list of lights leaves the sky alone.";
+      "A light source in addition to the sky. With an empty list of lights, only the sky gives light.";
   static constexpr std::array kTags = {"sun", "point", "spot", "area"};
   static constexpr bool kRequired = false;
 };
@@ -175,29 +181,28 @@ struct Names<Background> {
 template <>
 struct Table<EnvironmentSettings> {
   static constexpr const char* kName = "environment";
-  static constexpr const char* kHelp = "Sky, the light that comes from it, and fog.";
+  static constexpr const char* kHelp = "The sky, its light, and fog.";
   static Fields<EnvironmentSettings> fields() {
     using T = EnvironmentSettings;
-    return {
-        {"zenith", &T::zenith, "the sky overhead"},
-        {"horizon", &T::horizon, "the sky at the horizon, and the fog"},
-        {"ground", &T::ground,
-         "below the horizon, and light from below; default: what sun and sky let the ground plane send back"},
-        {"intensity", &T::intensity, "factor of sky and ambient light", "", kNotNegative},
-        {"fog", &T::fog,
-         "density; a share exp(-fog * distance) of the light comes through. 0: nothing fades with distance, "
-         "except that an infinite plane goes over into the sky in the last quarter of a degree below its "
-         "horizon",
-         "1/m", kNotNegative},
-        {"clouds", &T::clouds, "share of the sky that clouds cover", "", kShare},
-        {"occlusion", &T::occlusion,
-         "how far away things hide the sky from each other; 0: not at all; default: a tenth of the camera's "
-         "distance",
-         "m", kNotNegative},
-        {"background", &T::background,
-         "the sky, or nothing. Frames of a scene with the sky have no alpha channel, those of a "
-         "`transparent` one "
-         "all have one"}};
+    return {{"zenith", &T::zenith, "colour of the sky overhead"},
+            {"horizon", &T::horizon, "colour of the sky at the horizon, and of the fog"},
+            {"ground", &T::ground,
+             "colour below the horizon, and of the light from below; default: the light that a ground plane "
+             "would reflect"},
+            {"intensity", &T::intensity, "factor of the sky's brightness and of the ambient light", "",
+             kNotNegative},
+            {"fog", &T::fog,
+             "density of the fog: the share exp(-fog * distance) of the light passes. 0: no fog, but an "
+             "infinite plane still blends into the sky in the last quarter of a degree below its horizon",
+             "1/m", kNotNegative},
+            {"clouds", &T::clouds, "share of the sky that is covered by clouds", "", kShare},
+            {"occlusion", &T::occlusion,
+             "distance within which objects block the sky's light from each other; 0: no occlusion; default: "
+             "a tenth of the camera's distance",
+             "m", kNotNegative},
+            {"background", &T::background,
+             "`sky` draws the sky, and frames have no alpha channel; `transparent` draws none, and all "
+             "frames have an alpha channel"}};
   }
 };
 template <>
@@ -215,18 +220,22 @@ struct Names<render::ToneCurve> {
 template <>
 struct Table<RenderSettings> {
   static constexpr const char* kName = "render";
-  static constexpr const char* kHelp = "The picture. Nothing here changes the physics.";
+  static constexpr const char* kHelp = "The picture. These settings do not change the simulation.";
   static Fields<RenderSettings> fields() {
     using T = RenderSettings;
     return {
-        {"size", &T::size, "width and height; even for video", "pixels", between(16, 16384)},
-        {"quality", &T::quality, "1, 4 or 16 sub-frames per frame"},
-        {"shutter", &T::shutter, "share of the frame time that the shutter is open: motion blur", "", kShare},
-        {"exposure", &T::exposure, "factor of all light; a number or a curve over time", "", kPositive},
+        {"size", &T::size, "width and height; most video formats need even numbers", "pixels",
+         between(16, 16384)},
+        {"quality", &T::quality, "number of sub-frames per frame: `draft` 1, `preview` 4, `final` 16"},
+        {"shutter", &T::shutter,
+         "share of the frame time during which the shutter is open; gives motion blur", "", kShare},
+        {"exposure", &T::exposure, "brightness factor of the whole picture; a number or a curve over time",
+         "", kPositive},
         {"metering", &T::metering,
-         "automatic: exposure is a factor besides what makes each frame as bright as the others"},
+         "`fixed` uses `exposure` as it is; `automatic` also brings each frame to the same average "
+         "brightness"},
         {"bloom", &T::bloom, "share of very bright light that spreads as glow; 0: none", "", kNotNegative},
-        {"tone_curve", &T::tone_curve, "from light to the picture"},
+        {"tone_curve", &T::tone_curve, "mapping from light to picture values"},
         {"shadow_map", &T::shadow_map, "width and height of the sun's shadow map", "pixels",
          between(64, 16384)}};
   }
@@ -242,21 +251,21 @@ struct Names<render::ChannelFormat> {
 template <>
 struct Table<OutputSettings> {
   static constexpr const char* kName = "output";
-  static constexpr const char* kHelp = "The film's time, and the numbers that go with its pictures.";
+  static constexpr const char* kHelp =
+      "Frame rate and length of the film, and the channels written beside its frames.";
   static Fields<OutputSettings> fields() {
     using T = OutputSettings;
-    return {
-        {"fps", &T::fps, "frames per second: a number, or an exact fraction such as \"30000/1001\"", "1/s",
-         between(1, 1000)},
-        {"duration", &T::duration, "length of the film", "s", over(0, 86400)},
-        {"start", &T::start, "time of the first frame; earlier times are simulated but not shown", "s",
-         between(0, 86400)},
-        {"channels", &T::channels,
-         "numbers for each pixel, beside each frame (or in FILM.channels beside a video): depth [m], normal, "
-         "id, motion [px since the frame before]"},
-        {"channel_format", &T::channel_format,
-         "exr: FRAME.exr with all as they are; png: FRAME.depth.png (16 bits, mm) and so on, each with its "
-         "scale in its comment"}};
+    return {{"fps", &T::fps, "frames per second: a number, or an exact fraction such as \"30000/1001\"",
+             "1/s", between(1, 1000)},
+            {"duration", &T::duration, "length of the film", "s", over(0, 86400)},
+            {"start", &T::start, "time of the first frame; earlier times are simulated but not shown", "s",
+             between(0, 86400)},
+            {"channels", &T::channels,
+             "channels written beside each frame (or into FILM.channels beside a video): depth [m], normal, "
+             "id, motion [px since the previous frame]"},
+            {"channel_format", &T::channel_format,
+             "exr: FRAME.exr with all channels as floating-point numbers; png: FRAME.depth.png (16 bits, mm) "
+             "and so on, each with its scale in its comment"}};
   }
 };
 

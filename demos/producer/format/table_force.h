@@ -18,10 +18,10 @@ struct Table<sim::Everywhere> {
 template <>
 struct Table<sim::SphereRegion> {
   static constexpr const char* kName = "sphere_region";
-  static constexpr const char* kHelp = "A ball of the world.";
+  static constexpr const char* kHelp = "A ball in the world.";
   static Fields<sim::SphereRegion> fields() {
-    return {{"centre", &sim::SphereRegion::centre, "its middle", "m"},
-            {"radius", &sim::SphereRegion::radius, "radius", "m", kPositive}};
+    return {{"centre", &sim::SphereRegion::centre, "centre of the ball", "m"},
+            {"radius", &sim::SphereRegion::radius, "radius of the ball", "m", kPositive}};
   }
 };
 template <>
@@ -29,7 +29,7 @@ struct Table<sim::BoxRegion> {
   static constexpr const char* kName = "box_region";
   static constexpr const char* kHelp = "A cuboid along the axes of the world.";
   static Fields<sim::BoxRegion> fields() {
-    return {{"centre", &sim::BoxRegion::centre, "its middle", "m"},
+    return {{"centre", &sim::BoxRegion::centre, "centre of the cuboid", "m"},
             {"size", &sim::BoxRegion::size, "full lengths of the edges", "m", kPositive}};
   }
 };
@@ -37,7 +37,7 @@ template <>
 struct Tags<sim::Region> {
   static constexpr const char* kName = "region";
   static constexpr const char* kHelp =
-      "Where a field acts: on bodies with their centre of mass there, and on particles.";
+      "Where a field acts: on particles inside, and on bodies whose centre of mass is inside.";
   static constexpr std::array kTags = {"everywhere", "sphere", "box"};
   static constexpr bool kRequired = false;
 };
@@ -46,18 +46,18 @@ struct Tags<sim::Region> {
 
 inline constexpr Limits kDropRate = between(0, 16);
 inline constexpr const char* kDropRateHelp =
-    "power of its fall from the middle of the region to nothing at the edge; 0: the same throughout";
+    "exponent of the decrease from the centre of the region to zero at its edge; 0: uniform";
 inline constexpr const char* kParticlesHelp =
-    "names of groups, of emitters, or of child particles, such as rain/splash";
+    "names of particle groups, emitters, or child particles, such as rain/splash";
 inline constexpr const char* kClothsHelp =
-    "names of cloths, of one or of all copies; moving air acts on their triangles, other forces as on the "
-    "whole cloth, spread over it by mass";
+    "names of cloths, of one copy or of all; moving air acts on each triangle, other forces act on the whole "
+    "cloth, distributed by mass";
 inline constexpr const char* kBodiesHelp =
-    "names of what it acts on, of one or of all copies; this and the next two empty: all dynamic bodies and "
-    "all cloths";
-inline constexpr const char* kForceNameHelp = "unique; empty: force_ and its index";
+    "names of the bodies that it acts on, of one copy or of all; if this and the next two keys are empty, it "
+    "acts on all dynamic bodies and all cloths";
+inline constexpr const char* kForceNameHelp = "unique name; empty: force_ and its index";
 inline constexpr const char* kAirDragHelp =
-    "force per speed against this air; 0: only through the drag that things have of their own";
+    "drag force per speed relative to this air; 0: it acts only through the drag that each object has";
 
 template <>
 struct Table<ForceScope> {
@@ -66,15 +66,15 @@ struct Table<ForceScope> {
     return {{"bodies", &T::bodies, kBodiesHelp},
             {"particles", &T::particles, kParticlesHelp},
             {"cloths", &T::cloths, kClothsHelp},
-            {"start", &T::start, "from when", "s", kNotNegative},
-            {"end", &T::end, "until when", "s", kNotNegative}};
+            {"start", &T::start, "time at which the force starts", "s", kNotNegative},
+            {"end", &T::end, "time at which the force ends", "s", kNotNegative}};
   }
 };
 template <>
 struct Table<FieldScope> {
   static Fields<FieldScope> fields() {
     using T = FieldScope;
-    return Fields<T>{{"region", &T::region, "where it acts"},
+    return Fields<T>{{"region", &T::region, "region in which the force acts"},
                      {"drop_rate", &T::drop_rate, kDropRateHelp, "", kDropRate}}
         .with_base<ForceScope>();
   }
@@ -85,12 +85,13 @@ struct Table<PairScope> {
     using T = PairScope;
     return {{"particles", &T::particles, "names of groups and emitters whose particles act on each other",
              kRequired},
-            {"cut_off", &T::cut_off, "no force from this distance on, which saves much time; 0: none", "m",
-             kNotNegative},
-            {"region", &T::region, "where it acts"},
+            {"cut_off", &T::cut_off,
+             "particles farther apart than this do not act on each other, which saves much time; 0: no limit",
+             "m", kNotNegative},
+            {"region", &T::region, "region in which the force acts"},
             {"drop_rate", &T::drop_rate, kDropRateHelp, "", kDropRate},
-            {"start", &T::start, "from when", "s", kNotNegative},
-            {"end", &T::end, "until when", "s", kNotNegative}};
+            {"start", &T::start, "time at which the force starts", "s", kNotNegative},
+            {"end", &T::end, "time at which the force ends", "s", kNotNegative}};
   }
 };
 template <>
@@ -101,19 +102,20 @@ struct Table<ConstantField> {
   static Fields<ConstantField> fields() {
     using T = ConstantField;
     return Fields<T>{{"name", &T::name, kForceNameHelp},
-                     {"force", &T::force, "on each body and particle", "N"}}
+                     {"force", &T::force, "force on each body and particle", "N"}}
         .with_base<FieldScope>();
   }
 };
 template <>
 struct Table<PointField> {
   static constexpr const char* kName = "point_field";
-  static constexpr const char* kHelp = "A force towards a point, at the centre of mass.";
+  static constexpr const char* kHelp = "A force towards a point. On bodies it acts at the centre of mass.";
   static Fields<PointField> fields() {
     using T = PointField;
-    return Fields<T>{{"name", &T::name, kForceNameHelp},
-                     {"point", &T::point, "where it pulls to", "m"},
-                     {"force", &T::force, "on each; negative: away from the point", "N"}}
+    return Fields<T>{
+        {"name", &T::name, kForceNameHelp},
+        {"point", &T::point, "point of attraction", "m"},
+        {"force", &T::force, "force on each body and particle; negative: away from the point", "N"}}
         .with_base<FieldScope>();
   }
 };
@@ -121,7 +123,7 @@ template <>
 struct Table<WindField> {
   static constexpr const char* kName = "wind";
   static constexpr const char* kHelp =
-      "Moving air: a drag towards its own velocity, besides that of the bodies themselves.";
+      "Moving air: a drag force towards its velocity, in addition to the drag that bodies have.";
   static Fields<WindField> fields() {
     using T = WindField;
     return Fields<T>{{"name", &T::name, kForceNameHelp},
@@ -133,11 +135,12 @@ struct Table<WindField> {
 template <>
 struct Table<HandKey> {
   static constexpr const char* kName = "hand_key";
-  static constexpr const char* kHelp = "Where a hand is at a time.";
+  static constexpr const char* kHelp = "Position of a hand at a time.";
   static Fields<HandKey> fields() {
-    return {{"time", &HandKey::time, "when; times must increase", "s"},
-            {"position", &HandKey::position, "where", "m"},
-            {"interpolation", &HandKey::interpolation, "from this key to the next; left out: the grab's"}};
+    return {{"time", &HandKey::time, "time of the key; times must increase", "s"},
+            {"position", &HandKey::position, "position of the hand", "m"},
+            {"interpolation", &HandKey::interpolation,
+             "interpolation from this key to the next; default: that of the grab"}};
   }
 };
 template <>
@@ -145,30 +148,29 @@ struct Table<Grab> {
   static constexpr const char* kName = "grab";
   static constexpr const char* kHelp =
       "A hand that moves through keyframes and holds a point of a body, or particles, or points of cloths, "
-      "by "
-      "damped springs of no length.";
+      "by damped springs of rest length 0.";
   static Fields<Grab> fields() {
     using T = Grab;
     return {{"name", &T::name, kForceNameHelp},
             {"body", &T::body, "name of a dynamic body; empty: none"},
             {"particles", &T::particles, kParticlesHelp},
             {"cloths", &T::cloths, "names of cloths"},
-            {"point", &T::point, "where it is held, in the body's frame", "m"},
-            {"keyframes", &T::keyframes, "places of the hand; at least one"},
+            {"point", &T::point, "point of the body that is held, in the body's frame", "m"},
+            {"keyframes", &T::keyframes, "positions of the hand; at least one"},
             {"interpolation", &T::interpolation, kInterpolationHelp},
-            {"stiffness", &T::stiffness, "force per distance", "N/m", kNotNegative},
-            {"damping", &T::damping, "force per speed against the hand", "N s/m", kNotNegative},
-            {"reach", &T::reach, "particles and points of cloths farther away than this are left alone", "m",
-             kPositive},
-            {"start", &T::start, "when it takes hold", "s", kNotNegative},
-            {"end", &T::end, "when it lets go", "s", kNotNegative}};
+            {"stiffness", &T::stiffness, "force per distance from the hand", "N/m", kNotNegative},
+            {"damping", &T::damping, "force per speed relative to the hand", "N s/m", kNotNegative},
+            {"reach", &T::reach,
+             "particles and points of cloths farther from the hand than this are not held", "m", kPositive},
+            {"start", &T::start, "time at which the hand grabs", "s", kNotNegative},
+            {"end", &T::end, "time at which the hand releases", "s", kNotNegative}};
   }
 };
 template <>
 struct Table<Explosion> {
   static constexpr const char* kName = "explosion";
   static constexpr const char* kHelp =
-      "An impulse away from a point, at one time. It hits each body at its nearest point.";
+      "An impulse away from a point at one time. It acts on each body at the body's nearest point.";
   static Fields<Explosion> fields() {
     using T = Explosion;
     return {
@@ -176,46 +178,47 @@ struct Table<Explosion> {
         {"bodies", &T::bodies, kBodiesHelp},
         {"particles", &T::particles, kParticlesHelp},
         {"cloths", &T::cloths, kClothsHelp},
-        {"time", &T::time, "when", "s", kNotNegative},
-        {"point", &T::point, "where", "m"},
-        {"impulse", &T::impulse, "on what is right at the point; negative: towards it", "N s"},
-        {"radius", &T::radius, "no effect from this distance on", "m", kPositive},
+        {"time", &T::time, "time of the explosion", "s", kNotNegative},
+        {"point", &T::point, "centre of the explosion", "m"},
+        {"impulse", &T::impulse, "impulse on an object at the centre; negative: towards the centre", "N s"},
+        {"radius", &T::radius, "distance from which on there is no effect", "m", kPositive},
         {"drop_rate", &T::drop_rate,
-         "power of its fall from the point to nothing at the radius; 0: the same throughout", "", kDropRate}};
+         "exponent of the decrease from the centre to zero at the radius; 0: uniform", "", kDropRate}};
   }
 };
 template <>
 struct Table<VortexField> {
   static constexpr const char* kName = "vortex";
   static constexpr const char* kHelp =
-      "Air that turns about an axis: with the distance r from it at the speed circulation r / (2 pi (r^2 + "
+      "Air that rotates about an axis; at the distance r from it, its speed is circulation r / (2 pi (r^2 + "
       "radius^2)).";
   static Fields<VortexField> fields() {
     using T = VortexField;
-    return Fields<T>{{"name", &T::name, kForceNameHelp},
-                     {"point", &T::point, "of the axis", "m"},
-                     {"axis", &T::axis, "its direction; right-handed", "", kDirection},
-                     {"circulation", &T::circulation, "how strong it is; negative: the other way", "m^2/s"},
-                     {"radius", &T::radius, "where the air is fastest", "m", kPositive},
-                     {"drag", &T::drag, kAirDragHelp, "kg/s", kNotNegative}}
+    return Fields<T>{
+        {"name", &T::name, kForceNameHelp},
+        {"point", &T::point, "a point of the axis", "m"},
+        {"axis", &T::axis, "direction of the axis; the air turns by the right-hand rule", "", kDirection},
+        {"circulation", &T::circulation, "strength of the vortex; negative: the other direction", "m^2/s"},
+        {"radius", &T::radius, "distance from the axis at which the air is fastest", "m", kPositive},
+        {"drag", &T::drag, kAirDragHelp, "kg/s", kNotNegative}}
         .with_base<FieldScope>();
   }
 };
 template <>
 struct Table<TurbulenceField> {
   static constexpr const char* kName = "turbulence";
-  static constexpr const char* kHelp = "Air that swirls in eddies of several sizes, without divergence.";
+  static constexpr const char* kHelp = "Divergence-free turbulent air with eddies of several sizes.";
   static Fields<TurbulenceField> fields() {
     using T = TurbulenceField;
     return Fields<T>{
         {"name", &T::name, kForceNameHelp},
         {"speed", &T::speed, "root mean square of the air's speed", "m/s", kNotNegative},
         {"scale", &T::scale, "width of the largest eddies", "m", kPositive},
-        {"octaves", &T::octaves, "sizes of eddies, each half of the one before", "", between(1, 8)},
-        {"lifetime", &T::lifetime, "of the largest eddies; 0: they turn over once, scale / speed", "s",
-         kNotNegative},
-        {"drift", &T::drift, "of the eddies, with the wind", "m/s"},
-        {"seed", &T::seed, "another number, other eddies", "", between(0, 1e9)},
+        {"octaves", &T::octaves, "number of eddy sizes, each half of the previous one", "", between(1, 8)},
+        {"lifetime", &T::lifetime, "lifetime of the largest eddies; 0: their turnover time, scale / speed",
+         "s", kNotNegative},
+        {"drift", &T::drift, "velocity of the eddies; equal to the wind that carries them", "m/s"},
+        {"seed", &T::seed, "another seed gives other eddies", "", between(0, 1e9)},
         {"drag", &T::drag, kAirDragHelp, "kg/s", kNotNegative}}
         .with_base<FieldScope>();
   }
@@ -223,26 +226,26 @@ struct Table<TurbulenceField> {
 template <>
 struct Table<GravitationForce> {
   static constexpr const char* kName = "gravitation";
-  static constexpr const char* kHelp = "Particles that attract each other by their masses.";
+  static constexpr const char* kHelp = "Gravitation between particles.";
   static Fields<GravitationForce> fields() {
     using T = GravitationForce;
-    return Fields<T>{
-        {"name", &T::name, kForceNameHelp},
-        {"constant", &T::constant, "of gravitation", "N m^2/kg^2", kNotNegative},
-        {"softening", &T::softening, "as if masses were spread over this radius", "m", kNotNegative}}
+    return Fields<T>{{"name", &T::name, kForceNameHelp},
+                     {"constant", &T::constant, "gravitational constant", "N m^2/kg^2", kNotNegative},
+                     {"softening", &T::softening,
+                      "radius over which masses are spread, which keeps forces finite", "m", kNotNegative}}
         .with_base<PairScope>();
   }
 };
 template <>
 struct Table<CoulombForce> {
   static constexpr const char* kName = "coulomb";
-  static constexpr const char* kHelp = "Particles that attract and repel each other by their charges.";
+  static constexpr const char* kHelp = "Electrostatic force between charged particles.";
   static Fields<CoulombForce> fields() {
     using T = CoulombForce;
-    return Fields<T>{
-        {"name", &T::name, kForceNameHelp},
-        {"constant", &T::constant, "of electrostatics", "N m^2/C^2", kNotNegative},
-        {"softening", &T::softening, "as if charges were spread over this radius", "m", kNotNegative}}
+    return Fields<T>{{"name", &T::name, kForceNameHelp},
+                     {"constant", &T::constant, "Coulomb constant", "N m^2/C^2", kNotNegative},
+                     {"softening", &T::softening,
+                      "radius over which charges are spread, which keeps forces finite", "m", kNotNegative}}
         .with_base<PairScope>();
   }
 };
@@ -250,19 +253,20 @@ template <>
 struct Table<LennardJonesForce> {
   static constexpr const char* kName = "lennard_jones";
   static constexpr const char* kHelp =
-      "Particles that keep a distance, as atoms do: they repel closer than 1.12 sigma, attract beyond.";
+      "Force that keeps particles at a distance, as between atoms: repulsion closer than 1.12 sigma, "
+      "attraction beyond.";
   static Fields<LennardJonesForce> fields() {
     using T = LennardJonesForce;
     return Fields<T>{{"name", &T::name, kForceNameHelp},
-                     {"epsilon", &T::epsilon, "depth of the well", "J", kNotNegative},
-                     {"sigma", &T::sigma, "where the energy is that of particles far apart", "m", kPositive}}
+                     {"epsilon", &T::epsilon, "depth of the potential well", "J", kNotNegative},
+                     {"sigma", &T::sigma, "distance at which the potential energy is zero", "m", kPositive}}
         .with_base<PairScope>();
   }
 };
 template <>
 struct Tags<Force> {
   static constexpr const char* kName = "force";
-  static constexpr const char* kHelp = "Something that pushes or pulls bodies, cloths and particles.";
+  static constexpr const char* kHelp = "A force on bodies, cloths and particles.";
   static constexpr std::array kTags = {"constant", "point",      "wind",        "grab",    "explosion",
                                        "vortex",   "turbulence", "gravitation", "coulomb", "lennard_jones"};
   static constexpr bool kRequired = true;

@@ -20,30 +20,32 @@ struct Names<sim::Motor::Mode> {
 template <>
 struct Table<MotorKey> {
   static constexpr const char* kName = "motor_key";
-  static constexpr const char* kHelp = "A target at a time.";
+  static constexpr const char* kHelp = "A motor's target at a time.";
   static Fields<MotorKey> fields() {
-    return {{"time", &MotorKey::time, "when; times must increase", "s"},
-            {"target", &MotorKey::target, "as that of the motor"},
-            {"interpolation", &MotorKey::interpolation, "from this key to the next; left out: the motor's"}};
+    return {{"time", &MotorKey::time, "time of the key; times must increase", "s"},
+            {"target", &MotorKey::target, "target, in the unit of the motor's `target`"},
+            {"interpolation", &MotorKey::interpolation,
+             "interpolation from this key to the next; default: that of the motor"}};
   }
 };
 template <>
 struct Table<JointMotor> {
   static constexpr const char* kName = "motor";
-  static constexpr const char* kHelp = "What drives a revolute, prismatic or distance joint.";
+  static constexpr const char* kHelp = "Motor of a revolute, prismatic or distance joint.";
   static Fields<JointMotor> fields() {
     using T = JointMotor;
-    return {
-        {"mode", &T::mode, "what it works towards: a speed, or a position counted from that at time 0"},
-        {"target", &T::target, "degrees or metres, or these per second; `keys` come before it"},
-        {"keys", &T::keys, "targets over time"},
-        {"interpolation", &T::interpolation, kInterpolationHelp},
-        {"smooth", &T::smooth, "whether a `monotone` curve stands still at every key"},
-        {"max_effort", &T::max_effort, "greatest torque or force; left out: whatever it takes", "N m or N",
-         kNotNegative},
-        {"stiffness", &T::stiffness, "of a position, per radian or metre; 0: firm", "N m or N/m",
-         kNotNegative},
-        {"damping", &T::damping, "of a position with stiffness, per speed", "N m s or N s/m", kNotNegative}};
+    return {{"mode", &T::mode,
+             "quantity that the motor controls: a speed, or a position relative to that at time 0"},
+            {"target", &T::target, "target in degrees or metres, or per second; `keys` override it"},
+            {"keys", &T::keys, "targets over time"},
+            {"interpolation", &T::interpolation, kInterpolationHelp},
+            {"smooth", &T::smooth, "a `monotone` curve has zero speed at every key"},
+            {"max_effort", &T::max_effort, "greatest torque or force; default: unlimited", "N m or N",
+             kNotNegative},
+            {"stiffness", &T::stiffness, "stiffness of position control, per radian or metre; 0: rigid",
+             "N m or N/m", kNotNegative},
+            {"damping", &T::damping, "damping of position control with a stiffness, per speed",
+             "N m s or N s/m", kNotNegative}};
   }
 };
 
@@ -53,25 +55,29 @@ struct Table<JointBehaviour> {
     using T = JointBehaviour;
     return {
         {"type", &T::type,
-         "what stays free: all turning; nothing; turning about the axis; sliding along it; turning about two "
-         "axes; "
-         "all but the distance of the anchors: a rod, or with limits or a motor a rope or a winch"},
-        {"axis", &T::axis, "of turning or sliding; of a spherical joint, of its twist", "", kDirection},
-        {"second_axis", &T::second_axis, "of a universal joint", "", kDirection},
+         "degrees of freedom: `spherical` rotates freely; `fixed` has none; `revolute` rotates about the "
+         "axis; `prismatic` slides along the axis; `universal` rotates about two axes; `distance` keeps the "
+         "distance of the anchors, as a rod does, or with limits or a motor as a rope or a winch"},
+        {"axis", &T::axis, "axis of rotation or sliding; for a spherical joint, axis of the twist", "",
+         kDirection},
+        {"second_axis", &T::second_axis, "second axis of a universal joint", "", kDirection},
         {"limits", &T::limits,
-         "least and greatest way of a prismatic joint, or change of the distance: a rope has [-its length, "
-         "0]",
+         "least and greatest displacement of a prismatic joint, or change of the distance of a distance "
+         "joint: a rope has [-its length, 0]",
          "m"},
-        {"limits_deg", &T::limits_deg, "least and greatest angle; of a spherical joint, of its twist",
+        {"limits_deg", &T::limits_deg, "least and greatest angle; for a spherical joint, of the twist",
          "degrees"},
         {"swing_deg", &T::swing_deg,
-         "how far a spherical joint's axis may lean, or a universal one turn about its second", "degrees",
-         between(0, 180)},
-        {"friction", &T::friction, "dry: greatest torque or force against motion", "N m or N", kNotNegative},
-        {"damping", &T::damping, "viscous: torque or force per speed", "N m s or N s/m", kNotNegative},
-        {"motor", &T::motor, "what drives it"},
-        {"max_force", &T::max_force, "beyond which it breaks; left out: never", "N", kPositive},
-        {"max_torque", &T::max_torque, "beyond which it breaks; left out: never", "N m", kPositive},
+         "largest angle between the axes of a spherical joint, or of rotation about the second axis of a "
+         "universal joint",
+         "degrees", between(0, 180)},
+        {"friction", &T::friction, "dry friction: greatest torque or force against the motion", "N m or N",
+         kNotNegative},
+        {"damping", &T::damping, "viscous damping: torque or force per speed", "N m s or N s/m",
+         kNotNegative},
+        {"motor", &T::motor, "motor that drives the joint"},
+        {"max_force", &T::max_force, "force at which the joint breaks; default: never", "N", kPositive},
+        {"max_torque", &T::max_torque, "torque at which the joint breaks; default: never", "N m", kPositive},
     };
   }
 };
@@ -79,21 +85,21 @@ template <>
 struct Table<Joint> {
   static constexpr const char* kName = "joint";
   static constexpr const char* kHelp =
-      "Holds two bodies together, or one and the world, as they stand at time 0. Where bodies have copies, "
-      "each "
-      "copy of `a` is joined to the copy of `b` with the same number, or to the one `b` if that has none.";
+      "Connects two bodies, or a body and the world, in their poses at time 0. Where bodies have copies, "
+      "each copy of `a` is joined to the copy of `b` with the same number, or to the single `b` if that has "
+      "no copies.";
   static Fields<Joint> fields() {
     using T = Joint;
-    return Fields<T>{{"name", &T::name, "unique; empty: joint_ and its index"},
+    return Fields<T>{{"name", &T::name, "unique name; empty: joint_ and its index"},
                      {"a", &T::a, "name of a body", kRequired},
                      {"b", &T::b, "name of a body; empty: the world"},
-                     {"anchor", &T::anchor, "where they are joined", "m"},
-                     {"anchor_b", &T::anchor_b, "the other end of a distance joint, on b", "m"}}
+                     {"anchor", &T::anchor, "point at which the bodies are joined", "m"},
+                     {"anchor_b", &T::anchor_b, "other end of a distance joint, on `b`", "m"}}
         .with(&T::behaviour)
-        .then({{"collide", &T::collide, "whether the two bodies also collide with each other"},
-               {"visible", &T::visible, "whether a distance joint is drawn, as a straight rod"},
-               {"radius", &T::radius, "of that rod", "m", kPositive},
-               {"material", &T::material, "of that rod: name of a material; empty: grey"}});
+        .then({{"collide", &T::collide, "the two bodies also collide with each other"},
+               {"visible", &T::visible, "a distance joint is drawn as a straight rod"},
+               {"radius", &T::radius, "radius of the rod", "m", kPositive},
+               {"material", &T::material, "name of the rod's material; empty: grey"}});
   }
 };
 
@@ -101,47 +107,48 @@ template <>
 struct Table<Chain> {
   static constexpr const char* kName = "chain";
   static constexpr const char* kHelp =
-      "Links end to end from one point to another: bodies NAME/link_0 and on, joints NAME/joint_0 and on.";
+      "Links in a row from one point to another: bodies NAME/link_0 and on, joints NAME/joint_0 and on.";
   static Fields<Chain> fields() {
     using T = Chain;
     return {
-        {"name", &T::name, "unique; empty: articulation_ and its index"},
-        {"from", &T::from, "where it begins", "m"},
-        {"to", &T::to, "where it ends", "m"},
-        {"links", &T::links, "how many", "", between(1, 10000)},
-        {"sag", &T::sag, "length of the chain over the distance; over 1.0005 if both ends are held still", "",
-         between(1, 3)},
-        {"radius", &T::radius, "of a link", "m", kPositive},
-        {"density", &T::density, "of a link", "kg/m^3", kPositive},
+        {"name", &T::name, "unique name; empty: articulation_ and its index"},
+        {"from", &T::from, "start of the chain", "m"},
+        {"to", &T::to, "end of the chain", "m"},
+        {"links", &T::links, "number of links", "", between(1, 10000)},
+        {"sag", &T::sag,
+         "length of the chain relative to the distance of its ends; above 1.0005 if both ends are held still",
+         "", between(1, 3)},
+        {"radius", &T::radius, "radius of a link", "m", kPositive},
+        {"density", &T::density, "density of a link", "kg/m^3", kPositive},
         {"material", &T::material, "name of a material; empty: grey"},
-        {"start", &T::start, "what holds the first link: name of a body, `world`, or empty: nothing"},
-        {"end", &T::end, "the same of the last"},
-        {"swing_deg", &T::swing_deg, "how far a link may lean against the next", "degrees", between(0, 180)},
-        {"friction", &T::friction, "dry, of each joint", "N m", kNotNegative},
-        {"damping", &T::damping, "viscous, of each joint", "N m s", kNotNegative},
-        {"max_force", &T::max_force, "beyond which a joint breaks; left out: never", "N", kPositive}};
+        {"start", &T::start,
+         "name of the body that holds the first link, or `world`; empty: the end is free"},
+        {"end", &T::end, "name of the body that holds the last link, or `world`; empty: the end is free"},
+        {"swing_deg", &T::swing_deg, "largest angle between neighbouring links", "degrees", between(0, 180)},
+        {"friction", &T::friction, "dry friction of each joint", "N m", kNotNegative},
+        {"damping", &T::damping, "viscous damping of each joint", "N m s", kNotNegative},
+        {"max_force", &T::max_force, "force at which a joint breaks; default: never", "N", kPositive}};
   }
 };
 template <>
 struct Table<Ragdoll> {
   static constexpr const char* kName = "ragdoll";
   static constexpr const char* kHelp =
-      "A person who stands, looking along +Z, and lets go: bodies NAME/pelvis, chest, head, upper_arm_left "
-      "and so "
-      "on, with joints that bend as people do.";
+      "A standing person who faces +Z and collapses when the film starts: bodies NAME/pelvis, chest, head, "
+      "upper_arm_left and so on, with joints that bend as those of people.";
   static Fields<Ragdoll> fields() {
     using T = Ragdoll;
     return Fields<T>{
-        {"name", &T::name, "unique; empty: articulation_ and its index"},
-        {"position", &T::position, "between the soles", "m"},
-        {"orientation", &T::orientation, "of the whole figure about that place"},
-        {"velocity", &T::velocity, "of all of it at time 0", "m/s"},
-        {"height", &T::height, "of the figure", "m", between(0.1, 10)},
-        {"density", &T::density, "of its parts", "kg/m^3", kPositive},
-        {"stiffness", &T::stiffness, "of its joints: 0 turns freely, 1 is limp", "", kNotNegative},
-        {"skin", &T::skin, "name of a material: head, hands and feet; empty: grey"},
-        {"shirt", &T::shirt, "the same: trunk and arms"},
-        {"trousers", &T::trousers, "the same: pelvis and legs"}}
+        {"name", &T::name, "unique name; empty: articulation_ and its index"},
+        {"position", &T::position, "point on the ground between the feet", "m"},
+        {"orientation", &T::orientation, "orientation of the figure, about `position`"},
+        {"velocity", &T::velocity, "velocity of the figure at time 0", "m/s"},
+        {"height", &T::height, "height of the figure", "m", between(0.1, 10)},
+        {"density", &T::density, "density of the body parts", "kg/m^3", kPositive},
+        {"stiffness", &T::stiffness, "friction of the joints: 0 rotates freely, 1 is limp", "", kNotNegative},
+        {"skin", &T::skin, "name of the material of head, hands and feet; empty: grey"},
+        {"shirt", &T::shirt, "name of the material of trunk and arms; empty: grey"},
+        {"trousers", &T::trousers, "name of the material of pelvis and legs; empty: grey"}}
         .with(&T::placement);
   }
 };
@@ -149,46 +156,49 @@ template <>
 struct Table<Bridge> {
   static constexpr const char* kName = "bridge";
   static constexpr const char* kHelp =
-      "Planks hinged one to the next between two banks: bodies NAME/plank_0 and on.";
+      "Planks hinged to each other between two banks: bodies NAME/plank_0 and on.";
   static Fields<Bridge> fields() {
     using T = Bridge;
-    return {{"name", &T::name, "unique; empty: articulation_ and its index"},
-            {"from", &T::from, "where it begins", "m"},
-            {"to", &T::to, "where it ends", "m"},
-            {"planks", &T::planks, "how many", "", between(1, 1000)},
-            {"width", &T::width, "of the deck", "m", kPositive},
-            {"thickness", &T::thickness, "of a plank", "m", kPositive},
-            {"density", &T::density, "of a plank", "kg/m^3", kPositive},
-            {"material", &T::material, "name of a material; empty: grey"},
-            {"sag", &T::sag, "length of the deck over the distance of the banks", "", between(1.0005, 2)},
-            {"damping", &T::damping, "viscous, of each hinge", "N m s", kNotNegative},
-            {"max_force", &T::max_force, "beyond which a hinge breaks; left out: never", "N", kPositive}};
+    return {
+        {"name", &T::name, "unique name; empty: articulation_ and its index"},
+        {"from", &T::from, "start of the bridge", "m"},
+        {"to", &T::to, "end of the bridge", "m"},
+        {"planks", &T::planks, "number of planks", "", between(1, 1000)},
+        {"width", &T::width, "width of the deck", "m", kPositive},
+        {"thickness", &T::thickness, "thickness of a plank", "m", kPositive},
+        {"density", &T::density, "density of a plank", "kg/m^3", kPositive},
+        {"material", &T::material, "name of a material; empty: grey"},
+        {"sag", &T::sag, "length of the deck relative to the distance of the banks", "", between(1.0005, 2)},
+        {"damping", &T::damping, "viscous damping of each hinge", "N m s", kNotNegative},
+        {"max_force", &T::max_force, "force at which a hinge breaks; default: never", "N", kPositive}};
   }
 };
 template <>
 struct Table<Vehicle> {
   static constexpr const char* kName = "vehicle";
   static constexpr const char* kHelp =
-      "A car on springs, its rear wheels driven, its front wheels steered: bodies NAME/chassis, body, cabin, "
-      "hub_front_left, knuckle_left, wheel_front_left and so on. It looks along +Z.";
+      "A car with springs, driven by its rear wheels and steered by its front wheels: bodies NAME/chassis, "
+      "body, cabin, hub_front_left, knuckle_left, wheel_front_left and so on. It faces +Z.";
   static Fields<Vehicle> fields() {
     using T = Vehicle;
     return Fields<T>{
-        {"name", &T::name, "unique; empty: articulation_ and its index"},
-        {"position", &T::position, "on the ground in the middle of its wheels", "m"},
-        {"orientation", &T::orientation, "of all of it about that place"},
-        {"velocity", &T::velocity, "of all of it at time 0", "m/s"},
-        {"length", &T::length, "of its body", "m", kPositive},
-        {"width", &T::width, "over its wheels", "m", kPositive},
-        {"wheel_radius", &T::wheel_radius, "of each wheel", "m", kPositive},
-        {"mass", &T::mass, "of all of it", "kg", kPositive},
-        {"suspension_hz", &T::suspension_hz, "how often it bounces on its springs", "Hz", between(0.2, 10)},
-        {"speed", &T::speed, "what its rear wheels work towards over time, in m/s; none: it rolls"},
-        {"steer", &T::steer, "how its front wheels stand over time, in degrees, to the left positive"},
-        {"max_torque", &T::max_torque, "of each rear wheel", "N m", kNotNegative},
-        {"paint", &T::paint, "name of a material: body; empty: grey"},
-        {"trim", &T::trim, "the same: chassis and cabin"},
-        {"tyre", &T::tyre, "the same: wheels"}}
+        {"name", &T::name, "unique name; empty: articulation_ and its index"},
+        {"position", &T::position, "point on the ground at the centre of the wheels", "m"},
+        {"orientation", &T::orientation, "orientation of the car, about `position`"},
+        {"velocity", &T::velocity, "velocity of the car at time 0", "m/s"},
+        {"length", &T::length, "length of the car's body", "m", kPositive},
+        {"width", &T::width, "width over the wheels", "m", kPositive},
+        {"wheel_radius", &T::wheel_radius, "radius of each wheel", "m", kPositive},
+        {"mass", &T::mass, "mass of the whole car", "kg", kPositive},
+        {"suspension_hz", &T::suspension_hz, "frequency of the car's vibration on its springs", "Hz",
+         between(0.2, 10)},
+        {"speed", &T::speed,
+         "target speed of the rear wheels over time, in m/s; empty: the car rolls freely"},
+        {"steer", &T::steer, "angle of the front wheels over time, in degrees, positive to the left"},
+        {"max_torque", &T::max_torque, "greatest torque of each rear wheel", "N m", kNotNegative},
+        {"paint", &T::paint, "name of the material of the car's body; empty: grey"},
+        {"trim", &T::trim, "name of the material of chassis and cabin; empty: grey"},
+        {"tyre", &T::tyre, "name of the material of the wheels; empty: grey"}}
         .with(&T::placement);
   }
 };
@@ -197,23 +207,23 @@ struct Table<Crane> {
   static constexpr const char* kName = "crane";
   static constexpr const char* kHelp =
       "A tower crane whose jib points along +X, with a load on its rope: bodies NAME/mast, jib, "
-      "counterweight, "
-      "trolley, load, joints NAME/slew, way, rope.";
+      "counterweight, trolley, load, joints NAME/slew, way, rope.";
   static Fields<Crane> fields() {
     using T = Crane;
-    return Fields<T>{{"name", &T::name, "unique; empty: articulation_ and its index"},
-                     {"position", &T::position, "the foot of its mast", "m"},
-                     {"orientation", &T::orientation, "of all of it about that place"},
-                     {"height", &T::height, "of the mast", "m", kPositive},
-                     {"reach", &T::reach, "of the jib", "m", kPositive},
-                     {"load_mass", &T::load_mass, "of the load", "kg", kPositive},
-                     {"load_size", &T::load_size, "side of the load, a cube", "m", kPositive},
-                     {"slew", &T::slew, "how the jib turns over time, in degrees"},
-                     {"trolley", &T::trolley,
-                      "how far the trolley goes outwards over time, in metres, from 0.6 of the reach"},
-                     {"hoist", &T::hoist, "how far the load is lifted over time, in metres"},
-                     {"frame", &T::frame, "name of a material: mast, jib and trolley; empty: grey"},
-                     {"load", &T::load, "the same: load and counterweight"}}
+    return Fields<T>{
+        {"name", &T::name, "unique name; empty: articulation_ and its index"},
+        {"position", &T::position, "foot of the mast", "m"},
+        {"orientation", &T::orientation, "orientation of the crane, about `position`"},
+        {"height", &T::height, "height of the mast", "m", kPositive},
+        {"reach", &T::reach, "length of the jib", "m", kPositive},
+        {"load_mass", &T::load_mass, "mass of the load", "kg", kPositive},
+        {"load_size", &T::load_size, "edge of the load, a cube", "m", kPositive},
+        {"slew", &T::slew, "rotation of the jib over time, in degrees"},
+        {"trolley", &T::trolley,
+         "outward displacement of the trolley over time, in metres, from its place at 0.6 of the reach"},
+        {"hoist", &T::hoist, "height over time, in metres, by which the load is lifted"},
+        {"frame", &T::frame, "name of the material of mast, jib and trolley; empty: grey"},
+        {"load", &T::load, "name of the material of load and counterweight; empty: grey"}}
         .with(&T::placement);
   }
 };
@@ -221,43 +231,43 @@ template <>
 struct Table<NodeJoint> {
   static constexpr const char* kName = "node_joint";
   static constexpr const char* kHelp =
-      "The joint between a node of a model and the one above it, at its origin.";
+      "The joint between a node of a model and the link above it, at the node's origin.";
   static Fields<NodeJoint> fields() {
     using T = NodeJoint;
-    return Fields<T>{{"node", &T::node, "name of a node; axes are those of that node", kRequired}}.with(
-        &T::behaviour);
+    return Fields<T>{
+        {"node", &T::node, "name of a node; the joint's axes are in the frame of that node", kRequired}}
+        .with(&T::behaviour);
   }
 };
 template <>
 struct Table<ModelTree> {
   static constexpr const char* kName = "model_tree";
   static constexpr const char* kHelp =
-      "A model file whose nodes are links: each that has triangles is a body NAME/NODE, joined to the "
-      "nearest such "
-      "node above it, joint NAME/NODE. `offstage info FILE` lists the nodes.";
+      "A model file whose nodes are links: each node with triangles is a body NAME/NODE, and joint NAME/NODE "
+      "connects it to the nearest such node above it. `offstage info FILE` lists the nodes.";
   static Fields<ModelTree> fields() {
     using T = ModelTree;
-    return Fields<T>{
-        {"name", &T::name, "unique; empty: articulation_ and its index"},
-        {"file", &T::file, "model file", kRequired},
-        {"position", &T::position, "of the model's origin", "m"},
-        {"orientation", &T::orientation, "of the whole model about that place"},
-        {"velocity", &T::velocity, "of all of it at time 0", "m/s"},
-        {"scale", &T::scale, "factor of its size", "", kPositive},
-        {"density", &T::density, "of its links", "kg/m^3", kPositive},
-        {"base", &T::base, "what holds the uppermost nodes: name of a body, `world`, or empty: nothing"},
-        {"material", &T::material, "name of a material; empty: those of the file"},
-        {"collides", &T::collides, "whether links collide with what they are not joined to"},
-        {"joints", &T::joints, "those that are not spherical, or are driven or limited"},
-        {"friction", &T::friction, "dry, of the other joints", "N m", kNotNegative},
-        {"damping", &T::damping, "viscous, of the other joints", "N m s", kNotNegative}}
+    return Fields<T>{{"name", &T::name, "unique name; empty: articulation_ and its index"},
+                     {"file", &T::file, "model file", kRequired},
+                     {"position", &T::position, "position of the model's origin", "m"},
+                     {"orientation", &T::orientation, "orientation of the model, about `position`"},
+                     {"velocity", &T::velocity, "velocity of all links at time 0", "m/s"},
+                     {"scale", &T::scale, "scale factor of the model", "", kPositive},
+                     {"density", &T::density, "density of the links", "kg/m^3", kPositive},
+                     {"base", &T::base,
+                      "name of the body that holds the uppermost nodes, or `world`; empty: they are free"},
+                     {"material", &T::material, "name of a material; empty: the materials of the file"},
+                     {"collides", &T::collides, "links collide with all objects that they are not joined to"},
+                     {"joints", &T::joints, "joints that are not spherical, or have a motor or limits"},
+                     {"friction", &T::friction, "dry friction of the other joints", "N m", kNotNegative},
+                     {"damping", &T::damping, "viscous damping of the other joints", "N m s", kNotNegative}}
         .with(&T::placement);
   }
 };
 template <>
 struct Tags<ArticulationTemplate> {
   static constexpr const char* kName = "articulation";
-  static constexpr const char* kHelp = "Bodies and joints ready made.";
+  static constexpr const char* kHelp = "Ready-made bodies with their joints.";
   static constexpr std::array kTags = {"chain", "ragdoll", "bridge", "vehicle", "crane", "model"};
   static constexpr bool kRequired = true;
 };

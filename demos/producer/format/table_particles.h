@@ -28,39 +28,43 @@ template <>
 struct Table<ParticleLook> {
   static constexpr const char* kName = "look";
   static constexpr const char* kHelp =
-      "How particles are drawn. What is left out is as the style has it: soft round `sprite`; lit `streak` "
-      "along its motion that throws a shadow, `drop` one that throws none; lit ball, `sphere`; `smoke` "
-      "shadowed by the smoke before it; glowing tongue of `fire`; `flake` of snow or dust; glowing `spark` "
-      "with a tail.";
+      "How particles are drawn. The style gives the default of each key. `sprite`: soft disc; `streak`: lit "
+      "line along the motion, with a shadow; `drop`: the same without a shadow; `sphere`: lit ball; `smoke`: "
+      "puff that is shadowed by the smoke in front of it; `fire`: glowing flame; `flake`: snow or dust; "
+      "`spark`: glowing point with a tail.";
   static Fields<ParticleLook> fields() {
     using T = ParticleLook;
     return {
-        {"style", &T::style, "what a particle looks like"},
-        {"color", &T::color, "colour; alpha is opacity"},
-        {"color_over_age", &T::color_over_age, "multiplies `color`; age 0: birth, 1: end of life"},
+        {"style", &T::style, "kind of picture drawn for each particle"},
+        {"color", &T::color, "base colour; alpha is the opacity"},
+        {"color_over_age", &T::color_over_age,
+         "multiplies `color`; age 0 is the creation, 1 the end of the lifespan"},
         {"temperature_over_age", &T::temperature_over_age,
-         "multiplies both by the colour of what glows so hot, and by its brightness beside the hottest key",
+         "multiplies both by the colour of a black body of this temperature, and by its brightness relative "
+         "to the hottest key",
          "K", kTemperature},
         {"size_over_age", &T::size_over_age, "multiplies the drawn radius", "", kNotNegative},
-        {"ramp", &T::ramp, "between the keys over age"},
-        {"color_deviation", &T::color_deviation, "standard deviation of brightness between particles", "",
+        {"ramp", &T::ramp, "interpolation between the keys over age"},
+        {"color_deviation", &T::color_deviation, "standard deviation of the brightness between particles", "",
          kShare},
         {"channel_deviation", &T::channel_deviation,
          "standard deviations of red, green, blue and opacity between particles", "", kNotNegative},
-        {"additive", &T::additive, "adds light instead of covering; left out: of sparks and fire"},
-        {"lit", &T::lit, "by sun and sky, else its colour is its light; left out: all but sparks and fire"},
-        {"casts_shadow", &T::casts_shadow, "throws a shadow; left out: sprites, streaks, spheres and smoke"},
-        {"softness", &T::softness, "width of the fade at the rim as a share of the radius; left out: 0.5", "",
+        {"additive", &T::additive, "adds light instead of covering; default: true for sparks and fire"},
+        {"lit", &T::lit,
+         "lit by sun and sky; if false, the colour is emitted light; default: true except for sparks and "
+         "fire"},
+        {"casts_shadow", &T::casts_shadow,
+         "casts a shadow; default: true for sprites, streaks, spheres and smoke"},
+        {"softness", &T::softness, "width of the soft rim as a share of the radius; default: 0.5", "",
          kShare},
         {"stretch", &T::stretch,
-         "a streak is as long as its particle moves in this time, smoke, fire and flakes are longer by it; "
-         "left "
-         "out: 1/60, of sparks 1/40, of fire 0.1, of smoke 0",
+         "a streak is as long as its particle's motion in this time; smoke, fire and flakes are lengthened "
+         "by the same; default: 1/60, for sparks 1/40, for fire 0.1, for smoke 0",
          "s", kNotNegative},
-        {"taper", &T::taper, "share by which a streak fades towards its tail; left out: 0, of sparks 1", "",
+        {"taper", &T::taper, "share by which a streak fades towards its tail; default: 0, for sparks 1", "",
          kShare},
-        {"metallic", &T::metallic, "of spheres; 0: dielectric, 1: metal; left out: 0", "", kShare},
-        {"roughness", &T::roughness, "of spheres; 0: mirror, 1: dull; left out: 0.3", "", kShare},
+        {"metallic", &T::metallic, "for spheres: 0 is a dielectric, 1 a metal; default: 0", "", kShare},
+        {"roughness", &T::roughness, "for spheres: 0 is a mirror, 1 is dull; default: 0.3", "", kShare},
     };
   }
 };
@@ -69,17 +73,16 @@ struct Table<ParticleBehaviour> {
   static Fields<ParticleBehaviour> fields() {
     using T = ParticleBehaviour;
     return {
-        {"linear_drag", &T::linear_drag, "force against the air per speed", "kg/s", kNotNegative},
-        {"gravity", &T::gravity, "feels the world's gravity"},
+        {"linear_drag", &T::linear_drag, "drag force per speed relative to the air", "kg/s", kNotNegative},
+        {"gravity", &T::gravity, "the world's gravity acts on the particles"},
         {"force", &T::force, "constant force on each particle", "N"},
-        {"collides", &T::collides, "with bodies"},
-        {"internal", &T::internal, "its particles collide with each other"},
-        {"external", &T::external, "its particles collide with those of others that have this, too"},
-        {"dies_on_hit", &T::dies_on_hit, "is removed at its first collision"},
+        {"collides", &T::collides, "particles collide with bodies"},
+        {"internal", &T::internal, "particles of this system collide with each other"},
+        {"external", &T::external, "particles collide with those of other systems that also have `external`"},
+        {"dies_on_hit", &T::dies_on_hit, "a particle is removed at its first collision"},
         {"integrator", &T::integrator,
-         "method, for particles without springs; `leapfrog` is of second order at the cost of one evaluation "
-         "of the "
-         "forces, and stable for any drag"},
+         "integration method of particles without springs; `leapfrog` is of second order at the cost of one "
+         "force evaluation, and is stable for any drag"},
     };
   }
 };
@@ -91,9 +94,9 @@ struct Table<ParticlePlace> {
   static constexpr const char* kName = "particle";
   static constexpr const char* kHelp = "One particle of a group.";
   static Fields<ParticlePlace> fields() {
-    return {{"position", &ParticlePlace::position, "at time 0", "m"},
-            {"velocity", &ParticlePlace::velocity, "at time 0", "m/s"},
-            {"color", &ParticlePlace::color, "instead of the look's"}};
+    return {{"position", &ParticlePlace::position, "position at time 0", "m"},
+            {"velocity", &ParticlePlace::velocity, "velocity at time 0", "m/s"},
+            {"color", &ParticlePlace::color, "colour, instead of that of the look"}};
   }
 };
 template <>
@@ -103,15 +106,17 @@ struct Table<ParticleGroup> {
   static Fields<ParticleGroup> fields() {
     using T = ParticleGroup;
     return Fields<T>{
-        {"name", &T::name, "unique; empty: particles_ and its index"},
-        {"places", &T::places, "the particles"},
-        {"radius", &T::radius, "of each", "m", kPositive},
-        {"mass", &T::mass, "of each", "kg", kPositive},
-        {"restitution", &T::restitution, "bounciness; the larger of particle and body counts", "", kShare},
-        {"friction", &T::friction, "Coulomb's coefficient; the geometric mean of both counts", "",
+        {"name", &T::name, "unique name; empty: particles_ and its index"},
+        {"places", &T::places, "one entry for each particle"},
+        {"radius", &T::radius, "radius of each particle", "m", kPositive},
+        {"mass", &T::mass, "mass of each particle", "kg", kPositive},
+        {"restitution", &T::restitution,
+         "coefficient of restitution; of particle and body the larger value is used", "", kShare},
+        {"friction", &T::friction,
+         "coefficient of dynamic friction; of particle and body the geometric mean is used", "",
          kNotNegative},
-        {"charge", &T::charge, "of each", "C"},
-        {"look", &T::look, "how they are drawn"},
+        {"charge", &T::charge, "electric charge of each particle", "C"},
+        {"look", &T::look, "how the particles are drawn"},
     }
         .with(&T::behaviour);
   }
@@ -123,22 +128,27 @@ template <>
 struct Table<Split> {
   static constexpr const char* kName = "split";
   static constexpr const char* kHelp =
-      "Particles that throw off others of the same kind, which can split in their turn. Percentages are of "
-      "the "
-      "parent's at that time.";
+      "Particles that release children of the same kind, which can split again. Percentages refer to the "
+      "parent's value at the time of the split.";
   static Fields<Split> fields() {
     using T = Split;
-    return {{"enabled", &T::enabled, "whether they split at all"},
-            {"count", &T::count, "children of one split, rounded", "", between(0, 1000)},
-            {"age", &T::age, "of a particle at its first split", "s", kPositive},
-            {"delay", &T::delay, "to its next split", "s", kPositive},
-            {"depth", &T::depth, "the most splits of a particle, those of its ancestors included", "",
-             between(1, 16)},
-            {"velocity_percent", &T::velocity_percent, "of the parent's velocity", "%"},
-            {"spread_deg", &T::spread_deg, "angle from the parent's direction", "degrees", kAngles},
-            {"radius_percent", &T::radius_percent, "of the parent's radius", "%", kPositive},
-            {"mass_percent", &T::mass_percent, "of the parent's mass; 0: of its density", "%", kNotNegative},
-            {"lifespan_percent", &T::lifespan_percent, "of the parent's lifespan", "%", kPositive}};
+    return {
+        {"enabled", &T::enabled, "whether particles split"},
+        {"count", &T::count, "number of children of one split, rounded", "", between(0, 1000)},
+        {"age", &T::age, "age of a particle at its first split", "s", kPositive},
+        {"delay", &T::delay, "time to its next split", "s", kPositive},
+        {"depth", &T::depth,
+         "largest number of splits in the history of a particle, including those of its ancestors", "",
+         between(1, 16)},
+        {"velocity_percent", &T::velocity_percent, "share of the parent's velocity that a child starts with",
+         "%"},
+        {"spread_deg", &T::spread_deg, "angle between a child's direction and the parent's", "degrees",
+         kAngles},
+        {"radius_percent", &T::radius_percent, "radius of a child, relative to the parent's", "%", kPositive},
+        {"mass_percent", &T::mass_percent,
+         "mass of a child, relative to the parent's; 0: the same density as the parent", "%", kNotNegative},
+        {"lifespan_percent", &T::lifespan_percent, "lifespan of a child, relative to the parent's", "%",
+         kPositive}};
   }
 };
 template <>
@@ -146,18 +156,20 @@ struct Table<ParticleSource> {
   static Fields<ParticleSource> fields() {
     using T = ParticleSource;
     return Fields<T>{
-        {"speed", &T::speed, "of a particle as it leaves", "m/s"},
-        {"spread_deg", &T::spread_deg, "angle between its path and the direction it is released in",
+        {"speed", &T::speed, "speed of a new particle", "m/s"},
+        {"spread_deg", &T::spread_deg, "angle between a particle's velocity and the direction of the release",
          "degrees", kAngles},
-        {"radius", &T::radius, "of a particle", "m", kPositive},
-        {"density", &T::density, "gives the mass, unless `mass` does", "kg/m^3", kPositive},
-        {"mass", &T::mass, "of a particle; 0: from density and radius", "kg", kNotNegative},
-        {"lifespan", &T::lifespan, "of a particle", "s", kPositive},
-        {"restitution", &T::restitution, "bounciness; the larger of particle and body counts", "", kShare},
-        {"friction", &T::friction, "Coulomb's coefficient; the geometric mean of both counts", "",
+        {"radius", &T::radius, "radius of a particle", "m", kPositive},
+        {"density", &T::density, "density; determines the mass unless `mass` is given", "kg/m^3", kPositive},
+        {"mass", &T::mass, "mass of a particle; 0: computed from density and radius", "kg", kNotNegative},
+        {"lifespan", &T::lifespan, "age at which a particle is removed", "s", kPositive},
+        {"restitution", &T::restitution,
+         "coefficient of restitution; of particle and body the larger value is used", "", kShare},
+        {"friction", &T::friction,
+         "coefficient of dynamic friction; of particle and body the geometric mean is used", "",
          kNotNegative},
-        {"charge", &T::charge, "of a particle", "C"},
-        {"max_alive", &T::max_alive, "no more than this many exist at once", "", between(1, 2e7)},
+        {"charge", &T::charge, "electric charge of a particle", "C"},
+        {"max_alive", &T::max_alive, "largest number of particles that exist at once", "", between(1, 2e7)},
         {"look", &T::look, "how particles are drawn"},
     }
         .with(&T::behaviour);
@@ -167,26 +179,26 @@ struct Table<ParticleSource> {
 template <class T>
 Fields<T> with_offspring(Fields<T> fields) {
   return std::move(fields).then({
-      {"split", &T::split, "its particles throw off others of the same kind"},
-      {"trails", &T::trails, "other particles that each of them leaves behind"},
-      {"on_age", &T::on_age, "other particles born when one reaches an age"},
-      {"on_collision", &T::on_collision, "other particles born where one hits something"},
-      {"on_death", &T::on_death, "other particles born where one ends of age"},
+      {"split", &T::split, "its particles release children of the same kind"},
+      {"trails", &T::trails, "other particles that each particle leaves along its path"},
+      {"on_age", &T::on_age, "other particles that are created when a particle reaches an age"},
+      {"on_collision", &T::on_collision, "other particles that are created when a particle collides"},
+      {"on_death", &T::on_death, "other particles that are created when a particle reaches its lifespan"},
   });
 }
 template <>
 struct Table<TrailSource> {
   static constexpr const char* kName = "trail";
-  static constexpr const char* kHelp = "Particles that every parent leaves behind, evenly in time.";
+  static constexpr const char* kHelp = "Particles that each parent leaves along its path, evenly in time.";
   static Fields<TrailSource> fields() {
     using T = TrailSource;
     return with_offspring(Fields<T>{
-        {"name", &T::name, "follows the parent's and a slash; empty: trails_ and its index"},
-        {"rate", &T::rate, "particles of each parent", "1/s", between(0, 1e5)},
-        {"start_age", &T::start_age, "of the parent", "s", kNotNegative},
-        {"end_age", &T::end_age, "of the parent", "s", kNotNegative},
-        {"velocity_percent", &T::velocity_percent, "of the parent's velocity; `speed` is added, backwards",
-         "%"},
+        {"name", &T::name, "name after the parent's name and a slash; empty: trails_ and its index"},
+        {"rate", &T::rate, "particles released per second by each parent", "1/s", between(0, 1e5)},
+        {"start_age", &T::start_age, "age of the parent at which the trail starts", "s", kNotNegative},
+        {"end_age", &T::end_age, "age of the parent at which the trail ends", "s", kNotNegative},
+        {"velocity_percent", &T::velocity_percent,
+         "share of the parent's velocity that a new particle starts with; `speed` is added backwards", "%"},
     }
                               .with_base<ParticleSource>());
   }
@@ -199,15 +211,17 @@ struct Names<effects::Axis> {
 template <class T>
 Fields<T> event_fields() {
   return with_offspring(Fields<T>{
-      {"probability", &T::probability, "that an event is answered", "", kShare},
-      {"min_speed", &T::min_speed, "of the parent after the event; slower ones are not answered", "m/s",
-       kNotNegative},
-      {"count", &T::count, "particles for each event, rounded", "", kCounts},
+      {"probability", &T::probability, "probability that an event creates particles", "", kShare},
+      {"min_speed", &T::min_speed,
+       "least speed of the parent after the event; slower parents create no particles", "m/s", kNotNegative},
+      {"count", &T::count, "number of particles for each event, rounded", "", kCounts},
       {"axis", &T::axis,
-       "what they fly about: the normal of what was hit, else as the other; the parent's velocity"},
-      {"velocity_percent", &T::velocity_percent, "of the parent's velocity; `speed` is added, about the axis",
+       "axis of the release: `normal` is the normal of the surface that was hit (without a collision, as "
+       "`velocity`); `velocity` is the parent's velocity"},
+      {"velocity_percent", &T::velocity_percent,
+       "share of the parent's velocity that a new particle starts with; `speed` is added along the axis",
        "%"},
-      {"max_per_step", &T::max_per_step, "no more than this many are born in a step of the simulation", "",
+      {"max_per_step", &T::max_per_step, "largest number of particles created in one sub-step", "",
        between(1, 1e6)},
   }
                             .template with_base<ParticleSource>());
@@ -215,22 +229,24 @@ Fields<T> event_fields() {
 template <>
 struct Table<EventSource> {
   static constexpr const char* kName = "event_source";
-  static constexpr const char* kHelp = "Particles that answer something that happens to a parent.";
+  static constexpr const char* kHelp = "Particles that are created by a collision or by the end of a parent.";
   static Fields<EventSource> fields() {
     using T = EventSource;
-    return Fields<T>{{"name", &T::name,
-                      "follows the parent's and a slash; empty: on_collision_ or on_death_ and its index"}}
+    return Fields<T>{
+        {"name", &T::name,
+         "name after the parent's name and a slash; empty: on_collision_ or on_death_ and its index"}}
         .then(event_fields<T>());
   }
 };
 template <>
 struct Table<AgeSource> {
   static constexpr const char* kName = "age_source";
-  static constexpr const char* kHelp = "Particles that are born when a parent reaches an age.";
+  static constexpr const char* kHelp = "Particles that are created when a parent reaches an age.";
   static Fields<AgeSource> fields() {
     using T = AgeSource;
-    return Fields<T>{{"name", &T::name, "follows the parent's and a slash; empty: on_age_ and its index"},
-                     {"age", &T::age, "of the parent", "s", kNotNegative}}
+    return Fields<T>{
+        {"name", &T::name, "name after the parent's name and a slash; empty: on_age_ and its index"},
+        {"age", &T::age, "age of the parent", "s", kNotNegative}}
         .then(event_fields<T>());
   }
 };
@@ -240,70 +256,74 @@ struct Table<AgeSource> {
 template <>
 struct Table<PlaneSurface> {
   static constexpr const char* kName = "plane_surface";
-  static constexpr const char* kHelp = "A rectangle that particles leave along its normal.";
+  static constexpr const char* kHelp = "A rectangle that releases particles along its normal.";
   static Fields<PlaneSurface> fields() {
-    return {{"position", &PlaneSurface::position, "of its centre", "m"},
-            {"direction", &PlaneSurface::direction, "its normal", "", kDirection},
-            {"turn_deg", &PlaneSurface::turn_deg, "turn of the rectangle about its normal", "degrees"},
-            {"size", &PlaneSurface::size, "of its two edges", "m", kPositive}};
+    return {{"position", &PlaneSurface::position, "centre of the rectangle, in the emitter's frame", "m"},
+            {"direction", &PlaneSurface::direction, "normal of the rectangle, in the emitter's frame", "",
+             kDirection},
+            {"turn_deg", &PlaneSurface::turn_deg, "rotation of the rectangle about its normal", "degrees"},
+            {"size", &PlaneSurface::size, "lengths of the two edges", "m", kPositive}};
   }
 };
 template <>
 struct Table<SphereSurface> {
   static constexpr const char* kName = "sphere_surface";
-  static constexpr const char* kHelp = "A sphere that particles leave outwards, all around.";
+  static constexpr const char* kHelp = "A sphere that releases particles outwards in all directions.";
   static Fields<SphereSurface> fields() {
-    return {{"position", &SphereSurface::position, "of its centre", "m"},
-            {"radius", &SphereSurface::radius, "radius", "m", kPositive}};
+    return {{"position", &SphereSurface::position, "centre of the sphere, in the emitter's frame", "m"},
+            {"radius", &SphereSurface::radius, "radius of the sphere", "m", kPositive}};
   }
 };
 template <>
 struct Table<DiscSurface> {
   static constexpr const char* kName = "disc_surface";
-  static constexpr const char* kHelp = "A circle that particles leave along its normal.";
+  static constexpr const char* kHelp = "A disc that releases particles along its normal.";
   static Fields<DiscSurface> fields() {
-    return {{"position", &DiscSurface::position, "of its centre", "m"},
-            {"direction", &DiscSurface::direction, "its normal", "", kDirection},
-            {"radius", &DiscSurface::radius, "radius", "m", kPositive}};
+    return {
+        {"position", &DiscSurface::position, "centre of the disc, in the emitter's frame", "m"},
+        {"direction", &DiscSurface::direction, "normal of the disc, in the emitter's frame", "", kDirection},
+        {"radius", &DiscSurface::radius, "radius of the disc", "m", kPositive}};
   }
 };
 template <>
 struct Table<MeshSurface> {
   static constexpr const char* kName = "mesh_surface";
-  static constexpr const char* kHelp = "A model that particles leave along the normals of its faces.";
+  static constexpr const char* kHelp = "A model that releases particles along the normals of its faces.";
   static Fields<MeshSurface> fields() {
-    return {{"file", &MeshSurface::file, "model file", kRequired},
-            {"scale", &MeshSurface::scale, "factor of its size", "", kPositive},
-            {"position", &MeshSurface::position, "of the model's origin", "m"},
-            {"orientation", &MeshSurface::orientation, "of the model"}};
+    return {
+        {"file", &MeshSurface::file, "model file", kRequired},
+        {"scale", &MeshSurface::scale, "scale factor of the model", "", kPositive},
+        {"position", &MeshSurface::position, "position of the model's origin, in the emitter's frame", "m"},
+        {"orientation", &MeshSurface::orientation, "orientation of the model, in the emitter's frame"}};
   }
 };
 template <>
 struct Tags<EmitterSurface> {
   static constexpr const char* kName = "surface";
   static constexpr const char* kHelp =
-      "Where particles come from: in the world, or in the frame of the emitter's body.";
+      "Surface that particles are released from. Its coordinates are in the frame of the emitter's body, or "
+      "in the world.";
   static constexpr std::array kTags = {"plane", "sphere", "disc", "mesh"};
   static constexpr bool kRequired = false;
 };
 template <>
 struct Table<EmitterBurst> {
   static constexpr const char* kName = "burst";
-  static constexpr const char* kHelp = "Many particles at once.";
+  static constexpr const char* kHelp = "Many particles released at once.";
   static Fields<EmitterBurst> fields() {
-    return {{"time", &EmitterBurst::time, "of the first cycle", "s", kNotNegative},
-            {"count", &EmitterBurst::count, "particles in each cycle, rounded", "", kCounts},
-            {"cycles", &EmitterBurst::cycles, "how many times", "", between(1, 1e6)},
-            {"interval", &EmitterBurst::interval, "between cycles", "s", kPositive}};
+    return {{"time", &EmitterBurst::time, "time of the first release", "s", kNotNegative},
+            {"count", &EmitterBurst::count, "number of particles in each release, rounded", "", kCounts},
+            {"cycles", &EmitterBurst::cycles, "number of releases", "", between(1, 1e6)},
+            {"interval", &EmitterBurst::interval, "time between releases", "s", kPositive}};
   }
 };
 template <>
 struct Table<effects::TimeWindow> {
   static constexpr const char* kName = "window";
-  static constexpr const char* kHelp = "From one time up to, and without, another.";
+  static constexpr const char* kHelp = "A period of time. The start is included, the end is not.";
   static Fields<effects::TimeWindow> fields() {
-    return {{"start", &effects::TimeWindow::start, "from when", "s", kNotNegative},
-            {"end", &effects::TimeWindow::end, "until when", "s", kNotNegative}};
+    return {{"start", &effects::TimeWindow::start, "start of the period", "s", kNotNegative},
+            {"end", &effects::TimeWindow::end, "end of the period", "s", kNotNegative}};
   }
 };
 template <>
@@ -313,30 +333,31 @@ struct Table<Emitter> {
   static Fields<Emitter> fields() {
     using T = Emitter;
     return with_offspring(Fields<T>{
-        {"name", &T::name, "unique; also names its random numbers; empty: emitter_ and its index"},
+        {"name", &T::name,
+         "unique name, which also selects the random numbers; empty: emitter_ and its index"},
         {"preset", &T::preset,
-         "whose first emitter this one is but for the keys given here; of another: \"preset/emitter\"; "
-         "empty: "
-         "none"},
+         "preset whose first emitter provides all keys that are not given here; \"preset/emitter\" names "
+         "another of its emitters; empty: none"},
         {"body", &T::body, "name of the body it moves with; empty: fixed in the world"},
-        {"surface", &T::surface, "where particles come from"},
+        {"surface", &T::surface, "surface that particles are released from"},
         {"direction", &T::direction,
-         "they are released in, in the frame of the body or the world; zero: the surface's normal"},
+         "direction of release, in the frame of the body or in the world; zero: the normal of the surface"},
         {"overlap", &T::overlap,
-         "newborns may overlap and never wait for room: for particles that do not collide with each "
+         "new particles may overlap and never wait for space; for particles that do not collide with each "
          "other"},
-        {"rate", &T::rate, "particles released one by one", "1/s", between(0, 1e9)},
-        {"count", &T::count, "particles at once in every `interval`, rounded", "", kCounts},
-        {"interval", &T::interval, "between releases of `count`", "s", kPositive},
+        {"rate", &T::rate, "number of particles released one by one per second", "1/s", between(0, 1e9)},
+        {"count", &T::count, "number of particles released together in every `interval`, rounded", "",
+         kCounts},
+        {"interval", &T::interval, "time between releases of `count`", "s", kPositive},
         {"bursts", &T::bursts, "many particles at given times"},
-        {"start", &T::start, "of `rate` and `count`", "s", kNotNegative},
-        {"end", &T::end, "of everything; the living live on", "s", kNotNegative},
-        {"windows", &T::windows, "when `rate` and `count` release; empty: always"},
+        {"start", &T::start, "time at which `rate` and `count` start", "s", kNotNegative},
+        {"end", &T::end, "time at which all releases end; existing particles stay until their lifespan ends",
+         "s", kNotNegative},
+        {"windows", &T::windows, "periods in which `rate` and `count` release; empty: always"},
         {"prewarm", &T::prewarm,
-         "how long before `start` it has begun already; until time 0 particles live and collide while "
-         "dynamic "
-         "bodies, cloths and particle groups stand still, kinematic bodies follow their keys, and forces are "
-         "those of time 0",
+         "how long before `start` the emitter has been running. Until time 0, particles move and collide "
+         "while dynamic bodies, cloths and particle groups stand still, kinematic bodies follow their keys, "
+         "and forces have their values of time 0",
          "s", kNotNegative},
     }
                               .with_base<ParticleSource>()
@@ -366,17 +387,18 @@ template <>
 struct Table<Effect> {
   static constexpr const char* kName = "effect";
   static constexpr const char* kHelp =
-      "All emitters and forces of a preset, some of their keys replaced. `offstage presets` lists the "
+      "All emitters and forces of a preset, with some of their keys replaced. `offstage presets` lists the "
       "presets.";
   static Fields<Effect> fields() {
     using T = Effect;
     return {{"preset", &T::preset, "name of the preset", kRequired},
             {"name", &T::name,
-             "stands before those of its emitters and forces, with a slash; empty: the preset's"},
-            {"position", &T::position, "of the preset's origin, in the world or in the body's frame", "m"},
+             "prefix of the names of its emitters and forces, followed by a slash; empty: the preset's name"},
+            {"position", &T::position, "position of the preset's origin, in the world or in the body's frame",
+             "m"},
             {"body", &T::body, "name of the body that its emitters move with; empty: none"},
-            {"start", &T::start, "added to all its times", "s", kNotNegative},
-            {"overrides", &T::overrides, "names of its emitters and forces, each with the keys to replace"}};
+            {"start", &T::start, "time added to all times of the preset", "s", kNotNegative},
+            {"overrides", &T::overrides, "for each emitter or force, by name, the keys to replace"}};
   }
 };
 

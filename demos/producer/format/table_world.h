@@ -29,30 +29,32 @@ struct Names<sim::ImpactLaw> {
 template <>
 struct Table<WorldSettings> {
   static constexpr const char* kName = "world";
-  static constexpr const char* kHelp = "What holds for everything that is simulated.";
+  static constexpr const char* kHelp = "Settings of the whole simulation.";
   static Fields<WorldSettings> fields() {
     using T = WorldSettings;
     return {
-        {"gravity", &T::gravity, "acceleration of free fall", "m/s^2"},
-        {"wind", &T::wind, "velocity of the air, felt by drag", "m/s"},
-        {"step", &T::step, "longest step of the simulation; every frame takes the fewest equal ones", "s",
+        {"gravity", &T::gravity, "gravitational acceleration", "m/s^2"},
+        {"wind", &T::wind, "velocity of the air; it acts on objects through their drag", "m/s"},
+        {"step", &T::step,
+         "longest sub-step of the simulation; each frame is divided into the fewest equal sub-steps", "s",
          between(1e-6, 1)},
-        {"integrator", &T::integrator, "method for bodies and everything joined by springs"},
+        {"integrator", &T::integrator,
+         "integration method of bodies, and of everything connected by springs"},
         {"integration_error", &T::integration_error,
-         "greatest error of a coordinate that an adaptive integrator or `dormand_prince` allows in a step",
+         "greatest error per sub-step of a coordinate that an adaptive integrator or `dormand_prince` allows",
          "m", between(1e-14, 1)},
         {"solver", &T::solver,
-         "of resting contact: `exact` finds contact forces to rounding and collisions at their very times, "
-         "`fast` takes a bounded amount of work, `auto` the exact one where that is not slower"},
+         "contact solver: `exact` computes contact forces to rounding and each collision at its own time; "
+         "`fast` does a bounded amount of work; `auto` uses `exact` where it is not slower"},
         {"impact", &T::impact,
-         "of collisions at the same time: all solved together, or one after the other, which lets an impact "
-         "pass "
-         "through a row of balls"},
-        {"collision_speed", &T::collision_speed, "bodies that meet slower than this do not bounce", "m/s",
-         over(0, 100)},
-        {"sleep", &T::sleep, "bodies at rest are left alone until something happens to them"},
-        {"bounds", &T::bounds, "half the edge of the cube that things must stay in", "m", kPositive},
-        {"seed", &T::seed, "changes every random number of the scene", "", kNotNegative},
+         "how collisions at the same time are resolved: `simultaneous` solves them together; `sequential` "
+         "solves one after the other, so that an impact travels through a row of balls"},
+        {"collision_speed", &T::collision_speed, "bodies that approach more slowly than this do not bounce",
+         "m/s", over(0, 100)},
+        {"sleep", &T::sleep, "bodies at rest are not simulated until something reaches them"},
+        {"bounds", &T::bounds, "half the edge of the cube around the origin that all objects must stay in",
+         "m", kPositive},
+        {"seed", &T::seed, "changes all random numbers of the scene", "", kNotNegative},
     };
   }
 };
@@ -67,38 +69,39 @@ struct Names<render::Pattern> {
 template <>
 struct Table<Material> {
   static constexpr const char* kName = "material";
-  static constexpr const char* kHelp = "Look and contact behaviour in one.";
+  static constexpr const char* kHelp = "Appearance and contact behaviour of a surface.";
   static Fields<Material> fields() {
     using T = Material;
     return {
-        {"name", &T::name, "what bodies, springs and cloths call it; empty: material_ and its index"},
-        {"color", &T::color, "base colour; with alpha below 1 it is translucent, and so is its shadow"},
+        {"name", &T::name, "name that bodies, springs and cloths refer to; empty: material_ and its index"},
+        {"color", &T::color, "base colour; with an alpha below 1 the surface and its shadow are translucent"},
         {"metallic", &T::metallic, "0: dielectric, 1: metal", "", kShare},
         {"roughness", &T::roughness, "0: mirror, 1: dull", "", kShare},
         {"transmission", &T::transmission,
-         "share of the light under the surface that goes through: 1 is glass, its colour what it lets "
-         "through; of a cloth, what goes between its threads, as it is",
+         "share of the light that passes through the surface: 1 is glass, which tints the light with its "
+         "colour; for cloth, the share that passes between the threads without a tint",
          "", kShare},
-        {"refraction", &T::refraction, "index of refraction of what light goes through", "", between(1, 3)},
-        {"emission", &T::emission, "colour of the light it gives off"},
-        {"emission_strength", &T::emission_strength, "factor of the emission; 1: as bright as a sunlit white",
-         "", kNotNegative},
-        {"pattern", &T::pattern, "second colour laid over the first"},
-        {"pattern_color", &T::pattern_color, "the pattern's colour"},
+        {"refraction", &T::refraction, "index of refraction of a transmitting material", "", between(1, 3)},
+        {"emission", &T::emission, "colour of the emitted light"},
+        {"emission_strength", &T::emission_strength,
+         "factor of the emission; 1 is as bright as a white surface in sunlight", "", kNotNegative},
+        {"pattern", &T::pattern, "pattern in a second colour over the base colour"},
+        {"pattern_color", &T::pattern_color, "second colour, used by the pattern"},
         {"pattern_scale", &T::pattern_scale, "size of one cell of the pattern", "m", kPositive},
-        {"texture", &T::texture, "image file, multiplies the base colour; empty: none"},
-        {"two_sided", &T::two_sided, "lit and drawn from behind too"},
-        {"fabric", &T::fabric, "look of threads on cloths; left out: that of the cloth's fabric"},
-        {"restitution", &T::restitution, "bounciness; of two the larger counts", "", kShare},
+        {"texture", &T::texture, "image file that multiplies the base colour; empty: none"},
+        {"two_sided", &T::two_sided, "back faces are lit and drawn as well"},
+        {"fabric", &T::fabric, "appearance of the threads on cloths; default: that of the cloth's fabric"},
+        {"restitution", &T::restitution,
+         "coefficient of restitution; of two materials the larger value is used", "", kShare},
         {"friction", &T::friction,
-         "Coulomb's coefficient of what slides; of two the geometric mean counts, as of the next two", "",
-         kNotNegative},
+         "coefficient of dynamic friction; of two materials the geometric mean is used, as for the next two "
+         "keys",
+         "", kNotNegative},
         {"static_friction", &T::static_friction,
-         "the same of what does not slide, between bodies; left out: `friction`", "", kNotNegative},
+         "coefficient of static friction between bodies; default: `friction`", "", kNotNegative},
         {"cross_friction", &T::cross_friction,
-         "the same of sliding across the `friction_axis` of a body, which `friction` must then not be 0 "
-         "along; "
-         "left out: `friction`",
+         "coefficient of dynamic friction across the `friction_axis` of a body; needs a `friction` above 0; "
+         "default: `friction`",
          "", kNotNegative},
     };
   }
@@ -107,19 +110,21 @@ template <>
 struct Table<ContactRule> {
   static constexpr const char* kName = "contact";
   static constexpr const char* kHelp =
-      "What bodies of two materials do to each other, in place of what would follow from each material.";
+      "Contact behaviour of two materials, used instead of the values that follow from each material.";
   static Fields<ContactRule> fields() {
     using T = ContactRule;
     return {
         {"materials", &T::materials, "names of two materials, in any order; may be the same", kRequired},
-        {"restitution", &T::restitution, "bounciness; left out: by the materials", "", kShare},
+        {"restitution", &T::restitution, "coefficient of restitution; default: from the materials", "",
+         kShare},
         {"friction", &T::friction,
-         "Coulomb's coefficient of what slides, along a grain if there is one, and across it in the same "
-         "proportion as by the materials; left out: by the materials",
+         "coefficient of dynamic friction, along the friction axis if there is one; across it, the ratio "
+         "given by the materials applies; default: from the materials",
          "", kNotNegative},
         {"static_friction", &T::static_friction,
-         "of what does not slide; left out: `friction` if that is given, else by the materials", "",
-         kNotNegative},
+         "coefficient of static friction; default: `friction` of this rule if given, or else from the "
+         "materials",
+         "", kNotNegative},
     };
   }
 };
@@ -143,10 +148,10 @@ struct Table<sim::Box> {
 template <>
 struct Table<sim::Capsule> {
   static constexpr const char* kName = "capsule";
-  static constexpr const char* kHelp = "A cylinder along y with half a sphere on each end.";
+  static constexpr const char* kHelp = "A cylinder along y with a hemisphere on each end.";
   static Fields<sim::Capsule> fields() {
     return {{"radius", &sim::Capsule::radius, "radius", "m", kPositive},
-            {"height", &sim::Capsule::height, "distance between the centres of the half spheres", "m",
+            {"height", &sim::Capsule::height, "distance between the centres of the hemispheres", "m",
              kNotNegative}};
   }
 };
@@ -171,26 +176,28 @@ struct Table<sim::Cone> {
 template <>
 struct Table<sim::Plane> {
   static constexpr const char* kName = "plane";
-  static constexpr const char* kHelp = "Everything below y = 0 of the body's frame; not for dynamic bodies.";
+  static constexpr const char* kHelp =
+      "The half-space below y = 0 of the body's frame; not for dynamic bodies.";
   static Fields<sim::Plane> fields() { return {}; }
 };
 template <>
 struct Table<MeshFile> {
   static constexpr const char* kName = "mesh";
-  static constexpr const char* kHelp = "A model file as a shape: its triangles collide and give the mass.";
+  static constexpr const char* kHelp =
+      "A model file as a collision shape: its triangles collide and determine the mass.";
   static Fields<MeshFile> fields() {
     return {{"file", &MeshFile::file,
-             "model file relative to the scene, or the name of one that comes with offstage; FILE#NODE is "
-             "one of its nodes",
+             "model file relative to the scene, or the name of a model that comes with offstage; FILE#NODE "
+             "selects one node",
              kRequired},
-            {"scale", &MeshFile::scale, "factor of its size", "", kScale}};
+            {"scale", &MeshFile::scale, "scale factor of the model", "", kScale}};
   }
 };
 template <>
 struct Tags<Shape> {
   static constexpr const char* kName = "shape";
   static constexpr const char* kHelp =
-      "What a body is like to collide with, and to look at unless it has a `model`.";
+      "Collision shape of a body, which is also drawn unless the body has a `model`.";
   static constexpr std::array kTags = {"sphere", "box", "capsule", "cylinder", "cone", "plane", "mesh"};
   static constexpr bool kRequired = true;
 };
@@ -201,39 +208,38 @@ template <>
 struct Table<Repeat> {
   static constexpr const char* kName = "repeat";
   static constexpr const char* kHelp =
-      "Copies in a row or a ring: copy i is turned by i * turn_deg about the vertical through `pivot`, then "
-      "moved by "
-      "i * offset.";
+      "Copies in a row or a ring: copy i is turned by i * turn_deg about the vertical axis through `pivot`, "
+      "then moved by i * offset.";
   static Fields<Repeat> fields() {
-    return {{"count", &Repeat::count, "copies, the original included", "", between(1, kMaxCopies)},
-            {"offset", &Repeat::offset, "from one copy to the next", "m"},
-            {"turn_deg", &Repeat::turn_deg, "from one copy to the next", "degrees"},
-            {"pivot", &Repeat::pivot, "a point of the vertical that copies turn about", "m"}};
+    return {{"count", &Repeat::count, "number of copies, including the original", "", between(1, kMaxCopies)},
+            {"offset", &Repeat::offset, "displacement from one copy to the next", "m"},
+            {"turn_deg", &Repeat::turn_deg, "rotation from one copy to the next", "degrees"},
+            {"pivot", &Repeat::pivot, "a point of the vertical axis that copies turn about", "m"}};
   }
 };
 template <>
 struct Table<Grid> {
   static constexpr const char* kName = "grid";
   static constexpr const char* kHelp =
-      "Copies on a grid, centred on the original in x and z, upwards from it in y.";
+      "Copies on a grid, centred on the original in x and z, and upwards from it in y.";
   static Fields<Grid> fields() {
-    return {{"count", &Grid::count, "copies along x, y and z", "", between(1, kMaxCopies)},
-            {"spacing", &Grid::spacing, "between neighbours along x, y and z", "m"}};
+    return {{"count", &Grid::count, "number of copies along x, y and z", "", between(1, kMaxCopies)},
+            {"spacing", &Grid::spacing, "distance between neighbours along x, y and z", "m"}};
   }
 };
 template <>
 struct Table<Scatter> {
   static constexpr const char* kName = "scatter";
   static constexpr const char* kHelp =
-      "Copies at random places of a level rectangle centred on the original.";
+      "Copies at random places in a horizontal rectangle centred on the original.";
   static Fields<Scatter> fields() {
-    return {{"count", &Scatter::count, "copies", "", between(1, kMaxCopies)},
-            {"size", &Scatter::size, "of the rectangle along x and z", "m", kNotNegative},
-            {"min_distance", &Scatter::min_distance, "between copies; those that find no place are left out",
-             "m", kNotNegative},
-            {"turn", &Scatter::turn, "turn each copy about its vertical at random"},
-            {"scale", &Scatter::scale, "factor of the size of a body's shape and model", "", kScale},
-            {"seed", &Scatter::seed, "another seed, another arrangement", "", kNotNegative}};
+    return {{"count", &Scatter::count, "number of copies", "", between(1, kMaxCopies)},
+            {"size", &Scatter::size, "size of the rectangle along x and z", "m", kNotNegative},
+            {"min_distance", &Scatter::min_distance,
+             "least distance between copies; a copy that finds no place is omitted", "m", kNotNegative},
+            {"turn", &Scatter::turn, "each copy is turned about its vertical axis by a random angle"},
+            {"scale", &Scatter::scale, "scale factor of a body's shape and model", "", kScale},
+            {"seed", &Scatter::seed, "another seed gives another arrangement", "", kNotNegative}};
   }
 };
 template <>
@@ -257,9 +263,9 @@ struct Table<ModelLook> {
   static constexpr const char* kHelp = "A model file drawn instead of the body's shape.";
   static Fields<ModelLook> fields() {
     return {{"file", &ModelLook::file, "model file", kRequired},
-            {"scale", &ModelLook::scale, "factor of its size", "", kScale},
-            {"position", &ModelLook::position, "of the model's origin in the body's frame", "m"},
-            {"orientation", &ModelLook::orientation, "of the model in the body's frame"}};
+            {"scale", &ModelLook::scale, "scale factor of the model", "", kScale},
+            {"position", &ModelLook::position, "position of the model's origin in the body's frame", "m"},
+            {"orientation", &ModelLook::orientation, "orientation of the model in the body's frame"}};
   }
 };
 template <>
@@ -267,10 +273,13 @@ struct Table<BodyKey> {
   static constexpr const char* kName = "body_key";
   static constexpr const char* kHelp = "A pose of a kinematic body at a time.";
   static Fields<BodyKey> fields() {
-    return {{"time", &BodyKey::time, "when; times must increase", "s"},
-            {"position", &BodyKey::position, "where; left out: the body's own", "m"},
-            {"orientation", &BodyKey::orientation, "how it is turned; left out: the body's own"},
-            {"interpolation", &BodyKey::interpolation, "from this key to the next; left out: the body's"}};
+    return {{"time", &BodyKey::time, "time of the key; times must increase", "s"},
+            {"position", &BodyKey::position,
+             "position of the body at this key; default: the body's `position`", "m"},
+            {"orientation", &BodyKey::orientation,
+             "orientation of the body at this key; default: the body's `orientation`"},
+            {"interpolation", &BodyKey::interpolation,
+             "interpolation from this key to the next; default: that of the body"}};
   }
 };
 template <>
@@ -280,33 +289,35 @@ struct Table<Body> {
   static Fields<Body> fields() {
     using T = Body;
     return Fields<T>{
-        {"name", &T::name, "unique; empty: body_ and its index"},
-        {"motion", &T::motion, "never moves, follows its keyframes and spin, or is moved by forces"},
-        {"shape", &T::shape, "what it collides with"},
+        {"name", &T::name, "unique name; empty: body_ and its index"},
+        {"motion", &T::motion,
+         "`static` bodies never move, `kinematic` bodies follow their keyframes and spin, `dynamic` bodies "
+         "are moved by forces"},
+        {"shape", &T::shape, "collision shape"},
         {"model", &T::model, "model file drawn instead of the shape"},
-        {"material", &T::material, "name of a material; empty: grey, or the model file's own"},
-        {"position", &T::position, "of the body's origin at time 0", "m"},
-        {"orientation", &T::orientation, "of the body's axes at time 0"},
-        {"velocity", &T::velocity, "of the centre of mass at time 0; dynamic bodies only", "m/s"},
-        {"angular_velocity", &T::angular_velocity, "about the world's axes at time 0; dynamic bodies only",
-         "rad/s"},
-        {"density", &T::density, "gives the mass, unless `mass` does", "kg/m^3", kPositive},
-        {"mass", &T::mass, "of a dynamic body; 0: from density and volume", "kg", kNotNegative},
-        {"linear_drag", &T::linear_drag, "force against the air per speed", "kg/s", kNotNegative},
-        {"angular_drag", &T::angular_drag, "torque against rotation per angular speed", "kg m^2/s",
-         kNotNegative},
+        {"material", &T::material, "name of a material; empty: grey, or the materials of the model file"},
+        {"position", &T::position, "position of the body's origin at time 0", "m"},
+        {"orientation", &T::orientation, "orientation of the body at time 0"},
+        {"velocity", &T::velocity, "velocity of the centre of mass at time 0; dynamic bodies only", "m/s"},
+        {"angular_velocity", &T::angular_velocity,
+         "angular velocity at time 0, in world axes; dynamic bodies only", "rad/s"},
+        {"density", &T::density, "density; determines the mass unless `mass` is given", "kg/m^3", kPositive},
+        {"mass", &T::mass, "mass of a dynamic body; 0: computed from density and volume", "kg", kNotNegative},
+        {"linear_drag", &T::linear_drag, "drag force per speed relative to the air", "kg/s", kNotNegative},
+        {"angular_drag", &T::angular_drag, "drag torque per angular speed", "kg m^2/s", kNotNegative},
         {"friction_axis", &T::friction_axis,
-         "direction of the surface's grain in the body's frame, along which `friction` counts and across it "
-         "the material's `cross_friction`; zero: none; of two bodies the grain of the first one counts"},
+         "direction in the body's frame along which the material's `friction` applies; across it, "
+         "`cross_friction` applies; zero: friction is the same in all directions. If both bodies of a "
+         "contact have an axis, that of the body that comes first in the scene is used"},
         {"surface_velocity", &T::surface_velocity,
-         "of the surface against the body, as of a conveyor belt; in the body's frame", "m/s"},
+         "velocity of the surface relative to the body, as on a conveyor belt; in the body's frame", "m/s"},
         {"collides", &T::collides, "takes part in collisions"},
         {"visible", &T::visible, "is drawn"},
-        {"casts_shadow", &T::casts_shadow, "throws a shadow"},
+        {"casts_shadow", &T::casts_shadow, "casts a shadow"},
         {"keyframes", &T::keyframes, "poses over time; kinematic bodies only"},
         {"interpolation", &T::interpolation, kInterpolationHelp},
-        {"loop", &T::loop, "repeat the keyframes for ever; else hold the last"},
-        {"spin", &T::spin, "constant rotation about the body's own axes; kinematic bodies only", "rad/s"},
+        {"loop", &T::loop, "repeats the keyframes; otherwise the last pose is held"},
+        {"spin", &T::spin, "constant angular velocity in the body's axes; kinematic bodies only", "rad/s"},
     }
         .with(&T::placement);
   }
@@ -317,12 +328,12 @@ struct Table<Body> {
 template <>
 struct Table<SpringEnd> {
   static constexpr const char* kName = "spring_end";
-  static constexpr const char* kHelp = "A point of the world, of a body, or a particle of a group.";
+  static constexpr const char* kHelp = "A point of the world or of a body, or a particle of a group.";
   static Fields<SpringEnd> fields() {
     return {{"body", &SpringEnd::body, "name of a body; empty: none"},
             {"particles", &SpringEnd::particles, "name of a particle group; empty: none"},
-            {"index", &SpringEnd::index, "of the particle in its group", "", between(0, 1e9)},
-            {"position", &SpringEnd::position, "in the body's frame, or in the world", "m"}};
+            {"index", &SpringEnd::index, "index of the particle in its group", "", between(0, 1e9)},
+            {"position", &SpringEnd::position, "position in the body's frame, or in the world", "m"}};
   }
 };
 template <>
@@ -332,7 +343,7 @@ struct Table<Spring> {
   static Fields<Spring> fields() {
     using T = Spring;
     return {
-        {"name", &T::name, "unique; empty: spring_ and its index"},
+        {"name", &T::name, "unique name; empty: spring_ and its index"},
         {"a", &T::a, "one end"},
         {"b", &T::b, "the other end"},
         {"stiffness", &T::stiffness, "force per extension", "N/m", kNotNegative},
@@ -340,8 +351,8 @@ struct Table<Spring> {
         {"rest_length", &T::rest_length, "length without force; negative: the distance of the ends at time 0",
          "m"},
         {"visible", &T::visible, "is drawn as a rod"},
-        {"radius", &T::radius, "of the rod", "m", kPositive},
-        {"material", &T::material, "of the rod, by name; empty: grey"},
+        {"radius", &T::radius, "radius of the rod", "m", kPositive},
+        {"material", &T::material, "name of the rod's material; empty: grey"},
     };
   }
 };

@@ -175,8 +175,8 @@ struct AxisAngle {
   Real angle_deg = 0;
 };
 
-const Spec kAxis{"axis", "direction of the axis", "", kDirection, true};
-const Spec kAngle{"angle_deg", "angle about it", "degrees", {}, true};
+const Spec kAxis{"axis", "direction of the rotation axis", "", kDirection, true};
+const Spec kAngle{"angle_deg", "angle of rotation about the axis", "degrees", {}, true};
 
 Quat to_quat(const AxisAngle& turn) {
   const auto [sin, cos] = effects::sincos(turn.angle_deg * (std::numbers::pi / 360));

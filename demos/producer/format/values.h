@@ -85,9 +85,7 @@ struct Names<sim::Interpolation> {
   static constexpr std::array kNames = {"monotone", "smooth", "linear", "step"};
 };
 inline constexpr const char* kInterpolationHelp =
-    "between keys: `monotone` is a smooth curve of which each component stays between the values of its two "
-    "keys, and holds where these are equal; `smooth` (Catmull-Rom) is rounder and may swing beyond them; "
-    "`linear` has a constant velocity; `step` holds, and jumps at the next key";
+    "interpolation between keys: `monotone` is a smooth curve that never overshoots, and stays constant where two keys are equal; `smooth` (Catmull-Rom) is rounder and may overshoot; `linear` has a constant velocity; `step` holds each value until the next key";
 
 Description describe_vector(Description item, int size, bool nonzero);
 

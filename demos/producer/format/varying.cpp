@@ -24,7 +24,7 @@ struct NormalSpecs {
         deviation{"deviation", "standard deviation", of.unit, kNotNegative},
         min{"min", "smallest value", of.unit, of.limits},
         max{"max", "largest value", of.unit, of.limits},
-        clip{"clip", "cut off at mean - deviation and mean + deviation", "", {}} {}
+        clip{"clip", "truncate the distribution at mean - deviation and mean + deviation", "", {}} {}
 
   std::array<const Spec*, 5> all() const { return {&mean, &deviation, &min, &max, &clip}; }
 };
@@ -54,7 +54,7 @@ Uniform read_uniform(Reader& in, const Node& node, const Spec& spec) {
   Eigen::Vector2d ends(0, 0);
   in.keys(node, "range", std::array{&range}, false, [&](std::size_t, const Node& value) {
     Codec<Eigen::Vector2d>::read(in, value, range, ends);
-    if (ends[0] > ends[1]) in.fail(value.at, "must go from the smaller to the larger value");
+    if (ends[0] > ends[1]) in.fail(value.at, "must have the smaller value first");
   });
   return {ends[0], ends[1]};
 }

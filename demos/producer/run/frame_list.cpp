@@ -63,7 +63,8 @@ std::vector<int> parse_frames(const std::string& text, int count) {
         if (!every || *every < 1) refuse(item);
         step = *every;
       }
-      if (b < a) throw std::invalid_argument(fmt::format("frames: '{}' runs backwards", item));
+      if (b < a)
+        throw std::invalid_argument(fmt::format("frames: the range '{}' ends before it starts", item));
     }
     if (!part.empty()) refuse(item);
     for (int k = a; k <= b; k += step) frames.insert(k);

@@ -44,7 +44,7 @@ std::string usual_pattern(const fs::path& folder) {
 
 fs::path checked_pattern(const std::string& text) {
   if (const std::string meant = hash_pattern(text); !meant.empty())
-    throw OutputError(text + ": the numbers of frames are written as #; did you mean '" + meant + "'?");
+    throw OutputError(text + ": write the frame number as #; did you mean '" + meant + "'?");
   if (text.ends_with('/') || fs::is_directory(text)) return fs::path(text) / "####.png";
   const fs::path path = text;
   if (path.extension() != ".png")
@@ -53,7 +53,7 @@ fs::path checked_pattern(const std::string& text) {
   if (name.find('#') == std::string::npos) {
     const std::string pattern = name.find('*') != std::string::npos ? "####.png" : pattern_of(name);
     throw OutputError(
-        fmt::format("{}: the numbers of frames are written as #; {} '{}'{}", text,
+        fmt::format("{}: write the frame number as #; {} '{}'{}", text,
                     pattern.empty() ? "give a pattern such as" : "did you mean",
                     pattern.empty() ? "frames/####.png" : (path.parent_path() / pattern).string(),
                     pattern.empty() ? "" : "?"));
@@ -79,7 +79,7 @@ PngHead read_png_head(const fs::path& path) {
   };
   const int width = number(16), height = number(20);
   if (!is_whole_png(path, width, height))
-    throw render::FileError(path.string() + ": is not a whole PNG file");
+    throw render::FileError(path.string() + ": is not a complete PNG file");
   constexpr int kPalette = 3;  // may have a table of alpha
   const int kind = head[25];
   return {width, height, (kind & 4) != 0 || kind == kPalette};
@@ -91,11 +91,10 @@ void check_gaps(const FrameSequence& sequence) {
     if (frames[i].number == frames[i - 1].number + 1) continue;
     const std::string missing = render::frame_path(sequence.pattern, frames[i - 1].number + 1).string();
     const int more = sequence.left_out - 1;
-    throw render::FileError(
-        fmt::format("{}: frame {} is missing{}; the frames go from {} to {}. --allow-gaps "
-                    "leaves out what is missing",
-                    missing, frames[i - 1].number + 1, more > 0 ? fmt::format(" (and {} more)", more) : "",
-                    frames.front().number, frames.back().number));
+    throw render::FileError(fmt::format(
+        "{}: frame {} is missing{}; the frames go from {} to {}. Skip missing frames with --allow-gaps",
+        missing, frames[i - 1].number + 1, more > 0 ? fmt::format(" (and {} more)", more) : "",
+        frames.front().number, frames.back().number));
   }
 }
 
@@ -112,7 +111,7 @@ FrameSequence find_sequence(const std::string& text, bool allow_gaps) {
   if (sequence.frames.empty()) {
     const std::string usual = usual_pattern(folder);
     throw render::FileError(fmt::format(
-        "{}: no file fits this pattern{}", sequence.pattern.string(),
+        "{}: no file matches this pattern{}", sequence.pattern.string(),
         usual.empty() ? "" : "; did you mean '" + (sequence.pattern.parent_path() / usual).string() + "'?"));
   }
   std::ranges::sort(sequence.frames, {}, &SequenceFrame::number);

@@ -92,10 +92,10 @@ std::string judge_frame(const GoldenFrame& expected, const GoldenFrame& actual, 
   }
   const render::ImageDifference d = render::difference(expected.image, actual.image);
   const std::string amount =
-      fmt::format("{} pixels ({:.3f} %) off by more than 2 steps, largest {}, mean {:.4f}", d.pixels_over,
-                  100 * d.fraction_over, d.max_delta, d.mean_delta);
+      fmt::format("{} pixels ({:.3f} %) differ by more than 2 of 255, largest difference {}, mean {:.4f}",
+                  d.pixels_over, 100 * d.fraction_over, d.max_delta, d.mean_delta);
   const std::string cause =
-      same_state ? "the state is the same, so it is the renderer" : "the simulation's state differs";
+      same_state ? "the simulated state is the same; the renderer differs" : "the simulated state differs";
   const bool ok = !same_class && d.within_tolerance();
   pass = pass && ok;
   return fmt::format("{}: {}; {}", ok ? "within tolerance (another machine class)" : "DIFFERENT", cause,
@@ -139,8 +139,8 @@ GoldenPlace find_golden(const fs::path& folder, const LoadedScene& scene, const 
     place.name = name;
     return place;
   }
-  throw render::FileError(folder.string() + ": every name for a golden of " + scene_file.string() +
-                          " is taken");
+  throw render::FileError(folder.string() + ": all names for a golden of " + scene_file.string() +
+                          " are in use");
 }
 
 Golden draw_golden(const LoadedScene& scene, int threads, const GoldenStates& states,
@@ -169,7 +169,7 @@ Golden draw_golden(const LoadedScene& scene, int threads, const GoldenStates& st
 Golden read_golden(const fs::path& folder, const std::string& name) {
   const fs::path path = folder / (name + ".json");
   const std::optional<JsonObject> json = read_json_file(path);
-  if (!json || !json->has("frames")) throw render::FileError(path.string() + ": not a golden");
+  if (!json || !json->has("frames")) throw render::FileError(path.string() + ": is not a golden");
   Golden golden{.scene = name,
                 .source = json->text("source"),
                 .reason = json->text("reason"),
@@ -208,16 +208,17 @@ Verdict judge(const Golden& expected, const Golden& actual) {
   Verdict verdict;
   const bool same_class = expected.fingerprint == actual.fingerprint;
   if (!same_class)
-    verdict.text += fmt::format("made on:  {}\nthis is:  {}\n", expected.fingerprint, actual.fingerprint);
+    verdict.text +=
+        fmt::format("recorded on:  {}\nthis machine: {}\n", expected.fingerprint, actual.fingerprint);
   if (expected.frames.size() != actual.frames.size()) {
     verdict.pass = false;
-    verdict.text += "the golden has other frames: the scene's length changed\n";
+    verdict.text += "the golden has other frames, because the length of the scene changed\n";
     return verdict;
   }
   for (std::size_t i = 0; i < expected.frames.size(); ++i) {
     if (expected.frames[i].frame != actual.frames[i].frame) {
       verdict.pass = false;
-      verdict.text += "the golden has other frames: the scene's length changed\n";
+      verdict.text += "the golden has other frames, because the length of the scene changed\n";
       return verdict;
     }
     verdict.text += fmt::format("{} frame {}: {}\n", actual.scene, actual.frames[i].frame,

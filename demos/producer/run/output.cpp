@@ -103,7 +103,7 @@ OutputTarget parse_output(const std::string& out) {
   if (out.ends_with('/') || fs::is_directory(path, error)) return {OutputKind::frames, path / "####.png"};
   const std::string ending = path.extension().string();
   if (const std::string meant = hash_pattern(out); !meant.empty() && (ending.empty() || ending == ".png"))
-    throw OutputError(out + ": the numbers of frames are written as #; did you mean '" + meant + "'?");
+    throw OutputError(out + ": write the frame number as #; did you mean '" + meant + "'?");
   if (path.filename().string().find('#') != std::string::npos) {
     if (ending != ".png")
       throw OutputError(out + ": frames are PNG files; give a pattern such as frames/####.png");
@@ -198,7 +198,7 @@ FrameFolder prepare_frames(const fs::path& pattern, const ChannelFiles& channels
   const fs::path manifest_path = folder / kManifestName;
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error) throw render::FileError(folder.string() + ": cannot make the folder: " + error.message());
+  if (error) throw render::FileError(folder.string() + ": cannot create the folder: " + error.message());
 
   const bool is_part = static_cast<int>(frames.size()) < manifest.frames;
   FrameFolder result;
@@ -214,10 +214,9 @@ FrameFolder prepare_frames(const fs::path& pattern, const ChannelFiles& channels
   const bool same_settings =
       is_ours(old, pattern, manifest);  // without a manifest nobody knows what frames there are
   if (!same_settings && existing != Existing::replace && fs::exists(manifest_path, error))
-    throw OutputError(
-        folder.string() +
-        ": holds frames of another scene or other settings; choose another folder, or replace them "
-        "with --force");
+    throw OutputError(folder.string() +
+                      ": contains frames of another scene or other settings; choose another folder, or "
+                      "replace them with --force");
 
   std::set<int> kept;
   for (const int frame : frames) {
@@ -226,7 +225,7 @@ FrameFolder prepare_frames(const fs::path& pattern, const ChannelFiles& channels
     if (found == Found::nothing) continue;
     if (existing == Existing::refuse)
       throw OutputError(path.string() +
-                        ": exists already; keep finished frames with --resume, or replace them with --force");
+                        ": already exists; keep finished frames with --resume, or replace them with --force");
     if (existing == Existing::keep && !same_settings && found == Found::other)
       throw OutputError(path.string() + ": is not a frame of this film; replace it with --force");
     const bool has_channels =
@@ -268,9 +267,9 @@ void prepare_channels(const fs::path& folder, bool replace) {
   if (replace) remove_channels(folder);
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error) throw render::FileError(folder.string() + ": cannot make the folder: " + error.message());
+  if (error) throw render::FileError(folder.string() + ": cannot create the folder: " + error.message());
   if (!replace && !fs::is_empty(folder))
-    throw OutputError(folder.string() + ": holds channels already; replace them with --force");
+    throw OutputError(folder.string() + ": already contains channels; replace them with --force");
 }
 
 }  // namespace offstage::producer

@@ -18,7 +18,7 @@
 namespace offstage::producer {
 
 /// A frame to draw. Snapshots are immutable and each serves two neighbouring frames, hence shared.
-struct Shot {
+struct FrameJob {
   int index = 0;  // in the list of frames
   int frame = 0;
   std::shared_ptr<const Snapshot> previous, current;
@@ -27,61 +27,61 @@ struct Shot {
   std::optional<sim::Energy> energy;  // without a cache
 };
 
-struct Print {
-  Shot shot;
+struct RenderedFrame {
+  FrameJob frame_job;
   render::Image image;
   double render_ms = 0;
   render::Channels channels;  // empty unless asked for
 };
 
-/// Hands shots to the drawing threads and brings the finished frames back in order. At most `window` frames
+/// Hands frames to the drawing threads and brings the finished frames back in order. At most `window` frames
 /// are between the simulation and the sink, so memory is bounded. The first failure ends everything.
 class Pipeline {
  public:
   explicit Pipeline(int window) : window_(window) {}
 
   /// Waits for room; false when the run has failed.
-  bool push(Shot shot) {
+  bool push(FrameJob frame_job) {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return failure_ || shot.index < next_print_ + window_; });
+    changed_.wait(lock, [&] { return failure_ || frame_job.index < next_rendered_ + window_; });
     if (failure_) return false;
-    shots_.push_back(std::move(shot));
+    jobs_.push_back(std::move(frame_job));
     changed_.notify_all();
     return true;
   }
-  void no_more_shots() {
+  void no_more_jobs() {
     const std::lock_guard lock(mutex_);
-    all_shot_ = true;
+    all_produced_ = true;
     changed_.notify_all();
   }
-  std::optional<Shot> take_shot() {
+  std::optional<FrameJob> take_job() {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return failure_ || all_shot_ || !shots_.empty(); });
-    if (failure_ || shots_.empty()) return std::nullopt;
-    Shot shot = std::move(shots_.front());
-    shots_.pop_front();
+    changed_.wait(lock, [&] { return failure_ || all_produced_ || !jobs_.empty(); });
+    if (failure_ || jobs_.empty()) return std::nullopt;
+    FrameJob frame_job = std::move(jobs_.front());
+    jobs_.pop_front();
     ++drawing_;
-    return shot;
+    return frame_job;
   }
-  void give_print(Print print) {
+  void give_rendered(RenderedFrame rendered) {
     const std::lock_guard lock(mutex_);
     --drawing_;
-    const int index = print.shot.index;
-    prints_.emplace(index, std::move(print));
+    const int index = rendered.frame_job.index;
+    rendered_.emplace(index, std::move(rendered));
     changed_.notify_all();
   }
   /// The next finished frame in order; none when all are through or the run has failed.
-  std::optional<Print> take_print() {
+  std::optional<RenderedFrame> take_rendered() {
     std::unique_lock lock(mutex_);
-    const auto ready = [&] { return !prints_.empty() && prints_.begin()->first == next_print_; };
+    const auto ready = [&] { return !rendered_.empty() && rendered_.begin()->first == next_rendered_; };
     changed_.wait(lock,
-                  [&] { return failure_ || ready() || (all_shot_ && shots_.empty() && drawing_ == 0); });
+                  [&] { return failure_ || ready() || (all_produced_ && jobs_.empty() && drawing_ == 0); });
     if (failure_ || !ready()) return std::nullopt;
-    Print print = std::move(prints_.begin()->second);
-    prints_.erase(prints_.begin());
-    ++next_print_;
+    RenderedFrame rendered = std::move(rendered_.begin()->second);
+    rendered_.erase(rendered_.begin());
+    ++next_rendered_;
     changed_.notify_all();
-    return print;
+    return rendered;
   }
   void fail(std::exception_ptr error) {
     const std::lock_guard lock(mutex_);
@@ -101,10 +101,10 @@ class Pipeline {
   const int window_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<Shot> shots_;
-  std::map<int, Print> prints_;
-  int next_print_ = 0, drawing_ = 0;
-  bool all_shot_ = false;
+  std::deque<FrameJob> jobs_;
+  std::map<int, RenderedFrame> rendered_;
+  int next_rendered_ = 0, drawing_ = 0;
+  bool all_produced_ = false;
   std::exception_ptr failure_;
 };
 

@@ -95,7 +95,7 @@ class SnapshotSource {
   /// The state at a frame, or an earlier one if `stop` said so on the way; asked for in ascending order.
   virtual Snapshot at(int frame, const std::function<bool()>& stop) = 0;
   /// Adds what is known besides of the latest state.
-  virtual void describe(Shot&) const {}
+  virtual void describe(FrameJob&) const {}
 };
 
 class LiveSource : public SnapshotSource {
@@ -112,9 +112,9 @@ class LiveSource : public SnapshotSource {
     if (kept_) kept_->write(snapshot);
     return snapshot;
   }
-  void describe(Shot& shot) const override {
-    shot.contacts = simulation_.world().contacts().size();
-    shot.energy = simulation_.world().energy();
+  void describe(FrameJob& frame_job) const override {
+    frame_job.contacts = simulation_.world().contacts().size();
+    frame_job.energy = simulation_.world().energy();
   }
 
  private:
@@ -139,35 +139,35 @@ bool is_blank(const render::Image& image) {
   return true;
 }
 
-void draw_shots(Pipeline& pipeline, const Scene& scene, const ModelLibrary& models, bool channels) {
+void draw_frames(Pipeline& pipeline, const Scene& scene, const ModelLibrary& models, bool channels) {
   render::Context context;
   Picture picture(scene, models, context);
-  while (auto shot = pipeline.take_shot()) {
+  while (auto frame_job = pipeline.take_job()) {
     const auto start = Clock::now();
-    render::Image image = picture.draw(*shot->previous, *shot->current);
+    render::Image image = picture.draw(*frame_job->previous, *frame_job->current);
     render::Channels data;
-    if (channels) data = picture.channels(*shot->previous, *shot->current);
-    pipeline.give_print({std::move(*shot), std::move(image), ms_since(start), std::move(data)});
+    if (channels) data = picture.channels(*frame_job->previous, *frame_job->current);
+    pipeline.give_rendered({std::move(*frame_job), std::move(image), ms_since(start), std::move(data)});
   }
 }
 
 /// Keeps what a report shows of a frame.
-void keep_frame(const Print& print, double encode_ms, int total, RunStats& stats) {
+void keep_frame(const RenderedFrame& rendered, double encode_ms, int total, RunStats& stats) {
   constexpr int kPictures = 12, kWidth_px = 320;
-  const Snapshot& state = *print.shot.current;
-  stats.figures.push_back({.frame = print.shot.frame,
+  const Snapshot& state = *rendered.frame_job.current;
+  stats.figures.push_back({.frame = rendered.frame_job.frame,
                            .time = state.time,
-                           .sim_ms = print.shot.sim_ms,
-                           .render_ms = print.render_ms,
+                           .sim_ms = rendered.frame_job.sim_ms,
+                           .render_ms = rendered.render_ms,
                            .encode_ms = encode_ms,
                            .particles = state.point_count(),
-                           .contacts = print.shot.contacts,
-                           .energy = print.shot.energy,
+                           .contacts = rendered.frame_job.contacts,
+                           .energy = rendered.frame_job.energy,
                            .state_hash = state.state_hash.hex(),
-                           .pixel_hash = render::pixel_hash(print.image)});
+                           .pixel_hash = render::pixel_hash(rendered.image)});
   const int every = std::max(1, (total + kPictures - 1) / kPictures);
-  if (print.shot.index % every == 0)
-    stats.pictures.emplace_back(print.shot.frame, render::reduced(print.image, kWidth_px));
+  if (rendered.frame_job.index % every == 0)
+    stats.pictures.emplace_back(rendered.frame_job.frame, render::reduced(rendered.image, kWidth_px));
 }
 
 void print_frames(Pipeline& pipeline, render::FrameSink& sink, const Scene& scene, const RenderJob& job,
@@ -175,31 +175,31 @@ void print_frames(Pipeline& pipeline, render::FrameSink& sink, const Scene& scen
   const auto total = static_cast<int>(job.frames.size());
   const bool numbered = job.channels_stem.filename().string().find('#') != std::string::npos;
   const render::ObjectNames objects = object_names(scene);
-  while (auto print = pipeline.take_print()) {
+  while (auto rendered = pipeline.take_rendered()) {
     const auto encode_start = Clock::now();
-    sink.write(print->shot.frame, print->image);
+    sink.write(rendered->frame_job.frame, rendered->image);
     if (job.channels.any())
       render::write_channels(
-          numbered ? render::frame_path(job.channels_stem, print->shot.frame) : job.channels_stem,
-          print->channels, job.channels, objects);
+          numbered ? render::frame_path(job.channels_stem, rendered->frame_job.frame) : job.channels_stem,
+          rendered->channels, job.channels, objects);
     const double encode_ms = ms_since(encode_start);
     if (stats.frames++ == 0) stats.startup_s = process_age_s();
-    stats.sim.add(print->shot.sim_ms);
-    stats.render.add(print->render_ms);
+    stats.sim.add(rendered->frame_job.sim_ms);
+    stats.render.add(rendered->render_ms);
     stats.encode.add(encode_ms);
-    const Snapshot& state = *print->shot.current;
+    const Snapshot& state = *rendered->frame_job.current;
     stats.particles = state.point_count();
     stats.most_particles = std::max(stats.most_particles, stats.particles);
-    stats.state_hash = stats.frame_states[print->shot.frame] = state.state_hash.hex();
-    if (job.report) keep_frame(*print, encode_ms, total, stats);
-    if (is_blank(print->image)) stats.blank_frames.push_back(print->shot.frame);
-    meter.finished_one(print->shot.sim_ms, print->render_ms, encode_ms, stats.particles);
+    stats.state_hash = stats.frame_states[rendered->frame_job.frame] = state.state_hash.hex();
+    if (job.report) keep_frame(*rendered, encode_ms, total, stats);
+    if (is_blank(rendered->image)) stats.blank_frames.push_back(rendered->frame_job.frame);
+    meter.finished_one(rendered->frame_job.sim_ms, rendered->render_ms, encode_ms, stats.particles);
   }
 }
 
 /// Produces the shots on the calling thread.
-void shoot(Pipeline& pipeline, SnapshotSource& source, const std::vector<int>& frames, bool needs_previous,
-           bool report) {
+void produce_frames(Pipeline& pipeline, SnapshotSource& source, const std::vector<int>& frames,
+                    bool needs_previous, bool report) {
   const auto stop = [&] { return interrupt_signal() != 0 || pipeline.failed(); };
   std::shared_ptr<const Snapshot> last;
   for (std::size_t i = 0; i < frames.size() && !stop(); ++i) {
@@ -214,11 +214,12 @@ void shoot(Pipeline& pipeline, SnapshotSource& source, const std::vector<int>& f
     if (current->frame != frame) break;  // stopped on the way
     if (!previous) previous = current;
     last = current;
-    Shot shot{static_cast<int>(i), frame, std::move(previous), std::move(current), ms_since(start), 0, {}};
-    if (report) source.describe(shot);
-    if (!pipeline.push(std::move(shot))) return;
+    FrameJob frame_job{
+        static_cast<int>(i), frame, std::move(previous), std::move(current), ms_since(start), 0, {}};
+    if (report) source.describe(frame_job);
+    if (!pipeline.push(std::move(frame_job))) return;
   }
-  pipeline.no_more_shots();
+  pipeline.no_more_jobs();
 }
 
 }  // namespace
@@ -262,19 +263,19 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
 
   Pipeline pipeline(job.threads + 2);
   const auto draw = [&] {
-    guarded(pipeline, [&] { draw_shots(pipeline, loaded.scene, models, job.channels.any()); });
+    guarded(pipeline, [&] { draw_frames(pipeline, loaded.scene, models, job.channels.any()); });
   };
   const auto print = [&] {
     guarded(pipeline, [&] { print_frames(pipeline, sink, loaded.scene, job, stats, *meter); });
   };
   {
-    std::vector<std::jthread> crew;
+    std::vector<std::jthread> workers;
     // A thread that cannot be started must fail the run before the others are waited for.
     guarded(pipeline, [&] {
-      for (int i = 0; i < job.threads; ++i) crew.emplace_back(draw);
-      crew.emplace_back(print);
-      shoot(pipeline, *source, job.frames, subframes(loaded.scene.render.quality) > 1 || job.channels.any(),
-            job.report);
+      for (int i = 0; i < job.threads; ++i) workers.emplace_back(draw);
+      workers.emplace_back(print);
+      produce_frames(pipeline, *source, job.frames,
+                     subframes(loaded.scene.render.quality) > 1 || job.channels.any(), job.report);
     });
   }
   pipeline.rethrow_failure();

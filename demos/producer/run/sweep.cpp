@@ -60,13 +60,11 @@ std::optional<std::vector<std::string>> range(const std::string& text, const std
     numbers[i] = *number;
   }
   const auto [first, last, step] = numbers;
-  if (step == 0 || (last - first) * step < 0)
-    refuse_sweep(text, "the step does not lead from the first to the last value");
+  if (step == 0 || (last - first) * step < 0) refuse_sweep(text, "the step does not reach the last value");
   constexpr double kSlack = 1e-9;  // of a step: 0:1:0.1 has 11 values
   const double steps = std::floor((last - first) / step + kSlack);
   if (!(steps < static_cast<double>(kMostCombinations)))
-    refuse_sweep(text,
-                 fmt::format("has {:.0f} values; at most {} runs are made", steps + 1, kMostCombinations));
+    refuse_sweep(text, fmt::format("has {:.0f} values; the limit is {} runs", steps + 1, kMostCombinations));
   std::vector<std::string> all;
   constexpr double kZero = 1e-12;  // of a step: what rounding leaves of 0 in -1:1:0.1
   for (int i = 0; i <= static_cast<int>(steps); ++i) {
@@ -123,7 +121,7 @@ std::vector<std::vector<std::string>> combinations(const std::vector<Variation>&
       }
     all = std::move(longer);
     if (all.size() > kMostCombinations)
-      throw std::invalid_argument(fmt::format("--vary: {} combinations or more; at most {} runs are made",
+      throw std::invalid_argument(fmt::format("--vary: {} combinations or more; the limit is {} runs",
                                               all.size(), kMostCombinations));
   }
   return all;

@@ -32,7 +32,7 @@ struct BoxOnGround {
 
   explicit BoxOnGround(const PairSurface& surface = {})
       : box(make_body(Box{Vec3::Constant(0.2)}, MotionType::dynamic, {Vec3(0, 0.1, 0)})),
-        ground(make_body(Plane{}, MotionType::fixed, {})),
+        ground(make_body(Plane{}, MotionType::static_body, {})),
         pair(*box, *ground, surface) {}
 
   PlacedManifold& find(const Pose& pose, Real reuse = 1e-5) {

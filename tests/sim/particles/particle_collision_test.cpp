@@ -20,7 +20,8 @@ TEST(ParticleCollision, FastParticlesNeverPassAThinPlateOfAnyShape) {
   const std::vector<Shape> plates = {Box{{4, 0.01, 4}}, Cylinder{2.5, 0.01}, MeshShape{mesh},
                                      MeshShape{sheet}, Plane{}};
   for (const Shape& shape : plates) {
-    const auto plate = world.add_body({.shape = shape, .motion = MotionType::fixed, .restitution = 0.5});
+    const auto plate =
+        world.add_body({.shape = shape, .motion = MotionType::static_body, .restitution = 0.5});
     const auto system = world.add_particle_system({});
     const Scatter random{1};
     for (uint64_t i = 0; i < 2000; ++i)
@@ -66,7 +67,7 @@ TEST(ParticleCollision, RestsOnEveryShapeWithoutSinkingOrDrifting) {
   const auto system = world.add_particle_system({});
   for (std::size_t i = 0; i < shapes.size(); ++i) {
     world.add_body({.shape = shapes[i],
-                    .motion = MotionType::fixed,
+                    .motion = MotionType::static_body,
                     .pose = {Vec3(3.0 * Real(i), 0, 0)},
                     .restitution = 0});
     world.add_particle(system, {.position = {3.0 * Real(i) + 0.1, 0.6, 0.05}, .restitution = 0.3});
@@ -88,7 +89,7 @@ TEST(ParticleCollision, CoulombFrictionOnAnIncline) {
     World world;
     const Quat tilt(Eigen::AngleAxisd(angle, Vec3::UnitZ()));
     world.add_body({.shape = Plane{},
-                    .motion = MotionType::fixed,
+                    .motion = MotionType::static_body,
                     .pose = {Vec3::Zero(), tilt},
                     .restitution = 0,
                     .friction = kMu});
@@ -107,10 +108,11 @@ TEST(ParticleCollision, CoulombFrictionOnAnIncline) {
 
 TEST(ParticleCollision, ComesToRestInACornerWithoutTruncatedSweeps) {
   World world({.wind = {3, 0, 3}});
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
   for (const Vec3& n : {Vec3(-1, 0, 0), Vec3(0, 0, -1)})
-    world.add_body(
-        {.shape = Plane{}, .motion = MotionType::fixed, .pose = {-n, rotation_between(Vec3::UnitY(), n)}});
+    world.add_body({.shape = Plane{},
+                    .motion = MotionType::static_body,
+                    .pose = {-n, rotation_between(Vec3::UnitY(), n)}});
   const auto system = world.add_particle_system({.linear_drag = 0.05});
   world.add_particle(system, {.position = {0.5, 0.5, 0.3}, .mass = 0.01, .radius = 0.01, .friction = 0.1});
   for (int i = 0; i < 600; ++i) world.step(kFrame);
@@ -142,7 +144,7 @@ TEST(ParticleCollision, RidesOnATurntableWithoutSlipping) {
 
 TEST(ParticleCollision, IsProjectedOutOfABodyAndCounted) {
   World world({.gravity = Vec3::Zero()});
-  world.add_body({.shape = Box{{2, 1, 2}}, .motion = MotionType::fixed});
+  world.add_body({.shape = Box{{2, 1, 2}}, .motion = MotionType::static_body});
   const auto system = world.add_particle_system({});
   world.add_particle(system, {.position = {0.2, 0.4, 0}, .radius = 0.05});
   const StepReport report = world.step(kFrame);
@@ -155,7 +157,7 @@ TEST(ParticleCollision, IsRemovedAndCountedWhereThereIsNoWayOut) {
   World world({.gravity = Vec3::Zero()});
   for (const Vec3& n : {Vec3(0, 1, 0), Vec3(0, -1, 0)})  // a slot narrower than the particle
     world.add_body({.shape = Plane{},
-                    .motion = MotionType::fixed,
+                    .motion = MotionType::static_body,
                     .pose = {-0.01 * n, rotation_between(Vec3::UnitY(), n)}});
   const auto system = world.add_particle_system({});
   world.add_particle(system, {.radius = 0.05});
@@ -165,7 +167,7 @@ TEST(ParticleCollision, IsRemovedAndCountedWhereThereIsNoWayOut) {
 
 TEST(ParticleCollision, DiesOnItsFirstHitIfToldSo) {
   World world;
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
   const auto system = world.add_particle_system({.dies_on_hit = true});
   world.add_particle(system, {.position = {0, 0.02, 0}});
   world.add_particle(system, {.position = {0, 50, 0}});

@@ -205,7 +205,7 @@ TEST(ParticlePairs, FlagsSayWhichSystemsCollide) {
 // At first, in between, and after all have died; the grid must not remember the places of before.
 TEST(ParticlePairs, SystemsMayBeEmptyAtAnyTime) {
   World world({.gravity = Vec3::Zero(), .max_step = kFilmFrame});
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
   const auto a = world.add_particle_system({.internal = true});
   world.add_particle_system({.external = true});
   EXPECT_EQ(world.step(kFilmFrame).particle_collisions, 0u);
@@ -221,7 +221,7 @@ TEST(ParticlePairs, SystemsMayBeEmptyAtAnyTime) {
 
 TEST(ParticlePairs, EventsTellOfCollisionsAndDeathsInOrder) {
   World world({.gravity = Vec3::Zero(), .max_step = kFilmFrame});
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 1, .friction = 0});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 1, .friction = 0});
   const auto pairs = world.add_particle_system({.internal = true, .report_collisions = true});
   const auto rain = world.add_particle_system({.report_collisions = true, .report_deaths = true});
   world.add_particle(pairs, {.position = {-0.015, 1, 0}, .velocity = {1, 0, 0}, .restitution = 1});
@@ -256,7 +256,7 @@ TEST(ParticlePairs, StateIsTheSameForAnyNumberOfThreads) {
   for (std::size_t threads : {1u, 2u, 4u}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     World world;
-    world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
+    world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
     world.add_body({.shape = Box{{0.3, 0.1, 0.3}}, .pose = {Vec3(0, 0.05, 0)}});
     const auto a = world.add_particle_system({.internal = true, .external = true});
     const auto b = world.add_particle_system({.external = true});

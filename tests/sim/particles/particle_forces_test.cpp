@@ -169,7 +169,7 @@ TEST(ParticleForces, AreTheSameHoweverASystemIsIntegrated) {
 // A field presses a particle onto a wall that it slides along, as gravity would.
 TEST(ParticleForces, PressParticlesOntoSurfaces) {
   World world({.gravity = Vec3::Zero()});
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0, .friction = 0.25});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = 0.25});
   const auto system = world.add_particle_system({});
   world.add_force({.systems = {system}, .effect = ConstantField{{0, -10, 0}}});
   world.add_particle(system,

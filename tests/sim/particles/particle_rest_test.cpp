@@ -21,12 +21,14 @@ Vec3 total_momentum(const World& world) {
 }
 
 void add_tray(World& world, const Vec3& size, Real friction) {
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0, .friction = friction});
+  world.add_body(
+      {.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = friction});
   for (int axis : {0, 2})
     for (Real side : {-1.0, 1.0}) {
       Vec3 wall = size;
       wall[axis] = 0.1;
-      BodyDef def{.shape = Box{wall}, .motion = MotionType::fixed, .restitution = 0, .friction = friction};
+      BodyDef def{
+          .shape = Box{wall}, .motion = MotionType::static_body, .restitution = 0, .friction = friction};
       def.pose.position = Vec3(0, size.y() / 2, 0) + side * (size[axis] / 2 + 0.05) * Vec3::Unit(axis);
       world.add_body(def);
     }
@@ -42,7 +44,7 @@ Real greatest_overlap(const ParticleArrays& p) {
 
 TEST(ParticleRest, AStackOfTenBeadsStandsAndItsForcesSumUp) {
   World world({.max_step = kRestFrame});
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0});
   const auto system = world.add_particle_system({.internal = true});
   for (int i = 0; i < 10; ++i)
     world.add_particle(system,
@@ -60,7 +62,7 @@ TEST(ParticleRest, SlidesByTheFrictionAlongAndAcrossTheGrain) {
   for (bool internal : {false, true}) {
     World world;
     world.add_body({.shape = Plane{},
-                    .motion = MotionType::fixed,
+                    .motion = MotionType::static_body,
                     .restitution = 0,
                     .friction = 0.1,
                     .cross_friction = 0.4,
@@ -86,7 +88,8 @@ struct Heap {
 };
 Heap heap(Real friction, int frames) {
   World world({.max_step = 1.0 / 120});
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .restitution = 0, .friction = friction});
+  world.add_body(
+      {.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = friction});
   const auto system = world.add_particle_system({.internal = true});
   const Scatter random{2};
   uint64_t k = 0;

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
 
-#include "sim/world/spring_graph.h"
+#include "sim/world/coupling_graph.h"
 #include "tests/random.h"
 
 namespace offstage::sim {
@@ -99,30 +99,30 @@ TEST(CoupledSystem, APartPutBackAndSteppedAgainTakesTheSameWay) {
   }
 }
 
-TEST(SpringGraph, ConnectsThroughParticleSystemsButNotThroughTheWorld) {
+TEST(CouplingGraph, ConnectsThroughParticleSystemsButNotThroughTheWorld) {
   Sky sky;
   std::vector<BodyHandle> b;
   for (uint64_t i = 0; i < 6; ++i) b.push_back(sky.add(i));
   const ParticleSystemHandle beads = sky.world.systems.insert({});
   sky.world.systems[beads].add({}, -1);
-  sky.world.bodies[b[5]]->type = MotionType::fixed;
+  sky.world.bodies[b[5]]->type = MotionType::static_body;
   sky.join(BodyPoint{b[3]}, BodyPoint{b[1]});
   sky.join(ParticlePoint{beads, 0}, BodyPoint{b[3]});
   sky.join(ParticlePoint{beads, 0}, BodyPoint{b[0]});
   sky.join(BodyPoint{b[2]}, BodyPoint{b[5]});
   sky.join(BodyPoint{b[1]}, BodyPoint{b[5]});
   sky.join(BodyPoint{b[2]}, WorldPoint{});
-  const SpringGraph graph(sky.world);
+  const CouplingGraph graph(sky.world);
   EXPECT_EQ(graph.component(*sky.body(b[0])), graph.component(*sky.body(b[1])));
   EXPECT_EQ(graph.component(*sky.body(b[0])), graph.component(sky.world.systems[beads]));
   EXPECT_NE(graph.component(*sky.body(b[2])), graph.component(*sky.body(b[1])));
-  EXPECT_EQ(graph.component(*sky.body(b[4])), SpringGraph::kNone);
-  EXPECT_EQ(graph.component(*sky.body(b[5])), SpringGraph::kNone);
+  EXPECT_EQ(graph.component(*sky.body(b[4])), CouplingGraph::kNone);
+  EXPECT_EQ(graph.component(*sky.body(b[5])), CouplingGraph::kNone);
 }
 
-TEST(SpringNetwork, JacobianAgreesWithDifferences) {
+TEST(CoupledGroup, JacobianAgreesWithDifferences) {
   Sky sky;
-  NetworkMembers members;
+  GroupMembers members;
   std::vector<BodyHandle> b;
   for (uint64_t i = 0; i < 3; ++i) {
     b.push_back(sky.add(i));
@@ -140,7 +140,7 @@ TEST(SpringNetwork, JacobianAgreesWithDifferences) {
   sky.join(BodyPoint{b[2], {0.5, 0, 0}}, BodyPoint{b[2], {0, 0.5, 0.1}});  // of a body with itself
   sky.world.springs.for_each([&](SpringHandle, const Spring& s) { members.springs.push_back(&s); });
   const BodyForces forces{{0, -9.81, 0}, {}};
-  const SpringNetwork network(sky.world, members, forces);
+  const CoupledGroup network(sky.world, members, forces);
 
   std::vector<Real> x(3 * kBodyX + 6), p(3 * kBodyP + 6);
   for (std::size_t i = 0; i < 3; ++i)

@@ -27,7 +27,7 @@ TEST(World, RefusesWhatItCannotSimulateAndSaysWhy) {
   open.triangles.pop_back();
   const MeshHandle mesh = world.add_mesh(open);
   EXPECT_NE(message({.shape = MeshShape{mesh}}).find("3 border edges"), std::string::npos);
-  EXPECT_EQ(message({.shape = MeshShape{mesh}, .motion = MotionType::fixed}), "");
+  EXPECT_EQ(message({.shape = MeshShape{mesh}, .motion = MotionType::static_body}), "");
   EXPECT_THROW(world.add_mesh({{Vec3::Zero()}, {{0, 0, 1}}}), std::invalid_argument);
   EXPECT_THROW(world.add_mesh({}), std::invalid_argument);
 }
@@ -48,7 +48,7 @@ TEST(World, UsesTheFewestEqualSubSteps) {
 
 TEST(World, ReportsOnlyWhatMoved) {
   World world;
-  world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .pose = {Vec3(0, -50, 0)}});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .pose = {Vec3(0, -50, 0)}});
   const auto still = world.add_body({.motion = MotionType::kinematic});
   const auto wheel = world.add_body(
       {.motion = MotionType::kinematic, .pose = {Vec3(5, 0, 0)}, .track = {.spin = {0, 1, 0}}});
@@ -75,9 +75,9 @@ TEST(World, AConeFallsAboutItsCentreOfMass) {
 
 TEST(World, ContactsAreOfWhatCollidesAndNeverBetweenScriptedBodies) {
   World world({.sleep = false});
-  const auto ground = world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
+  const auto ground = world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
   world.add_body({.shape = Box{}, .motion = MotionType::kinematic});
-  world.add_body({.shape = Box{}, .motion = MotionType::fixed, .pose = {Vec3(0.5, 0, 0)}});
+  world.add_body({.shape = Box{}, .motion = MotionType::static_body, .pose = {Vec3(0.5, 0, 0)}});
   const auto ball = world.add_body({.shape = Sphere{0.5}, .pose = {Vec3(4, 1, 0)}, .restitution = 0});
   world.add_body({.shape = Sphere{0.5}, .pose = {Vec3(4, 0, 0)}, .collides = false});
   for (int i = 0; i < 60; ++i) world.step(1.0 / 60);
@@ -93,7 +93,7 @@ TEST(World, AFastBodyDoesNotPassAThinOneBetweenSteps) {
   for (const SolverKind solver : {SolverKind::exact, SolverKind::fast, SolverKind::automatic})
     for (const Real speed : {20.0, 100.0, 300.0}) {
       World world({.gravity = Vec3::Zero(), .solver = solver});
-      world.add_body({.shape = Box{{0.02, 1, 1}}, .motion = MotionType::fixed});
+      world.add_body({.shape = Box{{0.02, 1, 1}}, .motion = MotionType::static_body});
       const auto ball = world.add_body(
           {.shape = Sphere{0.01}, .pose = {Vec3(-0.5, 0.013, 0)}, .velocity = {speed, 0.1, 0}});
       for (int i = 0; i < 60; ++i) world.step(1.0 / 60);
@@ -103,7 +103,7 @@ TEST(World, AFastBodyDoesNotPassAThinOneBetweenSteps) {
 
 TEST(World, IslandsAreWhatTouchesAndWhatSpringsJoin) {
   World world;
-  const auto ground = world.add_body({.shape = Plane{}, .motion = MotionType::fixed});
+  const auto ground = world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
   std::vector<BodyHandle> boxes;
   for (const Real x : {0.0, 2.0, 4.0, 6.0})
     boxes.push_back(world.add_body({.shape = Box{}, .pose = {Vec3(x, 0.5, 0)}, .restitution = 0}));
@@ -119,7 +119,7 @@ TEST(World, IslandsAreWhatTouchesAndWhatSpringsJoin) {
 TEST(World, ContactRulesReplaceWhatFollowsFromTheSurfaces) {
   const auto slide = [](bool ruled) {
     World world({.sleep = false});
-    world.add_body({.shape = Plane{}, .motion = MotionType::fixed, .material = "ice", .friction = 0.5});
+    world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .material = "ice", .friction = 0.5});
     const auto box = world.add_body({.shape = Box{},
                                      .pose = {Vec3(0, 0.5, 0)},
                                      .velocity = {1, 0, 0},

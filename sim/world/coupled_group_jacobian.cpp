@@ -2,12 +2,12 @@
 /// the blocks are the edges of the interaction graph.
 
 #include "sim/dynamics/rigid_jacobian.h"
-#include "sim/world/spring_network.h"
+#include "sim/world/coupled_group.h"
 
 namespace offstage::sim {
 
 /// How a spring's end depends on the state of its object, and how a force there changes that object's rates.
-struct SpringNetwork::EndDerivative {
+struct CoupledGroup::EndDerivative {
   using Matrix3X = Eigen::Matrix<Real, 3, Eigen::Dynamic, 0, 3, 13>;
   using MatrixX3 = Eigen::Matrix<Real, Eigen::Dynamic, 3, 0, 13, 3>;
   using MatrixX = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic, 0, 13, 13>;
@@ -18,9 +18,8 @@ struct SpringNetwork::EndDerivative {
   MatrixX torque;  // rates by the state, with the force as it is
 };
 
-SpringNetwork::EndDerivative SpringNetwork::derivative(const End& end, const Vec3& force,
-                                                       std::span<const Real> x,
-                                                       std::span<const Real> p) const {
+CoupledGroup::EndDerivative CoupledGroup::derivative(const End& end, const Vec3& force,
+                                                     std::span<const Real> x, std::span<const Real> p) const {
   EndDerivative d;
   if (end.kind == End::Kind::particle) {
     d.columns = {static_cast<int>(particle_x(end.index)), static_cast<int>(x.size() + particle_p(end.index))};
@@ -47,8 +46,8 @@ SpringNetwork::EndDerivative SpringNetwork::derivative(const End& end, const Vec
   return d;
 }
 
-void SpringNetwork::add_derivatives(const ActiveSpring& s, Real t, std::span<const Real> x,
-                                    std::span<const Real> p, SparseEntries& entries) const {
+void CoupledGroup::add_derivatives(const ActiveSpring& s, Real t, std::span<const Real> x,
+                                   std::span<const Real> p, SparseEntries& entries) const {
   const Pull f = pull(s, t, x, p);
   // F_a = -(k (l - L) + c u.n) n with n = d / l, dn = (1 - n n^T) / l dd, and u the relative velocity.
   const Mat3 outer = f.along * f.along.transpose(), across = Mat3::Identity() - outer;
@@ -73,8 +72,8 @@ void SpringNetwork::add_derivatives(const ActiveSpring& s, Real t, std::span<con
     }
 }
 
-void SpringNetwork::jacobian(Real t, std::span<const Real> x, std::span<const Real> p,
-                             SparseEntries& entries) const {
+void CoupledGroup::jacobian(Real t, std::span<const Real> x, std::span<const Real> p,
+                            SparseEntries& entries) const {
   const auto n = static_cast<int>(x.size());
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     const RigidStage at = stage(i, x, p);

@@ -1,4 +1,4 @@
-#include "sim/world/spring_network.h"
+#include "sim/world/coupled_group.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +19,7 @@ constexpr int kMostHalvings = 128;
 
 }  // namespace
 
-SpringNetwork::SpringNetwork(const WorldState& world, NetworkMembers members, const BodyForces& forces)
+CoupledGroup::CoupledGroup(const WorldState& world, GroupMembers members, const BodyForces& forces)
     : forces_(forces), bodies_(std::move(members.bodies)) {
   for (ParticleSystem* system : members.systems) add_group(world, *system);
   x_.resize(particle_x(particles_));
@@ -31,7 +31,7 @@ SpringNetwork::SpringNetwork(const WorldState& world, NetworkMembers members, co
   add_pair_forces(world);
 }
 
-void SpringNetwork::add_group(const WorldState& world, ParticleSystem& system) {
+void CoupledGroup::add_group(const WorldState& world, ParticleSystem& system) {
   Group group{&system, world.forces(system), {}, {}, particles_};
   for (std::size_t i = 0; i < system.arrays.size(); ++i)
     if (system.whole_step(i)) {
@@ -43,7 +43,7 @@ void SpringNetwork::add_group(const WorldState& world, ParticleSystem& system) {
 }
 
 /// Newborns take part from the next sub-step on.
-void SpringNetwork::add_pair_forces(const WorldState& world) {
+void CoupledGroup::add_pair_forces(const WorldState& world) {
   world.force_defs.for_each([&](ForceHandle, const ForceDef& def) {
     if (!def.is_pairwise()) return;
     std::vector<PairMember> members;
@@ -56,16 +56,16 @@ void SpringNetwork::add_pair_forces(const WorldState& world) {
   });
 }
 
-bool SpringNetwork::holds(const ParticleSystem& system) const {
+bool CoupledGroup::holds(const ParticleSystem& system) const {
   return std::any_of(groups_.begin(), groups_.end(), [&](const Group& g) { return g.system == &system; });
 }
 
-void SpringNetwork::begin_substep() const {
+void CoupledGroup::begin_substep() const {
   for (const Group& g : groups_) g.system->begin_coupled();
 }
 
-void SpringNetwork::add_springs(const WorldState& world, std::span<const Spring* const> springs,
-                                const BodyIndex& index) {
+void CoupledGroup::add_springs(const WorldState& world, std::span<const Spring* const> springs,
+                               const BodyIndex& index) {
   // A spring at a newborn waits until that has lived up to the end of the sub-step.
   const auto ready = [&](const Attachment& a) {
     const auto* p = std::get_if<ParticlePoint>(&a);
@@ -80,14 +80,14 @@ void SpringNetwork::add_springs(const WorldState& world, std::span<const Spring*
                           def.damping, spring->rest_length});
 }
 
-void SpringNetwork::add_articulation(Articulation& articulation, const BodyIndex& index) {
+void CoupledGroup::add_articulation(Articulation& articulation, const BodyIndex& index) {
   Jointed jointed{&articulation, {}};
   for (const Body* body : articulation.bodies()) jointed.links.push_back(index.at(body));
   articulations_.push_back(std::move(jointed));
 }
 
-SpringNetwork::End SpringNetwork::resolve(const WorldState& world, const Attachment& a,
-                                          const BodyIndex& index) const {
+CoupledGroup::End CoupledGroup::resolve(const WorldState& world, const Attachment& a,
+                                        const BodyIndex& index) const {
   if (const auto* w = std::get_if<WorldPoint>(&a)) return {.point = w->position};
   if (const auto* b = std::get_if<BodyPoint>(&a)) {
     const Body* body = world.bodies[b->body].get();
@@ -108,8 +108,8 @@ SpringNetwork::End SpringNetwork::resolve(const WorldState& world, const Attachm
           system.arrays.mass[i]};
 }
 
-SpringNetwork::PointMotion SpringNetwork::motion(const End& end, Real t, std::span<const Real> x,
-                                                 std::span<const Real> p) const {
+CoupledGroup::PointMotion CoupledGroup::motion(const End& end, Real t, std::span<const Real> x,
+                                               std::span<const Real> p) const {
   switch (end.kind) {
     case End::Kind::still:
       break;
@@ -129,8 +129,8 @@ SpringNetwork::PointMotion SpringNetwork::motion(const End& end, Real t, std::sp
   return {end.point, Vec3::Zero()};
 }
 
-SpringNetwork::Pull SpringNetwork::pull(const ActiveSpring& s, Real t, std::span<const Real> x,
-                                        std::span<const Real> p) const {
+CoupledGroup::Pull CoupledGroup::pull(const ActiveSpring& s, Real t, std::span<const Real> x,
+                                      std::span<const Real> p) const {
   const PointMotion a = motion(s.a, t, x, p), b = motion(s.b, t, x, p);
   const Vec3 d = a.position - b.position;
   const Real length = d.norm();
@@ -139,8 +139,8 @@ SpringNetwork::Pull SpringNetwork::pull(const ActiveSpring& s, Real t, std::span
   return {along, length, s.stiffness * (length - s.rest_length) + s.damping * velocity.dot(along), velocity};
 }
 
-void SpringNetwork::apply(const End& end, const Vec3& force, std::span<const Real> x,
-                          std::span<Real> dp) const {
+void CoupledGroup::apply(const End& end, const Vec3& force, std::span<const Real> x,
+                         std::span<Real> dp) const {
   if (end.kind == End::Kind::dynamic) {
     const std::size_t at = kBodyP * end.index;
     const Eigen::Map<const Eigen::Vector4d> turn(&x[kBodyX * end.index + 3]);
@@ -151,22 +151,21 @@ void SpringNetwork::apply(const End& end, const Vec3& force, std::span<const Rea
   }
 }
 
-void SpringNetwork::velocity(Real, std::span<const Real> x, std::span<const Real> p,
-                             std::span<Real> dx) const {
+void CoupledGroup::velocity(Real, std::span<const Real> x, std::span<const Real> p,
+                            std::span<Real> dx) const {
   for (std::size_t i = 0; i < bodies_.size(); ++i) stage(i, x, p).velocity(dx.subspan(kBodyX * i, kBodyX));
   const auto particles = p.subspan(particle_p(0));
   std::copy(particles.begin(), particles.end(), dx.begin() + static_cast<std::ptrdiff_t>(particle_x(0)));
 }
 
-void SpringNetwork::force(Real t, std::span<const Real> x, std::span<const Real> p,
-                          std::span<Real> dp) const {
+void CoupledGroup::force(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const {
   set_free_forces(t, x, p, dp);
   for (const Jointed& j : articulations_) add_joint_forces(j, t, x, p, dp);
 }
 
 /// Sets `dp` to all forces but those of joints.
-void SpringNetwork::set_free_forces(Real t, std::span<const Real> x, std::span<const Real> p,
-                                    std::span<Real> dp) const {
+void CoupledGroup::set_free_forces(Real t, std::span<const Real> x, std::span<const Real> p,
+                                   std::span<Real> dp) const {
   for (std::size_t i = 0; i < bodies_.size(); ++i)
     stage(i, x, p).force(forces_, t, dp.subspan(kBodyP * i, kBodyP));
   const auto particles_x = x.subspan(particle_x(0)), particles_v = p.subspan(particle_p(0));
@@ -182,8 +181,8 @@ void SpringNetwork::set_free_forces(Real t, std::span<const Real> x, std::span<c
 }
 
 /// Of particles that act on each other; springs and bodies depend on velocities in other ways.
-bool SpringNetwork::force_and_damping(Real t, std::span<const Real> x, std::span<const Real> p,
-                                      std::span<Real> dp, std::span<Real> damping) const {
+bool CoupledGroup::force_and_damping(Real t, std::span<const Real> x, std::span<const Real> p,
+                                     std::span<Real> dp, std::span<Real> damping) const {
   if (!bodies_.empty() || !springs_.empty()) return false;
   for (const Group& g : groups_)
     FreeFlight(g.forces, g.mass).force_and_damping(t, g.part(x), g.part(p), g.part(dp), g.part(damping));
@@ -191,8 +190,8 @@ bool SpringNetwork::force_and_damping(Real t, std::span<const Real> x, std::span
   return true;
 }
 
-void SpringNetwork::add_joint_forces(const Jointed& jointed, Real t, std::span<const Real> x,
-                                     std::span<const Real> p, std::span<Real> dp) const {
+void CoupledGroup::add_joint_forces(const Jointed& jointed, Real t, std::span<const Real> x,
+                                    std::span<const Real> p, std::span<Real> dp) const {
   const std::size_t count = jointed.links.size();
   std::vector<LinkMotion> motion(count);
   std::vector<LinkMobility> mobility(count);
@@ -215,7 +214,7 @@ void SpringNetwork::add_joint_forces(const Jointed& jointed, Real t, std::span<c
 
 /// No integrator of a fixed step follows what turns by much more in it, or swings: links that are pulled
 /// tight are the masses of a string.
-Real SpringNetwork::pieces(Real h) const {
+Real CoupledGroup::pieces(Real h) const {
   Real fastest = 0, tightest = 0, spin = 0;
   for (const Body* body : bodies_) spin = std::max(spin, greatest_spin(body->rigid));
   for (const Jointed& j : articulations_) {
@@ -227,7 +226,7 @@ Real SpringNetwork::pieces(Real h) const {
                     kMostPieces);
 }
 
-void SpringNetwork::load(std::span<Real> x, std::span<Real> p) const {
+void CoupledGroup::load(std::span<Real> x, std::span<Real> p) const {
   for (std::size_t i = 0; i < bodies_.size(); ++i)
     sim::load(bodies_[i]->rigid, x.subspan(kBodyX * i, kBodyX), p.subspan(kBodyP * i, kBodyP));
   for (const Group& g : groups_)
@@ -237,7 +236,7 @@ void SpringNetwork::load(std::span<Real> x, std::span<Real> p) const {
     }
 }
 
-void SpringNetwork::store(std::span<const Real> x, std::span<const Real> p) {
+void CoupledGroup::store(std::span<const Real> x, std::span<const Real> p) {
   for (std::size_t i = 0; i < bodies_.size(); ++i)
     sim::store(x.subspan(kBodyX * i, kBodyX), p.subspan(kBodyP * i, kBodyP), bodies_[i]->rigid);
   for (const Group& g : groups_)
@@ -247,7 +246,7 @@ void SpringNetwork::store(std::span<const Real> x, std::span<const Real> p) {
     }
 }
 
-void SpringNetwork::step(const Integrator& integrator, Real t, Real h, IntegratorWorkspace& work) {
+void CoupledGroup::step(const Integrator& integrator, Real t, Real h, IntegratorWorkspace& work) {
   for (const Jointed& j : articulations_) j.articulation->transmit_impulses(t, joint_tally_);
   load(x_, p_);
   // The most careful member leads; without bodies there is none to remember.
@@ -271,7 +270,7 @@ void SpringNetwork::step(const Integrator& integrator, Real t, Real h, Integrato
   store(x_, p_);
 }
 
-SpringNetwork::Balance SpringNetwork::balance(Real t, IntegratorWorkspace& work) const {
+CoupledGroup::Balance CoupledGroup::balance(Real t, IntegratorWorkspace& work) const {
   const std::span<const Real> x = x_, p = p_;
   work.dp.resize(p.size());
   set_free_forces(t, x, p, work.dp);
@@ -295,8 +294,8 @@ SpringNetwork::Balance SpringNetwork::balance(Real t, IntegratorWorkspace& work)
 /// Advances by a piece from t to t + h and puts the joints back together. Joints can make a link turn far
 /// faster than the speeds at the start show: a universal joint whose axes and arm come into one plane turns a
 /// light link over at once. Then the piece is divided. What no division follows must not gain energy.
-void SpringNetwork::advance(const Integrator& integrator, Real t, Real h, int& halvings,
-                            IntegratorWorkspace& work) {
+void CoupledGroup::advance(const Integrator& integrator, Real t, Real h, int& halvings,
+                           IntegratorWorkspace& work) {
   const std::vector<Real> x = x_, p = p_;
   for (const Jointed& j : articulations_) j.articulation->begin_motion(t, h);
   const Balance before = balance(t, work);
@@ -330,7 +329,7 @@ void SpringNetwork::advance(const Integrator& integrator, Real t, Real h, int& h
 }
 
 /// Slows the links of each articulation against each other until the kinetic energy is `most` at most.
-void SpringNetwork::limit_energy(Real most) {
+void CoupledGroup::limit_energy(Real most) {
   IntegratorWorkspace unused;
   const Real excess = balance(0, unused).kinetic - most;
   if (!(excess > 0)) return;
@@ -342,7 +341,7 @@ void SpringNetwork::limit_energy(Real most) {
   ++joint_tally_.unsolved;
 }
 
-void SpringNetwork::save() {
+void CoupledGroup::save() {
   saved_x_.resize(x_.size());
   saved_p_.resize(p_.size());
   load(saved_x_, saved_p_);
@@ -350,7 +349,7 @@ void SpringNetwork::save() {
   for (const Body* body : bodies_) saved_steps_.push_back(body->rigid.next_step);
 }
 
-void SpringNetwork::restore() {
+void CoupledGroup::restore() {
   store(saved_x_, saved_p_);
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     RigidBody& body = bodies_[i]->rigid;

@@ -10,11 +10,11 @@
 
 namespace offstage::sim {
 
-class SpringGraph {
+class CouplingGraph {
  public:
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
-  explicit SpringGraph(const WorldState& world);
+  explicit CouplingGraph(const WorldState& world);
 
   /// Numbers of components are below this.
   std::size_t size() const { return objects_.size(); }

@@ -1,11 +1,11 @@
-#include "sim/world/spring_graph.h"
+#include "sim/world/coupling_graph.h"
 
 #include <algorithm>
 #include <numeric>
 
 namespace offstage::sim {
 
-SpringGraph::SpringGraph(const WorldState& world) : world_(world) {
+CouplingGraph::CouplingGraph(const WorldState& world) : world_(world) {
   for_each_link([&](const void* a, const void* b) {
     for (const void* o : {a, b})
       if (o) objects_.push_back(o);
@@ -24,7 +24,7 @@ SpringGraph::SpringGraph(const WorldState& world) : world_(world) {
 
 /// Calls f(a, b) for what is joined directly; either may be null, or both the same.
 template <class F>
-void SpringGraph::for_each_link(F&& f) const {
+void CouplingGraph::for_each_link(F&& f) const {
   world_.springs.for_each(
       [&](SpringHandle, const Spring& spring) { f(object(spring.def.a), object(spring.def.b)); });
   for (const auto& articulation : world_.articulations)
@@ -40,17 +40,17 @@ void SpringGraph::for_each_link(F&& f) const {
   });
 }
 
-std::size_t SpringGraph::component(const Spring& spring) const {
+std::size_t CouplingGraph::component(const Spring& spring) const {
   const std::size_t a = find(object(spring.def.a));
   return a != kNone ? a : find(object(spring.def.b));
 }
 
-std::size_t SpringGraph::component(const Articulation& articulation) const {
+std::size_t CouplingGraph::component(const Articulation& articulation) const {
   return find(articulation.bodies().front());
 }
 
 /// What of a spring's end moves with it.
-const void* SpringGraph::object(const Attachment& a) const {
+const void* CouplingGraph::object(const Attachment& a) const {
   if (const auto* point = std::get_if<BodyPoint>(&a)) {
     const Body* body = world_.bodies[point->body].get();
     return body->is_dynamic() ? body : nullptr;
@@ -59,24 +59,24 @@ const void* SpringGraph::object(const Attachment& a) const {
   return nullptr;
 }
 
-std::size_t SpringGraph::find(const void* object) const {
+std::size_t CouplingGraph::find(const void* object) const {
   const auto at = std::lower_bound(objects_.begin(), objects_.end(), object);
   if (at == objects_.end() || *at != object) return kNone;
   return root(static_cast<std::size_t>(at - objects_.begin()));
 }
 
-std::size_t SpringGraph::root(std::size_t i) const {
+std::size_t CouplingGraph::root(std::size_t i) const {
   while (parent_[i] != i) i = parent_[i];
   return i;
 }
 
 std::vector<Body*> connected(WorldState& world, std::span<Body* const> bodies) {
-  const SpringGraph graph(world);
+  const CouplingGraph graph(world);
   std::vector<const Body*> single;
   std::vector<std::size_t> components;
   for (const Body* body : bodies) {
     const std::size_t c = graph.component(*body);
-    if (c == SpringGraph::kNone)
+    if (c == CouplingGraph::kNone)
       single.push_back(body);
     else
       components.push_back(c);
@@ -86,8 +86,8 @@ std::vector<Body*> connected(WorldState& world, std::span<Body* const> bodies) {
   std::vector<Body*> all;
   world.bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& body) {
     const std::size_t c = graph.component(*body);
-    if (c == SpringGraph::kNone ? std::binary_search(single.begin(), single.end(), body.get())
-                                : std::binary_search(components.begin(), components.end(), c))
+    if (c == CouplingGraph::kNone ? std::binary_search(single.begin(), single.end(), body.get())
+                                  : std::binary_search(components.begin(), components.end(), c))
       all.push_back(body.get());
   });
   return all;

@@ -15,18 +15,18 @@
 
 namespace offstage::sim {
 
-/// What a network consists of: a component of the SpringGraph, or several.
-struct NetworkMembers {
+/// What a network consists of: a component of the CouplingGraph, or several.
+struct GroupMembers {
   std::vector<Body*> bodies;
   std::vector<ParticleSystem*> systems;
   std::vector<const Spring*> springs;
   std::vector<Articulation*> articulations;
 };
 
-class SpringNetwork final : public DynamicSystem {
+class CoupledGroup final : public DynamicSystem {
  public:
   /// `forces` must outlive the network, and the world must not gain or lose anything as long.
-  SpringNetwork(const WorldState& world, NetworkMembers members, const BodyForces& forces);
+  CoupledGroup(const WorldState& world, GroupMembers members, const BodyForces& forces);
 
   std::span<Body* const> bodies() const { return bodies_; }
   bool holds(const ParticleSystem& system) const;
