@@ -82,7 +82,7 @@ TEST(Pipeline, AFailureOfAnyStageEndsAllAndIsTheOneReported) {
     shoot(), draw(), print();
     EXPECT_EQ(shoot.failure, "shoot");
     EXPECT_EQ(draw.failure, "draw");
-    EXPECT_EQ(rendered.failure, "print");
+    EXPECT_EQ(print.failure, "print");
     EXPECT_LE(draw.printed.size(), static_cast<std::size_t>(at)) << "nothing after the missing frame";
   }
 }
