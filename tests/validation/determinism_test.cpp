@@ -139,9 +139,9 @@ constexpr const char* kParticles = "c5bfc404ccb7e022ce9ed6c7eb5cc342";
 constexpr const char* kSlidingExact = "dd732251e043ec037777fcccaae4b8d9";
 constexpr const char* kBouncingExact = "2f1c3cdf0257928ef668a7ebb6dfc2d6";
 constexpr const char* kBouncingFast = "eb1b23678611757101c8e8be769c38fb";
-constexpr const char* kHeapFast = "ef4264941ea9f4ec56db841bbe2d2b5a";
-constexpr const char* kChainExact = "a9cd0751b9decb7f8d91290a7afba397";
-constexpr const char* kChainFast = "a95d116a8895708fda40feca356ef40f";
+constexpr const char* kHeapFast = "6bdcca246b838355f8e0b8873bbcfdef";
+constexpr const char* kChainExact = "70f29be5fc3da84178118e9784c6670b";
+constexpr const char* kChainFast = "938a26ddd1af94c6f55818fc11ab299c";
 
 TEST(Determinism, SameHashInEveryBuild) {
   EXPECT_EQ(run().hex(), kParticles);
