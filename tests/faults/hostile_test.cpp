@@ -91,16 +91,16 @@ TEST(SymbolicLink, IsNotFollowedByAnOutput) {
 
 TEST(Names, AreEscapedInTablesPagesAndFiles) {
   const TemporaryFolder folder;
-  write_file(folder / "s.json", R"({"name": "../x\" onerror=alert(1)", "bodies": [
+  write_file(folder / "s.json", R"text({"name": "../x\" onerror=alert(1)", "bodies": [
     {"name": "a,b\"c\nd", "shape": {"type": "sphere"}, "position": [0, 1, 0]}],
     "render": {"size": [64, 36]}, "output": {
     "duration" : 0.2}
-})");
+})text");
   ASSERT_EQ(offstage("simulate s.json -q --trace t.csv", folder.path()).code, 0);
-EXPECT_NE(read_file(folder / "t.csv").find("\"a,b\"\"c\nd\""), std::string::npos);
-ASSERT_EQ(offstage("bless s.json --golden sub/golden --reason x", folder.path(), "env -u CI").code, 0);
-for (const auto& [name, bytes] : contents(folder.path()))
-  EXPECT_TRUE(name == "s.json" || name == "t.csv" || name.starts_with("sub/golden/")) << name;
+  EXPECT_NE(read_file(folder / "t.csv").find("\"a,b\"\"c\nd\""), std::string::npos);
+  ASSERT_EQ(offstage("bless s.json --golden sub/golden --reason x", folder.path(), "env -u CI").code, 0);
+  for (const auto& [name, bytes] : contents(folder.path()))
+    EXPECT_TRUE(name == "s.json" || name == "t.csv" || name.starts_with("sub/golden/")) << name;
 }
 
 TEST(ReplacedGoldenPicture, IsNoticed) {
