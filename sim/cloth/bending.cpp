@@ -319,7 +319,10 @@ void ClothBending::build_matrix() {
     for (uint32_t a = patch.first; a < patch.first + patch.count; ++a)
       for (uint32_t b = patch.first; b < patch.first + patch.count; ++b) {
         const Real q = rigidity_ * patch.area * weights_[a].dot(weights_[b]);
-        a == b ? diagonal_[points_[a]] += q : rows[points_[a]].emplace_back(points_[b], q).second;
+        if (a == b)
+          diagonal_[points_[a]] += q;
+        else
+          rows[points_[a]].emplace_back(points_[b], q);
       }
   row_.assign(1, 0);
   column_.clear();
