@@ -12,7 +12,8 @@ namespace {
 /// Pairs are sought this much farther than they touch, in thicknesses; half of it is how far points may stray
 /// from the predicted paths.
 constexpr Real kMargin = 0.8;
-/// The same of pairs sought while others keep their predicted paths, of which these may stray by a quarter now.
+/// The same of pairs sought while others keep their predicted paths, of which these may stray by a quarter
+/// now.
 constexpr Real kStrayMargin = 1.5 * kMargin;
 /// Up to this part of all points are sought again alone.
 constexpr std::size_t kFew = 3;

@@ -190,7 +190,7 @@ void ExactContacts::close_neighbors(const Island& island, Real duration) {
   }
 }
 
-/// Joints that got to where they stop block their bodies likewise.
+/// Joints at a stop also block their bodies.
 void ExactContacts::close_stops() {
   for (std::size_t i = 0; i < joints_.bounded().size(); ++i) {
     const BoundedRow& row = joints_.bounded()[i];

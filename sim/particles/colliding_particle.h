@@ -77,7 +77,7 @@ struct ParticleStep {
   const Obstacles& fixed;
   const Obstacles& moving;
   ImpactLaw law;
-  Real collision_speed;    ///< what meets slower does not bounce [m/s]
+  Real collision_speed;    ///< contacts slower than this do not bounce [m/s]
   BodyImpulses& impulses;  ///< on dynamic bodies
 };
 

@@ -191,7 +191,7 @@ class Looking(Case):
         page = self.page
         page.wait_for_frame(1)
         page.select('/bodies/1')
-        # The marks are made anew with each frame, hence the place alone.
+        # The marks are rebuilt with each frame, hence the place alone.
         at = wait(lambda: page.js('''const ring = document.querySelector("#marks .handle")?.getBoundingClientRect(), stage = document.getElementById("stage").getBoundingClientRect();
             return ring && [ring, stage].map(r => [r.x + r.width / 2, r.y + r.height / 2]).reduce((a, b) => [Math.round(a[0] - b[0]), Math.round(a[1] - b[1])])'''))
         ActionChains(self.driver).move_to_element_with_offset(page.find('#stage'), *at).click_and_hold() \
@@ -228,7 +228,7 @@ class Looking(Case):
         page = self.page
         page.set_text(SCENE.replace('"version": 1,', '"version": 1, "materials": [{"name": "unused"}],')
                       .replace('"radius": 0.4}, "position"', '"radius": 0.4}, "velocity": [3e4, 0, 0], "position"'))
-        # The list is made anew with each frame, hence its texts alone.
+        # The list is rebuilt with each frame, hence its texts alone.
         texts = 'return [...document.querySelectorAll("#facts .notes .problem")].map(p => p.textContent)'
         wait(lambda: len(page.js(texts)) == 2, 60, 'the warnings')
         shown = page.js(texts)

@@ -98,7 +98,7 @@ function drawFacts() {
 const factsLine = el('div', {class: 'facts-line'});
 const noteItem = n => el('li', {class: n.bad ? 'bad' : ''}, n.path ? el('button', {class: 'problem', title: 'Show it in the controls and in the text', onclick: () => { reveal(n.path); emit('show-text', n.path); }}, el('span', {class: 'where'}, `line ${n.line}`), n.what) : n.what);
 
-// A fact is made anew only when it changes: a click on a button that is replaced between press and release would be lost.
+// A fact is rebuilt only when it changes: a click on a button that is replaced between press and release would be lost.
 const made = new Map();
 function fact(key, signature, make) {
   if (made.get(key)?.signature !== signature) made.set(key, {signature, element: make()});
