@@ -333,10 +333,11 @@ Vector solve_normal(PatchBatch& p, Groups& u, const Gaps& gaps) {
   return change;
 }
 
-/// Takes the impulses a little back towards their means, which follow. No impulse changes by more than that
-/// share of itself, or of Coulomb's limit: the mean of an impact must not lift what it has stopped. The friction
-/// of what slides is brought to the limit of the normal impulses as they are now, so that the sums of both
-/// over the sub-steps keep to Coulomb's law however the load goes from point to point. Returns the change.
+/// Moves the impulses a fixed share towards their running means, and updates the means. No impulse changes by
+/// more than that share of itself, or of Coulomb's limit: otherwise the mean impulse of an impact would lift the
+/// body that the impact has stopped. The friction of sliding points is set to the limit of the present normal
+/// impulses. So the sums over the sub-steps obey Coulomb's law, however the load shifts between points. Returns
+/// the change.
 Groups return_to_mean(PatchBatch& p) {
   Groups change{};
   const Vector limits = friction_limits(p);
