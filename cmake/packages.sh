@@ -8,6 +8,7 @@ libosmesa6? mold? ccache?"
 test_packages="libgtest-dev librapidcheck-dev libfcl-dev libccd-dev libbullet-dev libvalijson-dev assimp-testmodels
 chromium|chromium-browser chromium-driver|chromium-chromedriver python3-selenium"
 bench_packages="libbenchmark-dev"
+fuzz_packages="clang libclang-rt-14-dev|libclang-rt-19-dev|libclang-rt-18-dev"
 
 is_installed() { dpkg-query -W -f='${Status}' "$1" 2>/dev/null | grep -q '^install ok installed$'; }
 is_known() { apt-cache policy "$1" 2>/dev/null | grep -q 'Candidate: [^(]'; }

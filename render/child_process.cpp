@@ -1,55 +1,41 @@
 #include "render/child_process.h"
 
+#include <array>
 #include <cstring>
 #include <thread>
 
 #include <fcntl.h>
+#include <poll.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 namespace offstage::render {
 namespace {
 
-/// The child's streams, group and signals: posix_spawn's two attribute objects with their lifetimes.
-struct SpawnSetup {
-  posix_spawn_file_actions_t actions;
-  posix_spawnattr_t attributes;
-
-  SpawnSetup(int in, int out, int err) {
-    posix_spawn_file_actions_init(&actions);
-    connect(in, STDIN_FILENO, O_RDONLY);
-    connect(out, STDOUT_FILENO, O_WRONLY);
-    connect(err, STDERR_FILENO, O_WRONLY);
-
-    posix_spawnattr_init(&attributes);
-    sigset_t none, all;
-    sigemptyset(&none);
-    sigfillset(&all);
-    posix_spawnattr_setsigmask(&attributes, &none);
-    posix_spawnattr_setsigdefault(&attributes, &all);
-    posix_spawnattr_setpgroup(&attributes, 0);
-    posix_spawnattr_setflags(&attributes,
-                             POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+/// In the child: its streams, group and signals, then the program. Only calls that are safe after fork() in a
+/// process with threads.
+[[noreturn]] void become(char** argv, const std::array<int, 3>& streams, pid_t parent, int report) {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) ::_exit(127);
+  ::setpgid(0, 0);
+  for (int stream = 0; stream < 3; ++stream) {
+    const int mode = stream == STDIN_FILENO ? O_RDONLY : O_WRONLY;
+    const int fd = streams[static_cast<std::size_t>(stream)];
+    if (::dup2(fd >= 0 ? fd : ::open("/dev/null", mode), stream) < 0) ::_exit(127);
   }
-  ~SpawnSetup() {
-    posix_spawnattr_destroy(&attributes);
-    posix_spawn_file_actions_destroy(&actions);
-  }
-  SpawnSetup(const SpawnSetup&) = delete;
-  SpawnSetup& operator=(const SpawnSetup&) = delete;
-
- private:
-  void connect(int fd, int stream, int mode) {
-    if (fd >= 0) {
-      posix_spawn_file_actions_adddup2(&actions, fd, stream);
-    } else {
-      posix_spawn_file_actions_addopen(&actions, stream, "/dev/null", mode, 0);
-    }
-  }
-};
+  for (int signal = 1; signal < NSIG; ++signal) ::signal(signal, SIG_DFL);
+  sigset_t none;
+  sigemptyset(&none);
+  ::sigprocmask(SIG_SETMASK, &none, nullptr);
+  ::execvp(argv[0], argv);
+  const int error = errno;
+  if (::write(report, &error, sizeof error) != sizeof error) ::_exit(126);
+  ::_exit(127);
+}
 
 }  // namespace
 
@@ -72,9 +58,31 @@ ChildProcess::ChildProcess(const std::vector<std::string>& arguments, int in, in
   std::vector<char*> argv;
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
-  const SpawnSetup setup(in, out, err);
-  error_ = ::posix_spawnp(&pid_, argv[0], &setup.actions, &setup.attributes, argv.data(), environ);
-  if (error_ != 0) pid_ = -1;
+  int ends[2];
+  if (::pipe2(ends, O_CLOEXEC) != 0) {
+    error_ = errno;
+    return;
+  }
+  const Descriptor reading(ends[0]);
+  Descriptor writing(ends[1]);
+  const pid_t parent = ::getpid();
+  pid_ = ::fork();
+  if (pid_ == 0) become(argv.data(), {in, out, err}, parent, writing.fd());
+  if (pid_ < 0) {
+    error_ = errno;
+    return;
+  }
+  writing.close();
+  ssize_t got = 0;
+  do {
+    got = ::read(reading.fd(), &error_, sizeof error_);  // nothing where the program started: the end closed
+  } while (got < 0 && errno == EINTR);
+  if (got != sizeof error_) {
+    error_ = 0;
+    return;
+  }
+  ::waitpid(pid_, nullptr, 0);
+  pid_ = -1;
 }
 
 ChildProcess::~ChildProcess() {
@@ -86,8 +94,11 @@ void ChildProcess::kill() {
   if (pid_ > 0) ::kill(-pid_, SIGKILL);
 }
 
-std::optional<std::string> ChildProcess::wait() {
+std::optional<std::string> ChildProcess::wait(const StopTest& stop) {
   if (pid_ <= 0) return std::nullopt;
+  Patience patience(stop);
+  while (stop && !wait_for_end(pid_, std::chrono::milliseconds(Patience::kInterval_ms)))
+    if (patience.exhausted()) kill();
   int status = 0;
   pid_t ended = -1;
   do {
@@ -98,18 +109,34 @@ std::optional<std::string> ChildProcess::wait() {
 }
 
 std::optional<std::string> ChildProcess::wait_for(std::chrono::milliseconds limit) {
-  const auto deadline = std::chrono::steady_clock::now() + limit;
-  siginfo_t info{};
-  while (pid_ > 0 && ::waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
-         info.si_pid == 0) {
-    if (std::chrono::steady_clock::now() > deadline) {
-      kill();
-      wait();
-      return "no answer within " + std::to_string(limit.count() / 1000) + " s";
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  if (pid_ > 0 && !wait_for_end(pid_, limit)) {
+    kill();
+    wait();
+    return "no answer within " + std::to_string(limit.count() / 1000) + " s";
   }
   return wait();
+}
+
+bool wait_for_end(pid_t child, std::chrono::milliseconds limit) {
+  const auto deadline = std::chrono::steady_clock::now() + limit;
+  // A descriptor of the process wakes at its end; without one (old kernels) the end is asked for.
+  const Descriptor process(static_cast<int>(::syscall(SYS_pidfd_open, child, 0)));
+  while (true) {
+    siginfo_t info{};
+    if (::waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOHANG | WNOWAIT) != 0 ||
+        info.si_pid != 0)
+      return true;
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
+    if (left.count() <= 0) return false;
+    constexpr std::chrono::milliseconds kAsk(2);
+    if (process) {
+      pollfd end{process.fd(), POLLIN, 0};
+      ::poll(&end, 1, static_cast<int>(left.count()));
+    } else {
+      std::this_thread::sleep_for(std::min(kAsk, left));
+    }
+  }
 }
 
 std::optional<std::string> describe_failure(int wait_status) {

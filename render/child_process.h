@@ -1,6 +1,6 @@
 #pragma once
 /// A program run as a child in its own process group, so that a Ctrl-C meant for us does not end it first.
-/// Private to render.
+/// The kernel kills it if this process dies. Private to render.
 
 #include <chrono>
 #include <optional>
@@ -39,8 +39,9 @@ class ChildProcess {
   /// Why it could not be started, an errno value; 0 if it was.
   int error() const { return error_; }
   void kill();
-  /// Waits for its end: nothing if it succeeded, else "exit code 1" or "signal 9".
-  std::optional<std::string> wait();
+  /// Waits for its end: nothing if it succeeded, else "exit code 1" or "signal 9". A child that does not end
+  /// after a request to stop is killed (Patience).
+  std::optional<std::string> wait(const StopTest& stop = {});
   /// The same with a limit, after which it is killed.
   std::optional<std::string> wait_for(std::chrono::milliseconds limit);
 
@@ -48,6 +49,9 @@ class ChildProcess {
   pid_t pid_ = -1;
   int error_ = 0;
 };
+
+/// Waits at most `limit` for the end of a child; false if it still runs. Does not reap it.
+bool wait_for_end(pid_t child, std::chrono::milliseconds limit);
 
 /// "exit code 1" or "signal 9 (Killed)" from waitpid's status; nothing for success.
 std::optional<std::string> describe_failure(int wait_status);

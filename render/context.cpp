@@ -1,5 +1,6 @@
 #include "render/context.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <mutex>
@@ -7,6 +8,9 @@
 #include <stdexcept>
 #include <tuple>
 #include <utility>
+#include <vector>
+
+#include <unistd.h>
 
 #include "render/error.h"
 #include "render/gl.h"
@@ -96,6 +100,29 @@ GlPlatform gl_platform_of_environment() {
   return name == nullptr ? GlPlatform::automatic : gl_platform(name);
 }
 
+namespace {
+
+/// Removes what changes a Mesa driver's pixels or traces them: every variable of these families but those
+/// that say where its parts are installed.
+void clear_driver_variables() {
+  constexpr std::array<std::string_view, 14> kFamilies = {
+      "MESA_", "GALLIUM_",  "GALLIVM_", "LP_",  "ST_",   "DRAW_",   "TGSI_",
+      "NIR_",  "SOFTPIPE_", "LIBGL_",   "EGL_", "GLSL_", "OSMESA_", "mesa_"};
+  constexpr std::array<std::string_view, 3> kKept = {"LIBGL_DRIVERS_PATH", "EGL_LOG_LEVEL",
+                                                     "EGL_DRIVERS_PATH"};
+  std::vector<std::string> names;
+  for (char** entry = environ; *entry != nullptr; ++entry) {
+    const std::string_view text = *entry;
+    const std::string_view name = text.substr(0, text.find('='));
+    const bool family =
+        std::ranges::any_of(kFamilies, [&](std::string_view f) { return name.starts_with(f); });
+    if (family && std::ranges::find(kKept, name) == kKept.end()) names.emplace_back(name);
+  }
+  for (const std::string& name : names) unsetenv(name.c_str());
+}
+
+}  // namespace
+
 void pin_environment(int raster_threads, GlPlatform platform) {
   const std::lock_guard lock(platform_mutex);
   chosen_platform = platform;
@@ -106,19 +133,13 @@ void pin_environment(int raster_threads, GlPlatform platform) {
     else
       unsetenv(name);
   };
+  clear_driver_variables();
   set_if(software, "GALLIUM_DRIVER", "llvmpipe");
   set_if(software, "LIBGL_ALWAYS_SOFTWARE", "true");  // EGL would look for a GPU first
   setenv("EGL_LOG_LEVEL", "fatal", 0);                // what fails is in the exceptions
   setenv("LP_NATIVE_VECTOR_WIDTH", "256", 1);
   setenv("LP_NUM_THREADS", std::to_string(raster_threads).c_str(), 1);
   setenv("MESA_SHADER_CACHE_DISABLE", "true", 1);
-  for (const char* name :
-       {"MESA_GL_VERSION_OVERRIDE", "MESA_GLES_VERSION_OVERRIDE", "MESA_GLSL_VERSION_OVERRIDE",
-        "MESA_EXTENSION_OVERRIDE", "MESA_LOADER_DRIVER_OVERRIDE", "MESA_NO_ERROR", "MESA_DEBUG",
-        "LIBGL_DEBUG", "LP_PERF", "LP_DEBUG", "GALLIVM_PERF", "GALLIVM_DEBUG", "GALLIUM_OVERRIDE_CPU_CAPS",
-        "GALLIUM_NOSSE", "DRAW_USE_LLVM", "EGL_PLATFORM"}) {
-    unsetenv(name);
-  }
 }
 
 struct Context::Impl {

@@ -24,14 +24,27 @@ void throw_file_error(const std::filesystem::path& path, const std::string& what
   throw FileError(path.string() + ": " + what + ": " + system_reason(error));
 }
 
-int write_all(int fd, std::span<const uint8_t> bytes) {
+bool Patience::exhausted() {
+  constexpr std::chrono::seconds kGrace(3);
+  const auto now = std::chrono::steady_clock::now();
+  if (!asked_ && stop_ && stop_()) {
+    asked_ = true;
+    since_ = now;
+  }
+  return asked_ && now - since_ > kGrace;
+}
+
+int write_all(int fd, std::span<const uint8_t> bytes, const StopTest& stop) {
+  Patience patience(stop);
   while (!bytes.empty()) {
     const ssize_t written = ::write(fd, bytes.data(), bytes.size());
     if (written >= 0) {
       bytes = bytes.subspan(static_cast<std::size_t>(written));
-    } else if (errno == EAGAIN) {  // someone made the descriptor non-blocking
+      patience.progressed();
+    } else if (errno == EAGAIN) {  // the descriptor does not block
+      if (patience.exhausted()) return ECANCELED;
       pollfd ready{fd, POLLOUT, 0};
-      ::poll(&ready, 1, -1);
+      ::poll(&ready, 1, Patience::kInterval_ms);
     } else if (errno != EINTR) {
       return errno;
     }
@@ -61,10 +74,32 @@ std::vector<uint8_t> read_file(const std::filesystem::path& path, uint64_t max_b
   return bytes;
 }
 
+std::string read_text_file(const std::filesystem::path& path, uint64_t max_bytes) {
+  const std::vector<uint8_t> bytes = read_file(path, max_bytes);
+  return {bytes.begin(), bytes.end()};
+}
+
 void create_parent_folders(const std::filesystem::path& file) {
   std::error_code error;
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), error);
   if (error) throw FileError(file.parent_path().string() + ": cannot be created: " + error.message());
+}
+
+std::string escaped(const std::string& text) {
+  static constexpr char kHex[] = "0123456789abcdef";
+  std::string out;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (c == '\n')
+      out += "\\n";
+    else if (c == '\t')
+      out += "\\t";
+    else if (byte < 0x20 || byte == 0x7F)
+      out += {'\\', 'x', kHex[byte >> 4], kHex[byte & 15]};
+    else
+      out += c;
+  }
+  return out;
 }
 
 std::string one_line(const std::string& text) {

@@ -1,6 +1,5 @@
 #include "render/image_io.h"
 
-#include <atomic>
 #include <cstdlib>
 #include <memory>
 #include <stdexcept>
@@ -11,6 +10,7 @@
 
 #include "render/error.h"
 #include "render/file_io.h"
+#include "render/output_file.h"
 #include "render/png.h"
 
 #define STB_IMAGE_IMPLEMENTATION
@@ -42,47 +42,13 @@ std::vector<uint8_t> without_alpha(const Image& image) {
   return rgb;
 }
 
-/// A file beside its final place; removed unless it got there.
-class TemporaryFile {
- public:
-  explicit TemporaryFile(const std::filesystem::path& target) : target_(target) {
-    static std::atomic<unsigned> counter{0};
-    // Named by process and count, not after the target, whose name may be as long as the system allows.
-    const std::string name =
-        ".offstage-" + std::to_string(::getpid()) + "-" + std::to_string(counter++) + ".part";
-    path_ = target.parent_path() / name;
-    file_ = Descriptor(::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
-    if (!file_) throw_file_error(target_, "cannot be created");
-  }
-  ~TemporaryFile() {
-    if (!renamed_) ::unlink(path_.c_str());
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-
-  void write(std::span<const uint8_t> bytes) {
-    if (const int error = write_all(file_.fd(), bytes)) throw_file_error(target_, "cannot be written", error);
-  }
-  void commit() {
-    if (::fsync(file_.fd()) != 0) throw_file_error(target_, "cannot be written");
-    if (const int error = file_.close()) throw_file_error(target_, "cannot be written", error);
-    if (::rename(path_.c_str(), target_.c_str()) != 0) throw_file_error(target_, "cannot be created");
-    renamed_ = true;
-  }
-
- private:
-  std::filesystem::path target_, path_;
-  Descriptor file_;
-  bool renamed_ = false;
-};
-
 }  // namespace
 
-Image read_image(const std::filesystem::path& path) {
-  return decode_image(read_file(path, kMaxImageBytes), path.string());
+Image read_image(const std::filesystem::path& path, uint64_t max_pixels) {
+  return decode_image(read_file(path, kMaxImageBytes), path.string(), max_pixels);
 }
 
-Image decode_image(std::span<const uint8_t> bytes, const std::string& name) {
+Image decode_image(std::span<const uint8_t> bytes, const std::string& name, uint64_t max_pixels) {
   const auto fail = [&](const std::string& why) -> FileError {
     return FileError(name + ": cannot be read as an image: " + why);
   };
@@ -96,6 +62,10 @@ Image decode_image(std::span<const uint8_t> bytes, const std::string& name) {
     throw fail("it has " + std::to_string(width) + "x" + std::to_string(height) + " pixels, of at most " +
                std::to_string(kMaxSide) + " a side");
   }
+  if (static_cast<uint64_t>(width) * static_cast<uint64_t>(height) > max_pixels) {
+    throw fail("it has " + std::to_string(width) + "x" + std::to_string(height) + " pixels, of at most " +
+               std::to_string(max_pixels >> 20) + " Mi");
+  }
   if (bytes[0] == 'P' && stbi_is_16_bit_from_memory(bytes.data(), size)) {
     throw fail("PNM of 16 bits is not supported; convert it to PNG");  // stb_image swaps its bytes
   }
@@ -108,30 +78,39 @@ Image decode_image(std::span<const uint8_t> bytes, const std::string& name) {
   return image;
 }
 
-std::vector<uint8_t> encode_png(const Image& image) {
+std::vector<uint8_t> encode_png(const Image& image, const std::string& settings) {
   const std::vector<uint8_t> rgb = image.transparent ? std::vector<uint8_t>{} : without_alpha(image);
   return encode_png(PngPixels{.width_px = image.width_px,
                               .height_px = image.height_px,
                               .channels = image.transparent ? 4 : 3,
-                              .samples = image.transparent ? image.rgba : rgb});
+                              .samples = image.transparent ? image.rgba : rgb,
+                              .settings = settings});
+}
+
+std::string png_settings(const std::filesystem::path& path) {
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+  std::vector<uint8_t> head(kPngHeadBytes);
+  const ssize_t size = ::pread(file.fd(), head.data(), head.size(), 0);
+  head.resize(size > 0 ? static_cast<std::size_t>(size) : 0);
+  return settings_in_png(head);
 }
 
 void write_file_atomically(const std::filesystem::path& path, std::span<const uint8_t> bytes) {
   struct stat info {};
-  if (::stat(path.c_str(), &info) == 0 && !S_ISREG(info.st_mode) && !S_ISDIR(info.st_mode)) {
-    // A device or a pipe is written to; renaming would replace it.
-    Descriptor device(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+  if (::lstat(path.c_str(), &info) == 0 && (S_ISFIFO(info.st_mode) || S_ISCHR(info.st_mode))) {
+    // A pipe or a device is written to; renaming would replace it. Without a reader a pipe is refused.
+    Descriptor device(::open(path.c_str(), O_WRONLY | O_NONBLOCK | O_NOFOLLOW | O_CLOEXEC));
     if (!device) throw_file_error(path, "cannot be opened");
     if (const int error = write_all(device.fd(), bytes)) throw_file_error(path, "cannot be written", error);
     return;
   }
-  TemporaryFile file(path);
+  OutputFile file(path);
   file.write(bytes);
   file.commit();
 }
 
-void write_png(const std::filesystem::path& path, const Image& image) {
-  write_file_atomically(path, encode_png(image));
+void write_png(const std::filesystem::path& path, const Image& image, const std::string& settings) {
+  write_file_atomically(path, encode_png(image, settings));
 }
 
 }  // namespace offstage::render

@@ -12,6 +12,7 @@
 
 #include "render/error.h"
 #include "render/file_io.h"
+#include "render/model_files.h"
 
 namespace offstage::render {
 namespace {
@@ -247,8 +248,9 @@ std::string reason(const Assimp::Importer& importer) {
 
 }  // namespace
 
-Model import_model(const std::filesystem::path& path, const std::string& node) {
+Model import_model(const std::filesystem::path& path, const std::string& node, const InputFolders& folders) {
   Assimp::Importer importer;
+  importer.SetIOHandler(make_model_files(folders).release());  // the importer owns it
   importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, kIgnored);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_READ_ANIMATIONS, false);
@@ -256,7 +258,7 @@ Model import_model(const std::filesystem::path& path, const std::string& node) {
   if (!scene) throw FileError(path.string() + ": cannot be read as a model: " + reason(importer));
 
   Model model;
-  std::vector<unsigned> uv_sets = import_materials(*scene, path.parent_path(), model);
+  std::vector<unsigned> uv_sets = import_materials(*scene, path.parent_path(), folders, model);
   if (model.materials.empty()) model.materials.emplace_back();
   PartBuilder builder(*scene, std::move(uv_sets), model);
   place_nodes(*scene, node, builder, model);

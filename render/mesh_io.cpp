@@ -2,31 +2,30 @@
 
 #include <algorithm>
 #include <cstring>
-#include <fstream>
+#include <span>
 
-#include <fcntl.h>
-#include <signal.h>
-#include <sys/mman.h>
-#include <sys/prctl.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include "render/child_process.h"
+#include "render/confined_child.h"
 #include "render/error.h"
 #include "render/file_io.h"
+#include "render/image_io.h"
 #include "render/mesh_import.h"
 
 // assimp overflows its stack, loops, or allocates what a header claims on files that any fuzzer finds within
-// minutes. So a forked child imports, under limits of time and memory, and hands the model over in a memory
-// file. Only that child can crash, and the caller gets a message.
+// minutes. So a confined child imports, and hands the model over in a memory file. Only that child can crash,
+// and the caller gets a message.
 
 namespace offstage::render {
 namespace {
 
 constexpr uint64_t kMaxMeshBytes = uint64_t{2} << 30;
-constexpr rlim_t kMaxMemoryBytes = rlim_t{4} << 30;  // beyond what the process has mapped already
-constexpr int kModelExit = 40, kMessageExit = 41;    // other codes are not the child's
+
+template <class Archive>
+void transfer_image(Archive& archive, Image& image) {
+  archive.value(image.width_px);
+  archive.value(image.height_px);
+  archive.value(image.transparent);
+  archive.array(image.rgba);
+}
 
 /// Calls `archive` for all that a model holds: the same list for writing and reading.
 template <class Archive>
@@ -55,11 +54,7 @@ void transfer(Archive& archive, Model& model) {
     archive.value(m.metallic_roughness_texture);
     archive.value(m.emission_texture);
   });
-  archive.list(model.textures, [&](Image& image) {
-    archive.value(image.width_px);
-    archive.value(image.height_px);
-    archive.array(image.rgba);
-  });
+  archive.list(model.textures, [&](Image& image) { transfer_image(archive, image); });
   archive.list(model.warnings, [&](std::string& line) { archive.array(line); });
 }
 
@@ -127,88 +122,13 @@ class Reader {
   std::span<const uint8_t> rest_;
 };
 
-/// A memory file's contents, mapped.
-class Mapping {
- public:
-  explicit Mapping(int fd) : size_(static_cast<std::size_t>(std::max<off_t>(::lseek(fd, 0, SEEK_END), 0))) {
-    if (size_ == 0) return;
-    data_ = ::mmap(nullptr, size_, PROT_READ, MAP_SHARED | MAP_POPULATE, fd, 0);
-    if (data_ == MAP_FAILED) throw std::bad_alloc();
-  }
-  ~Mapping() {
-    if (size_ > 0) ::munmap(data_, size_);
-  }
-  Mapping(const Mapping&) = delete;
-  Mapping& operator=(const Mapping&) = delete;
-
-  std::span<const uint8_t> bytes() const { return {static_cast<const uint8_t*>(data_), size_}; }
-
- private:
-  std::size_t size_;
-  void* data_ = nullptr;
-};
-
-/// 8 s of processor time and 1 s more for each MiB, six times that by the clock, 4 GiB of memory; quietly.
-void limit_this_process(uint64_t file_bytes) {
-  const rlim_t seconds = 8 + (file_bytes >> 20);
-  const auto limit = [](__rlimit_resource what, rlim_t value) {
-    const rlimit both{value, value};
-    ::setrlimit(what, &both);
-  };
-  uint64_t mapped_pages = 0;
-  std::ifstream("/proc/self/statm") >> mapped_pages;
-  limit(RLIMIT_AS, mapped_pages * static_cast<uint64_t>(::sysconf(_SC_PAGESIZE)) + kMaxMemoryBytes);
-  limit(RLIMIT_CPU, seconds);
-  limit(RLIMIT_CORE, 0);
-
-  sigset_t none;
-  sigemptyset(&none);
-  ::pthread_sigmask(SIG_SETMASK, &none, nullptr);
-  for (const int signal : {SIGALRM, SIGXCPU}) ::signal(signal, SIG_DFL);
-  for (const int signal : {SIGINT, SIGTERM}) ::signal(signal, SIG_IGN);  // our caller decides
-  ::alarm(static_cast<unsigned>(6 * seconds));
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-
-  const int nowhere = ::open("/dev/null", O_RDWR);  // assimp's own prints
-  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, stream);
+/// The files that a child may read: the folders, and those of the file itself where they are all it has.
+InputFolders readable(const std::filesystem::path& path, const InputFolders& folders) {
+  return folders.folders().empty() ? InputFolders({path.parent_path()}) : folders;
 }
 
-/// The child: leaves a model or a message in the memory file.
-[[noreturn]] void import_and_exit(const std::filesystem::path& path, const std::string& node,
-                                  uint64_t file_bytes, int memory) {
-  std::string message;
-  try {
-    limit_this_process(file_bytes);
-    Model model = import_model(path, node);
-    Writer writer(memory);
-    transfer(writer, model);
-    ::_exit(kModelExit);
-  } catch (const FileError& error) {
-    message = error.what();
-  } catch (const std::bad_alloc&) {
-    message = path.string() + ": needs more than 4 GiB of memory; it is broken or too large";
-  } catch (const std::exception& error) {
-    message = path.string() + ": cannot be read as a model: " + one_line(error.what());
-  }
-  write_all(memory, {reinterpret_cast<const uint8_t*>(message.data()), message.size()});
-  ::_exit(kMessageExit);
-}
-
-int wait_status(pid_t child) {
-  int status = 0;
-  while (::waitpid(child, &status, 0) < 0) {
-    if (errno != EINTR) throw UnavailableError("the model reader was lost: " + system_reason(errno));
-  }
-  return status;
-}
-
-[[noreturn]] void throw_for_crash(const std::filesystem::path& path, int status) {
-  const bool slow = WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGALRM ||
-                                            WTERMSIG(status) == SIGKILL);
-  throw FileError(path.string() +
-                  (slow ? ": takes too long or too much memory to read; it is broken or too large"
-                        : ": crashed the model reader (" + describe_failure(status).value_or("ended") +
-                              "); it is broken or nested too deeply"));
+void check_folder(const std::filesystem::path& path, const InputFolders& folders) {
+  if (!folders.folders().empty() && !folders.contain(path)) throw FileError(outside_of_folders(path));
 }
 
 uint64_t checked_size(const std::filesystem::path& path) {
@@ -225,6 +145,10 @@ uint64_t checked_size(const std::filesystem::path& path) {
 
 }  // namespace
 
+std::string outside_of_folders(const std::filesystem::path& path) {
+  return path.string() + ": is outside of the scene's folder; allow its folder with --allow DIR";
+}
+
 ModelPath split_node(const std::filesystem::path& path) {
   const std::string text = path.string();
   const std::size_t mark = text.rfind('#');
@@ -233,21 +157,18 @@ ModelPath split_node(const std::filesystem::path& path) {
   return {text.substr(0, mark), text.substr(mark + 1)};
 }
 
-Model read_model(const std::filesystem::path& file) {
-  const auto [path, node] = split_node(file);
+Model read_model(const std::filesystem::path& file, const InputFolders& folders, const StopTest& stop) {
+  const ModelPath place = split_node(file);
+  const std::filesystem::path& path = place.file;
+  check_folder(path, folders);
   const uint64_t size = checked_size(path);
-  const Descriptor memory(::memfd_create("offstage-model", MFD_CLOEXEC));
-  if (!memory) throw UnavailableError("no memory file for the model reader: " + system_reason(errno));
-  const pid_t child = ::fork();
-  if (child < 0) throw UnavailableError("the model reader cannot be started: " + system_reason(errno));
-  if (child == 0) import_and_exit(path, node, size, memory.fd());
-
-  const int status = wait_status(child);
-  const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 0;
-  if (code != kModelExit && code != kMessageExit) throw_for_crash(path, status);
-  const Mapping answer(memory.fd());
-  if (code == kMessageExit) throw FileError({answer.bytes().begin(), answer.bytes().end()});
-
+  const InputFolders allowed = readable(path, folders);
+  const ChildAnswer answer = run_confined(
+      {.what = path.string(), .file_bytes = size, .folders = &allowed, .stop = stop}, [&](int memory) {
+        Model model = import_model(path, place.node, allowed);
+        Writer writer(memory);
+        transfer(writer, model);
+      });
   Model model;
   Reader reader(answer.bytes());
   transfer(reader, model);
@@ -255,6 +176,22 @@ Model read_model(const std::filesystem::path& file) {
     if (part.mesh.normals.empty()) compute_normals(part.mesh);
   }
   return model;
+}
+
+Image read_texture(const std::filesystem::path& path, const InputFolders& folders, const StopTest& stop) {
+  check_folder(path, folders);
+  const uint64_t size = checked_size(path);
+  const InputFolders allowed = readable(path, folders);
+  const ChildAnswer answer = run_confined(
+      {.what = path.string(), .file_bytes = size, .folders = &allowed, .stop = stop}, [&](int memory) {
+        Image image = read_image(path, kMaxTexturePixels);
+        Writer writer(memory);
+        transfer_image(writer, image);
+      });
+  Image image;
+  Reader reader(answer.bytes());
+  transfer_image(reader, image);
+  return image;
 }
 
 }  // namespace offstage::render

@@ -1,10 +1,12 @@
 #pragma once
-/// Model files through assimp: OBJ, PLY, STL, glTF/GLB, Collada, FBX and what else it reads. assimp runs in a
-/// forked child with limits of time (8 s of processor time and 1 s more for each MiB of the file) and memory
-/// (4 GiB), because it crashes or hangs on hostile files; the caller gets a message instead.
+/// Model files through assimp: OBJ, PLY, STL, glTF/GLB, Collada, FBX and what else it reads; and textures.
+/// Both are read in a confined child (confined_child.h has its limits of time and memory), because readers
+/// crash or hang on hostile files; the caller gets a message instead.
 
 #include <filesystem>
 
+#include "render/file_io.h"
+#include "render/input_folders.h"
 #include "render/model.h"
 
 namespace offstage::render {
@@ -25,6 +27,16 @@ ModelPath split_node(const std::filesystem::path& path);
 /// ones as linear. Throws FileError with one line for a file that is missing, broken, or has no triangle
 /// left; UnavailableError if no process can be started.
 /// Of a path that ends in #NODE only that node's own triangles, from where it is (Model::Node).
-Model read_model(const std::filesystem::path& path);
+/// The model and all that it names must lie in `folders`; without any, in the model's own folder. `stop` ends
+/// the work with StoppedError.
+Model read_model(const std::filesystem::path& path, const InputFolders& folders = {},
+                 const StopTest& stop = {});
+
+/// Reads a picture of up to kMaxTexturePixels. Throws as read_model does.
+Image read_texture(const std::filesystem::path& path, const InputFolders& folders = {},
+                   const StopTest& stop = {});
+
+/// The message for a file that is in none of the folders that may be read.
+std::string outside_of_folders(const std::filesystem::path& path);
 
 }  // namespace offstage::render

@@ -58,7 +58,8 @@ std::filesystem::path find_texture(const std::filesystem::path& folder, std::str
 
 Image decode_embedded(const aiTexture& texture, const std::string& name) {
   if (texture.mHeight == 0) {  // a compressed file of mWidth bytes
-    return decode_image({reinterpret_cast<const uint8_t*>(texture.pcData), texture.mWidth}, name);
+    return decode_image({reinterpret_cast<const uint8_t*>(texture.pcData), texture.mWidth}, name,
+                        kMaxTexturePixels);
   }
   Image image{static_cast<int>(texture.mWidth), static_cast<int>(texture.mHeight), {}};
   image.rgba.reserve(image.pixel_count() * 4);
@@ -71,8 +72,9 @@ Image decode_embedded(const aiTexture& texture, const std::string& name) {
 
 class MaterialImporter {
  public:
-  MaterialImporter(const aiScene& scene, const std::filesystem::path& folder, Model& model)
-      : scene_(scene), folder_(folder), model_(model) {}
+  MaterialImporter(const aiScene& scene, const std::filesystem::path& folder, const InputFolders& folders,
+                   Model& model)
+      : scene_(scene), folder_(folder), folders_(folders), model_(model) {}
 
   /// Appends the material; returns its set of texture coordinates.
   unsigned add(const aiMaterial& source) {
@@ -195,11 +197,14 @@ class MaterialImporter {
     }
     const std::filesystem::path path = find_texture(folder_, name);
     if (path.empty()) throw FileError("texture '" + name + "' is not there");
-    return read_image(path);
+    if (!folders_.contain(path))
+      throw FileError("texture '" + name + "' is outside of the folders that may be read");
+    return read_image(path, kMaxTexturePixels);
   }
 
   const aiScene& scene_;
   std::filesystem::path folder_;
+  const InputFolders& folders_;
   Model& model_;
   std::map<std::pair<std::string, bool>, int> loaded_;
 };
@@ -207,8 +212,8 @@ class MaterialImporter {
 }  // namespace
 
 std::vector<unsigned> import_materials(const aiScene& scene, const std::filesystem::path& folder,
-                                       Model& model) {
-  MaterialImporter importer(scene, folder, model);
+                                       const InputFolders& folders, Model& model) {
+  MaterialImporter importer(scene, folder, folders, model);
   std::vector<unsigned> uv_sets;
   for (unsigned i = 0; i < scene.mNumMaterials; ++i) uv_sets.push_back(importer.add(*scene.mMaterials[i]));
   return uv_sets;

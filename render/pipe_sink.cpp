@@ -2,7 +2,9 @@
 #include <cerrno>
 #include <stdexcept>
 
+#include <fcntl.h>
 #include <signal.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "render/error.h"
@@ -38,12 +40,28 @@ class SigpipeBlock {
   bool was_pending_ = false;
 };
 
-void write_to_stdout(std::span<const uint8_t> bytes) {
-  const SigpipeBlock block;
-  const int error = write_all(STDOUT_FILENO, bytes);
-  if (error == EPIPE) throw FileError("standard output: the program that reads the frames has ended");
-  if (error != 0) throw_file_error("standard output", "cannot be written", error);
-}
+/// Standard output. A pipe is opened a second time, so that it need not block for this process and still does
+/// for others that share it.
+class StandardOutput {
+ public:
+  explicit StandardOutput(StopTest stop) : stop_(std::move(stop)) {
+    struct stat info {};
+    if (::fstat(STDOUT_FILENO, &info) == 0 && S_ISFIFO(info.st_mode))
+      own_ = Descriptor(::open("/proc/self/fd/1", O_WRONLY | O_NONBLOCK | O_CLOEXEC));
+  }
+
+  void write(std::span<const uint8_t> bytes) {
+    const SigpipeBlock block;
+    const int error = write_all(own_ ? own_.fd() : STDOUT_FILENO, bytes, stop_);
+    if (error == EPIPE) throw FileError("standard output: the program that reads the frames has ended");
+    if (error == ECANCELED) throw StoppedError("standard output: nobody reads the frames");
+    if (error != 0) throw_file_error("standard output", "cannot be written", error);
+  }
+
+ private:
+  StopTest stop_;
+  Descriptor own_;
+};
 
 /// BT.709 luma and colour differences, limited range, in 16-bit fixed point, rounded.
 std::array<uint8_t, 3> yuv_from_rgb(const uint8_t* rgb) {
@@ -58,8 +76,8 @@ std::array<uint8_t, 3> yuv_from_rgb(const uint8_t* rgb) {
 
 class PipeSink final : public FrameSink {
  public:
-  PipeSink(bool y4m, int width_px, int height_px, FrameRate fps)
-      : y4m_(y4m), width_px_(width_px), height_px_(height_px) {
+  PipeSink(bool y4m, int width_px, int height_px, FrameRate fps, StopTest stop)
+      : y4m_(y4m), width_px_(width_px), height_px_(height_px), out_(std::move(stop)) {
     header_ = "YUV4MPEG2 W" + std::to_string(width_px) + " H" + std::to_string(height_px) + " F" +
               std::to_string(fps.numerator) + ":" + std::to_string(fps.denominator) +
               " Ip A1:1 C444 XCOLORRANGE=LIMITED\n";
@@ -69,7 +87,7 @@ class PipeSink final : public FrameSink {
     if (image.width_px != width_px_ || image.height_px != height_px_) {
       throw std::invalid_argument("pipe sink: the frame's size is not the stream's");
     }
-    if (!y4m_) return write_to_stdout(image.rgba);
+    if (!y4m_) return out_.write(image.rgba);
     const std::string mark = std::exchange(header_, "") + "FRAME\n";
     const std::size_t pixels = image.pixel_count();
     buffer_.resize(mark.size() + 3 * pixels);
@@ -79,20 +97,22 @@ class PipeSink final : public FrameSink {
       const auto yuv = yuv_from_rgb(&image.rgba[4 * i]);
       for (std::size_t c = 0; c < 3; ++c) plane[c * pixels + i] = yuv[c];
     }
-    write_to_stdout(buffer_);
+    out_.write(buffer_);
   }
   void close() override {}
 
  private:
   bool y4m_;
   int width_px_, height_px_;
+  StandardOutput out_;
   std::string header_;
   std::vector<uint8_t> buffer_;
 };
 
 }  // namespace
 
-std::unique_ptr<FrameSink> make_pipe_sink(bool y4m, int width_px, int height_px, FrameRate fps) {
+std::unique_ptr<FrameSink> make_pipe_sink(bool y4m, int width_px, int height_px, FrameRate fps,
+                                          StopTest stop) {
   if (width_px <= 0 || height_px <= 0 || fps.numerator <= 0 || fps.denominator <= 0 ||
       fps.per_second() > 1000) {
     throw std::invalid_argument("pipe sink: needs a size, and a frame rate in (0, 1000]");
@@ -100,7 +120,7 @@ std::unique_ptr<FrameSink> make_pipe_sink(bool y4m, int width_px, int height_px,
   if (::isatty(STDOUT_FILENO)) {
     throw std::invalid_argument("standard output is a terminal; send the frames to a program or a file");
   }
-  return std::make_unique<PipeSink>(y4m, width_px, height_px, fps);
+  return std::make_unique<PipeSink>(y4m, width_px, height_px, fps, std::move(stop));
 }
 
 }  // namespace offstage::render

@@ -13,6 +13,7 @@ namespace offstage::render {
 namespace {
 
 constexpr int kLevel = 1;
+constexpr std::string_view kSettingsKey("Settings\0", 9);
 
 void append_number(std::vector<uint8_t>& out, uint32_t value) {
   for (int shift = 24; shift >= 0; shift -= 8) out.push_back(static_cast<uint8_t>(value >> shift));
@@ -68,6 +69,11 @@ std::vector<uint8_t> encode_png(const PngPixels& pixels) {
   header.insert(header.end(), {static_cast<uint8_t>(pixels.bits), kind, 0, 0, 0});
   append_chunk(png, "IHDR", header);
 
+  if (!pixels.settings.empty()) {
+    std::vector<uint8_t> text(kSettingsKey.begin(), kSettingsKey.end());
+    text.insert(text.end(), pixels.settings.begin(), pixels.settings.end());
+    append_chunk(png, "tEXt", text);
+  }
   if (!pixels.comment.empty()) {
     // Keyword, not compressed, no language, no translation of the keyword.
     constexpr std::string_view kStart("Comment\0\0\0\0\0", 12);
@@ -92,6 +98,19 @@ std::vector<uint8_t> encode_png(const PngPixels& pixels) {
   close_chunk(png, name_at);
   append_chunk(png, "IEND", {});
   return png;
+}
+
+std::string settings_in_png(std::span<const uint8_t> head) {
+  constexpr std::size_t kHeader = 8 + 25;  // signature and IHDR
+  if (head.size() < kHeader + 8) return {};
+  std::size_t length = 0;
+  for (std::size_t k = 0; k < 4; ++k) length = length << 8 | head[kHeader + k];
+  const std::string_view rest(reinterpret_cast<const char*>(head.data()) + kHeader + 4,
+                              head.size() - kHeader - 4);
+  if (!rest.starts_with("tEXt") || length > rest.size() - 4 || length < kSettingsKey.size() ||
+      !rest.substr(4).starts_with(kSettingsKey))
+    return {};
+  return std::string(rest.substr(4 + kSettingsKey.size(), length - kSettingsKey.size()));
 }
 
 }  // namespace offstage::render

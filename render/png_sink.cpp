@@ -9,14 +9,18 @@ namespace {
 
 class PngSink final : public FrameSink {
  public:
-  explicit PngSink(const std::filesystem::path& pattern) : pattern_(pattern) {
+  PngSink(const std::filesystem::path& pattern, const std::string& settings)
+      : pattern_(pattern), settings_(settings) {
     create_parent_folders(frame_path(pattern, 0));
   }
-  void write(int frame, const Image& image) override { write_png(frame_path(pattern_, frame), image); }
+  void write(int frame, const Image& image) override {
+    write_png(frame_path(pattern_, frame), image, settings_);
+  }
   void close() override {}
 
  private:
   std::filesystem::path pattern_;
+  std::string settings_;
 };
 
 }  // namespace
@@ -38,8 +42,8 @@ std::filesystem::path frame_path(const std::filesystem::path& pattern, int frame
   return pattern.parent_path() / name;
 }
 
-std::unique_ptr<FrameSink> make_png_sink(const std::filesystem::path& pattern) {
-  return std::make_unique<PngSink>(pattern);
+std::unique_ptr<FrameSink> make_png_sink(const std::filesystem::path& pattern, const std::string& settings) {
+  return std::make_unique<PngSink>(pattern, settings);
 }
 
 }  // namespace offstage::render

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "render/file_io.h"
 #include "render/frame_rate.h"
 #include "render/image.h"
 
@@ -24,8 +25,9 @@ class FrameSink {
 /// The file of a frame: `pattern` has a run of '#' in its file name, as long as the number is wide at least.
 std::filesystem::path frame_path(const std::filesystem::path& pattern, int frame);
 
-/// One PNG per frame.
-std::unique_ptr<FrameSink> make_png_sink(const std::filesystem::path& pattern);
+/// One PNG per frame, which carries the settings (encode_png).
+std::unique_ptr<FrameSink> make_png_sink(const std::filesystem::path& pattern,
+                                         const std::string& settings = {});
 
 struct VideoDef {
   std::filesystem::path
@@ -33,6 +35,7 @@ struct VideoDef {
   int width_px = 0, height_px = 0;
   FrameRate fps;
   bool alpha = false;  ///< .webm, .mov, .webp, .apng, .png keep it; others are refused
+  StopTest stop = {};  ///< ends the wait for an encoder that takes no frame or does not end
 };
 
 /// Throws UnavailableError, before any frame is drawn, if ffmpeg or the encoder this file needs is missing
@@ -40,15 +43,17 @@ struct VideoDef {
 /// advice).
 void check_video(const VideoDef& def);
 /// ffmpeg (or the program that OFFSTAGE_FFMPEG names) as a child process in its own process group, fed raw
-/// frames, writing to NAME.part.EXT. Colour is BT.709 with sRGB's curve, alpha straight; the same frames give
-/// the same bytes on any number of cores. GIF has a palette per frame, so that a long film needs no memory.
-/// Throws as check_video does, and FileError if the file cannot be made.
+/// frames, writing to an OutputFile, which gets its name when all frames are found in it. Colour is BT.709
+/// with sRGB's curve, alpha straight; the same frames give the same bytes on any number of cores. GIF has a
+/// palette per frame, so that a long film needs no memory. Throws as check_video does, and FileError if the
+/// file cannot be made.
 std::unique_ptr<FrameSink> make_video_sink(const VideoDef& def);
 
 /// Raw top-down frames on standard output: rgba bytes, or yuv4mpeg (4:4:4, BT.709, limited range) if `y4m`. A
-/// closed pipe throws FileError. Throws std::invalid_argument for an impossible size or rate, and on a
-/// terminal.
-std::unique_ptr<FrameSink> make_pipe_sink(bool y4m, int width_px, int height_px, FrameRate fps);
+/// closed pipe throws FileError; one whose reader waits, StoppedError after a request to stop. Throws
+/// std::invalid_argument for an impossible size or rate, and on a terminal.
+std::unique_ptr<FrameSink> make_pipe_sink(bool y4m, int width_px, int height_px, FrameRate fps,
+                                          StopTest stop = {});
 
 /// The endings of video files, with their dots.
 std::vector<std::string> video_endings();

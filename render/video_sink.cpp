@@ -1,26 +1,26 @@
 #include <algorithm>
 #include <cstdlib>
-#include <fstream>
 #include <memory>
 #include <mutex>
 #include <sstream>
 #include <stdexcept>
-#include <string_view>
 
-#include <fcntl.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include "render/child_process.h"
 #include "render/error.h"
+#include "render/output_file.h"
 #include "render/sink.h"
 #include "render/video_format.h"
+#include "render/video_frames.h"
 
 namespace offstage::render {
 namespace {
 
 constexpr std::size_t kCaptureBytes = 1 << 16;
-constexpr time_t kStallSeconds = 300;  // an encoder that takes no frame for so long is stuck
+constexpr std::chrono::seconds kStall{300};  // an encoder that takes no frame for so long is stuck
 
 std::string ffmpeg_program() {
   const char* chosen = std::getenv("OFFSTAGE_FFMPEG");
@@ -80,16 +80,25 @@ struct FrameChannel {
     }
     ours = Descriptor(ends[0]);
     theirs = Descriptor(ends[1]);
-    const timeval limit{kStallSeconds, 0};
-    ::setsockopt(ends[0], SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
   }
 };
 
-int send_all(int socket, std::span<const uint8_t> bytes) {
+/// Returns the error number that stopped it, or 0; ECANCELED after a request to stop, EAGAIN for a stuck
+/// encoder.
+int send_all(int socket, std::span<const uint8_t> bytes, const StopTest& stop) {
+  Patience patience(stop);
+  auto last = std::chrono::steady_clock::now();
   while (!bytes.empty()) {
-    const ssize_t sent = ::send(socket, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    const ssize_t sent = ::send(socket, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     if (sent >= 0) {
       bytes = bytes.subspan(static_cast<std::size_t>(sent));
+      patience.progressed();
+      last = std::chrono::steady_clock::now();
+    } else if (errno == EAGAIN) {
+      if (patience.exhausted()) return ECANCELED;
+      if (std::chrono::steady_clock::now() - last > kStall) return EAGAIN;
+      pollfd ready{socket, POLLOUT, 0};
+      ::poll(&ready, 1, Patience::kInterval_ms);
     } else if (errno != EINTR) {
       return errno;
     }
@@ -97,68 +106,19 @@ int send_all(int socket, std::span<const uint8_t> bytes) {
   return 0;
 }
 
-std::filesystem::path partial_name(const std::filesystem::path& path) {
-  const std::string own = std::to_string(::getpid());  // another process may write the same film
-  return path.parent_path() / (path.stem().string() + ".part-" + own + path.extension().string());
+/// Makes the folder of a film and removes what killed runs left in it.
+const std::filesystem::path& prepared(const std::filesystem::path& target) {
+  create_parent_folders(target);
+  remove_leftovers(target.parent_path());
+  return target;
 }
-
-/// Whether an MP4 or QuickTime file is whole: its boxes fill it exactly and the index is among them. ffmpeg
-/// ends with success even if the disk filled up while it moved the index to the front.
-bool has_whole_boxes(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary | std::ios::ate);
-  const auto size = static_cast<uint64_t>(in.tellg());
-  bool index = false;
-  uint64_t at = 0;
-  while (in && at + 8 <= size) {
-    uint8_t head[16] = {};
-    in.seekg(static_cast<std::streamoff>(at));
-    in.read(reinterpret_cast<char*>(head), at + 16 <= size ? 16 : 8);
-    const auto number = [&](int from, int bytes) {
-      uint64_t n = 0;
-      for (int i = 0; i < bytes; ++i) n = n << 8 | head[from + i];
-      return n;
-    };
-    const uint64_t length = number(0, 4) == 1 ? number(8, 8) : number(0, 4);
-    if (length < 8 || length > size - at) return false;
-    index |= std::string_view(reinterpret_cast<const char*>(head) + 4, 4) == "moov";
-    at += length;
-  }
-  return index && at == size;
-}
-
-/// Owns the partial file from before ffmpeg starts until it is whole.
-class PartialFile {
- public:
-  explicit PartialFile(const std::filesystem::path& target) : target_(target), path_(partial_name(target)) {
-    create_parent_folders(target);
-    // Made here, so that a folder that cannot be written to is named with the system's reason.
-    if (!Descriptor(::open(path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666))) {
-      throw_file_error(target_, "cannot be created");
-    }
-  }
-  ~PartialFile() {
-    if (!renamed_) ::unlink(path_.c_str());
-  }
-  PartialFile(const PartialFile&) = delete;
-  PartialFile& operator=(const PartialFile&) = delete;
-
-  const std::filesystem::path& path() const { return path_; }
-  void commit() {
-    if (::rename(path_.c_str(), target_.c_str()) != 0) throw_file_error(target_, "cannot be created");
-    renamed_ = true;
-  }
-
- private:
-  std::filesystem::path target_, path_;
-  bool renamed_ = false;
-};
 
 class VideoSink final : public FrameSink {
  public:
   VideoSink(const VideoDef& def, const VideoFormat& format)
       : def_(def),
         encoder_(format.encoder),
-        file_(def.path),
+        file_(prepared(def.path)),
         words_(kCaptureBytes),
         process_(encoder_command(ffmpeg_program(), def, format, file_.path()), channel_.theirs.fd(), -1,
                  words_.fd()) {
@@ -172,8 +132,9 @@ class VideoSink final : public FrameSink {
       throw std::invalid_argument("video sink: the frame's size is not the film's");
     }
     if (!channel_.ours) throw std::logic_error("video sink: it is closed");
-    const int error = send_all(channel_.ours.fd(), image.rgba);
-    if (error == EAGAIN) process_.kill();
+    const int error = send_all(channel_.ours.fd(), image.rgba, def_.stop);
+    if (error == EAGAIN || error == ECANCELED) process_.kill();
+    if (error == ECANCELED) throw StoppedError(def_.path.string() + ": ffmpeg takes no more frames");
     if (error != 0) fail(process_.wait());
     ++frames_;
   }
@@ -182,10 +143,12 @@ class VideoSink final : public FrameSink {
     if (closed_) return;
     if (frames_ == 0) throw FileError(def_.path.string() + ": no frame was written");
     channel_.ours.close();
-    if (const auto failure = process_.wait()) fail(failure);
-    const std::string ending = def_.path.extension().string();
-    if ((ending == ".mp4" || ending == ".mov") && !has_whole_boxes(file_.path()))
-      throw FileError(def_.path.string() + ": the film was cut short; is the disk full?");
+    if (const auto failure = process_.wait(def_.stop)) fail(failure);
+    // ffmpeg ends with success even if the disk was full for its last bytes: the film counts as written only
+    // when its frames are found in it.
+    const double seconds = def_.fps.seconds(frames_);
+    if (const std::string wrong = wrong_with_video(file_.path(), def_.path, frames_, seconds); !wrong.empty())
+      throw FileError(def_.path.string() + ": the film was cut short (" + wrong + "); is the disk full?");
     file_.commit();
     closed_ = true;
   }
@@ -200,7 +163,7 @@ class VideoSink final : public FrameSink {
 
   VideoDef def_;
   std::string encoder_;
-  PartialFile file_;
+  OutputFile file_;
   BoundedCapture words_;
   FrameChannel channel_;
   ChildProcess process_;  // last, so that it ends before the file goes

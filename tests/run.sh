@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds offstage and runs its tests:  tests/run.sh [--long] [--tsan] [CTEST OPTIONS...]
-#   --long  also the long cases (label "long"), for which scanned models are fetched, and the benchmarks are built
+#   --long  also the long cases (label "long"), for which scanned models are fetched, the benchmarks, and the fuzz targets
 #   --tsan  also the threaded tests under ThreadSanitizer
 # The unit tests and the model importer run a second time under AddressSanitizer and UndefinedBehaviorSanitizer.
 set -euo pipefail
@@ -20,7 +20,7 @@ while [ $# -gt 0 ]; do
 done
 
 install_packages $build_packages $test_packages
-[ $bench = OFF ] || install_packages $bench_packages debootstrap
+[ $bench = OFF ] || install_packages $bench_packages $fuzz_packages debootstrap
 cores=$(nproc)
 failed=0
 
@@ -40,6 +40,9 @@ build-asan/test_determinism --gtest_filter='*InEveryBuild' --gtest_brief=1 || fa
 if [ ${#long[@]} = 0 ]; then
   tests/meshes.sh build/meshes
   export OFFSTAGE_MESHES=$PWD/build/meshes
+  cmake --preset fuzz
+  cmake --build build-fuzz
+  ctest --test-dir build-fuzz -L fuzz -LE long -j "$cores" --output-on-failure || failed=1
 fi
 
 if [ "$tsan" = yes ]; then

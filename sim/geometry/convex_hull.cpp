@@ -213,6 +213,7 @@ class FaceMerger {
       for (std::size_t k = 0; k < 3; ++k)
         if (neighbours_[t][k] == kNoFace || group_[neighbours_[t][k]] != group)
           sides.emplace_back(triangles_[t][k], triangles_[t][(k + 1) % 3]);
+    if (sides.empty()) return {};  // a closed surface in one plane: the points are degenerate
     std::sort(sides.begin(), sides.end());
     std::vector<uint32_t> loop;
     uint32_t at = sides.front().first;
@@ -279,10 +280,33 @@ ConvexPolyhedron assemble(std::span<const Vec3> points, const std::vector<Triang
   }
 }
 
+/// The power of two that brings the largest coordinate to about 1 where products of four coordinates would
+/// overflow or vanish; else 0.
+int exponent_to_one(std::span<const Vec3> points) {
+  constexpr int kMost = 200;
+  Real largest = 0;
+  for (const Vec3& p : points) largest = std::max(largest, p.cwiseAbs().maxCoeff());
+  const int exponent = largest > 0 ? std::ilogb(largest) : 0;
+  return std::abs(exponent) > kMost ? -exponent : 0;
+}
+
+std::vector<Vec3> scaled_by_power(std::span<const Vec3> points, int exponent) {
+  std::vector<Vec3> scaled(points.begin(), points.end());
+  for (Vec3& p : scaled) p = p.unaryExpr([&](Real x) { return std::ldexp(x, exponent); });
+  return scaled;
+}
+
 }  // namespace
 
 ConvexPolyhedron convex_hull(std::span<const Vec3> points) {
   assert(!points.empty());
+  if (const int exponent = exponent_to_one(points); exponent != 0) {
+    const ConvexPolyhedron unit = convex_hull(scaled_by_power(points, exponent));
+    Loops faces(unit.face_count());
+    for (uint32_t f = 0; f < unit.face_count(); ++f)
+      faces[f].assign(unit.face_vertices(f).begin(), unit.face_vertices(f).end());
+    return {scaled_by_power(unit.vertices(), -exponent), faces};
+  }
   const Frame frame = fit(points);
   if (frame.dimension == 0) return {{points.front()}, {}};
   if (frame.dimension == 1) return segment_hull(points, frame);

@@ -14,9 +14,10 @@ namespace {
 constexpr Real kMaxSubsteps = 1e6;
 constexpr std::size_t kWorthThreads = 200;
 
+/// The state, and the velocities that follow from it.
 bool is_finite(const RigidBody& b) {
-  return b.position.allFinite() && b.orientation.coeffs().allFinite() && b.momentum.allFinite() &&
-         b.angular_momentum.allFinite();
+  return b.position.allFinite() && b.orientation.coeffs().allFinite() && b.velocity().allFinite() &&
+         b.angular_velocity().allFinite() && b.angular_momentum.allFinite();
 }
 
 bool same(const Pose& a, const Pose& b) {

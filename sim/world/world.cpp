@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <sstream>
 #include <stdexcept>
 
 #include "sim/dynamics/pair_forces.h"
@@ -11,6 +12,11 @@
 
 namespace offstage::sim {
 namespace {
+
+// What the solvers can still square and multiply without overflow.
+constexpr Real kLeastMass = 1e-40, kMostMass = 1e40;  // [kg]
+constexpr Real kMostInertia = 1e100;                  // [kg m^2], and of its inverse
+constexpr Real kMostCoordinate = 1e12;                // of a mesh [m]
 
 [[noreturn]] void refuse(const std::string& object, const std::string& what) {
   throw std::invalid_argument(object + ": " + what);
@@ -109,6 +115,17 @@ RigidBody make_rigid_body(const std::string& object, const BodyDef& def, const S
   rigid.centre = unit.centre;
   rigid.inertia = rigid.mass / unit.volume * unit.inertia;
   rigid.inverse_inertia = rigid.inertia.inverse();
+  const bool in_range = rigid.mass > kLeastMass && rigid.mass < kMostMass && rigid.centre.allFinite() &&
+                        rigid.inertia.allFinite() && rigid.inverse_inertia.allFinite() &&
+                        rigid.inertia.cwiseAbs().maxCoeff() < kMostInertia &&
+                        rigid.inverse_inertia.cwiseAbs().maxCoeff() < kMostInertia;
+  if (!in_range) {
+    std::ostringstream what;
+    what << "its mass is " << rigid.mass << " kg and its largest moment of inertia "
+         << rigid.inertia.diagonal().maxCoeff() << " kg m^2, allowed are masses of " << kLeastMass << " to "
+         << kMostMass << " kg and moments of 1e-100 to 1e100 kg m^2";
+    refuse(object, what.str());
+  }
   rigid.linear_drag = def.linear_drag;
   rigid.angular_drag = def.angular_drag;
   rigid.place(def.pose);
@@ -246,7 +263,11 @@ World::World(World&&) noexcept = default;
 World& World::operator=(World&&) noexcept = default;
 
 MeshHandle World::add_mesh(const TriangleMesh& mesh, std::optional<ConvexDecomposition> decomposition) {
-  for (const Vec3& v : mesh.vertices) check_finite("mesh", "a vertex", v);
+  for (const Vec3& v : mesh.vertices) {
+    check_finite("mesh", "a vertex", v);
+    if (v.cwiseAbs().maxCoeff() > kMostCoordinate)
+      refuse("mesh", "a coordinate is beyond 1e12 m; use a smaller scale");
+  }
   for (const Triangle& t : mesh.triangles)
     for (uint32_t v : t)
       if (v >= mesh.vertices.size())

@@ -252,7 +252,7 @@ TEST_F(SceneInclude, JoinsListsAndMergesObjectsAndTheIncluderWins) {
   EXPECT_EQ(scene.world.step, 0.01);
   EXPECT_EQ(scene.world.gravity, Vec3(0, -1, 0));
   EXPECT_EQ(scene.name, "c");
-  EXPECT_EQ(loaded.folder, folder);
+  EXPECT_EQ(loaded.folder.path(), folder);
   EXPECT_EQ(scene.bodies[1].where.file, path("parts/b.json"));
 }
 

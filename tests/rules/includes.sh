@@ -57,7 +57,7 @@ only() {
   status=1
 }
 only 'libqhull_r/' 'sim/geometry/convex_hull'
-only 'assimp/' 'render/mesh_import render/mesh_material'
+only 'assimp/' 'render/mesh_import render/mesh_material render/model_files'
 only 'stb_image' 'render/image_io'
 only 'libdeflate.h' 'render/png'
 only 'Imf' 'render/exr'

@@ -1,5 +1,7 @@
 #include "producer/base/error.h"
 
+#include "render/file_io.h"
+
 namespace offstage {
 namespace {
 
@@ -19,7 +21,7 @@ std::string Problem::describe() const {
   if (where.line > 0) text += ':' + std::to_string(where.line) + ':' + std::to_string(where.column);
   if (!text.empty()) text += ": ";
   if (!where.path.empty()) text += where.path + ": ";
-  return text + what;
+  return render::escaped(text + what);
 }
 
 SceneError::SceneError(std::vector<Problem> problems)

@@ -14,6 +14,9 @@ struct Where {
   std::string path;
 };
 
+/// A report of problems lists so many of them, then counts.
+inline constexpr std::size_t kMostProblems = 50;
+
 /// One problem: "file:line:col: /path: what is wrong; what is allowed".
 struct Problem {
   Where where;
@@ -22,7 +25,8 @@ struct Problem {
   std::string describe() const;
 };
 
-/// A scene that cannot be used, with every problem found.
+/// A scene that cannot be used, with the problems found: at most kMostProblems, and one more that counts the
+/// rest.
 class SceneError : public std::runtime_error {
  public:
   explicit SceneError(std::vector<Problem> problems);

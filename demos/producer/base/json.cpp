@@ -285,8 +285,12 @@ const Node* Node::find(std::string_view key) const {
 
 Node parse_json(std::string_view text, const std::string& name, int file) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
-  if (text.find('\0') != std::string_view::npos)
-    throw SceneError({name, 0, 0, {}}, "is not a text file: it contains a zero byte");
+  if (const std::size_t zero = text.find('\0'); zero != std::string_view::npos) {
+    const std::string_view before = text.substr(0, zero);
+    const auto line = static_cast<int>(std::count(before.begin(), before.end(), '\n')) + 1;
+    const auto column = static_cast<int>(zero - (before.rfind('\n') + 1)) + 1;  // npos + 1 is 0
+    throw SceneError({name, line, column, {}}, "is not a text file: it contains a zero byte");
+  }
   TreeBuilder builder(text, name, file);
   nlohmann::json::sax_parse(text, &builder, nlohmann::json::input_format_t::json, true, true);
   if (!builder.problems.empty()) throw SceneError(std::move(builder.problems));

@@ -1,17 +1,17 @@
 #include "producer/base/packed_file.h"
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 
 #include <fmt/format.h>
 #include <xxhash.h>
 #include <zstd.h>
 
+#include "render/file_io.h"
+
 namespace offstage::producer {
 namespace {
 
-constexpr uint64_t kMaxPayload = uint64_t{1} << 34;
+constexpr uint64_t kMaxPayload = uint64_t{1} << 32;
 
 struct Header {
   char magic[8];
@@ -65,9 +65,7 @@ std::vector<uint8_t> unpack(const FileKind& kind, std::span<const uint8_t> bytes
 }
 
 std::vector<uint8_t> read_file(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw render::FileError(path.string() + ": cannot read the file");
-  return {std::istreambuf_iterator<char>(in), {}};
+  return render::read_file(path, kMaxPayload);
 }
 
 }  // namespace offstage::producer

@@ -18,7 +18,7 @@ fs::path shipped_folder(std::string_view installed, std::string_view source) {
   return fs::is_directory(compiled, error) ? compiled : fs::path();
 }
 
-fs::path model_file(const std::string& name, const fs::path& scene_folder) {
+fs::path model_file(const std::string& name, const SceneFolder& scene_folder) {
   const fs::path beside = scene_folder / name;
   std::error_code error;
   if (fs::path(name).has_parent_path() || fs::exists(render::split_node(beside).file, error)) return beside;

@@ -1,9 +1,23 @@
 #include "producer/base/suggest.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <utility>
 #include <vector>
 
 namespace offstage::producer {
+
+namespace {
+
+constexpr std::size_t kMostComparisons = 100'000;
+thread_local std::size_t comparisons_left = SIZE_MAX;
+
+}  // namespace
+
+SuggestionBudget::SuggestionBudget() : before_(std::exchange(comparisons_left, kMostComparisons)) {}
+SuggestionBudget::~SuggestionBudget() {
+  comparisons_left = before_;
+}
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   // Optimal string alignment: row i of the table from the two rows before it.
@@ -28,6 +42,8 @@ std::string nearest(std::string_view word, std::span<const std::string> candidat
   std::size_t best = std::max<std::size_t>(1, word.size() / 3) + 1;
   std::string found;
   for (const std::string& candidate : candidates) {
+    if (comparisons_left == 0) return {};
+    --comparisons_left;
     if (candidate.size() > word.size() + best || word.size() > candidate.size() + best) continue;
     const std::size_t distance = edit_distance(word, candidate);
     if (distance >= best) continue;

@@ -7,6 +7,19 @@
 
 namespace offstage::producer {
 
+/// While one lives, this thread compares a limited number of words, so that a text with very many faults is
+/// refused in a time that grows with its length; then nothing is suggested any more.
+class SuggestionBudget {
+ public:
+  SuggestionBudget();
+  ~SuggestionBudget();
+  SuggestionBudget(const SuggestionBudget&) = delete;
+  SuggestionBudget& operator=(const SuggestionBudget&) = delete;
+
+ private:
+  std::size_t before_;
+};
+
 /// Fewest insertions, deletions, replacements and swaps of neighbours that turn one word into the other.
 std::size_t edit_distance(std::string_view a, std::string_view b);
 

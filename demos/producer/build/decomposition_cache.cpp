@@ -12,13 +12,16 @@ namespace offstage::producer {
 namespace {
 
 /// A new version whenever decompose() answers differently.
-constexpr FileKind kPartsKind = {"offparts", 1, "convex decomposition"};
+constexpr FileKind kPartsKind = {"offparts", 2, "convex decomposition"};
 
 using sim::ConvexDecomposition;
 using sim::ConvexPolyhedron;
 
-std::vector<uint8_t> serialize(const ConvexDecomposition& d) {
+/// `mesh_hash` is in the file, too: one that was renamed is not taken for that of another mesh.
+std::vector<uint8_t> serialize(const ConvexDecomposition& d, const XXH128_hash_t& mesh_hash) {
   ByteWriter out;
+  out.put(uint64_t{mesh_hash.low64});
+  out.put(uint64_t{mesh_hash.high64});
   out.put(static_cast<uint8_t>(d.method));
   out.put(d.volume_error);
   out.put(uint64_t{d.note.size()});
@@ -36,6 +39,17 @@ std::vector<uint8_t> serialize(const ConvexDecomposition& d) {
   return pack(kPartsKind, out.bytes());
 }
 
+XXH128_hash_t hash_of(const sim::TriangleMesh& mesh) {
+  static_assert(sizeof(sim::Vec3) == 24 && sizeof(sim::Triangle) == 12, "hashed as they lie in memory");
+  XXH3_state_t* hash = XXH3_createState();
+  XXH3_128bits_reset(hash);
+  XXH3_128bits_update(hash, mesh.vertices.data(), mesh.vertices.size() * sizeof(sim::Vec3));
+  XXH3_128bits_update(hash, mesh.triangles.data(), mesh.triangles.size() * sizeof(sim::Triangle));
+  const XXH128_hash_t h = XXH3_128bits_digest(hash);
+  XXH3_freeState(hash);
+  return h;
+}
+
 ConvexPolyhedron take_part(ByteReader& in) {
   std::vector<sim::Vec3> vertices(in.take_count(sizeof(sim::Vec3)));
   for (sim::Vec3& v : vertices) v = in.take<sim::Vec3>();
@@ -47,9 +61,13 @@ ConvexPolyhedron take_part(ByteReader& in) {
   return {std::move(vertices), faces};
 }
 
-ConvexDecomposition decomposition_from(std::span<const uint8_t> bytes, const std::string& source) {
+ConvexDecomposition decomposition_from(std::span<const uint8_t> bytes, const std::string& source,
+                                       const XXH128_hash_t& mesh_hash) {
   const std::vector<uint8_t> payload = unpack(kPartsKind, bytes, source);
   ByteReader in(payload, source);
+  const auto low = in.take<uint64_t>(), high = in.take<uint64_t>();
+  if (low != mesh_hash.low64 || high != mesh_hash.high64)
+    throw render::FileError(source + ": is of another mesh");
   ConvexDecomposition d;
   d.method = static_cast<ConvexDecomposition::Method>(in.take<uint8_t>());
   d.volume_error = in.take<double>();
@@ -77,20 +95,15 @@ DecompositionCache DecompositionCache::of_user() {
 
 std::filesystem::path DecompositionCache::file(const sim::TriangleMesh& mesh) const {
   if (folder_.empty()) return {};
-  static_assert(sizeof(sim::Vec3) == 24 && sizeof(sim::Triangle) == 12, "hashed as they lie in memory");
-  XXH3_state_t* hash = XXH3_createState();
-  XXH3_128bits_reset(hash);
-  XXH3_128bits_update(hash, mesh.vertices.data(), mesh.vertices.size() * sizeof(sim::Vec3));
-  XXH3_128bits_update(hash, mesh.triangles.data(), mesh.triangles.size() * sizeof(sim::Triangle));
-  const XXH128_hash_t h = XXH3_128bits_digest(hash);
-  XXH3_freeState(hash);
+  const XXH128_hash_t h = hash_of(mesh);
   return folder_ / fmt::format("{:016x}{:016x}-{}.parts", h.high64, h.low64, kPartsKind.version);
 }
 
-std::optional<ConvexDecomposition> DecompositionCache::read(const std::filesystem::path& path) const {
+std::optional<ConvexDecomposition> DecompositionCache::read(const std::filesystem::path& path,
+                                                            const sim::TriangleMesh& mesh) const {
   if (path.empty() || !std::filesystem::exists(path)) return std::nullopt;
   try {
-    return decomposition_from(read_file(path), path.string());
+    return decomposition_from(read_file(path), path.string(), hash_of(mesh));
   } catch (const render::FileError&) {
   } catch (const std::invalid_argument&) {  // faces that do not close
   }
@@ -99,12 +112,12 @@ std::optional<ConvexDecomposition> DecompositionCache::read(const std::filesyste
 
 ConvexDecomposition DecompositionCache::decompose(const sim::TriangleMesh& mesh) const {
   const std::filesystem::path path = file(mesh);
-  if (auto known = read(path)) return std::move(*known);
+  if (auto known = read(path, mesh)) return std::move(*known);
   ConvexDecomposition made = sim::decompose(mesh, sim::MeshTopology(mesh));
   if (path.empty()) return made;
   try {
     std::filesystem::create_directories(folder_);
-    render::write_file_atomically(path, serialize(made));
+    render::write_file_atomically(path, serialize(made, hash_of(mesh)));
   } catch (const render::FileError&) {
   } catch (const std::filesystem::filesystem_error&) {
   }

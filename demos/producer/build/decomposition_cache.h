@@ -27,7 +27,8 @@ class DecompositionCache {
   std::filesystem::path file(const sim::TriangleMesh& mesh) const;
 
  private:
-  std::optional<sim::ConvexDecomposition> read(const std::filesystem::path& path) const;
+  std::optional<sim::ConvexDecomposition> read(const std::filesystem::path& path,
+                                               const sim::TriangleMesh& mesh) const;
 
   std::filesystem::path folder_;
 };

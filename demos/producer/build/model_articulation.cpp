@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "producer/base/interrupt.h"
 #include "producer/base/shipped_files.h"
 #include "producer/build/articulation_builder.h"
 #include "render/error.h"
@@ -9,12 +10,13 @@
 
 namespace offstage::producer {
 
-void read_links(Scene& scene, const std::filesystem::path& folder, std::vector<Problem>& errors) {
+void read_links(Scene& scene, const SceneFolder& folder, std::vector<Problem>& errors) {
   for (ArticulationTemplate& articulation : scene.articulations) {
     auto* tree = std::get_if<ModelTree>(&articulation);
     if (!tree || tree->file.empty()) continue;
     try {
-      for (const render::Model::Node& node : render::read_model(model_file(tree->file, folder)).nodes)
+      for (const render::Model::Node& node :
+           render::read_model(model_file(tree->file, folder), folder.inputs(), interrupt_signal).nodes)
         tree->links.push_back({node.name,
                                node.parent,
                                {node.position.cast<Real>(), node.orientation.cast<Real>().normalized()}});

@@ -10,6 +10,6 @@ namespace offstage::producer {
 
 /// Reads the links of the scene's model trees from their files, relative to `folder`. What cannot be read
 /// goes to `errors`.
-void read_links(Scene& scene, const std::filesystem::path& folder, std::vector<Problem>& errors);
+void read_links(Scene& scene, const SceneFolder& folder, std::vector<Problem>& errors);
 
 }  // namespace offstage::producer

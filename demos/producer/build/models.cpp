@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <xxhash.h>
 
+#include "producer/base/interrupt.h"
 #include "producer/base/shipped_files.h"
 #include "render/error.h"
 #include "render/image_io.h"
@@ -108,9 +109,8 @@ std::map<std::string, Where> bodies_in_parts(const Scene& scene) {
 
 }  // namespace
 
-ModelLibrary::ModelLibrary(const Scene& scene, const std::filesystem::path& folder,
-                           const DecompositionCache& cache, std::vector<Problem>& warnings,
-                           const StepCallback& on_step) {
+ModelLibrary::ModelLibrary(const Scene& scene, const SceneFolder& folder, const DecompositionCache& cache,
+                           std::vector<Problem>& warnings, const StepCallback& on_step) {
   std::vector<Problem> problems;
   XXH3_state_t* hash = XXH3_createState();
   XXH3_128bits_reset(hash);
@@ -118,7 +118,9 @@ ModelLibrary::ModelLibrary(const Scene& scene, const std::filesystem::path& fold
   for (const auto& [file, where] : files.models) {
     try {
       const render::Model& model =
-          models_.emplace(file, render::read_model(model_file(file, folder))).first->second;
+          models_
+              .emplace(file, render::read_model(model_file(file, folder), folder.inputs(), interrupt_signal))
+              .first->second;
       for (const std::string& warning : model.warnings) warnings.push_back({where, file + ": " + warning});
       add_to(hash, model);
     } catch (const render::FileError& error) {
@@ -127,7 +129,9 @@ ModelLibrary::ModelLibrary(const Scene& scene, const std::filesystem::path& fold
   }
   for (const auto& [file, where] : files.textures) {
     try {
-      add_to(hash, textures_.emplace(file, render::read_image(folder / file)).first->second);
+      add_to(hash,
+             textures_.emplace(file, render::read_texture(folder / file, folder.inputs(), interrupt_signal))
+                 .first->second);
     } catch (const render::FileError& error) {
       problems.push_back({where, error.what()});
     }

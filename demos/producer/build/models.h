@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "producer/base/scene_folder.h"
 #include "producer/build/decomposition_cache.h"
 #include "producer/scene/scene.h"
 #include "render/model.h"
@@ -25,7 +26,7 @@ class ModelLibrary {
   /// and cuts models into convex parts where collisions of bodies or an overlay need that. Throws SceneError
   /// with every file that cannot be used; what was repaired in a model or is only approximately right is
   /// added to `warnings`.
-  ModelLibrary(const Scene& scene, const std::filesystem::path& folder, const DecompositionCache& cache,
+  ModelLibrary(const Scene& scene, const SceneFolder& folder, const DecompositionCache& cache,
                std::vector<Problem>& warnings, const StepCallback& on_step = {});
 
   const render::Model& model(const std::string& file) const { return models_.at(file); }

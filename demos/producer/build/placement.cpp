@@ -193,6 +193,12 @@ std::vector<T> expand_all(const std::vector<T>& originals, uint64_t seed, std::v
                           std::vector<Problem>& warnings) {
   std::vector<T> all;
   for (const T& original : originals) {
+    if (all.size() >= kMostBodies) {
+      errors.push_back(
+          {original.where, "there are more than " + std::to_string(kMostBodies) +
+                               " objects of this kind with all copies; a body takes about 8 kB of memory"});
+      return all;
+    }
     if (copy_count(original.placement) > kMaxCopies) {
       errors.push_back({original.where, "asks for more than " + std::to_string(kMaxCopies) +
                                             " copies: the counts of repeat, grid and scatter multiply"});

@@ -14,6 +14,8 @@
 
 namespace offstage::producer {
 
+/// Of a scene with all copies. A body takes about 8 kB, so that they fit into 2 GB.
+inline constexpr std::size_t kMostBodies = 200'000;
 inline constexpr int kMaxCopies = 100'000;  ///< of one object
 
 /// A rigid motion of the world that carries an original, with all its keyframes, to one of its copies.

@@ -332,6 +332,18 @@ void Simulation::note(const sim::StepReport& report) {
                         state_dump(report.non_finite));
 }
 
+sim::Energy Simulation::energy() const {
+  const sim::Energy energy = world_.energy();
+  if (!std::isfinite(energy.kinetic + energy.potential + energy.elastic))
+    fail("the energy is not finite; use smaller masses, speeds or forces");
+  return energy;
+}
+
+void Simulation::fail(const std::string& what) const {
+  throw DivergedError(fmt::format("the simulation diverged at {:.4f} s: {}", world_.time(), what),
+                      state_dump({}));
+}
+
 int Simulation::skipped_pieces() const {
   return static_cast<int>(std::ceil(scene_.output.start * scene_.output.fps.per_second()));
 }

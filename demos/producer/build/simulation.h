@@ -82,6 +82,10 @@ class Simulation {
   Snapshot snapshot() const;
 
   const sim::World& world() const { return world_; }
+  /// Of the world. Throws DivergedError if it is not finite.
+  sim::Energy energy() const;
+  /// Throws DivergedError with the state now and what is wrong with it.
+  [[noreturn]] void fail(const std::string& what) const;
   SimulationTotals totals() const;
   std::size_t body_count() const { return world_.body_count(); }
 

@@ -5,7 +5,6 @@
 
 #include "producer/base/packed_file.h"
 #include "render/error.h"
-#include "render/image_io.h"
 
 namespace offstage::producer {
 namespace {
@@ -13,7 +12,7 @@ namespace {
 using Eigen::Vector3f;
 using Eigen::Vector4f;
 
-constexpr FileKind kSnapshotKind = {"offsnap", 3, "snapshot"};
+constexpr FileKind kSnapshotKind = {"offsnap", 4, "snapshot"};
 
 constexpr std::size_t kBodyBytes = 7 * sizeof(float);
 constexpr std::size_t kRodBytes = 6 * sizeof(float);
@@ -35,14 +34,6 @@ void take_bytes(ByteReader& in, std::vector<T>& values) {
   for (T& v : values) v = in.take<T>();
 }
 
-void write_manifest(const std::filesystem::path& folder, const std::string& key, int frames, bool complete) {
-  const nlohmann::ordered_json manifest = {
-      {"offstage_cache", kSnapshotKind.version}, {"key", key}, {"frames", frames}, {"complete", complete}};
-  const std::string text = manifest.dump(2) + "\n";
-  render::write_file_atomically(folder / "cache.json",
-                                {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
-}
-
 }  // namespace
 
 uint64_t Snapshot::point_count() const {
@@ -51,8 +42,10 @@ uint64_t Snapshot::point_count() const {
   return n;
 }
 
-std::vector<uint8_t> serialize(const Snapshot& snapshot) {
+std::vector<uint8_t> serialize(const Snapshot& snapshot, std::string_view key) {
   ByteWriter out;
+  out.put(uint64_t{key.size()});
+  for (const char c : key) out.put(c);
   out.put(snapshot.frame);
   out.put(snapshot.time);
   out.put(snapshot.state_hash.low);
@@ -101,9 +94,12 @@ std::vector<uint8_t> serialize(const Snapshot& snapshot) {
   return pack(kSnapshotKind, out.bytes());
 }
 
-Snapshot deserialize(std::span<const uint8_t> bytes, const std::string& source) {
+Snapshot deserialize(std::span<const uint8_t> bytes, const std::string& source, std::string_view key) {
   const std::vector<uint8_t> payload = unpack(kSnapshotKind, bytes, source);
   ByteReader in(payload, source);
+  std::string own_key(in.take_count(1), '\0');
+  for (char& c : own_key) c = in.take<char>();
+  if (own_key != key) throw render::FileError(source + ": belongs to another simulation");
   Snapshot snapshot;
   snapshot.frame = in.take<int>();
   snapshot.time = in.take<double>();
@@ -155,60 +151,6 @@ Snapshot deserialize(std::span<const uint8_t> bytes, const std::string& source) 
     }
   }
   in.expect_end();
-  return snapshot;
-}
-
-std::filesystem::path SnapshotCache::file(int frame) const {
-  return folder_ / fmt::format("{:06}.snap", frame);
-}
-
-void SnapshotCache::create(const std::string& key, int frames, bool force) const {
-  std::error_code error;
-  std::filesystem::create_directories(folder_, error);
-  if (error) throw render::FileError(folder_.string() + ": " + error.message());
-  const bool occupied = std::filesystem::exists(folder_ / "cache.json");
-  if (occupied && !force)
-    throw render::FileError(folder_.string() + ": already contains a cache; replace it with --force");
-  if (!occupied && !std::filesystem::is_empty(folder_))
-    throw render::FileError(folder_.string() + ": is not empty and is not a cache; choose an empty folder");
-  for (const auto& entry : std::filesystem::directory_iterator(folder_))
-    if (entry.path().extension() == ".snap") std::filesystem::remove(entry.path());
-  write_manifest(folder_, key, frames, false);
-}
-
-void SnapshotCache::check(const std::string& key, int frames) const {
-  const auto path = folder_ / "cache.json";
-  if (!std::filesystem::exists(path))
-    throw render::FileError(folder_.string() +
-                            ": contains no cache; create one with: offstage simulate SCENE --cache " +
-                            folder_.string());
-  const std::vector<uint8_t> bytes = read_file(path);
-  const auto manifest = nlohmann::json::parse(bytes.begin(), bytes.end(), nullptr, false);
-  if (!manifest.is_object() || manifest.value("offstage_cache", 0u) != kSnapshotKind.version)
-    throw render::FileError(path.string() + ": is a cache of another version; simulate again");
-  if (!manifest.value("complete", false))
-    throw render::FileError(folder_.string() +
-                            ": the simulation of this cache did not finish; simulate again");
-  if (manifest.value("key", std::string()) != key || manifest.value("frames", 0) != frames)
-    throw render::FileError(
-        folder_.string() +
-        ": the cache was made with another scene or other settings; simulate again with --force");
-}
-
-void SnapshotCache::finish(const std::string& key, int frames) const {
-  write_manifest(folder_, key, frames, true);
-}
-
-void SnapshotCache::write(const Snapshot& snapshot) const {
-  render::write_file_atomically(file(snapshot.frame), serialize(snapshot));
-}
-
-Snapshot SnapshotCache::read(int frame) const {
-  const auto path = file(frame);
-  Snapshot snapshot = deserialize(read_file(path), path.string());
-  if (snapshot.frame != frame)
-    throw render::FileError(
-        fmt::format("{}: contains frame {} instead of {}", path.string(), snapshot.frame, frame));
   return snapshot;
 }
 

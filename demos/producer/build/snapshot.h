@@ -1,12 +1,13 @@
 #pragma once
 /// What one frame hands from the simulation to the drawing: an immutable picture of the state, cast to float
-/// once. It is also what `simulate --cache` writes, one compressed and checksummed file per frame.
+/// once. It is also what a SnapshotCache keeps, one compressed and checksummed file per frame.
 
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -60,30 +61,11 @@ struct Snapshot {
   uint64_t point_count() const;
 };
 
-/// The bytes of a snapshot: magic, format version, checksum (XXH3-64), zstd payload.
-std::vector<uint8_t> serialize(const Snapshot& snapshot);
-/// Throws render::FileError, naming `source`, for bytes that are damaged, cut short or of another version.
-Snapshot deserialize(std::span<const uint8_t> bytes, const std::string& source);
-
-/// A folder of snapshots of one simulation.
-class SnapshotCache {
- public:
-  explicit SnapshotCache(std::filesystem::path folder) : folder_(std::move(folder)) {}
-
-  /// Prepares the folder for a simulation identified by `key`, leaving another's files only if `force`.
-  /// Throws FileError.
-  void create(const std::string& key, int frames, bool force) const;
-  /// Throws FileError if the folder holds no cache, an unfinished one, or one of another simulation.
-  void check(const std::string& key, int frames) const;
-  /// Marks the cache as complete.
-  void finish(const std::string& key, int frames) const;
-
-  void write(const Snapshot& snapshot) const;
-  Snapshot read(int frame) const;
-
- private:
-  std::filesystem::path file(int frame) const;
-  std::filesystem::path folder_;
-};
+/// The bytes of a snapshot: magic, format version, checksum (XXH3-64), zstd payload. `key` is that of the
+/// run.
+std::vector<uint8_t> serialize(const Snapshot& snapshot, std::string_view key = {});
+/// Throws render::FileError, naming `source`, for bytes that are damaged, cut short, of another version or of
+/// a run with another key.
+Snapshot deserialize(std::span<const uint8_t> bytes, const std::string& source, std::string_view key = {});
 
 }  // namespace offstage::producer

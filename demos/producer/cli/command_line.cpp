@@ -24,6 +24,7 @@
 #include "producer/cli/commands.h"
 #include "producer/run/output.h"
 #include "render/error.h"
+#include "render/file_io.h"
 
 namespace offstage::producer {
 namespace {
@@ -41,12 +42,21 @@ const std::map<std::string, ProgressStyle> kProgressStyles = {{"auto", ProgressS
                                                               {"json", ProgressStyle::json},
                                                               {"none", ProgressStyle::none}};
 
+void add_allow(CLI::App& command, std::vector<std::string>& allow) {
+  command
+      .add_option(
+          "--allow", allow,
+          "A folder besides the scene's own that includes, models and textures may lie in (repeatable)")
+      ->allow_extra_args(false);
+}
+
 void add_overrides(CLI::App& command, SceneOptions& scene) {
   command
       .add_option("--set", scene.set,
                   "Override a value of the scene: path=value, such as emitters.0.rate=200")
       ->allow_extra_args(false);
   command.add_option("--seed", scene.seed, "Seed of all random numbers");
+  add_allow(command, scene.allow);
   command.add_flag("--no-cache", scene.no_cache,
                    "Do not use the cache of convex decompositions in ~/.cache/offstage");
 }
@@ -182,6 +192,7 @@ CLI::App* add_tune(CLI::App& app, TuneOptions& tune) {
   command->add_option("--size", tune.size, "Size WxH that drafts fit into")->capture_default_str();
   command->add_flag_callback(
       "--no-open", [&tune] { tune.open = false; }, "Only print the address and open no browser");
+  add_allow(*command, tune.scene.allow);
   command->add_flag("--no-cache", tune.scene.no_cache,
                     "Do not use the cache of convex decompositions in ~/.cache/offstage");
   add_threads(*command, tune.threads);
@@ -280,6 +291,7 @@ CLI::App* add_bless(CLI::App& app, BlessOptions& bless) {
   command->add_option("scenes", bless.scenes, "Scene files")->required();
   command->add_option("--golden", bless.golden, "Folder of the goldens")->capture_default_str();
   command->add_option("--reason", bless.reason, "Why the pictures changed")->required();
+  add_allow(*command, bless.allow);
   add_threads(*command, bless.threads);
   add_gl(*command, bless.gl);
   return command;
@@ -340,7 +352,9 @@ CLI::App* add_sweep(CLI::App& app, SweepOptions& sweep) {
 void open_standard_streams() {
   for (int fd = 0; fd <= 2; ++fd)
     if (fcntl(fd, F_GETFD) < 0)
-      open("/dev/null", fd == 0 ? O_RDONLY : O_WRONLY);  // takes the lowest free number
+      // Takes the lowest free number. Standard output cannot be written then: results are not lost in
+      // silence.
+      open("/dev/null", fd == 2 ? O_WRONLY : O_RDONLY);
 }
 
 /// Results that could not be written are a failure, whatever the command did.
@@ -358,32 +372,34 @@ int reported(const std::function<int()>& command) {
     log("{}\n", error.what());
     return kSceneInvalid;
   } catch (const OutputError& error) {
-    log("offstage: {}\n", error.what());
+    log("offstage: {}\n", render::escaped(error.what()));
     return kUsage;
   } catch (const std::invalid_argument& error) {
-    log("offstage: {}\n", error.what());
+    log("offstage: {}\n", render::escaped(error.what()));
     return kUsage;
   } catch (const render::UnavailableError& error) {
     log("offstage: {}\n", error.what());
     return kUnavailable;
   } catch (const DivergedError& error) {
-    const std::string file = "offstage-diverged.json";
     log("offstage: {}\n", error.what());
     try {
-      write_text_file(file, error.state());
-      log("the last state was saved to {}\n", file);
+      log("the last state was saved to {}\n",
+          write_numbered_file("offstage-diverged", ".json", error.state()));
     } catch (const render::FileError& unsaved) {
       log("the last state could not be saved: {}\n", unsaved.what());
     }
     return kDiverged;
+  } catch (const render::StoppedError&) {
+    log("interrupted\n");
+    return 128 + interrupt_signal();
   } catch (const Interrupted& interrupted) {
     log("interrupted\n");
     return 128 + interrupted.signal();
   } catch (const std::bad_alloc&) {
-    log("offstage: out of memory\n");
+    write_log("offstage: out of memory\n");
     return kRunFailed;
   } catch (const std::exception& error) {
-    log("offstage: {}\n", error.what());
+    log("offstage: {}\n", render::escaped(error.what()));
     return kRunFailed;
   }
 }

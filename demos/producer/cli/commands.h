@@ -30,7 +30,8 @@ struct SceneOptions {
   std::optional<uint64_t> seed;
   std::vector<std::string> channels;  ///< depth, normal, id, motion; empty: as the scene says
   std::optional<std::string> channel_format;
-  bool no_cache = false;  ///< neither read nor keep the convex parts of models on disk
+  std::vector<std::string> allow;  ///< folders besides the scene's own that its files may lie in
+  bool no_cache = false;           ///< neither read nor keep the convex parts of models on disk
 
   DecompositionCache decompositions() const {
     return no_cache ? DecompositionCache() : DecompositionCache::of_user();
@@ -152,7 +153,7 @@ struct CompareOptions {
 int compare_command(const CompareOptions& options);
 
 struct BlessOptions {
-  std::vector<std::string> scenes;
+  std::vector<std::string> scenes, allow;
   std::string golden, reason;
   int threads = 0;
   render::GlPlatform gl = render::GlPlatform::automatic;
@@ -190,6 +191,8 @@ void print_readable(const nlohmann::ordered_json& json, int indent = 0);
 /// What is wrong with a text that is no frame rate.
 std::string wrong_frame_rate(const std::string& text);
 void write_text_file(const std::string& path, const std::string& text);
+/// Writes to the first of STEM.EXT, STEM-2.EXT, ... that is not there yet, and returns that name.
+std::string write_numbered_file(const std::string& stem, const std::string& ending, const std::string& text);
 
 /// Refuses, before the work, a file that could not or must not be written after it. An empty name is none.
 /// Throws OutputError.

@@ -19,6 +19,7 @@
 #include "render/error.h"
 #include "render/image_io.h"
 #include "render/primitives.h"
+#include "render/sandbox.h"
 #include "render/sink.h"
 #include "render/stage.h"
 #include "render/tone_map.h"
@@ -135,6 +136,7 @@ int doctor_command() {
   json["threads"] = available_processors();
   utsname system{};
   uname(&system);
+  json["reader_of_models"] = "confined by " + render::sandbox_support();
   json["system"] = fmt::format("{} {} {}", system.sysname, system.release, system.machine);
   const std::vector<std::string> encoders = render::available_encoders();
   json["ffmpeg_encoders"] = encoders;

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <optional>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "producer/base/interrupt.h"
+#include "producer/base/json_file.h"
 #include "producer/base/log.h"
 #include "producer/cli/command_line.h"
 #include "producer/cli/commands.h"
@@ -28,12 +28,9 @@ namespace fs = std::filesystem;
 
 /// The frame rate that the manifest beside the frames records, if it is of these frames.
 std::optional<render::FrameRate> rate_of_manifest(const fs::path& pattern) {
-  std::ifstream in(pattern.parent_path() / "manifest.json");
-  const auto manifest = nlohmann::json::parse(in, nullptr, false);
-  if (!manifest.is_object() || !manifest.contains("fps") || !manifest.contains("pattern") ||
-      manifest["pattern"] != pattern.filename().string())
-    return {};
-  const auto& fps = manifest["fps"];
+  const std::optional<JsonObject> manifest = read_json_file(pattern.parent_path() / "manifest.json");
+  if (!manifest || manifest->text("pattern") != pattern.filename().string()) return {};
+  const nlohmann::json fps = manifest->value("fps");
   return render::parse_frame_rate(fps.is_string() ? fps.get<std::string>() : fps.dump());
 }
 
@@ -137,9 +134,11 @@ int encode_command(const EncodeOptions& options) {
   render::VideoDef def{.path = target.path,
                        .width_px = sequence.width_px,
                        .height_px = sequence.height_px,
-                       .fps = rate_of(options, sequence)};
+                       .fps = rate_of(options, sequence),
+                       .stop = [] { return interrupt_signal() != 0; }};
   render::check_video(def);
   check_file(target.path.string(), options.force);
+  const OutputLock lock(OutputLock::beside(target.path), target.path.string());
   def.alpha = render::keeps_alpha(target.path.extension().string()) && any_transparent(sequence);
   if (sequence.left_out > 0 && !options.talk.quiet)
     log("note: {} frames are missing between {} and {}; the video skips them\n", sequence.left_out,

@@ -130,9 +130,15 @@ int bless_command(const BlessOptions& options) {
   render::pin_environment(threads, options.gl);
   std::set<std::string> taken;  // by scenes of this command
   for (const std::string& file : options.scenes) {
-    const LoadedScene scene =
-        load({.file = file, .set = {}, .quality = {}, .size = {}, .fps = {}, .duration = {}, .seed = {}},
-             true, golden_overrides());
+    const LoadedScene scene = load({.file = file,
+                                    .set = {},
+                                    .quality = {},
+                                    .size = {},
+                                    .fps = {},
+                                    .duration = {},
+                                    .seed = {},
+                                    .allow = options.allow},
+                                   true, golden_overrides());
     const GoldenPlace place = find_golden(options.golden, scene, file, taken);
     Golden golden = drawn_with_progress(scene, threads);
     golden.scene = place.name;

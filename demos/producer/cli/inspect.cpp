@@ -1,7 +1,9 @@
 // schema and info, and what the commands share.
 
+#include <cerrno>
 #include <map>
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -12,6 +14,8 @@
 #include "producer/cli/commands.h"
 #include "producer/run/fingerprint.h"
 #include "producer/run/output.h"
+#include "render/error.h"
+#include "render/file_io.h"
 #include "render/image_io.h"
 #include "render/mesh_io.h"
 #include "sim/geometry/mass_properties.h"
@@ -42,7 +46,7 @@ Json describe(const sim::ConvexDecomposition& decomposition) {
 }
 
 Json describe_model(const std::filesystem::path& path, const DecompositionCache& cache) {
-  const render::Model model = render::read_model(path);
+  const render::Model model = render::read_model(path, {}, interrupt_signal);
   const sim::TriangleMesh mesh = sim::weld(collision_mesh(model, 1));
   const sim::MeshTopology topology(mesh);
   const sim::MassProperties mass = sim::mass_properties(mesh);
@@ -158,7 +162,7 @@ void print_warnings(const std::vector<Problem>& warnings) {
 LoadedScene load(const SceneOptions& options, bool quiet, const std::vector<std::string>& more_overrides) {
   std::vector<std::string> overrides = options.overrides();
   overrides.insert(overrides.begin(), more_overrides.begin(), more_overrides.end());
-  LoadedScene loaded = load_scene(options.file, overrides);
+  LoadedScene loaded = load_scene(options.file, overrides, options.allow);
   if (!quiet) print_warnings(loaded.warnings);
   return loaded;
 }
@@ -188,6 +192,20 @@ ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
   ModelLibrary models = load_models(loaded, options, talk, warnings);
   if (!talk.quiet) print_warnings(warnings);
   return models;
+}
+
+std::string write_numbered_file(const std::string& stem, const std::string& ending, const std::string& text) {
+  constexpr int kMost = 10'000;
+  for (int i = 1; i <= kMost; ++i) {
+    const std::string name = stem + (i == 1 ? "" : "-" + std::to_string(i)) + ending;
+    // Made here and now, or it is another's.
+    const render::Descriptor made(::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+    if (!made && errno == EEXIST) continue;
+    if (!made) render::throw_file_error(name, "cannot be created");
+    write_text_file(name, text);
+    return name;
+  }
+  throw render::FileError(stem + ending + ": and all further names are taken");
 }
 
 void write_text_file(const std::string& path, const std::string& text) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -71,7 +72,8 @@ render::VideoDef video_def(const Plan& plan) {
           .width_px = scene.render.size.x(),
           .height_px = scene.render.size.y(),
           .fps = scene.output.fps,
-          .alpha = scene.environment.background == Background::transparent};
+          .alpha = scene.environment.background == Background::transparent,
+          .stop = [] { return interrupt_signal() != 0; }};
 }
 
 int print_plan(const Plan& plan) {
@@ -96,12 +98,15 @@ int print_plan(const Plan& plan) {
   return kOk;
 }
 
+std::string frame_settings(const LoadedScene& loaded, const ModelLibrary& models, render::GlPlatform gl) {
+  return settings_key(loaded, models) + (gl == render::GlPlatform::egl_gpu ? "-gpu" : "");  // other pixels
+}
+
 Plan make_plan(const RenderOptions& options, const ModelLibrary& models, LoadedScene loaded) {
   Plan plan{.loaded = std::move(loaded), .target = parse_output(options.out)};
   plan.frames = parse_frames(options.frames, plan.loaded.scene.frame_count());
   if (!options.chunk.empty()) plan.frames = chunk_of(plan.frames, options.chunk);
-  plan.settings = settings_key(plan.loaded, models);
-  if (options.gl == render::GlPlatform::egl_gpu) plan.settings += "-gpu";  // other pixels
+  plan.settings = frame_settings(plan.loaded, models, options.gl);
   plan.threads = threads_or_all(options.threads);
   // llvmpipe already draws one frame with all processors. On two, a second drawing thread takes about 100 MB
   // and more processor time, and saves some 2 % by the clock; with more of them, what is serial in a frame
@@ -125,8 +130,16 @@ bool assemble_video(const Plan& plan) {
     video->write(frame, render::read_image(render::frame_path(plan.frames_pattern, frame)));
   }
   video->close();
-  fs::remove_all(plan.frames_pattern.parent_path());
   return true;
+}
+
+OutputLock lock_film(const Plan& plan) {
+  const fs::path& film = plan.target.path;
+  std::error_code error;
+  if (film.has_parent_path()) fs::create_directories(film.parent_path(), error);
+  if (error)
+    throw render::FileError(film.parent_path().string() + ": cannot make the folder: " + error.message());
+  return OutputLock(OutputLock::beside(film), film.string());
 }
 
 RunStats draw(const Plan& plan, const ModelLibrary& models, const RenderOptions& options,
@@ -148,24 +161,30 @@ int render_to_frames(const Plan& plan, const ModelLibrary& models, const RenderO
   const Existing existing = options.force    ? Existing::replace
                             : options.resume ? Existing::keep
                                              : Existing::refuse;
+  std::optional<OutputLock> film_lock;
+  if (plan.through_frames) film_lock.emplace(lock_film(plan));
   if (plan.through_frames && plan.channels.choice.any())
     fs::create_directories(plan.channels.stem.parent_path());
-  const std::vector<int> missing = prepare_frames(plan.frames_pattern, plan.channels, plan.frames,
-                                                  {.scene = scene.name,
-                                                   .settings = plan.settings,
-                                                   .width_px = scene.render.size.x(),
-                                                   .height_px = scene.render.size.y(),
-                                                   .frames = scene.frame_count(),
-                                                   .fps = scene.output.fps},
-                                                  existing);
+  FrameFolder folder = prepare_frames(plan.frames_pattern, plan.channels, plan.frames,
+                                      {.scene = scene.name,
+                                       .settings = plan.settings,
+                                       .width_px = scene.render.size.x(),
+                                       .height_px = scene.render.size.y(),
+                                       .frames = scene.frame_count(),
+                                       .fps = scene.output.fps},
+                                      existing);
   RunStats stats;
-  if (!missing.empty()) {
-    auto sink = render::make_png_sink(plan.frames_pattern);
-    stats = draw(plan, models, options, missing, *sink);
+  if (!folder.missing.empty()) {
+    auto sink = render::make_png_sink(plan.frames_pattern, plan.settings);
+    stats = draw(plan, models, options, folder.missing, *sink);
   }
-  stats.frames_kept = static_cast<int>(plan.frames.size() - missing.size());
+  stats.frames_kept = static_cast<int>(plan.frames.size() - folder.missing.size());
   if (plan.through_frames && !stats.interrupted_by) {
     if (!assemble_video(plan)) stats.interrupted_by = interrupt_signal();
+  }
+  if (plan.through_frames && !stats.interrupted_by) {
+    folder.lock = {};  // its file would keep the folder
+    remove_frames(plan.frames_pattern.parent_path());
   }
   report_run(stats, options.talk, options.stats);
   if (stats.interrupted_by)
@@ -180,6 +199,7 @@ int render_to_video(const Plan& plan, const ModelLibrary& models, const RenderOp
   // A part of a film must not look like the whole, nor replace a whole one: it gets the name when it has all
   // frames.
   render::VideoDef def = video_def(plan);
+  const OutputLock lock = lock_film(plan);
   const fs::path partial = def.path.replace_extension(".partial" + plan.target.path.extension().string());
   if (plan.channels.choice.any()) prepare_channels(plan.channels.stem.parent_path(), options.force);
   auto sink = render::make_video_sink(def);
@@ -202,7 +222,7 @@ int render_to_video(const Plan& plan, const ModelLibrary& models, const RenderOp
 int render_to_pipe(const Plan& plan, const ModelLibrary& models, const RenderOptions& options) {
   const Scene& scene = plan.loaded.scene;
   auto sink = render::make_pipe_sink(options.format == "y4m", scene.render.size.x(), scene.render.size.y(),
-                                     scene.output.fps);
+                                     scene.output.fps, [] { return interrupt_signal() != 0; });
   const RunStats stats = draw(plan, models, options, plan.frames, *sink);
   report_run(stats, options.talk, options.stats);
   return stats.interrupted_by ? interrupted(stats, static_cast<int>(plan.frames.size()), "") : kOk;
@@ -224,8 +244,11 @@ void check_file(const std::string& file, bool force) {
   std::error_code error;
   if (!folder.empty() && !fs::is_directory(folder, error))
     throw OutputError(file + ": there is no folder " + folder.string());
-  const fs::file_status status = fs::status(file, error);
+  const fs::file_status status = fs::symlink_status(file, error);
   if (status.type() == fs::file_type::not_found) return;
+  if (status.type() == fs::file_type::none) throw OutputError(file + ": " + error.message());
+  if (status.type() == fs::file_type::symlink)
+    throw OutputError(file + ": is a symbolic link, which outputs do not follow; name the file itself");
   if (status.type() != fs::file_type::regular) throw OutputError(file + ": is not a regular file");
   if (!force) throw OutputError(file + ": exists already; replace it with --force");
 }
@@ -256,7 +279,12 @@ int render_command(const RenderOptions& options) {
   const Plan plan = make_plan(options, models, std::move(loaded));
   if (plan.target.kind == OutputKind::video) {
     render::check_video(video_def(plan));
-    if (fs::exists(plan.target.path)) check_file(plan.target.path.string(), options.force);
+    check_file(plan.target.path.string(), options.force);
+    if (!options.chunk.empty())
+      throw OutputError(plan.target.path.string() +
+                        ": a part of a film is no film; render parts as frames (-o frames/####.png --chunk " +
+                        options.chunk + "), then: offstage encode frames/ -o " +
+                        plan.target.path.filename().string());
     const fs::path stale = channels_folder(plan.target.path);
     if (!plan.channels.choice.any() && !options.force && holds_channels(stale))
       throw OutputError(stale.string() +
@@ -302,17 +330,19 @@ int frame_command(const FrameOptions& options) {
 
   class PictureSink : public render::FrameSink {
    public:
-    explicit PictureSink(fs::path path) : path_(std::move(path)) {}
-    void write(int, const render::Image& image) override { render::write_png(path_, image); }
+    PictureSink(fs::path path, std::string settings)
+        : path_(std::move(path)), settings_(std::move(settings)) {}
+    void write(int, const render::Image& image) override { render::write_png(path_, image, settings_); }
     void close() override {}
 
    private:
     fs::path path_;
+    std::string settings_;
   };
   const ModelLibrary models = load_models(loaded, options.scene, options.talk);
   const auto threads = simulation_threads(options.threads);
   render::pin_environment(threads_or_all(options.threads), options.gl);
-  PictureSink sink(options.out);
+  PictureSink sink(options.out, frame_settings(loaded, models, options.gl));
   RunProgress progress(scene, models, options.talk);
   const RunStats stats = render_frames(
       loaded, models,

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <thread>
 
@@ -12,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "producer/base/interrupt.h"
+#include "producer/base/json_file.h"
 #include "producer/base/log.h"
 #include "producer/base/time_code.h"
 #include "producer/cli/command_line.h"
@@ -23,6 +25,7 @@
 #include "render/context.h"
 #include "render/error.h"
 #include "render/image_io.h"
+#include "render/output_file.h"
 
 namespace offstage::producer {
 namespace {
@@ -162,13 +165,13 @@ void keep(const Run& run, const fs::path& folder, const std::string& key) {
 }
 
 bool restore(Run& run, const fs::path& folder, const std::string& key) {
-  std::ifstream in(folder / (key + ".json"));
-  const Json json = Json::parse(in, nullptr, false);
-  if (!json.is_object()) return false;
   try {
-    run.figures = json.at("figures").get<Figures>();
-    run.fault = json.at("fault").get<std::string>();
-    run.code = json.at("code").get<int>();
+    const std::optional<JsonObject> kept = read_json_file(folder / (key + ".json"));
+    if (!kept) return false;
+    const auto json = [&](const char* name) { return Json(kept->value(name)); };
+    run.figures = json("figures").get<Figures>();
+    run.fault = json("fault").get<std::string>();
+    run.code = json("code").get<int>();
     for (const int frame : run.frames)
       if (run.fault.empty()) run.pictures.push_back(render::read_image(picture_path(folder, key, frame)));
   } catch (const std::exception&) {  // damaged: run it again
@@ -176,6 +179,20 @@ bool restore(Run& run, const fs::path& folder, const std::string& key) {
     return false;
   }
   return true;
+}
+
+/// Removes what keep() wrote, named by hexadecimal keys, and the folder unless it holds something else.
+void remove_finished(const fs::path& folder) {
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string(), ending = entry.path().extension().string();
+    constexpr std::size_t kKey = 32;
+    const bool ours = name.size() > kKey && name.find_first_not_of("0123456789abcdef") == kKey &&
+                      (name[kKey] == '-' || name[kKey] == '.') && (ending == ".png" || ending == ".json");
+    if (ours && fs::is_regular_file(entry.symlink_status(error))) fs::remove(entry.path(), error);
+  }
+  render::remove_leftovers(folder);
+  fs::remove(folder, error);
 }
 
 // --- The work ---
@@ -344,7 +361,8 @@ int sweep_command(const SweepOptions& options) {
   const int all_threads = threads_or_all(options.threads);
   render::pin_environment(all_threads, options.gl);
   std::error_code error;
-  if (options.force) fs::remove_all(sweep.finished, error);
+  const OutputLock lock(OutputLock::beside(options.out), options.out);
+  if (options.force) remove_finished(sweep.finished);
   fs::create_directories(sweep.finished, error);
   if (error)
     throw render::FileError(sweep.finished.string() + ": cannot make the folder: " + error.message());
@@ -356,7 +374,7 @@ int sweep_command(const SweepOptions& options) {
   }
   write_text_file(sweep.csv, table(sweep));
   render::write_png(options.out, draw_sheet(options, sweep));
-  fs::remove_all(sweep.finished, error);
+  remove_finished(sweep.finished);
   fmt::print("{}\n{}\n", options.out, sweep.csv);
   int code = kOk;
   for (const Run& run : sweep.runs) code = std::max(code, run.code);

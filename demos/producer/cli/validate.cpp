@@ -135,7 +135,7 @@ int validate_command(const ValidateOptions& options) {
   const std::string& file = options.scene.file;
   Json result = {{"file", file}, {"valid", true}, {"errors", Json::array()}, {"warnings", Json::array()}};
   try {
-    LoadedScene loaded = load_scene(file, options.scene.overrides());
+    LoadedScene loaded = load_scene(file, options.scene.overrides(), options.scene.allow);
     const TalkOptions talk{.progress = ProgressStyle::automatic, .quiet = options.json};
     const ModelLibrary models = load_models(loaded, options.scene, talk, loaded.warnings);
     Simulation simulation(loaded.scene, models);  // what only building shows

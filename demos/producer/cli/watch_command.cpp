@@ -2,12 +2,10 @@
 
 #include <csignal>
 #include <cstdio>
-#include <fstream>
 #include <optional>
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -97,21 +95,17 @@ class Workshop {
   fs::path folder_;
 };
 
-/// The frames that the manifest of a folder lists, with their channels, and that are there.
+/// What the manifest of a folder names, and is there.
 std::set<fs::path> frames_in(const fs::path& pattern) {
-  std::set<fs::path> frames;
-  std::ifstream in(pattern.parent_path() / "manifest.json");
-  const auto manifest = nlohmann::json::parse(in, nullptr, false);
-  if (!manifest.is_object() || manifest.value("pattern", std::string()) != pattern.filename().string())
-    return frames;
-  const fs::path stem = fs::path(pattern).replace_extension();
-  for (int frame = 1; frame <= manifest.value("frames", 0); ++frame) {
-    std::vector<fs::path> files = all_channel_files(stem, frame);
-    files.push_back(render::frame_path(pattern, frame));
-    for (const fs::path& path : files)
-      if (fs::exists(path)) frames.insert(path);
-  }
-  return frames;
+  const std::vector<fs::path> files = files_of_frames(pattern.parent_path());
+  return {files.begin(), files.end()};
+}
+
+/// Moves the files of channels into their folder, whose own are gone.
+void publish_channels(const fs::path& made, const fs::path& place) {
+  fs::create_directories(place);
+  for (const auto& entry : fs::directory_iterator(made))
+    fs::rename(entry.path(), place / entry.path().filename());
 }
 
 class Watcher {
@@ -178,8 +172,10 @@ class Watcher {
       remove_channels(channels_folder(target_.path));
       for (const auto& entry : fs::directory_iterator(made)) {
         const fs::path place = folder() / entry.path().filename();
-        if (entry.is_directory()) fs::remove_all(place);
-        fs::rename(entry.path(), place);
+        if (entry.is_directory())
+          publish_channels(entry.path(), place);
+        else
+          fs::rename(entry.path(), place);
       }
     } else {
       fs::create_directories(folder());

@@ -59,6 +59,24 @@ void describe_tag(const std::string& tag, bool required, ObjectEntry& entry) {
 
 }  // namespace
 
+Limits within_unit(Limits limits, std::string_view unit) {
+  if (limits.low != 0) return limits;
+  const auto narrow = [&](Real low, Real high) {
+    if (limits.open_low && low > 0) {
+      limits.low = low;
+      limits.open_low = false;
+    }
+    limits.high = std::min(limits.high, high);
+  };
+  if (unit == "m")
+    narrow(1e-9, 1e9);
+  else if (unit == "kg/m^3")
+    narrow(1e-12, 1e12);
+  else if (unit.starts_with("kg") || unit.starts_with("N"))
+    narrow(0, 1e30);
+  return limits;
+}
+
 std::string Limits::range() const {
   if (low == high) return to_text(low);
   if (low > -kInfinity && high < kInfinity && !open_low && !open_high)
@@ -146,7 +164,7 @@ std::optional<std::size_t> Reader::choice(const Node& node, std::span<const std:
   }
   const auto it = std::find(names.begin(), names.end(), *name);
   if (it != names.end()) return static_cast<std::size_t>(it - names.begin());
-  const std::string near = nearest(*name, names);
+  const std::string near = is_full() ? "" : nearest(*name, names);
   fail(node.at, "must be " + allowed + ", got " + describe(node) +
                     (near.empty() ? "" : "; did you mean '" + near + "'?"));
   return {};
@@ -176,6 +194,7 @@ void Reader::keys(const Node& node, std::string_view name, std::span<const Spec*
         std::find_if(specs.begin(), specs.end(), [&](const Spec* spec) { return spec->key == member.key; });
     within(member.key, [&] {
       if (it != specs.end()) return read(static_cast<std::size_t>(it - specs.begin()), member.value);
+      if (is_full()) return fail(member.at, {});
       std::vector<std::string> known;
       if (tagged) known.push_back("type");
       for (const Spec* spec : specs) known.push_back(spec->key);
@@ -219,7 +238,7 @@ Node ObjectEntry::definition() const {
 
 Key::Key(const char* key, const char* help, const char* unit, Limits limits, bool required,
          const ValueKind& value_kind, std::ptrdiff_t value_offset)
-    : spec{key, help, unit, limits, required}, kind(&value_kind), offset(value_offset) {}
+    : spec{key, help, unit, within_unit(limits, unit), required}, kind(&value_kind), offset(value_offset) {}
 
 void append(std::vector<Key>& keys, std::span<const Key> part, std::ptrdiff_t offset) {
   for (const Key& key : part) keys.emplace_back(key).offset += offset;

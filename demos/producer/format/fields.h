@@ -58,6 +58,14 @@ constexpr Limits over(Real low, Real high) {
   return {.low = low, .high = high, .open_low = true};
 }
 
+/// Factors of size: with lengths of up to 1e9 m, nothing that follows from them overflows.
+inline constexpr Limits kScale{.low = 1e-9, .high = 1e9};
+
+/// The limits of a size, mass or coefficient narrowed to what its unit can have: lengths of 1e-9 to 1e9 m,
+/// masses up to 1e30 kg, densities of 1e-12 to 1e12 kg/m^3, coefficients up to 1e30. Limits that do not begin
+/// at 0 stay.
+Limits within_unit(Limits limits, std::string_view unit);
+
 struct Required {};
 inline constexpr Required kRequired;
 
@@ -83,7 +91,15 @@ class Reader {
     path_.resize(length);
   }
   Where where(Position at) const;
-  void fail(Position at, std::string what) { problems_.push_back({where(at), std::move(what)}); }
+  /// The first kMostProblems are kept, the rest are counted.
+  void fail(Position at, std::string what) {
+    if (is_full())
+      ++more_;
+    else
+      problems_.push_back({where(at), std::move(what)});
+  }
+  bool is_full() const { return problems_.size() >= kMostProblems; }
+  std::size_t more() const { return more_; }
   /// "must be a number, got true"
   void refuse(const Node& node, std::string_view allowed);
 
@@ -110,6 +126,7 @@ class Reader {
   std::span<const std::string> files_;
   std::string path_;
   std::vector<Problem> problems_;
+  std::size_t more_ = 0;
 };
 
 /// How a kind of value is described: as JSON Schema, and in a word for the reference.

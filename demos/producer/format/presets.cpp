@@ -40,7 +40,7 @@ std::vector<std::string> preset_names_in(const Node* list) {
 
 class Layer {
  public:
-  Layer(SceneSource& source, const fs::path& folder, std::vector<Problem>& problems)
+  Layer(SceneSource& source, const SceneFolder& folder, std::vector<Problem>& problems)
       : source_(source), folder_(folder), problems_(problems) {}
 
   void lay_under_emitters() {
@@ -73,6 +73,7 @@ class Layer {
     if (const auto known = presets_.find(name); known != presets_.end()) return &known->second;
     try {
       const fs::path file = preset_file(name, folder_);
+      if (const std::string wrong = folder_.wrong_place(file); !wrong.empty()) throw SceneError({}, wrong);
       const int number = static_cast<int>(source_.files.size());
       source_.files.push_back(file.string());
       Node tree = parse_json(read_text(file), file.string(), number);
@@ -159,7 +160,7 @@ class Layer {
   }
 
   SceneSource& source_;
-  const fs::path& folder_;
+  const SceneFolder& folder_;
   std::vector<Problem>& problems_;
   std::map<std::string, Node> presets_;
 };
@@ -222,7 +223,7 @@ std::vector<std::string> preset_names() {
   return names;
 }
 
-fs::path preset_file(const std::string& name, const fs::path& scene_folder) {
+fs::path preset_file(const std::string& name, const SceneFolder& scene_folder) {
   if (name.ends_with(".json")) return (scene_folder / name).lexically_normal();
   const std::vector<std::string> names = preset_names();
   if (std::ranges::find(names, name) == names.end())
@@ -235,7 +236,7 @@ std::string preset_description(const std::string& name) {
   return text_of(parse_json(read_text(file), file.string()).find("description"));
 }
 
-std::vector<EffectParts> lay_presets(SceneSource& source, const fs::path& folder,
+std::vector<EffectParts> lay_presets(SceneSource& source, const SceneFolder& folder,
                                      std::vector<Problem>& problems) {
   if (!source.root.as<Object>()) return {};
   Layer layer(source, folder, problems);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "producer/base/error.h"
+#include "producer/base/scene_folder.h"
 #include "producer/format/scene_source.h"
 #include "producer/scene/scene.h"
 
@@ -21,7 +22,7 @@ std::filesystem::path presets_folder();
 /// Their names in order.
 std::vector<std::string> preset_names();
 /// The file of a preset. Throws SceneError, saying which there are, if there is none of that name.
-std::filesystem::path preset_file(const std::string& name, const std::filesystem::path& scene_folder = {});
+std::filesystem::path preset_file(const std::string& name, const SceneFolder& scene_folder = {});
 /// What a preset says it is. Throws SceneError.
 std::string preset_description(const std::string& name);
 
@@ -33,7 +34,7 @@ struct EffectParts {
 
 /// Lays presets under the emitters that name one, and adds those of effects to the emitters and forces of the
 /// tree. Leaves alone, and to the reader to report, whatever is of a wrong type.
-std::vector<EffectParts> lay_presets(SceneSource& source, const std::filesystem::path& folder,
+std::vector<EffectParts> lay_presets(SceneSource& source, const SceneFolder& folder,
                                      std::vector<Problem>& problems);
 
 /// Gives what comes from effects its name, place, body and time; then the scene has no effects any more.

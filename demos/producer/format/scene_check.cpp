@@ -56,7 +56,7 @@ std::optional<Real> mass_of(const Body& body) {
 
 class Checker {
  public:
-  Checker(const Scene& scene, const Scene& flat, const std::filesystem::path& folder)
+  Checker(const Scene& scene, const Scene& flat, const SceneFolder& folder)
       : scene_(scene), flat_(flat), folder_(folder) {
     for (const Body& body : flat.bodies) bodies_.emplace(body.name, &body);
     systems_ = particle_names(flat);
@@ -140,15 +140,13 @@ class Checker {
       fail(path, "there is no material '" + name + "'" + suggestion(name, names_of(scene_.materials)));
   }
   void check_file(const std::string& path, const std::string& file) {
-    std::error_code error;
-    if (!file.empty() && !std::filesystem::is_regular_file(folder_ / file, error))
-      fail(path, "there is no file '" + (folder_ / file).string() + "'");
+    const std::string wrong = file.empty() ? "" : folder_.wrong_file(folder_ / file);
+    if (!wrong.empty()) fail(path, wrong);
   }
   /// Of a model: beside the scene, or one that comes with offstage.
   void check_model(const std::string& path, const std::string& file) {
-    std::error_code error;
-    if (!file.empty() && !std::filesystem::is_regular_file(model_file(file, folder_), error))
-      fail(path, "there is no file '" + (folder_ / file).string() + "'");
+    const std::string wrong = file.empty() ? "" : folder_.wrong_file(model_file(file, folder_));
+    if (!wrong.empty()) fail(path, wrong);
   }
   void check_materials() {
     for (const Material& material : scene_.materials)
@@ -521,7 +519,7 @@ class Checker {
 
   const Scene& scene_;
   const Scene& flat_;
-  std::filesystem::path folder_;
+  const SceneFolder& folder_;
   std::map<std::string, const Body*> bodies_;  // with their copies, by name
   std::vector<std::string> systems_;           // of particles
   std::set<std::string> used_materials_;
@@ -530,7 +528,7 @@ class Checker {
 
 }  // namespace
 
-Findings check_scene(const Scene& scene, const Scene& flat, const std::filesystem::path& folder) {
+Findings check_scene(const Scene& scene, const Scene& flat, const SceneFolder& folder) {
   return Checker(scene, flat, folder).run();
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "producer/base/error.h"
+#include "producer/base/scene_folder.h"
 #include "producer/scene/scene.h"
 
 namespace offstage::producer {
@@ -18,7 +19,7 @@ struct Findings {
 
 /// Checks a scene as described; `flat` is the same with placements expanded. `folder` is where files are
 /// sought. Problems have a path only: who knows the text adds the lines.
-Findings check_scene(const Scene& scene, const Scene& flat, const std::filesystem::path& folder);
+Findings check_scene(const Scene& scene, const Scene& flat, const SceneFolder& folder);
 
 /// The longest step at which the integrator can follow a damped spring of stiffness k and damping c on a
 /// reduced mass m.

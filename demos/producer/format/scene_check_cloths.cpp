@@ -14,7 +14,7 @@ namespace {
 
 class ClothChecker {
  public:
-  ClothChecker(const Scene& scene, const Scene& flat, const std::filesystem::path& folder, Findings& findings)
+  ClothChecker(const Scene& scene, const Scene& flat, const SceneFolder& folder, Findings& findings)
       : scene_(scene), flat_(flat), folder_(folder), findings_(findings) {}
 
   void check(const Cloth& cloth) {
@@ -24,9 +24,8 @@ class ClothChecker {
                   "there is no fabric '" + cloth.fabric + "'" + suggestion(cloth.fabric, fabric_names()));
     for (const ClothPin& pin : cloth.pins) check_body(scope_of(pin));
     if (const auto* mesh = std::get_if<MeshFile>(&cloth.shape)) {
-      std::error_code error;
-      if (!mesh->file.empty() && !std::filesystem::is_regular_file(model_file(mesh->file, folder_), error))
-        fail(path + "/shape/file", "there is no file '" + (folder_ / mesh->file).string() + "'");
+      const std::string wrong = mesh->file.empty() ? "" : folder_.wrong_file(model_file(mesh->file, folder_));
+      if (!wrong.empty()) fail(path + "/shape/file", wrong);
       return;
     }
     try {
@@ -70,14 +69,13 @@ class ClothChecker {
 
   const Scene& scene_;
   const Scene& flat_;
-  std::filesystem::path folder_;
+  const SceneFolder& folder_;
   Findings& findings_;
 };
 
 }  // namespace
 
-void check_cloths(const Scene& scene, const Scene& flat, const std::filesystem::path& folder,
-                  Findings& findings) {
+void check_cloths(const Scene& scene, const Scene& flat, const SceneFolder& folder, Findings& findings) {
   ClothChecker checker(scene, flat, folder, findings);
   for (const Cloth& cloth : scene.cloths) checker.check(cloth);
 }

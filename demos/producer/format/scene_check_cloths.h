@@ -3,13 +3,13 @@
 
 #include <filesystem>
 
+#include "producer/base/scene_folder.h"
 #include "producer/format/scene_check.h"
 
 namespace offstage::producer {
 
 /// Adds what is wrong with the cloths of a scene as described; `flat`: with its placements expanded. What
 /// takes the triangles of a file, only the simulation finds out.
-void check_cloths(const Scene& scene, const Scene& flat, const std::filesystem::path& folder,
-                  Findings& findings);
+void check_cloths(const Scene& scene, const Scene& flat, const SceneFolder& folder, Findings& findings);
 
 }  // namespace offstage::producer

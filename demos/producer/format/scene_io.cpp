@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
+#include "producer/base/suggest.h"
 #include "producer/build/model_articulation.h"
 #include "producer/build/placement.h"
 #include "producer/format/presets.h"
@@ -39,8 +40,30 @@ void name_everything(Scene& scene, const std::string& file) {
     if (std::string& name = named(scene.forces[i]).name; name.empty()) name = "force_" + std::to_string(i);
 }
 
+/// What is beyond kMostProblems becomes a number.
+void count_the_rest(std::vector<Problem>& problems, std::size_t more) {
+  if (problems.size() > kMostProblems) {
+    more += problems.size() - kMostProblems;
+    problems.resize(kMostProblems);
+  }
+  if (more > 0) problems.push_back({{}, "and " + std::to_string(more) + " more problems"});
+}
+
+/// Refuses what would take too much memory only to be described.
+void check_count(const SceneSource& source) {
+  const Node* bodies = source.root.find("bodies");
+  const List* list = bodies ? bodies->as<List>() : nullptr;
+  if (list && list->size() > kMostBodies)
+    throw SceneError(source.locate("/bodies"), "has " + std::to_string(list->size()) + " bodies, at most " +
+                                                   std::to_string(kMostBodies) +
+                                                   " are possible: each takes about 8 kB");
+}
+
 void append(std::vector<Problem>& all, const std::vector<Problem>& more, const SceneSource& source) {
-  for (const Problem& problem : more) all.push_back({source.locate(problem.where.path), problem.what});
+  // Finding a place takes time; what is counted only needs none.
+  constexpr std::size_t kLocated = 4 * kMostProblems;
+  for (const Problem& problem : more)
+    all.push_back({all.size() < kLocated ? source.locate(problem.where.path) : problem.where, problem.what});
 }
 
 void sort_by_place(std::vector<Problem>& problems) {
@@ -52,9 +75,11 @@ void sort_by_place(std::vector<Problem>& problems) {
 
 }  // namespace
 
-LoadedScene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& folder,
+LoadedScene parse_scene(std::string_view text, const std::string& name, const SceneFolder& folder,
                         const std::vector<std::string>& overrides) {
+  const SuggestionBudget budget;
   SceneSource source = read_source(text, name, folder);
+  check_count(source);
   std::vector<Problem> errors;
   const Node defaults = write_scene({});
   for (const std::string& override : overrides) apply_override(source, override, defaults, errors);
@@ -77,13 +102,17 @@ LoadedScene parse_scene(std::string_view text, const std::string& name, const st
   append(loaded.warnings, findings.warnings, source);
   sort_by_place(errors);
   sort_by_place(loaded.warnings);
+  count_the_rest(loaded.warnings, 0);
+  count_the_rest(errors, reader.more());
   if (!errors.empty()) throw SceneError(std::move(errors));
   return loaded;
 }
 
-LoadedScene load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
-  if (file == kStandardInput) return parse_scene(standard_input(), kStandardInputName, "", overrides);
-  return parse_scene(read_text(file), file.string(), file.parent_path(), overrides);
+LoadedScene load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides,
+                       const std::vector<std::string>& allowed) {
+  if (file == kStandardInput)
+    return parse_scene(standard_input(), kStandardInputName, SceneFolder({}, allowed), overrides);
+  return parse_scene(read_text(file), file.string(), SceneFolder(file.parent_path(), allowed), overrides);
 }
 
 }  // namespace offstage::producer

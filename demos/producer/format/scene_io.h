@@ -8,23 +8,26 @@
 #include <vector>
 
 #include "producer/base/error.h"
+#include "producer/base/scene_folder.h"
 #include "producer/scene/scene.h"
 
 namespace offstage::producer {
 
 struct LoadedScene {
   Scene scene;
-  std::filesystem::path folder;  ///< relative files are sought here
+  SceneFolder folder;  ///< relative files are sought here
   std::vector<Problem> warnings;
   std::string canonical;  ///< the effective scene with every default, as compact JSON: what a run depends on
 };
 
 /// Reads a scene file and its includes, applies `overrides` ("path=value", path as a JSON pointer or dotted),
-/// checks all of it. The file "-" is standard input. Throws SceneError with every problem.
-LoadedScene load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides = {});
+/// checks all of it. The file "-" is standard input. Files that it names lie in its folder or in the
+/// `allowed` ones. Throws SceneError with the problems.
+LoadedScene load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides = {},
+                       const std::vector<std::string>& allowed = {});
 
 /// The same from text; `name` stands for the file in messages.
-LoadedScene parse_scene(std::string_view text, const std::string& name, const std::filesystem::path& folder,
+LoadedScene parse_scene(std::string_view text, const std::string& name, const SceneFolder& folder,
                         const std::vector<std::string>& overrides = {});
 
 /// JSON Schema, draft 07.

@@ -4,7 +4,6 @@
 #include <array>
 #include <cerrno>
 #include <charconv>
-#include <fstream>
 #include <iterator>
 #include <optional>
 
@@ -14,6 +13,8 @@
 #include "producer/base/interrupt.h"
 #include "producer/base/log.h"
 #include "producer/base/suggest.h"
+#include "render/error.h"
+#include "render/file_io.h"
 
 namespace offstage::producer {
 namespace {
@@ -92,7 +93,7 @@ fs::path identity_of(const fs::path& file) {
 
 class Includer {
  public:
-  explicit Includer(std::vector<std::string>& files) : files_(files) {}
+  Includer(std::vector<std::string>& files, const SceneFolder& scene) : files_(files), scene_(scene) {}
 
   std::vector<Problem> problems;
 
@@ -160,6 +161,7 @@ class Includer {
     if (std::find(open.begin(), open.end(), identity) != open.end())
       return refuse("'" + *name + "' includes itself");
     if (files_.size() >= kMostFiles) return refuse("more than " + std::to_string(kMostFiles) + " files");
+    if (const std::string wrong = scene_.wrong_place(file); !wrong.empty()) return refuse(wrong);
     std::string text;
     try {
       text = read_text(file);
@@ -174,6 +176,7 @@ class Includer {
   }
 
   std::vector<std::string>& files_;
+  const SceneFolder& scene_;
 };
 
 /// Lays `top` over `base`; an object that names its type replaces one of another. Lists at the root are
@@ -226,16 +229,21 @@ Where SceneSource::locate(const std::string& path) const {
 
 std::string read_text(const fs::path& file) {
   std::error_code error;
-  if (fs::is_directory(file, error)) throw SceneError({file.string(), 0, 0, {}}, "is a folder, not a file");
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream)
-    throw SceneError({file.string(), 0, 0, {}}, fs::exists(file, error) ? "cannot be read" : "no such file");
-  return {std::istreambuf_iterator<char>(stream), {}};
+  const Where where{file.string(), 0, 0, {}};
+  if (fs::is_directory(file, error)) throw SceneError(where, "is a folder, not a file");
+  if (!fs::exists(fs::status(file, error)))
+    throw SceneError(
+        where, error && error != std::errc::no_such_file_or_directory ? error.message() : "no such file");
+  try {
+    return render::read_text_file(file, kMostTextBytes);
+  } catch (const render::FileError& wrong) {
+    const std::string what = wrong.what(), name = file.string() + ": ";
+    throw SceneError(where, what.starts_with(name) ? what.substr(name.size()) : what);
+  }
 }
 
 const std::string& standard_input() {
   static const std::string text = [] {
-    constexpr std::size_t kMostBytes = 256 << 20;
     if (isatty(STDIN_FILENO)) log("reading the scene from the keyboard; end it with Ctrl-D\n");
     std::string all;
     std::array<char, 1 << 16> part{};
@@ -249,17 +257,18 @@ const std::string& standard_input() {
       if (got < 0) throw SceneError({kStandardInputName, 0, 0, {}}, "cannot be read");
       if (got == 0) return all;
       all.append(part.data(), static_cast<std::size_t>(got));
-      if (all.size() > kMostBytes) throw SceneError({kStandardInputName, 0, 0, {}}, "is longer than 256 MiB");
+      if (all.size() > kMostTextBytes)
+        throw SceneError({kStandardInputName, 0, 0, {}}, "is longer than 256 MiB");
     }
   }();
   return text;
 }
 
-SceneSource read_source(std::string_view text, const std::string& name, const fs::path& folder) {
+SceneSource read_source(std::string_view text, const std::string& name, const SceneFolder& folder) {
   SceneSource source;
-  Includer includer(source.files);
+  Includer includer(source.files, folder);
   includer.open.push_back(identity_of(folder / fs::path(name).filename()));
-  source.root = includer.read(text, name, folder);
+  source.root = includer.read(text, name, folder.path());
   if (!includer.problems.empty()) throw SceneError(std::move(includer.problems));
   return source;
 }

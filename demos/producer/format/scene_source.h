@@ -9,6 +9,7 @@
 
 #include "producer/base/error.h"
 #include "producer/base/json.h"
+#include "producer/base/scene_folder.h"
 
 namespace offstage::producer {
 
@@ -24,7 +25,7 @@ struct SceneSource {
 inline constexpr std::string_view kStandardInput = "-";
 inline constexpr const char* kStandardInputName = "<stdin>";
 
-/// The text of a file. Throws SceneError if it cannot be read.
+/// The text of a regular file of at most kMostTextBytes. Throws SceneError if it cannot be read.
 std::string read_text(const std::filesystem::path& file);
 
 /// All of standard input, which is read once and kept. Throws SceneError if it cannot be read or is longer
@@ -34,7 +35,7 @@ const std::string& standard_input();
 /// Parses `text` and what it includes. Included files are sought beside the file that names them (`folder`
 /// for `text`). Objects are merged key by key and the including file wins; lists at the top are joined,
 /// included first. Throws SceneError for what is no JSON, cannot be read, or includes itself.
-SceneSource read_source(std::string_view text, const std::string& name, const std::filesystem::path& folder);
+SceneSource read_source(std::string_view text, const std::string& name, const SceneFolder& folder);
 
 /// Lays `top` over `base`, object by object; one that names its type replaces one of another.
 void lay_over(Node& base, Node top);

@@ -190,7 +190,7 @@ struct Table<MeshFile> {
              "model file relative to the scene, or the name of a model that comes with offstage; FILE#NODE "
              "selects one node",
              kRequired},
-            {"scale", &MeshFile::scale, "scale factor of the model", "", kPositive}};
+            {"scale", &MeshFile::scale, "scale factor of the model", "", kScale}};
   }
 };
 template <>
@@ -238,7 +238,7 @@ struct Table<Scatter> {
             {"min_distance", &Scatter::min_distance,
              "least distance between copies; a copy that finds no place is omitted", "m", kNotNegative},
             {"turn", &Scatter::turn, "each copy is turned about its vertical axis by a random angle"},
-            {"scale", &Scatter::scale, "scale factor of a body's shape and model", "", kPositive},
+            {"scale", &Scatter::scale, "scale factor of a body's shape and model", "", kScale},
             {"seed", &Scatter::seed, "another seed gives another arrangement", "", kNotNegative}};
   }
 };
@@ -263,7 +263,7 @@ struct Table<ModelLook> {
   static constexpr const char* kHelp = "A model file drawn instead of the body's shape.";
   static Fields<ModelLook> fields() {
     return {{"file", &ModelLook::file, "model file", kRequired},
-            {"scale", &ModelLook::scale, "scale factor of the model", "", kPositive},
+            {"scale", &ModelLook::scale, "scale factor of the model", "", kScale},
             {"position", &ModelLook::position, "position of the model's origin in the body's frame", "m"},
             {"orientation", &ModelLook::orientation, "orientation of the model in the body's frame"}};
   }

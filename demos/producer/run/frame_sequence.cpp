@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <charconv>
 #include <cstring>
 #include <fstream>
 #include <map>
@@ -19,20 +18,6 @@ namespace offstage::producer {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// The number in a file name that a pattern gives; nothing for other files.
-std::optional<int> number_of(const fs::path& pattern, const fs::path& file) {
-  const std::string shape = pattern.filename().string(), name = file.filename().string();
-  const std::size_t last = shape.find_last_of('#'), before = shape.find_last_not_of('#', last);
-  const std::size_t begin = before == std::string::npos ? 0 : before + 1, after = shape.size() - last - 1;
-  if (name.size() <= begin + after) return {};
-  const std::string_view digits = std::string_view(name).substr(begin, name.size() - begin - after);
-  int number = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
-  if (error != std::errc() || end != digits.data() + digits.size() || number < 0) return {};
-  if (render::frame_path(pattern, number) != file) return {};
-  return number;
-}
 
 /// "shot_####.png" for shot_0007.png: the last run of digits as #. Empty if there is none.
 std::string pattern_of(const std::string& name) {
@@ -121,7 +106,7 @@ FrameSequence find_sequence(const std::string& text, bool allow_gaps) {
   if (!fs::is_directory(folder)) throw render::FileError(folder.string() + ": there is no such folder");
   for (const auto& entry : fs::directory_iterator(folder)) {
     const fs::path file = sequence.pattern.parent_path() / entry.path().filename();
-    if (const auto number = number_of(sequence.pattern, file)) sequence.frames.push_back({*number, file});
+    if (const auto number = frame_number(sequence.pattern, file)) sequence.frames.push_back({*number, file});
   }
   if (sequence.frames.empty()) {
     const std::string usual = usual_pattern(folder);

@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cctype>
-#include <fstream>
+#include <optional>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "producer/base/interrupt.h"
+#include "producer/base/json_file.h"
 #include "producer/run/fingerprint.h"
 #include "render/context.h"
 #include "render/error.h"
@@ -43,16 +44,19 @@ void write_golden_text(const fs::path& path, const std::string& text) {
 
 std::string escape_html(const std::string& text) {
   std::string out;
-  for (const char c : text) out += c == '<' ? "&lt;" : c == '&' ? "&amp;" : std::string(1, c);
+  for (const char c : text)
+    out += c == '<'   ? "&lt;"
+           : c == '>' ? "&gt;"
+           : c == '&' ? "&amp;"
+           : c == '"' ? "&quot;"
+                      : std::string(1, c);
   return out;
 }
 
 /// What a golden says it was made of; empty if it does not, or is none.
 std::string source_of(const fs::path& golden) {
-  std::ifstream in(golden);
-  const auto json = nlohmann::json::parse(in, nullptr, false);
-  if (!json.is_object() || !json.contains("source") || !json["source"].is_string()) return {};
-  return json["source"].get<std::string>();
+  const std::optional<JsonObject> json = read_json_file(golden);
+  return json ? json->text("source") : "";
 }
 
 /// A name as a file name: it stays in its folder, and needs no quotes.
@@ -164,21 +168,24 @@ Golden draw_golden(const LoadedScene& scene, int threads, const GoldenStates& st
 
 Golden read_golden(const fs::path& folder, const std::string& name) {
   const fs::path path = folder / (name + ".json");
-  std::ifstream in(path);
-  const auto json = nlohmann::json::parse(in, nullptr, false);
-  if (!json.is_object() || !json.contains("frames"))
-    throw render::FileError(path.string() + ": is not a golden");
+  const std::optional<JsonObject> json = read_json_file(path);
+  if (!json || !json->has("frames")) throw render::FileError(path.string() + ": is not a golden");
   Golden golden{.scene = name,
-                .source = source_of(path),
-                .reason = json.value("reason", ""),
-                .fingerprint = json.value("fingerprint", ""),
+                .source = json->text("source"),
+                .reason = json->text("reason"),
+                .fingerprint = json->text("fingerprint"),
                 .frames = {}};
-  for (const auto& f : json["frames"]) {
-    const int frame = f.value("frame", 0);
+  constexpr int kMostFrames = 1'000'000'000;
+  for (const JsonObject& f : json->objects("frames")) {
+    const int frame = f.count("frame", 0, kMostFrames);
+    const fs::path picture = picture_file(folder, name, frame);
     golden.frames.push_back({.frame = frame,
-                             .state_hash = f.value("state", ""),
-                             .pixel_hash = f.value("pixels", ""),
-                             .image = render::read_image(picture_file(folder, name, frame))});
+                             .state_hash = f.text("state"),
+                             .pixel_hash = f.text("pixels"),
+                             .image = render::read_image(picture)});
+    if (render::pixel_hash(golden.frames.back().image) != golden.frames.back().pixel_hash)
+      throw render::FileError(picture.string() + ": is not the picture that " + path.filename().string() +
+                              " was made with: its pixels have another hash");
   }
   return golden;
 }
@@ -234,7 +241,7 @@ fs::path write_report(const fs::path& folder, const Golden& expected, const Gold
     rows += fmt::format(
         "<tr><td>{0}</td><td><img src=\"{0}-expected.png\"></td><td><img src=\"{0}-actual.png\"></td>"
         "<td><img src=\"{0}-difference.png\"></td></tr>\n",
-        stem);
+        escape_html(stem));
   }
   const fs::path page = folder / "index.html";
   write_golden_text(

@@ -2,23 +2,27 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
+#include <charconv>
 #include <cstring>
 #include <fstream>
 #include <regex>
+#include <set>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "producer/base/json_file.h"
 #include "render/error.h"
 #include "render/image_io.h"
+#include "render/output_file.h"
 
 namespace offstage::producer {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMostFrames = 10'000'000;  // that a manifest can make us look for
+constexpr const char* kManifestName = "manifest.json";
+constexpr int kMostFrames = 1'000'000'000;
 
 nlohmann::ordered_json to_json(const Manifest& m, const fs::path& pattern) {
   return {{"pattern", pattern.filename().string()},
@@ -30,10 +34,16 @@ nlohmann::ordered_json to_json(const Manifest& m, const fs::path& pattern) {
           {"fps", fps_json(m.fps)}};
 }
 
-void remove_channels_of(const fs::path& stem, int count) {
-  std::error_code error;
-  for (int k = 1; k <= count; ++k)
-    for (const fs::path& path : all_channel_files(stem, k)) fs::remove(path, error);
+/// The number of the frame that a file of channels belongs to; nothing for other files.
+std::optional<int> channel_number(const fs::path& stem, const fs::path& file) {
+  const std::string name = file.filename().string();
+  std::optional<int> number;
+  for (const std::string_view ending : {".exr", ".depth.png", ".normal.png", ".id.png", ".motion.png"})
+    if (name.ends_with(ending))
+      number = frame_number(stem, stem.parent_path() / name.substr(0, name.size() - ending.size()));
+  if (!number) return {};
+  const std::vector<fs::path> known = all_channel_files(stem, *number);
+  return std::ranges::find(known, file) != known.end() ? number : std::nullopt;
 }
 
 /// What a film of any length left in its folder of channels.
@@ -41,13 +51,8 @@ std::vector<fs::path> channels_in(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
-    const std::string name = entry.path().filename().string(), number = name.substr(0, name.find('.'));
-    constexpr std::size_t kMostDigits = 9;
-    if (number.empty() || number.size() > kMostDigits ||
-        !std::ranges::all_of(number, [](unsigned char c) { return std::isdigit(c); }))
-      continue;
-    const std::vector<fs::path> known = all_channel_files(folder / "####", std::stoi(number));
-    if (std::ranges::find(known, entry.path()) != known.end()) files.push_back(entry.path());
+    if (fs::is_regular_file(entry.symlink_status(error)) && channel_number(folder / "####", entry.path()))
+      files.push_back(entry.path());
   }
   return files;
 }
@@ -94,7 +99,8 @@ OutputTarget parse_output(const std::string& out) {
   if (out.empty() || is_ending(fs::path(out).filename().string()))
     throw OutputError("'" + out + "': the output has no name");
   const fs::path path = out;
-  if (out.ends_with('/') || fs::is_directory(path)) return {OutputKind::frames, path / "####.png"};
+  std::error_code error;
+  if (out.ends_with('/') || fs::is_directory(path, error)) return {OutputKind::frames, path / "####.png"};
   const std::string ending = path.extension().string();
   if (const std::string meant = hash_pattern(out); !meant.empty() && (ending.empty() || ending == ".png"))
     throw OutputError(out + ": write the frame number as #; did you mean '" + meant + "'?");
@@ -126,47 +132,122 @@ bool is_whole_png(const fs::path& path, int width_px, int height_px) {
          number(20) == height_px && std::memcmp(tail.data() + 4, "IEND", 4) == 0;
 }
 
-std::vector<int> prepare_frames(const fs::path& pattern, const ChannelFiles& channels,
-                                const std::vector<int>& frames, const Manifest& manifest, Existing existing) {
+std::optional<int> frame_number(const fs::path& pattern, const fs::path& file) {
+  const std::string shape = pattern.filename().string(), name = file.filename().string();
+  const std::size_t last = shape.find_last_of('#'), before = shape.find_last_not_of('#', last);
+  const std::size_t begin = before == std::string::npos ? 0 : before + 1, after = shape.size() - last - 1;
+  if (name.size() <= begin + after) return {};
+  const std::string_view digits = std::string_view(name).substr(begin, name.size() - begin - after);
+  int number = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+  if (error != std::errc() || end != digits.data() + digits.size() || number < 0) return {};
+  if (render::frame_path(pattern, number) != file) return {};
+  return number;
+}
+
+std::vector<fs::path> files_of_frames(const fs::path& folder) {
+  const std::optional<JsonObject> manifest = read_json_file(folder / kManifestName);
+  if (!manifest) return {};
+  std::vector<fs::path> files;
+  const fs::path name = fs::path(manifest->text("pattern")).filename();
+  if (name.string().find('#') != std::string::npos) {
+    const int count = manifest->count("frames", 0, kMostFrames);
+    const fs::path pattern = folder / name, stem = fs::path(pattern).replace_extension();
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(folder.empty() ? "." : folder, error)) {
+      if (!fs::is_regular_file(entry.symlink_status(error))) continue;
+      const fs::path file = folder / entry.path().filename();
+      std::optional<int> number = frame_number(pattern, file);
+      if (!number) number = channel_number(stem, file);
+      if (number && *number >= 1 && *number <= count) files.push_back(file);
+    }
+  }
+  files.push_back(folder / kManifestName);  // last: until then the next run can name the rest
+  return files;
+}
+
+void remove_frames(const fs::path& folder) {
+  std::error_code error;
+  for (const fs::path& file : files_of_frames(folder)) fs::remove(file, error);
+  fs::remove(folder, error);  // unless it holds something else
+}
+
+namespace {
+
+bool is_ours(const std::optional<JsonObject>& manifest, const fs::path& pattern, const Manifest& wanted) {
+  return manifest && manifest->text("settings") == wanted.settings &&
+         manifest->text("pattern") == pattern.filename().string();
+}
+
+/// What a run finds where one of its frames belongs.
+enum class Found { nothing, own, other };
+
+Found look_at(const fs::path& path, const Manifest& manifest) {
+  std::error_code error;
+  if (!fs::exists(fs::symlink_status(path, error))) return Found::nothing;
+  const bool own = is_whole_png(path, manifest.width_px, manifest.height_px) &&
+                   render::png_settings(path) == manifest.settings;
+  return own ? Found::own : Found::other;
+}
+
+}  // namespace
+
+FrameFolder prepare_frames(const fs::path& pattern, const ChannelFiles& channels,
+                           const std::vector<int>& frames, const Manifest& manifest, Existing existing) {
   const fs::path folder = pattern.has_parent_path() ? pattern.parent_path() : ".";
-  const fs::path manifest_path = folder / "manifest.json";
+  const fs::path manifest_path = folder / kManifestName;
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw render::FileError(folder.string() + ": cannot create the folder: " + error.message());
 
-  bool same_settings = false;  // without a manifest nobody knows what the frames there are
-  if (std::ifstream in(manifest_path); in) {
-    const auto old = nlohmann::json::parse(in, nullptr, false);
-    same_settings = old.is_object() && old.value("settings", std::string()) == manifest.settings &&
-                    old.value("pattern", std::string()) == pattern.filename().string();
-    if (!same_settings && existing != Existing::replace)
-      throw OutputError(folder.string() +
-                        ": contains frames of another scene or other settings; choose another folder, or "
-                        "replace them with --force");
-    if (!same_settings && old.is_object()) {
-      const fs::path old_name = old.value("pattern", pattern.filename().string());
-      const int count = std::min(old.value("frames", 0), kMostFrames);
-      for (int k = 1; k <= count; ++k) fs::remove(render::frame_path(folder / old_name.filename(), k), error);
-      remove_channels_of(fs::path(folder / old_name.filename()).replace_extension(), count);
-    }
+  const bool is_part = static_cast<int>(frames.size()) < manifest.frames;
+  FrameFolder result;
+  if (is_part) {
+    result.lock = OutputLock::of_part(OutputLock::inside(folder), folder.string(), [&] {
+      return existing != Existing::replace && is_ours(read_json_file(manifest_path), pattern, manifest);
+    });
+  } else {
+    result.lock = OutputLock(OutputLock::inside(folder), folder.string());
   }
+  render::remove_leftovers(folder);
+  const std::optional<JsonObject> old = read_json_file(manifest_path);
+  const bool same_settings =
+      is_ours(old, pattern, manifest);  // without a manifest nobody knows what frames there are
+  if (!same_settings && existing != Existing::replace && fs::exists(manifest_path, error))
+    throw OutputError(
+        folder.string() +
+        ": contains frames of another scene or other settings; choose another folder, or replace them "
+        "with --force");
 
-  std::vector<int> missing;
+  std::set<int> kept;
   for (const int frame : frames) {
     const fs::path path = render::frame_path(pattern, frame);
-    const bool there = fs::exists(path);
-    if (there && existing == Existing::refuse)
+    const Found found = look_at(path, manifest);
+    if (found == Found::nothing) continue;
+    if (existing == Existing::refuse)
       throw OutputError(path.string() +
                         ": already exists; keep finished frames with --resume, or replace them with --force");
-    const bool keep =
-        there && same_settings && existing == Existing::keep &&
-        is_whole_png(path, manifest.width_px, manifest.height_px) &&
+    if (existing == Existing::keep && !same_settings && found == Found::other)
+      throw OutputError(path.string() + ": is not a frame of this film; replace it with --force");
+    const bool has_channels =
         std::ranges::all_of(channels.of(frame), [](const fs::path& p) { return fs::exists(p); });
-    if (!keep) missing.push_back(frame);
+    if (existing == Existing::keep && found == Found::own && has_channels) kept.insert(frame);
   }
+  if (!same_settings && existing == Existing::replace)  // all of them before the new manifest stands
+    for (const fs::path& file : files_of_frames(folder)) fs::remove(file, error);
+  for (const int frame : frames)
+    if (!kept.contains(frame)) result.missing.push_back(frame);
+
   const std::string text = to_json(manifest, pattern).dump(2) + "\n";
-  render::write_file_atomically(manifest_path, {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
-  return missing;
+  if (!same_settings || existing == Existing::replace)
+    render::write_file_atomically(manifest_path,
+                                  {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
+  if (is_part) {
+    result.lock.share();
+    if (!is_ours(read_json_file(manifest_path), pattern, manifest))
+      throw OutputError(folder.string() + ": another run has just begun to write here");
+  }
+  return result;
 }
 
 fs::path channels_folder(const fs::path& video) {

@@ -3,12 +3,14 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
 #include "producer/format/scene_io.h"
+#include "producer/run/output_lock.h"
 #include "render/channels.h"
 #include "render/sink.h"
 
@@ -63,12 +65,27 @@ std::vector<std::filesystem::path> all_channel_files(const std::filesystem::path
 
 enum class Existing { refuse, keep, replace };
 
-/// Prepares a folder of frames: checks or writes the manifest and returns those of `frames` that have to be
-/// drawn. Frames of other settings are never mixed in: they are refused, or removed with Existing::replace.
-/// Throws OutputError or FileError.
-/// `channels` belong to the frames: one that lacks a file of theirs is drawn again.
-std::vector<int> prepare_frames(const std::filesystem::path& pattern, const ChannelFiles& channels,
-                                const std::vector<int>& frames, const Manifest& manifest, Existing existing);
+/// A folder of frames that only this run writes, or this one and others that draw other frames of the same
+/// film.
+struct FrameFolder {
+  OutputLock lock;
+  std::vector<int> missing;  ///< frames that have to be drawn
+};
+
+/// Prepares a folder of frames: locks it, checks or writes the manifest and finds the frames that have to be
+/// drawn. A frame is kept if it carries the settings of this run. Frames of other settings are never mixed
+/// in: they are refused, or removed with Existing::replace before the new manifest stands. Files that are no
+/// frames of a film are refused, too, unless they are to be replaced. Throws OutputError, also if another
+/// process writes there, or FileError. `channels` belong to the frames: one that lacks a file of theirs is
+/// drawn again.
+FrameFolder prepare_frames(const std::filesystem::path& pattern, const ChannelFiles& channels,
+                           const std::vector<int>& frames, const Manifest& manifest, Existing existing);
+
+/// The files in a folder that the manifest of its frames names: frames, their channels, the manifest itself.
+std::vector<std::filesystem::path> files_of_frames(const std::filesystem::path& folder);
+
+/// Removes exactly those, and the folder if nothing else is in it.
+void remove_frames(const std::filesystem::path& folder);
 
 /// Where the channels of a video go: FILM.channels.
 std::filesystem::path channels_folder(const std::filesystem::path& video);
@@ -84,5 +101,8 @@ void prepare_channels(const std::filesystem::path& folder, bool replace);
 
 /// Whether a file is a complete PNG of this size.
 bool is_whole_png(const std::filesystem::path& path, int width_px, int height_px);
+
+/// The number in a file name that fits a pattern; nothing for other files.
+std::optional<int> frame_number(const std::filesystem::path& pattern, const std::filesystem::path& file);
 
 }  // namespace offstage::producer

@@ -16,6 +16,7 @@
 #include "producer/base/version.h"
 #include "producer/build/picture.h"
 #include "producer/run/pipeline.h"
+#include "producer/run/snapshot_cache.h"
 #include "producer/run/trace.h"
 #include "render/context.h"
 
@@ -247,13 +248,13 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
   const auto frames = static_cast<int>(job.frames.size());
   if (job.cache) {
     SnapshotCache cache(*job.cache);
-    cache.check(simulation_key(loaded, models), loaded.scene.frame_count());
+    cache.open(simulation_key(loaded, models), loaded.scene.frame_count());
     meter.emplace(progress, frames, 0, kDrawing_ms);
     source = std::make_unique<CachedSource>(std::move(cache));
   } else {
     simulation.emplace(loaded.scene, models);
     stats.bodies = simulation->body_count();
-    stats.energy_start = simulation->world().energy();
+    stats.energy_start = simulation->energy();
     if (job.keep)
       kept.emplace(*job.keep).create(simulation_key(loaded, models), loaded.scene.frame_count(), true);
     meter.emplace(progress, frames, frames > 0 ? simulation->advances_to(job.frames.back()) : 0, kDrawing_ms);
@@ -281,10 +282,10 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
 
   if (stats.frames < frames) stats.interrupted_by = interrupt_signal();
   if (stats.frames > 0) sink.close();
-  if (kept && !stats.interrupted_by) kept->finish(simulation_key(loaded, models), loaded.scene.frame_count());
+  if (kept && !stats.interrupted_by) kept->publish();
   if (simulation) {
     stats.totals = simulation->totals();
-    stats.energy_end = simulation->world().energy();
+    stats.energy_end = simulation->energy();
   }
   stats.wall_s = ms_since(start) / 1000;
   return stats;
@@ -309,14 +310,18 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
   std::optional<JointTrace> joints;
   if (job.joints) joints.emplace(*job.joints, simulation);
   const auto record = [&](double time) {
-    if (trace) trace->record(time);
-    if (contacts) contacts->record(time);
-    if (cloths) cloths->record(time);
-    if (joints) joints->record(time);
+    try {
+      if (trace) trace->record(time);
+      if (contacts) contacts->record(time);
+      if (cloths) cloths->record(time);
+      if (joints) joints->record(time);
+    } catch (const CsvFile::NotFinite& error) {
+      simulation.fail(error.what());
+    }
   };
   if (job.trace_every_step) simulation.on_substep(record);
   stats.bodies = simulation.body_count();
-  stats.energy_start = simulation.world().energy();
+  stats.energy_start = simulation.energy();
 
   ProgressMeter meter(progress, total, simulation.advances_to(total), 0);
   for (int frame = 1; frame <= total; ++frame) {
@@ -340,13 +345,13 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
     meter.finished_one(sim_ms, 0, ms_since(write_start), stats.particles);
   }
   if (stats.frames < total) stats.interrupted_by = interrupt_signal();
-  if (cache && stats.frames == total) cache->finish(key, total);
+  if (cache && stats.frames == total) cache->publish();
   if (trace && stats.frames == total) trace->close();
   if (contacts && stats.frames == total) contacts->close();
   if (cloths && stats.frames == total) cloths->close();
   if (joints && stats.frames == total) joints->close();
   stats.totals = simulation.totals();
-  stats.energy_end = simulation.world().energy();
+  stats.energy_end = simulation.energy();
   stats.state_hash = simulation.world().state_hash().hex();
   stats.wall_s = ms_since(start) / 1000;
   return stats;

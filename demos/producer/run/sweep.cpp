@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "producer/run/csv.h"
 #include "producer/run/production.h"
 
 namespace offstage::producer {
@@ -89,14 +90,6 @@ void flatten(const Json& json, const std::string& name, Figures& figures) {
   figures.emplace_back(name, std::move(text));
 }
 
-/// A cell of a CSV (RFC 4180).
-std::string cell(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
-  return quoted + "\"";
-}
-
 }  // namespace
 
 Variation parse_variation(const std::string& text) {
@@ -150,12 +143,12 @@ std::string to_csv(const std::vector<Figures>& rows) {
     for (const auto& [name, value] : row)
       if (std::ranges::find(columns, name) == columns.end()) columns.push_back(name);
   std::string csv;
-  for (std::size_t i = 0; i < columns.size(); ++i) csv += (i > 0 ? "," : "") + cell(columns[i]);
+  for (std::size_t i = 0; i < columns.size(); ++i) csv += (i > 0 ? "," : "") + csv_field(columns[i]);
   csv += '\n';
   for (const Figures& row : rows) {
     for (std::size_t i = 0; i < columns.size(); ++i) {
       const auto figure = std::ranges::find(row, columns[i], &Figures::value_type::first);
-      csv += (i > 0 ? "," : "") + (figure == row.end() ? "" : cell(figure->second));
+      csv += (i > 0 ? "," : "") + (figure == row.end() ? "" : csv_field(figure->second));
     }
     csv += '\n';
   }

@@ -1,85 +1,47 @@
 #include "producer/run/trace.h"
 
-#include <cerrno>
-#include <cstring>
-
 #include <fmt/format.h>
-#include <unistd.h>
-
-#include "render/error.h"
 
 namespace offstage::producer {
+namespace {
 
-CsvFile::CsvFile(const std::filesystem::path& path, const std::string& header)
-    : path_(path), temporary_(path.string() + fmt::format(".{}.part", getpid())) {
-  file_ = std::fopen(temporary_.c_str(), "wb");
-  if (!file_) fail();
-  write(header + "\n");
+void add_state(CsvRows& rows, double time, std::string_view name, const sim::Vec3& position,
+               const sim::Quat& q, const sim::Vec3& velocity, const sim::Vec3& angular_velocity) {
+  rows.number(time).text(name).vector(position).number(q.w()).number(q.x()).number(q.y()).number(q.z());
+  rows.vector(velocity).vector(angular_velocity).end_row();
 }
 
-CsvFile::~CsvFile() {
-  if (!file_) return;
-  const bool whole_rows = std::fclose(file_) == 0;
-  std::error_code ignored;
-  if (whole_rows)
-    std::filesystem::rename(temporary_, path_.string() + ".partial", ignored);
-  else
-    std::filesystem::remove(temporary_, ignored);
-}
-
-void CsvFile::write(const std::string& rows) {
-  if (std::fwrite(rows.data(), 1, rows.size(), file_) != rows.size()) fail();
-}
-
-void CsvFile::close() {
-  const bool flushed = std::fflush(file_) == 0 && fsync(fileno(file_)) == 0;
-  if (!flushed) fail();
-  std::fclose(file_);
-  file_ = nullptr;
-  std::error_code error;
-  std::filesystem::rename(temporary_, path_, error);
-  if (error) throw render::FileError(path_.string() + ": " + error.message());
-}
-
-void CsvFile::fail() {
-  throw render::FileError(path_.string() + ": " + std::strerror(errno));
-}
+}  // namespace
 
 Trace::Trace(const std::filesystem::path& path, const Simulation& simulation)
     : file_(path, "time,object,x,y,z,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz"), simulation_(simulation) {}
 
 void Trace::record(double time) {
   const sim::World& world = simulation_.world();
-  std::string rows;
+  CsvRows rows;
   for (const auto& [name, handle] : simulation_.moving_bodies()) {
     const sim::BodyState s = world.body(handle);
-    const sim::Vec3 &p = s.pose.position, &v = s.velocity, &w = s.angular_velocity;
-    const sim::Quat& q = s.pose.orientation;
-    fmt::format_to(std::back_inserter(rows), "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", time, name,
-                   p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z(), v.x(), v.y(), v.z(), w.x(), w.y(), w.z());
+    add_state(rows, time, name, s.pose.position, s.pose.orientation, s.velocity, s.angular_velocity);
   }
+  const sim::Quat upright = sim::Quat::Identity();
+  const sim::Vec3 none = sim::Vec3::Zero();
   for (const auto& [name, handle] : simulation_.cloths()) {
     const sim::ClothView cloth = world.cloth(handle);
     const std::vector<sim::Real>& masses = world.cloth_def(handle).masses;
-    sim::Vec3 p = sim::Vec3::Zero(), v = sim::Vec3::Zero();
+    sim::Vec3 p = none, v = none;
     sim::Real mass = 0;
     for (std::size_t i = 0; i < masses.size(); ++i) {
       mass += masses[i];
       p += masses[i] * cloth.points[i];
       v += masses[i] * cloth.velocities[i];
     }
-    p /= mass;
-    v /= mass;
-    fmt::format_to(std::back_inserter(rows), "{},{},{},{},{},1,0,0,0,{},{},{},0,0,0\n", time, name, p.x(),
-                   p.y(), p.z(), v.x(), v.y(), v.z());
+    add_state(rows, time, name, p / mass, upright, v / mass, none);
   }
   for (const auto& [name, handle] : simulation_.particle_groups()) {
     const sim::ParticleArrays& particles = world.particles(handle);
-    for (std::size_t i = 0; i < particles.size(); ++i) {
-      const sim::Vec3 &p = particles.position[i], &v = particles.velocity[i];
-      fmt::format_to(std::back_inserter(rows), "{},{}/{},{},{},{},1,0,0,0,{},{},{},0,0,0\n", time, name,
-                     particles.id[i], p.x(), p.y(), p.z(), v.x(), v.y(), v.z());
-    }
+    for (std::size_t i = 0; i < particles.size(); ++i)
+      add_state(rows, time, fmt::format("{}/{}", name, particles.id[i]), particles.position[i], upright,
+                particles.velocity[i], none);
   }
   file_.write(rows);
 }
@@ -92,13 +54,16 @@ ClothTrace::ClothTrace(const std::filesystem::path& path, const Simulation& simu
 
 void ClothTrace::record(double time) {
   const sim::World& world = simulation_.world();
-  std::string rows;
+  CsvRows rows;
   for (const auto& [name, handle] : simulation_.cloths()) {
     const sim::ClothReport& r = world.cloth_report(handle);
-    fmt::format_to(std::back_inserter(rows), "{},{},{},{},{},{},{},{},{},{},{},{},{}\n", time, name,
-                   world.cloth(handle).points.size(), r.max_strain, r.mean_strain, r.contacts,
-                   r.self_contacts, r.penetration, r.limited, r.held_back, r.crossings, r.torn,
-                   r.unconverged);
+    rows.number(time).text(name).count(world.cloth(handle).points.size());
+    rows.number(r.max_strain)
+        .number(r.mean_strain)
+        .count(r.contacts)
+        .count(r.self_contacts)
+        .number(r.penetration);
+    rows.count(r.limited).count(r.held_back).count(r.crossings).count(r.torn).count(r.unconverged).end_row();
   }
   file_.write(rows);
 }
@@ -109,13 +74,11 @@ JointTrace::JointTrace(const std::filesystem::path& path, const Simulation& simu
 
 void JointTrace::record(double time) {
   const sim::World& world = simulation_.world();
-  std::string rows;
+  CsvRows rows;
   world.for_each_joint([&](sim::JointHandle handle) {
     const sim::JointState j = world.joint(handle);
-    const sim::Vec3 &p = j.anchor_a, &f = j.force, &t = j.torque;
-    fmt::format_to(std::back_inserter(rows), "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", time,
-                   world.joint_def(handle).name, p.x(), p.y(), p.z(), f.x(), f.y(), f.z(), t.x(), t.y(),
-                   t.z(), j.coordinate, j.speed, j.error, j.broken ? 1 : 0);
+    rows.number(time).text(world.joint_def(handle).name).vector(j.anchor_a).vector(j.force).vector(j.torque);
+    rows.number(j.coordinate).number(j.speed).number(j.error).count(j.broken ? 1 : 0).end_row();
   });
   file_.write(rows);
 }
@@ -125,12 +88,10 @@ ContactTrace::ContactTrace(const std::filesystem::path& path, const Simulation& 
 
 void ContactTrace::record(double time) {
   const sim::World& world = simulation_.world();
-  std::string rows;
+  CsvRows rows;
   for (const sim::ContactState& c : world.contacts()) {
-    const sim::Vec3 &p = c.point, &n = c.normal, &f = c.force;
-    fmt::format_to(std::back_inserter(rows), "{},{},{},{},{},{},{},{},{},{},{},{},{}\n", time,
-                   world.body_def(c.a).name, world.body_def(c.b).name, p.x(), p.y(), p.z(), n.x(), n.y(),
-                   n.z(), f.x(), f.y(), f.z(), c.separation);
+    rows.number(time).text(world.body_def(c.a).name).text(world.body_def(c.b).name);
+    rows.vector(c.point).vector(c.normal).vector(c.force).number(c.separation).end_row();
   }
   file_.write(rows);
 }

@@ -1,35 +1,14 @@
 #pragma once
 /// CSV of what happened in a simulation. Values are written with all their digits, so that a trace can be
-/// checked against closed forms.
+/// checked against closed forms. A value that is not finite throws CsvFile::NotFinite.
 
-#include <cstdio>
 #include <filesystem>
 #include <string>
 
 #include "producer/build/simulation.h"
+#include "producer/run/csv.h"
 
 namespace offstage::producer {
-
-/// A table that grows row by row. It appears under its name on close(); one that ends before that is kept
-/// with .partial behind its name.
-class CsvFile {
- public:
-  /// Throws render::FileError, as do the others.
-  CsvFile(const std::filesystem::path& path, const std::string& header);
-  ~CsvFile();
-  CsvFile(const CsvFile&) = delete;
-  CsvFile& operator=(const CsvFile&) = delete;
-
-  /// Whole rows, each with its end of line.
-  void write(const std::string& rows);
-  void close();
-
- private:
-  void fail();
-
-  std::filesystem::path path_, temporary_;
-  std::FILE* file_ = nullptr;
-};
 
 /// Where everything went: time, object, position, orientation, velocities.
 class Trace {

@@ -1,0 +1,45 @@
+#pragma once
+/// Files of our own in JSON: goldens, caches, manifests. A value of the wrong type is an error that names the
+/// file and the key.
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+namespace offstage::producer {
+
+/// An object in such a file. A key that is missing has the default; one of another type throws
+/// render::FileError "FILE: /key: must be a text, got 3".
+class JsonObject {
+ public:
+  JsonObject(std::filesystem::path file, std::string path, nlohmann::json json)
+      : file_(std::move(file)), path_(std::move(path)), json_(std::move(json)) {}
+
+  bool has(const std::string& key) const { return json_.contains(key); }
+  std::string text(const std::string& key, const std::string& otherwise = {}) const;
+  bool flag(const std::string& key, bool otherwise) const;
+  /// A whole number from 0 to `most`.
+  int count(const std::string& key, int otherwise, int most) const;
+  /// The objects of a list; none if the key is missing.
+  std::vector<JsonObject> objects(const std::string& key) const;
+  /// The value as it stands; null if it is missing.
+  nlohmann::json value(const std::string& key) const;
+
+  [[noreturn]] void refuse(const std::string& key, const std::string& allowed) const;
+  const std::filesystem::path& file() const { return file_; }
+
+ private:
+  std::filesystem::path file_;
+  std::string path_;
+  nlohmann::json json_;
+};
+
+/// Reads one; nothing if there is no file, or if what is there is no object. Throws render::FileError for a
+/// file that cannot be read or is no regular one.
+std::optional<JsonObject> read_json_file(const std::filesystem::path& file);
+
+}  // namespace offstage::producer

@@ -1,0 +1,41 @@
+#pragma once
+/// Where the files of a scene may lie: its own folder, those that come with the program, and those that the
+/// user names with --allow.
+
+#include <filesystem>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "render/input_folders.h"
+
+namespace offstage::producer {
+
+/// The most that a text (a scene, an include, a preset, a file of our own in JSON) may have.
+inline constexpr uint64_t kMostTextBytes = uint64_t{256} << 20;
+
+class SceneFolder {
+ public:
+  SceneFolder() : SceneFolder(std::filesystem::path(), {}) {}
+  SceneFolder(std::filesystem::path path, const std::vector<std::string>& allowed);
+  /// Without other folders.
+  template <class Path>
+  requires(std::is_convertible_v<Path, std::filesystem::path> &&
+           !std::is_same_v<std::remove_cvref_t<Path>, SceneFolder>) SceneFolder(const Path& path)
+      : SceneFolder(std::filesystem::path(path), {}) {}
+
+  const std::filesystem::path& path() const { return path_; }
+  const render::InputFolders& inputs() const { return inputs_; }
+  std::filesystem::path operator/(const std::filesystem::path& file) const { return path_ / file; }
+  /// What is wrong with a file that is outside of all the folders, symbolic links resolved; empty if it is
+  /// inside.
+  std::string wrong_place(const std::filesystem::path& file) const;
+  /// The same, or that there is no regular file. The path may end in #NODE.
+  std::string wrong_file(const std::filesystem::path& file) const;
+
+ private:
+  std::filesystem::path path_;
+  render::InputFolders inputs_;
+};
+
+}  // namespace offstage::producer

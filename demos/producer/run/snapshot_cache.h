@@ -1,0 +1,40 @@
+#pragma once
+/// A folder with the snapshots of one simulation after another. Each run writes a generation, a folder of its
+/// own, and publishes it as a whole; a reader keeps to the generation that it found first.
+
+#include <filesystem>
+#include <string>
+
+#include "producer/build/snapshot.h"
+#include "render/file_io.h"
+
+namespace offstage::producer {
+
+class SnapshotCache {
+ public:
+  explicit SnapshotCache(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+  /// Begins a generation for the simulation identified by `key`. Throws FileError if the folder holds a cache
+  /// already, unless `force`, or something else.
+  void create(const std::string& key, int frames, bool force);
+  /// Opens the published generation for reading. Throws FileError if the folder holds no cache, an unfinished
+  /// one, or one of another simulation.
+  void open(const std::string& key, int frames);
+  /// Publishes the generation by one rename; generations that nobody reads or writes go.
+  void publish();
+
+  /// Of the generation begun or opened. Throw FileError; read() also for a snapshot of another run.
+  void write(const Snapshot& snapshot) const;
+  Snapshot read(int frame) const;
+
+ private:
+  std::filesystem::path file(int frame) const;
+  void remove_old_generations() const;
+
+  std::filesystem::path folder_, generation_;
+  std::string key_;
+  int frames_ = 0;
+  render::Descriptor hold_;  // a lock on the generation's folder: it is in use
+};
+
+}  // namespace offstage::producer

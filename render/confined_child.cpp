@@ -1,0 +1,118 @@
+#include "render/confined_child.h"
+
+#include <algorithm>
+#include <new>
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "render/child_process.h"
+#include "render/error.h"
+#include "render/sandbox.h"
+
+namespace offstage::render {
+namespace {
+
+constexpr int kAnswerExit = 40, kMessageExit = 41;  // other codes are not the child's
+constexpr uint64_t kMiB = uint64_t{1} << 20;
+
+ProcessLimits limits_of(uint64_t file_bytes) {
+  constexpr uint64_t kSeconds = 5, kMostSeconds = 60, kMebibytesPerSecond = 5;
+  constexpr uint64_t kMemory = 1536 * kMiB, kMostMemory = 4096 * kMiB, kTimesFile = 16;
+  return {.cpu_s = std::min(kSeconds + file_bytes / (kMebibytesPerSecond * kMiB), kMostSeconds),
+          .memory_bytes = std::min(kMemory + kTimesFile * file_bytes, kMostMemory)};
+}
+
+/// The child: leaves an answer or a message in the memory file.
+[[noreturn]] void become_child(const ConfinedWork& work, const ProcessLimits& limits, int memory,
+                               const std::function<void(int)>& job) {
+  std::string message;
+  try {
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    const int nowhere = ::open("/dev/null", O_RDWR);  // for the prints of importers
+    for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, stream);
+    limit_process(limits);
+    enter_sandbox(work.folders->folders());
+    job(memory);
+    ::_exit(kAnswerExit);
+  } catch (const FileError& error) {
+    message = error.what();
+  } catch (const std::bad_alloc&) {
+    message = work.what + ": needs more than " + std::to_string(limits.memory_bytes / kMiB) +
+              " MiB of memory to read; it is broken or too large";
+  } catch (const std::exception& error) {
+    message = work.what + ": cannot be read: " + one_line(error.what());
+  }
+  ::lseek(memory, 0, SEEK_SET);
+  if (::ftruncate(memory, 0) == 0)
+    write_all(memory, {reinterpret_cast<const uint8_t*>(message.data()), message.size()});
+  ::_exit(kMessageExit);
+}
+
+[[noreturn]] void throw_too_slow(const ConfinedWork& work, const ProcessLimits& limits) {
+  throw FileError(work.what + ": takes more than " + std::to_string(limits.cpu_s) +
+                  " s to read; it is broken or too large");
+}
+
+/// Waits for the child with a limit by the clock; its status.
+int wait_status(pid_t child, const ConfinedWork& work, const ProcessLimits& limits) {
+  constexpr uint64_t kClockPerCpu = 6;  // on a machine that is busy with other work
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(kClockPerCpu * limits.cpu_s);
+  bool stopped = false, late = false;
+  while (!wait_for_end(child, std::chrono::milliseconds(Patience::kInterval_ms))) {
+    stopped = work.stop && work.stop();
+    late = std::chrono::steady_clock::now() > deadline;
+    if (stopped || late) ::kill(child, SIGKILL);
+    if (stopped || late) break;
+  }
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0)
+    if (errno != EINTR) throw UnavailableError("the reader of files was lost: " + system_reason(errno));
+  if (stopped) throw StoppedError(work.what + ": reading was given up");
+  if (late) throw_too_slow(work, limits);
+  return status;
+}
+
+[[noreturn]] void throw_for_end(const ConfinedWork& work, const ProcessLimits& limits, int status) {
+  if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) throw_too_slow(work, limits);
+  if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL)
+    throw FileError(work.what +
+                    ": its reader was killed from outside; perhaps the machine ran out of memory");
+  throw FileError(work.what + ": crashed its reader (" + describe_failure(status).value_or("ended") +
+                  "); it is broken or nested too deeply");
+}
+
+}  // namespace
+
+ChildAnswer::ChildAnswer(int fd)
+    : size_(static_cast<std::size_t>(std::max<off_t>(::lseek(fd, 0, SEEK_END), 0))) {
+  if (size_ == 0) return;
+  data_ = ::mmap(nullptr, size_, PROT_READ, MAP_SHARED | MAP_POPULATE, fd, 0);
+  if (data_ == MAP_FAILED) throw std::bad_alloc();
+}
+
+ChildAnswer::~ChildAnswer() {
+  if (size_ > 0) ::munmap(data_, size_);
+}
+
+ChildAnswer run_confined(const ConfinedWork& work, const std::function<void(int)>& job) {
+  const Descriptor memory(::memfd_create("offstage-answer", MFD_CLOEXEC));
+  if (!memory) throw UnavailableError("no memory file for the reader of files: " + system_reason(errno));
+  const ProcessLimits limits = limits_of(work.file_bytes);
+  const pid_t child = ::fork();
+  if (child < 0) throw UnavailableError("the reader of files cannot be started: " + system_reason(errno));
+  if (child == 0) become_child(work, limits, memory.fd(), job);
+
+  const int status = wait_status(child, work, limits);
+  const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 0;
+  if (code != kAnswerExit && code != kMessageExit) throw_for_end(work, limits, status);
+  if (code == kAnswerExit) return ChildAnswer(memory.fd());
+  const ChildAnswer message(memory.fd());
+  throw FileError({message.bytes().begin(), message.bytes().end()});
+}
+
+}  // namespace offstage::render

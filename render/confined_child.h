@@ -1,0 +1,44 @@
+#pragma once
+/// Work on the files of strangers in a forked child that can do no harm: limits of time and memory, no
+/// network, no writing, no file outside of the given folders (sandbox.h). Private to render.
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+
+#include "render/file_io.h"
+#include "render/input_folders.h"
+
+namespace offstage::render {
+
+struct ConfinedWork {
+  std::string what;  ///< in messages: the file
+  uint64_t file_bytes =
+      0;  ///< its size, which the limits follow: 5 s of processor time and 1 s more for each 5 MiB,
+          ///< at most 60 s; 1.5 GiB of memory and 16 times the size, at most 4 GiB
+  const InputFolders* folders = nullptr;  ///< that may be read
+  StopTest stop = {};
+};
+
+/// What the child wrote, mapped.
+class ChildAnswer {
+ public:
+  explicit ChildAnswer(int fd);
+  ~ChildAnswer();
+  ChildAnswer(const ChildAnswer&) = delete;
+  ChildAnswer& operator=(const ChildAnswer&) = delete;
+
+  std::span<const uint8_t> bytes() const { return {static_cast<const uint8_t*>(data_), size_}; }
+
+ private:
+  std::size_t size_;
+  void* data_ = nullptr;
+};
+
+/// Runs `job` in the child with a memory file for its answer. Throws FileError with what the job threw, or
+/// with how the child ended: too slow, too much memory, killed, crashed; StoppedError after a request to
+/// stop; UnavailableError if no process can be started.
+ChildAnswer run_confined(const ConfinedWork& work, const std::function<void(int)>& job);
+
+}  // namespace offstage::render

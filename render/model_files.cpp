@@ -1,0 +1,75 @@
+#include "render/model_files.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include <assimp/IOStream.hpp>
+
+#include "render/error.h"
+#include "render/file_io.h"
+
+namespace offstage::render {
+namespace {
+
+constexpr uint64_t kMaxBytes = uint64_t{2} << 30;
+
+/// A file in memory.
+class ModelStream : public Assimp::IOStream {
+ public:
+  explicit ModelStream(std::vector<uint8_t> bytes) : bytes_(std::move(bytes)) {}
+
+  std::size_t Read(void* out, std::size_t size, std::size_t count) override {
+    if (size == 0) return 0;
+    const std::size_t whole = std::min(count, (bytes_.size() - at_) / size);
+    if (whole > 0) std::memcpy(out, bytes_.data() + at_, whole * size);
+    at_ += whole * size;
+    return whole;
+  }
+  std::size_t Write(const void*, std::size_t, std::size_t) override { return 0; }
+  aiReturn Seek(std::size_t offset, aiOrigin origin) override {
+    // The offset wraps round where it is meant to be negative.
+    const std::size_t base = origin == aiOrigin_SET ? 0 : origin == aiOrigin_CUR ? at_ : bytes_.size();
+    const std::size_t to = base + offset;
+    if (to > bytes_.size()) return aiReturn_FAILURE;
+    at_ = to;
+    return aiReturn_SUCCESS;
+  }
+  std::size_t Tell() const override { return at_; }
+  std::size_t FileSize() const override { return bytes_.size(); }
+  void Flush() override {}
+
+ private:
+  std::vector<uint8_t> bytes_;
+  std::size_t at_ = 0;
+};
+
+class ModelFiles : public Assimp::IOSystem {
+ public:
+  explicit ModelFiles(const InputFolders& folders) : folders_(folders) {}
+
+  bool Exists(const char* name) const override {
+    std::error_code error;
+    return folders_.contain(name) && std::filesystem::is_regular_file(name, error);
+  }
+  char getOsSeparator() const override { return '/'; }
+  Assimp::IOStream* Open(const char* name, const char* mode) override {
+    if (std::strpbrk(mode, "wa+") || !Exists(name)) return nullptr;
+    try {
+      return new ModelStream(read_file(name, kMaxBytes));
+    } catch (const FileError&) {
+      return nullptr;
+    }
+  }
+  void Close(Assimp::IOStream* stream) override { delete stream; }
+
+ private:
+  const InputFolders& folders_;
+};
+
+}  // namespace
+
+std::unique_ptr<Assimp::IOSystem> make_model_files(const InputFolders& folders) {
+  return std::make_unique<ModelFiles>(folders);
+}
+
+}  // namespace offstage::render

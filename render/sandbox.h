@@ -1,0 +1,28 @@
+#pragma once
+/// Takes rights away from the calling process for good: for the child that reads the files of strangers.
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+
+namespace offstage::render {
+
+struct ProcessLimits {
+  uint64_t cpu_s = 0;         ///< processor time [s]
+  uint64_t memory_bytes = 0;  ///< beyond what is mapped already; also the most that a file may grow to
+};
+
+/// Limits of time and memory (RLIMIT_CPU, RLIMIT_AS, RLIMIT_FSIZE), no core dump, no new process. Signals get
+/// their default action, but SIGINT and SIGTERM are ignored: the parent decides.
+void limit_process(const ProcessLimits& limits);
+
+/// No file but those below `folders` can be opened, and those for reading only (Landlock); no network, no new
+/// program, no change of the file system (seccomp: every other system call fails with EPERM). What the kernel
+/// does not have is left out.
+void enter_sandbox(std::span<const std::filesystem::path> folders);
+
+/// Which of the two this kernel has, for `doctor`: "Landlock and seccomp", "seccomp", ...
+std::string sandbox_support();
+
+}  // namespace offstage::render
