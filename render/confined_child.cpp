@@ -35,6 +35,7 @@ ProcessLimits limits_of(uint64_t file_bytes) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     const int nowhere = ::open("/dev/null", O_RDWR);  // for the prints of importers
     for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, stream);
+    close_descriptors(memory);
     limit_process(limits);
     enter_sandbox(work.folders->folders());
     job(memory);

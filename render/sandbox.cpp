@@ -46,56 +46,18 @@ void restrict_files(std::span<const std::filesystem::path> folders) {
 }
 
 /// What memory, arithmetic and reading need. Opening is checked apart.
-constexpr std::array kAllowedCalls = {SYS_read,
-                                      SYS_readv,
-                                      SYS_pread64,
-                                      SYS_write,
-                                      SYS_writev,
-                                      SYS_pwrite64,
-                                      SYS_close,
-                                      SYS_fstat,
-                                      SYS_newfstatat,
-                                      SYS_stat,
-                                      SYS_lstat,
-                                      SYS_statx,
-                                      SYS_lseek,
-                                      SYS_ftruncate,  // of the answer; nothing else is open for writing
-                                      SYS_access,
-                                      SYS_faccessat,
-                                      SYS_faccessat2,
-                                      SYS_readlink,
-                                      SYS_readlinkat,
-                                      SYS_getcwd,
-                                      SYS_getdents64,
-                                      SYS_mmap,
-                                      SYS_munmap,
-                                      SYS_mprotect,
-                                      SYS_mremap,
-                                      SYS_madvise,
-                                      SYS_brk,
-                                      SYS_futex,
-                                      SYS_sched_yield,
-                                      SYS_rt_sigaction,
-                                      SYS_rt_sigprocmask,
-                                      SYS_rt_sigreturn,
-                                      SYS_sigaltstack,
-                                      SYS_clock_gettime,
-                                      SYS_clock_getres,
-                                      SYS_gettimeofday,
-                                      SYS_time,
-                                      SYS_getrandom,
-                                      SYS_getpid,
-                                      SYS_gettid,
-                                      SYS_tgkill,
-                                      SYS_getrusage,
-                                      SYS_getrlimit,
-                                      SYS_sysinfo,
-                                      SYS_uname,
-                                      SYS_fcntl,
-                                      SYS_exit,
-                                      SYS_exit_group,
-                                      SYS_restart_syscall,
-                                      SYS_sched_getaffinity};
+constexpr std::array kAllowedCalls = {
+    SYS_read,         SYS_readv,          SYS_pread64,      SYS_write,           SYS_writev,
+    SYS_pwrite64,     SYS_close,          SYS_fstat,        SYS_newfstatat,      SYS_stat,
+    SYS_lstat,        SYS_statx,          SYS_lseek,
+    SYS_ftruncate,  // of the answer; nothing else is open for writing
+    SYS_access,       SYS_faccessat,      SYS_faccessat2,   SYS_readlink,        SYS_readlinkat,
+    SYS_getcwd,       SYS_getdents64,     SYS_mmap,         SYS_munmap,          SYS_mprotect,
+    SYS_mremap,       SYS_madvise,        SYS_brk,          SYS_futex,           SYS_sched_yield,
+    SYS_rt_sigaction, SYS_rt_sigprocmask, SYS_rt_sigreturn, SYS_sigaltstack,     SYS_clock_gettime,
+    SYS_clock_getres, SYS_gettimeofday,   SYS_time,         SYS_getrandom,       SYS_getpid,
+    SYS_gettid,       SYS_getrusage,      SYS_getrlimit,    SYS_sysinfo,         SYS_uname,
+    SYS_fcntl,        SYS_exit,           SYS_exit_group,   SYS_restart_syscall, SYS_sched_getaffinity};
 
 sock_filter statement(uint16_t code, uint32_t k) {
   return {code, 0, 0, k};
@@ -122,12 +84,22 @@ void allow_opening(std::vector<sock_filter>& program, uint32_t call, std::size_t
   program.push_back(answer(SECCOMP_RET_ALLOW));
 }
 
+/// Lets a signal through that a process sends to itself, as abort() does.
+void allow_own_signals(std::vector<sock_filter>& program) {
+  program.push_back(jump(BPF_JEQ, SYS_tgkill, 0, 4));
+  program.push_back(load(offsetof(seccomp_data, args)));
+  program.push_back(jump(BPF_JEQ, static_cast<uint32_t>(::getpid()), 0, 1));
+  program.push_back(answer(SECCOMP_RET_ALLOW));
+  program.push_back(answer(SECCOMP_RET_ERRNO | EPERM));
+}
+
 void restrict_calls() {
   std::vector<sock_filter> program = {load(offsetof(seccomp_data, arch)),
                                       jump(BPF_JEQ, AUDIT_ARCH_X86_64, 1, 0),
                                       answer(SECCOMP_RET_ERRNO | EPERM), load(offsetof(seccomp_data, nr))};
   allow_opening(program, SYS_open, 1);
   allow_opening(program, SYS_openat, 2);
+  allow_own_signals(program);
   for (const long call : kAllowedCalls) {
     program.push_back(jump(BPF_JEQ, static_cast<uint32_t>(call), 0, 1));
     program.push_back(answer(SECCOMP_RET_ALLOW));
@@ -138,6 +110,12 @@ void restrict_calls() {
 }
 
 }  // namespace
+
+void close_descriptors(int kept) {
+  const auto first = static_cast<unsigned>(STDERR_FILENO + 1), own = static_cast<unsigned>(kept);
+  if (own > first) ::syscall(SYS_close_range, first, own - 1, 0);
+  ::syscall(SYS_close_range, own + 1, ~0u, 0);
+}
 
 void limit_process(const ProcessLimits& limits) {
   const auto limit = [](__rlimit_resource what, rlim_t value) {

@@ -17,6 +17,10 @@ struct ProcessLimits {
 /// their default action, but SIGINT and SIGTERM are ignored: the parent decides.
 void limit_process(const ProcessLimits& limits);
 
+/// Closes every descriptor above the standard streams but `kept`: outputs and locks of this process stay out
+/// of reach.
+void close_descriptors(int kept);
+
 /// No file but those below `folders` can be opened, and those for reading only (Landlock); no network, no new
 /// program, no change of the file system (seccomp: every other system call fails with EPERM). What the kernel
 /// does not have is left out.

@@ -61,7 +61,8 @@ std::string changed_by(const std::string& text, const nlohmann::json& op) {
 
 }  // namespace
 
-Session::Session(const std::string& file, EngineSettings settings) : document_(file) {
+Session::Session(const std::string& file, EngineSettings settings, std::vector<std::string> allowed)
+    : allowed_(std::move(allowed)), document_(file) {
   engine_ =
       std::make_unique<Engine>(std::move(settings), [this](const EngineEvent& event) { on_event(event); });
   const std::lock_guard lock(mutex_);
@@ -105,7 +106,8 @@ Session::Parsed Session::parse(const std::string& text, bool with_view) const {
     if (with_view && !overlays_.empty()) overrides.push_back(overlays_override(text, overlays_));
     const std::string seen = muted.empty() ? text : blank_out(text, muted);
     parsed.loaded = std::make_shared<const producer::LoadedScene>(
-        producer::parse_scene(seen, document_.file().string(), document_.file().parent_path(), overrides));
+        producer::parse_scene(seen, document_.file().string(),
+                              producer::SceneFolder(document_.file().parent_path(), allowed_), overrides));
   } catch (const SceneError& error) {
     parsed.errors = error.problems();
   } catch (const std::exception& error) {

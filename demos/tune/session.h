@@ -31,7 +31,8 @@ class Session {
   using Json = nlohmann::ordered_json;
 
   /// Throws SceneError if the file cannot be read; a text that is no valid scene is shown with its errors.
-  Session(const std::string& file, EngineSettings settings);
+  /// Its files may lie beside it and in the `allowed` folders.
+  Session(const std::string& file, EngineSettings settings, std::vector<std::string> allowed = {});
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -82,6 +83,7 @@ class Session {
   void files_changed(const std::string& hash_before, const std::string& hash_now);
 
   mutable std::mutex mutex_;
+  std::vector<std::string> allowed_;  // folders besides the scene's own
   Document document_;
   Tabs tabs_;
   Engine::Loaded shown_;  // the latest valid version

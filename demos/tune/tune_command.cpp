@@ -54,7 +54,7 @@ int tune_command(const producer::TuneOptions& options) {
   const auto threads = producer::simulation_threads(options.threads);
   render::pin_environment(producer::threads_or_all(options.threads), options.gl);
   render::Context();  // a library that is missing is found before anything is promised
-  Session session(options.scene.file, std::move(settings));
+  Session session(options.scene.file, std::move(settings), options.scene.allow);
   const HttpServer server(session, options.port);
   fmt::print("{}\n", server.address());
   std::fflush(stdout);

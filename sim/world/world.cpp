@@ -115,7 +115,7 @@ RigidBody make_rigid_body(const std::string& object, const BodyDef& def, const S
   rigid.centre = unit.centre;
   rigid.inertia = rigid.mass / unit.volume * unit.inertia;
   rigid.inverse_inertia = rigid.inertia.inverse();
-  const bool in_range = rigid.mass > kLeastMass && rigid.mass < kMostMass && rigid.centre.allFinite() &&
+  const bool in_range = rigid.mass >= kLeastMass && rigid.mass <= kMostMass && rigid.centre.allFinite() &&
                         rigid.inertia.allFinite() && rigid.inverse_inertia.allFinite() &&
                         rigid.inertia.cwiseAbs().maxCoeff() < kMostInertia &&
                         rigid.inverse_inertia.cwiseAbs().maxCoeff() < kMostInertia;

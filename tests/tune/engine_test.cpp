@@ -1,6 +1,9 @@
 #include "tune/engine.h"
 
 #include <condition_variable>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <mutex>
 #include <thread>
 
@@ -8,6 +11,7 @@
 
 #include "producer/format/scene_io.h"
 #include "producer/run/production.h"
+#include "tune/session.h"
 
 namespace offstage::tune {
 namespace {
@@ -146,6 +150,19 @@ TEST_F(Engines, DrawASheetOfVersionsAndSayWhichAreNone) {
   ASSERT_TRUE(
       events_.wait_for<CellEvent>([&](const CellEvent& e) { return e.index == 1 && !e.fault.empty(); }));
   EXPECT_TRUE(engine_.cell(sheet, 0));
+}
+
+TEST(Sessions, ReadFilesOutsideOfTheScenesFolderOnlyIfAllowed) {
+  namespace fs = std::filesystem;
+  std::string name = (fs::temp_directory_path() / "offstage-session-XXXXXX").string();
+  const fs::path folder = mkdtemp(name.data());
+  fs::create_directories(folder / "scene");
+  std::ofstream(folder / "part.json") << R"({"output": {"duration": 0.1}, "render": {"size": [64, 36]}})";
+  const std::string scene = (folder / "scene/s.json").string();
+  std::ofstream(scene) << R"({"include": ["../part.json"]})";
+  EXPECT_EQ(Session(scene, {}).state()["errors"].size(), 1u);
+  EXPECT_EQ(Session(scene, {}, {folder.string()}).state()["errors"].size(), 0u);
+  fs::remove_all(folder);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "producer/base/log.h"
 
+#include <atomic>
 #include <cstdio>
 #include <mutex>
 
@@ -11,6 +12,7 @@ namespace {
 
 std::mutex talk_mutex;
 bool status_shown = false;
+std::atomic<bool> output_closed = false;
 
 constexpr std::string_view kClearLine = "\r\033[K";
 
@@ -20,6 +22,14 @@ void write_to_stderr(const std::string& text) {
 }
 
 }  // namespace
+
+void print_output_name(const std::string& name) {
+  if (!output_closed) fmt::print("{}\n", name);
+}
+
+void note_closed_output() {
+  output_closed = true;
+}
 
 void write_log(std::string_view lines) {
   const std::lock_guard lock(talk_mutex);

@@ -1,6 +1,6 @@
 #pragma once
-/// Talk to the person at the terminal. It goes to standard error, and that nobody reads it any more (a closed
-/// pipe, a full log disk) is no reason to end a run.
+/// Talk to the person at the terminal. All but the names of outputs goes to standard error, and that nobody
+/// reads it any more (a closed pipe, a full log disk) is no reason to end a run.
 
 #include <string>
 #include <string_view>
@@ -9,6 +9,12 @@
 #include <fmt/format.h>
 
 namespace offstage::producer {
+
+/// Prints the name of a finished output as a line of standard output. Where that was closed from the start
+/// nobody wants the name, and the output is there all the same.
+void print_output_name(const std::string& name);
+/// Says that standard output was closed from the start.
+void note_closed_output();
 
 /// Writes whole lines. A status line that is shown is removed first, so that the two never mix. Any thread
 /// may call it.

@@ -1,9 +1,9 @@
 #pragma once
 /// Articulations from the node trees of model files.
 
-#include <filesystem>
 #include <vector>
 
+#include "producer/base/scene_folder.h"
 #include "producer/scene/scene.h"
 
 namespace offstage::producer {

@@ -350,11 +350,12 @@ CLI::App* add_sweep(CLI::App& app, SweepOptions& sweep) {
 
 /// A program started with a standard stream closed would otherwise find its own files under that number.
 void open_standard_streams() {
-  for (int fd = 0; fd <= 2; ++fd)
-    if (fcntl(fd, F_GETFD) < 0)
-      // Takes the lowest free number. Standard output cannot be written then: results are not lost in
-      // silence.
-      open("/dev/null", fd == 2 ? O_WRONLY : O_RDONLY);
+  for (int fd = 0; fd <= 2; ++fd) {
+    if (fcntl(fd, F_GETFD) >= 0) continue;
+    // Takes the lowest free number. Standard output cannot be written then: results are not lost in silence.
+    open("/dev/null", fd == 2 ? O_WRONLY : O_RDONLY);
+    if (fd == 1) note_closed_output();
+  }
 }
 
 /// Results that could not be written are a failure, whatever the command did.

@@ -151,7 +151,7 @@ int encode_command(const EncodeOptions& options) {
   if (!options.talk.quiet)
     log("{} frames, {} per second, {:.3f} s\n", sequence.frames.size(), def.fps.text(),
         def.fps.seconds(static_cast<int64_t>(sequence.frames.size())));
-  fmt::print("{}\n", target.path.string());
+  print_output_name(target.path.string());
   return kOk;
 }
 

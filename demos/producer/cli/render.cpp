@@ -191,7 +191,7 @@ int render_to_frames(const Plan& plan, const ModelLibrary& models, const RenderO
     return interrupted(stats, static_cast<int>(plan.frames.size()),
                        options.force ? "; continue with the same command and --resume instead of --force"
                                      : "; continue with the same command and --resume");
-  fmt::print("{}\n", plan.target.path.string());
+  print_output_name(plan.target.path.string());
   return kOk;
 }
 
@@ -211,7 +211,7 @@ int render_to_video(const Plan& plan, const ModelLibrary& models, const RenderOp
   }
   report_run(stats, options.talk, options.stats);
   if (!stats.interrupted_by) {
-    fmt::print("{}\n", plan.target.path.string());
+    print_output_name(plan.target.path.string());
     return kOk;
   }
   return interrupted(stats, static_cast<int>(plan.frames.size()),
@@ -351,7 +351,7 @@ int frame_command(const FrameOptions& options) {
   progress.finish();
   report_run(stats, options.talk, "");
   if (stats.interrupted_by) return interrupted(stats, 1, "");
-  fmt::print("{}\n", options.out);
+  print_output_name(options.out);
   return kOk;
 }
 

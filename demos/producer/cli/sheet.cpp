@@ -81,7 +81,7 @@ int sheet_command(const SheetOptions& options) {
       fmt::format("{}  {:g} s, {} frames/s", scene.name, scene.output.duration, scene.output.fps.text());
   render::write_png(options.out,
                     contact_sheet({heading}, sink.cells, std::min(columns, static_cast<int>(frames.size()))));
-  fmt::print("{}\n", options.out);
+  print_output_name(options.out);
   return kOk;
 }
 

@@ -375,7 +375,8 @@ int sweep_command(const SweepOptions& options) {
   write_text_file(sweep.csv, table(sweep));
   render::write_png(options.out, draw_sheet(options, sweep));
   remove_finished(sweep.finished);
-  fmt::print("{}\n{}\n", options.out, sweep.csv);
+  print_output_name(options.out);
+  print_output_name(sweep.csv);
   int code = kOk;
   for (const Run& run : sweep.runs) code = std::max(code, run.code);
   return code;

@@ -188,7 +188,7 @@ class Watcher {
       for (const fs::path& path : stale) fs::remove(path);
     }
     published_ = true;
-    fmt::print("{}\n", target_.path.string());
+    print_output_name(target_.path.string());
     std::fflush(stdout);
   }
 

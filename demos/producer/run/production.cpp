@@ -367,7 +367,9 @@ std::string simulation_key(const LoadedScene& loaded, const ModelLibrary& models
 }
 
 std::string settings_key(const LoadedScene& loaded, const ModelLibrary& models) {
-  return text_hash(std::string(version()) + loaded.canonical + models.digest());
+  auto scene = nlohmann::ordered_json::parse(loaded.canonical);
+  for (const char* key : {"name", "description"}) scene.erase(key);  // no frame shows them
+  return text_hash(std::string(version()) + scene.dump() + models.digest());
 }
 
 namespace {

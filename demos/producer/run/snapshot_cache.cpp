@@ -60,12 +60,12 @@ void SnapshotCache::create(const std::string& key, int frames, bool force) {
   if (error) throw render::FileError(folder_.string() + ": " + error.message());
   const bool occupied = fs::exists(folder_ / kCacheFile, error);
   if (occupied && !force)
-    throw render::FileError(folder_.string() + ": holds a cache already; --force replaces it");
+    throw render::FileError(folder_.string() + ": already contains a cache; replace it with --force");
   if (!occupied && !fs::is_empty(folder_, error) && generations_in(folder_).empty())
-    throw render::FileError(folder_.string() + ": is not empty and holds no cache; give a folder of its own");
+    throw render::FileError(folder_.string() + ": is not empty and is not a cache; choose an empty folder");
   remove_old_generations();
   std::string name = (folder_ / (std::string(kGenerationPrefix) + "XXXXXX")).string();
-  if (::mkdtemp(name.data()) == nullptr) render::throw_file_error(folder_, "cannot make a folder");
+  if (::mkdtemp(name.data()) == nullptr) render::throw_file_error(folder_, "cannot create a folder");
   generation_ = name;
   fs::permissions(generation_, fs::status(folder_, error).permissions(), error);  // mkdtemp's are narrow
   hold_ = open_folder(generation_);
@@ -85,11 +85,11 @@ void SnapshotCache::open(const std::string& key, int frames) {
     if (!published && !generations_in(folder_).empty())
       refuse("the simulation of this cache did not finish; simulate again");
     if (!published)
-      refuse("no cache here; make one with: offstage simulate SCENE --cache " + folder_.string());
+      refuse("contains no cache; create one with: offstage simulate SCENE --cache " + folder_.string());
     if (published->count("offstage_cache", 0, kMostCachedFrames) != kCacheFormat)
-      refuse("not a cache of this version; simulate again with --force");
+      refuse("is a cache of another version; simulate again with --force");
     if (published->text("key") != key || published->count("frames", 0, kMostCachedFrames) != frames)
-      refuse("the cache belongs to another scene or other settings; simulate again with --force");
+      refuse("the cache was made with another scene or other settings; simulate again with --force");
     const std::string name = published->text("generation");
     if (!name.starts_with(kGenerationPrefix) || name.find('/') != std::string::npos)
       published->refuse("generation", "the name of a generation's folder");
@@ -141,7 +141,8 @@ Snapshot SnapshotCache::read(int frame) const {
   const fs::path path = file(frame);
   Snapshot snapshot = deserialize(read_file(path), path.string(), key_);
   if (snapshot.frame != frame)
-    throw render::FileError(fmt::format("{}: holds frame {}, not {}", path.string(), snapshot.frame, frame));
+    throw render::FileError(
+        fmt::format("{}: contains frame {} instead of {}", path.string(), snapshot.frame, frame));
   return snapshot;
 }
 

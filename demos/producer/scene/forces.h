@@ -97,7 +97,7 @@ struct Grab : NamedForce {
   sim::Interpolation interpolation = sim::Interpolation::monotone;
   Real stiffness = 100;
   Real damping = 10;
-  Real reach = 1e30;  ///< of particles and of points of cloths
+  Real reach = 1e9;  ///< of particles and of points of cloths [m]; the longest length of a scene: all of them
   Real start = 0;
   Real end = 1e30;
 };
