@@ -1,6 +1,8 @@
 #include "render/confined_child.h"
 
 #include <algorithm>
+#include <chrono>
+#include <ctime>
 #include <new>
 
 #include <fcntl.h>
@@ -21,7 +23,7 @@ constexpr int kAnswerExit = 40, kMessageExit = 41;  // other codes are not the c
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
 ProcessLimits limits_of(uint64_t file_bytes) {
-  constexpr uint64_t kSeconds = 5, kMostSeconds = 60, kMebibytesPerSecond = 5;
+  constexpr uint64_t kSeconds = 10, kMostSeconds = 60, kMebibytesPerSecond = 5;
   constexpr uint64_t kMemory = 1536 * kMiB, kMostMemory = 4096 * kMiB, kTimesFile = 16;
   return {.cpu_s = std::min(kSeconds + file_bytes / (kMebibytesPerSecond * kMiB), kMostSeconds),
           .memory_bytes = std::min(kMemory + kTimesFile * file_bytes, kMostMemory)};
@@ -56,25 +58,51 @@ ProcessLimits limits_of(uint64_t file_bytes) {
 
 [[noreturn]] void throw_too_slow(const ConfinedWork& work, const ProcessLimits& limits) {
   throw FileError(work.what + ": takes more than " + std::to_string(limits.cpu_s) +
-                  " s to read; it is broken or too large");
+                  " s of processor time to read; it is broken or too large");
 }
 
-/// Waits for the child with a limit by the clock; its status.
-int wait_status(pid_t child, const ConfinedWork& work, const ProcessLimits& limits) {
-  constexpr uint64_t kClockPerCpu = 6;  // on a machine that is busy with other work
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(kClockPerCpu * limits.cpu_s);
-  bool stopped = false, late = false;
+/// Whether a child no longer works: of the last minute it used less than a hundredth. On a machine that is
+/// busy with other work it gets less than all of its time, but not so little. Its processor time has a limit
+/// of its own.
+class Standstill {
+ public:
+  explicit Standstill(pid_t child) { known_ = ::clock_getcpuclockid(child, &clock_) == 0; }
+
+  bool reached() {
+    const auto now = std::chrono::steady_clock::now();
+    if (now - since_ < kInterval) return false;
+    timespec used{};
+    if (!known_ || ::clock_gettime(clock_, &used) != 0) return true;
+    const auto cpu = std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec);
+    const bool still = cpu - cpu_ < kInterval / 100;
+    since_ = now;
+    cpu_ = cpu;
+    return still;
+  }
+
+ private:
+  static constexpr std::chrono::nanoseconds kInterval = std::chrono::seconds(60);
+  clockid_t clock_ = 0;
+  bool known_ = false;
+  std::chrono::steady_clock::time_point since_ = std::chrono::steady_clock::now();
+  std::chrono::nanoseconds cpu_{0};
+};
+
+/// Waits for the child; its status.
+int wait_status(pid_t child, const ConfinedWork& work) {
+  Standstill standstill(child);
+  bool stopped = false, still = false;
   while (!wait_for_end(child, std::chrono::milliseconds(Patience::kInterval_ms))) {
     stopped = work.stop && work.stop();
-    late = std::chrono::steady_clock::now() > deadline;
-    if (stopped || late) ::kill(child, SIGKILL);
-    if (stopped || late) break;
+    still = standstill.reached();
+    if (stopped || still) ::kill(child, SIGKILL);
+    if (stopped || still) break;
   }
   int status = 0;
   while (::waitpid(child, &status, 0) < 0)
     if (errno != EINTR) throw UnavailableError("the reader of files was lost: " + system_reason(errno));
-  if (stopped) throw StoppedError(work.what + ": reading was given up");
-  if (late) throw_too_slow(work, limits);
+  if (stopped) throw StoppedError(work.what + ": reading was interrupted");
+  if (still) throw FileError(work.what + ": its reader made no progress for a minute; it is broken");
   return status;
 }
 
@@ -108,7 +136,7 @@ ChildAnswer run_confined(const ConfinedWork& work, const std::function<void(int)
   if (child < 0) throw UnavailableError("the reader of files cannot be started: " + system_reason(errno));
   if (child == 0) become_child(work, limits, memory.fd(), job);
 
-  const int status = wait_status(child, work, limits);
+  const int status = wait_status(child, work);
   const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 0;
   if (code != kAnswerExit && code != kMessageExit) throw_for_end(work, limits, status);
   if (code == kAnswerExit) return ChildAnswer(memory.fd());

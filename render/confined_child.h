@@ -14,9 +14,9 @@ namespace offstage::render {
 
 struct ConfinedWork {
   std::string what;  ///< in messages: the file
-  uint64_t file_bytes =
-      0;  ///< its size, which the limits follow: 5 s of processor time and 1 s more for each 5 MiB,
-          ///< at most 60 s; 1.5 GiB of memory and 16 times the size, at most 4 GiB
+  /// Its size, which the limits follow: 10 s of processor time and 1 s more for each 5 MiB, at most 60 s; 1.5
+  /// GiB of memory and 16 times the size, at most 4 GiB.
+  uint64_t file_bytes = 0;
   const InputFolders* folders = nullptr;  ///< that may be read
   StopTest stop = {};
 };

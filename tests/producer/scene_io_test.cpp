@@ -113,11 +113,13 @@ TEST(SceneIo, WhatVariesMustStayInItsRange) {
   EXPECT_EQ(radius(R"({"mean": 0.02, "deviation": 0.01})"), "");
   EXPECT_EQ(radius(R"({"mean": 0.02, "deviation": 0.03, "min": 0.001})"), "");
   EXPECT_EQ(radius(R"({"mean": 0.02, "deviation": 0.02})"),
-            "s:1:26: /emitters/0/radius: can become too small: must be greater than 0 m; give \"min\"");
+            "s:1:26: /emitters/0/radius: can become too small: must be greater than 1e-09 and at most "
+            "1000000000 m; give \"min\"");
   EXPECT_EQ(radius(R"({"mean": 0.02, "deviation": 0.01, "clip": false})"),
-            "s:1:26: /emitters/0/radius: can become too small: must be greater than 0 m; give \"min\"");
+            "s:1:26: /emitters/0/radius: can become too small: must be greater than 1e-09 and at most "
+            "1000000000 m; give \"min\"");
   EXPECT_EQ(radius(R"({"range": [0, 1]})"),
-            "s:1:37: /emitters/0/radius/range/0: must be greater than 0 m, got 0");
+            "s:1:37: /emitters/0/radius/range/0: must be greater than 1e-09 and at most 1000000000 m, got 0");
   EXPECT_EQ(radius(R"({"range": [0.02, 0.01]})"),
             "s:1:36: /emitters/0/radius/range: must have the smaller value first");
   EXPECT_EQ(radius(R"({"curve": [[0, 0.01], [1, 0.02], [1, 0.03]]})"),
@@ -178,10 +180,10 @@ TEST(SceneIo, EveryProblemIsReportedAtOnceInOrder) {
             "s:4:16: /bodies/1/motion: must be one of \"static\", \"kinematic\" or \"dynamic\", got the "
             "string \"dynamc\"; "
             "did you mean 'dynamic'?\n"
-            "s:5:44: /bodies/2/shape/radius: must be greater than 0 m, got -1\n"
+            "s:5:44: /bodies/2/shape/radius: must be greater than 1e-09 and at most 1000000000 m, got -1\n"
             "s:5:65: /bodies/2/position/1: must be a number, got the string \"x\"\n"
             "s:5:82: /bodies/2/mass: must be a number, got true\n"
-            "s:7:41: /camera/radius: must be greater than 0 m, got 0\n"
+            "s:7:41: /camera/radius: must be greater than 1e-09 and at most 1000000000 m, got 0\n"
             "s:8:23: /render/size/0: must be between 16 and 16384 pixels, got 8\n"
             "s:8:26: /render/size/1: must be a whole number, got 100.5\n"
             "s:9:14: /version: must be 1, got 2\n"

@@ -62,10 +62,7 @@ void describe_tag(const std::string& tag, bool required, ObjectEntry& entry) {
 Limits within_unit(Limits limits, std::string_view unit) {
   if (limits.low != 0) return limits;
   const auto narrow = [&](Real low, Real high) {
-    if (limits.open_low && low > 0) {
-      limits.low = low;
-      limits.open_low = false;
-    }
+    if (limits.open_low) limits.low = low;  // open as it was: a varying number still needs a "min"
     limits.high = std::min(limits.high, high);
   };
   if (unit == "m")

@@ -61,7 +61,7 @@ constexpr Limits over(Real low, Real high) {
 /// Factors of size: with lengths of up to 1e9 m, nothing that follows from them overflows.
 inline constexpr Limits kScale{.low = 1e-9, .high = 1e9};
 
-/// The limits of a size, mass or coefficient narrowed to what its unit can have: lengths of 1e-9 to 1e9 m,
+/// The limits of a size, mass or coefficient narrowed to what its unit can have: lengths over 1e-9 to 1e9 m,
 /// masses up to 1e30 kg, densities of 1e-12 to 1e12 kg/m^3, coefficients up to 1e30. Limits that do not begin
 /// at 0 stay.
 Limits within_unit(Limits limits, std::string_view unit);
