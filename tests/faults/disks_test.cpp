@@ -1,6 +1,7 @@
 // Full disks: a film that does not fit is an error and leaves nothing that looks whole.
 
 #include <filesystem>
+#include <memory>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -34,13 +35,31 @@ class SmallDisk {
   bool mounted_ = false;
 };
 
-class FilmOnAFullDisk : public testing::TestWithParam<const char*> {};
+/// Frames that are drawn once and then encoded to many disks: drawing would take most of the time.
+class FilmOnAFullDisk : public testing::TestWithParam<const char*> {
+ protected:
+  static void SetUpTestSuite() {
+    drawn_ = std::make_unique<TemporaryFolder>();
+    ASSERT_EQ(offstage("render " + tiny_scene() +
+                           " -q --size 160x90 --duration 0.5 --quality draft --threads 2 -o frames/",
+                       drawn_->path())
+                  .code,
+              0);
+  }
+  static void TearDownTestSuite() { drawn_.reset(); }
+
+  Outcome encode(const fs::path& film) {
+    return offstage("encode frames/ -q -o '" + film.string() + "'", drawn_->path());
+  }
+
+ private:
+  static inline std::unique_ptr<TemporaryFolder> drawn_;
+};
 
 TEST_P(FilmOnAFullDisk, IsWholeOrAnErrorThatLeavesNothing) {
   const std::string film = std::string("film") + GetParam();
   const TemporaryFolder folder;
-  const std::string options = " -q --size 160x90 --duration 0.5 --quality draft --threads 2";
-  ASSERT_EQ(offstage("render " + tiny_scene() + options + " -o " + film, folder.path()).code, 0);
+  ASSERT_EQ(encode(folder / film).code, 0);
   const std::string whole = read_file(folder / film);
   const int tries = tries_of(4);
   int failed = 0;
@@ -50,7 +69,7 @@ TEST_P(FilmOnAFullDisk, IsWholeOrAnErrorThatLeavesNothing) {
     const SmallDisk disk(folder / "disk",
                          static_cast<std::uintmax_t>(share * static_cast<double>(whole.size())));
     if (!disk) GTEST_SKIP() << "mounting is not allowed here";
-    const Outcome run = offstage("render " + tiny_scene() + options + " -o disk/" + film, folder.path());
+    const Outcome run = encode(folder / ("disk/" + film));
     const auto left = contents(folder / "disk");
     if (run.code == 0) {
       EXPECT_EQ(left.at(film), whole) << "share " << share;

@@ -1,12 +1,12 @@
-/* Preloaded: malloc fails from the N-th call on, for OFFSTAGE_MALLOC_FAILS_AFTER=N; 1000 calls later it works again, so
-   that a message can be made. */
+/* Preloaded: from the N-th call on, for OFFSTAGE_MALLOC_FAILS_AFTER=N, the next three calls of malloc for more than 64
+   bytes fail. Then it works again, so that a message can be made. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 
-static atomic_long calls;
+static atomic_long calls, failures;
 
 void* malloc(size_t size) {
   static void* (*next)(size_t);
@@ -17,7 +17,8 @@ void* malloc(size_t size) {
     first = text ? atol(text) : 0;
   }
   const long call = atomic_fetch_add(&calls, 1);
-  if (first > 0 && call >= first && call < first + 3 && size > 64) {
+  if (first > 0 && call >= first && size > 64 && atomic_load(&failures) < 3) {
+    atomic_fetch_add(&failures, 1);
     errno = ENOMEM;
     return NULL;
   }

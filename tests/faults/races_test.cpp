@@ -32,13 +32,16 @@ std::map<std::string, std::string> frames_of(const fs::path& folder) {
   return frames;
 }
 
-std::map<std::string, std::string> film_of_seed(int seed) {
+/// The whole film, drawn once.
+const std::map<std::string, std::string>& film_of_seed(int seed) {
+  static std::map<int, std::map<std::string, std::string>> known;
+  if (const auto film = known.find(seed); film != known.end()) return film->second;
   const TemporaryFolder folder;
   EXPECT_EQ(offstage("render " + tiny_scene() + kOptions + " --seed " + std::to_string(seed) + " -o f/",
                      folder.path())
                 .code,
             0);
-  return frames_of(folder / "f");
+  return known[seed] = frames_of(folder / "f");
 }
 
 TEST(TwoRuns, TheSecondIsRefusedWithTheNameOfTheFirst) {
@@ -67,7 +70,7 @@ TEST(TwoRuns, PartsOfOneFilmShareAFolder) {
 }
 
 TEST(KilledRun, ForcedOverForeignFramesAndResumedHasItsOwnFramesOnly) {
-  const auto expected = film_of_seed(7);
+  const auto& expected = film_of_seed(7);
   std::mt19937 random(1);
   for (int i = 0; i < tries_of(2); ++i) {
     const TemporaryFolder folder;
@@ -89,19 +92,19 @@ TEST(KilledRun, ForcedOverForeignFramesAndResumedHasItsOwnFramesOnly) {
 
 TEST(KilledRun, LeavesNothingThatTheNextRunDoesNotRemove) {
   std::mt19937 random(2);
-  for (const char* film : {"film.mp4", "film.gif"})
-    for (int i = 0; i < tries_of(2); ++i) {
-      const TemporaryFolder folder;
-      {
-        const Background killed(with_options({"render", tiny_scene(), "-o", film}), folder.path());
-        std::this_thread::sleep_for(std::chrono::milliseconds(200 + random() % 1500));
-      }
-      EXPECT_EQ(offstage("render " + tiny_scene() + kOptions + " --force -o " + film, folder.path()).code, 0);
-      std::set<std::string> names;
-      for (const auto& [name, bytes] : contents(folder.path()))
-        if (!name.starts_with("own-cache")) names.insert(name);
-      EXPECT_EQ(names, std::set<std::string>{film});
+  for (int i = 0; i < tries_of(2); ++i) {
+    const std::string film = i % 2 == 0 ? "film.mp4" : "film.gif";
+    const TemporaryFolder folder;
+    {
+      const Background killed(with_options({"render", tiny_scene(), "-o", film}), folder.path());
+      std::this_thread::sleep_for(std::chrono::milliseconds(200 + random() % 1500));
     }
+    EXPECT_EQ(offstage("render " + tiny_scene() + kOptions + " --force -o " + film, folder.path()).code, 0);
+    std::set<std::string> names;
+    for (const auto& [name, bytes] : contents(folder.path()))
+      if (!name.starts_with("own-cache")) names.insert(name);
+    EXPECT_EQ(names, std::set<std::string>{film});
+  }
 }
 
 TEST(ResumedVideo, RemovesOnlyFilesThatItWrote) {
@@ -130,21 +133,21 @@ TEST(PartOfAVideo, IsRefused) {
 }
 
 TEST(CacheOfSnapshots, RewrittenUnderItsReaderGivesOneSimulation) {
-  const auto expected = film_of_seed(1);
-  for (int i = 0; i < tries_of(2); ++i) {
+  const auto& expected = film_of_seed(7);
+  for (int i = 0; i < tries_of(1); ++i) {
     const TemporaryFolder folder;
     ASSERT_EQ(
-        offstage("simulate " + tiny_scene() + " -q --duration 1 --seed 1 --cache c", folder.path()).code, 0);
-    Background reader(with_options({"render", tiny_scene(), "--seed", "1", "--cache", "c", "-o", "d/"}),
+        offstage("simulate " + tiny_scene() + " -q --duration 1 --seed 7 --cache c", folder.path()).code, 0);
+    Background reader(with_options({"render", tiny_scene(), "--seed", "7", "--cache", "c", "-o", "d/"}),
                       folder.path());
     ASSERT_TRUE(appears(folder / "d/0002.png"));
     EXPECT_EQ(
-        offstage("simulate " + tiny_scene() + " -q --duration 1 --seed 7 --cache c --force", folder.path())
+        offstage("simulate " + tiny_scene() + " -q --duration 1 --seed 1 --cache c --force", folder.path())
             .code,
         0);
     EXPECT_EQ(reader.end(), 0);
     EXPECT_EQ(frames_of(folder / "d"), expected);
-    EXPECT_NE(offstage("render " + tiny_scene() + kOptions + " --seed 1 --cache c -o e/", folder.path()).code,
+    EXPECT_NE(offstage("render " + tiny_scene() + kOptions + " --seed 7 --cache c -o e/", folder.path()).code,
               0)
         << "the cache is of another simulation now";
   }

@@ -101,7 +101,7 @@ TEST(Json, NestingIsBounded) {
 }
 
 TEST(Json, ZeroBytesAreNoText) {
-  EXPECT_EQ(error_of(std::string("{}\0{", 4)), "f: is not a text file: it contains a zero byte");
+  EXPECT_EQ(error_of(std::string("{}\0{", 4)), "f:1:3: is not a text file: it contains a zero byte");
 }
 
 TEST(Json, NumbersAreWrittenSoThatTheyReadBackBitForBit) {

@@ -4,15 +4,19 @@
 #include <array>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <filesystem>
 #include <functional>
 #include <map>
 #include <new>
+#include <tuple>
 
 #include <CLI/CLI.hpp>
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "producer/base/error.h"
 #include "producer/base/interrupt.h"
@@ -358,6 +362,20 @@ void open_standard_streams() {
   }
 }
 
+/// Memory can run out where no exception may pass: in a thread, or in a destructor while another exception is
+/// on its way. That ends with the same line and code; files in the making keep their temporary names.
+[[noreturn]] void end_program() {
+  try {
+    if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
+  } catch (const std::bad_alloc&) {
+    constexpr std::string_view kLine = "offstage: out of memory\n";
+    std::ignore = ::write(STDERR_FILENO, kLine.data(), kLine.size());
+    ::_exit(kRunFailed);
+  } catch (...) {
+  }
+  std::abort();
+}
+
 /// Results that could not be written are a failure, whatever the command did.
 int flushed(int code) {
   if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
@@ -410,9 +428,10 @@ int dispatch(int argc, char** argv, const TuneCommand& tune);
 }  // namespace
 
 int run(int argc, char** argv, const TuneCommand& tune) {
+  std::set_terminate(end_program);
   open_standard_streams();
   install_signal_handlers();
-  return flushed(dispatch(argc, argv, tune));
+  return flushed(reported([&] { return dispatch(argc, argv, tune); }));
 }
 
 namespace {

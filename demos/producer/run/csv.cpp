@@ -1,6 +1,7 @@
 #include "producer/run/csv.h"
 
 #include <cmath>
+#include <exception>
 #include <iterator>
 
 #include <fmt/format.h>
@@ -56,10 +57,10 @@ CsvFile::CsvFile(const std::filesystem::path& path, const std::string& header) :
 
 CsvFile::~CsvFile() {
   if (!file_) return;
-  try {  // what there is of it
+  try {  // what there is of it; a full disk or memory loses it
     flush();
     file_->commit_as(path_.string() + ".partial");
-  } catch (const render::FileError&) {
+  } catch (const std::exception&) {
   }
 }
 
