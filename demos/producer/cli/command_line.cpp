@@ -376,6 +376,11 @@ void open_standard_streams() {
   std::abort();
 }
 
+/// Before objects of static lifetime are made, which need memory, too.
+[[gnu::constructor(101)]] void install_end() {
+  std::set_terminate(end_program);
+}
+
 /// Results that could not be written are a failure, whatever the command did.
 int flushed(int code) {
   if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
@@ -428,7 +433,6 @@ int dispatch(int argc, char** argv, const TuneCommand& tune);
 }  // namespace
 
 int run(int argc, char** argv, const TuneCommand& tune) {
-  std::set_terminate(end_program);
   open_standard_streams();
   install_signal_handlers();
   return flushed(reported([&] { return dispatch(argc, argv, tune); }));
