@@ -6,6 +6,7 @@
 #include <charconv>
 #include <iterator>
 #include <optional>
+#include <unordered_map>
 
 #include <poll.h>
 #include <unistd.h>
@@ -191,8 +192,11 @@ void merge(Node& base, Node top, bool at_root) {
     return;
   }
   base.at = top.at;
+  std::unordered_map<std::string, std::size_t> known;  // keys of one object are unique
+  for (std::size_t i = 0; i < below->size(); ++i) known.emplace((*below)[i].key, i);
   for (Member& member : *above) {
-    Node* same = base.find(member.key);
+    const auto place = known.find(member.key);
+    Node* same = place != known.end() ? &(*below)[place->second].value : nullptr;
     List* list = same ? same->as<List>() : nullptr;
     List* more = member.value.as<List>();
     if (!same) {
