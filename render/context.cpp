@@ -139,7 +139,10 @@ void pin_environment(int raster_threads, GlPlatform platform) {
   setenv("EGL_LOG_LEVEL", "fatal", 0);                // what fails is in the exceptions
   setenv("LP_NATIVE_VECTOR_WIDTH", "256", 1);
   setenv("LP_NUM_THREADS", std::to_string(raster_threads).c_str(), 1);
-  setenv("MESA_SHADER_CACHE_DISABLE", "true", 1);
+  const char* cache = std::getenv("OFFSTAGE_SHADER_CACHE");
+  const bool caches = cache != nullptr && *cache != '\0';
+  setenv("MESA_SHADER_CACHE_DISABLE", caches ? "false" : "true", 1);
+  set_if(caches, "MESA_SHADER_CACHE_DIR", caches ? cache : "");
 }
 
 struct Context::Impl {

@@ -37,7 +37,9 @@ struct ContextInfo {
 /// Sets and clears the environment variables that steer Mesa (LP_NUM_THREADS to `raster_threads`, which all
 /// contexts of the process share: llvmpipe has one rasteriser, so give it every processor even if several
 /// contexts draw at once), and chooses the platform of all contexts. Call once, in main, before any thread
-/// starts: it uses setenv. Mesa reads the variables at the first context.
+/// starts: it uses setenv. Mesa reads the variables at the first context. The environment variable
+/// OFFSTAGE_SHADER_CACHE names a folder that is there, in which Mesa keeps compiled shaders from process to
+/// process; without it none are kept. The pixels are the same.
 void pin_environment(int raster_threads, GlPlatform platform = gl_platform_of_environment());
 
 /// Owns an OpenGL context, which is current on the thread that created it. Use it from that thread only, and

@@ -2,7 +2,8 @@
 # Builds offstage and runs its tests:  tests/run.sh [--long] [--tsan] [CTEST OPTIONS...]
 #   --long  also the long cases (label "long"), for which scanned models are fetched, the benchmarks, and the fuzz targets
 #   --tsan  also the threaded tests under ThreadSanitizer
-# The unit tests and the model importer run a second time under AddressSanitizer and UndefinedBehaviorSanitizer.
+# The unit tests and the model importer run a second time with libraries under AddressSanitizer and UndefinedBehaviorSanitizer
+# (label "sanitized").
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . cmake/packages.sh
@@ -28,14 +29,9 @@ failed=0
 peers=()
 [ -d ../shared/peers ] && peers=("-DOFFSTAGE_PEERS=$(realpath ../shared/peers)")
 
-cmake --preset release -DOFFSTAGE_WERROR=ON -DOFFSTAGE_TESTS=ON -DOFFSTAGE_BENCH=$bench "${peers[@]}"
+# One build and one run of all tests: no core waits for the end of one before the next begins.
+cmake --preset release -DOFFSTAGE_WERROR=ON -DOFFSTAGE_TESTS=ON -DOFFSTAGE_SANITIZED_TESTS=ON -DOFFSTAGE_BENCH=$bench "${peers[@]}"
 cmake --build build
-
-cmake --preset asan
-cmake --build build-asan --target sanitized_tests
-export UBSAN_OPTIONS=print_stacktrace=1:halt_on_error=1
-ctest --test-dir build-asan -L unit -j "$cores" --output-on-failure "$@" || failed=1
-build-asan/test_determinism --gtest_filter='*InEveryBuild' --gtest_brief=1 || failed=1
 
 if [ ${#long[@]} = 0 ]; then
   tests/meshes.sh build/meshes

@@ -25,7 +25,7 @@ struct PolytopeFace {
   bool is_key_exact, alive;
 };
 
-struct Edge {
+struct HorizonEdge {
   Index face;
   uint8_t side;
 };
@@ -145,7 +145,7 @@ class ExpandingPolytope {
   }
 
   /// The other side of an edge.
-  Edge across(Index f, std::size_t k) const {
+  HorizonEdge across(Index f, std::size_t k) const {
     const Index other = faces_[f].neighbour[k];
     const auto& back = faces_[other].neighbour;
     const Index head = faces_[f].corner[next(k)];
@@ -156,7 +156,7 @@ class ExpandingPolytope {
 
   /// Coming over an edge into a face: kept, and then the edge is part of the outline, or removed with what is
   /// behind it.
-  void visit(Edge e, const Vec3& p) {
+  void visit(HorizonEdge e, const Vec3& p) {
     const PolytopeFace& f = faces_[e.face];
     if (!f.alive) return;
     if (f.normal.dot(p) <= f.offset) {
@@ -171,7 +171,7 @@ class ExpandingPolytope {
   /// The outline's edges follow each other, seen from the kept faces clockwise.
   bool is_loop() const {
     for (std::size_t k = 0; k < horizon_size_; ++k) {
-      const Edge e = horizon_[k], f = horizon_[k + 1 == horizon_size_ ? 0 : k + 1];
+      const HorizonEdge e = horizon_[k], f = horizon_[k + 1 == horizon_size_ ? 0 : k + 1];
       if (faces_[e.face].corner[e.side] != faces_[f.face].corner[next(f.side)]) return false;
     }
     return true;
@@ -183,7 +183,7 @@ class ExpandingPolytope {
     for (std::size_t k = 0; k < horizon_size_; ++k)
       slot[k] = dead_size_ > 0 ? dead_[--dead_size_] : static_cast<Index>(face_count_++);
     for (std::size_t k = 0; k < horizon_size_; ++k) {
-      const Edge e = horizon_[k];
+      const HorizonEdge e = horizon_[k];
       PolytopeFace& kept = faces_[e.face];
       PolytopeFace& f = faces_[slot[k]];
       const Index before = slot[k == 0 ? horizon_size_ - 1 : k - 1],
@@ -200,7 +200,7 @@ class ExpandingPolytope {
   std::size_t point_count_ = 0, face_count_ = 0, horizon_size_ = 0, dead_size_ = 0;
   std::array<SupportPoint, kMaxPoints> points_;
   std::array<PolytopeFace, kMaxFaces> faces_;
-  std::array<Edge, kMaxFaces> horizon_;
+  std::array<HorizonEdge, kMaxFaces> horizon_;
   std::array<Index, kMaxFaces> dead_;
 };
 

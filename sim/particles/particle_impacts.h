@@ -5,6 +5,7 @@
 /// collisions are too many, is left to resting contact (particle_contacts.h), which lets nothing through
 /// either. So are slow collisions in a crowd, of which there is no end and where each depends on all.
 
+#include <functional>
 #include <queue>
 #include <span>
 #include <vector>

@@ -8,7 +8,7 @@ namespace {
 
 /// Pieces in which the motion of what joints hold is integrated: of its turning, and of the phase of its
 /// fastest swinging [rad]; and the most of them.
-constexpr Real kTurn = 0.12, kSwing = 1, kFastSpin = 1, kMostPieces = 64;
+constexpr Real kTurn = 0.12, kSwing = 1, kSpin = 1, kMostPieces = 64;
 
 }  // namespace
 
@@ -209,7 +209,7 @@ Real CoupledGroup::pieces(Real h) const {
       fastest = std::max(fastest, body->rigid.angular_velocity().norm());
     tightest = std::max(tightest, j.articulation->greatest_frequency());
   }
-  return std::clamp(std::ceil(std::max({fastest / kTurn, tightest / kSwing, spin / kFastSpin}) * h), 1.0,
+  return std::clamp(std::ceil(std::max({fastest / kTurn, tightest / kSwing, spin / kSpin}) * h), 1.0,
                     kMostPieces);
 }
 

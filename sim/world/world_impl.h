@@ -25,6 +25,8 @@
 
 namespace offstage::sim {
 
+class CoupledSystem;
+
 struct Spring {
   SpringDef def;
   Real rest_length;

@@ -219,14 +219,12 @@ TEST(FailingAllocation, EndsWithOneLineOrGivesTheWholeTable) {
     fs::remove(folder / "t.csv");
     const int after = 4000 + (i * 977) % 14000;  // earlier calls are of libraries that begin
     const Outcome run = offstage(command, folder.path(), preload + std::to_string(after));
-    if (run.code == 0) {  // where nothing depends on it, such as a buffer of the C library
-      EXPECT_EQ(read_file(folder / "t.csv"), whole) << after;
-      continue;
-    }
+    // Whole where nothing depended on it, such as a buffer of the C library, or where it struck later.
+    if (run.code == 0 || fs::exists(folder / "t.csv")) EXPECT_EQ(read_file(folder / "t.csv"), whole) << after;
+    if (run.code == 0) continue;
     ++failed;
     EXPECT_EQ(run.code, 1) << after << ": " << run.err;
     EXPECT_EQ(run.err, "offstage: out of memory\n") << after;
-    EXPECT_FALSE(fs::exists(folder / "t.csv"));
   }
   EXPECT_GT(failed, 0);
 }

@@ -96,6 +96,22 @@ TEST(Context, PinningRemovesWhatWouldChangeThePicture) {
   EXPECT_STREQ(std::getenv("LP_NUM_THREADS"), "1");
 }
 
+TEST(Context, CompiledShadersAreKeptOnlyInTheFolderThatIsNamed) {
+  const char* inherited = std::getenv("OFFSTAGE_SHADER_CACHE");
+  const std::string before = inherited == nullptr ? "" : inherited;
+  setenv("MESA_SHADER_CACHE_DIR", "/elsewhere", 1);
+  setenv("OFFSTAGE_SHADER_CACHE", "", 1);
+  pin_environment(1);
+  EXPECT_STREQ(std::getenv("MESA_SHADER_CACHE_DISABLE"), "true");
+  EXPECT_EQ(std::getenv("MESA_SHADER_CACHE_DIR"), nullptr);
+  setenv("OFFSTAGE_SHADER_CACHE", "/here", 1);
+  pin_environment(1);
+  EXPECT_STREQ(std::getenv("MESA_SHADER_CACHE_DISABLE"), "false");
+  EXPECT_STREQ(std::getenv("MESA_SHADER_CACHE_DIR"), "/here");
+  setenv("OFFSTAGE_SHADER_CACHE", before.c_str(), 1);
+  pin_environment(1);
+}
+
 TEST(Context, TwoThreadsDrawTheSamePixelsAtTheSameTime) {
   std::string hashes[2];
   const auto draw = [&hashes](int k) {

@@ -172,17 +172,17 @@ double seconds_since(steady_clock::time_point start) {
   return std::chrono::duration<double>(steady_clock::now() - start).count();
 }
 
-/// Ends a trial within a frame; only the sub-step that runs is waited for.
+/// Ends a trial within a frame, after the sub-step that runs.
 struct TrialOver {};
 
-/// Simulates for so long at most; returns film time and computing time [s].
+/// Simulates for so long at most, but at least one sub-step; returns film time and computing time [s].
 std::pair<double, double> try_simulation(const Scene& scene, Simulation& simulation, double limit_s) {
   const auto start = steady_clock::now();
   double reached = 0;
   simulation.on_substep([&](double time) {
     reached = time;
     if (interrupt_signal()) throw Interrupted(interrupt_signal());
-    if (seconds_since(start) > limit_s) throw TrialOver();
+    if (time > 0 && seconds_since(start) > limit_s) throw TrialOver();
   });
   try {
     while (simulation.frame() < scene.frame_count()) {

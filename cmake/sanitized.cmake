@@ -1,0 +1,82 @@
+# The libraries a second time, under AddressSanitizer and UndefinedBehaviorSanitizer, and test programs that link them
+# (OFFSTAGE_SANITIZED_TESTS). The objects of the tests themselves are those of the normal programs, so they compile once.
+
+# Memory errors and index arithmetic. The checks of -fsanitize=undefined for null, misaligned and wrongly typed pointers are left
+# out: they take twice the compile time of everything else, and AddressSanitizer or the processor stops at most of what they find.
+set(OFFSTAGE_SANITIZERS
+  -fsanitize=address,signed-integer-overflow,shift,bounds,integer-divide-by-zero,float-cast-overflow,return,unreachable,bool,enum
+  -fno-sanitize-recover=all -fno-omit-frame-pointer)
+# GCC compiles a fifth faster when it calls the checks instead of writing them out.
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+  list(APPEND OFFSTAGE_SANITIZERS "SHELL:--param asan-instrumentation-with-call-threshold=0")
+endif()
+
+# sanitized_names(OUT LIBRARIES...): the libraries of this project in LIBRARIES replaced by their sanitized twins.
+function(sanitized_names out)
+  set(names)
+  foreach(library IN LISTS ARGN)
+    if(library MATCHES "^offstage::(sim|effects|render|producer|tune)$")
+      set(library offstage_${CMAKE_MATCH_1}_sanitized)
+    endif()
+    list(APPEND names ${library})
+  endforeach()
+  set(${out} ${names} PARENT_SCOPE)
+endfunction()
+
+# offstage_sanitized_library(TARGET): TARGET_sanitized from the same sources. To be called in the folder of TARGET, at its end.
+function(offstage_sanitized_library target)
+  if(NOT OFFSTAGE_SANITIZED_TESTS)
+    return()
+  endif()
+  foreach(property SOURCES LINK_LIBRARIES INCLUDE_DIRECTORIES UNITY_BUILD UNITY_BUILD_MODE)
+    get_target_property(${property} ${target} ${property})
+    if(NOT ${property})
+      set(${property})
+    endif()
+  endforeach()
+  set(twin ${target}_sanitized)
+  add_library(${twin} STATIC EXCLUDE_FROM_ALL ${SOURCES})
+  sanitized_names(libraries ${LINK_LIBRARIES})
+  target_link_libraries(${twin} PUBLIC ${libraries})
+  target_include_directories(${twin} PRIVATE ${INCLUDE_DIRECTORIES})
+  target_compile_options(${twin} PRIVATE -O1 -g1 -UNDEBUG -w ${OFFSTAGE_SANITIZERS})
+  target_precompile_headers(${twin} REUSE_FROM offstage_precompiled_sanitized)
+  if(UNITY_BUILD)
+    set_target_properties(${twin} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE ${UNITY_BUILD_MODE})
+  endif()
+endfunction()
+
+# offstage_sanitized_tests(NAME SHARDS FILTER): test_NAME_sanitized from the objects of test_NAME, run in SHARDS processes; the start
+# of a process costs more than most tests. The sanitized libraries come first, so that of a template that both use theirs is linked.
+function(offstage_sanitized_tests name shards filter)
+  if(NOT OFFSTAGE_SANITIZED_TESTS)
+    return()
+  endif()
+  get_target_property(LINK_LIBRARIES test_${name} LINK_LIBRARIES)
+  sanitized_names(libraries ${LINK_LIBRARIES})
+  set(twin test_${name}_sanitized)
+  add_executable(${twin} $<TARGET_OBJECTS:test_${name}>)
+  set_target_properties(${twin} PROPERTIES LINKER_LANGUAGE CXX)
+  target_link_libraries(${twin} PRIVATE ${libraries})
+  target_link_options(${twin} PRIVATE ${OFFSTAGE_SANITIZERS})
+  foreach(library IN LISTS libraries)
+    if(library MATCHES "_sanitized$")
+      target_link_options(${twin} PRIVATE LINKER:--whole-archive $<TARGET_FILE:${library}> LINKER:--no-whole-archive)
+    endif()
+  endforeach()
+  math(EXPR last "${shards} - 1")
+  foreach(shard RANGE ${last})
+    math(EXPR number "${shard} + 1")
+    add_test(NAME sanitized.${name}.${number}_of_${shards} COMMAND ${twin} --gtest_filter=${filter})
+    set_tests_properties(sanitized.${name}.${number}_of_${shards} PROPERTIES LABELS sanitized TIMEOUT 600 COST 100
+      ENVIRONMENT "GTEST_TOTAL_SHARDS=${shards};GTEST_SHARD_INDEX=${shard};UBSAN_OPTIONS=print_stacktrace=1;${property_tests}")
+  endforeach()
+endfunction()
+
+if(OFFSTAGE_SANITIZED_TESTS)
+  add_library(offstage_precompiled_sanitized OBJECT ${CMAKE_CURRENT_BINARY_DIR}/precompiled.cpp)
+  target_link_libraries(offstage_precompiled_sanitized PRIVATE Eigen3::Eigen offstage_flags)
+  target_compile_options(offstage_precompiled_sanitized PRIVATE -O1 -g1 -UNDEBUG -w ${OFFSTAGE_SANITIZERS})
+  get_target_property(headers offstage_precompiled PRECOMPILE_HEADERS)
+  target_precompile_headers(offstage_precompiled_sanitized PRIVATE ${headers})
+endif()
