@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Builds offstage and runs its tests:  tests/run.sh [--long] [--tsan] [CTEST OPTIONS...]
-#   --long  also the long cases (label "long"), for which scanned models are fetched, the benchmarks, and the fuzz targets
+#   --long  also the long cases (label "long"), for which scanned models are fetched, the benchmarks are built, the fuzz
+#           targets run, and the unit tests run with all checks of the sanitizers
 #   --tsan  also the threaded tests under ThreadSanitizer
 # The unit tests and the model importer run a second time with libraries under AddressSanitizer and UndefinedBehaviorSanitizer
 # (label "sanitized").
@@ -34,6 +35,9 @@ cmake --preset release -DOFFSTAGE_WERROR=ON -DOFFSTAGE_TESTS=ON -DOFFSTAGE_SANIT
 cmake --build build
 
 if [ ${#long[@]} = 0 ]; then
+  cmake --preset asan
+  cmake --build build-asan --target test_sim test_effects test_producer test_tune test_render
+  UBSAN_OPTIONS=print_stacktrace=1:halt_on_error=1 ctest --test-dir build-asan -L unit -j "$cores" --output-on-failure || failed=1
   tests/meshes.sh build/meshes
   export OFFSTAGE_MESHES=$PWD/build/meshes
   cmake --preset fuzz

@@ -32,7 +32,7 @@ struct Shown {
 };
 
 /// A scene of kinematic bodies and overlays.
-std::string scene(const std::string& bodies, const std::string& overlays) {
+std::string overlaid(const std::string& bodies, const std::string& overlays) {
   return R"({"bodies": [)" + bodies + R"(], "overlays": [)" + overlays + "]}";
 }
 std::string ball(const std::string& name, const std::string& position, const std::string& more = "") {
@@ -44,7 +44,7 @@ constexpr const char* kCrank =
     R"({"name": "crank", "motion": "kinematic", "position": [1, 2, 3],
         "shape": {"type": "mesh", "file": "assets/models/crank.glb", "scale": 2}})";
 std::string tree_of_crank(const std::string& more) {
-  return scene(kCrank, R"({"type": "tree", "body": "crank", )" + more + "}");
+  return overlaid(kCrank, R"({"type": "tree", "body": "crank", )" + more + "}");
 }
 
 Eigen::AlignedBox3f box_of(const LineSet& set) {
@@ -78,7 +78,7 @@ TEST(Overlays, LevelsOfATreeDoubleAndFadeIntoEachOther) {
 }
 
 TEST(Overlays, ClosestPointsAreOnTheLineBetweenTheCentresOfBalls) {
-  const Shown shown(scene(
+  const Shown shown(overlaid(
       ball("left", "[0, 0, 0]") + "," + ball("right", "[0, 3, 0]"),
       R"({"type": "closest", "a": "left", "b": "right", "color": [0, 0, 1], "penetrating": [1, 0, 0]})"));
   const render::Line line = shown.lines().lines.at(0);
@@ -88,7 +88,7 @@ TEST(Overlays, ClosestPointsAreOnTheLineBetweenTheCentresOfBalls) {
 }
 
 TEST(Overlays, BodiesInEachOtherShowTheirDepthInAnotherColour) {
-  const Shown shown(scene(
+  const Shown shown(overlaid(
       ball("left", "[0, 0, 0]") + "," + ball("right", "[0, 0.8, 0]"),
       R"({"type": "closest", "a": "left", "b": "right", "color": [0, 0, 1], "penetrating": [1, 0, 0]})"));
   const render::Line line = shown.lines().lines.at(0);
@@ -98,11 +98,11 @@ TEST(Overlays, BodiesInEachOtherShowTheirDepthInAnotherColour) {
 
 TEST(Overlays, ContactsOfAllPairsArePushedApart) {
   // A ball in the floor and a ball on the first; the third is far away, and the fourth does not collide.
-  const Shown shown(scene(R"({"motion": "static", "shape": {"type": "plane"}},)" +
-                              ball("low", "[0, 0.499, 0]") + "," + ball("high", "[0, 1.495, 0]") + "," +
-                              ball("far", "[5, 3, 0]") + "," +
-                              ball("ghost", "[0.2, 1, 0]", R"(, "collides": false)"),
-                          R"({"type": "contacts", "size": 0.05})"));
+  const Shown shown(overlaid(R"({"motion": "static", "shape": {"type": "plane"}},)" +
+                                 ball("low", "[0, 0.499, 0]") + "," + ball("high", "[0, 1.495, 0]") + "," +
+                                 ball("far", "[5, 3, 0]") + "," +
+                                 ball("ghost", "[0.2, 1, 0]", R"(, "collides": false)"),
+                             R"({"type": "contacts", "size": 0.05})"));
   std::vector<float> heights;
   for (const render::Line& line : shown.lines().lines) {
     if (line.a == line.b) heights.push_back(line.a.y());
@@ -213,8 +213,8 @@ TEST(Overlays, GroupsThatTouchShareAColourAndSleepersAreDim) {
 TEST(Overlays, AreTheSameWhateverWasSeenBefore) {
   const std::string box = R"({"name": "box", "motion": "kinematic", "spin": [1, 2, 3]})";
   const std::string text =
-      scene(ball("a", "[0, 1.02, 0]") + "," + box,
-            R"({"type": "closest", "a": "a", "b": "box"}, {"type": "contacts", "margin": 0.3})");
+      overlaid(ball("a", "[0, 1.02, 0]") + "," + box,
+               R"({"type": "closest", "a": "a", "b": "box"}, {"type": "contacts", "margin": 0.3})");
   Shown once(text), often(text);
   for (int frame = 0; frame < 5; ++frame) {
     often.simulation.advance();
@@ -229,7 +229,7 @@ TEST(Overlays, AreTheSameWhateverWasSeenBefore) {
 }
 
 TEST(Overlays, DoNotTouchTheState) {
-  const Shown with(tree_of_crank(R"("level": 3)")), without(scene(kCrank, ""));
+  const Shown with(tree_of_crank(R"("level": 3)")), without(overlaid(kCrank, ""));
   EXPECT_EQ(with.simulation.snapshot().state_hash, without.simulation.snapshot().state_hash);
 }
 

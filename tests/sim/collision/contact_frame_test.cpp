@@ -16,7 +16,6 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kPi = std::numbers::pi;
 const Vec3 kOrigin = Vec3::Zero();
 
 Mat3 matrix(const ContactFrame& f) {
@@ -120,8 +119,8 @@ std::vector<Pair> pairs() {
        at({0, 0.52 + corner, 0}, rotation_between(Vec3::Ones(), Vec3(0.1, -1, 0.05))), at(kOrigin),
        NormalSource::face_of_b},
       {"face on vertex", box, box, at(kOrigin), at({0.1, 0.53 + corner, 0}, tip), NormalSource::face_of_a},
-      {"edge across edge", box, box, at({0, 1.5, 0}, turn(kPi / 4, 0, 0.1)),
-       at(kOrigin, turn(0, 0.1, kPi / 4)), NormalSource::edges},
+      {"edge across edge", box, box, at({0, 1.5, 0}, turn(std::numbers::pi / 4, 0, 0.1)),
+       at(kOrigin, turn(0, 0.1, std::numbers::pi / 4)), NormalSource::edges},
       {"vertex on vertex", box, box, at({0.9, 0.93, 0.96}), at({-0.2, -0.2, -0.2}, away),
        NormalSource::points},
       {"vertex by edge", box, box, at(kOrigin),
@@ -140,8 +139,8 @@ std::vector<Pair> pairs() {
        NormalSource::edges},
       {"cylinders across", cylinder, cylinder, at({0, 0, 0.81}, turn(0, 0, 0.8)), at(kOrigin),
        NormalSource::edges},
-      {"a cylinder across an edge", cylinder, box, at({0, 1.16, 0}, turn(0, 0, kPi / 2 - 0.2)),
-       at(kOrigin, turn(0, 0.5, 0) * turn(kPi / 4, 0, 0)), NormalSource::edges},
+      {"a cylinder across an edge", cylinder, box, at({0, 1.16, 0}, turn(0, 0, std::numbers::pi / 2 - 0.2)),
+       at(kOrigin, turn(0, 0.5, 0) * turn(std::numbers::pi / 4, 0, 0)), NormalSource::edges},
       {"overlapping capsules", capsule, capsule, at({0, 0, 0.38}, turn(0, 0, 0.8)), at(kOrigin),
        NormalSource::edges},
       {"overlapping balls", ball, ball, at({0.3, 0.45, 0.1}), at(kOrigin), NormalSource::points},

@@ -15,7 +15,7 @@ namespace {
 
 using Kind = Feature::Kind;
 
-Pose at(const Vec3& position, const Quat& orientation = Quat::Identity()) {
+Pose placed_at(const Vec3& position, const Quat& orientation = Quat::Identity()) {
   return {position, orientation};
 }
 
@@ -50,7 +50,7 @@ TEST(Vclip, FindsTheFeaturesAndTheirDistance) {
     const Quat turn = Quat(Eigen::AngleAxisd(0.3, n)) * rotation_between(c.from, -n);
     const Vec3 gap = 0.1 * n;
     VclipCache cache;
-    const Separation s = vclip(cube, cube, at(c.to + gap - turn * c.from, turn), cache);
+    const Separation s = vclip(cube, cube, placed_at(c.to + gap - turn * c.from, turn), cache);
     EXPECT_EQ(cache.a.kind, c.kind_a);
     EXPECT_EQ(cache.b.kind, c.kind_b);
     EXPECT_NEAR(s.distance, 0.1, 1e-15);
@@ -81,19 +81,19 @@ TEST(Vclip, AVertexUnderAFaceEscapesToTheFaceItIsOver) {
   const ConvexPolyhedron tip = convex_hull(std::vector<Vec3>{{0, 0, 0}, {1, 1, 0}, {1, -1, 1}, {1, -1, -1}});
   for (uint32_t f = 0; f < cube.face_count(); ++f) {
     VclipCache cache{{Kind::vertex, 0}, {Kind::face, f}};
-    const Separation s = vclip(tip, cube, at({-0.8, 0, 0}), cache);
+    const Separation s = vclip(tip, cube, placed_at({-0.8, 0, 0}), cache);
     EXPECT_NEAR(s.distance, 0.3, 1e-15);
     ASSERT_EQ(cache.b.kind, Kind::face);
     EXPECT_EQ(cube.plane(cache.b.index).normal, Vec3(Vec3::UnitX()));
     EXPECT_LE(s.iterations, 3);
   }
   VclipCache inside{{Kind::vertex, 0}, {Kind::face, 0}};
-  EXPECT_NEAR(vclip(tip, cube, at({-0.4, 0, 0}), inside).distance, -0.1, 1e-12);
+  EXPECT_NEAR(vclip(tip, cube, placed_at({-0.4, 0, 0}), inside).distance, -0.1, 1e-12);
 }
 
 TEST(Vclip, AnEdgeThroughAFaceIsPenetration) {
   const ConvexPolyhedron slab = box_polyhedron({2, 0.2, 2}), spike = box_polyhedron({0.1, 6, 0.1});
-  const Separation s = cold_start(slab, spike, at({0.9, 0, 0}));
+  const Separation s = cold_start(slab, spike, placed_at({0.9, 0, 0}));
   EXPECT_NEAR(s.distance, -0.15, 1e-12);
   EXPECT_LT((s.normal + Vec3::UnitX()).norm(), 1e-12);
 }
@@ -106,19 +106,19 @@ TEST(Vclip, PolygonsSegmentsAndPoints) {
   const Quat upright(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitZ())),
       aside(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitY()));
   for (const Real y : {0.25, -0.25}) {
-    EXPECT_NEAR(cold_start(square, square, at({0.5, y, 0.3})).distance, 0.25, 1e-15);
-    EXPECT_NEAR(cold_start(square, rod, at({0.5, y, 0.3})).distance, 0.25, 1e-15);
-    EXPECT_NEAR(cold_start(square, point, at({0.5, y, 0.3})).distance, 0.25, 1e-15);
-    EXPECT_NEAR(cold_start(rod, rod, at({0.5, y, 0.3}, aside)).distance, 0.25, 1e-15);
-    EXPECT_NEAR(cold_start(rod, point, at({0.5, y, 0})).distance, 0.25, 1e-15);
+    EXPECT_NEAR(cold_start(square, square, placed_at({0.5, y, 0.3})).distance, 0.25, 1e-15);
+    EXPECT_NEAR(cold_start(square, rod, placed_at({0.5, y, 0.3})).distance, 0.25, 1e-15);
+    EXPECT_NEAR(cold_start(square, point, placed_at({0.5, y, 0.3})).distance, 0.25, 1e-15);
+    EXPECT_NEAR(cold_start(rod, rod, placed_at({0.5, y, 0.3}, aside)).distance, 0.25, 1e-15);
+    EXPECT_NEAR(cold_start(rod, point, placed_at({0.5, y, 0})).distance, 0.25, 1e-15);
   }
-  EXPECT_NEAR(cold_start(square, square, at({2.5, 0, 0})).distance, 0.5, 1e-15);  // in one plane
-  EXPECT_NEAR(cold_start(rod, rod, at({5, 0, 0})).distance, 1, 1e-15);            // in one line
-  EXPECT_NEAR(cold_start(point, point, at({3, 4, 0})).distance, 5, 1e-15);
-  EXPECT_NEAR(cold_start(square, rod, at({0.4, 0, 0.2}, upright)).distance, -0.6, 1e-12);
-  EXPECT_NEAR(cold_start(rod, rod, at({0.5, 0, 0}, aside)).distance, 0, 1e-12);
-  EXPECT_NEAR(cold_start(point, point, at(Vec3::Zero())).distance, 0, 1e-12);
-  EXPECT_NEAR(cold_start(square, point, at({1, 0, 1})).distance, 0, 1e-12);
+  EXPECT_NEAR(cold_start(square, square, placed_at({2.5, 0, 0})).distance, 0.5, 1e-15);  // in one plane
+  EXPECT_NEAR(cold_start(rod, rod, placed_at({5, 0, 0})).distance, 1, 1e-15);            // in one line
+  EXPECT_NEAR(cold_start(point, point, placed_at({3, 4, 0})).distance, 5, 1e-15);
+  EXPECT_NEAR(cold_start(square, rod, placed_at({0.4, 0, 0.2}, upright)).distance, -0.6, 1e-12);
+  EXPECT_NEAR(cold_start(rod, rod, placed_at({0.5, 0, 0}, aside)).distance, 0, 1e-12);
+  EXPECT_NEAR(cold_start(point, point, placed_at(Vec3::Zero())).distance, 0, 1e-12);
+  EXPECT_NEAR(cold_start(square, point, placed_at({1, 0, 1})).distance, 0, 1e-12);
 }
 
 ConvexPolyhedron ball(Dice& dice, int vertices) {
@@ -135,8 +135,8 @@ TEST(Vclip, AlongASmoothMotionAStepIsAllItTakes) {
   int steps = 0;
   for (int k = 0; k < kSteps; ++k) {
     const Real t = 0.01 * k;
-    const Pose pose = at({2.1 + 0.1 * std::sin(t), 0.3 * std::cos(0.7 * t), 0.2 * std::sin(1.3 * t)},
-                         Quat(Eigen::AngleAxisd(0.3 * t, Vec3(1, 2, 3).normalized())));
+    const Pose pose = placed_at({2.1 + 0.1 * std::sin(t), 0.3 * std::cos(0.7 * t), 0.2 * std::sin(1.3 * t)},
+                                Quat(Eigen::AngleAxisd(0.3 * t, Vec3(1, 2, 3).normalized())));
     const Separation s = vclip(a, b, pose, cache);
     ASSERT_NEAR(s.distance, cold_start(a, b, pose).distance, 1e-14);
     steps += s.iterations;
@@ -152,10 +152,10 @@ TEST(Vclip, ParallelBoxesHaveExactGapsAndTheWalkStandsStill) {
     const Quat turn(Eigen::AngleAxisd(0.5 * std::numbers::pi * dice.index(4), Vec3::UnitY()));
     Vec3 gap(dice.index(3) * 0.5, 1.25, dice.index(3) * 0.5);
     VclipCache cache;
-    EXPECT_NEAR(vclip(cube, cube, at(gap, turn), cache).distance, 0.25, 1e-14);
+    EXPECT_NEAR(vclip(cube, cube, placed_at(gap, turn), cache).distance, 0.25, 1e-14);
     for (int step = 0; step < 20; ++step) {
       gap += 1e-15 * dice.in_cube();
-      const Separation s = vclip(cube, cube, at(gap, turn), cache);
+      const Separation s = vclip(cube, cube, placed_at(gap, turn), cache);
       EXPECT_NEAR(s.distance, 0.25, 1e-13);
       EXPECT_LE(s.iterations, 3);
     }
@@ -168,7 +168,7 @@ TEST(Vclip, IsSymmetricAndMovesWithTheSolids) {
     const ConvexPair pair = random_pair(dice, 12);
     const Separation s = cold_start(pair.a, pair.b, pair.a_from_b);
     const Quat back = pair.a_from_b.orientation.conjugate();
-    const Separation t = cold_start(pair.b, pair.a, at(back * -pair.a_from_b.position, back));
+    const Separation t = cold_start(pair.b, pair.a, placed_at(back * -pair.a_from_b.position, back));
     RC_ASSERT(std::abs(s.distance - t.distance) <= 1e-10 * pair.size());
 
     const Quat turn = dice.rotation();
@@ -177,8 +177,9 @@ TEST(Vclip, IsSymmetricAndMovesWithTheSolids) {
     std::vector<std::vector<uint32_t>> faces;
     for (uint32_t f = 0; f < pair.a.face_count(); ++f)
       faces.emplace_back(pair.a.face_vertices(f).begin(), pair.a.face_vertices(f).end());
-    const Separation u = cold_start({std::move(turned), faces}, pair.b,
-                                    at(turn * pair.a_from_b.position, turn * pair.a_from_b.orientation));
+    const Separation u =
+        cold_start({std::move(turned), faces}, pair.b,
+                   placed_at(turn * pair.a_from_b.position, turn * pair.a_from_b.orientation));
     RC_ASSERT(std::abs(s.distance - u.distance) <= 1e-10 * pair.size());
   }));
 }
