@@ -47,7 +47,8 @@ function(offstage_sanitized_library target)
 endfunction()
 
 # offstage_sanitized_tests(NAME SHARDS FILTER): test_NAME_sanitized from the objects of test_NAME, run in SHARDS processes; the start
-# of a process costs more than most tests. Of the property tests' cases an eighth is enough here. The sanitized libraries come first, so that of a template that both use theirs is linked.
+# of a process costs more than most tests. Of the property tests' cases an eighth is enough here. The sanitized libraries come
+# first, so that of a template that both use theirs is linked.
 function(offstage_sanitized_tests name shards filter)
   if(NOT OFFSTAGE_SANITIZED_TESTS)
     return()
@@ -69,7 +70,7 @@ function(offstage_sanitized_tests name shards filter)
     math(EXPR number "${shard} + 1")
     add_test(NAME sanitized.${name}.${number}_of_${shards} COMMAND ${twin} --gtest_filter=${filter})
     set_tests_properties(sanitized.${name}.${number}_of_${shards} PROPERTIES LABELS sanitized TIMEOUT 600 COST 100
-      ENVIRONMENT "GTEST_TOTAL_SHARDS=${shards};GTEST_SHARD_INDEX=${shard};UBSAN_OPTIONS=print_stacktrace=1;RC_PARAMS=seed=20260101 max_success=50")
+      ENVIRONMENT "GTEST_TOTAL_SHARDS=${shards};GTEST_SHARD_INDEX=${shard};UBSAN_OPTIONS=print_stacktrace=1;LSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0;RC_PARAMS=seed=20260101 max_success=50")
   endforeach()
 endfunction()
 
