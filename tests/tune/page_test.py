@@ -82,7 +82,7 @@ class Editing(Case):
         self.assertIn('line 9', page.find('#problems').text)
         self.assertEqual(page.all('.gutter .bad')[0].text, '9')
         page.select('/emitters/0')
-        self.assertIn('greater than 0', page.find('#controls .row[data-key="radius"] .error').text)
+        self.assertIn('must be greater than', page.find('#controls .row[data-key="radius"] .error').text)
         page.set_text(SCENE.replace('"radius": 0.03', '"radius": 0.03,,'))
         self.assertTrue(page.find('#problems').is_displayed())
         page.set_text(SCENE)
