@@ -286,7 +286,7 @@ int exponent_to_one(std::span<const Vec3> points) {
   constexpr int kMost = 200;
   Real largest = 0;
   for (const Vec3& p : points) largest = std::max(largest, p.cwiseAbs().maxCoeff());
-  const int exponent = largest > 0 ? std::ilogb(largest) : 0;
+  const int exponent = largest > 0 && std::isfinite(largest) ? std::ilogb(largest) : 0;
   return std::abs(exponent) > kMost ? -exponent : 0;
 }
 

@@ -63,17 +63,23 @@ TEST(FileOutsideOfTheScenesFolder, IsReadOnlyIfItsFolderIsAllowed) {
   }
 }
 
-TEST(ModelThatNamesASystemFile, DoesNotReadIt) {
+TEST(BufferOutsideOfTheScenesFolder, IsReadOnlyIfItsFolderIsAllowed) {
   const TemporaryFolder folder;
-  write_file(folder / "m.gltf",
+  fs::create_directories(folder / "scene");
+  fs::create_directories(folder / "elsewhere");
+  const std::vector<float> corners = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+  write_file(folder / "elsewhere/corners.bin", {reinterpret_cast<const char*>(corners.data()), 36});
+  write_file(folder / "scene/m.gltf",
              R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
     "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
-    "buffers":[{"uri":"../../../../../../../../etc/passwd","byteLength":36}],
+    "buffers":[{"uri":"../elsewhere/corners.bin","byteLength":36}],
     "bufferViews":[{"buffer":0,"byteLength":36}],
     "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}]})");
-  write_file(folder / "s.json",
+  write_file(folder / "scene/s.json",
              R"({"bodies": [{"motion": "static", "shape": {"type": "mesh", "file": "m.gltf"}}]})");
-  EXPECT_EQ(offstage("validate --quick s.json", folder.path()).code, 3);
+  EXPECT_EQ(offstage("validate --quick scene/s.json", folder.path()).code, 3);
+  const Outcome allowed = offstage("validate --quick scene/s.json --allow elsewhere", folder.path());
+  EXPECT_EQ(allowed.code, 0) << allowed.err;
 }
 
 TEST(SymbolicLink, IsNotFollowedByAnOutput) {

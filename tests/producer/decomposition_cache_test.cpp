@@ -59,6 +59,16 @@ TEST(DecompositionCache, DamagedFilesAreMadeAgain) {
   EXPECT_TRUE(equal(cache.decompose(mesh), made));
 }
 
+TEST(DecompositionCache, AFileOfAnotherMeshIsNotTaken) {
+  const ScratchFolder scratch;
+  const DecompositionCache cache(scratch.path());
+  const sim::TriangleMesh mesh = sim::torus_mesh(1, 0.3, 8, 6), other = sim::torus_mesh(1, 0.4, 8, 6);
+  const auto made = cache.decompose(mesh);
+  cache.decompose(other);
+  std::filesystem::rename(cache.file(other), cache.file(mesh));
+  EXPECT_TRUE(equal(cache.decompose(mesh), made));
+}
+
 TEST(DecompositionCache, WorksWhereNothingCanBeWritten) {
   const DecompositionCache cache("/proc/offstage");
   EXPECT_GT(cache.decompose(sim::box_mesh(sim::Vec3(1, 2, 3))).parts.size(), 0u);

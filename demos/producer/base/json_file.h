@@ -12,6 +12,9 @@
 
 namespace offstage::producer {
 
+/// The most frames that such a file can speak of.
+inline constexpr int kMostFrames = 1'000'000'000;
+
 /// An object in such a file. A key that is missing has the default; one of another type throws
 /// render::FileError "FILE: /key: must be a text, got 3".
 class JsonObject {

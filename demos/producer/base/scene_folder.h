@@ -4,7 +4,6 @@
 
 #include <filesystem>
 #include <string>
-#include <type_traits>
 #include <vector>
 
 #include "render/input_folders.h"
@@ -16,13 +15,8 @@ inline constexpr uint64_t kMostTextBytes = uint64_t{256} << 20;
 
 class SceneFolder {
  public:
-  SceneFolder() : SceneFolder(std::filesystem::path(), {}) {}
-  SceneFolder(std::filesystem::path path, const std::vector<std::string>& allowed);
-  /// Without other folders.
-  template <class Path>
-  requires(std::is_convertible_v<Path, std::filesystem::path> &&
-           !std::is_same_v<std::remove_cvref_t<Path>, SceneFolder>) SceneFolder(const Path& path)
-      : SceneFolder(std::filesystem::path(path), {}) {}
+  SceneFolder(std::filesystem::path path = {}, const std::vector<std::string>& allowed = {});
+  SceneFolder(const char* path) : SceneFolder(std::filesystem::path(path)) {}
 
   const std::filesystem::path& path() const { return path_; }
   const render::InputFolders& inputs() const { return inputs_; }

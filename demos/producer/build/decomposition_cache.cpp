@@ -79,6 +79,21 @@ ConvexDecomposition decomposition_from(std::span<const uint8_t> bytes, const std
   return d;
 }
 
+std::optional<ConvexDecomposition> read_kept(const std::filesystem::path& path,
+                                             const XXH128_hash_t& mesh_hash) {
+  if (!std::filesystem::exists(path)) return std::nullopt;
+  try {
+    return decomposition_from(read_file(path), path.string(), mesh_hash);
+  } catch (const render::FileError&) {
+  } catch (const std::invalid_argument&) {  // faces that do not close
+  }
+  return std::nullopt;
+}
+
+std::string name_of(const XXH128_hash_t& mesh_hash) {
+  return fmt::format("{:016x}{:016x}-{}.parts", mesh_hash.high64, mesh_hash.low64, kPartsKind.version);
+}
+
 }  // namespace
 
 DecompositionCache DecompositionCache::of_user() {
@@ -94,30 +109,18 @@ DecompositionCache DecompositionCache::of_user() {
 }
 
 std::filesystem::path DecompositionCache::file(const sim::TriangleMesh& mesh) const {
-  if (folder_.empty()) return {};
-  const XXH128_hash_t h = hash_of(mesh);
-  return folder_ / fmt::format("{:016x}{:016x}-{}.parts", h.high64, h.low64, kPartsKind.version);
-}
-
-std::optional<ConvexDecomposition> DecompositionCache::read(const std::filesystem::path& path,
-                                                            const sim::TriangleMesh& mesh) const {
-  if (path.empty() || !std::filesystem::exists(path)) return std::nullopt;
-  try {
-    return decomposition_from(read_file(path), path.string(), hash_of(mesh));
-  } catch (const render::FileError&) {
-  } catch (const std::invalid_argument&) {  // faces that do not close
-  }
-  return std::nullopt;
+  return folder_.empty() ? std::filesystem::path() : folder_ / name_of(hash_of(mesh));
 }
 
 ConvexDecomposition DecompositionCache::decompose(const sim::TriangleMesh& mesh) const {
-  const std::filesystem::path path = file(mesh);
-  if (auto known = read(path, mesh)) return std::move(*known);
+  if (folder_.empty()) return sim::decompose(mesh, sim::MeshTopology(mesh));
+  const XXH128_hash_t mesh_hash = hash_of(mesh);
+  const std::filesystem::path path = folder_ / name_of(mesh_hash);
+  if (auto known = read_kept(path, mesh_hash)) return std::move(*known);
   ConvexDecomposition made = sim::decompose(mesh, sim::MeshTopology(mesh));
-  if (path.empty()) return made;
   try {
     std::filesystem::create_directories(folder_);
-    render::write_file_atomically(path, serialize(made, hash_of(mesh)));
+    render::write_file_atomically(path, serialize(made, mesh_hash));
   } catch (const render::FileError&) {
   } catch (const std::filesystem::filesystem_error&) {
   }

@@ -4,7 +4,6 @@
 /// of the result, so that a run with the cache has the same bits as one without.
 
 #include <filesystem>
-#include <optional>
 
 #include "sim/geometry/convex_decomposition.h"
 
@@ -27,9 +26,6 @@ class DecompositionCache {
   std::filesystem::path file(const sim::TriangleMesh& mesh) const;
 
  private:
-  std::optional<sim::ConvexDecomposition> read(const std::filesystem::path& path,
-                                               const sim::TriangleMesh& mesh) const;
-
   std::filesystem::path folder_;
 };
 

@@ -196,7 +196,7 @@ std::vector<T> expand_all(const std::vector<T>& originals, uint64_t seed, std::v
     if (all.size() >= kMostBodies) {
       errors.push_back(
           {original.where, "there are more than " + std::to_string(kMostBodies) +
-                               " objects of this kind with all copies; a body takes about 8 kB of memory"});
+                               " objects of this kind with all copies; a body takes up to 10 kB of memory"});
       return all;
     }
     if (copy_count(original.placement) > kMaxCopies) {

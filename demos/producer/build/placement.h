@@ -14,7 +14,7 @@
 
 namespace offstage::producer {
 
-/// Of a scene with all copies. A body takes about 8 kB, so that they fit into 2 GB.
+/// Of a scene with all copies. A body takes up to 10 kB, so that they fit into 2 GB.
 inline constexpr std::size_t kMostBodies = 200'000;
 inline constexpr int kMaxCopies = 100'000;  ///< of one object
 

@@ -56,7 +56,7 @@ void check_count(const SceneSource& source) {
   if (list && list->size() > kMostBodies)
     throw SceneError(source.locate("/bodies"), "has " + std::to_string(list->size()) + " bodies, at most " +
                                                    std::to_string(kMostBodies) +
-                                                   " are possible: each takes about 8 kB");
+                                                   " are possible: each takes up to 10 kB");
 }
 
 void append(std::vector<Problem>& all, const std::vector<Problem>& more, const SceneSource& source) {

@@ -175,7 +175,6 @@ Golden read_golden(const fs::path& folder, const std::string& name) {
                 .reason = json->text("reason"),
                 .fingerprint = json->text("fingerprint"),
                 .frames = {}};
-  constexpr int kMostFrames = 1'000'000'000;
   for (const JsonObject& f : json->objects("frames")) {
     const int frame = f.count("frame", 0, kMostFrames);
     const fs::path picture = picture_file(folder, name, frame);

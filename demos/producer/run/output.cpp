@@ -22,7 +22,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kManifestName = "manifest.json";
-constexpr int kMostFrames = 1'000'000'000;
 
 nlohmann::ordered_json to_json(const Manifest& m, const fs::path& pattern) {
   return {{"pattern", pattern.filename().string()},

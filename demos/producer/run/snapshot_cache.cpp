@@ -20,7 +20,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kCacheFormat = 4;
-constexpr int kMostCachedFrames = 1'000'000'000;
 constexpr const char* kCacheFile = "cache.json";
 constexpr std::string_view kGenerationPrefix = "generation-";
 
@@ -86,9 +85,9 @@ void SnapshotCache::open(const std::string& key, int frames) {
       refuse("the simulation of this cache did not finish; simulate again");
     if (!published)
       refuse("contains no cache; create one with: offstage simulate SCENE --cache " + folder_.string());
-    if (published->count("offstage_cache", 0, kMostCachedFrames) != kCacheFormat)
+    if (published->count("offstage_cache", 0, kMostFrames) != kCacheFormat)
       refuse("is a cache of another version; simulate again with --force");
-    if (published->text("key") != key || published->count("frames", 0, kMostCachedFrames) != frames)
+    if (published->text("key") != key || published->count("frames", 0, kMostFrames) != frames)
       refuse("the cache was made with another scene or other settings; simulate again with --force");
     const std::string name = published->text("generation");
     if (!name.starts_with(kGenerationPrefix) || name.find('/') != std::string::npos)
@@ -117,7 +116,6 @@ void SnapshotCache::publish() {
 void SnapshotCache::remove_old_generations() const {
   const std::optional<JsonObject> published = read_json_file(folder_ / kCacheFile);
   const std::string kept = published ? published->text("generation") : "";
-  if (published) remove_snapshots(folder_);  // of the format before generations
   std::error_code error;
   for (const fs::path& folder : generations_in(folder_)) {
     if (folder.filename() == kept || folder == generation_) continue;

@@ -177,5 +177,19 @@ TEST(ConvexPolyhedron, OpenSurfacesAreRefused) {
   EXPECT_THROW(ConvexPolyhedron(vertices, missing), std::invalid_argument);
 }
 
+// Products of four coordinates overflow beyond 1e77, and vanish below 1e-77.
+TEST(ConvexHull, IsTheSameAtEveryScale) {
+  const std::vector<Vec3> points = box_mesh(Vec3(1, 2, 3)).vertices;
+  const ConvexPolyhedron usual = convex_hull(points);
+  for (const int exponent : {-265, -1, 1, 265}) {
+    std::vector<Vec3> scaled = points;
+    for (Vec3& p : scaled) p *= std::ldexp(1.0, exponent);
+    const ConvexPolyhedron hull = convex_hull(scaled);
+    ASSERT_EQ(hull.face_count(), usual.face_count()) << exponent;
+    for (uint32_t f = 0; f < hull.face_count(); ++f)
+      EXPECT_LT((hull.plane(f).normal - usual.plane(f).normal).norm(), 1e-15) << exponent;
+  }
+}
+
 }  // namespace
 }  // namespace offstage::sim
