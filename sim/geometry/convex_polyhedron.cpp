@@ -2,11 +2,26 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <utility>
 
 namespace offstage::sim {
+
+namespace {
+
+/// A power of two that brings the largest coordinate to about 1, so that products of coordinates neither
+/// overflow nor vanish. Multiplying by it is exact.
+Real scale_to_one(const std::vector<Vec3>& points) {
+  constexpr int kMost = 1000;  // 2^1000 and its inverse are finite
+  Real largest = 0;
+  for (const Vec3& p : points) largest = std::max(largest, p.cwiseAbs().maxCoeff());
+  if (!(largest > 0) || !std::isfinite(largest)) return 1;
+  return std::ldexp(Real(1), -std::clamp(std::ilogb(largest), -kMost, kMost));
+}
+
+}  // namespace
 
 ConvexPolyhedron::ConvexPolyhedron(std::vector<Vec3> vertices, std::span<const std::vector<uint32_t>> faces)
     : vertices_(std::move(vertices)) {
@@ -21,9 +36,10 @@ ConvexPolyhedron::ConvexPolyhedron(std::vector<Vec3> vertices, std::span<const s
 
   for (const Vec3& v : vertices_) {
     centre_ += v / static_cast<Real>(vertices_.size());
-    reach_ = std::max(reach_, v.norm());
     box_.extend(v);
   }
+  const Real scale = scale_to_one(vertices_);
+  for (const Vec3& v : vertices_) reach_ = std::max(reach_, (v * scale).norm() / scale);
   find_edges();
   find_planes();
   find_edge_frames();
@@ -79,12 +95,13 @@ void ConvexPolyhedron::find_edges() {
 
 /// Newell's normal of each face, and the offset that puts every vertex of the face on the plane or below it.
 void ConvexPolyhedron::find_planes() {
+  const Real scale = scale_to_one(vertices_);
   for (uint32_t f = 0; f + 1 < face_vertices_.start.size(); ++f) {
     const std::span<const uint32_t> loop = face_vertices_.row(f);
     const Vec3& origin = vertices_[loop[0]];
     Vec3 area = Vec3::Zero();
     for (std::size_t k = 1; k + 1 < loop.size(); ++k)
-      area += (vertices_[loop[k]] - origin).cross(vertices_[loop[k + 1]] - origin);
+      area += ((vertices_[loop[k]] - origin) * scale).cross((vertices_[loop[k + 1]] - origin) * scale);
     const Vec3 normal = area.normalized();
     Real offset = -std::numeric_limits<Real>::infinity();
     for (uint32_t v : loop) offset = std::max(offset, normal.dot(vertices_[v]));
@@ -93,8 +110,9 @@ void ConvexPolyhedron::find_planes() {
 }
 
 void ConvexPolyhedron::find_edge_frames() {
+  const Real scale = scale_to_one(vertices_);
   for (const Edge& e : edges_) {
-    const Vec3 along = (vertices_[e.head] - vertices_[e.tail]).normalized();
+    const Vec3 along = ((vertices_[e.head] - vertices_[e.tail]) * scale).normalized();
     const Vec3 left = e.left == kNoFace ? Vec3::Zero() : planes_[e.left].normal,
                right = e.right == kNoFace ? Vec3::Zero() : planes_[e.right].normal;
     edge_frames_.push_back({along, left.cross(along), along.cross(right)});
