@@ -1,6 +1,7 @@
 #include "effects/cloth.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <stdexcept>
@@ -30,6 +31,7 @@ void check(const Fabric& f) {
   check("shear", f.shear, true);
   check("bend", f.bend, true);
   check("damping", f.damping, true);
+  check("bend_damping", f.bend_damping, true);
 }
 
 ClothDef with_fabric(const Fabric& f) {
@@ -40,6 +42,10 @@ ClothDef with_fabric(const Fabric& f) {
   def.max_stretch = f.max_stretch;
   def.max_shear = f.max_shear;
   def.air = {.drag = f.drag, .lift = f.lift};
+  if (f.bend_model == BendModel::plate) {
+    def.bend = f.bend;
+    def.bend_damping = f.bend_damping;
+  }
   return def;
 }
 
@@ -54,11 +60,14 @@ void spread_mass(ClothDef& def, Real areal_density) {
 }
 
 /// Adds a spring with its share of the critical damping of its two points, if it has any stiffness.
-void add_spring(ClothDef& def, uint32_t a, uint32_t b, Real stiffness, Real damping, SpringKind kind) {
-  const Real length = (def.vertices[a] - def.vertices[b]).norm();
+void add_spring(ClothDef& def, uint32_t a, uint32_t b, Real stiffness, Real damping, SpringKind kind,
+                std::array<uint32_t, 2> counterpart = {}) {
+  const auto distance = [&](uint32_t i, uint32_t j) { return (def.vertices[i] - def.vertices[j]).norm(); };
+  const Real length = distance(a, b);
   if (!(stiffness > 0) || !(length > 0)) return;
   const Real reduced = def.masses[a] * def.masses[b] / (def.masses[a] + def.masses[b]);
-  def.springs.push_back({a, b, length, stiffness, 2 * damping * std::sqrt(stiffness * reduced), kind});
+  def.springs.push_back({a, b, length, stiffness, 2 * damping * std::sqrt(stiffness * reduced), kind,
+                         counterpart, distance(counterpart[0], counterpart[1])});
 }
 
 /// A spring over two cells of length h that bends by an angle theta gets shorter by h theta^2 / 4, so that it
@@ -105,6 +114,7 @@ ClothDef grid_cloth(const GridSize& size, const sim::Pose& pose, const Fabric& f
         add_spring(def, at(c, r), at(c + 1, r), fabric.stretch * wz / dx, damping, SpringKind::stretch);
       if (r < nz)
         add_spring(def, at(c, r), at(c, r + 1), fabric.stretch * wx / dz, damping, SpringKind::stretch);
+      if (fabric.bend_model != BendModel::springs) continue;
       if (c + 2 <= nx)
         add_spring(def, at(c, r), at(c + 2, r), bend_stiffness(fabric.bend, wz, dx), damping,
                    SpringKind::bend);
@@ -114,11 +124,13 @@ ClothDef grid_cloth(const GridSize& size, const sim::Pose& pose, const Fabric& f
     }
   // Sheared by gamma, the diagonals of a cell change by gamma dx dz / |d|: the energy of both is that of the
   // modulus over the cell's area.
+  // Each of the two is the other's counterpart.
   const Real shear = fabric.shear * (dx * dx + dz * dz) / (2 * dx * dz);
   for (uint32_t r = 0; r < nz; ++r)
     for (uint32_t c = 0; c < nx; ++c) {
-      add_spring(def, at(c, r), at(c + 1, r + 1), shear, damping, SpringKind::shear);
-      add_spring(def, at(c + 1, r), at(c, r + 1), shear, damping, SpringKind::shear);
+      const std::array<uint32_t, 2> one = {at(c, r), at(c + 1, r + 1)}, other = {at(c + 1, r), at(c, r + 1)};
+      for (const auto& [own, across] : {std::pair(one, other), std::pair(other, one)})
+        add_spring(def, own[0], own[1], shear, damping, SpringKind::shear, across);
     }
   return def;
 }
@@ -155,6 +167,7 @@ ClothDef mesh_cloth(const sim::TriangleMesh& mesh, const sim::Pose& pose, const 
     const Real width = 2 * sides.area / (3 * length) * 1.5;
     add_spring(def, edge.first, edge.second, fabric.stretch * width / length, fabric.damping,
                SpringKind::stretch);
+    if (fabric.bend_model != BendModel::springs) continue;
     if (sides.opposite.size() != 2 || sides.opposite[0] == sides.opposite[1]) continue;
     const Real across = (def.vertices[sides.opposite[0]] - def.vertices[sides.opposite[1]]).norm();
     if (!(across > 0)) continue;

@@ -11,11 +11,19 @@ namespace offstage::effects {
 
 using sim::Real;
 
+/// Resistance to bending.
+enum class BendModel {
+  plate,    ///< a thin plate of the flexural rigidity `bend`, on any mesh (sim/cloth/bending.h)
+  springs,  ///< the book's springs to second neighbours, which resist folds but hardly a slight curvature
+};
+
 struct Fabric {
   Real areal_density = 0.15;  ///< [kg/m^2], > 0
   Real stretch = 1000;        ///< along the threads: force per metre of width at a strain of 1 [N/m], > 0
   Real shear = 100;           ///< across them [N/m], >= 0
-  Real bend = 1e-4;           ///< moment per metre of width at a curvature of 1/m [N m], >= 0
+  Real bend = 1e-4;  ///< flexural rigidity: moment per metre of width at a curvature of 1/m [N m], >= 0
+  Real bend_damping = 2e-3;  ///< the moment grows by this time times its rate [s], >= 0
+  BendModel bend_model = BendModel::plate;
   /// Of the springs: share of the critical damping of one spring between its two points, >= 0.
   Real damping = 0.05;
   Real friction = 0.5;       ///< on bodies, >= 0

@@ -42,6 +42,10 @@ std::string spring_problem(const ClothDef& def) {
     if (!is_positive(s.rest_length)) return element("springs", i) + "rest_length must be a finite number > 0";
     if (!is_positive(s.stiffness)) return element("springs", i) + "stiffness must be a finite number > 0";
     if (!is_not_negative(s.damping)) return element("springs", i) + "damping must be a finite number >= 0";
+    if (!is_not_negative(s.counterpart_rest))
+      return element("springs", i) + "counterpart_rest must be a finite number >= 0";
+    if (s.counterpart_rest > 0 && std::max(s.counterpart[0], s.counterpart[1]) >= count)
+      return element("springs", i) + "counterpart must join two vertices that exist";
   }
   return {};
 }
@@ -77,9 +81,11 @@ std::string number_problem(const ClothDef& def) {
     if (!is_positive(value)) return std::string(field) + " must be a finite number > 0";
   const std::pair<const char*, Real> not_negative[] = {
       {"friction", def.friction}, {"self_friction", def.self_friction}, {"air.drag", def.air.drag},
-      {"air.lift", def.air.lift}, {"air.density", def.air.density},     {"ram_pressure", def.ram_pressure}};
+      {"air.lift", def.air.lift}, {"air.density", def.air.density},     {"ram_pressure", def.ram_pressure},
+      {"bend", def.bend},         {"bend_damping", def.bend_damping}};
   for (const auto& [field, value] : not_negative)
     if (!is_not_negative(value)) return std::string(field) + " must be a finite number >= 0";
+  if (!(def.rest_curvature >= 0 && def.rest_curvature <= 1)) return "rest_curvature must be 0 to 1";
   if (def.air.lift > def.air.drag) return "air.lift must not be above air.drag";
   if (!std::isfinite(def.pressure)) return "pressure is not finite";
   for (const std::string& wrong :
@@ -116,10 +122,12 @@ Real enclosed_volume(std::span<const Vec3> points, std::span<const Triangle> tri
 Real elastic_energy(const Cloth& cloth) {
   Real energy = 0;
   for (const ClothSpring& s : cloth.springs) {
-    const Real stretch = (cloth.points[s.a] - cloth.points[s.b]).norm() - s.rest_length;
+    const Real stretch = s.elongation((cloth.points[s.a] - cloth.points[s.b]).norm(), cloth.points);
     energy += s.stiffness * stretch * stretch / 2;
   }
-  return energy;
+  std::vector<Vec4> points;
+  for (const Vec3& p : cloth.points) points.push_back(padded(p));
+  return energy + cloth.bending.energy(points);
 }
 
 Cloth::Cloth(ClothHandle cloth, const ClothDef& definition)
@@ -136,6 +144,11 @@ Cloth::Cloth(ClothHandle cloth, const ClothDef& definition)
   for (uint32_t i = 0; i < points.size(); ++i) sources.push_back(i);
   for (const ClothSeam& s : def.seams) seam_lengths.push_back((points[s.a] - points[s.b]).norm());
   if (def.pressure != 0) rest_volume = enclosed_volume(rest, triangles);
+  assign_bending();
+}
+
+void Cloth::assign_bending() {
+  bending.assign(rest, triangles, masses, def.bend, def.bend_damping, def.rest_curvature);
 }
 
 }  // namespace offstage::sim

@@ -3,8 +3,10 @@
 /// of springs between them, and triangles that collide, feel the air and are drawn. effects/cloth.h makes
 /// definitions from fabrics, grids and meshes.
 
+#include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -26,13 +28,27 @@ enum class SpringKind : uint8_t {
   bend,     ///< to second neighbours, or across an edge
 };
 
-/// F = -(k (|d| - L) + c (d'.d)/|d|) d/|d| on vertex a, d from b to a.
+/// F = -(k e + c (d'.d)/|d|) d/|d| on vertex a, d from b to a, with the elongation e = |d| - L.
+///
+/// The two diagonals of a woven cell can be each other's counterpart. Then e is half the difference of their
+/// elongations: the cell resists being sheared, but a pull along its threads leaves the diagonals without
+/// force, so that `stretch` alone determines its length under a load.
 struct ClothSpring {
   uint32_t a = 0, b = 0;  ///< vertices
   Real rest_length = 1;   ///< L [m], > 0
   Real stiffness = 100;   ///< k [N/m], > 0
   Real damping = 0;       ///< c [N s/m], >= 0
   SpringKind kind = SpringKind::stretch;
+  std::array<uint32_t, 2> counterpart = {};  ///< vertices of the other diagonal
+  Real counterpart_rest = 0;                 ///< its rest length [m]; 0: it has no counterpart
+
+  /// e, of a spring of this length, with the positions of vertices in `at`.
+  template <class Points>
+  Real elongation(Real length, const Points& at, std::size_t first = 0) const {
+    if (counterpart_rest == 0) return length - rest_length;
+    const Real other = (at[counterpart[0] - first] - at[counterpart[1] - first]).norm();
+    return (length - rest_length - other + counterpart_rest) / 2;
+  }
 };
 
 /// Holds a vertex at a point of the world or of a body. The body feels the pull of the cloth.
@@ -51,8 +67,8 @@ struct ClothSeam {
 /// Integration of the springs.
 enum class ClothIntegrator : uint8_t {
   /// Backward Euler, linearised once and solved by one symmetric Gauss-Seidel sweep. It is exact under static
-  /// loads, fast, and stable, because the stiffness of springs that are too stiff for it is clamped
-  /// (ClothReport::clamped).
+  /// loads and fast. Each sub-step is divided into as many steps of the springs as the stiffest of them needs
+  /// for stability, but none is shorter than kShortestSpringStep.
   relaxed,
   /// Backward Euler, linearised once (Baraff and Witkin, "Large Steps in Cloth Simulation", 1998) and solved.
   implicit,
@@ -75,6 +91,12 @@ struct ClothDef {
   std::vector<Vec3> rest_vertices;  ///< of the unstrained cloth [m]; empty: as `vertices`
   std::vector<Triangle> triangles;
   std::vector<ClothSpring> springs;
+  /// Flexural rigidity B of the triangles [N m], >= 0: moment per width at a curvature of 1/m (bending.h).
+  Real bend = 0;
+  /// Time tau in which bending is damped [s], >= 0: the moment is B (kappa + tau d kappa/dt).
+  Real bend_damping = 0;
+  /// Share of the curvature of the unstrained cloth that is without stress, 0 to 1.
+  Real rest_curvature = 1;
   std::vector<Real> masses;  ///< of the vertices [kg], > 0
   std::vector<ClothPin> pins;
   std::vector<ClothSeam> seams;
@@ -105,7 +127,14 @@ struct ClothDef {
 
   ClothIntegrator integrator = ClothIntegrator::relaxed;
   Real substep = 1.0 / 960;  ///< longest sub-step of the cloth [s], > 0; never longer than that of the world
+  /// Of `relaxed`: one step of the springs in each sub-step. The stiffness of springs that are too stiff for
+  /// it is clamped (ClothReport::clamped).
+  bool soften = false;
 };
+
+/// The shortest step of the springs of a `relaxed` cloth [s]. The stiffness of springs that are too stiff for
+/// it is clamped.
+inline constexpr Real kShortestSpringStep = 1e-5;
 
 /// Describes the first error of a definition: the field, the place and the allowed values. Empty if there is
 /// none.
@@ -116,9 +145,19 @@ std::string problem(const ClothDef& def);
 struct StableStep {
   Real step = std::numeric_limits<Real>::infinity();  ///< [s]
   uint32_t spring = 0;                                ///< of the definition
+  bool bending = false;                               ///< bending limits it, not a spring
 };
 /// Largest stable step of a definition. It is infinite unless the integrator is `symplectic` or `rk4`.
 StableStep largest_stable_step(const ClothDef& def);
+
+/// The first thread of a cloth that tore.
+struct ClothTear {
+  Real time = 0;              ///< of the end of the sub-step [s]
+  Vec3 place = Vec3::Zero();  ///< [m]
+  Real stretch = 0;           ///< its length over its rest length
+  bool by_pressure = false;   ///< of a closed cloth under pressure
+  bool touches_body = false;  ///< the cloth touched a body in that sub-step
+};
 
 /// Statistics of a cloth. Counts are sums over the sub-steps of the last step; other values are those at its
 /// end.
@@ -133,9 +172,12 @@ struct ClothReport {
   uint64_t held_back = 0;      ///< moves shortened because cloth would have passed through cloth
   uint64_t crossings = 0;  ///< pairs that could not be kept from crossing; cloth may pass through cloth there
   uint64_t clamped = 0;    ///< springs whose stiffness the `relaxed` integrator clamped, at the end
-  uint64_t torn = 0;       ///< springs
-  uint64_t unconverged = 0;  ///< solves of the implicit integrator that reached the limit of iterations
-  bool finite = true;        ///< false: the cloth became non-finite and stays at its last finite state
+  Real least_stiffness = 1;             ///< least share of its stiffness that a clamped spring has left
+  uint32_t spring_steps = 1;            ///< steps of the springs in each sub-step of a `relaxed` cloth
+  uint64_t torn = 0;                    ///< springs
+  uint64_t unconverged = 0;             ///< solves of springs or bending that reached the limit of iterations
+  std::optional<ClothTear> first_tear;  ///< the first since the start
+  bool finite = true;  ///< false: the cloth became non-finite and stays at its last finite state
 };
 
 /// Read-only view of a cloth; valid until the next step.

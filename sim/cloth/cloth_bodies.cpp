@@ -14,6 +14,16 @@ Pose moved(const Pose& pose, const Vec3& centre, const Vec3& shift, const Vec3& 
   return result;
 }
 
+/// Adds the mass matrix of a point mass at `arm` from the centre.
+void add_point_mass(Real mass, const Vec3& arm, Mat6& matrix) {
+  Mat3 cross;
+  cross << 0, -arm.z(), arm.y(), arm.z(), 0, -arm.x(), -arm.y(), arm.x(), 0;
+  matrix.topLeftCorner<3, 3>().diagonal().array() += mass;
+  matrix.topRightCorner<3, 3>() -= mass * cross;
+  matrix.bottomLeftCorner<3, 3>() += mass * cross;
+  matrix.bottomRightCorner<3, 3>() -= mass * cross * cross;
+}
+
 }  // namespace
 
 ClothBody::ClothBody(const Obstacle& way, Real h, const Vec3& velocity, const Vec3& angular_velocity,
@@ -25,11 +35,25 @@ ClothBody::ClothBody(const Obstacle& way, Real h, const Vec3& velocity, const Ve
       surface_velocity_(surface_velocity),
       reaction_{way.body, Vec3::Zero(), Vec3::Zero()} {}
 
+void ClothBody::fall_along_parabola(const Vec3& gravity) {
+  const Vec3 mean = (way_.end.point_to_world(way_.centre) - way_.start.point_to_world(way_.centre)) / h_;
+  const Vec3 bow = (velocity_ - mean) * h_;
+  // A greater change of velocity is an impact.
+  if (bow.norm() <= gravity.norm() * h_ * h_) bow_ = bow;
+}
+
+/// The pose that the world gave, before anything that cloth does.
+Pose ClothBody::on_way(Real fraction) const {
+  Pose pose = way_.at(fraction);
+  pose.position -= fraction * (1 - fraction) * bow_;
+  return pose;
+}
+
 void ClothBody::begin(Real from, Real to, Real dt) {
-  start_ = moved(way_.at(from), way_.centre, shift_, turn_);
+  start_ = from > 0 ? end_ : moved(on_way(from), way_.centre, shift_, turn_);
   shift_ += dt * gained_;
   turn_ += dt * gained_spin_;
-  end_ = moved(way_.at(to), way_.centre, shift_, turn_);
+  end_ = moved(on_way(to), way_.centre, shift_, turn_);
   centre_ = end_.point_to_world(way_.centre);
   dt_ = dt;
   to_ = to;
@@ -55,11 +79,7 @@ void ClothBody::push(const Vec3& impulse, const Vec3& p) {
   const Vec3 turning = (p - centre_).cross(impulse);
   reaction_.impulse += impulse;
   reaction_.angular_impulse += turning;
-  const Vec3 dv = way_.inverse_mass * impulse, dw = way_.inverse_inertia * turning;
-  velocity_ += dv;
-  angular_velocity_ += dw;
-  gained_ += dv;
-  gained_spin_ += dw;
+  accelerate(way_.inverse_mass * impulse, way_.inverse_inertia * turning);
 }
 
 void ClothBody::load(const Vec3& impulse, const Vec3& p) {
@@ -73,7 +93,76 @@ void ClothBody::pull(const Vec3& impulse, const Vec3& p, Real share) {
   push(impulse, p);
   shift_ += share * dt_ * (gained_ - gained);
   turn_ += share * dt_ * (gained_spin_ - gained_spin);
-  end_ = moved(way_.at(to_), way_.centre, shift_, turn_);
+  end_ = moved(on_way(to_), way_.centre, shift_, turn_);
+}
+
+Mat6 ClothBody::mobility(const Mat6& carried) const {
+  Mat6 own = Mat6::Zero();
+  own.topLeftCorner<3, 3>().diagonal().setConstant(way_.inverse_mass);
+  own.bottomRightCorner<3, 3>() = way_.inverse_inertia;
+  return (Mat6::Identity() + own * carried).partialPivLu().solve(own);
+}
+
+Vec6 ClothBody::pull(const Vec6& impulse, const Vec6& moving, const Mat6& carried) {
+  const Mat6 response = mobility(carried);
+  const Vec6 change = response * impulse, shift = dt_ * response * moving;
+  const Vec6 own = impulse - carried * change;
+  touched = true;
+  reaction_.impulse += own.head<3>();
+  reaction_.angular_impulse += own.tail<3>();
+  accelerate(change.head<3>(), change.tail<3>());
+  shift_ += shift.head<3>();
+  turn_ += shift.tail<3>();
+  end_ = moved(end_, way_.centre, shift.head<3>(), shift.tail<3>());
+  centre_ = end_.point_to_world(way_.centre);
+  return change;
+}
+
+void ClothBody::accelerate(const Vec3& dv, const Vec3& dw) {
+  velocity_ += dv;
+  angular_velocity_ += dw;
+  gained_ += dv;
+  gained_spin_ += dw;
+}
+
+Vec3 ClothBody::shorten(Real share, const Vec3& drift) {
+  const Vec3 way = move() - drift;
+  const Quat turned = end_.orientation * start_.orientation.conjugate();
+  const Vec3 turn = 2 * (turned.w() < 0 ? -1 : 1) * turned.vec();  // small
+  const Vec3 lost = (1 - share) * way, lost_turn = (1 - share) * turn;
+  shift_ -= lost;
+  turn_ -= lost_turn;
+  end_ = moved(start_, way_.centre, drift + share * way, share * turn);
+  centre_ = end_.point_to_world(way_.centre);
+  const Vec3 dv = -lost / dt_, dw = -lost_turn / dt_;
+  touched = true;
+  reaction_.impulse += dv / way_.inverse_mass;
+  reaction_.angular_impulse += way_.inverse_inertia.inverse() * dw;
+  accelerate(dv, dw);
+  return dv;
+}
+
+Mat6 Carrier::carried(const ClothPoints& cloth) const {
+  Mat6 matrix = Mat6::Zero();
+  for (uint32_t i : points) add_point_mass(cloth.mass[i], cloth.at(i) - body->centre(), matrix);
+  return matrix;
+}
+
+void Carrier::pull(const Vec6& impulse, const Vec6& moving, ClothPoints& cloth) const {
+  const Vec3 centre = body->centre();  // before it moves
+  const Vec6 change = body->pull(impulse, moving, carried(cloth));
+  for (uint32_t i : points)
+    cloth.velocity[i] += padded(change.head<3>() + change.tail<3>().cross(cloth.at(i) - centre));
+  place(cloth);
+}
+
+void Carrier::accelerate(const Vec3& dv, ClothPoints& cloth) const {
+  for (uint32_t i : points) cloth.velocity[i] += padded(dv);
+}
+
+void Carrier::place(ClothPoints& cloth) const {
+  for (std::size_t k = 0; k < points.size(); ++k)
+    cloth.position[points[k]] = padded(body->end().point_to_world(places[k]));
 }
 
 }  // namespace offstage::sim

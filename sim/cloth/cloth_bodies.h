@@ -8,7 +8,9 @@
 #include <span>
 #include <vector>
 
+#include "sim/cloth/cloth_points.h"
 #include "sim/collision/obstacles.h"
+#include "sim/linear/block_cholesky.h"
 
 namespace offstage::sim {
 
@@ -19,6 +21,10 @@ class ClothBody {
   ClothBody(const Obstacle& way, Real h, const Vec3& velocity, const Vec3& angular_velocity,
             const Vec3& surface_velocity);
 
+  /// Makes a body that carries cloth fall along a parabola within the sub-step of the world, as it does where
+  /// nothing hits it. Along the straight way, on which cloth meets bodies, a body that hangs at rest would
+  /// sag in each sub-step. `gravity` [m/s^2].
+  void fall_along_parabola(const Vec3& gravity);
   /// Begins a sub-step of cloth, which covers the fractions `from` to `to` of the world's sub-step and lasts
   /// dt [s].
   void begin(Real from, Real to, Real dt);
@@ -32,6 +38,8 @@ class ClothBody {
   Real mass() const { return 1 / way_.inverse_mass; }
   const Vec3& centre() const { return centre_; }  ///< of mass, at the end of the cloth's sub-step
 
+  Vec3 move() const { return centre_ - start_.point_to_world(way_.centre); }  ///< of that centre
+
   /// Displacement of the surface during the sub-step of cloth, at the point that is at `p` (world) at its
   /// end.
   Vec3 surface_motion(const Vec3& p) const;
@@ -42,10 +50,21 @@ class ClothBody {
   Real mobility(const Vec3& p, const Vec3& n) const;
   /// Applies an impulse at a point [N s].
   void push(const Vec3& impulse, const Vec3& p);
-  /// Applies the impulse of a pin. It moves the body already in this sub-step of cloth, by `share` of the
+  /// Applies the impulse of a contact. It moves the body already in this sub-step of cloth, by `share` of the
   /// displacement that its change of velocity causes in one sub-step. A delayed response of the body would
   /// gain energy.
   void pull(const Vec3& impulse, const Vec3& p, Real share);
+  /// Applies impulses and angular impulses about centre(), in this order, to a body that carries the mass of
+  /// what is pinned to it: that mass takes its part of them. The body moves already in this sub-step of cloth
+  /// by `moving`, the part of the impulses that acts from its start on. `carried` is the 6x6 mass matrix of
+  /// what it carries, about centre() [kg, kg m, kg m^2].
+  /// Returns the change of velocity.
+  Vec6 pull(const Vec6& impulse, const Vec6& moving, const Mat6& carried);
+  /// Change of velocity by a unit impulse and angular impulse, with what it carries.
+  Mat6 mobility(const Mat6& carried) const;
+  /// Makes the body go only a share of its way beyond `drift` in this sub-step of cloth, and changes its
+  /// velocity accordingly. Returns its change of velocity [m/s].
+  Vec3 shorten(Real share, const Vec3& drift);
 
   /// Records the impulse of a pin on a sleeping body, which it does not move.
   void load(const Vec3& impulse, const Vec3& p);
@@ -66,6 +85,9 @@ class ClothBody {
   bool collides = true;     ///< false: it only holds pins
 
  private:
+  void accelerate(const Vec3& dv, const Vec3& dw);
+  Pose on_way(Real fraction) const;
+
   Obstacle way_;
   Real h_;
   Vec3 velocity_, angular_velocity_;  // of the centre of mass, at the end
@@ -74,9 +96,27 @@ class ClothBody {
   Vec3 shift_ = Vec3::Zero(), turn_ = Vec3::Zero();          // by that, of the centre
   Vec3 centre_ = Vec3::Zero();                               // of mass, at the end of cloth's sub-step
   Pose start_, end_;                                         // of that sub-step
-  Real dt_ = 0, to_ = 0;                                     // of cloth's sub-step
+  Vec3 bow_ = Vec3::Zero();  // of the way: half the acceleration times the square of the world's sub-step
+  Real dt_ = 0, to_ = 0;     // of cloth's sub-step
   Reaction reaction_;
   std::optional<Reaction> pin_load_;
+};
+
+/// The points that pins hold on one dynamic body.
+struct Carrier {
+  ClothBody* body;
+  std::vector<uint32_t> points;
+  std::vector<Vec3> places;  ///< of each, in the body's frame
+
+  /// Mass matrix of the points about the body's centre.
+  Mat6 carried(const ClothPoints& points) const;
+  /// Puts the points where the body is at the end of the sub-step of cloth.
+  void place(ClothPoints& points) const;
+  /// Applies impulses to the body and the points, as ClothBody::pull() does, and moves them.
+  void pull(const Vec6& impulse, const Vec6& moving, ClothPoints& points) const;
+  /// Changes the velocities of the points alone, which are those that their momentum was last paid for. What
+  /// else accelerates the body leaves them behind, until ClothSystem::pull_bodies() takes that from the body.
+  void accelerate(const Vec3& dv, ClothPoints& points) const;
 };
 
 }  // namespace offstage::sim

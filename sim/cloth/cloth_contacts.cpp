@@ -17,6 +17,8 @@ constexpr Real kStabilization = 0.3;
 /// Two normals with a cosine below this face each other: what lies between is pinched.
 constexpr Real kFacing = -0.5;
 constexpr int kStopSweeps = 10;
+/// Share of an overlap that is taken back per sub-step where taut cloth stops a body.
+constexpr Real kTautRecovery = 0.1;
 
 }  // namespace
 
@@ -65,6 +67,17 @@ void ClothContacts::find(const ClothPoints& points, std::span<const uint8_t> col
   for (const auto& f : found) near_.insert(near_.end(), f.begin(), f.end());
 }
 
+Real ClothContacts::fastest_approach(const ClothPoints& points) const {
+  Real fastest = 0;
+  for (const Near& near : near_) {
+    const ClothBody& body = bodies_[near.body];
+    if (!body.is_dynamic()) continue;
+    const Vec3 velocity = points.velocity[near.point].head<3>();
+    fastest = std::max(fastest, (velocity - body.way().velocity_at(points.at(near.point), 0)).norm());
+  }
+  return fastest;
+}
+
 void ClothContacts::find_runaways(const ClothPoints& points) {
   if (bodies_.empty()) return;
   std::vector<Near> found;
@@ -85,14 +98,14 @@ void ClothContacts::find_runaways(const ClothPoints& points) {
   near_.erase(std::unique(near_.begin(), near_.end(), same), near_.end());
 }
 
-/// Whether a point is nearer to a body than the cloth's thickness, or came through its surface.
-bool ClothContacts::touch(const ClothPoints& points, Near& near, Touch& t) const {
+/// Whether a point is nearer to a body than the cloth's thickness and `reach`, or came through its surface.
+bool ClothContacts::touch(const ClothPoints& points, Near& near, Real reach, Touch& t) const {
   ClothBody& body = bodies_[near.body];
   const Real thickness = points.thickness[near.point];
   const Vec3 place = body.end().point_to_body(points.at(near.point));
   // The distance changes by no more than the point moves.
   const Real moved = (place - near.place).norm();
-  if (near.distance - moved >= thickness) return false;
+  if (near.distance - moved >= thickness + reach) return false;
   const Vec3 from = body.start().point_to_body(points.start_at(near.point));
   t.near = &near;
   t.body = &body;
@@ -104,7 +117,7 @@ bool ClothContacts::touch(const ClothPoints& points, Near& near, Touch& t) const
       t.on_body = body.end().point_to_world(centre - hit->distance * hit->normal);
       near.place = place;
       near.distance = -2 * thickness;  // unknown: it may be on the far side
-      return t.gap < 0;
+      return t.gap < reach;
     }
   }
   const SurfaceDistance s = signed_distance(body.solid(), place);
@@ -113,7 +126,20 @@ bool ClothContacts::touch(const ClothPoints& points, Near& near, Touch& t) const
   t.gap = s.distance - thickness;
   t.normal = body.end().vector_to_world(s.normal);
   t.on_body = body.end().point_to_world(place - s.distance * s.normal);
-  return t.gap < 0;
+  return t.gap < reach;
+}
+
+void ClothContacts::collect(const ClothPoints& points, std::vector<BodyContact>& found) {
+  for (Near& near : near_) {
+    ClothBody& body = bodies_[near.body];
+    Touch t;
+    if (!body.is_dynamic() || !(points.inverse_mass[near.point] > 0)) continue;
+    if (!touch(points, near, points.thickness[near.point], t)) continue;
+    // An overlap of the start is taken back slowly: the correction counts as velocity.
+    const Vec3 motion = points.at(near.point) - points.start_at(near.point) - body.surface_motion(t.on_body);
+    const Real before = std::min(t.gap - t.normal.dot(motion), 0.0);
+    found.push_back({near.point, &body, t.normal, t.on_body, t.gap - (1 - kTautRecovery) * before});
+  }
 }
 
 void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<VelocityCut>& cuts) {
@@ -127,7 +153,7 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
     near_to_[point] = &bodies_[near_[k].body];
     near_several_[point] = k + 1 < near_.size() && near_[k + 1].point == point;
     for (Touch t; k < near_.size() && near_[k].point == point; ++k)
-      if (touch(points, near_[k], t)) touches_.push_back(t);
+      if (touch(points, near_[k], 0, t)) touches_.push_back(t);
     const std::size_t count = touches_.size();
     if (count == 0) continue;
     active_[points.cloth[point]] += count;
@@ -194,7 +220,7 @@ void ClothContacts::block(Touch& t, ClothBody* holder) {
 }
 
 std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::span<const uint8_t> shortened,
-                                             std::span<const Real> recoil) {
+                                             std::span<const Vec4> kick, std::span<const Real> recoil) {
   struct Stop {
     Touch touch;
     Vec3 velocity;  // of the point
@@ -211,7 +237,7 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
     if (s.distance >= thickness) continue;
     stops.push_back({{&near, &body, body.end().vector_to_world(s.normal),
                       body.end().point_to_world(place - s.distance * s.normal), s.distance - thickness},
-                     (p - points.start_at(near.point)) / body.duration()});
+                     (p - points.start_at(near.point)) / body.duration() + kick[near.point].head<3>()});
   }
   std::vector<Vec3> taken(recoil.size(), Vec3::Zero());
   // Projected Gauss-Seidel: all of them stop a body together, or the first would turn it aside.

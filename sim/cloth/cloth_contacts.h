@@ -11,6 +11,7 @@
 #include "sim/cloth/cloth_bodies.h"
 #include "sim/cloth/cloth_points.h"
 #include "sim/cloth/stretch_limit.h"
+#include "sim/cloth/taut_springs.h"
 
 namespace offstage::sim {
 
@@ -26,20 +27,30 @@ class ClothContacts {
   /// point whether it collides.
   void find(const ClothPoints& points, std::span<const uint8_t> collides, std::span<ClothBody> bodies,
             Real h);
+  /// Greatest speed of points against dynamic bodies that they can touch [m/s].
+  Real fastest_approach(const ClothPoints& points) const;
   /// Repeats the search for points that moved farther than predicted.
   void find_runaways(const ClothPoints& points);
   /// Moves points out of the bodies in a sub-step of cloth of length dt, which is one of `parts` equal parts
   /// of the world's sub-step. Appends to `cuts`.
   void solve(ClothPoints& points, Real dt, Real parts, std::vector<VelocityCut>& cuts);
+  /// Contacts with dynamic bodies as points are now, also of points that are closer than twice the distance
+  /// that they keep.
+  void collect(const ClothPoints& points, std::vector<BodyContact>& found);
   /// Stops bodies that press into cloth whose moves were shortened, which are those of points with a non-zero
   /// `shortened`. `recoil` is the inverse mass of the piece of cloth of each point: 0 if it is pinned to the
-  /// world. Returns for each cloth the impulse that it absorbs [N s].
+  /// world; `kick` is the velocity of points besides that of their moves. Returns for each cloth the impulse
+  /// that it absorbs [N s].
   std::vector<Vec3> stop_bodies(const ClothPoints& points, std::span<const uint8_t> shortened,
-                                std::span<const Real> recoil);
+                                std::span<const Vec4> kick, std::span<const Real> recoil);
 
-  /// Whether a point was so close to a body other than `body` in the last solve() that it may soon touch it.
-  bool is_near_other_than(std::size_t point, const ClothBody* body) const {
-    return point < near_to_.size() && near_to_[point] && (near_to_[point] != body || near_several_[point]);
+  /// A body to which a point was so close in the last solve() that it may soon touch it, or null; and whether
+  /// there were several.
+  const ClothBody* near_to(std::size_t point) const {
+    return point < near_to_.size() ? near_to_[point] : nullptr;
+  }
+  bool is_near_several(std::size_t point) const {
+    return point < near_several_.size() && near_several_[point];
   }
   bool any_dynamic() const { return any_dynamic_; }             ///< whether a dynamic body touches cloth
   std::span<const uint64_t> active() const { return active_; }  ///< contacts of the last solve(), by cloth
@@ -61,7 +72,7 @@ class ClothContacts {
   };
 
   void look(const ClothPoints& points, uint32_t point, std::vector<Near>& found) const;
-  bool touch(const ClothPoints& points, Near& near, Touch& t) const;
+  bool touch(const ClothPoints& points, Near& near, Real reach, Touch& t) const;
   void pinch(Touch& a, Touch& b, Real friction);
   void block(Touch& t, ClothBody* holder);
   void press(ClothPoints& points, Touch& t, Real dt, Real parts, bool supported,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 namespace offstage::sim {
 namespace {
@@ -10,6 +11,9 @@ namespace {
 constexpr int kMaxIterations = 300;
 /// Of the residual against the right side, in the preconditioner's norm, squared.
 constexpr Real kTolerance2 = 1e-12;
+/// Of a step squared times the square of the fastest frequency of bending, damping included: up to this,
+/// bending is as stable as an explicit force.
+constexpr Real kSoftBending = 0.25;
 
 using SpringRun = std::vector<Vec4>;
 
@@ -26,13 +30,18 @@ Vec4 held_velocity(const ClothPoints& points, std::size_t i, Real h) {
 void accelerate(const ClothPoints& points, const ClothRange& cloth, const SpringRun& x, const SpringRun& v,
                 SpringRun& a) {
   std::fill(a.begin(), a.end(), Vec4::Zero());
+  if (!cloth.bending.empty()) {
+    cloth.bending.add_forces(x, 1, a);
+    if (cloth.bending.damping() > 0) cloth.bending.multiply(v, -cloth.bending.damping(), a);
+  }
   for (const ClothSpring& s : cloth.springs) {
     const std::size_t i = s.a - cloth.begin, j = s.b - cloth.begin;
     const Vec4 d = x[i] - x[j];
     const Real length = d.norm();
     if (!(length > 0)) continue;
     const Vec4 u = d / length;
-    const Vec4 force = (s.stiffness * (length - s.rest_length) + s.damping * u.dot(v[i] - v[j])) * u;
+    const Vec4 force =
+        (s.stiffness * s.elongation(length, x, cloth.begin) + s.damping * u.dot(v[i] - v[j])) * u;
     a[i] -= force;
     a[j] += force;
   }
@@ -46,6 +55,13 @@ void accelerate(const ClothPoints& points, const ClothRange& cloth, const Spring
 /// What springs do to what is held, over the time h.
 void pass_on(ClothPoints& points, const ClothRange& cloth, const SpringRun& x, const SpringRun& v, Real h,
              Real dt) {
+  if (!cloth.bending.empty()) {
+    SpringRun force(x.size(), Vec4::Zero());
+    cloth.bending.add_forces(x, 1, force);
+    if (cloth.bending.damping() > 0) cloth.bending.multiply(v, -cloth.bending.damping(), force);
+    for (std::size_t i = 0; i < force.size(); ++i)
+      if (is_held(points, cloth.begin + i)) points.pull[cloth.begin + i] += h * dt * force[i];
+  }
   for (const ClothSpring& s : cloth.springs) {
     const bool a = is_held(points, s.a), b = is_held(points, s.b);
     if (a == b) continue;
@@ -54,7 +70,7 @@ void pass_on(ClothPoints& points, const ClothRange& cloth, const SpringRun& x, c
     if (!(length > 0)) continue;
     const Vec4 u = d / length;
     const Vec4 impulse = h * dt *
-                         (s.stiffness * (length - s.rest_length) +
+                         (s.stiffness * s.elongation(length, x, cloth.begin) +
                           s.damping * u.dot(v[s.a - cloth.begin] - v[s.b - cloth.begin])) *
                          u;
     a ? points.pull[s.a] -= impulse : points.pull[s.b] += impulse;
@@ -72,22 +88,27 @@ void begin(const ClothPoints& points, const ClothRange& cloth, Real h, SpringRun
   }
 }
 
-/// The matrix of backward Euler: of each spring alpha u u^T + beta 1 between its ends, and the masses.
+/// The matrix of backward Euler: of each spring alpha u u^T + beta 1 between its ends, that of bending, and
+/// the masses.
 class ImplicitSystem {
  public:
   ImplicitSystem(const ClothPoints& points, const ClothRange& cloth, Real h)
-      : points_(points), cloth_(cloth) {
+      : points_(points),
+        cloth_(cloth),
+        bending_(cloth.bending.empty() ? 0 : h * (h + cloth.bending.damping())) {
     block_.assign(cloth.end - cloth.begin, Mat3::Zero());
     for (std::size_t i = 0; i < block_.size(); ++i)
-      block_[i].diagonal().setConstant(points.mass[cloth.begin + i]);
+      block_[i].diagonal().setConstant(
+          points.mass[cloth.begin + i] +
+          (bending_ > 0 ? bending_ * cloth.bending.diagonal(static_cast<uint32_t>(i)) : 0));
     for (const ClothSpring& s : cloth.springs) {
       const Vec4 d = points.start[s.a] - points.start[s.b];
       const Real length = d.norm();
       const Vec4 u = length > 0 ? Vec4(d / length) : Vec4(Vec4::Zero());
-      const Real sideways = length > s.rest_length ? 1 - s.rest_length / length : 0;
+      const Real elongation = s.elongation(length, points.start);
+      const Real sideways = elongation > 0 ? elongation / length : 0;
       const Real stiff = h * h * s.stiffness;
-      const Link link{u, stiff * (1 - sideways) + h * s.damping, stiff * sideways,
-                      s.stiffness * (length - s.rest_length)};
+      const Link link{u, stiff * (1 - sideways) + h * s.damping, stiff * sideways, s.stiffness * elongation};
       links_.push_back(link);
       const Mat3 k = link.along * u.head<3>() * u.head<3>().transpose() + link.across * Mat3::Identity();
       block_[s.a - cloth.begin] += k;
@@ -108,11 +129,19 @@ class ImplicitSystem {
       y[a] += f;
       y[b] -= f;
     }
+    if (bending_ > 0) cloth_.bending.multiply(p, bending_, y);
     clear_held(y);
   }
 
   /// What the springs do to what is held, when all move with v through the step.
   void pass_on(ClothPoints& points, const SpringRun& v, Real h) const {
+    if (bending_ > 0) {
+      SpringRun force(v.size(), Vec4::Zero());
+      cloth_.bending.add_forces(cloth_.part(points.start), h * h, force);
+      cloth_.bending.multiply(v, -h * bending_, force);
+      for (std::size_t i = 0; i < force.size(); ++i)
+        if (is_held(points, cloth_.begin + i)) points.pull[cloth_.begin + i] += force[i];
+    }
     for (std::size_t k = 0; k < links_.size(); ++k) {
       const ClothSpring& s = cloth_.springs[k];
       const Link& link = links_[k];
@@ -140,6 +169,7 @@ class ImplicitSystem {
       b[cloth_.springs[k].a - cloth_.begin] -= f;
       b[cloth_.springs[k].b - cloth_.begin] += f;
     }
+    if (bending_ > 0) cloth_.bending.add_forces(cloth_.part(points_.start), h, b);
     clear_held(b);
     return b;
   }
@@ -157,6 +187,7 @@ class ImplicitSystem {
 
   const ClothPoints& points_;
   const ClothRange& cloth_;
+  Real bending_;  // factor of its matrix
   std::vector<Link> links_;
   std::vector<Mat3> block_;  // inverse
 };
@@ -193,7 +224,115 @@ bool solve(const ImplicitSystem& system, const SpringRun& b, SpringRun& v) {
   return false;
 }
 
+/// What the solution left of the momentum of a cloth that nothing holds, is given to all of it.
+void keep_momentum(const ClothPoints& points, const ClothRange& cloth, const SpringRun& b, SpringRun& v) {
+  Vec4 lost = Vec4::Zero();
+  Real mass = 0;
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    if (is_held(points, cloth.begin + i)) return;
+    lost += b[i] - points.mass[cloth.begin + i] * v[i];
+    mass += points.mass[cloth.begin + i];
+  }
+  for (Vec4& velocity : v) velocity += lost / mass;
+}
+
+/// Bending in a sub-step of step_relaxed().
+class RelaxedBending {
+ public:
+  RelaxedBending(const ClothPoints& points, const ClothRange& cloth, Real dt, Real h)
+      : cloth_(cloth), damping_(cloth.bending.damping()), h_(h) {
+    const ClothBending& bending = cloth.bending;
+    is_stiff_ = dt * (dt + damping_) * bending.fastest() > kSoftBending;
+    force_.assign(cloth.end - cloth.begin, Vec4::Zero());
+    if (is_stiff_) return;
+    // Once for the whole sub-step.
+    bending.add_forces(cloth.part(points.start), 1, force_);
+    if (damping_ > 0) bending.multiply(cloth.part(points.velocity), -damping_, force_);
+  }
+  bool is_stiff() const { return is_stiff_; }
+
+  /// Adds what it does in a step to the moves, and to the pull of what is held.
+  void pull(ClothPoints& points, std::span<Vec4> moves) {
+    if (is_stiff_) {
+      std::fill(force_.begin(), force_.end(), Vec4::Zero());
+      cloth_.bending.add_forces(cloth_.part(points.start), 1, force_);
+    }
+    give(points, moves);
+  }
+
+  /// Takes out of the moves what stiff bending does not allow; whether to tolerance.
+  bool filter(ClothPoints& points, std::span<Vec4> moves) {
+    const Real stiff = h_ * (h_ + damping_);
+    const std::span<Vec4> own = moves.subspan(cloth_.begin, force_.size());
+    const bool done =
+        cloth_.bending.filter(cloth_.part(points.mass), cloth_.part(points.inverse_mass), stiff, own);
+    std::fill(force_.begin(), force_.end(), Vec4::Zero());
+    cloth_.bending.multiply(own, -stiff, force_);
+    for (std::size_t i = 0; i < force_.size(); ++i)
+      if (is_held(points, cloth_.begin + i)) points.pull[cloth_.begin + i] += force_[i];
+    return done;
+  }
+
+ private:
+  void give(ClothPoints& points, std::span<Vec4> moves) const {
+    for (std::size_t i = 0; i < force_.size(); ++i) {
+      const std::size_t k = cloth_.begin + i;
+      const Vec4 impulse = h_ * h_ * force_[i];
+      is_held(points, k) ? points.pull[k] += impulse : moves[k] += points.inverse_mass[k] * impulse;
+    }
+  }
+
+  const ClothRange& cloth_;
+  Real damping_, h_;
+  bool is_stiff_;
+  SpringRun force_;
+};
+
 }  // namespace
+
+bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& springs, uint32_t steps,
+                  Real dt, std::span<Vec4> kick) {
+  const Real h = dt / steps;
+  const std::size_t n = cloth.end - cloth.begin;
+  SpringRun from(n), velocity(n);  // velocity times the step
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t k = cloth.begin + i;
+    from[i] = points.start[k];
+    velocity[i] = is_held(points, k) ? Vec4((points.position[k] - points.start[k]) / steps)
+                                     : Vec4(h * points.velocity[k]);
+  }
+  const bool bends = !cloth.bending.empty();
+  std::optional<RelaxedBending> bending;
+  if (bends) bending.emplace(points, cloth, dt, h);
+  std::vector<Vec4>& moves = points.moves;
+  springs.begin(points, h);
+  bool solved = true;
+  for (uint32_t step = 0; step < steps; ++step) {
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::size_t k = cloth.begin + i;
+      moves[k] = is_held(points, k) ? velocity[i] : Vec4(velocity[i] + h * h * points.acceleration[k]);
+    }
+    if (bends) bending->pull(points, moves);
+    springs.pull(points, moves);
+    if (bends && bending->is_stiff()) solved &= bending->filter(points, moves);
+    springs.relax(points, moves);
+    for (std::size_t i = 0; i < n; ++i) {
+      velocity[i] = moves[cloth.begin + i];
+      points.start[cloth.begin + i] += velocity[i];
+    }
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t k = cloth.begin + i;
+    if (is_held(points, k)) {
+      points.pull[k] *= steps;  // impulses times the whole sub-step
+    } else {
+      points.position[k] = points.start[k];
+      if (steps > 1) kick[k] = velocity[i] / h - (points.position[k] - from[i]) / dt;
+    }
+    points.start[k] = from[i];
+  }
+  return solved;
+}
 
 void step_symplectic(ClothPoints& points, const ClothRange& cloth, Real h) {
   SpringRun x, v;
@@ -238,6 +377,7 @@ bool step_implicit(ClothPoints& points, const ClothRange& cloth, Real h) {
   const ImplicitSystem system(points, cloth, h);
   const SpringRun b = system.right_side(v, h);
   const bool converged = solve(system, b, v);
+  keep_momentum(points, cloth, b, v);
   system.pass_on(points, v, h);
   for (std::size_t i = 0; i < x.size(); ++i)
     if (!is_held(points, cloth.begin + i)) points.position[cloth.begin + i] = x[i] + h * v[i];

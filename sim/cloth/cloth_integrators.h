@@ -1,12 +1,14 @@
 #pragma once
-/// Moves the points of a cloth by its springs and outer accelerations through a sub-step of length h, without
-/// contacts. These are the alternatives to the sweep of cloth_springs.h. Pinned points have already been
-/// moved.
+/// Moves the points of a cloth by its springs, its bending and outer accelerations through a sub-step of
+/// length h, without contacts. Pinned points have already been moved. Where the velocity at the end differs
+/// from the mean velocity of the move, `kick` gets the difference.
 
 #include <span>
 
+#include "sim/cloth/bending.h"
 #include "sim/cloth/cloth.h"
 #include "sim/cloth/cloth_points.h"
+#include "sim/cloth/cloth_springs.h"
 
 namespace offstage::sim {
 
@@ -14,12 +16,27 @@ namespace offstage::sim {
 struct ClothRange {
   std::size_t begin, end;
   std::span<const ClothSpring> springs;  ///< between points of all cloths
+  ClothBending& bending;
+
+  /// The values of this cloth's points, of those of all points.
+  template <class T>
+  std::span<T> part(std::vector<T>& of_all) const {
+    return std::span<T>(of_all).subspan(begin, end - begin);
+  }
+  template <class T>
+  std::span<const T> part(const std::vector<T>& of_all) const {
+    return std::span<const T>(of_all).subspan(begin, end - begin);
+  }
 };
+
+/// Gauss-Seidel sweeps (cloth_springs.h) in `steps` equal steps. Returns false if stiff bending was not
+/// solved to its tolerance.
+bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& springs, uint32_t steps, Real h,
+                  std::span<Vec4> kick);
 
 void step_symplectic(ClothPoints& points, const ClothRange& cloth, Real h);
 
-/// Classical Runge-Kutta. The velocity at the end differs from the mean velocity of the move; `kick` gets the
-/// difference.
+/// Classical Runge-Kutta.
 void step_rk4(ClothPoints& points, const ClothRange& cloth, Real h, std::span<Vec4> kick);
 
 /// Backward Euler, linearised once. A spring that is compressed does not push sideways in it, which keeps the

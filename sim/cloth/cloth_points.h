@@ -24,10 +24,12 @@ struct ClothPoints {
   std::vector<Vec4> velocity;      ///< mean of the last sub-step of the cloth
   std::vector<Vec4> acceleration;  ///< by everything but springs and contacts
   std::vector<Vec4> rest;          ///< in the unstrained cloth
+  std::vector<Vec4> moves;         ///< of a step of the springs
   std::vector<Vec4> pull;          ///< impulse of the springs on pinned points, times the sub-step [kg m]
   std::vector<Real> mass;          ///< [kg]
   std::vector<Real> inverse_mass;  ///< 0 for pinned points
   std::vector<ClothBody*> holder;  ///< the body whose pin holds it; null: none, or the world
+  std::vector<uint8_t> carried;    ///< whether that body is dynamic, so that the point moves with it
   std::vector<Real> thickness, friction, self_friction;
   std::vector<uint32_t> cloth;  ///< which it belongs to
 

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "sim/core/staged_loop.h"
 #include "sim/linear/lanes.h"
@@ -25,6 +26,9 @@ constexpr Real kSoftRatio = 0.5;
 constexpr Real kNoLength2 = 1e-24;
 /// Between two points that are held [1/kg].
 constexpr Real kNoMobility = 1e-100;
+
+/// Of a stiffness that is exactly what the step allows.
+constexpr Real kRounding = 1e-5;
 
 /// Four numbers in one instruction, where Eigen's casts go one by one.
 typedef float Floats __attribute__((vector_size(16)));
@@ -87,22 +91,28 @@ void ClothSprings::assign(std::span<const ClothSpring> springs, const ClothPoint
   for (uint32_t c : color) ++color_start_[c + 1];
   for (std::size_t c = 1; c < color_start_.size(); ++c) color_start_[c] += color_start_[c - 1];
   std::vector<std::size_t> next(color_start_.begin(), color_start_.end());
+  longest_step_ = std::numeric_limits<Real>::infinity();
   spring_.resize(springs.size());
   material_.resize(springs.size());
   for (std::size_t i = 0; i < springs.size(); ++i) {
     const ClothSpring& s = springs[i];
     const std::size_t at = next[color[i]]++;
-    spring_[at] = {s.a, s.b, s.rest_length, 0};
+    spring_[at] = {s.a, s.b, s.counterpart, s.rest_length, 0, s.counterpart_rest};
+    if (s.counterpart_rest == 0) spring_[at].counterpart = {s.a, s.a};
     material_[at] = {s.stiffness, s.damping, most(s)};
+    const Real fastest = s.stiffness * (1 / points.mass[s.a] + 1 / points.mass[s.b]);
+    longest_step_ = std::min(longest_step_, std::sqrt(material_[at].most / fastest));
   }
   link_.resize(spring_.size());
   prepared_for_ = -1;
-  stages_.clear();
+  pull_.clear();
+  relax_.clear();
   for (auto kind : {Stage::pull, Stage::forward, Stage::backward}) {
     for (std::size_t c = 0; c + 1 < color_start_.size(); ++c) {
       const std::size_t k = kind == Stage::backward ? color_start_.size() - 2 - c : c;
       if (color_start_[k + 1] > color_start_[k])
-        stages_.push_back({kind, color_start_[k], color_start_[k + 1], k == kMaxColors});
+        (kind == Stage::pull ? pull_ : relax_)
+            .push_back({kind, color_start_[k], color_start_[k + 1], k == kMaxColors});
     }
   }
 }
@@ -111,11 +121,18 @@ uint32_t ClothSprings::Stage::block_count() const {
   return whole ? 1 : static_cast<uint32_t>((end - begin + kBlock - 1) / kBlock);
 }
 
-void ClothSprings::step(ClothPoints& points, std::span<Vec4> moves, Real h) {
-  prepare(points, h);
+void ClothSprings::pull(ClothPoints& points, std::span<Vec4> moves) {
+  run(pull_, points, moves);
+}
+
+void ClothSprings::relax(ClothPoints& points, std::span<Vec4> moves) {
+  run(relax_, points, moves);
+}
+
+void ClothSprings::run(std::span<const Stage> stages, ClothPoints& points, std::span<Vec4> moves) {
   const uint32_t threads = spring_.size() < kWorthThreads ? 1 : available_threads();
   const auto all = [](const Stage&) { return true; };
-  run_stages(std::span(stages_), threads, all, [&](const Stage& stage, uint32_t block) {
+  run_stages(stages, threads, all, [&](const Stage& stage, uint32_t block) {
     const std::size_t begin = stage.begin + block * kBlock;
     const std::size_t end = stage.whole ? stage.end : std::min(begin + kBlock, stage.end);
     if (stage.kind == Stage::pull)
@@ -129,17 +146,22 @@ void ClothSprings::step(ClothPoints& points, std::span<Vec4> moves, Real h) {
 
 /// What depends on the step and on what pins hold alone. Steps of one rate differ in their last bits, as
 /// differences of times do: in single precision they are one.
-void ClothSprings::prepare(const ClothPoints& points, Real step) {
+void ClothSprings::begin(const ClothPoints& points, Real step) {
   const Real h = static_cast<float>(step);
   if (h == prepared_for_ && points.inverse_mass == inverse_mass_) return;
   prepared_for_ = h;
   inverse_mass_ = points.inverse_mass;
-  clamped_.assign(points.cloth.empty() ? 0 : points.cloth.back() + 1, 0);
+  clamped_ = 0;
+  least_stiffness_ = 1;
   for (std::size_t i = 0; i < spring_.size(); ++i) {
     Spring& s = spring_[i];
     const Material& material = material_[i];
     const Real mobility = inverse_mass_[s.a] + inverse_mass_[s.b];
-    clamped_[points.cloth[s.a]] += h * h * material.stiffness * mobility > material.most;
+    const Real ratio = h * h * material.stiffness * mobility;
+    if (ratio > material.most * (1 + kRounding)) {
+      ++clamped_;
+      least_stiffness_ = std::min(least_stiffness_, material.most / ratio);
+    }
     s.stiffness = std::min(h * h * material.stiffness, material.most / std::max(mobility, kNoMobility));
     const Real resists = s.stiffness + h * material.damping, forget = 1 / (1 + resists * mobility);
     link_[i] = {Eigen::Vector4f(0, 0, 0, static_cast<float>(resists * forget)), static_cast<float>(forget), 0,
@@ -155,17 +177,20 @@ void ClothSprings::pull(ClothPoints& points, std::span<Vec4> moves, std::size_t 
   for (std::size_t first = begin; first < end; first += kLanes) {
     const std::size_t count = std::min(kLanes, end - first);
     std::array<Vec4, kLanes> direction;
-    Batch length2 = Batch::Ones();
+    Batch length2 = Batch::Ones(), other2 = Batch::Zero();
     for (std::size_t k = 0; k < count; ++k) {
       const Spring& s = spring_[first + k];
       direction[k] = x[s.a] - x[s.b];
       length2[static_cast<Eigen::Index>(k)] = std::max(direction[k].squaredNorm(), kNoLength2);
+      other2[static_cast<Eigen::Index>(k)] = (x[s.counterpart[0]] - x[s.counterpart[1]]).squaredNorm();
     }
-    const Batch length = length2.sqrt(), inverse = length.inverse();
+    const Batch length = length2.sqrt(), inverse = length.inverse(), other = other2.sqrt();
     for (std::size_t k = 0; k < count; ++k) {
       const Spring& s = spring_[first + k];
       const auto lane = static_cast<Eigen::Index>(k);
-      give(points, moves, s.a, s.b, s.stiffness * (length[lane] - s.rest) * inverse[lane] * direction[k]);
+      const Real own = length[lane] - s.rest;
+      const Real elongation = s.counterpart_rest > 0 ? (own - other[lane] + s.counterpart_rest) / 2 : own;
+      give(points, moves, s.a, s.b, s.stiffness * elongation * inverse[lane] * direction[k]);
       Link& link = link_[first + k];
       const float along = link.axis[3];
       link.axis = narrowed(inverse[lane] * direction[k]);

@@ -17,20 +17,29 @@ namespace offstage::sim {
 
 class ClothSprings {
  public:
-  /// Springs between points of all cloths; their order determines the colours.
+  /// Springs of one cloth, between points of all cloths; their order determines the colours.
   void assign(std::span<const ClothSpring> springs, const ClothPoints& points);
 
-  /// Applies the springs to `moves`, the displacements of points in a step of length h. The moves of pinned
-  /// points are kept, and the impulses on them are added to their `pull`.
-  void step(ClothPoints& points, std::span<Vec4> moves, Real h);
+  /// The longest step at which no spring's stiffness is clamped [s].
+  Real longest_step() const { return longest_step_; }
+  /// To be called before steps of length h.
+  void begin(const ClothPoints& points, Real h);
+  /// Applies the forces of the springs at the points' start to `moves`, the displacements of points in a
+  /// step. The moves of pinned points are kept, and the impulses on them are added to their `pull`.
+  void pull(ClothPoints& points, std::span<Vec4> moves);
+  /// Then makes the moves implicit, by one symmetric sweep.
+  void relax(ClothPoints& points, std::span<Vec4> moves);
 
-  /// Number of springs of each cloth whose stiffness was clamped in the last step; empty before the first.
-  std::span<const uint64_t> clamped() const { return clamped_; }
+  /// Number of springs whose stiffness was clamped, and the least share of its stiffness that any has left.
+  uint64_t clamped() const { return clamped_; }
+  Real least_stiffness() const { return least_stiffness_; }
 
  private:
   struct Spring {
     uint32_t a, b;
-    Real rest, stiffness;  // stiffness times h^2, clamped if necessary
+    std::array<uint32_t, 2> counterpart;  // a twice if it has none
+    Real rest, stiffness;                 // stiffness times h^2, clamped if necessary
+    Real counterpart_rest;
   };
   struct Material {
     Real stiffness, damping;
@@ -51,7 +60,7 @@ class ClothSprings {
     uint32_t block_count() const;
   };
 
-  void prepare(const ClothPoints& points, Real step);
+  void run(std::span<const Stage> stages, ClothPoints& points, std::span<Vec4> moves);
   void pull(ClothPoints& points, std::span<Vec4> moves, std::size_t begin, std::size_t end);
   void relax(ClothPoints& points, std::span<Vec4> moves, std::size_t spring);
 
@@ -59,10 +68,11 @@ class ClothSprings {
   std::vector<Material> material_;        // of each
   std::vector<std::size_t> color_start_;  // and the end
   std::vector<Link> link_;                // of the step
-  std::vector<Stage> stages_;             // of any step
+  std::vector<Stage> pull_, relax_;       // of any step
   std::vector<Real> inverse_mass_;        // that springs were prepared for
   Real prepared_for_ = -1;                // step [s]; < 0: none
-  std::vector<uint64_t> clamped_;
+  Real longest_step_ = 0, least_stiffness_ = 1;
+  uint64_t clamped_ = 0;
 };
 
 }  // namespace offstage::sim

@@ -1,6 +1,7 @@
 #pragma once
 /// One cloth of a world between steps.
 
+#include "sim/cloth/bending.h"
 #include "sim/cloth/cloth.h"
 
 namespace offstage::sim {
@@ -25,7 +26,12 @@ struct Cloth {
   Real age = 0;                      ///< [s]
   uint32_t version = 0;
   bool stopped = false;  ///< it became non-finite and is no longer stepped
+  ClothBending bending;  ///< of the triangles
+  std::optional<ClothTear> first_tear;
   ClothReport report;
+
+  /// After triangles changed.
+  void assign_bending();
 };
 
 /// Volume inside of a closed surface by the divergence theorem [m^3].

@@ -11,18 +11,21 @@
 namespace offstage::sim {
 namespace {
 
-/// Rounds of shortening moves; what is not right then is put back to where it started.
-constexpr int kMaxRounds = 64;
-/// Turns of contacts with bodies and of the stretch limit.
-constexpr int kMaxTurns = 4;
+/// Solutions for contacts with bodies and the stretch limit together.
+constexpr int kMaxTurns = 8;
 /// Substeps of cloth in one of the world.
 constexpr Real kMaxParts = 1000;
 /// Stretch is not limited so that cloth could not tear: the limit is at least this much above.
 constexpr Real kBeyondTear = 1.2;
+/// How far a body that pushes cloth may come towards it in a sub-step, in edges of triangles.
+constexpr Real kMostApproach = 0.1;
+/// Into how many a sub-step is divided for that, at most.
+constexpr Real kMostDivision = 16;
 /// How long a span is, at most [s].
 constexpr Real kSpan = 1.0 / 480;
-/// For how long pairs of cloth with cloth are sought at a time [s].
-constexpr Real kHorizon = 1.0 / 80;
+/// A cloth with a point that is faster than this has diverged [m/s]; waves along a thread are ten times
+/// slower.
+constexpr Real kLostSpeed = 5000;
 
 }  // namespace
 
@@ -40,11 +43,11 @@ void ClothSystem::assemble() {
   seams_.clear();
   all_springs_.clear();
   first_spring_.clear();
-  std::vector<ClothSpring> swept;
   std::vector<StretchLimit::Limit> limits, ties;
   std::vector<Triangle> colliding, touching;  // cloth; bodies
   for (uint32_t c = 0; c < cloths_.size(); ++c) {
-    const Cloth& cloth = *cloths_[c];
+    Cloth& cloth = *cloths_[c];
+    cloth.assign_bending();
     const auto first = static_cast<uint32_t>(points_.size());
     first_.push_back(first);
     for (std::size_t i = 0; i < cloth.points.size(); ++i) {
@@ -62,13 +65,13 @@ void ClothSystem::assemble() {
     for (ClothSpring s : cloth.springs) {
       s.a += first;
       s.b += first;
+      for (uint32_t& end : s.counterpart) end += first;
       all_springs_.push_back(s);
-      if (cloth.def.integrator == ClothIntegrator::relaxed) swept.push_back(s);
       Real limit = s.kind == SpringKind::stretch ? cloth.def.max_stretch
                    : s.kind == SpringKind::shear ? cloth.def.max_shear
                                                  : 0;
       if (limit > 0 && s.kind == SpringKind::stretch) limit = std::max(limit, kBeyondTear * cloth.def.tear);
-      if (limit > 0) limits.push_back({s.a, s.b, s.rest_length, limit * s.rest_length});
+      if (limit > 0) limits.push_back({s.a, s.b, s.rest_length, limit * s.rest_length, cloth.def.tear > 0});
     }
     if (cloth.def.collides && !cloth.stopped)
       for (const Triangle& t : cloth.triangles)
@@ -83,11 +86,14 @@ void ClothSystem::assemble() {
   }
   first_spring_.push_back(all_springs_.size());
   kick_.assign(points_.size(), Vec4::Zero());
-  moves_.assign(points_.size(), Vec4::Zero());
+  points_.moves.assign(points_.size(), Vec4::Zero());
   points_.start = points_.position;
   points_.acceleration.assign(points_.size(), Vec4::Zero());
   points_.pull.assign(points_.size(), Vec4::Zero());
-  springs_.assign(swept, points_);
+  springs_.clear();
+  springs_.resize(cloths_.size());
+  for (std::size_t c = 0; c < cloths_.size(); ++c)
+    if (cloths_[c]->def.integrator == ClothIntegrator::relaxed) springs_[c].assign(springs_of(c), points_);
   drift_.assign(points_.size(), Vec4::Zero());
   pieces_.assign(points_.size());
   for (const ClothSpring& s : all_springs_) pieces_.join(s.a, s.b);
@@ -113,7 +119,9 @@ Aabb ClothSystem::reach(Real h) const {
 /// What pins hold has no inverse mass in this sub-step of the world.
 void ClothSystem::find_held(Real time, std::span<ClothBody> bodies) {
   held_.clear();
+  carriers_.clear();
   points_.holder.assign(points_.size(), nullptr);
+  points_.carried.assign(points_.size(), 0);
   for (std::size_t i = 0; i < points_.size(); ++i) points_.inverse_mass[i] = 1 / points_.mass[i];
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     Cloth& cloth = *cloths_[c];
@@ -130,11 +138,32 @@ void ClothSystem::find_held(Real time, std::span<ClothBody> bodies) {
       points_.inverse_mass[point] = 0;
       points_.holder[point] = body;
       held_.push_back({point, body, pin.position});
+      if (body && body->is_dynamic()) carry(point, *body, pin.position);
     }
+    set_clamps(c);
     if (cloth.stopped)
       std::fill_n(points_.inverse_mass.begin() + static_cast<std::ptrdiff_t>(first_[c]), cloth.points.size(),
                   0.0);
   }
+}
+
+void ClothSystem::carry(uint32_t point, ClothBody& body, const Vec3& place) {
+  auto at = std::ranges::find(carriers_, &body, &Carrier::body);
+  if (at == carriers_.end()) at = carriers_.insert(at, {&body, {}, {}});
+  at->points.push_back(point);
+  at->places.push_back(place);
+  points_.carried[point] = 1;
+}
+
+/// Triangles whose corners are all pinned to one body are clamped.
+void ClothSystem::set_clamps(std::size_t c) {
+  Cloth& cloth = *cloths_[c];
+  if (cloth.bending.empty()) return;
+  std::vector<uint32_t> clamp(cloth.points.size(), 0);
+  for (const Held& held : held_)
+    if (points_.cloth[held.point] == c)
+      clamp[held.point - first_[c]] = held.body ? 2 + held.body->way().body : 1;
+  cloth.bending.set_clamps(clamp);
 }
 
 void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies) {
@@ -149,13 +178,20 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
       points_.velocity[first_[c] + i] = padded(cloths_[c]->velocities[i]);
     add_outer_forces(*cloths_[c], first_[c], weather, points_);
   }
+  find_held(weather.time, bodies);
+  for (const Carrier& carrier : carriers_) carrier.body->fall_along_parabola(weather.gravity);
+  contacts_.find(points_, collides_, bodies, weather.h);
+  corner_contacts_.find(points_, bodies, weather.h);
+  if (const Real speed = contacts_.fastest_approach(points_); speed > 0)
+    longest = std::min(longest, std::max(kMostApproach * corner_contacts_.mean_edge() / speed,
+                                         std::min(longest, weather.h) / kMostDivision));
   const Real parts = std::clamp(std::ceil(weather.h / longest * (1 - 1e-12)), 1.0, kMaxParts);
   const Real dt = weather.h / parts;
   parts_ = parts;
-  find_held(weather.time, bodies);
-  contacts_.find(points_, collides_, bodies, weather.h);
-  corner_contacts_.find(points_, bodies, weather.h);
-  const Real span = std::max(1.0, std::floor(kSpan / dt * (1 + 1e-9)));
+  dt_ = dt;
+  time_ = weather.time + weather.h;
+  // Moves of bodies that hang on cloth are shortened within one sub-step.
+  const Real span = carriers_.empty() ? std::max(1.0, std::floor(kSpan / dt * (1 + 1e-9))) : 1;
   for (Real k = 0; k < parts; ++k) {
     for (Cloth* cloth : cloths_) cloth->age += dt;
     substep(k / parts, (k + 1) / parts, dt, k + 1 == parts || span_ + 1 >= span);
@@ -172,13 +208,15 @@ void ClothSystem::substep(Real from, Real to, Real dt, bool ends_span) {
   cuts_.clear();
   move_held();
   integrate(dt);
+  stop_lost(dt);
+  pull_bodies(dt);
   close_seams(dt);
-  limit_.project(points_);
+  limit_.project(points_, carriers_, dt);
   if (ends_span && !self_contacts_.empty()) push_apart(dt);
   touch_bodies(dt);
+  push_holders(dt);
   shorten_moves(dt, ends_span);
   end_substep(dt);
-  pull_bodies(dt);
   if (ends_span) span_ = 0;
 }
 
@@ -195,13 +233,17 @@ void ClothSystem::push_apart(Real dt) {
       cuts_.push_back({i, (1 - 1.0 / span_) * (points_.position[i] - free_[i])});
 }
 
-/// Bodies push cloth that pulls at what is too long, which pushes back: in turns.
+/// Bodies push cloth out of their way. Where that makes it too long, contacts and springs are solved for
+/// together, and linearised again in each turn.
 void ClothSystem::touch_bodies(Real dt) {
   contacts_.find_runaways(points_);
   corner_contacts_.solve(points_, dt, cuts_);
   contacts_.solve(points_, dt, parts_, cuts_);
-  for (int round = 1; round < kMaxTurns && contacts_.any_dynamic() && limit_.project(points_); ++round)
-    contacts_.solve(points_, dt, parts_, cuts_);
+  for (int round = 1; round < kMaxTurns && contacts_.any_dynamic() && limit_.any_too_long(points_); ++round) {
+    body_contacts_.clear();
+    contacts_.collect(points_, body_contacts_);
+    limit_.project_with(body_contacts_, points_, carriers_, dt);
+  }
 }
 
 void ClothSystem::move_held() {
@@ -213,30 +255,29 @@ void ClothSystem::move_held() {
   }
 }
 
+/// Number of steps of the springs in a sub-step of a `relaxed` cloth.
+uint32_t ClothSystem::spring_steps(std::size_t cloth, Real dt) const {
+  if (cloths_[cloth]->def.soften) return 1;
+  const Real longest = std::max(springs_[cloth].longest_step(), kShortestSpringStep);
+  return static_cast<uint32_t>(std::max(1.0, std::ceil(dt / longest * (1 - 1e-6))));
+}
+
 void ClothSystem::integrate(Real dt) {
   // Springs begin where bodies are, which they have pulled since points were put on them.
   for (const Held& held : held_)
     if (held.body) points_.start[held.point] = padded(held.body->start().point_to_world(held.position));
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     const ClothIntegrator integrator = cloths_[c]->def.integrator;
-    const std::span springs(all_springs_);
-    const ClothRange range{first_[c], first_[c] + cloths_[c]->points.size(),
-                           springs.subspan(first_spring_[c], first_spring_[c + 1] - first_spring_[c])};
+    const ClothRange range{first_[c], first_[c] + cloths_[c]->points.size(), springs_of(c),
+                           cloths_[c]->bending};
     if (integrator == ClothIntegrator::symplectic) step_symplectic(points_, range, dt);
     if (integrator == ClothIntegrator::rk4) step_rk4(points_, range, dt, kick_);
     if (integrator == ClothIntegrator::implicit && !step_implicit(points_, range, dt))
       ++cloths_[c]->report.unconverged;
-    if (integrator != ClothIntegrator::relaxed) continue;
-    for (std::size_t i = range.begin; i < range.end; ++i)
-      moves_[i] = points_.inverse_mass[i] > 0
-                      ? Vec4(dt * (points_.velocity[i] + dt * points_.acceleration[i]))
-                      : Vec4(points_.position[i] - points_.start[i]);
+    if (integrator == ClothIntegrator::relaxed &&
+        !step_relaxed(points_, range, springs_[c], spring_steps(c, dt), dt, kick_))
+      ++cloths_[c]->report.unconverged;
   }
-  springs_.step(points_, moves_, dt);
-  for (std::size_t c = 0; c < cloths_.size(); ++c)
-    if (cloths_[c]->def.integrator == ClothIntegrator::relaxed)
-      for (std::size_t i = first_[c], end = i + cloths_[c]->points.size(); i < end; ++i)
-        if (points_.inverse_mass[i] > 0) points_.position[i] = points_.start[i] + moves_[i];
   for (const Held& held : held_) points_.start[held.point] = held.from;
 }
 
@@ -253,207 +294,69 @@ void ClothSystem::close_seams(Real dt) {
   }
 }
 
-/// The moves in whose frames moves are shortened, or what flies or falls would be held back in the air: of a
-/// piece of cloth with all that it may cross the mean one if it is free, that of its pins if one body holds
-/// them all; none if it is near another body. Whether any move.
-bool ClothSystem::find_drifts() {
-  pieces_.forget();
-  self_contacts_.for_doubtful([&](const auto& p) { pieces_.join(p[0], p[3]); });
-  frames_.assign(pieces_.count(), {});
-  const auto add = [&](uint32_t i) {
-    Frame& frame = frame_of(i);
-    frame.move += points_.mass[i] * (points_.position[i] - points_.start[i]);
-    frame.mass += points_.mass[i];
-  };
-  for (const Held& held : held_) {
-    Frame& frame = frame_of(held.point);
-    frame.rests |= !held.body || (frame.holder && frame.holder != held.body);
-    frame.holder = held.body;
-    add(held.point);
-  }
-  const auto all_rest = [&] { return std::ranges::all_of(frames_, &Frame::rests); };
-  if (all_rest()) return false;
-  for (uint32_t i = 0; i < points_.size(); ++i) {
-    Frame& frame = frame_of(i);
-    if (frame.rests) continue;
-    frame.rests = cloths_[points_.cloth[i]]->stopped || contacts_.is_near_other_than(i, frame.holder);
-    if (!frame.holder) add(i);
-  }
-  if (all_rest()) return false;
-  for (Frame& frame : frames_)
-    if (!frame.rests) frame.move /= frame.mass;
-  for (uint32_t i = 0; i < points_.size(); ++i)
-    if (!frame_of(i).rests) drift_[i] = frame_of(i).move;
-  return true;
-}
-
-/// Until nothing is too long and nothing crossed. What is held back in a moving frame goes ways that its
-/// pairs were not sought for, and is looked at once more in the world's.
-void ClothSystem::shorten_moves(Real dt, bool ends_span) {
-  const bool self = ends_span && !self_contacts_.empty();
-  if (limit_.empty() && !self) return;
-  if (self) points_.start.swap(span_start_);                           // the moves of the whole span
-  const std::vector<Vec4>& from = self ? span_start_ : points_.start;  // of the sub-step
-  const auto find_doubtful = [&] {
-    self ? self_contacts_.find_doubtful(points_, span_ * dt, kHorizon, drift_) : self_contacts_.find_none();
-  };
-  shortened_.assign(points_.size(), kWhole);
-  find_doubtful();
-  bool any = false, any_in_piece = false;
-  if (find_drifts()) {
-    add_momenta(1, from, dt);
-    find_doubtful();
-    any = any_in_piece = shorten_in_pieces();
-    self_contacts_.take_crossed();  // in the world's frame nothing has to
-    drift_.assign(points_.size(), Vec4::Zero());
-    if (any && self) find_doubtful();
-    if (any && self) shorten_doubtful(kInWorld);
-  } else {
-    any = shorten_doubtful(kInWorld);
-  }
-  for (uint32_t i : self_contacts_.take_crossed()) ++cloths_[points_.cloth[i]]->report.crossings;
-  for (std::size_t i = 0; any && i < points_.size(); ++i) {
-    if (shortened_[i] == kWhole) continue;
-    ++cloths_[points_.cloth[i]]->report.limited;
-    // Its velocity is that of the shortened move, which in a span is not that of the last sub-step.
-    if (self)
-      kick_[i] =
-          (points_.position[i] - points_.start[i]) / (span_ * dt) - (points_.position[i] - from[i]) / dt;
-  }
-  if (self) std::erase_if(cuts_, [&](const VelocityCut& cut) { return shortened_[cut.point] != kWhole; });
-  if (any_in_piece) {
-    add_momenta(-1, from, dt);
-    give_momenta_back();
-  }
-  if (self) {
-    self_contacts_.end_substep(points_, span_ * dt);
-    points_.start.swap(span_start_);
-  }
-  stop_bodies();
-}
-
-/// In the frames of the pieces; whether any. A free piece goes on as a whole as it would have: what is held
-/// back within it is inner forces' doing.
-bool ClothSystem::shorten_in_pieces() {
-  const auto shift_starts = [&](Real sign) {
-    for (std::size_t i = 0; i < points_.size(); ++i) points_.start[i] += sign * drift_[i];
-  };
-  shift_starts(1);
-  const bool any = shorten_doubtful(kInPiece);
-  shift_starts(-1);
-  if (!any) return false;
-  for (uint32_t i = 0; i < points_.size(); ++i) {
-    Frame& frame = frame_of(i);
-    if (frame.is_free())
-      frame.move -= points_.mass[i] / frame.mass * (points_.position[i] - points_.start[i]);
-  }
-  for (uint32_t i = 0; i < points_.size(); ++i)
-    if (frame_of(i).is_free()) points_.position[i] += frame_of(i).move;
-  return true;
-}
-
-/// Adds (or takes, with the sign) the momenta of free pieces at the end of the sub-step that began at `from`.
-void ClothSystem::add_momenta(Real sign, std::span<const Vec4> from, Real dt) {
-  for (uint32_t i = 0; i < points_.size(); ++i)
-    frame_of(i).momentum += sign * points_.mass[i] * ((points_.position[i] - from[i]) / dt + kick_[i]);
-  for (const VelocityCut& cut : cuts_)
-    frame_of(cut.point).momentum -= sign * points_.mass[cut.point] / dt * cut.move;
-}
-
-/// What pieces lost by shortening in their own frames. What the world's frame took is lost to what they met.
-void ClothSystem::give_momenta_back() {
-  for (uint32_t i = 0; i < points_.size(); ++i) frame_of(i).met |= shortened_[i] == kInWorld;
-  for (uint32_t i = 0; i < points_.size(); ++i) {
-    const Frame& frame = frame_of(i);
-    if (frame.is_free() && !frame.met) kick_[i] += frame.momentum / frame.mass;
-  }
-}
-
-/// Shortens moves from where points started; whether any. Notes `how` of the points.
-bool ClothSystem::shorten_doubtful(Shortened how) {
-  shares_.assign(points_.size(), 1);
-  bool again = true, any = false;
-  for (int round = 0; again && round < kMaxRounds; ++round) {
-    again = round == 0 ? limit_.shorten_whole_moves(points_, shares_, lowered_)
-                       : limit_.shorten(points_, shares_, lowered_);
-    again |= self_contacts_.shorten(points_, shares_, lowered_);
-    any |= again;
-  }
-  if (!any) return false;
-  for (uint32_t i : self_contacts_.take_held_back()) ++cloths_[points_.cloth[i]]->report.held_back;
-  any = false;
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    const Real share = again ? 0 : shares_[i];
-    if (share == 1 || !(points_.inverse_mass[i] > 0)) continue;
-    points_.position[i] = points_.start[i] + share * (points_.position[i] - points_.start[i]);
-    shortened_[i] = how;
-    any = true;
-  }
-  return any;
-}
-
-/// A cloth that gives no more stops bodies as one with those that it hangs on.
-void ClothSystem::stop_bodies() {
-  const std::vector<Real> recoil = recoils();
-  const std::vector<Vec3> taken = contacts_.stop_bodies(points_, shortened_, recoil);
-  for (std::size_t c = 0; c < cloths_.size(); ++c) {
-    if (!(recoil[c] > 0) || taken[c] == Vec3::Zero()) continue;
-    const Vec3 gain = recoil[c] * taken[c];
-    for (std::size_t i = first_[c], end = i + cloths_[c]->points.size(); i < end; ++i)
-      kick_[i] += padded(gain);
-    for (ClothBody* body : holders(c)) body->push(body->mass() * gain, body->centre());
-  }
-}
-
-/// The bodies that hold pins of a cloth, each once.
-std::vector<ClothBody*> ClothSystem::holders(std::size_t cloth) const {
-  std::vector<ClothBody*> found;
-  for (const Held& held : held_)
-    if (points_.cloth[held.point] == cloth && held.body && !std::ranges::count(found, held.body))
-      found.push_back(held.body);
-  return found;
-}
-
-/// Of each cloth the inverse of its mass and of that of the bodies which hold it; 0 if anything fixed does,
-/// which takes up what it is pushed.
-std::vector<Real> ClothSystem::recoils() const {
-  std::vector<Real> mass;
-  for (const Cloth* cloth : cloths_)
-    mass.push_back(std::accumulate(cloth->masses.begin(), cloth->masses.end(), 0.0));
-  for (const Held& held : held_)
-    if (!held.body || !held.body->is_dynamic())
-      mass[points_.cloth[held.point]] = std::numeric_limits<Real>::infinity();
-  std::vector<Real> recoil;
-  for (std::size_t c = 0; c < cloths_.size(); ++c) {
-    for (const ClothBody* body : holders(c)) mass[c] += body->mass();
-    recoil.push_back(1 / mass[c]);
-  }
-  return recoil;
-}
-
 void ClothSystem::end_substep(Real dt) {
   for (std::size_t i = 0; i < points_.size(); ++i)
-    points_.velocity[i] = (points_.position[i] - points_.start[i]) / dt + kick_[i];
+    if (!points_.carried[i]) points_.velocity[i] = (points_.position[i] - points_.start[i]) / dt + kick_[i];
   std::fill(kick_.begin(), kick_.end(), Vec4::Zero());
   for (const VelocityCut& cut : cuts_) points_.velocity[cut.point] -= cut.move / dt;
 }
 
 /// Bodies feel what hangs on their pins, and move by it as the points of the cloth did: by forces of the
-/// start of the sub-step at once, by those of its end from the next on, by those between half.
+/// start of the sub-step at once, by those of its end from the next on, by those between half. They carry the
+/// mass of the points: what these need to follow their body is taken from it.
 void ClothSystem::pull_bodies(Real dt) {
+  const auto impulse_on = [&](uint32_t i) {
+    const Vec4 load = points_.pull[i] / dt + dt * points_.mass[i] * points_.acceleration[i];
+    points_.pull[i].setZero();
+    return Vec3(load.head<3>());
+  };
+  for (const Carrier& carrier : carriers_) {
+    ClothBody& body = *carrier.body;
+    Vec6 sum = Vec6::Zero(), moving = Vec6::Zero();
+    for (uint32_t i : carrier.points) {
+      const Vec3 p = points_.at(i), arm = p - body.centre();
+      const Vec3 load = impulse_on(i);
+      const Vec3 lag = points_.mass[i] * (points_.velocity[i].head<3>() - body.velocity(p));
+      const Vec3 impulse = load + lag, early = share_at_once(points_.cloth[i], dt) * load + lag;
+      sum += (Vec6() << impulse, arm.cross(impulse)).finished();
+      moving += (Vec6() << early, arm.cross(early)).finished();
+      points_.velocity[i] = padded(body.velocity(p));
+    }
+    carrier.pull(sum, moving, points_);
+  }
+  for (const Held& held : held_)
+    if (held.body && !held.body->is_dynamic())
+      held.body->load(impulse_on(held.point), points_.at(held.point));
+}
+
+/// Share of the impulses of a cloth's springs that moves bodies already in the sub-step.
+Real ClothSystem::share_at_once(std::size_t cloth, Real dt) const {
+  switch (cloths_[cloth]->def.integrator) {
+    case ClothIntegrator::implicit:
+      return 0;
+    case ClothIntegrator::rk4:
+      return 0.5;
+    case ClothIntegrator::relaxed:
+      return 0.5 + 0.5 / spring_steps(cloth, dt);
+    case ClothIntegrator::symplectic:
+      return 1;
+  }
+  return 1;
+}
+
+/// Bodies feel what contacts and the stretch limit did to the points that they hold.
+void ClothSystem::push_holders(Real dt) {
   for (const Held& held : held_) {
-    if (!held.body) continue;
-    const ClothIntegrator integrator = cloths_[points_.cloth[held.point]]->def.integrator;
-    const Real share = integrator == ClothIntegrator::implicit ? 0
-                       : integrator == ClothIntegrator::rk4    ? 0.5
-                                                               : 1;
-    const Vec4 weight = dt * points_.mass[held.point] * points_.acceleration[held.point];
-    const Vec3 impulse = (points_.pull[held.point] / dt + weight).head<3>();
+    Vec4& pull = points_.pull[held.point];
+    if (!held.body || pull.isZero(0)) continue;
+    const Vec3 impulse = pull.head<3>() / dt;
+    pull.setZero();
     if (held.body->is_dynamic())
-      held.body->pull(impulse, points_.at(held.point), share);
+      held.body->pull(impulse, points_.at(held.point), 1);
     else
       held.body->load(impulse, points_.at(held.point));
   }
+  for (const Carrier& carrier : carriers_) carrier.place(points_);
 }
 
 void ClothSystem::write_back() {
@@ -472,10 +375,29 @@ void ClothSystem::write_back() {
       cloth.points[i] = points_.at(first_[c] + i);
       cloth.velocities[i] = points_.velocity[first_[c] + i].head<3>();
     }
-    const uint32_t torn = tear(cloth);
+    const uint32_t torn = tear_at(c, time_);
     cloth.report.torn += torn;
     changed_ |= torn > 0;
   }
+}
+
+/// Tears the threads that are too long, and reports the first tear.
+uint32_t ClothSystem::tear_at(std::size_t c, Real time) {
+  Cloth& cloth = *cloths_[c];
+  if (cloth.def.tear > 0 && !cloth.first_tear) {
+    ClothTear first{.time = time};
+    for (const ClothSpring& s : cloth.springs) {
+      const Real stretch = (cloth.points[s.a] - cloth.points[s.b]).norm() / s.rest_length;
+      if (s.kind != SpringKind::stretch || stretch <= std::max(first.stretch, cloth.def.tear)) continue;
+      first.stretch = stretch;
+      first.place = (cloth.points[s.a] + cloth.points[s.b]) / 2;
+    }
+    first.by_pressure = cloth.def.pressure != 0;
+    first.touches_body = c < contacts_.active().size() && contacts_.active()[c] > 0;
+    if (first.stretch > 0) cloth.first_tear = first;
+  }
+  cloth.report.first_tear = cloth.first_tear;
+  return tear(cloth);
 }
 
 void ClothSystem::count_penetration() {
@@ -488,7 +410,11 @@ void ClothSystem::count_penetration() {
 void ClothSystem::measure() {
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     Cloth& cloth = *cloths_[c];
-    if (!changed_ && c < springs_.clamped().size()) cloth.report.clamped = springs_.clamped()[c];
+    if (!changed_ && c < springs_.size() && cloth.def.integrator == ClothIntegrator::relaxed) {
+      cloth.report.clamped = springs_[c].clamped();
+      cloth.report.least_stiffness = springs_[c].least_stiffness();
+      cloth.report.spring_steps = spring_steps(c, dt_);
+    }
     Eigen::ArrayXd length2(cloth.springs.size()), rest(cloth.springs.size());
     Eigen::Index count = 0;
     for (const ClothSpring& s : cloth.springs) {
@@ -504,6 +430,20 @@ void ClothSystem::measure() {
   }
 }
 
+/// Stops cloths that diverge, before their contacts are sought: in a cloth that is scattered everywhere,
+/// nearly all pairs of triangles may touch, and the search would not end.
+void ClothSystem::stop_lost(Real dt) {
+  const Real farthest2 = kLostSpeed * kLostSpeed * dt * dt;
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    if (cloths_[c]->stopped) continue;
+    bool lost = false;
+    for (std::size_t i = first_[c], end = i + cloths_[c]->points.size(); i < end; ++i)
+      lost |= points_.inverse_mass[i] > 0 &&
+              !((points_.position[i] - points_.start[i]).squaredNorm() <= farthest2);
+    if (lost) stop(*cloths_[c], first_[c]);
+  }
+}
+
 /// A cloth that lost its numbers stays where it last was.
 void ClothSystem::stop(Cloth& cloth, std::size_t first) {
   cloth.stopped = true;
@@ -512,6 +452,9 @@ void ClothSystem::stop(Cloth& cloth, std::size_t first) {
     cloth.velocities[i].setZero();
     points_.position[first + i] = padded(cloth.points[i]);
     points_.velocity[first + i].setZero();
+    points_.start[first + i] = points_.position[first + i];
+    points_.inverse_mass[first + i] = 0;
+    kick_[first + i].setZero();
   }
   changed_ = true;
 }

@@ -36,6 +36,9 @@ class ClothSystem {
   Aabb reach(Real h) const;
 
  private:
+  /// For how long pairs of cloth with cloth are sought at a time [s].
+  static constexpr Real kHorizon = 1.0 / 80;
+
   struct Held {
     uint32_t point;
     ClothBody* body;  // null: the world
@@ -44,15 +47,17 @@ class ClothSystem {
   };
   /// Frame in which a point's move was shortened.
   enum Shortened : uint8_t { kWhole, kInPiece, kInWorld };
-  /// Frame of a piece of cloth and everything it may cross, in which its moves are shortened.
+  /// Frame of a piece of cloth, everything it may cross and the dynamic bodies that hold it, in which its
+  /// moves are shortened.
   struct Frame {
-    bool rests = false;  // in the world
-    bool met = false;    // the piece met something outside it, in the world's frame
-    const ClothBody* holder = nullptr;
-    Vec4 move = Vec4::Zero(), momentum = Vec4::Zero();  // of its points, or of its pins; of a free piece
-    Real mass = 0;                                      // of the same
-
-    bool is_free() const { return !rests && !holder; }
+    bool rests = false;                 // in the world
+    bool anchored = false;              // something fixed holds it
+    bool carries = false;               // dynamic bodies hang on it
+    const ClothBody* leader = nullptr;  // the only body that holds it, if that is not dynamic
+    Vec4 move = Vec4::Zero();           // mean, of the leader's points or of all and bodies
+    Real mass = 0;                      // of the same
+    Vec4 momentum = Vec4::Zero();       // lost by shortening
+    Real total_mass = 0;                // of points and bodies
   };
   struct Seam {
     uint32_t cloth;
@@ -61,39 +66,57 @@ class ClothSystem {
 
   void assemble();
   void find_held(Real time, std::span<ClothBody> bodies);
+  void carry(uint32_t point, ClothBody& body, const Vec3& place);
+  void set_clamps(std::size_t cloth);
+  uint32_t spring_steps(std::size_t cloth, Real dt) const;
+  std::span<const ClothSpring> springs_of(std::size_t cloth) const {
+    return std::span(all_springs_)
+        .subspan(first_spring_[cloth], first_spring_[cloth + 1] - first_spring_[cloth]);
+  }
   void substep(Real from, Real to, Real dt, bool ends_span);
   void push_apart(Real dt);
   void move_held();
   void integrate(Real dt);
   void close_seams(Real dt);
   void touch_bodies(Real dt);
+  // In shorten_moves.cpp:
+  void find_frames();
+  bool is_near_another(uint32_t point);
   bool find_drifts();
   void shorten_moves(Real dt, bool ends_span);
   bool shorten_in_pieces();
   bool shorten_doubtful(Shortened how);
+  bool shorten_straight(Shortened how, bool& turned);
+  void shorten_carrier(Carrier& carrier, Real share);
   void add_momenta(Real sign, std::span<const Vec4> from, Real dt);
   void give_momenta_back();
   Frame& frame_of(uint32_t point) { return frames_[pieces_.of(point)]; }
   void stop_bodies();
-  std::vector<ClothBody*> holders(std::size_t cloth) const;
+  std::vector<const Carrier*> carriers_of(std::size_t cloth) const;
   std::vector<Real> recoils() const;
+
   void end_substep(Real dt);
   void pull_bodies(Real dt);
+  Real share_at_once(std::size_t cloth, Real dt) const;
+  void push_holders(Real dt);
   void write_back();
+  uint32_t tear_at(std::size_t cloth, Real time);
   void stop(Cloth& cloth, std::size_t first);
+  void stop_lost(Real dt);
   void count_penetration();
 
   std::vector<Cloth*> cloths_;
   std::vector<std::size_t> first_;         // point of each cloth
   std::vector<ClothSpring> all_springs_;   // by cloth, between points of all
   std::vector<std::size_t> first_spring_;  // of each cloth, and the end
-  std::vector<Vec4> moves_;                // of a sub-step, by outer forces and springs
   std::vector<Vec4> kick_;                 // of velocities at the end of a sub-step, beside their moves
   bool changed_ = false;
+  Real dt_ = 0;     // sub-step of cloth [s]
+  Real time_ = 0;   // at the end of the world's sub-step [s]
   Real parts_ = 1;  // sub-steps of cloth in one of the world
 
   ClothPoints points_;
-  ClothSprings springs_;
+  std::vector<ClothSprings> springs_;  // of each `relaxed` cloth
   StretchLimit limit_;
   ClothContacts contacts_;
   CornerContacts corner_contacts_;
@@ -103,8 +126,10 @@ class ClothSystem {
   uint32_t span_ = 0;  // sub-steps of cloth since then
   std::vector<uint8_t> collides_;
   std::vector<Held> held_;
+  std::vector<Carrier> carriers_;  // of the sub-step of the world
   std::vector<Seam> seams_;
   std::vector<VelocityCut> cuts_;
+  std::vector<BodyContact> body_contacts_;
   ClothPieces pieces_;
   std::vector<Vec4> drift_;  // the move of the frame in which each point's move is shortened
   MoveShares shares_;

@@ -3,19 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace offstage::sim {
 namespace {
 
-/// Of the cloth's thickness, which its points keep: flat parts do not feel features at all.
-constexpr Real kDistance = 0.5;
 /// Triangles steeper than this against what points out of a feature do not lie over it.
 constexpr Real kLeastCosine = 0.3;
 constexpr int kMaxSamples = 32;            // of an edge
 constexpr std::size_t kMaxCorners = 2000;  // of a mesh
-/// Share of an overlap at the start that is taken back per sub-step.
-constexpr Real kRecovery = 0.2;
 
 int samples(Real length, Real spacing, int least) {
   return std::clamp(static_cast<int>(std::ceil(length / spacing)), least, kMaxSamples);
@@ -27,7 +24,14 @@ void CornerContacts::assign(std::vector<Triangle> triangles, const ClothPoints& 
   triangles_ = std::move(triangles);
   tree_.build(triangles_, points.rest);
   Real sum = 0;
-  for (const Triangle& t : triangles_) sum += (points.rest[t[0]] - points.rest[t[1]]).norm();
+  longest_ = 0;
+  thinnest_ = std::numeric_limits<Real>::infinity();
+  for (const Triangle& t : triangles_) {
+    sum += (points.rest[t[0]] - points.rest[t[1]]).norm();
+    thinnest_ = std::min(thinnest_, points.thickness[t[0]]);
+    for (std::size_t k = 0; k < 3; ++k)
+      longest_ = std::max(longest_, (points.rest[t[k]] - points.rest[t[(k + 1) % 3]]).norm());
+  }
   spacing_ = triangles_.empty() ? 1 : std::max(1e-3, sum / static_cast<Real>(triangles_.size()) / 2);
   near_.clear();
 }
@@ -80,31 +84,36 @@ std::vector<CornerContacts::Corner> CornerContacts::corners(const Solid& solid) 
 void CornerContacts::find(const ClothPoints& points, std::span<ClothBody> bodies, Real h) {
   bodies_ = bodies;
   near_.clear();
+  round_.clear();
   if (triangles_.empty()) return;
   bool fitted = false;
+  const auto seek = [&](const Aabb& box, auto&& visit) {
+    if (!std::exchange(fitted, true)) {
+      std::vector<Real> margin(points.size());
+      for (std::size_t i = 0; i < margin.size(); ++i)
+        margin[i] = points.thickness[i] + 2 * h * points.velocity[i].norm();
+      tree_.fit(points.position, points.position, margin);
+    }
+    tree_.overlapping(box, visit);
+  };
   for (uint32_t b = 0; b < bodies.size(); ++b) {
     if (!bodies[b].collides) continue;
     const Obstacle& way = bodies[b].way();
+    if (RoundContacts::concerns(way.solid, longest_, thinnest_))
+      seek(way.swept_bounds(), [&](uint32_t t) { round_.add(t, b); });
     for (const Corner& corner : corners(way.solid)) {
-      if (!std::exchange(fitted, true)) {
-        std::vector<Real> margin(points.size());
-        for (std::size_t i = 0; i < margin.size(); ++i)
-          margin[i] = points.thickness[i] + 2 * h * points.velocity[i].norm();
-        tree_.fit(points.position, points.position, margin);
-      }
       const Vec3 from = way.start.point_to_world(corner.place), to = way.end.point_to_world(corner.place);
       const Real depth = std::min(corner.depth, 2 * spacing_);
       Aabb box(from.cwiseMin(to), from.cwiseMax(to));
       box.min().array() -= depth;
       box.max().array() += depth;
-      tree_.overlapping(box, [&](uint32_t t) {
-        near_.push_back({{corner.place, corner.outward, depth}, b, t});
-      });
+      seek(box, [&](uint32_t t) { near_.push_back({{corner.place, corner.outward, depth}, b, t}); });
     }
   }
 }
 
 void CornerContacts::solve(ClothPoints& points, Real dt, std::vector<VelocityCut>& cuts) {
+  round_.solve(triangles_, points, bodies_, dt, cuts);
   for (const Near& near : near_) press(points, near, dt, cuts);
 }
 
@@ -120,38 +129,14 @@ void CornerContacts::press(ClothPoints& points, const Near& near, Real dt, std::
   const Vec3 n = cross / std::sqrt(size2) * (cross.dot(outward) < 0 ? -1 : 1);
   const Real cosine = n.dot(outward);
   if (cosine < kLeastCosine) return;
-  const Real height = n.dot(a - p), gap = height - kDistance * points.thickness[t[0]];
+  const Real height = n.dot(a - p), gap = height - kTriangleDistance * points.thickness[t[0]];
   if (gap >= 0 || height < -near.corner.depth) return;
   const Vec3 hit = p + height / cosine * outward - a;
   const Real s = hit.cross(ac).dot(cross) / size2, r = ab.cross(hit).dot(cross) / size2;
   const std::array<Real, 3> weights = {1 - s - r, s, r};
   if (std::ranges::min(weights) < 0) return;
 
-  Vec3 motion = -body.surface_motion(p);
-  Real mobility = 0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    motion += weights[k] * (points.at(t[k]) - points.start_at(t[k]));
-    mobility += weights[k] * weights[k] * points.inverse_mass[t[k]];
-  }
-  const Real before = std::min(gap - n.dot(motion), 0.0), push = -gap + (1 - kRecovery) * before;
-  const Real total = mobility + body.mobility(p, n);
-  if (!(push > 0) || !(total > 0)) return;
-  Vec3 impulse = push / total * n;
-  const Vec3 slip = motion - n.dot(motion) * n;
-  const Real length = slip.norm();
-  if (length > 0) {
-    const Real friction = std::sqrt(points.friction[t[0]] * body.way().friction);
-    impulse -= std::min(length, friction * push) / (total * length) * slip;
-  }
-  const Real recovered = std::min(push, -kRecovery * before);
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Real w = points.inverse_mass[t[k]];
-    points.position[t[k]] += padded(w * weights[k] * impulse);
-    if (w == 0) points.pull[t[k]] += padded(weights[k] * impulse);
-    if (recovered > 0) cuts.push_back({t[k], padded(w * weights[k] * recovered / total * n)});
-  }
-  body.touch(0);
-  body.pull(-impulse / dt, p, 1);
+  separate({weights, p, n, gap}, t, points, body, dt, cuts);
 }
 
 }  // namespace offstage::sim

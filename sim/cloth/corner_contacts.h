@@ -1,7 +1,7 @@
 #pragma once
-/// Contact of the sharp features of bodies with triangles of cloth: corners and edges of boxes, rims of
-/// cylinders and cones, vertices of meshes' hulls. cloth_contacts.h keeps the points of cloth out of bodies;
-/// these contacts keep the triangles between the points out.
+/// Contact of bodies with triangles of cloth: of corners and edges of boxes, rims of cylinders and cones,
+/// vertices of meshes' hulls, and of rounded bodies (round_contacts.h). cloth_contacts.h keeps the points of
+/// cloth out of bodies; these contacts keep the triangles between the points out.
 
 #include <span>
 #include <vector>
@@ -9,6 +9,7 @@
 #include "sim/cloth/cloth_bodies.h"
 #include "sim/cloth/cloth_contacts.h"
 #include "sim/cloth/cloth_tree.h"
+#include "sim/cloth/round_contacts.h"
 
 namespace offstage::sim {
 
@@ -18,6 +19,7 @@ class CornerContacts {
   void assign(std::vector<Triangle> triangles, const ClothPoints& points);
   /// Finds the features and triangles that can meet in a sub-step of the world of length h.
   void find(const ClothPoints& points, std::span<ClothBody> bodies, Real h);
+  Real mean_edge() const { return 2 * spacing_; }  ///< of the triangles [m]
   /// Separates features and triangles in a sub-step of cloth of length dt. Appends to `cuts`.
   void solve(ClothPoints& points, Real dt, std::vector<VelocityCut>& cuts);
 
@@ -37,7 +39,9 @@ class CornerContacts {
 
   std::vector<Triangle> triangles_;
   ClothTree tree_;
-  Real spacing_ = 0;  // of samples: half a mean edge of the cloths [m]
+  Real spacing_ = 0;                 // of samples: half a mean edge of the cloths [m]
+  Real longest_ = 0, thinnest_ = 0;  // edge and thickness of the cloths [m]
+  RoundContacts round_;
   std::span<ClothBody> bodies_;
   std::vector<Near> near_;
 };

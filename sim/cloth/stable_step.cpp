@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/cloth/bending.h"
 #include "sim/cloth/cloth.h"
 
 namespace offstage::sim {
@@ -25,7 +26,16 @@ StableStep largest_stable_step(const ClothDef& def) {
     // radius 2.6.
     const Real step = is_rk4 ? 2.6 / std::max(std::sqrt(omega2), delta)
                              : 4 / (delta + std::sqrt(delta * delta + 4 * omega2));
-    if (step < result.step) result = {step, i};
+    if (step < result.step) result = {step, i, false};
+  }
+  if (def.bend > 0) {
+    ClothBending bending;
+    bending.assign(def.rest_vertices.empty() ? def.vertices : def.rest_vertices, def.triangles, def.masses,
+                   def.bend, def.bend_damping, def.rest_curvature);
+    const Real omega2 = bending.fastest(), delta = def.bend_damping * omega2;
+    const Real step = is_rk4 ? 2.6 / std::max(std::sqrt(omega2), delta)
+                             : 4 / (delta + std::sqrt(delta * delta + 4 * omega2));
+    if (step < result.step) result = {step, 0, true};
   }
   return result;
 }

@@ -8,9 +8,8 @@ namespace offstage::sim {
 namespace {
 
 constexpr uint8_t kSweeps = 8;
-/// Projection aims at this share of the allowed elongation: at the limit itself every outward move would have
-/// to be taken back whole, and the cloth would freeze there.
-constexpr Real kAim = 0.97;
+/// Solutions for all springs that are too long, each linearised where the last one left them.
+constexpr int kSolves = 4;
 /// Slack of the check against rounding; far below what is promised.
 constexpr Real kSlack = 1e-12;
 
@@ -40,7 +39,41 @@ void StretchLimit::assign(std::vector<Limit> limits, std::vector<Limit> ties, st
     for (const uint32_t end : {limits_[k].a, limits_[k].b}) limits_at_[next[end]++] = k;
 }
 
-bool StretchLimit::project(ClothPoints& points) const {
+bool StretchLimit::project(ClothPoints& points, std::span<const Carrier> carriers, Real dt) {
+  bool all_hold = true;
+  if (!sweep(points, all_hold)) return false;
+  if (carriers.empty()) return true;  // points alone are light: the sweeps and the shortening of moves suffice
+  for (int round = 0; round < kSolves && !all_hold; ++round) {
+    TautSprings taut(points, carriers);
+    for (const auto* some : {&limits_, &ties_})
+      for (const Limit& l : *some) taut.add(l);
+    all_hold = !taut.any_too_long();
+    if (all_hold) break;
+    taut.solve();
+    taut.apply(points, dt);
+  }
+  return true;
+}
+
+bool StretchLimit::any_too_long(const ClothPoints& points) const {
+  return std::ranges::any_of(limits_, [&](const Limit& l) {
+    return !l.tears && (points.position[l.a] - points.position[l.b]).squaredNorm() > l.longest * l.longest;
+  });
+}
+
+void StretchLimit::project_with(std::span<const BodyContact> contacts, ClothPoints& points,
+                                std::span<const Carrier> carriers, Real dt) const {
+  TautSprings taut(points, carriers);
+  for (const auto* some : {&limits_, &ties_})
+    for (const Limit& l : *some) taut.add(l);
+  for (const BodyContact& contact : contacts) taut.add(contact);
+  taut.solve();
+  taut.apply(points, dt);
+}
+
+/// Whether any spring was too long. `all_hold` gets whether none is any more, as far as bodies do not have to
+/// move for that.
+bool StretchLimit::sweep(ClothPoints& points, bool& all_hold) const {
   Vec4* const x = points.position.data();
   const Real* const w = points.inverse_mass.data();
   bool again = true, any = false;
@@ -52,10 +85,16 @@ bool StretchLimit::project(ClothPoints& points) const {
       if (sweep > 1 && moved_in[l.a] < sweep - 1 && moved_in[l.b] < sweep - 1) return;
       const Vec4 d = x[l.a] - x[l.b];
       const Real length2 = d.squaredNorm();
+      if (length2 <= l.longest * l.longest) return;
+      any = true;
+      if (!l.tears && (points.carried[l.a] || points.carried[l.b])) {
+        all_hold = false;  // to be solved together with the body
+        return;
+      }
       const Real mass = w[l.a] + w[l.b];
-      if (length2 <= l.longest * l.longest || !(mass > 0)) return;
+      if (!(mass > 0)) return;
       again = true;
-      const Real length = std::sqrt(length2), aim = l.rest + kAim * (l.longest - l.rest);
+      const Real length = std::sqrt(length2), aim = l.rest + kStretchAim * (l.longest - l.rest);
       const Vec4 move = ((length - aim) / (length * mass)) * d;
       x[l.a] -= w[l.a] * move;
       x[l.b] += w[l.b] * move;
@@ -65,13 +104,13 @@ bool StretchLimit::project(ClothPoints& points) const {
     };
     std::for_each(limits_.begin(), limits_.end(), draw);
     std::for_each(ties_.begin(), ties_.end(), draw);
-    any |= again;
   }
+  all_hold &= !again;
   return any;
 }
 
-bool StretchLimit::shorten_whole_moves(const ClothPoints& points, MoveShares& shares,
-                                       std::vector<uint32_t>& lowered) const {
+bool StretchLimit::shorten_whole_moves(const ClothPoints& points, std::span<const Carrier> carriers,
+                                       MoveShares& shares, std::vector<uint32_t>& lowered) const {
   lowered.clear();
   for (const Limit& l : limits_) {
     const bool whole = shares[l.a] == 1 && shares[l.b] == 1;
@@ -80,10 +119,12 @@ bool StretchLimit::shorten_whole_moves(const ClothPoints& points, MoveShares& sh
     look(l, points, shares, lowered);
   }
   even_ties(points, shares, lowered);
+  even_carriers(carriers, shares, lowered);
   return !lowered.empty();
 }
 
-bool StretchLimit::shorten(const ClothPoints& points, MoveShares& shares, std::vector<uint32_t>& lowered) {
+bool StretchLimit::shorten(const ClothPoints& points, std::span<const Carrier> carriers, MoveShares& shares,
+                           std::vector<uint32_t>& lowered) {
   std::vector<uint32_t> now;
   ++round_;
   for (const uint32_t i : lowered)
@@ -92,6 +133,7 @@ bool StretchLimit::shorten(const ClothPoints& points, MoveShares& shares, std::v
         look(limits_[limits_at_[k]], points, shares, now);
   lowered = std::move(now);
   even_ties(points, shares, lowered);
+  even_carriers(carriers, shares, lowered);
   return !lowered.empty();
 }
 
@@ -100,9 +142,19 @@ void StretchLimit::even_ties(const ClothPoints& points, MoveShares& shares,
   for (const Limit& t : ties_) {
     if (shares[t.a] == shares[t.b]) continue;
     const uint32_t ahead = shares[t.a] > shares[t.b] ? t.a : t.b;
-    if (points.inverse_mass[ahead] == 0) continue;
+    if (points.inverse_mass[ahead] == 0 && !points.carried[ahead]) continue;
     shares[ahead] = std::min(shares[t.a], shares[t.b]);
     lowered.push_back(ahead);
+  }
+}
+
+void StretchLimit::even_carriers(std::span<const Carrier> carriers, MoveShares& shares,
+                                 std::vector<uint32_t>& lowered) {
+  for (const Carrier& carrier : carriers) {
+    Real least = 1;
+    for (uint32_t i : carrier.points) least = std::min(least, shares[i]);
+    for (uint32_t i : carrier.points)
+      if (std::exchange(shares[i], least) != least) lowered.push_back(i);
   }
 }
 
@@ -115,8 +167,10 @@ void StretchLimit::look(const Limit& l, const ClothPoints& points, MoveShares& s
   // What began too long may at least get no longer.
   const Real allowed2 = std::max(l.longest * l.longest, d.squaredNorm());
   if ((d + move).squaredNorm() <= allowed2 * (1 + kSlack)) return;
-  const bool free_a = points.inverse_mass[l.a] > 0 && shares[l.a] > 0;
-  const bool free_b = points.inverse_mass[l.b] > 0 && shares[l.b] > 0;
+  const auto can_shorten = [&](uint32_t i) {
+    return (points.inverse_mass[i] > 0 || (points.carried[i] && !l.tears)) && shares[i] > 0;
+  };
+  const bool free_a = can_shorten(l.a), free_b = can_shorten(l.b);
   if (!free_a && !free_b) return;
   Vec4 k1 = d, k2 = Vec4::Zero();
   free_a ? k2 += shares[l.a]* move_a : k1 += shares[l.a] * move_a;

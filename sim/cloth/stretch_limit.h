@@ -1,12 +1,16 @@
 #pragma once
-/// The greatest length of springs (physics F7): a few sweeps first shorten springs that are too long, which
-/// preserves the motion of the cloth; then moves are shortened until every limit holds, which guarantees it.
+/// The greatest length of springs (physics F7). A few sweeps first shorten springs that are too long. Where
+/// that is not enough, as under a body that hangs on the cloth, the impulses of all springs at their limit
+/// are solved for together. Both preserve the momentum. Then moves are shortened until every limit holds,
+/// which guarantees it.
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "sim/cloth/cloth_bodies.h"
 #include "sim/cloth/cloth_points.h"
+#include "sim/cloth/taut_springs.h"
 
 namespace offstage::sim {
 
@@ -15,10 +19,7 @@ using MoveShares = std::vector<Real>;
 
 class StretchLimit {
  public:
-  struct Limit {
-    uint32_t a, b;
-    Real rest, longest;  // [m]
-  };
+  using Limit = SpringLimit;
 
   /// Sets the limits and the ties, such as seams. Ties are shortened together with the limits, but no move is
   /// shortened because a tie is too long. Both ends of a tie make the same share of their moves, so that no
@@ -31,16 +32,23 @@ class StretchLimit {
   }
   void set_tie(std::size_t tie, Real length) { ties_[tie].rest = ties_[tie].longest = length; }
 
-  /// Shortens springs that are too long. Returns whether there were any. Some may stay too long.
-  bool project(ClothPoints& points) const;
+  /// Shortens springs that are too long in a sub-step of length dt, and moves the bodies that hang on them.
+  /// Returns whether there were any. Some may stay too long.
+  bool project(ClothPoints& points, std::span<const Carrier> carriers, Real dt);
+  /// Whether any spring is too long.
+  bool any_too_long(const ClothPoints& points) const;
+  /// Solves for all springs at their limits and these contacts together.
+  void project_with(std::span<const BodyContact> contacts, ClothPoints& points,
+                    std::span<const Carrier> carriers, Real dt) const;
 
   /// Lowers shares of moves where a limit does not hold, and returns whether it did. This ends, because with
-  /// shares of 0 the lengths are those at the start, where the limits held. Pinned points always make their
-  /// whole move. On entry `lowered` holds the points whose shares were lowered since their last check, and
-  /// only their limits are checked; while all shares are 1, all limits are. On return it holds the points
-  /// that this call lowered.
-  bool shorten(const ClothPoints& points, MoveShares& shares, std::vector<uint32_t>& lowered);
-  bool shorten_whole_moves(const ClothPoints& points, MoveShares& shares,
+  /// shares of 0 the lengths are those at the start, where the limits held. Points that a dynamic body
+  /// carries make the same share of their moves; other pinned points always make their whole move. On entry
+  /// `lowered` holds the points whose shares were lowered since their last check, and only their limits are
+  /// checked; while all shares are 1, all limits are. On return it holds the points that this call lowered.
+  bool shorten(const ClothPoints& points, std::span<const Carrier> carriers, MoveShares& shares,
+               std::vector<uint32_t>& lowered);
+  bool shorten_whole_moves(const ClothPoints& points, std::span<const Carrier> carriers, MoveShares& shares,
                            std::vector<uint32_t>& lowered) const;
 
  private:
@@ -48,6 +56,9 @@ class StretchLimit {
             std::vector<uint32_t>& lowered) const;
 
   void even_ties(const ClothPoints& points, MoveShares& shares, std::vector<uint32_t>& lowered) const;
+  static void even_carriers(std::span<const Carrier> carriers, MoveShares& shares,
+                            std::vector<uint32_t>& lowered);
+  bool sweep(ClothPoints& points, bool& all_hold) const;
 
   std::vector<Limit> limits_, ties_;
   std::vector<uint32_t> limits_at_,

@@ -134,6 +134,10 @@ void part(Cloth& cloth, uint32_t point, const std::vector<Fan>& fans) {
            std::none_of(a.begin(), a.end(), [&](std::size_t f) { return std::ranges::count(b, f) > 0; });
   });
 
+  // A cell that comes apart has no counterparts any more.
+  for (ClothSpring& s : cloth.springs)
+    if (s.a == point || s.b == point || std::ranges::count(s.counterpart, point) > 0) s.counterpart_rest = 0;
+
   Real area = 0;
   for (const Fan& fan : fans) area += fan.area(cloth);
   const Real mass = cloth.masses[point];

@@ -83,7 +83,7 @@ TEST(ClothAir, AnOpenBoxTakesTheStagnationPressureOfItsMouth) {
   World lee({.gravity = Vec3::Zero(), .wind = {0, -kWind, 0}, .max_step = kStep});
   const ClothHandle other = lee.add_cloth(def);
   lee.step(kStep);
-  EXPECT_EQ(momentum(def, lee.cloth(other)), Vec3::Zero());
+  EXPECT_LT(momentum(def, lee.cloth(other)).norm(), 1e-12);
 }
 
 TEST(ClothPressure, HoldsASkinByBoylesLaw) {

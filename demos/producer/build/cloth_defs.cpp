@@ -119,6 +119,8 @@ effects::Fabric fabric_of(const Cloth& cloth) {
   change(c.lift, f.lift);
   change(c.max_stretch, f.max_stretch);
   change(c.max_shear, f.max_shear);
+  change(c.bend_damping, f.bend_damping);
+  f.bend_model = c.bend_model.value_or(f.bend_model);
   return f;
 }
 
@@ -159,6 +161,7 @@ FlatCloth flat_cloth(const Cloth& cloth, const render::Model* model) {
   def.air.density = cloth.air_density;
   def.integrator = cloth.integrator;
   def.substep = cloth.substep;
+  def.soften = cloth.soften;
   return flat;
 }
 
@@ -244,6 +247,11 @@ std::optional<std::string> too_stiff(const Scene& scene, const sim::ClothDef& cl
   const sim::StableStep stable = sim::largest_stable_step(cloth);
   const Real used = std::min({cloth.substep, scene.world.step, scene.output.fps.seconds(1)});
   if (used < stable.step) return {};
+  if (stable.bending)
+    return fmt::format(
+        "its bending is too stiff for an explicit integrator: it needs a substep less than {:.3g} s, got "
+        "{:.3g} s; or use \"relaxed\" or \"implicit\"",
+        0.995 * stable.step, used);
   const sim::ClothSpring& spring = cloth.springs[stable.spring];
   return fmt::format(
       "its springs are too stiff for an explicit integrator: the {} spring between vertices {} and {} "

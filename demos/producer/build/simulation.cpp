@@ -102,6 +102,19 @@ void SimulationTotals::add(const sim::StepReport& report) {
   integration.add(report.integration);
 }
 
+/// Cloths that are softer than they should be, and those that tore.
+void Simulation::note_cloths() {
+  world_.for_each_cloth([&](sim::ClothHandle handle) {
+    const sim::ClothReport& report = world_.cloth_report(handle);
+    const std::string& name = world_.cloth_def(handle).name;
+    if (report.clamped > 0) {
+      sim::Real& least = totals_.softened_cloths.try_emplace(name, 1).first->second;
+      least = std::min(least, report.least_stiffness);
+    }
+    if (report.first_tear) totals_.first_tears.try_emplace(name, *report.first_tear);
+  });
+}
+
 Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
     : scene_(scene),
       world_({.gravity = scene.world.gravity,
@@ -310,6 +323,7 @@ void Simulation::step(double sampling_time) {
 
 void Simulation::note(const sim::StepReport& report) {
   totals_.add(report);
+  note_cloths();
   totals_.contacts = world_.contacts().size();
   totals_.most_contacts = std::max(totals_.most_contacts, totals_.contacts);
   const ParticleSources::Counts counts = sources_->counts();
@@ -325,11 +339,19 @@ void Simulation::note(const sim::StepReport& report) {
     ++totals_.rough_bodies[a.motion == sim::MotionType::dynamic ? a.name : b.name];
   }
 
-  if (!report.finite)
-    throw DivergedError(fmt::format("the simulation diverged at {:.4f} s: '{}' has a position or velocity "
-                                    "that is not finite. Reduce world.step or the forces",
-                                    world_.time(), report.non_finite.object),
-                        state_dump(report.non_finite));
+  if (report.finite) return;
+  bool is_cloth = false;
+  world_.for_each_cloth([&](sim::ClothHandle handle) {
+    is_cloth |=
+        !world_.cloth_report(handle).finite && world_.cloth_def(handle).name == report.non_finite.object;
+  });
+  throw DivergedError(
+      fmt::format(
+          "the simulation diverged at {:.4f} s: {}'{}' has a position or velocity that is not finite. {}",
+          world_.time(), is_cloth ? "cloth " : "", report.non_finite.object,
+          is_cloth ? "Reduce its \"substep\", use \"integrator\": \"implicit\", or make it less stiff"
+                   : "Reduce world.step or the forces"),
+      state_dump(report.non_finite));
 }
 
 sim::Energy Simulation::energy() const {

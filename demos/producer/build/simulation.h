@@ -53,6 +53,8 @@ struct SimulationTotals {
   uint64_t cloth_contacts = 0, cloth_self_contacts = 0, cloth_springs_clamped = 0;
   uint64_t cloth_moves_limited = 0, cloth_moves_held_back = 0, cloth_crossings = 0, cloth_springs_torn = 0,
            cloth_unconverged = 0;
+  std::map<std::string, sim::Real> softened_cloths;  ///< least share of its stiffness that a spring had
+  std::map<std::string, sim::ClothTear> first_tears;
   sim::ContactWork exact, fast, impacts;
   /// Bodies with approximate contact forces, and how often a solver had to fall back on them.
   std::map<std::string, uint64_t> rough_bodies;
@@ -117,6 +119,7 @@ class Simulation {
   void add_springs(const Scene& scene);
   void add_joints(const Scene& scene);
   void add_cloths(const Scene& scene, const ModelLibrary& models);
+  void note_cloths();
   void add_forces(const Scene& scene);
   sim::BodyHandle body_named(const std::string& name) const;
   sim::ParticleSystemHandle system_named(const std::string& name) const;

@@ -28,6 +28,10 @@ struct Tags<ClothShape> {
   static constexpr bool kRequired = false;
 };
 template <>
+struct Names<effects::BendModel> {
+  static constexpr std::array kNames = {"plate", "springs"};
+};
+template <>
 struct Table<FabricChanges> {
   static Fields<FabricChanges> fields() {
     using T = FabricChanges;
@@ -35,9 +39,16 @@ struct Table<FabricChanges> {
         {"areal_density", &T::areal_density,
          "mass per area; default of this and the next keys: the value of the fabric", "kg/m^2", kPositive},
         {"stretch", &T::stretch, "force per width at a strain of 1, along the threads", "N/m", kPositive},
-        {"shear", &T::shear, "force per width at a strain of 1, diagonally to the threads", "N/m",
+        {"shear", &T::shear, "shear modulus times thickness: shear force per width at a shear angle of 1",
+         "N/m", kNotNegative},
+        {"bend", &T::bend, "flexural rigidity: moment per width at a curvature of 1/m", "N m", kNotNegative},
+        {"bend_damping", &T::bend_damping,
+         "damping time of bending: the moment is bend * (curvature + bend_damping * its rate of change)", "s",
          kNotNegative},
-        {"bend", &T::bend, "moment per width at a curvature of 1/m", "N m", kNotNegative},
+        {"bend_model", &T::bend_model,
+         "`plate`: a thin plate, whose flexural rigidity is `bend` on any mesh; `springs`: the book's "
+         "springs "
+         "between second neighbours, which resist sharp folds but hardly a slight curvature"},
         {"damping", &T::damping, "share of the critical damping of a spring", "", between(0, 10)},
         {"friction", &T::friction,
          "coefficient of friction against bodies; of cloth and body the geometric mean is used", "",
@@ -194,8 +205,14 @@ struct Table<Cloth> {
             {"integrator", &T::integrator,
              "integration method of the springs; `symplectic` and `rk4` are explicit, for soft cloth and "
              "short sub-steps"},
-            {"substep", &T::substep, "longest step of the cloth, at most one sub-step of the world", "s",
-             over(0, 1)},
+            {"substep", &T::substep,
+             "longest step of the cloth, at most one sub-step of the world. With the integrator `relaxed` "
+             "the "
+             "springs take as many shorter steps in it as their stiffness needs",
+             "s", over(0, 1)},
+            {"soften", &T::soften,
+             "with the integrator `relaxed`: one step of the springs in each `substep`, which is faster. The "
+             "stiffness of springs that are too stiff for it is reduced, and a warning tells by how much"},
             {"visible", &T::visible, "is drawn"},
             {"casts_shadow", &T::casts_shadow, "casts a shadow"},
         })

@@ -35,6 +35,20 @@ std::vector<std::string> notes_of(const SimulationTotals& t) {
         fmt::format("warning: joint projection failed {} times; joints may visibly come apart. Reduce "
                     "world.step (now {:g} s).",
                     t.joints_unsolved, t.step_s));
+  for (const auto& [cloth, share] : t.softened_cloths)
+    notes.push_back(fmt::format(
+        "warning: cloth '{}': the stiffness of springs was reduced to {:.2g} of its value, because they are "
+        "too stiff for their step; the cloth stretches up to {:.2g} times as far as `stretch` says. Remove "
+        "\"soften\", reduce \"substep\" or use \"integrator\": \"implicit\".",
+        cloth, share, 1 / share));
+  for (const auto& [cloth, tear] : t.first_tears)
+    notes.push_back(
+        fmt::format("note: cloth '{}' first tore at {:.3f} s at ({:.3g}, {:.3g}, {:.3g}): a thread was "
+                    "{:.3g} times its rest length, under {}",
+                    cloth, tear.time, tear.place.x(), tear.place.y(), tear.place.z(), tear.stretch,
+                    tear.touches_body  ? "the load of a body that it touched"
+                    : tear.by_pressure ? "its pressure"
+                                       : "its own load"));
   const auto add = [&](uint64_t count, const char* what) {
     if (count) notes.push_back(fmt::format(fmt::runtime(what), count));
   };

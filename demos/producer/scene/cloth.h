@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "effects/fabric.h"
 #include "producer/scene/values.h"
 #include "sim/cloth/cloth.h"
 
@@ -24,7 +25,8 @@ using ClothShape = std::variant<GridShape, MeshFile>;
 /// What a cloth has of its own instead of its fabric's.
 struct FabricChanges {
   std::optional<Real> areal_density, stretch, shear, bend, damping, friction, self_friction, thickness, drag,
-      lift, max_stretch, max_shear;
+      lift, max_stretch, max_shear, bend_damping;
+  std::optional<effects::BendModel> bend_model;
 };
 
 enum class Side { left, right, top, bottom };
@@ -86,6 +88,7 @@ struct Cloth {
   Real air_density = 1.2;
   sim::ClothIntegrator integrator = sim::ClothIntegrator::relaxed;
   Real substep = 1.0 / 960;
+  bool soften = false;
   bool visible = true;
   bool casts_shadow = true;
   Placement placement;  ///< its three keys stand directly in the cloth

@@ -1,0 +1,480 @@
+#include "sim/cloth/bending.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include <Eigen/QR>
+
+namespace offstage::sim {
+namespace {
+
+/// Greatest weight of a gradient times the size of the fan: beyond it, its points lie so near to a conic that
+/// they do not determine a quadratic polynomial.
+constexpr Real kLargestWeight = 4;
+/// Of the second derivatives by the jumps of gradients against those by recovered gradients: holds what the
+/// latter do not see, which alternates from point to point.
+constexpr Real kJumpShare = 0.05;
+constexpr int kFilterIterations = 80;
+/// Of a step squared times the square of the fastest frequency: from here on conjugate gradients take so many
+/// iterations that a factorisation is faster, up to a number of points.
+constexpr Real kManyIterations = 20;
+constexpr std::size_t kMostFactorized = 30000;
+/// Of the residual against the right side, squared.
+constexpr Real kFilterTolerance2 = 1e-14;
+/// Curvature times size below which a triangle is flat at rest.
+constexpr Real kFlatAtRest = 1e-7;
+constexpr uint32_t kNoTriangle = ~0u;
+
+using Vec2 = Eigen::Vector2d;
+/// Weights of points in a gradient or in second derivatives (xx, yy, sqrt(2) xy).
+using GradientWeights = std::map<uint32_t, Vec2>;
+using HessianWeights = std::map<uint32_t, Vec3>;
+
+struct FlatPoint {
+  uint32_t point;
+  Vec2 place;
+};
+/// A triangle in the plane into which it was unfolded.
+struct FlatTriangle {
+  uint32_t triangle;
+  std::array<Vec2, 3> corners;
+};
+
+/// Adds scale times the gradient of the linear function on a triangle.
+void add_gradient(const Triangle& t, const std::array<Vec2, 3>& corners, Real scale,
+                  GradientWeights& weights) {
+  const Vec2 b = corners[1] - corners[0], c = corners[2] - corners[0];
+  const Real doubled = b.x() * c.y() - b.y() * c.x();
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec2 side = corners[(k + 2) % 3] - corners[(k + 1) % 3];
+    weights.try_emplace(t[k], Vec2::Zero()).first->second += scale / doubled * Vec2(-side.y(), side.x());
+  }
+}
+
+/// The cloth, and its triangles unfolded into the plane of any of them.
+class Unfolding {
+ public:
+  Unfolding(std::span<const Vec3> rest, std::span<const Triangle> triangles)
+      : rest_(rest), triangles_(triangles) {
+    std::map<std::pair<uint32_t, uint32_t>, std::vector<uint32_t>> edges;
+    first_at_.assign(rest.size(), kNoTriangle);
+    for (uint32_t t = 0; t < triangles.size(); ++t)
+      for (std::size_t k = 0; k < 3; ++k) {
+        edges[std::minmax(triangles[t][k], triangles[t][(k + 1) % 3])].push_back(t);
+        if (first_at_[triangles[t][k]] == kNoTriangle) first_at_[triangles[t][k]] = t;
+      }
+    neighbours_.assign(triangles.size(), {kNoTriangle, kNoTriangle, kNoTriangle});
+    for (uint32_t t = 0; t < triangles.size(); ++t)
+      for (std::size_t k = 0; k < 3; ++k) {
+        const auto& beside = edges[std::minmax(triangles[t][k], triangles[t][(k + 1) % 3])];
+        if (beside.size() == 2) neighbours_[t][k] = beside[0] == t ? beside[1] : beside[0];
+      }
+  }
+
+  /// A triangle as it lies in its own plane: from its first corner along x.
+  FlatTriangle own_plane(uint32_t t) const {
+    const Triangle& own = triangles_[t];
+    const Vec3 ab = rest_[own[1]] - rest_[own[0]], ac = rest_[own[2]] - rest_[own[0]];
+    const Real length = ab.norm(), along = ab.dot(ac) / length;
+    return {t, {Vec2::Zero(), Vec2(length, 0), Vec2(along, ab.cross(ac).norm() / length)}};
+  }
+  uint32_t neighbour(uint32_t t, std::size_t k) const { return neighbours_[t][k]; }
+
+  /// The triangles around a point in the plane of the first of them, and those around their points if `wide`.
+  std::vector<FlatTriangle> fan(uint32_t point, bool wide) const {
+    std::vector<FlatTriangle> found;
+    if (first_at_[point] == kNoTriangle) return found;
+    std::vector<uint32_t> around = {point};
+    found.push_back(own_plane(first_at_[point]));
+    for (int ring = 0; ring < (wide ? 2 : 1); ++ring) {
+      for (std::size_t i = 0; i < found.size(); ++i)
+        for (std::size_t k = 0; k < 3; ++k) {
+          const uint32_t u = neighbours_[found[i].triangle][k];
+          if (u == kNoTriangle || std::ranges::find(found, u, &FlatTriangle::triangle) != found.end())
+            continue;
+          const auto is_near = [&](uint32_t p) { return std::ranges::find(around, p) != around.end(); };
+          if (std::ranges::none_of(triangles_[u], is_near)) continue;
+          found.push_back(unfold(u, found[i], k));
+        }
+      for (const FlatTriangle& f : found)
+        for (uint32_t p : triangles_[f.triangle])
+          if (std::ranges::find(around, p) == around.end()) around.push_back(p);
+    }
+    return found;
+  }
+
+  /// Triangle u beyond edge k of one that lies in the plane already.
+  FlatTriangle unfold(uint32_t u, const FlatTriangle& from, std::size_t k) const {
+    const Triangle& t = triangles_[from.triangle];
+    FlatTriangle result{u, {}};
+    const std::size_t next = (k + 1) % 3, last = (k + 2) % 3;
+    const Vec2 origin = from.corners[k], edge = (from.corners[next] - origin).normalized();
+    Vec2 outward(edge.y(), -edge.x());
+    if (outward.dot(from.corners[last] - origin) > 0) outward = -outward;
+    for (std::size_t j = 0; j < 3; ++j) {
+      const uint32_t point = triangles_[u][j];
+      if (point == t[k] || point == t[next]) {
+        result.corners[j] = from.corners[point == t[k] ? k : next];
+        continue;
+      }
+      const Vec3 side = (rest_[t[next]] - rest_[t[k]]).normalized(), to = rest_[point] - rest_[t[k]];
+      const Real along = side.dot(to), away = side.cross(to).norm();
+      result.corners[j] = origin + along * edge + away * outward;
+    }
+    return result;
+  }
+
+ private:
+  std::span<const Vec3> rest_;
+  std::span<const Triangle> triangles_;
+  std::vector<std::array<uint32_t, 3>> neighbours_;
+  std::vector<uint32_t> first_at_;  // a triangle at each point
+};
+
+/// The gradient at a point, in the plane of the first triangle of its fan.
+struct Recovered {
+  std::vector<FlatTriangle> fan;
+  GradientWeights weights;
+};
+
+/// The weights of points in the gradient at the first of the quadratic polynomial nearest to all; none if
+/// they do not determine one.
+std::optional<GradientWeights> polynomial_gradient(std::span<const FlatPoint> points) {
+  if (points.size() < 6) return {};
+  Real size = 0;
+  for (const FlatPoint& p : points) size = std::max(size, (p.place - points[0].place).norm());
+  Eigen::MatrixXd basis(points.size(), 6);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vec2 p = (points[i].place - points[0].place) / size;
+    basis.row(static_cast<Eigen::Index>(i)) << 1, p.x(), p.y(), p.x() * p.x(), p.y() * p.y(), p.x() * p.y();
+  }
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(basis);
+  if (qr.rank() < 6) return {};
+  const Eigen::MatrixXd inverse = qr.solve(Eigen::MatrixXd::Identity(basis.rows(), basis.rows()));
+  if (inverse.middleRows(1, 2).cwiseAbs().maxCoeff() > kLargestWeight) return {};
+  GradientWeights weights;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    weights[points[i].point] = inverse.col(static_cast<Eigen::Index>(i)).segment<2>(1) / size;
+  return weights;
+}
+
+/// `clamped` of each triangle. At a clamped triangle the gradient is its own: of the others none counts.
+Recovered recover(const Unfolding& unfolding, std::span<const Triangle> triangles,
+                  std::span<const uint8_t> clamped, uint32_t point) {
+  Recovered result{unfolding.fan(point, false), {}};
+  const auto average = [&](auto&& counts) {
+    Real sum = 0;
+    for (const FlatTriangle& f : result.fan) sum += counts(f.triangle) ? 1 : 0;
+    for (const FlatTriangle& f : result.fan)
+      if (counts(f.triangle)) add_gradient(triangles[f.triangle], f.corners, 1 / sum, result.weights);
+  };
+  const auto is_clamped = [&](const FlatTriangle& f) { return clamped[f.triangle] != 0; };
+  if (std::ranges::any_of(result.fan, is_clamped)) {
+    average([&](uint32_t t) { return clamped[t] != 0; });
+    return result;
+  }
+  for (const bool wide : {false, true}) {
+    if (wide) result.fan = unfolding.fan(point, true);
+    std::vector<FlatPoint> points;
+    for (const FlatTriangle& f : result.fan)
+      for (std::size_t k = 0; k < 3; ++k)
+        if (const uint32_t p = triangles[f.triangle][k];
+            std::ranges::find(points, p, &FlatPoint::point) == points.end())
+          points.push_back({p, f.corners[k]});
+    if (points.empty()) return result;
+    std::swap(points.front(), *std::ranges::find(points, point, &FlatPoint::point));
+    if (auto weights = polynomial_gradient(points)) {
+      result.weights = std::move(*weights);
+      return result;
+    }
+  }
+  result.fan = unfolding.fan(point, false);  // a strip too narrow for a polynomial
+  average([](uint32_t) { return true; });
+  return result;
+}
+
+void add_outer_product(const Vec2& a, const Vec2& b, uint32_t point, HessianWeights& weights) {
+  weights.try_emplace(point, Vec3::Zero()).first->second +=
+      Vec3(a.x() * b.x(), a.y() * b.y(), (a.x() * b.y() + a.y() * b.x()) / std::numbers::sqrt2);
+}
+
+/// Second derivatives on a triangle: of the linear function between the gradients recovered at its corners.
+HessianWeights recovered_hessian(const FlatTriangle& own, const Triangle& t,
+                                 std::span<const Recovered> recovered) {
+  HessianWeights weights;
+  GradientWeights shape;
+  add_gradient(t, own.corners, 1, shape);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Recovered& at = recovered[t[k]];
+    const auto in_fan = std::ranges::find(at.fan, own.triangle, &FlatTriangle::triangle);
+    if (in_fan == at.fan.end()) continue;  // another sheet that only touches at this point
+    // From the fan's plane to the triangle's own.
+    const Vec2 there = (in_fan->corners[1] - in_fan->corners[0]).normalized();
+    const Vec2 here = (own.corners[1] - own.corners[0]).normalized();
+    Eigen::Matrix2d turn;
+    turn.col(0) = here * there.x() - Vec2(-here.y(), here.x()) * there.y();
+    turn.col(1) = here * there.y() + Vec2(-here.y(), here.x()) * there.x();
+    for (const auto& [point, w] : at.weights) add_outer_product(shape[t[k]], turn * w, point, weights);
+  }
+  return weights;
+}
+
+/// The same by the jumps of the gradients of the triangles: the boundary integral of the means of both sides
+/// over the area (Onate and Zarate, "Rotation-free triangular plate and shell elements", 2000).
+HessianWeights jump_hessian(const Unfolding& unfolding, const FlatTriangle& own,
+                            std::span<const Triangle> triangles) {
+  HessianWeights weights;
+  const Vec2 b = own.corners[1] - own.corners[0], c = own.corners[2] - own.corners[0];
+  const Real doubled = b.x() * c.y() - b.y() * c.x();
+  for (std::size_t k = 0; k < 3; ++k) {
+    const uint32_t u = unfolding.neighbour(own.triangle, k);
+    if (u == kNoTriangle) continue;
+    const Vec2 edge = own.corners[(k + 1) % 3] - own.corners[k], outward(edge.y(), -edge.x());
+    GradientWeights jump;
+    const FlatTriangle other = unfolding.unfold(u, own, k);
+    // The other side may be wound the other way.
+    add_gradient(triangles[u], other.corners, 1 / doubled, jump);
+    add_gradient(triangles[own.triangle], own.corners, -1 / doubled, jump);
+    for (const auto& [point, w] : jump) add_outer_product(outward, w, point, weights);
+  }
+  return weights;
+}
+
+Real filter_dot(std::span<const Vec4> a, std::span<const Vec4> b) {
+  Real sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i].dot(b[i]);
+  return sum;
+}
+
+}  // namespace
+
+void ClothBending::assign(std::span<const Vec3> rest, std::span<const Triangle> triangles,
+                          std::span<const Real> masses, Real rigidity, Real damping, Real rest_share) {
+  *this = {};
+  rigidity_ = rigidity;
+  damping_ = damping;
+  rest_share_ = rest_share;
+  if (!(rigidity > 0)) return;
+  rest_.assign(rest.begin(), rest.end());
+  triangles_.assign(triangles.begin(), triangles.end());
+  masses_.assign(masses.begin(), masses.end());
+  clamped_.assign(triangles.size(), 0);
+  build();
+}
+
+void ClothBending::set_clamps(std::span<const uint32_t> clamp) {
+  bool changed = false;
+  for (std::size_t t = 0; t < triangles_.size(); ++t) {
+    const Triangle& own = triangles_[t];
+    const uint32_t holder = clamp[own[0]];
+    const bool clamped = holder != 0 && clamp[own[1]] == holder && clamp[own[2]] == holder;
+    changed |= std::exchange(clamped_[t], uint8_t{clamped}) != uint8_t{clamped};
+  }
+  if (changed) build();
+}
+
+void ClothBending::build() {
+  patches_.clear();
+  points_.clear();
+  weights_.clear();
+  factor_.reset();
+  curved_ = false;
+  const Unfolding unfolding(rest_, triangles_);
+  std::vector<Recovered> recovered;
+  for (uint32_t i = 0; i < rest_.size(); ++i)
+    recovered.push_back(recover(unfolding, triangles_, clamped_, i));
+  const auto add_patch = [&](const Patch& patch, const HessianWeights& weights) {
+    patches_.push_back(patch);
+    patches_.back().first = static_cast<uint32_t>(points_.size());
+    patches_.back().count = static_cast<uint32_t>(weights.size());
+    for (const auto& [point, w] : weights) {
+      points_.push_back(point);
+      weights_.push_back(w);
+    }
+  };
+  for (uint32_t t = 0; t < triangles_.size(); ++t) {
+    const Triangle& own = triangles_[t];
+    const Vec3 normal = (rest_[own[1]] - rest_[own[0]]).cross(rest_[own[2]] - rest_[own[0]]);
+    Patch patch{.triangle = t, .area = normal.norm() / 2};
+    if (clamped_[t] || !(patch.area > 0)) continue;
+    const FlatTriangle flat = unfolding.own_plane(t);
+    const HessianWeights smooth = recovered_hessian(flat, own, recovered);
+    for (const auto& [point, w] : smooth)
+      patch.rest += rest_share_ * normal.normalized().dot(rest_[point] - rest_[own[0]]) * w;
+    if (patch.rest.norm() * std::sqrt(patch.area) < kFlatAtRest) patch.rest.setZero();
+    curved_ |= patch.rest != Vec3::Zero();
+    add_patch(patch, smooth);
+    HessianWeights rough = jump_hessian(unfolding, flat, triangles_);
+    for (const auto& [point, w] : smooth) rough.try_emplace(point, Vec3::Zero()).first->second -= w;
+    for (auto& [point, w] : rough) w *= std::sqrt(kJumpShare);
+    patch.rest.setZero();
+    add_patch(patch, rough);
+  }
+  build_matrix();
+}
+
+void ClothBending::build_matrix() {
+  const std::size_t n = masses_.size();
+  std::vector<std::vector<std::pair<uint32_t, Real>>> rows(n);
+  diagonal_.assign(n, 0);
+  for (const Patch& patch : patches_)
+    for (uint32_t a = patch.first; a < patch.first + patch.count; ++a)
+      for (uint32_t b = patch.first; b < patch.first + patch.count; ++b) {
+        const Real q = rigidity_ * patch.area * weights_[a].dot(weights_[b]);
+        if (a == b)
+          diagonal_[points_[a]] += q;
+        else
+          rows[points_[a]].emplace_back(points_[b], q);
+      }
+  row_.assign(1, 0);
+  column_.clear();
+  value_.clear();
+  fastest_ = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    // Entries of both halves add up in the same order, and stay the same to the last bit.
+    std::ranges::stable_sort(rows[i], {}, [](const auto& entry) { return entry.first; });
+    Real sum = std::abs(diagonal_[i]);
+    for (std::size_t k = 0; k < rows[i].size();) {
+      const uint32_t column = rows[i][k].first;
+      Real q = 0;
+      for (; k < rows[i].size() && rows[i][k].first == column; ++k) q += rows[i][k].second;
+      if (q == 0) continue;
+      sum += std::abs(q);
+      column_.push_back(column);
+      value_.push_back(q);
+    }
+    row_.push_back(column_.size());
+    fastest_ = std::max(fastest_, sum / masses_[i]);
+  }
+}
+
+void ClothBending::multiply(std::span<const Vec4> p, Real scale, std::span<Vec4> y) const {
+  for (std::size_t i = 0; i + 1 < row_.size(); ++i) {
+    // Differences: the same of a cloth wherever it is.
+    const Vec4 own = p[i];
+    Vec4 sum = Vec4::Zero();
+    for (std::size_t k = row_[i]; k < row_[i + 1]; ++k) sum += value_[k] * (p[column_[k]] - own);
+    y[i] += scale * sum;
+  }
+}
+
+void ClothBending::add_forces(std::span<const Vec4> x, Real scale, std::span<Vec4> f) const {
+  multiply(x, -scale, f);
+  if (curved_) add_rest_forces(x, scale, f);
+}
+
+/// Of -n b0 in the energy: along the normal at all points of a patch, and at the triangle's own by the
+/// turning of its normal.
+void ClothBending::add_rest_forces(std::span<const Vec4> x, Real scale, std::span<Vec4> f) const {
+  for (const Patch& patch : patches_) {
+    if (patch.rest == Vec3::Zero()) continue;
+    const Triangle& own = triangles_[patch.triangle];
+    const Vec3 a = x[own[0]].head<3>(), b = x[own[1]].head<3>(), c = x[own[2]].head<3>();
+    const Vec3 cross = (b - a).cross(c - a);
+    const Real size2 = cross.squaredNorm();
+    if (!(size2 > 0)) continue;
+    const Vec3 n = cross / std::sqrt(size2);
+    const Real moment = scale * rigidity_ * patch.area;
+    Vec3 curvature = Vec3::Zero();  // b0 : H x
+    for (uint32_t k = patch.first; k < patch.first + patch.count; ++k) {
+      const Real weight = patch.rest.dot(weights_[k]);
+      curvature += weight * (x[points_[k]].head<3>() - a);
+      f[points_[k]] += padded(moment * weight * n);
+    }
+    // The gradient of a corner's barycentric coordinate in the plane is n x (opposite edge) / |cross|.
+    const std::array<Vec3, 3> edges = {c - b, a - c, b - a};
+    for (std::size_t k = 0; k < 3; ++k)
+      f[own[k]] -= padded(moment * n.cross(edges[k]).dot(curvature) / std::sqrt(size2) * n);
+  }
+}
+
+Real ClothBending::energy(std::span<const Vec4> x) const {
+  Real sum = 0;
+  for (const Patch& patch : patches_) {
+    const Triangle& own = triangles_[patch.triangle];
+    const Vec3 a = x[own[0]].head<3>();
+    const Vec3 n = (x[own[1]].head<3>() - a).cross(x[own[2]].head<3>() - a).stableNormalized();
+    Mat3 h = Mat3::Zero();
+    for (uint32_t k = patch.first; k < patch.first + patch.count; ++k)
+      h += (x[points_[k]].head<3>() - a) * weights_[k].transpose();
+    sum += rigidity_ * patch.area / 2 * (h - n * patch.rest.transpose()).squaredNorm();
+  }
+  return sum;
+}
+
+/// Steps of one rate differ in their last bits: in single precision they are one.
+void ClothBending::factorize(std::span<const Real> masses, std::span<const Real> inverse_masses, Real stiff) {
+  const auto rounded = static_cast<float>(stiff);
+  if (factor_ && factor_stiff_ == rounded && std::ranges::equal(factor_masses_, inverse_masses)) return;
+  factor_stiff_ = rounded;
+  factor_masses_.assign(inverse_masses.begin(), inverse_masses.end());
+  const auto moves = [&](std::size_t i) { return inverse_masses[i] > 0; };
+  std::vector<Eigen::Triplet<Real>> entries;
+  for (std::size_t i = 0; i < masses.size(); ++i) {
+    const auto row = static_cast<int>(i);
+    entries.emplace_back(row, row, moves(i) ? masses[i] + Real{rounded} * diagonal_[i] : 1);
+    for (std::size_t k = row_[i]; moves(i) && k < row_[i + 1]; ++k)
+      if (moves(column_[k]))
+        entries.emplace_back(row, static_cast<int>(column_[k]), Real{rounded} * value_[k]);
+  }
+  Eigen::SparseMatrix<Real> matrix(static_cast<int>(masses.size()), static_cast<int>(masses.size()));
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  factor_ = std::make_shared<Factor>(matrix);
+}
+
+void ClothBending::filter_directly(std::span<const Real> inverse_masses, std::span<Vec4> moves) {
+  Eigen::Matrix<Real, Eigen::Dynamic, 3> right(moves.size(), 3);
+  right.setZero();
+  for (std::size_t i = 0; i < moves.size(); ++i)
+    if (inverse_masses[i] > 0) right.row(static_cast<Eigen::Index>(i)) = residual_[i].head<3>().transpose();
+  right = factor_->solve(right).eval();
+  for (std::size_t i = 0; i < moves.size(); ++i)
+    moves[i].head<3>() += right.row(static_cast<Eigen::Index>(i)).transpose();
+}
+
+bool ClothBending::filter(std::span<const Real> masses, std::span<const Real> inverse_masses, Real stiff,
+                          std::span<Vec4> moves) {
+  const std::size_t n = moves.size();
+  residual_.assign(n, Vec4::Zero());
+  image_.resize(n);
+  direction_.resize(n);
+  multiply(moves, -stiff, residual_);  // M moves less (M + stiff K) moves
+  if (stiff * fastest_ > kManyIterations && n <= kMostFactorized) {
+    factorize(masses, inverse_masses, stiff);
+    filter_directly(inverse_masses, moves);
+    return true;
+  }
+  Real scale = 0, rr = 0;
+  // By the masses alone: so each iteration keeps the momentum, however many there are.
+  const auto precondition = [&](const Vec4& r, std::size_t i) { return Vec4(r / masses[i]); };
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!(inverse_masses[i] > 0)) residual_[i].setZero();
+    direction_[i] = precondition(residual_[i], i);
+    rr += residual_[i].dot(direction_[i]);
+    scale += masses[i] * moves[i].squaredNorm();
+  }
+  for (int iteration = 0; iteration < kFilterIterations; ++iteration) {
+    if (!(rr > kFilterTolerance2 * scale)) return true;
+    for (std::size_t i = 0; i < n; ++i) image_[i] = masses[i] * direction_[i];
+    multiply(direction_, stiff, image_);
+    for (std::size_t i = 0; i < n; ++i)
+      if (!(inverse_masses[i] > 0)) image_[i].setZero();
+    const Real step = rr / filter_dot(direction_, image_);
+    Real next = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      moves[i] += step * direction_[i];
+      residual_[i] -= step * image_[i];
+      image_[i] = precondition(residual_[i], i);
+      next += residual_[i].dot(image_[i]);
+    }
+    for (std::size_t i = 0; i < n; ++i) direction_[i] = image_[i] + next / rr * direction_[i];
+    rr = next;
+  }
+  return false;
+}
+
+}  // namespace offstage::sim

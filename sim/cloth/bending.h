@@ -1,0 +1,92 @@
+#pragma once
+/// Bending of a cloth as a thin plate: energy B/2 times the integral of |H x - n b0|^2 over the unstrained
+/// cloth, where H x are the second derivatives of the points along the cloth, n is the normal and b0 the
+/// curvature at rest. Of a sheet that bends without stretching, |H x| is its curvature, so that B is the
+/// flexural rigidity [N m].
+///
+/// The gradient at a point is that of the quadratic polynomial nearest to the point and its neighbours,
+/// unfolded into a plane. Second derivatives on a triangle are those of the linear function between the
+/// gradients at its corners. Both are exact for quadratic shapes on every triangulation. (Angles at edges
+/// alone, as in discrete shells, depend on the mesh: Grinspun et al., "Computing Discrete Shape Operators on
+/// General Meshes", 2006.) The energy is quadratic in the points, as in Bergou et al., "A Quadratic Bending
+/// Model for Inextensible Surfaces", 2006; its matrix is the same for x, y and z, and constant.
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <Eigen/SparseCholesky>
+
+#include "sim/cloth/cloth_points.h"
+
+namespace offstage::sim {
+
+class ClothBending {
+ public:
+  /// `rigidity` B [N m]; 0: no bending. `damping`: time tau [s]; the moment is B (kappa + tau d kappa/dt).
+  /// `rest_share` of the curvature of `rest` is unstressed; the remainder is as if the cloth had been flat.
+  void assign(std::span<const Vec3> rest, std::span<const Triangle> triangles, std::span<const Real> masses,
+              Real rigidity, Real damping, Real rest_share);
+  bool empty() const { return rigidity_ == 0 || patches_.empty(); }
+  Real damping() const { return damping_; }
+
+  /// Triangles with all corners held by the same body do not bend: they are clamped. `clamp` is a number of
+  /// each point; equal numbers other than 0 are one body.
+  void set_clamps(std::span<const uint32_t> clamp);
+
+  /// Upper bound of the eigenvalues of M^-1 K [1/s^2].
+  Real fastest() const { return fastest_; }
+  /// Energy [J].
+  Real energy(std::span<const Vec4> x) const;
+  /// Adds scale times the bending forces at x to f. Points are those of the cloth, from 0.
+  void add_forces(std::span<const Vec4> x, Real scale, std::span<Vec4> f) const;
+  /// Adds scale K p to y: K is the Hessian of the energy without the curvature at rest.
+  void multiply(std::span<const Vec4> p, Real scale, std::span<Vec4> y) const;
+  /// The factor of the unit matrix on the diagonal of K for a point [N/m].
+  Real diagonal(uint32_t point) const { return diagonal_[point]; }
+
+  /// Solves (M + stiff K) moves = M moves: what backward Euler leaves of explicit moves. Those of points
+  /// without an inverse mass stay. By conjugate gradients, or by a factorisation, which is kept for the next
+  /// step, if they would take many iterations. Returns false if they reached the limit of iterations.
+  bool filter(std::span<const Real> masses, std::span<const Real> inverse_masses, Real stiff,
+              std::span<Vec4> moves);
+
+ private:
+  /// Second derivatives xx, yy and sqrt(2) xy on a triangle, as weights of points.
+  struct Patch {
+    uint32_t triangle = 0;
+    uint32_t first = 0, count = 0;  // of points_ and weights_
+    Real area = 0;
+    Vec3 rest = Vec3::Zero();  // unstressed curvature
+  };
+
+  void build();
+  void build_matrix();
+  void factorize(std::span<const Real> masses, std::span<const Real> inverse_masses, Real stiff);
+  void filter_directly(std::span<const Real> inverse_masses, std::span<Vec4> moves);
+  void add_rest_forces(std::span<const Vec4> x, Real scale, std::span<Vec4> f) const;
+
+  Real rigidity_ = 0, damping_ = 0, rest_share_ = 1, fastest_ = 0;
+  bool curved_ = false;
+  std::vector<Triangle> triangles_;
+  std::vector<Real> masses_;
+  std::vector<Vec3> rest_;
+  std::vector<uint8_t> clamped_;  // of each triangle
+  std::vector<Patch> patches_;
+  std::vector<uint32_t> points_;
+  std::vector<Vec3> weights_;
+  std::vector<std::size_t> row_;  // of the matrix, and the end
+  std::vector<uint32_t> column_;
+  std::vector<Real> value_;  // off the diagonal; rows add up to zero with it
+  std::vector<Real> diagonal_;
+  std::vector<Vec4> residual_, direction_, image_;
+  /// Of M + stiff K, without the rows of points that do not move.
+  using Factor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<Real>>;
+  std::shared_ptr<Factor> factor_;
+  float factor_stiff_ = 0;
+  std::vector<Real> factor_masses_;  // inverse
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,94 @@
+#include "sim/cloth/round_contacts.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sim/geometry/closest_points.h"
+
+namespace offstage::sim {
+namespace {
+
+/// A sample of a way every this share of the radius, so that nothing passes between two of them.
+constexpr Real kSampleSpacing = 0.5;
+constexpr int kMaxWaySamples = 256;
+/// Steps to the place of a triangle that is nearest to an axis.
+constexpr int kMaxAxisSteps = 8;
+/// A contact nearer to a corner than this is that of the point.
+constexpr Real kWithin = 0.99;
+
+/// The segment from -half to half along y around which a shape is rounded, and its radius.
+struct Rounding {
+  Real half, radius;
+};
+
+std::optional<Rounding> rounding(const Solid& solid) {
+  if (const auto* s = std::get_if<Sphere>(solid.shape)) return Rounding{0, s->radius};
+  if (const auto* s = std::get_if<Capsule>(solid.shape)) return Rounding{s->height / 2, s->radius};
+  if (const auto* s = std::get_if<Cylinder>(solid.shape)) return Rounding{s->height / 2, s->radius};
+  if (const auto* s = std::get_if<Cone>(solid.shape)) return Rounding{s->height / 2, s->radius / 2};
+  return {};
+}
+
+/// The place of a triangle nearest to the segment, by projections from one to the other in turns.
+TrianglePoint nearest_to_axis(const Rounding& shape, const std::array<Vec3, 3>& t) {
+  const auto on_axis = [&](const Vec3& p) { return Vec3(0, std::clamp(p.y(), -shape.half, shape.half), 0); };
+  Vec3 axis = on_axis((t[0] + t[1] + t[2]) / 3);
+  TrianglePoint nearest = closest_on_triangle(axis, t[0], t[1], t[2]);
+  for (int step = 0; step < kMaxAxisSteps && shape.half > 0; ++step) {
+    const Vec3 next = on_axis(nearest.point);
+    if ((next - axis).squaredNorm() < 1e-6 * shape.radius * shape.radius) break;
+    axis = next;
+    nearest = closest_on_triangle(axis, t[0], t[1], t[2]);
+  }
+  return nearest;
+}
+
+}  // namespace
+
+bool RoundContacts::concerns(const Solid& solid, Real edge, Real thickness) {
+  // Between two points at this distance a straight edge is nearer by edge^2 / (8 (radius + thickness)).
+  const std::optional<Rounding> shape = rounding(solid);
+  return shape && edge * edge > 8 * (shape->radius + thickness) * (1 - kTriangleDistance) * thickness;
+}
+
+std::optional<TriangleContact> RoundContacts::touch(const Triangle& t, const ClothPoints& points,
+                                                    const ClothBody& body) {
+  const std::optional<Rounding> shape = rounding(body.solid());
+  if (!shape) return {};
+  const Real keeps = kTriangleDistance * points.thickness[t[0]];
+  std::array<Vec3, 3> from, to;
+  Real longest = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    from[k] = body.start().point_to_body(points.start_at(t[k]));
+    to[k] = body.end().point_to_body(points.at(t[k]));
+    longest = std::max(longest, (to[k] - from[k]).norm());
+  }
+  const Real samples = std::ceil(longest / (kSampleSpacing * (shape->radius + keeps)));
+  const int count = std::clamp(static_cast<int>(std::min(samples, 1e6)), 1, kMaxWaySamples);
+  for (int i = 1; i <= count; ++i) {
+    const Real s = static_cast<Real>(i) / count;
+    std::array<Vec3, 3> at;
+    for (std::size_t k = 0; k < 3; ++k) at[k] = from[k] + s * (to[k] - from[k]);
+    const TrianglePoint nearest = nearest_to_axis(*shape, at);
+    const SurfaceDistance d = signed_distance(body.solid(), nearest.point);
+    if (d.distance >= keeps) continue;
+    const auto& w = nearest.weights;
+    if (std::max({w[0], w[1], w[2]}) > kWithin) return {};
+    const Vec3 end = w[0] * to[0] + w[1] * to[1] + w[2] * to[2];
+    const Real gap = d.distance + d.normal.dot(end - nearest.point) - keeps;
+    if (gap >= 0) return {};
+    const Vec3 on_body = nearest.point - d.distance * d.normal;
+    return TriangleContact{
+        {w[0], w[1], w[2]}, body.end().point_to_world(on_body), body.end().vector_to_world(d.normal), gap};
+  }
+  return {};
+}
+
+void RoundContacts::solve(std::span<const Triangle> triangles, ClothPoints& points,
+                          std::span<ClothBody> bodies, Real dt, std::vector<VelocityCut>& cuts) const {
+  for (const Near& near : near_)
+    if (const auto contact = touch(triangles[near.triangle], points, bodies[near.body]))
+      separate(*contact, triangles[near.triangle], points, bodies[near.body], dt, cuts);
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,40 @@
+#pragma once
+/// Contact of rounded bodies (spheres, capsules, cylinders, cones) with triangles of cloth. Points alone keep
+/// a triangle out of a body whose radius is large against the triangle; a thin rod or a small ball would pass
+/// between them. The place of a triangle that is nearest to the body's axis is swept along the way of both.
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "sim/cloth/cloth_bodies.h"
+#include "sim/cloth/cloth_tree.h"
+#include "sim/cloth/triangle_contact.h"
+
+namespace offstage::sim {
+
+class RoundContacts {
+ public:
+  /// Whether triangles with edges of up to `edge` at the distance `thickness` of their points from the shape
+  /// may come too near to it, or pass it by, between these.
+  static bool concerns(const Solid& solid, Real edge, Real thickness);
+
+  void clear() { near_.clear(); }
+  /// A triangle and a body that can meet in the sub-step of the world.
+  void add(uint32_t triangle, uint32_t body) { near_.push_back({triangle, body}); }
+  /// Takes triangles out of the bodies in a sub-step of cloth of length dt. Appends to `cuts`.
+  void solve(std::span<const Triangle> triangles, ClothPoints& points, std::span<ClothBody> bodies, Real dt,
+             std::vector<VelocityCut>& cuts) const;
+
+ private:
+  struct Near {
+    uint32_t triangle, body;
+  };
+
+  static std::optional<TriangleContact> touch(const Triangle& t, const ClothPoints& points,
+                                              const ClothBody& body);
+
+  std::vector<Near> near_;
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,270 @@
+/// The part of ClothSystem that shortens the moves of a sub-step until no spring is too long and no cloth has
+/// passed through cloth.
+///
+/// Moves are shortened in the frame of a piece of cloth: that of its mean velocity, or what flies and falls
+/// would be held back in the air. Shortening is the work of forces within the piece. So a piece that hangs on
+/// nothing but dynamic bodies keeps its momentum, together with them.
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include "sim/cloth/cloth_system.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Rounds of shortening moves; what is not right then is put back to where it started.
+constexpr int kMaxRounds = 64;
+/// Of shortening the moves of bodies that turn.
+constexpr int kMaxPasses = 6;
+
+}  // namespace
+
+/// Connects pieces that may cross each other, and those that hang on one body.
+void ClothSystem::find_frames() {
+  pieces_.forget();
+  self_contacts_.for_doubtful([&](const auto& p) { pieces_.join(p[0], p[3]); });
+  for (const Carrier& carrier : carriers_)
+    for (uint32_t i : carrier.points) pieces_.join(carrier.points[0], i);
+  frames_.assign(pieces_.count(), {});
+  for (const Held& held : held_) {
+    if (points_.carried[held.point]) continue;
+    Frame& frame = frame_of(held.point);
+    frame.rests |= !held.body || (frame.leader && frame.leader != held.body);
+    frame.leader = held.body;
+    frame.anchored = true;
+  }
+  for (uint32_t i = 0; i < points_.size(); ++i) {
+    Frame& frame = frame_of(i);
+    frame.total_mass += points_.mass[i];
+    if (cloths_[points_.cloth[i]]->stopped) frame.rests = frame.anchored = true;
+  }
+  for (const Carrier& carrier : carriers_) {
+    Frame& frame = frame_of(carrier.points[0]);
+    frame.total_mass += carrier.body->mass();
+    frame.carries = true;
+  }
+}
+
+/// Whether a point may soon touch a body other than those that its piece hangs on.
+bool ClothSystem::is_near_another(uint32_t point) {
+  const ClothBody* near = contacts_.near_to(point);
+  if (!near) return false;
+  if (contacts_.is_near_several(point)) return true;
+  const Frame& frame = frame_of(point);
+  if (frame.leader) return near != frame.leader;
+  const auto carrier = std::ranges::find(carriers_, near, &Carrier::body);
+  return carrier == carriers_.end() || &frame_of(carrier->points[0]) != &frame;
+}
+
+/// The move of each frame: that of the body which leads it, or the mean one of the piece with the bodies that
+/// hang on it; none if it is near another body. Whether any moves.
+bool ClothSystem::find_drifts() {
+  find_frames();
+  const auto all_rest = [&] { return std::ranges::all_of(frames_, &Frame::rests); };
+  if (all_rest()) return false;
+  const auto add = [&](Frame& frame, Real mass, const Vec4& move) {
+    frame.move += mass * move;
+    frame.mass += mass;
+  };
+  for (uint32_t i = 0; i < points_.size(); ++i) {
+    Frame& frame = frame_of(i);
+    frame.rests = frame.rests || is_near_another(i);
+    if (!frame.leader || points_.holder[i] == frame.leader)
+      add(frame, points_.mass[i], points_.position[i] - points_.start[i]);
+  }
+  for (const Carrier& carrier : carriers_)
+    if (Frame& frame = frame_of(carrier.points[0]); !frame.leader)
+      add(frame, carrier.body->mass(), padded(carrier.body->move()));
+  if (all_rest()) return false;
+  for (Frame& frame : frames_)
+    if (!frame.rests && frame.mass > 0) frame.move /= frame.mass;
+  for (uint32_t i = 0; i < points_.size(); ++i)
+    if (!frame_of(i).rests) drift_[i] = frame_of(i).move;
+  return true;
+}
+
+/// Until nothing is too long and nothing crossed. What is held back in a moving frame goes ways that its
+/// pairs were not sought for, and is looked at once more in the world's.
+void ClothSystem::shorten_moves(Real dt, bool ends_span) {
+  const bool self = ends_span && !self_contacts_.empty();
+  if (limit_.empty() && !self) return;
+  if (self) points_.start.swap(span_start_);                           // the moves of the whole span
+  const std::vector<Vec4>& from = self ? span_start_ : points_.start;  // of the sub-step
+  const auto find_doubtful = [&] {
+    self ? self_contacts_.find_doubtful(points_, span_ * dt, kHorizon, drift_) : self_contacts_.find_none();
+  };
+  shortened_.assign(points_.size(), kWhole);
+  find_doubtful();
+  const bool any_drifts = find_drifts();
+  add_momenta(1, from, dt);
+  if (any_drifts) find_doubtful();
+  bool any = any_drifts ? shorten_in_pieces() : shorten_doubtful(kInWorld);
+  if (any_drifts) {
+    self_contacts_.take_crossed();  // in the world's frame nothing has to
+    drift_.assign(points_.size(), Vec4::Zero());
+    if (any && self) find_doubtful();
+    if (any && self) shorten_doubtful(kInWorld);
+  }
+  for (uint32_t i : self_contacts_.take_crossed()) ++cloths_[points_.cloth[i]]->report.crossings;
+  for (std::size_t i = 0; any && i < points_.size(); ++i) {
+    if (shortened_[i] == kWhole) continue;
+    ++cloths_[points_.cloth[i]]->report.limited;
+    // Its velocity is that of the shortened move, which in a span is not that of the last sub-step.
+    if (self)
+      kick_[i] =
+          (points_.position[i] - points_.start[i]) / (span_ * dt) - (points_.position[i] - from[i]) / dt;
+  }
+  if (self) std::erase_if(cuts_, [&](const VelocityCut& cut) { return shortened_[cut.point] != kWhole; });
+  if (any) {
+    add_momenta(-1, from, dt);
+    give_momenta_back();
+  }
+  if (self) {
+    self_contacts_.end_substep(points_, span_ * dt);
+    points_.start.swap(span_start_);
+  }
+  stop_bodies();
+}
+
+/// In the frames of the pieces; whether any.
+bool ClothSystem::shorten_in_pieces() {
+  const auto shift_starts = [&](Real sign) {
+    for (std::size_t i = 0; i < points_.size(); ++i) points_.start[i] += sign * drift_[i];
+  };
+  shift_starts(1);
+  const bool any = shorten_doubtful(kInPiece);
+  shift_starts(-1);
+  if (!any) return false;
+  // A piece that nothing holds goes on as a whole as it would have.
+  const auto is_loose = [](const Frame& frame) { return !frame.rests && !frame.leader && !frame.carries; };
+  for (uint32_t i = 0; i < points_.size(); ++i)
+    if (Frame& frame = frame_of(i); is_loose(frame))
+      frame.move -= points_.mass[i] / frame.mass * (points_.position[i] - points_.start[i]);
+  for (uint32_t i = 0; i < points_.size(); ++i)
+    if (const Frame& frame = frame_of(i); is_loose(frame)) points_.position[i] += frame.move;
+  return true;
+}
+
+/// Adds (or takes, with the sign) the momenta of free points at the end of the sub-step that began at `from`.
+void ClothSystem::add_momenta(Real sign, std::span<const Vec4> from, Real dt) {
+  for (uint32_t i = 0; i < points_.size(); ++i)
+    if (points_.inverse_mass[i] > 0)
+      frame_of(i).momentum += sign * points_.mass[i] * ((points_.position[i] - from[i]) / dt + kick_[i]);
+  for (const VelocityCut& cut : cuts_)
+    if (points_.inverse_mass[cut.point] > 0)
+      frame_of(cut.point).momentum -= sign * points_.mass[cut.point] / dt * cut.move;
+}
+
+/// What pieces and the bodies that hang on them lost by shortening. Pieces that hang on anything fixed lost
+/// it to that.
+void ClothSystem::give_momenta_back() {
+  for (uint32_t i = 0; i < points_.size(); ++i)
+    if (const Frame& frame = frame_of(i); !frame.anchored && points_.inverse_mass[i] > 0)
+      kick_[i] += frame.momentum / frame.total_mass;
+  for (const Carrier& carrier : carriers_) {
+    const Frame& frame = frame_of(carrier.points[0]);
+    if (frame.anchored) continue;
+    const Vec3 gain = (frame.momentum / frame.total_mass).head<3>();
+    carrier.body->push(carrier.body->mass() * gain, carrier.body->centre());
+    carrier.accelerate(gain, points_);
+  }
+}
+
+/// Shortens moves from where points started; whether any. Notes `how` of the points.
+bool ClothSystem::shorten_doubtful(Shortened how) {
+  bool any = false, turned = false;
+  // The points of a body that turns go no straight ways: they are looked at again.
+  for (int pass = 0; pass < kMaxPasses; ++pass) {
+    turned = false;
+    if (!shorten_straight(how, turned)) break;
+    any = true;
+    if (!turned) break;
+  }
+  return any;
+}
+
+/// The same, as if all ways were straight. `turned` gets whether moves of bodies were shortened.
+bool ClothSystem::shorten_straight(Shortened how, bool& turned) {
+  shares_.assign(points_.size(), 1);
+  bool again = true, any = false;
+  for (int round = 0; again && round < kMaxRounds; ++round) {
+    again = round == 0 ? limit_.shorten_whole_moves(points_, carriers_, shares_, lowered_)
+                       : limit_.shorten(points_, carriers_, shares_, lowered_);
+    again |= self_contacts_.shorten(points_, shares_, lowered_);
+    any |= again;
+  }
+  if (!any) return false;
+  for (uint32_t i : self_contacts_.take_held_back()) ++cloths_[points_.cloth[i]]->report.held_back;
+  any = false;
+  const auto share_of = [&](std::size_t i) { return again ? 0 : shares_[i]; };
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Real share = share_of(i);
+    if (share == 1 || !(points_.inverse_mass[i] > 0)) continue;
+    points_.position[i] = points_.start[i] + share * (points_.position[i] - points_.start[i]);
+    shortened_[i] = how;
+    any = true;
+  }
+  for (Carrier& carrier : carriers_)
+    if (const Real share = share_of(carrier.points[0]); share < 1) {
+      shorten_carrier(carrier, share);
+      any = turned = true;
+    }
+  return any;
+}
+
+/// A body that hangs on cloth which can get no longer goes only a share of its way.
+void ClothSystem::shorten_carrier(Carrier& carrier, Real share) {
+  ClothBody& body = *carrier.body;
+  const uint32_t first = carrier.points[0];
+  Real mass = body.mass();
+  for (uint32_t i : carrier.points) mass += points_.mass[i];
+  const Vec3 change = body.shorten(share, drift_[first].head<3>());
+  frame_of(first).momentum -= mass * padded(change);
+  carrier.accelerate(change, points_);
+  carrier.place(points_);
+}
+
+/// A cloth that gives no more stops bodies as one with those that it hangs on.
+void ClothSystem::stop_bodies() {
+  const std::vector<Real> recoil = recoils();
+  const std::vector<Vec3> taken = contacts_.stop_bodies(points_, shortened_, kick_, recoil);
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    if (!(recoil[c] > 0) || taken[c] == Vec3::Zero()) continue;
+    const Vec3 gain = recoil[c] * taken[c];
+    for (std::size_t i = first_[c], end = i + cloths_[c]->points.size(); i < end; ++i)
+      if (points_.inverse_mass[i] > 0) kick_[i] += padded(gain);
+    for (const Carrier* carrier : carriers_of(c)) {
+      carrier->body->push(carrier->body->mass() * gain, carrier->body->centre());
+      carrier->accelerate(gain, points_);
+    }
+  }
+}
+
+/// The dynamic bodies that hold pins of a cloth.
+std::vector<const Carrier*> ClothSystem::carriers_of(std::size_t cloth) const {
+  std::vector<const Carrier*> found;
+  for (const Carrier& carrier : carriers_)
+    if (std::ranges::any_of(carrier.points, [&](uint32_t i) { return points_.cloth[i] == cloth; }))
+      found.push_back(&carrier);
+  return found;
+}
+
+/// Of each cloth the inverse of its mass and of that of the bodies which hold it; 0 if anything fixed does,
+/// which takes up what it is pushed.
+std::vector<Real> ClothSystem::recoils() const {
+  std::vector<Real> mass;
+  for (const Cloth* cloth : cloths_)
+    mass.push_back(std::accumulate(cloth->masses.begin(), cloth->masses.end(), 0.0));
+  for (const Held& held : held_)
+    if (!points_.carried[held.point]) mass[points_.cloth[held.point]] = std::numeric_limits<Real>::infinity();
+  std::vector<Real> recoil;
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    for (const Carrier* carrier : carriers_of(c)) mass[c] += carrier->body->mass();
+    recoil.push_back(1 / mass[c]);
+  }
+  return recoil;
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,203 @@
+#include "sim/cloth/taut_springs.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace offstage::sim {
+namespace {
+
+/// Share of its elongation beyond the aim that a spring keeps if it began the sub-step there: a body that
+/// hangs on it is stopped, and not thrown back.
+constexpr Real kKeepsBeyondAim = 0.9;
+/// Springs from this share of the allowed elongation on may become too long by what shortens others.
+constexpr Real kNearLimit = 0.3;
+/// Of the greatest excess: what may be left of it.
+constexpr Real kLeftOfExcess = 3e-3;
+constexpr int kMaxSets = 12, kMaxTautIterations = 200;
+
+}  // namespace
+
+TautSprings::TautSprings(const ClothPoints& points, std::span<const Carrier> carriers)
+    : points_(points), place_(points.size(), kNone) {
+  for (const Carrier& carrier : carriers) {
+    const Mat6 carried = carrier.carried(points);
+    const auto body = static_cast<uint32_t>(bodies_.size());
+    bodies_.push_back({carrier.body, &carrier, carried, carrier.body->mobility(carried)});
+    for (uint32_t i : carrier.points) {
+      place_[i] = static_cast<uint32_t>(places_.size());
+      places_.push_back({i, body, points.at(i) - carrier.body->centre()});
+    }
+  }
+}
+
+uint32_t TautSprings::place_of(uint32_t point) {
+  if (place_[point] == kNone) {
+    place_[point] = static_cast<uint32_t>(places_.size());
+    places_.push_back({point, kNone, Vec3::Zero()});
+  }
+  return place_[point];
+}
+
+Real TautSprings::compliance_at(uint32_t place, const Vec4& direction) const {
+  const Place& at = places_[place];
+  if (at.body == kNone) return points_.inverse_mass[at.point];
+  const Vec3 u = direction.head<3>();
+  const Vec6 push = (Vec6() << u, at.arm.cross(u)).finished();
+  return push.dot(bodies_[at.body].mobility * push);
+}
+
+void TautSprings::add_row(uint32_t first, uint32_t second, const Vec4& direction, Real excess) {
+  const Real compliance = compliance_at(first, direction) + compliance_at(second, direction);
+  if (!(compliance > 0)) return;
+  greatest_ = std::max(greatest_, excess);
+  rows_.push_back({first, second, direction, excess, compliance, excess > 0});
+}
+
+void TautSprings::add(const SpringLimit& l) {
+  if (l.tears) return;
+  const Vec4 d = points_.position[l.a] - points_.position[l.b];
+  const Real near = l.rest + kNearLimit * (l.longest - l.rest);
+  if (d.squaredNorm() <= near * near) return;
+  const Real length = d.norm();
+  if (!(length > 0)) return;
+  any_too_long_ |= length > l.longest;
+  const Real start = std::min((points_.start[l.a] - points_.start[l.b]).norm(), l.longest);
+  const Real aim = l.rest + kStretchAim * (l.longest - l.rest);
+  add_row(place_of(l.b), place_of(l.a), d / length,
+          length - aim - kKeepsBeyondAim * std::max(start - aim, 0.0));
+}
+
+void TautSprings::add(const BodyContact& contact) {
+  auto at = std::ranges::find(bodies_, contact.body, &MovedBody::body);
+  if (at == bodies_.end())
+    at = bodies_.insert(at, {contact.body, nullptr, Mat6::Zero(), contact.body->mobility(Mat6::Zero())});
+  const auto spot = static_cast<uint32_t>(places_.size());
+  places_.push_back(
+      {kNone, static_cast<uint32_t>(at - bodies_.begin()), contact.on_body - at->body->centre()});
+  add_row(place_of(contact.point), spot, padded(contact.normal), -contact.gap);
+}
+
+/// Sums impulses on places and bodies.
+void TautSprings::gather(std::span<const Real> impulses) {
+  moves_.assign(places_.size(), Vec4::Zero());
+  impulses_.assign(bodies_.size(), Vec6::Zero());
+  for (std::size_t k = 0; k < rows_.size(); ++k) {
+    if (impulses[k] == 0) continue;
+    moves_[rows_[k].first] += impulses[k] * rows_[k].direction;
+    moves_[rows_[k].second] -= impulses[k] * rows_[k].direction;
+  }
+  for (std::size_t k = 0; k < places_.size(); ++k) {
+    if (places_[k].body == kNone) continue;
+    const Vec3 push = moves_[k].head<3>();
+    impulses_[places_[k].body] += (Vec6() << push, places_[k].arm.cross(push)).finished();
+  }
+}
+
+/// y = J W J^T x.
+void TautSprings::multiply(std::span<const Real> x, std::span<Real> y) {
+  gather(x);
+  for (std::size_t b = 0; b < bodies_.size(); ++b) impulses_[b] = bodies_[b].mobility * impulses_[b];
+  for (std::size_t k = 0; k < places_.size(); ++k) {
+    const Place& at = places_[k];
+    if (at.body == kNone)
+      moves_[k] *= points_.inverse_mass[at.point];
+    else
+      moves_[k] = padded(impulses_[at.body].head<3>() + impulses_[at.body].tail<3>().cross(at.arm));
+  }
+  for (std::size_t k = 0; k < rows_.size(); ++k)
+    y[k] = rows_[k].direction.dot(moves_[rows_[k].first] - moves_[rows_[k].second]);
+}
+
+/// Conjugate gradients on the rows that act. False: the limit of iterations was reached.
+bool TautSprings::solve_acting() {
+  const std::size_t n = rows_.size();
+  Real worst = 0;
+  const auto scale = [&] {
+    Real sum = 0;
+    worst = 0;
+    for (std::size_t k = 0; k < n; ++k) {
+      if (!rows_[k].acts) residual_[k] = 0;
+      scaled_[k] = residual_[k] / rows_[k].compliance;
+      sum += residual_[k] * scaled_[k];
+      worst = std::max(worst, std::abs(residual_[k]));
+    }
+    return sum;
+  };
+  multiply(lambda_, image_);
+  for (std::size_t k = 0; k < n; ++k) residual_[k] = rows_[k].excess - image_[k];
+  Real rz = scale();
+  direction_ = scaled_;
+  for (int i = 0; i < kMaxTautIterations; ++i) {
+    if (worst <= kLeftOfExcess * greatest_) return true;
+    multiply(direction_, image_);
+    Real curvature = 0;
+    for (std::size_t k = 0; k < n; ++k) curvature += direction_[k] * image_[k];
+    if (!(curvature > 0)) return true;
+    const Real step = rz / curvature;
+    for (std::size_t k = 0; k < n; ++k) {
+      lambda_[k] += step * direction_[k];
+      residual_[k] -= step * image_[k];
+    }
+    const Real next = scale(), ratio = next / rz;
+    rz = next;
+    for (std::size_t k = 0; k < n; ++k) direction_[k] = scaled_[k] + ratio * direction_[k];
+  }
+  return false;
+}
+
+/// Takes out rows that act the wrong way, and takes in those with an excess; whether there were any.
+bool TautSprings::change_set() {
+  bool changed = false;
+  for (std::size_t k = 0; k < rows_.size(); ++k)
+    if (rows_[k].acts && lambda_[k] < 0) {
+      rows_[k].acts = false;
+      lambda_[k] = 0;
+      changed = true;
+    }
+  multiply(lambda_, image_);
+  for (std::size_t k = 0; k < rows_.size(); ++k)
+    if (!rows_[k].acts && rows_[k].excess - image_[k] > kLeftOfExcess * greatest_) {
+      rows_[k].acts = true;
+      changed = true;
+    }
+  return changed;
+}
+
+void TautSprings::solve() {
+  for (auto* values : {&lambda_, &residual_, &direction_, &image_, &scaled_}) values->assign(rows_.size(), 0);
+  for (int set = 0; set < kMaxSets; ++set)
+    if (!solve_acting() || !change_set()) break;
+  for (Real& impulse : lambda_) impulse = std::max(impulse, 0.0);
+  // What the limits of sets and iterations left unsolved must not add energy: the best length along the
+  // result.
+  multiply(lambda_, image_);
+  Real gain = 0, curvature = 0;
+  for (std::size_t k = 0; k < rows_.size(); ++k) {
+    gain += lambda_[k] * rows_[k].excess;
+    curvature += lambda_[k] * image_[k];
+  }
+  const Real scale = curvature > 0 ? std::clamp(gain / curvature, 0.0, 1.0) : 0;
+  for (Real& impulse : lambda_) impulse *= scale;
+}
+
+void TautSprings::apply(ClothPoints& points, Real dt) {
+  gather(lambda_);
+  for (std::size_t k = 0; k < places_.size(); ++k) {
+    const Place& at = places_[k];
+    if (at.body != kNone) continue;
+    if (points.inverse_mass[at.point] > 0)
+      points.position[at.point] += points.inverse_mass[at.point] * moves_[k];
+    else
+      points.pull[at.point] += moves_[k];
+  }
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    if (impulses_[b] == Vec6::Zero()) continue;
+    const Vec6 impulse = impulses_[b] / dt;
+    if (bodies_[b].carrier)
+      bodies_[b].carrier->pull(impulse, impulse, points);
+    else
+      bodies_[b].body->pull(impulse, impulse, bodies_[b].carried);
+  }
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,95 @@
+#pragma once
+/// Springs at their greatest length, and contacts of their points with dynamic bodies, solved for together:
+/// impulses that shorten all springs to what is aimed at and take points out of bodies, linearised. So a
+/// heavy body is stopped by the whole of a taut cloth, not by the points alone that it touches.
+///
+/// With the rows of J the directions of springs and contacts, and W the inverse masses of points and bodies,
+/// the impulses are the lambda >= 0 of the linear complementarity problem J W J^T lambda >= excess. Conjugate
+/// gradients on the set of rows that act, which changes until none acts the wrong way and none outside is
+/// left with an excess.
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "sim/cloth/cloth_bodies.h"
+#include "sim/cloth/cloth_points.h"
+
+namespace offstage::sim {
+
+/// Share of the allowed elongation that corrections aim at: at the limit itself every outward move would have
+/// to be taken back whole, and the cloth would freeze there.
+inline constexpr Real kStretchAim = 0.97;
+
+struct SpringLimit {
+  uint32_t a, b;       ///< points
+  Real rest, longest;  ///< [m]
+  bool tears = false;  ///< it tears before, between steps of the world, and stops no body
+};
+
+/// A point of cloth at a dynamic body.
+struct BodyContact {
+  uint32_t point;
+  ClothBody* body;
+  Vec3 normal, on_body;  ///< of the body's surface, and on it [m]
+  Real gap;              ///< by which the point may still approach; negative: it has to move away [m]
+};
+
+class TautSprings {
+ public:
+  /// The arguments must stay valid.
+  TautSprings(const ClothPoints& points, std::span<const Carrier> carriers);
+
+  /// Adds a spring if it is at its limit or near it.
+  void add(const SpringLimit& limit);
+  void add(const BodyContact& contact);
+  bool any_too_long() const { return any_too_long_; }
+  void solve();
+  /// Moves points and bodies by the impulses; they act through a sub-step of length dt. The impulses on
+  /// points that are pinned to anything else are added to their `pull`.
+  void apply(ClothPoints& points, Real dt);
+
+ private:
+  static constexpr uint32_t kNone = ~0u;
+
+  struct MovedBody {
+    ClothBody* body;
+    const Carrier* carrier;  // or null
+    Mat6 carried, mobility;
+  };
+  /// What a row acts on: a point, which a body may carry, or a spot on a body.
+  struct Place {
+    uint32_t point, body;
+    Vec3 arm;  // from the body's centre
+  };
+  /// Acts on one place along the direction, and on the other against it.
+  struct Row {
+    uint32_t first, second;  // places
+    Vec4 direction;
+    Real excess;      // what is to be gained along the direction [m]
+    Real compliance;  // J W J^T of the row alone [1/kg]
+    bool acts;        // in the set
+  };
+
+  uint32_t place_of(uint32_t point);
+  Real compliance_at(uint32_t place, const Vec4& direction) const;
+  void add_row(uint32_t first, uint32_t second, const Vec4& direction, Real excess);
+  void gather(std::span<const Real> impulses);
+  void multiply(std::span<const Real> x, std::span<Real> y);
+  bool solve_acting();
+  bool change_set();
+
+  const ClothPoints& points_;
+  std::vector<MovedBody> bodies_;
+  std::vector<Vec6> impulses_;   // on the bodies
+  std::vector<uint32_t> place_;  // of each point; kNone: none yet
+  std::vector<Place> places_;
+  std::vector<Vec4> moves_;  // impulses, then moves, of each place
+  std::vector<Row> rows_;
+  std::vector<Real> lambda_;  // [kg m]
+  std::vector<Real> residual_, direction_, image_, scaled_;
+  Real greatest_ = 0;  // excess [m]
+  bool any_too_long_ = false;
+};
+
+}  // namespace offstage::sim

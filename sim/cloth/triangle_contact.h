@@ -1,0 +1,29 @@
+#pragma once
+/// A contact of a place within a triangle of cloth with a body.
+
+#include <array>
+#include <vector>
+
+#include "sim/cloth/cloth_bodies.h"
+#include "sim/cloth/cloth_contacts.h"
+#include "sim/cloth/cloth_points.h"
+
+namespace offstage::sim {
+
+/// Of the cloth's thickness, which its points keep, the distance that places within triangles keep: flat
+/// parts of bodies do not feel them at all.
+inline constexpr Real kTriangleDistance = 0.5;
+
+struct TriangleContact {
+  std::array<Real, 3> weights;  ///< of the triangle's corners
+  Vec3 on_body;                 ///< in the world, at the end of the sub-step
+  Vec3 normal;                  ///< from the body to the triangle
+  Real gap;                     ///< to the distance that it keeps [m]; < 0
+};
+
+/// Moves the triangle's points and the body apart in a sub-step of cloth of length dt, with Coulomb friction.
+/// An overlap of its start is taken back slowly, and without giving velocities. Appends to `cuts`.
+void separate(const TriangleContact& contact, const Triangle& t, ClothPoints& points, ClothBody& body,
+              Real dt, std::vector<VelocityCut>& cuts);
+
+}  // namespace offstage::sim
