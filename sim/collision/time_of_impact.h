@@ -4,7 +4,6 @@
 /// greatest rate at which it can shrink give a time before which the solids cannot touch. Advancing to this
 /// time again and again approaches the impact from the safe side, so solids never pass through each other,
 /// however fast or thin they are.
-/// the impact from the safe side, so nothing is ever passed through, however fast or thin.
 ///
 /// The rate is that along the separating direction. The contribution of rotation follows from the support of
 /// both solids, and its change is bounded by the largest acceleration. For all points of both solids
