@@ -67,8 +67,8 @@ struct JointDef {
   Real lower = -kFree, upper = kFree;
   Real swing = kFree;  ///< greatest tilt of a spherical joint's axis, or angle of a universal joint about its
                        ///< second axis [rad]
-  Real friction =
-      0;  ///< dry friction: greatest torque or force against motion in each free direction [N m] or [N]
+  /// Dry friction: greatest torque or force against motion in each free direction [N m] or [N].
+  Real friction = 0;
   Real damping = 0;        ///< viscous damping, in each free direction [N m s] or [N s/m]
   Motor motor = {};        ///< for revolute, prismatic and distance joints
   Real max_force = kFree;  ///< the joint breaks at a larger force [N]

@@ -25,7 +25,7 @@ struct Placed {
   Placed inverse() const { return {rotation.transpose(), -(rotation.transpose() * translation)}; }
 };
 
-// --- Axes
+// Axes
 
 /// Gap between the boxes along each axis; negative where they overlap.
 struct Gaps {
@@ -110,7 +110,7 @@ std::optional<Separation> edge_separation(const Convex& a, const Convex& b, cons
   return s;
 }
 
-// --- Faces
+// Faces
 
 /// A face of a box, perpendicular to `axis`. Its corners are numbered as by Convex::vertex().
 struct Face {

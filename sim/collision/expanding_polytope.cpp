@@ -244,8 +244,8 @@ class TetrahedronMaker {
   }
 
  private:
-  static constexpr Real kWide =
-      1e-6;  // Share of the size: corners nearer than this to the line or plane of others are replaced.
+  // Share of the size: corners nearer than this to the line or plane of others are replaced.
+  static constexpr Real kWide = 1e-6;
 
   const Vec3& w(std::size_t i) const { return s_.points[i].w; }
 

@@ -39,7 +39,7 @@ struct Body {
   }
 };
 
-// --- Clipping
+// Clipping
 
 /// A corner of the part of the incident feature over the reference face, and the side that leaves it: a side
 /// of the incident feature, or of the reference face if kMaxCorners is added.
@@ -131,7 +131,7 @@ class Clipping {
   Polygon part_;
 };
 
-// --- Kinds of contact
+// Kinds of contact
 
 /// Sine of the angle between the normal of a face of `reference` and that of the separation; more than
 /// kMaxTilt if the face cannot give the normal.

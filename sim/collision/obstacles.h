@@ -51,8 +51,8 @@ struct Obstacle {
       Vec3::Zero();       ///< direction of the surface's friction axis, in the solid's frame; zero: none
   uint32_t body = 0;      ///< the world's index of the body
   Real inverse_mass = 0;  ///< inverse mass [1/kg]; 0: particles do not move it
-  Mat3 inverse_inertia =
-      Mat3::Zero();  ///< about the centre of mass, world axes at the end of the sub-step [1/(kg m^2)]
+  /// About the centre of mass, world axes at the end of the sub-step [1/(kg m^2)].
+  Mat3 inverse_inertia = Mat3::Zero();
   Vec3 centre = Vec3::Zero();  ///< centre of mass in the solid's frame
   /// For a dynamic body: velocity of the centre of mass and angular velocity at the end of the sub-step,
   /// world axes.

@@ -60,7 +60,7 @@ SupportingFeature segment_feature(const Vec3& p, uint32_t p_tag, const Vec3& q, 
   return f;
 }
 
-// --- Box
+// Box
 
 Vec3 box_extent(const Vec3& half, const Vec3& d, Real slack) {
   Vec3 extent = 2 * half;
@@ -106,7 +106,7 @@ SupportingFeature box_edge(const Convex& c, const Vec3& d, Real slack) {
   return segment_feature(c.vertex(corner), corner, c.vertex(other), other, d);
 }
 
-// --- Triangle
+// Triangle
 
 /// The side of the triangle that faces d; an edge if it has no area.
 SupportingFeature triangle_face(const Convex& c, const Vec3& d, Real slack) {
@@ -144,7 +144,7 @@ SupportingFeature triangle_edge(const Convex& c, const Vec3& d, Real slack) {
   return best.count > 0 ? best : point_feature(top, corner);
 }
 
-// --- Polyhedron
+// Polyhedron
 
 /// Selects the corners of a planar set of points that are farthest in evenly spaced directions: their hull
 /// except for corners so blunt that they fall between two directions.
@@ -235,7 +235,7 @@ SupportingFeature polyhedron_face(const ConvexPolyhedron& p, const Vec3& d, Real
   return flat_part(p, face);
 }
 
-// --- Solids of revolution
+// Solids of revolution
 
 /// Radial direction of d, away from the axis.
 Vec3 outward(const Vec3& d) {

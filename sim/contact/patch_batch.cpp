@@ -209,7 +209,7 @@ void set_mobility(PatchBatch& p) {
   }
 }
 
-// --- Filling
+// Filling
 
 /// Clears only the members that are used, because a batch is large.
 void clear(PatchBatch& p, const PatchBatch::Index& patches, std::span<const ContactPatch> all) {
@@ -287,7 +287,7 @@ Vector normal_wrench(const PatchBatch& p) {
   return f;
 }
 
-// --- Solving
+// Solving
 
 /// Updates the friction impulses and applies the change to the twist `u`. Returns the change.
 Vector solve_friction(PatchBatch& p, Groups& u) {
@@ -371,7 +371,7 @@ FloatLanes greatest(const Vector& v) {
   return lane_max(lane_abs(v.x), lane_max(lane_abs(v.y), lane_abs(v.z)));
 }
 
-// --- Patches of one point, as those of round bodies: no moments
+// Patches of one point, as those of round bodies: no moments
 
 /// A velocity or impulse at the point, along n, t and k.
 using Single = Vector;

@@ -97,7 +97,7 @@ uint32_t relaxation_substeps(Real duration) {
   return static_cast<uint32_t>(std::max(4.0, std::ceil(1920 * duration - 1e-6)));
 }
 
-// --- Stages
+// Stages
 
 /// Adds one range for each colour, and one for the batches that share bodies, which are solved in order.
 /// Colours of a single block do not justify a stage each and are solved in order, too.
