@@ -90,7 +90,7 @@ TEST(Cloth, AStiffOneIsStableAtOneStepPerFrame) {
     const ClothHandle cloth = world.add_cloth(def);
     for (int i = 0; i < 120; ++i) {
       world.step(1.0 / 24);
-      // Motion is only what its fall gave.
+      // All motion is due to its fall.
       ASSERT_LE(world.energy().kinetic + world.energy().potential, 1e-9);
     }
     EXPECT_TRUE(world.cloth_report(cloth).finite);

@@ -28,7 +28,7 @@ std::string answer_of(const std::filesystem::path& folder, const std::function<s
   return {answer.bytes().begin(), answer.bytes().end()};
 }
 
-/// What a job that has been taken over would try; the names of what it could do.
+/// Attempts of a compromised job; returns the names of those that succeeded.
 std::string harm(const std::filesystem::path& file, pid_t parent) {
   std::string done;
   const auto note = [&](const char* name, bool worked) { done += worked ? std::string(name) + " " : ""; };
@@ -84,7 +84,7 @@ TEST(ConfinedChild, FloodsAndCrashesAreErrorsOfTheFile) {
   EXPECT_THROW(answer_of(scratch.path(),
                          []() -> std::string {
                            ::raise(SIGSEGV);
-                           ::_exit(3);  // raise() was refused: an end, too
+                           ::_exit(3);  // raise() was refused; this also ends the child
                          }),
                FileError);
 }
