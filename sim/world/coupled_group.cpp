@@ -271,6 +271,19 @@ void CoupledGroup::step(const Integrator& integrator, Real t, Real h, Integrator
   store(x_, p_);
 }
 
+Real CoupledGroup::kinetic_energy() const {
+  const std::span<const Real> x = x_, p = p_;
+  Real sum = 0;
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    const RigidMotion m = stage(i, x, p).motion;
+    sum += (m.velocity.dot(vec3(p, kBodyP * i)) + m.angular_velocity.dot(vec3(p, kBodyP * i + 3))) / 2;
+  }
+  for (const Group& g : groups_)
+    for (std::size_t k = 0; k < g.members.size(); ++k)
+      sum += g.mass[k] * vec3(p, particle_p(g.offset + k)).squaredNorm() / 2;
+  return sum;
+}
+
 CoupledGroup::EnergyRate CoupledGroup::energy_rate(Real t, IntegratorWorkspace& work) const {
   const std::span<const Real> x = x_, p = p_;
   work.dp.resize(p.size());
@@ -345,12 +358,12 @@ void CoupledGroup::advance(const Integrator& integrator, Real t, Real h, int dep
     if (is_free) keep_angular_momentum(j.articulation->bodies(), common);
   }
   load(x_, p_);
-  if (keeps_energy) limit_energy(before.kinetic + std::max(done, 0.0) + allowed, work);
+  if (keeps_energy) limit_energy(before.kinetic + std::max(done, 0.0) + allowed);
 }
 
 /// Slows the links of each articulation down against each other until the kinetic energy is at most `most`.
-void CoupledGroup::limit_energy(Real most, IntegratorWorkspace& work) {
-  const Real excess = energy_rate(0, work).kinetic - most;
+void CoupledGroup::limit_energy(Real most) {
+  const Real excess = kinetic_energy() - most;
   if (!(excess > 0)) return;
   Real internal = 0;
   for (const Jointed& j : articulations_) internal += internal_energy(*j.articulation);

@@ -111,10 +111,11 @@ class CoupledGroup final : public DynamicSystem {
   struct EnergyRate {
     Real kinetic = 0, power = 0, from_rest = 0;
   };
+  Real kinetic_energy() const;
   EnergyRate energy_rate(Real t, IntegratorWorkspace& work) const;
   void advance(const Integrator& integrator, Real t, Real h, int depth, int& halvings,
                IntegratorWorkspace& work);
-  void limit_energy(Real most, IntegratorWorkspace& work);
+  void limit_energy(Real most);
   void set_free_forces(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const;
   void add_group(const WorldState& world, ParticleSystem& system);
   void add_pair_forces(const WorldState& world);
