@@ -11,6 +11,7 @@
 #include <Eigen/LU>
 
 #include "sim/contact/friction_lcp.h"
+#include "sim/contact/jointed_sweeps.h"
 #include "sim/contact/proximal_newton.h"
 #include "sim/contact/rough_collision.h"
 
@@ -27,7 +28,7 @@ constexpr Real kKeptEnergy = 1e-9;        ///< of what restitution would add: so
 constexpr std::size_t kDense = 24;        ///< contacts of a cluster that are solved by pivoting
 constexpr Real kAcceptedResidual = 1e-6;  ///< of the velocities, for an impact
 constexpr Real kRoughResidual = 1e-3;     ///< likewise: an answer with more than this left over is none
-constexpr uint32_t kCollisionSweeps = 200, kPlasticSweeps = 400;
+constexpr uint32_t kCollisionSweeps = 200, kPlasticSweeps = 400, kJointedSweeps = 60;
 /// With a bounded effort: contacts that are still solved by pivoting; updates of single contacts, by sweeps
 /// or in a sequence (60 ns each); solutions to find the restitution; what one with joints may take [ns].
 constexpr std::size_t kFewContacts = 8, kUpdates = 6'000;
@@ -272,16 +273,19 @@ class Cluster {
   }
 
   /// Targets may contradict each other: a body cannot bounce off one face and be stopped by the opposite one.
-  /// Those of a plastic impact never do among bodies that are not driven; and whatever projected Gauss-Seidel
-  /// leaves of it from no impulses on, each of its steps dissipates.
+  /// Those of a plastic impact never do among bodies that are not driven; and each step of Gauss-Seidel from
+  /// no impulses on dissipates.
   ContactWork solve_plastic(ContactWork work) {
     work.add(solve_with(0));
     work.solves = work.fallbacks = 1;
     work.residual = 0;
-    if (joints_.empty() && (residual(bodies_, contacts_) > kRoughResidual * fastest_ || added_energy() > 0)) {
+    if (residual(bodies_, contacts_) > kRoughResidual * fastest_ || added_energy() > 0) {
       std::copy(before_.begin(), before_.end(), bodies_.begin());
       for (Contact& c : contacts_) c.impulse.setZero();
-      work.iterations += projected_gauss_seidel(bodies_, contacts_, kPlasticSweeps, kRounding * fastest_);
+      work.iterations +=
+          joints_.empty()
+              ? projected_gauss_seidel(bodies_, contacts_, kPlasticSweeps, kRounding * fastest_)
+              : jointed_gauss_seidel(bodies_, contacts_, joints_, kJointedSweeps, kRounding * fastest_);
     }
     if (added_energy() > 0) shrink();
     work.residual = residual(bodies_, contacts_);

@@ -102,7 +102,7 @@ void StepDoubling::attempt(const DynamicSystem& system, Real t, Real h, std::spa
 
 void StepDoubling::accept(IntegratorWorkspace& work) const {
   // The whole step's error is 2^order times that of the two halves, to leading order.
-  const Real share = 1.0 / ((1 << order_) - 1);
+  const Real share = 1.0 / ((1 << inner_.order()) - 1);
   array(work.next_x) += share * array(work.error_x);
   array(work.next_p) += share * array(work.error_p);
 }
