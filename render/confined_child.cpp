@@ -19,7 +19,7 @@
 namespace offstage::render {
 namespace {
 
-constexpr int kAnswerExit = 40, kMessageExit = 41;  // other codes are not the child's
+constexpr int kAnswerExit = 40, kMessageExit = 41;  // other codes do not come from this code
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
 ProcessLimits limits_of(uint64_t file_bytes) {
@@ -29,13 +29,13 @@ ProcessLimits limits_of(uint64_t file_bytes) {
           .memory_bytes = std::min(kMemory + kTimesFile * file_bytes, kMostMemory)};
 }
 
-/// The child: leaves an answer or a message in the memory file.
+/// Runs in the child: writes an answer or a message to the memory file.
 [[noreturn]] void become_child(const ConfinedWork& work, const ProcessLimits& limits, int memory,
                                const std::function<void(int)>& job) {
   std::string message;
   try {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    const int nowhere = ::open("/dev/null", O_RDWR);  // for the prints of importers
+    const int nowhere = ::open("/dev/null", O_RDWR);  // for the output of importers
     for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, stream);
     close_descriptors(memory);
     limit_process(limits);
@@ -61,9 +61,9 @@ ProcessLimits limits_of(uint64_t file_bytes) {
                   " s of processor time to read; it is broken or too large");
 }
 
-/// Whether a child no longer works: of the last minute it used less than a hundredth. On a machine that is
-/// busy with other work it gets less than all of its time, but not so little. Its processor time has a limit
-/// of its own.
+/// Detects a child that does not work any more: in the last minute it used less than a hundredth of the time.
+/// On a busy machine a child gets less than all of its time, but not that little. Its processor time has a
+/// separate limit.
 class Standstill {
  public:
   Standstill(pid_t child, std::chrono::seconds interval) : interval_(interval) {
@@ -90,7 +90,7 @@ class Standstill {
   std::chrono::nanoseconds cpu_{0};
 };
 
-/// Waits for the child; its status.
+/// Waits for the child and returns its status.
 int wait_status(pid_t child, const ConfinedWork& work) {
   Standstill standstill(child, work.standstill);
   bool stopped = false, still = false;

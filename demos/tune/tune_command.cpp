@@ -19,7 +19,7 @@
 namespace offstage::tune {
 namespace {
 
-/// Opens the address in the browser of a desktop, if there is one; the browser is no child of ours.
+/// Opens the address in the desktop's browser, if there is one. The browser is not a child of this process.
 void open_browser(const std::string& address) {
   if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY")) return;
   const pid_t child = fork();
@@ -53,7 +53,7 @@ int tune_command(const producer::TuneOptions& options) {
   settings.decompositions = options.scene.decompositions();
   const auto threads = producer::simulation_threads(options.threads);
   render::pin_environment(producer::threads_or_all(options.threads), options.gl);
-  render::Context();  // a library that is missing is found before anything is promised
+  render::Context();  // reports a missing library before the address is printed
   Session session(options.scene.file, std::move(settings), options.scene.allow);
   const HttpServer server(session, options.port);
   fmt::print("{}\n", server.address());

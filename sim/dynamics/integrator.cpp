@@ -108,7 +108,7 @@ class RungeKutta4 final : public Integrator {
     array(work.sum_x).setZero();
     array(work.sum_p).setZero();
 
-    // k1..k4: where in the step each slope is taken, and its weight in the mean.
+    // k1..k4: time of each slope within the step, and its weight in the mean.
     constexpr Real kReach[] = {0, 0.5, 0.5, 1}, kWeight[] = {1.0 / 6, 1.0 / 3, 1.0 / 3, 1.0 / 6};
     for (int k = 0; k < 4; ++k) {
       if (k > 0) {

@@ -1,4 +1,4 @@
-/// The solution of ParticleContacts and what follows from it.
+/// Solution of ParticleContacts, and the resulting motion.
 
 #include <algorithm>
 #include <array>
@@ -11,16 +11,16 @@
 namespace offstage::sim {
 namespace {
 
-/// Sweeps of Gauss-Seidel end when one changes no velocity by more than this [m/s], or after so much work:
-/// few contacts are solved exactly, many go on from the sub-step before.
+/// Sweeps of Gauss-Seidel end when one changes no velocity by more than this [m/s], or after a limit of work.
+/// Few contacts are solved exactly; many contacts converge over several sub-steps.
 constexpr Real kTolerance = 1e-7;
 constexpr std::size_t kMaxContactVisits = 1'000'000;
 constexpr std::size_t kMinSweeps = 30, kMaxSweeps = 1000;
-/// Overlap of particles below this share of their radii is left, and of more this share is taken away in a
-/// sub-step: by moving them, so that velocities do not know of it.
+/// An overlap of particles below kSlop times their radii is not removed. Of the rest, kPush is removed in a
+/// sub-step by moving the particles, without changing velocities.
 constexpr Real kSlop = 0.002, kPush = 0.2;
 constexpr int kMaxSlides = 4;
-/// Parts of a slab that are gone through side by side: contacts that follow each other should not wait for
+/// Number of parts of a slab that are processed alternately, so that consecutive contacts do not wait for
 /// each other's velocities.
 constexpr uint32_t kStreams = 4;
 constexpr std::size_t kRelaxationChunk = ParticleSearch::kChunk;
@@ -59,7 +59,8 @@ void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads,
     }
 }
 
-/// The impulse's change that brings a contact with relative velocity u to its target, within Coulomb's cone.
+/// Change of the impulse that brings a contact with the relative velocity u to its target, within Coulomb's
+/// cone.
 template <class Contact>
 Vec3 correct(Contact& c, const Vec3& u) {
   const Vec3 before = c.impulse(), normal = c.normal();
@@ -76,8 +77,8 @@ Vec3 correct(Contact& c, const Vec3& u) {
 
 }  // namespace
 
-/// Calls on_pair for every pair and on_surface for every contact with a body; those that share a particle
-/// never at the same time, and always in the same order.
+/// Calls on_pair for every pair and on_surface for every contact with a body, in an order that does not
+/// depend on threads. Contacts that share a particle are never processed at the same time.
 template <class OnPair, class OnSurface>
 void ParticleContacts::for_each_contact(OnPair&& on_pair, OnSurface&& on_surface) {
   const std::size_t slabs = (order_.layer_begin.size() - 1) / 2;
@@ -143,7 +144,7 @@ void ParticleContacts::relax() {
   }
 }
 
-/// Where the impulses bring the particles, each from its time on.
+/// Moves the particles by their impulses, each from the start of its contact.
 void ParticleContacts::displace(std::span<Vec3> end, std::span<uint8_t> touched) {
   const Real h = step_->h;
   const auto press = [&](const Contact& c, uint32_t i, Real sign) {
@@ -167,7 +168,7 @@ void ParticleContacts::displace(std::span<Vec3> end, std::span<uint8_t> touched)
   });
 }
 
-/// Takes some of the overlap away.
+/// Removes a part of the overlaps.
 void ParticleContacts::push_apart(std::span<Vec3> end) {
   for_each_contact(
       [&](const Pair& c, std::size_t) {
@@ -182,7 +183,7 @@ void ParticleContacts::push_apart(std::span<Vec3> end) {
       [](const Surface&, std::size_t) {});
 }
 
-/// No particle ends its sub-step inside a body or beyond it.
+/// Moves particles that would end the sub-step inside a body or beyond it.
 void ParticleContacts::keep_outside(std::span<Vec3> end, std::vector<Reaction>& reactions,
                                     std::vector<ParticleStrike>& strikes) {
   const auto for_each = [&](auto&& f) {
@@ -262,7 +263,7 @@ void ParticleContacts::keep_outside(uint32_t i, NearObstacles& near, Vec3& end, 
   }
 }
 
-/// Tells of what a particle got by its contacts; those of pairs tell both.
+/// Records the collisions of a particle's contacts; those of pairs are recorded for both particles.
 void ParticleContacts::report(uint32_t i, const Vec3& end, Found& found) const {
   const auto strike = [&](const auto& c, uint32_t particle, const Vec3& normal) {
     if (c.is_impact && c.acts())

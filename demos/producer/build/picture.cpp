@@ -19,18 +19,18 @@ namespace {
 using Eigen::Affine3f;
 using Eigen::Vector3f;
 
-/// Half the edge of the square that stands for an infinite plane [m]: from 300 m up, it still reaches to
-/// where its horizon hides it.
+/// Half the edge of the square that represents an infinite plane [m]. For an eye up to 300 m high, its edge
+/// is hidden by the horizon's fade.
 constexpr float kGroundHalfSize = 256'000;
-constexpr float kGroundTexture_m = 2000;  // of one copy of its texture
+constexpr float kGroundTexture_m = 2000;  // size of one copy of its texture
 
 Affine3f affine(const Vec3& position, const Quat& orientation, Real scale = 1) {
   return Eigen::Translation3f(position.cast<float>()) * orientation.cast<float>() *
          Eigen::Scaling(to_float(scale));
 }
 
-/// The mesh of a primitive, and the numbers that tell it from others. Boxes get a small bevel, so that their
-/// edges catch light.
+/// The mesh of a primitive, and the numbers that identify it. Boxes get a small bevel, so that their edges
+/// catch light.
 render::Mesh mesh_of(const sim::Sphere& s) {
   return render::make_sphere(to_float(s.radius));
 }
@@ -193,7 +193,7 @@ render::MaterialHandle Picture::cloth_material(const Cloth& cloth, const ModelLi
   if (const auto it = std::ranges::find(scene_.materials, cloth.material, &Material::name);
       it != scene_.materials.end()) {
     render::Fabric fabric = m.fabric;
-    fabric.back_color.reset();  // that of another front
+    fabric.back_color.reset();  // it belongs to another front
     if (const std::optional<FabricLook>& look = it->fabric) {
       fabric = {.weave = look->weave,
                 .thread = to_float(look->thread),
@@ -260,7 +260,7 @@ void Picture::add_shape(const Body& body, const ModelLibrary& models, std::vecto
         if constexpr (std::is_same_v<S, MeshFile>) {
           add_model(shape.file, affine(Vec3::Zero(), Quat::Identity(), shape.scale), body, models, parts);
         } else {
-          // A plane is the ground: it takes shadows and throws none.
+          // A plane is the ground: it receives shadows and casts none.
           const bool casts = body.casts_shadow && !std::is_same_v<S, sim::Plane>;
           parts.push_back({stage_.add_instance(primitive(shape), material(body.material, models), casts),
                            Affine3f::Identity()});
@@ -337,7 +337,8 @@ render::Image Picture::draw(const Snapshot& previous, const Snapshot& current,
   std::ranges::fill(sum_.rgba, 0.f);
   for (int i = 0; i < n; ++i) {
     if (i > 0 && stop && stop()) return {};
-    // Sub-frames sit in the middle of equal parts of the time the shutter is open, which ends with the frame.
+    // Sub-frames are in the middle of equal parts of the time during which the shutter is open, which ends at
+    // the frame's time.
     const float open =
         to_float(scene_.render.shutter) * (1 - (static_cast<float>(i) + 0.5f) / static_cast<float>(n));
     const float w = n == 1 || &previous == &current ? 1 : 1 - open;

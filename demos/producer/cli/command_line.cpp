@@ -135,7 +135,7 @@ void add_threads(CLI::App& command, int& threads) {
       ->check(CLI::Range(1, 256));
 }
 
-/// `bare`: the command is left out, and -o with it.
+/// `bare`: for a command line without the command, which has no -o.
 CLI::App* add_render(CLI::App& app, RenderOptions& render, bool bare) {
   CLI::App* command = app.add_subcommand("render", "Simulate a scene and draw it: frames or a video");
   add_scene(*command, render.scene);
@@ -352,18 +352,19 @@ CLI::App* add_sweep(CLI::App& app, SweepOptions& sweep) {
   return command;
 }
 
-/// A program started with a standard stream closed would otherwise find its own files under that number.
+/// Opens closed standard streams, because otherwise the program's own files would get their numbers.
 void open_standard_streams() {
   for (int fd = 0; fd <= 2; ++fd) {
     if (fcntl(fd, F_GETFD) >= 0) continue;
-    // Takes the lowest free number. Standard output cannot be written then: results are not lost in silence.
+    // Takes the lowest free number. Writing to standard output then fails, so results are not lost silently.
     open("/dev/null", fd == 2 ? O_WRONLY : O_RDONLY);
     if (fd == 1) note_closed_output();
   }
 }
 
-/// Memory can run out where no exception may pass: in a thread, or in a destructor while another exception is
-/// on its way. That ends with the same line and code; files in the making keep their temporary names.
+/// Called when memory is exhausted where no exception can pass: in a thread, or in a destructor during
+/// another exception. The program ends with the same line and exit code; unfinished files keep their
+/// temporary names.
 [[noreturn]] void end_program() {
   try {
     if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
@@ -376,19 +377,19 @@ void open_standard_streams() {
   std::abort();
 }
 
-/// Before objects of static lifetime are made, which need memory, too.
+/// Installed before the construction of static objects, which needs memory, too.
 [[gnu::constructor(101)]] void install_end() {
   std::set_terminate(end_program);
 }
 
-/// Results that could not be written are a failure, whatever the command did.
+/// If results could not be written, the command has failed.
 int flushed(int code) {
   if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
   log("offstage: standard output: {}\n", std::strerror(errno));
   return code == kOk ? kRunFailed : code;
 }
 
-/// The exit code of a command; what it throws becomes a message and a code of its own.
+/// Returns the exit code of a command; an exception becomes a message and an exit code of its own.
 int reported(const std::function<int()>& command) {
   try {
     return command();
@@ -444,7 +445,7 @@ bool is_scene_name(std::string_view argument) {
   return argument == kStandardInput || argument.ends_with(".json");
 }
 
-/// Whether the arguments name a scene where a command should be: then it is rendered.
+/// Whether the arguments have a scene in place of a command; it is then rendered.
 bool lacks_command(const std::vector<const char*>& arguments, const std::vector<std::string>& commands) {
   if (arguments.size() < 2) return false;
   const std::string_view first = arguments[1];
@@ -456,7 +457,7 @@ bool lacks_command(const std::vector<const char*>& arguments, const std::vector<
          std::any_of(arguments.begin() + 1, arguments.end(), is_scene_name);
 }
 
-/// What is wrong with a word that is no command; empty if there is none.
+/// Error message for a word that is not a command; empty if there is none.
 std::string wrong_command(const std::vector<const char*>& arguments,
                           const std::vector<std::string>& commands) {
   if (arguments.size() < 2 || std::string_view(arguments[1]).starts_with('-')) return {};

@@ -26,7 +26,7 @@ std::set<std::string> pictures_in(const fs::path& folder) {
   return names;
 }
 
-/// One picture against another; prints a line.
+/// Compares two pictures; prints a line.
 bool same_picture(const fs::path& a, const fs::path& b, const std::string& report) {
   const render::Image x = render::read_image(a), y = render::read_image(b);
   if (x.width_px != y.width_px || x.height_px != y.height_px) {
@@ -128,7 +128,7 @@ int bless_command(const BlessOptions& options) {
   const int threads = threads_or_all(options.threads);
   const auto control = simulation_threads(options.threads);
   render::pin_environment(threads, options.gl);
-  std::set<std::string> taken;  // by scenes of this command
+  std::set<std::string> taken;  // names used by scenes of this command
   for (const std::string& file : options.scenes) {
     const LoadedScene scene = load({.file = file,
                                     .set = {},

@@ -1,5 +1,5 @@
 #pragma once
-/// The keys of how a scene is filmed: camera, light, environment, picture, time.
+/// The keys of the film: camera, light, environment, picture, time.
 
 #include <array>
 

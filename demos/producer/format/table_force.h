@@ -1,5 +1,5 @@
 #pragma once
-/// The keys of forces: fields in a region, moving air, a hand, explosions, forces between particles.
+/// The keys of forces: fields in a region, moving air, grabs, explosions, forces between particles.
 
 #include <array>
 

@@ -1,5 +1,5 @@
 #pragma once
-/// The keys of overlays: what is drawn over the picture to show how the simulation sees it.
+/// The keys of overlays: lines and text over the picture that show the state of the simulation.
 
 #include <array>
 

@@ -1,5 +1,5 @@
 #pragma once
-/// The keys of what is simulated: the world, materials, bodies with their shapes and placement, springs.
+/// The keys of simulated objects: the world, materials, bodies with their shapes and placement, springs.
 /// Those of particles are in table_particles.h, those of forces in table_force.h.
 
 #include <array>

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Keeps what it is given.
+/// Stores the frames in memory.
 class MemorySink : public render::FrameSink {
  public:
   explicit MemorySink(std::vector<GoldenFrame>& frames) : frames_(frames) {}
@@ -53,13 +53,13 @@ std::string escape_html(const std::string& text) {
   return out;
 }
 
-/// What a golden says it was made of; empty if it does not, or is none.
+/// The source recorded in a golden; empty if there is none, or if the file is not a golden.
 std::string source_of(const fs::path& golden) {
   const std::optional<JsonObject> json = read_json_file(golden);
   return json ? json->text("source") : "";
 }
 
-/// A name as a file name: it stays in its folder, and needs no quotes.
+/// Converts a name to a file name that stays in its folder and needs no quotes.
 std::string file_name_of(const std::string& name) {
   std::string out;
   for (const char c : name) {
@@ -70,7 +70,7 @@ std::string file_name_of(const std::string& name) {
   return out.empty() ? "scene" : out;
 }
 
-/// The golden in the folder that was made of a source.
+/// The golden in the folder with this source.
 std::optional<std::string> golden_made_of(const fs::path& folder, const std::string& source) {
   std::vector<std::string> names;
   if (!fs::is_directory(folder)) return {};
@@ -81,7 +81,7 @@ std::optional<std::string> golden_made_of(const fs::path& folder, const std::str
   return *std::ranges::min_element(names);
 }
 
-/// One frame's line of the verdict; sets `pass`.
+/// The line of the verdict for one frame; sets `pass`.
 std::string judge_frame(const GoldenFrame& expected, const GoldenFrame& actual, bool same_class, bool& pass) {
   const bool same_state = expected.state_hash == actual.state_hash;
   if (same_state && expected.pixel_hash == actual.pixel_hash) return "identical";
@@ -131,7 +131,7 @@ GoldenPlace find_golden(const fs::path& folder, const LoadedScene& scene, const 
       return place;
     }
   }
-  // The name belongs to another scene: folders are put in front until it is one of its own.
+  // The name belongs to another scene: folder names are prepended until it is unique.
   std::string name = file_name_of(file.stem().string());
   for (fs::path above = file.parent_path(); above.has_relative_path(); above = above.parent_path()) {
     name = file_name_of(above.filename().string()) + "-" + name;
@@ -157,7 +157,7 @@ Golden draw_golden(const LoadedScene& scene, int threads, const GoldenStates& st
   if (job.frames[0] == job.frames[1]) job.frames.pop_back();
   std::vector<Problem> warnings;
   const ModelLibrary models(scene.scene, scene.folder, DecompositionCache(),
-                            warnings);  // nothing from outside
+                            warnings);  // no files from outside
   MemorySink sink(golden.frames);
   const RunStats stats = render_frames(scene, models, job, sink, progress);
   if (stats.interrupted_by) throw Interrupted(stats.interrupted_by);

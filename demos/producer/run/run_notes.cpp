@@ -7,7 +7,7 @@
 namespace offstage::producer {
 namespace {
 
-/// Names the body that was concerned most often.
+/// The body in the note is the one with most fall-backs.
 std::string note_of_rough_contacts(const SimulationTotals& t) {
   const auto& [name, count] =
       *std::ranges::max_element(t.rough_bodies, {}, [](const auto& entry) { return entry.second; });

@@ -55,7 +55,7 @@ struct Series {
   std::function<double(const FrameFigures&)> value;
 };
 
-/// A round number; what rounding leaves of zero is zero.
+/// A rounded number; -0 is written as 0.
 std::string label(double value) {
   return fmt::format("{:g}", std::abs(value) < 1e-12 ? 0.0 : value);
 }
@@ -66,7 +66,7 @@ std::vector<double> ticks(double low, double high, int count) {
   const double share = rough / power;
   const double step = power * (share <= 1 ? 1 : share <= 2 ? 2 : share <= 5 ? 5 : 10);
   std::vector<double> result;
-  // The margin takes the last one in where rounding has put it a hair beyond.
+  // The margin includes the last one if rounding puts it slightly beyond the range.
   for (double k = std::ceil(low / step); k * step <= high + 1e-6 * step; ++k) result.push_back(k * step);
   return result;
 }
@@ -105,7 +105,7 @@ std::string plot(const std::string& title, const std::vector<FrameFigures>& figu
     svg += fmt::format("<polyline fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\" points=\"", s.color);
     for (const FrameFigures& f : figures) svg += fmt::format("{:.1f},{:.1f} ", x(f.time), y(s.value(f)));
     svg += "\"/>\n";
-    if (all.size() == 1) continue;  // the title says what it is
+    if (all.size() == 1) continue;  // the title names it
     svg += fmt::format("<text x=\"{}\" y=\"18\" text-anchor=\"end\" style=\"fill:{}\">{}</text>\n", legend,
                        s.color, s.name);
     legend -= 110;
