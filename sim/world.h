@@ -127,7 +127,7 @@ struct StepReport {
   IntegratorReport integration;  ///< of the motion without contacts
 
   Real joint_error = 0;  ///< greatest residual of a joint's constraint at the end of a motion [m], [rad]
-  uint64_t joints_unsolved = 0;  ///< times that joint projection failed
+  uint64_t joints_unsolved = 0;  ///< failed joint projections, and joint motions of limited energy
   /// Joints that exceeded their breaking force or torque in this step.
   std::vector<JointHandle> joints_broken;
 

@@ -44,7 +44,7 @@ struct Joint {
 
 /// Statistics of joints in a step, for StepReport.
 struct JointTally {
-  uint64_t unsolved = 0;  ///< systems that could not be factored, and failed joint projections
+  uint64_t unsolved = 0;  ///< failed factorizations and projections, motions of limited energy
   Real error = 0;         ///< greatest residual of a constraint [m]; of angles [rad]
 
   void add(const JointTally& t) {

@@ -11,6 +11,7 @@
 #include <Eigen/LU>
 
 #include "sim/contact/friction_lcp.h"
+#include "sim/contact/jointed_sweeps.h"
 #include "sim/contact/proximal_newton.h"
 #include "sim/contact/rough_collision.h"
 
@@ -30,7 +31,7 @@ constexpr std::size_t kDense = 24;  ///< clusters of at most this many contacts 
 constexpr Real kAcceptedResidual = 1e-6;  ///< share of the velocities: accepted residual of an impact
 /// Share of the velocities: a result with a larger residual is rejected.
 constexpr Real kRoughResidual = 1e-3;
-constexpr uint32_t kCollisionSweeps = 200, kPlasticSweeps = 400;
+constexpr uint32_t kCollisionSweeps = 200, kPlasticSweeps = 400, kJointedSweeps = 60;
 /// Limits with bounded effort: contacts still solved by pivoting; updates of single contacts, by sweeps or in
 /// a sequence (60 ns each); solutions in the search for the restitution; cost of a solution with joints [ns].
 constexpr std::size_t kFewContacts = 8, kUpdates = 6'000;
@@ -279,16 +280,19 @@ class Cluster {
   }
 
   /// Targets may contradict each other: a body cannot bounce off one face and be stopped by the opposite one.
-  /// Those of a plastic impact never contradict each other without driven bodies. Projected Gauss-Seidel from
-  /// zero impulses is also safe, because each of its steps dissipates energy.
+  /// Those of a plastic impact never contradict each other without driven bodies. Gauss-Seidel from zero
+  /// impulses is also safe, because each of its steps dissipates energy.
   ContactWork solve_plastic(ContactWork work) {
     work.add(solve_with(0));
     work.solves = work.fallbacks = 1;
     work.residual = 0;
-    if (joints_.empty() && (residual(bodies_, contacts_) > kRoughResidual * fastest_ || added_energy() > 0)) {
+    if (residual(bodies_, contacts_) > kRoughResidual * fastest_ || added_energy() > 0) {
       std::copy(before_.begin(), before_.end(), bodies_.begin());
       for (Contact& c : contacts_) c.impulse.setZero();
-      work.iterations += projected_gauss_seidel(bodies_, contacts_, kPlasticSweeps, kRounding * fastest_);
+      work.iterations +=
+          joints_.empty()
+              ? projected_gauss_seidel(bodies_, contacts_, kPlasticSweeps, kRounding * fastest_)
+              : jointed_gauss_seidel(bodies_, contacts_, joints_, kJointedSweeps, kRounding * fastest_);
     }
     if (added_energy() > 0) shrink();
     work.residual = residual(bodies_, contacts_);

@@ -38,8 +38,8 @@ class AdaptiveIntegrator : public Integrator {
 /// the error, and also corrects the result.
 class StepDoubling final : public AdaptiveIntegrator {
  public:
-  StepDoubling(const Integrator& inner, int order)
-      : AdaptiveIntegrator(order + 1), inner_(inner), order_(order) {}
+  explicit StepDoubling(const Integrator& inner) : AdaptiveIntegrator(inner.order() + 1), inner_(inner) {}
+  int order() const override { return inner_.order() + 1; }
 
  private:
   void attempt(const DynamicSystem& system, Real t, Real h, std::span<const Real> x, std::span<const Real> p,
@@ -47,7 +47,6 @@ class StepDoubling final : public AdaptiveIntegrator {
   void accept(IntegratorWorkspace& work) const override;
 
   const Integrator& inner_;
-  int order_;
 };
 
 /// The embedded pair of orders 5 and 4 by Dormand and Prince ("A family of embedded Runge-Kutta formulae",
@@ -55,6 +54,7 @@ class StepDoubling final : public AdaptiveIntegrator {
 class DormandPrince final : public AdaptiveIntegrator {
  public:
   DormandPrince() : AdaptiveIntegrator(5) {}
+  int order() const override { return 5; }
 
  private:
   void begin(const DynamicSystem& system, Real t, std::span<const Real> x, std::span<const Real> p,

@@ -10,6 +10,7 @@ namespace offstage::sim {
 /// either, the last iterate is used and counted as missed.
 class ImplicitEuler final : public Integrator {
  public:
+  int order() const override { return 1; }
   void step(const DynamicSystem& system, Real t, Real h, std::span<Real> x, std::span<Real> p,
             IntegratorWorkspace& work) const override;
 };

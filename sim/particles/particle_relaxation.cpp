@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 
 #include <oneapi/tbb/parallel_for.h>
 
@@ -23,6 +24,40 @@ constexpr int kMaxSlides = 4;
 /// each other's velocities.
 constexpr uint32_t kStreams = 4;
 constexpr std::size_t kRelaxationChunk = ParticleSearch::kChunk;
+
+/// What resting particles do to a body in a sub-step.
+struct Load {
+  const Obstacle* obstacle;
+  Vec3 impulse = Vec3::Zero(), angular_impulse = Vec3::Zero();
+  Real share = 1;
+};
+
+/// A body that moves against the push of particles is stopped at most; besides it gets no more momentum than
+/// the particles of `mass` that touch something have `brought` with them, as seen from the body.
+void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads, Real brought, Real mass) {
+  for (const Reaction& r : reactions)
+    if (const auto load = loads.find(r.body); load != loads.end()) {
+      load->second.impulse += r.impulse;
+      load->second.angular_impulse += r.angular_impulse;
+    }
+  for (auto& [body, load] : loads) {
+    const Obstacle& o = *load.obstacle;
+    // Of a share s of the load: the energy changes by s times the first and s^2 times the second.
+    const Real first = o.end_velocity.dot(load.impulse) + o.end_spin.dot(load.angular_impulse);
+    const Real second = (o.inverse_mass * load.impulse.squaredNorm() +
+                         load.angular_impulse.dot(o.inverse_inertia * load.angular_impulse)) /
+                        2;
+    const Real size = load.impulse.norm();
+    const Real stops = second > 0 ? std::max(0.0, -first) / (2 * second) : 1;
+    const Real bears = size > 0 ? (brought + mass * o.end_velocity.norm()) / size : 1;
+    load.share = std::min(1.0, stops + bears);
+  }
+  for (Reaction& r : reactions)
+    if (const auto load = loads.find(r.body); load != loads.end()) {
+      r.impulse *= load->second.share;
+      r.angular_impulse *= load->second.share;
+    }
+}
 
 /// Change of the impulse that brings a contact with the relative velocity u to its target, within Coulomb's
 /// cone.
@@ -163,10 +198,37 @@ void ParticleContacts::keep_outside(std::span<Vec3> end, std::vector<Reaction>& 
     if (particles_[i].hits_bodies) keep_outside(i, near, end[i], found);
   });
   for_each([&](uint32_t i, NearObstacles&, Found& found) { report(i, end[i], found); });
+  const std::size_t first = reactions.size();
   for (const Found& found : found_) {
     reactions.insert(reactions.end(), found.reactions.begin(), found.reactions.end());
     strikes.insert(strikes.end(), found.strikes.begin(), found.strikes.end());
   }
+
+  // A particle that is caught between a body and something else has no solution, and its impulses grow with
+  // each sweep.
+  std::map<uint32_t, Load> loads;
+  for (const Surface& s : surfaces_)
+    if (s.acts() && s.obstacle->is_dynamic()) loads.try_emplace(s.body, Load{s.obstacle});
+  if (loads.empty()) return;
+  std::vector<Vec3> momentum(particles_.size());  // before the contacts acted
+  std::vector<uint8_t> acts(particles_.size(), 0);
+  for (std::size_t i = 0; i < particles_.size(); ++i)
+    momentum[i] = particles_[i].mass * particles_[i].velocity;
+  const auto take_back = [&](const Contact& c, uint32_t i, Real sign) {
+    momentum[i] -= sign * c.impulse();
+    acts[i] |= c.acts();
+  };
+  for (const Pair& c : pairs_) {
+    take_back(c, c.a, 1);
+    take_back(c, c.b, -1);
+  }
+  for (const Surface& c : surfaces_) take_back(c, c.particle, 1);
+  Real brought = 0, mass = 0;
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    brought += acts[i] ? momentum[i].norm() : 0;
+    mass += acts[i] ? particles_[i].mass : 0;
+  }
+  limit_loads(std::span(reactions).subspan(first), loads, brought, mass);
 }
 
 void ParticleContacts::keep_outside(uint32_t i, NearObstacles& near, Vec3& end, Found& found) {

@@ -31,10 +31,10 @@ std::vector<std::string> notes_of(const SimulationTotals& t) {
   for (const std::string& joint : t.broken_joints)
     notes.push_back(fmt::format("note: joint '{}' broke", joint));
   if (t.joints_unsolved)
-    notes.push_back(
-        fmt::format("warning: joint projection failed {} times; joints may visibly come apart. Reduce "
-                    "world.step (now {:g} s).",
-                    t.joints_unsolved, t.step_s));
+    notes.push_back(fmt::format(
+        "warning: joints could not be followed {} times; they may come apart or slow down visibly. Reduce "
+        "world.step (now {:g} s).",
+        t.joints_unsolved, t.step_s));
   const auto add = [&](uint64_t count, const char* what) {
     if (count) notes.push_back(fmt::format(fmt::runtime(what), count));
   };
