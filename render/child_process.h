@@ -1,6 +1,6 @@
 #pragma once
 /// A program run as a child in its own process group, so that a Ctrl-C meant for us does not end it first.
-/// The kernel kills it if the thread that started it ends, or its whole process. Private to render.
+/// The kernel kills it if the thread that started it ends, or its whole process.
 
 #include <chrono>
 #include <optional>

@@ -9,7 +9,7 @@
 
 namespace offstage::producer {
 
-/// The folder `installed` of ../share/offstage beside the program, else `source` in the source that it was
+/// The folder `installed` of the one that OFFSTAGE_DATA names, else of ../share/offstage beside the program, else `source` in the source that it was
 /// compiled from; empty if neither is there.
 std::filesystem::path shipped_folder(std::string_view installed, std::string_view source);
 

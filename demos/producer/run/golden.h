@@ -61,7 +61,8 @@ void write_golden(const std::filesystem::path& folder, const Golden& golden);
 
 struct Verdict {
   bool pass = true;
-  std::string text;  ///< what was found, one line per frame
+  std::string text;        ///< what was found, one line per frame
+  std::string difference;  ///< the first line about a difference; empty if there is none
 };
 
 /// Compares; with the same fingerprint exactly, else within the tolerance.
