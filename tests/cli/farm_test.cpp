@@ -44,8 +44,10 @@ TEST(Farm, AFailedChunkIsTriedAgainAndResumed) {
   EXPECT_EQ(resumed.code, 0) << resumed.err;
   EXPECT_EQ(read_file(folder / "out.farm/tries"), "x\nx\nx\n");
   ASSERT_EQ(offstage("render " + tiny_scene() + " -o direct/####.png -q", folder.path()).code, 0);
-  for (const auto& [name, bytes] : contents(folder / "direct"))
-    if (name.ends_with(".png")) EXPECT_EQ(read_file(folder / "out" / name), bytes) << name;
+  for (const auto& [name, bytes] : contents(folder / "direct")) {
+    if (!name.ends_with(".png")) continue;
+    EXPECT_EQ(read_file(folder / "out" / name), bytes) << name;
+  }
 }
 
 TEST(Farm, AChangedSceneIsNotMixedIn) {

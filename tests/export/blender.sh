@@ -25,5 +25,5 @@ run wall.glb wall.csv "$pictures/wall-blender.png"
 film drape drape.glb
 run drape.glb drape.csv "$pictures/drape-blender.png"
 film fountain fountain/####.ply
-"$offstage" export "$source/demos/scenes/fountain.json" --duration 1 -o fountain.csv -q
-run fountain fountain.csv "$pictures/fountain-blender.png"
+"$offstage" export "$source/demos/scenes/fountain.json" --duration 1 -o fountain-table.csv -q
+run fountain fountain-table.csv "$pictures/fountain-blender.png"

@@ -16,6 +16,10 @@ import numpy as np
 
 TOLERANCE = 1e-5
 
+# The glTF importer of Debian 12's Blender 3.4 uses a name that Debian 12's numpy 1.24 no longer has.
+if not hasattr(np, "bool"):
+    np.bool = bool
+
 
 def y_up(v):
     return np.array([v[0], v[2], -v[1]])
@@ -98,20 +102,18 @@ def show_particles(places):
     sun = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))
     sun.data.energy, sun.rotation_euler = 3, (0.6, 0.3, 0)
     bpy.context.collection.objects.link(sun)
-    world = bpy.data.worlds.new("world")
-    world.color = (0.3, 0.4, 0.6)
-    scene.world = world
 
 
 def draw(picture):
     scene = bpy.context.scene
     if scene.camera is None:
         scene.camera = next(thing for thing in bpy.data.objects if thing.type == "CAMERA")
-    for thing in bpy.data.objects:
-        if thing.type == "LIGHT" and thing.data.type == "SUN":
-            thing.data.energy = min(thing.data.energy, 4)
+    sky = bpy.data.worlds.new("sky")
+    sky.use_nodes = True
+    sky.node_tree.nodes["Background"].inputs["Color"].default_value = (0.5, 0.65, 0.9, 1)
+    scene.world = sky
     scene.render.engine = "CYCLES"
-    scene.cycles.samples = 8
+    scene.cycles.samples, scene.cycles.use_denoising = 16, False
     scene.cycles.device = "CPU"
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 320, 180, 100
     scene.render.filepath = picture

@@ -417,8 +417,9 @@ class GltfExport : public FilmExport {
       add_node({{"name", name}, {"extensions", {{"KHR_lights_punctual", {{"light", lights_.size() - 1}}}}}},
                tracks);
     };
-    // A white surface has the radiance L under an irradiance of pi L, which stands for lux (sun) and candela
-    // (lamps 1 m away). Scenes have no absolute photometric scale.
+    // A white surface has the radiance L under an irradiance of pi L. glTF counts in lux and candela; scenes
+    // have no absolute scale, so one unit of theirs stands for 1 W, which is 683 lm, as importers have it.
+    constexpr float kLumens = 683;
     const float pi = std::numbers::pi_v<float>;
     const render::Sun sun = sun_of(parts_.scene);
     if (sun.intensity > 0) {
@@ -427,7 +428,7 @@ class GltfExport : public FilmExport {
       add({{"name", "Sun"},
            {"type", "directional"},
            {"color", array(sun.color)},
-           {"intensity", pi * sun.intensity}},
+           {"intensity", kLumens * pi * sun.intensity}},
           tracks);
     }
     for (std::size_t i = 0; i < first_lamps_.size(); ++i) {
@@ -437,7 +438,7 @@ class GltfExport : public FilmExport {
       Json light = {{"name", parts_.lamps[i]},
                     {"type", cone ? "spot" : "point"},
                     {"color", array(lamp.intensity / brightness)},
-                    {"intensity", pi * brightness}};
+                    {"intensity", kLumens * pi * brightness}};
       if (cone) {
         const float outer = lamp.cone_deg > 0 ? lamp.cone_deg / 2 * pi / 180 : 1.5f;
         light["spot"] = {{"innerConeAngle", outer * (1 - std::clamp(lamp.softness, 0.01f, 1.f))},
