@@ -7,7 +7,7 @@ scene=$(realpath "$2")/tests/data/tiny.json
 for program in munged slurmctld slurmd sbatch squeue; do
   command -v $program >/dev/null || { echo "$program is missing: apt-get install slurm-wlm munge"; exit 1; }
 done
-work=$(mktemp -d /tmp/offstage-slurm.XXXXXX)
+work=$(mktemp -d)
 chmod 755 "$work"
 pids=()
 stop() {

@@ -9,8 +9,8 @@
 
 namespace offstage::producer {
 
-/// The folder `installed` of the one that OFFSTAGE_DATA names, else of ../share/offstage beside the program, else `source` in the source that it was
-/// compiled from; empty if neither is there.
+/// The folder `installed` of the one that OFFSTAGE_DATA names, else of ../share/offstage beside the program,
+/// else `source` in the source that it was compiled from; empty if neither is there.
 std::filesystem::path shipped_folder(std::string_view installed, std::string_view source);
 
 /// The file of a model that a scene names, FILE or FILE#NODE: relative to the scene's folder; where that does
