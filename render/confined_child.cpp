@@ -66,22 +66,24 @@ ProcessLimits limits_of(uint64_t file_bytes) {
 /// of its own.
 class Standstill {
  public:
-  explicit Standstill(pid_t child) { known_ = ::clock_getcpuclockid(child, &clock_) == 0; }
+  Standstill(pid_t child, std::chrono::seconds interval) : interval_(interval) {
+    known_ = ::clock_getcpuclockid(child, &clock_) == 0;
+  }
 
   bool reached() {
     const auto now = std::chrono::steady_clock::now();
-    if (now - since_ < kInterval) return false;
+    if (now - since_ < interval_) return false;
     timespec used{};
     if (!known_ || ::clock_gettime(clock_, &used) != 0) return true;
     const auto cpu = std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec);
-    const bool still = cpu - cpu_ < kInterval / 100;
+    const bool still = cpu - cpu_ < std::chrono::nanoseconds(interval_) / 100;
     since_ = now;
     cpu_ = cpu;
     return still;
   }
 
  private:
-  static constexpr std::chrono::nanoseconds kInterval = std::chrono::seconds(60);
+  std::chrono::seconds interval_;
   clockid_t clock_ = 0;
   bool known_ = false;
   std::chrono::steady_clock::time_point since_ = std::chrono::steady_clock::now();
@@ -90,7 +92,7 @@ class Standstill {
 
 /// Waits for the child; its status.
 int wait_status(pid_t child, const ConfinedWork& work) {
-  Standstill standstill(child);
+  Standstill standstill(child, work.standstill);
   bool stopped = false, still = false;
   while (!wait_for_end(child, std::chrono::milliseconds(Patience::kInterval_ms))) {
     stopped = work.stop && work.stop();
@@ -102,7 +104,9 @@ int wait_status(pid_t child, const ConfinedWork& work) {
   while (::waitpid(child, &status, 0) < 0)
     if (errno != EINTR) throw UnavailableError("the reader of files was lost: " + system_reason(errno));
   if (stopped) throw StoppedError(work.what + ": reading was interrupted");
-  if (still) throw FileError(work.what + ": its reader made no progress for a minute; it is broken");
+  if (still)
+    throw FileError(work.what + ": its reader made no progress for " +
+                    std::to_string(work.standstill.count()) + " s; it is broken");
   return status;
 }
 

@@ -2,6 +2,7 @@
 /// Work on the files of strangers in a forked child that can do no harm: limits of time and memory, no
 /// network, no writing, no file outside of the given folders (sandbox.h). Private to render.
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -19,6 +20,8 @@ struct ConfinedWork {
   uint64_t file_bytes = 0;
   const InputFolders* folders = nullptr;  ///< that may be read
   StopTest stop = {};
+  /// A child that gets less than a hundredth of a processor for this long [s] is broken and is killed.
+  std::chrono::seconds standstill{60};
 };
 
 /// What the child wrote, mapped.

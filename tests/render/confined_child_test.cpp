@@ -1,6 +1,7 @@
 #include "render/confined_child.h"
 
 #include <cerrno>
+#include <chrono>
 #include <string>
 #include <vector>
 
@@ -87,6 +88,18 @@ TEST(ConfinedChild, FloodsAndCrashesAreErrorsOfTheFile) {
                            ::_exit(3);  // raise() was refused: an end, too
                          }),
                FileError);
+}
+
+TEST(ConfinedChild, ThatWaitsForeverIsEnded) {
+  const ScratchFolder scratch;
+  const InputFolders folders({scratch.path()});
+  try {
+    run_confined({.what = "test", .folders = &folders, .standstill = std::chrono::seconds(1)},
+                 [](int) { ::pause(); });
+    FAIL() << "it ended by itself";
+  } catch (const FileError& e) {
+    EXPECT_NE(std::string(e.what()).find("no progress for 1 s"), std::string::npos) << e.what();
+  }
 }
 
 TEST(ConfinedChild, ARequestToStopEndsIt) {
