@@ -1,6 +1,6 @@
 #pragma once
 /// A program run as a child in its own process group, so that Ctrl-C for this process does not end it first.
-/// The kernel kills it when the thread that started it, or the whole process, ends. Private to render.
+/// The kernel kills it when the thread that started it, or the whole process, ends.
 
 #include <chrono>
 #include <optional>

@@ -9,8 +9,8 @@
 
 namespace offstage::producer {
 
-/// Returns the folder `installed` of ../share/offstage beside the program, or else `source` in the source
-/// tree from which it was compiled; empty if neither exists.
+/// Returns the folder `installed` of the folder named by OFFSTAGE_DATA, else of ../share/offstage beside the
+/// program, else `source` in the source tree from which it was compiled; empty if none exists.
 std::filesystem::path shipped_folder(std::string_view installed, std::string_view source);
 
 /// Returns the file of a model named by a scene, FILE or FILE#NODE: relative to the scene's folder or, if

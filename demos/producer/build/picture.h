@@ -63,8 +63,6 @@ class Picture {
     uint32_t version = 0;
   };
 
-  render::Material material_named(const std::string& name, const ModelLibrary& models,
-                                  std::vector<render::Image>& textures) const;
   render::MaterialHandle material(const std::string& name, const ModelLibrary& models);
   void add_body(const Body& body, const ModelLibrary& models, std::size_t& slot, uint32_t object);
   void add_model(const std::string& file, const Eigen::Affine3f& body_from_model, const Body& body,

@@ -109,6 +109,39 @@ struct SimulateOptions {
 };
 int simulate_command(const SimulateOptions& options);
 
+struct ExportOptions {
+  SceneOptions scene;
+  TalkOptions talk;
+  std::string out, frames, cache;
+  int threads = 0;
+  bool force = false;
+};
+int export_command(const ExportOptions& options);
+
+struct CacheOptions {
+  enum class Action { list, verify, clear };
+  Action action = Action::list;
+  std::vector<std::string> folders;
+  bool json = false;
+};
+/// Looks after folders of snapshots.
+int cache_command(const CacheOptions& options);
+
+struct FarmOptions {
+  SceneOptions scene;
+  TalkOptions talk;
+  std::string out, work, program, status;
+  bool slurm = false;
+  int local = 0;  ///< processes that draw on this machine; 0: none
+  int chunks = 8, retries = 2, threads = 0;
+  std::string partition, account, time;
+  std::vector<std::string> sbatch;  ///< further options of sbatch
+  bool resume = false, force = false, dry_run = false;
+  render::GlPlatform gl = render::GlPlatform::automatic;
+};
+/// Renders in steps on many machines, or reports how far they are.
+int farm_command(const FarmOptions& options);
+
 struct ValidateOptions {
   SceneOptions scene;
   bool json = false;
@@ -141,9 +174,9 @@ struct NewOptions {
 int new_command(const NewOptions& options);
 
 struct CompareOptions {
-  SceneOptions scene;  ///< `file` may also be a picture or a folder of frames
-  std::string other;   ///< the second picture or folder
-  std::string golden, report;
+  std::vector<std::string> inputs;  ///< scenes, or two pictures, or two folders of frames
+  SceneOptions scene;               ///< of each scene; its file is not used
+  std::string golden, report, junit;
   GoldenStates states;
   int threads = 0;
   render::GlPlatform gl = render::GlPlatform::automatic;

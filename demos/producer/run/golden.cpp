@@ -9,6 +9,7 @@
 
 #include "producer/base/interrupt.h"
 #include "producer/base/json_file.h"
+#include "producer/base/markup.h"
 #include "producer/run/fingerprint.h"
 #include "render/context.h"
 #include "render/error.h"
@@ -40,17 +41,6 @@ fs::path picture_file(const fs::path& folder, const std::string& scene, int fram
 
 void write_golden_text(const fs::path& path, const std::string& text) {
   render::write_file_atomically(path, {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
-}
-
-std::string escape_html(const std::string& text) {
-  std::string out;
-  for (const char c : text)
-    out += c == '<'   ? "&lt;"
-           : c == '>' ? "&gt;"
-           : c == '&' ? "&amp;"
-           : c == '"' ? "&quot;"
-                      : std::string(1, c);
-  return out;
 }
 
 /// The source recorded in a golden; empty if there is none, or if the file is not a golden.
@@ -211,17 +201,23 @@ Verdict judge(const Golden& expected, const Golden& actual) {
         fmt::format("recorded on:  {}\nthis machine: {}\n", expected.fingerprint, actual.fingerprint);
   if (expected.frames.size() != actual.frames.size()) {
     verdict.pass = false;
-    verdict.text += "the golden has other frames, because the length of the scene changed\n";
+    verdict.difference = "the golden has other frames, because the length of the scene changed";
+    verdict.text += verdict.difference + "\n";
     return verdict;
   }
   for (std::size_t i = 0; i < expected.frames.size(); ++i) {
     if (expected.frames[i].frame != actual.frames[i].frame) {
       verdict.pass = false;
-      verdict.text += "the golden has other frames, because the length of the scene changed\n";
+      verdict.difference = "the golden has other frames, because the length of the scene changed";
+      verdict.text += verdict.difference + "\n";
       return verdict;
     }
-    verdict.text += fmt::format("{} frame {}: {}\n", actual.scene, actual.frames[i].frame,
-                                judge_frame(expected.frames[i], actual.frames[i], same_class, verdict.pass));
+    bool same = true;
+    const std::string line = fmt::format("{} frame {}: {}", actual.scene, actual.frames[i].frame,
+                                         judge_frame(expected.frames[i], actual.frames[i], same_class, same));
+    if (!same && verdict.pass) verdict.difference = line;
+    verdict.pass = verdict.pass && same;
+    verdict.text += line + "\n";
   }
   return verdict;
 }
@@ -240,7 +236,7 @@ fs::path write_report(const fs::path& folder, const Golden& expected, const Gold
     rows += fmt::format(
         "<tr><td>{0}</td><td><img src=\"{0}-expected.png\"></td><td><img src=\"{0}-actual.png\"></td>"
         "<td><img src=\"{0}-difference.png\"></td></tr>\n",
-        escape_html(stem));
+        escape_markup(stem));
   }
   const fs::path page = folder / "index.html";
   write_golden_text(
@@ -249,7 +245,7 @@ fs::path write_report(const fs::path& folder, const Golden& expected, const Gold
                   "<style>body{{font:14px sans-serif}}img{{image-rendering:pixelated;width:384px}}</style>\n"
                   "<h1>{0}</h1><pre>{1}</pre>\n"
                   "<table><tr><th>frame<th>expected<th>actual<th>difference x16</tr>\n{2}</table>\n",
-                  escape_html(actual.scene), escape_html(verdict.text), rows));
+                  escape_markup(actual.scene), escape_markup(verdict.text), rows));
   return page;
 }
 

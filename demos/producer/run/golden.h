@@ -62,7 +62,8 @@ void write_golden(const std::filesystem::path& folder, const Golden& golden);
 
 struct Verdict {
   bool pass = true;
-  std::string text;  ///< result, one line per frame
+  std::string text;        ///< result, one line per frame
+  std::string difference;  ///< the first line about a difference; empty if there is none
 };
 
 /// Compares two goldens: exactly for the same fingerprint, otherwise within the tolerance.

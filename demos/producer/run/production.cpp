@@ -359,6 +359,46 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
   return stats;
 }
 
+RunStats visit_frames(const LoadedScene& loaded, const ModelLibrary& models, const SnapshotJob& job,
+                      const std::function<void(const Snapshot&)>& take, const ProgressCallback& progress) {
+  const auto start = Clock::now();
+  RunStats stats;
+  std::optional<Simulation> simulation;
+  std::unique_ptr<SnapshotSource> source;
+  std::optional<ProgressMeter> meter;
+  const auto frames = static_cast<int>(job.frames.size());
+  if (job.cache) {
+    SnapshotCache cache(*job.cache);
+    cache.open(simulation_key(loaded, models), loaded.scene.frame_count());
+    meter.emplace(progress, frames, 0, 0);
+    source = std::make_unique<CachedSource>(std::move(cache));
+  } else {
+    simulation.emplace(loaded.scene, models);
+    stats.bodies = simulation->body_count();
+    meter.emplace(progress, frames, frames > 0 ? simulation->advances_to(job.frames.back()) : 0, 0);
+    source = std::make_unique<LiveSource>(*simulation, *meter, nullptr);
+  }
+  for (const int frame : job.frames) {
+    const auto sim_start = Clock::now();
+    const Snapshot snapshot = source->at(frame, [] { return interrupt_signal() != 0; });
+    if (snapshot.frame != frame) break;  // interrupted on the way
+    stats.sim.add(ms_since(sim_start));
+    const double sim_ms = ms_since(sim_start);
+    const auto take_start = Clock::now();
+    take(snapshot);
+    stats.encode.add(ms_since(take_start));
+    ++stats.frames;
+    stats.particles = snapshot.point_count();
+    stats.state_hash = snapshot.state_hash.hex();
+    meter->finished_one(sim_ms, 0, ms_since(take_start), stats.particles);
+    if (interrupt_signal()) break;
+  }
+  if (stats.frames < frames) stats.interrupted_by = interrupt_signal();
+  if (simulation) stats.totals = simulation->totals();
+  stats.wall_s = ms_since(start) / 1000;
+  return stats;
+}
+
 std::string simulation_key(const LoadedScene& loaded, const ModelLibrary& models) {
   auto scene = nlohmann::ordered_json::parse(loaded.canonical);
   for (const char* key : {"name", "description", "camera", "lights", "environment", "render"})

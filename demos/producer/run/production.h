@@ -114,6 +114,16 @@ struct SimulateJob {
 RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, const SimulateJob& job,
                          const ProgressCallback& progress);
 
+struct SnapshotJob {
+  std::vector<int> frames;                     ///< ascending
+  std::optional<std::filesystem::path> cache;  ///< read states from here instead of simulating
+};
+
+/// Gives the state of each frame to `take`, in order, on the calling thread. An interrupt ends it between two
+/// frames and is noted in the result. Throws what the simulation, the cache and `take` throw.
+RunStats visit_frames(const LoadedScene& loaded, const ModelLibrary& models, const SnapshotJob& job,
+                      const std::function<void(const Snapshot&)>& take, const ProgressCallback& progress);
+
 /// Hash of everything on which a cache of snapshots depends: the scene without camera, light, environment and
 /// picture settings.
 std::string simulation_key(const LoadedScene& loaded, const ModelLibrary& models);

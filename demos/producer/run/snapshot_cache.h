@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "producer/build/snapshot.h"
 #include "render/file_io.h"
@@ -12,6 +13,13 @@ namespace offstage::producer {
 
 class SnapshotCache {
  public:
+  /// Version of the folder's layout and of the snapshots in it; another one is refused (docs/cache.md).
+  static constexpr int kFormat = 4;
+  static constexpr const char* kFile = "cache.json";  ///< which generation is published, and of what
+  static constexpr std::string_view kGenerationPrefix = "generation-";  ///< of the folders with snapshots
+  /// "000012.snap"
+  static std::string file_name(int frame);
+
   explicit SnapshotCache(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   /// Begins a generation for the simulation identified by `key`. Throws FileError if the folder already
@@ -22,6 +30,8 @@ class SnapshotCache {
   void open(const std::string& key, int frames);
   /// Publishes the generation by one rename, and removes the generations that nobody reads or writes.
   void publish();
+  /// Removes the generations that are not published and that no process holds.
+  void remove_unused_generations() const { remove_old_generations(); }
 
   /// For the generation begun or opened. Both throw FileError; read() also for a snapshot of another run.
   void write(const Snapshot& snapshot) const;
