@@ -47,7 +47,8 @@ Eigen::Vector2i size_of(const std::string& text) {
 
 int tune_command(const producer::TuneOptions& options) {
   if (options.scene.from_standard_input())
-    throw std::invalid_argument("tune needs a scene file that it can save; standard input is none");
+    throw std::invalid_argument(
+        "tune needs a scene file, because it saves changes; standard input cannot be used");
   EngineSettings settings;
   settings.draft_px = size_of(options.size);
   settings.decompositions = options.scene.decompositions();

@@ -81,7 +81,7 @@ struct Table<ContactsOverlay> {
         {"b", &T::b, "name of another body; empty: every pair of bodies that collide"},
         {"margin", &T::margin, "two bodies that are not dynamic are in contact if they are closer than this",
          "m", kNotNegative},
-        {"size", &T::size, "radius of the rings; arrows are four times as long", "m", kPositive},
+        {"size", &T::size, "radius of the rings; the length of arrows is four times this", "m", kPositive},
         {"force_scale", &T::force_scale,
          "length of the arrows per contact force, which then includes friction; 0: all arrows have one "
          "length",
