@@ -6,7 +6,9 @@ libdeflate-dev libopenexr-dev libqhull-dev libxxhash-dev libzstd-dev nlohmann-js
 libturbojpeg0-dev ffmpeg
 libosmesa6? mold? ccache?"
 test_packages="libgtest-dev librapidcheck-dev libfcl-dev libccd-dev libbullet-dev libvalijson-dev assimp-testmodels
-chromium|chromium-browser chromium-driver|chromium-chromedriver python3-selenium"
+chromium|chromium-browser chromium-driver|chromium-chromedriver python3-selenium
+pybind11-dev python3-dev python3-numpy python3-pytest python3-matplotlib python3-pip"
+long_packages="blender slurm-wlm munge"
 bench_packages="libbenchmark-dev"
 fuzz_packages="clang libclang-rt-14-dev|libclang-rt-19-dev|libclang-rt-18-dev"
 

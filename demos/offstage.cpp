@@ -6,8 +6,8 @@
 #include "tune/tune_command.h"
 
 int main(int argc, char** argv) {
-  // Each frame makes pictures of the same sizes: memory that goes back to the system in between costs a
-  // twentieth of a draft, as each page is cleared again.
+  // Each frame allocates pictures of the same sizes. Returning this memory to the system in between would
+  // take a twentieth of the time of a draft, because each page is cleared again.
   mallopt(M_MMAP_THRESHOLD, 32 << 20);
   mallopt(M_TRIM_THRESHOLD, 256 << 20);
   return offstage::producer::run(argc, argv, offstage::tune::tune_command);

@@ -12,13 +12,14 @@ using Eigen::Vector3d;
 constexpr int kEntries = 512;
 constexpr double kColdest = 500, kHottest = 15'000;
 
-/// A bell with different widths below and above its middle [nm].
+/// A Gaussian lobe with different widths below and above its middle [nm].
 double lobe(double wavelength, double middle, double below, double above) {
   const double t = (wavelength - middle) * (wavelength < middle ? below : above);
   return std::exp(-t * t / 2);
 }
 
-/// The CIE 1931 observer in the lobes of Wyman, Sloan and Shirley, "Simple analytic approximations to the CIE
+/// The CIE 1931 standard observer, approximated by the lobes of Wyman, Sloan and Shirley, "Simple analytic
+/// approximations to the CIE XYZ color matching functions", JCGT 2013.
 /// XYZ color matching functions", JCGT 2013.
 Vector3d observer(double nm) {
   return {0.362 * lobe(nm, 442.0, 0.0624, 0.0374) + 1.056 * lobe(nm, 599.8, 0.0264, 0.0323) -
@@ -27,13 +28,13 @@ Vector3d observer(double nm) {
           1.217 * lobe(nm, 437.0, 0.0845, 0.0278) + 0.681 * lobe(nm, 459.0, 0.0385, 0.0725)};
 }
 
-/// Planck's law, but for a constant factor.
+/// Planck's law without its constant factor.
 double radiance(double nm, double kelvin) {
   const double second_constant = 1.438776877e7;  // h c / k [nm K]
   return std::pow(nm / 560, -5) / std::expm1(second_constant / (nm * kelvin));
 }
 
-/// X, Y, Z, but for a constant factor.
+/// X, Y, Z without a constant factor.
 Vector3d seen(double kelvin) {
   Vector3d sum = Vector3d::Zero();
   for (double nm = 360; nm <= 830; nm += 5) sum += radiance(nm, kelvin) * observer(nm);
@@ -54,7 +55,8 @@ Entry entry(double kelvin) {
   return {(rgb / luminance).cast<float>(), std::log(xyz.y())};
 }
 
-/// Over the inverse temperature, in which colour and the logarithm of luminance are nearly straight.
+/// Tabulated over the inverse temperature, as a function of which colour and the logarithm of luminance are
+/// nearly linear.
 const std::array<Entry, kEntries>& table() {
   static const std::array<Entry, kEntries> entries = [] {
     std::array<Entry, kEntries> made;
@@ -66,7 +68,7 @@ const std::array<Entry, kEntries>& table() {
   return entries;
 }
 
-/// The entry below a temperature and the part of the way to the next.
+/// The table entry below a temperature, and the fraction of the way to the next entry.
 struct Spot {
   std::size_t i;
   double part;

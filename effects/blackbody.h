@@ -5,13 +5,13 @@
 
 namespace offstage::effects {
 
-/// Linear sRGB of a black body at a temperature in [500, 15 000] K, clamped to it, of luminance 1: Planck's
-/// law under the CIE 1931 observer, interpolated in a table. Colours that sRGB does not hold, as of anything
-/// below 1900 K, lose what is negative and keep their luminance.
+/// Linear sRGB colour of luminance 1 of a black body at a temperature, which is clamped to [500, 15 000] K:
+/// Planck's law seen by the CIE 1931 observer, interpolated in a table. Colours outside of the sRGB gamut,
+/// such as those below 1900 K, lose their negative components and keep their luminance.
 Eigen::Vector3f blackbody_color(float kelvin);
 
-/// How much brighter than at `reference` a black body is at `kelvin`: the ratio of luminances. It falls
-/// off fast: at 1000 K it is 1/40 000 of that at 1800 K.
+/// Ratio of the luminance of a black body at `kelvin` to that at `reference`. It decreases fast: at 1000 K it
+/// is 1/40 000 of that at 1800 K.
 float blackbody_brightness(float kelvin, float reference);
 
 }  // namespace offstage::effects

@@ -49,7 +49,7 @@ ClothDef with_fabric(const Fabric& f) {
   return def;
 }
 
-/// Each triangle's mass in equal parts to its corners.
+/// Distributes each triangle's mass equally to its corners.
 void spread_mass(ClothDef& def, Real areal_density) {
   def.masses.assign(def.vertices.size(), 0);
   for (const Triangle& t : def.triangles) {
@@ -70,9 +70,10 @@ void add_spring(ClothDef& def, uint32_t a, uint32_t b, Real stiffness, Real damp
                          counterpart, distance(counterpart[0], counterpart[1])});
 }
 
-/// A spring over two cells of length h that bends by an angle theta gets shorter by h theta^2 / 4, so that it
-/// resists bending only as far as it is compressed. Its stiffness is what gives a strip of width w bent to
-/// the angle of a fold between cells, theta = 1/2, the energy of its bending moment B w theta^2 / (2 h).
+/// A spring over two cells of length h that bends by an angle theta gets shorter by h theta^2 / 4, so it
+/// resists bending only by its compression. Its stiffness is chosen for a strip of width w that is bent to
+/// the angle of a fold between cells, theta = 1/2: its energy then is that of the bending moment, B w theta^2
+/// / (2 h).
 Real bend_stiffness(Real bend, Real w, Real h) {
   constexpr Real kAngle = 0.5;
   return 16 * bend * w / (h * h * h * kAngle * kAngle);
@@ -103,7 +104,7 @@ ClothDef grid_cloth(const GridSize& size, const sim::Pose& pose, const Fabric& f
     }
   spread_mass(def, fabric.areal_density);
   const Real damping = fabric.damping;
-  // Along a thread a spring stands for the width between its neighbours, at the border for half of it.
+  // Along a thread a spring represents the width between its neighbours, at the border half of it.
   const auto width = [](uint32_t k, uint32_t last, Real step) {
     return k == 0 || k == last ? step / 2 : step;
   };
@@ -122,8 +123,8 @@ ClothDef grid_cloth(const GridSize& size, const sim::Pose& pose, const Fabric& f
         add_spring(def, at(c, r), at(c, r + 2), bend_stiffness(fabric.bend, wx, dz), damping,
                    SpringKind::bend);
     }
-  // Sheared by gamma, the diagonals of a cell change by gamma dx dz / |d|: the energy of both is that of the
-  // modulus over the cell's area.
+  // A shear of gamma changes the diagonals of a cell by gamma dx dz / |d|. The energy of both springs equals
+  // that of the shear modulus over the cell's area.
   // Each of the two is the other's counterpart.
   const Real shear = fabric.shear * (dx * dx + dz * dz) / (2 * dx * dz);
   for (uint32_t r = 0; r < nz; ++r)
@@ -148,7 +149,7 @@ ClothDef mesh_cloth(const sim::TriangleMesh& mesh, const sim::Pose& pose, const 
     if (!(def.masses[i] > 0))
       refuse("vertex " + std::to_string(i) + " of the mesh belongs to no face with an area");
   struct Sides {
-    Real area = 0;  // of the faces beside an edge [m^2]
+    Real area = 0;  // total area of the faces at an edge [m^2]
     std::vector<uint32_t> opposite;
   };
   std::map<std::pair<uint32_t, uint32_t>, Sides> edges;
@@ -160,8 +161,8 @@ ClothDef mesh_cloth(const sim::TriangleMesh& mesh, const sim::Pose& pose, const 
       sides.opposite.push_back(t[(k + 2) % 3]);
     }
   for (const auto& [edge, sides] : edges) {
-    // A third of each face beside it is the edge's, a strip as long as the edge: of a sheet of equilateral
-    // triangles whose edges have the stiffness k, Young's modulus (per width) is 2 k / sqrt(3).
+    // A third of each face belongs to each of its edges, as a strip as long as the edge. For a sheet of
+    // equilateral triangles whose edges have the stiffness k, Young's modulus (per width) is 2 k / sqrt(3).
     const Real length = (def.vertices[edge.first] - def.vertices[edge.second]).norm();
     if (!(length > 0)) continue;
     const Real width = 2 * sides.area / (3 * length) * 1.5;

@@ -5,7 +5,7 @@
 namespace offstage::effects {
 
 Rgba StartColor::of(const RandomStream& random, uint64_t id) const {
-  // Draws of drawing: far from those of the simulation.
+  // Properties of the random numbers for drawing, different from those of the simulation.
   constexpr uint32_t kBrightness = 1u << 24, kChannel = kBrightness + 1;
   const auto varied = [&](float middle, float spread, uint32_t property) {
     if (spread == 0) return middle;

@@ -1,5 +1,5 @@
 #pragma once
-/// Colour and size keyed over age (F4), and colours that vary from particle to particle (F2).
+/// Colour and size over age (F4), and colours that vary from particle to particle (F2).
 
 #include <algorithm>
 #include <array>
@@ -14,9 +14,9 @@
 
 namespace offstage::effects {
 
-using Rgba = Eigen::Vector4f;  ///< linear, straight alpha; above 1 glows
+using Rgba = Eigen::Vector4f;  ///< linear, straight alpha; values above 1 glow
 
-/// Value over normalised age in [0, 1], piecewise linear, held at the ends.
+/// Value over normalised age in [0, 1], piecewise linear, constant beyond the ends.
 template <class T>
 struct AgeRamp {
   struct Key {
@@ -42,11 +42,11 @@ using SizeRamp = AgeRamp<float>;
 
 enum class RampKind {
   linear,
-  smooth,  ///< continuous slope, never beyond the keys
+  smooth,  ///< continuous slope, without overshoot
 };
 
-/// The slope at the middle one of three keys, with which no channel overshoots: 0 at an extreme, else the
-/// weighted harmonic mean of the slopes beside it (Fritsch and Butland, "A method for constructing local
+/// Slope at the middle one of three keys with which no channel overshoots: 0 at an extremum, otherwise the
+/// weighted harmonic mean of the two slopes beside it (Fritsch and Butland, "A method for constructing local
 /// monotone piecewise cubic interpolants", 1984). h and s are the two spans and their slopes.
 inline float monotone_slope(float h0, float h1, float s0, float s1) {
   if (!(s0 * s1 > 0)) return 0;
@@ -59,8 +59,8 @@ inline Rgba monotone_slope(float h0, float h1, const Rgba& s0, const Rgba& s1) {
   return slope;
 }
 
-/// A ramp made ready for many evaluations: which keys an age lies between is looked up, and a cubic found
-/// there. Exact, steps (two keys of one age) included.
+/// A ramp prepared for many evaluations: the keys beside an age are found by a table, and a cubic is
+/// evaluated there. Exact, also at steps (two keys of one age).
 template <class T>
 class Ramp {
  public:
@@ -88,7 +88,7 @@ class Ramp {
     return p.value + x * (p.c1 + x * (p.c2 + x * p.c3));
   }
 
-  /// The value at the normalised age of every particle. The three have one length.
+  /// Computes the value at the normalised age of every particle. The three spans have the same length.
   void evaluate(std::span<const Real> age, std::span<const Real> lifespan, std::span<T> values) const {
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = at(age[i] / lifespan[i]);
   }
@@ -97,7 +97,8 @@ class Ramp {
   static constexpr std::size_t kBuckets = 64;
   using Keys = std::vector<typename AgeRamp<T>::Key>;
 
-  /// A cubic over (start, next start], in parts of its span; before the first key and after the last a value.
+  /// A cubic over (start, next start], in fractions of its span; constant before the first key and after the
+  /// last one.
   struct Piece {
     Real start;
     float inverse_span;
@@ -107,7 +108,7 @@ class Ramp {
   static float span_of(const Keys& k, std::size_t i) { return static_cast<float>(k[i + 1].age - k[i].age); }
   static T slope_of(const Keys& k, std::size_t i) { return (k[i + 1].value - k[i].value) / span_of(k, i); }
 
-  /// At key i, as the cubic beside it takes it. The ramp is flat beyond its ends and beside a step.
+  /// Slope at key i for the cubic beside it. It is zero beyond the ends and beside a step.
   static T slope_at(const Keys& k, std::size_t i) {
     const bool inside = i > 0 && i + 1 < k.size() && span_of(k, i - 1) > 0 && span_of(k, i) > 0;
     if (!inside) return T(k[i].value * 0.f);
@@ -123,17 +124,18 @@ class Ramp {
   }
 
   std::vector<Piece> pieces_;
-  std::array<uint32_t, kBuckets> first_;  // the piece to start looking from, by age
+  std::array<uint32_t, kBuckets> first_;  // first piece to check, by age
 };
 
-/// The colour particles start with, each channel normal about its mean, cut off at one deviation and at 0.
+/// The initial colour of particles: each channel is normally distributed about its mean, truncated at one
+/// deviation and at 0.
 struct StartColor {
   Rgba mean = Rgba::Ones();
   Rgba deviation = Rgba::Zero();  ///< >= 0
-  /// Of a common factor of red, green and blue about 1.
+  /// Deviation of a common factor of red, green and blue with the mean 1.
   float brightness_deviation = 0;
 
-  /// Of the particle with this id; a function of it alone, so nothing need be kept.
+  /// Colour of the particle with this id. It depends only on the id, so it need not be stored.
   Rgba of(const RandomStream& random, uint64_t id) const;
 };
 

@@ -15,7 +15,7 @@ template <class... Fs>
 Overloaded(Fs...) -> Overloaded<Fs...>;  // Clang before 17 does not deduce it
 
 constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
-/// Limits of this size are none.
+/// Limits of at least this size count as no limits.
 constexpr Real kUnbounded = 1e300;
 /// The normal distribution function at -1.
 constexpr Real kBelowOneDeviation = 0.15865525393145705;
@@ -31,13 +31,13 @@ Real value_at(const Curve& curve, Real t) {
   return v0 + (v1 - v0) * ((t - t0) / (t1 - t0));
 }
 
-/// Truncation at one deviation takes quantiles from the middle of the distribution only.
+/// Truncation at one deviation uses only quantiles from the middle of the distribution.
 Real value_at(const Normal& n, Real u) {
   const Real p = n.clip ? kBelowOneDeviation + u * (1 - 2 * kBelowOneDeviation) : u;
   return std::clamp(n.mean + n.deviation * normal_quantile(p), n.min, n.max);
 }
 
-/// The end of a normal distribution's range, on the side of `sign`.
+/// Bound of a normal distribution on the side of `sign`.
 Real bound(const Normal& n, int sign) {
   const Real reach = n.clip || n.deviation == 0 ? n.deviation : kInfinity;
   const Real end = std::clamp(n.mean + sign * reach, n.min, n.max);

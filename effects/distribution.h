@@ -1,5 +1,5 @@
 #pragma once
-/// Values that vary: constant, normal (mean and deviation, F2), uniform, or a curve over time.
+/// Varying values: constant, normal (mean and deviation, F2), uniform, or a curve over time.
 
 #include <utility>
 #include <variant>
@@ -9,7 +9,7 @@
 
 namespace offstage::effects {
 
-/// Normal distribution, truncated at mean +- deviation unless `clip` is false; min and max always hold.
+/// Normal distribution, truncated at mean +- deviation unless `clip` is false; min and max always apply.
 struct Normal {
   Real mean = 0;
   Real deviation = 0;  ///< >= 0
@@ -19,7 +19,7 @@ struct Normal {
 struct Uniform {
   Real low = 0, high = 1;
 };
-/// Piecewise linear over time [s], held at the ends; times strictly increasing.
+/// Piecewise linear over time [s], constant beyond the ends; times are strictly increasing.
 struct Curve {
   std::vector<std::pair<Real, Real>> keys;
 };
@@ -28,10 +28,11 @@ using Varying = std::variant<Real, Normal, Uniform, Curve>;
 
 /// The value at quantile u in (0, 1) and time t.
 Real sample(const Varying& v, Real u, Real t);
-/// Smallest and largest value that sample() can return; infinite for an unclipped normal without bounds.
+/// Smallest and largest value that sample() can return; infinite for a normal distribution without clipping
+/// and bounds.
 Real lower_bound(const Varying& v);
 Real upper_bound(const Varying& v);
-/// The mean at time t (before truncation bounds).
+/// Mean at time t, before truncation.
 Real mean(const Varying& v, Real t);
 
 }  // namespace offstage::effects

@@ -10,11 +10,11 @@
 namespace offstage::effects {
 namespace {
 
-/// A release that found no more room goes on after this time at the latest, however slow its particles are
-/// [s].
+/// A release that was interrupted for lack of room continues after this time at the latest, even if its
+/// particles are slow [s].
 constexpr Real kMaxClearing = 1;
-/// Places on a mesh that are looked at for one particle. Random places become hard to find when half of the
-/// surface is taken.
+/// Number of places on a mesh that are tried for one particle. When half of the surface is occupied, random
+/// free places become hard to find.
 constexpr uint32_t kTries = 64;
 
 std::string owner(const EmitterDef& def) {
@@ -70,7 +70,7 @@ void Emitter::stop(Real time) {
   schedule_.stop(time);
 }
 
-/// Everything to be born up to `end`, in order of time; at one time what waited comes first.
+/// Collects all particles due up to `end`, in order of time; at equal times postponed ones come first.
 void Emitter::collect_due(Real end) {
   if (end > stopped_) std::erase_if(waiting_, [&](const Release& r) { return r.time > stopped_; });
   const auto still_waiting = std::stable_partition(waiting_.begin(), waiting_.end(),
@@ -84,13 +84,13 @@ void Emitter::collect_due(Real end) {
 
 void Emitter::emit(sim::World& world, Real start, Real end) {
   collect_due(end);
-  // The list grows while it is worked off: the rest of a release may still be due in this sub-step.
+  // The list grows during the loop, because the rest of a release may still be due in this sub-step.
   for (std::size_t i = 0; i < due_.size(); ++i) release(world, Release(due_[i]), start, end);
   report_.waiting = 0;
   for (const Release& r : waiting_) report_.waiting += r.count;
 }
 
-/// Of the next particles.
+/// Largest diameter of the next `count` particles.
 Real Emitter::largest_diameter(uint64_t count, Real birth) const {
   Real radius = upper_bound(def_.radius);
   if (std::isinf(radius)) {
@@ -105,7 +105,7 @@ void Emitter::release(sim::World& world, const Release& r, Real start, Real end)
   const uint64_t alive = world.particles(target_).size();
   const uint64_t allowed = std::min(r.count, def_.max_alive > alive ? def_.max_alive - alive : 0);
   if (allowed > 0) {
-    // What did not have to wait but was due before now is prewarming's.
+    // Particles that were due earlier without waiting belong to the prewarming.
     const Real birth = r.waited ? std::max(r.time, start) : r.time;
     const Batch batch{allowed, birth, end, largest_diameter(allowed, birth),
                       def_.body ? world.body_motion(def_.body, std::max(birth, start)) : sim::Motion{}};
@@ -120,12 +120,13 @@ void Emitter::release(sim::World& world, const Release& r, Real start, Real end)
       wait({birth + clearing, allowed - placed, true}, end);
     }
   }
-  // Those over the limit have their numbers too, so that the others' draws do not depend on it.
+  // Particles over the limit use up their numbers, too, so that the random numbers of the others do not
+  // depend on the limit.
   report_.skipped += r.count - allowed;
   number_ += r.count - allowed;
 }
 
-/// Puts the rest of a release off, in order of time among the others.
+/// Postpones the rest of a release, in order of time among the others.
 void Emitter::wait(const Release& rest, Real end) {
   if (rest.time > stopped_) return;
   auto& list = rest.time <= end ? due_ : waiting_;
@@ -154,8 +155,8 @@ uint64_t Emitter::place_in_cells(sim::World& world, const Batch& batch) {
   return placed;
 }
 
-/// The cells of a sphere and a disc are turned for each round of them. A release that would go on into the
-/// next round, among cells that lie otherwise, begins with it.
+/// The cells of a sphere and a disc are rotated for each round of them. A release that would not fit into the
+/// current round begins with the next one, because the cells of two rounds may overlap.
 void Emitter::begin_cells(const Cells& cells, uint64_t count) {
   if (def_.surface.kind == SurfaceKind::plane) return;
   const uint64_t n = cells.count(), done = cell_cursor_ % n;
@@ -166,7 +167,7 @@ void Emitter::begin_cells(const Cells& cells, uint64_t count) {
   turn_ = Draws(random_, round, 0).uniforms(kTurn);
 }
 
-/// Up to the first that finds no place; it comes first next time.
+/// Places particles up to the first one without room, which comes first next time.
 uint64_t Emitter::place_apart(sim::World& world, const Batch& batch) {
   spacing_.reset(batch.count, batch.diameter);
   for (uint64_t k = 0; k < batch.count; ++k, ++number_) {

@@ -1,10 +1,10 @@
 #pragma once
-/// Emitters (physics F1, F2): release particles from a surface, with every parameter a distribution and every
-/// birth at its own time inside the step, from where the surface is at that time.
+/// Emitters (physics F1, F2): release particles from a surface, with every parameter a distribution. Each
+/// particle is created at its own time within the step, from the position of the surface at that time.
 ///
 /// Particles of one release never overlap: each takes a cell of the plane, the sphere or the disc, in
-/// shuffled order, or keeps its distance on a mesh. What finds no room waits. The schedule depends on the
-/// emitter's own clock alone, so counts and spread are the same at any frame rate.
+/// shuffled order, or keeps its distance on a mesh. Particles without room are postponed. The schedule
+/// depends only on the emitter's own clock, so counts and spread are the same at any frame rate.
 
 #include "effects/emitter_def.h"
 #include "effects/schedule.h"
@@ -14,26 +14,27 @@ namespace offstage::effects {
 
 class Draws;
 
-/// What an emitter has done so far.
+/// Counts of an emitter since its start.
 struct EmitterReport {
   uint64_t released = 0;
   uint64_t skipped = 0;  ///< not released because max_alive was reached
-  uint64_t waiting = 0;  ///< due, but the surface had no room; released later
-  uint64_t waited = 0;   ///< how many had to wait in all
+  uint64_t waiting = 0;  ///< due, but without room on the surface; released later
+  uint64_t waited = 0;   ///< total number of particles that were postponed
 };
 
 class Emitter {
  public:
-  /// Throws std::invalid_argument if a parameter cannot be drawn from (radius <= 0, empty surface ...).
-  /// `origin` is the world's time at which the emitter's clock shows 0. Call World::prewarm() for
-  /// as long as the emitter prewarms, so that what it releases before the world begins lives and collides
-  /// until then; without, the first emit() has it fly freely, through bodies.
+  /// Throws std::invalid_argument if a parameter is out of range (radius <= 0, empty surface ...). `origin`
+  /// is the world's time at which the emitter's clock shows 0. Call World::prewarm() for the time by which
+  /// the emitter prewarms, so that particles released before time 0 move and collide until then. Otherwise
+  /// the first emit() lets them fly freely, through bodies.
   Emitter(const EmitterDef& def, sim::ParticleSystemHandle target, Real origin = 0);
 
-  /// Adds to the world the particles born in (start, end], each with the time it has left in this sub-step.
+  /// Adds the particles created in (start, end] to the world, each with its remaining time in this sub-step.
   void emit(sim::World& world, Real start, Real end);
 
-  /// Releases nothing after this time of the world [s], nor what waits. The living live on.
+  /// Releases nothing after this time of the world [s], not even postponed particles. Existing particles live
+  /// on.
   void stop(Real time);
 
   sim::ParticleSystemHandle target() const { return target_; }
@@ -41,11 +42,11 @@ class Emitter {
   const EmitterDef& def() const { return def_; }
 
  private:
-  /// A release at work.
+  /// A release in progress.
   struct Batch {
     uint64_t count;
     Real birth, end;
-    Real diameter;  // the largest
+    Real diameter;  // largest diameter of its particles
     sim::Motion carrier;
   };
 
@@ -67,9 +68,9 @@ class Emitter {
   Schedule schedule_;
   Spacing spacing_;
   EmitterReport report_;
-  uint64_t number_ = 0;        // of the next particle: what its draws depend on
+  uint64_t number_ = 0;        // number of the next particle, on which its random numbers depend
   uint64_t cell_cursor_ = 0;   // position in the shuffled sequence of cells
-  std::array<Real, 3> turn_;   // of the cells, for one round of them
+  std::array<Real, 3> turn_;   // rotation of the cells for one round
   uint64_t turned_round_ = 0;  // which round that is, from 1
   std::vector<Release> due_, waiting_;
 };

@@ -1,5 +1,6 @@
 #pragma once
-/// What an emitter releases, from where and when (physics F1, F2): every number a distribution.
+/// The definition of an emitter: surface, parameters and times of its particles (physics F1, F2). Every
+/// number can be a distribution.
 
 #include <string>
 #include <vector>
@@ -10,7 +11,7 @@
 
 namespace offstage::effects {
 
-/// `count` particles at once at `time`, `cycles` times, `interval` apart.
+/// `count` particles at once at `time`, repeated `cycles` times at intervals of `interval`.
 struct Burst {
   Real time = 0;         ///< [s]
   Varying count = 10.0;  ///< rounded, >= 0
@@ -18,7 +19,7 @@ struct Burst {
   Real interval = 1;     ///< [s], > 0
 };
 
-/// From `start` up to, and without, `end` [s].
+/// The times in [start, end) [s].
 struct TimeWindow {
   Real start = 0, end = 1e30;
 };
@@ -28,29 +29,30 @@ struct EmitterDef {
   std::string name;  ///< also names its random stream
   uint64_t seed = 1;
   EmitterSurface surface;
-  sim::BodyHandle body;  ///< null: fixed in the world; else moves with the body and adds its velocity
-  /// Places are drawn anywhere on the surface and nothing waits for room: for particles that do not collide
+  /// Null: fixed in the world; otherwise it moves with the body, whose velocity is added.
+  sim::BodyHandle body;
+  /// Particles are placed anywhere on the surface and are never postponed; for particles that do not collide
   /// with each other.
   bool overlap = false;
   Varying rate = 100.0;    ///< particles per second, released one by one; 0: only `count` and bursts
   Varying count = 0.0;     ///< particles per release, rounded; 0: no periodic release
-  Varying interval = 0.1;  ///< between releases [s], > 0
+  Varying interval = 0.1;  ///< time between releases [s], > 0
   std::vector<Burst> bursts;
-  Real start = 0;                   ///< of `rate` and `count` [s]
-  Real end = 1e30;                  ///< of everything [s]; the living live on
-  std::vector<TimeWindow> windows;  ///< when `rate` and `count` release; none: always
-  Real prewarm = 0;                 ///< how long before `start` they have begun already [s], >= 0
-  Vec3 direction = Vec3::Zero();    ///< in the body's frame, or the world's; zero: the surface's normal
-  Varying speed = 1.0;              ///< along the direction [m/s]
-  Varying spread_deg = 0.0;         ///< angle from the direction [degrees]; azimuth uniform
-  Varying radius = 0.01;            ///< [m], > 0
-  Varying density = 1000.0;         ///< [kg/m^3]; gives the mass unless `mass` is set
-  Varying mass = 0.0;               ///< [kg]; 0: from density and radius
-  Varying lifespan = 5.0;           ///< [s], > 0
-  Varying restitution = 0.3;        ///< in [0, 1]
-  Varying friction = 0.5;           ///< >= 0
-  Varying charge = 0.0;             ///< [C]
-  uint64_t max_alive = 1'000'000;   ///< particles over this are not released, and counted
+  Real start = 0;                   ///< start of `rate` and `count` [s]
+  Real end = 1e30;                  ///< end of all releases [s]; existing particles live on
+  std::vector<TimeWindow> windows;  ///< times in which `rate` and `count` release; empty: always
+  Real prewarm = 0;                 ///< how long before `start` they begin [s], >= 0
+  Vec3 direction = Vec3::Zero();   ///< in the frame of the body or the world; zero: the normal of the surface
+  Varying speed = 1.0;             ///< speed along the direction [m/s]
+  Varying spread_deg = 0.0;        ///< angle from the direction [degrees]; azimuth uniform
+  Varying radius = 0.01;           ///< [m], > 0
+  Varying density = 1000.0;        ///< [kg/m^3]; gives the mass unless `mass` is set
+  Varying mass = 0.0;              ///< [kg]; 0: from density and radius
+  Varying lifespan = 5.0;          ///< [s], > 0
+  Varying restitution = 0.3;       ///< in [0, 1]
+  Varying friction = 0.5;          ///< >= 0
+  Varying charge = 0.0;            ///< [C]
+  uint64_t max_alive = 1'000'000;  ///< particles beyond this are not released, but counted
 };
 
 }  // namespace offstage::effects

@@ -9,12 +9,13 @@ namespace offstage::effects {
 namespace {
 
 constexpr Real kPi = std::numbers::pi;
-/// Points k = 0, 1 ... of a golden spiral turn by this part of a circle, in units of 2^-64: the golden ratio
-/// less 1.
+/// Angle between consecutive points of a golden spiral, in units of 2^-64 of a circle: the golden ratio minus
+/// 1.
 constexpr uint64_t kGoldenTurn = 0x9e3779b97f4a7c15u;
 
-// Least distances of the golden spirals, each times sqrt(n): on the unit sphere from 5 points on and for
-// fewer, and on a disc of radius sqrt(n), whose closest points are the first and the fourth.
+// Smallest distances between points of the golden spirals, times sqrt(n): on the unit sphere from 5 points
+// on, on the unit sphere for fewer, and on a disc of radius sqrt(n), where the first and the fourth point are
+// closest.
 constexpr Real kSphereGap = 3.078, kSphereGapOfFew = 2.685, kDiscGap = 1.546;
 
 Real golden_angle(uint64_t i) {
@@ -25,7 +26,7 @@ uint64_t at_least_one(Real n) {
   return static_cast<uint64_t>(std::clamp(std::floor(n + 1e-9), 1.0, 1e12));
 }
 
-/// A rotation drawn evenly (Shoemake, "Uniform random rotations", Graphics Gems III).
+/// Uniformly distributed rotation (Shoemake, "Uniform random rotations", Graphics Gems III).
 sim::Quat random_rotation(const std::array<Real, 3>& u) {
   const SinCos a = sincos(2 * kPi * u[1]), b = sincos(2 * kPi * u[2]);
   const Real p = std::sqrt(1 - u[0]), q = std::sqrt(u[0]);

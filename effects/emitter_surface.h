@@ -1,6 +1,7 @@
 #pragma once
-/// The surfaces particles leave from (physics F1), and the places on them that a release takes: cells that
-/// keep newborns apart on the plane, the sphere and the disc; places drawn evenly by area on a mesh.
+/// The surfaces from which particles are released (physics F1), and the places of a release. Cells keep new
+/// particles apart on the plane, the sphere and the disc; places on a mesh are distributed uniformly over its
+/// area.
 
 #include <array>
 #include <cstdint>
@@ -19,13 +20,13 @@ enum class SurfaceKind {
   mesh,    ///< a triangle mesh, along its faces' normals
 };
 
-/// A surface in the frame of the body it is attached to, or of the world. Particles leave along its normal.
+/// A surface in the frame of its body, or of the world. Particles are released along its normal.
 struct EmitterSurface {
   SurfaceKind kind = SurfaceKind::plane;
   sim::Pose pose;
-  Eigen::Vector2d size = {0.1, 0.1};  ///< of the plane, along X and Z of `pose` [m], > 0
-  Real radius = 0.1;                  ///< of the sphere and the disc [m], > 0
-  sim::TriangleMesh mesh;             ///< of the mesh, in the frame of `pose`; with some area
+  Eigen::Vector2d size = {0.1, 0.1};  ///< size of the plane along X and Z of `pose` [m], > 0
+  Real radius = 0.1;                  ///< radius of the sphere and the disc [m], > 0
+  sim::TriangleMesh mesh;             ///< mesh in the frame of `pose`; its area must not be zero
 };
 
 /// A point of a surface with its unit normal and a unit tangent, in the frame of the surface's pose.
@@ -33,7 +34,7 @@ struct Place {
   Vec3 point, normal, tangent;
 };
 
-/// How a surface is divided for particles of some diameter; cells are equal in area. A sphere and a disc have
+/// Division of a surface into cells of equal area for particles of some diameter. A sphere and a disc have
 /// one row.
 struct Cells {
   Real diameter = 0;
@@ -44,17 +45,17 @@ struct Cells {
 
 class ReleaseSurface {
  public:
-  /// Throws std::invalid_argument, saying what is wrong, for a surface without area.
+  /// Throws std::invalid_argument with the reason for a surface without area.
   explicit ReleaseSurface(const EmitterSurface& surface);
 
-  /// Whether places come from cells. Those on a mesh must be kept apart by looking.
+  /// Whether the surface has cells. On a mesh, the distances of particles must be checked instead.
   bool has_cells() const { return kind_ != SurfaceKind::mesh; }
-  /// As many cells as keep particles of this diameter apart, at least one.
+  /// The greatest number of cells that keeps particles of this diameter apart, at least one.
   Cells cells(Real diameter) const;
-  /// The middle of a cell. Cells of the sphere and the disc lie on a spiral that is turned by three uniform
-  /// numbers, so that no direction is preferred however few they are.
+  /// Centre of a cell. Cells of the sphere and the disc are on a spiral that is rotated by three uniform
+  /// random numbers, so that no direction is preferred even with few cells.
   Place cell(const Cells& cells, uint64_t i, const std::array<Real, 3>& turn) const;
-  /// A place drawn evenly by area, from three uniform numbers.
+  /// A uniformly distributed place, from three uniform random numbers.
   Place anywhere(const std::array<Real, 3>& u) const;
 
   Real area() const { return area_; }  ///< [m^2]
@@ -62,7 +63,7 @@ class ReleaseSurface {
  private:
   struct Face {
     Vec3 corner, edge1, edge2, normal;
-    Real area_before;  // of the faces before this one
+    Real area_before;  // total area of the faces before this one
   };
 
   void add_faces(const sim::TriangleMesh& mesh);
@@ -76,8 +77,8 @@ class ReleaseSurface {
   std::vector<Face> faces_;
 };
 
-/// A unit vector perpendicular to a unit vector, continuous but for one direction (Duff et al., "Building an
-/// orthonormal basis, revisited", JCGT 2017).
+/// A unit vector perpendicular to a unit vector, continuous except at one direction (Duff et al., "Building
+/// an orthonormal basis, revisited", JCGT 2017).
 Vec3 perpendicular(const Vec3& n);
 
 }  // namespace offstage::effects

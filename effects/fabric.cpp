@@ -7,9 +7,10 @@
 namespace offstage::effects {
 namespace {
 
-// Areal densities and bending rigidities are those of the trade's tables (Kawabata's measurements lie around
-// them). Stiffness along the threads is a tenth to a hundredth of the true one: at these loads it already is
-// far below a per cent, and what is stiffer only costs steps. Shear is what lets woven cloth drape in folds.
+// Areal densities and bending rigidities are typical of commercial fabrics (Kawabata's measurements are close
+// to them). The stiffness along the threads is a tenth to a hundredth of the true one. At these loads the
+// strain is already far below a per cent, and a higher stiffness would only need more steps. The low shear
+// stiffness makes woven cloth drape in folds.
 const std::array<FabricPreset, 5> kPresets = {{
     {"silk",
      "light and flowing, many small folds",

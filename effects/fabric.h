@@ -1,6 +1,6 @@
 #pragma once
-/// What cloth is made of. Stiffnesses are per metre of width, so that a cloth behaves the same however finely
-/// it is divided.
+/// Fabrics of cloth. Stiffnesses are per metre of width, so the behaviour of a cloth does not depend on its
+/// resolution.
 
 #include <span>
 #include <string>
@@ -20,19 +20,20 @@ enum class BendModel {
 struct Fabric {
   Real areal_density = 0.15;  ///< [kg/m^2], > 0
   Real stretch = 1000;        ///< along the threads: force per metre of width at a strain of 1 [N/m], > 0
-  Real shear = 100;           ///< across them [N/m], >= 0
+  Real shear = 100;           ///< resistance across the cells [N/m], >= 0
   Real bend = 1e-4;  ///< flexural rigidity: moment per metre of width at a curvature of 1/m [N m], >= 0
-  Real bend_damping = 2e-3;  ///< the moment grows by this time times its rate [s], >= 0
+  Real bend_damping = 2e-3;  ///< the moment is bend * (curvature + bend_damping * its rate) [s], >= 0
   BendModel bend_model = BendModel::plate;
-  /// Of the springs: share of the critical damping of one spring between its two points, >= 0.
+  /// Share of the critical damping of each spring between its two points, >= 0.
   Real damping = 0.05;
-  Real friction = 0.5;       ///< on bodies, >= 0
-  Real self_friction = 0.3;  ///< on itself, >= 0
-  Real thickness = 0.005;    ///< distance that layers and bodies keep [m], > 0: more than that of real cloth
-  Real drag = 1;             ///< coefficient of the pressure of air that comes square, >= 0
-  Real lift = 0.9;           ///< <= drag; drag - lift is the coefficient of air that comes along
-  Real max_stretch = 1.1;    ///< greatest length over rest length along the threads, > 1; 0: no limit
-  Real max_shear = 0;        ///< the same across
+  Real friction = 0.5;       ///< friction on bodies, >= 0
+  Real self_friction = 0.3;  ///< friction on itself, >= 0
+  /// Distance from other layers and from bodies [m], > 0; larger than that of real cloth.
+  Real thickness = 0.005;
+  Real drag = 1;           ///< coefficient of the pressure of air perpendicular to the cloth, >= 0
+  Real lift = 0.9;         ///< at most `drag`; drag - lift is the coefficient for air along the cloth
+  Real max_stretch = 1.1;  ///< greatest length over rest length along the threads, > 1; 0: no limit
+  Real max_shear = 0;      ///< the same limit for shear
 };
 
 struct FabricPreset {
@@ -41,9 +42,9 @@ struct FabricPreset {
   Fabric fabric;
 };
 
-/// silk, cotton, denim, leather, rubber.
+/// The presets: silk, cotton, denim, leather, rubber.
 std::span<const FabricPreset> fabric_presets();
-/// The preset of a name; none if there is no such.
+/// Returns the preset with this name; null if there is none.
 const FabricPreset* find_fabric(const std::string& name);
 
 }  // namespace offstage::effects

@@ -1,5 +1,5 @@
 #pragma once
-/// Private: refuses parameters that cannot be drawn from.
+/// Private: checks that parameters are in their allowed ranges.
 
 #include <limits>
 #include <stdexcept>
@@ -9,7 +9,8 @@
 
 namespace offstage::effects {
 
-/// What a parameter may be. Closed limits cut a distribution off (F2); an open one must be set explicitly.
+/// Allowed range of a parameter. Closed limits truncate a distribution (F2); an open limit must be set
+/// explicitly.
 struct Limits {
   Real low = -std::numeric_limits<Real>::max(), high = std::numeric_limits<Real>::max();
   bool low_open = false;  ///< `low` itself is not allowed
@@ -24,7 +25,7 @@ inline constexpr Limits kIntervals{.low = kMinInterval, .low_open = true};
 /// Throws std::invalid_argument in the name of `owner`, such as `emitter "rain"`.
 void check(const std::string& owner, const char* field, const Varying& v, const Limits& limits);
 
-/// The parameters that every newborn has.
+/// Checks the parameters that all new particles have.
 template <class Def>
 void check_particle(const std::string& owner, const Def& def) {
   check(owner, "speed", def.speed, kAnyNumber);

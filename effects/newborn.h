@@ -1,5 +1,5 @@
 #pragma once
-/// Private: how the parameters of a newborn particle are drawn.
+/// Private: drawing the parameters of a new particle.
 
 #include <algorithm>
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace offstage::effects {
 
-/// What a random number is drawn for. Values are part of every scene's result: append, never renumber.
+/// What a random number is used for. The values affect the result of every scene: append, never renumber.
 enum Property : uint32_t {
   kRate,
   kCount,
@@ -26,18 +26,18 @@ enum Property : uint32_t {
   kLifespan,
   kRestitution,
   kFriction,
-  kBurst,  // + its place in the list
+  kBurst,  // plus the index in the list
   kCharge = 1u << 16,
-  kTurn,  // and the two after it
+  kTurn,  // and the next two values
   kAge = kTurn + 3,
   kDelay,
-  kPercent,  // of the parent's velocity
+  kPercent,  // percentage of the parent's velocity
   kChance,
   kHeight,
-  kPlace = 1u << 20,  // + 3 times the try, and the two after it
+  kPlace = 1u << 20,  // plus 3 times the number of the try, and the next two values
 };
 
-/// The numbers one particle, or one release, is made of.
+/// The random numbers of one particle or one release.
 class Draws {
  public:
   Draws(const RandomStream& random, uint64_t index, Real time)
@@ -58,7 +58,7 @@ class Draws {
   Real time_;
 };
 
-/// A particle but for its place and velocity. `Def` has the parameters of physics F2.
+/// A particle without place and velocity. `Def` has the parameters of physics F2.
 template <class Def>
 sim::Particle drawn_particle(const Def& def, const Draws& draw) {
   sim::Particle p;
@@ -73,11 +73,11 @@ sim::Particle drawn_particle(const Def& def, const Draws& draw) {
   return p;
 }
 
-/// The directions about an axis: a right-handed frame of unit vectors.
+/// Directions about an axis, by a right-handed frame of unit vectors.
 struct Cone {
   Vec3 axis, tangent;
 
-  /// At a drawn angle from the axis, all around.
+  /// A direction at a random angle from the axis, with a uniform azimuth.
   Vec3 drawn(const Varying& spread_deg, const Draws& draw) const {
     const SinCos spread = sincos(draw(spread_deg, kSpread) * (std::numbers::pi / 180));
     const SinCos azimuth = sincos(2 * std::numbers::pi * draw.uniform(kAzimuth));
@@ -85,11 +85,11 @@ struct Cone {
   }
 };
 
-/// Nearest count to a drawn number, in [0, 1e9].
+/// The integer nearest to a number, clamped to [0, 1e9].
 uint64_t rounded(Real x);
 
-/// Adds a particle that was born at `birth` during a sub-step from `start` to `end`, or before it: then it
-/// has flown straight since. False if it is dead by then.
+/// Adds a particle that was created at `birth` during a sub-step from `start` to `end`, or before it; in the
+/// second case it has flown straight since. Returns false if its lifespan is over by then.
 bool add_newborn(sim::World& world, sim::ParticleSystemHandle system, sim::Particle particle, Real birth,
                  Real start, Real end);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// What those that let particles be born from particles have done so far.
+/// Counts of splits, trails and sub-emitters since their start.
 
 #include <cstdint>
 
@@ -8,7 +8,7 @@ namespace offstage::effects {
 struct OffspringReport {
   uint64_t released = 0;
   uint64_t skipped = 0;   ///< not released because max_alive or max_per_step was reached
-  uint64_t answered = 0;  ///< splits that took place, events answered; of trails 0
+  uint64_t answered = 0;  ///< number of splits, or of events that triggered particles; 0 for trails
 };
 
 }  // namespace offstage::effects

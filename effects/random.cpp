@@ -5,7 +5,7 @@
 namespace offstage::effects {
 namespace {
 
-/// The finaliser of MurmurHash3 in the constants of SplitMix64: every bit of the input reaches every bit of
+/// The finaliser of MurmurHash3 with the constants of SplitMix64: every bit of the input affects every bit of
 /// the output.
 uint64_t mix(uint64_t x) {
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -86,7 +86,8 @@ Permutation::Permutation(uint64_t n, uint64_t key) : n_(n), key_(key), half_bits
 
 uint64_t Permutation::operator()(uint64_t i) const {
   const uint64_t mask = (uint64_t{1} << half_bits_) - 1;
-  // The network permutes up to four times as many numbers; following it from i leads back below n.
+  // The network permutes up to four times as many numbers; repeated application, starting at i, leads back to
+  // a number below n.
   do {
     uint64_t left = i >> half_bits_, right = i & mask;
     for (uint64_t round = 0; round < 6; ++round) {

@@ -21,7 +21,8 @@ std::array<uint32_t, 4> philox(std::array<uint32_t, 4> counter, std::array<uint3
 /// Stable 64-bit name of a stream, from an object's name (FNV-1a).
 uint64_t stream_id(std::string_view name);
 
-/// One well-mixed number from two: the index of what has two of them, such as the child of a particle.
+/// Combines two numbers to a well-mixed one: the index of objects that are identified by two numbers, such as
+/// the child of a particle.
 uint64_t combined(uint64_t a, uint64_t b);
 
 /// The random numbers of one object's stream: pure functions of (index, property).
@@ -29,8 +30,8 @@ class RandomStream {
  public:
   RandomStream(uint64_t seed, uint64_t stream) : seed_(seed), stream_(stream) {}
 
-  /// Uniform in the open interval (0, 1), 52 bits. `index` counts particles or releases, `property` is what
-  /// is drawn.
+  /// Uniform in the open interval (0, 1), 52 bits. `index` counts particles or releases, `property` is the
+  /// purpose of the number.
   Real uniform(uint64_t index, uint32_t property) const;
   /// Uniform integer in [0, n), n > 0.
   uint64_t below(uint64_t n, uint64_t index, uint32_t property) const;
@@ -39,7 +40,7 @@ class RandomStream {
   uint64_t seed_, stream_;
 };
 
-/// A pseudo-random permutation of [0, n) evaluated at one place in O(1), by a Feistel network with cycle
+/// A pseudo-random permutation of [0, n). Each element is computed in O(1), by a Feistel network with cycle
 /// walking.
 class Permutation {
  public:

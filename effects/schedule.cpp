@@ -11,12 +11,13 @@ namespace offstage::effects {
 namespace {
 
 constexpr Real kNever = std::numeric_limits<Real>::infinity();
-/// How long a random rate keeps its value [s].
+/// Time for which a random rate keeps its value [s].
 constexpr Real kRateWindow = 0.1;
-/// Windows without a particle after which a random rate counts as zero for ever: almost three hours.
+/// Number of windows without a particle after which a random rate counts as zero for ever: almost three
+/// hours.
 constexpr int kMaxIdleWindows = 100'000;
 
-/// Where the integral of a rate over time, taken from t, reaches 1.
+/// Time at which the integral of a rate over time, from t on, reaches 1.
 Real curve_birth(const Varying& rate, const Curve& curve, Real t) {
   const auto at = [&](Real time) { return std::max(0.0, sample(rate, 0.5, time)); };
   Real need = 1;
@@ -24,7 +25,7 @@ Real curve_birth(const Varying& rate, const Curve& curve, Real t) {
     if (key <= t) continue;
     const Real span = key - t, r0 = at(t), slope = (std::max(0.0, value) - r0) / span;
     const Real area = (r0 + slope * span / 2) * span;
-    // r0 s + slope s^2 / 2 = need, in the form that also serves slope = 0 or r0 = 0.
+    // Solves r0 s + slope s^2 / 2 = need, in the form that is also valid for slope = 0 or r0 = 0.
     if (area >= need) return t + 2 * need / (r0 + std::sqrt(std::max(0.0, r0 * r0 + 2 * slope * need)));
     need -= area;
     t = key;
@@ -60,7 +61,7 @@ bool Schedule::open(Real time) const {
          });
 }
 
-/// Time of the particle of `rate` after the one at `last`.
+/// Time of the next particle of `rate` after that at `last`.
 Real Schedule::next_birth(Real last) {
   if (const auto* constant = std::get_if<Real>(&rate_))
     return *constant > 0 ? start_ + static_cast<Real>(singles_ + 1) / *constant : kNever;

@@ -1,6 +1,6 @@
 #pragma once
-/// When an emitter releases how many particles. The times depend on its own clock alone, so they are the same
-/// at any frame rate.
+/// Release times and counts of an emitter. The times depend only on its own clock, so they are the same at
+/// any frame rate.
 
 #include <algorithm>
 #include <vector>
@@ -9,11 +9,11 @@
 
 namespace offstage::effects {
 
-/// Particles that are due together.
+/// Particles that are due at one time.
 struct Release {
   Real time;
   uint64_t count;
-  bool waited = false;  ///< for room on the surface
+  bool waited = false;  ///< whether it was postponed for lack of room on the surface
 };
 
 class Schedule {
@@ -21,9 +21,9 @@ class Schedule {
   /// `origin`: the time at which the emitter's clock shows 0.
   Schedule(const EmitterDef& def, Real origin);
 
-  /// Appends what has become due up to `end`, each kind in order of time.
+  /// Appends the releases due up to `end`, each kind in order of time.
   void collect(Real end, std::vector<Release>& due);
-  /// Nothing is due after this time.
+  /// Nothing is released after this time.
   void stop(Real time) { end_ = std::min(end_, time); }
 
  private:
@@ -34,7 +34,7 @@ class Schedule {
   Real draw(const Varying& v, uint64_t number, uint32_t property, Real time) const;
   bool open(Real time) const;
 
-  // Times in here are on the world's clock, those of the definitions on the emitter's.
+  // Times in this class are on the world's clock, those of the definitions on the emitter's clock.
   Varying rate_, count_, interval_;
   std::vector<Burst> bursts_;
   std::vector<TimeWindow> windows_;
@@ -42,7 +42,7 @@ class Schedule {
   Real origin_, start_, end_;
   Real next_single_, next_periodic_;  // times of the next particle of `rate`, the next release of `count`
   uint64_t singles_ = 0, periodic_ = 0, rate_window_ = 0;
-  std::vector<uint64_t> burst_cycles_;  // already released, per burst
+  std::vector<uint64_t> burst_cycles_;  // number of cycles already released, for each burst
 };
 
 }  // namespace offstage::effects

@@ -7,7 +7,7 @@ namespace offstage::effects {
 namespace {
 
 constexpr uint32_t kNone = 0xffffffff;
-/// Keeps the table's size within reason; longer chains are slower, not wrong.
+/// Limits the size of the table; longer chains are slower, but correct.
 constexpr uint64_t kMaxBuckets = uint64_t{1} << 24;
 
 using Cell = Eigen::Matrix<int64_t, 3, 1>;
@@ -25,7 +25,7 @@ uint32_t& Spacing::bucket(const Cell& cell) {
   return buckets_[combined(combined(key(0), key(1)), key(2)) & (buckets_.size() - 1)];
 }
 
-/// Balls of other cells may share the bucket; they are looked at for nothing.
+/// The bucket may also contain balls of other cells, which do not change the result.
 bool Spacing::is_clear(const Cell& cell, const Vec3& centre, Real radius) {
   for (uint32_t i = bucket(cell); i != kNone; i = balls_[i].next) {
     const Real reach = radius + balls_[i].radius;

@@ -1,5 +1,5 @@
 #pragma once
-/// Private: finds out whether a ball keeps clear of others, by a hash table of grid cells.
+/// Private: checks that balls do not overlap, by a hash table of grid cells.
 
 #include <cstdint>
 #include <vector>
@@ -10,16 +10,16 @@ namespace offstage::effects {
 
 class Spacing {
  public:
-  /// Starts again, for up to `count` balls none of which is larger than `diameter` [m].
+  /// Clears the table, for up to `count` balls of at most `diameter` [m].
   void reset(uint64_t count, Real diameter);
-  /// Takes the ball in unless it overlaps one that is in.
+  /// Adds the ball unless it overlaps a ball in the table; returns whether it was added.
   bool add(const Vec3& centre, Real radius);
 
  private:
   struct Ball {
     Vec3 centre;
     Real radius;
-    uint32_t next;  // in its bucket
+    uint32_t next;  // next ball in its bucket
   };
 
   uint32_t& bucket(const Eigen::Matrix<int64_t, 3, 1>& cell);

@@ -10,7 +10,7 @@
 namespace offstage::effects {
 namespace {
 
-/// A particle at rest has no direction; its children take this one, and no speed.
+/// A particle at rest has no direction; its children get this direction, and no speed.
 const Vec3 kNoDirection = Vec3::UnitY();
 
 const SplitDef& checked_split(const SplitDef& def) {
@@ -47,7 +47,8 @@ void Splitter::emit(sim::World& world, Real start, Real end) {
   }
 }
 
-/// Those that come from elsewhere are numbered in order of birth, whatever children lie between them.
+/// New particles that are not children are numbered in order of creation, independently of the children
+/// between them.
 void Splitter::enter_newcomers(const sim::World& world, Real now) {
   const sim::ParticleArrays& p = world.particles(parents_);
   for (std::size_t i : newcomers_.find(p)) {

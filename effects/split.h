@@ -1,5 +1,5 @@
 #pragma once
-/// Particles that split (physics F3): from some age on each throws off children that take part of its
+/// Splitting particles (physics F3): from a given age on, each releases children that get a share of its
 /// velocity, size and lifespan.
 
 #include <functional>
@@ -15,34 +15,34 @@ namespace offstage::effects {
 
 class Draws;
 
-/// Percentages are of the parent's at the time of the split; 100 passes it on.
+/// Percentages are of the parent's value at the time of the split; 100 gives the same value.
 struct SplitDef {
   std::string name;  ///< also names its random stream
   uint64_t seed = 1;
   bool enabled = true;
-  Varying count = 2.0;  ///< children of one split, rounded
-  Varying age = 1.0;    ///< of the parent at its first split [s], > 0
-  Varying delay = 0.5;  ///< to its next split [s], > 0; n simulation steps are n WorldDef::max_step
-  /// The most splits of a particle, those of its ancestors included: where children can split too, one
-  /// particle becomes at most (1 + count)^depth.
+  Varying count = 2.0;  ///< children per split, rounded
+  Varying age = 1.0;    ///< age of the parent at its first split [s], > 0
+  Varying delay = 0.5;  ///< time to its next split [s], > 0; for n simulation steps use n WorldDef::max_step
+  /// Greatest number of splits in a line of descent, those of ancestors included. If children can split, too,
+  /// one particle becomes at most (1 + count)^depth.
   int depth = 1;
   Varying velocity_percent = 100.0;
   Varying spread_deg = 0.0;          ///< angle from the parent's direction [degrees]
   Varying radius_percent = 50.0;     ///< > 0
-  Varying mass_percent = 0.0;        ///< of each child; 0: of the parent's density
+  Varying mass_percent = 0.0;        ///< mass of each child; 0: that by the parent's density
   Varying lifespan_percent = 100.0;  ///< > 0
-  uint64_t max_alive = 1'000'000;    ///< children over this are not released, and counted
+  uint64_t max_alive = 1'000'000;    ///< children beyond this are not released, but counted
 };
 
-/// Splits the particles of one system into children of the same one, which then split in their turn, or of
-/// another. The parent lives on. Draws depend on the line of descent alone, so no order of events changes
-/// them.
+/// Splits the particles of one system into children of the same system, which then split themselves, or of
+/// another one. The parent continues to exist. Random numbers depend only on the line of descent, so they do
+/// not depend on the order of events.
 class Splitter {
  public:
-  /// Throws std::invalid_argument if a parameter cannot be drawn from.
+  /// Throws std::invalid_argument if a parameter is out of range.
   Splitter(const SplitDef& def, sim::ParticleSystemHandle parents, sim::ParticleSystemHandle children);
 
-  /// Adds the children born in (start, end]. To be called before each sub-step.
+  /// Adds the children created in (start, end]. Must be called before each sub-step.
   void emit(sim::World& world, Real start, Real end);
 
   const OffspringReport& report() const { return report_; }
@@ -52,9 +52,9 @@ class Splitter {
   /// The next split of a particle.
   struct Due {
     Real time;
-    uint64_t id, line;  // the number of its descent
-    int left;           // splits, this one included
-    int done;           // its own
+    uint64_t id, line;  // line: number of its line of descent
+    int left;           // remaining splits, this one included
+    int done;           // number of splits it has made
 
     friend bool operator>(const Due& a, const Due& b) {
       return a.time != b.time ? a.time > b.time : a.id > b.id;
@@ -71,7 +71,7 @@ class Splitter {
   RandomStream random_;
   Newcomers newcomers_;
   std::priority_queue<Due, std::vector<Due>, std::greater<>> due_;
-  std::vector<uint64_t> own_children_;  // ids of those in the system of their parents, ascending
+  std::vector<uint64_t> own_children_;  // ids of children in the system of their parents, ascending
   OffspringReport report_;
 };
 

@@ -47,7 +47,7 @@ void SubEmitter::answer_events(sim::World& world, Real start, Real end) {
 }
 
 void SubEmitter::answer_ages(sim::World& world, Real start, Real end) {
-  // What is added to the parents' own system comes after those there are now.
+  // Particles that are added to the parents' own system are appended after the existing ones.
   const std::size_t count = world.particles(parents_).size();
   const std::vector<std::size_t>& fresh = newcomers_.find(world.particles(parents_));
   auto next = fresh.begin();
@@ -75,7 +75,8 @@ void SubEmitter::answer_ages(sim::World& world, Real start, Real end) {
 
 void SubEmitter::answer(sim::World& world, const sim::ParticleEvent& event, Real start, Real end) {
   if (event.velocity.norm() < def_.min_speed) return;
-  // An age is reached once; its time is rounded in other ways at another frame rate.
+  // An age is reached only once, and the rounding of its time depends on the frame rate, so the time is not
+  // used.
   const uint64_t occasion = def_.trigger == Trigger::age ? 0 : std::bit_cast<uint64_t>(event.time);
   const uint64_t index = combined(event.id, occasion);
   const Draws draw(random_, index, event.time);
@@ -100,7 +101,7 @@ sim::Particle SubEmitter::answer_to(const sim::ParticleEvent& event, const Draws
   const Vec3 axis = hit && def_.axis == Axis::normal ? event.normal
                     : speed > 0                      ? Vec3(event.velocity / speed)
                                                      : Vec3(Vec3::UnitY());
-  // It touches what its parent touched.
+  // The particle touches the surface that its parent touched.
   particle.position = event.position + (particle.radius - event.radius) * event.normal;
   particle.velocity = draw(def_.velocity_percent, kPercent) / 100 * event.velocity +
                       draw(def_.speed, kSpeed) * Cone{axis, perpendicular(axis)}.drawn(def_.spread_deg, draw);

@@ -1,6 +1,6 @@
 #pragma once
-/// Sub-emitters: particles born where something happens to others: at an age, at a death, at
-/// a hit. Splashes, bursting shells, sparks.
+/// Sub-emitters release particles at events of other particles: an age, a death or a collision. They make
+/// splashes, bursting shells and sparks.
 
 #include <string>
 #include <vector>
@@ -14,29 +14,29 @@ namespace offstage::effects {
 class Draws;
 
 enum class Trigger {
-  age,        ///< reached by the parent
-  death,      ///< of the parent; its system must report deaths
-  collision,  ///< of the parent; its system must report collisions
+  age,        ///< the parent reaches an age
+  death,      ///< the parent's lifespan ends; its system must report deaths
+  collision,  ///< the parent collides; its system must report collisions
 };
 
-/// What newborns fly about.
+/// Axis of the directions of new particles.
 enum class Axis {
-  normal,    ///< of what was hit; without a hit as `velocity`
-  velocity,  ///< the parent's after the event; at rest upwards
+  normal,    ///< normal of the surface hit; without a collision, as `velocity`
+  velocity,  ///< direction of the parent's velocity after the event; upwards for a parent at rest
 };
 
 struct SubEmitterDef {
   std::string name;  ///< also names its random stream
   uint64_t seed = 1;
   Trigger trigger = Trigger::collision;
-  Real age = 1;          ///< of the trigger `age` [s], >= 0
-  Real probability = 1;  ///< that an event is answered, in [0, 1]
-  Real min_speed = 0;    ///< of the parent after the event; slower ones are not answered [m/s]
-  Varying count = 5.0;   ///< for each event, rounded
+  Real age = 1;          ///< age for the trigger `age` [s], >= 0
+  Real probability = 1;  ///< probability that an event triggers particles, in [0, 1]
+  Real min_speed = 0;    ///< smallest speed of the parent after the event [m/s]; slower ones trigger nothing
+  Varying count = 5.0;   ///< particles per event, rounded
   Axis axis = Axis::normal;
-  Varying velocity_percent = 0.0;  ///< of the parent's velocity after the event
-  Varying speed = 1.0;             ///< added, about the axis [m/s]
-  Varying spread_deg = 30.0;       ///< angle from the axis [degrees]; Uniform{0, 180} is all around
+  Varying velocity_percent = 0.0;  ///< share of the parent's velocity after the event
+  Varying speed = 1.0;             ///< additional speed, about the axis [m/s]
+  Varying spread_deg = 30.0;       ///< angle from the axis [degrees]; Uniform{0, 180} covers all directions
   Varying radius = 0.005;          ///< [m], > 0
   Varying density = 1000.0;        ///< [kg/m^3]; gives the mass unless `mass` is set
   Varying mass = 0.0;              ///< [kg]; 0: from density and radius
@@ -44,18 +44,18 @@ struct SubEmitterDef {
   Varying restitution = 0.3;       ///< in [0, 1]
   Varying friction = 0.5;          ///< >= 0
   Varying charge = 0.0;            ///< [C]
-  uint64_t max_per_step = 10'000;  ///< newborns in one sub-step; more are not released, and counted
-  uint64_t max_alive = 1'000'000;  ///< particles over this are not released, and counted
+  uint64_t max_per_step = 10'000;  ///< new particles in one sub-step; more are not released, but counted
+  uint64_t max_alive = 1'000'000;  ///< particles beyond this are not released, but counted
 };
 
-/// Answers the events of one system with particles of another, or the same. Draws depend on the parent's id
-/// and the time of the event.
+/// Releases particles of one system at the events of another one, or of the same. Random numbers depend on
+/// the parent's id and the time of the event.
 class SubEmitter {
  public:
-  /// Throws std::invalid_argument if a parameter cannot be drawn from.
+  /// Throws std::invalid_argument if a parameter is out of range.
   SubEmitter(const SubEmitterDef& def, sim::ParticleSystemHandle parents, sim::ParticleSystemHandle target);
 
-  /// Adds to the world what answers the events of the last sub-step, and the ages reached in (start, end]. To
+  /// Adds the particles for the events of the last sub-step, and for the ages reached in (start, end]. Must
   /// be called before each sub-step.
   void emit(sim::World& world, Real start, Real end);
 
@@ -73,7 +73,7 @@ class SubEmitter {
   RandomStream random_;
   Newcomers newcomers_;
   OffspringReport report_;
-  uint64_t born_ = 0;  // in this sub-step
+  uint64_t born_ = 0;  // number in this sub-step
 };
 
 }  // namespace offstage::effects

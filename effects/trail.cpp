@@ -36,19 +36,20 @@ void Trail::emit(sim::World& world, Real start, Real end) {
   for (std::size_t i = 0; i < p.size(); ++i) {
     const bool is_new = next != fresh.end() && *next == i;
     next += is_new;
-    // A newborn's time of birth shows when it has been stepped; then it catches up.
+    // The time of creation of a new particle is known only after it has been stepped; its trail then starts
+    // at that time.
     if (p.age[i] > 0) leave(world, i, is_new, start, end);
   }
 }
 
-/// What particle i leaves behind in the sub-step, and if it is new, what it has left since its birth.
+/// Adds the particles that particle i leaves in the sub-step or, if it is new, since its creation.
 void Trail::leave(sim::World& world, std::size_t i, bool is_new, Real start, Real end) {
   const sim::ParticleArrays& p = world.particles(parents_);
   const Draws draw(random_, p.id[i], start);
   const Real rate = std::min(kMaxRate, draw(def_.rate, kRate)), phase = draw.uniform(kChance);
   if (!(rate > 0)) return;
   const Real age = p.age[i], last_age = std::min(def_.end_age, p.lifespan[i]);
-  // Particle k is left at the age start_age + (k + phase) / rate.
+  // Particle k is created at the age start_age + (k + phase) / rate.
   const auto left_by_age = [&](Real a) {
     return static_cast<uint64_t>(
         std::max(0.0, std::floor((std::min(a, last_age) - def_.start_age) * rate - phase) + 1));

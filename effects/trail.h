@@ -1,5 +1,5 @@
 #pragma once
-/// Trails: particles that living particles leave behind them, as the stars of a firework do.
+/// Trails: particles left behind by moving particles, as by the stars of a firework.
 
 #include <string>
 #include <vector>
@@ -15,11 +15,11 @@ class Draws;
 struct TrailDef {
   std::string name;  ///< also names its random stream
   uint64_t seed = 1;
-  Varying rate = 60.0;             ///< particles per second of each parent, drawn once for its life; no curve
-  Real start_age = 0;              ///< of the parent [s], >= 0
-  Real end_age = 1e30;             ///< of the parent [s]
-  Varying velocity_percent = 0.0;  ///< of the parent's velocity
-  Varying speed = 0.0;             ///< added, along a direction about the parent's, backwards [m/s]
+  Varying rate = 60.0;  ///< particles per second of each parent, drawn once for its life; must not be a curve
+  Real start_age = 0;   ///< age of the parent [s], >= 0
+  Real end_age = 1e30;  ///< age of the parent [s]
+  Varying velocity_percent = 0.0;  ///< share of the parent's velocity
+  Varying speed = 0.0;             ///< additional speed, about the direction opposite to the parent's [m/s]
   Varying spread_deg = 0.0;        ///< angle from that direction [degrees]
   Varying radius = 0.005;          ///< [m], > 0
   Varying density = 1000.0;        ///< [kg/m^3]; gives the mass unless `mass` is set
@@ -28,17 +28,18 @@ struct TrailDef {
   Varying restitution = 0.3;       ///< in [0, 1]
   Varying friction = 0.5;          ///< >= 0
   Varying charge = 0.0;            ///< [C]
-  uint64_t max_alive = 1'000'000;  ///< particles over this are not released, and counted
+  uint64_t max_alive = 1'000'000;  ///< particles beyond this are not released, but counted
 };
 
-/// Every parent leaves its trail at its own even times, from where it is at each, so a trail has no clumps
-/// however fast it moves. Draws depend on the parent's id and the number of the particle in its trail.
+/// Leaves the trails of all parents. Each parent releases particles at regular times, from its position at
+/// each time, so a trail has no clumps however fast the parent moves. Random numbers depend on the parent's
+/// id and the number of the particle in its trail.
 class Trail {
  public:
-  /// Throws std::invalid_argument if a parameter cannot be drawn from, or if both systems are the same.
+  /// Throws std::invalid_argument if a parameter is out of range, or if both systems are the same.
   Trail(const TrailDef& def, sim::ParticleSystemHandle parents, sim::ParticleSystemHandle target);
 
-  /// Adds what is left behind in (start, end]. To be called before each sub-step.
+  /// Adds the particles left behind in (start, end]. Must be called before each sub-step.
   void emit(sim::World& world, Real start, Real end);
 
   const OffspringReport& report() const { return report_; }

@@ -11,9 +11,9 @@
 namespace offstage::effects {
 namespace {
 
-/// Whole numbers up to this are exact, and more are as good as no bound.
+/// Integers up to this are exact; larger bounds are useless.
 constexpr Real kSaturated = 0x1p53;
-/// Times nothing it is nothing.
+/// A finite substitute for infinity, because infinity times zero is not a number.
 constexpr Real kHuge = 1e300;
 constexpr Real kEver = std::numeric_limits<Real>::infinity();
 
@@ -25,7 +25,7 @@ Real most(const Varying& count) {
   return static_cast<Real>(rounded(upper_bound(count)));
 }
 
-// Quotients that are meant to be whole are.
+// Rounds up, except for quotients that are integers within rounding.
 Real up(Real x) {
   return std::ceil(x * (1 - 1e-12));
 }
@@ -37,8 +37,8 @@ Real highest_rate(const Varying& rate) {
   return std::clamp(upper_bound(rate), 0.0, kMaxRate);
 }
 
-/// Released between start and end, and within a time `window`, ends included: an age that is a sum of
-/// sub-steps may fall short of a lifespan by rounding.
+/// Greatest number of particles released between start and end within any time `window`, ends included,
+/// because an age that is a sum of sub-steps may be slightly less than the lifespan by rounding.
 Real most_released(const EmitterDef& def, Real start, Real end, Real window) {
   const Real rate = highest_rate(def.rate), interval = lower_bound(def.interval), length = end - start;
   Real sum = 0;
@@ -59,7 +59,7 @@ Real largest_release(const EmitterDef& def) {
   return count;
 }
 
-/// Whether a release may not find room. On a mesh it is hard to tell, so it may.
+/// Whether particles may be postponed for lack of room. On a mesh this is hard to tell, so the answer is yes.
 bool can_wait(const EmitterDef& def) {
   if (def.overlap) return false;
   const ReleaseSurface surface(def.surface);
@@ -69,10 +69,10 @@ bool can_wait(const EmitterDef& def) {
          count > static_cast<Real>(surface.cells(2 * radius).count());
 }
 
-/// A particle with `left` splits left, of which its own life has time for `own`, and all that come from it.
-/// Children live long enough for `each` splits.
+/// Number of descendants of a particle and itself. It has `left` splits left, of which `own` fit into its
+/// lifespan; `each` splits fit into the lifespan of each child.
 Real family(Real children, int left, int own, int each) {
-  // By splits left, of a child at the start of its life: the particles of shorter depth are known first.
+  // Number for a child at the start of its life, by splits left; smaller depths are computed first.
   std::vector<std::vector<Real>> size(static_cast<std::size_t>(left) + 1);
   const int most_own = std::min(left, std::max(own, each));
   for (int d = 0; d <= left; ++d) {
@@ -87,13 +87,13 @@ Real family(Real children, int left, int own, int each) {
   return size.back()[static_cast<std::size_t>(std::min(own, most_own))];
 }
 
-/// `alive` from what can be born within a lifespan, and within the limits of the system and the run.
+/// Bounds `alive` by the particles created within a lifespan, and by the limits of the system and the run.
 WorstCase bounded(Real born, Real lifespan, Real at_once, Real rate, uint64_t max_alive) {
   const Real alive = std::min(born, std::ceil(at_once + (rate > 0 ? rate * lifespan : 0)));
   return {saturated(born), std::min(saturated(alive), max_alive), lifespan, at_once, rate};
 }
 
-/// Where each parent has `children`, all within the time `after` its own birth.
+/// The bound if each parent has `children`, all within the time `after` its own creation.
 WorstCase bounded_children(const WorstCase& parents, Real children, Real after, Real lifespan,
                            uint64_t max_alive) {
   const Real at_once = parents.at_once + (parents.rate > 0 ? parents.rate * after : 0);
@@ -106,7 +106,7 @@ WorstCase bounded_children(const WorstCase& parents, Real children, Real after, 
 WorstCase worst_case(const EmitterDef& def, Real duration) {
   const Real start = def.start - def.prewarm, end = std::min(def.end, duration);
   const Real lifespan = upper_bound(def.lifespan), born = most_released(def, start, end, kEver);
-  // Waiting particles may be released together with later ones.
+  // Postponed particles may be released together with later ones.
   if (can_wait(def)) return bounded(born, lifespan, born, 0, def.max_alive);
   Real at_once = 1 + most(def.count),
        rate = highest_rate(def.rate) + most(def.count) / lower_bound(def.interval);
@@ -122,7 +122,8 @@ WorstCase worst_case(const EmitterDef& def, Real duration) {
 WorstCase worst_case(const SplitDef& def, const WorstCase& parents, bool same_system) {
   if (!def.enabled) return {};
   const Real first = lower_bound(def.age), delay = lower_bound(def.delay);
-  // The first split at `first`, the others `delay` apart, all before the end of a life.
+  // The first split is at `first`, the others follow at intervals of `delay`, all before the end of the
+  // lifespan.
   const auto splits_in = [&](Real life) {
     return life > first ? static_cast<int>(std::min<Real>(def.depth, up((life - first) / delay))) : 0;
   };
@@ -139,7 +140,7 @@ WorstCase worst_case(const SplitDef& def, const WorstCase& parents, bool same_sy
 WorstCase worst_case(const TrailDef& def, const WorstCase& parents) {
   const Real rate = highest_rate(def.rate), time = std::min(parents.lifespan, def.end_age) - def.start_age;
   if (!(time > 0)) return {};
-  // Each parent's times are even, and each may begin with a particle at once.
+  // Each parent releases at regular times, and each may release one particle at once.
   const WorstCase begun = bounded_children(parents, 1, parents.lifespan, 0, def.max_alive);
   return bounded(static_cast<Real>(parents.born) * up(rate * time), upper_bound(def.lifespan), begun.at_once,
                  begun.rate + static_cast<Real>(parents.alive) * rate, def.max_alive);

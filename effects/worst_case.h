@@ -1,6 +1,6 @@
 #pragma once
-/// How many particles a definition can lead to at most, for `validate` to refuse before a run (physics F3).
-/// Bounds hold for every seed and are reached by definitions of constants; sums saturate.
+/// Greatest number of particles that a definition can create, so that `validate` can refuse it before a run
+/// (physics F3). The bounds hold for every seed and are reached by constant parameters; sums saturate.
 
 #include <cstdint>
 
@@ -11,21 +11,24 @@
 
 namespace offstage::effects {
 
-/// Particles that something brings forth within a run. In any time t there are at most at_once + rate t born.
+/// Bounds for the particles created within a run. In any time t at most at_once + rate t particles are
+/// created.
 struct WorstCase {
-  uint64_t born = 0;   ///< in all
-  uint64_t alive = 0;  ///< at the end of any step
-  Real lifespan = 0;   ///< the longest [s]
+  uint64_t born = 0;   ///< total number
+  uint64_t alive = 0;  ///< number at the end of any step
+  Real lifespan = 0;   ///< longest lifespan [s]
   Real at_once = 0;
   Real rate = 0;  ///< [1/s]
 };
 
-/// Of an emitter, from its start to `duration` [s] on its clock.
+/// Bounds for an emitter, from its start to `duration` [s] on its clock.
 WorstCase worst_case(const EmitterDef& def, Real duration);
-/// The children alone, of parents that come as `parents` says. `same_system`: they are born among them.
+/// Bounds for the children alone. `parents` are the bounds for their parents. `same_system`: children are in
+/// the system of their parents.
 WorstCase worst_case(const SplitDef& def, const WorstCase& parents, bool same_system);
 WorstCase worst_case(const TrailDef& def, const WorstCase& parents);
-/// Each parent has one death and one age; of `hits_per_parent` in its life the caller must have an idea.
+/// Bounds for a sub-emitter. Each parent has one death and reaches the age once; the caller estimates
+/// `hits_per_parent`, the number of collisions in its life.
 WorstCase worst_case(const SubEmitterDef& def, const WorstCase& parents, Real hits_per_parent = 1);
 
 /// The highest rate [1/s] at which particles released one by one leave a cell before it is used again, so

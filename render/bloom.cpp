@@ -9,7 +9,7 @@
 namespace offstage::render {
 namespace {
 
-// Red, green, blue and a spare, so that a pixel is one register.
+// Red, green, blue and an unused value, so that a pixel is one register.
 typedef float Rgb __attribute__((vector_size(16)));
 
 struct Layer {
@@ -34,8 +34,8 @@ bool has_glow(const HdrImage& sum, float threshold) {
   return false;
 }
 
-// The light above the threshold, half the size. A pixel that is a hundred times too bright, as a glint of the
-// sun is, counts as ten: it would flicker.
+// The light above the threshold, at half the size. A pixel that is a hundred times too bright, such as a
+// glint of the sun, is limited to ten times, because it would flicker.
 void extract(const HdrImage& sum, float threshold, Layer& out) {
   const float most = 10 * threshold;
   tbb::parallel_for(0, out.height, [&](int y) {
@@ -73,7 +73,7 @@ Layer half_of(const Layer& in) {
   return out;
 }
 
-// A layer at a place of one twice as large.
+// Value of a layer at a pixel of a layer twice as large.
 inline Rgb enlarged(const Layer& in, int x, int y) {
   const int sx = x / 2 - 1 + (x & 1), sy = y / 2 - 1 + (y & 1);
   const float fx = (x & 1) != 0 ? 0.25f : 0.75f, fy = (y & 1) != 0 ? 0.25f : 0.75f;
@@ -94,7 +94,7 @@ void add_bloom(HdrImage& sum, const Bloom& options) {
   for (int k = 0; k < widest && std::min(layers.back().width, layers.back().height) > 2; ++k)
     layers.push_back(half_of(layers.back()));
 
-  // Each layer weighs the same, the narrow ones more per pixel: a sharp core with a long tail.
+  // All layers have the same total weight, so narrow ones have more per pixel: a sharp core with a long tail.
   const float weight = options.strength / static_cast<float>(layers.size());
   for (std::size_t k = layers.size() - 1; k > 0; --k) {
     Layer& finer = layers[k - 1];

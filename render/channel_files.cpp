@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 constexpr std::array kNames = {"depth", "normal", "id", "motion"};
 
 uint32_t color_of_id(uint32_t id) {
-  constexpr uint32_t kGolden = 0x9E3779;  // odd, so that no two ids have one colour
+  constexpr uint32_t kGolden = 0x9E3779;  // odd, so that no two ids have the same colour
   return id * kGolden & 0xFFFFFF;
 }
 

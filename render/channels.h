@@ -1,7 +1,7 @@
 #pragma once
-/// Numeric channels of a picture: depth, surface normal, object id and motion of every pixel. They cover
-/// opaque objects, glass and balls. Smoke, streaks, sprites and see-through materials have no single surface
-/// and are left out.
+/// Numeric channels of a picture: depth, surface normal, object id and motion of every pixel. They include
+/// opaque objects, glass and balls. Smoke, streaks, sprites and translucent materials have no single surface
+/// and are omitted.
 
 #include <algorithm>
 #include <cstdint>

@@ -27,7 +27,7 @@ void ChannelsPass::begin(const Matrix4f& clip_from_world, const Matrix4f& clip_b
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
   glViewport(0, 0, width_px_, height_px_);
   glEnable(GL_DEPTH_TEST);
-  glDepthMask(GL_TRUE);  // clearing obeys it, and what drew the picture left it off
+  glDepthMask(GL_TRUE);  // clearing needs it, and the drawing passes have disabled it
   glDepthFunc(GL_GREATER);
   glDisable(GL_BLEND);
   const std::array<float, 4> nothing = {0, 0, 0, 0};
@@ -60,7 +60,7 @@ void ChannelsPass::draw(const Instance& instance) {
 
 void ChannelsPass::draw(const Cloth& cloth) {
   std::vector<Vector3f> before = cloth.before;
-  if (before.size() != cloth.surface.vertices().size()) {  // it is new, or tore
+  if (before.size() != cloth.surface.vertices().size()) {  // the cloth is new, or tore
     before.clear();
     for (const ClothVertex& v : cloth.surface.vertices()) before.push_back(v.position);
   }
@@ -96,7 +96,7 @@ void ChannelsPass::end(Channels& result) {
             std::vector<Vector2f>(count)};
   std::vector<Vector4f> pixels(count);
   glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_);
-  // Rows come from the bottom up.
+  // OpenGL returns rows from the bottom up.
   const auto read = [&](GLenum attachment, auto&& put) {
     glReadBuffer(attachment);
     glReadPixels(0, 0, width_px_, height_px_, GL_RGBA, GL_FLOAT, pixels.data());

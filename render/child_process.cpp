@@ -16,8 +16,8 @@
 namespace offstage::render {
 namespace {
 
-/// In the child: its streams, group and signals, then the program. Only calls that are safe after fork() in a
-/// process with threads.
+/// In the child: sets its streams, group and signals, then starts the program. Uses only calls that are safe
+/// after fork() in a process with threads.
 [[noreturn]] void become(char** argv, const std::array<int, 3>& streams, pid_t parent, int report) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(127);
@@ -75,7 +75,8 @@ ChildProcess::ChildProcess(const std::vector<std::string>& arguments, int in, in
   writing.close();
   ssize_t got = 0;
   do {
-    got = ::read(reading.fd(), &error_, sizeof error_);  // nothing where the program started: the end closed
+    // Nothing is read if the program started, because the other end was closed.
+    got = ::read(reading.fd(), &error_, sizeof error_);
   } while (got < 0 && errno == EINTR);
   if (got != sizeof error_) {
     error_ = 0;
@@ -119,7 +120,7 @@ std::optional<std::string> ChildProcess::wait_for(std::chrono::milliseconds limi
 
 bool wait_for_end(pid_t child, std::chrono::milliseconds limit) {
   const auto deadline = std::chrono::steady_clock::now() + limit;
-  // A descriptor of the process wakes at its end; without one (old kernels) the end is asked for.
+  // A process descriptor becomes readable when the child ends; without one (old kernels) the child is polled.
   const Descriptor process(static_cast<int>(::syscall(SYS_pidfd_open, child, 0)));
   while (true) {
     siginfo_t info{};

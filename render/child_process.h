@@ -1,6 +1,6 @@
 #pragma once
-/// A program run as a child in its own process group, so that a Ctrl-C meant for us does not end it first.
-/// The kernel kills it if the thread that started it ends, or its whole process. Private to render.
+/// A program run as a child in its own process group, so that Ctrl-C for this process does not end it first.
+/// The kernel kills it when the thread that started it, or the whole process, ends.
 
 #include <chrono>
 #include <optional>
@@ -13,8 +13,8 @@
 
 namespace offstage::render {
 
-/// Memory of fixed size that a child may use as its standard output or error: what does not fit is lost, so
-/// it can neither block nor fill anything.
+/// Memory of fixed size that a child uses as its standard output or error. Output beyond it is lost, so the
+/// child can neither block nor fill a disk.
 class BoundedCapture {
  public:
   explicit BoundedCapture(std::size_t max_bytes);
@@ -28,21 +28,21 @@ class BoundedCapture {
 
 class ChildProcess {
  public:
-  /// Runs `arguments[0]`, searched in PATH, with these as its standard streams; -1 is /dev/null. Sets error()
-  /// if it cannot be run.
+  /// Runs `arguments[0]`, searched in PATH, with these standard streams; -1 is /dev/null. Sets error() if it
+  /// cannot be run.
   ChildProcess(const std::vector<std::string>& arguments, int in, int out, int err);
-  /// Kills what still runs.
+  /// Kills the child if it still runs.
   ~ChildProcess();
   ChildProcess(const ChildProcess&) = delete;
   ChildProcess& operator=(const ChildProcess&) = delete;
 
-  /// Why it could not be started, an errno value; 0 if it was.
+  /// The errno value if the child could not be started; otherwise 0.
   int error() const { return error_; }
   void kill();
-  /// Waits for its end: nothing if it succeeded, else "exit code 1" or "signal 9". A child that does not end
-  /// after a request to stop is killed (Patience).
+  /// Waits for the end of the child. Returns nothing if it succeeded, otherwise "exit code 1" or "signal 9".
+  /// A child that does not end after a request to stop is killed (Patience).
   std::optional<std::string> wait(const StopTest& stop = {});
-  /// The same with a limit, after which it is killed.
+  /// The same with a time limit, after which the child is killed.
   std::optional<std::string> wait_for(std::chrono::milliseconds limit);
 
  private:
@@ -50,10 +50,10 @@ class ChildProcess {
   int error_ = 0;
 };
 
-/// Waits at most `limit` for the end of a child; false if it still runs. Does not reap it.
+/// Waits at most `limit` for the end of a child; returns false if it still runs. Does not reap it.
 bool wait_for_end(pid_t child, std::chrono::milliseconds limit);
 
-/// "exit code 1" or "signal 9 (Killed)" from waitpid's status; nothing for success.
+/// Converts waitpid's status to "exit code 1" or "signal 9 (Killed)"; nothing for success.
 std::optional<std::string> describe_failure(int wait_status);
 
 }  // namespace offstage::render

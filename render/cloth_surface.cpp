@@ -8,15 +8,15 @@
 namespace offstage::render {
 namespace {
 
-/// Meshes are subdivided until they have that many triangles, or that often. On a picture of 1280 pixels
-/// triangles are then a few pixels wide.
+/// Meshes are subdivided until they have this many triangles, or kMostLevels times. In a picture 1280
+/// pixels wide, triangles are then a few pixels wide.
 constexpr std::size_t kFineTriangles = 25'000;
 constexpr int kMostLevels = 3;
-/// Rounds of smoothing whose difference tells hollows from ridges.
+/// Number of smoothing rounds; the difference to the smoothed surface distinguishes hollows from ridges.
 constexpr int kSmoothingRounds = 8;
 
-/// Smooth normals, with N. Max's weights ("Weights for computing vertex normals from facet normals", 1999):
-/// exact on spheres, and without the arc cosine that angles would take.
+/// Smooth normals by N. Max's weights ("Weights for computing vertex normals from facet normals", 1999). They
+/// are exact on spheres, and do not need the arc cosine that angles would need.
 void smooth_normals(std::span<const Vector4f> places, std::span<const uint32_t> triangles,
                     std::vector<Vector3f>& normals) {
   constexpr float kTiny = 1e-24f;
@@ -96,7 +96,7 @@ void ClothSurface::measure_hollows() {
   for (std::size_t v = 0; v < places_.size(); ++v)
     if (first_neighbor_[v] < first_neighbor_[v + 1])
       squares += static_cast<double>((places_[v] - places_[neighbors_[first_neighbor_[v]]]).squaredNorm());
-  // A round moves what it smooths by the root of half a squared edge.
+  // A round smooths over the square root of half the mean squared edge.
   const float width = std::sqrt(static_cast<float>(squares) / static_cast<float>(places_.size() + 1) *
                                 (0.5f * kSmoothingRounds)) +
                       1e-12f;

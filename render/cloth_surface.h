@@ -1,6 +1,6 @@
 #pragma once
-/// Private: the surface that is drawn for a cloth. The simulated mesh is subdivided until contact creases
-/// look round, and gets smooth normals. A rim as wide as the cloth is thick closes its boundary. The depth of
+/// Private: the drawn surface of a cloth. The simulated mesh is subdivided until contact creases look round,
+/// and gets smooth normals. A rim as wide as the thickness of the cloth closes its boundary. The depth of
 /// folds is estimated at each vertex, because folds receive less light from the sky.
 
 #include <cstdint>
@@ -32,7 +32,7 @@ class ClothSurface {
 
   std::span<const ClothVertex> vertices() const { return vertices_; }
   const std::vector<uint32_t>& indices() const { return indices_; }
-  /// Number of calls of set_mesh; shows whether uploaded `indices` are current.
+  /// Number of calls of set_mesh(), to check whether uploaded `indices` are current.
   uint32_t version() const { return version_; }
   const Eigen::AlignedBox3f& box() const { return box_; }
   int levels() const { return static_cast<int>(subdivisions_.size()); }
@@ -42,11 +42,11 @@ class ClothSurface {
 
   std::size_t coarse_count_ = 0;
   std::vector<uint32_t> coarse_triangles_;
-  std::vector<uint32_t> first_neighbor_, neighbors_;  // of the coarse vertices
+  std::vector<uint32_t> first_neighbor_, neighbors_;  // neighbours of the coarse vertices
   std::vector<LoopSubdivision> subdivisions_;
   std::vector<BoundaryEdge> rim_;
-  std::vector<uint32_t> indices_;  // of the sheet, then of the rim
-  std::vector<Vector2f> uvs_;      // of the fine vertices
+  std::vector<uint32_t> indices_;  // triangles of the sheet, then those of the rim
+  std::vector<Vector2f> uvs_;      // for the fine vertices
   uint32_t version_ = 0;
 
   std::vector<Vector4f> places_, finer_, smooth_, smoother_;  // w: hollow

@@ -19,7 +19,7 @@
 namespace offstage::render {
 namespace {
 
-constexpr int kAnswerExit = 40, kMessageExit = 41;  // other codes are not the child's
+constexpr int kAnswerExit = 40, kMessageExit = 41;  // other codes do not come from this code
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
 ProcessLimits limits_of(uint64_t file_bytes) {
@@ -29,13 +29,13 @@ ProcessLimits limits_of(uint64_t file_bytes) {
           .memory_bytes = std::min(kMemory + kTimesFile * file_bytes, kMostMemory)};
 }
 
-/// The child: leaves an answer or a message in the memory file.
+/// Runs in the child: writes an answer or a message to the memory file.
 [[noreturn]] void become_child(const ConfinedWork& work, const ProcessLimits& limits, int memory,
                                const std::function<void(int)>& job) {
   std::string message;
   try {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    const int nowhere = ::open("/dev/null", O_RDWR);  // for the prints of importers
+    const int nowhere = ::open("/dev/null", O_RDWR);  // for the output of importers
     for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, stream);
     close_descriptors(memory);
     limit_process(limits);
@@ -61,36 +61,38 @@ ProcessLimits limits_of(uint64_t file_bytes) {
                   " s of processor time to read; it is broken or too large");
 }
 
-/// Whether a child no longer works: of the last minute it used less than a hundredth. On a machine that is
-/// busy with other work it gets less than all of its time, but not so little. Its processor time has a limit
-/// of its own.
+/// Detects a child that does not work any more: in the last minute it used less than a hundredth of the time.
+/// On a busy machine a child gets less than all of its time, but not that little. Its processor time has a
+/// separate limit.
 class Standstill {
  public:
-  explicit Standstill(pid_t child) { known_ = ::clock_getcpuclockid(child, &clock_) == 0; }
+  Standstill(pid_t child, std::chrono::seconds interval) : interval_(interval) {
+    known_ = ::clock_getcpuclockid(child, &clock_) == 0;
+  }
 
   bool reached() {
     const auto now = std::chrono::steady_clock::now();
-    if (now - since_ < kInterval) return false;
+    if (now - since_ < interval_) return false;
     timespec used{};
     if (!known_ || ::clock_gettime(clock_, &used) != 0) return true;
     const auto cpu = std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec);
-    const bool still = cpu - cpu_ < kInterval / 100;
+    const bool still = cpu - cpu_ < std::chrono::nanoseconds(interval_) / 100;
     since_ = now;
     cpu_ = cpu;
     return still;
   }
 
  private:
-  static constexpr std::chrono::nanoseconds kInterval = std::chrono::seconds(60);
+  std::chrono::seconds interval_;
   clockid_t clock_ = 0;
   bool known_ = false;
   std::chrono::steady_clock::time_point since_ = std::chrono::steady_clock::now();
   std::chrono::nanoseconds cpu_{0};
 };
 
-/// Waits for the child; its status.
+/// Waits for the child and returns its status.
 int wait_status(pid_t child, const ConfinedWork& work) {
-  Standstill standstill(child);
+  Standstill standstill(child, work.standstill);
   bool stopped = false, still = false;
   while (!wait_for_end(child, std::chrono::milliseconds(Patience::kInterval_ms))) {
     stopped = work.stop && work.stop();
@@ -102,7 +104,9 @@ int wait_status(pid_t child, const ConfinedWork& work) {
   while (::waitpid(child, &status, 0) < 0)
     if (errno != EINTR) throw UnavailableError("the reader of files was lost: " + system_reason(errno));
   if (stopped) throw StoppedError(work.what + ": reading was interrupted");
-  if (still) throw FileError(work.what + ": its reader made no progress for a minute; it is broken");
+  if (still)
+    throw FileError(work.what + ": its reader made no progress for " +
+                    std::to_string(work.standstill.count()) + " s; it is broken");
   return status;
 }
 

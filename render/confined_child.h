@@ -1,7 +1,8 @@
 #pragma once
-/// Work on the files of strangers in a forked child that can do no harm: limits of time and memory, no
-/// network, no writing, no file outside of the given folders (sandbox.h). Private to render.
+/// Runs work on untrusted files in a forked child that can do no harm: limits of time and memory, no network,
+/// no writing, and no files outside of the given folders (sandbox.h). Private to render.
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -13,15 +14,17 @@
 namespace offstage::render {
 
 struct ConfinedWork {
-  std::string what;  ///< in messages: the file
-  /// Its size, which the limits follow: 10 s of processor time and 1 s more for each 5 MiB, at most 60 s; 1.5
-  /// GiB of memory and 16 times the size, at most 4 GiB.
+  std::string what;  ///< name of the file, for messages
+  /// Size of the file, which determines the limits: 10 s of processor time and 1 s more for each 5 MiB, at
+  /// most 60 s; 1.5 GiB of memory and 16 times the size, at most 4 GiB.
   uint64_t file_bytes = 0;
-  const InputFolders* folders = nullptr;  ///< that may be read
+  const InputFolders* folders = nullptr;  ///< folders that may be read
   StopTest stop = {};
+  /// A child that gets less than a hundredth of a processor for this long [s] is broken and is killed.
+  std::chrono::seconds standstill{60};
 };
 
-/// What the child wrote, mapped.
+/// The answer of a child, memory-mapped.
 class ChildAnswer {
  public:
   explicit ChildAnswer(int fd);
@@ -36,9 +39,9 @@ class ChildAnswer {
   void* data_ = nullptr;
 };
 
-/// Runs `job` in the child with a memory file for its answer. Throws FileError with what the job threw, or
-/// with how the child ended: too slow, too much memory, killed, crashed; StoppedError after a request to
-/// stop; UnavailableError if no process can be started.
+/// Runs `job` in the child, with a memory file for its answer. Throws FileError with the message of `job`, or
+/// with how the child ended: too slow, too much memory, killed, crashed. Throws StoppedError after a request
+/// to stop, and UnavailableError if no process can be started.
 ChildAnswer run_confined(const ConfinedWork& work, const std::function<void(int)>& job);
 
 }  // namespace offstage::render

@@ -25,8 +25,8 @@ constexpr std::array<std::pair<std::string_view, GlPlatform>, 4> kPlatforms = {
      {"egl", GlPlatform::egl},
      {"egl:gpu", GlPlatform::egl_gpu}}};
 
-// One for the whole process: Mesa's environment and glad's function pointers are, too. The first context
-// replaces `automatic` by what works.
+// One mutex for the whole process, as Mesa's environment and glad's function pointers are. The first context
+// replaces `automatic` by an available platform.
 std::mutex platform_mutex;
 GlPlatform chosen_platform = GlPlatform::automatic;
 
@@ -35,7 +35,7 @@ std::unique_ptr<PlatformContext> make_context_of(GlPlatform platform) {
                                         : make_egl_context(platform == GlPlatform::egl_gpu);
 }
 
-/// A context of the chosen platform, current on this thread.
+/// Creates a context of the chosen platform, current on this thread.
 std::pair<std::unique_ptr<PlatformContext>, GlPlatform> make_platform_context() {
   const std::lock_guard lock(platform_mutex);
   if (chosen_platform != GlPlatform::automatic) return {make_context_of(chosen_platform), chosen_platform};
@@ -57,7 +57,7 @@ std::string gl_string(GLenum name) {
   return text != nullptr ? reinterpret_cast<const char*>(text) : "";
 }
 
-// glad keeps its function pointers in globals; they are the same for every context of the process.
+// glad keeps its function pointers in global variables; they are the same for every context of the process.
 void load_functions(GlLookup lookup) {
   static std::once_flag once;
   static int version = 0;
@@ -102,8 +102,8 @@ GlPlatform gl_platform_of_environment() {
 
 namespace {
 
-/// Removes what changes a Mesa driver's pixels or traces them: every variable of these families but those
-/// that say where its parts are installed.
+/// Removes the variables that change or trace a Mesa driver's pixels: all variables of these families except
+/// those that say where its parts are installed.
 void clear_driver_variables() {
   constexpr std::array<std::string_view, 14> kFamilies = {
       "MESA_", "GALLIUM_",  "GALLIVM_", "LP_",  "ST_",   "DRAW_",   "TGSI_",
@@ -135,8 +135,8 @@ void pin_environment(int raster_threads, GlPlatform platform) {
   };
   clear_driver_variables();
   set_if(software, "GALLIUM_DRIVER", "llvmpipe");
-  set_if(software, "LIBGL_ALWAYS_SOFTWARE", "true");  // EGL would look for a GPU first
-  setenv("EGL_LOG_LEVEL", "fatal", 0);                // what fails is in the exceptions
+  set_if(software, "LIBGL_ALWAYS_SOFTWARE", "true");  // EGL would prefer a GPU
+  setenv("EGL_LOG_LEVEL", "fatal", 0);                // errors are reported as exceptions
   setenv("LP_NATIVE_VECTOR_WIDTH", "256", 1);
   setenv("LP_NUM_THREADS", std::to_string(raster_threads).c_str(), 1);
   const char* cache = std::getenv("OFFSTAGE_SHADER_CACHE");
@@ -148,7 +148,7 @@ void pin_environment(int raster_threads, GlPlatform platform) {
 struct Context::Impl {
   std::unique_ptr<PlatformContext> platform;
   ContextInfo info;
-  std::optional<gl::SharedPrograms> programs;  // they end before the context
+  std::optional<gl::SharedPrograms> programs;  // destroyed before the context
 };
 
 Context::Context() : impl_(std::make_unique<Impl>()) {

@@ -1,5 +1,6 @@
 // filter_edges of tone_map.h: after T. Lottes, "FXAA" (NVIDIA, 2009), in integers. A pixel on an edge of high
-// contrast is mixed with its neighbour across the edge, by how near the edge's end it lies.
+// contrast is mixed with its neighbour across the edge, by a weight that depends on its distance from the end
+// of the edge.
 
 #include <algorithm>
 #include <cstdlib>
@@ -12,7 +13,7 @@ namespace {
 constexpr int kSearch_px = 12;
 constexpr int kMinContrast = 12;
 
-// Brightness with a border of one pixel repeated, so that neighbours need no checks.
+// Brightness with a repeated border of one pixel, so that neighbours need no checks.
 struct Luma {
   int stride = 0;
   std::vector<uint8_t> values;
@@ -34,8 +35,8 @@ struct Luma {
   const uint8_t* row(int y) const { return values.data() + static_cast<std::ptrdiff_t>(y + 1) * stride + 1; }
 };
 
-// Marks the pixels of a row that differ enough from their neighbours; simple enough for the compiler to
-// vectorise.
+// Marks the pixels of a row that differ enough from their neighbours. The loop is simple, so that the
+// compiler vectorises it.
 void mark_edges(const Luma& luma, int y, int width, std::vector<uint8_t>& mark) {
   const uint8_t *north = luma.row(y - 1), *here = luma.row(y), *south = luma.row(y + 1);
   for (int x = 0; x < width; ++x) {
@@ -46,7 +47,7 @@ void mark_edges(const Luma& luma, int y, int width, std::vector<uint8_t>& mark) 
   }
 }
 
-// How a pixel mixes: `weight` in 1/256 of its neighbour `dx, dy`.
+// Mixing of a pixel: `weight` in 1/256 of its neighbour `dx, dy`.
 struct Mix {
   int dx = 0, dy = 0, weight = 0;
 };
@@ -59,13 +60,13 @@ Mix mix_of(const Luma& luma, const Image& image, int x, int y) {
   const int across_columns = std::abs(m[-1] + m[1] - 2 * m[0]) * 2 +
                              std::abs(m[-s - 1] + m[-s + 1] - 2 * m[-s]) +
                              std::abs(m[s - 1] + m[s + 1] - 2 * m[s]);
-  const bool horizontal = across_rows >= across_columns;  // the edge runs along x
+  const bool horizontal = across_rows >= across_columns;  // the edge is along x
   const int along = horizontal ? 1 : s;
   int across = horizontal ? s : 1;
   if (std::abs(m[-across] - m[0]) > std::abs(m[across] - m[0])) across = -across;
   const int gradient = std::abs(m[across] - m[0]);
 
-  // Twice the brightness on the edge itself; the ends are where it changes by half the gradient.
+  // Twice the brightness on the edge itself; an end is where it changes by half the gradient.
   const int edge = m[0] + m[across];
   const auto search = [&](int step, int limit) {
     int n = 1;
@@ -81,12 +82,12 @@ Mix mix_of(const Luma& luma, const Image& image, int x, int y) {
   const int ahead = search(along, std::min(kSearch_px, room_ahead));
   const int near = std::min(back, ahead);
   const int end = near == back ? -along * back : along * ahead;
-  // Only the side of the edge that steps over at its nearer end is mixed.
+  // Only pixels on the side of the edge that steps over at its nearer end are mixed.
   const int end_value = m[end] + m[end + across] - edge;
   const bool steps_here = (end_value < 0) != (2 * m[0] - edge < 0);
   int weight = steps_here ? 128 - 256 * near / (back + ahead) : 0;
 
-  // A pixel that stands out from all its surroundings is mixed a little, too.
+  // A pixel that differs from all its neighbours is mixed slightly, too.
   const int around = 2 * (m[-1] + m[1] + m[-s] + m[s]) + m[-s - 1] + m[-s + 1] + m[s - 1] + m[s + 1];
   const int range = std::max({m[-1], m[1], m[-s], m[s], m[0]}) - std::min({m[-1], m[1], m[-s], m[s], m[0]});
   const int stands_out = std::min(256, std::abs(around / 12 - m[0]) * 256 / range);

@@ -1,5 +1,5 @@
-// EGL without a surface: Mesa's surfaceless platform for llvmpipe, devices for GPUs. The few functions that
-// are needed are declared here, so that nothing but libEGL.so.1 is needed, and that at run time only.
+// EGL without a surface: Mesa's surfaceless platform for llvmpipe, devices for GPUs. The few functions used
+// are declared here, so that only libEGL.so.1 is needed, and only at run time.
 
 #include <algorithm>
 #include <array>
@@ -13,7 +13,7 @@
 namespace offstage::render {
 namespace {
 
-// From the Khronos registry of EGL.
+// Constants and types of the Khronos registry of EGL.
 using Display = void*;
 using EglHandle = void*;
 using Device = void*;
@@ -41,7 +41,7 @@ struct EglLibrary {
   unsigned (*make_current)(Display, void* draw, void* read, EglHandle) = nullptr;
   unsigned (*destroy_context)(Display, EglHandle) = nullptr;
   unsigned (*release_thread)() = nullptr;
-  // Of extensions; nullptr where they are missing.
+  // Functions of extensions; null if they are missing.
   Display (*get_platform_display)(unsigned platform, void* native, const int* attributes) = nullptr;
   unsigned (*query_devices)(int most, Device* devices, int* count) = nullptr;
   const char* (*query_device_string)(Device, int name) = nullptr;
@@ -84,7 +84,7 @@ bool has_word(const char* list, std::string_view word) {
   return false;
 }
 
-/// What went wrong last, for a message.
+/// Error code of the last call, for a message.
 std::string error_code() {
   std::array<char, 8> digits{};
   std::to_chars(digits.data(), digits.data() + digits.size(), egl().get_error(), 16);
@@ -98,14 +98,15 @@ std::vector<Device> devices() {
   if (egl().query_devices == nullptr || egl().query_device_string == nullptr ||
       !egl().query_devices(kMost, found.data(), &count))
     throw UnavailableError("libEGL cannot list devices; upgrade it: apt-get install " + kPackages);
-  return std::vector<Device>(found.begin(), found.begin() + count);  // parentheses: not the two as its items
+  // Parentheses, because braces would make a list of the two iterators.
+  return std::vector<Device>(found.begin(), found.begin() + count);
 }
 
 bool is_software(Device device) {
   return has_word(egl().query_device_string(device, kExtensions), "EGL_MESA_device_software");
 }
 
-/// A display of EGL that is initialised; they last until the process ends.
+/// Returns an initialised display of EGL; it stays valid until the process ends.
 Display initialised(unsigned platform, void* native) {
   if (egl().get_platform_display == nullptr)
     throw UnavailableError("libEGL has no platform displays; upgrade it: apt-get install " + kPackages);
@@ -157,14 +158,14 @@ std::unique_ptr<PlatformContext> make_software_context() {
   }
 }
 
-/// The first GPU that gives a context; the others are not tried.
+/// Returns the first GPU on which a context can be created; the following ones are not tried.
 Display first_gpu() {
   std::string reasons;
   for (const Device device : devices()) {
     if (is_software(device)) continue;
     try {
       const Display display = initialised(kDevicePlatform, device);
-      EglContext{display};  // its driver has OpenGL 4.5
+      EglContext{display};  // checks that its driver has OpenGL 4.5
       return display;
     } catch (const UnavailableError& error) {
       reasons += std::string(reasons.empty() ? "" : "; ") + error.what();

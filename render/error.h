@@ -1,12 +1,12 @@
 #pragma once
-/// What the renderer throws: one line that says what failed and what to do about it.
+/// Exceptions of the renderer. Each has one line that says what failed and what to do about it.
 
 #include <stdexcept>
 #include <string>
 
 namespace offstage::render {
 
-/// A file that cannot be read or written, or holds what it should not.
+/// A file cannot be read or written, or its content is invalid.
 class FileError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -19,7 +19,7 @@ class UnavailableError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A wait that was given up after a request to stop.
+/// A wait was ended by a request to stop.
 class StoppedError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

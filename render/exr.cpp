@@ -16,7 +16,7 @@
 namespace offstage::render {
 namespace {
 
-/// A file in memory, so that it can appear on disk as a whole.
+/// A file in memory, which is then written to the disk as a whole.
 class Buffer : public Imf::OStream {
  public:
   Buffer() : Imf::OStream("memory") {}
@@ -44,7 +44,7 @@ void write_exr(const std::filesystem::path& path, const Channels& channels, cons
   Imf::FrameBuffer pixels;
   const auto add = [&](const char* name, Imf::PixelType type, const void* first, std::size_t stride) {
     header.channels().insert(name, Imf::Channel(type));
-    // The library takes a pointer that can be written to, and only reads.
+    // The library takes a non-const pointer, but only reads.
     auto* base = static_cast<char*>(const_cast<void*>(first));
     pixels.insert(name, Imf::Slice(type, base, stride, stride * static_cast<std::size_t>(channels.width_px)));
   };

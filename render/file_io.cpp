@@ -41,7 +41,7 @@ int write_all(int fd, std::span<const uint8_t> bytes, const StopTest& stop) {
     if (written >= 0) {
       bytes = bytes.subspan(static_cast<std::size_t>(written));
       patience.progressed();
-    } else if (errno == EAGAIN) {  // the descriptor does not block
+    } else if (errno == EAGAIN) {  // the descriptor is non-blocking
       if (patience.exhausted()) return ECANCELED;
       pollfd ready{fd, POLLOUT, 0};
       ::poll(&ready, 1, Patience::kInterval_ms);
@@ -53,7 +53,7 @@ int write_all(int fd, std::span<const uint8_t> bytes, const StopTest& stop) {
 }
 
 std::vector<uint8_t> read_file(const std::filesystem::path& path, uint64_t max_bytes) {
-  // Not blocking, or opening a named pipe would wait for its writer.
+  // Non-blocking, because opening a named pipe would wait for its writer.
   Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   struct stat info {};
   if (!file || ::fstat(file.fd(), &info) != 0) throw_file_error(path, "cannot be opened");

@@ -9,7 +9,7 @@
 namespace offstage::render {
 namespace {
 
-/// From so many sub-frames on, their own places on the sun's disc filter its shadows.
+/// From this number of sub-frames on, the different sun directions of the sub-frames filter its shadows.
 constexpr int kManySamples = 16;
 
 constexpr float kRadians = std::numbers::pi_v<float> / 180;
@@ -18,7 +18,7 @@ Vector4f vec4(const Vector3f& v, float w = 0) {
   return {v.x(), v.y(), v.z(), w};
 }
 
-// A unit vector perpendicular to `direction`, continuous in it except at the vertical.
+// Returns a unit vector perpendicular to `direction`, a continuous function of it except at the vertical.
 Vector3f perpendicular(const Vector3f& direction) {
   const Vector3f other = std::abs(direction.y()) < 0.99f ? Vector3f::UnitY() : Vector3f::UnitX();
   return other.cross(direction).normalized();
@@ -51,7 +51,7 @@ bool View::sees(const Vector3f& center, float radius) const {
   if (depth < near_m - radius || depth > far_m + radius) return false;
   for (int axis = 0; axis < 2; ++axis) {
     const float across = (axis == 0 ? right : up).dot(relative);
-    const float middle = -shear[axis] * tan_half[axis] * depth;  // where the image's middle is at this depth
+    const float middle = -shear[axis] * tan_half[axis] * depth;  // centre of the image at this depth
     const float slope_high = (1 - shear[axis]) * tan_half[axis],
                 slope_low = (1 + shear[axis]) * tan_half[axis];
     const float over = across - depth * slope_high, under = -across - depth * slope_low;
@@ -104,7 +104,7 @@ View make_view(const Camera& camera, const SampleOffsets& offsets, int width_px,
   view.forward = distance > 0 ? Vector3f(sight / distance) : Vector3f(-Vector3f::UnitZ());
   Vector3f side = view.forward.cross(camera.up);
   if (side.norm() < 1e-6f)
-    side = view.forward.cross(-Vector3f::UnitZ());  // straight down: as on a map, -Z is up
+    side = view.forward.cross(-Vector3f::UnitZ());  // looking straight down: as on a map, -Z is up
   view.right = side.norm() > 1e-6f ? Vector3f(side.normalized()) : perpendicular(view.forward);
   view.up = view.right.cross(view.forward);
 
@@ -113,8 +113,7 @@ View make_view(const Camera& camera, const SampleOffsets& offsets, int width_px,
   view.near_m = camera.near_m;
   view.far_m = camera.far_m;
 
-  // Thin lens: the eye moves in the lens and the image is sheared so that the plane in focus stays where it
-  // is.
+  // Thin lens: the eye moves in the lens, and the image is sheared so that the plane in focus does not move.
   const Vector2f lens = square_to_disc(offsets.lens) * (0.5f * camera.aperture);
   const float focus = camera.focus > 0 ? camera.focus : std::max(distance, camera.near_m);
   view.eye = camera.eye + lens.x() * view.right + lens.y() * view.up;
@@ -170,7 +169,7 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
   const std::array<Vector3f, 9> irradiance = sky_irradiance(sky);
   for (std::size_t k = 0; k < 7; ++k)
     frame.irradiance[k] = vec4(irradiance[k], k < 6 ? irradiance[7 + k / 3][static_cast<int>(k % 3)] : 0);
-  // The dither of every pixel passes evenly through [0, 1).
+  // The dither of every pixel is evenly distributed over [0, 1) in the sub-frames.
   frame.shadow = {0, 0, 0, static_cast<float>(offsets.index) / static_cast<float>(offsets.count)};
   frame.penumbra = Vector4f::Zero();
   frame.air = {0, 0, environment.clouds, static_cast<float>(offsets.count)};
@@ -179,8 +178,8 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
 
 SampleOffsets sample_offsets(int i, int n) {
   if (n <= 1) return {};
-  // The Hammersley set, walked in three orders so that pixel, lens and light have nothing to do with each
-  // other or with time, which goes as i.
+  // The Hammersley set in three different orders, so that pixel, lens and light are independent of each other
+  // and of time, which is proportional to i.
   const auto hammersley = [n](int k) {
     float inverse = 0, digit = 0.5f;
     for (int bits = k; bits > 0; bits >>= 1, digit *= 0.5f) inverse += static_cast<float>(bits & 1) * digit;

@@ -37,7 +37,7 @@ struct FrameUniforms {
   Vector4f sun_direction;
   Vector4f sun_radiance;
   Vector4f zenith, horizon, ground, glow;
-  std::array<Vector4f, 7> irradiance;  ///< the last two of nine coefficients in the others' w
+  std::array<Vector4f, 7> irradiance;  ///< the last two of the nine coefficients are in the w components
   Vector4f shadow, penumbra;
   Vector4f ray_center, ray_x, ray_y;
   Vector4f depth;
@@ -52,7 +52,7 @@ static_assert(offsetof(FrameUniforms, lamps) == 32 * sizeof(Vector4f));
 /// Defines of the shaders that depend on the lighting, such as "SMOKE 1".
 using Features = std::vector<std::string>;
 
-/// The eye of one sub-frame: offset within the lens, looking along `forward`.
+/// The eye of one sub-frame: displaced within the lens, looking along `forward`.
 struct View {
   Matrix4f clip_from_world;
   Vector3f eye, right, up, forward;
@@ -60,10 +60,10 @@ struct View {
   Vector2f shear;     ///< shift of the image in half-sizes, by lens and pixel offsets
   float near_m = 0, far_m = 0;
 
-  /// Whether a ball may be in view; false only if it is outside one plane of the frustum.
+  /// Whether a ball may be in view; false only if it is outside of one plane of the frustum.
   bool sees(const Vector3f& center, float radius) const;
   float depth_of(const Vector3f& point) const { return forward.dot(point - eye); }
-  /// Corners of the frustum, cut at a distance; four near ones, then four far ones.
+  /// Corners of the frustum up to a distance: four near ones, then four far ones.
   std::array<Vector3f, 8> corners(float far_distance) const;
 };
 

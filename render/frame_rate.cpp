@@ -11,7 +11,7 @@ namespace {
 constexpr int64_t kMostNumerator = 1'000'000'000, kMostDenominator = 1'000'000;
 constexpr double kMostPerSecond = 2000;
 
-/// The number that the whole of a text is.
+/// Parses a text that consists of one number.
 template <class N>
 std::optional<N> number_in(std::string_view text) {
   N value{};
@@ -29,7 +29,8 @@ std::string FrameRate::text() const {
 }
 
 FrameRate frame_rate_of(double per_second) {
-  // Convergents p/q of the continued fraction; each is the best fraction with a denominator of its size.
+  // Convergents p/q of the continued fraction; each is the best fraction with a denominator of at most its
+  // size.
   int64_t p = 1, q = 0, p_before = 0, q_before = 1;
   double rest = per_second;
   constexpr int kMostTerms = 64;

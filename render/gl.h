@@ -14,7 +14,7 @@
 
 namespace offstage::render {
 
-/// The text of a file of shaders/ (see cmake/embed_shaders.cmake).
+/// Returns the text of a file of shaders/ (see cmake/embed_shaders.cmake).
 std::string_view shader_source(std::string_view name);
 
 namespace gl {

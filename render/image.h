@@ -1,5 +1,5 @@
 #pragma once
-/// Pictures in memory. Rows run from the top down everywhere outside GL.
+/// Pictures in memory. Rows are stored from the top down everywhere except in OpenGL.
 
 #include <cstddef>
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace offstage::render {
 struct Image {
   int width_px = 0, height_px = 0;
   std::vector<uint8_t> rgba;  ///< width * height * 4
-  bool transparent = false;   ///< alpha is used; otherwise files have no alpha channel
+  bool transparent = false;   ///< alpha is used; otherwise files are written without alpha
 
   std::size_t pixel_count() const {
     return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
@@ -33,7 +33,8 @@ struct HdrImage {
 /// XXH3-128 of size and pixels as 32 hexadecimal digits. It does not depend on the encoding of a file.
 std::string pixel_hash(const Image& image);
 
-/// How two images of one size differ. `max_delta` and `mean_delta` are over the RGBA channels in 8-bit steps.
+/// Difference of two images of the same size. `max_delta` and `mean_delta` are over the RGBA channels in
+/// 8-bit steps.
 struct ImageDifference {
   int max_delta = 0;
   double mean_delta = 0;
@@ -41,8 +42,8 @@ struct ImageDifference {
   double fraction_over = 0;     ///< the same as a share of all pixels
   double total_delta = 0;       ///< sum of all absolute channel differences
 
-  /// The tolerance for goldens of another machine class: at most 0.05 % of the pixels off by more than 2
-  /// steps, and a mean difference of at most 0.05 steps.
+  /// Tolerance for goldens of another fingerprint class: at most 0.05 % of the pixels differ by more than 2
+  /// steps, and the mean difference is at most 0.05 steps.
   bool within_tolerance() const;
 };
 /// Throws std::invalid_argument if the sizes differ.

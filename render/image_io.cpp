@@ -28,7 +28,7 @@
 namespace offstage::render {
 namespace {
 
-constexpr int kMaxSide = 16384;  // OpenGL's limit here too
+constexpr int kMaxSide = 16384;  // also OpenGL's limit here
 constexpr uint64_t kMaxImageBytes = uint64_t{1} << 30;
 
 std::vector<uint8_t> without_alpha(const Image& image) {
@@ -67,7 +67,7 @@ Image decode_image(std::span<const uint8_t> bytes, const std::string& name, uint
                std::to_string(max_pixels >> 20) + " Mi");
   }
   if (bytes[0] == 'P' && stbi_is_16_bit_from_memory(bytes.data(), size)) {
-    throw fail("PNM of 16 bits is not supported; convert it to PNG");  // stb_image swaps its bytes
+    throw fail("PNM of 16 bits is not supported; convert it to PNG");  // stb_image swaps their bytes
   }
   const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
       stbi_load_from_memory(bytes.data(), size, &width, &height, &channels, STBI_rgb_alpha), stbi_image_free);
@@ -98,7 +98,8 @@ std::string png_settings(const std::filesystem::path& path) {
 void write_file_atomically(const std::filesystem::path& path, std::span<const uint8_t> bytes) {
   struct stat info {};
   if (::lstat(path.c_str(), &info) == 0 && (S_ISFIFO(info.st_mode) || S_ISCHR(info.st_mode))) {
-    // A pipe or a device is written to; renaming would replace it. Without a reader a pipe is refused.
+    // A pipe or a device is written to directly, because renaming would replace it. A pipe without a reader
+    // is refused.
     Descriptor device(::open(path.c_str(), O_WRONLY | O_NONBLOCK | O_NOFOLLOW | O_CLOEXEC));
     if (!device) throw_file_error(path, "cannot be opened");
     if (const int error = write_all(device.fd(), bytes)) throw_file_error(path, "cannot be written", error);

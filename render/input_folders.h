@@ -1,5 +1,5 @@
 #pragma once
-/// Folders that files named by a scene or a model may lie in.
+/// Folders that may contain the files named by a scene or a model.
 
 #include <filesystem>
 #include <vector>
@@ -8,12 +8,13 @@ namespace offstage::render {
 
 class InputFolders {
  public:
-  /// Nothing may be read.
+  /// No files may be read.
   InputFolders() = default;
-  /// Folders and all below them; symbolic links are resolved now. One that does not exist is left out.
+  /// The folders and their subfolders; symbolic links are resolved in the constructor. Folders that do not
+  /// exist are ignored.
   explicit InputFolders(const std::vector<std::filesystem::path>& folders);
 
-  /// Whether a file, all of its links resolved, is in one of the folders.
+  /// Whether a file, with all of its links resolved, is in one of the folders.
   bool contain(const std::filesystem::path& file) const;
   const std::vector<std::filesystem::path>& folders() const { return folders_; }
 

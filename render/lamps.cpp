@@ -9,13 +9,13 @@ namespace {
 
 constexpr GLuint kLampShadowUnit = 10, kLampPlainUnit = 11;
 constexpr int kTile_px = 512, kRowWidth_px = 3 * kTile_px, kRowHeight_px = 2 * kTile_px;
-constexpr float kNear = 0.02f;  // of shaders/lamps.glsl
+constexpr float kNear = 0.02f;  // as in shaders/lamps.glsl
 
 float power(const Lamp& lamp) {
   return lamp.intensity.sum();
 }
 
-/// Depth is 1 - near / distance along the axis.
+/// Projection whose depth is 1 - near / distance along the axis.
 Matrix4f projection(const Vector3f& eye, const Vector3f& right, const Vector3f& up, const Vector3f& forward,
                     float tan_half) {
   Matrix4f m = Matrix4f::Zero();
@@ -27,7 +27,7 @@ Matrix4f projection(const Vector3f& eye, const Vector3f& right, const Vector3f& 
   return m;
 }
 
-/// Where a sub-frame takes the light from: a place of the ball or rectangle.
+/// Point of the ball or rectangle that emits the light in a sub-frame.
 Vector3f place_in(const Lamp& lamp, const Vector3f& right, const Vector3f& up, const SampleOffsets& offsets) {
   if (lamp.size.x() > 0)
     return lamp.position + offsets.light.x() * lamp.size.x() * right + offsets.light.y() * lamp.size.y() * up;
@@ -48,9 +48,9 @@ Lamp lamp_of_fire(const PointSet& flames) {
     light += seen * p.color.head<3>();
   }
   if (area <= 0) return {.intensity = Vector3f::Zero()};
-  // Flames hide each other: together they show no more than the side of the box around them.
-  constexpr float kCover = 0.6f;  // of a flame's disc
-  constexpr float kDimmed = 4;    // flames are drawn darker than they are, or they would all be white
+  // Flames hide each other: their total visible area is at most one side of the box around them.
+  constexpr float kCover = 0.6f;  // share of a flame's disc that is covered
+  constexpr float kDimmed = 4;  // flames are drawn darker than they are, because otherwise all would be white
   const Vector3f sizes = flames.box.sizes();
   const float side = 0.5f * sizes.y() * (sizes.x() + sizes.z());
   const float shown =

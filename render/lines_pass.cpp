@@ -7,7 +7,7 @@
 namespace offstage::render {
 namespace {
 
-/// The part of a line in front of the near plane; nothing if that is none of it.
+/// The part of a line in front of the near plane, if there is one.
 std::optional<Line> in_front(Line line, const View& view) {
   const float a = view.depth_of(line.a) - view.near_m, b = view.depth_of(line.b) - view.near_m;
   if (a < 0 && b < 0) return std::nullopt;
@@ -72,7 +72,7 @@ void LinesPass::draw(const LineSet& set, int width_px, int height_px) {
     glUniform1f(2, opacity);
     glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, set.drawn);
   };
-  draw_where(GL_LEQUAL, set.def.hidden);  // depth grows towards the eye
+  draw_where(GL_LEQUAL, set.def.hidden);  // depth increases towards the eye
   draw_where(GL_GREATER, 1);
 }
 

@@ -6,14 +6,14 @@
 namespace offstage::render {
 namespace {
 
-/// An edge with its one or two triangles: `left` and `right` are the corners opposite to it.
+/// An edge with its one or two triangles: `left` and `right` are the opposite corners.
 struct Edge {
   uint32_t a, b;  // a < b
   uint32_t left, right;
   bool boundary;
 };
 
-/// A side of a triangle, and where it stands in the list of triangles.
+/// A side of a triangle, with its index in the list of triangles.
 struct Side {
   uint32_t a, b, opposite, place;
 };
@@ -33,7 +33,7 @@ std::vector<Side> sorted_sides(std::span<const uint32_t> triangles) {
   return sides;
 }
 
-/// Calls visit(first, last) for the sides that lie on one edge each.
+/// Calls visit(first, last) for the sides of each edge.
 template <class Visit>
 void for_each_edge(const std::vector<Side>& sides, Visit&& visit) {
   for (std::size_t i = 0; i < sides.size();) {
@@ -44,8 +44,8 @@ void for_each_edge(const std::vector<Side>& sides, Visit&& visit) {
   }
 }
 
-/// Whether a boundary with these directions before and after a vertex has a corner there. No direction is
-/// one.
+/// Whether a boundary with these directions before and after a vertex has a corner there. A zero direction
+/// counts as a corner.
 bool turns(const Eigen::Vector2f& before, const Eigen::Vector2f& after) {
   return !(before.dot(after) > 0.5f * before.norm() * after.norm());
 }
@@ -69,14 +69,14 @@ LoopSubdivision::LoopSubdivision(std::span<const uint32_t> triangles,
   const std::size_t vertex_count = places.size();
   const std::vector<Side> sides = sorted_sides(triangles);
   std::vector<Edge> edges;
-  std::vector<uint32_t> edge_of(triangles.size());  // of each side, by its place
+  std::vector<uint32_t> edge_of(triangles.size());  // edge of each side
   for_each_edge(sides, [&](std::size_t first, std::size_t end) {
     const Side &s = sides[first], &last = sides[end - 1];
     for (std::size_t k = first; k < end; ++k) edge_of[sides[k].place] = static_cast<uint32_t>(edges.size());
     edges.push_back({s.a, s.b, s.opposite, last.opposite, end - first != 2});
   });
 
-  // Neighbours of each vertex by its edges, inner ones and those of the boundary.
+  // Neighbours of each vertex along inner edges and along boundary edges.
   std::vector<uint32_t> first_edge(vertex_count + 1, 0), boundary_count(vertex_count, 0);
   for (const Edge& e : edges) {
     ++first_edge[e.a + 1], ++first_edge[e.b + 1];
@@ -94,7 +94,7 @@ LoopSubdivision::LoopSubdivision(std::span<const uint32_t> triangles,
     begin_vertex();
     const uint32_t valence = first_edge[v + 1] - first_edge[v];
     const bool on_boundary = boundary_count[v] > 0;
-    std::array<uint32_t, 2> ends = {v, v};  // of the boundary on both sides
+    std::array<uint32_t, 2> ends = {v, v};  // neighbours along the boundary on both sides
     if (boundary_count[v] == 2) {
       std::size_t found = 0;
       for (uint32_t k = first_edge[v]; k < first_edge[v + 1]; ++k) {

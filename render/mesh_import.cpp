@@ -27,7 +27,7 @@ constexpr unsigned kSteps = aiProcess_Triangulate | aiProcess_RemoveComponent | 
 constexpr int kIgnored = aiComponent_ANIMATIONS | aiComponent_BONEWEIGHTS | aiComponent_LIGHTS |
                          aiComponent_CAMERAS | aiComponent_TANGENTS_AND_BITANGENTS | aiComponent_COLORS;
 
-/// What was left out, counted over the whole file.
+/// Omitted elements, counted over the whole file.
 struct Dropped {
   std::size_t no_triangle = 0, bad_index = 0, not_finite = 0, no_area = 0, bad_normals = 0;
 
@@ -55,7 +55,8 @@ Affine3d to_eigen(const aiMatrix4x4& m) {
   return result;
 }
 
-/// FBX states its unit, in centimetres; the other formats' readers convert to metres themselves or have none.
+/// FBX has a unit, in centimetres; the readers of other formats convert to metres, or the formats have no
+/// unit.
 double metres_per_unit(const aiScene& scene) {
   double centimetres = 100;
   float single = 0;
@@ -74,13 +75,13 @@ std::vector<Vector3f> transformed_positions(const aiMesh& mesh, const Affine3d& 
   return positions;
 }
 
-/// Empty if the mesh has none, or one that is not a direction.
+/// Transformed normals; empty if the mesh has none, or an invalid one.
 std::vector<Vector3f> transformed_normals(const aiMesh& mesh, const Affine3d& world_from_mesh) {
   if (!mesh.HasNormals()) return {};
   const Eigen::Matrix3d linear = world_from_mesh.linear();
   const double determinant = linear.determinant();
-  // The cofactor matrix, inverse transpose times determinant; the sign undoes the determinant's for mirrored
-  // nodes.
+  // The cofactor matrix is the inverse transpose times the determinant; the sign compensates that of the
+  // determinant for mirrored nodes.
   Eigen::Matrix3d cofactor;
   cofactor << linear.col(1).cross(linear.col(2)), linear.col(2).cross(linear.col(0)),
       linear.col(0).cross(linear.col(1));
@@ -100,7 +101,7 @@ bool has_area(const Vector3f& a, const Vector3f& b, const Vector3f& c) {
   return ab.cross(ac).norm() > 1e-10 * std::max(ab.squaredNorm(), ac.squaredNorm());
 }
 
-/// Collects the scene's meshes, placed by their nodes, in one part per material and kind of vertex.
+/// Collects the meshes of the scene, transformed by their nodes, in one part per material and kind of vertex.
 class PartBuilder {
  public:
   PartBuilder(const aiScene& scene, std::vector<unsigned> uv_sets, Model& model)
@@ -170,7 +171,7 @@ class PartBuilder {
     return true;
   }
 
-  /// assimp's v runs up for every format.
+  /// assimp's v increases upwards for every format.
   static Vector2f top_down(const aiVector3D& uv) {
     const Vector2f result(static_cast<float>(uv.x), 1 - static_cast<float>(uv.y));
     return result.allFinite() ? result : Vector2f(0, 0);
@@ -183,7 +184,7 @@ class PartBuilder {
   Dropped dropped_;
 };
 
-/// Gives nodes names of their own.
+/// Makes the names of nodes unique.
 class NodeNames {
  public:
   std::string next(const aiNode& node) {
@@ -199,15 +200,16 @@ class NodeNames {
   std::set<std::string> taken_;
 };
 
-/// Without scale, which the triangles have; of a node that is flat or turned inside out the nearest rotation.
+/// Rotation and translation without the scale, which is applied to the triangles. For a node that is flat or
+/// mirrored, the nearest rotation.
 Affine3d turned_and_moved(const Affine3d& m) {
   const Eigen::Matrix3d rotation = m.rotation();
   if (!rotation.allFinite() || !m.translation().allFinite()) return Affine3d::Identity();
   return Eigen::Translation3d(m.translation()) * rotation;
 }
 
-/// Lists the nodes that have meshes, and adds the meshes of all of them, or of the one that is `wanted`.
-/// Depth first with a stack of its own: the depth is the file's choice.
+/// Lists the nodes that have meshes, and adds the meshes of all of them, or of the node `wanted`. Depth first
+/// with an explicit stack, because the depth depends on the file.
 void place_nodes(const aiScene& scene, const std::string& wanted, PartBuilder& builder, Model& model) {
   struct Item {
     const aiNode* node;
@@ -250,7 +252,7 @@ std::string reason(const Assimp::Importer& importer) {
 
 Model import_model(const std::filesystem::path& path, const std::string& node, const InputFolders& folders) {
   Assimp::Importer importer;
-  importer.SetIOHandler(make_model_files(folders).release());  // the importer owns it
+  importer.SetIOHandler(make_model_files(folders).release());  // the importer takes ownership
   importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, kIgnored);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_READ_ANIMATIONS, false);

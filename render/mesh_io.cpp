@@ -10,9 +10,9 @@
 #include "render/image_io.h"
 #include "render/mesh_import.h"
 
-// assimp overflows its stack, loops, or allocates what a header claims on files that any fuzzer finds within
-// minutes. So a confined child imports, and hands the model over in a memory file. Only that child can crash,
-// and the caller gets a message.
+// With files that any fuzzer finds within minutes, assimp overflows its stack, loops, or allocates the size
+// that a header claims. Therefore a confined child imports the model and returns it in a memory file. Only
+// that child can crash, and the caller gets a message.
 
 namespace offstage::render {
 namespace {
@@ -27,7 +27,7 @@ void transfer_image(Archive& archive, Image& image) {
   archive.array(image.rgba);
 }
 
-/// Calls `archive` for all that a model holds: the same list for writing and reading.
+/// Calls `archive` for all members of a model; the same list serves writing and reading.
 template <class Archive>
 void transfer(Archive& archive, Model& model) {
   archive.list(model.parts, [&](Model::Part& part) {
@@ -84,7 +84,7 @@ class Writer {
   int fd_;
 };
 
-/// Believes no count: the child may have been damaged before it wrote.
+/// Checks all counts, because the child may have been corrupted before it wrote.
 class Reader {
  public:
   explicit Reader(std::span<const uint8_t> bytes) : rest_(bytes) {}
@@ -122,7 +122,7 @@ class Reader {
   std::span<const uint8_t> rest_;
 };
 
-/// The files that a child may read: the folders, and those of the file itself where they are all it has.
+/// The folders that a child may read: the given ones or, if there are none, that of the file itself.
 InputFolders readable(const std::filesystem::path& path, const InputFolders& folders) {
   return folders.folders().empty() ? InputFolders({path.parent_path()}) : folders;
 }

@@ -1,7 +1,7 @@
 #pragma once
-/// Model files through assimp: OBJ, PLY, STL, glTF/GLB, Collada, FBX and what else it reads; and textures.
+/// Reads model files by assimp (OBJ, PLY, STL, glTF/GLB, Collada, FBX and its other formats) and textures.
 /// Both are read in a confined child (confined_child.h has its limits of time and memory), because readers
-/// crash or hang on hostile files; the caller gets a message instead.
+/// crash or hang on hostile files; the caller then gets a message.
 
 #include <filesystem>
 
@@ -13,30 +13,30 @@ namespace offstage::render {
 
 struct ModelPath {
   std::filesystem::path file;
-  std::string node;  ///< empty: all of it
+  std::string node;  ///< empty: the whole file
 };
-/// Takes FILE#NODE apart, unless there is a file of that whole name.
+/// Splits FILE#NODE, unless a file with the whole name exists.
 ModelPath split_node(const std::filesystem::path& path);
 
-/// Reads a model, applies its nodes' transforms, drops what cannot be drawn (points, lines, faces with bad
-/// indices or no area, non-finite vertices) with a warning, and reads its textures, embedded or beside it.
-/// Animation, skins, cameras, lights and vertex colours are ignored. There is one part per material, with
-/// normals (compute_normals where the file has none). Texture coordinates start at the image's top left, v
-/// down, as its rows run. Up axis and unit become Y and metres where the format states them (FBX, Collada).
-/// Colours of classic materials (diffuse, specular, shininess) are taken as sRGB, those of physically based
-/// ones as linear. Throws FileError with one line for a file that is missing, broken, or has no triangle
-/// left; UnavailableError if no process can be started.
-/// Of a path that ends in #NODE only that node's own triangles, from where it is (Model::Node).
-/// The model and all that it names must lie in `folders`; without any, in the model's own folder. `stop` ends
-/// the work with StoppedError.
+/// Reads a model and its textures, embedded or beside it. Applies the transforms of its nodes, and removes
+/// elements that cannot be drawn (points, lines, faces with bad indices or no area, non-finite vertices) with
+/// a warning. Animation, skins, cameras, lights and vertex colours are ignored. There is one part per
+/// material, with normals (by compute_normals() if the file has none). Texture coordinates start at the
+/// image's top left, with v downwards. Up axis and unit are converted to Y and metres if the format defines
+/// them (FBX, Collada). Colours of classic materials (diffuse, specular, shininess) are treated as sRGB,
+/// those of physically based materials as linear.
+/// For a path that ends in #NODE, only the triangles of that node, in its frame (Model::Node).
+/// The model and all files that it names must be in `folders`; if there are none, in the model's own folder.
+/// Throws FileError with one line for a file that is missing, broken, or without triangles; UnavailableError
+/// if no process can be started; StoppedError after a request by `stop`.
 Model read_model(const std::filesystem::path& path, const InputFolders& folders = {},
                  const StopTest& stop = {});
 
-/// Reads a picture of up to kMaxTexturePixels. Throws as read_model does.
+/// Reads an image of up to kMaxTexturePixels. Throws as read_model() does.
 Image read_texture(const std::filesystem::path& path, const InputFolders& folders = {},
                    const StopTest& stop = {});
 
-/// The message for a file that is in none of the folders that may be read.
+/// Returns the message for a file outside of the folders that may be read.
 std::string outside_of_folders(const std::filesystem::path& path);
 
 }  // namespace offstage::render

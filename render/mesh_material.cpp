@@ -23,7 +23,7 @@ bool equal_ignoring_case(const std::string& a, const std::string& b) {
                     [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
 }
 
-/// "a%20b" to "a b", as in the URIs of glTF and Collada.
+/// Converts "a%20b" to "a b", as in the URIs of glTF and Collada.
 std::string percent_decoded(const std::string& text) {
   std::string result;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -36,8 +36,8 @@ std::string percent_decoded(const std::string& text) {
   return result;
 }
 
-/// Where a texture is: as named, then by its file name in the model's folder, then there in any letter case,
-/// for paths from other machines. Empty if nowhere.
+/// Finds a texture: by the name given, then by its file name in the model's folder, then there in any letter
+/// case, for paths from other machines. Empty if there is none.
 std::filesystem::path find_texture(const std::filesystem::path& folder, std::string name) {
   std::replace(name.begin(), name.end(), '\\', '/');
   if (name.starts_with("file://")) name.erase(0, 7);
@@ -76,7 +76,7 @@ class MaterialImporter {
                    Model& model)
       : scene_(scene), folder_(folder), folders_(folders), model_(model) {}
 
-  /// Appends the material; returns its set of texture coordinates.
+  /// Appends the material; returns the number of its set of texture coordinates.
   unsigned add(const aiMaterial& source) {
     Material material;
     aiString text;
@@ -94,12 +94,12 @@ class MaterialImporter {
     material.base_color_texture =
         texture(source, {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}, opaque, &uv_set);
     material.emission_texture = texture(source, {aiTextureType_EMISSION_COLOR, aiTextureType_EMISSIVE}, true);
-    // glTF's combined image; formats with an image for each of the two are not supported.
+    // glTF's combined image; formats with two separate images are not supported.
     if (gltf) material.metallic_roughness_texture = texture(source, {aiTextureType_UNKNOWN}, true);
     if (material.name.empty() && material.base_color_texture < 0 && material.color == Vector4f::Ones()) {
       give_default_look(material);
     }
-    if (!gltf && material.color.w() < 1e-3f) {  // many writers mean transparency by it
+    if (!gltf && material.color.w() < 1e-3f) {  // many programs write the transparency here instead
       material.color.w() = 1;
       model_.warnings.push_back("material '" + material.name + "': opacity 0 taken as opaque");
     }
@@ -108,7 +108,7 @@ class MaterialImporter {
   }
 
  private:
-  /// A file without materials comes with a nameless white one, which for glTF is rough metal.
+  /// A file without materials gets an unnamed white one, which for glTF is rough metal.
   static void give_default_look(Material& material) {
     material.color = Material{}.color;
     if (material.metallic == 1 && material.roughness == 1) {
@@ -117,7 +117,7 @@ class MaterialImporter {
     }
   }
 
-  /// Classic colours are meant for the screen, physically based ones are linear.
+  /// Colours of classic materials are sRGB, those of physically based materials are linear.
   static void read_color(const aiMaterial& source, bool gltf, bool opaque, Material& material) {
     aiColor4D color(0.8f, 0.8f, 0.8f, 1);
     float opacity = 1, gloss = 0;
@@ -133,7 +133,7 @@ class MaterialImporter {
                       opaque ? 1 : clamped(color.a)};
   }
 
-  /// A Blinn-Phong lobe of exponent n is about as wide as a GGX one with alpha^2 = roughness^4 = 2 / (n + 2)
+  /// A Blinn-Phong lobe of exponent n is about as wide as a GGX lobe with alpha^2 = roughness^4 = 2 / (n + 2)
   /// (Karis, "Specular BRDF reference", 2013); without a highlight the surface is matt.
   static void read_surface(const aiMaterial& source, Material& material) {
     float value = 0;
@@ -163,7 +163,7 @@ class MaterialImporter {
     return linear ? clamped(value) : srgb_decode(clamped(value));
   }
 
-  /// Index of the first texture there is among `types`, or -1.
+  /// Index of the first existing texture among `types`, or -1.
   int texture(const aiMaterial& source, std::initializer_list<aiTextureType> types, bool opaque,
               unsigned* uv_set = nullptr) {
     for (const aiTextureType type : types) {
@@ -176,7 +176,7 @@ class MaterialImporter {
     return -1;
   }
 
-  /// Each image once; `opaque` ones lose an alpha channel that their material is not to use.
+  /// Loads each image once; with `opaque` its alpha channel is removed, because the material must not use it.
   int load(const std::string& name, bool opaque) {
     const auto [entry, is_new] = loaded_.try_emplace({name, opaque}, -1);
     if (!is_new) return entry->second;

@@ -17,14 +17,16 @@ static_assert(sizeof(Vertex) == 32);
 
 constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1;
 constexpr GLuint kMaterialBlock = 1, kFirstTextureUnit = 1;
-constexpr float kSmooth = 0.3f;        // less rough, a surface shows an image of the scene
-constexpr GLsizei kFewIndices = 1200;  // of a mesh that costs little to draw again
-constexpr float kMirrorSteps = 14;     // along the ray on which it is looked for
+constexpr float kSmooth = 0.3f;        // with less roughness, a surface shows a mirror image of the scene
+constexpr GLsizei kFewIndices = 1200;  // number of indices of a mesh that is cheap to draw again
+constexpr float kMirrorSteps = 14;     // steps along the ray in the search for a mirror image
 
-constexpr int kManyPixels =
-    100'000;  // to shade in a simpler way, for which another program is worth building
-constexpr int kOpennessReach_px = 6;  // beyond where the sky is hidden that it is looked up
-constexpr float kGrazing = 0.05f;     // sine of the sun's height over a plane below which shadows are endless
+// Number of pixels for which a second, simpler program is worth building.
+constexpr int kManyPixels = 100'000;
+// Number of pixels beyond the occluded area at which occlusion is still read.
+constexpr int kOpennessReach_px = 6;
+// Sine of the sun's height over a plane below which shadows count as endless.
+constexpr float kGrazing = 0.05f;
 
 // The first three rows of a transform.
 using Rows = std::array<Vector4f, 3>;
@@ -44,7 +46,7 @@ Vector3f corner(const Eigen::AlignedBox3f& box, int k) {
   return box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k));
 }
 
-/// The pixels of an area and those around it, within a picture of a size.
+/// The pixels of an area, enlarged by `reach_px`, within a picture of the given size.
 Eigen::AlignedBox2i around(const ScreenArea& area, int reach_px, int width_px, int height_px) {
   if (area.empty()) return {};
   const Eigen::AlignedBox2i pixels = area.pixels(width_px, height_px);
@@ -52,8 +54,8 @@ Eigen::AlignedBox2i around(const ScreenArea& area, int reach_px, int width_px, i
           (pixels.max().array() + reach_px).min(Eigen::Array2i(width_px, height_px)).matrix()};
 }
 
-/// The greatest slope of a surface with this pattern, but for the edges of its stones; none if it is more
-/// than mirrors can be told from.
+/// Greatest slope of a surface with this pattern, except at the edges of its stones; none if the slope is too
+/// large for recognisable mirror images.
 std::optional<float> unevenness_of(Pattern pattern) {
   switch (pattern) {
     case Pattern::none:
@@ -69,7 +71,7 @@ std::optional<float> unevenness_of(Pattern pattern) {
   }
 }
 
-/// Whether each edge is passed through once in either direction; corners count as one where they coincide.
+/// Whether each edge is used once in either direction; corners at the same position count as one.
 bool is_closed(const Mesh& mesh) {
   const auto bits = [](float x) { return std::bit_cast<uint32_t>(x + 0.0f); };  // -0 is 0
   const auto before = [&](uint32_t a, uint32_t b) {
@@ -100,7 +102,7 @@ bool is_closed(const Mesh& mesh) {
 
 struct MeshPass::Item {
   const Instance* instance;
-  float depth;     // of the ball's far end: large ground then comes last
+  float depth;     // depth of the far end of the ball, so that large ground comes last
   uint32_t order;  // breaks ties
   bool mirrored;
 };
@@ -222,7 +224,7 @@ void MeshPass::prepare(std::span<const Instance* const> instances, const View& v
       seen.begin(), seen.end(), [](const Item& item) { return !item.instance->material->lets_through(); });
   const std::vector<Item> see_through(transparent, seen.end());
   seen.erase(transparent, seen.end());
-  // What is cut out by its texture is opaque where the texture is, so it is drawn in both passes.
+  // Surfaces cut out by their texture are opaque where the texture is, so they are drawn in both passes.
   const auto by_batch = [](const Item& a, const Item& b) {
     return std::tie(a.instance->batch_key, a.mirrored, a.depth, a.order) <
            std::tie(b.instance->batch_key, b.mirrored, b.depth, b.order);
@@ -380,8 +382,8 @@ void MeshPass::draw_opaque(const View& view, const Occluders& occluders, int wid
   }
 }
 
-// Floors, walls and metal. Of curved lacquer only a sliver at its outline mirrors, which many triangles are
-// not worth.
+// Only floors, walls and metal. Curved lacquer mirrors only in a thin region at its outline, which does not
+// justify drawing many triangles.
 bool MeshPass::mirrors(const Batch& batch) {
   return batch.material->smooth &&
          (batch.material->metal || batch.mesh->flat || batch.mesh->index_count <= kFewIndices);
@@ -401,7 +403,7 @@ ScreenArea MeshPass::occluded_area(const View& view, float reach,
   return area;
 }
 
-// Of a plane; of anything else all of the picture.
+// For a plane: the part of the picture in which light may be hidden; for other meshes the whole picture.
 ScreenArea MeshPass::hidden_area(const Batch& batch, const View& view, const Occluders& occluders) const {
   ScreenArea area(view, 0);
   const auto flat = [](const Instance* instance) { return instance->mesh->flat; };
@@ -463,7 +465,7 @@ ScreenArea MeshPass::hidden_area(const Batch& batch, const View& view, const Occ
 ScreenArea MeshPass::mirrored_area(const Batch& batch, const View& view, float reach,
                                    std::span<const Eigen::AlignedBox3f> others) const {
   const std::optional<float> unevenness = unevenness_of(batch.material->pattern);
-  // Rays leave the mirrored direction by twice the slope, and by what roughness spreads them.
+  // Rays deviate from the mirrored direction by twice the slope, and by the spread of the roughness.
   ScreenArea area(view, (2 * unevenness.value_or(0) + 0.5f * kSmooth * kSmooth) * reach);
   if (!batch.mesh->flat || batch.count > 1 || !unevenness) {
     area.add_all();

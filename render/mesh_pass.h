@@ -71,7 +71,7 @@ struct Instance {
 
   float scale() const;
   Caster ball() const;
-  /// Whether this is ground. Ground casts no visible shadow, and would stretch the shadow map over its whole
+  /// Whether this is ground. Ground casts no visible shadow, and would extend the shadow map over its whole
   /// area.
   bool is_ground() const;
 };
@@ -79,12 +79,12 @@ struct Instance {
 /// Objects that can hide light from surfaces, and the distance at which they do; 0 disables the effect.
 struct Occluders {
   float sky_reach_m = 0;
-  std::vector<Eigen::AlignedBox3f>
-      solid;  ///< boxes around other objects that hide the sky, in addition to the instances
+  /// Boxes around other objects that hide the sky, in addition to the instances.
+  std::vector<Eigen::AlignedBox3f> solid;
   Vector3f to_sun = Vector3f::UnitY();
   float shadow_reach_m = 0;  ///< reach of shadows, measured across the light
-  std::vector<Eigen::AlignedBox3f>
-      casting;  ///< boxes around other objects that cast shadows, in addition to the instances
+  /// Boxes around other objects that cast shadows, in addition to the instances.
+  std::vector<Eigen::AlignedBox3f> casting;
 };
 
 class MeshPass {
@@ -140,8 +140,8 @@ class MeshPass {
   ScreenArea mirrored_area(const Batch& batch, const View& view, float reach,
                            std::span<const Eigen::AlignedBox3f> others) const;
 
-  std::map<std::tuple<Pattern, bool, bool, bool, Shading, Features>, gl::LazyProgram>
-      surface_programs_;  ///< keyed by textured, glass, endless
+  /// Keyed by textured, glass, endless.
+  std::map<std::tuple<Pattern, bool, bool, bool, Shading, Features>, gl::LazyProgram> surface_programs_;
   gl::LazyProgram opaque_shadow_, dithered_shadow_, textured_shadow_;
   Features features_;
   gl::Texture white_;

@@ -9,7 +9,8 @@
 namespace offstage::render {
 namespace {
 
-// A position by its bits, so that vertices split at seams of the texture are still smoothed together.
+// Hash of a position by its bits, so that vertices that were split at seams of the texture are still smoothed
+// together.
 struct PositionHash {
   std::size_t operator()(const std::array<float, 3>& p) const {
     uint64_t hash = 0;
@@ -22,11 +23,10 @@ struct PositionHash {
   }
 };
 
-// For each vertex the corners (places in `indices`) of all triangles that touch its position, as one flat
-// list.
+// For each position, the corners (indices into `indices`) of all triangles that touch it, as one flat list.
 struct Fans {
-  std::vector<uint32_t> position;  // of each vertex: the number of its welded position
-  std::vector<uint32_t> begin;     // of each position: where its corners start in `corner`
+  std::vector<uint32_t> position;  // number of the welded position of each vertex
+  std::vector<uint32_t> begin;     // first element in `corner` of each position
   std::vector<uint32_t> corner;
 };
 
@@ -36,7 +36,7 @@ Fans find_fans(const Mesh& mesh) {
   welded.reserve(mesh.positions.size());
   for (const Vector3f& p : mesh.positions) {
     const auto next = static_cast<uint32_t>(welded.size());
-    // Adding zero makes -0 and 0 the same position.
+    // Adding zero makes -0 equal to 0.
     fans.position.push_back(
         welded.try_emplace({p.x() + 0.0f, p.y() + 0.0f, p.z() + 0.0f}, next).first->second);
   }
@@ -91,7 +91,7 @@ void compute_normals(Mesh& mesh, float crease_deg) {
   const Fans fans = find_fans(mesh);
   const std::vector<Vector3f> area = area_normals(mesh);
   std::vector<Vector3f> unit = area;
-  for (Vector3f& n : unit) n.normalize();  // leaves a triangle without area at zero
+  for (Vector3f& n : unit) n.normalize();  // a triangle without area keeps a zero normal
   // The small margin keeps edges of exactly the crease angle smooth.
   const float cos_crease = std::cos(crease_deg * std::numbers::pi_v<float> / 180.0f) - 1e-4f;
 

@@ -27,7 +27,7 @@ class ModelStream : public Assimp::IOStream {
   }
   std::size_t Write(const void*, std::size_t, std::size_t) override { return 0; }
   aiReturn Seek(std::size_t offset, aiOrigin origin) override {
-    // The offset wraps round where it is meant to be negative.
+    // Unsigned overflow is intended for negative offsets.
     const std::size_t base = origin == aiOrigin_SET ? 0 : origin == aiOrigin_CUR ? at_ : bytes_.size();
     const std::size_t to = base + offset;
     if (to > bytes_.size()) return aiReturn_FAILURE;

@@ -1,5 +1,5 @@
 #pragma once
-/// The files that assimp may open: regular ones in the folders of a model. Private to render.
+/// Restricts the files that assimp may open to regular ones in the folders of a model. Private to render.
 
 #include <memory>
 
@@ -9,7 +9,7 @@
 
 namespace offstage::render {
 
-/// `folders` must outlive it. Every other file is not there.
+/// `folders` must outlive it. All other files are treated as missing.
 std::unique_ptr<Assimp::IOSystem> make_model_files(const InputFolders& folders);
 
 }  // namespace offstage::render

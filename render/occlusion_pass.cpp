@@ -6,8 +6,8 @@ namespace offstage::render {
 namespace {
 
 constexpr GLuint kDepthUnit = 4, kOpennessUnit = 8;
-constexpr float kWidest = 0.16f;  // share of the picture's height that is looked through
-constexpr int kFewSamples = 4;    // up to so many sub-frames, each is smoothed by itself
+constexpr float kWidest = 0.16f;  // greatest radius as a share of the picture's height
+constexpr int kFewSamples = 4;    // with at most this many sub-frames, each is smoothed separately
 
 }  // namespace
 
@@ -27,14 +27,15 @@ void OcclusionPass::draw(GLuint depth, const View& view, float reach, const Scre
   glClearNamedFramebufferfv(few ? smooth_framebuffer_ : open_framebuffer_, GL_COLOR, 0, all.data());
   glBindTextureUnit(kOpennessUnit, few ? smooth_ : open_);
   if (reach <= 0 || area.empty()) return;  // its two programs are not built either
-  const float pixels = static_cast<float>(height_px_) / view.tan_half.y();  // per share of the distance
+  // Pixels per unit of size over distance.
+  const float pixels = static_cast<float>(height_px_) / view.tan_half.y();
   glViewport(0, 0, width_px_, height_px_);
   glDisable(GL_DEPTH_TEST);
   glDisable(GL_BLEND);
   glDisable(GL_CULL_FACE);
   glBindVertexArray(no_attributes_);
   glBindTextureUnit(kDepthUnit, depth);
-  // The smoothing looks at the texels around.
+  // The smoothing reads neighbouring texels.
   const Eigen::AlignedBox2i inside = area.pixels(width_px_, height_px_);
   const auto cover = [&](GLuint framebuffer, int around_px) {
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);

@@ -6,10 +6,11 @@
 namespace offstage::render {
 namespace {
 
-constexpr int kOpacityCells = 72;     // along the longest side
-constexpr float kCellsPerRadius = 2;  // of a typical puff, at most: finer cells would show single puffs
+constexpr int kOpacityCells = 72;  // number of cells along the longest side
+// Upper limit for a typical puff, because finer cells would show single puffs.
+constexpr float kCellsPerRadius = 2;
 
-// Corners of a tetrahedron: places within a puff that stand for all of it.
+// Corners of a tetrahedron: four points within a puff that represent it.
 const std::array<Vector3f, 4> kCorners = {Vector3f(1, 1, 1), Vector3f(1, -1, -1), Vector3f(-1, 1, -1),
                                           Vector3f(-1, -1, 1)};
 
@@ -36,7 +37,8 @@ void OpacityGrid::fit(std::span<const Absorber> absorbers, const Vector3f& away)
   }
   const float typical = static_cast<float>(volume / area);
   const float needed = std::max(box.sizes().maxCoeff() / (kOpacityCells - 4), typical / kCellsPerRadius);
-  // Sizes in steps and a corner on whole cells: the shadow does not swim while the smoke grows.
+  // The cell size changes in steps and the corner is on whole cells, so that the shadow does not swim while
+  // the smoke grows.
   cell_ = std::exp2(std::ceil(4 * std::log2(needed)) / 4);
   const Vector3f low = ((box.min() / cell_).array().floor() - 1).matrix();
   const Vector3f high = ((box.max() / cell_).array().ceil() + 1).matrix();
@@ -48,7 +50,7 @@ void OpacityGrid::fit(std::span<const Absorber> absorbers, const Vector3f& away)
 }
 
 void OpacityGrid::deposit(const Vector3f& place, float depth) {
-  const Vector3f p = local(place) - Vector3f::Constant(0.5f);  // between the middles of cells
+  const Vector3f p = local(place) - Vector3f::Constant(0.5f);  // relative to the cell centres
   const int x = std::clamp(static_cast<int>(p.x()), 0, nx_ - 2),
             y = std::clamp(static_cast<int>(p.y()), 0, ny_ - 2),
             z = std::clamp(static_cast<int>(p.z()), 0, nz_ - 2);
@@ -112,7 +114,7 @@ Eigen::Matrix4f OpacityGrid::texture_from_world() const {
   const Eigen::Matrix3f linear = size.cwiseInverse().asDiagonal() * axes_ / cell_;
   result.block<3, 3>(0, 0) = linear;
   result.block<3, 1>(0, 3) = -linear * origin_;
-  result(2, 3) += 0.5f / size.z();  // a sum stands on the boundary of two cells, a texel in its own middle
+  result(2, 3) += 0.5f / size.z();  // sums are at the boundary of two cells, texels at the cell centre
   return result;
 }
 

@@ -1,5 +1,5 @@
-// OSMesa. Its few functions are declared here: GL/osmesa.h includes Mesa's gl.h, which does not go together
-// with glad's, and Mesa 25.1 and later have neither header nor library.
+// OSMesa. Its few functions are declared here, because GL/osmesa.h includes Mesa's gl.h, which conflicts with
+// glad's, and Mesa 25.1 and later have neither header nor library.
 
 #include <array>
 #include <cstdint>
@@ -10,7 +10,7 @@
 namespace offstage::render {
 namespace {
 
-// From the interface of libOSMesa 11.2 and later.
+// Interface of libOSMesa 11.2 and later.
 constexpr int kRgba = 0x1908;               // GL_RGBA
 constexpr unsigned kUnsignedByte = 0x1401;  // GL_UNSIGNED_BYTE
 constexpr int kFormat = 0x22;
@@ -19,7 +19,7 @@ constexpr int kOsMesaProfile = 0x33, kOsMesaCoreProfile = 0x34;
 constexpr int kOsMesaMajorVersion = 0x36, kOsMesaMinorVersion = 0x37;
 using OsMesaHandle = void*;
 
-// Everything is drawn into framebuffer objects; OSMesa's own buffer is only what makes the context current.
+// All drawing goes to framebuffer objects; OSMesa's own buffer is only needed to make the context current.
 constexpr int kDummySize_px = 16;
 
 struct OsMesaLibrary {

@@ -1,6 +1,6 @@
 #pragma once
-/// The one way in which a file is written: under a temporary name of its own, flushed to the disk, then
-/// renamed. Whoever sees the final name sees a whole file.
+/// The only way in which files are written: under a unique temporary name, flushed to the disk, then renamed.
+/// A file under its final name is complete.
 
 #include <filesystem>
 #include <span>
@@ -10,12 +10,12 @@
 
 namespace offstage::render {
 
-/// A file in the making. It is locked while its process lives, so that another process can tell a live one
-/// from a leftover.
+/// An unfinished file. It is locked while its process runs, so that another process can distinguish it from a
+/// leftover.
 class OutputFile {
  public:
-  /// Makes the temporary file ".offstage-XXXXXX.part" beside `target` (O_EXCL, a random name). Throws
-  /// FileError if that fails, or if `target` is a symbolic link: outputs do not follow links.
+  /// Creates the temporary file ".offstage-XXXXXX.part" beside `target` (O_EXCL, random name). Throws
+  /// FileError if this fails, or if `target` is a symbolic link, because outputs do not follow links.
   explicit OutputFile(const std::filesystem::path& target);
   /// Removes the temporary file unless it was committed.
   ~OutputFile();
@@ -23,8 +23,8 @@ class OutputFile {
   OutputFile& operator=(const OutputFile&) = delete;
 
   int fd() const { return file_.fd(); }
-  const std::filesystem::path& path() const { return path_; }  ///< of the temporary file
-  /// Throws FileError.
+  const std::filesystem::path& path() const { return path_; }  ///< path of the temporary file
+  /// Appends bytes. Throws FileError.
   void write(std::span<const uint8_t> bytes);
   /// Flushes to the disk and renames to the target, or to `other` in the same folder. Throws FileError.
   void commit() { commit_as(target_); }
@@ -39,7 +39,7 @@ class OutputFile {
 /// Throws FileError if `path` is a symbolic link.
 void refuse_link(const std::filesystem::path& path);
 
-/// Removes the temporary files in a folder that processes left behind that live no more; returns how many.
+/// Removes the temporary files in a folder whose processes do not run any more; returns their number.
 int remove_leftovers(const std::filesystem::path& folder);
 
 }  // namespace offstage::render

@@ -13,14 +13,15 @@
 namespace offstage::render {
 namespace {
 
-// A key has, from the top: how many layers are in front, the depth, which is not negative, so that its bits
-// are in order, and the number of the point.
+// A key contains, from the most significant bit: the number of layers in front, the depth, which is not
+// negative, so its bits are ordered, and the number of the point.
 constexpr int kNumberBits = 27, kOrderDepthBits = 31;
 constexpr std::size_t kMostLayers = std::size_t{1} << (64 - kNumberBits - kOrderDepthBits);
 constexpr uint32_t kMostPoints = uint32_t{1} << kNumberBits;
 
-// Kinds are drawn by different means, one run after the other. Where more runs than this alternate,
-// neighbours in depth are joined to so many slices, in which kinds are drawn one after the other.
+// Each kind is drawn by another program, run by run. If the number of alternating runs is larger than
+// kMostRuns, neighbours in depth are merged to kSlices slices, in which the kinds are drawn one after the
+// other.
 constexpr std::size_t kMostRuns = 24, kSlices = 6;
 
 uint64_t depth_and_layer(uint64_t key) {
@@ -30,7 +31,7 @@ std::size_t layers_in_front(uint64_t key) {
   return static_cast<std::size_t>(key >> (kNumberBits + kOrderDepthBits));
 }
 
-// Sprites and flakes of equal depth are drawn by ascending number, so they are sorted by descending one.
+// Sprites and flakes of equal depth are drawn by ascending number, so they are sorted by descending number.
 bool is_quad(PaintOrder::Kind kind) {
   return kind == PaintOrder::Kind::sprites || kind == PaintOrder::Kind::flakes;
 }
@@ -75,14 +76,14 @@ Region::Region(const Eigen::AlignedBox3f& box, const Eigen::Affine3f& world_from
   }
 }
 
-// A plane between a place and a body, or in front of both, says which can hide the other, wherever they are
-// in the picture: the eye is on one side of it.
+// A plane between a place and a body determines which of them can hide the other, wherever they are in the
+// picture, because the eye is on one side of it.
 bool Region::hides(const Vector3f& place, float depth) const {
   if (depth <= nearest_) return false;
   if (depth > farthest_) return true;
   if (radius_ > 0) {
     if ((place - center_).norm() < radius_) return true;
-    // The circle in which the lines of sight touch the ball parts its two sides.
+    // The circle in which the lines of sight touch the ball separates its front and its back.
     return (place - world_eye_).squaredNorm() > (center_ - world_eye_).squaredNorm() - radius_ * radius_;
   }
   const Vector3f p = box_from_world_ * place;
@@ -149,8 +150,8 @@ bool Region::is_in_front_of(const Region& other) const {
 std::vector<uint32_t> back_to_front(std::span<const Region> bodies,
                                     std::span<const Eigen::AlignedBox2i> areas_px) {
   const std::size_t n = bodies.size();
-  std::vector<std::vector<uint32_t>> in_front(n);  // of each
-  std::vector<uint32_t> behind(n, 0);              // how many that are not drawn yet
+  std::vector<std::vector<uint32_t>> in_front(n);  // bodies in front of each body
+  std::vector<uint32_t> behind(n, 0);              // number of bodies behind each that are not yet drawn
   for (uint32_t a = 0; a < n; ++a)
     for (uint32_t b = a + 1; b < n; ++b) {
       if (!areas_px[a].intersects(areas_px[b])) continue;
@@ -201,7 +202,7 @@ void PaintOrder::gather(std::span<const PointSet* const> sets, const View& view)
     for (std::size_t i = 0; i < set->points.size() && next < kMostPoints; ++i, ++next) {
       const Vector3f center = set->points[i].position.head<3>();
       const float depth = view.depth_of(center);
-      // The margin covers what is drawn a pixel wide because it is thinner.
+      // The margin accounts for thin particles, which are drawn one pixel wide.
       if (!view.sees(center, set->reach(i) + 0.01f * std::abs(depth))) continue;
       if (depth <= view.near_m && !is_quad(*kind)) continue;
       const uint32_t low = is_quad(*kind) ? kMostPoints - 1 - next : next;
@@ -251,7 +252,7 @@ void PaintOrder::find_runs(std::size_t bodies) {
     pieces.back().last = ++at[next];
   }
 
-  // Joins pieces of one layer to slices, and those of one kind in them to a run.
+  // Merges pieces of one layer to slices, and pieces of one kind in a slice to a run.
   const std::size_t joined = pieces.size() > kMostRuns + bodies ? (pieces.size() + kSlices - 1) / kSlices : 1;
   std::vector<std::pair<std::size_t, Run>> runs;
   for (std::size_t p = 0; p < pieces.size();) {

@@ -13,7 +13,7 @@ PictureCopy::PictureCopy(GLenum format, GLenum filter, GLuint unit, int width_px
 }
 
 void PictureCopy::change(const Eigen::AlignedBox2i& area_px) {
-  constexpr std::size_t kMostAreas = 64;  // more are joined to one
+  constexpr std::size_t kMostAreas = 64;  // more areas are merged to one
   Eigen::AlignedBox2i area = area_px.intersection(all_px_);
   if (area.isEmpty()) return;
   const bool joins = area.contains(all_px_) || changed_px_.size() == kMostAreas;

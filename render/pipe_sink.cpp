@@ -14,8 +14,8 @@
 namespace offstage::render {
 namespace {
 
-/// Holds SIGPIPE back on this thread, so that a closed pipe is an error number, and swallows the one that
-/// came of it.
+/// Blocks SIGPIPE on this thread, so that a closed pipe is reported as an error number, and removes the
+/// pending signal.
 class SigpipeBlock {
  public:
   SigpipeBlock() {
@@ -40,8 +40,8 @@ class SigpipeBlock {
   bool was_pending_ = false;
 };
 
-/// Standard output. A pipe is opened a second time, so that it need not block for this process and still does
-/// for others that share it.
+/// Standard output. A pipe is opened a second time, so that it can be non-blocking for this process and stay
+/// blocking for others that share it.
 class StandardOutput {
  public:
   explicit StandardOutput(StopTest stop) : stop_(std::move(stop)) {
@@ -85,7 +85,7 @@ class PipeSink final : public FrameSink {
 
   void write(int, const Image& image) override {
     if (image.width_px != width_px_ || image.height_px != height_px_) {
-      throw std::invalid_argument("pipe sink: the frame's size is not the stream's");
+      throw std::invalid_argument("pipe sink: the size of the frame differs from that of the stream");
     }
     if (!y4m_) return out_.write(image.rgba);
     const std::string mark = std::exchange(header_, "") + "FRAME\n";

@@ -19,7 +19,7 @@ void append_number(std::vector<uint8_t>& out, uint32_t value) {
   for (int shift = 24; shift >= 0; shift -= 8) out.push_back(static_cast<uint8_t>(value >> shift));
 }
 
-/// Adds the check sum of a chunk, which goes from its name at `start` to the end.
+/// Appends the checksum of a chunk, from its name at `start` to the end.
 void close_chunk(std::vector<uint8_t>& out, std::size_t start) {
   append_number(out, libdeflate_crc32(0, out.data() + start, out.size() - start));
 }
@@ -32,7 +32,7 @@ void append_chunk(std::vector<uint8_t>& out, std::string_view name, std::span<co
   close_chunk(out, start);
 }
 
-/// Each row as its difference to the one above, after a byte that says so.
+/// Each row as its difference to the row above, after a byte for the filter type.
 std::vector<uint8_t> filtered(const PngPixels& pixels, std::size_t row_bytes) {
   constexpr uint8_t kUp = 2;
   const auto rows = static_cast<std::size_t>(pixels.height_px);
@@ -65,7 +65,7 @@ std::vector<uint8_t> encode_png(const PngPixels& pixels) {
   append_number(header, static_cast<uint32_t>(pixels.width_px));
   append_number(header, static_cast<uint32_t>(pixels.height_px));
   const auto kind = static_cast<uint8_t>(pixels.channels == 1 ? 0 : pixels.channels == 3 ? 2 : 6);
-  // Deflate, the standard's filters, not interlaced.
+  // Deflate, the standard filters, not interlaced.
   header.insert(header.end(), {static_cast<uint8_t>(pixels.bits), kind, 0, 0, 0});
   append_chunk(png, "IHDR", header);
 

@@ -8,7 +8,7 @@
 namespace offstage::render {
 namespace {
 
-// splitmix64's finaliser, to a number in [0, 1).
+// The finaliser of splitmix64, mapped to a number in [0, 1).
 float number_of_its_own(uint64_t id) {
   id = (id ^ (id >> 30)) * 0xBF58476D1CE4E5B9ull;
   id = (id ^ (id >> 27)) * 0x94D049BB133111EBull;
@@ -99,7 +99,7 @@ void PointsPass::prepare(PointSet& set, const View& view) {
   for (uint32_t i = 0; i < set.points.size(); ++i) {
     const Vector3f center = set.points[i].position.head<3>();
     const float depth = view.depth_of(center);
-    // The margin covers what is drawn a pixel wide because it is thinner.
+    // The margin accounts for thin particles, which are drawn one pixel wide.
     if (!view.sees(center, set.reach(i) + 0.01f * std::abs(depth))) {
       ordered_.push_back(set.points[i]);
       continue;

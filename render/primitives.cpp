@@ -10,13 +10,14 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 
-// A point of the half-section of a body of revolution. Two in a row at one place make a sharp edge.
+// A point of the half-section of a body of revolution. Two consecutive points at one position make a sharp
+// edge.
 struct ProfilePoint {
   float radius, y;
   Vector2f normal;  // (outwards, up)
 };
 
-// Turns a profile, given from the bottom up, about the Y axis.
+// Revolves a profile, given from the bottom up, about the Y axis.
 Mesh revolve(const std::vector<ProfilePoint>& profile, int segments) {
   float total = 0;
   std::vector<float> along(profile.size(), 0.0f);
@@ -29,7 +30,7 @@ Mesh revolve(const std::vector<ProfilePoint>& profile, int segments) {
   for (std::size_t i = 0; i < profile.size(); ++i) {
     const ProfilePoint& point = profile[i];
     for (int j = 0; j <= segments; ++j) {
-      // The seam's two columns are the same bits, so the surface is closed.
+      // The two columns at the seam have the same bits, so the surface is closed.
       const float angle = 2 * kPi * static_cast<float>(j % segments) / static_cast<float>(segments);
       const float c = std::cos(angle), s = std::sin(angle);
       mesh.positions.emplace_back(point.radius * c, point.y, -point.radius * s);
@@ -49,7 +50,7 @@ Mesh revolve(const std::vector<ProfilePoint>& profile, int segments) {
   return mesh;
 }
 
-// A quarter circle from the equator (sign 1: up to the top; sign -1: from the bottom up to the equator).
+// A quarter circle: from the equator to the top (sign 1), or from the bottom to the equator (sign -1).
 void append_cap(std::vector<ProfilePoint>& profile, float radius, float center_y, int rings, int sign) {
   for (int k = 0; k <= rings; ++k) {
     const int step = sign > 0 ? k : rings - k;
@@ -60,14 +61,15 @@ void append_cap(std::vector<ProfilePoint>& profile, float radius, float center_y
   }
 }
 
-// Grid lines of a box's axis: the flat part between two bevels, each of one facet a face. Their normals make
-// them look round, and finer ones would be most of what a scene of boxes costs.
+// Grid lines along one axis of a box: the flat part between two bevels of one facet each. Their normals make
+// the bevels look round. Finer bevels would dominate the cost of a scene of boxes.
 std::vector<float> box_lines(float half, float bevel) {
   if (bevel <= 0) return {-half, half};
   return {-half, bevel - half, half - bevel, half};
 }
 
-// The point of the rounded box that belongs to a point of the sharp one: it lies `bevel` from the inner box.
+// Adds the point of the rounded box for a point of the sharp one; it is at the distance `bevel` from the
+// inner box.
 void add_box_vertex(Mesh& mesh, const Vector3f& point, const Vector3f& half, float bevel,
                     const Vector3f& face_normal) {
   const Vector3f inner_half = half - Vector3f::Constant(bevel);
@@ -79,10 +81,10 @@ void add_box_vertex(Mesh& mesh, const Vector3f& point, const Vector3f& half, flo
   mesh.normals.push_back(normal);
 }
 
-// The flat parts of a bevelled box's faces, joined by one facet at each edge and corner: two fifths of its
+// The flat parts of a bevelled box's faces, connected by one facet at each edge and corner: two fifths of its
 // triangles.
 void add_coarse_box(Mesh& mesh) {
-  constexpr int kColumns = 4, kFace = kColumns * kColumns;  // vertices, as make_box lays them out
+  constexpr int kColumns = 4, kFace = kColumns * kColumns;  // number of vertices, in the layout of make_box
   // The corner of the flat part of the face across `axis`, towards (or away from) each axis.
   const auto corner = [](int axis, const std::array<bool, 3>& towards) {
     const auto along = [&](int offset) { return towards[static_cast<std::size_t>((axis + offset) % 3)]; };
@@ -124,7 +126,7 @@ Mesh make_sphere(float radius, int segments) {
   std::vector<ProfilePoint> profile;
   const int rings = std::max(segments / 4, 2);
   append_cap(profile, radius, 0, rings, -1);
-  profile.pop_back();  // the equator comes with the upper half
+  profile.pop_back();  // the upper half adds the equator
   append_cap(profile, radius, 0, rings, 1);
   return revolve(profile, std::max(segments, 3));
 }
@@ -192,7 +194,8 @@ Mesh make_box(const Vector3f& size, float bevel) {
       }
     }
   }
-  constexpr float kFine = 0.1f;  // a bevel whose shadow one facet is enough for, as a share of half a side
+  // Bevel below which one facet is enough for the shadow, as a share of half a side.
+  constexpr float kFine = 0.1f;
   if (bevel > 0 && bevel <= kFine * half.minCoeff()) add_coarse_box(mesh);
   return mesh;
 }

@@ -23,7 +23,7 @@ float lattice(int x, int y, int z, uint32_t seed) {
   return static_cast<float>(scramble(key) >> 8) * 0x1p-23f - 1;
 }
 
-// Noise in [-1, 1] that changes over a distance of 1.
+// Noise in [-1, 1] that varies over a distance of 1.
 float noise(const Vector3f& p, uint32_t seed) {
   const Vector3f base = p.array().floor();
   const Vector3f f = p - base;
@@ -36,12 +36,12 @@ float noise(const Vector3f& p, uint32_t seed) {
   return mix(mix(row(0, 0), row(1, 0), w.y()), mix(row(0, 1), row(1, 1), w.y()), w.z());
 }
 
-// Density of the lump at a place of the unit ball, at most about 1.
+// Density of the puff at a point of the unit ball, at most about 1.
 float density(PuffAtlas::Kind kind, const Vector3f& p, uint32_t seed) {
   const bool flame = kind == PuffAtlas::Kind::flame;
   const float r = p.norm();
   if (r >= 1) return 0;
-  // Billows: folds of noise point outwards in smoke and are torn along Y in flames.
+  // Billows: the folds of the noise point outwards in smoke and are stretched along Y in flames.
   const Vector3f q = flame ? Vector3f(3.2f * p.x(), 1.7f * p.y(), 3.2f * p.z()) : Vector3f(2.3f * p);
   float sum = 0, amplitude = 1, scale = 1;
   for (uint32_t octave = 0; octave < 4; ++octave, amplitude *= 0.52f, scale *= 2.07f) {
@@ -104,10 +104,10 @@ PuffAtlas::Picture PuffAtlas::make_picture(Kind kind, uint32_t seed) {
 
   Picture picture;
   picture.levels[0].assign(static_cast<std::size_t>(n * n), pack(0, Vector3f::UnitZ()));
-  constexpr int d = 3;  // over which slopes are taken
+  constexpr int d = 3;  // distance over which slopes are computed
   for (int y = d; y < n - d; ++y) {
     for (int x = d; x < n - d; ++x) {
-      // What is in front hides what is behind, in light and in shape.
+      // The front hides the back, both in light and in shape.
       float through = 1;
       Vector3f slope = Vector3f::Zero();
       for (int z = kSlices - 2; z > 0; --z) {

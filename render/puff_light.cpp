@@ -9,7 +9,7 @@
 namespace offstage::render {
 namespace {
 
-// Light of the sun in smoke under an optical depth: scattered once, a few and many times.
+// Sunlight scattered in smoke at an optical depth: once, a few times and many times.
 float sun_share(float depth, float albedo) {
   return 0.68f * std::exp(-depth) +
          albedo * (0.3f * std::exp(-0.35f * depth) + 0.12f * albedo * std::exp(-0.1f * depth));
@@ -30,7 +30,7 @@ PuffLight::PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_unif
 
 PuffRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vector3f& albedo,
                                  float visibility, const Vector3f& to_eye) const {
-  // Optical depth and its slope, from the corners of a tetrahedron in the puff.
+  // Optical depth and its gradient, from the corners of a tetrahedron in the puff.
   static const std::array<Vector3f, 4> kCorners = {Vector3f(1, 1, 1), Vector3f(1, -1, -1),
                                                    Vector3f(-1, 1, -1), Vector3f(-1, -1, 1)};
   const float reach = std::max(0.5f * radius, 0.5f * grid.cell_m());
@@ -41,7 +41,7 @@ PuffRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vect
     depth += 0.25f * d;
     slope += d / (4 * reach) * corner;
   }
-  // What lies above takes light from the sky; steps grow, as far smoke need not be seen in detail.
+  // Smoke above reduces the light of the sky. Steps grow, because distant smoke needs no detail.
   float above = 0, step = grid.cell_m();
   Vector3f p = place;
   for (int k = 0; k < 4 && !grid.empty(); ++k, step *= 2) {

@@ -13,11 +13,11 @@ namespace offstage::render {
 namespace {
 
 constexpr GLuint kSmokeUnit = 5, kColorUnit = 6, kLowDepthUnit = 7;
-constexpr float kMostOpaque = 0.98f;              // of one puff, so that its optical depth is finite
-constexpr double kHalf_px = 8, kQuarter_px = 64;  // radii from which the picture is made smaller
-constexpr float kNearest = 1.2f;      // radius from which a puff fades, as a share of half the height
+constexpr float kMostOpaque = 0.98f;  // greatest opacity of one puff, so that its optical depth is finite
+constexpr double kHalf_px = 8, kQuarter_px = 64;  // radii from which the picture is reduced
+constexpr float kNearest = 1.2f;      // radius from which a puff fades out, as a share of half the height
 constexpr float kTolerance = 0.25f;   // depth in typical radii over which puffs change little
-constexpr float kFlameCover = 0.6f;   // soot: deep flames glow, but do not add up without end
+constexpr float kFlameCover = 0.6f;   // soot: deep flames glow, but do not add up without limit
 constexpr float kFlameWobble = 0.5f;  // [rad]
 constexpr float kSpin = 0.35f;        // [rad/s]
 
@@ -25,7 +25,7 @@ PuffAtlas::Kind kind_of(const PointSet& set) {
   return set.def.style == PointStyle::fire ? PuffAtlas::Kind::flame : PuffAtlas::Kind::smoke;
 }
 
-// Independent numbers of a puff from its number in [0, 1), which has 24 bits.
+// Several independent numbers of a puff from its number in [0, 1), which has 24 bits.
 struct Shape {
   int variant;
   bool mirrored;
@@ -38,9 +38,10 @@ struct Shape {
   }
 };
 
-// The sun's disc blurs the shadow of a drop to nothing within a few tens of its widths, so drops are a mist.
+// The sun's disc blurs the shadow of a drop to nothing within a few tens of its widths, so drops are treated
+// as mist.
 void add_drops(const PointSet& set, std::vector<OpacityGrid::Absorber>& absorbers) {
-  constexpr float kLost = 0.6f;  // of the light that meets a drop
+  constexpr float kLost = 0.6f;  // share of the light on a drop that is removed
   for (const GpuPoint& point : set.points) {
     const float radius = point.position.w();
     const float length = std::max(set.def.stretch_s * point.velocity.head<3>().norm(), 2 * radius);
@@ -103,7 +104,7 @@ void PuffsPass::measure(const PaintOrder& order, const View& view, float pixel_m
     volume_px += px * px * px;
     farthest_m_ = std::max(farthest_m_, depth + ball.w());
   }
-  // In a picture of half or a quarter of the size, large puffs look the same and cost a fraction.
+  // In a picture of half or a quarter of the size, large puffs look the same and take a fraction of the time.
   typical_m_ = static_cast<float>(volume / area);
   const double typical_px = volume_px / area_px;
   factor_ = typical_px < kHalf_px ? 1 : typical_px < kQuarter_px ? 2 : 4;
@@ -142,7 +143,7 @@ void PuffsPass::make_splats(const PaintOrder& order, const View& view, const Puf
     s.opacity = std::min(point.color.w(), 1.0f) * thinning * thinning *
                 std::clamp(0.5f * (s.depth - view.near_m) / drawn, 0.0f, 1.0f);
 
-    // What comes so near that it fills the picture fades before the eye is in it.
+    // A puff that is near enough to fill the picture fades out before the eye is inside it.
     const float apart = std::clamp(0.5f * s.depth / radius - 1, 0.0f, 1.0f);
     s.opacity *= std::max(apart, std::clamp(2 - radius_px / (kNearest * half_size.y()), 0.0f, 1.0f));
 
@@ -151,7 +152,7 @@ void PuffsPass::make_splats(const PaintOrder& order, const View& view, const Puf
     const Vector3f velocity = point.velocity.head<3>();
     Vector2f motion(velocity.dot(view.right), velocity.dot(view.up));
     const float stretch = 1 + 0.5f * set.def.stretch_s * motion.norm() / drawn;
-    if (flame) motion += 0.2f * Vector2f(view.right.y(), view.up.y());  // what does not move burns upwards
+    if (flame) motion += 0.2f * Vector2f(view.right.y(), view.up.y());  // flames at rest point upwards
     const Vector2f along = motion.norm() > 1e-6f ? Vector2f(motion.normalized()) : Vector2f(0, 1);
     float angle = 2 * std::numbers::pi_v<float> * shape.turn + kSpin * (2 * shape.turn - 1) * set.ages[i];
     if (flame) angle = std::atan2(along.x(), along.y()) + kFlameWobble * (2 * shape.turn - 1);
@@ -245,8 +246,8 @@ void PuffsPass::read_depth(std::span<const Splat> splats, const FrameUniforms& f
   depths_.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer);
   glReadPixels(left, bottom, width, height, GL_DEPTH_COMPONENT, GL_FLOAT, depths_.data());
-  // The nearest and the farthest of the pixels in turns, so that what is laid over the scene finds both sides
-  // of every edge (Jansen and Bavoil, "Fast Rendering of Opacity Mapped Particles", 2011). Nearer is more.
+  // Alternately the nearest and the farthest of the pixels, so that compositing finds both sides of every
+  // edge (Jansen and Bavoil, "Fast Rendering of Opacity Mapped Particles", 2011). A nearer depth is greater.
   tbb::parallel_for(y0, y1, [&](int y) {
     for (int x = x0; x < x1; ++x) {
       const bool nearest = ((x ^ y) & 1) != 0;

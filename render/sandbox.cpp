@@ -45,12 +45,12 @@ void restrict_files(std::span<const std::filesystem::path> folders) {
   ::syscall(SYS_landlock_restrict_self, rules.fd(), 0);
 }
 
-/// What memory, arithmetic and reading need. Opening is checked apart.
+/// System calls for memory, arithmetic and reading. Opening files is handled separately.
 constexpr std::array kAllowedCalls = {
     SYS_read,         SYS_readv,          SYS_pread64,      SYS_write,           SYS_writev,
     SYS_pwrite64,     SYS_close,          SYS_fstat,        SYS_newfstatat,      SYS_stat,
     SYS_lstat,        SYS_statx,          SYS_lseek,
-    SYS_ftruncate,  // of the answer; nothing else is open for writing
+    SYS_ftruncate,  // for the answer; no other file is open for writing
     SYS_access,       SYS_faccessat,      SYS_faccessat2,   SYS_readlink,        SYS_readlinkat,
     SYS_getcwd,       SYS_getdents64,     SYS_mmap,         SYS_munmap,          SYS_mprotect,
     SYS_mremap,       SYS_madvise,        SYS_brk,          SYS_futex,           SYS_sched_yield,
@@ -72,11 +72,11 @@ sock_filter answer(uint32_t action) {
   return statement(BPF_RET | BPF_K, action);
 }
 
-/// Lets a call that opens through if the argument with its flags asks for reading only.
+/// Allows a system call that opens files if the argument with its flags is read-only.
 void allow_opening(std::vector<sock_filter>& program, uint32_t call, std::size_t flags_argument) {
   constexpr uint32_t kChanges = O_ACCMODE | O_CREAT | O_TRUNC | O_APPEND;  // O_RDONLY is 0
-  const std::size_t flags =
-      offsetof(seccomp_data, args) + flags_argument * sizeof(uint64_t);  // low half first
+  // The less significant half comes first.
+  const std::size_t flags = offsetof(seccomp_data, args) + flags_argument * sizeof(uint64_t);
   program.push_back(jump(BPF_JEQ, call, 0, 4));
   program.push_back(load(flags));
   program.push_back(jump(BPF_JSET, kChanges, 0, 1));
@@ -84,7 +84,7 @@ void allow_opening(std::vector<sock_filter>& program, uint32_t call, std::size_t
   program.push_back(answer(SECCOMP_RET_ALLOW));
 }
 
-/// Lets a signal through that a process sends to itself, as abort() does.
+/// Allows signals that a process sends to itself, as abort() does.
 void allow_own_signals(std::vector<sock_filter>& program) {
   program.push_back(jump(BPF_JEQ, SYS_tgkill, 0, 4));
   program.push_back(load(offsetof(seccomp_data, args)));
@@ -127,7 +127,8 @@ void limit_process(const ProcessLimits& limits) {
   limit(RLIMIT_AS, mapped_pages * static_cast<uint64_t>(::sysconf(_SC_PAGESIZE)) + limits.memory_bytes);
   limit(RLIMIT_FSIZE, limits.memory_bytes);
   limit(RLIMIT_CORE, 0);
-  // A second apart, so that the signal says what happened before the kernel kills.
+  // The hard limit is a second later, so that the signal reports the reason before the kernel kills the
+  // process.
   const rlimit time{limits.cpu_s, limits.cpu_s + 1};
   ::setrlimit(RLIMIT_CPU, &time);
 

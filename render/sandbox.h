@@ -1,5 +1,5 @@
 #pragma once
-/// Takes rights away from the calling process for good: for the child that reads the files of strangers.
+/// Permanently removes rights from the calling process, for the child that reads untrusted files.
 
 #include <cstdint>
 #include <filesystem>
@@ -10,24 +10,24 @@ namespace offstage::render {
 
 struct ProcessLimits {
   uint64_t cpu_s = 0;         ///< processor time [s]
-  uint64_t memory_bytes = 0;  ///< beyond what is mapped already; also the most that a file may grow to
+  uint64_t memory_bytes = 0;  ///< memory in addition to that already mapped; also the limit of file sizes
 };
 
-/// Limits of time and memory (RLIMIT_CPU, RLIMIT_AS, RLIMIT_FSIZE), and no core dump. SIGXCPU ends the
-/// process; SIGINT and SIGTERM are ignored, because the parent decides, and so is SIGXFSZ: the write fails
-/// instead.
+/// Limits time and memory (RLIMIT_CPU, RLIMIT_AS, RLIMIT_FSIZE), and disables core dumps. SIGXCPU ends the
+/// process. SIGINT and SIGTERM are ignored, because the parent decides, and so is SIGXFSZ, because the write
+/// fails instead.
 void limit_process(const ProcessLimits& limits);
 
-/// Closes every descriptor above the standard streams but `kept`: outputs and locks of this process stay out
-/// of reach.
+/// Closes all descriptors above the standard streams except `kept`, so that the child cannot reach outputs
+/// and locks of this process.
 void close_descriptors(int kept);
 
-/// No file but those below `folders` can be opened, and those for reading only (Landlock); no network, no new
-/// process or program, no change of the file system (seccomp: every other system call fails with EPERM). What
-/// the kernel does not have is left out.
+/// Allows only files below `folders` to be opened, and only for reading (Landlock). Allows no network, no new
+/// process or program, and no change of the file system (seccomp: all other system calls fail with EPERM).
+/// Features that the kernel lacks are skipped.
 void enter_sandbox(std::span<const std::filesystem::path> folders);
 
-/// Which of the two this kernel has, for `doctor`: "Landlock and seccomp", "seccomp", ...
+/// Returns which of the two the kernel supports, for `doctor`: "Landlock and seccomp", "seccomp", ...
 std::string sandbox_support();
 
 }  // namespace offstage::render

@@ -6,7 +6,7 @@ namespace offstage::render {
 namespace {
 
 constexpr GLuint kSunPlainUnit = 9, kSunNearestUnit = 13;
-constexpr int kCells = 64;  // a side of the coarse grid
+constexpr int kCells = 64;  // cells along a side of the coarse grid
 
 }  // namespace
 
@@ -26,8 +26,8 @@ ShadowFrame fit_shadow(std::span<const Caster> casters, const View& view, const 
     region.extend(center - reach).extend(center + reach);
     world.extend(caster.center - reach).extend(caster.center + reach);
   }
-  // A shadow can lie behind its caster by its height over the tangent of the sun's elevation; twice the
-  // diagonal is enough for every sun but one at the horizon.
+  // A shadow can be behind its caster by its height over the tangent of the sun's elevation; twice the
+  // diagonal is enough for every sun except one at the horizon.
   const float diagonal = world.diagonal().norm();
   float far_distance = 0, near_distance = view.far_m;
   for (const Caster& caster : casters) {
@@ -44,7 +44,7 @@ ShadowFrame fit_shadow(std::span<const Caster> casters, const View& view, const 
   if (!(low.x() < high.x() && low.y() < high.y()) || !std::isfinite(extent)) return {};
 
   constexpr float kMargin_px = 4, kTexelPerPixel = 1;
-  // Texels much smaller than a pixel would only cost time.
+  // Texels much smaller than a pixel would only take time.
   const float finest = kTexelPerPixel * pixel_m * std::max(near_distance, 0.0f);
   const float needed = std::max(extent * (1 + 2 * kMargin_px / static_cast<float>(size_px)),
                                 finest * static_cast<float>(size_px));
@@ -60,7 +60,8 @@ ShadowFrame fit_shadow(std::span<const Caster> casters, const View& view, const 
   frame.clip_from_world = Matrix4f::Identity();
   frame.clip_from_world.row(0) << 2 / side * light_from_world.row(0), -2 / side * snapped.x() - 1;
   frame.clip_from_world.row(1) << 2 / side * light_from_world.row(1), -2 / side * snapped.y() - 1;
-  frame.clip_from_world.row(2) << -light_from_world.row(2) / depth, z_high / depth;  // 0 nearest to the sun
+  // 0 is nearest to the sun.
+  frame.clip_from_world.row(2) << -light_from_world.row(2) / depth, z_high / depth;
   return frame;
 }
 
@@ -77,7 +78,7 @@ ShadowMap::ShadowMap(int size_px)
 
 void ShadowMap::mark(const ShadowFrame& frame, std::span<const Caster> balls,
                      std::span<const Eigen::AlignedBox3f> boxes) {
-  constexpr float kNothing = 2;  // behind all that the map holds
+  constexpr float kNothing = 2;  // greater than all depths in the map
   const float reach_m = search_m(frame);
   const Matrix4f& clip = frame.clip_from_world;
   const Vector3f per_m(clip.row(0).head<3>().norm(), clip.row(1).head<3>().norm(),
@@ -133,9 +134,9 @@ void ShadowMap::end() const {
 }
 
 void ShadowMap::read(int x, int y, int width, int height, std::vector<uint16_t>& depths) const {
-  constexpr int kRows = 32;  // at once
+  constexpr int kRows = 32;  // rows read at once
   const auto row = static_cast<std::size_t>(width), size = row * static_cast<std::size_t>(height);
-  if (depths.capacity() < size) depths = {};  // no room for both
+  if (depths.capacity() < size) depths = {};  // avoids holding both buffers
   depths.resize(size);
   std::vector<float> strip(row * kRows);
   glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_);

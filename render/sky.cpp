@@ -7,7 +7,7 @@
 namespace offstage::render {
 
 SkyModel make_sky(const Sun& sun, const Environment& environment) {
-  constexpr float kGlow = 0.12f;  // of the sun's radiance
+  constexpr float kGlow = 0.12f;  // share of the sun's radiance
   const Vector3f direction = sun.direction.normalized();
   const float risen = std::clamp(0.5f + 5 * direction.y(), 0.0f, 1.0f);
   SkyModel sky{.sun_direction = direction,
@@ -16,7 +16,7 @@ SkyModel make_sky(const Sun& sun, const Environment& environment) {
                .ground = environment.intensity * environment.ground,
                .glow = environment.intensity * kGlow * risen * sun.intensity * sun.color};
   if (environment.ground_albedo) {
-    // Level ground sees the whole sky: its share of low and high parts by the cosine, of the gradient above.
+    // Horizontal ground sees the whole sky: its mean of the gradient, weighted by the cosine.
     constexpr float kLow = 0.066f;
     const Vector3f light = sky.zenith + kLow * (sky.horizon - sky.zenith) +
                            std::max(direction.y(), 0.0f) * sun.intensity * sun.color;
@@ -35,8 +35,8 @@ Vector3f sky_radiance(const SkyModel& sky, const Vector3f& direction) {
 }
 
 std::array<Vector3f, 9> sky_irradiance(const SkyModel& sky) {
-  // Squares of the constants of the real spherical harmonics times the cosine lobe's factors over pi (1, 2/3,
-  // 1/4).
+  // Squares of the constants of the real spherical harmonics times the factors of the cosine lobe over pi (1,
+  // 2/3, 1/4).
   constexpr float pi = std::numbers::pi_v<float>;
   constexpr std::array<float, 9> kWeights = {1 / (4 * pi),     0.5f / pi,      0.5f / pi,
                                              0.5f / pi,        3.75f / pi / 4, 3.75f / pi / 4,
@@ -45,7 +45,7 @@ std::array<Vector3f, 9> sky_irradiance(const SkyModel& sky) {
   std::array<Vector3f, 9> sum;
   sum.fill(Vector3f::Zero());
   for (int band = 0; band < kBands; ++band) {
-    const float y = (static_cast<float>(band) + 0.5f) * 2 / kBands - 1;  // equal areas
+    const float y = (static_cast<float>(band) + 0.5f) * 2 / kBands - 1;  // bands of equal area
     const float r = std::sqrt(1 - y * y);
     for (int column = 0; column < kColumns; ++column) {
       const float angle = (static_cast<float>(column) + 0.5f) * 2 * pi / kColumns;
@@ -56,7 +56,7 @@ std::array<Vector3f, 9> sky_irradiance(const SkyModel& sky) {
     }
   }
   constexpr float kSolidAngle = 4 * pi / (kBands * kColumns);
-  // Light that went from surface to surface has lost some of the sky's blue.
+  // Light that is reflected from surface to surface loses some of the sky's blue.
   constexpr float kGrey = 0.35f;
   const Vector3f luminance(0.2126f, 0.7152f, 0.0722f);
   for (std::size_t k = 0; k < 9; ++k) {

@@ -10,10 +10,10 @@
 namespace offstage::render {
 namespace {
 
-constexpr int kLanes = 8;  // of a vector register
+constexpr int kLanes = 8;  // lanes of a vector register
 constexpr int kTileWidth_px = 64, kTileHeight_px = 16;
 constexpr int kTilePixels = kTileWidth_px * kTileHeight_px;
-constexpr float kHidden = 1.0f / 512;  // less of the background is as good as none
+constexpr float kHidden = 1.0f / 512;  // below this share the background counts as hidden
 constexpr int kCheckEvery = 24;
 
 struct Tile {
@@ -21,7 +21,7 @@ struct Tile {
 };
 
 struct TileRange {
-  int x0, y0, x1, y1;  // in tiles, the end not included
+  int x0, y0, x1, y1;  // in tiles, the end excluded
 };
 
 template <class S>
@@ -49,7 +49,7 @@ inline Lanes byte_of(IntLanes texel, int shift) {
   return __builtin_convertvector((texel >> shift) & 255, Lanes);
 }
 
-// The texels under eight pixels in a row, (dx, dy) being the first one's place from the centre.
+// The texels under eight pixels in a row; (dx, dy) is the position of the first one relative to the centre.
 inline IntLanes texels_at(const Splat& s, float dx, float dy) {
   const Lanes x = dx + Lanes{0, 1, 2, 3, 4, 5, 6, 7};
   const float half = 0.5f * static_cast<float>(s.cell.size_px), last = static_cast<float>(s.cell.size_px - 1);
@@ -86,7 +86,7 @@ inline void draw_lanes(const Splat& s, float dx, float dy, std::size_t at, Tile&
   through -= seen * s.cover;
 }
 
-// Eight pixels in a row of a streak.
+// Draws eight pixels in a row of a streak.
 inline void draw_lanes(const StreakSplat& s, float dx, float dy, std::size_t at, Tile& tile) {
   const Lanes x = dx + Lanes{0, 1, 2, 3, 4, 5, 6, 7};
   const Lanes along = x * s.along_x + dy * s.along_y,
@@ -115,7 +115,8 @@ inline void draw_lanes(const StreakSplat& s, float dx, float dy, std::size_t at,
   through -= seen * s.cover;
 }
 
-// The part of a row that a splat reaches, dy above its centre, as its left and right from the centre.
+// The part of a row that a splat covers, `dy` above its centre, as left and right ends relative to the
+// centre.
 inline std::array<float, 2> span_of(const Splat& s, float) {
   return {-s.half_x, s.half_x};
 }
@@ -143,7 +144,7 @@ void draw_splat(const S& s, int tile_x, int tile_y, Tile& tile) {
   }
 }
 
-// Folds the bytes' scale into the numbers: cover is byte / 255, a normal byte / 127.5 - 1.
+// Includes the scale of bytes in the numbers: cover is byte / 255, a normal is byte / 127.5 - 1.
 Splat in_bytes(Splat s) {
   s.opacity /= 255;
   for (auto& r : s.radiance) {
@@ -160,7 +161,7 @@ bool is_covered(const Tile& tile) {
   return *std::max_element(most.begin(), most.end()) < kHidden;
 }
 
-/// Draws into a tile whose depths are set; `farthest` is the greatest of them.
+/// Draws into a tile whose depths are set; `farthest` is the greatest depth.
 template <class S>
 void draw_tile(std::span<const S> splats, std::span<const uint32_t> order, int tile_x, int tile_y,
                float farthest, Tile& tile) {
@@ -207,7 +208,7 @@ void sort_by_tiles(std::span<const S> splats, int width_px, int height_px, Splat
   }
 }
 
-/// Calls f(i, at) for every pixel of a tile with its number in the picture's rows and its place in the tile.
+/// Calls f(i, at) for every pixel of a tile, with its index in the picture and its index in the tile.
 template <class F>
 void for_each_pixel(int x0, int y0, int width_px, int height_px, F&& f) {
   const int width = std::min(kTileWidth_px, width_px - x0), height = std::min(kTileHeight_px, height_px - y0);

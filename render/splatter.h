@@ -1,7 +1,7 @@
 #pragma once
 /// Private: draws many soft particles over each other on the CPU, front to back, by tiles in parallel. Where
-/// those in front cover a tile, those behind are not touched. llvmpipe needs several times as long for the
-/// same, since every quad goes through its vertex shader and set-up on one thread.
+/// the front particles cover a tile, those behind are skipped. llvmpipe would take several times as long,
+/// because every quad goes through its vertex shader and set-up on one thread.
 
 #include <cstdint>
 #include <span>
@@ -14,82 +14,84 @@
 
 namespace offstage::render {
 
-/// One puff on the screen, in pixels of the picture it is drawn in, y upwards: an affine picture of an
-/// atlas's cell, lit by its normals. It fades where the scene cuts through it.
+/// One puff on the screen, in pixels of the target picture, y upwards: a cell of the atlas under an affine
+/// transformation, lit by its normals. It fades out where it intersects the scene.
 struct Splat {
-  float x, y;            ///< of the centre
+  float x, y;            ///< centre
   float half_x, half_y;  ///< half-size of the rectangle around it
   float ux, uy, vx,
-      vy;  ///< place in the atlas's cell, in [-1, 1]: u = ux * dx + uy * dy, v = vx * dx + vy * dy
+      vy;  ///< Position in the atlas's cell, in [-1, 1]: u = ux * dx + uy * dy, v = vx * dx + vy * dy.
   float depth, inverse_reach;  ///< along the view axis [m]; 1 / (2 * radius)
-  float opacity;               ///< where the cell covers all
-  float cover;                 ///< of its opacity that hides what is behind: 1 smoke, 0 only adds light
-  /// Radiance of red, green, blue where the normal is n: r[0] + r[1] n.x + r[2] n.y + r[3] n.z
+  float opacity;               ///< opacity where the cell's cover is 1
+  float cover;  ///< share of its opacity that hides the background: 1 for smoke, 0 only adds light
+  /// Radiance of red, green and blue where the normal is n: r[0] + r[1] n.x + r[2] n.y + r[3] n.z.
   float radiance[3][4];
   PuffAtlas::Level cell;
 };
 
-/// What a streak sends to the eye: radiance in the middle, and mirrored at the sides, by the place across.
+/// Light of a streak towards the eye: radiance in the middle, and mirrored light at the sides, as functions
+/// of the position across.
 struct StreakLight {
   float middle[3], rim[3], rim_slope[3];
 };
 
-/// One streak on the screen: the stroke of a soft round pen.
+/// One streak on the screen, drawn as with a soft round pen.
 struct StreakSplat {
   float x, y;
   float half_x, half_y;
   float along_x, along_y;             ///< unit vector to its head
-  float half_length, inverse_radius;  ///< of the straight part; 1 / radius
+  float half_length, inverse_radius;  ///< half-length of the straight part; 1 / radius
   float depth, depth_slope;           ///< at the centre [m], and its change per pixel towards the head
   float inverse_reach;                ///< 1 / (2 * radius) [1/m]
-  float opacity, cover;               ///< as of a Splat
+  float opacity, cover;               ///< as in Splat
   float softness, taper;              ///< as in PointsDef
   const StreakLight* light;
 };
 
-/// What splats are drawn in. Premultiplied colour, and the share of what is behind that still shows.
+/// Target picture of splats: premultiplied colour, and the remaining share of the background.
 struct SplatPicture {
   int width_px = 0, height_px = 0;
-  std::vector<float> depth;  ///< of the scene along the view axis [m], one a pixel
-  std::vector<float> rgbt;   ///< 4 a pixel; written where a splat may be
+  std::vector<float> depth;  ///< depth of the scene along the view axis [m], one value per pixel
+  std::vector<float> rgbt;   ///< 4 values per pixel; written where a splat may be
 
-  /// Rectangle of pixels that may have changed, whole tiles; the rest of rgbt is not touched.
+  /// Rectangle of pixels that may have changed, in whole tiles; the rest of rgbt is not written.
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 };
 
-/// Which splats touch each tile of a picture, in their order.
+/// The splats that touch each tile of a picture, in their order.
 struct SplatTiles {
   int columns = 0, rows = 0;
-  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;  ///< rectangle of tiles that any touches
-  std::vector<uint32_t> begins;        ///< of each tile's splats in `order`, by rows; then the end
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;  ///< rectangle of tiles that are touched
+  std::vector<uint32_t> begins;        ///< first splat of each tile in `order`, by rows; then the end
   std::vector<uint32_t> order;
 
   bool empty() const { return x0 >= x1; }
   std::span<const uint32_t> of(int x, int y) const;
 };
 
-/// `front_to_back`: the order matters. The result does not depend on the number of threads.
+/// Draws splats in the order front to back. The result does not depend on the number of threads.
 void draw_splats(std::span<const Splat> front_to_back, SplatPicture& picture);
 
-/// Streaks over a picture that is there by bands alone, as it is read back: it needs no other of its size.
-/// Each tile draws its streaks back to front in as many goes as other things come in between.
+/// Draws streaks over a picture that exists only band by band while it is read back, so no second picture of
+/// its size is needed. Each tile draws its streaks back to front, in several parts if other objects are
+/// between them.
 class StreakBands {
  public:
-  static constexpr int kRows = 32;  ///< of a band [px]
-  /// A part of a band. `bottom` is a multiple of kRows, `left` and the right end are those of tiles.
+  static constexpr int kRows = 32;  ///< rows of a band [px]
+  /// A part of a band. `bottom` is a multiple of kRows; left and right ends are at tile borders.
   struct Strip {
     int left, bottom, width, rows;
-    std::span<const float> depth;  ///< one a pixel, of the depth buffer
+    std::span<const float> depth;  ///< values of the depth buffer, one per pixel
     std::span<float> rgba;         ///< premultiplied
   };
 
-  /// Finds what each tile has to draw. The streaks must stay where they are.
+  /// Finds the streaks of each tile. The streaks must stay in memory.
   void sort(std::span<const StreakSplat> front_to_back, int width_px, int height_px);
-  /// The columns of tiles that have a streak and a pixel from `left` to `right`.
+  /// Returns the range of tile columns between `left` and `right` that contain streaks.
   std::pair<int, int> columns_px(int left, int right) const;
-  /// Whether those tiles of a band have streaks, from number `first` on, that were not drawn.
+  /// Whether these tiles of a band contain streaks, from number `first` on, that were not drawn.
   bool any(int bottom, int left, int right, uint32_t first) const;
-  /// Lays the streaks from `first` on that were not drawn yet over a strip. The distance along the view axis
+  /// Draws the streaks from `first` on that were not drawn yet over a strip. The distance along the view axis
   /// is x / (depth + y) of `distance`.
   void lay_over(const Strip& strip, const Eigen::Vector2f& distance, uint32_t first);
 
@@ -99,8 +101,8 @@ class StreakBands {
   std::span<const StreakSplat> streaks_;
   int width_px_ = 0;
   SplatTiles tiles_;
-  std::vector<uint32_t>
-      ends_;  ///< of each tile, in the tiles' order: behind those that are still to be drawn
+  /// For each tile, in the order of the tiles: end of the streaks that are still to be drawn.
+  std::vector<uint32_t> ends_;
 };
 
 }  // namespace offstage::render

@@ -25,16 +25,17 @@ namespace offstage::render {
 namespace {
 
 constexpr GLuint kFrameBlock = 0, kSceneDepthUnit = 4, kBehindUnit = 12;
-constexpr float kMirrorReach = 0.6f;  // how far away mirrors look for the scene, in the same unit
-constexpr float kReach = 0.1f;        // how far things hide the sky, as a share of the distance to the target
+constexpr float kMirrorReach = 0.6f;  // greatest distance of mirrored objects, in the same unit
+// Greatest distance of objects that hide the sky, as a share of the distance to the target.
+constexpr float kReach = 0.1f;
 
 /// Colour and depth of the picture.
 struct Picture {
   gl::Texture color, depth;
   gl::Framebuffer framebuffer;
-  PictureCopy depth_copy;  ///< that particles and mirrors read
-  PictureCopy behind;      ///< what is seen through glass and in mirrors
-  gl::Framebuffer copies;  ///< of both; made when something is drawn in them alone
+  PictureCopy depth_copy;  ///< for particles and mirrors
+  PictureCopy behind;      ///< for glass and mirrors
+  gl::Framebuffer copies;  ///< for both copies; created when something is drawn only in them
 
   Picture(int width_px, int height_px)
       : color(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)),
@@ -44,17 +45,18 @@ struct Picture {
         behind(GL_RGBA32F, GL_LINEAR, kBehindUnit, width_px, height_px) {}
 };
 
-/// A body that something is seen through.
+/// A body through which other objects are visible.
 struct TranslucentBody {
-  const Cloth* cloth = nullptr;  ///< none: an instance
-  std::size_t instance = 0;      ///< of MeshPass::translucent
+  const Cloth* cloth = nullptr;  ///< null: an instance
+  std::size_t instance = 0;      ///< index in MeshPass::translucent
   bool glass = false;
   bool fills_region = false;
-  Eigen::AlignedBox2i area_px;    ///< that it takes
-  Eigen::AlignedBox2i looked_px;  ///< that it shows, refracted
+  Eigen::AlignedBox2i area_px;    ///< area that it covers
+  Eigen::AlignedBox2i looked_px;  ///< area of the picture that it shows by refraction
 };
 
-/// What a sub-frame must soften by itself, so that the mean of all is as soft as the sun's disc makes it.
+/// Softening that one sub-frame must do itself, so that the mean of all is as soft as the sun's disc makes
+/// it.
 Vector4f penumbra_of(const ShadowFrame& shadow, const Sun& sun, float size_px, int count) {
   const float half = std::tan(0.5f * sun.size_deg * std::numbers::pi_v<float> / 180);
   const float side_m = shadow.texel_m * size_px, ratio = side_m / shadow.depth_m;
@@ -94,7 +96,7 @@ struct Stage::Impl {
   StreaksPass streaks_pass;
   SurfaceProbe surface_probe;
   LinesPass lines_pass;
-  std::optional<ChannelsPass> channels_pass;  ///< made when asked for
+  std::optional<ChannelsPass> channels_pass;  ///< created on first use
   gl::LazyProgram sky_program{
       {"frame.glsl", "sky.vert"}, {"frame.glsl", "sky.glsl", "noise.glsl", "sky.frag"}, {"FLAT 1"}};
   gl::VertexArray no_attributes = gl::make_vertex_array();
@@ -186,7 +188,7 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
     for (int k = 0; k < 8; ++k)
       casters.push_back({box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k)), 1e-3f});
   }
-  // Without a caster the map is empty, which is light everywhere.
+  // Without a caster the map is empty, which means light everywhere.
   ShadowFrame shadow;
   if (sun.shadows)
     shadow = fit_shadow(casters, view, frame.sun_direction.head<3>(), frame.eye.w(), def.shadow_map_px);
@@ -245,7 +247,7 @@ void Stage::Impl::draw_lamp_shadows(std::span<const Caster> casters, std::span<c
   lamp_pass.end();
 }
 
-// Mirrors show sheer cloth, too, which is not in the picture yet.
+// Mirrors also show sheer cloth, which is not in the picture yet.
 void Stage::Impl::draw_sheer_in_copies(std::span<const Cloth* const> sheets) {
   if (std::ranges::none_of(sheets, [](const Cloth* cloth) { return cloth->is_translucent(); })) return;
   if (picture.copies == 0)
@@ -290,8 +292,8 @@ void Stage::Impl::draw_depth(std::span<const Cloth* const> sheets, std::span<Poi
   glClearNamedFramebufferfv(picture.framebuffer, GL_COLOR, 0, nothing);
   glClearNamedFramebufferfv(picture.framebuffer, GL_DEPTH, 0, nothing);
 
-  // A hair behind, and on steep faces by half of what a pixel's depth is, so that no rounding, of places in
-  // the picture either, hides a surface from its own shading.
+  // The depth is moved back slightly, on steep faces by half of a pixel's depth, so that rounding never hides
+  // a surface from its own shading.
   glEnable(GL_POLYGON_OFFSET_FILL);
   glPolygonOffset(-0.5f, -4);
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
@@ -354,7 +356,7 @@ std::vector<TranslucentBody> Stage::Impl::find_bodies(std::span<const Cloth* con
   const std::span<const Instance* const> see_through = mesh_pass.translucent();
   for (std::size_t k = 0; k < see_through.size(); ++k) {
     const Instance& instance = *see_through[k];
-    // Glass looks up what is behind it as far away as its thickness, twice.
+    // Glass reads the background from up to twice its thickness away.
     const bool fills = instance.mesh->round || instance.mesh->boxy || instance.mesh->flat;
     add({.instance = k, .glass = instance.material->glass, .fills_region = fills},
         {instance.mesh->box, instance.world_from_mesh, instance.mesh->round, view},
@@ -375,7 +377,7 @@ std::vector<TranslucentBody> Stage::Impl::find_bodies(std::span<const Cloth* con
   return ordered;
 }
 
-// Of bodies that have particles around them, but in their box.
+// For bodies that have particles around them, but within their box.
 void Stage::Impl::probe_surfaces(std::span<const TranslucentBody> bodies, std::span<PointSet* const> sets,
                                  const View& view, const FrameUniforms& frame, std::vector<Region>& regions) {
   const Eigen::AlignedBox2i all(Eigen::Vector2i(0, 0), Eigen::Vector2i(def.width_px, def.height_px));
@@ -453,7 +455,7 @@ void Stage::Impl::draw_translucent(std::span<const Cloth* const> sheets, std::sp
   puffs_pass.prepare_splats(paint_order, view, light, shadow_map);
   streaks_pass.prepare(paint_order, view, light, shadow_map, new_frame);
 
-  // Premultiplied: what adds light has no alpha, so one blend function serves both.
+  // Premultiplied: additive light has no alpha, so one blend function serves both.
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
   glDepthMask(GL_FALSE);
@@ -472,7 +474,7 @@ void Stage::Impl::draw_lines(const View& view) {
   });
 }
 
-// By bands, which stay in the processor's cache; rows run from the bottom up.
+// Adds the picture by bands, which fit into the processor's cache; rows are from the bottom up.
 void Stage::Impl::add_picture(const FrameUniforms& frame, HdrImage& sum) {
   glBindFramebuffer(GL_READ_FRAMEBUFFER, picture.framebuffer);
   const std::size_t row = static_cast<std::size_t>(sum.width_px) * 4;

@@ -1,10 +1,10 @@
 #pragma once
-/// The stage: what there is to see, and the passes that draw it. It knows handles, transforms, meshes, points
-/// and materials, and nothing of physics.
+/// The stage: the visible objects, and the passes that draw them. It has handles, transforms, meshes, points
+/// and materials, and does not depend on physics.
 ///
-/// A frame is the mean of N sub-frames (see sample_offsets), each drawn with its own offsets in the pixel, on
-/// the sun's disc, in the lens and, by the caller moving things in between, in time. That one mechanism gives
-/// anti-aliasing, soft shadows, depth of field and motion blur.
+/// A frame is the mean of N sub-frames (see sample_offsets). Each is drawn with its own offsets in the pixel,
+/// on the sun's disc and in the lens and, if the caller moves objects in between, in time. This one mechanism
+/// gives anti-aliasing, soft shadows, depth of field and motion blur.
 
 #include <memory>
 #include <optional>
@@ -28,44 +28,45 @@ struct Camera {
   float fov_deg = 40;  ///< vertical, in (0, 180)
   float near_m = 0.05f, far_m = 1e6f;
   float aperture = 0;  ///< lens diameter [m]; 0: everything is sharp
-  float focus = 0;     ///< distance in focus [m]; 0: the target's
+  float focus = 0;     ///< distance in focus [m]; 0: that of the target
 };
 
 struct Sun {
   Vector3f direction = Vector3f(0.45f, 0.75f, 0.5f).normalized();  ///< towards the sun, unit
   Vector3f color = {1, 0.95f, 0.87f};
-  float intensity = 3;    ///< radiance of a white surface facing it, before exposure
-  float size_deg = 1.5f;  ///< diameter of the disc: the softness of shadows
+  float intensity = 3;    ///< radiance of a white surface that faces the sun, before exposure
+  float size_deg = 1.5f;  ///< diameter of the disc, which sets the softness of shadows
   bool shadows = true;
 };
 
-/// A source of light near the scene: a glowing ball, cone, or rectangle.
+/// A light source near the scene: a glowing ball, a cone, or a rectangle.
 struct Lamp {
   Vector3f position = {0, 3, 0};
   Vector3f intensity = {10, 10, 10};  ///< radiance of a white surface 1 m away that faces it
-  float radius = 0.1f;                ///< of a ball [m], > 0
-  Vector2f size = {0, 0};             ///< of a rectangle [m]; else zero
-  Vector3f direction = {0, -1, 0};    ///< in which cones and rectangles shine, unit
-  float cone_deg = 0;                 ///< of a cone, across; else zero
+  float radius = 0.1f;                ///< radius of a ball [m], > 0
+  Vector2f size = {0, 0};             ///< size of a rectangle [m]; otherwise zero
+  Vector3f direction = {0, -1, 0};    ///< unit direction of cones and rectangles
+  float cone_deg = 0;                 ///< full angle of a cone; otherwise zero
   float softness = 0.3f;              ///< share of the cone over which its edge fades
   bool shadows = true;
 };
-inline constexpr std::size_t kMostLamps = 8;        ///< that light at once; the strongest do
-inline constexpr std::size_t kMostLampShadows = 4;  ///< of these, the first that want to
+inline constexpr std::size_t kMostLamps = 8;  ///< lamps that emit at once; if there are more, the strongest
+/// Number of these that cast shadows, in the order of lamps.
+inline constexpr std::size_t kMostLampShadows = 4;
 
 /// Sky, ambient light from it, and fog towards its horizon.
 struct Environment {
   Vector3f zenith = {0.20f, 0.42f, 0.88f};
   Vector3f horizon = {0.95f, 1.05f, 1.15f};
-  Vector3f ground = {0.36f, 0.33f, 0.28f};  ///< seen below the horizon, and light from below
+  Vector3f ground = {0.36f, 0.33f, 0.28f};  ///< visible below the horizon, and light from below
   float intensity = 1;                      ///< scales sky and ambient together
-  /// Of the ground that sends back the light of sun and sky, in place of `ground`.
+  /// Albedo of the ground, which reflects the light of sun and sky; replaces `ground`.
   std::optional<Vector3f> ground_albedo = {};
-  float clouds = 0;  ///< share of the sky that they cover
+  float clouds = 0;  ///< share of the sky covered by clouds
   /// Density [1/m]; transmittance exp(-fog * distance). 0: nothing fades with distance.
   float fog = 0;
-  /// How far away things hide the sky from each other [m]; 0: not at all; none: a tenth of the camera's
-  /// distance to its target.
+  /// Greatest distance at which objects hide the sky from each other [m]; 0: no occlusion; empty: a tenth of
+  /// the camera's distance to its target.
   std::optional<float> occlusion_reach = {};
   bool visible = true;  ///< false: transparent background; it still lights the scene
 };
@@ -76,7 +77,7 @@ struct Point {
   Vector3f velocity;  ///< [m/s], stretches streaks
   float radius;       ///< [m]
   Vector4f color;     ///< linear, straight alpha
-  uint64_t id;        ///< breaks ties when sorting, and gives a puff its shape
+  uint64_t id;        ///< breaks ties when sorting, and selects the shape of a puff
   float age = 0;      ///< [s], turns puffs slowly
 };
 
@@ -84,26 +85,29 @@ enum class PointStyle {
   sprite,  ///< soft round billboard, sorted, depth-faded
   streak,  ///< billboard stretched along its motion during the exposure: rain, sparks, water
   sphere,  ///< opaque lit ball
-  smoke,   ///< puff with a broken edge, lit through the other puffs between it and the sun
-  fire,    ///< tongue of flame along its motion: it glows, whatever `additive` and `lit` say, and hides a
-           ///< little
-  flake,   ///< thin irregular disc, bright against the light: snow, dust
+  smoke,   ///< puff with an irregular edge, lit through the other puffs between it and the sun
+  /// Flame along its motion; it glows independently of `additive` and `lit`, and hides the background
+  /// slightly.
+  fire,
+  flake,  ///< thin irregular disc, bright against the light: snow, dust
 };
 
 struct PointsDef {
   PointStyle style = PointStyle::sprite;
-  bool additive = false;     ///< add light instead of covering: fire, sparks
-  bool lit = true;           ///< by sun and sky; false: its colour is its light
-  bool casts_shadow = true;  ///< on the scene; of smoke on other smoke, too
+  bool additive = false;     ///< adds light instead of covering: fire, sparks
+  bool lit = true;           ///< lit by sun and sky; false: its colour is its radiance
+  bool casts_shadow = true;  ///< casts a shadow on the scene; smoke also on other smoke
   float softness = 0.5f;     ///< width of the fade at the rim, as a share of the radius, in [0, 1]
-  float stretch_s =
-      1.0f / 60;    ///< streaks are velocity * stretch_s long, others but balls and sprites longer by it [s]
-  float taper = 0;  ///< share by which a streak fades towards its tail, in [0, 1]: 0 a drop, 1 a spark
-  float metallic = 0, roughness = 0.3f;  ///< of spheres
+  /// Length of streaks is velocity * stretch_s; other styles except balls and sprites are longer by this
+  /// [s].
+  float stretch_s = 1.0f / 60;
+  /// Share by which a streak fades towards its tail, in [0, 1]: 0 for a drop, 1 for a spark.
+  float taper = 0;
+  float metallic = 0, roughness = 0.3f;  ///< for spheres
 };
 
-/// The stroke of a round pen: it faces the eye, is not lit, and shadows nothing. Where both ends are the same
-/// it is a dot; from a wide end to a narrow one, the head of an arrow.
+/// A line drawn as with a round pen. It faces the eye, is not lit, and casts no shadow. If both ends are
+/// equal it is a dot; with a wide and a narrow end it is the head of an arrow.
 struct Line {
   Vector3f a, b;
   Vector4f color;                  ///< linear, straight alpha
@@ -112,15 +116,15 @@ struct Line {
 
 struct LinesDef {
   float width = 0.0025f;  ///< share of the picture's height, so that large and small pictures look alike
-  float hidden = 0;       ///< opacity of what opaque things hide, in [0, 1]
+  float hidden = 0;       ///< opacity of the parts hidden by opaque objects, in [0, 1]
 };
 
-/// A thin sheet of triangles that bends: drawn smooth, from both sides, with the fabric of its material.
+/// A thin flexible sheet of triangles. It is drawn smooth, from both sides, with the fabric of its material.
 struct ClothDef {
   std::vector<uint32_t> triangles;  ///< three vertices each, counter-clockwise seen from the front
-  std::vector<Vector2f> uvs;        ///< place of each vertex along the cloth [m]
+  std::vector<Vector2f> uvs;        ///< position of each vertex along the cloth [m]
   float thickness = 0.001f;         ///< [m], >= 0
-  Vector2f texture_size = {1, 1};   ///< of one copy of the material's texture on the cloth [m], > 0
+  Vector2f texture_size = {1, 1};   ///< size of one copy of the material's texture on the cloth [m], > 0
   bool casts_shadow = true;
 };
 
@@ -129,8 +133,8 @@ struct SampleOffsets {
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
   Eigen::Vector2f lens = Eigen::Vector2f::Zero();
   Eigen::Vector2f light = Eigen::Vector2f::Zero();
-  int index = 0;  ///< of the sub-frame
-  int count = 1;  ///< of sub-frames in the frame: among many, one needs no filtering of its own
+  int index = 0;  ///< number of the sub-frame
+  int count = 1;  ///< number of sub-frames in the frame; among many, one needs no filtering of its own
 };
 /// Offsets of sub-frame i of n: a fixed low-discrepancy set; all zero for n = 1.
 SampleOffsets sample_offsets(int i, int n);
@@ -148,13 +152,14 @@ class Stage {
   Stage(Stage&&) noexcept;
 
   MeshHandle add_mesh(const Mesh& mesh);
-  /// `textures` are those the material's indices refer to; each is uploaded once per call, with mip maps.
+  /// `textures` are those to which the material's indices refer; each is uploaded once per call, with mip
+  /// maps.
   MaterialHandle add_material(const Material& material, std::span<const Image> textures = {});
   InstanceHandle add_instance(MeshHandle mesh, MaterialHandle material, bool casts_shadow = true);
   PointsHandle add_points(const PointsDef& def);
   LinesHandle add_lines(const LinesDef& def);
-  /// Nothing is seen of it before set_cloth. Throws std::invalid_argument for triangles of vertices that have
-  /// no place.
+  /// Adds a cloth, which is not visible before set_cloth(). Throws std::invalid_argument for an index out of
+  /// range.
   ClothHandle add_cloth(const ClothDef& def, MaterialHandle material);
 
   void remove(InstanceHandle instance);
@@ -167,30 +172,32 @@ class Stage {
   void set_points(PointsHandle points, std::span<const Point> values);
   void set_lines(LinesHandle lines, std::span<const Line> values);
 
-  /// Where the vertices of a cloth are in the world; throws std::invalid_argument if their number is wrong.
+  /// Sets the positions of a cloth's vertices in the world; throws std::invalid_argument if their number is
+  /// wrong.
   void set_cloth(ClothHandle cloth, std::span<const Vector3f> positions);
-  /// Gives a cloth other triangles, as after it tore. It is not seen again before set_cloth.
+  /// Sets other triangles of a cloth, for instance after it tore. It is not visible before the next
+  /// set_cloth().
   void set_cloth_mesh(ClothHandle cloth, std::span<const uint32_t> triangles, std::span<const Vector2f> uvs);
 
   void set_camera(const Camera& camera);
   void set_sun(const Sun& sun);
   void set_environment(const Environment& environment);
   void set_lamps(std::span<const Lamp> lamps);
-  /// The time of self-animated things such as ripples and clouds [s].
+  /// Sets the time of animated surfaces such as ripples and clouds [s].
   void set_time(float time);
 
   /// Draws one sub-frame and adds it to `sum`, which is sized and cleared first if it does not have the
   /// stage's size. Throws UnavailableError on a GL error.
   void draw(const SampleOffsets& offsets, HdrImage& sum);
 
-  /// Whose it is in Channels; 0, the default: nobody's.
+  /// Sets the object id of an instance in Channels; 0, the default: none.
   void set_object(InstanceHandle instance, uint32_t id);
   void set_object(ClothHandle cloth, uint32_t id);
   void set_object(PointsHandle points, uint32_t id);
-  /// Motion is measured from where everything is now, camera included.
+  /// Stores the current transforms, camera included, as the start of motion in Channels.
   void store_previous_transforms();
-  /// Depth, normals, ids and motion of what is in place. `time`: since `store_previous_transforms` [s], by
-  /// which balls moved on with their velocity.
+  /// Draws depth, normals, ids and motion of the current state. `time`: since store_previous_transforms()
+  /// [s]; the previous positions of balls follow from their velocity.
   Channels channels(float time);
 
  private:

@@ -7,12 +7,11 @@
 namespace offstage::render {
 namespace {
 
-constexpr float kNearestStreak =
-    0.016f;  // radius from which a streak at the lens fades, as a share of half the picture
-constexpr float kThinnest_px = 0.6f;  // radius; what is thinner stays as wide and gets fainter
+// Radius from which a streak near the lens fades out, as a share of half the picture.
+constexpr float kNearestStreak = 0.016f;
+constexpr float kThinnest_px = 0.6f;  // radius; thinner streaks are drawn with this radius and fainter
 
-// A drop drawn out by its motion: it refracts the sky behind it, and it is bright when the sun stands behind
-// it.
+// A drop stretched by its motion: it refracts the sky behind it, and is bright when the sun is behind it.
 Vector3f drop_light(const PuffLight& light, const Vector3f& place, const Vector3f& to_eye, float visibility) {
   const Vector3f through = 0.5f * (light.sky_reflection(-to_eye, 0.25f) + light.ambient(Vector3f::UnitY()));
   const float forward = 0.5f - 0.5f * light.to_sun.dot(to_eye);
@@ -21,13 +20,13 @@ Vector3f drop_light(const PuffLight& light, const Vector3f& place, const Vector3
   return through + sun * light.frame.sun_radiance.head<3>() + light.lamps_around(place);
 }
 
-// A place on the screen [px], and the distance along the view axis.
+// Position on the screen [px], and distance along the view axis.
 Vector3f project(const View& view, const Vector3f& place, const Vector2f& half_size) {
   const Vector4f clip = view.clip_from_world * place.homogeneous();
   return {(clip.x() / clip.w() + 1) * half_size.x(), (clip.y() / clip.w() + 1) * half_size.y(), clip.w()};
 }
 
-/// `along`: its direction on the screen.
+/// `along`: direction of the streak on the screen.
 StreakLight light_of(const GpuPoint& point, const PointsDef& def, const View& view, const PuffLight& light,
                      const SceneShadow& shadow, const Vector2f& along) {
   const Vector3f center = point.position.head<3>(), to_eye = (view.eye - center).normalized();
@@ -50,14 +49,14 @@ StreakLight light_of(const GpuPoint& point, const PointsDef& def, const View& vi
   return s;
 }
 
-/// All but its light.
+/// The splat of a streak without its light.
 StreakSplat splat_of(const GpuPoint& point, const PointsDef& def, const View& view, float pixel_m,
                      const Vector2f& half_size) {
   const Vector3f center = point.position.head<3>();
   const float distance = view.depth_of(center), pixel = pixel_m * distance;
   const float radius = point.position.w(), drawn = std::max(radius, kThinnest_px * pixel);
 
-  // With its rounded ends it is as long as it moved; its ends must not come behind the eye.
+  // With its rounded ends a streak is as long as its motion; its ends must not be behind the eye.
   Vector3f half_axis = 0.5f * def.stretch_s * point.velocity.head<3>();
   const float half_length = half_axis.norm();
   half_axis *= half_length > drawn ? 1 - drawn / half_length : 0;
@@ -83,7 +82,7 @@ StreakSplat splat_of(const GpuPoint& point, const PointsDef& def, const View& vi
   s.inverse_reach = 0.5f / drawn;
   s.opacity =
       std::min(point.color.w(), 1.0f) * (radius / drawn) * std::clamp(0.5f * room / drawn, 0.0f, 1.0f);
-  // A drop at the lens would be a bar across the picture.
+  // A drop near the lens would be a bar across the picture.
   const float apart = std::clamp(0.1f * distance / view.near_m - 1, 0.0f, 1.0f);
   s.opacity *= std::max(apart, std::clamp(2 - radius_px / (kNearestStreak * half_size.y()), 0.0f, 1.0f));
   s.cover = def.additive ? 0.0f : 1.0f;

@@ -1,7 +1,7 @@
 #pragma once
 /// Private: draws streaks: drops, sparks, trails. They are lit one by one, sorted together and splatted on
-/// the CPU: those that are in front of all else over the finished picture as it is read back, others over the
-/// part of it that something nearer is about to be drawn over.
+/// the CPU. Streaks in front of all other objects are drawn over the finished picture while it is read back;
+/// others are drawn over an area of the picture before a nearer object is drawn there.
 
 #include <span>
 #include <vector>
@@ -20,17 +20,18 @@ namespace offstage::render {
 class StreaksPass {
  public:
   StreaksPass(int width_px, int height_px);
-  /// Makes ready what a sub-frame shows. `light`: with the smoke between sun and streaks. Streaks stay where
-  /// they are during a frame, so only its first sub-frame (`new_frame`) works out their light.
+  /// Prepares the streaks of a sub-frame. `light` includes the smoke between sun and streaks. Streaks do not
+  /// move during a frame, so only its first sub-frame (`new_frame`) computes their light.
   void prepare(const PaintOrder& order, const View& view, const PuffLight& light, const ShadowMap& shadow_map,
                bool new_frame);
-  /// From now on those from `first` of their keys in the PaintOrder on are behind what is drawn next.
+  /// The streaks from `first` of their keys in the PaintOrder on are behind the next object.
   void pass(uint32_t first) { first_behind_ = first; }
-  /// Lays those that are behind over an area of the picture, and returns the pixels that can have changed.
+  /// Draws the streaks behind the next object over an area of the picture; returns the pixels that may have
+  /// changed.
   Eigen::AlignedBox2i lay_behind(const Eigen::AlignedBox2i& area_px, const FrameUniforms& frame,
                                  GLuint color);
-  /// Lays the rest over a band of the picture (see StreakBands). The picture's framebuffer is bound for
-  /// reading, for both.
+  /// Draws the remaining streaks over a band of the picture (see StreakBands). For both functions, the
+  /// picture's framebuffer must be bound for reading.
   void lay_over(int bottom, int rows, const FrameUniforms& frame, std::span<float> rgba);
 
  private:
@@ -39,12 +40,12 @@ class StreaksPass {
     uint64_t id = ~uint64_t{0};
     StreakLight light;
   };
-  std::vector<KnownLight> lights_;  ///< by number, of those seen in this frame
+  std::vector<KnownLight> lights_;  ///< by number, for those visible in this frame
   SceneShadow shadow_;
   int width_px_, height_px_;
   uint32_t first_behind_ = 0;
   StreakBands bands_;
-  std::vector<float> depth_, rgba_;  ///< of a band
+  std::vector<float> depth_, rgba_;  ///< values of a band
 };
 
 }  // namespace offstage::render

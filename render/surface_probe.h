@@ -1,5 +1,5 @@
 #pragma once
-/// Private: looks how far away the nearest surface of a single body is, pixel by pixel.
+/// Private: finds the distance of the nearest surface of a single body, pixel by pixel.
 
 #include <functional>
 #include <vector>
@@ -12,14 +12,14 @@ namespace offstage::render {
 class SurfaceProbe {
  public:
   SurfaceProbe(int width_px, int height_px) : width_px_(width_px), height_px_(height_px) {}
-  /// Distances along the view axis [m] in an area within the picture, by rows; infinite where `draw` draws
-  /// nothing. `draw` writes depth; the framebuffer that was bound is no longer so.
+  /// Distances along the view axis [m] in an area of the picture, by rows; infinite where `draw` draws
+  /// nothing. `draw` must write depth. The framebuffer binding is changed.
   std::vector<float> distances(const Eigen::AlignedBox2i& area_px, const FrameUniforms& frame,
                                const std::function<void()>& draw);
 
  private:
   int width_px_, height_px_;
-  gl::Texture depth_;  ///< made when first needed
+  gl::Texture depth_;  ///< created on first use
   gl::Framebuffer framebuffer_;
 };
 

@@ -9,7 +9,7 @@
 namespace offstage::render {
 namespace {
 
-/// What the font has.
+/// Replaces characters that the font lacks.
 std::string printable(std::string_view text) {
   std::string line(text);
   for (char& c : line)
@@ -41,7 +41,7 @@ int text_width_px(std::string_view text) {
 
 void draw_text(Image& image, int x_px, int y_px, std::string_view text, int scale,
                const std::array<uint8_t, 3>& rgb) {
-  constexpr std::size_t kMostQuads = 32;  // that one character is made of
+  constexpr std::size_t kMostQuads = 32;  // greatest number of quads of one character
   std::string line = printable(text);
   std::vector<GlyphVertex> corners(4 * kMostQuads * line.size());
   const int quads = stb_easy_font_print(0, 0, line.data(), nullptr, corners.data(),

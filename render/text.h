@@ -1,6 +1,6 @@
 #pragma once
-/// Short texts in pictures, such as the labels of a contact sheet: one plain font (stb_easy_font) in whole
-/// pixels, so that it is the same on every machine. ASCII; what is not becomes a question mark.
+/// Short texts in pictures, such as the labels of a contact sheet. There is one simple font (stb_easy_font)
+/// in whole pixels, so it is the same on every machine. Characters that are not ASCII become question marks.
 
 #include <array>
 #include <cstdint>
@@ -10,13 +10,13 @@
 
 namespace offstage::render {
 
-inline constexpr int kTextHeight_px = 10;  ///< from the top of a capital to the foot of a "g", at scale 1
+inline constexpr int kTextHeight_px = 10;  ///< from the top of a capital to the bottom of a "g", at scale 1
 
-/// One line, at scale 1 [px].
+/// Width of one line at scale 1 [px].
 int text_width_px(std::string_view text);
 
-/// Draws one line with its upper left corner at (x, y), each pixel of the font as scale x scale pixels; what
-/// lies outside of the image is left out.
+/// Draws one line with its upper left corner at (x, y), each pixel of the font as scale x scale pixels. Parts
+/// outside of the image are clipped.
 void draw_text(Image& image, int x_px, int y_px, std::string_view text, int scale,
                const std::array<uint8_t, 3>& rgb);
 

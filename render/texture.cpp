@@ -29,7 +29,7 @@ uint8_t encode(float value, TextureContent content) {
   return static_cast<uint8_t>(std::clamp(encoded, 0.0f, 1.0f) * 255 + 0.5f);
 }
 
-// Half the size; colours weigh by their alpha, so that what is cut out leaves no fringe.
+// Halves the size; colours are weighted by their alpha, so that cut-out parts leave no fringe.
 Image half_size(const Image& image, TextureContent content, const ChannelTable& decode) {
   Image half{std::max(image.width_px / 2, 1), std::max(image.height_px / 2, 1), {}};
   half.rgba.reserve(half.pixel_count() * 4);

@@ -8,8 +8,8 @@ namespace offstage::render {
 namespace {
 
 // A display curve as a table over the upper bits of a float: the exponent and kMantissaBits of the mantissa,
-// each entry taken at its cell's centre. Entries are in 1/256 of an 8-bit step; the steepest place of the
-// sRGB curve is off by 0.11 steps. Below the first cell the display value is under 0.1 steps.
+// with each entry computed at the centre of its cell. Entries are in 1/256 of an 8-bit step. At the steepest
+// part of the sRGB curve the error is 0.11 steps. Below the first cell the display value is under 0.1 steps.
 constexpr int kMantissaBits = 9;
 constexpr int kShift = 23 - kMantissaBits;
 constexpr int kFirstExponent = -15, kLastExponent = 7;
@@ -19,8 +19,8 @@ constexpr int kStep = 256;
 
 using Table = std::vector<uint16_t>;
 
-// Rational fit of a film's response by K. Narkowicz, "ACES Filmic Tone Mapping Curve" (2015). The scale puts
-// a sunlit white at 0.91 and leaves its reflections room above.
+// Rational fit of a film's response by K. Narkowicz, "ACES Filmic Tone Mapping Curve" (2015). The scale maps
+// a sunlit white to 0.91, which leaves room for its reflections.
 double filmic(double x) {
   constexpr double kScale = 0.4;
   x *= kScale;
@@ -49,14 +49,14 @@ const Table& table_of(ToneCurve curve) {
   return curve == ToneCurve::filmic ? filmic_table : linear_table;
 }
 
-// Negative numbers have the sign bit, so they end in the table's first entry, which is black.
+// Negative numbers have the sign bit, so they map to the table's first entry, which is black.
 inline uint32_t look_up(const uint16_t* table, float value) {
   const int cell = (std::bit_cast<int32_t>(value) >> kShift) - kFirstCell + 1;
   return table[std::clamp(cell, 0, kCellCount)];
 }
 
 // A threshold in [0, kStep) by the R2 sequence of M. Roberts folded to a triangle wave: close to blue noise,
-// no table.
+// without a table.
 inline uint32_t dither_threshold(uint32_t x, uint32_t y) {
   const uint32_t phase = x * 3242174889u + y * 2447445413u;
   const uint32_t folded = phase ^ (phase & 0x80000000u ? 0xFFFFFFFFu : 0u);
@@ -82,7 +82,7 @@ float metered_exposure(const HdrImage& sum, float sample_weight) {
   constexpr double kGrey = 0.5, kDarkest = 1e-3, kMost = 16;
   double logarithms = 0;
   std::size_t pixels = 0;
-  // Every third pixel each way is enough to measure.
+  // Every third pixel in each direction is enough for the measurement.
   for (int y = 0; y < sum.height_px; y += 3) {
     for (int x = 0; x < sum.width_px; x += 3, ++pixels) {
       const float* p =
@@ -98,7 +98,7 @@ float metered_exposure(const HdrImage& sum, float sample_weight) {
 }
 
 Image tone_map(const HdrImage& sum, const ToneMap& options) {
-  constexpr float kOpaque = 0.9999f;  // of N summed ones times 1/N
+  constexpr float kOpaque = 0.9999f;  // for a sum of N values times 1/N
   Image image{sum.width_px, sum.height_px, std::vector<uint8_t>(sum.rgba.size()), sum.transparent};
   const uint16_t* table = table_of(options.curve).data();
   const float weight = options.sample_weight;
@@ -110,7 +110,7 @@ Image tone_map(const HdrImage& sum, const ToneMap& options) {
       float alpha = in[3] * weight;
       float scale = gain;
       if (alpha < kOpaque) {
-        // Added light covers nothing, yet a picture with straight alpha can only show what it covers.
+        // Added light covers nothing, but a picture with straight alpha can only show light where it covers.
         alpha = std::max(alpha, std::min(1.0f, gain * std::max({in[0], in[1], in[2]})));
         scale = alpha > 0 ? gain / alpha : 0;
       }

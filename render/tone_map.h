@@ -1,6 +1,6 @@
 #pragma once
-/// From linear light to a displayable picture, on the CPU by tables, so that the bits do not depend on the
-/// GPU driver: exposure, filmic curve, sRGB encoding, a fixed dither against banding.
+/// Converts linear light to a displayable picture: exposure, filmic curve, sRGB encoding, and a fixed dither
+/// against banding. It uses tables on the CPU, so that the result does not depend on the GPU driver.
 
 #include "render/image.h"
 
@@ -8,7 +8,7 @@ namespace offstage::render {
 
 enum class ToneCurve {
   filmic,  ///< soft toe and shoulder
-  linear,  ///< clipped: greys come back as they went in
+  linear,  ///< clipped, without a curve: values in [0, 1] keep their size
 };
 
 struct ToneMap {
@@ -22,13 +22,14 @@ struct ToneMap {
 float srgb_encode(float linear);
 float srgb_decode(float encoded);
 
-/// The exposure that gives a picture the mean brightness of a sunlit grey of 18 %: by the geometric mean of
-/// its luminance, which a lamp or a black corner hardly changes, and within four stops of 1 either way.
+/// Returns the exposure that gives a picture the mean brightness of a sunlit grey of 18 %. It uses the
+/// geometric mean of the luminance, which a lamp or a black corner hardly changes, and is within four stops
+/// of 1.
 float metered_exposure(const HdrImage& sum, float sample_weight);
 
 Image tone_map(const HdrImage& sum, const ToneMap& options);
 
-/// Smooths stair steps along edges of high contrast: the draft quality's anti-aliasing, for one sub-frame.
+/// Smooths jagged edges of high contrast: the anti-aliasing of the draft quality, which has one sub-frame.
 void filter_edges(Image& image);
 
 }  // namespace offstage::render

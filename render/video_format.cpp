@@ -11,7 +11,8 @@ namespace {
 
 using Options = std::vector<std::string>;
 
-/// From full-range sRGB to limited-range BT.709 in the given pixel format, tagged as what it is.
+/// Options for conversion from full-range sRGB to limited-range BT.709 in the given pixel format, with the
+/// matching tags.
 Options yuv(const std::string& pixel_format, Options options) {
   const Options colours = {"-vf",
                            "scale=in_range=full:out_color_matrix=bt709:out_range=tv:flags=bicubic+accurate_"
@@ -36,10 +37,10 @@ std::vector<VideoFormat> make_formats() {
   h264_mp4.insert(h264_mp4.end(), {"-movflags", "+faststart"});
   const Options vp9 = {"-crf",      "24", "-b:v",          "0", "-deadline", "good",
                        "-cpu-used", "4",  "-tile-columns", "2"};
-  Options vp9_alpha = vp9;  // alternate reference frames cannot carry alpha
+  Options vp9_alpha = vp9;  // alternate reference frames cannot have alpha
   vp9_alpha.insert(vp9_alpha.end(), {"-auto-alt-ref", "0"});
   const Options prores = {"-profile:v", "4444", "-vendor", "apl0"};
-  // A palette per frame: one for the whole film would hold all its frames in memory first.
+  // A palette per frame, because a palette for the whole film would need all its frames in memory.
   const Options gif = {"-filter_complex",
                        "split[a][b];[a]palettegen=stats_mode=single[p];"
                        "[b][p]paletteuse=new=1:dither=bayer:bayer_scale=3:diff_mode=rectangle",
@@ -141,7 +142,8 @@ std::vector<std::string> encoder_command(const std::string& ffmpeg, const VideoD
                      format.encoder};
   const Options& options = def.alpha ? format.transparent : format.opaque;
   command.insert(command.end(), options.begin(), options.end());
-  // A fixed number of threads and no dates or versions: the same frames give the same file on any machine.
+  // A fixed number of threads and no dates or versions, so that the same frames give the same file on any
+  // machine.
   command.insert(command.end(), {"-threads", "4", "-map_metadata", "-1", "-fflags", "+bitexact", "-flags:v",
                                  "+bitexact", "-f", format.container, "-y", "file:" + output.string()});
   return command;

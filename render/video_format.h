@@ -1,5 +1,5 @@
 #pragma once
-/// What each video file name means to ffmpeg: encoder, container and their options. Private to render.
+/// The encoder, the container and their options for each video file name. Private to render.
 
 #include <span>
 #include <string>
@@ -22,10 +22,11 @@ struct VideoFormat {
 
 std::span<const VideoFormat> video_formats();
 
-/// The format of a definition that it can represent. Throws std::invalid_argument with advice.
+/// Returns the format of a definition. Throws std::invalid_argument with advice if the format cannot
+/// represent it.
 const VideoFormat& video_format(const VideoDef& def);
 
-/// The whole command; frames are read from its standard input.
+/// Returns the whole command; ffmpeg reads the frames from its standard input.
 std::vector<std::string> encoder_command(const std::string& ffmpeg, const VideoDef& def,
                                          const VideoFormat& format, const std::filesystem::path& output);
 

@@ -16,14 +16,14 @@
 namespace offstage::render {
 namespace {
 
-/// What a container says about itself. `whole`: its parts fill the file and the last one is there.
+/// Contents of a container. `whole`: its parts fill the file and the last one exists.
 struct Contents {
   bool whole = false;
   uint64_t frames = 0;
-  std::optional<double> seconds;  // where equal frames are joined
+  std::optional<double> seconds;  // duration, for formats that merge equal frames
 };
 
-/// Reads single numbers anywhere in a file; beyond its end they are 0.
+/// Reads numbers at any position of a file; beyond its end they are 0.
 class FileView {
  public:
   explicit FileView(const std::filesystem::path& path)
@@ -67,7 +67,8 @@ class FileView {
   std::array<uint8_t, 4096> buffer_{};
 };
 
-/// MP4 and QuickTime (ISO/IEC 14496-12): boxes, and in moov/trak/mdia/minf/stbl/stsz the count of samples.
+/// MP4 and QuickTime (ISO/IEC 14496-12): visits boxes; moov/trak/mdia/minf/stbl/stsz contains the number of
+/// samples.
 void visit_boxes(FileView& file, uint64_t at, uint64_t end, Contents& found, bool& index) {
   while (at + 8 <= end) {
     uint64_t length = file.big(at, 4), head = 8;
@@ -106,7 +107,7 @@ class Matroska {
   static constexpr uint64_t kSegment = 0x18538067, kCluster = 0x1F43B675, kBlockGroup = 0xA0, kBlock = 0xA1,
                             kSimpleBlock = 0xA3;
 
-  /// A variable-size number; the marker bit is kept in ids. Nothing for one of unknown size.
+  /// Reads a variable-size number; the marker bit is kept in ids. Nothing for a number of unknown size.
   std::optional<uint64_t> number(uint64_t& at, bool keep_marker) {
     const uint8_t first = file_.byte(at);
     int length = 1;
@@ -136,7 +137,7 @@ class Matroska {
   Contents found_;
 };
 
-/// GIF89a: delays of the graphic control extensions in hundredths of a second, to the trailer.
+/// GIF89a: delays of the graphic control extensions in hundredths of a second, up to the trailer.
 Contents read_gif(FileView& file) {
   Contents found{.seconds = 0};
   if (!file.is(0, "GIF8")) return found;
@@ -157,7 +158,7 @@ Contents read_gif(FileView& file) {
       at += 2;
     } else if (kind == 0x2C) {
       ++found.frames;
-      at += 11 + table(file.byte(at + 9));  // and the code size of the pixels
+      at += 11 + table(file.byte(at + 9));  // including the code size of the pixels
     } else {
       return found;
     }
@@ -166,8 +167,8 @@ Contents read_gif(FileView& file) {
   return found;
 }
 
-/// WebP (RFC 9649): chunks of a RIFF that fills the file; ANMF are frames, with their duration in
-/// milliseconds.
+/// WebP (RFC 9649): chunks of a RIFF file that must fill the file; ANMF chunks are frames, with their
+/// duration in milliseconds.
 Contents read_webp(FileView& file) {
   Contents found{.seconds = 0};
   if (!file.is(0, "RIFF") || !file.is(8, "WEBP") || file.little(4, 4) + 8 != file.size()) return found;
@@ -187,7 +188,7 @@ Contents read_webp(FileView& file) {
   return found;
 }
 
-/// Animated PNG: a frame control chunk for every frame, to IEND at the end.
+/// Animated PNG: a frame control chunk for every frame, up to IEND at the end.
 Contents read_apng(FileView& file) {
   Contents found;
   if (!file.is(0, "\x89PNG\r\n\x1a\n")) return found;
@@ -226,7 +227,7 @@ std::string wrong_with_video(const std::filesystem::path& path, const std::files
     if (found.frames == expected) return {};
     return "it has " + std::to_string(found.frames) + " of " + std::to_string(frames) + " frames";
   }
-  // Every time stamp is rounded, and the last frame may be shown for another time than it was meant for.
+  // Time stamps are rounded, and the last frame may be displayed for another time than intended.
   const double frame_s = seconds / frames, rounding_s = 0.011;
   if (found.frames > 0 && found.frames <= expected && *found.seconds > seconds - 1.5 * frame_s - rounding_s)
     return {};

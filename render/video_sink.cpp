@@ -20,14 +20,14 @@ namespace offstage::render {
 namespace {
 
 constexpr std::size_t kCaptureBytes = 1 << 16;
-constexpr std::chrono::seconds kStall{300};  // an encoder that takes no frame for so long is stuck
+constexpr std::chrono::seconds kStall{300};  // an encoder that reads no frame for this time is stuck
 
 std::string ffmpeg_program() {
   const char* chosen = std::getenv("OFFSTAGE_FFMPEG");
   return chosen && *chosen ? chosen : "ffmpeg";
 }
 
-/// Names of the encoders that a program offers. Throws UnavailableError.
+/// Returns the names of the encoders that a program offers. Throws UnavailableError.
 std::vector<std::string> list_encoders(const std::string& program) {
   BoundedCapture output(kCaptureBytes);
   ChildProcess child({program, "-hide_banner", "-encoders"}, -1, output.fd(), -1);
@@ -51,7 +51,7 @@ std::vector<std::string> list_encoders(const std::string& program) {
   return names;
 }
 
-/// The same, asked once per program and process.
+/// The same, but the program is run only once per process.
 std::vector<std::string> known_encoders(const std::string& program) {
   static std::mutex mutex;
   static std::string known_program;
@@ -68,8 +68,8 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-/// ffmpeg's end of a socket pair, and ours. A socket rather than a pipe: send() can be told not to raise
-/// SIGPIPE.
+/// ffmpeg's end of a socket pair, and ours. It is a socket instead of a pipe, because send() can be told not
+/// to raise SIGPIPE.
 struct FrameChannel {
   Descriptor ours, theirs;
 
@@ -83,7 +83,7 @@ struct FrameChannel {
   }
 };
 
-/// Returns the error number that stopped it, or 0; ECANCELED after a request to stop, EAGAIN for a stuck
+/// Sends all bytes; returns the error number, or 0. ECANCELED after a request to stop, EAGAIN for a stuck
 /// encoder.
 int send_all(int socket, std::span<const uint8_t> bytes, const StopTest& stop) {
   Patience patience(stop);
@@ -106,7 +106,7 @@ int send_all(int socket, std::span<const uint8_t> bytes, const StopTest& stop) {
   return 0;
 }
 
-/// Makes the folder of a film and removes what killed runs left in it.
+/// Creates the folder of a film and removes leftovers of killed runs.
 const std::filesystem::path& prepared(const std::filesystem::path& target) {
   create_parent_folders(target);
   remove_leftovers(target.parent_path());
@@ -144,8 +144,8 @@ class VideoSink final : public FrameSink {
     if (frames_ == 0) throw FileError(def_.path.string() + ": no frame was written");
     channel_.ours.close();
     if (const auto failure = process_.wait(def_.stop)) fail(failure);
-    // ffmpeg ends with success even if the disk was full for its last bytes: the film counts as written only
-    // when its frames are found in it.
+    // ffmpeg succeeds even if the disk was full for its last bytes, so the film counts as written only when
+    // its frames are found in it.
     const double seconds = def_.fps.seconds(frames_);
     if (const std::string wrong = wrong_with_video(file_.path(), def_.path, frames_, seconds); !wrong.empty())
       throw FileError(def_.path.string() + ": the film was cut short (" + wrong + "); is the disk full?");
@@ -166,7 +166,7 @@ class VideoSink final : public FrameSink {
   OutputFile file_;
   BoundedCapture words_;
   FrameChannel channel_;
-  ChildProcess process_;  // last, so that it ends before the file goes
+  ChildProcess process_;  // last, so that it ends before the file is destroyed
   int frames_ = 0;
   bool closed_ = false;
 };

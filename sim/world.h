@@ -76,14 +76,14 @@ enum class SolverKind {
 
 struct WorldDef {
   Vec3 gravity = {0, -9.81, 0};                     ///< [m/s^2]
-  Vec3 wind = Vec3::Zero();                         ///< air velocity felt by drag [m/s]
-  Real max_step = 1.0 / 240;                        ///< longest internal step [s]
-  IntegratorKind integrator = IntegratorKind::rk4;  ///< of bodies and of everything connected by springs
+  Vec3 wind = Vec3::Zero();                         ///< velocity of the air, for drag [m/s]
+  Real max_step = 1.0 / 240;                        ///< longest sub-step [s]
+  IntegratorKind integrator = IntegratorKind::rk4;  ///< for bodies and all objects connected by springs
   Real integration_error = 1e-6;  ///< largest error of a coordinate per step of the adaptive integrators [m]
   SolverKind solver = SolverKind::automatic;
   ImpactLaw impact = ImpactLaw::simultaneous;
-  Real collision_speed = 0.05;  ///< bodies that meet slower than this do not bounce [m/s], > 0
-  bool sleep = true;            ///< islands at rest are not simulated until something reaches them
+  Real collision_speed = 0.05;  ///< bodies that approach more slowly do not bounce [m/s], > 0
+  bool sleep = true;            ///< whether islands at rest are not simulated until something reaches them
   Aabb bounds = Aabb(Vec3::Constant(-1000),
                      Vec3::Constant(1000));  ///< objects that leave are retired and reported (E3)
 };
@@ -116,8 +116,8 @@ struct StepReport {
   uint64_t tracebacks = 0;         ///< trace-backs of islands to a time of impact
   uint64_t toi_limit_reached = 0;  ///< pairs that reached the limit of time-of-impact events in a sub-step;
                                    ///< their later impacts were not traced back
-  uint64_t restitution_suppressed =
-      0;  ///< pairs whose restitution was suppressed in a sub-step because their pile had too many impacts
+  /// Pairs whose restitution was suppressed in a sub-step because their pile had too many impacts.
+  uint64_t restitution_suppressed = 0;
   uint64_t speculative_contacts = 0;  ///< speculative contacts of the fast solver
   uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
   ContactWork exact, fast;  ///< work of the solvers of resting contact
@@ -127,9 +127,9 @@ struct StepReport {
   IntegratorReport integration;  ///< of the motion without contacts
 
   Real joint_error = 0;  ///< greatest residual of a joint's constraint at the end of a motion [m], [rad]
-  uint64_t joints_unsolved = 0;  ///< times that joint projection failed
-  std::vector<JointHandle>
-      joints_broken;  ///< joints that exceeded their breaking force or torque in this step
+  uint64_t joints_unsolved = 0;  ///< failed joint projections, and joint motions of limited energy
+  /// Joints that exceeded their breaking force or torque in this step.
+  std::vector<JointHandle> joints_broken;
 
   uint64_t cloth_contacts = 0;  ///< of all cloths at the end of the step; for the others see ClothReport
   uint64_t cloth_self_contacts = 0;
@@ -150,7 +150,7 @@ struct Energy {
   Real total() const { return kinetic + potential + elastic; }
 };
 
-/// A point where two bodies touch.
+/// A contact point of two bodies.
 struct ContactState {
   BodyHandle a, b;
   Vec3 point = Vec3::Zero();   ///< between both surfaces, world [m]
@@ -175,7 +175,7 @@ struct MovedBody {
 /// State of a body at the end of the last step.
 struct BodyState {
   Pose pose;              ///< pose of the body's own frame, as given at creation
-  Vec3 centre;            ///< of mass, world [m]
+  Vec3 centre;            ///< centre of mass, world [m]
   Vec3 velocity;          ///< of the centre of mass [m/s]
   Vec3 angular_velocity;  ///< world [rad/s]
   Vec3 angular_momentum;  ///< about the centre of mass, world [kg m^2/s]

@@ -22,7 +22,7 @@ while [ $# -gt 0 ]; do
 done
 
 install_packages $build_packages $test_packages
-[ $bench = OFF ] || install_packages $bench_packages $fuzz_packages debootstrap
+[ $bench = OFF ] || install_packages $bench_packages $fuzz_packages $long_packages debootstrap
 cores=$(nproc)
 failed=0
 
@@ -31,7 +31,8 @@ peers=()
 [ -d ../shared/peers ] && peers=("-DOFFSTAGE_PEERS=$(realpath ../shared/peers)")
 
 # One build and one run of all tests: no core waits for the end of one before the next begins.
-cmake --preset release -DOFFSTAGE_WERROR=ON -DOFFSTAGE_TESTS=ON -DOFFSTAGE_SANITIZED_TESTS=ON -DOFFSTAGE_BENCH=$bench "${peers[@]}"
+cmake --preset release -DOFFSTAGE_WERROR=ON -DOFFSTAGE_TESTS=ON -DOFFSTAGE_SANITIZED_TESTS=ON -DOFFSTAGE_PYTHON=ON \
+  -DOFFSTAGE_BENCH=$bench "${peers[@]}"
 cmake --build build
 
 if [ ${#long[@]} = 0 ]; then

@@ -31,7 +31,7 @@ int main() try {
     sim::StepReport report;
     uint64_t collisions = 0;
     for (int frame = 0; frame < 30; ++frame) {
-      // Emitters run before each sub-step, so that every birth has its own time inside the step.
+      // Emitters run before each sub-step, so that every particle is created at its own time within the step.
       report = world.step(1.0 / 30, [&](double start, double end) { nozzle.emit(world, start, end); });
       collisions += report.particle_collisions;
     }
@@ -42,7 +42,8 @@ int main() try {
                 static_cast<unsigned long long>(collisions), top);
     if (!report.finite) return 1;
   }
-  std::printf("state %s\n", world.state_hash().hex().c_str());  // the same on every machine of the class
+  // The same on all machines of a fingerprint class.
+  std::printf("state %s\n", world.state_hash().hex().c_str());
 } catch (const std::exception& error) {
   std::fprintf(stderr, "fountain: %s\n", error.what());
   return 1;

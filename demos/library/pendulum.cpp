@@ -37,7 +37,7 @@ int main() try {
                 e.speed, world.energy().total());
     world.step(1.0 / 60);
   }
-  // Nothing takes energy away: the drift is the error of the integrator.
+  // There is no dissipation, so the drift is the error of the integrator.
   const double drift = std::abs(world.energy().total() - start);
   std::fprintf(stderr, "energy drift in 2 s: %.1e J\n", drift);
   return drift < 1e-6 ? 0 : 1;

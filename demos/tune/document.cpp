@@ -16,14 +16,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostBytes = 64u << 20;  // of the texts of versions
+constexpr std::size_t kMostBytes = 64u << 20;  // limit for the texts of versions
 constexpr std::size_t kMostVersions = 400;
 
 [[noreturn]] void refuse_file(const fs::path& file, const std::string& what, int error) {
   throw render::FileError(file.string() + ": " + what + ": " + std::generic_category().message(error));
 }
 
-/// Writes, flushes to the disk and closes; the error number that stopped it, or 0.
+/// Writes, flushes to the disk and closes; returns the error number, or 0.
 int write_through(int fd, const std::string& text) {
   std::size_t written = 0;
   while (written < text.size()) {
@@ -36,11 +36,11 @@ int write_through(int fd, const std::string& text) {
     }
     written += static_cast<std::size_t>(n);
   }
-  const int failed = fsync(fd) != 0 && errno != EINVAL ? errno : 0;  // some file systems know no fsync
+  const int failed = fsync(fd) != 0 && errno != EINVAL ? errno : 0;  // some file systems do not support fsync
   return ::close(fd) != 0 && !failed ? errno : failed;
 }
 
-/// Replaces a file in one step; a link stays one, and so do the file's rights.
+/// Replaces a file atomically; a symbolic link and the file's permissions are kept.
 void replace_file(const fs::path& file, const std::string& text) {
   std::error_code error;
   fs::path place = fs::canonical(file, error);

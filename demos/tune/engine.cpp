@@ -15,11 +15,12 @@ using producer::ModelLibrary;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kQuiet{500};       // before a frame is refined
-constexpr milliseconds kVeryQuiet{2500};  // before it is drawn as well as possible
-constexpr int kBusy = 4;                  // times as long while the film is not complete: it comes first
-constexpr milliseconds kGlimpse{60};      // between two pictures of the lead-in
+constexpr milliseconds kVeryQuiet{2500};  // before it is refined to the highest quality
+constexpr int kBusy = 4;                  // factor of these times until the film is complete
+constexpr milliseconds kGlimpse{60};      // between two pictures of the time before frame 1
 
-/// What decides which model files a scene reads and what is made of them: everything but its numbers.
+/// The part of a scene that determines which model files are read and how they are processed: everything
+/// except its numbers.
 std::string without_numbers(const std::string& canonical) {
   auto json = nlohmann::json::parse(canonical);
   for (const char* key : {"camera", "lights", "environment", "render", "output", "world"}) json.erase(key);
@@ -158,13 +159,13 @@ void Engine::work_with(const Workshop& workshop) {
     bool busy = false;
     try {
       busy = holds_ == 0 && step(workshop);
-    } catch (const std::exception& error) {  // of the scene, the models, the physics, GL
+    } catch (const std::exception& error) {  // exceptions of the scene, the models, the physics, GL
       fail(error.what());
       busy = true;
     }
     if (busy) continue;
     std::unique_lock lock(mutex_);
-    // Refining begins after a while without orders, hence the limit.
+    // The wait is limited, because refining begins after a time without orders.
     woken_.wait_for(lock, milliseconds(100), [&] { return ending_ || (holds_ == 0 && ordered_ != taken_); });
   }
 }
@@ -175,7 +176,7 @@ bool Engine::step(const Workshop& workshop) {
          advance_pinned(workshop);
 }
 
-/// Whether there was anything to take.
+/// Returns whether there were any orders.
 bool Engine::take_orders(const Workshop& workshop) {
   std::optional<FilmDef> wanted;
   {
@@ -329,7 +330,7 @@ bool Engine::advance_pinned(const Workshop& workshop) {
   return true;
 }
 
-/// One version at a time; an order in between is taken, and the version begun again.
+/// Processes one version at a time; after an order in between, the version is started again.
 bool Engine::advance_sweep(const Workshop& workshop) {
   Loaded version;
   CellEvent event;

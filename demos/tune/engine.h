@@ -1,7 +1,7 @@
 #pragma once
-/// Scene in, frames and figures out. One thread simulates and draws; what is asked of it meanwhile takes
-/// effect within one frame. The latest version of the scene is all that counts: an older run ends where it
-/// is, and what it made stays in memory of a stated size.
+/// Computes frames and figures of a scene. One thread simulates and draws; orders take effect within one
+/// frame. Only the latest version of the scene counts: an older run ends at once, and its results stay in
+/// memory of a bounded size.
 
 #include <atomic>
 #include <condition_variable>
@@ -20,42 +20,42 @@
 
 namespace offstage::tune {
 
-/// A frame can be had from the store. Frame 0 is a glimpse of the time before frame 1.
+/// A frame is available in the store. Frame 0 is a picture of the time before frame 1.
 struct FrameEvent {
   uint64_t run = 0;
   std::string film;
   int frame = 0;
-  double time = 0;  ///< of the film [s]
+  double time = 0;  ///< time of the film [s]
   Detail detail = Detail::draft;
   double draw_ms = 0;
   std::optional<producer::FrameFigures> figures;
   render::Camera camera;
 };
-/// How far the film is.
+/// Progress of the film.
 struct FilmEvent {
   enum class Phase { loading, lead_in, running, complete, failed };
   uint64_t run = 0;
   std::string film;
   Phase phase = Phase::loading;
-  double lead_in = 0;      ///< share of the time before frame 1 that is simulated
-  int simulated = 0;       ///< frames
-  std::string message;     ///< why it failed, or what is loaded
-  std::string statistics;  ///< JSON, when the simulation is complete
+  double lead_in = 0;      ///< simulated share of the time before frame 1
+  int simulated = 0;       ///< number of frames
+  std::string message;     ///< reason of a failure, or the file being loaded
+  std::string statistics;  ///< JSON, after the simulation is complete
   std::vector<std::string> notes;
 };
-/// A picture of a sweep is done.
+/// A picture of a sweep is finished.
 struct CellEvent {
   uint64_t sweep = 0;
   int index = 0;
-  std::string fault;  ///< why there is none; empty: there is one
+  std::string fault;  ///< reason if there is no picture; otherwise empty
   uint64_t particles = 0;
 };
 using EngineEvent = std::variant<FrameEvent, FilmEvent, CellEvent>;
 
 struct EngineSettings {
   Eigen::Vector2i draft_px = {640, 360};
-  std::size_t frame_bytes = 192u << 20;    ///< of compressed pictures
-  std::size_t physics_bytes = 384u << 20;  ///< of states
+  std::size_t frame_bytes = 192u << 20;    ///< limit for compressed pictures
+  std::size_t physics_bytes = 384u << 20;  ///< limit for states
   producer::DecompositionCache decompositions;
 };
 
@@ -64,7 +64,7 @@ class Engine {
   using OnEvent = std::function<void(const EngineEvent&)>;
   using Loaded = std::shared_ptr<const producer::LoadedScene>;
 
-  /// `on_event` is called on the engine's thread; of the engine it may call `frame` and `ranges` alone.
+  /// `on_event` is called on the engine's thread; it may only call `frame` and `ranges` of the engine.
   Engine(EngineSettings settings, OnEvent on_event);
   /// Ends the run within one frame.
   ~Engine();
@@ -75,8 +75,8 @@ class Engine {
     uint64_t number = 0;
     std::string film;
   };
-  /// While one of these lives, the engine begins nothing new and leaves the processors to what is about to
-  /// give it an order: between the arrival of a change and show() every piece of work would be for nothing.
+  /// During its lifetime the engine begins no new work, so that the processors are free for the next order:
+  /// work done between the arrival of a change and show() would be useless.
   class Hold {
    public:
     explicit Hold(Engine& engine) : engine_(engine) { ++engine_.holds_; }
@@ -88,19 +88,20 @@ class Engine {
     Engine& engine_;
   };
 
-  /// Shows this version from now on. The number rises with every call.
+  /// Shows this version from now on. Returns a number that increases with every call.
   Run show(Loaded scene, const std::optional<ViewCamera>& camera);
-  /// The key of a version's pictures by the scene's own camera.
+  /// Key of a version's pictures with the scene's own camera.
   std::string film_of(const producer::LoadedScene& scene) const;
-  /// A second version whose frames are kept and, when there is nothing else to do, completed; null: none.
+  /// Sets a second version whose frames are kept and, in idle time, completed; null: none.
   void pin(Loaded scene);
-  /// Which frame is looked at. It is drawn first, and well when nothing else changes and nothing plays.
+  /// Sets the frame that is looked at. It is drawn first, and refined when nothing changes or plays.
   void look_at(int frame, bool playing);
-  /// Model files have changed: they are read again.
+  /// Reads model files again after they have changed.
   void forget_models();
-  /// The name of what is seen at a place of a frame; see FilmRun::pick. Empty also if the frame is not there.
+  /// Name of the object at a position of a frame; see FilmRun::pick. Also empty if the frame is not
+  /// available.
   std::future<std::string> pick(int frame, double x, double y);
-  /// Draws a frame of each of these versions small; ends an earlier sweep. Returns its number.
+  /// Draws a small frame of each of these versions; ends an earlier sweep. Returns its number.
   uint64_t sweep(std::vector<Loaded> versions, int frame);
   void stop_sweep() { sweep({}, 1); }
 
@@ -109,7 +110,7 @@ class Engine {
   }
   std::shared_ptr<const std::string> cell(uint64_t sweep, int index) const;
   std::vector<std::pair<int, int>> ranges(const std::string& film) const { return frames_.ranges(film); }
-  /// Figures of the frames that are simulated so far of the current version.
+  /// Figures of the simulated frames of the current version.
   std::vector<producer::FrameFigures> figures() const;
   std::size_t bytes() const { return frames_.bytes(); }
   std::size_t most_bytes() const { return frames_.most_bytes(); }
@@ -152,9 +153,9 @@ class Engine {
   FrameStore frames_;
   PhysicsStore physics_;
 
-  mutable std::mutex mutex_;  // of what follows, up to the thread's own
+  mutable std::mutex mutex_;  // for the members below, up to those of the thread
   std::condition_variable woken_;
-  std::atomic<uint64_t> ordered_ = 0;  // rises with every order that the thread has to look at
+  std::atomic<uint64_t> ordered_ = 0;  // increases with every order for the thread
   std::atomic<bool> ending_ = false;
   std::atomic<int> holds_ = 0;
   uint64_t runs_ = 0, sweeps_ = 0, models_generation_ = 0;
@@ -162,13 +163,13 @@ class Engine {
   bool pinned_changed_ = false;
   int frame_ = 1;
   bool playing_ = false;
-  Clock::time_point changed_ = Clock::now();  // the version or the frame that is looked at
+  Clock::time_point changed_ = Clock::now();  // last change of the version or the frame that is looked at
   std::deque<Pick> picks_;
   Sweep sweep_;
   std::shared_ptr<const Physics> shown_physics_;
   std::vector<producer::FrameFigures> figures_;
 
-  // Of the thread alone.
+  // Used only by the thread.
   uint64_t taken_ = 0, run_ = 0;
   std::optional<FilmDef> def_;
   std::unique_ptr<FilmRun> film_, pinned_;
@@ -177,7 +178,7 @@ class Engine {
   Clock::time_point lead_in_shown_{};
   bool failed_ = false, complete_reported_ = false;
 
-  std::thread thread_;  // last
+  std::thread thread_;  // last, so that it ends first
 };
 
 }  // namespace offstage::tune

@@ -12,13 +12,13 @@ using Clock = std::chrono::steady_clock;
 using producer::Scene;
 using producer::StaticCamera;
 
-constexpr int kDraftQuality = 82, kFineQuality = 92;  // of JPEG
+constexpr int kDraftQuality = 82, kFineQuality = 92;  // quality of JPEG
 
 double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-/// The largest size of a picture's shape within a box, and no larger than the picture.
+/// The largest size with a picture's aspect ratio within a box, and no larger than the picture.
 Eigen::Vector2i fitted(const Eigen::Vector2i& size, const Eigen::Vector2i& box) {
   const double scale = std::min({1.0, double(box.x()) / size.x(), double(box.y()) / size.y()});
   return {std::max(2, int(size.x() * scale + 0.5)), std::max(2, int(size.y() * scale + 0.5))};
@@ -114,7 +114,7 @@ void FilmRun::add_figures(double sim_ms) {
                                .contacts = world.contacts().size(),
                                .energy = world.energy(),
                                .state_hash = world.state_hash().hex()});
-  constexpr int kEvery = 15;  // frames
+  constexpr int kEvery = 15;  // number of frames
   if (frame % kEvery == 0 || frame == frames()) physics_->notes = producer::notes_of(simulation_->totals());
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-/// One version of a scene on its way to a film: simulated frame by frame, drawn small, and single frames
-/// drawn well. Everything happens on the calling thread, which owns the GL context, in pieces of one frame.
+/// The film of one version of a scene: it is simulated frame by frame, drawn small, and single frames are
+/// refined. All work is done on the calling thread, which owns the GL context, in pieces of one frame.
 
 #include <functional>
 #include <memory>
@@ -17,13 +17,13 @@
 
 namespace offstage::tune {
 
-/// A camera to look around with, in place of the scene's.
+/// A camera that replaces the scene's, to look around.
 struct ViewCamera {
   Eigen::Vector3d eye, target;
   bool operator==(const ViewCamera& other) const { return eye == other.eye && target == other.target; }
 };
 
-/// A version of a scene, with what its pictures and its physics depend on.
+/// A version of a scene, with the keys of its pictures and its physics.
 struct FilmDef {
   std::shared_ptr<const producer::LoadedScene> loaded;
   std::optional<ViewCamera> camera;
@@ -31,7 +31,7 @@ struct FilmDef {
   std::string physics;  ///< key of its states
 };
 
-/// What the films of a sitting share.
+/// Data shared by the films of a session.
 struct Workshop {
   PhysicsStore& physics;
   FrameStore& frames;
@@ -44,49 +44,49 @@ class FilmRun {
  public:
   using Stop = std::function<bool()>;
 
-  /// Throws what building a simulation throws.
+  /// Throws the exceptions of building a simulation.
   FilmRun(FilmDef def, std::shared_ptr<const producer::ModelLibrary> models, const Workshop& workshop);
 
   const FilmDef& def() const { return def_; }
   int frames() const { return scene_.frame_count(); }
-  /// The same film by another camera. The states stay; `film` is the key of the new pictures.
+  /// Uses another camera for the same film. The states are kept; `film` is the key of the new pictures.
   void look_from(const std::optional<ViewCamera>& camera, const std::string& film);
 
   bool has_state(int frame) const;
   bool has_draft(int frame) const { return workshop_.frames.has(def_.film, frame, Detail::draft); }
-  /// The first frame without a draft; frames() + 1 if all are there.
+  /// The first frame without a draft; frames() + 1 if there is none.
   int first_missing();
   bool is_simulated() const { return !physics_->statistics.empty(); }
 
-  /// The next simulate() begins at the start of the film.
+  /// Makes the next simulate() begin at the start of the film.
   void restart();
-  /// Simulates by one frame, or a part of what comes before frame 1. Throws DivergedError.
+  /// Simulates one frame, or a part of the time before frame 1. Throws DivergedError.
   void simulate();
   /// The latest simulated frame, or 0 before the first.
   int simulated_to() const { return simulation_ ? simulation_->frame() : 0; }
-  /// Share of the work before frame 1 that is done.
+  /// Finished share of the work before frame 1.
   double lead_in() const;
-  /// Draws a draft of a frame whose state is there, into the store.
+  /// Draws a draft of a frame whose state is available, into the store.
   void draw_draft(int frame);
-  /// Draws the state between two frames of the lead-in as frame 0.
+  /// Draws the current state before frame 1 as frame 0.
   void draw_lead_in();
-  /// Draws a frame whose state is there at full size; false if `stop` said so on the way.
+  /// Draws a frame whose state is available at full size; returns false if `stop` returned true meanwhile.
   bool refine(int frame, Detail detail, const Stop& stop);
-  /// What is seen at a place of a frame, by name, or empty. The place is a share of width and height, from
-  /// the top left corner. The state must be there.
+  /// Name of the visible object at a position of a frame, or empty. The position is a share of width and
+  /// height, from the top left corner. The state must be available.
   std::string pick(int frame, double x, double y);
-  /// A small picture for a sheet; the state must be there.
+  /// A small picture for a sheet; the state must be available.
   render::Image small_picture(int frame) { return draft_picture().draw(previous(frame), state(frame)); }
 
   const Physics& physics() const { return *physics_; }
   const producer::Scene& scene() const { return scene_; }
-  /// Time of the state that the lead-in has come to [s].
+  /// Time of the state reached before frame 1 [s].
   double lead_in_time() const;
 
  private:
   struct Refined {
     producer::Scene scene;
-    std::optional<producer::Picture> picture;  // after the scene, which it refers to
+    std::optional<producer::Picture> picture;  // declared after the scene, to which it refers
   };
 
   producer::Picture& draft_picture();
@@ -101,11 +101,11 @@ class FilmRun {
   FilmDef def_;
   std::shared_ptr<const producer::ModelLibrary> models_;
   Workshop workshop_;
-  producer::Scene scene_;  // as drafts are drawn
+  producer::Scene scene_;  // as used for drafts
   std::shared_ptr<Physics> physics_;
   std::optional<producer::Simulation> simulation_;
   std::optional<sim::Energy> energy_start_;
-  std::shared_ptr<const producer::Snapshot> latest_[2];  // also where the store has no room
+  std::shared_ptr<const producer::Snapshot> latest_[2];  // also used if the store has no room
   std::optional<producer::Picture> picture_;
   std::unique_ptr<Refined> refined_;
   render::Camera camera_;

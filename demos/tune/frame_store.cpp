@@ -77,7 +77,8 @@ std::size_t FrameStore::bytes() const {
 
 void FrameStore::make_room() {
   while (bytes_ > most_bytes_ && !films_.empty()) {
-    // The film that was used longest ago; of those on show the first frames, when nothing else is left.
+    // The film that was not used for the longest time; of protected films the first frames, when nothing else
+    // is left.
     const auto rank = [&](const auto& entry) {
       return std::pair(std::ranges::find(protected_, entry.first) != protected_.end(), entry.second.used);
     };

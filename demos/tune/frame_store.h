@@ -1,6 +1,6 @@
 #pragma once
-/// What has been simulated and drawn, in memory of a stated size: states of the latest simulations, and
-/// compressed pictures of the latest versions of a scene. Both forget what was used longest ago.
+/// Simulated states and drawn frames, in memory of a bounded size: states of the latest simulations, and
+/// compressed pictures of the latest versions of a scene. The least recently used ones are removed first.
 
 #include <cstdint>
 #include <list>
@@ -16,29 +16,29 @@
 
 namespace offstage::tune {
 
-/// How well a frame is drawn: draft small, the others at full size.
+/// Quality of a frame: draft is small, the others have full size.
 enum class Detail { draft, preview, final };
 
 struct StoredFrame {
   Detail detail = Detail::draft;
   double draw_ms = 0;
   std::shared_ptr<const std::string> jpeg;
-  render::Camera camera;  ///< that it was seen by
+  render::Camera camera;  ///< camera with which it was drawn
 };
 
-/// Pictures by film and frame; a better one replaces a draft's place when it is asked for, and the draft
-/// stays for playing. Any thread may call.
+/// Pictures by film and frame. A refined picture is returned in place of the draft on request; the draft is
+/// kept for playing. All threads may use it.
 class FrameStore {
  public:
   explicit FrameStore(std::size_t most_bytes) : most_bytes_(most_bytes) {}
 
   void put(const std::string& film, int frame, StoredFrame picture);
-  /// The picture of a frame with at most this detail, the best there is.
+  /// The best picture of a frame with at most this detail.
   std::optional<StoredFrame> get(const std::string& film, int frame, Detail most = Detail::final);
   bool has(const std::string& film, int frame, Detail detail) const;
-  /// Frames with a draft, as first and last of each run of neighbours.
+  /// Frames with a draft, as first and last of each range.
   std::vector<std::pair<int, int>> ranges(const std::string& film) const;
-  /// These films are forgotten last.
+  /// Sets the films that are removed last.
   void protect(std::vector<std::string> films);
   std::size_t bytes() const;
   std::size_t most_bytes() const { return most_bytes_; }
@@ -59,16 +59,16 @@ class FrameStore {
   uint64_t clock_ = 0;
 };
 
-/// The states of one simulation, as far as it went.
+/// The states of one simulation so far.
 struct Physics {
-  std::vector<std::shared_ptr<const producer::Snapshot>> states;  ///< from frame 1; null: not kept
+  std::vector<std::shared_ptr<const producer::Snapshot>> states;  ///< from frame 1; null: not stored
   std::vector<producer::FrameFigures> figures;                    ///< from frame 1
-  std::string statistics;                                         ///< JSON, when the film is complete
-  std::vector<std::string> notes;  ///< what went wrong on the way, as sentences
+  std::string statistics;                                         ///< JSON, after the film is complete
+  std::vector<std::string> notes;  ///< problems during the simulation, as sentences
 };
 
-/// Simulations by key. The one in use is never forgotten, but its states beyond the bound are not kept: they
-/// are simulated again when they are asked for. For one thread.
+/// Simulations by key. The current one is never removed, but its states beyond the bound are not stored; they
+/// are simulated again on request. For one thread.
 class PhysicsStore {
  public:
   explicit PhysicsStore(std::size_t most_bytes) : most_bytes_(most_bytes) {}

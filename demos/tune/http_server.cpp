@@ -32,7 +32,7 @@ std::string random_token() {
   return token;
 }
 
-/// In a time that does not say where they differ.
+/// Compares in constant time.
 bool equal(const std::string& a, const std::string& b) {
   if (a.size() != b.size()) return false;
   unsigned char difference = 0;
@@ -80,7 +80,7 @@ struct HttpServer::Impl {
 
   std::string origin() const { return fmt::format("http://{}:{}", kHost, port); }
 
-  /// The rules that every request has to pass. The token is the first part of the path.
+  /// Checks that apply to every request. The token is the first part of the path.
   void guard(httplib::Server& server, const int& own_port) {
     server.set_pre_routing_handler([this, &own_port](const httplib::Request& request,
                                                      httplib::Response& response) {
@@ -163,7 +163,7 @@ struct HttpServer::Impl {
     };
     get("state", [this] {
       Json json = session.state();
-      // The one with the fewest tabs: a browser keeps at most six connections to each.
+      // The port with the fewest tabs, because a browser allows at most six connections to each.
       json["stream"] = stream_ports[stream_tabs[0] <= stream_tabs[1] ? 0 : 1];
       return json;
     });
@@ -220,7 +220,7 @@ struct HttpServer::Impl {
     response.set_content(jpeg, "image/jpeg");
   }
 
-  /// Server-sent events: the latest message of each kind, and a heartbeat that shows when a tab has gone.
+  /// Server-sent events: the latest message of each kind, and a heartbeat that detects closed tabs.
   void serve_stream(httplib::Server& server, std::atomic<int>& open) {
     server.Get(
         "/[0-9a-f]+/stream", [this, &open](const httplib::Request& request, httplib::Response& response) {
@@ -296,7 +296,8 @@ HttpServer::HttpServer(Session& session, int port) : impl_(std::make_unique<Impl
 HttpServer::~HttpServer() {
   impl_->session.close();
   const auto stop = [](httplib::Server& server) {
-    while (!server.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));  // has just begun
+    // The server is starting.
+    while (!server.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     server.stop();
   };
   stop(impl_->main);

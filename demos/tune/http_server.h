@@ -1,10 +1,10 @@
 #pragma once
-/// The page and its sitting over HTTP, on this machine alone.
+/// Serves the page and its session over HTTP, on this machine only.
 ///
-/// One server has the page, the pictures and the changes; two more have the streams of the tabs, four each,
-/// because browsers keep at most six connections to one of them. Every address begins with a random token.
-/// The Host of every request and the Origin of those that have one must be ours, so that no other page in the
-/// same browser can read or change anything, even by a name that it makes lead here.
+/// One server has the page, the pictures and the changes. Two more have the streams of the tabs, four each,
+/// because browsers allow at most six connections to a server. Every address begins with a random token. The
+/// Host of every request, and the Origin of those that have one, must be ours, so that no other page in the
+/// same browser can read or change anything, even by a host name that resolves to this machine.
 
 #include <memory>
 #include <string>
@@ -15,7 +15,7 @@ namespace offstage::tune {
 
 class HttpServer {
  public:
-  /// Binds to 127.0.0.1; port 0 is any that is free. Throws std::runtime_error if the port is taken.
+  /// Binds to 127.0.0.1; port 0 selects any free port. Throws std::runtime_error if the port is in use.
   HttpServer(Session& session, int port);
   /// Ends the streams and the requests.
   ~HttpServer();

@@ -8,7 +8,7 @@
 
 namespace offstage::tune {
 
-/// One per thread: it keeps its memory from picture to picture.
+/// One per thread; its buffers are reused.
 class JpegWriter {
  public:
   JpegWriter();

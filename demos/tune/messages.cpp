@@ -110,7 +110,7 @@ Json event_json(const CellEvent& event) {
 }
 
 std::string kind_of(const FrameEvent& event) {
-  // A pinned film has no camera, and its frames are not those of the run.
+  // A pinned film has no camera, and its frames do not belong to the run.
   return event.figures || event.frame == 0 ? "frame" : "other_frame";
 }
 std::string kind_of(const FilmEvent&) {
@@ -121,7 +121,7 @@ std::string kind_of(const CellEvent& event) {
 }
 
 std::string with_muted(const std::string& path, const std::vector<std::string>& muted) {
-  // "/emitters/1/rate", with /emitters/0 muted, is /emitters/2/rate.
+  // If /emitters/0 is muted, "/emitters/1/rate" stands for /emitters/2/rate.
   const std::size_t slash = path.find('/', 1);
   if (slash == std::string::npos) return path;
   const std::size_t end = std::min(path.find('/', slash + 1), path.size());

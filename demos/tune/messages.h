@@ -1,5 +1,5 @@
 #pragma once
-/// What the page is told, as JSON.
+/// Messages to the page, as JSON.
 
 #include <map>
 #include <string>
@@ -17,27 +17,27 @@ namespace offstage::tune {
 
 using Json = nlohmann::ordered_json;
 
-/// Text that is no UTF-8 is mended rather than refused.
+/// Invalid UTF-8 is replaced instead of causing an error.
 std::string dump(const Json& json);
 Json vector_json(const Eigen::Vector3d& v);
 /// Throws nlohmann::json::exception unless it is a list of three numbers.
 Eigen::Vector3d vector_of(const nlohmann::json& json);
 
 Json version_json(const Version& version, const std::map<uint64_t, std::string>& films);
-/// `file` is the scene's own: problems elsewhere name theirs.
+/// `file` is the scene's own file; problems in other files name theirs.
 Json problems_json(const std::vector<Problem>& problems, const std::string& file);
-/// Runs of neighbours as pairs of the first and the last.
+/// Ranges as pairs of the first and the last number.
 Json ranges_json(const std::vector<std::pair<int, int>>& ranges);
 Json figures_json(const producer::FrameFigures& figures);
 Json event_json(const FrameEvent& event);
 Json event_json(const FilmEvent& event);
 Json event_json(const CellEvent& event);
-/// The kind of a message: the next of the same kind replaces it.
+/// Kind of a message; the next message of the same kind replaces it.
 std::string kind_of(const FrameEvent& event);
 std::string kind_of(const FilmEvent& event);
 std::string kind_of(const CellEvent& event);
 
-/// The path in the whole text that a path in a text without the items at `muted` stands for.
+/// Converts a path in the text without the items at `muted` to the path in the whole text.
 std::string with_muted(const std::string& path, const std::vector<std::string>& muted);
 
 }  // namespace offstage::tune

@@ -15,7 +15,7 @@ nlohmann::ordered_json presets_list() {
       const producer::Node tree = producer::parse_json(producer::read_text(file), file);
       all.push_back({{"name", name}, {"preset", nlohmann::ordered_json::parse(producer::to_text(tree))}});
     } catch (const SceneError&) {
-      continue;  // a preset that cannot be read is not offered; scenes that name it say why
+      continue;  // an invalid preset is not offered; scenes that name it report why
     }
   }
   return all;

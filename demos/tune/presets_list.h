@@ -1,5 +1,5 @@
 #pragma once
-/// What the page offers to add to a scene.
+/// Objects that the page can add to a scene.
 
 #include <nlohmann/json.hpp>
 

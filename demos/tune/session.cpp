@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 using producer::Node;
 using std::chrono::milliseconds;
 
-/// The step of a path that stands for an item of a list: its index, or its name.
+/// The index of the list item that a step of a path refers to, by index or by name.
 std::optional<std::size_t> item_of(const producer::List& list, const std::string& step) {
   for (std::size_t i = 0; i < list.size(); ++i) {
     const Node* name = list[i].find("name");
@@ -33,7 +33,7 @@ std::optional<std::size_t> item_of(const producer::List& list, const std::string
   return {};
 }
 
-/// The text's overlays and `more`, as an override.
+/// The overlays of the text and `more`, as an override.
 std::string overlays_override(const std::string& text, const Session::Json& more) {
   Session::Json all = Session::Json::array();
   const Node root = producer::parse_json(text, "");
@@ -51,7 +51,7 @@ std::vector<std::string> strings_in(const nlohmann::json& request, const char* k
   return request.value(key, std::vector<std::string>());
 }
 
-/// One change of the text by its paths.
+/// Applies one change to the text.
 std::string changed_by(const std::string& text, const nlohmann::json& op) {
   if (op.contains("set"))
     return set_value(text, op.at("set").get<std::string>(), op.at("value").get<std::string>());
@@ -96,7 +96,7 @@ std::vector<std::string> Session::muted_paths(const std::string& text) const {
   return paths;
 }
 
-/// With the view: without what is muted, and with the overlays of the page.
+/// With `with_view`: without the muted objects, and with the overlays of the page.
 Session::Parsed Session::parse(const std::string& text, bool with_view) const {
   Parsed parsed;
   std::vector<std::string> muted;
@@ -117,12 +117,12 @@ Session::Parsed Session::parse(const std::string& text, bool with_view) const {
   return parsed;
 }
 
-/// Shows the text as it is now; if it is not a valid scene, the latest valid version stays.
+/// Shows the current text; if it is not a valid scene, the latest valid version stays visible.
 void Session::show() {
   Parsed parsed = parse(document_.text(), true);
   errors_ = std::move(parsed.errors);
   if (!parsed.loaded) return;
-  // The same scene in other words (a comment, a blank) goes on as the film that it is.
+  // If only the text changed (a comment, white space), the film continues.
   const bool same = shown_ && shown_->canonical == parsed.loaded->canonical;
   warnings_ = parsed.loaded->warnings;
   if (!same) shown_ = std::move(parsed.loaded);
@@ -270,7 +270,7 @@ Reply Session::restore(const nlohmann::json& request) {
   return shown();
 }
 
-/// What is never an undo step: where one looks, from where, at what besides, and which objects are muted.
+/// Changes that are never an undo step: frame, camera, overlays, and muted objects.
 Reply Session::view(const nlohmann::json& request) {
   const std::lock_guard lock(mutex_);
   bool changed = false;
@@ -378,7 +378,7 @@ void Session::on_event(const EngineEvent& event) {
   std::visit(
       [this](const auto& e) {
         Json json = event_json(e);
-        // A tab that was too slow for the message of a frame learns of the frame by the next one.
+        // A tab that was too slow for the message of a frame gets its data with the next one.
         if constexpr (std::is_same_v<std::decay_t<decltype(e)>, FrameEvent>)
           json["ranges"] = ranges_json(engine_->ranges(e.film));
         tabs_.post(kind_of(e), dump(json));
@@ -395,7 +395,7 @@ void Session::watch_files() {
   std::string hash = others(files());
   while (!closing_) {
     producer::FileWatch watch(files());
-    // A change between the reading of the file and the start of the watch counts as well.
+    // Also detects a change between the reading of the file and the start of the watch.
     files_changed(hash, hash);
     while (!closing_ && !watch.changed()) watch.wait(milliseconds(250));
     if (closing_) return;

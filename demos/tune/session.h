@@ -1,6 +1,6 @@
 #pragma once
-/// A sitting: one scene file, its text, the engine that shows it, and the tabs that look on. Speaks JSON,
-/// knows nothing of HTTP.
+/// A tuning session: one scene file, its text, the engine that shows it, and the connected tabs. Uses JSON
+/// and is independent of HTTP.
 
 #include <atomic>
 #include <map>
@@ -20,7 +20,7 @@
 
 namespace offstage::tune {
 
-/// What a request comes to: a status of HTTP, and an object.
+/// Reply to a request: an HTTP status, and an object.
 struct Reply {
   int status = 200;
   nlohmann::ordered_json body = nlohmann::ordered_json::object();
@@ -30,26 +30,26 @@ class Session {
  public:
   using Json = nlohmann::ordered_json;
 
-  /// Throws SceneError if the file cannot be read; a text that is no valid scene is shown with its errors.
-  /// Its files may lie beside it and in the `allowed` folders.
+  /// Throws SceneError if the file cannot be read; a text that is not a valid scene is shown with its errors.
+  /// Its files may be beside it and in the `allowed` folders.
   Session(const std::string& file, EngineSettings settings, std::vector<std::string> allowed = {});
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  /// Everything that a tab needs to begin.
+  /// The complete state, for a new tab.
   Json state();
   Json figures() const;
   Json versions();
-  /// The text of a version; null if it is forgotten.
+  /// The text of a version; null if it was removed.
   Json version_text(uint64_t id);
-  /// A change: `what` is the last part of the address, such as "edit". Only the writing tab may change the
-  /// scene.
+  /// Handles a change: `what` is the last part of the address, such as "edit". Only the writing tab may
+  /// change the scene.
   Reply post(const std::string& what, const nlohmann::json& request, const std::string& tab);
 
   Tabs& tabs() { return tabs_; }
   Engine& engine() { return *engine_; }
-  /// Ends the streams and the watching of files.
+  /// Ends the streams and stops watching files.
   void close();
 
  private:
@@ -83,24 +83,24 @@ class Session {
   void files_changed(const std::string& hash_before, const std::string& hash_now);
 
   mutable std::mutex mutex_;
-  std::vector<std::string> allowed_;  // folders besides the scene's own
+  std::vector<std::string> allowed_;  // folders in addition to the scene's own
   Document document_;
   Tabs tabs_;
   Engine::Loaded shown_;  // the latest valid version
   std::vector<Problem> errors_, warnings_;
-  uint64_t revision_ = 0;  // rises when the document that the tabs know is no longer the latest
+  uint64_t revision_ = 0;  // increases when the document known to the tabs is outdated
   Engine::Run run_;
-  std::map<uint64_t, std::string> films_;  // of versions
+  std::map<uint64_t, std::string> films_;  // films of versions
   std::optional<ViewCamera> camera_;
   Json overlays_ = Json::array();
   std::set<std::string> muted_;
   Json pinned_;
-  std::optional<std::string> theirs_;  // the file has changed outside, to this
+  std::optional<std::string> theirs_;  // content of the file after a change by another program
   mutable std::mutex events_mutex_;
-  Json latest_film_;  // how far it is, for tabs that come later
+  Json latest_film_;  // latest progress, for new tabs
   std::unique_ptr<Engine> engine_;
   std::atomic<bool> closing_ = false;
-  std::thread watcher_;  // last
+  std::thread watcher_;  // last, so that it ends first
 };
 
 }  // namespace offstage::tune

@@ -1,6 +1,6 @@
 #pragma once
-/// The browser tabs that watch a sitting. Each has one stream and a mailbox that holds the latest message of
-/// each kind: a slow tab misses what was replaced and never makes anything wait or grow.
+/// The browser tabs of a session. Each has one stream and a mailbox with the latest message of each kind: a
+/// slow tab misses replaced messages, and never blocks others or uses more memory.
 
 #include <chrono>
 #include <condition_variable>
@@ -19,14 +19,14 @@ inline constexpr std::size_t kMostTabs = 8;
 class Tabs {
  public:
   struct Message {
-    std::string kind;  ///< "frame", "cell:3"; a later one of the same kind replaces it
+    std::string kind;  ///< "frame", "cell:3"; a later message of the same kind replaces it
     std::string json;
   };
 
-  /// Opens the stream of a tab and returns its ticket; an earlier stream of the same tab ends. Nothing if
-  /// there are kMostTabs others. The first tab is the writer.
+  /// Opens the stream of a tab and returns its ticket; an earlier stream of the same tab ends. Returns
+  /// nothing if there are already kMostTabs others. The first tab is the writer.
   std::optional<uint64_t> open(const std::string& tab);
-  /// Ends a stream, if it is still that of the tab. The writer's role goes to the tab that is open longest.
+  /// Ends a stream, if it is still that of the tab. The tab that has been open longest becomes the writer.
   void close(const std::string& tab, uint64_t ticket);
   void close_all();
 

@@ -12,18 +12,18 @@ namespace {
 
 constexpr std::string_view kBlanks = " \t\r\n";
 
-/// A value with the bytes that it takes; an item of a list has no key.
+/// A value with its range of bytes; a list item has no key.
 struct Part {
   std::string key;
   ByteRange key_range, value;
-  std::size_t comma = std::string_view::npos;  ///< that follows it
+  std::size_t comma = std::string_view::npos;  ///< position of the comma after it
   bool object = false, list = false;
   std::vector<Part> parts;
 
   std::size_t begin() const { return key_range.end > 0 ? key_range.begin : value.begin; }
 };
 
-/// Finds the bytes of every value in a text that parse_json has accepted, hence without checks of its own.
+/// Finds the bytes of every value in a text that parse_json has accepted, so it needs no checks.
 class PartFinder {
  public:
   explicit PartFinder(std::string_view text) : text_(text) {
@@ -33,7 +33,7 @@ class PartFinder {
     skip();
     return value();
   }
-  /// The first byte from `i` on that is neither a blank nor in a comment.
+  /// The first byte from `i` on that is neither white space nor in a comment.
   static std::size_t skip_from(std::string_view text, std::size_t i) {
     while (i < text.size()) {
       i = std::min(text.find_first_not_of(kBlanks, i), text.size());
@@ -135,7 +135,7 @@ std::optional<std::size_t> child_of(const Part& parent, const std::string& step)
   return static_cast<std::size_t>(it - parent.parts.begin());
 }
 
-/// How far a path leads: the deepest value on it, that value's parent, and how many steps were taken.
+/// Result of following a path: the deepest existing value, its parent, and the number of steps.
 struct Way {
   const Part* parent = nullptr;
   std::size_t index = 0;  ///< in the parent
@@ -157,7 +157,7 @@ Way follow(const Part& root, const std::vector<std::string>& steps) {
   throw std::invalid_argument("the scene has no " + std::string(path));
 }
 
-/// What stands between the beginning of the line and `at`, if these are blanks alone.
+/// The text between the beginning of the line and `at`, if it is only white space.
 std::optional<std::string> own_line_indent(std::string_view text, std::size_t at) {
   const std::size_t line = text.substr(0, at).find_last_of('\n');
   const std::size_t begin = line == std::string_view::npos ? 0 : line + 1;
@@ -166,8 +166,8 @@ std::optional<std::string> own_line_indent(std::string_view text, std::size_t at
   return std::string(before);
 }
 
-/// The end of the line that `at` is on, before its line break, if nothing but blanks and whole comments stand
-/// in between.
+/// The end of the line of `at`, before its line break, if there are only white space and complete comments in
+/// between.
 std::optional<std::size_t> rest_of_line(std::string_view text, std::size_t at) {
   while (at < text.size()) {
     at = std::min(text.find_first_not_of(" \t", at), text.size());
@@ -189,7 +189,7 @@ std::string_view line_end(std::string_view text) {
   return text.find("\r\n") != std::string_view::npos ? "\r\n" : "\n";
 }
 
-/// What stands between keys and values in this object, or else in the text.
+/// The text between keys and values in this object, or else in the whole text.
 std::string colon_of(std::string_view text, const Part& object) {
   if (object.parts.empty()) return ": ";
   const Part& last = object.parts.back();
@@ -197,14 +197,15 @@ std::string colon_of(std::string_view text, const Part& object) {
   return between.find_first_not_of(" \t:") == std::string::npos ? between : ": ";
 }
 
-/// Adds `member` ("key": value, or an item) after the last of a container.
+/// Adds `member` ("key": value, or an item) after the last one of a container.
 std::string append_to(std::string_view text, const Part& container, const std::string& member) {
   std::string result(text);
   if (container.parts.empty()) return result.insert(container.value.begin + 1, member);
   const Part& last = container.parts.back();
   const auto indent = own_line_indent(text, last.begin());
   const auto end = rest_of_line(text, last.value.end);
-  if (indent && end && *end < container.value.end) {  // a line of its own, after the comment of the last
+  // On a line of its own, after the comment of the last member.
+  if (indent && end && *end < container.value.end) {
     result.insert(*end, std::string(line_end(text)) + *indent + member);
     return result.insert(last.value.end, ",");
   }
@@ -219,7 +220,7 @@ std::string append_to(std::string_view text, const Part& container, const std::s
   return result.insert(last.value.end, "," + gap + member);
 }
 
-/// The bytes that go when a part goes.
+/// The bytes that are removed with a part.
 std::vector<ByteRange> bytes_to_remove(std::string_view text, const Part& container, std::size_t index) {
   const Part& part = container.parts[index];
   const bool is_last = index + 1 == container.parts.size();
@@ -268,8 +269,8 @@ std::string set_value(std::string_view text, std::string_view path, std::string_
     std::string result(text);
     return result.replace(way.end->value.begin, way.end->value.end - way.end->value.begin, value);
   }
-  // What the missing objects and lists hold, from the inside. A list in an object whose keys have lines of
-  // their own has its first item on one, too.
+  // Content of the missing objects and lists, from the inside. A list in an object whose keys are on separate
+  // lines has its first item on a separate line, too.
   const auto indent = way.end->object && !way.end->parts.empty()
                           ? own_line_indent(text, way.end->parts.back().begin())
                           : std::nullopt;
@@ -327,7 +328,7 @@ std::string blank_out(std::string_view text, const std::vector<std::string>& pat
       items.emplace_back(way.parent, way.index);
   }
   for (const auto& [list, index] : items) blank(list->parts[index].value);
-  // Of the commas of a list, those stay that stand between two items that stay.
+  // Of the commas of a list, those between two remaining items stay.
   std::vector<const Part*> lists;
   for (const auto& item : items)
     if (std::ranges::find(lists, item.first) == lists.end()) lists.push_back(item.first);

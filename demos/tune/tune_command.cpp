@@ -19,7 +19,7 @@
 namespace offstage::tune {
 namespace {
 
-/// Opens the address in the browser of a desktop, if there is one; the browser is no child of ours.
+/// Opens the address in the desktop's browser, if there is one. The browser is not a child of this process.
 void open_browser(const std::string& address) {
   if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY")) return;
   const pid_t child = fork();
@@ -47,13 +47,14 @@ Eigen::Vector2i size_of(const std::string& text) {
 
 int tune_command(const producer::TuneOptions& options) {
   if (options.scene.from_standard_input())
-    throw std::invalid_argument("tune needs a scene file that it can save; standard input is none");
+    throw std::invalid_argument(
+        "tune needs a scene file, because it saves changes; standard input cannot be used");
   EngineSettings settings;
   settings.draft_px = size_of(options.size);
   settings.decompositions = options.scene.decompositions();
   const auto threads = producer::simulation_threads(options.threads);
   render::pin_environment(producer::threads_or_all(options.threads), options.gl);
-  render::Context();  // a library that is missing is found before anything is promised
+  render::Context();  // reports a missing library before the address is printed
   Session session(options.scene.file, std::move(settings), options.scene.allow);
   const HttpServer server(session, options.port);
   fmt::print("{}\n", server.address());

@@ -7,7 +7,7 @@ layout(location = 1) out vec4 motion_depth;
 
 void main() {
   normal_id = vec4(normalize(gl_FrontFacing ? normal : -normal), half_size_id.z);
-  // What was behind the eye has no place to come from.
+  // A point behind the eye has no previous position in the picture.
   vec2 way = before.w > 0.0 ? now.xy / now.w - before.xy / before.w : vec2(0.0);
   motion_depth = vec4(half_size_id.xy * way, now.w, 0.0);
 }

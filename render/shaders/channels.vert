@@ -1,4 +1,4 @@
-// For depth, normals, ids and motion: where a vertex is in the picture, and where it was.
+// Depth, normals, ids and motion: the current and the previous position of a vertex in the picture.
 layout(location = 0) in vec3 in_position;
 layout(location = 1) in vec3 in_normal;
 #ifdef CLOTH

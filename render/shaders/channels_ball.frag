@@ -3,13 +3,14 @@ layout(location = 2) flat in vec4 ball;  // centre, radius
 layout(location = 3) in vec3 position;
 layout(location = 4) flat in vec3 velocity;
 layout(location = 4) uniform mat4 clip_before_from_world;
-layout(location = 11) uniform vec4 half_size_id_time;  // half the picture [px], y downwards; id; time since before
+// Half the picture [px], y downwards; id; time since the previous transforms.
+layout(location = 11) uniform vec4 half_size_id_time;
 layout(location = 0) out vec4 normal_id;
 layout(location = 1) out vec4 motion_depth;
 
 void main() {
   vec3 ray = normalize(position - frame.eye.xyz), to_eye = frame.eye.xyz - ball.xyz;
-  vec3 nearest = to_eye - ray * dot(to_eye, ray);  // of the ray to the centre
+  vec3 nearest = to_eye - ray * dot(to_eye, ray);  // from the centre to the ray
   float h2 = ball.w * ball.w - dot(nearest, nearest);
   if (h2 < 0.0) discard;
   vec3 offset = nearest - ray * sqrt(h2), hit = ball.xyz + offset;

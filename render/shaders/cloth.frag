@@ -36,19 +36,20 @@ void main() {
   }
   Threads weave = threads(uv);
   s.albedo *= weave.shade;
-  through *= s.albedo / max(max(s.albedo.r, s.albedo.g), max(s.albedo.b, 1e-3));  // deeper: it went farther
+  // Deeper colour, because the light has travelled farther.
+  through *= s.albedo / max(max(s.albedo.r, s.albedo.g), max(s.albedo.b, 1e-3));
   slope += weave.slope;
   mat2x3 along = cloth_frame(position, n, uv);
   vec3 relief = normalize(n - side * (along[0] * slope.x + along[1] * slope.y));
 
-  // In folds the sky is hidden, but cloth is what hides it: light comes from there in the cloth's own colour.
+  // In folds the sky is hidden by the cloth itself, so the light from there has the colour of the cloth.
   float open = exp2(-2.2 * max(side * place.z, 0.0));
 #ifndef SHEER
-  open *= open_sky(1.0 / gl_FragCoord.w);  // of what is seen through it otherwise
+  open *= open_sky(1.0 / gl_FragCoord.w);  // for objects seen through it, the sky's openness behind
 #endif
   vec3 opened = open / (1.0 - s.albedo * (0.8 * (1.0 - open)));
 
-  // The side that the sun sees is the one that can be in shadow.
+  // Only the side that faces the sun can be in shadow.
   float towards_sun = dot(n, frame.sun_direction.xyz) < 0.0 ? -1.0 : 1.0;
   vec3 lit = position + normal.xyz * (abs(normal.w) * towards_sun * side - normal.w);
   float visibility = sun_visibility(lit, n * towards_sun);

@@ -1,4 +1,4 @@
-layout(location = 0) in vec4 in_position;  // w: how hollow the front is here
+layout(location = 0) in vec4 in_position;  // w: hollowness of the front at the vertex
 layout(location = 1) in vec4 in_normal;    // w: half the thickness [m]
 layout(location = 2) in vec2 in_uv;        // along the cloth [m]
 
@@ -10,8 +10,8 @@ layout(location = 2) out vec3 place;
 #else
 layout(location = 0) out vec3 position;
 layout(location = 1) out vec4 normal;  // w: height of `position` over the middle layer [m]
-layout(location = 2) out vec3 place;   // uv, and how hollow the front is
-// Depth alone is drawn first, by another program.
+layout(location = 2) out vec3 place;  // uv, and hollowness of the front
+// Depth is drawn first, by another program.
 invariant gl_Position;
 #endif
 
@@ -22,7 +22,7 @@ void main() {
   place = vec3(in_uv, in_position.w);
 #endif
 #else
-  // The one layer there is stands for whichever side is seen; towards the outline it goes over into the other.
+  // The single layer stands for the visible side; towards the outline it blends into the other side.
   vec3 view = normalize(frame.eye.xyz - in_position.xyz);
   float lift = in_normal.w * clamp(8.0 * dot(in_normal.xyz, view), -1.0, 1.0);
   position = in_position.xyz + lift * in_normal.xyz;

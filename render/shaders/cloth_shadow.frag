@@ -1,4 +1,4 @@
-// The shadow of cloth that is not opaque, by a dither that sub-frames and the search for soft edges average out.
+// The shadow of translucent cloth, by a dither that sub-frames and the filter of soft edges average out.
 layout(location = 2) in vec3 place;
 #ifdef TEXTURED
 layout(location = 1) uniform vec2 texture_from_uv;

@@ -1,4 +1,4 @@
-// Threads and the light of fabrics. WEAVE is the number of the enumerator.
+// Threads and reflection of fabrics. WEAVE is the number of the enumerator.
 struct Threads {
   float shade;  // factor of the colour: darker between threads
   vec2 slope;   // gradient of the height, along the cloth
@@ -20,12 +20,12 @@ Threads threads(vec2 uv) {
 #else  // satin: four over, one under, shifted by two
   bool warp = mod(cell.x + 2.0 * cell.y, 5.0) > 0.5;
 #endif
-  // A round thread across its run, which dips under its neighbours at both ends of a float.
+  // A round thread across its direction, which dips under its neighbours at both ends of a float.
   float across = warp ? f.x : f.y, along = warp ? f.y : f.x, far = 4.0 * across * across;
   vec2 dip = vec2(across, 0.6 * along) * (-1.8 * relief * near);
   result.slope = warp ? dip : dip.yx;
   result.shade = 1.0 + 0.55 * relief * near * (0.2 - far * far);
-  // No two threads are alike: uneven along their length, by patches that a larger footprint can still see.
+  // Threads vary along their length, by patches that are large enough to remain visible at a larger footprint.
   vec2 slub = vec2(noise(p * vec2(0.5, 0.03), 21u).x, noise(p * vec2(0.03, 0.5), 22u).x) - 0.5;
   result.shade *= 1.0 + 0.22 * relief * (warp ? slub.x : slub.y) * near +
                   0.10 * relief * (slub.x + slub.y) * (1.0 - near) * visible(footprint, 3.0);
@@ -43,9 +43,9 @@ mat2x3 cloth_frame(vec3 position, vec3 n, vec2 uv) {
   return mat2x3(t, s) * inversesqrt(max(max(dot(t, t), dot(s, s)), 1e-20));
 }
 
-// A cloth: its fibres scatter light through it and, where it grazes, back (sheen by A. Estevez and C. Kulla,
-// "Production Friendly Microfacet Sheen BRDF", 2017, at roughness 1/4, with the visibility of D. Neubelt and
-// M. Pettineo, 2013). `open`: share of the sky that folds leave.
+// Cloth: its fibres scatter light through it and, at grazing angles, back (sheen by A. Estevez and C. Kulla,
+// "Production Friendly Microfacet Sheen BRDF", 2017, at roughness 1/4, with the visibility term of D. Neubelt and M.
+// Pettineo, 2013). `open`: share of the sky that folds do not hide.
 vec3 shade_fabric(Surface s, vec3 through, vec3 normal, vec3 view, float visibility, vec3 open) {
   vec3 l = frame.sun_direction.xyz;
   vec3 h = normalize(l + view);
@@ -62,7 +62,8 @@ vec3 shade_fabric(Surface s, vec3 through, vec3 normal, vec3 view, float visibil
   float rest = 1.0 - max(sheen.r, max(sheen.g, sheen.b)) * sheen_sky;
   vec3 diffuse = s.albedo * ((1.0 - s.metallic) * rest);
 
-  // What enters on one side is scattered until it leaves on either: light wraps softly around the edge of shadow.
+  // Light that enters on one side is scattered until it leaves on either side, so it wraps softly around the shadow's
+  // edge.
   float share = material.back.w, wrap = 0.35 * share, norm = 1.0 / ((1.0 + wrap) * (1.0 + wrap));
   float front = saturate((cosine + wrap) * norm), behind = saturate((wrap - cosine) * norm);
   vec3 sun = diffuse * (1.0 - fresnel) * ((1.0 - share) * front) + through * (share * behind) +

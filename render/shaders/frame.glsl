@@ -1,14 +1,14 @@
-// What every shader of a frame knows; the same fields as FrameUniforms in frame.h.
+// Uniforms of a frame that all shaders share; the same fields as FrameUniforms in frame.h.
 struct Lamp {
   vec4 position;   // w: radius
   vec4 intensity;  // radiance of a white surface at 1 m; w: 0 no shadow, 1 shadow in a cone, 2 all around
-  vec4 direction;  // w: what the cosine to it counts
-  vec4 right;      // w: what is added; the sum, in [0, 1], is the share that shines there
+  vec4 direction;  // w: factor of the cosine to this direction
+  vec4 right;  // w: offset; factor * cosine + offset, in [0, 1], is the share of light in that direction
   vec4 up;         // w: tangent of half the angle of a tile of the shadow map
   vec4 block;      // first corner in the shadow map; size of a tile there
 };
 
-// What shading reads for nearly every pixel.
+// Values that shading reads for nearly every pixel.
 #define NONE
 #define FRAME_FIELDS(qualifier) \
   qualifier vec4 eye;               /* w: size of a pixel at distance 1 */ \
@@ -22,16 +22,16 @@ struct Lamp {
 
 layout(std140, binding = 0) uniform Frame {
   mat4 clip_from_world;
-  mat4 smoke_from_world;  // to [0, 1] of the smoke's optical depth
+  mat4 smoke_from_world;  // maps to [0, 1] of the grid of the smoke's optical depth
   FRAME_FIELDS(NONE)
-  vec4 ray_center, ray_x, ray_y;  // direction through a place of the screen: center + x * ndc.x + y * ndc.y
+  vec4 ray_center, ray_x, ray_y;  // direction through a point of the screen: center + x * ndc.x + y * ndc.y
   vec4 depth;             // distance along the view axis = x / (depth + y); z: near plane
   vec4 air;               // number of lamps, time [s], share of clouds, number of sub-frames
   Lamp lamps[8];
 } uniforms;
 
-// llvmpipe's fragment shaders read a uniform lane by lane, in forty instructions (Mesa 22.3), which was half of all that
-// shading cost. Flat inputs are as good as constants, so those fields come along with each triangle.
+// llvmpipe's fragment shaders read a uniform lane by lane, with forty instructions (Mesa 22.3), which was half of the
+// cost of shading. Flat inputs are as fast as constants, so these fields are passed with each triangle.
 #ifndef FLAT
 #define frame uniforms
 #elif defined(FRAGMENT)
@@ -56,7 +56,7 @@ void pass_frame() {
 
 float saturate(float x) { return clamp(x, 0.0, 1.0); }
 
-// A threshold in [0, 1) for a pixel, by the R2 sequence of M. Roberts: its mean over a few neighbours is even.
+// A threshold in [0, 1) for each pixel, by the R2 sequence of M. Roberts, whose mean over a few neighbours is even.
 float dither(vec2 pixel, float shift) {
   return fract(dot(floor(pixel), vec2(0.75487767, 0.56984029)) + shift);
 }

@@ -9,7 +9,7 @@ vec3 lamp_radiance(Lamp lamp, vec3 position, out vec3 l) {
   return lamp.intensity.rgb * (share / (d2 + 0.25 * lamp.position.w * lamp.position.w));
 }
 
-// On something so small that it is lit from all sides.
+// Light on a particle so small that it is lit from all sides.
 vec3 lamps_all_around(vec3 position) {
   vec3 sum = vec3(0.0), l;
   for (int k = 0; k < int(uniforms.air.x); ++k) sum += lamp_radiance(uniforms.lamps[k], position, l);
@@ -18,10 +18,10 @@ vec3 lamps_all_around(vec3 position) {
 
 #ifdef FRAGMENT
 layout(binding = 10) uniform sampler2DShadow lamp_shadows;
-layout(binding = 11) uniform sampler2D lamp_depths;  // the same without comparing
+layout(binding = 11) uniform sampler2D lamp_depths;  // the same texture without comparison
 const float kLampNear = 0.02;                        // depth is 1 - near / distance
 
-// Place in the shadow map, and the distance along the tile's axis in z.
+// Position in the shadow map, and in z the distance along the tile's axis.
 vec3 lamp_place(Lamp lamp, vec3 v, out vec4 tile) {
   vec3 p = vec3(dot(v, lamp.right.xyz), dot(v, lamp.up.xyz), dot(v, lamp.direction.xyz));
   vec2 corner = vec2(0.0);
@@ -64,12 +64,12 @@ float lamp_visibility(Lamp lamp, vec3 position, vec3 normal) {
   for (int k = 0; k < taps; ++k) {
     vec2 at = p.xy + a * (penumbra * texel * sqrt((float(k) + 0.5) / float(taps)));
     lit += texture(lamp_shadows, vec3(clamp(at, tile.xy, tile.zw), z));
-    a = mat2(-0.73736888, -0.67549029, 0.67549029, -0.73736888) * a;  // by the golden angle
+    a = mat2(-0.73736888, -0.67549029, 0.67549029, -0.73736888) * a;  // rotation by the golden angle
   }
   return taps == 0 ? (blockers == 0.0 ? 1.0 : 0.0) : lit / float(taps);
 }
 
-// What a surface sends to the eye of it. `smooth_normal` is without relief.
+// Light of the lamp that a surface reflects to the eye. `smooth_normal` excludes the relief.
 vec3 lamp_light(Surface s, vec3 normal, vec3 smooth_normal, vec3 view, vec3 position) {
   vec3 f0 = mix(vec3(0.04), s.albedo, s.metallic), diffuse = s.albedo * (1.0 - s.metallic), sum = vec3(0.0), l;
   float nv = max(abs(dot(normal, view)), 1e-3);
@@ -77,7 +77,7 @@ vec3 lamp_light(Surface s, vec3 normal, vec3 smooth_normal, vec3 view, vec3 posi
     Lamp lamp = uniforms.lamps[k];
     vec3 light = lamp_radiance(lamp, position, l), h = normalize(l + view);
     float nl = saturate(dot(normal, l)), vh = saturate(dot(view, h));
-    // A lamp that is large from here has a large highlight.
+    // A lamp that looks large from here has a large highlight.
     float a = max(s.roughness * s.roughness, 0.5 * lamp.position.w * inversesqrt(dot(lamp.position.xyz - position, lamp.position.xyz - position)) + 0.002);
     vec3 fresnel = fresnel_at(f0, vh);
     float lobe = sun_lobe(min(a, 1.0), nl, nv, saturate(dot(normal, h)));

@@ -10,8 +10,8 @@ struct Surface {
 
 vec3 in_shadow_map(vec4 v) { return vec3(dot(frame.shadow_rows[0], v), dot(frame.shadow_rows[1], v), dot(frame.shadow_rows[2], v)); }
 
-// A place in the shadow map. The point is moved off its surface by about a texel, more where the light grazes, which
-// keeps a surface from shadowing itself without detaching shadows from their casters.
+// Position in the shadow map. The point is moved off its surface by about a texel, more at grazing light. This prevents
+// a surface from shadowing itself without detaching shadows from their casters.
 vec3 shadow_place(vec3 position, vec3 normal) {
   float cosine = saturate(dot(normal, frame.sun_direction.xyz));
   vec3 moved = position + frame.shadow.x * (normal * (2.2 * sqrt(1.0 - cosine * cosine) + 0.3) + 0.7 * frame.sun_direction.xyz);
@@ -21,27 +21,27 @@ vec3 shadow_place(vec3 position, vec3 normal) {
 bool off_shadow_map(vec3 p) { return any(notEqual(p.xy, clamp(p.xy, 0.0, 1.0))); }
 
 #ifdef FRAGMENT
-layout(binding = 9) uniform sampler2D shadow_depth;  // the shadow map without comparing
-layout(binding = 13) uniform sampler2D casters;      // the depth from which on something can be in front
+layout(binding = 9) uniform sampler2D shadow_depth;  // the shadow map without comparison
+layout(binding = 13) uniform sampler2D casters;  // depth from which on a caster may be in front
 
-// Shadows are as soft as what throws them is far away (R. Fernando, "Percentage-Closer Soft Shadows", 2005): first the
-// mean depth of what is in between, then the share of a disc as wide as its penumbra. Where nothing or only shadow is
-// near, as almost everywhere, the first is all. llvmpipe runs a loop's body until no pixel of eight wants another round, once at
-// least: such loops look at their condition at the end.
+// The softness of a shadow grows with the distance of its caster (R. Fernando, "Percentage-Closer Soft Shadows", 2005):
+// first the mean depth of the casters is computed, then the share of a disc as wide as the penumbra. Where all samples
+// agree, as almost everywhere, the first step is enough. llvmpipe runs a loop's body until no pixel of eight needs
+// another round, and at least once, so these loops test their condition at the end.
 float shadow_map_visibility(vec3 position, vec3 normal) {
   if (frame.sun_direction.w == 0.0) return 1.0;
   vec3 p = shadow_place(position, normal);
   if (off_shadow_map(p)) return 1.0;
   float turn = 6.2831853 * dither(gl_FragCoord.xy, frame.shadow.w);
   vec2 a = vec2(cos(turn), sin(turn));
-  // Along its own surface a tap is higher or lower.
+  // Height of a sample along the surface itself.
   vec3 g = in_shadow_map(vec4(normal, 0.0));
   vec2 slope = g.xy * (frame.penumbra.z / min(g.z, -1e-9));
   float steep = inversesqrt(dot(slope, slope) + 1e-12);
   slope *= -min(1.0, 4.0 * sqrt(frame.penumbra.z) * steep);
   float beside = min(1.0 / steep, 4.0 * sqrt(frame.penumbra.z)) * frame.shadow.z;
   float search = min(frame.penumbra.x * p.z, frame.penumbra.y) + 1.0, sum = 0.0, blockers = 0.0;
-  // None where a surface looks away from the sun, or nothing can be in front of it.
+  // No search where a surface faces away from the sun, or where no caster can be in front of it.
   float nearest = texelFetch(casters, ivec2(p.xy * vec2(textureSize(casters, 0))), 0).r;
   int rounds = g.z < 0.0 && p.z > nearest ? 4 : 0;
   int k = 0;
@@ -60,7 +60,7 @@ float shadow_map_visibility(vec3 position, vec3 normal) {
   do {
     vec2 offset = a * (penumbra * frame.shadow.z * sqrt((float(k) + 0.5) / n));
     lit += texture(shadow_map, vec3(p.xy + offset, min(p.z + dot(slope, offset), 1.0)));
-    a = mat2(-0.73736888, -0.67549029, 0.67549029, -0.73736888) * a;  // by the golden angle
+    a = mat2(-0.73736888, -0.67549029, 0.67549029, -0.73736888) * a;  // rotation by the golden angle
   } while (++k < taps);
   return rounds == 0 || blockers == 0.0 ? 1.0 : blockers == 16.0 ? 0.0 : lit / n;
 }
@@ -76,7 +76,7 @@ float shadow_map_visibility(vec3 position, vec3 normal) {
 layout(binding = 5) uniform sampler3D smoke_depth;
 #endif
 
-// The same through smoke. UNHIDDEN: where nothing solid is near enough to hide the sun or the sky.
+// The same including smoke. UNHIDDEN: no solid object is near enough to hide the sun or the sky.
 float sun_visibility(vec3 position, vec3 normal) {
 #ifdef UNHIDDEN
   float visibility = 1.0;
@@ -90,10 +90,10 @@ float sun_visibility(vec3 position, vec3 normal) {
 }
 
 #ifdef FRAGMENT
-layout(binding = 8) uniform sampler2D openness;  // half the picture's size; y: the distance it was found at
+layout(binding = 8) uniform sampler2D openness;  // half the picture's size; y: the distance for which it was computed
 
-// Share of the sky that near things leave over a pixel at a distance along the view axis. Of the four texels around it
-// those count that are as far away.
+// Share of the sky that near objects leave visible at a pixel, at a distance along the view axis. Of the four texels
+// around it, those at a similar distance are used.
 float open_sky(float distance) {
 #ifdef UNHIDDEN
   return 1.0;
@@ -122,21 +122,22 @@ vec3 fresnel_at(vec3 f0, float vh) {
   return f0 + (1.0 - f0) * (m2 * m2 * m);
 }
 
-// The split sum of B. Karis, "Physically Based Shading on Mobile" (2014).
+// The split-sum approximation of B. Karis, "Physically Based Shading on Mobile" (2014).
 vec3 sky_reflectance(vec3 f0, float roughness, float nv) {
   vec4 r = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
   float t = min(r.x * r.x, exp2(-9.28 * nv)) * r.x + r.y;
   return f0 * (-1.04 * t + r.z) + (1.04 * t + r.w);
 }
 
-// Where the sky is hidden, other surfaces send some of the light instead: as many as there are of this one's colour
+// Where the sky is hidden, other surfaces reflect some light instead. They are assumed to have this surface's colour
 // (J. Jimenez et al., "Practical Realtime Strategies for Accurate Indirect Occlusion", 2016).
 vec3 with_bounces(float open, vec3 albedo) {
   vec3 a = 2.0404 * albedo - 0.3324, b = 0.6417 - 4.7951 * albedo, c = 2.7552 * albedo + 0.6903;
   return max(vec3(open), ((open * a + b) * open + c) * open);
 }
 
-// The sun's light and the sky's that a surface sends to the eye; `view` points to it; `open` of the sky is not hidden.
+// Light of sun and sky that a surface reflects to the eye; `view` points to the eye; `open` is the visible share of the
+// sky.
 vec3 shade(Surface s, vec3 normal, vec3 view, float visibility, float open) {
   vec3 l = frame.sun_direction.xyz;
   vec3 h = normalize(l + view);
@@ -156,7 +157,7 @@ vec3 shade(Surface s, vec3 normal, vec3 view, float visibility, float open) {
   return sun + sky + s.emission;
 }
 
-// What `shade` lacks where it is not the sky that is mirrored, but in a share w the `scene`.
+// Correction of `shade` where a share w of the mirrored light comes from the `scene` instead of the sky.
 vec3 mirror_gain(Surface s, vec3 normal, vec3 view, float open, vec4 scene) {
   float nv = max(abs(dot(normal, view)), 1e-3);
   vec3 reflectance = sky_reflectance(mix(vec3(0.04), s.albedo, s.metallic), s.roughness, nv);

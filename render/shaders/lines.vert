@@ -1,9 +1,9 @@
-// One quad per line on the screen: the stroke of a round pen from a to b.
+// One quad per line on the screen, drawn as with a round pen from a to b.
 layout(location = 0) in vec4 in_a;  // w: width there, as a factor
 layout(location = 1) in vec4 in_b;
 layout(location = 2) in vec4 in_color;
-layout(location = 0) uniform vec2 half_size;     // of the picture [px]
-layout(location = 1) uniform float half_width;   // of a line of factor 1 [px]
+layout(location = 0) uniform vec2 half_size;  // half the size of the picture [px]
+layout(location = 1) uniform float half_width;  // half the width of a line with the factor 1 [px]
 
 layout(location = 0) out vec2 place;             // along the line from a, and across it [px]
 layout(location = 1) flat out vec3 stroke;       // length, half width at a and at b [px]
@@ -22,7 +22,7 @@ void main() {
   float reach = max(stroke.y, stroke.z) + 1.0;
   place = vec2(at_b ? length_px + reach : -reach, side * reach);
   vec2 p = pa + u * place.x + v * place.y;
-  // A line has the depth of the front of a tube as wide as it is drawn, so that one on a surface is not cut by it.
+  // A line has the depth of the front of a tube of its width, so that a surface does not cut a line on it.
   float w = at_b ? b.w : a.w;
   float front = w * (1.0 - (at_b ? stroke.z : stroke.y) * frame.eye.w);
   gl_Position = vec4(p / half_size, saturate(uniforms.depth.x / front - uniforms.depth.y), 1.0);

@@ -10,11 +10,11 @@ layout(location = 5) flat in vec3 axis_x;
 layout(location = 6) flat in vec3 axis_y;
 layout(location = 7) flat in vec3 axis_z;
 #endif
-layout(location = 0) uniform float min_alpha;  // of what this pass draws
+layout(location = 0) uniform float min_alpha;  // smallest alpha that this pass draws
 layout(location = 0) out vec4 color;
 
-// Roughness raised where the normal turns within a pixel, so that highlights do not sparkle (Kaplanyan and Tokuyoshi,
-// "Stable Geometric Specular Antialiasing", 2019).
+// Roughness, increased where the normal varies within a pixel, so that highlights do not flicker (Kaplanyan and
+// Tokuyoshi, "Stable Geometric Specular Antialiasing", 2019).
 float filtered_roughness(float roughness, vec3 normal) {
   vec3 dx = dFdx(normal), dy = dFdy(normal);
   float variance = 0.25 * (dot(dx, dx) + dot(dy, dy));
@@ -51,7 +51,7 @@ void main() {
   vec4 fog = fog_to(position);
 #endif
 #ifdef MIRROR
-  // Added to what was drawn already.
+  // Added to the picture drawn so far.
   vec4 scene = seen_in_mirror(position, n, view, s.roughness);
   color = vec4(mirror_gain(s, n, view, open_sky(1.0 / gl_FragCoord.w), scene) * fog.w, 0.0);
 #else

@@ -6,7 +6,7 @@ layout(location = 4) in vec4 row_y;
 layout(location = 5) in vec4 row_z;
 
 #ifdef SHADOW
-layout(location = 0) uniform mat4 shadow_clip_from_world;  // or the picture's, for depth alone
+layout(location = 0) uniform mat4 shadow_clip_from_world;  // or that of the picture, when only depth is drawn
 #else
 layout(location = 0) out vec3 position;
 layout(location = 1) out vec3 normal;
@@ -30,7 +30,7 @@ void main() {
 #ifdef SHADOW
   gl_Position = shadow_clip_from_world * vec4(world, 1.0);
 #else
-  // Normals go by the cofactors, which are the inverse transpose up to a factor.
+  // Normals are transformed by the cofactor matrix, the inverse transpose up to a factor.
   vec3 cx = cross(row_y.xyz, row_z.xyz), cy = cross(row_z.xyz, row_x.xyz), cz = cross(row_x.xyz, row_y.xyz);
   normal = normalize(vec3(dot(cx, in_normal), dot(cy, in_normal), dot(cz, in_normal)));
   if (dot(row_x.xyz, cx) < 0.0) normal = -normal;

@@ -1,4 +1,4 @@
-// Surfaces that are not opaque let through their share of the light, by a dither that sub-frames average out.
+// Translucent surfaces transmit a share of the light, by a dither that sub-frames average out.
 #ifdef TEXTURED
 layout(location = 2) in vec2 uv;
 #endif

@@ -1,12 +1,12 @@
-// Noise and what keeps procedural detail from sparkling: every detail fades to its mean before it gets smaller than a
-// pixel.
+// Noise, and filters that prevent procedural detail from flickering: every detail fades to its mean before it gets
+// smaller than a pixel.
 uint mix_bits(uint h) {
   h = (h ^ (h >> 15)) * 0x2C1B3C6Du;
   h = (h ^ (h >> 12)) * 0x297A2D39u;
   return h ^ (h >> 15);
 }
 
-// In [0, 1).
+// A random number in [0, 1).
 float unit_of(uint bits) { return float(mix_bits(bits) >> 8) * (1.0 / 16777216.0); }
 
 const uvec2 kPrimes = uvec2(0x9E3779B1u, 0x85EBCA77u);
@@ -14,7 +14,7 @@ float cell_random(vec2 cell, uint salt) {
   uvec2 c = uvec2(ivec2(cell)) * kPrimes;
   return unit_of(c.x ^ c.y ^ salt);
 }
-// Of the cell, and those after it along x, y and both. Multiplying whole numbers is what costs.
+// Random numbers of the cell, and of the next cells along x, y and both. The cost is in the integer multiplications.
 vec4 cells_random(vec2 cell, uint salt) {
   uvec2 c = uvec2(ivec2(cell)) * kPrimes, d = c + kPrimes;
   return vec4(unit_of(c.x ^ c.y ^ salt), unit_of(d.x ^ c.y ^ salt), unit_of(c.x ^ d.y ^ salt), unit_of(d.x ^ d.y ^ salt));
@@ -39,11 +39,11 @@ float noise(vec3 p) {
   return mix(mix(c.x, c.y, s.x), mix(c.z, c.w, s.x), s.y);
 }
 
-// 1 while a detail of this size is well above the pixel's footprint, 0 when it drowns in it.
+// 1 while a detail of this size is larger than the pixel's footprint, 0 when it is much smaller.
 float visible(float footprint, float size) { return 1.0 - smoothstep(0.2, 0.7, footprint / size); }
 
-// The share of a box of width w around p in which a square wave of period 2 is up. On a hem w can be nothing, and
-// rounding all that is left of the difference: a share beyond [0, 1] would make colours negative.
+// Share of a box of width w around p in which a square wave of period 2 is high. At a hem w can be 0, and the
+// difference is then mostly rounding; a share outside of [0, 1] would make colours negative.
 vec2 square_wave(vec2 p, vec2 w) {
   w = max(w, 1e-3);
   return clamp(0.5 + (abs(fract((p - 0.5 * w) * 0.5) - 0.5) - abs(fract((p + 0.5 * w) * 0.5) - 0.5)) / w, 0.0, 1.0);

@@ -1,4 +1,4 @@
-// A triangle that covers the screen, with all that occlusion.frag reads of the frame: see FLAT in frame.glsl.
+// A triangle that covers the screen, with all frame data that occlusion.frag uses: see FLAT in frame.glsl.
 layout(location = 0) uniform vec4 frame_reach;
 layout(location = 1) uniform int frame_taps;
 layout(location = 2) uniform vec4 frame_image;

@@ -1,12 +1,12 @@
-// Procedural surfaces in object space. PATTERN is the number of the enumerator. Every detail fades to its mean before it
-// gets smaller than a pixel, so nothing sparkles in the distance.
+// Procedural surfaces in object space. PATTERN is the number of the enumerator. Every detail fades to its mean before
+// it gets smaller than a pixel, so nothing flickers in the distance.
 struct PatternSample {
   vec3 color;
   float roughness;  // factor
   vec3 slope;       // gradient of the surface's height, along the object's axes
 };
 
-// Bricks or slabs in rows: `size` of one, `joint` half the joint's width, all in metres.
+// Bricks or slabs in rows: `size` of one, `joint` is half the width of the joint, all in metres.
 struct Masonry {
   vec2 cell;
   float stone;  // 0 in the joint, 1 on the stone
@@ -35,7 +35,7 @@ PatternSample pattern_sample(vec3 p, vec3 n) {
   vec3 a = material.color.rgb, b = material.pattern_color.rgb;
   float scale = material.pattern_color.w;
   vec3 dx = dFdx(p), dy = dFdy(p);
-  float footprint = 0.8 * sqrt(sqrt(dot(dx, dx) * dot(dy, dy)));  // a mean of its length and width
+  float footprint = 0.8 * sqrt(sqrt(dot(dx, dx) * dot(dy, dy)));  // mean of its length and width
   PatternSample result = PatternSample(a, 1.0, vec3(0.0));
 
 #if PATTERN == 3 || PATTERN == 5
@@ -63,7 +63,7 @@ PatternSample pattern_sample(vec3 p, vec3 n) {
   result.color = mix(a, b, saturate(tone));
   result.roughness = 0.9 + 0.25 * late;
 #else
-  // The others lie in the plane that the surface is nearest to.
+  // The other patterns use the plane that is closest to the surface's orientation.
   vec3 size = abs(n);
   bool level = size.y >= max(size.x, size.z), facing_x = !level && size.x > size.z;
   vec3 u = facing_x ? vec3(0.0, 0.0, 1.0) : vec3(1.0, 0.0, 0.0), v = level ? vec3(0.0, 0.0, 1.0) : vec3(0.0, 1.0, 0.0);
@@ -171,7 +171,7 @@ PatternSample pattern_sample(vec3 p, vec3 n) {
                (1.0 + vec3(0.06, 0.0, -0.06) * (tint + mottle.x));
   result.color = mix(b * (1.0 + 0.4 * grain.x), stone, m.stone);
   result.roughness = mix(1.6, 1.0 + 0.5 * broad + 0.35 * mottle.x + 0.3 * tint, m.stone);
-  float dry = mix(0.3, 1.0, material.surface.y);  // water lies smooth in the small hollows
+  float dry = mix(0.3, 1.0, material.surface.y);  // water stays smooth in the small hollows
   slope = m.slope + dry * (0.02 * tilt + 0.02 * mottle.yz + 0.03 * grain.yz);
 #endif
   result.slope = u * slope.x + v * slope.y;

@@ -1,4 +1,4 @@
-// Sprites and flakes, blended over what is behind them.
+// Sprites and flakes, blended over the background.
 layout(location = 0) in vec3 place;
 layout(location = 1) in vec4 light;
 layout(location = 2) in float reach;
@@ -9,7 +9,7 @@ layout(location = 4) flat in vec2 rim;  // softness, additive
 layout(binding = 4) uniform sampler2D scene_depth;
 layout(location = 0) out vec4 color;
 
-// Fades where a sprite meets a surface, instead of being cut.
+// Fades out where a sprite meets a surface, instead of being cut.
 float depth_fade(float radius) {
   float behind = uniforms.depth.x / (texelFetch(scene_depth, ivec2(gl_FragCoord.xy), 0).r + uniforms.depth.y);
   return saturate((behind - 1.0 / gl_FragCoord.w) / radius);
@@ -18,7 +18,7 @@ float depth_fade(float radius) {
 void main() {
   vec3 radiance = light.rgb;
 #if STYLE == 5
-  // Three blunt corners, more or less.
+  // Approximately three blunt corners.
   float c = dot(place.xy, lobe) * inversesqrt(dot(place.xy, place.xy) + 1e-6);
   float alpha = light.a * coverage(place * (1.15 - 0.15 * c * (4.0 * c * c - 3.0)), rim.x);
 #else

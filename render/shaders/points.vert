@@ -1,25 +1,25 @@
 // One quad per particle. STYLE is 0 sprite, 2 sphere, 5 flake; with SHADOW it faces the sun instead of the eye.
 layout(location = 0) in vec4 in_position;  // w: radius
-layout(location = 1) in vec4 in_velocity;  // w: a number of its own in [0, 1)
+layout(location = 1) in vec4 in_velocity;  // w: random number in [0, 1)
 layout(location = 2) in vec4 in_color;
 #ifdef SHADOW
 layout(location = 0) uniform mat4 shadow_clip_from_world;
 #endif
-// Softness, stretch [s], lit, additive: sprites and flakes of several sets are drawn together.
+// Softness, stretch [s], lit, additive: per particle, because sprites and flakes of several sets are drawn together.
 #if defined(SHADOW) || STYLE == 2
 layout(location = 1) uniform vec4 style;
 #else
 layout(location = 3) in vec4 style;
 #endif
 
-// The place on the quad in radii: across, up, and for a flake half the length of its axis, which up runs along.
+// Position on the quad in radii: across, up, and for a flake half the length of its axis, which is vertical.
 layout(location = 0) out vec3 place;
 #ifdef SHADOW
-layout(location = 1) flat out vec2 dimming;  // alpha, shift of the dither
+layout(location = 1) flat out vec2 dimming;  // alpha, offset of the dither
 #elif STYLE == 2
 layout(location = 1) flat out vec4 color;
 layout(location = 2) flat out vec4 ball;     // centre, radius
-layout(location = 3) out vec3 position;      // on the quad
+layout(location = 3) out vec3 position;  // position on the quad
 #ifdef CHANNELS
 layout(location = 4) flat out vec3 velocity;
 #endif
@@ -32,7 +32,7 @@ layout(location = 3) flat out vec2 lobe;     // direction of a flake's first cor
 layout(location = 4) flat out vec2 rim;      // softness, additive
 #endif
 
-// The vector between viewer and particle, unit, and the width of a pixel or texel there.
+// Unit vector between viewer and particle, and the width of a pixel or texel there.
 vec4 viewer_of(vec3 p) {
 #ifdef SHADOW
   return vec4(frame.sun_direction.xyz, frame.shadow.x);
@@ -53,11 +53,11 @@ vec3 puff_light(vec3 p, vec3 n, vec3 u, vec3 to_viewer, float radius) {
                              sun_visibility(front + b, l) + sun_visibility(front - b, l));
   float forward = saturate(-dot(l, to_viewer)), forward2 = forward * forward;
   float phase = max(0.45 + 0.35 * dot(n, l) + 0.8 * forward2 * forward2, 0.0);
-  // Some light gets into the shadow of a cloud from all around.
+  // Some light reaches the shadow of a cloud from all sides.
   return ambient(n) + frame.sun_radiance.rgb * (phase * mix(0.2, 1.0, visibility));
 }
 #elif STYLE == 5
-// Ice and dust let light through in all directions, most of it forwards.
+// Ice and dust transmit light in all directions, most of it forwards.
 vec3 flake_light(vec3 p, vec3 to_viewer) {
   float forward = saturate(-dot(frame.sun_direction.xyz, to_viewer)), forward2 = forward * forward;
   float visibility = sun_visibility(p, frame.sun_direction.xyz);
@@ -73,7 +73,7 @@ void main() {
   vec4 viewer = viewer_of(p);
   vec3 u = normalize(cross(abs(viewer.y) < 0.99 ? vec3(0.0, 1.0, 0.0) : vec3(1.0, 0.0, 0.0), viewer.xyz));
 
-  // What would be thinner than a pixel stays about one wide and gets fainter instead.
+  // Particles thinner than a pixel are drawn about one pixel wide and fainter.
   float drawn = STYLE == 2 ? radius : max(radius, 0.6 * viewer.w);
   float thinning = radius / drawn;
 #if STYLE == 5
@@ -83,7 +83,7 @@ void main() {
   vec3 w = half_length > 1e-6 ? across_view / half_length : cross(viewer.xyz, u);
   u = cross(w, viewer.xyz);
   alpha *= thinning * thinning;
-  // With its rounded ends it is as long as it moved.
+  // With its rounded ends its length equals its motion.
   float straight = max(half_length - drawn, 0.0) / drawn;
   vec3 at = p + half_axis * (half_length > drawn ? corner.y * (1.0 - drawn / half_length) : 0.0) +
             drawn * (w * corner.y + u * corner.x);
@@ -119,9 +119,9 @@ void main() {
   velocity = in_velocity.xyz;
 #endif
 #else
-  // Added light is dimmed by the fog but brings none of its colour.
+  // Fog dims added light, but does not add its own colour.
   vec4 fog = fog_to(p) * vec4(vec3(1.0 - style.w), 1.0);
-  // What comes close to the lens fades out before it is cut.
+  // Particles near the lens fade out before they are cut.
   light = vec4(in_color.rgb, alpha * saturate(0.5 * (gl_Position.w - uniforms.depth.z) / drawn));
   reach = drawn;
   rim = vec2(style.x, style.w);

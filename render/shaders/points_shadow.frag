@@ -1,4 +1,4 @@
-// A dithered disc or streak in the shadow map; of a ball the disc through its middle, which throws the same shadow.
+// A dithered disc or streak in the shadow map; for a ball the disc through its centre, which has the same shadow.
 layout(location = 0) in vec3 place;
 layout(location = 1) flat in vec2 dimming;
 layout(location = 1) uniform vec4 style;

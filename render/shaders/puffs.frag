@@ -1,9 +1,10 @@
-// Lays smoke and fire, drawn in a smaller picture, over the scene. Of the four texels around a pixel those count whose
-// scene is as far away as the pixel's.
-layout(location = 0) uniform vec3 scale;     // pixels per texel; depth over which puffs change little, and of the farthest [m]
-layout(location = 1) uniform ivec4 region;   // texels that hold something: first, last
+// Composites smoke and fire, drawn in a smaller picture, over the scene. Of the four texels around a pixel, those with
+// a scene depth similar to the pixel's are used.
+// Pixels per texel; depth over which puffs change little, and that of the farthest puff [m].
+layout(location = 0) uniform vec3 scale;
+layout(location = 1) uniform ivec4 region;  // texels with content: first, last
 layout(binding = 4) uniform sampler2D scene_depth;
-layout(binding = 6) uniform sampler2D puffs;  // w: share of the scene that shows
+layout(binding = 6) uniform sampler2D puffs;  // w: remaining share of the scene
 layout(binding = 7) uniform sampler2D puff_depth;
 layout(location = 0) out vec4 color;
 

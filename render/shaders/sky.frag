@@ -1,10 +1,11 @@
 layout(location = 0) in vec3 ray;
 layout(location = 0) out vec4 color;
 
-// Fair weather clouds on a level far up: how thick they are there, from 0.
+// Fair-weather clouds on a high level: their thickness, at least 0.
 float cloud_thickness(vec2 p) {
   float sum = 0.0, amplitude = 0.5;
-  int octaves = uniforms.air.z > 0.0 ? 5 : 0;  // not a constant: the loop must not be unrolled, for compilation takes time
+  // Not a constant, so that the loop is not unrolled, which would take long to compile.
+  int octaves = uniforms.air.z > 0.0 ? 5 : 0;
   for (int octave = 0; octave < octaves; ++octave) {
     sum += amplitude * noise(p, uint(40 + octave)).x;
     p = mat2(1.6, 1.2, -1.2, 1.6) * p + 7.1;
@@ -25,14 +26,14 @@ vec3 with_clouds(vec3 sky, vec3 d) {
 
 void main() {
   vec3 d = normalize(ray);
-  // Below the horizon the haze thins out towards the nadir, so that a far ground plane ends without a seam.
+  // Below the horizon the haze decreases towards the nadir, so that a distant ground plane ends without a visible edge.
   vec3 sky = mix(horizon_color(d), frame.ground.rgb, smoothstep(0.03, 0.5, -d.y));
   float sine = length(cross(d, frame.sun_direction.xyz));
   float radius = frame.sun_radiance.w;
   float disc = (1.0 - smoothstep(0.85 * radius, 1.15 * radius, sine)) *
                step(0.0, dot(d, frame.sun_direction.xyz)) * smoothstep(-0.02, 0.0, d.y);
   sky += frame.sun_radiance.rgb * (8.0 * disc);
-  // A loop of no rounds costs nothing where there are no clouds.
+  // Without clouds the loop has no rounds and costs nothing.
   for (int k = 0; k < (uniforms.air.z > 0.0 && d.y > 0.015 ? 1 : 0); ++k) sky = with_clouds(sky, d);
   color = vec4(sky, 1.0);
 }

@@ -1,4 +1,4 @@
-// The sky, the same as sky_radiance in sky.cpp.
+// The sky, equal to sky_radiance() in sky.cpp.
 float glow_profile(vec3 direction) {
   float x = max(dot(direction, frame.sun_direction.xyz), 0.0);
   float x2 = x * x, x4 = x2 * x2, x8 = x4 * x4, x16 = x8 * x8, x64 = x16 * x16 * x16 * x16;
@@ -10,8 +10,8 @@ vec3 sky_gradient(float y) {
   return mix(frame.zenith.rgb, frame.horizon.rgb, 0.3 * u2 + 0.7 * u4 * u4);
 }
 
-// Ambient light on a white surface, from spherical harmonics of order 2. The last two of the nine coefficients lie in the
-// others' fourth components.
+// Ambient light on a white surface, from spherical harmonics of order 2. The last two of the nine coefficients are in
+// the fourth components of the others.
 vec3 ambient(vec3 n) {
   vec4 c[7] = frame.irradiance;
   vec3 c7 = vec3(c[0].w, c[1].w, c[2].w), c8 = vec3(c[3].w, c[4].w, c[5].w);
@@ -19,7 +19,7 @@ vec3 ambient(vec3 n) {
              c[6].rgb * (3.0 * n.z * n.z - 1.0) + c7 * (n.x * n.z) + c8 * (n.x * n.x - n.y * n.y), 0.0);
 }
 
-// What a surface of this roughness reflects from a direction: the sky, more and more blurred.
+// Sky reflected from a direction by a surface of this roughness; blurred with increasing roughness.
 vec3 sky_reflection(vec3 direction, float roughness) {
   float blur = 0.02 + 0.5 * roughness;
   vec3 sharp = mix(sky_gradient(direction.y) + frame.glow.rgb * glow_profile(direction), frame.ground.rgb,
@@ -32,8 +32,8 @@ vec3 horizon_color(vec3 direction) {
   return sky_gradient(level.y) + frame.glow.rgb * glow_profile(level);
 }
 
-// Light added on the way from a place to the eye, and in w the share of its own light that arrives, through fog and
-// another optical depth.
+// Light added on the way from a point to the eye, and in w the share of the point's own light that arrives, through fog
+// and an additional optical depth.
 vec4 fog_to(vec3 position, float more) {
   vec3 ray = position - frame.eye.xyz;
   float distance = length(ray);
@@ -42,8 +42,9 @@ vec4 fog_to(vec3 position, float more) {
 }
 vec4 fog_to(vec3 position) { return fog_to(position, 0.0); }
 
-// The optical depth that hides the last quarter of a degree of an endless plane below its horizon, so that it meets the sky
-// without an edge and its pattern does not shimmer there. It depends on directions alone: scenes of any size look alike.
+// Optical depth that hides the last quarter of a degree of an endless plane below its horizon, so that the plane meets
+// the sky without an edge and its pattern does not flicker. It depends only on directions, so scenes of any size look
+// alike.
 float horizon_haze(vec3 normal, vec3 view) {
   float near_horizon = 0.004 / max(abs(dot(normal, view)), 1e-6);
   return near_horizon * near_horizon;

@@ -9,7 +9,7 @@ layout(location = 0) out vec4 result;
 void main() {
   vec3 ray = normalize(position - frame.eye.xyz);
   vec3 to_eye = frame.eye.xyz - ball.xyz;
-  vec3 nearest = to_eye - ray * dot(to_eye, ray);  // of the ray to the centre
+  vec3 nearest = to_eye - ray * dot(to_eye, ray);  // from the centre to the ray
   float h2 = ball.w * ball.w - dot(nearest, nearest);
   if (h2 < 0.0) discard;
   vec3 offset = nearest - ray * sqrt(h2);

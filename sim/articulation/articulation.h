@@ -23,19 +23,20 @@ struct Joint {
   JointDef def;
   JointHandle handle;
   Body *a = nullptr, *b = nullptr;  ///< b may be null: the world
-  JointFrame on_a, on_b;            ///< in the bodies' frames
-  Real length = 0;                  ///< of a rod
+  JointFrame on_a, on_b;            ///< frames in the bodies' frames
+  Real length = 0;                  ///< length of a rod
   Articulation* articulation = nullptr;
 
   bool is_broken = false;
-  Real coordinate = 0;  ///< of joints that count turns
+  Real coordinate = 0;  ///< accumulated coordinate, for joints that count turns
   // Loads of the joint on body a, about the anchor.
-  Wrench load;                   ///< during the last motion, including its contacts [N], [N m]
-  Wrench impact_impulse;         ///< impulses of collisions in this sub-step [N s], [N m s]
-  Wrench borne;                  ///< load and impacts of the last sub-step together [N], [N m]
-  Vec6 reaction = Vec6::Zero();  ///< of its constraints to contacts; initial guess of the next solution
-  std::array<Real, 9> efforts =
-      {};  ///< of its rows with bounds (joint_limits.h); initial guess of the next solution
+  Wrench load;            ///< mean during the last motion, including the effect of contacts [N], [N m]
+  Wrench impact_impulse;  ///< impulses of collisions in this sub-step [N s], [N m s]
+  Wrench borne;           ///< mean load of the last sub-step including impacts [N], [N m]
+  /// Impulse of its constraints in the last contact solution; initial guess of the next one.
+  Vec6 reaction = Vec6::Zero();
+  /// Impulses of its rows with bounds (joint_limits.h); initial guess of the next solution.
+  std::array<Real, 9> efforts = {};
 
   /// Whether the joint has a limit, a motor, friction or damping.
   bool has_bounded_rows() const;
@@ -43,8 +44,8 @@ struct Joint {
 
 /// Statistics of joints in a step, for StepReport.
 struct JointTally {
-  uint64_t unsolved = 0;  ///< systems that could not be factored, or failed joint projections
-  Real error = 0;         ///< greatest residual of a constraint [m], of angles [rad]
+  uint64_t unsolved = 0;  ///< failed factorizations and projections, motions of limited energy
+  Real error = 0;         ///< greatest residual of a constraint [m]; of angles [rad]
 
   void add(const JointTally& t) {
     unsolved += t.unsolved;
@@ -52,9 +53,9 @@ struct JointTally {
   }
 };
 
-/// Whether the joint's coordinate is an angle without bounds; then Joint::coordinate counts whole turns.
+/// Whether the joint's coordinate is an unbounded angle; Joint::coordinate then counts whole turns.
 bool counts_turns(const Joint& joint);
-/// Motion of a body's centre of mass, or origin if it is not dynamic, at a time.
+/// Motion of a body at a time: that of its centre of mass, or of its origin if it is not dynamic.
 LinkMotion link_motion(const Body* body, Real time);
 /// Frame of a joint on a body, relative to the point whose motion link_motion() returns.
 JointFrame link_frame(const Body* body, const JointFrame& in_body);
@@ -65,13 +66,13 @@ class Articulation final : public JointedBodies {
   /// dynamic body.
   explicit Articulation(std::vector<Joint*> joints);
 
-  std::span<Body* const> bodies() const { return bodies_; }  ///< the dynamic ones, in slot order
+  std::span<Body* const> bodies() const { return bodies_; }  ///< the dynamic bodies, in slot order
   std::span<Joint* const> joints() const { return joints_; }
 
   /// Estimates the highest angular frequency at which links swing under the last forces of their joints
   /// [rad/s].
   Real greatest_frequency() const;
-  /// A motion from t to t + h begins.
+  /// Begins a motion from t to t + h.
   void begin_motion(Real t, Real h);
   /// Adds the joint forces at a time within the motion to `forces` [force, torque] of the links. `motion` is
   /// the state of the links, and `forces` holds all other forces on entry.
@@ -86,7 +87,7 @@ class Articulation final : public JointedBodies {
   /// Evaluates the constraints for the contact solver, at the bodies' current `rigid` states or, if
   /// `at_start`, at those of their interval's start.
   void place(Real time, bool at_start = false);
-  /// Place of a joint as of the last place().
+  /// Place of a joint, as computed by the last place().
   JointPlace joint_place(std::size_t j, Real time, LinkMotion& still_a, LinkMotion& still_b) const {
     return place_of(j, time, motion_, still_a, still_b);
   }
@@ -99,8 +100,8 @@ class Articulation final : public JointedBodies {
   /// Adds constraint impulses of a collision to the loads of the joints.
   void add_impact_impulses(std::span<const Vec6> impulses);
 
-  /// Prepares impulses on links at the end of a sub-step, at this time and the bodies' current poses. The
-  /// system is factored once, when a link is first used.
+  /// Prepares for impulses on links at the end of a sub-step, at this time and the bodies' current poses. The
+  /// system is factored when a link is first used.
   void begin_impulses(Real time);
   Mat6 link_mobility(uint32_t link, const Vec6& push) override;
   void respond(uint32_t link, const Vec6& impulse, std::span<Vec6> velocities) override;
@@ -127,10 +128,10 @@ class Articulation final : public JointedBodies {
 
   std::vector<Joint*> joints_;
   std::vector<Body*> bodies_;
-  std::vector<JointFrame> frames_a_, frames_b_;  // from the links' centres
-  std::vector<Driven> driven_a_, driven_b_;      // in this motion
+  std::vector<JointFrame> frames_a_, frames_b_;  // relative to the links' centres
+  std::vector<Driven> driven_a_, driven_b_;      // driven links in this motion
   bool has_bounded_rows_ = false, has_kinematic_ = false;
-  std::vector<Momenta> settled_;  // of the bodies, as settle() left them
+  std::vector<Momenta> settled_;  // momenta of the bodies after settle()
   JointSystem system_;
 
   std::vector<JointRows> rows_;
@@ -154,11 +155,12 @@ class Articulation final : public JointedBodies {
   void find_response(uint32_t link, const Vec6& impulse);
   Mat6 free_mobility(uint32_t link);
   Eigen::VectorXd stop_impulses() const;
-  std::vector<Stop> stops_;  // since begin_impulses()
+  std::vector<Stop> stops_;  // computed since begin_impulses()
   std::mutex responding_;
-  std::vector<std::optional<Mat6>> link_mobility_;  // since begin_impulses(), of the links asked for
+  // Computed since begin_impulses(), for the links that were used.
+  std::vector<std::optional<Mat6>> link_mobility_;
   Real response_time_ = 0;
-  bool is_placed_ = false;  // since begin_impulses()
+  bool is_placed_ = false;  // whether place() was called since begin_impulses()
   std::vector<Vec6> response_;
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Joints between two bodies, or a body and the world (physics A1, A6).
+/// Joints between two bodies, or between a body and the world (physics A1, A6).
 
 #include <cstdint>
 #include <limits>
@@ -18,27 +18,28 @@ struct JointTag {};
 using JointHandle = Handle<JointTag>;
 
 enum class JointType : uint8_t {
-  spherical,  ///< the anchors stay together
-  fixed,      ///< both bodies move as one
-  revolute,   ///< turns about the axis
-  prismatic,  ///< slides along the axis, without turning
-  universal,  ///< turns about the axis, fixed in a, and about the second one, fixed in b
-  distance,   ///< the anchors keep their distance, as a massless rod does; with limits or a motor the length
-              ///< may change, as that of a rope or a winch
+  spherical,  ///< keeps the anchors together
+  fixed,      ///< connects both bodies rigidly
+  revolute,   ///< allows rotation about the axis
+  prismatic,  ///< allows displacement along the axis, without rotation
+  universal,  ///< allows rotation about the axis, fixed in a, and about the second axis, fixed in b
+  /// Keeps the distance of the anchors, as a massless rod does; with limits or a motor the length may change,
+  /// as that of a rope or a winch.
+  distance,
 };
 
 /// Motor that drives the free coordinate of a joint: the angle of a revolute joint [rad], the displacement of
 /// a prismatic joint [m], or the length change of a rod [m]. Each is 0 when the joint is created.
 struct Motor {
   enum class Mode : uint8_t { none, speed, position };
-  /// A target at a time. It is constant before the first key and after the last one.
+  /// A target at a time. The target is constant before the first key and after the last one.
   struct Key {
     Real time = 0;                                          ///< [s]
     Real target = 0;                                        ///< [rad/s] or [m/s], or [rad] or [m]
     Interpolation interpolation = Interpolation::monotone;  ///< to the next key
   };
   Mode mode = Mode::none;
-  std::vector<Key> targets = {};  ///< strictly increasing times; none: 0
+  std::vector<Key> targets = {};  ///< strictly increasing times; empty: the target is 0
   bool smooth = false;            ///< interpolates by a cubic whose rate is zero at every key
   Real max_effort = std::numeric_limits<Real>::infinity();  ///< [N m] or [N]
   /// For a position target: effort = stiffness (target - position) - damping speed. With stiffness 0 the
@@ -57,8 +58,8 @@ struct JointDef {
   JointType type = JointType::spherical;
   BodyHandle a = {}, b = {};     ///< b may be null: the world
   Vec3 anchor = Vec3::Zero();    ///< common point of both bodies [m]
-  Vec3 anchor_b = Vec3::Zero();  ///< of a rod: its other end, on b [m]
-  Vec3 axis = Vec3::UnitZ();     ///< axis of rotation or sliding; of a spherical joint, the axis of its twist
+  Vec3 anchor_b = Vec3::Zero();  ///< other end of a rod, on b [m]
+  Vec3 axis = Vec3::UnitZ();  ///< axis of rotation or sliding; for a spherical joint, the axis of its twist
   Vec3 second_axis = Vec3::UnitX();  ///< second axis of a universal joint; not parallel to `axis`
   /// Limits of the free coordinate of a relative to b: the angle of a revolute joint, the displacement of a
   /// prismatic joint, the length change of a rod (a rope has lower = minus infinity), the twist of a
@@ -66,13 +67,13 @@ struct JointDef {
   Real lower = -kFree, upper = kFree;
   Real swing = kFree;  ///< greatest tilt of a spherical joint's axis, or angle of a universal joint about its
                        ///< second axis [rad]
-  Real friction =
-      0;  ///< dry friction: greatest torque or force against motion in each free direction [N m] or [N]
-  Real damping = 0;        ///< viscous, in each free direction [N m s] or [N s/m]
-  Motor motor = {};        ///< of revolute, prismatic and distance joints
-  Real max_force = kFree;  ///< breaks beyond [N]
-  Real max_torque =
-      kFree;  ///< breaks beyond this torque of constraints, limits, motor and friction together [N m]
+  /// Dry friction: greatest torque or force against motion in each free direction [N m] or [N].
+  Real friction = 0;
+  Real damping = 0;        ///< viscous damping, in each free direction [N m s] or [N s/m]
+  Motor motor = {};        ///< for revolute, prismatic and distance joints
+  Real max_force = kFree;  ///< the joint breaks at a larger force [N]
+  /// The joint breaks at a larger torque of constraints, limits, motor and friction together [N m].
+  Real max_torque = kFree;
   bool collide = false;  ///< whether the two bodies also collide with each other
 
   bool has_limits() const { return lower > -kFree || upper < kFree; }
@@ -86,12 +87,12 @@ struct JointDef {
 /// State of a joint.
 struct JointState {
   Vec3 anchor_a = Vec3::Zero(), anchor_b = Vec3::Zero();  ///< world [m]
-  Vec3 axis = Vec3::UnitZ();                              ///< world, with b
+  Vec3 axis = Vec3::UnitZ();                              ///< world, fixed in b
   /// Load on a at its anchor: the mean over the last sub-step, impacts included [N], [N m].
   Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
-  Real coordinate = 0;  ///< of the free one; 0 for joints that have none
-  Real speed = 0;       ///< of the free one
-  Real error = 0;       ///< unwanted distance of the anchors [m]
+  Real coordinate = 0;  ///< the free coordinate; 0 for joints without one
+  Real speed = 0;       ///< rate of the free coordinate
+  Real error = 0;       ///< distance by which the anchors violate the joint [m]
   bool broken = false;
 };
 

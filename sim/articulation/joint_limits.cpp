@@ -8,16 +8,17 @@ namespace offstage::sim {
 namespace {
 
 constexpr Real kInfinite = std::numeric_limits<Real>::infinity();
-/// Of what a limit is exceeded by, the share that a step takes back, and the fastest that it does [rad/s],
+/// Share of the violation of a limit that a step removes, and the greatest speed of the removal [rad/s],
 /// [m/s].
 constexpr Real kPushOut = 0.2, kFastestPush = 2;
-/// Limits nearer than this have a row, and those that are reached take part in collisions [rad], [m].
+/// A limit within kNear of the coordinate has a row; limits within kReached take part in collisions [rad],
+/// [m].
 constexpr Real kNear = 0.02, kReached = 1e-4;
 
 /// Slots of Joint::efforts.
 enum Slot : std::size_t { kLimit = 0, kSwing = 1, kMotor = 2, kFriction = 3, kDamping = 6 };
 
-/// One joint's rows.
+/// Makes the rows of one joint.
 class RowMaker {
  public:
   RowMaker(const Articulation& articulation, std::size_t j, Real duration, Real time)
@@ -51,7 +52,7 @@ class RowMaker {
   }
 
  private:
-  /// The free coordinate with its whole turns.
+  /// The free coordinate including whole turns.
   JointRow free() const {
     JointRow row = free_row(def_.type, place_, joint_.length);
     if (!counts_turns(joint_)) return row;
@@ -79,7 +80,8 @@ class RowMaker {
            row.on_b.head<3>().dot(place_.b.velocity) + row.on_b.tail<3>().dot(place_.b.angular_velocity);
   }
 
-  /// The coordinate at the interval's start, without what is sought: by the mean of the speeds at both ends.
+  /// The coordinate at the interval's start, by the mean of the speeds at both ends, without the effect of
+  /// the rows.
   Real at_start(const JointRow& row) const {
     Real sum = speed(row);
     const auto add_end = [&](const Body* body, const LinkMotion& motion, const Vec6& on) {
@@ -101,7 +103,7 @@ class RowMaker {
     add(row, slot, is_stop);
   }
 
-  /// Both sides; of a range without width it is held.
+  /// Adds a row for the nearer of both limits. If they are equal, the coordinate is held.
   void add_range(const JointRow& row, std::size_t slot, Real lower, Real upper) {
     const Real u = speed(row), start = at_start(row);
     const Real reach = kNear + 2 * h_ * std::abs(u);
@@ -135,7 +137,7 @@ class RowMaker {
     if (motor.stiffness == 0) {
       r.target = missing / h_;
     } else {
-      // effort = k (missing - h u) - c u, by the speed at the end.
+      // effort = k (missing - h u) - c u, with the speed u at the end.
       const Real resistance = motor.stiffness * h_ + motor.damping;
       r.softness = 1 / (h_ * resistance);
       r.target = motor.stiffness * missing / resistance;
@@ -143,7 +145,7 @@ class RowMaker {
     add_guessed(r, kMotor, true);
   }
 
-  /// Of all free directions.
+  /// Friction and damping of all free directions.
   void add_resistance() {
     std::vector<JointRow> free_directions;
     switch (def_.type) {

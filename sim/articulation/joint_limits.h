@@ -8,10 +8,10 @@
 
 namespace offstage::sim {
 
-/// Where the row of a joint with bounds comes from.
+/// Origin of a row with bounds.
 struct BoundedOrigin {
   Joint* joint;
-  std::size_t slot;  ///< in Joint::efforts
+  std::size_t slot;  ///< index in Joint::efforts
   Vec3 arm;          ///< from the centre of the joint's body a to the anchor, world [m]
   /// The row limits the coordinate at the interval's end, not the velocity during the interval.
   bool is_stop;

@@ -9,7 +9,7 @@
 
 namespace offstage::sim {
 
-/// Index in place of a body that no impulse moves.
+/// Index used for a body that impulses do not move.
 constexpr uint32_t kUnmoved = UINT32_MAX;
 
 /// J (v+ - v) = 0: the velocities on entry already satisfy the constraint.
@@ -18,22 +18,22 @@ struct JointConstraint {
   const JointRows* rows;
 };
 
-/// u = on_a . v_a + on_b . v_b + offset becomes `target` - softness p, if p is within the bounds; else p is
-/// the bound in that direction.
+/// u = on_a . v_a + on_b . v_b + offset becomes `target` - softness p if p is within its bounds; otherwise p
+/// is at the bound in that direction.
 struct BoundedRow {
   uint32_t a = kUnmoved, b = kUnmoved;
   Vec6 on_a = Vec6::Zero(), on_b = Vec6::Zero();
   Real offset = 0;            ///< contribution of driven links [m/s] or [rad/s]
   Real target = 0;            ///< [m/s] or [rad/s]
   Real softness = 0;          ///< [1/kg] or [1/(kg m^2)], >= 0
-  Real lower = 0, upper = 0;  ///< of the impulse [N s] or [N m s]
+  Real lower = 0, upper = 0;  ///< bounds of the impulse [N s] or [N m s]
   Real impulse = 0;           ///< in: a guess; out: the solution
 };
 
 struct JointProblem {
   std::span<const JointConstraint> constraints;
   std::span<BoundedRow> bounded;
-  std::span<Vec6> impulses;  ///< of the constraints, by their rows; in: a guess; out: the solution
+  std::span<Vec6> impulses;  ///< impulses of the constraints, by their rows; in: a guess; out: the solution
 
   bool empty() const { return constraints.empty() && bounded.empty(); }
 };

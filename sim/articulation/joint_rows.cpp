@@ -12,9 +12,9 @@ Vec6 concatenate(const Vec3& linear, const Vec3& angular) {
   return v;
 }
 
-/// t . (anchor a - anchor b) = 0, where t goes with b. With s from b's centre to a's anchor,
-///   dC/dt = t . s',  s' = v_a(anchor) - v_b - w_b x s   (as b sees it),
-///   d2C/dt2 has besides the accelerations t . (w_a x (w_a x r_a) - w_b x (w_b x s) - 2 w_b x s').
+/// t . (anchor a - anchor b) = 0, where t is fixed in b. With s from b's centre to a's anchor,
+///   dC/dt = t . s',  s' = v_a(anchor) - v_b - w_b x s   (as seen from b).
+/// Besides the accelerations, d2C/dt2 contains t . (w_a x (w_a x r_a) - w_b x (w_b x s) - 2 w_b x s').
 JointRow slide_row(const JointPlace& p, const Vec3& t) {
   const Vec3 s = p.arm_b + p.apart;
   const Vec3 &wa = p.a.angular_velocity, &wb = p.b.angular_velocity;
@@ -23,8 +23,8 @@ JointRow slide_row(const JointPlace& p, const Vec3& t) {
           t.dot(wa.cross(turning) - wb.cross(wb.cross(s)) - 2 * wb.cross(seen))};
 }
 
-/// Both anchors at the same place, along the world's axes: d2C/dt2 has besides the accelerations
-/// w_a x (w_a x r_a) - w_b x (w_b x r_b).
+/// Both anchors coincide, along the world's axes. Besides the accelerations, d2C/dt2 contains w_a x (w_a x
+/// r_a) - w_b x (w_b x r_b).
 void add_meeting_rows(const JointPlace& p, JointRows& rows) {
   const auto cross_matrix = [](const Vec3& r) {
     Mat3 m;
@@ -41,7 +41,7 @@ void add_meeting_rows(const JointPlace& p, JointRows& rows) {
   rows.count = 3;
 }
 
-/// u . v = 0, where u goes with a and v with b.
+/// u . v = 0, where u is fixed in a and v in b.
 JointRow perpendicular_row(const JointPlace& p, const Vec3& u, const Vec3& v) {
   const Vec3 n = u.cross(v), &wa = p.a.angular_velocity, &wb = p.b.angular_velocity;
   const Vec3 n_rate = wa.cross(u).cross(v) + u.cross(wb.cross(v));
@@ -137,7 +137,7 @@ JointRow free_row(JointType type, const JointPlace& p, Real length) {
     row = turning_row(za);
     row.error = angle_of(-ya.dot(xb), xa.dot(xb));
   } else {
-    // After the shortest turn of one axis onto the other. Undefined where they are opposite.
+    // Angle after the smallest rotation of one axis onto the other. It is undefined if they are opposite.
     const Real both = std::max(1 + za.dot(zb), 0.05);
     row = turning_row((za + zb) / both);
     const Mat3 between = p.axes_b.transpose() * p.axes_a;
@@ -163,14 +163,14 @@ JointRow swing_row(JointType type, const JointPlace& p) {
 Real angle_of(Real y, Real x) {
   const Real r = std::sqrt(x * x + y * y);
   if (r == 0) return 0;
-  // Half the angle, so that it is within a right angle, and then twice half of that.
+  // First half the angle, which is within a right angle, then two more halvings.
   Real t = x >= 0 ? y / (r + x) : (y < 0 ? -1 : 1) * ((r - x) / std::max(std::abs(y), 1e-300));
   if (x < 0 && y == 0) return std::numbers::pi;
   const bool steep = std::abs(t) > 1;
   if (steep) t = 1 / t;
   t /= 1 + std::sqrt(1 + t * t);
   t /= 1 + std::sqrt(1 + t * t);
-  // atan of at most tan(pi / 16).
+  // Series of atan for an argument of at most tan(pi / 16).
   const Real s = t * t;
   Real sum = 0;
   for (int k = 23; k > 0; k -= 2) sum = 1.0 / k - s * sum;

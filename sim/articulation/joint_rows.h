@@ -10,7 +10,7 @@
 
 namespace offstage::sim {
 
-/// Motion of a link at a time: of its centre of mass, or of its origin if it is driven.
+/// Motion of a link at a time: of its centre of mass, or of its origin if it is kinematic.
 struct LinkMotion {
   Vec3 position = Vec3::Zero();
   Mat3 axes = Mat3::Identity();  ///< world from body
@@ -36,17 +36,17 @@ struct JointFrame {
   Mat3 axes = Mat3::Identity();
 };
 
-/// Both ends of a joint at a moment.
+/// Both ends of a joint at a time.
 struct JointPlace {
   JointPlace(const LinkMotion& a, const JointFrame& on_a, const LinkMotion& b, const JointFrame& on_b);
 
   const LinkMotion &a, &b;
   Vec3 arm_a, arm_b;    ///< from the links' centres to the anchors, world
-  Vec3 apart;           ///< from the anchor on b to that on a
+  Vec3 apart;           ///< vector from the anchor on b to that on a
   Mat3 axes_a, axes_b;  ///< world
 };
 
-/// One constraint, or one free direction: J = [on_a, on_b].
+/// One constraint or one free direction: J = [on_a, on_b].
 struct JointRow {
   Vec6 on_a, on_b;
   Real error = 0, bias = 0;
@@ -55,7 +55,7 @@ struct JointRow {
 /// The constraints of a joint, up to six. Rows beyond `count` are zero.
 struct JointRows {
   uint32_t count = 0;
-  Mat6 on_a = Mat6::Zero(), on_b = Mat6::Zero();  ///< J^T: a column for each
+  Mat6 on_a = Mat6::Zero(), on_b = Mat6::Zero();  ///< J^T: a column for each constraint
   Vec6 error = Vec6::Zero(), bias = Vec6::Zero();
 
   void add(const JointRow& row);
@@ -63,7 +63,7 @@ struct JointRows {
 
 /// Number of constraints. A distance joint has one only if it is a rod.
 uint32_t constraint_count(const JointDef& def);
-/// `length` of a rod.
+/// Computes the rows of a joint; `length` is that of a rod.
 void set_joint_rows(const JointDef& def, const JointPlace& place, Real length, JointRows& rows);
 
 /// Row of the free coordinate of a revolute, prismatic or distance joint, the first angle of a universal

@@ -5,14 +5,16 @@
 namespace offstage::sim {
 namespace {
 
-/// Links of more joints than this get rows of their own.
+/// Links with more joints than this get rows of their own.
 constexpr uint32_t kFewJoints = 3;
-/// Of the diagonal, where the matrix is not plain; then more each time that it is not enough. At the stages
-/// of an integrator, where loops do not quite close, constraints that depend on each other disagree by about
-/// the square of that: the part must be above it, or they would fight.
+/// Share of the diagonal that is added if the matrix is not plain; kMore times that if it is not enough. At
+/// the stages of an integrator loops are not closed exactly, and dependent constraints contradict each other
+/// by about the square of the gap. The added share must be larger than this, or their impulses would grow
+/// against each other.
 constexpr Real kRegularization = 1e-6, kMore = 100;
 constexpr int kAttempts = 3, kRefinements = 8;
-/// Refinement ends at this share of what was asked.
+/// Refinement ends at a residual of kExact times the requested change; a step is at most kLongest times the
+/// preconditioner's.
 constexpr Real kExact = 1e-12, kLongest = 2;
 
 }  // namespace
@@ -24,7 +26,7 @@ JointSystem::JointSystem(uint32_t links, std::vector<Topology> joints) : joints_
       if (link != kDriven) ++degree[link];
   const auto grounded = static_cast<uint32_t>(std::count_if(
       joints_.begin(), joints_.end(), [](const Topology& j) { return j.a == kDriven || j.b == kDriven; }));
-  // All that is driven counts as one node, if there is any.
+  // All driven bodies together count as one node, if there are any.
   has_loops_ = joints_.size() > links - (grounded == 0 ? 1u : 0u);
   hub_row_.assign(links, kDriven);
   for (uint32_t link = 0; link < links; ++link)
@@ -164,7 +166,8 @@ void JointSystem::apply(std::span<const Vec6> impulses, std::span<Vec6> velociti
   }
 }
 
-/// Conjugate gradients with the factor as preconditioner, whose eigenvalues are 1 but for what was added.
+/// Conjugate gradients with the factor as preconditioner. The eigenvalues are 1, except for the effect of the
+/// added diagonal.
 void JointSystem::refine(std::span<const Vec6> change, std::span<Vec6> impulses) {
   const auto dot = [](std::span<const Vec6> a, std::span<const Vec6> b) {
     Real sum = 0;
@@ -190,8 +193,9 @@ void JointSystem::refine(std::span<const Vec6> change, std::span<Vec6> impulses)
     before = now;
     multiply(p, q);
     const Real curvature = dot(p, q);
-    // What the constraints can hardly do is left, rather than blown up: rows that depend on each other and
-    // disagree, as of a straight chain held at both ends.
+    // Directions in which the constraints have hardly any effect are skipped, because their impulses would
+    // grow without limit. They arise from dependent rows that contradict each other, as in a straight chain
+    // held at both ends.
     const Real length = now / curvature;
     if (!(curvature > 0) || length > kLongest) return;
     for (std::size_t j = 0; j < p.size(); ++j) {

@@ -1,9 +1,9 @@
 #pragma once
-/// The linear system of an articulation's joints (physics A1): with M the masses of its links and J its
-/// constraints, A = J M^-1 J^T has a block row for each joint and couples those that share a link. Links of
-/// many joints, which would couple all of them with each other, stay in the system as rows of their own, so
-/// that any tree costs O(n). Where joints form loops, rows may be linearly dependent. A small part of the
-/// diagonal is then added, and conjugate gradients remove the error that this causes.
+/// The linear system of an articulation's joints (physics A1). With M the masses of its links and J its
+/// constraints, A = J M^-1 J^T has a block row for each joint and couples joints that share a link. A link
+/// with many joints would couple all of them; it gets a row of its own instead, so that any tree costs O(n).
+/// If joints form loops, rows may be linearly dependent. A small share of the diagonal is then added, and
+/// conjugate gradients remove the error that this causes.
 
 #include <array>
 #include <cstdint>
@@ -17,10 +17,10 @@ namespace offstage::sim {
 
 class JointSystem {
  public:
-  static constexpr uint32_t kDriven = UINT32_MAX;  ///< index in place of a link that forces do not move
+  static constexpr uint32_t kDriven = UINT32_MAX;  ///< index used for a link that forces do not move
   struct Topology {
     uint32_t a, b;  ///< links, or kDriven
-    uint32_t rows;  ///< constraints
+    uint32_t rows;  ///< number of constraints
   };
 
   /// The joints must connect all links.
@@ -34,7 +34,7 @@ class JointSystem {
   /// must then be iterated.
   void update(std::span<const JointRows> rows) { rows_ = rows; }
 
-  /// J v of the joints. Driven links count as motionless.
+  /// Computes J v for all joints. Driven links count as motionless.
   void relative(std::span<const Vec6> velocities, std::span<Vec6> result) const;
   /// Computes the impulses p that change J v by `change` and applies them: velocities += M^-1 J^T p. Does
   /// nothing if factorize() failed.
@@ -46,7 +46,7 @@ class JointSystem {
   bool has_loops() const { return has_loops_; }
 
  private:
-  /// The matrix with blocks of one size.
+  /// The matrix with blocks of N x N.
   template <int N>
   struct Matrix {
     std::vector<Eigen::Matrix<Real, N, N>> diagonal, off;
@@ -73,7 +73,7 @@ class JointSystem {
   bool is_hub(uint32_t link) const { return hub_row_[link] != kDriven; }
 
   std::vector<Topology> joints_;
-  std::vector<uint32_t> hub_row_;  // by link; kDriven: it has none
+  std::vector<uint32_t> hub_row_;  // by link; kDriven: no row of its own
   std::vector<uint32_t> hubs_;
   std::vector<BlockRowKind> kinds_;
   std::vector<std::pair<uint32_t, uint32_t>> pairs_;
@@ -83,7 +83,7 @@ class JointSystem {
   std::span<const JointRows> rows_;
   std::vector<LinkMobility> links_;
   std::vector<Mat6> response_a_, response_b_;  // M^-1 J^T of each joint
-  Matrix<3> small_;                            // where no joint has more than three constraints
+  Matrix<3> small_;                            // used if no joint has more than three constraints
   Matrix<6> large_;
   std::vector<Vec6> residual_, part_, direction_, product_, given_;
 };

@@ -36,7 +36,7 @@ void fit(BoundingSphere& sphere, std::span<const Vec3> points, bool) {
   sphere = fit_sphere(points);
 }
 
-/// Boxes of branches hold their children's, from the leaves up.
+/// Fits each branch to its children, from the leaves up.
 template <class ItemBox>
 void fit_boxes(AabbTree& tree, std::span<AabbTree::Node> nodes, ItemBox&& item_box) {
   for (auto node = nodes.rbegin(); node != nodes.rend(); ++node) {
@@ -49,7 +49,8 @@ void fit_boxes(AabbTree& tree, std::span<AabbTree::Node> nodes, ItemBox&& item_b
   }
 }
 
-/// Oriented boxes and spheres hold all the points beneath, which is tighter than holding their children.
+/// Oriented boxes and spheres enclose all points of the subtree, which is tighter than enclosing the
+/// children.
 template <class Tree>
 void fit_points(Tree& tree, std::span<typename Tree::Node> nodes, const TriangleMesh& mesh, bool fresh) {
   std::vector<Vec3> points;

@@ -1,6 +1,7 @@
 #pragma once
 /// Binary trees of bounding volumes over the triangles of a mesh or, with axis-aligned boxes, over any items
-/// that have one (physics H1-H3). All volumes are in the frame of the mesh; queries transform the root only.
+/// that have a box (physics H1-H3). All volumes are in the frame of the mesh; queries transform only the
+/// root.
 
 #include <algorithm>
 #include <concepts>
@@ -25,7 +26,7 @@ class BoundingTree {
   struct Node {
     Volume volume;
     uint32_t size;          ///< nodes in the subtree, itself included
-    uint32_t first, count;  ///< the items beneath, as a range of items()
+    uint32_t first, count;  ///< range of items() in the subtree
 
     bool is_leaf() const { return size == 1; }
   };
@@ -47,7 +48,7 @@ class BoundingTree {
   const Node& first_child(const Node& branch) const { return *(&branch + 1); }
   const Node& second_child(const Node& branch) const { return *(&branch + 1 + first_child(branch).size); }
 
-  /// Volume of all items; an empty box, or a point at the origin, if there are none.
+  /// Returns the volume of all items; an empty box, or a point at the origin, if there are none.
   Volume bounds() const { return nodes_.empty() ? Volume() : nodes_.front().volume; }
   /// Upper bound of the distance of all items from the frame's origin [m].
   Real reach() const;
@@ -58,8 +59,8 @@ class BoundingTree {
     if (!nodes_.empty()) visit_below(nodes_.front(), 0, visit);
   }
 
-  /// Calls visit(item) for every item in a leaf whose box meets `query`, in an order that depends on the tree
-  /// alone.
+  /// Calls visit(item) for every item in a leaf whose box meets `query`, in an order that depends only on the
+  /// tree.
   template <class Visit>
   requires std::same_as<Volume, Aabb>
   void overlapping(const Aabb& query, Visit&& visit) const {
@@ -76,7 +77,7 @@ class BoundingTree {
   }
 
   /// Branch and bound: calls distance2(item), the squared distance of an item to p, for every item that can
-  /// be nearer than the least value seen so far, starting from `limit2`. Nearer boxes first.
+  /// be nearer than the smallest value so far, starting from `limit2`. Nearer boxes are visited first.
   template <class Distance2>
   requires std::same_as<Volume, Aabb>
   void nearest(const Vec3& p, Distance2&& distance2,

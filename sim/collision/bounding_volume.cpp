@@ -16,8 +16,8 @@ namespace {
 constexpr int kDirections = kSmallHullPoints / 2;
 using Heights = Eigen::Array<Real, kDirections, 1>;
 
-/// Axes spread about evenly: through the vertices of an icosahedron, and of the dodecahedron dual to it those
-/// that are not a cube's as well.
+/// Axes with an even distribution: through the vertices of an icosahedron, and through those vertices of its
+/// dual dodecahedron that are not the vertices of a cube.
 Eigen::Array<Real, kDirections, 3> even_directions() {
   constexpr Real kGolden = std::numbers::phi;
   Eigen::Matrix<Real, kDirections, 3> d;
@@ -33,7 +33,7 @@ Eigen::Array<Real, kDirections, 3> even_directions() {
   return d.rowwise().normalized();
 }
 
-/// The points themselves if they are few, else those that are extreme in 24 directions.
+/// Returns the points themselves if they are few, otherwise those that are extreme in 24 directions.
 std::span<const Vec3> extreme_points(std::span<const Vec3> points, std::array<Vec3, kSmallHullPoints>& kept) {
   static const Eigen::Array<Real, kDirections, 3> directions = even_directions();
   if (points.size() <= kept.size()) return points;
@@ -57,7 +57,8 @@ std::span<const Vec3> extreme_points(std::span<const Vec3> points, std::array<Ve
   return kept;
 }
 
-/// Along the longest edge and the normal of a triangle: its smallest box, of twice its area.
+/// Axes along the longest edge and the normal of a triangle: those of its smallest box, which has twice its
+/// area.
 Mat3 triangle_axes(const Vec3& p, const Vec3& q, const Vec3& r) {
   const std::array<Vec3, 3> edges = {q - p, r - q, p - r};
   const Vec3 longest = *std::max_element(edges.begin(), edges.end(), [](const Vec3& a, const Vec3& b) {
@@ -112,7 +113,8 @@ BoundingSphere fit_sphere(std::span<const Vec3> points) {
   for (const Vec3& p : points) {
     const Real d2 = (p - s.centre).squaredNorm();
     if (d2 <= s.radius * s.radius) continue;
-    // The new diameter runs from p to the far side: r' = (r + d)/2, and the centre is r' from p.
+    // The new diameter extends from p to the far side: r' = (r + d)/2, and the centre is at the distance r'
+    // from p.
     const Real d = std::sqrt(d2), radius = (s.radius + d) / 2;
     s = {(radius * s.centre + (d - radius) * p) / d, radius};
   }

@@ -1,6 +1,6 @@
 #pragma once
-/// The volumes of bounding trees (physics H1-H3), axis-aligned box, oriented box and sphere, and how they are
-/// fitted to points. Whether two of them overlap: volume_pair.h.
+/// The volumes of bounding trees (physics H1-H3): axis-aligned box, oriented box and sphere, and how they are
+/// fitted to points. volume_pair.h has the overlap tests.
 
 #include <span>
 
@@ -20,16 +20,17 @@ struct BoundingSphere {
 };
 
 /// Box along the eigenvectors of the area-weighted covariance of the triangles of the points' convex hull, so
-/// that points inside do not tilt it. The hull is that of the points that are extreme in 24 directions: exact
-/// for up to 24 points. Flat sets have one axis at right angles to their plane, straight ones one along their
-/// line. Three points have the box along their longest side, for it is the smallest. At least one point.
+/// that inner points do not tilt it. The hull is that of the points that are extreme in 24 directions, so it
+/// is exact for up to 24 points. For flat sets one axis is perpendicular to their plane; for straight ones
+/// one axis is along their line. For three points the box is along their longest side, because it is the
+/// smallest. Needs at least one point.
 Obb fit_obb(std::span<const Vec3> points);
-/// Smallest box along given axes.
+/// Smallest box along the given axes.
 Obb fit_obb(std::span<const Vec3> points, const Mat3& axes);
 
-/// After Ritter, "An efficient bounding sphere" (1990): the two farthest of the six points that are extreme
-/// along the axes give a first diameter, and each point outside grows the sphere just enough to hold it. Its
-/// centre is kept and the radius reduced to the farthest point. At least one point.
+/// After Ritter, "An efficient bounding sphere" (1990). The two farthest of the six points that are extreme
+/// along the axes give a first diameter, and each point outside enlarges the sphere as little as possible. At
+/// the end the radius is reduced to the distance of the farthest point. Needs at least one point.
 BoundingSphere fit_sphere(std::span<const Vec3> points);
 
 }  // namespace offstage::sim

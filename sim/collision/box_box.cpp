@@ -11,10 +11,11 @@
 namespace offstage::sim {
 namespace {
 
-/// Sine: edges less inclined span no axis of their own; leaving it out is wrong by as much of their length.
+/// Sine of the angle below which two edges have no axis of their own. The error of omitting it is this share
+/// of their length.
 constexpr Real kNoAxis = 1e-10;
-/// Of the sizes: how far rounding may put the crossing of two edges, or the gap along their common
-/// perpendicular.
+/// Greatest rounding error of the crossing of two edges, or of the gap along their common perpendicular, as a
+/// share of the sizes.
 constexpr Real kCrossingRounding = 1e-12;
 
 /// One box in the frame of the other.
@@ -26,10 +27,11 @@ struct Placed {
 
 // Axes
 
-/// By how much the boxes are apart along each axis; negative where they overlap.
+/// Gap between the boxes along each axis; negative where they overlap.
 struct Gaps {
-  Lanes a, b;                     ///< along the axes of either
-  std::array<Lanes, 3> products;  ///< of A's axes with each of B's; times the sine of the angle between them
+  Lanes a, b;  ///< along the axes of A and of B
+  /// Along the products of A's axes with each of B's, times the sine of the angle between them.
+  std::array<Lanes, 3> products;
 
   Gaps(const Vec3& half_a, const Vec3& half_b, const Placed& at) {
     const LaneColumns r = columns(at.rotation), s = lane_abs(r);
@@ -55,21 +57,22 @@ int largest(Lanes x) {
   return x[2] > x[best] ? 2 : best;
 }
 
-/// Where the boxes are farthest apart: an edge of each, or a face if `edges` is false.
+/// Axis of the largest gap: the product of two edges, or the normal of a face if `edges` is false.
 struct Axis {
   Real gap;
   bool edges;
   int a, b;
 };
 
-/// The product of two axes if the gap along it, made of unit length, is larger than any so far: by more than
-/// rounding than a face's, for an edge that lies on a face spans the face's normal with every edge of it.
+/// Takes the product of two axes if the normalised gap along it is the largest so far. It must exceed the gap
+/// of a face by more than rounding, because an edge that lies on a face spans the normal of the face with
+/// every edge of it.
 void try_products(const Gaps& gaps, const Mat3& rotation, Real rounding, Axis& best) {
   Real least = best.gap + rounding;
   for (int b = 0; b < 3; ++b)
     for (int a = 0; a < 3; ++a) {
       const Real scaled = gaps.products[static_cast<std::size_t>(b)][a];
-      if (scaled <= 0 && scaled <= least) continue;  // it only gets deeper
+      if (scaled <= 0 && scaled <= least) continue;  // normalising it only makes it more negative
       const Real next = rotation((a + 1) % 3, b), last = rotation((a + 2) % 3, b);
       const Real sine = std::sqrt(next * next + last * last);
       if (!(sine > kNoAxis && scaled > least * sine)) continue;
@@ -78,7 +81,8 @@ void try_products(const Gaps& gaps, const Mat3& rotation, Real rounding, Axis& b
     }
 }
 
-/// Where the boxes are closest if it is where two edges cross; none if it is not, or rounding may hide it.
+/// Returns the closest points if they are where two edges cross; none if they are not, or if rounding may
+/// hide it.
 std::optional<Separation> edge_separation(const Convex& a, const Convex& b, const Placed& at,
                                           const Axis& axis, Real rounding) {
   const Vec3 u = Vec3::Unit(axis.a), w = at.rotation.col(axis.b), cross = u.cross(w);
@@ -87,14 +91,14 @@ std::optional<Separation> edge_separation(const Convex& a, const Convex& b, cons
   Separation s;
   s.normal = (cross.dot(at.translation) > 0 ? -1 : 1) / sine * cross;
   const Vec3 in_b = at.rotation.transpose() * s.normal;
-  Vec3 p, q;  // the middles of the edges
+  Vec3 p, q;  // midpoints of the edges
   for (int k = 0; k < 3; ++k) {
     p[k] = k == axis.a ? 0 : std::copysign(a.half[k], -s.normal[k]);
     q[k] = k == axis.b ? 0 : std::copysign(b.half[k], in_b[k]);
   }
   const Vec3 between = p - (at.rotation * q + at.translation);
   s.distance = s.normal.dot(between);
-  // The difference of the points of the edges is along the normal.
+  // The vector between the closest points of the edges is along the normal.
   const Vec3 across_a = s.normal.cross(u), across_b = s.normal.cross(w);
   const Real along_a = -across_b.dot(between) / across_b.dot(u),
              along_b = across_a.dot(between) / across_a.dot(w);
@@ -108,22 +112,22 @@ std::optional<Separation> edge_separation(const Convex& a, const Convex& b, cons
 
 // Faces
 
-/// A face of a box across axis `axis`, with the corners as Convex::vertex() numbers them.
+/// A face of a box, perpendicular to `axis`. Its corners are numbered as by Convex::vertex().
 struct Face {
   int axis;
   bool positive;
 
   int axis_of(int k) const { return (axis + 1 + k) % 3; }
   Real sign() const { return positive ? 1 : -1; }
-  /// Counter-clockwise from outside.
+  /// Number of a corner; corners are counter-clockwise seen from outside.
   uint32_t tag(uint32_t corner) const {
     const uint32_t at = (positive ? corner : 3 - corner) % 4, right = at == 1 || at == 2, up = at >= 2;
     return uint32_t{positive} << axis | right << axis_of(0) | up << axis_of(1);
   }
 };
 
-/// The face of which most lies within `slack` of the plane that touches the box in direction `d`, as
-/// supporting_feature() has it.
+/// Returns the face with the largest part within `slack` of the plane that touches the box in direction `d`,
+/// as supporting_feature() does.
 Face facing(const Vec3& half, const Vec3& d, Real slack) {
   Vec3 extent = 2 * half;
   for (int k = 0; k < 3; ++k)
@@ -134,8 +138,8 @@ Face facing(const Vec3& half, const Vec3& d, Real slack) {
   return {axis, d[axis] > 0};
 }
 
-/// The face that is least inclined to `d`, and the sine of the angle; kMaxTilt exceeded if it may not give
-/// the contact's normal (see tilt() of manifold.cpp).
+/// The face that is least inclined to `d`, with the sine of the angle; the sine is 1, more than kMaxTilt, if
+/// this face cannot give the normal of the contact (see tilt() in manifold.cpp).
 struct Tilted {
   Face face;
   Real sine;
@@ -147,10 +151,11 @@ Tilted tilted_face(const Vec3& d, Lanes gaps, Real distance, Real tolerance) {
   return {{axis, d[axis] > 0}, serves ? sine : 1};
 }
 
-/// The reference face and the incident one, clipped against it in the plane.
+/// The incident face, clipped against the sides of the reference face in its plane.
 class FaceContact {
  public:
-  /// `other` is what of the incident box faces the reference face, and `at` where in the reference's frame.
+  /// `other` is the face of the incident box that faces the reference face; `at` is its placement in the
+  /// reference's frame.
   FaceContact(const Vec3& half, const Face& face, const Face& other, const Vec3& other_half, const Placed& at,
               uint32_t body, Real slop)
       : face_(face), other_(other), body_(body) {
@@ -175,26 +180,27 @@ class FaceContact {
   FaceContact(const FaceContact&) = delete;
 
   struct Corner {
-    Vec3 at;  ///< along the reference face's axes, and the height over it
+    Vec3 at;  ///< position along the axes of the reference face, and height over it
     uint32_t id;
-    uint32_t side;  ///< that leaves it: of the incident face, or kReference + of the reference face
+    /// The side that leaves the corner: of the incident face, or kReference + k for the reference face.
+    uint32_t side;
   };
   uint32_t count() const { return count_; }
   int other_axis() const { return other_.axis; }
   const Corner& corner(uint32_t k) const { return corners_[k]; }
-  /// Height of the lowest corner; infinite without any.
+  /// Height of the lowest corner; infinite if there is none.
   Real lowest() const {
     Real least = kInfinity;
     for (uint32_t k = 0; k < count_; ++k) least = std::min(least, corners_[k].at[2]);
     return least;
   }
-  /// The mean of the corners.
+  /// Mean of the corners.
   Vec3 middle() const {
     Vec3 sum = Vec3::Zero();
     for (uint32_t k = 0; k < count_; ++k) sum += corners_[k].at;
     return sum / std::max(1u, count_);
   }
-  /// Whether a corner not higher than this is over the face itself.
+  /// Whether a corner that is not higher than this is over the face itself.
   bool has_corner_over_face(Real height) const {
     for (uint32_t k = 0; k < count_; ++k) {
       const Vec3& p = corners_[k].at;
@@ -208,13 +214,13 @@ class FaceContact {
 
   static uint32_t side_id(const Face& f, uint32_t k) { return edge_id(f.tag(k), f.tag(k + 1)); }
 
-  /// Neighbouring sides of the reference face meet in its vertex.
+  /// Id of a crossing. Neighbouring sides of the reference face meet in its vertex.
   uint32_t crossing(uint32_t side, uint32_t cut, uint32_t cut_id) const {
     if (side < kReference) return crossing_id(1 - body_, side_id(other_, side), cut_id);
     return vertex_id(body_, face_.tag((side - kReference + 1) % 4 == cut ? cut : side - kReference));
   }
 
-  /// Side k of the reference face: sides 0 and 2 bound v, and 1 and 3 bound u; see Face::tag.
+  /// Cuts at side k of the reference face: sides 0 and 2 bound v, sides 1 and 3 bound u; see Face::tag.
   void cut(uint32_t k) {
     const int along = k % 2 == 0 ? 1 : 0;
     const bool low = face_.positive ? k == 0 || k == 3 : k >= 2;
@@ -237,7 +243,7 @@ class FaceContact {
     }
   }
 
-  // A cut adds one corner; if rounding has dented the polygon, as many as there are.
+  // A cut adds one corner or, if rounding has made the polygon concave, at most doubles their number.
   static constexpr uint32_t kMax = 4 << 4;
 
   Face face_, other_;
@@ -246,28 +252,28 @@ class FaceContact {
   Real slop_;
   uint32_t count_ = 4;
   std::array<std::array<Corner, kMax>, 2> buffers_;
-  Corner* corners_ = buffers_[0].data();  ///< in one of both
+  Corner* corners_ = buffers_[0].data();  ///< one of the two buffers
 };
 
-/// The two boxes of a face contact: the reference, whose face gives the normal, and the incident one.
+/// The two boxes of a face contact: the reference box, whose face gives the normal, and the incident box.
 struct FacePair {
   const Convex &reference, &incident;
-  Placed at;  ///< the incident one, in the reference's frame
+  Placed at;  ///< the incident box in the reference's frame
   Face face;
-  uint32_t body;  ///< the reference's name, 0 for A and 1 for B
+  uint32_t body;  ///< name of the reference box: 0 for A, 1 for B
 
   FaceContact contact(Real slack, Real slop) const {
     const Vec3 towards = -face.sign() * at.rotation.row(face.axis).transpose();
     return {reference.half, face, facing(incident.half, towards, slack), incident.half, at, body, slop};
   }
 
-  /// Whether boxes that are apart, `gap` along the reference's face, have it for their distance: if what is
-  /// lowest over the face's plane is over the face.
+  /// Whether separate boxes with a `gap` along the normal of the reference face have this gap as their
+  /// distance. They do if the lowest corner over the plane of the face is over the face.
   ///
-  /// Or almost, of faces at a small angle. Let a point of the incident one be over the face, `depth` from its
-  /// border, and `drop` higher than the lowest there, h. Since boxes are convex, what is x beside the face is
-  /// not lower than h - x drop / depth; so the closest points are about h apart, along a normal that is
-  /// inclined by no more than drop / depth.
+  /// Faces at a small angle may also count. Let a point of the incident box be over the face, `depth` from
+  /// its border, and higher by `drop` than the lowest corner, whose height is h. Boxes are convex, so at x
+  /// beside the face the height is at least h - x drop / depth. The closest points are therefore about h
+  /// apart, along a normal that is inclined by at most drop / depth.
   bool is_distance(Real gap, const FaceContact& contact, Real margin, Real slop, Real rounding) const {
     if (contact.has_corner_over_face(gap + rounding)) return true;
     const Real alike = at.rotation.row(face.axis).transpose().cross(Vec3::Unit(contact.other_axis())).norm();
@@ -280,7 +286,7 @@ struct FacePair {
   }
 };
 
-/// The points of the contact and, if it is deeper, `closest`, the separation's point on the incident box.
+/// Writes the points of the contact and, if it is deeper, `closest`, the closest point on the incident box.
 void fill(Manifold& m, const FacePair& pair, const FaceContact& contact, const Pose& a_from_b, Real margin,
           Real slop, const Separation* closest, Manifold* more) {
   const bool on_a = pair.body == 0;
@@ -332,7 +338,7 @@ bool box_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real m
   const Vec3 along = by_a ? Vec3(Vec3::Unit(face_a)) : Vec3(at.rotation.col(face_b));
   const Vec3 n = edges ? edges->normal : Vec3((along.dot(at.translation) > 0 ? -1 : 1) * along);
 
-  // As in manifold(): of the faces that may give the normal the less inclined one.
+  // As in manifold(): of the faces that may give the normal, the less inclined one is used.
   const Real rounding = kSeparationRounding * size, tolerance = kTilt * margin + rounding,
              slop = kRim * margin + rounding;
   const Tilted of_a = tilted_face(-n, gaps.a, axis.gap, tolerance),

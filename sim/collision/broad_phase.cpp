@@ -9,7 +9,7 @@
 namespace offstage::sim {
 namespace {
 
-// Buckets or objects in one parallel job.
+// Number of buckets or objects in one parallel job.
 constexpr uint32_t kJob = 2048;
 
 uint32_t jobs_of(std::size_t items) {
@@ -30,7 +30,7 @@ void BroadPhase::insert(uint32_t object, const Aabb& box, bool is_static) {
   }
   boxes_[object] = box;
   unsettle(object);
-  // A static object counts as at rest from the start, others are about to move.
+  // A static object counts as at rest from the start; other objects are expected to move.
   states_[object] |= static_cast<uint8_t>(kLive | (is_static ? kStatic : kMoved));
   ++count_;
   count_diameter(object, 1);
@@ -66,7 +66,8 @@ void BroadPhase::count_diameter(uint32_t object, Real sign) {
   bounded_ += sign;
 }
 
-/// Follows the mean diameter, but not its every little change: then all objects need other cells.
+/// Adapts the cell width to the mean diameter, with hysteresis, because a change moves all objects to other
+/// cells.
 void BroadPhase::fit_uniform_width() {
   constexpr Real kTolerance = 1.25;
   if (sizes_.kind != GridKind::uniform || !(bounded_ > 0 && diameters_ > 0)) return;
@@ -95,8 +96,8 @@ std::span<const IndexPair> BroadPhase::pairs() {
   return pairs_;
 }
 
-/// Calls find(job, candidates) for each job in parallel, into places that do not depend on threads, and keeps
-/// the pairs that count.
+/// Calls find(job, candidates) for each job in parallel. The results are stored by job, so they do not depend
+/// on threads. Keeps the pairs that are valid.
 template <class Find>
 void BroadPhase::search(std::size_t jobs, Find&& find) {
   const std::size_t first = block_count_;
@@ -122,7 +123,7 @@ void BroadPhase::find_among_moving() {
 }
 
 void BroadPhase::find_with_resting() {
-  // The resting grid still holds those that have left since it was made.
+  // The grid of resting objects still contains those that have left since it was built.
   const auto has_left = [&](const IndexPair& p) { return !is_settled(p.a) && !is_settled(p.b); };
   for (std::size_t level = 0; level < moving_.tables().size(); ++level) {
     const CellTable &moving = moving_.tables()[level], &resting = resting_.tables()[level];
@@ -135,7 +136,7 @@ void BroadPhase::find_with_resting() {
   }
 }
 
-/// Objects that cells cannot hold: each pair with one of them that has an unsettled object.
+/// For objects that are too large for cells: finds each of their pairs that has an unsettled object.
 void BroadPhase::find_large() {
   const auto size = static_cast<uint32_t>(states_.size());
   const auto is_large = [&](uint32_t i) { return sizes_.level(boxes_[i]) == CellSizes::kNone; };
@@ -155,11 +156,11 @@ void BroadPhase::find_large() {
     });
 }
 
-/// Sorts what was found, by counting, and merges it with the remembered pairs of settled objects.
+/// Sorts the new pairs by counting and merges them with the remembered pairs of settled objects.
 void BroadPhase::collect() {
   const std::span<const CandidatePairs> blocks(blocks_.data(), block_count_);
-  // Counted two places up: placing the pairs of a then moves begin_[a + 1] from where they begin to where
-  // they end.
+  // Counts are stored two places up. Placing the pairs of a then moves begin_[a + 1] from the beginning of
+  // its range to its end.
   begin_.assign(states_.size() + 2, 0);
   for (const CandidatePairs& block : blocks) {
     work_.compared += block.compared;
@@ -183,7 +184,7 @@ void BroadPhase::settle_if_due() {
   const auto rests = [&](uint32_t i) { return !(states_[i] & kMoved); };
   const auto resting = static_cast<std::size_t>(std::count_if(unsettled_.begin(), unsettled_.end(), rests));
   in_vain_ += resting;
-  // To settle an object costs about half as much as to enter and compare it once.
+  // Settling an object costs about half as much as inserting and comparing it once.
   const bool due = resting > 0 && 2 * in_vain_ >= count_;
   if (due) {
     std::erase_if(unsettled_, [&](uint32_t i) {

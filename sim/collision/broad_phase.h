@@ -23,7 +23,7 @@ class BroadPhase {
   /// to the greatest index. The box is that of the bounding sphere, or a tighter or swept one. It may be a
   /// point or infinite, but not empty or NaN.
   void insert(uint32_t object, const Aabb& box, bool is_static = false);
-  /// Changes the box of an object. Objects that did not move need no call. Static objects may move, too.
+  /// Changes the box of an object. Objects that did not move need no call. Static objects may be moved, too.
   void move(uint32_t object, const Aabb& box);
   void remove(uint32_t object);
   bool contains(uint32_t object) const { return object < states_.size() && (states_[object] & kLive); }
@@ -33,11 +33,11 @@ class BroadPhase {
   /// next call.
   std::span<const IndexPair> pairs();
 
-  /// Work of the last call of pairs().
+  /// Work of the last call of pairs(), as counts.
   struct Work {
-    std::size_t entered = 0;   ///< objects entered because they may have moved
-    std::size_t copies = 0;    ///< in how many cells
-    std::size_t compared = 0;  ///< boxes compared
+    std::size_t entered = 0;   ///< objects inserted because they may have moved
+    std::size_t copies = 0;    ///< copies of these in cells
+    std::size_t compared = 0;  ///< pairs of boxes compared
     std::size_t settled = 0;   ///< objects in the rebuilt grid of objects at rest; 0 if it was not rebuilt
   };
   const Work& work() const { return work_; }
@@ -58,20 +58,20 @@ class BroadPhase {
   void settle_if_due();
 
   CellSizes sizes_;
-  std::size_t count_ = 0;  // of objects
+  std::size_t count_ = 0;  // number of objects
   Real diameters_ = 0;     // sum of the diameters of bounded objects [m]
   Real bounded_ = 0;       // number of these
 
   std::vector<Aabb> boxes_;          // by object
   std::vector<uint8_t> states_;      // by object, bits of State
-  std::vector<uint32_t> unsettled_;  // objects, and removed ones until the next pairs()
-  Grid moving_, resting_;            // of the unsettled and of the settled objects
-  std::size_t in_vain_ = 0;          // objects entered in vain since the last settling
+  std::vector<uint32_t> unsettled_;  // unsettled objects, and removed ones until the next pairs()
+  Grid moving_, resting_;            // grids of the unsettled and of the settled objects
+  std::size_t in_vain_ = 0;          // insertions of objects that did not move, since the last settling
 
-  std::vector<CandidatePairs> blocks_;  // of parallel jobs
+  std::vector<CandidatePairs> blocks_;  // results of the parallel jobs
   std::size_t block_count_ = 0;
   std::vector<IndexPair> pairs_, found_, merged_;
-  std::vector<uint32_t> begin_;  // of the pairs of each object in found_
+  std::vector<uint32_t> begin_;  // start of the pairs of each object in found_
   Work work_;
 };
 

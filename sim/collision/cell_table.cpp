@@ -20,20 +20,20 @@ CellLanes lanes(const CellBox& box) {
   return CellLanes(box.bound.data(), stdx::vector_aligned);
 }
 
-/// What the lanes of another box must not exceed for it to meet this one.
+/// Upper limits for the lanes of another box that meets this one.
 CellLanes limits(const CellBox& box) {
   const Half low(box.bound.data(), stdx::vector_aligned),
       minus_high(box.bound.data() + 4, stdx::vector_aligned);
   return stdx::concat(-minus_high, -low);
 }
 
-/// Neighbours along x are neighbours in the table.
+/// Cells that are neighbours along x are neighbours in the table.
 uint32_t hash(int32_t x, int32_t y, int32_t z) {
   return static_cast<uint32_t>(x) + static_cast<uint32_t>(y) * 0x9e3779b1u +
          static_cast<uint32_t>(z) * 0x85ebca6bu;
 }
 
-/// Equal for equal cells; 24 bits, exact in single precision.
+/// Lane that is equal for equal cells: 24 bits, exact in single precision.
 float cell_lane(int32_t x, int32_t y, int32_t z) {
   return static_cast<float>((x & 255) << 16 | (y & 255) << 8 | (z & 255));
 }
@@ -44,9 +44,9 @@ CellBox in_cell(CellBox box, float cell) {
   return box;
 }
 
-/// Calls visit(hash, cell lane, axes along which this is the object's low cell) for the cells of a range, two
-/// by two by two: as nearly every object has one or two cells along an axis and no branch can be predicted,
-/// a single loop over those of the eight cells that are within the range is quicker than three nested ones.
+/// Calls visit(hash, cell lane, axes along which this is the object's low cell) for the cells of a range, in
+/// blocks of 2 x 2 x 2. Nearly every object has one or two cells along an axis, unpredictably. One loop over
+/// those of the eight cells that are in the range is therefore faster than three nested loops.
 template <class Visit>
 void for_each_cell(const CellRange& range, Visit&& visit) {
   const auto& [x0, y0, z0] = range.low;
@@ -61,7 +61,7 @@ void for_each_cell(const CellRange& range, Visit&& visit) {
           const int32_t cx = x + static_cast<int32_t>(c & 1), cy = y + static_cast<int32_t>(c >> 1 & 1),
                         cz = z + static_cast<int32_t>(c >> 2);
           visit(hash(cx, cy, cz), cell_lane(cx, cy, cz), lowest & ~c);
-          c = (c - within) & within;  // the next subset of the axes
+          c = (c - within) & within;  // next subset of the axes
         } while (c != 0);
       }
 }
@@ -84,7 +84,7 @@ void CellTable::clear() {
   copies_.clear();
 }
 
-/// Appends the copies of objects [first, end) to the list, as far as needed(hash).
+/// Appends the copies of objects [first, end) for which needed(hash) is true to the list.
 template <class Needed>
 void CellTable::list(std::span<const CellRange> objects, std::size_t first, std::size_t end,
                      Needed&& needed) {
@@ -138,8 +138,8 @@ void CellTable::enter(std::span<const CellRange> objects, std::size_t own_copies
   }
 }
 
-/// Compares a copy with the copies [first, end). To write down every index and count the right ones alone
-/// spares a branch that cannot be foretold.
+/// Compares a copy with the copies [first, end). Every index is written, and only the matching ones are
+/// counted; this avoids a branch that cannot be predicted.
 void CellTable::compare(const CellBox& box, uint32_t object, uint32_t first, uint32_t end,
                         CandidatePairs& out) const {
   constexpr uint32_t kBlock = 128;

@@ -19,19 +19,20 @@ struct IndexPair {
   friend auto operator<=>(const IndexPair&, const IndexPair&) = default;
 };
 
-/// A box as a point of eight dimensions: A meets B exactly if low(A) <= high(B) and -high(A) <= -low(B),
-/// which is one comparison of eight lanes. Rounding to single precision keeps order, so boxes that meet still
-/// do, and those that meet with no lane equal met before. The fourth axis distinguishes cells: copies in
-/// different cells do not meet.
+/// A box as a point in eight dimensions: A meets B exactly if low(A) <= high(B) and -high(A) <= -low(B),
+/// which is one comparison of eight lanes. Rounding to single precision keeps the order, so boxes that meet
+/// in double precision also meet here. If no two compared lanes are equal, the converse holds, too. The
+/// fourth axis distinguishes cells: copies in different cells do not meet.
 struct alignas(32) CellBox {
   std::array<float, 8> bound;  ///< low x y z, cell, minus high x y z, minus cell
 };
 
 /// Pairs in the order in which they were found.
 struct CandidatePairs {
-  std::vector<IndexPair> meeting;   ///< their boxes meet
-  std::vector<IndexPair> doubtful;  ///< they meet in single precision
-  std::size_t compared = 0;         ///< boxes compared to find them
+  std::vector<IndexPair> meeting;  ///< pairs whose boxes meet
+  /// Pairs whose boxes meet in single precision; to be tested in double precision.
+  std::vector<IndexPair> doubtful;
+  std::size_t compared = 0;  ///< number of boxes compared
 };
 
 /// An object and the cells of one level that its box touches.
@@ -39,9 +40,10 @@ struct CellRange {
   uint32_t object;  ///< caller's index, below CellTable::kMaxObjects
   int32_t level;
   std::array<int32_t, 3> low, high;  ///< cell coordinates, both inclusive
-  CellBox box;                       ///< without a cell
+  CellBox box;                       ///< its cell lanes are not set
 
-  /// The same for a coarser level. Cells are halved from level to level, so those of all levels nest.
+  /// The same object at a coarser level. The width of cells doubles from level to level, so cells of all
+  /// levels nest.
   CellRange at(int32_t coarser) const;
 };
 
@@ -59,13 +61,13 @@ class CellTable {
   static constexpr uint32_t kMaxObjects = 1u << 29;
   static constexpr int32_t kMaxSpan = 64;
 
-  /// Inserts objects, which are ordered from the finest level to this one; the level's own begin at
-  /// `first_own`. Ranges are at their objects' levels. If `other`, the same level's table of other objects,
-  /// is given (built or not), then finer objects are left out of buckets in which neither table has an own
-  /// object: there is no partner for them.
+  /// Inserts objects, ordered from the finest level to this one; the level's own objects begin at
+  /// `first_own`. Ranges are at the levels of their objects. If `other`, the table of the same level for
+  /// other objects, is given (built or not), finer objects are omitted from buckets in which neither table
+  /// has an object of this level, because they have no partner there.
   void build(int32_t level, std::span<const CellRange> objects, std::size_t first_own,
              const CellTable* other);
-  /// Forgets the objects; keeps the memory.
+  /// Removes all objects; keeps the memory.
   void clear();
 
   bool built() const { return !own_end_.empty(); }
@@ -75,21 +77,20 @@ class CellTable {
 
   /// Adds the pairs of the buckets [first, end).
   void find_pairs(uint32_t first, uint32_t end, CandidatePairs& out) const;
-  /// Adds the pairs of objects in the buckets [first, end) with those of the same level's table of other
-  /// objects.
+  /// Adds the pairs between objects in the buckets [first, end) and those of another table of the same level.
   void find_pairs_with(const CellTable& other, uint32_t first, uint32_t end, CandidatePairs& out) const;
 
  private:
   /// An object to be inserted.
   struct Listed {
     uint32_t hash;
-    uint32_t range;  // index
+    uint32_t range;  // index of the range
     float cell;
     uint32_t axes;
   };
   struct Copy {
     uint32_t hash;
-    uint32_t object;  // index * 8 + the axes along which the cell is the object's low one
+    uint32_t object;  // 8 * index + bits of the axes along which the cell is the object's low cell
   };
 
   template <class Needed>
@@ -99,11 +100,11 @@ class CellTable {
   bool has_own(uint32_t bucket) const { return own_end_[bucket] > begin_[bucket]; }
 
   int32_t level_ = 0;
-  uint32_t mask_ = 0;                // of hashes, to buckets
-  std::vector<uint32_t> begin_;      // of a bucket's copies; one more than there are buckets
-  std::vector<uint32_t> own_end_;    // where a bucket's own objects end and the finer ones begin
-  std::vector<uint32_t> finer_end_;  // where these end; needed while building
-  std::vector<CellBox> boxes_;       // of the copies
+  uint32_t mask_ = 0;                // maps hashes to buckets
+  std::vector<uint32_t> begin_;      // first copy of each bucket; one more entry than there are buckets
+  std::vector<uint32_t> own_end_;    // end of a bucket's own objects, where the finer ones begin
+  std::vector<uint32_t> finer_end_;  // end of the finer objects; needed while building
+  std::vector<CellBox> boxes_;       // boxes of the copies
   std::vector<Copy> copies_;
   std::vector<Listed> list_;  // needed while building
   std::size_t listed_ = 0;

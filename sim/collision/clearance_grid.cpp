@@ -6,10 +6,10 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kCells = 96;  // along the longest side
-constexpr int kPadding = 3;  // cells around the mesh, of which rounding may take one
+constexpr Real kCells = 96;  // number of cells along the longest side
+constexpr int kPadding = 3;  // cells around the mesh; rounding may use up one of them
 constexpr uint8_t kUnknown = 255, kOutside = 254;
-constexpr Real kClearRounding = 1e-9;  // of a cell
+constexpr Real kClearRounding = 1e-9;  // share of a cell
 
 Aabb bounds(const TriangleMesh& mesh) {
   Aabb box;
@@ -51,18 +51,19 @@ ClearanceGrid::Cell ClearanceGrid::cell_of(const Vec3& p) const {
 }
 
 bool ClearanceGrid::is_clear(const Vec3& centre, Real radius) const {
-  // Who is outside of the grid is farther from all in it than the nearest place of the grid is.
+  // A point outside of the grid is farther from everything in it than the nearest cell of the grid is.
   const int steps = steps_[index(cell_of(centre))];
   return (steps - 1) * cell_ > radius;
 }
 
-/// Marks the cells that a triangle may meet: it is cut in two until its pieces are as small as cells.
+/// Marks the cells that a triangle may intersect. The triangle is halved until its pieces are as small as
+/// cells.
 void ClearanceGrid::mark(const std::array<Vec3, 3>& triangle, std::vector<Cell>& surface) {
   std::vector<std::array<Vec3, 3>> pieces = {triangle};
   while (!pieces.empty()) {
     const std::array<Vec3, 3> t = pieces.back();
     pieces.pop_back();
-    std::size_t longest = 0;  // the edge after this corner
+    std::size_t longest = 0;  // the edge that follows this corner
     Real length = 0;
     for (std::size_t k = 0; k < 3; ++k) {
       const Real l = (t[(k + 1) % 3] - t[k]).squaredNorm();
@@ -95,7 +96,7 @@ void ClearanceGrid::for_each_neighbor(const Cell& c, F&& f) const {
       for (int x = std::max(c[0] - 1, 0); x <= std::min(c[0] + 1, count_[0] - 1); ++x) f(Cell{x, y, z});
 }
 
-/// From the grid's corner: the surface is closed, so that nothing leaks into its inside.
+/// Flood fill from a corner of the grid. The marked surface is closed, so the fill does not enter its inside.
 void ClearanceGrid::flood_outside() {
   std::vector<Cell> open = {{0, 0, 0}};
   steps_[0] = kOutside;

@@ -12,7 +12,7 @@ namespace offstage::sim {
 
 class ClearanceGrid {
  public:
-  /// `solid`: the mesh has an inside, which is not clear.
+  /// `solid`: the mesh has an inside, which counts as not clear.
   ClearanceGrid(const TriangleMesh& mesh, bool solid);
 
   /// Returns true only if a sphere (mesh frame) neither touches the surface nor is inside it. The test is
@@ -42,8 +42,8 @@ class ClearanceGrid {
   Vec3 origin_;
   Real cell_ = 1;
   Cell count_{};
-  /// 0: the surface is in the cell, or the cell is inside; else the Chebyshev distance to the nearest cell
-  /// with the surface, in cells.
+  /// 0 if the cell contains surface or is inside; otherwise the Chebyshev distance to the nearest cell that
+  /// contains surface, in cells.
   std::vector<uint8_t> steps_;
 };
 

@@ -11,8 +11,8 @@ namespace offstage::sim {
 namespace {
 
 /// Keeps the clearance grids of the latest meshes for all worlds of the process. The tuning page builds a
-/// world for every change of a number, and most of that time would go into the same grids again. A grid is a
-/// function of its mesh alone, so keeping it changes no result. Holds at most 26 MB.
+/// world after every change, and would spend most of that time on computing the same grids again. A grid
+/// depends only on its mesh, so keeping it does not change results. Uses at most 26 MB.
 class RecentGrids {
  public:
   ClearanceGrid of(const TriangleMesh& mesh, bool solid) {

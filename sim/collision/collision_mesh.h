@@ -17,16 +17,18 @@ namespace offstage::sim {
 
 class CollisionMesh {
  public:
-  /// `known` is the mesh's decomposition, if the caller has it; else it is computed when first needed.
+  /// `known` is the decomposition of the mesh, if the caller has it; otherwise it is computed when first
+  /// needed.
   explicit CollisionMesh(TriangleMesh welded, std::optional<ConvexDecomposition> known = {});
 
   TriangleMesh mesh;
   MeshTopology topology;
-  MeshSurface surface;  ///< around each triangle
+  MeshSurface surface;  ///< surroundings of each triangle
   MassProperties mass;
-  AabbTree tree;          ///< of the triangles
-  ConvexPolyhedron hull;  ///< of the vertices
-  bool solid;             ///< closed and not inverted: it has an inside; else it is a two-sided surface
+  AabbTree tree;          ///< tree of the triangles
+  ConvexPolyhedron hull;  ///< convex hull of the vertices
+  /// The mesh is closed and not inverted, so it has an inside; otherwise it is a two-sided surface.
+  bool solid;
 
   /// Computed at the first call, which may take seconds; safe from several threads.
   const ConvexDecomposition& decomposition() const;

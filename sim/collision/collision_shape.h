@@ -37,8 +37,8 @@ class CollisionShape {
  private:
   Solid solid_;
   Convex hull_;
-  AabbTree own_tree_;                    // of a primitive: one box
-  const AabbTree* mesh_tree_ = nullptr;  // of parts or triangles
+  AabbTree own_tree_;                    // tree of a primitive: one box
+  const AabbTree* mesh_tree_ = nullptr;  // tree of the parts or triangles
   bool triangles_ = false;
 };
 

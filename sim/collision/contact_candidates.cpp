@@ -6,8 +6,8 @@
 namespace offstage::sim {
 namespace {
 
-/// The point of the largest measure; of equal ones (to a thousandth) the one of the least id, lest rounding
-/// or the order choose.
+/// Returns the point with the largest measure. Among equal points (within a thousandth) the one with the
+/// lowest id is chosen, so that neither rounding nor the order decides.
 template <class Measure>
 const Candidate& most(const Candidates& c, Measure&& measure) {
   std::array<Real, Candidates::kMax> values;
@@ -20,8 +20,8 @@ const Candidate& most(const Candidates& c, Measure&& measure) {
   return best ? *best : c.points[0];
 }
 
-/// How far points lie to the left of the line from p to q as seen against the normal, times its length: twice
-/// the area of the triangle with them.
+/// Signed distance of points to the left of the line from p to q, seen against the normal, times the length
+/// of pq: twice the area of their triangle.
 struct LeftOf {
   Vec3 inward;
   Real offset;
@@ -46,7 +46,7 @@ void reduce(Manifold& m, const Candidates& c, Real slop, Manifold* more) {
   const Real level = c.least_separation() + slop;
   const Vec3 p = keep(most(c, [&](const Candidate& x) { return x.separation <= level ? 1.0 : 0.0; }));
   const Vec3 q = keep(most(c, [&](const Candidate& x) { return (x.on_a - p).squaredNorm(); }));
-  // Of points in a row the end away from q.
+  // Among collinear points this term prefers the end away from q.
   constexpr Real kRow = 1e-9;
   const LeftOf pq(m.normal, p, q);
   const Vec3 r = keep(

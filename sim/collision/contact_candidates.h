@@ -1,5 +1,5 @@
 #pragma once
-/// Contact points before they become a manifold: their names, and the choice of four among many.
+/// Contact points before the selection for a manifold: their ids, and the choice of four among many.
 
 #include <algorithm>
 #include <array>
@@ -11,11 +11,12 @@
 
 namespace offstage::sim {
 
-/// Shares of the margin within which solids count as touching. By kTilt the gap along a face's normal may be
-/// shorter than the separation, and parallel edges may pass each other; by kRim a point may lie outside a
-/// face, and the true deepest point of a rim be deeper than the polygon's that stands for it.
+/// Shares of the margin within which solids count as touching. kTilt: how much the gap along the normal of a
+/// face may be smaller than the separation, and how far parallel edges may pass each other. kRim: how far a
+/// point may lie outside of a face, and how much the true deepest point of a rim may be deeper than that of
+/// its polygon.
 inline constexpr Real kTilt = 0.05, kRim = 0.001;
-/// Of the solids' size: what separations are found to.
+/// Accuracy of separations, as a share of the solids' size.
 inline constexpr Real kSeparationRounding = 1e-9;
 /// Sine: a face whose normal is tilted more than this from the separation's normal never gives the contact
 /// normal.
@@ -46,23 +47,23 @@ inline uint32_t vertex_id(uint32_t body, uint32_t tag) {
 inline uint32_t edge_id(uint32_t tag, uint32_t other_tag) {
   return mixed(std::min(tag, other_tag) + 2, std::max(tag, other_tag));
 }
-/// Id of the crossing of an edge of one body with an edge of the other.
+/// Id of the crossing of an edge of one body and an edge of the other.
 inline uint32_t crossing_id(uint32_t body_x, uint32_t edge_x, uint32_t edge_y) {
   return body_x == 0 ? mixed(edge_x, edge_y) : mixed(edge_y, edge_x);
 }
-/// Id of a body's closest point that is not one of its corners.
+/// Id of the closest point of a body that is not one of its corners.
 inline uint32_t closest_id(uint32_t body) {
   return mixed(2, body);
 }
 
-/// A ContactPoint; without its defaults, for there is room for many.
+/// A ContactPoint without default values, because many are allocated.
 struct Candidate {
   Vec3 on_a, on_b;
   Real separation;
   uint32_t id;
 };
 
-/// Contact points, no two of the same features.
+/// Contact points; no two of them have the same features.
 struct Candidates {
   static constexpr uint32_t kMax = 2 * SupportingFeature::kMaxCorners + 1;
   uint32_t count = 0;
@@ -80,10 +81,10 @@ struct Candidates {
   }
 };
 
-/// Gives the manifold, whose normal is known, at most four of the points: all of them, or the deepest, the
-/// farthest from it, the one that spans the largest triangle with both, and the one that adds most to it.
-/// Depths that differ by less than `slop` count as equal. `more`, if not null, gets four of the points left
-/// out.
+/// Selects at most four of the points for the manifold, whose normal is known: all of them, or the deepest,
+/// the farthest from it, the one that spans the largest triangle with both, and the one that adds most area
+/// to this triangle. Depths that differ by less than `slop` count as equal. `more`, if not null, gets up to
+/// four of the remaining points.
 void reduce(Manifold& m, const Candidates& c, Real slop, Manifold* more = nullptr);
 
 /// Removes the points whose separation is not greater than `least` [m].

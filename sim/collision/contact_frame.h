@@ -1,8 +1,7 @@
 #pragma once
-/// The frame of a contact and how it turns with the bodies (physics R11): resting contact needs the second
-/// derivative of the gap, and with it the rates of the normal and of the tangents. Everything is in one
-/// frame, at rest or at least not turning; of a manifold that is given in a body's frame, turn the vectors
-/// first.
+/// The frame of a contact and its rotation with the bodies (physics R11). Resting contact needs the second
+/// derivative of the gap, and with it the rates of the normal and of the tangents. All vectors are in one
+/// frame that does not turn; rotate the vectors first if a manifold is in the frame of a body.
 
 #include "sim/collision/manifold.h"
 #include "sim/core/twist.h"
@@ -10,23 +9,23 @@
 
 namespace offstage::sim {
 
-/// Right-handed orthonormal axes: normal and two tangents, k = n x t. Or their time derivatives [1/s].
+/// Right-handed orthonormal axes: normal n and two tangents t and k = n x t; or their time derivatives [1/s].
 struct ContactFrame {
   Vec3 n, t, k;
 };
 
-/// The frame of a unit normal. The tangent t comes from dropping the smallest component of n, exchanging the
-/// other two and negating one: it is a smooth function of n except where another component becomes the
-/// smallest.
+/// Returns the frame of a unit normal. The tangent t is the normal with its smallest component set to zero,
+/// the other two exchanged and one of them negated. It is a smooth function of n except where another
+/// component becomes the smallest.
 ContactFrame contact_frame(const Vec3& n);
 
-/// The rate of contact_frame(n) as n changes at `n_rate`, which must be across n.
+/// Returns the rate of contact_frame(n) when n changes at `n_rate`, which must be perpendicular to n.
 ContactFrame contact_frame_rate(const ContactFrame& frame, const Vec3& n_rate);
 
-/// The rate of the manifold's normal at one of its points while A and B move, by what the normal comes from.
-/// The sliding of the contact over the surfaces is part of it. Exact for faces, straight edges, vertices,
-/// spheres, cylinders and cones; a rim turns as its tangent does. Where a point lies on the other body's
-/// point or line, so that its direction is undefined, the normal turns with the mean of the bodies.
+/// Returns the rate of the manifold's normal at one of its points while A and B move, according to
+/// NormalSource. The sliding of the contact over the surfaces is included. Exact for faces, straight edges,
+/// vertices, spheres, cylinders and cones; a rim turns as its tangent does. If a point lies on the point or
+/// line of the other body, so that its direction is undefined, the normal turns with the mean of the bodies.
 Vec3 normal_rate(const Manifold& m, const ContactPoint& point, const Twist& a, const Twist& b);
 
 }  // namespace offstage::sim

@@ -8,9 +8,10 @@
 namespace offstage::sim {
 namespace {
 
-constexpr std::size_t kScanned = 24;  // vertices; up to here looking at all of them is quicker than climbing
-// Share of the polyhedron's size by which it may fail to be convex: hulls merge faces that are closer to one
-// plane.
+// With at most this many vertices, checking all of them is faster than climbing.
+constexpr std::size_t kScanned = 24;
+// Share of the polyhedron's size by which it may fail to be convex, because hulls merge faces that are this
+// close to one plane.
 constexpr Real kLevel = 1e-9;
 
 uint32_t highest(const ConvexPolyhedron& p, const Vec3& d) {
@@ -30,14 +31,14 @@ Vec3 corner(const Vec3& half, uint32_t bits) {
   return {bits & 1 ? half.x() : -half.x(), bits & 2 ? half.y() : -half.y(), bits & 4 ? half.z() : -half.z()};
 }
 
-/// Of a disc about Y at a height; its centre if no point of the rim is favoured.
+/// Support point of a disc about Y at a height; its centre if all points of the rim are equally far.
 Vec3 rim(const Vec3& d, Real radius, Real height) {
   const Real rho = std::sqrt(d.x() * d.x() + d.z() * d.z());
   if (!(rho > 0)) return {0, height, 0};
   return {radius * (d.x() / rho), height, radius * (d.z() / rho)};
 }
 
-/// The apex if it is higher along d than the base's rim.
+/// Support point of a cone: the apex if it is higher along d than the rim of the base.
 Vec3 cone_support(const Vec3& half, const Vec3& d) {
   const Real rho2 = d.x() * d.x() + d.z() * d.z(), rise = 2 * half.y() * d.y();
   if (rise > 0 && rise * rise >= half.x() * half.x() * rho2) return {0, half.y(), 0};
@@ -67,15 +68,15 @@ struct ConvexOf {
 
 }  // namespace
 
-// On a convex polyhedron a vertex above its neighbours is above all, since the edges at it span a cone around
-// the polyhedron. On one that is convex only within rounding, a vertex that wrongly seems to be the top has a
-// neighbour almost as high.
+// On a convex polyhedron a vertex above its neighbours is above all others, because the edges at it span a
+// cone around the polyhedron. If the polyhedron is convex only within rounding, a vertex that wrongly seems
+// to be the top has a neighbour of almost the same height.
 uint32_t support_vertex(const ConvexPolyhedron& p, const Vec3& d, uint32_t start) {
   const std::span<const Vec3> vertices = p.vertices();
   if (vertices.size() <= kScanned) return highest(p, d);
   uint32_t top = start < vertices.size() ? start : 0;
   Real height = d.dot(vertices[top]);
-  for (;;) {  // ends, for the height grows
+  for (;;) {  // ends, because the height grows
     uint32_t next = top;
     Real best = -std::numeric_limits<Real>::infinity();
     for (uint32_t v : p.vertex_neighbours(top))

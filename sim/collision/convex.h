@@ -1,7 +1,7 @@
 #pragma once
 /// Convex solid for GJK, the penetration test and conservative advancement: the support mapping of a core,
-/// and a radius around the core. A sphere is a point with a radius, a capsule a segment with one; so the
-/// smooth shapes have exact distances.
+/// and a radius around the core. A sphere is a point with a radius, a capsule is a segment with a radius, so
+/// distances of these round shapes are exact.
 
 #include <array>
 #include <cstdint>
@@ -16,15 +16,15 @@ struct Convex {
   enum class Core : uint8_t { point, segment, triangle, box, cylinder, cone, polyhedron };
 
   Core core = Core::point;
-  /// Of the core: box half sizes; (radius, half height, -) of cylinder and cone; half height in y of a
-  /// segment.
+  /// Size of the core: half sizes of a box; (radius, half height, unused) of a cylinder or cone; half height
+  /// in y of a segment.
   Vec3 half = Vec3::Zero();
   Real radius = 0;  ///< around the core [m]
   const ConvexPolyhedron* polyhedron = nullptr;
-  std::array<const Vec3*, 3> corners{};  ///< of a triangle
+  std::array<const Vec3*, 3> corners{};  ///< corners of a triangle
 
-  /// The farthest point of the core along `d`, which need not be unit. For a polyhedron `vertex` is the
-  /// vertex to start climbing from on entry, and the vertex found on return. For a box it holds the sign bits
+  /// Returns the farthest point of the core along `d`, which need not be unit. For a polyhedron `vertex` is
+  /// the vertex from which the climb starts, and on return the vertex found. For a box it holds the sign bits
   /// of the corner, for a segment the end, for a triangle the corner. Other cores do not use it.
   Vec3 support(const Vec3& d, uint32_t& vertex) const;
   /// Whether support points are vertices that can be identified by a number.
@@ -38,16 +38,16 @@ struct Convex {
   Real reach() const;
 };
 
-/// The convex solid of a primitive; MeshShape and Plane have none and are not accepted.
+/// Returns the convex solid of a primitive. MeshShape and Plane are not accepted.
 Convex convex(const Shape& primitive);
 Convex convex(const ConvexPolyhedron& polyhedron, Real radius = 0);
-/// A triangle that refers to its vertices, which must outlive it. Without area it acts as a segment or a
-/// point.
+/// Returns a triangle that refers to its vertices, which must outlive it. A triangle without area acts as a
+/// segment or a point.
 Convex convex_triangle(const Vec3& a, const Vec3& b, const Vec3& c);
 
-/// A vertex of a polyhedron that is farthest along `d`. Climbs from `start` along the edges; if neighbours
-/// are level within rounding (the top may then be further away), and on small polyhedra, it checks all
-/// vertices.
+/// Returns a vertex of a polyhedron that is farthest along `d`. Climbs from `start` along the edges. On small
+/// polyhedra, and if neighbours are level within rounding (the top may then be elsewhere), all vertices are
+/// checked.
 uint32_t support_vertex(const ConvexPolyhedron& p, const Vec3& d, uint32_t start);
 
 }  // namespace offstage::sim

@@ -11,13 +11,13 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 
-/// v / |v|, or `fallback` where there is no direction.
+/// v / |v|, or `fallback` if v is zero.
 Vec3 direction(const Vec3& v, const Vec3& fallback) {
   const Real norm = v.norm();
   return norm > 0 ? Vec3(v / norm) : fallback;
 }
 
-/// A figure of revolution about Y seen in its half plane: (distance from the axis, height).
+/// Point of a solid of revolution about Y in its half plane: (distance from the axis, height).
 Vec2 to_profile(const Vec3& p) {
   return {std::sqrt(p.x() * p.x() + p.z() * p.z()), p.y()};
 }
@@ -36,8 +36,8 @@ struct ProfileDistance {
   Vec2 normal;
 };
 
-/// From two faces that bound a convex profile: inside by the nearer face's line, outside by the nearer
-/// closest point.
+/// Distance to two faces that bound a convex profile: inside by the line of the nearer face, outside by the
+/// nearer closest point.
 ProfileDistance profile_distance(const Vec2& p, Real above_1, const Vec2& normal_1, const Vec2& closest_1,
                                  Real above_2, const Vec2& normal_2, const Vec2& closest_2) {
   if (above_1 <= 0 && above_2 <= 0)
@@ -48,7 +48,7 @@ ProfileDistance profile_distance(const Vec2& p, Real above_1, const Vec2& normal
   return {distance, distance > 0 ? Vec2(away / distance) : (first ? normal_1 : normal_2)};
 }
 
-/// The pseudonormal of the feature of a face that holds a point with these barycentric weights.
+/// Returns the pseudonormal of the feature of a face that contains the point with these barycentric weights.
 Vec3 feature_normal(const CollisionMesh& m, uint32_t face, const std::array<Real, 3>& w) {
   const Triangle& t = m.mesh.triangles[face];
   for (std::size_t k = 0; k < 3; ++k) {
@@ -127,7 +127,7 @@ SurfaceDistance signed_distance(const Plane&, const Vec3& p) {
 
 namespace {
 
-/// Of the nearest triangle, if any is nearer than the root of `limit2`.
+/// Distance to the nearest triangle, if any is nearer than the square root of `limit2`.
 SurfaceDistance mesh_distance(const CollisionMesh& m, const Vec3& p, Real limit2) {
   Real best2 = limit2;
   uint32_t face = 0;
@@ -161,7 +161,7 @@ SurfaceDistance signed_distance(const CollisionMesh& m, const Vec3& p) {
 }
 
 SurfaceDistance signed_distance_below(const Solid& s, const Vec3& p, Real limit) {
-  // What is not known to be outside may be deep inside.
+  // A point that is not known to be outside may be deep inside.
   const bool outside = s.mesh && (!s.mesh->solid || s.mesh->clearance_grid().is_outside(p));
   return outside ? mesh_distance(*s.mesh, p, limit * limit) : signed_distance(s, p);
 }

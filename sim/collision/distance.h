@@ -12,7 +12,7 @@
 
 namespace offstage::sim {
 
-/// Distance of a point to a surface, negative inside, and its unit gradient there.
+/// Distance of a point to a surface, negative inside, with its unit gradient at the point.
 struct SurfaceDistance {
   Real distance = std::numeric_limits<Real>::infinity();
   Vec3 normal = Vec3::UnitY();
@@ -29,20 +29,20 @@ SurfaceDistance signed_distance(const Capsule& c, const Vec3& p);
 SurfaceDistance signed_distance(const Cylinder& c, const Vec3& p);
 SurfaceDistance signed_distance(const Cone& c, const Vec3& p);
 SurfaceDistance signed_distance(const Plane&, const Vec3& p);
-/// A mesh that is not solid has positive distances on both sides; for a solid mesh, the pseudonormal of the
-/// nearest feature decides whether the point is inside.
+/// Signed distance to a mesh. It is positive on both sides of a mesh that is not solid; for a solid mesh, the
+/// pseudonormal of the nearest feature determines whether the point is inside.
 SurfaceDistance signed_distance(const CollisionMesh& m, const Vec3& p);
 SurfaceDistance signed_distance(const Solid& s, const Vec3& p);
-/// Signed distance if it is less than `limit` [m], >= 0; otherwise any value not less than `limit`. It is
-/// much faster away from a mesh.
+/// Signed distance if it is less than `limit` [m], >= 0; otherwise any value that is at least `limit`. Much
+/// faster than signed_distance() at points away from a mesh.
 SurfaceDistance signed_distance_below(const Solid& s, const Vec3& p, Real limit);
 
 /// Support function: the largest n.x over the points x of a solid; infinite for a plane unless n is +Y.
 Real support(const Solid& s, const Vec3& n);
 
-/// Box of a solid in its own frame, tight; infinite for a plane.
+/// Tight box of a solid in its own frame; infinite for a plane.
 Aabb local_bounds(const Solid& s);
-/// Box of a placed solid in the world, tight.
+/// Tight box of a placed solid in the world.
 Aabb bounds(const Solid& s, const Pose& pose);
 /// Distance of the farthest point from the frame's origin.
 Real reach(const Solid& s);

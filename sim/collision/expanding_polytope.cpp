@@ -8,10 +8,13 @@ namespace {
 
 constexpr std::size_t kMaxPoints = 128;
 constexpr std::size_t kMaxFaces = 2 * kMaxPoints;  // a closed surface of n points has 2 n - 4 triangles
-constexpr Real kHeightTolerance = 64;              // in roundings of a point: of heights over a face
-constexpr Real kCurvedTolerance = 1e-10;           // of the size
-constexpr Real kDeep = 1e-6;         // of the size: depth from which a point tells the direction
-constexpr Real kAcceptedGap = 1e-9;  // of the size: an early end with this gap of its bounds is an answer
+// Tolerance of heights over a face, in units of the rounding of a point.
+constexpr Real kHeightTolerance = 64;
+constexpr Real kCurvedTolerance = 1e-10;  // the same for curved cores, as a share of the size
+// Share of the size: at greater depth the point gives the direction of the normal.
+constexpr Real kDeep = 1e-6;
+// Share of the size: an early end with a smaller gap between the bounds is accepted.
+constexpr Real kAcceptedGap = 1e-9;
 
 using Index = uint16_t;
 
@@ -20,8 +23,8 @@ struct PolytopeFace {
   std::array<Index, 3> neighbour;  ///< across the edge from corner k to the next
   Vec3 normal;                     ///< unit, outward
   Real offset;                     ///< normal.w of its plane
-  Real slack;                      ///< points lower than this over the plane may be in it, for all we know
-  Real key;                        ///< bound on the depth from below; infinite on a dead face
+  Real slack;                      ///< a point that is lower than this over the plane may be in the plane
+  Real key;                        ///< lower bound of the depth; infinite for a removed face
   bool is_key_exact, alive;
 };
 
@@ -55,13 +58,13 @@ class ExpandingPolytope {
     }
   }
 
-  /// `last` becomes the final face, or the best one if points run out or rounding breaks the polytope.
+  /// On return `last` is the final face, or the best one if points run out or rounding breaks the polytope.
   DeepestPoint expand(Simplex& last) {
     DeepestPoint best{.normal = Vec3::UnitY(), .distance = -kInfinity, .on_a = Vec3::Zero()};
     for (int iterations = 0;; ++iterations) {
       const Index nearest = nearest_face();
       const PolytopeFace& face = faces_[nearest];
-      if (face.key == kInfinity) return best;  // nothing but slivers is left
+      if (face.key == kInfinity) return best;  // only slivers are left
       const SupportPoint p = m_.lowest(-face.normal, points_[face.corner[0]].from);
       const Real height = face.normal.dot(p.w), gap = height - face.offset;
       const bool found = gap <= tolerance_ || (gap <= face.slack && is_known(p));
@@ -72,8 +75,9 @@ class ExpandingPolytope {
   }
 
  private:
-  /// The depth along a face's normal. Rounding can leave faces nearly in one plane of which none is under the
-  /// origin; then the edge nearest to it is, and on a deep one the direction is that of its point.
+  /// Returns the depth along the normal of a face. Rounding can leave faces nearly in one plane, none of
+  /// which is under the origin. The nearest edge to the origin is then used; if it is deep, its point gives
+  /// the direction.
   DeepestPoint answer(const PolytopeFace& face, Real height, Simplex& corners) const {
     corners.size = 3;
     for (std::size_t k = 0; k < 3; ++k) corners.points[k] = points_[face.corner[k]];
@@ -87,14 +91,15 @@ class ExpandingPolytope {
             .converged = converged};
   }
 
-  /// A point found again makes no difference but for rounding.
+  /// Whether a support point was found before, within rounding.
   bool is_known(const SupportPoint& p) const {
     return std::any_of(points_.begin(), points_.begin() + static_cast<std::ptrdiff_t>(point_count_),
                        [&](const SupportPoint& q) { return q.w == p.w; });
   }
 
-  /// By the distance of the plane or, beside the triangle, of the triangle: so that of triangles in one plane
-  /// the one under the origin wins. Most faces are never looked at so closely.
+  /// Compares faces by the distance of the plane or, if the origin is beside the triangle, of the triangle,
+  /// so that of triangles in one plane the one under the origin is chosen. The second distance is computed
+  /// only when needed.
   Index nearest_face() {
     for (;;) {
       Index best = 0;
@@ -128,7 +133,8 @@ class ExpandingPolytope {
     f.slack = rounding_ * (4 + size2 / area);
   }
 
-  /// Replaces the faces that the point is above by a fan around it; false if rounding breaks their outline.
+  /// Replaces the faces that are visible from the point by a fan around it; returns false if rounding breaks
+  /// their outline.
   bool add(const SupportPoint& p, Index above) {
     const auto apex = static_cast<Index>(point_count_);
     points_[point_count_++] = p;
@@ -144,7 +150,7 @@ class ExpandingPolytope {
     dead_[dead_size_++] = f;
   }
 
-  /// The other side of an edge.
+  /// The same edge seen from the neighbouring face.
   HorizonEdge across(Index f, std::size_t k) const {
     const Index other = faces_[f].neighbour[k];
     const auto& back = faces_[other].neighbour;
@@ -154,8 +160,8 @@ class ExpandingPolytope {
     return {other, 0};
   }
 
-  /// Coming over an edge into a face: kept, and then the edge is part of the outline, or removed with what is
-  /// behind it.
+  /// Visits a face over an edge. If the face is kept, the edge is part of the outline; otherwise the face is
+  /// removed and its neighbours are visited.
   void visit(HorizonEdge e, const Vec3& p) {
     const PolytopeFace& f = faces_[e.face];
     if (!f.alive) return;
@@ -168,7 +174,7 @@ class ExpandingPolytope {
     visit(across(e.face, next(next(e.side))), p);
   }
 
-  /// The outline's edges follow each other, seen from the kept faces clockwise.
+  /// Whether the edges of the outline form a loop, clockwise seen from the kept faces.
   bool is_loop() const {
     for (std::size_t k = 0; k < horizon_size_; ++k) {
       const HorizonEdge e = horizon_[k], f = horizon_[k + 1 == horizon_size_ ? 0 : k + 1];
@@ -204,20 +210,20 @@ class ExpandingPolytope {
   std::array<Index, kMaxFaces> dead_;
 };
 
-/// A direction across `u`.
+/// A direction perpendicular to `u`.
 Vec3 any_perpendicular(const Vec3& u) {
   int axis;
   u.cwiseAbs().minCoeff(&axis);
   return u.cross(Vec3(Vec3::Unit(axis))).normalized();
 }
 
-/// Makes a simplex of points of A - B a tetrahedron, with support points in place of those that lie in the
-/// line or plane of others.
+/// Extends a simplex of points of A - B to a tetrahedron. Corners that lie in the line or plane of others are
+/// replaced by support points.
 class TetrahedronMaker {
  public:
   TetrahedronMaker(const MinkowskiDifference& m, Simplex& s) : m_(m), s_(s) {}
 
-  /// False if A - B is flat; then the simplex has one corner more than its dimension.
+  /// Returns false if A - B is flat; the simplex then has one corner more than its dimension.
   bool make() {
     const Real size = m_.rounding() / std::numeric_limits<Real>::epsilon();
     for (std::size_t have = 1; have < 4; ++have) {
@@ -229,7 +235,7 @@ class TetrahedronMaker {
     }
     return true;
   }
-  /// Unit, across what the simplex spans, as far as possible along `sense`.
+  /// Unit vector perpendicular to the span of the simplex, as far as possible along `sense`.
   Vec3 across(const Vec3& sense) const {
     if (s_.size == 3) return normal_.dot(sense) < 0 ? Vec3(-normal_) : normal_;
     const Vec3 n = s_.size == 2 ? Vec3(sense - along_.dot(sense) * along_) : sense;
@@ -238,8 +244,8 @@ class TetrahedronMaker {
   }
 
  private:
-  static constexpr Real kWide =
-      1e-6;  // of the size: corners nearer to the line or plane of others are replaced
+  // Share of the size: corners nearer than this to the line or plane of others are replaced.
+  static constexpr Real kWide = 1e-6;
 
   const Vec3& w(std::size_t i) const { return s_.points[i].w; }
 
@@ -247,7 +253,7 @@ class TetrahedronMaker {
     if (have == 2) along_ = (w(1) - w(0)).normalized();
     if (have == 3) normal_ = (w(1) - w(0)).cross(w(2) - w(0)).normalized();
   }
-  /// From the point, line or plane of the first corners.
+  /// Distance from the point, line or plane of the first corners.
   Real distance(std::size_t have, const Vec3& x) const {
     const Vec3 d = x - w(0);
     return have == 1 ? d.norm() : have == 2 ? d.cross(along_).norm() : std::abs(d.dot(normal_));
@@ -293,7 +299,7 @@ DeepestPoint deepest_point(const MinkowskiDifference& m, Simplex& s, const Vec3&
   }
   DeepestPoint deepest = ExpandingPolytope(m, s).expand(s);
   if (deepest.distance > 0 && nearest.size < 4)
-    deepest.on_a = on_a;  // apart after all: the nearest point is GJK's
+    deepest.on_a = on_a;  // they are separate after all: use GJK's nearest point
   return deepest;
 }
 

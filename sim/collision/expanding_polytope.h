@@ -1,26 +1,26 @@
 #pragma once
-/// Penetration depth by the expanding polytope: van den Bergen, "Proximity queries and penetration depth
-/// computation on 3D game objects" (2001). A polytope inside A - B grows by support points beyond its face
-/// nearest to the origin until that face is one of A - B. Distances of faces are signed, so touching is no
-/// special case: an origin slightly outside gets a small positive distance along the same normal.
+/// Penetration depth by the expanding polytope algorithm: van den Bergen, "Proximity queries and penetration
+/// depth computation on 3D game objects" (2001). A polytope inside A - B grows by support points beyond its
+/// face nearest to the origin, until that face is a face of A - B. Distances of faces are signed, so touching
+/// is not a special case: an origin slightly outside gets a small positive distance along the same normal.
 
 #include "sim/collision/simplex.h"
 
 namespace offstage::sim {
 
-/// The surface point of A - B nearest to an origin that is inside, or barely outside.
+/// The surface point of A - B nearest to an origin that is inside, or slightly outside.
 struct DeepestPoint {
-  Vec3 normal;    ///< unit, into A - B
-  Real distance;  ///< of the origin from the surface, negative inside: the plane through the point has
-                  ///< normal.w = distance
-  Vec3 on_a;      ///< point of A's core that it comes from
+  Vec3 normal;  ///< unit, into A - B
+  /// Signed distance of the origin, negative inside: normal.w = distance for the plane through the point.
+  Real distance;
+  Vec3 on_a;  ///< the point of A's core from which it results
   int iterations = 0;
   bool converged = true;
 };
 
 /// Starts from the simplex that contains the origin or its nearest point, and replaces it by the final face.
-/// If A
-/// - B is flat, the distance is 0 within rounding and the normal is across it, on the side of `sense`.
+/// If A - B is flat, the distance is 0 within rounding, and the normal is perpendicular to it, on the side of
+/// `sense`.
 DeepestPoint deepest_point(const MinkowskiDifference& m, Simplex& s, const Vec3& sense);
 
 }  // namespace offstage::sim

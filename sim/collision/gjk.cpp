@@ -8,18 +8,21 @@ namespace offstage::sim {
 namespace {
 
 constexpr int kMaxGjkIterations = 100;
-constexpr Real kTolerance = 4;  // of the gap between the bounds of the distance, in roundings of a point
-constexpr Real kTouchingRoundings = 64;  // roundings of a point; nearer cores have no direction between them
-constexpr Real kNear = 1e-9;           // of the size: if GJK stalls this near, the expanding polytope decides
+// Accepted gap between the bounds of the distance, in units of the rounding of a point.
+constexpr Real kTolerance = 4;
+// In units of the rounding of a point; the direction between nearer cores is undefined.
+constexpr Real kTouchingRoundings = 64;
+// Share of the size: if GJK stalls at a smaller distance, the expanding polytope decides.
+constexpr Real kNear = 1e-9;
 constexpr Real kGjkLevel = 1 + 1e-14;  // ratio of squares that differ by rounding
-constexpr Real kAccepted = 1e-12;      // of the size: gap with which a stalled query is still an answer
+constexpr Real kAccepted = 1e-12;      // share of the size: with a smaller gap a stalled query is accepted
 
-/// The last normal, or from the middle of B to that of A.
+/// Start direction: the last normal, or from the centre of B to that of A.
 Vec3 start_direction(const MinkowskiDifference& m, const GjkCache& cache) {
   return cache.direction.squaredNorm() > 0 ? cache.direction : m.centre();
 }
 
-/// The simplex where the last query ended, or the support point along its normal.
+/// Start simplex: that of the last query, or the support point along its normal.
 Simplex first_simplex(const MinkowskiDifference& m, const GjkCache& cache) {
   Simplex s;
   if (m.has_vertices() && cache.size > 0) {
@@ -38,7 +41,7 @@ void remember(const Simplex& s, const Vec3& direction, GjkCache& cache) {
   cache.direction = direction;
 }
 
-/// Of the solids, from the closest points of their cores.
+/// Separation of the solids from the closest points of their cores.
 Separation around_cores(const MinkowskiDifference& m, Real distance, const Vec3& normal, const Vec3& on_a) {
   Separation s;
   s.distance = distance - m.radius();
@@ -57,8 +60,8 @@ Separation overlapping(const MinkowskiDifference& m, Simplex& s, GjkCache& cache
   return result;
 }
 
-/// Whether the nearest point of the simplex with a new corner is better: nearer to the origin, or as near
-/// within rounding but in a face rather than on its edge, which has the better normal.
+/// Whether the nearest point of the simplex with a new corner is better: nearer to the origin, or equally
+/// near within rounding but in a face instead of on its edge, because a face gives a better normal.
 bool is_progress(const SimplexPoint& nearer, const SimplexPoint& nearest) {
   return nearer.squared < nearest.squared ||
          (nearer.size > nearest.size && nearer.squared <= kGjkLevel * nearest.squared);
@@ -114,7 +117,7 @@ bool overlap(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache& c
   Simplex s;
   SimplexPoint nearest;
   Vec3 d = start_direction(m, cache);
-  if (m.has_vertices() && cache.size == 4) {  // the tetrahedron that held the origin last time
+  if (m.has_vertices() && cache.size == 4) {  // the tetrahedron that contained the origin in the last query
     s = first_simplex(m, cache);
     nearest = nearest_point(s);
     if (nearest.size == 4) return true;

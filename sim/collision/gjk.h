@@ -1,9 +1,9 @@
 #pragma once
 /// Distance between convex solids by the algorithm of Gilbert, Johnson and Keerthi (1988), physics R4: the
-/// nearest point to the origin of the Minkowski difference A - B, from simplices whose sub-algorithm is
-/// solved robustly (Montanari, Petrinic, Barbieri, "Improving the GJK algorithm for faster and more reliable
-/// distance queries between convex objects", 2017). Supports climb the adjacency of polyhedra from the last
-/// vertex, and the simplex of the last query is where the next begins.
+/// point of the Minkowski difference A - B that is nearest to the origin, found by simplices. The
+/// sub-algorithm is that of Montanari, Petrinic, Barbieri, "Improving the GJK algorithm for faster and more
+/// reliable distance queries between convex objects" (2017). Support points of polyhedra are found by
+/// climbing from the last vertex, and a query starts from the simplex of the last query.
 
 #include <array>
 #include <cstdint>
@@ -14,22 +14,22 @@
 
 namespace offstage::sim {
 
-/// Final state of the last query of a pair; empty before the first. Any content is safe: it affects only the
-/// speed of the query, not its result, except for rounding and the choice between equivalent results.
+/// Final state of the last query of a pair; empty before the first one. Any content is safe: it affects only
+/// the speed of the query, not its result, except for rounding and the choice between equivalent results.
 struct GjkCache {
-  uint32_t size = 0;                 ///< of the simplex, in `from`; not used with curved cores
-  std::array<VertexPair, 4> from{};  ///< also the start of the support climb
+  uint32_t size = 0;                 ///< size of the simplex in `from`; not used with curved cores
+  std::array<VertexPair, 4> from{};  ///< vertices of the simplex, also the start of the support climb
   Vec3 direction = Vec3::Zero();     ///< last normal, in A's frame; zero before the first query
 };
 
-/// Signed distance of A and B. Exact to rounding between cores with vertices, whatever their position; with a
-/// cylinder or a cone to 1e-12 of the size when apart and 1e-10 in penetration (about 0.5 % of those are
-/// slightly worse, which `converged` reports). Cores that overlap or touch are passed to deepest_point(),
-/// whose normal is that of a face of A - B, so the normal is robust near touching.
+/// Signed distance of A and B. Exact to rounding between cores with vertices, at any position. With a
+/// cylinder or a cone accurate to 1e-12 of the size when apart and to 1e-10 in penetration (about 0.5 % of
+/// those are slightly worse, which `converged` reports). Cores that overlap or touch are passed to
+/// deepest_point(), which returns the normal of a face of A - B, so the normal is robust near touching.
 Separation gjk(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache& cache);
 
-/// The same without a cache: for solids known to overlap, the depth and direction of the least translation
-/// that separates them.
+/// The same without a cache, for solids that are known to overlap: depth and direction of the smallest
+/// translation that separates them.
 Separation penetration(const Convex& a, const Convex& b, const Pose& a_from_b);
 
 /// Whether A and B have a point in common; ends at the first separating direction.

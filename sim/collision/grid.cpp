@@ -9,9 +9,9 @@
 namespace offstage::sim {
 namespace {
 
-// Cell coordinates are less than this: far out, cells are the wider for it.
+// Cell coordinates are below this; far from the origin cells are larger.
 constexpr Real kMaxCoordinate = 0x1p29;
-// An object takes no more cells than this; in the multi-level grid none comes near.
+// Greatest number of cells of an object; in the multi-level grid no object comes near it.
 constexpr Real kMaxCells = CellTable::kMaxSpan;
 
 }  // namespace
@@ -28,7 +28,7 @@ int32_t CellSizes::level(const Aabb& box) const {
     const bool few = (sides / uniform_width + Vec3::Ones()).prod() <= kMaxCells;
     return few && reach < kMaxCoordinate * uniform_width ? 0 : kNone;
   }
-  // The width is the least power of two above all its bounds.
+  // The width is the smallest power of two above all bounds.
   const Real bound = std::max(sides.maxCoeff() / (2 * kMinInCell), reach / kMaxCoordinate);
   return std::max(std::ilogb(std::max(bound, 0x1p-60)) + 1 - kFinest, 0);
 }
@@ -73,7 +73,7 @@ void Grid::assign(const CellSizes& sizes, std::span<const uint32_t> objects, std
   });
 }
 
-/// The table of a level, with its own objects and all finer ones.
+/// Builds the table of a level, with its own objects and all finer ones.
 void Grid::build(std::size_t level, const CellTable* other) {
   tables_[level].build(static_cast<int32_t>(level), std::span(ranges_).first(begin_[level + 1]),
                        begin_[level], other);
@@ -84,7 +84,7 @@ std::size_t Grid::copies() const {
                                [](const CellTable& table) { return table.copies(); });
 }
 
-// A level matters if either grid has objects of its own there and the other has any that it holds.
+// A level matters if one grid has objects of that level, and the other contains any.
 
 std::size_t Grid::enter_to_stay(const Grid& moving) {
   const std::size_t before = copies();

@@ -2,14 +2,14 @@
 /// A set of boxes in the cells of a uniform or multi-level grid (physics H5, H6), with a CellTable for each
 /// level.
 ///
-/// An object of the multi-level grid with diameter d belongs to the level whose cells are L wide with
-/// kMinInCell <= d/L < 2 kMinInCell. L is a power of two of a metre, where the book has one of d_min/k_min:
-/// so neither the level of an object nor the cells of a level depend on the smallest object, levels exist
-/// only while they have objects, and coarser cells follow from finer ones by a bit shift. Objects are
-/// inserted at their own and every coarser level, as in the book; moving objects only where they can find a
-/// partner. (Inserting each object at its own level alone and looking up coarser cells took a tenth longer if
-/// all objects move, and twice as long if many are at rest, because contiguous data are compared fastest.)
-/// The uniform grid is the case of a single level whose width is given.
+/// An object of the multi-level grid with diameter d belongs to the level whose cells have a width L with
+/// kMinInCell <= d/L < 2 kMinInCell. L is a power of two metres, where the book uses a power of two times
+/// d_min/k_min. Therefore neither the level of an object nor the cells of a level depend on the smallest
+/// object, levels exist only while they have objects, and coarser cells follow from finer ones by a bit
+/// shift. Objects are inserted at their own and every coarser level, as in the book; moving objects only
+/// where they can find a partner. (Inserting each object only at its own level and looking up coarser cells
+/// took a tenth longer if all objects move, and twice as long if many are at rest, because contiguous data
+/// are compared fastest.) The uniform grid has a single level whose width is given.
 
 #include <array>
 #include <cstdint>
@@ -29,20 +29,21 @@ enum class GridKind {
 struct CellSizes {
   /// Width of a cell of the uniform grid in mean diameters (the book's k).
   static constexpr Real kMeansInCell = 2;
-  /// Least diameter of a level's own objects in cells of the multi-level grid (the book's k_min). Cells of
-  /// two to four diameters measured best.
+  /// Smallest diameter of a level's own objects, in cells of the multi-level grid (the book's k_min). Cells
+  /// of two to four diameters were the fastest.
   static constexpr Real kMinInCell = 0.25;
-  /// Levels count from 0 to kLevels - 1, from the width 2^kFinest m, good for objects of a micrometre.
+  /// Levels count from 0 to kLevels - 1, starting at the width 2^kFinest m, which suits objects of a
+  /// micrometre.
   static constexpr int32_t kFinest = -18, kLevels = 64;
   /// Greatest distance of cells from the origin [m].
   static constexpr Real kMaxReach = 0x1p40;
-  /// In place of a level: for objects too large or too far away for cells.
+  /// Used instead of a level for objects that are too large or too far away for cells.
   static constexpr int32_t kNone = -1;
 
   GridKind kind = GridKind::multilevel;
   Real uniform_width = 1;  ///< [m]
 
-  /// Of a level's cells [m].
+  /// Width of a level's cells [m].
   Real width(int32_t level) const;
   /// The level that a box belongs to, or kNone.
   int32_t level(const Aabb& box) const;
@@ -52,12 +53,12 @@ struct CellSizes {
 
 class Grid {
  public:
-  /// Assigns the objects, given by their indices in `boxes`, without inserting them in cells.
+  /// Assigns the objects, given by their indices in `boxes`, to levels without inserting them in cells.
   void assign(const CellSizes& sizes, std::span<const uint32_t> objects, std::span<const Aabb> boxes);
 
-  /// Those that cells can hold, from the finest to the coarsest level.
+  /// The objects that cells can hold, from the finest to the coarsest level.
   std::span<const CellRange> ranges() const { return ranges_; }
-  /// The others.
+  /// The objects that are too large or too far away.
   std::span<const uint32_t> large() const { return large_; }
 
   /// For a grid at rest: builds the complete tables that are needed for pairs with the objects of `moving`
@@ -77,10 +78,10 @@ class Grid {
   std::size_t copies() const;
 
   std::vector<CellRange> ranges_;
-  std::array<uint32_t, CellSizes::kLevels + 1> begin_{};  // of a level's own in ranges_
+  std::array<uint32_t, CellSizes::kLevels + 1> begin_{};  // start of each level's own objects in ranges_
   std::vector<uint32_t> large_;
   std::array<CellTable, CellSizes::kLevels> tables_;
-  std::vector<int8_t> levels_;  // of the objects taken
+  std::vector<int8_t> levels_;  // levels of the assigned objects
 };
 
 }  // namespace offstage::sim

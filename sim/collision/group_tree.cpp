@@ -16,7 +16,7 @@ GroupTree::GroupTree(std::span<const uint32_t> members)
   place(1, members, 0);
 }
 
-/// The leaves from left to right are the members in their order; returns the first that is left.
+/// Places the members in their order into the leaves from left to right; returns the first that remains.
 std::size_t GroupTree::place(std::size_t node, std::span<const uint32_t> members, std::size_t next) {
   if (is_leaf(node)) {
     members_[node - members.size()] = members[next];
@@ -45,7 +45,7 @@ void GroupTree::find_pairs(const GroupTree& other, std::vector<IndexPair>& pairs
   find_between(1, other, 1, pairs);
 }
 
-/// The greater of the two is opened first.
+/// The larger of the two nodes is opened first.
 void GroupTree::find_between(std::size_t node, const GroupTree& other, std::size_t other_node,
                              std::vector<IndexPair>& pairs) const {
   const Aabb &box = boxes_[node], &other_box = other.boxes_[other_node];

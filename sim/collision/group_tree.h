@@ -13,7 +13,7 @@ namespace offstage::sim {
 
 class GroupTree {
  public:
-  /// At least one member.
+  /// Requires at least one member.
   explicit GroupTree(std::span<const uint32_t> members);
 
   std::span<const uint32_t> members() const { return members_; }
@@ -34,7 +34,7 @@ class GroupTree {
   void find_between(std::size_t node, const GroupTree& other, std::size_t other_node,
                     std::vector<IndexPair>& pairs) const;
 
-  std::vector<uint32_t> members_;  // of the leaves
+  std::vector<uint32_t> members_;  // members in the order of the leaves
   std::vector<Aabb> boxes_;  // node i has the children 2 i and 2 i + 1; the root is 1, the leaves come last
 };
 

@@ -14,7 +14,7 @@ namespace offstage::sim {
 
 class GroupedBroadPhase {
  public:
-  /// As the functions of BroadPhase, for objects of both levels.
+  /// These functions are as those of BroadPhase, for objects of both levels.
   void insert(uint32_t object, const Aabb& box, bool is_static = false);
   void move(uint32_t object, const Aabb& box);
   void remove(uint32_t object);
@@ -29,7 +29,7 @@ class GroupedBroadPhase {
 
  private:
   static constexpr uint32_t kAbsent = UINT32_MAX, kAlone = UINT32_MAX - 1;
-  /// In the grid under its first member.
+  /// A group; it is in the grid under its first member.
   struct Group {
     GroupTree tree;
     bool is_whole = true;  // no member has been removed; otherwise it is no longer treated as a group

@@ -13,7 +13,7 @@ namespace {
 
 constexpr uint32_t kMaxCorners = SupportingFeature::kMaxCorners;
 
-/// One of the two solids, as the manifold needs it, in A's frame.
+/// One of the two solids in A's frame, with the data for the manifold.
 struct Body {
   const Convex& convex;
   Mat3 rotation;
@@ -41,8 +41,8 @@ struct Body {
 
 // Clipping
 
-/// A corner of the incident feature's part over the reference face, and the side that leaves it: of the
-/// incident feature, or of the reference face if kMaxCorners are added.
+/// A corner of the part of the incident feature over the reference face, and the side that leaves it: a side
+/// of the incident feature, or of the reference face if kMaxCorners is added.
 struct Corner {
   Vec3 point;
   uint32_t id;
@@ -59,7 +59,7 @@ struct Polygon {
 };
 
 /// Sutherland and Hodgman, "Reentrant polygon clipping" (1974), against the planes that stand on the sides of
-/// the reference face. Segments and points pass as polygons of two corners and one.
+/// the reference face. Segments and points are clipped as polygons with two corners and one.
 class Clipping {
  public:
   Clipping(const Body& reference_body, const SupportingFeature& reference, const Body& incident_body,
@@ -72,11 +72,11 @@ class Clipping {
       part_.add({incident.corners[k].point, vertex_id(incident_body.name, incident.corners[k].tag), k});
   }
 
-  /// At all sides, beyond which points may be by `slop`.
+  /// Cuts at all sides; points may be outside of them by `slop`.
   void cut_all(Real slop) {
     for (uint32_t k = 0; k < reference_.count && part_.count > 0; ++k) cut(k, slop);
   }
-  /// At the k-th side.
+  /// Cuts at the k-th side.
   void cut(uint32_t k, Real slop) {
     const Vec3& corner = reference_.corners[k].point;
     const Vec3& next = reference_.corners[(k + 1) % reference_.count].point;
@@ -112,7 +112,7 @@ class Clipping {
     return edge_id(tag_of(f, k), tag_of(f, k + 1));
   }
 
-  /// Two neighbouring sides of the reference face meet in its vertex.
+  /// Id of a crossing. Two neighbouring sides of the reference face meet in its vertex.
   uint32_t id_of_crossing(uint32_t side, uint32_t reference_side) const {
     const uint32_t cut = side_id(reference_, reference_side);
     if (side < kMaxCorners) return crossing_id(incident_body_.name, side_id(incident_, side), cut);
@@ -133,8 +133,8 @@ class Clipping {
 
 // Kinds of contact
 
-/// Whether a face of `reference` may give the normal: how far its normal is from the separation's, as a sine;
-/// or more than kMaxTilt.
+/// Sine of the angle between the normal of a face of `reference` and that of the separation; more than
+/// kMaxTilt if the face cannot give the normal.
 Real tilt(const Body& reference, const SupportingFeature& f, const Body& incident, uint32_t incident_vertex,
           const Separation& s, Real tolerance) {
   constexpr Real kNever = 2;
@@ -146,16 +146,16 @@ Real tilt(const Body& reference, const SupportingFeature& f, const Body& inciden
   return s.distance - gap <= tolerance ? sine : kNever;
 }
 
-/// Whether a solid's surface turns through its contact when it rolls.
+/// Whether the surface turns through its contact when the solid rolls.
 bool is_round(const Convex& c) {
   using Core = Convex::Core;
   return c.core == Core::point || c.core == Core::segment || c.core == Core::cylinder || c.core == Core::cone;
 }
 
-/// The incident feature over a face, which gives the normal. `closest` is the separation's point on the
-/// incident solid: of a rim it may be deeper than the corners that stand for it. A round solid is over the
-/// face where it faces it, and else has no points: the line that is nearest to the face's edge would be
-/// pushed along the face's normal although it rolls down to the face.
+/// Contact with a face that gives the normal. `closest` is the closest point on the incident solid; for a rim
+/// it may be deeper than the corners of its polygon. The feature of a round solid is the one that faces the
+/// face; if this is not over the face, there are no points. The line nearest to an edge of the face is not
+/// used, because the face would push it along its normal although it rolls down to the face.
 void face_manifold(Manifold& m, const Body& reference, const SupportingFeature& face, Body incident,
                    SupportingFeature other, const Vec3& closest, Real margin, Real slack, Real slop,
                    Manifold* more) {
@@ -185,20 +185,20 @@ void face_manifold(Manifold& m, const Body& reference, const SupportingFeature& 
   reduce(m, candidates, slop, more);
 }
 
-/// Whether something may come near a face besides what touches with an edge or a vertex.
+/// Whether another part of the surface than the touching edge or vertex may come near a face.
 bool is_near(const Body& body, const SupportingFeature& f) {
   return f.is_face() && f.normal.dot(body.outward) > kNearFace;
 }
 
-/// The ends of the stretch along which two edges run side by side, if they do and are what the solids touch
-/// with.
+/// Adds the ends of the segment along which two edges run side by side, if they are parallel and are the
+/// closest features.
 void parallel_edges(Manifold& m, const Body& a, const SupportingFeature& of_a, const Body& b,
                     const SupportingFeature& of_b, Real distance, Real margin, Real tolerance) {
   if (of_a.count < 2 || of_b.count < 2) return;
   const Vec3 &p = of_a.corners[0].point, &q = of_b.corners[0].point;
   const Vec3 u = of_a.corners[1].point - p, w = of_b.corners[1].point - q;
-  // Seen along the normal, in shares of B's edge: where A's edge begins and how far it goes. Then where it
-  // passes the ends of B's.
+  // In a projection along the normal, in units of B's edge: where A's edge begins and how far it extends.
+  // Then where it passes the ends of B's edge.
   const Vec3 across = m.normal.cross(w), on_plane = across.cross(m.normal);
   if (across.squaredNorm() < 0.5 * w.squaredNorm()) return;
   const Real start = (p - q).dot(on_plane) / across.squaredNorm(),
@@ -222,13 +222,13 @@ void parallel_edges(Manifold& m, const Body& a, const SupportingFeature& of_a, c
   if (ends.least_separation() <= distance + tolerance) reduce(m, ends, 0);
 }
 
-/// Of an edge or a vertex.
+/// Tag of an edge or a vertex.
 uint32_t feature_id(const Body& body, const SupportingFeature& f) {
   return f.edge != Vec3::Zero() ? edge_id(f.corners[0].tag, f.corners[f.count - 1].tag)
                                 : vertex_id(body.name, f.corners[0].tag);
 }
 
-/// Edges and vertices, where no face gives the normal.
+/// Contact of edges and vertices, if no face gives the normal.
 void edge_manifold(Manifold& m, const Body& a, const Body& b, const Separation& s, Real margin, Real slack,
                    Real tolerance) {
   const SupportingFeature of_a = a.edge(slack, s.on_a), of_b = b.edge(slack, s.on_b);
@@ -294,7 +294,7 @@ Manifold triangle_face_manifold(const Convex& a, const Convex& b, const Pose& a_
   const SupportingFeature face = reference.feature(0), other = incident.feature(margin + rounding);
   if (!face.is_face()) return m;
 
-  // The edges that the sides are, as seen from this side of the triangle.
+  // Edges of the triangle that correspond to the sides, seen from this side of the triangle.
   std::array<Real, 3> room;
   for (uint32_t k = 0; k < 3; ++k) {
     const uint32_t from = face.corners[k].tag, to = face.corners[(k + 1) % 3].tag;
@@ -355,7 +355,7 @@ Manifold plane_manifold(const Convex& a, const Pose& plane_from_a, Real margin) 
   };
   for (uint32_t k = 0; k < feature.count; ++k)
     add(feature.corners[k].point - a.radius * Vec3::UnitY(), vertex_id(body.name, feature.corners[k].tag));
-  // Of a rim the lowest point may be between the corners that stand for it.
+  // The lowest point of a rim may be between the corners of its polygon.
   const Vec3 lowest = body.support(body.outward, feature.vertex);
   if (lowest.y() < candidates.least_separation() - (kRim * margin + rounding)) add(lowest, closest_id(0));
   reduce(m, candidates, kRim * margin + rounding);

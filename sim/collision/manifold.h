@@ -23,60 +23,63 @@ struct ContactPoint {
 enum class NormalSource : uint8_t {
   face_of_a,  ///< the normal is fixed in A
   face_of_b,  ///< the normal is fixed in B
-  edges,      ///< across a line fixed in A and one fixed in B
-  edge_of_a,  ///< from a point fixed in B, across a line fixed in A
-  edge_of_b,  ///< to a point fixed in A, across a line fixed in B
+  edges,      ///< the normal is perpendicular to a line fixed in A and to a line fixed in B
+  edge_of_a,  ///< from a point fixed in B, perpendicular to a line fixed in A
+  edge_of_b,  ///< to a point fixed in A, perpendicular to a line fixed in B
   points,     ///< from a point fixed in B to one fixed in A
 };
 
 struct Manifold {
   Vec3 normal = Vec3::UnitY();  ///< unit, from B to A
   NormalSource source = NormalSource::points;
-  Vec3 edge_a = Vec3::Zero(), edge_b = Vec3::Zero();  ///< unit directions of the lines that `source` names
+  Vec3 edge_a = Vec3::Zero(), edge_b = Vec3::Zero();  ///< unit directions of the lines of `source`
   /// Depth of those lines and points behind the surfaces [m]: the radius for a sphere's centre or the axis of
   /// a cylinder's side, 0 for a sharp edge, a vertex or a face.
   Real radius_a = 0, radius_b = 0;
   uint32_t count = 0;
-  uint32_t piece_a = 0, piece_b = 0;  ///< of the shapes (CollisionShape::piece())
-  /// Whether the surface of A (of B) is known to continue around the points in the plane across the normal.
-  /// Otherwise other pieces or bodies may be flush with it.
+  uint32_t piece_a = 0, piece_b = 0;  ///< indices of the pieces of both shapes (CollisionShape::piece())
+  /// Whether the surface of A (of B) is known to continue around the points in the plane perpendicular to the
+  /// normal. Otherwise other pieces or bodies may be flush with it.
   bool continues_a = false, continues_b = false;
   std::array<ContactPoint, 4> points;  ///< the deepest first
 };
 
-/// Further manifolds of solids that turn: the points that did not fit into four; and where an edge or a
-/// vertex touches, the points near a face, with those that did not fit.
+/// Further manifolds of solids that turn: the points beyond the first four and, where an edge or a vertex
+/// touches, points near a face.
 struct MoreManifolds {
   std::array<Manifold, 2> manifolds;
 };
 
-/// The manifold of two solids around their closest (or deepest) points, in A's frame: the features of both
-/// that face each other along the normal, one clipped against the other, keeping points within `margin` [m]
-/// of touching. Of more than four points, the deepest and those that span the greatest area are kept. At
-/// least one point if the separation itself is within the margin, none otherwise. Points on the radius around
-/// an inclined core are placed below the core's points, so all but the deepest are slightly inside the solid.
+/// Returns the manifold of two solids around their closest (or deepest) points, in A's frame. The features of
+/// both that face each other along the normal are found, one is clipped against the other, and points within
+/// `margin` [m] of touching are kept. Of more than four points, the deepest and those that span the greatest
+/// area are kept. There is at least one point if the separation is within the margin, otherwise none. Points
+/// on the radius around an inclined core are placed below the core's points, so all but the deepest are
+/// slightly inside the solid.
 ///
-/// A face that is almost across the separation's normal gives the normal instead of it: where the gap along
-/// the face's normal is less than a twentieth of the margin shorter. Solids at rest on each other therefore
-/// keep their normal and their points while they rock slightly. If both solids have such a face, the less
-/// inclined one gives the normal; if they are equal (to a thousandth), that of the larger solid, or A's.
+/// A face that is almost perpendicular to the normal of the separation gives the normal instead, if the gap
+/// along the face's normal is less than a twentieth of the margin shorter. Solids at rest on each other
+/// therefore keep their normal and their points while they rock slightly. If both solids have such a face,
+/// the less inclined one gives the normal; if they are equal (within a thousandth), that of the larger solid,
+/// or A's.
 ///
-/// `more`, if not null, gets the points of turning solids that may touch next and would otherwise be missed.
+/// `more`, if not null, gets the points of turning solids that may touch next.
 Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const Separation& s, Real margin,
                   MoreManifolds* more = nullptr);
 
-/// The manifold of a triangle whose face gives the normal, `up`, unit and away from the triangle, in A's
-/// frame, and of the other solid: the corners of its supporting feature that are in front of the face, and
-/// further points of the feature that are level with its deepest point. `of_b`: the triangle is B. `beyond`:
-/// by how much the points may be outside of the edges (0,1), (1,2), (2,0) [m]. May have no points.
+/// Returns the manifold of a triangle, whose face gives the normal, and the other solid. `up` is the unit
+/// normal away from the triangle, in A's frame. Points are the corners of the other solid's supporting
+/// feature that are in front of the face, and further points of the feature that are level with its deepest
+/// point. `of_b`: the triangle is B. `beyond`: how far points may be outside of the edges (0,1), (1,2), (2,0)
+/// [m]. May have no points.
 Manifold triangle_face_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, bool of_b,
                                 const Vec3& up, const std::array<Real, 3>& beyond, Real margin);
 
-/// The same manifold in another frame, for instance world_from_a's.
+/// Returns the same manifold in another frame, for instance with the pose of A in the world.
 Manifold placed(const Manifold& m, const Pose& pose);
 
-/// The manifold of a solid A on the half-space y <= 0, B, in the half-space's frame. The deepest point is
-/// exact for every core, to two thousandths of the margin.
+/// Returns the manifold of a solid A on the half-space y <= 0, B, in the frame of the half-space. The deepest
+/// point is accurate to two thousandths of the margin for every core.
 Manifold plane_manifold(const Convex& a, const Pose& plane_from_a, Real margin);
 
 }  // namespace offstage::sim

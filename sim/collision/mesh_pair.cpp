@@ -8,8 +8,8 @@
 namespace offstage::sim {
 namespace {
 
-/// The vertices of both meshes' triangles in A's frame. The traversal meets a triangle of B with many of A in
-/// a row, so the last one is kept.
+/// The vertices of the triangles of both meshes in A's frame. The traversal visits a triangle of B with many
+/// of A in a row, so the last one is kept.
 class PlacedTriangles {
  public:
   PlacedTriangles(const TriangleMesh& a, const TriangleMesh& b, const Placement& placement)

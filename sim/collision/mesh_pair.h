@@ -1,6 +1,6 @@
 #pragma once
-/// Pairs of triangles of two meshes that meet or are close (physics R3), tree against tree. Everything is
-/// computed and answered in the frame of the first mesh, A; `a_from_b` places the second in it.
+/// Pairs of triangles of two meshes that intersect or are close (physics R3), by two trees. All results are
+/// in the frame of the first mesh, A; `a_from_b` places the second one in it.
 
 #include <cstdint>
 #include <limits>
@@ -20,36 +20,37 @@ struct MeshTree {
   const BoundingTree<Volume>& tree;
 };
 
-/// Triangles of A and of B by index.
+/// Indices of a triangle of A and of one of B.
 struct TrianglePair {
   uint32_t a, b;
   friend auto operator<=>(const TrianglePair&, const TrianglePair&) = default;
 };
 
-/// Two triangles with their closest points. Where they intersect the points are one that they share.
+/// Two triangles with their closest points. If they intersect, both points are a common point.
 struct CloseTriangles {
   TrianglePair triangles;
   ClosestPoints points;
 };
 
-/// Whether any two triangles intersect. A mesh wholly inside another does not.
+/// Whether any two triangles intersect. A mesh completely inside another does not.
 template <class A, class B>
 bool surfaces_intersect(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& a_from_b);
 
-/// All pairs of intersecting triangles, each once, appended to `pairs` in an order that depends on the trees.
-/// They are just those for which triangles_intersect() holds after the rounding of B's vertices to A's frame.
+/// Appends all pairs of intersecting triangles to `pairs`, each once, in an order that depends on the trees.
+/// They are exactly those for which triangles_intersect() is true after the vertices of B are rounded to A's
+/// frame.
 template <class A, class B>
 void intersecting_triangles(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& a_from_b,
                             std::vector<TrianglePair>& pairs);
 
-/// All pairs of triangles within `tolerance` of each other [m], appended to `pairs`.
+/// Appends all pairs of triangles within `tolerance` [m] of each other to `pairs`.
 template <class A, class B>
 void close_triangles(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& a_from_b, Real tolerance,
                      std::vector<CloseTriangles>& pairs);
 
-/// The closest triangles of two meshes; none if one has no triangles or all are farther than `limit` [m].
-/// `start` is where to look first: the last query's answer, or any pair. It decides how soon the answer is
-/// found, not the distance.
+/// Returns the closest triangles of two meshes; none if one has no triangles or all are farther than `limit`
+/// [m]. `start` is the pair to test first: the result of the last query, or any pair. It affects how soon the
+/// result is found, not the distance.
 template <class A, class B>
 std::optional<CloseTriangles> closest_triangles(const MeshTree<A>& a, const MeshTree<B>& b,
                                                 const Pose& a_from_b,

@@ -9,13 +9,14 @@
 namespace offstage::sim {
 namespace {
 
-/// Of the square of its longest edge: a triangle of less area has no reliable normal.
+/// Share of the square of its longest edge: a triangle of less area has no reliable normal.
 constexpr Real kSliver = 1e-5;
-/// Slivers in a row that are looked past.
+/// Greatest number of slivers in a row that are skipped.
 constexpr int kMostSlivers = 16;
-/// Sine: normals that leave a region by less are allowed, for they are not found better.
+/// Sine: normals that are outside of a region by less than this are allowed, because normals are not more
+/// accurate.
 constexpr Real kOff = 1e-5;
-/// Of the longest edge: points this near to an edge or a vertex are on it.
+/// Share of the longest edge: points this near to an edge or a vertex are on it.
 constexpr Real kOnFeature = 1e-6;
 
 bool is_thin(const TriangleMesh& mesh, const Triangle& t) {
@@ -36,8 +37,8 @@ std::size_t longest_edge(const TriangleMesh& mesh, const Triangle& t) {
   return longest;
 }
 
-/// From an edge into a triangle that it belongs to, or along which it lies: unit and across the edge; zero if
-/// the triangle has no area.
+/// Direction from an edge into its triangle, or into one that has the edge on its side: unit and
+/// perpendicular to the edge; zero if the triangle has no area.
 Vec3 inward(const TriangleMesh& mesh, uint32_t face, const Vec3& from, const Vec3& to) {
   const Vec3 along = (to - from).normalized();
   Vec3 best = Vec3::Zero();
@@ -66,7 +67,8 @@ MeshSurface::MeshSurface(const TriangleMesh& mesh, const MeshTopology& topology)
     for (std::size_t k = 0; k < 3; ++k) {
       uint32_t from = f, next = topology.face_neighbours(f)[k];
       for (int i = 0; i < kMostSlivers && next != kNoFace && faces_[next].sliver; ++i) {
-        // Where the longest edge is the one that leads into it, past the longest of the others is as good.
+        // If the sliver is entered through its longest edge, the search goes on through the longest of its
+        // other edges.
         const auto& around = topology.face_neighbours(next);
         std::size_t out = longest_edge(mesh, mesh.triangles[next]);
         if (around[out] == from) out = around[(out + 1) % 3] != kNoFace ? (out + 1) % 3 : (out + 2) % 3;
@@ -109,7 +111,7 @@ bool SurfaceTriangle::vertex_allows(uint32_t vertex, const Vec3& n, Real guard) 
     for (std::size_t k = 0; k < 3; ++k) {
       const bool begins = corners[k] == vertex, ends = corners[(k + 1) % 3] == vertex;
       if (!begins && !ends) {
-        // It is opposite. Of a sliver the vertex may be in the middle of it.
+        // The edge is opposite to the vertex. In a sliver the vertex may lie on this edge.
         if (mesh->surface.is_sliver(f) && !t.edge_allows(k, n, guard)) return false;
         continue;
       }

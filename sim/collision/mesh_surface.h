@@ -12,13 +12,12 @@
 
 namespace offstage::sim {
 
-/// Neighbourhood of each triangle of a mesh; computed once.
+/// Surroundings of each triangle of a mesh; computed once.
 class MeshSurface {
  public:
   MeshSurface(const TriangleMesh& mesh, const MeshTopology& topology);
 
-  /// The triangles across the edges (0,1), (1,2), (2,0) of a face, past any without an area; kNoFace at a
-  /// border.
+  /// The triangles across the edges (0,1), (1,2), (2,0) of a face, skipping slivers; kNoFace at a border.
   const std::array<uint32_t, 3>& across(uint32_t face) const { return faces_[face].across; }
   /// Whether one of its vertices is at a border, beyond which the surface is unknown.
   bool is_at_border(uint32_t face) const { return faces_[face].at_border; }
@@ -39,17 +38,18 @@ class CollisionMesh;
 struct SurfaceTriangle {
   const CollisionMesh* mesh = nullptr;
   uint32_t face = 0;
-  int side = 1;  ///< 1: the front, from where its vertices are counter-clockwise; -1: the back
+  int side = 1;  ///< 1: the front, from which the vertices are counter-clockwise; -1: the back
 
-  /// Unit, on this side; zero if it has no area.
+  /// Unit normal on this side; zero if the triangle has no area.
   Vec3 normal() const;
-  /// The corner, 0 to 2.
+  /// Corner k, 0 to 2.
   const Vec3& corner(std::size_t k) const;
-  /// How steeply the surface falls beyond the edge (k, k + 1), as the sine of the angle from the triangle's
-  /// plane: positive at a ridge, negative in a valley, 0 where it is flat or ends.
+  /// Slope of the surface beyond the edge (k, k + 1), as the sine of the angle below the triangle's plane:
+  /// positive at a ridge, negative in a valley, 0 where the surface is flat or ends.
   Real fall(std::size_t k) const;
-  /// Whether a contact at a point of the triangle can push along `n`, unit, on this side of it. `guard`, 0 to
-  /// 1: normals outside of a ridge's region by less than this share of its fall are allowed, too.
+  /// Whether a contact at a point of the triangle can push along the unit vector `n` on this side. With
+  /// `guard`, 0 to 1, normals outside of the region of a ridge by less than this share of its slope are
+  /// allowed, too.
   bool allows(const Vec3& point, const Vec3& n, Real guard = 0) const;
 
  private:

@@ -1,4 +1,4 @@
-/// time_of_impact() of shapes made of many pieces.
+/// time_of_impact() for shapes with many pieces.
 
 #include <algorithm>
 #include <cassert>
@@ -12,12 +12,12 @@ namespace offstage::sim {
 namespace {
 
 constexpr int kMaxMeshAdvances = 2000;
-/// How often touching shapes are looked at on their way.
+/// Number of points of the motion at which shapes that touch are sampled.
 constexpr int kLooks = 32;
 
 using Node = AabbTree::Node;
 
-/// Two shapes at one share of their ways.
+/// Two shapes at one time of their motions.
 class Instant {
  public:
   Instant(const MovingShape& a, const MovingShape& b, Real share, Real tolerance)
@@ -35,15 +35,15 @@ class Instant {
         spin_b_(pose_a_.vector_to_body(b.path.angular_velocity(share))) {}
 
   const Pose& a_from_b() const { return a_from_b_; }
-  /// Where the first two pieces touch, if any do now; the closest of them.
+  /// The closest two pieces, if any are in contact at this time.
   const std::optional<Separation>& contact() const { return contact_; }
 
-  /// The least share after which any two pieces can come within half the tolerance; 0 if two are within it
-  /// now.
+  /// Returns a lower bound of the time until any two pieces come within half the tolerance; 0 if two are
+  /// within it now.
   Real time_to_contact(Real limit) {
     time_ = limit;
     const AabbTree &tree_a = a_.shape.tree(), &tree_b = b_.shape.tree();
-    NodePairStack<Aabb, Aabb> stack;  // `gap` is the time here
+    NodePairStack<Aabb, Aabb> stack;  // `gap` holds the time here
     const auto timed = [&](NodePair<Aabb, Aabb> pair) {
       pair.gap = node_time(*pair.a, *pair.b);
       return pair;
@@ -51,7 +51,7 @@ class Instant {
     stack.push(timed({&tree_a.nodes()[0], &tree_b.nodes()[0]}));
     while (!stack.empty()) {
       const NodePair<Aabb, Aabb> pair = stack.pop();
-      // Touching pairs have time 0: among them the nearest is wanted, so that equal times are looked at.
+      // Touching pairs have time 0. The nearest of them is wanted, so pairs with equal times are not skipped.
       if (pair.gap > time_ || pair.gap >= limit) continue;
       if (pair.a->is_leaf() && pair.b->is_leaf()) {
         for (uint32_t i : tree_a.items(*pair.a))
@@ -69,8 +69,8 @@ class Instant {
   }
 
  private:
-  /// Bound for all that is beneath two nodes, along that axis of the two boxes on which they are farthest
-  /// apart.
+  /// Lower bound of the time for all pieces below two nodes, along the axis of the two boxes on which they
+  /// are farthest apart.
   Real node_time(const Node& a, const Node& b) const {
     const Mat3& R = placement_.rotation;
     const Vec3 offset = placement_.point(centre(b.volume)) - centre(a.volume);
@@ -117,14 +117,14 @@ class Instant {
   std::optional<Separation> contact_;
 };
 
-/// How far a path's speed may be off that of an even turn, for the points of a shape on it: its rate is that
-/// of an even one within angle^2 / 24 [m per step].
+/// Bound of the deviation of a path's speed from that of a constant rotation, for all points of a shape [m
+/// per step]. The rate of a path deviates from a constant one by at most angle^2 / 24.
 Real unevenness(const MovingShape& s) {
   if (s.shape.is_plane()) return 0;
   return s.path.turn() * s.path.max_acceleration(s.shape.hull().reach()) / 24;
 }
 
-/// Of the point at a place of the world on its way [m per step].
+/// Velocity of the material point that is at `place` [m per step].
 Vec3 velocity(const PosePath& path, Real share, const Vec3& place) {
   return path.velocity() + path.angular_velocity(share).cross(place - path.at(share).position);
 }

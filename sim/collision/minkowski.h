@@ -1,7 +1,7 @@
 #pragma once
-/// The Minkowski difference A - B = {a - b} of two cores in A's frame, by its support mapping. It holds the
-/// origin where they overlap; otherwise its point nearest to the origin is the vector between their closest
-/// points.
+/// The Minkowski difference A - B = {a - b} of two cores in A's frame, by its support mapping. It contains
+/// the origin if the cores overlap; otherwise its point nearest to the origin is the vector between their
+/// closest points.
 
 #include <limits>
 
@@ -10,7 +10,7 @@
 
 namespace offstage::sim {
 
-/// Vertex numbers of a core of A and one of B; see Convex::support.
+/// Vertex numbers of a point of A's core and one of B's; see Convex::support.
 struct VertexPair {
   uint32_t a = 0, b = 0;
   bool operator==(const VertexPair&) const = default;
@@ -19,7 +19,7 @@ struct VertexPair {
 /// A support point of A - B.
 struct SupportPoint {
   Vec3 w;  ///< the point
-  Vec3 a;  ///< the point of A's core which it comes from
+  Vec3 a;  ///< the point of A's core from which it results
   VertexPair from;
 };
 
@@ -28,7 +28,8 @@ class MinkowskiDifference {
   MinkowskiDifference(const Convex& a, const Convex& b, const Pose& a_from_b)
       : a_(a), b_(b), R_(a_from_b.orientation.toRotationMatrix()), t_(a_from_b.position) {}
 
-  /// The point of A - B that is lowest along `d`, which need not be unit. Vertices are climbed from `hint`.
+  /// Returns the point of A - B that is lowest along `d`, which need not be unit. Vertices are climbed from
+  /// `hint`.
   SupportPoint lowest(const Vec3& d, VertexPair hint) const {
     SupportPoint p;
     p.from = hint;
@@ -36,16 +37,16 @@ class MinkowskiDifference {
     p.w = p.a - place(b_.support(R_.transpose() * d, p.from.b));
     return p;
   }
-  /// The point of two vertices.
+  /// Difference of two vertices.
   SupportPoint at(VertexPair from) const {
     const Vec3 a = a_.vertex(from.a);
     return {a - place(b_.vertex(from.b)), a, from};
   }
-  /// Whether all points of lowest() are differences of vertices.
+  /// Whether all points returned by lowest() are differences of vertices.
   bool has_vertices() const { return a_.has_vertices() && b_.has_vertices(); }
-  /// A point inside.
+  /// A point inside A - B.
   Vec3 centre() const { return a_.centre() - place(b_.centre()); }
-  /// Approximate bound of the rounding error of its points [m].
+  /// Approximate bound of the rounding error of the points of A - B [m].
   Real rounding() const {
     return std::numeric_limits<Real>::epsilon() * (a_.reach() + b_.reach() + t_.norm());
   }

@@ -40,9 +40,9 @@ Separation plane_separation(const Convex& a, const Pose& a_from_plane) {
   return s;
 }
 
-/// On which side of a triangle the other piece is. As long as they are apart it is where the piece is seen
-/// from the triangle; `height`, of the piece's middle over its front, says so. One that penetrates it is
-/// where it was, or else where it is of the triangles around.
+/// Returns the side of a triangle on which the other piece is. If they are apart, it is the side from which
+/// the triangle is seen, given by `height`, that of the piece's centre over the front. A piece that
+/// penetrates the triangle keeps its previous side or takes the side of a neighbouring triangle.
 template <class SideOfFace>
 int side_of(const SurfaceTriangle& t, Real height, bool apart, int before, SideOfFace&& side_of_face) {
   const int seen = height >= 0 ? 1 : -1;
@@ -53,7 +53,7 @@ int side_of(const SurfaceTriangle& t, Real height, bool apart, int before, SideO
   return seen;
 }
 
-/// Two pieces of two shapes that are near each other, on their way to a manifold.
+/// Two pieces of two shapes that are near each other, for which manifolds are computed.
 class PiecePair {
  public:
   PiecePair(const CollisionShape& shape_a, uint32_t i, const CollisionShape& shape_b, uint32_t j,
@@ -67,7 +67,7 @@ class PiecePair {
         a_(shape_a.piece(i)),
         b_(shape_b.piece(j)) {}
 
-  /// Finds the manifolds in the quickest way there is for the pieces' cores.
+  /// Appends the manifolds, by the fastest method for the cores of the pieces.
   void find(Real margin, DistanceMethod method, bool turning, std::vector<Manifold>& found) {
     const std::size_t before = found.size();
     const CollisionMesh *mesh_a = shape_a_.surface(), *mesh_b = shape_b_.surface();
@@ -88,7 +88,7 @@ class PiecePair {
   }
 
  private:
-  /// A round surface, and the inside of one that is all known, has no seams.
+  /// Round surfaces have no seams. A triangle whose surroundings are all known has none either.
   static bool continues(const CollisionShape& shape, uint32_t piece) {
     if (const CollisionMesh* mesh = shape.surface()) return !mesh->surface.is_at_border(piece);
     return std::holds_alternative<Sphere>(*shape.solid().shape) ||
@@ -124,7 +124,7 @@ class PiecePair {
     return e ? e->side_of_b : 0;
   }
 
-  /// `centre` of the sphere and `mesh_pose` in A's frame.
+  /// `centre` (of the sphere) and `mesh_pose` are in A's frame.
   void find_sphere(SurfaceTriangle triangle, const Convex& sphere, const Vec3& centre, const Pose& mesh_pose,
                    bool of_b, Real margin, std::vector<Manifold>& found) {
     if (triangle.mesh->surface.is_sliver(triangle.face)) return;
@@ -155,7 +155,7 @@ class PiecePair {
     PairCache::Entry& entry = cache_.of(i_, j_);
     const Separation s = measure(a_, b_, a_from_b_, method, entry);
     const bool apart = s.distance > 0;
-    // Of a normal along the triangle it is the middle of the other piece that says on which side it is.
+    // If the normal is along the triangle, the centre of the other piece determines the side.
     const auto height = [&](const SurfaceTriangle& t, const Vec3& outward, const Vec3& middle) {
       constexpr Real kAlongside = 0.01;
       const Real lean = outward.dot(t.normal());
@@ -186,8 +186,8 @@ class PiecePair {
   Convex a_, b_;
 };
 
-/// How deep a shape is inside a hollow one that none of its pieces touches, as seen from the hollow one's
-/// frame: it is pushed out whole along the way that its centre has to the surface. None if it is outside.
+/// Depth of a shape inside a hollow one whose pieces it does not touch, in the hollow one's frame. The shape
+/// is pushed out along the direction from its centre to the surface. None if it is outside.
 struct Inside {
   Real depth;
   Vec3 outward, deepest;  // hollow's frame

@@ -50,8 +50,8 @@ class PairCache {
   std::vector<Used> entries_;  // ascending by pieces
 };
 
-/// Signed distance of the closest, or deepest, two pieces; none if all are farther than `limit` [m]. A piece
-/// inside a hollow shape counts as penetrating, too.
+/// Returns the signed distance of the closest, or deepest, two pieces; none if all are farther than `limit`
+/// [m]. A piece inside a hollow shape counts as penetrating, too.
 std::optional<Separation> separation(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b,
                                      PairCache& cache, DistanceMethod method = DistanceMethod::gjk,
                                      Real limit = std::numeric_limits<Real>::infinity());
@@ -60,7 +60,7 @@ std::optional<Separation> separation(const CollisionShape& a, const CollisionSha
 bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b);
 
 /// Appends the manifolds of all pairs of pieces within `margin` [m] of each other, in an order that depends
-/// on the shapes alone. For every method, two boxes use the separating axis test, and spheres use closed
+/// only on the shapes. For every method, two boxes use the separating axis test, and spheres use closed
 /// forms. If the shapes turn relative to each other (`turning`), points that may touch next are added as
 /// further manifolds (`more` of manifold()).
 void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b, Real margin,
@@ -73,16 +73,16 @@ struct MovingShape {
   const PosePath& path;
 };
 
-/// Share of the step at which the shapes are within `tolerance` [m], > 0, of each other. Before it they are
-/// never within half of that distance. None if they stay more than half of it apart. Shapes that begin within
-/// it, or one inside the other, have their impact at share 0. Conservative advancement over both trees at
-/// once, with a bound on the motion per node: Tang, Kim, Manocha, "C2A: controlled conservative advancement
-/// for continuous collision detection of polygonal models" (2009).
+/// Returns the time, as a share of the step, at which the shapes are within `tolerance` [m], > 0, of each
+/// other. Before it they are never within half of that distance. None if they stay more than half of it
+/// apart. For shapes that are within it at the start, or one inside the other, the time is 0. The method is
+/// conservative advancement over both trees at once, with a bound on the motion per node: Tang, Kim, Manocha,
+/// "C2A: controlled conservative advancement for continuous collision detection of polygonal models" (2009).
 std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance);
 
-/// Time of the next impact of shapes that are within the tolerance at the start and may stay so or separate.
-/// An impact is where their nearest or deepest points approach faster than `speed` [m per step], > 0, and
-/// faster than the deviation of the turn from a constant rate. The points are sampled along the motion until
+/// Returns the time of the next impact of shapes that are within the tolerance at the start and may stay so
+/// or separate. An impact is where their nearest or deepest points approach faster than `speed` [m per step],
+/// > 0, plus the deviation of the turn from a constant rate. The points are sampled along the motion until
 /// the shapes are separate, because conservative advancement makes no progress within the tolerance.
 std::optional<Impact> time_of_next_impact(const MovingShape& a, const MovingShape& b, Real tolerance,
                                           Real speed);

@@ -19,7 +19,7 @@ Obstacle::Obstacle(const Solid& shape, const Pose& from, const Pose& to, Real du
   const Eigen::AngleAxisd axis_angle(rotation);
   angular_velocity = axis_angle.angle() / duration * axis_angle.axis();
   if (std::holds_alternative<Sphere>(*shape.shape)) {
-    end.orientation = from.orientation;  // a turning sphere stays where it is
+    end.orientation = from.orientation;  // the orientation of a sphere does not matter
   } else {
     turn = axis_angle.angle();
     if (from.orientation.dot(end.orientation) < 0) end.orientation.coeffs() = -end.orientation.coeffs();
@@ -39,7 +39,7 @@ Vec3 Obstacle::friction_axis_on(const Vec3& n, Real fraction) const {
   if (cross_friction == 1 || friction_axis.isZero()) return Vec3::Zero();
   const Vec3 axis = at(fraction).vector_to_world(friction_axis), along = axis - n.dot(axis) * n;
   const Real length = along.norm();
-  if (length < 1e-6 * axis.norm()) return Vec3::Zero();  // it stands on the surface
+  if (length < 1e-6 * axis.norm()) return Vec3::Zero();  // the axis is perpendicular to the surface
   return along / length;
 }
 
@@ -51,7 +51,7 @@ Mat3 Obstacle::mobility(const Vec3& arm) const {
 
 int Obstacle::pieces(Real particle_radius) const {
   if (turn == 0) return 1;
-  // An arc of angle a and radius R leaves its chord by R a^2 / 8.
+  // An arc of angle a and radius R deviates from its chord by R a^2 / 8.
   const Real count = turn * std::sqrt(extent / (8 * kChordError * particle_radius));
   return count < kMaxPieces ? std::max(1, static_cast<int>(std::ceil(count))) : kMaxPieces;
 }

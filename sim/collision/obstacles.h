@@ -50,11 +50,12 @@ struct Obstacle {
   Vec3 friction_axis =
       Vec3::Zero();       ///< direction of the surface's friction axis, in the solid's frame; zero: none
   uint32_t body = 0;      ///< the world's index of the body
-  Real inverse_mass = 0;  ///< [1/kg]; 0: particles do not move it
-  Mat3 inverse_inertia =
-      Mat3::Zero();  ///< about the centre of mass, world axes at the end of the sub-step [1/(kg m^2)]
-  Vec3 centre = Vec3::Zero();  ///< of mass, in the solid's frame
-  /// Of a dynamic one: velocity of the centre of mass and angular velocity at the end of the sub-step, world.
+  Real inverse_mass = 0;  ///< inverse mass [1/kg]; 0: particles do not move it
+  /// About the centre of mass, world axes at the end of the sub-step [1/(kg m^2)].
+  Mat3 inverse_inertia = Mat3::Zero();
+  Vec3 centre = Vec3::Zero();  ///< centre of mass in the solid's frame
+  /// For a dynamic body: velocity of the centre of mass and angular velocity at the end of the sub-step,
+  /// world axes.
   Vec3 end_velocity = Vec3::Zero(), end_spin = Vec3::Zero();
 };
 
@@ -96,7 +97,7 @@ class Obstacles {
     Real start_offset, end_offset;
     uint32_t obstacle;
 
-    /// Least height of the two points above the two planes.
+    /// Smallest height of the two points above the two planes.
     Real height(const Vec3& a, const Vec3& b) const {
       return std::min(std::min(start_normal.dot(a), start_normal.dot(b)) - start_offset,
                       std::min(end_normal.dot(a), end_normal.dot(b)) - end_offset);

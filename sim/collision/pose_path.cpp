@@ -4,17 +4,17 @@
 
 namespace offstage::sim {
 
-// With f half the angle and a(s) the half angle turned at share s, the interpolation has
+// Let f be half the angle and a(s) half the angle turned at share s. Then
 //   tan a = s sin f / ((1 - s) + s cos f),  da/ds = sin f / D,  D = 1 - 2 s (1 - s) (1 - cos f).
-// The spin 2 da/ds is largest at s = 1/2, 4 tan(f/2), and changes by at most 16 tan^3(f/2). A point at
-// distance 1 from the axis has the centripetal acceleration spin^2 and the tangential one of the spin's
-// change.
+// The angular speed 2 da/ds has its maximum 4 tan(f/2) at s = 1/2, and its rate is at most 16 tan^3(f/2). A
+// point at distance 1 from the axis has the centripetal acceleration (2 da/ds)^2 and the tangential
+// acceleration of that rate.
 PosePath::PosePath(const Pose& start, const Pose& end)
     : start_(start), end_(end), velocity_(end.position - start.position) {
   if (start_.orientation.dot(end_.orientation) < 0) end_.orientation.coeffs() = -end_.orientation.coeffs();
   const Quat rotation = end_.orientation * start_.orientation.conjugate();
   sine_ = rotation.vec().norm();
-  // Orientations that differ by rounding alone do not turn.
+  // Orientations that differ only by rounding do not turn.
   if (start_.orientation.coeffs() == end_.orientation.coeffs() || sine_ < 1e-15) sine_ = 0;
   cosine_ = std::max(0.0, rotation.w());
   axis_ = sine_ > 0 ? Vec3(rotation.vec() / sine_) : Vec3::Zero();

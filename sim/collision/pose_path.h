@@ -1,9 +1,9 @@
 #pragma once
-/// Path of a solid from one pose to another during a step. Its frame's origin moves on a straight line at
-/// constant speed. Its orientation follows the shortest arc, by normalised linear interpolation of the two
-/// quaternions. That turns about a fixed axis and needs no trigonometry; its rate is within 6 % of constant
-/// for a quarter turn and 1 + angle^2 / 48 for small ones. Time is the share of the step, from 0 to 1, so
-/// velocities are per step.
+/// Path of a solid from one pose to another during a step. The origin of its frame moves on a straight line
+/// at constant speed. Its orientation follows the shortest arc, by normalised linear interpolation of the two
+/// quaternions: a rotation about a fixed axis that needs no trigonometry. The rate of rotation is constant
+/// within 6 % for a quarter turn, and within angle^2 / 48 for small angles. Time is the share of the step,
+/// from 0 to 1, so velocities are per step.
 
 #include "sim/core/types.h"
 
@@ -21,7 +21,7 @@ class PosePath {
 
   /// Velocity of the origin, world [m per step].
   const Vec3& velocity() const { return velocity_; }
-  /// World [rad per step].
+  /// Angular velocity, world [rad per step].
   Vec3 angular_velocity(Real share) const;
   /// Whether the orientations differ, and the angle between them, 0 to pi [rad].
   bool turns() const { return sine_ > 0; }
@@ -33,8 +33,8 @@ class PosePath {
   Pose start_, end_;
   Vec3 velocity_;
   Vec3 axis_;              // unit, world
-  Real sine_, cosine_;     // of half the angle of the turn
-  Real max_acceleration_;  // of a point at distance 1
+  Real sine_, cosine_;     // sine and cosine of half the angle of rotation
+  Real max_acceleration_;  // acceleration of a point at distance 1
 };
 
 }  // namespace offstage::sim

@@ -5,11 +5,12 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kOnEdge = 1e-15;  // share of the corners' distance: an origin beyond an edge by this is on it
-constexpr Real kFlatAngle2 = 1e-24;  // squared sine of the angle of a triangle that has no normal
-constexpr Real kRounding = 1e-13;    // of a volume, relative to the edges it is made of
+// Share of the distance of the corners: an origin beyond an edge by less than this counts as on it.
+constexpr Real kOnEdge = 1e-15;
+constexpr Real kFlatAngle2 = 1e-24;  // squared sine of the angle below which a triangle has no normal
+constexpr Real kRounding = 1e-13;    // rounding error of a volume, relative to the product of its edges
 
-/// A point with its place in the simplex.
+/// A point with its index in the simplex.
 struct SimplexCorner {
   const Vec3& w;
   uint8_t place;
@@ -27,7 +28,8 @@ SimplexPoint on_segment(const SimplexCorner& i, const SimplexCorner& j) {
   const Real t = along / length2;
   Vec3 v = p + t * e;
   v -= e.dot(v) / length2 *
-       e;  // square to the edge even if tiny, since its direction matters as much as its length
+       // This is perpendicular to the edge even if tiny, because its direction matters as much as its length.
+       e;
   return {v, v.squaredNorm(), 2, {i.place, j.place}, {1 - t, t}};
 }
 
@@ -35,8 +37,8 @@ void keep_nearer(SimplexPoint& best, const SimplexPoint& p) {
   if (p.squared < best.squared) best = p;
 }
 
-// With n normal to the triangle, the barycentric coordinates of the origin's foot are areas seen along n. The
-// nearest point of a triangle lies on an edge whose coordinate is negative, if there are any.
+// With n normal to the triangle, the barycentric coordinates of the origin's projection are areas seen along
+// n. If any coordinate is negative, the nearest point lies on an edge with a negative coordinate.
 SimplexPoint on_triangle(const SimplexCorner& i, const SimplexCorner& j, const SimplexCorner& k) {
   const Vec3 &p = i.w, e = j.w - p, f = k.w - p, n = e.cross(f);
   const Real area2 = n.squaredNorm();
@@ -61,8 +63,8 @@ SimplexPoint on_triangle(const SimplexCorner& i, const SimplexCorner& j, const S
   return best;
 }
 
-// Likewise one dimension up: a face whose coordinate is negative holds the nearest point. The coordinates of
-// a tetrahedron that is flat within rounding mean nothing: any of its faces may.
+// As for a triangle: the nearest point lies in a face with a negative coordinate. The coordinates of a
+// tetrahedron that is flat within rounding are meaningless, so all of its faces are tried.
 SimplexPoint in_tetrahedron(const SimplexCorner& i, const SimplexCorner& j, const SimplexCorner& k,
                             const SimplexCorner& l) {
   const Vec3 &p = l.w, e = i.w - p, f = j.w - p, g = k.w - p;
@@ -111,7 +113,8 @@ SimplexPoint nearest_on_triangle(const Vec3& p, const Vec3& q, const Vec3& r) {
 }
 
 void reduce(Simplex& s, SimplexPoint& p) {
-  for (uint8_t k = 0; k < p.size; ++k) {  // the corners ascend: none is overwritten before it is read
+  // Indices of corners ascend, so none is overwritten before it is read.
+  for (uint8_t k = 0; k < p.size; ++k) {
     if (p.corner[k] != k) s.points[k] = s.points[p.corner[k]];
     p.corner[k] = k;
   }

@@ -1,7 +1,7 @@
 #pragma once
 /// Simplices of GJK and its distance sub-algorithm by signed volumes: the signs of the origin's barycentric
 /// coordinates determine the faces that can contain the nearest point (after Montanari, Petrinic, Barbieri,
-/// 2017). Only differences from one corner are used, so a small simplex far from the origin is as exact as
+/// 2017). Only differences from one corner are used, so a small simplex far from the origin is as accurate as
 /// its corners.
 
 #include <array>
@@ -24,16 +24,17 @@ struct SimplexPoint {
   std::array<uint8_t, 4> corner{};
   std::array<Real, 4> weight{};
 
-  /// The point of A's core that it comes from.
+  /// The point of A's core from which it results.
   Vec3 on_a(const Simplex& s) const;
 };
 
-/// The nearest point of a simplex of 1-4 points. Three corners are preferred where two would do within
-/// rounding, since a triangle's normal is exact however near the origin is.
+/// Returns the point of a simplex of 1-4 points that is nearest to the origin. Three corners are preferred
+/// where two would do within rounding, because the normal of a triangle is accurate however near the origin
+/// is.
 SimplexPoint nearest_point(const Simplex& s);
 SimplexPoint nearest_on_triangle(const Vec3& p, const Vec3& q, const Vec3& r);
 
-/// Removes the corners without weight; the others become 0, 1, ...
+/// Removes the corners with weight 0; the others are renumbered 0, 1, ...
 void reduce(Simplex& s, SimplexPoint& p);
 
 }  // namespace offstage::sim

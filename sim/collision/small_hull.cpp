@@ -8,32 +8,32 @@
 namespace offstage::sim {
 namespace {
 
-/// The hull as triangles, grown point by point from a tetrahedron.
+/// The hull as triangles, which grows point by point from a tetrahedron.
 class SmallHull {
  public:
   struct Face {
     std::array<uint32_t, 3> v;
     Vec3 normal;
-    Real length;  ///< of the normal: twice the area
+    Real length;  ///< length of the normal: twice the area
   };
 
   explicit SmallHull(std::span<const Vec3> points);
 
   std::span<const Face> faces() const { return {faces_.data(), static_cast<std::size_t>(face_count_)}; }
-  /// Relative to the first of the points given.
+  /// Point i relative to the first of the given points.
   const Vec3& point(uint32_t i) const { return points_[i]; }
-  /// Between two points far apart; all there is if there are no faces.
+  /// Vector between two distant points; the whole result if there are no faces.
   const Vec3& diameter() const { return diameter_; }
 
  private:
-  /// The point for which f is largest, and how large.
+  /// Returns the point for which f is largest, with this value.
   template <class F>
   std::pair<uint32_t, Real> farthest(F&& f) const;
   void grow_from(uint32_t a, uint32_t b, uint32_t c);
   void add_face(uint32_t a, uint32_t b, uint32_t c);
   void add_point(uint32_t p);
 
-  static constexpr std::size_t kCapacity = kSmallHullPoints + 2;  // two for the apexes of a flat set
+  static constexpr std::size_t kCapacity = kSmallHullPoints + 2;  // two more for the apexes of a flat set
   static constexpr std::ptrdiff_t kMaxFaces = 2 * kCapacity;
 
   std::array<Vec3, kCapacity> points_;
@@ -66,12 +66,12 @@ std::pair<uint32_t, Real> SmallHull::farthest(F&& f) const {
   return best;
 }
 
-/// From the triangle a, b, c and the point farthest from its plane.
+/// Starts with the triangle a, b, c and the point farthest from its plane.
 void SmallHull::grow_from(uint32_t a, uint32_t b, uint32_t c) {
   const Vec3 normal = diameter_.cross(points_[c] - points_[a]).normalized();
   const auto height = [&](const Vec3& p) { return normal.dot(p - points_[a]); };
   auto [d, most] = farthest([&](const Vec3& p) { return std::abs(height(p)); });
-  // A flat set gets an apex on either side, so low that what is measured is the polygon.
+  // A flat set gets an apex on either side, so low that it does not change the result.
   constexpr Real kFlat = 1e-9, kApex = 1e-6;
   if (most <= kFlat * diameter_.norm()) {
     const Vec3 middle = (points_[a] + points_[b] + points_[c]) / 3, up = kApex * diameter_.norm() * normal;
@@ -93,15 +93,14 @@ void SmallHull::add_face(uint32_t a, uint32_t b, uint32_t c) {
   faces_[static_cast<std::size_t>(face_count_++)] = {{a, b, c}, normal, normal.norm()};
 }
 
-/// Replaces the faces that see p by those that join their outline to it.
+/// Replaces the faces that are visible from p by faces that connect their outline with p.
 void SmallHull::add_point(uint32_t p) {
   const Real rounding = 1e-12 * diameter_.norm();
   const auto seen = std::partition(faces_.begin(), faces_.begin() + face_count_, [&](const Face& f) {
     return f.normal.dot(points_[p] - points_[f.v[0]]) <= rounding * f.length;
   });
   static_assert(kCapacity <= 32);
-  std::array<uint32_t, kCapacity>
-      heads{};  // bit j of heads[i]: an edge from i to j bounds a face that is seen
+  std::array<uint32_t, kCapacity> heads{};  // Bit j of heads[i]: an edge from i to j bounds a visible face.
   std::array<std::pair<uint32_t, uint32_t>, 3 * kMaxFaces> edges;
   std::size_t edge_count = 0;
   for (auto f = seen; f != faces_.begin() + face_count_; ++f)
@@ -114,7 +113,7 @@ void SmallHull::add_point(uint32_t p) {
     if (const auto [tail, head] = edges[e]; !(heads[head] >> tail & 1)) add_face(tail, head, p);
 }
 
-/// About the triangle's centre, per unit of area.
+/// Covariance about the triangle's centre, per unit of area.
 Mat3 triangle_covariance(const Vec3& p, const Vec3& q, const Vec3& r) {
   const Vec3 middle = (p + q + r) / 3, u = p - middle, v = q - middle, w = r - middle;
   return (u * u.transpose() + v * v.transpose() + w * w.transpose()) / 12;

@@ -1,7 +1,7 @@
 #pragma once
-/// The convex hull of a few points, for fitting oriented boxes to the hundred thousands of nodes of a tree,
-/// where Qhull would take minutes. Only the directions of the boxes depend on it, not their contents, so it
-/// is not robust against rounding beyond staying within its bounds; convex_hull.h is.
+/// The convex hull of a few points, for fitting oriented boxes to the hundreds of thousands of nodes of a
+/// tree, for which Qhull would take minutes. Only the directions of the boxes depend on it, not which points
+/// they contain, so it is not robust against rounding beyond staying within its bounds; convex_hull.h is.
 
 #include <array>
 #include <cstdint>
@@ -13,9 +13,9 @@ namespace offstage::sim {
 
 inline constexpr std::size_t kSmallHullPoints = 24;
 
-/// Covariance of the surface of the convex hull of at most kSmallHullPoints points, at least one, about its
-/// own centre and weighted by area (physics H). Of flat sets that of their polygon; of straight ones some
-/// matrix with their direction as its last eigenvector; of equal points zero.
+/// Covariance of the surface of the convex hull of 1 to kSmallHullPoints points, about its own centre and
+/// weighted by area (physics H). For flat sets it is that of their polygon; for straight sets some matrix
+/// with their direction as its last eigenvector; for equal points zero.
 Mat3 hull_covariance(std::span<const Vec3> points);
 
 }  // namespace offstage::sim

@@ -10,17 +10,17 @@ namespace {
 
 using Core = Convex::Core;
 
-/// Of the size: nearer to a core than this there is no direction from it.
+/// Share of the size: nearer to a core than this, the direction from it is undefined.
 constexpr Real kNoDirection = 1e-12;
 
-/// The nearest point of a core's surface, in the core's frame.
+/// The nearest point on the surface of a core, in the core's frame.
 struct Nearest {
   enum class Kind : uint8_t { face, edge, point };
   Kind kind = Kind::point;
   Real distance = 0;              ///< negative inside [m]
-  Vec3 outward = Vec3::UnitY();   ///< unit, towards the point asked for
-  Vec3 edge = Vec3::Zero();       ///< unit, of an edge
-  uint32_t tag = 0, end_tag = 0;  ///< of a vertex, or of both ends of an edge
+  Vec3 outward = Vec3::UnitY();   ///< unit, towards the query point
+  Vec3 edge = Vec3::Zero();       ///< unit direction, if it is on an edge
+  uint32_t tag = 0, end_tag = 0;  ///< tag of the vertex, or tags of both ends of the edge
 };
 
 Nearest nearest_to_point(const Vec3& p) {
@@ -77,7 +77,7 @@ Nearest nearest(const Convex& c, const Vec3& p) {
   return c.core == Core::segment ? nearest_to_segment(c.half.y(), p) : nearest_to_point(p);
 }
 
-/// Of the contact of the sphere's centre and the feature.
+/// Id of the contact of the sphere's centre with the feature.
 uint32_t contact_id(const Nearest& n, uint32_t other) {
   const uint32_t sphere = vertex_id(1 - other, 0);
   if (n.kind == Nearest::Kind::face) return sphere;
@@ -122,7 +122,7 @@ void sphere_manifold(const Convex& a, const Pose& pose_a, const Convex& b, const
   m.radius_a = a.radius;
   m.radius_b = b.radius;
   set_source(m, n, other, pose.vector_to_world(n.edge));
-  // From the sphere's centre.
+  // Seen from the sphere's centre.
   ContactPoint& p = m.points[m.count++];
   p.separation = separation;
   p.id = contact_id(n, other);

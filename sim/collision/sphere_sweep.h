@@ -9,17 +9,19 @@
 namespace offstage::sim {
 
 struct SweepHit {
-  Real fraction;  ///< of the way from a to b
-  Real distance;  ///< of the centre to the surface there: the sphere's radius, or less if it started closer
-  Vec3 normal;    ///< outward, by the feature hit
+  Real fraction;  ///< share of the path from a to b
+  /// Distance of the centre from the surface at that point: the sphere's radius, or less if it started
+  /// closer.
+  Real distance;
+  Vec3 normal;  ///< outward normal of the feature that is hit
 };
 
-/// The first place where the centre comes within `radius` of the solid while approaching it. A sphere that
-/// starts closer than its radius hits at once if it approaches, and never if it leaves.
+/// Returns the first position where the centre comes within `radius` of the solid while approaching it. A
+/// sphere that starts closer than its radius hits at once if it approaches, and never if it moves away.
 ///
-/// The distance to a convex set along a line is a convex function. Newton's iteration from the near side on a
-/// convex function never oversteps the root and converges quadratically, and where its slope turns positive
-/// there is no root ahead: this is conservative advancement with the exact bound. All primitives and all
+/// The distance to a convex set along a line is a convex function. Newton's iteration on a convex function
+/// from the near side never passes the root and converges quadratically; where the slope becomes positive,
+/// there is no root ahead. This is conservative advancement with the exact bound. All primitives and all
 /// triangles are convex sets, so one method serves every shape and every feature (face, edge, vertex).
 std::optional<SweepHit> sweep_sphere(const Solid& s, const Vec3& a, const Vec3& b, Real radius);
 

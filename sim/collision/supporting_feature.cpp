@@ -10,17 +10,18 @@ namespace {
 
 constexpr uint32_t kMaxFeatureCorners = SupportingFeature::kMaxCorners;
 
-/// Of the solid's size: vertices so little below a face's plane belong to the face. Coordinates from files
-/// are seldom better, and what is meant to be flat comes as triangles that are not quite.
+/// Share of the solid's size: vertices that are less than this below the plane of a face belong to the face.
+/// Coordinates from files are seldom more accurate, and flat faces are often given as triangles that are not
+/// exactly coplanar.
 constexpr Real kFlat = 1e-5;
-/// Cosine: edges and directions closer to a right angle are across each other. Normals at round solids are
-/// found to the root of what distances are found to.
+/// Cosine: edges and directions closer to a right angle than this count as perpendicular. Normals of round
+/// solids are accurate to the square root of the accuracy of distances.
 constexpr Real kAcross = 1e-4;
 
-/// Tags of the ends of a round side's line; rims have the ones below.
+/// Tags of the ends of the line on a round side; rims use the tags below.
 constexpr uint32_t kLineTag = 2 * kMaxFeatureCorners;
 
-/// Directions around the circle. By halving the angle with square roots: the same bits on every machine.
+/// Directions around the circle, by halving angles with square roots, for the same bits on every machine.
 const std::array<Eigen::Vector2d, kMaxFeatureCorners>& circle() {
   static const std::array<Eigen::Vector2d, kMaxFeatureCorners> points = [] {
     Real cosine = 0;  // of a quarter turn
@@ -38,7 +39,7 @@ const std::array<Eigen::Vector2d, kMaxFeatureCorners>& circle() {
   return points;
 }
 
-/// How much of a length lies within `slack` if its far end rises by `rise`, as a share.
+/// Share of a length that lies within `slack`, if its far end rises by `rise`.
 Real share_within(Real slack, Real rise) {
   return rise > slack ? slack / rise : 1;
 }
@@ -107,7 +108,7 @@ SupportingFeature box_edge(const Convex& c, const Vec3& d, Real slack) {
 
 // Triangle
 
-/// The side of it that faces d; an edge if it has no area.
+/// The side of the triangle that faces d; an edge if it has no area.
 SupportingFeature triangle_face(const Convex& c, const Vec3& d, Real slack) {
   const Vec3 &p = *c.corners[0], &q = *c.corners[1], &r = *c.corners[2];
   const Vec3 area = (q - p).cross(r - p);
@@ -124,7 +125,8 @@ SupportingFeature triangle_face(const Convex& c, const Vec3& d, Real slack) {
   return f;
 }
 
-/// Of the two edges at the corner touched the one across d, or else the one of which most is within `slack`.
+/// Of the two edges at the touching corner, the one perpendicular to d, or else the one with the longest part
+/// within `slack`.
 SupportingFeature triangle_edge(const Convex& c, const Vec3& d, Real slack) {
   uint32_t corner = 0;
   const Vec3 top = c.support(d, corner);
@@ -144,8 +146,8 @@ SupportingFeature triangle_edge(const Convex& c, const Vec3& d, Real slack) {
 
 // Polyhedron
 
-/// The corners of a set of points of a plane that are farthest in as many directions: their hull but for
-/// corners so blunt that they fall between two directions.
+/// Selects the corners of a planar set of points that are farthest in evenly spaced directions: their hull
+/// except for corners so blunt that they fall between two directions.
 void spread_corners(SupportingFeature& f, const ConvexPolyhedron& p, std::span<const uint32_t> vertices,
                     const Vec3& u) {
   const Vec3 w = f.normal.cross(u);
@@ -160,7 +162,7 @@ void spread_corners(SupportingFeature& f, const ConvexPolyhedron& p, std::span<c
   }
 }
 
-/// The face, together with the vertices around it that are all but in its plane.
+/// The face, together with the vertices around it that are almost in its plane.
 SupportingFeature flat_part(const ConvexPolyhedron& p, uint32_t face) {
   const ConvexPolyhedron::Plane& plane = p.plane(face);
   const std::span<const uint32_t> loop = p.face_vertices(face);
@@ -192,7 +194,7 @@ SupportingFeature flat_part(const ConvexPolyhedron& p, uint32_t face) {
   return f;
 }
 
-/// Part of the edge from one vertex to another that is within `slack` of the first along d.
+/// Part of the edge from one vertex to another that is within `slack` of the first one along d.
 Vec3 part_within(const ConvexPolyhedron& p, uint32_t from, uint32_t to, const Vec3& d, Real slack) {
   const Vec3 edge = p.vertex(to) - p.vertex(from);
   return share_within(slack, -d.dot(edge)) * edge;
@@ -235,7 +237,7 @@ SupportingFeature polyhedron_face(const ConvexPolyhedron& p, const Vec3& d, Real
 
 // Solids of revolution
 
-/// The direction away from the axis in which d leans.
+/// Radial direction of d, away from the axis.
 Vec3 outward(const Vec3& d) {
   const Real rho = std::sqrt(d.x() * d.x() + d.z() * d.z());
   return rho > 0 ? Vec3(d.x() / rho, 0, d.z() / rho) : Vec3::UnitX();
@@ -253,8 +255,8 @@ SupportingFeature disc(Real radius, Real y, bool up) {
   return f;
 }
 
-/// The line of the round side that faces d: from the base to the top, or from the end that is farther along
-/// d. And its inclination: the outward normal there.
+/// The line of the round side that faces d, from the base to the top or from the end that is farther along d,
+/// and the outward normal there.
 struct RoundSide {
   Vec3 from, to, normal;
   uint32_t from_tag = kLineTag, to_tag = kLineTag + 1;
@@ -272,8 +274,8 @@ RoundSide round_side(const Convex& c, const Vec3& d) {
   return side;
 }
 
-/// Whether more of the flat side than of the round one is within `slack`. Both patches are about as wide
-/// across the plane through d and the axis, so what they extend in it decides.
+/// Whether more of the flat side than of the round one is within `slack`. Both patches are about equally wide
+/// across the plane through d and the axis, so their lengths in this plane decide.
 bool rests_on_disc(const Convex& c, const RoundSide& side, const Vec3& d, Real slack) {
   const bool up = d.y() > 0;
   if (up && c.core == Convex::Core::cone) return false;
@@ -289,13 +291,13 @@ SupportingFeature revolved(const Convex& c, const Vec3& d, Real slack) {
   return segment_feature(side.from, side.from_tag, side.to, side.to_tag, d);
 }
 
-/// A line of the round side where it is across d or, unless it rests on a disc, almost is; else the rim,
-/// whose tangent always is; else the apex.
+/// Returns a line of the round side if it is perpendicular to d or, unless the solid rests on a disc, almost
+/// perpendicular; else the rim, whose tangent always is perpendicular; else the apex.
 SupportingFeature revolved_edge(const Convex& c, const Vec3& d, Real slack, const Vec3& on_surface) {
   const RoundSide side = round_side(c, d);
   SupportingFeature line = segment_feature(side.from, side.from_tag, side.to, side.to_tag, d);
   if (line.edge != Vec3::Zero()) {
-    // On a cone the centre of curvature is where the normal meets the axis.
+    // The centre of curvature of a cone is where the normal meets the axis.
     line.rod = std::max(0.0, outward(d).dot(on_surface)) / side.normal.dot(outward(d));
     return line;
   }

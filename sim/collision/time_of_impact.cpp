@@ -8,22 +8,22 @@
 namespace offstage::sim {
 namespace {
 
-/// Far more than any pair needs whose rate bound is within a factor of a hundred of the truth.
+/// Enough for all pairs whose bound of the rate is at most a hundred times the true rate.
 constexpr int kMaxAdvances = 2000;
 
 Pose relative(const Pose& a, const Pose& b) {
   return {a.point_to_body(b.position), a.orientation.conjugate() * b.orientation};
 }
 
-/// The largest d.p over a placed solid's points relative to its frame's origin; d in the world.
+/// The largest d.p over the points of a placed solid, relative to its frame's origin; d is in the world.
 Real extent(const Convex& shape, const Quat& orientation, const Vec3& d) {
   const Vec3 local = orientation.conjugate() * d;
   uint32_t start = 0;
   return local.dot(shape.support(local, start)) + shape.radius * local.norm();
 }
 
-/// Advances until the solids are within the tolerance. `gap_at(share, separation)` measures, filling in the
-/// separation. Each advance aims at half the tolerance, so that it ends after finitely many.
+/// Advances until the solids are within the tolerance. `gap_at(share, separation)` measures the gap and
+/// writes the separation. Each advance aims at half the tolerance, so their number is finite.
 template <class GapAt>
 std::optional<Impact> advance(const GapAt& gap_at, Real tolerance) {
   Impact impact{0, {}};
@@ -44,8 +44,7 @@ Real Gap::time_to(Real target) const {
   const Real room = distance - target;
   if (room <= 0) return 0;
   const Real root = std::sqrt(rate * rate + 2 * acceleration * room);
-  // Of the two forms of the positive root of room = rate t + acceleration t^2 / 2, the one without
-  // cancellation.
+  // Positive root of room = rate t + acceleration t^2 / 2, in the form without cancellation.
   if (rate > 0) return 2 * room / (rate + root);
   return acceleration > 0 ? (root - rate) / acceleration : kInfinity;
 }
@@ -74,12 +73,13 @@ std::optional<Impact> time_of_impact(const MovingConvex& a, const MovingConvex& 
   return advance(gap_at, tolerance);
 }
 
-// A point a of the solid is n.(a - o) over a plane through o. While the plane turns with w about o this
-// changes by n.(v_a - v_o) + (w x n).(a - o): as if the point moved and the plane stood still with the
-// opposite rotation. The relative acceleration seen from the plane adds the Coriolis and centripetal terms.
+// The height of a point a of the solid over a plane through o is n.(a - o). While the plane turns with w
+// about o, its rate is n.(v_a - v_o) + (w x n).(a - o): as if the plane were fixed and the point moved with
+// the opposite rotation. The relative acceleration seen from the plane has the Coriolis and centripetal terms
+// in addition.
 std::optional<Impact> time_of_plane_impact(const MovingConvex& a, const PosePath& plane, Real tolerance) {
   const Real reach = a.shape.reach();
-  // The greatest distance of a point of the solid from the plane's origin on the way: at one of its ends.
+  // The greatest distance of a point of the solid from the plane's origin occurs at one end of the motion.
   const Real lever =
       reach + std::sqrt(std::max((a.path.start().position - plane.start().position).squaredNorm(),
                                  (a.path.end().position - plane.end().position).squaredNorm()));

@@ -1,6 +1,6 @@
 #pragma once
-/// Traversal of two bounding trees of the same or of different kinds, each in the frame of its own mesh. Only
-/// where one frame lies in the other is needed: volumes are carried over as the descent meets them (physics
+/// Traversal of two bounding trees of the same or of different kinds, each in the frame of its own mesh. The
+/// caller gives only the pose of one frame in the other; volumes are transformed during the descent (physics
 /// H8). Nothing is allocated.
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 
 namespace offstage::sim {
 
-/// A pair of nodes yet to be visited; `gap` bounds the distance of what is beneath.
+/// A pair of nodes to be visited; `gap` is a lower bound of the distance of their items.
 template <class A, class B>
 struct NodePair {
   const typename BoundingTree<A>::Node* a;
@@ -21,8 +21,8 @@ struct NodePair {
   Real gap = 0;
 };
 
-/// The pairs of nodes that remain for later. Each step down replaces a pair by two of which one is visited
-/// next, so no more than the sum of the depths remain.
+/// Stack of pairs of nodes that remain to be visited. Each step down replaces a pair by two, one of which is
+/// visited next, so the size never exceeds the sum of the depths.
 template <class A, class B>
 class NodePairStack {
  public:
@@ -35,8 +35,7 @@ class NodePairStack {
   std::size_t size_ = 0;
 };
 
-/// The two pairs into which a pair of nodes falls, of which not both are leaves: by the children of the
-/// larger one.
+/// Splits a pair of nodes, not both leaves, into two by the children of the larger node.
 template <class A, class B>
 std::pair<NodePair<A, B>, NodePair<A, B>> descend(const BoundingTree<A>& tree_a,
                                                   const BoundingTree<B>& tree_b, const NodePair<A, B>& pair) {
@@ -46,9 +45,9 @@ std::pair<NodePair<A, B>, NodePair<A, B>> descend(const BoundingTree<A>& tree_a,
   return {{a, &tree_b.first_child(*b)}, {a, &tree_b.second_child(*b)}};
 }
 
-/// Calls visit(item of a, item of b) for every pair of items whose leaves' volumes come within the
-/// placement's margin, in an order that depends on the trees alone. Where visit returns bool, false ends the
-/// traversal. Returns whether it went through.
+/// Calls visit(item of a, item of b) for every pair of items whose leaves' volumes are within the placement's
+/// margin, in an order that depends only on the trees. If visit returns bool, false ends the traversal.
+/// Returns whether the traversal was complete.
 template <class A, class B, class Visit>
 bool for_each_pair(const BoundingTree<A>& tree_a, const BoundingTree<B>& tree_b, const Placement& a_from_b,
                    Visit&& visit) {
@@ -76,8 +75,8 @@ bool for_each_pair(const BoundingTree<A>& tree_a, const BoundingTree<B>& tree_b,
   return true;
 }
 
-/// Branch and bound: calls distance(item of a, item of b) for every pair that can be nearer than the least
-/// value seen so far, starting from `limit`; nearer volumes first. The placement's margin plays no part.
+/// Branch and bound: calls distance(item of a, item of b) for every pair that can be nearer than the smallest
+/// value so far, starting from `limit`; nearer volumes first. The placement's margin is not used.
 template <class A, class B, class Distance>
 void nearest_pair(const BoundingTree<A>& tree_a, const BoundingTree<B>& tree_b, const Placement& a_from_b,
                   Real limit, Distance&& distance) {

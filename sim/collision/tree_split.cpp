@@ -11,7 +11,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Fewer items are not worth a task of their own.
+/// With fewer items a separate task does not pay.
 constexpr uint32_t kTaskItems = 4096;
 
 Aabb midpoint_box(std::span<const TreeItem> items) {
@@ -43,14 +43,14 @@ std::size_t mean_split(std::span<TreeItem> items, int axis) {
   return balanced && split > 0 ? split : median_split(items, axis);
 }
 
-/// The midpoints of a node's items in equal slices along each axis.
+/// The midpoints of a node's items in slices of equal width along each axis.
 class Bins {
  public:
   static constexpr int kCount = 16;
 
   explicit Bins(const Aabb& midpoints) : low_(midpoints.min()) {
     const Vec3 extent = midpoints.sizes();
-    // Slices of an extent near the smallest number have no width.
+    // For an extent near the smallest number the slices have no width.
     for (int k = 0; k < 3; ++k) scale_[k] = extent[k] > 1e-300 ? kCount / extent[k] : 0;
   }
 
@@ -66,8 +66,8 @@ class Bins {
     }
   }
 
-  /// Where the heuristic's cost is least: the axis and the first bin of the second half; bin 0 if no axis
-  /// separates the items.
+  /// Returns the axis and the first bin of the second half with the least cost of the heuristic; bin 0 if no
+  /// axis separates the items.
   std::pair<int, int> best_split() const {
     std::pair<int, int> best = {0, 0};
     Real least = kInfinity;
@@ -91,7 +91,8 @@ class Bins {
     uint32_t count = 0;
   };
 
-  /// Calls visit(bin, cost of the bins from the first to this one); infinite while they hold nothing.
+  /// Calls visit(bin, cost of the bins from the first to this one); the cost is infinite while they are
+  /// empty.
   template <class Visit>
   void sweep(int axis, int from, int step, Visit&& visit) const {
     Bin sum;
@@ -122,13 +123,13 @@ std::size_t surface_area_split(std::span<TreeItem> items, const Aabb& midpoints)
   });
 }
 
-/// Parts the items and returns where the second half starts; 0 if nothing separates them.
+/// Splits the items and returns where the second half starts; 0 if nothing separates them.
 std::size_t split_items(std::span<TreeItem> items, TreeSplit split, uint32_t depth) {
   if (items.size() < 2) return 0;
   const Aabb midpoints = midpoint_box(items);
   int axis = 0;
   if (!(midpoints.sizes().maxCoeff(&axis) > 0)) return 0;
-  // Halving from here on just reaches single items in time.
+  // From this depth on, only halving reaches single items within the limit.
   const bool too_deep = depth + std::bit_width(items.size()) >= kMaxTreeDepth;
   if (items.size() == 2 || too_deep) return median_split(items, axis);
   return split == TreeSplit::mean ? mean_split(items, axis) : surface_area_split(items, midpoints);

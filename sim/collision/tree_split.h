@@ -1,5 +1,5 @@
 #pragma once
-/// How the items of a bounding tree are parted, whatever its volumes.
+/// Splits the items of a bounding tree, independently of its kind of volume.
 
 #include <cstdint>
 #include <span>
@@ -9,17 +9,17 @@
 
 namespace offstage::sim {
 
-/// How the items of a node are parted in two.
+/// Rule by which the items of a node are split in two.
 enum class TreeSplit : uint8_t {
-  /// At the mean of the midpoints along the longest axis, at their median where the mean is unbalanced, along
-  /// another axis where all midpoints coincide: the book's.
+  /// At the mean of the midpoints along the longest axis; at their median if the mean is unbalanced; along
+  /// another axis if all midpoints coincide. This is the book's rule.
   mean,
-  /// Where the surface area heuristic says that queries cost least, among 16 bins along each axis: Wald, "On
+  /// At the least cost of queries by the surface area heuristic, among 16 bins along each axis: Wald, "On
   /// fast construction of SAH-based bounding volume hierarchies" (2007).
   surface_area,
 };
 
-/// No node of a tree is deeper, so that a traversal needs no more than a fixed stack.
+/// Greatest depth of a node, so that a traversal needs only a fixed stack.
 inline constexpr uint32_t kMaxTreeDepth = 64;
 
 struct TreeItem {
@@ -33,8 +33,8 @@ struct TreeRange {
   uint32_t size, first, count;
 };
 
-/// The nodes of a tree in depth-first order, and the items in the order of its leaves. A leaf has one item,
-/// or several whose midpoints coincide. The same for any number of threads.
+/// Returns the nodes of a tree in depth-first order, with the items in the order of its leaves. A leaf has
+/// one item, or several whose midpoints coincide. The result does not depend on the number of threads.
 std::vector<TreeRange> split_tree(std::span<TreeItem> items, TreeSplit split);
 
 }  // namespace offstage::sim

@@ -10,14 +10,14 @@
 namespace offstage::sim {
 namespace {
 
-/// Of a ridge's fall: a face that comes down on it may be off by this share, for it may turn into the ridge's
-/// region within the step.
+/// Share of a ridge's slope by which a face that approaches the ridge may be outside of the ridge's region,
+/// because it may turn into that region within the step.
 constexpr Real kGuard = 0.5;
-/// Sine: a valley is where the surface rises by more than this.
+/// Sine: the surface beyond an edge is a valley if it rises by more than this.
 constexpr Real kValley = 1e-3;
 
-/// By how much the other solid may be outside of a triangle's sides and still be before its face. The plane
-/// of a face goes on beneath the surface on the other side of a valley, and is what stops the solid next.
+/// How far the other solid may be outside of a triangle's sides and still count as in front of its face.
+/// Beyond a valley the plane of the face continues beneath the surface, and stops the solid next.
 std::array<Real, 3> room_beyond(const SurfaceTriangle& t, Real margin) {
   std::array<Real, 3> room{};
   for (std::size_t k = 0; k < 3; ++k)
@@ -25,7 +25,7 @@ std::array<Real, 3> room_beyond(const SurfaceTriangle& t, Real margin) {
   return room;
 }
 
-/// A triangle as one of the two pieces.
+/// A triangle that is one of the two pieces.
 struct TriangleSide {
   SurfaceTriangle triangle;
   Pose a_from_mesh;
@@ -34,14 +34,14 @@ struct TriangleSide {
   bool gives_normal(const Manifold& m) const {
     return m.source == (of_b ? NormalSource::face_of_b : NormalSource::face_of_a);
   }
-  /// Of the other piece's face.
+  /// Whether the other piece's face gives the normal.
   bool takes_normal(const Manifold& m) const {
     return m.source == (of_b ? NormalSource::face_of_a : NormalSource::face_of_b);
   }
   /// The normal away from the triangle, in the mesh's frame.
   Vec3 outward(const Vec3& normal) const { return a_from_mesh.vector_to_body(of_b ? normal : Vec3(-normal)); }
 
-  /// Leaves out the points at which the surface does not allow the normal; whether there were any.
+  /// Removes the points at which the surface does not allow the normal; returns whether there were any.
   bool restrict(Manifold& m) const {
     const Vec3 n = outward(m.normal);
     const uint32_t count = m.count;
@@ -72,12 +72,12 @@ void sphere_triangle_manifold(const Vec3& centre, Real radius, const SurfaceTria
   if (distance - radius > margin) return;
 
   std::size_t excluded = 0, without = 0,
-              with = 0;  // vertices of weight 0; the last of them, and of the others
+              with = 0;  // number of vertices of weight 0; the last of them, and the last of the others
   for (std::size_t k = 0; k < 3; ++k) {
     (nearest.weights[k] == 0 ? without : with) = k;
     excluded += nearest.weights[k] == 0;
   }
-  // Through the surface, the centre sees its other side.
+  // If the sphere penetrates the surface, its centre sees the other side.
   const bool through = height < 0 && distance < radius;
   const SurfaceTriangle seen{triangle.mesh, triangle.face, height < 0 ? -triangle.side : triangle.side};
   Vec3 outward = up;
@@ -96,7 +96,7 @@ void sphere_triangle_manifold(const Vec3& centre, Real radius, const SurfaceTria
                                : NormalSource::edge_of_a;
       (of_b ? m.radius_a : m.radius_b) = radius;
     } else {
-      // Before the plane of a face beyond a valley.
+      // In front of the plane of a face, beyond a valley.
       const std::array<Real, 3> room = room_beyond(triangle, margin);
       const std::size_t k = excluded == 1 ? (without + 1) % 3 : room[with] > 0 ? with : (with + 2) % 3;
       if ((away - height * up).squaredNorm() > room[k] * room[k] || !(separation <= margin)) return;

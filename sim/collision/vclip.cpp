@@ -14,21 +14,22 @@ namespace {
 using Kind = Feature::Kind;
 constexpr uint32_t kNone = 0xffffffff;
 
-/// Of the coordinates' size: what a computed height over a plane may be wrong by. A feature is only left for
-/// a neighbour that is better by more, so that rounding seldom makes the walk circle.
+/// Share of the coordinates' size: rounding error of a computed height over a plane. A feature is left only
+/// for a neighbour that is better by more than this, so that rounding seldom makes the walk go in circles.
 constexpr Real kVClipRounding = 1e-14;
-/// Of the coordinates' size: closer than this the difference of two points says nothing about the normal.
+/// Share of the coordinates' size: if two points are closer than this, their difference does not define a
+/// normal.
 constexpr Real kVClipTouching = 1e-12;
 
 enum class Step : uint8_t { moved, closest, overlapping };
 
-/// One of the two polyhedra, with the way from its frame to the other's and the feature the walk has reached.
+/// One of the two polyhedra, with the transformation to the other's frame and the current feature.
 struct Side {
   const ConvexPolyhedron& shape;
   Mat3 rotation;
   Vec3 translation;
   Feature at;
-  Real slop;  ///< of heights over planes [m]
+  Real slop;  ///< rounding error of heights over planes [m]
 
   Vec3 to_other(const Vec3& p) const { return rotation * p + translation; }
   const Vec3& vertex() const { return shape.vertex(at.index); }
@@ -41,13 +42,14 @@ struct Side {
   }
 };
 
-/// The part of a segment inside the planes that have cut it, as parameters from its tail (0) to its head (1),
-/// and the features beyond the planes that cut last at either end.
+/// The part of a segment inside the clipping planes so far, as parameters from its tail (0) to its head (1),
+/// and the features beyond the planes that cut each end.
 struct Clip {
   Real low = 0, high = 1;
   uint32_t beyond_low = kNone, beyond_high = kNone;
 
-  /// Given the heights of both ends over a plane, positive inside. False if nothing is inside this plane.
+  /// Cuts at a plane, given the heights of both ends over it, positive inside. Returns false if nothing is
+  /// left.
   bool cut(Real tail, Real head, uint32_t beyond) {
     if (tail < 0 && head < 0) return false;
     if (tail >= 0 && head >= 0) return true;
@@ -64,7 +66,7 @@ struct Clip {
   bool empty() const { return low > high; }
 };
 
-/// Leaves the vertex for the edge whose vertex-edge plane hides p most, if one does.
+/// Moves from the vertex to the edge whose vertex-edge plane is violated most by p, if there is one.
 bool leave_vertex(Side& x, const Vec3& p) {
   const Vec3 d = p - x.vertex();
   Real worst = x.slop;
@@ -79,7 +81,7 @@ bool leave_vertex(Side& x, const Vec3& p) {
   return to != kNone && x.move(Kind::edge, to);
 }
 
-/// Leaves the edge for an end or a face in whose direction p lies.
+/// Moves from the edge to the end or the face in whose direction p lies.
 bool leave_edge(Side& x, const Vec3& p) {
   const ConvexPolyhedron::EdgeFrame& frame = x.shape.edge_frame(x.at.index);
   const Vec3 d = p - x.tail();
@@ -90,10 +92,10 @@ bool leave_edge(Side& x, const Vec3& p) {
   return x.move(Kind::face, left >= right ? x.edge().left : x.edge().right);
 }
 
-/// The same for an edge of the other polyhedron: it is clipped to the Voronoi region, first by the
-/// vertex-edge planes and then by the face-edge planes, and where the distance grows inwards from a cut the
-/// closest point lies beyond. The distance to the edge and to the neighbour beyond are equal on a cut and so
-/// are their derivatives, of which the neighbour's is simpler.
+/// The same for an edge of the other polyhedron. It is clipped to the Voronoi region, first by the
+/// vertex-edge planes and then by the face-edge planes. If the distance increases inwards from a cut, the
+/// closest point lies beyond the cut. On a cut, the distances to the edge and to the neighbour beyond are
+/// equal, and so are their derivatives; the neighbour's is simpler to compute.
 bool leave_edge(Side& x, const Vec3& tail, const Vec3& head) {
   const ConvexPolyhedron::Edge& edge = x.edge();
   const ConvexPolyhedron::EdgeFrame& frame = x.shape.edge_frame(x.at.index);
@@ -149,8 +151,8 @@ Step edge_edge(Side& x, Side& y) {
              : Step::closest;
 }
 
-/// The vertex is under the face and no edge leads out of that half-space: it is inside, or another face, the
-/// one it is highest over, is closer.
+/// The vertex is under the face, and no edge leads out of that half-space. Either it is inside, or another
+/// face, the one over which it is highest, is closer.
 Step escape_local_minimum(Side& f, const Vec3& p) {
   Real best = 0;
   for (uint32_t k = 0; k < f.shape.face_count(); ++k) {
@@ -193,7 +195,7 @@ Step vertex_face(Side& v, Side& f) {
   return height > 0 ? Step::closest : escape_local_minimum(f, p);
 }
 
-/// The side of a face that is closest to a segment.
+/// Returns the side of a face that is closest to a segment.
 uint32_t closest_side(const Side& f, const Vec3& tail, const Vec3& head) {
   Real best = std::numeric_limits<Real>::infinity();
   uint32_t closest = kNone;
@@ -207,8 +209,8 @@ uint32_t closest_side(const Side& f, const Vec3& tail, const Vec3& head) {
   return closest;
 }
 
-/// An edge over a face is never the answer: the lower end of its part over the face is closer, or as close
-/// and the simpler feature.
+/// An edge over a face is never the result: the lower end of its part over the face is closer, or equally
+/// close and the simpler feature.
 Step edge_face(Side& e, Side& f) {
   const Vec3 tail = e.to_other(e.tail()), head = e.to_other(e.head());
   Clip clip;
@@ -245,10 +247,10 @@ Step step(Side& a, Side& b) {
   return Step::moved;
 }
 
-/// Walks until the features are the closest or overlap; nothing if the walk circles. A pair of features
-/// decides the next, so a circle has been entered once a pair is seen again: the one kept is renewed after 1,
-/// 2, 4 ... steps, and so lies on the circle in the end (Brent, "An improved Monte Carlo factorization
-/// algorithm", 1980).
+/// Walks until the features are the closest or overlap; returns nothing if the walk goes in circles. A pair
+/// of features determines the next one, so the walk is in a cycle if a pair occurs twice. The pair to compare
+/// with is renewed after 1, 2, 4 ... steps, so it lies on the cycle eventually (Brent, "An improved Monte
+/// Carlo factorization algorithm", 1980).
 std::optional<Step> walk(Side& a, Side& b, int& steps) {
   Feature kept_a = a.at, kept_b = b.at;
   for (int renewal = 1;;) {
@@ -263,7 +265,8 @@ std::optional<Step> walk(Side& a, Side& b, int& steps) {
   }
 }
 
-/// Closest points of the features of x and y, x's of no higher dimension, in y's frame and as if y were A.
+/// Closest points of the features of x and y, where x's dimension is not higher, in y's frame and as if y
+/// were A.
 Separation closest_points(const Side& x, const Side& y) {
   Separation s;
   if (x.at.kind == Kind::edge) {
@@ -290,7 +293,7 @@ Separation closest_points(const Side& x, const Side& y) {
   return s;
 }
 
-/// To the frame of `a`, which was x.
+/// Transforms to the frame of `a`, which was x.
 Separation exchanged(const Separation& s, const Side& b) {
   return {.distance = s.distance,
           .normal = b.rotation * -s.normal,

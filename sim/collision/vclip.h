@@ -1,8 +1,8 @@
 #pragma once
 /// Distance between convex polyhedra by the Voronoi Clip algorithm: Mirtich, "V-Clip: fast and robust
 /// polyhedral collision detection" (1998), physics R4. It walks from feature to neighbouring feature of both
-/// polyhedra until each closest point lies in the other feature's Voronoi region; started from the last
-/// step's features it ends almost at once.
+/// polyhedra until each closest point lies in the other feature's Voronoi region. Started from the features
+/// of the last step, it ends almost at once.
 
 #include <cstdint>
 
@@ -18,17 +18,17 @@ struct Feature {
   friend bool operator==(const Feature&, const Feature&) = default;
 };
 
-/// The closest features of the last query of a pair; the first start anywhere. Any features that the
-/// polyhedra have are safe to start from.
+/// The closest features of the last query of a pair. The first query may start from any features that the
+/// polyhedra have.
 struct VclipCache {
   Feature a, b;
 };
 
-/// Signed distance of two polyhedra, neither of them empty, and in `cache` the features that have it: two
-/// vertices, a vertex and an edge or face, or two edges. Those of overlapping polyhedra are where the walk
-/// found that they do; penetration() then has the depth and the direction of the least translation.
-/// `iterations` counts pairs of features. The walk never repeats a pair: where rounding would let it circle,
-/// gjk() answers.
+/// Signed distance of two polyhedra that are not empty. On return `cache` has the closest features: two
+/// vertices, a vertex and an edge or face, or two edges. For overlapping polyhedra it has the features at
+/// which the overlap was found; the depth and the direction of the smallest translation are those of
+/// penetration(). `iterations` counts pairs of features. If rounding would let the walk go in circles, the
+/// result is that of gjk().
 Separation vclip(const ConvexPolyhedron& a, const ConvexPolyhedron& b, const Pose& a_from_b,
                  VclipCache& cache);
 

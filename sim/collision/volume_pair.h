@@ -1,6 +1,6 @@
 #pragma once
-/// Whether two volumes of bounding trees, each in the frame of its own mesh, overlap, and how far they are
-/// apart at least. Both answers are conservative: rounding never separates volumes that hold a common point.
+/// Overlap tests and lower bounds of distance for two volumes of bounding trees, each in the frame of its own
+/// mesh. Both are conservative: rounding never separates volumes that have a common point.
 
 #include <algorithm>
 #include <cmath>
@@ -41,8 +41,8 @@ inline Real squared_size(const BoundingSphere& v) {
 
 /// Frame B placed in frame A, prepared for testing many volumes.
 struct Placement {
-  /// `size` bounds the distance of every point to be tested from the origin of its frame [m]; rounding is
-  /// forgiven in proportion to it. `margin` is how far apart volumes may be and still overlap [m].
+  /// `size` bounds the distance of every tested point from the origin of its frame [m]; the allowance for
+  /// rounding is proportional to it. `margin` is how far apart volumes may be and still overlap [m].
   Placement(const Pose& a_from_b, Real size, Real margin)
       : rotation(a_from_b.orientation.normalized().toRotationMatrix()),
         translation(a_from_b.position),
@@ -52,22 +52,22 @@ struct Placement {
   /// A point of B in A's frame.
   Vec3 point(const Vec3& p) const { return rotation * p + translation; }
 
-  /// A volume's corner goes through a fitted box (3 products and sums), the placement (4) and a projection
-  /// (6), each with an error of half a unit in the last place of the sizes involved; axes are orthonormal to
-  /// a few units.
+  /// Rounding errors: a volume's corner comes from a fitted box (3 products and sums), the placement (4) and
+  /// a projection (6), each with an error of half a unit in the last place of the sizes involved; axes are
+  /// orthonormal to a few units.
   static constexpr Real kRounding = 64 * std::numeric_limits<Real>::epsilon();
 
   Mat3 rotation;  ///< A's axes from B's
   Vec3 translation;
-  Real slack;  ///< what rounding can do [m]
+  Real slack;  ///< bound of the rounding errors [m]
   Real pad;    ///< margin and slack [m]
 };
 
-/// Two boxes, the second as placed in the first's axes. A gap is by how much they are apart in a direction;
-/// negative where they overlap.
+/// Two boxes, the second one in the axes of the first. A gap is the distance along a direction, negative
+/// where they overlap.
 struct BoxPair {
   LaneColumns rotation, spread;  ///< a's axes from b's, and its absolute values
-  Lanes offset;                  ///< of the centres
+  Lanes offset;                  ///< difference of the centres
   Vec3 half_a, half_b;
 
   Lanes gaps_a() const { return lane_abs(offset) - lanes(half_a) - product(spread, half_b); }
@@ -75,8 +75,8 @@ struct BoxPair {
     return lane_abs(product(transposed(rotation), offset)) - lanes(half_b) -
            product(transposed(spread), half_a);
   }
-  /// In the directions of the products of each of a's edges with each of b's, which are not of unit length:
-  /// too small, but of the right sign. Where the edges are parallel it is rounding noise around 0.
+  /// Gaps along the products of each of a's edges with each of b's. The products are not unit vectors, so the
+  /// gaps are too small but have the right sign. For parallel edges they are rounding noise around 0.
   Lanes product_gaps() const {
     const auto [x, y, z] = spread;
     return lane_max(lane_max(product_gaps(rotation.x, x, half_b[1] * z + half_b[2] * y),
@@ -85,7 +85,7 @@ struct BoxPair {
   }
 
  private:
-  /// For one edge direction of b, with what b extends across it.
+  /// Gaps for one edge direction of b; `extent_b` is the extent of b along the products.
   Lanes product_gaps(Lanes r, Lanes s, Lanes extent_b) const {
     const Lanes a = lanes(half_a);
     return lane_abs(lane_last(offset) * lane_next(r) - lane_next(offset) * lane_last(r)) -
@@ -112,7 +112,7 @@ inline LaneColumns from_axes(const LaneColumns& m, const Obb& box) {
   return product(m, box.axes);
 }
 
-/// Always inline, for as a call it would return the vectors through memory.
+/// Always inline, because a call would return the vectors through memory.
 template <class A, class B>
 [[gnu::always_inline]] inline BoxPair box_pair(const A& a, const B& b, const Placement& p) {
   const LaneColumns placed = to_axes(a, p.rotation);
@@ -121,7 +121,7 @@ template <class A, class B>
   return {rotation, lane_abs(rotation), offset, half_sizes(a), half_sizes(b)};
 }
 
-/// By how much a point is outside a box along the box's axes; negative inside.
+/// Distance of a point from a box along the box's axes; negative inside.
 inline Vec3 point_gaps(const Aabb& box, const Vec3& p) {
   return (p - centre(box)).cwiseAbs() - half_sizes(box);
 }
@@ -132,8 +132,8 @@ inline Vec3 point_gaps(const Obb& box, const Vec3& p) {
 template <class Volume>
 inline constexpr bool kIsSphere = std::is_same_v<Volume, BoundingSphere>;
 
-/// A lower bound of the distance of two volumes, 0 or less if they may overlap [m]: exact with a sphere; of
-/// boxes what their own axes tell. Rounding may exceed the true distance by the slack.
+/// A lower bound of the distance of two volumes [m], 0 or less if they may overlap. Exact if one is a sphere;
+/// for boxes, the bound by their own axes. By rounding it may exceed the true distance by the slack.
 template <class A, class B>
 Real gap(const A& a, const B& b, const Placement& p) {
   if constexpr (kIsSphere<A> && kIsSphere<B>) {
@@ -151,9 +151,9 @@ Real gap(const A& a, const B& b, const Placement& p) {
   }
 }
 
-/// Whether two volumes may have points within the margin of each other. Without a margin exact up to the
-/// slack; two boxes by their fifteen axes. All are computed before any is looked at: most pairs that a
-/// traversal meets do overlap.
+/// Whether two volumes may have points within the margin of each other. Without a margin it is exact up to
+/// the slack; two boxes are tested by their fifteen axes. All gaps are computed before any is tested, because
+/// most pairs in a traversal overlap.
 template <class A, class B>
 bool overlap(const A& a, const B& b, const Placement& p) {
   if constexpr (kIsSphere<A> || kIsSphere<B>) {

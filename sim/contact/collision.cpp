@@ -11,6 +11,7 @@
 #include <Eigen/LU>
 
 #include "sim/contact/friction_lcp.h"
+#include "sim/contact/jointed_sweeps.h"
 #include "sim/contact/proximal_newton.h"
 #include "sim/contact/rough_collision.h"
 
@@ -19,27 +20,32 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr Real kRounding = 1e-13;         ///< of products of impulses and velocities
-constexpr int kArcs = 64;                 ///< of the circle of directions, each searched for a change of sign
-constexpr int kHalvings = 60;             ///< of a bisection: to the last bit
-constexpr int kSolves = 20;               ///< of a cluster, to find the restitution that keeps the energy
-constexpr Real kKeptEnergy = 1e-9;        ///< of what restitution would add: so much may be lost instead
-constexpr std::size_t kDense = 24;        ///< contacts of a cluster that are solved by pivoting
-constexpr Real kAcceptedResidual = 1e-6;  ///< of the velocities, for an impact
-constexpr Real kRoughResidual = 1e-3;     ///< likewise: an answer with more than this left over is none
-constexpr uint32_t kCollisionSweeps = 200, kPlasticSweeps = 400;
-/// With a bounded effort: contacts that are still solved by pivoting; updates of single contacts, by sweeps
-/// or in a sequence (60 ns each); solutions to find the restitution; what one with joints may take [ns].
+constexpr Real kRounding = 1e-13;  ///< relative rounding error of products of impulses and velocities
+/// Number of arcs of the circle of directions; each is searched for a change of sign.
+constexpr int kArcs = 64;
+constexpr int kHalvings = 60;  ///< bisection steps: to the last bit
+/// Solutions of a cluster in the search for the restitution that conserves the energy.
+constexpr int kSolves = 20;
+constexpr Real kKeptEnergy = 1e-9;  ///< share of the energy added by restitution that may be lost instead
+constexpr std::size_t kDense = 24;  ///< clusters of at most this many contacts are solved by pivoting
+constexpr Real kAcceptedResidual = 1e-6;  ///< share of the velocities: accepted residual of an impact
+/// Share of the velocities: a result with a larger residual is rejected.
+constexpr Real kRoughResidual = 1e-3;
+constexpr uint32_t kCollisionSweeps = 200, kPlasticSweeps = 400, kJointedSweeps = 60;
+/// Limits with bounded effort: contacts still solved by pivoting; updates of single contacts, by sweeps or in
+/// a sequence (60 ns each); solutions in the search for the restitution; cost of a solution with joints [ns].
 constexpr std::size_t kFewContacts = 8, kUpdates = 6'000;
 constexpr int kBoundedSolves = 3;
 constexpr Real kJointBudget = 1e6;
-constexpr Real kResting = 1e-11;  ///< of the fastest approach of all: slower ones are left
-constexpr Real kTie = 1e-6;  ///< of the fastest approach left: contacts as fast but for this collide together
-/// For each contact of a sequence; with joints, where each takes a solution of the whole system.
+constexpr Real kResting = 1e-11;  ///< share of the fastest approach of all: slower approaches are ignored
+/// Share of the fastest remaining approach: contacts that differ by less collide together.
+constexpr Real kTie = 1e-6;
+/// Limits of the number of impulses per contact of a sequence; with joints each impulse takes a solution of
+/// the whole system.
 constexpr std::size_t kImpulses = 200, kJointedImpulses = 12;
 
-/// The impulse with normal part du_n and friction at its limit against the direction `d`; none if friction
-/// then pulls the points together faster than the normal impulse parts them.
+/// The impulse with normal part du_n and friction at its limit against the direction `d`. None if this
+/// friction would pull the points together faster than the normal impulse separates them.
 std::optional<Vec3> sliding_impulse(const Mat3& K, Real du_n, Real mu, const Vector2d& d) {
   const Real resistance = K(0, 0) - mu * (K(0, 1) * d.x() + K(0, 2) * d.y());
   if (!(resistance > 0)) return std::nullopt;
@@ -47,7 +53,7 @@ std::optional<Vec3> sliding_impulse(const Mat3& K, Real du_n, Real mu, const Vec
   return Vec3(normal, -mu * normal * d.x(), -mu * normal * d.y());
 }
 
-/// A direction for each s in [0, 4): to the points around a square, without trigonometry.
+/// A direction for each s in [0, 4), through a point of the boundary of a square; without trigonometry.
 Vector2d direction_at(Real s) {
   const int side = std::min(static_cast<int>(s), 3);
   const Real x = 2 * (s - side) - 1;
@@ -57,11 +63,11 @@ Vector2d direction_at(Real s) {
   return Vector2d(turn[0] + turn[1] * x, turn[2] + turn[3] * x).normalized();
 }
 
-/// Friction on the round cone against the sliding that it leaves: d and u_tk(after) are parallel. With
-/// P_n = du_n / D(d), D(d) = K_nn - mu K_n,tk.d, their cross product times D is
+/// Friction on the round cone against the sliding that remains after the impact: d and u_tk(after) are
+/// parallel. With P_n = du_n / D(d), D(d) = K_nn - mu K_n,tk.d, their cross product times D is
 ///   g(d) = d x (D u_tk + du_n (K_tk,n - mu K_tk d)),
-/// a trigonometric polynomial of the second degree: at most four roots. With a diagonal K the sliding before
-/// the impact is one. Of several the one nearest to that is right.
+/// a trigonometric polynomial of the second degree with at most four roots. With a diagonal K one root is the
+/// direction of sliding before the impact. If there are several, the one nearest to this direction is used.
 class RoundSlide {
  public:
   RoundSlide(const Mat3& K, const Vec3& u, Real du_n, Real mu) : K_(K), u_(u), du_n_(du_n), mu_(mu) {}
@@ -112,7 +118,8 @@ class RoundSlide {
   Real nearness_ = 0;
 };
 
-/// The cases of 4.8: each axis sticks, or slides with its sign (+1, -1) against friction at the limit.
+/// The cases of section 4.8: each axis sticks, or slides with its sign (+1, -1) against friction at the
+/// limit.
 std::optional<Vec3> axes_impulse(const Mat3& K, const Vec3& u, Real du_n, const Vec3& mu, const Vec3& signs) {
   Mat3 M = K;
   Vec3 du(du_n, -u.y(), -u.z());
@@ -141,7 +148,7 @@ Vec3 separate_slide(const Mat3& K, const Vec3& u, Real du_n, const Vec3& mu) {
   return {du_n / K(0, 0), 0, 0};
 }
 
-/// For any restitution, whatever it does to the energy.
+/// The impulse for any restitution, without regard to the energy.
 Vec3 impulse_for(const Mat3& K, const Vec3& u, Real restitution, Real mu_t, Real mu_k) {
   const Real du_n = -(1 + restitution) * u.x();
   const Vec3 stick = K.llt().solve(Vec3(du_n, -u.y(), -u.z()));
@@ -150,21 +157,21 @@ Vec3 impulse_for(const Mat3& K, const Vec3& u, Real restitution, Real mu_t, Real
   return RoundSlide(K, u, du_n, mu_t).impulse();
 }
 
-/// The kinetic energy that an impulse adds is p.(u + u+) / 2. More than rounding?
+/// Whether the kinetic energy added by an impulse, p.(u + u+) / 2, is more than rounding.
 bool adds_energy(const Mat3& K, const Vec3& u, const Vec3& p) {
   return p.dot(u + K * p / 2) > kRounding * p.norm() * u.norm();
 }
 
-/// Approaching speed, 0 if parting.
+/// Speed of approach; 0 if the points separate.
 Real approach(const Contact& c, std::span<const ContactBody> bodies) {
   return std::max(0.0, -c.relative_velocity(bodies).x());
 }
 
-/// How much a solution may take: what it needs, or a bounded number of operations.
+/// Limit of a solution's work: unlimited, or a bounded number of operations.
 enum class Effort : uint8_t { full, bounded };
 
-/// Few contacts by pivoting; many by sweeps, whose impulses the proximal method takes further if need be and
-/// if there is time; with joints by that alone.
+/// Solves few contacts by pivoting and many by sweeps, whose impulses are improved by the proximal method if
+/// necessary and if the effort allows it. With joints only the proximal method is used.
 void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, const JointProblem& joints,
                     Effort effort, ContactWork& work) {
   const bool is_bounded = effort == Effort::bounded;
@@ -195,7 +202,7 @@ void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, 
   --work.solves;
 }
 
-/// A cluster's collision with its restitutions scaled down by the factor that keeps the energy.
+/// The collision of a cluster. Its restitutions are scaled down by the factor that conserves the energy.
 class Cluster {
  public:
   Cluster(std::span<ContactBody> bodies, std::span<Contact> contacts, std::span<const Real> restitution,
@@ -229,17 +236,18 @@ class Cluster {
     return work;
   }
 
-  /// What a bounded number of sweeps leaves is no failure: the contacts that still approach collide again.
+  /// The residual after a bounded number of sweeps is not a failure, because contacts that still approach
+  /// collide again.
   bool is_solved(const ContactWork& work) const {
     return work.residual <= kRoughResidual * fastest_ ||
            (effort_ == Effort::bounded && joints_.empty() && contacts_.size() > kFewContacts);
   }
 
-  /// With restitutions scaled down to where the energy stays: `energy` is what they add as they are. Without
-  /// restitution p.u+ <= 0 at each contact, and then the sum of p.(u + u+) / 2 is negative: the search has a
-  /// lower end. While the same contacts close and slide the energy is a parabola of the factor, which false
-  /// position finds the zero of in a few steps; halving the weight of an end that stays (the Illinois rule)
-  /// keeps it from creeping.
+  /// Scales the restitutions down until no energy is added; `energy` is what they add unscaled. Without
+  /// restitution p.u+ <= 0 at each contact, so the sum of p.(u + u+) / 2 is negative: the search has a lower
+  /// end. While the same contacts close and slide, the energy is a quadratic function of the factor, and
+  /// false position finds its zero in a few steps. Halving the weight of an end that stays (the Illinois
+  /// rule) prevents slow convergence.
   ContactWork soften(ContactWork work, Real energy) {
     work.restitution_reduced = 1;
     struct End {
@@ -272,23 +280,26 @@ class Cluster {
   }
 
   /// Targets may contradict each other: a body cannot bounce off one face and be stopped by the opposite one.
-  /// Those of a plastic impact never do among bodies that are not driven; and whatever projected Gauss-Seidel
-  /// leaves of it from no impulses on, each of its steps dissipates.
+  /// Those of a plastic impact never contradict each other without driven bodies. Gauss-Seidel from zero
+  /// impulses is also safe, because each of its steps dissipates energy.
   ContactWork solve_plastic(ContactWork work) {
     work.add(solve_with(0));
     work.solves = work.fallbacks = 1;
     work.residual = 0;
-    if (joints_.empty() && (residual(bodies_, contacts_) > kRoughResidual * fastest_ || added_energy() > 0)) {
+    if (residual(bodies_, contacts_) > kRoughResidual * fastest_ || added_energy() > 0) {
       std::copy(before_.begin(), before_.end(), bodies_.begin());
       for (Contact& c : contacts_) c.impulse.setZero();
-      work.iterations += projected_gauss_seidel(bodies_, contacts_, kPlasticSweeps, kRounding * fastest_);
+      work.iterations +=
+          joints_.empty()
+              ? projected_gauss_seidel(bodies_, contacts_, kPlasticSweeps, kRounding * fastest_)
+              : jointed_gauss_seidel(bodies_, contacts_, joints_, kJointedSweeps, kRounding * fastest_);
     }
     if (added_energy() > 0) shrink();
     work.residual = residual(bodies_, contacts_);
     return work;
   }
 
-  /// What the impulses add to the kinetic energy, beyond rounding [J].
+  /// Kinetic energy added by the impulses, beyond rounding [J].
   Real added_energy() const {
     Real size = 0;
     for (std::size_t i = 0; i < contacts_.size(); ++i)
@@ -296,7 +307,8 @@ class Cluster {
     return sim::added_energy(before_, bodies_, contacts_) - kRounding * static_cast<Real>(kDense) * size;
   }
 
-  /// For an inexact answer: the energy of s p is s (p.u + s p.(u+ - u) / 2), zero at the largest s allowed.
+  /// For an inexact result: scales the impulses down. The energy added by s p is s (p.u + s p.(u+ - u) / 2),
+  /// which is zero at the largest allowed s.
   void shrink() {
     Real first = 0, second = 0;
     for (std::size_t i = 0; i < contacts_.size(); ++i) {
@@ -321,10 +333,10 @@ class Cluster {
   Effort effort_;
   std::vector<ContactBody> before_;
   std::vector<Vec3> velocities_;
-  Real fastest_ = 0;  ///< of the velocities [m/s]
+  Real fastest_ = 0;  ///< greatest of the velocities [m/s]
 };
 
-/// Sums up what several solutions do to the joints.
+/// Sums the impulses of several solutions on the joints.
 class JointSums {
  public:
   explicit JointSums(const JointProblem& joints)
@@ -349,8 +361,8 @@ class JointSums {
   std::vector<Real> bounded_;
 };
 
-/// Impulses in the order of the approaching speeds, the fastest first. Contacts that approach equally fast
-/// collide together, so that mirror images stay so and the order of the list does not matter.
+/// Impulses in the order of the speeds of approach, the fastest first. Contacts with equal speeds collide
+/// together, so symmetric scenes stay symmetric and the order of the list does not matter.
 class Sequence {
  public:
   Sequence(std::span<ContactBody> bodies, std::span<Contact> contacts, std::span<const Real> restitution,
@@ -397,7 +409,7 @@ class Sequence {
       if (approach(contacts_[i], bodies_) >= (1 - kTie) * fastest) next_.push_back(i);
   }
 
-  /// Whether no two of the next contacts share a body that they move: then each is solved in closed form.
+  /// Whether no two of the next contacts share a movable body, so that each is solved in closed form.
   bool are_apart() {
     hit_.clear();
     for (const std::size_t i : next_)
@@ -429,7 +441,7 @@ class Sequence {
     sums_.add_last();
   }
 
-  /// A sequence without an end is cut off by a plastic impact of all contacts.
+  /// Ends a sequence that has reached its limit by a plastic impact of all contacts.
   void end_at_once() {
     std::vector<Vec3> impulses;
     for (const Contact& c : contacts_) impulses.push_back(c.impulse);

@@ -11,17 +11,18 @@
 
 namespace offstage::sim {
 
-/// How the contacts of a cluster act on each other.
+/// Order of the impulses in a cluster.
 enum class ImpactLaw : uint8_t {
-  simultaneous,  ///< all impulses together, P_n >= 0 complementary to u_n >= -e u_n(before)
-  /// One contact after the other, the fastest approach first and equally fast ones together. Impulses
-  /// propagate through Newton's cradle.
+  simultaneous,  ///< all impulses at once, P_n >= 0 complementary to u_n >= -e u_n(before)
+  /// One contact after the other, the fastest approach first, and equally fast ones together. Impulses
+  /// propagate as through Newton's cradle.
   sequential
 };
 
-/// The impulse on body a in the contact's frame (n, t, k) [N s] of a contact with mobility `K` [1/kg] whose
-/// points have the relative velocity `u` [m/s]; zero if they do not approach. Equal coefficients give the
-/// round friction cone, |P_tk| = mu P_n against the sliding; otherwise each axis sticks or slides separately.
+/// Returns the impulse on body a in the contact's frame (n, t, k) [N s] for a contact with mobility `K`
+/// [1/kg] whose points have the relative velocity `u` [m/s]; zero if they do not approach. Equal coefficients
+/// give the round friction cone, |P_tk| = mu P_n against the sliding; otherwise each axis sticks or slides
+/// separately.
 Vec3 collision_impulse(const Mat3& K, const Vec3& u, Real restitution, Real friction_t, Real friction_k);
 
 /// Resolves a cluster: changes the bodies' velocities, and sets the contacts' targets and total impulses.

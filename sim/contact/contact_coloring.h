@@ -1,7 +1,6 @@
 #pragma once
-/// Colours of the contact graph: patches of one colour share no body that contacts move, so that they can be
-/// solved at the same time. The colouring is greedy in the order of the patches and depends on that order
-/// alone.
+/// Colours of the contact graph. Patches of one colour share no movable body, so they can be solved at the
+/// same time. The colouring is greedy in the order of the patches and depends only on that order.
 
 #include <array>
 #include <cstdint>
@@ -13,9 +12,9 @@ namespace offstage::sim {
 class ContactColoring {
  public:
   static constexpr uint32_t kLanes = 8, kNone = UINT32_MAX;
-  /// Patches of one colour; kNone in unused lanes.
+  /// Patches of one colour, one per lane; kNone in unused lanes.
   using Batch = std::array<uint32_t, kLanes>;
-  /// kNone for a body that contacts do not move: it may be in many patches of a colour.
+  /// Bodies of a patch. kNone for a body that contacts do not move: it may be in many patches of a colour.
   struct Link {
     uint32_t a, b;
   };
@@ -31,7 +30,7 @@ class ContactColoring {
   uint32_t serial_begin() const { return begins_.back(); }
 
  private:
-  std::vector<uint64_t> used_;   // by body: bits of the colours around it
+  std::vector<uint64_t> used_;   // by body: bits of the colours of its patches
   std::vector<uint8_t> colors_;  // by patch
   std::vector<uint32_t> begins_;
   std::vector<Batch> batches_;

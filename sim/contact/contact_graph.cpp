@@ -10,14 +10,14 @@ namespace {
 
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 
-/// Of two bodies, the rows of those that are awake.
+/// Rows of the awake bodies of a pair.
 struct Link {
   uint32_t a = kNone, b = kNone;
 
   bool moves() const { return a != kNone || b != kNone; }
 };
 
-/// Disjoint sets of numbers, each named by its least.
+/// Disjoint sets of numbers; each set is represented by its least number.
 class Sets {
  public:
   explicit Sets(std::size_t size) : parent_(size) {
@@ -45,8 +45,8 @@ void ContactGraph::forget(uint32_t slot) {
 
 void find_islands(std::span<Body* const> bodies, std::span<ContactPair* const> pairs,
                   std::span<const std::pair<Body*, Body*>> springs, std::vector<Island>& islands) {
-  // Bodies and pairs lie all over the memory: they are asked side by side, and what is done in order has but
-  // their numbers.
+  // Bodies and pairs are scattered in memory, so their data are gathered in parallel. The sequential part
+  // then uses only their numbers.
   for_each_index(bodies.size(), [&](std::size_t i) { bodies[i]->row = static_cast<uint32_t>(i); });
   const auto link = [](const Body& a, const Body& b) {
     return Link{a.is_awake() ? a.row : kNone, b.is_awake() ? b.row : kNone};

@@ -20,9 +20,9 @@ struct Island {
   std::vector<Body*> bodies;
   std::vector<ContactPair*> pairs;
   std::vector<Articulation*> articulations;
-  CoupledSystem* motion =
-      nullptr;    ///< system that moved it from the interval's start and can restore its state
-  Real from = 0;  ///< since the sub-step's start [s]
+  /// System that moved it from the interval's start and can restore its state.
+  CoupledSystem* motion = nullptr;
+  Real from = 0;  ///< start of its interval, since the sub-step's start [s]
 };
 
 class ContactGraph {
@@ -33,7 +33,7 @@ class ContactGraph {
   template <class BodyAt, class SurfaceOf>
   void update(std::span<const IndexPair> candidates, bool adds, BodyAt&& body_at, SurfaceOf&& surface_of);
 
-  void forget(uint32_t slot);  ///< all pairs of a body
+  void forget(uint32_t slot);  ///< removes all pairs of a body
   void forget_all() { entries_.clear(); }
 
   /// All pairs in ascending order of their slots.

@@ -8,40 +8,40 @@
 namespace offstage::sim {
 namespace {
 
-/// Bodies that turn by less in an interval carry their arms as they are [rad].
+/// The arms of bodies that turn by less than this in an interval are not rotated [rad].
 constexpr Real kStraight = 2e-4;
-/// And so far a corner's way is nearly straight, and the velocity at it changes evenly [rad].
+/// Up to this rotation the path of a corner is nearly straight and its velocity changes at a constant rate
+/// [rad].
 constexpr Real kEven = 0.1;
-/// Bodies that turn by more in a sub-step are not followed: where their contacts get is beyond a prediction
-/// from the start [rad].
+/// The contacts of bodies that turn by more than this in a sub-step are not predicted [rad].
 constexpr Real kMostTurn = 1;
-/// Cosine of the greatest turn of a normal within an interval that is predicted.
+/// Cosine of the greatest predicted rotation of a normal within an interval.
 constexpr Real kPredictable = 0.8;
-/// Sine between an axis of revolution and the contact's direction: below it the direction around the axis is
-/// not defined well enough to follow.
+/// Sine of the angle between an axis of revolution and the contact's direction: below it the direction around
+/// the axis is too inaccurate to follow.
 constexpr Real kUpright = 0.02;
-/// Cosine: points of a surface of revolution that are not nearer than this to the meridian that faces the
-/// other body go with the body.
+/// Cosine: points of a surface of revolution farther than this from the meridian that faces the other body
+/// are fixed in the body.
 constexpr Real kFacing = 0.97;
-/// Of lines that are less inclined, the crossing is not defined [sine].
+/// Sine: the crossing of lines with a smaller angle is undefined.
 constexpr Real kParallel = 0.05;
 
 using Vec2 = Eigen::Vector2d;
 
-/// Round about its axis of revolution: the cylinder's and the cone's side and rims.
+/// Round about its axis of revolution: the sides and rims of cylinders and cones.
 bool is_revolved(const Shape& shape) {
   return std::holds_alternative<Cylinder>(shape) || std::holds_alternative<Cone>(shape);
 }
-/// Of a sphere or capsule, the radius around its core; else 0.
+/// Radius around the core of a sphere or capsule; 0 for other shapes.
 Real round_radius(const Shape& shape) {
   if (const auto* sphere = std::get_if<Sphere>(&shape)) return sphere->radius;
   if (const auto* capsule = std::get_if<Capsule>(&shape)) return capsule->radius;
   return 0;
 }
 
-/// How a body is at a time after the interval's start, by its velocities then.
+/// State of a body at a time after the interval's start, extrapolated by its velocities at the start.
 struct Carried {
-  Vec3 shift = Vec3::Zero();  // of the centre of mass, or of the origin
+  Vec3 shift = Vec3::Zero();  // displacement of the centre of mass, or of the origin
   Quat orientation, turn = Quat::Identity();
 };
 
@@ -63,12 +63,12 @@ Carried carried(const Body& body, Real time) {
   return c;
 }
 
-/// Everything about a contact at the interval's start.
+/// Data of a contact at the interval's start.
 struct Start {
   const Body &a, &b;
   const Manifold& m;
   Vec3 arm_a, arm_b;
-  Vec3 sliding;  // velocity of a's material there against b's
+  Vec3 sliding;  // velocity of a's material at the contact relative to b's
 };
 
 bool is_sphere(const Body& body) {
@@ -79,8 +79,8 @@ bool has_lines(NormalSource s) {
   return s == NormalSource::edges || s == NormalSource::edge_of_a || s == NormalSource::edge_of_b;
 }
 
-/// The direction of a line of a body after a turn. A rim's tangent stays where the rim faces the other body;
-/// the line of a round side goes with the axis either way.
+/// Direction of a line of a body after a rotation. The tangent of a rim is taken where the rim faces the
+/// other body; the line of a round side turns with the axis in any case.
 Vec3 turned_edge(const Body& body, const Vec3& edge, const Carried& now, const Vec3& arm, const Vec3& out) {
   const Quat& from = start_orientation(body);
   if (!is_revolved(body.def.shape)) return now.turn * edge;
@@ -97,7 +97,7 @@ struct Lines {
   Vec3 of_a, of_b;
 };
 
-/// The normal after a time, by what it comes from; not unit and of no meaning if the directions fail.
+/// Normal after a time, according to its source; not unit, and meaningless if the directions are undefined.
 Vec3 turned_normal(const Start& s, const Carried& a, const Carried& b, const Lines& lines) {
   const Vec3& n = s.m.normal;
   switch (s.m.source) {
@@ -125,13 +125,13 @@ Vec3 turned_normal(const Start& s, const Carried& a, const Carried& b, const Lin
   return length > 0.5 * distance && distance > 0 ? Vec3(between / length) : Vec3(Vec3::Zero());
 }
 
-/// The point of line A that is nearest to line B, across the normal; from A's centre.
+/// Point of line A nearest to line B, perpendicular to the normal; relative to A's centre.
 Vec3 crossing(const Vec3& on_a, const Vec3& from_b_to_a, const Lines& lines, const Vec3& n) {
   const Real area = lines.of_a.cross(lines.of_b).dot(n);
   return on_a - from_b_to_a.cross(lines.of_b).dot(n) / area * lines.of_a;
 }
 
-/// The contact after a time; none if its normal cannot be predicted.
+/// Computes the contact after a time; returns false if its normal cannot be predicted.
 bool place_after(const Start& s, Real time, ContactPlace& place) {
   const Carried a = carried(s.a, time), b = carried(s.b, time);
   const Vec3& n = s.m.normal;
@@ -145,8 +145,8 @@ bool place_after(const Start& s, Real time, ContactPlace& place) {
     return turned_arm(s.a, s.arm_a, from_a, -n, a.orientation, Vec3(-place.normal));
   };
   const auto arm_of_b = [&] { return turned_arm(s.b, s.arm_b, from_b, n, b.orientation, place.normal); };
-  // The contact goes with the material of the other body, too, but for its running along the first and for
-  // what the one slides over the other.
+  // The contact also moves with the material of the other body, apart from its motion along the first body's
+  // surface and the sliding.
   const Vec3 slide = time * s.sliding;
   const bool by_b = s.m.source == NormalSource::face_of_a || s.m.source == NormalSource::edge_of_a;
   place.turn = by_b ? b.turn : a.turn;
@@ -159,7 +159,7 @@ bool place_after(const Start& s, Real time, ContactPlace& place) {
   if (s.m.source == NormalSource::edges) {
     const Vec3 core_a = place.arm_a + s.m.radius_a * place.normal,
                core_b = arm_of_b() - s.m.radius_b * place.normal;
-    // Both lines begin at one place.
+    // Both lines start at the same point.
     const Vec3 from_b_to_a = core_a - core_b - (s.arm_a - s.arm_b) - b.shift + a.shift;
     place.arm_a = crossing(core_a, from_b_to_a, lines, place.normal) - s.m.radius_a * place.normal;
   }
@@ -167,7 +167,7 @@ bool place_after(const Start& s, Real time, ContactPlace& place) {
   return true;
 }
 
-/// The frame turned by the shortest way to another normal.
+/// The frame after the smallest rotation to another normal.
 ContactFrame turned_frame(const ContactFrame& f, const Vec3& n) {
   if (n == f.n) return f;
   const auto turn = [&](const Vec3& tangent) {
@@ -180,7 +180,7 @@ Vec3 components(const ContactFrame& f, const Vec3& v) {
   return {f.n.dot(v), f.t.dot(v), f.k.dot(v)};
 }
 
-/// What a change of place makes of the relative velocity, in the frame of the middle.
+/// Change of the relative velocity due to a change of place, in the frame of the middle.
 struct Gain {
   Vec3 velocity;
   Real along_t, along_k;
@@ -194,7 +194,7 @@ Gain gain(const Start& s, const ContactMotion& motion, const ContactPlace& place
   Vec3 by_turning =
       components(motion.frame, wa.cross(place.arm_a - middle.arm_a) - wb.cross(place.arm_b - middle.arm_b));
   by_turning.x() += (place.normal - middle.normal).dot(velocity);
-  if (s.m.count == 1) return {by_turning, 0, 0};  // nothing is beside it
+  if (s.m.count == 1) return {by_turning, 0, 0};  // there are no points beside it
   const Vec3 spin = wa - wb;
   const Quat turn = place.turn * middle.turn.conjugate();
   const auto along = [&](const Vec3& tangent) {
@@ -203,7 +203,7 @@ Gain gain(const Start& s, const ContactMotion& motion, const ContactPlace& place
   return {by_turning, along(motion.frame.t), along(motion.frame.k)};
 }
 
-/// Through the three of the start, the middle and the end, which is 0.
+/// Fits a parabola through the gains at the start, the middle (where it is 0) and the end.
 void set_gain(const Start& s, const ContactPlace& start, const ContactPlace& end, ContactMotion& motion) {
   const Gain first = gain(s, motion, start), last = gain(s, motion, end);
   motion.gain = (last.velocity - first.velocity) / 2;
@@ -213,7 +213,7 @@ void set_gain(const Start& s, const ContactPlace& start, const ContactPlace& end
   motion.turns = true;
 }
 
-/// Between two spheres, whose own turning moves no contact: in a heap of balls all contacts are such.
+/// For two spheres, whose rotation does not move the contact. This is every contact in a heap of balls.
 ContactPlace between_spheres(const Start& s, Real time) {
   const Vec3 between =
       (s.m.radius_a + s.m.radius_b) * s.m.normal + time * (twist_of(s.a).velocity - twist_of(s.b).velocity);
@@ -222,7 +222,7 @@ ContactPlace between_spheres(const Start& s, Real time) {
           Quat::Identity()};
 }
 
-/// An arm at a time, while its end goes with a body and slides by `sliding`.
+/// Motion of an arm whose end turns with a body and slides by `sliding`.
 struct Arm {
   Vec3 start, rate, curve;
 
@@ -232,8 +232,8 @@ struct Arm {
   }
 };
 
-/// The same for a corner or an edge of one body over a face of the other, if both turn little: to the second
-/// order, without rotations. In a heap almost all contacts are such, and each has this done in each step.
+/// The same for a corner or an edge of one body over a face of the other, if both turn little: to second
+/// order, without rotations. Almost all contacts in a heap are of this kind.
 void set_even_motion(const Start& s, const ContactFrame& frame, Real duration, ContactMotion& motion) {
   const Vec3 wa = twist_of(s.a).angular_velocity, wb = twist_of(s.b).angular_velocity, &n = frame.n;
   const bool by_b = s.m.source == NormalSource::face_of_a;
@@ -288,7 +288,7 @@ Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3&
   if (facing.norm() < kUpright || next.norm() < kUpright ||
       spoke.dot(facing) < kFacing * length * facing.norm())
     return with_body(arm);
-  // The angle from the meridian that faces the other body stays, which is but what the manifold is off.
+  // The angle from the meridian that faces the other body is kept. It is only the error of the manifold.
   const Real c = spoke.dot(facing), t = facing.x() * spoke.y() - facing.y() * spoke.x();
   const Vec2 turned =
       Vec2(c * next.x() - t * next.y(), t * next.x() + c * next.y()) / (facing.norm() * next.norm());
@@ -311,7 +311,7 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
   motion.middle = at_start;
   if (const Real share = duration / substep; most2 > share * share * kMostTurn * kMostTurn) return motion;
   if (is_face && most2 < kStraight * kStraight) {
-    // The one slides along the other's face.
+    // One body slides along the face of the other.
     if (m.source == NormalSource::face_of_b)
       motion.middle.arm_b += duration / 2 * start.sliding;
     else
@@ -331,7 +331,7 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
   }
   const bool by_a = m.source == NormalSource::face_of_b;
   if (is_face && is_sphere(by_a ? a : b) && turn2(by_a ? b : a) < kStraight * kStraight) {
-    // A ball on a face that does not turn: only its centre moves the contact.
+    // A ball on a face that does not turn: only the motion of its centre moves the contact.
     const Vec3 way =
         duration / 2 *
         (start.sliding -

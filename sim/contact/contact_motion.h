@@ -15,37 +15,37 @@
 
 namespace offstage::sim {
 
-/// A contact at one time of the interval.
+/// Position of a contact at one time of the interval.
 struct ContactPlace {
   Vec3 normal;        ///< unit, from b to a, world
   Vec3 arm_a, arm_b;  ///< from the bodies' centres of mass (of kinematic bodies their origins) [m]
-  Quat turn;          ///< rotation since the start of the body that carries the contact
+  Quat turn;          ///< rotation since the start of the body whose feature defines the contact
 };
 
 struct ContactMotion {
   ContactPlace middle;
-  ContactFrame frame;  ///< at the middle
+  ContactFrame frame;  ///< frame at the middle of the interval
   /// Change of the relative velocity at the contact due to the rotation of arms and normal alone, in `frame`
   /// (n, t, k): gain s + bow s^2, where s increases from -1 at the start through 0 in the middle to 1 at the
   /// end [m/s].
   Vec3 gain = Vec3::Zero(), bow = Vec3::Zero();
-  /// The gain of the normal velocity of points beside it, per metre along the tangents t and k [1/s].
+  /// Gain of the normal velocity at points beside it, per metre along the tangents t and k [1/s].
   Real gain_along_t = 0, gain_along_k = 0;
-  bool turns = false;  ///< whether any gain is not 0
+  bool turns = false;  ///< whether any gain differs from 0
 };
 
 /// Position of a body's centre of mass at the interval's start; of a kinematic body, its origin.
 Vec3 start_centre(const Body& body);
 
-/// Whether contacts may move along a body's surface while it turns: the body has rims or round sides and
-/// turns noticeably within `duration` [s].
+/// Whether contacts may move along a body's surface while it turns: it has rims or round sides and turns
+/// noticeably within `duration` [s].
 bool runs_along(const Body& body, Real duration);
 
 /// Predicts the motion of a contact of a manifold. `frame` is the manifold's frame and `place` the contact's
 /// position in the world at the interval's start; `duration` is the length of the interval and `substep` that
-/// of the whole sub-step [s]. Bodies that turn by more than a radian in a sub-step are not followed. A normal
-/// that turns too fast to be predicted, as between sharp corners that pass each other, is kept constant, with
-/// the arms of the start.
+/// of the whole sub-step [s]. Contacts of bodies that turn by more than a radian in a sub-step are not
+/// predicted. A normal that turns too fast to be predicted, as between sharp corners that pass each other, is
+/// kept constant, with the arms of the start.
 ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, const ContactFrame& frame,
                              const Vec3& place, Real duration, Real substep);
 

@@ -11,23 +11,23 @@
 namespace offstage::sim {
 namespace {
 
-/// Points that are this near to each other are the same, whatever their features are called [m].
+/// Points closer to each other than this are identical, even if their ids differ [m].
 constexpr Real kSame = 5e-3;
-/// Of squared distances: points of the same features count as so much nearer.
+/// Factor of the squared distance of points with equal ids, which are preferred.
 constexpr Real kSameFeature = 1.0 / 16;
-/// Cosine: contacts whose normals are not more inclined to each other than this may follow one another.
+/// Cosine: a contact can continue another one only if their normals are at most this different.
 constexpr Real kAlong = 0.7;
-/// What overlaps at an interval's end by less than kExpected, or than a point tells that has a normal as
-/// alike as this cosine and is so near, is expected [m].
+/// An overlap at an interval's end is expected if it exceeds the prediction of an existing point by less than
+/// kExpected. The point must be within kNear, and its normal must differ by less than this cosine [m].
 constexpr Real kSameNormal = 0.999, kNear = 0.02, kExpected = 2e-4;
-/// Of the spread of points, what makes it invertible.
+/// Share of the spread of points that is added to make it invertible.
 constexpr Real kFlat = 1e-6;
 
 Pose between(const Pose& a, const Pose& b) {
   return {a.point_to_body(b.position), a.orientation.conjugate() * b.orientation};
 }
 
-/// How far any point of a solid of the given reach is moved by the difference of two poses.
+/// Greatest displacement of a point of a solid with the given reach between two poses.
 Real difference(const Pose& p, const Pose& q, Real reach) {
   const Real half_sine = (p.orientation.coeffs() - q.orientation.coeffs()).norm();
   return (p.position - q.position).norm() + 2 * half_sine * reach;
@@ -43,7 +43,7 @@ bool is_ball(const Body& body) {
   return std::holds_alternative<Sphere>(body.def.shape);
 }
 
-/// A surface without edges.
+/// Whether the surface has no edges.
 bool is_round(const Body& body) {
   return std::holds_alternative<Sphere>(body.def.shape) || std::holds_alternative<Capsule>(body.def.shape);
 }
@@ -55,7 +55,7 @@ Vec3 frame_vector(const ContactFrame& f, const Vec3& v) {
   return {f.n.dot(v), f.t.dot(v), f.k.dot(v)};
 }
 
-/// A pose for many vectors: the rotation is a matrix, which is made once.
+/// A pose for many vectors: the rotation matrix is computed once.
 struct Frame {
   explicit Frame(const Pose& pose) : position(pose.position), axes(pose.orientation.toRotationMatrix()) {}
 
@@ -68,7 +68,7 @@ struct Frame {
   Mat3 axes;
 };
 
-/// Most normals come from faces, and then no line is named.
+/// Most normals are those of faces and have no lines.
 void turn_lines(const Manifold& local, const Mat3& axes, Manifold& m) {
   const bool of_a = local.source == NormalSource::edges || local.source == NormalSource::edge_of_a;
   const bool of_b = local.source == NormalSource::edges || local.source == NormalSource::edge_of_b;
@@ -76,7 +76,7 @@ void turn_lines(const Manifold& local, const Mat3& axes, Manifold& m) {
   m.edge_b = of_b ? Vec3(axes * local.edge_b) : Vec3(Vec3::Zero());
 }
 
-/// Copies no more than the points that there are.
+/// Copies only the points that exist.
 void place(const Manifold& local, const Pose& from, Manifold& m) {
   const Frame pose(from);
   m.normal = pose.vector_to_world(local.normal);
@@ -95,8 +95,8 @@ void place(const Manifold& local, const Pose& from, Manifold& m) {
   }
 }
 
-/// By points: shares of a force at `centre`, in a's frame like `frame`. They make a sum of 1 and, if the
-/// place is among the points, have their centre there: linear over the plane of the points.
+/// Shares of the points of a force at `centre`, in a's frame like `frame`. Their sum is 1, and if `centre` is
+/// among the points, their weighted mean is `centre`: they are linear over the plane of the points.
 using Weights = std::array<Real, 4>;
 Weights weights(const Manifold& m, const ContactFrame& frame, const Pose& a, const Vec3& centre) {
   const uint32_t count = m.count;
@@ -109,7 +109,7 @@ Weights weights(const Manifold& m, const ContactFrame& frame, const Pose& a, con
   }
   Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
   for (uint32_t k = 0; k < count; ++k) spread += (at[k] - middle) * (at[k] - middle).transpose();
-  // In a line, or at one place, the spread has no inverse: a little more of it does not matter.
+  // For collinear or equal points the spread is singular; a small addition has no other effect.
   spread += kFlat * (spread.trace() + kSame * kSame) * Eigen::Matrix2d::Identity();
   const Eigen::Vector2d slope = -spread.inverse() * middle;
   Weights result{};
@@ -120,12 +120,13 @@ Weights weights(const Manifold& m, const ContactFrame& frame, const Pose& a, con
   return result;
 }
 
-/// A rim over a face. A manifold has a disc as a polygon; where the disc leans, its lowest point is between
-/// two corners, and the corner that stands for it would make the contact jump along the rim. And the corners
-/// beside it get down by the contact's running along the rim, not by going on as they move at the start.
+/// A rim over a face. A manifold represents a disc by a polygon. If the disc leans, its lowest point is
+/// between two corners, and using a corner instead would make the contact jump along the rim. The corners
+/// beside the lowest point are omitted: they touch when the contact runs along the rim, not by their velocity
+/// at the start.
 class LeaningRim {
  public:
-  /// `core` is the shape's frame in the manifold's, `out` the direction towards the face.
+  /// `core` is the shape's frame in the manifold's frame, `out` is the direction towards the face.
   LeaningRim(const Shape& shape, const Pose& core, const Vec3& out) : core_(core) {
     if (!std::holds_alternative<Cylinder>(shape) && !std::holds_alternative<Cone>(shape)) return;
     const Vec3 facing = core.vector_to_body(out);
@@ -134,14 +135,14 @@ class LeaningRim {
   }
   bool leans() const { return facing_ != Eigen::Vector2d::Zero(); }
 
-  /// Points next to the meridian that faces the other body are moved there.
+  /// Moves points near the meridian that faces the other body to this meridian.
   Vec3 lowered(const Vec3& place) const {
     const Vec3 local = core_.point_to_body(place);
     const Real radius = std::hypot(local.x(), local.z());
     if (towards(local) < kNearest * radius) return place;
     return core_.point_to_world({radius * facing_.x(), local.y(), radius * facing_.y()});
   }
-  /// Whether a point is beside the lowest one of the same rim.
+  /// Whether a point is beside the lowest point of the same rim.
   bool is_beside(const Vec3& place, const Vec3& lowest) const {
     const Vec3 local = core_.point_to_body(place), low = core_.point_to_body(lowest);
     const Real radius = std::hypot(low.x(), low.z());
@@ -151,7 +152,7 @@ class LeaningRim {
   }
 
  private:
-  /// Cosine of half the angle between corners; sine of the least lean; of the radius.
+  /// Cosine of half the angle between corners; sine of the smallest lean; share of the radius.
   static constexpr Real kNearest = 0.9951847, kLeast = 0.02, kSameHeight = 1e-6;
   Real towards(const Vec3& local) const { return local.x() * facing_.x() + local.z() * facing_.y(); }
 
@@ -159,7 +160,7 @@ class LeaningRim {
   Eigen::Vector2d facing_ = Eigen::Vector2d::Zero();
 };
 
-/// Of a manifold in a's frame.
+/// Corrects the points on leaning rims of a manifold in a's frame.
 void follow_rims(Manifold& m, const Body& a, const Body& b, const Pose& a_from_b) {
   const bool on_a = m.source == NormalSource::face_of_b, on_b = m.source == NormalSource::face_of_a;
   if (!on_a && !on_b) return;
@@ -171,7 +172,7 @@ void follow_rims(Manifold& m, const Body& a, const Body& b, const Pose& a_from_b
   for (uint32_t k = 0; k < m.count; ++k) {
     ContactPoint& p = m.points[k];
     const Vec3 moved = rim.lowered(on_rim(p));
-    // The face is flat: what the point goes along the normal, the separation changes by.
+    // The face is flat, so the separation changes by the displacement along the normal.
     p.separation += (on_a ? 1 : -1) * m.normal.dot(moved - on_rim(p));
     on_rim(p) = moved;
     (on_a ? p.on_b : p.on_a) =
@@ -184,7 +185,7 @@ void follow_rims(Manifold& m, const Body& a, const Body& b, const Pose& a_from_b
     if (!rim.is_beside(on_rim(m.points[k]), low)) m.points[m.count++] = m.points[k];
 }
 
-/// Of the material point at an arm, without contacts: the mean of its ends.
+/// Velocity of the material point at an arm without contacts: the mean of start and end of the interval.
 Vec3 free_velocity(const Body& body, const Vec3& arm) {
   if (!body.is_awake()) return body.is_kinematic() ? body.drive.at(arm) : Vec3(Vec3::Zero());
   const Twist mean{(body.start_twist.velocity + body.rigid.velocity()) / 2,
@@ -192,7 +193,7 @@ Vec3 free_velocity(const Body& body, const Vec3& arm) {
   return mean.at(arm);
 }
 
-/// Where a body is when the interval begins and, if it moves freely, when it ends. The position is that of
+/// Poses of a body at the start and, if it moves freely, at the end of the interval. The position is that of
 /// start_centre().
 struct Ends {
   explicit Ends(const Body& body)
@@ -232,7 +233,7 @@ void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_wit
   at_end_.clear();
   has_narrow_ = false;
   for (const PlacedManifold& m : placed_) {
-    // No edge of a face acts on a ball that lies on it.
+    // Edges of a face have no effect on a ball that lies on the face.
     const bool on_face = (m.manifold.source == NormalSource::face_of_b && is_ball(*a_)) ||
                          (m.manifold.source == NormalSource::face_of_a && is_ball(*b_));
     has_narrow_ |= !on_face && !(m.manifold.continues_a && m.manifold.continues_b) && is_narrow(m.manifold);
@@ -279,7 +280,7 @@ void ContactPair::find_points(const Pose& a, const Pose& b, Real margin, Real re
     placed_at_ = a;
     return find_one_point(a, b, margin);
   }
-  // Pairs are found side by side; what they need for a moment is each thread's own.
+  // Pairs are processed in parallel, so the buffers belong to the threads.
   static thread_local std::vector<Remembered> before;
   static thread_local std::vector<Manifold> found;
   const Pose a_from_b = between(a, b);
@@ -315,8 +316,8 @@ Real ContactPair::free_way(const PlacedManifold& m, const Vec3& place, Real dura
   return duration * motion.frame.n.dot(velocity);
 }
 
-/// The contact of a wheel stays below it while its rim turns: a point found at the end is the same as one of
-/// the start if it lies where that one's feature gets to, on either body.
+/// The contact of a wheel stays below it while its rim turns. So a point found at the end is the same as one
+/// of the start if it is where the feature of that point moves to, on either body.
 bool ContactPair::is_expected(const Vec3& normal, const ContactPoint& at_end, Real duration) const {
   const auto is_near = [&](const Body& body, const Vec3& before, const Vec3& after, const Vec3& out_before,
                            const Vec3& out_after) {
@@ -340,7 +341,7 @@ bool ContactPair::is_expected(const Vec3& normal, const ContactPoint& at_end, Re
   return false;
 }
 
-/// What meets at the interval's end, as it is at its start if each feature goes with its body.
+/// Transforms the contacts of the interval's end back to its start, each feature with its body.
 PlacedManifold ContactPair::brought_back(const Manifold& at_end, Real duration) const {
   const Ends a(*a_), b(*b_);
   const auto back = [](const Ends& body, const Vec3& v) {
@@ -392,7 +393,8 @@ void ContactPair::add_speculative_contacts(Real duration) {
   }
 }
 
-/// Of a sphere. Its force stays as it is in the world, for the sphere turns under it when it rolls.
+/// For a pair with a sphere. The force keeps its direction in the world, because the sphere turns under it
+/// when it rolls.
 void ContactPair::find_one_point(const Pose& a, const Pose& b, Real margin) {
   const bool known = !placed_.empty();
   placed_.resize(1);
@@ -409,7 +411,7 @@ void ContactPair::find_one_point(const Pose& a, const Pose& b, Real margin) {
   f = {last, last, frame_vector(m.frame, world_vector(before, f.mean)), true};
 }
 
-/// What acted along the normal does so along the new one, however far the bodies have turned: they may roll.
+/// The normal force is kept along the new normal however far the bodies have turned, because they may roll.
 PointForce ContactPair::recalled(const Remembered& p, const ContactFrame& frame, const Mat3& a_axes) {
   const auto force = [&](const Vec3& before) -> Vec3 {
     const Real normal = before.dot(p.normal);
@@ -420,7 +422,7 @@ PointForce ContactPair::recalled(const Remembered& p, const ContactFrame& frame,
   return {last, last, force(p.mean), true};
 }
 
-/// The points stay where they are on their bodies; the normal stays with a.
+/// The points keep their positions on their bodies; the normal keeps its direction in a.
 void ContactPair::reuse(const Pose& a, const Pose& b, const std::vector<Remembered>& points) {
   if (found_.empty()) {
     found_.resize(placed_.size());
@@ -440,7 +442,7 @@ void ContactPair::reuse(const Pose& a, const Pose& b, const std::vector<Remember
       const Vec3 on_a = frame_a.point_to_world(local.points[k].on_a);
       const Vec3 on_b = frame_b.point_to_world(from_b.point_to_body(local.points[k].on_b));
       m.points[k].separation = m.normal.dot(on_a - on_b);
-      // Both on one line along the normal, halfway between what each body says.
+      // Both points are on one line along the normal, through the midpoint of their positions on both bodies.
       const Vec3 middle = (on_a + on_b) / 2;
       m.points[k].on_a = middle + m.points[k].separation / 2 * m.normal;
       m.points[k].on_b = middle - m.points[k].separation / 2 * m.normal;
@@ -457,12 +459,12 @@ void ContactPair::set_frame(PlacedManifold& m) const {
   const Vec3 axis = surface_.grain->start_pose.vector_to_world(surface_.grain->def.friction_axis);
   const Vec3 along = axis - n.dot(axis) * n;
   const Real length = along.norm();
-  if (length < 1e-6 * axis.norm()) return;  // the grain stands on the contact
+  if (length < 1e-6 * axis.norm()) return;  // the friction axis is perpendicular to the contact
   m.frame.t = along / length;
   m.frame.k = n.cross(m.frame.t);
 }
 
-/// Forces turn with body a. (A frame's tangents can jump while its normal hardly moves.)
+/// Forces are stored in a's frame. (The tangents of a frame can jump although its normal hardly moves.)
 void ContactPair::remember(std::vector<Remembered>& points) const {
   if (placed_.empty()) return;
   const Frame at(placed_at_);
@@ -477,8 +479,9 @@ void ContactPair::remember(std::vector<Remembered>& points) const {
   }
 }
 
-/// Points that were there before keep their forces: those of the same features, or else nearby. Each force
-/// goes to one point, or the forces of a pair that is found again and again would grow without end.
+/// Points that existed before keep their forces; they are identified by their ids, or else by distance. Each
+/// stored force is used once, otherwise the forces of a pair that is found repeatedly would grow without
+/// limit.
 void ContactPair::recall(std::vector<Remembered>& points, const Pose& pose) {
   const Frame a(pose);
   for (PlacedManifold& m : placed_) {
@@ -504,10 +507,10 @@ void ContactPair::recall(std::vector<Remembered>& points, const Pose& pose) {
   }
 }
 
-/// What acted at points that are gone goes on to act at those that came for them: faces that lie on each
-/// other may have other corners in every step, and what they bear does not change by that. Of the first
-/// manifold along whose normal it is, each point gets a share, so that the sum acts where it did, as far as
-/// the points reach.
+/// Transfers the forces of points that have disappeared to the current points. Faces that lie on each other
+/// may have different corners in every step, but their load does not change. The forces go to the first
+/// manifold with a similar normal. They are distributed over its points so that their sum acts where it did,
+/// as far as the points extend.
 void ContactPair::inherit(std::vector<Remembered>& points, const Pose& a) {
   if (std::all_of(points.begin(), points.end(), [](const Remembered& p) { return p.taken; })) return;
   for (PlacedManifold& m : placed_) {
@@ -516,7 +519,7 @@ void ContactPair::inherit(std::vector<Remembered>& points, const Pose& a) {
     Vec3 force = Vec3::Zero(), mean = Vec3::Zero(), moment = Vec3::Zero();
     Real pressure = 0;
     for (Remembered& p : points) {
-      // In the world the directions stay, however far a body that rolls has turned.
+      // Directions are kept in the world, however far a rolling body has turned.
       const Vec3 before = placed_at_.vector_to_world(p.normal);
       if (p.taken || !(before.dot(m.frame.n) > kAlong)) continue;
       const auto along_normal = [&](const Vec3& f) {

@@ -1,6 +1,6 @@
 #pragma once
-/// A pair of bodies near each other: their contact points, and the data kept between steps, which are the
-/// narrow phase's cache and the forces at the points as initial guess of the next solution.
+/// A pair of bodies near each other: their contact points, and the data that is kept between steps. This is
+/// the narrow phase's cache and the forces at the points, which are the initial guess of the next solution.
 
 #include <array>
 #include <limits>
@@ -18,13 +18,13 @@ struct PairSurface {
   Real restitution = 0, friction = 0, static_friction = 0;
   Real cross = 1;               ///< friction across the friction axis over friction along it
   const Body* grain = nullptr;  ///< body that defines the friction axis; null: isotropic
-  bool conveys = false;         ///< a surface is a conveyor
+  bool conveys = false;         ///< whether a surface is a conveyor
 };
 
 /// Force at a point of a manifold on body a, in the manifold's frame.
 struct PointForce {
   Vec3 now = Vec3::Zero();   ///< mean over the interval [N]
-  Vec3 last = Vec3::Zero();  ///< at its end; initial guess of the next interval [N]
+  Vec3 last = Vec3::Zero();  ///< at the end of the interval; initial guess of the next one [N]
   Vec3 mean = Vec3::Zero();  ///< over previous intervals; used by the fast solver [N]
   bool known = false;        ///< whether the point existed in the previous interval
 };
@@ -54,14 +54,14 @@ class alignas(64) ContactPair {
   bool has_narrow_ = false;
 
  public:
-  uint32_t impacts = 0;        ///< in this sub-step
-  uint8_t speculative = 0;     ///< manifolds that add_speculative_contacts() added
-  bool toi_exhausted = false;  ///< it reached the limit of impacts: no more trace-backs in this sub-step
-  bool restitution_suppressed =
-      false;         ///< its contacts have no restitution in this sub-step: they only limit the approach
-  Real deepest = 0;  ///< overlap that find() has seen in this sub-step [m]
-  bool needs_toi =
-      false;  ///< impacts of this pair are traced back to; otherwise its points limit the approach
+  uint32_t impacts = 0;        ///< number in this sub-step
+  uint8_t speculative = 0;     ///< number of manifolds that add_speculative_contacts() added
+  bool toi_exhausted = false;  ///< the limit of impacts is reached: no more trace-backs in this sub-step
+  /// Its contacts have no restitution in this sub-step; they only limit the approach.
+  bool restitution_suppressed = false;
+  Real deepest = 0;  ///< deepest overlap that find() has seen in this sub-step [m]
+  /// Impacts of this pair are traced back to; otherwise its points limit the approach.
+  bool needs_toi = false;
 
   /// Only `b` may be a plane.
   ContactPair(Body& a, Body& b, const PairSurface& surface);
@@ -89,7 +89,7 @@ class alignas(64) ContactPair {
 
   /// Whether some manifold is a line or a point (is_narrow()), where there may be a seam.
   bool has_narrow() const { return has_narrow_; }
-  /// The i-th manifold that add_speculative_contacts() added, with its points where they are at the
+  /// The i-th manifold added by add_speculative_contacts(), with its points at their positions at the
   /// interval's end.
   const Manifold& at_end(std::size_t i) const { return at_end_[i]; }
   /// Replaces the i-th manifold by another one in world coordinates. A manifold without points is removed at
@@ -103,7 +103,7 @@ class alignas(64) ContactPair {
   std::vector<PlacedManifold>& manifolds() { return placed_; }
   const std::vector<PlacedManifold>& manifolds() const { return placed_; }
 
-  /// Least separation of the contact points; infinite if there are none.
+  /// Smallest separation of the contact points; infinite if there are none.
   Real separation() const { return separation_; }
   /// Number of touching points.
   uint32_t touching() const { return touching_; }
@@ -120,7 +120,7 @@ class alignas(64) ContactPair {
     Vec3 on_a, last, mean, normal;
     Real torque, mean_torque;
     uint32_t id;
-    bool taken = false;  ///< it was matched with a current point
+    bool taken = false;  ///< whether it was matched with a current point
   };
   static PointForce recalled(const Remembered& p, const ContactFrame& frame, const Mat3& a_axes);
   void find_points(const Pose& a, const Pose& b, Real margin, Real reuse, bool turning);
@@ -130,7 +130,7 @@ class alignas(64) ContactPair {
   void inherit(std::vector<Remembered>& points, const Pose& a);
   void reuse(const Pose& a, const Pose& b, const std::vector<Remembered>& points);
   void set_frame(PlacedManifold& m) const;
-  /// Displacement of a away from b along the normal due to the free motion, at a contact of the start [m].
+  /// Displacement of a relative to b along the normal by the free motion, at a contact of the start [m].
   Real free_way(const PlacedManifold& m, const Vec3& place, Real duration) const;
   /// Whether the existing points already predict an overlap at this point of the world at the end.
   bool is_expected(const Vec3& normal, const ContactPoint& at_end, Real duration) const;
@@ -138,14 +138,14 @@ class alignas(64) ContactPair {
 
   PairSurface surface_;
   bool is_on_plane_;
-  bool has_sphere_;  // such a pair has at most one point, which is found as quickly as it is reused
+  bool has_sphere_;  // the pair has at most one point, and finding it is as fast as reusing it
   PairCache cache_;
   // Manifolds in a's frame. Filled when they are first reused, to save memory for moving pairs.
   std::vector<Manifold> found_;
-  std::vector<Manifold> at_end_;  // of the speculative ones
-  Pose a_from_b_;                 // when found
+  std::vector<Manifold> at_end_;  // manifolds of the speculative contacts
+  Pose a_from_b_;                 // relative pose when the contacts were found
   Real found_margin_ = -1;
-  Pose placed_at_;  // of a, when placed
+  Pose placed_at_;  // pose of a when the contacts were placed
 };
 
 }  // namespace offstage::sim

@@ -14,7 +14,7 @@ Mat3 cross_of(const Vec3& r) {
   return m;
 }
 
-/// p is the solution where it is its own projection after a step against u: the natural residual.
+/// Natural residual: p is the solution if a step against u and a projection return p.
 Real violation(const Contact& c, std::span<const ContactBody> bodies) {
   const Real k = mobility(c, bodies).diagonal().maxCoeff();
   Vec3 u = c.relative_velocity(bodies);
@@ -80,7 +80,8 @@ uint32_t projected_gauss_seidel(std::span<ContactBody> bodies, std::span<Contact
       Vec3 u = c.relative_velocity(bodies);
       const Vec3 before = c.impulse;
       c.impulse.x() = std::max(0.0, before.x() - (u.x() - c.target) / K(0, 0));
-      // Friction against what the normal's change leaves; the larger of both diagonals makes the step safe.
+      // Friction against the velocity that remains after the change of the normal impulse. The larger of both
+      // diagonal elements makes the step safe.
       u += (c.impulse.x() - before.x()) * K.col(0);
       const Real k = std::max(K(1, 1), K(2, 2)) + std::abs(K(1, 2));
       const Vec3 wanted(c.impulse.x(), before.y() - u.y() / k, before.z() - u.z() / k);

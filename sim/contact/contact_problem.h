@@ -21,9 +21,10 @@
 namespace offstage::sim {
 
 struct ContactBody {
-  Real inverse_mass = 0;                 ///< [1/kg]; 0: contacts do not move it
-  Mat3 inverse_inertia = Mat3::Zero();   ///< about the centre of mass, world axes [1/(kg m^2)]
-  Vec3 velocity = Vec3::Zero();          ///< of the centre of mass [m/s]; solvers add what the impulses do
+  Real inverse_mass = 0;                ///< [1/kg]; 0: contacts do not move it
+  Mat3 inverse_inertia = Mat3::Zero();  ///< about the centre of mass, world axes [1/(kg m^2)]
+  /// Velocity of the centre of mass [m/s]; solvers add the effect of the impulses.
+  Vec3 velocity = Vec3::Zero();
   Vec3 angular_velocity = Vec3::Zero();  ///< world [rad/s]
 
   bool is_moved() const { return inverse_mass > 0; }
@@ -34,15 +35,18 @@ struct ContactBody {
   }
 };
 
-/// One point where body a touches body b. Its numbers are in the order normal, t, k of its frame.
+/// One point where body a touches body b. Vectors of three numbers are in the order normal, t, k of its
+/// frame.
 struct Contact {
   uint32_t a = 0, b = 0;                            ///< indices of bodies; not both unmoved
   ContactFrame frame;                               ///< n from b to a
   Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();  ///< from the centres of mass to the point, world [m]
-  Vec3 offset = Vec3::Zero();  ///< added to the relative velocity: moving surfaces, turning frames [m/s]
-  Vec3 bias = Vec3::Zero();    ///< the part of `offset` that no surface has: velocity terms of R9 [m/s]
-  Real target = 0;             ///< least normal velocity afterwards [m/s]
-  /// Coulomb's coefficients along t and k. Equal ones make the round cone, |p_tk| <= mu p_n; with different
+  /// Added to the relative velocity, for moving surfaces and turning frames [m/s].
+  Vec3 offset = Vec3::Zero();
+  /// The part of `offset` that is not a surface velocity: velocity terms of R9 [m/s].
+  Vec3 bias = Vec3::Zero();
+  Real target = 0;  ///< smallest normal velocity after the solution [m/s]
+  /// Coulomb's coefficients along t and k. Equal ones give the round cone, |p_tk| <= mu p_n; with different
   /// ones each axis has its own limit (R6).
   Real friction_t = 0, friction_k = 0;
   Vec3 impulse = Vec3::Zero();  ///< in: a guess; out: the solution [N s]
@@ -51,7 +55,7 @@ struct Contact {
   bool is_isotropic() const { return friction_t == friction_k; }
   Vec3 to_world(const Vec3& p) const { return p.x() * frame.n + p.y() * frame.t + p.z() * frame.k; }
   Vec3 to_frame(const Vec3& v) const { return {frame.n.dot(v), frame.t.dot(v), frame.k.dot(v)}; }
-  /// (u_n, u_t, u_k), offset included.
+  /// Relative velocity (u_n, u_t, u_k), offset included.
   Vec3 relative_velocity(std::span<const ContactBody> bodies) const {
     return to_frame(bodies[a].velocity_at(arm_a) - bodies[b].velocity_at(arm_b)) + offset;
   }
@@ -85,11 +89,11 @@ struct ContactWork {
   uint64_t iterations = 0;      ///< pivots, Newton steps or sweeps
   uint64_t factorizations = 0;  ///< full factorizations of the matrix
   uint64_t fallbacks = 0;       ///< problems that the intended solver did not solve
-  uint64_t over_budget =
-      0;  ///< problems that exceeded the budget of the exact solver and went to the fast one
+  /// Problems that exceeded the budget of the exact solver and were given to the fast one.
+  uint64_t over_budget = 0;
   uint64_t cluster_truncated = 0;  ///< collisions solved without the contacts far from the impact
-  uint64_t restitution_reduced =
-      0;  ///< collisions with reduced restitution, and steps with reduced impulses, to avoid a gain of energy
+  /// Collisions with reduced restitution, and steps with reduced impulses, to avoid a gain of energy.
+  uint64_t restitution_reduced = 0;
   Real residual = 0;  ///< greatest residual [m/s]
 
   void add(const ContactWork& w) {
@@ -104,7 +108,7 @@ struct ContactWork {
   }
 };
 
-/// Solves the problem by projected Gauss-Seidel, starting at the contacts' impulses, which the bodies'
+/// Solves the problem by projected Gauss-Seidel, starting at the contacts' impulses, whose effect the bodies'
 /// velocities must already contain. Each sweep solves the contacts one by one in order, until no velocity
 /// changes by more than `tolerance` [m/s]. Returns the number of sweeps. It is the fall-back of the other
 /// solvers.

@@ -5,11 +5,11 @@
 namespace offstage::sim {
 namespace {
 
-/// What slides slower than this is at rest, to static friction [m/s].
+/// Below this sliding speed, static friction applies [m/s].
 constexpr Real kSlip = 1e-3;
 
-/// The material point of a round body that stands for a point of its surface: on the axis, or at the centre.
-/// The surface turns through the contact, these do not.
+/// The material point of a round body that represents a point of its surface: on the axis, or at the centre.
+/// The surface turns through the contact; these points do not.
 Vec3 core_point(const Body& body, const Vec3& place) {
   const Shape& shape = body.def.shape;
   if (std::holds_alternative<Sphere>(shape)) return body.start_pose.position;
@@ -21,7 +21,8 @@ Vec3 core_point(const Body& body, const Vec3& place) {
 }
 
 struct PointRates {
-  Vec3 velocity, acceleration;  ///< of a material point at the start; the latter without forces: w x (w x r)
+  /// Of a material point at the start; the acceleration is that without forces, w x (w x r).
+  Vec3 velocity, acceleration;
 };
 
 PointRates rates(const Body& body, const Vec3& place) {
@@ -29,12 +30,12 @@ PointRates rates(const Body& body, const Vec3& place) {
     const Vec3 &w = body.start_twist.angular_velocity, wr = w.cross(place - body.start.position);
     return {body.start_twist.velocity + wr, w.cross(wr)};
   }
-  // The velocities of kinematic bodies are those of the interval's end, so nothing is missing from them.
+  // The velocities of kinematic bodies are those of the interval's end, so they need no correction.
   return {body.start_velocity(place), Vec3::Zero()};
 }
 
 Twist twist(const Body& body) {
-  // At the origin of the world's axes.
+  // Twist at the origin of the world.
   if (body.is_awake()) {
     const Vec3& w = body.start_twist.angular_velocity;
     return {body.start_twist.velocity - w.cross(body.start.position), w};
@@ -55,8 +56,8 @@ Real spin(const Body& body) {
   return body.is_kinematic() ? body.drive.angular_velocity.squaredNorm() : 0;
 }
 
-/// The rotation by a vector of angle times axis: exact enough by series for what contacts turn in a step, and
-/// without trigonometry, whose last bits differ between libraries.
+/// Rotation by a rotation vector, by series. It is accurate enough for the rotation of contacts in a step,
+/// and needs no trigonometry, whose last bits differ between libraries.
 Quat rotation(const Vec3& v) {
   const Real s = v.squaredNorm() / 4;
   const Real sine = 1 - s / 6 * (1 - s / 20 * (1 - s / 42)), cosine = 1 - s / 2 * (1 - s / 12 * (1 - s / 30));
@@ -65,18 +66,18 @@ Quat rotation(const Vec3& v) {
 
 }  // namespace
 
-/// What the relative acceleration of R9 has besides the part that is linear in the accelerations of the
+/// Terms of the relative acceleration of R9 besides the part that is linear in the accelerations of the
 /// bodies:
 ///   n . (c_a'' - c_b'') + 2 n' . (c_a' - c_b') - |n'|^2 D
-/// with material points c on both bodies at a distance D along n. (Of two centres of spheres, this is
-/// n.c'' + n'.c', not twice the latter.) Tangentially, what turns with the bodies. Returned is what this
-/// makes of the relative velocity in an interval of length h, in the contact's frame.
+/// with material points c on both bodies at a distance D along n. (For two centres of spheres, this is n.c''
+/// + n'.c', not twice the latter.) The tangential terms are due to the rotation of the bodies. Returns the
+/// change of the relative velocity by these terms in an interval of length h, in the contact's frame.
 ///
-/// The terms with n' hold while n turns little. Of sharp corners that slide past each other, and of edges
-/// that are almost parallel, it turns by any angle in no time; then as much of the sliding as there is has
-/// become parting, and no more. Of two points that pass each other with the velocity s, T = s^2 / D makes
+/// The terms with n' are valid while n turns little. When sharp corners slide past each other, or edges that
+/// are almost parallel, n turns by any angle in a very short time; the velocity of separation then equals the
+/// sliding speed at most. For two points that pass each other with the velocity s, T = s^2 / D gives
 ///   d/dt |(D, s t)| at h = T h / sqrt(1 + (T h / s)^2),
-/// which is used for all.
+/// which is used in all cases.
 Vec3 velocity_bias(const ContactPair& pair, const PlacedManifold& placed, const ContactPoint& point, Real h) {
   const Manifold& m = placed.manifold;
   if (is_face(m.source) && spin(pair.a()) < kNoSpin && spin(pair.b()) < kNoSpin) return Vec3::Zero();

@@ -9,8 +9,8 @@
 
 namespace offstage::sim {
 
-/// The change of the relative velocity at a contact in an interval of length h, in the contact's frame, that
-/// does not depend on the forces: the velocity terms of the relative acceleration (R9).
+/// Change of the relative velocity at a contact in an interval of length h that does not depend on the
+/// forces, in the contact's frame: the velocity terms of the relative acceleration (R9).
 Vec3 velocity_bias(const ContactPair& pair, const PlacedManifold& placed, const ContactPoint& point, Real h);
 
 /// Velocity that conveyors add to the velocity of a relative to b [m/s], world axes.
@@ -20,7 +20,7 @@ Vec3 surface_velocity(const ContactPair& pair);
 Vec3 in_frame(const ContactFrame& f, const Vec3& v);
 
 /// Coefficients of friction along t and k at a relative velocity u (contact's frame): the static coefficients
-/// if the contact does not slide yet.
+/// if the contact does not slide.
 std::pair<Real, Real> friction(const PairSurface& surface, const Vec3& u);
 
 /// Reference point of a body's velocities. For kinematic bodies it is that of the interval's end.
@@ -29,7 +29,7 @@ Vec3 origin(const Body& body);
 /// The inverse inertia in world axes at an orientation.
 Mat3 inverse_inertia(const RigidBody& body, const Quat& orientation);
 
-/// The angle times the axis of the turn from one orientation to another [rad], for small turns.
+/// Rotation vector (angle times axis) from one orientation to another [rad], for small rotations.
 Vec3 rotation_vector(const Quat& from, const Quat& to);
 
 /// Moves a body by a shift [m] and a small rotation vector [rad].

@@ -7,7 +7,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Of the kinetic energy, what the velocity terms may add in a step.
+/// Share of the kinetic energy that the velocity terms may add in a step.
 constexpr Real kAdded = 0.02;
 
 bool is_driven(const Island& island) {
@@ -28,7 +28,8 @@ bool is_driven(const Island& island) {
 }  // namespace
 
 Real kept_share(const Island& island, std::span<const RelaxedBody> relaxed) {
-  Real kinetic = 0, first = 0, second = 0;  // of s times the impulses: kinetic + first s + second s^2
+  // Energy with s times the impulses: kinetic + first s + second s^2.
+  Real kinetic = 0, first = 0, second = 0;
   for (std::size_t i = 0; i < island.bodies.size(); ++i) {
     const RigidBody& body = island.bodies[i]->rigid;
     const RelaxedBody& r = relaxed[i];

@@ -11,8 +11,8 @@ namespace offstage::sim {
 /// Factor for an island's contact and joint impulses with which they add no kinetic energy to its free
 /// motion, which is in Body::rigid. It is 1 unless they add more than a fiftieth of that energy. Contacts and
 /// joints dissipate energy, except for the error of their velocity terms over a step, which is unbounded for
-/// a thin body that turns far in a step. Scaling all impulses by one factor conserves the momenta. It is 1
-/// for an island driven by a kinematic body, a conveyor or a motor.
+/// a thin body that turns far in a step. Scaling all impulses by one factor conserves the momenta. The factor
+/// is 1 for an island driven by a kinematic body, a conveyor or a motor.
 Real kept_share(const Island& island, std::span<const RelaxedBody> relaxed);
 
 }  // namespace offstage::sim

@@ -12,20 +12,21 @@
 namespace offstage::sim {
 namespace {
 
-/// Of a penetration, the share that a step takes back, and the fastest that it does so [m/s].
+/// Share of a penetration that a step removes, and the greatest speed of the removal [m/s].
 constexpr Real kPushOut = 0.2, kFastestPush = 0.5;
-/// Points that meet faster than this have come together in the interval, not before [m/s].
+/// Points that approach faster than this have closed in the interval, not before [m/s].
 constexpr Real kClosing = 1e-3;
-/// Of the normal velocity that turning makes in half an interval, what a contact that holds may be off by.
+/// Uncertainty of the approach of a resting contact, as a share of the normal velocity due to rotation in
+/// half an interval.
 constexpr Real kTurningShare = 0.5;
-/// A blocked body blocks its neighbours, and these theirs, so many times, where they would overlap by more
-/// [m].
+/// A stopped body also stops its neighbours where they would overlap by more than kOverlap [m]; this is
+/// repeated for their neighbours, in at most kBlockPasses passes.
 constexpr int kBlockPasses = 20;
 constexpr Real kOverlap = 1e-6;
-/// A fall-back with more than this left over [m/s], or with more energy than before but for rounding, is
-/// none.
+/// The result of a fall-back is rejected if its residual is larger than kRough [m/s], or if it adds energy
+/// beyond the rounding share.
 constexpr Real kRough = 1e-2, kEnergyRounding = 1e-9;
-/// Of the kinetic energy, what the velocity terms of a solution may add in a step.
+/// Share of the kinetic energy that the velocity terms of a solution may add in a step.
 constexpr Real kTermsShare = 0.02;
 
 }  // namespace
@@ -63,10 +64,11 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
   return outcome;
 }
 
-/// Contacts that push out of overlaps from two sides have no solution; then impulses without bounds cancel
-/// but for what throws bodies away. And the velocity terms of R9 are wrong where a thin body turns far in a
-/// step. Surfaces that drive, motors and friction in joints may do work; all else may only take energy, but
-/// for the speed at which overlaps are pushed out, and a small share for those terms.
+/// Whether the solution can be applied. Contacts that push a body out of overlaps from two sides have no
+/// solution; their unbounded impulses nearly cancel, and the rest throws bodies away. The velocity terms of
+/// R9 are wrong if a thin body turns far in a step. Moving surfaces, motors and friction in joints may do
+/// work. All other forces may only dissipate energy, apart from the speed at which overlaps are removed and a
+/// small share for those terms.
 bool ExactContacts::is_safe(const ContactWork& work) const {
   if (work.fallbacks > 0 && work.residual > kRough) return false;
   Real energy = added_energy(free_, bodies_, contacts_);
@@ -130,8 +132,8 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       c.offset = in_frame(c.frame, surface);
       if (touches) c.bias = motion.turns ? Vec3(motion.gain + motion.bow) : velocity_bias(pair, m, point, h);
       c.offset += c.bias;
-      // In a moment that an impact has left of a sub-step, it would be pushed out as fast as the moment is
-      // short.
+      // The sub-step's length is used, because in a very short rest of a sub-step after an impact the speed
+      // would be unbounded.
       c.target = touches ? std::min(-kPushOut * point.separation / interval.substep, kFastestPush)
                          : -point.separation / h;
       std::tie(c.friction_t, c.friction_k) = friction(pair.surface(), u);
@@ -140,14 +142,15 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       contacts_.push_back(c);
       pairs_.push_back(&pair);
       forces_.push_back(&m.forces[k]);
-      // What turns meets by a little more or less than the prediction of how it turns has it.
+      // The approach of a rotating contact differs slightly from the prediction of its rotation.
       approach_.push_back(std::max(0.0, std::abs(u.x()) - kTurningShare * std::abs(motion.gain.x())));
     }
 }
 
-/// Forces that act throughout the interval move bodies by half of what they change the velocity times the
-/// time. A body of which a contact closed in the interval, or parted and came back, is blocked from some time
-/// in it on: it gets as far as its new velocity brings it, which is what the contact's target speaks of.
+/// Constant forces over the interval move a body by half of the change of velocity times the time. If a
+/// contact of the body closed in the interval, or opened and closed again, the force acts only in a part of
+/// it. The body then moves by its new velocity throughout the interval, which is what the contact's target
+/// assumes.
 void ExactContacts::move_bodies(const Island& island, Real duration) {
   closing_.assign(bodies_.size(), 0);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
@@ -169,8 +172,9 @@ void ExactContacts::move_bodies(const Island& island, Real duration) {
   }
 }
 
-/// A blocked body gets less far than one that moves on, whose new velocity is the same: by half of what
-/// forces change that in the interval. Where this would be an overlap the other one is blocked as well.
+/// A stopped body moves less far than one that is not stopped, although their new velocities are equal: by
+/// half of the change of velocity in the interval. If this would cause an overlap, the other body counts as
+/// stopped, too.
 void ExactContacts::close_neighbors(const Island& island, Real duration) {
   const auto way = [&](uint32_t i, const Vec3& arm) {
     const Vec3 end = bodies_[i].velocity_at(arm);
@@ -190,7 +194,7 @@ void ExactContacts::close_neighbors(const Island& island, Real duration) {
   }
 }
 
-/// Joints at a stop also block their bodies.
+/// Joints at a stop also stop their bodies.
 void ExactContacts::close_stops() {
   for (std::size_t i = 0; i < joints_.bounded().size(); ++i) {
     const BoundedRow& row = joints_.bounded()[i];

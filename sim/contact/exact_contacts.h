@@ -8,13 +8,14 @@
 
 namespace offstage::sim {
 
-/// Solves one island's contacts to rounding. The bodies have moved freely through the interval from their
-/// `start` to `rigid`; the effect of the contacts is added to this motion. Keep one object per island.
+/// Solves the contacts of one island to rounding. The bodies have moved freely through the interval from
+/// their `start` to `rigid`; the effect of the contacts is added to this motion. Keep one object per island.
 class ExactContacts {
  public:
   struct Outcome {
-    bool is_applied = false;  ///< false: nothing changed, because it was over budget, or because the result
-                              ///< of a fall-back was unsafe
+    /// False: nothing was changed, because the cost exceeded the budget, or because the result of a fall-back
+    /// was unsafe.
+    bool is_applied = false;
     ContactWork work;
     const ContactPair* rough = nullptr;  ///< after a fall-back: the pair with the greatest error
   };
@@ -33,13 +34,13 @@ class ExactContacts {
   void close_stops();
   void close_neighbors(const Island& island, Real duration);
 
-  std::vector<ContactBody> bodies_, free_;  // the latter without contacts
+  std::vector<ContactBody> bodies_, free_;  // free_: the velocities without contacts
   std::vector<Contact> contacts_;
-  std::vector<const ContactPair*> pairs_;  // of the contacts
-  std::vector<PointForce*> forces_;        // of the contacts, in their pairs
-  std::vector<Real>
-      approach_;  // of the contacts at the start, of either sign, less the part due to rotation [m/s]
-  std::vector<uint8_t> closing_;  // by body: some contact closed in the interval
+  std::vector<const ContactPair*> pairs_;  // pair of each contact
+  std::vector<PointForce*> forces_;        // force of each contact, in its pair
+  // Speed of each contact at the start, as an absolute value, less the part due to rotation [m/s].
+  std::vector<Real> approach_;
+  std::vector<uint8_t> closing_;  // by body: whether a contact of it closed in the interval
   IslandJoints joints_;
   ProximalNewton newton_;
 };

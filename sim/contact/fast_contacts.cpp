@@ -15,7 +15,7 @@ RelaxedBody relaxed(const Body& body, const ContactInterval& interval) {
   const Real duration = interval.duration;
   if (body.is_awake()) {
     b.inverse_mass = 1 / body.rigid.mass;
-    // At the end, so that velocities and momenta agree there.
+    // The inertia at the end, so that velocities and momenta agree there.
     b.inverse_inertia = inverse_inertia(body.rigid, body.rigid.orientation);
     b.velocity = body.start_twist.velocity;
     b.angular_velocity = body.start_twist.angular_velocity;
@@ -25,7 +25,7 @@ RelaxedBody relaxed(const Body& body, const ContactInterval& interval) {
     b.velocity = body.drive.velocity;
     b.angular_velocity = body.drive.angular_velocity;
     if (!interval.is_whole) return b;
-    // Evenly accelerated, so that it gets to where it gets with the velocity that it has there.
+    // Constant acceleration to the pose at the end, with the velocity at the end.
     const Vec3 mean = (body.pose.position - body.start_pose.position) / duration;
     const Vec3 mean_spin = rotation_vector(body.start_pose.orientation, body.pose.orientation) / duration;
     b.free_acceleration = 2 / duration * (b.velocity - mean);
@@ -36,7 +36,7 @@ RelaxedBody relaxed(const Body& body, const ContactInterval& interval) {
   return b;
 }
 
-/// How the contact at its centre moves. The points go with the body that carries it.
+/// Motion of the contact at the patch's centre. The points move with the body that defines the contact.
 void set_motion(ContactPatch& patch, const ContactMotion& motion) {
   patch.arm_a = motion.middle.arm_a;
   patch.arm_b = motion.middle.arm_b;
@@ -55,12 +55,12 @@ void set_motion(ContactPatch& patch, const ContactMotion& motion) {
   patch.gain_along_k = motion.gain_along_k;
 }
 
-/// Of a manifold, with the forces that it begins with. What the patch was in another step does not matter.
+/// Sets a patch from a manifold with its initial forces. Nothing of the patch's earlier use remains.
 void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifold& m,
                const ContactInterval& interval) {
   const Real duration = interval.duration;
   const Vec3 centre_a = start_centre(pair.a()), surface = surface_velocity(pair);
-  // What else of a rim is near does not say where on it the contact is.
+  // Only the deepest point of a rim shows where on the rim the contact is.
   const bool runs = runs_along(pair.a(), duration) || runs_along(pair.b(), duration);
   set_points(patch, m.manifold, m.frame, centre_a, start_centre(pair.b()), runs);
   const Vec3 place = centre_a + patch.arm_a;
@@ -83,7 +83,7 @@ void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifol
   patch.mean_friction = mean;
 }
 
-/// The patch's friction is shared out by the points' normal forces.
+/// Distributes the friction of the patch over the points by their normal forces.
 void store_forces(const ContactPatch& patch, const ContactInterval& interval, PlacedManifold& m) {
   Real sum = 0;
   for (uint32_t k = 0; k < patch.count; ++k) sum += patch.points[k].force;

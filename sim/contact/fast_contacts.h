@@ -23,11 +23,11 @@ class FastContacts {
   };
   void collect(std::span<const Island* const> islands);
 
-  std::vector<Body*>
-      members_;  // movable bodies first, then one entry for each contact with an immovable body
+  // Movable bodies first, then one entry for each contact with an immovable body.
+  std::vector<Body*> members_;
   std::size_t moved_ = 0;
   std::vector<RelaxedBody> bodies_;
-  std::vector<Origin> origins_;  // of the patches
+  std::vector<Origin> origins_;  // origins of the patches
   std::vector<ContactPatch> patches_;
   IslandJoints joints_;
   RelaxationSolver solver_;

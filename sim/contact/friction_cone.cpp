@@ -6,7 +6,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Limits of the pyramid that may be reached: the sign of p_t, then of p_k; 0: not reached.
+/// Limits of the pyramid that are active: the sign of p_t, then that of p_k; 0: not active.
 struct Reached {
   ConeRegion region;
   int t, k;
@@ -17,8 +17,8 @@ constexpr Reached kPyramid[] = {
     {ConeRegion::high_low, 1, -1}, {ConeRegion::high_high, 1, 1},
 };
 
-/// The projection on the plane or line in which these limits are reached is P P^T / P^2 on p_n and what goes
-/// with it, and leaves the other axis alone.
+/// Derivative of the projection on the plane or line on which these limits are active: P P^T / P^2 for p_n
+/// and the limited axes; the other axis is not changed.
 Mat3 pyramid_derivative(const Contact& c, int t, int k) {
   const Vec3 along(1, t * c.friction_t, k * c.friction_k);
   Mat3 D = along * along.transpose() / along.squaredNorm();

@@ -8,12 +8,12 @@
 
 namespace offstage::sim {
 
-/// Part of a cone that is nearest to a point.
+/// Part of a cone that contains the projection of a point.
 enum class ConeRegion : uint8_t {
   apex,     ///< the projection is zero
   inside,   ///< the projection is the point itself
-  surface,  ///< on the round cone
-  // Of the pyramid: on a face or an edge, by the signs of the active limits.
+  surface,  ///< the projection is on the round cone
+  // Pyramid: on a face or an edge, by the signs of the active limits.
   low_t,
   high_t,
   low_k,

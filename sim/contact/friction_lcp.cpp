@@ -19,18 +19,19 @@ using Eigen::VectorXd;
 
 using Mat36 = Eigen::Matrix<Real, 3, 6>;
 
-constexpr Real kAccurate = 1e-12;   ///< of the greatest velocity: solved, but for rounding
-constexpr Real kAccepted = 1e-10;   ///< likewise: with more than this left over, other methods go on
-constexpr Real kGoodEnough = 1e-5;  ///< likewise: with more than this left over of those, fall back
+constexpr Real kAccurate = 1e-12;   ///< share of the greatest velocity: the solution is exact to rounding
+constexpr Real kAccepted = 1e-10;   ///< likewise: with a larger residual, other methods continue
+constexpr Real kGoodEnough = 1e-5;  ///< likewise: with a larger residual of those, fall back
 constexpr Real kSliding = 1e-9;     ///< likewise: slower contacts do not slide
-constexpr Real kRank = 1e-11;       ///< of the greatest pivot: redundant contacts make the matrix singular
-/// Of the diagonal, added to it for pivoting: redundant contacts then share their load in one way only.
+constexpr Real kRank = 1e-11;  ///< share of the greatest pivot: redundant contacts make the matrix singular
+/// Share of the diagonal that is added to it for pivoting, so that redundant contacts share their load in a
+/// unique way.
 constexpr Real kSoftness = 1e-7;
-constexpr std::size_t kRounds = 4;  ///< of pivoting, with other tangents and another order
+constexpr std::size_t kRounds = 4;  ///< number of rounds of pivoting, with other tangents and another order
 constexpr int kNewtonSteps = 25, kStepsInVain = 10, kStepHalvings = 6, kFallbacks = 4;
 constexpr uint32_t kSweeps = 200;
 
-/// A side of a contact: its u is J (v, w) of the body.
+/// One body of a contact: its part of u is J (v, w).
 struct Side {
   uint32_t body;
   Mat36 J, J_inverse_mass;
@@ -51,7 +52,7 @@ std::array<Side, 2> sides_of(const Contact& c, std::span<const ContactBody> bodi
   return {side(c.a, c.arm_a, 1), side(c.b, c.arm_b, -1)};
 }
 
-/// R9: blocks of contacts that share a body; unmoved ones have no inverse mass and add nothing.
+/// R9: blocks for contacts that share a body. Immovable bodies have no inverse mass and add nothing.
 MatrixXd delassus_matrix(std::span<const ContactBody> bodies, std::span<const Contact> contacts) {
   std::vector<std::array<Side, 2>> sides;
   for (const Contact& c : contacts) sides.push_back(sides_of(c, bodies));
@@ -72,7 +73,7 @@ MatrixXd delassus_matrix(std::span<const ContactBody> bodies, std::span<const Co
 
 class FrictionSolver {
  public:
-  /// The contacts hold no impulses yet.
+  /// The contacts' impulses must be zero.
   FrictionSolver(std::span<ContactBody> bodies, std::span<Contact> contacts);
 
   ContactWork solve();
@@ -116,7 +117,7 @@ FrictionSolver::FrictionSolver(std::span<ContactBody> bodies, std::span<Contact>
   problem_.slides.assign(contacts.size(), 0);
 }
 
-/// Turns the tangents of a contact, so that t becomes what was `direction` in them.
+/// Turns the tangents of a contact, so that t becomes `direction`, which is given in the old tangents.
 void FrictionSolver::turn(std::size_t i, const Vector2d& direction) {
   const Real length = direction.norm();
   if (!(length > 0)) return;
@@ -132,8 +133,8 @@ void FrictionSolver::turn(std::size_t i, const Vector2d& direction) {
       Vector2d(axis_[i].x() * d.x() - axis_[i].y() * d.y(), axis_[i].y() * d.x() + axis_[i].x() * d.y());
 }
 
-/// Along the sliding that the solution has, which is then dynamic friction; along the force, where the limits
-/// of the axes let more pass than the cone does. False if the contact is right as it is.
+/// Aligns the tangents with the sliding of the solution, which then has dynamic friction, or with the force,
+/// if the limits of the axes allow more than the cone. Returns false if nothing has to change.
 bool FrictionSolver::realign(std::size_t i, const Vector2d& force, Real normal, const Vector2d& sliding) {
   const bool slid = problem_.slides[i] != 0;
   problem_.slides[i] = 0;
@@ -160,7 +161,7 @@ bool FrictionSolver::realign() {
   return changed;
 }
 
-/// The cone: p_tk - mu p_n y / |y| where y = p_tk - u_tk / K is outside of it, else u_tk.
+/// Row of the cone: p_tk - mu p_n y / |y| if y = p_tk - u_tk / K is outside of it, else u_tk.
 void FrictionSolver::round_friction_row(Index row, const Vec3& p, const Vec3& y, bool with_jacobian) {
   const Real mu = problem_.friction[static_cast<std::size_t>(row / 3)].x(), rho = step_size(row);
   const Real limit = mu * std::max(p.x(), 0.0), length = y.tail<2>().norm();
@@ -196,8 +197,8 @@ void FrictionSolver::axis_friction_row(Index row, Index axis, const Vec3& p, con
   if (p.x() > 0) line[row] = y[axis] > 0 ? -mu : mu;
 }
 
-/// The natural residual of residual(), in r_ [N s], and its generalised Jacobian (Alart and Curnier, 1991).
-/// Returns its length as a velocity.
+/// The natural residual as in residual(), in r_ [N s], and its generalised Jacobian (Alart and Curnier,
+/// 1991). Returns its norm as a velocity.
 Real FrictionSolver::evaluate(const VectorXd& p, bool with_jacobian) {
   const VectorXd u = problem_.A * p + problem_.b;
   r_.resize(p.size());
@@ -219,8 +220,9 @@ Real FrictionSolver::evaluate(const VectorXd& p, bool with_jacobian) {
   return std::sqrt(sum);
 }
 
-/// Newton's method on the cone: near the solution each step squares the error. Steps that lead away are
-/// halved; where that does not help, a corner of the cone is in the way, and the whole step goes beyond it.
+/// Newton's method on the cone: near the solution each step squares the error. Steps that increase the
+/// residual are halved. If that does not help, a kink of the cone is in the way, and the full step passes
+/// beyond it.
 Real FrictionSolver::polish(VectorXd& best, ContactWork& work) {
   VectorXd p = best;
   Real worst = evaluate(p, false), least = worst;
@@ -269,7 +271,7 @@ void FrictionSolver::set_impulses(const VectorXd& p) {
 
 void FrictionSolver::solve_by_rounds(ContactWork& work) {
   p_.setZero(problem_.b.size());
-  // Without contact forces all slide that way: for most the right direction at once.
+  // Direction of sliding without contact forces; for most contacts it is right at once.
   for (std::size_t i = 0; i < problem_.count(); ++i)
     if (is_round(i)) turn(i, problem_.b.segment<2>(static_cast<Index>(3 * i + 1)));
   Real least = evaluate(p_, false);
@@ -289,8 +291,8 @@ void FrictionSolver::solve_by_rounds(ContactWork& work) {
   }
 }
 
-/// Pivoting may cycle among redundant contacts that just touch; the proximal method does not mind them, but
-/// stops short of the last digits.
+/// Pivoting may cycle among redundant contacts that just touch. The proximal method converges for these, but
+/// not to the last digits.
 void FrictionSolver::solve_by_newton(ContactWork& work) {
   const VectorXd before = impulses();
   const Real least = residual(bodies_, contacts_);
@@ -304,7 +306,7 @@ void FrictionSolver::solve_by_newton(ContactWork& work) {
   if (residual(bodies_, contacts_) > least) set_impulses(before);
 }
 
-/// Gauss-Seidel comes near from anywhere, but slowly; Newton is fast once near.
+/// Gauss-Seidel approaches the solution from anywhere, but slowly; Newton is fast near the solution.
 void FrictionSolver::fall_back(ContactWork& work) {
   ++work.fallbacks;
   for (int k = 0; k < kFallbacks && residual(bodies_, contacts_) > kAccepted * scale_; ++k) {

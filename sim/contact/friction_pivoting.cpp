@@ -14,15 +14,15 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr Real kSatisfied = 1e-11;  ///< of the greatest |b|
-constexpr Real kNoise = 1e-12;      ///< of the greatest rate: it is zero but for rounding
+constexpr Real kSatisfied = 1e-11;  ///< share of the greatest |b|
+constexpr Real kNoise = 1e-12;      ///< share of the greatest rate: smaller rates count as zero
 constexpr Real kDependent = UpdatedCholesky::kDependent;
 constexpr int kAttempts = 4;
-constexpr uint8_t kMoves = 4;  ///< of one row in steps without length, before it is called a cycle
+constexpr uint8_t kMoves = 4;  ///< changes of one row in steps of no length after which it counts as a cycle
 
-/// free is Baraff's ZA: no velocity, any force in the limits. high and low are his MaxF and MinF. held is a
-/// row with no velocity that depends on free ones: its force stays as it is. fixed: not brought in, or F_t
-/// given by F_n alone. broken: a normal without force.
+/// free is Baraff's ZA: no velocity, and any force within the limits. high and low are his MaxF and MinF.
+/// held is a row without velocity that depends on free ones: its force stays constant. fixed: not yet added,
+/// or F_t is determined by F_n. broken: a normal without force.
 enum class State : uint8_t { fixed, free, held, high, low, broken };
 
 class Pivoting {
@@ -74,8 +74,8 @@ class Pivoting {
   VectorXd a_, dF_, da_, x_;
   Real zero_, noise_ = 0;
   std::vector<State> states_;
-  std::vector<uint8_t> moves_;         ///< of each row since the last step of some length
-  std::vector<Index> rows_, columns_;  ///< of the factor
+  std::vector<uint8_t> moves_;         ///< per row: changes since the last step of some length
+  std::vector<Index> rows_, columns_;  ///< rows and columns of the factor
   UpdatedQr factor_;
   PivotingResult result_;
   uint32_t max_pivots_;
@@ -95,8 +95,8 @@ Pivoting::Pivoting(const DenseContacts& contacts, VectorXd& F)
   F_.setZero(a_.size());
 }
 
-/// F_t / F_n where the normal force decides it: then the normal's column has this much of the tangent's in
-/// it.
+/// F_t / F_n if the normal force determines it. The normal's column then contains this multiple of the
+/// tangent's column.
 Real Pivoting::share(Index tangent) const {
   switch (state(tangent)) {
     case State::high:
@@ -130,7 +130,7 @@ bool Pivoting::find_direction(Index m, Real sign) {
   return true;
 }
 
-/// Where the force meets mu F_n, which moves too.
+/// Where the force reaches mu F_n, which changes, too.
 void Pivoting::block_on_limits(Index t, Block& first) const {
   const Real mu = friction(t), limit = mu * F_[t - t % 3], change = mu * dF_[t - t % 3];
   if (change - dF_[t] < -noise_) first.consider((limit - F_[t]) / (dF_[t] - change), t, State::high);
@@ -146,7 +146,7 @@ void Pivoting::block_on_tangent(Index t, Block& first) const {
     first.consider(-a_[t] / da_[t], t, State::free);
 }
 
-/// What first ends a step: row m is done, or another row would leave its state.
+/// Finds the event that ends a step first: row m is satisfied, or another row would leave its state.
 Pivoting::Block Pivoting::first_block(Index m, Real sign) const {
   Block first;
   if (std::abs(da_[m]) > kDependent * A_(m, m) && a_[m] * da_[m] < 0)
@@ -173,7 +173,7 @@ void Pivoting::advance(const Block& block, Index m) {
   if (block.step * A_(m, m) > zero_) std::fill(moves_.begin(), moves_.end(), uint8_t{0});
 }
 
-/// Adds a row to the system of free ones, unless it depends on them.
+/// Adds a row to the system of free rows; returns false if it depends on them.
 bool Pivoting::enter(Index row) {
   const Index n = factor_.size();
   VectorXd across(n), down(n);
@@ -201,7 +201,7 @@ void Pivoting::leave(Index row) {
   columns_.erase(c);
 }
 
-/// After a change of the shares that its tangents have in its column.
+/// Updates the column of a normal after a change of its tangents' shares.
 void Pivoting::update_normal(Index normal) {
   const auto c = std::find(columns_.begin(), columns_.end(), normal);
   if (c == columns_.end()) return;
@@ -250,8 +250,8 @@ void Pivoting::change(const Block& block) {
     close(block.row);
 }
 
-/// Whether row m needs no more force, and if so its state. Of a dependent normal whose velocity is right by
-/// the others, the load goes back to them until it is gone or one of them leaves.
+/// Whether row m needs no more force; if so, sets its state. If a normal is dependent and the others already
+/// make its velocity right, its load is transferred back to them until it is zero or one of them leaves.
 bool Pivoting::is_settled(Index m) {
   if (m % 3 == 0) {
     if (F_[m] > 0) return std::abs(a_[m]) <= zero_ && enter(m);
@@ -264,8 +264,9 @@ bool Pivoting::is_settled(Index m) {
   return state(m) != State::fixed;
 }
 
-/// Whether the row that has just changed would at once go back. Sliding friction makes principal minors
-/// negative: there the path of solutions, with F_m as its parameter, turns, and F_m with it.
+/// Whether the row that has just changed would change back at once. Sliding friction can make principal
+/// minors negative. The path of solutions, with F_m as its parameter, then reverses its direction, and so
+/// does F_m.
 bool Pivoting::turns_back(const Block& last, State before) const {
   const Index r = last.row;
   const Real still = kDependent * std::sqrt(A_(r, r) * A_.diagonal().maxCoeff());
@@ -285,7 +286,7 @@ bool Pivoting::turns_back(const Block& last, State before) const {
   }
 }
 
-/// The end of a step by row m itself. False if the path has led back to no force, or to the wrong limit.
+/// Ends a step at row m itself. Returns false if the path has led back to no force, or to the wrong limit.
 bool Pivoting::end_step(const Block& block, Index m) {
   if (block.to == State::broken) {
     F_[m] = 0;

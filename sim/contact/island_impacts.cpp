@@ -12,11 +12,11 @@
 namespace offstage::sim {
 namespace {
 
-/// So many contacts always collide together; more than kCluster, or after more than kGrowths extensions, only
-/// when asked for.
+/// At most kSmallCluster contacts always collide together. Clusters of more than kCluster contacts, or with
+/// more than kGrowths extensions, are solved as a whole only on request.
 constexpr std::size_t kSmallCluster = 40, kCluster = 100;
 constexpr int kGrowths = 2;
-/// What an update of a contact, and a product of a dense factorization take [ns].
+/// Cost of an update of a contact, and of a product of a dense factorization [ns].
 constexpr Real kContactUpdate = 60, kDenseProduct = 0.7;
 
 std::vector<std::size_t> indices_of(std::span<const uint8_t> marks) {
@@ -26,7 +26,7 @@ std::vector<std::size_t> indices_of(std::span<const uint8_t> marks) {
   return marked;
 }
 
-/// Contacts of an island that collide together, with the bodies' velocities before.
+/// Contacts of an island that collide together, with the bodies' velocities before the collision.
 struct CollisionCluster {
   std::vector<ContactBody> bodies;
   std::vector<Contact> contacts;
@@ -60,13 +60,13 @@ struct CollisionCluster {
         contacts.push_back(c);
         pairs.push_back(&pair);
         bounces.push_back(u.x() < -collision_speed);
-        // In sequence, a contact at rest may be hit by the impulse of another.
+        // In a sequence, the impulse of another contact may hit a resting contact.
         restitution.push_back(bounces.back() || law == ImpactLaw::sequential ? pair.surface().restitution
                                                                              : 0);
       }
   }
 
-  /// Adds contacts to those that collide together, and all that share a moved body with one of them.
+  /// Marks the wanted contacts, and all contacts that share a movable body with one of them.
   void take(std::span<const std::size_t> wanted, std::vector<uint8_t>& taken) const {
     std::vector<uint8_t> involved(bodies.size(), 0);
     for (const std::size_t i : wanted)
@@ -76,10 +76,11 @@ struct CollisionCluster {
   }
 };
 
-/// Collides the contacts of a large cluster that the impact reaches: those around what bounces, then also
-/// those that their impulses make approach faster than `speed` and all around these, until nothing else does.
-/// What is left out has no impulse, which is then its solution. A cluster that grows beyond kCluster
-/// contacts, or too often, is cut off; what is left out of it blocks the way afterwards, as resting contact.
+/// Collides the contacts of a large cluster that the impact reaches. These are the contacts around the
+/// bouncing ones, then also those that the impulses make approach faster than `speed` and the contacts around
+/// them, until there are no more. The other contacts have no impulse, which is then their solution. A cluster
+/// with more than kCluster contacts or too many extensions is truncated; the omitted contacts block
+/// afterwards as resting contacts.
 ContactWork collide_reached(CollisionCluster& cluster, Real speed, ImpactLaw law,
                             const JointProblem& joints) {
   std::vector<uint8_t> taken(cluster.contacts.size(), 0);

@@ -7,7 +7,7 @@
 namespace offstage::sim {
 
 struct CollisionSettings {
-  Real time;             ///< the world's [s]
+  Real time;             ///< as the world's time [s]
   Real reach;            ///< contacts with a smaller separation belong to the cluster [m]
   Real collision_speed;  ///< contacts that approach faster bounce [m/s]
   ImpactLaw law;

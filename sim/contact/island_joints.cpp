@@ -52,14 +52,15 @@ void IslandJoints::collect_for_collision(const Island& island, Real time) {
   impulses_.assign(constraints_.size(), Vec6::Zero());
 }
 
-/// What a row with bounds does to its joint.
+/// Wrench of a bounded row's impulse on its joint.
 Wrench IslandJoints::wrench(std::size_t i, Real impulse) const {
   const Vec6 on_a = impulse * bounded_[i].on_a;
   return {on_a.head<3>(), on_a.tail<3>() - origins_[i].arm.cross(on_a.head<3>())};
 }
 
 void IslandJoints::store_impact_impulses() {
-  for (std::size_t i = 0; i < bounded_.size(); ++i) origins_[i].joint->impact_impulse += wrench(i, bounded_[i].impulse);
+  for (std::size_t i = 0; i < bounded_.size(); ++i)
+    origins_[i].joint->impact_impulse += wrench(i, bounded_[i].impulse);
   std::size_t first = 0;
   for (Articulation* a : articulations_) {
     a->add_impact_impulses(std::span(impulses_).subspan(first, a->joints().size()));

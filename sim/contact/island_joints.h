@@ -14,17 +14,17 @@ namespace offstage::sim {
 /// Whether contacts or joints act in an island.
 bool has_forces(const Island& island);
 
-/// The joints of islands as part of a problem: their bodies have the indices Body::row.
+/// The joints of islands as part of a contact problem. Their bodies have the indices Body::row.
 class IslandJoints {
  public:
   /// Collects the joints' constraints and rows for an interval.
   void collect(std::span<const Island* const> islands, const ContactInterval& interval);
-  /// Collects those for a collision at the bodies' `start` states.
+  /// Collects the constraints and rows for a collision at the bodies' `start` states.
   void collect_for_collision(const Island& island, Real time);
   /// Adds the impulses of a collision to the loads of the joints.
   void store_impact_impulses();
   JointProblem problem() { return {constraints_, bounded_, impulses_}; }
-  /// Stores the joints' forces after the solution. They are also the next initial guess.
+  /// Stores the joints' impulses after the solution; they are also the next initial guess.
   void store_impulses(Real duration);
 
   std::span<Articulation* const> articulations() const { return articulations_; }

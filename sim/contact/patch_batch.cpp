@@ -14,20 +14,21 @@
 namespace offstage::sim {
 namespace {
 
-/// A sweep goes over a patch in rounds, until one changes its velocities by less than this [m/s] or there
-/// were enough. What holds takes one; an impact takes more, or some of the points would be pressed in. A patch
-/// without a guess is at first solved to the end, or it would slip until the sweeps have found one.
+/// A sweep solves a patch in rounds, until one changes its velocities by less than this [m/s] or the limit is
+/// reached. A resting patch takes one round. An impact takes more, because otherwise some points would
+/// penetrate. A patch without an initial guess is solved completely at first, because otherwise it would slip
+/// during the first sweeps.
 constexpr float kSettled = 0.01F, kSolved = 1e-6F;
 constexpr uint32_t kPatchRounds = 20;
 
-/// Of the difference between an impulse and its mean, the share that a sub-step takes from the impulse, and
-/// the share that it adds to the mean. Slow modes lose most if their frequencies are about the latter. A
-/// patch without a guess has no past: its means are the impulses.
+/// Shares of the difference between an impulse and its mean: what a sub-step subtracts from the impulse, and
+/// what it adds to the mean. Slow modes with frequencies near the latter are damped most. The mean of a patch
+/// without an initial guess is its impulse.
 constexpr float kReturn = 0.03F, kRenewal = 0.01F;
-/// Friction up to this share of its limit, squared, holds; and from this share on it slides.
+/// Up to this share of its limit, squared, friction sticks; from the second share on it slides.
 constexpr float kHolds = 0.96F, kSlides = 0.999F;
-/// The friction of what slides grows by no more than this with what the normal impulses have become after it
-/// was found: it must not turn the sliding round.
+/// Greatest factor by which sliding friction follows a later increase of the normal impulses. A larger one
+/// could reverse the sliding.
 constexpr float kMostGrowth = 1.1F;
 
 using Vector = PatchBatch::Vector;
@@ -39,14 +40,14 @@ struct LaneTwist {
   Vector linear, angular;
 };
 
-/// In each half of four rows of four the first three columns.
+/// In each half of four rows of four numbers, the first three columns.
 Vector columns(FloatLanes a, FloatLanes b, FloatLanes c, FloatLanes d) {
   const FloatLanes low_ab = _mm256_unpacklo_ps(a, b), low_cd = _mm256_unpacklo_ps(c, d);
   const FloatLanes high_ab = _mm256_unpackhi_ps(a, b), high_cd = _mm256_unpackhi_ps(c, d);
   return {_mm256_shuffle_ps(low_ab, low_cd, 0x44), _mm256_shuffle_ps(low_ab, low_cd, 0xEE),
           _mm256_shuffle_ps(high_ab, high_cd, 0x44)};
 }
-/// And back, with 0 in the last column.
+/// The inverse of columns(), with 0 in the last column.
 std::array<FloatLanes, 4> rows(const Vector& v) {
   const FloatLanes zero{};
   const FloatLanes low_xy = _mm256_unpacklo_ps(v.x, v.y), low_z = _mm256_unpacklo_ps(v.z, zero);
@@ -54,7 +55,7 @@ std::array<FloatLanes, 4> rows(const Vector& v) {
   return {_mm256_shuffle_ps(low_xy, low_z, 0x44), _mm256_shuffle_ps(low_xy, low_z, 0xEE),
           _mm256_shuffle_ps(high_xy, high_z, 0x44), _mm256_shuffle_ps(high_xy, high_z, 0xEE)};
 }
-/// The first halves of both, or the second ones.
+/// The first halves of both registers, or the second ones.
 FloatLanes first_halves(FloatLanes a, FloatLanes b) {
   return _mm256_permute2f128_ps(a, b, 0x20);
 }
@@ -74,7 +75,7 @@ LaneTwist gather(std::span<const BodyMotion> motions, const PatchBatch::Index& i
           columns(angular(0), angular(1), angular(2), angular(3))};
 }
 
-/// Bodies that contacts do not move are left alone: others may be reading them.
+/// Bodies that contacts do not move are not written, because other threads may be reading them.
 template <FloatLanes BodyMotion::*kWhat>
 void scatter(const LaneTwist& v, std::span<BodyMotion> motions, const PatchBatch::Index& i,
              const std::array<bool, kLanes>& moves) {
@@ -85,7 +86,7 @@ void scatter(const LaneTwist& v, std::span<BodyMotion> motions, const PatchBatch
   }
 }
 
-/// At the centre.
+/// Relative velocity at the centre.
 Vector relative_velocity(const PatchBatch& p, const LaneTwist& a, const LaneTwist& b) {
   return a.linear + cross(a.angular, p.arm_a) - b.linear - cross(b.angular, p.arm_b);
 }
@@ -97,8 +98,8 @@ Groups relative(const PatchBatch& p, const LaneTwist& a, const LaneTwist& b) {
           {dot(p.t, linear), dot(p.k, linear), dot(p.n, angular)}};
 }
 
-/// Of a twist's normal group, what a point has of it along the normal; and the wrench of a normal impulse
-/// there.
+/// The normal velocity of a point from the normal group of a twist; and the wrench of a normal impulse at the
+/// point.
 FloatLanes point_part(const PatchBatch::Point& q, const Vector& normal) {
   return normal.x + q.y * normal.y - q.x * normal.z;
 }
@@ -116,10 +117,10 @@ void apply(const PatchBatch& p, const Groups& wrench, LaneTwist& a, LaneTwist& b
   b.angular = b.angular - p.inverse_inertia_b * (cross(p.arm_b, force) + torque);
 }
 
-// What a unit impulse (or angular impulse) along each axis gives to one body, R6's K of patches.
+// Response of one body to a unit impulse (or angular impulse) along each axis: R6's K for patches.
 
 struct Row {
-  Vector linear, angular;  // the axis in a wrench about the centre of mass
+  Vector linear, angular;  // the axis as a wrench about the centre of mass
   Vector turned;           // inverse inertia times `angular`
 };
 
@@ -210,7 +211,7 @@ void set_mobility(PatchBatch& p) {
 
 // Filling
 
-/// Nothing but what is used: a batch is large.
+/// Clears only the members that are used, because a batch is large.
 void clear(PatchBatch& p, const PatchBatch::Index& patches, std::span<const ContactPatch> all) {
   static_assert(std::is_trivial_v<PatchBatch>);
   uint32_t count = 0;
@@ -228,7 +229,7 @@ void set_body(uint32_t index, std::span<const RelaxedBody> bodies, unsigned lane
   if (inverse_mass[lane] > 0) inverse_inertia.set(lane, bodies[index].inverse_inertia);
 }
 
-/// Velocities at the start, which are not small, are subtracted in double precision.
+/// Velocities at the start may be large, so they are subtracted in double precision.
 void set_approach(PatchBatch& p, unsigned lane, const ContactPatch& c, const RelaxedBody& a,
                   const RelaxedBody& b) {
   const Vec3 linear =
@@ -257,7 +258,7 @@ void set_patch(PatchBatch& p, unsigned lane, const ContactPatch& c, Real substep
   p.arm_b.set(lane, c.arm_b);
   p.friction_t[lane] = narrow(c.friction_t);
   p.friction_k[lane] = narrow(c.friction_k);
-  // One point has no torque of its own, and sweep_single() knows none.
+  // A patch of one point has no torque about the normal; sweep_single() does not compute one.
   const bool is_single = c.count == 1;
   p.friction_impulse.set(lane, substep * Vec3(c.force_t, c.force_k, is_single ? 0 : c.torque_n));
   p.friction_mean.set(lane, substep * c.mean_friction);
@@ -288,7 +289,7 @@ Vector normal_wrench(const PatchBatch& p) {
 
 // Solving
 
-/// Changes the friction impulses and the twist `u` by them. Returns the change.
+/// Updates the friction impulses and applies the change to the twist `u`. Returns the change.
 Vector solve_friction(PatchBatch& p, Groups& u) {
   Vector next = p.friction_impulse - p.friction_stiffness * u.friction;
   const Vector limits = friction_limits(p);
@@ -312,10 +313,10 @@ Vector solve_friction(PatchBatch& p, Groups& u) {
   return change;
 }
 
-/// By points, the speed that closes the gap in a sub-step [m/s]; 0 where there is none.
+/// For each point, the speed that closes its gap in a sub-step [m/s]; 0 without a gap.
 using Gaps = std::array<FloatLanes, 4>;
 
-/// Likewise one sweep over the normal impulses.
+/// Solves the normal impulses once and applies the change to the twist `u`. Returns the change.
 Vector solve_normal(PatchBatch& p, Groups& u, const Gaps& gaps) {
   Vector change{};
   const Symmetric& K = p.normal_mobility;
@@ -334,10 +335,10 @@ Vector solve_normal(PatchBatch& p, Groups& u, const Gaps& gaps) {
 }
 
 /// Moves the impulses a fixed share towards their running means, and updates the means. No impulse changes by
-/// more than that share of itself, or of Coulomb's limit: otherwise the mean impulse of an impact would lift the
-/// body that the impact has stopped. The friction of sliding points is set to the limit of the present normal
-/// impulses. So the sums over the sub-steps obey Coulomb's law, however the load shifts between points. Returns
-/// the change.
+/// more than that share of itself or of Coulomb's limit; otherwise the mean impulse of an impact would lift
+/// the body that the impact has stopped. The friction of sliding points is set to the limit given by the
+/// present normal impulses, so the sums over the sub-steps obey Coulomb's law however the load shifts between
+/// points. Returns the change.
 Groups return_to_mean(PatchBatch& p) {
   Groups change{};
   const Vector limits = friction_limits(p);
@@ -349,7 +350,7 @@ Groups return_to_mean(PatchBatch& p) {
     q.mean -= p.renewal * difference;
     change.normal = change.normal + point_wrench(q, d);
   }
-  // What slides has its friction from the law, which knows no mean.
+  // Sliding friction follows from Coulomb's law and has no mean.
   p.friction_mean = p.friction_impulse + p.holds * (p.friction_mean - p.friction_impulse);
   const Vector difference = p.friction_mean - p.friction_impulse;
   const FloatLanes growth = lane_min(pressure(p) * lane_inverse(p.pressure), float_lanes(kMostGrowth));
@@ -370,16 +371,16 @@ FloatLanes greatest(const Vector& v) {
   return lane_max(lane_abs(v.x), lane_max(lane_abs(v.y), lane_abs(v.z)));
 }
 
-// Patches of one point, as those of round bodies: no moments.
+// Patches of one point, as those of round bodies: no moments
 
-/// A velocity or impulse there, along n, t and k.
+/// A velocity or impulse at the point, along n, t and k.
 using Single = Vector;
 
 Single in_frame(const PatchBatch& p, const Vector& v) {
   return {dot(p.n, v), dot(p.t, v), dot(p.k, v)};
 }
 
-/// What solve_normal() and solve_friction() do. They return the change.
+/// The same as solve_normal() and solve_friction() for one point. They return the change.
 Single solve_single_normal(PatchBatch& p, Single& u, FloatLanes gap) {
   PatchBatch::Point& q = p.points[0];
   const FloatLanes next = lane_max(q.impulse - q.mass * (u.x + gap), FloatLanes{});
@@ -403,7 +404,8 @@ Single solve_single_friction(PatchBatch& p, Single& u) {
   return {FloatLanes{}, t, k};
 }
 
-/// What turning arms and frames add to the twist at the end of a sub-step, and to the way before.
+/// Change of the twist at the end of a sub-step, and of the displacement before, due to turning arms and
+/// frames.
 Groups turning_velocity(const PatchBatch& p, const SubstepTime& time) {
   const FloatLanes s = _mm256_set1_ps(time.s), s2 = s * s;
   return {s * p.gain.normal + Vector{s2 * p.bow.x, FloatLanes{}, FloatLanes{}},
@@ -424,16 +426,16 @@ Groups relative_now(const PatchBatch& p, const LaneTwist& a, const LaneTwist& b,
   return {u.normal + gain.normal, u.friction + gain.friction};
 }
 
-/// Whether in some lane friction changes the normal velocity noticeably. Between balls it does not.
+/// Whether friction changes the normal velocity noticeably in any lane. Between balls it does not.
 bool is_coupled(const PatchBatch& p) {
   constexpr float kNoticeable = 1e-4F;  // squared share
   const FloatLanes &x = p.coupling.x.x, &y = p.coupling.y.x, &K = p.normal_mobility.xx;
   return _mm256_movemask_ps(FloatLanes(x * x + y * y > kNoticeable * K * K)) != 0;
 }
 
-/// Of bodies that roll the normal and the friction depend on each other so much that taking turns converges
-/// slowly: where the point neither parts nor slides, all three impulses come from one system. Returns the
-/// change, and sets `all` if that was everywhere.
+/// For rolling bodies the normal impulse and the friction depend on each other so strongly that alternating
+/// between them converges slowly. If the point neither separates nor slides, all three impulses are solved as
+/// one system. Returns the change, and sets `all` if this was the case in all lanes.
 Single solve_single_rolling(PatchBatch& p, Single& u, FloatLanes gap, bool& all) {
   const Symmetric& F = p.friction_mobility;
   const Symmetric K{p.normal_mobility.xx, p.coupling.x.x, p.coupling.y.x, F.xx, F.xy, F.yy};
@@ -458,7 +460,7 @@ Single solve_single_rolling(PatchBatch& p, Single& u, FloatLanes gap, bool& all)
   return d;
 }
 
-/// How far the points have come together since the start, in the normal group's terms.
+/// Approach of the points since the start, in the normal group's terms.
 Vector moved_normal(const PatchBatch& p, std::span<const BodyMotion> motions, const SubstepTime& time) {
   const LaneTwist a = gather<&BodyMotion::shift>(motions, p.a), b = gather<&BodyMotion::shift>(motions, p.b);
   const Vector& v = p.approach.normal;
@@ -509,7 +511,7 @@ void sweep_single(PatchBatch& p, std::span<BodyMotion> motions, const SubstepTim
 
 }  // namespace
 
-// With s = 2 t / h - 1 at the sub-steps' ends t.
+// s = 2 t / h - 1 at the sub-steps' ends t.
 SubstepTime::SubstepTime(Real substep_, uint32_t index, Real duration_)
     : substep(substep_), elapsed(index * substep_), duration(duration_) {
   const Real e = elapsed, first = e * (e + substep) / duration,
@@ -553,8 +555,8 @@ void begin_substep(PatchBatch& p) {
   p.friction_shift = p.friction_shift + p.friction_before;
 }
 
-// The friction sees the normal impulses of this sweep, and what it does to the normal velocities is made
-// good.
+// Friction uses the normal impulses of this sweep, and its effect on the normal velocities is corrected
+// afterwards.
 void sweep(PatchBatch& p, std::span<BodyMotion> motions, const SubstepTime& time) {
   if (p.count == 1) return sweep_single(p, motions, time);
   const Vector moved = moved_normal(p, motions, time);

@@ -24,7 +24,7 @@ struct ContactPatch;
 struct RelaxedBody;
 
 /// Deviation of a body within a step from uniform motion: its change of velocity since the start, and the
-/// displacement and rotation due to it. Linear in elements 0 to 2, angular in 4 to 6.
+/// resulting displacement and rotation. Elements 0 to 2 are linear, elements 4 to 6 angular.
 struct BodyMotion {
   FloatLanes velocity{}, shift{};
 };
@@ -42,19 +42,19 @@ struct PatchBatch {
   using Index = ContactColoring::Batch;  ///< by lane
 
   struct Point {
-    Lanes x, y, radius;   ///< along t and k, and from the centre [m]
-    Lanes mass;           ///< effective [kg], 0 in lanes without this point
+    Lanes x, y, radius;   ///< coordinates along t and k, and distance from the centre [m]
+    Lanes mass;           ///< effective mass [kg], 0 in lanes without this point
     Lanes start;          ///< separation at the start of the step [m]
-    Lanes impulse, mean;  ///< of a sub-step, and mean over the time before [N s]
+    Lanes impulse, mean;  ///< impulse of a sub-step, and its mean over the time before [N s]
     Lanes before;         ///< sum over previous sub-steps [N s]
     Lanes shift;  ///< mass times the displacement due to these: during sub-steps [N s], at the end [kg m]
     Lanes push;   ///< part of `shift` that removed penetration [kg m]
   };
 
-  Index a, b, patch;  ///< in unused lanes the body beyond the last, and kNone
+  Index a, b, patch;  ///< in unused lanes: the body beyond the last, and kNone
   std::array<bool, ContactColoring::kLanes> moves_a, moves_b;
-  uint32_t count;   ///< greatest number of points of a lane
-  float tolerance;  ///< of the next sweep's rounds [m/s]
+  uint32_t count;   ///< greatest number of points in a lane
+  float tolerance;  ///< tolerance of the next sweep's rounds [m/s]
   Vector n, t, k, arm_a, arm_b;
   Lanes inverse_mass_a, inverse_mass_b;
   Symmetric inverse_inertia_a, inverse_inertia_b;
@@ -65,26 +65,27 @@ struct PatchBatch {
   /// The inverse of friction_mobility. For patches of one point, which have no torque, the inverse of the
   /// part along t and k, and in zz the reciprocal of a bound on its eigenvalues.
   Symmetric friction_stiffness;
-  PatchGroups approach;  ///< the twist due to the velocities at the start, conveyors included
-  Lanes conveyed;        ///< part of it along n due to conveyors [m/s]
+  PatchGroups approach;  ///< twist due to the velocities at the start, conveyors included
+  Lanes conveyed;        ///< the part of it along n due to conveyors [m/s]
   Lanes friction_t, friction_k;
-  Vector friction_impulse, friction_mean, friction_before, friction_shift;  ///< along t, k, about n, likewise
-  Lanes pressure;  ///< sum of the normal impulses that the friction was computed with, if the patch slides;
-                   ///< else 0 [N s]
+  /// Along t, k, about n; see Point.
+  Vector friction_impulse, friction_mean, friction_before, friction_shift;
+  /// Sum of the normal impulses with which the friction was computed, if the patch slides; else 0 [N s].
+  Lanes pressure;
   Lanes holds;     ///< all ones where friction was well within its limit in the last sweep, else 0
   Lanes renewal;   ///< share of the difference by which means follow their impulses
   Lanes residual;  ///< change of the velocity of the centre in the last sweep [m/s]
   bool turns;      ///< whether `gain` is used
   std::array<Point, 4> points;
-  PatchGroups gain;  ///< of the approach due to turning arms and frames, see ContactPatch
-  Vector bow;        ///< of the centre along n, t, k, see ContactPatch
+  PatchGroups gain;  ///< gain of the approach due to turning arms and frames, see ContactPatch
+  Vector bow;        ///< bow of the centre along n, t, k, see ContactPatch
 };
 
 /// Time of a sub-step.
 struct SubstepTime {
-  Real substep;   ///< its length [s]
-  Real elapsed;   ///< since the step's start, when it begins [s]
-  Real duration;  ///< of the step [s]
+  Real substep;   ///< length of the sub-step [s]
+  Real elapsed;   ///< time from the step's start to the beginning of the sub-step [s]
+  Real duration;  ///< length of the step [s]
   /// Factors of `gain` and `bow` at its end, see ContactPatch: s at that time, and the sums of s and of s^2
   /// over previous sub-steps, times their length [s].
   float s, s_sum, s2_sum;
@@ -109,7 +110,7 @@ void end_substeps(PatchBatch& batch, Real substep);
 
 /// Parameters of the removal of penetration.
 struct PushOut {
-  SubstepTime time;  ///< of the sub-step that would follow the last one
+  SubstepTime time;  ///< that of the sub-step after the last one
   Real share;        ///< share of the depth that one sweep removes
   Real limit;        ///< greatest displacement by push-out in a step [m]
 };

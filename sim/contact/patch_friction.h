@@ -53,7 +53,7 @@ inline PatchVector coulomb_impulse(const PatchBatch& p, const PatchVector& u, co
   return {sticks ? stick_t : held_t, sticks ? stick_k : held_k, FloatLanes{}};
 }
 
-/// x of A x = b, for a positive definite A.
+/// Solution x of A x = b for a positive definite A.
 inline PatchVector solution_of(const PatchSymmetric& A, const PatchVector& b) {
   const FloatLanes first = lane_inverse(A.xx), y_x = first * A.xy, z_x = first * A.xz;
   const FloatLanes yy = A.yy - y_x * A.xy, yz = A.yz - y_x * A.xz;

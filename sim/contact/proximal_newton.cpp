@@ -10,38 +10,39 @@
 namespace offstage::sim {
 namespace {
 
-/// Penalty times mobility: how many times stiffer than inertia a contact is. The method of multipliers leaves
-/// 1 / (1 + kStiffness e) of the error in a direction whose eigenvalue of the mobility is e (of the largest):
-/// with stacks of 100 at 1e-4. Larger ones cost digits of H.
+/// Penalty times mobility: how many times stiffer than inertia a contact is. In a direction whose eigenvalue
+/// of the mobility is e (relative to the largest), the method of multipliers leaves 1 / (1 + kStiffness e) of
+/// the error; for stacks of 100 e is about 1e-4. Larger values reduce the accuracy of H.
 constexpr Real kStiffness = 1e5;
-/// Rows with bounds less so, until that lasts too long: dry friction, whose bounds may be small, turns over
-/// within bound / rho, and Newton's method would go from kink to kink.
+/// Rows with bounds have this smaller stiffness, until convergence takes too long. The force of dry friction,
+/// whose bounds may be small, reverses within a velocity of bound / rho, and Newton's method would jump from
+/// kink to kink.
 constexpr Real kBoundedStiffness = 1e3;
-/// Joints pass on what a contact does, and a guess that is far off changes which others are closed. Then the
-/// first iterations are softer, each by that factor than the next (heaps of chains: a third of the
-/// factorisations, a tenth of the fall-backs).
+/// Joints transmit the effect of a contact, and a poor initial guess changes which other contacts are closed.
+/// The first iterations then use smaller penalties, each by the factor kStiffen (heaps of chains: a third of
+/// the factorisations, a tenth of the fall-backs).
 constexpr int kSoftSteps = 4;
 constexpr Real kStiffen = 10, kFarOff = 1e-3;
-/// Without joints a guess that is worse than none starts that much softer, which changes fewer contacts in
-/// each iteration, and stiffens when the multipliers are what is slow (heaps of boxes: half of the
-/// factorisations, a seventh of the fall-backs). Without any guess it starts stiff: redundant contacts then
-/// share their load in a way that the next steps can keep (a wall of 1000 takes 62 factorisations in 4 s for
-/// 3100).
+/// Without joints, if the initial guess is worse than none, the penalties start smaller by kSoft. This
+/// changes fewer contacts in each iteration. They increase when the multipliers converge slowly (heaps of
+/// boxes: half of the factorisations, a seventh of the fall-backs). Without any guess they start at full
+/// size, because redundant contacts then share their load in a way that the next steps can keep (a wall of
+/// 1000 takes 62 factorisations in 4 s instead of 3100).
 constexpr Real kSoft = 1e-2, kWrong = 1;
-constexpr Real kTolerance = 3e-8, kSmallest = 1e-11;  // of the velocities, and [m/s]
+constexpr Real kTolerance = 3e-8, kSmallest = 1e-11;  // share of the velocities, and lower bound [m/s]
 constexpr Real kCoarse = 1e-5;
 constexpr uint32_t kPatience = 4;
-/// An iteration that leaves more than this is slow.
+/// An iteration that leaves more than this share of the error is slow.
 constexpr Real kSlow = 0.2;
 constexpr uint32_t kMaxOuter = 120, kMaxNewton = 40, kMaxHalvings = 25, kMaxSweeps = 200;
-/// A matrix from before serves while each step leaves less of the gradient than this.
+/// An earlier matrix is reused while each step leaves less than this share of the gradient.
 constexpr Real kStale = 0.2;
 constexpr Real kMeritRounding = 1e-11;
 constexpr std::size_t kMixed = 5;
-/// Of the mobility of a joint's constraints: keeps those that depend on each other apart.
+/// Share of the mobility of a joint's constraints; makes dependent constraints solvable.
 constexpr Real kRegularization = 1e-11;
 constexpr uint32_t kMaxFactorizations = 300;
-/// What operations take [ns]: per contact, and per block of the factor.
+/// Cost of operations [ns]: per contact, and per block of the factor.
 constexpr Real kSetUp = 150, kEvaluation = 80, kAssembly = 150, kSolve = 25, kProduct = 80;
 
 Mat3 cross_matrix(const Vec3& r) {
@@ -83,7 +84,7 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
   for (const Point& p : points_) speed = std::max(speed, p.impulse.cwiseAbs().maxCoeff());
   for (const Bounded& p : bounded_) speed = std::max(speed, std::abs(p.impulse));
   const Real tolerance = kSmallest + kTolerance * speed;
-  // At rest the impulses of before still hold the joints together.
+  // At rest the impulses of the last step still satisfy the joints.
   if (constraint_speed() > tolerance / 4) satisfy_constraints();
 
   evaluate(contacts);
@@ -109,11 +110,11 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
     const Real before = left, multipliers_before = change.multipliers;
     change = update_multipliers(contacts);
     left = std::max({gradient_speed(), change.multipliers, change.lifts});
-    // The longer it takes the fewer digits are asked for.
+    // The tolerance is relaxed as iterations go on.
     solved =
         left <= std::min(tolerance * std::pow(10, (outer - began) / kPatience), tolerance + kCoarse * speed);
     if (solved && softness == 1) break;
-    if (solved) {  // the last digits are the stiff ones'
+    if (solved) {  // the last digits are computed with the full penalties
       scale_penalties(1 / std::exchange(softness, 1), 1);
       evaluate(contacts);
       gradient(contacts);
@@ -191,7 +192,8 @@ void ProximalNewton::number_bodies(std::span<const ContactBody> bodies, std::spa
   }
 }
 
-/// Bodies that share a contact or a row with bounds, and the constraints' rows with their bodies.
+/// Finds the pairs of bodies that share a contact or a row with bounds, and those of the constraints' rows
+/// with their bodies.
 void ProximalNewton::find_pairs(std::span<const Contact> contacts) {
   const auto row = [this](uint32_t body) { return body == kUnmoved ? kNone : row_of_body_[body]; };
   pairs_.clear();
@@ -214,14 +216,14 @@ void ProximalNewton::find_pairs(std::span<const Contact> contacts) {
   std::fill(kinds_.begin() + rows, kinds_.end(), BlockRowKind{.is_negative = true, .is_empty = true});
 }
 
-/// Where the block of two rows is; kNone if one is of nothing that moves.
+/// Index of the block of two rows; kNone if one of them does not move.
 uint32_t ProximalNewton::pair_of(uint32_t row, uint32_t other) const {
   if (row == kNone || other == kNone) return kNone;
   const std::pair<uint32_t, uint32_t> pair = std::minmax(row, other);
   return static_cast<uint32_t>(std::lower_bound(pairs_.begin(), pairs_.end(), pair) - pairs_.begin());
 }
 
-/// Multiplies the penalties.
+/// Multiplies the penalties by these factors.
 void ProximalNewton::scale_penalties(Real contacts, Real bounded) {
   if (contacts == 1 && bounded_.empty()) return;
   for (Point& p : points_) p.rho *= contacts;
@@ -229,7 +231,8 @@ void ProximalNewton::scale_penalties(Real contacts, Real bounded) {
   is_factored_ = false;
 }
 
-/// Towards the solution from a guess that is far from it; false if the budget is spent.
+/// Approaches the solution from a poor initial guess with increasing penalties; returns false if the budget
+/// is exceeded.
 bool ProximalNewton::ramp_penalties(std::span<const Contact> contacts, Real tolerance, ContactWork& work) {
   Real softness = 1;
   for (int k = 0; k < kSoftSteps; ++k) softness /= kStiffen;
@@ -247,8 +250,8 @@ bool ProximalNewton::ramp_penalties(std::span<const Contact> contacts, Real tole
   return true;
 }
 
-/// The guess: multipliers from the contacts, and the velocities that go with them. `impulse` is left with
-/// the relative velocities without any impulse, for their scale.
+/// Sets the initial guess: multipliers from the contacts, and the velocities that result from them. `impulse`
+/// holds the relative velocities without any impulse, as a scale.
 void ProximalNewton::set_points(std::span<const ContactBody> bodies, std::span<const Contact> contacts) {
   if (factored_contacts_ != contacts.size()) is_factored_ = false;
   points_.resize(contacts.size());
@@ -280,7 +283,7 @@ void ProximalNewton::set_points(std::span<const ContactBody> bodies, std::span<c
         cone_lift(contacts[i], relative_velocity(contacts[i], points_[i], velocity_) + fixed_[i]);
 }
 
-/// After the points: the impulses of rows with bounds add to the velocities, too.
+/// Called after set_points(): the impulses of rows with bounds also change the velocities.
 void ProximalNewton::set_joints() {
   const auto row = [this](uint32_t body) { return body == kUnmoved ? kNone : row_of_body_[body]; };
   const auto rows = static_cast<uint32_t>(body_of_row_.size());
@@ -323,7 +326,7 @@ void ProximalNewton::set_joints() {
   if (!joints_.empty() || factor_.rows() != direction_.size()) is_factored_ = false;
 }
 
-/// How far the velocities are from what the joints allow.
+/// Violation of the joints' constraints by the velocities.
 Real ProximalNewton::constraint_speed() const {
   Real worst = 0;
   for (std::size_t j = 0; j < constraints_.size(); ++j)
@@ -341,8 +344,8 @@ Vec6 ProximalNewton::violation(std::size_t j) const {
   return v;
 }
 
-/// The nearest velocities, weighted with the masses, that differ from those without impulses by what the
-/// joints allow.
+/// Changes the velocities to the nearest ones, in the norm of the masses, that satisfy the joints'
+/// constraints.
 void ProximalNewton::satisfy_constraints() {
   factor_.analyze(static_cast<uint32_t>(direction_.size()), pairs_, kinds_);
   add_constraint_blocks();
@@ -357,7 +360,7 @@ void ProximalNewton::satisfy_constraints() {
   is_factored_ = false;
 }
 
-/// The matrix of the masses and constraints.
+/// Assembles the blocks of the masses and constraints.
 void ProximalNewton::add_constraint_blocks() {
   diagonal_ = mass_;
   off_.assign(pairs_.size(), Mat6::Zero());
@@ -369,8 +372,8 @@ void ProximalNewton::add_constraint_blocks() {
   }
 }
 
-/// Against the gradient and what is left of the constraints: -direction_ is Newton's step of the velocities,
-/// and direction_ after those that of the constraints' impulses.
+/// Solves for Newton's step, with the gradient and the violation of the constraints as right-hand side.
+/// -direction_ is the step of the velocities; the elements after it are the impulses of the constraints.
 void ProximalNewton::solve_for_direction() {
   std::copy(gradient_.begin(), gradient_.end(), direction_.begin());
   for (std::size_t j = 0; j < constraints_.size(); ++j) direction_[gradient_.size() + j] = violation(j);
@@ -394,8 +397,8 @@ Vec3 ProximalNewton::relative_velocity(const Contact& c, const Point& p,
   return c.to_frame(u);
 }
 
-/// The impulses at the velocities, and the function whose gradient is M (v - v0) - J^T p, with the
-/// constraints' impulses among p.
+/// Evaluates the impulses at the velocities, and the function whose gradient is M (v - v0) - J^T p, with the
+/// constraints' impulses in p.
 void ProximalNewton::evaluate(std::span<const Contact> contacts) {
   merit_ = {};
   for (std::size_t row = 0; row < velocity_.size(); ++row) {
@@ -465,13 +468,13 @@ void ProximalNewton::gradient(std::span<const Contact> contacts) {
   }
 }
 
-/// The greatest velocity that the impulses out of balance give to a body.
+/// The greatest velocity that the unbalanced impulses give to a body.
 Real ProximalNewton::gradient_speed() const {
   Real worst = 0;
   for (std::size_t row = 0; row < gradient_.size(); ++row) {
     const Vec6& g = gradient_[row];
     const Real mass = mass_[row](0, 0);
-    // The angular part by a lower bound of the inertia's effect: the trace exceeds its eigenvalues.
+    // The angular part uses a lower bound of the inertia, because the trace exceeds its eigenvalues.
     const Mat3& inertia = mass_[row].bottomRightCorner<3, 3>();
     const Real radius = std::sqrt(inertia.trace() / mass);
     worst = std::max(worst, (g.head<3>().norm() + g.tail<3>().norm() / std::max(radius, 1e-12)) / mass);
@@ -514,13 +517,13 @@ bool ProximalNewton::assemble(std::span<const Contact> contacts, ContactWork& wo
   return is_factored_ = factor_.factorize(diagonal_, off_);
 }
 
-/// Newton's method for the multipliers and limits as they are, down to a gradient of `tolerance` [m/s].
+/// Minimises by Newton's method for constant multipliers and limits, to a gradient of `tolerance` [m/s].
 bool ProximalNewton::minimize(std::span<const Contact> contacts, Real tolerance, ContactWork& work) {
   Real before = std::numeric_limits<Real>::infinity();
   for (uint32_t step = 0; step < kMaxNewton; ++step) {
     const Real now = gradient_speed();
     if (now <= tolerance) return true;
-    // The matrix from before is tried first, though some contacts may have changed sides.
+    // The earlier matrix is tried first, although some contacts may have opened or closed.
     if (!is_factored_ || now > kStale * before)
       if (work.factorizations >= kMaxFactorizations || !assemble(contacts, work)) return false;
     before = now;
@@ -531,12 +534,13 @@ bool ProximalNewton::minimize(std::span<const Contact> contacts, Real tolerance,
   return false;
 }
 
-/// One step along -H^-1 g with back-tracking; false if rounding leaves no way down.
+/// One step along -H^-1 g with back-tracking; returns false if rounding prevents a decrease.
 bool ProximalNewton::descend(std::span<const Contact> contacts) {
   solve_for_direction();
   cost_ +=
       kSolve * static_cast<Real>(factor_.factor_blocks()) + kEvaluation * static_cast<Real>(contacts.size());
-  // With the constraints' new impulses the step goes downhill, even where it leads back to what joints allow.
+  // With the new impulses of the constraints the step decreases the function, even where it leads back to the
+  // constraints.
   const auto add_to_constraints = [this, &contacts](Real sign) {
     for (std::size_t j = 0; j < constraints_.size(); ++j)
       constraints_[j].impulse += sign * direction_[gradient_.size() + j];
@@ -558,7 +562,7 @@ bool ProximalNewton::descend(std::span<const Contact> contacts) {
       gradient(contacts);
       return true;
     }
-    // Near the minimum the function's rounding hides its decrease; the gradient still tells.
+    // Near the minimum rounding hides the decrease of the function; the gradient is then used instead.
     if (merit_.value > before.value + kMeritRounding * before.size) continue;
     gradient(contacts);
     if (gradient_speed() <= 0.8 * speed) return true;
@@ -568,7 +572,7 @@ bool ProximalNewton::descend(std::span<const Contact> contacts) {
   return false;
 }
 
-/// q := p and g := mu |u_t|; returns how far they were from that.
+/// Sets q := p and g := mu |u_t|; returns the changes.
 ProximalNewton::Change ProximalNewton::update_multipliers(std::span<const Contact> contacts) {
   Change change;
   for (std::size_t i = 0; i < contacts.size(); ++i) {
@@ -579,7 +583,7 @@ ProximalNewton::Change ProximalNewton::update_multipliers(std::span<const Contac
     const Contact& c = contacts[i];
     const Vec3 u = relative_velocity(c, p, velocity_) + fixed_[i];
     const Real lift = cone_lift(c, u);
-    // What is open does not depend on it, if it still is.
+    // An open contact does not depend on g if it stays open.
     const bool open = p.region == ConeRegion::apex &&
                       project_on_cone(c, -p.rho * (u + Vec3(lift, 0, 0))).region == ConeRegion::apex;
     p.rise = open ? 0 : lift - p.lift;
@@ -593,9 +597,9 @@ ProximalNewton::Change ProximalNewton::update_multipliers(std::span<const Contac
   return change;
 }
 
-/// Friction's feedback on the normal impulses can make g = mu |u_t(g)| a slow iteration. Anderson, "Iterative
-/// procedures for nonlinear integral equations" (1965), sees through that from the last few: to g goes the
-/// combination of them that lacks least.
+/// The feedback of friction on the normal impulses can make g = mu |u_t(g)| converge slowly. Anderson
+/// acceleration ("Iterative procedures for nonlinear integral equations", 1965) sets g to the combination of
+/// the last few values with the smallest residual.
 void ProximalNewton::mix_lifts(bool slow) {
   const auto n = static_cast<Eigen::Index>(points_.size());
   Eigen::VectorXd lift(n), rise(n);

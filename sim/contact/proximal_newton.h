@@ -54,13 +54,13 @@ class ProximalNewton {
     uint32_t a, b, pair;                // rows of the matrix; kNone for bodies that are not moved
     ConeRegion region;
   };
-  /// A row with bounds: q, p(v), and whether p(v) is within them.
+  /// A row with bounds: q, p(v), and whether p(v) is within the bounds.
   struct Bounded {
     Real multiplier, impulse, rho;
     uint32_t a, b, pair;
     bool is_free;
   };
-  /// A joint's constraints are a row of the matrix after those of the bodies.
+  /// The constraints of a joint. They are a row of the matrix after the rows of the bodies.
   struct Constraint {
     uint32_t a, b, pair_a, pair_b;
     Mat6 diagonal;
@@ -113,7 +113,7 @@ class ProximalNewton {
   std::vector<std::pair<uint32_t, uint32_t>> pairs_;
   std::vector<Point> points_;
   std::vector<Vec6> free_, velocity_, trial_, gradient_, direction_;
-  std::vector<Vec3> fixed_;  // relative velocity due to unmoved bodies and offsets, less the target
+  std::vector<Vec3> fixed_;  // relative velocity due to immovable bodies and offsets, less the target
   std::vector<Mat6> mass_;   // of each row
   std::vector<LinkMobility> mobility_;
   std::vector<Mat6> diagonal_, off_;  // H
@@ -122,8 +122,8 @@ class ProximalNewton {
   std::vector<Bounded> bounded_;
   std::vector<Constraint> constraints_;
   bool is_factored_ = false;
-  std::size_t factored_contacts_ = 0;  // their number when H was factored
-  std::vector<Mixed> mixing_;          // of the last iterations
+  std::size_t factored_contacts_ = 0;  // number of contacts when H was factored
+  std::vector<Mixed> mixing_;          // values of the last iterations
   BlockCholesky<6> factor_;
   Merit merit_;
   Real cost_ = 0, budget_ = 0;

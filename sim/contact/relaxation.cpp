@@ -11,31 +11,32 @@
 namespace offstage::sim {
 namespace {
 
-/// Of the penetration that a step finds, the share that it takes away, and the fastest that it does [m/s].
-/// What one patch moves opens the gaps of others, whose forces are then missing until they close: with 0.65
-/// and 0.8 a wall of 1000 bricks trembled (0.2 and 2 J after 4 s for 0.001), with 1 it fell; with 0.3 the
+/// Share of the penetration that a step removes, and the greatest speed of the removal [m/s]. Moving one
+/// patch opens the gaps of others, whose forces are then missing until they close. With shares of 0.65 and
+/// 0.8 a wall of 1000 bricks trembled (0.2 and 2 J after 4 s instead of 0.001), with 1 it fell. With 0.3 the
 /// greatest overlap in heaps was the same.
 constexpr Real kPushShare = 0.5, kMaxPush = 3;
 
-/// Below this a step is not worth a second thread.
+/// With fewer batches a second thread does not pay.
 constexpr std::size_t kSerialBatches = 48;
-/// A sweep that changes the velocity of a patch by more than this strikes its bodies [m/s]: what else they
-/// touch gets another sweep before they move, or it would be pressed in; and so on, so many times at most. In
-/// a sub-step of 1/1920 s such a speed presses in 0.05 mm. (At half and at twice of it the greatest overlap
-/// of 1000 boxes that fall on a heap was 0.5 and 0.7 mm for 0.8, which is how it scatters, in the same time.)
+/// A sweep that changes the velocity of a patch by more than this marks its bodies as hit [m/s]. Their other
+/// contacts get another sweep before the bodies move, because otherwise they would penetrate; this is
+/// repeated at most kRepeats times. In a sub-step of 1/1920 s this speed causes a penetration of 0.05 mm.
+/// (With half and twice the value, the greatest overlap of 1000 boxes that fall on a heap was 0.5 and 0.7 mm
+/// instead of 0.8 mm, in the same time; this is within the scatter.)
 constexpr Real kImpact = 0.1;
 constexpr uint32_t kRepeats = 12;
-/// What lies under a load gives way only together: a push as far as kPress is passed on likewise, and then on
-/// to where it is but kPassedOn [m]. In heaps of 3000 boxes columns stayed 1 mm in each other for seconds
-/// while they lay still, now 0.6 mm; the sampled overlap was above 1 mm in 114 of 360 instants, now in 5.
-/// From less on it would do more, but a wall of 1000 bricks begins to sway by it: one that stands stays
-/// below.
+/// Bodies under a load can only be separated together. A displacement by push-out of more than kPress is
+/// therefore passed on in the same way, and then on until it is less than kPassedOn [m]. Without this,
+/// columns in heaps of 3000 boxes overlapped by 1 mm for seconds at rest, with it by 0.6 mm; the sampled
+/// overlap was above 1 mm in 114 of 360 samples, with it in 5. Smaller values reduce it further, but make a
+/// wall of 1000 bricks sway. In a wall at rest the displacements are smaller than this.
 constexpr Real kPress = 3e-4, kPassedOn = 1e-4;
 
-/// A sub-step with more than this many times the mean change of velocity has an impact in it.
+/// A sub-step whose change of velocity is more than this many times the mean contains an impact.
 constexpr Real kUneven = 2.5;
 
-/// Points that are no farther from the deepest along the normal are as deep [m].
+/// Points within this distance of the deepest one along the normal are equally deep [m].
 constexpr Real kAsDeep = 5e-5;
 
 constexpr uint32_t kBatchesPerBlock = 4, kBodiesPerBlock = 128;
@@ -51,10 +52,10 @@ FloatLanes joined(const Vec3& linear, const Vec3& angular) {
   return FloatLanes{v.x(), v.y(), v.z(), 0, w.x(), w.y(), w.z(), 0};
 }
 
-/// Whether a body hit something: its velocity changed by more than steady forces would, which is twice what
-/// the free motion has, counted as kinetic energy; and not evenly, but most of it in few sub-steps. (The
-/// torque of the load turns a rolling coin's spin more than gravity.) `greatest`: by components, the greatest
-/// change of velocity in a sub-step.
+/// Whether a body was hit. Its velocity must change by more than steady forces would, which is twice the
+/// change of the free motion, measured as kinetic energy, and most of the change must be in few sub-steps.
+/// (Twice, because the torque of the load turns the spin of a rolling coin faster than gravity does.)
+/// `greatest`: by component, the greatest change of velocity in a sub-step.
 bool jumps(const RelaxedBody& b, const BodyMotion& m, FloatLanes greatest, const RelaxationDef& def) {
   const Real inertia = b.inverse_inertia.trace() > 0 ? 3 * b.inverse_mass / b.inverse_inertia.trace() : 0;
   const auto size2 = [inertia](const Vec3& linear, const Vec3& angular) {
@@ -98,8 +99,8 @@ uint32_t relaxation_substeps(Real duration) {
 
 // Stages
 
-/// One range for each colour, and one for what shares bodies within itself: it is done in order. Colours that
-/// are one block each are not worth a stage each: they are done in order, too.
+/// Adds one range for each colour, and one for the batches that share bodies, which are solved in order.
+/// Colours of a single block do not justify a stage each and are solved in order, too.
 void RelaxationSolver::plan_colors(Stage stage, uint32_t substep, bool backward) {
   const std::span<const uint32_t> begins = coloring_.begins();
   const std::size_t first = ranges_.size();
@@ -121,8 +122,8 @@ void RelaxationSolver::plan_colors(Stage stage, uint32_t substep, bool backward)
   if (backward) std::reverse(ranges_.begin() + static_cast<std::ptrdiff_t>(first), ranges_.end());
 }
 
-/// A sweep over all batches, and then over those that impacts reach: there and back, so that they go both
-/// ways.
+/// A sweep over all batches, and then over those that impacts reach, alternately backward and forward, so
+/// that impacts propagate in both directions.
 void RelaxationSolver::plan_sweeps(Stage first, Stage again, uint32_t substep) {
   ++sweeps_;
   plan_colors(first, substep);
@@ -147,7 +148,7 @@ void RelaxationSolver::plan(uint32_t substeps) {
     if (joints > 0) ranges_.push_back({Stage::join, 0, joints, 1, i + 1});
     ranges_.push_back({i + 1 < substeps ? Stage::advance : Stage::advance_last, 0, bodies, kBodiesPerBlock});
   }
-  // Contacts that closed in the last sub-step still have the velocity that closed them.
+  // Contacts that closed in the last sub-step still have the velocity with which they closed.
   plan_sweeps(Stage::push, Stage::push_again, substeps);
   ++sweeps_;
   plan_colors(Stage::solve, substeps);
@@ -224,8 +225,8 @@ void RelaxationSolver::start(uint32_t i) {
                  FloatLanes{}};
 }
 
-// What the contacts did in the last sub-step, as a guess for the next, and the free motion together: the
-// change of velocity was the sum of both.
+// The change of velocity in the last sub-step, by contacts and free motion together, is the initial guess for
+// the next one.
 void RelaxationSolver::extrapolate(uint32_t i) {
   FloatLanes& v = motions_[i].velocity;
   const FloatLanes now = v;
@@ -247,7 +248,7 @@ void RelaxationSolver::push(uint32_t i, const Range& range, Real threshold) {
   strike(p, range.sweep, push_out(p, motions_, how), threshold);
 }
 
-/// Contacts of bodies in lanes with so strong an impact get another sweep.
+/// Marks the bodies in lanes with an impact above the threshold; their contacts get another sweep.
 void RelaxationSolver::strike(const PatchBatch& p, uint32_t sweep, FloatLanes impact, Real threshold) {
   for (unsigned lane = 0; lane < ContactColoring::kLanes; ++lane) {
     if (!(impact[lane] > threshold)) continue;
@@ -269,9 +270,9 @@ void RelaxationSolver::advance(uint32_t i) {
   m.shift += float_lanes(substep_) * m.velocity;
 }
 
-// The sub-steps moved with the velocities at their ends, which closes gaps exactly. For steady forces the
-// mean of old and new is the right one, and summed over the sub-steps the difference is that of a half
-// sub-step with the whole change of velocity.
+// The sub-steps moved the bodies with the velocities at their ends, which closes gaps exactly. For steady
+// forces the mean of the velocities at start and end is correct. Summed over the sub-steps, the difference is
+// the whole change of velocity times half a sub-step.
 void RelaxationSolver::finish(uint32_t i) {
   RelaxedBody& b = bodies_[i];
   if (b.inverse_mass == 0) return;
@@ -281,7 +282,7 @@ void RelaxationSolver::finish(uint32_t i) {
   const FloatLanes greatest = lane_max(greatest_[i], lane_abs(m.velocity - last_[i]));
   late_[i] = jumps(b, m, greatest, def_) ? 0 : substep_ / 2;
   b.impulse = b.angular_impulse = b.displacement = b.rotation_vector = Vec3::Zero();
-  if (!has_joints()) {  // report() adds what contacts do
+  if (!has_joints()) {  // report() adds the effect of contacts
     b.velocity += h * b.free_acceleration;
     b.angular_velocity += h * b.free_angular_acceleration;
     return;
@@ -296,10 +297,10 @@ void RelaxationSolver::finish(uint32_t i) {
 
 namespace {
 
-/// About a patch's centre, in world axes: of what the points have along n, and all together along t, k and
-/// about n.
+/// Wrench about a patch's centre, in world axes, from the normal components of the points and the common
+/// components along t, k and about n.
 Wrench wrench(const ContactPatch& p, Real ContactPatch::Point::*normal, const Vec3& friction) {
-  Vec3 sum = Vec3::Zero();  // along n, and the moments about t and k
+  Vec3 sum = Vec3::Zero();  // along n, and moments about t and k
   for (uint32_t i = 0; i < p.count; ++i) {
     const ContactPatch::Point& q = p.points[i];
     sum += q.*normal * Vec3(1, q.k, -q.t);
@@ -310,7 +311,7 @@ Wrench wrench(const ContactPatch& p, Real ContactPatch::Point::*normal, const Ve
 
 }  // namespace
 
-/// To both bodies what the patch did in the step, in double precision.
+/// Adds the effect of the patch in the step to both bodies, in double precision.
 void RelaxationSolver::give(const ContactPatch& p) {
   const Wrench impulse = wrench(p, &ContactPatch::Point::impulse, p.friction_impulse);
   const Wrench shift = wrench(p, &ContactPatch::Point::shift, p.friction_shift);
@@ -331,8 +332,8 @@ void RelaxationSolver::give(const ContactPatch& p) {
   to(p.b, p.arm_b, -1);
 }
 
-// Where nothing but contacts acts, motion is made anew from their impulses: what these give to one body they
-// take from the other, to the last bits of double precision, so that momentum is kept.
+// If only contacts act, the motion is computed again from their impulses in double precision. The impulses on
+// both bodies are opposite to the last bit, so momentum is conserved.
 void RelaxationSolver::report(uint32_t i) {
   sim::report(batches_[i], patches_, substep_);
   if (has_joints()) return;

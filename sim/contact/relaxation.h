@@ -34,11 +34,11 @@ namespace offstage::sim {
 
 /// A body during a step of the fast solver.
 struct RelaxedBody {
-  Real inverse_mass = 0;                  ///< [1/kg]; 0: contacts do not move it, but it may move
-  Mat3 inverse_inertia = Mat3::Zero();    ///< about the centre of mass, world axes [1/(kg m^2)]
-  Vec3 velocity = Vec3::Zero();           ///< of the centre of mass [m/s]; in: at the start, out: at the end
-  Vec3 angular_velocity = Vec3::Zero();   ///< world [rad/s]; in: at the start, out: at the end
-  Vec3 free_acceleration = Vec3::Zero();  ///< mean over the step, without contacts [m/s^2]
+  Real inverse_mass = 0;                ///< [1/kg]; 0: contacts do not move it, but it may be moving
+  Mat3 inverse_inertia = Mat3::Zero();  ///< about the centre of mass, world axes [1/(kg m^2)]
+  Vec3 velocity = Vec3::Zero();  ///< velocity of the centre of mass [m/s]; in: at the start, out: at the end
+  Vec3 angular_velocity = Vec3::Zero();           ///< world [rad/s]; in: at the start, out: at the end
+  Vec3 free_acceleration = Vec3::Zero();          ///< mean over the step, without contacts [m/s^2]
   Vec3 free_angular_acceleration = Vec3::Zero();  ///< [rad/s^2]
   /// Out: the impulse of contacts and joints, which is added to the free motion's momentum [N s], and their
   /// angular impulse about the centre of mass [N m s]. The impulses of a contact on its two bodies are
@@ -63,27 +63,28 @@ struct ContactPatch {
   struct Point {
     Real t = 0, k = 0;    ///< coordinates along the tangents, from the patch's centre [m]
     Real separation = 0;  ///< at the start of the step, negative in penetration [m]
-    Real force = 0;       ///< normal [N]; in: the guess, from the last step; out: at the end of this step
+    Real force = 0;  ///< normal force [N]; in: the guess from the last step; out: at the end of this step
     Real mean_force = 0;  ///< mean over the time before [N]; in: from the last step, out: updated
-    Real impulse = 0;     ///< out: of the whole step [N s]
+    Real impulse = 0;     ///< out: impulse over the whole step [N s]
     Real shift = 0;       ///< out: mass times the displacement by this point in the step [kg m]
   };
-  uint32_t a = 0, b = 0;                            ///< indices of bodies; not both unmoved
+  uint32_t a = 0, b = 0;                            ///< indices of bodies; at least one is movable
   ContactFrame frame;                               ///< n from b to a
   Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();  ///< from the centres of mass to the patch's centre [m]
-  Vec3 offset = Vec3::Zero();  ///< (n, t, k), added to the relative velocity: moving surfaces [m/s]
+  Vec3 offset = Vec3::Zero();  ///< (n, t, k), added to the relative velocity, for moving surfaces [m/s]
   /// Change of the relative velocity at the centre due to turning arms and frames, in (n, t, k): gain s + bow
   /// s^2, where s increases linearly from -1 at the step's start to 1 at its end [m/s]. The normal velocity
   /// also changes by gain_along_t s and gain_along_k s per metre along t and k [1/s].
   Vec3 gain = Vec3::Zero(), bow = Vec3::Zero();
   Real gain_along_t = 0, gain_along_k = 0;
-  bool turns = false;  ///< whether any gain is not 0
+  bool turns = false;  ///< whether any gain differs from 0
   /// Coulomb's coefficients. Equal coefficients give the round cone; with different ones each axis has its
   /// own limit.
   Real friction_t = 0, friction_k = 0;
   uint32_t count = 0;
   std::array<Point, 4> points;
-  /// Of all points together: tangential [N] and about the normal [N m]; in and out like Point::force.
+  /// Friction of all points together: tangential [N] and about the normal [N m]; in and out like
+  /// Point::force.
   Real force_t = 0, force_k = 0, torque_n = 0;
   Vec3 mean_friction = Vec3::Zero();     ///< the mean of these, like Point::mean_force
   Vec3 friction_impulse = Vec3::Zero();  ///< in the order of mean_friction, like Point::impulse
@@ -101,11 +102,11 @@ void set_points(ContactPatch& patch, const Manifold& m, const ContactFrame& fram
 uint32_t relaxation_substeps(Real duration);
 
 struct RelaxationDef {
-  Real duration = 1.0 / 240;  ///< of the step [s], > 0
+  Real duration = 1.0 / 240;  ///< length of the step [s], > 0
   uint32_t substeps = 8;      ///< > 0
 };
 
-/// The object keeps only its memory between steps, no state.
+/// The fast solver. An object keeps only its memory between steps, no state.
 class RelaxationSolver {
  public:
   /// Solves the contacts of a step and updates bodies and patches. Penetration is removed gradually; where a
@@ -119,19 +120,19 @@ class RelaxationSolver {
     start,
     prepare,
     solve,
-    solve_next,   // in another sub-step
-    solve_again,  // the bodies that the previous sweep struck
+    solve_next,   // the first sweep of another sub-step
+    solve_again,  // repeated sweep over the bodies hit in the previous one
     start_joints,
     join,
     join_last,
     advance,
     advance_last,
     push,
-    push_again,  // likewise
+    push_again,  // repeated push-out, likewise
     finish,
     report
   };
-  /// Blocks of a stage may run in any order and at the same time.
+  /// The blocks of a range may run in any order and at the same time.
   struct Range {
     Stage stage;
     uint32_t begin, end, block_size;
@@ -162,21 +163,21 @@ class RelaxationSolver {
   std::span<RelaxedBody> bodies_;
   std::span<ContactPatch> patches_;
   RelaxationDef def_;
-  RelaxedJoints* joints_ = nullptr;  // null: none
+  RelaxedJoints* joints_ = nullptr;  // may be null
   Real substep_ = 0;
   std::vector<ContactColoring::Link> links_;
   ContactColoring coloring_;
   std::vector<PatchBatch> batches_;
-  std::vector<BodyMotion> motions_;   // one more than bodies: of unused lanes
-  std::vector<FloatLanes> last_;      // velocities of the sub-step before
-  std::vector<FloatLanes> greatest_;  // by components, the greatest change of velocity in a sub-step
+  std::vector<BodyMotion> motions_;   // one more than bodies, for unused lanes
+  std::vector<FloatLanes> last_;      // velocities at the end of the previous sub-step
+  std::vector<FloatLanes> greatest_;  // by component, the greatest change of velocity in a sub-step
   std::vector<Real> late_;            // by body: see finish() [s]
-  std::vector<SubstepTime> times_;    // and one of what would follow the last
+  std::vector<SubstepTime> times_;    // and that of the sub-step after the last one
   std::vector<Range> ranges_;
-  // Sweeps are numbered from 1; a body stores the number of the last sweep that struck it.
+  // Sweeps are numbered from 1; a body stores the number of the last sweep in which it was hit.
   uint32_t sweeps_ = 0;
   std::vector<uint32_t> struck_;  // by body
-  std::vector<uint8_t> strikes_;  // by sweep: some body
+  std::vector<uint8_t> strikes_;  // by sweep: whether any body was hit
 };
 
 }  // namespace offstage::sim

@@ -8,10 +8,10 @@
 namespace offstage::sim {
 namespace {
 
-/// Rows times links beyond which what each row does is not kept for all links.
+/// Rows times links above which the responses of all links are not stored.
 constexpr std::size_t kMostResponses = 20000;
 
-/// Since the step's start.
+/// Change of velocity since the step's start.
 Vec6 change_of(const BodyMotion& m) {
   Vec6 v;
   for (unsigned i = 0; i < 3; ++i) {
@@ -32,7 +32,7 @@ void add_to(BodyMotion& m, const Vec6& v) {
   m.velocity += FloatLanes{f[0], f[1], f[2], 0, f[3], f[4], f[5], 0};
 }
 
-/// Without contacts and rows with bounds.
+/// Change of velocity without contacts and rows with bounds.
 Vec6 free_change(const RelaxedBody& b, Real elapsed) {
   Vec6 v;
   v << b.free_acceleration, b.free_angular_acceleration;
@@ -144,7 +144,8 @@ void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapse
   std::fill(correction.begin(), correction.end(), Vec6::Zero());
   system.correct(part.change, part.impulses, correction);
   for (std::size_t k = 0; k < part.bodies.size(); ++k) add_to(motions[part.bodies[k]], correction[k]);
-  // The motion of a sub-step goes on in the next, with all that acted in it; after the last there is none.
+  // The velocities of a sub-step carry over to the next one, including the impulses; after the last there is
+  // none.
   if (is_last) std::fill(part.now.begin(), part.now.end(), Vec6::Zero());
   for (std::size_t j = 0; j < part.now.size(); ++j) part.now[j] += part.impulses[j];
 

@@ -1,7 +1,7 @@
 #pragma once
-/// Joints in the sub-steps of the fast solver: after the contacts' sweep, the sparse system of each
-/// articulation satisfies all its constraints at once, so that neither long chains nor large mass ratios
-/// stretch it. Its bounded rows are then solved one after the other, each using the response of the whole
+/// Joints in the sub-steps of the fast solver. After the contacts' sweep, the sparse system of each
+/// articulation satisfies all its constraints at once, so neither long chains nor large mass ratios stretch
+/// it. Its bounded rows are then solved one after the other, each using the response of the whole
 /// articulation to its impulse.
 
 #include <span>
@@ -22,13 +22,13 @@ class RelaxedJoints {
   RelaxedJoints(const JointProblem& problem, std::span<Articulation* const> articulations,
                 std::span<const uint32_t> bounded_ends);
 
-  /// Number of parts of solve(). Parts share no body.
+  /// Number of parts of solve(). Parts have no common bodies.
   uint32_t count() const { return static_cast<uint32_t>(parts_.size()); }
 
   void begin(std::span<const RelaxedBody> bodies, Real duration, uint32_t substeps);
   /// Begins the first sub-step with the impulses of the last step.
   void start(uint32_t part, std::span<BodyMotion> motions);
-  /// At the end of a sub-step that is `elapsed` after the start.
+  /// Solves a part at the end of a sub-step, `elapsed` after the start.
   void solve(uint32_t part, std::span<BodyMotion> motions, Real elapsed, bool is_last);
   /// Writes the impulses of the whole step.
   void finish();
@@ -36,17 +36,17 @@ class RelaxedJoints {
  private:
   struct Row {
     Real inverse_stiffness;      // change of u per unit impulse, softness included
-    Real impulse, lower, upper;  // of a sub-step
+    Real impulse, lower, upper;  // bounds and impulse of a sub-step
     Real softness, sum = 0;      // softness; impulse of the whole step
-    std::vector<Vec6> response;  // of the links to a unit impulse; empty: only its own two links, in
-                                 // `response_a` and `response_b`
+    // Of the links to a unit impulse; empty: only of its own two links, in `response_a` and `response_b`.
+    std::vector<Vec6> response;
     std::vector<Vec6> reaction;  // of the joints to a unit impulse
     Vec6 response_a, response_b;
   };
   struct Part {
     Articulation* articulation;
     uint32_t first_constraint, first_row, last_row;
-    std::vector<uint32_t> bodies;  // of the links
+    std::vector<uint32_t> bodies;  // indices of the links' bodies
     std::vector<Vec6> velocities, change, impulses;
     std::vector<Vec6> now, sum;  // impulses of the joints in this sub-step, and in the whole step
   };

@@ -1,12 +1,12 @@
 #pragma once
-/// Collisions of clusters within a bounded effort, for the fast solver and heaps.
+/// Collisions of clusters with bounded effort, for the fast solver and heaps.
 
 #include "sim/contact/collision.h"
 
 namespace offstage::sim {
 
-/// As collide(), but with at most about ten thousand operations, so that contacts of a large cluster may
-/// still approach afterwards. Like collide(), it never adds kinetic energy.
+/// The same as collide(), but with at most about ten thousand operations, so some contacts of a large cluster
+/// may still approach afterwards. Like collide(), it never adds kinetic energy.
 ContactWork collide_roughly(std::span<ContactBody> bodies, std::span<Contact> contacts,
                             std::span<const Real> restitution, ImpactLaw law, const JointProblem& joints);
 

@@ -13,25 +13,24 @@
 namespace offstage::sim {
 namespace {
 
-/// Cosine: normals that are more alike are the same.
+/// Cosine: normals with a smaller angle count as equal.
 constexpr Real kSameWay = 1 - 1e-10;
-/// Of the body's extent: clipping lets points be outside of their surface by no more.
+/// Share of the body's extent by which clipping may put points outside of their surface.
 constexpr Real kClipped = 2e-3;
-/// Cosines: a surface goes on along a face if its own normal is so alike; and a contact pushes along the
-/// surface's own normal if that is so alike.
+/// Cosines: a surface continues a face if its own normal differs by less than kGoesOn; a contact pushes along
+/// the surface's own normal if it differs by less than kOwnNormal.
 constexpr Real kGoesOn = 0.999, kOwnNormal = 0.9;
-/// How far over a face the surface beside it is looked at, of the height of steps that count.
+/// Height over a face at which the surface beside it is sampled, as a multiple of the greatest flush step.
 constexpr Real kLookOver = 3;
-/// More contacts of a body are not compared with each other.
+/// The contacts of a body are not compared with each other if there are more.
 constexpr std::size_t kMostContacts = 512;
-/// How far beside a place the surface is looked at, of the height of steps that count: with kLookOver the
-/// direction from an edge to there is 18 degrees from upright.
+/// Lateral distance at which the surface is sampled, as a multiple of the greatest flush step. With kLookOver
+/// the direction from an edge to the sample is 18 degrees from the normal.
 constexpr Real kLookBeside = 1;
-/// Contacts of a slope are looked for this far beyond the contact that they replace [m].
+/// Contacts of a slope are searched this far beyond the contact that they replace [m].
 constexpr Real kSlopeMargin = 2e-3;
 
-/// How far a point is from a convex piece of a shape, and along which direction that grows; in the shape's
-/// frame.
+/// Distance of a point from a convex piece of a shape, with its gradient, in the shape's frame.
 SurfaceDistance piece_distance(const CollisionShape& shape, uint32_t piece, const Vec3& p) {
   if (shape.is_plane()) return {p.y(), Vec3::UnitY()};
   if (!shape.solid().mesh) return signed_distance(shape.solid(), p);
@@ -55,7 +54,7 @@ SurfaceDistance piece_distance(const CollisionShape& shape, uint32_t piece, cons
   return {s.distance, s.normal};
 }
 
-/// One manifold as the body X sees it that it has in common with others; Y is the other body.
+/// A manifold seen from body X, which it shares with other manifolds; Y is the other body.
 struct View {
   ContactPair* pair;
   uint32_t index;
@@ -76,14 +75,14 @@ struct View {
       if (m->points[k].separation < m->points[best].separation) best = k;
     return best;
   }
-  /// A seam is a line, or a point of it.
+  /// A seam is a line, or a point on a line.
   bool may_be_at_seam() const {
     if (continues() || y().collision_shape().is_plane() || !is_narrow(*m)) return false;
     return !is_face() || !std::holds_alternative<Sphere>(x().def.shape);
   }
 };
 
-/// What becomes of a contact: it goes, or another comes in its place.
+/// The decision on a contact: it is removed, or replaced by another manifold.
 struct Verdict {
   ContactPair* pair;
   uint32_t index;
@@ -112,7 +111,7 @@ class BodyContacts {
     if (views_.size() > kMostContacts) return verdicts;
     struct Hidden {
       std::size_t contact, by;
-      Vec3 normal;  // of the surface there
+      Vec3 normal;  // normal of the surface at the contact
     };
     std::vector<Hidden> hidden;
     for (std::size_t i = 0; i < views_.size(); ++i) {
@@ -126,7 +125,7 @@ class BodyContacts {
     };
     std::size_t last = views_.size();
     for (const auto& [contact, by, normal] : hidden) {
-      // Of two that hide each other both are kept.
+      // If two contacts hide each other, both are kept.
       if (contact == last || is_hidden(by)) continue;
       last = contact;
       const View& v = views_[contact];
@@ -146,7 +145,7 @@ class BodyContacts {
     return sum / v.m->count;
   }
 
-  /// The point of a contact that is highest over a face.
+  /// The point of a contact that is highest above a face.
   static Vec3 highest(const View& v, const Vec3& up) {
     Vec3 best = v.on_y(0);
     for (uint32_t k = 1; k < v.m->count; ++k)
@@ -154,13 +153,13 @@ class BodyContacts {
     return best;
   }
 
-  /// If a contact is on or below the face by which another holds the same piece, and its own surface does not
-  /// push as it says when seen from above the face: how it does push; the face's normal if it just goes on
-  /// from there.
+  /// Returns a new normal for a contact that is level with or below a face on which the same piece lies, if
+  /// the surface at the contact, seen from above the face, does not have the contact's normal. It is the
+  /// surface's own normal, or that of the face if the surface only continues the face.
   std::optional<Vec3> normal_instead(const View& v, const View& face) const {
     const Vec3 n = v.normal(), up = face.normal();
     if (v.x_piece() != face.x_piece() || n.dot(up) > kSameWay) return std::nullopt;
-    // Two convex pieces have no seam between them: what they touch with next is theirs, too.
+    // Two convex pieces have no seam between them: all their contacts are valid.
     if (v.pair == face.pair && v.y_piece() == face.y_piece()) return std::nullopt;
     const uint32_t deepest = face.deepest();
     const Vec3& on_face = face.on_y(deepest);
@@ -191,40 +190,40 @@ class BodyContacts {
   }
 
   /// Whether Y is part of the ground, or lies on a face of its own as a wedge does. In a heap a box may stand
-  /// on another one with an edge: that is no foot of a slope, and it would change from step to step.
+  /// on another one with an edge. This is not the foot of a slope, and it would change from step to step.
   bool is_ramp(const View& v, const Vec3& foot, const Vec3& up, const Vec3& across) const {
     if (!v.y().is_dynamic()) return true;
     const Real look = kLookOver * flush_;
     return distance(v, foot - look * up - 2 * look * across).normal.dot(up) < -kGoesOn;
   }
 
-  /// A point of a contact on Y's piece. Clipping lets it be a little outside.
+  /// A point of a contact, moved to the surface of Y's piece; clipping can put it slightly outside.
   Vec3 on_surface(const View& v, uint32_t k) const {
     const SurfaceDistance off = distance(v, v.on_y(k));
     return v.on_y(k) - std::max(0.0, off.distance) * off.normal;
   }
 
-  /// Of Y's piece, at a place of the world.
+  /// Distance of a place in the world from Y's piece.
   SurfaceDistance distance(const View& v, const Vec3& place) const {
     const Pose y = pose(v.y(), v.speculative);
     SurfaceDistance d = piece_distance(v.y().collision_shape(), v.y_piece(), y.point_to_body(place));
     d.normal = y.vector_to_world(d.normal);
     return d;
   }
-  /// Whether Y's surface below a place is a face towards `up`, at least on one side along a direction. Over a
-  /// convex edge or a corner the nearest point of Y is the edge itself, straight below, whichever way `up`
-  /// is: that alone does not make a face.
+  /// Whether Y's surface below a place is a face with the normal `up`, at least on one side along a
+  /// direction. Above a convex edge or a corner the nearest point of Y is on the edge, directly below, for
+  /// many directions of `up`. This alone does not prove a face.
   bool is_flat(const View& v, const Vec3& over, const Vec3& up, const Vec3& along) const {
     const CollisionShape& shape = v.y().collision_shape();
     const bool is_triangle =
         !shape.is_plane() && shape.solid().mesh && shape.piece(v.y_piece()).core == Convex::Core::triangle;
-    if (is_triangle) return true;  // its neighbours go on from it
+    if (is_triangle) return true;  // its neighbours continue it
     const Vec3 aside = kLookBeside * flush_ * along;
     return distance(v, over - aside).normal.dot(up) > kGoesOn ||
            distance(v, over + aside).normal.dot(up) > kGoesOn;
   }
 
-  /// The contact of X's piece with the slope that begins where a contact is.
+  /// The contact of X's piece with the slope that begins at a contact.
   Manifold on_slope(const View& v, const View& face, const Vec3& normal) const {
     const Pose plane{highest(v, face.normal()), rotation_between(Vec3::UnitY(), normal)};
     const Pose x = pose(v.x(), false), y = pose(v.y(), false);
@@ -238,7 +237,8 @@ class BodyContacts {
     m.edge_a = m.edge_b = Vec3::Zero();
     m.radius_a = m.radius_b = 0;
     m.count = 0;
-    // It stands on the face, not in the slope: else what is seen is a corner of something flush.
+    // The piece stands on the face, not in the slope. If it were deeper, the slope would be the corner of a
+    // flush object.
     const Real least =
         std::min({0.0, v.m->points[v.deepest()].separation, face.m->points[face.deepest()].separation}) -
         flush_;
@@ -257,14 +257,14 @@ class BodyContacts {
   std::vector<View> views_;
 };
 
-/// Pairs by a body that they share.
+/// The pairs of one body.
 struct Group {
   Body* x;
   std::vector<ContactPair*> pairs;
 };
 
-/// Those of the bodies that can move and have a contact that may be at a seam; and pairs of other bodies with
-/// ones of several pieces, by themselves.
+/// Returns groups for the movable bodies that have a contact that may be at a seam; and, one by one, the
+/// pairs of immovable bodies with bodies of several pieces.
 std::vector<Group> groups_with_seams(std::span<ContactPair* const> pairs) {
   std::vector<Group> groups;
   std::vector<std::pair<Body*, std::size_t>> numbers;  // by slot

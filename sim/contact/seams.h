@@ -11,7 +11,7 @@
 
 namespace offstage::sim {
 
-/// Greatest height of a step between two surfaces that still counts as flush and stops nothing [m]. For
+/// Greatest height of a step between two surfaces that counts as flush and does not stop objects [m]. For
 /// bodies smaller than a decimetre it is this share of their extent.
 constexpr Real kFlush = 1e-4, kFlushShare = 1e-3;
 

@@ -1,4 +1,4 @@
-/// Whether an island is for the exact or the fast solver.
+/// Choice of the exact or the fast solver for an island.
 
 #include "sim/contact/solver_choice.h"
 
@@ -7,24 +7,25 @@
 namespace offstage::sim {
 namespace {
 
-/// So few bodies are always worth it in a world where the fast solver takes less than this [ns].
+/// Islands of at most this many bodies always use the exact solver, in a world whose fast solution takes less
+/// than kSmall [ns].
 constexpr std::size_t kFew = 6;
 constexpr Real kSmall = 1e5;
-/// Of the fast solver, per point and sub-step [ns].
+/// Cost of the fast solver per point and sub-step [ns].
 constexpr Real kFastPoint = 60;
-/// Of the fast solver, per joint and sub-step [ns].
+/// Cost of the fast solver per joint and sub-step [ns].
 constexpr Real kFastJoint = 200;
-/// How much dearer than the fast solver the exact one may be in the long run: it is worth that. What it takes
-/// beyond counts as a debt, of which it may have as much as so many steps of the fast solver: it is dear
-/// where an island is new, and cheap from then on.
+/// kWorth: how many times more expensive than the fast solver the exact one may be on average. Cost beyond
+/// this is a debt, of at most kCredit steps of the fast solver. The exact solver is expensive for a new
+/// island, and cheap afterwards.
 constexpr Real kWorth = 2.5, kCredit = 120;
-/// After that it waits until its debt is but this share of what the fast solver has taken.
+/// After exceeding the credit, it pauses until the debt is this share of the fast solver's cost.
 constexpr Real kShare = 0.25, kLongestWait = 2400;
-/// With so little of the credit left, only what is known to be cheap is tried.
+/// With less than this share of the credit left, only islands whose last attempt was cheap are tried.
 constexpr Real kLittle = 0.05;
-/// The most that an attempt may take: in a world where no solver takes long, and, as multiples of the fast
-/// solver, on bodies that move. Those at rest, none of which is faster than kQuiet, may use all of the
-/// credit: they will go on as they are, and what their solution takes then is little [ns], [m/s].
+/// Greatest cost of an attempt: in a small world [ns], and as a multiple of the fast solver's cost if bodies
+/// move. If no body is faster than kQuiet [m/s], an attempt may use the whole credit, because the island will
+/// stay at rest and the following solutions are cheap.
 constexpr Real kMostOfFew = 2e6, kMostOfMoving = 3, kQuiet = 0.1;
 
 bool is_quiet(const Island& island) {

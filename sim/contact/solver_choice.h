@@ -32,7 +32,7 @@ class ExactSolverBudget {
 /// choice is deterministic.
 class SolverChoice {
  public:
-  /// Whether to try the exact solver now.
+  /// Returns whether to try the exact solver in this sub-step.
   bool is_exact_worth(const Island& island, const ExactSolverBudget& patience);
   /// Greatest allowed cost of the attempt [ns]. It keeps the cost of all attempts below a share of the fast
   /// solver's cost.

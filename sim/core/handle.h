@@ -1,7 +1,7 @@
 #pragma once
 /// Opaque generational handles and the slot map that resolves them in O(1) (physics E1). A handle is passed
-/// by value and is null by default; one whose object was removed is detected, because its slot's generation
-/// moved on.
+/// by value and is null by default. The handle of a removed object is detected, because the generation of its
+/// slot has increased.
 
 #include <cassert>
 #include <compare>
@@ -13,7 +13,7 @@
 
 namespace offstage::sim {
 
-/// Names one object of a World. `Tag` only keeps handles of different kinds apart.
+/// Refers to one object of a World. `Tag` makes handles of different kinds of objects different types.
 template <class Tag>
 struct Handle {
   uint32_t index = 0;
@@ -73,7 +73,7 @@ class SlotMap {
 
   std::size_t size() const { return slots_.size() - free_.size(); }
   bool empty() const { return size() == 0; }
-  /// Above every index of a handle.
+  /// Returns a number greater than the index of every handle.
   std::size_t slot_count() const { return slots_.size(); }
 
   /// Calls f(handle, object) for every live object in slot order.

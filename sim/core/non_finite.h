@@ -1,5 +1,5 @@
 #pragma once
-/// The report of an object whose state stopped being finite.
+/// Report of an object whose state is no longer finite.
 
 #include <cstdint>
 #include <string>
@@ -8,11 +8,11 @@
 
 namespace offstage::sim {
 
-/// Something that stopped being finite: what it was just before, and what became of it. Bodies: centre of
-/// mass; the velocity before is not kept.
+/// An object whose state became infinite or NaN, with its last finite state. For a body this is the centre of
+/// mass, without the velocity.
 struct NonFinite {
   std::string object;     ///< name of the body, the particle system or the cloth
-  uint64_t particle = 0;  ///< its id, in a system; the point of a cloth
+  uint64_t particle = 0;  ///< id of the particle in its system, or index of the vertex of a cloth
   Vec3 position_before = Vec3::Zero(), velocity_before = Vec3::Zero();
   Vec3 position = Vec3::Zero(), velocity = Vec3::Zero();
 };

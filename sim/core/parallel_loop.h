@@ -1,5 +1,5 @@
 #pragma once
-/// Loops over things that do not depend on each other.
+/// Parallel loops over independent items.
 
 #include <cstddef>
 #include <cstdint>
@@ -9,8 +9,8 @@
 
 namespace offstage::sim {
 
-/// Calls work(i) for each i below `count`, on several threads if there are enough. Each call may write to
-/// what belongs to its i alone.
+/// Calls work(i) for each i below `count`, on several threads if `count` is large enough. Each call may write
+/// only to data that belongs to its i.
 template <class Work>
 void for_each_index(std::size_t count, Work&& work) {
   constexpr std::size_t kWorthThreads = 256, kBlock = 64;
@@ -23,8 +23,8 @@ void for_each_index(std::size_t count, Work&& work) {
   });
 }
 
-/// The numbers i below `count` for which is_wanted(i), in ascending order. It is called as for_each_index()
-/// would.
+/// Returns the numbers i below `count` for which is_wanted(i) is true, in ascending order. is_wanted() is
+/// called in parallel, as for_each_index() does.
 template <class Predicate>
 std::vector<std::size_t> indices_where(std::size_t count, Predicate&& is_wanted) {
   std::vector<uint8_t> wanted(count);

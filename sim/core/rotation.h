@@ -9,10 +9,10 @@
 
 namespace offstage::sim {
 
-/// The smallest rotation that turns direction `from` into direction `to`; neither may be zero, lengths do not
-/// matter. Opposite directions are a half turn about the axis perpendicular to `from` that is closest to Z
-/// (for a `from` near Z: to X). Eigen's FromTwoVectors does the same with a singular value decomposition,
-/// which takes five seconds to compile in every file that calls it.
+/// Returns the smallest rotation that turns direction `from` into direction `to`. Neither may be zero;
+/// lengths do not matter. For opposite directions it is a half turn about the axis perpendicular to `from`
+/// that is closest to Z (or to X, if `from` is near Z). Eigen's FromTwoVectors does the same with a singular
+/// value decomposition, which takes five seconds to compile in every file that calls it.
 template <typename A, typename B>
 Eigen::Quaternion<typename A::Scalar> rotation_between(const Eigen::MatrixBase<A>& from,
                                                        const Eigen::MatrixBase<B>& to) {

@@ -1,6 +1,6 @@
 #pragma once
-/// Many short parallel loops after each other. A parallel loop of oneTBB for each of them would cost more
-/// than what it does; here the threads are called once and go from stage to stage together.
+/// A sequence of many short parallel loops. A parallel loop of oneTBB for each of them would cost more than
+/// its work. Here the threads are started once and go from stage to stage together.
 
 #include <algorithm>
 #include <atomic>
@@ -15,20 +15,20 @@
 
 namespace offstage::sim {
 
-/// How many threads a loop here and now can get.
+/// Returns how many threads a loop can get at this point of the program.
 inline uint32_t available_threads() {
   const auto allowed = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
   return std::min(static_cast<uint32_t>(allowed),
                   static_cast<uint32_t>(std::max(1, tbb::this_task_arena::max_concurrency())));
 }
 
-/// The blocks of a stage that one thread begins with, and others take from when they have no more of theirs.
-/// One counter serves all stages, as they come in order, and all that threads tell each other of a share is
-/// in one cache line: to hand that from core to core is what a stage costs besides its blocks.
+/// The blocks of a stage that one thread takes first; other threads take the rest when their own blocks are
+/// used up. One counter serves all stages, because they come in order, and the whole shared state is in one
+/// cache line: besides the work of the blocks, passing that line between cores is the only cost of a stage.
 class alignas(64) BlockShare {
  public:
-  /// How many of `count` blocks of a stage were taken before this call, which takes another one; `count` if
-  /// there is none left, or the stage is over.
+  /// Takes one block. Returns how many of the `count` blocks of a stage were taken before, or `count` if none
+  /// is left or the stage is over.
   uint32_t take(uint32_t stage, uint32_t count) {
     uint64_t now = state_.load(std::memory_order_relaxed);
     while (true) {
@@ -40,7 +40,7 @@ class alignas(64) BlockShare {
     }
   }
 
-  /// A block that was taken is done.
+  /// Marks a block that was taken as done.
   void finish() { state_.fetch_add(kDone, std::memory_order_release); }
 
   /// Whether all `count` blocks of a stage are done.
@@ -60,15 +60,15 @@ class alignas(64) BlockShare {
             static_cast<uint32_t>(s % kTaken)};
   }
 
-  std::atomic<uint64_t> state_{0};  // the stage, and how many of its blocks are taken, and done
+  std::atomic<uint64_t> state_{0};  // stage, number of its blocks taken, number done
 };
 
-/// Calls run(stage, block) for each block of each stage that is_needed(stage), a stage's only when all before
-/// it are done. Stage has block_count(). What is needed may depend on the stages before, but not on its own
-/// blocks. In each stage a thread begins with the same part of the blocks, of which its cache may still have
-/// what it was at before, and helps others when that is done; it waits only for blocks that others are at, so
-/// that it ends even if it gets no thread but its own. Up to 16 million stages of a million blocks for each
-/// thread.
+/// Calls run(stage, block) for each block of each stage for which is_needed(stage) is true. A stage begins
+/// when all blocks of the stages before it are done. Stage has block_count(). is_needed() may depend on the
+/// stages before, but not on the stage's own blocks. In each stage a thread begins with the same part of the
+/// blocks, whose data may still be in its cache, and then helps other threads. It waits only for blocks that
+/// are in progress, so the loop ends even if no other thread joins. Limits: 16 million stages, and a million
+/// blocks for each thread.
 template <class Stage, class IsNeeded, class Run>
 void run_stages(std::span<Stage> stages, uint32_t threads, IsNeeded&& is_needed, Run&& run) {
   if (threads == 1) {

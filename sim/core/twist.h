@@ -1,5 +1,5 @@
 #pragma once
-/// Rigid motions, and forces with torques.
+/// Rigid motions and wrenches.
 
 #include "sim/core/types.h"
 
@@ -12,8 +12,8 @@ struct Twist {
   Vec3 at(const Vec3& p) const { return velocity + angular_velocity.cross(p); }
 };
 
-/// A force and a torque about the centre of mass unless said otherwise, or an impulse and an angular impulse;
-/// world axes.
+/// A force and a torque, or an impulse and an angular impulse, in world axes. The torque is about the centre
+/// of mass unless stated otherwise.
 struct Wrench {
   Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
 

@@ -8,10 +8,12 @@
 namespace offstage::sim {
 namespace {
 
-/// Of the step that would just meet the target, what is taken; and the bounds of the change.
+/// The next step is kSafety times the one that would just meet the target; its change is limited to the two
+/// other factors.
 constexpr Real kSafety = 0.8, kLeastChange = 0.1, kGreatestChange = 4;
 
-/// r^(1/n) for r in [0, 5^n], by Newton's method from above, which is monotonous: the same bits everywhere.
+/// r^(1/n) for r in [0, 5^n], by Newton's method from above. It converges monotonically, so the bits are the
+/// same everywhere.
 Real root(Real r, int n) {
   Real y = 5;
   for (int i = 0; i < 60; ++i) {
@@ -31,13 +33,13 @@ Real step_change(Real target, Real error, int error_order) {
     least *= kLeastChange / kSafety;
     greatest_ratio *= kGreatestChange / kSafety;
   }
-  if (!(error < target / least)) return kLeastChange;  // also where the error is not a number
+  if (!(error < target / least)) return kLeastChange;  // also if the error is NaN
   if (error <= target / greatest_ratio) return kGreatestChange;
   return kSafety * root(target / error, error_order);
 }
 
-/// The greatest error in the unit of the coordinates, of (x, p) = work.next at time t, by what the rates'
-/// error comes to in a time `span`.
+/// The greatest error of (x, p) = work.next at time t, in the unit of the coordinates: that of x itself, or
+/// the error that the rates would cause in x within the time `span`.
 Real error_of(const DynamicSystem& system, Real t, Real span, IntegratorWorkspace& work) {
   work.x.resize(work.next_x.size());
   work.p.resize(work.next_p.size());
@@ -60,7 +62,7 @@ void AdaptiveIntegrator::step(const DynamicSystem& system, Real t, Real h, std::
   Real length = work.next_step > 0 ? std::max(work.next_step, shortest) : h;
   begin(system, t, x, p, work);
   for (Real at = 0; at < h;) {
-    // What would leave a crumb for the last step takes it along.
+    // A remainder shorter than the shortest step is included in this step.
     const bool is_last = at + length >= h - shortest / 2;
     const Real now = is_last ? h - at : length;
     attempt(system, t + at, now, x, p, work);
@@ -78,7 +80,7 @@ void AdaptiveIntegrator::step(const DynamicSystem& system, Real t, Real h, std::
     ++work.report.steps;
     work.report.missed += !good;
     at = is_last ? h : at + now;
-    // A step that only filled up the time says nothing against longer ones.
+    // A step that was shortened to end at h is no evidence against longer steps.
     const Real proposed = std::max(shortest, change * now);
     length = now < length ? std::max(length, proposed) : proposed;
   }
@@ -95,14 +97,14 @@ void StepDoubling::attempt(const DynamicSystem& system, Real t, Real h, std::spa
   inner_.step(system, t, h, work.error_x, work.error_p, work);
   inner_.step(system, t, h / 2, work.next_x, work.next_p, work);
   inner_.step(system, t + h / 2, h / 2, work.next_x, work.next_p, work);
-  work.report.steps = steps;  // they are parts of one
+  work.report.steps = steps;  // they are parts of one step
   array(work.error_x) = array(work.next_x) - array(work.error_x);
   array(work.error_p) = array(work.next_p) - array(work.error_p);
 }
 
 void StepDoubling::accept(IntegratorWorkspace& work) const {
-  // The whole step's error is 2^order times that of the two halves, to leading order.
-  const Real share = 1.0 / ((1 << order_) - 1);
+  // To leading order, the error of the whole step is 2^order times that of the two halves.
+  const Real share = 1.0 / ((1 << inner_.order()) - 1);
   array(work.next_x) += share * array(work.error_x);
   array(work.next_p) += share * array(work.error_p);
 }
@@ -111,7 +113,7 @@ namespace {
 
 constexpr int kStages = 7;
 constexpr Real kNodes[kStages] = {0, 1.0 / 5, 3.0 / 10, 4.0 / 5, 8.0 / 9, 1, 1};
-// The last row is also the weights of the fifth order.
+// The last row contains the weights of the fifth order, too.
 constexpr Real kCoefficients[kStages][kStages - 1] = {
     {},
     {1.0 / 5},
@@ -120,7 +122,7 @@ constexpr Real kCoefficients[kStages][kStages - 1] = {
     {19372.0 / 6561, -25360.0 / 2187, 64448.0 / 6561, -212.0 / 729},
     {9017.0 / 3168, -355.0 / 33, 46732.0 / 5247, 49.0 / 176, -5103.0 / 18656},
     {35.0 / 384, 0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84}};
-// Fifth order less fourth.
+// Weights of the fifth order minus those of the fourth.
 constexpr Real kErrorWeights[kStages] = {71.0 / 57600,      0,          -71.0 / 16695, 71.0 / 1920,
                                          -17253.0 / 339200, 22.0 / 525, -1.0 / 40};
 

@@ -1,5 +1,5 @@
 #pragma once
-/// A body of the world, as the files that implement it see it.
+/// A body of the world with its internal state.
 
 #include <optional>
 
@@ -15,58 +15,57 @@
 
 namespace offstage::sim {
 
-/// Its `solid` points into it and to its mesh, so it stays where it was made.
+/// `solid` has pointers into the body and to its mesh, so a body is never moved or copied.
 struct Body {
-  // What the contact pairs ask for comes first, so that it lies together.
+  // The members that contact pairs read come first, close together in memory.
  private:
   std::optional<CollisionShape> collision_shape_;
 
  public:
   BodyHandle handle;
-  MotionType type = MotionType::dynamic;  // as defined, until it left the world's bounds
+  MotionType type = MotionType::dynamic;  // as defined; static after it left the world's bounds
   bool asleep = false;
-  uint32_t surface = 0;  // number of its material, for rules
-  uint32_t island = 0;   // awake: number among the islands of the sub-step; asleep: of the sleeping ones
-  uint32_t row = 0;      // among the bodies of its island
-  uint32_t rank = 0;     // its place in the order of the world's bodies; see World::Impl::rank_bodies()
-  Real extent = 0;       // reach() of the solid; of a plane infinite
-  Real impact_speed_bound = 0;  // greatest speed of a body near it that may hit it in the sub-step [m/s]
-  Pose pose;                    // now
+  uint32_t surface = 0;  // number of its material, for contact rules
+  uint32_t island = 0;   // awake: number of its island in the sub-step; asleep: number of its sleeping island
+  uint32_t row = 0;      // index among the bodies of its island
+  uint32_t rank = 0;     // position in the order of the world's bodies; see World::Impl::rank_bodies()
+  Real extent = 0;       // reach() of the solid; infinite for a plane
+  Real impact_speed_bound = 0;  // greatest speed of a nearby body that may hit it in the sub-step [m/s]
+  Pose pose;                    // at the current time
 
-  // The interval in which it moves at the moment: a whole sub-step, or what an impact has left of it.
-  Real from = 0;  // since the sub-step's start [s]
+  // The current interval of motion: a whole sub-step, or the rest of it after an impact.
+  Real from = 0;  // start of the interval, since the sub-step's start [s]
   Pose start_pose;
-  Twist start_twist;  // dynamic bodies: of the centre of mass then
+  Twist start_twist;  // dynamic bodies: twist of the centre of mass at the start of the interval
   Twist drive;  // kinematic bodies: velocity of the pose's origin and angular velocity, at the interval's end
   Real turning = 0;  // see turning_speed()
-  RigidState start;  // dynamic bodies: its state then
-  RigidBody rigid;   // dynamic bodies only: now
+  RigidState start;  // dynamic bodies: state at the start of the interval
+  RigidBody rigid;   // dynamic bodies only: state at the current time
 
   Pose before_substep, before_step;
-  Aabb swept;             // around its ways in the sub-step, as the broad phase has it
-  Real quiet_time = 0;    // for how long it has hardly moved [s]
+  Aabb swept;             // box around its motion in the sub-step, as given to the broad phase
+  Real quiet_time = 0;    // how long it has been almost at rest [s]
   bool on_cloth = false;  // touched by cloth in the last sub-step
-  Wrench rest_push;       // asleep: what forces that change did to it when it fell asleep, about its centre
-  std::vector<SpringHandle> moving_springs;  // asleep: those whose other end can move by itself
-  std::optional<Wrench> rest_pins;           // asleep: what cloth on its pins did to it then
+  Wrench rest_push;  // asleep: wrench of the variable forces when it fell asleep, about its centre of mass
+  std::vector<SpringHandle> moving_springs;  // asleep: springs whose other end can move independently
+  std::optional<Wrench> rest_pins;           // asleep: wrench by pinned cloth when it fell asleep
   BodyDef def;
   Solid solid;
 
-  /// Asks for the memory of what it is at the interval's start and now.
+  /// Prefetches the members that describe the interval.
   void prefetch_interval() const { prefetch(&start_pose, &before_substep); }
 
   bool is_dynamic() const { return type == MotionType::dynamic; }
   bool is_kinematic() const { return type == MotionType::kinematic; }
   bool is_awake() const { return is_dynamic() && !asleep; }
-  /// The speed at which its turning moves its surface in the interval; none of a sphere, which its centre
-  /// alone moves [m/s].
+  /// Greatest speed of its surface in the interval due to rotation [m/s]; 0 for a sphere about its centre.
   Real turning_speed() const { return is_awake() || is_kinematic() ? turning : 0; }
   bool can_move() const { return is_awake() || (is_kinematic() && def.track.moves()); }
-  /// Made when another body first comes near, because a mesh may have to be decomposed for it.
+  /// Created on first use, because a mesh may have to be decomposed for it.
   const CollisionShape& collision_shape();
-  /// Pose and velocities of the body's origin at a time not far from now.
+  /// Pose and velocities of the body's origin at a time near `now`.
   Motion motion(Real now, Real time) const;
-  /// An interval begins now.
+  /// Begins an interval at this time.
   void begin_interval(Real time) {
     from = time;
     start = rigid.state();
@@ -74,33 +73,33 @@ struct Body {
     start_pose = pose;
     set_turning(start_twist.angular_velocity, extent + rigid.centre.norm());
   }
-  /// Where the interval brings it to, kinematic.
+  /// Moves a kinematic body to the end of the interval.
   void drive_to(const Motion& motion) {
     pose = motion.pose;
     drive = {motion.velocity, motion.angular_velocity};
     set_turning(drive.angular_velocity, extent);
   }
-  /// A collision changes the velocities of the centre of mass at the interval's start.
+  /// Sets the velocities of the centre of mass at the interval's start, after a collision.
   void set_start_velocity(const Vec3& v, const Vec3& w) {
     start.momentum = rigid.mass * v;
     start.angular_momentum = rigid.spin_momentum(start.orientation, w);
     start_twist = {v, w};
     set_turning(w, extent + rigid.centre.norm());
   }
-  /// The body as it was at the interval's start.
+  /// Returns the body in its state at the interval's start.
   RigidBody at_start() const {
     RigidBody body = rigid;
     body.set_state(start);
     return body;
   }
-  /// From the interval's start to now.
+  /// Path from the interval's start to the current pose.
   PosePath path() const { return {start_pose, pose}; }
-  /// Where it is at a time of a sub-step of length h, not before its interval's start.
+  /// Pose at a time of a sub-step of length h, not before the interval's start.
   Pose placed_at(Real time, Real h) const {
     if (time <= from || !can_move()) return start_pose;
     return path().at((time - from) / (h - from));
   }
-  /// The velocity at the interval's start, of the material point that is at a place of the world.
+  /// Velocity at the interval's start of the material point at this place of the world.
   Vec3 start_velocity(const Vec3& place) const {
     if (is_awake()) return start_twist.at(place - start.position);
     return is_kinematic() ? drive.at(place - pose.position) : Vec3(Vec3::Zero());
@@ -114,8 +113,8 @@ struct Body {
   }
 };
 
-/// Calls work(i) for each body i of many, as for_each_index() does, with the memory of its interval asked for
-/// a little before: bodies lie far from each other.
+/// Calls work(i) for each body i, in parallel as for_each_index() does. The memory of each body's interval is
+/// prefetched, because bodies are far apart in memory.
 template <class Work>
 void for_each_interval(std::span<Body* const> bodies, Work&& work) {
   constexpr std::size_t kAhead = 3;

@@ -1,5 +1,5 @@
 #pragma once
-/// The definition of a body: everything about it that is given before it moves.
+/// The definition of a body: the properties with which it is created.
 
 #include <string>
 
@@ -16,8 +16,8 @@ using BodyHandle = Handle<BodyTag>;
 using SpringHandle = Handle<SpringTag>;
 
 enum class MotionType {
-  static_body,  ///< never moves, costs nothing per step
-  kinematic,    ///< follows its keyframes, pushes others with infinite mass
+  static_body,  ///< never moves, costs no time in a step
+  kinematic,    ///< follows its keyframes; pushes other bodies as if its mass were infinite
   dynamic,      ///< moved by forces
 };
 
@@ -25,24 +25,26 @@ struct BodyDef {
   std::string name;
   Shape shape = Sphere{};
   MotionType motion = MotionType::dynamic;
-  Pose pose;                     ///< at time 0; kinematic bodies with keys take the keys' pose instead
+  Pose pose;                     ///< at time 0; the pose of kinematic bodies with keys is that of the keys
   Vec3 velocity = Vec3::Zero();  ///< of the centre of mass [m/s]
   Vec3 angular_velocity = Vec3::Zero();  ///< world axes [rad/s]
   Real density = 1000;                   ///< [kg/m^3], > 0; ignored if mass > 0
   Real mass = 0;                         ///< [kg]; 0: from density and volume
   Real linear_drag = 0;                  ///< k_v of F = -k_v v [kg/s]
   Real angular_drag = 0;                 ///< k_w of tau = -k_w w [kg m^2/s]
-  std::string material;                  ///< of the surface: what ContactRule names; may be empty
-  Real restitution = 0.5;                ///< of two the larger is used; in [0, 1]
-  Real friction = 0.5;                   ///< Coulomb's coefficient of what slides; of two the geometric mean
-  Real static_friction = -1;             ///< of what does not; negative: as `friction`
-  /// Of sliding across friction_axis; negative: as along it. What it is of `friction`, its square root is in
-  /// every pair, whatever a ContactRule says. Not beside a friction of 0.
+  std::string material;                  ///< name of the surface for ContactRule; may be empty
+  Real restitution = 0.5;                ///< in [0, 1]; a pair uses the larger value of both bodies
+  Real friction = 0.5;        ///< dynamic coefficient of Coulomb friction; a pair uses the geometric mean
+  Real static_friction = -1;  ///< static coefficient; negative: the same as `friction`
+  /// Dynamic coefficient across friction_axis; negative: the same as along it. In every pair, friction across
+  /// the axis is friction along it times the square root of cross_friction / friction, even if a ContactRule
+  /// sets the friction. Requires `friction` > 0.
   Real cross_friction = -1;
-  Vec3 friction_axis = Vec3::Zero();  ///< the surface's grain, in the body's frame; zero: none. Of two bodies
-                                      ///< with a grain that of the one that was added first counts
-  Vec3 surface_velocity =
-      Vec3::Zero();      ///< of the surface against the body, as of a conveyor [m/s], its frame
+  /// Friction axis, in the body's frame; zero: isotropic. If both bodies of a pair have one, that of the body
+  /// that was added first is used.
+  Vec3 friction_axis = Vec3::Zero();
+  /// Velocity of the surface relative to the body, as of a conveyor, in its frame [m/s].
+  Vec3 surface_velocity = Vec3::Zero();
   bool collides = true;  ///< takes part in collisions with bodies and particles
   KeyframeTrack track;   ///< for kinematic bodies
 };

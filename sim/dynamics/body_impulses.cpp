@@ -13,7 +13,7 @@ void BodyImpulses::begin(std::span<const Link> links) {
 Mat3 BodyImpulses::mobility(const Obstacle& o, const Vec3& arm, const Vec3& push) const {
   const Link at = link(o.body);
   if (!at.bodies || !o.is_dynamic()) return o.mobility(arm);
-  // The point's velocity is v + w x arm = E (v, w), and an impulse P there is E^T P.
+  // The point's velocity is v + w x arm = E (v, w), and an impulse P at the point acts as E^T P.
   Eigen::Matrix<Real, 3, 6> E;
   E << Mat3::Identity(), -cross_matrix(arm);
   return E * at.bodies->link_mobility(at.index, E.transpose() * push) * E.transpose();

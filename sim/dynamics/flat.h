@@ -1,5 +1,5 @@
 #pragma once
-/// Vectors as the flat runs of numbers that integrators work on, and back.
+/// Conversion between vectors and the flat arrays of numbers that integrators use.
 
 #include <span>
 
@@ -7,13 +7,13 @@
 
 namespace offstage::sim {
 
-/// The coordinates of consecutive points.
+/// The coordinates of consecutive points as a flat array.
 inline std::span<Real> flat(std::span<Vec3> v) {
   static_assert(sizeof(Vec3) == 3 * sizeof(Real));
   return {v.empty() ? nullptr : v.front().data(), 3 * v.size()};
 }
 
-/// Three numbers of a run as a vector.
+/// Three numbers of a flat array as a vector.
 inline Eigen::Map<Vec3> vec3(std::span<Real> s, std::size_t at) {
   return Eigen::Map<Vec3>(&s[at]);
 }

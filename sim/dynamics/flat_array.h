@@ -1,5 +1,5 @@
 #pragma once
-/// Flat runs of numbers as Eigen arrays, for the integrators.
+/// Flat arrays of numbers as Eigen arrays, for the integrators.
 
 #include <algorithm>
 #include <cmath>
@@ -20,7 +20,7 @@ inline Eigen::Map<Eigen::ArrayXd> array(std::vector<Real>& s) {
   return array(std::span(s));
 }
 
-/// The greatest absolute value; NaN if any is.
+/// The greatest absolute value; NaN if any element is NaN.
 inline Real greatest(std::span<const Real> s) {
   Real m = 0;
   for (Real v : s) m = std::abs(v) <= m ? m : std::abs(v);

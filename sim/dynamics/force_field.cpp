@@ -13,7 +13,7 @@ Vec3 direction(const Vec3& v) {
   return length > 0 ? Vec3(v / length) : Vec3(Vec3::Zero());
 }
 
-/// A body at a stage, and what of it forces depend on beside its motion.
+/// A body at a stage of the integration, with the properties that forces need besides its motion.
 struct Target {
   const RigidMotion& motion;
   const Vec3& centre;
@@ -198,7 +198,7 @@ Wrench impulse(const Explosion& explosion, const Solid& solid, const Pose& pose,
   const Real size =
       explosion.impulse * strength_at_depth(1 - distance / explosion.radius, explosion.drop_rate);
   if (!(size != 0)) return {};
-  // Inside of the body no side is nearer in a way that matters: it is thrown off as a whole.
+  // Inside of the body the nearest side is irrelevant: the body is pushed as a whole, without rotation.
   if (surface.distance <= 0) return {size * direction(centre - explosion.point), Vec3::Zero()};
   // The gradient of the distance points from the body to the source.
   const Vec3 push = -size * pose.vector_to_world(surface.normal);

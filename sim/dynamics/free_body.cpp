@@ -12,17 +12,17 @@
 namespace offstage::sim {
 namespace {
 
-/// Pieces in which the free rotation of a sub-step is integrated, by the fastest spin that its angular
-/// momentum allows [rad], and the most of them: a thin body that turns across its length may come to spin
-/// about it.
+/// Greatest rotation of a body in one piece of a sub-step, at the fastest spin that its angular momentum
+/// allows [rad], and the greatest number of pieces. (A thin body that turns about a short axis may later spin
+/// about its long axis.)
 constexpr Real kTurn = 0.5, kMostPieces = 8;
-/// Beyond these, pieces by the angle of a kick of SplitRotation and by its nutation [rad], and the most of
-/// them.
+/// With more pieces SplitRotation is used. Its pieces are limited by the angle of a kick and by that of the
+/// nutation [rad], and their number by the last constant.
 constexpr Real kKick = 0.05, kNutation = 0.2, kMostKicks = 1000;
-/// Of the energy of a free rotation, which does not change: what may be off.
+/// Accepted relative error of the energy of a free rotation, which is constant.
 constexpr Real kRotationEnergy = 1e-3;
 
-/// The four numbers of the orientation in a body's coordinates.
+/// The quaternion in a body's coordinates.
 Eigen::Map<Eigen::Vector4d> turn_of(std::span<Real> x) {
   return Eigen::Map<Eigen::Vector4d>(&x[3]);
 }
@@ -35,7 +35,7 @@ RigidMotion motion_of(const RigidBody& body, std::span<const Real> x, std::span<
   return {vec3(x, 0), q, vec3(p, 0) / body.mass, body.angular_velocity(q, vec3(p, 3))};
 }
 
-/// Whether all axes have the same moment of inertia, up to the rounding of a mesh's.
+/// Whether all axes have the same moment of inertia, within the rounding errors of a mesh's inertia.
 bool is_isotropic(const Mat3& inertia) {
   const Real tiny = 1e-13 * inertia(0, 0);
   return std::abs(inertia(0, 1)) <= tiny && std::abs(inertia(0, 2)) <= tiny &&
@@ -63,10 +63,10 @@ void integrate(RigidBody& body, const BodyForces& forces, const Integrator& inte
 
 namespace {
 
-/// The free rotation of a body that turns by many radians in a sub-step, or could. Its kinetic energy is that
-/// of a symmetric top, whose motion has a closed form, and a rest of one axis that is also exact by itself;
-/// of both in turns (Touma and Wisdom, "Lie-Poisson integrators for rigid body dynamics in the solar system",
-/// 1994). The angular momentum is kept exactly, and the energy does not drift.
+/// The free rotation of a body that may turn by many radians in a sub-step. Its kinetic energy is split in
+/// that of a symmetric top, whose motion has a closed form, and a term of one axis, whose motion is also
+/// exact; the two are applied alternately (Touma and Wisdom, "Lie-Poisson integrators for rigid body dynamics
+/// in the solar system", 1994). The angular momentum is conserved exactly, and the energy does not drift.
 class SplitRotation {
  public:
   explicit SplitRotation(const RigidBody& body) : H_(body.angular_momentum) {
@@ -75,13 +75,13 @@ class SplitRotation {
     if (axes.determinant() < 0) axes.col(0) = -axes.col(0);
     body_from_principal_ = Quat(axes).normalized();
     inverse_ = solver.eigenvalues().cwiseInverse();
-    // The two axes that are most alike make the symmetric top.
+    // The two axes with the most similar moments make the symmetric top.
     const bool is_flat = inverse_[0] - inverse_[1] < inverse_[1] - inverse_[2];
     own_ = is_flat ? 2 : 0;
     kicked_ = is_flat ? 0 : 2;
   }
 
-  /// Over a time h.
+  /// Advances the body over a time h.
   void advance(RigidBody& body, Real h) const {
     const Real momentum = H_.norm(), kick = std::abs(inverse_[kicked_] - inverse_[1]) * momentum,
                nutation = std::sqrt(kick * momentum * inverse_[0]);
@@ -96,14 +96,14 @@ class SplitRotation {
       turn(q, kicked_, h / pieces / 2);
     }
     q = (q * body_from_principal_.conjugate()).normalized();
-    // Where even this cannot follow, a turn about the angular momentum keeps the energy.
+    // If even this is too inaccurate, a rotation about the angular momentum conserves the energy.
     if (!(std::abs(energy(q) - before) <= kRotationEnergy * before))
       q = (rotation(inverse_[1] * H_, h) * body.orientation).normalized();
     body.orientation = q;
   }
 
  private:
-  /// What an axis has beyond the middle one.
+  /// Rotation by the difference of an axis from the middle one.
   void turn(Quat& q, int axis, Real h) const {
     const Real along = (q.conjugate() * H_)[axis];
     q = q * rotation(along * (inverse_[axis] - inverse_[1]) * Vec3::Unit(axis), h);
@@ -210,10 +210,10 @@ void fly(RigidBody& body, const BodyForces& forces, const Integrator& integrator
   if (!body.angular_momentum.isZero(0)) {
     if (is_isotropic(body.inertia)) {
       const Quat turned = rotation(body.angular_momentum / body.inertia(0, 0), h) * body.orientation;
-      // The length is 1 up to rounding: one Newton step for 1 / sqrt(length^2) is enough.
+      // The length is 1 within rounding, so one Newton step for 1 / sqrt(length^2) is enough.
       body.orientation.coeffs() = (1.5 - 0.5 * turned.squaredNorm()) * turned.coeffs();
     } else {
-      // No integrator of a fixed step follows what turns by much more than this in it.
+      // Integrators with a fixed step are inaccurate for much larger rotations in a step.
       const Real pieces = std::max(std::ceil(greatest_spin(body) * h / kTurn), 1.0);
       if (!(pieces <= kMostPieces)) SplitRotation(body).advance(body, h);
       for (Real i = 0; i < pieces && pieces <= kMostPieces; ++i)

@@ -1,6 +1,6 @@
 #pragma once
-/// Bodies as dynamic systems (physics R1, R2), and the flight of one that nothing else holds: exact where
-/// there is a closed form, else by an integrator on 13 numbers.
+/// Bodies as dynamic systems (physics R1, R2), and the motion of a body without springs and joints: exact
+/// where there is a closed form, otherwise by an integrator on 13 numbers.
 
 #include <span>
 
@@ -10,17 +10,16 @@
 
 namespace offstage::sim {
 
-/// Of each body in a flat state: x = [position 3, quaternion x y z w], p = [L 3, H 3].
+/// Size of a body in a flat state: x = [position 3, quaternion x y z w], p = [L 3, H 3].
 constexpr std::size_t kBodyX = 7, kBodyP = 6;
 
-/// What acts on every body by itself.
+/// The forces that act on each body independently of others.
 struct BodyForces {
   Vec3 gravity;
   std::span<const ActiveForce> forces;
 };
 
-/// The state of a body as an integrator sees it, at one of its stages. The quaternion there need not have
-/// unit length.
+/// The state of a body at a stage of an integrator. Its quaternion need not have unit length.
 struct RigidStage {
   RigidStage(const RigidBody& rigid, std::span<const Real> x, std::span<const Real> p);
 
@@ -28,7 +27,7 @@ struct RigidStage {
   void force(const BodyForces& forces, Real t, std::span<Real> dp) const;
 
   const RigidBody& body;
-  Eigen::Vector4d turn;  ///< the quaternion as it is
+  Eigen::Vector4d turn;  ///< the quaternion, not normalised
   RigidMotion motion;
   Vec3 angular_momentum;
 };
@@ -36,7 +35,7 @@ struct RigidStage {
 void load(const RigidBody& body, std::span<Real> x, std::span<Real> p);
 void store(std::span<const Real> x, std::span<const Real> p, RigidBody& body);
 
-/// A body alone.
+/// The dynamic system of a single body.
 class FreeBody final : public DynamicSystem {
  public:
   FreeBody(const RigidBody& body, const BodyForces& forces) : body_(body), forces_(forces) {}
@@ -51,16 +50,16 @@ class FreeBody final : public DynamicSystem {
   const BodyForces& forces_;
 };
 
-/// A bound on the spin that a body can come to have while it turns freely, by its angular momentum [rad/s].
+/// Upper bound of the spin that a body can reach while it rotates freely, by its angular momentum [rad/s].
 Real greatest_spin(const RigidBody& body);
 
 /// exp(h w / 2): the rotation by a constant angular velocity w over a time h, by a series that gives the same
 /// bits everywhere.
 Quat rotation(const Vec3& w, Real h);
 
-/// Advances a body that nothing but `forces` acts on from t to t + h. Without drag and fields it falls along
-/// its parabola exactly, whatever the integrator, and one with the same inertia about all axes, or without
-/// spin, turns exactly too.
+/// Advances a body on which only `forces` act from t to t + h. Without drag and fields the centre of mass
+/// follows its parabola exactly with every integrator. A body without spin, or with the same inertia about
+/// all axes, also rotates exactly.
 void fly(RigidBody& body, const BodyForces& forces, const Integrator& integrator, Real t, Real h,
          IntegratorWorkspace& work);
 

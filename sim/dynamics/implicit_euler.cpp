@@ -10,8 +10,8 @@ namespace offstage::sim {
 namespace {
 
 constexpr int kIterations = 16;
-/// A correction this small relative to the coordinates, or to a millimetre if they are smaller, is the last:
-/// the next would be its square.
+/// Newton's method ends after a correction below kConverged relative to the coordinates, or to a millimetre
+/// if they are smaller, because the next one would be about its square.
 constexpr Real kConverged = 1e-9, kLeastScale = 1e-3;
 constexpr Real kShortest = 1.0 / 64;
 
@@ -68,7 +68,7 @@ class ImplicitStep {
     return factors_.info() == Eigen::Success;
   }
 
-  /// Whether a correction that led to `y` moved nothing any more, neither by the coordinates nor by the
+  /// Whether a correction that led to `y` is negligible, both in the coordinates and by its effect on the
   /// rates.
   bool is_small(const Eigen::VectorXd& correction, Real t, Real h, const Eigen::VectorXd& y) {
     system_.velocity(t + h, head(y), tail(y), velocity_);
@@ -104,7 +104,7 @@ void ImplicitEuler::step(const DynamicSystem& system, Real t, Real h, std::span<
     end = start;
     const bool good = implicit.solve(t + at, length, start, end);
     if (!good && length > h * kShortest) {
-      length /= 2;  // halves of h end exactly at h
+      length /= 2;  // after halving, the steps still end exactly at h
       ++work.report.rejected;
       continue;
     }

@@ -17,6 +17,7 @@ void count(IntegratorWorkspace& work, uint64_t evaluations) {
 
 class ExplicitEuler final : public Integrator {
  public:
+  int order() const override { return 1; }
   void step(const DynamicSystem& system, Real t, Real h, std::span<Real> x, std::span<Real> p,
             IntegratorWorkspace& work) const override {
     work.dx.resize(x.size());
@@ -31,6 +32,7 @@ class ExplicitEuler final : public Integrator {
 
 class SymplecticEuler final : public Integrator {
  public:
+  int order() const override { return 1; }
   void step(const DynamicSystem& system, Real t, Real h, std::span<Real> x, std::span<Real> p,
             IntegratorWorkspace& work) const override {
     work.dx.resize(x.size());
@@ -45,6 +47,7 @@ class SymplecticEuler final : public Integrator {
 
 class Leapfrog final : public Integrator {
  public:
+  int order() const override { return 2; }
   void step(const DynamicSystem& system, Real t, Real h, std::span<Real> x, std::span<Real> p,
             IntegratorWorkspace& work) const override {
     for (auto* v : {&work.x, &work.dx}) v->resize(x.size());
@@ -74,6 +77,7 @@ class Leapfrog final : public Integrator {
 
 class Midpoint final : public Integrator {
  public:
+  int order() const override { return 2; }
   void step(const DynamicSystem& system, Real t, Real h, std::span<Real> x, std::span<Real> p,
             IntegratorWorkspace& work) const override {
     work.x.resize(x.size());
@@ -94,6 +98,7 @@ class Midpoint final : public Integrator {
 
 class RungeKutta4 final : public Integrator {
  public:
+  int order() const override { return 4; }
   void step(const DynamicSystem& system, Real t, Real h, std::span<Real> x, std::span<Real> p,
             IntegratorWorkspace& work) const override {
     for (auto* v : {&work.x, &work.dx, &work.sum_x}) v->resize(x.size());
@@ -103,7 +108,7 @@ class RungeKutta4 final : public Integrator {
     array(work.sum_x).setZero();
     array(work.sum_p).setZero();
 
-    // k1..k4: where in the step each slope is taken, and its weight in the mean.
+    // k1..k4: time of each slope within the step, and its weight in the mean.
     constexpr Real kReach[] = {0, 0.5, 0.5, 1}, kWeight[] = {1.0 / 6, 1.0 / 3, 1.0 / 3, 1.0 / 6};
     for (int k = 0; k < 4; ++k) {
       if (k > 0) {
@@ -158,8 +163,7 @@ const Integrator& integrator(IntegratorKind kind) {
   static const Midpoint midpoint;
   static const RungeKutta4 rk4;
   static const ImplicitEuler implicit_euler;
-  static const StepDoubling adaptive_euler(explicit_euler, 1), adaptive_midpoint(midpoint, 2),
-      adaptive_rk4(rk4, 4);
+  static const StepDoubling adaptive_euler(explicit_euler), adaptive_midpoint(midpoint), adaptive_rk4(rk4);
   static const DormandPrince dormand_prince;
   switch (kind) {
     case IntegratorKind::explicit_euler:

@@ -1,6 +1,7 @@
 #pragma once
-/// Integrators behind one seam (physics N1-N5). A system is described by two flat vectors: coordinates x and
-/// rates p (velocities or momenta), with dx/dt = velocity(t, x, p) and dp/dt = force(t, x, p).
+/// Common interface of the integrators (physics N1-N5). A system is described by two flat vectors:
+/// coordinates x and rates p (velocities or momenta), with dx/dt = velocity(t, x, p) and dp/dt = force(t, x,
+/// p).
 
 #include <cstdint>
 #include <memory>
@@ -13,38 +14,40 @@
 
 namespace offstage::sim {
 
-/// Entries of a sparse matrix; those at the same place add up.
+/// Entries of a sparse matrix; entries with the same row and column are added.
 using SparseEntries = std::vector<Eigen::Triplet<Real>>;
 
 /// The right-hand side of the equations of motion. Implementations must not keep state between calls.
 class DynamicSystem {
  public:
   virtual ~DynamicSystem() = default;
-  /// dx = dx/dt at time t; sizes: x and dx equal, p as the state's.
+  /// Computes dx = dx/dt at time t. x and dx have the same size; p has the size of the state's rates.
   virtual void velocity(Real t, std::span<const Real> x, std::span<const Real> p,
                         std::span<Real> dx) const = 0;
-  /// dp = dp/dt at time t.
+  /// Computes dp = dp/dt at time t.
   virtual void force(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const = 0;
-  /// The same, and in `damping` for each p the rate at which drag takes it away [1/s]: minus the derivative
-  /// of dp by p, where that couples no two of them. False, and nothing is written: forces depend on p in
-  /// other ways, or this is not known. Here false.
+  /// The same, and for each p the rate at which drag reduces it in `damping` [1/s]: minus the derivative of
+  /// dp by p, if it is diagonal. Returns false and writes nothing if forces depend on p in other ways, or if
+  /// this is unknown. The default returns false.
   virtual bool force_and_damping(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp,
                                  std::span<Real> damping) const;
-  /// Appends the derivatives of (dx, dp) by (x, p), for implicit integration: row and column i are x_i, or
-  /// p_(i - |x|). The places must not depend on the state. Small parts may be left out: the result is the
-  /// same, found in more iterations. Here by differences, which suits small systems only.
+  /// Appends the derivatives of (dx, dp) by (x, p), for implicit integration. Row and column i stand for x_i,
+  /// or for p_(i - |x|). The sparsity pattern must not depend on the state. Small entries may be omitted: the
+  /// result is the same, but takes more iterations. The default uses finite differences, which suits only
+  /// small systems.
   virtual void jacobian(Real t, std::span<const Real> x, std::span<const Real> p,
                         SparseEntries& entries) const;
 };
 
-/// What integration took.
+/// Statistics of an integration.
 struct IntegratorReport {
-  uint64_t steps = 0;        ///< accepted; a fixed-step integrator makes one per call
-  uint64_t rejected = 0;     ///< undone and tried again with a shorter step
-  uint64_t evaluations = 0;  ///< of the forces
+  uint64_t steps = 0;        ///< accepted steps; a fixed-step integrator makes one per call
+  uint64_t rejected = 0;     ///< steps undone and repeated with a shorter length
+  uint64_t evaluations = 0;  ///< evaluations of the forces
   uint64_t iterations = 0;   ///< Newton steps of an implicit integrator
-  uint64_t missed = 0;       ///< steps of the shortest length, accepted though the error was above the target
-                             ///< or the Newton iteration had not converged
+  /// Steps of the shortest length that were accepted although the error was above the target or the Newton
+  /// iteration had not converged.
+  uint64_t missed = 0;
 
   void add(const IntegratorReport& r) {
     steps += r.steps;
@@ -55,14 +58,14 @@ struct IntegratorReport {
   }
 };
 
-/// What belongs to the caller of an integrator, and buffers; one per thread avoids allocation.
+/// State that belongs to the caller of an integrator, and buffers. One per thread avoids allocation.
 struct IntegratorWorkspace {
-  /// Of the adaptive integrators: the greatest error of a coordinate by a step, in that coordinate's unit.
+  /// Adaptive integrators: greatest error of a coordinate in a step, in the unit of that coordinate.
   Real tolerance = 1e-6;
-  /// Of the adaptive integrators: the length that the next step may have [s]; 0: not known. Whoever
-  /// integrates several systems with one workspace keeps it for each.
+  /// Adaptive integrators: length of the next step [s]; 0: unknown. A caller that integrates several systems
+  /// with one workspace stores it for each of them.
   Real next_step = 0;
-  IntegratorReport report;  ///< summed over all calls
+  IntegratorReport report;  ///< sums over all calls
 
   std::vector<Real> x, p, dx, dp, damping, sum_x, sum_p;
   std::vector<Real> next_x, next_p, error_x, error_p;
@@ -71,24 +74,25 @@ struct IntegratorWorkspace {
 
 enum class IntegratorKind {
   explicit_euler,    ///< N1, order 1
-  symplectic_euler,  ///< order 1, keeps energy bounded; one force evaluation
-  /// Order 2: forces act at the middle of the step (drift, kick, drift). Symplectic without drag; drag damps
-  /// as 1 / (1 + z + z^2 / 2), z = h k / m, stable for any step. One evaluation of the forces where they
-  /// depend on the rates by drag alone (DynamicSystem::force_and_damping), else two. The default for
-  /// particles.
+  symplectic_euler,  ///< order 1, energy stays bounded; one evaluation of the forces
+  /// Order 2: forces act at the middle of the step (drift, kick, drift). Symplectic without drag. Drag damps
+  /// by the factor 1 / (1 + z + z^2 / 2), z = h k / m, which is stable for any step. One evaluation of the
+  /// forces if they depend on the rates only by drag (DynamicSystem::force_and_damping), otherwise two. The
+  /// default for particles.
   leapfrog,
-  midpoint,           ///< N3, RK2, order 2
-  rk4,                ///< N4, order 4
-  implicit_euler,     ///< N2, backward, order 1: stable for any stiffness, and damps what it cannot follow
+  midpoint,  ///< N3, RK2, order 2
+  rk4,       ///< N4, order 4
+  /// N2, backward, order 1: stable for any stiffness; damps motions that are faster than the step.
+  implicit_euler,
   adaptive_euler,     ///< N5, step doubling
   adaptive_midpoint,  ///< N5, step doubling
   adaptive_rk4,       ///< N5, step doubling
   dormand_prince,     ///< N5, embedded pair of orders 5 and 4
 };
 
-/// What an acceleration a at the start of a step of length h comes to where drag takes the velocity away at
-/// the rate k: v + end a at its end, v + mean a in its mean. To second order in h k, without overshoot for
-/// any.
+/// Effect of an acceleration a that begins at the start of a step of length h, with drag of the rate k: the
+/// velocity is v + end a at the end, and v + mean a on average. Second order in h k; no overshoot for any h
+/// k.
 struct DampedKick {
   DampedKick(Real h, Real k) {
     const Real z = h * k, share = h / (1 + z + z * z / 2);
@@ -98,15 +102,17 @@ struct DampedKick {
   Real end, mean;
 };
 
-/// Advances (x, p) from t to t + h in place. The adaptive ones step inside by their own clock.
+/// Advances (x, p) from t to t + h in place. Adaptive integrators divide this time into steps of their own.
 class Integrator {
  public:
   virtual ~Integrator() = default;
   virtual void step(const DynamicSystem& system, Real t, Real h, std::span<Real> x, std::span<Real> p,
                     IntegratorWorkspace& work) const = 0;
+  /// The error of a motion falls as the step to this power.
+  virtual int order() const = 0;
 };
 
-/// The integrator of a kind; a shared immutable object.
+/// Returns the integrator of a kind, a shared immutable object.
 const Integrator& integrator(IntegratorKind kind);
 
 }  // namespace offstage::sim

@@ -1,5 +1,5 @@
 #pragma once
-/// Interpolation between keys over time, the same for poses, cameras, hands and motors.
+/// Interpolation between keys over time, for poses, cameras, hands and motors.
 
 #include <algorithm>
 #include <cmath>
@@ -10,16 +10,17 @@
 
 namespace offstage::sim {
 
-/// How a value goes from one key to the next.
+/// Shape of the curve between two keys.
 enum class Interpolation : uint8_t {
-  monotone,  ///< cubic Hermite with limited tangents: each component stays between the values of its two
-             ///< keys, and holds where both are equal
-  smooth,    ///< cubic Hermite with Catmull-Rom tangents: rounder, but may swing beyond the keys
-  linear,    ///< constant velocity
-  step,      ///< holds the first key's value, and jumps at the second key
+  /// Cubic Hermite with limited tangents: each component stays between the values of its two keys, and is
+  /// constant if both are equal.
+  monotone,
+  smooth,  ///< cubic Hermite with Catmull-Rom tangents: smoother, but may overshoot the keys
+  linear,  ///< constant velocity
+  step,    ///< holds the first key's value and jumps at the second key
 };
 
-/// N numbers at a time, and how they go on to the next key.
+/// N numbers at a time, with the interpolation to the next key.
 template <int N>
 struct CurveKey {
   Real time;  ///< [s]
@@ -27,17 +28,17 @@ struct CurveKey {
   Interpolation interpolation = Interpolation::monotone;
 };
 
-/// A value and its derivative in time.
+/// A value and its time derivative.
 template <int N>
 struct CurveSample {
   Eigen::Array<Real, N, 1> value = Eigen::Array<Real, N, 1>::Zero();
   Eigen::Array<Real, N, 1> rate = Eigen::Array<Real, N, 1>::Zero();
 };
 
-/// Tangent at a key between segments with the mean rates `before` and `after` that last h0 and h1: that of
-/// the parabola through the three keys (Catmull-Rom over uneven times). Limited, each component is zero at an
-/// extremum and else at most three times the smaller mean rate, so that the cubic is monotone (de Boor and
-/// Swartz 1977; Fritsch and Carlson 1980).
+/// Tangent at a key between two segments with the mean rates `before` and `after` and the durations h0 and
+/// h1: that of the parabola through the three keys (Catmull-Rom over uneven times). If limited, each
+/// component is zero at an extremum and otherwise at most three times the smaller mean rate, so that the
+/// cubic is monotone (de Boor and Swartz 1977; Fritsch and Carlson 1980).
 template <int N>
 Eigen::Array<Real, N, 1> key_tangent(const Eigen::Array<Real, N, 1>& before, Real h0,
                                      const Eigen::Array<Real, N, 1>& after, Real h1, bool limited) {
@@ -50,8 +51,8 @@ Eigen::Array<Real, N, 1> key_tangent(const Eigen::Array<Real, N, 1>& before, Rea
   return tangent;
 }
 
-/// The curve at a time in segment i, between keys i and i + 1 of `count`; `key(i)` gives a CurveKey<N>. At an
-/// open end the tangent is the segment's mean rate; a `loop` wraps.
+/// The curve at a time in segment i, between the keys i and i + 1 of `count`; `key(i)` returns a CurveKey<N>.
+/// At an open end the tangent is the segment's mean rate; a `loop` is continued periodically.
 template <int N, class Key>
 CurveSample<N> sample_segment(std::size_t count, Key&& key, bool loop, std::size_t i, Real t) {
   using Value = Eigen::Array<Real, N, 1>;
@@ -63,7 +64,7 @@ CurveSample<N> sample_segment(std::size_t count, Key&& key, bool loop, std::size
 
   const bool limited = a.interpolation == Interpolation::monotone;
   const std::size_t segments = count - 1;
-  // A jump has no rate: what comes before it and after it is at rest there.
+  // A jump has no rate, so the curves before and after it end and start at rest.
   const auto rate = [&](std::size_t segment) -> Value {
     const CurveKey<N> from = key(segment), to = key(segment + 1);
     if (from.interpolation == Interpolation::step) return Value::Zero();
@@ -76,13 +77,13 @@ CurveSample<N> sample_segment(std::size_t count, Key&& key, bool loop, std::size
   const Value m0 = i > 0 || loop ? tangent((i + segments - 1) % segments, i) : mean;
   const Value m1 = i + 1 < segments || loop ? tangent(i, (i + 1) % segments) : mean;
   const Real s2 = s * s, s3 = s2 * s;
-  // In a form that holds equal values to the last bit.
+  // This form reproduces equal values to the last bit.
   return {a.value + (3 * s2 - 2 * s3) * (b.value - a.value) + (s3 - 2 * s2 + s) * span * m0 +
               (s3 - s2) * span * m1,
           (6 * s2 - 6 * s) / span * (a.value - b.value) + (3 * s2 - 4 * s + 1) * m0 + (3 * s2 - 2 * s) * m1};
 }
 
-/// The segment that a time from the first key up to the last is in; `time(i)` is that of key i.
+/// The segment that contains a time between the first and the last key; `time(i)` is that of key i.
 template <class Time>
 std::size_t segment_at(std::size_t count, Time&& time, Real t) {
   std::size_t low = 0, high = count - 1;  // time(low) <= t < time(high)

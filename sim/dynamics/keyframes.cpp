@@ -23,7 +23,7 @@ Motion on_segment(const KeyframeTrack& track, std::size_t i, Real t) {
     out.pose.orientation = a.pose.orientation;
     return out;
   }
-  // Slerp turns at a constant rate about one axis, the short way round.
+  // Slerp turns at a constant rate about one axis, along the shortest arc.
   const Real span = b.time - a.time, s = (t - a.time) / span;
   Quat turn = b.pose.orientation * a.pose.orientation.conjugate();
   if (turn.w() < 0) turn.coeffs() = -turn.coeffs();
@@ -33,7 +33,7 @@ Motion on_segment(const KeyframeTrack& track, std::size_t i, Real t) {
   return out;
 }
 
-/// The start of the round of a loop that a time is in.
+/// Start of the period of a loop that contains a time.
 Real round_start(const KeyframeTrack& track, Real t) {
   const Real first = track.keys.front().time, period = track.keys.back().time - first;
   return first + period * std::floor((t - first) / period);
@@ -52,7 +52,7 @@ Motion on_keys(const KeyframeTrack& track, Real t, const Pose& rest) {
                     t);
 }
 
-/// Up to what rounding makes of the numbers in a scene.
+/// Equality within the rounding of the numbers in a scene.
 bool same(const Pose& a, const Pose& b) {
   constexpr Real kRounding = 1e-9;
   return (a.position - b.position).norm() < kRounding &&
@@ -76,7 +76,7 @@ bool KeyframeTrack::jumps(Real from, Real to) const {
   if (keys.size() < 2) return false;
   const auto jumps_at = [&](Real time) { return from < time && time <= to; };
   const Real round = loop ? round_start(*this, to) - keys.front().time : 0;
-  // A jump lies in the round that `to` is in, or in the one before.
+  // A jump is in the period that contains `to`, or in the one before.
   for (std::size_t i = 0; i + 1 < keys.size(); ++i) {
     if (kind(*this, i) != Interpolation::step) continue;
     const Real time = keys[i + 1].time, period = keys.back().time - keys.front().time;

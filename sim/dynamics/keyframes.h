@@ -1,6 +1,6 @@
 #pragma once
 /// Keyframed motion of kinematic bodies (physics E8, N6): positions by one of the interpolations,
-/// orientations by slerp, and the velocities that belong to them.
+/// orientations by slerp, with the matching velocities.
 
 #include <optional>
 #include <vector>
@@ -13,30 +13,29 @@ namespace offstage::sim {
 struct Keyframe {
   Real time = 0;  ///< [s]
   Pose pose;
-  std::optional<Interpolation> interpolation = {};  ///< to the next key; default: the track's
+  std::optional<Interpolation> interpolation = {};  ///< to the next key; default: that of the track
 };
 
-/// A pose with the velocities of the motion through it.
+/// A pose with its velocities.
 struct Motion {
   Pose pose;
-  Vec3 velocity = Vec3::Zero();          ///< of the origin, world [m/s]
+  Vec3 velocity = Vec3::Zero();          ///< velocity of the origin, world [m/s]
   Vec3 angular_velocity = Vec3::Zero();  ///< world [rad/s]
 };
 
-/// Key poses over time, plus an optional constant spin on top (for wheels and gears, where keys would be
-/// many).
+/// Key poses over time, plus an optional constant spin (for wheels and gears, which would need many keys).
 struct KeyframeTrack {
-  std::vector<Keyframe> keys;  ///< strictly increasing times; empty: rests at the body's initial pose
-  Interpolation interpolation = Interpolation::monotone;  ///< of positions; orientations turn at a constant
-                                                          ///< rate between two keys, or step
-  bool loop = false;  ///< repeat with the period keys.back().time - keys.front().time; else hold the ends
-  Vec3 spin = Vec3::Zero();  ///< extra rotation about the body's origin, body axes [rad/s]
+  std::vector<Keyframe> keys;  ///< strictly increasing times; empty: the body stays at its initial pose
+  /// Interpolation of positions; orientations turn at a constant rate between two keys, or jump with `step`.
+  Interpolation interpolation = Interpolation::monotone;
+  /// Repeat with the period keys.back().time - keys.front().time; otherwise the end poses are held.
+  bool loop = false;
+  Vec3 spin = Vec3::Zero();  ///< additional rotation about the body's origin, body axes [rad/s]
 
   bool moves() const { return !keys.empty() || !spin.isZero(); }
-  /// Pose and exact derivative at time t; `rest` is the pose where there are no keys.
+  /// Returns the pose and its exact derivative at time t; `rest` is the pose without keys.
   Motion at(Real t, const Pose& rest) const;
-  /// Whether the pose jumps after `from` and not after `to`, by a step or at the end of a loop that does not
-  /// close.
+  /// Whether the pose jumps at a time in (from, to], by a step or at the end of a loop that is not closed.
   bool jumps(Real from, Real to) const;
 };
 

@@ -10,9 +10,9 @@ namespace offstage::sim {
 namespace {
 
 constexpr std::size_t kGridChunk = 4096;
-/// Points are parted by the first bits of their cells, then each part is sorted by itself.
+/// Points are first distributed by the leading bits of their cells; each part is then sorted separately.
 constexpr uint32_t kPartBits = 8;
-/// Fewer cells along an axis would make a neighbour twice.
+/// With fewer cells along an axis the same neighbour would be visited twice.
 constexpr uint32_t kMinBits = 2;
 
 Aabb bounding_box(std::span<const Vec3> points) {
@@ -27,7 +27,8 @@ Aabb bounding_box(std::span<const Vec3> points) {
 
 }  // namespace
 
-/// As many cells as the points' box has, but not many more than there are points: longer axes wrap first.
+/// Chooses about as many cells as the points' box contains, but not many more than there are points; longer
+/// axes wrap first.
 void NeighborGrid::choose_torus(std::span<const Vec3> points) {
   const Aabb box = bounding_box(points);
   std::array<Real, 3> extent;

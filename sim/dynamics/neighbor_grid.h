@@ -1,7 +1,7 @@
 #pragma once
-/// Points sorted into cells, for finding those near a place (physics P2's cut-off, P3). The cells tile a
-/// torus: along each axis they repeat after a power of two, so that a table of about as many cells as points
-/// serves any extent, and what is far away, but in the same cell of the torus, is told apart by its distance.
+/// Points sorted into cells, for searching neighbours (physics P2's cut-off, P3). The cells tile a torus:
+/// along each axis they repeat with a power of two, so a table with about as many cells as points serves any
+/// extent. Distant points in the same cell of the torus are excluded by their distance.
 
 #include <algorithm>
 #include <array>
@@ -17,12 +17,12 @@ namespace offstage::sim {
 
 class NeighborGrid {
  public:
-  /// Sorts finite points into cells of width `cell` [m], > 0. The order depends on the arguments alone, not
-  /// on threads; oneTBB's are used.
+  /// Sorts finite points into cells of width `cell` [m], > 0, on oneTBB's threads. The order depends only on
+  /// the arguments, not on threads.
   void build(std::span<const Vec3> points, Real cell);
 
-  /// Calls f(index) for every point within `radius` of p, the distance included; quickest for a radius up to
-  /// the cells' width.
+  /// Calls f(index) for every point within `radius` of p, inclusive. It is fastest for a radius of at most
+  /// the width of a cell.
   template <class F>
   void for_each_near(const Vec3& p, Real radius, F&& f) const {
     if (index_.empty()) return;
@@ -33,14 +33,14 @@ class NeighborGrid {
         visit_cells(row(run[0].first + i, run[1].first + j), run[2], p, radius, f);
   }
 
-  /// The same for the point at a place of the order, but of two points near each other only one is told of
-  /// the other. The radius must not be greater than the cells' width.
+  /// The same for the point at a place of the sorted order, but each pair of points is reported only once,
+  /// for one of the two. The radius must not be greater than the width of a cell.
   template <class F>
   void for_each_pair(std::size_t place, Real radius, F&& f) const {
     const Vec3 p = point(place);
     const std::array<Run, 3> run = {cells(p, radius, 0), cells(p, radius, 1), cells(p, radius, 2)};
     const std::array<uint32_t, 3> own = {cell_of(p, 0), cell_of(p, 1), cell_of(p, 2)};
-    // How far the first cells are before the own one: one at most.
+    // Distance of the own cell from the first cells: at most one.
     const std::array<uint32_t, 3> before = {own[0] - run[0].first, own[1] - run[1].first,
                                             own[2] - run[2].first};
     const uint32_t cell = row(own[0], own[1]) + (own[2] & mask_[2]);
@@ -56,35 +56,35 @@ class NeighborGrid {
   std::size_t size() const { return index_.size(); }
   Real cell() const { return cell_; }
 
-  /// The indices, sorted by cells.
+  /// Index of the point at a place of the sorted order.
   uint32_t at(std::size_t place) const { return index_[place]; }
-  /// The cells of the torus lie in layers across its longest axis, an even number of them. Points nearer to
-  /// each other than a cell's width are in the same or in neighbouring layers, of which the last and the
-  /// first are two, too.
+  /// The cells of the torus form layers across its longest axis; their number is even. Points closer than the
+  /// width of a cell are in the same layer or in neighbouring layers. The last and the first layer are
+  /// neighbours, too.
   uint32_t layers() const { return mask_[0] + 1; }
-  /// Where in the order a layer begins; layers() gives its end.
+  /// First place of a layer in the sorted order; layer_begin(layers()) is the end.
   std::size_t layer_begin(uint32_t layer) const {
     return begin_[static_cast<std::size_t>(layer) << (bits_[1] + bits_[2])];
   }
 
  private:
-  /// Cells in a row along an axis, each of the torus at most once.
+  /// Consecutive cells along an axis; each cell of the torus occurs at most once.
   struct Run {
     uint32_t first, count;
   };
 
-  /// Farther out all are in the same cell.
+  /// Points beyond this cell are all in the same cell.
   static constexpr Real kMaxCell = 1e15;
 
-  /// Points are looked at so many at once.
+  /// Number of points that are tested at once.
   static constexpr uint32_t kLanes = 4;
 
   Vec3 point(std::size_t place) const { return {x_[place], y_[place], z_[place]}; }
-  /// The first cell of a row along the last axis.
+  /// First cell of a row along the last axis.
   uint32_t row(uint32_t i, uint32_t j) const {
     return (((i & mask_[0]) << bits_[1]) + (j & mask_[1])) << bits_[2];
   }
-  /// Calls f(index) for the points within the radius at the places from `from` up to but without `to`.
+  /// Calls f(index) for the points within the radius at the places [from, to).
   template <class F>
   void visit(uint32_t from, uint32_t to, const Vec3& p, Real radius, F&& f) const {
     const Real radius2 = radius * radius;
@@ -98,7 +98,7 @@ class NeighborGrid {
         if (distance2[k] <= radius2) f(index_[e + k]);
     }
   }
-  /// The same in a run of cells of a row.
+  /// The same for consecutive cells of a row.
   template <class F>
   void visit_cells(uint32_t row, Run run, const Vec3& p, Real radius, F&& f) const {
     const uint32_t first = run.first & mask_[2], whole = mask_[2] + 1;
@@ -123,10 +123,10 @@ class NeighborGrid {
   void choose_torus(std::span<const Vec3> points);
 
   Real cell_ = 1, inverse_ = 1;
-  std::array<Eigen::Index, 3> axis_{0, 1, 2};  // the longest first
+  std::array<Eigen::Index, 3> axis_{0, 1, 2};  // the longest axis first
   std::array<uint32_t, 3> bits_{}, mask_{};
-  std::vector<uint32_t> begin_{0, 0};  // of each cell among the places, and the end
-  std::vector<Real> x_, y_, z_;        // by place, with room for kLanes behind the last
+  std::vector<uint32_t> begin_{0, 0};  // first place of each cell, and the end
+  std::vector<Real> x_, y_, z_;        // by place, with kLanes more elements after the last
   std::vector<uint32_t> index_;        // by place
   std::vector<uint32_t> bucket_, place_, counts_;
   std::vector<std::pair<uint32_t, uint32_t>> parted_;  // (bucket, index)

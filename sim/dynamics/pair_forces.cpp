@@ -15,7 +15,7 @@ namespace {
 
 /// Particles per task.
 constexpr std::size_t kPairChunk = 32;
-/// Squared distance below which a force without a length of its own does not grow any more [m^2].
+/// Squared distance below which a force without a length scale does not increase any more [m^2].
 constexpr Real kLeastSquare = 1e-30;
 
 Real root_node(Real x) {
@@ -31,7 +31,7 @@ Lanes greater(Lanes x, Real y) {
   return lane_max(x, lanes(y));
 }
 
-/// U = c / sqrt(r^2 + s^2) between particles of weight 1. The force on the first of a pair is factor(r^2) d,
+/// U = c / sqrt(r^2 + s^2) between particles of weight 1. The force on the first particle is factor(r^2) d,
 /// where d leads to it from the second.
 struct InverseDistance {
   Real constant, softening2;
@@ -45,7 +45,7 @@ struct InverseDistance {
     const T s = square(r2);
     return constant / (s * root_node(s));
   }
-  /// d factor / d r^2.
+  /// Derivative of factor by r^2.
   Real slope(Real r2) const { return -1.5 * factor(r2) / square(r2); }
   Real energy(Real r2) const { return constant / root_node(square(r2)); }
 };
@@ -97,7 +97,7 @@ Real weight(const LennardJones&, const PairMember&) {
   return 1;
 }
 
-/// The particles that a law acts on, at a stage.
+/// The particles on which a law acts, at a stage.
 struct Cloud {
   template <class Law>
   Cloud(const Law& law, std::span<const PairMember> members, std::span<const Real> state)
@@ -106,7 +106,8 @@ struct Cloud {
     for (std::size_t i = 0; i < size(); ++i) points[i] = place(i).allFinite() ? Vec3(place(i)) : Vec3::Zero();
     std::iota(member.begin(), member.end(), 0u);
     if (cut_off > 0) sort_by_cells();
-    // What is added to fill the last lanes has no weight; nor has what is not finite, so that it spoils none.
+    // Elements that fill the last lanes have no weight. Particles at infinite or NaN positions have none
+    // either, so they do not affect others.
     for (auto* v : {&x, &y, &z, &w}) v->resize((size() + 3) / 4 * 4, 0.0);
     for (std::size_t i = 0; i < size(); ++i) {
       const Vec3& p = points[i];
@@ -131,13 +132,13 @@ struct Cloud {
   }
 
   Real cut_off;
-  std::vector<uint32_t> member;  // which of those given each is
+  std::vector<uint32_t> member;  // index of each point among the given members
   std::vector<Vec3> points;
   std::vector<Real> x, y, z, w;
   std::optional<NeighborGrid> grid;
 
  private:
-  /// Those near each other come to lie near each other in memory.
+  /// Sorts particles so that neighbours are close in memory.
   void sort_by_cells() {
     grid.emplace().build(points, cut_off);
     for (std::size_t i = 0; i < size(); ++i) member[i] = grid->at(i);
@@ -148,7 +149,7 @@ struct Cloud {
   }
 };
 
-/// The force on particle i by all others.
+/// The force on particle i from all others.
 template <class Kernel>
 Vec3 force_by_all(const Kernel& kernel, const Cloud& c, std::size_t i) {
   LaneVector<Lanes> sum{};
@@ -156,7 +157,7 @@ Vec3 force_by_all(const Kernel& kernel, const Cloud& c, std::size_t i) {
   for (std::size_t j = 0; j < c.x.size(); j += 4) {
     const auto four = [&](const std::vector<Real>& v) { return Lanes(_mm256_loadu_pd(&v[j])); };
     const LaneVector<Lanes> d{x - four(c.x), y - four(c.y), z - four(c.z)};
-    // At no distance, as to itself, this is a finite factor times nothing.
+    // At distance 0, as for the particle itself, this is a finite factor times zero.
     sum = sum + (w * four(c.w) * kernel.factor(dot(d, d))) * d;
   }
   const auto total = [](Lanes v) { return (v[0] + v[1]) + (v[2] + v[3]); };
@@ -179,7 +180,7 @@ void for_each_parallel(std::size_t size, F&& f) {
   });
 }
 
-/// Calls f(law) if the force is one between particles.
+/// Calls f(law) if the force acts between particles.
 template <class F>
 void with_law(const ForceDef& def, F&& f) {
   std::visit(

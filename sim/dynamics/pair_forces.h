@@ -1,5 +1,5 @@
 #pragma once
-/// The forces of particles on each other (physics P2): gravitation, charges, Lennard-Jones.
+/// Forces between particles (physics P2): gravitation, Coulomb, Lennard-Jones.
 
 #include <span>
 #include <vector>
@@ -9,18 +9,18 @@
 
 namespace offstage::sim {
 
-/// A particle that a pairwise force acts on.
+/// A particle on which a pairwise force acts.
 struct PairMember {
-  std::size_t place;  ///< in the state, in units of 3
+  std::size_t place;  ///< position in the state, in units of 3 numbers
   Real mass, charge;
 };
 
-/// Of the particles in a flat state, x y z after each other. Each particle sums up what pulls at it, in an
-/// order that depends on the state alone, so results are the same for any number of threads; of a pair both
-/// get the same force to the bit, but for its sign.
+/// Forces between particles in a flat state (x y z of each particle). Each particle sums the forces on it in
+/// an order that depends only on the state, so results are the same for any number of threads. The two forces
+/// of a pair are opposite to the last bit.
 class PairForces {
  public:
-  /// `def` must be pairwise and outlive this.
+  /// `def` must be pairwise and outlive this object.
   void add(const ForceDef& def, std::vector<PairMember> members) {
     groups_.push_back({&def, std::move(members)});
   }
@@ -28,11 +28,12 @@ class PairForces {
 
   /// Adds to the accelerations `dv` at positions `x`.
   void accelerate(Real t, std::span<const Real> x, std::span<Real> dv) const;
-  /// Appends the derivatives of dv/dt by x, which begin at row `at_v` and column `at_x`. Exact among up to
-  /// kExactJacobian particles; among more, what they do to each other's is left out, because its places would
-  /// change with the state.
+  /// Appends the derivatives of dv/dt by x, which begin at row `at_v` and column `at_x`. Exact for up to
+  /// kExactJacobian particles. For more particles the derivatives between different particles are omitted,
+  /// because their pattern would change with the state.
   void jacobian(Real t, std::span<const Real> x, int at_x, int at_v, SparseEntries& entries) const;
-  /// [J]; 0 at infinity, or at the cut-off distance. Strengths in a region count as they are.
+  /// Potential energy [J]; 0 at infinity, or at the cut-off distance. Strengths in a region count as constant
+  /// factors.
   Real potential_energy(Real t, std::span<const Real> x) const;
 
   static constexpr std::size_t kExactJacobian = 128;

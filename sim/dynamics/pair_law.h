@@ -1,12 +1,12 @@
 #pragma once
 /// Laws of forces between the particles of one or more systems (physics P2). The force on particle 1 of a
-/// pair is -dU/dr1, that on particle 2 its opposite. In a region it is multiplied by the strengths at both
-/// particles. Without a cut-off distance all pairs are visited, which takes the square of the number of
-/// particles; with one, only those near each other.
+/// pair is -dU/dr1, that on particle 2 the opposite. In a region it is multiplied by the strengths at both
+/// particles. Without a cut-off distance all pairs are computed, which takes time in proportion to the square
+/// of the number of particles; with one, only neighbours are.
 ///
-/// Systems that such a force joins are integrated together, by the integrator of the first of them, or by the
-/// world's where springs hold one of them. A particle takes part from the first whole sub-step of its life
-/// on.
+/// Systems connected by such a force are integrated together, by the integrator of the first system, or by
+/// that of the world if springs act on one of them. A particle participates from the first whole sub-step of
+/// its life.
 
 #include <type_traits>
 
@@ -17,8 +17,8 @@ namespace offstage::sim {
 /// U = -G m1 m2 / sqrt(r^2 + s^2).
 struct MutualGravitation {
   Real constant = 6.672e-11;  ///< G [N m^2/kg^2], >= 0
-  Real softening = 0;         ///< s, as if the masses were spread over this radius [m], >= 0 (Plummer)
-  Real cut_off = 0;           ///< no force from here on [m]; 0: none
+  Real softening = 0;         ///< s, as if each mass were distributed over this radius [m], >= 0 (Plummer)
+  Real cut_off = 0;           ///< distance of no force [m]; 0: unlimited
   Region region;
   uint32_t drop_rate = 0;
 };
@@ -27,17 +27,17 @@ struct MutualGravitation {
 struct Coulomb {
   Real constant = 8.9875e9;  ///< K [N m^2/C^2], >= 0
   Real softening = 0;        ///< s [m], >= 0
-  Real cut_off = 0;          ///< no force from here on [m]; 0: none
+  Real cut_off = 0;          ///< distance of no force [m]; 0: unlimited
   Region region;
   uint32_t drop_rate = 0;
 };
 
-/// U = 4 epsilon [(sigma/r)^12 - (sigma/r)^6]; at rest at a distance of 2^(1/6) sigma. Closer than sigma/1000
-/// the force is as there.
+/// U = 4 epsilon [(sigma/r)^12 - (sigma/r)^6]; the equilibrium distance is 2^(1/6) sigma. Below sigma/1000
+/// the force is constant.
 struct LennardJones {
   Real epsilon = 1;   ///< depth of the well [J], >= 0
-  Real sigma = 0.01;  ///< where U = 0 [m], > 0
-  Real cut_off = 0;   ///< no force from here on [m]; 0: none. Usual is 2.5 sigma
+  Real sigma = 0.01;  ///< distance of U = 0 [m], > 0
+  Real cut_off = 0;   ///< distance of no force [m]; 0: unlimited. A common value is 2.5 sigma
   Region region;
   uint32_t drop_rate = 0;
 };

@@ -1,5 +1,5 @@
 #pragma once
-/// Where a field acts, and how its strength falls towards the edge there (physics P2).
+/// Regions of fields, and how the strength of a field decreases towards their edges (physics P2).
 
 #include <cstdint>
 #include <span>
@@ -9,25 +9,26 @@
 
 namespace offstage::sim {
 
-/// The strength in a region falls from 1 in the middle to 0 at the edge, to the power of the field's drop
+/// The strength in a region decreases from 1 in the middle to 0 at the edge, to the power of the field's drop
 /// rate; with drop rate 0 it is 1 throughout.
 struct Everywhere {};
 struct SphereRegion {
   Vec3 centre = Vec3::Zero();
   Real radius = 1;  ///< [m], > 0
 };
-/// Along the axes of the world. The strength is by the axis in which the point is nearest to the edge.
+/// Aligned with the world's axes. The strength is that of the axis along which the point is nearest to the
+/// edge.
 struct BoxRegion {
   Vec3 centre = Vec3::Zero();
   Vec3 size = Vec3::Ones();  ///< full edges [m], > 0
 };
 using Region = std::variant<Everywhere, SphereRegion, BoxRegion>;
 
-/// 1 - |f|/R in a sphere, the least 1 - |f_i|/(b_i/2) in a box, to the power `drop_rate`; 0 outside.
+/// 1 - |f|/R in a sphere, the smallest 1 - |f_i|/(b_i/2) in a box, to the power `drop_rate`; 0 outside.
 Real strength(const Region& region, uint32_t drop_rate, const Vec3& point);
-/// The same at points x y z after each other; whether it is anything but 0 at any.
+/// The same at several points (x y z of each); returns whether any strength is not 0.
 bool strengths(const Region& region, uint32_t drop_rate, std::span<const Real> points, std::span<Real> out);
-/// What is left of an effect at a share `depth` of the way from the edge of its reach to the middle.
+/// Strength at a share `depth` of the way from the edge of the region to its middle.
 Real strength_at_depth(Real depth, uint32_t drop_rate);
 
 }  // namespace offstage::sim

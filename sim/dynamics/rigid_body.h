@@ -1,23 +1,23 @@
 #pragma once
-/// State and equations of motion of a rigid body (physics R1). Integration works on (x, q) and the momenta
-/// (L, H): torque-free motion then keeps the angular momentum exactly.
+/// State and equations of motion of a rigid body (physics R1). Integration uses (x, q) and the momenta (L,
+/// H), so torque-free motion conserves the angular momentum exactly.
 
 #include "sim/core/types.h"
 
 namespace offstage::sim {
 
-/// What changes as a rigid body moves.
+/// The variables of a rigid body that change with time.
 struct RigidState {
-  Vec3 position = Vec3::Zero();  ///< of the centre of mass, world
+  Vec3 position = Vec3::Zero();  ///< position of the centre of mass, world
   Quat orientation = Quat::Identity();
   Vec3 momentum = Vec3::Zero();          ///< L
   Vec3 angular_momentum = Vec3::Zero();  ///< H, about the centre of mass, world
-  Real next_step = 0;                    ///< what an adaptive integrator will try next [s]; 0: not known
+  Real next_step = 0;                    ///< adaptive integrators: length of the next step [s]; 0: unknown
 };
 
 struct RigidBody : RigidState {
   Real mass = 1;
-  Vec3 centre = Vec3::Zero();       ///< of mass, in the shape's frame
+  Vec3 centre = Vec3::Zero();       ///< centre of mass in the shape's frame
   Mat3 inertia = Mat3::Identity();  ///< about the centre of mass, axes of the shape's frame
   Mat3 inverse_inertia = Mat3::Identity();
   Real linear_drag = 0, angular_drag = 0;
@@ -31,7 +31,7 @@ struct RigidBody : RigidState {
   Vec3 angular_velocity(const Quat& q, const Vec3& H) const {
     return q * (inverse_inertia * (q.conjugate() * H));
   }
-  /// H of a spin.
+  /// H for the angular velocity w.
   Vec3 spin_momentum(const Quat& q, const Vec3& w) const { return q * (inertia * (q.conjugate() * w)); }
   Pose pose() const { return {position - orientation * centre, orientation}; }
 

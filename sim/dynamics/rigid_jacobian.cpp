@@ -3,7 +3,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Where the parts of a body's state begin among its 13 numbers.
+/// First index of each part of a body's state among its 13 numbers.
 constexpr int kTurnRow = 3, kMomentum = 7, kAngularMomentum = 10;
 
 /// The matrix of w -> (0, w) q, in the order x y z w.
@@ -97,7 +97,7 @@ Eigen::Matrix<Real, 13, 13> RigidDerivative::own_rates(const BodyForces& forces,
 
 void add_block(const Eigen::Ref<const Eigen::MatrixXd>& block, const StateColumns& rows,
                const StateColumns& columns, SparseEntries& entries) {
-  // Of a body 7 numbers are coordinates, of a particle 3.
+  // 7 of a body's numbers are coordinates, 3 of a particle's.
   const auto place = [](const StateColumns& at, Eigen::Index i, Eigen::Index size) {
     const auto coordinates = size == 13 ? static_cast<Eigen::Index>(kBodyX) : 3;
     return static_cast<int>(i < coordinates ? at.x + i : at.p + (i - coordinates));

@@ -15,14 +15,14 @@ typedef float Floats __attribute__((vector_size(kWidth * sizeof(float))));
 typedef uint32_t Words __attribute__((vector_size(kWidth * sizeof(uint32_t))));
 typedef int32_t Ints __attribute__((vector_size(kWidth * sizeof(int32_t))));
 
-/// Cells of the lattice until it repeats, in each axis: 10 bits.
+/// Period of the lattice in cells along each axis: 10 bits.
 constexpr Real kTile = 1024;
-/// A corner's velocity has three whole numbers below this, which are 10 bits of a hash each.
+/// The velocity of a corner consists of three integers below this, 10 bits of a hash each.
 constexpr uint32_t kLevels = 1024;
-/// Mean over a cell of sum |M|^2, M = (w + (grad w . d)/2) 1 - d grad w^T / 2, with which random velocities
-/// of variance 1 in each axis give a field of this mean square.
+/// Mean over a cell of sum |M|^2, M = (w + (grad w . d)/2) 1 - d grad w^T / 2. Random velocities of variance
+/// 1 in each axis give a field with this mean square.
 constexpr Real kMeanSquare = 1.0974211408;
-/// 2^(-1/3): of the speed of eddies of half the width; squared, of their lifetime.
+/// 2^(-1/3): factor of the speed of eddies of half the width; its square is that of their lifetime.
 constexpr Real kCascade = 0.79370052598409973738;
 
 uint32_t mixed(uint32_t x) {
@@ -35,7 +35,7 @@ Real fade(Real t) {
   return t * t * t * (10 + t * (6 * t - 15));
 }
 
-/// The numbers of two registers in one of single precision.
+/// Converts the numbers of two registers to one register of single precision.
 Floats narrowed(Lanes low, Lanes high) {
   return _mm256_set_m128(_mm256_cvtpd_ps(high), _mm256_cvtpd_ps(low));
 }
@@ -48,8 +48,8 @@ Floats product_sum(Floats a, Floats b, Floats c) {
   return _mm256_fmadd_ps(a, b, c);
 }
 
-/// One axis at eight points: for the low and the high corner of their cells the way from it, its weight, and
-/// half the slope of the weight.
+/// One axis at eight points: for the low and the high corner of their cells the distance from it, its weight,
+/// and half the derivative of the weight.
 struct Axis {
   Floats way[2], weight[2], slope[2];
   Words index[2];
@@ -74,8 +74,8 @@ struct Axis {
   }
 };
 
-/// The random velocities at eight corners, as they are now. The hash is Wellons' lowbias32, with the key in
-/// its middle so that both ticks share the first half.
+/// The current random velocities at eight corners. The hash is Wellons' lowbias32, with the key in its
+/// middle, so that both ticks share the first half.
 std::array<Floats, 3> corner_velocity(const EddyLattice& o, Words x, Words y, Words z) {
   Words hash = x | (y << 10) | (z << 20);
   hash = (hash ^ (hash >> 16)) * 0x7feb352du;
@@ -98,7 +98,7 @@ std::array<Floats, 3> corner_velocity(const EddyLattice& o, Words x, Words y, Wo
 TurbulentFlow::TurbulentFlow(const Turbulence& f, Real time) : octave_count_(f.octaves) {
   Real total = 0, square = 1;
   for (uint32_t k = 0; k < octave_count_; ++k, square *= kCascade * kCascade) total += square;
-  // The variance of a whole number from 0 to n - 1 is (n^2 - 1) / 12.
+  // The variance of an integer from 0 to n - 1 is (n^2 - 1) / 12.
   Real speed = f.speed / std::sqrt(total * kMeanSquare * (kLevels * Real{kLevels} - 1) / 12);
   Real cells = 1 / f.scale;
   Real rate = f.lifetime > 0 ? 1 / f.lifetime : f.speed / f.scale;
@@ -108,11 +108,11 @@ TurbulentFlow::TurbulentFlow(const Turbulence& f, Real time) : octave_count_(f.o
     const auto tick = static_cast<uint32_t>(static_cast<int64_t>(std::clamp(whole, -0x1p62, 0x1p62)));
     EddyLattice& o = octaves_[k];
     o.cells = cells;
-    // Lattices of different octaves have no corner in common.
+    // Random offsets: lattices of different octaves have no corner in common.
     o.origin = time * cells * f.drift;
     for (int i = 0; i < 3; ++i)
       o.origin[i] += mixed(stream + 1 + static_cast<uint32_t>(i)) * (kTile / 0x1p32);
-    // Shares of constant sum of squares: the air does not calm down between two ticks.
+    // The squares of the shares have a constant sum, so the air does not calm down between two ticks.
     const Real norm = speed / std::sqrt(late * late + early * early);
     o.key = {mixed(stream ^ mixed(tick)), mixed(stream ^ mixed(tick + 1))};
     o.share = {static_cast<float>(norm * early), static_cast<float>(norm * late)};

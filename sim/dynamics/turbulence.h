@@ -1,6 +1,6 @@
 #pragma once
-/// Turbulent air (physics P2): a random velocity field without divergence, so that what drifts in it neither
-/// gathers nor thins out (after Bridson, Houriham, Nordenstam, "Curl-Noise for Procedural Fluid Flow", 2007).
+/// Turbulent air (physics P2): a random velocity field without divergence, so that drifting particles keep
+/// their density (after Bridson, Houriham, Nordenstam, "Curl-Noise for Procedural Fluid Flow", 2007).
 
 #include <array>
 #include <cstdint>
@@ -10,44 +10,47 @@
 
 namespace offstage::sim {
 
-/// Air that swirls in eddies of several sizes. Each octave has eddies of half the width of those before;
-/// their speed falls with the cube root of the width and their lifetime with its power 2/3, as in
-/// Kolmogorov's cascade.
+/// Air with eddies of several sizes. Each octave has eddies of half the width of the one before; their speed
+/// decreases with the cube root of the width and their lifetime with its power 2/3, as in Kolmogorov's
+/// cascade.
 struct Turbulence {
   static constexpr uint32_t kMaxOctaves = 8;
 
-  Real speed = 1;             ///< root mean square of the air's speed [m/s], >= 0
-  Real scale = 1;             ///< width of the largest eddies [m], > 0
-  uint32_t octaves = 2;       ///< sizes of eddies, 1 to kMaxOctaves
-  Real lifetime = 0;          ///< of the largest eddies [s], >= 0; 0: they turn over, scale / speed
-  Vec3 drift = Vec3::Zero();  ///< of the eddies with the mean wind, which this does not blow [m/s]
-  uint32_t seed = 0;          ///< another number, other eddies
-  Real drag = 0;              ///< as WindField's [kg/s]
+  Real speed = 1;        ///< root mean square of the air's speed [m/s], >= 0
+  Real scale = 1;        ///< width of the largest eddies [m], > 0
+  uint32_t octaves = 2;  ///< number of sizes of eddies, 1 to kMaxOctaves
+  Real lifetime = 0;     ///< lifetime of the largest eddies [s], >= 0; 0: scale / speed, their turnover time
+  /// Velocity of the eddies themselves [m/s]; the mean wind must be a separate field.
+  Vec3 drift = Vec3::Zero();
+  uint32_t seed = 0;  ///< different seeds give different eddies
+  Real drag = 0;      ///< k as in WindField [kg/s]
   Region region;
   uint32_t drop_rate = 0;
 };
 
-/// The eddies of one size at a moment.
+/// The eddies of one size at a time.
 struct EddyLattice {
-  Real cells;                   ///< per metre
-  Vec3 origin;                  ///< [cells]
-  std::array<uint32_t, 2> key;  ///< of the hashes that give the corners' velocities, at the ticks around now
-  std::array<float, 2> share;   ///< of these
-  float bias;                   ///< makes the mean of the hashes 0
+  Real cells;   ///< cells per metre
+  Vec3 origin;  ///< [cells]
+  /// Keys of the hashes that give the corners' velocities, at the ticks before and after this time.
+  std::array<uint32_t, 2> key;
+  std::array<float, 2> share;  ///< shares of these ticks
+  float bias;                  ///< makes the mean of the hashes 0
 };
 
-/// The velocity of turbulent air at a moment. Its period in space is 1024 eddies; in time it has none.
+/// The velocity of turbulent air at a time. It is periodic in space with 1024 eddies, and not periodic in
+/// time.
 ///
-/// At each corner c of a lattice there is a random velocity a. Let d be the way from c, in cells, and w(d)
-/// the corner's smooth weight. The potential psi = sum w (a x d)/2 has the curl
+/// Each corner c of a lattice has a random velocity a. Let d be the vector from c, in cells, and w(d) the
+/// corner's smooth weight. The potential psi = sum w (a x d)/2 has the curl
 ///   v = sum [a (w + (grad w . d)/2) - d (grad w . a)/2],
-/// which is a at each corner. All is exact, so the divergence is 0 to rounding, which is that of single
-/// precision here.
+/// which is a at each corner. The formula is exact, so the divergence is 0 within the rounding of single
+/// precision.
 class TurbulentFlow {
  public:
   TurbulentFlow(const Turbulence& turbulence, Real time);
 
-  /// Velocities [m/s] at points; both x y z after each other. The velocity at a point does not depend on the
+  /// Computes velocities [m/s] at points (x y z of each). The velocity at a point does not depend on the
   /// other points.
   void velocity(std::span<const Real> points, std::span<Real> out) const;
   Vec3 velocity(const Vec3& point) const;

@@ -34,7 +34,8 @@ void keep_nearer(ClosestPoints& best, const Vec3& on_a, const Vec3& on_b) {
   if (d2 < best.squared_distance) best = {on_a, on_b, d2};
 }
 
-/// Where the edges of `edges` cross the plane of `t`, and the points of `t` nearest to there.
+/// Tries the points where the edges of `edges` cross the plane of `t`, with the points of `t` nearest to
+/// them.
 template <class Keep>
 void for_each_crossing(const TriangleVertices& edges, const TriangleVertices& t, Keep&& keep) {
   const Vec3 n = (t[1] - t[0]).cross(t[2] - t[0]);
@@ -48,8 +49,8 @@ void for_each_crossing(const TriangleVertices& edges, const TriangleVertices& t,
   }
 }
 
-/// A point that two intersecting triangles share, up to rounding: where an edge pierces, or else the nearest
-/// of the features.
+/// Returns a point that two intersecting triangles share, within rounding: where an edge pierces the other
+/// triangle, or else the closest points of the features.
 ClosestPoints shared_point(const TriangleVertices& a, const TriangleVertices& b, ClosestPoints best) {
   for_each_crossing(a, b, [&](const Vec3& p, const Vec3& q) { keep_nearer(best, p, q); });
   for_each_crossing(b, a, [&](const Vec3& p, const Vec3& q) { keep_nearer(best, q, p); });
@@ -66,8 +67,8 @@ Real closest_on_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
   return along < length2 ? along / length2 : 1;
 }
 
-// Voronoi regions of the triangle, after Ericson, "Real-Time Collision Detection" (2005), 5.1.5, but with the
-// areas from cross products.
+// By Voronoi regions of the triangle, after Ericson, "Real-Time Collision Detection" (2005), 5.1.5, but with
+// the areas from cross products.
 TrianglePoint closest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
   const Real d1 = ab.dot(ap), d2 = ac.dot(ap), d3 = ab.dot(bp), d4 = ac.dot(bp), d5 = ab.dot(cp),
@@ -78,15 +79,15 @@ TrianglePoint closest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, c
   const Vec3 n = ab.cross(ac);
   const Real va = n.dot((c - b).cross(bp)), vb = n.dot(ap.cross(ac)), vc = n.dot(ab.cross(ap));
   if (!(va > 0 && vb > 0 && vc > 0)) return nearest_edge_point(p, {&a, &b, &c}).at;
-  // va + vb + vc is |n|^2 as well, but less exactly where b and c are far; vb + vc more would leave the
-  // triangle.
+  // va + vb + vc equals |n|^2, but is less accurate where b and c are far. If vb + vc is larger, dividing by
+  // |n|^2 would put the point outside of the triangle.
   const Real sum = std::max(n.squaredNorm(), vb + vc), v = vb / sum, w = vc / sum;
   return {a + v * ab + w * ac, {1 - v - w, v, w}};
 }
 
-// The line through both at right angles gives the fraction s along p; held to the segment, the nearest t
-// along q; that held, the nearest s again. The squared distance is convex, so each step is the minimum over
-// what is still free.
+// The common perpendicular of the two lines gives the fraction s along p. It is clamped to the segment, then
+// the nearest t along q is found and clamped, then the nearest s again. The squared distance is convex, so
+// each step is the minimum over the remaining freedom.
 ClosestPoints closest_on_segments(const Vec3& p0, const Vec3& p1, const Vec3& q0, const Vec3& q1) {
   const Vec3 dp = p1 - p0, dq = q1 - q0, n = dp.cross(dq);
   const Real n2 = n.squaredNorm();

@@ -16,10 +16,10 @@
 namespace offstage::sim {
 namespace {
 
-/// Distances below this share of a mesh's diagonal count as none: files give coordinates in single precision,
-/// so what was flat when it was drawn is flat within 1e-7.
+/// Distances below this share of a mesh's diagonal count as zero. Files store coordinates in single
+/// precision, so faces that were modelled flat are flat within 1e-7.
 constexpr Real kSamePlace = 2e-7;
-/// How well the parts of an exact decomposition fill the solid, as a share of its volume.
+/// Accepted difference between the volume of the exact parts and that of the solid, as a share.
 constexpr Real kExact = 1e-6;
 
 using Method = ConvexDecomposition::Method;
@@ -30,7 +30,7 @@ Real relative_error(const std::vector<ConvexPolyhedron>& parts, Real volume) {
   return std::abs(sum - volume) / volume;
 }
 
-/// The exact method's parts, or why there are none.
+/// The parts of the exact method, or the reason why there are none.
 struct ExactResult {
   std::vector<ConvexPolyhedron> parts;
   std::string failure;
@@ -40,7 +40,7 @@ ExactResult failed(std::string why) {
   return {{}, std::move(why)};
 }
 
-/// Why the pieces of a surface cannot be cut apart, or nothing.
+/// Returns the reason why a surface cannot be decomposed exactly, or an empty string.
 std::string obstacle(const std::vector<Polyhedron>& shells, uint32_t max_reflex_edges) {
   uint32_t reflex = 0;
   for (const Polyhedron& shell : shells) {
@@ -67,7 +67,8 @@ ExactResult decompose_exactly(const TriangleMesh& mesh, const MeshTopology& topo
     result.parts.push_back(convex_hull(p.points));
     if (result.parts.back().dimension() < 3) result.parts.pop_back();
   }
-  // A hull holds its part and more if that is not convex, so equal volumes prove all of them convex.
+  // The hull of a part is larger than the part unless the part is convex, so equal volumes prove that all are
+  // convex.
   if (!(relative_error(result.parts, volume) <= kExact)) return failed("cuts that rounding spoils");
   const WindingNumber winding(mesh);
   for (const ConvexPolyhedron& p : result.parts)
@@ -75,7 +76,7 @@ ExactResult decompose_exactly(const TriangleMesh& mesh, const MeshTopology& topo
   return result;
 }
 
-/// The same surface with its inside where a positive volume needs it.
+/// Returns the same surface with faces reversed, for a positive volume.
 TriangleMesh turned_over(TriangleMesh mesh) {
   for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
   return mesh;

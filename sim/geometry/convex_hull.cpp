@@ -17,12 +17,12 @@ extern "C" {
 namespace offstage::sim {
 namespace {
 
-constexpr Real kFlat = 1e-9;       // of the extent: thinner is flat
-constexpr Real kCoplanar = 1e-10;  // of the extent: nearer to a face's plane is on it
+constexpr Real kFlat = 1e-9;       // share of the extent: a thinner set counts as flat
+constexpr Real kCoplanar = 1e-10;  // share of the extent: a nearer point counts as on a face's plane
 
 using Loops = std::vector<std::vector<uint32_t>>;
 
-/// Qhull's state, freed whatever happens. Its messages go to a file that is thrown away with it.
+/// State of Qhull, freed in all cases. Its messages go to a temporary file that is discarded.
 class Qhull {
  public:
   Qhull() : log_(std::tmpfile()) { qh_zero(&qh_, log_); }
@@ -35,7 +35,7 @@ class Qhull {
   Qhull(const Qhull&) = delete;
   Qhull& operator=(const Qhull&) = delete;
 
-  /// The hull's triangles, counter-clockwise from outside; empty if Qhull gives up.
+  /// Returns the triangles of the hull, counter-clockwise from outside; empty if Qhull fails.
   std::vector<Triangle> triangles(std::vector<Real>& coordinates, const char* command) {
     const int count = static_cast<int>(coordinates.size() / 3);
     std::vector<char> text(command, command + std::char_traits<char>::length(command) + 1);
@@ -57,10 +57,10 @@ class Qhull {
   std::FILE* log_;
 };
 
-/// The points' best line or plane fitted by extreme points: no sums, so far-off and repeated points do no
-/// harm.
+/// Line or plane through extreme points of the set. It uses no sums, so distant and repeated points do not
+/// reduce its accuracy.
 struct Frame {
-  int dimension;  // of the set: 0-3
+  int dimension;  // dimension of the set: 0-3
   Vec3 origin, along, normal;
   Real extent;
 };
@@ -102,7 +102,7 @@ ConvexPolyhedron segment_hull(std::span<const Vec3> points, const Frame& frame) 
   return {{*low, *high}, {}};
 }
 
-/// Hull of a flat set by Andrew's monotone chain; both sides of it are faces.
+/// Hull of a flat set by Andrew's monotone chain. It has two faces, one for each side.
 ConvexPolyhedron polygon_hull(std::span<const Vec3> points, const Frame& frame) {
   const Vec3 across = frame.normal.cross(frame.along);
   struct Flat {
@@ -141,13 +141,13 @@ ConvexPolyhedron polygon_hull(std::span<const Vec3> points, const Frame& frame) 
   return {std::move(vertices), faces};
 }
 
-/// Joins triangles that lie in one plane into polygons and drops the vertices inside them.
+/// Merges triangles that lie in one plane into polygons and removes the vertices inside them.
 class FaceMerger {
  public:
   FaceMerger(std::span<const Vec3> points, const std::vector<Triangle>& triangles, Real tolerance)
       : points_(points), triangles_(triangles), tolerance_(tolerance), group_(triangles.size(), kNoFace) {}
 
-  /// The polygons' vertices as indices of points; empty if some group has no single outline.
+  /// Returns the polygons as indices of points; empty if some group has no single outline.
   Loops faces() {
     find_neighbours();
     std::vector<uint32_t> by_area(triangles_.size());
@@ -187,7 +187,7 @@ class FaceMerger {
     }
   }
 
-  /// Floods from a triangle over neighbours that lie in its plane.
+  /// Flood fill from a triangle over neighbours that lie in its plane.
   void gather(uint32_t seed, uint32_t group) {
     const Vec3 normal = area(seed).normalized();
     const Real offset = normal.dot(corner(seed, 0));
@@ -199,14 +199,14 @@ class FaceMerger {
         bool flat = true;
         for (std::size_t k = 0; k < 3; ++k)
           flat &= std::abs(normal.dot(corner(next, k)) - offset) <= tolerance_;
-        // A sliver lies in every plane through its long side; one that faces away belongs elsewhere.
+        // A sliver lies in every plane through its long side; one that faces away belongs to another group.
         if (!flat || normal.dot(area(next)) < 0) continue;
         group_[next] = group;
         members_.back().push_back(next);
       }
   }
 
-  /// The boundary of a group as one loop; empty if there are several.
+  /// Returns the boundary of a group as one loop; empty if there are several.
   std::vector<uint32_t> outline(uint32_t group) const {
     std::vector<std::pair<uint32_t, uint32_t>> sides;
     for (uint32_t t : members_[group])
@@ -226,7 +226,7 @@ class FaceMerger {
     return loop.size() == sides.size() ? loop : std::vector<uint32_t>{};
   }
 
-  /// A vertex of only two polygons lies inside an edge.
+  /// Removes the vertices of only two polygons, which lie inside an edge.
   void drop_straight_vertices(Loops& loops) const {
     std::vector<uint32_t> uses(points_.size(), 0);
     for (const auto& loop : loops)
@@ -261,15 +261,15 @@ ConvexPolyhedron compact(std::span<const Vec3> points, Loops faces) {
   return {std::move(vertices), faces};
 }
 
-/// The polyhedron of a triangulated hull: with merged faces, or, where merging does not give a closed
-/// surface, with the triangles as they are. Empty if even they do not close.
+/// Builds the polyhedron of a triangulated hull with merged faces or, if merging does not give a closed
+/// surface, with the triangles as they are. Returns an empty one if even these do not close.
 ConvexPolyhedron assemble(std::span<const Vec3> points, const std::vector<Triangle>& triangles,
                           Real tolerance) {
   try {
     if (Loops faces = FaceMerger(points, triangles, tolerance).faces(); faces.size() >= 4)
       return compact(points, std::move(faces));
   } catch (const std::invalid_argument&) {
-    // A merged outline that touches itself; the triangles below have none.
+    // A merged outline touches itself; the triangles below have no such outlines.
   }
   Loops faces;
   for (const Triangle& t : triangles) faces.push_back({t[0], t[1], t[2]});
@@ -280,8 +280,8 @@ ConvexPolyhedron assemble(std::span<const Vec3> points, const std::vector<Triang
   }
 }
 
-/// The power of two that brings the largest coordinate to about 1 where products of four coordinates would
-/// overflow or vanish; else 0.
+/// Returns the power of two that scales the largest coordinate to about 1 if products of four coordinates
+/// would overflow or underflow; else 0.
 int exponent_to_one(std::span<const Vec3> points) {
   constexpr int kMost = 200;
   Real largest = 0;
@@ -318,7 +318,8 @@ ConvexPolyhedron convex_hull(std::span<const Vec3> points) {
   coordinates.reserve(3 * points.size());
   for (const Vec3& p : points)
     for (int k = 0; k < 3; ++k) coordinates.push_back((p[k] - frame.origin[k]) / frame.extent);
-  // Qt: triangles only. QJ, the last resort, joggles the input, so that no two faces are ever coplanar.
+  // Qt: triangles only. QJ, as the last resort, perturbs the input, so that no two faces are exactly
+  // coplanar.
   for (const char* command : {"qhull Qt Pp", "qhull QJ Pp"}) {
     std::vector<Real> copy = coordinates;
     const std::vector<Triangle> triangles = Qhull().triangles(copy, command);
@@ -326,7 +327,7 @@ ConvexPolyhedron convex_hull(std::span<const Vec3> points) {
     if (ConvexPolyhedron hull = assemble(points, triangles, kCoplanar * frame.extent); hull.face_count() >= 4)
       return hull;
   }
-  return polygon_hull(points, frame);  // too thin for Qhull: its shadow along the thin direction
+  return polygon_hull(points, frame);  // too thin for Qhull: use its projection along the thin direction
 }
 
 }  // namespace offstage::sim

@@ -93,7 +93,8 @@ void ConvexPolyhedron::find_edges() {
   vertex_neighbours_.start = vertex_edges_.start;
 }
 
-/// Newell's normal of each face, and the offset that puts every vertex of the face on the plane or below it.
+/// Computes Newell's normal of each face, and the offset for which all vertices of the face are on the plane
+/// or below it.
 void ConvexPolyhedron::find_planes() {
   const Real scale = scale_to_one(vertices_);
   for (uint32_t f = 0; f + 1 < face_vertices_.start.size(); ++f) {

@@ -1,7 +1,7 @@
 #pragma once
 /// Convex polyhedra with polygonal faces and the adjacency that V-Clip, hill climbing and the clipping of
-/// contact faces walk along. Flat, straight and single-point sets are convex too and are kept as such: a
-/// polygon is two faces back to back, a segment is an edge without faces, a point a lone vertex.
+/// contact faces use. Flat and straight sets and single points are convex, too, and are stored as such: a
+/// polygon is two faces back to back, a segment is an edge without faces, a point is a single vertex.
 
 #include <cstdint>
 #include <span>
@@ -19,8 +19,9 @@ class ConvexPolyhedron {
     uint32_t tail, head;
     uint32_t left, right;
   };
-  /// The unit vectors that bound the Voronoi regions at an edge (Mirtich, "V-Clip", 1998): along it from tail
-  /// to head, and perpendicular to it in its faces' planes, into the faces; zero where there is no face.
+  /// The unit vectors that bound the Voronoi regions at an edge (Mirtich, "V-Clip", 1998): along the edge
+  /// from tail to head, and perpendicular to it in the planes of its faces, pointing into the faces. Zero
+  /// where there is no face.
   struct EdgeFrame {
     Vec3 along, into_left, into_right;
   };
@@ -31,10 +32,10 @@ class ConvexPolyhedron {
   };
 
   ConvexPolyhedron() = default;
-  /// From faces whose vertices run counter-clockwise seen from outside. The caller vouches that the
-  /// polyhedron is convex and closed; convex_hull() makes one from any points. Without faces, at most two
-  /// vertices. Throws std::invalid_argument for an index out of range, a face of less than three vertices, or
-  /// an edge that does not have exactly two faces running along it in opposite directions.
+  /// Builds a polyhedron from faces whose vertices are counter-clockwise seen from outside. The caller
+  /// guarantees that it is convex and closed; convex_hull() makes one from any points. Without faces, at most
+  /// two vertices are allowed. Throws std::invalid_argument for an index out of range, a face of less than
+  /// three vertices, or an edge that does not have exactly two faces in opposite directions.
   ConvexPolyhedron(std::vector<Vec3> vertices, std::span<const std::vector<uint32_t>> faces);
 
   std::span<const Vec3> vertices() const { return vertices_; }
@@ -47,7 +48,7 @@ class ConvexPolyhedron {
 
   /// Vertices around a face, counter-clockwise seen from outside.
   std::span<const uint32_t> face_vertices(uint32_t face) const { return face_vertices_.row(face); }
-  /// Edges around a face: the k-th joins the k-th vertex and the next.
+  /// Edges around a face: edge k connects vertex k and the next.
   std::span<const uint32_t> face_edges(uint32_t face) const { return face_edges_.row(face); }
   /// Edges at a vertex, and the vertices at their other ends, in the same order.
   std::span<const uint32_t> vertex_edges(uint32_t vertex) const { return vertex_edges_.row(vertex); }
@@ -57,14 +58,14 @@ class ConvexPolyhedron {
 
   /// 3 for a solid, 2 for a polygon, 1 for a segment, 0 for a point.
   int dimension() const { return dimension_; }
-  /// The mean of the vertices: a point inside.
+  /// The mean of the vertices, a point inside.
   const Vec3& centre() const { return centre_; }
   /// Distance of the farthest vertex from the frame's origin [m].
   Real reach() const { return reach_; }
   /// Box around the vertices.
   const Aabb& box() const { return box_; }
 
-  /// The faces cut into triangles: a fan each.
+  /// The faces as triangles, one fan for each.
   TriangleMesh triangles() const;
 
  private:
@@ -94,7 +95,7 @@ class ConvexPolyhedron {
 /// A box of full edge lengths `size` about the origin.
 ConvexPolyhedron box_polyhedron(const Vec3& size);
 
-/// Largest height of a vertex over a face's plane, over all faces: at most rounding if it is convex. [m]
+/// Greatest height of a vertex above the plane of a face; at most rounding for a convex polyhedron [m].
 Real concavity(const ConvexPolyhedron& p);
 
 }  // namespace offstage::sim

@@ -68,7 +68,7 @@ class Merger {
     return best;
   }
 
-  /// The hull takes the place of the first; the second goes.
+  /// The hull replaces the first part; the second is removed.
   void join(const Pair& pair) {
     const auto erase = [&](auto& list) { list.erase(list.begin() + static_cast<std::ptrdiff_t>(pair.b)); };
     parts_[pair.a] = common_hull(parts_[pair.a], parts_[pair.b]);
@@ -85,7 +85,7 @@ class Merger {
 
   std::vector<ConvexPolyhedron> parts_;
   std::vector<Real> volumes_;
-  std::vector<std::vector<Real>> gains_;  // of joining a and b, at [a][b] with a < b
+  std::vector<std::vector<Real>> gains_;  // gain of joining a and b at [a][b], a < b
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
 #pragma once
-/// Fewer convex parts for a little more volume.
+/// Merging of convex parts, at the price of some additional volume.
 
 #include <vector>
 
@@ -10,9 +10,9 @@ namespace offstage::sim {
 /// Volume of a convex polyhedron; 0 if it is flat. [m^3]
 Real hull_volume(const ConvexPolyhedron& p);
 
-/// Replaces two parts by their common hull, first those that gain the least volume by it: while there are
-/// more than `max_parts`, and while the gain is at most `free_gain` [m^3]. Parts whose boxes are apart come
-/// last.
+/// Replaces two parts by their common hull, those with the least additional volume first, while there are
+/// more than `max_parts` and then while the additional volume is at most `free_gain` [m^3]. Parts whose boxes
+/// are separate are merged last.
 std::vector<ConvexPolyhedron> merge_hulls(std::vector<ConvexPolyhedron> parts, std::size_t max_parts,
                                           Real free_gain);
 

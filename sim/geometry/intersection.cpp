@@ -44,8 +44,8 @@ Aabb box_of(std::span<const Vec3> points) {
   return box;
 }
 
-/// Whether the line through two points of `a`, seen along an axis, has `a` on one side, perhaps on the line,
-/// and `b` strictly on the other.
+/// Returns whether the line through two points of `a`, in a projection along an axis, has all of `a` on one
+/// side or on it, and all of `b` strictly on the other side.
 bool edge_separates(std::span<const Vec3> a, std::span<const Vec3> b, int dropped) {
   for (std::size_t i = 0; i < a.size(); ++i)
     for (std::size_t j = i + 1; j < a.size(); ++j) {
@@ -59,10 +59,10 @@ bool edge_separates(std::span<const Vec3> a, std::span<const Vec3> b, int droppe
   return false;
 }
 
-/// Whether the hulls of up to three points each, all in one plane, meet. In two dimensions disjoint convex
-/// polygons are separated by an edge of one of them, or lie on one line and have disjoint boxes. Seen along
-/// each of the coordinate axes: along one at least the plane is not seen edge-on, and along the others what
-/// is separated in the view is separated in space.
+/// Returns whether the hulls of up to three points each, all in one plane, intersect. In two dimensions
+/// disjoint convex polygons are separated by an edge of one of them, or lie on one line and have disjoint
+/// boxes. The test is done in the projections along all coordinate axes: at least one of them does not
+/// project the plane to a line, and a separation in any projection is a separation in space.
 bool coplanar_intersect(std::span<const Vec3> a, std::span<const Vec3> b) {
   if (!box_of(a).intersects(box_of(b))) return false;
   for (int axis = 0; axis < 3; ++axis)
@@ -76,7 +76,7 @@ bool collinear(const TriangleVertices& t) {
   return true;
 }
 
-/// Whether two collinear point sets lie on lines that are not in one plane.
+/// Whether two collinear point sets lie on skew lines.
 bool skew(std::span<const Vec3> a, std::span<const Vec3> b) {
   for (std::size_t i = 0; i < a.size(); ++i)
     for (std::size_t j = 0; j < b.size(); ++j)
@@ -90,9 +90,9 @@ bool any_edge_intersects(const TriangleVertices& edges, const TriangleVertices& 
   return false;
 }
 
-/// The vertex that is alone on its side of a plane, the others being on the other side or in the plane, and
-/// its side; or, where two are on one side and the third is in the plane, that third, as if it were on the
-/// other.
+/// Returns the vertex that is alone on its side of a plane, with its side; the others are on the other side
+/// or in the plane. If two vertices are on one side and the third is in the plane, the third one is returned,
+/// as if it were on the other side.
 std::pair<std::size_t, int> lone_vertex(const Signs& s) {
   for (std::size_t i = 0; i < 3; ++i)
     if (s[i] != 0 && s[i] * s[(i + 1) % 3] <= 0 && s[i] * s[(i + 2) % 3] <= 0) return {i, s[i]};
@@ -119,7 +119,7 @@ bool segment_intersects_triangle(const Vec3& p, const Vec3& q, const TriangleVer
     const std::array<Vec3, 2> segment = {p, q};
     return !(collinear(t) && skew(segment, t)) && coplanar_intersect(segment, t);
   }
-  // The line crosses the plane, and the triangle if it passes its edges all on one hand.
+  // The line crosses the plane, and the triangle if all edges have it on the same side.
   int low = 0, high = 0;
   for (std::size_t i = 0; i < 3; ++i) {
     const int side = sign(orient3d(p, q, t[i], t[(i + 1) % 3]));
@@ -136,12 +136,12 @@ bool triangles_intersect(const TriangleVertices& a, const TriangleVertices& b) {
   if (one_sided(side_b)) return false;
   if (all_zero(side_a) && all_zero(side_b))
     return !(collinear(a) && collinear(b) && skew(a, b)) && coplanar_intersect(a, b);
-  // A triangle without a plane covers what its edges cover.
+  // A triangle without a plane is the union of its edges.
   if (all_zero(side_a)) return any_edge_intersects(b, a);
   if (all_zero(side_b)) return any_edge_intersects(a, b);
-  // Both cut the line common to the planes in an interval that ends on the edges at their lone vertices.
-  // Turned so that each lone vertex is above the other's plane, each interval must begin before the other
-  // ends.
+  // Each triangle cuts the common line of the planes in an interval that ends on the edges at the triangle's
+  // lone vertex. The triangles are oriented so that each lone vertex is above the plane of the other; they
+  // intersect if each interval begins before the other ends.
   const auto [i, above_b] = lone_vertex(side_a);
   const auto [j, above_a] = lone_vertex(side_b);
   const Vec3 &p1 = a[i], &p2 = b[j];

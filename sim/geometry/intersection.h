@@ -1,9 +1,9 @@
 #pragma once
-/// Whether points, segments and triangles meet (physics H7). All are closed sets: touching counts. Triangles
-/// may be degenerate, and are then the segment or the point that they cover.
+/// Intersection tests of points, segments and triangles (physics H7). All are closed sets, so touching
+/// counts. Triangles may be degenerate; they are then segments or points.
 ///
-/// Tests among points, segments and triangles are exact for the coordinates as given (predicates.h): they are
-/// symmetric, do not depend on the order of vertices, and nothing slips between two triangles that share an
+/// Tests among points, segments and triangles are exact for the given coordinates (predicates.h). They are
+/// symmetric, do not depend on the order of vertices, and leave no gap between two triangles that share an
 /// edge. Tests against boxes and spheres are rounded, with a relative error of a few units in the last place.
 
 #include <array>

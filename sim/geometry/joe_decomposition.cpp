@@ -13,16 +13,18 @@
 namespace offstage::sim {
 namespace {
 
-/// Angles that differ by less are equal [rad].
+/// Angles that differ by less than this are equal [rad].
 constexpr Real kFlatFace = 1e-6;
-/// Shares of the limits that are asked for in turn.
+/// Factors by which the limits are relaxed, one after the other.
 constexpr std::array<Real, 5> kRelaxed = {1, 0.5, 0.25, 0.1, 0};
-/// Shares of the dihedral angle that cuts are tried at, after the planes of the neighbourhood (F.2).
+/// Shares of the dihedral angle at which cuts are tried, after the planes of neighbouring faces and edges
+/// (F.2).
 constexpr std::array<Real, 5> kShares = {0.25, 0.5, 0.75, 0.375, 0.625};
 constexpr std::size_t kMaxCandidates = 12;
-/// Reflex edges with an acceptable cut that are compared before the best of their cuts is made.
+/// Number of reflex edges with an acceptable cut that are compared before the best of their cuts is made.
 constexpr int kCompared = 8;
-/// Bounds of the whole work: parts, and half-edges of the polyhedra that candidate planes are tried on.
+/// Bounds of the total work: number of parts, and of half-edges of the polyhedra for which candidate planes
+/// are tried.
 constexpr std::size_t kMaxParts = 1024;
 constexpr Real kMaxWork = 5e7;
 
@@ -32,8 +34,8 @@ Real mean_edge(const Polyhedron& p) {
   return sum / static_cast<Real>(p.half_edges.size());
 }
 
-/// Angles at which a plane splits the wedge of a reflex edge into two that are not reflex, as F.2 lists them:
-/// along the two faces, through neighbouring edges, by fractions of the angle.
+/// Angles of the planes that split the wedge of a reflex edge into two convex wedges, as F.2 lists them:
+/// along the two faces, through neighbouring edges, and at fractions of the angle.
 class Candidates {
  public:
   Candidates(const Polyhedron& p, uint32_t h, Real tolerance) : wedge_(wedge(p, h)) {
@@ -67,11 +69,11 @@ class Candidates {
   std::vector<Real> angles_;
 };
 
-/// How good a cut is.
+/// Quality of a cut.
 struct Merit {
-  int resolved = 0;                                       ///< reflex edges gone, less those cut in two
-  Real dihedral = std::numeric_limits<Real>::infinity();  ///< smallest angle it makes [rad]
-  Real distance = std::numeric_limits<Real>::infinity();  ///< of the nearest vertex off it [m]
+  int resolved = 0;                                       ///< reflex edges removed, less those cut in two
+  Real dihedral = std::numeric_limits<Real>::infinity();  ///< smallest angle between the cut and a face [rad]
+  Real distance = std::numeric_limits<Real>::infinity();  ///< distance of the nearest vertex off the cut [m]
 };
 
 void measure_distances(const Polyhedron& p, const Cut& cut, uint32_t face, Real tolerance, Merit& merit) {
@@ -81,7 +83,7 @@ void measure_distances(const Polyhedron& p, const Cut& cut, uint32_t face, Real 
   });
 }
 
-/// Nothing if a side of the cut is not inside the solid, which only rounding can bring about.
+/// Returns nothing if a side of the cut is not inside the solid, which only rounding can cause.
 std::optional<Merit> merit(const Polyhedron& p, const Cut& cut, Real tolerance) {
   Merit m;
   for (std::size_t k = 0; k < cut.corners.size(); ++k) {
@@ -141,8 +143,8 @@ class Decomposer {
     return edges;
   }
 
-  /// The best of the acceptable cuts of the first edges that have one, under the strictest limits that leave
-  /// any.
+  /// Returns the best of the acceptable cuts of the first edges that have one, under the strictest limits
+  /// that allow any.
   std::optional<RatedCut> best_cut(const Polyhedron& p, const std::vector<uint32_t>& reflex) {
     const Real edge = mean_edge(p);
     std::optional<RatedCut> best;
@@ -184,7 +186,7 @@ class Decomposer {
 
 bool is_reflex(const Polyhedron& p, uint32_t h) {
   const Real angle = wedge(p, h).angle;
-  // A fin without thickness has an angle of 0 or, by rounding, a full turn.
+  // A fin without thickness has an angle of 0 or, by rounding, of a full turn.
   return angle > std::numbers::pi + kFlatFace && angle < 2 * std::numbers::pi - kFlatFace;
 }
 

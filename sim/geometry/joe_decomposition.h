@@ -1,7 +1,7 @@
 #pragma once
 /// Exact convex decomposition: reflex edges are resolved by cut planes, after Joe, "Tetrahedral mesh
-/// generation in polyhedral regions based on convex polyhedron decompositions" (1994), as the book's appendix
-/// F has it.
+/// generation in polyhedral regions based on convex polyhedron decompositions" (1994), as described in the
+/// book's appendix F.
 
 #include <string>
 #include <vector>
@@ -10,10 +10,11 @@
 
 namespace offstage::sim {
 
-/// What a cut must keep from a polyhedron, at first; relaxed in steps to nothing where no cut keeps it.
+/// Initial limits of a cut. They are relaxed in steps, at last to zero, if no cut satisfies them.
 struct CutLimits {
   Real dihedral = 0;  ///< smallest angle between the cut and a face it meets [rad]
-  Real distance = 0;  ///< of the cut from vertices next to it that are off it, share of the mean edge
+  /// Smallest distance of the cut from neighbouring vertices off it, as a share of the mean edge.
+  Real distance = 0;
 };
 
 /// Whether the dihedral angle at a half-edge is over pi.
@@ -21,11 +22,11 @@ bool is_reflex(const Polyhedron& p, uint32_t half_edge);
 uint32_t count_reflex_edges(const Polyhedron& p);
 
 struct JoeResult {
-  std::vector<Polyhedron> parts;  ///< without reflex edges; none if it failed
-  std::string failure;            ///< why; else empty
+  std::vector<Polyhedron> parts;  ///< parts without reflex edges; empty if it failed
+  std::string failure;            ///< reason of the failure; otherwise empty
 };
 
-/// Cuts polyhedra into parts without reflex edges. Points within `tolerance` of a cut are taken to be on it.
+/// Cuts polyhedra into parts without reflex edges. Points within `tolerance` of a cut count as on it.
 JoeResult resolve_reflex_edges(std::vector<Polyhedron> polyhedra, const CutLimits& limits, Real tolerance);
 
 }  // namespace offstage::sim

@@ -24,9 +24,9 @@ struct Moments {
   }
 };
 
-/// Sums over some triangles the signed tetrahedra that they span with `origin`. For a tetrahedron (0, a, b,
-/// c) with D = a.(b x c) and s = a + b + c: volume D/6, first moment D s/24, second D (aa' + bb' + cc' +
-/// ss')/120.
+/// Sums the signed tetrahedra that some triangles span with `origin`. A tetrahedron (0, a, b, c) with D =
+/// a.(b x c) and s = a + b + c has the volume D/6, the first moment D s/24 and the second moment D (aa' + bb'
+/// + cc' + ss')/120.
 Moments tetrahedra(const TriangleMesh& mesh, const Vec3& origin, std::size_t begin, std::size_t end) {
   Moments sum;
   for (std::size_t i = begin; i < end; ++i) {
@@ -97,7 +97,7 @@ MassProperties closed_form(const MeshShape&) {
 }  // namespace
 
 MassProperties mass_properties(const TriangleMesh& mesh) {
-  // Blocks of fixed size, summed in order: the same bits for any number of threads.
+  // Blocks of fixed size are summed in order, for the same bits with any number of threads.
   constexpr std::size_t kBlock = 8192;
   const std::size_t count = mesh.triangles.size();
   const Vec3 origin = middle(mesh);

@@ -22,11 +22,11 @@ struct PrincipalInertia {
   Quat orientation;  ///< shape frame from principal frame
 };
 
-/// Surface integrals over the triangles; the mesh should be closed (see MeshDefects), else the result means
-/// nothing.
+/// Volume integrals over the solid that the triangles bound. The mesh should be closed (see MeshDefects),
+/// otherwise the result is meaningless.
 MassProperties mass_properties(const TriangleMesh& mesh);
 
-/// Closed forms of the primitives. A Plane has none: volume 0. MeshShape is not accepted (it needs the mesh).
+/// Closed forms of the primitives. A Plane has volume 0. MeshShape is not accepted (it needs the mesh).
 MassProperties mass_properties(const Shape& primitive);
 
 PrincipalInertia diagonalise(const Mat3& inertia);

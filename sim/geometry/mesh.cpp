@@ -9,7 +9,7 @@
 namespace offstage::sim {
 namespace {
 
-/// The bits of a position, with both zeros made one.
+/// The bits of a position; -0 counts as +0.
 struct PositionKey {
   std::array<uint64_t, 3> bits;
 
@@ -47,7 +47,7 @@ Real corner_angle(const TriangleMesh& mesh, const Triangle& t, std::size_t k) {
   return std::atan2(u.cross(v).norm(), u.dot(v));
 }
 
-/// One side of a face, filed under its lower vertex.
+/// One side of a face, stored under its lower vertex.
 struct HalfEdge {
   uint32_t other;  // the higher vertex
   uint32_t face;
@@ -106,7 +106,7 @@ class HalfEdges {
   std::vector<HalfEdge> edges_;
 };
 
-/// Six times the signed volume, against a point near the mesh so that little cancels.
+/// Six times the signed volume, relative to a point near the mesh to limit cancellation.
 Real signed_volume6(const TriangleMesh& mesh) {
   if (mesh.vertices.empty()) return 0;
   const Vec3 origin = mesh.vertices.front();
@@ -135,7 +135,7 @@ std::string MeshDefects::describe() const {
 
 TriangleMesh weld(const TriangleMesh& mesh) {
   constexpr uint32_t kUnused = 0xffffffff;
-  // The first vertex at each position stands for all of them.
+  // The first vertex at a position represents all of them.
   std::unordered_map<PositionKey, uint32_t, PositionHash> first;
   first.reserve(mesh.vertices.size());
   std::vector<uint32_t> representative(mesh.vertices.size());
@@ -194,8 +194,8 @@ MeshTopology::MeshTopology(const TriangleMesh& mesh) {
   for (uint32_t face = 0; face < faces; ++face)
     for (uint32_t v : mesh.triangles[face]) vertex_faces_[next[v]++] = face;
 
-  // Neighbours of each vertex. Edges come in ascending (low, high) order, so for any vertex first all its
-  // lower neighbours arrive, ascending, then all its higher ones.
+  // Neighbours of each vertex. Edges are in ascending (low, high) order, so each vertex gets first its lower
+  // neighbours, ascending, and then its higher ones.
   vertex_neighbour_start_.assign(vertices + 1, 0);
   for (const Edge& e : edges_)
     for (uint32_t v : e.vertices) ++vertex_neighbour_start_[v];
@@ -207,8 +207,9 @@ MeshTopology::MeshTopology(const TriangleMesh& mesh) {
     vertex_neighbours_[next[e.vertices[1]]++] = e.vertices[0];
   }
 
-  // Normals by feature; those of edges and vertices are also the pseudonormals that decide inside and outside
-  // (Baerentzen and Aanaes, "Signed distance computation using the angle weighted pseudonormal", 2005).
+  // Normals by feature. Those of edges and vertices are also the pseudonormals that determine inside and
+  // outside (Baerentzen and Aanaes, "Signed distance computation using the angle weighted pseudonormal",
+  // 2005).
   face_normals_.resize(faces);
   vertex_normals_.assign(vertices, Vec3::Zero());
   for (std::size_t face = 0; face < faces; ++face) {

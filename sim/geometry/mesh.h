@@ -15,7 +15,7 @@ namespace offstage::sim {
 using Triangle = std::array<uint32_t, 3>;
 inline constexpr uint32_t kNoFace = 0xffffffff;
 
-/// Vertices and triangles as a user gives them.
+/// Vertices and triangles as given by the user.
 struct TriangleMesh {
   std::vector<Vec3> vertices;       ///< [m]
   std::vector<Triangle> triangles;  ///< indices into `vertices`
@@ -27,7 +27,7 @@ struct Edge {
   std::array<uint32_t, 2> faces;
 };
 
-/// What is wrong with a mesh as the surface of a solid; all zero for a closed, consistently wound one.
+/// Defects of a mesh as the surface of a solid. All are zero for a closed mesh with consistent winding.
 struct MeshDefects {
   uint32_t border_edges = 0;        ///< edges with one face: the mesh is open
   uint32_t non_manifold_edges = 0;  ///< edges with three or more faces
@@ -36,12 +36,12 @@ struct MeshDefects {
   bool inverted = false;            ///< the enclosed volume is negative
 
   bool closed() const { return border_edges == 0 && non_manifold_edges == 0 && flipped_edges == 0; }
-  /// One line that names every defect, empty if there is none.
+  /// Returns one line that names every defect; empty if there is none.
   std::string describe() const;
 };
 
-/// Merges vertices at the same position (bitwise), drops faces that collapse, then unused vertices. Importers
-/// split vertices along texture seams; physics needs them joined.
+/// Merges vertices at the same position (bitwise), removes faces that become degenerate, then unused
+/// vertices. Importers split vertices along texture seams; physics needs them joined.
 TriangleMesh weld(const TriangleMesh& mesh);
 
 /// Connectivity and normals of a mesh. Every query is O(1).

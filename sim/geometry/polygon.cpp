@@ -10,7 +10,7 @@ namespace {
 
 using Loop = std::vector<uint32_t>;
 
-/// Sine of the turn at a vertex below which the polygon counts as straight there [rad].
+/// Sine of the turn at a vertex below which the polygon counts as straight there.
 constexpr Real kFlatPolygon = 1e-6;
 
 Real cross(const Vec2& a, const Vec2& b) {
@@ -28,19 +28,19 @@ Real distance_to_segment(const Vec2& p, const Vec2& a, const Vec2& b) {
   return (p - a - t * d).norm();
 }
 
-/// Whether two segments cross at a point inside both.
+/// Whether two segments cross at a point interior to both.
 bool cross_properly(const Vec2& a, const Vec2& b, const Vec2& c, const Vec2& d) {
   const Real c_side = cross(b - a, c - a), d_side = cross(b - a, d - a);
   const Real a_side = cross(d - c, a - c), b_side = cross(d - c, b - c);
   return ((c_side > 0) != (d_side > 0)) && ((a_side > 0) != (b_side > 0));
 }
 
-/// Part of a polygon, being cut along diagonals.
+/// Part of a polygon that is being cut along diagonals.
 class Divider {
  public:
   Divider(std::span<const Vec2> polygon, Real tolerance) : points_(polygon), tolerance_(tolerance) {}
 
-  /// False if a reflex vertex has no diagonal.
+  /// Returns false if a reflex vertex has no diagonal.
   bool divide(Loop loop) {
     std::vector<Loop> rest = {std::move(loop)};
     while (!rest.empty()) {
@@ -96,7 +96,8 @@ class Divider {
   bool is_diagonal(const Loop& loop, std::size_t i, std::size_t j) const {
     const Vec2 &a = point(loop, i), &b = point(loop, j);
     if (!starts_inside(loop, i, b - a) || !starts_inside(loop, j, a - b)) return false;
-    // Where the outline touches itself, several corners are at an end; its wedge has told them apart.
+    // Where the outline touches itself, several corners are at an end point; the wedge test has selected the
+    // right one.
     const auto is_end = [&](const Vec2& p) {
       return (p - a).norm() <= tolerance_ || (p - b).norm() <= tolerance_;
     };
@@ -109,7 +110,7 @@ class Divider {
     return true;
   }
 
-  /// The diagonal from a reflex vertex that removes most reflex angles, the shortest of these.
+  /// Returns the diagonal from a reflex vertex that removes most reflex angles; among equals the shortest.
   std::size_t best_diagonal(const Loop& loop, std::size_t from) const {
     std::size_t best = loop.size();
     std::tuple<int, Real> best_cost{0, std::numeric_limits<Real>::infinity()};

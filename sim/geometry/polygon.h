@@ -1,5 +1,5 @@
 #pragma once
-/// Simple polygons in the plane: what capping a cut solid needs.
+/// Simple polygons in the plane, for the caps of a solid that is cut.
 
 #include <cstdint>
 #include <span>
@@ -15,9 +15,9 @@ using Vec2 = Eigen::Vector2d;
 bool well_inside(std::span<const Vec2> polygon, const Vec2& p, Real margin);
 
 /// Cuts a counter-clockwise polygon into convex ones along diagonals, at most one per reflex vertex. The
-/// outline may touch itself at vertices but not cross itself. Vertices in the middle of a straight side stay
-/// vertices of every part they touch. Each part lists indices, counter-clockwise. Distances below `tolerance`
-/// count as none; if they leave no diagonal, the result is empty.
+/// outline may touch itself at vertices but must not cross itself. Vertices in the middle of a straight side
+/// remain vertices of every part that they touch. Each part lists indices, counter-clockwise. Distances below
+/// `tolerance` count as zero. The result is empty if no diagonal is left.
 std::vector<std::vector<uint32_t>> convex_pieces(std::span<const Vec2> polygon, Real tolerance);
 
 }  // namespace offstage::sim

@@ -19,7 +19,7 @@ Vec3 doubled_area_of(const TriangleMesh& mesh, uint32_t face) {
   return (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a);
 }
 
-/// Least height of a triangle.
+/// Smallest height of a triangle.
 Real thickness(const TriangleMesh& mesh, uint32_t face, Real area2) {
   const Triangle& t = mesh.triangles[face];
   Real longest = 0;
@@ -28,8 +28,9 @@ Real thickness(const TriangleMesh& mesh, uint32_t face, Real area2) {
   return longest > 0 ? area2 / longest : 0;
 }
 
-/// The plane of each triangle, shared by neighbours that lie in one. Grown from the largest triangles, whose
-/// normals are the surest; slivers, which have none, go along with their neighbours.
+/// The plane of each triangle, shared by neighbours that lie in it. Planes grow from the largest triangles,
+/// whose normals are the most accurate. Slivers have no reliable normal and take the plane of their
+/// neighbours.
 std::vector<FacePlane> shared_planes(const TriangleMesh& mesh, const MeshTopology& topology, Real tolerance) {
   const auto n = static_cast<uint32_t>(mesh.triangles.size());
   std::vector<Real> area(n);
@@ -66,7 +67,7 @@ std::vector<FacePlane> shared_planes(const TriangleMesh& mesh, const MeshTopolog
   return planes;
 }
 
-/// The faces of one piece of surface, moved to a polyhedron of their own.
+/// Copies the faces of one piece of surface to a polyhedron of its own.
 Polyhedron extract(const Polyhedron& p, std::span<const uint32_t> faces, std::vector<uint32_t>& new_point,
                    std::vector<uint32_t>& new_half_edge) {
   Polyhedron part;

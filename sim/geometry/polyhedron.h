@@ -2,8 +2,8 @@
 /// The boundary of a solid as convex polygons joined along half-edges, which Joe's decomposition cuts
 /// (physics N8, the book's appendix F).
 ///
-/// What touches what is told by the twins of the half-edges alone. Two faces may lie in the same place
-/// without being joined, as the two sides of a cut through a ring do.
+/// Connections are defined by the twins of the half-edges alone. Two faces may lie in the same place without
+/// being connected, as the two sides of a cut through a ring do.
 
 #include <cstdint>
 #include <vector>
@@ -15,8 +15,9 @@ namespace offstage::sim {
 
 struct Polyhedron {
   using Plane = ConvexPolyhedron::Plane;
-  /// The face of a half-edge is on its left, seen from outside. `sibling` is another one from the same point,
-  /// and so on round to this one, whether or not they are joined around a corner; set by components().
+  /// The face of a half-edge is on its left, seen from outside. `sibling` is another half-edge from the same
+  /// point; the siblings form a cycle, whether or not they are connected around a corner. Set by
+  /// components().
   struct HalfEdge {
     uint32_t origin = 0, face = 0, next = 0, previous = 0, twin = 0, sibling = 0;
   };
@@ -35,7 +36,7 @@ struct Polyhedron {
   const Vec3& head_point(uint32_t h) const { return points[head(h)]; }
   const Plane& plane(uint32_t h) const { return faces[half_edges[h].face].plane; }
 
-  /// Calls f for every half-edge that leaves the origin of `h` and is joined to it around that corner.
+  /// Calls f for every half-edge that leaves the origin of `h` and is connected with it around that corner.
   template <class F>
   void for_each_leaving(uint32_t h, F&& f) const {
     uint32_t k = h;
@@ -55,8 +56,8 @@ struct Polyhedron {
   }
 };
 
-/// The inside at an edge, as angles about it: 0 along the face on the left, growing through the solid to
-/// `angle` at the face on the right.
+/// The solid around an edge, by angles about the edge: 0 along the face on the left, increasing through the
+/// solid to `angle` at the face on the right.
 struct Wedge {
   Vec3 along;   ///< unit direction of the edge
   Vec3 normal;  ///< of the left face
@@ -64,7 +65,7 @@ struct Wedge {
   Real angle;   ///< the interior dihedral angle, in [0, 2 pi) [rad]
 
   Wedge(const Vec3& along, const Vec3& left_normal, const Vec3& right_normal);
-  /// Of a direction, which need not be across the edge. In [0, 2 pi). [rad]
+  /// Angle of a direction, which need not be perpendicular to the edge; in [0, 2 pi) [rad].
   Real angle_of(const Vec3& direction) const;
   Vec3 direction(Real theta) const;
   /// Unit normal of the plane through the edge and direction(theta), on the side of the left face.
@@ -74,9 +75,9 @@ struct Wedge {
 /// The wedge at a half-edge, between its face and its twin's.
 Wedge wedge(const Polyhedron& p, uint32_t half_edge);
 
-/// Triangles in one plane within `tolerance` are given the same plane. The mesh must be closed and
-/// consistently wound; triangles that repeat a vertex are left out. One polyhedron for each connected piece
-/// of the surface.
+/// Builds one polyhedron for each connected piece of the surface. Triangles that lie in one plane within
+/// `tolerance` get the same plane. The mesh must be closed and consistently wound; triangles that repeat a
+/// vertex are left out.
 std::vector<Polyhedron> boundaries(const TriangleMesh& mesh, const MeshTopology& topology, Real tolerance);
 
 /// The connected pieces of a surface, each as a polyhedron of its own.

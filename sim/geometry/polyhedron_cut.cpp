@@ -16,11 +16,10 @@ namespace {
 using CutPlane = Polyhedron::Plane;
 
 constexpr uint32_t kNoVertex = 0xffffffff;
-/// Angles below this are a full turn, and angles that differ by less are the same [rad].
+/// Angles below this are a full turn, and angles that differ by less than this are equal [rad].
 constexpr Real kNoTurn = 1e-7;
 
-/// Puts a point in the middle of an edge. The half-edge keeps its origin; the one after it starts at the
-/// point.
+/// Inserts a point in an edge. The half-edge keeps its origin; the half-edge after it starts at the point.
 void split_edge(Polyhedron& p, uint32_t h, const Vec3& point) {
   const uint32_t t = p.half_edges[h].twin;
   const auto h2 = static_cast<uint32_t>(p.half_edges.size()), t2 = h2 + 1;
@@ -38,7 +37,7 @@ void split_edge(Polyhedron& p, uint32_t h, const Vec3& point) {
 }
 
 /// Divides a face between the origins of two of its half-edges. Returns the half-edge from the first origin
-/// to the second, which bounds a new face on its left.
+/// to the second, which has a new face on its left.
 uint32_t split_face(Polyhedron& p, uint32_t from, uint32_t to) {
   const uint32_t old_face = p.half_edges[from].face;
   const auto new_face = static_cast<uint32_t>(p.faces.size());
@@ -54,8 +53,8 @@ uint32_t split_face(Polyhedron& p, uint32_t from, uint32_t to) {
   return there;
 }
 
-/// Closes one side of a cut. `outline[k]` runs from corner k to corner k + 1 if the cap is on its right, back
-/// if `mirrored`.
+/// Closes one side of a cut. `outline[k]` leads from corner k to corner k + 1 if the cap is on its right, and
+/// back if `mirrored`.
 void add_cap(Polyhedron& p, std::span<const std::vector<uint32_t>> pieces, std::span<const uint32_t> origins,
              std::span<const uint32_t> outline, const CutPlane& plane, bool mirrored) {
   const auto n = static_cast<uint32_t>(outline.size());
@@ -86,7 +85,7 @@ void add_cap(Polyhedron& p, std::span<const std::vector<uint32_t>> pieces, std::
   }
 }
 
-/// Follows the outline of a cut face.
+/// Traces the outline of a cut face.
 class Tracer {
  public:
   Tracer(const Polyhedron& p, const CutPlane& plane, Real tolerance)
@@ -112,7 +111,7 @@ class Tracer {
     Corner at = {p_.head_point(start), p_.half_edges[start].next, false, false};
     pass(seen_edge_, edge(start));
     seen_point_[p_.origin(start)] = true;
-    // Every step crosses a new face or takes a new edge.
+    // The loop ends, because every step crosses a new face or takes a new edge.
     for (;;) {
       const Corner last = cut.corners.back();
       if (at.on_edge) {
@@ -139,25 +138,25 @@ class Tracer {
   Real height_at_head(uint32_t h) const { return height_[p_.head(h)]; }
   Vec2 flat(const Vec3& d) const { return {x_axis_.dot(d), y_axis_.dot(d)}; }
 
-  /// One number for both half-edges.
+  /// The same number for both half-edges of an edge.
   uint32_t edge(uint32_t h) const { return std::min(h, p_.half_edges[h].twin); }
 
-  /// False if it has been passed before.
+  /// Marks i as passed; returns false if it was passed before.
   static bool pass(std::vector<bool>& seen, uint32_t i) {
     if (seen[i]) return false;
     seen[i] = true;
     return true;
   }
 
-  /// Where the plane meets an edge; the same point for both half-edges.
+  /// Intersection of the plane with an edge; the same point for both half-edges.
   Vec3 crossing(uint32_t h) const {
     uint32_t a = p_.origin(h), b = p_.head(h);
     if (a > b) std::swap(a, b);
     return p_.points[a] + height_[a] / (height_[a] - height_[b]) * (p_.points[b] - p_.points[a]);
   }
 
-  /// Where the plane leaves a face that it enters at the origin or in the middle of a half-edge whose head is
-  /// below. Faces are convex: it is where their outline comes up again.
+  /// Returns where the plane leaves a face that it enters at the origin or in the middle of a half-edge whose
+  /// head is below. Faces are convex, so this is where the outline comes up again.
   Corner far_side(uint32_t h) const {
     uint32_t k = p_.half_edges[h].next;
     while (height_at_head(k) < 0) k = p_.half_edges[k].next;
@@ -165,10 +164,10 @@ class Tracer {
     return {p_.head_point(k), p_.half_edges[k].next, false, false};
   }
 
-  /// The way on from a vertex: the one with the smallest angle inside the cut face (F.2). Corners of the
-  /// surface that meet here in a point count if they are truly in the way, for where solids touch in a point
-  /// from inside, what is around it is in several corners; but not the other side of an earlier cut. False if
-  /// there is no way.
+  /// Chooses the next side from a vertex: the one with the smallest angle inside the cut face (F.2). Other
+  /// corners of the surface at the same point are considered, too, because where a solid touches itself at a
+  /// point its surroundings are divided among several corners. They must be better by a margin, which
+  /// excludes the other side of an earlier cut. Returns false if there is no next side.
   bool turn(Corner& at, const Vec3& from, uint32_t edge_back) const {
     const Vec2 back = flat(from - at.point);
     const uint32_t here = at.half_edge;
@@ -192,7 +191,7 @@ class Tracer {
     return std::isfinite(least);
   }
 
-  /// The cut with its pieces, if nothing of the surface is inside its outline.
+  /// Returns the cut with its pieces, if no part of the surface is inside its outline.
   std::optional<Cut> closed(Cut cut) const {
     std::vector<Vec2> outline;
     for (const Corner& c : cut.corners) outline.push_back(flat(c.point - origin_));
@@ -223,7 +222,7 @@ class Tracer {
   CutPlane plane_;
   Real tolerance_;
   Vec3 origin_, x_axis_, y_axis_;
-  std::vector<Real> height_;  // over the plane; 0 within the tolerance, once and for all
+  std::vector<Real> height_;  // height of each point over the plane; 0 within the tolerance, decided once
   std::vector<bool> seen_point_, seen_edge_, seen_face_;
 };
 
@@ -242,8 +241,8 @@ std::vector<Polyhedron> separate(Polyhedron p, const Cut& cut) {
     leaving[k] = c.on_edge ? p.half_edges[c.half_edge].next : c.half_edge;
     origins[k] = p.origin(leaving[k]);
   }
-  // With the inside of the cut on the left of its outline, what is on the left of a side seen from outside
-  // the solid is above the plane.
+  // The inside of the cut is on the left of its outline, so the part on the left of a side, seen from outside
+  // the solid, is above the plane.
   for (std::size_t k = 0; k < n; ++k) {
     above[k] = leaving[k];
     if (cut.corners[k].across_face) {

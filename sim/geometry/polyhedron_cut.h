@@ -1,5 +1,5 @@
 #pragma once
-/// Cutting a polyhedron by a plane along one connected cut face (the book's appendix F.2).
+/// Cuts a polyhedron by a plane along one connected cut face (the book's appendix F.2).
 
 #include <cstdint>
 #include <optional>
@@ -9,27 +9,28 @@
 
 namespace offstage::sim {
 
-/// A cut face: the region of a plane inside a polyhedron next to an edge.
+/// A cut face: the connected region of a plane inside a polyhedron that begins at an edge.
 struct Cut {
-  /// A corner of the cut face and what its side to the next corner runs along.
+  /// A corner of the cut face, and the side from it to the next corner.
   struct Corner {
     Vec3 point;
-    uint32_t half_edge;  ///< leaves the corner; if `on_edge` the corner is in its middle
+    uint32_t half_edge;  ///< leaves the corner; if `on_edge`, the corner is in its middle
     bool on_edge;
-    bool across_face;  ///< the side crosses the face of `half_edge`, else it is the edge `half_edge`
+    bool across_face;  ///< the side crosses the face of `half_edge`; otherwise it is the edge `half_edge`
   };
   Polyhedron::Plane plane;
   std::vector<Corner> corners;                ///< counter-clockwise about the plane's normal
   std::vector<std::vector<uint32_t>> pieces;  ///< convex parts of the cut face, as indices of corners
 };
 
-/// Traces the cut face that starts along an edge, with the inside on the left of the half-edge seen from the
-/// tip of the plane's normal. Points within `tolerance` of the plane are taken to be on it. Nothing if the
-/// cut face has holes or slits, or touches the surface inside; its outline may touch itself at vertices.
+/// Traces the cut face that begins along an edge. The inside of the cut is on the left of the half-edge, seen
+/// from the tip of the plane's normal. Points within `tolerance` of the plane count as on it. Returns nothing
+/// if the cut face has holes or slits, or touches the surface inside; its outline may touch itself at
+/// vertices.
 std::optional<Cut> trace_cut(const Polyhedron& p, uint32_t half_edge, const Polyhedron::Plane& plane,
                              Real tolerance);
 
-/// Separates a polyhedron along a cut face: two polyhedra, or one that has the cut face twice.
+/// Separates a polyhedron along a cut face into two polyhedra, or into one that has the cut face twice.
 std::vector<Polyhedron> separate(Polyhedron p, const Cut& cut);
 
 }  // namespace offstage::sim

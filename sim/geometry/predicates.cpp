@@ -8,12 +8,12 @@ namespace offstage::sim {
 namespace {
 
 constexpr Real kHalfUlp = std::numeric_limits<Real>::epsilon() / 2;
-// Bounds of the rounding error of the determinants of differences, relative to the same sum of absolute
-// values (Shewchuk 1997, section 4).
+// Bounds of the rounding error of the determinants of differences, relative to the sum of the absolute values
+// of their terms (Shewchuk 1997, section 4).
 constexpr Real kError3d = (7 + 56 * kHalfUlp) * kHalfUlp, kError2d = (3 + 16 * kHalfUlp) * kHalfUlp;
 
-/// A sum held without error as components of increasing size that do not overlap, so the last one has its
-/// sign.
+/// An exact sum as components of increasing size that do not overlap, so the last one has the sign of the
+/// sum.
 class Expansion {
  public:
   void add(Real x) {
@@ -40,7 +40,7 @@ class Expansion {
   Real value() const { return size_ > 0 ? part_[size_ - 1] : 0; }
 
  private:
-  std::array<Real, 96> part_;  // four for each of the 24 products of orient3d
+  std::array<Real, 96> part_;  // four components for each of the 24 products of orient3d
   std::size_t size_ = 0;
 };
 

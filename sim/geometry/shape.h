@@ -1,7 +1,8 @@
 #pragma once
-/// Shapes a body can have. Primitives keep their exact implicit form; a mesh shape refers to a mesh that was
-/// registered with the World. All are given in the body's own frame, whose origin need not be the centre of
-/// mass for meshes (registration finds it); primitives are centred, axes of revolution along Y.
+/// Shapes of bodies. Primitives keep their exact implicit form; a mesh shape refers to a mesh that was
+/// registered with the World. All are given in the body's own frame. Primitives are centred at its origin,
+/// with axes of revolution along Y. For meshes, the origin need not be the centre of mass, which registration
+/// computes.
 
 #include <variant>
 

@@ -17,31 +17,32 @@ namespace {
 
 using Index3 = Eigen::Array3i;
 
-/// What winding numbers inside must be on average, for solids, and for the two sides of a surface both.
+/// Lower bounds of the mean winding number of the inside: for a solid, and for both sides of a surface
+/// together.
 constexpr Real kHardlyInside = 0.6, kSurelyInside = 0.9;
-/// Share of the volume that hulls may have too much.
+/// Accepted excess of the hulls' volume, as a share of the volume.
 constexpr Real kGoodEnough = 0.01;
-/// Planes tried along each axis before the surroundings of the best.
+/// Number of planes tried along each axis before the refinement around the best one.
 constexpr int kCoarse = 20;
-/// Planes of flat sides tried along each axis.
+/// Number of planes of flat sides tried along each axis.
 constexpr std::size_t kFlatSides = 4;
-/// What a difference between the two halves costs, as a share of the volume.
+/// Penalty for halves of different size, as a share of the volume.
 constexpr Real kBalance = 0.03;
-/// Surfaces that reach less into a box, in voxels, only touch it.
+/// A surface that extends less than this into a box, in voxels, only touches it.
 constexpr Real kTouch = 1e-5;
-/// How far a corner of a box is moved inwards to tell whether the solid is there.
+/// How far a corner of a box is moved inwards for the test whether the solid is there, as a share of the way.
 constexpr Real kNearby = 0.01;
-/// Boxes are halved beyond the number wanted, then merged where that costs least.
+/// Factor by which there are more boxes than wanted parts, before the parts that cost least are merged.
 constexpr std::size_t kExcess = 2;
-/// Share of the volume that a merger may add even when there are few enough parts.
+/// Share of the volume that a merger may add although there are few enough parts.
 constexpr Real kFreeGain = 2e-4;
 
-/// Voxels from `low` up to but without `high`.
+/// Voxels from `low` to `high`, without `high`.
 struct Range {
   Index3 low, high;
 };
 
-/// The voxels of a mesh's box, and which have their centre inside.
+/// The voxels of a mesh's box, and whether the centre of each is inside.
 class VoxelGrid {
  public:
   VoxelGrid(const TriangleMesh& mesh, const Aabb& box, uint32_t resolution) : winding_(mesh) {
@@ -74,8 +75,8 @@ class VoxelGrid {
     return static_cast<std::size_t>(i.x() + counts_.x() * (i.y() + counts_.y() * i.z()));
   }
 
-  /// A solid has winding numbers near 1 inside, or -1 if its surface is inside out. About an open sheet they
-  /// are just over 1/2 on its hollow sides, and may be so on both.
+  /// A solid has winding numbers near 1 inside, or -1 if its surface is inside out. Near an open sheet they
+  /// are just over 1/2 on hollow sides, possibly on both.
   void find_inside() {
     struct Sum {
       Real positive = 0, negative = 0;
@@ -107,10 +108,10 @@ class VoxelGrid {
   Real size_ = 0;
   Index3 counts_;
   Vec3 low_;
-  std::vector<char> inside_;  // not bool: threads write neighbours
+  std::vector<char> inside_;  // not bool, because threads write neighbouring elements
 };
 
-/// Of some voxels those that can be corners of their hull: the outermost in their rows along every axis.
+/// Returns those voxels that can be corners of the hull: the outermost ones of their rows along every axis.
 std::vector<Index3> outermost(const std::vector<Index3>& voxels, const Range& range) {
   std::array<std::vector<std::pair<int, int>>, 3> rows;
   const Index3 extent = range.high - range.low;
@@ -140,8 +141,9 @@ std::vector<Index3> outermost(const std::vector<Index3>& voxels, const Range& ra
   return out;
 }
 
-/// Volume of the hull of whole voxels, in voxels, from the hull K of their centres: the sum of K and a unit
-/// cube has the volume V(K) + areas of K's shadows along the axes + widths of K along the axes + 1.
+/// Volume of the hull of whole voxels, in voxels, from the hull K of their centres: the Minkowski sum of K
+/// and a unit cube has the volume V(K) + areas of the projections of K along the axes + widths of K along the
+/// axes + 1.
 Real voxel_hull_volume(const std::vector<Index3>& voxels, const Range& range) {
   std::vector<Vec3> centres;
   for (const Index3& i : outermost(voxels, range)) centres.push_back(i.matrix().cast<Real>());
@@ -155,8 +157,8 @@ Real voxel_hull_volume(const std::vector<Index3>& voxels, const Range& range) {
   return hull_volume(hull) + shadows + hull.box().sizes().sum() + 1;
 }
 
-/// Appends the corners of the part of a triangle inside a box; nothing if it only touches the box within
-/// `margin`.
+/// Appends the corners of the part of a triangle inside a box; none if the triangle only touches the box
+/// within `margin`.
 void clip(const std::array<Vec3, 3>& triangle, const Aabb& box, Real margin, std::vector<Vec3>& corners) {
   std::array<Vec3, 9> polygon, clipped;  // each plane adds at most one corner
   std::copy(triangle.begin(), triangle.end(), polygon.begin());
@@ -183,12 +185,12 @@ void clip(const std::array<Vec3, 3>& triangle, const Aabb& box, Real margin, std
   corners.insert(corners.end(), polygon.begin(), polygon.begin() + static_cast<std::ptrdiff_t>(count));
 }
 
-/// A box, and the hull of the solid in it.
+/// A box, and the hull of the solid's part in it.
 struct Cluster {
   Aabb box;
-  Range range;  ///< of voxels with their centre in the box
+  Range range;  ///< voxels whose centre is in the box
   std::vector<Index3> voxels;
-  std::vector<uint32_t> triangles;  ///< those that meet the box
+  std::vector<uint32_t> triangles;  ///< triangles that intersect the box
   ConvexPolyhedron hull;
   Real excess = 0;  ///< volume of the hull over that of the voxels [m^3]
 };
@@ -242,7 +244,7 @@ class VoxelDecomposer {
       // The corner itself may be on the surface.
       if (grid_.point_inside(corner + kNearby * (box.center() - corner))) points.push_back(corner);
     }
-    // Where the surface has holes nothing else marks the inside.
+    // Where the surface has holes, only voxels show the inside.
     for (const Index3& i : outermost(c.voxels, range)) points.push_back(grid_.centre(i));
     c.hull = convex_hull(points);
     c.excess = std::max(0.0, hull_volume(c.hull) - grid_.voxel_volume() * static_cast<Real>(c.voxels.size()));
@@ -254,7 +256,8 @@ class VoxelDecomposer {
     return {mesh_.vertices[i], mesh_.vertices[j], mesh_.vertices[k]};
   }
 
-  /// Where to cut: the largest flat side within half a voxel of the plane, else the plane.
+  /// Position of a cut: that of the largest flat side within half a voxel of the plane, otherwise that of the
+  /// plane.
   Real place(const Cluster& c, const Plane& plane) const {
     const Real middle = grid_.node(Index3::Constant(plane.position))[plane.axis];
     Real largest = 0, place = middle;
@@ -270,7 +273,7 @@ class VoxelDecomposer {
     return place;
   }
 
-  /// False if nothing can be gained.
+  /// Halves a cluster; returns false if this gains nothing.
   bool halve(std::vector<Cluster>& clusters, std::size_t which) const {
     const Plane plane = best_plane(clusters[which]);
     if (!std::isfinite(plane.cost)) return false;
@@ -287,7 +290,7 @@ class VoxelDecomposer {
     return true;
   }
 
-  /// Tries planes all over the box, then around the best of them at ever smaller steps.
+  /// Tries planes throughout the box, then around the best of them with ever smaller steps.
   Plane best_plane(const Cluster& c) const {
     Index3 low = c.voxels.front(), high = low;
     for (const Index3& i : c.voxels) {
@@ -314,12 +317,12 @@ class VoxelDecomposer {
     return best;
   }
 
-  /// Adds the planes that most of the surface lies in. The hulls' volume jumps there, so that neighbouring
-  /// planes do not lead to them.
+  /// Adds the planes that contain most of the surface. The volume of the hulls jumps there, so neighbouring
+  /// planes do not lead the search to them.
   void add_flat_sides(const Cluster& c, const Index3& low, const Index3& high,
                       std::vector<Plane>& planes) const {
     for (int axis = 0; axis < 3; ++axis) {
-      std::vector<Plane> sides;  // the cost is less the area
+      std::vector<Plane> sides;  // the cost field holds minus the area
       for (int at = low[axis] + 1; at < high[axis]; ++at) sides.push_back({axis, at, 0});
       Index3 step = Index3::Zero();
       step[axis] = 1;
@@ -344,7 +347,7 @@ class VoxelDecomposer {
     return best;
   }
 
-  /// Volume of the two hulls, and something for halves of different size.
+  /// Volume of the two hulls plus a penalty for halves of different size.
   static Real cost(const Cluster& c, const Plane& plane) {
     std::array<std::vector<Index3>, 2> halves;
     for (const Index3& i : c.voxels) halves[i[plane.axis] < plane.position ? 0 : 1].push_back(i);

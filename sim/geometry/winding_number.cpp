@@ -8,7 +8,7 @@ namespace offstage::sim {
 namespace {
 
 constexpr uint32_t kLeaf = 8;
-/// Clusters farther than this many of their radii count as dipoles.
+/// Clusters at a distance of more than this many of their radii are approximated by dipoles.
 constexpr Real kFar = 2.3;
 
 /// Solid angle of a triangle as seen from the origin: van Oosterom and Strackee, "The solid angle of a plane

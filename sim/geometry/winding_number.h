@@ -1,8 +1,9 @@
 #pragma once
-/// Generalised winding numbers: how often a surface goes around a point, which tells inside from outside even
-/// where it has holes, doubled sheets or crossings. Jacobson, Kavan, Sorkine-Hornung, "Robust inside-outside
-/// segmentation using generalized winding numbers" (2013); far clusters of triangles as dipoles after Barill
-/// et al., "Fast winding numbers for soups and clouds" (2018).
+/// Generalised winding numbers: how often a surface winds around a point. They distinguish inside from
+/// outside even where the surface has holes, doubled sheets or self-intersections. Jacobson, Kavan,
+/// Sorkine-Hornung, "Robust inside-outside segmentation using generalized winding numbers" (2013). Far
+/// clusters of triangles are approximated by dipoles after Barill et al., "Fast winding numbers for soups and
+/// clouds" (2018).
 
 #include <cstdint>
 #include <span>
@@ -16,17 +17,18 @@ class WindingNumber {
  public:
   explicit WindingNumber(const TriangleMesh& mesh);
 
-  /// 1 inside a closed surface, 0 outside, in between near holes; within 0.1 of the exact sum.
+  /// Winding number at p: 1 inside a closed surface, 0 outside, in between near holes; within 0.1 of the
+  /// exact sum.
   Real at(const Vec3& p) const;
 
  private:
   /// Nodes lie in depth-first order; `next` is where a subtree ends.
   struct Node {
-    Vec3 centre;       // of the area
+    Vec3 centre;       // area centroid
     Vec3 area_normal;  // sum of areas times normals [m^2]
-    Real radius;       // around the centre, of all triangles [m]
+    Real radius;       // radius around the centre that encloses all triangles [m]
     uint32_t next = 0;
-    uint32_t first = 0, count = 0;  // triangles of a leaf; a branch has none
+    uint32_t first = 0, count = 0;  // range of triangles of a leaf; count is 0 for a branch
   };
   using Corners = std::array<Vec3, 3>;
 

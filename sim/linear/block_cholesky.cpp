@@ -9,7 +9,8 @@
 namespace offstage::sim {
 namespace {
 
-/// The inverse of the triangle of a block's Cholesky factor; false if the block is not positive definite.
+/// Computes the inverse of the Cholesky factor of a block; returns false if the block is not positive
+/// definite.
 template <int N>
 bool invert_factor(const Eigen::Matrix<Real, N, N>& block, Eigen::Matrix<Real, N, N>& inverse) {
   Eigen::Matrix<Real, N, N> L = Eigen::Matrix<Real, N, N>::Zero();
@@ -83,8 +84,8 @@ void BlockCholesky<N>::order(uint32_t rows) {
   }
 }
 
-/// To right after the last of them: after the first the pivot may be zero still, if that one is held by
-/// others.
+/// Moves each empty row right behind the last of its neighbours. Behind the first one its pivot might still
+/// be zero, if that neighbour is determined by other rows.
 template <int N>
 void BlockCholesky<N>::put_empty_rows_after_neighbours() {
   std::vector<uint32_t> last = place_;
@@ -97,7 +98,8 @@ void BlockCholesky<N>::put_empty_rows_after_neighbours() {
   for (uint32_t k = 0; k < order_.size(); ++k) place_[order_[k]] = k;
 }
 
-/// The columns of the factor: those of the matrix, and all of a column passed on to its first row.
+/// Finds the columns of the factor: a column has the blocks of the matrix and the fill-in from earlier
+/// columns.
 template <int N>
 void BlockCholesky<N>::find_columns(uint32_t rows) {
   std::vector<std::vector<uint32_t>> columns(rows);
@@ -128,7 +130,7 @@ bool BlockCholesky<N>::factorize(std::span<const Block> diagonal, std::span<cons
   for (uint32_t k = 0; k < n; ++k) diagonal_[k] = diagonal[order_[k]];
   std::fill(below_.begin(), below_.end(), Block::Zero());
   for (std::size_t e = 0; e < pairs_.size(); ++e) {
-    // The lower triangle wants the block whose row is eliminated later.
+    // The lower triangle needs the block whose row is eliminated later.
     if (place_[pairs_[e].first] < place_[pairs_[e].second])
       below_[pair_at_[e]] = pairs[e].transpose();
     else
@@ -140,7 +142,7 @@ bool BlockCholesky<N>::factorize(std::span<const Block> diagonal, std::span<cons
     diagonal_[j] = inverse;
     const uint32_t first = begin_[j], last = begin_[j + 1];
     for (uint32_t p = first; p < last; ++p) below_[p] = (below_[p] * inverse.transpose()).eval();
-    // What is kept under the diagonal is L S, from which the rows of L have the sign once more.
+    // The stored blocks below the diagonal are L S, so the sign must be applied again to get the rows of L.
     for (uint32_t q = first; q < last; ++q) {
       const uint32_t column = row_[q];
       const Block row = sign_[j] * below_[q];

@@ -4,8 +4,8 @@
 /// in an order of approximate minimum degree, so that a stack or a chain of n costs O(n), a wall about
 /// O(n^1.5) (physics N11, A1).
 ///
-/// With bodies as positive rows and what joins them as negative ones the matrix is quasi-definite (Vanderbei,
-/// "Symmetric quasidefinite matrices", 1995): it has this factorisation in any order of elimination in which
+/// With bodies as positive rows and joints as negative rows the matrix is quasi-definite (Vanderbei,
+/// "Symmetric quasidefinite matrices", 1995). It has this factorisation in any order of elimination in which
 /// a row with a zero on the diagonal comes after its neighbours.
 
 #include <cstdint>
@@ -20,7 +20,7 @@ namespace offstage::sim {
 using Mat6 = Eigen::Matrix<Real, 6, 6>;
 using Vec6 = Eigen::Matrix<Real, 6, 1>;
 
-/// What is known of a row of blocks before it is eliminated.
+/// Properties of a row of blocks that are known before the factorisation.
 struct BlockRowKind {
   bool is_negative = false;  ///< its sign in S
   bool is_empty = false;     ///< its diagonal block is zero: its neighbours are eliminated first
@@ -34,22 +34,23 @@ class BlockCholesky {
   using Vector = Eigen::Matrix<Real, N, 1>;
 
   /// Prepares for matrices whose blocks off the diagonal are at the given pairs of rows, first < second, each
-  /// once and in ascending order; no kinds: all rows are positive. Does nothing if that is what it is
-  /// prepared for.
+  /// once and in ascending order. Without kinds all rows are positive. Does nothing if it is already prepared
+  /// for this structure.
   void analyze(uint32_t rows, std::span<const std::pair<uint32_t, uint32_t>> pairs,
                std::span<const BlockRowKind> kinds = {});
 
-  /// Blocks (first, second) of the upper triangle, in the order of the pairs. False if a pivot has not its
-  /// sign to rounding; then there is nothing to solve with.
+  /// `pairs` are the blocks (first, second) of the upper triangle, in the order of the pairs given to
+  /// analyze(). Returns false, and solve() must not be called, if a pivot does not have its sign within
+  /// rounding.
   bool factorize(std::span<const Block> diagonal, std::span<const Block> pairs);
 
-  /// x := A^-1 x.
+  /// Replaces x by A^-1 x.
   void solve(std::span<Vector> x) const;
 
   uint32_t rows() const { return static_cast<uint32_t>(order_.size()); }
-  /// Blocks of the factor, the diagonal included: what solve() costs.
+  /// Number of blocks of the factor including the diagonal; the cost of solve() is proportional to it.
   std::size_t factor_blocks() const { return row_.size() + order_.size(); }
-  /// Products of two blocks in factorize().
+  /// Number of products of two blocks in factorize().
   std::size_t factor_products() const { return products_; }
 
  private:
@@ -59,10 +60,10 @@ class BlockCholesky {
 
   std::vector<std::pair<uint32_t, uint32_t>> pairs_;
   std::vector<BlockRowKind> kinds_;
-  std::vector<Real> sign_;               // in the order of elimination
+  std::vector<Real> sign_;               // by position in the order of elimination
   std::vector<uint32_t> order_, place_;  // order_[k]: the row eliminated k-th; place_: its inverse
   std::vector<uint32_t> begin_, row_;  // columns of L under the diagonal, in order of elimination, ascending
-  std::vector<uint32_t> pair_at_;      // where in row_ the block of each pair goes
+  std::vector<uint32_t> pair_at_;      // index in row_ of the block of each pair
   std::size_t products_ = 0;
   std::vector<Block> diagonal_, below_;  // L; the diagonal holds the inverses of its triangles
 };

@@ -1,6 +1,6 @@
 #pragma once
-/// Vectors of three in the lanes of three registers: the same arithmetic for several contacts at once. The
-/// lanes are those of a register of doubles (Lanes) or of floats (FloatLanes).
+/// Vectors of three numbers in three registers, so that the same arithmetic is done for several contacts at
+/// once. A register holds doubles (Lanes) or floats (FloatLanes).
 
 #include <type_traits>
 
@@ -45,7 +45,7 @@ LaneVector<L> cross(const LaneVector<L>& a, const LaneVector<L>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-/// Symmetric matrices of 3 x 3.
+/// Symmetric 3 x 3 matrices.
 template <class L>
 struct LaneSymmetric {
   L xx, xy, xz, yy, yz, zz;
@@ -71,7 +71,7 @@ LaneVector<L> operator*(const LaneSymmetric<L>& m, const LaneVector<L>& v) {
           m.xz * v.x + m.yz * v.y + m.zz * v.z};
 }
 
-/// Matrices by their rows.
+/// 3 x 3 matrices, stored by rows.
 template <class L>
 struct LaneMatrix {
   LaneVector<L> x, y, z;
@@ -80,7 +80,7 @@ template <class L>
 LaneVector<L> operator*(const LaneMatrix<L>& m, const LaneVector<L>& v) {
   return {dot(m.x, v), dot(m.y, v), dot(m.z, v)};
 }
-/// The transposed times v.
+/// The transposed matrix times v.
 template <class L>
 LaneVector<L> transposed_product(const LaneMatrix<L>& m, const LaneVector<L>& v) {
   return v.x * m.x + v.y * m.y + v.z * m.z;
@@ -104,7 +104,7 @@ inline FloatLanes lane_min(FloatLanes x, FloatLanes y) {
 inline FloatLanes lane_clamp(FloatLanes x, FloatLanes limit) {
   return lane_min(lane_max(x, -limit), limit);
 }
-/// 1 / x, and 0 of what is not positive.
+/// Returns 1 / x, and 0 in lanes that are not positive.
 inline FloatLanes lane_inverse(FloatLanes x) {
   return x > 0 ? 1 / x : FloatLanes{};
 }

@@ -12,13 +12,14 @@ namespace {
 
 using Eigen::Index;
 
-constexpr Real kLcpSatisfied = 1e-11;  ///< of the greatest |b|
-constexpr Real kAccurateLcp = 1e-9;    ///< likewise: with more than this left over, fall back
-constexpr Real kLcpNoise = 1e-12;      ///< of a rate: it is zero but for rounding
+constexpr Real kLcpSatisfied = 1e-11;  ///< share of the greatest |b|: smaller accelerations count as zero
+/// Share of the greatest |b|: with a larger residual the fall-back is used.
+constexpr Real kAccurateLcp = 1e-9;
+constexpr Real kLcpNoise = 1e-12;  ///< relative: smaller rates count as zero
 constexpr int kLcpAttempts = 4;
 constexpr int kLcpSweeps = 500;
 
-/// waiting: not brought in, its a is not looked at. ZA: contact holds, a = 0. ZF: broken, f = 0.
+/// waiting: not yet added, its a is ignored. ZA: the contact holds, a = 0. ZF: the contact is broken, f = 0.
 enum class Zone : uint8_t { waiting, ZA, ZF };
 
 enum class Outcome { solved, postponed, unbounded };
@@ -52,8 +53,8 @@ class Dantzig {
   LcpSolution result_;
   Eigen::VectorXd a_, da_, x_;
   std::vector<Zone> zones_;
-  std::vector<Index> active_;   ///< ZA in the order of the factor
-  std::vector<uint8_t> moves_;  ///< of each index since the last step of some length
+  std::vector<Index> active_;   ///< the indices in ZA, in the order of the factor
+  std::vector<uint8_t> moves_;  ///< per index: changes of zone since the last step of positive length
   UpdatedCholesky factor_;
 };
 
@@ -70,7 +71,7 @@ Dantzig::Dantzig(const Eigen::MatrixXd& A, const Eigen::VectorXd& b)
   result_.f.setZero(b.size());
 }
 
-/// The change of forces with f_m: those of ZA keep their a = 0.
+/// Finds how the forces in ZA change with f_m so that they keep a = 0.
 void Dantzig::find_direction(Index m, Real sign) {
   x_.resize(factor_.size());
   for (std::size_t k = 0; k < active_.size(); ++k) x_[static_cast<Index>(k)] = -sign * A_(active_[k], m);
@@ -79,8 +80,9 @@ void Dantzig::find_direction(Index m, Real sign) {
   for (std::size_t k = 0; k < active_.size(); ++k) da_ += x_[static_cast<Index>(k)] * A_.col(active_[k]);
 }
 
-/// What first ends a step: a_m has become zero, or another index would leave its zone. A dependent m, da_m =
-/// 0, is never ended by itself: it takes the load off the others until one of them is free to leave.
+/// Finds the event that ends a step first: a_m becomes zero, or another index would leave its zone. If m is
+/// dependent (da_m = 0), it never ends the step itself: it unloads the other contacts until one of them can
+/// leave.
 Dantzig::Block Dantzig::first_block(Index m, Real sign) const {
   Block first;
   const auto consider = [&first](Real step, Index i) {
@@ -123,7 +125,8 @@ bool Dantzig::enter(Index i) {
   return true;
 }
 
-/// Moves an index that blocks to the other zone. A dependent one may stay in ZF: the others hold its a at 0.
+/// Moves a blocking index to the other zone. A dependent index may stay in ZF, because the others keep its a
+/// at 0.
 void Dantzig::change_zone(Index i) {
   Zone& zone = zones_[static_cast<std::size_t>(i)];
   ++moves_[static_cast<std::size_t>(i)];
@@ -138,8 +141,8 @@ void Dantzig::change_zone(Index i) {
   }
 }
 
-/// A dependent m whose a is zero by the others cannot be held as well: its load goes back to them, until it
-/// is gone or one of them leaves.
+/// Adds index m. If m is dependent and the others already make its a zero, it cannot enter the factor: its
+/// force is transferred back to the others, until it is zero or one of them leaves.
 Outcome Dantzig::bring_in(Index m) {
   std::fill(moves_.begin(), moves_.end(), uint8_t{0});
   const Real zero = kLcpSatisfied * scale_;
@@ -161,7 +164,7 @@ Outcome Dantzig::bring_in(Index m) {
   return Outcome::postponed;
 }
 
-/// Takes the rounding of the steps out: once more from the matrix itself.
+/// Removes the accumulated rounding of the steps by one more solve with the matrix itself.
 void Dantzig::refine() {
   a_ = A_ * result_.f + b_;
   x_.resize(factor_.size());
@@ -184,7 +187,7 @@ Real Dantzig::residual() const {
   return worst;
 }
 
-/// Projected Gauss-Seidel from the current forces.
+/// Fall-back: projected Gauss-Seidel from the current forces.
 void Dantzig::relax() {
   for (int sweep = 0; sweep < kLcpSweeps; ++sweep) {
     for (Index i = 0; i < a_.size(); ++i) {

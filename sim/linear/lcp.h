@@ -1,8 +1,8 @@
 #pragma once
 /// Contact forces without friction: the linear complementarity problem of a symmetric positive semidefinite
-/// matrix by Dantzig's method (physics N9; Baraff, "Fast contact force computation for nonpenetrating rigid
-/// bodies", 1994). Contacts are brought in one at a time, and the forces of those in contact follow so that
-/// all before stay solved.
+/// matrix, by Dantzig's method (physics N9; Baraff, "Fast contact force computation for nonpenetrating rigid
+/// bodies", 1994). Contacts are added one at a time, and the forces change so that all contacts added before
+/// stay solved.
 
 #include <cstdint>
 #include <vector>
@@ -15,14 +15,16 @@ namespace offstage::sim {
 
 struct LcpSolution {
   Eigen::VectorXd f;                ///< >= 0
-  uint32_t pivots = 0;              ///< steps, each ended by an index that blocks
-  bool fell_back = false;           ///< ended with projected Gauss-Seidel
+  uint32_t pivots = 0;              ///< number of steps, each ended by a blocking index
+  bool fell_back = false;           ///< the result is from projected Gauss-Seidel
   std::vector<uint32_t> unbounded;  ///< indices that no force, however large, brings to a >= 0
-  Real residual = 0;                ///< greatest |min(A_ii f_i, a_i)| but for the unbounded, in units of b
+  /// Greatest |min(A_ii f_i, a_i)| over the indices that are not unbounded, in units of b.
+  Real residual = 0;
 };
 
-/// f such that a = A f + b >= 0, f >= 0, f.a = 0. A may be singular, as it is with redundant contacts: of
-/// dependent rows some are left at f = 0. Where no f does it (b outside of the range), `unbounded` says so.
+/// Finds f such that a = A f + b >= 0, f >= 0, f.a = 0. A may be singular, as it is with redundant contacts;
+/// some of the dependent rows then keep f = 0. If no such f exists (b is outside of the range of A),
+/// `unbounded` lists the indices.
 LcpSolution solve_lcp(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
 
 }  // namespace offstage::sim

@@ -1,5 +1,6 @@
 #pragma once
-/// Dense least squares by QR factorisations, whose templates take seconds to compile.
+/// Dense least squares by QR factorisations. They are compiled here once, because their templates take
+/// seconds to compile.
 
 #include <Eigen/Core>
 
@@ -7,10 +8,11 @@
 
 namespace offstage::sim {
 
-/// A solution of least |A x - b|; A has full rank.
+/// Returns the x that minimises |A x - b|; A must have full rank.
 Eigen::VectorXd least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
 
-/// The shortest of all solutions of least |A x - b|; pivots below `rank` of the greatest count as zero.
+/// Returns the shortest x that minimises |A x - b|. Pivots below `rank` times the greatest pivot count as
+/// zero.
 Eigen::VectorXd shortest_least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b, Real rank);
 
 }  // namespace offstage::sim

@@ -23,8 +23,8 @@ bool UpdatedCholesky::append(const Eigen::VectorXd& couplings, Real diagonal) {
   return true;
 }
 
-// The rows below move up and reach one column beyond the diagonal; a rotation of two columns per row brings
-// them back. Row by row, so that memory is walked through in order.
+// The rows below move up and reach one column beyond the diagonal; one rotation of two columns per row
+// restores the triangle. The loop goes row by row, so that memory is read in order.
 void UpdatedCholesky::remove(Eigen::Index first) {
   --size_;
   for (Eigen::Index r = first; r < size_; ++r) {

@@ -1,6 +1,6 @@
 #pragma once
 /// The Cholesky factorisation of a symmetric matrix that gains and loses rows (Golub and Van Loan, Matrix
-/// Computations, 6.5): for pivoting methods, whose active set changes by one index at a time (N9).
+/// Computations, 6.5), for pivoting methods, whose active set changes by one index at a time (N9).
 
 #include <vector>
 
@@ -10,16 +10,19 @@
 
 namespace offstage::sim {
 
-/// L L^T of the rows and columns that were appended and not removed, in that order. O(n^2) each.
+/// The factor L L^T of the current rows and columns, in the order in which they were appended. Each operation
+/// is O(n^2).
 class UpdatedCholesky {
  public:
-  /// A row whose pivot is this small a part of its diagonal is a combination of the ones before.
+  /// A row whose pivot is less than this share of its diagonal counts as a linear combination of the rows
+  /// before.
   static constexpr Real kDependent = 1e-10;
 
   explicit UpdatedCholesky(Eigen::Index capacity);
 
   Eigen::Index size() const { return size_; }
-  /// Appends a row and column with these `couplings` to the others. False, and nothing done, if dependent.
+  /// Appends a row and column with these `couplings` to the others. Returns false and changes nothing if it
+  /// is dependent.
   bool append(const Eigen::VectorXd& couplings, Real diagonal);
   void remove(Eigen::Index i);
   /// Replaces a right-hand side by the solution.
@@ -27,7 +30,7 @@ class UpdatedCholesky {
 
  private:
   Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> lower_;
-  std::vector<Real> cosines_, sines_;  ///< of remove()
+  std::vector<Real> cosines_, sines_;  ///< rotations of remove()
   Eigen::Index size_ = 0;
 };
 

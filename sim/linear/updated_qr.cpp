@@ -5,12 +5,13 @@
 namespace offstage::sim {
 namespace {
 
-/// A diagonal element this small a part of the greatest is zero but for rounding.
+/// A diagonal element below this share of the greatest one counts as zero.
 constexpr Real kSingular = 1e-13;
 
 }  // namespace
 
-/// The rotation that takes (x, y) to (|xy|, 0), of two rows of R from a column on, and the columns of Q.
+/// Applies the rotation that takes (x, y) to (|xy|, 0) to two rows of R, from a column on, and to the columns
+/// of Q.
 void UpdatedQr::rotate(Eigen::Index upper, Eigen::Index lower, Eigen::Index from, Real x, Real y) {
   if (y == 0) return;
   const Real length = std::sqrt(x * x + y * y), c = x / length, s = y / length;
@@ -40,7 +41,7 @@ void UpdatedQr::append(const Eigen::VectorXd& row, const Eigen::VectorXd& column
   }
 }
 
-/// Leaves R triangular but for its last column, which is not set.
+/// Removes a column and leaves R triangular except for its last column, which the caller sets.
 void UpdatedQr::drop_column(Eigen::Index column) {
   for (Eigen::Index i = 0; i < size_; ++i)
     for (Eigen::Index j = column; j + 1 < size_; ++j) r_(i, j) = r_(i, j + 1);
@@ -56,7 +57,7 @@ void UpdatedQr::replace(Eigen::Index column, const Eigen::VectorXd& by) {
   r_.col(size_ - 1).head(size_).noalias() = q_.topLeftCorner(size_, size_).transpose() * by.head(size_);
 }
 
-// The row goes where Q's row is turned into the last unit vector: then Q's last column is one too.
+// Rotations turn the row of Q into the last unit vector. The last column of Q is then a unit vector, too.
 void UpdatedQr::remove(Eigen::Index row, Eigen::Index column) {
   drop_column(column);
   const Eigen::Index last = size_ - 1;

@@ -1,7 +1,7 @@
 #pragma once
 /// The QR factorisation of a square matrix that gains, loses and changes rows and columns (Golub and Van
-/// Loan, Matrix Computations, 6.5): for pivoting on matrices without symmetry, as sliding friction makes them
-/// (N10).
+/// Loan, Matrix Computations, 6.5), for pivoting on matrices without symmetry, which sliding friction
+/// produces (N10).
 
 #include <Eigen/Core>
 
@@ -9,19 +9,19 @@
 
 namespace offstage::sim {
 
-/// Q R, with Q itself kept, each change by Givens rotations in O(n^2).
+/// The product Q R with an explicit Q. Each change takes O(n^2) by Givens rotations.
 class UpdatedQr {
  public:
   explicit UpdatedQr(Eigen::Index capacity) : q_(capacity, capacity), r_(capacity, capacity) {}
 
   Eigen::Index size() const { return size_; }
-  /// Appends a last row and column, which meet at `corner`.
+  /// Appends a last row and a last column with the common element `corner`.
   void append(const Eigen::VectorXd& row, const Eigen::VectorXd& column, Real corner);
   /// Removes a row and a column; those after it move up.
   void remove(Eigen::Index row, Eigen::Index column);
-  /// Removes a column; those after it move up, and the new one becomes the last.
+  /// Removes a column and appends `by` as the last one; the columns between move up.
   void replace(Eigen::Index column, const Eigen::VectorXd& by);
-  /// Replaces a right-hand side by the solution. False, and x of no use, if the matrix is singular.
+  /// Replaces a right-hand side by the solution. Returns false, with x undefined, if the matrix is singular.
   bool solve(Eigen::VectorXd& x) const;
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
-/// A particle among those that collide with particles (physics P3), on its straight way through what is left
-/// of a sub-step.
+/// A particle that collides with other particles (physics P3), on its straight path through the rest of a
+/// sub-step.
 
 #include <cmath>
 #include <cstdint>
@@ -15,18 +15,18 @@
 namespace offstage::sim {
 
 struct CollidingParticle {
-  Vec3 position;       ///< where its way begins
-  Vec3 path_velocity;  ///< mean along its way
+  Vec3 position;       ///< position at the start of its path
+  Vec3 path_velocity;  ///< mean velocity along its path
   Vec3 velocity;       ///< at the end of the sub-step
-  Vec3 acceleration;   ///< mean, by forces
-  Real from;           ///< when its way begins, since the sub-step's start [s]
+  Vec3 acceleration;   ///< mean acceleration by forces
+  Real from;           ///< start of its path, since the sub-step's start [s]
   Real mass, radius, restitution, friction;
   uint32_t system;          ///< number of its system
-  bool internal, external;  ///< as ParticleSystemDef has them
+  bool internal, external;  ///< see ParticleSystemDef
   bool hits_bodies;
 
   Vec3 at(Real t) const { return position + (t - from) * path_velocity; }
-  /// A collision at time t of a sub-step of length h changes its velocity; it goes on under the same forces.
+  /// Changes the velocity by a collision at time t of a sub-step of length h; the forces stay the same.
   void strike(Real t, Real h, const Vec3& change) {
     const Vec3 after = arrival(t, h) + change;
     position = at(t);
@@ -35,7 +35,7 @@ struct CollidingParticle {
     from = t;
   }
   Vec3 velocity_at(Real t, Real h) const { return velocity - (h - t) * acceleration; }
-  /// The same with the energy that it has at(t), which is on a straight way.
+  /// Velocity at time t, scaled to the energy that the particle has at at(t), which is on a straight path.
   Vec3 arrival(Real t, Real h) const {
     const Vec3 v = velocity_at(t, h);
     const Vec3 shift = (t - from) * (path_velocity - (velocity_at(from, h) + v) / 2);
@@ -47,7 +47,7 @@ inline bool may_collide(const CollidingParticle& a, const CollidingParticle& b) 
   return a.system == b.system ? a.internal : a.external && b.external;
 }
 
-/// How the surfaces of two particles act on each other: as those of bodies do.
+/// Restitution and friction of two particles, combined as for bodies.
 inline Real pair_restitution(const CollidingParticle& a, const CollidingParticle& b) {
   return std::max(a.restitution, b.restitution);
 }
@@ -55,7 +55,7 @@ inline Real pair_friction(Real a, Real b) {
   return std::sqrt(a * b);
 }
 
-/// When two particles meet on their ways before the sub-step's end; n from b to a.
+/// Time at which two particles meet on their paths before the sub-step's end; n points from b to a.
 struct Meeting {
   Real time;
   Vec3 normal;
@@ -71,19 +71,19 @@ inline std::optional<Meeting> meeting(const CollidingParticle& a, const Collidin
   return Meeting{from + *after, apart / distance};
 }
 
-/// A sub-step as its collisions see it.
+/// Parameters of a sub-step for the collisions of particles.
 struct ParticleStep {
-  Real h;  ///< its length [s]
+  Real h;  ///< length of the sub-step [s]
   const Obstacles& fixed;
   const Obstacles& moving;
   ImpactLaw law;
-  Real collision_speed;    ///< contacts slower than this do not bounce [m/s]
-  BodyImpulses& impulses;  ///< on dynamic bodies
+  Real collision_speed;    ///< slower contacts do not bounce [m/s]
+  BodyImpulses& impulses;  ///< impulses on dynamic bodies
 };
 
-/// An approach as slow as what forces make within a sub-step belongs to resting contact, and so does what is
-/// slow anyway. Force is not only what acts on the two themselves: contacts hand it on. `acceleration` is the
-/// greater of both.
+/// An approach that is slower than what forces cause within a sub-step is a resting contact, and so is any
+/// approach below the collision speed. Contacts transmit forces, so `acceleration` is the greater one of both
+/// particles.
 inline bool is_impact(Real speed, Real acceleration, const ParticleStep& step) {
   return speed > step.collision_speed + acceleration * step.h;
 }
@@ -91,7 +91,7 @@ inline Real greater_acceleration(const CollidingParticle& a, const CollidingPart
   return std::sqrt(std::max(a.acceleration.squaredNorm(), b.acceleration.squaredNorm()));
 }
 
-/// A collision of a particle, for those who ask.
+/// A collision of a particle, for the caller.
 struct ParticleStrike {
   uint32_t particle;
   Real time;  ///< since the sub-step's start [s]

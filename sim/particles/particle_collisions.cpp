@@ -9,11 +9,12 @@ namespace offstage::sim {
 namespace {
 
 constexpr std::size_t kCollisionChunk = 1024;
-/// Thickness of the layers in greatest radii: partners in contact are in neighbouring ones unless they are
+/// Thickness of the layers in greatest radii. Partners in contact are in neighbouring layers unless they are
 /// fast.
 constexpr Real kLayer = 3;
-/// What a change of the ways adds to how near two must come to be partners: the middle and half the length of
-/// each way change by half as much at most, and by as much again where one was born within the sub-step.
+/// Increase of the search distance of partners, as a multiple of the change of the paths. The middle and half
+/// the length of each path change by at most half of it, and by as much again if a particle was created
+/// within the sub-step.
 constexpr Real kSlack = 3;
 
 template <class F>
@@ -36,8 +37,8 @@ void ParticleCollisions::step(std::span<ParticleSystem* const> systems, const Pa
   match();
 
   const ParticleStep step{stage.h, stage.fixed, stage.moving, law, collision_speed, stage.impulses};
-  // Resting contact moves by the velocities at the end. The partners found by the mean velocities serve for
-  // that, too, unless particles speed up by much in a sub-step.
+  // Resting contact uses the velocities at the end. The partners found with the mean velocities can be used
+  // for it, unless particles accelerate much in a sub-step.
   Real largest = 0, change = 0;
   for (const CollidingParticle& g : particles_) {
     largest = std::max(largest, g.radius);
@@ -72,7 +73,7 @@ CollidingParticle ParticleCollisions::make_particles(const ParticleSystem& syste
   g.velocity = p.velocity[i];
   g.acceleration = duration > 0 ? Vec3((g.velocity - flight.velocity) / duration) : Vec3::Zero();
   g.path_velocity = duration > 0 ? Vec3(way / duration) : g.velocity;
-  // Rounding alone is no difference.
+  // A difference by rounding does not count.
   if ((way - duration * g.velocity).norm() <= 1e-14 * (1 + p.position[i].norm()))
     g.path_velocity = g.velocity;
   g.from = h - duration;
@@ -87,7 +88,7 @@ CollidingParticle ParticleCollisions::make_particles(const ParticleSystem& syste
   return g;
 }
 
-/// Makes the particles, those in bodies projected out of them.
+/// Creates the colliding particles; those inside bodies are projected out.
 void ParticleCollisions::gather(const ParticleStage& stage) {
   sources_.clear();
   for (uint32_t s = 0; s < systems_.size(); ++s) {
@@ -121,7 +122,7 @@ void ParticleCollisions::gather(const ParticleStage& stage) {
   for (std::size_t k = 0; k < n; ++k) outcomes_[sources_[k].system].tally.ejected += ejected[k];
 }
 
-/// Puts the particles in an order by layers.
+/// Orders the particles by layers.
 void ParticleCollisions::sort() {
   members_.clear();
   places_.clear();
@@ -152,7 +153,7 @@ void ParticleCollisions::sort() {
   });
 }
 
-/// Finds out which particle of the step before each one is.
+/// Finds the particle of the previous step that corresponds to each particle.
 void ParticleCollisions::match() {
   std::vector<uint32_t> place(sources_.size(), ParticleContacts::kNone);
   for (uint32_t i = 0; i < source_of_.size(); ++i) place[source_of_[i]] = i;
@@ -171,7 +172,7 @@ void ParticleCollisions::match() {
   known_ = std::move(now);
 }
 
-/// Brings the particles to where their particles are, and tells what happened to them.
+/// Writes the results back to the particle systems, with the collisions.
 void ParticleCollisions::scatter(const ParticleStage& stage) {
   for (const ParticleStrike& strike : strikes_) touched_[strike.particle] = 1;
   for_each_chunked(particles_.size(), [&](std::size_t i) {

@@ -1,7 +1,7 @@
 #pragma once
-/// The collisions of particles that collide with particles (physics P3-P8), of all systems together. They
-/// have flown; then, as particles sorted by place, they are taken through their impacts (particle_impacts.h),
-/// and what is left of the sub-step through resting contact (particle_contacts.h).
+/// The collisions of particles with particles (physics P3-P8), for all systems together. After their flight,
+/// the particles are sorted by position and go through their impacts (particle_impacts.h), and then through
+/// resting contact for the rest of the sub-step (particle_contacts.h).
 
 #include <span>
 #include <vector>
@@ -15,26 +15,26 @@ namespace offstage::sim {
 
 class ParticleCollisions {
  public:
-  /// What became of the particles of a system.
+  /// Results for the particles of a system.
   struct Outcome {
     std::vector<uint8_t> touched, trapped;  ///< by particle
-    ParticleTally tally;                    ///< of collisions alone
+    ParticleTally tally;                    ///< counts of collisions only
   };
 
-  /// Moves the particles of systems that have flown (ParticleSystem::fly_all), given in the order of their
-  /// handles, to the end of the sub-step.
+  /// Moves the particles of systems after their flight (ParticleSystem::fly_all) to the end of the sub-step.
+  /// The systems are in the order of their handles.
   void step(std::span<ParticleSystem* const> systems, const ParticleStage& stage, ImpactLaw law,
             Real collision_speed);
 
-  /// By system, of the last step.
+  /// Results of the last step by system.
   std::span<Outcome> outcomes() { return outcomes_; }
 
  private:
   struct Source {
     uint32_t system, index;
-    bool is_particles;  // its numbers are finite, and it is in no body
+    bool is_particles;  // whether it takes part: its numbers are finite, and it is not inside a body
   };
-  /// A particle of the step before, and its place among its particles.
+  /// A particle of the previous step, with its index there.
   struct Known {
     ParticleSystemHandle system;
     uint64_t id;

@@ -12,11 +12,11 @@ namespace offstage::sim {
 namespace {
 
 constexpr std::size_t kContactChunk = ParticleSearch::kChunk;
-/// Normals with a larger cosine between them are those of one surface.
+/// Cosine: contacts whose normals differ by less belong to one surface.
 constexpr Real kSameSurface = 0.95;
 
-/// Calls f(distance, normal) for the places of a solid's surface that are within `reach` of p, its own frame:
-/// the nearest one, of a mesh that of each triangle.
+/// Calls f(distance, normal) for the points of a solid's surface within `reach` of p (in its own frame): the
+/// nearest point or, for a mesh, that of each triangle.
 template <class F>
 void for_each_surface(const Solid& solid, const Vec3& p, Real reach, F&& f) {
   if (!solid.mesh) {
@@ -35,7 +35,7 @@ void for_each_surface(const Solid& solid, const Vec3& p, Real reach, F&& f) {
   });
 }
 
-/// What of an impulse a contact can carry along its normal as it is now.
+/// The part of an impulse that a contact can transmit with its current normal.
 Vec3 admissible(const Vec3& impulse, const Vec3& normal, Real friction) {
   const Real pressing = impulse.dot(normal);
   if (!(pressing > 0)) return Vec3::Zero();
@@ -50,7 +50,7 @@ std::size_t ParticleContacts::chunk_count() const {
   return (particles_.size() + kContactChunk - 1) / kContactChunk;
 }
 
-/// Calls f(chunk, first, last) in parallel for runs of particles.
+/// Calls f(chunk, first, last) in parallel for consecutive ranges of particles.
 template <class F>
 void ParticleContacts::for_each_chunk(F&& f) const {
   tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
@@ -69,7 +69,7 @@ void ParticleContacts::find() {
     found.strikes.clear();
     NearObstacles near(step_->fixed, step_->moving);
     for (uint32_t i = begin; i < end; ++i) {
-      // Relative to the chunk's first, until collect().
+      // Relative to the start of the chunk, until collect().
       pair_begin_[i] = static_cast<uint32_t>(found.pairs.size());
       surface_begin_[i] = static_cast<uint32_t>(found.surfaces.size());
       find_pairs(i, found);
@@ -91,14 +91,15 @@ void ParticleContacts::find_pairs(uint32_t i, Found& found) const {
     if (const auto met = meeting(a, b, h)) {
       const Real speed = -u.dot(met->normal);
       pair.is_impact = is_impact(speed, greater_acceleration(a, b), *step_);
-      // What is no impact acts all the time, because what presses does, and closes the gap by the end.
+      // A contact that is not an impact acts during the whole sub-step, and its target closes the gap at the
+      // end.
       const Real from = std::max(a.from, b.from);
       target = pair.is_impact ? pair_restitution(a, b) * speed : -speed * (met->time - from) / h;
       normal = met->normal;
       time = pair.is_impact ? met->time : from;
     } else {
-      // The normal half-way does not turn over for those that press into each other. Those that fly past each
-      // other have to be looked at where they are.
+      // The normal is that at half of the motion, which does not reverse if the particles press into each
+      // other. For fast particles that pass each other, it is that at the end.
       const Real from = std::max(a.from, b.from), reach = a.radius + b.radius;
       const Vec3 d = a.at(h) - b.at(h), way = (h - from) * u;
       const Vec3 middle = way.squaredNorm() < reach * reach / 64 ? Vec3(d - way / 2) : d;
@@ -148,8 +149,8 @@ void ParticleContacts::find_surfaces(uint32_t i, NearObstacles& near, Found& fou
   }
 }
 
-/// Adds the contact of particle i with a surface that it meets, or that is `gap` away at the end; once per
-/// surface, of which those from `first` on were found before.
+/// Adds the contact of particle i with a surface that it meets, or that is at the distance `gap` at the end.
+/// Each surface is added once; those from `first` on were found for this particle.
 void ParticleContacts::add_surface(uint32_t i, const Obstacle& o, const Vec3& normal, Real gap, Real time,
                                    bool meets, std::size_t first, Found& found) const {
   for (std::size_t k = first; k < found.surfaces.size(); ++k)
@@ -170,7 +171,8 @@ void ParticleContacts::add_surface(uint32_t i, const Obstacle& o, const Vec3& no
   Real target = meets ? -speed * (time - g.from) / step_->h : std::min(0.0, -speed - gap / step_->h);
   s.time = static_cast<float>(s.is_impact ? time : g.from);
   if (s.is_impact) {
-    // The body gives way, but only later: the particle is left with the velocity that it then has.
+    // The body moves only in the next sub-step, so the particle keeps the velocity that the body will then
+    // have.
     const Vec3 arm = g.at(time) - g.radius * normal - o.centre_at(time / step_->h);
     const Real yielding =
         o.is_dynamic() ? g.mass * normal.dot(step_->impulses.mobility(o, arm, -normal) * normal) : 0;
@@ -181,7 +183,7 @@ void ParticleContacts::add_surface(uint32_t i, const Obstacle& o, const Vec3& no
   found.surfaces.push_back(s);
 }
 
-/// The impulse of the sub-step before as the guess.
+/// Uses the impulse of the previous sub-step as the initial guess.
 void ParticleContacts::recall(Pair& pair) const {
   pair.impulse_single.setZero();
   const uint32_t a = order_.before[pair.a], b = order_.before[pair.b];
@@ -210,7 +212,7 @@ void ParticleContacts::recall(Surface& s) const {
   }
 }
 
-/// Brings what the chunks found together.
+/// Merges the results of the chunks.
 void ParticleContacts::collect() {
   std::size_t pairs = 0, surfaces = 0;
   std::vector<std::pair<std::size_t, std::size_t>> offset;

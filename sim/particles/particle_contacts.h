@@ -1,11 +1,11 @@
 #pragma once
-/// Resting contact of particles with each other and with bodies, and whatever ParticleImpacts left (physics
-/// P6, P7, P8, R10): a complementarity problem on the velocities at the end of the sub-step with Coulomb's
-/// round cone, as of bodies (contact_problem.h). Particles do not turn, so a contact's mobility is a number
-/// and its solution closed. It is relaxed by projected Gauss-Seidel from the impulses of the sub-step before:
-/// a heap at rest is its own solution. Particles lie in layers (NeighborGrid), two to a slab, and a slab's
-/// contacts reach no farther than the layers beside it: all even slabs may be relaxed at the same time, then
-/// all odd ones.
+/// Resting contact of particles with each other and with bodies, including the collisions that
+/// ParticleImpacts leaves (physics P6, P7, P8, R10): a complementarity problem on the velocities at the end
+/// of the sub-step with Coulomb's round cone, as for bodies (contact_problem.h). Particles do not rotate, so
+/// a contact's mobility is a number and its solution has a closed form. The problem is solved by projected
+/// Gauss-Seidel from the impulses of the previous sub-step; a heap at rest is its own solution. Particles are
+/// in layers (NeighborGrid), two of which make a slab, and contacts of a slab reach no farther than the
+/// layers beside it. All even slabs can therefore be solved at the same time, then all odd ones.
 
 #include <algorithm>
 #include <cmath>
@@ -24,18 +24,20 @@ namespace offstage::sim {
 class ParticleContacts {
  public:
   static constexpr uint32_t kNone = ~0u;
-  /// Gaps below this share of the radii count as contact: what impulses of a sub-step may close.
+  /// Gaps below this share of the radii count as contact, because the impulses of a sub-step may close them.
   static constexpr Real kMargin = 0.1;
 
-  /// The particles, in an order by layers.
+  /// The particles ordered by layers.
   struct Order {
-    std::span<const uint32_t> layer_begin;  ///< of each layer, an even number, and the end
-    std::span<const uint32_t> layer;        ///< of each particle
-    std::span<const uint32_t> before;       ///< index of each in the solution before, or kNone
+    /// First particle of each layer, and the end; the number of layers is even.
+    std::span<const uint32_t> layer_begin;
+    std::span<const uint32_t> layer;   ///< of each particle
+    std::span<const uint32_t> before;  ///< index of each particle in the previous solution, or kNone
   };
 
-  /// Moves the particles to the end of their sub-step: `end` gets their positions, the particles their
-  /// velocities, `touched` whether they press on anything. Appends what bodies and particles got.
+  /// Moves the particles to the end of their sub-step. Writes their positions to `end`, their velocities to
+  /// the particles, and to `touched` whether they touch anything. Appends the reactions of bodies and the
+  /// collisions of particles.
   void solve(std::span<CollidingParticle> particles, const Order& order, const ParticleSearch& search,
              const ParticleImpacts& impacts, const ParticleStep& step, std::span<Vec3> end,
              std::span<uint8_t> touched, std::vector<Reaction>& reactions,
@@ -47,40 +49,40 @@ class ParticleContacts {
  private:
   static constexpr Real kNever = std::numeric_limits<Real>::infinity();
 
-  /// Of a contact: how it acts, in single precision, because the time of a sweep is that of reading the
-  /// contacts. What two particles give each other is equal and opposite all the same, and velocities are
-  /// double.
+  /// The effect of a contact. It is in single precision, because a sweep takes as long as reading the
+  /// contacts. The impulses on two particles are opposite all the same, and velocities are in double
+  /// precision.
   struct Contact {
     Eigen::Vector3f normal_single;
     Eigen::Vector3f impulse_single;
-    float target;    // least normal velocity at the end [m/s]
+    float target;    // smallest normal velocity at the end [m/s]
     float friction;  // Coulomb's coefficient
-    float mass;      // effective [kg]
-    float time;      // since when [s]
+    float mass;      // effective mass [kg]
+    float time;      // start of the contact [s]
 
     Vec3 normal() const { return normal_single.cast<Real>(); }
     Vec3 impulse() const { return impulse_single.cast<Real>(); }  // on the first particle, world [N s]
-    /// What is left of an impulse along the surface that friction can hold no more of than `limit`.
+    /// The part of a tangential impulse that friction with this `limit` can transmit.
     Vec3 held(const Vec3& along, Real limit) const {
       const Real size2 = along.squaredNorm();
       return size2 > limit * limit ? Vec3(limit / std::sqrt(size2) * along) : along;
     }
     bool acts() const { return impulse_single != Eigen::Vector3f::Zero(); }
   };
-  static constexpr uint32_t kIndex = 0x7fffffff;  // all bits of a particle's number
+  static constexpr uint32_t kIndex = 0x7fffffff;  // mask of a particle's index
   struct Pair : Contact {
     uint32_t a : 31, is_impact : 1;
-    uint32_t b : 31, is_far : 1;  // far: not in neighbouring layers
+    uint32_t b : 31, is_far : 1;  // is_far: not in neighbouring layers
   };
   struct Surface : Contact {
     uint32_t particle;
     bool is_impact;
     uint32_t body;
     const Obstacle* obstacle;
-    Vec3 velocity;       // of the surface
-    Vec3 friction_axis;  // Obstacle::friction_axis_on the surface
+    Vec3 velocity;       // velocity of the surface
+    Vec3 friction_axis;  // Obstacle::friction_axis_on() of the surface
 
-    /// Along and across the friction_axis each for itself.
+    /// Along and across the friction axis separately.
     Vec3 held(const Vec3& along, Real limit) const {
       if (friction_axis.isZero()) return Contact::held(along, limit);
       const Vec3 across = normal().cross(friction_axis);
@@ -93,11 +95,11 @@ class ParticleContacts {
     Vec3 velocity;
     Real inverse_mass;
   };
-  /// Two particles that would pass through each other.
+  /// Two particles whose paths would pass through each other.
   struct Passing {
     Real time;
     uint32_t a, b;
-    bool a_stands, b_stands;  // by then
+    bool a_stands, b_stands;  // whether they have stopped by then
 
     bool operator>(const Passing& o) const { return std::tie(time, a, b) > std::tie(o.time, o.a, o.b); }
   };
@@ -151,17 +153,17 @@ class ParticleContacts {
   std::vector<Found> found_;  // by chunk
   std::vector<Pair> pairs_, pairs_before_;
   std::vector<Surface> surfaces_, surfaces_before_;
-  // Where a particle's contacts begin; of a pair it is the first one's.
+  // First contact of each particle; a pair belongs to its first particle.
   std::vector<uint32_t> pair_begin_, surface_begin_, pair_begin_before_, surface_begin_before_;
   std::vector<uint32_t> far_;
   std::vector<Motion> motion_;
   std::vector<Real> slab_change2_;
-  // The ways as contact made them, whether they are long, and when those that end early do.
+  // Paths after contact, whether they are long, and the time at which stopped particles stopped.
   std::vector<CollidingParticle> ways_;
   std::vector<uint8_t> is_long_;
   std::vector<Real> stop_;
   ParticleSearch way_search_;
-  // Of each particle those whose ways may come near its own, if one of the two is long.
+  // For each particle, the particles whose paths may come near its own, if one of the two paths is long.
   std::vector<uint32_t> near_begin_, near_;
   Real h_before_ = 0;
   uint32_t sweeps_ = 0;

@@ -5,10 +5,10 @@
 namespace offstage::sim {
 namespace {
 
-/// Particles at a time, so that what is known of them meanwhile stays in the first-level cache.
+/// Number of particles in a block, so that intermediate data stay in the first-level cache.
 constexpr std::size_t kBlock = 64;
 
-/// Particles at a stage of an integration, and where to add to their accelerations.
+/// Particles at a stage of an integration, with their accelerations.
 struct Run {
   Real time;
   std::span<const Real> x, v, mass;
@@ -35,7 +35,7 @@ struct Run {
   }
 };
 
-/// Calls f(block, strengths) for blocks of particles of which some are in the field's region.
+/// Calls f(block, strengths) for each block of particles with at least one particle in the field's region.
 template <class Field, class F>
 void for_each_block(const Field& field, const Run& run, F&& f) {
   std::array<Real, kBlock> share;
@@ -61,7 +61,7 @@ void add(const PointField& f, const Run& run) {
   });
 }
 
-/// `blow(block, air)` gives the velocity of the air at each particle of a block.
+/// `blow(block, air)` writes the velocity of the air at each particle of a block.
 template <class Field, class Blow>
 void add_air(const Field& f, const Run& run, Blow&& blow) {
   for_each_block(f, run, [&](const Run& b, std::span<const Real> share) {
@@ -103,7 +103,7 @@ void add(const Other&, const Run&) {
   static_assert(kIsPairLaw<Other> || std::is_same_v<Other, Explosion>, "forces that work in other ways");
 }
 
-/// How fast the force on a particle at a place falls with its position and its velocity [N/m, N s/m].
+/// Rate at which the force on a particle decreases with its position and its velocity [N/m, N s/m].
 struct Stiffness {
   Real by_position = 0, by_velocity = 0;
 };
@@ -142,7 +142,7 @@ void ParticleForces::leap(Real h, std::span<Vec3> x, std::span<Vec3> v, std::spa
 
 bool FreeFlight::force_and_damping(Real t, std::span<const Real> x, std::span<const Real> p,
                                    std::span<Real> dp, std::span<Real> damping) const {
-  // One rate for each particle, then spread over its three coordinates, the last first.
+  // One rate for each particle is copied to its three coordinates, from the last one on.
   const std::size_t count = mass_.size();
   forces_.accelerate(t, x, p, mass_, dp, damping.first(count));
   for (std::size_t i = count; i-- > 0;)

@@ -1,6 +1,6 @@
 #pragma once
-/// The forces that act on each particle of a system alone: gravity, viscous drag, a constant force, and the
-/// world's fields, moving air and hands (physics P2).
+/// The forces on each single particle of a system: gravity, viscous drag, a constant force, and the world's
+/// fields, moving air and grabs (physics P2).
 
 #include <algorithm>
 #include <span>
@@ -22,28 +22,28 @@ struct ParticleForces {
         drag(def.linear_drag),
         fields(std::move(acting)) {}
 
-  /// By what is the same everywhere: without `fields`.
+  /// Acceleration by the forces that do not depend on position: without `fields`.
   Vec3 acceleration(const Vec3& v, Real mass) const {
     return gravity + (force - drag * (v - wind)) * (1 / mass);
   }
-  /// By everything, of a run of particles: x, v and dv have x y z after each other. `damping`, if not empty,
-  /// has for each particle the rate at which drag takes its velocity away [1/s].
+  /// Accelerations of consecutive particles by all forces; x, v and dv are flat (x y z of each). `damping`,
+  /// if not empty, gets for each particle the rate at which drag reduces its velocity [1/s].
   void accelerate(Real t, std::span<const Real> x, std::span<const Real> v, std::span<const Real> mass,
                   std::span<Real> dv, std::span<Real> damping = {}) const;
-  /// A step of IntegratorKind::leapfrog of a run of particles that no field acts on.
+  /// One step of IntegratorKind::leapfrog for consecutive particles on which no field acts.
   void leap(Real h, std::span<Vec3> x, std::span<Vec3> v, std::span<const Real> mass) const;
-  /// Appends the derivatives of (dx/dt, dv/dt) of a run of particles by (x, v), which begin at the rows and
-  /// columns `at_x` and `at_v`. Left out is how fields change from place to place: it does not make a system
-  /// stiff.
+  /// Appends the derivatives of (dx/dt, dv/dt) of consecutive particles by (x, v), which begin at the rows
+  /// and columns `at_x` and `at_v`. The change of fields with position is omitted, because it does not make a
+  /// system stiff.
   void jacobian(Real t, std::span<const Real> x, std::span<const Real> mass, int at_x, int at_v,
                 SparseEntries& entries) const;
 
   Vec3 gravity, force, wind;
   Real drag;
-  std::vector<const ForceDef*> fields;  ///< those of the world that act on the system
+  std::vector<const ForceDef*> fields;  ///< fields of the world that act on the system
 };
 
-/// A run of particles in free flight. The state is position and velocity, x y z after each other.
+/// Consecutive particles in free flight. The state is position and velocity, x y z of each.
 class FreeFlight final : public DynamicSystem {
  public:
   FreeFlight(const ParticleForces& forces, std::span<const Real> mass) : forces_(forces), mass_(mass) {}

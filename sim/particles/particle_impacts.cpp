@@ -10,16 +10,16 @@ namespace {
 
 constexpr std::size_t kImpactChunk = 512;
 constexpr uint32_t kMaxImpactsOfParticle = 1000;
-/// Collisions of a sub-step that are taken one after the other.
+/// Greatest number of collisions in a sub-step that are resolved one after the other.
 constexpr std::size_t kMaxImpacts = 5000;
-/// A particle with so many neighbours, at gaps below this share of the radii, is in a crowd.
+/// A particle with this many neighbours at small gaps is in a crowd.
 constexpr uint32_t kCrowd = 4;
 constexpr Real kNeighbourGap = 0.1;
-/// Particles touch if the gap is below this, of the distance of their centres.
+/// Particles touch if their gap is below this share of the distance of their centres.
 constexpr Real kTouching = 1e-6;
 /// A larger cluster is left to resting contact.
 constexpr std::size_t kMaxCluster = 16;
-/// Changed particles that are looked through one by one before they are sorted.
+/// Number of changed particles that are searched one by one before they are sorted.
 constexpr std::size_t kMaxUnsorted = 128;
 
 }  // namespace
@@ -66,13 +66,13 @@ void ParticleImpacts::count_neighbours() {
       });
 }
 
-/// Whether a collision is one of a crowd, and slow enough that all of them may be solved at once.
+/// Whether a collision is left to resting contact: it is in a crowd, and slow enough.
 bool ParticleImpacts::is_left(uint32_t i, uint32_t j, Real speed) const {
   return std::max(neighbours_[i], neighbours_[j]) >= kCrowd &&
          speed * step_->h < particles_[i].radius + particles_[j].radius;
 }
 
-/// The collisions on the ways as they are at the beginning.
+/// Finds the collisions on the initial paths.
 void ParticleImpacts::find_first() {
   const std::size_t n = particles_.size();
   found_.resize((n + kImpactChunk - 1) / kImpactChunk);
@@ -117,7 +117,7 @@ void ParticleImpacts::find_obstacle(uint32_t i, NearObstacles& near, Add&& add) 
   add(Impact{time, i, kNone, stamp_[i], 0, hit.normal, hit.obstacle});
 }
 
-/// The particles, unchanged or changed, that may come near a particle's way.
+/// Calls f for the particles, unchanged or changed, that may come near a particle's path.
 template <class F>
 void ParticleImpacts::for_each_near(const CollidingParticle& particle, F&& f) const {
   search_->for_each_near(particle, [&](uint32_t k) {
@@ -137,7 +137,7 @@ void ParticleImpacts::collide_with_obstacle(const Impact& impact) {
   const Vec3 contact = g.at(impact.time) - g.radius * impact.normal, arm = contact - o.centre_at(fraction);
   const Vec3 surface = o.is_dynamic() ? step_->impulses.velocity(o, arm) : o.velocity_at(contact, fraction);
   const Vec3 u = g.arrival(impact.time, step_->h) - surface;
-  // What is struck may move away by now; then it is only in the way until it does.
+  // The body may already be moving away. It then stops the particle without an impulse.
   const Vec3 impulse =
       u.dot(impact.normal) < 0
           ? collision_impulse(
@@ -166,7 +166,7 @@ void ParticleImpacts::collide_particles(const Impact& impact) {
   find_again(impact.b);
 }
 
-/// The two particles and all that touch them, and so on, at the time.
+/// The two particles and all particles that touch them, directly or through others, at that time.
 std::vector<uint32_t> ParticleImpacts::cluster(const Impact& impact) const {
   std::vector<uint32_t> members = {impact.a, impact.b};
   for (std::size_t m = 0; m < members.size(); ++m) {
@@ -228,7 +228,7 @@ void ParticleImpacts::strike(uint32_t i, Real time, const Vec3& change, const Ve
     strikes_->push_back({i, time, g.position, g.velocity_at(time, step_->h), normal});
 }
 
-/// The collisions that are ahead of a particle that has collided.
+/// Finds the next collisions of a particle that has collided.
 void ParticleImpacts::find_again(uint32_t i) {
   if (unsorted_.size() > kMaxUnsorted) {
     changed_search_.build(particles_, changed_, step_->h, 0);

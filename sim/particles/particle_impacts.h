@@ -1,9 +1,9 @@
 #pragma once
-/// Collisions of particles with particles and bodies, one after the other in the order of time, at their very
-/// times (physics E6, P3, P5, P6). Particles that touch when one of them is hit make a cluster and are solved
-/// together. The work is bounded: a particle that collides too often within a sub-step, and everything where
-/// collisions are too many, is left to resting contact (particle_contacts.h), which lets nothing through
-/// either. So are slow collisions in a crowd, of which there is no end and where each depends on all.
+/// Collisions of particles with particles and bodies, one after the other in the order of time, at their
+/// exact times (physics E6, P3, P5, P6). Particles that touch when one of them is hit form a cluster and are
+/// solved together. The work is bounded: a particle with too many collisions in a sub-step, or all particles
+/// if there are too many, are left to resting contact (particle_contacts.h), which also prevents tunnelling.
+/// So are slow collisions in a crowd, of which there are very many, each depending on all others.
 
 #include <functional>
 #include <queue>
@@ -20,23 +20,23 @@ class ParticleImpacts {
  public:
   static constexpr uint32_t kNone = ~0u;
 
-  /// Takes the particles through their collisions. `search` must have sorted them and listed their partners.
-  /// Bodies get theirs by the step's impulses; appends what particles got.
+  /// Resolves the collisions of the particles. `search` must have sorted them and listed their partners.
+  /// Bodies get their impulses through the step; the collisions of particles are appended.
   void resolve(std::span<CollidingParticle> particles, const ParticleSearch& search, const ParticleStep& step,
                std::vector<ParticleStrike>& strikes);
 
   /// The particles that collided.
   std::span<const uint32_t> changed() const { return changed_; }
-  /// Obstacle::body of the dynamic body that a particle struck last; it gives way in the next sub-step only.
+  /// Obstacle::body of the dynamic body that a particle hit last. The body moves only in the next sub-step.
   uint32_t struck_body(uint32_t particle) const { return struck_body_[particle]; }
   uint64_t count() const { return count_; }
 
  private:
   struct Impact {
     Real time;
-    uint32_t a, b;  // b: kNone if it is with an obstacle
+    uint32_t a, b;  // b: kNone for a collision with an obstacle
     uint32_t stamp_a, stamp_b;
-    Vec3 normal;  // towards a
+    Vec3 normal;  // points towards a
     const Obstacle* obstacle;
 
     bool operator>(const Impact& o) const {
@@ -66,11 +66,11 @@ class ParticleImpacts {
   std::vector<ParticleStrike>* strikes_ = nullptr;
   std::priority_queue<Impact, std::vector<Impact>, std::greater<>> queue_;
   std::vector<std::vector<Impact>> found_;  // by chunk
-  std::vector<uint32_t> stamp_;             // collisions of each particle so far
-  std::vector<uint32_t> neighbours_;        // that nearly touch, of each particle
+  std::vector<uint32_t> stamp_;             // number of collisions of each particle so far
+  std::vector<uint32_t> neighbours_;        // number of neighbours that nearly touch, for each particle
   std::vector<uint32_t> struck_body_;
   std::vector<uint32_t> changed_;
-  // Where the changed ones are: those sorted lately, and those changed since.
+  // The changed particles: those sorted last, and those changed since.
   ParticleSearch changed_search_;
   std::vector<uint32_t> sorted_stamp_;
   std::vector<uint32_t> unsorted_;

@@ -1,7 +1,8 @@
-/// The solution of ParticleContacts and what follows from it.
+/// Solution of ParticleContacts, and the resulting motion.
 
 #include <algorithm>
 #include <array>
+#include <map>
 
 #include <oneapi/tbb/parallel_for.h>
 
@@ -10,21 +11,56 @@
 namespace offstage::sim {
 namespace {
 
-/// Sweeps of Gauss-Seidel end when one changes no velocity by more than this [m/s], or after so much work:
-/// few contacts are solved exactly, many go on from the sub-step before.
+/// Sweeps of Gauss-Seidel end when one changes no velocity by more than this [m/s], or after a limit of work.
+/// Few contacts are solved exactly; many contacts converge over several sub-steps.
 constexpr Real kTolerance = 1e-7;
 constexpr std::size_t kMaxContactVisits = 1'000'000;
 constexpr std::size_t kMinSweeps = 30, kMaxSweeps = 1000;
-/// Overlap of particles below this share of their radii is left, and of more this share is taken away in a
-/// sub-step: by moving them, so that velocities do not know of it.
+/// An overlap of particles below kSlop times their radii is not removed. Of the rest, kPush is removed in a
+/// sub-step by moving the particles, without changing velocities.
 constexpr Real kSlop = 0.002, kPush = 0.2;
 constexpr int kMaxSlides = 4;
-/// Parts of a slab that are gone through side by side: contacts that follow each other should not wait for
+/// Number of parts of a slab that are processed alternately, so that consecutive contacts do not wait for
 /// each other's velocities.
 constexpr uint32_t kStreams = 4;
 constexpr std::size_t kRelaxationChunk = ParticleSearch::kChunk;
 
-/// The impulse's change that brings a contact with relative velocity u to its target, within Coulomb's cone.
+/// What resting particles do to a body in a sub-step.
+struct Load {
+  const Obstacle* obstacle;
+  Vec3 impulse = Vec3::Zero(), angular_impulse = Vec3::Zero();
+  Real share = 1;
+};
+
+/// A body that moves against the push of particles is stopped at most; besides it gets no more momentum than
+/// the particles of `mass` that touch something have `brought` with them, as seen from the body.
+void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads, Real brought, Real mass) {
+  for (const Reaction& r : reactions)
+    if (const auto load = loads.find(r.body); load != loads.end()) {
+      load->second.impulse += r.impulse;
+      load->second.angular_impulse += r.angular_impulse;
+    }
+  for (auto& [body, load] : loads) {
+    const Obstacle& o = *load.obstacle;
+    // Of a share s of the load: the energy changes by s times the first and s^2 times the second.
+    const Real first = o.end_velocity.dot(load.impulse) + o.end_spin.dot(load.angular_impulse);
+    const Real second = (o.inverse_mass * load.impulse.squaredNorm() +
+                         load.angular_impulse.dot(o.inverse_inertia * load.angular_impulse)) /
+                        2;
+    const Real size = load.impulse.norm();
+    const Real stops = second > 0 ? std::max(0.0, -first) / (2 * second) : 1;
+    const Real bears = size > 0 ? (brought + mass * o.end_velocity.norm()) / size : 1;
+    load.share = std::min(1.0, stops + bears);
+  }
+  for (Reaction& r : reactions)
+    if (const auto load = loads.find(r.body); load != loads.end()) {
+      r.impulse *= load->second.share;
+      r.angular_impulse *= load->second.share;
+    }
+}
+
+/// Change of the impulse that brings a contact with the relative velocity u to its target, within Coulomb's
+/// cone.
 template <class Contact>
 Vec3 correct(Contact& c, const Vec3& u) {
   const Vec3 before = c.impulse(), normal = c.normal();
@@ -41,8 +77,8 @@ Vec3 correct(Contact& c, const Vec3& u) {
 
 }  // namespace
 
-/// Calls on_pair for every pair and on_surface for every contact with a body; those that share a particle
-/// never at the same time, and always in the same order.
+/// Calls on_pair for every pair and on_surface for every contact with a body, in an order that does not
+/// depend on threads. Contacts that share a particle are never processed at the same time.
 template <class OnPair, class OnSurface>
 void ParticleContacts::for_each_contact(OnPair&& on_pair, OnSurface&& on_surface) {
   const std::size_t slabs = (order_.layer_begin.size() - 1) / 2;
@@ -108,7 +144,7 @@ void ParticleContacts::relax() {
   }
 }
 
-/// Where the impulses bring the particles, each from its time on.
+/// Moves the particles by their impulses, each from the start of its contact.
 void ParticleContacts::displace(std::span<Vec3> end, std::span<uint8_t> touched) {
   const Real h = step_->h;
   const auto press = [&](const Contact& c, uint32_t i, Real sign) {
@@ -132,7 +168,7 @@ void ParticleContacts::displace(std::span<Vec3> end, std::span<uint8_t> touched)
   });
 }
 
-/// Takes some of the overlap away.
+/// Removes a part of the overlaps.
 void ParticleContacts::push_apart(std::span<Vec3> end) {
   for_each_contact(
       [&](const Pair& c, std::size_t) {
@@ -147,7 +183,7 @@ void ParticleContacts::push_apart(std::span<Vec3> end) {
       [](const Surface&, std::size_t) {});
 }
 
-/// No particle ends its sub-step inside a body or beyond it.
+/// Moves particles that would end the sub-step inside a body or beyond it.
 void ParticleContacts::keep_outside(std::span<Vec3> end, std::vector<Reaction>& reactions,
                                     std::vector<ParticleStrike>& strikes) {
   const auto for_each = [&](auto&& f) {
@@ -162,10 +198,37 @@ void ParticleContacts::keep_outside(std::span<Vec3> end, std::vector<Reaction>& 
     if (particles_[i].hits_bodies) keep_outside(i, near, end[i], found);
   });
   for_each([&](uint32_t i, NearObstacles&, Found& found) { report(i, end[i], found); });
+  const std::size_t first = reactions.size();
   for (const Found& found : found_) {
     reactions.insert(reactions.end(), found.reactions.begin(), found.reactions.end());
     strikes.insert(strikes.end(), found.strikes.begin(), found.strikes.end());
   }
+
+  // A particle that is caught between a body and something else has no solution, and its impulses grow with
+  // each sweep.
+  std::map<uint32_t, Load> loads;
+  for (const Surface& s : surfaces_)
+    if (s.acts() && s.obstacle->is_dynamic()) loads.try_emplace(s.body, Load{s.obstacle});
+  if (loads.empty()) return;
+  std::vector<Vec3> momentum(particles_.size());  // before the contacts acted
+  std::vector<uint8_t> acts(particles_.size(), 0);
+  for (std::size_t i = 0; i < particles_.size(); ++i)
+    momentum[i] = particles_[i].mass * particles_[i].velocity;
+  const auto take_back = [&](const Contact& c, uint32_t i, Real sign) {
+    momentum[i] -= sign * c.impulse();
+    acts[i] |= c.acts();
+  };
+  for (const Pair& c : pairs_) {
+    take_back(c, c.a, 1);
+    take_back(c, c.b, -1);
+  }
+  for (const Surface& c : surfaces_) take_back(c, c.particle, 1);
+  Real brought = 0, mass = 0;
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    brought += acts[i] ? momentum[i].norm() : 0;
+    mass += acts[i] ? particles_[i].mass : 0;
+  }
+  limit_loads(std::span(reactions).subspan(first), loads, brought, mass);
 }
 
 void ParticleContacts::keep_outside(uint32_t i, NearObstacles& near, Vec3& end, Found& found) {
@@ -200,7 +263,7 @@ void ParticleContacts::keep_outside(uint32_t i, NearObstacles& near, Vec3& end, 
   }
 }
 
-/// Tells of what a particle got by its contacts; those of pairs tell both.
+/// Records the collisions of a particle's contacts; those of pairs are recorded for both particles.
 void ParticleContacts::report(uint32_t i, const Vec3& end, Found& found) const {
   const auto strike = [&](const auto& c, uint32_t particle, const Vec3& normal) {
     if (c.is_impact && c.acts())

@@ -57,8 +57,8 @@ void ParticleSearch::build(std::span<const CollidingParticle> particles, std::sp
   for (SizeClass& c : classes_) c.grid.build(c.centres, 2 * c.radius * (1 + 1e-9));
 }
 
-/// Makes the lists of the particles, which go through the cells in their order; `for_each_partner` is called
-/// with the class of a particle, its place there, and whom to tell of a partner's index.
+/// Makes the lists of partners. `for_each_partner` is called with the size class of a particle, its place
+/// there, and a function that takes the index of each partner.
 template <class ForEachPartner>
 void ParticleSearch::list(std::span<const CollidingParticle> particles, ForEachPartner&& for_each_partner) {
   struct Range {

@@ -1,7 +1,8 @@
 #pragma once
-/// Which particles come near each other on their ways. Each has a ball around its way, in a frame that moves
-/// with the mean of all; balls are sorted by size into classes, each a factor two wide, with a grid each, so
-/// that neither the large nor the fast make cells too wide for the others.
+/// Search for particles that come near each other on their paths. Each particle has a ball around its path,
+/// in a frame that moves with the mean of all particles. Balls are sorted by size into classes, each a factor
+/// of two wide and with a grid of its own, so that neither large nor fast particles make cells too wide for
+/// the others.
 
 #include <span>
 #include <vector>
@@ -15,13 +16,13 @@ class ParticleSearch {
  public:
   static constexpr std::size_t kChunk = 512;
 
-  /// Sorts the particles, or of them the `members`. `margin` is how near counts [m].
+  /// Sorts all particles, or only the `members`. `margin` is the distance that counts as near [m].
   void build(std::span<const CollidingParticle> particles, Real h, Real margin);
   void build(std::span<const CollidingParticle> particles, std::span<const uint32_t> members, Real h,
              Real margin);
 
-  /// Calls f(index) for the particles whose ways may come near that of `particle`, which may be in another
-  /// state than when it was sorted, and for itself.
+  /// Calls f(index) for the particles whose paths may come near that of `particle`, including itself. Its
+  /// state may differ from that when it was sorted.
   template <class F>
   void for_each_near(const CollidingParticle& particle, F&& f) const {
     const Ball b = ball(particle);
@@ -31,11 +32,11 @@ class ParticleSearch {
       });
   }
 
-  /// Lists for each particle, of which all must have been sorted, those it may collide with and whose ways
-  /// may come near its own; of a pair one lists the other.
+  /// Lists for each particle those with which it may collide and whose paths may come near its own. Each pair
+  /// is listed once, for one of the two. All particles must have been sorted.
   void list_partners(std::span<const CollidingParticle> particles);
-  /// The same for pairs of which at least one is among the `chosen`, a flag for each particle; that one lists
-  /// the other.
+  /// The same for pairs with at least one `chosen` particle (a flag for each particle), for which the pair is
+  /// listed.
   void list_partners(std::span<const CollidingParticle> particles, std::span<const uint8_t> chosen);
   std::span<const uint32_t> partners(uint32_t i) const {
     const List& list = lists_[i];
@@ -49,14 +50,14 @@ class ParticleSearch {
   };
   struct SizeClass {
     int size = 0;
-    Real radius = 0;  // of the largest ball
+    Real radius = 0;  // radius of the largest ball
     NeighborGrid grid;
     std::vector<uint32_t> member;
     std::vector<Ball> balls;
     std::vector<Vec3> centres;
   };
 
-  /// The partners of a particle, among those of its chunk.
+  /// The partners of a particle, as a range of those of its chunk.
   struct List {
     uint32_t chunk = 0, first = 0, count = 0;
   };

@@ -10,19 +10,20 @@
 namespace offstage::sim {
 namespace {
 
-/// Particles are kept this far off surfaces [m], far above rounding (1e-13 at 1000 m) and far below anything
-/// seen. A hit is declared at half of it, so that sliding along a surface, exact up to rounding, is not a
-/// hit.
+/// Distance from surfaces at which particles are kept [m]: far above rounding (1e-13 at 1000 m) and invisibly
+/// small. A hit is detected at half of it, so sliding along a surface, which is exact up to rounding, is not
+/// a hit.
 constexpr Real kSkin = 1e-10;
 constexpr int kMaxHits = 8;
-/// Rounds of projection out of bodies; each clears one layer of overlapping bodies.
+/// Greatest number of projections out of bodies; each removes one layer of overlapping bodies.
 constexpr int kMaxEjections = 4;
-/// Overlap, relative to the radius, that only the straightening of paths around turning bodies can make.
+/// Overlap, relative to the radius, up to which the straight pieces of paths around turning bodies can be the
+/// cause.
 constexpr Real kDriftDepth = Obstacle::kChordError;
 /// Passes over simultaneous contacts; two at right angles need one.
 constexpr int kContactPasses = 8;
 
-/// Whether a sphere, in the solid's frame, surely does not touch it.
+/// Whether a sphere, in the solid's frame, certainly does not touch the solid.
 bool is_clear(const Solid& solid, const Vec3& centre, Real radius) {
   return solid.mesh && solid.mesh->clearance_grid().is_clear(centre, radius);
 }
@@ -116,7 +117,8 @@ ObstacleHit NearObstacles::hit(const Obstacle& o, const Vec3& a, const Vec3& b, 
   return {};
 }
 
-/// Whether the particle moved it before in this sub-step: it then moves away, but not before the next one.
+/// Whether the particle already hit this obstacle in this sub-step. The obstacle then moves away, but only in
+/// the next one.
 bool ParticleSweep::was_struck(const Obstacle& o) const {
   return std::any_of(contacts_.begin(), contacts_.begin() + static_cast<std::ptrdiff_t>(contact_count_),
                      [&](const Contact& c) { return c.gives_way && c.obstacle == &o; });
@@ -127,8 +129,8 @@ Vec3 ParticleSweep::fly(const Vec3& v, Real mass, Real duration, const Vec3& ext
   return v + DampedKick(duration, forces_.drag / mass).end * (forces_.acceleration(v, mass) + extra);
 }
 
-/// Puts the particle at the hit with its velocity after the impulse (P5), and integrates the rest of its
-/// path. False: it strikes a body, and others may do so before it.
+/// Moves the particle to the hit, applies the impulse (P5), and integrates the rest of its path. Returns
+/// false if it strikes a body, because other particles may strike it earlier.
 bool ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real from, const Vec3& extra,
                             SweepOutcome& outcome) {
   const Obstacle& o = *hit.obstacle;
@@ -143,10 +145,10 @@ bool ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real fro
   Vec3 u = v - o.velocity_at(hit.position, hit.fraction);
   Real approach = -u.dot(hit.normal);
   const Real pressing = -acceleration.dot(hit.normal);
-  const Real gain = pressing * h_;  // approach speed that the forces would restore within one sub-step
+  const Real gain = pressing * h_;  // speed of approach that the forces would restore within one sub-step
   Real restitution = std::max(path.restitution, o.restitution);
   const bool strikes = approach > std::max(gain, 0.0);
-  // Only what strikes moves the obstacle: what rests on it is held by what holds the obstacle.
+  // Only impacts move the obstacle here; the load of resting particles is added separately.
   const bool moves_it = strikes && o.is_dynamic(), moved_it = was_struck(o);
   const Vec3 contact = hit.position - path.radius * hit.normal;
   Mat3 mobility = Mat3::Zero();
@@ -185,7 +187,7 @@ bool ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real fro
   return true;
 }
 
-/// The oldest contact gives way: it matters least where the particle is now.
+/// If there are too many contacts, the oldest is dropped, because it matters least at the current position.
 void ParticleSweep::add_contact(const Contact& contact) {
   if (contact_count_ == contacts_.size()) {
     std::move(contacts_.begin() + 1, contacts_.end(), contacts_.begin());
@@ -194,8 +196,8 @@ void ParticleSweep::add_contact(const Contact& contact) {
   contacts_[contact_count_++] = contact;
 }
 
-/// Moves over the remaining time. What the forces would press into surfaces that the particle rests on, these
-/// take up again with an impulse of no restitution: over the time it is the normal force and Coulomb's
+/// Moves the particle over the remaining time. Where forces would press it into a surface on which it rests,
+/// an impulse without restitution compensates them. Over the time this is the normal force and Coulomb
 /// friction.
 void ParticleSweep::finish(ParticlePath& path, Real duration, const Vec3& extra) {
   Vec3 v = fly(path.start_velocity, path.mass, duration, extra);

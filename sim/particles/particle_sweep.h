@@ -1,8 +1,8 @@
 #pragma once
-/// Takes one particle through a sub-step among obstacles (physics P3-P5): the path that integration gave is
-/// swept against the bodies, in each body's own frame between its poses, so that neither a fast particle nor
-/// a moving body passes through the other. At a hit the particle is placed at the surface, gets its impulse,
-/// and spends the remaining time with its new velocity under the same forces.
+/// Moves one particle through a sub-step among obstacles (physics P3-P5). The integrated path is swept
+/// against the bodies, in each body's own frame between its poses, so that neither a fast particle nor a
+/// moving body passes through the other. At a hit the particle is placed at the surface, gets its impulse,
+/// and continues for the remaining time with its new velocity under the same forces.
 
 #include <array>
 #include <cstdint>
@@ -15,7 +15,7 @@
 
 namespace offstage::sim {
 
-/// A particle before and after integration without collisions; the sweep rewrites the end.
+/// A particle before and after the integration without collisions; the sweep replaces the end.
 struct ParticlePath {
   Vec3 start, start_velocity;
   Vec3 end, end_velocity;
@@ -23,63 +23,65 @@ struct ParticlePath {
 };
 
 struct SweepOutcome {
-  uint32_t collisions = 0;    ///< impacts; a resting contact is not one
-  bool hit = false;           ///< touched anything
-  bool ejected = false;       ///< found inside a body, projected out (P4)
-  bool trapped = false;       ///< found inside a body, could not be projected out (P4)
-  bool truncated = false;     ///< used up its hits
-  bool strikes_body = false;  ///< left as it was before, because it strikes a dynamic body ...
+  uint32_t collisions = 0;    ///< number of impacts; resting contacts do not count
+  bool hit = false;           ///< it touched anything
+  bool ejected = false;       ///< it was inside a body and was projected out (P4)
+  bool trapped = false;       ///< it was inside a body and could not be projected out (P4)
+  bool truncated = false;     ///< it reached the limit of hits
+  bool strikes_body = false;  ///< it strikes a dynamic body and was left unchanged ...
   Real time = 0;              ///< ... at this fraction of the sub-step
 };
 
-/// A collision of a particle, after it.
+/// A collision of a particle, with the state after it.
 struct Strike {
-  Real fraction;  ///< of the sub-step
+  Real fraction;  ///< time as a fraction of the sub-step
   Vec3 position, velocity;
-  Vec3 normal;  ///< of what was hit, towards the particle
+  Vec3 normal;  ///< normal of the obstacle, towards the particle
 };
 
-/// What sweeps leave behind for others.
+/// Results of sweeps besides the paths.
 struct SweepLog {
   std::vector<Reaction> reactions;
-  std::vector<Strike> strikes;  ///< of the particle swept last, if wanted
+  std::vector<Strike> strikes;  ///< collisions of the last particle, if requested
   bool wants_strikes = false;
 };
 
-/// Where a particle on its path comes to touch an obstacle.
+/// First contact of a particle on its path with an obstacle.
 struct ObstacleHit {
   const Obstacle* obstacle = nullptr;
-  Real fraction = 1;  ///< of the sub-step
+  Real fraction = 1;  ///< time as a fraction of the sub-step
   Vec3 position;      ///< of the particle's centre
   Vec3 normal;        ///< of the obstacle
 };
 
-/// Impulse on a particle that meets an obstacle at a fraction of the sub-step with the relative velocity u,
-/// u.n < 0 (P5, P8); `mobility`: of the obstacle at the contact, zero if it does not give way. `friction`
-/// counts along the obstacle's friction axis; across it `cross_friction` of that, and each sticks or slides
-/// by itself.
+/// Returns the impulse on a particle that meets an obstacle at a fraction of the sub-step with the relative
+/// velocity u, u.n < 0 (P5, P8). `mobility` is that of the obstacle at the contact; zero if the particle does
+/// not move it. `friction` applies along the obstacle's friction axis, and `cross_friction` times this across
+/// it; with a friction axis each direction sticks or slides separately.
 Vec3 collision_impulse(const Obstacle& o, Real fraction, Real particle_mass, const Vec3& u, const Vec3& n,
                        Real restitution, Real friction, const Mat3& mobility);
-/// What an impulse on a particle does to the obstacle.
+/// Returns the reaction of an impulse on the obstacle.
 Reaction reaction(const Obstacle& o, const Vec3& contact, Real fraction, const Vec3& impulse_on_particle);
 
-/// The obstacles that are near one particle's way.
+/// The obstacles near one particle's path.
 class NearObstacles {
  public:
   NearObstacles(const Obstacles& fixed, const Obstacles& moving) : fixed_(fixed), moving_(moving) {}
 
-  /// Looks for those that a sphere may touch on its way from a to b.
+  /// Finds those that a sphere may touch on its path from a to b.
   void find(const Vec3& a, const Vec3& b, Real radius);
   std::span<const Obstacle* const> all() const { return near_; }
 
-  /// Projects a sphere, to be at `start` at a fraction of the sub-step, out of the bodies that it is in,
-  /// along the nearest face (P4); `end` moves with it. False if that does not succeed. `deep`: it was inside
-  /// by more than rounding and straightened paths make. Those found must be those near `start` and `end`.
+  /// Projects a sphere out of the bodies that contain it, along the nearest face (P4). `start` is its
+  /// position at a fraction of the sub-step; `end` is moved by the same displacement. Returns false if this
+  /// fails. `deep`: it was inside by more than rounding and straightened paths can cause. The obstacles found
+  /// must include those near `start` and `end`.
   bool eject(Vec3& start, Vec3& end, Real radius, Real fraction, bool& deep);
-  /// Of those found, the first that a sphere meets on its way from a at a fraction of the sub-step to b at
-  /// its end.
+  /// Returns the first hit of a sphere on its path from a, at a fraction of the sub-step, to b at its end,
+  /// among the obstacles found.
   ObstacleHit first_hit(const Vec3& a, const Vec3& b, Real radius, Real from) const;
-  /// Where a sphere meets one; none if it does not before `latest`, a fraction of the sub-step.
+  /// Returns the hit of a sphere with one obstacle; none if there is none before `latest`, a fraction of the
+  /// sub-step.
   static ObstacleHit hit(const Obstacle& o, const Vec3& a, const Vec3& b, Real radius, Real from,
                          Real latest);
 
@@ -91,26 +93,25 @@ class NearObstacles {
 
 class ParticleSweep {
  public:
-  /// `fixed` and `moving` are the obstacles of a sub-step of length h [s]. Those that strike dynamic bodies
-  /// change `impulses`, one after the other; without, as where many sweep at the same time, they are left as
-  /// they were and reported (SweepOutcome::strikes_body).
+  /// `fixed` and `moving` are the obstacles of a sub-step of length h [s]. With `impulses`, particles that
+  /// strike dynamic bodies change them one after the other. Without, as when many particles are swept in
+  /// parallel, such particles are left unchanged and reported (SweepOutcome::strikes_body).
   ParticleSweep(const Obstacles& fixed, const Obstacles& moving, const ParticleForces& forces, Real h,
                 SweepLog& log, BodyImpulses* impulses = nullptr)
       : near_(fixed, moving), forces_(forces), h_(h), log_(log), impulses_(impulses) {}
 
-  /// The particle lives from fraction `born` of the sub-step to its end. `extra` is the mean acceleration by
-  /// forces beyond ParticleForces (springs).
+  /// Sweeps a particle that exists from fraction `born` of the sub-step to its end. `extra` is the mean
+  /// acceleration by forces beyond ParticleForces (springs).
   SweepOutcome operator()(ParticlePath& path, Real born, const Vec3& extra);
 
  private:
-  /// A surface that presses on the particle until the end of the sub-step.
+  /// A surface against which the particle presses until the end of the sub-step.
   struct Contact {
     Vec3 normal;
     const Obstacle* obstacle;
     Real friction;
-    Real fraction;  // since when
-    /// Its obstacle was struck and gives way, but not before the next sub-step: so long it only is in the
-    /// way.
+    Real fraction;  // start of the contact
+    /// Its obstacle was hit and will move away in the next sub-step; until then it only blocks the particle.
     bool gives_way;
   };
 

@@ -12,18 +12,18 @@
 namespace offstage::sim {
 namespace {
 
-/// Particles per task; a chunk's state stays in the second-level cache between integration and sweep.
+/// Particles per task; the state of a chunk stays in the second-level cache between integration and sweep.
 constexpr std::size_t kChunk = 1024;
-/// Steps a second of what was born long ago, and how many at most.
+/// Steps per second for particles created before the sub-step, and greatest number of these steps.
 constexpr Real kStepsBefore = 120, kMostStepsBefore = 10000;
-/// Durations that come of rounding alone [s].
+/// Durations below this are rounding errors [s].
 constexpr Real kRounding = 1e-11;
 
 std::size_t chunk_count(std::size_t n) {
   return (n + kChunk - 1) / kChunk;
 }
 
-/// The part of an array that a range of indices covers.
+/// Range of elements of an array.
 template <class T>
 std::span<T> part(std::vector<T>& v, std::size_t begin, std::size_t end) {
   return std::span(v).subspan(begin, end - begin);
@@ -36,7 +36,7 @@ struct ParticleSystem::Scratch {
   std::vector<Vec3> position, velocity;  // at the start of the sub-step
 };
 
-/// A particle that strikes a body, and its flight so far.
+/// A particle that strikes a body, with its flight so far.
 struct ParticleSystem::Striker {
   Real time;  // as a fraction of the sub-step
   std::size_t particle;
@@ -82,8 +82,8 @@ void ParticleSystem::begin_coupled() {
   start_velocity_ = arrays.velocity;
 }
 
-/// Free flight of a run of particles, its start kept in `scratch`. Before the world begins forces are those
-/// of its first moment.
+/// Free flight of consecutive particles; their initial state is stored in `scratch`. Before time 0 the forces
+/// are those of time 0.
 void ParticleSystem::fly(const ParticleForces& forces, Real t, Real h, std::size_t begin, std::size_t end,
                          Scratch& scratch) {
   const auto x = part(arrays.position, begin, end), v = part(arrays.velocity, begin, end);
@@ -92,11 +92,13 @@ void ParticleSystem::fly(const ParticleForces& forces, Real t, Real h, std::size
   const auto mass = part(arrays.mass, begin, end);
   t = std::max(t, 0.0);
   if (def.integrator == IntegratorKind::leapfrog && forces.fields.empty()) return forces.leap(h, x, v, mass);
-  scratch.integrator.next_step = 0;  // whose step it was depends on the threads
+  // Otherwise the previous particle, and thus the threads, would affect the result.
+  scratch.integrator.next_step = 0;
   integrator(def.integrator).step(FreeFlight(forces, mass), t, h, flat(x), flat(v), scratch.integrator);
 }
 
-/// What was born before the world began, or long before this sub-step, has flown freely until it begins.
+/// Free flight of a particle that was created before time 0, or long before this sub-step, until the sub-step
+/// begins.
 void ParticleSystem::fly_before(const ParticleForces& forces, Real t, std::size_t i, Real duration,
                                 Scratch& scratch) {
   duration = std::min(duration, arrays.lifespan[i]);
@@ -113,9 +115,9 @@ void ParticleSystem::admit_newborn(const ParticleForces& forces) {
   newborn.clear();
 }
 
-/// Flies every particle, and calls make_landing(chunk)(i, flight, integrated) when it has flown; `integrated`
-/// says that it was before, by a network of springs. Calls of a chunk are in order, those of different chunks
-/// at the same time.
+/// Integrates every particle, and then calls make_landing(chunk)(i, flight, integrated). `integrated` means
+/// that it was integrated before, in a CoupledGroup. Calls of one chunk are in order; those of different
+/// chunks are parallel.
 template <class MakeLanding>
 void ParticleSystem::fly_each(const ParticleStage& stage, const ParticleForces& forces, bool coupled,
                               MakeLanding&& make_landing) {
@@ -131,7 +133,7 @@ void ParticleSystem::fly_each(const ParticleStage& stage, const ParticleForces& 
     for (std::size_t i = begin; i < end; ++i) land(i, Flight{x0[i - begin], v0[i - begin], stage.h}, coupled);
   });
 
-  // Each newborn has its own time to fly.
+  // Each new particle has a flight time of its own.
   tbb::parallel_for(std::size_t{0}, chunk_count(newborn.size()), [&](std::size_t chunk) {
     const std::size_t begin = old + chunk * kChunk, end = std::min(count, begin + kChunk);
     auto land = make_landing(chunk_count(old) + chunk);
@@ -156,7 +158,7 @@ bool ParticleSystem::is_lost(std::size_t i, const Flight& flight, ParticleTally&
   return true;
 }
 
-/// Takes a particle that has flown through its collisions with bodies.
+/// Resolves the collisions of a particle with bodies after its flight.
 SweepOutcome ParticleSystem::sweep(const ParticleStage& stage, const ParticleForces& forces,
                                    ParticleSweep& sweep, std::size_t i, const Flight& flight,
                                    bool integrated) {
@@ -174,7 +176,7 @@ SweepOutcome ParticleSystem::sweep(const ParticleStage& stage, const ParticleFor
   return outcome;
 }
 
-/// The end of a particle's sub-step; `spent` if it collided and that was its death.
+/// Ends a particle's sub-step; `spent` means that it was removed by a collision.
 void ParticleSystem::end(const ParticleStage& stage, std::size_t i, bool spent, bool trapped,
                          ParticleTally& tally) {
   tally.removed += trapped;
@@ -259,8 +261,8 @@ ParticleTally ParticleSystem::step(const ParticleStage& stage, const ParticleFor
   return sum_up(tallies);
 }
 
-/// Those that strike dynamic bodies do so one after the other, in the order of time: each meets a body with
-/// the velocity that the ones before it have left it.
+/// Particles that strike dynamic bodies are processed one after the other, in the order of time: each meets a
+/// body with the velocity after the previous ones.
 void ParticleSystem::strike_bodies(const ParticleStage& stage, const ParticleForces& forces,
                                    std::vector<Striker> strikers, ParticleTally& tally) {
   std::sort(strikers.begin(), strikers.end(), [](const Striker& a, const Striker& b) {

@@ -1,8 +1,8 @@
 #pragma once
-/// A particle system at work: its arrays, the newborns of the coming sub-step, and the stages of a sub-step.
-/// They run over chunks in parallel, and their results do not depend on the chunks. Particles that collide
-/// with particles fly first, are then taken through their collisions together (particle_collisions.h), and
-/// end their sub-step last.
+/// Internal state of a particle system: its arrays, the new particles of the next sub-step, and the stages of
+/// a sub-step. The stages run over chunks in parallel, and their results do not depend on the chunks.
+/// Particles that collide with particles first fly, then go through their collisions together
+/// (particle_collisions.h), and end their sub-step last.
 
 #include <optional>
 #include <span>
@@ -15,23 +15,23 @@
 
 namespace offstage::sim {
 
-/// What became of a system's particles in a sub-step.
+/// Results for a system's particles in a sub-step.
 struct ParticleTally {
   uint64_t expired = 0, retired = 0, ejected = 0, removed = 0, collisions = 0, truncated = 0;
-  std::optional<NonFinite>
-      lost;  ///< the first particle that stopped being finite; `object` is left to the world
+  /// The first particle whose state became infinite or NaN; the world sets `object`.
+  std::optional<NonFinite> lost;
   std::vector<ParticleEvent> events;  ///< if the system reports them
 
   ParticleTally& operator+=(const ParticleTally& t);
 };
 
-/// A sub-step as all particle systems see it.
+/// Parameters of a sub-step for all particle systems.
 struct ParticleStage {
   Real time, h;
   const Obstacles& fixed;
   const Obstacles& moving;
   const Aabb& bounds;
-  BodyImpulses& impulses;  ///< on dynamic bodies
+  BodyImpulses& impulses;  ///< impulses on dynamic bodies
 };
 
 struct ParticleSystem {
@@ -39,39 +39,39 @@ struct ParticleSystem {
   ParticleSystemDef def;
   ParticleArrays arrays;
   uint64_t next_id = 0;
-  /// For the last particles of the arrays, those added since the last sub-step: how long before its end each
-  /// was born; negative: it was there from its start.
+  /// For the last particles of the arrays, those added since the last sub-step: time from their creation to
+  /// the end of the sub-step. Negative: the particle exists from the sub-step's start.
   std::vector<Real> newborn;
 
   uint64_t add(const Particle& p, Real elapsed);
-  /// Place of a particle in the arrays; empty if it is no more.
+  /// Index of a particle in the arrays; empty if it does not exist any more.
   std::optional<std::size_t> find(uint64_t id) const;
 
-  /// Whether a particle lives through the whole coming sub-step.
+  /// Whether a particle exists during the whole next sub-step.
   bool whole_step(std::size_t i) const {
     const std::size_t old = arrays.size() - newborn.size();
     return i < old || newborn[i - old] < 0;
   }
 
-  /// Takes in those added since the last sub-step as they are now: each flies for as long as it has lived,
-  /// and lives through the whole coming sub-step.
+  /// Adds the particles created since the last sub-step in their current state. Each flies for its age so
+  /// far, and exists during the whole next sub-step.
   void admit_newborn(const ParticleForces& forces);
-  /// Keeps the state at the start of the sub-step, for those that integrate the whole system themselves.
+  /// Stores the state at the start of the sub-step, for a CoupledGroup that integrates the system.
   void begin_coupled();
   bool hits_particles() const { return def.internal || def.external; }
-  /// Of particles that do not collide with particles: integrates, sweeps against bodies, ages and removes. Of
-  /// a `coupled` system the particles of whole_step() are already integrated.
+  /// For particles that do not collide with particles: integrates, sweeps against bodies, ages and removes.
+  /// In a `coupled` system the particles of whole_step() are already integrated.
   ParticleTally step(const ParticleStage& stage, const ParticleForces& forces, bool coupled);
 
-  /// Of the others: integrates alone, and keeps how it began.
+  /// For the other particles: only integrates, and stores the initial state.
   void fly_all(const ParticleStage& stage, const ParticleForces& forces, bool coupled);
-  /// A particle's flight: from where and for how long.
+  /// A particle's flight: initial state and duration.
   struct Flight {
     Vec3 position, velocity;
     Real duration;
   };
   Flight flight(std::size_t i) const { return {start_position_[i], start_velocity_[i], duration_[i]}; }
-  /// Ages and removes. `touched` and `trapped` say what collisions did to each particle.
+  /// Ages and removes particles. `touched` and `trapped` are the results of collisions for each particle.
   ParticleTally end_step(const ParticleStage& stage, std::span<const uint8_t> touched,
                          std::span<const uint8_t> trapped);
   ParticleEvent collision_event(const ParticleStage& stage, std::size_t i, const Strike& strike) const;
@@ -99,7 +99,7 @@ struct ParticleSystem {
                      std::size_t i, const Flight& flight, bool integrated);
   void remove_dead();
 
-  std::vector<Vec3> start_position_, start_velocity_;  // of a coupled system, or after fly_all()
+  std::vector<Vec3> start_position_, start_velocity_;  // for a coupled system, or after fly_all()
   std::vector<Real> duration_;                         // after fly_all()
   std::vector<Fate> fate_;
 };

@@ -1,8 +1,8 @@
-/// What ParticleContacts does about particles that its solution sends through each other. It knows of those
-/// that come near each other on their ways as they were before: contact may turn a fast particle towards
-/// others. So the ways that it made are swept once more, in the order of time, and two particles that would
-/// pass stop for the rest of the sub-step. What stops stays clear of what has not come yet, so nothing
-/// passes, and each particle stops once at most.
+/// Prevents particles from passing through each other in the solution of ParticleContacts. That solution uses
+/// the particles that come near each other on their paths before contact, but contact may turn a fast
+/// particle towards others. The resulting paths are therefore swept once more, in the order of time, and two
+/// particles that would pass stop for the rest of the sub-step. A stopped particle keeps its distance from
+/// particles that arrive later, so no particle passes, and each particle stops at most once.
 
 #include <algorithm>
 #include <queue>
@@ -14,15 +14,15 @@
 namespace offstage::sim {
 namespace {
 
-/// Two whose ways are shorter than this share of their radii cannot pass each other.
+/// Two particles whose paths are shorter than this share of their radii cannot pass each other.
 constexpr Real kShort = 0.5;
-/// So near, of the distance they had or of that at which they touch, they stop: nearer than contact lets them
-/// come.
+/// Distance at which particles stop, as a share of their initial distance or of that at which they touch:
+/// smaller than contact allows.
 constexpr Real kNearest = 0.992;
 
 }  // namespace
 
-/// Makes the ways to the ends; whether any is long, in the frame that moves with the mean.
+/// Sets the paths to the ends; returns whether any is long, in the frame that moves with the mean.
 bool ParticleContacts::set_out(std::span<const Vec3> end) {
   const std::size_t n = particles_.size();
   const Real h = step_->h;
@@ -41,7 +41,7 @@ bool ParticleContacts::set_out(std::span<const Vec3> end) {
   return std::find(is_long_.begin(), is_long_.end(), 1) != is_long_.end();
 }
 
-/// When two particles come too near each other after a time, as far as is known where they stop.
+/// Finds when two particles come too near each other after a time, given where they stop as far as known.
 template <class Add>
 void ParticleContacts::find_passing(uint32_t i, uint32_t j, Real after, Add&& add) const {
   const CollidingParticle &a = ways_[i], &b = ways_[j];
@@ -84,7 +84,7 @@ void ParticleContacts::list_near() {
   });
 }
 
-/// Both stop, and no longer approach each other.
+/// Stops both particles, and removes their speed of approach.
 void ParticleContacts::stop(const Passing& p) {
   stop_[p.a] = std::min(stop_[p.a], p.time);
   stop_[p.b] = std::min(stop_[p.b], p.time);

@@ -1,5 +1,6 @@
-/// Particles against cloth, both ways (physics F6): after both have moved, a particle that came to the other
-/// side of a triangle, or nearer than its radius, is put back and exchanges an impulse with its corners.
+/// Collisions of particles with cloth in both directions (physics F6). After both have moved, a particle that
+/// is beyond a triangle, or nearer than its radius, is put back and exchanges an impulse with the triangle's
+/// corners.
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +12,8 @@
 namespace offstage::sim {
 namespace {
 
-/// A particle meets a triangle as far as this beyond its border, in radii: triangles bend as they move.
+/// Distance beyond the border of a triangle at which a particle still meets it, in radii, because triangles
+/// bend as they move.
 constexpr Real kSlack = 0.1;
 
 struct ClothTriangle {
@@ -21,17 +23,18 @@ struct ClothTriangle {
 
 struct ClothHit {
   const ClothTriangle* triangle;
-  Real fraction = 2;  // of the sub-step; above 1: none
-  Vec3 weights;       // of the corners
+  Real fraction = 2;  // time as a fraction of the sub-step; above 1: no hit
+  Vec3 weights;       // weights of the corners
   Vec3 normal;        // towards the particle
-  Real overlap;       // at the end [m]
+  Real overlap;       // overlap at the end [m]
 };
 
 Vec3 unit_normal(const Vec3& a, const Vec3& b, const Vec3& c) {
   return (b - a).cross(c - a).stableNormalized();
 }
 
-/// The earliest hit of a sphere on its straight way from p0 to p1; a triangle's way is straight, too.
+/// Finds the earliest hit of a sphere on its straight path from p0 to p1 with a triangle, whose path is
+/// straight, too.
 void find_hit(const ClothTriangle& t, const Vec3& p0, const Vec3& p1, Real radius, ClothHit& first) {
   const auto from = [&](std::size_t k) { return t.cloth->before[t.corners[k]]; };
   const auto to = [&](std::size_t k) { return t.cloth->points[t.corners[k]]; };
@@ -39,7 +42,7 @@ void find_hit(const ClothTriangle& t, const Vec3& p0, const Vec3& p1, Real radiu
   const Real height0 = n0.dot(p0 - from(0)), side = height0 < 0 ? -1 : 1;
   const Real gap0 = side * height0 - radius, gap1 = side * n1.dot(p1 - to(0)) - radius;
   if (gap1 >= 0) return;
-  // Where it comes to touch; or, over a crease, where its centre comes through.
+  // First the contact of its surface; then, over a crease, the passage of its centre.
   for (const Real reach : {radius, 0.0}) {
     const Real before = gap0 + radius - reach, after = gap1 + radius - reach;
     if (after >= 0) return;
@@ -94,7 +97,7 @@ void World::Impl::hit_cloths(Real h) {
       Cloth& cloth = *hit.triangle->cloth;
       Vec3 velocity = p.velocity[i];
       Real mobility = 1 / p.mass[i];
-      std::array<Real, 3> gain;  // of the corners' velocities by a unit impulse
+      std::array<Real, 3> gain;  // changes of the corners' velocities by a unit impulse
       for (std::size_t k = 0; k < 3; ++k) {
         const uint32_t corner = hit.triangle->corners[k];
         const Real weight = hit.weights[static_cast<Eigen::Index>(k)];

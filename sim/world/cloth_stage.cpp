@@ -1,5 +1,5 @@
-/// Cloths in the world (physics F6-F8): after bodies and particles have moved, cloths do, among bodies on the
-/// ways that these made. What they do to bodies counts from the next sub-step on.
+/// Cloths in the world (physics F6-F8). Cloths move after bodies and particles, among the bodies on the paths
+/// of these. Their effect on bodies begins in the next sub-step.
 
 #include <algorithm>
 #include <stdexcept>
@@ -9,9 +9,9 @@
 namespace offstage::sim {
 namespace {
 
-/// Cloth under a body that moves slower than this is at rest [m/s].
+/// Cloth is at rest under a body that moves slower than this [m/s].
 constexpr Real kClothRest = 0.05;
-/// A change of speed in a sub-step that is an impact; gravity's is a fifth of it [m/s].
+/// A larger change of speed in a sub-step is an impact; that by gravity is a fifth of it [m/s].
 constexpr Real kImpact = 0.2;
 
 }  // namespace
@@ -59,7 +59,7 @@ void World::Impl::arrange_cloths() {
   cloth_system.assign(std::move(all));
 }
 
-/// What is pinned to a body that goes away, hangs free.
+/// Cloth pinned to a removed body is released.
 void World::Impl::detach_cloths(BodyHandle body) {
   cloths.for_each([&](ClothHandle, std::unique_ptr<Cloth>& cloth) {
     std::erase_if(cloth->pins, [&](const ClothPin& pin) { return pin.body == body; });
@@ -71,7 +71,7 @@ void World::Impl::begin_cloths() {
       [](ClothHandle, std::unique_ptr<Cloth>& cloth) { cloth->report = {.finite = !cloth->stopped}; });
 }
 
-/// Those that cloths may touch in a sub-step of length h, and those that hold pins.
+/// The bodies that cloths may touch in a sub-step of length h, and those that hold pins.
 std::vector<ClothBody> World::Impl::bodies_near_cloths(Real h) const {
   std::vector<uint8_t> holds(bodies.slot_count(), 0);
   cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
@@ -91,7 +91,7 @@ std::vector<ClothBody> World::Impl::bodies_near_cloths(Real h) const {
       velocity = body->rigid.velocity();
       spin = body->rigid.angular_velocity();
     } else {
-      way.inverse_mass = 0;  // asleep: as if fixed, until what lies beneath it moves
+      way.inverse_mass = 0;  // asleep: cloth does not move it until the body wakes
     }
     near.emplace_back(way, h, velocity, spin, body->def.surface_velocity);
     near.back().collides = body->def.collides;
@@ -108,7 +108,7 @@ void World::Impl::step_cloths(Real start, Real h) {
   hit_cloths(h);
 }
 
-/// Wakes sleeping bodies whose pins hold no cloth any more.
+/// Wakes sleeping bodies whose pins do not hold cloth any more.
 void World::Impl::wake_unpinned(std::span<const ClothBody> near) {
   std::vector<Body*> released;
   for (const auto& [number, group] : sleeping)
@@ -122,7 +122,8 @@ void World::Impl::wake_unpinned(std::span<const ClothBody> near) {
   for (Body* body : released) wake(*body);
 }
 
-/// What cloths did to bodies has moved them in this sub-step, and changes their velocities from the next on.
+/// Applies the effect of cloths on bodies: the displacement in this sub-step, and the change of velocity from
+/// the next one on.
 void World::Impl::answer_cloths(std::span<const ClothBody> near, Real start, Real h) {
   std::vector<Reaction> reactions;
   wake_unpinned(near);
@@ -130,7 +131,7 @@ void World::Impl::answer_cloths(std::span<const ClothBody> near, Real start, Rea
     Body& body = *bodies[bodies.at_slot(at.way().body)];
     const bool left = std::exchange(body.on_cloth, at.touched) && !at.touched;
     if (!body.is_dynamic()) continue;
-    // It sleeps while what it lies on is at rest, and wakes when that moves or goes.
+    // It sleeps while the cloth below it is at rest, and wakes when that moves or goes away.
     if (left || at.touching_speed > kClothRest) wake(body);
     if (body.asleep && at.pin_load()) {
       const Wrench pull{at.pin_load()->impulse / h, at.pin_load()->angular_impulse / h};
@@ -138,8 +139,9 @@ void World::Impl::answer_cloths(std::span<const ClothBody> near, Real start, Rea
       if (is_pushed(body, pull, *body.rest_pins)) wake(body);
     }
     if (!at.touched || body.asleep) continue;
-    // It is where cloth met it: put back to where it would be without, it would drag cloth along each time.
-    // Between two bodies cloth acts on velocities, and only an impact moves them.
+    // The body stays where cloth touched it. If it were put back to its position without cloth, it would drag
+    // the cloth along each time. Cloth between two bodies acts only on their velocities, unless there is an
+    // impact.
     if (!at.pinches || at.reaction().impulse.norm() > kImpact * body.rigid.mass) {
       body.pose = at.end();
       body.rigid.place(body.pose);

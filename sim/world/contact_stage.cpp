@@ -1,5 +1,4 @@
-/// Contacts of a sub-step: which bodies are near, where they touch, and the forces that keep them apart
-/// (physics E6, R7-R10).
+/// Contacts of a sub-step: near pairs, contact points, and contact forces (physics E6, R7-R10).
 
 #include <algorithm>
 #include <cmath>
@@ -15,42 +14,43 @@
 namespace offstage::sim {
 namespace {
 
-/// Points are looked for this far beyond what the bodies' motion in the interval asks for: so far, and no
-/// further than this share of the smaller body [m].
+/// Distance of contact points in addition to that by the bodies' motion in the interval: at most kMargin [m]
+/// and at most this share of the smaller body.
 constexpr Real kMargin = 2e-3, kMarginShare = 0.05;
-/// Motion beyond this share of the smaller body within an interval: the points of its start do not tell any
-/// more what will meet. The fast solver, where nothing bounces, takes them as limits of the approach all the
-/// same, farther.
+/// Motion in an interval, as a share of the smaller body, above which the contact points at the start do not
+/// predict later contacts. The limit is larger for the fast solver without restitution, which uses the points
+/// only as limits of the approach.
 constexpr Real kFar = 0.25, kFarWithoutBounce = 1;
-/// Room that bodies get in the broad phase: a share of their size, and as far as they get in so many steps.
+/// Margin of bodies in the broad phase: a share of their size, plus their motion in this many steps.
 constexpr Real kRoom = 0.03, kSteps = 2;
-/// Of the extent: a bow wider than this is of a turn by more than half a radian.
+/// Share of the extent: a greater deviation from the chord occurs only for rotations of more than half a
+/// radian.
 constexpr Real kWide = 0.036;
-/// How far bodies may shift against each other before their points are found anew, and no further than this
-/// share of the smaller body [m]. Until then the distances of the points are new in each step, right to the
-/// second order.
+/// Greatest relative motion of bodies for which their contact points are reused: at most this length [m] and
+/// at most this share of the smaller body. Until then only the distances of the points are updated in each
+/// step, to second order.
 constexpr Real kReuse = 1e-4, kReuseShare = 2e-4, kExactReuse = 1e-8;
-/// Of the speed of what strikes it, a body of the same mass gets this share if it does not bounce: then both
-/// go on together. So often an impact is passed on: the next one would have a sixteenth of its speed, and of
-/// less than 7.7 m/s that is within kMargin in a step of 1/240 s.
+/// A body that is hit without restitution by a body of the same mass gets this share of its speed; both then
+/// move together. Impacts are propagated kPassedOn times. The next one would have a sixteenth of the speed;
+/// for less than 7.7 m/s this is within kMargin in a step of 1/240 s.
 constexpr Real kPassedShare = 0.5;
 constexpr uint32_t kPassedOn = 3;
-/// Bodies turn if their turning moves their surfaces by more than this in an interval [m].
+/// Bodies turn if their rotation moves their surfaces by more than this in an interval [m].
 constexpr Real kTurning = 2e-4;
-/// Bodies that move against each other by more than this in an interval may meet with other features [m].
+/// Bodies with more relative motion than this in an interval may touch with other features [m].
 constexpr Real kFastPair = 3e-3;
 
 Real smaller_extent(const Body& a, const Body& b) {
   return std::min(a.extent, b.extent);
 }
 
-/// Box around all places of a body in its interval.
+/// Box around all positions of a body in its interval.
 Aabb swept_bounds(const Body& body) {
   Aabb box = bounds(body.solid, body.start_pose).merged(bounds(body.solid, body.pose));
   Real margin = std::min(kMargin, kMarginShare * body.extent);
   if (!std::holds_alternative<Sphere>(body.def.shape)) {
-    // A point leaves the chord of its path by no more than an eighth of its greatest acceleration. Or,
-    // whatever way the body turns: around the balls that it is in.
+    // The deviation of a point from the chord of its path is at most an eighth of its greatest acceleration.
+    // Large rotations use the balls around the start and the end instead.
     const Real bow = body.path().max_acceleration(body.extent) / 8;
     margin += bow > kWide * body.extent ? body.extent : bow;
   }
@@ -59,13 +59,13 @@ Aabb swept_bounds(const Body& body) {
   return box;
 }
 
-/// A pair by the ranks of its bodies.
+/// A pair with the ranks of its bodies.
 struct RankedPair {
   uint32_t low, high;
   ContactPair* pair;
 };
 
-/// In ascending order of ranks. There are many pairs, and few of one body.
+/// Sorts pairs in ascending order of ranks. There are many pairs, but few of each body.
 void sort_by_rank(std::span<const RankedPair> pairs, std::size_t bodies, std::vector<ContactPair*>& sorted) {
   std::vector<uint32_t> ends(bodies, 0);
   for (const RankedPair& p : pairs) ++ends[p.low];
@@ -83,7 +83,7 @@ void sort_by_rank(std::span<const RankedPair> pairs, std::size_t bodies, std::ve
   for (const RankedPair& p : order) sorted.push_back(p.pair);
 }
 
-/// Whether its way is more than the broad phase has of it.
+/// Whether the path is not within the box in the broad phase.
 bool leaves(const Body& body, const Aabb& way) {
   return body.def.collides && !body.swept.contains(way);
 }
@@ -111,15 +111,15 @@ PairSurface World::Impl::surface_of(const Body& a, const Body& b) const {
     s.conveys |= d.surface_velocity != Vec3::Zero();
     if (d.cross_friction < 0 || d.friction_axis == Vec3::Zero() || s.grain) continue;
     s.grain = body;
-    s.cross = d.friction > 0 ? std::sqrt(d.cross_friction / d.friction) : 1;  // then both are 0
+    s.cross = d.friction > 0 ? std::sqrt(d.cross_friction / d.friction) : 1;  // otherwise both are 0
   }
   return s;
 }
 
-/// Gives a body's way to the broad phase, with some room. In the same sub-step, what was given before stays
-/// part of it.
+/// Gives the box of a body's path to the broad phase, enlarged by a margin. If repeated in a sub-step
+/// (`again`), the previous box is included.
 void World::Impl::move_in_broad_phase(Body& body, Aabb way, bool again) {
-  // Room for some more steps like this one.
+  // Margin for some more steps like this one.
   const Vec3 shift = kSteps * (body.pose.position - body.start_pose.position);
   const Vec3 room = Vec3::Constant(kRoom * body.extent);
   way.min() += shift.cwiseMin(0) - room;
@@ -130,7 +130,7 @@ void World::Impl::move_in_broad_phase(Body& body, Aabb way, bool again) {
   pairs_changed = true;
 }
 
-/// The same unless its way is within what was given before; returns whether that was needed.
+/// The same unless the path is within the previous box; returns whether the box was changed.
 bool World::Impl::move_in_broad_phase(Body& body, bool again) {
   const Aabb way = swept_bounds(body);
   if (!leaves(body, way)) return false;
@@ -138,8 +138,8 @@ bool World::Impl::move_in_broad_phase(Body& body, bool again) {
   return true;
 }
 
-/// The pairs of bodies whose ways come near each other. `again` in a sub-step: impacts and islands know of
-/// pairs, which must last until its end.
+/// Collects the pairs of bodies whose paths come near each other. With `again`, within a sub-step, existing
+/// pairs are kept, because impacts and islands refer to them.
 void World::Impl::collect_pairs(bool again) {
   if (!std::exchange(pairs_changed, false)) return;
   graph.update(
@@ -156,10 +156,10 @@ void World::Impl::collect_pairs(bool again) {
   sort_by_rank(ranked, bodies.size(), active_pairs);
 }
 
-/// What strikes a body in the sub-step gives it a speed that it does not have yet, and what it touches then a
-/// share of that, and so on.
+/// Computes a bound of the speed that an impact in the sub-step can give to each body, propagated from body
+/// to body with decreasing shares.
 void World::Impl::propagate_impact_speeds(Real h) {
-  if (def.solver == SolverKind::exact) return;  // it goes from one impact to the next
+  if (def.solver == SolverKind::exact) return;  // the exact solver resolves each impact at its own time
   struct Approach {
     Body *a, *b;
     Real speed;
@@ -197,7 +197,7 @@ void World::Impl::update_pairs(Real h) {
   collect_pairs(false);
   propagate_impact_speeds(h);
   const auto find = [&](std::size_t i) {
-    // They lie all over the memory.
+    // Pairs are scattered in memory.
     if (i + 6 < active_pairs.size()) active_pairs[i + 6]->prefetch();
     if (i + 3 < active_pairs.size()) active_pairs[i + 3]->prefetch_manifold();
     active_pairs[i]->impacts = 0;
@@ -217,8 +217,8 @@ void World::Impl::update_pairs(Real h) {
   remove_seams(active_pairs, 0, h);
 }
 
-/// How far a pair's bodies may move against each other in what is left of the sub-step, and how far their
-/// points tell [m].
+/// Bound of the relative motion of a pair's bodies in the rest of the sub-step, and the motion for which its
+/// contact points are sufficient [m].
 Real World::Impl::motion_bound(const ContactPair& pair, Real left) const {
   return (pair.speed_bound() + 2 * def.gravity.norm() * left) * left;
 }
@@ -228,17 +228,18 @@ Real World::Impl::motion_known(const ContactPair& pair) const {
   return std::max(std::min(kMargin, kMarginShare * size), (bounces ? kFar : kFarWithoutBounce) * size);
 }
 
-/// Where a pair's bodies touch at their interval's start, or may touch in what is left of the sub-step.
+/// Finds the points where a pair's bodies touch at their interval's start, or may touch in the rest of the
+/// sub-step.
 void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
   const Real left = h - time;
   const Real size = smaller_extent(pair.a(), pair.b());
   const Real base = std::min(kMargin, kMarginShare * size);
   const Real motion = motion_bound(pair, left), far = motion_known(pair);
   const bool exact = def.solver == SolverKind::exact;
-  // An impact moves a body no faster than the body that hits it.
+  // An impact moves a body at most as fast as the body that hits it.
   const Real impact = std::max(pair.a().impact_speed_bound, pair.b().impact_speed_bound) * left;
   const Real margin = base + std::min(std::max(2 * motion, impact), far);
-  // An impact also makes the body turn.
+  // An impact also turns the body.
   const Real turning = pair.turning_speed() * left + (impact > kMargin ? impact : 0);
   const Real reuse = exact ? kExactReuse : std::min(kReuse, kReuseShare * size);
   pair.find(pair.a().placed_at(time, h), pair.b().placed_at(time, h), margin, reuse, turning > kTurning);
@@ -250,7 +251,8 @@ void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
   choose_event(pair, is_far, left);
 }
 
-/// Whether a pair's next impact is to be traced back to. `far`: it moves too far for its points to tell.
+/// Chooses whether a pair's next impact is traced back to. `far`: its motion is too large for its contact
+/// points.
 void World::Impl::choose_event(ContactPair& pair, bool far, Real left) const {
   pair.needs_toi = far && !pair.toi_exhausted;
   const bool bounces = def.solver == SolverKind::exact || pair.surface().restitution > 0;
@@ -265,13 +267,13 @@ void World::Impl::choose_event(ContactPair& pair, bool far, Real left) const {
     }
 }
 
-/// What is flush with something else stops nothing. Pairs found at the same time.
+/// Removes the contacts at seams of pairs that were found at the same time.
 void World::Impl::remove_seams(std::span<ContactPair* const> pairs, Real time, Real h) const {
   for (ContactPair* pair : remove_seam_contacts(pairs, time, h))
     choose_event(*pair, motion_bound(*pair, h - time) > motion_known(*pair), h - time);
 }
 
-/// Wakes what something that moves has come near, moves it through the sub-step, and returns it.
+/// Wakes the sleeping bodies near moving ones, moves them through the sub-step, and returns them.
 std::vector<Body*> World::Impl::wake_touched(Real start, Real h) {
   if (asleep == 0) return {};
   std::vector<Body*> touched;
@@ -317,7 +319,7 @@ void World::Impl::solve_islands(Real start, Real h, StepReport& report) {
   solve(all, {.duration = h, .end = start + h, .substep = h, .is_whole = true}, report);
 }
 
-/// What contacts have added to the motion is not quite what joints allow.
+/// The motion by contacts satisfies the joints only approximately, so it is projected.
 void World::Impl::settle_joints(const Island& island, Real end) {
   for (Articulation* articulation : island.articulations) {
     articulation->settle(end, joint_tally);
@@ -325,7 +327,7 @@ void World::Impl::settle_joints(const Island& island, Real end) {
   }
 }
 
-/// Contact forces of islands over an interval: each by the solver that suits it.
+/// Solves the contact forces of islands over an interval, each by the suitable solver.
 void World::Impl::solve(std::span<Island* const> group, const ContactInterval& interval, StepReport& report) {
   std::vector<const Island*> fast;
   std::vector<std::pair<Island*, SolverChoice*>> exact;

@@ -3,12 +3,20 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/articulation/joint_energy.h"
+
 namespace offstage::sim {
 namespace {
 
 /// Pieces in which the motion of what joints hold is integrated: of its turning, and of the phase of its
 /// fastest swinging [rad]; and the most of them.
 constexpr Real kTurn = 0.12, kSwing = 1, kSpin = 1, kMostPieces = 64;
+/// A piece is halved if it leaves a joint farther apart than this [m], [rad], or if the kinetic energy
+/// differs from the work of the forces by more than these shares of the kinetic energy, of the work, and of
+/// the work that the forces would do on free bodies at rest. Halvings are bounded in depth and, per sub-step,
+/// in number.
+constexpr Real kGap = 1e-4, kEnergyShare = 1e-4, kWorkShare = 1e-2;
+constexpr int kMostHalvings = 128, kDeepestHalving = 8;
 
 }  // namespace
 
@@ -152,6 +160,13 @@ void CoupledGroup::velocity(Real, std::span<const Real> x, std::span<const Real>
 }
 
 void CoupledGroup::force(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const {
+  set_free_forces(t, x, p, dp);
+  for (const Jointed& j : articulations_) add_joint_forces(j, t, x, p, dp);
+}
+
+/// Sets `dp` to all forces but those of joints.
+void CoupledGroup::set_free_forces(Real t, std::span<const Real> x, std::span<const Real> p,
+                                   std::span<Real> dp) const {
   for (std::size_t i = 0; i < bodies_.size(); ++i)
     stage(i, x, p).force(forces_, t, dp.subspan(kBodyP * i, kBodyP));
   const auto particles_x = x.subspan(particle_x(0)), particles_v = p.subspan(particle_p(0));
@@ -164,7 +179,6 @@ void CoupledGroup::force(Real t, std::span<const Real> x, std::span<const Real> 
     apply(s.a, -f.size * f.along, x, dp);
     apply(s.b, f.size * f.along, x, dp);
   }
-  for (const Jointed& j : articulations_) add_joint_forces(j, t, x, p, dp);
 }
 
 /// Of particles that act on each other; springs and bodies depend on velocities in other ways.
@@ -244,18 +258,119 @@ void CoupledGroup::step(const Integrator& integrator, Real t, Real h, Integrator
   const bool particles_only = bodies_.empty() && springs_.empty();
   const Integrator& chosen =
       particles_only ? sim::integrator(groups_.front().system->def.integrator) : integrator;
-  const Real count = pieces(h);
+  const Real count = pieces(h), duration = h / count;
+  int halvings = kMostHalvings;
   for (Real i = 0; i < count; ++i) {
-    const Real duration = h / count, begin = t + i * duration;
-    for (const Jointed& j : articulations_) j.articulation->begin_motion(begin, duration);
-    chosen.step(*this, begin, duration, x_, p_, work);
-    if (articulations_.empty()) continue;
-    store(x_, p_);
-    for (const Jointed& j : articulations_) j.articulation->settle(begin + duration, joint_tally_);
-    load(x_, p_);
+    const Real begin = t + i * duration;
+    if (articulations_.empty())
+      chosen.step(*this, begin, duration, x_, p_, work);
+    else
+      advance(chosen, begin, duration, 0, halvings, work);
   }
   for (Body* body : bodies_) body->rigid.next_step = work.next_step;
   store(x_, p_);
+}
+
+Real CoupledGroup::kinetic_energy() const {
+  const std::span<const Real> x = x_, p = p_;
+  Real sum = 0;
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    const RigidMotion m = stage(i, x, p).motion;
+    sum += (m.velocity.dot(vec3(p, kBodyP * i)) + m.angular_velocity.dot(vec3(p, kBodyP * i + 3))) / 2;
+  }
+  for (const Group& g : groups_)
+    for (std::size_t k = 0; k < g.members.size(); ++k)
+      sum += g.mass[k] * vec3(p, particle_p(g.offset + k)).squaredNorm() / 2;
+  return sum;
+}
+
+CoupledGroup::EnergyRate CoupledGroup::energy_rate(Real t, IntegratorWorkspace& work) const {
+  const std::span<const Real> x = x_, p = p_;
+  work.dp.resize(p.size());
+  set_free_forces(t, x, p, work.dp);
+  const std::span<const Real> dp = work.dp;
+  EnergyRate sum;
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    const RigidStage s = stage(i, x, p);
+    const std::size_t at = kBodyP * i;
+    const Vec3 force = vec3(dp, at), torque = vec3(dp, at + 3);
+    const Vec3 turning = s.motion.orientation.conjugate() * torque;  // in the body's axes
+    sum.kinetic += (s.motion.velocity.dot(vec3(p, at)) + s.motion.angular_velocity.dot(vec3(p, at + 3))) / 2;
+    sum.power += s.motion.velocity.dot(force) + s.motion.angular_velocity.dot(torque);
+    sum.from_rest += (force.squaredNorm() / s.body.mass + turning.dot(s.body.inverse_inertia * turning)) / 2;
+  }
+  for (const Group& g : groups_)
+    for (std::size_t k = 0; k < g.members.size(); ++k) {
+      const Vec3 velocity = vec3(p, particle_p(g.offset + k)),
+                 acceleration = vec3(dp, particle_p(g.offset + k));
+      sum.kinetic += g.mass[k] * velocity.squaredNorm() / 2;
+      sum.power += g.mass[k] * velocity.dot(acceleration);
+      sum.from_rest += g.mass[k] * acceleration.squaredNorm() / 2;
+    }
+  return sum;
+}
+
+/// Advances by a piece from t to t + h and puts the joints back together. Joints can make a link turn far
+/// faster than the speeds at the start show: a universal joint whose axes and arm come into one plane turns a
+/// light link over at once. Then the energy differs from the work of the forces, and the piece is halved.
+/// If halving does not help, the links are slowed down until they have gained no energy.
+void CoupledGroup::advance(const Integrator& integrator, Real t, Real h, int depth, int& halvings,
+                           IntegratorWorkspace& work) {
+  const std::vector<Real> x = x_, p = p_;
+  for (const Jointed& j : articulations_) j.articulation->begin_motion(t, h);
+  const EnergyRate before = energy_rate(t, work);
+  integrator.step(*this, t, h, x_, p_, work);
+  const EnergyRate after = energy_rate(t + h, work);
+  store(x_, p_);
+  Real gap = 0;
+  // Links that keys move do work through the joints, and methods of first order do not keep energy.
+  bool keeps_energy = integrator.order() > 1;
+  for (const Jointed& j : articulations_) {
+    gap = std::max(gap, joint_gap(*j.articulation, t + h));
+    keeps_energy &= !has_kinematic_end(*j.articulation);
+  }
+  const Real done = h / 2 * (before.power + after.power);
+  const Real allowed =
+      kEnergyShare * before.kinetic + kWorkShare * h *
+                                          (std::max(std::abs(before.power), std::abs(after.power)) +
+                                           h * std::max(before.from_rest, after.from_rest));
+  const bool is_finite = after.kinetic <= kInfinity;
+  const bool follows =
+      gap <= kGap && (!keeps_energy || std::abs(after.kinetic - before.kinetic - done) <= allowed);
+  const bool may_halve = depth < kDeepestHalving && halvings > 0;
+  if (!is_finite || (!follows && may_halve)) {
+    x_ = x;
+    p_ = p;
+    store(x_, p_);
+    if (may_halve) {
+      --halvings;
+      advance(integrator, t, h / 2, depth + 1, halvings, work);
+      return advance(integrator, t + h / 2, h / 2, depth + 1, halvings, work);
+    }
+    ++joint_tally_.unsolved;  // the members do not move in this piece
+  }
+  for (const Jointed& j : articulations_) {
+    // The shifts that put the joints together change the angular momentum. (After contacts they do not: there
+    // they take back shifts by the contacts.)
+    const bool is_free = !is_held(*j.articulation);
+    const CommonMotion common = is_free ? common_motion(j.articulation->bodies()) : CommonMotion{};
+    j.articulation->settle(t + h, joint_tally_);
+    if (is_free) keep_angular_momentum(j.articulation->bodies(), common);
+  }
+  load(x_, p_);
+  if (keeps_energy) limit_energy(before.kinetic + std::max(done, 0.0) + allowed);
+}
+
+/// Slows the links of each articulation down against each other until the kinetic energy is at most `most`.
+void CoupledGroup::limit_energy(Real most) {
+  const Real excess = kinetic_energy() - most;
+  if (!(excess > 0)) return;
+  Real internal = 0;
+  for (const Jointed& j : articulations_) internal += internal_energy(*j.articulation);
+  const Real share = std::sqrt(std::max(0.0, 1 - excess / internal));
+  for (const Jointed& j : articulations_) slow_down(*j.articulation, share);
+  load(x_, p_);
+  ++joint_tally_.unsolved;
 }
 
 void CoupledGroup::save() {

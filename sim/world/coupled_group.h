@@ -106,6 +106,17 @@ class CoupledGroup final : public DynamicSystem {
   void add_joint_forces(const Jointed& jointed, Real t, std::span<const Real> x, std::span<const Real> p,
                         std::span<Real> dp) const;
   Real pieces(Real h) const;
+  /// Kinetic energy [J], power of all forces but those of joints [W], and the energy that these forces give
+  /// free bodies from rest in a time, per square of that time [J/s^2].
+  struct EnergyRate {
+    Real kinetic = 0, power = 0, from_rest = 0;
+  };
+  Real kinetic_energy() const;
+  EnergyRate energy_rate(Real t, IntegratorWorkspace& work) const;
+  void advance(const Integrator& integrator, Real t, Real h, int depth, int& halvings,
+               IntegratorWorkspace& work);
+  void limit_energy(Real most);
+  void set_free_forces(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const;
   void add_group(const WorldState& world, ParticleSystem& system);
   void add_pair_forces(const WorldState& world);
   void add_springs(const WorldState& world, std::span<const Spring* const> springs, const BodyIndex& index);

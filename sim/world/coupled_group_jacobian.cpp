@@ -1,5 +1,5 @@
-/// Derivatives of the forces in a network of springs, for implicit integration (physics N2). The places of
-/// the blocks are the edges of the interaction graph.
+/// Derivatives of the forces in a group of coupled objects, for implicit integration (physics N2). The blocks
+/// are the edges of the interaction graph.
 
 #include "sim/dynamics/rigid_jacobian.h"
 #include "sim/world/coupled_group.h"
@@ -14,8 +14,8 @@ struct CoupledGroup::EndDerivative {
 
   StateColumns columns;
   Matrix3X position, velocity;
-  MatrixX3 force;  // rates by the force
-  MatrixX torque;  // rates by the state, with the force as it is
+  MatrixX3 force;  // derivatives of the rates by the force
+  MatrixX torque;  // derivatives of the rates by the state for a constant force
 };
 
 CoupledGroup::EndDerivative CoupledGroup::derivative(const End& end, const Vec3& force,

@@ -10,7 +10,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Lone bodies per task; fewer than kParallel are not worth tasks.
+/// Single bodies per task; with fewer than kParallel tasks do not pay.
 constexpr std::size_t kBlock = 64, kParallel = 256;
 
 std::vector<Body*> awake_bodies(WorldState& world) {
@@ -53,7 +53,7 @@ void CoupledSystem::gather(WorldState& world, std::span<Body* const> bodies, boo
     return;
   }
   const CouplingGraph graph(world);
-  // Networks in the order in which their first members come, which does not depend on addresses.
+  // Groups in the order of their first members, which does not depend on addresses.
   std::vector<std::size_t> index(graph.size(), CouplingGraph::kNone);
   std::vector<GroupMembers> networks;
   const auto has_network = [&](std::size_t component) { return index[component] != CouplingGraph::kNone; };

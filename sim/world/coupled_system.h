@@ -1,7 +1,7 @@
 #pragma once
-/// The motion of bodies, and of the particles that springs hold on to or that act on each other, between
-/// contacts (physics E6, R1, R2, P2): a body that no spring holds flies alone, what is joined is integrated
-/// together. How an object moves does not depend on what else moves.
+/// Motion between contacts of bodies, and of the particles that springs hold or that act on each other
+/// (physics E6, R1, R2, P2). A body without springs and joints moves alone; connected objects are integrated
+/// together. The motion of an object does not depend on unconnected objects.
 
 #include <vector>
 
@@ -11,32 +11,32 @@ namespace offstage::sim {
 
 class CoupledSystem {
  public:
-  /// All dynamic bodies, and all particle systems that springs hold on to or whose particles act on others.
-  /// The world must not gain or lose anything while this is in use.
+  /// Uses all dynamic bodies, and all particle systems with springs or with forces between particles. No
+  /// object may be added to the world or removed from it during its lifetime.
   explicit CoupledSystem(WorldState& world, std::span<const ForceDef* const> forces = {});
-  /// These bodies, and what joins them; for the rest of a sub-step that one of everything has begun. They
-  /// must contain all that are connected() to them.
+  /// Uses these bodies, and what connects them, for the rest of a sub-step that a CoupledSystem of all
+  /// objects has begun. They must contain all bodies that are connected() to them.
   CoupledSystem(WorldState& world, std::span<Body* const> bodies,
                 std::span<const ForceDef* const> forces = {});
 
   CoupledSystem(const CoupledSystem&) = delete;
   CoupledSystem& operator=(const CoupledSystem&) = delete;
 
-  /// Whether a particle system moves with this.
+  /// Whether a particle system is integrated by this object.
   bool holds(const ParticleSystem& system) const;
 
   /// Advances everything from t to t + h; `tolerance` is for adaptive integrators.
   void step(const Integrator& integrator, Real t, Real h, Real tolerance = IntegratorWorkspace{}.tolerance);
 
-  /// Keeps the state of everything.
+  /// Stores the state of all members.
   void save();
-  /// Takes bodies, with what is connected to them, back to where save() found them.
+  /// Restores the state of bodies, and of what is connected to them, at the last save().
   void restore(std::span<Body* const> bodies);
   void restore();
 
-  /// What all steps so far took.
+  /// Statistics of all steps so far.
   const IntegratorReport& report() const { return report_; }
-  /// What was left of joints, of all steps so far.
+  /// Residuals of joints in all steps so far.
   JointTally joint_tally() const;
 
  private:
@@ -49,8 +49,8 @@ class CoupledSystem {
   BodyForces forces_;
   std::vector<Body*> lone_;
   std::vector<CoupledGroup> networks_;
-  std::vector<RigidState> kept_;                                 // of the lone bodies
-  std::vector<std::pair<const Body*, std::size_t>> lone_index_;  // by address; made when first needed
+  std::vector<RigidState> kept_;                                 // states of the single bodies
+  std::vector<std::pair<const Body*, std::size_t>> lone_index_;  // by address; created when first needed
   IntegratorReport report_;
 };
 

@@ -18,11 +18,11 @@ CouplingGraph::CouplingGraph(const WorldState& world) : world_(world) {
     const std::size_t a = find(object_a), b = find(object_b);
     if (a != kNone && b != kNone) parent_[std::max(a, b)] = std::min(a, b);
   });
-  // A parent comes before its children, so one pass leaves only roots.
+  // A parent comes before its children, so after one pass all parents are roots.
   for (std::size_t& parent : parent_) parent = parent_[parent];
 }
 
-/// Calls f(a, b) for what is joined directly; either may be null, or both the same.
+/// Calls f(a, b) for each direct connection; either may be null, or both the same.
 template <class F>
 void CouplingGraph::for_each_link(F&& f) const {
   world_.springs.for_each(
@@ -49,7 +49,7 @@ std::size_t CouplingGraph::component(const Articulation& articulation) const {
   return find(articulation.bodies().front());
 }
 
-/// What of a spring's end moves with it.
+/// The object that a spring's end belongs to.
 const void* CouplingGraph::object(const Attachment& a) const {
   if (const auto* point = std::get_if<BodyPoint>(&a)) {
     const Body* body = world_.bodies[point->body].get();

@@ -1,6 +1,7 @@
 #pragma once
-/// What springs, joints and forces between particles join (physics E7): dynamic bodies and particle systems
-/// that are connected through them, however far, form a component. A particle system counts as one object.
+/// Connections by springs, joints and forces between particles (physics E7). Dynamic bodies and particle
+/// systems that are connected, directly or through others, form a component. A particle system counts as one
+/// object.
 
 #include <span>
 #include <utility>
@@ -16,12 +17,12 @@ class CouplingGraph {
 
   explicit CouplingGraph(const WorldState& world);
 
-  /// Numbers of components are below this.
+  /// Greater than the numbers of all components.
   std::size_t size() const { return objects_.size(); }
-  /// A number that connected objects share; kNone for what nothing joins.
+  /// Number that connected objects share; kNone for an object without connections.
   std::size_t component(const Body& body) const { return find(&body); }
   std::size_t component(const ParticleSystem& system) const { return find(&system); }
-  /// That of its ends; kNone if neither can be moved.
+  /// Number of the component of its ends; kNone if neither end can move.
   std::size_t component(const Spring& spring) const;
   std::size_t component(const Articulation& articulation) const;
 
@@ -34,10 +35,10 @@ class CouplingGraph {
 
   const WorldState& world_;
   std::vector<const void*> objects_;  // by address
-  std::vector<std::size_t> parent_;   // a forest, of components
+  std::vector<std::size_t> parent_;   // disjoint-set forest of the components
 };
 
-/// The bodies given and all that are connected to them, in the world's order.
+/// Returns the given bodies and all bodies that are connected to them, in the world's order.
 std::vector<Body*> connected(WorldState& world, std::span<Body* const> bodies);
 
 }  // namespace offstage::sim

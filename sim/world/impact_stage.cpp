@@ -1,8 +1,8 @@
-/// Impacts within a sub-step (physics E6, E7, R12): bodies are put back to the time of impact, with all that
-/// is connected to them, collide there, and go on for the rest. Others are not touched. The work is bounded:
-/// a pair that collides too often in a sub-step, or any when there are too many impacts, is left to the
-/// contact solver, which lets nothing through either. So are slower impacts within a pile once others have
-/// moved it often enough: they do not bounce in this sub-step.
+/// Impacts within a sub-step (physics E6, E7, R12). Bodies, with all objects connected to them, are moved
+/// back to the time of impact, collide there, and continue for the rest of the sub-step. Other bodies are not
+/// changed. The work is bounded: if a pair collides too often in a sub-step, or if there are too many
+/// impacts, later ones are left to the contact solver, which also prevents tunnelling. In a pile with too
+/// many impacts the restitution of slower ones is suppressed for the rest of the sub-step.
 
 #include <algorithm>
 #include <cmath>
@@ -17,43 +17,45 @@ namespace {
 
 constexpr uint32_t kMaxImpactsOfPair = 40, kMaxOfTumblingPair = 100;
 constexpr std::size_t kMaxImpacts = 128, kImpactsPerBody = 4;
-/// What impacts of a sub-step may take, in contact points and bodies that are moved again, about 1 us each by
-/// the fast solver, and in us of their own solver; by the exact solver so many times more. In a pile each
-/// impact moves everything, and makes hundreds of others.
+/// Limit of the work of impacts in a sub-step, in contact points and bodies that are moved again (about 1 us
+/// each by the fast solver), and in us of the impact solver; the limit for the exact solver is larger by
+/// kExactImpactWork. In a pile each impact moves all bodies and causes hundreds of other impacts.
 constexpr std::size_t kImpactWork = 2500, kExactImpactWork = 8;
-/// Of it, what it takes to look when a pair meets, for each piece of its way.
+/// Work of a search for the time of impact of a pair, for each piece of its path.
 constexpr std::size_t kLookWork = 2;
-/// After so many times the work no pair is traced back any more in the sub-step.
+/// After this multiple of the limit no more pairs are traced back to in the sub-step.
 constexpr std::size_t kLastWork = 4;
-/// Points this near to each other when two bodies collide take part [m].
+/// Contact points with a smaller separation take part in a collision [m].
 constexpr Real kCluster = 1e-4;
-/// Bodies that turn by more in an interval are looked at in pieces of as much [rad]; at most so many.
+/// Larger rotations in an interval are divided into pieces of this angle [rad], of which there are at most
+/// kMostTurns.
 constexpr Real kImpactTurn = 0.5, kMostTurns = 512;
-/// What turns by more in an interval is soon elsewhere than where contact forces of its start are: it flies
-/// [rad].
+/// With a larger rotation in an interval, the contact forces of its start soon become invalid; the body is
+/// assumed to fly freely [rad].
 constexpr Real kFastSpin = 3;
 
-/// A way that leaves its chord by more than kStraight [m] is looked at in pieces, at most so many. A force is
-/// steady if the place at the end is that of the mean velocity within this share of the velocity's change.
+/// A path that deviates from its chord by more than kStraight [m] is divided into at most kMostArcs pieces. A
+/// force counts as steady if the position at the end agrees with the mean velocity within the share kSteady
+/// of the change of velocity.
 constexpr Real kStraight = 1e-5, kMostArcs = 8, kSteady = 0.05;
-/// Shorter intervals are none [of the sub-step].
+/// Intervals shorter than this share of the sub-step are skipped.
 constexpr Real kInstant = 1e-9;
 
 Real spin(const Body& body) {
   return body.is_awake() ? body.start_twist.angular_velocity.norm() : 0;
 }
 
-/// How fast one of a pair turns [rad/s].
+/// Angular speed of the faster turning body of a pair [rad/s].
 Real turn_of(const ContactPair& pair) {
   return std::max(spin(pair.a()), spin(pair.b()));
 }
 
-/// In how many pieces a turn is looked at.
+/// Number of pieces into which a rotation is divided.
 uint32_t pieces_of(Real turn) {
   return static_cast<uint32_t>(std::clamp(std::ceil(turn / kImpactTurn), 1.0, kMostTurns));
 }
 
-/// What an impact among them takes, see kImpactWork.
+/// Work of an impact in an island, see kImpactWork.
 std::size_t impact_work(const Island& island) {
   std::size_t work = island.bodies.size();
   for (const ContactPair* pair : island.pairs)
@@ -61,8 +63,8 @@ std::size_t impact_work(const Island& island) {
   return work;
 }
 
-/// What a body's velocity changes by in its interval if a steady force does that; zero if it was stopped on
-/// the way, which shows in where it is at the end [m/s].
+/// Change of a body's velocity in its interval if it is due to a steady force; zero if the body was stopped
+/// on the way, which is seen from its position at the end [m/s].
 Vec3 bend(const Body& body, Real h) {
   if (!body.is_awake()) return Vec3::Zero();
   const Vec3 change = body.rigid.velocity() - body.start_twist.velocity;
@@ -71,7 +73,7 @@ Vec3 bend(const Body& body, Real h) {
   return steady ? change : Vec3(Vec3::Zero());
 }
 
-/// Its place at a time of its interval, on the parabola of a steady force.
+/// Pose at a time of its interval, on the parabola of a steady force.
 Pose on_arc(const Body& body, Real time, Real h) {
   Pose pose = body.placed_at(time, h);
   if (time > body.from)
@@ -79,8 +81,9 @@ Pose on_arc(const Body& body, Real time, Real h) {
   return pose;
 }
 
-/// When two bodies touch whose advancement has ended within its tolerance: the rest at the speed of the
-/// nearest points. Bounces that come early by the tolerance would add up.
+/// Time at which two bodies touch after conservative advancement has ended within its tolerance: the rest of
+/// the gap closes at the speed of the nearest points. Otherwise bounces would be early by the tolerance, and
+/// the errors would add up.
 Real touching_share(const Impact& impact, const PosePath& a, const PosePath& b) {
   const Separation& s = impact.separation;
   if (impact.share == 0 || !(s.distance > 0)) return impact.share;
@@ -94,14 +97,15 @@ Real touching_share(const Impact& impact, const PosePath& a, const PosePath& b) 
   return impact.share + std::min(s.distance / closing, 1 - impact.share);
 }
 
-/// A body on its way through its interval, turning as nothing but its spin makes it.
+/// A body in free rotation through its interval.
 class Tumbling {
  public:
-  /// A body that spins fast flies under gravity, another goes straight to where forces take it.
+  /// A body that spins fast flies under gravity; the position of any other body is interpolated on a straight
+  /// line.
   Tumbling(const Body& body, const WorldDef& def, bool spins_fast, Real h)
       : body_(body), def_(def), spins_fast_(spins_fast), h_(h), turning_(body.at_start()), now_(body.from) {}
 
-  /// Its place at a time of the sub-step of length h, not before the last.
+  /// Pose at a time of the sub-step of length h, not before the time of the last call.
   Pose go_on(Real time) {
     if (!body_.is_awake()) return body_.placed_at(time, h_);
     fly(turning_, {def_.gravity, {}}, integrator(def_.integrator), now_, time - now_, work_);
@@ -125,8 +129,8 @@ class Tumbling {
 
 }  // namespace
 
-/// When a pair's bodies, which do not touch yet, will on their ways as they are now; or do already,
-/// approaching.
+/// Time at which the bodies of a pair will touch on their current paths. If they touch already and approach,
+/// it is the current time.
 std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) const {
   if (pair.toi_exhausted) return std::nullopt;
   const Body &a = pair.a(), &b = pair.b();
@@ -149,14 +153,14 @@ std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) co
   return std::nullopt;
 }
 
-/// A path knows no more than half a turn: what tumbles faster goes in pieces.
+/// A path describes at most half a turn, so faster rotations are divided into pieces.
 std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, Real from, Real h,
                                                       Real turn) const {
   const bool spins_fast = turn > kFastSpin;
   Tumbling body_a(pair.a(), def, spins_fast, h), body_b(pair.b(), def, spins_fast, h);
   Pose begin_a = body_a.go_on(from), begin_b = body_b.go_on(from);
   const uint32_t pieces = pieces_of(turn);
-  // What touches now has just met.
+  // Bodies that touch now have just met.
   const bool touches = pair.separation() <= kTouching;
   for (uint32_t i = 0; i < pieces; ++i) {
     const Real begin = from + (h - from) * i / pieces, end = from + (h - from) * (i + 1) / pieces;
@@ -169,12 +173,13 @@ std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, R
         (i == 0 && touches) || ((impact = time_of_impact(a, b, kTouching / 2)) && impact->share == 0);
     if (met) impact = time_of_next_impact(a, b, kTouching / 2, def.collision_speed * (end - begin));
     if (impact) return begin + impact->share * (end - begin);
-    if (spins_fast && touches) return end;  // what the contact did by then is over, or has to be found again
+    // The effect of the contact has ended by then, or the contact must be found again.
+    if (spins_fast && touches) return end;
   }
   return std::nullopt;
 }
 
-/// The same of bodies that touch somewhere: by those of the points known that do not.
+/// The same for bodies that touch at some points, by their known points that do not touch.
 std::optional<Real> World::Impl::point_impact_time(const ContactPair& pair, Real h) const {
   const Body &a = pair.a(), &b = pair.b();
   const Real from = std::max(a.is_awake() ? a.from : 0, b.is_awake() ? b.from : 0);
@@ -185,7 +190,7 @@ std::optional<Real> World::Impl::point_impact_time(const ContactPair& pair, Real
       const Real speed = pair.relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n);
       if (speed >= -def.collision_speed) continue;
       if (point.separation <= kTouching) return from;
-      // Both points go with their bodies, the normal with the one whose it is.
+      // Both points move with their bodies; the normal turns with the body that defines it.
       const bool with_b = m.manifold.source == NormalSource::face_of_b;
       const Pose pose_a = a.placed_at(from, h), pose_b = b.placed_at(from, h);
       const Vec3 on_a = pose_a.point_to_body(point.on_a), on_b = pose_b.point_to_body(point.on_b);
@@ -249,7 +254,7 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
     work += impact_work(islands[island]);
     if (work > most_work) suppress_restitution(island, report);
     work += collide(island, start, impact.time, h, report);
-    // The speculative contacts of these bodies no longer hold.
+    // The speculative contacts of these bodies are no longer valid.
     const auto involved = [&](const ContactPair& p) {
       return (p.a().is_awake() && p.a().island == island) || (p.b().is_awake() && p.b().island == island);
     };
@@ -258,8 +263,8 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
   }
 }
 
-/// No pair within an island bounces any more in this sub-step, unless it is so fast that only its impact
-/// shows where it meets.
+/// Suppresses restitution within an island for the rest of this sub-step. Pairs that are so fast that only
+/// tracing back shows where they meet are still traced back to.
 void World::Impl::suppress_restitution(uint32_t island, StepReport& report) {
   const auto is_outside = [&](const Body& body) { return body.is_awake() && body.island != island; };
   for (ContactPair* pair : active_pairs) {
@@ -269,7 +274,7 @@ void World::Impl::suppress_restitution(uint32_t island, StepReport& report) {
   }
 }
 
-/// Takes an island from wherever it has been moved back to a time, under the contact forces until then.
+/// Moves an island back to a time, with the contact forces until then.
 void World::Impl::bring_to(Island& island, Real start, Real time, Real h, StepReport& report) {
   if (island.from >= time) return;
   island.motion->restore(island.bodies);
@@ -285,7 +290,7 @@ void World::Impl::bring_to(Island& island, Real start, Real time, Real h, StepRe
   island.from = time;
 }
 
-/// Makes two islands, which must be at the same time, one.
+/// Merges two islands, which must be at the same time.
 void World::Impl::join(uint32_t into, uint32_t other) {
   if (into == other) return;
   Island &x = islands[into], &y = islands[other];
@@ -299,11 +304,10 @@ void World::Impl::join(uint32_t into, uint32_t other) {
   y.articulations.clear();
 }
 
-/// Collides an island's bodies with each other and with what they touch at a time, and moves them on from
-/// there.
-/// Returns what that took, see kImpactWork.
+/// Collides an island's bodies with each other and with the bodies that they touch at a time, and continues
+/// their motion from there. Returns the work, see kImpactWork.
 std::size_t World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepReport& report) {
-  // Whatever they touch now comes along, with what that touches in turn.
+  // Bodies that they touch join the island, and in turn the bodies that those touch.
   for (bool grown = true; grown;) {
     grown = false;
     Island& island = islands[number];
@@ -338,8 +342,8 @@ std::size_t World::Impl::collide(uint32_t number, Real start, Real time, Real h,
   return static_cast<std::size_t>(outcome.cost / 1000);
 }
 
-/// Moves an island on from an impact to the end of the sub-step. Its velocities are others now: so are the
-/// bodies that it may meet, and the contacts that limit its way.
+/// Continues the motion of an island from an impact to the end of the sub-step. Its velocities have changed,
+/// so other bodies may be in its way and other contacts limit its motion.
 void World::Impl::go_on(uint32_t number, Real start, Real time, Real h, StepReport& report) {
   do {
     islands[number].motion = &move_some(islands[number].bodies, start, time, h - time);
@@ -351,9 +355,9 @@ void World::Impl::go_on(uint32_t number, Real start, Real time, Real h, StepRepo
   find_pairs_again(number, start, h, report);
 }
 
-/// Finds the contacts of an island that goes on from `time`. If a body of another island is in its way, and
-/// their impact would not be an event, that island comes along, and has to be moved on as well: then it
-/// returns true.
+/// Finds the contacts of an island that continues from `time`. If a body of another island is in its way and
+/// their impact would not be traced back to, that island is merged, and must be moved again; the function
+/// then returns true.
 bool World::Impl::join_next(uint32_t number, Real start, Real time, Real h, StepReport& report) {
   islands[number].pairs.clear();
   bool joined = false;
@@ -377,7 +381,7 @@ bool World::Impl::join_next(uint32_t number, Real start, Real time, Real h, Step
   return joined;
 }
 
-/// Whether points of a pair may meet within a time.
+/// Whether any points of a pair may meet within a time.
 bool World::Impl::closes(const ContactPair& pair, Real left) const {
   for (const PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
@@ -388,8 +392,7 @@ bool World::Impl::closes(const ContactPair& pair, Real left) const {
   return false;
 }
 
-/// Bodies that leave the boxes that the broad phase was given have new neighbours, which may have to be
-/// woken.
+/// Bodies that leave their boxes in the broad phase have new neighbours, which may have to be woken.
 void World::Impl::find_pairs_again(uint32_t number, Real start, Real h, StepReport& report) {
   bool left = false;
   for (Body* body : islands[number].bodies) left |= move_in_broad_phase(*body, true);

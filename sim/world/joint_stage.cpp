@@ -1,4 +1,4 @@
-/// Joints of the world: what may be joined, and the articulations that they form (physics A1, A2).
+/// Joints of the world: checks, and the articulations that they form (physics A1, A2).
 
 #include <algorithm>
 #include <cmath>
@@ -59,7 +59,7 @@ void check(const JointDef& def) {
       refuse(def, "motor.targets: must be finite, with strictly increasing times");
 }
 
-/// Columns: the second axis, across the axis; the third; the axis.
+/// Columns: the second axis, perpendicular to the axis; the third; the axis.
 Mat3 frame_axes(const Vec3& axis, const Vec3& second) {
   Mat3 m;
   m.col(2) = axis.normalized();
@@ -79,7 +79,7 @@ bool is_dynamic(const Body* body) {
   return body && body->is_dynamic();
 }
 
-/// Slots of the bodies of a component that move and collide, those that joints connect after each other.
+/// Slots of the colliding bodies of a component that can move, ordered so that joined bodies are adjacent.
 std::vector<uint32_t> colliding_links(std::span<Joint* const> component) {
   std::map<const Body*, std::vector<const Body*>> neighbours;
   const Body* first = nullptr;
@@ -104,7 +104,8 @@ std::vector<uint32_t> colliding_links(std::span<Joint* const> component) {
   return slots;
 }
 
-/// A motor that goes on moving or is yet to, or a link that does by itself.
+/// Whether the joint keeps its bodies moving: by a motor that moves now or later, or by a moving kinematic
+/// link.
 bool drives(const Joint& joint, Real time) {
   const Motor& motor = joint.def.motor;
   const bool has_keys_left = motor.targets.size() > 1 && motor.targets.back().time > time;
@@ -206,7 +207,7 @@ void World::for_each_joint(const std::function<void(JointHandle)>& f) const {
   impl_->joints.for_each([&](JointHandle handle, const auto&) { f(handle); });
 }
 
-/// Groups the joints that hold by the bodies that they move, in the order of their first joints.
+/// Groups the intact joints by the bodies that they connect, in the order of their first joints.
 void World::Impl::update_articulations() {
   if (!std::exchange(joints_changed, false)) return;
   articulations.clear();
@@ -258,7 +259,7 @@ void World::Impl::update_articulations() {
   pairs_changed = true;
 }
 
-/// Those that had to bear too much in a sub-step of length h hold no longer.
+/// Breaks the joints whose load in a sub-step of length h exceeded their limits.
 void World::Impl::break_joints(Real h, StepReport& report) {
   for (const auto& articulation : articulations) {
     if (!articulation->bodies().front()->is_awake()) continue;
@@ -274,7 +275,7 @@ void World::Impl::break_joints(Real h, StepReport& report) {
   }
 }
 
-/// A body that goes away takes its joints with it.
+/// Removes the joints of a body that is removed.
 void World::Impl::detach_joints(const Body& body) {
   std::vector<JointHandle> gone;
   joints.for_each([&](JointHandle handle, const std::unique_ptr<Joint>& joint) {
@@ -289,7 +290,7 @@ void World::Impl::detach_joints(const Body& body) {
   joints_changed |= !gone.empty();
 }
 
-/// Whether joints keep an island from coming to rest.
+/// Whether a joint prevents an island from falling asleep.
 bool World::Impl::is_driven(const Island& island, Real time) const {
   return std::any_of(island.articulations.begin(), island.articulations.end(), [&](const Articulation* a) {
     return std::any_of(a->joints().begin(), a->joints().end(),

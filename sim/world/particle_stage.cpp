@@ -1,4 +1,4 @@
-/// Particles among themselves and what they do to bodies (physics P3-P8).
+/// Collisions between particles, and the effect of particles on bodies (physics P3-P8).
 
 #include <algorithm>
 
@@ -8,12 +8,12 @@
 namespace offstage::sim {
 namespace {
 
-/// A sleeping body wakes when what hits it would make it faster than this [m/s].
+/// A sleeping body wakes if an impact would make it faster than this [m/s].
 constexpr Real kNudge = 1e-4;
 
 }  // namespace
 
-/// Whether a system stands still because others are prewarmed.
+/// Whether a system is paused while others are prewarmed.
 bool World::Impl::waits(ParticleSystemHandle system) const {
   return prewarming && std::find(waiting.begin(), waiting.end(), system) != waiting.end();
 }
@@ -51,7 +51,7 @@ StepReport World::Impl::prewarm(Real from, Real to, const BeforeSubStep& before)
   return report;
 }
 
-/// Particles that collide with particles fly and go through their collisions, of all systems together.
+/// Moves the particles that collide with particles, of all systems together.
 void World::Impl::collide_particles(const ParticleStage& stage, const CoupledSystem& coupled) {
   std::vector<ParticleSystem*> colliding;
   systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
@@ -62,7 +62,7 @@ void World::Impl::collide_particles(const ParticleStage& stage, const CoupledSys
   if (!colliding.empty()) particle_collisions.step(colliding, stage, def.impact, def.collision_speed);
 }
 
-/// Appends the events of a system, by particle.
+/// Appends the events of a system, ordered by particle.
 void World::Impl::add_events(std::vector<ParticleEvent>& events) {
   std::stable_sort(events.begin(), events.end(), [](const ParticleEvent& a, const ParticleEvent& b) {
     return a.id != b.id ? a.id < b.id : a.time < b.time;
@@ -70,8 +70,8 @@ void World::Impl::add_events(std::vector<ParticleEvent>& events) {
   particle_events.insert(particle_events.end(), events.begin(), events.end());
 }
 
-/// What particles and cloths did to bodies in a sub-step that ends at a time changes their momenta from the
-/// next one on, and through joints those of all that these hold.
+/// Applies the impulses of particles and cloths in a sub-step that ends at `time` to the momenta of bodies,
+/// and through joints to whole articulations. They act from the next sub-step on.
 void World::Impl::push_bodies(std::span<const Reaction> reactions, Real time) {
   std::vector<uint32_t> pushed;
   for (const Reaction& r : reactions) {

@@ -1,4 +1,5 @@
-/// Rest: groups of bodies that have hardly moved for a while are left alone until something happens to them.
+/// Sleep: groups of bodies that have been almost at rest for some time are not simulated until something
+/// disturbs them.
 
 #include <algorithm>
 #include <array>
@@ -8,11 +9,11 @@
 namespace offstage::sim {
 namespace {
 
-/// A body is quiet while none of its points moves faster than this [m/s], and goes to sleep after being quiet
-/// so long [s], with all of its island.
+/// A body is quiet while no point of it moves faster than kQuietSpeed [m/s]. When all bodies of an island
+/// have been quiet for kQuietTime [s], the island falls asleep.
 constexpr Real kQuietSpeed = 0.01, kQuietTime = 0.5;
-/// A sleeping body wakes when forces push it so differently from when it fell asleep that one of its points
-/// would be accelerated by this [m/s^2].
+/// A sleeping body wakes when the forces on it have changed so much since it fell asleep that one of its
+/// points would be accelerated by this [m/s^2].
 constexpr Real kPush = 0.01;
 
 Real fastest_point(const Body& body) {
@@ -21,9 +22,9 @@ Real fastest_point(const Body& body) {
 
 }  // namespace
 
-/// Solvers and collision tests depend on the order of bodies and contacts a little, and in a pile little
-/// differences grow. So the order is not that in which bodies were added but follows from what they are: by
-/// where they were when they were added, from below; of those at one place by their other properties.
+/// Solvers and collision tests depend slightly on the order of bodies and contacts, and small differences
+/// grow in a pile. Therefore the order does not depend on when bodies were added: they are ordered by their
+/// initial positions from below, and bodies at the same position by their other properties.
 void World::Impl::rank_bodies() {
   if (!std::exchange(ranks_changed, false)) return;
   constexpr std::size_t kKeys = 15;
@@ -59,7 +60,7 @@ void World::Impl::update_lists() {
   std::sort(kinematic.begin(), kinematic.end(), by_rank);
 }
 
-/// Wakes a body and its sleeping group.
+/// Wakes a body and all bodies of its sleeping group.
 void World::Impl::wake(Body& body) {
   body.quiet_time = 0;
   if (!body.asleep) return;
@@ -82,7 +83,7 @@ void World::Impl::wake_all() {
   while (!sleeping.empty()) wake(*sleeping.begin()->second.front());
 }
 
-/// Keeps for bodies that fall asleep which springs can pull at them in another way later: those that end at a
+/// Stores for bodies that fall asleep the springs whose force can change later: those with the other end at a
 /// kinematic body or a particle.
 void World::Impl::watch_springs(std::span<Body* const> group) {
   const auto sleeper = [&](const Attachment& end) -> Body* {
@@ -106,7 +107,7 @@ void World::Impl::watch_springs(std::span<Body* const> group) {
   });
 }
 
-/// What a spring does to a sleeping body at one of its ends.
+/// Wrench of a spring on a sleeping body at one of its ends.
 Wrench World::Impl::spring_push(const Spring& spring, const Body& body, Real time) const {
   const auto motion = [&](const Attachment& end) -> Motion {
     if (const auto* p = std::get_if<ParticlePoint>(&end)) {
@@ -133,7 +134,7 @@ Wrench World::Impl::spring_push(const Spring& spring, const Body& body, Real tim
   return {force, (own.pose.position - body.rigid.position).cross(force)};
 }
 
-/// What the forces that may change in time do to a body at rest.
+/// Wrench on a body at rest by the forces that may change with time.
 Wrench World::Impl::changing_push(const Body& body, Real time) const {
   const RigidMotion at_rest{body.rigid.position, body.rigid.orientation, Vec3::Zero(), Vec3::Zero()};
   Wrench sum;
@@ -147,13 +148,13 @@ Wrench World::Impl::changing_push(const Body& body, Real time) const {
   return sum;
 }
 
-/// Whether a push is so different from that at rest that it could move a sleeping body.
+/// Whether a wrench differs so much from that at rest that it could move a sleeping body.
 bool World::Impl::is_pushed(const Body& body, const Wrench& push, const Wrench& at_rest) const {
   const Vec3 turn = body.rigid.angular_velocity(body.rigid.orientation, push.torque - at_rest.torque);
   return (push.force - at_rest.force).norm() / body.rigid.mass + turn.norm() * body.extent > kPush;
 }
 
-/// Wakes whom a force or a spring has begun to push, or no longer holds.
+/// Wakes the bodies that a force or a spring has begun to push, or does not support any more.
 void World::Impl::wake_pushed(Real time) {
   bool changing = false;
   force_defs.for_each([&](ForceHandle, const ForceDef& force) { changing |= force.changes(); });
@@ -177,7 +178,8 @@ void World::Impl::put_to_sleep(Real start, Real h) {
     const bool quiet = std::all_of(island.bodies.begin(), island.bodies.end(), [](const Body* body) {
       return body->quiet_time >= kQuietTime && body->is_dynamic();
     });
-    // Something pushes, or nothing holds: what hangs at the top of its flight is quiet for a moment only.
+    // A body with changing or missing support is not at rest: at the top of its flight it is quiet only for a
+    // moment.
     if (!quiet || is_driven(island, start + h)) continue;
     const bool pushed = std::any_of(island.pairs.begin(), island.pairs.end(), [](const ContactPair* pair) {
       const Body& other = pair->a().is_awake() ? pair->b() : pair->a();

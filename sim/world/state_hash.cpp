@@ -1,4 +1,4 @@
-/// Hash of everything that evolves, in slot order and little-endian bytes (the only byte order supported).
+/// Hash of the whole changing state, in slot order and little-endian bytes (the only supported byte order).
 
 #include <algorithm>
 #include <bit>
@@ -72,7 +72,7 @@ StateHash World::state_hash() const {
     for (const auto* v : {&a.position, &a.velocity}) hash.add(*v);
     for (const auto* v : {&a.mass, &a.radius, &a.age, &a.lifespan, &a.restitution, &a.friction}) hash.add(*v);
     hash.add(a.id);
-    // Only where there are any, so that the hash of what knows no charge stays as it was.
+    // Charges are hashed only if there are any, so that the hash of scenes without charges does not change.
     if (std::any_of(a.charge.begin(), a.charge.end(), [](Real q) { return q != 0; })) hash.add(a.charge);
   });
   impl_->springs.for_each([&](SpringHandle handle, const Spring& spring) {

@@ -14,7 +14,7 @@ namespace {
 constexpr Real kMaxSubsteps = 1e6;
 constexpr std::size_t kWorthThreads = 200;
 
-/// The state, and the velocities that follow from it.
+/// Whether the state and the velocities that follow from it are finite.
 bool is_finite(const RigidBody& b) {
   return b.position.allFinite() && b.orientation.coeffs().allFinite() && b.velocity().allFinite() &&
          b.angular_velocity().allFinite() && b.angular_momentum.allFinite();
@@ -79,7 +79,8 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
     count_contacts(report);
     return step_cloths(start, h);
   }
-  // Few bodies are not worth waking threads for, and waiting for them on a busy machine.
+  // For few bodies a task arena of several threads would cost more than it gains, in particular on a busy
+  // machine.
   const auto bodies_move = [&] { move_bodies(start, h, report); };
   if (awake.size() < kWorthThreads && !has_pair_forces())
     serial.execute(bodies_move);
@@ -102,7 +103,7 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
   step_cloths(start, h);
 }
 
-/// All that bodies do in a sub-step.
+/// Moves all bodies through a sub-step, with their contacts and impacts.
 void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
   move_all(start, h);
   if (!awake.empty() || (!kinematic.empty() && asleep > 0)) {
@@ -112,7 +113,7 @@ void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
     solve_islands(start, h, report);
     resolve_impacts(start, h, report);
   } else {
-    // Those of the last sub-step in which something was awake must not fall asleep once more.
+    // Islands of the last sub-step with awake bodies must not fall asleep again.
     islands.clear();
     active_pairs.clear();
     pairs_changed = true;
@@ -125,7 +126,7 @@ void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
   put_to_sleep(start, h);
 }
 
-/// Every body that moves begins a sub-step; kinematic ones are moved through it at once.
+/// Begins a sub-step for every moving body; kinematic bodies are moved to its end.
 void World::Impl::begin_bodies(Real start, Real end) {
   for_each_interval(awake, [&](std::size_t i) {
     awake[i]->before_substep = awake[i]->pose;
@@ -138,7 +139,7 @@ void World::Impl::begin_kinematic(Real start, Real end) {
   for (Body* body : kinematic) {
     const Motion motion = body->def.track.at(end, body->def.pose);
     if (body->def.track.jumps(start, end)) {
-      // It is gone from where it was and stands at the new place: nothing is swept along in between.
+      // The body jumps to the new pose: nothing is swept along in between.
       wake_neighbours(*body);
       body->pose = motion.pose;
     }
@@ -148,7 +149,7 @@ void World::Impl::begin_kinematic(Real start, Real end) {
   }
 }
 
-/// Explosions that go off in the sub-step do so at its start.
+/// Applies the explosions of the sub-step at its start.
 void World::Impl::explode(Real start, Real end) {
   force_defs.for_each([&](ForceHandle, const ForceDef& def_) {
     if (!def_.explodes(start, end)) return;
@@ -170,7 +171,7 @@ void World::Impl::explode(Real start, Real end) {
     });
     cloths.for_each([&](ClothHandle handle, const std::unique_ptr<Cloth>& cloth) {
       if (!def_.acts_on(handle)) return;
-      // Each point gets its share of an impact on the whole, by mass.
+      // Each point gets its share of the impulse on the whole cloth, by mass.
       const Real total = std::accumulate(cloth->masses.begin(), cloth->masses.end(), 0.0);
       for (std::size_t i = 0; i < cloth->points.size(); ++i)
         cloth->velocities[i] += impulse(explosion, cloth->points[i]) / total;
@@ -184,8 +185,7 @@ std::vector<const ForceDef*> World::Impl::active_forces() const {
   return active;
 }
 
-/// Moves all awake bodies, and the particles that springs hold, through the sub-step as if there were no
-/// contacts.
+/// Moves all awake bodies, and the particles held by springs, through the sub-step without contacts.
 void World::Impl::move_all(Real start, Real h) {
   motions.push_back(std::make_unique<CoupledSystem>(*this, active_forces()));
   CoupledSystem& motion = *motions.back();
@@ -194,7 +194,7 @@ void World::Impl::move_all(Real start, Real h) {
   for_each_index(awake.size(), [&](std::size_t i) { awake[i]->pose = awake[i]->rigid.pose(); });
 }
 
-/// The same for some bodies and what springs join to them, from `from` on over `duration`.
+/// The same for some bodies and the objects connected to them, over `duration` from `from` on.
 CoupledSystem& World::Impl::move_some(std::span<Body* const> group, Real start, Real from, Real duration) {
   motions.push_back(std::make_unique<CoupledSystem>(*this, group, active_forces()));
   CoupledSystem& motion = *motions.back();
@@ -209,7 +209,8 @@ bool World::Impl::is_within_bounds(const Body& body) const {
   return is_finite(body.rigid) && def.bounds.contains(body.rigid.position);
 }
 
-/// Freezes a body that left the world or lost its numbers; the latter where it last was.
+/// Freezes a body that left the world's bounds, or whose state is not finite; the latter at its last finite
+/// state.
 void World::Impl::retire(Body& body, StepReport& report) {
   if (body.is_dynamic() && !is_finite(body.rigid)) {
     if (report.finite) {
@@ -228,7 +229,7 @@ void World::Impl::retire(Body& body, StepReport& report) {
   report.bodies_retired.push_back(body.handle);
 }
 
-/// A body on its way through the sub-step of length h.
+/// The body as an obstacle that moves through the sub-step of length h.
 Obstacle World::Impl::swept_obstacle(const Body& body, Real h) const {
   const Pose& from = body.can_move() ? body.before_substep : body.pose;
   Obstacle o(body.solid, from, body.pose, h, body.def.restitution, body.def.friction);

@@ -13,10 +13,10 @@
 namespace offstage::sim {
 namespace {
 
-// What the solvers can still square and multiply without overflow.
+// Limits within which the solvers can square and multiply without overflow.
 constexpr Real kLeastMass = 1e-40, kMostMass = 1e40;  // [kg]
-constexpr Real kMostInertia = 1e100;                  // [kg m^2], and of its inverse
-constexpr Real kMostCoordinate = 1e12;                // of a mesh [m]
+constexpr Real kMostInertia = 1e100;                  // [kg m^2], and limit of the inverse
+constexpr Real kMostCoordinate = 1e12;                // greatest coordinate of a mesh [m]
 
 [[noreturn]] void refuse(const std::string& object, const std::string& what) {
   throw std::invalid_argument(object + ": " + what);
@@ -133,7 +133,7 @@ RigidBody make_rigid_body(const std::string& object, const BodyDef& def, const S
   return rigid;
 }
 
-/// Of the particles that act on each other.
+/// Energy of the forces between particles.
 Real pair_energy(const WorldState& world, Real time) {
   Real energy = 0;
   world.force_defs.for_each([&](ForceHandle, const ForceDef& def) {
@@ -160,7 +160,7 @@ Real pair_energy(const WorldState& world, Real time) {
 Motion Body::motion(Real now, Real time) const {
   if (is_kinematic()) return def.track.at(time, def.pose);
   if (!is_dynamic()) return {.pose = pose};
-  // Extrapolated along the present velocities.
+  // Extrapolated with the current velocities.
   const Real dt = time - now;
   const Vec3 v = rigid.velocity(), w = rigid.angular_velocity();
   const Real rate = w.norm();
@@ -186,7 +186,7 @@ void World::Impl::wake_neighbours(Body& body) {
   });
 }
 
-/// Whatever rests on a body that goes away wakes.
+/// Wakes the bodies that rest on a body that is removed.
 void World::Impl::detach(Body& body) {
   wake(body);
   wake_neighbours(body);
@@ -234,7 +234,7 @@ Vec3 WorldState::position(const Attachment& a) const {
   return std::get<WorldPoint>(a).position;
 }
 
-/// Springs that have lost an end are no more, and bodies at their other ends wake.
+/// Removes springs that have lost an end, and wakes the bodies at their other ends.
 void World::Impl::remove_dead_springs() {
   std::vector<SpringHandle> dead;
   springs.for_each([&](SpringHandle handle, const Spring& s) {
@@ -487,7 +487,7 @@ std::vector<ContactState> World::contacts() const {
 }
 
 std::vector<BodyOverlap> World::overlaps(Real least) const {
-  impl_->update_articulations();  // joined bodies pass through each other
+  impl_->update_articulations();  // joined bodies do not collide with each other
   BroadPhase boxes;
   impl_->bodies.for_each([&](BodyHandle handle, const auto& body) {
     if (body->def.collides) boxes.insert(handle.index, bounds(body->solid, body->pose), !body->is_dynamic());
@@ -501,7 +501,8 @@ std::vector<BodyOverlap> World::overlaps(Real least) const {
     const Pose a_from_b{a->pose.point_to_body(b->pose.position),
                         a->pose.orientation.conjugate() * b->pose.orientation};
     PairCache none;
-    // Trees are searched down to a limit, which bounds that touch are at 0 of: so it is above that.
+    // The tree search ignores pairs beyond a limit, and the bound for touching bodies is 0, so the limit must
+    // be above 0.
     const auto s =
         separation(a->collision_shape(), b->collision_shape(), a_from_b, none, DistanceMethod::gjk, least);
     if (!s || -s->distance <= least) continue;

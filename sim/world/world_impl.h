@@ -1,5 +1,5 @@
 #pragma once
-/// The inside of the World, shared by the files that implement it.
+/// Implementation of the World, shared by several source files.
 
 #include <map>
 #include <memory>
@@ -32,8 +32,8 @@ struct Spring {
   Real rest_length;
 };
 
-/// The fewest equal sub-steps of a duration that are not longer than `longest`. Rounding of a ratio that is
-/// meant to be whole adds none.
+/// Returns the smallest number of equal sub-steps of a duration that are not longer than `longest`. A ratio
+/// that is an integer within rounding is rounded to it.
 uint32_t substep_count(Real duration, Real longest);
 
 /// The objects of a world.
@@ -46,13 +46,13 @@ struct WorldState {
   SlotMap<ForceDef, ForceTag> force_defs;
   SlotMap<std::unique_ptr<Cloth>, ClothTag> cloths;
   SlotMap<std::unique_ptr<Joint>, JointTag> joints;
-  std::vector<std::unique_ptr<Articulation>> articulations;  // of the joints that hold, as components
+  std::vector<std::unique_ptr<Articulation>> articulations;  // the connected components of the intact joints
 
-  /// What acts on each particle of a system alone.
+  /// Forces on each single particle of a system.
   ParticleForces forces(const ParticleSystem& system) const;
-  /// Whether particles act on each other.
+  /// Whether there are forces between particles.
   bool has_pair_forces() const;
-  /// Whether the object that an attachment names exists.
+  /// Whether the object of an attachment exists.
   bool is_alive(const Attachment& a) const;
   Vec3 position(const Attachment& a) const;
 };
@@ -156,7 +156,7 @@ struct World::Impl : WorldState {
   void report_cloths(StepReport& report);
   void detach_cloths(BodyHandle body);
 
-  // Time is a base plus a whole number of equal samplings: no sum of rounded steps.
+  // Time is a base plus an integer number of equal sampling times, so that rounding errors do not add up.
   Real base_time = 0, sampling_time = 0;
   uint64_t samplings = 0, substeps = 0;
   Real now = 0;
@@ -164,44 +164,45 @@ struct World::Impl : WorldState {
   std::vector<MovedBody> moved;
   uint64_t born = 0, bodies_woken = 0, bodies_put_to_sleep = 0;  // since the last report
 
-  // Lists of bodies by rank, made anew when one was added, removed, fell asleep or woke.
+  // Lists of bodies by rank, rebuilt after a body was added or removed, fell asleep or woke.
   bool ranks_changed = false, lists_changed = true, pairs_changed = true, joints_changed = false;
-  JointTally joint_tally;  // of the sub-step, beside that of the motions
-  std::vector<std::pair<uint32_t, uint32_t>>
-      apart;                            // slots of bodies that do not collide, because of a joint
-  std::vector<Body*> awake, kinematic;  // dynamic ones; kinematic ones that move
-  std::vector<Body*> stepped;           // all that may have moved in this step
+  JointTally joint_tally;  // of the sub-step, without that of `motions`
+  // Slots of bodies that do not collide with each other, because of a joint.
+  std::vector<std::pair<uint32_t, uint32_t>> apart;
+  std::vector<Body*> awake, kinematic;  // awake dynamic bodies; moving kinematic bodies
+  std::vector<Body*> stepped;           // all bodies that may have moved in this step
   std::map<uint32_t, std::vector<Body*>> sleeping;
-  uint32_t sleeping_groups = 0;  // so far
-  std::size_t asleep = 0;        // bodies
-  std::size_t watched = 0;       // springs of sleeping bodies whose other ends can move
+  uint32_t sleeping_groups = 0;  // number of groups so far
+  std::size_t asleep = 0;        // number of sleeping bodies
+  std::size_t watched = 0;       // number of springs of sleeping bodies whose other ends can move
 
-  GroupedBroadPhase broad_phase;  // of the bodies that collide, by slot; articulations are groups
+  GroupedBroadPhase broad_phase;  // of the colliding bodies, by slot; articulations are groups
   ContactGraph graph;
   tbb::task_arena serial{1};
-  std::vector<ContactPair*> active_pairs;  // those of which a body can move
+  std::vector<ContactPair*> active_pairs;  // pairs with a body that can move
   std::vector<Island> islands;
   std::map<uint32_t, SolverChoice> choices;  // by the slot of an island's first body
   ExactSolverBudget patience;
   FastContacts fast_contacts;
-  std::vector<std::unique_ptr<CoupledSystem>> motions;  // of the sub-step
+  std::vector<std::unique_ptr<CoupledSystem>> motions;  // of this sub-step
 
-  std::vector<std::string> materials;  // names; bodies have their numbers
+  std::vector<std::string> materials;  // names of materials; bodies have their numbers
   std::map<std::pair<uint32_t, uint32_t>, ContactRule> rules;
 
-  // What particles can hit in the current sub-step. What cannot move is arranged anew only when it changed
+  // Obstacles of particles in the current sub-step. Those that cannot move are rebuilt only after a change
   // (E9).
   Obstacles fixed_obstacles, moving_obstacles;
   bool fixed_changed = true;
   bool prewarming = false;
-  std::vector<ParticleSystemHandle> waiting;  // systems that stand still while others are prewarmed
+  std::vector<ParticleSystemHandle> waiting;  // systems that are paused while others are prewarmed
   ParticleCollisions particle_collisions;
   BodyImpulses body_impulses;
-  std::vector<BodyImpulses::Link> links;       // by slot, of bodies that joints hold
-  std::vector<Articulation*> articulation_of;  // likewise
+  std::vector<BodyImpulses::Link> links;       // by slot, for bodies with joints
+  std::vector<Articulation*> articulation_of;  // by slot, for bodies with joints
   std::vector<ParticleEvent> particle_events;  // of the last sub-step
   ClothSystem cloth_system;
-  std::map<uint32_t, Reaction> pending_impulses;  // too weak to wake the body, by its slot; they add up
+  // Impulses too weak to wake the body, by its slot; they are summed.
+  std::map<uint32_t, Reaction> pending_impulses;
 };
 
 }  // namespace offstage::sim

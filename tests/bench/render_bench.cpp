@@ -1,5 +1,5 @@
-// Times of the renderer on one core at 1280x720: the first frame from nothing, sub-frames, and what follows
-// them.
+// Times of the renderer on one core at 1280x720: the first frame of a context, sub-frames, and
+// post-processing.
 
 #include <cmath>
 
@@ -57,7 +57,7 @@ void time_draw(benchmark::State& state, Set&& set) {
   Stage stage(context, kStage);
   set(stage);
   HdrImage sum;
-  stage.draw({}, sum);  // compiles what the scene needs
+  stage.draw({}, sum);  // compiles the shader programs of the scene
   int i = 0;
   for (auto _ : state) stage.draw(sample_offsets(i++ % 16, 16), sum);
 }
@@ -138,7 +138,7 @@ struct Drape {
   std::vector<Vector3f> points;
 };
 
-// Sub-frames of a cloth that moves: its surface is made anew for each.
+// Sub-frames of a moving cloth, whose surface is computed again for each.
 void BM_DrawCloth(benchmark::State& state) {
   Context context;
   Stage stage(context, kStage);
@@ -151,7 +151,7 @@ void BM_DrawCloth(benchmark::State& state) {
     stage.set_cloth(cloth, drape.points);
     stage.draw(sample_offsets(i++ % 16, 16), sum);
   };
-  draw();  // compiles what the scene needs
+  draw();  // compiles the shader programs of the scene
   for (auto _ : state) draw();
 }
 BENCHMARK(BM_DrawCloth)->Arg(60)->Arg(100)->Arg(200)->ArgName("cells")->Unit(benchmark::kMillisecond);

@@ -1,5 +1,7 @@
 // A test of the image tests: a golden must notice a parameter changed by one percent, and a single pixel.
 
+#include <cstdlib>
+
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -121,6 +123,78 @@ TEST(GoldenNames, AGoldenWithoutASourceServesTheSceneOfItsName) {
   golden.erase("source");
   write_file(folder / "g/rain.json", golden.dump());
   EXPECT_EQ(offstage("compare rain.json --golden g", folder.path()).code, 0);
+}
+
+/// Reads a JUnit file by Python's XML parser: "NAME OUTCOME KIND" of each test, then the counts.
+std::string read_junit(const std::filesystem::path& file) {
+  const std::filesystem::path script = file.parent_path() / "read_junit.py", out = script.string() + ".out";
+  write_file(script, R"(
+import sys, xml.etree.ElementTree as xml
+suite = xml.parse(sys.argv[1]).getroot().find("testsuite")
+for case in suite.findall("testcase"):
+    problem = case.find("failure") if case.find("failure") is not None else case.find("error")
+    float(case.get("time"))
+    print(case.get("name"), "passed" if problem is None else problem.tag + " " + problem.get("type"))
+print(suite.get("tests"), suite.get("failures"), suite.get("errors"))
+)");
+  const std::string command =
+      "/usr/bin/python3 " + script.string() + " " + file.string() + " >" + out.string() + " 2>&1";
+  EXPECT_EQ(std::system(command.c_str()), 0);
+  return read_file(out);
+}
+
+TEST(GoldenSuites, ManyScenesGiveOneVerdictOneReportAndOneJunitFile) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "scenes");
+  write_file(folder / "scenes/slow.json", falling_ball(1));
+  write_file(folder / "scenes/fast & odd.json", falling_ball(2));
+  write_file(folder / "scenes/broken.json", falling_ball(3));
+  ASSERT_EQ(offstage("bless scenes/*.json --golden goldens --reason new", folder.path(), "env -u CI").code,
+            0);
+  const std::string compare = "compare scenes/*.json --golden goldens --junit results.xml --report report";
+  const Outcome same = offstage(compare, folder.path());
+  EXPECT_EQ(same.code, 0) << same.out << same.err;
+  EXPECT_EQ(read_junit(folder / "results.xml"),
+            "scenes/broken.json passed\nscenes/fast & odd.json passed\nscenes/slow.json passed\n3 0 0\n");
+
+  // A scene that changed: a picture of the difference, and exit code 6.
+  write_file(folder / "scenes/fast & odd.json", falling_ball(2.02));
+  const Outcome changed = offstage(compare, folder.path());
+  EXPECT_EQ(changed.code, 6) << changed.err;
+  EXPECT_NE(changed.out.find("3 scenes: 2 as recorded, 1 with differences, 0 with errors"), std::string::npos)
+      << changed.out;
+  EXPECT_EQ(read_junit(folder / "results.xml"),
+            "scenes/broken.json passed\nscenes/fast & odd.json failure images differ\n"
+            "scenes/slow.json passed\n3 1 0\n");
+  const std::string page = read_file(folder / "report/index.html");
+  EXPECT_NE(page.find("href=\"fast___odd/index.html\""), std::string::npos) << page;
+  EXPECT_TRUE(std::filesystem::exists(folder / "report/fast___odd/fast___odd-0001-difference.png"));
+
+  // One that cannot be read does not keep the others from being compared; an error decides the exit code.
+  write_file(folder / "scenes/broken.json", "{\"version\": 1, \"bodis\": []}");
+  const Outcome broken = offstage(compare, folder.path());
+  EXPECT_EQ(broken.code, 3) << broken.err;
+  EXPECT_NE(broken.err.find("bodis"), std::string::npos) << broken.err;
+  EXPECT_EQ(read_junit(folder / "results.xml"),
+            "scenes/broken.json error scene invalid\nscenes/fast & odd.json failure images differ\n"
+            "scenes/slow.json passed\n3 1 1\n");
+}
+
+TEST(GoldenSuites, StatesOfManyScenesAreDrawnAgain) {
+  const TemporaryFolder folder;
+  write_file(folder / "a.json", falling_ball(1));
+  write_file(folder / "b.json", falling_ball(2));
+  ASSERT_EQ(offstage("bless a.json b.json --golden g --reason new", folder.path(), "env -u CI").code, 0);
+  EXPECT_EQ(offstage("compare a.json b.json --golden g --keep-states kept", folder.path()).code, 0);
+  EXPECT_EQ(offstage("compare a.json b.json --golden g --states kept", folder.path()).code, 0);
+}
+
+TEST(GoldenSuites, ScenesAndPicturesDoNotMix) {
+  const TemporaryFolder folder;
+  write_file(folder / "a.json", falling_ball(1));
+  EXPECT_EQ(offstage("compare a.json picture.png --golden g", folder.path()).code, 2);
+  EXPECT_EQ(offstage("compare one.png two.png three.png", folder.path()).code, 2);
+  EXPECT_EQ(offstage("compare one.png two.png --junit out.xml", folder.path()).code, 2);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 #pragma once
-/// What emitters brought into a world, told from the particles at its end.
+/// Particles that emitters added to a world, reconstructed from the particles at its end.
 
 #include <vector>
 

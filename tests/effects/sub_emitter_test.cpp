@@ -49,7 +49,8 @@ TEST(SubEmitter, ADeathIsAnsweredWhereItHappens) {
   EXPECT_EQ(burst.report().answered, 10u);
   ASSERT_EQ(burst.report().released, 200u);
   const auto births = births_of(world, stars);
-  // What is told from a birth is where it was at the end of the sub-step in which its parent died.
+  // The only known place of a particle's creation is its position at the end of the sub-step in which its
+  // parent died.
   constexpr Real kStep = 1.0 / 240, kMargin = 1e-9;
   for (std::size_t i = 0; i < births.size(); ++i) {
     EXPECT_NEAR(births[i].position.x(), 10 * (0.1 + 0.02 * static_cast<Real>(i / 20)),

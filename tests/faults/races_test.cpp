@@ -157,6 +157,25 @@ TEST(CacheOfSnapshots, RewrittenUnderItsReaderGivesOneSimulation) {
   }
 }
 
+TEST(CacheOfSnapshots, WithASnapshotOfAnotherSimulationIsRefused) {
+  const TemporaryFolder folder;
+  for (const std::string seed : {"1", "7"})
+    ASSERT_EQ(offstage("simulate " + tiny_scene() + " -q --duration 1 --seed " + seed + " --cache c" + seed,
+                       folder.path())
+                  .code,
+              0);
+  const auto snapshot = [&](const std::string& cache) {
+    for (const auto& entry : fs::directory_iterator(folder / cache))
+      if (entry.is_directory()) return entry.path() / "000003.snap";
+    return fs::path();
+  };
+  fs::copy_file(snapshot("c1"), snapshot("c7"), fs::copy_options::overwrite_existing);
+  const Outcome run =
+      offstage("render " + tiny_scene() + kOptions + " --seed 7 --cache c7 -o d/", folder.path());
+  EXPECT_EQ(run.code, 1);
+  EXPECT_NE(run.err.find("000003.snap"), std::string::npos) << run.err;
+}
+
 TEST(CacheOfSnapshots, OfAKilledRunIsUnfinishedAndGoesWithTheNext) {
   const TemporaryFolder folder;
   {

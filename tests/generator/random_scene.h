@@ -1,6 +1,6 @@
 #pragma once
-/// Random scenes, and what must hold in each of them whatever happens there. A scene is a function of its
-/// seed alone, so that a seed is all it takes to see a failure again: see random_scenes_test.cpp.
+/// Random scenes, and invariants that must hold in each of them. A scene is a function of its seed alone, so
+/// a seed is enough to reproduce a failure: see random_scenes_test.cpp.
 
 #include <cstdint>
 #include <optional>
@@ -58,10 +58,10 @@ struct Findings {
   bool finite = true;
   std::vector<std::string> lost;  ///< bodies that left the world, or the room
   Real energy_gain = 0;           ///< greatest rise above the least so far [J]
-  Real energy_scale = 1;          ///< what the scene's energies are about [J]
+  Real energy_scale = 1;          ///< scale of the scene's energies [J]
   Real gained_at = 0;             ///< when it was greatest [s]
-  Real penetration = 0;           ///< of bodies, where it exceeds what is allowed most [m]
-  Real allowed_penetration = 0;   ///< then, see Overlap in random_scene.cpp [m]
+  Real penetration = 0;           ///< penetration of bodies when it exceeded the allowed one most [m]
+  Real allowed_penetration = 0;   ///< allowed penetration at that time, see Overlap in random_scene.cpp [m]
   Real momentum_error = 0, angular_momentum_error = 0;  ///< of the greatest sizes of their parts
   uint64_t work = 0, allowed_work = 0;                  ///< greatest of a step, counted
   uint64_t rough = 0;                                   ///< fall-backs of contact solvers

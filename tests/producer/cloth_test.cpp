@@ -1,4 +1,4 @@
-// Cloths of a scene: what selects their vertices, what is refused, and what is handed to the drawing.
+// Cloths of a scene: selection of their vertices, refused values, and the data for drawing.
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
-// Frame 1 shows the state at output.start with all that exists then: what was prewarmed, what is born at that
-// time, and nothing that was not there.
+// Frame 1 shows the state at output.start with all objects that exist then: prewarmed particles and those
+// created at that time, and no others.
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-// Joints and articulations of a scene: their copies, what is refused, and that they hold.
+// Joints and articulations of a scene: their copies, refused values, and that they hold.
 
 #include <cmath>
 #include <numbers>
@@ -64,7 +64,7 @@ TEST(SceneJoints, WhatCannotBeIsRefusedWithWhatCan) {
             "/articulations/0/end: there is no body 'dor'; did you mean 'door'?\n");
 }
 
-// Nothing of a figure that stands still is in anything else of it, or the first step would throw it about.
+// No parts of a standing figure overlap, because the first step would push them apart.
 TEST(Articulations, AreAsTheyStandAndHoldWhenTheyFall) {
   const LoadedScene loaded = parse(R"(
     "output": {"fps": 30, "duration": 2},

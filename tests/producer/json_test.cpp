@@ -127,7 +127,7 @@ TEST(Json, TextIsEscapedSoThatItReadsBack) {
   EXPECT_EQ(*parse_json(to_text(text), "f").as<std::string>(), text);
 }
 
-/// Writes a random tree with random spaces and comments, and keeps what is written where.
+/// Writes a random tree with random white space and comments, and records the position of each value.
 class RandomText {
  public:
   explicit RandomText(uint64_t seed) : random_(seed, 2) { value(0); }

@@ -1,4 +1,4 @@
-// What overlays show, against what is known of the bodies they show.
+// Lines of overlays, compared with known properties of their bodies.
 
 #include "producer/build/overlays.h"
 
@@ -233,8 +233,8 @@ TEST(Overlays, DoNotTouchTheState) {
   EXPECT_EQ(with.simulation.snapshot().state_hash, without.simulation.snapshot().state_hash);
 }
 
-// A weight of 2 kg that hangs on a hinge: its axis, a line to the centre, and an arrow for what the hinge
-// bears.
+// A weight of 2 kg that hangs on a hinge: its axis, a line to the centre, and an arrow for the load of the
+// hinge.
 TEST(JointsOverlay, ShowsTheHingeAndWhatItBears) {
   Shown shown(R"({"bodies": [{"name": "arm", "shape": {"type": "box", "size": [0.1, 1, 0.1]}, "density": 200,
                               "position": [0, 0.5, 0]}],

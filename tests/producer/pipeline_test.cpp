@@ -15,7 +15,7 @@
 namespace offstage::producer {
 namespace {
 
-/// Runs a pipeline of `count` shots with `drawers` threads; each stage can be told to throw at one frame.
+/// Runs a pipeline of `count` frames with `drawers` threads; each stage can throw at one frame.
 struct Relay {
   int count = 200, drawers = 3, window = 4;
   int throw_in_shoot = -1, throw_in_draw = -1, throw_in_print = -1;

@@ -49,7 +49,7 @@ class SceneSchema : public testing::Test {
     json rule;  // the schema of the value
   };
 
-  /// Whether a path goes round in what is born from what is born from particles.
+  /// Whether a path is recursive through child particles of child particles.
   static bool is_deep(const std::string& path) {
     int lists = 0;
     for (std::size_t at = 0; (at = path.find("/0", at)) != std::string::npos; ++at) ++lists;

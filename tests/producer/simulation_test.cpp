@@ -1,5 +1,5 @@
-// That what a scene says of bodies, their contacts and the forces on them reaches the simulation: against
-// closed forms that each of the keys decides.
+// Bodies, contacts and forces of a scene reach the simulation: tests against closed forms that depend on each
+// of the keys.
 
 #include "producer/build/simulation.h"
 
@@ -64,7 +64,7 @@ TEST(Simulation, AFieldPushesWhomItNamesWhereAndWhileItSays) {
     {"type": "constant", "force": [0, 0, 8], "region": {"type": "box", "centre": [5, 0, 0], "size": [4, 4, 40]}},
     {"type": "point", "point": [14, 0, 0], "force": -1, "drop_rate": 2, "end": 0.1,
      "region": {"type": "sphere", "centre": [12, 0, 0], "radius": 4}}])"));
-  constexpr Real kStep = 1.0 / 240;  // what a force that starts or ends is rounded to, times the acceleration
+  constexpr Real kStep = 1.0 / 240;  // times the acceleration: rounding of the start and end of a force
   EXPECT_TRUE(run.body("body_0").velocity.isApprox(Vec3(0, 0.75, 0), 2 * kStep));
   EXPECT_TRUE(run.body("body_1").velocity.isApprox(Vec3(0, 0, 4), 1e-9));
   EXPECT_NEAR(run.body("body_2").velocity.x(), -0.25 / 2 * 0.1, 0.25 / 2 * kStep);

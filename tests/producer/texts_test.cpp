@@ -1,4 +1,4 @@
-// Words on the picture: what they say, where they stand, and when.
+// Texts on the picture: content, position and time.
 
 #include "producer/build/texts.h"
 
@@ -17,7 +17,7 @@ render::Image grey() {
   return {kWidth, kHeight, std::vector<uint8_t>(std::size_t{4} * kWidth * kHeight, 128)};
 }
 
-/// The picture of one text over grey, at a moment.
+/// The picture of one text over grey, at a time.
 render::Image shown(const TextOverlay& overlay, double time = 1.5) {
   Scene scene;
   scene.overlays.push_back(overlay);
@@ -32,7 +32,7 @@ render::Image shown(const TextOverlay& overlay, double time = 1.5) {
   return image;
 }
 
-/// Left, top, right and bottom of what differs from grey; the last two not included.
+/// Bounds of the pixels that differ from grey: left, top, right and bottom; the last two excluded.
 std::array<int, 4> text_box(const render::Image& image) {
   std::array<int, 4> box = {kWidth, kHeight, 0, 0};
   for (int y = 0; y < kHeight; ++y)

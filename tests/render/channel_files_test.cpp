@@ -1,4 +1,4 @@
-// Channels as PNG say what their comments promise. The reader keeps the upper byte of 16 bits.
+// Channels as PNG have the encoding stated in their comments. The reader keeps the upper byte of 16 bits.
 
 #include <limits>
 
@@ -12,7 +12,7 @@ namespace {
 
 constexpr float kNothing = std::numeric_limits<float>::infinity();
 
-/// Four pixels in a row, the last with nothing.
+/// Four pixels in a row; the last one is empty.
 Channels sample() {
   return {.width_px = 4,
           .height_px = 1,

@@ -1,4 +1,4 @@
-// The drawn surface of cloths, against what is known of flat sheets and balls, and how light falls on them.
+// The drawn surface of cloths, compared with flat sheets and balls, and its shading.
 
 #include <algorithm>
 #include <array>
@@ -250,8 +250,7 @@ TEST(StageCloth, TornSheetHasItsNewTrianglesAndIsOpenBetween) {
   EXPECT_EQ(pixel(picture, 36, 32).w(), 1);
 }
 
-// A crumpled thick sheet has places where one surface hides another by a hair; what was drawn before must not
-// show there.
+// In a crumpled thick sheet one surface may be just in front of another; the hidden one must not be visible.
 TEST(StageCloth, IsDrawnTheSameWhateverWasDrawnBefore) {
   ClothStage s(plain(), {0.3f, 0.5f, 1});
   Sheet sheet(12);

@@ -1,6 +1,7 @@
 #include "render/confined_child.h"
 
 #include <cerrno>
+#include <chrono>
 #include <string>
 #include <vector>
 
@@ -28,7 +29,7 @@ std::string answer_of(const std::filesystem::path& folder, const std::function<s
   return {answer.bytes().begin(), answer.bytes().end()};
 }
 
-/// What a job that has been taken over would try; the names of what it could do.
+/// Attempts of a compromised job; returns the names of those that succeeded.
 std::string harm(const std::filesystem::path& file, pid_t parent) {
   std::string done;
   const auto note = [&](const char* name, bool worked) { done += worked ? std::string(name) + " " : ""; };
@@ -84,9 +85,21 @@ TEST(ConfinedChild, FloodsAndCrashesAreErrorsOfTheFile) {
   EXPECT_THROW(answer_of(scratch.path(),
                          []() -> std::string {
                            ::raise(SIGSEGV);
-                           ::_exit(3);  // raise() was refused: an end, too
+                           ::_exit(3);  // raise() was refused; this also ends the child
                          }),
                FileError);
+}
+
+TEST(ConfinedChild, ThatWaitsForeverIsEnded) {
+  const ScratchFolder scratch;
+  const InputFolders folders({scratch.path()});
+  try {
+    run_confined({.what = "test", .folders = &folders, .standstill = std::chrono::seconds(1)},
+                 [](int) { ::pause(); });
+    FAIL() << "it ended by itself";
+  } catch (const FileError& e) {
+    EXPECT_NE(std::string(e.what()).find("no progress for 1 s"), std::string::npos) << e.what();
+  }
 }
 
 TEST(ConfinedChild, ARequestToStopEndsIt) {

@@ -168,7 +168,7 @@ TEST(PaintOrder, EveryKindOfParticleIsSeenThroughGlassBehindItAndInIt) {
       };
       for (const float z : {-2.0f, 0.0f, 2.0f})
         EXPECT_GT(shown(true, z).x(), 0.8f * shown(false, z).x()) << static_cast<int>(style) << ' ' << z;
-      // The glow of the glass lies over what is behind or in it.
+      // The glow of the glass is drawn over the particles behind and inside it.
       EXPECT_GT(shown(true, -2).z(), 0.09f);
       EXPECT_GT(shown(true, 0).z(), 0.09f);
       EXPECT_LT(shown(true, 2).z(), 0.06f) << static_cast<int>(style);
@@ -192,7 +192,7 @@ TEST(PaintOrder, GlassIsSeenThroughGlass) {
 }
 
 TEST(PaintOrder, SheerClothVeilsWhatIsBehindItAndNothingInFront) {
-  // A wavy sheet: particles in its box are in front of it or behind it by its surface.
+  // A wavy sheet: particles in its box are in front of it or behind it according to its surface.
   constexpr int n = 40;
   std::vector<Vector3f> places;
   std::vector<Vector2f> uvs;
@@ -261,7 +261,7 @@ TEST(PaintOrder, RainDrawnInPartsLooksAsDrawnAtOnce) {
   float worst = 0;
   for (std::size_t i = 0; i < at_once.rgba.size(); ++i)
     worst = std::max(worst, std::abs(at_once.rgba[i] - in_parts.rgba[i]));
-  EXPECT_LT(worst, 2e-3f);  // what a tile that is nearly covered leaves out
+  EXPECT_LT(worst, 2e-3f);  // the error of skipping particles behind a nearly covered tile
 }
 
 View view_from(const Vector3f& eye) {

@@ -12,7 +12,7 @@ using std::chrono::milliseconds;
 TEST(Tabs, ASlowTabGetsTheLatestMessageOfEachKind) {
   Tabs tabs;
   const auto ticket = tabs.open("a");
-  tabs.wait("a", *ticket, milliseconds(0));  // who writes
+  tabs.wait("a", *ticket, milliseconds(0));  // the writer
   for (int i = 0; i < 1000; ++i) tabs.post("frame", std::to_string(i));
   tabs.post("film", "f");
   EXPECT_EQ(tabs.wait("a", *ticket, milliseconds(0)).message->json, "999");
@@ -37,7 +37,7 @@ TEST(Tabs, ANewStreamOfATabEndsTheOldOne) {
   const auto old = tabs.open("a");
   const auto fresh = tabs.open("a");
   EXPECT_TRUE(tabs.wait("a", *old, milliseconds(0)).over);
-  tabs.close("a", *old);  // comes late and changes nothing
+  tabs.close("a", *old);  // arrives late and has no effect
   EXPECT_FALSE(tabs.wait("a", *fresh, milliseconds(0)).over);
   tabs.close_all();
   EXPECT_TRUE(tabs.wait("a", *fresh, milliseconds(0)).over);

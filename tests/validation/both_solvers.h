@@ -27,16 +27,16 @@ class BothSolvers : public testing::TestWithParam<SolverKind> {
   }
 };
 
-/// Instances of a suite for both solvers; `kind` is Solvers, or Long for what takes minutes.
+/// Instances of a suite for both solvers; `kind` is Solvers, or Long for tests that take minutes.
 #define OFFSTAGE_BOTH_SOLVERS(kind, suite) \
   INSTANTIATE_TEST_SUITE_P(kind, suite, testing::Values(SolverKind::exact, SolverKind::fast), solver_name)
 
-/// The same, and for what chooses between them.
+/// The same including `auto`.
 #define OFFSTAGE_ALL_SOLVERS(kind, suite) \
   INSTANTIATE_TEST_SUITE_P(               \
       kind, suite, testing::Values(SolverKind::exact, SolverKind::fast, SolverKind::automatic), solver_name)
 
-/// What many steps reported: counts summed, the greatest of the rest.
+/// Reports of many steps: counts are sums, other figures the greatest values.
 struct Tally {
   Real penetration = 0;
   uint64_t collisions = 0, tracebacks = 0, toi_limit_reached = 0, exact_fallbacks = 0, fast_fallbacks = 0;

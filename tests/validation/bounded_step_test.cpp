@@ -1,4 +1,4 @@
-/// What a step may cost, counted in what the solvers do, on heaps that come down: see tests/bench for times.
+/// Bounds of the cost of a step, as counted work of the solvers, on falling heaps; tests/bench has the times.
 
 #include <gtest/gtest.h>
 

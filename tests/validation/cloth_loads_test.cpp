@@ -171,7 +171,7 @@ std::vector<Swing> swings(World& world, BodyHandle body, int seconds) {
   return result;
 }
 
-/// Without what takes energy from a cloth.
+/// Removes all dissipation of a cloth.
 ClothDef lossless(ClothDef def) {
   for (ClothSpring& s : def.springs) s.damping = 0;
   def.air.density = 0;

@@ -81,7 +81,7 @@ TEST(ClothValidation, ExchangesMomentumWithABody) {
   };
   for (int i = 0; i < 24; ++i) world.step(1.0 / 24);
   EXPECT_LT(world.body(ball).velocity.norm(), 1.99);
-  // Overlaps are taken back without motion, which is what is lost here.
+  // Removing overlaps does not change velocities; this is the energy lost here.
   EXPECT_NEAR((momentum() - Vec3(0, -1, 0)).norm(), 0, 0.02);
 }
 
@@ -112,7 +112,7 @@ TEST(ClothValidation, ParticlesBounceOffClothAndPushIt) {
   World world({.gravity = Vec3::Zero()});
   ClothDef def = sheet(0.6, 12, Vec3::Zero());
   def.air.density = 0;
-  def.max_stretch = 0;  // moves cut short lose momentum
+  def.max_stretch = 0;  // shortened moves lose momentum
   def.self_collision = false;
   const ClothHandle cloth = world.add_cloth(def);
   const ParticleSystemHandle grains = world.add_particle_system({.name = "grains"});

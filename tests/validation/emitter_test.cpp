@@ -1,4 +1,4 @@
-/// Statistics of what an emitter releases, and the ballistics of a sprinkler.
+/// Statistics of emitters, and the ballistics of a sprinkler.
 
 #include "effects/emitter.h"
 
@@ -14,7 +14,7 @@ using namespace sim;
 
 constexpr int kDraws = 100'000;
 
-/// All particles of one release, just born.
+/// All particles of one release, just created.
 ParticleArrays release(const EmitterDef& def) {
   World world({.gravity = Vec3::Zero()});
   const auto system = world.add_particle_system({});

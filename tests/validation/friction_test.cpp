@@ -1,4 +1,4 @@
-/// Sliding, sticking, rolling and tipping against what Coulomb's law gives in closed form.
+/// Sliding, sticking, rolling and tipping, compared with closed forms of Coulomb's law.
 
 #include <cmath>
 #include <numbers>
@@ -50,11 +50,12 @@ TEST_P(Incline, BoxSlidesAsComputedAbove) {
   }
 }
 
-// Grain at 30 degrees to the slope. Each axis has its own limit: across it holds, along it slides.
+// Friction axis at 30 degrees to the slope. Each axis has its own limit: across it sticks, along it slides.
 TEST_P(Incline, BoxFollowsTheGrainOfASurface) {
   const Real a = 0.4, phi = std::numbers::pi / 6, t = 1.5;
   const Vec3 axis(std::cos(phi), 0, std::sin(phi)), across(-std::sin(phi), 0, std::cos(phi));
-  // With the box's 0.5: 0.2 along the grain, and across it 0.6, or 0.1, which is less than what pulls there.
+  // With the box's 0.5: 0.2 along the friction axis, and across it 0.6, or 0.1, which is less than the load
+  // there.
   for (const Real mu_across : {0.6, 0.1}) {
     const BodyDef ground{.restitution = 0,
                          .friction = 0.08,
@@ -163,7 +164,7 @@ TEST_P(Level, StaticFrictionHoldsUpToItsLimitThenTheDynamicOneDecides) {
   EXPECT_LT(std::abs(slide(0.57, 0)), 1e-6);
   // The few steps that it takes to be seen to slide are those of the static limit.
   EXPECT_NEAR(slide(0.63, 0) / (0.5 * kFrictionGravity * (0.63 - kDynamic)), 1, 0.02);
-  // What slides already is not held by what would hold it at rest.
+  // A sliding body is not held by static friction.
   EXPECT_NEAR(slide(0.5, 1) / (1 + 0.5 * kFrictionGravity * (0.5 - kDynamic)), 1, 0.005);
 }
 
@@ -187,7 +188,7 @@ TEST_P(Level, ConveyorBringsABoxToItsSpeed) {
   EXPECT_NEAR(world.body(box).centre.x(), kBelt * (world.time() - takes / 2), 0.005 * kBelt);
 }
 
-// A plank under a box on a smooth floor: together, or each for itself.
+// A plank under a box on a smooth floor: they move together or separately.
 TEST_P(Level, PlankPulledFromUnderABox) {
   constexpr Real kMu = 0.3, kBox = 2, kPlank = 3, t = 0.8;
   for (const Real pull : {10.0, 40.0}) {
@@ -242,7 +243,8 @@ TEST_P(Level, BoxPushedOnABox) {
   }
 }
 
-// A pusher that speeds up evenly takes two boxes in a row along; between them acts what moves the second.
+// A pusher with constant acceleration moves two boxes in a row; the force between them accelerates the second
+// one.
 TEST_P(Level, PusherDrivesARowOfBoxes) {
   constexpr Real kAcceleration = 2, kMu = 0.2, kMass = 1.5;
   World world(def());
@@ -322,7 +324,8 @@ TEST_P(Rod, FallsFromUprightOnARoughAndOnASmoothFloor) {
                                       .friction = rough ? 8.0 : 0});
     const FallingRod rod{1, (kLength * kLength + kWidth * kWidth) / 12, d, rough};
     const Vec3 start = world.body(body).centre;
-    // Until 50 degrees: further down no friction holds the foot any more (tan of what it needs has a pole).
+    // Up to 50 degrees: further down no friction holds the foot any more (the tangent of the required angle
+    // has a pole).
     for (int k = 1; k < 40; ++k) {
       run(world, 0.025, 1.0 / 240);
       const Real phi = rod.angle(kStart, world.time());
@@ -343,9 +346,9 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, Rod);
 class Dome : public BothSolvers {
  protected:
   struct Flight {
-    Real cosine;   ///< of the polar angle where it left, by what it took along
-    Real touched;  ///< of where a force last acted
-    Real energy;   ///< lost, in units of m g (R + r)
+    Real cosine;   ///< cosine of the polar angle where it left, by its horizontal velocity
+    Real touched;  ///< cosine of the polar angle where a force last acted
+    Real energy;   ///< energy lost, in units of m g (R + r)
   };
   /// A ball of 1 m goes down from near the top of a sphere of 9 m with the speed that it would have come
   /// there with, rolling if there is friction. In flight the speed towards x stays what it was where the ball

@@ -128,7 +128,7 @@ TEST_P(ElasticPair, BallsKeepMomentumAngularMomentumAndEnergy) {
     World world(weightless());
     const Real ra = dice.uniform(0.02, 0.3), rb = dice.uniform(0.02, 0.3);
     const Vec3 way = dice.direction(), side = way.cross(dice.direction()).normalized();
-    // Head-on, or anything up to a glance.
+    // From head-on to grazing impacts.
     const Vec3 at = 0.7 * way + dice.uniform(0, k % 2 == 0 ? 0 : 0.95 * (ra + rb)) * side;
     const auto ball = [&](Real r, const Vec3& p, const Vec3& v) {
       return world.add_body({.shape = Sphere{r},
@@ -263,7 +263,7 @@ TEST_P(Paddle, ABoxPushesAStackAlong) {
     EXPECT_NEAR(s.centre.y(), 0.1 + 0.2 * i, 1e-3) << i;
     EXPECT_NEAR(s.centre.x(), face + 0.1, 0.03) << i;
   }
-  // Friction of the floor under all three, and nothing else, is what the pusher works against.
+  // The pusher works only against the friction of the floor under all three.
   Vec3 push = Vec3::Zero();
   for (const ContactState& c : world.contacts())
     if (c.a == pusher || c.b == pusher) push += c.a == pusher ? -c.force : c.force;
@@ -272,7 +272,7 @@ TEST_P(Paddle, ABoxPushesAStackAlong) {
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, Paddle);
 
-// Of boxes that turn and slide fast, other corners meet in a step than were near when it began.
+// Boxes that rotate and slide fast touch in a step with other corners than those near at its start.
 TEST(FastSolver, BoxesThatTurnAsTheyMeetDoNotOverlap) {
   const Scatter random{11};
   Real deepest = 0;

@@ -215,7 +215,7 @@ TEST_P(InternalEdges, DoNotStopWhatAConveyorCarries) {
   }
 }
 
-// Two planes that meet at the bottom, of many triangles each: what lies in both goes along.
+// Two planes that meet at the bottom, of many triangles each: a body that touches both slides along the line.
 TEST_P(InternalEdges, OfAValleyDoNotStopWhatGoesAlongIt) {
   const Real slope = std::tan(0.5), radius = 0.1;
   const Mover movers[] = {{"ball", Sphere{radius}, radius / std::cos(0.5)},
@@ -265,8 +265,8 @@ TriangleMesh cone_mesh(Real radius, Real height, uint32_t around, uint32_t rings
   return m;
 }
 
-// A sphere of radius 2 of 96 x 48 triangles: its edges turn by 0.065 rad, and what slides over them loses the
-// speed that it has across the next face.
+// A sphere of radius 2 of 96 x 48 triangles: its edges turn by 0.065 rad, and a sliding body loses the
+// velocity component perpendicular to the next face.
 TEST_P(RoundMeshes, LetThingsSlideDownASphereAsTheSmoothOneDoes) {
   const Real radius = 2, from = 0.3;
   const Vec3 up(std::sin(from), std::cos(from), 0);
@@ -372,7 +372,7 @@ TEST_P(RealEdges, AWallOfTheSameMeshStopsABox) {
   EXPECT_LT(end.pose.position.x(), 0.85 + 1e-3);
   EXPECT_NEAR(end.pose.position.x(), 0.85, 0.01);
   EXPECT_NEAR(end.pose.position.y(), 0.15, 1e-3);
-  EXPECT_LT(end.velocity.norm(), 0.03);  // a hundredth of what it came with
+  EXPECT_LT(end.velocity.norm(), 0.03);  // a hundredth of its initial speed
 }
 
 TEST_P(RealEdges, ABallIsThrownOffARidge) {

@@ -1,5 +1,5 @@
-/// Particles that hit bodies: what bodies on joints, and bodies that many hit at once, take from them
-/// (physics P8, A3), against closed forms and invariants.
+/// Particles that hit bodies, in particular bodies with joints and bodies hit by many at once (physics P8,
+/// A3), compared with closed forms and invariants.
 
 #include <cmath>
 #include <optional>
@@ -26,7 +26,7 @@ World weightless(Real max_step = 1.0 / 240) {
   return World({.gravity = Vec3::Zero(), .max_step = max_step, .sleep = false});
 }
 
-/// A particle falls onto a plate's end and bounces; its velocity then.
+/// A particle falls onto a plate's end and bounces; returns its velocity afterwards.
 Real rebound(World& world, bool internal) {
   const auto system = world.add_particle_system({.internal = internal});
   world.add_particle(system, {.position = {kHitArm, 0.5, 0},

@@ -24,7 +24,7 @@ Real overlap(const PlacedBox& a, const PlacedBox& b) {
   Real least = std::numeric_limits<Real>::infinity();
   const auto try_axis = [&](const Vec3& axis) {
     const Real length = axis.norm();
-    if (length < 1e-7) return;  // of two parallel edges: the faces tell the same
+    if (length < 1e-7) return;  // parallel edges: the faces give the same axis
     const Real reach = a.half.dot((a.axes.transpose() * axis).cwiseAbs()) +
                        b.half.dot((b.axes.transpose() * axis).cwiseAbs());
     least = std::min(least, (reach - std::abs(axis.dot(way))) / length);
@@ -40,7 +40,7 @@ Real overlap(const PlacedBox& a, const PlacedBox& b) {
 
 class Pit : public BothSolvers {
  protected:
-  /// Looks sixty times a second for 6 s.
+  /// Samples sixty times a second for 6 s.
   static void expect_keeps_apart(int count) {
     World world(def());
     std::vector<BodyHandle> bodies;

@@ -299,7 +299,7 @@ TEST_P(Joined, APendulumOnAStiffSpringHandsItsSpeedOver) {
   EXPECT_NEAR(world.energy().total(), before, 0.01 * before + 0.05);
 }
 
-// E7: what a spring joins goes back to the time of impact together, so a larger step finds the same motion.
+// E7: bodies connected by a spring are traced back together, so a larger step finds the same motion.
 TEST_P(Joined, BodiesOnASpringAreTracedBackTogether) {
   const auto finish = [](Real max_step) {
     World world(weightless(max_step));
@@ -329,7 +329,7 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, Joined);
 
 class Rain : public BothSolvers {};
 
-// Particles fall on a stack while it falls itself: none gets inside, and the stack lands as without them.
+// Particles fall on a falling stack: none gets inside, and the stack lands as without them.
 TEST_P(Rain, OnBodiesThatMove) {
   World world(def());
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0});

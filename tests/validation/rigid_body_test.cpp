@@ -22,9 +22,9 @@ Real elliptic_k(Real m) {
   return std::numbers::pi / (2 * a);
 }
 
-// A box of three different moments I1 < I2 < I3, spun about the middle one, does what the T-handle does.
-// Between flips lies half the period of w2, 4 K(m) / p (Landau and Lifshitz, Mechanics, section 37; H^2 > 2 E
-// I2).
+// A box with three different moments I1 < I2 < I3 that rotates about the middle axis flips as a T-handle
+// does. The time between flips is half the period of w2, 4 K(m) / p (Landau and Lifshitz, Mechanics, section
+// 37; H^2 > 2 E I2).
 TEST(THandle, FlipsWithThePeriodOfTheEllipticIntegralAndKeepsEnergyAndMomentum) {
   World world({.gravity = Vec3::Zero()});
   const auto body =

@@ -68,7 +68,7 @@ TEST_P(Stack, HeavyOnTopStands) {
   }
 }
 
-// Each contact's force is what statics says: the weight of all above.
+// The force at each contact follows from statics: the weight of all bodies above.
 TEST_P(Stack, CarriesItsWeight) {
   World world(def());
   add_ground(world);
@@ -123,7 +123,7 @@ TEST_P(Table, StandsOnMoreLegsThanItNeeds) {
       all.add(world.step(1.0 / 240));
       for (std::size_t i = 0; i < bodies.size(); ++i)
         far = std::max(far, (world.body(bodies[i]).centre - start[i]).norm());
-      if (world.time() < 1) continue;  // until the load has come to the legs
+      if (world.time() < 1) continue;  // until the load has reached the legs
       Real carried = 0;
       Vec3 middle = Vec3::Zero();
       int points = 0;

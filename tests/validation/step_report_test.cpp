@@ -1,4 +1,4 @@
-/// What the engine decides within a step is told in its report: none of it is silent.
+/// The report of a step contains all decisions of the engine within it.
 
 #include <gtest/gtest.h>
 

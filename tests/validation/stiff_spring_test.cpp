@@ -1,4 +1,5 @@
-/// Stiff springs: backward Euler where others would blow up, and adaptive steps where the stiffness passes.
+/// Stiff springs: backward Euler where explicit integrators diverge, and adaptive steps where the stiffness
+/// passes.
 
 #include <array>
 #include <cmath>
@@ -128,7 +129,7 @@ class Softening final : public DynamicSystem {
   }
 };
 
-/// Positions at 20 equally spaced times, and what they cost.
+/// Positions at 20 equally spaced times, and the cost.
 struct Course {
   std::array<Real, 20> x;
   IntegratorReport report;

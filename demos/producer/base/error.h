@@ -1,5 +1,5 @@
 #pragma once
-/// What is wrong with a scene, and where. Thrown for bad input only; caught in main.
+/// Errors of a scene, with their place. Thrown only for bad input; caught in command_line.cpp.
 
 #include <stdexcept>
 #include <string>
@@ -14,7 +14,7 @@ struct Where {
   std::string path;
 };
 
-/// A report of problems lists so many of them, then counts.
+/// Greatest number of problems that are listed; the rest are only counted.
 inline constexpr std::size_t kMostProblems = 50;
 
 /// One problem: "file:line:col: /path: what is wrong; what is allowed".
@@ -25,7 +25,7 @@ struct Problem {
   std::string describe() const;
 };
 
-/// A scene that cannot be used, with the problems found: at most kMostProblems, and one more that counts the
+/// An invalid scene, with the problems found: at most kMostProblems, and one more with the number of the
 /// rest.
 class SceneError : public std::runtime_error {
  public:

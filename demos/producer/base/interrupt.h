@@ -1,11 +1,12 @@
 #pragma once
-/// Ctrl-C and TERM. The first asks the run to end tidily; the second ends the process at once.
+/// Handling of SIGINT (Ctrl-C) and SIGTERM. The first one asks the run to end cleanly; the second one ends
+/// the process at once.
 
 #include <stdexcept>
 
 namespace offstage::producer {
 
-/// Thrown where a signal ends work that is of no use in part.
+/// Thrown when a signal ends work whose partial result is useless.
 class Interrupted : public std::runtime_error {
  public:
   explicit Interrupted(int signal) : std::runtime_error("interrupted"), signal_(signal) {}
@@ -15,11 +16,11 @@ class Interrupted : public std::runtime_error {
   int signal_;
 };
 
-/// Installs the handlers for SIGINT and SIGTERM, and ignores SIGPIPE and SIGXFSZ: a closed pipe or a file at
-/// its size limit is an error of the write instead.
+/// Installs the handlers for SIGINT and SIGTERM. Ignores SIGPIPE and SIGXFSZ, so that a closed pipe or the
+/// limit of a file's size is an error of the write.
 void install_signal_handlers();
 
-/// The signal that asked the run to end, or 0.
+/// Returns the signal that asked the run to end, or 0.
 int interrupt_signal();
 
 }  // namespace offstage::producer

@@ -20,8 +20,8 @@ struct Token {
   bool separator() const { return first == ',' || first == ':'; }
 };
 
-/// Walks over the text once and notes where each token starts. It need not judge the text: nlohmann's parser
-/// does, and the two agree on tokens up to the first error.
+/// Scans the text once and records the start of each token. It does not validate the text, because nlohmann's
+/// parser does; both agree on the tokens up to the first error.
 class Scanner {
  public:
   Scanner(std::string_view text, int file) : text_(text), at_{file, 1, 1} {}
@@ -44,8 +44,8 @@ class Scanner {
 
   void advance(std::size_t n = 1) {
     for (; n > 0 && i_ < text_.size(); --n, ++i_) {
-      const bool continuation =
-          (static_cast<unsigned char>(text_[i_]) & 0xC0) == 0x80;  // of a UTF-8 character
+      // Bytes of a UTF-8 character.
+      const bool continuation = (static_cast<unsigned char>(text_[i_]) & 0xC0) == 0x80;
       if (text_[i_] == '\n') {
         ++at_.line;
         at_.column = 1;
@@ -149,8 +149,7 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
     const std::size_t at = what.rfind("; expected ");
     return at == std::string::npos ? "" : what.substr(at);
   }
-  /// The part of nlohmann's message that says what is wrong, without exception number, position and last
-  /// token read.
+  /// The reason in nlohmann's message, without exception number, position and last token.
   static std::string reason(const std::string& what) {
     const std::size_t dash = what.find(" - "), bracket = what.find("] ");
     const std::size_t begin = dash != std::string::npos      ? dash + 3
@@ -171,7 +170,7 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
   }
   void next() { ++token_; }
 
-  /// Adds a value to what is open.
+  /// Adds a value to the innermost open list or object.
   template <class T>
   Node& add(T&& value) {
     const Position at = here();
@@ -189,7 +188,8 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
   bool open(T&& container) {
     if (open_.size() == kMaxDepth)
       return fail(here(), "nested deeper than " + std::to_string(kMaxDepth) + " levels");
-    open_.push_back(&add(std::forward<T>(container)));  // stays put: its parent grows only after it is closed
+    // The address stays valid, because the parent grows only after this is closed.
+    open_.push_back(&add(std::forward<T>(container)));
     return true;
   }
   bool close() {
@@ -204,21 +204,22 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
   Position end_;
   std::size_t token_ = 0;
   std::vector<Node*> open_;
-  std::vector<std::set<std::string>> keys_;  // of each open object
+  std::vector<std::set<std::string>> keys_;  // keys of each open object
 };
 
 void append_number(double v, std::string& out) {
-  if (v == 0 && std::signbit(v)) {  // "-0" would read back as the integer 0
+  if (v == 0 && std::signbit(v)) {  // "-0" would be read back as the integer 0
     out += "-0.0";
     return;
   }
   constexpr double kManyDigits = 1e15;
-  if (v == std::trunc(v) && std::abs(v) < kManyDigits) {  // 100000 rather than 1e+05
+  if (v == std::trunc(v) && std::abs(v) < kManyDigits) {  // 100000 instead of 1e+05
     out += std::to_string(static_cast<int64_t>(v));
     return;
   }
   char buffer[32];
-  const bool large = std::abs(v) >= kManyDigits;  // with an exponent, lest it reads as an integer too long
+  // With an exponent, so that it is not read back as an integer that is too long.
+  const bool large = std::abs(v) >= kManyDigits;
   const auto format = large ? std::chars_format::scientific : std::chars_format::general;
   out.append(buffer, std::to_chars(buffer, buffer + sizeof buffer, v, format).ptr);
 }

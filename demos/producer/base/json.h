@@ -1,6 +1,6 @@
 #pragma once
-/// JSON text as a tree in which every value and every key knows where it stands, so that a message can point
-/// at it (product spec, "Scene files"). Comments are allowed; repeated keys are not.
+/// JSON text as a tree in which every value and every key has its position, so that messages can refer to it.
+/// Comments are allowed; repeated keys are not.
 
 #include <cstdint>
 #include <string>
@@ -12,7 +12,7 @@
 
 namespace offstage::producer {
 
-/// A place in one of the texts a scene is read from.
+/// A position in one of the texts of a scene.
 struct Position {
   int file = -1;             ///< index into SceneSource::files; -1: not from a text
   int line = 0, column = 0;  ///< from 1, in characters; 0: not from a file
@@ -23,7 +23,7 @@ struct Member;
 using List = std::vector<Node>;
 using Object = std::vector<Member>;  ///< in the order of the file, keys unique
 
-/// A JSON value and where it starts.
+/// A JSON value and its position.
 struct Node {
   using Value = std::variant<std::nullptr_t, bool, int64_t, double, std::string, List, Object>;
   Value value;  ///< null at first
@@ -43,7 +43,7 @@ struct Node {
   T* as() {
     return std::get_if<T>(&value);
   }
-  /// The value of a key; nullptr if there is none or this is not an object.
+  /// Returns the value of a key; null if there is none or if this is not an object.
   const Node* find(std::string_view key) const;
   Node* find(std::string_view key) { return const_cast<Node*>(std::as_const(*this).find(key)); }
 };
@@ -55,20 +55,20 @@ struct Member {
   Position at = {};
 };
 
-inline Node::Node() = default;  // here, where Member is complete
+inline Node::Node() = default;  // defined here, because Member must be complete
 
 inline constexpr int kMaxDepth = 64;  ///< of nested lists and objects
 
-/// Reads one JSON text. `file` is its index in positions, `name` its name in messages. Throws SceneError with
-/// what is wrong and where: a syntax error, nesting over kMaxDepth, an integer that does not fit in 64 bits,
-/// or repeated keys.
+/// Parses one JSON text. `file` is its index in positions, `name` its name in messages. Throws SceneError
+/// with position and reason for a syntax error, nesting deeper than kMaxDepth, an integer that does not fit
+/// in 64 bits, or repeated keys.
 Node parse_json(std::string_view text, const std::string& name, int file = 0);
 
-/// Compact JSON, or with line breaks if `indent` > 0. Numbers are the shortest text that reads back to the
-/// same bits.
+/// Converts to compact JSON, or with line breaks if `indent` > 0. Numbers are the shortest text that reads
+/// back to the same bits.
 std::string to_text(const Node& node, int indent = 0);
 
-/// What a message calls a value: `the string "abc"`, `-1`, `[0,0,0]`, `an object`.
+/// Returns the description of a value for messages: `the string "abc"`, `-1`, `[0,0,0]`, `an object`.
 std::string describe(const Node& node);
 
 /// A key as a step of a JSON pointer ("/" and "~" escaped), with the slash in front.

@@ -1,5 +1,5 @@
 #pragma once
-/// Files of our own in JSON: goldens, caches, manifests. A value of the wrong type is an error that names the
+/// JSON files written by offstage: goldens, caches, manifests. A value of the wrong type is an error with the
 /// file and the key.
 
 #include <cstdint>
@@ -12,11 +12,11 @@
 
 namespace offstage::producer {
 
-/// The most frames that such a file can speak of.
+/// Greatest number of frames in such a file.
 inline constexpr int kMostFrames = 1'000'000'000;
 
-/// An object in such a file. A key that is missing has the default; one of another type throws
-/// render::FileError "FILE: /key: must be a text, got 3".
+/// An object in such a file. A missing key has its default; a key of another type throws render::FileError
+/// "FILE: /key: must be a text, got 3".
 class JsonObject {
  public:
   JsonObject(std::filesystem::path file, std::string path, nlohmann::json json)
@@ -25,11 +25,11 @@ class JsonObject {
   bool has(const std::string& key) const { return json_.contains(key); }
   std::string text(const std::string& key, const std::string& otherwise = {}) const;
   bool flag(const std::string& key, bool otherwise) const;
-  /// A whole number from 0 to `most`.
+  /// An integer from 0 to `most`.
   int count(const std::string& key, int otherwise, int most) const;
   /// The objects of a list; none if the key is missing.
   std::vector<JsonObject> objects(const std::string& key) const;
-  /// The value as it stands; null if it is missing.
+  /// The value without a check of its type; null if it is missing.
   nlohmann::json value(const std::string& key) const;
 
   [[noreturn]] void refuse(const std::string& key, const std::string& allowed) const;
@@ -41,8 +41,8 @@ class JsonObject {
   nlohmann::json json_;
 };
 
-/// Reads one; nothing if there is no file, or if what is there is no object. Throws render::FileError for a
-/// file that cannot be read or is no regular one.
+/// Reads such a file; nothing if there is no file, or if its content is not an object. Throws
+/// render::FileError for a file that cannot be read or is not regular.
 std::optional<JsonObject> read_json_file(const std::filesystem::path& file);
 
 }  // namespace offstage::producer

@@ -1,6 +1,6 @@
 #pragma once
-/// Talk to the person at the terminal. All but the names of outputs goes to standard error, and that nobody
-/// reads it any more (a closed pipe, a full log disk) is no reason to end a run.
+/// Output for the user at the terminal. Everything except the names of outputs goes to standard error. A
+/// closed or full standard error does not end a run.
 
 #include <string>
 #include <string_view>
@@ -10,23 +10,23 @@
 
 namespace offstage::producer {
 
-/// Prints the name of a finished output as a line of standard output. Where that was closed from the start
-/// nobody wants the name, and the output is there all the same.
+/// Prints the name of a finished output as a line of standard output. Does nothing if standard output was
+/// closed from the start.
 void print_output_name(const std::string& name);
-/// Says that standard output was closed from the start.
+/// Records that standard output was closed from the start.
 void note_closed_output();
 
-/// Writes whole lines. A status line that is shown is removed first, so that the two never mix. Any thread
-/// may call it.
+/// Writes whole lines. A visible status line is removed first, so that the two never mix. Any thread may call
+/// it.
 void write_log(std::string_view lines);
 
-/// Shows one line that later calls replace, for a terminal; without a line break, and no wider than
-/// terminal_width(). An empty text removes it.
+/// Shows a status line, which later calls replace, on a terminal. It must have no line break and be no wider
+/// than terminal_width(). An empty text removes it.
 void show_status(std::string_view line);
-/// Leaves the status line where it is and goes on below it.
+/// Keeps the status line visible and continues below it.
 void keep_status();
 
-/// Columns of the terminal behind standard error; 80 if it does not say.
+/// Columns of the terminal at standard error; 80 if unknown.
 int terminal_width();
 
 template <class... Args>

@@ -54,7 +54,7 @@ std::vector<uint8_t> unpack(const FileKind& kind, std::span<const uint8_t> bytes
   const std::string damaged = fmt::format("damaged {} ", kind.name);
   if (header.payload_size > kMaxPayload) refuse(damaged + "(size)");
   const auto packed = bytes.subspan(sizeof header);
-  // The header's size is not trusted before the frame agrees with it.
+  // The size in the header is not trusted unless the zstd frame has the same size.
   if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != header.payload_size)
     refuse(damaged + "(size)");
   std::vector<uint8_t> payload(header.payload_size);

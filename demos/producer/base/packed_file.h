@@ -1,7 +1,7 @@
 #pragma once
-/// Binary files of our own, compressed and checksummed: a header with a magic word and a format version, then
-/// the zstd-compressed payload. What is damaged, cut short or of another kind or version is distinguished
-/// from what is whole.
+/// Binary files written by offstage, compressed and with a checksum: a header with a magic word and a format
+/// version, then the zstd-compressed payload. Files that are damaged, cut short, or of another kind or
+/// version are detected.
 
 #include <cstdint>
 #include <cstring>
@@ -18,8 +18,7 @@
 
 namespace offstage::producer {
 
-/// Which kind of file: eight characters at most, the version that is read and written, and its name in
-/// messages.
+/// Kind of a file: at most eight characters, the version that is read and written, and its name in messages.
 struct FileKind {
   std::string_view magic;
   uint32_t version;
@@ -27,13 +26,13 @@ struct FileKind {
 };
 
 std::vector<uint8_t> pack(const FileKind& kind, std::span<const uint8_t> payload);
-/// The payload. Throws render::FileError, naming `source`.
+/// Returns the payload. Throws render::FileError with `source`.
 std::vector<uint8_t> unpack(const FileKind& kind, std::span<const uint8_t> bytes, const std::string& source);
 
 /// Throws render::FileError.
 std::vector<uint8_t> read_file(const std::filesystem::path& path);
 
-/// Puts numbers and vectors one after the other, in the machine's byte order.
+/// Appends numbers and vectors in the machine's byte order.
 class ByteWriter {
  public:
   template <class T>
@@ -52,7 +51,7 @@ class ByteWriter {
   std::vector<uint8_t> bytes_;
 };
 
-/// Takes them out again. Throws render::FileError, naming `source`, where there is no more to take.
+/// Reads the same data. Throws render::FileError with `source` at the end of the data.
 class ByteReader {
  public:
   ByteReader(std::span<const uint8_t> bytes, const std::string& source) : bytes_(bytes), source_(source) {}
@@ -71,14 +70,14 @@ class ByteReader {
     for (int i = 0; i < V::SizeAtCompileTime; ++i) v[i] = take<typename V::Scalar>();
     return v;
   }
-  /// A count of records of at least `record_size` bytes; a wrong one must not make us allocate the machine
-  /// away.
+  /// Reads a count of records of at least `record_size` bytes. A wrong count throws before memory is
+  /// allocated.
   std::size_t take_count(std::size_t record_size) {
     const auto n = take<uint64_t>();
     if (n > bytes_.size() / record_size) throw render::FileError(source_ + ": damaged (bad count)");
     return n;
   }
-  /// Throws if anything is left.
+  /// Throws if data are left.
   void expect_end() const {
     if (!bytes_.empty()) throw render::FileError(source_ + ": damaged (trailing bytes)");
   }

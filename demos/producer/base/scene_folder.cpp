@@ -16,7 +16,7 @@ std::vector<std::filesystem::path> all_folders(const std::filesystem::path& path
   for (const std::string& folder : allowed) {
     std::error_code error;
     if (!std::filesystem::is_directory(folder, error))
-      throw render::FileError(render::escaped(folder) + ": --allow needs a folder, this is none");
+      throw render::FileError(render::escaped(folder) + ": not a folder; --allow needs a folder");
     folders.emplace_back(folder);
   }
   for (const std::filesystem::path& shipped :

@@ -1,6 +1,6 @@
 #pragma once
-/// Where the files of a scene may lie: its own folder, those that come with the program, and those that the
-/// user names with --allow.
+/// Folders that may contain the files of a scene: its own folder, those that come with the program, and those
+/// given by --allow.
 
 #include <filesystem>
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace offstage::producer {
 
-/// The most that a text (a scene, an include, a preset, a file of our own in JSON) may have.
+/// Greatest size of a text (a scene, an include, a preset, a JSON file written by offstage).
 inline constexpr uint64_t kMostTextBytes = uint64_t{256} << 20;
 
 class SceneFolder {
@@ -21,10 +21,10 @@ class SceneFolder {
   const std::filesystem::path& path() const { return path_; }
   const render::InputFolders& inputs() const { return inputs_; }
   std::filesystem::path operator/(const std::filesystem::path& file) const { return path_ / file; }
-  /// What is wrong with a file that is outside of all the folders, symbolic links resolved; empty if it is
-  /// inside.
+  /// Returns an error message for a file outside of all the folders, with symbolic links resolved; empty if
+  /// it is inside.
   std::string wrong_place(const std::filesystem::path& file) const;
-  /// The same, or that there is no regular file. The path may end in #NODE.
+  /// The same, and also an error message if there is no regular file. The path may end in #NODE.
   std::string wrong_file(const std::filesystem::path& file) const;
 
  private:

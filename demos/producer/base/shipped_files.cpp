@@ -1,5 +1,6 @@
 #include "producer/base/shipped_files.h"
 
+#include <cstdlib>
 #include <system_error>
 
 #include "producer/base/version.h"
@@ -11,6 +12,10 @@ namespace fs = std::filesystem;
 
 fs::path shipped_folder(std::string_view installed, std::string_view source) {
   std::error_code error;
+  if (const char* data = std::getenv("OFFSTAGE_DATA"); data && *data) {
+    const fs::path named = fs::path(data) / installed;
+    if (fs::is_directory(named, error)) return named;
+  }
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
   const fs::path beside = program.parent_path().parent_path() / "share/offstage" / installed;
   if (!error && fs::is_directory(beside, error)) return beside;

@@ -20,7 +20,7 @@ SuggestionBudget::~SuggestionBudget() {
 }
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
-  // Optimal string alignment: row i of the table from the two rows before it.
+  // Optimal string alignment: each row of the table follows from the two rows before it.
   std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
   for (std::size_t i = 1; i <= a.size(); ++i) {

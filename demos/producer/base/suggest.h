@@ -1,5 +1,5 @@
 #pragma once
-/// "Did you mean": the nearest of the words that would have been right.
+/// "Did you mean": suggestions for misspelt words.
 
 #include <span>
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace offstage::producer {
 
-/// While one lives, this thread compares a limited number of words, so that a text with very many faults is
-/// refused in a time that grows with its length; then nothing is suggested any more.
+/// During its lifetime, this thread compares a limited number of words, so that the time to refuse a text
+/// with very many errors is proportional to its length. After that no suggestions are made.
 class SuggestionBudget {
  public:
   SuggestionBudget();
@@ -20,14 +20,16 @@ class SuggestionBudget {
   std::size_t before_;
 };
 
-/// Fewest insertions, deletions, replacements and swaps of neighbours that turn one word into the other.
+/// Smallest number of insertions, deletions, replacements and swaps of neighbours that change one word to the
+/// other.
 std::size_t edit_distance(std::string_view a, std::string_view b);
 
-/// The candidate nearest to `word` (the first of equals) if it is near enough to be a slip, else empty.
+/// Returns the candidate nearest to `word` (the first of equals) if it is similar enough for a typing error,
+/// else an empty text.
 std::string nearest(std::string_view word, std::span<const std::string> candidates);
 
-/// "; did you mean 'x'?" if there is a near candidate, else "; known: 'a', 'b'", or `if_none` without any
-/// candidate.
+/// Returns "; did you mean 'x'?" if there is a similar candidate, else "; known: 'a', 'b'", or `if_none`
+/// without candidates.
 std::string suggestion(std::string_view word, std::span<const std::string> candidates,
                        std::string_view if_none = "");
 

@@ -1,5 +1,5 @@
 #pragma once
-/// The simulation computes in double, the renderer in float; this is where numbers change sides.
+/// Conversion from double, which the simulation uses, to float, which the renderer uses.
 
 namespace offstage::producer {
 

@@ -1,5 +1,5 @@
 #pragma once
-/// What ready-made articulations are built from.
+/// Parts of ready-made articulations.
 
 #include <string>
 #include <vector>
@@ -8,13 +8,13 @@
 
 namespace offstage::producer {
 
-/// What an articulation becomes.
+/// The bodies and joints of an articulation.
 struct Parts {
   std::vector<Body> bodies;
   std::vector<Joint> joints;
 };
 
-/// Names bodies and joints after the articulation that they belong to.
+/// Creates bodies and joints with names that begin with the name of the articulation.
 class ArticulationBuilder {
  public:
   ArticulationBuilder(const Where& where, const std::string& name) : where_(where), name_(name) {}

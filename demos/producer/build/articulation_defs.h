@@ -1,5 +1,5 @@
 #pragma once
-/// Ready-made articulations as bodies and joints, and joints as the simulation has them.
+/// Conversion of ready-made articulations to bodies and joints, and of joints to those of the simulation.
 
 #include <vector>
 
@@ -12,7 +12,7 @@ namespace offstage::producer {
 void expand_joints(const Scene& scene, Scene& flat, std::vector<Problem>& errors,
                    std::vector<Problem>& warnings);
 
-/// Without the bodies.
+/// Converts a joint without its bodies.
 sim::JointDef joint_def(const Joint& joint);
 
 }  // namespace offstage::producer

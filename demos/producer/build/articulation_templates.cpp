@@ -8,13 +8,13 @@
 namespace offstage::producer {
 namespace {
 
-/// The name of a body that holds an end; nothing if none does.
+/// Returns the name of the body that holds an end; nothing if there is none.
 std::optional<std::string> holder(const std::string& end) {
   if (end.empty()) return std::nullopt;
   return end == "world" ? std::string() : end;
 }
 
-/// Corners of a polygon of `n` equal sides of length `side`, hanging between two points on a level or slope.
+/// Corners of a polygon of `n` sides of length `side` that hangs between two points at any heights.
 std::vector<Vec3> hanging_nodes(const Vec3& from, const Vec3& to, int n, Real side) {
   const Vec3 across = to - from;
   const Real span = across.norm();
@@ -100,7 +100,7 @@ Parts build(const Bridge& bridge) {
   return std::move(make.parts);
 }
 
-/// Lengths are shares of the height; x to the figure's left, z to its front.
+/// Lengths are shares of the height; x points to the figure's left, z to its front.
 Parts build(const Ragdoll& doll) {
   ArticulationBuilder make(doll.where, doll.name);
   const Real H = doll.height;
@@ -115,12 +115,12 @@ Parts build(const Ragdoll& doll) {
     b.density = doll.density;
   };
   const auto box = [&](Real x, Real y, Real z) { return sim::Box{H * Vec3(x, y, z)}; };
-  /// Between two heights, ends round.
+  /// A limb between two heights with round ends.
   const auto limb = [&](Real top, Real bottom, Real radius) {
     return sim::Capsule{H * radius, H * (top - bottom - 2 * radius)};
   };
-  // The volume of all parts is kVolume H^3. A limp joint's dry friction bears that share of what would hold
-  // the whole figure out by its feet.
+  // The volume of all parts is kVolume H^3. The dry friction of a limp joint can bear the share kLimp of the
+  // torque that would hold the whole figure horizontally at its feet.
   constexpr Real kVolume = 0.0098, kLimp = 0.004, kGravity = 9.81;
   const Real torque = doll.stiffness * kLimp * kVolume * doll.density * H * H * H * kGravity * H;
   const auto join = [&](const std::string& a, const std::string& b, const Vec3& anchor, const Vec3& axis,

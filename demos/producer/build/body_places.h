@@ -1,5 +1,5 @@
 #pragma once
-/// Where bodies are by their names, for what follows them: cameras and lights.
+/// Positions of bodies by their names, for objects attached to them: cameras and lights.
 
 #include <map>
 #include <string>
@@ -19,7 +19,7 @@ class BodyPlaces {
   /// `slot`: in Snapshot::bodies.
   void add_moving(const std::string& name, std::size_t slot) { slots_[name] = slot; }
 
-  /// Throws std::out_of_range for a name that is not known.
+  /// Throws std::out_of_range for an unknown name.
   Eigen::Affine3f at(const std::string& name, const std::vector<BodySample>& moving) const {
     const auto slot = slots_.find(name);
     if (slot == slots_.end()) return fixed_.at(name);

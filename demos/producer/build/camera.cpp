@@ -20,7 +20,7 @@ Real vertical_fov_deg(const Lens& lens, const Eigen::Vector2i& size) {
   return 2 * std::atan(kHalfWidth_mm / *lens.focal_mm * size.y() / size.x()) / kRadians;
 }
 
-/// Half the sizes of the box around a shape.
+/// Half the size of the box around a shape.
 Vec3 half_extent(const sim::Sphere& s, const ModelLibrary&) {
   return Vec3::Constant(s.radius);
 }
@@ -45,7 +45,7 @@ Eigen::AlignedBox3f box_of(const Body& body, const ModelLibrary& models) {
   return {(body.position - reach).cast<float>(), (body.position + reach).cast<float>()};
 }
 
-/// The value of keys that may leave it to the lens.
+/// The value of keys that may be left to the lens.
 template <class Value>
 Vec3 follow_keys(const KeyframedCamera& camera, double time, Value&& value) {
   sim::KeyframeTrack track{.keys = {}, .interpolation = camera.interpolation};
@@ -107,7 +107,7 @@ render::Camera CameraRig::at(double time, const BodyPlaces& places,
       scene_.camera);
   if (!lens.look_at.empty()) view.target = place(lens.look_at);
   if (!fitted_.isEmpty()) {
-    // The ball around them touches the nearer sides of the picture.
+    // The ball around the bodies touches the nearer sides of the picture.
     const Real aspect = Real(scene_.render.size.x()) / scene_.render.size.y();
     const Real half = std::atan(std::tan(0.5 * view.fov_deg * kRadians) * std::min(1.0, aspect));
     const Real distance = 0.5 * static_cast<Real>(fitted_.diagonal().norm()) / std::sin(half);

@@ -1,5 +1,5 @@
 #pragma once
-/// From a scene's camera to the view of a moment.
+/// Converts the camera of a scene to the view at a time.
 
 #include <vector>
 
@@ -17,7 +17,7 @@ class CameraRig {
 
  private:
   const Scene& scene_;
-  Eigen::AlignedBox3f fitted_;  ///< of the bodies that are to fill the picture; empty: none are
+  Eigen::AlignedBox3f fitted_;  ///< box of the bodies that are to fill the picture; empty if there are none
 };
 
 }  // namespace offstage::producer

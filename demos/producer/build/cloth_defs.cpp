@@ -49,7 +49,7 @@ uint32_t nearest_vertex(const std::vector<Vec3>& places, const Vec3& point) {
   return static_cast<uint32_t>(std::ranges::min_element(places, nearer) - places.begin());
 }
 
-/// Places along the two longest directions of the box around.
+/// Coordinates along the two longest directions of the bounding box.
 std::vector<Vector2f> projected(const std::vector<Vec3>& places) {
   sim::Aabb box;
   for (const Vec3& p : places) box.extend(p);
@@ -62,15 +62,15 @@ std::vector<Vector2f> projected(const std::vector<Vec3>& places) {
   return uvs;
 }
 
-/// The texture coordinates of a model in metres, as long on the whole as what they stand for; empty if it has
-/// none for every triangle.
+/// The texture coordinates of a model in metres, scaled to the mean length of its edges; empty if some
+/// triangle has none.
 std::vector<Vector2f> model_uvs(const render::Model& model, const sim::ClothDef& def) {
   std::vector<Vector2f> corners;
   for (const render::Model::Part& part : model.parts) {
     if (part.mesh.uvs.size() != part.mesh.positions.size()) return {};
     for (const uint32_t index : part.mesh.indices) corners.push_back(part.mesh.uvs[index]);
   }
-  if (corners.size() != 3 * def.triangles.size()) return {};  // some were left out when it was welded
+  if (corners.size() != 3 * def.triangles.size()) return {};  // some triangles were removed by welding
   std::vector<Vector2f> uvs(def.vertices.size(), Vector2f::Zero());
   double in_space = 0, in_plane = 0;
   for (std::size_t i = 0; i < corners.size(); ++i) {

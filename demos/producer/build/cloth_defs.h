@@ -1,5 +1,6 @@
 #pragma once
-/// Cloths of a scene as the simulation takes them, as they lie flat, and how their fabrics look.
+/// Conversion of a scene's cloths to those of the simulation, in their flat state, and the look of their
+/// fabrics.
 
 #include <optional>
 #include <string>
@@ -14,39 +15,39 @@
 
 namespace offstage::producer {
 
-/// Most vertices of a cloth.
+/// Greatest number of vertices of a cloth.
 inline constexpr std::size_t kMaxClothVertices = 250'000;
 
 /// A cloth in its own frame, and placed in the world.
 struct FlatCloth {
   sim::ClothDef def;                 ///< without pins, which need the bodies
-  std::vector<Vec3> places;          ///< of its vertices in its own frame [m]
-  std::vector<Eigen::Vector2f> uvs;  ///< along it [m]
+  std::vector<Vec3> places;          ///< positions of its vertices in its own frame [m]
+  std::vector<Eigen::Vector2f> uvs;  ///< coordinates along the cloth [m]
 
   std::vector<uint32_t> triangles() const;  ///< three vertices each
 };
 
-/// `model`: of a mesh, else null. Throws std::invalid_argument for a shape or a fabric that cannot be.
+/// `model`: that of a mesh, otherwise null. Throws std::invalid_argument for an impossible shape or fabric.
 FlatCloth flat_cloth(const Cloth& cloth, const render::Model* model);
 
-/// The fabric a cloth is made of, with its changes. Throws std::invalid_argument if there is none of that
-/// name.
+/// Returns the fabric of a cloth with its changes. Throws std::invalid_argument for an unknown name.
 effects::Fabric fabric_of(const Cloth& cloth);
 /// Names of all fabrics.
 std::vector<std::string> fabric_names();
 
-/// The vertices that a pin holds, which may be none. Throws std::invalid_argument for a side or corner of
-/// what is no grid.
+/// Returns the vertices held by a pin, possibly none. Throws std::invalid_argument for a side or corner of a
+/// cloth that is not a grid.
 std::vector<uint32_t> pinned_vertices(const ClothPin& pin, const Cloth& cloth, const FlatCloth& flat);
 const PinScope& scope_of(const ClothPin& pin);
-/// The pairs of vertices that a seam joins. Throws std::invalid_argument if its sides differ in length, or
-/// are no grid's.
+/// Returns the pairs of vertices that a seam joins. Throws std::invalid_argument if its sides differ in
+/// length, or are not those of a grid.
 std::vector<sim::ClothSeam> sewn_vertices(const ClothSeam& seam, const Cloth& cloth, const FlatCloth& flat);
 
-/// The look of a cloth without a material, and what materials without a fabric take from it.
+/// Returns the look of a cloth without a material; materials without a fabric use its fabric.
 render::Material fabric_look(const std::string& fabric);
 
-/// Why an explicit integrator cannot step a cloth of this scene, naming the spring and the longest step.
+/// Returns why an explicit integrator is unstable for a cloth of this scene, with the spring and the longest
+/// step.
 std::optional<std::string> too_stiff(const Scene& scene, const sim::ClothDef& cloth);
 
 }  // namespace offstage::producer

@@ -11,13 +11,13 @@
 namespace offstage::producer {
 namespace {
 
-/// A new version whenever decompose() answers differently.
+/// Increase the version whenever decompose() gives other results.
 constexpr FileKind kPartsKind = {"offparts", 2, "convex decomposition"};
 
 using sim::ConvexDecomposition;
 using sim::ConvexPolyhedron;
 
-/// `mesh_hash` is in the file, too: one that was renamed is not taken for that of another mesh.
+/// `mesh_hash` is stored in the file, so that a renamed file is not used for another mesh.
 std::vector<uint8_t> serialize(const ConvexDecomposition& d, const XXH128_hash_t& mesh_hash) {
   ByteWriter out;
   out.put(uint64_t{mesh_hash.low64});
@@ -85,7 +85,7 @@ std::optional<ConvexDecomposition> read_kept(const std::filesystem::path& path,
   try {
     return decomposition_from(read_file(path), path.string(), mesh_hash);
   } catch (const render::FileError&) {
-  } catch (const std::invalid_argument&) {  // faces that do not close
+  } catch (const std::invalid_argument&) {  // the faces are not closed
   }
   return std::nullopt;
 }

@@ -1,7 +1,7 @@
 #pragma once
-/// Convex decompositions kept on disk from run to run, because making them is slow. A file is named by the
-/// hash of the mesh and of the settings, so that a changed model never meets a stale one, and holds every bit
-/// of the result, so that a run with the cache has the same bits as one without.
+/// Convex decompositions stored on disk between runs, because computing them is slow. A file is named by the
+/// hash of the mesh and of the settings, so a changed model never uses an outdated file. It contains every
+/// bit of the result, so a run with the cache gives the same bits as one without.
 
 #include <filesystem>
 
@@ -11,18 +11,18 @@ namespace offstage::producer {
 
 class DecompositionCache {
  public:
-  /// In a folder; it is made when there is something to keep.
+  /// Uses a folder, which is created when the first result is stored.
   explicit DecompositionCache(std::filesystem::path folder) : folder_(std::move(folder)) {}
-  /// Keeps nothing.
+  /// Stores nothing.
   DecompositionCache() = default;
-  /// In $XDG_CACHE_HOME/offstage, else $HOME/.cache/offstage; keeps nothing if neither is set.
+  /// Uses $XDG_CACHE_HOME/offstage, else $HOME/.cache/offstage; stores nothing if neither is set.
   static DecompositionCache of_user();
 
-  /// From disk, or made and kept. A file that is damaged is made again; a folder that cannot be written to is
-  /// not an error, for the cache only saves time.
+  /// Returns a decomposition from the disk, or computes and stores it. A damaged file is computed again. A
+  /// folder that cannot be written to is not an error, because the cache only saves time.
   sim::ConvexDecomposition decompose(const sim::TriangleMesh& mesh) const;
 
-  /// Where a mesh's decomposition is, or would be, kept; empty if nothing is.
+  /// File of a mesh's decomposition, whether it exists or not; empty if nothing is stored.
   std::filesystem::path file(const sim::TriangleMesh& mesh) const;
 
  private:

@@ -9,7 +9,7 @@
 namespace offstage::producer {
 namespace {
 
-/// What all definitions of newborns have in common.
+/// Sets the parameters that all definitions of new particles have in common.
 template <class Def>
 Def newborn_def(const ParticleSource& source, const std::string& name, uint64_t seed) {
   Def def;
@@ -45,7 +45,7 @@ effects::EmitterSurface surface_of(const MeshSurface& s) {
 
 // --- Bounds ---
 
-/// An unclipped normal distribution cut off far out, so that it has ends.
+/// Bounds an unclipped normal distribution far from its mean.
 void bound(Varying& v) {
   constexpr Real kDeviations = 4;
   auto* normal = std::get_if<effects::Normal>(&v);
@@ -55,12 +55,12 @@ void bound(Varying& v) {
 }
 constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max();
 
-/// How often a particle hits something in its life, as a guess.
+/// Estimated number of collisions of a particle in its life.
 Real expected_hits(const ParticleSource& source) {
   return source.behaviour.dies_on_hit ? 1 : 4;
 }
 
-/// Both with and without the limits on the living.
+/// With and without the limits on living particles.
 struct Bounds {
   effects::WorstCase possible, limited;
 };
@@ -88,7 +88,8 @@ Bounds bounds_of_emitter(const Emitter& emitter, Real film_end) {
   effects::EmitterDef def = emitter_def(emitter, 0);
   for (Varying* v : {&def.rate, &def.count, &def.interval, &def.lifespan, &def.radius}) bound(*v);
   for (effects::Burst& burst : def.bursts) bound(burst.count);
-  // The triangles of a model are not read yet. As for the count, newborns on one may have to wait.
+  // The triangles of a model are not read yet. For the count this does not matter; particles on a model may
+  // be postponed.
   if (def.surface.kind == effects::SurfaceKind::mesh)
     def.surface = {.kind = effects::SurfaceKind::sphere, .radius = 1e-9};
   return bounds_of(def, nullptr, film_end);

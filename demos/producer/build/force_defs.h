@@ -1,5 +1,5 @@
 #pragma once
-/// Forces of a scene as definitions of the simulation.
+/// Conversion of a scene's forces to definitions of the simulation.
 
 #include <string>
 #include <vector>
@@ -9,10 +9,10 @@
 
 namespace offstage::producer {
 
-/// Without what it acts on.
+/// Without the objects on which it acts.
 sim::ForceDef force_def(const Force& force);
 
-/// Names of what a force acts on.
+/// Names of the objects on which a force acts.
 struct ForceTargets {
   std::vector<std::string> bodies, particles, cloths;
 };

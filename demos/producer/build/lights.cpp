@@ -8,7 +8,7 @@
 namespace offstage::producer {
 namespace {
 
-/// What the ground plane sends back of the light, if there is one that is seen.
+/// Albedo of the ground plane, if there is a visible one.
 std::optional<Eigen::Vector3f> ground_albedo(const Scene& scene) {
   for (const Body& body : scene.bodies) {
     if (!std::holds_alternative<sim::Plane>(body.shape) || !body.visible) continue;

@@ -1,5 +1,5 @@
 #pragma once
-/// From a scene's lights and air to those of the stage.
+/// Conversion of a scene's lights and environment to those of the stage.
 
 #include <vector>
 
@@ -9,7 +9,7 @@
 
 namespace offstage::producer {
 
-/// The sun, or none: a sun without light.
+/// The sun; without one, a sun of intensity 0.
 render::Sun sun_of(const Scene& scene);
 render::Environment environment_of(const Scene& scene);
 /// The other lights at a time, in scene order.

@@ -10,8 +10,8 @@ using sim::Vec3;
 
 namespace {
 
-constexpr float kHeadWidth = 5;     // of an arrow, in widths of its shaft
-constexpr Real kHeadLength = 0.35;  // share of the arrow
+constexpr float kHeadWidth = 5;     // width of an arrow's head, in widths of its shaft
+constexpr Real kHeadLength = 0.35;  // length of the head as a share of the arrow
 
 }  // namespace
 

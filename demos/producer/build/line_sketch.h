@@ -1,5 +1,5 @@
 #pragma once
-/// What overlays draw with: lines, rings, dots and arrows in the world, and colours that tell things apart.
+/// Drawing tools of overlays: lines, rings, dots and arrows in the world, and distinct colours.
 
 #include <cstdint>
 
@@ -10,17 +10,17 @@
 
 namespace offstage::producer {
 
-/// A linear colour of given hue, one turn being all round the circle. Hues look equally bright (Ottosson, "A
+/// A linear colour of the given hue; one turn is the full circle. Hues look equally bright (Ottosson, "A
 /// perceptual color space for image processing", 2020).
 Eigen::Vector3f hue_color(double turns);
-/// Colours of consecutive numbers are far apart, and so are those of numbers near each other: hues by the
-/// golden section.
+/// Colours of neighbouring numbers are very different: hues by the golden ratio.
 Eigen::Vector3f distinct_color(std::size_t i);
 
-/// Collects the lines of one overlay. Those of the same object, added in the same order, have the same ids.
+/// Collects the lines of one overlay. The lines of an object that are added in the same order have the same
+/// ids.
 class LineSketch {
  public:
-  /// Begins the lines of an object, known by a number of its own.
+  /// Begins the lines of an object with a unique number.
   void object(uint64_t id);
 
   void line(const sim::Vec3& a, const sim::Vec3& b, const Eigen::Vector4f& color, float width_a = 1,

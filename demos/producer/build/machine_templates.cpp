@@ -10,7 +10,7 @@ namespace {
 constexpr Real kGravity = 9.81;
 constexpr Real kDegrees = 180 / std::numbers::pi;
 
-/// A motor that follows keys smoothly and firmly, or as firmly as its effort allows.
+/// A motor that follows keys smoothly, held rigidly within its maximum effort.
 JointMotor follow(sim::Motor::Mode mode, const std::vector<MotorKey>& keys,
                   std::optional<Real> max_effort = {}) {
   return {.mode = mode, .keys = keys, .smooth = true, .max_effort = max_effort};
@@ -21,7 +21,7 @@ std::vector<MotorKey> mapped(std::vector<MotorKey> keys, auto&& value) {
   return keys;
 }
 
-/// A part of a machine that stands somewhere: places and directions are the machine's own.
+/// A part of a machine at some pose: positions and directions are in the machine's frame.
 class MachineBuilder {
  public:
   template <class Machine>
@@ -64,13 +64,13 @@ class MachineBuilder {
 
 }  // namespace
 
-/// The chassis is low and narrow, for the wheels to turn beside it; the body is over them. Each wheel hangs
-/// on a hub that slides up and down on a spring, the front ones with a knuckle between that steers.
+/// The chassis is low and narrow, so that the wheels can turn beside it; the body is above them. Each wheel
+/// is on a hub that slides up and down on a spring, the front wheels with a steering knuckle between.
 Parts build(const Vehicle& car) {
   using enum sim::JointType;
   MachineBuilder make(car);
   const Real r = car.wheel_radius, tread = 0.55 * r, L = car.length, W = car.width;
-  const Real track = W - tread, base = 0.62 * L;  // between the middles of the wheels
+  const Real track = W - tread, base = 0.62 * L;  // distances between the centres of the wheels
   const Real travel = 0.3 * r, hub_mass = 0.01 * car.mass, wheel_mass = 0.025 * car.mass;
   const Real sprung = car.mass - 4 * (hub_mass + wheel_mass) - 2 * hub_mass;
 
@@ -99,7 +99,7 @@ Parts build(const Vehicle& car) {
       inside(make.box(hub, car.trim, size, hub_mass, centre));
       Joint& spring = make.join(prismatic, hub, hub, "chassis", centre);
       spring.behaviour.limits = std::array{-travel, travel};
-      // Bears the car's weight on Earth, which it is built for.
+      // Supports the car's weight with gravity on Earth.
       spring.behaviour.motor = JointMotor{.mode = sim::Motor::Mode::position,
                                           .target = -load * kGravity / stiffness,
                                           .stiffness = stiffness,
@@ -144,7 +144,7 @@ Parts build(const Crane& crane) {
   Joint& way = make.join(prismatic, "way", "trolley", "jib", start, Vec3::UnitX());
   way.behaviour.motor = follow(sim::Motor::Mode::position, crane.trolley);
 
-  const Real side = crane.load_size, hook = 0.45 * H;  // the load's top
+  const Real side = crane.load_size, hook = 0.45 * H;  // top of the load
   make.box("load", crane.load, Vec3::Constant(side), crane.load_mass, {start.x(), hook - side / 2, 0});
   Joint& rope = make.join(distance, "rope", "load", "trolley", {start.x(), hook, 0});
   rope.anchor_b = make.place({start.x(), start.y() - 0.3 * beam, 0});

@@ -8,8 +8,8 @@
 
 namespace offstage::producer {
 
-/// Reads the links of the scene's model trees from their files, relative to `folder`. What cannot be read
-/// goes to `errors`.
+/// Reads the links of the scene's model trees from their files, relative to `folder`. Errors are added to
+/// `errors`.
 void read_links(Scene& scene, const SceneFolder& folder, std::vector<Problem>& errors);
 
 }  // namespace offstage::producer

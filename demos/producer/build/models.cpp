@@ -32,7 +32,8 @@ void add_to(XXH3_state_t* hash, const render::Image& image) {
   add_to(hash, image.rgba);
 }
 
-/// All that was read, from the model's own file and from those it refers to (materials, textures).
+/// Adds all data read from the model's own file and from the files to which it refers (materials, textures)
+/// to the digest.
 void add_to(XXH3_state_t* hash, const render::Model& model) {
   for (const render::Model::Part& part : model.parts) {
     XXH3_128bits_update(hash, &part.material, sizeof part.material);
@@ -58,7 +59,7 @@ void add_to(XXH3_state_t* hash, const render::Model& model) {
   for (const render::Image& texture : model.textures) add_to(hash, texture);
 }
 
-/// Every file a scene names, with the first place that names it.
+/// All files named by a scene, with the first place that names each.
 struct Files {
   std::map<std::string, Where> models, textures;
 };
@@ -79,8 +80,8 @@ Files files_of(const Scene& scene) {
   return files;
 }
 
-/// Bodies whose convex parts something needs, with the first place that does: collisions with a body that
-/// moves by forces, or an overlay.
+/// Bodies whose convex parts are needed, for collisions with a dynamic body or for an overlay, with the first
+/// place that needs them.
 std::map<std::string, Where> bodies_in_parts(const Scene& scene) {
   std::map<std::string, Where> names;
   const auto need = [&](const std::string& body, const Where& where) { names.emplace(body, where); };
@@ -163,7 +164,7 @@ void ModelLibrary::decompose_models(const Scene& scene, const DecompositionCache
       if (on_step) on_step("");
     }
     const sim::ConvexDecomposition& parts = parts_.at(mesh->file);
-    // What stands still collides with its triangles then.
+    // A body that is not dynamic then collides by its triangles.
     const bool matters = body.motion == sim::MotionType::dynamic;
     if (matters && !parts.note.empty() && warned.insert(mesh->file).second)
       warnings.push_back({need->second, mesh->file + ": the convex parts are approximate: " + parts.note});

@@ -19,24 +19,24 @@ namespace offstage::producer {
 class ModelLibrary {
  public:
   ModelLibrary() = default;
-  /// Told what the next step of some seconds is, and "" at its end. May throw to stop the work.
+  /// Called with a description of the next step that takes seconds, and with "" at its end. May throw to stop
+  /// the work.
   using StepCallback = std::function<void(const std::string& step)>;
 
   /// Reads every model and texture that the (flat) scene names, relative to `folder` (or see `model_file`),
-  /// and cuts models into convex parts where collisions of bodies or an overlay need that. Throws SceneError
-  /// with every file that cannot be used; what was repaired in a model or is only approximately right is
-  /// added to `warnings`.
+  /// and decomposes models into convex parts where collisions of bodies or an overlay need them. Throws
+  /// SceneError with every unusable file; repairs of a model and approximations are added to `warnings`.
   ModelLibrary(const Scene& scene, const SceneFolder& folder, const DecompositionCache& cache,
                std::vector<Problem>& warnings, const StepCallback& on_step = {});
 
   const render::Model& model(const std::string& file) const { return models_.at(file); }
-  /// The convex parts of a model at its own scale, or null if nothing needs them.
+  /// The unscaled convex parts of a model, or null if they are not needed.
   const sim::ConvexDecomposition* parts(const std::string& file) const {
     const auto it = parts_.find(file);
     return it == parts_.end() ? nullptr : &it->second;
   }
   const render::Image& texture(const std::string& file) const { return textures_.at(file); }
-  /// A model that was cut into convex parts, and the time that this took (little if they were kept on disk).
+  /// A model that was decomposed into convex parts, and the time this took (short if they were on disk).
   struct Decomposed {
     std::string file;
     std::size_t triangles = 0, parts = 0;
@@ -44,7 +44,7 @@ class ModelLibrary {
   };
   const std::vector<Decomposed>& decomposed() const { return decomposed_; }
 
-  /// Digest of everything that was read, so that a run knows when a file changed.
+  /// Digest of all data read, so that a run detects when a file changed.
   const std::string& digest() const { return digest_; }
 
  private:

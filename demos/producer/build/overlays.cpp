@@ -17,14 +17,14 @@ using Edges = std::vector<std::pair<Vec3, Vec3>>;
 
 constexpr Real kTrailStep = 1.0 / 120;        // [s]
 constexpr float kDotWidth = 4;                // in widths of a line
-constexpr Real kShortestArrow = 5e-3;         // [m]; a shorter one would be a blot
-constexpr uint64_t kByGeometry = 1ull << 63;  // in the ids of contacts
+constexpr Real kShortestArrow = 5e-3;         // [m]; a shorter one would be unrecognisable
+constexpr uint64_t kByGeometry = 1ull << 63;  // flag in the ids of contacts
 
 sim::Pose relative(const sim::Pose& a, const sim::Pose& b) {
   return {a.point_to_body(b.position), a.orientation.conjugate() * b.orientation};
 }
 
-/// The light of a colour as bright as if the sun shone on it.
+/// Radiance of a colour as bright as in sunlight.
 Vector4f light(const Vector4f& color) {
   constexpr float kSunlit = 3;
   return {kSunlit * color.x(), kSunlit * color.y(), kSunlit * color.z(), color.w()};
@@ -67,7 +67,7 @@ Edges edges_of(const sim::BoundingSphere& ball) {
 
 // --- Contacts ---
 
-/// The outline of a patch of contact: its points in order around their middle.
+/// Draws the outline of a contact patch: its points in order around their centre.
 void draw_patch(const std::vector<Vec3>& points, const Vec3& normal, const Vector4f& color,
                 LineSketch& sketch) {
   if (points.size() < 2) return;
@@ -81,7 +81,7 @@ void draw_patch(const std::vector<Vec3>& points, const Vec3& normal, const Vecto
     sketch.line(around[i].second, around[(i + 1) % around.size()].second, color);
 }
 
-/// A point of contact with an arrow from it.
+/// Draws a contact point with an arrow.
 void draw_point(const Vec3& p, const Vec3& normal, const Vec3& arrow, Real size, const Vector4f& color,
                 LineSketch& sketch) {
   sketch.ring(p, normal, size, color);
@@ -106,9 +106,9 @@ uint64_t pair_id(sim::BodyHandle a, sim::BodyHandle b) {
   return (uint64_t{a.index} << 40) ^ (uint64_t{b.index} << 16);
 }
 
-/// The simulation's contacts between any two bodies, or between two given ones, by pair. Those of a pair are
-/// in an order that goes with the body: the points come in that of their depth, which may change while they
-/// stay.
+/// The simulation's contacts between all bodies, or between two given ones, by pair. The contacts of a pair
+/// are sorted by their position on the body. Their original order is by depth, which may change while the
+/// points stay.
 std::vector<sim::ContactState> contacts_of(const sim::World& world, sim::BodyHandle a, sim::BodyHandle b) {
   std::vector<sim::ContactState> contacts = world.contacts();
   if (a)
@@ -126,7 +126,7 @@ std::vector<sim::ContactState> contacts_of(const sim::World& world, sim::BodyHan
 
 }  // namespace
 
-/// Makes what the overlays of one scene draw from.
+/// Prepares the data that the overlays of one scene draw.
 struct Overlays::Builder {
   const Scene& scene;
   const sim::World& world;
@@ -226,8 +226,7 @@ struct Overlays::Builder {
         tree.volumes.push_back({static_cast<int>(level), leaf, edges_of(volume)});
     });
   }
-  /// Whether bodies can touch of which the simulation knows no contacts: at least one moves, and none by
-  /// forces.
+  /// Whether bodies may touch without contacts in the simulation: at least one moves, and neither is dynamic.
   static bool touch_by_geometry(const Body& a, const Body& b) {
     using enum sim::MotionType;
     const auto is_plane = [](const Body& body) { return std::holds_alternative<sim::Plane>(body.shape); };
@@ -306,7 +305,7 @@ LineSet Overlays::draw(const TreeLines& tree, const sim::World& world) {
 LineSet Overlays::draw(const ClosestLines& closest, const sim::World& world) {
   const auto [first, second] = closest.pair;
   const sim::Pose a = world.body(first->body).pose, b = world.body(second->body).pose;
-  sim::PairCache cache;  // a fresh one each time: what is seen does not depend on the frames before
+  sim::PairCache cache;  // a new cache each time, so that the picture does not depend on earlier frames
   const auto found = sim::separation(*first->collision, *second->collision, relative(a, b), cache);
   if (!found) return {};
   const bool apart = found->distance >= 0;
@@ -363,7 +362,7 @@ LineSet Overlays::draw(const VelocityLines& velocities, const sim::World& world)
 }
 
 LineSet Overlays::draw(const IslandLines& islands, const sim::World& world) {
-  // A group has the colour of its first body, so that it keeps it while others come and go.
+  // A group has the colour of its first body, so that it keeps its colour when other bodies come and go.
   std::map<uint32_t, std::size_t> first;
   LineSketch sketch;
   for (std::size_t i = 0; i < islands.bodies.size(); ++i) {
@@ -438,7 +437,7 @@ LineSet Overlays::draw(const ClothLines& cloths, const sim::World& world) {
     for (uint32_t t = 0; t < cloth.triangles.size(); ++t) {
       for (uint32_t k = 0; k < 3; ++k) {
         const uint32_t a = cloth.triangles[t][k], b = cloth.triangles[t][(k + 1) % 3];
-        if (a > b) continue;  // of the two triangles at an edge one draws it
+        if (a > b) continue;  // only one of the two triangles at an edge draws it
         const Real length = (rest[cloth.sources[a]] - rest[cloth.sources[b]]).norm();
         const Real strain = (cloth.points[a] - cloth.points[b]).norm() / length - 1;
         const Real share = std::clamp(strain / cloths.overlay->strain, 0.0, 1.0);

@@ -1,6 +1,6 @@
 #pragma once
-/// The simulation side of overlays: bounding trees, closest points, contacts, velocities and groups of
-/// bodies, and the strain of cloths, as lines in the world. They look at the world and never change it.
+/// The simulation side of overlays: bounding trees, closest points, contacts, velocities and islands of
+/// bodies, and the strain of cloths, as lines in the world. They only read the world.
 
 #include <deque>
 #include <map>
@@ -26,10 +26,10 @@ class Overlays {
   Overlays(const Scene& scene, const sim::World& world, const BodiesByName& bodies,
            const ClothsByName& cloths);
 
-  /// What each overlay shows of the world as it is now, in scene order; nothing for the parts of bodies,
-  /// which are no lines.
+  /// Returns the lines of each overlay for the current state of the world, in scene order; none for the parts
+  /// of bodies, which are not lines.
   std::vector<LineSet> lines(const sim::World& world) const;
-  /// To be called as time goes on, for what shows the past.
+  /// Must be called as time advances, for overlays of past states.
   void record(const sim::World& world);
 
  private:
@@ -44,13 +44,13 @@ class Overlays {
     sim::BodyHandle body;
     std::vector<Volume> volumes;
   };
-  /// A body as the narrow phase sees it.
+  /// A body as used by the narrow phase.
   struct Collider {
     sim::BodyHandle body;
     sim::Shape shape;
     std::optional<sim::CollisionShape> collision;
   };
-  /// Not both are planes; if one is, it is the second.
+  /// At most one is a plane; it is the second.
   struct ColliderPair {
     const Collider *a, *b;
   };
@@ -60,8 +60,8 @@ class Overlays {
   };
   struct ContactLines {
     const ContactsOverlay* overlay;
-    sim::BodyHandle a, b;             // of the simulation's contacts those of these; null: all
-    std::vector<ColliderPair> pairs;  // of which the simulation knows no contacts
+    sim::BodyHandle a, b;             // only the simulation's contacts of these bodies; null: all
+    std::vector<ColliderPair> pairs;  // pairs without contacts in the simulation
   };
   struct VelocityLines {
     const VelocitiesOverlay* overlay;

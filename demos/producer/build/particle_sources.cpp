@@ -12,8 +12,8 @@ effects::RampKind ramp_kind(const ParticleLook& look) {
   return look.ramp;
 }
 
-/// The colours of a glowing body along a ramp of temperatures. Between two keys they do not change evenly, so
-/// the ramp of colours has more.
+/// The colours of a glowing body along a ramp of temperatures. Colour is not linear between two temperatures,
+/// so the ramp of colours has more keys.
 effects::ColorRamp glow_of(const std::vector<std::pair<Real, Real>>& kelvin) {
   constexpr int kSteps = 16;
   const auto hottest = static_cast<float>(
@@ -37,7 +37,7 @@ effects::ColorRamp glow_of(const std::vector<std::pair<Real, Real>>& kelvin) {
   return ramp;
 }
 
-/// Runs `add`, turning the library's refusal into a problem at the place in the scene.
+/// Runs `add`, and converts the library's exception to a problem at the place in the scene.
 template <class F>
 void at_source(const Where& where, F&& add) {
   try {

@@ -1,6 +1,6 @@
 #pragma once
-/// The emitters of a simulation at work, with all that is born from their particles: builds their systems,
-/// releases particles, and gives the points to draw.
+/// The emitters of a simulation, with all their child particles: builds their systems, releases particles,
+/// and returns the points to draw.
 
 #include <cstdint>
 #include <deque>
@@ -19,12 +19,12 @@
 
 namespace offstage::producer {
 
-/// Colour and size of a look, made ready for many particles.
+/// Colour and size of a look, prepared for many particles.
 class LookRamps {
  public:
   LookRamps(const ParticleLook& look, uint64_t seed, const std::string& name);
 
-  /// How the particles look now. `places`: those of a group, which may have colours of their own.
+  /// Current look of the particles. `places`: those of a group, which may have individual colours.
   PointSet points(const sim::ParticleArrays& particles, const std::vector<ParticlePlace>* places) const;
 
  private:
@@ -36,20 +36,20 @@ class LookRamps {
 
 class ParticleSources {
  public:
-  /// Finds the body of that name; null for an empty one.
+  /// Returns the body with this name; null for an empty name.
   using FindBody = std::function<sim::BodyHandle(const std::string&)>;
 
-  /// Throws SceneError for an emitter that cannot emit.
+  /// Throws SceneError for an emitter with invalid parameters.
   ParticleSources(const Scene& scene, const ModelLibrary& models, sim::World& world, const FindBody& body);
 
-  /// How long before time 0 the first particles are born [s].
+  /// Time before 0 at which the first particles are created [s].
   Real prewarm() const;
 
-  /// To be called before each sub-step.
+  /// Must be called before each sub-step.
   void emit(sim::World& world, Real start, Real end);
 
   struct Counts {
-    uint64_t waiting = 0;  ///< particles that had to wait for room
+    uint64_t waiting = 0;  ///< particles that were postponed for lack of room
     uint64_t skipped = 0;  ///< not released because of a limit
   };
   Counts counts() const;

@@ -5,6 +5,7 @@
 #include "effects/distribution.h"
 #include "producer/base/to_float.h"
 #include "producer/build/cloth_defs.h"
+#include "producer/build/drawn_objects.h"
 #include "producer/build/lights.h"
 #include "producer/build/line_sketch.h"
 #include "producer/build/particle_sources.h"
@@ -19,40 +20,12 @@ namespace {
 using Eigen::Affine3f;
 using Eigen::Vector3f;
 
-/// Half the edge of the square that stands for an infinite plane [m]: from 300 m up, it still reaches to
-/// where its horizon hides it.
-constexpr float kGroundHalfSize = 256'000;
-constexpr float kGroundTexture_m = 2000;  // of one copy of its texture
-
 Affine3f affine(const Vec3& position, const Quat& orientation, Real scale = 1) {
   return Eigen::Translation3f(position.cast<float>()) * orientation.cast<float>() *
          Eigen::Scaling(to_float(scale));
 }
 
-/// The mesh of a primitive, and the numbers that tell it from others. Boxes get a small bevel, so that their
-/// edges catch light.
-render::Mesh mesh_of(const sim::Sphere& s) {
-  return render::make_sphere(to_float(s.radius));
-}
-render::Mesh mesh_of(const sim::Box& s) {
-  return render::make_box(s.size.cast<float>(), 0.04f * to_float(s.size.minCoeff()));
-}
-render::Mesh mesh_of(const sim::Capsule& s) {
-  return render::make_capsule(to_float(s.radius), to_float(s.height));
-}
-render::Mesh mesh_of(const sim::Cylinder& s) {
-  return render::make_cylinder(to_float(s.radius), to_float(s.height));
-}
-render::Mesh mesh_of(const sim::Cone& s) {
-  return render::make_cone(to_float(s.radius), to_float(s.height));
-}
-render::Mesh mesh_of(const sim::Plane&) {
-  render::Mesh ground = render::make_ground(kGroundHalfSize);
-  for (Eigen::Vector2f& uv : ground.uvs)
-    uv = (uv.array() - 0.5f) * (2 * kGroundHalfSize / kGroundTexture_m) + 0.5f;
-  return ground;
-}
-
+/// The numbers that distinguish the mesh of a primitive from others.
 std::vector<float> shape_key(const sim::Sphere& s) {
   return {0, to_float(s.radius)};
 }
@@ -77,16 +50,6 @@ const PartsOverlay* parts_overlay(const Scene& scene, const std::string& body) {
   for (const Overlay& overlay : scene.overlays)
     if (const auto* parts = std::get_if<PartsOverlay>(&overlay); parts && parts->body == body) return parts;
   return nullptr;
-}
-
-render::Mesh mesh_of(const sim::ConvexPolyhedron& part) {
-  const sim::TriangleMesh triangles = part.triangles();
-  render::Mesh mesh;
-  for (const Vec3& v : triangles.vertices) mesh.positions.push_back(v.cast<float>());
-  for (const sim::Triangle& t : triangles.triangles)
-    mesh.indices.insert(mesh.indices.end(), t.begin(), t.end());
-  render::compute_normals(mesh, 20);
-  return mesh;
 }
 
 std::string name_or(const std::string& name, const char* kind, uint32_t id) {
@@ -154,58 +117,18 @@ render::PointsHandle Picture::add_blur_streaks(const ParticleLook& look) {
   return stage_.add_points(def);
 }
 
-render::Material Picture::material_named(const std::string& name, const ModelLibrary& models,
-                                         std::vector<render::Image>& textures) const {
-  render::Material m;
-  const auto it = std::ranges::find(scene_.materials, name, &Material::name);
-  if (it != scene_.materials.end()) {
-    m = {.name = it->name,
-         .color = it->color.rgba,
-         .metallic = to_float(it->metallic),
-         .roughness = to_float(it->roughness),
-         .emission = it->emission.rgb() * to_float(it->emission_strength),
-         .transmission = to_float(it->transmission),
-         .refraction = to_float(it->refraction),
-         .pattern = it->pattern,
-         .pattern_color = it->pattern_color.rgb(),
-         .pattern_scale = to_float(it->pattern_scale),
-         .two_sided = it->two_sided};
-    if (!it->texture.empty()) {
-      textures.push_back(models.texture(it->texture));
-      m.base_color_texture = 0;
-    }
-  }
-  return m;
-}
-
 render::MaterialHandle Picture::material(const std::string& name, const ModelLibrary& models) {
   if (const auto it = materials_.find(name); it != materials_.end()) return it->second;
   std::vector<render::Image> textures;
-  const render::Material m = material_named(name, models, textures);
+  const render::Material m = material_of(scene_, name, models, textures);
   return materials_[name] = stage_.add_material(m, textures);
 }
 
 render::MaterialHandle Picture::cloth_material(const Cloth& cloth, const ModelLibrary& models) {
   render::MaterialHandle& known = fabrics_[cloth.fabric + "/" + cloth.material];
   if (known) return known;
-  render::Material m = fabric_look(cloth.fabric);
   std::vector<render::Image> textures;
-  if (const auto it = std::ranges::find(scene_.materials, cloth.material, &Material::name);
-      it != scene_.materials.end()) {
-    render::Fabric fabric = m.fabric;
-    fabric.back_color.reset();  // that of another front
-    if (const std::optional<FabricLook>& look = it->fabric) {
-      fabric = {.weave = look->weave,
-                .thread = to_float(look->thread),
-                .relief = to_float(look->relief),
-                .sheen = to_float(look->sheen),
-                .sheen_color = look->sheen_color.rgb(),
-                .translucency = to_float(look->translucency)};
-      if (look->back_color) fabric.back_color = look->back_color->rgb();
-    }
-    m = material_named(cloth.material, models, textures);
-    m.fabric = fabric;
-  }
+  const render::Material m = material_of(scene_, cloth, models, textures);
   return known = stage_.add_material(m, textures);
 }
 
@@ -260,7 +183,7 @@ void Picture::add_shape(const Body& body, const ModelLibrary& models, std::vecto
         if constexpr (std::is_same_v<S, MeshFile>) {
           add_model(shape.file, affine(Vec3::Zero(), Quat::Identity(), shape.scale), body, models, parts);
         } else {
-          // A plane is the ground: it takes shadows and throws none.
+          // A plane is the ground: it receives shadows and casts none.
           const bool casts = body.casts_shadow && !std::is_same_v<S, sim::Plane>;
           parts.push_back({stage_.add_instance(primitive(shape), material(body.material, models), casts),
                            Affine3f::Identity()});
@@ -337,7 +260,8 @@ render::Image Picture::draw(const Snapshot& previous, const Snapshot& current,
   std::ranges::fill(sum_.rgba, 0.f);
   for (int i = 0; i < n; ++i) {
     if (i > 0 && stop && stop()) return {};
-    // Sub-frames sit in the middle of equal parts of the time the shutter is open, which ends with the frame.
+    // Sub-frames are in the middle of equal parts of the time during which the shutter is open, which ends at
+    // the frame's time.
     const float open =
         to_float(scene_.render.shutter) * (1 - (static_cast<float>(i) + 0.5f) / static_cast<float>(n));
     const float w = n == 1 || &previous == &current ? 1 : 1 - open;

@@ -21,7 +21,7 @@
 
 namespace offstage::producer {
 
-/// What the ids of Channels stand for: bodies, cloths, particles, in scene order from 1.
+/// Names of the ids in Channels: bodies, cloths, particles, in scene order from 1.
 render::ObjectNames object_names(const Scene& scene);
 
 class Picture {
@@ -29,9 +29,10 @@ class Picture {
   /// The context must be current on this thread and outlive the picture.
   Picture(const Scene& scene, const ModelLibrary& models, render::Context& context);
 
-  /// The frame at `current`; the shutter is open during the end of the interval from `previous`, the frame
-  /// before it (or the same snapshot for the first frame, which has no motion blur). The camera is that of
-  /// the scene as it is now. If `stop` says so between two sub-frames, the image has no pixels.
+  /// Draws the frame at `current`. The shutter is open during the last part of the interval from `previous`,
+  /// the frame before it (or the same snapshot for the first frame, which has no motion blur). The camera is
+  /// that of the scene in its current state. If `stop` returns true between two sub-frames, the image has no
+  /// pixels.
   render::Image draw(const Snapshot& previous, const Snapshot& current,
                      const std::function<bool()>& stop = {});
   /// The camera of the latest picture.
@@ -44,26 +45,24 @@ class Picture {
   struct DrawnPart {
     render::InstanceHandle instance;
     Eigen::Affine3f body_from_part;
-    Eigen::Vector3f outwards =
-        Eigen::Vector3f::Zero();  // where an explosion of 1 moves it, in the body's frame
+    // Displacement by an explosion of 1, in the body's frame.
+    Eigen::Vector3f outwards = Eigen::Vector3f::Zero();
   };
   struct DrawnBody {
     std::optional<std::size_t> slot;  // in Snapshot::bodies; none: it never moves
     Eigen::Affine3f world_from_body;  // at time 0
-    const PartsOverlay* overlay;      // it is drawn as convex parts; or null
+    const PartsOverlay* overlay;      // if it is drawn as convex parts; otherwise null
     std::vector<DrawnPart> parts;
   };
 
-  /// A cloth, its places along the flat one, and which triangles the stage has of it.
+  /// A cloth with its coordinates along the flat cloth, and the version of its triangles in the stage.
   struct DrawnCloth {
-    render::ClothHandle cloth;  // null where invisible
+    render::ClothHandle cloth;  // null if invisible
     std::vector<uint32_t> triangles;
     std::vector<Eigen::Vector2f> uvs;
     uint32_t version = 0;
   };
 
-  render::Material material_named(const std::string& name, const ModelLibrary& models,
-                                  std::vector<render::Image>& textures) const;
   render::MaterialHandle material(const std::string& name, const ModelLibrary& models);
   void add_body(const Body& body, const ModelLibrary& models, std::size_t& slot, uint32_t object);
   void add_model(const std::string& file, const Eigen::Affine3f& body_from_model, const Body& body,
@@ -82,7 +81,7 @@ class Picture {
   void place_body(const DrawnBody& body, const Eigen::Affine3f& world_from_body, double time);
   void place_rods(const Snapshot& previous, const Snapshot& current, float w);
   void place_points(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
-  /// Between two sub-frames; 0 if there is one alone [s].
+  /// Time between two sub-frames; 0 if there is only one [s].
   float subframe_time() const;
   void set_balls(std::size_t set, std::span<const render::Point> balls);
   void place_cloths(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
@@ -100,14 +99,14 @@ class Picture {
   CameraRig camera_;
   render::Camera latest_camera_;
   std::vector<DrawnBody> bodies_;
-  std::vector<render::InstanceHandle> rods_;  // null where invisible
+  std::vector<render::InstanceHandle> rods_;  // null if invisible
   std::vector<render::PointsHandle> points_;
   std::vector<render::PointStyle> styles_;  // of the same
-  std::vector<render::PointsHandle>
-      blur_streaks_;  // motion blur of balls that move too far in a sub-frame; or null
+  // Motion blur of balls that move too far in a sub-frame; or null.
+  std::vector<render::PointsHandle> blur_streaks_;
   std::map<std::string, render::MaterialHandle> fabrics_;  // by fabric and material
   std::vector<DrawnCloth> cloths_;
-  std::vector<render::LinesHandle> overlays_;  // null for those without lines
+  std::vector<render::LinesHandle> overlays_;  // null for overlays without lines
   std::vector<render::Point> scratch_, scratch_blur_streaks_;
   std::vector<Eigen::Vector3f> scratch_places_;
   std::vector<render::Line> scratch_lines_;

@@ -1,4 +1,4 @@
-// The part of picture.h that puts everything in its place between two snapshots.
+// The part of picture.h that moves all objects to their states between two snapshots.
 
 #include <numbers>
 #include <unordered_map>
@@ -23,8 +23,8 @@ BodySample interpolate(const BodySample& a, const BodySample& b, float w) {
   return {a.position + w * (b.position - a.position), a.orientation.slerp(w, b.orientation)};
 }
 
-/// Where a particle is at share w of the interval `dt` between two states: the cubic through both states
-/// while it flew freely; a straight line where a bounce came between, which a cubic would overshoot.
+/// Position of a particle at share w of the interval `dt` between two states: the cubic through both states
+/// if it flew freely; a straight line if it bounced in between, which a cubic would overshoot.
 Vector3f interpolate(const render::Point& a, const render::Point& b, float w, float dt) {
   const Vector3f step = b.position - a.position;
   const Vector3f mean_velocity = 0.5f * (a.velocity + b.velocity);
@@ -35,9 +35,9 @@ Vector3f interpolate(const render::Point& a, const render::Point& b, float w, fl
          dt * ((w3 - 2 * w2 + w) * a.velocity + (w3 - w2) * b.velocity);
 }
 
-/// A point of a cloth between two states, by the cubic through both. Where an impact came between, the
-/// velocities at both ends say little about the way: what they are off the mean one counts up to half of
-/// that.
+/// Position of a cloth point between two states, by the cubic through both. If there was an impact in
+/// between, the velocities at both ends are misleading; their deviation from the mean velocity is limited to
+/// half of it.
 Vector3f interpolate(const Vector3f& a, const Vector3f& va, const Vector3f& b, const Vector3f& vb, float w,
                      float dt) {
   const Vector3f step = b - a;
@@ -60,7 +60,7 @@ float Picture::subframe_time() const {
 }
 
 void Picture::set_balls(std::size_t set, std::span<const render::Point> balls) {
-  // A ball that moves by more than its radius from one sub-frame to the next would be seen as a row of balls.
+  // A ball that moves by more than its radius between sub-frames would appear as a row of balls.
   std::vector<render::Point> still;
   scratch_blur_streaks_.clear();
   for (const render::Point& ball : balls) {
@@ -102,7 +102,8 @@ void Picture::place_points(const Snapshot& previous, const Snapshot& current, fl
   const float back = (1 - w) * dt;
   for (std::size_t set = 0; set < points_.size(); ++set) {
     const PointSet &before = previous.point_sets[set], &now = current.point_sets[set];
-    // A streak is its own motion blur: it stays where the frame ends and is as long as its style says.
+    // A streak contains its own motion blur: it stays at its position at the end of the frame, with the
+    // length of its style.
     const auto show = [&](std::span<const render::Point> points) {
       blur_streaks_[set] ? set_balls(set, points) : stage_.set_points(points_[set], points);
     };
@@ -118,7 +119,7 @@ void Picture::place_points(const Snapshot& previous, const Snapshot& current, fl
       if (j < before.points.size() && before.points[j].id == p.id)
         p.position = interpolate(before.points[j], p, w, dt);
       else if (now.ages[i] < back)
-        continue;  // not born yet
+        continue;  // not created yet
       else
         p.position -= back * p.velocity;
       scratch_.push_back(p);
@@ -158,7 +159,7 @@ void Picture::place_overlays(const Snapshot& previous, const Snapshot& current, 
     const LineSet &before = previous.overlays[i], &now = current.overlays[i];
     scratch_lines_ = now.lines;
     if (w < 1) {
-      // Lines that came have no way between the two states.
+      // New lines have no motion between the two states.
       std::unordered_map<uint64_t, std::size_t> places;
       for (std::size_t k = 0; k < before.ids.size(); ++k) places.emplace(before.ids[k], k);
       for (std::size_t k = 0; k < scratch_lines_.size(); ++k) {

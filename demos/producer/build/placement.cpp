@@ -22,7 +22,7 @@ Quat turn(Real radians) {
   return {cos, 0, sin, 0};
 }
 
-/// The motion that turns about the vertical through `pivot`, then shifts.
+/// Rotation about the vertical through `pivot`, then displacement.
 Pose turn_about(const Vec3& pivot, const Quat& q, const Vec3& shift) {
   return {pivot - q * pivot + shift, q};
 }
@@ -43,7 +43,8 @@ Pose on_grid(const Grid& grid, int i) {
   return {cell.cwiseProduct(grid.spacing), Quat::Identity()};
 }
 
-/// Dart throwing: a place at random, again if it is too near to another, for a bounded number of times.
+/// Dart throwing: a random place is tried again if it is too near to another one, for a bounded number of
+/// times.
 class Scatterer {
  public:
   Scatterer(const Scatter& scatter, uint64_t seed, std::string_view name)
@@ -54,7 +55,8 @@ class Scatterer {
 
   void begin_group() { cells_.clear(); }
 
-  /// The i-th scattered copy in all, for an original at `position`; nothing if it found no place.
+  /// The i-th scattered copy, counted over all originals, for an original at `position`; nothing if there is
+  /// no room.
   std::optional<std::pair<Pose, Real>> place(uint64_t i, const Vec3& position) {
     for (uint64_t attempt = 0; attempt < kAttempts; ++attempt) {
       const uint64_t index = i * kAttempts + attempt;
@@ -75,8 +77,8 @@ class Scatterer {
   enum Property : uint32_t { kX, kZ, kTurn, kScale };
   using Cell = std::pair<int, int>;
 
-  /// Takes the place unless one of its group is nearer than min_distance. Only cells around it can hold such
-  /// a one.
+  /// Takes the place unless another place of its group is nearer than min_distance. Only the neighbouring
+  /// cells can contain such a place.
   bool claim(const Vector2d& p) {
     const Cell cell(static_cast<int>(std::floor(p.x() / cell_)), static_cast<int>(std::floor(p.y() / cell_)));
     for (int dx = -1; dx <= 1; ++dx) {
@@ -141,7 +143,7 @@ void turn_surface(PlaneSurface& surface, const Quat& q) {
   const Quat turned = q * surface.orientation();
   surface.direction = q * surface.direction;
   surface.turn_deg = 0;
-  const Quat turn = surface.orientation().conjugate() * turned;  // about +Y alone
+  const Quat turn = surface.orientation().conjugate() * turned;  // rotation about +Y only
   surface.turn_deg = 2 * std::atan2(turn.y(), turn.w()) * 180 / std::numbers::pi;
 }
 void turn_surface(SphereSurface&, const Quat&) {}
@@ -217,7 +219,8 @@ std::vector<T> expand_all(const std::vector<T>& originals, uint64_t seed, std::v
   return all;
 }
 
-/// Names of objects that have copies become those of all copies. What follows a slash stays behind each.
+/// Replaces names of objects with copies by the names of all copies. A part after a slash is appended to
+/// each.
 template <class T>
 void name_copies(const std::vector<T>& originals, const std::vector<T>& copies,
                  std::vector<std::string>& names) {

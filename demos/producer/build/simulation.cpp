@@ -30,7 +30,7 @@ sim::KeyframeTrack track_of(const Body& body) {
   return track;
 }
 
-/// Runs `add`, turning the simulation's refusal into a problem at the place in the scene.
+/// Runs `add`, and converts the simulation's exception to a problem at the place in the scene.
 template <class F>
 auto at_place(const Where& where, F&& add) {
   try {
@@ -371,7 +371,7 @@ int Simulation::skipped_pieces() const {
 }
 
 void Simulation::advance() {
-  // What comes before frame 1 is stepped in frame-sized pieces too, so that a caller can stop in between.
+  // The time before frame 1 is simulated in frame-sized pieces, too, so that a caller can stop in between.
   if (prewarmed_pieces_ < prewarm_pieces_) {
     const double piece = sources_->prewarm() / prewarm_pieces_;
     const int left = prewarm_pieces_ - ++prewarmed_pieces_;
@@ -425,7 +425,7 @@ Snapshot Simulation::snapshot() const {
 }
 
 std::string Simulation::state_dump(const sim::NonFinite& lost) const {
-  // Numbers that are not finite have no form in JSON, hence text.
+  // JSON has no infinite numbers and NaN, so they are written as text.
   const auto text = [](const Vec3& v) { return fmt::format("{} {} {}", v.x(), v.y(), v.z()); };
   nlohmann::ordered_json dump;
   dump["time"] = world_.time();

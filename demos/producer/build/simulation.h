@@ -19,7 +19,8 @@
 
 namespace offstage::producer {
 
-/// The physics cannot go on: something became non-finite. Carries the state as JSON text, to be saved.
+/// The physics cannot continue, because a quantity became infinite or NaN. Contains the state as JSON text,
+/// to be saved.
 class DivergedError : public std::runtime_error {
  public:
   DivergedError(const std::string& what, std::string state)
@@ -30,25 +31,25 @@ class DivergedError : public std::runtime_error {
   std::string state_;
 };
 
-/// What the step reports of a run come to.
+/// Sums of the step reports of a run.
 struct SimulationTotals {
   uint64_t substeps = 0, born = 0, expired = 0, retired = 0, ejected = 0, removed = 0,
            particle_collisions = 0, truncated = 0;
-  uint64_t waiting = 0, skipped = 0;       ///< of the emitters
-  std::vector<std::string> broken_joints;  ///< in the order in which they broke
-  sim::Real joint_error = 0;               ///< greatest that was left of a constraint [m], [rad]
-  uint64_t joints_unsolved = 0;            ///< times that joints could not be put back together
-  std::vector<std::string> lost_bodies;    ///< left the world's bounds and were frozen there
+  uint64_t waiting = 0, skipped = 0;       ///< counts of the emitters
+  std::vector<std::string> broken_joints;  ///< in the order of breaking
+  sim::Real joint_error = 0;               ///< greatest residual of a constraint [m], [rad]
+  uint64_t joints_unsolved = 0;            ///< times that joint projection failed
+  std::vector<std::string> lost_bodies;    ///< bodies that left the world's bounds and were frozen there
 
   uint32_t bodies_awake = 0, bodies_asleep = 0, islands = 0;  ///< at the end
-  std::size_t contacts = 0;                                   ///< points where bodies touch, at the end
+  std::size_t contacts = 0;                                   ///< contact points of bodies at the end
   std::size_t most_contacts = 0;                              ///< at the end of a frame
-  sim::Real penetration = 0;                                  ///< greatest of the run and at its end [m]
+  sim::Real penetration = 0;                                  ///< greatest in the run, and at its end [m]
   uint64_t collisions = 0, tracebacks = 0, toi_limit_reached = 0, restitution_suppressed = 0,
            speculative_contacts = 0;
   uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
 
-  // Of cloths: greatest of the run, at its end, and sums.
+  // Cloths: greatest values in the run, values at its end, and sums.
   sim::Real cloth_strain = 0, cloth_penetration = 0;
   uint64_t cloth_contacts = 0, cloth_self_contacts = 0, cloth_springs_clamped = 0;
   uint64_t cloth_moves_limited = 0, cloth_moves_held_back = 0, cloth_crossings = 0, cloth_springs_torn = 0,
@@ -56,9 +57,9 @@ struct SimulationTotals {
   std::map<std::string, sim::Real> softened_cloths;  ///< least share of its stiffness that a spring had
   std::map<std::string, sim::ClothTear> first_tears;
   sim::ContactWork exact, fast, impacts;
-  /// Bodies with approximate contact forces, and how often a solver had to fall back on them.
+  /// Bodies with approximate contact forces, and how often a solver fell back for them.
   std::map<std::string, uint64_t> rough_bodies;
-  double first_rough_s = 0;  ///< the first time that one did [s]
+  double first_rough_s = 0;  ///< time of the first fall-back [s]
   double step_s = 0;         ///< longest internal step [s]
   sim::IntegratorReport integration;
 
@@ -67,26 +68,26 @@ struct SimulationTotals {
 
 class Simulation {
  public:
-  /// Throws SceneError for what only building shows: an open mesh as a dynamic body, an emitter that cannot
-  /// emit.
+  /// Throws SceneError for errors that only building finds: an open mesh as a dynamic body, an emitter with
+  /// invalid parameters.
   Simulation(const Scene& scene, const ModelLibrary& models);
 
   /// Called at the start of every internal step, with its time, if set: for traces.
   void on_substep(std::function<void(double time)> callback) { on_substep_ = std::move(callback); }
 
-  /// Advances by one frame. Prewarming and what `output.start` skips take several calls, during which frame()
-  /// is 0. Throws DivergedError.
+  /// Advances by one frame. Prewarming and the time skipped by `output.start` take several calls, during
+  /// which frame() is 0. Throws DivergedError.
   void advance();
   int frame() const { return frame_; }
-  /// How many calls of advance() it takes from the beginning to a frame.
+  /// Number of calls of advance() from the start to a frame.
   int advances_to(int frame) const { return prewarm_pieces_ + skipped_pieces() + frame; }
 
   Snapshot snapshot() const;
 
   const sim::World& world() const { return world_; }
-  /// Of the world. Throws DivergedError if it is not finite.
+  /// Energy of the world. Throws DivergedError if it is not finite.
   sim::Energy energy() const;
-  /// Throws DivergedError with the state now and what is wrong with it.
+  /// Throws DivergedError with the current state and the reason.
   [[noreturn]] void fail(const std::string& what) const;
   SimulationTotals totals() const;
   std::size_t body_count() const { return world_.body_count(); }
@@ -109,7 +110,8 @@ class Simulation {
   /// In scene order.
   const std::vector<NamedCloth>& cloths() const { return cloths_; }
 
-  /// What stopped being finite, and the state of the rest, as JSON text: what is saved when a run diverges.
+  /// The object that is not finite, and the state of all others, as JSON text; it is saved when a run
+  /// diverges.
   std::string state_dump(const sim::NonFinite& lost) const;
 
  private:
@@ -125,7 +127,7 @@ class Simulation {
   sim::ParticleSystemHandle system_named(const std::string& name) const;
   void prewarm(double from, double to);
   void step(double sampling_time);
-  int skipped_pieces() const;  // in which output.start is simulated
+  int skipped_pieces() const;  // pieces in which the time before output.start is simulated
   void note(const sim::StepReport& report);
 
   const Scene& scene_;
@@ -137,7 +139,7 @@ class Simulation {
   std::vector<LookRamps> group_looks_;
   std::map<std::string, sim::BodyHandle> bodies_;
   std::vector<sim::Pose> moving_poses_;             // kept up to date from World::moved()
-  std::map<sim::BodyHandle, std::size_t> slot_of_;  // handle -> place in `moving_`
+  std::map<sim::BodyHandle, std::size_t> slot_of_;  // index in `moving_` by handle
   std::vector<sim::SpringDef> springs_;
   std::vector<sim::JointHandle> rods_;  // distance joints
   std::optional<Overlays> overlays_;

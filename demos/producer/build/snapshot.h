@@ -1,6 +1,6 @@
 #pragma once
-/// What one frame hands from the simulation to the drawing: an immutable picture of the state, cast to float
-/// once. It is also what a SnapshotCache keeps, one compressed and checksummed file per frame.
+/// The data that one frame passes from the simulation to the drawing: an immutable copy of the state,
+/// converted to float once. A SnapshotCache stores it as one compressed file with a checksum per frame.
 
 #include <cstdint>
 #include <filesystem>
@@ -22,12 +22,12 @@ struct BodySample {
   Eigen::Quaternionf orientation;
 };
 
-/// Ends of a spring, or of a joint that is a rod or rope; both the same where it is gone.
+/// Ends of a spring, or of a joint that is a rod or rope; both are equal if it does not exist any more.
 struct RodSample {
   Eigen::Vector3f a, b;
 };
 
-/// Particles of one group or emitter. `ids` ascend; `ages` tell when a particle was born inside the frame.
+/// Particles of one group or emitter. `ids` ascend; `ages` show when a particle was created within the frame.
 struct PointSet {
   std::vector<render::Point> points;
   std::vector<float> ages;  ///< [s]
@@ -37,12 +37,12 @@ struct PointSet {
 struct ClothSample {
   std::vector<Eigen::Vector3f> points;      ///< [m]
   std::vector<Eigen::Vector3f> velocities;  ///< [m/s]
-  uint32_t version = 0;                     ///< of the next two; 0: the cloth is whole, and they are empty
-  std::vector<uint32_t> triangles;          ///< three points each
-  std::vector<uint32_t> sources;  ///< of each point the vertex of the scene's cloth that it comes from
+  uint32_t version = 0;             ///< version of the next two; 0: the cloth is intact, and they are empty
+  std::vector<uint32_t> triangles;  ///< three points each
+  std::vector<uint32_t> sources;    ///< for each point, the vertex of the scene's cloth from which it comes
 };
 
-/// What an overlay shows. A line with the same id in two snapshots is the same line, moved.
+/// The lines of an overlay. A line with the same id in two snapshots is the same line, moved.
 struct LineSet {
   std::vector<render::Line> lines;
   std::vector<uint64_t> ids;
@@ -61,8 +61,8 @@ struct Snapshot {
   uint64_t point_count() const;
 };
 
-/// The bytes of a snapshot: magic, format version, checksum (XXH3-64), zstd payload. `key` is that of the
-/// run.
+/// Returns the bytes of a snapshot: magic, format version, checksum (XXH3-64), zstd payload. `key` is that of
+/// the run.
 std::vector<uint8_t> serialize(const Snapshot& snapshot, std::string_view key = {});
 /// Throws render::FileError, naming `source`, for bytes that are damaged, cut short, of another version or of
 /// a run with another key.

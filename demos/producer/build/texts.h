@@ -7,7 +7,7 @@
 
 namespace offstage::producer {
 
-/// Writes on a finished frame what its moment shows.
+/// Draws the texts for the time of `moment` on a finished frame.
 void write_texts(const Scene& scene, const Snapshot& moment, render::Image& image);
 
 }  // namespace offstage::producer

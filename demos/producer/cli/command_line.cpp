@@ -26,6 +26,7 @@
 #include "producer/build/simulation.h"
 #include "producer/cli/command_texts.h"
 #include "producer/cli/commands.h"
+#include "producer/cli/failure.h"
 #include "producer/run/output.h"
 #include "render/error.h"
 #include "render/file_io.h"
@@ -135,7 +136,7 @@ void add_threads(CLI::App& command, int& threads) {
       ->check(CLI::Range(1, 256));
 }
 
-/// `bare`: the command is left out, and -o with it.
+/// `bare`: for a command line without the command, which has no -o.
 CLI::App* add_render(CLI::App& app, RenderOptions& render, bool bare) {
   CLI::App* command = app.add_subcommand("render", "Simulate a scene and draw it: frames or a video");
   add_scene(*command, render.scene);
@@ -267,15 +268,94 @@ CLI::App* add_simulate(CLI::App& app, SimulateOptions& simulate) {
   return command;
 }
 
+CLI::App* add_export(CLI::App& app, ExportOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "export", "Simulate a scene and write its motion for other programs: USD, glTF, PLY, OBJ or CSV");
+  add_scene(*command, options.scene);
+  command
+      ->add_option("-o,--output", options.out,
+                   "film.usda, film.glb or film.csv; frames/####.ply or frames/####.obj, one file per frame")
+      ->required();
+  add_timing(*command, options.scene);
+  command->add_option("--frames", options.frames,
+                      "Frames to export: 1-30,40,50-90x2 (negative numbers count from the end)");
+  command->add_option("--cache", options.cache,
+                      "Take the snapshots of `simulate --cache` instead of simulating");
+  add_threads(*command, options.threads);
+  command->add_flag("--force", options.force, "Replace existing output");
+  add_talk(*command, options.talk);
+  return command;
+}
+
+CLI::App* add_cache(CLI::App& app, CacheOptions& options) {
+  CLI::App* command =
+      app.add_subcommand("cache", "List, verify or clear folders of snapshots that `simulate --cache` wrote");
+  const std::map<std::string, CacheOptions::Action> actions = {{"list", CacheOptions::Action::list},
+                                                               {"verify", CacheOptions::Action::verify},
+                                                               {"clear", CacheOptions::Action::clear}};
+  command
+      ->add_option("action", options.action,
+                   "list: what is in them; verify: read every snapshot; clear: remove the snapshots")
+      ->required()
+      ->transform(CLI::CheckedTransformer(actions).description("{list,verify,clear}"));
+  command
+      ->add_option("folders", options.folders,
+                   "Caches; for `list` and `verify` also folders that hold caches")
+      ->required();
+  command->add_flag("--json", options.json, "Print the list as JSON");
+  return command;
+}
+
+CLI::App* add_farm(CLI::App& app, FarmOptions& farm) {
+  CLI::App* command = app.add_subcommand(
+      "farm", "Simulate once and draw on many machines by Slurm, or by several processes of this one");
+  command->add_option("scene", farm.scene.file, "Scene file");
+  command->add_option("-o,--output", farm.out, "Video, or frames/####.png");
+  command->add_flag("--slurm", farm.slurm,
+                    "Submit the steps to Slurm; the folder must be visible to all nodes");
+  command->add_option("--local", farm.local, "Run the same steps here, with so many drawing processes")
+      ->check(CLI::Range(1, 256));
+  command->add_option("--chunks", farm.chunks, "Parts of the frames")
+      ->check(CLI::Range(1, 10000))
+      ->capture_default_str();
+  command->add_option("--retries", farm.retries, "How often a failed step is tried again")
+      ->check(CLI::Range(0, 100))
+      ->capture_default_str();
+  command->add_option("--work", farm.work,
+                      "Folder of scripts, cache, frames and logs (default: OUTPUT.farm)");
+  command->add_option("--partition", farm.partition, "Partition of Slurm");
+  command->add_option("--account", farm.account, "Account of Slurm");
+  command->add_option("--time", farm.time, "Time limit of each job of Slurm, such as 2:00:00");
+  command
+      ->add_option("--sbatch", farm.sbatch,
+                   "A further option of sbatch, such as --sbatch=--mem=8G (repeatable)")
+      ->allow_extra_args(false);
+  command->add_option("--program", farm.program, "Path of offstage on the nodes (default: this one)");
+  auto* resume = command->add_flag("--resume", farm.resume, "Keep the steps and frames that are done");
+  command->add_flag("--force", farm.force, "Begin again, and replace existing output")->excludes(resume);
+  command->add_flag("--dry-run", farm.dry_run, "Print the scripts and write nothing");
+  command->add_option("--status", farm.status, "Report how far the farm in this folder is");
+  add_overrides(*command, farm.scene);
+  add_picture(*command, farm.scene);
+  add_timing(*command, farm.scene);
+  add_threads(*command, farm.threads);
+  add_gl(*command, farm.gl);
+  add_talk(*command, farm.talk);
+  return command;
+}
+
 CLI::App* add_compare(CLI::App& app, CompareOptions& compare) {
   compare.golden = "tests/golden";
-  CLI::App* command =
-      app.add_subcommand("compare", "Compare a scene with its golden, or two pictures or folders of frames");
-  command->add_option("a", compare.scene.file, "Scene, picture or folder")->required();
-  command->add_option("b", compare.other, "Second picture or folder");
+  CLI::App* command = app.add_subcommand(
+      "compare", "Compare scenes with their goldens, or two pictures or folders of frames");
+  command->add_option("inputs", compare.inputs, "Scenes, or two pictures, or two folders of frames")
+      ->required();
   command->add_option("--golden", compare.golden, "Folder of the goldens")->capture_default_str();
   command->add_option("--report", compare.report,
-                      "Folder for the expected and actual pictures, their difference and an HTML page");
+                      "Folder for the expected and actual pictures, their difference and an HTML page; with\n"
+                      "several scenes, a folder for each that differs, and a page about all");
+  command->add_option("--junit", compare.junit,
+                      "Write the results of the scenes to this JUnit XML file, which CI systems read");
   CLI::Option* keep = command->add_option("--keep-states", compare.states.keep,
                                           "Write the simulated states of the golden's frames to this folder");
   command
@@ -352,18 +432,19 @@ CLI::App* add_sweep(CLI::App& app, SweepOptions& sweep) {
   return command;
 }
 
-/// A program started with a standard stream closed would otherwise find its own files under that number.
+/// Opens closed standard streams, because otherwise the program's own files would get their numbers.
 void open_standard_streams() {
   for (int fd = 0; fd <= 2; ++fd) {
     if (fcntl(fd, F_GETFD) >= 0) continue;
-    // Takes the lowest free number. Standard output cannot be written then: results are not lost in silence.
+    // Takes the lowest free number. Writing to standard output then fails, so results are not lost silently.
     open("/dev/null", fd == 2 ? O_WRONLY : O_RDONLY);
     if (fd == 1) note_closed_output();
   }
 }
 
-/// Memory can run out where no exception may pass: in a thread, or in a destructor while another exception is
-/// on its way. That ends with the same line and code; files in the making keep their temporary names.
+/// Called when memory is exhausted where no exception can pass: in a thread, or in a destructor during
+/// another exception. The program ends with the same line and exit code; unfinished files keep their
+/// temporary names.
 [[noreturn]] void end_program() {
   try {
     if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
@@ -376,34 +457,22 @@ void open_standard_streams() {
   std::abort();
 }
 
-/// Before objects of static lifetime are made, which need memory, too.
+/// Installed before the construction of static objects, which needs memory, too.
 [[gnu::constructor(101)]] void install_end() {
   std::set_terminate(end_program);
 }
 
-/// Results that could not be written are a failure, whatever the command did.
+/// If results could not be written, the command has failed.
 int flushed(int code) {
   if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
   log("offstage: standard output: {}\n", std::strerror(errno));
   return code == kOk ? kRunFailed : code;
 }
 
-/// The exit code of a command; what it throws becomes a message and a code of its own.
+/// Returns the exit code of a command; an exception becomes a message and an exit code of its own.
 int reported(const std::function<int()>& command) {
   try {
     return command();
-  } catch (const SceneError& error) {
-    log("{}\n", error.what());
-    return kSceneInvalid;
-  } catch (const OutputError& error) {
-    log("offstage: {}\n", render::escaped(error.what()));
-    return kUsage;
-  } catch (const std::invalid_argument& error) {
-    log("offstage: {}\n", render::escaped(error.what()));
-    return kUsage;
-  } catch (const render::UnavailableError& error) {
-    log("offstage: {}\n", error.what());
-    return kUnavailable;
   } catch (const DivergedError& error) {
     log("offstage: {}\n", error.what());
     try {
@@ -422,9 +491,10 @@ int reported(const std::function<int()>& command) {
   } catch (const std::bad_alloc&) {
     write_log("offstage: out of memory\n");
     return kRunFailed;
-  } catch (const std::exception& error) {
-    log("offstage: {}\n", render::escaped(error.what()));
-    return kRunFailed;
+  } catch (const std::exception&) {
+    const Failure failure = describe_failure(std::current_exception());
+    log("{}\n", failure.message);
+    return failure.code;
   }
 }
 
@@ -444,7 +514,7 @@ bool is_scene_name(std::string_view argument) {
   return argument == kStandardInput || argument.ends_with(".json");
 }
 
-/// Whether the arguments name a scene where a command should be: then it is rendered.
+/// Whether the arguments have a scene in place of a command; it is then rendered.
 bool lacks_command(const std::vector<const char*>& arguments, const std::vector<std::string>& commands) {
   if (arguments.size() < 2) return false;
   const std::string_view first = arguments[1];
@@ -456,7 +526,7 @@ bool lacks_command(const std::vector<const char*>& arguments, const std::vector<
          std::any_of(arguments.begin() + 1, arguments.end(), is_scene_name);
 }
 
-/// What is wrong with a word that is no command; empty if there is none.
+/// Error message for a word that is not a command; empty if there is none.
 std::string wrong_command(const std::vector<const char*>& arguments,
                           const std::vector<std::string>& commands) {
   if (arguments.size() < 2 || std::string_view(arguments[1]).starts_with('-')) return {};
@@ -469,9 +539,9 @@ std::string wrong_command(const std::vector<const char*>& arguments,
          " (--help lists all)";
 }
 
-constexpr std::array kCommandNames = {"render",  "frame",  "sheet",    "sweep",  "simulate",  "new",
-                                      "tune",    "encode", "validate", "schema", "presets",   "info",
-                                      "compare", "bless",  "doctor",   "man",    "completion"};
+constexpr std::array kCommandNames = {
+    "render",  "frame", "sheet",   "sweep", "simulate", "new", "tune",       "encode", "validate", "schema",
+    "presets", "info",  "compare", "bless", "doctor",   "man", "completion", "export", "cache",    "farm"};
 
 int dispatch(int argc, char** argv, const TuneCommand& tune) {
   std::vector<const char*> arguments(argv, argv + argc);
@@ -506,6 +576,12 @@ int dispatch(int argc, char** argv, const TuneCommand& tune) {
 
   SimulateOptions simulate;
   auto* simulate_app = add_simulate(app, simulate);
+  ExportOptions exporting;
+  auto* export_app = add_export(app, exporting);
+  CacheOptions caches;
+  auto* cache_app = add_cache(app, caches);
+  FarmOptions farm;
+  auto* farm_app = add_farm(app, farm);
   ValidateOptions validate;
   auto* validate_app = add_validate(app, validate);
 
@@ -557,6 +633,9 @@ int dispatch(int argc, char** argv, const TuneCommand& tune) {
     if (*sheet_app) return sheet_command(sheet);
     if (*sweep_app) return sweep_command(sweep);
     if (*simulate_app) return simulate_command(simulate);
+    if (*export_app) return export_command(exporting);
+    if (*cache_app) return cache_command(caches);
+    if (*farm_app) return farm_command(farm);
     if (*validate_app) return validate_command(validate);
     if (*schema_app) return schema_command(reference);
     if (*info_app) return info_command(info, info_json);

@@ -18,7 +18,8 @@ enum ExitCode {
   kImagesDiffer = 6,
 };
 
-/// Parses, runs, reports; returns the exit code. Results go to standard output, talk to standard error.
+/// Parses the arguments and runs the command; returns the exit code. Results go to standard output, messages
+/// to standard error.
 int run(int argc, char** argv, const TuneCommand& tune);
 
 }  // namespace offstage::producer

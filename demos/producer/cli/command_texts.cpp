@@ -11,9 +11,9 @@
 namespace offstage::producer {
 namespace {
 
-/// An option or a positional of a command.
+/// An option or a positional argument of a command.
 struct Argument {
-  std::vector<std::string> names;    ///< "-o", "--output"; of a positional, what it stands for
+  std::vector<std::string> names;    ///< "-o", "--output"; for a positional argument, its placeholder
   std::vector<std::string> choices;  ///< the values it accepts, if they are few
   std::string help, environment;
   bool takes_value = false, required = false, positional = false, repeated = false;
@@ -76,7 +76,7 @@ std::string with_replaced(std::string text, std::string_view what, std::string_v
   return text;
 }
 
-/// In single quotes, for every shell that is known here.
+/// Quotes a text for all supported shells.
 std::string shell_word(const std::string& text) {
   return "'" + with_replaced(text, "'", "'\\''") + "'";
 }

@@ -1,4 +1,4 @@
-// doctor: what this machine has.
+// doctor: the capabilities of this machine.
 
 #include <array>
 #include <chrono>
@@ -29,7 +29,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// A lit ball on a plane, small: that it draws at all is most of the test, its hash the rest.
+/// Hash of a small picture of a lit ball on a plane, which tests the whole drawing.
 std::string test_render_hash(render::Context& context) {
   render::Stage stage(context, {.width_px = 128, .height_px = 72, .shadow_map_px = 512});
   const auto material = stage.add_material({});
@@ -71,8 +71,8 @@ Json describe_egl_devices() {
   }
 }
 
-/// What `describe` returns, made in a process of its own: Mesa reads its environment once per process, and a
-/// driver that crashes or hangs becomes an "error".
+/// Runs `describe` in a separate process: Mesa reads its environment once per process, and a driver that
+/// crashes or hangs becomes an "error".
 Json in_child(const std::function<Json()>& describe) {
   constexpr std::chrono::seconds kLimit{60};
   std::array<int, 2> ends{};

@@ -1,4 +1,4 @@
-// encode: a video of frames that are there already.
+// encode: a video of existing frames.
 
 #include <algorithm>
 #include <array>
@@ -26,7 +26,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The frame rate that the manifest beside the frames records, if it is of these frames.
+/// The frame rate in the manifest beside the frames, if it belongs to them.
 std::optional<render::FrameRate> rate_of_manifest(const fs::path& pattern) {
   const std::optional<JsonObject> manifest = read_json_file(pattern.parent_path() / "manifest.json");
   if (!manifest || manifest->text("pattern") != pattern.filename().string()) return {};
@@ -47,7 +47,7 @@ bool is_transparent(const render::Image& image) {
   return false;
 }
 
-/// Whether the frames have to keep an alpha channel. An alpha channel that is opaque throughout has no need.
+/// Whether the frames need an alpha channel. A fully opaque one is not needed.
 bool any_transparent(const FrameSequence& sequence) {
   return sequence.may_be_transparent && std::ranges::any_of(sequence.frames, [](const SequenceFrame& frame) {
            if (interrupt_signal()) throw Interrupted(interrupt_signal());
@@ -55,7 +55,7 @@ bool any_transparent(const FrameSequence& sequence) {
          });
 }
 
-/// Lays a picture with straight alpha over black, in linear light.
+/// Composites a picture with straight alpha over black, in linear light.
 void lay_over_black(render::Image& image) {
   static const std::array<float, 256> linear = [] {
     std::array<float, 256> table{};
@@ -80,7 +80,7 @@ void check_not_a_frame(const EncodeOptions& options, const FrameSequence& sequen
       throw OutputError(options.out + ": is one of the frames");
 }
 
-/// Encodes all frames; how many were done when a signal ended it, or all.
+/// Encodes all frames; returns the number of encoded frames, which is smaller if a signal ended it.
 std::size_t encode(const FrameSequence& sequence, const render::VideoDef& def, const TalkOptions& talk) {
   const auto sink = render::make_video_sink(def);
   ProgressPrinter printer(talk.quiet ? ProgressStyle::none : talk.progress);

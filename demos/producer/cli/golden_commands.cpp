@@ -1,6 +1,9 @@
 // compare and bless.
 
+#include <algorithm>
+#include <chrono>
 #include <cstdlib>
+#include <exception>
 #include <set>
 
 #include <fmt/format.h>
@@ -8,10 +11,14 @@
 #include "producer/base/log.h"
 #include "producer/cli/command_line.h"
 #include "producer/cli/commands.h"
+#include "producer/cli/failure.h"
 #include "producer/run/fingerprint.h"
 #include "producer/run/golden.h"
+#include "producer/run/golden_overview.h"
+#include "producer/run/junit.h"
 #include "render/context.h"
 #include "render/error.h"
+#include "render/file_io.h"
 #include "render/image_io.h"
 
 namespace offstage::producer {
@@ -26,7 +33,7 @@ std::set<std::string> pictures_in(const fs::path& folder) {
   return names;
 }
 
-/// One picture against another; prints a line.
+/// Compares two pictures; prints a line.
 bool same_picture(const fs::path& a, const fs::path& b, const std::string& report) {
   const render::Image x = render::read_image(a), y = render::read_image(b);
   if (x.width_px != y.width_px || x.height_px != y.height_px) {
@@ -51,7 +58,7 @@ bool same_picture(const fs::path& a, const fs::path& b, const std::string& repor
 }
 
 int compare_pictures(const CompareOptions& options) {
-  const fs::path a = options.scene.file, b = options.other;
+  const fs::path a = options.inputs[0], b = options.inputs[1];
   if (fs::is_directory(a) != fs::is_directory(b))
     throw render::FileError(a.string() + " and " + b.string() + ": compare two pictures or two folders");
   if (!fs::is_directory(a)) return same_picture(a, b, options.report) ? kOk : kImagesDiffer;
@@ -85,38 +92,131 @@ void refuse_standard_input(const std::string& command, const std::string& file) 
         ": needs a scene file, because a golden is found by the file's name; standard input has none");
 }
 
-int compare_with_golden(const CompareOptions& options) {
-  refuse_standard_input("compare", options.scene.file);
-  const LoadedScene scene = load(options.scene, true, golden_overrides());
-  const GoldenPlace place = find_golden(options.golden, scene, options.scene.file);
+/// What came of a scene.
+struct Comparison {
+  TestResult result;
+  int code = kOk;
+  fs::path page;              // of the report; empty: none
+  std::exception_ptr thrown;  // the reason why there is no result
+};
+
+void compare_scene(const CompareOptions& options, const std::string& file, Comparison& comparison) {
+  refuse_standard_input("compare", file);
+  SceneOptions scene_options = options.scene;
+  scene_options.file = file;
+  const LoadedScene scene = load(scene_options, true, golden_overrides());
+  const GoldenPlace place = find_golden(options.golden, scene, file);
   if (!place.exists)
     throw render::FileError(
         fmt::format("{}: no golden for {}; make one with: offstage bless {} --golden {} "
                     "--reason \"...\"",
-                    options.golden, options.scene.file, options.scene.file, options.golden));
+                    options.golden, file, file, options.golden));
   if (!place.moved_from.empty())
     log("note: the golden was recorded for {}, which no longer exists; it is used for {} as its moved file\n",
-        (fs::path(options.golden) / place.moved_from).lexically_normal().string(), options.scene.file);
+        (fs::path(options.golden) / place.moved_from).lexically_normal().string(), file);
+  const bool several = options.inputs.size() > 1;
+  const auto states_in = [&](const std::string& folder) {
+    return several && !folder.empty() ? (fs::path(folder) / place.name).string() : folder;
+  };
   const Golden expected = read_golden(options.golden, place.name);
-  const int threads = threads_or_all(options.threads);
-  const auto control = simulation_threads(options.threads);
-  render::pin_environment(threads, options.gl);
-  Golden actual = drawn_with_progress(scene, threads, options.states);
+  Golden actual = drawn_with_progress(scene, threads_or_all(options.threads),
+                                      {states_in(options.states.keep), states_in(options.states.from)});
   actual.scene = place.name;
   const Verdict verdict = judge(expected, actual);
+  comparison.result.output = verdict.text;
   fmt::print("{}", verdict.text);
-  if (verdict.pass) return kOk;
-  const std::string folder = options.report.empty() ? "golden-report/" + actual.scene : options.report;
+  if (verdict.pass) return;
+  comparison.code = kImagesDiffer;
+  comparison.result.outcome = TestResult::Outcome::failed;
+  comparison.result.kind = "images differ";
+  comparison.result.message = verdict.difference;
+  const fs::path folder = options.report.empty() ? fs::path("golden-report") / actual.scene
+                          : several              ? fs::path(options.report) / actual.scene
+                                                 : fs::path(options.report);
+  comparison.page = write_report(folder, expected, actual, verdict);
   fmt::print("see {}\nto accept the new pictures: offstage bless {} --golden {} --reason \"...\"\n",
-             fs::absolute(write_report(folder, expected, actual, verdict)).string(), options.scene.file,
-             options.golden);
-  return kImagesDiffer;
+             fs::absolute(comparison.page).string(), file, options.golden);
+}
+
+/// The comparison of a scene; an error of one scene leaves the others alone.
+Comparison compared(const CompareOptions& options, const std::string& file) {
+  const auto start = std::chrono::steady_clock::now();
+  Comparison comparison;
+  comparison.result.name = file;
+  comparison.result.class_name = fs::path(options.golden).lexically_normal().generic_string();
+  try {
+    compare_scene(options, file, comparison);
+  } catch (const std::exception&) {
+    comparison.thrown = std::current_exception();
+    const Failure failure = describe_failure(comparison.thrown);
+    comparison.code = failure.code;
+    comparison.result.outcome = TestResult::Outcome::error;
+    comparison.result.kind = failure.kind;
+    comparison.result.message = render::one_line(failure.message);
+    comparison.result.output = failure.message;
+  }
+  comparison.result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return comparison;
+}
+
+void write_overview(const CompareOptions& options, const std::vector<Comparison>& comparisons) {
+  std::vector<ReportedScene> scenes;
+  for (const Comparison& c : comparisons)
+    scenes.push_back(
+        {c.result, c.page.empty() ? "" : c.page.lexically_relative(options.report).generic_string()});
+  fmt::print("see {}\n", fs::absolute(write_report_overview(options.report, scenes)).string());
+}
+
+/// An error comes before a difference, the first error before the others.
+int exit_code(const std::vector<Comparison>& comparisons) {
+  int code = kOk;
+  for (const Comparison& c : comparisons) {
+    if (c.thrown) return c.code;
+    if (c.code != kOk) code = c.code;
+  }
+  return code;
+}
+
+int compare_with_goldens(const CompareOptions& options) {
+  const auto control = simulation_threads(options.threads);
+  render::pin_environment(threads_or_all(options.threads), options.gl);
+  std::vector<Comparison> comparisons;
+  const bool several = options.inputs.size() > 1;
+  for (const std::string& file : options.inputs) {
+    comparisons.push_back(compared(options, file));
+    if (several && comparisons.back().thrown) log("{}\n", comparisons.back().result.output);
+  }
+  if (!options.junit.empty()) {
+    std::vector<TestResult> results;
+    for (const Comparison& c : comparisons) results.push_back(c.result);
+    const std::string xml = junit_xml("offstage compare", results);
+    render::write_file_atomically(options.junit, {reinterpret_cast<const uint8_t*>(xml.data()), xml.size()});
+  }
+  if (!several && comparisons.front().thrown) std::rethrow_exception(comparisons.front().thrown);
+  if (several) {
+    const auto count = [&](TestResult::Outcome outcome) {
+      return std::ranges::count_if(comparisons,
+                                   [&](const Comparison& c) { return c.result.outcome == outcome; });
+    };
+    fmt::print("{} scenes: {} as recorded, {} with differences, {} with errors\n", comparisons.size(),
+               count(TestResult::Outcome::passed), count(TestResult::Outcome::failed),
+               count(TestResult::Outcome::error));
+    if (!options.report.empty()) write_overview(options, comparisons);
+  }
+  return exit_code(comparisons);
 }
 
 }  // namespace
 
 int compare_command(const CompareOptions& options) {
-  return options.other.empty() ? compare_with_golden(options) : compare_pictures(options);
+  const auto is_scene = [](const std::string& input) {
+    return input == kStandardInput || fs::path(input).extension() == ".json";
+  };
+  if (std::ranges::all_of(options.inputs, is_scene)) return compare_with_goldens(options);
+  if (options.inputs.size() != 2 || std::ranges::any_of(options.inputs, is_scene))
+    throw std::invalid_argument("compare: takes scenes (.json), or two pictures, or two folders of frames");
+  if (!options.junit.empty()) throw std::invalid_argument("compare: --junit is for scenes");
+  return compare_pictures(options);
 }
 
 int bless_command(const BlessOptions& options) {
@@ -128,7 +228,7 @@ int bless_command(const BlessOptions& options) {
   const int threads = threads_or_all(options.threads);
   const auto control = simulation_threads(options.threads);
   render::pin_environment(threads, options.gl);
-  std::set<std::string> taken;  // by scenes of this command
+  std::set<std::string> taken;  // names used by scenes of this command
   for (const std::string& file : options.scenes) {
     const LoadedScene scene = load({.file = file,
                                     .set = {},

@@ -1,4 +1,4 @@
-// schema and info, and what the commands share.
+// schema and info, and functions shared by the commands.
 
 #include <cerrno>
 #include <map>
@@ -198,7 +198,7 @@ std::string write_numbered_file(const std::string& stem, const std::string& endi
   constexpr int kMost = 10'000;
   for (int i = 1; i <= kMost; ++i) {
     const std::string name = stem + (i == 1 ? "" : "-" + std::to_string(i)) + ending;
-    // Made here and now, or it is another's.
+    // O_EXCL: the file is created here, or the name is in use.
     const render::Descriptor made(::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
     if (!made && errno == EEXIST) continue;
     if (!made) render::throw_file_error(name, "cannot be created");

@@ -1,4 +1,4 @@
-// new: a scene to begin with.
+// new: writes a first scene.
 
 #include <algorithm>
 #include <cctype>
@@ -35,7 +35,7 @@ std::string_view template_text(const std::string& name) {
                                           list_of_templates()));
 }
 
-/// As it has to be typed in a shell.
+/// The file name in the form in which it is typed in a shell.
 std::string typed(const std::string& file) {
   if (file.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./-") ==
       std::string::npos)

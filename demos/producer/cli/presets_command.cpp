@@ -1,4 +1,4 @@
-// presets: what there is to name in a scene.
+// presets: the presets that a scene can name.
 
 #include <algorithm>
 
@@ -29,7 +29,7 @@ std::vector<ArticulationPreset> articulation_presets() {
   return presets;
 }
 
-/// As a scene would have it.
+/// The preset in the form of a scene.
 std::string preset_text(const ArticulationPreset& preset) {
   Scene scene;
   scene.articulations.push_back(preset.made);

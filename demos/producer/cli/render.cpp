@@ -49,7 +49,7 @@ void report_run(const RunStats& stats, const TalkOptions& talk, const std::strin
       peak_rss_mb());
 }
 
-/// The exit code of a run that was interrupted, after saying how to go on.
+/// The exit code of an interrupted run; prints how to continue.
 int interrupted(const RunStats& stats, int total, const std::string& advice) {
   log("interrupted: {} of {} frames done{}\n", stats.frames + stats.frames_kept, total, advice);
   return 128 + stats.interrupted_by;
@@ -61,8 +61,8 @@ struct Plan {
   std::vector<int> frames;
   std::string settings;
   int threads = 1, jobs = 1;
-  bool through_frames = false;  // a video that can be resumed: frames first, then the video
-  fs::path frames_pattern;      // where frames go, if they do
+  bool through_frames = false;  // a video that can be resumed: first frames, then the video
+  fs::path frames_pattern;      // pattern of these frames
   ChannelFiles channels;
 };
 
@@ -99,7 +99,8 @@ int print_plan(const Plan& plan) {
 }
 
 std::string frame_settings(const LoadedScene& loaded, const ModelLibrary& models, render::GlPlatform gl) {
-  return settings_key(loaded, models) + (gl == render::GlPlatform::egl_gpu ? "-gpu" : "");  // other pixels
+  // Its pixels differ.
+  return settings_key(loaded, models) + (gl == render::GlPlatform::egl_gpu ? "-gpu" : "");
 }
 
 Plan make_plan(const RenderOptions& options, const ModelLibrary& models, LoadedScene loaded) {
@@ -108,9 +109,9 @@ Plan make_plan(const RenderOptions& options, const ModelLibrary& models, LoadedS
   if (!options.chunk.empty()) plan.frames = chunk_of(plan.frames, options.chunk);
   plan.settings = frame_settings(plan.loaded, models, options.gl);
   plan.threads = threads_or_all(options.threads);
-  // llvmpipe already draws one frame with all processors. On two, a second drawing thread takes about 100 MB
-  // and more processor time, and saves some 2 % by the clock; with more of them, what is serial in a frame
-  // leaves some idle.
+  // llvmpipe already draws one frame with all processors. On two processors, a second drawing thread takes
+  // about 100 MB and more processor time, and saves about 2 % of wall time. With more processors, the serial
+  // part of a frame leaves some of them idle.
   plan.jobs = options.jobs > 0 ? options.jobs : std::max(1, plan.threads / 2);
   plan.through_frames = plan.target.kind == OutputKind::video && options.resume;
   plan.frames_pattern =
@@ -122,7 +123,7 @@ Plan make_plan(const RenderOptions& options, const ModelLibrary& models, LoadedS
   return plan;
 }
 
-/// Finished frames on disk become the video; the frames go when it is there. False if interrupted.
+/// Makes the video from finished frames, and then removes the frames. Returns false if interrupted.
 bool assemble_video(const Plan& plan) {
   auto video = render::make_video_sink(video_def(plan));
   for (const int frame : plan.frames) {
@@ -183,7 +184,7 @@ int render_to_frames(const Plan& plan, const ModelLibrary& models, const RenderO
     if (!assemble_video(plan)) stats.interrupted_by = interrupt_signal();
   }
   if (plan.through_frames && !stats.interrupted_by) {
-    folder.lock = {};  // its file would keep the folder
+    folder.lock = {};  // its file would prevent the folder from being removed
     remove_frames(plan.frames_pattern.parent_path());
   }
   report_run(stats, options.talk, options.stats);
@@ -196,7 +197,7 @@ int render_to_frames(const Plan& plan, const ModelLibrary& models, const RenderO
 }
 
 int render_to_video(const Plan& plan, const ModelLibrary& models, const RenderOptions& options) {
-  // A part of a film must not look like the whole, nor replace a whole one: it gets the name when it has all
+  // A part of a film must neither look like the whole film nor replace one, so it gets its name only with all
   // frames.
   render::VideoDef def = video_def(plan);
   const OutputLock lock = lock_film(plan);
@@ -207,7 +208,7 @@ int render_to_video(const Plan& plan, const ModelLibrary& models, const RenderOp
   if (!stats.interrupted_by) {
     fs::rename(partial, plan.target.path);
     if (!plan.channels.choice.any())
-      remove_channels(channels_folder(plan.target.path));  // of an earlier film
+      remove_channels(channels_folder(plan.target.path));  // those of an earlier film
   }
   report_run(stats, options.talk, options.stats);
   if (!stats.interrupted_by) {
@@ -305,7 +306,7 @@ int render_command(const RenderOptions& options) {
 
   const auto threads = simulation_threads(options.threads);
   render::pin_environment(plan.threads, options.gl);
-  render::Context();  // a library that is missing is found before anything is written
+  render::Context();  // reports a missing library before anything is written
   if (plan.target.kind == OutputKind::pipe) return render_to_pipe(plan, models, options);
   if (plan.target.kind == OutputKind::frames || plan.through_frames)
     return render_to_frames(plan, models, options);

@@ -1,5 +1,5 @@
 #pragma once
-/// What a run of the command line says while it works: its progress, and once that it takes long and why.
+/// Messages of the command line during a run: its progress, and once that it takes long and why.
 
 #include <chrono>
 
@@ -8,7 +8,7 @@
 
 namespace offstage::producer {
 
-/// A ProgressCallback. The scene and the models must outlive it.
+/// The function for ProgressCallback. The scene and the models must outlive it.
 class RunProgress {
  public:
   RunProgress(const Scene& scene, const ModelLibrary& models, const TalkOptions& talk);

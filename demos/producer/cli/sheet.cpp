@@ -19,7 +19,7 @@
 namespace offstage::producer {
 namespace {
 
-/// So many frames from the first to the last, evenly; the one in the middle if it is one.
+/// Evenly distributed frames from the first to the last; for one frame, the middle.
 std::vector<int> spread_frames(int count, int total) {
   count = std::min(count, total);
   if (count == 1) return {(total + 1) / 2};

@@ -33,7 +33,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// One combination of values, and what came of it.
+/// One combination of values with its result.
 struct Run {
   std::vector<std::string> values;
   LoadedScene scene;
@@ -48,7 +48,7 @@ struct Sweep {
   std::vector<Variation> variations;
   std::vector<Run> runs;
   std::string csv;
-  fs::path finished;  // folder of the runs that are done, until all are
+  fs::path finished;  // folder of the finished runs until all are finished
 };
 
 /// "emitters.0.rate=200, world.seed=3"
@@ -61,7 +61,7 @@ std::string name_of(const Sweep& sweep, const Run& run) {
 
 // --- Before the work ---
 
-/// The frames at the times asked for, each once; the middle one if there are none.
+/// The frames at the given times, each once; the middle one if there are none.
 std::vector<int> frames_of(const Scene& scene, const std::vector<double>& times) {
   if (times.empty()) return {(scene.frame_count() + 1) / 2};
   std::vector<int> frames;
@@ -71,7 +71,8 @@ std::vector<int> frames_of(const Scene& scene, const std::vector<double>& times)
   return frames;
 }
 
-/// Problems of the scenes of a sweep: those of values it sets are its own, and each is told once.
+/// Collects the problems of the scenes of a sweep. A problem with a varied value belongs to one scene; other
+/// problems are reported once.
 class SweepFindings {
  public:
   void add(const std::vector<Problem>& problems) {
@@ -148,7 +149,7 @@ void check_outputs(const SweepOptions& options, const Sweep& sweep) {
 
 // --- Finished runs on disk ---
 
-/// Under a name made of all that the result depends on, so that only what is still true is found again.
+/// A name that contains everything on which the result depends, so that only valid results are found.
 std::string key_of(const Run& run, const ModelLibrary& models) {
   return text_hash(settings_key(run.scene, models) + fmt::format(" {}", fmt::join(run.frames, ",")));
 }
@@ -161,7 +162,8 @@ void keep(const Run& run, const fs::path& folder, const std::string& key) {
   for (std::size_t i = 0; i < run.pictures.size(); ++i)
     render::write_png(picture_path(folder, key, run.frames[i]), run.pictures[i]);
   const Json json = {{"figures", run.figures}, {"fault", run.fault}, {"code", run.code}};
-  write_text_file((folder / (key + ".json")).string(), json.dump() + "\n");  // last: then it is whole
+  // Last, so that its presence shows that the result is complete.
+  write_text_file((folder / (key + ".json")).string(), json.dump() + "\n");
 }
 
 bool restore(Run& run, const fs::path& folder, const std::string& key) {
@@ -181,7 +183,7 @@ bool restore(Run& run, const fs::path& folder, const std::string& key) {
   return true;
 }
 
-/// Removes what keep() wrote, named by hexadecimal keys, and the folder unless it holds something else.
+/// Removes the files that keep() wrote, named by hexadecimal keys, and the folder if it is then empty.
 void remove_finished(const fs::path& folder) {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
@@ -214,8 +216,8 @@ void fail(Run& run, const std::string& fault, int code) {
   run.pictures.clear();
 }
 
-/// Simulates and draws one combination. That its physics or its models are impossible is a result too. False
-/// if it was interrupted.
+/// Simulates and draws one combination. Impossible physics or models are a result, too. Returns false if
+/// interrupted.
 bool produce(Run& run, const SweepOptions& options, const fs::path& folder) {
   try {
     std::vector<Problem> warnings;
@@ -247,12 +249,12 @@ double available_memory_mb() {
   return INFINITY;
 }
 
-/// Works through the runs on several threads; the first one alone, which shows how much memory one takes.
+/// Processes the runs on several threads. The first run is done alone and shows the memory of one run.
 class Crew {
  public:
   Crew(Sweep& sweep, const SweepOptions& options) : sweep_(sweep), options_(options) {}
 
-  /// How many runs are done.
+  /// Returns the number of finished runs.
   std::size_t work(int jobs) {
     work_through(1);
     const double spare = available_memory_mb() / peak_rss_mb();

@@ -20,7 +20,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// How many particles a scene can have at most, in all and of each name.
+/// Greatest number of particles of a scene, in total and by name.
 struct MostParticles {
   uint64_t alive = 0;
   Json by_name = Json::object();
@@ -34,7 +34,8 @@ MostParticles most_particles(const Scene& scene) {
   return most;
 }
 
-/// Bodies that begin in each other, the deepest first. The simulation pushes them apart, which moves them.
+/// Adds warnings for bodies that overlap at the start, the deepest first. The simulation separates them,
+/// which moves them.
 void add_overlaps(const Scene& scene, const Simulation& simulation, std::vector<Problem>& warnings) {
   constexpr double kVisible = 1e-3;
   constexpr std::size_t kMost = 5;
@@ -110,7 +111,7 @@ void print_cost(const Scene& scene, const CostEstimate& cost) {
                cost.objects.front().advice);
 }
 
-/// The cost, unless the trial diverges, which is a warning.
+/// The cost; a trial that diverges is a warning.
 std::optional<CostEstimate> tried(const LoadedScene& loaded, const ModelLibrary& models,
                                   Simulation& simulation, std::vector<Problem>& warnings) {
   try {
@@ -138,7 +139,7 @@ int validate_command(const ValidateOptions& options) {
     LoadedScene loaded = load_scene(file, options.scene.overrides(), options.scene.allow);
     const TalkOptions talk{.progress = ProgressStyle::automatic, .quiet = options.json};
     const ModelLibrary models = load_models(loaded, options.scene, talk, loaded.warnings);
-    Simulation simulation(loaded.scene, models);  // what only building shows
+    Simulation simulation(loaded.scene, models);  // finds the errors that only building shows
     add_overlaps(loaded.scene, simulation, loaded.warnings);
     std::optional<CostEstimate> cost;
     if (!options.no_estimate) {

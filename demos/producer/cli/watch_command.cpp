@@ -25,9 +25,9 @@ namespace fs = std::filesystem;
 using Renderer = std::function<int(const RenderOptions&)>;
 using std::chrono::milliseconds;
 
-constexpr milliseconds kStill{120};  // that files keep before they are read
+constexpr milliseconds kStill{120};  // time without changes before files are read
 
-/// A render in a process of its own, which can be given up at any time and cannot take the watch with it.
+/// A render in a separate process, which can be ended at any time and whose crash does not affect the watch.
 class RenderProcess {
  public:
   RenderProcess(const RenderOptions& options, const Renderer& render) {
@@ -45,7 +45,7 @@ class RenderProcess {
   RenderProcess(const RenderProcess&) = delete;
   RenderProcess& operator=(const RenderProcess&) = delete;
 
-  /// Its exit code, or -1 if it crashed; nothing while it works.
+  /// Its exit code, or -1 if it crashed; nothing while it runs.
   std::optional<int> result() {
     int status = 0;
     if (waitpid(pid_, &status, WNOHANG) != pid_) return {};
@@ -59,7 +59,8 @@ class RenderProcess {
   [[noreturn]] static void become_render(const RenderOptions& options, const Renderer& render, pid_t parent) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (getppid() != parent) _exit(1);
-    // The watch gets the Ctrl-C and ends this process; what it prints as its result is a temporary name.
+    // The watch handles Ctrl-C and ends this process. The printed name of its result would be a temporary
+    // one.
     std::signal(SIGINT, SIG_IGN);
     std::signal(SIGTERM, SIG_IGN);
     if (const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC); nowhere >= 0)
@@ -72,7 +73,7 @@ class RenderProcess {
   pid_t pid_ = -1;
 };
 
-/// A hidden folder beside the output for the result that is being made; it goes with the object.
+/// A hidden folder beside the output for the unfinished result; it is removed with the object.
 class Workshop {
  public:
   explicit Workshop(const fs::path& output) {
@@ -95,13 +96,13 @@ class Workshop {
   fs::path folder_;
 };
 
-/// What the manifest of a folder names, and is there.
+/// The existing files that the manifest of a folder lists.
 std::set<fs::path> frames_in(const fs::path& pattern) {
   const std::vector<fs::path> files = files_of_frames(pattern.parent_path());
   return {files.begin(), files.end()};
 }
 
-/// Moves the files of channels into their folder, whose own are gone.
+/// Moves channel files into their folder, from which old ones were removed.
 void publish_channels(const fs::path& made, const fs::path& place) {
   fs::create_directories(place);
   for (const auto& entry : fs::directory_iterator(made))
@@ -128,7 +129,7 @@ class Watcher {
     while (!interrupt_signal()) {
       FileWatch watch(files_of_scene(options_.scene.file, options_.scene.overrides()));
       watch.settle(kStill);
-      if (watch.changed()) continue;  // and now it may be made of other files
+      if (watch.changed()) continue;  // the set of files may have changed, too
       const std::string hash = contents_hash(files_of_scene(options_.scene.file, options_.scene.overrides()));
       if (hash != rendered_) render_once(watch, hash);
       while (!watch.changed() && !interrupt_signal()) watch.wait(milliseconds(1000));
@@ -138,7 +139,7 @@ class Watcher {
   }
 
  private:
-  /// Renders unless the files change meanwhile: then the result would be late.
+  /// Renders unless the files change meanwhile, which would make the result outdated.
   void render_once(FileWatch& watch, const std::string& hash) {
     const Workshop workshop(target_.kind == OutputKind::frames ? folder() : target_.path);
     RenderOptions options = options_;
@@ -165,10 +166,10 @@ class Watcher {
 
   fs::path folder() const { return target_.path.has_parent_path() ? target_.path.parent_path() : "."; }
 
-  /// Gives the finished files their names; those of an earlier, longer film go.
+  /// Renames the finished files, and removes those of an earlier, longer film.
   void publish(const fs::path& made) {
     if (target_.kind == OutputKind::video) {
-      // The video, and its folder of channels if it has any; those of an earlier film go.
+      // The video, and its folder of channels if it has one; those of an earlier film are removed.
       remove_channels(channels_folder(target_.path));
       for (const auto& entry : fs::directory_iterator(made)) {
         const fs::path place = folder() / entry.path().filename();
@@ -195,8 +196,8 @@ class Watcher {
   const RenderOptions& options_;
   const Renderer& render_;
   OutputTarget target_;
-  std::string rendered_;    // hash of the files of the last render, good or not
-  bool published_ = false;  // by this watch
+  std::string rendered_;    // hash of the files of the last render, successful or not
+  bool published_ = false;  // whether this watch has published a result
 };
 
 }  // namespace

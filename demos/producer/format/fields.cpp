@@ -20,7 +20,7 @@ std::string quoted(std::span<const std::string> names) {
   return text;
 }
 
-/// An object in a default says no more than its type: {} stands for all of its own defaults.
+/// An object in a default is reduced to its type: {} stands for all of its own defaults.
 Node abridged(const Node& node) {
   if (const List* list = node.as<List>()) {
     List items;
@@ -32,7 +32,7 @@ Node abridged(const Node& node) {
   return type ? Object{{"type", *type}} : Object{};
 }
 
-/// Adds a key to its object's entry: the description of its value, and what is said of it.
+/// Adds a key to its object's entry: the description of its value, and its help.
 void describe_key(const Spec& spec, Description value, const std::optional<Node>& initial,
                   ObjectEntry& entry) {
   Row row{spec.key, value.type, spec.unit, spec.limits.range(), "none", spec.help};
@@ -49,7 +49,7 @@ void describe_key(const Spec& spec, Description value, const std::optional<Node>
   entry.properties.push_back({spec.key, std::move(value.schema)});
 }
 
-/// Adds the key "type" of an object that is one of a choice.
+/// Adds the key "type" of an object that is one of several alternatives.
 void describe_tag(const std::string& tag, bool required, ObjectEntry& entry) {
   const std::string value = "`\"" + tag + "\"`";
   entry.rows.push_back({"type", value, "", "", required ? "required" : value, "the kind of this object"});
@@ -62,7 +62,7 @@ void describe_tag(const std::string& tag, bool required, ObjectEntry& entry) {
 Limits within_unit(Limits limits, std::string_view unit) {
   if (limits.low != 0) return limits;
   const auto narrow = [&](Real low, Real high) {
-    if (limits.open_low) limits.low = low;  // open as it was: a varying number still needs a "min"
+    if (limits.open_low) limits.low = low;  // stays open: a varying number still needs a "min"
     limits.high = std::min(limits.high, high);
   };
   if (unit == "m")

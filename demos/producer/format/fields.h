@@ -1,8 +1,8 @@
 #pragma once
 /// One description of each key of the scene format, from which reading, writing, the schema and the reference
-/// all follow.
+/// follow.
 ///
-/// Table<T> lists the keys of a struct T as Fields<T>; Codec<V> knows how a value of type V stands in JSON. A
+/// Table<T> lists the keys of a struct T as Fields<T>; Codec<V> defines the JSON form of a value of type V. A
 /// new key is one line in a table_*.h; a new kind of value is one Codec. Those of plain values are in
 /// values.h.
 
@@ -31,11 +31,12 @@ using sim::Real;
 
 inline constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 
-/// What a number may be: also each component of a vector, and every value that a varying number can take.
+/// Allowed range of a number. It also applies to each component of a vector, and to every value of a varying
+/// number.
 struct Limits {
   Real low = -kInfinity, high = kInfinity;
   bool open_low = false, open_high = false;  ///< the bound itself is excluded
-  bool nonzero = false;                      ///< of a vector: it needs a direction
+  bool nonzero = false;                      ///< for a vector: it needs a direction
 
   bool bounded() const { return low > -kInfinity || high < kInfinity; }
   bool allows(Real v) const { return (open_low ? v > low : v >= low) && (open_high ? v < high : v <= high); }
@@ -58,31 +59,31 @@ constexpr Limits over(Real low, Real high) {
   return {.low = low, .high = high, .open_low = true};
 }
 
-/// Factors of size: with lengths of up to 1e9 m, nothing that follows from them overflows.
+/// Factors of size: with lengths of up to 1e9 m, no derived quantity overflows.
 inline constexpr Limits kScale{.low = 1e-9, .high = 1e9};
 
-/// The limits of a size, mass or coefficient narrowed to what its unit can have: lengths over 1e-9 to 1e9 m,
-/// masses up to 1e30 kg, densities of 1e-12 to 1e12 kg/m^3, coefficients up to 1e30. Limits that do not begin
+/// Narrows the limits of a size, mass or coefficient to the range of its unit: lengths to 1e-9 to 1e9 m,
+/// masses up to 1e30 kg, densities to 1e-12 to 1e12 kg/m^3, coefficients up to 1e30. Limits that do not begin
 /// at 0 stay.
 Limits within_unit(Limits limits, std::string_view unit);
 
 struct Required {};
 inline constexpr Required kRequired;
 
-/// What is said of one key.
+/// Name, help, unit and limits of one key.
 struct Spec {
   std::string key, help, unit;
   Limits limits;
   bool required = false;
 };
 
-/// Reads on past every problem and keeps them all.
+/// Continues after every problem and collects them all.
 class Reader {
  public:
-  /// `files` are the names that positions refer to.
+  /// `files` are the names for positions.
   explicit Reader(std::span<const std::string> files) : files_(files) {}
 
-  /// Runs f one step further down the path that messages name.
+  /// Runs f with one step appended to the path in messages.
   template <class F>
   void within(std::string_view step, F&& f) {
     const std::size_t length = path_.size();
@@ -91,7 +92,7 @@ class Reader {
     path_.resize(length);
   }
   Where where(Position at) const;
-  /// The first kMostProblems are kept, the rest are counted.
+  /// The first kMostProblems are stored, the rest are counted.
   void fail(Position at, std::string what) {
     if (is_full())
       ++more_;
@@ -103,20 +104,21 @@ class Reader {
   /// "must be a number, got true"
   void refuse(const Node& node, std::string_view allowed);
 
-  /// The number in `node` if it is one, within the limits.
+  /// Returns the number in `node` if it is one, within the limits.
   std::optional<Real> number(const Node& node, const Spec& spec);
-  /// The same for a whole number; 1e6 and 3.0 are whole.
+  /// The same for an integer; 1e6 and 3.0 are integers.
   std::optional<int64_t> integer(const Node& node, const Spec& spec);
-  /// The list in `node` if it is one and has from `least` to `most` items.
+  /// Returns the list in `node` if it is one and has from `least` to `most` items.
   const List* list(const Node& node, std::string_view allowed, std::size_t least = 0,
                    std::size_t most = SIZE_MAX);
-  /// Which of `names` the string in `node` is.
+  /// Returns the index in `names` of the string in `node`.
   std::optional<std::size_t> choice(const Node& node, std::span<const std::string> names);
-  /// Which of `names` the key "type" of an object is; without that key the first, unless it is required.
+  /// Returns the index in `names` of the key "type" of an object; without that key the first one, unless it
+  /// is required.
   std::optional<std::size_t> type(const Node& node, std::span<const std::string> names, bool required);
-  /// Calls read(i, value) for each key of an object that is specs[i], at that key's path. Reports unknown
-  /// keys (other than "type" if the object is `tagged`) and required ones that are missing. `name` is what
-  /// messages call the object.
+  /// Calls read(i, value) for each key of an object that is specs[i], with that key's path. Reports unknown
+  /// keys (except "type" if the object is `tagged`) and missing required keys. `name` is the name of the
+  /// object in messages.
   void keys(const Node& node, std::string_view name, std::span<const Spec* const> specs, bool tagged,
             const std::function<void(std::size_t, const Node&)>& read);
 
@@ -129,7 +131,7 @@ class Reader {
   std::size_t more_ = 0;
 };
 
-/// How a kind of value is described: as JSON Schema, and in a word for the reference.
+/// Description of a kind of value: as JSON Schema, and in one word for the reference.
 struct Description {
   Object schema;
   std::string type;
@@ -149,13 +151,13 @@ struct ObjectEntry {
 
   Node definition() const;  ///< JSON Schema
 };
-/// Every object of the format, each after the first that refers to it.
+/// Every object of the format, each after the first one that refers to it.
 class Catalogue {
  public:
-  /// A reference to the named object; `describe` fills in its entry the first time.
+  /// Returns a reference to the named object; `describe` fills in its entry the first time.
   Description refer(const std::string& name, std::string_view help,
                     const std::function<void(ObjectEntry&)>& describe);
-  /// A reference to a schema that many keys share.
+  /// Returns a reference to a schema that many keys share.
   Object share(const std::string& name, const Node& schema);
 
   const std::deque<ObjectEntry>& objects() const { return objects_; }
@@ -166,7 +168,7 @@ class Catalogue {
   Object shared_;
 };
 
-/// How a value of type V is read, written and described, by three static functions:
+/// Reads, writes and describes a value of type V, by three static functions:
 /// - `void read(Reader&, const Node&, const Spec&, V& out)` leaves a usable `out` if the value is wrong;
 /// - `Node write(const V&)`, or `std::optional<Node>` where a value can be absent;
 /// - `Description describe(Catalogue&, const Spec&)`.
@@ -181,8 +183,8 @@ concept Tabled = requires {
   Table<T>::kName;
 };
 
-/// The codec of one type, for a value at some address. What follows knows the types of values and of objects
-/// no further: two hundred keys would otherwise be as many classes of functions to compile.
+/// The codec of one type, for a value at some address. The code below does not depend on the types of values
+/// and objects; otherwise two hundred keys would be as many classes of functions to compile.
 struct ValueKind {
   void (*read)(Reader&, const Node&, const Spec&, void* out);
   std::optional<Node> (*write)(const void* value);
@@ -196,11 +198,11 @@ inline constexpr ValueKind kValueKind = {
     [](const void* value) -> std::optional<Node> { return Codec<V>::write(*static_cast<const V*>(value)); },
     [](Catalogue& all, const Spec& spec) { return Codec<V>::describe(all, spec); }};
 
-/// A key of an object: what is said of it, and where its value lies in the object.
+/// A key of an object: its Spec, and the position of its value in the object.
 struct Key {
   Spec spec;
   const ValueKind* kind;
-  std::ptrdiff_t offset;  ///< of the value in the object [bytes]
+  std::ptrdiff_t offset;  ///< offset of the value in the object [bytes]
 
   Key(const char* key, const char* help, const char* unit, Limits limits, bool required,
       const ValueKind& value_kind, std::ptrdiff_t value_offset);
@@ -219,7 +221,7 @@ const T& initial_object() {
   static const T object{};
   return object;
 }
-/// Where a part of the initial object lies in it [bytes].
+/// Offset of a part in the initial object [bytes].
 template <class T, class Part>
 std::ptrdiff_t offset_in(const Part& part) {
   return reinterpret_cast<const std::byte*>(&part) - reinterpret_cast<const std::byte*>(&initial_object<T>());
@@ -241,7 +243,7 @@ struct Field : Key {
       : Key(key, help, unit, limits, required, kValueKind<M>, offset_in<T>(initial_object<T>().*member)) {}
 };
 
-/// Adds the keys of a part that lies at `offset` in the object.
+/// Adds the keys of a part at `offset` in the object.
 void append(std::vector<Key>& keys, std::span<const Key> part, std::ptrdiff_t offset);
 
 /// The keys of T, in the order of the reference.
@@ -254,9 +256,9 @@ class Fields {
 
   std::span<const Key> keys() const { return keys_; }
 
-  /// Adds more keys of its own.
+  /// Adds further keys of T.
   Fields then(const Fields& more) && { return std::move(*this).add(more, 0); }
-  /// Adds the keys of a member, or of a base, that stand directly in T.
+  /// Adds the keys of a member, or of a base, which are directly in T.
   template <class Part>
   Fields with(Part T::*part) && {
     return std::move(*this).add(Table<Part>::fields(), offset_in<T>(initial_object<T>().*part));
@@ -324,8 +326,8 @@ struct Codec<E> {
   static Description describe(Catalogue&, const Spec&) { return describe_names(Names<E>::kNames); }
 };
 
-/// Objects distinguished by "type": `kName`, `kHelp`, `kTags` for each alternative, `kRequired` or else the
-/// first if absent.
+/// Objects distinguished by "type": `kName`, `kHelp`, `kTags` for each alternative; `kRequired`, or else the
+/// first one if absent.
 template <class V>
 struct Tags;
 

@@ -18,7 +18,7 @@ std::string text_of(const Node* node) {
   return text ? *text : "";
 }
 
-/// The list under a key of an object, made if there is none; nullptr if there is something else.
+/// Returns the list at a key of an object, created if there is none; null if the value is not a list.
 List* list_in(Node& object, std::string_view key) {
   if (Node* node = object.find(key)) return node->as<List>();
   Object* members = object.as<Object>();
@@ -68,7 +68,7 @@ class Layer {
     problems_.push_back({{file, at.at.line, at.at.column, path}, what});
   }
 
-  /// The tree of a preset, or nullptr with a problem.
+  /// Returns the tree of a preset, or null with a problem.
   const Node* preset(const std::string& name, const Node& at, const std::string& path) {
     if (const auto known = presets_.find(name); known != presets_.end()) return &known->second;
     try {
@@ -120,8 +120,8 @@ class Layer {
     emitter = std::move(base);
   }
 
-  /// Adds the items of a preset's list, with what replaces their keys; returns how many. Takes names off
-  /// `unused`.
+  /// Adds the items of a preset's list, with the keys that replace theirs; returns their number. Removes
+  /// their names from `unused`.
   std::size_t add_items(const Node& tree, std::string_view key, const Node* overrides,
                         std::vector<std::string>& unused) {
     const Node* items = tree.find(key);

@@ -39,8 +39,8 @@ std::string step(std::size_t i) {
   return "/" + std::to_string(i);
 }
 
-/// The mass that resists a force; infinite for what does not move; nothing for a mesh, which is not read
-/// here.
+/// The mass that resists a force; infinite for a body that is not dynamic; nothing for a mesh, which is not
+/// read here.
 std::optional<Real> mass_of(const Body& body) {
   if (body.motion != sim::MotionType::dynamic) return kUnlimited;
   if (body.mass > 0) return body.mass;
@@ -77,13 +77,14 @@ class Checker {
     for (const Force& force : scene_.forces)
       std::visit(
           [&](const auto& f) {
-            if (!f.where.path.empty()) check_force(f);  // else its type was wrong, and none was read
+            if (!f.where.path.empty()) check_force(f);  // otherwise its type was invalid, and it was not read
           },
           force);
     for (const Overlay& overlay : scene_.overlays)
       std::visit(
           [&](const auto& o) {
-            if (!o.where.path.empty()) check_overlay(o);  // else its type was wrong, and none was read
+            // Otherwise its type was invalid, and it was not read.
+            if (!o.where.path.empty()) check_overlay(o);
           },
           overlay);
     std::visit(
@@ -143,7 +144,7 @@ class Checker {
     const std::string wrong = file.empty() ? "" : folder_.wrong_file(folder_ / file);
     if (!wrong.empty()) fail(path, wrong);
   }
-  /// Of a model: beside the scene, or one that comes with offstage.
+  /// Checks the file of a model: beside the scene, or one that comes with offstage.
   void check_model(const std::string& path, const std::string& file) {
     const std::string wrong = file.empty() ? "" : folder_.wrong_file(model_file(file, folder_));
     if (!wrong.empty()) fail(path, wrong);
@@ -163,7 +164,7 @@ class Checker {
       else
         check_grain(material);
   }
-  /// Friction across a grain takes a material that has it and a body that says which way the grain goes.
+  /// Friction across an axis needs a material that defines it and a body with a friction_axis.
   void check_grain(const Material& material) {
     bool any = false;
     for (const Body& body : scene_.bodies) any = any || (body.material == material.name && has_grain(body));
@@ -181,7 +182,7 @@ class Checker {
     for (const ContactRule& rule : scene_.contacts) {
       const std::string& path = rule.where.path;
       const auto& [a, b] = rule.materials;
-      if (a.empty() || b.empty()) continue;  // reported as what they are
+      if (a.empty() || b.empty()) continue;  // reported by another check
       for (std::size_t i = 0; i < 2; ++i)
         if (const std::string& name = rule.materials[i]; !find_named(scene_.materials, name))
           fail(path + "/materials" + step(i),
@@ -248,7 +249,7 @@ class Checker {
 
   // --- Springs ---
 
-  /// The mass at an end; nothing if it is not known or wrong.
+  /// The mass at an end; nothing if it is unknown or invalid.
   std::optional<Real> check_end(const SpringEnd& end, const std::string& path) {
     if (!end.body.empty() && !end.particles.empty()) {
       fail(path, "must name a body or a particle, not both");
@@ -275,7 +276,7 @@ class Checker {
     return {};
   }
 
-  /// Their bodies are in the flat scene only.
+  /// Their bodies exist only in the flat scene.
   void check_materials_of_articulations() {
     std::set<std::pair<std::string, std::string>> seen;
     for (const Body& body : flat_.bodies)
@@ -292,8 +293,8 @@ class Checker {
       fail(path, "has the same particle at both ends");
     if (!a || !b || *a <= 0 || *b <= 0) return;
     if (std::isinf(*a) && std::isinf(*b)) return warn(path, "has no effect: neither end can move");
-    // One spring alone on a point of each mass: further springs, and ends away from a centre of mass, only
-    // shorten the step it needs, so what fails here fails in the scene.
+    // Stability of a single spring between two point masses. Further springs, and ends away from a centre of
+    // mass, only reduce the stable step, so a spring that fails here fails in the scene.
     const Real reduced = 1 / (1 / *a + 1 / *b);
     check_stiffness(spring.stiffness, spring.damping, reduced, path, "the spring '" + spring.name + "'");
   }
@@ -347,7 +348,7 @@ class Checker {
     check_period(field, field.start, field.end);
     check_region(field.where.path, field.region, field.drop_rate);
   }
-  /// Whether a list names a body, or what it is a copy of.
+  /// Whether a list names a body, or its original.
   bool names(const std::vector<std::string>& bodies, const Body& body) const {
     return std::ranges::any_of(bodies, [&](const std::string& name) {
       const Body* original = find_named(scene_.bodies, name);
@@ -396,7 +397,7 @@ class Checker {
 
   // --- Overlays ---
 
-  /// The body of that name; reports if there is none.
+  /// Returns the body of that name; reports an error if there is none.
   const Body* named_body(const std::string& path, const std::string& name) {
     check_body_name(path, name);
     const auto body = bodies_.find(name);
@@ -520,8 +521,8 @@ class Checker {
   const Scene& scene_;
   const Scene& flat_;
   const SceneFolder& folder_;
-  std::map<std::string, const Body*> bodies_;  // with their copies, by name
-  std::vector<std::string> systems_;           // of particles
+  std::map<std::string, const Body*> bodies_;  // including copies, by name
+  std::vector<std::string> systems_;           // names of particle systems
   std::set<std::string> used_materials_;
   Findings findings_;
 };
@@ -533,9 +534,9 @@ Findings check_scene(const Scene& scene, const Scene& flat, const SceneFolder& f
 }
 
 Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real c, Real m) {
-  // x'' = -(k/m) x and v' = -(c/m) v: the ends of the stability region on the imaginary and on the negative
-  // real axis. The Euler methods, the leapfrog and the midpoint rule share 2; Runge-Kutta 4 has 2 sqrt(2)
-  // and 2.785. The implicit method has no end, and the others, from there on, find their own step.
+  // x'' = -(k/m) x and v' = -(c/m) v: limits of the stability region on the imaginary and on the negative
+  // real axis. For the Euler methods, leapfrog and the midpoint rule both are 2; for Runge-Kutta 4 they are 2
+  // sqrt(2) and 2.785. The implicit method has no limit, and the following methods choose their own step.
   if (integrator >= sim::IntegratorKind::implicit_euler) return kUnlimited;
   const bool rk4 = integrator == sim::IntegratorKind::rk4;
   const Real by_stiffness = (rk4 ? 2 * std::sqrt(2.0) : 2) * std::sqrt(m / k),

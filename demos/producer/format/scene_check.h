@@ -1,6 +1,6 @@
 #pragma once
-/// What a scene must be beyond the types and ranges of its keys: names that lead somewhere, times that
-/// increase, files that exist, springs that the step can follow, emitters that can emit.
+/// Checks of a scene beyond the types and ranges of its keys: names that exist, times that increase, files
+/// that exist, springs that are stable at the step, emitters with valid parameters.
 
 #include <filesystem>
 #include <optional>
@@ -17,18 +17,18 @@ struct Findings {
   std::vector<Problem> errors, warnings;
 };
 
-/// Checks a scene as described; `flat` is the same with placements expanded. `folder` is where files are
-/// sought. Problems have a path only: who knows the text adds the lines.
+/// Checks a scene as described; `flat` is the same with placements expanded. Files are searched in `folder`.
+/// Problems only have a path; the caller adds the lines.
 Findings check_scene(const Scene& scene, const Scene& flat, const SceneFolder& folder);
 
-/// The longest step at which the integrator can follow a damped spring of stiffness k and damping c on a
-/// reduced mass m.
+/// Returns the longest step at which the integrator is stable for a damped spring of stiffness k and damping
+/// c on a reduced mass m.
 Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real c, Real m);
 
-/// What is wrong with a drag [kg/s] on what resists by m: a mass, or a moment of inertia.
+/// Returns an error message if a drag [kg/s] is too large for m, a mass or a moment of inertia.
 std::optional<std::string> too_much_drag(const Scene& scene, sim::IntegratorKind integrator, Real drag,
                                          Real m);
-/// What is wrong with a place that is not in the world.
+/// Returns an error message if a position is outside of the world.
 std::optional<std::string> outside(const Scene& scene, const Vec3& position);
 
 }  // namespace offstage::producer

@@ -51,7 +51,7 @@ class ClothChecker {
   void check_grid(const Cloth& cloth, FlatCloth flat) {
     for (const ClothPin& pin : cloth.pins) {
       const PinScope& scope = scope_of(pin);
-      if (scope.where.path.empty()) continue;  // its type was wrong, and none was read
+      if (scope.where.path.empty()) continue;  // its type was invalid, and it was not read
       const std::vector<uint32_t> held = pinned_vertices(pin, cloth, flat);
       if (held.empty()) fail(scope.where.path, "selects no vertex of the cloth; " + extent(flat));
     }

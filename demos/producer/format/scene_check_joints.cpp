@@ -25,7 +25,7 @@ class JointChecker {
     for (const ArticulationTemplate& articulation : scene_.articulations)
       std::visit(
           [this](const auto& a) {
-            if (!a.where.path.empty()) check(a);  // else its type was wrong, and none was read
+            if (!a.where.path.empty()) check(a);  // otherwise its type was invalid, and it was not read
           },
           articulation);
   }

@@ -1,5 +1,5 @@
 #pragma once
-/// What only the whole of a scene shows of its joints: bodies that exist, limits that fit the kind of joint.
+/// Checks of joints that need the whole scene: bodies that exist, limits that fit the kind of joint.
 
 #include "producer/format/scene_check.h"
 

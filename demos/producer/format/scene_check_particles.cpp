@@ -15,7 +15,7 @@ namespace offstage::producer {
 namespace {
 
 constexpr Real kMostParticles = 2e7;
-constexpr Real kTolerance = 1.01;  // one that ends and one that begins at the same time are both counted
+constexpr Real kTolerance = 1.01;  // an ending and a beginning particle at the same time are both counted
 constexpr Real kSmallest = 1e-6;   // radius [m]
 
 std::string index_step(std::size_t i) {
@@ -26,7 +26,7 @@ Real film_end(const Scene& scene) {
   return scene.output.start + scene.output.duration;
 }
 
-/// The smallest width of a surface; infinite for a model, which is not read here.
+/// Smallest width of a surface; infinite for a model, which is not read here.
 Real spread_of(const EmitterSurface& surface) {
   return std::visit(
       []<class S>(const S& s) {
@@ -60,7 +60,7 @@ class ParticleChecker {
     findings_.warnings.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
   }
 
-  /// Groups and sources have one space of names, since forces name either.
+  /// Groups and sources share one set of names, because forces refer to both.
   void check_names() {
     std::map<std::string, std::string> owners;
     std::set<std::string> reported;
@@ -77,7 +77,7 @@ class ParticleChecker {
   }
 
   void check_drag(const ParticleBehaviour& behaviour, Real mass, const std::string& path) {
-    if (behaviour.integrator == sim::IntegratorKind::leapfrog) return;  // damps as fast as drag can
+    if (behaviour.integrator == sim::IntegratorKind::leapfrog) return;  // stable for any drag
     if (const auto problem = too_much_drag(scene_, behaviour.integrator, behaviour.linear_drag, mass))
       fail(path + "/linear_drag", *problem);
   }
@@ -132,7 +132,7 @@ class ParticleChecker {
     if (b.dies_on_hit && !hits) warn(path + "/dies_on_hit", "has no effect: its particles do not collide");
   }
 
-  /// What is to happen at an age that no particle reaches never happens.
+  /// Reports ages that no particle reaches.
   void check_lifespan(const ParticleSource& source) {
     const std::string& path = source.where.path;
     const Real longest = effects::upper_bound(source.lifespan);
@@ -180,7 +180,7 @@ class ParticleChecker {
 
   void check_count(const Emitter& emitter) {
     const int copies = copy_count(emitter.placement);
-    bool refused = false;  // what comes from too many is too many as well
+    bool refused = false;  // child particles of a refused source are not reported again
     bound_sources(emitter, film_end(scene_),
                   [&](const ParticleSource& source, const std::string&, const SourceBound& bound) {
                     if (!refused) refused = check_bound(emitter, source, bound, copies);
@@ -188,7 +188,7 @@ class ParticleChecker {
     too_many_ = too_many_ || refused;
   }
 
-  /// Whether it is refused.
+  /// Returns whether it is refused.
   bool check_bound(const Emitter& emitter, const ParticleSource& source, const SourceBound& bound,
                    int copies) {
     const std::string& path = source.where.path;

@@ -9,13 +9,13 @@
 
 namespace offstage::producer {
 
-/// Adds what is wrong with the particles of a scene as described; `flat`: with its placements expanded.
+/// Adds the problems of the particles of a scene as described; `flat`: with its placements expanded.
 void check_particles(const Scene& scene, const Scene& flat, Findings& findings);
 
 /// The names of all particle systems: of groups, of emitters, and of their child particles.
 std::vector<std::string> particle_names(const Scene& scene);
 
-/// How many particles of one name there can be at once.
+/// Greatest number of particles of one name at one time.
 struct ParticleBound {
   std::string name;
   uint64_t alive = 0;

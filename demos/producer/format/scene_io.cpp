@@ -40,7 +40,7 @@ void name_everything(Scene& scene, const std::string& file) {
     if (std::string& name = named(scene.forces[i]).name; name.empty()) name = "force_" + std::to_string(i);
 }
 
-/// What is beyond kMostProblems becomes a number.
+/// Replaces the problems beyond kMostProblems by their number.
 void count_the_rest(std::vector<Problem>& problems, std::size_t more) {
   if (problems.size() > kMostProblems) {
     more += problems.size() - kMostProblems;
@@ -49,7 +49,7 @@ void count_the_rest(std::vector<Problem>& problems, std::size_t more) {
   if (more > 0) problems.push_back({{}, "and " + std::to_string(more) + " more problems"});
 }
 
-/// Refuses what would take too much memory only to be described.
+/// Refuses a scene whose description alone would take too much memory.
 void check_count(const SceneSource& source) {
   const Node* bodies = source.root.find("bodies");
   const List* list = bodies ? bodies->as<List>() : nullptr;
@@ -60,7 +60,7 @@ void check_count(const SceneSource& source) {
 }
 
 void append(std::vector<Problem>& all, const std::vector<Problem>& more, const SceneSource& source) {
-  // Finding a place takes time; what is counted only needs none.
+  // Finding a position takes time; problems that are only counted do not need one.
   constexpr std::size_t kLocated = 4 * kMostProblems;
   for (const Problem& problem : more)
     all.push_back({all.size() < kLocated ? source.locate(problem.where.path) : problem.where, problem.what});

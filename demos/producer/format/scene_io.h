@@ -1,6 +1,6 @@
 #pragma once
-/// Scene files: reading with every problem reported at once, the schema and the reference made from the same
-/// table.
+/// Scene files: reading with every problem reported at once, and the schema and the reference made from the
+/// same table.
 
 #include <filesystem>
 #include <string>
@@ -15,18 +15,19 @@ namespace offstage::producer {
 
 struct LoadedScene {
   Scene scene;
-  SceneFolder folder;  ///< relative files are sought here
+  SceneFolder folder;  ///< folder of relative files
   std::vector<Problem> warnings;
-  std::string canonical;  ///< the effective scene with every default, as compact JSON: what a run depends on
+  /// The effective scene with every default, as compact JSON; it determines the result of a run.
+  std::string canonical;
 };
 
 /// Reads a scene file and its includes, applies `overrides` ("path=value", path as a JSON pointer or dotted),
-/// checks all of it. The file "-" is standard input. Files that it names lie in its folder or in the
+/// and checks the result. The file "-" is standard input. Files that it names must be in its folder or in the
 /// `allowed` ones. Throws SceneError with the problems.
 LoadedScene load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides = {},
                        const std::vector<std::string>& allowed = {});
 
-/// The same from text; `name` stands for the file in messages.
+/// The same from text; `name` is used as the file name in messages.
 LoadedScene parse_scene(std::string_view text, const std::string& name, const SceneFolder& folder,
                         const std::vector<std::string>& overrides = {});
 

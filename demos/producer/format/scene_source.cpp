@@ -59,7 +59,7 @@ std::vector<std::string> names_in(const List& list) {
   return names;
 }
 
-/// The item a step names: by index, else by its key "name".
+/// The item that a step names: by index, else by its key "name".
 std::optional<std::size_t> find_item(const List& list, const std::string& step) {
   if (const auto index = to_index(step)) return *index < list.size() ? index : std::nullopt;
   const std::vector<std::string> names = names_in(list);
@@ -68,7 +68,7 @@ std::optional<std::size_t> find_item(const List& list, const std::string& step) 
   return static_cast<std::size_t>(it - names.begin());
 }
 
-/// Gives a tree one place: that of the override it comes from.
+/// Gives all nodes of a tree one position: that of the override from which it comes.
 void stamp(Node& node, Position at) {
   node.at = at;
   if (List* list = node.as<List>())
@@ -85,7 +85,7 @@ void stamp(Node& node, Position at) {
 
 void merge(Node& base, Node top, bool at_root);
 
-/// The same for all names of a file, as far as the system can tell.
+/// The same value for all names of a file, as far as the system can tell.
 fs::path identity_of(const fs::path& file) {
   std::error_code error;
   fs::path identity = fs::weakly_canonical(file, error);
@@ -98,7 +98,7 @@ class Includer {
 
   std::vector<Problem> problems;
 
-  /// The tree of one text with all it includes below it.
+  /// The tree of one text with all of its includes.
   Node read(std::string_view text, const std::string& name, const fs::path& folder) {
     const int file = static_cast<int>(files_.size());
     files_.push_back(name);
@@ -129,7 +129,7 @@ class Includer {
     return all;
   }
 
-  /// Files being read, each including the next.
+  /// Files being read, each included by the one before.
   std::vector<fs::path> open;
 
  private:
@@ -180,8 +180,8 @@ class Includer {
   const SceneFolder& scene_;
 };
 
-/// Lays `top` over `base`; an object that names its type replaces one of another. Lists at the root are
-/// joined.
+/// Merges `top` into `base`; an object with a "type" replaces one of another type. Lists at the root are
+/// concatenated.
 void merge(Node& base, Node top, bool at_root) {
   Object* below = base.as<Object>();
   Object* above = top.as<Object>();
@@ -192,7 +192,7 @@ void merge(Node& base, Node top, bool at_root) {
     return;
   }
   base.at = top.at;
-  std::unordered_map<std::string, std::size_t> known;  // keys of one object are unique
+  std::unordered_map<std::string, std::size_t> known;  // keys of an object are unique
   for (std::size_t i = 0; i < below->size(); ++i) known.emplace((*below)[i].key, i);
   for (Member& member : *above) {
     const auto place = known.find(member.key);
@@ -254,7 +254,7 @@ const std::string& standard_input() {
     while (true) {
       pollfd input{STDIN_FILENO, POLLIN, 0};
       constexpr int kWait_ms = 200;
-      const int ready = ::poll(&input, 1, kWait_ms);  // so that a signal ends the wait
+      const int ready = ::poll(&input, 1, kWait_ms);  // limited, so that a signal ends the wait
       if (interrupt_signal()) throw Interrupted(interrupt_signal());
       if (ready == 0 || (ready < 0 && errno == EINTR)) continue;
       const ssize_t got = ::read(STDIN_FILENO, part.data(), part.size());
@@ -292,7 +292,7 @@ void apply_override(SceneSource& source, const std::string& override, const Node
   const Position here{file, 0, 0};
   const std::vector<std::string> steps = split_path(override.substr(0, equals));
   Node* node = &source.root;
-  const Node* guide = &defaults;  // what stands at the same place in a scene of defaults
+  const Node* guide = &defaults;  // the value at the same place in a scene of defaults
   std::string path;
   for (std::size_t i = 0; i < steps.size(); ++i) {
     const std::string& step = steps[i];

@@ -1,6 +1,6 @@
 #pragma once
-/// The text of a scene: its file, the files it includes, and the overrides of the command line, joined into
-/// one tree that still knows where each value came from.
+/// The text of a scene: its file, the files it includes, and the overrides of the command line, merged into
+/// one tree in which every value keeps its position.
 
 #include <filesystem>
 #include <string>
@@ -14,35 +14,37 @@
 namespace offstage::producer {
 
 struct SceneSource {
-  std::vector<std::string> files;  ///< what positions refer to
+  std::vector<std::string> files;  ///< file names for positions
   Node root;
 
-  /// Where the value at a JSON pointer stands; if it was not given, where what should hold it stands.
+  /// Position of the value at a JSON pointer; if it was not given, position of the object that would contain
+  /// it.
   Where locate(const std::string& path) const;
 };
 
-/// Stands for standard input where the command line names a scene file, and what messages call it.
+/// Name of standard input as a scene file on the command line and in messages.
 inline constexpr std::string_view kStandardInput = "-";
 inline constexpr const char* kStandardInputName = "<stdin>";
 
-/// The text of a regular file of at most kMostTextBytes. Throws SceneError if it cannot be read.
+/// Returns the text of a regular file of at most kMostTextBytes. Throws SceneError if it cannot be read.
 std::string read_text(const std::filesystem::path& file);
 
-/// All of standard input, which is read once and kept. Throws SceneError if it cannot be read or is longer
-/// than 256 MiB.
+/// Returns all of standard input, which is read once and stored. Throws SceneError if it cannot be read or is
+/// longer than 256 MiB.
 const std::string& standard_input();
 
-/// Parses `text` and what it includes. Included files are sought beside the file that names them (`folder`
-/// for `text`). Objects are merged key by key and the including file wins; lists at the top are joined,
-/// included first. Throws SceneError for what is no JSON, cannot be read, or includes itself.
+/// Parses `text` and its includes. Included files are searched beside the file that names them (`folder` for
+/// `text`). Objects are merged key by key, and the including file has priority; lists at the top are
+/// concatenated, included first. Throws SceneError for a text that is not JSON, cannot be read, or includes
+/// itself.
 SceneSource read_source(std::string_view text, const std::string& name, const SceneFolder& folder);
 
-/// Lays `top` over `base`, object by object; one that names its type replaces one of another.
+/// Merges `top` into `base`, object by object; an object with a "type" replaces one of another type.
 void lay_over(Node& base, Node top);
 
-/// Sets "path=value" in the tree; the value is JSON or else a string, the path as in /emitters/0/rate or
-/// emitters.rain.rate. What the tree lacks is made, lists with the content they have in `defaults`. Adds to
-/// `problems` if the path leads nowhere.
+/// Sets "path=value" in the tree. The value is JSON or else a string; the path is as /emitters/0/rate or
+/// emitters.rain.rate. Missing parts of the tree are created, lists with their content in `defaults`. Adds to
+/// `problems` if the path does not exist.
 void apply_override(SceneSource& source, const std::string& override, const Node& defaults,
                     std::vector<Problem>& problems);
 

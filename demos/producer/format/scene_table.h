@@ -1,5 +1,5 @@
 #pragma once
-/// Every key of the scene format: the one place that lists them, with units, ranges and help.
+/// All keys of the scene format with units, ranges and help texts; each is defined only here.
 
 #include "producer/format/fields.h"
 #include "producer/scene/scene.h"
@@ -7,9 +7,9 @@
 namespace offstage::producer {
 
 void read_scene(Reader& in, const Node& node, Scene& out);
-/// With every key, defaults too.
+/// Writes a scene with every key, including defaults.
 Node write_scene(const Scene& scene);
-/// The scene first, then every object in it.
+/// Returns the scene first, then every object in it.
 Catalogue scene_catalogue();
 
 }  // namespace offstage::producer

@@ -9,7 +9,7 @@
 
 namespace offstage::producer {
 
-/// Name and text of each, by name.
+/// Name and text of each template, ordered by name.
 using EmbeddedText = std::pair<std::string_view, std::string_view>;
 std::span<const EmbeddedText> templates();
 

@@ -1,5 +1,5 @@
 #pragma once
-/// The keys of how a scene is filmed: camera, light, environment, picture, time.
+/// The keys of the film: camera, light, environment, picture, time.
 
 #include <array>
 
@@ -232,7 +232,7 @@ struct Table<RenderSettings> {
         {"exposure", &T::exposure, "brightness factor of the whole picture; a number or a curve over time",
          "", kPositive},
         {"metering", &T::metering,
-         "`fixed` uses `exposure` as it is; `automatic` also brings each frame to the same average "
+         "`fixed` uses `exposure` unchanged; `automatic` also brings each frame to the same average "
          "brightness"},
         {"bloom", &T::bloom, "share of very bright light that spreads as glow; 0: none", "", kNotNegative},
         {"tone_curve", &T::tone_curve, "mapping from light to picture values"},

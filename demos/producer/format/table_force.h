@@ -1,5 +1,5 @@
 #pragma once
-/// The keys of forces: fields in a region, moving air, a hand, explosions, forces between particles.
+/// The keys of forces: fields in a region, moving air, grabs, explosions, forces between particles.
 
 #include <array>
 
@@ -161,7 +161,7 @@ struct Table<Grab> {
             {"stiffness", &T::stiffness, "force per distance from the hand", "N/m", kNotNegative},
             {"damping", &T::damping, "force per speed relative to the hand", "N s/m", kNotNegative},
             {"reach", &T::reach,
-             "particles and points of cloths farther from the hand than this are not held", "m", kPositive},
+             "particles and cloth points at a greater distance from the hand are not held", "m", kPositive},
             {"start", &T::start, "time at which the hand grabs", "s", kNotNegative},
             {"end", &T::end, "time at which the hand releases", "s", kNotNegative}};
   }

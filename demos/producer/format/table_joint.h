@@ -221,7 +221,7 @@ struct Table<Crane> {
         {"slew", &T::slew, "rotation of the jib over time, in degrees"},
         {"trolley", &T::trolley,
          "outward displacement of the trolley over time, in metres, from its place at 0.6 of the reach"},
-        {"hoist", &T::hoist, "height over time, in metres, by which the load is lifted"},
+        {"hoist", &T::hoist, "upward displacement of the load over time, in metres"},
         {"frame", &T::frame, "name of the material of mast, jib and trolley; empty: grey"},
         {"load", &T::load, "name of the material of load and counterweight; empty: grey"}}
         .with(&T::placement);

@@ -1,5 +1,5 @@
 #pragma once
-/// The keys of overlays: what is drawn over the picture to show how the simulation sees it.
+/// The keys of overlays: lines and text over the picture that show the state of the simulation.
 
 #include <array>
 
@@ -81,7 +81,7 @@ struct Table<ContactsOverlay> {
         {"b", &T::b, "name of another body; empty: every pair of bodies that collide"},
         {"margin", &T::margin, "two bodies that are not dynamic are in contact if they are closer than this",
          "m", kNotNegative},
-        {"size", &T::size, "radius of the rings; arrows are four times as long", "m", kPositive},
+        {"size", &T::size, "radius of the rings; the length of arrows is four times this", "m", kPositive},
         {"force_scale", &T::force_scale,
          "length of the arrows per contact force, which then includes friction; 0: all arrows have one "
          "length",

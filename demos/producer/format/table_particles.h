@@ -175,7 +175,7 @@ struct Table<ParticleSource> {
         .with(&T::behaviour);
   }
 };
-/// Child particles of any kind of parent.
+/// Child particles of any source.
 template <class T>
 Fields<T> with_offspring(Fields<T> fields) {
   return std::move(fields).then({
@@ -207,7 +207,7 @@ template <>
 struct Names<effects::Axis> {
   static constexpr std::array kNames = {"normal", "velocity"};
 };
-/// What events of all kinds have.
+/// Keys of all events.
 template <class T>
 Fields<T> event_fields() {
   return with_offspring(Fields<T>{

@@ -1,5 +1,5 @@
 #pragma once
-/// The keys of what is simulated: the world, materials, bodies with their shapes and placement, springs.
+/// The keys of simulated objects: the world, materials, bodies with their shapes and placement, springs.
 /// Those of particles are in table_particles.h, those of forces in table_force.h.
 
 #include <array>
@@ -308,7 +308,7 @@ struct Table<Body> {
         {"friction_axis", &T::friction_axis,
          "direction in the body's frame along which the material's `friction` applies; across it, "
          "`cross_friction` applies; zero: friction is the same in all directions. If both bodies of a "
-         "contact have an axis, that of the body that comes first in the scene is used"},
+         "contact have an axis, the one of the body that is listed first in the scene is used"},
         {"surface_velocity", &T::surface_velocity,
          "velocity of the surface relative to the body, as on a conveyor belt; in the body's frame", "m/s"},
         {"collides", &T::collides, "takes part in collisions"},

@@ -12,7 +12,7 @@
 namespace offstage::producer {
 namespace {
 
-/// The decimal number that the shortest text of a float says, so that 0.8f is written as 0.8.
+/// Returns the decimal number of the shortest text of a float, so that 0.8f is written as 0.8.
 double widen(float v) {
   char text[32];
   const char* end = std::to_chars(text, text + sizeof text, v).ptr;
@@ -204,8 +204,7 @@ void Codec<Quat>::read(Reader& in, const Node& node, const Spec&, Quat& out) {
   const std::size_t before = in.problems().size();
   Codec<Eigen::Vector4d>::read(in, node, {"", "", "", kDirection}, wxyz);
   if (in.problems().size() > before) return;
-  constexpr Real kUnit =
-      1e-14;  // what is already normalised keeps its bits, so that writing and reading agree
+  constexpr Real kUnit = 1e-14;  // Normalised values keep their bits, so that writing and reading agree.
   if (std::abs(wxyz.squaredNorm() - 1) > kUnit) wxyz.stableNormalize();
   out = Quat(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
 }
@@ -225,7 +224,7 @@ Description Codec<Quat>::describe(Catalogue& all, const Spec&) {
 
 namespace {
 
-/// The value of two hexadecimal digits as a share of 255; negative if they are none.
+/// The value of two hexadecimal digits as a share of 255; negative if they are invalid.
 float hex_share(std::string_view digits) {
   int value = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value, 16);

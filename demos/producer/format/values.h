@@ -1,6 +1,6 @@
 #pragma once
-/// How plain values stand in a scene file: numbers, text, vectors, orientations, colours, numbers that vary,
-/// keys over age.
+/// JSON forms of plain values in a scene file: numbers, text, vectors, orientations, colours, varying
+/// numbers, keys over age.
 
 #include <array>
 #include <string>
@@ -72,7 +72,7 @@ struct Codec<render::FrameRate> {
   static Description describe(Catalogue& all, const Spec& spec);
 };
 /// A number, {"mean", "deviation", "min", "max", "clip"}, {"range": [a, b]} or {"curve": [[time, value],
-/// ...]}. All that it can be must lie within the limits; a closed limit also cuts off a normal distribution.
+/// ...]}. All possible values must be within the limits; a closed limit also truncates a normal distribution.
 template <>
 struct Codec<Varying> {
   static void read(Reader& in, const Node& node, const Spec& spec, Varying& out);
@@ -91,7 +91,7 @@ inline constexpr const char* kInterpolationHelp =
 
 Description describe_vector(Description item, int size, bool nonzero);
 
-/// [x, y, z]; limits hold for each component.
+/// [x, y, z]; limits apply to each component.
 template <class S, int N>
 struct Codec<Eigen::Matrix<S, N, 1>> {
   using V = Eigen::Matrix<S, N, 1>;
@@ -118,7 +118,7 @@ struct Codec<Eigen::Matrix<S, N, 1>> {
 
 Description describe_tuple(Description item, std::size_t size);
 
-/// A list of so many values of one kind.
+/// A list of N values of one kind.
 template <class V, std::size_t N>
 struct Codec<std::array<V, N>> {
   static void read(Reader& in, const Node& node, const Spec& spec, std::array<V, N>& out) {
@@ -139,7 +139,7 @@ struct Codec<std::array<V, N>> {
 
 Description describe_age_key(const Description& age, const Description& value);
 
-/// [age, value] with age in [0, 1]; limits hold for the value.
+/// [age, value] with age in [0, 1]; limits apply to the value.
 template <class V>
 struct Codec<std::pair<Real, V>> {
   static void read(Reader& in, const Node& node, const Spec& spec, std::pair<Real, V>& out) {

@@ -1,4 +1,4 @@
-/// Numbers that vary: how effects::Varying stands in a scene file.
+/// Varying numbers: the JSON form of effects::Varying.
 
 #include <algorithm>
 #include <array>
@@ -29,8 +29,8 @@ struct NormalSpecs {
   std::array<const Spec*, 5> all() const { return {&mean, &deviation, &min, &max, &clip}; }
 };
 
-/// Closed limits cut off a distribution; an open one, like "greater than 0", leaves no smallest value to cut
-/// at.
+/// Closed limits truncate a distribution; an open limit, like "greater than 0", has no smallest value at
+/// which to truncate.
 Normal within(const Limits& limits) {
   Normal normal;
   if (!limits.open_low) normal.min = std::max(normal.min, limits.low);
@@ -113,7 +113,7 @@ void Codec<Varying>::read(Reader& in, const Node& node, const Spec& spec, Varyin
   else
     v = read_normal(in, node, spec);
   if (in.problems().size() > before) return;
-  // Only a normal distribution can still leave the limits: through an open one.
+  // Only a normal distribution can still be outside of the limits: through an open one.
   if (!spec.limits.allows(effects::lower_bound(v)))
     return in.fail(node.at,
                    "can become too small: must be " + spec.limits.rule(spec.unit) + "; give \"min\"");

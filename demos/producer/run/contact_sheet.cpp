@@ -17,16 +17,16 @@ using Rgb = std::array<uint8_t, 3>;
 
 constexpr Rgb kPaper = {24, 25, 28}, kInk = {225, 227, 230}, kHeadingInk = {150, 190, 235},
               kFaultPaper = {64, 22, 24}, kFaultInk = {255, 170, 160};
-constexpr int kGap_px = 12;  // between pictures, and around all
-constexpr int kScale = 2;    // of the text
+constexpr int kGap_px = 12;  // between pictures, and around the sheet
+constexpr int kScale = 2;    // scale of the text
 constexpr int kLine_px = kScale * render::kTextHeight_px + 4;
-constexpr int kMostSide_px = 16384;  // what image readers commonly take
+constexpr int kMostSide_px = 16384;  // common limit of image readers
 
 int width_of(const std::string& text) {
   return kScale * render::text_width_px(text);
 }
 
-/// The end of a text, if it is too wide.
+/// Returns the end of a text that is too wide.
 std::string cut_start(std::string text, int width_px) {
   if (width_of(text) <= width_px) return text;
   while (!text.empty() && width_of(".." + text) > width_px) text.erase(0, 1);
@@ -39,7 +39,7 @@ std::string cut_end(std::string text, int width_px) {
   return text + "..";
 }
 
-/// Lines of whole words no wider than that; a longer word is cut.
+/// Splits a text to lines of whole words of at most this width; longer words are cut.
 std::vector<std::string> wrapped(const std::string& text, int width_px) {
   std::vector<std::string> lines;
   std::istringstream words(text);
@@ -67,7 +67,7 @@ std::size_t pixel_at(const render::Image& image, int x, int y) {
               static_cast<std::size_t>(x));
 }
 
-/// Lays a picture over the sheet; where it is transparent the paper shows.
+/// Draws a picture on the sheet; transparent parts show the background.
 void paste(render::Image& sheet, const render::Image& picture, int left, int top) {
   for (int y = 0; y < picture.height_px; ++y)
     for (int x = 0; x < picture.width_px; ++x) {
@@ -80,7 +80,7 @@ void paste(render::Image& sheet, const render::Image& picture, int left, int top
 
 /// Sizes of the parts of a sheet [px].
 struct Layout {
-  int columns, rows, width, height;  // of a picture: the last two
+  int columns, rows, width, height;  // width and height are those of a picture
   int label_lines, heading_lines;
 
   int cell_width() const { return width + kGap_px; }
@@ -98,7 +98,7 @@ Layout layout_of(const std::vector<std::string>& heading, const std::vector<Shee
     layout.height = std::max(layout.height, cell.picture.height_px);
     layout.label_lines = std::max(layout.label_lines, static_cast<int>(cell.label.size()));
   }
-  constexpr int kLeastWidth = 160, kLeastHeight = 90;  // if every run failed
+  constexpr int kLeastWidth = 160, kLeastHeight = 90;  // used if every run failed
   layout.width = std::max(layout.width, kLeastWidth);
   layout.height = std::max(layout.height, kLeastHeight);
   return layout;

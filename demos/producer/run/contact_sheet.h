@@ -1,5 +1,5 @@
 #pragma once
-/// Many small pictures in one: a grid with a heading above and a label under each.
+/// Many small pictures in one: a grid with a heading at the top and a label under each picture.
 
 #include <string>
 #include <vector>
@@ -10,20 +10,20 @@ namespace offstage::producer {
 
 struct SheetCell {
   std::vector<std::string> label;  ///< lines
-  render::Image picture;           ///< none: `fault` stands in its place
+  render::Image picture;           ///< empty: `fault` is shown instead
   std::string fault = {};
 };
 
-/// Draws the sheet, cell after cell in rows of `columns`. What is too long for its place is cut: a label at
-/// its start, where paths are least telling, the heading at its end.
+/// Draws the sheet, cell after cell in rows of `columns`. Text that is too long is cut: labels at their
+/// start, where paths differ least, the heading at its end.
 render::Image contact_sheet(const std::vector<std::string>& heading, const std::vector<SheetCell>& cells,
                             int columns);
 
-/// Throws std::invalid_argument if a sheet of so many pictures would be larger than a PNG should be.
+/// Throws std::invalid_argument if a sheet of this many pictures would be too large for a PNG.
 void check_sheet_size(std::size_t cells, int columns, int width_px, int height_px);
 
-/// Columns for so many pictures of one series: one row of few, else about as many as rows, with the fewest
-/// places left empty.
+/// Number of columns for this many pictures of one series: one row for a few, otherwise about as many columns
+/// as rows, with the fewest empty cells.
 int columns_for(std::size_t cells);
 
 }  // namespace offstage::producer

@@ -30,7 +30,7 @@ constexpr double kTriangle_s = 0.1e-6;             // a sub-frame of a triangle 
 constexpr double kClothPicture_s = 0.09;           // a sub-frame of a cloth, whatever its mesh
 constexpr double kPixel_s = 40e-3 / (1280 * 720);  // a sub-frame of a pixel of ground
 
-/// A sub-frame of a particle of each style; puffs cover many pixels.
+/// Time of a sub-frame for a particle of each style; puffs cover many pixels.
 double drawn_particle_s(const ParticleLook& look) {
   constexpr double kStreak = 2.4e-6, kBall = 5e-6, kPuff = 60e-6;
   switch (look.style) {
@@ -161,7 +161,7 @@ class CostTable {
 
   const Scene& scene_;
   const ModelLibrary& models_;
-  double substeps_;  // per second
+  double substeps_;  // number per second
   int subframes_;
   double pixels_;
   std::vector<ObjectCost> costs_;
@@ -172,10 +172,10 @@ double seconds_since(steady_clock::time_point start) {
   return std::chrono::duration<double>(steady_clock::now() - start).count();
 }
 
-/// Ends a trial within a frame, after the sub-step that runs.
+/// Thrown to end a trial within a frame, after the current sub-step.
 struct TrialOver {};
 
-/// Simulates for so long at most, but at least one sub-step; returns film time and computing time [s].
+/// Simulates for at most this time, but at least one sub-step; returns film time and computing time [s].
 std::pair<double, double> try_simulation(const Scene& scene, Simulation& simulation, double limit_s) {
   const auto start = steady_clock::now();
   double reached = 0;
@@ -195,7 +195,7 @@ std::pair<double, double> try_simulation(const Scene& scene, Simulation& simulat
   return {reached, seconds_since(start)};
 }
 
-/// Computing time of a frame of the film, from a draft of it of at most 1280x720.
+/// Computing time of a frame of the film, estimated from a draft of at most 1280x720.
 double try_drawing(const Scene& scene, const ModelLibrary& models, const Simulation& simulation) {
   constexpr double kMostPixels = 1280 * 720;
   Scene draft = scene;
@@ -207,13 +207,13 @@ double try_drawing(const Scene& scene, const ModelLibrary& models, const Simulat
   render::Context context;
   Picture picture(draft, models, context);
   const Snapshot state = simulation.snapshot();
-  picture.draw(state, state);  // compiles programs, which a film does once
+  picture.draw(state, state);  // compiles shader programs, which a film does once
   const auto start = steady_clock::now();
   picture.draw(state, state);
   return seconds_since(start) * subframes(scene.render.quality) / (scale * scale);
 }
 
-/// How much the work grows when there are as many particles as there can be.
+/// Factor of the work if there are as many particles as possible.
 double growth(const std::vector<ObjectCost>& objects, double ObjectCost::*work, uint64_t alive) {
   double all = 0, of_particles = 0;
   uint64_t most = 0;

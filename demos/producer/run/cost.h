@@ -1,6 +1,6 @@
 #pragma once
-/// What a scene costs: how the work spreads over its objects by their sizes, and how long the film takes on
-/// this machine by a short trial.
+/// Cost of a scene: how the work is distributed over its objects, and how long the film takes on this
+/// machine, by a short trial.
 
 #include <cstdint>
 #include <optional>
@@ -13,34 +13,34 @@
 
 namespace offstage::producer {
 
-/// One object of a scene with its copies, or what belongs to no object. The times are those of the benchmarks
-/// (tests/bench/RESULTS.md), for comparing objects of one scene, not for clocks.
+/// One object of a scene with its copies, or work that belongs to no object. The times are those of the
+/// benchmarks (tests/bench/RESULTS.md); they compare objects of one scene and do not predict durations.
 struct ObjectCost {
   std::string kind, name;   ///< "cloth", "sheet"
-  std::size_t count = 1;    ///< copies
+  std::size_t count = 1;    ///< number of copies
   std::string size;         ///< "1681 vertices"
-  std::string advice;       ///< what makes it cheaper
-  double simulation_s = 0;  ///< per second of film
-  double drawing_s = 0;     ///< per frame
-  uint64_t particles = 0;   ///< most that are alive at once, of an emitter
-  double share = 0;         ///< of the time of the whole film, 0 .. 1; by estimate_cost() alone
+  std::string advice;       ///< how to make it cheaper
+  double simulation_s = 0;  ///< time per second of film
+  double drawing_s = 0;     ///< time per frame
+  uint64_t particles = 0;   ///< for an emitter: greatest number of particles alive at once
+  double share = 0;         ///< share of the time of the whole film, 0 .. 1; set only by estimate_cost()
 };
 
-/// Every object of a (flat) scene that costs something, in no order.
+/// Returns every object of a (flat) scene that has a cost, in no particular order.
 std::vector<ObjectCost> object_costs(const Scene& scene, const ModelLibrary& models);
 
 struct CostEstimate {
   double trial_film_s = 0;          ///< film time that the trial simulated [s]
   double simulation_s_per_s = 0;    ///< measured, per second of film
-  std::optional<double> frame_s;    ///< of drawing, measured and scaled to the film's size and quality
-  std::string not_drawn;            ///< why there is no frame_s
-  double film_s = 0;                ///< whole film, as it goes at the trial's number of particles
-  double most_film_s = 0;           ///< the same with all particles that there can be
+  std::optional<double> frame_s;    ///< time of drawing, measured and scaled to the film's size and quality
+  std::string not_drawn;            ///< reason if there is no frame_s
+  double film_s = 0;                ///< whole film, with the trial's number of particles
+  double most_film_s = 0;           ///< the same with the greatest possible number of particles
   std::vector<ObjectCost> objects;  ///< the most expensive first
 };
 
-/// Runs the simulation for about a second and draws a frame or two. The simulation must be fresh, and is of
-/// no use afterwards; the GL environment must be pinned. Throws Interrupted and DivergedError.
+/// Simulates for about a second and draws one or two frames. The simulation must be new, and cannot be used
+/// afterwards; the GL environment must be set. Throws Interrupted and DivergedError.
 CostEstimate estimate_cost(const LoadedScene& loaded, const ModelLibrary& models, Simulation& simulation);
 
 /// "cloth 'sheet' (1681 vertices)"

@@ -1,6 +1,5 @@
 #pragma once
-/// Tables as comma-separated values (RFC 4180): texts are quoted where they need it, numbers keep all their
-/// digits.
+/// Tables as comma-separated values (RFC 4180): texts are quoted if necessary, numbers have all their digits.
 
 #include <filesystem>
 #include <optional>
@@ -13,14 +12,15 @@
 
 namespace offstage::producer {
 
-/// A text as a field: in quotes, with its own quotes doubled, if it holds a comma, a quote or a line break.
+/// Returns a text as a field: quoted, with its own quotes doubled, if it contains a comma, a quote or a line
+/// break.
 std::string csv_field(std::string_view text);
 
-/// Rows in the making.
+/// Builds rows of a table.
 class CsvRows {
  public:
   CsvRows& text(std::string_view value);
-  /// Remembers the first number that is not finite.
+  /// Stores the first number that is not finite.
   CsvRows& number(double value);
   CsvRows& vector(const sim::Vec3& v) { return number(v.x()).number(v.y()).number(v.z()); }
   CsvRows& count(uint64_t value);
@@ -39,17 +39,17 @@ class CsvRows {
   bool first_ = true, finite_ = true;
 };
 
-/// A table that grows row by row. It appears under its name on close(); one that ends before that is kept
-/// with .partial behind its name.
+/// A table that grows row by row. It gets its name on close(); a table that is not closed keeps the ending
+/// .partial.
 class CsvFile {
  public:
-  /// Throws render::FileError, as do the others.
+  /// Throws render::FileError, as the other functions do.
   CsvFile(const std::filesystem::path& path, const std::string& header);
   ~CsvFile();
   CsvFile(const CsvFile&) = delete;
   CsvFile& operator=(const CsvFile&) = delete;
 
-  /// Throws NotFinite for rows with a number that is not finite; then nothing is written.
+  /// Throws NotFinite and writes nothing if a number of the rows is not finite.
   void write(const CsvRows& rows);
   void close();
 

@@ -1,7 +1,7 @@
 #pragma once
-/// What decides about the bits of a picture besides the scene: GL, C library, processor class, compiler.
-/// Golden images made under one fingerprint are compared exactly under the same, and within a tolerance under
-/// another.
+/// Properties that determine the bits of a picture besides the scene: GL, C library, processor class,
+/// compiler. Golden images are compared exactly under the same fingerprint, and within a tolerance under
+/// another one.
 
 #include <string>
 
@@ -14,7 +14,7 @@ std::string cpu_class();
 
 std::string fingerprint(const render::ContextInfo& context);
 
-/// Processors this process may use (its affinity), at least 1.
+/// Number of processors that this process may use (its affinity), at least 1.
 int available_processors();
 
 }  // namespace offstage::producer

@@ -11,7 +11,7 @@
 namespace offstage::producer {
 namespace {
 
-/// Takes a whole number off the front of `text`.
+/// Parses an integer at the start of `text` and removes it.
 std::optional<int> take_number(std::string_view& text) {
   int value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// "shot_####.png" for shot_0007.png: the last run of digits as #. Empty if there is none.
+/// "shot_####.png" for shot_0007.png: the last run of digits becomes #. Empty if there is none.
 std::string pattern_of(const std::string& name) {
   const auto is_digit = [](unsigned char c) { return std::isdigit(c) != 0; };
   const auto last = std::find_if(name.rbegin(), name.rend(), is_digit);
@@ -30,7 +30,7 @@ std::string pattern_of(const std::string& name) {
   return pattern;
 }
 
-/// The pattern that most PNG files of a folder have, for advice.
+/// The pattern of most PNG files of a folder, for advice in messages.
 std::string usual_pattern(const fs::path& folder) {
   std::map<std::string, int> counts;
   std::error_code error;
@@ -66,7 +66,7 @@ struct PngHead {
   bool alpha = false;
 };
 
-/// Size and kind of a PNG file. Throws FileError unless it is whole.
+/// Size and kind of a PNG file. Throws FileError unless it is complete.
 PngHead read_png_head(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
   std::array<uint8_t, 26> head{};
@@ -80,7 +80,7 @@ PngHead read_png_head(const fs::path& path) {
   const int width = number(16), height = number(20);
   if (!is_whole_png(path, width, height))
     throw render::FileError(path.string() + ": is not a complete PNG file");
-  constexpr int kPalette = 3;  // may have a table of alpha
+  constexpr int kPalette = 3;  // may have a table of alpha values
   const int kind = head[25];
   return {width, height, (kind & 4) != 0 || kind == kPalette};
 }

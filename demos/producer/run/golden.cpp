@@ -9,6 +9,7 @@
 
 #include "producer/base/interrupt.h"
 #include "producer/base/json_file.h"
+#include "producer/base/markup.h"
 #include "producer/run/fingerprint.h"
 #include "render/context.h"
 #include "render/error.h"
@@ -20,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Keeps what it is given.
+/// Stores the frames in memory.
 class MemorySink : public render::FrameSink {
  public:
   explicit MemorySink(std::vector<GoldenFrame>& frames) : frames_(frames) {}
@@ -42,24 +43,13 @@ void write_golden_text(const fs::path& path, const std::string& text) {
   render::write_file_atomically(path, {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
 }
 
-std::string escape_html(const std::string& text) {
-  std::string out;
-  for (const char c : text)
-    out += c == '<'   ? "&lt;"
-           : c == '>' ? "&gt;"
-           : c == '&' ? "&amp;"
-           : c == '"' ? "&quot;"
-                      : std::string(1, c);
-  return out;
-}
-
-/// What a golden says it was made of; empty if it does not, or is none.
+/// The source recorded in a golden; empty if there is none, or if the file is not a golden.
 std::string source_of(const fs::path& golden) {
   const std::optional<JsonObject> json = read_json_file(golden);
   return json ? json->text("source") : "";
 }
 
-/// A name as a file name: it stays in its folder, and needs no quotes.
+/// Converts a name to a file name that stays in its folder and needs no quotes.
 std::string file_name_of(const std::string& name) {
   std::string out;
   for (const char c : name) {
@@ -70,7 +60,7 @@ std::string file_name_of(const std::string& name) {
   return out.empty() ? "scene" : out;
 }
 
-/// The golden in the folder that was made of a source.
+/// The golden in the folder with this source.
 std::optional<std::string> golden_made_of(const fs::path& folder, const std::string& source) {
   std::vector<std::string> names;
   if (!fs::is_directory(folder)) return {};
@@ -81,7 +71,7 @@ std::optional<std::string> golden_made_of(const fs::path& folder, const std::str
   return *std::ranges::min_element(names);
 }
 
-/// One frame's line of the verdict; sets `pass`.
+/// The line of the verdict for one frame; sets `pass`.
 std::string judge_frame(const GoldenFrame& expected, const GoldenFrame& actual, bool same_class, bool& pass) {
   const bool same_state = expected.state_hash == actual.state_hash;
   if (same_state && expected.pixel_hash == actual.pixel_hash) return "identical";
@@ -131,7 +121,7 @@ GoldenPlace find_golden(const fs::path& folder, const LoadedScene& scene, const 
       return place;
     }
   }
-  // The name belongs to another scene: folders are put in front until it is one of its own.
+  // The name belongs to another scene: folder names are prepended until it is unique.
   std::string name = file_name_of(file.stem().string());
   for (fs::path above = file.parent_path(); above.has_relative_path(); above = above.parent_path()) {
     name = file_name_of(above.filename().string()) + "-" + name;
@@ -157,7 +147,7 @@ Golden draw_golden(const LoadedScene& scene, int threads, const GoldenStates& st
   if (job.frames[0] == job.frames[1]) job.frames.pop_back();
   std::vector<Problem> warnings;
   const ModelLibrary models(scene.scene, scene.folder, DecompositionCache(),
-                            warnings);  // nothing from outside
+                            warnings);  // no files from outside
   MemorySink sink(golden.frames);
   const RunStats stats = render_frames(scene, models, job, sink, progress);
   if (stats.interrupted_by) throw Interrupted(stats.interrupted_by);
@@ -211,17 +201,23 @@ Verdict judge(const Golden& expected, const Golden& actual) {
         fmt::format("recorded on:  {}\nthis machine: {}\n", expected.fingerprint, actual.fingerprint);
   if (expected.frames.size() != actual.frames.size()) {
     verdict.pass = false;
-    verdict.text += "the golden has other frames, because the length of the scene changed\n";
+    verdict.difference = "the golden has other frames, because the length of the scene changed";
+    verdict.text += verdict.difference + "\n";
     return verdict;
   }
   for (std::size_t i = 0; i < expected.frames.size(); ++i) {
     if (expected.frames[i].frame != actual.frames[i].frame) {
       verdict.pass = false;
-      verdict.text += "the golden has other frames, because the length of the scene changed\n";
+      verdict.difference = "the golden has other frames, because the length of the scene changed";
+      verdict.text += verdict.difference + "\n";
       return verdict;
     }
-    verdict.text += fmt::format("{} frame {}: {}\n", actual.scene, actual.frames[i].frame,
-                                judge_frame(expected.frames[i], actual.frames[i], same_class, verdict.pass));
+    bool same = true;
+    const std::string line = fmt::format("{} frame {}: {}", actual.scene, actual.frames[i].frame,
+                                         judge_frame(expected.frames[i], actual.frames[i], same_class, same));
+    if (!same && verdict.pass) verdict.difference = line;
+    verdict.pass = verdict.pass && same;
+    verdict.text += line + "\n";
   }
   return verdict;
 }
@@ -240,7 +236,7 @@ fs::path write_report(const fs::path& folder, const Golden& expected, const Gold
     rows += fmt::format(
         "<tr><td>{0}</td><td><img src=\"{0}-expected.png\"></td><td><img src=\"{0}-actual.png\"></td>"
         "<td><img src=\"{0}-difference.png\"></td></tr>\n",
-        escape_html(stem));
+        escape_markup(stem));
   }
   const fs::path page = folder / "index.html";
   write_golden_text(
@@ -249,7 +245,7 @@ fs::path write_report(const fs::path& folder, const Golden& expected, const Gold
                   "<style>body{{font:14px sans-serif}}img{{image-rendering:pixelated;width:384px}}</style>\n"
                   "<h1>{0}</h1><pre>{1}</pre>\n"
                   "<table><tr><th>frame<th>expected<th>actual<th>difference x16</tr>\n{2}</table>\n",
-                  escape_html(actual.scene), escape_html(verdict.text), rows));
+                  escape_markup(actual.scene), escape_markup(verdict.text), rows));
   return page;
 }
 

@@ -1,7 +1,7 @@
 #pragma once
-/// Image-hash regression: a golden keeps, for a few frames of a scene drawn small, the hash of the
-/// simulation's state, the hash of the pixels, and the picture itself. State first: if it is equal and the
-/// pixels differ, it is the renderer that changed.
+/// Image-hash regression: for a few frames of a scene drawn small, a golden stores the hash of the
+/// simulation's state, the hash of the pixels, and the picture itself. The state is compared first: if it is
+/// equal and the pixels differ, the renderer has changed.
 
 #include <filesystem>
 #include <set>
@@ -14,7 +14,7 @@
 
 namespace offstage::producer {
 
-/// The settings goldens are drawn with, as overrides of the scene.
+/// The settings of goldens, as overrides of the scene.
 std::vector<std::string> golden_overrides();
 
 struct GoldenFrame {
@@ -24,34 +24,35 @@ struct GoldenFrame {
 };
 
 struct Golden {
-  std::string scene;   ///< the name, which its files begin with
+  std::string scene;   ///< name, with which its files begin
   std::string source;  ///< the scene's file, relative to the folder of goldens; empty: not recorded
   std::string reason, fingerprint;
   std::vector<GoldenFrame> frames;
 };
 
-/// Where states of a simulation are kept between two drawings of a golden; empty: nowhere.
+/// Folders of the states of a simulation between two drawings of a golden; empty: none.
 struct GoldenStates {
-  std::string keep;  ///< folder that the states of the golden frames are written to
-  std::string from;  ///< folder that they are read from, instead of simulating
+  std::string keep;  ///< folder to which the states of the golden frames are written
+  std::string from;  ///< folder from which they are read, instead of simulating
 };
 
-/// Which golden of a folder belongs to a scene file. A golden records the file it was made of, so two scenes
-/// of one name in different folders have two goldens: the second is named after its folder and file, too.
+/// The golden of a scene file in a folder. A golden records its scene file, so two scenes of the same name in
+/// different folders have two goldens; the second one is named after its folder and file.
 struct GoldenPlace {
-  std::string name;        ///< of the golden's files
-  std::string source;      ///< of the scene, relative to the folder, with links resolved
-  bool exists = false;     ///< it is there and belongs to this scene
-  std::string moved_from;  ///< the golden's source, if that is gone: it is taken for this scene moved
+  std::string name;     ///< name of the golden's files
+  std::string source;   ///< path of the scene, relative to the folder, with links resolved
+  bool exists = false;  ///< it exists and belongs to this scene
+  /// Source of the golden, if that file does not exist any more: the scene is assumed to have been moved.
+  std::string moved_from;
 };
-/// Finds it by its source, else by the scene's name if the golden there records no source or one that is
-/// gone. Else a name for a new golden that no other has. `taken` are names that are already given away.
-/// Throws FileError for a folder that cannot be read, or if no name is free.
+/// Finds the golden by its source, else by the scene's name if the golden of that name has no source or one
+/// that does not exist any more. Otherwise the result is an unused name for a new golden. `taken` are names
+/// that are already in use. Throws FileError for a folder that cannot be read, or if no name is free.
 GoldenPlace find_golden(const std::filesystem::path& folder, const LoadedScene& scene,
                         const std::filesystem::path& scene_file, const std::set<std::string>& taken = {});
 
-/// Draws the golden frames of a scene that was loaded with golden_overrides(): one early, one late. Throws
-/// Interrupted.
+/// Draws the golden frames of a scene that was loaded with golden_overrides(): an early and a late one.
+/// Throws Interrupted.
 Golden draw_golden(const LoadedScene& scene, int threads, const GoldenStates& states = {},
                    const ProgressCallback& progress = {});
 
@@ -61,13 +62,14 @@ void write_golden(const std::filesystem::path& folder, const Golden& golden);
 
 struct Verdict {
   bool pass = true;
-  std::string text;  ///< what was found, one line per frame
+  std::string text;        ///< result, one line per frame
+  std::string difference;  ///< the first line about a difference; empty if there is none
 };
 
-/// Compares; with the same fingerprint exactly, else within the tolerance.
+/// Compares two goldens: exactly for the same fingerprint, otherwise within the tolerance.
 Verdict judge(const Golden& expected, const Golden& actual);
 
-/// Writes expected, actual and amplified difference of every frame and a page that shows them; returns the
+/// Writes expected, actual and amplified difference of every frame, and a page that shows them; returns the
 /// page.
 std::filesystem::path write_report(const std::filesystem::path& folder, const Golden& expected,
                                    const Golden& actual, const Verdict& verdict);

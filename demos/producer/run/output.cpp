@@ -33,7 +33,7 @@ nlohmann::ordered_json to_json(const Manifest& m, const fs::path& pattern) {
           {"fps", fps_json(m.fps)}};
 }
 
-/// The number of the frame that a file of channels belongs to; nothing for other files.
+/// The number of the frame of a channel file; nothing for other files.
 std::optional<int> channel_number(const fs::path& stem, const fs::path& file) {
   const std::string name = file.filename().string();
   std::optional<int> number;
@@ -45,7 +45,7 @@ std::optional<int> channel_number(const fs::path& stem, const fs::path& file) {
   return std::ranges::find(known, file) != known.end() ? number : std::nullopt;
 }
 
-/// What a film of any length left in its folder of channels.
+/// The channel files of a film of any length in its folder.
 std::vector<fs::path> channels_in(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
@@ -161,14 +161,15 @@ std::vector<fs::path> files_of_frames(const fs::path& folder) {
       if (number && *number >= 1 && *number <= count) files.push_back(file);
     }
   }
-  files.push_back(folder / kManifestName);  // last: until then the next run can name the rest
+  // Last, because until then the next run can use it to find the rest.
+  files.push_back(folder / kManifestName);
   return files;
 }
 
 void remove_frames(const fs::path& folder) {
   std::error_code error;
   for (const fs::path& file : files_of_frames(folder)) fs::remove(file, error);
-  fs::remove(folder, error);  // unless it holds something else
+  fs::remove(folder, error);  // unless it contains other files
 }
 
 namespace {
@@ -178,7 +179,7 @@ bool is_ours(const std::optional<JsonObject>& manifest, const fs::path& pattern,
          manifest->text("pattern") == pattern.filename().string();
 }
 
-/// What a run finds where one of its frames belongs.
+/// State of a frame's file before a run.
 enum class Found { nothing, own, other };
 
 Found look_at(const fs::path& path, const Manifest& manifest) {
@@ -210,8 +211,7 @@ FrameFolder prepare_frames(const fs::path& pattern, const ChannelFiles& channels
   }
   render::remove_leftovers(folder);
   const std::optional<JsonObject> old = read_json_file(manifest_path);
-  const bool same_settings =
-      is_ours(old, pattern, manifest);  // without a manifest nobody knows what frames there are
+  const bool same_settings = is_ours(old, pattern, manifest);  // without a manifest the frames are unknown
   if (!same_settings && existing != Existing::replace && fs::exists(manifest_path, error))
     throw OutputError(
         folder.string() +
@@ -232,7 +232,7 @@ FrameFolder prepare_frames(const fs::path& pattern, const ChannelFiles& channels
         std::ranges::all_of(channels.of(frame), [](const fs::path& p) { return fs::exists(p); });
     if (existing == Existing::keep && found == Found::own && has_channels) kept.insert(frame);
   }
-  if (!same_settings && existing == Existing::replace)  // all of them before the new manifest stands
+  if (!same_settings && existing == Existing::replace)  // all of them before the new manifest is written
     for (const fs::path& file : files_of_frames(folder)) fs::remove(file, error);
   for (const int frame : frames)
     if (!kept.contains(frame)) result.missing.push_back(frame);
@@ -260,7 +260,7 @@ bool holds_channels(const fs::path& folder) {
 void remove_channels(const fs::path& folder) {
   std::error_code error;
   for (const fs::path& path : channels_in(folder)) fs::remove(path, error);
-  fs::remove(folder, error);  // unless it holds something else
+  fs::remove(folder, error);  // unless it contains other files
 }
 
 void prepare_channels(const fs::path& folder, bool replace) {

@@ -1,5 +1,5 @@
 #pragma once
-/// Where a render goes: what OUT means, what is already there, and the manifest that lets a run be resumed.
+/// Output of a render: the meaning of OUT, existing files, and the manifest with which a run can be resumed.
 
 #include <filesystem>
 #include <memory>
@@ -16,7 +16,7 @@
 
 namespace offstage::producer {
 
-/// Output exists and may not be overwritten, or OUT cannot be what it says.
+/// Output exists and may not be overwritten, or OUT is invalid.
 class OutputError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -30,27 +30,28 @@ enum class OutputKind {
 
 struct OutputTarget {
   OutputKind kind = OutputKind::frames;
-  std::filesystem::path path;  ///< the pattern of frames, or the video
+  std::filesystem::path path;  ///< pattern of the frames, or file of the video
 };
 
-/// Throws OutputError for an ending that is none of the known ones, and for the number patterns of other
-/// programs (f%04d.png), with the pattern that is meant.
+/// Throws OutputError for an unknown ending, and for the number patterns of other programs (f%04d.png), with
+/// the equivalent pattern.
 OutputTarget parse_output(const std::string& out);
 
-/// The pattern with # that a pattern of another program means: %04d of C, $F4, {:04}. Empty if it is none.
+/// Converts a pattern of another program (%04d of C, $F4, {:04}) to one with #. Empty if it is not such a
+/// pattern.
 std::string hash_pattern(const std::string& pattern);
 
-/// What identifies the frames in a folder.
+/// Identifies the frames in a folder.
 struct Manifest {
   std::string scene, settings;  ///< name; settings_key()
   int width_px = 0, height_px = 0, frames = 0;
   render::FrameRate fps;
 };
 
-/// A frame rate as it stands in JSON: a number if it is whole, else a fraction such as "30000/1001".
+/// A frame rate in JSON: a number if it is an integer, else a fraction such as "30000/1001".
 nlohmann::ordered_json fps_json(const render::FrameRate& fps);
 
-/// Files with channels: which, and how their names begin, with '#' as in render::frame_path.
+/// Channel files: the kinds, and the start of their names, with '#' as in render::frame_path.
 struct ChannelFiles {
   render::ChannelChoice choice;
   std::filesystem::path stem;
@@ -60,49 +61,49 @@ struct ChannelFiles {
   }
 };
 
-/// Those of every channel and format that a frame may have.
+/// Files of all channels and formats that a frame may have.
 std::vector<std::filesystem::path> all_channel_files(const std::filesystem::path& stem, int frame);
 
 enum class Existing { refuse, keep, replace };
 
-/// A folder of frames that only this run writes, or this one and others that draw other frames of the same
-/// film.
+/// A folder of frames that only this run writes, or which it shares with runs that draw other frames of the
+/// same film.
 struct FrameFolder {
   OutputLock lock;
-  std::vector<int> missing;  ///< frames that have to be drawn
+  std::vector<int> missing;  ///< frames to be drawn
 };
 
-/// Prepares a folder of frames: locks it, checks or writes the manifest and finds the frames that have to be
-/// drawn. A frame is kept if it carries the settings of this run. Frames of other settings are never mixed
-/// in: they are refused, or removed with Existing::replace before the new manifest stands. Files that are no
-/// frames of a film are refused, too, unless they are to be replaced. Throws OutputError, also if another
-/// process writes there, or FileError. `channels` belong to the frames: one that lacks a file of theirs is
+/// Prepares a folder of frames: locks it, checks or writes the manifest, and finds the frames to be drawn. A
+/// frame is kept if it has the settings of this run. Frames with other settings are never mixed in: they are
+/// refused or, with Existing::replace, removed before the new manifest is written. Files that are not frames
+/// of a film are refused, too, unless they are to be replaced. Throws OutputError, also if another process
+/// writes there, or FileError. `channels` belong to the frames: a frame without one of its channel files is
 /// drawn again.
 FrameFolder prepare_frames(const std::filesystem::path& pattern, const ChannelFiles& channels,
                            const std::vector<int>& frames, const Manifest& manifest, Existing existing);
 
-/// The files in a folder that the manifest of its frames names: frames, their channels, the manifest itself.
+/// Returns the files that the manifest of a folder lists: frames, their channels, the manifest itself.
 std::vector<std::filesystem::path> files_of_frames(const std::filesystem::path& folder);
 
-/// Removes exactly those, and the folder if nothing else is in it.
+/// Removes exactly these files, and the folder if it is then empty.
 void remove_frames(const std::filesystem::path& folder);
 
-/// Where the channels of a video go: FILM.channels.
+/// Folder of the channels of a video: FILM.channels.
 std::filesystem::path channels_folder(const std::filesystem::path& video);
 
-/// Whether there are channels of an earlier film.
+/// Whether a folder contains channels of an earlier film.
 bool holds_channels(const std::filesystem::path& folder);
 
-/// Removes them, whatever their frames and format, and the folder unless it holds something else.
+/// Removes all channel files of any frame and format, and the folder if it is then empty.
 void remove_channels(const std::filesystem::path& folder);
 
-/// Makes the folder for the channels of a video. Those that are there are refused, or removed to be replaced.
+/// Creates the folder for the channels of a video. Existing channels are refused or, with `replace`, removed.
 void prepare_channels(const std::filesystem::path& folder, bool replace);
 
 /// Whether a file is a complete PNG of this size.
 bool is_whole_png(const std::filesystem::path& path, int width_px, int height_px);
 
-/// The number in a file name that fits a pattern; nothing for other files.
+/// Returns the number in a file name that matches a pattern; nothing for other files.
 std::optional<int> frame_number(const std::filesystem::path& pattern, const std::filesystem::path& file);
 
 }  // namespace offstage::producer

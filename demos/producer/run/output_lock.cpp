@@ -61,7 +61,7 @@ OutputLock OutputLock::of_part(fs::path file, const std::string& output,
   }
 }
 
-/// Names the owner in the file; on a full disk it stays unnamed.
+/// Writes the owner to the file; on a full disk it stays empty.
 void OutputLock::sign() {
   const std::string owner = owner_text();
   if (lock_ && ::ftruncate(lock_.fd(), 0) == 0 && ::pwrite(lock_.fd(), owner.data(), owner.size(), 0) < 0)
@@ -70,7 +70,7 @@ void OutputLock::sign() {
 
 void OutputLock::refuse(const std::string& output) {
   const std::string owner = owner_in(lock_.fd());
-  lock_.close();  // it is not ours to remove
+  lock_.close();  // it belongs to another process
   throw OutputError(output + ": is being written by " + owner +
                     "; wait for its end, or choose another output");
 }
@@ -94,7 +94,7 @@ void OutputLock::share() {
 }
 
 bool OutputLock::take(int mode, const std::string& output) {
-  constexpr int kTries = 100;  // against owners that remove the file between open and lock
+  constexpr int kTries = 100;  // repeated if owners remove the file between open and lock
   for (int i = 0; i < kTries; ++i) {
     lock_ = render::Descriptor(
         ::open(file_.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666));
@@ -115,7 +115,7 @@ bool OutputLock::take(int mode, const std::string& output) {
 }
 
 fs::path OutputLock::beside(const fs::path& output) {
-  constexpr std::size_t kLongest = 240;  // of 255 bytes that a name may have
+  constexpr std::size_t kLongest = 240;  // of the 255 bytes that a name may have
   return output.parent_path() / ("." + output.filename().string().substr(0, kLongest) + ".lock");
 }
 

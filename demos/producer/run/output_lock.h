@@ -1,6 +1,6 @@
 #pragma once
-/// One writer for each output. The lock is advisory (flock) and held by the kernel for as long as its process
-/// lives, so that a killed run leaves no lock behind.
+/// One writer for each output. The lock is advisory (flock). The kernel holds it as long as the process runs,
+/// so a killed run leaves no lock behind.
 
 #include <filesystem>
 #include <functional>
@@ -12,25 +12,25 @@ namespace offstage::producer {
 
 class OutputLock {
  public:
-  /// Holds nothing.
+  /// Holds no lock.
   OutputLock() = default;
-  /// Takes the lock that lies in `file`, for this process alone. Throws OutputError that names the owner if
-  /// another process writes `output`. A file system without locks gets a warning instead.
+  /// Takes an exclusive lock on `file`. Throws OutputError with the owner if another process writes `output`.
+  /// A file system without locks causes a warning.
   OutputLock(std::filesystem::path file, const std::string& output);
-  /// Removes the file, unless others still share the lock.
+  /// Removes the file, unless other processes share the lock.
   ~OutputLock();
   OutputLock(OutputLock&& other) noexcept;
   OutputLock& operator=(OutputLock&& other) noexcept;
 
-  /// Takes the lock of an output that several processes write parts of: with them if `may_share` says so,
-  /// else alone, to prepare the output and then share(). Waits up to ten seconds while another one prepares
-  /// it.
+  /// Takes the lock of an output of which several processes write parts: shared if `may_share` returns true,
+  /// otherwise exclusive, to prepare the output and then call share(). Waits up to ten seconds while another
+  /// process prepares it.
   static OutputLock of_part(std::filesystem::path file, const std::string& output,
                             const std::function<bool()>& may_share);
-  /// Others may share it from now on.
+  /// Lets other processes share the lock.
   void share();
 
-  /// Of an output that is a file: ".NAME.lock" beside it; of a folder: ".offstage.lock" in it.
+  /// File of the lock: ".NAME.lock" beside an output file, ".offstage.lock" in an output folder.
   static std::filesystem::path beside(const std::filesystem::path& output);
   static std::filesystem::path inside(const std::filesystem::path& folder);
 

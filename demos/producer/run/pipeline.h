@@ -1,6 +1,6 @@
 #pragma once
-/// The hand-over between the simulation, the drawing threads and the sink: bounded, in order, and with one
-/// way to fail.
+/// The queue between the simulation, the drawing threads and the sink. It is bounded, keeps the order, and
+/// handles failures in one place.
 
 #include <condition_variable>
 #include <deque>
@@ -17,30 +17,30 @@
 
 namespace offstage::producer {
 
-/// A frame to draw. Snapshots are immutable and each serves two neighbouring frames, hence shared.
+/// A frame to draw. Snapshots are immutable; each is used by two neighbouring frames, so they are shared.
 struct FrameJob {
-  int index = 0;  // in the list of frames
+  int index = 0;  // index in the list of frames
   int frame = 0;
   std::shared_ptr<const Snapshot> previous, current;
   double sim_ms = 0;
-  std::size_t contacts = 0;           // of bodies; without a cache
-  std::optional<sim::Energy> energy;  // without a cache
+  std::size_t contacts = 0;           // contacts of bodies; 0 with a cache
+  std::optional<sim::Energy> energy;  // empty with a cache
 };
 
 struct RenderedFrame {
   FrameJob frame_job;
   render::Image image;
   double render_ms = 0;
-  render::Channels channels;  // empty unless asked for
+  render::Channels channels;  // empty unless requested
 };
 
-/// Hands frames to the drawing threads and brings the finished frames back in order. At most `window` frames
-/// are between the simulation and the sink, so memory is bounded. The first failure ends everything.
+/// Passes frames to the drawing threads and returns the finished frames in order. At most `window` frames are
+/// between the simulation and the sink, so the memory is bounded. The first failure ends the run.
 class Pipeline {
  public:
   explicit Pipeline(int window) : window_(window) {}
 
-  /// Waits for room; false when the run has failed.
+  /// Waits for room; returns false if the run has failed.
   bool push(FrameJob frame_job) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return failure_ || frame_job.index < next_rendered_ + window_; });
@@ -70,7 +70,7 @@ class Pipeline {
     rendered_.emplace(index, std::move(rendered));
     changed_.notify_all();
   }
-  /// The next finished frame in order; none when all are through or the run has failed.
+  /// Returns the next finished frame in order; none after the last one or if the run has failed.
   std::optional<RenderedFrame> take_rendered() {
     std::unique_lock lock(mutex_);
     const auto ready = [&] { return !rendered_.empty() && rendered_.begin()->first == next_rendered_; };
@@ -92,7 +92,7 @@ class Pipeline {
     const std::lock_guard lock(mutex_);
     return failure_ != nullptr;
   }
-  /// To be called when the threads have ended.
+  /// Must be called after the threads have ended.
   void rethrow_failure() const {
     if (failure_) std::rethrow_exception(failure_);
   }
@@ -108,7 +108,7 @@ class Pipeline {
   std::exception_ptr failure_;
 };
 
-/// Runs `work`; a failure of it becomes the pipeline's.
+/// Runs `work`; an exception in it becomes that of the pipeline.
 template <class F>
 void guarded(Pipeline& pipeline, F&& work) {
   try {

@@ -29,11 +29,11 @@ double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-/// Keeps count of simulated and finished frames for the progress of a run; the two threads that do them share
-/// it.
+/// Counts simulated and finished frames for the progress of a run; the simulating and the writing thread
+/// share it.
 class ProgressMeter {
  public:
-  /// `drawing_ms`: a guess at what a frame takes to draw, until there is one.
+  /// `drawing_ms`: initial estimate of the drawing time of a frame.
   ProgressMeter(const ProgressCallback& callback, int frames, int frames_to_simulate, double drawing_ms)
       : callback_(callback), guess_ms_(drawing_ms) {
     latest_.total = frames;
@@ -48,7 +48,7 @@ class ProgressMeter {
     report();
     simulating_since_ = Clock::now();
   }
-  /// The simulation goes on now, after it waited for the drawing.
+  /// Call when the simulation continues after waiting for the drawing.
   void simulation_goes_on() { simulating_since_ = Clock::now(); }
   void finished_one(double sim_ms, double render_ms, double encode_ms, uint64_t particles) {
     const std::lock_guard lock(mutex_);
@@ -64,7 +64,7 @@ class ProgressMeter {
   }
 
  private:
-  /// Simulated and finished frames count by what they take on average.
+  /// Simulated and finished frames are weighted by their mean times.
   void report() {
     constexpr double kKnown = 0.02;  // share of the work after which the rest can be estimated
     const auto mean = [](double sum, int count, double guess) { return count > 0 ? sum / count : guess; };
@@ -85,16 +85,17 @@ class ProgressMeter {
   Progress latest_;
   double simulation_ms_ = 0, drawing_ms_ = 0;
   const Clock::time_point start_ = Clock::now();
-  Clock::time_point simulating_since_ = start_;  // of the simulating thread
+  Clock::time_point simulating_since_ = start_;  // used by the simulating thread
 };
 
-/// Where snapshots come from: the simulation or a cache.
+/// Source of snapshots: the simulation or a cache.
 class SnapshotSource {
  public:
   virtual ~SnapshotSource() = default;
-  /// The state at a frame, or an earlier one if `stop` said so on the way; asked for in ascending order.
+  /// Returns the state at a frame, or an earlier one if `stop` returned true. Frames must be requested in
+  /// ascending order.
   virtual Snapshot at(int frame, const std::function<bool()>& stop) = 0;
-  /// Adds what is known besides of the latest state.
+  /// Adds further data of the latest state.
   virtual void describe(FrameJob&) const {}
 };
 
@@ -120,7 +121,7 @@ class LiveSource : public SnapshotSource {
  private:
   Simulation& simulation_;
   ProgressMeter& meter_;
-  const SnapshotCache* kept_;  ///< where to write what was asked for; may be null
+  const SnapshotCache* kept_;  ///< receives the requested states; may be null
 };
 
 class CachedSource : public SnapshotSource {
@@ -151,7 +152,7 @@ void draw_frames(Pipeline& pipeline, const Scene& scene, const ModelLibrary& mod
   }
 }
 
-/// Keeps what a report shows of a frame.
+/// Stores the data of a frame for the report.
 void keep_frame(const RenderedFrame& rendered, double encode_ms, int total, RunStats& stats) {
   constexpr int kPictures = 12, kWidth_px = 320;
   const Snapshot& state = *rendered.frame_job.current;
@@ -270,7 +271,7 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
   };
   {
     std::vector<std::jthread> workers;
-    // A thread that cannot be started must fail the run before the others are waited for.
+    // If a thread cannot be started, the run must fail before the other threads are awaited.
     guarded(pipeline, [&] {
       for (int i = 0; i < job.threads; ++i) workers.emplace_back(draw);
       workers.emplace_back(print);
@@ -336,7 +337,8 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
     const double sim_ms = ms_since(step_start);
     const auto write_start = Clock::now();
     if (cache) cache->write(simulation.snapshot());
-    const bool at_step = job.trace_every_step && frame < total;  // that state is the next sub-step's start
+    // The start of the next sub-step records that state.
+    const bool at_step = job.trace_every_step && frame < total;
     if (!at_step) record(simulation.world().time());
     stats.encode.add(ms_since(write_start));
     ++stats.frames;
@@ -357,6 +359,46 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
   return stats;
 }
 
+RunStats visit_frames(const LoadedScene& loaded, const ModelLibrary& models, const SnapshotJob& job,
+                      const std::function<void(const Snapshot&)>& take, const ProgressCallback& progress) {
+  const auto start = Clock::now();
+  RunStats stats;
+  std::optional<Simulation> simulation;
+  std::unique_ptr<SnapshotSource> source;
+  std::optional<ProgressMeter> meter;
+  const auto frames = static_cast<int>(job.frames.size());
+  if (job.cache) {
+    SnapshotCache cache(*job.cache);
+    cache.open(simulation_key(loaded, models), loaded.scene.frame_count());
+    meter.emplace(progress, frames, 0, 0);
+    source = std::make_unique<CachedSource>(std::move(cache));
+  } else {
+    simulation.emplace(loaded.scene, models);
+    stats.bodies = simulation->body_count();
+    meter.emplace(progress, frames, frames > 0 ? simulation->advances_to(job.frames.back()) : 0, 0);
+    source = std::make_unique<LiveSource>(*simulation, *meter, nullptr);
+  }
+  for (const int frame : job.frames) {
+    const auto sim_start = Clock::now();
+    const Snapshot snapshot = source->at(frame, [] { return interrupt_signal() != 0; });
+    if (snapshot.frame != frame) break;  // interrupted on the way
+    stats.sim.add(ms_since(sim_start));
+    const double sim_ms = ms_since(sim_start);
+    const auto take_start = Clock::now();
+    take(snapshot);
+    stats.encode.add(ms_since(take_start));
+    ++stats.frames;
+    stats.particles = snapshot.point_count();
+    stats.state_hash = snapshot.state_hash.hex();
+    meter->finished_one(sim_ms, 0, ms_since(take_start), stats.particles);
+    if (interrupt_signal()) break;
+  }
+  if (stats.frames < frames) stats.interrupted_by = interrupt_signal();
+  if (simulation) stats.totals = simulation->totals();
+  stats.wall_s = ms_since(start) / 1000;
+  return stats;
+}
+
 std::string simulation_key(const LoadedScene& loaded, const ModelLibrary& models) {
   auto scene = nlohmann::ordered_json::parse(loaded.canonical);
   for (const char* key : {"name", "description", "camera", "lights", "environment", "render"})
@@ -368,7 +410,7 @@ std::string simulation_key(const LoadedScene& loaded, const ModelLibrary& models
 
 std::string settings_key(const LoadedScene& loaded, const ModelLibrary& models) {
   auto scene = nlohmann::ordered_json::parse(loaded.canonical);
-  for (const char* key : {"name", "description"}) scene.erase(key);  // no frame shows them
+  for (const char* key : {"name", "description"}) scene.erase(key);  // they are not visible in any frame
   return text_hash(std::string(version()) + scene.dump() + models.digest());
 }
 
@@ -394,7 +436,7 @@ Json report_json(const sim::IntegratorReport& report) {
           {"missed", report.missed}};
 }
 
-/// What bodies do to each other, and what it took.
+/// Adds the figures of contacts and their solvers.
 void add_contact_figures(const SimulationTotals& t, Json& json) {
   json["bodies_awake"] = t.bodies_awake;
   json["bodies_asleep"] = t.bodies_asleep;

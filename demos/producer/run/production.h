@@ -1,6 +1,7 @@
 #pragma once
-/// The frame loop: simulation (or a cache), several drawing threads with a GL context each, and the sink,
-/// overlapping through bounded queues. What comes out does not depend on how many threads draw.
+/// The frame loop: the simulation (or a cache), several drawing threads with a GL context each, and the sink
+/// run concurrently, connected by bounded queues. The output does not depend on the number of drawing
+/// threads.
 
 #include <chrono>
 #include <filesystem>
@@ -32,66 +33,70 @@ class StageTimes {
   std::vector<double> ms_;
 };
 
-/// What is known of one frame, for a report.
+/// Figures of one frame, for a report.
 struct FrameFigures {
   int frame = 0;
-  double time = 0;  ///< of the film [s]
+  double time = 0;  ///< time of the film [s]
   double sim_ms = 0, render_ms = 0, encode_ms = 0;
   uint64_t particles = 0;
-  std::size_t contacts = 0;           ///< of bodies; without a cache
-  std::optional<sim::Energy> energy;  ///< without a cache
+  std::size_t contacts = 0;           ///< contacts of bodies; 0 with a cache
+  std::optional<sim::Energy> energy;  ///< empty with a cache
   std::string state_hash, pixel_hash;
 };
 
-/// What a run did: the stats object of the command line.
+/// Results of a run: the stats object of the command line.
 struct RunStats {
   int frames = 0;       ///< written by this run
-  int frames_kept = 0;  ///< already there (resume)
+  int frames_kept = 0;  ///< existing frames that were kept (resume)
   double wall_s = 0;
   double startup_s = 0;  ///< from the start of the process to the first written frame
   StageTimes sim, render, encode;
   std::size_t bodies = 0;
-  uint64_t particles = 0;  ///< alive at the end
+  uint64_t particles = 0;  ///< number at the end
   uint64_t most_particles = 0;
   SimulationTotals totals;
-  std::optional<sim::Energy> energy_start, energy_end;  ///< without a cache
+  std::optional<sim::Energy> energy_start, energy_end;  ///< empty with a cache
   std::string state_hash;                               ///< after the last frame
   std::map<int, std::string> frame_states;              ///< state hash of every drawn frame
-  std::vector<FrameFigures> figures;                    ///< if the job asks for them
+  std::vector<FrameFigures> figures;                    ///< only if the job requests them
   std::vector<std::pair<int, render::Image>> pictures;  ///< thumbnails of about a dozen frames
   std::vector<int> blank_frames;                        ///< all pixels equal: something is probably wrong
-  int interrupted_by = 0;                               ///< signal, or 0
+  int interrupted_by = 0;                               ///< number of the signal, or 0
 };
 
 /// One JSON object.
 std::string to_json(const RunStats& stats);
 
-/// How far a run is. Reported after every simulated and every finished frame, by one thread at a time.
+/// Progress of a run. Reported after every simulated and every finished frame, by one thread at a time.
 struct Progress {
   int done = 0, total = 0;                          ///< finished frames
-  double sim_ms = 0, render_ms = 0, encode_ms = 0;  ///< of the latest finished frame
+  double sim_ms = 0, render_ms = 0, encode_ms = 0;  ///< for the latest finished frame
   uint64_t particles = 0;                           ///< in that frame
-  double eta_s = 0;                                 ///< time left [s]; 0: not known yet
-  double fraction = 0;                              ///< of the work of simulation and drawing, 0 .. 1
-  /// Of the simulation, which also runs what the film skips; both 0 without one.
+  double eta_s = 0;                                 ///< remaining time [s]; 0: not known yet
+  double fraction = 0;                              ///< share of the work of simulation and drawing, 0 .. 1
+  /// Frames of the simulation, including those that the film skips; both 0 without a simulation.
   int frames_simulated = 0, frames_to_simulate = 0;
-  bool frame_finished = true;              ///< false: reported for a simulated frame
-  double simulating_s = 0, drawing_s = 0;  ///< spent so far; drawing with encoding, of all threads together
+  bool frame_finished = true;  ///< false: reported for a simulated frame
+  /// Time spent so far; drawing includes encoding and is the sum over all threads.
+  double simulating_s = 0, drawing_s = 0;
 };
 using ProgressCallback = std::function<void(const Progress&)>;
 
 struct RenderJob {
-  std::vector<int> frames;                     ///< to draw, ascending
-  int threads = 1;                             ///< that draw, each with a context of its own
-  std::optional<std::filesystem::path> cache;  ///< read states from here instead of simulating
-  std::optional<std::filesystem::path> keep;  ///< write the states that are drawn here, to be read as `cache`
-  bool report = false;                        ///< keep figures and pictures
-  render::ChannelChoice channels;             ///< to write ...
-  std::filesystem::path channels_stem;  ///< ... as these; '#' as in render::frame_path, or for one frame
+  std::vector<int> frames;                     ///< frames to draw, ascending
+  int threads = 1;                             ///< number of drawing threads, each with a context of its own
+  std::optional<std::filesystem::path> cache;  ///< states are read from here instead of simulating
+  /// States that are drawn are written here, to be read as `cache`.
+  std::optional<std::filesystem::path> keep;
+  bool report = false;             ///< whether figures and pictures are stored
+  render::ChannelChoice channels;  ///< channels to write ...
+  /// ... to these files; '#' as in render::frame_path, or for one frame.
+  std::filesystem::path channels_stem;
 };
 
-/// Draws the frames into the sink and closes it. After an interrupt it finishes the frames in flight, closes
-/// the sink and says so in the result. Throws what the parts throw; then nothing is left half-written.
+/// Draws the frames into the sink and closes it. After an interrupt it finishes the frames in progress,
+/// closes the sink, and sets RunStats::interrupted_by. Passes on exceptions of the parts; no partial output
+/// is left then.
 RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, const RenderJob& job,
                        render::FrameSink& sink, const ProgressCallback& progress);
 
@@ -99,19 +104,30 @@ struct SimulateJob {
   std::optional<std::filesystem::path> cache;  ///< write a snapshot per frame
   bool force = false;
   std::optional<std::filesystem::path> trace;     ///< CSV of every moving body and placed particle
-  std::optional<std::filesystem::path> contacts;  ///< CSV of the points where bodies touch
+  std::optional<std::filesystem::path> contacts;  ///< CSV of the contact points of bodies
   std::optional<std::filesystem::path> cloths;    ///< CSV of strain and contacts of cloths
-  std::optional<std::filesystem::path> joints;    ///< CSV of what joints bear and how they stand
-  bool trace_every_step = false;                  ///< all of them; else once a frame
+  std::optional<std::filesystem::path> joints;    ///< CSV of the loads and states of joints
+  bool trace_every_step = false;                  ///< rows for all sub-steps; otherwise once per frame
 };
 
-/// Runs the physics alone, over all frames.
+/// Runs only the physics, over all frames.
 RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, const SimulateJob& job,
                          const ProgressCallback& progress);
 
-/// What a cache of snapshots depends on: everything of the scene but camera, light, air and picture settings.
+struct SnapshotJob {
+  std::vector<int> frames;                     ///< ascending
+  std::optional<std::filesystem::path> cache;  ///< read states from here instead of simulating
+};
+
+/// Gives the state of each frame to `take`, in order, on the calling thread. An interrupt ends it between two
+/// frames and is noted in the result. Throws what the simulation, the cache and `take` throw.
+RunStats visit_frames(const LoadedScene& loaded, const ModelLibrary& models, const SnapshotJob& job,
+                      const std::function<void(const Snapshot&)>& take, const ProgressCallback& progress);
+
+/// Hash of everything on which a cache of snapshots depends: the scene without camera, light, environment and
+/// picture settings.
 std::string simulation_key(const LoadedScene& loaded, const ModelLibrary& models);
-/// What a frame's pixels depend on.
+/// Hash of everything on which the pixels of a frame depend.
 std::string settings_key(const LoadedScene& loaded, const ModelLibrary& models);
 
 /// Time since the process started [s].

@@ -30,7 +30,7 @@ std::string left_text(const Progress& p) {
   return p.eta_s > 0 ? duration_text(p.eta_s) + " left" : "";
 }
 
-/// Figures of the latest frame, the more important ones first.
+/// Figures of the latest frame, the most important first.
 std::vector<std::string> details_of(const Progress& p) {
   std::vector<std::string> details;
   for (const auto& [name, ms] :
@@ -60,7 +60,7 @@ ProgressStyle resolved(ProgressStyle style) {
 }
 
 std::string duration_text(double seconds) {
-  constexpr double kLongest = 1e9;  // some thirty years
+  constexpr double kLongest = 1e9;  // about thirty years
   const auto s = static_cast<long>(std::ceil(std::clamp(seconds, 0.0, kLongest)));
   if (s < 60) return fmt::format("{} s", s);
   if (s < 3600) return fmt::format("{} min {:02} s", s / 60, s % 60);
@@ -75,7 +75,8 @@ std::string progress_bar(const Progress& p, int width) {
   std::string text = fmt::format("  {:3.0f} %", std::floor(100 * fraction));
   std::vector<std::string> parts = {frames_text(p), left_text(p)};
   for (std::string& detail : details_of(p)) parts.push_back(std::move(detail));
-  const int bar = std::clamp(width / 4, kShortestBar, kLongestBar);  // of the width alone: the line is steady
+  // Depends only on the width, so that the line does not move.
+  const int bar = std::clamp(width / 4, kShortestBar, kLongestBar);
   const int room = width - 1 - (bar + 2);  // some terminals wrap when the last column is written
   if (room < kPercent) return width > kPercent ? text.substr(2) : "";
   for (const std::string& part : parts) {
@@ -137,7 +138,7 @@ void StepNotice::work() {
   if (style_ != ProgressStyle::bar && style_ != ProgressStyle::plain) return;
   const auto start = steady_clock::now();
   std::unique_lock lock(mutex_);
-  constexpr std::chrono::milliseconds kPatience{500};  // what is over sooner is not worth a line
+  constexpr std::chrono::milliseconds kPatience{500};  // shorter steps are not shown
   const auto ended = [&] { return end_; };
   if (style_ == ProgressStyle::plain) {
     if (!ended_.wait_for(lock, kLogInterval, ended)) log("{} ...\n", what_);

@@ -1,6 +1,6 @@
 #pragma once
-/// How a run shows its progress: one steady line with a bar on a terminal, a plain line now and then in a log
-/// file, JSON lines for programs, nothing on a pipe.
+/// Display of a run's progress: one line with a bar on a terminal, occasional plain lines in a log file, JSON
+/// lines for programs, nothing on a pipe.
 
 #include <chrono>
 #include <condition_variable>
@@ -15,17 +15,17 @@ namespace offstage::producer {
 /// `automatic`: a bar on a terminal, plain lines if standard error is a file, else nothing.
 enum class ProgressStyle { automatic, bar, plain, json, none };
 
-/// What `automatic` stands for with today's standard error; any other style is itself.
+/// Resolves `automatic` for the current standard error; other styles are returned unchanged.
 ProgressStyle resolved(ProgressStyle style);
 
 /// "8 s", "2 min 05 s", "1 h 20 min".
 std::string duration_text(double seconds);
 
-/// The line of a terminal: bar, percentage, frames, time left, and figures of the latest frame as far as
-/// `width` columns allow. ASCII.
+/// The line on a terminal: bar, percentage, frames, time left, and as many figures of the latest frame as fit
+/// into `width` columns. ASCII.
 std::string progress_bar(const Progress& progress, int width);
 
-/// Writes to standard error. One thread at a time may call it.
+/// Writes to standard error. Must be called by one thread at a time.
 class ProgressPrinter {
  public:
   explicit ProgressPrinter(ProgressStyle style);
@@ -35,12 +35,11 @@ class ProgressPrinter {
 
  private:
   ProgressStyle style_;
-  double shown_fraction_ = 0;  // the bar never runs backwards
+  double shown_fraction_ = 0;  // the bar never moves backwards
   std::chrono::steady_clock::time_point last_{};
 };
 
-/// Says what a long step of the set-up does for as long as it takes: with the seconds on a terminal, once in
-/// a log file.
+/// Shows a long step of the set-up while it runs: with the elapsed seconds on a terminal, once in a log file.
 class StepNotice {
  public:
   StepNotice(ProgressStyle style, std::string what);
@@ -56,7 +55,7 @@ class StepNotice {
   std::mutex mutex_;
   std::condition_variable ended_;
   bool end_ = false;
-  std::thread thread_;  // last
+  std::thread thread_;  // last, so that it ends first
 };
 
 }  // namespace offstage::producer

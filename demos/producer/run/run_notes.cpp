@@ -7,7 +7,7 @@
 namespace offstage::producer {
 namespace {
 
-/// Names the body that was concerned most often.
+/// The body in the note is the one with most fall-backs.
 std::string note_of_rough_contacts(const SimulationTotals& t) {
   const auto& [name, count] =
       *std::ranges::max_element(t.rough_bodies, {}, [](const auto& entry) { return entry.second; });
@@ -31,10 +31,10 @@ std::vector<std::string> notes_of(const SimulationTotals& t) {
   for (const std::string& joint : t.broken_joints)
     notes.push_back(fmt::format("note: joint '{}' broke", joint));
   if (t.joints_unsolved)
-    notes.push_back(
-        fmt::format("warning: joint projection failed {} times; joints may visibly come apart. Reduce "
-                    "world.step (now {:g} s).",
-                    t.joints_unsolved, t.step_s));
+    notes.push_back(fmt::format(
+        "warning: joints could not be followed {} times; they may come apart or slow down visibly. Reduce "
+        "world.step (now {:g} s).",
+        t.joints_unsolved, t.step_s));
   for (const auto& [cloth, share] : t.softened_cloths)
     notes.push_back(fmt::format(
         "warning: cloth '{}': the stiffness of springs was reduced to {:.2g} of its value, because they are "

@@ -1,5 +1,5 @@
 #pragma once
-/// What went wrong or is remarkable in a simulation, as sentences.
+/// Problems and notable events of a simulation, as sentences.
 
 #include <string>
 #include <vector>

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "producer/base/markup.h"
 #include "producer/base/time_code.h"
 #include "producer/run/contact_sheet.h"
 #include "render/image_io.h"
@@ -22,21 +23,6 @@ svg{width:100%;height:auto;background:#fff;border:1px solid #ddd}svg text{font:1
 pre{background:#fff;border:1px solid #ddd;padding:1em;overflow:auto;max-height:30em}table{border-collapse:collapse}
 td,th{padding:2px 10px;text-align:left;border-bottom:1px solid #eee;font-family:ui-monospace,monospace;font-size:12px}
 </style>)";
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '&')
-      out += "&amp;";
-    else if (c == '<')
-      out += "&lt;";
-    else if (c == '>')
-      out += "&gt;";
-    else
-      out += c;
-  }
-  return out;
-}
 
 std::string base64(std::span<const uint8_t> bytes) {
   constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -55,7 +41,7 @@ struct Series {
   std::function<double(const FrameFigures&)> value;
 };
 
-/// A round number; what rounding leaves of zero is zero.
+/// A rounded number; -0 is written as 0.
 std::string label(double value) {
   return fmt::format("{:g}", std::abs(value) < 1e-12 ? 0.0 : value);
 }
@@ -66,7 +52,7 @@ std::vector<double> ticks(double low, double high, int count) {
   const double share = rough / power;
   const double step = power * (share <= 1 ? 1 : share <= 2 ? 2 : share <= 5 ? 5 : 10);
   std::vector<double> result;
-  // The margin takes the last one in where rounding has put it a hair beyond.
+  // The margin includes the last one if rounding puts it slightly beyond the range.
   for (double k = std::ceil(low / step); k * step <= high + 1e-6 * step; ++k) result.push_back(k * step);
   return result;
 }
@@ -89,7 +75,7 @@ std::string plot(const std::string& title, const std::vector<FrameFigures>& figu
   };
 
   std::string svg = fmt::format("<svg viewBox=\"0 0 {} {}\"><text x=\"{}\" y=\"18\">{}</text>\n", kWidth,
-                                kHeight, kLeft, escaped(title));
+                                kHeight, kLeft, escape_markup(title));
   for (const double v : ticks(low, high, 4)) {
     svg += fmt::format(
         "<line x1=\"{0}\" x2=\"{1}\" y1=\"{2:.1f}\" y2=\"{2:.1f}\" stroke=\"#eee\"/>"
@@ -105,7 +91,7 @@ std::string plot(const std::string& title, const std::vector<FrameFigures>& figu
     svg += fmt::format("<polyline fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\" points=\"", s.color);
     for (const FrameFigures& f : figures) svg += fmt::format("{:.1f},{:.1f} ", x(f.time), y(s.value(f)));
     svg += "\"/>\n";
-    if (all.size() == 1) continue;  // the title says what it is
+    if (all.size() == 1) continue;  // the title names it
     svg += fmt::format("<text x=\"{}\" y=\"18\" text-anchor=\"end\" style=\"fill:{}\">{}</text>\n", legend,
                        s.color, s.name);
     legend -= 110;
@@ -165,13 +151,14 @@ std::string run_report(const LoadedScene& loaded, const std::string& settings, c
       "<h1>{0}</h1>\n<p>{2}</p>\n<p>{3} frames of {4} x {5} pixels, {6} a second; {7} bodies, at most {8} "
       "particles; "
       "made in {9:.1f} s.</p>\n",
-      escaped(scene.name), kStyle, escaped(scene.description), stats.frames, scene.render.size.x(),
-      scene.render.size.y(), scene.output.fps.text(), stats.bodies, stats.most_particles, stats.wall_s);
+      escape_markup(scene.name), kStyle, escape_markup(scene.description), stats.frames,
+      scene.render.size.x(), scene.render.size.y(), scene.output.fps.text(), stats.bodies,
+      stats.most_particles, stats.wall_s);
   html += sheet(scene, stats);
   html += "<h2>Plots</h2>\n" + plots(stats.figures);
-  html += "<h2>Figures</h2>\n<pre>" + escaped(to_json(stats)) + "</pre>\n";
+  html += "<h2>Figures</h2>\n<pre>" + escape_markup(to_json(stats)) + "</pre>\n";
   html += "<h2>Settings</h2>\n<p>Hash <code>" + settings + "</code></p>\n<pre>" +
-          escaped(nlohmann::ordered_json::parse(loaded.canonical).dump(2)) + "</pre>\n";
+          escape_markup(nlohmann::ordered_json::parse(loaded.canonical).dump(2)) + "</pre>\n";
   html += "<h2>Hashes</h2>\n" + hashes(stats.figures);
   return html + "</body></html>\n";
 }

@@ -10,6 +10,7 @@
 
 #include "producer/base/json_file.h"
 #include "producer/base/packed_file.h"
+#include "producer/base/version.h"
 #include "render/error.h"
 #include "render/image_io.h"
 #include "render/output_file.h"
@@ -19,9 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kCacheFormat = 4;
-constexpr const char* kCacheFile = "cache.json";
-constexpr std::string_view kGenerationPrefix = "generation-";
+constexpr std::string_view kGenerationPrefix = SnapshotCache::kGenerationPrefix;
 
 render::Descriptor open_folder(const fs::path& folder) {
   return render::Descriptor(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
@@ -57,7 +56,7 @@ void SnapshotCache::create(const std::string& key, int frames, bool force) {
   std::error_code error;
   fs::create_directories(folder_, error);
   if (error) throw render::FileError(folder_.string() + ": " + error.message());
-  const bool occupied = fs::exists(folder_ / kCacheFile, error);
+  const bool occupied = fs::exists(folder_ / kFile, error);
   if (occupied && !force)
     throw render::FileError(folder_.string() + ": already contains a cache; replace it with --force");
   if (!occupied && !fs::is_empty(folder_, error) && generations_in(folder_).empty())
@@ -66,7 +65,8 @@ void SnapshotCache::create(const std::string& key, int frames, bool force) {
   std::string name = (folder_ / (std::string(kGenerationPrefix) + "XXXXXX")).string();
   if (::mkdtemp(name.data()) == nullptr) render::throw_file_error(folder_, "cannot create a folder");
   generation_ = name;
-  fs::permissions(generation_, fs::status(folder_, error).permissions(), error);  // mkdtemp's are narrow
+  // Mkdtemp sets narrower permissions.
+  fs::permissions(generation_, fs::status(folder_, error).permissions(), error);
   hold_ = open_folder(generation_);
   ::flock(hold_.fd(), LOCK_EX | LOCK_NB);
   key_ = key;
@@ -74,19 +74,23 @@ void SnapshotCache::create(const std::string& key, int frames, bool force) {
 }
 
 void SnapshotCache::open(const std::string& key, int frames) {
-  const fs::path path = folder_ / kCacheFile;
+  const fs::path path = folder_ / kFile;
   const auto refuse = [&](const std::string& what) {
     throw render::FileError(folder_.string() + ": " + what);
   };
-  constexpr int kTries = 10;  // against a writer that publishes the next generation meanwhile
+  constexpr int kTries = 10;  // repeated if a writer publishes the next generation meanwhile
   for (int i = 0; i < kTries; ++i) {
     const std::optional<JsonObject> published = read_json_file(path);
     if (!published && !generations_in(folder_).empty())
       refuse("the simulation of this cache did not finish; simulate again");
     if (!published)
       refuse("contains no cache; create one with: offstage simulate SCENE --cache " + folder_.string());
-    if (published->count("offstage_cache", 0, kMostFrames) != kCacheFormat)
+    if (published->count("offstage_cache", 0, kMostFrames) != kFormat)
       refuse("is a cache of another version; simulate again with --force");
+    const std::string program = published->text("program");
+    if (published->text("key") != key && !program.empty() && program != version())
+      refuse(fmt::format("the cache was made by offstage {}, and this is {}; simulate again with --force",
+                         program, version()));
     if (published->text("key") != key || published->count("frames", 0, kMostFrames) != frames)
       refuse("the cache was made with another scene or other settings; simulate again with --force");
     const std::string name = published->text("generation");
@@ -102,19 +106,20 @@ void SnapshotCache::open(const std::string& key, int frames) {
 }
 
 void SnapshotCache::publish() {
-  const nlohmann::ordered_json published = {{"offstage_cache", kCacheFormat},
+  const nlohmann::ordered_json published = {{"offstage_cache", kFormat},
+                                            {"program", std::string(version())},
                                             {"key", key_},
                                             {"frames", frames_},
                                             {"generation", generation_.filename().string()}};
   const std::string text = published.dump(2) + "\n";
-  render::write_file_atomically(folder_ / kCacheFile,
+  render::write_file_atomically(folder_ / kFile,
                                 {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
   remove_old_generations();
 }
 
-/// Those that no process holds, but for the published one and this one.
+/// Removes the generations that no process holds, except the published one and this one.
 void SnapshotCache::remove_old_generations() const {
-  const std::optional<JsonObject> published = read_json_file(folder_ / kCacheFile);
+  const std::optional<JsonObject> published = read_json_file(folder_ / kFile);
   const std::string kept = published ? published->text("generation") : "";
   std::error_code error;
   for (const fs::path& folder : generations_in(folder_)) {
@@ -128,7 +133,11 @@ void SnapshotCache::remove_old_generations() const {
 }
 
 fs::path SnapshotCache::file(int frame) const {
-  return generation_ / fmt::format("{:06}.snap", frame);
+  return generation_ / file_name(frame);
+}
+
+std::string SnapshotCache::file_name(int frame) {
+  return fmt::format("{:06}.snap", frame);
 }
 
 void SnapshotCache::write(const Snapshot& snapshot) const {

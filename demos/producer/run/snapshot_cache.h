@@ -1,9 +1,10 @@
 #pragma once
-/// A folder with the snapshots of one simulation after another. Each run writes a generation, a folder of its
-/// own, and publishes it as a whole; a reader keeps to the generation that it found first.
+/// A folder with the snapshots of one simulation at a time. Each run writes a generation, a folder of its
+/// own, and publishes it as a whole; a reader keeps the generation that it opened.
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "producer/build/snapshot.h"
 #include "render/file_io.h"
@@ -12,18 +13,27 @@ namespace offstage::producer {
 
 class SnapshotCache {
  public:
+  /// Version of the folder's layout and of the snapshots in it; another one is refused (docs/cache.md).
+  static constexpr int kFormat = 4;
+  static constexpr const char* kFile = "cache.json";  ///< which generation is published, and of what
+  static constexpr std::string_view kGenerationPrefix = "generation-";  ///< of the folders with snapshots
+  /// "000012.snap"
+  static std::string file_name(int frame);
+
   explicit SnapshotCache(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-  /// Begins a generation for the simulation identified by `key`. Throws FileError if the folder holds a cache
-  /// already, unless `force`, or something else.
+  /// Begins a generation for the simulation identified by `key`. Throws FileError if the folder already
+  /// contains a cache (unless `force`) or other files.
   void create(const std::string& key, int frames, bool force);
-  /// Opens the published generation for reading. Throws FileError if the folder holds no cache, an unfinished
-  /// one, or one of another simulation.
+  /// Opens the published generation for reading. Throws FileError if the folder contains no cache, an
+  /// unfinished one, or one of another simulation.
   void open(const std::string& key, int frames);
-  /// Publishes the generation by one rename; generations that nobody reads or writes go.
+  /// Publishes the generation by one rename, and removes the generations that nobody reads or writes.
   void publish();
+  /// Removes the generations that are not published and that no process holds.
+  void remove_unused_generations() const { remove_old_generations(); }
 
-  /// Of the generation begun or opened. Throw FileError; read() also for a snapshot of another run.
+  /// For the generation begun or opened. Both throw FileError; read() also for a snapshot of another run.
   void write(const Snapshot& snapshot) const;
   Snapshot read(int frame) const;
 
@@ -34,7 +44,7 @@ class SnapshotCache {
   std::filesystem::path folder_, generation_;
   std::string key_;
   int frames_ = 0;
-  render::Descriptor hold_;  // a lock on the generation's folder: it is in use
+  render::Descriptor hold_;  // a lock on the generation's folder while it is in use
 };
 
 }  // namespace offstage::producer

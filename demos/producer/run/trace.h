@@ -1,6 +1,6 @@
 #pragma once
-/// CSV of what happened in a simulation. Values are written with all their digits, so that a trace can be
-/// checked against closed forms. A value that is not finite throws CsvFile::NotFinite.
+/// CSV tables of a simulation. Values are written with all their digits, so that they can be checked against
+/// closed forms. A value that is not finite throws CsvFile::NotFinite.
 
 #include <filesystem>
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace offstage::producer {
 
-/// Where everything went: time, object, position, orientation, velocities.
+/// Motion of all objects: time, object, position, orientation, velocities.
 class Trace {
  public:
   Trace(const std::filesystem::path& path, const Simulation& simulation);
@@ -25,7 +25,7 @@ class Trace {
   const Simulation& simulation_;
 };
 
-/// How cloths did: time, cloth, points, strain, contacts and what had to be held back.
+/// State of cloths: time, cloth, points, strain, contacts and shortened moves.
 class ClothTrace {
  public:
   ClothTrace(const std::filesystem::path& path, const Simulation& simulation);
@@ -39,8 +39,8 @@ class ClothTrace {
   const Simulation& simulation_;
 };
 
-/// How joints stood and what they bore: time, joint, anchor on a, force and torque on a, the free coordinate
-/// and its speed, how far the anchors are apart, 1 if it is broken.
+/// State and loads of joints: time, joint, anchor on a, force and torque on a, the free coordinate and its
+/// speed, distance of the anchors, 1 if it is broken.
 class JointTrace {
  public:
   JointTrace(const std::filesystem::path& path, const Simulation& simulation);
@@ -54,7 +54,7 @@ class JointTrace {
   const Simulation& simulation_;
 };
 
-/// Where bodies touched: time, the two bodies, point, normal from b to a, force on a, separation.
+/// Contact points of bodies: time, the two bodies, point, normal from b to a, force on a, separation.
 class ContactTrace {
  public:
   ContactTrace(const std::filesystem::path& path, const Simulation& simulation);

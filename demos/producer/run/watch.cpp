@@ -33,7 +33,7 @@ std::string file_bytes(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// Whether a text could be the name of a file: short, with an ending that begins with a letter.
+/// Whether a text may be a file name: short, with an ending that begins with a letter.
 bool is_name(const std::string& text) {
   constexpr std::size_t kLongestName = 4096, kLongestEnding = 8;
   if (text.empty() || text.size() > kLongestName || text.find_first_of("\n\"*?") != std::string::npos)
@@ -51,7 +51,7 @@ void collect_strings(const Node& node, std::vector<std::string>& strings) {
     for (const Member& member : *object) collect_strings(member.value, strings);
 }
 
-/// The text between quotes of what is no JSON at the moment.
+/// The quoted strings of a text that is currently not valid JSON.
 std::vector<std::string> quoted_strings(const std::string& text) {
   std::vector<std::string> strings;
   std::istringstream lines(text);
@@ -72,7 +72,7 @@ std::vector<std::string> strings_in_json(const std::string& text, const fs::path
   return strings;
 }
 
-/// What the lines of an OBJ or MTL file that name other files end with.
+/// File names at the ends of lines of an OBJ or MTL file.
 std::vector<std::string> names_in_obj(const std::string& text) {
   std::vector<std::string> names;
   std::istringstream lines(text);
@@ -113,7 +113,8 @@ std::set<fs::path> files_of_scene(const fs::path& scene, const std::vector<std::
   while (!unread.empty()) {
     const fs::path file = unread.back();
     unread.pop_back();
-    // Models are named relative to the scene even where an include names them, includes to their own file.
+    // Models are named relative to the scene, even by an include; includes are named relative to their own
+    // file.
     for (const std::string& name : included_names(file))
       for (const fs::path& folder : {file.parent_path(), scene.parent_path()}) add(name, folder);
   }
@@ -134,10 +135,10 @@ FileWatch::FileWatch(std::set<fs::path> files, Method method) : files_(std::move
     std::set<fs::path> folders;
     for (const fs::path& file : files_) {
       folders.insert(file.has_parent_path() ? file.parent_path() : ".");
-      std::error_code error;  // a link is written where it leads to
+      std::error_code error;  // a link is written at its target
       if (const fs::path real = fs::canonical(file, error); !error) folders.insert(real.parent_path());
     }
-    // Folders rather than files: editors write a new file and give it the old one's name.
+    // Folders are watched instead of files, because editors write a new file and rename it.
     constexpr uint32_t kEvents =
         IN_CLOSE_WRITE | IN_MODIFY | IN_MOVED_TO | IN_MOVED_FROM | IN_CREATE | IN_DELETE;
     for (const fs::path& folder : folders) inotify_add_watch(fd_, folder.c_str(), kEvents | IN_ONLYDIR);
@@ -177,7 +178,7 @@ void FileWatch::wait(std::chrono::milliseconds limit) {
 }
 
 void FileWatch::settle(std::chrono::milliseconds still) {
-  constexpr int kMostRounds = 50;  // a file that is written all the time is taken as it is
+  constexpr int kMostRounds = 50;  // a file that is written all the time is read in its current state
   Stamps last = stamps();
   for (int round = 0; round < kMostRounds; ++round) {
     std::this_thread::sleep_for(still);

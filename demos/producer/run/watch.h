@@ -1,5 +1,5 @@
 #pragma once
-/// The files a scene is made of, and noticing when one of them changes.
+/// The files of a scene, and detection of their changes.
 
 #include <chrono>
 #include <filesystem>
@@ -10,17 +10,17 @@
 
 namespace offstage::producer {
 
-/// Every file that a scene file names, directly or through what it names: includes, models and their parts,
-/// textures; and those that `overrides` name. Takes names for files rather than too few, also of files that
-/// are missing or broken: they are about to be mended.
+/// Returns all files that a scene file names, directly or indirectly: includes, models and their parts,
+/// textures; and those named by `overrides`. In doubt a name counts as a file. Missing or damaged files are
+/// included, because they may be repaired.
 std::set<std::filesystem::path> files_of_scene(const std::filesystem::path& scene,
                                                const std::vector<std::string>& overrides);
 
-/// A hash of what files hold; the same when one was only touched.
+/// Hash of the contents of files; it does not change if a file is only touched.
 std::string contents_hash(const std::set<std::filesystem::path>& files);
 
-/// Sees changes by comparing times and sizes; the system's notifications (inotify) only tell it sooner, so
-/// file systems that send none are watched as well.
+/// Detects changes by comparing times and sizes. The system's notifications (inotify) only make this faster,
+/// so file systems without them are supported, too.
 class FileWatch {
  public:
   enum class Method { notified, polling };
@@ -30,11 +30,12 @@ class FileWatch {
   FileWatch(const FileWatch&) = delete;
   FileWatch& operator=(const FileWatch&) = delete;
 
-  /// Whether a file is not as it was at the construction, or has come or gone.
+  /// Whether a file has changed since the construction, or was created or removed.
   bool changed() const;
-  /// Waits so long, or until something happens in a folder of the files, or a signal arrives.
+  /// Waits at most this time, or until something happens in a folder of the files, or a signal arrives.
   void wait(std::chrono::milliseconds limit);
-  /// Waits until the files have kept still so long; an editor may write a file in several steps.
+  /// Waits until the files have not changed for this time, because an editor may write a file in several
+  /// steps.
   void settle(std::chrono::milliseconds still);
 
   Method method() const { return fd_ < 0 ? Method::polling : Method::notified; }
@@ -45,7 +46,7 @@ class FileWatch {
 
   std::set<std::filesystem::path> files_;
   Stamps first_;
-  int fd_ = -1;  // of inotify
+  int fd_ = -1;  // descriptor of inotify
 };
 
 }  // namespace offstage::producer

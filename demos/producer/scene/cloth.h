@@ -1,6 +1,6 @@
 #pragma once
-/// The cloths of a scene; see scene.h. Where a pin or a seam asks for a place, it is one of the flat cloth in
-/// its own frame, so that copies of a cloth are pinned alike.
+/// The cloths of a scene; see scene.h. Positions of pins and seams are those of the flat cloth in its own
+/// frame, so that copies of a cloth are pinned alike.
 
 #include <array>
 #include <optional>
@@ -14,15 +14,15 @@
 
 namespace offstage::producer {
 
-/// A rectangle in the plane y = 0 of the cloth's frame, its front towards +Y: left to right along x, top to
-/// bottom along z.
+/// A rectangle in the plane y = 0 of the cloth's frame with its front towards +Y: left to right is along x,
+/// top to bottom along z.
 struct GridShape {
   Eigen::Vector2d size = {1, 1};
   Eigen::Vector2i cells = {40, 40};
 };
 using ClothShape = std::variant<GridShape, MeshFile>;
 
-/// What a cloth has of its own instead of its fabric's.
+/// Values that replace those of the cloth's fabric.
 struct FabricChanges {
   std::optional<Real> areal_density, stretch, shear, bend, damping, friction, self_friction, thickness, drag,
       lift, max_stretch, max_shear, bend_damping;
@@ -32,10 +32,10 @@ struct FabricChanges {
 enum class Side { left, right, top, bottom };
 enum class Corner { top_left, top_right, bottom_left, bottom_right };
 
-/// What holds the vertices that a pin selects.
+/// The object to which a pin attaches the selected vertices.
 struct PinScope {
   Where where;
-  std::string body;  ///< name; empty: they stay where they are
+  std::string body;  ///< name of the body; empty: the vertices stay at their positions
   Real until = 1e30;
 };
 struct CornerPin : PinScope {
@@ -44,7 +44,7 @@ struct CornerPin : PinScope {
 };
 struct SidePin : PinScope {
   Side side = Side::top;
-  int every = 1;  ///< of its vertices each so-manieth, from the first
+  int every = 1;  ///< only every n-th of its vertices, from the first
 };
 struct NearestPin : PinScope {
   Vec3 point = Vec3::Zero();
@@ -59,7 +59,7 @@ using ClothPin = std::variant<CornerPin, SidePin, NearestPin, BoxPin>;
 struct SideSeam {
   Where where;
   Side a = Side::left, b = Side::right;
-  bool reversed = false;  ///< the first vertex of one meets the last of the other
+  bool reversed = false;  ///< the first vertex of one side is sewn to the last of the other
 };
 /// The vertices nearest to two points.
 struct PointSeam {
@@ -73,8 +73,8 @@ struct Cloth {
   std::string name;
   ClothShape shape = GridShape{};
   std::string fabric = "cotton";
-  FabricChanges changes;  ///< its keys stand directly in the cloth
-  std::string material;   ///< name; empty: the fabric's own look
+  FabricChanges changes;  ///< its keys are directly in the cloth
+  std::string material;   ///< name; empty: the look of the fabric
   Vec3 position = Vec3::Zero();
   Quat orientation = Quat::Identity();
   Vec3 velocity = Vec3::Zero();
@@ -91,7 +91,7 @@ struct Cloth {
   bool soften = false;
   bool visible = true;
   bool casts_shadow = true;
-  Placement placement;  ///< its three keys stand directly in the cloth
+  Placement placement;  ///< its three keys are directly in the cloth
 };
 
 }  // namespace offstage::producer

@@ -1,5 +1,5 @@
 #pragma once
-/// Effects of a scene: presets at some place; see scene.h and presets.h.
+/// Effects of a scene: presets at a place; see scene.h and presets.h.
 
 #include <string>
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace offstage::producer {
 
-/// The names of a preset's emitters and forces with the keys that replace theirs.
+/// Names of a preset's emitters and forces, with the keys that replace theirs.
 struct Overrides {
   Node node = Object{};
 };
@@ -18,9 +18,9 @@ struct Overrides {
 struct Effect {
   Where where;
   std::string preset;
-  std::string name;  ///< before the names of its emitters and forces; default: the preset's
+  std::string name;  ///< prefix of the names of its emitters and forces; default: the preset's name
   Vec3 position = Vec3::Zero();
-  std::string body;  ///< that its emitters move with; the position is then in its frame
+  std::string body;  ///< body with which its emitters move; the position is then in the body's frame
   Real start = 0;
   Overrides overrides;
 };

@@ -1,6 +1,6 @@
 #pragma once
-/// The forces of a scene; see scene.h. Those that can act on many have the names of what they act on; none:
-/// all dynamic bodies, all cloths and no particles.
+/// The forces of a scene; see scene.h. Forces have the names of the objects on which they act; without names
+/// they act on all dynamic bodies, all cloths and no particles.
 
 #include <optional>
 #include <string>
@@ -19,7 +19,7 @@ struct NamedForce {
   Where where;
   std::string name;
 };
-/// Whom it acts on, and when.
+/// The objects on which a force acts, and its time.
 struct ForceScope : NamedForce {
   std::vector<std::string> bodies;
   std::vector<std::string> particles;  ///< names of groups, of emitters, or of their child particles
@@ -27,10 +27,10 @@ struct ForceScope : NamedForce {
   Real start = 0;
   Real end = 1e30;
 };
-/// What fields have: also where they act.
+/// Fields also have a region.
 struct FieldScope : ForceScope {
   sim::Region region;
-  int drop_rate = 0;  ///< power of the fall from 1 in the middle of the region to 0 at its edge
+  int drop_rate = 0;  ///< exponent of the decrease from 1 in the middle of the region to 0 at its edge
 };
 struct ConstantField : FieldScope {
   Vec3 force = Vec3::Zero();
@@ -60,7 +60,7 @@ struct TurbulenceField : FieldScope {
   Real drag = 0;
 };
 
-/// What forces between particles have.
+/// Keys of forces between particles.
 struct PairScope : NamedForce {
   std::vector<std::string> particles;
   Real start = 0;
@@ -87,17 +87,19 @@ struct HandKey {
   Vec3 position = Vec3::Zero();
   std::optional<sim::Interpolation> interpolation;  ///< to the next key; default: the grab's
 };
-/// A damped spring of no length from a body or from particles to a point that moves, as of a hand.
+/// A damped spring of length 0 from a body or from particles to a moving point, as of a hand.
 struct Grab : NamedForce {
   std::string body;
   std::vector<std::string> particles;
   std::vector<std::string> cloths;
-  Vec3 point = Vec3::Zero();  ///< of the body, in its frame
+  Vec3 point = Vec3::Zero();  ///< point of the body, in its frame
   std::vector<HandKey> keyframes;
   sim::Interpolation interpolation = sim::Interpolation::monotone;
   Real stiffness = 100;
   Real damping = 10;
-  Real reach = 1e9;  ///< of particles and of points of cloths [m]; the longest length of a scene: all of them
+  /// Greatest distance of particles and of cloth points [m]; the default is the greatest length of a scene:
+  /// all of them.
+  Real reach = 1e9;
   Real start = 0;
   Real end = 1e30;
 };
@@ -114,7 +116,7 @@ struct Explosion : NamedForce {
 using Force = std::variant<ConstantField, PointField, WindField, Grab, Explosion, VortexField,
                            TurbulenceField, GravitationForce, CoulombForce, LennardJonesForce>;
 
-/// What every force has.
+/// The part that every force has.
 NamedForce& named(Force& force);
 const NamedForce& named(const Force& force);
 

@@ -1,6 +1,5 @@
 #pragma once
-/// The joints and articulations of a scene; see scene.h. Places and directions are those of the world at time
-/// 0.
+/// The joints and articulations of a scene; see scene.h. Positions and directions are in the world at time 0.
 
 #include <array>
 #include <optional>
@@ -30,13 +29,13 @@ struct JointMotor {
   Real stiffness = 0, damping = 0;
 };
 
-/// How a joint moves, and its motor.
+/// Free motion of a joint, and its motor.
 struct JointBehaviour {
   sim::JointType type = sim::JointType::spherical;
   Vec3 axis = Vec3::UnitZ();
   Vec3 second_axis = Vec3::UnitX();
-  std::optional<std::array<Real, 2>> limits;      ///< of sliding and lengths [m]
-  std::optional<std::array<Real, 2>> limits_deg;  ///< of turning
+  std::optional<std::array<Real, 2>> limits;      ///< of sliding and of lengths [m]
+  std::optional<std::array<Real, 2>> limits_deg;  ///< of rotation
   std::optional<Real> swing_deg;
   Real friction = 0, damping = 0;
   std::optional<JointMotor> motor;
@@ -47,11 +46,11 @@ struct Joint {
   Where where;
   std::string name;
   JointBehaviour behaviour;
-  std::string a, b;  ///< names of bodies; b empty: the world
+  std::string a, b;  ///< names of bodies; b is empty for the world
   Vec3 anchor = Vec3::Zero();
-  Vec3 anchor_b = Vec3::Zero();  ///< of a rod
+  Vec3 anchor_b = Vec3::Zero();  ///< end of a rod
   bool collide = false;
-  bool visible = true;  ///< of a rod or rope
+  bool visible = true;  ///< whether a rod or rope is drawn
   Real radius = 0.01;   ///< of the drawn rod or rope [m]
   std::string material;
 };
@@ -62,12 +61,12 @@ struct Chain {
   std::string name;
   Vec3 from = Vec3::Zero(), to = Vec3::UnitX();
   int links = 10;
-  Real sag = 1;  ///< length of the chain over the distance
+  Real sag = 1;  ///< length of the chain as a multiple of the distance
   Real radius = 0.03;
   Real density = 7800;
   std::string material;
-  std::string start = "world";  ///< what holds the first link: a body, "world", or nothing
-  std::string end;              ///< the last one
+  std::string start = "world";  ///< holder of the first link: a body, "world", or nothing
+  std::string end;              ///< holder of the last link
   Real swing_deg = 180;
   Real friction = 0, damping = 0;
   std::optional<Real> max_force;
@@ -77,12 +76,12 @@ struct Chain {
 struct Ragdoll {
   Where where;
   std::string name;
-  Vec3 position = Vec3::Zero();  ///< of the soles
+  Vec3 position = Vec3::Zero();  ///< position of the soles
   Quat orientation = Quat::Identity();
   Vec3 velocity = Vec3::Zero();
   Real height = 1.75;
   Real density = 1000;
-  Real stiffness = 1;                 ///< of the joints' dry friction: 1 is a limp grown-up
+  Real stiffness = 1;                 ///< factor of the joints' dry friction; 1 is a limp adult
   std::string skin, shirt, trousers;  ///< names of materials
   Placement placement;
 };
@@ -96,7 +95,7 @@ struct Bridge {
   Real width = 1, thickness = 0.05;
   Real density = 600;
   std::string material;
-  Real sag = 1.02;  ///< length of the deck over the distance
+  Real sag = 1.02;  ///< length of the deck as a multiple of the distance
   Real damping = 0;
   std::optional<Real> max_force;
 };
@@ -105,15 +104,15 @@ struct Bridge {
 struct Vehicle {
   Where where;
   std::string name;
-  Vec3 position = Vec3::Zero();  ///< on the ground in the middle of its wheels
+  Vec3 position = Vec3::Zero();  ///< on the ground, at the centre of its wheels
   Quat orientation = Quat::Identity();
   Vec3 velocity = Vec3::Zero();
   Real length = 4, width = 1.8, wheel_radius = 0.36;
   Real mass = 1200;
-  Real suspension_hz = 1.6;       ///< of its bouncing
+  Real suspension_hz = 1.6;       ///< natural frequency of the suspension
   std::vector<MotorKey> speed;    ///< [m/s]
-  std::vector<MotorKey> steer;    ///< of the middle of the front axle [degrees], left positive
-  Real max_torque = 900;          ///< of each rear wheel
+  std::vector<MotorKey> steer;    ///< steering angle at the centre of the front axle [degrees], left positive
+  Real max_torque = 900;          ///< for each rear wheel
   std::string paint, trim, tyre;  ///< names of materials
   Placement placement;
 };
@@ -122,24 +121,24 @@ struct Vehicle {
 struct Crane {
   Where where;
   std::string name;
-  Vec3 position = Vec3::Zero();  ///< the foot of its mast
+  Vec3 position = Vec3::Zero();  ///< position of the foot of its mast
   Quat orientation = Quat::Identity();
   Real height = 8, reach = 6;
   Real load_mass = 400, load_size = 0.9;
-  std::vector<MotorKey> slew;     ///< turning of the jib [degrees]
-  std::vector<MotorKey> trolley;  ///< way outwards [m]
-  std::vector<MotorKey> hoist;    ///< way of the load upwards [m]
+  std::vector<MotorKey> slew;     ///< rotation of the jib [degrees]
+  std::vector<MotorKey> trolley;  ///< outward displacement [m]
+  std::vector<MotorKey> hoist;    ///< upward displacement of the load [m]
   std::string frame, load;        ///< names of materials
   Placement placement;
 };
 
-/// The joint above a node of a model.
+/// The joint between a node of a model and its parent.
 struct NodeJoint {
   Where where;
   std::string node;
-  JointBehaviour behaviour;  ///< axes as the node has them
+  JointBehaviour behaviour;  ///< axes are in the node's frame
 };
-/// The nodes of a model file that have triangles as links, each joined to the one above it where it is.
+/// The nodes of a model file that have triangles as links, each joined to its parent at the node's origin.
 struct ModelTree {
   Where where;
   std::string name;
@@ -149,10 +148,10 @@ struct ModelTree {
   Vec3 velocity = Vec3::Zero();
   Real scale = 1;
   Real density = 1000;
-  std::string base = "world";  ///< what holds the uppermost nodes: a body, "world", or nothing
+  std::string base = "world";  ///< holder of the uppermost nodes: a body, "world", or nothing
   std::string material;        ///< empty: those of the file
   bool collides = true;
-  Real friction = 0, damping = 0;  ///< of the joints that are not in `joints`, which are spherical
+  Real friction = 0, damping = 0;  ///< for joints that are not in `joints`, which are spherical
   std::vector<NodeJoint> joints;
   Placement placement;
 

@@ -7,7 +7,7 @@
 namespace offstage::producer {
 namespace {
 
-/// The defaults of a style. Light that is not lit is its own, so it throws no shadow.
+/// The defaults of a style. Self-luminous particles cast no shadow.
 render::PointsDef usual_look(LookStyle style) {
   using render::PointStyle;
   switch (style) {

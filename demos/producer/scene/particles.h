@@ -1,6 +1,5 @@
 #pragma once
-/// The particles of a scene: how they look and behave, groups of them, emitters, and child
-/// particles. See scene.h.
+/// The particles of a scene: looks, behaviour, groups, emitters, and child particles. See scene.h.
 
 #include <array>
 #include <cstdint>
@@ -23,7 +22,7 @@ namespace offstage::producer {
 
 enum class LookStyle { sprite, streak, sphere, smoke, fire, flake, drop, spark };
 
-/// How particles are drawn. What is left out is as the style has it; see points_def().
+/// Look of particles. Omitted values are those of the style; see points_def().
 struct ParticleLook {
   LookStyle style = LookStyle::sprite;
   Color color;
@@ -31,23 +30,24 @@ struct ParticleLook {
   std::vector<std::pair<Real, Real>> temperature_over_age;  ///< [age 0..1, K]; multiplies both
   std::vector<std::pair<Real, Real>> size_over_age;         ///< [age 0..1, factor]
   effects::RampKind ramp = effects::RampKind::linear;
-  Real color_deviation = 0;                                     ///< of brightness, per particle
-  Eigen::Vector4d channel_deviation = Eigen::Vector4d::Zero();  ///< of red, green, blue, alpha, per particle
+  Real color_deviation = 0;  ///< deviation of brightness, per particle
+  /// Deviation of red, green, blue, alpha, per particle.
+  Eigen::Vector4d channel_deviation = Eigen::Vector4d::Zero();
   std::optional<bool> additive, lit, casts_shadow;
   std::optional<Real> softness, stretch, taper, metallic, roughness;
 };
 
-/// The look as the stage wants it, with the defaults of its style.
+/// The look for the stage, with the defaults of its style.
 render::PointsDef points_def(const ParticleLook& look);
 
-/// What particles of a group or an emitter feel and do, other than their own parameters.
+/// Forces and collisions of the particles of a group or an emitter, besides their individual parameters.
 struct ParticleBehaviour {
   Real linear_drag = 0;
   bool gravity = true;
   Vec3 force = Vec3::Zero();
-  bool collides = true;   ///< with bodies
-  bool internal = false;  ///< with each other
-  bool external = false;  ///< with those of other systems that have this, too
+  bool collides = true;   ///< whether they collide with bodies
+  bool internal = false;  ///< whether they collide with each other
+  bool external = false;  ///< whether they collide with those of other systems that also have this flag
   bool dies_on_hit = false;
   sim::IntegratorKind integrator = sim::IntegratorKind::leapfrog;
 };
@@ -55,7 +55,7 @@ struct ParticleBehaviour {
 struct ParticlePlace {
   Vec3 position = Vec3::Zero();
   Vec3 velocity = Vec3::Zero();
-  std::optional<Color> color;  ///< default: the look's
+  std::optional<Color> color;  ///< default: that of the look
 };
 
 /// Particles placed one by one.
@@ -68,11 +68,12 @@ struct ParticleGroup {
   Real restitution = 0.5;
   Real friction = 0.5;
   Real charge = 0;
-  ParticleBehaviour behaviour;  ///< its keys stand directly in the group
+  ParticleBehaviour behaviour;  ///< its keys are directly in the group
   ParticleLook look;
 };
 
-/// Particles that throw off others of the same kind, from some age on. Percentages are of the parent's.
+/// Splitting of particles into others of the same kind, from a given age on. Percentages are those of the
+/// parent's values.
 struct Split {
   bool enabled = true;
   Varying count = 2.0;
@@ -90,8 +91,8 @@ struct TrailSource;
 struct EventSource;
 struct AgeSource;
 
-/// The keys common to all sources of particles: the particles' properties, and their child particles. Each
-/// has a particle system of its own.
+/// The keys common to all sources of particles: properties of the particles, and their child particles. Each
+/// source has a particle system of its own.
 struct ParticleSource {
   Where where;
   std::string name;
@@ -105,7 +106,7 @@ struct ParticleSource {
   Varying friction = 0.5;
   Varying charge = 0.0;
   int64_t max_alive = 1'000'000;
-  ParticleBehaviour behaviour;  ///< its keys stand directly in the source
+  ParticleBehaviour behaviour;  ///< its keys are directly in the source
   ParticleLook look;
   std::optional<Split> split;
   std::vector<TrailSource> trails;
@@ -122,7 +123,7 @@ struct TrailSource : ParticleSource {
   TrailSource();
 };
 
-/// Particles that answer something that happens to a parent.
+/// Particles that are released at an event of a parent.
 struct EventSource : ParticleSource {
   Real probability = 1;
   Real min_speed = 0;
@@ -136,14 +137,14 @@ struct AgeSource : EventSource {
   Real age = 1;
 };
 
-/// A rectangle that particles leave along `direction`.
+/// A rectangle from which particles are released along `direction`.
 struct PlaneSurface {
   Vec3 position = Vec3::Zero();
   Vec3 direction = Vec3::UnitY();
-  Real turn_deg = 0;  ///< of the rectangle about its direction
+  Real turn_deg = 0;  ///< rotation of the rectangle about its direction
   Eigen::Vector2d size = {0.1, 0.1};
 
-  /// Takes +Y to the direction by the shortest rotation, after the turn.
+  /// Maps +Y to the direction by the smallest rotation, after the turn.
   Quat orientation() const;
 };
 struct SphereSurface {
@@ -163,7 +164,7 @@ struct MeshSurface {
 };
 using EmitterSurface = std::variant<PlaneSurface, SphereSurface, DiscSurface, MeshSurface>;
 
-/// Where a surface is.
+/// Position of a surface.
 Vec3& position_of(EmitterSurface& surface);
 const Vec3& position_of(const EmitterSurface& surface);
 
@@ -175,10 +176,10 @@ struct EmitterBurst {
 };
 
 struct Emitter : ParticleSource {
-  std::string preset;  ///< already laid under the emitter when a scene is read
+  std::string preset;  ///< already merged into the emitter when a scene is read
   std::string body;    ///< name of the body it moves with; empty: fixed in the world
   EmitterSurface surface = PlaneSurface{};
-  Vec3 direction = Vec3::Zero();  ///< zero: the surface's normal
+  Vec3 direction = Vec3::Zero();  ///< zero: the normal of the surface
   bool overlap = false;
   Varying rate = 100.0;
   Varying count = 0.0;
@@ -191,12 +192,12 @@ struct Emitter : ParticleSource {
   Placement placement;
 };
 
-/// How a particle comes into being.
+/// Kind of creation of a particle.
 struct Birth {
   const TrailSource* trail = nullptr;
   const EventSource* event = nullptr;
   effects::Trigger trigger = effects::Trigger::collision;
-  Real age = 0;  ///< of the trigger `age`
+  Real age = 0;  ///< age for the trigger `age`
 };
 
 namespace detail {
@@ -232,9 +233,9 @@ void visit_tree(const ParticleSource& source, const ParticleSource* parent, cons
 
 }  // namespace detail
 
-/// Calls visit(source, parent, name, birth) for an emitter and all that is born from its particles, parents
-/// first; the name of a child is that of its parent, a slash, and its own. This is also the order of their
-/// point sets.
+/// Calls visit(source, parent, name, birth) for an emitter and all of its child particles, parents first. The
+/// name of a child is that of its parent, a slash, and its own name. This is also the order of their point
+/// sets.
 template <class F>
 void for_each_source(const Emitter& emitter, F&& visit) {
   detail::visit_tree(emitter, nullptr, emitter.name, {}, visit);

@@ -44,14 +44,14 @@ std::vector<LinkMobility> random_links(Dice& dice, uint32_t count) {
   return links;
 }
 
-/// What correct() changes is what was asked, and comes from the impulses that it tells.
+/// Checks that correct() makes the requested change, and that it equals the effect of the returned impulses.
 void expect_solves(uint32_t links, const std::vector<Topology>& joints, uint64_t seed, Real tolerance) {
   Dice dice(seed);
   JointSystem system(links, joints);
   const auto rows = random_rows(dice, joints);
   const auto mobility = random_links(dice, links);
   ASSERT_TRUE(system.factorize(rows, mobility));
-  // Asked for is what some velocities have, so that loops of too many constraints can do it.
+  // The request is the violation of some velocities, so that loops of redundant constraints can satisfy it.
   std::vector<Vec6> wanted(links), change(joints.size()), impulses(joints.size()), result(joints.size());
   for (Vec6& v : wanted) v = random_columns(dice, 1).col(0);
   system.relative(wanted, change);

@@ -20,7 +20,7 @@ Aabb cube(const Vec3& centre, Real side) {
   return {centre - Vec3::Constant(side / 2), centre + Vec3::Constant(side / 2)};
 }
 
-/// The boxes by object, and what a broad phase must say of them.
+/// The boxes by object, and the expected pairs of a broad phase.
 struct Model {
   struct Item {
     Aabb box;

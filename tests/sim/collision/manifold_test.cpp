@@ -79,7 +79,8 @@ Real surface_distance(const Shape& shape, const Vec3& p) {
 
 TEST(Manifold, PointsLieOnBothSurfacesAlongTheNormalAndHoldTheDeepest) {
   Dice dice(7);
-  constexpr Real kMargin = 0.02, kTilt = 0.05 * kMargin;  // what a face's normal may change, see the header
+  // Changes that a face's normal may cause, see the header.
+  constexpr Real kMargin = 0.02, kTilt = 0.05 * kMargin;
   for (const Shape& a : solids())
     for (const Shape& b : solids())
       for (int k = 0; k < 300; ++k) {
@@ -101,7 +102,7 @@ TEST(Manifold, PointsLieOnBothSurfacesAlongTheNormalAndHoldTheDeepest) {
           const ContactPoint& p = m.points[i];
           ASSERT_LE(p.separation, kMargin);
           ASSERT_LT((p.on_a - p.on_b - p.separation * m.normal).norm(), 1e-12);
-          // Of an inclined capsule what is not deepest may lie inside (see the header).
+          // For an inclined capsule, points other than the deepest may be inside (see the header).
           const Real on_a = surface_distance(a, p.on_a),
                      on_b = surface_distance(b, a_from_b.point_to_body(p.on_b));
           ASSERT_LT(std::max(on_a, on_b), 2 * kTilt);

@@ -335,7 +335,7 @@ TEST(NarrowPhase, WhatSinksIntoASheetStaysOnItsSide) {
     }
 }
 
-/// Looks at many shares, then halves: what tests compare with.
+/// Samples many times, then bisects: the reference of the tests.
 std::optional<Real> first_contact(const MovingShape& a, const MovingShape& b, Real tolerance, int looks) {
   const auto near = [&](Real share) {
     PairCache none;

@@ -23,8 +23,8 @@ Real distance(const MovingConvex& a, const MovingConvex& b, Real share) {
       .distance;
 }
 
-/// The book's way (4.4): looks at equal intervals, and halves the first that ends in contact. Finds what the
-/// advancement finds if the interval is short enough; it can miss what is thinner.
+/// The book's method (4.4): samples equal intervals, and bisects the first one that ends in contact. Agrees
+/// with conservative advancement if the interval is short enough; it can miss thin objects.
 std::optional<Real> bisection(const MovingConvex& a, const MovingConvex& b, Real near, int looks) {
   if (distance(a, b, 0) <= near) return 0;
   for (int k = 1; k <= looks; ++k) {

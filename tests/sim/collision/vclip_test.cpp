@@ -38,7 +38,7 @@ TEST(Vclip, FindsTheFeaturesAndTheirDistance) {
   const ConvexPolyhedron cube = box_polyhedron(Vec3::Ones());
   const Vec3 corner(0.5, 0.5, 0.5), edge(0.5, 0.5, 0), face(0.5, 0, 0);
   struct Case {
-    Vec3 from, to;  // on B, as it lies, and on A: what looks at what
+    Vec3 from, to;  // on B in its pose, and on A: the two features
     Kind kind_a, kind_b;
   };
   for (const Case& c :

@@ -65,7 +65,7 @@ TEST(ContactPair, FindsTheFourCornersOfABoxOnTheGround) {
   EXPECT_EQ(scene.pair.separation(), std::numeric_limits<Real>::infinity());
 }
 
-// Points that hardly move are not found anew, but their distances are.
+// Points that hardly move are reused, but their distances are updated.
 TEST(ContactPair, TakesPointsOverWithNewDistances) {
   BoxOnGround scene;
   scene.find({Vec3(0, 0.1, 0)});
@@ -135,7 +135,7 @@ TEST(ContactPair, ForcesOfPointsThatAreGoneAreForgotten) {
 
 TEST(ContactPair, TheGrainDecidesTheTangents) {
   BoxOnGround scene;
-  scene.ground->def.friction_axis = {1, 5, 1};  // only what lies in the surface counts
+  scene.ground->def.friction_axis = {1, 5, 1};  // only the component in the surface matters
   ContactPair pair(*scene.box, *scene.ground, {.cross = 2, .grain = scene.ground.get()});
   const auto find = [&](const Vec3& at) {
     pair.find({at}, Pose{}, 1e-3, 1e-5, false);

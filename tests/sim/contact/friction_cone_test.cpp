@@ -95,8 +95,8 @@ TEST(FrictionCone, DerivativeAgreesWithDifferences) {
   EXPECT_GT(compared, 4000);
 }
 
-// The lift is what makes u~ of sliding lie in the dual cone: p . u~ >= 0 for all p in the cone, 0 for the one
-// against u.
+// With the lift, u~ of a sliding contact is in the dual cone: p . u~ >= 0 for all p in the cone, 0 for the
+// one against u.
 TEST(FrictionCone, LiftPutsSlidingOnTheDualCone) {
   Dice dice(3);
   for (int i = 0; i < 1000; ++i) {

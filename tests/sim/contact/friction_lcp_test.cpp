@@ -148,7 +148,7 @@ TEST(FrictionLcp, GuessIsIgnoredAndNothingIsNothing) {
   EXPECT_EQ(solve_by_pivoting(s.bodies, {}).solves, 0u);
 }
 
-// Rows and columns come, go and change in any order; the factor stays that of what is there.
+// Rows and columns are added, removed and changed in any order; the factor stays that of the current matrix.
 TEST(UpdatedQr, FollowsEveryChange) {
   Dice dice(6);
   constexpr Eigen::Index kMost = 20;

@@ -10,7 +10,7 @@
 namespace offstage::sim {
 namespace {
 
-/// How far two answers lie apart, in the velocities of the bodies.
+/// Difference of two solutions, as velocities of the bodies.
 Real largest_difference(const ContactSample& x, const ContactSample& y) {
   Real d = 0;
   for (std::size_t i = 0; i < x.bodies.size(); ++i)
@@ -66,7 +66,7 @@ TEST(ProximalNewton, LeavesNoResidualAndAddsNoEnergy) {
     if (work.fallbacks > 0) continue;
     ASSERT_LT(residual(s.bodies, s.contacts), (work.residual < 1e-8 ? 1e-6 : 1e-3) * speed) << round;
   }
-  // As many contacts as these, without order, are more than what resting bodies have.
+  // This many random contacts are more than those of bodies at rest.
   EXPECT_LT(fallbacks, 100);
 }
 
@@ -121,7 +121,7 @@ TEST(ProximalNewton, ChangesNothingIfTheBudgetDoesNotDo) {
   EXPECT_GT(solver.cost(), 1);
 }
 
-// Targets, offsets and bodies that are moved by others: what resting contact is made of.
+// Targets, offsets and kinematic bodies, as in resting contact.
 TEST(ProximalNewton, MeetsTargetsAndFollowsMovingSurfaces) {
   ContactSample s = stacked_boxes(1, {0, -1, 0}, 10);
   s.bodies[1].velocity = {0.3, 0.2, 0};

@@ -12,7 +12,7 @@ struct Stage {
   uint32_t block_count() const { return blocks; }
 };
 
-// Each block adds to what one of the stage before has left, in memory that nothing but the loop guards.
+// Each block reads the result of a block of the previous stage, in memory that only the loop protects.
 void expect_in_order(uint32_t threads) {
   std::vector<Stage> stages;
   std::vector<std::vector<uint32_t>> chain;
@@ -20,7 +20,8 @@ void expect_in_order(uint32_t threads) {
     stages.push_back({s * 7 % 11, s % 5 != 3, s});
     chain.emplace_back(stages.back().blocks, 0);
   }
-  std::vector<const std::vector<uint32_t>*> before;  // of each stage, what the last one that ran has left
+  // For each stage, the results of the previous stage that ran.
+  std::vector<const std::vector<uint32_t>*> before;
   const std::vector<uint32_t>* last = nullptr;
   for (const Stage& stage : stages) {
     before.push_back(last);

@@ -22,7 +22,7 @@ TEST(Region, StrengthFallsToZeroAtTheEdgeByTheDropRate) {
   EXPECT_EQ(strength(sphere, 0, {2.9, 0, 0}), 1);
   EXPECT_EQ(strength(sphere, 0, {3.1, 0, 0}), 0);
   EXPECT_EQ(strength(sphere, 2, {3, 0, 0}), 0);
-  // The axis in which the edge is nearest decides: 1 - 0.8 in y, though x is farther from the centre.
+  // The axis with the nearest edge decides: 1 - 0.8 in y, although x is farther from the centre.
   const Region box = BoxRegion{{0, 1, 0}, {10, 1, 10}};
   EXPECT_NEAR(strength(box, 1, {2, 1.4, 0}), 0.2, 1e-15);
   EXPECT_NEAR(strength(box, 2, {2, 1.4, 0}), 0.04, 1e-15);

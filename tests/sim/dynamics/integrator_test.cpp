@@ -26,7 +26,7 @@ class Oscillator final : public DynamicSystem {
   }
 };
 
-/// After equal steps; an adaptive integrator makes them too, because it is told that no error is too large.
+/// Integrates with equal steps; an adaptive integrator does so, too, because its tolerance is infinite.
 Real error(IntegratorKind kind, int steps) {
   constexpr Real kTime = 2;
   std::array<Real, 1> x = {1}, p = {0};

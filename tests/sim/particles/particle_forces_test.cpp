@@ -35,7 +35,7 @@ TEST(ParticleForces, OfAirActThroughTheFieldsDragOrElseTheParticlesOwn) {
   EXPECT_NEAR(
       (acceleration({.effect = WindField{.wind = wind, .drag = 4}}, Vec3::Zero(), v) - 2 * (wind - v)).norm(),
       0, 1e-15);
-  // -k (v - wind) is what there is plus k wind.
+  // -k (v - wind) equals the own drag plus k wind.
   EXPECT_NEAR((acceleration({.effect = WindField{.wind = wind}}, Vec3::Zero(), v) - 0.25 * wind).norm(), 0,
               1e-15);
 }

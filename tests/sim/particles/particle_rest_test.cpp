@@ -1,4 +1,4 @@
-/// Resting contact of particles, and what they do to bodies.
+/// Resting contact of particles, and their effect on bodies.
 
 #include <gtest/gtest.h>
 
@@ -57,7 +57,7 @@ TEST(ParticleRest, AStackOfTenBeadsStandsAndItsForcesSumUp) {
   }
 }
 
-// On planks they slide twice as far along the particle as across it; v^2 / (2 mu g) each.
+// On planks they slide twice as far along the friction axis as across it; v^2 / (2 mu g) each.
 TEST(ParticleRest, SlidesByTheFrictionAlongAndAcrossTheGrain) {
   for (bool internal : {false, true}) {
     World world;
@@ -81,8 +81,8 @@ TEST(ParticleRest, SlidesByTheFrictionAlongAndAcrossTheGrain) {
   }
 }
 
-/// A loose column of sand is let go; one in a lattice, of particles that do not turn, would stand. Returns
-/// how high it still stands over how far it reaches.
+/// Releases a loose column of sand; particles do not rotate, so a lattice would not collapse. Returns the
+/// ratio of its final height to its reach.
 struct Heap {
   Real slope, kinetic_energy_each, overlap;
 };

@@ -12,7 +12,7 @@
 namespace offstage::sim {
 namespace {
 
-/// A world of boxes without shapes, for what flies and is joined.
+/// A world of boxes without shapes, for free and connected bodies.
 struct Sky {
   WorldState world;
 
@@ -87,7 +87,7 @@ TEST(CoupledSystem, APartPutBackAndSteppedAgainTakesTheSameWay) {
     all.restore(involved);
     EXPECT_NE(sky[bodies[0]].position, lone.position);
     EXPECT_NE(sky.world.systems[beads].arrays.position[0], held);
-    EXPECT_TRUE(same_state(sky[bodies[5]], other));  // is not connected, so not touched
+    EXPECT_TRUE(same_state(sky[bodies[5]], other));  // not connected, so not changed
     const std::vector<Body*> part = connected(sky.world, involved);
     ASSERT_EQ(part, (std::vector<Body*>{sky.body(bodies[0]), sky.body(bodies[1]), sky.body(bodies[3])}));
     CoupledSystem again(sky.world, part);

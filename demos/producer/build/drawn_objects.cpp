@@ -1,0 +1,96 @@
+#include "producer/build/drawn_objects.h"
+
+#include <algorithm>
+
+#include "producer/base/to_float.h"
+#include "producer/build/cloth_defs.h"
+#include "render/primitives.h"
+
+namespace offstage::producer {
+namespace {
+
+/// Half the edge of the square that stands for an infinite plane [m]: from 300 m up, it still reaches to
+/// where its horizon hides it.
+constexpr float kGroundHalfSize = 256'000;
+constexpr float kGroundTexture_m = 2000;  // of one copy of its texture
+
+}  // namespace
+
+render::Mesh mesh_of(const sim::Sphere& s) {
+  return render::make_sphere(to_float(s.radius));
+}
+render::Mesh mesh_of(const sim::Box& s) {
+  return render::make_box(s.size.cast<float>(), 0.04f * to_float(s.size.minCoeff()));
+}
+render::Mesh mesh_of(const sim::Capsule& s) {
+  return render::make_capsule(to_float(s.radius), to_float(s.height));
+}
+render::Mesh mesh_of(const sim::Cylinder& s) {
+  return render::make_cylinder(to_float(s.radius), to_float(s.height));
+}
+render::Mesh mesh_of(const sim::Cone& s) {
+  return render::make_cone(to_float(s.radius), to_float(s.height));
+}
+render::Mesh mesh_of(const sim::Plane&) {
+  render::Mesh ground = render::make_ground(kGroundHalfSize);
+  for (Eigen::Vector2f& uv : ground.uvs)
+    uv = (uv.array() - 0.5f) * (2 * kGroundHalfSize / kGroundTexture_m) + 0.5f;
+  return ground;
+}
+
+render::Mesh mesh_of(const sim::ConvexPolyhedron& part) {
+  const sim::TriangleMesh triangles = part.triangles();
+  render::Mesh mesh;
+  for (const Vec3& v : triangles.vertices) mesh.positions.push_back(v.cast<float>());
+  for (const sim::Triangle& t : triangles.triangles)
+    mesh.indices.insert(mesh.indices.end(), t.begin(), t.end());
+  render::compute_normals(mesh, 20);
+  return mesh;
+}
+
+render::Material material_of(const Scene& scene, const std::string& name, const ModelLibrary& models,
+                             std::vector<render::Image>& textures) {
+  render::Material m;
+  const auto it = std::ranges::find(scene.materials, name, &Material::name);
+  if (it != scene.materials.end()) {
+    m = {.name = it->name,
+         .color = it->color.rgba,
+         .metallic = to_float(it->metallic),
+         .roughness = to_float(it->roughness),
+         .emission = it->emission.rgb() * to_float(it->emission_strength),
+         .transmission = to_float(it->transmission),
+         .refraction = to_float(it->refraction),
+         .pattern = it->pattern,
+         .pattern_color = it->pattern_color.rgb(),
+         .pattern_scale = to_float(it->pattern_scale),
+         .two_sided = it->two_sided};
+    if (!it->texture.empty()) {
+      textures.push_back(models.texture(it->texture));
+      m.base_color_texture = 0;
+    }
+  }
+  return m;
+}
+
+render::Material material_of(const Scene& scene, const Cloth& cloth, const ModelLibrary& models,
+                             std::vector<render::Image>& textures) {
+  render::Material m = fabric_look(cloth.fabric);
+  const auto it = std::ranges::find(scene.materials, cloth.material, &Material::name);
+  if (it == scene.materials.end()) return m;
+  render::Fabric fabric = m.fabric;
+  fabric.back_color.reset();  // that of another front
+  if (const std::optional<FabricLook>& look = it->fabric) {
+    fabric = {.weave = look->weave,
+              .thread = to_float(look->thread),
+              .relief = to_float(look->relief),
+              .sheen = to_float(look->sheen),
+              .sheen_color = look->sheen_color.rgb(),
+              .translucency = to_float(look->translucency)};
+    if (look->back_color) fabric.back_color = look->back_color->rgb();
+  }
+  m = material_of(scene, cloth.material, models, textures);
+  m.fabric = fabric;
+  return m;
+}
+
+}  // namespace offstage::producer

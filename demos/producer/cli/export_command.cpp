@@ -1,0 +1,57 @@
+// export.
+
+#include <functional>
+
+#include <fmt/format.h>
+
+#include "producer/base/log.h"
+#include "producer/cli/command_line.h"
+#include "producer/cli/commands.h"
+#include "producer/cli/run_progress.h"
+#include "producer/export/film_export.h"
+#include "producer/run/frame_list.h"
+#include "producer/run/output.h"
+#include "producer/run/production.h"
+#include "render/file_io.h"
+#include "render/sink.h"
+
+namespace offstage::producer {
+namespace {
+
+/// Refuses what is there already, before the work.
+void check_target(const ExportTarget& target, const std::vector<int>& frames, bool force) {
+  render::create_parent_folders(target.path);
+  if (!target.sequence()) return check_file(target.path.string(), force);
+  for (const int frame : frames) check_file(render::frame_path(target.path, frame).string(), force);
+}
+
+}  // namespace
+
+int export_command(const ExportOptions& options) {
+  const ExportTarget target = parse_export(options.out);
+  const LoadedScene loaded = load(options.scene, options.talk.quiet);
+  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
+  const std::vector<int> frames = parse_frames(options.frames, loaded.scene.frame_count());
+  check_target(target, frames, options.force);
+  const auto threads = simulation_threads(options.threads);
+
+  const FilmParts parts(loaded.scene, models);
+  const std::unique_ptr<FilmExport> film = make_export(target, parts);
+  RunProgress progress(loaded.scene, models, options.talk);
+  SnapshotJob job{.frames = frames, .cache = {}};
+  if (!options.cache.empty()) job.cache = options.cache;
+  const RunStats stats = visit_frames(
+      loaded, models, job, [&](const Snapshot& snapshot) { film->write(snapshot); }, std::ref(progress));
+  progress.finish();
+  if (stats.interrupted_by) {
+    log("interrupted: {} of {} frames done\n", stats.frames, frames.size());
+    return 128 + stats.interrupted_by;
+  }
+  film->close();
+  if (!options.talk.quiet)
+    for (const std::string& note : film->notes()) log("note: {}\n", note);
+  print_output_name(options.out);
+  return kOk;
+}
+
+}  // namespace offstage::producer

@@ -1,0 +1,18 @@
+#pragma once
+/// What the errors of a command mean: a message, an exit code and a short name of their kind.
+
+#include <exception>
+#include <string>
+
+namespace offstage::producer {
+
+struct Failure {
+  int code = 0;         ///< an ExitCode
+  std::string kind;     ///< "scene invalid", "usage", ...
+  std::string message;  ///< as the program prints it, without a line break at its end
+};
+
+/// Of any exception but those of an interrupt (Interrupted, render::StoppedError), which are thrown again.
+Failure describe_failure(const std::exception_ptr& error);
+
+}  // namespace offstage::producer

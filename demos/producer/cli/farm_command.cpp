@@ -1,0 +1,229 @@
+// farm.
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <mutex>
+#include <thread>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "producer/base/interrupt.h"
+#include "producer/base/log.h"
+#include "producer/cli/command_line.h"
+#include "producer/cli/commands.h"
+#include "producer/run/farm.h"
+#include "producer/run/output.h"
+#include "producer/run/production.h"
+#include "render/child_process.h"
+#include "render/error.h"
+#include "render/file_io.h"
+#include "render/sink.h"
+
+namespace offstage::producer {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The folder of a farm: FILM.mp4.farm, or the one above the frames.
+fs::path default_work(const OutputTarget& target) {
+  if (target.kind == OutputKind::video) return target.path.string() + ".farm";
+  const fs::path folder = target.path.parent_path();
+  return (folder.empty() ? fs::path("frames") : folder).string() + ".farm";
+}
+
+FarmPlan plan_of(const FarmOptions& options) {
+  const OutputTarget target = parse_output(options.out);
+  if (target.kind == OutputKind::pipe) throw OutputError("-: a farm writes files; name a video or frames");
+  if (options.scene.from_standard_input())
+    throw std::invalid_argument("farm: needs a scene file that all machines can read");
+  FarmPlan plan;
+  std::error_code error;
+  plan.program =
+      options.program.empty() ? fs::read_symlink("/proc/self/exe", error) : fs::path(options.program);
+  plan.scene = fs::absolute(options.scene.file);
+  plan.out = fs::absolute(target.path);
+  plan.work = fs::absolute(options.work.empty() ? default_work(target) : fs::path(options.work));
+  plan.encodes = target.kind == OutputKind::video;
+  plan.chunks = options.chunks;
+  plan.retries = options.retries;
+  plan.threads = options.threads;
+  const auto option = [](std::vector<std::string>& list, const char* name, const std::string& value) {
+    list.emplace_back(name);
+    list.push_back(value);
+  };
+  for (const std::string& set : options.scene.set) option(plan.simulate_options, "--set", set);
+  for (const std::string& folder : options.scene.allow)
+    option(plan.simulate_options, "--allow", fs::absolute(folder).string());
+  if (options.scene.fps) option(plan.simulate_options, "--fps", *options.scene.fps);
+  if (options.scene.duration)
+    option(plan.simulate_options, "--duration", fmt::format("{}", *options.scene.duration));
+  if (options.scene.seed) option(plan.simulate_options, "--seed", std::to_string(*options.scene.seed));
+  if (options.scene.quality) option(plan.render_options, "--quality", *options.scene.quality);
+  if (options.scene.size) option(plan.render_options, "--size", *options.scene.size);
+  if (options.gl != render::GlPlatform::automatic)
+    option(plan.render_options, "--gl", std::string(name_of(options.gl)));
+  return plan;
+}
+
+/// Checks the scene here, before machines are asked, and gives the plan its key.
+void check_scene(const FarmOptions& options, FarmPlan& plan) {
+  const LoadedScene loaded = load(options.scene, options.talk.quiet);
+  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
+  plan.key = settings_key(loaded, models);
+  plan.chunks = std::min(plan.chunks, loaded.scene.frame_count());
+  if (plan.encodes)
+    render::check_video({.path = plan.out,
+                         .width_px = loaded.scene.render.size.x(),
+                         .height_px = loaded.scene.render.size.y(),
+                         .fps = loaded.scene.output.fps,
+                         .alpha = loaded.scene.environment.background == Background::transparent});
+}
+
+/// A folder of an earlier farm goes on with --resume if it is of the same film.
+void prepare_work(const FarmOptions& options, const FarmPlan& plan) {
+  const bool there = fs::exists(plan.work / "farm.json");
+  if (there && !options.resume && !options.force)
+    throw OutputError(plan.work.string() +
+                      ": holds a farm already; go on with --resume, or begin again with --force");
+  if (there && options.resume) {
+    const FarmPlan before = read_farm(plan.work);
+    if (before.key != plan.key || before.chunks != plan.chunks)
+      throw OutputError(
+          plan.work.string() +
+          ": was begun with another scene, other settings or another --chunks; begin again with --force");
+  }
+  if (there && !options.resume) {
+    fs::remove_all(plan.work / "done");
+    if (plan.encodes) remove_frames(plan.work / "frames");
+  }
+  if (!options.resume && plan.encodes) check_file(plan.out.string(), options.force);
+  fs::create_directories(plan.work / "logs");
+  fs::create_directories(plan.work / "done");
+  for (const FarmScript& script : step_scripts(plan)) {
+    const fs::path file = plan.work / script.name;
+    write_text_file(file.string(), script.text);
+    ::chmod(file.c_str(), 0755);
+  }
+  write_farm(plan);
+}
+
+/// Runs a script of the farm's folder to its end; what it prints goes to a log. Nothing if it succeeded.
+std::optional<std::string> run_script(const FarmPlan& plan, const std::vector<std::string>& arguments,
+                                      const std::string& log_name) {
+  const fs::path log_file = plan.work / "logs" / log_name;
+  const render::Descriptor out(::open(log_file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644));
+  std::vector<std::string> words = {"/bin/sh", (plan.work / arguments[0]).string()};
+  words.insert(words.end(), arguments.begin() + 1, arguments.end());
+  render::ChildProcess child(words, -1, out.fd(), out.fd());
+  if (child.error()) return render::system_reason(child.error());
+  auto failed = child.wait([] { return interrupt_signal() != 0; });
+  if (failed) return *failed + "; see " + log_file.string();
+  return {};
+}
+
+int run_locally(const FarmOptions& options, const FarmPlan& plan) {
+  const auto say = [&](const std::string& line) {
+    if (!options.talk.quiet) log("{}\n", line);
+  };
+  say("simulating once");
+  if (const auto failed = run_script(plan, {"simulate.sh"}, "simulate.log")) {
+    if (interrupt_signal()) throw Interrupted(interrupt_signal());
+    throw render::FileError("the simulation failed: " + *failed);
+  }
+  const std::vector<int> chunks = farm_state(plan).missing;
+  std::atomic<std::size_t> next = 0, finished = 0;
+  std::mutex mutex;
+  std::vector<std::string> problems;
+  const auto work = [&] {
+    for (std::size_t i = next++; i < chunks.size() && !interrupt_signal(); i = next++) {
+      const std::string number = std::to_string(chunks[i]);
+      const auto failed = run_script(plan, {"chunk.sh", number}, "chunk-" + number + ".log");
+      const std::lock_guard lock(mutex);
+      if (failed)
+        problems.push_back("chunk " + number + ": " + *failed);
+      else
+        say(fmt::format("chunk {} done, {} of {}", number, ++finished, chunks.size()));
+    }
+  };
+  {
+    std::vector<std::jthread> workers;
+    for (int i = 0; i < options.local; ++i) workers.emplace_back(work);
+  }
+  if (interrupt_signal()) {
+    log("interrupted; continue with the same command and --resume\n");
+    throw Interrupted(interrupt_signal());
+  }
+  if (!problems.empty())
+    throw render::FileError(fmt::format("{} of {} chunks failed after {} retries: {}; continue with --resume",
+                                        problems.size(), chunks.size(), plan.retries, problems.front()));
+  if (const auto failed = run_script(plan, {"encode.sh"}, "encode.log"))
+    throw render::FileError("the encoding failed: " + *failed);
+  print_output_name(options.out);
+  return kOk;
+}
+
+int submit_to_slurm(const FarmOptions& options, const FarmPlan& plan) {
+  const FarmScript script = slurm_script(
+      plan, {options.partition, options.account, options.time, options.sbatch}, farm_state(plan).missing);
+  write_text_file((plan.work / script.name).string(), script.text);
+  if (const auto failed = run_script(plan, {script.name}, "submit.log"))
+    throw render::UnavailableError("sbatch did not take the jobs: " + *failed);
+  fmt::print("jobs {}", render::read_text_file(plan.work / "jobs", 1 << 16));
+  if (!options.talk.quiet)
+    log("see how far they are: offstage farm --status {}\n", shell_word(plan.work.string()));
+  return kOk;
+}
+
+int print_scripts(const FarmOptions& options, const FarmPlan& plan) {
+  std::vector<FarmScript> scripts = step_scripts(plan);
+  if (options.slurm) {
+    std::vector<int> all(static_cast<std::size_t>(plan.chunks));
+    for (int i = 0; i < plan.chunks; ++i) all[static_cast<std::size_t>(i)] = i + 1;
+    scripts.push_back(
+        slurm_script(plan, {options.partition, options.account, options.time, options.sbatch}, all));
+  }
+  for (const FarmScript& script : scripts)
+    fmt::print("# ---- {}\n{}\n", (plan.work / script.name).string(), script.text);
+  return kOk;
+}
+
+int print_status(const FarmOptions& options) {
+  const FarmPlan plan = read_farm(options.status);
+  const FarmState state = farm_state(plan);
+  const int done = plan.chunks - static_cast<int>(state.missing.size());
+  fmt::print("simulation: {}\nchunks: {} of {} done, {} frames\n", state.simulated ? "done" : "not done",
+             done, plan.chunks, state.frames);
+  if (plan.encodes) fmt::print("film: {}\n", state.encoded ? plan.out.string() : "not done");
+  if (fs::exists(plan.work / "jobs")) {
+    std::string jobs = render::read_text_file(plan.work / "jobs", 1 << 16);
+    std::erase(jobs, '\n');
+    std::ranges::replace(jobs, ' ', ',');
+    std::fflush(stdout);
+    render::ChildProcess squeue({"squeue", "--jobs=" + jobs, "--format=%.18i %.24j %.10T %.10M %R"}, -1,
+                                STDOUT_FILENO, -1);
+    if (!squeue.error()) squeue.wait_for(std::chrono::seconds(20));
+  }
+  return state.encoded ? kOk : kRunFailed;
+}
+
+}  // namespace
+
+int farm_command(const FarmOptions& options) {
+  if (!options.status.empty()) return print_status(options);
+  if (options.scene.file.empty() || options.out.empty())
+    throw std::invalid_argument("farm: needs a scene and -o OUTPUT, or --status FOLDER");
+  if (options.slurm == (options.local > 0)) throw std::invalid_argument("farm: choose --slurm or --local N");
+  FarmPlan plan = plan_of(options);
+  check_scene(options, plan);
+  if (options.dry_run) return print_scripts(options, plan);
+  prepare_work(options, plan);
+  return options.slurm ? submit_to_slurm(options, plan) : run_locally(options, plan);
+}
+
+}  // namespace offstage::producer

@@ -1,0 +1,48 @@
+#pragma once
+/// Films for other programs: the states of the simulation as USD, glTF, PLY, OBJ or CSV. An exporter is a
+/// sink of the same snapshots that the drawing gets.
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "producer/build/snapshot.h"
+#include "producer/export/film_parts.h"
+
+namespace offstage::producer {
+
+class FilmExport {
+ public:
+  virtual ~FilmExport() = default;
+  /// Takes the frames in ascending order. Throws render::FileError.
+  virtual void write(const Snapshot& snapshot) = 0;
+  /// Completes the output: only now a single file appears under its name.
+  virtual void close() = 0;
+  /// What the format has no form for, one line each; empty if it holds everything.
+  virtual std::vector<std::string> notes() const { return {}; }
+};
+
+enum class ExportFormat { usd, gltf, ply, obj, csv };
+
+struct ExportTarget {
+  ExportFormat format = ExportFormat::usd;
+  std::filesystem::path path;  ///< a file, or a pattern with '#' for one file per frame
+  bool sequence() const { return path.filename().string().find('#') != std::string::npos; }
+};
+
+/// What OUT means. Throws std::invalid_argument for an ending that is none of .usda .glb .ply
+/// .obj .csv, and for a file where the format needs one per frame (or the other way round).
+ExportTarget parse_export(const std::string& out);
+
+/// `parts` must outlive the exporter. Throws render::FileError.
+std::unique_ptr<FilmExport> make_export(const ExportTarget& target, const FilmParts& parts);
+
+// The exporters behind it.
+std::unique_ptr<FilmExport> make_usd_export(const std::filesystem::path& file, const FilmParts& parts);
+std::unique_ptr<FilmExport> make_gltf_export(const std::filesystem::path& file, const FilmParts& parts);
+std::unique_ptr<FilmExport> make_ply_export(const std::filesystem::path& pattern, const FilmParts& parts);
+std::unique_ptr<FilmExport> make_obj_export(const std::filesystem::path& pattern, const FilmParts& parts);
+std::unique_ptr<FilmExport> make_csv_export(const std::filesystem::path& file, const FilmParts& parts);
+
+}  // namespace offstage::producer

@@ -1,0 +1,259 @@
+#include "producer/export/film_parts.h"
+
+#include <map>
+#include <set>
+
+#include "producer/base/to_float.h"
+#include "producer/build/cloth_defs.h"
+#include "producer/build/drawn_objects.h"
+#include "producer/build/lights.h"
+#include "producer/build/particle_sources.h"
+#include "render/primitives.h"
+#include "sim/core/rotation.h"
+
+namespace offstage::producer {
+namespace {
+
+using Eigen::Affine3f;
+using Eigen::Vector2f;
+using Eigen::Vector3f;
+
+constexpr float kGroundHalf_m = 100;  // of the square that stands for an infinite plane
+
+Affine3f placed(const Vec3& position, const Quat& orientation, Real scale) {
+  return Eigen::Translation3f(position.cast<float>()) * orientation.cast<float>() *
+         Eigen::Scaling(to_float(scale));
+}
+
+/// Other programs have no use for a ground that reaches to the horizon in cells of growing size.
+render::Mesh ground_square() {
+  constexpr float r = kGroundHalf_m;
+  return {.positions = {{-r, 0, -r}, {-r, 0, r}, {r, 0, r}, {r, 0, -r}},
+          .normals = std::vector<Vector3f>(4, Vector3f::UnitY()),
+          .uvs = {{0, 0}, {0, 1}, {1, 1}, {1, 0}},
+          .indices = {0, 1, 2, 0, 2, 3}};
+}
+
+std::vector<float> size_key(const sim::Sphere& s) {
+  return {0, to_float(s.radius)};
+}
+std::vector<float> size_key(const sim::Box& s) {
+  return {1, to_float(s.size.x()), to_float(s.size.y()), to_float(s.size.z())};
+}
+std::vector<float> size_key(const sim::Capsule& s) {
+  return {2, to_float(s.radius), to_float(s.height)};
+}
+std::vector<float> size_key(const sim::Cylinder& s) {
+  return {3, to_float(s.radius), to_float(s.height)};
+}
+std::vector<float> size_key(const sim::Cone& s) {
+  return {4, to_float(s.radius), to_float(s.height)};
+}
+std::vector<float> size_key(const sim::Plane&) {
+  return {5};
+}
+
+/// Names, each given once.
+class UniqueNames {
+ public:
+  std::string operator()(const std::string& wanted, const char* otherwise) {
+    const std::string base = wanted.empty() ? otherwise : wanted;
+    std::string name = base;
+    for (int i = 2; !taken_.insert(name).second; ++i) name = base + "_" + std::to_string(i);
+    return name;
+  }
+
+ private:
+  std::set<std::string> taken_;
+};
+
+}  // namespace
+
+class FilmParts::Builder {
+ public:
+  Builder(FilmParts& parts, const Scene& scene, const ModelLibrary& models)
+      : parts_(parts), scene_(scene), models_(models) {}
+
+  void add_body(const Body& body) {
+    FilmBody film{.name = names_(body.name, "body"),
+                  .slot = {},
+                  .place = {body.position.cast<float>(), body.orientation.cast<float>()},
+                  .parts = {}};
+    if (body.motion == sim::MotionType::static_body) {
+      parts_.places_.add_fixed(body.name, placed(body.position, body.orientation, 1));
+    } else {
+      film.slot = slots_++;
+      parts_.places_.add_moving(body.name, *film.slot);
+    }
+    if (!body.visible) return;
+    if (body.model)
+      add_model(body.model->file, placed(body.model->position, body.model->orientation, body.model->scale),
+                body.material, film);
+    else
+      std::visit([&](const auto& shape) { add_shape(shape, body.material, film); }, body.shape);
+    parts_.bodies.push_back(std::move(film));
+  }
+
+  template <class Rod>
+  void add_rod(const Rod& rod, const char* kind) {
+    const std::size_t index = rods_++;
+    if (!rod.visible) return;
+    parts_.rods.push_back(
+        {names_(rod.name, kind), index,
+         mesh({6, to_float(rod.radius)}, [&] { return render::make_cylinder(to_float(rod.radius), 1); }),
+         material(rod.material)});
+  }
+
+  void add_cloth(const Cloth& cloth, std::size_t index) {
+    if (!cloth.visible) return;
+    const auto* file = std::get_if<MeshFile>(&cloth.shape);
+    FlatCloth flat = flat_cloth(cloth, file ? &models_.model(file->file) : nullptr);
+    Eigen::AlignedBox2f box;
+    for (const Vector2f& uv : flat.uvs) box.extend(uv);
+    const Vector2f size = box.sizes().cwiseMax(1e-6f);
+    FilmCloth film{.name = names_(cloth.name, "cloth"),
+                   .cloth = index,
+                   .material = cloth_material(cloth),
+                   .triangles = flat.triangles(),
+                   .uvs = {}};
+    for (const Vector2f& uv : flat.uvs) {
+      const Vector2f share = (uv - box.min()).cwiseQuotient(size);
+      film.uvs.push_back({share.x(), 1 - share.y()});
+    }
+    parts_.cloths.push_back(std::move(film));
+  }
+
+  std::string unique(const std::string& name, const char* otherwise) { return names_(name, otherwise); }
+
+ private:
+  template <class S>
+  void add_shape(const S& shape, const std::string& material_name, FilmBody& film) {
+    if constexpr (std::is_same_v<S, MeshFile>) {
+      add_model(shape.file, placed(Vec3::Zero(), Quat::Identity(), shape.scale), material_name, film);
+    } else if constexpr (std::is_same_v<S, sim::Plane>) {
+      film.parts.push_back({mesh(size_key(shape), ground_square), material(material_name)});
+    } else {
+      film.parts.push_back({mesh(size_key(shape), [&] { return mesh_of(shape); }), material(material_name)});
+    }
+  }
+
+  void add_model(const std::string& file, const Affine3f& body_from_model, const std::string& material_name,
+                 FilmBody& film) {
+    const render::Model& model = models_.model(file);
+    const auto [it, is_new] = models_done_.try_emplace(file);
+    auto& [first_mesh, first_material] = it->second;
+    if (is_new) {
+      first_mesh = parts_.meshes.size();
+      for (const render::Model::Part& part : model.parts) parts_.meshes.push_back(part.mesh);
+      first_material = parts_.materials.size();
+      for (const render::Material& m : model.materials) add_material(m, model.textures);
+    }
+    for (std::size_t i = 0; i < model.parts.size(); ++i)
+      film.parts.push_back({first_mesh + i,
+                            material_name.empty() && !model.materials.empty()
+                                ? first_material + static_cast<std::size_t>(model.parts[i].material)
+                                : material(material_name),
+                            body_from_model});
+  }
+
+  template <class Make>
+  std::size_t mesh(const std::vector<float>& key, Make&& make) {
+    const auto [it, is_new] = meshes_done_.try_emplace(key, parts_.meshes.size());
+    if (is_new) parts_.meshes.push_back(make());
+    return it->second;
+  }
+
+  std::size_t material(const std::string& name) {
+    const auto [it, is_new] = materials_done_.try_emplace(name, parts_.materials.size());
+    if (is_new) {
+      std::vector<render::Image> textures;
+      const render::Material look = material_of(scene_, name, models_, textures);
+      add_material(look, textures);
+    }
+    return it->second;
+  }
+
+  std::size_t cloth_material(const Cloth& cloth) {
+    const auto [it, is_new] =
+        materials_done_.try_emplace("cloth/" + cloth.fabric + "/" + cloth.material, parts_.materials.size());
+    if (is_new) {
+      std::vector<render::Image> textures;
+      render::Material look = material_of(scene_, cloth, models_, textures);
+      if (look.name.empty()) look.name = cloth.fabric;
+      add_material(look, textures);
+    }
+    return it->second;
+  }
+
+  void add_material(const render::Material& look, const std::vector<render::Image>& textures) {
+    FilmMaterial material{material_names_(look.name, "material"), look, {}};
+    if (look.base_color_texture >= 0)
+      material.texture = textures.at(static_cast<std::size_t>(look.base_color_texture));
+    parts_.materials.push_back(std::move(material));
+  }
+
+  FilmParts& parts_;
+  const Scene& scene_;
+  const ModelLibrary& models_;
+  UniqueNames names_, material_names_;
+  std::map<std::vector<float>, std::size_t> meshes_done_;
+  std::map<std::string, std::size_t> materials_done_;
+  std::map<std::string, std::pair<std::size_t, std::size_t>> models_done_;
+  std::size_t slots_ = 0, rods_ = 0;
+};
+
+FilmParts::FilmParts(const Scene& s, const ModelLibrary& models) : scene(s), camera_(s, models) {
+  Builder builder(*this, s, models);
+  for (const Body& body : s.bodies) builder.add_body(body);
+  for (const Spring& spring : s.springs) builder.add_rod(spring, "spring");
+  for (const Joint& joint : s.joints)
+    if (joint.behaviour.type == sim::JointType::distance) builder.add_rod(joint, "rod");
+  for (std::size_t i = 0; i < s.cloths.size(); ++i) builder.add_cloth(s.cloths[i], i);
+
+  std::vector<std::string> set_names;
+  for (const ParticleGroup& group : s.particles) set_names.push_back(group.name);
+  for (const Emitter& emitter : s.emitters)
+    for_each_source(emitter, [&](const ParticleSource&, const ParticleSource*, const std::string& name,
+                                 const Birth&) { set_names.push_back(name); });
+  const std::vector<const ParticleLook*> looks = looks_of(s);
+  for (std::size_t i = 0; i < set_names.size(); ++i)
+    points.push_back({builder.unique(set_names[i], "particles"), i, !points_def(*looks[i]).lit});
+  for (const Light& light : s.lights)
+    if (!std::holds_alternative<SunLight>(light)) lamps.push_back(builder.unique("", "lamp"));
+}
+
+render::Camera FilmParts::camera_at(const Snapshot& snapshot) const {
+  return camera_.at(snapshot.time, places_, snapshot.bodies);
+}
+
+std::vector<render::Lamp> FilmParts::lamps_at(const Snapshot& snapshot) const {
+  return lamps_of(scene, snapshot.time, places_, snapshot.bodies);
+}
+
+std::optional<Affine3f> rod_transform(const RodSample& rod) {
+  const Vector3f d = rod.b - rod.a;
+  if (!d.allFinite() || d.norm() <= 1e-6f) return {};
+  return Affine3f(Eigen::Translation3f(0.5f * (rod.a + rod.b)) * sim::rotation_between(Vector3f::UnitY(), d) *
+                  Eigen::Scaling(1.f, d.norm(), 1.f));
+}
+
+ClothSurface cloth_surface(const FilmCloth& cloth, const ClothSample& sample) {
+  ClothSurface surface{sample.version == 0 ? &cloth.triangles : &sample.triangles, {}, {}};
+  if (sample.version == 0) {
+    surface.uvs = cloth.uvs;
+  } else {
+    for (const uint32_t source : sample.sources) surface.uvs.push_back(cloth.uvs[source]);
+  }
+  surface.normals.assign(sample.points.size(), Vector3f::Zero());
+  const std::vector<uint32_t>& t = *surface.triangles;
+  for (std::size_t i = 0; i + 2 < t.size(); i += 3) {
+    const Vector3f &a = sample.points[t[i]], &b = sample.points[t[i + 1]], &c = sample.points[t[i + 2]];
+    const Vector3f doubled_area = (b - a).cross(c - a);
+    for (std::size_t k = 0; k < 3; ++k) surface.normals[t[i + k]] += doubled_area;
+  }
+  for (Vector3f& n : surface.normals)
+    n = n.norm() > 0 ? Vector3f(n.normalized()) : Vector3f(Vector3f::UnitY());
+  return surface;
+}
+
+}  // namespace offstage::producer

@@ -1,0 +1,95 @@
+#pragma once
+/// What a film consists of for other programs: meshes, materials and the objects that use them, before any
+/// frame. A Snapshot then says where they are; the indices here are those of its lists.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "producer/build/body_places.h"
+#include "producer/build/camera.h"
+#include "producer/build/models.h"
+#include "producer/scene/scene.h"
+#include "render/model.h"
+#include "render/stage.h"
+
+namespace offstage::producer {
+
+struct FilmMaterial {
+  std::string name;  ///< unique, not empty
+  render::Material look;
+  std::optional<render::Image> texture;  ///< of the base colour
+};
+
+/// A mesh in the frame of a body.
+struct FilmPart {
+  std::size_t mesh = 0, material = 0;
+  Eigen::Affine3f body_from_part = Eigen::Affine3f::Identity();
+};
+
+struct FilmBody {
+  std::string name;
+  std::optional<std::size_t> slot;  ///< in Snapshot::bodies; none: it never moves
+  BodySample place;                 ///< at time 0
+  std::vector<FilmPart> parts;
+};
+
+/// A spring, rod or rope: a cylinder of length 1 along Y, which is placed between two points.
+struct FilmRod {
+  std::string name;
+  std::size_t rod = 0;  ///< in Snapshot::rods
+  std::size_t mesh = 0, material = 0;
+};
+
+struct FilmCloth {
+  std::string name;
+  std::size_t cloth = 0;  ///< in Snapshot::cloths
+  std::size_t material = 0;
+  std::vector<uint32_t> triangles;   ///< while it is whole
+  std::vector<Eigen::Vector2f> uvs;  ///< of the vertices of the whole cloth, over its bounds, v upwards
+};
+
+struct FilmPoints {
+  std::string name;
+  std::size_t set = 0;  ///< in Snapshot::point_sets
+  bool glows = false;   ///< its colour is its light
+};
+
+/// Objects that the scene hides are left out. Names are unique within their kind.
+class FilmParts {
+ public:
+  FilmParts(const Scene& scene, const ModelLibrary& models);
+
+  const Scene& scene;
+  std::vector<render::Mesh> meshes;
+  std::vector<FilmMaterial> materials;
+  std::vector<FilmBody> bodies;
+  std::vector<FilmRod> rods;
+  std::vector<FilmCloth> cloths;
+  std::vector<FilmPoints> points;
+  std::vector<std::string> lamps;  ///< names, in the order of lamps_at()
+
+  render::Camera camera_at(const Snapshot& snapshot) const;
+  std::vector<render::Lamp> lamps_at(const Snapshot& snapshot) const;
+
+ private:
+  class Builder;
+  BodyPlaces places_;
+  CameraRig camera_;
+};
+
+/// A rod between its ends; nothing if it is gone.
+std::optional<Eigen::Affine3f> rod_transform(const RodSample& rod);
+
+/// Triangles of a cloth at a frame, and texture coordinates of its points.
+struct ClothSurface {
+  const std::vector<uint32_t>* triangles;
+  std::vector<Eigen::Vector2f> uvs;
+  std::vector<Eigen::Vector3f> normals;  ///< of the points, means weighted by area
+};
+ClothSurface cloth_surface(const FilmCloth& cloth, const ClothSample& sample);
+
+}  // namespace offstage::producer

@@ -1,0 +1,513 @@
+// glTF 2.0 as one binary file (.glb): Khronos Group, "glTF 2.0 Specification". Bodies are animated nodes,
+// cloths meshes with a morph target per frame.
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "producer/base/to_float.h"
+#include "producer/base/version.h"
+#include "producer/build/lights.h"
+#include "producer/export/film_export.h"
+#include "producer/export/sample_track.h"
+#include "producer/export/spool.h"
+#include "render/error.h"
+#include "render/image_io.h"
+#include "render/output_file.h"
+#include "sim/core/rotation.h"
+
+namespace offstage::producer {
+namespace {
+
+namespace fs = std::filesystem;
+using Eigen::Affine3f;
+using Eigen::Quaternionf;
+using Eigen::Vector3f;
+using Json = nlohmann::ordered_json;
+
+// Constants of the format.
+constexpr int kFloat = 5126, kUnsignedInt = 5125;
+constexpr int kArrayBuffer = 34962, kElementBuffer = 34963;
+constexpr uint32_t kGlbMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
+
+/// The buffer of a file, and the accessors into it.
+class GltfBuffer {
+ public:
+  explicit GltfBuffer(const fs::path& file) : file_(file), spool_(file.parent_path()) {}
+
+  /// `target`: what the numbers are used for, 0: other. Returns the number of the accessor.
+  int add(std::span<const float> numbers, int width, int target = 0, bool with_bounds = false) {
+    const char* type = width == 1 ? "SCALAR" : width == 2 ? "VEC2" : width == 3 ? "VEC3" : "VEC4";
+    Json accessor = {{"bufferView", add_view(bytes_of(numbers), target)},
+                     {"componentType", kFloat},
+                     {"count", numbers.size() / static_cast<std::size_t>(width)},
+                     {"type", type}};
+    if (with_bounds) add_bounds(numbers, static_cast<std::size_t>(width), accessor);
+    accessors.push_back(std::move(accessor));
+    return static_cast<int>(accessors.size()) - 1;
+  }
+  int add(std::span<const Vector3f> vectors, int target, bool with_bounds = false) {
+    return add({vectors.empty() ? nullptr : vectors[0].data(), 3 * vectors.size()}, 3, target, with_bounds);
+  }
+  int add_indices(std::span<const uint32_t> indices) {
+    accessors.push_back({{"bufferView", add_view(bytes_of(indices), kElementBuffer)},
+                         {"componentType", kUnsignedInt},
+                         {"count", indices.size()},
+                         {"type", "SCALAR"}});
+    return static_cast<int>(accessors.size()) - 1;
+  }
+  int add_view(std::span<const uint8_t> bytes, int target = 0) {
+    Json view = {{"buffer", 0}, {"byteOffset", spool_.size()}, {"byteLength", bytes.size()}};
+    if (target != 0) view["target"] = target;
+    views.push_back(std::move(view));
+    spool_.append(bytes);
+    constexpr std::array<uint8_t, 4> kZero{};
+    spool_.append(std::span(kZero).first((4 - bytes.size() % 4) % 4));
+    if (spool_.size() > std::numeric_limits<uint32_t>::max() - (1u << 28))
+      throw render::FileError(file_.string() +
+                              ": a .glb file holds 4 GiB at most; export fewer frames, or .usda");
+    return static_cast<int>(views.size()) - 1;
+  }
+  Spool& spool() { return spool_; }
+
+  Json views = Json::array(), accessors = Json::array();
+
+ private:
+  template <class T>
+  static std::span<const uint8_t> bytes_of(std::span<const T> values) {
+    return {reinterpret_cast<const uint8_t*>(values.data()), values.size_bytes()};
+  }
+  static void add_bounds(std::span<const float> numbers, std::size_t width, Json& accessor) {
+    std::vector<float> least(width, std::numeric_limits<float>::max()), most(width, -least[0]);
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      least[i % width] = std::min(least[i % width], numbers[i]);
+      most[i % width] = std::max(most[i % width], numbers[i]);
+    }
+    accessor["min"] = least;
+    accessor["max"] = most;
+  }
+
+  fs::path file_;
+  Spool spool_;
+};
+
+/// A stretch of frames in which a cloth keeps its triangles: a mesh with a morph target for each frame.
+struct ClothStretch {
+  std::vector<int> frames;
+  std::vector<uint32_t> triangles;
+  std::vector<Eigen::Vector2f> uvs;
+  std::vector<Vector3f> points, normals;     // at its first frame
+  std::vector<std::pair<int, int>> targets;  // accessors of positions and normals, of the frames after it
+};
+
+struct ClothRecord {
+  std::optional<uint32_t> version;
+  std::vector<ClothStretch> stretches;
+};
+
+struct NodeTracks {
+  SampleTrack<Vector3f> translation, scale;
+  SampleTrack<Quaternionf> rotation;
+
+  void add(int frame, const Vector3f& position, Quaternionf q) {
+    if (!rotation.samples().empty() && rotation.samples().back().second.dot(q) < 0) q.coeffs() *= -1;
+    translation.add(frame, position);
+    rotation.add(frame, q);
+  }
+};
+
+Json array(const Vector3f& v) {
+  return {v.x(), v.y(), v.z()};
+}
+Json array(const Quaternionf& q) {
+  return {q.x(), q.y(), q.z(), q.w()};  // the order of glTF
+}
+void append(const Vector3f& v, std::vector<float>& out) {
+  out.insert(out.end(), v.data(), v.data() + 3);
+}
+void append(const Quaternionf& q, std::vector<float>& out) {
+  out.insert(out.end(), q.coeffs().data(), q.coeffs().data() + 4);  // x, y, z, w
+}
+
+/// Turns -Z, along which cameras and lights of glTF look, to a direction.
+Quaternionf look_rotation(const Vector3f& direction, const Vector3f& up) {
+  const Vector3f z = -direction.normalized();
+  Vector3f x = up.cross(z);
+  if (x.norm() < 1e-6f) return sim::rotation_between(Vector3f(-Vector3f::UnitZ()), direction);
+  x.normalize();
+  Eigen::Matrix3f m;
+  m << x, z.cross(x), z;
+  return Quaternionf(m).normalized();
+}
+
+class GltfExport : public FilmExport {
+ public:
+  GltfExport(const fs::path& file, const FilmParts& parts)
+      : parts_(parts),
+        file_(file),
+        buffer_(file),
+        bodies_(parts.bodies.size()),
+        rods_(parts.rods.size()),
+        cloths_(parts.cloths.size()),
+        lamps_(parts.lamps.size()) {}
+
+  void write(const Snapshot& snapshot) override {
+    const int frame = snapshot.frame;
+    frames_.push_back(frame);
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+      const FilmBody& body = parts_.bodies[i];
+      const BodySample& s = body.slot ? snapshot.bodies[*body.slot] : body.place;
+      bodies_[i].add(frame, s.position, s.orientation);
+    }
+    for (std::size_t i = 0; i < rods_.size(); ++i)
+      write_rod(frame, snapshot.rods[parts_.rods[i].rod], rods_[i]);
+    for (std::size_t i = 0; i < cloths_.size(); ++i)
+      write_cloth(frame, parts_.cloths[i], snapshot.cloths[parts_.cloths[i].cloth], cloths_[i]);
+    const render::Camera camera = parts_.camera_at(snapshot);
+    camera_.add(frame, camera.eye, look_rotation(camera.target - camera.eye, camera.up));
+    if (frames_.size() == 1) first_fov_deg_ = camera.fov_deg;
+    zooms_ = zooms_ || camera.fov_deg != first_fov_deg_;
+    const std::vector<render::Lamp> lamps = parts_.lamps_at(snapshot);
+    for (std::size_t i = 0; i < lamps_.size(); ++i) {
+      lamps_[i].add(frame, lamps[i].position, look_rotation(lamps[i].direction, Vector3f::UnitY()));
+      if (frames_.size() == 1) first_lamps_.push_back(lamps[i]);
+      flickers_ = flickers_ || lamps[i].intensity != first_lamps_[i].intensity;
+    }
+  }
+
+  void close() override {
+    add_materials();
+    add_meshes();
+    for (std::size_t i = 0; i < bodies_.size(); ++i) add_body(parts_.bodies[i], bodies_[i]);
+    for (std::size_t i = 0; i < rods_.size(); ++i)
+      add_node({{"name", parts_.rods[i].name},
+                {"mesh", mesh_of_part(parts_.rods[i].mesh, parts_.rods[i].material)}},
+               rods_[i]);
+    for (std::size_t i = 0; i < cloths_.size(); ++i) add_cloth(parts_.cloths[i], cloths_[i]);
+    add_camera();
+    add_lights();
+    write_file();
+  }
+
+  std::vector<std::string> notes() const override {
+    std::vector<std::string> notes;
+    if (!parts_.points.empty())
+      notes.push_back(
+          fmt::format("glTF has no form for particles: {} set{} left out; .usda, .ply and .csv hold them",
+                      parts_.points.size(), parts_.points.size() == 1 ? " is" : "s are"));
+    for (const render::Lamp& lamp : first_lamps_)
+      if (!lamp.size.isZero(0)) {
+        notes.push_back("glTF has no area lights: they are written as spot lights");
+        break;
+      }
+    if (zooms_)
+      notes.push_back("glTF has no animated field of view: the camera keeps that of its first frame");
+    if (flickers_) notes.push_back("glTF has no animated intensity: lights keep that of the first frame");
+    return notes;
+  }
+
+ private:
+  void write_rod(int frame, const RodSample& rod, NodeTracks& out) {
+    const Vector3f d = rod.b - rod.a;
+    if (!rod_transform(rod)) {  // gone
+      out.scale.add(frame, Vector3f::Zero());
+      return;
+    }
+    out.add(frame, 0.5f * (rod.a + rod.b), sim::rotation_between(Vector3f::UnitY(), d));
+    out.scale.add(frame, {1, d.norm(), 1});
+  }
+
+  void write_cloth(int frame, const FilmCloth& cloth, const ClothSample& sample, ClothRecord& out) {
+    ClothSurface surface = cloth_surface(cloth, sample);
+    if (out.version != sample.version) {
+      out.version = sample.version;
+      out.stretches.push_back({{frame}, *surface.triangles, {}, sample.points, surface.normals, {}});
+      for (const Eigen::Vector2f& uv : surface.uvs) out.stretches.back().uvs.push_back({uv.x(), 1 - uv.y()});
+      return;
+    }
+    ClothStretch& stretch = out.stretches.back();
+    stretch.frames.push_back(frame);
+    std::vector<Vector3f> moves(sample.points.size());
+    for (std::size_t i = 0; i < moves.size(); ++i) moves[i] = sample.points[i] - stretch.points[i];
+    const int positions = buffer_.add(moves, kArrayBuffer, true);
+    for (std::size_t i = 0; i < moves.size(); ++i) moves[i] = surface.normals[i] - stretch.normals[i];
+    stretch.targets.emplace_back(positions, buffer_.add(moves, kArrayBuffer));
+  }
+
+  float time_of(int frame) const {
+    return to_float(parts_.scene.output.fps.seconds(frame - frames_.front()));
+  }
+
+  template <class T>
+  void animate(const SampleTrack<T>& track, int node, const char* path,
+               const char* interpolation = "LINEAR") {
+    if (track.samples().size() < 2) return;
+    std::vector<float> times, values;
+    for (const auto& [frame, value] : track.samples()) {
+      times.push_back(time_of(frame));
+      append(value, values);
+    }
+    add_channel(times, values, std::is_same_v<T, Quaternionf> ? 4 : 3, node, path, interpolation);
+  }
+  void add_channel(std::span<const float> times, std::span<const float> values, int width, int node,
+                   const char* path, const char* interpolation) {
+    samplers_.push_back({{"input", buffer_.add(times, 1, 0, true)},
+                         {"interpolation", interpolation},
+                         {"output", buffer_.add(values, width)}});
+    channels_.push_back({{"sampler", samplers_.size() - 1}, {"target", {{"node", node}, {"path", path}}}});
+  }
+
+  int add_node(Json node, const NodeTracks& tracks, bool root = true) {
+    if (!tracks.translation.samples().empty()) {
+      node["translation"] = array(tracks.translation.samples()[0].second);
+      node["rotation"] = array(tracks.rotation.samples()[0].second);
+    }
+    if (!tracks.scale.samples().empty()) node["scale"] = array(tracks.scale.samples()[0].second);
+    nodes_.push_back(std::move(node));
+    const int index = static_cast<int>(nodes_.size()) - 1;
+    animate(tracks.translation, index, "translation");
+    animate(tracks.rotation, index, "rotation");
+    animate(tracks.scale, index, "scale");
+    if (root) roots_.push_back(index);
+    return index;
+  }
+
+  void add_materials() {
+    for (const FilmMaterial& m : parts_.materials) {
+      const render::Material& look = m.look;
+      Json pbr = {{"baseColorFactor", {look.color.x(), look.color.y(), look.color.z(), look.color.w()}},
+                  {"metallicFactor", look.metallic},
+                  {"roughnessFactor", look.roughness}};
+      if (m.texture) {
+        const int view = buffer_.add_view(render::encode_png(*m.texture));
+        images_.push_back({{"bufferView", view}, {"mimeType", "image/png"}});
+        textures_.push_back({{"source", images_.size() - 1}});
+        pbr["baseColorTexture"] = {{"index", textures_.size() - 1}};
+      }
+      Json material = {{"name", m.name}, {"pbrMetallicRoughness", std::move(pbr)}};
+      if (look.color.w() < 1) material["alphaMode"] = "BLEND";
+      if (look.two_sided) material["doubleSided"] = true;
+      const float glow = look.emission.maxCoeff();
+      if (glow > 0) {
+        material["emissiveFactor"] = array(look.emission / std::max(glow, 1.f));
+        if (glow > 1) {
+          material["extensions"]["KHR_materials_emissive_strength"] = {{"emissiveStrength", glow}};
+          used_.insert("KHR_materials_emissive_strength");
+        }
+      }
+      if (look.transmission > 0) {
+        material["extensions"]["KHR_materials_transmission"] = {{"transmissionFactor", look.transmission}};
+        material["extensions"]["KHR_materials_ior"] = {{"ior", look.refraction}};
+        used_.insert({"KHR_materials_transmission", "KHR_materials_ior"});
+      }
+      materials_.push_back(std::move(material));
+    }
+    for (const FilmCloth& cloth : parts_.cloths) materials_[cloth.material]["doubleSided"] = true;
+  }
+
+  void add_meshes() {
+    for (const render::Mesh& mesh : parts_.meshes) {
+      Json attributes = {{"POSITION", buffer_.add(mesh.positions, kArrayBuffer, true)}};
+      if (!mesh.normals.empty()) attributes["NORMAL"] = buffer_.add(mesh.normals, kArrayBuffer);
+      if (!mesh.uvs.empty())
+        attributes["TEXCOORD_0"] = buffer_.add({mesh.uvs[0].data(), 2 * mesh.uvs.size()}, 2, kArrayBuffer);
+      primitives_.push_back(
+          {{"attributes", std::move(attributes)}, {"indices", buffer_.add_indices(mesh.indices)}});
+    }
+  }
+
+  /// The mesh of glTF for geometry with a material.
+  int mesh_of_part(std::size_t mesh, std::size_t material) {
+    const auto [it, is_new] = meshes_done_.try_emplace({mesh, material}, static_cast<int>(meshes_.size()));
+    if (is_new) {
+      Json primitive = primitives_[mesh];
+      primitive["material"] = material;
+      meshes_.push_back({{"primitives", Json::array({std::move(primitive)})}});
+    }
+    return it->second;
+  }
+
+  void add_body(const FilmBody& body, const NodeTracks& tracks) {
+    Json node = {{"name", body.name}};
+    Json children = Json::array();
+    for (const FilmPart& part : body.parts) {
+      const int mesh = mesh_of_part(part.mesh, part.material);
+      if (body.parts.size() == 1 && part.body_from_part.matrix().isIdentity(0)) {
+        node["mesh"] = mesh;
+        break;
+      }
+      Json matrix = Json::array();
+      for (int i = 0; i < 16; ++i) matrix.push_back(part.body_from_part.data()[i]);  // by columns, both
+      nodes_.push_back({{"mesh", mesh}, {"matrix", std::move(matrix)}});
+      children.push_back(nodes_.size() - 1);
+    }
+    if (!children.empty()) node["children"] = std::move(children);
+    add_node(std::move(node), tracks);
+  }
+
+  void add_cloth(const FilmCloth& cloth, const ClothRecord& record) {
+    for (std::size_t i = 0; i < record.stretches.size(); ++i) {
+      const ClothStretch& stretch = record.stretches[i];
+      const Json attributes = {
+          {"POSITION", buffer_.add(stretch.points, kArrayBuffer, true)},
+          {"NORMAL", buffer_.add(stretch.normals, kArrayBuffer)},
+          {"TEXCOORD_0", buffer_.add({stretch.uvs[0].data(), 2 * stretch.uvs.size()}, 2, kArrayBuffer)}};
+      Json primitive = {{"attributes", attributes},
+                        {"indices", buffer_.add_indices(stretch.triangles)},
+                        {"material", cloth.material}};
+      for (const auto& [position, normal] : stretch.targets)
+        primitive["targets"].push_back({{"POSITION", position}, {"NORMAL", normal}});
+      Json mesh = {{"primitives", Json::array({std::move(primitive)})}};
+      const std::size_t targets = stretch.targets.size();
+      if (targets > 0) mesh["weights"] = std::vector<float>(targets, 0);
+      meshes_.push_back(std::move(mesh));
+      NodeTracks tracks;
+      if (record.stretches.size() > 1)
+        tracks.scale.add(frames_.front(), i == 0 ? Vector3f::Ones() : Vector3f::Zero());
+      const int node = add_node({{"name", i == 0 ? cloth.name : fmt::format("{}/torn_{}", cloth.name, i)},
+                                 {"mesh", meshes_.size() - 1}},
+                                tracks);
+      if (targets > 0) animate_weights(stretch, node);
+      if (record.stretches.size() > 1) animate_presence(record, i, node);
+    }
+  }
+
+  /// At each frame one target has the weight 1; in between the cloth goes straight from one to the next.
+  void animate_weights(const ClothStretch& stretch, int node) {
+    const std::size_t targets = stretch.targets.size();
+    std::vector<float> times, weights((targets + 1) * targets, 0);
+    for (std::size_t k = 0; k <= targets; ++k) {
+      times.push_back(time_of(stretch.frames[k]));
+      if (k > 0) weights[k * targets + k - 1] = 1;
+    }
+    add_channel(times, weights, 1, node, "weights", "LINEAR");
+  }
+
+  /// The mesh of a stretch is there during its frames alone: outside of them its scale is zero.
+  void animate_presence(const ClothRecord& record, std::size_t i, int node) {
+    SampleTrack<Vector3f> scale;
+    for (const int frame : frames_) {
+      const bool begun = frame >= record.stretches[i].frames.front();
+      const bool over = i + 1 < record.stretches.size() && frame >= record.stretches[i + 1].frames.front();
+      scale.add(frame, begun && !over ? Vector3f::Ones() : Vector3f::Zero());
+    }
+    animate(scale, node, "scale", "STEP");
+  }
+
+  void add_camera() {
+    const Eigen::Vector2i size = parts_.scene.render.size;
+    cameras_.push_back({{"type", "perspective"},
+                        {"perspective",
+                         {{"aspectRatio", static_cast<double>(size.x()) / size.y()},
+                          {"yfov", first_fov_deg_ * std::numbers::pi / 180},
+                          {"znear", 0.05},
+                          {"zfar", 1e4}}}});
+    add_node({{"name", "Camera"}, {"camera", 0}}, camera_);
+  }
+
+  void add_lights() {
+    const auto add = [&](Json light, const NodeTracks& tracks) {
+      const std::string name = light["name"];
+      lights_.push_back(std::move(light));
+      used_.insert("KHR_lights_punctual");
+      add_node({{"name", name}, {"extensions", {{"KHR_lights_punctual", {{"light", lights_.size() - 1}}}}}},
+               tracks);
+    };
+    // A white surface has the radiance L under an irradiance of pi L. glTF counts in lux and candela; scenes
+    // have no absolute scale, so one unit of theirs stands for 1 W, which is 683 lm, as importers have it.
+    constexpr float kLumens = 683;
+    const float pi = std::numbers::pi_v<float>;
+    const render::Sun sun = sun_of(parts_.scene);
+    if (sun.intensity > 0) {
+      NodeTracks tracks;
+      tracks.add(1, Vector3f::Zero(), look_rotation(-sun.direction, Vector3f::UnitY()));
+      add({{"name", "Sun"},
+           {"type", "directional"},
+           {"color", array(sun.color)},
+           {"intensity", kLumens * pi * sun.intensity}},
+          tracks);
+    }
+    for (std::size_t i = 0; i < first_lamps_.size(); ++i) {
+      const render::Lamp& lamp = first_lamps_[i];
+      const float brightness = std::max(lamp.intensity.maxCoeff(), 1e-12f);
+      const bool cone = lamp.cone_deg > 0 || !lamp.size.isZero(0);
+      Json light = {{"name", parts_.lamps[i]},
+                    {"type", cone ? "spot" : "point"},
+                    {"color", array(lamp.intensity / brightness)},
+                    {"intensity", kLumens * pi * brightness}};
+      if (cone) {
+        const float outer = lamp.cone_deg > 0 ? lamp.cone_deg / 2 * pi / 180 : 1.5f;
+        light["spot"] = {{"innerConeAngle", outer * (1 - std::clamp(lamp.softness, 0.01f, 1.f))},
+                         {"outerConeAngle", outer}};
+      }
+      add(std::move(light), lamps_[i]);
+    }
+  }
+
+  void write_file() {
+    Json json = {{"asset", {{"version", "2.0"}, {"generator", "offstage " + std::string(version())}}},
+                 {"scene", 0},
+                 {"scenes", Json::array({{{"name", parts_.scene.name}, {"nodes", roots_}}})},
+                 {"nodes", std::move(nodes_)},
+                 {"cameras", std::move(cameras_)}};
+    const auto add = [&](const char* key, Json& list) {
+      if (!list.empty()) json[key] = std::move(list);
+    };
+    add("meshes", meshes_);
+    add("materials", materials_);
+    add("textures", textures_);
+    add("images", images_);
+    if (!channels_.empty())
+      json["animations"] = Json::array(
+          {{{"name", "film"}, {"samplers", std::move(samplers_)}, {"channels", std::move(channels_)}}});
+    if (!lights_.empty()) json["extensions"] = {{"KHR_lights_punctual", {{"lights", std::move(lights_)}}}};
+    if (!used_.empty()) json["extensionsUsed"] = used_;
+    add("accessors", buffer_.accessors);
+    add("bufferViews", buffer_.views);
+    if (buffer_.spool().size() > 0) json["buffers"] = Json::array({{{"byteLength", buffer_.spool().size()}}});
+    std::string text = json.dump();
+    text.resize((text.size() + 3) / 4 * 4, ' ');
+    const auto binary = static_cast<uint32_t>(buffer_.spool().size());
+    const auto length = static_cast<uint32_t>(text.size());
+    put({kGlbMagic, 2, 12 + 8 + length + (binary > 0 ? 8 + binary : 0), length, kJsonChunk});
+    file_.write({reinterpret_cast<const uint8_t*>(text.data()), text.size()});
+    if (binary > 0) {
+      put({binary, kBinaryChunk});
+      buffer_.spool().copy_to(file_);
+    }
+    file_.commit();
+  }
+  void put(std::initializer_list<uint32_t> words) {
+    file_.write({reinterpret_cast<const uint8_t*>(words.begin()), 4 * words.size()});
+  }
+
+  const FilmParts& parts_;
+  render::OutputFile file_;
+  GltfBuffer buffer_;
+  std::vector<int> frames_;
+  std::vector<NodeTracks> bodies_, rods_;
+  std::vector<ClothRecord> cloths_;
+  NodeTracks camera_;
+  std::vector<NodeTracks> lamps_;
+  std::vector<render::Lamp> first_lamps_;
+  float first_fov_deg_ = 40;
+  bool zooms_ = false, flickers_ = false;
+  Json nodes_ = Json::array(), meshes_ = Json::array(), materials_ = Json::array(), textures_ = Json::array(),
+       images_ = Json::array(), cameras_ = Json::array(), lights_ = Json::array(), samplers_ = Json::array(),
+       channels_ = Json::array(), primitives_ = Json::array();
+  std::vector<int> roots_;
+  std::set<std::string> used_;
+  std::map<std::pair<std::size_t, std::size_t>, int> meshes_done_;
+};
+
+}  // namespace
+
+std::unique_ptr<FilmExport> make_gltf_export(const fs::path& file, const FilmParts& parts) {
+  return std::make_unique<GltfExport>(file, parts);
+}
+
+}  // namespace offstage::producer

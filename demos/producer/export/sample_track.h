@@ -1,0 +1,34 @@
+#pragma once
+/// Values over frames that are only written down where they change.
+
+#include <utility>
+#include <vector>
+
+namespace offstage::producer {
+
+/// Between two samples other programs interpolate. A value that rests is therefore sampled once more, just
+/// before it changes.
+template <class T>
+class SampleTrack {
+ public:
+  /// Frames ascend.
+  void add(int frame, const T& value) {
+    if (samples_.empty()) {
+      samples_.emplace_back(frame, value);
+    } else if (!(samples_.back().second == value)) {
+      const auto [last, rest] = samples_.back();
+      if (last != latest_) samples_.emplace_back(latest_, rest);
+      samples_.emplace_back(frame, value);
+    }
+    latest_ = frame;
+  }
+  const std::vector<std::pair<int, T>>& samples() const { return samples_; }
+  /// It has one value throughout.
+  bool constant() const { return samples_.size() == 1; }
+
+ private:
+  std::vector<std::pair<int, T>> samples_;
+  int latest_ = 0;
+};
+
+}  // namespace offstage::producer

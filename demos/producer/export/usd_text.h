@@ -1,0 +1,52 @@
+#pragma once
+/// Values and names in the text format of USD.
+
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+#include <Eigen/Geometry>
+
+namespace offstage::producer::usd {
+
+/// A name that USD allows for a prim: letters, digits and '_', not a digit first.
+std::string prim_name(std::string_view name);
+/// Prim names below one parent, each given once.
+class PrimNames {
+ public:
+  std::string operator()(std::string_view name);
+
+ private:
+  std::set<std::string> taken_;
+};
+
+/// A quoted string.
+std::string quoted(std::string_view text);
+
+std::string text(float value);
+std::string text(const Eigen::Vector2f& v);
+std::string text(const Eigen::Vector3f& v);
+/// Real part first, as quatf has it.
+std::string text(const Eigen::Quaternionf& q);
+/// As matrix4d, which takes row vectors: the transpose of Eigen's.
+std::string text(const Eigen::Matrix4f& transform);
+/// A token.
+std::string text(const std::string& token);
+
+/// "[a, b, ...]"
+template <class T>
+std::string list(std::span<const T> values) {
+  std::string out = "[";
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (i > 0) out += ", ";
+    if constexpr (std::is_integral_v<T>)
+      out += std::to_string(values[i]);
+    else
+      out += text(values[i]);
+  }
+  return out + "]";
+}
+
+}  // namespace offstage::producer::usd

@@ -1,0 +1,39 @@
+#pragma once
+/// All surfaces and particles of a frame in world coordinates, for formats without a scene graph.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "producer/build/snapshot.h"
+#include "producer/export/film_parts.h"
+
+namespace offstage::producer {
+
+/// Surfaces of one object with one material. Vertices and indices are those of WorldGeometry.
+struct GeometryGroup {
+  std::string object;
+  std::size_t material = 0;
+  uint32_t id = 0;  ///< of the object, from 1, in the order bodies, rods, cloths, particles
+  std::size_t first_vertex = 0, vertices = 0;
+  std::size_t first_index = 0, indices = 0;
+};
+
+struct GeometryParticles {
+  std::string object;
+  uint32_t id = 0;
+  const PointSet* set = nullptr;
+};
+
+struct WorldGeometry {
+  std::vector<Eigen::Vector3f> positions, normals;
+  std::vector<Eigen::Vector2f> uvs;  ///< v downwards; zero where a mesh has none
+  std::vector<uint32_t> indices;     ///< three per triangle
+  std::vector<GeometryGroup> groups;
+  std::vector<GeometryParticles> particles;
+};
+
+/// `snapshot` must outlive the result.
+WorldGeometry world_geometry(const FilmParts& parts, const Snapshot& snapshot);
+
+}  // namespace offstage::producer

@@ -1,0 +1,176 @@
+#!/usr/bin/env python3
+"""What `offstage export` writes is the simulation: positions agree with the trace to 1e-5 m, in every format.
+
+usage: export_test.py OFFSTAGE SOURCE_DIR
+"""
+
+import csv
+import os
+import subprocess
+import sys
+import tempfile
+
+from readers import Gltf, UsdText, read_ply
+
+TOLERANCE = 1e-5  # m; positions of a few metres as float32 have errors of 2e-7
+FRAMES = (1, 5, 11, 17, 24)
+FPS = 24
+program, source = os.path.abspath(sys.argv[1]), os.path.abspath(sys.argv[2])
+scene = source + "/tests/data/export.json"
+
+
+def offstage(*arguments, code=0):
+    run = subprocess.run([program, *arguments], capture_output=True, text=True)
+    assert run.returncode == code, f"{arguments}: {run.returncode}\n{run.stdout}{run.stderr}"
+    return run
+
+
+def distance(a, b):
+    return max(abs(x - y) for x, y in zip(a, b))
+
+
+def read_trace(path):
+    """Position by (frame, object)."""
+    rows = {}
+    for row in csv.DictReader(open(path)):
+        rows[round(float(row["time"]) * FPS) + 1, row["object"]] = tuple(float(row[k]) for k in "xyz")
+    return rows
+
+
+def read_table(path):
+    rows = {}
+    for row in csv.DictReader(open(path)):
+        rows[int(row["frame"]), row["kind"], row["object"], int(row["id"])] = tuple(float(row[k]) for k in "xyz")
+    return rows
+
+
+def centre_of_cloth(points, triangles, flat):
+    """Centre of mass: each vertex has a third of the mass of its triangles, by their area in the flat cloth."""
+    total, centre = 0.0, [0.0, 0.0, 0.0]
+    for triangle in triangles:
+        (ax, ay), (bx, by), (cx, cy) = (flat[i] for i in triangle)
+        area = abs((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)) / 2
+        total += area
+        for i in triangle:
+            for k in range(3):
+                centre[k] += area / 3 * points[i][k]
+    return [c / total for c in centre]
+
+
+def check_usd(trace, table):
+    offstage("export", scene, "-o", "film.usda", "-q")
+    layer = UsdText("film.usda").root
+    assert layer.metadata["upAxis"] == '"Y"' and layer.metadata["metersPerUnit"] == 1
+    assert layer.metadata["timeCodesPerSecond"] == FPS and layer.metadata["endTimeCode"] == FPS
+    world = layer.find("World")
+    for name, prim in {"box/1": "box_1", "box 1": "box_1_2", "wheel": "wheel"}.items():
+        for frame in FRAMES:
+            assert distance(world.find(prim).at("xformOp:translate", frame), trace[frame, name]) < TOLERANCE, name
+    turning = world.find("wheel").attributes["xformOp:orient.timeSamples"]
+    assert len(turning) == FPS and all(abs(sum(x * x for x in q) - 1) < 1e-5 for q in turning.values())
+
+    cloth = world.find("flag")
+    counts = cloth.attributes["faceVertexCounts.timeSamples"]
+    assert len(counts) > 1, "the cloth tore, so its triangles change"
+    first_tear = sorted(counts)[1]
+    assert len(cloth.at("points", first_tear)) > 49 == len(cloth.at("points", 1))
+    for frame in range(1, FPS + 1):
+        indices, points = cloth.at("faceVertexIndices", frame), cloth.at("points", frame)
+        assert max(indices) < len(points) == len(cloth.at("normals", frame)) == len(cloth.at("velocities", frame))
+        triangles = [tuple(int(i) for i in indices[k:k + 3]) for k in range(0, len(indices), 3)]
+        if frame < first_tear:
+            centre = centre_of_cloth(points, triangles, cloth.at("primvars:st", frame))
+            assert distance(centre, trace[frame, "flag"]) < TOLERANCE, frame
+
+    ball, fountain = world.find("ball"), world.find("fountain")
+    for frame in FRAMES:
+        assert distance(ball.at("points", frame)[0], trace[frame, "ball/0"]) < TOLERANCE
+        ids, points = fountain.at("ids", frame), fountain.at("points", frame)
+        assert len(ids) == len(points) == len(fountain.at("widths", frame)) == len(fountain.at("primvars:displayColor", frame))
+        for i, point in zip(ids, points):
+            assert distance(point, table[frame, "particle", "fountain", int(i)]) == 0
+    assert len(fountain.at("ids", 24)) > 20 and fountain.at("ids", 24)[0] > 0, "old particles died"
+    assert distance(fountain.at("widths", 24), [0.024] * 100) < 1e-7
+
+    names = {m.name for m in world.find("Materials").children}
+    assert "red_paint" in names and "glass" in names
+    surface = world.find("Materials").find("glass").find("Surface")
+    assert surface.attributes["info:id"] == '"UsdPreviewSurface"' and abs(surface.attributes["inputs:ior"] - 1.4) < 1e-6
+    meshes = layer.find("_Meshes")
+    for prim in world.of_kind("Xform"):
+        for part in prim.children:
+            assert part.metadata["references"].startswith("</_Meshes/mesh_")
+            meshes.find(part.metadata["references"][len("</_Meshes/"):-1])
+            assert part.attributes["material:binding"].split("/")[-1].rstrip(">") in names
+    assert [p.kind for p in world.children if p.kind.endswith("Light")] == ["DistantLight", "DomeLight", "SphereLight"]
+    eye = world.find("Camera").at("xformOp:transform", 1)[3][:3]
+    assert distance(eye, (0, 2.3, 5)) < 1e-5, eye
+    return world
+
+
+def check_gltf(trace, usd):
+    run = offstage("export", scene, "-o", "film.glb")
+    assert "particles: 2 sets are left out" in run.stderr, run.stderr
+    film = Gltf("film.glb")
+    for name in ("box/1", "box 1", "wheel", "ground"):
+        for frame in FRAMES:
+            wanted = trace.get((frame, name), (0, 0, 0))
+            assert distance(film.translation(name, (frame - 1) / FPS), wanted) < TOLERANCE, name
+    stretches = [i for i, node in enumerate(film.json["nodes"]) if node.get("name", "").startswith("flag")]
+    assert len(stretches) == len(usd.find("flag").attributes["faceVertexCounts.timeSamples"])
+    for frame in FRAMES:
+        time = (frame - 1) / FPS
+        shown = [n for n in stretches if film.animated(n, "scale", time) == (1, 1, 1)]
+        assert len(shown) == 1, "one mesh of the torn cloth is there at a time"
+        points = usd.find("flag").at("points", frame)
+        got = film.cloth_points(shown[0], time)
+        assert len(got) == len(points) and all(distance(a, b) < TOLERANCE for a, b in zip(got, points))
+    assert {"KHR_lights_punctual", "KHR_materials_transmission"} <= set(film.json["extensionsUsed"])
+
+
+def check_sequences(table, usd):
+    offstage("export", scene, "-o", "ply/f####.ply", "-q", "--frames", "1-24x23")
+    assert sorted(os.listdir("ply")) == ["f0001.ply", "f0024.ply"]
+    vertices, triangles = read_ply("ply/f0024.ply")
+    particles = [i for i, radius in enumerate(vertices["radius"]) if radius > 0]
+    in_faces = {i for triangle in triangles for i in triangle}
+    assert particles and not in_faces & set(particles) and max(in_faces) < len(vertices["x"])
+    fountain = max(vertices["object"])
+    for i in particles:
+        if vertices["object"][i] == fountain:
+            wanted = table[24, "particle", "fountain", vertices["id"][i]]
+            assert distance((vertices["x"][i], vertices["y"][i], vertices["z"][i]), wanted) < TOLERANCE
+    cloth = [p for p in usd.find("flag").at("points", 24)]
+    places = set(zip(vertices["x"], vertices["y"], vertices["z"]))
+    near = {tuple(round(c, 5) for c in place) for place in places}
+    assert all(tuple(round(c, 5) for c in p) in near for p in cloth), "the cloth is among the vertices"
+
+    offstage("export", scene, "-o", "obj/f####.obj", "-q", "--frames", "24")
+    lines = open("obj/f0024.obj").read().split("\n")
+    assert sum(line.startswith("v ") for line in lines) == len(vertices["x"])
+    assert sum(line.startswith("f ") for line in lines) == len(triangles)
+    used = {line.split()[1] for line in lines if line.startswith("usemtl")}
+    made = {line.split()[1] for line in open("obj/f.mtl") if line.startswith("newmtl")}
+    assert used <= made and "mtllib f.mtl" in lines
+
+
+def check_command():
+    offstage("simulate", scene, "--cache", "cache", "-q")
+    offstage("export", scene, "-o", "cached.usda", "--cache", "cache", "-q")
+    assert open("cached.usda").read() == open("film.usda").read(), "a cache gives the same film"
+    assert "exists already" in offstage("export", scene, "-o", "film.glb", code=2).stderr
+    for out, advice in {"f.usdc": ".usda", "f.gltf": ".glb", "f.abc": "Alembic", "f.ply": "f_####.ply", "#.csv": "leave out",
+                        "f.fbx": "must end in"}.items():
+        assert advice in offstage("export", scene, "-o", out, code=2).stderr, out
+
+
+with tempfile.TemporaryDirectory() as folder:
+    os.chdir(folder)
+    offstage("simulate", scene, "--trace", "trace.csv", "-q")
+    offstage("export", scene, "-o", "film.csv", "-q")
+    trace, table = read_trace("trace.csv"), read_table("film.csv")
+    usd = check_usd(trace, table)
+    check_gltf(trace, usd)
+    check_sequences(table, usd)
+    check_command()
+print("ok")
