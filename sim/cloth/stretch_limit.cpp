@@ -42,7 +42,8 @@ void StretchLimit::assign(std::vector<Limit> limits, std::vector<Limit> ties, st
 bool StretchLimit::project(ClothPoints& points, std::span<const Carrier> carriers, Real dt) {
   bool all_hold = true;
   if (!sweep(points, all_hold)) return false;
-  if (carriers.empty()) return true;  // points alone are light: the sweeps and the shortening of moves suffice
+  if (carriers.empty())
+    return true;  // points alone are light: the sweeps and the shortening of moves suffice
   for (int round = 0; round < kSolves && !all_hold; ++round) {
     TautSprings taut(points, carriers);
     for (const auto* some : {&limits_, &ties_})
