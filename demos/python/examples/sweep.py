@@ -38,4 +38,6 @@ def main(scene_file, picture, path="emitters.0.rate", values=(1000, 2000, 4000, 
 
 
 if __name__ == "__main__":
+    if not 3 <= len(sys.argv) <= 4:
+        sys.exit(__doc__)
     main(*sys.argv[1:])
