@@ -7,8 +7,8 @@
 namespace offstage::sim {
 
 /// The eigenvalues of M^-1 K are below the greatest K_a / m_a + K_b / m_b over springs, where K_i is the sum
-/// of the stiffnesses at a point (as of the Laplacian of a graph, Anderson and Morley, 1985); of damping
-/// likewise.
+/// of the stiffnesses at a point (as of the Laplacian of a graph, Anderson and Morley, 1985). The bound for
+/// damping is the same with dampings in place of stiffnesses.
 StableStep largest_stable_step(const ClothDef& def) {
   StableStep result;
   const bool is_rk4 = def.integrator == ClothIntegrator::rk4;

@@ -19,10 +19,11 @@ using Eigen::VectorXd;
 
 using Mat36 = Eigen::Matrix<Real, 3, 6>;
 
-constexpr Real kAccurate = 1e-12;   ///< share of the greatest velocity: the solution is exact to rounding
-constexpr Real kAccepted = 1e-10;   ///< likewise: with a larger residual, other methods continue
-constexpr Real kGoodEnough = 1e-5;  ///< likewise: with a larger residual of those, fall back
-constexpr Real kSliding = 1e-9;     ///< likewise: slower contacts do not slide
+// Bounds of residuals and speeds, as shares of the greatest velocity.
+constexpr Real kAccurate = 1e-12;   ///< residual of a solution that is exact to rounding
+constexpr Real kAccepted = 1e-10;   ///< greatest residual at which pivoting ends; else other methods continue
+constexpr Real kGoodEnough = 1e-5;  ///< greatest residual of the other methods; else the fall-back solves
+constexpr Real kSliding = 1e-9;     ///< slowest tangential speed that counts as sliding
 constexpr Real kRank = 1e-11;  ///< share of the greatest pivot: redundant contacts make the matrix singular
 /// Share of the diagonal that is added to it for pivoting, so that redundant contacts share their load in a
 /// unique way.

@@ -18,10 +18,8 @@ Vec6 twist_of(std::span<const ContactBody> bodies, uint32_t body) {
 
 /// Velocity change of a body due to an impulse [force, torque].
 Vec6 response_of(std::span<const ContactBody> bodies, uint32_t body, const Vec6& impulse) {
-  Vec6 v = Vec6::Zero();
-  if (body != kUnmoved)
-    v << bodies[body].inverse_mass * impulse.head<3>(), bodies[body].inverse_inertia * impulse.tail<3>();
-  return v;
+  if (body == kUnmoved) return Vec6::Zero();
+  return LinkMobility{bodies[body].inverse_mass, bodies[body].inverse_inertia}.velocity(impulse);
 }
 
 void add_impulse(std::span<ContactBody> bodies, uint32_t body, const Vec6& impulse) {

@@ -334,11 +334,11 @@ Vector solve_normal(PatchBatch& p, Groups& u, const Gaps& gaps) {
   return change;
 }
 
-/// Moves the impulses a fixed share towards their running means, and updates the means. No impulse changes by
-/// more than that share of itself or of Coulomb's limit; otherwise the mean impulse of an impact would lift
-/// the body that the impact has stopped. The friction of sliding points is set to the limit given by the
-/// present normal impulses, so the sums over the sub-steps obey Coulomb's law however the load shifts between
-/// points. Returns the change.
+/// Moves the impulses a fixed share towards their running means, and updates the means. The change
+/// of an impulse is limited to the same share of the impulse, or of Coulomb's limit for friction. Without the
+/// limit, the mean impulse of an impact would lift the body that the impact has stopped. The friction of
+/// sliding points is set to the limit given by the present normal impulses, so the sums over the sub-steps
+/// obey Coulomb's law however the load shifts between points. Returns the change.
 Groups return_to_mean(PatchBatch& p) {
   Groups change{};
   const Vector limits = friction_limits(p);

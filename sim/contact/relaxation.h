@@ -128,7 +128,7 @@ class RelaxationSolver {
     advance,
     advance_last,
     push,
-    push_again,  // repeated push-out, likewise
+    push_again,  // repeated push-out of the bodies moved in the previous one
     finish,
     report
   };

@@ -17,7 +17,8 @@ namespace offstage::sim {
 struct DecompositionSettings {
   /// Smallest angle between a cut and the faces that it meets [rad]; relaxed if no cut satisfies it.
   Real min_dihedral = 0.35;
-  /// Smallest distance of a cut from vertices off it, as a share of the mean edge; relaxed likewise.
+  /// Smallest distance of a cut from vertices off it, as a share of the mean edge. Relaxed if no cut
+  /// satisfies it.
   Real min_distance = 0.1;
   uint32_t max_reflex_edges = 2000;  ///< with more reflex edges the solid is approximated at once
   uint32_t max_parts = 32;           ///< greatest number of parts of an approximate decomposition

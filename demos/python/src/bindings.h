@@ -7,9 +7,13 @@
 
 namespace offstage::python {
 
+class LiveWorld;
+
 void bind_scene(py::module_& m);  ///< Scene, Simulation, Snapshot, caches
 void bind_film(py::module_& m);   ///< render()
-void bind_world(py::module_& m);  ///< World and what it is made of
-void bind_stage(py::module_& m);  ///< Stage
+void bind_world(py::module_& m);  ///< World, handles, step_all()
+void bind_shapes(py::module_& m);
+void bind_building(py::class_<LiveWorld>& world);  ///< calls that add objects to a world
+void bind_stage(py::module_& m);                   ///< Stage
 
 }  // namespace offstage::python
