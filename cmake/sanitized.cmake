@@ -46,25 +46,30 @@ function(offstage_sanitized_library target)
   endif()
 endfunction()
 
+# offstage_link_sanitized(TARGET LIBRARIES...): links the sanitized twins of LIBRARIES. They come first, so that of a template that
+# both use theirs is linked.
+function(offstage_link_sanitized target)
+  sanitized_names(libraries ${ARGN})
+  target_link_libraries(${target} PRIVATE ${libraries})
+  target_link_options(${target} PRIVATE ${OFFSTAGE_SANITIZERS})
+  foreach(library IN LISTS libraries)
+    if(library MATCHES "_sanitized$")
+      target_link_options(${target} PRIVATE LINKER:--whole-archive $<TARGET_FILE:${library}> LINKER:--no-whole-archive)
+    endif()
+  endforeach()
+endfunction()
+
 # offstage_sanitized_tests(NAME SHARDS FILTER): test_NAME_sanitized from the objects of test_NAME, run in SHARDS processes; the start
-# of a process costs more than most tests. Of the property tests' cases an eighth is enough here. The sanitized libraries come
-# first, so that of a template that both use theirs is linked.
+# of a process costs more than most tests. Of the property tests' cases an eighth is enough here.
 function(offstage_sanitized_tests name shards filter)
   if(NOT OFFSTAGE_SANITIZED_TESTS)
     return()
   endif()
   get_target_property(LINK_LIBRARIES test_${name} LINK_LIBRARIES)
-  sanitized_names(libraries ${LINK_LIBRARIES})
   set(twin test_${name}_sanitized)
   add_executable(${twin} $<TARGET_OBJECTS:test_${name}>)
   set_target_properties(${twin} PROPERTIES LINKER_LANGUAGE CXX)
-  target_link_libraries(${twin} PRIVATE ${libraries})
-  target_link_options(${twin} PRIVATE ${OFFSTAGE_SANITIZERS})
-  foreach(library IN LISTS libraries)
-    if(library MATCHES "_sanitized$")
-      target_link_options(${twin} PRIVATE LINKER:--whole-archive $<TARGET_FILE:${library}> LINKER:--no-whole-archive)
-    endif()
-  endforeach()
+  offstage_link_sanitized(${twin} ${LINK_LIBRARIES})
   math(EXPR last "${shards} - 1")
   foreach(shard RANGE ${last})
     math(EXPR number "${shard} + 1")

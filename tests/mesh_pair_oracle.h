@@ -72,14 +72,20 @@ struct AllTrees {
   SphereTree sphere;
 };
 
+/// A mesh with one of its trees. A function, because Clang 14 deduces no template arguments of aggregates.
+template <class Volume>
+MeshTree<Volume> mesh_tree(const TriangleMesh& mesh, const BoundingTree<Volume>& tree) {
+  return {mesh, tree};
+}
+
 /// Calls visit(a, b) for the nine combinations of kinds.
 template <class Visit>
 void for_each_kind(const AllTrees& a, const AllTrees& b, Visit&& visit) {
   const auto with_a = [&](const auto& tree_a) {
-    const MeshTree of_a{a.mesh, tree_a};
-    visit(of_a, MeshTree{b.mesh, b.aabb});
-    visit(of_a, MeshTree{b.mesh, b.obb});
-    visit(of_a, MeshTree{b.mesh, b.sphere});
+    const auto of_a = mesh_tree(a.mesh, tree_a);
+    visit(of_a, mesh_tree(b.mesh, b.aabb));
+    visit(of_a, mesh_tree(b.mesh, b.obb));
+    visit(of_a, mesh_tree(b.mesh, b.sphere));
   };
   with_a(a.aabb);
   with_a(a.obb);

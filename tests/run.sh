@@ -42,7 +42,7 @@ if [ ${#long[@]} = 0 ]; then
   tests/meshes.sh build/meshes
   export OFFSTAGE_MESHES=$PWD/build/meshes
   cmake --preset fuzz
-  cmake --build build-fuzz
+  cmake --build build-fuzz --target fuzz_targets
   ctest --test-dir build-fuzz -L fuzz -LE long -j "$cores" --output-on-failure || failed=1
 fi
 

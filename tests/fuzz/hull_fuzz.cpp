@@ -1,32 +1,26 @@
-// Finite coordinates of any size as points of a hull and as a mesh to be decomposed.
+// Finite coordinates of any size as points of a convex hull.
 
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
+#include <vector>
 
-#include "sim/geometry/convex_decomposition.h"
+#include "sim/core/types.h"
 #include "sim/geometry/convex_hull.h"
-#include "sim/geometry/mesh.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace offstage::sim;
   constexpr size_t kMostPoints = 64;
-  TriangleMesh mesh;
-  for (size_t at = 0; at + sizeof(Vec3) <= size && mesh.vertices.size() < kMostPoints; at += sizeof(Vec3)) {
+  std::vector<Vec3> points;
+  for (size_t at = 0; at + sizeof(Vec3) <= size && points.size() < kMostPoints; at += sizeof(Vec3)) {
     Vec3 point;
     std::memcpy(point.data(), data + at, sizeof point);
-    if (point.allFinite()) mesh.vertices.push_back(point);
+    if (point.allFinite()) points.push_back(point);
   }
-  if (mesh.vertices.empty()) return 0;
+  if (points.empty()) return 0;
   try {
-    const ConvexPolyhedron hull = convex_hull(mesh.vertices);
+    const ConvexPolyhedron hull = convex_hull(points);
     if (hull.vertices().empty()) __builtin_trap();
-  } catch (const std::invalid_argument&) {
-  }
-  for (uint32_t i = 0; i + 2 < mesh.vertices.size(); ++i) mesh.triangles.push_back({i, i + 1, i + 2});
-  try {
-    const TriangleMesh welded = weld(mesh);
-    if (!welded.triangles.empty()) decompose(welded, MeshTopology(welded));
   } catch (const std::invalid_argument&) {
   }
   return 0;
