@@ -77,13 +77,33 @@ bool boxes_apart(std::span<const Vec4> start, std::span<const Vec4> end, const s
   return over.cwiseMax(under).maxCoeff() > reach;
 }
 
-/// Whether the planes through both with their common normal are farther apart than `reach`: of edges that
-/// normal to both, of a triangle its own.
-bool planes_apart(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool edges, Real reach) {
+/// The least of n (x_i - x_j) over the points i of the first and j of the second.
+Real separation(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool edges, const Vec4& n) {
+  const Real h0 = n.dot(x[p[0]]), h1 = n.dot(x[p[1]]), h2 = n.dot(x[p[2]]), h3 = n.dot(x[p[3]]);
+  return edges ? std::min(h0, h1) - std::max(h2, h3) : h0 - std::max({h1, h2, h3});
+}
+
+/// Whether a plane with the normal n (of any length) separates both by more than `reach`, at the start and at
+/// the end: then it does so on all of their straight paths, since the heights above it change linearly.
+bool plane_separates(std::span<const Vec4> start, std::span<const Vec4> end, const std::array<uint32_t, 4>& p,
+                     bool edges, const Vec4& n, Real reach) {
+  const Real from = separation(start, p, edges, n);
+  if (!(from > 0)) return false;
+  const Real to = separation(end, p, edges, n), least = std::min(from, to);
+  return least > 0 && least * least > reach * reach * n.squaredNorm();
+}
+
+/// From the middle of the second to that of the first.
+Vec4 middle_to_middle(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool edges) {
+  if (edges) return x[p[0]] + x[p[1]] - x[p[2]] - x[p[3]];
+  return x[p[0]] - (x[p[1]] + x[p[2]] + x[p[3]]) / 3;
+}
+
+/// Normal to both edges, or of the triangle, towards the first of the two.
+Vec4 common_normal(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool edges) {
   const Vec3 p0 = place(x, p[0]), p1 = place(x, p[1]), p2 = place(x, p[2]), p3 = place(x, p[3]);
   const Vec3 n = edges ? (p1 - p0).cross(p3 - p2) : (p2 - p1).cross(p3 - p1);
-  const Real height = n.dot(p2 - p0);
-  return height * height > reach * reach * n.squaredNorm();
+  return padded(n.dot(p0 - p2) < 0 ? Vec3(-n) : n);
 }
 
 Real least_distance(Real distance, Real nearest) {
@@ -146,16 +166,14 @@ void SelfContacts::add(const ClothPoints& points, const std::array<uint32_t, 4>&
   Real thickness = (points.thickness[p[0]] + points.thickness[p[3]]) / 2;
   const Real near = thickness * (1 + slack);
   if (boxes_apart(points.start, predicted_to_, p, edges, near)) return;
-  Real longest2 = 0;  // of the ways of one relative to the other
-  for (uint32_t i : first)
-    for (uint32_t j : second)
-      longest2 = std::max(
-          longest2, (predicted_to_[i] - points.start[i] - predicted_to_[j] + points.start[j]).squaredNorm());
-  const Real reach = near + std::sqrt(longest2);
-  if (planes_apart(points.start, p, edges, reach)) return;
+  const auto separates = [&](const Vec4& n) {
+    return plane_separates(points.start, predicted_to_, p, edges, n, near);
+  };
+  if (separates(middle_to_middle(points.start, p, edges))) return;
+  if (separates(common_normal(points.start, p, edges))) return;
   const Closest c = closest(points.start, p, edges);
   const Real distance = c.apart.norm();
-  if (!(distance > kNoSide) || distance > reach) return;
+  if (!(distance > kNoSide) || separates(c.apart)) return;
   const Real nearest = kNearest * thickness;
   if (points.cloth[p[0]] == points.cloth[p[3]]) {
     const Real at_rest = closest(points.rest, p, edges).apart.norm();
