@@ -17,6 +17,10 @@ constexpr Real kMargin = 0.8;
 constexpr Real kStrayMargin = 1.5 * kMargin;
 /// Up to this part of all points are sought again alone.
 constexpr std::size_t kFew = 3;
+/// How much work fitting a triangle's box, looking at a pair, and finding its closest points are against
+/// watching a pair in a sub-step (measured).
+constexpr std::size_t kFitWork = 10;
+constexpr Real kPairWork = 3, kClosestWork = 8;
 /// What is near at rest in the cloth itself, is not pushed farther apart than this share of it.
 constexpr Real kRestShare = 0.8;
 /// Share of an overlap that is taken back per sub-step, so that layers do not fly apart.
@@ -163,6 +167,7 @@ void SelfContacts::add(const ClothPoints& points, const std::array<uint32_t, 4>&
   const auto first = std::span(p).first(first_side(edges)), second = std::span(p).subspan(first_side(edges));
   for (uint32_t i : first)
     if (std::ranges::find(second, i) != second.end()) return;
+  length_.spend(kPairWork);
   Real thickness = (points.thickness[p[0]] + points.thickness[p[3]]) / 2;
   const Real near = thickness * (1 + slack);
   if (boxes_apart(points.start, predicted_to_, p, edges, near)) return;
@@ -171,6 +176,7 @@ void SelfContacts::add(const ClothPoints& points, const std::array<uint32_t, 4>&
   };
   if (separates(middle_to_middle(points.start, p, edges))) return;
   if (separates(common_normal(points.start, p, edges))) return;
+  length_.spend(kClosestWork);
   const Closest c = closest(points.start, p, edges);
   const Real distance = c.apart.norm();
   if (!(distance > kNoSide) || separates(c.apart)) return;
@@ -193,9 +199,8 @@ void SelfContacts::predict(const ClothPoints& points, std::size_t i, Real dt) {
   predicted_to_[i] = points.start[i] + (horizon_ - since_) * velocity;
 }
 
-void SelfContacts::search(const ClothPoints& points, Real dt, Real horizon) {
-  since_ = 0;
-  horizon_ = std::max(horizon, dt);
+void SelfContacts::search(const ClothPoints& points, Real dt) {
+  horizon_ = length_.next(std::exchange(since_, 0)) * dt;
   for (std::size_t i = 0; i < points.size(); ++i) predict(points, i, dt);
   tree_.fit(predicted_from_, predicted_to_, margin_);
   std::fill(travel_.begin(), travel_.end(), 0.0);
@@ -203,6 +208,7 @@ void SelfContacts::search(const ClothPoints& points, Real dt, Real horizon) {
   tree_.pairs(points.start, [&](uint32_t ta, uint32_t tb) {
     add_pairs(points, ta, tb, kMargin, [](const auto&) { return true; });
   });
+  length_.spend(kFitWork * static_cast<Real>(triangles_.size()));
 }
 
 bool SelfContacts::expired(Real dt) const {
@@ -226,8 +232,8 @@ bool SelfContacts::strayed(const ClothPoints& points, Real dt) const {
 
 /// From where all were at the start of the sub-step, at the velocities they now have in it. While the horizon
 /// lasts and few strayed, only the pairs of those are sought again, over what is left of it.
-void SelfContacts::search_again(const ClothPoints& points, Real dt, Real horizon) {
-  if (expired(dt)) return search(points, dt, horizon);
+void SelfContacts::search_again(const ClothPoints& points, Real dt) {
+  if (expired(dt)) return search(points, dt);
   std::vector<uint8_t> strays(points.size(), 0);
   std::size_t count = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -235,7 +241,7 @@ void SelfContacts::search_again(const ClothPoints& points, Real dt, Real horizon
     strays[i] = off_course(points, i, dt).squaredNorm() > far * far;
     count += strays[i];
   }
-  if (count > points.size() / kFew) return search(points, dt, horizon);
+  if (count > points.size() / kFew) return search(points, dt);
 
   for (std::size_t i = 0; i < points.size(); ++i)
     if (strays[i]) predict(points, i, dt);
@@ -249,6 +255,7 @@ void SelfContacts::search_again(const ClothPoints& points, Real dt, Real horizon
   std::erase_if(pairs_, [&](const Pair& pair) { return is_stray(pair.points); });
   tree_.pairs(points.start,
               [&](uint32_t ta, uint32_t tb) { add_pairs(points, ta, tb, kStrayMargin, is_stray); });
+  length_.spend(static_cast<Real>(points.size() + kFitWork * seeking.size()));
 }
 
 SelfContacts::Contact SelfContacts::look(const ClothPoints& points, uint32_t k) {
@@ -278,9 +285,9 @@ Real SelfContacts::left_between(const ClothPoints& points, const Pair& pair, std
 
 /// The pairs that any parts of the moves made now, beyond the drifts, may bring nearer than `reach(pair)`.
 template <class Reach>
-void SelfContacts::gather(const ClothPoints& points, Real dt, Real horizon, std::span<const Vec4> drift,
-                          Reach&& reach) {
-  if (strayed(points, dt)) search_again(points, dt, horizon);
+void SelfContacts::gather(const ClothPoints& points, Real dt, std::span<const Vec4> drift, Reach&& reach) {
+  if (strayed(points, dt)) search_again(points, dt);
+  length_.spend(static_cast<Real>(pairs_.size()));
   for (std::size_t i = 0; i < move_.size(); ++i)
     move_[i] = (points.position[i] - points.start[i] - drift[i]).norm();
   contacts_.clear();
@@ -296,14 +303,12 @@ void SelfContacts::gather(const ClothPoints& points, Real dt, Real horizon, std:
   }
 }
 
-void SelfContacts::find(const ClothPoints& points, Real dt, Real horizon) {
-  gather(points, dt, horizon, still_, [](const Pair& pair) { return pair.thickness; });
+void SelfContacts::find(const ClothPoints& points, Real dt) {
+  gather(points, dt, still_, [](const Pair& pair) { return pair.thickness; });
 }
 
-void SelfContacts::find_doubtful(const ClothPoints& points, Real dt, Real horizon,
-                                 std::span<const Vec4> drift) {
-  gather(points, dt, horizon, drift,
-         [](const Pair& pair) { return least_distance(pair.distance, pair.nearest); });
+void SelfContacts::find_doubtful(const ClothPoints& points, Real dt, std::span<const Vec4> drift) {
+  gather(points, dt, drift, [](const Pair& pair) { return least_distance(pair.distance, pair.nearest); });
 }
 
 void SelfContacts::solve(ClothPoints& points) {
