@@ -8,14 +8,18 @@ struct Lamp {
   vec4 block;      // first corner in the shadow map; size of a tile there
 };
 
-// Values that shading reads for nearly every pixel.
+// Values that shading reads for nearly every pixel. One member a declaration: for lists, NVIDIA's compiler (driver 580)
+// assigns one location to all members.
 #define NONE
 #define FRAME_FIELDS(qualifier) \
   qualifier vec4 eye;               /* w: size of a pixel at distance 1 */ \
   qualifier vec4 shadow_rows[3];    /* world to [0, 1] of the shadow map, by rows */ \
   qualifier vec4 sun_direction;     /* w: 1 if the shadow map holds something */ \
   qualifier vec4 sun_radiance;      /* of a white surface that faces it; w: radius of the disc [rad] */ \
-  qualifier vec4 zenith, horizon, ground, glow;  /* zenith.w: fog density; horizon.w: 1 if one of many sub-frames */ \
+  qualifier vec4 zenith;            /* w: fog density */ \
+  qualifier vec4 horizon;           /* w: 1 if one of many sub-frames */ \
+  qualifier vec4 ground; \
+  qualifier vec4 glow; \
   qualifier vec4 irradiance[7];     /* ambient light of a white surface: see ambient() */ \
   qualifier vec4 shadow;            /* size of a texel [m], texels, 1 / texels, seed of the dither */ \
   qualifier vec4 penumbra;          /* of the shadow map: half-width [texels] per depth, the widest [texels], depth per its width, taps */
