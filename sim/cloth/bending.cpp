@@ -27,7 +27,7 @@ constexpr std::size_t kMostFactorized = 30000;
 constexpr Real kFilterTolerance2 = 1e-14;
 /// Curvature times size below which a triangle is flat at rest.
 constexpr Real kFlatAtRest = 1e-7;
-constexpr uint32_t kNoTriangle = ~0u;
+constexpr uint32_t kNoTriangle = ~0u, kNoPoint = ~0u;
 
 using Vec2 = Eigen::Vector2d;
 /// Weights of points in a gradient or in second derivatives (xx, yy, sqrt(2) xy).
@@ -60,19 +60,27 @@ class Unfolding {
  public:
   Unfolding(std::span<const Vec3> rest, std::span<const Triangle> triangles)
       : rest_(rest), triangles_(triangles) {
-    std::map<std::pair<uint32_t, uint32_t>, std::vector<uint32_t>> edges;
+    struct Side {
+      std::pair<uint32_t, uint32_t> ends;
+      uint32_t triangle, corner;
+    };
+    std::vector<Side> sides;
+    sides.reserve(3 * triangles.size());
     first_at_.assign(rest.size(), kNoTriangle);
     for (uint32_t t = 0; t < triangles.size(); ++t)
-      for (std::size_t k = 0; k < 3; ++k) {
-        edges[std::minmax(triangles[t][k], triangles[t][(k + 1) % 3])].push_back(t);
+      for (uint32_t k = 0; k < 3; ++k) {
+        sides.push_back({std::minmax(triangles[t][k], triangles[t][(k + 1) % 3]), t, k});
         if (first_at_[triangles[t][k]] == kNoTriangle) first_at_[triangles[t][k]] = t;
       }
+    std::ranges::sort(sides, {}, [](const Side& s) { return std::pair(s.ends, s.triangle); });
     neighbours_.assign(triangles.size(), {kNoTriangle, kNoTriangle, kNoTriangle});
-    for (uint32_t t = 0; t < triangles.size(); ++t)
-      for (std::size_t k = 0; k < 3; ++k) {
-        const auto& beside = edges[std::minmax(triangles[t][k], triangles[t][(k + 1) % 3])];
-        if (beside.size() == 2) neighbours_[t][k] = beside[0] == t ? beside[1] : beside[0];
+    for (std::size_t i = 0, end; i < sides.size(); i = end) {
+      for (end = i + 1; end < sides.size() && sides[end].ends == sides[i].ends; ++end) {
       }
+      if (end - i != 2) continue;
+      neighbours_[sides[i].triangle][sides[i].corner] = sides[i + 1].triangle;
+      neighbours_[sides[i + 1].triangle][sides[i + 1].corner] = sides[i].triangle;
+    }
   }
 
   /// A triangle as it lies in its own plane: from its first corner along x.
@@ -204,12 +212,12 @@ void add_outer_product(const Vec2& a, const Vec2& b, uint32_t point, HessianWeig
 
 /// Second derivatives on a triangle: of the linear function between the gradients recovered at its corners.
 HessianWeights recovered_hessian(const FlatTriangle& own, const Triangle& t,
-                                 std::span<const Recovered> recovered) {
+                                 std::span<const std::optional<Recovered>> recovered) {
   HessianWeights weights;
   GradientWeights shape;
   add_gradient(t, own.corners, 1, shape);
   for (std::size_t k = 0; k < 3; ++k) {
-    const Recovered& at = recovered[t[k]];
+    const Recovered& at = *recovered[t[k]];
     const auto in_fan = std::ranges::find(at.fan, own.triangle, &FlatTriangle::triangle);
     if (in_fan == at.fan.end()) continue;  // another sheet that only touches at this point
     // From the fan's plane to the triangle's own.
@@ -244,6 +252,34 @@ HessianWeights jump_hessian(const Unfolding& unfolding, const FlatTriangle& own,
   return weights;
 }
 
+/// The two patches of a triangle: of recovered gradients, and of what these do not see.
+struct TrianglePatches {
+  Real area;
+  Vec3 rest;  // unstressed curvature, of the first
+  HessianWeights smooth, rough;
+};
+
+TrianglePatches triangle_patches(const Unfolding& unfolding, std::span<const Vec3> rest,
+                                 std::span<const Triangle> triangles, Real rest_share, uint32_t t,
+                                 std::span<const std::optional<Recovered>> recovered) {
+  const Triangle& own = triangles[t];
+  const Vec3 normal = (rest[own[1]] - rest[own[0]]).cross(rest[own[2]] - rest[own[0]]);
+  const FlatTriangle flat = unfolding.own_plane(t);
+  TrianglePatches result{normal.norm() / 2, Vec3::Zero(), recovered_hessian(flat, own, recovered),
+                         jump_hessian(unfolding, flat, triangles)};
+  for (const auto& [point, w] : result.smooth) {
+    result.rest += rest_share * normal.normalized().dot(rest[point] - rest[own[0]]) * w;
+    result.rough.try_emplace(point, Vec3::Zero()).first->second -= w;
+  }
+  if (result.rest.norm() * std::sqrt(result.area) < kFlatAtRest) result.rest.setZero();
+  for (auto& [point, w] : result.rough) w *= std::sqrt(kJumpShare);
+  return result;
+}
+
+bool has_area(std::span<const Vec3> rest, const Triangle& t) {
+  return (rest[t[1]] - rest[t[0]]).cross(rest[t[2]] - rest[t[0]]).norm() > 0;
+}
+
 Real filter_dot(std::span<const Vec4> a, std::span<const Vec4> b) {
   Real sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += a[i].dot(b[i]);
@@ -254,102 +290,163 @@ Real filter_dot(std::span<const Vec4> a, std::span<const Vec4> b) {
 
 void ClothBending::assign(std::span<const Vec3> rest, std::span<const Triangle> triangles,
                           std::span<const Real> masses, Real rigidity, Real damping, Real rest_share) {
-  *this = {};
+  const bool known = rigidity > 0 && rigidity == rigidity_ && rest_share == rest_share_ &&
+                     triangles.size() == triangles_.size() && rest.size() >= rest_.size() &&
+                     std::equal(rest_.begin(), rest_.end(), rest.begin());
+  if (!known) *this = {};
   rigidity_ = rigidity;
   damping_ = damping;
   rest_share_ = rest_share;
   if (!(rigidity > 0)) return;
+  if (known && std::ranges::equal(triangles, triangles_) && std::ranges::equal(masses, masses_)) return;
+  std::vector<uint8_t> changed(triangles.size(), 1), moved(rest.size(), 0);
+  for (std::size_t t = 0; known && t < triangles.size(); ++t) {
+    changed[t] = triangles[t] != triangles_[t];
+    for (uint32_t corner : triangles_[t]) moved[corner] |= changed[t];
+  }
   rest_.assign(rest.begin(), rest.end());
   triangles_.assign(triangles.begin(), triangles.end());
   masses_.assign(masses.begin(), masses.end());
-  clamped_.assign(triangles.size(), 0);
-  build();
+  clamped_.resize(triangles.size(), 0);
+  build(changed, std::move(moved));
 }
 
 void ClothBending::set_clamps(std::span<const uint32_t> clamp) {
-  bool changed = false;
+  std::vector<uint8_t> changed(triangles_.size(), 0);
   for (std::size_t t = 0; t < triangles_.size(); ++t) {
     const Triangle& own = triangles_[t];
     const uint32_t holder = clamp[own[0]];
     const bool clamped = holder != 0 && clamp[own[1]] == holder && clamp[own[2]] == holder;
-    changed |= std::exchange(clamped_[t], uint8_t{clamped}) != uint8_t{clamped};
+    changed[t] = std::exchange(clamped_[t], uint8_t{clamped}) != uint8_t{clamped};
   }
-  if (changed) build();
+  if (std::ranges::count(changed, 1) > 0) build(changed, std::vector<uint8_t>(rest_.size(), 0));
 }
 
-void ClothBending::build() {
-  patches_.clear();
-  points_.clear();
-  weights_.clear();
+/// The triangles whose patches depend on changed ones. `near` are the corners that these had before.
+/// Gradients are recovered from up to two rings of triangles around a point.
+std::vector<uint8_t> ClothBending::affected(std::span<const uint8_t> changed,
+                                            std::vector<uint8_t> near) const {
+  for (std::size_t t = 0; t < triangles_.size(); ++t)
+    for (uint32_t corner : triangles_[t]) near[corner] |= changed[t];
+  std::vector<uint8_t> result(triangles_.size(), 0);
+  for (int ring = 0; ring < 3; ++ring) {
+    for (std::size_t t = 0; t < triangles_.size(); ++t)
+      for (uint32_t corner : triangles_[t]) result[t] |= near[corner];
+    for (std::size_t t = 0; t < triangles_.size(); ++t)
+      for (uint32_t corner : triangles_[t]) near[corner] |= result[t];
+  }
+  return result;
+}
+
+/// Builds the patches of changed triangles and of those that depend on them; the others stay. The result is
+/// that of building all, to the last bit. `moved_corners`: see affected().
+void ClothBending::build(std::span<const uint8_t> changed, std::vector<uint8_t> moved_corners) {
+  const std::vector<uint8_t> builds = affected(changed, std::move(moved_corners));
+  const auto old_patches = std::exchange(patches_, {});
+  const auto old_points = std::exchange(points_, {});
+  const auto old_weights = std::exchange(weights_, {});
   factor_.reset();
-  curved_ = false;
   const Unfolding unfolding(rest_, triangles_);
-  std::vector<Recovered> recovered;
-  for (uint32_t i = 0; i < rest_.size(); ++i)
-    recovered.push_back(recover(unfolding, triangles_, clamped_, i));
-  const auto add_patch = [&](const Patch& patch, const HessianWeights& weights) {
-    patches_.push_back(patch);
-    patches_.back().first = static_cast<uint32_t>(points_.size());
-    patches_.back().count = static_cast<uint32_t>(weights.size());
-    for (const auto& [point, w] : weights) {
-      points_.push_back(point);
-      weights_.push_back(w);
-    }
-  };
+  std::vector<std::optional<Recovered>> recovered(rest_.size());
+  std::vector<uint8_t> rows(rest_.size(), 0);  // of the matrix that change
+  std::size_t old = 0;
   for (uint32_t t = 0; t < triangles_.size(); ++t) {
-    const Triangle& own = triangles_[t];
-    const Vec3 normal = (rest_[own[1]] - rest_[own[0]]).cross(rest_[own[2]] - rest_[own[0]]);
-    Patch patch{.triangle = t, .area = normal.norm() / 2};
-    if (clamped_[t] || !(patch.area > 0)) continue;
-    const FlatTriangle flat = unfolding.own_plane(t);
-    const HessianWeights smooth = recovered_hessian(flat, own, recovered);
-    for (const auto& [point, w] : smooth)
-      patch.rest += rest_share_ * normal.normalized().dot(rest_[point] - rest_[own[0]]) * w;
-    if (patch.rest.norm() * std::sqrt(patch.area) < kFlatAtRest) patch.rest.setZero();
-    curved_ |= patch.rest != Vec3::Zero();
-    add_patch(patch, smooth);
-    HessianWeights rough = jump_hessian(unfolding, flat, triangles_);
-    for (const auto& [point, w] : smooth) rough.try_emplace(point, Vec3::Zero()).first->second -= w;
-    for (auto& [point, w] : rough) w *= std::sqrt(kJumpShare);
-    patch.rest.setZero();
-    add_patch(patch, rough);
+    for (; old < old_patches.size() && old_patches[old].triangle == t; ++old) {
+      const Patch& patch = old_patches[old];
+      const auto points = std::span(old_points).subspan(patch.first, patch.count);
+      if (builds[t])
+        for (uint32_t point : points) rows[point] = 1;
+      else
+        add_patch(patch, points, std::span(old_weights).subspan(patch.first, patch.count));
+    }
+    if (!builds[t] || clamped_[t] || !has_area(rest_, triangles_[t])) continue;
+    for (uint32_t corner : triangles_[t])
+      if (!recovered[corner]) recovered[corner] = recover(unfolding, triangles_, clamped_, corner);
+    const auto [area, rest, smooth, rough] =
+        triangle_patches(unfolding, rest_, triangles_, rest_share_, t, recovered);
+    for (const HessianWeights* of_kind : {&smooth, &rough}) {
+      std::vector<uint32_t> points;
+      std::vector<Vec3> weights;
+      for (const auto& [point, w] : *of_kind) {
+        points.push_back(point);
+        weights.push_back(w);
+        rows[point] = 1;
+      }
+      add_patch({.triangle = t, .area = area, .rest = of_kind == &smooth ? rest : Vec3(Vec3::Zero())}, points,
+                weights);
+    }
   }
-  build_matrix();
+  curved_ = std::ranges::any_of(patches_, [](const Patch& p) { return p.rest != Vec3::Zero(); });
+  build_matrix(rows);
 }
 
-void ClothBending::build_matrix() {
+void ClothBending::add_patch(Patch patch, std::span<const uint32_t> points, std::span<const Vec3> weights) {
+  patch.first = static_cast<uint32_t>(points_.size());
+  patch.count = static_cast<uint32_t>(points.size());
+  patches_.push_back(patch);
+  points_.insert(points_.end(), points.begin(), points.end());
+  weights_.insert(weights_.end(), weights.begin(), weights.end());
+}
+
+/// Computes the given rows, and keeps the others. Both halves add up their entries in the order of the
+/// patches, and stay equal to the last bit.
+void ClothBending::build_matrix(std::span<const uint8_t> rows) {
   const std::size_t n = masses_.size();
-  std::vector<std::vector<std::pair<uint32_t, Real>>> rows(n);
-  diagonal_.assign(n, 0);
-  for (const Patch& patch : patches_)
-    for (uint32_t a = patch.first; a < patch.first + patch.count; ++a)
-      for (uint32_t b = patch.first; b < patch.first + patch.count; ++b) {
-        const Real q = rigidity_ * patch.area * weights_[a].dot(weights_[b]);
-        if (a == b)
-          diagonal_[points_[a]] += q;
-        else
-          rows[points_[a]].emplace_back(points_[b], q);
+  // The places in points_ and weights_ of each point, and the patch of each place.
+  std::vector<std::size_t> first(n + 1, 0);
+  for (uint32_t point : points_) ++first[point + 1];
+  for (std::size_t i = 0; i < n; ++i) first[i + 1] += first[i];
+  std::vector<uint32_t> places(points_.size()), patch_of(points_.size());
+  std::vector<std::size_t> next(first.begin(), first.end() - 1);
+  for (uint32_t p = 0; p < patches_.size(); ++p)
+    for (uint32_t a = patches_[p].first; a < patches_[p].first + patches_[p].count; ++a) {
+      places[next[points_[a]]++] = a;
+      patch_of[a] = p;
+    }
+  const auto old_row = std::exchange(row_, {0});
+  const auto old_column = std::exchange(column_, {});
+  const auto old_value = std::exchange(value_, {});
+  diagonal_.resize(n, 0);
+  row_sum_.resize(n, 0);
+  std::vector<Real> entry(n, 0);
+  std::vector<uint32_t> seen_in(n, kNoPoint), columns;
+  for (uint32_t i = 0; i < n; ++i) {
+    if (!rows[i] && i + 1 < old_row.size()) {
+      for (std::size_t k = old_row[i]; k < old_row[i + 1]; ++k) {
+        column_.push_back(old_column[k]);
+        value_.push_back(old_value[k]);
       }
-  row_.assign(1, 0);
-  column_.clear();
-  value_.clear();
-  fastest_ = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    // Entries of both halves add up in the same order, and stay the same to the last bit.
-    std::ranges::stable_sort(rows[i], {}, [](const auto& entry) { return entry.first; });
-    Real sum = std::abs(diagonal_[i]);
-    for (std::size_t k = 0; k < rows[i].size();) {
-      const uint32_t column = rows[i][k].first;
-      Real q = 0;
-      for (; k < rows[i].size() && rows[i][k].first == column; ++k) q += rows[i][k].second;
-      if (q == 0) continue;
-      sum += std::abs(q);
-      column_.push_back(column);
-      value_.push_back(q);
+      row_.push_back(column_.size());
+      continue;
+    }
+    columns.clear();
+    diagonal_[i] = row_sum_[i] = 0;
+    for (std::size_t at = first[i]; at < first[i + 1]; ++at) {
+      const uint32_t a = places[at];
+      const Patch& patch = patches_[patch_of[a]];
+      for (uint32_t b = patch.first; b < patch.first + patch.count; ++b) {
+        const uint32_t column = points_[b];
+        if (std::exchange(seen_in[column], i) != i) {
+          entry[column] = 0;
+          columns.push_back(column);
+        }
+        entry[column] += rigidity_ * patch.area * weights_[a].dot(weights_[b]);
+      }
+    }
+    std::ranges::sort(columns);
+    for (uint32_t column : columns) {
+      row_sum_[i] += std::abs(entry[column]);
+      if (column == i) {
+        diagonal_[i] = entry[i];
+      } else if (entry[column] != 0) {
+        column_.push_back(column);
+        value_.push_back(entry[column]);
+      }
     }
     row_.push_back(column_.size());
-    fastest_ = std::max(fastest_, sum / masses_[i]);
   }
+  fastest_ = 0;
+  for (std::size_t i = 0; i < n; ++i) fastest_ = std::max(fastest_, row_sum_[i] / masses_[i]);
 }
 
 void ClothBending::multiply(std::span<const Vec4> p, Real scale, std::span<Vec4> y) const {
@@ -365,6 +462,14 @@ void ClothBending::multiply(std::span<const Vec4> p, Real scale, std::span<Vec4>
 void ClothBending::add_forces(std::span<const Vec4> x, Real scale, std::span<Vec4> f) const {
   multiply(x, -scale, f);
   if (curved_) add_rest_forces(x, scale, f);
+}
+
+void ClothBending::add_damped_forces(std::span<const Vec4> x, std::span<const Vec4> v, std::span<Vec4> f) {
+  if (damping_ == 0) return add_forces(x, 1, f);
+  image_.resize(x.size());
+  for (std::size_t i = 0; i < x.size(); ++i) image_[i] = x[i] + damping_ * v[i];
+  multiply(image_, -1, f);
+  if (curved_) add_rest_forces(x, 1, f);
 }
 
 /// Of -n b0 in the energy: along the normal at all points of a patch, and at the triangle's own by the

@@ -27,6 +27,8 @@ class ClothBending {
  public:
   /// `rigidity` B [N m]; 0: no bending. `damping`: time tau [s]; the moment is B (kappa + tau d kappa/dt).
   /// `rest_share` of the curvature of `rest` is unstressed; the remainder is as if the cloth had been flat.
+  /// Of a cloth that tore, which has other corners of triangles and more points, only the surroundings of the
+  /// tears are computed again. Triangles that were clamped stay so until set_clamps().
   void assign(std::span<const Vec3> rest, std::span<const Triangle> triangles, std::span<const Real> masses,
               Real rigidity, Real damping, Real rest_share);
   bool empty() const { return rigidity_ == 0 || patches_.empty(); }
@@ -42,6 +44,8 @@ class ClothBending {
   Real energy(std::span<const Vec4> x) const;
   /// Adds scale times the bending forces at x to f. Points are those of the cloth, from 0.
   void add_forces(std::span<const Vec4> x, Real scale, std::span<Vec4> f) const;
+  /// Adds the bending forces at x, and those of damping at the velocities v, to f.
+  void add_damped_forces(std::span<const Vec4> x, std::span<const Vec4> v, std::span<Vec4> f);
   /// Adds scale K p to y: K is the Hessian of the energy without the curvature at rest.
   void multiply(std::span<const Vec4> p, Real scale, std::span<Vec4> y) const;
   /// The factor of the unit matrix on the diagonal of K for a point [N/m].
@@ -62,8 +66,10 @@ class ClothBending {
     Vec3 rest = Vec3::Zero();  // unstressed curvature
   };
 
-  void build();
-  void build_matrix();
+  std::vector<uint8_t> affected(std::span<const uint8_t> changed, std::vector<uint8_t> near) const;
+  void build(std::span<const uint8_t> changed, std::vector<uint8_t> moved_corners);
+  void add_patch(Patch patch, std::span<const uint32_t> points, std::span<const Vec3> weights);
+  void build_matrix(std::span<const uint8_t> rows);
   void factorize(std::span<const Real> masses, std::span<const Real> inverse_masses, Real stiff);
   void filter_directly(std::span<const Real> inverse_masses, std::span<Vec4> moves);
   void add_rest_forces(std::span<const Vec4> x, Real scale, std::span<Vec4> f) const;
@@ -79,8 +85,8 @@ class ClothBending {
   std::vector<Vec3> weights_;
   std::vector<std::size_t> row_;  // of the matrix, and the end
   std::vector<uint32_t> column_;
-  std::vector<Real> value_;  // off the diagonal; rows add up to zero with it
-  std::vector<Real> diagonal_;
+  std::vector<Real> value_;               // off the diagonal; rows add up to zero with it
+  std::vector<Real> diagonal_, row_sum_;  // the latter of absolute values, with the diagonal
   std::vector<Vec4> residual_, direction_, image_;
   /// Of M + stiff K, without the rows of points that do not move.
   using Factor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<Real>>;

@@ -241,13 +241,12 @@ class RelaxedBending {
  public:
   RelaxedBending(const ClothPoints& points, const ClothRange& cloth, Real dt, Real h)
       : cloth_(cloth), damping_(cloth.bending.damping()), h_(h) {
-    const ClothBending& bending = cloth.bending;
+    ClothBending& bending = cloth.bending;
     is_stiff_ = dt * (dt + damping_) * bending.fastest() > kSoftBending;
     force_.assign(cloth.end - cloth.begin, Vec4::Zero());
     if (is_stiff_) return;
     // Once for the whole sub-step.
-    bending.add_forces(cloth.part(points.start), 1, force_);
-    if (damping_ > 0) bending.multiply(cloth.part(points.velocity), -damping_, force_);
+    bending.add_damped_forces(cloth.part(points.start), cloth.part(points.velocity), force_);
   }
   bool is_stiff() const { return is_stiff_; }
 

@@ -224,7 +224,7 @@ void ClothSystem::substep(Real from, Real to, Real dt, bool ends_span) {
 void ClothSystem::push_apart(Real dt) {
   points_.start.swap(span_start_);
   free_ = points_.position;
-  self_contacts_.find(points_, span_ * dt, kHorizon);
+  self_contacts_.find(points_, span_ * dt);
   self_contacts_.solve(points_);
   points_.start.swap(span_start_);
   if (span_ == 1) return;
@@ -384,20 +384,12 @@ void ClothSystem::write_back() {
 /// Tears the threads that are too long, and reports the first tear.
 uint32_t ClothSystem::tear_at(std::size_t c, Real time) {
   Cloth& cloth = *cloths_[c];
-  if (cloth.def.tear > 0 && !cloth.first_tear) {
-    ClothTear first{.time = time};
-    for (const ClothSpring& s : cloth.springs) {
-      const Real stretch = (cloth.points[s.a] - cloth.points[s.b]).norm() / s.rest_length;
-      if (s.kind != SpringKind::stretch || stretch <= std::max(first.stretch, cloth.def.tear)) continue;
-      first.stretch = stretch;
-      first.place = (cloth.points[s.a] + cloth.points[s.b]) / 2;
-    }
-    first.by_pressure = cloth.def.pressure != 0;
-    first.touches_body = c < contacts_.active().size() && contacts_.active()[c] > 0;
-    if (first.stretch > 0) cloth.first_tear = first;
-  }
+  ClothTear first{.time = time};
+  first.by_pressure = cloth.def.pressure != 0;
+  first.touches_body = c < contacts_.active().size() && contacts_.active()[c] > 0;
+  const uint32_t torn = tear(cloth, first);
   cloth.report.first_tear = cloth.first_tear;
-  return tear(cloth);
+  return torn;
 }
 
 void ClothSystem::count_penetration() {

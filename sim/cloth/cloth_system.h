@@ -36,9 +36,6 @@ class ClothSystem {
   Aabb reach(Real h) const;
 
  private:
-  /// For how long pairs of cloth with cloth are sought at a time [s].
-  static constexpr Real kHorizon = 1.0 / 80;
-
   struct Held {
     uint32_t point;
     ClothBody* body;  // null: the world

@@ -17,6 +17,10 @@ constexpr Real kMargin = 0.8;
 constexpr Real kStrayMargin = 1.5 * kMargin;
 /// Up to this part of all points are sought again alone.
 constexpr std::size_t kFew = 3;
+/// How much work fitting a triangle's box, looking at a pair, and finding its closest points are against
+/// watching a pair in a sub-step (measured).
+constexpr std::size_t kFitWork = 10;
+constexpr Real kPairWork = 3, kClosestWork = 8;
 /// What is near at rest in the cloth itself, is not pushed farther apart than this share of it.
 constexpr Real kRestShare = 0.8;
 /// Share of an overlap that is taken back per sub-step, so that layers do not fly apart.
@@ -77,13 +81,33 @@ bool boxes_apart(std::span<const Vec4> start, std::span<const Vec4> end, const s
   return over.cwiseMax(under).maxCoeff() > reach;
 }
 
-/// Whether the planes through both with their common normal are farther apart than `reach`: of edges that
-/// normal to both, of a triangle its own.
-bool planes_apart(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool edges, Real reach) {
+/// The least of n (x_i - x_j) over the points i of the first and j of the second.
+Real separation(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool edges, const Vec4& n) {
+  const Real h0 = n.dot(x[p[0]]), h1 = n.dot(x[p[1]]), h2 = n.dot(x[p[2]]), h3 = n.dot(x[p[3]]);
+  return edges ? std::min(h0, h1) - std::max(h2, h3) : h0 - std::max({h1, h2, h3});
+}
+
+/// Whether a plane with the normal n (of any length) separates both by more than `reach`, at the start and at
+/// the end: then it does so on all of their straight paths, since the heights above it change linearly.
+bool plane_separates(std::span<const Vec4> start, std::span<const Vec4> end, const std::array<uint32_t, 4>& p,
+                     bool edges, const Vec4& n, Real reach) {
+  const Real from = separation(start, p, edges, n);
+  if (!(from > 0)) return false;
+  const Real to = separation(end, p, edges, n), least = std::min(from, to);
+  return least > 0 && least * least > reach * reach * n.squaredNorm();
+}
+
+/// From the middle of the second to that of the first.
+Vec4 middle_to_middle(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool edges) {
+  if (edges) return x[p[0]] + x[p[1]] - x[p[2]] - x[p[3]];
+  return x[p[0]] - (x[p[1]] + x[p[2]] + x[p[3]]) / 3;
+}
+
+/// Normal to both edges, or of the triangle, towards the first of the two.
+Vec4 common_normal(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool edges) {
   const Vec3 p0 = place(x, p[0]), p1 = place(x, p[1]), p2 = place(x, p[2]), p3 = place(x, p[3]);
   const Vec3 n = edges ? (p1 - p0).cross(p3 - p2) : (p2 - p1).cross(p3 - p1);
-  const Real height = n.dot(p2 - p0);
-  return height * height > reach * reach * n.squaredNorm();
+  return padded(n.dot(p0 - p2) < 0 ? Vec3(-n) : n);
 }
 
 Real least_distance(Real distance, Real nearest) {
@@ -143,19 +167,19 @@ void SelfContacts::add(const ClothPoints& points, const std::array<uint32_t, 4>&
   const auto first = std::span(p).first(first_side(edges)), second = std::span(p).subspan(first_side(edges));
   for (uint32_t i : first)
     if (std::ranges::find(second, i) != second.end()) return;
+  length_.spend(kPairWork);
   Real thickness = (points.thickness[p[0]] + points.thickness[p[3]]) / 2;
   const Real near = thickness * (1 + slack);
   if (boxes_apart(points.start, predicted_to_, p, edges, near)) return;
-  Real longest2 = 0;  // of the ways of one relative to the other
-  for (uint32_t i : first)
-    for (uint32_t j : second)
-      longest2 = std::max(
-          longest2, (predicted_to_[i] - points.start[i] - predicted_to_[j] + points.start[j]).squaredNorm());
-  const Real reach = near + std::sqrt(longest2);
-  if (planes_apart(points.start, p, edges, reach)) return;
+  const auto separates = [&](const Vec4& n) {
+    return plane_separates(points.start, predicted_to_, p, edges, n, near);
+  };
+  if (separates(middle_to_middle(points.start, p, edges))) return;
+  if (separates(common_normal(points.start, p, edges))) return;
+  length_.spend(kClosestWork);
   const Closest c = closest(points.start, p, edges);
   const Real distance = c.apart.norm();
-  if (!(distance > kNoSide) || distance > reach) return;
+  if (!(distance > kNoSide) || separates(c.apart)) return;
   const Real nearest = kNearest * thickness;
   if (points.cloth[p[0]] == points.cloth[p[3]]) {
     const Real at_rest = closest(points.rest, p, edges).apart.norm();
@@ -175,9 +199,8 @@ void SelfContacts::predict(const ClothPoints& points, std::size_t i, Real dt) {
   predicted_to_[i] = points.start[i] + (horizon_ - since_) * velocity;
 }
 
-void SelfContacts::search(const ClothPoints& points, Real dt, Real horizon) {
-  since_ = 0;
-  horizon_ = std::max(horizon, dt);
+void SelfContacts::search(const ClothPoints& points, Real dt) {
+  horizon_ = length_.next(std::exchange(since_, 0)) * dt;
   for (std::size_t i = 0; i < points.size(); ++i) predict(points, i, dt);
   tree_.fit(predicted_from_, predicted_to_, margin_);
   std::fill(travel_.begin(), travel_.end(), 0.0);
@@ -185,6 +208,7 @@ void SelfContacts::search(const ClothPoints& points, Real dt, Real horizon) {
   tree_.pairs(points.start, [&](uint32_t ta, uint32_t tb) {
     add_pairs(points, ta, tb, kMargin, [](const auto&) { return true; });
   });
+  length_.spend(kFitWork * static_cast<Real>(triangles_.size()));
 }
 
 bool SelfContacts::expired(Real dt) const {
@@ -208,8 +232,8 @@ bool SelfContacts::strayed(const ClothPoints& points, Real dt) const {
 
 /// From where all were at the start of the sub-step, at the velocities they now have in it. While the horizon
 /// lasts and few strayed, only the pairs of those are sought again, over what is left of it.
-void SelfContacts::search_again(const ClothPoints& points, Real dt, Real horizon) {
-  if (expired(dt)) return search(points, dt, horizon);
+void SelfContacts::search_again(const ClothPoints& points, Real dt) {
+  if (expired(dt)) return search(points, dt);
   std::vector<uint8_t> strays(points.size(), 0);
   std::size_t count = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -217,7 +241,7 @@ void SelfContacts::search_again(const ClothPoints& points, Real dt, Real horizon
     strays[i] = off_course(points, i, dt).squaredNorm() > far * far;
     count += strays[i];
   }
-  if (count > points.size() / kFew) return search(points, dt, horizon);
+  if (count > points.size() / kFew) return search(points, dt);
 
   for (std::size_t i = 0; i < points.size(); ++i)
     if (strays[i]) predict(points, i, dt);
@@ -231,6 +255,7 @@ void SelfContacts::search_again(const ClothPoints& points, Real dt, Real horizon
   std::erase_if(pairs_, [&](const Pair& pair) { return is_stray(pair.points); });
   tree_.pairs(points.start,
               [&](uint32_t ta, uint32_t tb) { add_pairs(points, ta, tb, kStrayMargin, is_stray); });
+  length_.spend(static_cast<Real>(points.size() + kFitWork * seeking.size()));
 }
 
 SelfContacts::Contact SelfContacts::look(const ClothPoints& points, uint32_t k) {
@@ -260,9 +285,9 @@ Real SelfContacts::left_between(const ClothPoints& points, const Pair& pair, std
 
 /// The pairs that any parts of the moves made now, beyond the drifts, may bring nearer than `reach(pair)`.
 template <class Reach>
-void SelfContacts::gather(const ClothPoints& points, Real dt, Real horizon, std::span<const Vec4> drift,
-                          Reach&& reach) {
-  if (strayed(points, dt)) search_again(points, dt, horizon);
+void SelfContacts::gather(const ClothPoints& points, Real dt, std::span<const Vec4> drift, Reach&& reach) {
+  if (strayed(points, dt)) search_again(points, dt);
+  length_.spend(static_cast<Real>(pairs_.size()));
   for (std::size_t i = 0; i < move_.size(); ++i)
     move_[i] = (points.position[i] - points.start[i] - drift[i]).norm();
   contacts_.clear();
@@ -278,14 +303,12 @@ void SelfContacts::gather(const ClothPoints& points, Real dt, Real horizon, std:
   }
 }
 
-void SelfContacts::find(const ClothPoints& points, Real dt, Real horizon) {
-  gather(points, dt, horizon, still_, [](const Pair& pair) { return pair.thickness; });
+void SelfContacts::find(const ClothPoints& points, Real dt) {
+  gather(points, dt, still_, [](const Pair& pair) { return pair.thickness; });
 }
 
-void SelfContacts::find_doubtful(const ClothPoints& points, Real dt, Real horizon,
-                                 std::span<const Vec4> drift) {
-  gather(points, dt, horizon, drift,
-         [](const Pair& pair) { return least_distance(pair.distance, pair.nearest); });
+void SelfContacts::find_doubtful(const ClothPoints& points, Real dt, std::span<const Vec4> drift) {
+  gather(points, dt, drift, [](const Pair& pair) { return least_distance(pair.distance, pair.nearest); });
 }
 
 void SelfContacts::solve(ClothPoints& points) {

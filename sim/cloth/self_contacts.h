@@ -14,6 +14,7 @@
 
 #include "sim/cloth/cloth_points.h"
 #include "sim/cloth/cloth_tree.h"
+#include "sim/cloth/search_horizon.h"
 #include "sim/cloth/stretch_limit.h"
 
 namespace offstage::sim {
@@ -25,14 +26,13 @@ class SelfContacts {
   bool empty() const { return triangles_.empty(); }
 
   /// Finds the pairs that may touch, after points moved freely in a sub-step of length dt. The search is
-  /// repeated only if the known pairs no longer suffice. `horizon` is the time for which a search is meant to
-  /// suffice [s].
-  void find(const ClothPoints& points, Real dt, Real horizon);
+  /// repeated only if the known pairs no longer suffice.
+  void find(const ClothPoints& points, Real dt);
   /// Separates pairs that are closer than their thickness.
   void solve(ClothPoints& points);
   /// Finds the pairs that may have crossed with the current moves, or may cross if any move is shortened
   /// towards the drift of its point. Points of one piece have a common drift.
-  void find_doubtful(const ClothPoints& points, Real dt, Real horizon, std::span<const Vec4> drift);
+  void find_doubtful(const ClothPoints& points, Real dt, std::span<const Vec4> drift);
   void find_none() { contacts_.clear(); }
   /// Calls visit(points) for the pairs found: four, of which the first and the last are of one each.
   template <class Visit>
@@ -71,20 +71,20 @@ class SelfContacts {
   };
 
   void predict(const ClothPoints& points, std::size_t i, Real dt);
-  void search(const ClothPoints& points, Real dt, Real horizon);
+  void search(const ClothPoints& points, Real dt);
   template <class Wanted>
   void add_pairs(const ClothPoints& points, uint32_t ta, uint32_t tb, Real slack, Wanted&& wanted);
   void add(const ClothPoints& points, const std::array<uint32_t, 4>& p, bool edges, Real slack);
   bool expired(Real dt) const;
   Vec4 off_course(const ClothPoints& points, std::size_t i, Real dt) const;
   bool strayed(const ClothPoints& points, Real dt) const;
-  void search_again(const ClothPoints& points, Real dt, Real horizon);
+  void search_again(const ClothPoints& points, Real dt);
   Real travelled(const Pair& pair) const {
     return travel_[pair.points[0]] + travel_[pair.points[1]] + travel_[pair.points[2]] +
            travel_[pair.points[3]];
   }
   template <class Reach>
-  void gather(const ClothPoints& points, Real dt, Real horizon, std::span<const Vec4> drift, Reach&& reach);
+  void gather(const ClothPoints& points, Real dt, std::span<const Vec4> drift, Reach&& reach);
   static Real left_between(const ClothPoints& points, const Pair& pair, std::span<const Vec4> drift);
   Contact look(const ClothPoints& points, uint32_t pair);
 
@@ -99,6 +99,7 @@ class SelfContacts {
 
   // Since the last search: predicted paths, and the paths made.
   Real since_ = 0, horizon_ = -1;
+  SearchHorizon length_;
   std::vector<Vec4> predicted_from_, predicted_to_, predicted_velocity_;
   std::vector<Real> travel_, margin_;
   std::vector<Vec4> still_;  // no drifts

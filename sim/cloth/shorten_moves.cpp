@@ -93,7 +93,7 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   if (self) points_.start.swap(span_start_);                           // the moves of the whole span
   const std::vector<Vec4>& from = self ? span_start_ : points_.start;  // of the sub-step
   const auto find_doubtful = [&] {
-    self ? self_contacts_.find_doubtful(points_, span_ * dt, kHorizon, drift_) : self_contacts_.find_none();
+    self ? self_contacts_.find_doubtful(points_, span_ * dt, drift_) : self_contacts_.find_none();
   };
   shortened_.assign(points_.size(), kWhole);
   find_doubtful();

@@ -49,9 +49,11 @@ std::vector<Broken> overstretched(const Cloth& cloth) {
   for (uint32_t i = 0; i < cloth.springs.size(); ++i) {
     const ClothSpring& s = cloth.springs[i];
     if (s.kind != SpringKind::stretch) continue;
-    const Real ratio = (cloth.points[s.a] - cloth.points[s.b]).norm() / s.rest_length;
-    if (ratio > cloth.def.tear)
-      broken.push_back({i, is_at_border(cloth, s.a) || is_at_border(cloth, s.b), ratio});
+    const Real longest = cloth.def.tear * s.rest_length;
+    const Real length2 = (cloth.points[s.a] - cloth.points[s.b]).squaredNorm();
+    if (length2 > longest * longest)
+      broken.push_back(
+          {i, is_at_border(cloth, s.a) || is_at_border(cloth, s.b), std::sqrt(length2) / s.rest_length});
   }
   std::stable_sort(broken.begin(), broken.end(), [](const Broken& a, const Broken& b) {
     return a.at_border != b.at_border ? a.at_border : a.ratio > b.ratio;
@@ -203,10 +205,18 @@ bool split(Cloth& cloth, uint32_t point, const Vec3& normal) {
 
 }  // namespace
 
-uint32_t tear(Cloth& cloth) {
+uint32_t tear(Cloth& cloth, ClothTear first_tear) {
   if (cloth.def.tear == 0) return 0;
   std::vector<ClothSpring> torn;
-  for (const Broken& b : overstretched(cloth)) {
+  const std::vector<Broken> broken = overstretched(cloth);
+  if (!broken.empty() && !cloth.first_tear) {
+    const Broken& worst = *std::ranges::max_element(broken, {}, &Broken::ratio);
+    const ClothSpring& s = cloth.springs[worst.spring];
+    first_tear.stretch = worst.ratio;
+    first_tear.place = (cloth.points[s.a] + cloth.points[s.b]) / 2;
+    cloth.first_tear = first_tear;
+  }
+  for (const Broken& b : broken) {
     const ClothSpring& s = cloth.springs[b.spring];
     const bool relieved = std::any_of(torn.begin(), torn.end(), [&](const ClothSpring& t) {
       return (cloth.rest[t.a] - cloth.rest[s.a]).norm() < kRelief * t.rest_length;

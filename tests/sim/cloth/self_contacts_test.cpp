@@ -34,7 +34,7 @@ struct Layers {
   }
   /// What of their moves goes beyond the drift that all make in any case.
   void shorten(const Vec4& drift, MoveShares shares) {
-    contacts.find_doubtful(points, kStep, 1.0 / 60, std::vector<Vec4>(6, drift));
+    contacts.find_doubtful(points, kStep, std::vector<Vec4>(6, drift));
     std::vector<uint32_t> lowered;
     for (Vec4& start : points.start) start += drift;
     for (int round = 0; round < 64 && contacts.shorten(points, shares, lowered); ++round) {
