@@ -1,4 +1,4 @@
-// Finite coordinates of any size as points of a hull and as a mesh to be decomposed.
+// Arbitrary finite coordinates as the points of a convex hull and as a mesh for convex decomposition.
 
 #include <cmath>
 #include <cstring>

@@ -1,5 +1,5 @@
-// Any bytes as a model file of each ending, through the confined reader: a model or a FileError, never a
-// crash here.
+// Arbitrary bytes as a model file of each format, read in the confined process: the result is a model or a
+// FileError, never a crash of this process.
 
 #include <cstdlib>
 #include <filesystem>

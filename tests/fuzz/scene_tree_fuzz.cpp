@@ -1,6 +1,5 @@
-// Scenes of the gallery with changed values: keys and structure stay those of a scene, numbers, texts and
-// places in lists change. What is accepted is simulated for a few frames; a state that is not finite must be
-// reported.
+// Scenes of the gallery with changed values: keys and structure stay valid; numbers, texts and the order of
+// lists change. Accepted scenes are simulated for a few frames, and a non-finite state must be reported.
 
 #include <filesystem>
 #include <random>
@@ -29,7 +28,7 @@ const std::vector<Node>& gallery() {
   return scenes;
 }
 
-/// The bytes of the fuzzer as choices; 0 when they are used up.
+/// Turns the bytes of the fuzzer into choices; 0 when they are used up.
 class Choices {
  public:
   Choices(const uint8_t* data, size_t size) : data_(data), size_(size) {}
@@ -91,7 +90,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   try {
     const LoadedScene loaded = parse_scene(to_text(scene), "fuzz.json", OFFSTAGE_SOURCE_DIR "/demos/scenes",
                                            {"output.duration=0.1"});
-    constexpr std::size_t kMostBodies = 100;  // so that one run takes a moment
+    constexpr std::size_t kMostBodies = 100;  // keeps one run short
     if (loaded.scene.bodies.size() > kMostBodies || !loaded.scene.emitters.empty()) return 0;
     std::vector<offstage::Problem> warnings;
     const ModelLibrary models(loaded.scene, loaded.folder, DecompositionCache(), warnings);
