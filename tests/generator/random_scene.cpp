@@ -14,8 +14,8 @@ namespace offstage::sim {
 namespace {
 
 constexpr Real kWall = 1;          ///< thickness of the walls [m]
-constexpr Real kGap = 0.01;  ///< distance between bodies at the start [m]
-constexpr int kTries = 40;  ///< attempts to find a free place
+constexpr Real kGap = 0.01;        ///< distance between bodies at the start [m]
+constexpr int kTries = 40;         ///< attempts to find a free place
 constexpr Real kFrame = 1.0 / 60;  ///< sampling time [s]
 
 /// Makes one scene from a sequence of random numbers.

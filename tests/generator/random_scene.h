@@ -16,7 +16,7 @@ struct RandomScene {
   struct Body {
     BodyDef def;
     std::optional<std::size_t> mesh;  ///< used instead of the shape
-    Real reach = 0;  ///< radius of a ball around the body's centre that contains it [m]
+    Real reach = 0;                   ///< radius of a ball around the body's centre that contains it [m]
   };
   struct Joint {
     JointDef def;
@@ -32,7 +32,7 @@ struct RandomScene {
   uint64_t seed = 0;
   WorldDef world;
   Real duration = 1;       ///< [s]
-  Real room = 0;  ///< half of the room's width [m]; 0: no walls, and no external forces
+  Real room = 0;           ///< half of the room's width [m]; 0: no walls, and no external forces
   bool is_driven = false;  ///< a kinematic body or a motor does work
   std::vector<TriangleMesh> meshes;
   std::vector<Body> bodies;  ///< the walls come first
@@ -58,14 +58,14 @@ World make_world(const RandomScene& scene);
 struct Findings {
   bool finite = true;
   std::vector<std::string> lost;  ///< bodies that left the world or the room
-  Real energy_gain = 0;  ///< greatest rise above the lowest energy so far [J]
-  Real energy_scale = 1;  ///< scale of the scene's energies [J]
-  Real gained_at = 0;  ///< time of the greatest rise [s]
-  Real penetration = 0;  ///< penetration at the time when it exceeded the allowed one most [m]
+  Real energy_gain = 0;           ///< greatest rise above the lowest energy so far [J]
+  Real energy_scale = 1;          ///< scale of the scene's energies [J]
+  Real gained_at = 0;             ///< time of the greatest rise [s]
+  Real penetration = 0;           ///< penetration at the time when it exceeded the allowed one most [m]
   Real allowed_penetration = 0;   ///< allowed penetration at that time, see Overlap in random_scene.cpp [m]
   Real momentum_error = 0, angular_momentum_error = 0;  ///< relative to the greatest sum of the magnitudes of
                                                         ///< their parts
-  uint64_t work = 0, allowed_work = 0;  ///< counted work of the most expensive step
+  uint64_t work = 0, allowed_work = 0;                  ///< counted work of the most expensive step
   uint64_t rough = 0;                                   ///< fall-backs of contact solvers
   StateHash hash;
 };

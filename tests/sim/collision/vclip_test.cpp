@@ -113,7 +113,7 @@ TEST(Vclip, PolygonsSegmentsAndPoints) {
     EXPECT_NEAR(cold_start(rod, point, placed_at({0.5, y, 0})).distance, 0.25, 1e-15);
   }
   EXPECT_NEAR(cold_start(square, square, placed_at({2.5, 0, 0})).distance, 0.5, 1e-15);  // coplanar
-  EXPECT_NEAR(cold_start(rod, rod, placed_at({5, 0, 0})).distance, 1, 1e-15);  // collinear
+  EXPECT_NEAR(cold_start(rod, rod, placed_at({5, 0, 0})).distance, 1, 1e-15);            // collinear
   EXPECT_NEAR(cold_start(point, point, placed_at({3, 4, 0})).distance, 5, 1e-15);
   EXPECT_NEAR(cold_start(square, rod, placed_at({0.4, 0, 0.2}, upright)).distance, -0.6, 1e-12);
   EXPECT_NEAR(cold_start(rod, rod, placed_at({0.5, 0, 0}, aside)).distance, 0, 1e-12);

@@ -129,7 +129,7 @@ ContactSample cradle(int moving) {
   return s;
 }
 
-TEST(Collision, NewtonsCradlePassesAsManyBallsOnAsCameIn) {
+TEST(Collision, NewtonsCradleEjectsAsManyBallsAsArrive) {
   const std::vector<Real> e(4, 1);
   for (int moving = 1; moving < 5; ++moving) {
     ContactSample s = cradle(moving);
