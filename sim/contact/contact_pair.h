@@ -16,9 +16,9 @@ namespace offstage::sim {
 /// Combined surface parameters of two bodies.
 struct PairSurface {
   Real restitution = 0, friction = 0, static_friction = 0;
-  Real cross = 1;               ///< friction across the friction axis over friction along it
-  const Body* grain = nullptr;  ///< body that defines the friction axis; null: isotropic
-  bool conveys = false;         ///< whether a surface is a conveyor
+  Real cross = 1;                   ///< friction across the friction axis over friction along it
+  const Body* axis_body = nullptr;  ///< body that defines the friction axis; null: isotropic
+  bool conveys = false;             ///< whether a surface is a conveyor
 };
 
 /// Force at a point of a manifold on body a, in the manifold's frame.

@@ -136,7 +136,7 @@ TEST(ContactPair, ForcesOfRemovedPointsAreDropped) {
 TEST(ContactPair, TheFrictionAxisDeterminesTheTangents) {
   BoxOnGround scene;
   scene.ground->def.friction_axis = {1, 5, 1};  // only the component in the surface counts
-  ContactPair pair(*scene.box, *scene.ground, {.cross = 2, .grain = scene.ground.get()});
+  ContactPair pair(*scene.box, *scene.ground, {.cross = 2, .axis_body = scene.ground.get()});
   const auto find = [&](const Vec3& at) {
     pair.find({at}, Pose{}, 1e-3, 1e-5, false);
     return pair.manifolds().at(0);
