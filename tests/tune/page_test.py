@@ -107,7 +107,7 @@ class EmptyStage(Case):
 
     def test_a_fountain_is_built_from_a_preset_on_an_empty_stage(self):
         page = self.page
-        self.assertIn('The stage is empty', page.find('#controls').text)
+        self.assertIn('The scene has no objects yet', page.find('#controls').text)
         page.wait_for_frame(1)
         page.js('document.querySelector("#controls .empty button").click()')
         self.assertTrue(wait(lambda: page.js('return document.querySelector(`[data-preset="fountain"] img`)?.naturalWidth')), 'its picture')
