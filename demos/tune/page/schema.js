@@ -36,16 +36,13 @@ function limitsOf(s) {
 }
 
 /** The lists of objects that a string may refer to, judged by its key and help; empty if any text is allowed. */
-function targetsOf(key, help, owner) {
+function targetsOf(key, help) {
   if (/^(name|description|text|file|texture|node|preset|fabric)$/.test(key)) return [];
-  if (/name of a material|of the rod, by name/.test(help) || /^(skin|shirt|trousers|paint|trim|tyre|frame|load)$/.test(key) && /the same|material/.test(help)) return ['materials'];
-  if (key === 'materials') return ['materials'];
-  if (/bod(y|ies)/.test(help) && /name/.test(help) || key === 'bodies') return ['bodies'];
-  if (/^(a|b)$/.test(key) && /name of another/.test(help)) return ['bodies'];
+  if (/^names? of .*\bmaterials?\b/.test(help)) return ['materials'];
+  if (/^names? of .*\bbod(y|ies)\b/.test(help)) return ['bodies'];
   if (key === 'particles') return /emitter/.test(help) ? ['emitters', 'particles'] : ['particles'];
   if (key === 'cloths' || key === 'cloth') return ['cloths'];
   if (key === 'joint') return ['joints'];
-  if (/^(start|end|base)$/.test(key) && /what holds|the same of the last/.test(help)) return ['bodies'];
   return [];
 }
 
