@@ -30,7 +30,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The folder of a farm: FILM.mp4.farm, or the one above the frames.
+/// The folder of a farm: FILM.mp4.farm, or the folder above the frames.
 fs::path default_work(const OutputTarget& target) {
   if (target.kind == OutputKind::video) return target.path.string() + ".farm";
   const fs::path folder = target.path.parent_path();
@@ -71,7 +71,7 @@ FarmPlan plan_of(const FarmOptions& options) {
   return plan;
 }
 
-/// Checks the scene here, before machines are asked, and gives the plan its key.
+/// Checks the scene on this machine before any job is submitted, and sets the key of the plan.
 void check_scene(const FarmOptions& options, FarmPlan& plan) {
   const LoadedScene loaded = load(options.scene, options.talk.quiet);
   const ModelLibrary models = load_models(loaded, options.scene, options.talk);
@@ -85,7 +85,7 @@ void check_scene(const FarmOptions& options, FarmPlan& plan) {
                          .alpha = loaded.scene.environment.background == Background::transparent});
 }
 
-/// A folder of an earlier farm goes on with --resume if it is of the same film.
+/// An existing folder of a farm is continued with --resume if it belongs to the same film.
 void prepare_work(const FarmOptions& options, const FarmPlan& plan) {
   const bool there = fs::exists(plan.work / "farm.json");
   if (there && !options.resume && !options.force)
@@ -113,7 +113,8 @@ void prepare_work(const FarmOptions& options, const FarmPlan& plan) {
   write_farm(plan);
 }
 
-/// Runs a script of the farm's folder to its end; what it prints goes to a log. Nothing if it succeeded.
+/// Runs a script of the farm's folder and writes its output to a log. Returns an error message; nothing if it
+/// succeeded.
 std::optional<std::string> run_script(const FarmPlan& plan, const std::vector<std::string>& arguments,
                                       const std::string& log_name) {
   const fs::path log_file = plan.work / "logs" / log_name;

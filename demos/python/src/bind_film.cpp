@@ -7,7 +7,7 @@
 namespace offstage::python {
 namespace {
 
-/// What a consumer gets of a frame. Pictures become arrays without a copy.
+/// A frame for Python. Pictures become arrays without a copy.
 struct PythonFrame {
   int number;
   double time;
@@ -38,7 +38,7 @@ PythonFrame to_python(FilmFrame&& film_frame) {
 PythonFrame next_frame(Film& film) {
   std::optional<FilmFrame> frame;
   {
-    // Ctrl-C is noticed between two frames.
+    // Ctrl-C takes effect between two frames.
     const py::gil_scoped_release released;
     frame = film.next();
   }

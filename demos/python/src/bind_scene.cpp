@@ -15,7 +15,7 @@ namespace {
 using producer::Snapshot;
 using SnapshotPointer = std::shared_ptr<const Snapshot>;
 
-/// "emitters.0.rate": 200 becomes an override of the command line.
+/// Converts "emitters.0.rate": 200 to an override as on the command line.
 std::vector<std::string> overrides_of(const py::dict& set) {
   const py::object dumps = py::module_::import("json").attr("dumps");
   std::vector<std::string> overrides;
