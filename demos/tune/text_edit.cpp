@@ -307,7 +307,7 @@ std::string rename_key(std::string_view text, std::string_view path, const std::
   const Way way = follow(root, steps);
   if (way.taken < steps.size() || !way.parent || !way.parent->object) refuse_path(path);
   if (way.end->key != key && child_of(*way.parent, key))
-    throw std::invalid_argument("there is a key \"" + key + "\" already");
+    throw std::invalid_argument("there is already a key \"" + key + '"');
   std::string result(text);
   return result.replace(way.end->key_range.begin, way.end->key_range.end - way.end->key_range.begin,
                         quoted(key));

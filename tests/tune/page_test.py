@@ -334,7 +334,7 @@ class Connections(Case):
             wait(lambda: self.driver.execute_script('return tuneStore.writer !== ""'))
         self.driver.switch_to.new_window('tab')
         self.driver.get(self.server.address)
-        self.assertIn('room for no more', self.driver.page_source)
+        self.assertIn('more are not allowed', self.driver.page_source)
         for handle in self.driver.window_handles:
             if handle != first:
                 self.driver.switch_to.window(handle)

@@ -90,13 +90,13 @@ void prepare_work(const FarmOptions& options, const FarmPlan& plan) {
   const bool there = fs::exists(plan.work / "farm.json");
   if (there && !options.resume && !options.force)
     throw OutputError(plan.work.string() +
-                      ": holds a farm already; go on with --resume, or begin again with --force");
+                      ": already contains a farm; continue with --resume, or start again with --force");
   if (there && options.resume) {
     const FarmPlan before = read_farm(plan.work);
     if (before.key != plan.key || before.chunks != plan.chunks)
       throw OutputError(
           plan.work.string() +
-          ": was begun with another scene, other settings or another --chunks; begin again with --force");
+          ": was started with another scene, other settings or other --chunks; start again with --force");
   }
   if (there && !options.resume) {
     fs::remove_all(plan.work / "done");
@@ -174,10 +174,10 @@ int submit_to_slurm(const FarmOptions& options, const FarmPlan& plan) {
       plan, {options.partition, options.account, options.time, options.sbatch}, farm_state(plan).missing);
   write_text_file((plan.work / script.name).string(), script.text);
   if (const auto failed = run_script(plan, {script.name}, "submit.log"))
-    throw render::UnavailableError("sbatch did not take the jobs: " + *failed);
+    throw render::UnavailableError("sbatch did not accept the jobs: " + *failed);
   fmt::print("jobs {}", render::read_text_file(plan.work / "jobs", 1 << 16));
   if (!options.talk.quiet)
-    log("see how far they are: offstage farm --status {}\n", shell_word(plan.work.string()));
+    log("show their progress: offstage farm --status {}\n", shell_word(plan.work.string()));
   return kOk;
 }
 

@@ -101,7 +101,7 @@ FarmScript slurm_script(const FarmPlan& plan, const SlurmOptions& slurm, const s
   std::string array;
   for (const int chunk : chunks) array += (array.empty() ? "" : ",") + std::to_string(chunk);
   std::string text =
-      fmt::format("#!/bin/sh\n# {}: hands the steps to Slurm.\nset -eu\ncd {}\nmkdir -p logs\n",
+      fmt::format("#!/bin/sh\n# {}: submits the steps to Slurm.\nset -eu\ncd {}\nmkdir -p logs\n",
                   plan.out.filename().string(), shell_word(plan.work.string()));
   text += "simulate=" + job("simulate", "") + "\n";
   std::string before_encoding = "$simulate";

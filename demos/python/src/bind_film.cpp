@@ -76,12 +76,12 @@ void bind_film(py::module_& m) {
       .def_readonly("motion", &PythonFrame::motion,
                     "(height, width, 2) float32 [px] since the previous frame; or None.");
   py::class_<Film>(m, "Film",
-                   "An iterator over the frames of a film, which are made ahead on a thread of its own.")
+                   "An iterator over the frames of a film, which a thread of its own makes in advance.")
       .def("__iter__", [](py::object self) { return self; })
       .def("__next__", &next_frame)
       .def("__len__", &Film::total)
-      .def("cancel", &Film::cancel, "Ends the film: the iterator stops.")
-      .def_property_readonly("done", &Film::done, "Frames that were taken.")
+      .def("cancel", &Film::cancel, "Ends the film; the iterator then stops.")
+      .def_property_readonly("done", &Film::done, "Number of frames that the iterator has returned.")
       .def_property_readonly("total", &Film::total);
   m.def("_film", &make_film, py::arg("scene"), py::arg("frames"), py::arg("images"), py::arg("channels"),
         py::arg("cache"), py::arg("threads"), py::arg("gl"), py::call_guard<py::gil_scoped_release>());

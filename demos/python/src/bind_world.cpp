@@ -73,7 +73,7 @@ py::dict step(LiveWorld& w, double sampling_time, const py::object& before) {
 std::vector<bool> step_all(const std::vector<LiveWorld*>& worlds, double sampling_time, int threads) {
   if (!(sampling_time > 0)) throw std::invalid_argument("sampling_time: must be > 0");
   if (std::set<LiveWorld*>(worlds.begin(), worlds.end()).size() != worlds.size())
-    throw std::invalid_argument("worlds: a world is there twice");
+    throw std::invalid_argument("worlds: a world is listed twice");
   std::vector<char> finite(worlds.size(), 1);
   {
     const py::gil_scoped_release released;
