@@ -132,7 +132,7 @@ class alignas(64) ContactPair {
   void set_frame(PlacedManifold& m) const;
   /// Displacement of a relative to b along the normal by the free motion, at a contact of the start [m].
   Real free_way(const PlacedManifold& m, const Vec3& place, Real duration) const;
-  /// Whether the existing points already predict an overlap at this point of the world at the end.
+  /// Whether the motion of the existing points already predicts the overlap at `at_end`.
   bool is_expected(const Vec3& normal, const ContactPoint& at_end, Real duration) const;
   PlacedManifold brought_back(const Manifold& at_end, Real duration) const;
 

@@ -54,7 +54,7 @@ TEST(Ramp, SmoothGoesThroughItsKeysWithoutOvershootOrKink) {
   }
 }
 
-TEST(Ramp, EvaluatesOverNormalisedAges) {
+TEST(Ramp, EvaluatesOverNormalizedAges) {
   const Ramp<float> ramp(SizeRamp{{{0, 1.f}, {1, 3.f}}});
   const std::vector<Real> age = {0, 1, 2, 5}, lifespan = {1, 4, 4, 5};
   std::vector<float> size(4);
