@@ -31,11 +31,10 @@ std::vector<std::string> notes_of(const SimulationTotals& t) {
   for (const std::string& joint : t.broken_joints)
     notes.push_back(fmt::format("note: joint '{}' broke", joint));
   if (t.joints_unsolved)
-    notes.push_back(
-        fmt::format("warning: the motion of joints could not be solved {} times; they may come apart or slow "
-                    "down. Reduce "
-                    "world.step (now {:g} s).",
-                    t.joints_unsolved, t.step_s));
+    notes.push_back(fmt::format(
+        "warning: the motion of joints could not be solved {} times; they may come apart or slow down. "
+        "Reduce world.step (now {:g} s).",
+        t.joints_unsolved, t.step_s));
   for (const auto& [cloth, share] : t.softened_cloths)
     notes.push_back(fmt::format(
         "warning: cloth '{}': the stiffness of springs was reduced to {:.2g} of its value, because they are "
