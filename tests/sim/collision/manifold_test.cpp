@@ -131,7 +131,7 @@ TEST(Manifold, OfAnOctagonFourCornersKeepTheLargestArea) {
   EXPECT_NEAR(area(m), 2 * corner * corner, 1e-4);
 }
 
-TEST(Manifold, ABoxThatRocksALittleKeepsItsFourPointsAndTheirNames) {
+TEST(Manifold, ABoxThatRocksALittleKeepsItsFourPointsAndTheirIds) {
   const Convex slab = convex(Box{{4, 1, 4}}), box = convex(Box{Vec3::Ones()});
   const ConvexPolyhedron polyhedron = box_polyhedron(Vec3::Ones());
   Dice dice(3);
@@ -150,7 +150,7 @@ TEST(Manifold, ABoxThatRocksALittleKeepsItsFourPointsAndTheirNames) {
 
 // Boxes of equal size stacked on each other: their sides are coplanar, and rounding must not decide which
 // vertices are reported.
-TEST(Manifold, AStackOfEqualBoxesKeepsItsNamesWhileItCreeps) {
+TEST(Manifold, AStackOfEqualBoxesKeepsItsIdsWhileItCreeps) {
   const Convex box = convex(Box{Vec3::Ones()});
   Dice dice(5);
   const std::set<uint32_t> names = ids(manifold_of(box, box, pose_at({0, -1, 0}), 0.01));
