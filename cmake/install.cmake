@@ -11,7 +11,7 @@ install(DIRECTORY assets/models DESTINATION ${DATA}/assets COMPONENT program)
 install(DIRECTORY demos/scenes DESTINATION ${DATA}/demos COMPONENT program)  # they name models as ../../assets/models/...
 install(FILES LICENSE assets/CREDITS.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)
 
-# What the program says of itself.
+# The manual page and the completions, which the program prints itself.
 install(CODE "
   function(written command file)
     execute_process(COMMAND \"$<TARGET_FILE:offstage>\" \${command} OUTPUT_VARIABLE text COMMAND_ERROR_IS_FATAL ANY)
@@ -57,7 +57,7 @@ set(CPACK_COMPONENTS_ALL program development)
 set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME offstage)
-# Loaded while it runs, so no tool sees them.
+# The program loads these libraries at run time, so dpkg-shlibdeps does not find them.
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_DEPENDS "libosmesa6 | libegl1, libosmesa6 | libgl1-mesa-dri")
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS ffmpeg)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME offstage-dev)

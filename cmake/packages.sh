@@ -1,5 +1,5 @@
-# Sourced by demos/run.sh and tests/run.sh: installs what is missing, on Debian 12, Debian 13 and Ubuntu 24.04.
-# "a|b" is the first of them that the release has; "a?" is installed where the release has it.
+# Sourced by demos/run.sh and tests/run.sh: installs missing packages, on Debian 12, Debian 13 and Ubuntu 24.04.
+# "a|b" stands for the first of them that the release has; "a?" is optional and is installed if the release has it.
 
 build_packages="g++ cmake ninja-build pkg-config python3-glad libeigen3-dev libtbb-dev libegl1 libgl1-mesa-dri libassimp-dev libstb-dev
 libdeflate-dev libopenexr-dev libqhull-dev libxxhash-dev libzstd-dev nlohmann-json3-dev libcli11-dev libfmt-dev libcpp-httplib-dev
@@ -15,7 +15,7 @@ fuzz_packages="clang libclang-rt-14-dev|libclang-rt-19-dev|libclang-rt-18-dev"
 is_installed() { dpkg-query -W -f='${Status}' "$1" 2>/dev/null | grep -q '^install ok installed$'; }
 is_known() { apt-cache policy "$1" 2>/dev/null | grep -q 'Candidate: [^(]'; }
 
-# missing_packages PACKAGE...: those that are not installed, with one name for each choice.
+# missing_packages PACKAGE...: prints those that are not installed, with one name for each choice.
 missing_packages() {
   local wanted name names
   for wanted in "$@"; do
@@ -24,11 +24,11 @@ missing_packages() {
     for name in ${names//|/ }; do
       is_known "$name" && echo "$name" && continue 2
     done
-    [ "$wanted" != "$names" ] || echo "${names%%|*}"  # unknown: apt-get says so
+    [ "$wanted" != "$names" ] || echo "${names%%|*}"  # unknown here: apt-get will report it
   done
 }
 
-# install_packages PACKAGE...: quick when all are there; sudo if not root; a clear message if neither.
+# install_packages PACKAGE...: returns at once if all are installed; uses sudo if not root; without either, a message says what to do.
 install_packages() {
   local name missing as_root="" required=()
   [ -n "$(missing_packages "$@")" ] || return 0
@@ -50,7 +50,7 @@ install_packages() {
     as_root=sudo
   fi
   $as_root env DEBIAN_FRONTEND=noninteractive apt-get update -q >&2 || return
-  missing=$(missing_packages "$@")  # by the names of this release, which are known only now
+  missing=$(missing_packages "$@")  # again, since the names of this release are known only after the update
   echo "Installing:" $missing >&2
   $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends $missing >&2
 }

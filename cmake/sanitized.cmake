@@ -1,12 +1,12 @@
-# The libraries a second time, under AddressSanitizer and UndefinedBehaviorSanitizer, and test programs that link them
-# (OFFSTAGE_SANITIZED_TESTS). The objects of the tests themselves are those of the normal programs, so they compile once.
+# Compiles the libraries a second time with AddressSanitizer and UndefinedBehaviorSanitizer, and links test programs with them
+# (OFFSTAGE_SANITIZED_TESTS). The tests themselves are compiled once: both programs use the same object files.
 
-# Memory errors and index arithmetic. The checks of -fsanitize=undefined for null, misaligned and wrongly typed pointers are left
-# out: they take twice the compile time of everything else, and AddressSanitizer or the processor stops at most of what they find.
+# Checks memory errors and integer arithmetic. The checks of -fsanitize=undefined for null, misaligned and wrongly typed pointers are
+# left out: they take twice the compile time of all the others, and AddressSanitizer or the processor finds most of these errors.
 set(OFFSTAGE_SANITIZERS
   -fsanitize=address,signed-integer-overflow,shift,bounds,integer-divide-by-zero,float-cast-overflow,return,unreachable,bool,enum
   -fno-sanitize-recover=all -fno-omit-frame-pointer)
-# GCC compiles a fifth faster when it calls the checks instead of writing them out.
+# GCC compiles a fifth faster when the checks are function calls instead of inline code.
 if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
   list(APPEND OFFSTAGE_SANITIZERS "SHELL:--param asan-instrumentation-with-call-threshold=0")
 endif()
@@ -23,7 +23,7 @@ function(sanitized_names out)
   set(${out} ${names} PARENT_SCOPE)
 endfunction()
 
-# offstage_sanitized_library(TARGET): TARGET_sanitized from the same sources. To be called in the folder of TARGET, at its end.
+# offstage_sanitized_library(TARGET): defines TARGET_sanitized from the same sources. It is called at the end of the folder of TARGET.
 function(offstage_sanitized_library target)
   if(NOT OFFSTAGE_SANITIZED_TESTS)
     return()
@@ -46,8 +46,8 @@ function(offstage_sanitized_library target)
   endif()
 endfunction()
 
-# offstage_link_sanitized(TARGET LIBRARIES...): links the sanitized twins of LIBRARIES. They come first, so that of a template that
-# both use theirs is linked.
+# offstage_link_sanitized(TARGET LIBRARIES...): links the sanitized twins of LIBRARIES. They come first on the
+# command line, so that the linker takes their instances of the templates that the target and the libraries share.
 function(offstage_link_sanitized target)
   sanitized_names(libraries ${ARGN})
   target_link_libraries(${target} PRIVATE ${libraries})
@@ -59,8 +59,8 @@ function(offstage_link_sanitized target)
   endforeach()
 endfunction()
 
-# offstage_sanitized_tests(NAME SHARDS FILTER): test_NAME_sanitized from the objects of test_NAME, run in SHARDS processes; the start
-# of a process costs more than most tests. Of the property tests' cases an eighth is enough here.
+# offstage_sanitized_tests(NAME SHARDS FILTER): links test_NAME_sanitized from the objects of test_NAME and runs it in SHARDS processes,
+# because starting a process costs more than most tests. Property tests run an eighth of their cases here.
 function(offstage_sanitized_tests name shards filter)
   if(NOT OFFSTAGE_SANITIZED_TESTS)
     return()

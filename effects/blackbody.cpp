@@ -20,7 +20,6 @@ double lobe(double wavelength, double middle, double below, double above) {
 
 /// The CIE 1931 standard observer, approximated by the lobes of Wyman, Sloan and Shirley, "Simple analytic
 /// approximations to the CIE XYZ color matching functions", JCGT 2013.
-/// XYZ color matching functions", JCGT 2013.
 Vector3d observer(double nm) {
   return {0.362 * lobe(nm, 442.0, 0.0624, 0.0374) + 1.056 * lobe(nm, 599.8, 0.0264, 0.0323) -
               0.065 * lobe(nm, 501.1, 0.0490, 0.0382),

@@ -16,7 +16,7 @@ namespace offstage::effects {
 
 using Rgba = Eigen::Vector4f;  ///< linear, straight alpha; values above 1 glow
 
-/// Value over normalised age in [0, 1], piecewise linear, constant beyond the ends.
+/// Value over normalized age in [0, 1], piecewise linear, constant beyond the ends.
 template <class T>
 struct AgeRamp {
   struct Key {
@@ -88,7 +88,7 @@ class Ramp {
     return p.value + x * (p.c1 + x * (p.c2 + x * p.c3));
   }
 
-  /// Computes the value at the normalised age of every particle. The three spans have the same length.
+  /// Computes the value at the normalized age of every particle. The three spans have the same length.
   void evaluate(std::span<const Real> age, std::span<const Real> lifespan, std::span<T> values) const {
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = at(age[i] / lifespan[i]);
   }

@@ -13,7 +13,7 @@ void check(const std::string& owner, const char* field, const Varying& v, const 
     if (!(n->min <= n->max)) refuse("has min > max");
   }
   if (const auto* u = std::get_if<Uniform>(&v); u && !(u->low <= u->high))
-    refuse("has a range with its ends exchanged");
+    refuse("has a range whose first value is greater than its second");
   if (const auto* c = std::get_if<Curve>(&v)) {
     if (c->keys.empty()) refuse("is a curve without keys");
     for (std::size_t i = 1; i < c->keys.size(); ++i)

@@ -5,7 +5,7 @@
 namespace offstage::effects {
 namespace {
 
-/// The finaliser of MurmurHash3 with the constants of SplitMix64: every bit of the input affects every bit of
+/// The finalizer of MurmurHash3 with the constants of SplitMix64: every bit of the input affects every bit of
 /// the output.
 uint64_t mix(uint64_t x) {
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;

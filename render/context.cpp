@@ -49,7 +49,7 @@ std::pair<std::unique_ptr<PlatformContext>, GlPlatform> make_platform_context() 
       reasons += std::string(reasons.empty() ? "" : "\n") + error.what();
     }
   }
-  throw UnavailableError("nothing here can draw; one of the two is enough:\n" + reasons);
+  throw UnavailableError("no OpenGL backend is available; one of the two is enough:\n" + reasons);
 }
 
 std::string gl_string(GLenum name) {
@@ -83,7 +83,7 @@ void check(const ContextInfo& info) {
 std::string_view name_of(GlPlatform platform) {
   for (const auto& [name, value] : kPlatforms)
     if (value == platform) return name;
-  throw std::logic_error("no name of a GL platform");
+  throw std::logic_error("unknown GL platform");
 }
 
 GlPlatform gl_platform(std::string_view name) {
@@ -92,7 +92,7 @@ GlPlatform gl_platform(std::string_view name) {
     if (known == name) return value;
     names += (names.empty() ? "" : ", ") + std::string(known);
   }
-  throw std::invalid_argument("'" + std::string(name) + "' is no way to draw; there are " + names);
+  throw std::invalid_argument("'" + std::string(name) + "' is not an OpenGL backend; there are " + names);
 }
 
 GlPlatform gl_platform_of_environment() {

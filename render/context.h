@@ -35,7 +35,7 @@ struct ContextInfo {
 };
 
 /// Sets and clears the environment variables of Mesa, and chooses the platform of all contexts.
-/// LP_NUM_THREADS becomes `raster_threads`; llvmpipe has one rasteriser for all contexts of a process, so it
+/// LP_NUM_THREADS becomes `raster_threads`; llvmpipe has one rasterizer for all contexts of a process, so it
 /// should get all processors even if several contexts draw at once. Call once, in main, before any thread
 /// starts, because it uses setenv. Mesa reads the variables when the first context is created. The
 /// environment variable OFFSTAGE_SHADER_CACHE may name an existing folder, in which Mesa keeps compiled

@@ -36,7 +36,7 @@ struct Luma {
 };
 
 // Marks the pixels of a row that differ enough from their neighbours. The loop is simple, so that the
-// compiler vectorises it.
+// compiler vectorizes it.
 void mark_edges(const Luma& luma, int y, int width, std::vector<uint8_t>& mark) {
   const uint8_t *north = luma.row(y - 1), *here = luma.row(y), *south = luma.row(y + 1);
   for (int x = 0; x < width; ++x) {

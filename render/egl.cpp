@@ -106,8 +106,8 @@ bool is_software(Device device) {
   return has_word(egl().query_device_string(device, kExtensions), "EGL_MESA_device_software");
 }
 
-/// Returns an initialised display of EGL; it stays valid until the process ends.
-Display initialised(unsigned platform, void* native) {
+/// Returns an initialized display of EGL; it stays valid until the process ends.
+Display initialized(unsigned platform, void* native) {
   if (egl().get_platform_display == nullptr)
     throw UnavailableError("libEGL has no platform displays; upgrade it: apt-get install " + kPackages);
   const Display display = egl().get_platform_display(platform, native, nullptr);
@@ -150,7 +150,7 @@ class EglContext : public PlatformContext {
 
 std::unique_ptr<PlatformContext> make_software_context() {
   try {
-    static const Display display = initialised(kSurfaceless, nullptr);
+    static const Display display = initialized(kSurfaceless, nullptr);
     return std::make_unique<EglContext>(display);
   } catch (const UnavailableError& error) {
     throw UnavailableError("EGL cannot draw with llvmpipe (" + std::string(error.what()) +
@@ -164,7 +164,7 @@ Display first_gpu() {
   for (const Device device : devices()) {
     if (is_software(device)) continue;
     try {
-      const Display display = initialised(kDevicePlatform, device);
+      const Display display = initialized(kDevicePlatform, device);
       EglContext{display};  // checks that its driver has OpenGL 4.5
       return display;
     } catch (const UnavailableError& error) {

@@ -55,7 +55,7 @@ Eigen::AlignedBox2i around(const ScreenArea& area, int reach_px, int width_px, i
 }
 
 /// Greatest slope of a surface with this pattern, except at the edges of its stones; none if the slope is too
-/// large for recognisable mirror images.
+/// large for recognizable mirror images.
 std::optional<float> unevenness_of(Pattern pattern) {
   switch (pattern) {
     case Pattern::none:

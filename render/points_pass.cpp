@@ -8,7 +8,7 @@
 namespace offstage::render {
 namespace {
 
-// The finaliser of splitmix64, mapped to a number in [0, 1).
+// The finalizer of splitmix64, mapped to a number in [0, 1).
 float number_of_its_own(uint64_t id) {
   id = (id ^ (id >> 30)) * 0xBF58476D1CE4E5B9ull;
   id = (id ^ (id >> 27)) * 0x94D049BB133111EBull;

@@ -97,7 +97,7 @@ const VideoFormat& video_format(const VideoDef& def) {
   if (format == formats.end()) {
     std::string endings;
     for (const VideoFormat& f : formats) endings += std::string(" ") + f.extension;
-    throw std::invalid_argument(file + ": no video format; use one of" + endings);
+    throw std::invalid_argument(file + ": the ending names no video format; use one of" + endings);
   }
   const std::string size = std::to_string(def.width_px) + "x" + std::to_string(def.height_px);
   if (def.width_px <= 0 || def.height_px <= 0 || def.width_px > 16384 || def.height_px > 16384) {

@@ -1,6 +1,6 @@
 #pragma once
-/// Boxes that fall, slide and rest: free motion, collision detection and the fast contact solver, put
-/// together as simply as can be, to try the solver by. The scenes are those of the peer benchmarks.
+/// Boxes that fall, slide and rest: a minimal combination of free motion, collision detection and the fast
+/// contact solver, for testing the solver. The scenes are those of the peer benchmarks.
 
 #include <algorithm>
 #include <array>
@@ -21,7 +21,7 @@ namespace offstage::sim {
 
 struct BoxBody {
   Vec3 size = Vec3::Ones();
-  Real mass = 0;  ///< 0: does not move
+  Real mass = 0;  ///< 0: static
   Pose pose;
   Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
 
@@ -47,14 +47,14 @@ class BoxScene {
   std::vector<BoxBody> bodies;
   Real friction = 0.5;
   Vec3 gravity = Vec3(0, -9.81, 0);
-  uint32_t substeps = 0;  ///< 0: as many as the solver recommends
+  uint32_t substeps = 0;  ///< 0: the number that the solver recommends
 
   void add(const Vec3& size, Real mass, const Vec3& position, const Quat& q = Quat::Identity()) {
     bodies.push_back({size, mass, {position, q}});
   }
   void add_ground() { add(Vec3(200, 10, 200), 0, Vec3(0, -5, 0)); }
 
-  /// The problem of the next step.
+  /// Sets up the contact problem of the next step.
   void prepare(Real h) {
     set_bodies(h);
     find_patches(h);
@@ -101,7 +101,7 @@ class BoxScene {
     Manifold manifold;
   };
 
-  /// Free of torque: the angular momentum stays.
+  /// Without torques, angular momentum is conserved.
   void set_bodies(Real h) {
     relaxed_.resize(bodies.size());
     for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -163,7 +163,7 @@ class BoxScene {
     manifolds_.push_back(m);
   }
 
-  /// Points are matched by their features; what remains, where features changed, by the places.
+  /// Points are matched by their features; the remaining ones, whose features changed, by their positions.
   static void reuse(const Kept& kept, const Manifold& m, ContactPatch& p) {
     p.force_t = kept.patch.force_t;
     p.force_k = kept.patch.force_k;
@@ -223,7 +223,7 @@ inline BoxScene brick_wall(int count) {
   return s;
 }
 
-/// Downhill is x.
+/// A box on an incline; downhill is +x.
 inline BoxScene box_on_incline(Real degrees) {
   BoxScene s;
   const Quat q(Eigen::AngleAxisd(-degrees * std::numbers::pi / 180, Vec3::UnitZ()));
@@ -232,7 +232,7 @@ inline BoxScene box_on_incline(Real degrees) {
   return s;
 }
 
-/// At 5 m/s over the ground.
+/// A box that slides over the ground at 5 m/s.
 inline BoxScene sliding_box(Real heading_degrees) {
   BoxScene s;
   s.add_ground();
@@ -242,7 +242,7 @@ inline BoxScene sliding_box(Real heading_degrees) {
   return s;
 }
 
-/// Boxes above a pit with walls.
+/// Boxes that fall into a pit with walls.
 inline BoxScene box_pile(int count) {
   BoxScene s;
   constexpr Real pitch = 1.5;

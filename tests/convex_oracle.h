@@ -1,7 +1,7 @@
 #pragma once
-/// The distance and the penetration depth of convex polyhedra by brute force over all pairs of features: an
-/// oracle for GJK, V-Clip and the expanding polytope. Quadratic in the edges and free of iteration, so that
-/// nothing can fail to converge.
+/// The distance and the penetration depth of convex polyhedra by brute force over all pairs of features: a
+/// reference for GJK, V-Clip and EPA. The cost is quadratic in the number of edges; there is no iteration
+/// that could fail to converge.
 
 #include <algorithm>
 #include <cmath>
@@ -18,13 +18,14 @@ class ConvexOracle {
   ConvexOracle(const ConvexPolyhedron& a, const ConvexPolyhedron& b, const Pose& a_from_b)
       : a_(a, {}), b_(b, a_from_b), scale_(a.reach() + b.reach() + a_from_b.position.norm()) {}
 
-  /// Distance and normal as gjk() and vclip() answer; closest points only of solids that are apart (deepest
-  /// points are not unique).
+  /// Distance and normal as gjk() and vclip() return them. Closest points are given only for separate solids,
+  /// because deepest points are not unique.
   Separation signed_distance() {
     for (const Vec3& n : a_.normals) separate(n);
     for (const Vec3& n : b_.normals) separate(n);
     if (!(axis_.distance > 0)) separate_by_edges();
-    // Flat solids in one plane and solids that touch have an axis of separation zero: the features decide.
+    // Coplanar flat solids and touching solids have a separating axis with distance zero; the features then
+    // decide.
     if (std::isfinite(axis_.distance) && axis_.distance < -1e-13 * scale_) return axis_;
     vertices_to_faces(a_, b_, 1);
     vertices_to_faces(b_, a_, -1);
@@ -35,7 +36,7 @@ class ConvexOracle {
   }
 
  private:
-  /// A polyhedron brought to A's frame.
+  /// A polyhedron transformed to A's frame.
   struct Placed {
     Placed(const ConvexPolyhedron& p, const Pose& pose) : shape(p) {
       const Mat3 R = pose.orientation.normalized().toRotationMatrix();
@@ -48,7 +49,7 @@ class ConvexOracle {
     std::vector<Vec3> vertices, normals;
   };
 
-  /// The separation along an axis, of either sense.
+  /// Keeps the separation along an axis, or its opposite, if it is the largest so far.
   void separate(const Vec3& axis) {
     for (const Vec3& n : {axis, Vec3(-axis)}) {
       Real low = std::numeric_limits<Real>::infinity(), high = -low;
@@ -64,7 +65,7 @@ class ConvexOracle {
     }
   }
 
-  /// Axes across an edge of each, but for parallel ones, until one separates.
+  /// Tries the cross products of all pairs of non-parallel edges until one separates the solids.
   void separate_by_edges() {
     for (const ConvexPolyhedron::Edge& e : a_.shape.edges())
       for (const ConvexPolyhedron::Edge& f : b_.shape.edges()) {
@@ -74,8 +75,8 @@ class ConvexOracle {
       }
   }
 
-  /// Keeps the pair of a point of one solid and of another if it is the closest so far; `sign` is -1 if the
-  /// first is B's.
+  /// Keeps the pair of a point p of one solid and a point q of the other if it is the closest so far; `sign`
+  /// is -1 if p belongs to B.
   void keep(const Vec3& p, const Vec3& q, Real sign) {
     const Real distance = (p - q).norm();
     if (distance >= closest_.distance) return;
@@ -104,7 +105,7 @@ class ConvexOracle {
     return p + std::clamp((x - p).dot(u) / u.squaredNorm(), 0.0, 1.0) * u;
   }
 
-  /// And to vertices.
+  /// Distances of vertices to edges and to vertices.
   void vertices_to_edges(const Placed& one, const Placed& other, Real sign) {
     for (const Vec3& v : one.vertices) {
       for (const Vec3& w : other.vertices) keep(v, w, sign);
@@ -113,7 +114,7 @@ class ConvexOracle {
     }
   }
 
-  /// Where the common perpendicular of two edges meets both.
+  /// The points at which the common perpendicular of two edges meets both.
   void edges_to_edges() {
     for (const ConvexPolyhedron::Edge& e : a_.shape.edges())
       for (const ConvexPolyhedron::Edge& f : b_.shape.edges()) {
@@ -128,7 +129,7 @@ class ConvexOracle {
   }
 
   Placed a_, b_;
-  Real scale_;  ///< of coordinates, which rounding is relative to [m]
+  Real scale_;  ///< size of the coordinates, to which rounding is relative [m]
   Separation axis_{.distance = -std::numeric_limits<Real>::infinity()};
   Separation closest_{.distance = std::numeric_limits<Real>::infinity()};
 };

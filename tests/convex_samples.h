@@ -1,6 +1,6 @@
 #pragma once
-/// Random convex polyhedra, and pairs of them in the positions that trouble distance algorithms: face upon
-/// face, edge along edge, touching exactly, hovering within rounding of touching, tiny against large.
+/// Random convex polyhedra, and pairs of them in positions that are difficult for distance algorithms: face
+/// on face, edge along edge, touching exactly, within rounding of touching, very different in size.
 
 #include <array>
 #include <cmath>
@@ -15,13 +15,13 @@
 
 namespace offstage::sim {
 
-/// Numbers without a pattern, one after the other; the same ones for the same seed everywhere.
+/// A pseudo-random sequence, the same for the same seed on every machine.
 class Dice {
  public:
   explicit Dice(uint64_t seed) : scatter_{seed} {}
 
   Real uniform(Real low = 0, Real high = 1) { return low + (high - low) * scatter_.uniform(next_++, 0); }
-  /// 0 to count - 1.
+  /// A number from 0 to count - 1.
   uint32_t index(std::size_t count) { return static_cast<uint32_t>(uniform() * static_cast<Real>(count)); }
   bool chance(Real probability) { return uniform() < probability; }
   Vec3 in_cube() { return {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)}; }
@@ -36,8 +36,8 @@ class Dice {
   uint64_t next_ = 0;
 };
 
-/// About the origin, some `size` wide: the hull of points in a ball or on it, a box, a prism, a needle, a
-/// plate, a polygon, a segment or a point.
+/// A polyhedron about the origin, roughly `size` wide: the hull of points in a ball or on a sphere, a box, a
+/// prism, a needle, a plate, a polygon, a segment or a point.
 inline ConvexPolyhedron random_polyhedron(Dice& dice, uint32_t points, Real size) {
   enum Kind { kCloud, kSphere, kBox, kPrism, kNeedle, kPlate, kPolygon, kSegment, kPoint };
   constexpr std::array kKinds = {kCloud, kCloud, kCloud,  kCloud, kSphere,  kSphere,  kSphere,  kBox,
@@ -67,7 +67,7 @@ struct ConvexPair {
   Separation exact() const { return brute_force_separation(a, b, a_from_b); }
 };
 
-/// B turned at random, or as it is, or so that one of its faces or edges is parallel to one of A's.
+/// B rotated at random, not at all, or so that one of its faces or edges is parallel to one of A's.
 inline Quat feature_rotation(const ConvexPair& pair, Dice& dice) {
   const auto &a = pair.a, &b = pair.b;
   const uint32_t choice = dice.index(5);
@@ -81,8 +81,8 @@ inline Quat feature_rotation(const ConvexPair& pair, Dice& dice) {
   return choice == 2 ? Quat::Identity() : dice.rotation();
 }
 
-/// Two polyhedra of up to `points` vertices, 1 mm to 100 m, apart, touching or overlapping: beside a random
-/// position also B brought from there to a given distance along the normal.
+/// Two polyhedra of up to `points` vertices, from 1 mm to 100 m, that are apart, touching or overlapping.
+/// Besides random positions there are some in which B is moved to a given distance along the normal.
 inline ConvexPair random_pair(Dice& dice, uint32_t points) {
   const Real size = std::pow(10, dice.uniform(-3, 2)),
              smaller = size * (dice.chance(0.5) ? 1 : dice.uniform(0.01, 1));

@@ -1,5 +1,5 @@
 #pragma once
-/// Heaps that come down: what a step may cost is asked of them by a test and measured by a benchmark.
+/// Heaps of falling bodies. A test limits the counted work of a step, a benchmark measures its time.
 
 #include <array>
 #include <cmath>
@@ -20,7 +20,7 @@ inline const char* name_of(Heap heap) {
   return kNames[static_cast<std::size_t>(heap)];
 }
 
-/// An upright tube over a funnel over a closed bottom, as one open mesh seen from inside.
+/// A vertical tube above a funnel with a closed bottom, as one open mesh that faces inwards.
 inline TriangleMesh silo_mesh() {
   constexpr uint32_t kAround = 32;
   constexpr std::array<std::array<Real, 2>, 4> kProfile = {{{0.1, 0}, {0.1, 0.1}, {0.5, 0.5}, {0.5, 4}}};
@@ -44,7 +44,7 @@ inline TriangleMesh silo_mesh() {
   return mesh;
 }
 
-/// Hills of half a metre on a grid of half a metre.
+/// Hills of half a metre on a grid with cells of half a metre.
 inline TriangleMesh terrain_mesh() {
   constexpr uint32_t kCells = 24;
   TriangleMesh mesh;
@@ -62,7 +62,7 @@ inline TriangleMesh terrain_mesh() {
   return mesh;
 }
 
-/// A body of two links and a head with arms and legs of two links each, lying on its back along x.
+/// A torso of two links and a head, with arms and legs of two links each, lying on its back along x.
 inline void add_ragdoll(World& world, const Pose& at) {
   const auto limb = [&](const Vec3& from, const Vec3& to, Real radius, Real mass) {
     BodyDef def{.shape = Capsule{radius, std::max((to - from).norm() - 2 * radius, 0.01)},
@@ -103,7 +103,7 @@ inline void add_ragdoll(World& world, const Pose& at) {
   }
 }
 
-/// A heap before anything has met.
+/// A heap at its start, before any contacts.
 inline World heap_scene(Heap heap, SolverKind solver = SolverKind::automatic, Real step = 1.0 / 240) {
   World world({.max_step = step, .solver = solver});
   const Scatter random{11};

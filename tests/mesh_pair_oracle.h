@@ -1,6 +1,6 @@
 #pragma once
-/// Brute force over all pairs of triangles of two meshes, and all nine combinations of trees to be compared
-/// with it.
+/// Brute force over all pairs of triangles of two meshes, as the reference for all nine combinations of tree
+/// kinds.
 
 #include <vector>
 
@@ -11,7 +11,7 @@
 
 namespace offstage::sim {
 
-/// 2 around (rings - 1) triangles, without symmetry.
+/// A sphere with random radii, without symmetry: 2 around (rings - 1) triangles.
 inline TriangleMesh bumpy_sphere(uint32_t around, uint32_t rings, uint64_t seed) {
   TriangleMesh mesh = sphere_mesh(1, around, rings);
   for (uint64_t i = 0; i < mesh.vertices.size(); ++i)
@@ -19,7 +19,7 @@ inline TriangleMesh bumpy_sphere(uint32_t around, uint32_t rings, uint64_t seed)
   return mesh;
 }
 
-/// Turned at random and moved up to `reach` in any direction.
+/// A random rotation, and a random translation of at most `reach`.
 inline Pose random_pose(uint64_t i, Real reach) {
   const Scatter random{17};
   const auto value = [&](uint64_t k) { return 2 * random.uniform(i, k) - 1; };
@@ -45,7 +45,7 @@ void for_each_brute_pair(const TriangleMesh& a, const TriangleMesh& b, const Pos
     for (uint32_t j = 0; j < of_b.size(); ++j) visit(TrianglePair{i, j}, of_a[i], of_b[j]);
 }
 
-/// The intersecting pairs in order. Triangles whose exact boxes are apart are.
+/// The intersecting pairs in order. Pairs whose bounding boxes are apart are skipped.
 inline std::vector<TrianglePair> brute_pairs(const TriangleMesh& a, const TriangleMesh& b,
                                              const Pose& a_from_b) {
   const auto of_a = triangles_of(a, Placement(Pose(), 0, 0)),
@@ -62,7 +62,7 @@ inline std::vector<TrianglePair> brute_pairs(const TriangleMesh& a, const Triang
   return pairs;
 }
 
-/// A mesh with a tree of each kind; the book's split and the surface area's among them.
+/// A mesh with a tree of each kind; both the book's split and the surface area heuristic are used.
 struct AllTrees {
   explicit AllTrees(const TriangleMesh& m) : mesh(m), aabb(m), obb(m), sphere(m, TreeSplit::mean) {}
 
@@ -78,7 +78,7 @@ MeshTree<Volume> mesh_tree(const TriangleMesh& mesh, const BoundingTree<Volume>&
   return {mesh, tree};
 }
 
-/// Calls visit(a, b) for the nine combinations of kinds.
+/// Calls visit(a, b) for the nine combinations of tree kinds.
 template <class Visit>
 void for_each_kind(const AllTrees& a, const AllTrees& b, Visit&& visit) {
   const auto with_a = [&](const auto& tree_a) {

@@ -1,5 +1,5 @@
 #pragma once
-/// Numbers without a pattern for tests of libraries that have no random numbers of their own (SplitMix64).
+/// Pseudo-random numbers (SplitMix64) for tests of libraries that have no random numbers of their own.
 
 #include <cstdint>
 
@@ -8,7 +8,7 @@ namespace offstage {
 struct Scatter {
   uint64_t seed = 0;
 
-  /// In [0, 1); a function of the seed and both arguments.
+  /// A number in [0, 1) that is a function of the seed and both arguments.
   double uniform(uint64_t i, uint64_t k) const {
     uint64_t x = 0x9e3779b97f4a7c15u * (seed * 1'000'003 + i * 64 + k + 1);
     x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;

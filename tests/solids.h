@@ -1,5 +1,5 @@
 #pragma once
-/// Closed meshes of non-convex solids, for tests of what works on any solid.
+/// Closed meshes of non-convex solids, for tests of functions that accept any solid.
 
 #include <array>
 #include <cmath>
@@ -13,8 +13,8 @@
 
 namespace offstage::sim {
 
-/// A solid made of unit cubes, where `filled(i, j, k)` on a grid; its outer faces alone. The volume is the
-/// number of cubes.
+/// A solid made of the unit cubes of a grid for which `filled(i, j, k)` is true; only its outer faces are in
+/// the mesh. The volume is the number of cubes.
 template <class Filled>
 TriangleMesh cubes(int nx, int ny, int nz, Filled&& filled) {
   const auto solid = [&](int i, int j, int k) {
@@ -40,7 +40,7 @@ TriangleMesh cubes(int nx, int ny, int nz, Filled&& filled) {
             for (std::size_t c = 0; c < 4; ++c) {
               std::array<int, 3> corner = {i, j, k};
               corner[axis] += side;
-              // Counter-clockwise about the axis, the other way round on the low side.
+              // Counter-clockwise about the axis, and clockwise on the low side.
               const std::size_t turn = side == 1 ? c : 3 - c;
               corner[(axis + 1) % 3] += turn == 1 || turn == 2;
               corner[(axis + 2) % 3] += turn >= 2;
@@ -72,7 +72,7 @@ inline TriangleMesh star_shaped_prism(const std::vector<Eigen::Vector2d>& outlin
   return mesh;
 }
 
-/// A star of `points` tips at `outer` with `inner` between them.
+/// A star with `points` tips at radius `outer` and inner corners at radius `inner`.
 inline TriangleMesh star_prism(uint32_t points, Real outer, Real inner, Real height) {
   std::vector<Eigen::Vector2d> outline;
   for (uint32_t i = 0; i < 2 * points; ++i) {
@@ -110,25 +110,25 @@ inline TriangleMesh u_solid() {
 inline TriangleMesh cross_solid() {
   return cubes(3, 3, 1, [](int i, int j, int) { return i == 1 || j == 1; });
 }
-/// Three bars through each other.
+/// Three bars that cross in the middle.
 inline TriangleMesh jack_solid() {
   return cubes(3, 3, 3, [](int i, int j, int k) { return (i == 1) + (j == 1) + (k == 1) >= 2; });
 }
 inline TriangleMesh stairs() {
   return cubes(5, 5, 2, [](int i, int j, int) { return j <= i; });
 }
-/// A plate with two holes through it.
+/// A plate with two holes.
 inline TriangleMesh frame() {
   return cubes(5, 4, 2, [](int i, int j, int) { return i % 2 == 0 || j % 3 == 0; });
 }
 inline TriangleMesh notched_box() {
   return cubes(3, 1, 2, [](int i, int, int k) { return i != 1 || k == 0; });
 }
-/// A block with a pit in one face.
+/// A block with a pocket in one face.
 inline TriangleMesh pocketed_box() {
   return cubes(3, 3, 2, [](int i, int j, int k) { return i != 1 || j != 1 || k == 0; });
 }
-/// A cube with a tunnel through it along every axis: of genus five.
+/// A cube with a tunnel along every axis: a surface of genus five.
 inline TriangleMesh sponge() {
   return cubes(3, 3, 3, [](int i, int j, int k) { return (i == 1) + (j == 1) + (k == 1) < 2; });
 }
@@ -151,7 +151,7 @@ inline TriangleMesh bowl(Real outer, Real inner, uint32_t around, uint32_t rings
   return lathe(profile, around);
 }
 
-/// The mesh turned, then scaled, then moved; without a pattern, by a seed.
+/// The mesh rotated, scaled and translated by random amounts that depend on `seed`.
 inline TriangleMesh placed_at_random(TriangleMesh mesh, Real scale, uint64_t seed) {
   const Scatter random{seed};
   const auto signed_unit = [&](uint64_t k) { return 2 * random.uniform(0, k) - 1; };

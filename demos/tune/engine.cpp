@@ -57,7 +57,7 @@ Engine::Hold::~Hold() {
   engine_.woken_.notify_all();
 }
 
-// --- Orders ---
+// --- Requests ---
 
 FilmDef Engine::definition(Loaded scene, const std::optional<ViewCamera>& camera) const {
   FilmDef def{std::move(scene), camera, "", ""};
@@ -77,7 +77,7 @@ Engine::Run Engine::show(Loaded scene, const std::optional<ViewCamera>& camera) 
   const Run run{++runs_, def.film};
   wanted_ = std::move(def);
   changed_ = Clock::now();
-  ++ordered_;
+  ++requested_;
   woken_.notify_all();
   return run;
 }
@@ -92,7 +92,7 @@ void Engine::pin(Loaded scene) {
   wanted_pinned_.reset();
   if (scene) wanted_pinned_ = definition(std::move(scene), {});
   pinned_changed_ = true;
-  ++ordered_;
+  ++requested_;
   woken_.notify_all();
 }
 
@@ -102,7 +102,7 @@ void Engine::look_at(int frame, bool playing) {
   frame_ = frame;
   playing_ = playing;
   changed_ = Clock::now();
-  ++ordered_;
+  ++requested_;
   woken_.notify_all();
 }
 
@@ -114,7 +114,7 @@ void Engine::forget_models() {
 std::future<std::string> Engine::pick(int frame, double x, double y) {
   const std::lock_guard lock(mutex_);
   picks_.push_back({frame, x, y, {}});
-  ++ordered_;
+  ++requested_;
   woken_.notify_all();
   return picks_.back().name.get_future();
 }
@@ -124,7 +124,7 @@ uint64_t Engine::sweep(std::vector<Loaded> versions, int frame) {
   const std::size_t count = versions.size();
   sweep_ = {++sweeps_, std::move(versions), frame, 0, {}};
   sweep_.pictures.resize(count);
-  ++ordered_;
+  ++requested_;
   woken_.notify_all();
   return sweep_.number;
 }
@@ -165,24 +165,25 @@ void Engine::work_with(const Workshop& workshop) {
     }
     if (busy) continue;
     std::unique_lock lock(mutex_);
-    // The wait is limited, because refining begins after a time without orders.
-    woken_.wait_for(lock, milliseconds(100), [&] { return ending_ || (holds_ == 0 && ordered_ != taken_); });
+    // The wait is limited, because refining begins after a time without requests.
+    woken_.wait_for(lock, milliseconds(100),
+                    [&] { return ending_ || (holds_ == 0 && requested_ != taken_); });
   }
 }
 
 bool Engine::step(const Workshop& workshop) {
-  if (take_orders(workshop)) return true;
+  if (take_requests(workshop)) return true;
   return answer_picks() || advance_sweep(workshop) || refine_frame() || advance_film() ||
          advance_pinned(workshop);
 }
 
-/// Returns whether there were any orders.
-bool Engine::take_orders(const Workshop& workshop) {
+/// Returns whether there were any requests.
+bool Engine::take_requests(const Workshop& workshop) {
   std::optional<FilmDef> wanted;
   {
     const std::lock_guard lock(mutex_);
-    if (taken_ == ordered_) return false;
-    taken_ = ordered_;
+    if (taken_ == requested_) return false;
+    taken_ = requested_;
     if (runs_ != run_) wanted = wanted_;
     run_ = runs_;
     if (pinned_changed_) pinned_.reset();
@@ -247,7 +248,7 @@ bool Engine::answer_picks() {
   return true;
 }
 
-/// The frame that is looked at comes first, then the film in order.
+/// The visible frame comes first, then the film in order.
 bool Engine::advance_film() {
   if (!film_ || failed_) return false;
   int frame = 0;

@@ -1,5 +1,5 @@
 #pragma once
-/// Computes frames and figures of a scene. One thread simulates and draws; orders take effect within one
+/// Computes frames and figures of a scene. One thread simulates and draws; requests take effect within one
 /// frame. Only the latest version of the scene counts: an older run ends at once, and its results stay in
 /// memory of a bounded size.
 
@@ -75,7 +75,7 @@ class Engine {
     uint64_t number = 0;
     std::string film;
   };
-  /// During its lifetime the engine begins no new work, so that the processors are free for the next order:
+  /// During its lifetime the engine begins no new work, so that the processors are free for the next request:
   /// work done between the arrival of a change and show() would be useless.
   class Hold {
    public:
@@ -134,7 +134,7 @@ class Engine {
   void work();
   void work_with(const Workshop& workshop);
   bool step(const Workshop& workshop);
-  bool take_orders(const Workshop& workshop);
+  bool take_requests(const Workshop& workshop);
   void start_film(const Workshop& workshop);
   bool answer_picks();
   bool advance_film();
@@ -146,7 +146,7 @@ class Engine {
   void report_frame(int frame, Detail detail);
   void report_film(FilmEvent::Phase phase, const std::string& message = "");
   void fail(const std::string& what);
-  bool is_stale() const { return ending_ || holds_ > 0 || ordered_ != taken_; }
+  bool is_stale() const { return ending_ || holds_ > 0 || requested_ != taken_; }
 
   const EngineSettings settings_;
   const OnEvent on_event_;
@@ -155,7 +155,7 @@ class Engine {
 
   mutable std::mutex mutex_;  // for the members below, up to those of the thread
   std::condition_variable woken_;
-  std::atomic<uint64_t> ordered_ = 0;  // increases with every order for the thread
+  std::atomic<uint64_t> requested_ = 0;  // increases with every request to the thread
   std::atomic<bool> ending_ = false;
   std::atomic<int> holds_ = 0;
   uint64_t runs_ = 0, sweeps_ = 0, models_generation_ = 0;

@@ -26,7 +26,7 @@ constexpr const char* kHost = "127.0.0.1";
 std::string random_token() {
   std::array<unsigned char, 16> bytes{};
   if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
-    throw std::runtime_error("the system gives no random numbers");
+    throw std::runtime_error("the system provides no random numbers");
   std::string token;
   for (const unsigned char byte : bytes) token += fmt::format("{:02x}", byte);
   return token;
@@ -93,7 +93,7 @@ struct HttpServer::Impl {
       if (!is_ours(host, own_port)) {
         refuse(response, 403, "This server answers to 127.0.0.1 only.");
       } else if (!from.empty() && !(scheme && is_ours(from.substr(7), port))) {
-        refuse(response, 403, "Requests of other pages are not answered.");
+        refuse(response, 403, "Requests from other pages are refused.");
       } else if (!equal(request.path.substr(0, token.size() + 2), "/" + token + "/")) {
         refuse(response, 403,
                "The address lacks the right token. Open the address that `offstage tune` printed.");
@@ -136,11 +136,10 @@ struct HttpServer::Impl {
   void serve_page() {
     main.Get("/[0-9a-f]+/", [this](const httplib::Request&, httplib::Response& response) {
       if (!session.tabs().has_room())
-        return refuse(
-            response, 503,
-            fmt::format("{} tabs show this scene already, and there is room for no more. Close one and "
-                        "load this page again.",
-                        kMostTabs));
+        return refuse(response, 503,
+                      fmt::format("{} tabs show this scene already, and more are not allowed. Close one and "
+                                  "load this page again.",
+                                  kMostTabs));
       serve_file("index.html", response);
     });
     main.Get("/[0-9a-f]+/page/([a-z_./0-9]+)",
@@ -181,7 +180,7 @@ struct HttpServer::Impl {
               [this](const httplib::Request& request, httplib::Response& response) {
                 const auto body = nlohmann::json::parse(request.body, nullptr, false);
                 if (!body.is_object())
-                  return send_json(response, {{"error", "the request is no JSON object"}}, 400);
+                  return send_json(response, {{"error", "the request is not a JSON object"}}, 400);
                 const Reply reply = session.post(request.matches[1], body, request.get_header_value("X-Tab"));
                 send_json(response, reply.body, reply.status);
               });
@@ -264,7 +263,7 @@ struct HttpServer::Impl {
     if (wanted > 0) {
       if (!server.bind_to_port(kHost, wanted))
         throw std::runtime_error(fmt::format(
-            "port {} of {} is taken, or must not be used; choose another with --port", wanted, kHost));
+            "port {} of {} is in use or not permitted; choose another with --port", wanted, kHost));
       bound = wanted;
       return;
     }

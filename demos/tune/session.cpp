@@ -224,7 +224,7 @@ Reply Session::post(const std::string& what, const nlohmann::json& request, cons
   try {
     return (this->*handler->second)(request);
   } catch (const nlohmann::json::exception& error) {
-    return refused(400, std::string("the request is wrong: ") + error.what());
+    return refused(400, std::string("the request is not valid: ") + error.what());
   } catch (const std::invalid_argument& error) {
     return refused(422, error.what());
   } catch (const SceneError& error) {

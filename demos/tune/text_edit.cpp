@@ -248,7 +248,7 @@ std::vector<ByteRange> bytes_to_remove(std::string_view text, const Part& contai
   return all;
 }
 
-std::string normalised(std::string_view json) {
+std::string normalized(std::string_view json) {
   const producer::Node node = producer::parse_json(json, "value");
   if (node.as<double>() || node.as<int64_t>()) return producer::to_text(node);
   return std::string(json);
@@ -264,7 +264,7 @@ std::string set_value(std::string_view text, std::string_view path, std::string_
   const Part root = parts_of(text);
   const std::vector<std::string> steps = steps_of(path);
   const Way way = follow(root, steps);
-  std::string value = normalised(json);
+  std::string value = normalized(json);
   if (way.taken == steps.size()) {
     std::string result(text);
     return result.replace(way.end->value.begin, way.end->value.end - way.end->value.begin, value);
@@ -307,7 +307,7 @@ std::string rename_key(std::string_view text, std::string_view path, const std::
   const Way way = follow(root, steps);
   if (way.taken < steps.size() || !way.parent || !way.parent->object) refuse_path(path);
   if (way.end->key != key && child_of(*way.parent, key))
-    throw std::invalid_argument("there is a key \"" + key + "\" already");
+    throw std::invalid_argument("there is already a key \"" + key + '"');
   std::string result(text);
   return result.replace(way.end->key_range.begin, way.end->key_range.end - way.end->key_range.begin,
                         quoted(key));

@@ -13,18 +13,17 @@
 namespace offstage::sim {
 namespace {
 
-/// Positions are put together in so many steps of Newton's method at most, until they are this near [m], and
-/// velocities until they fit together as well [m/s].
+/// Limits of the projection: at most kMostSteps steps of Newton's method, until the constraint errors are
+/// below kTogether [m]; velocities are projected to the same accuracy [m/s].
 constexpr int kMostSteps = 8;
 constexpr Real kTogether = 1e-12;
-/// What has come apart farther than this is brought back by no more in a step: its constraints say little
-/// about so far [m].
+/// Largest correction of a constraint error in one step [m], because the linearization is poor beyond this.
 constexpr Real kFarApart = 0.1;
 constexpr Real kSmall = 1e-4;
 constexpr int kVelocitySteps = 2;
-/// A joint that moves off its limit faster than this is free [m/s], [rad/s].
+/// A joint that leaves its limit faster than this is not in contact with it [m/s], [rad/s].
 constexpr Real kLeaving = 1e-6;
-/// Velocities that fit together less than this have been changed from outside [m/s].
+/// Velocities that violate the constraints by less than this count as unchanged since settle() [m/s].
 constexpr Real kDisturbed = 1e-7;
 
 bool is_moved(const Body* body) {
@@ -117,8 +116,8 @@ Articulation::Articulation(std::vector<Joint*> joints)
   impulses_.resize(joints_.size());
 }
 
-/// A link that a force F pulls at an arm r swings at w^2 = F K / r, where K is the mobility at the joint
-/// across the arm; a string of such links at up to twice that.
+/// A link that a force F pulls at a lever arm r swings with w^2 = F K / r, where K is its mobility at the
+/// joint, perpendicular to the arm. A chain of such links swings at up to twice this frequency.
 Real Articulation::greatest_frequency() const {
   Real greatest = 0;
   for (std::size_t j = 0; j < joints_.size(); ++j) {
@@ -139,7 +138,7 @@ Real Articulation::greatest_frequency() const {
 }
 
 void Articulation::begin_motion(Real t, Real h) {
-  // Of kinematic links the mean over the motion: their velocities may jump at keys.
+  // The mean acceleration over the motion, because the velocities of kinematic links may jump at keys.
   const auto acceleration = [&](const Body* body) -> Driven {
     if (!body || !body->is_kinematic()) return {};
     const LinkMotion before = link_motion(body, t), after = link_motion(body, t + h);
@@ -151,7 +150,7 @@ void Articulation::begin_motion(Real t, Real h) {
   }
 }
 
-/// `still_a` and `still_b` keep the motion of links that are driven.
+/// `still_a` and `still_b` hold the motion of driven links, to which the result refers.
 JointPlace Articulation::place_of(std::size_t j, Real time, std::span<const LinkMotion> motion,
                                   LinkMotion& still_a, LinkMotion& still_b) const {
   const auto& [a, b, count] = system_.joints()[j];
@@ -171,9 +170,9 @@ void Articulation::read_rows(Real time, std::span<const LinkMotion> motion) {
 void Articulation::add_forces(Real t, std::span<const LinkMotion> motion,
                               std::span<const LinkMobility> mobility, std::span<Vec6> forces) {
   read_rows(t, motion);
-  if (!system_.factorize(rows_, mobility)) return;  // settle() will find the same, and count it
+  if (!system_.factorize(rows_, mobility)) return;  // settle() detects and counts the same failure
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    // d/dt (I w) = torque: the angular acceleration has the turning of the inertia in it.
+    // d/dt (I w) = torque: the angular acceleration includes the gyroscopic term.
     const Mat3& R = motion[i].axes;
     const Vec3& w = motion[i].angular_velocity;
     const Vec3 H = R * (bodies_[i]->rigid.inertia * (R.transpose() * w));
@@ -198,12 +197,12 @@ void Articulation::add_forces(Real t, std::span<const LinkMotion> motion,
   for (std::size_t j = 0; j < joints_.size(); ++j) joints_[j]->load = wrench(j, impulses_[j], motion);
 }
 
-/// What an impulse of a joint's constraints does, or a force.
+/// The force and torque, or impulses, that the constraints of a joint exert on its body a.
 Wrench Articulation::wrench(std::size_t j, const Vec6& impulse, std::span<const LinkMotion> motion) const {
   const Vec6 on_a = rows_[j].on_a * impulse;
   const uint32_t a = system_.joints()[j].a;
   const Mat3 axes = a != JointSystem::kDriven ? motion[a].axes : link_motion(joints_[j]->a, 0).axes;
-  // What keeps the axes together, without the moment of the force.
+  // The torque of the angular constraints, without the moment of the force.
   return {on_a.head<3>(), on_a.tail<3>() - (axes * frames_a_[j].point).cross(on_a.head<3>())};
 }
 
@@ -252,21 +251,21 @@ void Articulation::find_stops() {
   }
 }
 
-/// What the joints make of velocities that impulses have given to single links.
+/// Applies the constraint impulses that follow from impulses on single links.
 void Articulation::pass_on(std::span<Vec6> velocities) {
   system_.relative(velocities, change_);
   for (Vec6& c : change_) c = -c;
   system_.correct(change_, impulses_, velocities);
 }
 
-/// Of all links, to an impulse on one; limits do not count.
+/// Computes the velocity changes of all links due to an impulse on one link, ignoring limits.
 void Articulation::find_response(uint32_t link, const Vec6& impulse) {
   response_.assign(bodies_.size(), Vec6::Zero());
   response_[link] = mobility_[link].velocity(impulse);
   pass_on(response_);
 }
 
-/// Of the limits, so that no response passes them.
+/// Returns the impulses of the limits for which no link in the response moves beyond a limit.
 Eigen::VectorXd Articulation::stop_impulses() const {
   const auto n = static_cast<Eigen::Index>(stops_.size());
   Eigen::MatrixXd mobility(n, n);
@@ -280,7 +279,7 @@ Eigen::VectorXd Articulation::stop_impulses() const {
   return solve_lcp((mobility + mobility.transpose()) / 2, speed).f;
 }
 
-/// With the limits that a push presses on as constraints.
+/// Treats the limits that the push presses against as constraints.
 Mat6 Articulation::link_mobility(uint32_t link, const Vec6& push) {
   const std::lock_guard lock(responding_);
   place_for_impulses();
@@ -310,7 +309,7 @@ Mat6 Articulation::free_mobility(uint32_t link) {
     find_response(link, Vec6::Unit(k));
     mobility.col(k) = response_[link];
   }
-  // Rounding leaves it not quite symmetric, and then an impulse could gain energy.
+  // Rounding makes the matrix slightly asymmetric, with which an impulse could add energy.
   const Mat6 symmetric = (mobility + mobility.transpose()) / 2;
   link_mobility_[link] = symmetric;
   return symmetric;
@@ -356,7 +355,7 @@ void Articulation::place(Real time, bool at_start) {
   system_.factorize(rows_, mobility_);
 }
 
-/// J v, driven links included.
+/// Computes J v, including the velocities of driven links.
 void Articulation::residual(Real time, std::span<const Vec6> velocities, std::span<Vec6> result) const {
   system_.relative(velocities, result);
   for (std::size_t j = 0; j < joints_.size(); ++j) {
@@ -389,20 +388,21 @@ void Articulation::transmit_impulses(Real time, JointTally& tally) {
 
 void Articulation::settle(Real time, JointTally& tally) {
   Real apart = 0;
-  std::vector<Pose> before(bodies_.size());  // of the centres
+  std::vector<Pose> before(bodies_.size());  // poses of the centres of mass
   for (int step = 0; step < kMostSteps; ++step) {
     read_bodies();
     read_rows(time, motion_);
     Real now = 0;
     for (const JointRows& rows : rows_) now = std::max(now, rows.error.cwiseAbs().maxCoeff());
-    // One factorisation serves for small corrections.
+    // One factorization serves for all small corrections.
     if (step > 0 && now <= kSmall) {
       system_.update(rows_);
     } else if (!system_.factorize(rows_, mobility_)) {
       ++tally.unsolved;
       return;
     }
-    // Where links are stretched out, Newton's method may lead away: never farther than it was.
+    // Near singular poses Newton's method may diverge: if the error has grown, the previous poses are
+    // restored.
     if (step > 0 && now > apart) {
       for (std::size_t i = 0; i < bodies_.size(); ++i) {
         bodies_[i]->rigid.position = before[i].position;

@@ -1,5 +1,5 @@
 #pragma once
-/// Energy and momentum of bodies that joints hold together: what guards their motion (physics A1, A5).
+/// Energy and momentum of bodies connected by joints, for checks of their motion (physics A1, A5).
 
 #include <span>
 
@@ -7,7 +7,7 @@
 
 namespace offstage::sim {
 
-/// Motion of bodies as if they were one rigid body of the same momenta.
+/// Motion of bodies as if they were one rigid body with the same momentum and angular momentum.
 struct CommonMotion {
   Vec3 centre = Vec3::Zero(), velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
   Vec3 angular_momentum = Vec3::Zero();  ///< about the centre [kg m^2/s]
@@ -17,22 +17,21 @@ struct CommonMotion {
 };
 CommonMotion common_motion(std::span<Body* const> bodies);
 
-/// How far an articulation's bodies are from what its joints allow at a time: the greatest error of a
-/// constraint [m], [rad].
+/// Returns the greatest constraint error of an articulation's joints at a time [m], [rad].
 Real joint_gap(const Articulation& articulation, Real time);
-/// Whether a joint connects it to the world or to a body that no force moves.
+/// Whether a joint connects it to the world or to a static or kinematic body.
 bool is_held(const Articulation& articulation);
-/// Whether a joint connects it to a body that keys move, which may do work.
+/// Whether a joint connects it to a kinematic body, which may do work.
 bool has_kinematic_end(const Articulation& articulation);
 
-/// Kinetic energy of the links relative to their common motion; of an articulation that is held, all of it
-/// [J].
+/// Kinetic energy of the links relative to their common motion; if the articulation is held, all kinetic
+/// energy [J].
 Real internal_energy(const Articulation& articulation);
-/// Multiplies the velocities relative to the common motion by a share, 0 to 1. Joints allow the result as
-/// they allow the velocities before, and an articulation that is not held keeps its momenta.
+/// Multiplies the velocities relative to the common motion by a share, 0 to 1. The result still satisfies the
+/// constraints, and an articulation that is not held keeps its momentum and angular momentum.
 void slow_down(const Articulation& articulation, Real share);
-/// Turns all bodies together so that their angular momentum becomes that of `before` again, after shifts of
-/// their masses.
+/// Rotates the velocities of all bodies together to restore the angular momentum of `before`, after
+/// corrections have displaced the bodies.
 void keep_angular_momentum(std::span<Body* const> bodies, const CommonMotion& before);
 
 }  // namespace offstage::sim

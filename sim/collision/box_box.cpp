@@ -64,7 +64,7 @@ struct Axis {
   int a, b;
 };
 
-/// Takes the product of two axes if the normalised gap along it is the largest so far. It must exceed the gap
+/// Takes the product of two axes if the normalized gap along it is the largest so far. It must exceed the gap
 /// of a face by more than rounding, because an edge that lies on a face spans the normal of the face with
 /// every edge of it.
 void try_products(const Gaps& gaps, const Mat3& rotation, Real rounding, Axis& best) {
@@ -72,7 +72,7 @@ void try_products(const Gaps& gaps, const Mat3& rotation, Real rounding, Axis& b
   for (int b = 0; b < 3; ++b)
     for (int a = 0; a < 3; ++a) {
       const Real scaled = gaps.products[static_cast<std::size_t>(b)][a];
-      if (scaled <= 0 && scaled <= least) continue;  // normalising it only makes it more negative
+      if (scaled <= 0 && scaled <= least) continue;  // normalizing it only makes it more negative
       const Real next = rotation((a + 1) % 3, b), last = rotation((a + 2) % 3, b);
       const Real sine = std::sqrt(next * next + last * last);
       if (!(sine > kNoAxis && scaled > least * sine)) continue;

@@ -1,6 +1,6 @@
 #pragma once
 /// Path of a solid from one pose to another during a step. The origin of its frame moves on a straight line
-/// at constant speed. Its orientation follows the shortest arc, by normalised linear interpolation of the two
+/// at constant speed. Its orientation follows the shortest arc, by normalized linear interpolation of the two
 /// quaternions: a rotation about a fixed axis that needs no trigonometry. The rate of rotation is constant
 /// within 6 % for a quarter turn, and within angle^2 / 48 for small angles. Time is the share of the step,
 /// from 0 to 1, so velocities are per step.

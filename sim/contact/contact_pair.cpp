@@ -454,9 +454,9 @@ void ContactPair::reuse(const Pose& a, const Pose& b, const std::vector<Remember
 
 void ContactPair::set_frame(PlacedManifold& m) const {
   m.frame = contact_frame(m.manifold.normal);
-  if (!surface_.grain) return;
+  if (!surface_.axis_body) return;
   const Vec3& n = m.frame.n;
-  const Vec3 axis = surface_.grain->start_pose.vector_to_world(surface_.grain->def.friction_axis);
+  const Vec3 axis = surface_.axis_body->start_pose.vector_to_world(surface_.axis_body->def.friction_axis);
   const Vec3 along = axis - n.dot(axis) * n;
   const Real length = along.norm();
   if (length < 1e-6 * axis.norm()) return;  // the friction axis is perpendicular to the contact

@@ -16,9 +16,9 @@ namespace offstage::sim {
 /// Combined surface parameters of two bodies.
 struct PairSurface {
   Real restitution = 0, friction = 0, static_friction = 0;
-  Real cross = 1;               ///< friction across the friction axis over friction along it
-  const Body* grain = nullptr;  ///< body that defines the friction axis; null: isotropic
-  bool conveys = false;         ///< whether a surface is a conveyor
+  Real cross = 1;                   ///< friction across the friction axis over friction along it
+  const Body* axis_body = nullptr;  ///< body that defines the friction axis; null: isotropic
+  bool conveys = false;             ///< whether a surface is a conveyor
 };
 
 /// Force at a point of a manifold on body a, in the manifold's frame.
@@ -132,7 +132,7 @@ class alignas(64) ContactPair {
   void set_frame(PlacedManifold& m) const;
   /// Displacement of a relative to b along the normal by the free motion, at a contact of the start [m].
   Real free_way(const PlacedManifold& m, const Vec3& place, Real duration) const;
-  /// Whether the existing points already predict an overlap at this point of the world at the end.
+  /// Whether the motion of the existing points already predicts the overlap at `at_end`.
   bool is_expected(const Vec3& normal, const ContactPoint& at_end, Real duration) const;
   PlacedManifold brought_back(const Manifold& at_end, Real duration) const;
 

@@ -198,7 +198,7 @@ void FrictionSolver::axis_friction_row(Index row, Index axis, const Vec3& p, con
   if (p.x() > 0) line[row] = y[axis] > 0 ? -mu : mu;
 }
 
-/// The natural residual as in residual(), in r_ [N s], and its generalised Jacobian (Alart and Curnier,
+/// The natural residual as in residual(), in r_ [N s], and its generalized Jacobian (Alart and Curnier,
 /// 1991). Returns its norm as a velocity.
 Real FrictionSolver::evaluate(const VectorXd& p, bool with_jacobian) {
   const VectorXd u = problem_.A * p + problem_.b;

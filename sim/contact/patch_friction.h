@@ -81,7 +81,7 @@ inline PatchVector separate_impulse(const PatchBatch& p, const PatchVector& u, c
 
 /// Friction of a patch that slides or spins with the relative `twist`. Each point has Coulomb friction
 /// against its own velocity, so sliding reduces the friction against spin and vice versa. The friction of a
-/// point is linearised as viscous with the coefficient limit / speed, which gives one linear system per
+/// point is linearized as viscous with the coefficient limit / speed, which gives one linear system per
 /// patch. The speeds are those after separate_impulse(), which is exact without spin. `kIsotropic`:
 /// friction_t equals friction_k in all lanes, which takes fewer operations.
 template <bool kIsotropic>

@@ -20,14 +20,14 @@ constexpr Real kStiffness = 1e5;
 constexpr Real kBoundedStiffness = 1e3;
 /// Joints transmit the effect of a contact, and a poor initial guess changes which other contacts are closed.
 /// The first iterations then use smaller penalties, each by the factor kStiffen (heaps of chains: a third of
-/// the factorisations, a tenth of the fall-backs).
+/// the factorizations, a tenth of the fall-backs).
 constexpr int kSoftSteps = 4;
 constexpr Real kStiffen = 10, kFarOff = 1e-3;
 /// Without joints, if the initial guess is worse than none, the penalties start smaller by kSoft. This
 /// changes fewer contacts in each iteration. They increase when the multipliers converge slowly (heaps of
-/// boxes: half of the factorisations, a seventh of the fall-backs). Without any guess they start at full
+/// boxes: half of the factorizations, a seventh of the fall-backs). Without any guess they start at full
 /// size, because redundant contacts then share their load in a way that the next steps can keep (a wall of
-/// 1000 takes 62 factorisations in 4 s instead of 3100).
+/// 1000 takes 62 factorizations in 4 s instead of 3100).
 constexpr Real kSoft = 1e-2, kWrong = 1;
 constexpr Real kTolerance = 3e-8, kSmallest = 1e-11;  // share of the velocities, and lower bound [m/s]
 constexpr Real kCoarse = 1e-5;
@@ -517,7 +517,7 @@ bool ProximalNewton::assemble(std::span<const Contact> contacts, ContactWork& wo
   return is_factored_ = factor_.factorize(diagonal_, off_);
 }
 
-/// Minimises by Newton's method for constant multipliers and limits, to a gradient of `tolerance` [m/s].
+/// Minimizes by Newton's method for constant multipliers and limits, to a gradient of `tolerance` [m/s].
 bool ProximalNewton::minimize(std::span<const Contact> contacts, Real tolerance, ContactWork& work) {
   Real before = std::numeric_limits<Real>::infinity();
   for (uint32_t step = 0; step < kMaxNewton; ++step) {

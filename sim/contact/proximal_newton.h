@@ -6,16 +6,16 @@
 /// bipotential method", 1998). With g = mu |u_t| held constant, multipliers q and penalties rho, the impulses
 ///   p(v) = projection of q - rho (u(v) - target + g n) on C
 /// make M (v - v0) = J^T p(v) the stationarity condition of a smooth, strongly convex function of v. Newton's
-/// method with line search minimises it for any contacts: even with redundant contacts the matrix
+/// method with line search minimizes it for any contacts: even with redundant contacts the matrix
 ///   H = M + sum J^T rho (dp/dq) J
 /// is positive definite, and it has the sparsity of the graph of bodies. Then q := p and g := mu |u_t|, until
 /// neither changes. Without sliding g is 0 and only q must converge. The multipliers of the last step are the
 /// initial guess for the next: at rest they are the solution, which one evaluation confirms without a
-/// factorisation. See Rockafellar, "Monotone operators and the proximal point algorithm" (1976); Alart and
+/// factorization. See Rockafellar, "Monotone operators and the proximal point algorithm" (1976); Alart and
 /// Curnier, "A mixed formulation for frictional contact problems prone to Newton like solution methods"
 /// (1991).
 ///
-/// Joints are constraints J (v - v0) = 0 of that minimisation: Newton's steps solve the quasi-definite system
+/// Joints are constraints J (v - v0) = 0 of that minimization: Newton's steps solve the quasi-definite system
 /// of H and J, so all iterates satisfy the constraints. Rows with bounds are treated like contacts, with an
 /// interval in place of the cone.
 
@@ -73,7 +73,7 @@ class ProximalNewton {
   struct Change {
     Real multipliers = 0, lifts = 0;
   };
-  /// Value of the minimised function, and the sum of the magnitudes of its terms, which bounds the rounding
+  /// Value of the minimized function, and the sum of the magnitudes of its terms, which bounds the rounding
   /// error.
   struct Merit {
     Real value = 0, size = 0;

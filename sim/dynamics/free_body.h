@@ -27,7 +27,7 @@ struct RigidStage {
   void force(const BodyForces& forces, Real t, std::span<Real> dp) const;
 
   const RigidBody& body;
-  Eigen::Vector4d turn;  ///< the quaternion, not normalised
+  Eigen::Vector4d turn;  ///< the quaternion, not normalized
   RigidMotion motion;
   Vec3 angular_momentum;
 };

@@ -1,6 +1,6 @@
 #pragma once
 /// Backward Euler (physics N2): y1 = y0 + h f(t + h, y1), solved by Newton's method with a sparse
-/// factorisation of 1 - h df/dy. The pattern of the matrix is the graph of the forces between objects.
+/// factorization of 1 - h df/dy. The pattern of the matrix is the graph of the forces between objects.
 
 #include "sim/dynamics/integrator.h"
 

@@ -69,10 +69,11 @@ ExactResult decompose_exactly(const TriangleMesh& mesh, const MeshTopology& topo
   }
   // The hull of a part is larger than the part unless the part is convex, so equal volumes prove that all are
   // convex.
-  if (!(relative_error(result.parts, volume) <= kExact)) return failed("cuts that rounding spoils");
+  if (!(relative_error(result.parts, volume) <= kExact))
+    return failed("the cuts are inexact because of rounding");
   const WindingNumber winding(mesh);
   for (const ConvexPolyhedron& p : result.parts)
-    if (winding.at(p.centre()) > 1.5) return failed("a surface that covers itself");
+    if (winding.at(p.centre()) > 1.5) return failed("the surface overlaps itself");
   return result;
 }
 

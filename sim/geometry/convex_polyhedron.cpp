@@ -28,7 +28,7 @@ ConvexPolyhedron::ConvexPolyhedron(std::vector<Vec3> vertices, std::span<const s
   for (const std::vector<uint32_t>& face : faces) {
     if (face.size() < 3) throw std::invalid_argument("a face needs at least three vertices");
     for (uint32_t v : face)
-      if (v >= vertices_.size()) throw std::invalid_argument("a face refers to a vertex that is not there");
+      if (v >= vertices_.size()) throw std::invalid_argument("a face refers to a vertex that does not exist");
     face_vertices_.items.insert(face_vertices_.items.end(), face.begin(), face.end());
     face_vertices_.start.push_back(static_cast<uint32_t>(face_vertices_.items.size()));
   }
@@ -70,8 +70,7 @@ void ConvexPolyhedron::find_edges() {
       return j < sides.size() && sides[j].low == sides[i].low && sides[j].high == sides[i].high;
     };
     if (!same(i + 1) || same(i + 2) || !sides[i].forward || sides[i + 1].forward)
-      throw std::invalid_argument(
-          "an edge does not have exactly two faces that run along it in opposite ways");
+      throw std::invalid_argument("an edge is not shared by exactly two faces with opposite directions");
     face_edges_.items[sides[i].slot] = face_edges_.items[sides[i + 1].slot] =
         static_cast<uint32_t>(edges_.size());
     edges_.push_back({sides[i].low, sides[i].high, sides[i].face, sides[i + 1].face});

@@ -1,5 +1,5 @@
 #pragma once
-/// Generalised winding numbers: how often a surface winds around a point. They distinguish inside from
+/// Generalized winding numbers: how often a surface winds around a point. They distinguish inside from
 /// outside even where the surface has holes, doubled sheets or self-intersections. Jacobson, Kavan,
 /// Sorkine-Hornung, "Robust inside-outside segmentation using generalized winding numbers" (2013). Far
 /// clusters of triangles are approximated by dipoles after Barill et al., "Fast winding numbers for soups and

@@ -1,11 +1,11 @@
 #pragma once
-/// Cholesky factorisation L S L^T of a sparse symmetric matrix of N x N blocks, one row of blocks for each
+/// Cholesky factorization L S L^T of a sparse symmetric matrix of N x N blocks, one row of blocks for each
 /// body or joint; S has a sign for each row: all are positive if the matrix is definite. Rows are eliminated
 /// in an order of approximate minimum degree, so that a stack or a chain of n costs O(n), a wall about
 /// O(n^1.5) (physics N11, A1).
 ///
 /// With bodies as positive rows and joints as negative rows the matrix is quasi-definite (Vanderbei,
-/// "Symmetric quasidefinite matrices", 1995). It has this factorisation in any order of elimination in which
+/// "Symmetric quasidefinite matrices", 1995). It has this factorization in any order of elimination in which
 /// a row with a zero on the diagonal comes after its neighbours.
 
 #include <cstdint>
@@ -20,7 +20,7 @@ namespace offstage::sim {
 using Mat6 = Eigen::Matrix<Real, 6, 6>;
 using Vec6 = Eigen::Matrix<Real, 6, 1>;
 
-/// Properties of a row of blocks that are known before the factorisation.
+/// Properties of a row of blocks that are known before the factorization.
 struct BlockRowKind {
   bool is_negative = false;  ///< its sign in S
   bool is_empty = false;     ///< its diagonal block is zero: its neighbours are eliminated first

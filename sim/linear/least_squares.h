@@ -1,5 +1,5 @@
 #pragma once
-/// Dense least squares by QR factorisations. They are compiled here once, because their templates take
+/// Dense least squares by QR factorizations. They are compiled here once, because their templates take
 /// seconds to compile.
 
 #include <Eigen/Core>
@@ -8,10 +8,10 @@
 
 namespace offstage::sim {
 
-/// Returns the x that minimises |A x - b|; A must have full rank.
+/// Returns the x that minimizes |A x - b|; A must have full rank.
 Eigen::VectorXd least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
 
-/// Returns the shortest x that minimises |A x - b|. Pivots below `rank` times the greatest pivot count as
+/// Returns the shortest x that minimizes |A x - b|. Pivots below `rank` times the greatest pivot count as
 /// zero.
 Eigen::VectorXd shortest_least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b, Real rank);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// The Cholesky factorisation of a symmetric matrix that gains and loses rows (Golub and Van Loan, Matrix
+/// The Cholesky factorization of a symmetric matrix that gains and loses rows (Golub and Van Loan, Matrix
 /// Computations, 6.5), for pivoting methods, whose active set changes by one index at a time (N9).
 
 #include <vector>

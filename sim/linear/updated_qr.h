@@ -1,5 +1,5 @@
 #pragma once
-/// The QR factorisation of a square matrix that gains, loses and changes rows and columns (Golub and Van
+/// The QR factorization of a square matrix that gains, loses and changes rows and columns (Golub and Van
 /// Loan, Matrix Computations, 6.5), for pivoting on matrices without symmetry, which sliding friction
 /// produces (N10).
 

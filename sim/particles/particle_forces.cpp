@@ -100,7 +100,8 @@ void add(const Grab& f, const Run& run) {
 }
 template <class Other>
 void add(const Other&, const Run&) {
-  static_assert(kIsPairLaw<Other> || std::is_same_v<Other, Explosion>, "forces that work in other ways");
+  static_assert(kIsPairLaw<Other> || std::is_same_v<Other, Explosion>,
+                "every other kind must be handled here");
 }
 
 /// Rate at which the force on a particle decreases with its position and its velocity [N/m, N s/m].

@@ -25,15 +25,15 @@ constexpr int kMaxSlides = 4;
 constexpr uint32_t kStreams = 4;
 constexpr std::size_t kRelaxationChunk = ParticleSearch::kChunk;
 
-/// What resting particles do to a body in a sub-step.
+/// The load of resting particles on a body in a sub-step.
 struct Load {
   const Obstacle* obstacle;
   Vec3 impulse = Vec3::Zero(), angular_impulse = Vec3::Zero();
   Real share = 1;
 };
 
-/// A body that moves against the push of particles is stopped at most; besides it gets no more momentum than
-/// the particles of `mass` that touch something have `brought` with them, as seen from the body.
+/// Limits the load on a body. A load against the body's motion can at most stop it. Beyond that, the body
+/// gets no more momentum than the touching particles, of total `mass`, have `brought` relative to the body.
 void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads, Real brought, Real mass) {
   for (const Reaction& r : reactions)
     if (const auto load = loads.find(r.body); load != loads.end()) {
@@ -42,7 +42,7 @@ void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads,
     }
   for (auto& [body, load] : loads) {
     const Obstacle& o = *load.obstacle;
-    // Of a share s of the load: the energy changes by s times the first and s^2 times the second.
+    // A fraction s of the load changes the energy by first s + second s^2.
     const Real first = o.end_velocity.dot(load.impulse) + o.end_spin.dot(load.angular_impulse);
     const Real second = (o.inverse_mass * load.impulse.squaredNorm() +
                          load.angular_impulse.dot(o.inverse_inertia * load.angular_impulse)) /

@@ -109,8 +109,8 @@ PairSurface World::Impl::surface_of(const Body& a, const Body& b) const {
   for (const Body* body : {a_is_first ? &a : &b, a_is_first ? &b : &a}) {
     const BodyDef& d = body->def;
     s.conveys |= d.surface_velocity != Vec3::Zero();
-    if (d.cross_friction < 0 || d.friction_axis == Vec3::Zero() || s.grain) continue;
-    s.grain = body;
+    if (d.cross_friction < 0 || d.friction_axis == Vec3::Zero() || s.axis_body) continue;
+    s.axis_body = body;
     s.cross = d.friction > 0 ? std::sqrt(d.cross_friction / d.friction) : 1;  // otherwise both are 0
   }
   return s;

@@ -8,13 +8,13 @@
 namespace offstage::sim {
 namespace {
 
-/// Pieces in which the motion of what joints hold is integrated: of its turning, and of the phase of its
-/// fastest swinging [rad]; and the most of them.
+/// The motion of articulations is integrated in pieces: greatest rotation of a body and greatest phase of the
+/// fastest swinging in a piece [rad], and greatest number of pieces.
 constexpr Real kTurn = 0.12, kSwing = 1, kSpin = 1, kMostPieces = 64;
-/// A piece is halved if it leaves a joint farther apart than this [m], [rad], or if the kinetic energy
-/// differs from the work of the forces by more than these shares of the kinetic energy, of the work, and of
-/// the work that the forces would do on free bodies at rest. Halvings are bounded in depth and, per sub-step,
-/// in number.
+/// A piece is halved if a joint error exceeds kGap [m], [rad], or if the change of the kinetic energy differs
+/// from the work of the forces by more than these shares of the kinetic energy, of the work, and of the work
+/// that the forces would do on free bodies at rest. Halvings are bounded in depth and, per sub-step, in
+/// number.
 constexpr Real kGap = 1e-4, kEnergyShare = 1e-4, kWorkShare = 1e-2;
 constexpr int kMostHalvings = 128, kDeepestHalving = 8;
 
@@ -43,7 +43,7 @@ void CoupledGroup::add_group(const WorldState& world, ParticleSystem& system) {
   groups_.push_back(std::move(group));
 }
 
-/// Newborns take part from the next sub-step on.
+/// New particles take part from their first whole sub-step on.
 void CoupledGroup::add_pair_forces(const WorldState& world) {
   world.force_defs.for_each([&](ForceHandle, const ForceDef& def) {
     if (!def.is_pairwise()) return;
@@ -67,7 +67,7 @@ void CoupledGroup::begin_substep() const {
 
 void CoupledGroup::add_springs(const WorldState& world, std::span<const Spring* const> springs,
                                const BodyIndex& index) {
-  // A spring at a newborn waits until that has lived up to the end of the sub-step.
+  // A spring at a new particle acts from that particle's first whole sub-step on.
   const auto ready = [&](const Attachment& a) {
     const auto* p = std::get_if<ParticlePoint>(&a);
     if (!p) return true;
@@ -93,7 +93,7 @@ CoupledGroup::End CoupledGroup::resolve(const WorldState& world, const Attachmen
   if (const auto* b = std::get_if<BodyPoint>(&a)) {
     const Body* body = world.bodies[b->body].get();
     if (body->is_awake()) {
-      assert(index.contains(body) && "what a spring joins must be in one network");
+      assert(index.contains(body) && "both ends of a spring must be in the same network");
       return {End::Kind::dynamic, b->position - body->rigid.centre, body, index.at(body)};
     }
     if (body->can_move()) return {End::Kind::kinematic, b->position, body};
@@ -164,7 +164,7 @@ void CoupledGroup::force(Real t, std::span<const Real> x, std::span<const Real> 
   for (const Jointed& j : articulations_) add_joint_forces(j, t, x, p, dp);
 }
 
-/// Sets `dp` to all forces but those of joints.
+/// Computes in `dp` all forces except those of joints.
 void CoupledGroup::set_free_forces(Real t, std::span<const Real> x, std::span<const Real> p,
                                    std::span<Real> dp) const {
   for (std::size_t i = 0; i < bodies_.size(); ++i)
@@ -181,7 +181,8 @@ void CoupledGroup::set_free_forces(Real t, std::span<const Real> x, std::span<co
   }
 }
 
-/// Of particles that act on each other; springs and bodies depend on velocities in other ways.
+/// Available for particles with forces between each other; the forces of springs and bodies depend on the
+/// velocities in other ways.
 bool CoupledGroup::force_and_damping(Real t, std::span<const Real> x, std::span<const Real> p,
                                      std::span<Real> dp, std::span<Real> damping) const {
   if (!bodies_.empty() || !springs_.empty()) return false;
@@ -213,8 +214,8 @@ void CoupledGroup::add_joint_forces(const Jointed& jointed, Real t, std::span<co
   }
 }
 
-/// No integrator of a fixed step follows what turns by much more in it, or swings: links that are pulled
-/// tight are the masses of a string.
+/// No fixed-step integrator is accurate if bodies turn, or swing, by much more than this in a step. Links
+/// under high tension swing like the masses of a vibrating string.
 Real CoupledGroup::pieces(Real h) const {
   Real fastest = 0, tightest = 0, spin = 0;
   for (const Body* body : bodies_) spin = std::max(spin, greatest_spin(body->rigid));
@@ -250,7 +251,8 @@ void CoupledGroup::store(std::span<const Real> x, std::span<const Real> p) {
 void CoupledGroup::step(const Integrator& integrator, Real t, Real h, IntegratorWorkspace& work) {
   for (const Jointed& j : articulations_) j.articulation->transmit_impulses(t, joint_tally_);
   load(x_, p_);
-  // The most careful member leads; without bodies there is none to remember.
+  // The shortest step that an adaptive integrator found for any member. It is stored in the bodies; without
+  // bodies it is unknown.
   work.next_step = 0;
   for (const Body* body : bodies_)
     if (const Real next = body->rigid.next_step; next > 0)
@@ -294,7 +296,7 @@ CoupledGroup::EnergyRate CoupledGroup::energy_rate(Real t, IntegratorWorkspace& 
     const RigidStage s = stage(i, x, p);
     const std::size_t at = kBodyP * i;
     const Vec3 force = vec3(dp, at), torque = vec3(dp, at + 3);
-    const Vec3 turning = s.motion.orientation.conjugate() * torque;  // in the body's axes
+    const Vec3 turning = s.motion.orientation.conjugate() * torque;  // in body axes
     sum.kinetic += (s.motion.velocity.dot(vec3(p, at)) + s.motion.angular_velocity.dot(vec3(p, at + 3))) / 2;
     sum.power += s.motion.velocity.dot(force) + s.motion.angular_velocity.dot(torque);
     sum.from_rest += (force.squaredNorm() / s.body.mass + turning.dot(s.body.inverse_inertia * turning)) / 2;
@@ -310,10 +312,10 @@ CoupledGroup::EnergyRate CoupledGroup::energy_rate(Real t, IntegratorWorkspace& 
   return sum;
 }
 
-/// Advances by a piece from t to t + h and puts the joints back together. Joints can make a link turn far
-/// faster than the speeds at the start show: a universal joint whose axes and arm come into one plane turns a
-/// light link over at once. Then the energy differs from the work of the forces, and the piece is halved.
-/// If halving does not help, the links are slowed down until they have gained no energy.
+/// Advances by a piece from t to t + h and projects the joints. Joints can make a link rotate much faster
+/// than the initial speeds suggest: if the axes and the arm of a universal joint become coplanar, a light
+/// link flips. Then the energy differs from the work of the forces, and the piece is halved. If halving does
+/// not help, the links are slowed down until no energy is gained.
 void CoupledGroup::advance(const Integrator& integrator, Real t, Real h, int depth, int& halvings,
                            IntegratorWorkspace& work) {
   const std::vector<Real> x = x_, p = p_;
@@ -323,7 +325,7 @@ void CoupledGroup::advance(const Integrator& integrator, Real t, Real h, int dep
   const EnergyRate after = energy_rate(t + h, work);
   store(x_, p_);
   Real gap = 0;
-  // Links that keys move do work through the joints, and methods of first order do not keep energy.
+  // Kinematic links do work through the joints, and first-order methods do not conserve energy.
   bool keeps_energy = integrator.order() > 1;
   for (const Jointed& j : articulations_) {
     gap = std::max(gap, joint_gap(*j.articulation, t + h));
@@ -350,8 +352,8 @@ void CoupledGroup::advance(const Integrator& integrator, Real t, Real h, int dep
     ++joint_tally_.unsolved;  // the members do not move in this piece
   }
   for (const Jointed& j : articulations_) {
-    // The shifts that put the joints together change the angular momentum. (After contacts they do not: there
-    // they take back shifts by the contacts.)
+    // The projection of the joints changes the angular momentum. (After contacts this is wanted: there the
+    // projection reverses displacements by the contacts.)
     const bool is_free = !is_held(*j.articulation);
     const CommonMotion common = is_free ? common_motion(j.articulation->bodies()) : CommonMotion{};
     j.articulation->settle(t + h, joint_tally_);
@@ -361,7 +363,8 @@ void CoupledGroup::advance(const Integrator& integrator, Real t, Real h, int dep
   if (keeps_energy) limit_energy(before.kinetic + std::max(done, 0.0) + allowed);
 }
 
-/// Slows the links of each articulation down against each other until the kinetic energy is at most `most`.
+/// Scales the relative velocities of the links of each articulation until the kinetic energy is at most
+/// `most`.
 void CoupledGroup::limit_energy(Real most) {
   const Real excess = kinetic_energy() - most;
   if (!(excess > 0)) return;
@@ -386,7 +389,7 @@ void CoupledGroup::restore() {
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     RigidBody& body = bodies_[i]->rigid;
     body.next_step = saved_steps_[i];
-    // To the bit: normalising again might change the last one.
+    // The exact bits are restored, because normalizing again might change the last one.
     body.orientation.coeffs() = Eigen::Map<const Eigen::Vector4d>(&saved_x_[kBodyX * i + 3]);
   }
 }

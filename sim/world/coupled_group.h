@@ -1,9 +1,9 @@
 #pragma once
-/// Bodies and particles that springs, joints and forces between particles join, as one dynamic system
-/// (physics R1, R2, A1, P2).
+/// Bodies and particles that are connected by springs, joints or forces between particles, as one dynamic
+/// system (physics R1, R2, A1, P2).
 ///
-/// Layout: per body x = [position 3, quaternion x y z w], p = [L 3, H 3]; then per particle x = position, p =
-/// velocity.
+/// Layout of the state: for each body x = [position 3, quaternion x y z w], p = [L 3, H 3]; then for each
+/// particle x = position, p = velocity.
 
 #include <unordered_map>
 #include <vector>
@@ -15,7 +15,7 @@
 
 namespace offstage::sim {
 
-/// What a network consists of: a component of the CouplingGraph, or several.
+/// The members of a group: those of one component of the CouplingGraph, or of several.
 struct GroupMembers {
   std::vector<Body*> bodies;
   std::vector<ParticleSystem*> systems;
@@ -25,21 +25,22 @@ struct GroupMembers {
 
 class CoupledGroup final : public DynamicSystem {
  public:
-  /// `forces` must outlive the network, and the world must not gain or lose anything as long.
+  /// `forces` must outlive the group, and no object may be added to or removed from the world during its
+  /// lifetime.
   CoupledGroup(const WorldState& world, GroupMembers members, const BodyForces& forces);
 
   std::span<Body* const> bodies() const { return bodies_; }
   bool holds(const ParticleSystem& system) const;
 
-  /// Tells the particle systems that a sub-step begins.
+  /// Notifies the particle systems that a sub-step begins.
   void begin_substep() const;
-  /// Advances the members from t to t + h. Where only forces between particles join them, the integrator is
-  /// that of the first system.
+  /// Advances the members from t to t + h. If only forces between particles connect them, the integrator of
+  /// the first system is used.
   void step(const Integrator& integrator, Real t, Real h, IntegratorWorkspace& work);
 
   const JointTally& joint_tally() const { return joint_tally_; }
 
-  /// Keeps the state, and takes the members back to the one kept last.
+  /// Stores the state, and restores the state that was stored last.
   void save();
   void restore();
 
@@ -54,17 +55,17 @@ class CoupledGroup final : public DynamicSystem {
   struct Group {
     ParticleSystem* system;
     ParticleForces forces;
-    std::vector<std::size_t> members;  // the particles that live through the whole sub-step
-    std::vector<Real> mass;            // of these
-    std::size_t offset;                // of the first in units of 3, after the bodies
+    std::vector<std::size_t> members;  // the particles that exist during the whole sub-step
+    std::vector<Real> mass;            // masses of these particles
+    std::size_t offset;                // index of the first of them in units of 3, after the bodies
 
-    /// The part of these in all particles' coordinates or velocities.
+    /// The part of all particles' coordinates or velocities that belongs to these particles.
     template <class T>
     std::span<T> part(std::span<T> particles) const {
       return particles.subspan(3 * offset, 3 * members.size());
     }
   };
-  /// A spring's end, resolved to where it is in the state.
+  /// An end of a spring, as a position in the state.
   struct End {
     enum class Kind { still, kinematic, dynamic, particle } kind = Kind::still;
     Vec3 point =
@@ -75,7 +76,7 @@ class CoupledGroup final : public DynamicSystem {
 
     bool is_moved() const { return kind == Kind::dynamic || kind == Kind::particle; }
   };
-  /// An articulation, whose links are these of the bodies.
+  /// An articulation, with the indices of its links among the bodies.
   struct Jointed {
     Articulation* articulation;
     std::vector<std::size_t> links;
@@ -87,12 +88,12 @@ class CoupledGroup final : public DynamicSystem {
     End a, b;
     Real stiffness, damping, rest_length;
   };
-  /// The force of a spring at a moment.
+  /// The force of a spring at one time.
   struct Pull {
-    Vec3 along = Vec3::Zero();  // from b to a; zero if they are at the same place: no direction to push in
+    Vec3 along = Vec3::Zero();  // from b to a; zero if the ends coincide, where the direction is undefined
     Real length = 0;
-    Real size = 0;                 // on a against `along`, on b along it
-    Vec3 velocity = Vec3::Zero();  // of a against b
+    Real size = 0;                 // force on a against `along`, and on b along it
+    Vec3 velocity = Vec3::Zero();  // velocity of a relative to b
   };
   struct EndDerivative;
   using BodyIndex = std::unordered_map<const Body*, std::size_t>;
@@ -106,8 +107,8 @@ class CoupledGroup final : public DynamicSystem {
   void add_joint_forces(const Jointed& jointed, Real t, std::span<const Real> x, std::span<const Real> p,
                         std::span<Real> dp) const;
   Real pieces(Real h) const;
-  /// Kinetic energy [J], power of all forces but those of joints [W], and the energy that these forces give
-  /// free bodies from rest in a time, per square of that time [J/s^2].
+  /// Kinetic energy [J], power of all forces except those of joints [W], and the kinetic energy that these
+  /// forces would give to free bodies from rest in a time t, divided by t^2 [J/s^2].
   struct EnergyRate {
     Real kinetic = 0, power = 0, from_rest = 0;
   };

@@ -332,7 +332,7 @@ SpringHandle World::add_spring(const SpringDef& def) {
   check_not_negative(object, "stiffness", def.stiffness);
   check_not_negative(object, "damping", def.damping);
   if (!impl_->is_alive(def.a) || !impl_->is_alive(def.b))
-    refuse(object, "an end is attached to nothing that exists");
+    refuse(object, "an end is attached to an object that does not exist");
   const Real rest =
       def.rest_length >= 0 ? def.rest_length : (impl_->position(def.a) - impl_->position(def.b)).norm();
   for (const Attachment* end : {&def.a, &def.b})

@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""How soon a slider shows in the film, through the real page. usage: tune_latency.py PROGRAM SOURCE_DIR [ROUNDS] [--first]
+"""Measures how soon the film shows a moved slider, on the real page. usage: tune_latency.py PROGRAM SOURCE_DIR [ROUNDS] [--first]
 
 The sprinkler scene at 640x360. For each round a slider moves one step; the time to the first new picture on the canvas
 and the rate of new pictures in the following two seconds are measured inside the page. Prints medians, the processor time
-of the server, and the load average, since other work on the machine counts as well. --first: the server and the browser
-run before all other processes (real-time scheduling, which needs the right to), to come near an idle machine."""
+of the server, and the load average, since other work on the machine has an effect. --first: the server and the browser
+have priority over all other processes (real-time scheduling, which needs permission), which comes near an idle machine."""
 
 import os
 import pathlib
@@ -13,7 +13,7 @@ import sys
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / 'tune'))
-from sitting import Page, Server, browser  # noqa: E402
+from tune_session import Page, Server, browser  # noqa: E402
 
 MEASURE = r'''
 const done = arguments[arguments.length - 1], canvas = document.getElementById('film'), track = document.querySelector('#controls .row[data-key="rate"] .track');

@@ -1,4 +1,4 @@
-// Folders of snapshots as a user looks after them.
+// Listing, verifying and clearing caches of snapshots by the command line.
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-// What a user sees of the commands: exit codes, messages, and what is and is not written.
+// The commands as a user sees them: exit codes, messages, and which files are written.
 
 #include <algorithm>
 #include <cmath>
@@ -28,7 +28,7 @@ TEST(Commands, PresetsNameEffectsFabricsAndArticulations) {
   const Outcome all = offstage("presets", folder.path());
   for (const std::string name : {"rain ", "denim ", "ragdoll ", "crane "})
     EXPECT_NE(all.out.find("\n" + name), std::string::npos) << name;
-  // What it prints of one is what a scene may say.
+  // The printed JSON of a preset is valid in a scene.
   const Outcome crane = offstage("presets crane", folder.path());
   ASSERT_EQ(crane.code, 0) << crane.err;
   EXPECT_EQ(json::parse(crane.out).at("reach"), 6);
@@ -132,7 +132,7 @@ TEST(Commands, DivergedSimulationIsExit5AndSavesTheState) {
   EXPECT_NE(state["not_finite"]["velocity"].get<std::string>().find("inf"), std::string::npos);
 }
 
-/// A crate of 8 kg that falls on the floor, with more keys of the scene.
+/// A scene with a crate of 8 kg that falls on the floor; `more` adds keys to the scene.
 std::string falling_crate(const std::string& more) {
   return R"({"version": 1, "materials": [{"name": "wood", "restitution": 0}],
     "bodies": [{"name": "floor", "motion": "static", "shape": {"type": "plane"}, "material": "wood"},
@@ -151,12 +151,13 @@ TEST(Commands, ContactsOfARestingBodyCarryItsWeight) {
     std::string row;
     std::getline(rows, row);
     EXPECT_EQ(row, "time,a,b,x,y,z,nx,ny,nz,fx,fy,fz,separation");
-    std::map<std::string, double> weight;  // by time
+    std::map<std::string, double> weight;  // sum of the vertical forces, by time
     while (std::getline(rows, row)) {
       std::istringstream cells(row);
       std::vector<std::string> cell(13);
       for (std::string& text : cell) std::getline(cells, text, ',');
-      const double up = cell[1] == "crate" ? 1 : -1;  // the force is on a, the normal from b to a
+      // the force acts on a, and the normal points from b to a
+      const double up = cell[1] == "crate" ? 1 : -1;
       EXPECT_EQ(cell[1] == "crate" ? cell[2] : cell[1], "floor");
       EXPECT_NEAR(std::stod(cell[7]), up, 1e-9);
       EXPECT_NEAR(std::abs(std::stod(cell[3])), 0.5, 1e-3);
@@ -275,9 +276,9 @@ TEST(Commands, InfoDescribesScenesAndModels) {
   EXPECT_EQ(cube["convex_parts"]["count"], 1);
 }
 
-TEST(Commands, ConvexPartsAreKeptOnDiskUnlessToldNotTo) {
+TEST(Commands, ConvexPartsAreCachedOnDiskUnlessDisabled) {
   const TemporaryFolder folder;
-  // An L: two bars of a unit square's section.
+  // An L: two bars whose cross-section is a unit square.
   write_file(folder / "l.obj",
              "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 1\nv 2 0 1\nv 2 1 1\nv 1 1 1\nv 1 "
              "2 1\nv 0 2 1\n"
@@ -298,7 +299,7 @@ TEST(Commands, ConvexPartsAreKeptOnDiskUnlessToldNotTo) {
   EXPECT_EQ(json::parse(first.out)["convex_parts"]["count"], 2);
 }
 
-TEST(Commands, ABodyThatLeavesTheWorldIsNamed) {
+TEST(Commands, BodiesThatLeaveTheWorldAreNamed) {
   const TemporaryFolder folder;
   write_file(
       folder / "s.json",
@@ -319,7 +320,7 @@ TEST(Commands, FrameTimesOutsideTheFilmAreRefused) {
   EXPECT_TRUE(contents(folder.path()).empty());
 }
 
-TEST(Commands, NobodyListeningIsNoReasonToEnd) {
+TEST(Commands, ClosedStreamsOfMessagesDoNotEndTheRun) {
   const TemporaryFolder folder;
   EXPECT_EQ(offstage("render " + tiny_scene() + " -o a/ --frames 1-2 2>/dev/full", folder.path()).code, 0);
   EXPECT_EQ(offstage("validate nowhere.json 2>&-", folder.path()).code, 3);
@@ -327,7 +328,7 @@ TEST(Commands, NobodyListeningIsNoReasonToEnd) {
   EXPECT_EQ(read_file(folder / "f.png"), read_file(folder / "a/0001.png"));
 }
 
-TEST(Commands, ResultsThatCannotBeWrittenAreAFailure) {
+TEST(Commands, UnwritableResultsAreErrors) {
   const TemporaryFolder folder;
   for (const std::string& command : {std::string("schema"), std::string("doctor"), "validate " + tiny_scene(),
                                      "simulate " + tiny_scene() + " -q"})
@@ -368,12 +369,12 @@ TEST(Commands, ManualAndCompletionsHaveEveryCommandAndOption) {
     ASSERT_EQ(run.code, 0) << command << run.err;
     texts.push_back(run.out);
   }
-  std::erase(texts[0], '\\');  // of "\-"
+  std::erase(texts[0], '\\');  // the manual writes hyphens as "\-"
   for (const std::string command : {"render", "simulate", "compare", "bless", "doctor", "completion"}) {
     for (const std::string& text : texts) EXPECT_NE(text.find(command), std::string::npos) << command;
     std::istringstream help(offstage(command + " --help", folder.path()).out);
     for (std::string line; std::getline(help, line);) {
-      const std::size_t dashes = line.find("--");  // as in "  -o,--output TEXT REQUIRED"
+      const std::size_t dashes = line.find("--");  // a line of the help such as "  -o,--output TEXT REQUIRED"
       if (!line.starts_with("  -") || dashes > 5) continue;
       const std::string name = line.substr(dashes + 2, line.find(' ', dashes) - dashes - 2);
       for (std::size_t i = 0; i < texts.size(); ++i)
@@ -384,7 +385,7 @@ TEST(Commands, ManualAndCompletionsHaveEveryCommandAndOption) {
   EXPECT_EQ(offstage("completion tcsh", folder.path()).code, 2);
 }
 
-TEST(Commands, AModelWithoutAFolderIsBesideTheSceneOrOneOfThoseThatComeWithTheProgram) {
+TEST(Commands, AModelIsFoundBesideTheSceneOrInTheInstalledModels) {
   const TemporaryFolder folder;
   const auto with = [&](const std::string& file) {
     write_file(folder / "s.json",

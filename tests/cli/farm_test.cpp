@@ -1,4 +1,4 @@
-// The steps of a farm, run by processes of this machine.
+// The steps of a farm, run by local processes.
 
 #include <cstdlib>
 
@@ -76,7 +76,7 @@ TEST(Farm, ADryRunPrintsScriptsThatAShellReads) {
     EXPECT_NE(run.out.find(text), std::string::npos) << text << "\n" << run.out;
 }
 
-TEST(Farm, NeedsAWayToRun) {
+TEST(Farm, NeedsLocalOrSlurm) {
   const TemporaryFolder folder;
   EXPECT_EQ(offstage("farm " + tiny_scene() + " -o f.mp4", folder.path()).code, 2);
   EXPECT_EQ(offstage("farm " + tiny_scene() + " -o f.mp4 --slurm --local 2", folder.path()).code, 2);

@@ -1,4 +1,5 @@
-// What a new user meets first: `new`, a scene without a command, `encode`, standard input, and the estimate.
+// The first commands of a new user: `new`, a scene without a command, `encode`, standard input, and the
+// estimate.
 
 #include <algorithm>
 #include <sstream>
@@ -14,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-/// What ffprobe says of a video's first stream: "30000/1001,12".
+/// Frame rate and frame count of a video's first stream as ffprobe prints them: "30000/1001,12".
 std::string probe(const fs::path& video) {
   const TemporaryFolder folder;
   const std::string out = (folder / "out").string();
@@ -76,7 +77,7 @@ TEST(BareScene, RendersToItsNameInTheCurrentFolder) {
   EXPECT_EQ(probe(folder / "a.mkv"), "24/1,2");
 }
 
-TEST(BareScene, ASlipOfACommandGetsAMessageOfItsOwn) {
+TEST(BareScene, AMisspelledCommandGetsItsOwnMessage) {
   const TemporaryFolder folder;
   const Outcome slip = offstage("rendr " + tiny_scene(), folder.path());
   EXPECT_EQ(slip.code, 2);

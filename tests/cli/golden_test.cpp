@@ -1,4 +1,5 @@
-// A test of the image tests: a golden must notice a parameter changed by one percent, and a single pixel.
+// Tests of the image tests: a golden must detect a parameter changed by one percent, and a single changed
+// pixel.
 
 #include <cstdlib>
 
@@ -81,7 +82,7 @@ TEST_F(Golden, PicturesCompareByPixels) {
   EXPECT_EQ(offstage("compare a.png c.png", folder_.path()).code, 6);
 }
 
-/// A scene that falls at its own pace, 64 x 36 pixels.
+/// A scene with a ball whose initial vertical speed is `speed`, 64 x 36 pixels.
 std::string falling_ball(double speed) {
   return R"({"version": 1, "bodies": [{"shape": {"type": "sphere"}, "velocity": [0, )" +
          std::to_string(speed) +
@@ -100,13 +101,13 @@ TEST(GoldenNames, ScenesOfOneNameInDifferentFoldersHaveGoldensOfTheirOwn) {
   for (const char* scene : {"rain.json", "sub/rain.json", "./sub/../rain.json"})
     EXPECT_EQ(offstage(std::string("compare ") + scene + " --golden g", folder.path()).code, 0) << scene;
 
-  // One alone must not be taken for the other.
+  // If only one of them has a golden, it must not be used for the other.
   EXPECT_EQ(offstage("bless sub/rain.json --golden h --reason new", folder.path(), in).code, 0);
   const Outcome other = offstage("compare rain.json --golden h", folder.path());
   EXPECT_EQ(other.code, 1);
   EXPECT_NE(other.err.find("no golden for rain.json"), std::string::npos) << other.err;
 
-  // A scene that moved keeps its golden, and says so.
+  // A scene that was moved to another folder keeps its golden, and a message says so.
   std::filesystem::create_directories(folder / "new");
   std::filesystem::rename(folder / "sub/rain.json", folder / "new/rain.json");
   const Outcome moved = offstage("compare new/rain.json --golden h", folder.path());
@@ -157,7 +158,7 @@ TEST(GoldenSuites, ManyScenesGiveOneVerdictOneReportAndOneJunitFile) {
   EXPECT_EQ(read_junit(folder / "results.xml"),
             "scenes/broken.json passed\nscenes/fast & odd.json passed\nscenes/slow.json passed\n3 0 0\n");
 
-  // A scene that changed: a picture of the difference, and exit code 6.
+  // A changed scene gives a difference image and exit code 6.
   write_file(folder / "scenes/fast & odd.json", falling_ball(2.02));
   const Outcome changed = offstage(compare, folder.path());
   EXPECT_EQ(changed.code, 6) << changed.err;
@@ -170,7 +171,8 @@ TEST(GoldenSuites, ManyScenesGiveOneVerdictOneReportAndOneJunitFile) {
   EXPECT_NE(page.find("href=\"fast___odd/index.html\""), std::string::npos) << page;
   EXPECT_TRUE(std::filesystem::exists(folder / "report/fast___odd/fast___odd-0001-difference.png"));
 
-  // One that cannot be read does not keep the others from being compared; an error decides the exit code.
+  // A scene that cannot be read does not prevent the comparison of the others; an error decides the exit
+  // code.
   write_file(folder / "scenes/broken.json", "{\"version\": 1, \"bodis\": []}");
   const Outcome broken = offstage(compare, folder.path());
   EXPECT_EQ(broken.code, 3) << broken.err;

@@ -12,7 +12,7 @@ namespace fs = std::filesystem;
 
 Outcome offstage(const std::string& args, const fs::path& folder, const std::string& before) {
   const TemporaryFolder talk;
-  // What the caller redirects comes later and wins.
+  // Redirections of the caller come later and take precedence.
   const std::string command = "cd '" + folder.string() + "' && export XDG_CACHE_HOME='" +
                               (talk / "cache").string() + "' && " + before +
                               " '" OFFSTAGE_BINARY_DIR "/offstage' >'" + (talk / "out").string() + "' 2>'" +

@@ -1,5 +1,5 @@
 #pragma once
-/// Runs the offstage program as a user would, and catches what it says.
+/// Runs the offstage program as a user would, and captures its output.
 
 #include <filesystem>
 #include <map>
@@ -20,10 +20,10 @@ Outcome offstage(const std::string& args, const std::filesystem::path& folder,
 std::string read_file(const std::filesystem::path& path);
 void write_file(const std::filesystem::path& path, const std::string& text);
 
-/// All regular files below a folder, by relative name, with their contents; hidden files too.
+/// All regular files below a folder, including hidden ones: contents by relative name.
 std::map<std::string, std::string> contents(const std::filesystem::path& folder);
 
-/// A new empty folder that goes away with the object.
+/// A new empty folder that is removed with the object.
 class TemporaryFolder {
  public:
   TemporaryFolder();
@@ -37,7 +37,7 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-/// The scene most tests use, tests/data/tiny.json.
+/// Path of the scene that most tests use, tests/data/tiny.json.
 std::string tiny_scene();
 
 }  // namespace offstage::test

@@ -1,5 +1,5 @@
-// Rendering as a user runs it: the same bytes however the work is split, interrupted or resumed, and nothing
-// half-written.
+// Rendering as a user runs it: the same bytes however the work is split, interrupted or resumed, and no
+// partial files.
 
 #include <algorithm>
 #include <chrono>
@@ -26,7 +26,7 @@ std::map<std::string, std::string> frames(const fs::path& folder) {
   return files;
 }
 
-/// Frames of the undisturbed render that the others are compared with.
+/// Frames of an uninterrupted render, with which the others are compared.
 const std::map<std::string, std::string>& reference() {
   static const std::map<std::string, std::string> files = [] {
     const TemporaryFolder folder;
@@ -58,13 +58,13 @@ TEST(Render, CacheAndChunksGiveTheSameFrames) {
 
   // A cache of another scene, and a damaged one, are refused.
   EXPECT_EQ(offstage("render " + tiny_scene() + " --cache cache -o b/ --seed 8", folder.path()).code, 1);
-  // The camera may change: that is what a cache is for.
+  // The camera may change, because a cache contains only the simulation.
   EXPECT_EQ(
       offstage("render " + tiny_scene() + " --cache cache -o c/ -q --set camera.radius=6", folder.path())
           .code,
       0);
   int damaged = 0;
-  for (const auto& [name, content] : contents(folder / "cache"))  // of the one generation that is published
+  for (const auto& [name, content] : contents(folder / "cache"))  // the cache has one published generation
     if (name.ends_with("/000005.snap")) {
       std::string bytes = content;
       bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
@@ -90,7 +90,7 @@ TEST(Render, ExistingOutputIsKeptUnlessForced) {
   EXPECT_EQ(frames(folder / "out").size(), 1u) << "frames of the other settings are gone";
 }
 
-/// Runs a render in the background, sends it `signal` once `frames_before` frames are there, returns its exit
+/// Runs a render in the background, sends it `signal` once `frames_before` frames exist, and returns its exit
 /// code.
 int interrupt_render(const TemporaryFolder& folder, const std::string& out, int signal, const fs::path& watch,
                      std::size_t frames_before) {
@@ -126,7 +126,7 @@ TEST(Render, InterruptedAndResumedGivesTheSameBytesAsOneRun) {
   ASSERT_LT(part.size(), 480u) << "the run was over before it could be interrupted";
   for (const auto& [name, bytes] : part) EXPECT_TRUE(name.ends_with(".png")) << name;
 
-  // The rest of a shorter piece, then one undisturbed run of the same piece.
+  // Resumes up to a shorter film, and compares with one uninterrupted run of that film.
   const std::string piece = "render " + tiny_scene() +
                             " -q --duration 20 --set bodies.thrown.collides=false --frames 1-" +
                             std::to_string(part.size() + 4);
@@ -139,7 +139,7 @@ TEST(Render, InterruptedVideoNeverLooksWhole) {
   const TemporaryFolder folder;
   EXPECT_EQ(interrupt_render(folder, "film.mp4", SIGINT, folder / "film.mp4.frames", 5), 130);
   EXPECT_FALSE(fs::exists(folder / "film.mp4"));
-  // It goes on from its frames and ends as the same film as an undisturbed one.
+  // The resumed video continues from its frames and equals the video of an uninterrupted run.
   const std::string piece =
       "render " + tiny_scene() + " -q --duration 20 --set bodies.thrown.collides=false --frames 1-12";
   ASSERT_EQ(offstage(piece + " -o film.mp4 --resume", folder.path()).code, 0);
@@ -148,7 +148,7 @@ TEST(Render, InterruptedVideoNeverLooksWhole) {
   EXPECT_FALSE(fs::exists(folder / "film.mp4.frames"));
 }
 
-// What lived before the film does so in every part of it.
+// Particles created before the start of the film are the same in every part of it.
 TEST(Render, APrewarmedSceneIsTheSameInChunksFromACacheAndResumed) {
   const TemporaryFolder folder;
   const std::string scene = tiny_scene() + " -q --set emitters.fountain.prewarm=1.1 --set output.start=0.2 ";
@@ -169,7 +169,7 @@ TEST(Render, APrewarmedSceneIsTheSameInChunksFromACacheAndResumed) {
   EXPECT_EQ(frames(folder / "whole"), whole);
 }
 
-/// `offstage render scene.json -o out/ --watch` in the background; it ends with the object.
+/// `offstage render scene.json -o out/ --watch` in the background; the destructor ends it.
 class WatchedRender {
  public:
   explicit WatchedRender(const fs::path& folder) : child_(fork()) {
@@ -188,7 +188,7 @@ class WatchedRender {
   pid_t child_;
 };
 
-TEST(Render, WatchTakesAwayFramesAndChannelsThatTheNewFilmHasNot) {
+TEST(Render, WatchRemovesFramesAndChannelsThatTheNewFilmLacks) {
   const TemporaryFolder folder;
   const auto write_scene = [&](const std::string& output) {
     write_file(folder / "scene.json", R"({"version": 1, "bodies": [{"shape": {"type": "sphere"}}], )"
@@ -221,7 +221,7 @@ TEST(Render, WatchTakesAwayFramesAndChannelsThatTheNewFilmHasNot) {
 
 TEST(Render, FullDiskIsAnErrorAndLeavesNoBrokenFile) {
   const TemporaryFolder folder;
-  // A file size limit stands for the full disk: the write fails the same way.
+  // A file size limit stands in for the full disk: the write fails in the same way.
   const Outcome run =
       offstage("render " + tiny_scene() + " -o out/ --size 640x360", folder.path(), "ulimit -f 16;");
   EXPECT_EQ(run.code, 1);
@@ -243,7 +243,7 @@ TEST(Render, VideoOnAFullDiskIsAnErrorAndLeavesNoFilm) {
     }
     umount(disk.c_str());
   }
-  // Without the right to mount, an encoder that finds the disk full.
+  // Without permission to mount, an encoder script simulates the full disk.
   write_file(folder / "ffmpeg",
              "#!/bin/sh\ncase \"$*\" in *-encoders*) echo ' V....D libx264 x'; exit 0;; esac\n"
              "cat >/dev/null; echo 'No space left on device' >&2; exit 1\n");
@@ -280,7 +280,7 @@ TEST(Render, TwoPatternsDoNotShareAFolder) {
 
 TEST(Render, AThreadThatCannotBeStartedIsAnErrorNotAHang) {
   const TemporaryFolder folder;
-  // No new thread fits into the address space.
+  // The address space is too small for the stack of another thread.
   const Outcome run = offstage("render " + tiny_scene() + " -q -o out/ --jobs 64", folder.path(),
                                "ulimit -v 400000; timeout 60");
   EXPECT_NE(run.code, 0);
@@ -327,12 +327,12 @@ TEST(Render, QualityNeverChangesThePhysics) {
   EXPECT_EQ(hashes.size(), 1u);
 }
 
-/// The compressed pixels of a PNG file, without the settings before them, of which channels are a part.
+/// The compressed pixels of a PNG file, without the settings in front of them, which depend on the channels.
 std::string pixel_data(const std::string& png) {
   return png.substr(png.find("IDAT"));
 }
 
-TEST(Render, ChannelsStandBesideTheFramesAndOnlyThere) {
+TEST(Render, ChannelsAreWrittenBesideTheFrames) {
   const TemporaryFolder folder;
   ASSERT_EQ(
       offstage("render " + tiny_scene() + " -o out/ -q --frames 2-3 --channels depth,id", folder.path()).code,
@@ -349,7 +349,7 @@ TEST(Render, ChannelsStandBesideTheFramesAndOnlyThere) {
   EXPECT_EQ(offstage("render " + tiny_scene() + " -o b/ --channels colour", folder.path()).code, 2);
 }
 
-TEST(Render, ChannelsStandInAFolderBesideAVideo) {
+TEST(Render, ChannelsAreWrittenInAFolderBesideAVideo) {
   const TemporaryFolder folder;
   const std::string command =
       "render " + tiny_scene() + " -o a.gif -q --frames 1-2 --channels depth,id --channel-format png";

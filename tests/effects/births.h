@@ -7,7 +7,7 @@
 
 namespace offstage::effects {
 
-/// A particle as it was at its own birth, if nothing has acted on it since.
+/// A particle at its own birth, assuming that nothing has acted on it since.
 struct Birth {
   Real time;
   Vec3 position, velocity;
@@ -23,14 +23,14 @@ inline std::vector<Birth> births_of(const sim::World& world, sim::ParticleSystem
   return births;
 }
 
-/// A world in which nothing acts on particles.
+/// A world without forces.
 inline sim::World empty_world(Real max_step = 1.0 / 240) {
   return sim::World({.gravity = Vec3::Zero(),
                      .max_step = max_step,
                      .bounds = sim::Aabb(Vec3::Constant(-1e6), Vec3::Constant(1e6))});
 }
 
-/// Steps a world for some time, giving each sub-step to all of `sources` in turn.
+/// Steps a world for `seconds`, calling emit() of all `sources` in turn in each sub-step.
 template <class... Sources>
 void run(sim::World& world, Real seconds, int fps, Sources&... sources) {
   const int frames = static_cast<int>(seconds * fps + 0.5);

@@ -7,7 +7,7 @@
 namespace offstage::effects {
 namespace {
 
-// Chromaticities of the Planckian locus (CIE 1931, Kim et al. 2002 and tables), as linear sRGB over
+// Chromaticities of the Planckian locus (CIE 1931, Kim et al. 2002 and tables), as linear sRGB divided by
 // luminance.
 TEST(Blackbody, LiesOnThePlanckianLocus) {
   struct Known {
@@ -40,7 +40,8 @@ TEST(Blackbody, IsNeverNegativeAndTurnsFromRedToBlue) {
   }
 }
 
-// Wien's law: the logarithm falls by h c / (k lambda) (1/T - 1/T0), lambda near 600 nm where the eye sees it.
+// Wien's law: the logarithm falls by h c / (k lambda) (1/T - 1/T0), with lambda near 600 nm, where the eye is
+// sensitive.
 TEST(Blackbody, BrightnessFollowsWien) {
   EXPECT_EQ(blackbody_brightness(1800, 1800), 1);
   for (float t : {1000.f, 1400.f, 2500.f}) {

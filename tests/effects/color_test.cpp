@@ -49,12 +49,12 @@ TEST(Ramp, SmoothGoesThroughItsKeysWithoutOvershootOrKink) {
   for (float t = 0; t < 1 - 2 * d; t += d) {
     EXPECT_GE(ramp.at(t), -1e-6f);
     EXPECT_LE(ramp.at(t), 1.2f + 1e-6f);
-    // The slope changes by no more than the curvature of a cubic of these spans allows.
+    // The slope changes by no more than the curvature of a cubic over these intervals allows.
     EXPECT_LT(std::abs(ramp.at(t + 2 * d) - 2 * ramp.at(t + d) + ramp.at(t)) / d, 0.7f);
   }
 }
 
-TEST(Ramp, EvaluatesOverNormalisedAges) {
+TEST(Ramp, EvaluatesOverNormalizedAges) {
   const Ramp<float> ramp(SizeRamp{{{0, 1.f}, {1, 3.f}}});
   const std::vector<Real> age = {0, 1, 2, 5}, lifespan = {1, 4, 4, 5};
   std::vector<float> size(4);

@@ -11,7 +11,7 @@ struct Statistics {
   Real mean, deviation;
 };
 
-/// Over evenly spread quantiles, which is the integral rather than a random sample.
+/// Statistics over evenly spaced quantiles: the integral instead of a random sample.
 Statistics integrate(const Varying& v) {
   constexpr int kN = 200'000;
   Real sum = 0, sum2 = 0;
@@ -23,8 +23,8 @@ Statistics integrate(const Varying& v) {
   return {sum / kN, std::sqrt(sum2 / kN - sum / kN * sum / kN)};
 }
 
-// The variance of a normal distribution cut at one deviation is 1 - 2 phi(1) / (2 Phi(1) - 1).
-TEST(Distribution, NormalIsTruncatedAtOneDeviationUnlessToldOtherwise) {
+// The variance of a normal distribution truncated at one deviation is 1 - 2 phi(1) / (2 Phi(1) - 1).
+TEST(Distribution, NormalIsTruncatedAtOneDeviationByDefault) {
   const Real phi = std::exp(-0.5) / std::sqrt(2 * M_PI), inside = std::erf(std::sqrt(0.5));
   const Statistics cut = integrate(Normal{4, 2}),
                    whole = integrate(Normal{.mean = 4, .deviation = 2, .clip = false});
@@ -36,7 +36,7 @@ TEST(Distribution, NormalIsTruncatedAtOneDeviationUnlessToldOtherwise) {
   EXPECT_EQ(sample(Normal{4, 2, 3.5, 5}, 0.001, 0), 3.5);
 }
 
-TEST(Distribution, BoundsHoldWhatCanBeDrawn) {
+TEST(Distribution, BoundsContainAllSamples) {
   const std::vector<Varying> all = {3.0, Normal{4, 2}, Normal{4, 2, 3, 4.5}, Uniform{-1, 2},
                                     Curve{{{0, 5}, {1, 2}, {3, 8}}}};
   for (const Varying& v : all) {

@@ -1,4 +1,4 @@
-/// When and from where emitters release: windows, prewarming, stopping, moving bodies.
+/// When and where emitters release particles: time windows, prewarming, stopping, moving bodies.
 
 #include <algorithm>
 #include <cmath>
@@ -63,8 +63,8 @@ TEST(Emission, WindowsOpenAndCloseWithoutShiftingTheTimes) {
   for (std::size_t i = 0; i < times.size(); ++i) EXPECT_NEAR(times[i], expected[i], 1e-12);
 }
 
-// The clock of one starts 2 s after that of the world, but it has been at work for 1.5 s by then.
-TEST(Emission, APrewarmedEmitterIsWhereOneThatStartedEarlierIs) {
+// One emitter starts 2 s after the world but is prewarmed by 1.5 s, so it acts like one that starts at 0.5 s.
+TEST(Emission, APrewarmedEmitterEqualsOneThatStartedEarlier) {
   World world = empty_world();
   const auto warm = world.add_particle_system({}), early = world.add_particle_system({});
   EmitterDef def{.rate = 100.0, .spread_deg = Normal{0, 30}, .lifespan = 1.2, .max_alive = 1'000'000};
@@ -78,8 +78,8 @@ TEST(Emission, APrewarmedEmitterIsWhereOneThatStartedEarlierIs) {
   EXPECT_EQ(world.particles(warm).position, world.particles(early).position);
 }
 
-// At the first picture there is rain all the way down, of every age.
-TEST(Emission, WhatIsBornBeforeTheWorldHasFlownUntilThen) {
+// In the first picture there is rain of every age, from top to bottom.
+TEST(Emission, PrewarmedParticlesHaveMovedByTheStart) {
   World world({.gravity = Vec3(0, -10, 0)});
   const auto system = world.add_particle_system({});
   Emitter emitter({.rate = 100.0, .prewarm = 2, .direction = Vec3::UnitX(), .speed = 1.0, .lifespan = 1e9},
@@ -94,7 +94,7 @@ TEST(Emission, WhatIsBornBeforeTheWorldHasFlownUntilThen) {
   }
 }
 
-TEST(Emission, StoppingReleasesNothingMoreAndKillsNobody) {
+TEST(Emission, StoppingEndsReleasesAndKeepsLivingParticles) {
   World world = empty_world();
   const auto system = world.add_particle_system({});
   Emitter emitter({.surface = {.size = {0.01, 0.01}},
@@ -112,8 +112,8 @@ TEST(Emission, StoppingReleasesNothingMoreAndKillsNobody) {
   EXPECT_EQ(world.particle_count(), released);
 }
 
-// An emitter that rides at 20 m/s and releases at a rate that has nothing to do with the sub-steps: gaps
-// along its way are all the same, where an emitter moved once a sub-step would leave clumps 8 cm apart.
+// An emitter that moves at 20 m/s, with a rate unrelated to the sub-steps, leaves equal gaps along its path.
+// An emitter moved once per sub-step would leave clumps 8 cm apart.
 TEST(Emission, AMovingEmitterLeavesNoClumps) {
   for (const MotionType type : {MotionType::kinematic, MotionType::dynamic}) {
     World world = empty_world();

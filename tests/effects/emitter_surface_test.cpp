@@ -44,7 +44,7 @@ TEST(ReleaseSurface, CellsOfSphereAndDiscKeepParticlesApartAndLeaveLittleRoom) {
         else
           ASSERT_NEAR(p.norm(), 2, 1e-12);
       }
-      // Circles as wide as the particles cover more than half of the surface, where it is large.
+      // On a large surface, circles as wide as the particles cover more than half of the area.
       if (diameter < 0.2) {
         EXPECT_GT(static_cast<Real>(points.size()) * kPi * diameter * diameter / 4, 0.5 * surface.area());
       }
@@ -52,7 +52,8 @@ TEST(ReleaseSurface, CellsOfSphereAndDiscKeepParticlesApartAndLeaveLittleRoom) {
   }
 }
 
-// Of n cells the part within any cap or circle is its part of the area, to some cells along its edge.
+// The cells have equal area: the fraction of cells within any cap or circle is its fraction of the area, up
+// to some cells along its border.
 TEST(ReleaseSurface, CellsAreEqualInArea) {
   const ReleaseSurface sphere({.kind = SurfaceKind::sphere, .radius = 1}),
       disc({.kind = SurfaceKind::disc, .radius = 1});
@@ -73,7 +74,7 @@ TEST(ReleaseSurface, CellsAreEqualInArea) {
 }
 
 TEST(ReleaseSurface, PlacesOnAMeshAreEvenByArea) {
-  // A large and a small triangle, and one without area between them.
+  // A large and a small triangle, and between them one without area.
   const TriangleMesh mesh{{{0, 0, 0}, {3, 0, 0}, {0, 0, 1}, {10, 0, 0}, {10, 1, 0}, {10, 0, 1}},
                           {{0, 2, 1}, {0, 1, 1}, {3, 4, 5}}};
   const ReleaseSurface surface({.kind = SurfaceKind::mesh, .mesh = mesh});
@@ -91,7 +92,7 @@ TEST(ReleaseSurface, PlacesOnAMeshAreEvenByArea) {
     sum += p.point;
   }
   EXPECT_NEAR(large, 0.75 * kN, 3 * std::sqrt(kN * 0.75 * 0.25));
-  // The centroid, and the deviation of a coordinate of a triangle, base / sqrt(18).
+  // Position of the centroid; the deviation of a coordinate over a triangle is base / sqrt(18).
   const Real error = 3 / std::sqrt(18.0 * large);
   EXPECT_NEAR(sum.x() / large, 1, 3 * 3 * error / 3);
   EXPECT_NEAR(sum.z() / large, 1.0 / 3, 3 * error / 3);
@@ -138,7 +139,7 @@ TEST(EmitterSurface, NewbornsOfOneReleaseNeverOverlapOnAnySurface) {
                   births[i].radius + births[j].radius - 1e-9);
         together += j + 1 == i;
       }
-    EXPECT_GT(together, 900u);  // large releases, few of them
+    EXPECT_GT(together, 900u);  // most particles come in large releases
   }
 }
 
@@ -159,7 +160,7 @@ TEST(EmitterSurface, ParticlesTouchTheSurfaceFromOutsideAndLeaveAlongItsNormal) 
   }
 }
 
-// However small a sphere is, and however few its cells, it sends its particles all around.
+// A sphere emits in all directions, even if it is tiny and has few cells.
 TEST(EmitterSurface, ATinySphereHasNoPreferredDirection) {
   World world = empty_world();
   const auto system = world.add_particle_system({});
@@ -194,13 +195,13 @@ TEST(EmitterSurface, OverlappingReleasesNeedNoRoomAndLieEvenly) {
     ASSERT_EQ(world.particle_count(), 20'000u);
     Vec3 sum = Vec3::Zero();
     for (const Birth& b : births_of(world, system)) sum += surface.pose.point_to_body(b.position);
-    // The middle of all: deviations of a coordinate are below 0.5 m.
+    // Mean of all positions; the deviation of a coordinate is below 0.5 m.
     sum.y() *= surface.kind == SurfaceKind::sphere || surface.kind == SurfaceKind::mesh;
     EXPECT_NEAR((sum / 20'000).norm(), 0, 3 * 0.5 / std::sqrt(20'000.0));
   }
 }
 
-TEST(EmitterSurface, AGivenDirectionIsTheBodysAndNotTheSurfaces) {
+TEST(EmitterSurface, AGivenDirectionIsInTheBodysFrame) {
   World world = empty_world();
   const auto body = world.add_body({.motion = MotionType::kinematic,
                                     .pose = {Vec3::Zero(), Quat(Eigen::AngleAxisd(kPi / 2, Vec3::UnitZ()))},
@@ -220,7 +221,7 @@ TEST(EmitterSurface, AGivenDirectionIsTheBodysAndNotTheSurfaces) {
   }
 }
 
-TEST(EmitterSurface, RefusesWhatHasNoArea) {
+TEST(EmitterSurface, RefusesSurfacesWithoutArea) {
   EXPECT_THROW(ReleaseSurface({.kind = SurfaceKind::sphere, .radius = 0}), std::invalid_argument);
   EXPECT_THROW(ReleaseSurface({.kind = SurfaceKind::mesh}), std::invalid_argument);
   EXPECT_THROW(ReleaseSurface({.kind = SurfaceKind::mesh, .mesh = {{Vec3::Zero()}, {{0, 0, 1}}}}),

@@ -9,14 +9,14 @@ namespace {
 
 using namespace sim;
 
-/// A birth, as the state of the particle at its own birth.
+/// The state of a particle at its own birth.
 struct FirstState {
   Real time;
   Vec3 position, velocity;
   Real radius;
 };
 
-/// Births in order; nothing acts on the particles, so their first state follows from age.
+/// Births in order. Nothing acts on the particles, so their first state follows from their age.
 std::vector<FirstState> births(const EmitterDef& def, Real seconds, int fps, Real max_step = 1.0 / 240,
                                EmitterReport* report = nullptr) {
   World world({.gravity = Vec3::Zero(),
@@ -71,8 +71,8 @@ TEST(Emitter, AConstantRateGivesExactlyItsCountAtEvenTimes) {
   for (std::size_t i = 0; i < b.size(); ++i) ASSERT_NEAR(b[i].time, (Real(i) + 1) / 100, 1e-12);
 }
 
-// From 0 to 100 in 2 s and back to 0 for ever after 4 s: the integral is 50 t^2 / 2 on the way up, 200 in
-// all.
+// The rate rises from 0 to 100 in 2 s and falls to 0 at 4 s. Its integral is 50 t^2 / 2 on the way up and 200
+// in all; it stays 0 for a second before it rises again.
 TEST(Emitter, ACurveOfRatesIsIntegratedExactlyAndZeroDoesNotStall) {
   const auto b = births({.rate = Curve{{{0, 0}, {2, 100}, {4, 0}, {5, 0}, {5.5, 40}}}, .lifespan = 1e9},
                         6 + 1.0 / 30, 30);
@@ -125,8 +125,9 @@ TEST(Emitter, NewbornsOfAReleaseNeverOverlapAndLieOnTheSurface) {
   }
 }
 
-// A surface of 25 cells and a burst of 70: three releases, each one cell's clearing time after the other.
-TEST(Emitter, WhatFindsNoFreeCellWaitsUntilTheCellsAreClear) {
+// A surface of 25 cells and a burst of 70 particles: three releases, each delayed by the time in which the
+// particles of the previous one clear their cells.
+TEST(Emitter, ParticlesWithoutAFreeCellWaitUntilOneIsClear) {
   EmitterReport report;
   const EmitterDef def = {.surface = {.size = {0.1, 0.1}},
                           .rate = 0.0,
@@ -173,7 +174,8 @@ TEST(Emitter, MovesWithItsBodyAndAddsItsVelocity) {
   ASSERT_EQ(p.size(), 50u);
   for (std::size_t i = 0; i < p.size(); ++i) {
     const Real angle = 2 * (Real(i) + 1) / 50, c = std::cos(angle), s = std::sin(angle);
-    // Arm (1, r): position turned by the angle, velocity w x arm plus the speed along the turned normal.
+    // Arm (1, r): the position rotated by the angle. The velocity is w x arm plus the speed along the rotated
+    // normal.
     const Vec3 arm(c - 0.01 * s, s + 0.01 * c, 0),
         v = Vec3(-2 * arm.y(), 2 * arm.x(), 0) + 3 * Vec3(-s, c, 0);
     ASSERT_NEAR((p.velocity[i] - v).norm(), 0, 1e-12);
@@ -181,7 +183,7 @@ TEST(Emitter, MovesWithItsBodyAndAddsItsVelocity) {
   }
 }
 
-TEST(Emitter, RefusesWhatCannotBeDrawnFrom) {
+TEST(Emitter, RefusesInvalidDistributions) {
   const auto message = [](const EmitterDef& def) {
     try {
       Emitter(def, {});
@@ -196,7 +198,7 @@ TEST(Emitter, RefusesWhatCannotBeDrawnFrom) {
             std::string::npos);
   EXPECT_NE(message({.surface = {.size = {0, 1}}}).find("surface.size"), std::string::npos);
   EXPECT_NE(message({.restitution = 1.5}).find("restitution"), std::string::npos);
-  EXPECT_EQ(message({.restitution = Normal{0.9, 0.2}}), "");  // cut off at 1
+  EXPECT_EQ(message({.restitution = Normal{0.9, 0.2}}), "");  // truncated at 1
   EXPECT_NE(message({.rate = Curve{}}).find("without keys"), std::string::npos);
 }
 

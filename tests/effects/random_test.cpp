@@ -75,7 +75,7 @@ TEST(Permutation, IsABijectionThatDependsOnItsKey) {
   }
 }
 
-// p = erfc(-x / sqrt 2) / 2; erfc keeps its relative accuracy in the lower tail.
+// p = erfc(-x / sqrt 2) / 2. erfc keeps its relative accuracy in the lower tail.
 TEST(NormalQuantile, InvertsTheDistributionFunction) {
   for (Real x = -37; x <= 0; x += 0.173) {
     const Real p = std::erfc(-x / std::sqrt(2.0)) / 2;

@@ -24,7 +24,8 @@ const Particle kParent{.position = {1, 2, 3},
                        .friction = 0.2,
                        .charge = 4e-6};
 
-// Each split makes 1 + count of one particle, and uses one of its splits up: (1 + count)^depth in the end.
+// Each split replaces one particle by 1 + count, whose remaining depth is one less: (1 + count)^depth
+// particles at the end.
 TEST(Split, ChildrenByDepth) {
   for (int depth = 0; depth <= 5; ++depth) {
     World world = empty_world();
@@ -38,7 +39,8 @@ TEST(Split, ChildrenByDepth) {
   }
 }
 
-// A parent of age 0.1, 0.15, 0.2 ... splits: after the time t its children in another system are counted.
+// The parent splits at the ages 0.1, 0.15, 0.2 ... s; its children, in another system, are counted at each
+// time.
 TEST(Split, ChildrenByAgeAndDelay) {
   World world = empty_world();
   const auto parents = world.add_particle_system({}), children = world.add_particle_system({});
@@ -82,7 +84,7 @@ TEST(Split, ChildrenInheritTheirPercentagesExactly) {
     EXPECT_NEAR(p.velocity[i].norm(), 4, 1e-12);
     EXPECT_NEAR(p.velocity[i].x(), 4 * std::cos(25 * std::numbers::pi / 180), 1e-12);
     EXPECT_EQ(p.radius[i], 0.05);
-    EXPECT_DOUBLE_EQ(p.mass[i], 0.1);  // of the parent's density
+    EXPECT_DOUBLE_EQ(p.mass[i], 0.1);  // density of the parent
     EXPECT_DOUBLE_EQ(p.charge[i], 0.5e-6);
     EXPECT_EQ(p.lifespan[i], 20);
     EXPECT_EQ(p.restitution[i], 0.7);
@@ -92,8 +94,8 @@ TEST(Split, ChildrenInheritTheirPercentagesExactly) {
   }
 }
 
-// Children that share the parent's mass and keep its velocity, tilted all around, carry its momentum but for
-// the cosine of the tilt.
+// Children that share the parent's mass and keep its speed, in directions all around it, carry its momentum
+// times the mean cosine of their angle.
 TEST(Split, MomentumIsInherited) {
   World world = empty_world();
   const auto parents = world.add_particle_system({}), children = world.add_particle_system({});
@@ -116,7 +118,8 @@ TEST(Split, MomentumIsInherited) {
   EXPECT_NEAR(momentum.z(), 0, 3 * sideways);
 }
 
-// Under gravity the velocity at the very time of the split counts, wherever in a sub-step that is.
+// Under gravity, children inherit the parent's velocity at the exact time of the split, also within a
+// sub-step.
 TEST(Split, InheritsTheVelocityOfItsTimeUnderGravity) {
   World world({.max_step = 1.0 / 24});
   const auto parents = world.add_particle_system({.integrator = IntegratorKind::midpoint}),
@@ -130,7 +133,8 @@ TEST(Split, InheritsTheVelocityOfItsTimeUnderGravity) {
   EXPECT_NEAR((a.velocity[0] - b.velocity[0]).norm(), 0, 1e-11);
 }
 
-// An emitter feeds the system in which children are born, so ids depend on the sub-steps. Draws must not.
+// An emitter adds particles to the system of the children, so particle ids depend on the sub-steps. Random
+// draws must not.
 TEST(Split, IsTheSameAtAnyFrameRateAndSubStep) {
   const auto outcome = [](int fps, Real step) {
     World world = empty_world(step);

@@ -13,7 +13,7 @@ namespace {
 
 using namespace sim;
 
-TEST(SubEmitter, AnAgeIsAnsweredOnceAtItsTime) {
+TEST(SubEmitter, AnAgeTriggersOnceAtItsTime) {
   World world = empty_world();
   const auto shells = world.add_particle_system({}), stars = world.add_particle_system({});
   Emitter emitter({.rate = 240.0, .end = 0.5, .speed = 10.0, .lifespan = 1e9}, shells);
@@ -37,7 +37,7 @@ TEST(SubEmitter, AnAgeIsAnsweredOnceAtItsTime) {
   }
 }
 
-TEST(SubEmitter, ADeathIsAnsweredWhereItHappens) {
+TEST(SubEmitter, ADeathTriggersWhereItHappens) {
   World world = empty_world();
   const auto shells = world.add_particle_system({.report_deaths = true}),
              stars = world.add_particle_system({});
@@ -49,8 +49,7 @@ TEST(SubEmitter, ADeathIsAnsweredWhereItHappens) {
   EXPECT_EQ(burst.report().answered, 10u);
   ASSERT_EQ(burst.report().released, 200u);
   const auto births = births_of(world, stars);
-  // The only known place of a particle's creation is its position at the end of the sub-step in which its
-  // parent died.
+  // The parent's position is known only at the end of the sub-step in which it died.
   constexpr Real kStep = 1.0 / 240, kMargin = 1e-9;
   for (std::size_t i = 0; i < births.size(); ++i) {
     EXPECT_NEAR(births[i].position.x(), 10 * (0.1 + 0.02 * static_cast<Real>(i / 20)),
@@ -66,7 +65,7 @@ struct Rain {
   uint64_t hits;
 };
 
-/// Drops that splash where they hit the ground.
+/// Drops that create splash particles where they hit the ground.
 Rain rain(int threads, const SubEmitterDef& def) {
   tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
   World world;
@@ -109,10 +108,10 @@ TEST(SubEmitter, SplashesAreTheSameForAnyNumberOfThreads) {
   for (int threads : {2, 4}) EXPECT_EQ(rain(threads, kSplash).hash, reference.hash);
 }
 
-TEST(SubEmitter, AnswersItsPartOfTheHitsAndNoMoreThanItMay) {
+TEST(SubEmitter, TriggersByProbabilityUpToItsLimit) {
   const Rain free = rain(2, kSplash);
   const auto hits = static_cast<Real>(free.hits);
-  // The hits of the last sub-step have no answer yet.
+  // The collisions of the last sub-step have not been processed yet.
   EXPECT_NEAR(static_cast<Real>(free.report.answered), hits / 2, 3 * std::sqrt(hits / 4) + 25);
   EXPECT_NEAR(static_cast<Real>(free.report.released) / static_cast<Real>(free.report.answered), 4, 0.1);
   EXPECT_EQ(free.report.skipped, 0u);
@@ -124,7 +123,7 @@ TEST(SubEmitter, AnswersItsPartOfTheHitsAndNoMoreThanItMay) {
   EXPECT_LE(bounded.report.released, 3u * 240);
 }
 
-TEST(SubEmitter, FliesAboutTheNormalOfTheHitFromItsPoint) {
+TEST(SubEmitter, EmitsAboutTheNormalFromTheContactPoint) {
   World world({.gravity = Vec3::Zero()});
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
   const auto drops = world.add_particle_system({.dies_on_hit = true, .report_collisions = true}),

@@ -12,8 +12,8 @@ namespace {
 
 using namespace sim;
 
-// Born in the middle of a sub-step at 80 m/s, at a rate that has nothing to do with the sub-steps: the trail
-// is even from its first particle to its last.
+// A star is created within a sub-step at 80 m/s, and the trail's rate is unrelated to the sub-steps: the
+// trail particles are evenly spaced from the first to the last.
 TEST(Trail, OfAFastParentIsEven) {
   for (Real step : {1.0 / 240, 1.0 / 24}) {
     World world = empty_world(step);
@@ -38,13 +38,13 @@ TEST(Trail, OfAFastParentIsEven) {
   }
 }
 
-TEST(Trail, StartsAtBirthAndInheritsItsPart) {
+TEST(Trail, StartsAtBirthAndInheritsAShareOfTheVelocity) {
   World world = empty_world();
   const auto stars = world.add_particle_system({}), trail = world.add_particle_system({});
   Emitter emitter({.rate = 240.0, .end = 0.25, .speed = 20.0, .spread_deg = 40.0, .lifespan = 1e9}, stars);
   Trail left({.rate = 60.0, .velocity_percent = 25.0, .lifespan = 1e9}, stars, trail);
   run(world, 1, 30, emitter, left);
-  // Sixty emissions a second of each star, from its birth on; the first of each at a random time.
+  // Each star emits sixty times a second from its birth on; the first time of each star is random.
   Real expected = 0;
   for (Real age : world.particles(stars).age) expected += 60 * age;
   const auto n = static_cast<Real>(world.particles(stars).size());

@@ -15,7 +15,7 @@ struct Count {
   uint64_t born, alive;
 };
 
-/// What an emitter really leads to.
+/// The number of particles that an emitter really creates.
 Count count(const EmitterDef& def, Real duration) {
   World world = empty_world();
   const auto system = world.add_particle_system({});
@@ -28,7 +28,7 @@ Count count(const EmitterDef& def, Real duration) {
   return {emitter.report().released, alive};
 }
 
-TEST(WorstCase, OfAnEmitterOfConstantsIsReached) {
+TEST(WorstCase, OfConstantParametersIsReached) {
   const std::vector<EmitterDef> defs = {
       {.rate = 120.0, .lifespan = 0.5},
       {.surface = {.size = {1, 1}}, .rate = 0.0, .count = 30.0, .interval = 0.25, .lifespan = 0.6},
@@ -45,7 +45,7 @@ TEST(WorstCase, OfAnEmitterOfConstantsIsReached) {
   }
 }
 
-TEST(WorstCase, BoundsWhatVaries) {
+TEST(WorstCase, BoundsVaryingParameters) {
   for (uint64_t seed = 1; seed <= 5; ++seed) {
     const EmitterDef def{.name = "varies",
                          .seed = seed,
@@ -63,7 +63,7 @@ TEST(WorstCase, BoundsWhatVaries) {
   }
 }
 
-TEST(WorstCase, OfDescendantsBoundsWhatReallyComes) {
+TEST(WorstCase, OfDescendantsIsABound) {
   World world = empty_world();
   const auto shells = world.add_particle_system({}), stars = world.add_particle_system({}),
              trail = world.add_particle_system({});
@@ -106,7 +106,7 @@ TEST(WorstCase, Saturates) {
   EXPECT_EQ(worst_case(split, {1, 1, 10, 1}, true).alive, kAll);
 }
 
-// At the bound a cell's next particle touches the one before it, never overlapping it.
+// At the highest rate, the next particle of a cell just touches the previous one and never overlaps it.
 TEST(WorstCase, TheHighestClearRateKeepsSinglesApart) {
   EmitterDef def{.surface = {.size = {0.1, 0.1}}, .speed = Uniform{2, 2}, .radius = 0.01, .lifespan = 1e9};
   EXPECT_NEAR(highest_clear_rate(def), 25 * 2 / 0.02, 1e-6);

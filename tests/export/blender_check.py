@@ -83,7 +83,7 @@ def check_ply(folder, table_file):
 
 
 def show_particles(places):
-    """The PLY has Y up, as its own format does not say: the object is turned, and each particle gets a small ball."""
+    """Shows the imported particles as small balls. PLY does not state the up axis, which is Y here, so the object is turned."""
     thing = bpy.context.selected_objects[0]
     thing.rotation_euler = (np.pi / 2, 0, 0)
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=1, radius=0.02)

@@ -47,7 +47,7 @@ def read_table(path):
 
 
 def centre_of_cloth(points, triangles, flat):
-    """Centre of mass: each vertex has a third of the mass of its triangles, by their area in the flat cloth."""
+    """Centre of mass: each vertex has a third of the mass of its triangles, which is proportional to their area in the flat cloth."""
     total, centre = 0.0, [0.0, 0.0, 0.0]
     for triangle in triangles:
         (ax, ay), (bx, by), (cx, cy) = (flat[i] for i in triangle)

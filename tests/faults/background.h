@@ -1,5 +1,5 @@
 #pragma once
-/// The program in the background, to be stopped, continued and killed while it works.
+/// Runs the program in the background, so that tests can stop, continue and kill it while it works.
 
 #include <filesystem>
 #include <string>
@@ -12,21 +12,22 @@ namespace offstage::test {
 class Background {
  public:
   Background(const std::vector<std::string>& arguments, const std::filesystem::path& folder);
-  /// Kills it, if it still runs.
+  /// Kills the program if it still runs.
   ~Background();
   Background(const Background&) = delete;
   Background& operator=(const Background&) = delete;
 
   pid_t pid() const { return pid_; }
   void send(int signal) const;
-  /// Its exit code, 128 + signal, or -1 if it has not ended after `seconds`; then it is killed.
+  /// Waits for the program and returns its exit code or 128 + signal; after `seconds` it is killed and the
+  /// result is -1.
   int end(double seconds = 60);
 
  private:
   pid_t pid_;
 };
 
-/// Waits until `file` is there, for a minute at most.
+/// Waits until `file` exists; false after a minute.
 bool appears(const std::filesystem::path& file);
 
 }  // namespace offstage::test

@@ -1,4 +1,4 @@
-// Full disks: a film that does not fit is an error and leaves nothing that looks whole.
+// Full disks: a film that does not fit is an error and leaves no file that looks complete.
 
 #include <filesystem>
 #include <memory>
@@ -15,25 +15,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder that holds no more than so many bytes: a file system in memory. Without the right to mount one,
-/// no file that is written there may be longer (the shell's `ulimit -f`), which fails at the same places.
+/// A folder of limited capacity: a file system in memory. Without permission to mount one, the shell's
+/// `ulimit -f` limits the size of each file instead, so writes fail at the same places.
 class SmallDisk {
  public:
   SmallDisk(const fs::path& place, std::uintmax_t bytes) : place_(place) {
     fs::create_directories(place);
     const std::string size = "size=" + std::to_string((bytes + 4095) / 4096 * 4096);
     mounted_ = mount("none", place.c_str(), "tmpfs", 0, size.c_str()) == 0;
-    constexpr std::uintmax_t kUnit = 512;  // of POSIX's ulimit
+    constexpr std::uintmax_t kUnit = 512;  // unit of POSIX's ulimit
     if (!mounted_) limit_ = "ulimit -f " + std::to_string(bytes / kUnit) + ";";
   }
   ~SmallDisk() {
     if (mounted_) umount2(place_.c_str(), MNT_DETACH);
     std::error_code error;
-    fs::remove_all(place_, error);  // the next one is empty, too
+    fs::remove_all(place_, error);  // the next disk starts empty
   }
   SmallDisk(const SmallDisk&) = delete;
   SmallDisk& operator=(const SmallDisk&) = delete;
-  /// What a command that writes there has to be run with.
+  /// Shell text to put in front of a command that writes there.
   const std::string& limit() const { return limit_; }
 
  private:
@@ -42,7 +42,7 @@ class SmallDisk {
   bool mounted_ = false;
 };
 
-/// Frames that are drawn once and then encoded to many disks: drawing would take most of the time.
+/// Frames that are drawn once and then encoded to many disks, because drawing would take most of the time.
 class FilmOnAFullDisk : public testing::TestWithParam<const char*> {
  protected:
   static void SetUpTestSuite() {
@@ -71,7 +71,8 @@ TEST_P(FilmOnAFullDisk, IsWholeOrAnErrorThatLeavesNothing) {
   const int tries = tries_of(4);
   int failed = 0;
   for (int i = 0; i <= tries; ++i) {
-    // From half of the film to all of it; most of them lack the last part only, which ffmpeg does not notice.
+    // Sizes from half of the film to all of it. Most of them lack only the last part, whose loss ffmpeg does
+    // not report.
     const double share = i == 0 ? 0.5 : 0.9 + 0.2 * (i - 1) / std::max(tries - 1, 1);
     const SmallDisk disk(folder / "disk",
                          static_cast<std::uintmax_t>(share * static_cast<double>(whole.size())));

@@ -1,4 +1,4 @@
-// Files and names of strangers, closed descriptors, failing allocations.
+// Hostile files and names, closed descriptors, failing allocations.
 
 #include <csignal>
 #include <filesystem>
@@ -223,9 +223,10 @@ TEST(FailingAllocation, EndsWithOneLineOrGivesTheWholeTable) {
   int failed = 0;
   for (int i = 0; i < tries_of(20); ++i) {
     fs::remove(folder / "t.csv");
-    const int after = 4000 + (i * 977) % 14000;  // earlier calls are of libraries that begin
+    const int after = 4000 + (i * 977) % 14000;  // earlier allocations belong to the start-up of libraries
     const Outcome run = offstage(command, folder.path(), preload + std::to_string(after));
-    // Whole where nothing depended on it, such as a buffer of the C library, or where it struck later.
+    // The table is complete if the failed allocation was optional, such as a buffer of the C library, or came
+    // after the table.
     if (run.code == 0 || fs::exists(folder / "t.csv")) {
       EXPECT_EQ(read_file(folder / "t.csv"), whole) << after;
     }

@@ -1,4 +1,4 @@
-// Two runs at one output, and runs that are killed: frames of two films are never mixed.
+// Concurrent runs with the same output, and runs that are killed: frames of two films are never mixed.
 
 #include <chrono>
 #include <csignal>
@@ -25,14 +25,14 @@ std::vector<std::string> with_options(std::vector<std::string> arguments) {
   return arguments;
 }
 
-/// PNG files of a folder by name.
+/// The PNG files of a folder by name.
 std::map<std::string, std::string> frames_of(const fs::path& folder) {
   std::map<std::string, std::string> frames = contents(folder);
   std::erase_if(frames, [](const auto& file) { return !file.first.ends_with(".png"); });
   return frames;
 }
 
-/// The whole film, drawn once.
+/// The complete film for a seed, drawn once.
 const std::map<std::string, std::string>& film_of_seed(int seed) {
   static std::map<int, std::map<std::string, std::string>> known;
   if (const auto film = known.find(seed); film != known.end()) return film->second;
@@ -88,7 +88,8 @@ TEST(KilledRun, ForcedOverForeignFramesAndResumedHasItsOwnFramesOnly) {
     const Outcome resumed =
         offstage("render " + tiny_scene() + kOptions + " --seed 7 -o d/ --resume", folder.path());
     if (!has_begun && resumed.code == 2)
-      continue;  // killed before it began: the frames are still another's, and it is said
+      // killed before it wrote anything: the frames belong to another film, and the message says so
+      continue;
     EXPECT_EQ(resumed.code, 0) << resumed.err;
     EXPECT_EQ(frames_of(folder / "d"), expected);
   }

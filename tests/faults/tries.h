@@ -1,12 +1,12 @@
 #pragma once
-/// How often a fault is injected.
+/// The number of times a fault is injected.
 
 #include <algorithm>
 #include <cstdlib>
 
 namespace offstage::test {
 
-/// `usual` in the tests of every change; OFFSTAGE_FAULTS_FACTOR times as often behind the label "long".
+/// `usual`, multiplied by OFFSTAGE_FAULTS_FACTOR, which the tests with the label "long" set.
 inline int tries_of(int usual) {
   const char* factor = std::getenv("OFFSTAGE_FAULTS_FACTOR");
   return usual * (factor ? std::max(1, std::atoi(factor)) : 1);

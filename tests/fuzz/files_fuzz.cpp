@@ -1,4 +1,4 @@
-// Any bytes as the files of our own: a snapshot, a golden, a manifest.
+// Arbitrary bytes as files of the program's own formats: a snapshot, a golden, a manifest.
 
 #include <filesystem>
 #include <fstream>
@@ -42,7 +42,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   ++data;
   --size;
   if (kind == 0) refused_or_read([&] { deserialize({data, size}, "fuzz"); });
-  // A payload behind a right header and checksum, which no fuzzer finds by itself.
+  // The bytes as the payload behind a valid header and checksum, which a fuzzer would not find by itself.
   if (kind == 1)
     refused_or_read([&] { deserialize(pack({"offsnap", 4, "snapshot"}, {data, size}), "fuzz"); });
   if (kind == 2) {

@@ -1,4 +1,4 @@
-// Any bytes as the text of a scene: refused with a SceneError, or loaded.
+// Arbitrary bytes as the text of a scene: it is loaded or refused with a SceneError.
 
 #include <string_view>
 

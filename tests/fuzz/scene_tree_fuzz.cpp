@@ -30,7 +30,7 @@ const std::vector<Node>& gallery() {
   return scenes;
 }
 
-/// The bytes of the fuzzer as choices; 0 when they are used up.
+/// Turns the bytes of the fuzzer into choices; 0 when they are used up.
 class Choices {
  public:
   Choices(const uint8_t* data, size_t size) : data_(data), size_(size) {}
@@ -90,7 +90,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   constexpr int kMostMutations = 16;
   for (int i = 0; i < kMostMutations && !choices.empty(); ++i) mutate(scene, choices);
   const std::string text = to_text(scene);
-  // Models would be decomposed into convex parts in each run, which takes seconds; hull_fuzz.cpp does that.
+  // Models would be decomposed into convex parts in each run, which takes seconds; decomposition_fuzz.cpp does that.
   if (text.find("/models/") != std::string::npos) return 0;
   try {
     const LoadedScene loaded =

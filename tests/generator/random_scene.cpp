@@ -14,11 +14,11 @@ namespace offstage::sim {
 namespace {
 
 constexpr Real kWall = 1;          ///< thickness of the walls [m]
-constexpr Real kGap = 0.01;        ///< between bodies at the start [m]
-constexpr int kTries = 40;         ///< to find a free place
+constexpr Real kGap = 0.01;        ///< distance between bodies at the start [m]
+constexpr int kTries = 40;         ///< attempts to find a free place
 constexpr Real kFrame = 1.0 / 60;  ///< sampling time [s]
 
-/// Makes one scene, in the order in which the dice are thrown.
+/// Makes one scene from a sequence of random numbers.
 class Generator {
  public:
   explicit Generator(uint64_t seed) : dice_(seed) { scene_.seed = seed; }
@@ -78,7 +78,7 @@ class Generator {
       }
   }
 
-  /// Whatever is not in the way of others; without a place there is one body less.
+  /// A place where a ball of radius `reach` overlaps no other body. If none is found, the body is left out.
   std::optional<Vec3> free_place(Real reach) {
     const Real half = (scene_.room > 0 ? scene_.room : 1.2) - reach - kGap;
     if (half <= 0) return std::nullopt;
@@ -98,10 +98,10 @@ class Generator {
     Vec3 e = size_ * Vec3(dice_.uniform(0.5, 1.5), dice_.uniform(0.5, 1.5), dice_.uniform(0.5, 1.5));
     if (!thin_ || dice_.chance(0.5)) return e;
     const int axis = static_cast<int>(dice_.index(3));
-    if (dice_.chance(0.5)) {  // a plate
+    if (dice_.chance(0.5)) {  // plate
       e *= 1.5;
       e[axis] *= dice_.uniform(0.03, 0.2);
-    } else {  // a rod
+    } else {  // rod
       e *= dice_.uniform(0.05, 0.3);
       e[axis] = size_ * dice_.uniform(1, 3);
     }
@@ -147,7 +147,7 @@ class Generator {
     movable_.push_back(scene_.bodies.size() - 1);
   }
 
-  /// A box or an L about its middle, welded of triangles.
+  /// Adds the mesh of a box or an L about its centre.
   std::size_t add_mesh(const Vec3& e) {
     TriangleMesh mesh = dice_.chance(0.5)
                             ? box_mesh(Vec3::Ones())
@@ -161,7 +161,7 @@ class Generator {
 
   std::size_t any_body() { return movable_[dice_.index(movable_.size())]; }
 
-  /// A chain of bodies that are there, each joined to the one before half-way between.
+  /// Connects some of the existing bodies to a chain, each by a joint half-way to the previous one.
   void add_joints() {
     const std::size_t count = std::min<std::size_t>(movable_.size(), 2 + dice_.index(3));
     for (std::size_t i = 1; i < count; ++i) {
@@ -189,7 +189,7 @@ class Generator {
     }
   }
 
-  /// Between centres, no stiffer than the integrators can follow at the longest step.
+  /// Adds springs between body centres that are soft enough for all integrators at the longest step.
   void add_springs() {
     const uint32_t count = 1 + dice_.index(3);
     for (uint32_t i = 0; i < count && !movable_.empty(); ++i) {
@@ -209,7 +209,7 @@ class Generator {
     }
   }
 
-  /// A paddle that turns or a box that goes to and fro in the middle of the room's floor.
+  /// Adds a rotating paddle or a box that moves back and forth in the middle of the room's floor.
   void add_drive() {
     scene_.is_driven = true;
     RandomScene::Body drive{surface(), {}};
@@ -390,7 +390,7 @@ World make_world(const RandomScene& scene) {
 
 namespace {
 
-/// Sums over all that moves, with the sizes of their parts.
+/// Total momentum and angular momentum of all moving objects, and the sums of the magnitudes of their parts.
 struct Momenta {
   Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
   Real linear_size = 0, angular_size = 0;
@@ -406,18 +406,18 @@ struct Momenta {
   }
 };
 
-/// How far bodies may be in each other, derived from how they move. Both solvers know where two bodies touch,
-/// or may touch, as points that move evenly, and stop these, to kSolved. A point at a distance R of a body
-/// that turns by the angle w h in a sub-step leaves its tangent by R (w h)^2 / 2, up to what is looked at in
-/// pieces: a quarter of the body; for as much, two bodies may get into each other. Overlaps are pushed out by
-/// a fifth in each sub-step, so that what the sub-steps before have left adds up. Where the bounded number of
-/// trace-backs in a sub-step was used up, or the bodies spin fast, two may get as far as they move against
-/// each other.
+/// The allowed penetration of bodies, derived from their motion. Both solvers treat the places where two
+/// bodies touch, or may touch, as points with constant velocity, and stop these to within kSolved. A point at
+/// distance R from the centre of a body that turns by the angle w h in a sub-step deviates from its tangent
+/// by R (w h)^2 / 2, at most by the piece length of the collision detection, a quarter of the body; two
+/// bodies may penetrate by as much. Each sub-step removes a fifth of the penetration, so the remainders of
+/// earlier sub-steps accumulate. If the limit of trace-backs in a sub-step was reached, or bodies spin fast,
+/// two bodies may also penetrate by their relative motion in the sub-step.
 class Overlap {
  public:
   Overlap(const RandomScene& scene, std::span<const BodyHandle> bodies) : scene_(scene), bodies_(bodies) {}
 
-  /// After each step.
+  /// Called after each step.
   void add(const World& world, const StepReport& report) {
     const Real h = kFrame / report.substeps;
     Motions now;
@@ -442,7 +442,7 @@ class Overlap {
  private:
   static constexpr Real kSolved = 5e-4, kPiece = 0.25, kPushedOut = 0.2;
 
-  /// The greatest two of the bodies.
+  /// The two greatest values among the bodies.
   struct GreatestTwo {
     Real first = 0, second = 0;
     void add(Real x) {
@@ -467,7 +467,7 @@ class Overlap {
   Real left_ = 0;
 };
 
-/// What a step took, in operations of a solver on the contacts of the scene.
+/// The counted work of a step, in solver operations on the contacts of the scene.
 uint64_t counted_work(const StepReport& r) {
   return r.exact.iterations + r.exact.factorizations + r.impacts.iterations + r.impacts.factorizations +
          50 * r.tracebacks;

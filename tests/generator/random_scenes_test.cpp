@@ -1,6 +1,7 @@
-/// Whatever a scene is made of, nothing in it explodes, leaves, sinks in or takes for ever. To see one again:
-///   OFFSTAGE_SEED=1234 build/test_generator --gtest_filter='*Replays*'
-/// and with OFFSTAGE_BODIES=1 if it is one of bodies alone.
+/// In random scenes, no object explodes, leaves the room or sinks into another one, and the work of each step
+/// is bounded. To run one scene again:
+/// OFFSTAGE_SEED=1234 build/test_generator --gtest_filter='*Replays*'
+/// and with OFFSTAGE_BODIES=1 if it is a scene of bodies alone.
 
 #include <cstdlib>
 #include <iostream>
@@ -13,7 +14,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Every so many scenes are run a second time with other numbers of threads.
+/// One scene out of this many is run again with other numbers of threads.
 constexpr uint64_t kThreadsEvery = 10;
 
 Findings with_threads(const RandomScene& scene, std::size_t threads) {
@@ -33,7 +34,7 @@ void check(uint64_t seed, Parts parts) {
         << "seed " << seed << ", " << threads << " threads";
 }
 
-/// Scenes by seeds, a hundred each.
+/// Blocks of a hundred scenes.
 class RandomScenes : public testing::TestWithParam<uint64_t> {
  protected:
   static void check_block(Parts parts) {
@@ -55,7 +56,7 @@ TEST_P(RandomScenes, KeepEnergyMomentumBoundsAndTime) {
 }
 INSTANTIATE_TEST_SUITE_P(Long, RandomScenes, testing::Range<uint64_t>(0, 50));
 
-/// A tool rather than a test: it exists only where OFFSTAGE_SEED names a seed to show again.
+/// A tool rather than a test: it exists only if OFFSTAGE_SEED names the seed of a scene to run again.
 class ReplayedScene : public testing::TestWithParam<uint64_t> {};
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(ReplayedScene);
 
@@ -75,13 +76,13 @@ TEST_P(ReplayedScene, Replays) {
 }
 INSTANTIATE_TEST_SUITE_P(Seed, ReplayedScene, testing::ValuesIn(seeds_to_replay()));
 
-// Universal joints near their singular pose (204, 256, 454), and particles caught between a body and a wall
-// (357, 419, 454).
+// These seeds have universal joints near their singular pose (204, 256, 454), and particles between a body
+// and a wall (357, 419, 454).
 TEST(RandomScene, SeedsThatGainedEnergyKeepIt) {
   for (const uint64_t seed : {204, 256, 357, 419, 454}) check(seed, Parts::all);
 }
 
-// The same seed is the same scene, or a failure could not be seen again.
+// The same seed gives the same scene, so that failures can be reproduced.
 TEST(RandomScene, DependsOnItsSeedAlone) {
   EXPECT_EQ(text(random_scene(42, Parts::all)), text(random_scene(42, Parts::all)));
   EXPECT_NE(text(random_scene(42, Parts::all)), text(random_scene(43, Parts::all)));

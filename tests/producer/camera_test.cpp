@@ -10,7 +10,7 @@ namespace {
 
 using Eigen::Vector3f;
 
-// Two balls; the second moves.
+// Two balls, one of which moves.
 struct Set {
   Set() {
     scene.render.size = {1600, 900};
@@ -31,7 +31,7 @@ struct Set {
 TEST(CameraRig, FocalLengthIsThatOfAPicture36MillimetresWide) {
   Set set;
   StaticCamera camera;
-  camera.focal_mm = 18;  // 90 degrees across
+  camera.focal_mm = 18;  // 90 degrees horizontally
   set.scene.camera = camera;
   const double half = 0.5 * static_cast<double>(set.at(0).fov_deg) * std::numbers::pi / 180;
   EXPECT_NEAR(std::tan(half) * 16 / 9, 1, 1e-5);
@@ -59,7 +59,7 @@ TEST(CameraRig, FitFillsThePictureFromItsSide) {
   const render::Camera view = set.at(0);
   EXPECT_TRUE(view.target.isApprox(Vector3f(0, 1, 0)));
   EXPECT_NEAR(view.eye.x(), 0, 1e-5);
-  // The ball around both is seen whole, and no more than that.
+  // The sphere around both balls just fits into the picture.
   const float radius = std::sqrt(4.0f * 4 + 1 + 1), distance = (view.eye - view.target).norm();
   EXPECT_NEAR(std::asin(radius / distance), 0.5f * view.fov_deg * 0.01745329f, 1e-4f);
 }

@@ -1,4 +1,4 @@
-// How the work of a scene spreads over its objects.
+// The estimated share of each object in the work of a scene.
 
 #include "producer/run/cost.h"
 

@@ -18,7 +18,7 @@ class Film {
   explicit Film(const std::string& text)
       : loaded_(parse_scene(text, "scene", OFFSTAGE_SOURCE_DIR)),
         simulation_(loaded_.scene, ModelLibrary()) {}
-  /// The particles of the first source at a frame; frames in ascending order.
+  /// The particles of the first source in a frame; frames must be requested in ascending order.
   const std::vector<render::Point>& at(int frame) {
     while (simulation_.frame() < frame) simulation_.advance();
     snapshot_ = simulation_.snapshot();
@@ -33,7 +33,7 @@ class Film {
   Snapshot snapshot_;
 };
 
-/// An emitter, with more keys of it, the film and the scene.
+/// A scene with one emitter; the arguments add keys to the emitter, the output section and the scene.
 std::string scene(const std::string& emitter, const std::string& output = "", const std::string& more = "") {
   return R"({"emitters": [{"overlap": true, "radius": 0.02, "surface": {"position": [0, 6, 0], "size": [2, 2]},)" +
          emitter + R"(}], "output": {"fps": 10, "duration": 1)" + output + "}" + more + "}";
@@ -45,7 +45,7 @@ float lowest(const std::vector<render::Point>& points) {
   return y;
 }
 
-TEST(FirstFrame, HasTheBurstAtItsTimeWhateverThatIs) {
+TEST(FirstFrame, HasABurstAtTheStartTime) {
   for (const auto& [time, start] : {std::pair(0.0, 0.0), {1.0, 1.0}, {0.3, 0.3}}) {
     Film film(scene(R"("rate": 0, "speed": 2, "lifespan": 9, "bursts": [{"count": 10, "time": )" +
                         std::to_string(time) + "}]",
@@ -54,18 +54,18 @@ TEST(FirstFrame, HasTheBurstAtItsTimeWhateverThatIs) {
     EXPECT_EQ(film.totals().born, 10u);
     for (const render::Point& p : film.at(1)) EXPECT_NEAR(p.position.y(), 6.02, 1e-6);
     const auto& later = film.at(2);
-    // And each lives through the whole first step: 2 m/s upwards for 0.1 s.
+    // Each particle is integrated over the whole first step: 2 m/s upwards for 0.1 s.
     for (const render::Point& p : later) EXPECT_NEAR(p.position.y(), 6.02 + 0.2 - 9.81 * 0.01 / 2, 1e-5);
   }
 }
 
-TEST(FirstFrame, HasWhatComesFromOneInterval) {
+TEST(FirstFrame, HasTheFirstIntervalRelease) {
   Film film(scene(R"("rate": 0, "count": 7, "interval": 0.5, "lifespan": 9)"));
   EXPECT_EQ(film.at(1).size(), 7u);
   EXPECT_EQ(film.at(6).size(), 14u);
 }
 
-// Rain from 6 m onto the ground: after 3 s it has been landing for two.
+// Rain from 6 m onto the ground: by 3 s, drops have been landing for about two seconds.
 TEST(FirstFrame, HasPrewarmedParticlesWhereAFilmWithAnEarlierStartHasThem) {
   const std::string
       rain = R"("rate": 300, "direction": [0, -1, 0], "speed": 5, "lifespan": 3, "restitution": 0.2)",
@@ -77,24 +77,24 @@ TEST(FirstFrame, HasPrewarmedParticlesWhereAFilmWithAnEarlierStartHasThem) {
   ASSERT_EQ(here.size(), there.size());
   for (std::size_t i = 0; i < here.size(); ++i)
     EXPECT_NEAR((here[i].position - there[i].position).norm(), 0, 1e-4) << i;
-  // Nothing was below the ground and is put onto it now.
+  // No particle was below the ground and had to be moved out of it.
   EXPECT_GT(lowest(here), 0.0199);
   prewarmed.at(3);
   EXPECT_EQ(prewarmed.totals().ejected + prewarmed.totals().removed, 0u);
 }
 
-TEST(FirstFrame, HasNothingThatDiedOnAHitWhilePrewarmingButItsSplashes) {
+TEST(FirstFrame, HasSplashesOfPrewarmedParticlesThatDied) {
   Film film(scene(
       R"("rate": 300, "direction": [0, -1, 0], "speed": 5, "lifespan": 30, "dies_on_hit": true, "prewarm": 3,
                      "on_collision": [{"name": "splash", "lifespan": 0.3, "count": 2}])",
       "", R"(, "bodies": [{"motion": "static", "shape": {"type": "plane"}}])"));
-  // 6 m at 5 m/s and accelerated take 0.72 s.
+  // Falling 6 m from an initial speed of 5 m/s takes 0.72 s.
   EXPECT_NEAR(static_cast<double>(film.at(1).size()), 300 * 0.72, 6);
   EXPECT_NEAR(static_cast<double>(film.snapshot().point_sets[1].points.size()), 300 * 0.3 * 2, 10);
 }
 
-// A jet on a turning nozzle is a spiral at once, not a ray.
-TEST(FirstFrame, ShowsWhereAMovingBodyHasEmittedBefore) {
+// The jet of a rotating nozzle is a spiral from the first frame on.
+TEST(FirstFrame, ShowsParticlesPrewarmedFromAMovingBody) {
   Film film(R"({"world": {"gravity": [0, 0, 0]},
     "bodies": [{"name": "nozzle", "motion": "kinematic", "collides": false, "shape": {"type": "sphere"}, "spin": [0, 6.283185307179586, 0]}],
     "emitters": [{"body": "nozzle", "overlap": true, "rate": 100, "speed": 3, "lifespan": 5, "prewarm": 1, "spread_deg": 0,
@@ -107,8 +107,8 @@ TEST(FirstFrame, ShowsWhereAMovingBodyHasEmittedBefore) {
   for (const int count : quadrants) EXPECT_NEAR(count, 25, 2);
 }
 
-// Groups, bodies and cloths are where the scene says at time 0.
-TEST(FirstFrame, HasTheRestAsTheSceneSaysHoweverLongItWasPrewarmed) {
+// Prewarming does not move groups, bodies and cloths: they start as the scene says.
+TEST(FirstFrame, PrewarmingDoesNotMoveOtherObjects) {
   Film film(scene(
       R"("rate": 100, "lifespan": 9, "prewarm": 2)", "",
       R"(, "bodies": [{"name": "ball", "shape": {"type": "sphere"}, "position": [3, 5, 0], "velocity": [1, 0, 0]}],
@@ -122,7 +122,7 @@ TEST(FirstFrame, HasTheRestAsTheSceneSaysHoweverLongItWasPrewarmed) {
   EXPECT_NEAR(film.snapshot().point_sets[0].points[0].position.y(), 5.1 - 9.81 * 0.01 / 2, 1e-5);
 }
 
-// "Hold, then move": cameras, hands and motors have the keys of bodies.
+// Keys of the form "hold, then move" do not overshoot in grabs and motors either, as in cameras and bodies.
 TEST(Keys, OfAGrabAndOfAMotorDoNotSwingBeyondTheirValues) {
   const LoadedScene loaded = parse_scene(R"({"world": {"gravity": [0, 0, 0]},
     "bodies": [{"name": "held", "shape": {"type": "sphere", "radius": 0.1}, "mass": 1},

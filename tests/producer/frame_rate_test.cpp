@@ -1,4 +1,4 @@
-// Frame rates as fractions, and the times that frames of such a film show.
+// Frame rates as fractions, and the times of the frames.
 
 #include "render/frame_rate.h"
 
@@ -56,7 +56,7 @@ TEST(FrameRate, AWholeRateHasTheTimesItAlwaysHad) {
 }
 
 TEST(FrameRate, TenThousandFramesOfAFractionDoNotDrift) {
-  // 1/30 s steps: one per frame at 30000/1001 would be longer, so there are two.
+  // Sub-steps of at most 0.0333 s: one per frame at 30000/1001 would be longer, so there are two.
   const LoadedScene film = parse_scene(
       R"({"world": {"step": 0.0333}, "output": {"fps": "30000/1001", "duration": 334, "start": 0.5}})", "s",
       "");
@@ -69,7 +69,7 @@ TEST(FrameRate, TenThousandFramesOfAFractionDoNotDrift) {
     const long double exact = 0.5L + (simulation.frame() - 1) * 1001.0L / 30000.0L;
     worst = std::max(worst, static_cast<double>(std::abs(simulation.world().time() - exact)));
   }
-  EXPECT_LT(worst, 2e-13);  // a few roundings of some 333 s, not of 10 000 sums
+  EXPECT_LT(worst, 2e-13);  // a few rounding errors at 333 s, not the sum of 10 000
   EXPECT_EQ(simulation.snapshot().time, 0.5 + 9999 * 1001.0 / 30000);
 }
 

@@ -1,4 +1,4 @@
-// Joints and articulations of a scene: their copies, refused values, and that they hold.
+// Joints and articulations of a scene: their copies, refused values, and that the joints hold.
 
 #include <cmath>
 #include <numbers>
@@ -45,7 +45,7 @@ TEST(SceneJoints, AreCopiedWithTheirBodies) {
   EXPECT_LT((joints[4].anchor - Vec3(2, 1.5, 0)).norm(), 1e-12);
 }
 
-TEST(SceneJoints, WhatCannotBeIsRefusedWithWhatCan) {
+TEST(SceneJoints, InvalidValuesAreRefusedWithTheAllowedOnes) {
   const std::string bodies = R"("bodies": [{"name": "wall", "motion": "static"}, {"name": "door"}], )";
   EXPECT_EQ(joint_errors(bodies + R"("joints": [{"a": "dor"}])"),
             "/joints/0/a: there is no body 'dor'; did you mean 'door'?\n");
@@ -64,8 +64,8 @@ TEST(SceneJoints, WhatCannotBeIsRefusedWithWhatCan) {
             "/articulations/0/end: there is no body 'dor'; did you mean 'door'?\n");
 }
 
-// No parts of a standing figure overlap, because the first step would push them apart.
-TEST(Articulations, AreAsTheyStandAndHoldWhenTheyFall) {
+// No parts of a standing figure overlap, because the solver would push them apart in the first step.
+TEST(Articulations, StartWithoutOverlapAndHoldWhenTheyFall) {
   const LoadedScene loaded = parse(R"(
     "output": {"fps": 30, "duration": 2},
     "bodies": [{"name": "ground", "motion": "static", "shape": {"type": "plane"}}],
@@ -102,9 +102,9 @@ sim::BodyHandle handle_of(const Simulation& simulation, const std::string& name)
   throw std::out_of_range(name);
 }
 
-// The speed of its rear wheels, half of it in the mean of a smooth start; turning, a circle of L /
-// tan(angle).
-TEST(Vehicle, DrivesAsFastAsItsWheelsAndTurnsAsItIsSteered) {
+// The speed follows from the rear wheels; during the smooth start its mean is half of that. The turning
+// circle has the radius L / tan(angle).
+TEST(Vehicle, SpeedAndTurningCircleFollowFromTheWheels) {
   const LoadedScene loaded = parse(R"(
     "output": {"fps": 30, "duration": 8}, "world": {"solver": "fast"},
     "materials": [{"name": "road", "friction": 1, "restitution": 0}],
@@ -125,13 +125,13 @@ TEST(Vehicle, DrivesAsFastAsItsWheelsAndTurnsAsItIsSteered) {
   EXPECT_NEAR(driving.velocity.z(), 3, 0.03);
   EXPECT_NEAR(driving.pose.position.z(), 3.0 / 2 * 3 + 3 * 0.5, 0.15);
   EXPECT_NEAR(driving.pose.position.x(), 0, 0.02);
-  // Round a circle about a point on the line of the rear axle.
+  // The car moves on a circle about a point on the line of the rear axle.
   const sim::BodyState turning = advance_to(6);
   const Real base = 0.62 * 4, radius = base / std::tan(20 * std::numbers::pi / 180);
   EXPECT_NEAR(turning.angular_velocity.y(), turning.velocity.norm() / std::hypot(radius, base / 2), 0.02);
 }
 
-TEST(Crane, BearsItsLoadAndMovesItByItsMotors) {
+TEST(Crane, HoldsItsLoadAndMovesItByItsMotors) {
   const LoadedScene loaded = parse(R"(
     "output": {"fps": 30, "duration": 16}, "world": {"solver": "exact"},
     "articulations": [{"type": "crane", "name": "crane", "height": 8, "reach": 6, "load_mass": 400,

@@ -16,7 +16,7 @@ std::string at(const Position& p) {
   return std::to_string(p.line) + ":" + std::to_string(p.column);
 }
 
-/// The message for a text that must be refused.
+/// The error message for a text that must be refused.
 std::string error_of(const std::string& text) {
   try {
     parse_json(text, "f");
@@ -133,7 +133,7 @@ class RandomText {
   explicit RandomText(uint64_t seed) : random_(seed, 2) { value(0); }
 
   std::string text;
-  std::vector<std::string> places;  // of all values, in order
+  std::vector<std::string> places;  // positions of all values, in order
 
  private:
   uint64_t draw(uint64_t n) { return random_.below(n, i_++, 0); }

@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::Vector3f;
 
-/// The world of a scene given as text, with the source folder as its own.
+/// The simulation of a scene given as text; files are found in the source folder.
 struct Shown {
   explicit Shown(const std::string& text)
       : loaded(parse_scene(text, "scene", OFFSTAGE_SOURCE_DIR)),
@@ -87,7 +87,7 @@ TEST(Overlays, ClosestPointsAreOnTheLineBetweenTheCentresOfBalls) {
   EXPECT_GT(line.color.z(), line.color.x());
 }
 
-TEST(Overlays, BodiesInEachOtherShowTheirDepthInAnotherColour) {
+TEST(Overlays, OverlappingBodiesShowTheirDepthInAnotherColour) {
   const Shown shown(overlaid(
       ball("left", "[0, 0, 0]") + "," + ball("right", "[0, 0.8, 0]"),
       R"({"type": "closest", "a": "left", "b": "right", "color": [0, 0, 1], "penetrating": [1, 0, 0]})"));
@@ -97,7 +97,8 @@ TEST(Overlays, BodiesInEachOtherShowTheirDepthInAnotherColour) {
 }
 
 TEST(Overlays, ContactsOfAllPairsArePushedApart) {
-  // A ball in the floor and a ball on the first; the third is far away, and the fourth does not collide.
+  // A ball in the floor and a ball on the first one. The third ball is far away, and the fourth does not
+  // collide.
   const Shown shown(overlaid(R"({"motion": "static", "shape": {"type": "plane"}},)" +
                                  ball("low", "[0, 0.499, 0]") + "," + ball("high", "[0, 1.495, 0]") + "," +
                                  ball("far", "[5, 3, 0]") + "," +
@@ -107,7 +108,7 @@ TEST(Overlays, ContactsOfAllPairsArePushedApart) {
   for (const render::Line& line : shown.lines().lines) {
     if (line.a == line.b) heights.push_back(line.a.y());
     if (line.width_b > 0) continue;
-    // The head of an arrow: along the normal, which is vertical here.
+    // An arrow head: along the normal, which is vertical here.
     EXPECT_NEAR(line.a.x(), 0, 1e-5);
     EXPECT_NEAR(line.b.x(), 0, 1e-5);
   }
@@ -117,7 +118,7 @@ TEST(Overlays, ContactsOfAllPairsArePushedApart) {
   EXPECT_NEAR(heights[1], 0.997, 1e-5);
 }
 
-/// A cube of 2 kg that has come to rest on the floor after half a second, and one in free fall far above.
+/// A cube of 2 kg that comes to rest on the floor within half a second, and one in free fall far above.
 std::string resting_and_falling(const std::string& overlays, const std::string& more = "") {
   return R"({"materials": [{"name": "wood", "restitution": 0}], "bodies": [
     {"name": "floor", "motion": "static", "shape": {"type": "plane"}, "material": "wood"},
@@ -131,7 +132,7 @@ Shown after_half_a_second(const std::string& text) {
   for (int frame = 0; frame < 5; ++frame) shown.simulation.advance();
   return shown;
 }
-/// From the start to the tip of every arrow of a set.
+/// The vectors from start to tip of all arrows in a set.
 std::vector<Vector3f> arrows(const LineSet& set) {
   std::vector<Vector3f> all;
   for (std::size_t i = 1; i < set.lines.size(); ++i)
@@ -165,7 +166,7 @@ TEST(Overlays, VelocitiesAreArrowsFromTheCentre) {
   EXPECT_EQ(arrows(shown.lines(1)).size(), 1u) << "what rests has none, nor has the floor";
 }
 
-TEST(Overlays, TrailsLieOnTheWayAndEndWhenTheyAreOld) {
+TEST(Overlays, TrailsLieOnThePathAndEndAtTheirAge) {
   Shown shown(R"({"bodies": [{"name": "thrown", "position": [0, 50, 0], "velocity": [2, 3, 0],
                               "shape": {"type": "sphere", "radius": 0.1}},
                              {"name": "other", "motion": "static", "position": [9, 9, 9], "shape": {"type": "sphere"}}],
@@ -176,7 +177,7 @@ TEST(Overlays, TrailsLieOnTheWayAndEndWhenTheyAreOld) {
   float oldest = 1e9f, newest = 0, last_alpha = 0, way = 0;
   for (const render::Line& line : trail.lines) {
     for (const Vector3f& place : {line.a, line.b}) {
-      const float t = place.x() / 2;  // the parabola of its flight
+      const float t = place.x() / 2;  // time on the ballistic parabola
       EXPECT_NEAR(place.y(), 50 + 3 * t - 0.5f * 9.81f * t * t, 2e-3f);
       oldest = std::min(oldest, t);
       newest = std::max(newest, t);
@@ -191,7 +192,7 @@ TEST(Overlays, TrailsLieOnTheWayAndEndWhenTheyAreOld) {
   EXPECT_NEAR(way, 0.4 * std::hypot(2, 3 - 9.81 * (now - 0.2)), 0.4) << "without gaps";
 }
 
-TEST(Overlays, GroupsThatTouchShareAColourAndSleepersAreDim) {
+TEST(Overlays, IslandsShareAColourAndSleepingOnesAreDim) {
   const std::string stack =
       R"({"name": "upper", "position": [0, 1.5, 0]}, {"name": "lower", "position": [0, 0.5, 0]},
     {"name": "lone", "position": [5, 0.5, 0]}, {"motion": "static", "shape": {"type": "plane"}})";
@@ -210,7 +211,7 @@ TEST(Overlays, GroupsThatTouchShareAColourAndSleepersAreDim) {
     EXPECT_TRUE(asleep[i].head<3>().isApprox(0.5f * awake[i].head<3>(), 1e-5f)) << i;
 }
 
-TEST(Overlays, AreTheSameWhateverWasSeenBefore) {
+TEST(Overlays, DoNotDependOnEarlierFrames) {
   const std::string box = R"({"name": "box", "motion": "kinematic", "spin": [1, 2, 3]})";
   const std::string text =
       overlaid(ball("a", "[0, 1.02, 0]") + "," + box,
@@ -233,9 +234,9 @@ TEST(Overlays, DoNotTouchTheState) {
   EXPECT_EQ(with.simulation.snapshot().state_hash, without.simulation.snapshot().state_hash);
 }
 
-// A weight of 2 kg that hangs on a hinge: its axis, a line to the centre, and an arrow for the load of the
-// hinge.
-TEST(JointsOverlay, ShowsTheHingeAndWhatItBears) {
+// A weight of 2 kg that hangs on a hinge: the overlay shows its axis, a line to the centre, and an arrow for
+// the constraint force.
+TEST(JointsOverlay, ShowsTheHingeAndItsForce) {
   Shown shown(R"({"bodies": [{"name": "arm", "shape": {"type": "box", "size": [0.1, 1, 0.1]}, "density": 200,
                               "position": [0, 0.5, 0]}],
     "joints": [{"name": "hinge", "type": "revolute", "a": "arm", "anchor": [0, 1, 0], "axis": [0, 0, 1]}],

@@ -1,5 +1,5 @@
-// The hand-over between the threads of a render: order, bounds, and that a failure anywhere ends it for
-// everyone.
+// The pipeline between the threads of a render: order, limits, and that a failure of any stage ends all
+// threads.
 
 #include "producer/run/pipeline.h"
 
@@ -65,7 +65,7 @@ struct Relay {
   }
 };
 
-TEST(Pipeline, BringsEveryFrameInOrderWithinItsWindow) {
+TEST(Pipeline, DeliversEveryFrameInOrderWithinItsWindow) {
   for (const int drawers : {1, 2, 5}) {
     Relay run{.drawers = drawers};
     run();
@@ -87,12 +87,12 @@ TEST(Pipeline, AFailureOfAnyStageEndsAllAndIsTheOneReported) {
   }
 }
 
-TEST(Pipeline, EndsWithoutShotsAndWithoutDrawers) {
+TEST(Pipeline, EndsWithoutFramesAndWithoutDrawingThreads) {
   Relay empty{.count = 0};
   empty();
   EXPECT_TRUE(empty.printed.empty());
 
-  // As when no drawing thread could be started: the failure reaches those that wait.
+  // If no drawing thread could be started, the waiting threads get the failure.
   Pipeline pipeline(2);
   std::jthread sink([&] { EXPECT_FALSE(pipeline.take_rendered()); });
   std::jthread shooter([&] {

@@ -15,7 +15,7 @@ Copies copies_of(const Placement& placement, const Vec3& position = Vec3::Zero()
   return expand(placement, position, seed, name);
 }
 
-/// Where the copies of an object at `position` stand.
+/// Positions of the copies of an object at `position`.
 std::vector<Vec3> places(const Copies& copies, const Vec3& position = Vec3::Zero()) {
   std::vector<Vec3> all;
   for (const PlacedCopy& copy : copies.placed) all.push_back(copy.motion.point_to_world(position));
@@ -48,7 +48,8 @@ TEST(Placement, RepeatedCopiesStandInARingAboutThePivot) {
     const Real angle = static_cast<Real>(i) * std::numbers::pi / 3;
     EXPECT_LT((at[i] - Vec3(1 + 3 * std::cos(angle), 1, 2 - 3 * std::sin(angle))).norm(), 1e-12);
     const Vec3 outward =
-        copies.placed[i].motion.vector_to_world(Vec3::UnitX());  // the original's, turned along
+        // the x axis of the original, rotated with the copy
+        copies.placed[i].motion.vector_to_world(Vec3::UnitX());
     EXPECT_LT((outward - (at[i] - Vec3(1, 1, 2)) / 3).norm(), 1e-12);
   }
 }
@@ -104,7 +105,7 @@ TEST(Placement, ScatteringFollowsSeedsAndNameAndNothingElse) {
   EXPECT_TRUE(std::equal(first.begin(), first.end(), more.begin())) << "more copies moved the first ones";
 }
 
-TEST(Placement, CopiesThatFindNoPlaceAreLeftOutWithAWarning) {
+TEST(Placement, CopiesWithoutAFreePlaceAreLeftOutWithAWarning) {
   const LoadedScene loaded = parse_scene(
       R"({"bodies": [{"name": "rock", "scatter": {"count": 50, "size": [2, 2], "min_distance": 1}}]})", "s",
       ".");
@@ -149,7 +150,7 @@ TEST(Placement, TooManyCopiesAreAnErrorWhateverTheProduct) {
   }
 }
 
-TEST(Placement, MotionGoesAlongWithItsCopy) {
+TEST(Placement, MotionIsRotatedWithItsCopy) {
   const Scene scene = scene_of(R"({"bodies": [
     {"name": "arm", "motion": "kinematic", "position": [1, 0, 0], "orientation": {"axis": [1, 2, 0], "angle_deg": 30},
      "keyframes": [{"time": 0}, {"time": 1, "position": [2, 1, 0], "orientation": {"axis": [0, 0, 1], "angle_deg": 90}}],

@@ -71,7 +71,7 @@ TEST(Presets, AnEffectIsPlacedNamedAndDelayedAsAWhole) {
   EXPECT_EQ(draught.speed, 0);
 }
 
-TEST(Presets, WhatIsNotThereIsNamedWithWhatIs) {
+TEST(Presets, UnknownPresetsAreReportedWithTheKnownOnes) {
   const std::string text = preset_errors(R"({"emitters": [{"preset": "smoek"}, {"preset": "fire/smok"}],
     "effects": [{"preset": "fire", "overrides": {"flame": {}}}, {"preset": "rain", "overrides": {"rain": {"rat": 1}}}]})");
   EXPECT_NE(text.find("/emitters/0/preset: there is no preset 'smoek'; did you mean 'smoke'?"),
@@ -92,7 +92,7 @@ TEST(Presets, ACanonicalSceneNeedsNoPresets) {
   EXPECT_TRUE(loaded.scene.effects.empty());
 }
 
-TEST(Effects, WhatHappensToParticlesBringsForthOthers) {
+TEST(Effects, ParticleEventsCreateOtherParticles) {
   const LoadedScene loaded = load(R"({"output": {"fps": 20, "duration": 2},
     "bodies": [{"motion": "static", "shape": {"type": "plane"}}],
     "emitters": [{"name": "ball", "surface": {"position": [0, 1.5, 0]}, "rate": 0, "bursts": [{"count": 4}], "speed": 0,
@@ -108,11 +108,11 @@ TEST(Effects, WhatHappensToParticlesBringsForthOthers) {
     for (const PointSet& set : simulation.snapshot().point_sets) all.push_back(set.points.size());
     return all;
   };
-  while (simulation.frame() < 9) simulation.advance();  // 0.4 s: in the air
+  while (simulation.frame() < 9) simulation.advance();  // 0.4 s: all in flight
   EXPECT_EQ(counts(), (std::vector<std::size_t>{4, 32, 8, 0, 0}));
   while (simulation.frame() < 13) simulation.advance();  // 0.6 s: they have hit the ground once, at 0.55 s
   EXPECT_EQ(counts(), (std::vector<std::size_t>{4, 48, 8, 12, 0}));
-  while (simulation.frame() < 23) simulation.advance();  // 1.1 s: their lives are over
+  while (simulation.frame() < 23) simulation.advance();  // 1.1 s: all have died
   const std::vector<std::size_t> end = counts();
   EXPECT_EQ(end[0], 0u);
   EXPECT_EQ(end[4], 20u);

@@ -1,4 +1,4 @@
-// The line that a terminal shows, and how times are said.
+// The progress line of a terminal, and the format of durations.
 
 #include "producer/run/progress.h"
 
@@ -20,7 +20,7 @@ Progress halfway() {
           .fraction = 0.5};
 }
 
-TEST(Progress, DurationsAreSaidInTheUnitsOfAClock) {
+TEST(Progress, DurationsUseHoursMinutesAndSeconds) {
   EXPECT_EQ(duration_text(0.2), "1 s");
   EXPECT_EQ(duration_text(59), "59 s");
   EXPECT_EQ(duration_text(125), "2 min 05 s");
@@ -54,7 +54,7 @@ TEST(Progress, TheBarGrowsWithTheWork) {
   EXPECT_EQ(before, 25);
 }
 
-TEST(Progress, BeforeTheFirstFrameItSaysWhatIsSimulated) {
+TEST(Progress, BeforeTheFirstFrameItNamesTheSimulation) {
   const std::string line = progress_bar(
       {.done = 0, .total = 1, .fraction = 0.3, .frames_simulated = 270, .frames_to_simulate = 900}, 100);
   EXPECT_NE(line.find("simulating frame 270/900"), std::string::npos) << line;

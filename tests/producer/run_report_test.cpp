@@ -1,4 +1,4 @@
-// The page about a run: whole by itself, and its plots and tables show the figures they are given.
+// The page about a run is self-contained, and its plots and tables show the given figures.
 
 #include "producer/run/run_report.h"
 
@@ -61,12 +61,12 @@ TEST(RunReport, PicturesAreInThePageItself) {
   ASSERT_EQ(pictures.size(), 1u);
   const render::Image image = render::decode_image(from_base64(pictures[0]), "picture");
   EXPECT_EQ(image.rgba, three_frames().pictures[0].second.rgba);
-  // Nothing is fetched from elsewhere.
+  // Nothing is loaded from elsewhere.
   EXPECT_EQ(all(html, "((?:src|href)=\"(?!data:))").size(), 0u);
   EXPECT_EQ(html.find("http"), std::string::npos);
 }
 
-TEST(RunReport, TextOfTheSceneIsNotTakenForMarkup) {
+TEST(RunReport, TextOfTheSceneIsEscaped) {
   const std::string html = page();
   EXPECT_NE(html.find("<h1>a &lt; b &amp; c</h1>"), std::string::npos);
   EXPECT_EQ(html.find("<script"), std::string::npos);
@@ -83,7 +83,7 @@ TEST(RunReport, PlotsGoThroughTheFigures) {
   };
   const auto kinetic = points(lines[0]), potential = points(lines[1]), total = points(lines[3]);
   ASSERT_EQ(kinetic.size(), 3u);
-  // Evenly spaced in time and value; a picture's y goes down.
+  // Points are evenly spaced in time and value; the y axis of a picture points down.
   EXPECT_NEAR(kinetic[2][0] - kinetic[1][0], kinetic[1][0] - kinetic[0][0], 0.11);
   EXPECT_NEAR(kinetic[2][1] - kinetic[1][1], kinetic[1][1] - kinetic[0][1], 0.11);
   EXPECT_GT(kinetic[0][1], kinetic[2][1]);

@@ -3,7 +3,7 @@
 
 namespace offstage::producer {
 
-/// Its model files are LICENSE, in the source folder: the format checks only that they are there.
+/// Its model file is LICENSE in the source folder, because the format only checks that the file exists.
 inline constexpr const char* kSampleScene = R"({
   "$schema": "scene.schema.json",
   "version": 1,

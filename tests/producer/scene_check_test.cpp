@@ -16,7 +16,7 @@ std::string lines(const std::vector<Problem>& problems) {
   return text;
 }
 
-/// Paths and texts of all errors, one a line.
+/// Paths and texts of all errors, one per line.
 std::string errors_of(const std::string& text) {
   try {
     parse_scene(text, "s", OFFSTAGE_SOURCE_DIR);
@@ -38,7 +38,7 @@ TEST(SceneCheck, NamesAreUniqueWithinASection) {
             "/bodies/1/name: the name 'a_1' is already used by /bodies/0\n");
 }
 
-TEST(SceneCheck, NamesLeadSomewhere) {
+TEST(SceneCheck, NamesReferToExistingObjects) {
   EXPECT_EQ(errors_of(R"({
     "materials": [{"name": "steel"}],
     "bodies": [{"name": "ball", "material": "stele"}, {"name": "rock", "repeat": {"count": 2}}],
@@ -56,7 +56,7 @@ TEST(SceneCheck, NamesLeadSomewhere) {
             "/camera/body: there is no body 'car'; known: 'ball', 'rock_0', 'rock_1'\n");
 }
 
-TEST(SceneCheck, OverlaysShowWhatThereIs) {
+TEST(SceneCheck, OverlaysNameExistingObjects) {
   EXPECT_EQ(errors_of(R"({
     "bodies": [{"name": "ball"}, {"name": "floor", "motion": "static", "shape": {"type": "plane"}},
                {"name": "wall", "motion": "static", "shape": {"type": "plane"}},
@@ -82,7 +82,7 @@ TEST(SceneCheck, OverlaysShowWhatThereIs) {
             "\"velocities\", \"islands\", \"joints\", \"cloth\", \"trails\" or \"text\"\n");
 }
 
-TEST(SceneCheck, FilesAreThere) {
+TEST(SceneCheck, FilesMustExist) {
   EXPECT_EQ(errors_of(R"({"materials": [{"texture": "no.png"}],
                           "bodies": [{"material": "material_0", "shape": {"type": "mesh", "file": "no.obj"}},
                                      {"model": {"file": "LICENSE"}}]})"),
@@ -103,7 +103,7 @@ TEST(SceneCheck, OnlyKinematicBodiesFollowKeysAndPlanesDoNotMove) {
       "/bodies/3/keyframes/2/time: times must increase, got 0 after 1\n");
 }
 
-TEST(SceneCheck, CameraAndSunCanBeUsed) {
+TEST(SceneCheck, CameraAndSunAreValid) {
   EXPECT_EQ(
       errors_of(
           R"({"camera": {"eye": [1, 1, 1], "target": [1, 1, 1]}, "lights": [{"direction": [1, 0, 0]}, {}]})"),
@@ -120,7 +120,7 @@ TEST(SceneCheck, AFilmHasAtLeastOneFrame) {
   EXPECT_EQ(errors_of(R"({"output": {"fps": 10, "duration": 0.06}})"), "");
 }
 
-TEST(SceneCheck, WhatHasNoEffectIsWarnedOf) {
+TEST(SceneCheck, KeysWithoutEffectGiveWarnings) {
   EXPECT_EQ(warnings_of(R"({
     "materials": [{"name": "lone"}],
     "bodies": [{"name": "b", "motion": "static", "velocity": [1, 0, 0]}, {"mass": 2, "density": 7}],
@@ -153,7 +153,7 @@ TEST(SceneCheck, ContactRulesNameTwoMaterialsOnce) {
             "/contacts/0: has no effect: it has neither restitution nor friction\n");
 }
 
-TEST(SceneCheck, FrictionAcrossAGrainTakesMaterialAndAxis) {
+TEST(SceneCheck, CrossFrictionNeedsMaterialAndAxis) {
   EXPECT_EQ(warnings_of(R"({"materials": [{"name": "planks", "cross_friction": 1}, {"name": "ice"}],
     "bodies": [{"material": "planks"}, {"material": "ice", "friction_axis": [1, 0, 0]}]})"),
             "/materials/0/cross_friction: has no effect: no body of this material has a friction_axis\n"
@@ -167,7 +167,7 @@ TEST(SceneCheck, FrictionAcrossAGrainTakesMaterialAndAxis) {
       "/materials/0/cross_friction: needs a \"friction\" above 0, which it is relative to, such as 0.001\n");
 }
 
-TEST(SceneCheck, ForcesActOnWhatThereIs) {
+TEST(SceneCheck, ForcesNameExistingObjects) {
   EXPECT_EQ(errors_of(R"({"bodies": [{"name": "crate", "repeat": {"count": 2}}, {"name": "ball", "mass": 1}],
     "forces": [{"type": "constant", "bodies": ["crate_1", "bal", "crate"]}, {"type": "wind", "end": 0},
                {"type": "grab", "body": "ball"},
@@ -194,7 +194,7 @@ TEST(SceneCheck, GrabsAndWindsTooStrongForTheStepAreRefusedUnlessTheIntegratorFo
       "forces": [{"type": "wind", "drag": 300},
                  {"type": "grab", "body": "ball", "keyframes": [{}], "stiffness": 90000, "damping": 0}]})";
   };
-  // 2.785 m / c = 0.0093 s, and 2.83 sqrt(m / k) = 0.0094 s.
+  // Bounds: 2.785 m / c = 0.0093 s, and 2.83 sqrt(m / k) = 0.0094 s.
   EXPECT_EQ(errors_of(scene("rk4")),
             "/forces/0/drag: is too large for this mass and sub-step: /world/step must be less than 0.00924 "
             "s, is 0.01 s\n"
@@ -204,7 +204,7 @@ TEST(SceneCheck, GrabsAndWindsTooStrongForTheStepAreRefusedUnlessTheIntegratorFo
     EXPECT_EQ(errors_of(scene(integrator)), "");
 }
 
-TEST(SceneCheck, WhatIsToHappenAtAnAgeThatNoParticleReachesIsAnError) {
+TEST(SceneCheck, EventsAtUnreachableAgesAreErrors) {
   const auto scene = [](const std::string& more) {
     return R"({"emitters": [{"lifespan": {"mean": 1, "deviation": 0.2}, )" + more + "}]}";
   };
@@ -222,7 +222,7 @@ TEST(SceneCheck, WhatIsToHappenAtAnAgeThatNoParticleReachesIsAnError) {
 
 // --- Springs ---
 
-/// Steps x'' = -k x - c x' from rest at 1; whether it stays bounded.
+/// Integrates x'' = -k x - c x' from rest at x = 1 and returns whether the solution stays bounded.
 bool stays_bounded(sim::IntegratorKind kind, Real k, Real c, Real h) {
   Real x = 1, v = 0;
   const auto a = [&](Real x1, Real v1) { return -k * x1 - c * v1; };
@@ -242,13 +242,13 @@ bool stays_bounded(sim::IntegratorKind kind, Real k, Real c, Real h) {
   return std::abs(x) < 1e6;
 }
 
-TEST(SceneCheck, TheLargestStableStepIsWhereTheIntegratorsBreakDown) {
+TEST(SceneCheck, TheLargestStableStepIsWhereTheIntegratorsDiverge) {
   using enum sim::IntegratorKind;
   for (const auto kind : {symplectic_euler, rk4}) {
     for (const auto& [k, c] : {std::pair(400.0, 0.0), std::pair(0.0, 30.0)}) {
       const Real h = largest_stable_step(kind, k, c, 1);
       EXPECT_TRUE(stays_bounded(kind, k, c, 0.99 * h)) << k;
-      // Damping alone only sends the speed to infinity.
+      // Without a spring, only the speed diverges.
       EXPECT_TRUE(c > 0 || !stays_bounded(kind, k, c, 1.01 * h)) << k;
     }
   }
@@ -264,7 +264,8 @@ TEST(SceneCheck, ASpringTooStiffForItsStepIsNamedWithTheStepItNeeds) {
                "springs": [{"name": "tie", "a": {"particles": "p"}, "b": {"particles": "p", "index": 1}, "stiffness": )" +
            std::to_string(stiffness) + "}]}";
   };
-  // Reduced mass 1 kg: 2 sqrt(1 / k) = 0.01 s at k = 40000 N/m, 2.83 sqrt(1 / k) at k = 80000.
+  // The reduced mass is 1 kg: the bound 2 sqrt(1 / k) is 0.01 s at k = 40000 N/m, 2.83 sqrt(1 / k) at k =
+  // 80000.
   EXPECT_EQ(errors_of(scene(39000, "symplectic_euler")), "");
   EXPECT_EQ(errors_of(scene(41000, "symplectic_euler")),
             "/springs/0: the spring 'tie' is too stiff for this sub-step: /world/step must be less than "
@@ -302,7 +303,7 @@ TEST(SceneCheck, ASplitThatExplodesIsRefused) {
       << errors_of(scene(9));
 }
 
-TEST(SceneCheck, BoundsCountWhatIsBornFromParticles) {
+TEST(SceneCheck, BoundsCountDescendants) {
   const Scene scene = parse_scene(R"({"output": {"duration": 1}, "emitters": [
     {"name": "shell", "rate": 0, "bursts": [{"count": 3}], "lifespan": 0.5,
      "trails": [{"name": "tail", "rate": 100, "lifespan": 9}],
@@ -344,8 +345,8 @@ TEST(SceneCheck, AgesDoNotDecreaseAndEmittersEndAfterTheyStart) {
       "/emitters/0/look/size_over_age/2: ages must not decrease\n");
 }
 
-TEST(SceneCheck, DragThatWouldBlowUpIsRefused) {
-  // m/k = 0.01 s: explicit steps diverge from 0.02 s on (0.02785 s for Runge-Kutta).
+TEST(SceneCheck, UnstableDragIsRefused) {
+  // m/k = 0.01 s: explicit methods diverge for steps above 0.02 s (0.02785 s for Runge-Kutta).
   const auto group = [](double step) {
     return R"({"world": {"step": )" + std::to_string(step) +
            R"(}, "particles": [{"integrator": "symplectic_euler", "mass": 0.01, "linear_drag": 1, "places": [{}]}]})";
@@ -367,7 +368,7 @@ TEST(SceneCheck, NothingStartsOutsideTheWorld) {
   EXPECT_EQ(errors_of(R"({"world": {"bounds": 6000}, "bodies": [{"position": [5000, 0, 0]}]})"), "");
 }
 
-TEST(SceneCheck, WhatSpheresCannotShowIsSaid) {
+TEST(SceneCheck, KeysThatSpheresIgnoreGiveWarnings) {
   EXPECT_NE(
       warnings_of(
           R"({"particles": [{"places": [{}], "look": {"style": "sphere", "color": "#ff000080", "additive": true}}]})")

@@ -16,7 +16,7 @@ Scene loaded_scene(const std::string& text, const std::vector<std::string>& over
   return parse_scene(text, "s", OFFSTAGE_SOURCE_DIR, overrides).scene;
 }
 
-/// All that is wrong with a scene, one problem a line.
+/// All problems of a scene, one per line.
 std::string load_errors(const std::string& text, const std::vector<std::string>& overrides = {}) {
   try {
     parse_scene(text, "s", OFFSTAGE_SOURCE_DIR, overrides);
@@ -64,7 +64,7 @@ TEST(SceneIo, ColoursAreSrgbTextOrLinearNumbers) {
   const Scene scene =
       loaded_scene(R"({"materials": [{"color": "#ff8000"}, {"color": "#00000080"}, {"color": [2, 0.5, 0]},
                                                  {"color": [0, 0, 0, 0.25]}]})");
-  const Eigen::Vector4f orange(1, 0.21586050f, 0, 1);  // 0x80 / 255 decoded by IEC 61966-2-1
+  const Eigen::Vector4f orange(1, 0.21586050f, 0, 1);  // 0x80 / 255, decoded according to IEC 61966-2-1
   EXPECT_LT((scene.materials[0].color.rgba - orange).cwiseAbs().maxCoeff(), 1e-6f);
   EXPECT_FLOAT_EQ(scene.materials[1].color.rgba[3], 128 / 255.f);
   EXPECT_EQ(scene.materials[2].color.rgba, Eigen::Vector4f(2, 0.5f, 0, 1));
@@ -106,7 +106,7 @@ TEST(SceneIo, OrientationsAreQuaternionsOrAxisAndAngle) {
       "90");
 }
 
-TEST(SceneIo, WhatVariesMustStayInItsRange) {
+TEST(SceneIo, DistributionsMustStayInTheirRange) {
   const auto radius = [](const std::string& value) {
     return load_errors(R"({"emitters": [{"radius": )" + value + "}]}");
   };
@@ -131,7 +131,7 @@ TEST(SceneIo, WhatVariesMustStayInItsRange) {
             "s:1:27: /emitters/0/radius/maen: unknown key in varying number; did you mean 'mean'?");
 }
 
-TEST(SceneIo, ClosedLimitsCutOffANormalDistribution) {
+TEST(SceneIo, ClosedLimitsTruncateANormalDistribution) {
   const Scene scene =
       loaded_scene(R"({"emitters": [{"restitution": {"mean": 0.9, "deviation": 0.5, "clip": false}}]})");
   const auto& normal = std::get<effects::Normal>(scene.emitters[0].restitution);
@@ -139,7 +139,7 @@ TEST(SceneIo, ClosedLimitsCutOffANormalDistribution) {
   EXPECT_EQ(normal.max, 1);
 }
 
-TEST(SceneIo, TypesLeftOutAreTheFirstWhereThatReadsNaturally) {
+TEST(SceneIo, OmittedTypesHaveDefaultsOrAreReported) {
   EXPECT_TRUE(std::holds_alternative<StaticCamera>(loaded_scene(R"({"camera": {"eye": [0, 1, 9]}})").camera));
   EXPECT_EQ(load_errors(R"({"bodies": [{"shape": {"radius": 1}}]})"),
             "s:1:23: /bodies/0/shape/type: is required: one of \"sphere\", \"box\", \"capsule\", "
@@ -190,7 +190,7 @@ TEST(SceneIo, EveryProblemIsReportedAtOnceInOrder) {
             "s:10:3: /wrold: unknown key in scene; did you mean 'world'?");
 }
 
-TEST(SceneIo, WhatIsRequiredIsMissed) {
+TEST(SceneIo, MissingRequiredKeysAreReported) {
   EXPECT_EQ(
       load_errors(
           R"({"bodies": [{"shape": {"type": "mesh"}, "model": {"file": ""}}], "camera": {"type": "follow"}})"),

@@ -1,4 +1,4 @@
-/// The schema, the loader and the reference come from one table; here is checked that they say the same.
+/// The schema, the loader and the reference are generated from one table; these tests check that they agree.
 
 #include <fstream>
 #include <functional>
@@ -31,7 +31,7 @@ class SceneSchema : public testing::Test {
   bool schema_accepts(const json& scene) {
     return valijson::Validator().validate(schema, Adapter(scene), nullptr);
   }
-  /// Paths of all problems the loader reports; empty if it accepts the scene.
+  /// Paths of all problems that the loader reports; empty if it accepts the scene.
   static std::set<std::string> refused(const json& scene) {
     std::set<std::string> paths;
     try {
@@ -42,14 +42,14 @@ class SceneSchema : public testing::Test {
     return paths;
   }
 
-  /// One place of the format that a value can be put into.
+  /// A place in the format at which a value can stand.
   struct Slot {
     std::string path;
     std::function<json(const json&)> scene_with;
     json rule;  // the schema of the value
   };
 
-  /// Whether a path is recursive through child particles of child particles.
+  /// Whether a path leads into child particles of child particles, which is recursive.
   static bool is_deep(const std::string& path) {
     int lists = 0;
     for (std::size_t at = 0; (at = path.find("/0", at)) != std::string::npos; ++at) ++lists;
@@ -62,8 +62,8 @@ class SceneSchema : public testing::Test {
                : rule;
   }
 
-  /// Calls `leaf` for every key whose value is no object, and `object` for every object, wherever they can
-  /// stand.
+  /// Calls `leaf` for every key whose value is not an object, and `object` for every object, at all places
+  /// where they can stand.
   void walk(const Slot& slot, const std::function<void(const Slot&)>& leaf,
             const std::function<void(const Slot&, const json& minimal)>& object) const {
     const json& rule = resolve(slot.rule);
@@ -118,7 +118,7 @@ class SceneSchema : public testing::Test {
   }
 };
 
-/// A number that the limits in `rule` forbid, on the given side.
+/// A number outside the limits in `rule`, below or above.
 std::optional<json> beyond(const json& rule, bool low) {
   if (low && rule.contains("minimum")) return rule.at("minimum").get<double>() - 1.5;
   if (low && rule.contains("exclusiveMinimum")) return rule.at("exclusiveMinimum");
@@ -158,7 +158,7 @@ TEST_F(SceneSchema, EveryKeyRefusesAWrongTypeByItsPathAsTheLoaderDoes) {
   EXPECT_GT(keys, 200);
 }
 
-TEST_F(SceneSchema, EveryRangeRefusesWhatLiesBeyondAsTheLoaderDoes) {
+TEST_F(SceneSchema, EveryRangeRefusesValuesOutsideAsTheLoaderDoes) {
   int ranges = 0;
   walk_all(
       [&](const Slot& slot) {
@@ -215,7 +215,7 @@ TEST_F(SceneSchema, EveryDefaultItNamesIsTheLoaders) {
             schema_json.at("definitions").at("world").at("properties").at("step").at("default"));
 }
 
-/// Puts an odd value at a random place of a tree.
+/// Replaces a random value of a tree by an unusual one.
 void disturb(json& tree, const effects::RandomStream& random, uint64_t seed) {
   static const std::vector<json> kOdd = {nullptr,
                                          true,
@@ -247,7 +247,7 @@ void disturb(json& tree, const effects::RandomStream& random, uint64_t seed) {
   tree[pointer] = kOdd[random.below(kOdd.size(), seed, 2)];
 }
 
-TEST_F(SceneSchema, AcceptsWhateverTheLoaderAccepts) {
+TEST_F(SceneSchema, AcceptsAllThatTheLoaderAccepts) {
   const json sample = json::parse(kSampleScene, nullptr, true, true);
   const effects::RandomStream random(3, 1);
   int accepted = 0;

@@ -1,4 +1,4 @@
-// Bodies, contacts and forces of a scene reach the simulation: tests against closed forms that depend on each
+// Bodies, contacts and forces of a scene reach the simulation: compared with closed forms that depend on each
 // of the keys.
 
 #include "producer/build/simulation.h"
@@ -15,7 +15,7 @@ namespace {
 
 constexpr Real kGravity = 9.81;
 
-/// A scene given as text, simulated.
+/// A scene given as text, simulated to its end.
 class Simulated {
  public:
   explicit Simulated(const std::string& text)
@@ -34,7 +34,7 @@ class Simulated {
   Simulation simulation_;
 };
 
-/// Balls of 2 kg without weight at given places of the x axis, for one second.
+/// Balls of 2 kg at the given places of the x axis, for one second; gravity is off.
 std::string balls(const std::vector<double>& places, const std::string& more) {
   std::string bodies;
   for (const double x : places)
@@ -45,7 +45,7 @@ std::string balls(const std::vector<double>& places, const std::string& more) {
          R"(], "output": {"fps": 10, "duration": 1.1}, )" + more + "}";
 }
 
-/// A cube of 1 kg on a floor, for two seconds; with more keys of the floor, the cube and the scene.
+/// A cube of 1 kg on a floor, for two seconds; the arguments add keys to the floor, the cube and the scene.
 std::string cube_on_floor(const std::string& floor, const std::string& cube, const std::string& scene) {
   return R"({"bodies": [{"name": "floor", "motion": "static", "shape": {"type": "plane"}, "material": "floor")" +
          floor +
@@ -53,18 +53,18 @@ std::string cube_on_floor(const std::string& floor, const std::string& cube, con
              "position": [0, 0.05, 0], "material": "cube")" +
          cube + R"(}], "output": {"fps": 10, "duration": 2.1}, )" + scene + "}";
 }
-/// Where a body stops that slides with 2 m/s.
+/// Stopping distance of a body that slides with 2 m/s.
 Real stopping_distance(Real friction) {
   return 4 / (2 * friction * kGravity);
 }
 
-TEST(Simulation, AFieldPushesWhomItNamesWhereAndWhileItSays) {
+TEST(Simulation, AFieldActsOnItsObjectsInItsRegionDuringItsTime) {
   const Simulated run(balls({0, 5, 10}, R"("forces": [
     {"type": "constant", "force": [0, 3, 0], "bodies": ["body_0"], "start": 0.25, "end": 0.75},
     {"type": "constant", "force": [0, 0, 8], "region": {"type": "box", "centre": [5, 0, 0], "size": [4, 4, 40]}},
     {"type": "point", "point": [14, 0, 0], "force": -1, "drop_rate": 2, "end": 0.1,
      "region": {"type": "sphere", "centre": [12, 0, 0], "radius": 4}}])"));
-  constexpr Real kStep = 1.0 / 240;  // times the acceleration: rounding of the start and end of a force
+  constexpr Real kStep = 1.0 / 240;  // the start and end of a force are rounded to a sub-step
   EXPECT_TRUE(run.body("body_0").velocity.isApprox(Vec3(0, 0.75, 0), 2 * kStep));
   EXPECT_TRUE(run.body("body_1").velocity.isApprox(Vec3(0, 0, 4), 1e-9));
   EXPECT_NEAR(run.body("body_2").velocity.x(), -0.25 / 2 * 0.1, 0.25 / 2 * kStep);
@@ -89,14 +89,14 @@ TEST(Simulation, WindCarriesBodiesAlong) {
 }
 
 TEST(Simulation, AnExplosionThrowsByDistance) {
-  // Its impulse falls linearly from 6 N s to nothing 4 m away; the nearest point of the ball is 1 m away.
+  // The impulse falls linearly from 6 N s to zero at 4 m; the nearest point of the ball is 1 m away.
   const Simulated run(balls({1.5, 20}, R"("forces": [
     {"type": "explosion", "time": 0.5, "point": [0, 0, 0], "impulse": 6, "radius": 4}])"));
   EXPECT_TRUE(run.body("body_0").velocity.isApprox(Vec3(6 * 0.75 / 2, 0, 0), 1e-9));
   EXPECT_EQ(run.body("body_1").velocity, Vec3(0, 0, 0));
 }
 
-TEST(Simulation, AHandCarriesABodyByOnePoint) {
+TEST(Simulation, AGrabHoldsABodyByOnePoint) {
   const Simulated run(
       R"({"world": {"integrator": "implicit_euler"}, "bodies": [{"name": "box", "mass": 2, "angular_drag": 1}],
     "forces": [{"type": "grab", "body": "box", "point": [0, 0.5, 0], "stiffness": 400, "damping": 40,
@@ -105,8 +105,8 @@ TEST(Simulation, AHandCarriesABodyByOnePoint) {
   EXPECT_TRUE(run.body("box").centre.isApprox(Vec3(3, 1 - 2 * kGravity / 400, 0), 1e-3));
 }
 
-TEST(Simulation, ABeltTakesWhatLiesOnItToItsSpeed) {
-  // The belt's friction of 0.2 needs 0.76 s for 1.5 m/s.
+TEST(Simulation, AConveyorAcceleratesBodiesToItsSpeed) {
+  // With a friction coefficient of 0.2, the belt needs 0.76 s to accelerate the cube to 1.5 m/s.
   const std::string materials =
       R"("materials": [{"name": "floor", "friction": 0.2}, {"name": "cube", "friction": 0.2}])";
   const Simulated run(cube_on_floor(R"(, "surface_velocity": [0, 0, 1.5])", "", materials));
@@ -115,7 +115,7 @@ TEST(Simulation, ABeltTakesWhatLiesOnItToItsSpeed) {
   EXPECT_NEAR(run.body("cube").centre.z(), 1.5 * 2 - slid, 0.01);
 }
 
-TEST(Simulation, FrictionIsThatOfTheMaterialsOrOfTheirRule) {
+TEST(Simulation, FrictionComesFromTheMaterialsOrTheirRule) {
   const std::string materials =
       R"("materials": [{"name": "floor", "friction": 0.8}, {"name": "cube", "friction": 0.2}])";
   const std::string slides = R"(, "velocity": [2, 0, 0])";
@@ -128,8 +128,8 @@ TEST(Simulation, FrictionIsThatOfTheMaterialsOrOfTheirRule) {
   EXPECT_NEAR(Simulated(cube_on_floor("", slides, materials + ice)).body("cube").centre.x(), 4, 5e-3);
 }
 
-TEST(Simulation, WhatDoesNotSlideHasItsOwnFriction) {
-  // A push of 0.45 of the weight: less than the static limit and more than the dynamic one.
+TEST(Simulation, StickingContactsUseStaticFriction) {
+  // A force of 0.45 of the weight: below the limit of static friction, above that of dynamic friction.
   const auto pushed = [](const std::string& more) {
     return Simulated(cube_on_floor("", "",
                                    R"("materials": [{"name": "floor", "friction": 0.3)" + more +
@@ -140,7 +140,7 @@ TEST(Simulation, WhatDoesNotSlideHasItsOwnFriction) {
   EXPECT_GT(pushed("").body("cube").centre.x(), 1);
 }
 
-TEST(Simulation, FrictionAcrossTheGrainIsItsOwn) {
+TEST(Simulation, CrossFrictionActsAcrossTheFrictionAxis) {
   const std::string materials =
       R"("materials": [{"name": "floor", "friction": 0.4}, {"name": "cube", "friction": 0.4, "cross_friction": 0.1}])";
   const auto slid = [&](const std::string& velocity) {
@@ -152,7 +152,7 @@ TEST(Simulation, FrictionAcrossTheGrainIsItsOwn) {
   EXPECT_NEAR(slid("[0, 0, 2]").z(), stopping_distance(0.2), 5e-3);  // the mean of 0.1 and 0.4
 }
 
-TEST(Simulation, ABlowPassesThroughARowOfBallsInSequence) {
+TEST(Simulation, ImpactLawsDifferInARowOfBalls) {
   const auto last = [](const std::string& law) {
     const Simulated run(R"({"world": {"gravity": [0, 0, 0], "impact": ")" + law + R"("},
       "materials": [{"name": "steel", "restitution": 1, "friction": 0}],
@@ -164,7 +164,8 @@ TEST(Simulation, ABlowPassesThroughARowOfBallsInSequence) {
     return run.body("last").velocity.x();
   };
   EXPECT_NEAR(last("sequential"), 3, 1e-6);
-  EXPECT_NEAR(last("simultaneous"), 2, 1e-6);  // all three by complementarity: -1, 2 and 2
+  // solution of the complementarity problem with all three balls: -1, 2 and 2
+  EXPECT_NEAR(last("simultaneous"), 2, 1e-6);
 }
 
 TEST(Simulation, BodiesThatMeetSlowlyDoNotBounce) {
@@ -180,7 +181,7 @@ TEST(Simulation, BodiesThatMeetSlowlyDoNotBounce) {
   EXPECT_NEAR(top("5"), 0.5, 0.01);
 }
 
-TEST(Simulation, TheSolverAndSleepAreWhatTheSceneSays) {
+TEST(Simulation, TheSceneSelectsSolverAndSleep) {
   const std::string materials = R"("materials": [{"name": "floor"}, {"name": "cube"}], "world": )";
   const Simulated fast(cube_on_floor("", "", materials + R"({"solver": "fast"})"));
   EXPECT_EQ(fast.totals().exact.solves, 0u);

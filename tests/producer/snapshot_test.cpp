@@ -34,7 +34,7 @@ Snapshot sample() {
   return s;
 }
 
-TEST(Snapshot, ComesBackAsItWas) {
+TEST(Snapshot, IsReadBackUnchanged) {
   const auto bytes = serialize(sample());
   const Snapshot back = deserialize(bytes, "memory");
   EXPECT_EQ(back.frame, 42);
@@ -55,7 +55,7 @@ TEST(Snapshot, ComesBackAsItWas) {
 TEST(Snapshot, AnyDamagedByteIsNoticed) {
   const auto good = serialize(sample());
   for (std::size_t i = 0; i < good.size(); ++i) {
-    if (i >= 12 && i < 16) continue;  // the header's reserved word
+    if (i >= 12 && i < 16) continue;  // the reserved word of the header is not checked
     auto bytes = good;
     bytes[i] = static_cast<uint8_t>(bytes[i] ^ 0x55);
     EXPECT_THROW(deserialize(bytes, "memory"), render::FileError) << "byte " << i;

@@ -1,4 +1,4 @@
-// What a sweep runs, and the table it makes.
+// The runs of a sweep and its table.
 
 #include "producer/run/sweep.h"
 
@@ -33,7 +33,7 @@ TEST(Sweep, CommasInsideBracketsAndQuotesBelongToTheValue) {
   EXPECT_EQ(parse_variation("p=smoke,fire").values, (Values{"smoke", "fire"}));
 }
 
-TEST(Sweep, WhatIsNoVariationIsRefused) {
+TEST(Sweep, InvalidVariationsAreRefused) {
   for (const char* text : {"a", "=1,2", "a=", "a=1,,2", "a=1:2", "a=1:2:0", "a=1:2:-1", "a=1:x:1",
                            "a=1:2:3:4", "a=0:1e9:1", "a=1:nan:1"})
     EXPECT_THROW(parse_variation(text), std::invalid_argument) << text;
@@ -68,7 +68,7 @@ TEST(Sweep, FiguresHaveNoTimesSoThatTheyRepeat) {
     EXPECT_NE(table.find(name), std::string::npos) << name;
 }
 
-/// Whether a rectangle of an image has a pixel that differs from the lower right corner.
+/// Whether a rectangle of an image has a pixel that differs from the lower right corner of the image.
 bool is_drawn(const render::Image& image, int left, int top, int right, int bottom) {
   const auto at = [&](int x, int y) {
     return image.rgba[4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width_px) +
@@ -86,7 +86,7 @@ TEST(ContactSheet, LabelsStayUnderTheirPictureHoweverLongTheyAre) {
   picture.rgba.assign(4 * picture.pixel_count(), 255);
   const std::string longest(300, 'W');
   const render::Image sheet = contact_sheet({longest}, {{{longest}, picture}, {{"b"}, picture}}, 2);
-  // From the right: a margin, a picture, a gap, a picture, a margin, all gaps alike.
+  // From the right: a margin, a picture, a gap, a picture, a margin; all gaps are equal.
   const int gap = (sheet.width_px - 2 * 160) / 3;
   ASSERT_GT(gap, 4);
   const int top = sheet.height_px / 4;  // below the heading

@@ -1,4 +1,4 @@
-// Texts on the picture: content, position and time.
+// Text overlays: content, position and time.
 
 #include "producer/build/texts.h"
 
@@ -17,7 +17,7 @@ render::Image grey() {
   return {kWidth, kHeight, std::vector<uint8_t>(std::size_t{4} * kWidth * kHeight, 128)};
 }
 
-/// The picture of one text over grey, at a time.
+/// The picture of one text over grey at a given time.
 render::Image shown(const TextOverlay& overlay, double time = 1.5) {
   Scene scene;
   scene.overlays.push_back(overlay);
@@ -32,7 +32,7 @@ render::Image shown(const TextOverlay& overlay, double time = 1.5) {
   return image;
 }
 
-/// Bounds of the pixels that differ from grey: left, top, right and bottom; the last two excluded.
+/// Bounds of the pixels that differ from grey: left, top, right and bottom (the last two exclusive).
 std::array<int, 4> text_box(const render::Image& image) {
   std::array<int, 4> box = {kWidth, kHeight, 0, 0};
   for (int y = 0; y < kHeight; ++y)
@@ -49,13 +49,13 @@ TEST(Texts, PlaceholdersStandForTheMoment) {
   EXPECT_NE(by_name.rgba, grey().rgba);
 }
 
-TEST(Texts, StandWhereTheyAreToldTo) {
+TEST(Texts, StandAtTheirPlace) {
   const auto box = [](TextPlace place) { return text_box(shown({.text = "Here", .place = place})); };
   const auto [left, top, right, bottom] = box(TextPlace::top_left);
   EXPECT_LT(right, kWidth / 2);
   EXPECT_LT(bottom, kHeight / 2);
   const auto corner = box(TextPlace::bottom_right);
-  // The same distance from the other sides, but for the room below and beside letters.
+  // The distances from the other sides are equal, up to the space below and beside the letters.
   EXPECT_NEAR(kWidth - corner[2], left, 4);
   EXPECT_NEAR(kHeight - corner[3], top, 6);
   const auto center = box(TextPlace::center);
@@ -73,7 +73,7 @@ TEST(Texts, LinesAreOneBelowTheOtherAndGrowWithTheirSize) {
   EXPECT_NEAR(height({.text = "HH", .size = 0.1}), 2 * one, 2);
 }
 
-TEST(Texts, AreThereOnlyInTheirTime) {
+TEST(Texts, AreVisibleOnlyInTheirTime) {
   const TextOverlay overlay{.text = "now", .from = 1, .until = 2};
   EXPECT_EQ(shown(overlay, 0.99).rgba, grey().rgba);
   EXPECT_NE(shown(overlay, 1).rgba, grey().rgba);

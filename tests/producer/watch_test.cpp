@@ -1,4 +1,4 @@
-// Which files a scene is made of, and that their changes are seen.
+// Finds the files of a scene, and notices their changes.
 
 #include "producer/run/watch.h"
 
@@ -69,7 +69,7 @@ TEST_F(Watch, ChangesAreSeenWithAndWithoutNotifications) {
   }
 }
 
-TEST_F(Watch, NotificationsComeAtOnceAndOthersFilesAreNoChange) {
+TEST_F(Watch, NotificationsComeAtOnceAndOtherFilesAreIgnored) {
   write("a.json", "1");
   FileWatch watch({folder_ / "a.json"});
   write("b.json", "1");

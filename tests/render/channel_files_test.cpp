@@ -1,4 +1,5 @@
-// Channels as PNG have the encoding stated in their comments. The reader keeps the upper byte of 16 bits.
+// Channels as PNG have the encoding stated in their comments. The reader keeps only the upper byte of 16
+// bits.
 
 #include <limits>
 
@@ -12,7 +13,7 @@ namespace {
 
 constexpr float kNothing = std::numeric_limits<float>::infinity();
 
-/// Four pixels in a row; the last one is empty.
+/// Four pixels in a row; the last one shows nothing.
 Channels sample() {
   return {.width_px = 4,
           .height_px = 1,

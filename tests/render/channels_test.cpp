@@ -1,4 +1,4 @@
-// Depth, normals, ids and motion against closed forms.
+// Depth, normals, ids and motion compared with closed forms.
 
 #include "render/channels.h"
 
@@ -32,7 +32,8 @@ TEST(StageChannels, DepthOfTheGroundIsTheClosedForm) {
   int seen = 0;
   for (int y = 0; y < 64; ++y)
     for (int x = 0; x < 96; x += 7) {
-      // Along the ray through the pixel's centre, whose part along the view axis is 1.
+      // A point on the ray through the pixel's centre; the ray's component along the view axis is 1, so its
+      // parameter is the depth.
       const Vector3f ray = forward + right * tan_x * (2 * (static_cast<float>(x) + 0.5f) / 96 - 1) -
                            up * tan_y * (2 * (static_cast<float>(y) + 0.5f) / 64 - 1);
       const float depth = -camera.eye.y() / ray.y();
@@ -49,7 +50,7 @@ TEST(StageChannels, DepthOfTheGroundIsTheClosedForm) {
   EXPECT_EQ(sky.id[at(sky, 48, 2)], 0u);
 }
 
-TEST(StageChannels, APictureInBetweenLeavesNothingOfTheFrameBefore) {
+TEST(StageChannels, AnImageInBetweenDoesNotChangeTheChannels) {
   SmallStage s;
   s.stage.set_object(s.add(make_box({4, 4, 1}), {}, {0, 0, -1}), 4);
   const InstanceHandle front = s.add(make_box({1, 1, 1}), {}, {0, 0, 1});
@@ -63,7 +64,7 @@ TEST(StageChannels, APictureInBetweenLeavesNothingOfTheFrameBefore) {
   EXPECT_EQ(after.id[middle(after)], 4u);
 }
 
-TEST(StageChannels, IdsTellWhatIsInFront) {
+TEST(StageChannels, IdsAreThoseOfTheNearestObject) {
   SmallStage s;
   s.stage.set_object(s.add(make_box({1, 1, 1}), {}, {0, 0, 1}), 3);
   s.stage.set_object(s.add(make_box({4, 4, 1}), {}, {0, 0, -1}), 4);
@@ -86,7 +87,7 @@ TEST(StageChannels, IdsTellWhatIsInFront) {
   EXPECT_NEAR(c.depth[middle(c)], 3.5f, 1e-4f);
 }
 
-// Half the picture's height is tan(20 degrees) at distance 1: so many pixels a metre at this distance.
+// Half of the picture's 64 rows cover tan(20 degrees) at distance 1.
 float pixels_per_m(float distance) {
   return 32 / std::tan(20 * 0.0174532925f) / distance;
 }
@@ -112,7 +113,7 @@ TEST(StageChannels, BallsMoveWithTheirVelocityAndTheCameraMovesEverything) {
   s.stage.store_previous_transforms();
   Channels c = s.stage.channels(0.1f);
   EXPECT_NEAR(c.motion[middle(c)].x(), 0.1f * pixels_per_m(4.5f), 0.05f);
-  s.stage.set_camera({.eye = {0.1f, 0, 5}, .target = {0.1f, 0, 0}});  // along with it
+  s.stage.set_camera({.eye = {0.1f, 0, 5}, .target = {0.1f, 0, 0}});  // the camera moves with the ball
   c = s.stage.channels(0.1f);
   EXPECT_NEAR(c.motion[middle(c)].x(), 0, 0.05f);
 }

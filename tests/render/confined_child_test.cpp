@@ -20,7 +20,7 @@
 namespace offstage::render {
 namespace {
 
-/// The answer of a job that runs in the child and may read `folder`.
+/// Runs a job in the confined child, which may read `folder`, and returns its answer.
 std::string answer_of(const std::filesystem::path& folder, const std::function<std::string()>& job) {
   const InputFolders folders({folder});
   const ChildAnswer answer = run_confined({.what = "test", .folders = &folders}, [&](int memory) {
@@ -30,7 +30,7 @@ std::string answer_of(const std::filesystem::path& folder, const std::function<s
   return {answer.bytes().begin(), answer.bytes().end()};
 }
 
-/// Attempts of a compromised job; returns the names of those that succeeded.
+/// Things that a compromised job could try; returns the names of those that succeeded.
 std::string harm(const std::filesystem::path& file, pid_t parent) {
   std::string done;
   const auto note = [&](const char* name, bool worked) { done += worked ? std::string(name) + " " : ""; };
@@ -45,7 +45,7 @@ std::string harm(const std::filesystem::path& file, pid_t parent) {
   if (child == 0) ::_exit(0);
   note("fork", child > 0);
   char* arguments[] = {const_cast<char*>("/bin/true"), nullptr};
-  ::execv(arguments[0], arguments);  // would end without an answer
+  ::execv(arguments[0], arguments);  // would replace the child, which then sends no answer
   return done;
 }
 
@@ -91,7 +91,7 @@ TEST(ConfinedChild, FloodsAndCrashesAreErrorsOfTheFile) {
                FileError);
 }
 
-TEST(ConfinedChild, ThatWaitsForeverIsEnded) {
+TEST(ConfinedChild, AHangingJobIsEnded) {
   const ScratchFolder scratch;
   const InputFolders folders({scratch.path()});
   try {

@@ -18,7 +18,7 @@ namespace {
 
 constexpr const char* kThreadsVariable = "OFFSTAGE_TEST_RASTER_THREADS";
 
-// Before any test makes a context.
+// Sets the environment before any test creates a context.
 class PinnedEnvironment : public ::testing::Environment {
   void SetUp() override {
     const char* threads = std::getenv(kThreadsVariable);
@@ -27,7 +27,7 @@ class PinnedEnvironment : public ::testing::Environment {
 };
 const ::testing::Environment* const kPinned = ::testing::AddGlobalTestEnvironment(new PinnedEnvironment);
 
-// A scene that uses every pass, drawn with offsets, as the hash of its displayed pixels.
+// Draws a scene that uses every pass, with sample offsets, and returns the hash of its displayed pixels.
 std::string hash_of_a_rich_scene(Context& context) {
   Stage stage(context, {.width_px = 160, .height_px = 90, .shadow_map_px = 512});
   const MaterialHandle brick = stage.add_material({.pattern = Pattern::brick});
@@ -125,8 +125,8 @@ TEST(Context, TwoThreadsDrawTheSamePixelsAtTheSameTime) {
   EXPECT_EQ(hashes[0], hashes[1]);
 }
 
-// Also the body of the child processes of the next test, which read the printed line. On a thread of its own:
-// the tests that follow draw by the context that is current here.
+// Child processes of the next test also run this test and print the hash. It runs on a thread of its own,
+// because the following tests draw with the context that is current on this thread.
 TEST(Context, DrawsTheSameSceneTwice) {
   std::string first, second;
   std::thread([&] {
@@ -150,13 +150,13 @@ TEST(Context, OsmesaAndEglDrawTheSamePixels) {
   EXPECT_EQ(osmesa, egl);
 }
 
-TEST(ContextPlatform, HasANameAndOthersAreRefusedWithTheList) {
+TEST(ContextPlatform, UnknownNamesAreRefusedWithTheList) {
   for (const char* name : {"auto", "osmesa", "egl", "egl:gpu"}) EXPECT_EQ(name_of(gl_platform(name)), name);
   try {
     gl_platform("glx");
     FAIL() << "taken";
   } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "'glx' is no way to draw; there are auto, osmesa, egl, egl:gpu");
+    EXPECT_STREQ(error.what(), "'glx' is not an OpenGL backend; there are auto, osmesa, egl, egl:gpu");
   }
 }
 

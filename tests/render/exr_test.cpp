@@ -1,4 +1,4 @@
-// What is written to an EXR file comes back from it.
+// Values written to an EXR file are read back unchanged.
 
 #include <cmath>
 #include <limits>
@@ -56,7 +56,7 @@ TEST(Exr, KeepsEveryNumber) {
   EXPECT_EQ(file.header().typedAttribute<Imf::StringAttribute>("objects").value(), "16000001 the box\n");
 }
 
-TEST(Exr, HoldsOnlyWhatWasChosen) {
+TEST(Exr, ContainsOnlyTheChosenChannels) {
   const ScratchFolder folder;
   write_exr(folder / "a.exr", exr_sample(), {{Channel::motion}}, {});
   Imf::InputFile file((folder / "a.exr").c_str());

@@ -1,6 +1,6 @@
 #pragma once
-/// What the tests that draw share: one context for all of them on the main thread, and small pictures read as
-/// numbers.
+/// Shared by the tests that draw: one context for all of them on the main thread, and access to the pixels of
+/// small pictures.
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,7 @@ namespace offstage::render {
 
 Context& shared_context();
 
-/// A stage with little going on: no fog, no sky, the camera on the Z axis looking at the
-/// origin.
+/// A stage without fog and sky, and a camera on the Z axis that looks at the origin.
 struct SmallStage {
   explicit SmallStage(int width_px = 96, int height_px = 64)
       : stage(shared_context(), {.width_px = width_px, .height_px = height_px, .shadow_map_px = 512}) {
@@ -41,7 +40,7 @@ inline Vector4f center_pixel(const HdrImage& image) {
   return pixel(image, image.width_px / 2, image.height_px / 2);
 }
 
-/// Where a point of the world falls in the picture of a camera [px].
+/// The pixel at which a camera shows a point of the world [px].
 inline Vector2f project(const Camera& camera, const Vector3f& point, int width_px, int height_px) {
   const Vector3f forward = (camera.target - camera.eye).normalized();
   const Vector3f right = forward.cross(camera.up).normalized(), up = right.cross(forward);

@@ -10,7 +10,7 @@
 namespace offstage::render {
 namespace {
 
-/// A gradient with some structure; `alpha` of the first pixel.
+/// A gradient with some structure; `alpha` is that of the first pixel.
 Image test_image(int width, int height, uint8_t alpha = 255) {
   Image image{width, height, {}};
   for (int y = 0; y < height; ++y) {
@@ -43,7 +43,7 @@ TEST(EncodePng, ComesBackUnchanged) {
   }
 }
 
-TEST(EncodePng, StoresAlphaIfTheImageIsTransparentWhateverItsPixelsAre) {
+TEST(EncodePng, StoresAlphaIfTheImageIsMarkedTransparent) {
   constexpr std::size_t kColorType = 25;  // in the IHDR chunk: 2 is RGB, 6 is RGBA
   for (const uint8_t alpha : {uint8_t{255}, uint8_t{254}}) {
     Image image = test_image(4, 4, alpha);
@@ -74,7 +74,7 @@ TEST(DecodeImage, WidensGreyAndNarrowsSixteenBits) {
             (std::vector<uint8_t>{0x80, 0x80, 0x80, 255, 255, 255, 255, 255}));
 }
 
-TEST(DecodeImage, NamesWhatItCannotRead) {
+TEST(DecodeImage, NamesUnreadableFiles) {
   const std::vector<uint8_t> png = encode_png(test_image(64, 64));
   const std::span<const uint8_t> half(png.data(), png.size() / 2);
   const std::string deep_pnm("P5 1 1 65535\n\x80\x12");
@@ -92,7 +92,7 @@ TEST(DecodeImage, RefusesMoreThan16384PixelsASideBeforeItAllocates) {
   EXPECT_NE(message.find("20000x10"), std::string::npos) << message;
 }
 
-TEST(ReadImage, TellsAMissingFileFromAFolder) {
+TEST(ReadImage, DistinguishesAMissingFileFromAFolder) {
   const ScratchFolder folder;
   EXPECT_NE(message_of<FileError>([&] { read_image(folder / "none.png"); }).find("No such file"),
             std::string::npos);

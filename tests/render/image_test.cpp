@@ -30,8 +30,8 @@ TEST(PixelHash, IsThirtyTwoDigitsAndSeesEveryPixelAndTheShape) {
 TEST(ImageDifference, CountsAndSums) {
   const Image a = grey(10, 10);
   Image b = a;
-  b.rgba[0] = 102;   // two steps: not over
-  b.rgba[41] = 103;  // three steps
+  b.rgba[0] = 102;   // a difference of two: within the threshold
+  b.rgba[41] = 103;  // a difference of three
   b.rgba[43] = 90;   // another channel of the same pixel
   const ImageDifference d = difference(a, b);
   EXPECT_EQ(d.max_delta, 10);
@@ -46,11 +46,11 @@ TEST(ImageDifference, CountsAndSums) {
 TEST(ImageDifference, ToleranceHasBothBounds) {
   const Image a = grey(100, 100);
   Image few = a;
-  for (std::size_t i = 0; i < 5; ++i) few.rgba[4 * i] = 255;  // 0.05 % of the pixels, by much
+  for (std::size_t i = 0; i < 5; ++i) few.rgba[4 * i] = 255;  // 0.05 % of the pixels, with a large difference
   EXPECT_TRUE(difference(a, few).within_tolerance());
   few.rgba[40] = 255;
   EXPECT_FALSE(difference(a, few).within_tolerance());
-  EXPECT_FALSE(difference(a, grey(100, 100, 101)).within_tolerance());  // a little, everywhere
+  EXPECT_FALSE(difference(a, grey(100, 100, 101)).within_tolerance());  // all pixels, with a small difference
 }
 
 TEST(ImageDifference, RefusesDifferentSizes) {

@@ -9,7 +9,7 @@ namespace {
 const Environment kDark{.intensity = 0, .occlusion_reach = 0.f, .visible = false};
 const Material kWhite{.color = {1, 1, 1, 1}, .roughness = 1};
 
-// A white floor seen from above, under a dark sky without a sun.
+// A white floor seen from above, under a dark sky and without sun.
 struct Floor {
   explicit Floor(const Environment& environment = kDark, const Material& look = kWhite) : s(160, 120) {
     s.stage.set_environment(environment);
@@ -30,7 +30,7 @@ TEST(StageLight, OfALampFallsWithTheSquareOfTheDistance) {
     Floor floor;
     floor.s.stage.set_lamps(std::array{
         Lamp{.position = {0, height, 0}, .intensity = {3, 3, 3}, .radius = 0.01f, .shadows = false}});
-    // As of the sun: Fresnel takes 4 %, the rough highlight gives about 1 % back.
+    // As in sunlight, the Fresnel term removes 4 %, and the rough highlight adds about 1 %.
     EXPECT_NEAR(floor.at(0.02f, 0) * height * height, 3, 0.15);
   }
 }
@@ -44,10 +44,10 @@ TEST(StageLight, OfAConeEndsAtItsEdge) {
   EXPECT_EQ(floor.at(1.1f * edge, 0), 0);
 }
 
-TEST(StageLight, LampsThrowShadowsWhereGeometrySays) {
+TEST(StageLight, LampsCastShadowsWhereGeometryPredicts) {
   for (const float cone_deg : {0.0f, 100.0f}) {
-    // A box of 0.5 m with its top 1 m up, under a lamp 3 m up: its shadow is 0.75 m wide, as is its side's
-    // light 1.5 m off.
+    // A box of 0.5 m whose top is 1 m high, under a lamp at 3 m: the shadow of its top is 0.75 m wide. The
+    // floor beside the shadow, and on the other sides of the lamp, is lit.
     Floor floor;
     floor.s.add(make_box({0.5f, 0.5f, 0.5f}), kWhite, {1.2f, 0.75f, 0});
     floor.s.stage.set_lamps(std::array{Lamp{.position = {0, 3, 0},
@@ -62,8 +62,8 @@ TEST(StageLight, LampsThrowShadowsWhereGeometrySays) {
   }
 }
 
-TEST(StageLight, SkyIsHiddenBesideWhatStandsOnTheGround) {
-  // Dark, for white things send each other nearly all of the light that they hide.
+TEST(StageLight, SkyLightIsOccludedBesideObjects) {
+  // The floor is dark, because white surfaces replace nearly all of the occluded light by interreflection.
   const Material dark{.color = {0.2f, 0.2f, 0.2f, 1}, .roughness = 1};
   Floor floor({.zenith = {1, 1, 1},
                .horizon = {1, 1, 1},
@@ -78,9 +78,10 @@ TEST(StageLight, SkyIsHiddenBesideWhatStandsOnTheGround) {
   EXPECT_GT(floor.at(0.62f, 0), 0.3f * open) << "half the sky and what the box sends back";
 }
 
-TEST(StageLight, ShadowsHardenTowardsWhatThrowsThem) {
-  // One sub-frame, a large sun at 45 degrees behind a wall 2 m high: the edge of the shadow of its foot is
-  // sharp, that of its top soft, as wide as the way of the light to it times the sun's width.
+TEST(StageLight, ShadowsAreSharperNearTheirCaster) {
+  // One sub-frame with a large sun at 45 degrees. A bar near the ground has a sharp shadow, a bar 2 m up a
+  // soft one. The width of the shadow's edge is the distance that the light travels times the angular width
+  // of the sun.
   const auto width_of_edge = [](float height) {
     Floor floor;
     floor.s.stage.set_sun({.direction = Vector3f(1, 1, 0).normalized(), .intensity = 3, .size_deg = 8});
@@ -96,8 +97,8 @@ TEST(StageLight, ShadowsHardenTowardsWhatThrowsThem) {
   EXPECT_GT(width_of_edge(2), 2 * width_of_edge(0.15f));
 }
 
-TEST(StageLight, GroundSendsTheLightOfSunAndSkyUp) {
-  // The underside of a box over ground of albedo 0.5 under an even sky and the sun overhead.
+TEST(StageLight, GroundReflectsTheLightOfSunAndSky) {
+  // The underside of a box above ground of albedo 0.5, under a uniform sky and the sun overhead.
   SmallStage s;
   s.stage.set_environment({.zenith = {1, 1, 1},
                            .horizon = {1, 1, 1},
@@ -110,7 +111,7 @@ TEST(StageLight, GroundSendsTheLightOfSunAndSkyUp) {
   EXPECT_NEAR(center_pixel(s.draw()).x(), 0.5f * (1 + 2), 0.1);
 }
 
-TEST(StageLight, GlassShowsWhatIsBehindItInItsColour) {
+TEST(StageLight, GlassTintsTheObjectsBehindIt) {
   SmallStage s;
   s.stage.set_environment(kDark);
   s.stage.set_sun({.intensity = 0, .shadows = false});
@@ -124,15 +125,15 @@ TEST(StageLight, GlassShowsWhatIsBehindItInItsColour) {
   EXPECT_NEAR(seen.z(), 0.5f * fresnel, 0.02);
 }
 
-TEST(StageLight, MirrorsShowTheSceneWhereGeometrySays) {
+TEST(StageLight, MirrorsShowTheSceneWhereGeometryPredicts) {
   Camera camera{.eye = {0, 1.5f, 6}, .target = {0, 1, 0}};
   SmallStage s(192, 128);
   s.stage.set_environment(kDark);
   s.stage.set_sun({.intensity = 0, .shadows = false});
   s.stage.set_camera(camera);
   s.add(make_ground(20), {.color = {0.9f, 0.9f, 0.9f, 1}, .metallic = 1, .roughness = 0.02f});
-  // A glowing square over the floor: the one in the floor is seen where the line to its mirror image meets
-  // the floor.
+  // A glowing square above the floor. Its reflection is seen where the line from the eye to the mirror image
+  // meets the floor.
   s.add(make_box({1, 1, 0.05f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {1, 0.2f, 0}},
         {0, 1, 0});
   const HdrImage picture = s.draw();
@@ -145,12 +146,12 @@ TEST(StageLight, MirrorsShowTheSceneWhereGeometrySays) {
   EXPECT_NEAR(mirrored(0.4f, 0.6f).x(), 0.9f, 0.06f);
   EXPECT_NEAR(mirrored(0.8f, 1).x(), 0, 0.02f) << "beside it";
   EXPECT_NEAR(mirrored(0, 0.3f).x(), 0, 0.02f) << "below it";
-  // What is not in the picture cannot be found.
+  // Screen-space reflections cannot show objects outside the picture.
   s.stage.set_camera(camera = {.eye = {0, 1.5f, 6}, .target = {0, -0.7f, 0}, .fov_deg = 15});
   EXPECT_NEAR(pixel(s.draw(), 96, 64).x(), 0, 0.02f);
 }
 
-TEST(StageLight, OfAFireFallsOnWhatIsAround) {
+TEST(StageLight, OfAFireIlluminatesItsSurroundings) {
   Floor floor;
   const PointsHandle flames = floor.s.stage.add_points({.style = PointStyle::fire});
   std::vector<Point> points;

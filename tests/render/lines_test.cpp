@@ -1,4 +1,4 @@
-// Lines as the stage draws them.
+// Lines of overlays as the stage draws them.
 
 #include <cmath>
 #include <limits>
@@ -12,7 +12,7 @@ constexpr int kWidth = 96, kHeight = 64;
 const Camera kCamera{.eye = {0, 0, 5}, .target = {0, 0, 0}};
 const Vector4f kRed(1, 0, 0, 1);
 
-// A stage with one set of lines, `width_px` wide.
+// A stage with one set of lines that are `width_px` wide.
 struct LinesScene {
   explicit LinesScene(float width_px, float hidden = 0)
       : lines(s.stage.add_lines({.width = width_px / kHeight, .hidden = hidden})) {}
@@ -32,7 +32,7 @@ double covered(const HdrImage& image) {
   return sum;
 }
 
-TEST(StageLines, CoverWhatAPenOfTheirWidthCovers) {
+TEST(StageLines, CoverTheAreaOfTheirWidth) {
   LinesScene scene(6);
   for (const Line& line :
        {Line{{-1, 0.2f, 0}, {1, 0.2f, 0}, kRed}, Line{{-0.7f, -0.5f, 1}, {0.9f, 1, -2}, kRed},
@@ -55,7 +55,7 @@ TEST(StageLines, CoverWhatAPenOfTheirWidthCovers) {
 TEST(StageLines, DotIsADiscAndATaperedLineATriangle) {
   LinesScene scene(20);
   EXPECT_NEAR(covered(scene.draw({{0, 0, 0}, {0, 0, 0}, kRed})), 3.1416 * 100, 5);
-  // 50 pixels long, as wide as high at its base, where half a disc stands out.
+  // An arrow head of 50 pixels that is 20 pixels wide at its base, from which half a disc protrudes.
   const float px = 10 * std::tan(20 * 0.01745329f) / kHeight;
   const Line arrow{{-25 * px, 0, 0}, {25 * px, 0, 0}, kRed, 1, 0};
   EXPECT_NEAR(covered(scene.draw(arrow)), 0.5 * 50 * 20 + 0.5 * 3.1416 * 100, 15);
@@ -77,7 +77,7 @@ TEST(StageLines, LookAlikeInLargeAndSmallPictures) {
   EXPECT_NEAR(share(4) / share(1), 1, 0.02);
 }
 
-TEST(StageLines, AreHiddenByWhatIsOpaqueOrShowFaintlyThrough) {
+TEST(StageLines, AreOccludedOrShowFaintlyThroughSurfaces) {
   for (const float hidden : {0.f, 0.25f}) {
     LinesScene scene(8, hidden);
     scene.s.add(make_box({1, 1, 1}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {0, 1, 0}});
@@ -86,12 +86,12 @@ TEST(StageLines, AreHiddenByWhatIsOpaqueOrShowFaintlyThrough) {
     EXPECT_NEAR(behind.x(), hidden + (1 - hidden) * without.x(), 1e-3f);
     EXPECT_NEAR(behind.y(), (1 - hidden) * without.y(), 1e-3f);
     EXPECT_NEAR(center_pixel(scene.draw({{-2, 0, 1}, {2, 0, 1}, kRed})).x(), 1, 1e-3f);
-    // On the surface itself it is not cut by it.
+    // A line exactly on the surface is not cut by it.
     EXPECT_NEAR(center_pixel(scene.draw({{-2, 0, 0.5f}, {2, 0, 0.5f}, kRed})).x(), 1, 1e-3f);
   }
 }
 
-TEST(StageLines, NearerCoversFartherWhateverTheOrder) {
+TEST(StageLines, NearerLinesCoverFartherOnesInAnyOrder) {
   LinesScene scene(8);
   const Line far{{-1, 0, -1}, {1, 0, -1}, kRed}, near{{0, -1, 1}, {0, 1, 1}, {0, 1, 0, 1}};
   for (const auto& lines : {std::array{far, near}, std::array{near, far}})
@@ -100,20 +100,21 @@ TEST(StageLines, NearerCoversFartherWhateverTheOrder) {
 
 TEST(StageLines, EndingBehindTheEyeAreCutAtTheNearPlane) {
   LinesScene scene(4);
-  // It runs towards the eye and past it, below it: from the middle straight down to the lower edge.
+  // The line runs below the eye, towards it and past it: in the picture, from the middle straight down to the
+  // lower edge.
   const HdrImage picture = scene.draw({{0, -0.5f, -40}, {0, -0.5f, 20}, kRed});
   for (const int y : {40, 50, 62}) EXPECT_NEAR(pixel(picture, kWidth / 2, y).w(), 1, 1e-6);
   EXPECT_EQ(pixel(picture, kWidth / 2, 20).w(), 0);
   EXPECT_EQ(covered(scene.draw({{0, -0.5f, 6}, {0, 0.5f, 20}, kRed})), 0);
 }
 
-TEST(StageLines, WhatIsNotFiniteIsNotDrawn) {
+TEST(StageLines, NonFiniteLinesAreNotDrawn) {
   LinesScene scene(4);
   const float nan = std::numeric_limits<float>::quiet_NaN();
   EXPECT_EQ(covered(scene.draw({{nan, 0, 0}, {0, 0, 0}, kRed})), 0);
 }
 
-TEST(StageLines, RemovedOnesAreGoneAndTheirHandleIsRefused) {
+TEST(StageLines, RemovedLinesAreNotDrawnAndTheirHandleIsRefused) {
   LinesScene scene(4);
   const Line line{{-1, 0, 0}, {1, 0, 0}, kRed};
   EXPECT_GT(covered(scene.draw(line)), 0);
@@ -122,7 +123,7 @@ TEST(StageLines, RemovedOnesAreGoneAndTheirHandleIsRefused) {
   EXPECT_THROW(scene.s.stage.set_lines(scene.lines, {}), std::logic_error);
 }
 
-TEST(StageLines, TenThousandAreDrawnTheSameEveryTime) {
+TEST(StageLines, TenThousandLinesAreDrawnTheSameEveryTime) {
   std::vector<Line> lines;
   for (int i = 0; i < 10'000; ++i) {
     const float t = static_cast<float>(i);

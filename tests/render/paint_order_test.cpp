@@ -14,8 +14,8 @@ namespace {
 
 const Vector3f kRedLight(1, 0, 0), kGreenLight(0, 1, 0), kBlueLight(0, 0, 1), kWhiteLight(1, 1, 1);
 
-/// A stage without light: materials show their emission, particles their colour. It can be emptied, which
-/// costs less than another one, whose shaders must be compiled.
+/// A stage without light: materials show their emission, particles their colour. Clearing it is faster than
+/// creating another one, which would have to compile its shaders.
 struct DarkStage : SmallStage {
   std::vector<PointsHandle> point_sets;
   std::vector<InstanceHandle> bodies;
@@ -67,7 +67,7 @@ struct Veil {
   Vector3f color;
   float alpha;
 };
-/// What layers look like, the nearest first.
+/// The colour of translucent layers, the nearest first.
 Vector3f over(std::initializer_list<Veil> layers) {
   Vector3f sum(0, 0, 0);
   float through = 1;
@@ -78,7 +78,7 @@ Vector3f over(std::initializer_list<Veil> layers) {
   return sum;
 }
 
-TEST(PaintOrder, SpritesAndFlakesOfTwoSystemsCoverByDepthNotByTheirOrderOnTheStage) {
+TEST(PaintOrder, SpritesAndFlakesOfTwoSystemsAreSortedByDepth) {
   DarkStage s;
   for (const bool near_first : {true, false})
     for (const PointStyle style : {PointStyle::sprite, PointStyle::flake}) {
@@ -140,7 +140,7 @@ TEST(PaintOrder, SmokeSpritesAndStreaksCoverEachOtherByDepth) {
     }
 }
 
-TEST(PaintOrder, AddedLightIsDimmedByWhatIsInFrontOfItAndByNothingBehind) {
+TEST(PaintOrder, AddedLightIsDimmedOnlyByLayersInFront) {
   DarkStage s;
   for (const PointStyle style : {PointStyle::sprite, PointStyle::streak})
     for (const bool additive_in_front : {true, false}) {
@@ -160,7 +160,7 @@ TEST(PaintOrder, EveryKindOfParticleIsSeenThroughGlassBehindItAndInIt) {
     for (const bool ball : {true, false}) {
       const auto shown = [&](bool with_glass, float z) {
         s.clear();
-        // The particle comes first and last in depth, but for the glass.
+        // Apart from the glass, the particle is the first and the last in depth.
         if (with_glass)
           s.add_glass(ball ? make_sphere(1) : make_box({2, 2, 2}), {0, 0, 0}, 0.1f * kBlueLight);
         s.add_particle(style, {0, 0, z}, kRedLight, 0.9f, false, 0.3f);
@@ -168,7 +168,7 @@ TEST(PaintOrder, EveryKindOfParticleIsSeenThroughGlassBehindItAndInIt) {
       };
       for (const float z : {-2.0f, 0.0f, 2.0f})
         EXPECT_GT(shown(true, z).x(), 0.8f * shown(false, z).x()) << static_cast<int>(style) << ' ' << z;
-      // The glow of the glass is drawn over the particles behind and inside it.
+      // The emission of the glass covers particles behind it and inside it.
       EXPECT_GT(shown(true, -2).z(), 0.09f);
       EXPECT_GT(shown(true, 0).z(), 0.09f);
       EXPECT_LT(shown(true, 2).z(), 0.06f) << static_cast<int>(style);
@@ -191,8 +191,8 @@ TEST(PaintOrder, GlassIsSeenThroughGlass) {
   }
 }
 
-TEST(PaintOrder, SheerClothVeilsWhatIsBehindItAndNothingInFront) {
-  // A wavy sheet: particles in its box are in front of it or behind it according to its surface.
+TEST(PaintOrder, TranslucentClothCoversOnlyParticlesBehindIt) {
+  // A wavy sheet: particles in its bounding box are in front of it or behind it, depending on the surface.
   constexpr int n = 40;
   std::vector<Vector3f> places;
   std::vector<Vector2f> uvs;
@@ -212,7 +212,7 @@ TEST(PaintOrder, SheerClothVeilsWhatIsBehindItAndNothingInFront) {
   Material voile{.roughness = 1, .emission = kGreenLight};
   voile.color = {0, 0, 0, 0.4f};
   voile.fabric = {.weave = Weave::none, .sheen = 0, .translucency = 0};
-  // At x = 0 the sheet is at z = 0.5, at x = 2 at z = -0.5.
+  // The sheet is at z = 0.5 for x = 0, and at z = -0.5 for x = 2.
   DarkStage s;
   const MaterialHandle material = s.stage.add_material(voile);
   const auto shown = [&](float x, float z, bool with_cloth, bool with_particle) {
@@ -252,7 +252,7 @@ TEST(PaintOrder, RainDrawnInPartsLooksAsDrawnAtOnce) {
                        .id = i});
     }
     s.add_particles(PointStyle::streak, drops);
-    for (int k = 0; parts && k < 5; ++k)  // so faint that they are not drawn
+    for (int k = 0; parts && k < 5; ++k)  // too faint to be drawn, but they divide the particles into parts
       s.add_pane({0.3f * static_cast<float>(k), 0, 1.0f - static_cast<float>(k)}, kWhiteLight, 0.001f, 0.4f,
                  {1.5f, 2, 0.05f});
     return s.draw();
@@ -261,7 +261,7 @@ TEST(PaintOrder, RainDrawnInPartsLooksAsDrawnAtOnce) {
   float worst = 0;
   for (std::size_t i = 0; i < at_once.rgba.size(); ++i)
     worst = std::max(worst, std::abs(at_once.rgba[i] - in_parts.rgba[i]));
-  EXPECT_LT(worst, 2e-3f);  // the error of skipping particles behind a nearly covered tile
+  EXPECT_LT(worst, 2e-3f);  // error of skipping particles behind a nearly opaque tile
 }
 
 View view_from(const Vector3f& eye) {
@@ -293,20 +293,20 @@ TEST(PaintOrder, RunsAreBoundedHoweverKindsAlternateAndKeepTheOrderOfEachKind) {
   std::array<uint32_t, PaintOrder::kKinds> next = {1000, 1000, 0, 1000};
   for (const PaintOrder::Run& run : order.runs_before(0)) {
     uint32_t& last = next[static_cast<std::size_t>(run.kind)];
-    EXPECT_EQ(run.last, last);  // every particle once, back to front
+    EXPECT_EQ(run.last, last);  // every particle occurs once, from back to front
     last = run.first;
   }
   EXPECT_EQ(next, (std::array<uint32_t, PaintOrder::kKinds>{0, 0, 0, 0}));
 }
 
-TEST(PaintOrder, BodiesHidePlacesBehindAnyOfTheirFacesThatTheEyeDoesNotSee) {
+TEST(PaintOrder, BodiesHidePointsBehindTheirBackFaces) {
   const View view = view_from({0, 0, 5});
   const auto hides = [&](const Region& region, const Vector3f& p) {
     return region.hides(p, view.depth_of(p));
   };
   const Eigen::AlignedBox3f pane(Vector3f(-4, -4, -0.01f), Vector3f(4, 4, 0.01f));
   const Region slanting(pane, Eigen::Affine3f(Eigen::AngleAxisf(0.8f, Vector3f::UnitY())), false, view);
-  // The pane's right side is farther away: its plane is z = -x tan(0.8).
+  // The right side of the pane is farther away: its plane is z = -x tan(0.8).
   EXPECT_FALSE(hides(slanting, {2, 0, -1.9f}));
   EXPECT_TRUE(hides(slanting, {2, 0, -2.3f}));
   EXPECT_FALSE(hides(slanting, {-1, 0, 1.2f}));
@@ -314,7 +314,7 @@ TEST(PaintOrder, BodiesHidePlacesBehindAnyOfTheirFacesThatTheEyeDoesNotSee) {
   const Region ball({Vector3f(-1, -1, -1), Vector3f(1, 1, 1)}, Eigen::Affine3f::Identity(), true, view);
   EXPECT_TRUE(hides(ball, {0, 0, 0}));
   EXPECT_TRUE(hides(ball, {0.9f, 0, -0.6f}));
-  EXPECT_FALSE(hides(ball, {0.7f, 0, 0.9f}));  // before the ball, in its box
+  EXPECT_FALSE(hides(ball, {0.7f, 0, 0.9f}));  // in front of the ball, inside its bounding box
   EXPECT_FALSE(hides(ball, {0, 0, 1.01f}));
 }
 

@@ -23,7 +23,8 @@ float spread(int i, double step) {
   return static_cast<float>(x - std::floor(x));
 }
 
-// A cloud of round puffs in a picture `scale` times 160 x 96, nearest first, in front of a plane at 5 m.
+// A cloud of round puffs in a picture of `scale` times 160 x 96, nearest first, in front of a plane at depth
+// `plane_m`.
 std::vector<Splat> cloud(float scale, float plane_m, SplatPicture& picture) {
   picture.width_px = static_cast<int>(160 * scale);
   picture.height_px = static_cast<int>(96 * scale);
@@ -140,12 +141,12 @@ TEST(Splatter, StreakCoversAsMuchAsItsStroke) {
       bands.lay_over({0, bottom, 150, rows, depth, rgba}, {9, 0}, 0);
       for (std::size_t i = 3; i < rgba.size(); i += 4) area += static_cast<double>(rgba[i]);
     }
-    // Its soft rim counts half: 2 * 60 * 2.25, and the ends.
+    // The soft rim counts half: 2 * 60 * 2.25, plus the ends.
     EXPECT_NEAR(area, 60 * 4.5 + 16, 4) << angle;
   }
 }
 
-TEST(OpacityGrid, TransmittanceFallsAlongTheLightToWhatTheSmokeTakes) {
+TEST(OpacityGrid, TransmittanceFallsAlongTheLightByTheAbsorption) {
   const Vector3f away = Vector3f(0.3f, -1, 0.2f).normalized();
   std::vector<OpacityGrid::Absorber> absorbers;
   for (int i = 0; i < 2000; ++i)
@@ -161,7 +162,7 @@ TEST(OpacityGrid, TransmittanceFallsAlongTheLightToWhatTheSmokeTakes) {
     before = depth;
   }
   EXPECT_EQ(grid.depth(middle - 6 * away), 0);
-  // 2000 * 0.02 m^2 in 64 m^3, along a ray of about 4.25 m.
+  // The cross-sections of 2000 puffs of 0.02 m^2 in 64 m^3, along a ray of about 4.25 m.
   EXPECT_NEAR(before, 2000 * 0.02f / 64 * 4 / std::abs(away.y()), 0.4f);
   EXPECT_EQ(grid.depth(middle + Vector3f(20, 0, 0)), 0);
   grid.build({}, away);
@@ -174,7 +175,7 @@ HdrImage picture_of(float value) {
   return image;
 }
 
-TEST(Bloom, LeavesBlackAndWhatIsBelowTheThresholdAlone) {
+TEST(Bloom, LeavesPixelsBelowTheThresholdUnchanged) {
   for (const float value : {0.0f, 1.0f, 3.99f}) {
     HdrImage image = picture_of(value);
     add_bloom(image, {});
@@ -226,7 +227,7 @@ TEST(StageParticles, DoNotDependOnTheirOrderInTheSet) {
   }
 }
 
-TEST(StageParticles, SmokeShadowsTheGroundWhereTheSunSays) {
+TEST(StageParticles, SmokeCastsItsShadowAwayFromTheSun) {
   const Camera camera{.eye = {0, 12, 0.01f}, .target = {0, 0, 0}};
   SmallStage s(160, 120);
   s.stage.set_camera(camera);

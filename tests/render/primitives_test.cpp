@@ -55,7 +55,7 @@ Totals totals_of(const Mesh& mesh) {
   return totals;
 }
 
-// Those that do not run once in each direction between positions of the same bits.
+// Counts the edges that do not occur exactly once in each direction between bitwise equal positions.
 int bad_edges(const Mesh& mesh) {
   std::map<std::pair<std::array<float, 3>, std::array<float, 3>>, int> edges;
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
@@ -94,7 +94,7 @@ TEST(Primitives, CoarseBoxIsClosedAndJustInsideOfTheOther) {
 TEST(Primitives, HaveTheAreaVolumeAndBoundsOfTheirShape) {
   for (const Named& shape : closed_primitives()) {
     const Totals totals = totals_of(shape.mesh);
-    EXPECT_NEAR(totals.area / shape.area, 1, 0.005) << shape.name;  // of order 1 / segments^2
+    EXPECT_NEAR(totals.area / shape.area, 1, 0.005) << shape.name;  // the error is of order 1 / segments^2
     EXPECT_NEAR(totals.volume / shape.volume, 1, 0.0035) << shape.name;
     const Eigen::AlignedBox3f box = shape.mesh.bounds();
     EXPECT_EQ(box.sizes(), shape.size) << shape.name;

@@ -1,6 +1,5 @@
 #pragma once
-/// What the tests of files and processes share: a folder that goes away, whole files, forked children,
-/// commands.
+/// Shared by the tests of files and processes: a temporary folder, whole files, forked children, commands.
 
 #include <array>
 #include <cstdio>
@@ -19,7 +18,7 @@
 
 namespace offstage::render {
 
-/// A new empty folder, removed at the end.
+/// A new empty folder that is removed with the object.
 class ScratchFolder {
  public:
   ScratchFolder() {
@@ -54,7 +53,8 @@ inline std::string file_content(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// Runs `body` in a forked child, for at most `limit_s`: waitpid's status; exit code 0 if it returns true.
+/// Runs `body` in a forked child for at most `limit_s` seconds and returns the status of waitpid; the exit
+/// code is 0 if `body` returns true.
 inline int status_of_child(const std::function<bool()>& body, unsigned limit_s = 60) {
   const pid_t child = ::fork();
   if (child == 0) {
@@ -71,7 +71,7 @@ inline int status_of_child(const std::function<bool()>& body, unsigned limit_s =
   return status;
 }
 
-/// What a shell command prints.
+/// The standard output of a shell command.
 inline std::string output_of(const std::string& command) {
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(::popen(command.c_str(), "r"), ::pclose);
   std::string text;

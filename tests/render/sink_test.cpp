@@ -22,7 +22,7 @@ Image flat(int width, int height, std::array<uint8_t, 4> color) {
   return image;
 }
 
-/// Sixteen grey columns, moved by one column a frame.
+/// Sixteen grey columns that move by one column per frame.
 Image greys(int width, int height, int frame) {
   Image image{width, height, {}};
   for (int i = 0; i < width * height; ++i) {
@@ -38,7 +38,7 @@ void film(const VideoDef& def, int frames) {
   sink->close();
 }
 
-/// Sets an environment variable for its own life.
+/// Sets an environment variable during its lifetime.
 class EnvironmentVariable {
  public:
   EnvironmentVariable(const char* name, const std::string& value) : name_(name) {
@@ -52,7 +52,7 @@ class EnvironmentVariable {
   const char* name_;
 };
 
-/// A stand-in for ffmpeg that lists the real encoders, and otherwise runs `body`.
+/// A replacement for ffmpeg that lists the real encoders, and otherwise runs the shell code `body`.
 std::filesystem::path fake_ffmpeg(const ScratchFolder& folder, const std::string& body) {
   const auto path = folder.put(
       "fake-ffmpeg", "#!/bin/sh\ncase \"$*\" in *-encoders*) exec ffmpeg -encoders;; esac\n" + body);
@@ -114,7 +114,8 @@ TEST(VideoSink, KnownGreysComeBackThroughMp4AndAreTagged) {
       output_of("ffmpeg -v error -i " + def.path.string() + " -f rawvideo -pix_fmt rgb24 -");
   ASSERT_EQ(raw.size(), 3u * 256 * 64 * 3);
   for (int f = 0; f < 3; ++f) {
-    for (int column = 0; column < 16; ++column) {  // the middle of each, away from the edges' ringing
+    // the middle of each column, away from the ringing at its edges
+    for (int column = 0; column < 16; ++column) {
       const auto at = static_cast<std::size_t>((f * 64 + 32) * 256 + column * 16 + 8) * 3;
       for (std::size_t c = 0; c < 3; ++c) {
         EXPECT_NEAR(static_cast<uint8_t>(raw[at + c]), 17 * ((column + f) % 16), 2);
@@ -167,7 +168,7 @@ TEST(VideoSink, TheSameFramesGiveTheSameFile) {
   }
 }
 
-TEST(VideoSink, DiscardsWhatIsPartialWithoutClose) {
+TEST(VideoSink, DiscardsPartialFilesWithoutClose) {
   const ScratchFolder folder;
   {
     const auto sink = make_video_sink({.path = folder / "a.mp4", .width_px = 32, .height_px = 32});
@@ -179,7 +180,7 @@ TEST(VideoSink, DiscardsWhatIsPartialWithoutClose) {
   EXPECT_EQ(folder.names(), std::set<std::string>{});
 }
 
-TEST(VideoSink, ShowsTheLastWordsOfAKilledEncoder) {
+TEST(VideoSink, ShowsTheLastMessagesOfAKilledEncoder) {
   const ScratchFolder folder;
   const EnvironmentVariable ffmpeg("OFFSTAGE_FFMPEG",
                                    fake_ffmpeg(folder,
@@ -248,7 +249,7 @@ TEST(CheckVideo, NamesAMissingEncoder) {
   EXPECT_NE(message.find("libvpx-vp9"), std::string::npos) << message;
 }
 
-TEST(CheckVideo, RefusesWhatAFormatCannotHoldWithAdvice) {
+TEST(CheckVideo, RefusesUnsupportedSettingsOfAFormatWithAdvice) {
   const auto advice = [](const VideoDef& def) {
     return message_of<std::invalid_argument>([&] { check_video(def); });
   };
@@ -264,7 +265,7 @@ TEST(CheckVideo, RefusesWhatAFormatCannotHoldWithAdvice) {
   EXPECT_EQ(advice({.path = "a.mov", .width_px = 65, .height_px = 49, .alpha = true}), "");
 }
 
-/// What two frames written to standard output give, through a file in its place.
+/// The bytes that a pipe sink writes to standard output for two frames.
 std::string piped(bool y4m, const Image& image) {
   const ScratchFolder folder;
   const std::string file = (folder / "out").string();
@@ -288,8 +289,8 @@ TEST(PipeSink, WritesRawFramesAsTheyAre) {
 
 TEST(PipeSink, WritesYuv4mpegInLimitedBt709) {
   const Image image{4, 1, {0, 0, 0, 255, 255, 255, 255, 255, 255, 0, 0, 255, 0, 0, 255, 255}};
-  // Black, white, red, blue: Y = 16 + 219 (0.2126 R + 0.7152 G + 0.0722 B), Cb and Cr = 128 + 112 (B or R -
-  // Y) / ...
+  // Black, white, red, blue: Y = 16 + 219 (0.2126 R + 0.7152 G + 0.0722 B), Cb = 128 + 112 (B - Y) / 0.9278,
+  // Cr = 128 + 112 (R - Y) / 0.7874.
   const std::string frame =
       std::string("FRAME\n") + "\x10\xeb\x3f\x20" + "\x80\x80\x66\xf0" + "\x80\x80\xf0\x76";
   EXPECT_EQ(piped(true, image),

@@ -9,7 +9,7 @@
 namespace offstage::render {
 namespace {
 
-// Shows its colour whatever the light.
+// A material that shows its colour under any light.
 Material glowing(const Vector3f& radiance) {
   return {.color = {0, 0, 0, 1}, .roughness = 1, .emission = radiance};
 }
@@ -24,7 +24,7 @@ double brightness(const HdrImage& image) {
   return sum;
 }
 
-TEST(Stage, DrawsNothingWhenThereIsNothing) {
+TEST(Stage, AnEmptyStageDrawsNothing) {
   SmallStage s;
   const HdrImage picture = s.draw();
   ASSERT_EQ(picture.rgba.size(), 96u * 64u * 4u);
@@ -54,7 +54,7 @@ TEST(Stage, UnlitGreyComesBackThroughTheLinearCurve) {
   s.stage.set_points(points, std::array{point_at({0, 0, 0}, 1, {0.5f, 0.5f, 0.5f, 1})});
   const Image shown = tone_map(s.draw(), {.curve = ToneCurve::linear, .dither = false});
   const std::size_t center = 4 * (32 * 96 + 48);
-  EXPECT_NEAR(shown.rgba[center], 188, 1);  // sRGB of one half
+  EXPECT_NEAR(shown.rgba[center], 188, 1);  // one half, encoded as sRGB
   EXPECT_EQ(shown.rgba[center + 3], 255);
 }
 
@@ -78,8 +78,9 @@ TEST(Stage, WithoutFogNothingFadesWithDistance) {
   for (std::size_t k = 0; k < near.size(); ++k) EXPECT_LT((near[k] - far[k]).norm(), 1e-3f) << k;
 }
 
-TEST(Stage, EndlessPlaneKeepsItsColorUntilItMeetsTheSkyAtItsHorizonAtEveryScale) {
-  // The camera looks along the plane: the horizon is in the middle of the picture, 1.6 rows to a degree.
+TEST(Stage, EndlessPlaneMeetsTheSkyAtTheHorizonAtEveryScale) {
+  // The camera looks along the plane: the horizon is in the middle of the picture, and a degree covers 51
+  // rows.
   std::array<Vector4f, 3> first;
   for (const float height : {0.1f, 1.5f, 100.0f}) {
     SmallStage s(16, 512);
@@ -88,10 +89,10 @@ TEST(Stage, EndlessPlaneKeepsItsColorUntilItMeetsTheSkyAtItsHorizonAtEveryScale)
     s.add(make_ground(256'000), glowing({1, 0, 1}));
     const HdrImage picture = s.draw();
     const float px_per_rad = 256 / std::tan(0.0872665f);
-    const int near_row = 256 + static_cast<int>(0.05f * px_per_rad);  // 3 degrees down
+    const int near_row = 256 + static_cast<int>(0.05f * px_per_rad);  // 3 degrees below the horizon
     EXPECT_GT(pixel(picture, 8, near_row).x() - pixel(picture, 8, near_row).y(), 0.97f) << height;
     EXPECT_LT((pixel(picture, 8, 258) - pixel(picture, 8, 252)).head<3>().norm(), 0.05f) << height;
-    for (int y = 1; y < 512; ++y)  // no edge anywhere
+    for (int y = 1; y < 512; ++y)  // neighbouring rows differ little everywhere
       ASSERT_LT((pixel(picture, 8, y) - pixel(picture, 8, y - 1)).norm(), 0.12f) << height << ' ' << y;
     const std::array rows{pixel(picture, 8, 262), pixel(picture, 8, 270), pixel(picture, 8, 300)};
     if (height == 0.1f) first = rows;
@@ -127,7 +128,7 @@ TEST(Stage, WhiteSurfaceFacingTheSunHasTheSunsRadianceInItsDiffusePart) {
   s.stage.set_sun({.direction = Vector3f::UnitZ(), .color = {1, 1, 1}, .intensity = 2, .shadows = false});
   s.stage.set_environment({.intensity = 0, .visible = false});
   s.add(make_box({3, 3, 1}), {.color = {1, 1, 1, 1}, .roughness = 1});
-  // Fresnel takes 4 % of the diffuse part, and the rough highlight gives about 1 % back.
+  // The Fresnel term removes 4 % of the diffuse part, and the rough highlight adds about 1 %.
   EXPECT_NEAR(center_pixel(s.draw()).x(), 2, 0.1);
 }
 
@@ -140,7 +141,7 @@ TEST(Stage, AmbientLightOfAnEvenSkyIsItsRadiance) {
   EXPECT_NEAR(center_pixel(s.draw()).x(), 0.5, 0.015);
 }
 
-TEST(Stage, WhatIsBehindIsHiddenWhateverTheOrder) {
+TEST(Stage, NearerBodiesHideFartherOnesInAnyOrder) {
   for (const bool near_first : {true, false}) {
     SmallStage s;
     const Mesh box = make_box({1, 1, 0.2f});
@@ -165,7 +166,7 @@ TEST(Stage, DepthIsPreciseFarAway) {
 }
 
 TEST(Stage, RayCastSphereEqualsATessellatedOne) {
-  // Off the axis, where a perspective silhouette is an ellipse.
+  // Off the axis, where the silhouette in perspective is an ellipse.
   const Vector3f center(1.2f, 0.6f, 1);
   SmallStage ball(192, 128), mesh(192, 128);
   const Vector4f color(0.7f, 0.3f, 0.2f, 1);
@@ -187,7 +188,8 @@ TEST(Stage, RayCastSphereEqualsATessellatedOne) {
   }
   EXPECT_GT(covered, 1000);
   EXPECT_LE(silhouette_differs, 12);
-  EXPECT_LE(shading_differs, covered / 50);  // the terminator, where the meshes' facets shadow themselves
+  // near the terminator, where facets of the mesh shadow each other
+  EXPECT_LE(shading_differs, covered / 50);
 }
 
 TEST(Stage, SphereImpostorsCutEachOtherWhereTheirSurfacesMeet) {
@@ -200,7 +202,7 @@ TEST(Stage, SphereImpostorsCutEachOtherWhereTheirSurfacesMeet) {
   EXPECT_GT(pixel(picture, 51, 32).y(), 0.9f);
 }
 
-// Looks down on a white floor with a ball of radius 0.5 at height 2.
+// Looks down on a white floor with a ball of radius 0.5 at a height of 2.
 struct ShadowScene {
   Camera camera{.eye = {0, 12, 0.01f}, .target = {0, 0, 0}};
   SmallStage s{160, 120};
@@ -222,10 +224,10 @@ struct ShadowScene {
   }
 };
 
-TEST(Stage, ShadowFallsWhereGeometrySays) {
+TEST(Stage, ShadowFallsWhereGeometryPredicts) {
   for (const bool point_caster : {false, true}) {
-    // The sun stands at 45 degrees over +X: the shadow's centre is at x = -2, its half-axes 0.5 across and
-    // 0.71 along.
+    // The sun is at 45 degrees above +X: the centre of the shadow is at x = -2, its half-axes are 0.5 across
+    // and 0.71 along.
     ShadowScene scene({1, 1, 0}, point_caster);
     const float light = scene.floor_at(3, 2);
     EXPECT_LT(scene.floor_at(-2, 0), 0.5f * light);
@@ -244,8 +246,8 @@ TEST(Stage, ShadowMovesWithTheSun) {
 }
 
 TEST(Stage, ShadowsSoftenWithTheSizeOfTheSun) {
-  // The penumbra of a caster 2 m up under a disc of 20 degrees is 0.7 m wide: part of the light is back 0.3 m
-  // inside.
+  // A caster 2 m up under a sun disc of 20 degrees has a penumbra 0.7 m wide; 0.3 m inside it, the light is
+  // partly back.
   ShadowScene scene({0.01f, 1, 0});
   scene.s.stage.set_camera(scene.camera = {.eye = {3, 12, 0.01f}, .target = {3, 0, 0}});
   scene.s.stage.set_sun({.direction = Vector3f(1, 1, 0).normalized(), .size_deg = 20});
@@ -273,9 +275,9 @@ TEST(Stage, FlatGroundDoesNotShadowItself) {
   EXPECT_GT(low, 0.97f * high);
 }
 
-// Large enough that the ground is shaded in a simpler way where nothing is near. Another plane in view, even
-// one that shows nothing and shadows nothing, makes the renderer look for hidden light everywhere.
-TEST(Stage, GroundIsTheSameWhetherHiddenLightIsLookedForOrNot) {
+// In a picture of this size, ground without near objects is shaded in a simpler way. A second plane in view,
+// even an invisible one without a shadow, makes the renderer compute the occlusion of light everywhere.
+TEST(Stage, GroundIsTheSameWithAndWithoutComputedOcclusion) {
   for (const Vector3f& to_sun :
        {Vector3f(1, 1.2f, 0.4f), Vector3f(-0.6f, 0.5f, -1), Vector3f(0.4f, 0.12f, 0.2f)}) {
     std::array<HdrImage, 2> sums;
@@ -299,7 +301,7 @@ TEST(Stage, GroundIsTheSameWhetherHiddenLightIsLookedForOrNot) {
   }
 }
 
-TEST(Stage, TransparentBackgroundHasNoAlphaAndThingsHaveAllOfIt) {
+TEST(Stage, TransparentBackgroundHasAlphaZeroAndObjectsHaveAlphaOne) {
   SmallStage s;
   s.add(make_box({1, 1, 1}), Material{});
   const HdrImage picture = s.draw();
@@ -322,7 +324,7 @@ TEST(Stage, BlendedPointsDoNotDependOnTheirOrderInTheSet) {
   const PointsHandle points = s.stage.add_points({.lit = false, .casts_shadow = false});
   std::vector<Point> values;
   for (uint64_t i = 0; i < 24; ++i) {
-    const float depth = static_cast<float>(i / 3) * 0.1f;  // three at each depth: ties
+    const float depth = static_cast<float>(i / 3) * 0.1f;  // three at each depth, so that depths are equal
     values.push_back(point_at({0.05f * static_cast<float>(i % 5), 0, depth}, 0.5f,
                               {static_cast<float>(i % 2), 0.5f, static_cast<float>(i % 3), 0.5f}, i));
   }
@@ -361,7 +363,7 @@ TEST(Stage, AddedLightCoversNothing) {
 
 TEST(Stage, SpritesFadeWhereTheyMeetASurface) {
   SmallStage s;
-  s.add(make_box({3, 3, 1}), glowing({0, 0, 0}), {0, 0, -0.5f});  // its face is at z = 0
+  s.add(make_box({3, 3, 1}), glowing({0, 0, 0}), {0, 0, -0.5f});  // its front face is at z = 0
   const PointsHandle points = s.stage.add_points({.lit = false, .casts_shadow = false});
   const auto red_at = [&](float z) {
     s.stage.set_points(points, std::array{point_at({0, 0, z}, 0.4f, {5, 0, 0, 1})});
@@ -403,12 +405,12 @@ TEST(Stage, ThinStreaksKeepTheirLightAndGetFainter) {
   EXPECT_NEAR(light_of(0.002f) / light_of(0.001f), 2, 0.1);
 }
 
-TEST(Stage, LensBlursWhatIsOutOfFocusAndOnlyThat) {
+TEST(Stage, LensBlursOnlyObjectsOutOfFocus) {
   const auto contrast = [](float z) {
     SmallStage s;
     s.stage.set_camera({.eye = {0, 0, 5}, .aperture = 0.6f, .focus = 5});
     s.add(make_box({1, 40, 0.01f}), glowing({1, 1, 1}),
-          {0.5f, 0, z});  // its left edge is the middle of the picture
+          {0.5f, 0, z});  // its left edge is in the middle of the picture
     HdrImage sum;
     constexpr int kSamples = 16;
     for (int i = 0; i < kSamples; ++i) s.stage.draw({.lens = sample_offsets(i, kSamples).lens}, sum);
@@ -446,7 +448,8 @@ TEST(Stage, TransformMovesMirrorsAndHides) {
 
 TEST(Stage, TextureAlphaCutsOut) {
   SmallStage s;
-  // Left half opaque red, right half nothing; looked at in the middle of each half.
+  // The left half of the texture is opaque red, the right half transparent; the picture is checked in the
+  // middle of each half.
   Image texture{2, 1, {255, 0, 0, 255, 255, 0, 0, 0}};
   const MaterialHandle material =
       s.stage.add_material({.color = {1, 1, 1, 1}, .emission = {0, 0, 0}, .base_color_texture = 0},
@@ -466,7 +469,8 @@ TEST(Stage, PatternsFadeToTheirMeanInTheDistance) {
     s.add(make_box({40, 40, 1}), {.color = {0.9f, 0.9f, 0.9f, 1},
                                   .pattern = pattern,
                                   .pattern_color = {0.1f, 0.1f, 0.1f},
-                                  .pattern_scale = 0.02f});  // a cell is a tenth of a pixel
+                                  // a cell of the pattern is a tenth of a pixel wide
+                                  .pattern_scale = 0.02f});
     const HdrImage picture = s.draw();
     float low = 1e9f, high = 0;
     for (int x = 20; x < 70; ++x) {

@@ -34,7 +34,7 @@ TEST(ToneMap, LinearCurveReturnsEveryDisplayableGrey) {
 }
 
 TEST(ToneMap, TableIsWithinAQuarterStepOfDoublePrecision) {
-  // With dither the mean over many pixels shows the table's value below one step.
+  // With dithering, the mean over many pixels has the table's value to less than one step.
   for (float x = 0.0004f; x < 0.99f; x *= 1.37f) {
     HdrImage image{64, 64, {}};
     for (int i = 0; i < 64 * 64; ++i) image.rgba.insert(image.rgba.end(), {x, x, x, 1});
@@ -110,16 +110,16 @@ Image slanted_edge() {
   return image;
 }
 
-TEST(FilterEdges, SmoothsTheStairsOfASlantedEdge) {
+TEST(FilterEdges, SmoothsTheStepsOfASlantedEdge) {
   const Image sharp = slanted_edge();
   Image smooth = sharp;
   filter_edges(smooth);
-  // The error against the exact coverage of the edge's line falls by at least a third.
+  // The error relative to the exact coverage falls by at least a third.
   const auto error = [](const Image& image) {
     double sum = 0;
     for (int y = 8; y < 56; ++y) {
       for (int x = 8; x < 40; ++x) {
-        const double edge = 13 + (y - 1.5) / 4;  // where the stairs' mean line runs
+        const double edge = 13 + (y - 1.5) / 4;  // the mean line through the steps
         const double coverage = std::clamp(x + 1 - edge, 0.0, 1.0);
         sum += std::abs(image.rgba[static_cast<std::size_t>(4 * (y * 64 + x))] - (20 + 200 * coverage));
       }

@@ -11,7 +11,7 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
 from page_case import Case, SCENE
-from sitting import set_dark, wait
+from tune_session import set_dark, wait
 
 CURVES = SCENE.replace('"look": {"color": "#4080ff"}', '"look": {"color": "#4080ff", "size_over_age": [[0, 1], [1, 2]],\n'
                        '       "color_over_age": [[0, [1, 1, 1, 1]], [1, [1, 0, 0, 0]]]}')
@@ -167,7 +167,7 @@ class Choices(Case):
         self.page.js('const s = document.querySelector(`#controls .row[data-key="${arguments[0]}"] select`); s.value = arguments[1]; s.dispatchEvent(new Event("change"))', key, value)
         self.settle()
 
-    def test_names_of_other_objects_are_pick_lists_that_follow_a_rename(self):
+    def test_names_of_other_objects_are_drop_down_lists_that_follow_a_rename(self):
         page = self.page
         page.select('/bodies/1')
         options = page.js('return [...document.querySelector("#controls .row[data-key=material] select").options].map(o => o.value)')
@@ -261,7 +261,7 @@ class Objects(Case):
         self.settle()
         self.assertEqual(page.text(), SCENE)
 
-    def test_undo_takes_text_that_is_not_sent_yet_as_a_step(self):
+    def test_undo_treats_unsent_text_as_a_step(self):
         page = self.page
         changed = SCENE.replace('4.0e2', '55')
         page.js('''const t = document.getElementById("text"); t.focus(); t.value = arguments[0]; t.dispatchEvent(new Event("input"));

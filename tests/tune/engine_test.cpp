@@ -18,7 +18,7 @@ namespace {
 
 using producer::LoadedScene;
 
-/// A few particles and a falling ball; `rate` makes versions of it.
+/// A scene with a few particles and a falling ball; different rates make different versions of it.
 Engine::Loaded fountain(int rate, double duration = 0.5) {
   const std::string text =
       R"({"bodies": [{"name": "ball", "position": [0, 2, 0], "shape": {"type": "sphere", "radius": 0.3}}],
@@ -29,7 +29,7 @@ Engine::Loaded fountain(int rate, double duration = 0.5) {
   return std::make_shared<const LoadedScene>(producer::parse_scene(text, "fountain", ""));
 }
 
-/// The events of an engine, to be waited for.
+/// Collects the events of an engine, so that a test can wait for them.
 class Events {
  public:
   void operator()(const EngineEvent& event) {
@@ -37,7 +37,7 @@ class Events {
     events_.push_back(event);
     changed_.notify_all();
   }
-  /// Until an event of a kind satisfies the condition; false after a minute.
+  /// Waits for an event of a type that satisfies the condition; false after a minute.
   template <class Event, class Condition>
   bool wait_for(Condition&& condition) {
     std::unique_lock lock(mutex_);
@@ -97,13 +97,13 @@ TEST_F(Engines, EndAnOldRunWithinOneFrame) {
   EXPECT_LE(late, 1u);
 }
 
-TEST_F(Engines, BeginNothingWhileAChangeIsOnItsWay) {
+TEST_F(Engines, StartNoWorkWhileAChangeIsPending) {
   const Engine::Run run = engine_.show(fountain(100, 60), {});
   ASSERT_TRUE(events_.wait_for<FrameEvent>([&](const FrameEvent& e) { return e.run == run.number; }));
   std::size_t before = 0;
   {
     const Engine::Hold hold(engine_);
-    bool still = false;  // after the piece of work that was begun, of the film's 1200 frames
+    bool still = false;  // the current piece of work has ended, out of 1200 frames
     for (int i = 0; i < 10 && !still; ++i) {
       before = events_.all().size();
       std::this_thread::sleep_for(std::chrono::milliseconds(500));
@@ -126,7 +126,7 @@ TEST_F(Engines, KeepTheFramesOfEarlierVersions) {
   EXPECT_EQ(engine_.frame(again.film, 10, Detail::draft)->jpeg, frame);
 }
 
-TEST_F(Engines, SeeTheSameStatesByAnotherCamera) {
+TEST_F(Engines, ReuseStatesForAnotherCamera) {
   const Engine::Loaded scene = fountain(100);
   ASSERT_TRUE(events_.wait_until_complete(engine_.show(scene, {}).number));
   const std::string state = engine_.figures().back().state_hash;
@@ -136,14 +136,14 @@ TEST_F(Engines, SeeTheSameStatesByAnotherCamera) {
   EXPECT_TRUE(engine_.frame(other.film, 10));
 }
 
-TEST_F(Engines, NameWhatIsSeen) {
+TEST_F(Engines, NameTheObjectUnderThePointer) {
   const Engine::Run run = engine_.show(fountain(1), ViewCamera{{0, 2, 3}, {0, 2, 0}});
   ASSERT_TRUE(events_.wait_until_complete(run.number));
   EXPECT_EQ(engine_.pick(1, 0.5, 0.5).get(), "ball");
   EXPECT_EQ(engine_.pick(1, 0.02, 0.02).get(), "");
 }
 
-TEST_F(Engines, DrawASheetOfVersionsAndSayWhichAreNone) {
+TEST_F(Engines, DrawASheetOfVersionsAndReportMissingOnes) {
   const auto sheet = engine_.sweep({fountain(50), nullptr}, 3);
   ASSERT_TRUE(events_.wait_for<CellEvent>(
       [&](const CellEvent& e) { return e.sweep == sheet && e.index == 0 && e.fault.empty(); }));

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""Wild clicking on the tuning page. usage: monkey.py PROGRAM SOURCE_DIR SECONDS [SEED]
+"""Uses the tuning page at random ("monkey test"). usage: monkey.py PROGRAM SOURCE_DIR SECONDS [SEED]
 
-Random controls, text edits, seeks, undo, saves, overlays, versions and reloads of the page. Fails on an error in the
-browser or of the server, on memory beyond its bounds, and on processes that are left."""
+Random controls, text edits, seeks, undo, saves, overlays, versions and reloads of the page. Fails on an error of the
+browser or the server, on memory use beyond the bounds, and on child processes that remain."""
 
 import pathlib
 import random
@@ -11,13 +11,13 @@ import sys
 import tempfile
 import time
 
-from sitting import Page, Server, browser, wait
+from tune_session import Page, Server, browser, wait
 
 PROGRAM, SOURCE, SECONDS = sys.argv[1], pathlib.Path(sys.argv[2]), float(sys.argv[3])
 SEED = int(sys.argv[4]) if len(sys.argv) > 4 else 20260101
 MOST_SERVER_MB, MOST_PAGE_MB = 1600, 400
 
-# What a person can do, inside of the page: the pace of WebDriver would leave it idle most of the time.
+# The actions of a user, as a script in the page: sent one by one through WebDriver they would leave the page idle most of the time.
 ACTIONS = r'''
 const pick = list => list[Math.floor(random() * list.length)];
 const fire = (target, type, more = {}) => target?.dispatchEvent(new PointerEvent(type, {bubbles: true, cancelable: true, button: 0, pointerId: 1, ...more}));
@@ -80,14 +80,14 @@ def main():
             if rng.random() < 0.2:
                 driver.refresh()
                 wait(lambda: page.js('return document.body.dataset.ready'))
-            # Texts that are refused are part of it; what else the browser calls an error is not.
+            # Random texts are often refused, with these codes. Every other error in the console is a failure.
             errors = [e for e in page.errors() if not any(f'status of {code}' in e['message'] for code in (404, 409, 422, 423))]
             if errors:
                 raise AssertionError(errors)
             if server.process.poll() is not None:
                 raise AssertionError('the server has ended: ' + server.process.stderr.read())
         if server.children():
-            raise AssertionError('the server has children')
+            raise AssertionError('the server still has child processes')
         code = server.interrupt()
         if code != 130:
             raise AssertionError(f'exit code {code}')

@@ -1,4 +1,4 @@
-"""A scene, a sitting and a browser for each test of the tuning page."""
+"""The base class of the tests of the tuning page: a scene, a server and a browser."""
 
 import pathlib
 import shutil
@@ -10,7 +10,7 @@ import unittest
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
-from sitting import Page, Server, browser, wait
+from tune_session import Page, Server, browser, wait
 
 PROGRAM, SOURCE = sys.argv[1], pathlib.Path(sys.argv[2])
 
@@ -71,6 +71,6 @@ class Case(unittest.TestCase):
         self.settle()
 
     def settle(self):
-        """Until what was done has come to the server and back."""
+        """Waits until the server has answered all requests of the page."""
         time.sleep(0.05)
         self.page.idle()

@@ -15,7 +15,7 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
 from page_case import Case, PROGRAM, SCENE
-from sitting import Page, Server, set_size, wait
+from tune_session import Page, Server, set_size, wait
 
 
 def get(address, headers=None):
@@ -45,7 +45,7 @@ class Editing(Case):
         self.assertEqual(self.scene.read_bytes(), SCENE.replace('4.0e2', '2500').encode())
         self.assertEqual(page.errors(), [])
 
-    def test_a_key_that_is_missing_goes_in_with_the_objects_indentation(self):
+    def test_a_missing_key_is_inserted_with_the_indentation_of_its_object(self):
         self.page.select('/emitters/0')
         self.page.type_value('lifespan', 'lifespan', 1.5)
         self.assertIn('     "look": {"color": "#4080ff"},\n     "lifespan": 1.5}', self.page.text())
@@ -73,7 +73,7 @@ class Editing(Case):
         self.command(Keys.SHIFT, 'z')
         self.assertNotEqual(page.text(), SCENE)
 
-    def test_text_with_an_error_keeps_the_last_film_and_says_where(self):
+    def test_a_text_with_an_error_keeps_the_last_film_and_shows_the_place(self):
         page = self.page
         page.wait_for_frame(1)
         film = page.film()
@@ -107,7 +107,7 @@ class EmptyStage(Case):
 
     def test_a_fountain_is_built_from_a_preset_on_an_empty_stage(self):
         page = self.page
-        self.assertIn('The stage is empty', page.find('#controls').text)
+        self.assertIn('The scene has no objects yet', page.find('#controls').text)
         page.wait_for_frame(1)
         page.js('document.querySelector("#controls .empty button").click()')
         self.assertTrue(wait(lambda: page.js('return document.querySelector(`[data-preset="fountain"] img`)?.naturalWidth')), 'its picture')
@@ -127,11 +127,11 @@ class Looking(Case):
         told = subprocess.run([PROGRAM, 'simulate', str(self.scene), '-q'], capture_output=True, check=True, text=True)
         self.assertEqual(page.find('#final-state').get_attribute('data-hash'), json.loads(told.stdout)['state_hash'])
 
-    def test_the_frame_that_is_looked_at_becomes_better_when_nothing_changes(self):
+    def test_the_visible_frame_is_refined_while_nothing_changes(self):
         wait(lambda: self.page.js('return document.getElementById("film").dataset.detail') == 'preview', 60)
         wait(lambda: self.page.js('return document.getElementById("film").dataset.detail') == 'final', 60)
 
-    def test_playing_and_stepping_are_no_undo_steps(self):
+    def test_playing_and_stepping_make_no_undo_steps(self):
         page = self.page
         wait(lambda: page.js('return tuneStore.film.phase') == 'complete', 60)
         page.js('document.getElementById("stage").focus()')
@@ -143,7 +143,7 @@ class Looking(Case):
         self.assertFalse(page.js('return tuneStore.playing'))
         self.assertFalse(page.find('#undo').is_enabled())
 
-    def test_a_click_selects_what_is_seen(self):
+    def test_a_click_selects_the_object_under_the_pointer(self):
         page = self.page
         page.wait_for_frame(1)
         box = page.find('#film').rect
@@ -168,7 +168,7 @@ class Looking(Case):
         wait(lambda: page.text() != SCENE)
         self.assertNotEqual(page.js('return tuneStore.value.camera.eye'), [0, 1.5, 5])
 
-    def test_versions_are_compared_side_by_side_as_a_wipe_and_in_turns(self):
+    def test_versions_are_compared_side_by_side_as_a_wipe_and_alternating(self):
         page = self.page
         page.wait_for_frame(1)
         page.click('#pin')
@@ -191,7 +191,7 @@ class Looking(Case):
         page = self.page
         page.wait_for_frame(1)
         page.select('/bodies/1')
-        # The marks are rebuilt with each frame, hence the place alone.
+        # The marks are rebuilt with each frame, so an element could be gone by now; its position remains valid.
         at = wait(lambda: page.js('''const ring = document.querySelector("#marks .handle")?.getBoundingClientRect(), stage = document.getElementById("stage").getBoundingClientRect();
             return ring && [ring, stage].map(r => [r.x + r.width / 2, r.y + r.height / 2]).reduce((a, b) => [Math.round(a[0] - b[0]), Math.round(a[1] - b[1])])'''))
         ActionChains(self.driver).move_to_element_with_offset(page.find('#stage'), *at).click_and_hold() \
@@ -228,7 +228,7 @@ class Looking(Case):
         page = self.page
         page.set_text(SCENE.replace('"version": 1,', '"version": 1, "materials": [{"name": "unused"}],')
                       .replace('"radius": 0.4}, "position"', '"radius": 0.4}, "velocity": [3e4, 0, 0], "position"'))
-        # The list is rebuilt with each frame, hence its texts alone.
+        # The list is rebuilt with each frame, so an element could be gone by now; its texts remain valid.
         texts = 'return [...document.querySelectorAll("#facts .notes .problem")].map(p => p.textContent)'
         wait(lambda: len(page.js(texts)) == 2, 60, 'the warnings')
         shown = page.js(texts)
@@ -239,7 +239,7 @@ class Looking(Case):
         page.js('document.querySelectorAll("#facts .notes .problem")[1].click()')
         self.assertEqual(page.js('return tuneStore.selection'), ['/bodies/1'])
 
-    def test_a_version_is_gone_back_to_and_shows_its_picture(self):
+    def test_an_earlier_version_can_be_restored_and_shows_its_picture(self):
         page = self.page
         page.wait_for_frame(1)
         page.set_text(SCENE.replace('4.0e2', '90'))
@@ -250,7 +250,7 @@ class Looking(Case):
         page.js('arguments[0].querySelector("button").click()', first)
         wait(lambda: page.text() == SCENE)
 
-    def test_overlays_are_drawn_and_leave_the_scene_alone(self):
+    def test_overlays_are_drawn_and_do_not_change_the_scene(self):
         page = self.page
         wait(lambda: page.js('return tuneStore.film.phase') == 'complete', 60)
         film = page.film()
@@ -261,7 +261,7 @@ class Looking(Case):
         wait(lambda: page.all('#marks .emitter'))
         self.assertEqual(page.text(), SCENE)
 
-    def test_a_sweep_shows_values_and_takes_the_one_that_is_clicked(self):
+    def test_a_sweep_shows_a_picture_per_value_and_a_click_sets_the_value(self):
         page = self.page
         page.wait_for_frame(1)
         page.select('/emitters/0')
@@ -275,15 +275,15 @@ class Looking(Case):
 
 
 class TheFile(Case):
-    def test_an_edit_from_outside_is_taken_when_nothing_is_lost(self):
+    def test_a_change_of_the_file_is_loaded_if_the_page_has_no_changes(self):
         other = SCENE.replace('4.0e2', '77')
         new = self.folder / 'new'
         new.write_text(other)
-        os.replace(new, self.scene)  # as editors do
+        os.replace(new, self.scene)  # as editors save files
         wait(lambda: self.page.text() == other, 10)
         self.assertTrue(self.page.js('return tuneStore.doc.saved'))
 
-    def test_an_edit_from_outside_beside_own_changes_is_never_overwritten(self):
+    def test_a_change_of_the_file_is_not_overwritten_by_changes_on_the_page(self):
         page = self.page
         page.set_text(SCENE.replace('4.0e2', '500'))
         other = SCENE.replace('4.0e2', '77')
@@ -299,7 +299,7 @@ class TheFile(Case):
         self.command('s')
         self.assertEqual(self.scene.read_text(), SCENE.replace('4.0e2', '500'))
 
-    def test_line_ends_of_windows_stay(self):
+    def test_windows_line_ends_are_kept(self):
         crlf = SCENE.replace('\n', '\r\n').encode()
         self.scene.write_bytes(crlf)
         wait(lambda: '\r\n' in self.page.text(), 10)
@@ -310,7 +310,7 @@ class TheFile(Case):
 
 
 class Connections(Case):
-    def test_a_second_tab_looks_on_until_it_takes_over(self):
+    def test_a_second_tab_is_read_only_until_it_takes_over(self):
         first = self.driver.current_window_handle
         self.driver.switch_to.new_window('tab')
         second = Page(self.driver, self.server.address)
@@ -334,7 +334,7 @@ class Connections(Case):
             wait(lambda: self.driver.execute_script('return tuneStore.writer !== ""'))
         self.driver.switch_to.new_window('tab')
         self.driver.get(self.server.address)
-        self.assertIn('room for no more', self.driver.page_source)
+        self.assertIn('more are not allowed', self.driver.page_source)
         for handle in self.driver.window_handles:
             if handle != first:
                 self.driver.switch_to.window(handle)
@@ -349,7 +349,7 @@ class Connections(Case):
         wait(lambda: self.page.js('return tuneStore.writer === tuneStore.tab'), 10)
         self.page.wait_for_frame(1)
 
-    def test_the_end_of_the_server_is_told_and_unsaved_text_comes_back(self):
+    def test_the_end_of_the_server_is_reported_and_unsaved_text_is_recovered(self):
         port = self.server.address.split(':')[2].split('/')[0]
         changed = SCENE.replace('4.0e2', '61')
         self.page.set_text(changed)
@@ -387,7 +387,7 @@ class Safety(Case):
             urllib.request.urlopen(request, timeout=10)
         self.assertEqual(refused.exception.code, 415)
 
-    def test_nothing_listens_beyond_this_machine(self):
+    def test_the_server_listens_on_the_loopback_interface_only(self):
         with socket.socket() as other:
             other.settimeout(2)
             outside = subprocess.run(['hostname', '-I'], capture_output=True, text=True).stdout.split()

@@ -12,7 +12,7 @@ using std::chrono::milliseconds;
 TEST(Tabs, ASlowTabGetsTheLatestMessageOfEachKind) {
   Tabs tabs;
   const auto ticket = tabs.open("a");
-  tabs.wait("a", *ticket, milliseconds(0));  // the writer
+  tabs.wait("a", *ticket, milliseconds(0));  // consumes the message that names the writer
   for (int i = 0; i < 1000; ++i) tabs.post("frame", std::to_string(i));
   tabs.post("film", "f");
   EXPECT_EQ(tabs.wait("a", *ticket, milliseconds(0)).message->json, "999");
@@ -25,7 +25,7 @@ TEST(Tabs, ThereIsRoomForEightAndTheFirstWrites) {
   for (std::size_t i = 0; i < kMostTabs; ++i) EXPECT_TRUE(tabs.open(std::to_string(i)));
   EXPECT_FALSE(tabs.open("ninth"));
   EXPECT_EQ(tabs.writer(), "0");
-  const auto again = tabs.open("0");  // the same tab once more
+  const auto again = tabs.open("0");  // the same tab, opened once more
   EXPECT_TRUE(again);
   tabs.close("0", *again);
   EXPECT_EQ(tabs.writer(), "1");
@@ -37,7 +37,7 @@ TEST(Tabs, ANewStreamOfATabEndsTheOldOne) {
   const auto old = tabs.open("a");
   const auto fresh = tabs.open("a");
   EXPECT_TRUE(tabs.wait("a", *old, milliseconds(0)).over);
-  tabs.close("a", *old);  // arrives late and has no effect
+  tabs.close("a", *old);  // a late close of the old stream has no effect
   EXPECT_FALSE(tabs.wait("a", *fresh, milliseconds(0)).over);
   tabs.close_all();
   EXPECT_TRUE(tabs.wait("a", *fresh, milliseconds(0)).over);
@@ -47,7 +47,7 @@ StoredFrame frame_of(std::size_t bytes) {
   return {Detail::draft, 1, std::make_shared<const std::string>(bytes, 'x'), {}};
 }
 
-TEST(FrameStore, StaysWithinItsBoundAndKeepsWhatIsOnShow) {
+TEST(FrameStore, StaysWithinItsLimitAndKeepsTheShownFilm) {
   FrameStore store(1000);
   store.protect({"shown"});
   for (int i = 1; i <= 5; ++i) store.put("shown", i, frame_of(100));
@@ -58,7 +58,7 @@ TEST(FrameStore, StaysWithinItsBoundAndKeepsWhatIsOnShow) {
   EXPECT_FALSE(store.get("other1", 1));
 }
 
-TEST(FrameStore, GivesTheBestPictureThatIsAskedFor) {
+TEST(FrameStore, ReturnsTheFinestPictureUpToTheRequestedDetail) {
   FrameStore store(1000);
   store.put("film", 1, frame_of(10));
   StoredFrame fine = frame_of(20);

@@ -26,7 +26,7 @@ TEST(TextEdit, ReplacesTheBytesOfAValueAlone) {
             "{\r\n  \"a\" : 1.50, // one\r\n  /* two */ \"b\":[1e3,  2 ,{\"c\": \"y\"}]\r\n}\r\n");
 }
 
-TEST(TextEdit, AddsAKeyInTheMannerOfTheObject) {
+TEST(TextEdit, AddsAKeyInTheLayoutOfTheObject) {
   EXPECT_EQ(set_value("{}", "/a", "1"), "{\"a\": 1}");
   EXPECT_EQ(set_value("{\"a\":1,\"b\":2}", "/c", "3"), "{\"a\":1,\"b\":2,\"c\":3}");
   EXPECT_EQ(set_value("{\"a\": 1}", "/b", "2"), "{\"a\": 1, \"b\": 2}");
@@ -48,7 +48,7 @@ TEST(TextEdit, RemovesOneCommaWithAValue) {
   EXPECT_EQ(remove_value("{\"a\": 1}", "/none"), "{\"a\": 1}");
 }
 
-TEST(TextEdit, SaysWhatCannotBeDone) {
+TEST(TextEdit, ReportsImpossibleEdits) {
   EXPECT_THROW(set_value("{\"a\": 1", "/a", "2"), SceneError);
   EXPECT_THROW(set_value("{\"a\": 1}", "/a", "nonsense"), SceneError);
   EXPECT_THROW(set_value("{\"a\": [1]}", "/a/5", "2"), std::invalid_argument);
@@ -64,13 +64,13 @@ TEST(TextEdit, BlankingKeepsLinesAndColumns) {
   EXPECT_EQ(blank_out(text, {"/l/0", "/l/1", "/l/2", "/nowhere/7"}), "{\"l\": [\n        \n   ]}");
 }
 
-/// Random JSON with comments, blanks and line ends of all kinds.
+/// Writes random JSON with comments, blanks and all kinds of line ends.
 class Writer {
  public:
   explicit Writer(uint32_t seed) : random_(seed) {}
 
   std::string text() { return gap() + value(0) + gap(); }
-  /// The paths of all values in a tree.
+  /// Collects the paths of all values in a tree.
   static void collect(const Node& node, const std::string& path, std::vector<std::string>& paths) {
     if (!path.empty()) paths.push_back(path);
     if (const List* list = node.as<List>())
@@ -117,7 +117,7 @@ TEST(TextEdit, OfRandomTextsOnlyTheChangedValueDiffers) {
     const std::string changed = set_value(text, path, "-7.25");
     EXPECT_EQ(changed, text.substr(0, range.begin) + "-7.25" + text.substr(range.end)) << "seed " << seed;
 
-    // Removed and added, every other value reads as before.
+    // After removing and adding a value, every other value reads as before.
     std::vector<std::string> left;
     const std::string shorter = remove_value(text, path);
     Writer::collect(parse_json(shorter, "text"), "", left);

@@ -1,5 +1,5 @@
-/// Bodies joined by joints against closed forms and minimal coordinates (physics A1-A6, specification's rows
-/// on articulations).
+/// Bodies connected by joints, compared with closed forms and with simulations in minimal coordinates
+/// (physics A1-A6, rows on articulations of the validation table).
 
 #include <array>
 #include <cmath>
@@ -35,7 +35,7 @@ Quat about_z(Real angle) {
   return Quat(Eigen::AngleAxisd(angle, Vec3::UnitZ()));
 }
 
-/// A rod of length 1 that hangs at the origin, turned by an angle from hanging down.
+/// A rod of length 1 attached at the origin, rotated by an angle from hanging down.
 BodyHandle add_pendulum(World& world, Real angle, Real width = 0.02,
                         JointDef joint = {.type = JointType::revolute}) {
   const Quat turn = about_z(angle);
@@ -74,7 +74,8 @@ TEST(CompoundPendulum, HasThePeriodOfTheEllipticIntegral) {
   }
 }
 
-/// Two rods as angles from hanging down, [t1, t2, t1', t2'], by RK4 in steps of 1e-5 s.
+/// Reference for two rods: angles from hanging down and their rates, [t1, t2, t1', t2'], integrated by RK4
+/// with steps of 1e-5 s.
 std::array<Real, 4> double_pendulum(std::array<Real, 4> y, Real time) {
   constexpr Real m = 1, l = 1, a = 0.5, width = 0.05;
   constexpr Real inertia = m * (l * l + width * width) / 12;
@@ -118,7 +119,7 @@ TEST(DoublePendulum, FollowsItsMinimalCoordinatesForFiveSeconds) {
   }
 }
 
-// Steady precession at the rate W of a top that leans by theta: I1 W^2 cos(theta) - I3 w3 W + m g l = 0.
+// Steady precession with rate W of a top that is tilted by theta: I1 W^2 cos(theta) - I3 w3 W + m g l = 0.
 TEST(HeavyTop, PrecessesSteadily) {
   constexpr Real kLean = std::numbers::pi / 3, kSpin = 200, radius = 0.1, height = 0.05, l = 0.1, mass = 1;
   World world(quiet());
@@ -142,7 +143,7 @@ TEST(HeavyTop, PrecessesSteadily) {
   for (int i = 0; i < 4 * 240; ++i) {
     world.step(1.0 / 240);
     const Vec3 now = world.body(top).pose.orientation * Vec3::UnitY();
-    // About +y, from +z towards +x.
+    // Angle about +y, from +z towards +x.
     turned +=
         std::atan2(before.z() * now.x() - before.x() * now.z(), before.x() * now.x() + before.z() * now.z());
     before = now;
@@ -156,7 +157,7 @@ struct Chain {
   std::vector<JointHandle> joints;
 };
 
-/// Of links of half a metre, level from the origin on.
+/// A horizontal chain of links of half a metre that starts at the origin.
 Chain add_chain(World& world, int links, JointDef joint = {}) {
   Chain chain;
   for (int i = 0; i < links; ++i) {
@@ -192,7 +193,7 @@ TEST(ChainReleasedLevel, KeepsItsEnergyAndItsJoints) {
 }
 
 TEST(HangingChain, ComesToRestAsACatenary) {
-  // Links of 0.1 m, 30 of them over a span of 2 m: 2 a sinh(S / 2a) = L, sag = a (cosh(S / 2a) - 1).
+  // 30 links of 0.1 m over a span of 2 m: 2 a sinh(S / 2a) = L, sag = a (cosh(S / 2a) - 1).
   constexpr int kLinks = 30;
   constexpr Real kLength = 3, kSpan = 2;
   Real low = 0.1, high = 10;
@@ -202,7 +203,7 @@ TEST(HangingChain, ComesToRestAsACatenary) {
   }
   const Real sag = low * (std::cosh(kSpan / (2 * low)) - 1);
   World world(quiet());
-  // Zigzag at first: two straight flights from the ends down to the middle.
+  // The chain starts as two straight parts, from the ends down to the middle.
   const Real depth = std::sqrt(kLength * kLength - kSpan * kSpan) / 2;
   std::vector<Vec3> nodes;
   for (int i = 0; i <= kLinks; ++i) {
@@ -231,7 +232,7 @@ TEST(HangingChain, ComesToRestAsACatenary) {
   EXPECT_NEAR(-lowest, sag, 0.005 * sag);
 }
 
-// Four revolute joints in a plane: three of their constraints depend on the others.
+// Four revolute joints in a plane: three of their constraints are redundant.
 TEST(FourBarLoop, StaysClosedForAMinute) {
   World world(quiet());
   const std::array<Vec3, 4> corners = {Vec3(0, 0, 0), Vec3(0.3, 0.8, 0), Vec3(1.4, 1.1, 0), Vec3(1.5, 0, 0)};
@@ -254,12 +255,14 @@ TEST(FourBarLoop, StaysClosedForAMinute) {
     ASSERT_EQ(report.joints_unsolved, 0u);
     ASSERT_LT(worst_gap(world, joints), 1e-6) << world.time();
   }
-  // 2.3e-4, and a thirty-second of it at half the step: the integrator's error, of order five over a minute.
+  // The change is 2.3e-4, and a thirty-second of that at half the step: the fifth-order error of the
+  // integrator over a minute.
   EXPECT_NEAR(world.energy().total(), start, 3e-4 * 3 * kG);
 }
 
-// tan(angle 2) = cos(bend) tan(angle 1), from where the first shaft's axle is across the plane of both.
-TEST(UniversalJoint, TurnsShaftsAsHookeFound) {
+// tan(angle 2) = cos(bend) tan(angle 1), where both angles are zero if the first shaft's axle is
+// perpendicular to the plane of the shafts.
+TEST(UniversalJoint, TransmitsRotationByTheEquationOfHookesJoint) {
   constexpr Real kBend = 0.6;
   World world({.gravity = Vec3::Zero(), .sleep = false});
   const Vec3 second_way(std::cos(kBend), std::sin(kBend), 0);
@@ -268,7 +271,8 @@ TEST(UniversalJoint, TurnsShaftsAsHookeFound) {
   world.add_joint({.type = JointType::revolute, .a = first, .anchor = {-1, 0, 0}, .axis = Vec3::UnitX()});
   const JointHandle out =
       world.add_joint({.type = JointType::revolute, .a = second, .anchor = second_way, .axis = second_way});
-  // The cross: one axle across each shaft; the one of the second is across both now.
+  // The cross of the joint has one axle perpendicular to each shaft; at the start, the axle of the second
+  // shaft is perpendicular to both.
   world.add_joint({.type = JointType::universal,
                    .a = second,
                    .b = first,
@@ -284,7 +288,7 @@ TEST(UniversalJoint, TurnsShaftsAsHookeFound) {
   }
 }
 
-// x = r cos + sqrt(l^2 - r^2 sin^2).
+// Slider position: x = r cos + sqrt(l^2 - r^2 sin^2).
 TEST(SliderCrank, FollowsADrivenCrank) {
   constexpr Real r = 0.3, l = 1, kSpeed = 5;
   World world(quiet());
@@ -319,14 +323,14 @@ TEST_P(Joints, SlideDownAnInclineWithoutTurning) {
                                             .axis = {std::cos(kAngle), -std::sin(kAngle), 0},
                                             .friction = 1});
   run(world, 1);
-  // Dry friction takes 1 N of the weight's part along the rail.
+  // Dry friction reduces the component of the weight along the rail by 1 N.
   EXPECT_NEAR(world.joint(rail).coordinate, 0.5 * (kG * std::sin(kAngle) - 1), 1e-3);
   EXPECT_NEAR(world.body(box).angular_velocity.norm(), 0, 1e-9);
 }
 
 TEST_P(Joints, StopAtTheirLimits) {
   World world(def());
-  // Falls from level, and stops 60 degrees further down.
+  // The rod falls from horizontal and stops 60 degrees below.
   const BodyHandle rod = add_pendulum(world, std::numbers::pi / 2, 0.02,
                                       {.type = JointType::revolute, .lower = -std::numbers::pi / 3});
   JointHandle joint;
@@ -341,12 +345,12 @@ TEST_P(Joints, StopAtTheirLimits) {
   EXPECT_LT(world.body(rod).angular_velocity.norm(), 1e-4);
 }
 
-TEST_P(Joints, LeanNoFurtherThanTheirSwingAndTwistNoFurtherThanTheirRange) {
+TEST_P(Joints, StayWithinTheirSwingAndTwistLimits) {
   World world(def());
   JointDef neck{.axis = Vec3::UnitY(), .lower = -0.3, .upper = 0.3, .swing = 0.5, .damping = 0.05};
   neck.a = add_box(world, {0.1, 1, 0.1}, 2, {0, 0.5, 0});
   const JointHandle joint = world.add_joint(neck);
-  // Upright on its end, pushed over and spun.
+  // The body stands on its end and is given a push and a spin.
   world.set_velocity(neck.a, {0.5, 0, 0.25}, {0.5, 6, -1});
   for (int i = 0; i < 960; ++i) {
     world.step(1.0 / 240);
@@ -357,7 +361,7 @@ TEST_P(Joints, LeanNoFurtherThanTheirSwingAndTwistNoFurtherThanTheirRange) {
   EXPECT_LT(world.body(neck.a).angular_velocity.norm(), 1e-2);
 }
 
-TEST_P(Joints, TurnByTheTorqueOfTheirMotorUpToItsSpeed) {
+TEST_P(Joints, SpeedMotorsAccelerateByTheirTorqueUpToTheirSpeed) {
   World world(weightless());
   JointDef axle{.type = JointType::revolute};
   axle.motor = {.mode = Motor::Mode::speed, .targets = {{0, 10}}, .max_effort = 0.5};
@@ -368,11 +372,11 @@ TEST_P(Joints, TurnByTheTorqueOfTheirMotorUpToItsSpeed) {
   EXPECT_NEAR(world.joint(joint).coordinate, 0.5 * 0.5 * 4, 2e-3);
   run(world, 20);
   EXPECT_NEAR(world.joint(joint).speed, 10, 1e-6);
-  EXPECT_NEAR(world.joint(joint).coordinate, 10 * 22 - 0.5 * 10 * 20, 0.05);  // whole turns counted
+  EXPECT_NEAR(world.joint(joint).coordinate, 10 * 22 - 0.5 * 10 * 20, 0.05);  // whole turns are counted
 }
 
-TEST_P(Joints, HoldTheirPositionAsStifflyAsTheirMotorIs) {
-  // A level arm of 1 m: a torque of m g / 2 bends the spring by m g l / (2 k) and no further.
+TEST_P(Joints, PositionMotorsActAsSprings) {
+  // A horizontal arm of 1 m: the torque m g / 2 deflects the spring by m g l / (2 k).
   World world(def());
   JointDef arm{.type = JointType::revolute};
   arm.motor = {.mode = Motor::Mode::position, .stiffness = 500, .damping = 20};
@@ -390,7 +394,7 @@ TEST_P(Joints, HoldTheirPositionAsStifflyAsTheirMotorIs) {
 
 TEST_P(Joints, SlowDownByFrictionAndDamping) {
   World world(weightless());
-  // I = 1: dry friction takes 0.3 t, viscous friction leaves e^(-0.5 t).
+  // I = 1: dry friction removes 0.3 t, viscous friction leaves a factor e^(-0.5 t).
   JointDef dry{.type = JointType::revolute, .friction = 0.3};
   dry.a = add_box(world, {1, 1, 0.1}, 6, Vec3::Zero());
   world.add_joint(dry);
@@ -414,7 +418,7 @@ TEST_P(Joints, BreakBeyondTheirForce) {
   for (int i = 0; i < 240; ++i) broken += world.step(1.0 / 240).joints_broken.size();
   EXPECT_EQ(broken, 0u);
   EXPECT_NEAR(world.joint(joint).force.y(), 2 * kG, 1e-6);
-  // Another weight, and it is too much.
+  // A second weight exceeds the limit.
   JointDef more{.type = JointType::fixed, .b = hook.a, .anchor = {0, -0.1, 0}};
   more.a = add_box(world, {0.1, 0.1, 0.1}, 0.5, {0, -0.1, 0});
   world.add_joint(more);
@@ -437,8 +441,9 @@ TEST_P(Joints, KeepTheLengthOfARod) {
   }
 }
 
-// A weight on a rope of 2 m that is held 1 m below its end: it falls freely for that metre, and then hangs.
-TEST_P(Joints, LetARopeBeShorterButNotLonger) {
+// A weight on a rope of 2 m starts 1 m below the anchor: it falls freely for a metre and then hangs on the
+// rope.
+TEST_P(Joints, RopesCanBeShorterButNotLonger) {
   World world(def());
   JointDef rope{.type = JointType::distance, .anchor_b = {0, 1, 0}, .upper = 1};
   rope.a = add_box(world, {0.1, 0.1, 0.1}, 2, Vec3::Zero());
@@ -471,8 +476,9 @@ TEST_P(Joints, WindTheRopeOfAWinch) {
   EXPECT_NEAR(world.body(winch.a).centre.y(), 1.5, 1e-3);
 }
 
-// A shelf on one fixed joint, and a box that lies on it: the joint bears both, with their moment.
-TEST_P(Joints, TellWhatTheyBear) {
+// A shelf on one fixed joint, and a box on the shelf: the force and torque of the joint are those of both
+// weights.
+TEST_P(Joints, ReportTheirForceAndTorque) {
   World world(def());
   JointDef wall{.type = JointType::fixed};
   wall.a = add_box(world, {1, 0.1, 0.5}, 3, {0.5, 0, 0}, Quat::Identity(), true);
@@ -484,7 +490,7 @@ TEST_P(Joints, TellWhatTheyBear) {
   EXPECT_LT(world.joint(joint).force.head<1>().norm() + world.joint(joint).torque.head<2>().norm(), 1e-2);
 }
 
-// The ball alone could hang on it; its impact cannot.
+// The joint carries the resting ball, but breaks when the ball falls on the shelf.
 TEST_P(Joints, BreakByAnImpact) {
   for (const Real height : {0.0, 1.0}) {
     World world(def());
@@ -503,7 +509,7 @@ TEST_P(Joints, BreakByAnImpact) {
   }
 }
 
-// A ball of the greatest mass holds on to a chain of the lightest links, and falls onto the floor with it.
+// A ball of the greatest mass hangs on a chain of the lightest links, and falls onto the floor with it.
 TEST_P(Joints, HoldAThousandTimesTheirLinksMass) {
   World world(def());
   BodyDef floor;
@@ -541,8 +547,8 @@ TEST_P(Joints, HoldAThousandTimesTheirLinksMass) {
   EXPECT_GT(world.body(joint.a).centre.y(), -5.6);
 }
 
-TEST_P(Joints, PassTheBlowOfACollisionOn) {
-  // A ball strikes the end of the second of two hinged rods at rest in space.
+TEST_P(Joints, TransmitTheImpulseOfACollision) {
+  // A ball hits the end of the second of two hinged rods that are at rest without gravity.
   WorldDef elastic = weightless();
   World world(elastic);
   const BodyHandle first = add_box(world, {1, 0.1, 0.1}, 1, {0.5, 0, 0}, Quat::Identity(), true);
@@ -591,11 +597,11 @@ TEST_P(Joints, LieStillOnTheFloorAndSleep) {
   const Tally all = run(world, 5);
   EXPECT_EQ(all.last.bodies_asleep, 8u);
   EXPECT_LT(all.penetration, 1e-3);
-  EXPECT_LE(all.exact_fallbacks, 2u);  // as they fall onto the floor
+  EXPECT_LE(all.exact_fallbacks, 2u);  // when they fall onto the floor
   EXPECT_EQ(all.fast_fallbacks + all.toi_limit_reached, 0u);
 }
 
-// Between two keys a motor holds still for longer than bodies take to fall asleep.
+// Between two keys, the motor holds still for longer than bodies take to fall asleep.
 TEST_P(Joints, SleepWhenTheLastKeyOfTheirMotorsIsPast) {
   WorldDef sleepy = def();
   sleepy.sleep = true;
@@ -623,7 +629,7 @@ TEST_P(Joints, MoveTheSameWayForAnyNumberOfThreads) {
     floor.shape = Plane{};
     floor.motion = MotionType::static_body;
     world.add_body(floor);
-    // Chains in a heap.
+    // Four chains in a heap.
     for (int chain = 0; chain < 4; ++chain) {
       JointDef joint{.swing = 1, .friction = 0.05};
       for (int i = 0; i < 6; ++i) {
@@ -646,7 +652,7 @@ TEST_P(Joints, MoveTheSameWayForAnyNumberOfThreads) {
 
 OFFSTAGE_BOTH_SOLVERS(Solvers, Joints);
 
-TEST(JointDefs, SayWhatIsWrongWithThem) {
+TEST(JointDefs, InvalidDefinitionsAreRefusedWithAReason) {
   World world;
   const BodyHandle body = add_box(world, {1, 1, 1}, 1, Vec3::Zero());
   const auto message = [&](JointDef def) -> std::string {

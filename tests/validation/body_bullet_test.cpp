@@ -1,5 +1,5 @@
-/// R12 through the whole loop: bullets of 300 m/s do not get through a plate of 1 cm, whatever both are made
-/// of.
+/// R12 with the full simulation: bullets of 300 m/s do not pass through a plate of 1 cm, for all combinations
+/// of shapes.
 
 #include <algorithm>
 #include <cmath>
@@ -21,8 +21,8 @@ class BodyBullet : public BothSolvers {
     sheet.triangles = {{0, 2, 1}, {0, 3, 2}};
     return sheet;
   }
-  /// Whether a bullet comes out on a plate's far side in the time that it has for twice its way, other than
-  /// past an edge that it slid off.
+  /// Whether a bullet reaches the far side of a plate within the time for twice its path, unless it slid off
+  /// the plate's edge.
   static bool gets_through(World& world, BodyHandle bullet, BodyHandle plate, Real max_step) {
     const auto seen_from_plate = [&] {
       return world.body(plate).pose.point_to_body(world.body(bullet).centre);
@@ -39,7 +39,7 @@ class BodyBullet : public BothSolvers {
     }
     return false;
   }
-  /// One world, where plates and bullets come and go.
+  /// Fires all bullets in one world; plates and bullets are added and removed.
   static void shoot(uint64_t shots, Real max_step) {
     World world(weightless(max_step));
     const Shape bullets[] = {Sphere{0.01},
@@ -57,7 +57,7 @@ class BodyBullet : public BothSolvers {
       const auto u = [&](uint64_t k) { return 2 * random.uniform(i, k) - 1; };
       const Shape& plate_shape = plates[i / 7 % 5];
       const bool planar = std::holds_alternative<Plane>(plate_shape) || i / 7 % 5 == 4;
-      const bool free = !planar && i % 3 == 0;  // a plate that is hit and moves off
+      const bool free = !planar && i % 3 == 0;  // a plate that can move when it is hit
       const Real e = 0.5 * Real(i % 4 % 3);
       const auto plate = world.add_body({.shape = plate_shape,
                                          .motion = free ? MotionType::dynamic : MotionType::static_body,

@@ -1,4 +1,4 @@
-/// Bodies in contact move by the same bits for any number of threads and in every repeat.
+/// Bodies in contact move identically, bit for bit, for any number of threads and in every repetition.
 
 #include <optional>
 #include <set>
@@ -17,7 +17,7 @@ namespace {
 
 class BodyDeterminism : public testing::TestWithParam<SolverKind> {
  protected:
-  /// Several heaps of all shapes, some of which bounce, with a ball that rolls in.
+  /// Several heaps of all shapes, some of them bouncing, and a ball that rolls into them.
   static StateHash heaps(int per_heap, Real restitution) {
     World world({.solver = GetParam()});
     world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0});
@@ -55,15 +55,15 @@ class CrowdDeterminism : public BodyDeterminism {
  protected:
   struct Outcome {
     StateHash hash;
-    std::size_t touching = 0;  ///< most pairs at once
+    std::size_t touching = 0;  ///< greatest number of pairs at once
   };
 
-  /// A heap that is driven together, and columns that come down beside it, some of each bouncing. The world
-  /// takes threads for 200 awake bodies, the fast solver for 384 touching pairs (48 batches of eight), the
-  /// exact one for islands, which it works on side by side: it gets a smaller heap and more columns.
+  /// A heap that is pushed together, and columns that fall beside it; some of each bounce. The world uses
+  /// threads for 200 awake bodies, the fast solver for 384 touching pairs (48 batches of eight), and the
+  /// exact solver for islands, which it solves in parallel: it gets a smaller heap and more columns.
   static Outcome crowd() {
     const bool is_exact = GetParam() == SolverKind::exact;
-    const int side = is_exact ? 3 : 6, high = is_exact ? 4 : 7;  // the heap
+    const int side = is_exact ? 3 : 6, high = is_exact ? 4 : 7;  // size of the heap
     World world({.max_step = 1.0 / 120, .solver = GetParam(), .collision_speed = 0.4});
     const MeshHandle angle = world.add_mesh(placed_at_random(l_solid(), 0.09, 3));
     const MeshHandle crystal = world.add_mesh(sphere_mesh(0.1, 6, 4));

@@ -1,6 +1,6 @@
 #pragma once
-/// What tests of bodies in contact share: everything is asked of both solvers, and nothing sleeps unless it
-/// is the matter.
+/// Shared by the tests of bodies in contact: each test runs with both solvers, and bodies do not sleep unless
+/// the test is about sleep.
 
 #include <algorithm>
 #include <string>
@@ -18,7 +18,7 @@ inline std::string solver_name(const testing::TestParamInfo<SolverKind>& info) {
 class BothSolvers : public testing::TestWithParam<SolverKind> {
  protected:
   static bool is_exact() { return GetParam() == SolverKind::exact; }
-  /// A world of the solver that is tested.
+  /// The definition of a world with the solver under test.
   static WorldDef def(Real max_step = 1.0 / 240) {
     return {.max_step = max_step, .solver = GetParam(), .sleep = false};
   }
@@ -31,12 +31,12 @@ class BothSolvers : public testing::TestWithParam<SolverKind> {
 #define OFFSTAGE_BOTH_SOLVERS(kind, suite) \
   INSTANTIATE_TEST_SUITE_P(kind, suite, testing::Values(SolverKind::exact, SolverKind::fast), solver_name)
 
-/// The same including `auto`.
+/// Instances of a suite for all solvers, including `auto`.
 #define OFFSTAGE_ALL_SOLVERS(kind, suite) \
   INSTANTIATE_TEST_SUITE_P(               \
       kind, suite, testing::Values(SolverKind::exact, SolverKind::fast, SolverKind::automatic), solver_name)
 
-/// Reports of many steps: counts are sums, other figures the greatest values.
+/// Accumulated reports of many steps: counts are added, other figures are the greatest values.
 struct Tally {
   Real penetration = 0;
   uint64_t collisions = 0, tracebacks = 0, toi_limit_reached = 0, exact_fallbacks = 0, fast_fallbacks = 0;
@@ -55,7 +55,7 @@ struct Tally {
   }
 };
 
-/// Steps the world for some seconds.
+/// Steps the world for `seconds`.
 inline Tally run(World& world, Real seconds, Real sampling = 1.0 / 240) {
   Tally all;
   const Real end = world.time() + seconds - sampling / 2;
@@ -63,12 +63,12 @@ inline Tally run(World& world, Real seconds, Real sampling = 1.0 / 240) {
   return all;
 }
 
-/// A plane that goes down towards +x at an angle.
+/// The pose of a plane that descends towards +x at an angle.
 inline Pose incline(Real angle) {
   return {Vec3::Zero(), Quat(Eigen::AngleAxisd(-angle, Vec3::UnitZ()))};
 }
 
-/// The place at a height over such a plane, upright to it.
+/// A pose above such a plane at a height, with the up axis along the plane's normal.
 inline Pose over_incline(Real angle, Real height, const Quat& turn = Quat::Identity()) {
   const Pose plane = incline(angle);
   return {plane.point_to_world({0, height, 0}), plane.orientation * turn};

@@ -1,4 +1,4 @@
-/// A ball dropped on the ground, and the oblique impact, through the whole loop.
+/// A ball dropped on the ground, and the oblique impact, with the full simulation.
 
 #include <cmath>
 
@@ -13,10 +13,10 @@ constexpr Real kRadius = 0.05;
 
 struct Drop {
   std::vector<Real> apexes;  // heights above the rest position after each bounce
-  Real rest_height;          // after the whole time
+  Real rest_height;          // at the end
 };
 
-/// Drops a particle from 1 m on a shape whose top is at y = 0.
+/// Drops a particle from 1 m onto a shape whose top is at y = 0.
 Drop drop(const Shape& shape, Real depth, Real e, Real seconds) {
   World world;
   world.add_body(
@@ -29,7 +29,7 @@ Drop drop(const Shape& shape, Real depth, Real e, Real seconds) {
     world.step(1.0 / 240);
     const Real y = world.particles(system).position[0].y() - kRadius,
                v = world.particles(system).velocity[0].y();
-    // At the apex of a parabola, from any point of it: y + v^2 / 2g.
+    // The apex of the parabola from any point on it: y + v^2 / 2g.
     if (last_v > 0 && v <= 0 && y > 1e-3) result.apexes.push_back(y + v * v / (2 * 9.81));
     last_v = v;
   }
@@ -52,7 +52,7 @@ TEST(Bounce, ElasticBallComesBackToItsHeightAgainAndAgain) {
   for (Real apex : d.apexes) EXPECT_NEAR(apex, 1, 1e-3);
 }
 
-TEST(Bounce, WithoutRestitutionItRestsAtOnceAndOthersInTheEnd) {
+TEST(Bounce, WithoutRestitutionItRestsAtOnceAndOtherwiseEventually) {
   const std::vector<std::pair<Shape, Real>> grounds = {
       {Plane{}, 0}, {Box{{1, 1, 1}}, 0.5}, {Sphere{2}, 2}, {Capsule{0.5, 1}, 1}, {Cylinder{1, 1}, 0.5}};
   for (const auto& [shape, depth] : grounds) {
@@ -61,7 +61,7 @@ TEST(Bounce, WithoutRestitutionItRestsAtOnceAndOthersInTheEnd) {
   }
 }
 
-// Without gravity the impact is all there is: P5 to the last bits.
+// Without gravity, only the impact changes the velocity: P5 to rounding.
 TEST(ObliqueImpact, StickAndSlideThroughTheWorld) {
   constexpr Real kE = 0.5;
   const Real critical = 2 / ((1 + kE) * 3);

@@ -1,4 +1,5 @@
-/// Bounds of the cost of a step, as counted work of the solvers, on falling heaps; tests/bench has the times.
+/// Limits of the cost of a step, as counted work of the solvers, on falling heaps; tests/bench measures the
+/// times.
 
 #include <gtest/gtest.h>
 
@@ -7,8 +8,8 @@
 namespace offstage::sim {
 namespace {
 
-// The exact solver's attempts are bounded by their counted work, and the impacts of a sub-step by theirs.
-TEST(BoundedStep, OfHeapsTakesFewTraceBacksAndFactorisations) {
+// The counted work of the exact solver's attempts is limited, and so are the impacts of a sub-step.
+TEST(BoundedStep, OfHeapsTakesFewTraceBacksAndFactorizations) {
   for (const Heap heap : kHeaps) {
     World world = heap_scene(heap);
     for (int step = 0; step < 600; ++step) {

@@ -13,7 +13,7 @@
 namespace offstage::sim {
 namespace {
 
-// Spheres of 1 cm to 1 m fly about in a crowd, a fifth of them rest now and then, and some ground is static.
+// A crowd of spheres from 1 cm to 1 m moves about; a fifth of them rests at times, and some ground is static.
 TEST(BroadPhase, GridsGiveTheSameCandidatesAsAllPairsAndNoneTwice) {
   constexpr uint32_t kSpheres = 1500;
   const Scatter random{11};

@@ -29,8 +29,8 @@ TriangleMesh sheet_mesh() {
   return sheet;
 }
 
-/// Bullets of 300 m/s, 5 m a step, aimed at a point of the plate from random sides, turning as they fly, with
-/// steps that end anywhere behind the plate. The plate may move and turn, too.
+/// Bullets of 300 m/s (5 m a step) from random directions hit a point of the plate; they rotate in flight,
+/// and the steps end anywhere behind the plate. In half of the cases the plate also moves and rotates.
 TEST(Bullet, NeverPassesAPlate) {
   std::vector<std::unique_ptr<Body>> bullets, plates;
   for (const Shape& s : {Shape(Sphere{0.01}), Shape(Box{Vec3(0.02, 0.01, 0.01)}), Shape(Capsule{0.005, 0.02}),
@@ -49,8 +49,8 @@ TEST(Bullet, NeverPassesAPlate) {
     const auto u = [&](uint64_t k) { return 2 * random.uniform(i, k) - 1; };
     const auto turned = [&](uint64_t k) { return Quat(u(k), u(k + 1), u(k + 2), u(k + 3)).normalized(); };
     const Body &bullet = *bullets[i % bullets.size()], &plate = *plates[i / bullets.size() % plates.size()];
-    // The bullet crosses the middle of the plate at some share of the step, from above so that planes are
-    // hit, too.
+    // The bullet crosses the middle of the plate at a random fraction of the step, from above so that planes
+    // are also hit.
     const Vec3 target(0.6 * u(0), 0, 0.6 * u(1)),
         direction = Vec3(u(2), -0.3 - std::abs(u(3)), u(4)).normalized();
     const Real share = 0.02 + 0.96 * random.uniform(i, 5);
@@ -63,7 +63,7 @@ TEST(Bullet, NeverPassesAPlate) {
     const PosePath standing(rest, moving ? tilted : rest);
     const auto impact =
         time_of_impact(MovingShape{bullet.collision, flight}, MovingShape{plate.collision, standing}, 1e-5);
-    // At the impact it is still on the side that it came from, and near the plate.
+    // At the impact, the bullet is still in front of the plate, and near it.
     const bool hit =
         impact && flight.at(impact->share).position.dot(direction) < target.dot(direction) + 0.05;
     misses += !hit;

@@ -1,4 +1,4 @@
-/// Distances and depths of convex polyhedra against brute force, and against libccd and FCL.
+/// Distances and depths of convex polyhedra, compared with brute force, libccd and FCL.
 
 #include <cmath>
 #include <memory>
@@ -13,7 +13,7 @@
 namespace offstage::sim {
 namespace {
 
-/// How much the separation along a normal differs from a distance: zero if both are right.
+/// Difference between a distance and the separation along its normal: zero if both are right.
 Real normal_error(const ConvexPair& pair, const Separation& s) {
   Real low = 1e300, high = -1e300;
   for (const Vec3& v : pair.a.vertices()) low = std::min(low, s.normal.dot(v));
@@ -22,7 +22,7 @@ Real normal_error(const ConvexPair& pair, const Separation& s) {
   return std::abs(low - high - s.distance);
 }
 
-/// How far a point is outside.
+/// Distance of a point outside a polyhedron; zero inside.
 Real outside(const ConvexPolyhedron& p, const Vec3& point) {
   return std::max(0.0, brute_force_separation(p, ConvexPolyhedron({point}, {}), {}).distance);
 }
@@ -77,9 +77,9 @@ ConvexPair solid_pair(Dice& dice) {
   return {hull(), hull(), {dice.uniform(0, 3) * dice.direction(), dice.rotation()}};
 }
 
-// The depth that libccd reports is that of its polytope, which it stops growing too soon on a tenth of these
-// pairs: the depth differs from the overlap along its own direction then, and is no answer. Others must be
-// ours.
+// libccd reports the depth of its polytope, whose expansion stops too early for a tenth of these pairs. For
+// these, the depth differs from the overlap along its own direction and is not compared; the others must
+// agree with ours.
 TEST(GjkDistance, AgreesWithLibccd) {
   Dice dice(15);
   ccd_t ccd;

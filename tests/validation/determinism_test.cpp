@@ -1,5 +1,5 @@
-/// One small scene with everything in it: the same bits for any number of threads, in every repeat and every
-/// build. Small scenes of bodies in contact: in every build.
+/// A small scene with all kinds of objects gives the same bits for any number of threads, in every repetition
+/// and every build. Small scenes of bodies in contact give the same bits in every build.
 
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
@@ -53,7 +53,7 @@ TEST(Determinism, SameHashForAnyNumberOfThreadsAndEveryRepeat) {
   }
 }
 
-/// A box that slides to rest, one that bounces and tumbles, and one that slides down another.
+/// A box that slides to rest, one that bounces and tumbles, and one that slides off an inclined box.
 StateHash sliding() {
   World world({.solver = SolverKind::exact});
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0.4, .friction = 0.3});
@@ -75,7 +75,7 @@ StateHash sliding() {
   return world.state_hash();
 }
 
-/// Balls, a box and a capsule that fly into a row and bounce.
+/// Balls, a box and a capsule that fly into a row of bodies and bounce.
 StateHash bouncing(SolverKind solver) {
   World world({.solver = solver});
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0.7});
@@ -113,7 +113,7 @@ StateHash heap() {
   return world.state_hash();
 }
 
-/// A chain that falls on the ground aslant, hinges and balls in turns.
+/// A tilted chain with alternating hinges and ball joints that falls on the ground.
 StateHash chain(SolverKind solver) {
   World world({.solver = solver});
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0.2});
@@ -133,8 +133,8 @@ StateHash chain(SolverKind solver) {
   return world.state_hash();
 }
 
-// Debug, release and sanitizer builds must all give these. They change when the physics does, and then on
-// purpose: the test says what to.
+// Debug, release and sanitizer builds must all give these hashes. If the physics is changed on purpose, the
+// failing test prints the new values.
 constexpr const char* kParticles = "c5bfc404ccb7e022ce9ed6c7eb5cc342";
 constexpr const char* kSlidingExact = "dd732251e043ec037777fcccaae4b8d9";
 constexpr const char* kBouncingExact = "2f1c3cdf0257928ef668a7ebb6dfc2d6";

@@ -1,5 +1,5 @@
-/// Contact of edges that are almost parallel: where they cross, and with it the normal, runs along them at
-/// any speed, and from one step to the next it is elsewhere (physics R9, R11).
+/// Contact of almost parallel edges: the point where they cross, and with it the normal, moves along them at
+/// any speed and changes from step to step (physics R9, R11).
 
 #include <algorithm>
 #include <numbers>
@@ -14,9 +14,9 @@ namespace {
 
 class Edges : public BothSolvers {};
 
-// A drum slides over the upper edge of a block, pushed by a ball: 18 J are there to be had until both are a
-// metre below. A drum that was askew by a thousandth got up to 6e8 J from the turning of the normal.
-TEST_P(Edges, ADrumThatGoesOverOneGetsNoEnergyFromIt) {
+// A drum slides over the upper edge of a block, pushed by a ball. The available energy is 18 J, until both
+// are a metre below. A wrong rate of the normal gave a drum tilted by a thousandth up to 6e8 J.
+TEST_P(Edges, ADrumSlidingOverAnEdgeGainsNoEnergy) {
   const Quat lying(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitX()));
   for (const Real askew : {1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1})
     for (const Real speed : {0.3, 1.0})

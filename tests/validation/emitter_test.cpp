@@ -14,7 +14,7 @@ using namespace sim;
 
 constexpr int kDraws = 100'000;
 
-/// All particles of one release, just created.
+/// All particles of one release at the time of their creation.
 ParticleArrays release(const EmitterDef& def) {
   World world({.gravity = Vec3::Zero()});
   const auto system = world.add_particle_system({});
@@ -23,8 +23,8 @@ ParticleArrays release(const EmitterDef& def) {
   return world.particles(system);
 }
 
-/// Mean and deviation of a sample against those of its distribution, within three standard errors. `kurtosis`
-/// is the distribution's fourth central moment over its variance squared.
+/// Compares mean and deviation of a sample with those of its distribution, within three standard errors.
+/// `kurtosis` is the fourth central moment of the distribution divided by its variance squared.
 void expect_statistics(const std::vector<Real>& sample, Real mean, Real deviation, Real kurtosis) {
   const Real n = static_cast<Real>(sample.size());
   Real sum = 0, squares = 0;
@@ -35,8 +35,8 @@ void expect_statistics(const std::vector<Real>& sample, Real mean, Real deviatio
   EXPECT_NEAR(squares / n, variance, 3 * variance * std::sqrt((kurtosis - 1) / n));
 }
 
-// Standard normal cut at one: variance v = 1 - 2 phi(1) / (2 Phi(1) - 1), fourth moment 3 v - 2 phi(1) / (2
-// Phi(1) - 1).
+// The standard normal distribution truncated at one deviation: variance v = 1 - 2 phi(1) / (2 Phi(1) - 1),
+// fourth moment 3 v - 2 phi(1) / (2 Phi(1) - 1).
 struct CutNormal {
   Real phi = std::exp(-0.5) / std::sqrt(2 * std::numbers::pi), edge = 2 * phi / std::erf(std::sqrt(0.5));
   Real variance = 1 - edge, kurtosis = (3 * variance - edge) / (variance * variance);
@@ -67,7 +67,7 @@ TEST(EmitterStatistics, EveryParameterHasItsMeanAndDeviation) {
   }
   expect_statistics(speed, 4, cut_deviation, cut.kurtosis);
   expect_statistics(spread, 30, 60 * flat, 1.8);
-  expect_statistics(east, 0, std::sqrt(0.5), 1.5);  // the cosine of a uniform angle
+  expect_statistics(east, 0, std::sqrt(0.5), 1.5);  // the cosine of a uniformly distributed angle
   expect_statistics(p.radius, 0.0125, 0.005 * flat, 1.8);
   expect_statistics(p.mass, 0.5, 0.05, 3);
   expect_statistics(p.lifespan, 5, 2 * cut_deviation, cut.kurtosis);
@@ -92,7 +92,7 @@ TEST(EmitterStatistics, CountsFollowTheMeanRateAndTheMeanRelease) {
       random_rate.emit(world, start, end);
       random_count.emit(world, start, end);
     });
-  // 10 windows a second, each of a uniform rate; 2001 releases of 0 to 20.
+  // 10 windows a second, each with a uniformly distributed rate; 2001 releases of 0 to 20 particles.
   const Real windows = kSeconds * 10, releases = kSeconds * 2 + 1;
   EXPECT_NEAR(Real(random_rate.report().released), 20.0 * kSeconds,
               3 * 40 * 0.1 * std::sqrt(windows / 12) + 1);
@@ -100,7 +100,7 @@ TEST(EmitterStatistics, CountsFollowTheMeanRateAndTheMeanRelease) {
               3 * std::sqrt(releases * (21 * 21 - 1) / 12.0));
 }
 
-// Height v^2 cos^2 / 2g, reach v^2 sin(2 spread) / g, both from the surface at y = 0.
+// Height v^2 cos^2 / 2g, range v^2 sin(2 spread) / g, both from the surface at y = 0.
 TEST(Sprinkler, HeightAndReach) {
   World world;
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body});

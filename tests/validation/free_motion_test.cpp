@@ -1,4 +1,4 @@
-/// Bodies in free motion against closed forms, with every integrator.
+/// Bodies in free motion, compared with closed forms for every integrator.
 
 #include <array>
 #include <cmath>
@@ -13,8 +13,8 @@
 namespace offstage::sim {
 namespace {
 
-/// One body, integrated in equal steps. The adaptive integrators make them too, as no error is too large for
-/// them.
+/// One body, integrated with equal steps. The adaptive integrators also take these steps, because their
+/// tolerance is infinite.
 RigidBody moved(const RigidBody& start, const Vec3& gravity, IntegratorKind kind, int steps, Real time) {
   WorldState world;
   world.def.gravity = gravity;
@@ -31,7 +31,7 @@ struct Order {
   Real order;
 };
 
-// Step doubling corrects its result by its own estimate, which gains an order.
+// Step doubling corrects its result by its own error estimate, which raises the order by one.
 constexpr std::array kOrders = {
     Order{IntegratorKind::explicit_euler, 1},    Order{IntegratorKind::symplectic_euler, 1},
     Order{IntegratorKind::midpoint, 2},          Order{IntegratorKind::rk4, 4},
@@ -71,7 +71,7 @@ TEST(FreeFallOfABody, WithoutDragIsExactForEveryIntegrator) {
   }
 }
 
-/// A body of revolution about z, spinning about an axis askew.
+/// A body with rotational symmetry about z that rotates about a tilted axis.
 RigidBody symmetric_top() {
   RigidBody top;
   top.inertia = Vec3(0.5, 0.5, 0.2).asDiagonal();
@@ -80,8 +80,8 @@ RigidBody symmetric_top() {
   return top;
 }
 
-/// Its orientation: precession about H at the rate |H| / I_across, then spin about z at the rate w_z (1 - I_z
-/// / I_across).
+/// The exact orientation of the top: precession about H with the rate |H| / I_across, after a spin about z
+/// with the rate w_z (1 - I_z / I_across).
 Quat exact_top(const RigidBody& top, Real t) {
   const Vec3 H = top.angular_momentum;
   const Vec3 w = top.angular_velocity();
@@ -95,12 +95,12 @@ TEST(SymmetricTop, TurnsTorqueFreeAsTheClosedFormWithTheOrderOfTheIntegrator) {
   constexpr Real kTime = 2;
   const Quat exact = exact_top(top, kTime);
   for (const auto& [kind, order] : kOrders) {
-    // The sine of half the angle between them: unlike an arc cosine it is exact for small ones.
+    // The sine of half the angle between them; unlike an arc cosine, it is accurate for small angles.
     const auto error = [&](int steps) {
       return (moved(top, Vec3::Zero(), kind, steps, kTime).orientation * exact.conjugate()).vec().norm();
     };
-    // The doubled methods and Euler's with a normalised quaternion may do better than their order, never
-    // worse.
+    // The step doubling methods, and Euler's method with a normalized quaternion, may exceed their order but
+    // never fall below it.
     const int steps = order < 2 ? 2000 : 400;
     EXPECT_GT(std::log2(error(steps) / error(2 * steps)), order - 0.15) << static_cast<int>(kind);
   }

@@ -12,7 +12,7 @@ constexpr Real kFrictionGravity = 9.81;
 
 class Incline : public BothSolvers {
  protected:
-  /// Where a box of 0.2 m that starts at rest is after `seconds`, from where it was, along the plane's axes.
+  /// Displacement, in the plane's axes, of a box of 0.2 m that starts at rest, after `seconds`.
   static Vec3 way(const Shape& shape, Real height, const BodyDef& ground, Real angle, Real seconds,
                   Real* fastest = nullptr) {
     World world(def());
@@ -50,12 +50,13 @@ TEST_P(Incline, BoxSlidesAsComputedAbove) {
   }
 }
 
-// Friction axis at 30 degrees to the slope. Each axis has its own limit: across it sticks, along it slides.
-TEST_P(Incline, BoxFollowsTheGrainOfASurface) {
+// The friction axis is at 30 degrees to the slope. Each axis has its own limit: the box sticks across it and
+// slides along it.
+TEST_P(Incline, BoxSlidesAlongTheFrictionAxis) {
   const Real a = 0.4, phi = std::numbers::pi / 6, t = 1.5;
   const Vec3 axis(std::cos(phi), 0, std::sin(phi)), across(-std::sin(phi), 0, std::cos(phi));
-  // With the box's 0.5: 0.2 along the friction axis, and across it 0.6, or 0.1, which is less than the load
-  // there.
+  // Combined with the box's 0.5, the coefficients are 0.2 along the friction axis and 0.6 or 0.1 across it;
+  // 0.1 is too small to hold the box.
   for (const Real mu_across : {0.6, 0.1}) {
     const BodyDef ground{.restitution = 0,
                          .friction = 0.08,
@@ -86,10 +87,9 @@ TEST_P(Incline, CylinderRollsWithTwoThirdsOfThePull) {
   EXPECT_LT(std::abs(s.z()), 1e-3);
 }
 
-// On a slope a slender box tips over its lower edge if tan a > width / height, unless friction gives way
-// first.
-TEST_P(Incline, BoxTipsIfFrictionHoldsMoreThanWidthOverHeight) {
-  constexpr Real kWidth = 0.12, kHeight = 0.4;  // ratio 0.3
+// On a slope, a slender box tips over its lower edge if tan a > width / height, unless it slides first.
+TEST_P(Incline, BoxTipsIfItDoesNotSlideFirst) {
+  constexpr Real kWidth = 0.12, kHeight = 0.4;  // width / height is 0.3
   const auto outcome = [&](Real tangent, Real mu) {
     Real turning = 0;
     const Vec3 s = way(Box{{kWidth, kHeight, 0.2}}, kHeight / 2,
@@ -133,7 +133,7 @@ TEST_P(Level, SlidingBallRollsAfterTwoSeventhsAtFiveSevenths) {
     const BodyState s = world.body(ball);
     return s.velocity.x() + kRadius * s.angular_velocity.z();
   };
-  // Slipping falls from v0 at 7/2 mu g.
+  // The slip velocity decreases from v0 at the rate 7/2 mu g.
   run(world, 0.9 * rolls, rolls / 70);
   EXPECT_NEAR(slip(), 0.1 * kSpeed, 0.005 * kSpeed);
   run(world, 0.115 * rolls, rolls / 70 / 4);
@@ -145,7 +145,7 @@ TEST_P(Level, SlidingBallRollsAfterTwoSeventhsAtFiveSevenths) {
   EXPECT_NEAR((world.body(ball).centre.x() - then) / (5.0 / 7 * kSpeed), 1, 0.005);
 }
 
-TEST_P(Level, StaticFrictionHoldsUpToItsLimitThenTheDynamicOneDecides) {
+TEST_P(Level, StaticFrictionHoldsUpToItsLimitThenDynamicFrictionActs) {
   constexpr Real kStatic = 0.6, kDynamic = 0.3, kMass = 2;
   const auto slide = [&](Real pull, Real speed) {
     World world(def());
@@ -162,9 +162,9 @@ TEST_P(Level, StaticFrictionHoldsUpToItsLimitThenTheDynamicOneDecides) {
     return world.body(box).centre.x();
   };
   EXPECT_LT(std::abs(slide(0.57, 0)), 1e-6);
-  // The few steps that it takes to be seen to slide are those of the static limit.
+  // In the first steps, until the contact counts as sliding, the static coefficient applies.
   EXPECT_NEAR(slide(0.63, 0) / (0.5 * kFrictionGravity * (0.63 - kDynamic)), 1, 0.02);
-  // A sliding body is not held by static friction.
+  // A sliding body is subject to dynamic friction only.
   EXPECT_NEAR(slide(0.5, 1) / (1 + 0.5 * kFrictionGravity * (0.5 - kDynamic)), 1, 0.005);
 }
 
@@ -188,7 +188,7 @@ TEST_P(Level, ConveyorBringsABoxToItsSpeed) {
   EXPECT_NEAR(world.body(box).centre.x(), kBelt * (world.time() - takes / 2), 0.005 * kBelt);
 }
 
-// A plank under a box on a smooth floor: they move together or separately.
+// A plank below a box on a smooth floor: they move together or separately.
 TEST_P(Level, PlankPulledFromUnderABox) {
   constexpr Real kMu = 0.3, kBox = 2, kPlank = 3, t = 0.8;
   for (const Real pull : {10.0, 40.0}) {
@@ -243,13 +243,13 @@ TEST_P(Level, BoxPushedOnABox) {
   }
 }
 
-// A pusher with constant acceleration moves two boxes in a row; the force between them accelerates the second
+// A pusher with constant acceleration moves a row of two boxes; the force between them accelerates the second
 // one.
 TEST_P(Level, PusherDrivesARowOfBoxes) {
   constexpr Real kAcceleration = 2, kMu = 0.2, kMass = 1.5;
   World world(def());
   add_floor(world, kMu);
-  KeyframeTrack track;  // the cubic through quadratic positions is their parabola, but for the first key
+  KeyframeTrack track;  // cubic interpolation reproduces the parabola, except next to the first key
   for (int i = 0; i <= 40; ++i) {
     const Real t = 0.05 * i;
     track.keys.push_back({t, {Vec3(-0.5 + 0.5 * kAcceleration * t * t, 0.2, 0)}});
@@ -264,7 +264,7 @@ TEST_P(Level, PusherDrivesARowOfBoxes) {
                                   .restitution = 0,
                                   .friction = kMu}));
   run(world, 0.5);
-  // The mean of half a second: the pusher's speed comes to the boxes in small steps.
+  // The mean over half a second, because the pusher's speed reaches the boxes in small steps.
   Vec3 between = Vec3::Zero();
   for (int i = 0; i < 120; ++i) {
     world.step(1.0 / 240);
@@ -278,18 +278,19 @@ TEST_P(Level, PusherDrivesARowOfBoxes) {
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, Level);
 
-/// A thin box that falls over a lower edge, as one degree of freedom: phi, of the centre from over the edge.
+/// Reference for a thin box that falls over a lower edge, with one degree of freedom: phi, the angle of the
+/// centre from the vertical through the edge.
 struct FallingRod {
-  Real mass, inertia, distance;  // inertia about the centre, distance from the edge
+  Real mass, inertia, distance;  // inertia about the centre, distance of the centre from the edge
   bool rough;
 
   Real acceleration(Real phi, Real rate) const {
     const Real d = distance, s = std::sin(phi), c = std::cos(phi);
     if (rough) return mass * kFrictionGravity * d * s / (inertia + mass * d * d);
-    // The centre goes straight down: T = (I + m d^2 sin^2 phi) phi'^2 / 2, V = m g d cos phi.
+    // Without friction the centre moves vertically: T = (I + m d^2 sin^2 phi) phi'^2 / 2, V = m g d cos phi.
     return mass * d * s * (kFrictionGravity - d * c * rate * rate) / (inertia + mass * d * d * s * s);
   }
-  /// By RK4, from rest.
+  /// The angle after `seconds`, from rest at `phi`, by RK4.
   Real angle(Real phi, Real seconds) const {
     constexpr int kSteps = 20000;
     const Real h = seconds / kSteps;
@@ -314,7 +315,7 @@ TEST_P(Rod, FallsFromUprightOnARoughAndOnASmoothFloor) {
     World world(def());
     world.add_body(
         {.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = rough ? 8.0 : 0});
-    // Leaning to +x, over its edge at the origin; phi = kStart.
+    // Tilted towards +x, over its edge at the origin; phi = kStart.
     const Quat turn(Eigen::AngleAxisd(-(kStart + lean), Vec3::UnitZ()));
     const Vec3 edge(kWidth / 2, -kLength / 2, 0);
     const auto body = world.add_body({.shape = Box{{kWidth, kLength, 0.1}},
@@ -324,8 +325,8 @@ TEST_P(Rod, FallsFromUprightOnARoughAndOnASmoothFloor) {
                                       .friction = rough ? 8.0 : 0});
     const FallingRod rod{1, (kLength * kLength + kWidth * kWidth) / 12, d, rough};
     const Vec3 start = world.body(body).centre;
-    // Up to 50 degrees: further down no friction holds the foot any more (the tangent of the required angle
-    // has a pole).
+    // Only up to 50 degrees: beyond that angle no friction coefficient can hold the lower edge (the required
+    // coefficient has a pole).
     for (int k = 1; k < 40; ++k) {
       run(world, 0.025, 1.0 / 240);
       const Real phi = rod.angle(kStart, world.time());
@@ -350,9 +351,9 @@ class Dome : public BothSolvers {
     Real touched;  ///< cosine of the polar angle where a force last acted
     Real energy;   ///< energy lost, in units of m g (R + r)
   };
-  /// A ball of 1 m goes down from near the top of a sphere of 9 m with the speed that it would have come
-  /// there with, rolling if there is friction. In flight the speed towards x stays what it was where the ball
-  /// left, so that v_x^2 = g (R + r) cos^3.
+  /// A ball of radius 1 m moves down a sphere of radius 9 m. It starts near the top with the speed that it
+  /// would have gained from there, rolling if there is friction. In flight v_x stays constant, and at the
+  /// point of departure v_x^2 = g (R + r) cos^3.
   static Flight leave(Real max_step, Real friction, Real share) {
     constexpr Real kSphere = 9, kBall = 1, kWay = kSphere + kBall, kStart = 0.1;
     World world(def(max_step));
@@ -381,10 +382,11 @@ class Dome : public BothSolvers {
   }
 };
 
-// It leaves where v^2 = g (R + r) cos; and v^2 = 2 share g (R + r) (1 - cos), of which the turning of a ball
-// that rolls has two sevenths. With a friction of 50 it slips only from a cosine of 0.59 on. A tenth of the
-// size is nothing for the fast solver: the cosine is 1.3 % off, and 1.0 % at 1/960 s.
-TEST_P(Dome, BallLeavesWhereNothingPressesItOnAnyMore) {
+// The ball leaves where v^2 = g (R + r) cos, with v^2 = 2 share g (R + r) (1 - cos); the rotation of a
+// rolling ball takes two sevenths of the energy. With a friction coefficient of 50 it slips only below a
+// cosine of 0.59. The scene is too coarse for the fast solver at a tenth of this size: its cosine would be
+// 1.3 % off, and 1.0 % at 1/960 s.
+TEST_P(Dome, BallLeavesWhereTheNormalForceVanishes) {
   struct Case {
     Real friction, share, cosine;
   };
@@ -394,9 +396,9 @@ TEST_P(Dome, BallLeavesWhereNothingPressesItOnAnyMore) {
       EXPECT_NEAR(f.cosine / c.cosine, 1, max_step > 1.0 / 900 ? 0.01 : 0.002)
           << c.friction << ", " << max_step;
       EXPECT_LT(std::abs(f.energy), 0.002) << c.friction << ", " << max_step;
-      // A step ends (v h)^2 / 2 (R + r) off the sphere. At 1/240 s that is 0.06 mm, which is not touching any
-      // more: near the end the ball skips along, the last time 2 to 3 % further down. So do balls of the fast
-      // solver at any step.
+      // At the end of a step, the ball is (v h)^2 / 2 (R + r) away from the sphere. At 1/240 s that is 0.06
+      // mm, which no longer counts as contact: near the end the ball makes small jumps and touches the sphere
+      // for the last time 2 to 3 % further down. With the fast solver this happens at any step.
       if (is_exact() && max_step < 1.0 / 900) {
         EXPECT_NEAR(f.touched / c.cosine, 1, 0.002) << c.friction;
       }

@@ -1,5 +1,5 @@
-/// Bodies that bounce: balls, oblique impacts, elastic pairs, Newton's cradle, paddles, and impacts without
-/// end, all through the whole loop.
+/// Bouncing bodies: balls, oblique impacts, elastic pairs, Newton's cradle, paddles, and endless sequences of
+/// impacts, all with the full simulation.
 
 #include <cmath>
 #include <vector>
@@ -31,7 +31,7 @@ class BallDrop : public BothSolvers {
       d.tally.add(world.step(max_step));
       const BodyState s = world.body(ball);
       const Real y = s.centre.y() - kRadius, v = s.velocity.y();
-      // Of the parabola, from any point of it.
+      // The apex of the parabola, from any point on it.
       if (last_v > 0 && v <= 0 && y > 1e-2) d.apexes.push_back(y + v * v / (2 * kImpactGravity));
       last_v = v;
     }
@@ -51,7 +51,7 @@ TEST_P(BallDrop, ApexesFallWithTheSquareOfTheRestitution) {
     }
 }
 
-TEST_P(BallDrop, WithoutRestitutionItRestsAtOnceAndWithHalfInTheEnd) {
+TEST_P(BallDrop, WithoutRestitutionItRestsAtOnceAndWithOneHalfEventually) {
   for (const Real max_step : {1.0 / 240, 1.0 / 60}) {
     const Drop dead = drop(0, max_step, 1);
     EXPECT_TRUE(dead.apexes.empty());
@@ -60,7 +60,8 @@ TEST_P(BallDrop, WithoutRestitutionItRestsAtOnceAndWithHalfInTheEnd) {
   }
 }
 
-// Impacts come ever faster: they end by the collision threshold, each step with a bounded number.
+// The intervals between impacts shrink. The collision speed ends the sequence, and the number of impacts in a
+// step is limited.
 TEST_P(BallDrop, ImpactsWithoutEndTerminate) {
   const Drop d = drop(0.5, 1.0 / 30, 4);
   EXPECT_TRUE(d.tally.finite);
@@ -73,8 +74,8 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, BallDrop);
 
 class ObliqueBall : public BothSolvers {};
 
-// A solid sphere sticks, and rolls, if mu (1 + e) u_n >= 2/7 u_t, else slides (P5). The contact point lies
-// half the touching distance outside the ball, which is what keeps the rolling case from rounding.
+// A solid sphere sticks and rolls if mu (1 + e) u_n >= 2/7 u_t, and slides otherwise (P5). The contact point
+// is half the contact distance outside the ball, which limits the accuracy of the rolling case.
 TEST_P(ObliqueBall, SticksOrSlidesOnEitherSideOfTheCriticalFriction) {
   constexpr Real kRadius = 0.1, e = 0.5, kAcross = 2, kDown = 3;
   const Real critical = 2.0 / 7 * kAcross / ((1 + e) * kDown);
@@ -147,7 +148,7 @@ TEST_P(ElasticPair, BallsKeepMomentumAngularMomentumAndEnergy) {
   }
 }
 
-// A box turns after the impact, so its energy is as good as the integration of its free rotation.
+// A box rotates after the impact, so its energy is as accurate as the integration of its free rotation.
 TEST_P(ElasticPair, BoxesAndCapsulesKeepThemToo) {
   Dice dice(12);
   int hits = 0;
@@ -173,7 +174,7 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, ElasticPair);
 
 class Cradle : public BothSolvers {
  protected:
-  /// Five balls in a row, the first `moving` at 1 m/s from a distance; their speeds afterwards.
+  /// Five balls in a row; the first `moving` ones approach at 1 m/s. Returns the speeds after the impacts.
   static std::vector<Real> speeds(std::size_t moving, ImpactLaw law) {
     constexpr Real kRadius = 0.05;
     WorldDef def_ = weightless();
@@ -193,15 +194,16 @@ class Cradle : public BothSolvers {
   }
 };
 
-TEST_P(Cradle, SequentialImpactsPassOnAsManyBallsAsCameIn) {
+TEST_P(Cradle, SequentialImpactsEjectAsManyBallsAsArrive) {
   for (std::size_t moving = 1; moving < 5; ++moving) {
     const std::vector<Real> v = speeds(moving, ImpactLaw::sequential);
     for (std::size_t i = 0; i < 5; ++i) EXPECT_NEAR(v[i], i < 5 - moving ? 0 : 1, 0.01) << moving << ' ' << i;
   }
 }
 
-// All at once, contacts at rest only must not close: the row of four leaves with one speed.
-TEST_P(Cradle, SimultaneousImpactsSendTheRowOffAsOne) {
+// All contacts are resolved together, and contacts at rest may not close: the row of four balls leaves at one
+// speed.
+TEST_P(Cradle, SimultaneousImpactsMoveTheRowAsOneBody) {
   const std::vector<Real> v = speeds(1, ImpactLaw::simultaneous);
   EXPECT_NEAR(v[0], -0.6, 1e-8);
   for (std::size_t i = 1; i < 5; ++i) EXPECT_NEAR(v[i], 0.4, 1e-8);
@@ -225,7 +227,7 @@ TEST_P(Paddle, GivesABallTheSpeedOfItsSurfaceAndTheRestitution) {
   }
 }
 
-TEST_P(Paddle, ATurningBatHitsWithTheVelocityOfWhereItHits) {
+TEST_P(Paddle, ARotatingBatHitsWithItsVelocityAtTheContact) {
   World world(weightless());
   world.add_body({.shape = Box{{2, 0.1, 0.1}},
                   .motion = MotionType::kinematic,
@@ -233,7 +235,7 @@ TEST_P(Paddle, ATurningBatHitsWithTheVelocityOfWhereItHits) {
                   .restitution = 0.8,
                   .friction = 0,
                   .track = {.spin = {0, 0, 4}}});
-  // It lies 0.3 rad ahead, with the ball's surface on the bat's then.
+  // The ball is 0.3 rad ahead and will then touch the surface of the bat.
   const Vec3 along(std::cos(0.3), std::sin(0.3), 0), across(-along.y(), along.x(), 0);
   const auto ball = world.add_body(
       {.shape = Sphere{0.05}, .pose = {0.8 * along + 0.1 * across}, .restitution = 0, .friction = 0});
@@ -263,7 +265,7 @@ TEST_P(Paddle, ABoxPushesAStackAlong) {
     EXPECT_NEAR(s.centre.y(), 0.1 + 0.2 * i, 1e-3) << i;
     EXPECT_NEAR(s.centre.x(), face + 0.1, 0.03) << i;
   }
-  // The pusher works only against the friction of the floor under all three.
+  // The pusher's force equals the floor friction of all three boxes.
   Vec3 push = Vec3::Zero();
   for (const ContactState& c : world.contacts())
     if (c.a == pusher || c.b == pusher) push += c.a == pusher ? -c.force : c.force;
@@ -272,8 +274,8 @@ TEST_P(Paddle, ABoxPushesAStackAlong) {
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, Paddle);
 
-// Boxes that rotate and slide fast touch in a step with other corners than those near at its start.
-TEST(FastSolver, BoxesThatTurnAsTheyMeetDoNotOverlap) {
+// Boxes that rotate and slide fast touch with corners that were not near at the start of the step.
+TEST(FastSolver, BoxesThatRotateIntoContactDoNotOverlap) {
   const Scatter random{11};
   Real deepest = 0;
   for (uint64_t i = 0; i < 400; ++i) {

@@ -1,4 +1,4 @@
-/// Motion without contact against closed forms.
+/// Motion without contact, compared with closed forms.
 
 #include <array>
 #include <cmath>
@@ -57,7 +57,7 @@ TEST(FreeFall, ErrorFallsWithTheOrderOfTheIntegrator) {
   }
 }
 
-// With a field: then the general form of the integrator is used.
+// With a force field, the integrator uses its general form.
 TEST(LinearDrag, TheDefaultIsOfSecondOrderInMovingAirToo) {
   const auto fall = [](int steps) {
     World world({.max_step = 2.0 / steps, .bounds = Aabb(Vec3::Constant(-1e4), Vec3::Constant(1e4))});
@@ -70,7 +70,7 @@ TEST(LinearDrag, TheDefaultIsOfSecondOrderInMovingAirToo) {
   EXPECT_NEAR(std::log2(fall(80) / fall(160)), 2, 0.1);
 }
 
-// The explicit methods would send it to infinity.
+// The explicit methods would diverge.
 TEST(LinearDrag, TheDefaultEndsAtTheTerminalVelocityHoweverGreatTheDrag) {
   for (const Real drag : {30.0, 3e3, 3e6}) {
     const Fall computed = particle_fall(ParticleSystemDef{}.integrator, drag, 20, 2);
@@ -80,8 +80,8 @@ TEST(LinearDrag, TheDefaultEndsAtTheTerminalVelocityHoweverGreatTheDrag) {
   }
 }
 
-// 0.9 % short, and 3.8 % at 1/60 s, by a method of first order.
-TEST(Fountain, ReachesAsFarAsItsParabolaAtAnyStep) {
+// A first-order method falls short by 0.9 % at 1/240 s, and by 3.8 % at 1/60 s.
+TEST(Fountain, HasTheRangeOfItsParabolaAtAnyStep) {
   for (const Real step : {1.0 / 240, 1.0 / 60}) {
     World world({.max_step = step});
     world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = 1e6});
@@ -113,7 +113,7 @@ TEST(Rain, ReachesItsTerminalSpeedRelativeToTheWind) {
   EXPECT_NEAR((world.particles(rain).velocity[0] - Vec3(2, -kMass * 9.81 / kDrag, 1)).norm(), 0, 1e-3);
 }
 
-/// Two bodies under their mutual gravitation, as a system of the test's own.
+/// Two bodies under mutual gravitation, as a DynamicSystem defined by the test.
 class Kepler final : public DynamicSystem {
  public:
   static constexpr Real kG = 1, kM1 = 3, kM2 = 1;
@@ -139,7 +139,7 @@ class Kepler final : public DynamicSystem {
 };
 
 TEST(Kepler, EccentricOrbitClosesOnItselfForTenPeriods) {
-  // Starting at the apocentre r = a (1 + e), with momentum of the reduced mass along y.
+  // The orbit starts at the apocentre r = a (1 + e), with the momentum of the reduced mass along y.
   constexpr Real kA = 1, kE = 0.3;
   const Real total = Kepler::kM1 + Kepler::kM2, mu = Kepler::kM1 * Kepler::kM2 / total, r = kA * (1 + kE);
   const Real speed = std::sqrt(Kepler::kG * total * (2 / r - 1 / kA));
@@ -156,7 +156,7 @@ TEST(Kepler, EccentricOrbitClosesOnItselfForTenPeriods) {
   for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(x[i], x0[i], 1e-4);
 }
 
-// Critically chosen numbers: w0 = 10, damping ratio 0.1. x = e^(-a t) (cos wt + a/w sin wt).
+// w0 = 10, damping ratio 0.1: x = e^(-a t) (cos wt + a/w sin wt).
 TEST(Spring, PeriodAndDampingOfAParticleOnASpring) {
   World world({.gravity = Vec3::Zero()});
   const auto system = world.add_particle_system({.linear_drag = 0});
@@ -171,7 +171,7 @@ TEST(Spring, PeriodAndDampingOfAParticleOnASpring) {
   }
 }
 
-// Two bodies of equal mass: the reduced mass is half of each.
+// Two bodies of equal mass: the reduced mass is half of each mass.
 TEST(Spring, TwoBodiesOscillateWithTheReducedMassAndKeepTheirMomentum) {
   World world({.gravity = Vec3::Zero()});
   const auto left =

@@ -1,6 +1,5 @@
-/// Edges that are none: between triangles of one plane, between bodies side by side, between the convex parts
-/// of one body. What slides or rolls over them goes on as on a plane; and real edges, steps and walls stop
-/// it.
+/// Internal edges: between coplanar triangles, between bodies side by side, and between the convex parts of
+/// one body. Bodies that slide or roll over them move as on a plane. Real edges, steps and walls stop them.
 
 #include <array>
 #include <cmath>
@@ -29,8 +28,8 @@ BodyDef fixed_body(const Shape& shape, const Vec3& at, Real friction) {
           .friction = friction};
 }
 
-/// Columns along x of cells along z, each cell two triangles. `rows(i)` cells in the i-th column, and
-/// `height(x, z)`; inner corners are off their grid by up to `jitter` of a cell.
+/// A sheet in columns along x, each divided into cells along z, with two triangles per cell: `rows(i)` cells
+/// in the i-th column, heights from `height(x, z)`. Inner corners are displaced by up to `jitter` of a cell.
 TriangleMesh triangle_sheet(Real from, Real to, int columns, const std::function<int(int)>& rows,
                             const std::function<Real(Real, Real)>& height, Real jitter = 0) {
   TriangleMesh m;
@@ -67,7 +66,7 @@ Real flat_height(Real, Real) {
   return 0;
 }
 
-/// Adds a flat floor at y = 0, from x = -3 to 12, made of whatever the name says.
+/// Adds a flat floor at y = 0 from x = -3 to 12; `kind` says what it is made of.
 void add_flat_floor(World& world, const std::string& kind, Real friction) {
   const auto add = [&](const Shape& shape, const Vec3& at = Vec3::Zero()) {
     return world.add_body(fixed_body(shape, at, friction));
@@ -93,7 +92,7 @@ void add_flat_floor(World& world, const std::string& kind, Real friction) {
           x, x + 0.5, 1, [i](int) { return 1 + std::abs(i) % 2; }, flat_height))});
     }
   } else if (kind == "convex parts") {
-    // A comb whose back is the floor.
+    // A comb with its teeth downwards; its back is the floor.
     TriangleMesh floor = cubes(20, 2, 1, [](int x, int y, int) { return y == 1 || x % 2 == 0; });
     Aabb box;
     for (const Vec3& v : floor.vertices) box.extend(v);
@@ -108,7 +107,7 @@ void add_flat_floor(World& world, const std::string& kind, Real friction) {
 struct Mover {
   const char* name;
   Shape shape;
-  Real height;  ///< of its middle over the floor
+  Real height;  ///< height of its centre over the floor
   Quat turn = Quat::Identity();
 };
 
@@ -129,7 +128,7 @@ class InternalEdges : public BothSolvers {
   static Real tolerance() { return is_exact() ? 1e-6 : 1e-3; }
 };
 
-TEST_P(InternalEdges, DoNotStopWhatSlides) {
+TEST_P(InternalEdges, DoNotStopSlidingBodies) {
   const Mover movers[] = {
       {"box", Box{{0.3, 0.3, 0.3}}, 0.15},
       {"turned box", Box{{0.5, 0.2, 0.3}}, 0.1, Quat(Eigen::AngleAxisd(0.3, Vec3::UnitY()))},
@@ -142,7 +141,7 @@ TEST_P(InternalEdges, DoNotStopWhatSlides) {
     for (const Mover& mover : movers)
       for (const Real step : {1.0 / 240, 1.0 / 60}) {
         for (const Real speed : {5.0, 15.0}) {
-          // The rim of a cone still trips over meshes side by side where it moves far in a step.
+          // The rim of a cone still catches on meshes side by side if it moves far in a step.
           if (speed * step > 0.05 && std::string(floor) == "tiles of mesh" &&
               std::string(mover.name) == "cone")
             continue;
@@ -162,7 +161,7 @@ TEST_P(InternalEdges, DoNotStopWhatSlides) {
       }
 }
 
-TEST_P(InternalEdges, DoNotStopWhatRolls) {
+TEST_P(InternalEdges, DoNotStopRollingBodies) {
   const Mover movers[] = {{"ball", Sphere{0.1}, 0.1},
                           {"capsule", Capsule{0.1, 0.4}, 0.1, lying_across()},
                           {"cylinder", Cylinder{0.1, 0.3}, 0.1, lying_across()}};
@@ -181,7 +180,7 @@ TEST_P(InternalEdges, DoNotStopWhatRolls) {
     }
 }
 
-TEST_P(InternalEdges, LeaveTheStoppingDistanceAsItIs) {
+TEST_P(InternalEdges, DoNotChangeTheStoppingDistance) {
   const Real friction = 0.3, speed = 4, distance = speed * speed / (2 * friction * kFallAcceleration);
   for (const char* floor : {"a mesh", "T-vertices", "tiles", "tiles of mesh"}) {
     World world(def());
@@ -193,8 +192,8 @@ TEST_P(InternalEdges, LeaveTheStoppingDistanceAsItIs) {
   }
 }
 
-// Friction brings a box to the speed of the tiles' surfaces, which goes on over the joints between them.
-TEST_P(InternalEdges, DoNotStopWhatAConveyorCarries) {
+// Friction accelerates a box to the surface speed of the tiles, which continues across their borders.
+TEST_P(InternalEdges, DoNotStopBodiesOnAConveyor) {
   for (const Real step : {1.0 / 240, 1.0 / 60}) {
     World world(def(step));
     for (int i = -4; i < 16; ++i)
@@ -207,16 +206,17 @@ TEST_P(InternalEdges, DoNotStopWhatAConveyorCarries) {
     const Real seconds = 2, pull = 0.5 * kFallAcceleration;
     run(world, seconds, step);
     const Motion end = world.body_motion(body, world.time());
-    const Real travelled = 2 * world.time() - 2 / pull;  // v t - v^2 / (2 mu g)
-    // Friction ends within a step.
+    const Real travelled = 2 * world.time() - 2 / pull;  // travelled distance v t - v^2 / (2 mu g)
+    // Sliding ends within a step.
     EXPECT_NEAR(end.pose.position.x() + 1.013, travelled, 5 * tolerance() + pull * step * step / 8) << step;
     EXPECT_NEAR(end.pose.position.y(), 0.15, tolerance()) << step;
     EXPECT_NEAR(end.velocity.x(), 2, 2 * tolerance()) << step;
   }
 }
 
-// Two planes that meet at the bottom, of many triangles each: a body that touches both slides along the line.
-TEST_P(InternalEdges, OfAValleyDoNotStopWhatGoesAlongIt) {
+// Two inclined planes of many triangles meet at the bottom: a body that touches both slides along the line
+// where they meet.
+TEST_P(InternalEdges, OfAValleyDoNotStopBodiesSlidingAlongIt) {
   const Real slope = std::tan(0.5), radius = 0.1;
   const Mover movers[] = {{"ball", Sphere{radius}, radius / std::cos(0.5)},
                           {"capsule", Capsule{radius, 0.4}, radius / std::cos(0.5),
@@ -244,7 +244,7 @@ OFFSTAGE_ALL_SOLVERS(Solvers, InternalEdges);
 
 class RoundMeshes : public BothSolvers {};
 
-/// A cone about Y whose base is at y = 0, of triangles.
+/// A cone about Y with its base at y = 0, made of triangles.
 TriangleMesh cone_mesh(Real radius, Real height, uint32_t around, uint32_t rings) {
   TriangleMesh m;
   m.vertices.emplace_back(0, height, 0);
@@ -265,9 +265,9 @@ TriangleMesh cone_mesh(Real radius, Real height, uint32_t around, uint32_t rings
   return m;
 }
 
-// A sphere of radius 2 of 96 x 48 triangles: its edges turn by 0.065 rad, and a sliding body loses the
-// velocity component perpendicular to the next face.
-TEST_P(RoundMeshes, LetThingsSlideDownASphereAsTheSmoothOneDoes) {
+// A sphere of radius 2 made of 96 x 48 triangles. Neighbouring faces differ by 0.065 rad, and a sliding body
+// loses the velocity component perpendicular to the next face.
+TEST_P(RoundMeshes, BodiesSlideDownASphereAsDownASmoothOne) {
   const Real radius = 2, from = 0.3;
   const Vec3 up(std::sin(from), std::cos(from), 0);
   const Quat tilted = Quat::FromTwoVectors(Vec3::UnitY(), up), across = tilted * lying_across();
@@ -295,10 +295,10 @@ TEST_P(RoundMeshes, LetThingsSlideDownASphereAsTheSmoothOneDoes) {
     }
 }
 
-// Down the middle of a face, over many edges across its way.
-TEST_P(RoundMeshes, LetThingsSlideDownACone) {
+// The path is the middle line of a face and crosses many edges.
+TEST_P(RoundMeshes, BodiesSlideDownACone) {
   const Real radius = 4, height = 3, steepness = std::atan2(height, radius), middle = std::numbers::pi / 24;
-  const Real flat = radius * std::cos(middle);  // of the faces' middles
+  const Real flat = radius * std::cos(middle);  // radius at the middle of a face
   const Real angle = std::atan2(height, flat);
   const Vec3 along =
                  Quat(Eigen::AngleAxisd(-middle, Vec3::UnitY())) * Vec3(std::cos(angle), -std::sin(angle), 0),
@@ -336,7 +336,7 @@ OFFSTAGE_ALL_SOLVERS(Solvers, RoundMeshes);
 
 class RealEdges : public BothSolvers {};
 
-// The floor goes up by a step at x = 1: of 1 mm, and of 5 cm.
+// The floor has a step of 1 mm or 5 cm at x = 1.
 TEST_P(RealEdges, StepsStopABox) {
   for (const Real height : {1e-3, 0.05})
     for (const bool is_mesh : {false, true}) {
@@ -344,7 +344,7 @@ TEST_P(RealEdges, StepsStopABox) {
       if (is_mesh) {
         TriangleMesh floor = triangle_sheet(
             -3, 5, 8, [](int) { return 4; }, flat_height);
-        for (Vec3& v : floor.vertices)  // the column from x = 1 on is upright
+        for (Vec3& v : floor.vertices)  // the column from x = 1 on becomes vertical
           if (v.x() > 1.5) v += Vec3(-1, height, 0);
         world.add_body(fixed_body(MeshShape{world.add_mesh(floor)}, Vec3::Zero(), 0));
       } else {
@@ -372,7 +372,7 @@ TEST_P(RealEdges, AWallOfTheSameMeshStopsABox) {
   EXPECT_LT(end.pose.position.x(), 0.85 + 1e-3);
   EXPECT_NEAR(end.pose.position.x(), 0.85, 0.01);
   EXPECT_NEAR(end.pose.position.y(), 0.15, 1e-3);
-  EXPECT_LT(end.velocity.norm(), 0.03);  // a hundredth of its initial speed
+  EXPECT_LT(end.velocity.norm(), 0.03);  // one percent of its initial speed
 }
 
 TEST_P(RealEdges, ABallIsThrownOffARidge) {
@@ -380,7 +380,8 @@ TEST_P(RealEdges, ABallIsThrownOffARidge) {
       -2, 2, 2, [](int) { return 3; }, [](Real x, Real) { return -std::abs(x); });
   World world(def());
   world.add_body(fixed_body(MeshShape{world.add_mesh(roof)}, Vec3::Zero(), 0));
-  // Off the ridge by half of what makes the slope the nearest: the normal is half as inclined as the slope.
+  // The ball is beside the ridge by half the distance at which the slope would be the nearest feature: its
+  // normal has half the inclination of the slope.
   const Real radius = 0.1, sine = std::sin(std::numbers::pi / 8);
   BodyDef ball = fixed_body(Sphere{radius}, {radius * sine, 0.5, 0.05}, 0);
   ball.motion = MotionType::dynamic;
@@ -392,11 +393,11 @@ TEST_P(RealEdges, ABallIsThrownOffARidge) {
               speed * sine * std::cos(std::numbers::pi / 8), 0.1);
 }
 
-// A wheel rolls at 1 m/s against a kerb of 2 cm and sticks to its corner, over which it turns: its moment
-// about the corner stays as it is, then its energy.
+// A wheel rolls at 1 m/s against a kerb of 2 cm, sticks to its corner and rotates over it. Its angular
+// momentum about the corner is conserved in the impact, its energy afterwards.
 TEST_P(RealEdges, AWheelClimbsAKerb) {
   const Real radius = 0.3, kerb = 0.02, spin = 1 / radius;
-  const Real inertia = 1.5 * radius * radius;  // by mass, about the rim
+  const Real inertia = 1.5 * radius * radius;  // moment of inertia about the rim, per mass
   const Real struck = ((radius - kerb) + radius * radius / 2 * spin) / inertia;
   const Real left = std::sqrt(struck * struck - 2 * kFallAcceleration * kerb / inertia) * radius;
   for (const bool is_mesh : {false, true})
@@ -405,7 +406,7 @@ TEST_P(RealEdges, AWheelClimbsAKerb) {
       if (is_mesh) {
         TriangleMesh floor = triangle_sheet(
             -3, 6, 18, [](int) { return 3; }, flat_height);
-        for (Vec3& v : floor.vertices)  // the column from x = 1 on is upright
+        for (Vec3& v : floor.vertices)  // the column from x = 1 on becomes vertical
           if (v.x() > 1.25) v += Vec3(-0.5, kerb, 0);
         world.add_body(fixed_body(MeshShape{world.add_mesh(floor)}, Vec3::Zero(), 1));
       } else {
@@ -425,7 +426,7 @@ TEST_P(RealEdges, AWheelClimbsAKerb) {
     }
 }
 
-// However deep it is: the ridge is nearer than the faces beside it.
+// The ridge is nearer than the faces beside it, for any depth.
 TEST_P(RealEdges, ABallInARidgeIsPushedOffTheRidge) {
   const TriangleMesh roof = triangle_sheet(
       -2, 2, 2, [](int) { return 3; }, [](Real x, Real) { return -std::abs(x); });
@@ -452,8 +453,8 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, RealEdges);
 
 class Sheets : public BothSolvers {};
 
-// A load of fifteen times its weight presses a ball, or a box, on a sheet.
-TEST_P(Sheets, KeepWhatIsPressedOnThemOnItsSide) {
+// A load of fifteen times its weight presses a ball or a box on a sheet.
+TEST_P(Sheets, KeepPressedBodiesOnTheirSide) {
   for (const bool is_box : {false, true}) {
     World world(def());
     world.add_body(fixed_body(MeshShape{world.add_mesh(triangle_sheet(

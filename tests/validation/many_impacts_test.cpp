@@ -1,5 +1,5 @@
-/// Many impacts at once or one after the other in a sub-step: columns that rebound into each other, the break
-/// of a rack, thousands of bounces; and bodies that no contact forces can free.
+/// Many impacts at once or in sequence within a sub-step: columns of balls that rebound into each other, the
+/// break of a rack, thousands of bounces; and bodies whose contacts have no solution.
 
 #include <array>
 #include <cmath>
@@ -18,7 +18,7 @@ std::string named(SolverKind solver, Real step) {
   return name + std::string(" at 1/") + std::to_string(std::lround(1 / step)) + " s";
 }
 
-/// Balls of 1 m above each other over a floor.
+/// A column of balls of 1 m diameter above a floor.
 struct BallColumn {
   World world;
   std::vector<BodyHandle> balls;
@@ -42,7 +42,7 @@ struct BallColumn {
   }
 };
 
-// The lowest comes back up at 5 to 10 m/s into one that still falls, within the same sub-step.
+// The lowest ball rebounds at 5 to 10 m/s into one that still falls, within the same sub-step.
 TEST(ManyImpacts, BallsOfAColumnThatReboundIntoEachOtherDoNotOverlap) {
   for (const SolverKind solver : kAllSolvers)
     for (const Real step : kBothSteps)
@@ -63,7 +63,7 @@ TEST(ManyImpacts, BallsOfAColumnThatReboundIntoEachOtherDoNotOverlap) {
           }
 }
 
-// Overlaps are seen when they are, not only when nothing has met since.
+// The report contains overlaps of the whole step, also those that have disappeared at its end.
 TEST(ManyImpacts, ThePenetrationOfAStepIsTheGreatestInIt) {
   World world({.gravity = Vec3::Zero(), .sleep = false});
   world.add_body({.shape = Sphere{0.5}, .pose = {Vec3(0, 0, 0)}, .restitution = 1});
@@ -72,8 +72,8 @@ TEST(ManyImpacts, ThePenetrationOfAStepIsTheGreatestInIt) {
   EXPECT_GE(world.step(1.0 / 240).penetration, 0.05 - 1e-12) << "though the balls have parted since";
 }
 
-/// Fifteen touching balls in a triangle, and one that comes in along its axis. Ball i's mirror image is
-/// mirror(i).
+/// A rack of fifteen touching balls in a triangle, and a cue ball that approaches along its axis. The mirror
+/// image of ball i is ball mirror(i).
 struct Rack {
   World world;
   std::array<BodyHandle, 15> balls;
@@ -106,9 +106,9 @@ struct Rack {
   static std::size_t mirror(std::size_t i) { return 2 * first_of(row_of(i)) + row_of(i) - i; }
 };
 
-// By the complementarity of all 31 contacts at once (P >= 0, u+ >= -e u-): the cue ball stops at -5.817 m/s
-// of its 8, the corners leave at 1.544 m/s, and 0.9136 of the energy is kept.
-TEST(ManyImpacts, ARackBreaksAlikeByAllSolvers) {
+// Solution of the complementarity problem of all 31 contacts (P >= 0, u+ >= -e u-): the velocity of the cue
+// ball changes from 8 to -5.817 m/s, the corner balls leave at 1.544 m/s, and 0.9136 of the energy remains.
+TEST(ManyImpacts, ARackBreaksTheSameWithAllSolvers) {
   for (const SolverKind solver : kAllSolvers)
     for (const Real step : kBothSteps) {
       Rack rack(solver, step, ImpactLaw::simultaneous, false);
@@ -138,8 +138,8 @@ TEST(ManyImpacts, MirrorImagesOfARackStayMirrorImages) {
       }
 }
 
-// A bounce that comes early by the tolerance of its time makes the next early, too.
-TEST(ManyImpacts, TenThousandElasticBouncesBetweenWallsAreAsMany) {
+// A bounce is early by at most the tolerance of the time of impact, which also shifts the next one.
+TEST(ManyImpacts, TenThousandElasticBouncesBetweenWallsAreCounted) {
   constexpr Real kRadius = 0.005, kRoom = 0.01, kSpeed = 2;
   for (const SolverKind solver : kAllSolvers)
     for (const Real step : kBothSteps) {
@@ -158,8 +158,8 @@ TEST(ManyImpacts, TenThousandElasticBouncesBetweenWallsAreAsMany) {
     }
 }
 
-// A bar between jaws that are closer than it is thick: both push it out, which has no solution. It may stay
-// or be squeezed out slowly, never be shot away.
+// A bar between jaws that are closer than it is thick: both push it out, so the contact problem has no
+// solution. The bar may stay or be squeezed out slowly, but must not be ejected.
 TEST(ManyImpacts, ContactsThatContradictEachOtherAddNoEnergyAndAreReported) {
   for (const SolverKind solver : kAllSolvers)
     for (const Real step : kBothSteps) {
@@ -174,7 +174,7 @@ TEST(ManyImpacts, ContactsThatContradictEachOtherAddNoEnergyAndAreReported) {
           {.name = "bar",
            .shape = Box{{0.02, 0.6, 0.02}},
            .pose = {Vec3(0, 0.5, 0), Quat(Eigen::AngleAxisd(0.01, Vec3(1, 1, 1).normalized()))}});
-      // What pushes out does so at half a metre per second at most.
+      // Penetration correction moves bodies at up to half a metre per second.
       const Real most = world.energy().total() + world.body(bar).mass * (0.125 + 9.81 * 0.005);
       std::size_t rough = 0;
       for (int i = 0; i < 240; ++i) {

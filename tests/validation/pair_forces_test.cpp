@@ -1,4 +1,4 @@
-/// Particles that act on each other against closed forms.
+/// Particles with forces between each other, compared with closed forms.
 
 #include <cmath>
 #include <numbers>
@@ -26,8 +26,8 @@ struct Pair {
   Vec3 speed() const { return world.particles(system).velocity[0] - world.particles(system).velocity[1]; }
 };
 
-// The relative motion is an ellipse of half axis a and eccentricity e with a period of 2 pi sqrt(a^3 / (G (m1
-// + m2))); from its nearest point a (1 - e) the speed is sqrt(G M (1 + e) / (a (1 - e))).
+// The relative motion is an ellipse with semi-major axis a, eccentricity e and period 2 pi sqrt(a^3 / (G (m1
+// + m2))). At the smallest distance a (1 - e) the speed is sqrt(G M (1 + e) / (a (1 - e))).
 TEST(Kepler, OrbitOfTwoParticlesClosesAfterTenPeriods) {
   constexpr Real kM1 = 2, kM2 = 1, kA = 1, kE = 0.5, kPeriods = 10;
   const Real period = 4, G = std::pow(2 * std::numbers::pi / period, 2) * kA * kA * kA / (kM1 + kM2);
@@ -50,7 +50,7 @@ TEST(Kepler, OrbitOfTwoParticlesClosesAfterTenPeriods) {
   EXPECT_NEAR((kM1 * p.velocity[0] + kM2 * p.velocity[1]).norm(), 0, 1e-13);
 }
 
-// mu v^2 / 2 = K q1 q2 (1/r0 - 1/r), mu = m1 m2 / (m1 + m2).
+// Energy: mu v^2 / 2 = K q1 q2 (1/r0 - 1/r), with mu = m1 m2 / (m1 + m2).
 TEST(Charges, ReleasedAtRestFlyApartWithTheirEnergy) {
   const Real k = 8.9875e9, q1 = 1e-5, q2 = 3e-5, mu = 0.5 * 1.5 / 2;
   Pair pair({.position = {0, 0, 0}, .mass = 0.5, .charge = q1},
@@ -61,7 +61,7 @@ TEST(Charges, ReleasedAtRestFlyApartWithTheirEnergy) {
   EXPECT_NEAR(pair.speed().norm() / v, 1, 1e-4);
 }
 
-TEST(Charges, ShotAtEachOtherTurnAroundWhereTheirEnergySays) {
+TEST(Charges, FiredAtEachOtherTurnAroundAtTheDistanceOfTheirEnergy) {
   const Real k = 8.9875e9, q = 1e-5, mu = 0.5, v = 4;
   const Real nearest = 1 / (1 / 2.0 + mu * v * v / (2 * k * q * q));
   Pair pair({.position = {1, 0, 0}, .velocity = {-v / 2, 0, 0}, .charge = q},
@@ -75,8 +75,8 @@ TEST(Charges, ShotAtEachOtherTurnAroundWhereTheirEnergySays) {
   EXPECT_GT(pair.gap().norm(), 1);
 }
 
-// With q = (sigma / r)^6 the energy -0.5 epsilon is U at q^2 - q = -1/8.
-TEST(LennardJones, PairSwingsBetweenItsTurningPoints) {
+// With q = (sigma / r)^6, the potential equals the energy -0.5 epsilon where q^2 - q = -1/8.
+TEST(LennardJones, PairOscillatesBetweenItsTurningPoints) {
   constexpr Real kSigma = 0.1;
   const Real root = std::sqrt(0.5), far = kSigma * std::pow((1 - root) / 2, -1 / 6.0),
              near = kSigma * std::pow((1 + root) / 2, -1 / 6.0);
@@ -91,7 +91,7 @@ TEST(LennardJones, PairSwingsBetweenItsTurningPoints) {
   EXPECT_NEAR(greatest / far, 1, 1e-4);
 }
 
-/// Molecules in a lattice, warm, two kinds of them in systems of their own.
+/// A lattice of molecules with thermal velocities, in two particle systems.
 World gas(std::array<ParticleSystemHandle, 2>& systems) {
   World world({.gravity = Vec3::Zero()});
   std::mt19937 random(1);

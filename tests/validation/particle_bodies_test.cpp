@@ -1,5 +1,5 @@
-/// Particles that hit bodies, in particular bodies with joints and bodies hit by many at once (physics P8,
-/// A3), compared with closed forms and invariants.
+/// Particles that hit bodies, in particular bodies with joints and bodies hit by many particles at once
+/// (physics P8, A3), compared with closed forms and invariants.
 
 #include <cmath>
 #include <optional>
@@ -26,7 +26,7 @@ World weightless(Real max_step = 1.0 / 240) {
   return World({.gravity = Vec3::Zero(), .max_step = max_step, .sleep = false});
 }
 
-/// A particle falls onto a plate's end and bounces; returns its velocity afterwards.
+/// Lets a particle fall on the end of a plate and bounce; returns its velocity afterwards.
 Real rebound(World& world, bool internal) {
   const auto system = world.add_particle_system({.internal = internal});
   world.add_particle(system, {.position = {kHitArm, 0.5, 0},
@@ -41,7 +41,7 @@ Real rebound(World& world, bool internal) {
   return world.particles(system).velocity[0].y();
 }
 
-/// Of an elastic impact on a body of this effective mass.
+/// Velocity after an elastic impact on a body of this effective mass.
 Real rebound_from(Real mass) {
   return kHitSpeed * (mass - 0.5) / (mass + 0.5);
 }
@@ -63,8 +63,8 @@ TEST(ParticlesAndJoints, AParticleMeetsTheInertiaOfAHingedPlateAndTheMassOfARail
   }
 }
 
-// Its hinge can turn to one side alone: from there it is a wall, from the other side a plate on a hinge.
-TEST(ParticlesAndJoints, AJointAtItsLimitGivesWayToOneSideOnly) {
+// The hinge can turn in one direction only: against the other direction the plate acts like a wall.
+TEST(ParticlesAndJoints, AJointAtItsLimitMovesInOneDirectionOnly) {
   const Real inertia = kHitMass * ((1 + 0.04) / 12 + 0.25), reach = kHitArm + 0.5;
   for (const bool internal : {false, true})
     for (const bool opens : {false, true}) {
@@ -83,7 +83,7 @@ TEST(ParticlesAndJoints, AJointAtItsLimitGivesWayToOneSideOnly) {
     }
 }
 
-// The plate's far end hangs on a second plate by a hinge, which moves at once, too.
+// The far end of the plate is connected to a second plate by a hinge, so the impact also moves that plate.
 TEST(ParticlesAndJoints, AnImpulseReachesEveryLinkAndTheJointsHold) {
   World world = weightless();
   const BodyHandle first = add_plate(world), second = add_plate(world, {-1, 0, 0}),
@@ -111,8 +111,9 @@ TEST(ParticlesAndJoints, AnImpulseReachesEveryLinkAndTheJointsHold) {
   EXPECT_LT(world.joint(near).error, 1e-9);
 }
 
-// A hundred particles that weigh more than the plate together: each for itself would give it its own share.
-TEST(ParticlesAndBodies, ManyThatHitALightBodyInOneStepKeepMomentumAndEnergy) {
+// A hundred particles that are heavier than the plate together: resolving each impact on its own would add
+// energy.
+TEST(ParticlesAndBodies, ManyHitsOnALightBodyInOneStepKeepMomentumAndEnergy) {
   for (const bool internal : {false, true})
     for (const bool railed : {false, true}) {
       World world = weightless(1.0 / 60);
@@ -137,7 +138,7 @@ TEST(ParticlesAndBodies, ManyThatHitALightBodyInOneStepKeepMomentumAndEnergy) {
     }
 }
 
-/// An elastic gas in a shaft under a lid, which has weight; its greatest relative change of energy.
+/// An elastic gas in a shaft, below a lid with weight; returns its greatest relative change of energy.
 Real gas_drift(bool joined, bool internal, Real max_step, Real seconds) {
   World world({.max_step = max_step, .sleep = false});
   const auto wall = [&](const Vec3& at, const Vec3& normal) {

@@ -1,5 +1,5 @@
-/// Unit boxes dropped into a pit, as by the benchmarks beside other engines. What they overlap by is not
-/// asked of the engine.
+/// Unit boxes dropped into a pit, as in the benchmarks of other engines. The test computes the overlaps
+/// itself.
 
 #include <algorithm>
 #include <cmath>
@@ -17,14 +17,14 @@ struct PlacedBox {
   Mat3 axes;
 };
 
-/// How deep two boxes are in each other, by the separating axes; 0 if they are apart.
+/// Depth of the overlap of two boxes by the separating axis theorem; 0 if they are apart.
 Real overlap(const PlacedBox& a, const PlacedBox& b) {
   const Vec3 way = b.centre - a.centre;
   if (way.norm() >= a.half.norm() + b.half.norm()) return 0;
   Real least = std::numeric_limits<Real>::infinity();
   const auto try_axis = [&](const Vec3& axis) {
     const Real length = axis.norm();
-    if (length < 1e-7) return;  // parallel edges: the faces give the same axis
+    if (length < 1e-7) return;  // parallel edges: a face normal gives the same axis
     const Real reach = a.half.dot((a.axes.transpose() * axis).cwiseAbs()) +
                        b.half.dot((b.axes.transpose() * axis).cwiseAbs());
     least = std::min(least, (reach - std::abs(axis.dot(way))) / length);
@@ -46,7 +46,8 @@ class Pit : public BothSolvers {
     std::vector<BodyHandle> bodies;
     std::vector<PlacedBox> boxes;
     const BoxScene scene = box_pile(count);
-    const Real wide = scene.bodies.front().size.x() / 2 - 2;  // of the floor, which is 2 m wider all round
+    // half width of the pit; the floor is 2 m wider on each side
+    const Real wide = scene.bodies.front().size.x() / 2 - 2;
     for (const BoxBody& b : scene.bodies) {
       bodies.push_back(world.add_body({.shape = Box{b.size},
                                        .motion = b.mass == 0 ? MotionType::static_body : MotionType::dynamic,

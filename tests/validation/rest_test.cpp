@@ -1,4 +1,4 @@
-/// Sleeping and waking, overlaps at the start, leaving the world, bodies joined by springs, and particles
+/// Sleeping and waking, overlaps at the start, leaving the world, bodies connected by springs, and particles
 /// among bodies.
 
 #include <cmath>
@@ -18,7 +18,7 @@ class Sleep : public BothSolvers {
     BodyHandle support;
     std::vector<BodyHandle> stack;
   };
-  /// A stack of three on a block, asleep.
+  /// A sleeping stack of three boxes on a block.
   static Scene sleeping_stack() {
     WorldDef sleepy = def();
     sleepy.sleep = true;
@@ -53,7 +53,7 @@ TEST_P(Sleep, ASettledStackCostsNothing) {
   EXPECT_NE(before, StateHash{});
 }
 
-TEST_P(Sleep, WhatHitsItWakesIt) {
+TEST_P(Sleep, AnImpactWakesIt) {
   Scene s = sleeping_stack();
   s.world.add_body({.shape = Sphere{0.1}, .pose = {Vec3(-1.1, 1, 0)}, .velocity = {6, 1, 0}});
   const Tally t = run(s.world, 0.3);
@@ -62,7 +62,7 @@ TEST_P(Sleep, WhatHitsItWakesIt) {
   EXPECT_GT(s.world.body(s.stack[2]).centre.x(), 0.01);
 }
 
-TEST_P(Sleep, AFastBulletWakesItToo) {
+TEST_P(Sleep, AFastBulletWakesIt) {
   Scene s = sleeping_stack();
   s.world.add_body({.shape = Sphere{0.02}, .pose = {Vec3(-3, 1, 0)}, .velocity = {300, 0, 0}});
   run(s.world, 0.1);
@@ -85,7 +85,7 @@ TEST_P(Sleep, LosingOneOfItsOwnWakesIt) {
   EXPECT_LT(s.world.body(s.stack[2]).centre.y(), 1 - 0.04);
 }
 
-TEST_P(Sleep, ForcesExplosionsAndOrdersWakeIt) {
+TEST_P(Sleep, ForcesExplosionsAndCallsWakeIt) {
   Scene pushed = sleeping_stack();
   pushed.world.add_force({.effect = ConstantField{.force = {100, 0, 0}}});
   run(pushed.world, 0.5);
@@ -104,7 +104,7 @@ TEST_P(Sleep, ForcesExplosionsAndOrdersWakeIt) {
   EXPECT_GT(told.world.body(told.stack[2]).centre.y(), 1.1);
 }
 
-TEST_P(Sleep, AForceThatBeginsLaterAHandThatPullsAndTheEndOfASupportWakeIt) {
+TEST_P(Sleep, ALaterForceAGrabAndTheEndOfASupportForceWakeIt) {
   Scene pushed = sleeping_stack();
   const Real soon = pushed.world.time() + 1;
   pushed.world.add_force({.start = soon, .effect = ConstantField{.force = {100, 0, 0}}});
@@ -137,7 +137,8 @@ TEST_P(Sleep, AForceThatBeginsLaterAHandThatPullsAndTheEndOfASupportWakeIt) {
   EXPECT_NEAR(held.body(ball).velocity.y(), 0.2 * sleepy.gravity.y(), 0.05);
 }
 
-// Whatever the other end is: a body on keys, of which one may jump, or a particle that flies away.
+// The other end of the spring may be a kinematic body, whose keys may make it jump, or a particle that moves
+// away.
 TEST_P(Sleep, ASpringWhoseOtherEndMovesWakesIt) {
   for (const Interpolation kind : {Interpolation::monotone, Interpolation::step}) {
     Scene s = sleeping_stack();
@@ -152,13 +153,13 @@ TEST_P(Sleep, ASpringWhoseOtherEndMovesWakesIt) {
     s.world.add_spring({.a = BodyPoint{s.stack[2]}, .b = BodyPoint{hand}, .stiffness = 2000, .damping = 50});
     run(s.world, 0.95);
     EXPECT_TRUE(s.world.is_asleep(s.stack[2]));
-    EXPECT_EQ(s.world.step(1.0 / 240).bodies_awake, 0u);  // and costs nothing until then
+    EXPECT_EQ(s.world.step(1.0 / 240).bodies_awake, 0u);  // no cost until the other end moves
     run(s.world, 1);
     EXPECT_GT(s.world.body(s.stack[2]).centre.x(), 0.5);
   }
 }
 
-TEST_P(Sleep, ASpringToAParticleThatMovesOffOrIsGoneWakesIt) {
+TEST_P(Sleep, ASpringToAParticleThatMovesOrDiesWakesIt) {
   Scene s = sleeping_stack();
   const Vec3 top = s.world.body(s.stack[2]).centre;
   const auto system = s.world.add_particle_system({.gravity = false, .collides = false});
@@ -195,7 +196,7 @@ TEST_P(Sleep, LosingASpringWithTheBodyAtItsOtherEndWakesIt) {
   EXPECT_LT(world.body(ball).centre.y(), 1.5);
 }
 
-TEST_P(Sleep, AKinematicBodyThatComesAlongWakesIt) {
+TEST_P(Sleep, AnArrivingKinematicBodyWakesIt) {
   Scene s = sleeping_stack();
   const Real t = s.world.time();
   s.world.add_body({.shape = Box{{0.2, 0.1, 0.2}},
@@ -209,7 +210,7 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, Sleep);
 
 class Overlap : public BothSolvers {};
 
-// Pushed out at no more than the speed for that, and without a jump afterwards.
+// Overlaps are removed at no more than the correction speed, and no velocity remains.
 TEST_P(Overlap, IsPushedApartGently) {
   for (const Real depth : {0.005, 0.05}) {
     World world(def());
@@ -266,9 +267,9 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, Bounds);
 
 class Joined : public BothSolvers {};
 
-// A bob on a stiff spring swings into a ball of its mass that lies at the lowest point: the ball takes all
-// the speed.
-TEST_P(Joined, APendulumOnAStiffSpringHandsItsSpeedOver) {
+// A bob on a stiff spring swings into a ball of equal mass at the lowest point: the ball takes over all the
+// speed.
+TEST_P(Joined, APendulumOnAStiffSpringTransfersItsSpeed) {
   constexpr Real kLength = 1, kRadius = 0.05, kStart = 1;
   WorldDef light = def();
   World world(light);
@@ -299,7 +300,7 @@ TEST_P(Joined, APendulumOnAStiffSpringHandsItsSpeedOver) {
   EXPECT_NEAR(world.energy().total(), before, 0.01 * before + 0.05);
 }
 
-// E7: bodies connected by a spring are traced back together, so a larger step finds the same motion.
+// E7: bodies connected by a spring are traced back together, so larger steps give the same motion.
 TEST_P(Joined, BodiesOnASpringAreTracedBackTogether) {
   const auto finish = [](Real max_step) {
     World world(weightless(max_step));
@@ -329,7 +330,7 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, Joined);
 
 class Rain : public BothSolvers {};
 
-// Particles fall on a falling stack: none gets inside, and the stack lands as without them.
+// Particles fall on a falling stack: none gets inside a body, and the stack lands as without them.
 TEST_P(Rain, OnBodiesThatMove) {
   World world(def());
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0});

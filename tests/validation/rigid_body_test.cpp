@@ -1,4 +1,4 @@
-/// Torque-free rotation and mass properties against closed forms.
+/// Torque-free rotation and mass properties, compared with closed forms.
 
 #include <cmath>
 #include <numbers>
@@ -22,20 +22,20 @@ Real elliptic_k(Real m) {
   return std::numbers::pi / (2 * a);
 }
 
-// A box with three different moments I1 < I2 < I3 that rotates about the middle axis flips as a T-handle
-// does. The time between flips is half the period of w2, 4 K(m) / p (Landau and Lifshitz, Mechanics, section
-// 37; H^2 > 2 E I2).
+// A box with three different moments I1 < I2 < I3 that rotates about its middle axis flips like a T-handle.
+// The time between flips is half the period of w2, 4 K(m) / p (Landau and Lifshitz, Mechanics, section 37;
+// H^2 > 2 E I2).
 TEST(THandle, FlipsWithThePeriodOfTheEllipticIntegralAndKeepsEnergyAndMomentum) {
   World world({.gravity = Vec3::Zero()});
   const auto body =
       world.add_body({.shape = Box{{0.1, 0.3, 0.5}}, .angular_velocity = {0.02, 5, 0.05}, .density = 600});
-  // x is the thin axis and has the largest moment, z the smallest.
+  // The thin axis x has the largest moment, z the smallest.
   const Mat3 inertia = mass_properties(Shape(Box{{0.1, 0.3, 0.5}})).inertia * 600;
   const Real I1 = inertia(2, 2), I2 = inertia(1, 1), I3 = inertia(0, 0);
   const Real w1 = 0.05, w2 = 5, w3 = 0.02;
   const Real E2 = I1 * w1 * w1 + I2 * w2 * w2 + I3 * w3 * w3;
   const Real H2 = I1 * I1 * w1 * w1 + I2 * I2 * w2 * w2 + I3 * I3 * w3 * w3;
-  // For H^2 > 2 E I2 the motion circles the axis of I3; otherwise exchange the roles of I1 and I3.
+  // For H^2 > 2 E I2 the motion circles the axis of I3; otherwise the roles of I1 and I3 are exchanged.
   const bool about_3 = H2 > E2 * I2;
   const Real A = about_3 ? I1 : I3, C = about_3 ? I3 : I1;
   const Real m = (I2 - A) * (E2 * C - H2) / ((C - I2) * (H2 - E2 * A));
@@ -63,7 +63,7 @@ TEST(THandle, FlipsWithThePeriodOfTheEllipticIntegralAndKeepsEnergyAndMomentum) 
     EXPECT_NEAR((flips[i] - flips[i - 1]) / half_period, 1, 1e-3);
 }
 
-// A symmetric body: its axis turns about H at the rate H / I_across, at a constant angle.
+// A symmetric body: its axis precesses about H at the rate H / I_across, at a constant angle.
 TEST(SymmetricTop, PrecessesFreelyAtTheClosedFormRate) {
   World world({.gravity = Vec3::Zero()});
   const auto top = world.add_body({.shape = Cylinder{0.2, 0.05}, .angular_velocity = {2, 20, 0}, .mass = 1});
@@ -94,7 +94,7 @@ TEST(AngularDrag, SlowsTheSpinExponentially) {
 }
 
 struct Exact {
-  Real volume, polar;  // moment about Y
+  Real volume, polar;  // moment of inertia about Y
 };
 
 void expect_second_order(const Exact& exact, const std::function<TriangleMesh(uint32_t)>& mesh) {

@@ -1,5 +1,6 @@
-/// Contacts that move along the bodies, by closed forms: rolling, precession on a rim, sliding with spin,
-/// rest on what moves. Asked of all solvers, with the default step and with one of a frame.
+/// Contacts that move along the bodies, compared with closed forms: rolling, precession on a rim, sliding
+/// with spin, rest on moving bodies. Each test runs with all solvers, with the default step and with a step
+/// of one frame.
 
 #include <cmath>
 #include <numbers>
@@ -32,7 +33,7 @@ class MovingContact : public testing::TestWithParam<std::tuple<SolverKind, int>>
 
 const Quat kLying(Eigen::AngleAxisd(pi / 2, Vec3::UnitX()));
 
-TEST_P(MovingContact, WhatRollsKeepsItsSpeed) {
+TEST_P(MovingContact, RollingBodiesKeepTheirSpeed) {
   constexpr Real kRadius = 0.3;
   const std::vector<Shape> shapes = {Sphere{kRadius}, Cylinder{kRadius, 0.8}, Capsule{kRadius, 0.5},
                                      Cylinder{kRadius, 0.1}};
@@ -57,7 +58,7 @@ TEST_P(MovingContact, WhatRollsKeepsItsSpeed) {
     }
 }
 
-/// Two axles with wheels on a chassis that nothing else touches; the rear one may have a motor.
+/// A cart: two axles with wheels on a chassis that touches nothing else. The rear axle may have a motor.
 BodyHandle add_cart(World& w, Real speed, Real torque) {
   constexpr Real kRadius = 0.3;
   const BodyHandle chassis = w.add_body({.shape = Box{{2, 0.2, 1}},
@@ -91,8 +92,9 @@ TEST_P(MovingContact, ACartOnFreeWheelsKeepsItsSpeed) {
   EXPECT_NEAR(w.body(chassis).velocity.y(), 0, 5e-3);
 }
 
-// The torque T on wheels of radius R moves the mass m and turns the wheels, I = m_w R^2 / 2 each.
-TEST_P(MovingContact, AMotorAcceleratesACartAsItsTorqueDoes) {
+// The torque T on wheels of radius R accelerates the mass m and rotates the wheels, each with I = m_w R^2 /
+// 2.
+TEST_P(MovingContact, AMotorAcceleratesACartByItsTorque) {
   World w = world();
   w.add_body(ground(1));
   const BodyHandle chassis = add_cart(w, 0, 60);
@@ -101,26 +103,27 @@ TEST_P(MovingContact, AMotorAcceleratesACartAsItsTorqueDoes) {
   EXPECT_NEAR(w.body(chassis).velocity.norm(), 3 * acceleration, 0.01 * 3 * acceleration);
 }
 
-/// A coin that rolls on its rim around a point below its centre of mass, which rests.
+/// A coin that rolls on its rim around a point below its centre of mass, which is at rest.
 struct Coin {
   Real radius, height, tilt;
   Real mass = 0.44;
 
   Vec3 axis() const { return {std::sin(tilt), std::cos(tilt), 0}; }
-  /// From the centre to the contact.
+  /// Vector from the centre to the contact.
   Vec3 arm() const {
     const Vec3 down = -(Vec3::UnitY() - std::cos(tilt) * axis()).normalized();
     return radius * down - height / 2 * axis();
   }
-  /// The contact and the centre are at rest, so it turns about the line through both; and that is the sum of
-  /// the precession about the vertical and a spin about its own axis.
+  /// The contact point and the centre are at rest, so the coin rotates about the line through both. This
+  /// rotation is the sum of the precession about the vertical and a spin about the coin's axis.
   Vec3 angular_velocity_per_precession() const {
     const Vec3 line = arm().normalized();
     Eigen::Matrix2d parts;
     parts << line.x(), -axis().x(), line.y(), -axis().y();
     return Vec3((parts.inverse() * Eigen::Vector2d(0, 1)).x() * line);
   }
-  /// The load's torque turns the angular momentum around the vertical.
+  /// The rate of precession at which the torque of the normal force rotates the angular momentum about the
+  /// vertical.
   Real precession() const {
     const Real across = mass * (3 * radius * radius + height * height) / 12,
                along = mass * radius * radius / 2;
@@ -138,7 +141,7 @@ struct Coin {
   }
 };
 
-/// The share of its energy that a coin gains in two seconds.
+/// The relative energy gain of a coin within two seconds.
 Real gain(const Coin& coin, const WorldDef& def, Real friction) {
   World w(def);
   w.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = friction});
@@ -150,15 +153,16 @@ Real gain(const Coin& coin, const WorldDef& def, Real friction) {
 
 TEST_P(MovingContact, ACoinInSteadyPrecessionKeepsItsEnergy) {
   const WorldDef def{.max_step = step(), .solver = solver(), .sleep = false};
-  // It turns by 0.23 rad in a frame.
+  // This coin rotates by 0.23 rad in a frame.
   EXPECT_NEAR(gain({0.3, 0.05, 70 * pi / 180}, def, 0.5), 0, 5e-3);
-  if (std::get<1>(GetParam()) < 240) return;  // by 0.7 rad in a frame: too far to be followed
+  // the next coins rotate by 0.7 rad in a frame, too far for the contact prediction
+  if (std::get<1>(GetParam()) < 240) return;
   EXPECT_NEAR(gain({0.0375, 0.0127, 60 * pi / 180}, def, 0.5), 0, 5e-3);
   EXPECT_NEAR(gain({0.0375, 0.0127, 60 * pi / 180}, def, 0.3), 0, 5e-3);
   EXPECT_NEAR(gain({0.0375, 0.0127, 30 * pi / 180}, def, 2), 0, solver() == SolverKind::fast ? 0.06 : 0.01);
 }
 
-// A quarter at half the step, while the first order has a half.
+// At half the step the error is a quarter, where a first-order method would have a half.
 TEST_P(MovingContact, TheErrorOfPrecessionIsOfTheSecondOrder) {
   const Coin coin{0.3, 0.05, 70 * pi / 180};
   const auto height_after = [&](Real step_length) {
@@ -180,10 +184,10 @@ TEST_P(MovingContact, TheErrorOfPrecessionIsOfTheSecondOrder) {
   EXPECT_LT(fine, 0.35 * coarse + 1e-4);
 }
 
-// Each corner bears what a pressure that grows evenly along the slide gives it, and its friction is against
-// its own velocity: integrated by Runge and Kutta, this gives 2.816 m, and 2.718 m without the turning. The
-// exact solver shares the load of the four corners in another way.
-TEST_P(MovingContact, ABoxThatTurnsSlidesFartherAndStopsTogether) {
+// Each corner carries the normal force of a pressure that grows linearly in the sliding direction, and its
+// friction opposes its own velocity. Integration by a Runge-Kutta method gives 2.816 m, and 2.718 m without
+// the rotation. The exact solver distributes the load over the four corners differently.
+TEST_P(MovingContact, ARotatingBoxSlidesFartherAndStopsBothMotionsTogether) {
   World w = world();
   w.add_body(ground(0.3));
   const BodyHandle box =
@@ -242,7 +246,7 @@ INSTANTIATE_TEST_SUITE_P(Solvers, MovingContact,
                                           testing::Values(60, 240)),
                          name_of);
 
-/// A heap of boxes, balls and cylinders that fall and slide, added in the order of a permutation.
+/// A heap of boxes, balls and cylinders that fall and slide; bodies are added in a permuted order.
 std::vector<Pose> heap_after(SolverKind solver, std::size_t first, std::size_t stride) {
   constexpr std::size_t kCount = 19;
   World w(WorldDef{.solver = solver});
@@ -266,9 +270,9 @@ std::vector<Pose> heap_after(SolverKind solver, std::size_t first, std::size_t s
   return poses;
 }
 
-// Rounding would differ by 1e-16 m and grow by collisions, some ten times in each; another order of the
-// sweeps made 0.2 m in this second.
-TEST(OrderOfBodies, DoesNotChangeWhatTheyDo) {
+// Rounding differences of 1e-16 m would grow about tenfold with each collision; another order of the sweeps
+// made 0.2 m in this second.
+TEST(OrderOfBodies, DoesNotChangeTheirMotion) {
   for (const SolverKind solver : {SolverKind::fast, SolverKind::automatic, SolverKind::exact}) {
     const std::vector<Pose> expected = heap_after(solver, 0, 1);
     for (const auto& [first, stride] : {std::pair<std::size_t, std::size_t>{18, 18}, {5, 11}}) {

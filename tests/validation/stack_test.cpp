@@ -1,5 +1,4 @@
-/// What people build: stacks, card houses, arches, piles. They stand where statics says so, and fall where it
-/// does not.
+/// Structures: stacks, card houses, arches, piles. They stand or fall as statics predicts.
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +16,7 @@ BodyHandle add_ground(World& world, Real friction = 0.5) {
       {.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = friction});
 }
 
-/// Boxes of 0.2 m on each other, the k-th of `mass(k)`.
+/// A stack of boxes of 0.2 m; the k-th has `mass(k)`.
 template <class Mass>
 std::vector<BodyHandle> add_stack(World& world, int count, Mass&& mass) {
   std::vector<BodyHandle> boxes;
@@ -51,8 +50,8 @@ TEST_P(LongStack, TenBoxesStandForAMinute) {
   expect_stands(60, 1.0 / 240);
 }
 
-// The exact solver does not mind; to the fast one the light boxes are soft: they give way by 3.5 mm as the
-// load comes on them, and come back up. A heavier load is not for it.
+// The exact solver handles every ratio. With the fast solver the light boxes sink in by 3.5 mm when the load
+// arrives, and then recover; it is not tested with heavier loads.
 TEST_P(Stack, HeavyOnTopStands) {
   for (const Real ratio : {100.0, 1000.0}) {
     if (!is_exact() && ratio > 100) continue;
@@ -68,7 +67,7 @@ TEST_P(Stack, HeavyOnTopStands) {
   }
 }
 
-// The force at each contact follows from statics: the weight of all bodies above.
+// The force of each contact follows from statics: the weight of all bodies above.
 TEST_P(Stack, CarriesItsWeight) {
   World world(def());
   add_ground(world);
@@ -91,8 +90,8 @@ OFFSTAGE_BOTH_SOLVERS(Long, LongStack);
 
 class Table : public BothSolvers {};
 
-// Four points on each of four legs: of what presses on all sixteen, statics says no more than the sum and
-// where its middle is.
+// Four contact points on each of four legs: statics determines only the sum of the sixteen forces and their
+// centre.
 TEST_P(Table, StandsOnMoreLegsThanItNeeds) {
   constexpr Real kLeg = 0.7, kTop = 30, kLoad = 12;
   for (const bool loose : {false, true}) {
@@ -150,12 +149,12 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, Table);
 
 class Rocking : public BothSolvers {};
 
-// A slender block that is let go tilted rocks from edge to edge. Each impact, though without restitution, is
-// at the very end of its base and leaves it the share (1 - 3/2 sin^2(a))^2 of its energy, with a the angle
-// between its side and its diagonal (Housner, "The behavior of inverted pendulum structures during
-// earthquakes", 1963): ten times as high as wide, 97 %. So columns in a heap rock on for long, and no solver
-// may stop them at once.
-TEST_P(Rocking, LosesAtEachImpactWhatHousnerSays) {
+// A tilted slender block that is released rocks from edge to edge. Each impact, though without restitution,
+// acts at the end of the base and leaves the fraction (1 - 3/2 sin^2(a))^2 of the energy, where a is the
+// angle between its side and its diagonal (Housner, "The behavior of inverted pendulum structures during
+// earthquakes", 1963): 97 % if it is ten times as high as wide. Columns in a heap therefore rock for a long
+// time, and no solver may stop them at once.
+TEST_P(Rocking, LosesTheEnergyOfHousnersFormulaAtEachImpact) {
   constexpr Real kWidth = 1, kHeight = 10, kTilt = 0.02, kStep = 1.0 / 1920;
   const Real slenderness = std::atan(kWidth / kHeight), diagonal = std::hypot(kWidth, kHeight) / 2;
   World world(def(kStep));
@@ -172,10 +171,10 @@ TEST_P(Rocking, LosesAtEachImpactWhatHousnerSays) {
   for (int k = 0; k < 6 / kStep; ++k) {
     world.step(kStep);
     const Real w = world.body(block).angular_velocity.z();
-    if (w * turning >= 0) continue;  // until the top of a swing, where it turns back
+    if (w * turning >= 0) continue;  // until the top of a swing, where the block turns back
     turning = w;
     const Real now = energy();
-    if (now > 0.99 * before) continue;  // the same top, by rounding
+    if (now > 0.99 * before) continue;  // the same top again, because of rounding
     kept.push_back(now / before);
     before = now;
   }
@@ -187,8 +186,8 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, Rocking);
 
 class Cards : public BothSolvers {
  protected:
-  /// Two cards lean against a post that stands between them. Post and cards are smooth, so that only the
-  /// floor's friction keeps a card from sliding: m g (L/2 sin a - t/2 cos a) = mu m g L cos a about its foot.
+  /// Two cards lean against a post between them. Post and cards are frictionless, so only the friction of the
+  /// floor holds a card: m g (L/2 sin a - t/2 cos a) = mu m g L cos a about its lower edge.
   static Real height_after(Real share_of_bound, Real seconds) {
     constexpr Real kLength = 0.4, kThick = 0.01, kTilt = 20 * std::numbers::pi / 180, kPost = 0.02;
     const Real bound =
@@ -205,7 +204,7 @@ class Cards : public BothSolvers {
     BodyHandle card;
     for (const Real side : {-1.0, 1.0}) {
       const Quat turn(Eigen::AngleAxisd(side * kTilt, Vec3::UnitZ()));
-      // Its upper edge touches the post, its lower one the floor: both edges of its inner face.
+      // The upper edge of its inner face touches the post, the lower edge the floor.
       const Vec3 top = turn * Vec3(-side * kThick / 2, kLength / 2, 0),
                  foot = turn * Vec3(-side * kThick / 2, -kLength / 2, 0);
       const Vec3 centre(side * kPost / 2 - top.x(), -foot.y(), 0);
@@ -222,21 +221,21 @@ class Cards : public BothSolvers {
   }
 };
 
-TEST_P(Cards, LeanUpToTheStaticBoundOfFriction) {
+TEST_P(Cards, StandUpToTheStaticFrictionBound) {
   EXPECT_NEAR(height_after(1.1, 5), 1, 1e-3);
   EXPECT_LT(height_after(0.9, 2), 0.3);
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, Cards);
 
-/// A round arch of equal wedges with joints at angles s (2 k - n) / n from the crown, between fixed
-/// springers.
+/// A circular arch of equal wedges between fixed springers. The joints are at the angles s (2 k - n) / n from
+/// the crown.
 struct Arch {
   static constexpr int kWedges = 9;
   static constexpr Real kInner = 1, kOuter = 1.5, kSpan = 75 * std::numbers::pi / 180;
 
-  /// Joint k at theta carries a thrust of horizontal part H and the weight between it and the crown, V ~
-  /// theta; it slips unless the thrust is within phi of the joint's normal: V / tan(theta + phi) <= H <= V /
-  /// tan(theta - phi).
+  /// The joint at theta carries a thrust with horizontal component H and the weight V ~ theta of the wedges
+  /// between it and the crown. It does not slip if the thrust is within phi of the joint's normal: V /
+  /// tan(theta + phi) <= H <= V / tan(theta - phi).
   static bool can_stand(Real mu) {
     const Real phi = std::atan(mu);
     Real low = 0, high = 1e9;
@@ -252,7 +251,7 @@ struct Arch {
     for (int i = 0; i < 60; ++i) (can_stand((low + high) / 2) ? high : low) = (low + high) / 2;
     return high;
   }
-  /// In the world's axes; springers are wedges, too.
+  /// Vertices in world coordinates; springers are wedges, too.
   static TriangleMesh wedge(int k) {
     TriangleMesh mesh;
     for (const Real z : {-0.2, 0.2})
@@ -269,7 +268,7 @@ struct Arch {
 
 class Masonry : public BothSolvers {
  protected:
-  /// How far the arch's stones are from where they were built at the end, at most.
+  /// The largest displacement of a wedge at the end.
   static Real displacement(Real mu, Real seconds) {
     World world(def());
     std::vector<BodyHandle> stones;
@@ -289,7 +288,7 @@ class Masonry : public BothSolvers {
   }
 };
 
-TEST_P(Masonry, ArchStandsAboveItsBoundOfFrictionAndFallsBelow) {
+TEST_P(Masonry, ArchStandsAboveItsFrictionBoundAndFallsBelow) {
   const Real bound = Arch::friction_bound();
   EXPECT_GT(bound, 0.05);
   EXPECT_LT(displacement(1.2 * bound, 5), 2e-3);
@@ -311,7 +310,7 @@ class Pile : public BothSolvers {
     }
   }
 
-  /// One of boxes whose sizes and turns have no order.
+  /// A box of random size and orientation.
   static BodyDef box(const Scatter& random, uint64_t i, const Vec3& at) {
     const auto u = [&](uint64_t k) { return 2 * random.uniform(i, k) - 1; };
     const Quat turn = Quat(u(0), u(1), u(2), u(3)).normalized();
@@ -319,8 +318,8 @@ class Pile : public BothSolvers {
     return {.shape = Box{size}, .pose = {at, turn}, .restitution = 0.1};
   }
 
-  /// Boxes dropped into a pit of 1.6 m. On the way an impact can press in a corner that was not near before;
-  /// it is pushed out at once.
+  /// Drops boxes into a pit of 1.6 m. An impact can cause a penetration by a corner that was not near before;
+  /// it is corrected at once.
   static void expect_settles(uint64_t count, Real seconds, Real angular_drag, Real deepest) {
     WorldDef sleepy = def();
     sleepy.sleep = true;
@@ -349,9 +348,9 @@ class Pile : public BothSolvers {
 };
 class LongPile : public Pile {};
 
-// What stops a box in the moment after an impact must not throw it in the next; nor what holds two of them in
-// an interval that a hundred impacts make anew. Pushing out and rounding may lift a little.
-TEST_P(Pile, BoxesThatKnockTogetherGainNoEnergy) {
+// Impulses that stop a box after an impact must not accelerate it in the next interval, even if a hundred
+// impacts divide a step into many intervals. Penetration correction and rounding may raise boxes slightly.
+TEST_P(Pile, CollidingBoxesGainNoEnergy) {
   for (const uint64_t seed : {3, 4, 10}) {
     World world(def());
     add_pit(world, 0.8);
@@ -377,8 +376,8 @@ TEST_P(Pile, BoxesThatKnockTogetherGainNoEnergy) {
 TEST_P(Pile, BoxesComeToRestInAPit) {
   expect_settles(is_exact() ? 30 : 60, 6, 0, 5e-3);
 }
-// The last of 500 come down at 20 m/s. Of so many one may come to hang between two corners of others, where
-// nothing but the air would stop its swing.
+// The last of 500 boxes fall at 20 m/s. Among so many, one may hang between corners of two others, and only
+// air drag damps its swing.
 TEST_P(LongPile, HundredsOfBoxesComeToRestInAPit) {
   expect_settles(is_exact() ? 60 : 500, 20, 0.05, 0.02);
 }

@@ -34,7 +34,7 @@ void add_floor(World& world, Real restitution = 0) {
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = restitution});
 }
 
-TEST(StepReport, TellsWhoFellAsleepAndWhoWoke) {
+TEST(StepReport, ListsBodiesThatFellAsleepOrWoke) {
   World world(WorldDef{});
   add_floor(world);
   for (int i = 0; i < 2; ++i)
@@ -49,7 +49,7 @@ TEST(StepReport, TellsWhoFellAsleepAndWhoWoke) {
   EXPECT_EQ(d.put_to_sleep, 3u);
 }
 
-// 80 boxes of six contacts and more, falling into a pit: many impacts at once.
+// 80 boxes with six or more contacts each fall into a pit: many impacts at once.
 Decisions reported_heap(SolverKind solver, Real restitution) {
   World world(WorldDef{.solver = solver});
   add_floor(world, restitution);
@@ -70,7 +70,7 @@ Decisions reported_heap(SolverKind solver, Real restitution) {
   return decisions(world, 2);
 }
 
-TEST(StepReport, TellsOfEachSolversShortCuts) {
+TEST(StepReport, CountsApproximationsOfEachSolver) {
   const Decisions fast = reported_heap(SolverKind::fast, 0.3);
   EXPECT_GT(fast.speculative_contacts, 0u);
   EXPECT_GT(fast.impacts.cluster_truncated, 0u);
@@ -83,7 +83,7 @@ TEST(StepReport, TellsOfEachSolversShortCuts) {
   EXPECT_EQ(automatic.impacts.cluster_truncated, 0u) << "nothing bounces";
 }
 
-TEST(StepReport, TheExactSolverTakesNoShortCuts) {
+TEST(StepReport, TheExactSolverMakesNoApproximations) {
   World world(WorldDef{.solver = SolverKind::exact});
   add_floor(world, 0.5);
   for (int i = 0; i < 12; ++i)

@@ -1,5 +1,5 @@
-/// Stiff springs: backward Euler where explicit integrators diverge, and adaptive steps where the stiffness
-/// passes.
+/// Stiff springs: backward Euler where explicit integrators diverge, and adaptive steps for a temporary
+/// stiffness.
 
 #include <array>
 #include <cmath>
@@ -18,12 +18,12 @@ WorldDef implicit(const Vec3& gravity) {
 }
 
 struct SpringRun {
-  Real start = 0, end = 0, greatest_rise = 0;  // of the energy
-  Real length = 0;                             // of the spring at the end
+  Real start = 0, end = 0, greatest_rise = 0;  // energies
+  Real length = 0;                             // length of the spring at the end
 };
 
 /// Ten seconds of a ball on a spring of rest length 1 m with k/m = 1e6, at h = 1/30: h^2 k/m = 1111, where
-/// explicit methods are stable up to 4 or 8.
+/// the limits of explicit methods are 4 to 8.
 SpringRun swing(const Vec3& position, const Vec3& attachment) {
   World world(implicit(Vec3::Zero()));
   const auto ball = world.add_body({.shape = Sphere{0.1},
@@ -54,9 +54,9 @@ TEST(BackwardEuler, AStiffSpringNeverGainsEnergy) {
   }
 }
 
-// Off the centre the spring turns the ball. The work of the torque is only right to second order in h for a
-// turn, so the little energy that is left may rise a little.
-TEST(BackwardEuler, AStiffSpringOffTheCentreStaysTame) {
+// A spring that is attached beside the centre rotates the ball. The work of its torque has an error of second
+// order in h, so the small remaining energy may rise slightly.
+TEST(BackwardEuler, AStiffSpringBesideTheCentreStaysStable) {
   for (const Vec3& start : {Vec3(1.5, 0, 0), Vec3(0.6, 0, 0), Vec3(1.2, 0.3, -0.2)}) {
     const SpringRun run = swing(start, {0.05, 0, 0.05});
     EXPECT_LE(run.greatest_rise, 1e-6 * run.start) << start.transpose();
@@ -65,7 +65,8 @@ TEST(BackwardEuler, AStiffSpringOffTheCentreStaysTame) {
   }
 }
 
-// A rope of stiff springs swings down under gravity and comes to hang, of the length that the weights give.
+// A rope of stiff springs swings down under gravity and finally hangs with the elongation that the weights
+// give.
 TEST(BackwardEuler, AStiffRopeSwingsDownAndHangs) {
   constexpr int kBeads = 20;
   constexpr Real kMass = 0.1, kStiffness = 1e5, kLength = 0.1;
@@ -156,9 +157,9 @@ Real difference(const Course& a, const Course& b) {
   return greatest;
 }
 
-// The damping forgets errors, so that the whole course stays within the target of a step; the thousands of
-// short steps of Euler's method add up to a little more.
-TEST(AdaptiveStep, StaysBelowTheTargetWithFewerEvaluationsThanFixedSteps) {
+// Damping removes earlier errors, so the whole solution stays within the tolerance of one step; the thousands
+// of short steps of Euler's method accumulate slightly more.
+TEST(AdaptiveStep, MeetsTheToleranceWithFewerEvaluationsThanFixedSteps) {
   const Course exact = course(IntegratorKind::rk4, 0, 20000);
   struct Case {
     IntegratorKind adaptive, fixed;
@@ -172,7 +173,7 @@ TEST(AdaptiveStep, StaysBelowTheTargetWithFewerEvaluationsThanFixedSteps) {
     const Real error = difference(adaptive, exact);
     EXPECT_LT(error, c.accumulated * c.target) << static_cast<int>(c.adaptive);
     EXPECT_EQ(adaptive.report.missed, 0u);
-    // The fewest fixed steps, within a quarter, that are as accurate.
+    // The smallest number of fixed steps, to within a quarter, that is as accurate.
     int substeps = 10;
     while (!(difference(course(c.fixed, 0, substeps), exact) <= error) && substeps < 20000)
       substeps += substeps / 4 + 1;

@@ -1,5 +1,5 @@
-/// Validation row: tree queries against brute force, 10^4 random poses of meshes, all three trees; the same
-/// pairs exactly.
+/// Row of the validation table: tree queries compared with brute force, for 10^4 random poses of meshes and
+/// all three tree kinds; the pairs must be the same.
 
 #include <algorithm>
 #include <vector>
@@ -20,7 +20,7 @@ TEST(Trees, FindTheIntersectingPairsOfBruteForceInTenThousandPoses) {
     const auto brute = brute_pairs(mesh_a, mesh_b, pose);
     found += brute.size();
     poses_apart += brute.empty();
-    // Every pose with three of the nine combinations in turn, and so with each kind on both sides.
+    // Each pose uses three of the nine combinations in turn.
     uint64_t combination = 0;
     for_each_kind(trees_a, trees_b, [&](const auto& a, const auto& b) {
       if ((combination++ + i) % 3 != 0) return;

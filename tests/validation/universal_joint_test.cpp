@@ -1,6 +1,6 @@
-/// A universal joint whose two axes and the arm of a light link come into one plane (physics A1, A6). Its
-/// constraint of the axes then says nothing about the link's turn about its arm, and next to that pose it
-/// turns the link over with any speed.
+/// A universal joint whose two axes and the lever arm of a light link become coplanar (physics A1, A6). In
+/// that singular pose, the joint's constraint on its axes does not determine the rotation of the link about
+/// its arm; near it, the link flips at any speed.
 
 #include <algorithm>
 
@@ -24,7 +24,7 @@ struct PairState {
   }
 };
 
-/// A heavy capsule and a ball of little inertia, each half a metre from the joint between them.
+/// A heavy capsule and a ball with little inertia, each half a metre from the joint between them.
 World heavy_and_light(Real max_step) {
   World world({.gravity = Vec3::Zero(), .max_step = max_step, .sleep = false});
   BodyDef heavy;
@@ -47,12 +47,12 @@ World heavy_and_light(Real max_step) {
   return world;
 }
 
-// Without halved sub-steps the energy trebles at 1/240 s. What is left is the integrator's error.
+// Without halved sub-steps, the energy triples at 1/240 s. The remaining error is that of the integrator.
 TEST(UniversalJointPose, InOnePlaneKeepsEnergyAndAngularMomentum) {
   for (const Real step : {1.0 / 480, 1.0 / 240, 1.0 / 120, 1.0 / 60}) {
     SCOPED_TRACE(step);
     World world = heavy_and_light(step);
-    world.step(1.0 / 60);  // the joint makes the velocities fit together
+    world.step(1.0 / 60);  // the first step makes the velocities consistent with the joint
     const PairState start(world);
     Real most = start.energy, least = start.energy;
     while (world.time() < 10) {

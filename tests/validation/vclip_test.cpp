@@ -1,5 +1,5 @@
-/// V-Clip against brute force and against GJK, cold and warm, in the positions that trouble distance
-/// algorithms.
+/// V-Clip compared with brute force and with GJK, with cold and warm starts, in positions that are difficult
+/// for distance algorithms.
 
 #include "sim/collision/vclip.h"
 
@@ -11,8 +11,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Pairs from seed on: V-Clip's answers, from the start and from features of a nearby pose, are the exact
-/// ones and GJK's, relative to the size.
+/// Checks pairs of consecutive seeds: V-Clip from a cold start, and from the features of a nearby pose,
+/// agrees with the exact result and with GJK, relative to the size.
 void expect_agreement(uint64_t seed, int pairs, uint32_t points) {
   constexpr Real kTolerance = 1e-9;
   for (int k = 0; k < pairs; ++k, ++seed) {
@@ -34,8 +34,8 @@ void expect_agreement(uint64_t seed, int pairs, uint32_t points) {
       ASSERT_NEAR(s.normal.norm(), 1, 1e-12) << "seed " << seed;
       ASSERT_LT((s.on_a - s.on_b - s.distance * s.normal).norm(), kTolerance * pair.size())
           << "seed " << seed;
-      // Apart the normal is unique, but where faces of a hull are flat to 1e-10 only it goes with the root of
-      // that.
+      // The normal of separate solids is unique. Where faces of a hull are flat only to 1e-10, the error of
+      // the normal is the square root of that.
       if (s.distance > 1e-3 * pair.size()) {
         ASSERT_LT((s.normal - exact.normal).norm(), 1e-5) << "seed " << seed;
       }

@@ -67,7 +67,7 @@ ConvexDecomposition decomposition_from(std::span<const uint8_t> bytes, const std
   ByteReader in(payload, source);
   const auto low = in.take<uint64_t>(), high = in.take<uint64_t>();
   if (low != mesh_hash.low64 || high != mesh_hash.high64)
-    throw render::FileError(source + ": is of another mesh");
+    throw render::FileError(source + ": belongs to another mesh");
   ConvexDecomposition d;
   d.method = static_cast<ConvexDecomposition::Method>(in.take<uint8_t>());
   d.volume_error = in.take<double>();

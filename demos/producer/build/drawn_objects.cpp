@@ -78,7 +78,7 @@ render::Material material_of(const Scene& scene, const Cloth& cloth, const Model
   const auto it = std::ranges::find(scene.materials, cloth.material, &Material::name);
   if (it == scene.materials.end()) return m;
   render::Fabric fabric = m.fabric;
-  fabric.back_color.reset();  // that of another front
+  fabric.back_color.reset();  // it belonged to another front colour
   if (const std::optional<FabricLook>& look = it->fabric) {
     fabric = {.weave = look->weave,
               .thread = to_float(look->thread),

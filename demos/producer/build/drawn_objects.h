@@ -1,6 +1,6 @@
 #pragma once
-/// How the objects of a scene look: meshes of shapes, and materials. Both the stage (picture.h) and the
-/// exporters take them from here.
+/// The appearance of a scene's objects: meshes of shapes, and materials. Used by the stage (picture.h) and by
+/// the exporters.
 
 #include <string>
 #include <vector>
@@ -11,8 +11,8 @@
 
 namespace offstage::producer {
 
-/// The mesh of a primitive, centred as the simulation has it. Boxes get a small bevel, so that their edges
-/// catch light. A plane is a very large square.
+/// The mesh of a primitive, centred as in the simulation. Boxes have a small bevel, whose edges reflect
+/// light. A plane is a very large square.
 render::Mesh mesh_of(const sim::Sphere& s);
 render::Mesh mesh_of(const sim::Box& s);
 render::Mesh mesh_of(const sim::Capsule& s);
@@ -21,11 +21,11 @@ render::Mesh mesh_of(const sim::Cone& s);
 render::Mesh mesh_of(const sim::Plane& s);
 render::Mesh mesh_of(const sim::ConvexPolyhedron& part);
 
-/// A material of the scene by its name, or the default material. A texture that it needs is added to
+/// Returns a material of the scene by its name, or the default material. Adds its texture, if any, to
 /// `textures`.
 render::Material material_of(const Scene& scene, const std::string& name, const ModelLibrary& models,
                              std::vector<render::Image>& textures);
-/// The material of a cloth: that of its fabric, with what the scene's material changes.
+/// The material of a cloth: that of its fabric, with the changes of the scene's material.
 render::Material material_of(const Scene& scene, const Cloth& cloth, const ModelLibrary& models,
                              std::vector<render::Image>& textures);
 

@@ -332,9 +332,9 @@ CLI::App* add_farm(CLI::App& app, FarmOptions& farm) {
       ->allow_extra_args(false);
   command->add_option("--program", farm.program, "Path of offstage on the nodes (default: this one)");
   auto* resume = command->add_flag("--resume", farm.resume, "Keep the steps and frames that are done");
-  command->add_flag("--force", farm.force, "Begin again, and replace existing output")->excludes(resume);
+  command->add_flag("--force", farm.force, "Start again, and replace existing output")->excludes(resume);
   command->add_flag("--dry-run", farm.dry_run, "Print the scripts and write nothing");
-  command->add_option("--status", farm.status, "Report how far the farm in this folder is");
+  command->add_option("--status", farm.status, "Report the progress of the farm in this folder");
   add_overrides(*command, farm.scene);
   add_picture(*command, farm.scene);
   add_timing(*command, farm.scene);

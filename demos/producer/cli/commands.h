@@ -124,7 +124,7 @@ struct CacheOptions {
   std::vector<std::string> folders;
   bool json = false;
 };
-/// Looks after folders of snapshots.
+/// Lists, verifies or clears folders of snapshots.
 int cache_command(const CacheOptions& options);
 
 struct FarmOptions {
@@ -132,14 +132,14 @@ struct FarmOptions {
   TalkOptions talk;
   std::string out, work, program, status;
   bool slurm = false;
-  int local = 0;  ///< processes that draw on this machine; 0: none
+  int local = 0;  ///< number of drawing processes on this machine; 0: none
   int chunks = 8, retries = 2, threads = 0;
   std::string partition, account, time;
   std::vector<std::string> sbatch;  ///< further options of sbatch
   bool resume = false, force = false, dry_run = false;
   render::GlPlatform gl = render::GlPlatform::automatic;
 };
-/// Renders in steps on many machines, or reports how far they are.
+/// Renders a film in steps on many machines, or reports their progress.
 int farm_command(const FarmOptions& options);
 
 struct ValidateOptions {
@@ -175,7 +175,7 @@ int new_command(const NewOptions& options);
 
 struct CompareOptions {
   std::vector<std::string> inputs;  ///< scenes, or two pictures, or two folders of frames
-  SceneOptions scene;               ///< of each scene; its file is not used
+  SceneOptions scene;               ///< options for each scene; its file name is not used
   std::string golden, report, junit;
   GoldenStates states;
   int threads = 0;

@@ -18,7 +18,7 @@
 namespace offstage::producer {
 namespace {
 
-/// Refuses what is there already, before the work.
+/// Refuses existing output before the work begins.
 void check_target(const ExportTarget& target, const std::vector<int>& frames, bool force) {
   render::create_parent_folders(target.path);
   if (!target.sequence()) return check_file(target.path.string(), force);

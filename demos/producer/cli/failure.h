@@ -1,5 +1,5 @@
 #pragma once
-/// What the errors of a command mean: a message, an exit code and a short name of their kind.
+/// Descriptions of the errors of a command: a message, an exit code and a short name of the kind.
 
 #include <exception>
 #include <string>
@@ -12,7 +12,8 @@ struct Failure {
   std::string message;  ///< as the program prints it, without a line break at its end
 };
 
-/// Of any exception but those of an interrupt (Interrupted, render::StoppedError), which are thrown again.
+/// Describes any exception except those of an interrupt (Interrupted, render::StoppedError), which are
+/// rethrown.
 Failure describe_failure(const std::exception_ptr& error);
 
 }  // namespace offstage::producer

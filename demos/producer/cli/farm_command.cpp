@@ -30,7 +30,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The folder of a farm: FILM.mp4.farm, or the one above the frames.
+/// The folder of a farm: FILM.mp4.farm, or the folder above the frames.
 fs::path default_work(const OutputTarget& target) {
   if (target.kind == OutputKind::video) return target.path.string() + ".farm";
   const fs::path folder = target.path.parent_path();
@@ -71,7 +71,7 @@ FarmPlan plan_of(const FarmOptions& options) {
   return plan;
 }
 
-/// Checks the scene here, before machines are asked, and gives the plan its key.
+/// Checks the scene on this machine before any job is submitted, and sets the key of the plan.
 void check_scene(const FarmOptions& options, FarmPlan& plan) {
   const LoadedScene loaded = load(options.scene, options.talk.quiet);
   const ModelLibrary models = load_models(loaded, options.scene, options.talk);
@@ -85,18 +85,18 @@ void check_scene(const FarmOptions& options, FarmPlan& plan) {
                          .alpha = loaded.scene.environment.background == Background::transparent});
 }
 
-/// A folder of an earlier farm goes on with --resume if it is of the same film.
+/// An existing folder of a farm is continued with --resume if it belongs to the same film.
 void prepare_work(const FarmOptions& options, const FarmPlan& plan) {
   const bool there = fs::exists(plan.work / "farm.json");
   if (there && !options.resume && !options.force)
     throw OutputError(plan.work.string() +
-                      ": holds a farm already; go on with --resume, or begin again with --force");
+                      ": already contains a farm; continue with --resume, or start again with --force");
   if (there && options.resume) {
     const FarmPlan before = read_farm(plan.work);
     if (before.key != plan.key || before.chunks != plan.chunks)
       throw OutputError(
           plan.work.string() +
-          ": was begun with another scene, other settings or another --chunks; begin again with --force");
+          ": was started with another scene, other settings or other --chunks; start again with --force");
   }
   if (there && !options.resume) {
     fs::remove_all(plan.work / "done");
@@ -113,7 +113,8 @@ void prepare_work(const FarmOptions& options, const FarmPlan& plan) {
   write_farm(plan);
 }
 
-/// Runs a script of the farm's folder to its end; what it prints goes to a log. Nothing if it succeeded.
+/// Runs a script of the farm's folder and writes its output to a log. Returns an error message; nothing if it
+/// succeeded.
 std::optional<std::string> run_script(const FarmPlan& plan, const std::vector<std::string>& arguments,
                                       const std::string& log_name) {
   const fs::path log_file = plan.work / "logs" / log_name;
@@ -173,10 +174,10 @@ int submit_to_slurm(const FarmOptions& options, const FarmPlan& plan) {
       plan, {options.partition, options.account, options.time, options.sbatch}, farm_state(plan).missing);
   write_text_file((plan.work / script.name).string(), script.text);
   if (const auto failed = run_script(plan, {script.name}, "submit.log"))
-    throw render::UnavailableError("sbatch did not take the jobs: " + *failed);
+    throw render::UnavailableError("sbatch did not accept the jobs: " + *failed);
   fmt::print("jobs {}", render::read_text_file(plan.work / "jobs", 1 << 16));
   if (!options.talk.quiet)
-    log("see how far they are: offstage farm --status {}\n", shell_word(plan.work.string()));
+    log("show their progress: offstage farm --status {}\n", shell_word(plan.work.string()));
   return kOk;
 }
 

@@ -33,7 +33,7 @@ std::set<std::string> pictures_in(const fs::path& folder) {
   return names;
 }
 
-/// Compares two pictures; prints a line.
+/// Compares two pictures and prints one line.
 bool same_picture(const fs::path& a, const fs::path& b, const std::string& report) {
   const render::Image x = render::read_image(a), y = render::read_image(b);
   if (x.width_px != y.width_px || x.height_px != y.height_px) {
@@ -92,11 +92,11 @@ void refuse_standard_input(const std::string& command, const std::string& file) 
         ": needs a scene file, because a golden is found by the file's name; standard input has none");
 }
 
-/// What came of a scene.
+/// The result of the comparison of one scene.
 struct Comparison {
   TestResult result;
   int code = kOk;
-  fs::path page;              // of the report; empty: none
+  fs::path page;              // page of the report; empty: none
   std::exception_ptr thrown;  // the reason why there is no result
 };
 
@@ -138,7 +138,7 @@ void compare_scene(const CompareOptions& options, const std::string& file, Compa
              fs::absolute(comparison.page).string(), file, options.golden);
 }
 
-/// The comparison of a scene; an error of one scene leaves the others alone.
+/// Compares a scene with its golden. An error does not affect the other scenes.
 Comparison compared(const CompareOptions& options, const std::string& file) {
   const auto start = std::chrono::steady_clock::now();
   Comparison comparison;
@@ -167,7 +167,7 @@ void write_overview(const CompareOptions& options, const std::vector<Comparison>
   fmt::print("see {}\n", fs::absolute(write_report_overview(options.report, scenes)).string());
 }
 
-/// An error comes before a difference, the first error before the others.
+/// Errors take precedence over differences, and the first error over later ones.
 int exit_code(const std::vector<Comparison>& comparisons) {
   int code = kOk;
   for (const Comparison& c : comparisons) {

@@ -282,10 +282,10 @@ int render_command(const RenderOptions& options) {
     render::check_video(video_def(plan));
     check_file(plan.target.path.string(), options.force);
     if (!options.chunk.empty())
-      throw OutputError(plan.target.path.string() +
-                        ": a part of a film is no film; render parts as frames (-o frames/####.png --chunk " +
-                        options.chunk + "), then: offstage encode frames/ -o " +
-                        plan.target.path.filename().string());
+      throw OutputError(
+          plan.target.path.string() +
+          ": a video cannot be rendered in parts; render them as frames (-o frames/####.png --chunk " +
+          options.chunk + "), then: offstage encode frames/ -o " + plan.target.path.filename().string());
     const fs::path stale = channels_folder(plan.target.path);
     if (!plan.channels.choice.any() && !options.force && holds_channels(stale))
       throw OutputError(stale.string() +

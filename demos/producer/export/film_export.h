@@ -1,6 +1,6 @@
 #pragma once
-/// Films for other programs: the states of the simulation as USD, glTF, PLY, OBJ or CSV. An exporter is a
-/// sink of the same snapshots that the drawing gets.
+/// Export of films to other programs: the states of the simulation as USD, glTF, PLY, OBJ or CSV. An exporter
+/// gets the same snapshots as the drawing.
 
 #include <filesystem>
 #include <memory>
@@ -17,9 +17,9 @@ class FilmExport {
   virtual ~FilmExport() = default;
   /// Takes the frames in ascending order. Throws render::FileError.
   virtual void write(const Snapshot& snapshot) = 0;
-  /// Completes the output: only now a single file appears under its name.
+  /// Completes the output. A single file gets its name only now.
   virtual void close() = 0;
-  /// What the format has no form for, one line each; empty if it holds everything.
+  /// Describes the objects and properties that the format cannot hold, one per line; empty if there are none.
   virtual std::vector<std::string> notes() const { return {}; }
 };
 
@@ -31,14 +31,14 @@ struct ExportTarget {
   bool sequence() const { return path.filename().string().find('#') != std::string::npos; }
 };
 
-/// What OUT means. Throws std::invalid_argument for an ending that is none of .usda .glb .ply
-/// .obj .csv, and for a file where the format needs one per frame (or the other way round).
+/// Parses the output OUT. Throws std::invalid_argument for an ending other than .usda, .glb, .ply, .obj and
+/// .csv, and for a single file where the format needs one per frame (or the other way round).
 ExportTarget parse_export(const std::string& out);
 
 /// `parts` must outlive the exporter. Throws render::FileError.
 std::unique_ptr<FilmExport> make_export(const ExportTarget& target, const FilmParts& parts);
 
-// The exporters behind it.
+// The exporters of the formats.
 std::unique_ptr<FilmExport> make_usd_export(const std::filesystem::path& file, const FilmParts& parts);
 std::unique_ptr<FilmExport> make_gltf_export(const std::filesystem::path& file, const FilmParts& parts);
 std::unique_ptr<FilmExport> make_ply_export(const std::filesystem::path& pattern, const FilmParts& parts);

@@ -18,14 +18,14 @@ using Eigen::Affine3f;
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 
-constexpr float kGroundHalf_m = 100;  // of the square that stands for an infinite plane
+constexpr float kGroundHalf_m = 100;  // half side of the square that stands for an infinite plane
 
 Affine3f placed(const Vec3& position, const Quat& orientation, Real scale) {
   return Eigen::Translation3f(position.cast<float>()) * orientation.cast<float>() *
          Eigen::Scaling(to_float(scale));
 }
 
-/// Other programs have no use for a ground that reaches to the horizon in cells of growing size.
+/// Replaces the renderer's ground mesh, which reaches to the horizon, by a simple square.
 render::Mesh ground_square() {
   constexpr float r = kGroundHalf_m;
   return {.positions = {{-r, 0, -r}, {-r, 0, r}, {r, 0, r}, {r, 0, -r}},
@@ -53,7 +53,7 @@ std::vector<float> size_key(const sim::Plane&) {
   return {5};
 }
 
-/// Names, each given once.
+/// Makes names unique.
 class UniqueNames {
  public:
   std::string operator()(const std::string& wanted, const char* otherwise) {

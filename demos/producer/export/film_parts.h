@@ -1,6 +1,6 @@
 #pragma once
-/// What a film consists of for other programs: meshes, materials and the objects that use them, before any
-/// frame. A Snapshot then says where they are; the indices here are those of its lists.
+/// The constant parts of a film for other programs: meshes, materials and the objects that use them. A
+/// Snapshot has the positions of the objects; the indices here refer to its lists.
 
 #include <cstdint>
 #include <optional>
@@ -48,17 +48,18 @@ struct FilmCloth {
   std::string name;
   std::size_t cloth = 0;  ///< in Snapshot::cloths
   std::size_t material = 0;
-  std::vector<uint32_t> triangles;   ///< while it is whole
-  std::vector<Eigen::Vector2f> uvs;  ///< of the vertices of the whole cloth, over its bounds, v upwards
+  std::vector<uint32_t> triangles;   ///< for a cloth without tears
+  std::vector<Eigen::Vector2f> uvs;  ///< texture coordinates of the intact cloth's vertices, over its bounds,
+                                     ///< v upwards
 };
 
 struct FilmPoints {
   std::string name;
   std::size_t set = 0;  ///< in Snapshot::point_sets
-  bool glows = false;   ///< its colour is its light
+  bool glows = false;   ///< the particles emit light of their colour
 };
 
-/// Objects that the scene hides are left out. Names are unique within their kind.
+/// Invisible objects are omitted. Names are unique among objects of the same kind.
 class FilmParts {
  public:
   FilmParts(const Scene& scene, const ModelLibrary& models);
@@ -81,14 +82,15 @@ class FilmParts {
   CameraRig camera_;
 };
 
-/// A rod between its ends; nothing if it is gone.
+/// Places the cylinder of a rod between its ends; nothing if the rod does not exist any more.
 std::optional<Eigen::Affine3f> rod_transform(const RodSample& rod);
 
 /// Triangles of a cloth at a frame, and texture coordinates of its points.
 struct ClothSurface {
   const std::vector<uint32_t>* triangles;
   std::vector<Eigen::Vector2f> uvs;
-  std::vector<Eigen::Vector3f> normals;  ///< of the points, means weighted by area
+  std::vector<Eigen::Vector3f> normals;  ///< normals of the points: means of the triangles' normals, weighted
+                                         ///< by area
 };
 ClothSurface cloth_surface(const FilmCloth& cloth, const ClothSample& sample);
 

@@ -34,12 +34,12 @@ constexpr int kFloat = 5126, kUnsignedInt = 5125;
 constexpr int kArrayBuffer = 34962, kElementBuffer = 34963;
 constexpr uint32_t kGlbMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
 
-/// The buffer of a file, and the accessors into it.
+/// The binary buffer of a file, and the accessors that refer to it.
 class GltfBuffer {
  public:
   explicit GltfBuffer(const fs::path& file) : file_(file), spool_(file.parent_path()) {}
 
-  /// `target`: what the numbers are used for, 0: other. Returns the number of the accessor.
+  /// Adds data and returns the index of its accessor. `target`: the usage of the data; 0: other.
   int add(std::span<const float> numbers, int width, int target = 0, bool with_bounds = false) {
     const char* type = width == 1 ? "SCALAR" : width == 2 ? "VEC2" : width == 3 ? "VEC3" : "VEC4";
     Json accessor = {{"bufferView", add_view(bytes_of(numbers), target)},
@@ -95,13 +95,14 @@ class GltfBuffer {
   Spool spool_;
 };
 
-/// A stretch of frames in which a cloth keeps its triangles: a mesh with a morph target for each frame.
+/// A range of frames in which a cloth has the same triangles, as a mesh with a morph target for each frame.
 struct ClothStretch {
   std::vector<int> frames;
   std::vector<uint32_t> triangles;
   std::vector<Eigen::Vector2f> uvs;
-  std::vector<Vector3f> points, normals;     // at its first frame
-  std::vector<std::pair<int, int>> targets;  // accessors of positions and normals, of the frames after it
+  std::vector<Vector3f> points, normals;  // at its first frame
+  // accessors of positions and normals, for each frame after the first
+  std::vector<std::pair<int, int>> targets;
 };
 
 struct ClothRecord {
@@ -133,7 +134,7 @@ void append(const Quaternionf& q, std::vector<float>& out) {
   out.insert(out.end(), q.coeffs().data(), q.coeffs().data() + 4);  // x, y, z, w
 }
 
-/// Turns -Z, along which cameras and lights of glTF look, to a direction.
+/// Returns the rotation from -Z, the viewing direction of cameras and lights in glTF, to a direction.
 Quaternionf look_rotation(const Vector3f& direction, const Vector3f& up) {
   const Vector3f z = -direction.normalized();
   Vector3f x = up.cross(z);
@@ -213,7 +214,7 @@ class GltfExport : public FilmExport {
  private:
   void write_rod(int frame, const RodSample& rod, NodeTracks& out) {
     const Vector3f d = rod.b - rod.a;
-    if (!rod_transform(rod)) {  // gone
+    if (!rod_transform(rod)) {  // the rod does not exist any more
       out.scale.add(frame, Vector3f::Zero());
       return;
     }
@@ -320,7 +321,7 @@ class GltfExport : public FilmExport {
     }
   }
 
-  /// The mesh of glTF for geometry with a material.
+  /// Returns the glTF mesh for geometry with a material.
   int mesh_of_part(std::size_t mesh, std::size_t material) {
     const auto [it, is_new] = meshes_done_.try_emplace({mesh, material}, static_cast<int>(meshes_.size()));
     if (is_new) {
@@ -341,7 +342,8 @@ class GltfExport : public FilmExport {
         break;
       }
       Json matrix = Json::array();
-      for (int i = 0; i < 16; ++i) matrix.push_back(part.body_from_part.data()[i]);  // by columns, both
+      // both are in column order
+      for (int i = 0; i < 16; ++i) matrix.push_back(part.body_from_part.data()[i]);
       nodes_.push_back({{"mesh", mesh}, {"matrix", std::move(matrix)}});
       children.push_back(nodes_.size() - 1);
     }
@@ -376,7 +378,7 @@ class GltfExport : public FilmExport {
     }
   }
 
-  /// At each frame one target has the weight 1; in between the cloth goes straight from one to the next.
+  /// At each frame one target has the weight 1; between frames the cloth is interpolated linearly.
   void animate_weights(const ClothStretch& stretch, int node) {
     const std::size_t targets = stretch.targets.size();
     std::vector<float> times, weights((targets + 1) * targets, 0);
@@ -387,7 +389,7 @@ class GltfExport : public FilmExport {
     add_channel(times, weights, 1, node, "weights", "LINEAR");
   }
 
-  /// The mesh of a stretch is there during its frames alone: outside of them its scale is zero.
+  /// The mesh of a range of frames is shown during these frames only: otherwise its scale is zero.
   void animate_presence(const ClothRecord& record, std::size_t i, int node) {
     SampleTrack<Vector3f> scale;
     for (const int frame : frames_) {
@@ -417,8 +419,8 @@ class GltfExport : public FilmExport {
       add_node({{"name", name}, {"extensions", {{"KHR_lights_punctual", {{"light", lights_.size() - 1}}}}}},
                tracks);
     };
-    // A white surface has the radiance L under an irradiance of pi L. glTF counts in lux and candela; scenes
-    // have no absolute scale, so one unit of theirs stands for 1 W, which is 683 lm, as importers have it.
+    // A white surface has the radiance L under an irradiance of pi L. glTF uses lux and candela. Scenes have
+    // no absolute scale, so one unit stands for 1 W, which importers convert to 683 lm.
     constexpr float kLumens = 683;
     const float pi = std::numbers::pi_v<float>;
     const render::Sun sun = sun_of(parts_.scene);

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A name in a file whose words end at blanks.
+/// A name without white space, as OBJ requires.
 std::string one_word(const std::string& name) {
   std::string out;
   for (const char c : name) out += static_cast<unsigned char>(c) <= 0x20 ? '_' : c;
@@ -38,7 +38,7 @@ class ObjExport : public FilmExport {
     std::string out = fmt::format("# {} frame {} time {} s\nmtllib {}\n", render::escaped(parts_.scene.name),
                                   snapshot.frame, snapshot.time, library_);
     for (const GeometryGroup& group : geometry.groups) write_group(geometry, group, out);
-    std::size_t next = geometry.positions.size() + 1;  // OBJ counts from 1
+    std::size_t next = geometry.positions.size() + 1;  // OBJ indices start at 1
     for (const GeometryParticles& particles : geometry.particles) {
       if (particles.set->points.empty()) continue;
       out += "o " + one_word(particles.object) + "\n";

@@ -18,7 +18,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little);
 
-/// Linear light as eight bits with the sRGB curve, which is what programs take vertex colours for.
+/// Converts linear light to eight bits of sRGB, the usual encoding of vertex colours.
 uint8_t srgb_byte(float linear) {
   const float c = std::clamp(linear, 0.f, 1.f);
   const float s = c <= 0.0031308f ? 12.92f * c : 1.055f * std::pow(c, 1 / 2.4f) - 0.055f;

@@ -1,17 +1,17 @@
 #pragma once
-/// Values over frames that are only written down where they change.
+/// Values over frames, stored only where they change.
 
 #include <utility>
 #include <vector>
 
 namespace offstage::producer {
 
-/// Between two samples other programs interpolate. A value that rests is therefore sampled once more, just
+/// Other programs interpolate between two samples. A constant value is therefore sampled once more just
 /// before it changes.
 template <class T>
 class SampleTrack {
  public:
-  /// Frames ascend.
+  /// Must be called with ascending frames.
   void add(int frame, const T& value) {
     if (samples_.empty()) {
       samples_.emplace_back(frame, value);
@@ -23,7 +23,7 @@ class SampleTrack {
     latest_ = frame;
   }
   const std::vector<std::pair<int, T>>& samples() const { return samples_; }
-  /// It has one value throughout.
+  /// Whether the value never changes.
   bool constant() const { return samples_.size() == 1; }
 
  private:

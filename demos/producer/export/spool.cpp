@@ -17,7 +17,7 @@ constexpr std::size_t kBuffer = std::size_t{1} << 20;
 Spool::Spool(const std::filesystem::path& folder) : folder_(folder) {
   const std::filesystem::path place = folder.empty() ? "." : folder;
   file_ = render::Descriptor(::open(place.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600));
-  if (!file_) {  // a file system without nameless files
+  if (!file_) {  // the file system does not support unnamed files
     std::string name = (place / ".offstage-spool-").string() + std::string(6, 'X');
     file_ = render::Descriptor(::mkostemp(name.data(), O_CLOEXEC));
     if (!file_) render::throw_file_error(place, "cannot create a temporary file");

@@ -1,5 +1,6 @@
 #pragma once
-/// Bytes that are produced frame by frame and needed in one piece at the end: a file without a name.
+/// Collects bytes that are produced frame by frame and needed as a whole at the end, in an unnamed temporary
+/// file.
 
 #include <cstdint>
 #include <filesystem>
@@ -12,14 +13,14 @@ namespace offstage::producer {
 
 class Spool {
  public:
-  /// The file is made in `folder`, where the output goes, because a temporary folder may be small. Throws
-  /// render::FileError.
+  /// Creates the file in `folder`, the folder of the output, because the system's temporary folder may be
+  /// small. Throws render::FileError.
   explicit Spool(const std::filesystem::path& folder);
 
   void append(std::span<const uint8_t> bytes);
   void append(std::string_view text) { append({reinterpret_cast<const uint8_t*>(text.data()), text.size()}); }
   uint64_t size() const { return size_; }
-  /// Everything so far, to the end of another file.
+  /// Appends all collected bytes to another file.
   void copy_to(render::OutputFile& file);
 
  private:

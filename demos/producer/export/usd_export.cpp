@@ -25,7 +25,7 @@ using Eigen::Affine3f;
 using Eigen::Quaternionf;
 using Eigen::Vector3f;
 
-/// "name.timeSamples = { 1: a, 2: b, }", or "name = a" for one that does not change.
+/// Writes "name.timeSamples = { 1: a, 2: b, }", or "name = a" for a constant value.
 template <class T>
 std::string sampled(std::string_view attribute, const SampleTrack<T>& track) {
   if (track.samples().empty()) return {};
@@ -36,10 +36,10 @@ std::string sampled(std::string_view attribute, const SampleTrack<T>& track) {
   return out + "}\n";
 }
 
-/// An attribute with many numbers at each frame.
+/// An attribute that is an array of numbers at each frame.
 class SpooledAttribute {
  public:
-  /// `interpolation`: how the values belong to the points; empty: as USD has it for this attribute.
+  /// `interpolation`: how the values are assigned to the points; empty: the default of this attribute in USD.
   SpooledAttribute(std::string declaration, const fs::path& folder, std::string interpolation = {})
       : declaration_(std::move(declaration)), interpolation_(std::move(interpolation)), spool_(folder) {}
   void add(int frame, const std::string& value) { spool_.append(fmt::format("  {}: {},\n", frame, value)); }
@@ -65,8 +65,8 @@ struct PoseTrack {
   SampleTrack<Quaternionf> orientation;
 
   void add(int frame, const Vector3f& p, Quaternionf q) {
-    // q and -q are the same rotation, but between samples of opposite signs an interpolation takes the long
-    // way round.
+    // q and -q are the same rotation, but an interpolation between opposite signs would take the long way
+    // around.
     if (!orientation.samples().empty() && orientation.samples().back().second.dot(q) < 0) q.coeffs() *= -1;
     position.add(frame, p);
     orientation.add(frame, q);
@@ -86,7 +86,7 @@ struct ClothAttributes {
         indices("int[] faceVertexIndices", folder),
         uvs("texCoord2f[] primvars:st", folder, "vertex") {}
   SpooledAttribute points, normals, velocities, counts, indices, uvs;
-  std::optional<uint32_t> version;  // of the triangles that were written last
+  std::optional<uint32_t> version;  // version of the triangles that were written last
 };
 
 struct PointAttributes {
@@ -102,7 +102,7 @@ struct PointAttributes {
 
 struct RodTracks {
   SampleTrack<Eigen::Matrix4f> transform;
-  SampleTrack<std::string> visibility;  // a rod that broke is drawn no more
+  SampleTrack<std::string> visibility;  // a broken rod is invisible
 };
 
 struct LampTracks {
@@ -229,8 +229,8 @@ class UsdExport : public FilmExport {
     out.opacities.add(frame, opacities + "]");
   }
 
-  // Apertures and focal lengths of USD are in tenths of the unit, which is the metre here: a frame 24 mm
-  // high.
+  // USD gives apertures and focal lengths in tenths of the scene unit, which is the metre here: the frame is
+  // 24 mm high.
   static constexpr float kApertureHeight = 0.24f;
 
   void write_camera(int frame, const render::Camera& camera) {
@@ -246,8 +246,9 @@ class UsdExport : public FilmExport {
     out.transform.add(frame, looking(lamp.position, lamp.direction, Vector3f::UnitY()));
     const float brightness = lamp.intensity.maxCoeff();
     out.color.add(frame, brightness > 0 ? Vector3f(lamp.intensity / brightness) : Vector3f(Vector3f::Ones()));
-    // A white surface 1 m away has the radiance L when the light sends it an irradiance of pi L. Normalized
-    // lights of USD spread their intensity over their area: 4 pi r^2 of a ball, of which pi r^2 is seen.
+    // A white surface 1 m away has the radiance L if the light causes an irradiance of pi L. Normalized
+    // lights of USD distribute their intensity over their area: 4 pi r^2 for a sphere, of which pi r^2 is
+    // visible.
     const float pi = std::numbers::pi_v<float>;
     out.intensity.add(frame, (lamp.size.isZero(0) ? 4 : 1) * pi * brightness);
   }
@@ -404,7 +405,7 @@ class UsdExport : public FilmExport {
     }
   }
 
-  /// Meshes that the bodies refer to. A class is not drawn by itself.
+  /// The meshes that bodies refer to. A class prim is not drawn by itself.
   void put_prototypes() {
     put("class \"_Meshes\"\n{\n");
     for (std::size_t i = 0; i < parts_.meshes.size(); ++i) {
@@ -442,7 +443,7 @@ class UsdExport : public FilmExport {
   SampleTrack<float> focal_, focus_, f_stop_;
   std::vector<LampTracks> lamps_;
   usd::PrimNames names_, material_names_;
-  std::vector<std::string> materials_;  // paths
+  std::vector<std::string> materials_;  // paths of the materials
 };
 
 }  // namespace

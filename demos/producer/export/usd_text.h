@@ -11,9 +11,9 @@
 
 namespace offstage::producer::usd {
 
-/// A name that USD allows for a prim: letters, digits and '_', not a digit first.
+/// Returns a valid prim name of USD: letters, digits and '_', not beginning with a digit.
 std::string prim_name(std::string_view name);
-/// Prim names below one parent, each given once.
+/// Makes prim names unique below one parent.
 class PrimNames {
  public:
   std::string operator()(std::string_view name);
@@ -28,9 +28,9 @@ std::string quoted(std::string_view text);
 std::string text(float value);
 std::string text(const Eigen::Vector2f& v);
 std::string text(const Eigen::Vector3f& v);
-/// Real part first, as quatf has it.
+/// Real part first, as in quatf.
 std::string text(const Eigen::Quaternionf& q);
-/// As matrix4d, which takes row vectors: the transpose of Eigen's.
+/// As matrix4d, which uses row vectors: the transpose of Eigen's matrix.
 std::string text(const Eigen::Matrix4f& transform);
 /// A token.
 std::string text(const std::string& token);

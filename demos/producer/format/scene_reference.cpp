@@ -43,7 +43,7 @@ column and path.
 
 ## Orientations
 
-`[w, x, y, z]`, a quaternion that need not be normalised, or `{"axis": [x, y, z], "angle_deg": 90}`.
+`[w, x, y, z]`, a quaternion that need not be normalized, or `{"axis": [x, y, z], "angle_deg": 90}`.
 
 ## Colours
 

@@ -204,7 +204,7 @@ void Codec<Quat>::read(Reader& in, const Node& node, const Spec&, Quat& out) {
   const std::size_t before = in.problems().size();
   Codec<Eigen::Vector4d>::read(in, node, {"", "", "", kDirection}, wxyz);
   if (in.problems().size() > before) return;
-  constexpr Real kUnit = 1e-14;  // Normalised values keep their bits, so that writing and reading agree.
+  constexpr Real kUnit = 1e-14;  // Normalized values keep their bits, so that writing and reading agree.
   if (std::abs(wxyz.squaredNorm() - 1) > kUnit) wxyz.stableNormalize();
   out = Quat(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
 }

@@ -50,7 +50,7 @@ struct Codec<uint64_t> {
   static Node write(const uint64_t& value);
   static Description describe(Catalogue& all, const Spec& spec);
 };
-/// [w, x, y, z], or {"axis": [x, y, z], "angle_deg": a}. Normalised; zero is refused.
+/// [w, x, y, z], or {"axis": [x, y, z], "angle_deg": a}. Normalized; zero is refused.
 template <>
 struct Codec<Quat> {
   static void read(Reader& in, const Node& node, const Spec& spec, Quat& out);

@@ -110,7 +110,8 @@ uint64_t clear_cache(const fs::path& folder, std::string& problem) {
   if (!is_cache(folder)) throw render::FileError(folder.string() + ": is not a cache of snapshots");
   const uint64_t before = bytes_in(folder);
   std::error_code error;
-  fs::remove(folder / SnapshotCache::kFile, error);  // first: nobody begins to read any more
+  // removed first, so that no further process opens the cache
+  fs::remove(folder / SnapshotCache::kFile, error);
   SnapshotCache(folder).remove_unused_generations();
   render::remove_leftovers(folder);
   for (const auto& entry : fs::directory_iterator(folder, error))

@@ -24,7 +24,7 @@ std::string command_text(const FarmPlan& plan, const std::vector<std::string>& w
   return text;
 }
 
-/// What all steps begin with.
+/// The common beginning of all scripts.
 std::string head(const FarmPlan& plan, const std::string& title) {
   return fmt::format(
       "#!/bin/sh\n# {}: {}\nset -eu\ncd {}\nmkdir -p done\n"
@@ -66,7 +66,7 @@ std::vector<FarmScript> step_scripts(const FarmPlan& plan) {
   scripts.push_back({"simulate.sh", head(plan, "simulates once, for all chunks") +
                                         "[ ! -e done/simulate ] || exit 0\ntry " +
                                         command_text(plan, simulate) + "\ntouch done/simulate\n"});
-  // A chunk that was done keeps its frames with --resume; what a dead machine left is drawn again.
+  // With --resume a finished chunk keeps its frames; partial files of a crashed machine are drawn again.
   scripts.push_back(
       {"chunk.sh", head(plan, "draws one part of the frames") + "chunk=${1:-$SLURM_ARRAY_TASK_ID}\ntry " +
                        command_text(plan, render) +
@@ -101,7 +101,7 @@ FarmScript slurm_script(const FarmPlan& plan, const SlurmOptions& slurm, const s
   std::string array;
   for (const int chunk : chunks) array += (array.empty() ? "" : ",") + std::to_string(chunk);
   std::string text =
-      fmt::format("#!/bin/sh\n# {}: hands the steps to Slurm.\nset -eu\ncd {}\nmkdir -p logs\n",
+      fmt::format("#!/bin/sh\n# {}: submits the steps to Slurm.\nset -eu\ncd {}\nmkdir -p logs\n",
                   plan.out.filename().string(), shell_word(plan.work.string()));
   text += "simulate=" + job("simulate", "") + "\n";
   std::string before_encoding = "$simulate";

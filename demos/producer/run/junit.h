@@ -9,16 +9,16 @@ namespace offstage::producer {
 struct TestResult {
   enum class Outcome { passed, failed, error };  ///< error: the test could not be run
 
-  std::string name;        ///< of the test: a scene file
-  std::string class_name;  ///< what it belongs to: a folder of goldens
+  std::string name;        ///< name of the test: a scene file
+  std::string class_name;  ///< group of the test: a folder of goldens
   double seconds = 0;      ///< [s]
   Outcome outcome = Outcome::passed;
-  std::string kind;     ///< of the failure or error
+  std::string kind;     ///< kind of the failure or error
   std::string message;  ///< one line; empty if passed
-  std::string output;   ///< lines, for every outcome
+  std::string output;   ///< output lines, for every outcome
 };
 
-/// One <testsuites> element with one <testsuite>, as Jenkins, GitLab and pytest write and read it.
+/// Writes one <testsuites> element with one <testsuite>, as Jenkins, GitLab and pytest do.
 std::string junit_xml(const std::string& suite, std::span<const TestResult> results);
 
 }  // namespace offstage::producer

@@ -119,8 +119,9 @@ struct SnapshotJob {
   std::optional<std::filesystem::path> cache;  ///< read states from here instead of simulating
 };
 
-/// Gives the state of each frame to `take`, in order, on the calling thread. An interrupt ends it between two
-/// frames and is noted in the result. Throws what the simulation, the cache and `take` throw.
+/// Passes the state of each frame to `take`, in order, on the calling thread. An interrupt ends it between
+/// two frames and is recorded in the result. Passes on the exceptions of the simulation, the cache and
+/// `take`.
 RunStats visit_frames(const LoadedScene& loaded, const ModelLibrary& models, const SnapshotJob& job,
                       const std::function<void(const Snapshot&)>& take, const ProgressCallback& progress);
 

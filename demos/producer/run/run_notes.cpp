@@ -24,16 +24,16 @@ std::string note_of_rough_contacts(const SimulationTotals& t) {
 std::vector<std::string> notes_of(const SimulationTotals& t) {
   std::vector<std::string> notes;
   for (const std::string& body : t.lost_bodies)
-    notes.push_back(fmt::format(
-        "warning: body '{}' left the world and stays frozen where it left. Enlarge world.bounds to keep it "
-        "moving.",
-        body));
+    notes.push_back(
+        fmt::format("warning: body '{}' left the world and does not move any more. Enlarge world.bounds to "
+                    "keep it moving.",
+                    body));
   for (const std::string& joint : t.broken_joints)
     notes.push_back(fmt::format("note: joint '{}' broke", joint));
   if (t.joints_unsolved)
     notes.push_back(fmt::format(
-        "warning: joints could not be followed {} times; they may come apart or slow down visibly. Reduce "
-        "world.step (now {:g} s).",
+        "warning: the motion of joints could not be solved {} times; they may come apart or slow down. "
+        "Reduce world.step (now {:g} s).",
         t.joints_unsolved, t.step_s));
   for (const auto& [cloth, share] : t.softened_cloths)
     notes.push_back(fmt::format(

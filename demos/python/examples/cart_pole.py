@@ -85,13 +85,13 @@ class Picture:
 
 
 def balance(observation):
-    """Gains by hand: drive the cart under the pole, which leans to -X for a positive angle."""
+    """A controller with hand-tuned gains: it drives the cart under the pole, which leans to -X for a positive angle."""
     x, v, angle, rate = observation
     return x + 2 * v - 40 * angle - 10 * rate
 
 
 def run_one(steps=250, seed=0):
-    """Steps until the pole fell, at most `steps`."""
+    """The number of steps until the pole has fallen, at most `steps`."""
     env = CartPole()
     observation, _ = env.reset(seed)
     for i in range(steps):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Sweeps the rate of an emitter and plots what follows, with matplotlib.
+"""Sweeps the rate of an emitter and plots the results with matplotlib.
 
     PYTHONPATH=build/python python3 demos/python/examples/sweep.py demos/scenes/fountain.json sweep.png
 """
@@ -12,7 +12,7 @@ import offstage
 
 
 def figures(scene_file, path, values, duration=1.0):
-    """Particles and highest particle [m] at the end, for each value at `path`; drawn nowhere."""
+    """Number of particles and height of the highest [m] at the end, for each value at `path`. Nothing is rendered."""
     rows = []
     for value in values:
         scene = offstage.load(scene_file, set={path: value, "output.duration": duration})

@@ -54,7 +54,7 @@ def render(source, frames="", *, images=True, channels=False, cache=None, set=No
     images    False: states (and channels) alone, nothing is drawn
     channels  also depth, normal, id and motion
     cache     folder of `offstage simulate --cache`, instead of simulating
-    threads   of the rasteriser; 0: all. The first call of a process decides
+    threads   of the rasterizer; 0: all. The first call of a process decides
     gl        "osmesa", "egl", "egl:gpu"; the first call of a process decides
     progress  called as progress(done, total) for each frame
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Between numpy arrays and the types of the libraries.
+/// Conversion between numpy arrays and the types of the libraries.
 
 #include <array>
 #include <memory>
@@ -18,7 +18,7 @@ namespace offstage::python {
 
 namespace py = pybind11;
 
-/// Three numbers of any sequence or array.
+/// Three numbers from any sequence or array.
 using Triple = std::array<double, 3>;
 /// [w, x, y, z]
 using Quadruple = std::array<double, 4>;
@@ -55,7 +55,7 @@ py::array_t<T> numbers(std::span<const T> values) {
   return py::array_t<T>(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
-/// The (n, 3) rows of an array that came from Python.
+/// The (n, 3) rows of an array passed from Python.
 inline std::vector<sim::Vec3> vectors(const py::array_t<double, py::array::c_style | py::array::forcecast>& a,
                                       const char* name) {
   if (a.ndim() != 2 || a.shape(1) != 3)
@@ -74,7 +74,7 @@ py::array view(std::vector<py::ssize_t> shape, std::vector<py::ssize_t> strides,
   return out;
 }
 
-/// An array that takes over a vector, without a copy.
+/// An array that takes ownership of a vector, without a copy.
 template <class T, class Element>
 py::array_t<T> taken(std::vector<Element>&& values, std::vector<py::ssize_t> shape) {
   auto* kept = new std::vector<Element>(std::move(values));

@@ -7,7 +7,7 @@
 namespace offstage::python {
 namespace {
 
-/// What a consumer gets of a frame. Pictures become arrays without a copy.
+/// A frame for Python. Pictures become arrays without a copy.
 struct PythonFrame {
   int number;
   double time;
@@ -38,7 +38,7 @@ PythonFrame to_python(FilmFrame&& film_frame) {
 PythonFrame next_frame(Film& film) {
   std::optional<FilmFrame> frame;
   {
-    // Ctrl-C is noticed between two frames.
+    // Ctrl-C takes effect between two frames.
     const py::gil_scoped_release released;
     frame = film.next();
   }
@@ -76,12 +76,12 @@ void bind_film(py::module_& m) {
       .def_readonly("motion", &PythonFrame::motion,
                     "(height, width, 2) float32 [px] since the previous frame; or None.");
   py::class_<Film>(m, "Film",
-                   "An iterator over the frames of a film, which are made ahead on a thread of its own.")
+                   "An iterator over the frames of a film, which a thread of its own makes in advance.")
       .def("__iter__", [](py::object self) { return self; })
       .def("__next__", &next_frame)
       .def("__len__", &Film::total)
-      .def("cancel", &Film::cancel, "Ends the film: the iterator stops.")
-      .def_property_readonly("done", &Film::done, "Frames that were taken.")
+      .def("cancel", &Film::cancel, "Ends the film; the iterator then stops.")
+      .def_property_readonly("done", &Film::done, "Number of frames that the iterator has returned.")
       .def_property_readonly("total", &Film::total);
   m.def("_film", &make_film, py::arg("scene"), py::arg("frames"), py::arg("images"), py::arg("channels"),
         py::arg("cache"), py::arg("threads"), py::arg("gl"), py::call_guard<py::gil_scoped_release>());

@@ -15,7 +15,7 @@ namespace {
 using producer::Snapshot;
 using SnapshotPointer = std::shared_ptr<const Snapshot>;
 
-/// "emitters.0.rate": 200 becomes an override of the command line.
+/// Converts "emitters.0.rate": 200 to an override as on the command line.
 std::vector<std::string> overrides_of(const py::dict& set) {
   const py::object dumps = py::module_::import("json").attr("dumps");
   std::vector<std::string> overrides;
@@ -194,7 +194,7 @@ void bind_scene_class(py::module_& m) {
       .def_property_readonly("warnings", [](const SharedScene& s) { return s.loaded.warnings; })
       .def_property_readonly(
           "simulation_key", [](const SharedScene& s) { return producer::simulation_key(s.loaded, s.models); },
-          "What a cache of this scene is found by.")
+          "The key by which a cache of this scene is found.")
       .def(
           "to_dict",
           [](const SharedScene& s) { return py::module_::import("json").attr("loads")(s.loaded.canonical); },

@@ -1,4 +1,4 @@
-// Stage: pictures of what a World simulates, without a scene.
+// Stage: draws the objects of a World, without a scene.
 
 #include <atomic>
 #include <condition_variable>
@@ -18,8 +18,8 @@ namespace {
 
 using Released = py::call_guard<py::gil_scoped_release>;
 
-/// A context belongs to the thread that made it, a Python object to none: the stage has a thread of its own,
-/// and calls wait for it.
+/// A context belongs to one thread, but a Python object may be used by any thread. The stage therefore has a
+/// thread of its own, and calls wait for it.
 class ThreadStage {
  public:
   ThreadStage(int width_px, int height_px) {
@@ -48,7 +48,7 @@ class ThreadStage {
     changed_.notify_all();
   }
 
-  /// Runs `work` with the stage on its thread and returns the result. Throws what it throws.
+  /// Runs `work` with the stage on its thread and returns the result. Passes on its exceptions.
   template <class F>
   auto with(F&& work) {
     using Result = std::invoke_result_t<F, render::Stage&>;
@@ -84,7 +84,7 @@ class ThreadStage {
   std::condition_variable changed_;
   std::function<void(render::Stage&)> work_;
   bool ended_ = false;
-  std::jthread thread_;  // last: it uses the others
+  std::jthread thread_;  // declared last, because it uses the other members
 };
 
 template <class H>

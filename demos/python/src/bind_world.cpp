@@ -69,11 +69,11 @@ py::dict step(LiveWorld& w, double sampling_time, const py::object& before) {
   return to_dict(report);
 }
 
-/// Steps several worlds at once, each by one thread.
+/// Steps several worlds at the same time, each on one thread.
 std::vector<bool> step_all(const std::vector<LiveWorld*>& worlds, double sampling_time, int threads) {
   if (!(sampling_time > 0)) throw std::invalid_argument("sampling_time: must be > 0");
   if (std::set<LiveWorld*>(worlds.begin(), worlds.end()).size() != worlds.size())
-    throw std::invalid_argument("worlds: a world is there twice");
+    throw std::invalid_argument("worlds: a world is listed twice");
   std::vector<char> finite(worlds.size(), 1);
   {
     const py::gil_scoped_release released;
@@ -99,7 +99,7 @@ py::dict body_dict(const LiveWorld& w, sim::BodyHandle body) {
   return d;
 }
 
-/// (n, 13): position, orientation [w, x, y, z], velocity, angular velocity of many bodies at once.
+/// (n, 13) array of many bodies: position, orientation [w, x, y, z], velocity, angular velocity.
 py::array_t<double> body_states(const LiveWorld& w, const std::vector<sim::BodyHandle>& bodies) {
   py::array_t<double> out({static_cast<py::ssize_t>(bodies.size()), py::ssize_t{13}});
   double* row = out.mutable_data();

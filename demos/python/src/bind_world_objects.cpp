@@ -81,7 +81,7 @@ sim::ParticleSystemHandle add_particle_system(LiveWorld& w, const py::kwargs& kw
   return *w.systems.insert(w.world.add_particle_system(def)).first;
 }
 
-/// Values for n particles: one number for all, or an array.
+/// Values for n particles: one number for all of them, or an array.
 std::vector<double> per_particle(const py::object& value, double otherwise, std::size_t n, const char* name) {
   if (value.is_none()) return std::vector<double>(n, otherwise);
   const auto a = DoubleArray::ensure(value);
@@ -152,7 +152,7 @@ sim::JointHandle add_joint(LiveWorld& w, const std::string& type, sim::BodyHandl
 }
 
 sim::Attachment attachment(LiveWorld& w, const py::object& end) {
-  // (body, point), (system, id) or a point of the world.
+  // (body, point), (system, id) or a world point
   if (py::isinstance<py::tuple>(end) && py::len(end) == 2) {
     const auto pair = end.cast<py::tuple>();
     if (py::isinstance<sim::BodyHandle>(pair[0]))

@@ -1,6 +1,6 @@
 #pragma once
-/// A film for a consumer that asks for one frame after another: simulation and drawing run ahead of it on a
-/// thread of their own.
+/// A film that is consumed frame by frame: simulation and drawing run ahead of the consumer on a separate
+/// thread.
 
 #include <condition_variable>
 #include <deque>
@@ -22,7 +22,7 @@
 
 namespace offstage::python {
 
-/// A scene that was read, with its models. It never changes, so simulations and films share it.
+/// A loaded scene with its models. It is immutable, so simulations and films can share it.
 struct SharedScene {
   producer::LoadedScene loaded;
   producer::ModelLibrary models;
@@ -30,9 +30,9 @@ struct SharedScene {
 
 struct FilmJob {
   std::vector<int> frames;                     ///< ascending
-  bool images = true;                          ///< false: states and channels alone
+  bool images = true;                          ///< false: only states and channels
   bool channels = false;                       ///< depth, normals, ids and motion
-  std::optional<std::filesystem::path> cache;  ///< states from here instead of a simulation
+  std::optional<std::filesystem::path> cache;  ///< folder from which states are read instead of simulating
 };
 
 struct FilmFrame {
@@ -46,18 +46,18 @@ struct FilmFrame {
 class Film {
  public:
   Film(std::shared_ptr<const SharedScene> scene, FilmJob job);
-  /// Ends the work; a frame that is being drawn is finished first.
+  /// Ends the work; the frame in progress is finished first.
   ~Film();
 
-  /// Waits for the next frame; none at the end, or after cancel(). Throws what the simulation or the drawing
-  /// threw.
+  /// Waits for the next frame; none at the end, or after cancel(). Passes on exceptions of the simulating and
+  /// the drawing thread.
   std::optional<FilmFrame> next();
   void cancel();
   int total() const { return static_cast<int>(job_.frames.size()); }
-  int done() const;  ///< frames that were taken
+  int done() const;  ///< number of consumed frames
 
  private:
-  static constexpr std::size_t kAhead = 3;  // frames that wait for the consumer
+  static constexpr std::size_t kAhead = 3;  // greatest number of frames that wait for the consumer
 
   void produce();
   bool push(FilmFrame frame);
@@ -71,10 +71,10 @@ class Film {
   std::exception_ptr failure_;
   bool ended_ = false, cancelled_ = false;
   int done_ = 0;
-  std::jthread worker_;  // last: it uses the others
+  std::jthread worker_;  // declared last, because it uses the other members
 };
 
-/// Chooses the OpenGL implementation of the process; only the first call counts.
+/// Selects the OpenGL implementation of the process; only the first call has an effect.
 void pin_environment_once(int threads, render::GlPlatform platform);
 
 }  // namespace offstage::python

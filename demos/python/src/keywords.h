@@ -15,7 +15,7 @@ namespace offstage::python {
 using DoubleArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using IndexArray = py::array_t<uint32_t, py::array::c_style | py::array::forcecast>;
 
-/// Returns the value of a word. Throws std::invalid_argument, which lists the allowed words.
+/// Returns the value that belongs to a word. Throws std::invalid_argument, which lists the allowed words.
 template <class T>
 T chosen(const std::map<std::string, T>& words, const std::string& word, const char* name) {
   const auto it = words.find(word);
@@ -59,7 +59,7 @@ class Keywords {
     taken_.insert(name);
     return given_.contains(name) ? py::object(given_[name]) : py::none();
   }
-  /// Throws TypeError for a keyword that does not exist.
+  /// Throws TypeError for an unknown keyword.
   void finish(const char* function) const {
     for (const auto& [key, value] : given_)
       if (!taken_.contains(key.cast<std::string>()))

@@ -1,6 +1,6 @@
 #pragma once
-/// A world for Python: it knows which handles are live, because a stale one must raise an exception instead
-/// of undefined behaviour.
+/// A world for Python. It records which handles are valid, because a stale handle must raise an exception
+/// instead of undefined behaviour.
 
 #include <set>
 #include <stdexcept>
@@ -37,7 +37,7 @@ class LiveWorld {
   bool remove(sim::BodyHandle handle) {
     bodies.erase(handle);
     const bool removed = world.remove(handle);
-    joints.clear();  // those of the body went with it
+    joints.clear();  // removing a body also removes its joints
     world.for_each_joint([&](sim::JointHandle joint) { joints.insert(joint); });
     return removed;
   }

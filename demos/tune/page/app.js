@@ -1,7 +1,7 @@
-// Brings the page up, and what belongs to no part of it alone: the bar and the keyboard.
+// The entry point of the page: the tool bar, the keyboard, and the connection to the server.
 
 import {byId, el} from './dom.js';
-import {store, on, emit, get, listen, takeDocument, takeFilm, undo, redo, isWriter, tellView, frameCount} from './store.js';
+import {store, on, emit, get, listen, takeDocument, takeFilm, undo, redo, isWriter, reportView, frameCount} from './store.js';
 import {setSchema} from './schema.js';
 import {present, seek, setPlaying, fit} from './viewer.js';
 import './scrub.js';
@@ -12,7 +12,7 @@ import {drawControls} from './controls.js';
 
 function drawBar() {
   const doc = store.doc, mine = isWriter();
-  document.body.classList.toggle('onlooker', !mine);
+  document.body.classList.toggle('read-only', !mine);
   byId('scene-name').textContent = doc.scene?.name ?? 'scene';
   byId('file-name').textContent = store.file;
   byId('dirty').hidden = doc.saved;
@@ -62,7 +62,7 @@ function bind() {
   });
 }
 
-/** What is typed in a control counts before an undo; the text keeps its caret. */
+/** Applies a typed value before an undo. The text keeps its caret. */
 function commitField() {
   if (document.activeElement?.id !== 'text') document.activeElement?.blur?.();
 }
@@ -85,7 +85,7 @@ addEventListener('keydown', event => {
 
 on('document writer', () => { if (store.doc) drawBar(); });
 on('document film film-changed', drawFilmState);
-on('writer', () => { if (isWriter()) tellView(); drawControls(true); });
+on('writer', () => { if (isWriter()) reportView(); drawControls(true); });
 
 async function start() {
   bind();
@@ -104,7 +104,7 @@ async function start() {
     emit('writer');
     if (!greeted) offerDraft();
     greeted = true;
-    tellView();
+    reportView();
   });
   const stream = listen(state.stream);
   stream.addEventListener('error', () => { if (stream.readyState === EventSource.CLOSED) emit('lost'); });

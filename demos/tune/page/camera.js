@@ -1,7 +1,8 @@
-// In the picture: look around, click to select, drag what is selected, and marks of emitters and positions.
+// Interaction with the picture: moving the camera, selecting and dragging objects, and the marks of emitters and
+// positions.
 
 import {byId, el, oncePerFrame, newGroup, toast} from './dom.js';
-import {store, on, send, view as tellServer, select, edit, isWriter, listOf} from './store.js';
+import {store, on, send, view as setView, select, edit, isWriter, listOf} from './store.js';
 import {find, valueOf, stepsOf, toText} from './jsonc.js';
 import {view, comparing} from './viewer.js';
 import {objectPaths, nameOf} from './tree.js';
@@ -18,7 +19,7 @@ const length = a => Math.hypot(...a);
 const unit = a => { const n = length(a) || 1; return a.map(x => x / n); };
 const tidy = a => a.map(x => Number(x.toFixed(3)));
 
-/** Where the picture of the edited version is on the screen: side by side it is the right one. */
+/** The screen rectangle of the edited version's picture; in the side-by-side view it is the right one. */
 function pictureBox() {
   const box = canvas.getBoundingClientRect(), half = box.width / 2;
   return comparing() === 'side' ? new DOMRect(box.left + half, box.top, half, box.height) : box;
@@ -30,7 +31,7 @@ function frameOf(camera) {
   const right = unit(cross(forward, up));
   return {forward, right, up: cross(right, forward), scale: Math.tan(camera.fov * Math.PI / 360), shape: canvas.width / canvas.height / (comparing() === 'side' ? 2 : 1)};
 }
-/** A place of the world as shares of the picture; null behind the camera. */
+/** The position of a world point in the picture, from 0 to 1; null behind the camera. */
 function project(point, camera) {
   const f = frameOf(camera), d = sub(point, camera.eye), z = dot(d, f.forward);
   if (z < 0.01) return null;
@@ -47,7 +48,7 @@ function onPlane(ray, eye, point, normal) {
 }
 
 // --- Where objects are ---
-/** The path and value of an object's place; null if it has none that can be dragged. */
+/** The path and value of an object's position; null if it has no position that can be dragged. */
 export function placeOf(path) {
   const steps = stepsOf(path), value = valueOf(find(store.root, path));
   if (!value || steps.length !== 2) return null;
@@ -56,7 +57,10 @@ export function placeOf(path) {
   if (!value.position && (value.type === 'sun' || value.shape?.type === 'plane')) return null;
   return {path: path + '/position', at: value.position ?? [0, 0, 0], free: steps[0] === 'bodies' ? true : !value.body};
 }
-/** In the world, as far as the text says it: of an emitter on a body where that begins. */
+/**
+ * The position in world coordinates according to the text. For an emitter on a body, the body's initial position is
+ * used.
+ */
 function worldPlace(path) {
   const place = placeOf(path);
   if (!place) return null;
@@ -95,14 +99,14 @@ function emitterMark(emitter, path, screen) {
   return shapes;
 }
 
-// --- The camera to look around with ---
+// --- The camera of the view ---
 let looking = null;
-const tell = oncePerFrame(() => { if (looking) tellServer({camera: {eye: looking.eye, target: looking.target}}); });
+const sendCamera = oncePerFrame(() => { if (looking) setView({camera: {eye: looking.eye, target: looking.target}}); });
 function look(camera) {
   looking = camera;
   view.camera = {...view.camera, ...camera};
   drawMarks();
-  tell();
+  sendCamera();
 }
 on('document', () => {
   const own = store.doc.camera;
@@ -110,12 +114,12 @@ on('document', () => {
   for (const id of ['camera-reset', 'camera-write']) byId(id).hidden = !own;
   drawMarks();
 });
-byId('camera-reset').addEventListener('click', () => tellServer({camera: null}));
+byId('camera-reset').addEventListener('click', () => setView({camera: null}));
 byId('camera-write').addEventListener('click', async () => {
   if (!store.doc.camera) return;
   const now = store.value.camera ?? {}, keep = ['fov_deg', 'focal_mm', 'aperture', 'focus', 'focus_on'];
   const camera = {type: 'static', eye: tidy(store.doc.camera.eye), target: tidy(store.doc.camera.target), ...Object.fromEntries(keep.filter(k => k in now).map(k => [k, now[k]]))};
-  if (await edit([{set: '/camera', value: toText(camera)}], 'camera', ['/camera'])) { tellServer({camera: null}); toast('The scene has this camera now.'); }
+  if (await edit([{set: '/camera', value: toText(camera)}], 'camera', ['/camera'])) { setView({camera: null}); toast('The camera was written to the scene.'); }
 });
 
 function orbit(start, dx, dy) {
@@ -178,7 +182,10 @@ stage.addEventListener('wheel', event => {
   look({target: camera.target, eye: add(camera.target, sub(camera.eye, camera.target), scale)});
 }, {passive: false});
 
-/** Moves an object, and those selected with it, in the level plane through it; with Alt in the upright one that faces the camera. */
+/**
+ * Moves the selected objects in the horizontal plane through one of them; with Alt, in the vertical plane that faces
+ * the camera.
+ */
 function objectMover(path, camera) {
   const start = placeOf(path).at, group = newGroup();
   const moved = store.selection.map(p => ({path: p, place: placeOf(p)})).filter(m => m.place?.free);
@@ -193,7 +200,7 @@ function objectMover(path, camera) {
   };
 }
 
-/** Selects what is seen; where the picture has nothing solid, the nearest mark of an emitter. */
+/** Selects the object under the pointer; if there is no solid object, the emitter with the nearest mark. */
 async function pick(event) {
   const [x, y] = shareAt(event);
   if (x < 0 || x > 1 || y < 0 || y > 1) return;

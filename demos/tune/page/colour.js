@@ -1,4 +1,4 @@
-// Colours: "#rrggbb[aa]" in sRGB, or linear [r, g, b(, a)] where values above 1 glow.
+// Colours: "#rrggbb[aa]" in sRGB, or linear [r, g, b(, a)], where values above 1 emit light.
 
 import {el, newGroup} from './dom.js';
 import {numberField} from './number.js';
@@ -8,7 +8,7 @@ const toLinear = x => x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4;
 const hex2 = x => Math.round(Math.min(1, Math.max(0, x)) * 255).toString(16).padStart(2, '0');
 const tidy = x => Number(x.toPrecision(3));
 
-/** Linear [r, g, b, a] of any colour. */
+/** Converts any colour to linear [r, g, b, a]. */
 export function toRgba(colour) {
   if (Array.isArray(colour)) return [colour[0] ?? 0, colour[1] ?? 0, colour[2] ?? 0, colour[3] ?? 1];
   let digits = String(colour).slice(1);
@@ -17,7 +17,7 @@ export function toRgba(colour) {
   return [toLinear(part(0)), toLinear(part(2)), toLinear(part(4)), digits.length > 6 ? part(6) : 1];
 }
 
-/** A colour in the form that another one has: hexadecimal as long as it does not glow. */
+/** Writes a colour in the form of another one: hexadecimal unless it emits light. */
 export function fromRgba(rgba, like) {
   const glows = rgba.slice(0, 3).some(x => x > 1.0001);
   if (!Array.isArray(like) && !glows)
@@ -31,7 +31,7 @@ export function css(colour) {
   return `rgba(${[r, g, b].map(x => Math.round(toSrgb(Math.max(0, x / top)) * 255)).join(',')},${a})`;
 }
 
-/** {element, set}: hue by the browser's own picker, strength for light above 1, opacity. */
+/** {element, set}: hue by the browser's colour picker, strength for light above 1, opacity. */
 export function colourField({value, name, change}) {
   let now = value;
   const pick = el('input', {type: 'color', 'aria-label': name, class: 'swatch'});

@@ -1,4 +1,4 @@
-// The controls of what is selected, made from the schema.
+// The controls of the selected object, generated from the schema.
 
 import {byId, el, newGroup, toast} from './dom.js';
 import {store, on, emit, setValue, removeValue, select, listOf} from './store.js';
@@ -20,7 +20,7 @@ setKeySearch((path, query) => {
 });
 const found = (d, query) => d.key.replace(/_/g, ' ').includes(query.replace(/_/g, ' ')) || d.help.toLowerCase().includes(query);
 
-/** What stands for the keys that an object leaves out: of an emitter by a preset, the preset's. */
+/** The values of the keys that an object omits; for an emitter with a preset, those of the preset. */
 function presetOf(value, steps) {
   const emitters = name => store.presets.find(p => p.name === name)?.preset.emitters ?? [];
   if (steps[0] === 'emitters' && steps.length === 2 && value?.preset) {
@@ -30,7 +30,7 @@ function presetOf(value, steps) {
   return undefined;
 }
 
-/** The parts of an effect, as descriptions of emitters and forces with the preset's values below. */
+/** The parts of an effect, as descriptions of emitters and forces, with the preset's values as defaults. */
 function effectParts(effect) {
   const preset = store.presets.find(p => p.name === effect?.preset)?.preset;
   if (!preset) return [];
@@ -38,7 +38,7 @@ function effectParts(effect) {
   return [...(preset.emitters ?? []).map(e => part('emitters', e)), ...(preset.forces ?? []).map(f => part('forces', f))];
 }
 
-/** Everything that decides which controls there are, but not what they show. */
+/** A text that changes when other controls are needed, but not when only their values change. */
 function signatureOf(description, value, path, below) {
   if (description.kind === 'object' && !description.free && (open.has(path) || path === shownPath)) {
     const object = schema.objectFor(description, value ?? below);
@@ -73,7 +73,7 @@ function drawEmpty() {
   rows = [];
   const empty = store.root && !schema.kLists.some(l => listOf(l).length);
   panel.replaceChildren(el('div', {class: 'empty'}, empty
-    ? el('div', {}, el('p', {}, 'The stage is empty.'), el('button', {class: 'primary', onclick: () => byId('add-button').click()}, 'Add something'))
+    ? el('div', {}, el('p', {}, 'The scene has no objects yet.'), el('button', {class: 'primary', onclick: () => byId('add-button').click()}, 'Add an object'))
     : el('p', {}, 'Select an object above, in the picture or in the text to see its controls.')));
 }
 
@@ -136,7 +136,7 @@ function listItems(path, d, items) {
   return [...boxes, el('button', {class: 'quiet', onclick: add}, `Add to ${schema.label(d.key).toLowerCase()}`)];
 }
 
-/** A value to begin with. */
+/** The initial value of a new key. */
 export function sample(d) {
   if (!d) return 0;
   if (d.fallback !== undefined) return d.fallback;
@@ -181,7 +181,7 @@ function fieldRow(path, d, below) {
   return row;
 }
 
-/** New values into the controls that are there. */
+/** Writes new values into the existing controls. */
 function refresh() {
   const errors = store.doc?.errors ?? [];
   for (const one of rows) {
@@ -194,7 +194,7 @@ function refresh() {
   }
 }
 
-/** Opens the groups on the way to a path and shows its row. */
+/** Opens the groups that contain a path, and scrolls to its row. */
 export function reveal(path) {
   const steps = stepsOf(path);
   if (steps.length < 1) return;

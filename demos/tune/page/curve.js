@@ -1,4 +1,4 @@
-// Numbers over time or age, and colours over age, as points to drag.
+// Editors for numbers over time or age, and for colours over age, with points that can be dragged.
 
 import {el, clamp, drag, newGroup} from './dom.js';
 import {colourField, css, toRgba, fromRgba} from './colour.js';

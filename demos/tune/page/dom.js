@@ -1,8 +1,8 @@
-// Small helpers for elements.
+// Helper functions for DOM elements.
 
 export const byId = id => document.getElementById(id);
 
-/** An element with attributes, listeners (on...) and children; null and false children are left out. */
+/** Creates an element with attributes, listeners (on...) and children; children that are null or false are omitted. */
 export function el(tag, attributes = {}, ...children) {
   const node = tag === 'svg' || svgTags.has(tag) ? document.createElementNS('http://www.w3.org/2000/svg', tag) : document.createElement(tag);
   for (const [key, value] of Object.entries(attributes)) {
@@ -26,7 +26,7 @@ export function toast(text, action = null) {
   setTimeout(() => box.remove(), action ? 9000 : 5000);
 }
 
-/** A panel below a button; a click elsewhere or Escape closes it. Returns the function that closes it. */
+/** Opens a panel below a button. A click elsewhere or Escape closes it. Returns the function that closes it. */
 export function popover(anchor, title, content, wide = false) {
   const box = byId('popover');
   box.replaceChildren(el('div', {class: 'popover-head'}, el('strong', {}, title),
@@ -53,7 +53,7 @@ export function popover(anchor, title, content, wide = false) {
   return close;
 }
 
-/** Calls f at most once a frame, with the latest arguments. */
+/** Returns a function that calls f at most once per screen frame, with the latest arguments. */
 export function oncePerFrame(f) {
   let waiting = false, latest;
   return (...all) => {
@@ -64,7 +64,7 @@ export function oncePerFrame(f) {
   };
 }
 
-/** Follows a drag from a pointerdown: move(event, dx, dy), end(). */
+/** Follows a drag that began with a pointerdown event: calls move(event, dx, dy) and finally end(). */
 export function drag(event, move, end = () => {}) {
   const target = event.currentTarget, x = event.clientX, y = event.clientY;
   target.setPointerCapture(event.pointerId);
@@ -81,5 +81,5 @@ export function drag(event, move, end = () => {}) {
 }
 
 let groups = 0;
-/** A name for the changes that together are one undo step. */
+/** Returns a new group name; changes of the same group are one undo step. */
 export const newGroup = () => 'g' + Date.now().toString(36) + (++groups);

@@ -1,4 +1,4 @@
-// The text of the scene: a plain text field with colours behind it, line numbers, and errors at their lines.
+// The text of the scene: a text area over a highlighted copy of the text, with line numbers and marks of errors.
 
 import {byId, el, newGroup, toast} from './dom.js';
 import {store, on, setText, select, isIdle} from './store.js';
@@ -24,7 +24,7 @@ function colour() {
   }
   colours.innerHTML = html + escape(text.slice(from)) + '\n';
   drawGutter();
-  area.style.height = '0';  // so that it grows and shrinks with the text
+  area.style.height = '0';  // reset, so that the height can also shrink
   area.style.height = Math.max(area.scrollHeight, byId('editor').clientHeight) + 'px';
   area.style.width = Math.max(colours.scrollWidth + 20, byId('editor').clientWidth - gutter.offsetWidth) + 'px';
 }
@@ -55,7 +55,7 @@ export function showLine(line, column = 1) {
   area.setSelectionRange(starts + column - 1, starts + column - 1);
 }
 
-/** Marks the lines of a value, and scrolls to them unless the caret is in the text. */
+/** Highlights the lines of a value and, if `scroll`, scrolls to them. */
 export function markPath(path, scroll = true) {
   const node = path && find(store.root, path);
   band.hidden = !node || !store.textValid;
@@ -66,7 +66,7 @@ export function markPath(path, scroll = true) {
   if (scroll) byId('editor').scrollTop = Math.max(0, (before - 4) * lineHeight());
 }
 
-let group = newGroup(), lastKey = 0, timer = 0, pending = false, base = 0;  // base: the version that the text was made from
+let group = newGroup(), lastKey = 0, timer = 0, pending = false, base = 0;  // base: the version on which the edited text is based
 area.addEventListener('input', () => {
   if (performance.now() - lastKey > 1500) group = newGroup();
   lastKey = performance.now();
@@ -103,7 +103,7 @@ let following = false;
 area.addEventListener('click', follow);
 area.addEventListener('keyup', event => { if (event.key.startsWith('Arrow')) follow(); });
 
-/** Takes the document's text; what the caret and the scroll were at stays there. */
+/** Shows the document's text and keeps the caret and the scroll position. */
 function take() {
   if (!store.doc) return;
   if (!pending && area.value !== store.doc.text && (isIdle() || document.activeElement !== area)) {

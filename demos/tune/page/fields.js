@@ -17,10 +17,12 @@ const kFits = {
   orientation: v => isList(v, isNumber, 4) || isPlain(v) && isList(v.axis, isNumber, 3) && isNumber(v.angle_deg),
   varying: v => isNumber(v) || isPlain(v) && (isList(v.range, isNumber, 2) || isList(v.curve, isPair(isNumber)) && v.curve.length > 0 || isNumber(v.mean) && Object.values(v).every(isNumber)),
 };
-/** Whether a value has the form that its control shows; one that has not, an error in the text, is shown as JSON. */
+/**
+ * Whether a value has a form that its control can show. Other values, which are errors in the text, are shown as JSON.
+ */
 export const fits = (d, value) => value === undefined || (kFits[d.kind]?.(value, d) ?? true);
 
-/** In which of its forms a value stands; a control is made anew when that changes. */
+/** The form of a value, such as constant or curve. If it changes, the control is created again. */
 export function modeOf(d, value) {
   if (!fits(d, value)) return 'other';
   if (d.kind === 'varying') return varyingMode(value);
@@ -133,7 +135,7 @@ function curveKind(d, value, context) {
   return curveField({value, limits: d.limits, unit: d.unit, overAge: d.overAge, name: d.key, change: context.change});
 }
 
-/** Numbers that vary: constant, spread about a mean, between two values, over time. */
+/** Distributions: a constant, a mean with a deviation, a range, or a curve over time. */
 function varyingField(d, value, context) {
   const mode = varyingMode(value);
   if (mode === 'none') return missing(d, context);

@@ -1,11 +1,11 @@
-// The pictures of films: compressed ones in a cache of a stated size, and a few decoded ones for the canvas.
+// Cache of the pictures of films: compressed pictures up to a memory limit, and a few decoded ones for the canvas.
 
 import {store} from './store.js';
 
 const kMostBytes = 96 << 20, kMostDecoded = 12;
 
-const blobs = new Map();    // "film/frame/detail" -> {blob, camera}, the latest used last
-const decoded = new Map();  // the same -> {bitmap, camera}
+const blobs = new Map();    // "film/frame/detail" -> {blob, camera}, the most recently used last
+const decoded = new Map();  // the same keys -> {bitmap, camera}
 let bytes = 0;
 
 const keyOf = (film, frame, detail) => `${film}/${frame}/${detail}`;
@@ -28,7 +28,7 @@ export function forget(film, frame, detail) {
   decoded.delete(key);
 }
 
-/** The compressed picture, from here or the server; null if neither has it. */
+/** Returns the compressed picture from the cache or the server; null if neither has it. */
 export async function load(film, frame, detail) {
   const key = keyOf(film, frame, detail), known = blobs.get(key);
   if (known) { blobs.delete(key); blobs.set(key, known); return known; }
@@ -40,7 +40,7 @@ export async function load(film, frame, detail) {
   return entry;
 }
 
-/** The decoded picture; null if there is none. It is closed when it leaves the cache. */
+/** Returns the decoded picture, or null. It is closed when it is removed from the cache. */
 export async function picture(film, frame, detail) {
   const key = keyOf(film, frame, detail), known = decoded.get(key);
   if (known) { decoded.delete(key); decoded.set(key, known); return known; }

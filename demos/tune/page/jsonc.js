@@ -1,4 +1,4 @@
-// JSON with comments as a tree that knows where everything stands, and back to text.
+// Parses JSON with comments to a tree with text positions, and writes values as JSON.
 
 const kSpace = /(?:[ \t\r\n]|\/\/[^\n]*|\/\*[^]*?\*\/)*/y;
 const kNumber = /-?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?/y;
@@ -53,7 +53,7 @@ class Parser {
   }
 }
 
-/** The tree of a text, or null if it is no JSON. */
+/** Returns the tree of a text, or null if the text is not JSON. */
 export function parse(text) {
   try {
     const parser = new Parser(text);
@@ -88,7 +88,7 @@ export function find(root, path) {
   return stepsOf(path).reduce(child, root);
 }
 
-/** The deepest value that a place in the text lies in, as a path. */
+/** Returns the path of the innermost value at a position in the text. */
 export function pathAt(root, offset) {
   const steps = [];
   for (let node = root; node;) {
@@ -105,13 +105,13 @@ export function pathAt(root, offset) {
   return pathOf(steps);
 }
 
-/** A number as the shortest decimal that reads back exactly. */
+/** Writes a number as the shortest decimal that is read back exactly. */
 export function numberText(x) {
   if (Object.is(x, -0)) return '0';
   return String(x).replace('e+', 'e');
 }
 
-/** JSON in the manner of the scenes: on one line where it fits, else a line for each member. */
+/** Writes JSON in the layout of the scene files: on one line if it fits, otherwise with a line for each member. */
 export function toText(value, indent = 0, width = 110) {
   const flat = flatText(value);
   if (typeof value !== 'object' || value === null || flat.length + indent <= width) return flat;

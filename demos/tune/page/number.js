@@ -1,12 +1,12 @@
-// A number with a slider: drag, Shift drags ten times finer, arrows move one step, a click on the value types.
+// A number with a slider. Shift makes drags ten times finer, arrow keys move by one step, and the value can be typed.
 
 import {el, clamp, drag, newGroup} from './dom.js';
 import {numberText} from './jsonc.js';
 
-const kDecades = 50;   // a slider without ends reaches from a value / 50 to 50 times it
-const kLogFrom = 100;  // a range whose ends differ by more is shown logarithmically
+const kDecades = 50;   // without limits, a slider covers value / 50 to value * 50
+const kLogFrom = 100;  // a slider is logarithmic if the ratio of its limits is at least this
 
-/** The slider's scale for a value within limits. */
+/** Returns the slider's scale for a value within limits. */
 export function scaleFor(value, limits, whole) {
   const {min, max} = limits;
   const size = Math.abs(value) || 1;
@@ -56,9 +56,7 @@ function withinLimits(x, limits, scale) {
   return value;
 }
 
-/**
- * {element, set(value)}. `change(value, group)` is called while it changes: all calls of one drag have one group.
- */
+/** {element, set(value)}. `change(value, group)` is called during a drag; all calls of one drag have the same group. */
 export function numberField({value, limits = {min: -Infinity, max: Infinity}, whole = false, unit = '', name, change, small = false}) {
   let now = value, scale = scaleFor(value, limits, whole), group = null, groupTime = 0;
   const input = el('input', {type: 'text', inputMode: 'decimal', spellcheck: false, 'aria-label': name, autocomplete: 'off'});
@@ -134,7 +132,7 @@ export function numberField({value, limits = {min: -Infinity, max: Infinity}, wh
   };
 }
 
-/** A small field changes by dragging over it sideways; a click without a drag types. */
+/** Makes a small field change when it is dragged sideways. A click without a drag starts typing. */
 function scrubbed(input, now, scale, take) {
   input.addEventListener('pointerdown', event => {
     if (document.activeElement === input) return;

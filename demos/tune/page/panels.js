@@ -1,4 +1,4 @@
-// The panels behind the buttons: versions, adding, overlays; and what the page says about the file and the server.
+// The panels of the tool bar (versions, add, overlays), and messages about the file and the server.
 
 import {byId, el, popover, toast} from './dom.js';
 import {store, on, get, emit, restore, pin, view, send, save, reload, keepOwn, setText, select, isWriter, listOf} from './store.js';
@@ -30,7 +30,7 @@ export function togglePin() {
 }
 
 // --- Add ---
-/** A sentence of the reference without its marks of code. */
+/** Removes the code marks from a sentence of the reference. */
 const plain = text => text.replace(/`/g, '');
 
 export function showAdd(anchor) {
@@ -102,7 +102,7 @@ function showBoth(anchor) {
   const rows = diff(mine, theirs).map(([kind, a, b]) => el('tr', {class: kind}, el('td', {}, a ?? ''), el('td', {}, b ?? '')));
   popover(anchor, 'Your text and the file', el('div', {class: 'scroll'}, el('table', {class: 'both'}, el('tr', {}, el('th', {}, 'Your text'), el('th', {}, 'In the file')), rows)), true);
 }
-/** Lines side by side: what both have stands in one row. */
+/** Returns the rows of a side-by-side comparison; equal lines are in one row. */
 function diff(a, b) {
   let start = 0, end = 0;
   while (start < Math.min(a.length, b.length) && a[start] === b[start]) start++;
@@ -131,7 +131,7 @@ on('lost', () => {
 });
 on('connected', () => { lostAt = 0; byId('gone').hidden = true; });
 
-/** A text that was not saved when the server ended is offered in the next session. */
+/** Unsaved text is kept when the server ends, and offered in the next session. */
 const draftKey = () => 'offstage:' + store.file;
 function keepDraft() {
   if (store.doc && !store.doc.saved) localStorage.setItem(draftKey(), store.doc.text);

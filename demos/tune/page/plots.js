@@ -1,4 +1,4 @@
-// Figures over the film's time, and the facts of the run.
+// Plots of figures over the film's time, and facts about the run.
 
 import {byId, el, clamp, oncePerFrame, toast} from './dom.js';
 import {find} from './jsonc.js';
@@ -64,13 +64,13 @@ const draw = oncePerFrame(() => {
   }
 });
 
-/** The object that a sentence of the simulation names in quotes. */
+/** Returns the path of the object that a message names in quotes. */
 function objectIn(text) {
   const name = /'([^']+)'/.exec(text)?.[1];
   return name && objectPaths().find(p => nameOf(p) === name || name.startsWith(nameOf(p) + '_') || name.startsWith(nameOf(p) + '/'));
 }
 
-/** The line of the text that a value begins in. */
+/** Returns the number of the line in which a value begins. */
 function lineOf(path) {
   const node = find(store.root, path);
   return node ? store.doc.text.slice(0, node.start).split('\n').length : '–';
@@ -98,13 +98,13 @@ function drawFacts() {
 const factsLine = el('div', {class: 'facts-line'});
 const noteItem = n => el('li', {class: n.bad ? 'bad' : ''}, n.path ? el('button', {class: 'problem', title: 'Show it in the controls and in the text', onclick: () => { reveal(n.path); emit('show-text', n.path); }}, el('span', {class: 'where'}, `line ${n.line}`), n.what) : n.what);
 
-// A fact is rebuilt only when it changes: a click on a button that is replaced between press and release would be lost.
+// A fact is rebuilt only when it changes. If a button were replaced between press and release, the click would be lost.
 const made = new Map();
 function fact(key, signature, make) {
   if (made.get(key)?.signature !== signature) made.set(key, {signature, element: make()});
   return made.get(key).element;
 }
-/** Makes these the children of a box; those that are there already stay in place. */
+/** Sets the children of a box; children that are already there are not moved. */
 function keepIn(box, children) {
   for (const child of [...box.children]) if (!children.includes(child)) child.remove();
   children.forEach((child, i) => { if (box.children[i] !== child) box.insertBefore(child, box.children[i] ?? null); });
@@ -125,13 +125,13 @@ on('figures playhead film document', redraw);
 new ResizeObserver(draw).observe(byId('plots'));
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', draw);
 
-// A tab that was too slow for some frames gets their figures together.
+// A tab that was too slow to receive some frames loads their figures together.
 on('film', () => {
   const known = store.figures.filter(Boolean).length;
   if (store.film.simulated > known + 20 || store.film.phase === 'complete' && store.film.simulated > known) loadFigures().catch(() => {});
 });
 
-/** Figures of frames that were drawn before this page was opened. */
+/** Loads the figures of frames that were drawn before this page was opened. */
 export async function loadFigures() {
   for (const f of await get('api/figures')) store.figures[f.frame - 1] = {...f, draw_ms: store.figures[f.frame - 1]?.draw_ms};
   redraw();

@@ -1,4 +1,4 @@
-// What the schema of the scene format says about a place in a scene: the kind of control it gets, its range, unit,
+// Reads from the schema of the scene format, for each value of a scene, the kind of its control, its range, unit,
 // default and help.
 
 let schema = null;
@@ -16,7 +16,7 @@ function resolved(s) {
 
 const isObject = s => s && (s.type === 'object' || s.properties);
 
-/** Alternatives of an object that is one of several, by their "type"; null if it is not. */
+/** The alternatives of an object that is one of several, distinguished by "type"; null for other schemas. */
 function alternatives(s) {
   if (!s.oneOf) return null;
   const all = s.oneOf.map(a => resolved(a));
@@ -35,23 +35,20 @@ function limitsOf(s) {
   };
 }
 
-/** Which objects of the scene a string may name, from its key and help; empty: any text. */
-function targetsOf(key, help, owner) {
+/** The lists of objects that a string may refer to, judged by its key and help; empty if any text is allowed. */
+function targetsOf(key, help) {
   if (/^(name|description|text|file|texture|node|preset|fabric)$/.test(key)) return [];
-  if (/name of a material|of the rod, by name/.test(help) || /^(skin|shirt|trousers|paint|trim|tyre|frame|load)$/.test(key) && /the same|material/.test(help)) return ['materials'];
-  if (key === 'materials') return ['materials'];
-  if (/bod(y|ies)/.test(help) && /name/.test(help) || key === 'bodies') return ['bodies'];
-  if (/^(a|b)$/.test(key) && /name of another/.test(help)) return ['bodies'];
+  if (/^names? of .*\bmaterials?\b/.test(help)) return ['materials'];
+  if (/^names? of .*\bbod(y|ies)\b/.test(help)) return ['bodies'];
   if (key === 'particles') return /emitter/.test(help) ? ['emitters', 'particles'] : ['particles'];
   if (key === 'cloths' || key === 'cloth') return ['cloths'];
   if (key === 'joint') return ['joints'];
-  if (/^(start|end|base)$/.test(key) && /what holds|the same of the last/.test(help)) return ['bodies'];
   return [];
 }
 
 const kColourRef = 'colour', kOrientationRef = 'orientation';
 
-/** The kind of a value, and what is known of it, from its schema. */
+/** Describes a value by its schema: its kind and the properties of its control. */
 export function describe(s, key = '') {
   const {help, unit} = helpAndUnit(s.description);
   const base = {key, help, unit, fallback: s.default};
@@ -88,7 +85,7 @@ function describeArray(s, key, help) {
   return {kind: 'json'};
 }
 
-/** The object definition that holds for a value: of several the one of its "type". */
+/** Returns the object schema for a value; among several alternatives, the one of its "type". */
 export function objectFor(description, value) {
   if (description.object) return description.object;
   const type = value && typeof value === 'object' ? value.type : undefined;
@@ -107,7 +104,7 @@ export function root() { return describe({...schema, $ref: undefined}, ''); }
 export const rootKey = key => describe(schema.properties[key], key);
 export const itemOf = list => describe(list.item ?? {}, '');
 
-/** The description of a place, walking down the value beside the schema; null where the schema ends. */
+/** Returns the description of the value at a path, following schema and value together; null where the schema ends. */
 export function at(steps, rootValue) {
   let description = {kind: 'object', object: schema}, value = rootValue;
   for (const step of steps) {
@@ -128,7 +125,7 @@ export function at(steps, rootValue) {
 export const kLists = ['emitters', 'effects', 'forces', 'bodies', 'materials', 'particles', 'cloths', 'springs', 'joints', 'articulations', 'contacts', 'lights', 'overlays'];
 export const kSettings = ['world', 'camera', 'environment', 'render', 'output'];
 
-/** "spread_deg" is called Spread. */
+/** The label of a key: "spread_deg" becomes "Spread". */
 export function label(key) {
   const text = String(key).replace(/_(deg|mm|px|m|s)$/, '').replace(/_/g, ' ');
   return text.charAt(0).toUpperCase() + text.slice(1);

@@ -1,4 +1,4 @@
-// The bar below the film: which frames are there, and where the playhead is.
+// The time bar below the film: available frames and the playhead.
 
 import {byId, clamp, drag, oncePerFrame} from './dom.js';
 import {store, on, frameCount} from './store.js';

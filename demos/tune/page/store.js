@@ -1,5 +1,5 @@
-// What the page knows, and who wants to hear of it. Everything that changes the scene goes to the server, and comes
-// back as the document.
+// The state of the page, and the events about its changes. Every change of the scene goes to the server and comes back
+// as a new document.
 
 import * as jsonc from './jsonc.js';
 import {toast} from './dom.js';
@@ -7,10 +7,10 @@ import {toast} from './dom.js';
 export const store = {
   tab: [...crypto.getRandomValues(new Uint8Array(8))].map(b => b.toString(16).padStart(2, '0')).join(''),
   base: location.pathname.replace(/[^/]*$/, ''),
-  doc: null,        // as the server sent it last
-  root: null,       // tree of the latest text that is JSON
-  value: {},        // its plain value
-  selection: [],    // paths of objects; the last one is shown
+  doc: null,        // the latest document from the server
+  root: null,       // tree of the latest text that is valid JSON
+  value: {},        // the value of this tree
+  selection: [],    // paths of objects; the controls show the last one
   frame: 1, playing: false,
   film: {phase: 'loading', lead_in: 0, simulated: 0, notes: [], statistics: null, message: ''},
   figures: [],      // by frame - 1
@@ -41,7 +41,9 @@ export async function send(what, body = {}) {
 
 export const isWriter = () => store.writer === store.tab;
 
-/** Takes a document from the server. It comes twice, as the answer to a request and by the stream; an older one is dropped. */
+/**
+ * Takes a document from the server. Each arrives twice, as an answer and by the event stream; older ones are ignored.
+ */
 export function takeDocument(doc) {
   if (store.doc && doc.revision < store.doc.revision) return;
   const before = store.doc;
@@ -67,7 +69,10 @@ export function takeDocument(doc) {
   emit('document', before);
 }
 
-/** Where an object of an earlier value stands now: a named one is followed when its list grows or shrinks before it. */
+/**
+ * Returns the current path of an object of an earlier value. Named objects are found again after their list has
+ * changed.
+ */
 function moved(path, old) {
   const [list, index] = jsonc.stepsOf(path), name = old[list]?.[index]?.name;
   if (!name || !Array.isArray(store.value[list]) || store.value[list][index]?.name === name) return path;
@@ -92,19 +97,19 @@ async function change(what, body) {
   return false;
 }
 
-// Changes go out one at a time; of several of one group that wait, the latest counts. A body may be a function, which is
-// called when the request goes out: what it makes of the document then holds whatever waited before it.
+// Changes are sent one at a time. Among waiting changes of one group, only the latest is sent. A body may be a
+// function, which is called when the request is sent, so it uses the document that contains all earlier changes.
 let busy = false;
 const waiting = [];
 function enqueue(what, body) {
-  if (what !== 'text' && what !== 'view') emit('flush');  // what is typed but not sent yet goes first, as a step of its own
+  if (what !== 'text' && what !== 'view') emit('flush');  // pending typed text is sent first, as a separate step
   return new Promise(done => {
     const last = waiting.at(-1);
     if (what === 'edit' && last?.what === 'edit' && body.group && last.body.group === body.group) {
       last.done(true);
       waiting.pop();
     }
-    if (what === 'view' && last?.what === 'view') {  // only where one looks last counts
+    if (what === 'view' && last?.what === 'view') {  // only the latest view is sent
       last.done(true);
       body = {...waiting.pop().body, ...body};
     }
@@ -132,9 +137,9 @@ export const isIdle = () => !busy && waiting.length === 0;
 
 /** ops: [{set: path, value: JSON text} | {remove: path}]. */
 export const edit = (ops, label, paths, group = '') => enqueue('edit', {ops, label, paths, group});
-/** `make` gives {ops, label, paths} from the document as it is when the change is made, or null. */
+/** `make` returns {ops, label, paths} for the document at the time of sending, or null. */
 export const editLater = make => enqueue('edit', make);
-/** `base()`: the version that the text was made from; the server refuses it if another has come in between. */
+/** `base()` is the version on which the text is based; the server refuses the text if there is a newer one. */
 export const setText = (text, group, label = 'text', base = () => undefined) => enqueue('text', () => ({text, group, label, base: base()}));
 export const undo = () => enqueue('undo', {});
 export const redo = () => enqueue('redo', {});
@@ -145,7 +150,7 @@ export const keepOwn = () => enqueue('keep', {});
 export const pin = id => enqueue('pin', {id});
 export const view = body => enqueue('view', body);
 
-/** Sets values in all selected objects of the same kind as the one shown. */
+/** Sets a value in all selected objects of the same list as the one shown. */
 export function setValue(path, value, label, group = '') {
   const paths = alike(path);
   return edit(paths.map(p => ({set: p, value: jsonc.toText(value, 0, 110)})), label, paths, group);
@@ -154,7 +159,7 @@ export function removeValue(path, label) {
   const paths = alike(path);
   return edit(paths.map(p => ({remove: p})), label, paths);
 }
-/** The same key in every selected object of the same list. */
+/** The path of the same key in every selected object of the same list. */
 export function alike(path) {
   const shown = store.selection.at(-1);
   if (!shown || store.selection.length < 2 || !path.startsWith(shown + '/')) return [path];
@@ -167,28 +172,28 @@ export function select(paths) {
   emit('selection');
 }
 
-/** The objects of a list of the scene; the text may hold something else there for a while. */
+/** The objects of a list of the scene; empty if the text has another value there. */
 export const listOf = list => Array.isArray(store.value[list]) ? store.value[list] : [];
 
 export const frameCount = () => store.doc?.scene?.frames ?? 1;
 export const timeOf = frame => (store.doc?.scene?.start ?? 0) + (frame - 1) / (store.doc?.scene?.fps ?? 30);
 
 let viewed = '';
-export function tellView() {
+export function reportView() {
   const now = `${store.frame} ${store.playing}`;
   if (now === viewed || !isWriter()) return;
   viewed = now;
   view({frame: store.frame, playing: store.playing});
 }
 
-/** How far the film is. */
+/** Takes the progress of the film. */
 export function takeFilm(state) {
   if (!state || state.film !== store.doc?.film) return;
   Object.assign(store.film, state);
   emit('film', state);
 }
 
-/** The long connection: what happens on the server. */
+/** Opens the event stream of the server. */
 export function listen(port) {
   const stream = new EventSource(`http://${location.hostname}:${port}${store.base}stream?tab=${store.tab}`);
   const kinds = {

@@ -1,4 +1,4 @@
-// Two clicks from a number: values, run, contact sheet; a click on a cell takes its value.
+// Sweep of a value: enter values, run, and see a contact sheet; a click on a picture sets its value.
 
 import {el, popover, newGroup} from './dom.js';
 import {store, on, send, setValue, alike} from './store.js';
@@ -7,7 +7,7 @@ import {label} from './schema.js';
 
 const tidy = x => Number(x.toPrecision(3));
 
-/** The part of a value that a sweep changes: the mean, both ends, the whole curve, or one component of a vector. */
+/** The part of a value that a sweep changes: the mean, a range, a whole curve, or one component of a vector. */
 function around(value, component) {
   if (Array.isArray(value)) return {centre: value[component], with: x => value.map((y, i) => i === component ? x : y)};
   if (value?.axis) return {centre: value.angle_deg, with: x => ({...value, angle_deg: x})};

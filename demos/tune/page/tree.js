@@ -1,4 +1,4 @@
-// The objects of the scene as a tree, and what can be done with them.
+// The objects of the scene as a tree, with the commands on objects.
 
 import {byId, el, popover, toast} from './dom.js';
 import {store, on, emit, edit, editLater, setValue, select, view, isWriter, listOf} from './store.js';
@@ -27,8 +27,9 @@ function iconButton(text, title, run) {
   return el('button', {class: 'icon quiet', title, 'aria-label': title, onclick: event => { event.stopPropagation(); run(event); }}, text);
 }
 
-// Rows stay while their object is there, with what has the focus and the name that is being typed; only what differs changes.
-const rows = new Map();  // by path, or by the name of a heading
+// A row is kept as long as its object exists, together with the focus and a name being typed; only differences are
+// updated.
+const rows = new Map();  // by path, or by the text of a heading
 let renaming = null;     // {path, input}
 
 function makeRow(path) {
@@ -94,7 +95,7 @@ function matches(path, query) {
   const has = value => value && typeof value === 'object' && Object.entries(value).some(([k, v]) => k.replace(/_/g, ' ').includes(query.replace(/_/g, ' ')) || has(v));
   return nameOf(path).toLowerCase().includes(query) || has(valueOf(find(store.root, path))) || emitSearch(path, query);
 }
-// The controls know the keys that the text does not have.
+// The controls know the keys that the text omits.
 let searchKeys = () => false;
 export function setKeySearch(f) { searchKeys = f; }
 const emitSearch = (path, query) => searchKeys(path, query);
@@ -127,7 +128,7 @@ export function duplicate(paths) {
 }
 export const addTo = (list, value, what) => addAll([[list, value]], what);
 
-/** Adds objects at the end of their lists, with names that are free there, and selects them. */
+/** Adds objects at the end of their lists, with unused names, and selects them. */
 async function addAll(objects, what) {
   let added = [];
   const ok = await editLater(() => {
@@ -148,7 +149,7 @@ async function addAll(objects, what) {
   select(added);
   tree.querySelector(`[data-path="${CSS.escape(added.at(-1))}"]`)?.scrollIntoView({block: 'nearest'});
 }
-const kIndent = 4;  // of the items of a list of objects
+const kIndent = 4;  // indentation of the items of a list of objects
 
 export function remove(paths) {
   const objects = paths.map(p => ({path: p, name: valueOf(find(store.root, p))?.name})), names = paths.map(nameOf).join(', ');
@@ -158,14 +159,14 @@ export function remove(paths) {
   });
   select([]);
 }
-/** The place of an object after the changes that went out before. */
+/** Returns the path of an object after the changes that were sent before; null if it was removed. */
 function pathNow({path, name}) {
   if (!name) return path;
   const list = stepsOf(path)[0], i = listOf(list).findIndex(o => o?.name === name);
   return i < 0 ? null : `/${list}/${i}`;
 }
 
-/** Strings elsewhere that name the object: those of keys whose values are names of objects of its list. */
+/** Returns the paths of all strings that refer to an object by its name. */
 function references(name, own, node = store.root, steps = []) {
   if (node.type === 'object') return node.members.flatMap(m => references(name, own, m.node, [...steps, m.key]));
   if (node.type === 'array') return node.items.flatMap((n, i) => references(name, own, n, [...steps, i]));
@@ -202,7 +203,7 @@ function rename(path) {
   for (const type of ['click', 'dblclick']) input.addEventListener(type, event => event.stopPropagation());
 }
 
-// --- Copying, as scene JSON ---
+// --- Copy and paste, as scene JSON ---
 const kNoClipboard = 'The browser does not allow this page to use the clipboard. Ctrl+C and Ctrl+V work.';
 const textOf = paths => toText(paths.length === 1 ? valueOf(find(store.root, paths[0])) : paths.map(p => valueOf(find(store.root, p))));
 
@@ -218,7 +219,7 @@ function parsed(text) {
 }
 const isObject = v => v !== null && typeof v === 'object' && !Array.isArray(v);
 
-/** Replaces objects by those in the text, one by one; each keeps its name, so that what names it still does. */
+/** Replaces objects by those in the text, one by one. Each keeps its name, so that references to it stay valid. */
 function pasteOver(paths, text) {
   const value = parsed(text);
   if (value === undefined) return;
@@ -238,7 +239,10 @@ function pasteNew(list, text) {
   addAll(values.map(v => [list, v]), 'paste');
 }
 
-/** What Ctrl+C and Ctrl+V mean where the focus is: the value of a control, or the selected objects; null: plain text. */
+/**
+ * The target of Ctrl+C and Ctrl+V at the current focus: the value of a control, the selected objects, or null for plain
+ * text.
+ */
 function clipTarget() {
   const focus = document.activeElement, row = focus?.closest?.('#controls .row');
   if (!focus || focus.matches('input:not([type=checkbox]):not([type=color]), textarea, select')) return null;
@@ -262,7 +266,7 @@ addEventListener('paste', event => {
   const value = parsed(text);
   if (value !== undefined) setValue(target.row, value, `paste ${target.key}`);
 });
-// The controls know the values that the text leaves out.
+// The controls know the defaults of values that the text omits.
 let rowValue = path => valueOf(find(store.root, path));
 export function setRowValue(f) { rowValue = f; }
 

@@ -1,15 +1,15 @@
-// The film: what is on the canvas, playing and scrubbing, and comparing with a pinned version.
+// The film: the picture on the canvas, playback, and comparison with a pinned version.
 
 import {byId, el, clamp, drag, oncePerFrame} from './dom.js';
-import {store, on, emit, tellView, frameCount, timeOf} from './store.js';
+import {store, on, emit, reportView, frameCount, timeOf} from './store.js';
 import {picture, load, forget} from './frames.js';
 
 const canvas = byId('film'), pen = canvas.getContext('2d');
-let have = new Uint8Array(2);         // frames with a draft on the server, by number
+let have = new Uint8Array(2);         // frames of which the server has a draft, by number
 let havePinned = new Uint8Array(2);
 let film = '', shown = {film: '', frame: -1, detail: ''}, wantedBetter = null;
 let compare = 'off', wipeAt = 0.5, turn = false;
-let latest = null, latestA = null;    // pictures on the canvas
+let latest = null, latestA = null;    // pictures that are on the canvas
 export const view = {camera: null, shownFrame: 0};
 
 export const hasFrame = f => have[f] === 1;
@@ -64,7 +64,7 @@ on('other-frame', event => {
 });
 
 let glimpsing = false, nextGlimpse = null;
-/** Shows a frame on the way to the one that is wanted, if there is time. */
+/** Shows an intermediate frame until the requested one is available, if the page is not busy. */
 async function glimpse(frame, time) {
   if (glimpsing) { nextGlimpse = [frame, time]; return; }
   glimpsing = true;
@@ -82,7 +82,7 @@ function badge(text) {
 }
 
 let presenting = false, again = false;
-/** Brings the frame under the playhead to the canvas. */
+/** Draws the frame at the playhead. */
 export async function present() {
   if (presenting) { again = true; return; }
   presenting = true;
@@ -126,7 +126,7 @@ function paint(found, frame, detail) {
 function repaint() {
   if (!latest) return;
   const b = latest.bitmap;
-  if (b.width === 0) { latest = null; shown.frame = -1; present(); return; }  // closed by the cache
+  if (b.width === 0) { latest = null; shown.frame = -1; present(); return; }  // the cache has closed the bitmap
   const size = compare === 'side' ? [b.width * 2, b.height] : [b.width, b.height];
   if (canvas.width !== size[0] || canvas.height !== size[1]) { [canvas.width, canvas.height] = size; fit(); }
   const a = compare !== 'off' && latestA?.bitmap.width ? latestA.bitmap : null;
@@ -145,7 +145,7 @@ function repaint() {
   }
 }
 
-/** The largest size of the picture in the stage. */
+/** Fits the picture into the available space. */
 export function fit() {
   const stage = byId('stage'), room = stage.getBoundingClientRect(), shape = canvas.width / canvas.height;
   const width = Math.min(room.width, room.height * shape);
@@ -183,7 +183,7 @@ function drawCompareTools() {
   byId('pin').textContent = pinned ? 'Unpin A' : 'Pin as A';
   if (!pinned) { compare = 'off'; fit(); return; }
   const choice = (mode, text) => el('button', {class: 'choice' + (compare === mode ? ' on' : ''), 'data-mode': mode, onclick: () => setCompare(mode)}, text);
-  box.replaceChildren(el('span', {class: 'ab'}, compare === 'turns' ? (turn ? 'A' : 'B') : 'A | B'), choice('off', 'B only'), choice('wipe', 'Wipe'), choice('side', 'Side by side'), choice('turns', 'In turns'));
+  box.replaceChildren(el('span', {class: 'ab'}, compare === 'turns' ? (turn ? 'A' : 'B') : 'A | B'), choice('off', 'B only'), choice('wipe', 'Wipe'), choice('side', 'Side by side'), choice('turns', 'Alternate'));
   fit();
 }
 setInterval(() => {
@@ -202,9 +202,9 @@ export function seek(frame, keepPlaying = false) {
   if (next !== store.frame) { store.frame = next; wantedBetter = null; }
   present();
   emit('playhead');
-  tell();
+  report();
 }
-const tell = oncePerFrame(() => tellView());
+const report = oncePerFrame(() => reportView());
 
 let started = 0, startFrame = 1;
 export function setPlaying(playing) {
@@ -219,9 +219,9 @@ export function setPlaying(playing) {
     requestAnimationFrame(tick);
   } else present();
   emit('playhead');
-  tell();
+  report();
 }
-/** Plays as fast as the film is there: it waits for frames that are not. */
+/** Plays the film; waits for frames that are not available yet. */
 function tick(now) {
   if (!store.playing) return;
   const due = startFrame + Math.floor((now - started) / 1000 * (store.doc?.scene?.fps ?? 30));

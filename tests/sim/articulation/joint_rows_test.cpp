@@ -15,7 +15,7 @@ namespace {
 constexpr std::array kTypes = {JointType::spherical, JointType::fixed,     JointType::revolute,
                                JointType::prismatic, JointType::universal, JointType::distance};
 
-/// A link that accelerates along and turns evenly.
+/// A link with constant linear acceleration and constant angular velocity.
 struct Moving {
   LinkMotion start;
   Vec3 acceleration;
@@ -85,7 +85,8 @@ TEST(JointRows, FreeCoordinatesMoveAsTheirRowsSay) {
   constexpr std::array kFree = {JointType::spherical, JointType::revolute, JointType::prismatic,
                                 JointType::universal, JointType::distance};
   for (int round = 0; round < 60; ++round) {
-    // b moves freely, a moves on it as its joint allows: turning about the axis, then about the second one.
+    // b moves freely. a moves relative to b as its joint allows: it turns about the joint axis, and about the
+    // second axis where the joint has one.
     const Moving b = random_link(dice);
     const JointFrame frame;
     const Real angle = dice.uniform(-3, 3), lean = dice.uniform(-1.2, 1.2), rate = dice.uniform(-2, 2),

@@ -13,7 +13,7 @@ namespace {
 constexpr uint32_t kDriven = JointSystem::kDriven;
 using Topology = JointSystem::Topology;
 
-/// As independent as those of joints are.
+/// A matrix close to the identity, whose columns are about as independent as the rows of real joints.
 Mat6 random_columns(Dice& dice, uint32_t count) {
   Mat6 m = Mat6::Zero();
   for (Eigen::Index j = 0; j < count; ++j)
@@ -33,7 +33,7 @@ std::vector<JointRows> random_rows(Dice& dice, const std::vector<Topology>& join
   return rows;
 }
 
-/// Masses over three decades.
+/// Random links whose masses span three decades.
 std::vector<LinkMobility> random_links(Dice& dice, uint32_t count) {
   std::vector<LinkMobility> links;
   for (uint32_t i = 0; i < count; ++i) {
@@ -51,7 +51,8 @@ void expect_solves(uint32_t links, const std::vector<Topology>& joints, uint64_t
   const auto rows = random_rows(dice, joints);
   const auto mobility = random_links(dice, links);
   ASSERT_TRUE(system.factorize(rows, mobility));
-  // The request is the violation of some velocities, so that loops of redundant constraints can satisfy it.
+  // The requested change is the violation of some random velocities, so loops of redundant constraints can
+  // satisfy it.
   std::vector<Vec6> wanted(links), change(joints.size()), impulses(joints.size()), result(joints.size());
   for (Vec6& v : wanted) v = random_columns(dice, 1).col(0);
   system.relative(wanted, change);
@@ -77,7 +78,7 @@ TEST(JointSystem, SolvesTreesOfAllKinds) {
     const uint32_t links = 1 + dice.index(30);
     std::vector<Topology> joints;
     if (round % 2 == 0) joints.push_back({0, kDriven, 1 + dice.index(6)});
-    // Now and then a joint at one of few: hubs, and hubs beside hubs.
+    // Every third round takes parents from the first two links only, which makes hubs with many joints.
     for (uint32_t i = 1; i < links; ++i) {
       const uint32_t parent = round % 3 == 0 ? dice.index(std::min(i, 2u)) : dice.index(i);
       const uint32_t rows = round % 5 == 0 ? 3 : 1 + dice.index(6);
@@ -90,7 +91,7 @@ TEST(JointSystem, SolvesTreesOfAllKinds) {
 }
 
 TEST(JointSystem, SolvesLoopsWithRowsThatDependOnEachOther) {
-  // Ladders: as many constraints as freedoms, and more.
+  // Ladders have as many constraints as degrees of freedom, or more.
   for (const uint32_t n : {2u, 5u, 12u}) {
     std::vector<Topology> joints = {{0, kDriven, 3}, {n, kDriven, 3}};
     for (uint32_t i = 0; i + 1 < n; ++i) {
@@ -103,8 +104,9 @@ TEST(JointSystem, SolvesLoopsWithRowsThatDependOnEachOther) {
   }
 }
 
-TEST(JointSystem, AStarCostsWhatItsJointsDo) {
-  // Joints at one link would couple all of each other: a thousand would be a dense matrix of 3000 rows.
+TEST(JointSystem, TheCostOfAStarIsLinearInItsJoints) {
+  // Eliminating the shared link first would couple all its joints: 1000 joints would give a dense matrix of
+  // 3000 rows.
   constexpr uint32_t kLinks = 1001;
   std::vector<Topology> joints;
   for (uint32_t i = 1; i < kLinks; ++i) joints.push_back({i, 0, 3});

@@ -25,7 +25,8 @@ std::vector<Aabb> random_boxes(std::size_t n, bool clustered) {
     Vec3 p, s;
     for (uint32_t k = 0; k < 3; ++k) {
       p[k] = random.uniform(i, k);
-      if (clustered) p[k] = std::pow(p[k], 20);  // nearly all at one corner: the mean is useless
+      // nearly all boxes lie at one corner, so a split at the mean separates almost nothing
+      if (clustered) p[k] = std::pow(p[k], 20);
       s[k] = 0.05 * random.uniform(i, 3 + k);
     }
     boxes.emplace_back(p, p + s);
@@ -118,8 +119,8 @@ TYPED_TEST(BoundingTreeOf, IsTheSameForAnyNumberOfThreads) {
 }
 
 TYPED_TEST(BoundingTreeOf, DepthIsBoundedForHostileInput) {
-  // Coincident triangles; and each ten times nearer to a corner than the last, which every mean and every bin
-  // splits off alone.
+  // Two hostile meshes: coincident triangles; and triangles each ten times nearer to a corner than the one
+  // before, so that every split at a mean or at a bin border separates only one of them.
   TriangleMesh same, crowded;
   same.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   same.triangles.assign(50'000, {0, 1, 2});
@@ -192,7 +193,7 @@ TEST(AabbTree, CoincidentItemsShareALeafAndEmptyTreesHaveNothing) {
   EXPECT_TRUE(empty.bounds().isEmpty());
 }
 
-/// The corners of a box, turned and away from the origin.
+/// The corners of a box that is rotated and away from the origin.
 std::vector<Vec3> turned_box(const Vec3& size, const Quat& q) {
   std::vector<Vec3> points;
   for (const Vec3& v : box_mesh(size).vertices) points.push_back(q * v + Vec3(5, -3, 2));
@@ -203,7 +204,7 @@ TEST(ObbFit, IsTheBoxOfABoxWhateverIsInside) {
   const Quat q(0.9, 0.2, -0.3, 0.25);
   const Vec3 size(3, 2, 1);
   std::vector<Vec3> points = turned_box(size, q.normalized());
-  // A heap in a corner, that would tilt the covariance of the points.
+  // Many points in one corner, which would tilt the principal axes of a covariance fit.
   const Scatter random{5};
   for (uint64_t i = 0; i < 1000; ++i) {
     const Vec3 p(random.uniform(i, 0), random.uniform(i, 1), random.uniform(i, 2));
@@ -256,8 +257,8 @@ TEST(SphereFit, HoldsAllPointsAndIsNearlyMinimal) {
       ASSERT_LE((p - s.centre).norm(), s.radius * (1 + 1e-15));
       for (const Vec3& q : points) widest = std::max(widest, (p - q).norm());
     }
-    // The smallest sphere is between the half of the widest pair and sqrt(3/8) of it (Jung); Ritter's is
-    // known to stay within a fifth of it.
+    // The radius of the smallest sphere is at least half of the largest distance between two points and at
+    // most sqrt(3/8) of it (Jung's theorem). The sphere of Ritter's method is at most a fifth larger.
     ASSERT_LE(s.radius, 1.2 * std::sqrt(3.0 / 8) * widest);
   }
   const BoundingSphere ball = fit_sphere(sphere_mesh(2, 40, 20).vertices);

@@ -29,7 +29,7 @@ struct PlacedBoxes {
   Real size, margin;
 };
 
-/// Turned at random, by quarter turns, about an axis of A, or by next to nothing from there.
+/// A random rotation, quarter turns, a turn about an axis of A, or a tiny perturbation of one of these.
 Quat turn(Dice& dice) {
   Quat q = dice.chance(0.3) ? dice.rotation() : Quat::Identity();
   if (dice.chance(0.5))
@@ -128,8 +128,8 @@ TEST(BoxBox, EqualCubesExactlyOnAndBesideEachOtherTouchWithTheirFourCorners) {
   }
 }
 
-// Bricks that overhang by half, of which none shares a corner, and a brick beside that touches at an edge
-// only.
+// Bricks that overhang by half and share no corner, then a brick beside another that touches it only along an
+// edge.
 TEST(BoxBox, BricksRestOnTheHalfThatTheyShare) {
   const Convex brick = convex(Box{{0.4, 0.1, 0.2}});
   Manifold m;
@@ -145,8 +145,8 @@ TEST(BoxBox, BricksRestOnTheHalfThatTheyShare) {
   }
 }
 
-// What a solver holds at rest: gaps and overlaps of any size, tilted and moved by next to nothing. The path
-// by GJK costs three times as much and must be rare.
+// The configurations of a stack at rest: small gaps and overlaps, tilted and moved by tiny amounts. The
+// fallback to GJK costs three times as much, so it must be rare.
 TEST(BoxBox, AStackAtRestKeepsItsPointsWithoutOtherHelp) {
   Dice dice(5);
   constexpr Real kMargin = 0.01;

@@ -20,7 +20,7 @@ Aabb cube(const Vec3& centre, Real side) {
   return {centre - Vec3::Constant(side / 2), centre + Vec3::Constant(side / 2)};
 }
 
-/// The boxes by object, and the expected pairs of a broad phase.
+/// The boxes by object, and the pairs that a broad phase is expected to report, by comparing all boxes.
 struct Model {
   struct Item {
     Aabb box;
@@ -38,7 +38,7 @@ struct Model {
   }
 };
 
-/// A broad phase and its model, changed together.
+/// A broad phase and its reference model; every change is made to both.
 struct Both {
   explicit Both(GridKind kind) : grid(kind) {}
   void insert(uint32_t i, const Aabb& box, bool is_static = false) {
@@ -61,7 +61,7 @@ struct Both {
   Model model;
 };
 
-/// Sizes from 1 mm to 100 m as often by the decade, most of them small and near the origin.
+/// Sizes from 1 mm to 100 m, distributed evenly over the logarithm. Most boxes lie near the origin.
 Aabb scattered_box(const Scatter& random, uint64_t i) {
   const Real size = std::pow(10, 5 * random.uniform(i, 0) - 3);
   Vec3 centre, half;
@@ -72,7 +72,8 @@ Aabb scattered_box(const Scatter& random, uint64_t i) {
   return {centre - half, centre + half};
 }
 
-// Objects come, go, rest and move in varying shares, so that settling, leaving and remembering all happen.
+// Objects are added, removed, at rest or moving, and the share of moving ones changes. All paths of the grid
+// are taken: resting objects settle, become active again, and levels are rebuilt.
 TEST(BroadPhase, FindsExactlyTheMeetingBoxesWhateverHappens) {
   for (const GridKind kind : kKinds) {
     const Scatter random{5};
@@ -101,8 +102,8 @@ TEST(BroadPhase, FindsExactlyTheMeetingBoxesWhateverHappens) {
   }
 }
 
-// Corners on the lattice of the cells, so that boxes touch, coincide, are points, end on cell borders, or
-// reach to infinity.
+// Corners lie on the lattice of the cells, so boxes touch, coincide, are points, end on cell borders, or
+// extend to infinity.
 TEST(BroadPhase, AnySequenceOfChangesOnALatticeGivesThePairsOfTheModel) {
   const auto coordinate = rc::gen::weightedElement<Real>({{4, 0},
                                                           {4, 1},
@@ -137,7 +138,7 @@ TEST(BroadPhase, AnySequenceOfChangesOnALatticeGivesThePairsOfTheModel) {
   }));
 }
 
-TEST(BroadPhase, TouchingCountsAndTheLeastGapSeparates) {
+TEST(BroadPhase, TouchingCountsAndTheSmallestGapSeparates) {
   for (const GridKind kind : kKinds)
     for (const Real x : {0.0, 1.0, -3.7, 1e5}) {
       Both both(kind);
@@ -171,7 +172,7 @@ TEST(BroadPhase, PlanesPointsAndAnythingFarOrHuge) {
   }
 }
 
-// A level that no object at rest belongs to appears over them, vanishes, and appears elsewhere.
+// A grid level appears without any object at rest on it, disappears, and appears elsewhere.
 TEST(BroadPhase, LevelsComeAndGoWithTheirObjects) {
   Both both(GridKind::multilevel);
   const Scatter random{6};
@@ -193,8 +194,8 @@ TEST(BroadPhase, LevelsComeAndGoWithTheirObjects) {
   EXPECT_EQ(both.grid.work().copies, 0u);
 }
 
-// A hundred movers among static boxes cost the same boxes compared and cells entered with and without ten
-// thousand static objects that nothing touches; and at rest nothing at all.
+// A hundred moving boxes cause the same comparisons and visit the same cells whether or not there are ten
+// thousand static objects out of reach. Without moving objects there is no work at all.
 TEST(BroadPhase, StaticObjectsCostNothingWhenNothingTouchesThem) {
   for (const GridKind kind : kKinds) {
     const Scatter random{7};
@@ -217,7 +218,7 @@ TEST(BroadPhase, StaticObjectsCostNothingWhenNothingTouchesThem) {
     EXPECT_EQ(many.entered, 100u);
     EXPECT_EQ(many.settled, 0u);
     EXPECT_EQ(many.copies, few.copies);
-    // Far cells may share a bucket with near ones.
+    // Distant cells may share a hash bucket with near ones.
     EXPECT_LE(many.compared, few.compared + few.compared / 4);
   }
 }
@@ -267,8 +268,8 @@ TEST(BroadPhase, SameResultForAnyNumberOfThreadsAndAnyPast) {
   }
 }
 
-// Long boxes share many cells and reach others in the same bucket, whose number is small: a pair is still
-// found once, in the one cell that counts.
+// Long boxes share many cells, and few buckets make different cells collide. Each pair is still reported
+// once, from the one cell that is responsible for it.
 TEST(CellTable, LongBoxesAreFoundOnceAlthoughBucketsAreShared) {
   const CellSizes sizes{.kind = GridKind::uniform, .uniform_width = 1};
   const Scatter random{10};
@@ -292,7 +293,8 @@ TEST(CellTable, LongBoxesAreFoundOnceAlthoughBucketsAreShared) {
   EXPECT_EQ(met, 3000u) << "in doubt only where bounds are equal in single precision";
 }
 
-// H6: kmin <= d/L < 2 kmin, widths that double, few cells for each object, cells of all levels that nest.
+// H6: kmin <= d/L < 2 kmin; widths double from level to level; each object covers few cells; cells of all
+// levels nest.
 TEST(CellSizes, LevelsFollowTheDiameterAndCellsNest) {
   const CellSizes sizes;
   const Scatter random{9};
@@ -318,8 +320,8 @@ TEST(CellSizes, UniformCellsAreTwoMeanDiametersWide) {
   CellSizes sizes{.kind = GridKind::uniform, .uniform_width = 2};
   EXPECT_EQ(sizes.level(cube(Vec3::Zero(), 1)), 0);
   EXPECT_EQ(sizes.level({Vec3::Zero(), Vec3(1000, 0.1, 0.1)}), CellSizes::kNone) << "500 cells";
-  // Twice as many objects of a quarter of the size: the work stays in proportion, as the cells shrink with
-  // them.
+  // Objects a quarter as large, on a grid scaled with them: the number of comparisons stays in proportion,
+  // because the cells shrink with the objects.
   const auto compared = [](Real size) {
     BroadPhase grid(GridKind::uniform);
     for (uint32_t i = 0; i < 4096; ++i)

@@ -24,7 +24,7 @@ TriangleMesh open_box() {
   return mesh;
 }
 
-TEST(ClearanceGrid, WhatIsClearTouchesNothingAndIsNotInside) {
+TEST(ClearanceGrid, ClearPointsTouchNothingAndAreNotInside) {
   for (const TriangleMesh& mesh : {torus_mesh(1, 0.4, 48, 24), box_mesh({3, 0.5, 0.01}), open_box()}) {
     const CollisionMesh reference(mesh);
     const ClearanceGrid cells(mesh, reference.solid);
@@ -37,7 +37,7 @@ TEST(ClearanceGrid, WhatIsClearTouchesNothingAndIsNotInside) {
   }
 }
 
-TEST(ClearanceGrid, LeaveASearchOfWhatIsNearAsExactAsAWholeOne) {
+TEST(ClearanceGrid, ALimitedSearchIsAsExactAsAFullOne) {
   constexpr Real kLimit = 0.05;
   const Shape shape = MeshShape{};
   int near = 0;
@@ -57,8 +57,9 @@ TEST(ClearanceGrid, LeaveASearchOfWhatIsNearAsExactAsAWholeOne) {
   EXPECT_GT(near, 500);
 }
 
-TEST(ClearanceGrid, WhatIsThreeCellsAwayIsClear) {
-  // Of a small sphere: its cell and the surface's lose one each, a chessboard's diagonal the factor sqrt(3).
+TEST(ClearanceGrid, PointsThreeCellsAwayAreClear) {
+  // For a small sphere. Its own cell and the surface's cell cost one cell each, and distances along a cell
+  // diagonal cost a factor sqrt(3).
   const CollisionMesh torus(torus_mesh(1, 0.4, 48, 24));
   const ClearanceGrid cells(torus.mesh, torus.solid);
   int tried = 0;

@@ -35,7 +35,8 @@ TEST(ContactFrame, IsRightHandedAndOrthonormalForEveryNormal) {
   }
 }
 
-// n turns at w. The central difference is wrong by w^3 h^2 / 6 at most, and by rounding / h.
+// n rotates with angular velocity w. The central difference has an error of at most w^3 h^2 / 6, and rounding
+// / h.
 TEST(ContactFrame, RateIsTheDerivative) {
   Dice dice(2);
   constexpr Real h = 1e-5;
@@ -44,7 +45,7 @@ TEST(ContactFrame, RateIsTheDerivative) {
     const auto at = [&](Real t) { return contact_frame(Quat(Eigen::AngleAxisd(t, w)) * n); };
     const Vec3 size = n.cwiseAbs();
     const Real second = size.sum() - size.minCoeff() - size.maxCoeff();
-    if (second - size.minCoeff() < 10 * h) continue;  // another component becomes the smallest
+    if (second - size.minCoeff() < 10 * h) continue;  // another component becomes the smallest within h
     const ContactFrame rate = contact_frame_rate(contact_frame(n), w.cross(n));
     const Mat3 difference = (matrix(at(h)) - matrix(at(-h))) / (2 * h);
     ASSERT_LT((matrix(rate) - difference).norm(), 1e-9);
@@ -53,7 +54,7 @@ TEST(ContactFrame, RateIsTheDerivative) {
   }
 }
 
-/// Two solids whose motions are about the world's origin.
+/// Two solids whose velocities are given about the world's origin.
 struct Pair {
   std::string name;
   Convex a, b;
@@ -80,7 +81,7 @@ Separation separation(const Pair& pair, const Pose& a, const Pose& b) {
   return gjk(pair.a, pair.b, relative(a, b), fresh);
 }
 
-/// The normal's central difference over a step, from the geometry alone.
+/// Central difference of the normal over a time step, from the geometry alone.
 Vec3 difference(const Pair& pair, const Twist& a, const Twist& b, Real h) {
   const auto normal = [&](Real t) {
     const Pose at = moved(pair.world_from_a, a, t);
@@ -147,8 +148,8 @@ std::vector<Pair> pairs() {
   };
 }
 
-// Each normal turns as the closest points of the moving solids say. Closest points of curved cores are found
-// to some 1e-9, those of polyhedra and spheres to rounding.
+// The analytic rate of each normal equals the rate found from the closest points of the moving solids.
+// Closest points of curved shapes are accurate to about 1e-9, those of polyhedra and spheres to rounding.
 TEST(NormalRate, IsTheDerivativeOfTheGeometryForEverySource) {
   constexpr Real h = 1e-3;
   Dice dice(4);

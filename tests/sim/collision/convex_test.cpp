@@ -10,7 +10,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Points of a primitive's core, its extreme ones among them.
+/// Points of a primitive's core, including its extreme points.
 std::vector<Vec3> points_of(const Convex& c) {
   std::vector<Vec3> points;
   const auto circle = [&](Real radius, Real y) {
@@ -53,7 +53,8 @@ TEST(Support, OfAPrimitiveIsOnItAndFarthest) {
         nearest = std::min(nearest, (p - s).norm());
       }
       EXPECT_GE(d.dot(s), farthest - 1e-15) << shape.index();
-      // Sampled rims are a degree apart; a cap seen along the axis is represented by its centre.
+      // The sampled circles have a point per degree. Along the axis, the support point of a cap is its
+      // centre, which is not a sampled point.
       EXPECT_LE(nearest, i < 6 ? 0.8 : 0.01) << shape.index();
       EXPECT_TRUE(!c.has_vertices() || c.vertex(vertex) == s);
     }
@@ -81,14 +82,15 @@ TEST(Support, ClimbsToTheTopOfEveryPolyhedron) {
   for (int i = 0; i < 300; ++i) {
     const ConvexPolyhedron p = random_polyhedron(dice, 150, 1);
     for (int k = 0; k < 20; ++k) expect_top_from_anywhere(p, dice.direction());
-    for (uint32_t f = 0; f < p.face_count(); f += 7) {  // level faces, and almost level ones
+    for (uint32_t f = 0; f < p.face_count(); f += 7) {  // exactly along a face normal, and almost so
       expect_top_from_anywhere(p, p.plane(f).normal);
       expect_top_from_anywhere(p, p.plane(f).normal + 1e-12 * dice.direction());
     }
   }
 }
 
-/// A lens of 290 triangles. Flattening is affine and leaves it convex; noise does not, but hulls have it too.
+/// A lens of 290 triangles. Flattening is an affine map and keeps it convex; noise does not, so the hull is
+/// taken again.
 ConvexPolyhedron lens(Real thickness, Real noise) {
   std::vector<Vec3> cloud;
   for (int ring = 0; ring <= 6; ++ring)
@@ -107,7 +109,7 @@ ConvexPolyhedron lens(Real thickness, Real noise) {
   return {std::move(vertices), faces};
 }
 
-// Where the slopes are below the errors of the heights, a climb that trusts them ends anywhere.
+// Where height differences are below rounding, a hill climb that compares them can stop anywhere.
 TEST(Support, ClimbsFansThatAreAlmostFlat) {
   struct Lens {
     Real thickness, noise;

@@ -43,13 +43,13 @@ void expect_answer(const Separation& s, Real distance, const Vec3& normal) {
 
 TEST(Gjk, KnowsSimpleCasesInClosedForm) {
   const Real sqrt2 = std::sqrt(2.0);
-  // Two spheres; face and face, of boxes of which one is turned; edge across edge.
+  // Two spheres; two boxes face to face, one of them rotated; two boxes edge to edge.
   expect_answer(cold(Sphere{1}, Sphere{0.5}, {{0, 3, 0}, Quat::Identity()}), 1.5, {0, -1, 0});
   expect_answer(cold(Box{{2, 2, 2}}, Box{{2, 2, 2}}, {{0, 3, 0.2}, turned(30, {0, 1, 0})}), 1, {0, -1, 0});
   expect_answer(
       cold(Box{{2, 2, 2}}, Box{{2, 2, 2}}, {{0, 3.2, 0}, turned(90, {0, 1, 0}) * turned(45, {1, 0, 0})}),
       2.2 - sqrt2, {0, -1, 0});
-  // The apex of a cone over a box, the rim of a tilted cylinder over one, and crossed capsules.
+  // The apex of a cone above a box, the rim of a tilted cylinder above a box, and crossed capsules.
   expect_answer(cold(Box{{2, 2, 2}}, Cone{0.5, 1}, {{0.3, 2, 0.2}, turned(180, {1, 0, 0})}), 0.5, {0, -1, 0});
   expect_answer(cold(Box{{4, 2, 4}}, Cylinder{1, 2}, {{0, 3, 0}, turned(45, {0, 0, 1})}), 2 - sqrt2,
                 {0, -1, 0});
@@ -72,14 +72,15 @@ TEST(Gjk, CrossedCapsulesPartAcrossBothAxes) {
   expect_answer(s, -0.5, s.normal.x() > 0 ? Vec3(1, 0, 0) : Vec3(-1, 0, 0));
 }
 
-// Resting contact hovers around zero: neither the distance nor the normal may jump there. The depth of a
-// curved core is found to 1e-10 of the size, which leaves the square root of that to the normal.
+// The separation of a resting contact changes sign often: neither the distance nor the normal may jump there.
+// The depth of a curved core is accurate to 1e-10 of its size, so the normal is accurate to the square root
+// of that.
 TEST(Gjk, CrossesTouchingSmoothly) {
   const ConvexPolyhedron hull = box_polyhedron({1, 1, 1});
   struct Rest {
     Convex a, b;
     Quat rotation;
-    Real height;  // of B's centre at touch
+    Real height;  // of B's centre when the solids touch
     bool curved;
   };
   const std::vector<Rest> rests = {
@@ -134,7 +135,7 @@ TEST(Gjk, WarmStartsChangeNothingButTheEffort) {
     const Vec3 drift = 0.002 * pair.size() * dice.direction();
     const Quat turn(Eigen::AngleAxisd(0.005, dice.direction()));
     GjkCache cache;
-    cache.size = 3;  // rubbish, as another pair may have left it
+    cache.size = 3;  // arbitrary contents, as another pair may have left them
     cache.from = {{{1000, 3}, {2, 2}, {0, 77}, {0, 0}}};
     cache.direction = dice.direction();
     for (int k = 0; k < 100; ++k) {
@@ -158,12 +159,12 @@ TEST(Gjk, OverlapIsTheSignOfTheDistance) {
     if (std::abs(distance - radius) < 1e-12 * (pair.size() + pair.a_from_b.position.norm())) continue;
     const Convex a = convex(pair.a, radius), b = convex(pair.b);
     GjkCache cache;
-    for (int k = 0; k < 2; ++k)  // cold, then warm
+    for (int k = 0; k < 2; ++k)  // cold start, then warm start
       ASSERT_EQ(overlap(a, b, pair.a_from_b, cache), distance < radius) << i << ": " << distance;
   }
 }
 
-/// Any two primitives, from touching to apart or deep in each other.
+/// Two random primitives in any relation: touching, apart, or penetrating deeply.
 struct Placed {
   Shape a, b;
   Pose a_from_b;
@@ -198,13 +199,13 @@ Real size_of(const Placed& p) {
   return convex(p.a).reach() + convex(p.b).reach() + p.a_from_b.position.norm();
 }
 
-/// Extent along `n`, radius included.
+/// Support distance along `n`, including the radius.
 Real height_along(const Convex& c, const Vec3& n) {
   uint32_t vertex = 0;
   return n.dot(c.support(n, vertex)) + c.radius;
 }
 
-/// A lower bound of the distance, and the exact one if n is the right normal.
+/// A lower bound of the distance, which is exact if n is the right normal.
 Real separation_along(const Placed& p, const Vec3& n) {
   return -height_along(convex(p.a), -n) - height_along(convex(p.b), p.a_from_b.vector_to_body(n)) -
          n.dot(p.a_from_b.position);
@@ -229,8 +230,8 @@ TEST(GjkProperties, SwappingTheSolidsTurnsTheNormal) {
     const Placed p = random_primitives(seed);
     const Separation s = cold(p.a, p.b, p.a_from_b), t = cold(p.b, p.a, inverse_of(p.a_from_b));
     RC_ASSERT(std::abs(s.distance - t.distance) <= 2e-9 * size_of(p));
-    // The normal of overlapping solids is not unique; of others an excess e of the distance d turns it by
-    // sqrt(2 e / d), and e is at most 1e-12 of the size.
+    // The normal of overlapping solids is not unique. For separate ones, an error e of the distance d turns
+    // the normal by sqrt(2 e / d), and e is at most 1e-12 of the size.
     if (s.distance > 1e-3 * size_of(p))
       RC_ASSERT((p.a_from_b.vector_to_world(t.normal) + s.normal).norm() < 1e-4);
   }));
@@ -267,7 +268,8 @@ TEST(GjkProperties, NoPointsAreCloserThanTheDistance) {
   }));
 }
 
-// A translation by t changes a signed distance by |t| at most, also from apart to overlapping.
+// A translation by t changes a signed distance by at most |t|, including the transition from separation to
+// overlap.
 TEST(GjkProperties, DistanceIsLipschitzInTranslation) {
   EXPECT_TRUE(rc::check([](uint64_t seed) {
     Placed p = random_primitives(seed);

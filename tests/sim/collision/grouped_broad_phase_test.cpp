@@ -9,14 +9,14 @@ namespace {
 
 constexpr uint32_t kObjects = 120;
 
-/// A box near the one before it, as of a chain.
+/// A box near the box of the previous object, as in a chain.
 Aabb link_box(const Scatter& random, uint64_t event, uint32_t object) {
   const Vec3 centre(0.3 * (object % 40), object / 40, 0.3 * random.uniform(event, 0));
   const Vec3 half = Vec3::Constant(0.05 + 0.2 * random.uniform(event, 1));
   return {centre - half, centre + half};
 }
 
-// Groups of any sizes form, move, lose members and fall apart.
+// Groups of different sizes form, move, lose members and dissolve.
 TEST(GroupedBroadPhase, FindsThePairsOfOneWithoutGroups) {
   const Scatter random{11};
   GroupedBroadPhase grouped;
@@ -28,7 +28,7 @@ TEST(GroupedBroadPhase, FindsThePairsOfOneWithoutGroups) {
       const Aabb box = link_box(random, event, i);
       if (!plain.contains(i)) {
         if (random.uniform(event, 2) > 0.5) continue;
-        // The last ones are static.
+        // Objects from 100 on are static.
         plain.insert(i, box, i >= 100);
         grouped.insert(i, box, i >= 100);
       } else if (random.uniform(event, 3) < 0.01) {

@@ -34,8 +34,8 @@ std::set<uint32_t> ids(const Manifold& m) {
   return result;
 }
 
-/// Of the largest quadrilateral with corners among points of a plane across n; all orders of the corners are
-/// tried.
+/// Area of the largest quadrilateral whose corners are among the given points of a plane with normal n. All
+/// orders of the corners are tried.
 Real area(const Vec3& n, std::vector<Vec3> p) {
   if (p.size() < 3) return 0;
   const auto triangle = [&](const Vec3& a, const Vec3& b, const Vec3& c) {
@@ -79,7 +79,7 @@ Real surface_distance(const Shape& shape, const Vec3& p) {
 
 TEST(Manifold, PointsLieOnBothSurfacesAlongTheNormalAndHoldTheDeepest) {
   Dice dice(7);
-  // Changes that a face's normal may cause, see the header.
+  // The manifold may differ by this much where a face normal is used (see the header).
   constexpr Real kMargin = 0.02, kTilt = 0.05 * kMargin;
   for (const Shape& a : solids())
     for (const Shape& b : solids())
@@ -102,7 +102,7 @@ TEST(Manifold, PointsLieOnBothSurfacesAlongTheNormalAndHoldTheDeepest) {
           const ContactPoint& p = m.points[i];
           ASSERT_LE(p.separation, kMargin);
           ASSERT_LT((p.on_a - p.on_b - p.separation * m.normal).norm(), 1e-12);
-          // For an inclined capsule, points other than the deepest may be inside (see the header).
+          // For a tilted capsule, points other than the deepest may lie inside the shape (see the header).
           const Real on_a = surface_distance(a, p.on_a),
                      on_b = surface_distance(b, a_from_b.point_to_body(p.on_b));
           ASSERT_LT(std::max(on_a, on_b), 2 * kTilt);
@@ -131,7 +131,7 @@ TEST(Manifold, OfAnOctagonFourCornersKeepTheLargestArea) {
   EXPECT_NEAR(area(m), 2 * corner * corner, 1e-4);
 }
 
-TEST(Manifold, ABoxThatRocksALittleKeepsItsFourPointsAndTheirNames) {
+TEST(Manifold, ABoxThatRocksALittleKeepsItsFourPointsAndTheirIds) {
   const Convex slab = convex(Box{{4, 1, 4}}), box = convex(Box{Vec3::Ones()});
   const ConvexPolyhedron polyhedron = box_polyhedron(Vec3::Ones());
   Dice dice(3);
@@ -148,8 +148,9 @@ TEST(Manifold, ABoxThatRocksALittleKeepsItsFourPointsAndTheirNames) {
   }
 }
 
-// Boxes of one size upon each other: every side is in one plane with another, and rounding must not choose.
-TEST(Manifold, AStackOfEqualBoxesKeepsItsNamesWhileItCreeps) {
+// Boxes of equal size stacked on each other: their sides are coplanar, and rounding must not decide which
+// vertices are reported.
+TEST(Manifold, AStackOfEqualBoxesKeepsItsIdsWhileItCreeps) {
   const Convex box = convex(Box{Vec3::Ones()});
   Dice dice(5);
   const std::set<uint32_t> names = ids(manifold_of(box, box, pose_at({0, -1, 0}), 0.01));
@@ -161,7 +162,8 @@ TEST(Manifold, AStackOfEqualBoxesKeepsItsNamesWhileItCreeps) {
   }
 }
 
-// Edges across edges are then often a little better than the faces, and would come and go.
+// Here a pair of crossing edges often has slightly less penetration than the faces, and would be selected in
+// some steps only.
 TEST(Manifold, BoxesTwistedUponEachOtherKeepTheFacesNormalWhileTheyRock) {
   const Convex box = convex(Box{Vec3::Ones()});
   const Quat twist(Eigen::AngleAxisd(kPi / 4, Vec3::UnitY()));
@@ -188,7 +190,7 @@ TEST(Manifold, AnEdgeOnAFaceHasTwoPointsAndAVertexOne) {
   EXPECT_NEAR(vertex.points[0].separation, 0, 1e-12);
 }
 
-// Beams of 3 m that stand on an edge of theirs, the one upon the other.
+// Two beams of 3 m, each standing on one of its edges, one on the other.
 TEST(Manifold, EdgesMeetInTwoPointsAlongEachOtherAndInOneAcross) {
   const ConvexPolyhedron upright = box_polyhedron({3, 1, 1});
   std::vector<Vec3> corners;
@@ -227,7 +229,7 @@ TEST(Manifold, RoundSolidsRestOnTheirLinesAndDiscs) {
   ASSERT_EQ(side_by_side.count, 2u);
   EXPECT_NEAR((side_by_side.points[0].on_a - side_by_side.points[1].on_a).norm(), 0.7, 1e-9);
   EXPECT_EQ(manifold_of(slab, cone, pose_at({0, -1, 0}, Vec3::UnitX(), kPi), 0.01).count, 4u);
-  const Real slope = std::atan2(0.5, 1);  // half angle: the side line lies flat
+  const Real slope = std::atan2(0.5, 1);  // half angle of the cone: its side line lies flat
   EXPECT_EQ(manifold_of(slab, cone,
                         pose_at({0, -0.5 - 0.5 * std::sin(slope), 0}, Vec3::UnitX(), slope - kPi / 2), 0.01)
                 .count,
@@ -239,7 +241,7 @@ TEST(Manifold, RoundSolidsRestOnTheirLinesAndDiscs) {
   EXPECT_EQ(manifold_of(ball, ball, pose_at({1, 0, 0}), 0.01).source, NormalSource::points);
 }
 
-// A flat bottom cut into triangles whose corners are rounded as in a file is still one face.
+// A flat bottom, triangulated with corners that are rounded as in a model file, is still one face.
 TEST(Manifold, AFloorOfAlmostCoplanarTrianglesIsOneFace) {
   Dice dice(11);
   std::vector<Vec3> points;
@@ -257,7 +259,7 @@ TEST(Manifold, AFloorOfAlmostCoplanarTrianglesIsOneFace) {
   EXPECT_NEAR(area(on_slab), 2, 0.02);
 }
 
-// The ends lean outwards less steeply than the sides, so that the face most nearly facing the ground is an
+// The ends lean outwards less steeply than the sides, so the face that most nearly faces the ground is an
 // end.
 TEST(Manifold, ABladeStandsOnBothEndsOfItsEdge) {
   const std::vector<Vec3> points = {{-1, 0, 0},  {1, 0, 0},     {-3, 1, 0.1},
@@ -323,9 +325,9 @@ BulletContact bullet_boxes(const Vec3& a, const Vec3& b, const Pose& a_from_b) {
   return result;
 }
 
-// Bullet takes a face for the normal unless edges are better by a twentieth; where it finds our normal it
-// must find our depth and no larger area. Across edges it adds 1e-5 to the cosines, which makes its depth
-// wrong by as much times the size over the sine between the edges; ours is the exact one.
+// Bullet takes a face normal unless an edge pair is better by 5 %. Where it finds our normal, it must find
+// our depth and at most our area. For edge pairs Bullet adds 1e-5 to the cosines, so its depth has an error
+// of 1e-5 times the size, divided by the sine of the angle between the edges; ours is exact.
 TEST(Manifold, BoxesAgreeWithBullet) {
   Dice dice(17);
   int compared = 0, overlapping = 0;

@@ -29,7 +29,7 @@ TEST(MeshPair, CoincidentMeshesMeetInEveryTouchingPair) {
   }
 }
 
-TEST(MeshPair, BoxesFaceToFaceTouchAndTheLeastGapParts) {
+TEST(MeshPair, BoxesFaceToFaceTouchAndTheSmallestGapSeparates) {
   for (Real size : {1e-3, 1.0, 100.0}) {
     const TriangleMesh box = box_mesh(Vec3::Constant(size));
     const AllTrees trees(box);
@@ -70,7 +70,7 @@ TEST(MeshPair, CloseTrianglesAreThoseOfBruteForceWithTheirPoints) {
 TEST(MeshPair, ClosestTrianglesAreThoseOfBruteForceColdAndWarm) {
   const TriangleMesh mesh_a = bumpy_sphere(12, 8, 1), mesh_b = torus_mesh(0.8, 0.3, 12, 8);
   const AllTrees trees_a(mesh_a), trees_b(mesh_b);
-  TrianglePair last = {1000, 1000};  // out of range is no place to start
+  TrianglePair last = {1000, 1000};  // an initial pair out of range is ignored
   for (uint64_t i = 0; i < 8; ++i) {
     const Pose pose = random_pose(i, 3.5);
     Real least2 = 1e30;
@@ -89,7 +89,7 @@ TEST(MeshPair, ClosestTrianglesAreThoseOfBruteForceColdAndWarm) {
   }
 }
 
-TEST(MeshPair, NothingMeetsNothing) {
+TEST(MeshPair, EmptyMeshesMeetNothing) {
   const TriangleMesh box = box_mesh(Vec3::Ones()), none;
   const AllTrees trees(box), no_trees(none);
   for_each_kind(trees, no_trees, [&](const auto& a, const auto& b) {
@@ -98,7 +98,7 @@ TEST(MeshPair, NothingMeetsNothing) {
   });
 }
 
-// Another library's answers to the same questions.
+// Compared with the answers of another library.
 TEST(MeshPair, AgreesWithFcl) {
   const TriangleMesh mesh_a = bumpy_sphere(12, 8, 1), mesh_b = torus_mesh(0.8, 0.3, 12, 8);
   const AllTrees trees_a(mesh_a), trees_b(mesh_b);

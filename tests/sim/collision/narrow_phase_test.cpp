@@ -9,7 +9,7 @@
 namespace offstage::sim {
 namespace {
 
-/// A body's shape with all that it stands on.
+/// A shape with the collision data that it needs.
 struct Piece {
   explicit Piece(const Shape& s, bool needs_volume = true)
       : shape(s), collision({&shape, nullptr}, needs_volume) {}
@@ -77,7 +77,7 @@ TEST(NarrowPhase, TouchingIsExactForEveryPairOfPrimitives) {
     EXPECT_EQ(both(cone, {}, ball, pose({0, 1 + e, 0})), e < 0);
     EXPECT_EQ(both(cylinder, {}, cylinder, pose({0.6 + e, 1 + e, 0})), e < 0);
     EXPECT_EQ(both(cylinder, {}, box, pose({1 + e, 0, 0})), e < 0);
-    // Edges along z and x cross at right angles above each other.
+    // The lower edge of one box crosses the upper edge of the other at a right angle.
     EXPECT_EQ(both(box, tilt, box, pose({0, 2 * std::sqrt(0.5) + e, 0}, M_PI / 4, Vec3::UnitX())), e < 0);
   }
 }
@@ -112,7 +112,7 @@ TEST(NarrowPhase, NonConvexSolidsHaveTheDistanceOfTheirSurfaces) {
 TEST(NarrowPhase, TheGapOfAnLHoldsABox) {
   const Piece l(l_mesh(), true), box(Box{Vec3(0.5, 0.5, 0.5)});
   PairCache cache;
-  // In the angle of the L, touching neither arm, and then resting on both.
+  // In the angle of the L: first touching neither arm, then resting on both.
   EXPECT_FALSE(touching(l.collision, box.collision, pose({0.1, 0.6, 0})));
   const auto s = separation(l.collision, box.collision, pose({0.1, 0.6, 0}), cache);
   ASSERT_TRUE(s);
@@ -135,7 +135,7 @@ TEST(NarrowPhase, ABoxOnATiltedPlaneRestsOnFourPoints) {
   const Pose slope = pose({0.3, -0.2, 0.1}, 0.6, {1, 2, 3});
   PairCache cache;
   for (const Real height : {1.004, 0.999, 1.02}) {
-    // The box lies flat on the slope, turned about the slope's normal.
+    // The box lies flat on the slope and is rotated about the slope's normal.
     const Pose placed = {slope.point_to_world({0.5, height, -0.4}),
                          slope.orientation * Quat(Eigen::AngleAxisd(0.4, Vec3::UnitY()))};
     const auto s = separation(box.collision, plane.collision, between(placed, slope), cache);
@@ -173,7 +173,7 @@ TEST(NarrowPhase, ABoxRestsExactlyOnAGroundTwoHundredTimesAsLarge) {
   for (uint64_t k = 0; k < 100; ++k) {
     const Pose on = pose({190 * random.uniform(k, 0) - 95, 5.5, 190 * random.uniform(k, 1) - 95},
                          k % 4 == 0 ? 0 : 6 * random.uniform(k, 2), Vec3::UnitY());
-    // The whole world may stand askew.
+    // In every second case the whole scene is rotated and moved.
     const Pose world = k % 2 == 0 ? Pose{} : random_pose(random, k, 1);
     const Pose on_world{world.point_to_world(on.position), world.orientation * on.orientation};
     for (const Manifold& m : {contact(box, on_world, ground, world), contact(ground, world, box, on_world)}) {
@@ -188,8 +188,8 @@ TEST(NarrowPhase, ABoxRestsExactlyOnAGroundTwoHundredTimesAsLarge) {
   }
 }
 
-/// Shapes of one piece skip the trees; the same as parts of a mesh do not.
-TEST(NarrowPhase, OnePieceHasTheManifoldThatItHasAmongOthers) {
+/// A pair of single convex shapes skips the bounding trees; the same shapes as parts of a mesh do not.
+TEST(NarrowPhase, ASingleShapeHasTheManifoldThatItHasAsPartOfAMesh) {
   const Piece box(Box{{1.5, 0.5, 0.5}}), l(l_mesh(), true);
   PairCache cache;
   std::vector<Manifold> alone, among;
@@ -210,10 +210,10 @@ TEST(NarrowPhase, OnePieceHasTheManifoldThatItHasAmongOthers) {
   EXPECT_TRUE(alone.empty()) << "farther than the margin";
 }
 
-TEST(NarrowPhase, WhatIsInsideASolidIsInPenetration) {
+TEST(NarrowPhase, ABodyInsideASolidIsInPenetration) {
   const TriangleMesh torus = torus_mesh(1, 0.4, 48, 24);
   const Piece parts(torus, true), ball(Sphere{0.1});
-  // With an approximate decomposition, a body that does not need one is its triangles.
+  // With an approximate decomposition, a body that does not need a volume uses its triangles.
   ConvexDecomposition rough;
   rough.method = ConvexDecomposition::Method::approximate;
   const CollisionMesh hollow_mesh(torus, rough);
@@ -257,7 +257,7 @@ TEST(NarrowPhase, OpenSurfacesAreTwoSided) {
   }
 }
 
-/// Two squares along x that meet at x = 0, of which the second rises by `rise` per metre; at a height.
+/// Two squares along x that meet at x = 0, at height `height`. The second one rises by `rise` per metre.
 TriangleMesh folded_sheet(Real rise, Real height) {
   TriangleMesh m;
   for (const Real x : {-1.0, 0.0, 1.0})
@@ -295,21 +295,22 @@ TEST(NarrowPhase, ATriangleGivesItsNormalAtAnyHeightInItsMesh) {
 TEST(NarrowPhase, AnEdgeOfASheetHasTheNormalsBetweenItsFacesAlone) {
   const Piece box(Box{Vec3::Constant(0.5)}), ball(Sphere{0.25}), drum(Cylinder{0.25, 0.5});
   for (const Piece* piece : {&box, &ball, &drum}) {
-    // Before the edge, by less than the margin: the triangles beyond it are near, but in the same plane.
+    // Short of the edge by less than the margin: the triangles beyond the edge are near, but in the same
+    // plane.
     for (const Manifold& m : manifolds_on(folded_sheet(0, 0), *piece, pose({-0.255, 0.25, 0}), 0.02))
       EXPECT_NEAR(m.normal.y(), 1, 1e-15);
-    // In a valley, too, it is the slope's face that comes next, not the edge.
+    // In a valley, too, the next contact is with the face of the slope, not with the edge.
     const Vec3 slope = Vec3(-0.5, 1, 0).normalized();
     for (const Manifold& m : manifolds_on(folded_sheet(0.5, 0), *piece, pose({-0.255, 0.25, 0}), 0.02))
       EXPECT_GT(std::max(m.normal.y(), m.normal.dot(slope)), 1 - 1e-12);
   }
-  // At the border there is nothing beyond.
+  // Beyond the border of the sheet the contact is with the border edge.
   const auto beside = manifolds_on(folded_sheet(0, 0), ball, pose({1.2, 0.1, 0.3}), 0.02);
   ASSERT_FALSE(beside.empty());
   for (const Manifold& m : beside) EXPECT_GT(m.normal.x(), 0.8);
 }
 
-TEST(NarrowPhase, WhatSinksIntoASheetStaysOnItsSide) {
+TEST(NarrowPhase, ABodySinkingIntoASheetStaysOnItsSide) {
   const Piece ball(Sphere{0.1}), box(Box{Vec3::Constant(0.2)}), capsule(Capsule{0.1, 0.2}),
       drum(Cylinder{0.1, 0.2});
   const Piece sheet(folded_sheet(0, 0), false);
@@ -335,7 +336,7 @@ TEST(NarrowPhase, WhatSinksIntoASheetStaysOnItsSide) {
     }
 }
 
-/// Samples many times, then bisects: the reference of the tests.
+/// The reference of the tests: samples many times, then bisects the first interval that ends in contact.
 std::optional<Real> first_contact(const MovingShape& a, const MovingShape& b, Real tolerance, int looks) {
   const auto near = [&](Real share) {
     PairCache none;
@@ -394,7 +395,8 @@ TEST(TimeOfNextImpact, ARodThatTouchesMeetsTheGroundAgainWithItsOtherEnd) {
   sheet_mesh.triangles = {{0, 2, 1}, {0, 3, 2}};
   const Piece rod(Box{{1, 0.02, 0.02}}), plane(Plane{}), sheet(sheet_mesh, false), slab(Box{{4, 1, 4}});
   constexpr Real kTilt = 0.2, kTolerance = 1e-5, kSpeed = 0.01;
-  const Real high = 0.5 * std::sin(kTilt) + 0.01 * std::cos(kTilt);  // of the centre, when an end touches
+  // height of the rod's centre when one end touches
+  const Real high = 0.5 * std::sin(kTilt) + 0.01 * std::cos(kTilt);
   for (const Piece* ground : {&plane, &sheet, &slab}) {
     const PosePath rest(pose({0, ground == &slab ? -0.5 : 0, 0}));
     const auto next = [&](const Pose& start, const Pose& end) {

@@ -12,7 +12,7 @@ Pose random_start(const Scatter& random, uint64_t i) {
   return {Vec3(u(0), u(1), u(2)), Quat(u(3), u(4), u(5), u(6)).normalized()};
 }
 
-TEST(PosePath, VelocitiesAreTheDerivativeOfTheWay) {
+TEST(PosePath, VelocitiesAreTheDerivativeOfThePath) {
   const Scatter random{4};
   for (uint64_t i = 0; i < 100; ++i) {
     const PosePath path(random_start(random, 2 * i), random_start(random, 2 * i + 1));
@@ -32,7 +32,7 @@ TEST(PosePath, VelocitiesAreTheDerivativeOfTheWay) {
   }
 }
 
-TEST(PosePath, StraightWaysDoNotTurn) {
+TEST(PosePath, StraightPathsDoNotTurn) {
   Pose a, b;
   a.orientation = b.orientation = Quat(Eigen::AngleAxisd(0.3, Vec3(1, 2, 3).normalized()));
   b.position = Vec3(3, 0, 0);
@@ -40,7 +40,7 @@ TEST(PosePath, StraightWaysDoNotTurn) {
   EXPECT_EQ(path.turn(), 0);
   EXPECT_EQ(path.max_acceleration(5), 0);
   EXPECT_EQ(path.at(0.5).orientation.coeffs(), a.orientation.coeffs());
-  b.orientation.coeffs() = -b.orientation.coeffs();  // the same orientation
+  b.orientation.coeffs() = -b.orientation.coeffs();  // the opposite quaternion is the same orientation
   EXPECT_EQ(PosePath(a, b).turn(), 0);
 }
 

@@ -15,7 +15,8 @@ Simplex simplex_of(std::initializer_list<Vec3> points) {
   return s;
 }
 
-// No point of the simplex is lower along the nearest one, and its weights are those of a mean.
+// No vertex of the simplex is lower in the direction of the nearest point, and the weights are non-negative
+// and sum to one.
 TEST(NearestPoint, SupportsItsSimplex) {
   Dice dice(1);
   for (int i = 0; i < 20'000; ++i) {
@@ -38,8 +39,8 @@ TEST(NearestPoint, SupportsItsSimplex) {
   }
 }
 
-// The origin is 1e-8 above the middle of an edge: seen from the edge alone its direction is known to 1e-8,
-// from the face exactly.
+// The plane of the triangle is 1e-8 from the origin, nearly below the middle of an edge. From the edge alone
+// the direction is accurate to 1e-8, from the face it is exact.
 TEST(NearestPoint, PrefersTheFaceToTheEdgeUnderTheOrigin) {
   Dice dice(2);
   for (int i = 0; i < 10'000; ++i) {
@@ -52,7 +53,7 @@ TEST(NearestPoint, PrefersTheFaceToTheEdgeUnderTheOrigin) {
   }
 }
 
-// Square to its edge within rounding of its own length, not of the edge's.
+// The nearest point is perpendicular to its edge to the rounding of its own length, not of the edge's length.
 TEST(NearestPoint, OfAnEdgeIsSquareToItHoweverNear) {
   Dice dice(3);
   for (int i = 0; i < 10'000; ++i) {

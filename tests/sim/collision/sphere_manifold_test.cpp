@@ -23,7 +23,7 @@ Manifold found(const Convex& a, const Convex& b, const Pose& a_from_b, Real marg
   return m;
 }
 
-TEST(SphereManifold, IsTheSeparationByGjk) {
+TEST(SphereManifold, AgreesWithGjk) {
   Dice dice(3);
   int contacts = 0;
   for (int k = 0; k < 20000; ++k) {
@@ -44,7 +44,7 @@ TEST(SphereManifold, IsTheSeparationByGjk) {
     ASSERT_LT((m.normal - s.normal).norm(), 1e-6);
     ASSERT_LT((p.on_a - s.on_a).norm() + (p.on_b - s.on_b).norm(), 1e-6 * size);
     ASSERT_LT((p.on_a - p.on_b - p.separation * m.normal).norm(), 1e-14 * size);
-    // The same seen from the ball.
+    // The same pair with the ball as the first shape.
     const Manifold seen = found(ball, other, inverse(pose), margin);
     ASSERT_EQ(seen.count, 1u);
     ASSERT_NEAR(seen.points[0].separation, p.separation, 1e-13 * size);

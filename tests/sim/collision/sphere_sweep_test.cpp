@@ -56,7 +56,7 @@ TEST(Distance, MeshOfABoxHasTheDistanceOfTheBoxInsideAndOutside) {
   }
 }
 
-// The path enters the sphere of the sum of the radii.
+// The time at which the path enters a sphere whose radius is the sum of both radii.
 TEST(Sweep, SphereAgainstSphereIsTheRootOfTheQuadratic) {
   const Shape shape = Sphere{0.7};
   Vectors random;

@@ -23,8 +23,8 @@ Real distance(const MovingConvex& a, const MovingConvex& b, Real share) {
       .distance;
 }
 
-/// The book's method (4.4): samples equal intervals, and bisects the first one that ends in contact. Agrees
-/// with conservative advancement if the interval is short enough; it can miss thin objects.
+/// The book's method (4.4): samples equal intervals and bisects the first one that ends in contact. It agrees
+/// with conservative advancement if the intervals are short enough; it can miss thin objects.
 std::optional<Real> bisection(const MovingConvex& a, const MovingConvex& b, Real near, int looks) {
   if (distance(a, b, 0) <= near) return 0;
   for (int k = 1; k <= looks; ++k) {
@@ -65,7 +65,7 @@ TEST(TimeOfImpact, SpheresThatGlanceAndThatMiss) {
 }
 
 TEST(TimeOfImpact, TurningRodMeetsThePlane) {
-  // A rod of half length 1 about its middle, 0.5 above the plane: its end touches at 30 degrees.
+  // A rod of half length 1 turns about its middle, 0.5 above the plane: its end touches at 30 degrees.
   const Convex rod = convex(Box{Vec3(2, 1e-3, 1e-3)});
   const Pose start = still_pose({0, 0.5, 0}), end = still_pose({0, 0.5, 0}, 1.2);
   const PosePath turning(start, end), ground{Pose{}};
@@ -79,7 +79,7 @@ TEST(TimeOfImpact, TurningRodMeetsThePlane) {
 }
 
 TEST(TimeOfImpact, TiltingPlaneMeetsABall) {
-  // A ball rests beside the pivot of a plane that swings up: it is touched when tan-free geometry says so.
+  // A ball rests beside the pivot of a plane that swings up. The time of contact has a closed form.
   const Convex ball = convex(Sphere{0.1});
   const PosePath resting(still_pose({2, 0.5, 0})),
       swinging(still_pose(Vec3::Zero()), still_pose(Vec3::Zero(), 1.0));
@@ -102,8 +102,8 @@ TEST(TimeOfImpact, TouchingAtTheStartIsAnImpactAtOnce) {
   }
 }
 
-// The advancement never comes late, stops within the tolerance, and misses nothing that the fine bisection
-// sees.
+// Conservative advancement is never late, stops within the tolerance, and misses no contact that the fine
+// bisection finds.
 TEST(TimeOfImpact, AgreesWithFineBisection) {
   const Scatter random{11};
   const std::array<Shape, 5> shapes = {Box{Vec3(1, 0.05, 0.6)}, Capsule{0.1, 0.8}, Cylinder{0.4, 0.1},

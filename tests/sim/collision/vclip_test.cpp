@@ -32,13 +32,13 @@ std::vector<Feature> features(const ConvexPolyhedron& p) {
   return all;
 }
 
-/// Unit cubes; B's corner, edge or face looks at A's, at a distance of 0.1 along a diagonal, half-diagonal or
-/// axis.
+/// Unit cubes. A corner, edge or face of B points at one of A, at a distance of 0.1 along the line from A's
+/// centre through that feature.
 TEST(Vclip, FindsTheFeaturesAndTheirDistance) {
   const ConvexPolyhedron cube = box_polyhedron(Vec3::Ones());
   const Vec3 corner(0.5, 0.5, 0.5), edge(0.5, 0.5, 0), face(0.5, 0, 0);
   struct Case {
-    Vec3 from, to;  // on B in its pose, and on A: the two features
+    Vec3 from, to;  // points of the two features: on B in its own frame, and on A
     Kind kind_a, kind_b;
   };
   for (const Case& c :
@@ -74,8 +74,8 @@ TEST(Vclip, StartsFromAnyFeatures) {
   }
 }
 
-// The walk enters behind the cube's far face: the vertex lies in its prism, under its plane, and all edges
-// lead farther away.
+// The search starts at the cube's far face: the vertex lies in the face's Voronoi prism, below its plane, and
+// all edges lead farther away.
 TEST(Vclip, AVertexUnderAFaceEscapesToTheFaceItIsOver) {
   const ConvexPolyhedron cube = box_polyhedron(Vec3::Ones());
   const ConvexPolyhedron tip = convex_hull(std::vector<Vec3>{{0, 0, 0}, {1, 1, 0}, {1, -1, 1}, {1, -1, -1}});
@@ -112,8 +112,8 @@ TEST(Vclip, PolygonsSegmentsAndPoints) {
     EXPECT_NEAR(cold_start(rod, rod, placed_at({0.5, y, 0.3}, aside)).distance, 0.25, 1e-15);
     EXPECT_NEAR(cold_start(rod, point, placed_at({0.5, y, 0})).distance, 0.25, 1e-15);
   }
-  EXPECT_NEAR(cold_start(square, square, placed_at({2.5, 0, 0})).distance, 0.5, 1e-15);  // in one plane
-  EXPECT_NEAR(cold_start(rod, rod, placed_at({5, 0, 0})).distance, 1, 1e-15);            // in one line
+  EXPECT_NEAR(cold_start(square, square, placed_at({2.5, 0, 0})).distance, 0.5, 1e-15);  // coplanar
+  EXPECT_NEAR(cold_start(rod, rod, placed_at({5, 0, 0})).distance, 1, 1e-15);            // collinear
   EXPECT_NEAR(cold_start(point, point, placed_at({3, 4, 0})).distance, 5, 1e-15);
   EXPECT_NEAR(cold_start(square, rod, placed_at({0.4, 0, 0.2}, upright)).distance, -0.6, 1e-12);
   EXPECT_NEAR(cold_start(rod, rod, placed_at({0.5, 0, 0}, aside)).distance, 0, 1e-12);
@@ -127,7 +127,7 @@ ConvexPolyhedron ball(Dice& dice, int vertices) {
   return convex_hull(points);
 }
 
-TEST(Vclip, AlongASmoothMotionAStepIsAllItTakes) {
+TEST(Vclip, AlongASmoothMotionOneStepSuffices) {
   Dice dice(2);
   const ConvexPolyhedron a = ball(dice, 100), b = ball(dice, 100);
   VclipCache cache;
@@ -144,8 +144,9 @@ TEST(Vclip, AlongASmoothMotionAStepIsAllItTakes) {
   EXPECT_LT(steps, 1.2 * kSteps);
 }
 
-// Where everything is parallel and equal, rounding must neither make the walk circle nor leave its features.
-TEST(Vclip, ParallelBoxesHaveExactGapsAndTheWalkStandsStill) {
+// Many features are parallel and equally near: rounding must neither make the search cycle nor move it to
+// other features.
+TEST(Vclip, ParallelBoxesHaveExactGapsAndStableFeatures) {
   Dice dice(3);
   const ConvexPolyhedron cube = box_polyhedron(Vec3::Ones());
   for (int k = 0; k < 200; ++k) {

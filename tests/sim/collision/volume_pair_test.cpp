@@ -23,14 +23,14 @@ struct Sample {
     const Real x = next(), y = next(), z = next();
     return {x - 0.5, y - 0.5, z - 0.5};
   }
-  /// A box may be flat, straight or a point.
+  /// Half extents of a box, which may be flat, straight or a point.
   Vec3 half() {
     Vec3 h = vec() + Vec3::Constant(0.5);
     for (int k = 0; k < 3; ++k)
       if (next() < 0.15) h[k] = 0;
     return h;
   }
-  /// Parallel axes are common, which makes the products of edges noise.
+  /// Parallel axes are frequent, because the cross products of parallel edges are rounding noise.
   Quat turn() {
     const int kind = static_cast<int>(next() * 4);
     const Quat half_turns[] = {Quat::Identity(), Quat(std::sqrt(0.5), 0, std::sqrt(0.5), 0)};
@@ -48,7 +48,7 @@ struct Sample {
   }
 };
 
-/// The same volume as a solid for the oracle: an oriented box with a radius around it, in A's frame.
+/// The same volume as a solid for the reference: an oriented box with a radius around it, in A's frame.
 struct Body {
   Obb box;
   Real radius = 0;
@@ -82,7 +82,7 @@ bool inside(const Obb& box, const Vec3& p) {
   return ((box.axes.transpose() * (p - box.centre)).cwiseAbs().array() <= box.half.array()).all();
 }
 
-/// Of two boxes, by all pairs of triangles of their surfaces.
+/// Distance of two boxes, by all pairs of triangles of their surfaces.
 Real true_distance(const Body& a, const Body& b) {
   Real d2 = inside(a.box, b.box.centre) || inside(b.box, a.box.centre) ? 0 : 1e30;
   const auto surface_b = surface(b.box);
@@ -131,7 +131,7 @@ TYPED_TEST(VolumePair, OverlapsIfTheDistanceOfTheirSurfacesIsZero) {
   compare(TypeParam());
 }
 
-// Two unit cubes whose faces, edges or corners just meet, or are apart by a little more than rounding.
+// Two unit cubes whose faces, edges or corners just touch, or are apart by slightly more than rounding.
 TYPED_TEST(VolumePair, TouchingCounts) {
   const auto expect = [](auto a, auto b) {
     for (Vec3 direction : {Vec3(1, 0, 0), Vec3(0, -1, 0), Vec3(1, 1, 0), Vec3(1, -1, 1)})

@@ -12,7 +12,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Two bodies of 2 and 3 kg whose centres are on the normal: K is diagonal.
+/// Two bodies of 2 and 3 kg whose centres lie on the contact normal, so K is diagonal.
 struct SpherePair {
   static constexpr Real m12 = 2.0 * 3 / (2 + 3);
   ContactSample sample;
@@ -27,7 +27,7 @@ struct SpherePair {
   Mat3 K() const { return mobility(sample.contacts[0], sample.bodies); }
 };
 
-// P5, and for solid spheres, which turn as well, the tangential mass 2/7 m12.
+// P5. For solid spheres that may turn, the tangential effective mass is 2/7 m12.
 TEST(Collision, ObliqueImpactSticksOrSlidesOnEitherSideOfTheCriticalFriction) {
   const Vec3 u(-3, 1.2, -1.6);
   constexpr Real e = 0.4, kAcross = 2.0;
@@ -54,7 +54,8 @@ TEST(Collision, AxesWithTheirOwnCoefficientsStickOrSlideByThemselves) {
   }
 }
 
-/// Coulomb's law after the impact, by the residual of the contact problem with the normal velocity as target.
+/// Violation of Coulomb's law after the impact: the residual of the contact problem whose target is the
+/// normal velocity.
 Real violation(ContactSample s, const Vec3& p) {
   apply(s.contacts[0], p, s.bodies);
   s.contacts[0].impulse = p;
@@ -62,8 +63,8 @@ Real violation(ContactSample s, const Vec3& p) {
   return residual(s.bodies, s.contacts);
 }
 
-// Any bodies, so that all components of K are there: friction is right for the sliding that is left, the
-// restitution is right, or, where it would add energy, as large as it can be.
+// Random bodies, so all components of K are non-zero. Friction must fit the sliding velocity that remains.
+// The restitution must be the given one or, if that would add energy, the largest possible one.
 TEST(Collision, OneContactObeysCoulombAndKeepsTheEnergy) {
   for (const bool isotropic : {true, false}) {
     Dice dice(isotropic ? 1 : 2);
@@ -128,7 +129,7 @@ ContactSample cradle(int moving) {
   return s;
 }
 
-TEST(Collision, NewtonsCradlePassesAsManyBallsOnAsCameIn) {
+TEST(Collision, NewtonsCradleEjectsAsManyBallsAsArrive) {
   const std::vector<Real> e(4, 1);
   for (int moving = 1; moving < 5; ++moving) {
     ContactSample s = cradle(moving);
@@ -138,19 +139,20 @@ TEST(Collision, NewtonsCradlePassesAsManyBallsOnAsCameIn) {
   }
 }
 
-// All at once, contacts at rest only must not close: the row of four leaves with one speed.
+// All contacts are resolved together, and contacts at rest may not close: the row of four balls leaves at one
+// speed.
 TEST(Collision, SimultaneousCradleMovesAsOne) {
   ContactSample s = cradle(1);
   const ContactWork work = collide(s.bodies, s.contacts, std::vector<Real>(4, 1), ImpactLaw::simultaneous);
   EXPECT_EQ(work.fallbacks, 0u);
-  // v0 = v - 1, v0 + 4 v = 1
+  // Restitution and momentum: v0 = v - 1, v0 + 4 v = 1
   EXPECT_NEAR(s.bodies[0].velocity.x(), -0.6, 1e-12);
   for (std::size_t i = 1; i < 5; ++i) EXPECT_NEAR(s.bodies[i].velocity.x(), 0.4, 1e-12);
 }
 
-// Equally fast contacts collide together: which of them comes first in the list is no matter.
+// Contacts with equal approach speeds are resolved together, so their order in the list has no effect.
 TEST(Collision, ASequenceDoesNotDependOnTheOrderOfTheList) {
-  // One ball hits two that touch each other, which lie to either side of its way.
+  // One ball hits two that touch each other, on either side of its path.
   const auto broken = [](bool reversed) {
     ContactSample s;
     const Vec3 right = Vec3(std::sqrt(3), 1, 0) / 2, left = Vec3(std::sqrt(3), -1, 0) / 2;
@@ -169,7 +171,7 @@ TEST(Collision, ASequenceDoesNotDependOnTheOrderOfTheList) {
   EXPECT_NEAR(a[1].velocity.y(), -a[2].velocity.y(), 1e-9);
 }
 
-// A body between two faces cannot bounce off one and be stopped by the other: it stops, and gains nothing.
+// A body between two faces cannot satisfy the restitution of both: it stops, and no energy is added.
 TEST(Collision, TargetsThatContradictEachOtherEndInAPlasticImpact) {
   ContactSample s;
   s.bodies = {sphere_body(1, 0.1), ContactBody{}};
@@ -183,7 +185,8 @@ TEST(Collision, TargetsThatContradictEachOtherEndInAPlasticImpact) {
   EXPECT_LT(s.kinetic_energy(), energy);
 }
 
-// A box that falls flat bounces flat, though four contacts are one too many for its three motions.
+// A box that falls flat rebounds flat, although four contacts are one more than its three affected degrees of
+// freedom need.
 TEST(Collision, BoxFallsFlatAndBouncesFlat) {
   ContactSample s = stacked_boxes(1, Vec3(0, -2, 0), 0.5);
   const ContactWork work = collide(s.bodies, s.contacts, std::vector<Real>(4, 0.5), ImpactLaw::simultaneous);
@@ -192,7 +195,7 @@ TEST(Collision, BoxFallsFlatAndBouncesFlat) {
   EXPECT_LT(s.bodies[0].angular_velocity.norm(), 1e-12);
 }
 
-TEST(Collision, SequenceWithoutAnEndIsCutOff) {
+TEST(Collision, AnEndlessSequenceIsCutOff) {
   ContactSample s = stacked_boxes(5, Vec3(0.3, -2, 0.1), 0.5);
   const ContactWork work = collide(s.bodies, s.contacts, std::vector<Real>(20, 0.9), ImpactLaw::sequential);
   EXPECT_LE(work.iterations, 200u * 20 + 20'000);

@@ -9,7 +9,7 @@
 namespace offstage::sim {
 namespace {
 
-/// As the world makes them.
+/// A body as the world makes it.
 std::unique_ptr<Body> make_body(const Shape& shape, MotionType motion, const Pose& pose) {
   auto body = std::make_unique<Body>();
   body->def.shape = shape;
@@ -25,7 +25,7 @@ std::unique_ptr<Body> make_body(const Shape& shape, MotionType motion, const Pos
   return body;
 }
 
-/// A box of 0.2 m on the ground.
+/// A box with edges of 0.2 m on the ground.
 struct BoxOnGround {
   std::unique_ptr<Body> box, ground;
   ContactPair pair;
@@ -65,7 +65,7 @@ TEST(ContactPair, FindsTheFourCornersOfABoxOnTheGround) {
   EXPECT_EQ(scene.pair.separation(), std::numeric_limits<Real>::infinity());
 }
 
-// Points that hardly move are reused, but their distances are updated.
+// Contact points whose bodies hardly move are reused with updated separations.
 TEST(ContactPair, TakesPointsOverWithNewDistances) {
   BoxOnGround scene;
   scene.find({Vec3(0, 0.1, 0)});
@@ -77,7 +77,7 @@ TEST(ContactPair, TakesPointsOverWithNewDistances) {
   }
 }
 
-// However it came there, a force stays with its point and turns with the body.
+// Whether points are reused or computed again, a force stays with its point and rotates with the body.
 TEST(ContactPair, ForcesStayWithTheirPoints) {
   for (const Real reuse : {0.0, 1.0}) {
     BoxOnGround scene;
@@ -106,7 +106,7 @@ TEST(ContactPair, ForcesStayWithTheirPoints) {
   }
 }
 
-// Where one point becomes two, its force stays one.
+// Where one contact point becomes two, only one of them inherits the force.
 TEST(ContactPair, AForceGoesToOnePointOnly) {
   BoxOnGround scene;
   scene.box->def.shape = Box{{0.2, 0.2, 0.002}};
@@ -123,7 +123,7 @@ TEST(ContactPair, AForceGoesToOnePointOnly) {
   EXPECT_NEAR(sum, 14, 1e-12);
 }
 
-TEST(ContactPair, ForcesOfPointsThatAreGoneAreForgotten) {
+TEST(ContactPair, ForcesOfRemovedPointsAreDropped) {
   BoxOnGround scene;
   PlacedManifold& m = scene.find({Vec3(0, 0.1, 0)});
   for (uint32_t k = 0; k < 4; ++k) m.forces[k].last = Vec3::UnitX();
@@ -133,10 +133,10 @@ TEST(ContactPair, ForcesOfPointsThatAreGoneAreForgotten) {
   for (uint32_t k = 0; k < 4; ++k) EXPECT_FALSE(again.forces[k].known);
 }
 
-TEST(ContactPair, TheGrainDecidesTheTangents) {
+TEST(ContactPair, TheFrictionAxisDeterminesTheTangents) {
   BoxOnGround scene;
-  scene.ground->def.friction_axis = {1, 5, 1};  // only the component in the surface matters
-  ContactPair pair(*scene.box, *scene.ground, {.cross = 2, .grain = scene.ground.get()});
+  scene.ground->def.friction_axis = {1, 5, 1};  // only the component in the surface counts
+  ContactPair pair(*scene.box, *scene.ground, {.cross = 2, .axis_body = scene.ground.get()});
   const auto find = [&](const Vec3& at) {
     pair.find({at}, Pose{}, 1e-3, 1e-5, false);
     return pair.manifolds().at(0);
@@ -144,7 +144,7 @@ TEST(ContactPair, TheGrainDecidesTheTangents) {
   const PlacedManifold m = find({0, 0.1, 0});
   EXPECT_NEAR((m.frame.t - Vec3(1, 0, 1).normalized()).norm(), 0, 1e-12);
   EXPECT_NEAR((m.frame.k - m.frame.n.cross(m.frame.t)).norm(), 0, 1e-12);
-  // Upright to the surface it names no direction: any tangents do.
+  // An axis perpendicular to the surface defines no direction: any tangents are valid.
   scene.ground->def.friction_axis = {0, 1, 0};
   const PlacedManifold any = find({0.1, 0.1, 0});
   EXPECT_NEAR(any.frame.t.norm(), 1, 1e-12);

@@ -16,7 +16,7 @@ namespace offstage::sim {
 struct ContactSample {
   std::vector<ContactBody> bodies;
   std::vector<Contact> contacts;
-  std::vector<Vec3> positions;  ///< of random_contacts: centres of mass
+  std::vector<Vec3> positions;  ///< centres of mass; set by random_contacts
 
   Vec3 momentum() const {
     Vec3 p = Vec3::Zero();
@@ -24,7 +24,7 @@ struct ContactSample {
       if (b.is_moved()) p += b.velocity / b.inverse_mass;
     return p;
   }
-  /// About the origin, with centres of mass at `positions`.
+  /// About the origin, for centres of mass at `positions`.
   Vec3 angular_momentum() const {
     Vec3 h = Vec3::Zero();
     for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -35,7 +35,7 @@ struct ContactSample {
     }
     return h;
   }
-  /// Greatest speed of the contacts as they are.
+  /// Greatest component of the relative velocities of the contacts.
   Real speed() const {
     Real s = 0;
     for (const Contact& c : contacts) s = std::max(s, c.relative_velocity(bodies).cwiseAbs().maxCoeff());
@@ -70,8 +70,8 @@ inline Contact contact_between(uint32_t a, uint32_t b, const Vec3& normal, const
   return c;
 }
 
-/// Bodies of any shape in contacts anywhere, the last of them unmoved. Nothing moves by itself, so that there
-/// always is a solution.
+/// Random bodies with contacts at random places; the last body is static. No contact has a target velocity,
+/// so a solution always exists.
 inline ContactSample random_contacts(Dice& dice, uint32_t bodies, uint32_t contacts, Real most_friction,
                                      bool isotropic) {
   ContactSample s;
@@ -95,7 +95,7 @@ inline ContactSample random_contacts(Dice& dice, uint32_t bodies, uint32_t conta
   return s;
 }
 
-/// Unit cubes of 1 kg on each other on the ground (the last body), falling or sliding at `velocity`.
+/// A stack of unit cubes of 1 kg on the ground (the last body), all moving at `velocity`.
 inline ContactSample stacked_boxes(uint32_t boxes, const Vec3& velocity, Real friction) {
   ContactSample s;
   for (uint32_t i = 0; i < boxes; ++i) {

@@ -18,7 +18,7 @@ Contact with_friction(Real t, Real k) {
   return c;
 }
 
-/// Round cones and pyramids, flat and steep ones, and none at all.
+/// Circular cones and pyramids, flat or steep, and degenerate ones without friction.
 Contact random_cone(Dice& dice) {
   const Real t = dice.chance(0.15) ? 0 : dice.uniform(0, 2), k = dice.chance(0.15) ? 0 : dice.uniform(0, 2);
   return with_friction(t, dice.chance(0.5) ? t : k);
@@ -30,8 +30,7 @@ bool is_inside(const Contact& c, const Vec3& p, Real slack) {
   return std::abs(p.y()) <= c.friction_t * p.x() + slack && std::abs(p.z()) <= c.friction_k * p.x() + slack;
 }
 
-// On a convex cone the nearest point p of q is the one with p . (q - p) = 0 and (q - p) . r <= 0 for all r in
-// it.
+// p is the nearest point of a convex cone to q if p . (q - p) = 0 and (q - p) . r <= 0 for all r in the cone.
 TEST(FrictionCone, ProjectionIsTheNearestPoint) {
   Dice dice(1);
   for (int i = 0; i < 20'000; ++i) {
@@ -52,7 +51,7 @@ TEST(FrictionCone, ProjectionIsTheNearestPoint) {
   }
 }
 
-// Where a frictionless contact parts without sliding, exactly, it must not be held.
+// A frictionless contact that separates without sliding must get exactly zero impulse.
 TEST(FrictionCone, WithoutFrictionNothingPulls) {
   const Contact c = with_friction(0, 0);
   EXPECT_EQ(project_on_cone(c, Vec3(-1, 0, 0)).point, Vec3::Zero());
@@ -95,8 +94,8 @@ TEST(FrictionCone, DerivativeAgreesWithDifferences) {
   EXPECT_GT(compared, 4000);
 }
 
-// With the lift, u~ of a sliding contact is in the dual cone: p . u~ >= 0 for all p in the cone, 0 for the
-// one against u.
+// With the lift, the velocity u~ of a sliding contact lies in the dual cone: p . u~ >= 0 for all p in the
+// cone, and 0 for the p opposite to u.
 TEST(FrictionCone, LiftPutsSlidingOnTheDualCone) {
   Dice dice(3);
   for (int i = 0; i < 1000; ++i) {

@@ -15,8 +15,8 @@
 namespace offstage::sim {
 namespace {
 
-/// The conditions one by one, without the solver's or the problem's code: bounds, complementarity, and that
-/// no allowed friction takes out more power (maximal dissipation, at its limits against the sliding).
+/// Checks the conditions one by one, without code of the solver or the problem: bounds, complementarity, and
+/// maximal dissipation (no admissible friction impulse takes out more power).
 void expect_law(const ContactSample& s, Real tolerance) {
   for (const Contact& c : s.contacts) {
     const Vec3 u = c.relative_velocity(s.bodies), p = c.impulse;
@@ -48,7 +48,7 @@ TEST(FrictionLcp, RandomContactsDissipateTheMostInTheirBounds) {
         work.add(w);
         ASSERT_LT(w.residual, 1e-9);
         expect_law(s, 1e-8);
-        for (const Contact& c : s.contacts) {  // the impulses are those that the bodies have got
+        for (const Contact& c : s.contacts) {  // the impulses are those that were applied to the bodies
           ContactSample again = before;
           for (const Contact& d : s.contacts) apply(d, d.impulse, again.bodies);
           ASSERT_LT((again.bodies[c.a].velocity - s.bodies[c.a].velocity).norm(), 1e-12);
@@ -58,7 +58,8 @@ TEST(FrictionLcp, RandomContactsDissipateTheMostInTheirBounds) {
   EXPECT_LT(work.fallbacks, 12u);
 }
 
-// Falling, at rest or sliding askew: rows are dependent, and which box slides on which is not known before.
+// Falling, at rest or sliding diagonally: the rows are dependent, and which box slides on which is not known
+// in advance.
 TEST(FrictionLcp, StacksOfBoxesAreSolved) {
   for (const uint32_t boxes : {1u, 2u, 5u, 10u, 15u})
     for (const Vec3& v : {Vec3(0, -1, 0), Vec3(0.4, -1, 0.1), Vec3(2, -1, 0.6)}) {
@@ -70,8 +71,9 @@ TEST(FrictionLcp, StacksOfBoxesAreSolved) {
     }
 }
 
-// Friction of a box that slides without tipping is mu m v_n in the direction it slides in, on no axis.
-TEST(FrictionLcp, SlidingIsHeldBackStraightInEveryDirection) {
+// The friction impulse of a box that slides without tipping is mu m v_n, opposite to the sliding direction,
+// which is along none of the axes.
+TEST(FrictionLcp, FrictionOpposesSlidingInEveryDirection) {
   for (int k = 0; k < 24; ++k) {
     const Real angle = 0.1 + 2 * 3.14159265358979 * k / 24;
     const Vec3 along(std::cos(angle), 0, std::sin(angle));
@@ -82,7 +84,8 @@ TEST(FrictionLcp, SlidingIsHeldBackStraightInEveryDirection) {
   }
 }
 
-// Just under and over the angle of friction, across the axes: held exactly, and slid by the difference.
+// Slopes just below and above the friction angle, in a direction between the axes: the box is held exactly,
+// or slides by the difference.
 TEST(FrictionLcp, InclineHoldsToTheAngleOfFriction) {
   const Vec3 across = Vec3(0.6, 0, 0.8);
   for (const Real slope : {0.0, 0.3, 0.4999999, 0.5000001, 0.9}) {
@@ -105,9 +108,9 @@ TEST(FrictionLcp, AnisotropicAxesHaveTheirOwnLimits) {
   EXPECT_LT((s.bodies[0].velocity - Vec3(2.25, 0, 1.75)).norm(), 1e-12);
 }
 
-// Painleve's rod, at an angle on ground so rough that sliding friction alone would pull it in: K_nn < mu
-// K_nt.
-TEST(FrictionLcp, RodThatJamsEndsBounded) {
+// Painleve's rod, inclined on ground so rough that sliding friction alone would pull it into the ground: K_nn
+// < mu K_nt.
+TEST(FrictionLcp, AJammingRodHasABoundedImpulse) {
   for (const Real mu : {0.5, 1.5, 5.0, 50.0})
     for (const Real speed : {-2.0, 2.0}) {
       ContactSample s;
@@ -125,8 +128,9 @@ TEST(FrictionLcp, RodThatJamsEndsBounded) {
     }
 }
 
-// A wedge pressed between two walls that come together cannot give way: no solution, but an end, and counted.
-TEST(FrictionLcp, ImpossibleSqueezeEndsCounted) {
+// A wedge between two approaching walls cannot give way: there is no solution. The solver must stop and count
+// a fall-back.
+TEST(FrictionLcp, AnUnsolvableSqueezeStopsAndIsCounted) {
   ContactSample s;
   s.bodies = {sphere_body(1, 1), ContactBody{.velocity = Vec3(-1, 0, 0)},
               ContactBody{.velocity = Vec3(1, 0, 0)}};
@@ -138,7 +142,7 @@ TEST(FrictionLcp, ImpossibleSqueezeEndsCounted) {
   EXPECT_TRUE(s.bodies[0].velocity.allFinite());
 }
 
-TEST(FrictionLcp, GuessIsIgnoredAndNothingIsNothing) {
+TEST(FrictionLcp, TheGuessIsIgnoredAndNoContactsAreNoWork) {
   ContactSample s = stacked_boxes(2, Vec3(1, -1, 0), 0.5), other = s;
   for (Contact& c : other.contacts) c.impulse = Vec3(7, 1, -1);
   solve_by_pivoting(s.bodies, s.contacts);
@@ -148,7 +152,8 @@ TEST(FrictionLcp, GuessIsIgnoredAndNothingIsNothing) {
   EXPECT_EQ(solve_by_pivoting(s.bodies, {}).solves, 0u);
 }
 
-// Rows and columns are added, removed and changed in any order; the factor stays that of the current matrix.
+// Rows and columns are added, removed and changed in any order; the factorization stays that of the current
+// matrix.
 TEST(UpdatedQr, FollowsEveryChange) {
   Dice dice(6);
   constexpr Eigen::Index kMost = 20;

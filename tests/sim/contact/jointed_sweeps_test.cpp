@@ -9,7 +9,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Two rods in a row along x, joined at a point, of which the second hits the ground with its far end.
+/// Two rods in a row along x, joined by a ball joint. The far end of the second rod hits the ground.
 struct Pair {
   std::array<ContactBody, 3> bodies;
   std::array<JointRows, 1> rows;

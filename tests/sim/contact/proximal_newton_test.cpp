@@ -10,7 +10,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Difference of two solutions, as velocities of the bodies.
+/// Largest difference between two solutions, as velocities of the bodies.
 Real largest_difference(const ContactSample& x, const ContactSample& y) {
   Real d = 0;
   for (std::size_t i = 0; i < x.bodies.size(); ++i)
@@ -19,7 +19,7 @@ Real largest_difference(const ContactSample& x, const ContactSample& y) {
   return d;
 }
 
-// Without friction the velocities are unique, however redundant the contacts are.
+// Without friction the velocities are unique, even if the contacts are redundant.
 TEST(ProximalNewton, WithoutFrictionAgreesWithPivoting) {
   Dice dice(1);
   int compared = 0;
@@ -35,8 +35,8 @@ TEST(ProximalNewton, WithoutFrictionAgreesWithPivoting) {
   EXPECT_GT(compared, 180);
 }
 
-// With friction there can be several solutions, so only where the contacts are few, and both are solved to
-// rounding.
+// With friction there can be several solutions, so solutions are compared only for few contacts, and where
+// both solvers converge to rounding.
 TEST(ProximalNewton, WithFrictionAgreesWithPivotingOnFewContacts) {
   Dice dice(2);
   int compared = 0, agreed = 0;
@@ -53,7 +53,7 @@ TEST(ProximalNewton, WithFrictionAgreesWithPivotingOnFewContacts) {
   EXPECT_GE(agreed, compared - compared / 50);
 }
 
-// The answer obeys Coulomb's law, and no energy comes from contacts that only stop.
+// The solution obeys Coulomb's law, and contacts without restitution add no energy.
 TEST(ProximalNewton, LeavesNoResidualAndAddsNoEnergy) {
   Dice dice(3);
   int fallbacks = 0;
@@ -66,7 +66,7 @@ TEST(ProximalNewton, LeavesNoResidualAndAddsNoEnergy) {
     if (work.fallbacks > 0) continue;
     ASSERT_LT(residual(s.bodies, s.contacts), (work.residual < 1e-8 ? 1e-6 : 1e-3) * speed) << round;
   }
-  // This many random contacts are more than those of bodies at rest.
+  // Random contacts are harder than those of bodies at rest, so some fall-backs are accepted.
   EXPECT_LT(fallbacks, 100);
 }
 
@@ -83,17 +83,18 @@ TEST(ProximalNewton, StacksOfRedundantContactsStopAtOnce) {
   }
 }
 
-TEST(ProximalNewton, ASlidingStackKeepsSlidingAsOneWouldExpect) {
+TEST(ProximalNewton, ASlidingStackIsSlowedByFriction) {
   ContactSample s = stacked_boxes(1, {1, -0.1, 0}, 0.3);
   ProximalNewton().solve(s.bodies, s.contacts);
-  // The impulse along the floor is mu times the one from below, and acts at its height: no turning, as the
-  // floor's points shift their shares.
+  // The impulse along the floor is mu times the one from below. It acts at floor height, but the box does not
+  // tip, because the normal impulses shift towards the leading points.
   EXPECT_NEAR(s.bodies[0].velocity.x(), 1 - 0.3 * 0.1, 1e-6);
   EXPECT_NEAR(s.bodies[0].velocity.y(), 0, 1e-6);
   EXPECT_NEAR(s.bodies[0].angular_velocity.norm(), 0, 1e-6);
 }
 
-// The solution of one step is the guess of the next: at rest it is confirmed without a factorisation.
+// The solution of one step is the initial guess of the next: at rest, it is confirmed without a
+// factorization.
 TEST(ProximalNewton, ConfirmsAGuessThatIsTheAnswer) {
   ProximalNewton solver;
   ContactSample s = stacked_boxes(10, {0, -0.04, 0}, 0.5);
@@ -108,7 +109,7 @@ TEST(ProximalNewton, ConfirmsAGuessThatIsTheAnswer) {
   EXPECT_LT(largest_difference(s, again), 1e-8);
 }
 
-TEST(ProximalNewton, ChangesNothingIfTheBudgetDoesNotDo) {
+TEST(ProximalNewton, ChangesNothingIfTheBudgetIsTooSmall) {
   Dice dice(4);
   ContactSample s = random_contacts(dice, 8, 20, 0.7, true);
   const ContactSample before = s;
@@ -121,7 +122,7 @@ TEST(ProximalNewton, ChangesNothingIfTheBudgetDoesNotDo) {
   EXPECT_GT(solver.cost(), 1);
 }
 
-// Targets, offsets and kinematic bodies, as in resting contact.
+// Contacts with targets, offsets and kinematic bodies, as in resting contact.
 TEST(ProximalNewton, MeetsTargetsAndFollowsMovingSurfaces) {
   ContactSample s = stacked_boxes(1, {0, -1, 0}, 10);
   s.bodies[1].velocity = {0.3, 0.2, 0};
@@ -131,7 +132,7 @@ TEST(ProximalNewton, MeetsTargetsAndFollowsMovingSurfaces) {
   }
   ProximalNewton().solve(s.bodies, s.contacts);
   EXPECT_NEAR(s.bodies[0].velocity.y(), 0.25, 1e-8);
-  // What sticks has no relative velocity, offset included.
+  // Sticking contacts have no relative velocity once the offset is included.
   for (const Contact& c : s.contacts) EXPECT_LT(c.relative_velocity(s.bodies).tail<2>().norm(), 1e-7);
 }
 

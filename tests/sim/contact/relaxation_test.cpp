@@ -22,7 +22,7 @@ Real greatest_move(const BoxScene& now, const BoxScene& before) {
   return most;
 }
 
-/// Overlapping and approaching boxes without anything that is fixed.
+/// Overlapping and approaching boxes without any static body.
 BoxScene floating_boxes(uint64_t seed) {
   BoxScene s;
   Dice dice(seed);
@@ -60,7 +60,7 @@ TEST(Relaxation, BoxSlidesDownAboveTheFrictionAngle) {
   EXPECT_NEAR(greatest_move(s, start), expected, 1e-3);
 }
 
-// v^2 / (2 mu g), whatever the heading, and at coarse steps, too.
+// The stopping distance is v^2 / (2 mu g), for any direction and also with coarse steps.
 TEST(Relaxation, SlidingBoxStopsWhereFrictionSays) {
   const Real expected = 25 / (2 * 0.5 * 9.81);
   for (const Real h : {kStep, 4 * kStep})
@@ -83,7 +83,7 @@ TEST(Relaxation, WallOfHundredStandsAtCoarseSteps) {
   EXPECT_LT(s.deepest(), 1e-3);
 }
 
-// Without the return to the mean forces the wall sways on: 0.02 J.
+// Without the averaging of forces over steps, the wall keeps swaying with 0.02 J.
 TEST(Relaxation, WallOfHundredComesToRest) {
   BoxScene s = brick_wall(100);
   s.run(2, kStep);
@@ -143,7 +143,7 @@ TEST(Relaxation, CollisionsDoNotAddEnergy) {
   }
 }
 
-// Deep overlap is taken away by moving the bodies, which stay at rest.
+// Deep overlaps are removed by moving the bodies, which gain no velocity.
 TEST(Relaxation, PushingOutLeavesNoVelocity) {
   BoxScene s;
   s.gravity = Vec3::Zero();
@@ -156,7 +156,8 @@ TEST(Relaxation, PushingOutLeavesNoVelocity) {
             1e-12);
 }
 
-// Each box of a column has one above and one below that push it back: only together they get out.
+// Each box of the column is pushed back by the boxes above and below it, so the overlaps have to be removed
+// for the column as a whole.
 TEST(Relaxation, ColumnPressedTogetherIsPushedApartTogether) {
   BoxScene s = box_stack(20);
   Real down = 0;
@@ -164,7 +165,7 @@ TEST(Relaxation, ColumnPressedTogetherIsPushedApartTogether) {
     if (b.mass > 0) b.pose.position.y() -= down += 2e-3;
   ASSERT_GT(s.deepest(), 1.9e-3);
   s.run(0.5, kStep);
-  EXPECT_LT(s.deepest(), 7e-4);  // 3 mm if each were pushed alone
+  EXPECT_LT(s.deepest(), 7e-4);  // 3 mm if each pair were corrected alone
 }
 
 TEST(Relaxation, ForcesAreWeightAndFrictionOfASlidingBox) {
@@ -178,7 +179,7 @@ TEST(Relaxation, ForcesAreWeightAndFrictionOfASlidingBox) {
       ASSERT_GE(p.points[i].force, 0);
       normal += p.points[i].force;
     }
-    if (k < 24) continue;  // until the pressure has moved forward
+    if (k < 24) continue;  // until the normal forces have shifted to the leading points
     const Vec3 tangential = p.force_t * p.frame.t + p.force_k * p.frame.k, v = s.bodies[1].velocity;
     ASSERT_NEAR(normal, 9.81, 1e-5);
     ASSERT_NEAR(tangential.norm(), 0.5 * 9.81, 1e-5);
@@ -211,7 +212,7 @@ TEST(Relaxation, SameBitsForAnyNumberOfThreads) {
   }
 }
 
-// A belt under the box runs at 1 m/s: it is carried along after v / (mu g), and keeps to the belt's speed.
+// A belt runs under the box at 1 m/s: the box reaches the belt's speed after v / (mu g) and keeps it.
 TEST(Relaxation, ConveyorCarriesTheBox) {
   BoxScene s;
   s.add_ground();
@@ -248,17 +249,17 @@ TEST(Relaxation, APointHasNoTorque) {
 
 TEST(Relaxation, DegenerateInputGivesFiniteNumbers) {
   std::vector<RelaxedBody> bodies(3);
-  bodies[0].velocity = Vec3(1, 2, 3);  // moved by nothing
+  bodies[0].velocity = Vec3(1, 2, 3);  // has no inverse mass, so nothing moves it
   bodies[1].inverse_mass = 1e9;
   bodies[1].inverse_inertia = 1e18 * Mat3::Identity();
-  bodies[2].inverse_mass = 1e-9;  // does not turn
+  bodies[2].inverse_mass = 1e-9;  // has no inverse inertia, so it does not turn
   std::vector<ContactPatch> patches(4);
   patches[0] = {.a = 1,
                 .b = 0,
                 .frame = contact_frame(Vec3::UnitY()),
                 .friction_t = 0.5,
                 .friction_k = 0.2,
-                .count = 4};  // all points at one place, arms of no length
+                .count = 4};  // all points at one place, with lever arms of zero
   patches[1] = {.a = 1,
                 .b = 2,
                 .frame = contact_frame(Vec3::UnitX()),
@@ -285,7 +286,7 @@ TEST(ContactColoring, PatchesOfOneColorShareNoMovedBody) {
   std::vector<ContactColoring::Link> links;
   for (int i = 0; i < 2000; ++i) {
     const uint32_t a = dice.index(300), b = dice.chance(0.2) ? ContactColoring::kNone : 300 + dice.index(300);
-    links.push_back({dice.chance(0.1) ? 0 : a, b});  // body 0 has more than there are colours
+    links.push_back({dice.chance(0.1) ? 0 : a, b});  // body 0 has more patches than there are colours
   }
   ContactColoring coloring;
   coloring.assign(600, links);

@@ -12,7 +12,7 @@ struct Stage {
   uint32_t block_count() const { return blocks; }
 };
 
-// Each block reads the result of a block of the previous stage, in memory that only the loop protects.
+// Each block reads the result of a block of the previous stage, from memory that only the loop synchronizes.
 void expect_in_order(uint32_t threads) {
   std::vector<Stage> stages;
   std::vector<std::vector<uint32_t>> chain;
@@ -20,7 +20,7 @@ void expect_in_order(uint32_t threads) {
     stages.push_back({s * 7 % 11, s % 5 != 3, s});
     chain.emplace_back(stages.back().blocks, 0);
   }
-  // For each stage, the results of the previous stage that ran.
+  // For each stage, the results of the last stage before it that ran.
   std::vector<const std::vector<uint32_t>*> before;
   const std::vector<uint32_t>* last = nullptr;
   for (const Stage& stage : stages) {

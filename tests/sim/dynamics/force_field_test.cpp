@@ -22,7 +22,7 @@ TEST(Region, StrengthFallsToZeroAtTheEdgeByTheDropRate) {
   EXPECT_EQ(strength(sphere, 0, {2.9, 0, 0}), 1);
   EXPECT_EQ(strength(sphere, 0, {3.1, 0, 0}), 0);
   EXPECT_EQ(strength(sphere, 2, {3, 0, 0}), 0);
-  // The axis with the nearest edge decides: 1 - 0.8 in y, although x is farther from the centre.
+  // The axis whose edge is nearest decides: 1 - 0.8 in y, although the distance along x is larger.
   const Region box = BoxRegion{{0, 1, 0}, {10, 1, 10}};
   EXPECT_NEAR(strength(box, 1, {2, 1.4, 0}), 0.2, 1e-15);
   EXPECT_NEAR(strength(box, 2, {2, 1.4, 0}), 0.04, 1e-15);
@@ -39,7 +39,7 @@ TEST(Fields, PullTowardsTheirPointWhileTheyAreOn) {
   EXPECT_EQ(wrench(field, 2, at_rest({0, 1, 0}), Vec3::Zero()).force, Vec3::Zero());
 }
 
-// v' = -(k/m)(v - wind).
+// Equation of motion: v' = -(k/m)(v - wind).
 TEST(Wind, CarriesABodyUpToItsSpeed) {
   const ForceDef wind{.effect = WindField{.wind = {5, 0, 1}, .drag = 3}};
   const std::vector<ActiveForce> active = {{&wind, {}}};
@@ -52,8 +52,9 @@ TEST(Wind, CarriesABodyUpToItsSpeed) {
   EXPECT_NEAR((body.velocity() - (1 - std::exp(-1.5)) * Vec3(5, 0, 1)).norm(), 0, 1e-9);
 }
 
-// The air is that which particles feel; with no drag of the field it acts through the body's own.
-TEST(Air, MovesBodiesByItsDragOrTheirOwn) {
+// The air velocity is the one that particles feel. If the field has no drag of its own, the body's drag
+// coefficient applies.
+TEST(Air, MovesBodiesByItsOwnDragOrTheirs) {
   const Turbulence turbulence{.speed = 3, .drag = 0.5, .region = SphereRegion{{0, 0, 0}, 4}, .drop_rate = 1};
   const Vortex vortex{.circulation = 7, .radius = 0.5};
   RigidMotion motion = at_rest({0, 1, 0.5});
@@ -66,7 +67,8 @@ TEST(Air, MovesBodiesByItsDragOrTheirOwn) {
   EXPECT_NEAR((by_own - 0.3 * velocity(vortex, motion.position)).norm(), 0, 1e-15);
 }
 
-// In the end the hand's point of a body hangs below the hand by its weight, and the body below that point.
+// At equilibrium, the grabbed point hangs below the hand by weight / stiffness, and the body hangs below that
+// point.
 TEST(Grab, HoldsABodyByItsPoint) {
   const ForceDef grab{.effect = Grab{.point = {0.5, 0, 0},
                                      .track = {.keys = {{.time = 0, .pose = {Vec3(0, 2, 0)}},
@@ -93,11 +95,11 @@ TEST(ActiveForce, ActsOnTheNamedBodiesOnly) {
   EXPECT_TRUE((ActiveForce{&all, {}}.acts_on(a)));
   EXPECT_TRUE((ActiveForce{&named, {&a}}.acts_on(a)));
   EXPECT_FALSE((ActiveForce{&named, {&a}}.acts_on(b)));
-  EXPECT_FALSE((ActiveForce{&named, {}}.acts_on(a)));  // the named one is gone
+  EXPECT_FALSE((ActiveForce{&named, {}}.acts_on(a)));  // the named body has been removed
 }
 
-// Under the middle of a face the push is square: no spin. Off the middle it turns the box, and the far side
-// of a ball none ever.
+// Below the middle of a face, the impulse has no torque. Beside the middle it turns the box. It never turns a
+// ball.
 TEST(Explosion, BlowsAwayFromItsPointAndSpinsTheExposedSide) {
   const Shape box = Box{{2, 1, 1}}, ball = Sphere{0.5};
   const Pose pose{Vec3(0, 3, 0)};
@@ -105,7 +107,7 @@ TEST(Explosion, BlowsAwayFromItsPointAndSpinsTheExposedSide) {
   Wrench w = impulse(bang, {&box}, pose, pose.position);
   EXPECT_NEAR((w.force - Vec3(0, 10 * (1 - 0.5 / 2), 0)).norm(), 0, 1e-12);
   EXPECT_NEAR(w.torque.norm(), 0, 1e-12);
-  bang.point.x() = 0.8;  // pushes the +x end up: about +z
+  bang.point.x() = 0.8;  // pushes the +x end up: spin about +z
   w = impulse(bang, {&box}, pose, pose.position);
   EXPECT_NEAR((w.torque - Vec3(0, 0, 0.8 * 7.5)).norm(), 0, 1e-12);
   bang.point = {3, 3, 4};
@@ -115,7 +117,7 @@ TEST(Explosion, BlowsAwayFromItsPointAndSpinsTheExposedSide) {
   EXPECT_NEAR(w.torque.norm(), 0, 1e-12);
   bang.radius = 4.5;
   EXPECT_NEAR(impulse(bang, {&ball}, pose, pose.position).force.norm(), 0, 1e-12);
-  bang.point = {0.1, 3, 0};  // inside
+  bang.point = {0.1, 3, 0};  // inside the body
   EXPECT_NEAR((impulse(bang, {&ball}, pose, pose.position).force - Vec3(-10, 0, 0)).norm(), 0, 1e-12);
 }
 

@@ -38,7 +38,7 @@ TEST(Rotation, IsTheExponentialMapForAnglesSmallAndLarge) {
     const Vec3 axis = random_vector(s, i, 0, 1).normalized();
     const Real angle = std::pow(10.0, -8 + 10 * s.uniform(i, 3));
     const Quat exact(Eigen::AngleAxisd(angle, axis)), q = rotation(angle / 0.25 * axis, 0.25);
-    // An angle is known to its own rounding.
+    // A large angle has the rounding error of its own magnitude.
     ASSERT_NEAR((q.coeffs() - exact.coeffs()).norm(), 0, 1e-15 * std::max(4.0, angle)) << angle;
     ASSERT_NEAR(q.norm(), 1, 1e-15);
   }
@@ -59,7 +59,8 @@ TEST(FreeBody, JacobianAgreesWithDifferences) {
     std::array<Real, kBodyX> x;
     std::array<Real, kBodyP> p;
     load(body, x, p);
-    for (std::size_t k = 3; k < 7; ++k) x[k] *= 0.9;  // stages are not of unit length
+    // quaternions within Runge-Kutta stages are not normalized
+    for (std::size_t k = 3; k < 7; ++k) x[k] *= 0.9;
     const FreeBody system(body, forces);
     Eigen::SparseMatrix<Real> exact(13, 13), differences(13, 13);
     SparseEntries entries;
@@ -72,7 +73,8 @@ TEST(FreeBody, JacobianAgreesWithDifferences) {
   }
 }
 
-// The closed form does not know steps: one of two seconds or many short ones, the same place.
+// The closed form does not depend on the step: one step of two seconds gives the same place as many short
+// ones.
 TEST(FreeBody, ACubeFliesAndTurnsExactlyInStepsOfAnyLength) {
   const Vec3 g(0, -9.81, 0), v(3, 8, -1), w(4, -7, 2);
   for (int steps : {1, 7, 480}) {
@@ -87,7 +89,7 @@ TEST(FreeBody, ACubeFliesAndTurnsExactlyInStepsOfAnyLength) {
     EXPECT_NEAR((cube.position - (2 * v + 2 * g)).norm(), 0, 1e-12);
     EXPECT_NEAR((cube.velocity() - (v + 2 * g)).norm(), 0, 1e-12);
     const Quat turned(Eigen::AngleAxisd(2 * w.norm(), w.normalized()));
-    EXPECT_NEAR(cube.orientation.angularDistance(turned), 0, 1e-7);  // of an arc cosine near 1
+    EXPECT_NEAR(cube.orientation.angularDistance(turned), 0, 1e-7);  // accuracy of an arc cosine near 1
     EXPECT_NEAR(std::abs(cube.orientation.dot(turned)), 1, 1e-13);
     EXPECT_EQ(work.report.evaluations, 0u);
   }
@@ -107,7 +109,8 @@ TEST(FreeBody, OneAtRestWithoutForcesKeepsEveryBit) {
   EXPECT_EQ(body.orientation.coeffs(), before.orientation.coeffs());
 }
 
-// A spin of 100 turns a second for ten minutes: rounding adds up no faster than the steps.
+// A spin of 100 revolutions a second for ten minutes: the rounding error grows at most linearly with the
+// steps.
 TEST(FreeBody, TheOrientationStaysAUnitQuaternion) {
   RigidBody ball;
   ball.set_velocity(Vec3::Zero(), {600, 100, -300});

@@ -26,7 +26,7 @@ class Oscillator final : public DynamicSystem {
   }
 };
 
-/// Integrates with equal steps; an adaptive integrator does so, too, because its tolerance is infinite.
+/// Integrates with equal steps. The adaptive integrators do so too, because their tolerance is infinite.
 Real error(IntegratorKind kind, int steps) {
   constexpr Real kTime = 2;
   std::array<Real, 1> x = {1}, p = {0};
@@ -37,7 +37,7 @@ Real error(IntegratorKind kind, int steps) {
 }
 
 TEST(Integrator, ObservedOrderOnADampedOscillator) {
-  // Step doubling corrects its result by its own estimate, which gains an order.
+  // Step doubling corrects its result by its own error estimate, which raises the order by one.
   for (const auto& [kind, order] :
        {std::pair(IntegratorKind::explicit_euler, 1.0), std::pair(IntegratorKind::symplectic_euler, 1.0),
         std::pair(IntegratorKind::midpoint, 2.0), std::pair(IntegratorKind::rk4, 4.0),
@@ -48,7 +48,7 @@ TEST(Integrator, ObservedOrderOnADampedOscillator) {
         << "kind " << static_cast<int>(kind);
 }
 
-/// x' = 2 t, p' = 3 t^2: the stages must be evaluated at their own times.
+/// x' = 2 t, p' = 3 t^2: exact only if the stages are evaluated at their own times.
 class TimeOnly final : public DynamicSystem {
  public:
   void velocity(Real t, std::span<const Real>, std::span<const Real>, std::span<Real> dx) const override {
@@ -70,8 +70,8 @@ TEST(Integrator, MidpointAndRungeKuttaAreExactForPolynomialsInTimeOfTheirDegree)
   EXPECT_NEAR(p[0], 27 - 1, 1e-13);
 }
 
-/// Symplectic Euler on x'' = -x keeps p^2 + x^2 - h x p exactly; explicit Euler multiplies the energy by 1 +
-/// h^2 a step.
+/// Symplectic Euler on x'' = -x conserves p^2 + x^2 - h x p exactly; explicit Euler multiplies the energy by
+/// 1 + h^2 in each step.
 TEST(Integrator, SymplecticEulerBoundsTheEnergyThatExplicitEulerPumps) {
   class Harmonic final : public DynamicSystem {
    public:
@@ -96,7 +96,7 @@ TEST(Integrator, SymplecticEulerBoundsTheEnergyThatExplicitEulerPumps) {
 constexpr std::array kAdaptive = {IntegratorKind::adaptive_euler, IntegratorKind::adaptive_midpoint,
                                   IntegratorKind::adaptive_rk4, IntegratorKind::dormand_prince};
 
-// What each call learnt about the length of a step serves the next.
+// The step length found in one call is the initial step of the next.
 TEST(Adaptive, RemembersItsStepBetweenCalls) {
   for (IntegratorKind kind : kAdaptive) {
     std::array<Real, 1> x = {1}, p = {0};
@@ -111,7 +111,7 @@ TEST(Adaptive, RemembersItsStepBetweenCalls) {
   }
 }
 
-/// Its rates are never finite.
+/// A system whose derivatives are never finite.
 class Broken final : public DynamicSystem {
  public:
   void velocity(Real, std::span<const Real>, std::span<const Real>, std::span<Real> dx) const override {
@@ -122,7 +122,7 @@ class Broken final : public DynamicSystem {
   }
 };
 
-TEST(Adaptive, AlwaysEndsAndCountsWhatItCouldNotReach) {
+TEST(Adaptive, AlwaysEndsAndCountsMissedTolerances) {
   for (IntegratorKind kind : kAdaptive) {
     std::array<Real, 1> x = {1}, p = {0};
     IntegratorWorkspace work;
@@ -137,7 +137,7 @@ TEST(Adaptive, AlwaysEndsAndCountsWhatItCouldNotReach) {
   EXPECT_EQ(work.report.missed, 64u);
 }
 
-// One step of x'' = -k x: (x, p) divided by 1 + h^2 k, with p - h k x.
+// One step of x'' = -k x has the closed form x1 = (x + h p) / (1 + h^2 k), p1 = (p - h k x) / (1 + h^2 k).
 TEST(ImplicitEuler, SolvesALinearSpringExactly) {
   class Spring final : public DynamicSystem {
    public:

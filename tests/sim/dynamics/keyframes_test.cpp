@@ -29,7 +29,7 @@ TEST(Keyframes, PassThroughTheKeys) {
   }
 }
 
-// Central differences of the pose; their error is of order d^2.
+// Compared with central differences of the pose, whose error is of order d^2.
 TEST(Keyframes, VelocitiesAreTheDerivativeOfThePose) {
   constexpr Real kD = 1e-5;
   for (auto kind :
@@ -60,7 +60,7 @@ TEST(Keyframes, SmoothMotionReproducesAParabolaOverUnevenKeys) {
   for (Real x : {0.35, 0.7, 1.2}) EXPECT_NEAR((t.at(x, {}).pose.position - position(x)).norm(), 0, 1e-14);
 }
 
-// "Hold for 5 s, then move 3 m in 0.1 s" swung out to -21.8 m.
+// A cubic spline through "hold for 5 s, then move 3 m in 0.1 s" would overshoot to -21.8 m.
 TEST(Keyframes, AComponentStaysBetweenItsKeysAndHoldsWhereTheyAreEqual) {
   const KeyframeTrack t{.keys = {{0, {Vec3(0, 0, 0)}},
                                  {5, {Vec3(0, 1, 0)}},
@@ -85,7 +85,7 @@ TEST(Keyframes, AComponentStaysBetweenItsKeysAndHoldsWhereTheyAreEqual) {
   }
 }
 
-TEST(Keyframes, AKeySaysHowItGoesOnToTheNext) {
+TEST(Keyframes, AKeyCanChooseItsOwnInterpolation) {
   KeyframeTrack t{
       .keys = {{0, {Vec3(0, 0, 0)}, Interpolation::linear},
                {1, {Vec3(1, 0, 0), Quat(Eigen::AngleAxisd(1, Vec3::UnitY()))}, Interpolation::step},
@@ -100,7 +100,7 @@ TEST(Keyframes, AKeySaysHowItGoesOnToTheNext) {
   EXPECT_FALSE(t.jumps(0.9, 1.1));
   EXPECT_FALSE(t.jumps(2, 2.5));
   t.loop = true;
-  EXPECT_TRUE(t.jumps(2.9, 3.1));  // from the last key to the first
+  EXPECT_TRUE(t.jumps(2.9, 3.1));  // between the last key and the first
   EXPECT_TRUE(t.jumps(4.9, 5.1));
 }
 

@@ -27,7 +27,7 @@ std::vector<uint32_t> near(const NeighborGrid& grid, const Vec3& p, Real radius)
 TEST(NeighborGrid, FindsEachPointWithinTheRadiusOnceLikeAllPairs) {
   for (const Vec3& size : {Vec3(1, 1, 1), Vec3(0.01, 20, 1), Vec3(3, 0, 3), Vec3(0, 0, 0)}) {
     std::vector<Vec3> points = scattered(700, size, 1);
-    points.emplace_back(1e4, -1e5, 1e300);  // one that flew off
+    points.emplace_back(1e4, -1e5, 1e300);  // one point extremely far away
     NeighborGrid grid;
     grid.build(points, 0.1);
     for (Real radius : {0.02, 0.1, 0.35, 5.0})
@@ -64,7 +64,7 @@ TEST(NeighborGrid, OrderIsTheSameForAnyNumberOfThreadsAndLayersHoldNeighbours) {
   }
 }
 
-TEST(NeighborGrid, IsEmptyOfNothing) {
+TEST(NeighborGrid, OfNoPointsIsEmpty) {
   NeighborGrid grid;
   EXPECT_TRUE(near(grid, Vec3::Zero(), 1).empty());
   grid.build(std::vector<Vec3>{Vec3::Zero()}, 1);

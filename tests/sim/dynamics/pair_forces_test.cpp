@@ -12,7 +12,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Particles at random in a cube, of random masses and charges.
+/// Particles at random places in a cube, with random masses and charges.
 struct Swarm {
   Swarm(std::size_t count, Real size) {
     std::mt19937 random(3);
@@ -65,8 +65,9 @@ TEST(PairForces, AreMinusTheSlopeOfTheirEnergy) {
     }
 }
 
-// F = G m1 m2 / r^2 and K q1 q2 / r^2; 24 e / sigma at r = sigma, nothing at 2^(1/6) sigma, where U = -e.
-TEST(PairForces, OfTwoHaveTheirClosedForms) {
+// F = G m1 m2 / r^2 and K q1 q2 / r^2. Lennard-Jones: 24 e / sigma at r = sigma, and zero at r = 2^(1/6)
+// sigma, where U = -e.
+TEST(PairForces, OfTwoParticlesAgreeWithClosedForms) {
   const std::vector<Real> x = {0, 0, 0, 0, 2, 0};
   const auto pull = [&](const ForceDef& def) {
     PairForces forces;
@@ -109,7 +110,7 @@ TEST(PairForces, KeepMomentumAndAngularMomentum) {
     }
 }
 
-TEST(PairForces, WithACutOffAreThoseOfTheNearPairs) {
+TEST(PairForces, WithACutOffSumOverNearPairsOnly) {
   const Swarm swarm(2000, 1);
   constexpr Real kCutOff = 0.13;
   const auto dv = swarm.accelerations({.effect = Coulomb{.constant = 1, .cut_off = kCutOff}});
@@ -126,7 +127,7 @@ TEST(PairForces, WithACutOffAreThoseOfTheNearPairs) {
   }
 }
 
-TEST(PairForces, OfAParticleThatIsLostPullAtNone) {
+TEST(PairForces, OfAParticleAtNanActOnNone) {
   for (Real cut_off : {0.0, 0.5})
     for (const ForceDef& def : all_laws(cut_off)) {
       Swarm swarm(20, 1);
@@ -153,7 +154,7 @@ TEST(PairForces, InARegionAreWeakenedByBothStrengths) {
   EXPECT_NEAR(3 * dv[3], -1 * 0.75 * 6 / 0.25, 1e-12);
 }
 
-TEST(PairForces, HaveTheDerivativesThatDifferencesGive) {
+TEST(PairForces, DerivativesAgreeWithDifferences) {
   for (const ForceDef& def : all_laws(0)) {
     Swarm swarm(6, 1);
     const PairForces forces = swarm.under(def);
@@ -179,7 +180,7 @@ TEST(PairForces, HaveTheDerivativesThatDifferencesGive) {
 
 TEST(PairForces, AreTheSameBitsForAnyThreadsAndFiniteForAnyPlaces) {
   Swarm swarm(1000, 1);
-  // Two at the same place, two almost, and one that is lost.
+  // Two particles at the same place, two almost so, and one at NaN.
   for (std::size_t k = 0; k < 3; ++k) {
     swarm.x[3 + k] = swarm.x[k];
     swarm.x[9 + k] = swarm.x[6 + k] + (k == 0 ? 1e-17 : 0);

@@ -29,7 +29,8 @@ Real correlation(const std::vector<Real>& a, const std::vector<Real>& b) {
   return ab / std::sqrt(aa * bb);
 }
 
-// 200 000 points in a tile of 1024^3 cells see about as many cells: the mean square is within 1 % at 3 sigma.
+// A tile has 1024^3 cells, so 200 000 points lie in about as many different cells: 3 sigma of the mean square
+// is 1 %.
 TEST(Turbulence, HasItsSpeedInEachDirectionAtAnyTimeAndNoMean) {
   const std::vector<Real> x = random_points(200'000, 400);
   for (uint32_t octaves : {1u, 3u})
@@ -47,8 +48,8 @@ TEST(Turbulence, HasItsSpeedInEachDirectionAtAnyTimeAndNoMean) {
     }
 }
 
-// By central differences, whose error is that of single precision, 1e-7 / h, and the jumps of the second
-// derivative at the cells' faces, some h.
+// By central differences. Their error comes from single precision (1e-7 / h) and from jumps of the second
+// derivative at the cell faces (of order h).
 TEST(Turbulence, HasNoDivergence) {
   const TurbulentFlow flow({.speed = 1, .scale = 1, .octaves = 3}, 0.37);
   const std::vector<Real> x = random_points(3000, 30);
@@ -68,12 +69,12 @@ TEST(Turbulence, HasNoDivergence) {
   EXPECT_LT(worst, 4e-3);
 }
 
-// In cubes of the middle of a cloud that has been stirred for some turnovers, numbers are Poisson's: their
-// variance is their mean, to sqrt(2 / 1000) by chance.
-TEST(Turbulence, KeepsWhatDriftsEvenlySpread) {
+// After some turnovers of the eddies, the number of particles in cubes in the middle of the cloud is Poisson
+// distributed: its variance equals its mean, with a statistical error of sqrt(2 / 1000).
+TEST(Turbulence, KeepsDriftingParticlesEvenlySpread) {
   std::vector<Real> x = random_points(60'000, 16), half(x.size()), v(x.size());
   constexpr Real kH = 0.05;
-  for (int i = 0; i < 60; ++i) {  // by the midpoint rule
+  for (int i = 0; i < 60; ++i) {  // midpoint rule
     const Turbulence air{.speed = 1, .scale = 1, .octaves = 1};
     TurbulentFlow(air, i * kH).velocity(x, v);
     for (std::size_t k = 0; k < x.size(); ++k) half[k] = x[k] + kH / 2 * v[k];
@@ -120,7 +121,8 @@ TEST(Turbulence, DriftsWithItsWindAndRepeatsAfterATileOnly) {
     EXPECT_NEAR(v[i], w[i], 1e-5);
     EXPECT_NEAR(v[i], u[i], 1e-5);
   }
-  const Turbulence alone{.speed = 1, .scale = 0.5, .octaves = 1};  // that of half the width repeats twice
+  // the octave of half the width repeats twice per tile
+  const Turbulence alone{.speed = 1, .scale = 0.5, .octaves = 1};
   EXPECT_NEAR(correlation(velocities(alone, 4, x), velocities(alone, 4, half)), 0, 0.06);
 }
 
@@ -129,7 +131,7 @@ TEST(Turbulence, SeedsAndOctavesAreIndependent) {
   Turbulence a{.octaves = 1}, b = a;
   b.seed = 1;
   EXPECT_NEAR(correlation(velocities(a, 0, x), velocities(b, 0, x)), 0, 0.03);
-  // The second octave is half as wide: at the same place in its own lattice it would look like the first.
+  // The second octave is half as wide. Without its own random stream it would be a scaled copy of the first.
   b = a;
   b.octaves = 2;
   const auto both = velocities(b, 0, x), first = velocities(a, 0, x);
@@ -137,7 +139,7 @@ TEST(Turbulence, SeedsAndOctavesAreIndependent) {
   EXPECT_NEAR(correlation(both, first), share, 0.02);
 }
 
-TEST(Turbulence, OfAPointDoesNotDependOnItsCompanyAndIsFiniteFarOut) {
+TEST(Turbulence, AtAPointDoesNotDependOnOtherPointsAndIsFiniteFarAway) {
   std::vector<Real> x = random_points(19, 5);
   x[4] = 1e6, x[20] = -1e18, x[21] = 1e300, x[40] = -0.0;
   const Turbulence t{.octaves = Turbulence::kMaxOctaves};

@@ -17,8 +17,8 @@ PreciseVec precise(const Vec3& v) {
   return v.cast<Precise>();
 }
 
-/// The minimum of a convex function on [0, 1] by golden section, which knows nothing of cases. Searches are
-/// nested.
+/// The minimum of a convex function on [0, 1] by golden section search, without any case distinctions.
+/// Searches can be nested.
 template <class F>
 Precise minimum(int steps, F&& f) {
   constexpr Precise kRatio = 0.618033988749894848204586834L;
@@ -48,8 +48,8 @@ Precise segments(const Vec3& p0, const Vec3& p1, const Vec3& q0, const Vec3& q1)
   return minimum(80, [&](Precise s) { return point_segment(p + s * d, precise(q0), precise(q1)); });
 }
 
-/// The triangle as the union of its segments parallel to one side. Along them, unlike along a fan, the
-/// distance is convex.
+/// Treats the triangle as the union of its segments parallel to one side. Along these, unlike along a fan,
+/// the distance is convex.
 Precise point_triangle(const PreciseVec& p, const TriangleVertices& t, int steps = 80) {
   const PreciseVec a = precise(t[0]), b = precise(t[1]), c = precise(t[2]);
   return minimum(steps, [&](Precise s) { return point_segment(p, a + s * (b - a), c + s * (b - c)); });
@@ -61,8 +61,8 @@ struct Sample {
   uint32_t used = 0;
 
   Real next() { return random.uniform(i, used++); }
-  /// On a coarse grid, continuous, or a small step from the last point, so that degenerate and nearly
-  /// degenerate figures are common.
+  /// A point on a coarse grid, a random point, or one near the previous point, so that degenerate and nearly
+  /// degenerate figures are frequent.
   Vec3 point(const Vec3& last) {
     const Real kind = next();
     const Vec3 p(next() - 0.5, next() - 0.5, next() - 0.5);
@@ -94,7 +94,7 @@ TEST(ClosestPoints, OnATriangleMatchTheMinimumBySearch) {
     const Vec3 a = sample.point(Vec3::Zero()), b = sample.point(a), c = sample.point(b);
     const Vec3 p = sample.point((a + b + c) / 3);
     const TrianglePoint q = closest_on_triangle(p, a, b, c);
-    // What rounding of a unit in the last place does along a sliver.
+    // The effect of a rounding error of one unit in the last place along a sliver.
     const Real area = (b - a).cross(c - a).norm();
     const Real along = area > 0 ? 1e-15 * (b - a).norm() * (c - a).norm() / area : 0;
     ASSERT_NEAR(static_cast<double>(point_triangle(precise(p), {a, b, c})), (p - q.point).norm(),
@@ -116,9 +116,10 @@ TEST(ClosestPoints, WeightsOnATriangleNameTheFeature) {
   EXPECT_EQ(weights({0.5, 0.5, 1}), (std::array<Real, 3>{0.5, 0.25, 0.25}));
 }
 
-/// Random triangles, some of which touch, intersect or are degenerate, against a search in four dimensions.
+/// Compares random triangles, some of which touch, intersect or are degenerate, with a search in four
+/// dimensions.
 void compare_triangles(uint64_t from, uint64_t to) {
-  constexpr int kSteps = 40;  // to a width of 5e-9, in which a minimum that is a kink may lie anywhere
+  constexpr int kSteps = 40;  // to a width of 5e-9, within which a minimum at a kink may lie anywhere
   for (uint64_t i = from; i < to; ++i) {
     Sample sample{{5}, i};
     TriangleVertices a, b;
@@ -134,7 +135,7 @@ void compare_triangles(uint64_t from, uint64_t to) {
     const ClosestPoints c = closest_on_triangles(a, b);
     ASSERT_NEAR(static_cast<double>(truth), std::sqrt(c.squared_distance), 2e-8) << i;
     ASSERT_NEAR((c.on_a - c.on_b).norm(), std::sqrt(c.squared_distance), 1e-15) << i;
-    // A point shared by slivers that cross at a small angle is known as well as the angle.
+    // A common point of slivers that cross at a small angle is only as accurate as the angle.
     const Precise tolerance = c.squared_distance > 0 ? 1e-14L : 1e-10L;
     ASSERT_LT(point_triangle(precise(c.on_a), a), tolerance) << i;
     ASSERT_LT(point_triangle(precise(c.on_b), b), tolerance) << i;

@@ -43,7 +43,7 @@ void expect_exact(const ConvexDecomposition& d, Real volume, Real size) {
   for (const ConvexPolyhedron& p : d.parts) EXPECT_LE(concavity(p), 1e-9 * size);
 }
 
-/// How often the surface goes round a point, by the sum of all solid angles.
+/// Winding number of the surface about a point, as the sum of all solid angles.
 Real winding(const TriangleMesh& mesh, const Vec3& p) {
   Real sum = 0;
   for (const Triangle& t : mesh.triangles) {
@@ -54,7 +54,7 @@ Real winding(const TriangleMesh& mesh, const Vec3& p) {
   return sum / (4 * std::numbers::pi);
 }
 
-/// Height of a point over the highest plane: negative inside.
+/// Height of a point over the highest face plane; negative inside.
 Real height_over(const ConvexPolyhedron& part, const Vec3& p) {
   Real height = -std::numeric_limits<Real>::infinity();
   for (uint32_t f = 0; f < part.face_count(); ++f)
@@ -62,7 +62,7 @@ Real height_over(const ConvexPolyhedron& part, const Vec3& p) {
   return height;
 }
 
-/// Points all over the box of a mesh.
+/// Random points in the bounding box of a mesh.
 std::vector<Vec3> scattered_points(const TriangleMesh& mesh, uint64_t count) {
   Aabb box;
   for (const Vec3& v : mesh.vertices) box.extend(v);
@@ -74,7 +74,7 @@ std::vector<Vec3> scattered_points(const TriangleMesh& mesh, uint64_t count) {
   return points;
 }
 
-/// Every point inside the solid is in one part and no other point is in any.
+/// Checks that every point inside the solid is in exactly one part, and that no other point is in any.
 void expect_tiling(const TriangleMesh& mesh, const ConvexDecomposition& d) {
   const Real margin = 1e-6 * extent(mesh);
   for (const Vec3& p : scattered_points(mesh, 2000)) {
@@ -94,7 +94,7 @@ struct Solid {
   const char* name;
   TriangleMesh mesh;
   Real volume;
-  std::size_t parts;  // enough for it
+  std::size_t parts;  // number of parts that suffices
 };
 
 Real prism_volume(uint32_t points, Real outer, Real inner, Real height) {
@@ -146,10 +146,10 @@ TEST(Decomposition, PartsShareTheCornersOfACutBitwise) {
   for (const Vec3& v : d.parts[0].vertices())
     shared += std::find(d.parts[1].vertices().begin(), d.parts[1].vertices().end(), v) !=
               d.parts[1].vertices().end();
-  EXPECT_GE(shared, 2);  // at least the reflex edge
+  EXPECT_GE(shared, 2);  // at least those of the reflex edge
 }
 
-// Solids of random cubes are full of coplanar faces, collinear edges, tunnels and corners that touch.
+// Unions of random cubes have many coplanar faces, collinear edges, tunnels and corners that touch.
 TEST(Decomposition, RandomPolycubes) {
   int exact = 0;
   for (uint64_t seed = 0; seed < 400; ++seed) {
@@ -160,7 +160,7 @@ TEST(Decomposition, RandomPolycubes) {
     };
     for (int i = 0; i < 48; ++i) count += filled(i / 12, i / 3 % 4, i % 3);
     const TriangleMesh mesh = placed_at_random(cubes(4, 4, 3, filled), 1, seed);
-    if (!MeshTopology(mesh).defects().closed()) continue;  // cubes that touch along an edge
+    if (!MeshTopology(mesh).defects().closed()) continue;  // cubes that touch only along an edge
     const ConvexDecomposition d = decomposed(mesh, {.resolution = 8});
     if (d.note == "a cavity inside") continue;
     SCOPED_TRACE(seed);
@@ -170,7 +170,7 @@ TEST(Decomposition, RandomPolycubes) {
   EXPECT_GT(exact, 20);
 }
 
-// Every face of a crumpled ball has its own plane and about half of the edges are reflex.
+// Every face of a ball with random radii has its own plane, and about half of the edges are reflex.
 TEST(Decomposition, CrumpledBalls) {
   for (uint64_t seed = 0; seed < 10; ++seed) {
     TriangleMesh mesh = sphere_mesh(1, 6, 4);
@@ -240,7 +240,7 @@ TEST(Decomposition, PartsAreRebuiltBitwiseFromVerticesAndFaces) {
   }
 }
 
-/// Share of the points inside the surface that some part holds.
+/// Fraction of the points inside the surface that lie in some part.
 Real covered(const TriangleMesh& mesh, const ConvexDecomposition& d, uint64_t points) {
   int inside = 0, held = 0;
   for (const Vec3& p : scattered_points(mesh, points)) {
@@ -260,7 +260,7 @@ TEST(ApproximateDecomposition, HolesAreBridgedAndSidesStaySmooth) {
   EXPECT_EQ(d.note, "3 border edges");
   EXPECT_NEAR(total_volume(d), 7, 0.2);
   EXPECT_GT(covered(mesh, d, 2000), 0.999);
-  // Parts keep the surface's corners: no stairs of voxels.
+  // The parts keep the corners of the surface, without voxel steps.
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
     EXPECT_TRUE(std::any_of(d.parts.begin(), d.parts.end(), [&](const ConvexPolyhedron& part) {
       return std::abs(height_over(part, mesh.vertices[v])) < 1e-9;
@@ -308,7 +308,7 @@ TEST(ApproximateDecomposition, SurfacesWithoutInsideHaveNoParts) {
   EXPECT_EQ(d.note, "the surface encloses nothing: 32 border edges");
   EXPECT_EQ(decomposed({}).method, Method::none);
   EXPECT_EQ(decomposed({{Vec3::Ones(), Vec3::Ones(), Vec3::Ones()}, {{0, 1, 2}}}).method, Method::none);
-  // A sheet with two sides is closed but has no volume.
+  // A two-sided sheet is closed but has no volume.
   EXPECT_EQ(decomposed({{Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY()}, {{0, 1, 2}, {0, 2, 1}}}).method,
             Method::none);
 }

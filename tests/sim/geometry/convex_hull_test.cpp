@@ -10,7 +10,7 @@
 namespace offstage::sim {
 namespace {
 
-/// How far the farthest point lies outside the hull.
+/// Distance of the farthest point outside the hull.
 Real excess(const ConvexPolyhedron& hull, const std::vector<Vec3>& points) {
   Real worst = 0;
   for (uint32_t f = 0; f < hull.face_count(); ++f)
@@ -22,9 +22,9 @@ long euler_characteristic(const ConvexPolyhedron& p) {
   return static_cast<long>(p.vertices().size()) - static_cast<long>(p.edges().size()) + p.face_count();
 }
 
-/// Six times the volume of the hull of points with small integer coordinates, exactly: every plane through
-/// three points that has all others on one side is a face plane; its polygon's area comes from the pairs of
-/// neighbours around it.
+/// Six times the volume of the convex hull of points with small integer coordinates, exactly. Every plane
+/// through three points with all others on one side is a face plane; the area of its polygon comes from the
+/// pairs of neighbouring corners.
 long brute_volume(const std::vector<Vec3>& points) {
   using Int3 = Eigen::Matrix<long, 3, 1>;
   std::vector<Int3> p;
@@ -35,16 +35,16 @@ long brute_volume(const std::vector<Vec3>& points) {
   p.erase(std::unique(p.begin(), p.end()), p.end());
   const std::size_t n = p.size();
   long volume = 0;
-  // A directed edge (i, j) of the face on its left: no point of the set lies to the right of it within the
-  // face's plane, and none above the plane.
+  // A directed edge (i, j) with its face on the left: within the plane of the face, no point lies to the
+  // right of it, and no point lies above the plane.
   for (std::size_t i = 0; i < n; ++i)
     for (std::size_t j = 0; j < n; ++j)
       for (std::size_t k = 0; k < n; ++k) {
         if (i == j || j == k || i == k) continue;
         const Int3 normal = (p[j] - p[i]).cross(p[k] - p[i]);
         if (normal.isZero()) continue;
-        // (i, j, k) counts if k is the fan's apex: the lowest index in the plane, and i, j are hull
-        // neighbours.
+        // (i, j, k) counts if k is the apex of the fan (the lowest index in the plane) and i, j are
+        // neighbours on the hull.
         bool counts = true;
         for (std::size_t m = 0; m < n && counts; ++m) {
           const long height = normal.dot(p[m] - p[i]);
@@ -98,7 +98,7 @@ TEST(ConvexHull, RoundSolidsKeepEveryVertex) {
   EXPECT_NEAR(mass_properties(hull.triangles()).volume, mass_properties(mesh).volume, 1e-12 * 32);
 }
 
-// On integer points every degenerate case is frequent: duplicates, lines, planes.
+// With integer coordinates, all degenerate cases are frequent: duplicates, collinear and coplanar points.
 TEST(ConvexHull, VolumeOfGridPointsIsExact) {
   EXPECT_TRUE(rc::check([] {
     const auto coordinate = rc::gen::element<Real>(0, 1, 2, 3);
@@ -177,7 +177,7 @@ TEST(ConvexPolyhedron, OpenSurfacesAreRefused) {
   EXPECT_THROW(ConvexPolyhedron(vertices, missing), std::invalid_argument);
 }
 
-// Products of four coordinates overflow beyond 1e77, and vanish below 1e-77.
+// Products of four coordinates overflow above 1e77 and underflow below 1e-77.
 TEST(ConvexHull, IsTheSameAtEveryScale) {
   const std::vector<Vec3> points = box_mesh(Vec3(1, 2, 3)).vertices;
   const ConvexPolyhedron usual = convex_hull(points);

@@ -14,7 +14,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Vectors of whole numbers and an exact oracle for the intersection of hulls of few points.
+/// Vectors of whole numbers, and an exact reference for the intersection of the convex hulls of a few points.
 __extension__ typedef __int128 Whole;
 
 struct WholeVec {
@@ -42,8 +42,9 @@ bool separated(const WholeVec& axis, const std::vector<WholeVec>& a, const std::
   return before(*a_high, *b_low) || before(*b_high, *a_low);
 }
 
-/// Hulls of points are disjoint if and only if some plane separates them strictly; one that does can be
-/// turned until it is normal to a difference of points, to two of them, or to one in the plane of two.
+/// Convex hulls of points are disjoint if and only if some plane strictly separates them. A separating plane
+/// can be turned until its normal is a difference of two points, is perpendicular to two such differences, or
+/// is perpendicular to one within the plane of two.
 bool exactly_intersect(const std::vector<WholeVec>& a, const std::vector<WholeVec>& b) {
   std::vector<WholeVec> differences, normals;
   for (const auto* own : {&a, &b})
@@ -67,7 +68,7 @@ std::vector<WholeVec> hull(const P&... points) {
   return {whole(points)...};
 }
 
-/// A point of a grid so small that most triangles are degenerate, touch, or lie in one plane.
+/// A point of a grid so small that most triangles are degenerate, touch, or are coplanar.
 Vec3 grid_point(int side, int stretch) {
   const auto coordinate = rc::gen::map(rc::gen::inRange(0, side), [=](int i) { return Real(i * stretch); });
   return {*coordinate, *coordinate, *coordinate};
@@ -102,10 +103,9 @@ TEST(Intersection, OfGridSegmentsAndPointsIsExact) {
   }));
 }
 
-// Points near a line, a few units off it: the true determinants are far below the rounding error of naive
-// ones.
+// Points a few units away from a line: the exact determinants are far below the rounding error of naive ones.
 TEST(Predicates, AreExactWhereRoundingIsNot) {
-  constexpr Real kUnit = 0x1p-38;  // all are whole numbers of it, which the oracle computes with
+  constexpr Real kUnit = 0x1p-38;  // all coordinates are whole multiples of it, so the reference is exact
   const Scatter random{1};
   int naive_wrong = 0;
   for (uint64_t i = 0; i < 5000; ++i) {
@@ -133,8 +133,8 @@ TEST(Predicates, AreExactWhereRoundingIsNot) {
   EXPECT_GT(naive_wrong, 500) << "the inputs are not hard enough to show anything";
 }
 
-// The classroom example of Kettner, Mehlhorn, Pion, Schirra and Yap (2008): next to 1/2 the differences to 12
-// and 24 are rounded.
+// The example of Kettner, Mehlhorn, Pion, Schirra and Yap (2008): near 1/2, the differences to 12 and 24 are
+// rounded.
 TEST(Predicates, InThePlaneAreExactWhereRoundingIsNot) {
   int naive_wrong = 0;
   for (int i = 0; i < 128; ++i)
@@ -149,8 +149,7 @@ TEST(Predicates, InThePlaneAreExactWhereRoundingIsNot) {
   EXPECT_GT(naive_wrong, 500);
 }
 
-// A segment through the shared edge of two triangles, or so close by that rounding cannot tell, hits at least
-// one.
+// A segment through the shared edge of two triangles, or within rounding of it, hits at least one of them.
 TEST(Intersection, NothingSlipsThroughASharedEdge) {
   const Scatter random{2};
   for (uint64_t i = 0; i < 5000; ++i) {

@@ -23,7 +23,8 @@ TEST(MassProperties, BoxMeshEqualsTheClosedFormWhereverItIs) {
   EXPECT_NEAR((m.inertia - R * exact.inertia * R.transpose()).norm(), 0, 1e-12);
 }
 
-// With vertices at 0 and the unit axes: volume 1/6, centre 1/4 each, int x^2 = 1/60, int xy = 1/120.
+// For vertices at 0 and at the unit vectors: volume 1/6, centre (1/4, 1/4, 1/4), int x^2 = 1/60, int xy =
+// 1/120.
 TEST(MassProperties, CornerTetrahedron) {
   const TriangleMesh mesh = {{Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()},
                              {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
@@ -36,9 +37,10 @@ TEST(MassProperties, CornerTetrahedron) {
   EXPECT_NEAR(m.inertia(1, 2), off, 1e-15);
 }
 
-// The closed forms of the primitives against fine meshes of the same solids.
+// Compares the closed forms of the primitives with fine meshes of the same solids.
 TEST(MassProperties, ClosedFormsOfPrimitivesAgreeWithMeshes) {
-  const auto revolution = [](const std::vector<Eigen::Vector2d>& profile) {  // top pole to bottom pole
+  // the profile goes from the top pole to the bottom pole
+  const auto revolution = [](const std::vector<Eigen::Vector2d>& profile) {
     constexpr uint32_t kAround = 400;
     TriangleMesh mesh;
     for (const auto& p : profile)

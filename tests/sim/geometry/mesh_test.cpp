@@ -41,7 +41,7 @@ TEST(Topology, VertexListsAreAscendingAndComplete) {
   const MeshTopology topology(mesh);
   for (uint32_t v = 0; v < mesh.vertices.size(); ++v) {
     const auto faces = topology.vertex_faces(v), neighbours = topology.vertex_neighbours(v);
-    EXPECT_EQ(faces.size(), neighbours.size());  // a closed fan
+    EXPECT_EQ(faces.size(), neighbours.size());  // the faces around the vertex form a closed fan
     EXPECT_TRUE(std::is_sorted(faces.begin(), faces.end()));
     EXPECT_TRUE(std::is_sorted(neighbours.begin(), neighbours.end()));
     for (uint32_t f : faces)

@@ -22,7 +22,7 @@ Real area(const std::vector<Vec2>& polygon) {
   return sum;
 }
 
-/// The pieces are convex, use every vertex and fill the polygon.
+/// Checks that the pieces are convex, use every vertex and fill the polygon.
 void expect_convex_pieces(const std::vector<Vec2>& polygon) {
   const auto pieces = convex_pieces(polygon, 1e-9);
   ASSERT_FALSE(pieces.empty());
@@ -46,7 +46,7 @@ void expect_convex_pieces(const std::vector<Vec2>& polygon) {
 
 TEST(Polygon, ConvexPiecesFillIt) {
   expect_convex_pieces({{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}});
-  // A comb with vertices in the middle of straight sides.
+  // A comb-shaped polygon with vertices in the middle of straight sides.
   expect_convex_pieces({{0, 0},
                         {1, 0},
                         {2, 0},
@@ -77,7 +77,7 @@ TEST(Polygon, ConvexPiecesFillIt) {
 }
 
 TEST(Polygon, MayTouchItselfAtAVertex) {
-  // A ring of four squares around a hole, closed by two corners that meet.
+  // A ring of squares around a hole, closed at two corners that coincide.
   expect_convex_pieces({{0, 0}, {3, 0}, {3, 2}, {2, 2}, {2, 1}, {1, 1}, {1, 2}, {2, 2}, {2, 3}, {0, 3}});
 }
 

@@ -23,12 +23,12 @@ TEST(WindingNumber, IsOneInsideAndZeroOutsideOfClosedMeshes) {
   for (uint64_t i = 0; i < 2000; ++i) {
     const Vec3 p = scattered(i, 1.5);
     const Real height = std::hypot(std::hypot(p.x(), p.z()) - R, p.y()) - r;
-    if (std::abs(height) < 0.01) continue;  // the mesh is not quite the torus
+    if (std::abs(height) < 0.01) continue;  // near the surface, the mesh differs from the torus
     ASSERT_NEAR(torus.at(p), height < 0 ? 1 : 0, 0.1) << p.transpose();
   }
 }
 
-// A disc seen from its axis covers a cap of the sphere: half of (1 - cos) of the whole.
+// Seen from a point on its axis, a disc covers a spherical cap: a fraction (1 - cos) / 2 of the sphere.
 TEST(WindingNumber, OfAnOpenSheetIsItsSolidAngle) {
   TriangleMesh disc;
   constexpr uint32_t kAround = 720;

@@ -24,7 +24,8 @@ Mat6 random_block(Dice& dice) {
   return m;
 }
 
-/// Like a contact problem: a mass for each row, and for each pair a stiff B^T B on both of its rows.
+/// A matrix like that of a contact problem: a mass on the diagonal for each row, and for each pair a stiff
+/// B^T B coupling both of its rows.
 Matrix random_matrix(Dice& dice, uint32_t rows, const Pairs& pairs, Real stiffness) {
   Matrix m{std::vector<Mat6>(rows, Mat6::Identity()), {}, Eigen::MatrixXd::Identity(6 * rows, 6 * rows)};
   for (const auto& [i, j] : pairs) {
@@ -53,9 +54,9 @@ Pairs random_pairs(Dice& dice, uint32_t rows, uint32_t count) {
   return pairs;
 }
 
-TEST(BlockCholesky, SolvesAsTheDenseOneDoes) {
+TEST(BlockCholesky, AgreesWithTheDenseFactorization) {
   Dice dice(1);
-  BlockCholesky<6> cholesky;  // kept, so that one pattern follows another
+  BlockCholesky<6> cholesky;  // the object is reused, so one pattern follows another
   for (int round = 0; round < 120; ++round) {
     const uint32_t rows = 1 + dice.index(20);
     const Pairs pairs = random_pairs(dice, rows, dice.index(4 * rows));
@@ -78,7 +79,7 @@ TEST(BlockCholesky, SolvesAsTheDenseOneDoes) {
   }
 }
 
-TEST(BlockCholesky, SaysWhenTheMatrixIsNotPositiveDefinite) {
+TEST(BlockCholesky, ReportsMatricesThatAreNotPositiveDefinite) {
   Dice dice(2);
   const Pairs pairs = {{0, 1}, {1, 2}};
   Matrix m = random_matrix(dice, 3, pairs, 1);
@@ -89,9 +90,9 @@ TEST(BlockCholesky, SaysWhenTheMatrixIsNotPositiveDefinite) {
   EXPECT_FALSE(cholesky.factorize(m.diagonal, m.off));
 }
 
-// A stack in any numbering has no fill: one block more per row. A wall of n x n bodies has far less than a
-// band of n.
-TEST(BlockCholesky, ReordersSoThatLittleFillsIn) {
+// A stack has no fill-in in any numbering: one off-diagonal block per row. A wall of n x n bodies has far
+// less than a band matrix of width n.
+TEST(BlockCholesky, ReordersForLittleFillIn) {
   constexpr uint32_t kRows = 400, kWide = 20;
   std::vector<uint32_t> name(kRows);
   for (uint32_t i = 0; i < kRows; ++i) name[i] = i * 157 % kRows;
@@ -113,10 +114,10 @@ TEST(BlockCholesky, ReordersSoThatLittleFillsIn) {
   EXPECT_LT(cholesky.factor_blocks(), kRows * kWide / 2);
 }
 
-TEST(BlockCholesky, SolvesQuasiDefiniteMatricesWhateverComesFirst) {
+TEST(BlockCholesky, SolvesQuasiDefiniteMatricesInAnyOrder) {
   Dice dice(7);
   for (int round = 0; round < 40; ++round) {
-    // Bodies, and rows that join two of them, with nothing on the diagonal.
+    // Rows of bodies, and rows of joints that connect two of them and have a zero diagonal block.
     const uint32_t bodies = 2 + dice.index(12), joints = 1 + dice.index(bodies - 1);
     std::vector<Mat6> diagonal, off;
     std::vector<BlockRowKind> kinds(joints, {.is_negative = true, .is_empty = true});
@@ -134,7 +135,7 @@ TEST(BlockCholesky, SolvesQuasiDefiniteMatricesWhateverComesFirst) {
       dense.block<6, 6>(6 * (joints + i), 6 * (joints + i)) = diagonal.back();
     }
     for (const auto& [i, j] : pairs) {
-      // As of joints: whatever one body does, another can undo.
+      // As in joints, the block is invertible: each body can move along every constraint.
       off.push_back(Mat6::Identity() + 0.2 * random_block(dice));
       dense.block<6, 6>(6 * i, 6 * j) = off.back();
       dense.block<6, 6>(6 * j, 6 * i) = off.back().transpose();

@@ -25,7 +25,7 @@ MatrixXd random_lcp_matrix(Dice& dice, Index rows, Index columns) {
   return m;
 }
 
-/// Tries all 2^n sets of contacts that hold.
+/// Reference solution: tries all 2^n sets of active contacts.
 VectorXd enumerated(const MatrixXd& A, const VectorXd& b) {
   const Index n = b.size();
   for (uint32_t set = 0; set < (1u << n); ++set) {
@@ -47,7 +47,7 @@ VectorXd enumerated(const MatrixXd& A, const VectorXd& b) {
   return VectorXd::Zero(n);
 }
 
-/// The conditions themselves, relative to b.
+/// Checks the conditions of the LCP, relative to b.
 void expect_solves(const LcpSolution& s, const MatrixXd& A, const VectorXd& b, Real tolerance) {
   const VectorXd a = A * s.f + b;
   const Real scale = b.cwiseAbs().maxCoeff();
@@ -72,7 +72,8 @@ TEST(Lcp, RandomProblemsMatchEnumeration) {
   }
 }
 
-// b in the range of A, as it is for contacts: solvable whatever the rank, and a is unique where f is not.
+// b is in the range of A, as it is for contacts: the problem is solvable for any rank, and a is unique even
+// where f is not.
 TEST(Lcp, ProblemsOfEveryRankAreSolved) {
   Dice dice(2);
   for (int trial = 0; trial < 2000; ++trial) {
@@ -84,7 +85,7 @@ TEST(Lcp, ProblemsOfEveryRankAreSolved) {
   }
 }
 
-// Whole numbers make ties everywhere: steps of no length, where indices could go back and forth for ever.
+// Whole numbers cause many ties, hence steps of length zero, at which a pivoting method could cycle.
 TEST(Lcp, DegenerateProblemsAreSolved) {
   Dice dice(3);
   for (int trial = 0; trial < 2000; ++trial) {
@@ -108,14 +109,14 @@ TEST(Lcp, FiveHundredContactsHaveNoResidual) {
   EXPECT_LT(s.pivots, 2000u);
 }
 
-/// Unit boxes on each other: `points` contacts per layer, all normals up; b is gravity's.
+/// Unit boxes on each other with `points` contacts per layer. All normals point up, and b comes from gravity.
 struct Stack {
   MatrixXd A;
   VectorXd b;
 
   Stack(int boxes, const std::vector<Vec3>& points, Real mass, Real inertia) {
     const auto per = static_cast<Index>(points.size()), n = boxes * per;
-    MatrixXd J = MatrixXd::Zero(n, 3 * boxes);  // of each box: up, and turning about x and z
+    MatrixXd J = MatrixXd::Zero(n, 3 * boxes);  // for each box: vertical motion, and rotation about x and z
     for (Index i = 0; i < n; ++i) {
       const Vec3& r = points[static_cast<std::size_t>(i % per)];
       const Index above = i / per;
@@ -148,7 +149,7 @@ TEST(Lcp, RedundantContactsCarryTheWholeWeight) {
   }
 }
 
-TEST(Lcp, TenBoxesCarryWhatStandsOnThem) {
+TEST(Lcp, TenBoxesCarryTheBoxesAboveThem) {
   const Stack stack(10, square_grid(2), 2, 1.0 / 3);
   const LcpSolution s = solve_lcp(stack.A, stack.b);
   expect_solves(s, stack.A, stack.b, 1e-12);
@@ -156,7 +157,8 @@ TEST(Lcp, TenBoxesCarryWhatStandsOnThem) {
     EXPECT_NEAR(s.f.segment<4>(4 * k).sum(), static_cast<Real>(10 - k) * 2 * 9.81, 1e-10);
 }
 
-// Two opposite walls that both come nearer: no force on the one is without the other.
+// Two opposite walls that both approach: a force from one requires an equal one from the other, which changes
+// nothing.
 TEST(Lcp, ImpossibleProblemReportsTheIndex) {
   MatrixXd A(3, 3);
   A << 1, -1, 0, -1, 1, 0, 0, 0, 2;

@@ -82,7 +82,7 @@ TEST(ParticleCollision, RestsOnEveryShapeWithoutSinkingOrDrifting) {
   }
 }
 
-// s = 1/2 g (sin a - mu cos a) t^2 above the friction angle, nothing below it.
+// s = 1/2 g (sin a - mu cos a) t^2 above the friction angle, zero below it.
 TEST(ParticleCollision, CoulombFrictionOnAnIncline) {
   for (Real angle : {0.4, 0.6}) {
     constexpr Real kMu = 0.5;
@@ -153,9 +153,9 @@ TEST(ParticleCollision, IsProjectedOutOfABodyAndCounted) {
   EXPECT_EQ(world.step(kFrame).particles_ejected, 0u);
 }
 
-TEST(ParticleCollision, IsRemovedAndCountedWhereThereIsNoWayOut) {
+TEST(ParticleCollision, IsRemovedAndCountedIfItCannotBeProjectedOut) {
   World world({.gravity = Vec3::Zero()});
-  for (const Vec3& n : {Vec3(0, 1, 0), Vec3(0, -1, 0)})  // a slot narrower than the particle
+  for (const Vec3& n : {Vec3(0, 1, 0), Vec3(0, -1, 0)})  // the slot is narrower than the particle
     world.add_body({.shape = Plane{},
                     .motion = MotionType::static_body,
                     .pose = {-0.01 * n, rotation_between(Vec3::UnitY(), n)}});
@@ -165,7 +165,7 @@ TEST(ParticleCollision, IsRemovedAndCountedWhereThereIsNoWayOut) {
   EXPECT_EQ(world.particle_count(), 0u);
 }
 
-TEST(ParticleCollision, DiesOnItsFirstHitIfToldSo) {
+TEST(ParticleCollision, DiesOnItsFirstCollisionIfSet) {
   World world;
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
   const auto system = world.add_particle_system({.dies_on_hit = true});

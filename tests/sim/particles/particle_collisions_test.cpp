@@ -1,4 +1,4 @@
-/// Particles against particles: impacts at their very times.
+/// Collisions between particles, each at its own time of impact.
 
 #include "sim/particles/particle_collisions.h"
 
@@ -71,7 +71,7 @@ TEST(ParticlePairs, HeadOnAndObliqueCollisionsHaveTheClosedForm) {
     }
 }
 
-/// Five touching particles in a row, hit by the first ones; velocities afterwards.
+/// Five touching particles in a row, hit by the first `hitting` ones; returns the velocities afterwards.
 std::vector<Real> cradle(ImpactLaw law, int hitting) {
   World world({.gravity = Vec3::Zero(), .impact = law});
   const auto system = world.add_particle_system({.internal = true});
@@ -93,7 +93,8 @@ TEST(ParticlePairs, NewtonsCradleByBothImpactLaws) {
     const std::vector<Real> v = cradle(ImpactLaw::sequential, hitting);
     for (int i = 0; i < 5; ++i) EXPECT_NEAR(v[static_cast<std::size_t>(i)], i >= 5 - hitting ? 1 : 0, 1e-9);
   }
-  // Together: the first one rebounds against the others as one body of four.
+  // With the simultaneous law, the first particle rebounds from the others as from one body of four times the
+  // mass.
   const std::vector<Real> v = cradle(ImpactLaw::simultaneous, 1);
   EXPECT_NEAR(v[0], -0.6, 1e-9);
   for (std::size_t i = 1; i < 5; ++i) EXPECT_NEAR(v[i], 0.4, 1e-9);
@@ -118,7 +119,7 @@ World gas(ParticleSystemHandle& system, std::size_t count, Real e, Real friction
 TEST(ParticlePairs, AGasKeepsMomentumAndWithElasticCollisionsEnergy) {
   ParticleSystemHandle system;
   World elastic = gas(system, 300, 1, 0);
-  elastic.step(kFilmFrame);  // those that overlapped come apart
+  elastic.step(kFilmFrame);  // particles that overlapped at the start separate
   const Real energy = elastic.energy().kinetic;
   const Vec3 before = momentum(elastic);
   uint64_t collisions = 0;
@@ -138,9 +139,9 @@ TEST(ParticlePairs, AGasKeepsMomentumAndWithElasticCollisionsEnergy) {
   EXPECT_NEAR((momentum(rough) - first).norm(), 0, 1e-10);
 }
 
-TEST(ParticlePairs, FastOnesInALineNeverPassEachOther) {
-  // Off the line by rounding, which each collision multiplies by about the way over the radius, they would in
-  // the end pass beside each other if they were small.
+TEST(ParticlePairs, FastParticlesInALineNeverPassEachOther) {
+  // Rounding moves the particles off the line, and each collision multiplies the deviation by about the free
+  // path over the radius. Smaller particles would eventually pass beside each other.
   World world({.gravity = Vec3::Zero()});
   const auto system = world.add_particle_system({.internal = true});
   const Scatter random{9};
@@ -161,13 +162,13 @@ TEST(ParticlePairs, FastOnesInALineNeverPassEachOther) {
   EXPECT_GT(collisions, 500u);
 }
 
-TEST(ParticlePairs, FastSmallOnesInACloudNeverOverlap) {
+TEST(ParticlePairs, FastSmallParticlesInACloudNeverOverlap) {
   World world({.gravity = Vec3::Zero()});
   const auto system = world.add_particle_system({.internal = true});
   const Scatter random{9};
   constexpr Real kRadius = 0.005;
   for (uint64_t i = 0; i < 1000; ++i) {
-    // From all sides towards the middle.
+    // Particles from all sides move towards the middle.
     const auto at = [&](uint64_t k) { return random.uniform(i, k) - 0.5; };
     const Vec3 place(0.05 * static_cast<Real>(i % 10), 0.05 * static_cast<Real>(i / 10 % 10),
                      0.05 * static_cast<Real>(i / 100));
@@ -202,7 +203,8 @@ TEST(ParticlePairs, FlagsSayWhichSystemsCollide) {
     }
 }
 
-// At first, in between, and after all have died; the grid must not remember the places of before.
+// Systems are empty at first, in between, and after all particles have died; the grid must not contain the
+// earlier positions.
 TEST(ParticlePairs, SystemsMayBeEmptyAtAnyTime) {
   World world({.gravity = Vec3::Zero(), .max_step = kFilmFrame});
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
@@ -219,7 +221,7 @@ TEST(ParticlePairs, SystemsMayBeEmptyAtAnyTime) {
   }
 }
 
-TEST(ParticlePairs, EventsTellOfCollisionsAndDeathsInOrder) {
+TEST(ParticlePairs, EventsListCollisionsAndDeathsInOrder) {
   World world({.gravity = Vec3::Zero(), .max_step = kFilmFrame});
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 1, .friction = 0});
   const auto pairs = world.add_particle_system({.internal = true, .report_collisions = true});

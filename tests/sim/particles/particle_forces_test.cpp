@@ -10,13 +10,13 @@
 namespace offstage::sim {
 namespace {
 
-/// The acceleration of a particle of 2 kg with a drag of 0.5 kg/s by one force alone.
+/// The acceleration that one force gives a particle of 2 kg whose own drag coefficient is 0.5 kg/s.
 Vec3 acceleration(const ForceDef& def, const Vec3& x, const Vec3& v = Vec3::Zero(), Real t = 0) {
   const ParticleForces forces({.linear_drag = 0.5, .gravity = false}, Vec3::Zero(), Vec3::Zero(), {&def});
   const Real mass[] = {2};
   Vec3 dv;
   forces.accelerate(t, {x.data(), 3}, {v.data(), 3}, mass, {dv.data(), 3});
-  return dv + 0.25 * v;  // without its own drag
+  return dv + 0.25 * v;  // subtracts the particle's own drag
 }
 
 TEST(ParticleForces, OfFieldsFallOffInTheirRegions) {
@@ -30,24 +30,24 @@ TEST(ParticleForces, OfFieldsFallOffInTheirRegions) {
   EXPECT_EQ(acceleration(ForceDef{.effect = PointField{{0, 5, 0}, 6}}, {0, 5, 0}), Vec3::Zero());
 }
 
-TEST(ParticleForces, OfAirActThroughTheFieldsDragOrElseTheParticlesOwn) {
+TEST(ParticleForces, OfAirUseTheFieldsDragOrTheParticlesOwn) {
   const Vec3 wind(3, 0, 0), v(1, 2, 0);
   EXPECT_NEAR(
       (acceleration({.effect = WindField{.wind = wind, .drag = 4}}, Vec3::Zero(), v) - 2 * (wind - v)).norm(),
       0, 1e-15);
-  // -k (v - wind) equals the own drag plus k wind.
+  // -k (v - wind) is the particle's own drag plus k wind.
   EXPECT_NEAR((acceleration({.effect = WindField{.wind = wind}}, Vec3::Zero(), v) - 0.25 * wind).norm(), 0,
               1e-15);
 }
 
-TEST(ParticleForces, AreOnForTheirTimeOnly) {
+TEST(ParticleForces, ActDuringTheirTimeOnly) {
   const ForceDef push{.start = 1, .end = 2, .effect = ConstantField{{2, 0, 0}}};
   EXPECT_EQ(acceleration(push, Vec3::Zero(), Vec3::Zero(), 0.99), Vec3::Zero());
   EXPECT_EQ(acceleration(push, Vec3::Zero(), Vec3::Zero(), 1), Vec3(1, 0, 0));
   EXPECT_EQ(acceleration(push, Vec3::Zero(), Vec3::Zero(), 2), Vec3::Zero());
 }
 
-// The integral of the velocity around a circle about the axis: Gamma r^2 / (r^2 + R^2).
+// The circulation: the integral of the velocity around a circle about the axis is Gamma r^2 / (r^2 + R^2).
 TEST(Vortex, HasItsCirculationAndNoDivergence) {
   const Vortex vortex{.point = {1, 2, 3}, .axis = {1, 2, -2}, .circulation = 5, .radius = 0.4};
   const Vec3 axis = vortex.axis / 3, e1 = axis.unitOrthogonal(), e2 = axis.cross(e1);
@@ -71,7 +71,7 @@ TEST(Vortex, HasItsCirculationAndNoDivergence) {
   EXPECT_NEAR(divergence, 0, 1e-12);
 }
 
-// m g = k (v - u) at the end.
+// Terminal velocity: m g = k (v - u).
 TEST(ParticleForces, CarryParticlesToTheirTerminalSpeedInTheWind) {
   World world({.wind = {1, 0, 0}});
   const auto system = world.add_particle_system({.linear_drag = 0.2});
@@ -82,12 +82,12 @@ TEST(ParticleForces, CarryParticlesToTheirTerminalSpeedInTheWind) {
   EXPECT_NEAR((world.particles(system).velocity[0] - Vec3(0.5, -0.04 * 9.81 / 0.4, 2)).norm(), 0, 1e-6);
 }
 
-TEST(ParticleForces, ActOnWhatTheyName) {
+TEST(ParticleForces, ActOnNamedObjectsOnly) {
   World world({.gravity = Vec3::Zero()});
   const auto a = world.add_particle_system({.name = "a"}), b = world.add_particle_system({.name = "b"});
   const BodyHandle body = world.add_body({.mass = 1});
   world.add_force({.systems = {a}, .effect = ConstantField{{1, 0, 0}}});
-  world.add_force({.effect = ConstantField{{0, 1, 0}}});  // all bodies
+  world.add_force({.effect = ConstantField{{0, 1, 0}}});  // acts on all bodies
   world.add_force({.bodies = {body}, .systems = {b}, .effect = ConstantField{{0, 0, 1}}});
   for (auto system : {a, b}) world.add_particle(system, {.position = {9, 0, 0}});
   world.step(1);
@@ -96,7 +96,7 @@ TEST(ParticleForces, ActOnWhatTheyName) {
   EXPECT_NEAR((world.body(body).velocity - Vec3(0, 1, 1)).norm(), 0, 1e-12);
 }
 
-TEST(ParticleForces, OfAHandPullWhatIsInItsReach) {
+TEST(ParticleForces, OfAGrabPullParticlesInItsReach) {
   World world;
   const auto system = world.add_particle_system({.linear_drag = 0.1, .integrator = IntegratorKind::rk4});
   world.add_force({.systems = {system},
@@ -125,8 +125,8 @@ TEST(ParticleForces, OfAnExplosionAreItsImpulse) {
   EXPECT_EQ(world.particles(system).velocity[1], Vec3::Zero());
 }
 
-// k/m = 1e6: explicit methods at this step would explode.
-TEST(ParticleForces, StiffOnesAreForImplicitEuler) {
+// k/m = 1e6: explicit methods diverge at this step.
+TEST(ParticleForces, StiffForcesAreStableWithImplicitEuler) {
   World world({.max_step = 1.0 / 30});
   const auto system =
       world.add_particle_system({.linear_drag = 100, .integrator = IntegratorKind::implicit_euler});
@@ -142,7 +142,8 @@ TEST(ParticleForces, StiffOnesAreForImplicitEuler) {
   EXPECT_NEAR((world.particles(system).position[0] - Vec3(0, 2, 0)).norm(), 0, 1e-4);
 }
 
-// The same particle in a system that springs hold, in one of particles that attract each other, and alone.
+// The same particle in a system coupled by springs, in a system whose particles attract each other, and
+// alone.
 TEST(ParticleForces, AreTheSameHoweverASystemIsIntegrated) {
   std::array<Vec3, 3> ends;
   for (std::size_t kind = 0; kind < ends.size(); ++kind) {
@@ -166,7 +167,7 @@ TEST(ParticleForces, AreTheSameHoweverASystemIsIntegrated) {
   EXPECT_NEAR((ends[2] - ends[0]).norm(), 0, 1e-12);
 }
 
-// A field presses a particle onto a wall that it slides along, as gravity would.
+// A force field presses a particle onto a surface on which it slides, as gravity would.
 TEST(ParticleForces, PressParticlesOntoSurfaces) {
   World world({.gravity = Vec3::Zero()});
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = 0.25});

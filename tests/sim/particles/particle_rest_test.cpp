@@ -57,8 +57,9 @@ TEST(ParticleRest, AStackOfTenBeadsStandsAndItsForcesSumUp) {
   }
 }
 
-// On planks they slide twice as far along the friction axis as across it; v^2 / (2 mu g) each.
-TEST(ParticleRest, SlidesByTheFrictionAlongAndAcrossTheGrain) {
+// On planks, particles slide twice as far along the friction axis as across it: v^2 / (2 mu g) with either
+// coefficient.
+TEST(ParticleRest, SlidesByTheFrictionAlongAndAcrossTheFrictionAxis) {
   for (bool internal : {false, true}) {
     World world;
     world.add_body({.shape = Plane{},
@@ -81,8 +82,8 @@ TEST(ParticleRest, SlidesByTheFrictionAlongAndAcrossTheGrain) {
   }
 }
 
-/// Releases a loose column of sand; particles do not rotate, so a lattice would not collapse. Returns the
-/// ratio of its final height to its reach.
+/// Releases a loose column of sand and returns the ratio of its final height to its radius. Particles do not
+/// rotate, so a regular lattice would not collapse.
 struct Heap {
   Real slope, kinetic_energy_each, overlap;
 };
@@ -106,7 +107,8 @@ Heap heap(Real friction, int frames) {
   const ParticleArrays& p = world.particles(system);
   Vec3 centre = Vec3::Zero();
   for (const Vec3& x : p.position) centre += x / static_cast<Real>(p.size());
-  // Of a cone with slope s and radius R the mean height is s R / 4, the mean distance from the axis R / 2.
+  // For a cone with slope s and radius R, the mean height is s R / 4 and the mean distance from the axis R /
+  // 2.
   Real height = 0, distance = 0, energy = 0;
   for (std::size_t i = 0; i < p.size(); ++i) {
     const Vec3 d = p.position[i] - centre;
@@ -117,7 +119,7 @@ Heap heap(Real friction, int frames) {
   return {2 * height / distance, energy, greatest_overlap(p)};
 }
 
-TEST(LongParticleRest, AHeapComesToRestAndIsTheSteeperTheRougher) {
+TEST(LongParticleRest, AHeapComesToRestAndIsSteeperWithMoreFriction) {
   const Heap slippery = heap(0, 240), sand = heap(0.3, 240), rough = heap(0.6, 240);
   EXPECT_LT(slippery.slope, 0.02);
   EXPECT_GT(sand.slope, 0.2);
@@ -148,7 +150,7 @@ TEST(ParticleRest, BeadsInATrayWeighOnTheBodyBeneathThem) {
                                 .restitution = 0,
                                 .friction = 0.3});
   for (int i = 0; i < 240; ++i) world.step(kRestFrame);
-  // What the plate presses on the ground with is its own weight and that of the beads.
+  // The plate presses on the ground with its own weight and that of the beads.
   Real weight = 0;
   constexpr int kSamples = 60;
   for (int i = 0; i < kSamples; ++i) {
@@ -181,7 +183,7 @@ TEST(ParticleBodies, AJetOnABoxKeepsMomentumAndWakesIt) {
     }
     EXPECT_FALSE(world.is_asleep(box));
     EXPECT_GT(world.body(box).velocity.x(), 1);
-    EXPECT_LT(world.body(box).angular_velocity.z(), -0.1);  // it is hit above its middle
+    EXPECT_LT(world.body(box).angular_velocity.z(), -0.1);  // the jet hits the box above its centre
   }
 }
 

@@ -8,7 +8,7 @@ namespace {
 const Vec3 kNormal = Vec3(1, 2, -1).normalized();
 const Vec3 kTangent = kNormal.cross(Vec3::UnitX()).normalized();
 
-// Critical coefficient: |u_t| / ((1 + e) |u_n|).
+// Critical friction coefficient: |u_t| / ((1 + e) |u_n|).
 TEST(Impulse, SticksAboveTheCriticalFrictionAndSlidesBelow) {
   constexpr Real kMass = 0.7, kE = 0.5;
   const Vec3 u = -3 * kNormal + 2 * kTangent;
@@ -42,7 +42,7 @@ TEST(Impulse, NeverAddsEnergyAndElasticPairsKeepMomentumEnergyAndAngularMomentum
     const Vec3 P = collision_impulse(m12, v1 - v2, n, 1, 0), w1 = v1 + P / m1, w2 = v2 - P / m2;
     ASSERT_NEAR((m1 * w1 + m2 * w2 - m1 * v1 - m2 * v2).norm(), 0, 1e-12);
     ASSERT_NEAR(energy(w1, w2), energy(v1, v2), 1e-12);
-    // Particles meet with their centres along n about the contact point.
+    // The centres of colliding particles lie along n about the contact point.
     const Vec3 r1 = contact + 0.3 * n, r2 = contact - 0.2 * n;
     ASSERT_NEAR((m1 * r1.cross(w1 - v1) + m2 * r2.cross(w2 - v2)).norm(), 0, 1e-12);
 

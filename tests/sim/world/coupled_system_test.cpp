@@ -12,7 +12,7 @@
 namespace offstage::sim {
 namespace {
 
-/// A world of boxes without shapes, for free and connected bodies.
+/// A world of bodies without collision shapes, free or connected by springs.
 struct Sky {
   WorldState world;
 
@@ -44,7 +44,7 @@ bool same_state(const RigidBody& a, const RigidBody& b) {
 constexpr std::array kSomeKinds = {IntegratorKind::rk4, IntegratorKind::implicit_euler,
                                    IntegratorKind::dormand_prince};
 
-TEST(CoupledSystem, ABodyMovesTheSameWhateverElseMoves) {
+TEST(CoupledSystem, ABodyMovesIndependentlyOfUnconnectedOnes) {
   for (IntegratorKind kind : kSomeKinds) {
     std::vector<RigidBody> expected;
     for (bool crowded : {false, true})
@@ -68,7 +68,7 @@ TEST(CoupledSystem, ABodyMovesTheSameWhateverElseMoves) {
   }
 }
 
-TEST(CoupledSystem, APartPutBackAndSteppedAgainTakesTheSameWay) {
+TEST(CoupledSystem, APartResetAndSteppedAgainMovesTheSame) {
   for (IntegratorKind kind : kSomeKinds) {
     Sky sky;
     std::vector<BodyHandle> bodies;
@@ -87,7 +87,7 @@ TEST(CoupledSystem, APartPutBackAndSteppedAgainTakesTheSameWay) {
     all.restore(involved);
     EXPECT_NE(sky[bodies[0]].position, lone.position);
     EXPECT_NE(sky.world.systems[beads].arrays.position[0], held);
-    EXPECT_TRUE(same_state(sky[bodies[5]], other));  // not connected, so not changed
+    EXPECT_TRUE(same_state(sky[bodies[5]], other));  // not connected, hence unchanged
     const std::vector<Body*> part = connected(sky.world, involved);
     ASSERT_EQ(part, (std::vector<Body*>{sky.body(bodies[0]), sky.body(bodies[1]), sky.body(bodies[3])}));
     CoupledSystem again(sky.world, part);
@@ -137,7 +137,7 @@ TEST(CoupledGroup, JacobianAgreesWithDifferences) {
   sky.join(BodyPoint{b[1], {0, -0.1, 0.2}}, ParticlePoint{beads, 1});
   sky.join(ParticlePoint{beads, 0}, ParticlePoint{beads, 1});
   sky.join(WorldPoint{{4, 1, 0}}, BodyPoint{b[2], {0, 0.2, 0}});
-  sky.join(BodyPoint{b[2], {0.5, 0, 0}}, BodyPoint{b[2], {0, 0.5, 0.1}});  // of a body with itself
+  sky.join(BodyPoint{b[2], {0.5, 0, 0}}, BodyPoint{b[2], {0, 0.5, 0.1}});  // connects a body with itself
   sky.world.springs.for_each([&](SpringHandle, const Spring& s) { members.springs.push_back(&s); });
   const BodyForces forces{{0, -9.81, 0}, {}};
   const CoupledGroup network(sky.world, members, forces);
@@ -173,7 +173,8 @@ TEST(CoupledSystem, ForcesReachTheBodiesThatTheyName) {
     CoupledSystem(sky.world, std::span(forces).first(pushed)).step(integrator(IntegratorKind::rk4), 0, 1e-3);
     for (std::size_t i = 0; i < 4; ++i) momentum[pushed][i] = sky[b[i]].momentum;
   }
-  for (std::size_t i = 0; i < 4; ++i)  // up to what spring and damper make of the motion that this gives
+  // up to the change of the spring and damper forces that this motion causes
+  for (std::size_t i = 0; i < 4; ++i)
     EXPECT_NEAR((momentum[1][i] - momentum[0][i]).z(), i == 1 || i == 2 ? 0.1 : 0, 1e-4) << i;
 }
 

@@ -10,7 +10,7 @@
 namespace offstage::sim {
 namespace {
 
-TEST(World, RefusesWhatItCannotSimulateAndSaysWhy) {
+TEST(World, RefusesInvalidDefinitionsWithAReason) {
   World world;
   const auto message = [&](const BodyDef& def) {
     try {
@@ -73,7 +73,7 @@ TEST(World, AConeFallsAboutItsCentreOfMass) {
               1e-12);
 }
 
-TEST(World, ContactsAreOfWhatCollidesAndNeverBetweenScriptedBodies) {
+TEST(World, ContactsExcludeNonCollidingAndScriptedPairs) {
   World world({.sleep = false});
   const auto ground = world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
   world.add_body({.shape = Box{}, .motion = MotionType::kinematic});
@@ -101,7 +101,7 @@ TEST(World, AFastBodyDoesNotPassAThinOneBetweenSteps) {
     }
 }
 
-TEST(World, IslandsAreWhatTouchesAndWhatSpringsJoin) {
+TEST(World, IslandsAreBodiesConnectedByContactsOrSprings) {
   World world;
   const auto ground = world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
   std::vector<BodyHandle> boxes;
@@ -116,7 +116,7 @@ TEST(World, IslandsAreWhatTouchesAndWhatSpringsJoin) {
   EXPECT_FALSE(world.island(ground).has_value());
 }
 
-TEST(World, ContactRulesReplaceWhatFollowsFromTheSurfaces) {
+TEST(World, ContactRulesReplaceTheSurfacesCoefficients) {
   const auto slide = [](bool ruled) {
     World world({.sleep = false});
     world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .material = "ice", .friction = 0.5});
@@ -143,7 +143,7 @@ TEST(World, FreezesAndReportsABodyThatLeaves) {
   EXPECT_NEAR(world.body(ball).pose.position.y(), -2, 0.1);
 }
 
-TEST(World, NamesWhatIsNotFiniteAndStaysUsable) {
+TEST(World, NamesNonFiniteObjectsAndStaysUsable) {
   World world({.max_step = 0.1});
   const auto a =
       world.add_body({.name = "stiff", .shape = Sphere{0.1}, .pose = {Vec3(1, 0, 0)}, .mass = 1e-40});
@@ -181,7 +181,7 @@ TEST(World, RemovalTakesSpringsAlongAndKeepsTheOrderOfParticles) {
   EXPECT_TRUE(world.remove(living));
 }
 
-TEST(World, ANewbornIsIntegratedOverItsOwnPartOfTheSubStep) {
+TEST(World, ANewParticleIsIntegratedOverItsPartOfTheSubStep) {
   World world({.gravity = Vec3::Zero(), .max_step = 0.1});
   const auto system = world.add_particle_system({});
   world.step(0.2, [&](Real start, Real) {
@@ -191,7 +191,7 @@ TEST(World, ANewbornIsIntegratedOverItsOwnPartOfTheSubStep) {
   EXPECT_NEAR(world.particles(system).age[0], 0.13, 1e-15);
 }
 
-/// The same motion as a system of its own, through the integrators' seam.
+/// The same equation of motion, written as a DynamicSystem of its own.
 class DragAndGravity final : public DynamicSystem {
  public:
   void velocity(Real, std::span<const Real>, std::span<const Real> p, std::span<Real> dx) const override {
@@ -204,7 +204,7 @@ class DragAndGravity final : public DynamicSystem {
   }
 };
 
-TEST(World, ParticlesMoveBitByBitAsTheIntegratorSays) {
+TEST(World, ParticlesMoveExactlyAsTheIntegrator) {
   for (auto kind : {IntegratorKind::explicit_euler, IntegratorKind::symplectic_euler,
                     IntegratorKind::midpoint, IntegratorKind::rk4}) {
     World world({.wind = {1, 0, 2}, .max_step = 1});

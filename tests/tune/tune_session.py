@@ -1,4 +1,4 @@
-"""A sitting of `offstage tune` and a headless browser that looks at it, for the tests and the benchmark."""
+"""Runs `offstage tune` and a headless browser with its page, for the tests and the benchmark."""
 
 import atexit
 import os
@@ -15,7 +15,7 @@ from selenium.webdriver.common.by import By
 
 
 def wait(condition, seconds=30, what='a condition'):
-    """The first true value of condition(); fails after so many seconds."""
+    """Repeats condition() until its value is true, and returns it; fails after `seconds`."""
     end = time.monotonic() + seconds
     while True:
         value = condition()
@@ -27,7 +27,7 @@ def wait(condition, seconds=30, what='a condition'):
 
 
 class Server:
-    """`offstage tune SCENE` as a child."""
+    """`offstage tune SCENE` as a child process."""
 
     def __init__(self, program, scene, *options):
         self.process = subprocess.Popen([program, 'tune', str(scene), '--no-open', *options], stdout=subprocess.PIPE,
@@ -41,7 +41,7 @@ class Server:
             return next(int(line.split()[1]) / 1024 for line in status if line.startswith('VmRSS'))
 
     def cpu_s(self):
-        """Processor time of the server so far."""
+        """CPU time of the server so far [s]."""
         with open(f'/proc/{self.process.pid}/stat') as stat:
             fields = stat.read().rsplit(')', 1)[1].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
@@ -91,7 +91,7 @@ def set_dark(driver, dark):
 
 
 class Page:
-    """The page in a tab, by what a person sees and does."""
+    """The page in a tab of the browser, with functions for what a user sees and does."""
 
     def __init__(self, driver, address):
         self.driver = driver
@@ -123,12 +123,12 @@ class Page:
         return self.js('return tuneStore.doc.film')
 
     def pixels(self):
-        """A sum over the canvas that differs for other pictures."""
+        """A checksum of the pixels of the canvas."""
         return self.js('''const c = document.getElementById('film'); const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
             let a = 0; for (let i = 0; i < d.length; i += 4) a = (a * 31 + d[i] * 7 + d[i + 1] * 3 + d[i + 2]) % 4294967291; return a;''')
 
     def wait_for_frame(self, frame=None, seconds=60, film=None):
-        """Until the canvas shows this frame (or any) of the version that is edited."""
+        """Waits until the canvas shows this frame (or any frame) of the edited version, or of the film `film`."""
         wait(lambda: self.js('''const c = document.getElementById('film').dataset;
             return c.film === (arguments[1] ?? tuneStore.doc.film) && (arguments[0] === null ? c.frame > 0 : Number(c.frame) === arguments[0]);''', frame, film),
             seconds, f'frame {frame}')
@@ -142,13 +142,13 @@ class Page:
         self.idle()
 
     def row(self, key):
-        """The row of a key among the controls, in view."""
+        """The row of a key among the controls, scrolled into view."""
         row = wait(lambda: self.all(f'#controls .row[data-key="{key}"]'), what=f'the control of {key}')[0]
         self.js('arguments[0].scrollIntoView({block: "center"})', row)
         return row
 
     def open_group(self, path):
-        """Opens a group of keys, and those around it."""
+        """Opens a group of keys and the groups that contain it."""
         steps = path.split('/')
         for i in range(4, len(steps) + 1):
             group = '/'.join(steps[:i])
@@ -163,5 +163,5 @@ class Page:
         wait(lambda: self.text() == text, what='the text')
 
     def errors(self):
-        """What the browser complains of."""
+        """The errors in the console of the browser."""
         return [entry for entry in self.driver.get_log('browser') if entry['level'] == 'SEVERE']
