@@ -7,11 +7,12 @@
 #include "render/confined_child.h"
 #include "render/error.h"
 #include "render/file_io.h"
+#include "render/gltf_packed.h"
 #include "render/image_io.h"
 #include "render/mesh_import.h"
 
 // With files that any fuzzer finds within minutes, assimp overflows its stack, loops, or allocates the size
-// that a header claims. Therefore a confined child imports the model and returns it in a memory file. Only
+// that a header claims, and the libraries for compressed data may do so. Therefore a confined child imports the model and returns it in a memory file. Only
 // that child can crash, and the caller gets a message.
 
 namespace offstage::render {
@@ -35,6 +36,9 @@ void transfer(Archive& archive, Model& model) {
     archive.array(part.mesh.positions);
     archive.array(part.mesh.normals);
     archive.array(part.mesh.uvs);
+    archive.array(part.mesh.second_uvs);
+    archive.array(part.mesh.colors);
+    archive.array(part.mesh.tangents);
     archive.array(part.mesh.indices);
   });
   archive.list(model.nodes, [&](Model::Node& node) {
@@ -49,10 +53,20 @@ void transfer(Archive& archive, Model& model) {
     archive.value(m.metallic);
     archive.value(m.roughness);
     archive.value(m.emission);
+    archive.value(m.transmission);
+    archive.value(m.refraction);
     archive.value(m.two_sided);
-    archive.value(m.base_color_texture);
-    archive.value(m.metallic_roughness_texture);
-    archive.value(m.emission_texture);
+    for_each_texture(m, [&](TextureMap& map) { archive.value(map); });
+    archive.value(m.normal_scale);
+    archive.value(m.occlusion_strength);
+    archive.value(m.alpha_cutoff);
+    for (bool* flag : {&m.unlit, &m.thin, &m.vertex_colors, &m.vertex_alpha}) archive.value(*flag);
+    archive.value(m.specular);
+    archive.value(m.glossiness);
+    archive.value(m.clearcoat);
+    archive.value(m.clearcoat_roughness);
+    archive.value(m.sheen_color);
+    archive.value(m.sheen_roughness);
   });
   archive.list(model.textures, [&](Image& image) { transfer_image(archive, image); });
   archive.list(model.warnings, [&](std::string& line) { archive.array(line); });
@@ -144,6 +158,14 @@ uint64_t checked_size(const std::filesystem::path& path) {
 }
 
 }  // namespace
+
+std::vector<std::string> missing_model_libraries() {
+  std::vector<std::string> missing;
+  if (!has_draco()) missing.emplace_back("libdraco-dev");
+  if (!has_meshopt()) missing.emplace_back("libmeshoptimizer-dev");
+  if (!has_webp()) missing.emplace_back("libwebp-dev");
+  return missing;
+}
 
 std::string outside_of_folders(const std::filesystem::path& path) {
   return path.string() + ": is outside of the scene's folder; allow its folder with --allow DIR";

@@ -9,6 +9,7 @@
 #include "render/file_io.h"
 #include "render/image_io.h"
 #include "render/mesh_import.h"
+#include "render/model_files.h"
 #include "render/tone_map.h"
 
 namespace offstage::render {
@@ -16,44 +17,6 @@ namespace {
 
 float clamped(float value, float high = 1) {
   return std::isfinite(value) ? std::clamp(value, 0.0f, high) : 0;
-}
-
-bool equal_ignoring_case(const std::string& a, const std::string& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
-}
-
-/// Converts "a%20b" to "a b", as in the URIs of glTF and Collada.
-std::string percent_decoded(const std::string& text) {
-  std::string result;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const bool code = text[i] == '%' && i + 2 < text.size() &&
-                      std::isxdigit(static_cast<unsigned char>(text[i + 1])) &&
-                      std::isxdigit(static_cast<unsigned char>(text[i + 2]));
-    result += code ? static_cast<char>(std::stoi(text.substr(i + 1, 2), nullptr, 16)) : text[i];
-    if (code) i += 2;
-  }
-  return result;
-}
-
-/// Finds a texture: by the name given, then by its file name in the model's folder, then there in any letter
-/// case, for paths from other machines. Empty if there is none.
-std::filesystem::path find_texture(const std::filesystem::path& folder, std::string name) {
-  std::replace(name.begin(), name.end(), '\\', '/');
-  if (name.starts_with("file://")) name.erase(0, 7);
-  std::error_code ignored;
-  for (const std::filesystem::path path : {name, percent_decoded(name)}) {
-    for (const std::filesystem::path& candidate : {folder / path, folder / path.filename()}) {
-      if (std::filesystem::is_regular_file(candidate, ignored)) return candidate;
-    }
-  }
-  const std::string file = std::filesystem::path(name).filename().string();
-  const std::filesystem::path here = folder.empty() ? "." : folder;
-  for (std::filesystem::directory_iterator entry(here, ignored), end; entry != end;
-       entry.increment(ignored)) {
-    if (equal_ignoring_case(entry->path().filename().string(), file)) return entry->path();
-  }
-  return {};
 }
 
 Image decode_embedded(const aiTexture& texture, const std::string& name) {
@@ -91,12 +54,14 @@ class MaterialImporter {
     if (source.Get(AI_MATKEY_TWOSIDED, two_sided) == aiReturn_SUCCESS) material.two_sided = two_sided != 0;
 
     unsigned uv_set = 0;
-    material.base_color_texture =
+    material.base_color_texture.image =
         texture(source, {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}, opaque, &uv_set);
-    material.emission_texture = texture(source, {aiTextureType_EMISSION_COLOR, aiTextureType_EMISSIVE}, true);
+    material.emission_texture.image =
+        texture(source, {aiTextureType_EMISSION_COLOR, aiTextureType_EMISSIVE}, true);
     // glTF's combined image; formats with two separate images are not supported.
-    if (gltf) material.metallic_roughness_texture = texture(source, {aiTextureType_UNKNOWN}, true);
-    if (material.name.empty() && material.base_color_texture < 0 && material.color == Vector4f::Ones()) {
+    if (gltf) material.metallic_roughness_texture.image = texture(source, {aiTextureType_UNKNOWN}, true);
+    if (material.name.empty() && material.base_color_texture.image < 0 &&
+        material.color == Vector4f::Ones()) {
       give_default_look(material);
     }
     if (!gltf && material.color.w() < 1e-3f) {  // many programs write the transparency here instead
@@ -195,7 +160,7 @@ class MaterialImporter {
     if (const aiTexture* embedded = scene_.GetEmbeddedTexture(name.c_str())) {
       return decode_embedded(*embedded, "embedded texture " + name);
     }
-    const std::filesystem::path path = find_texture(folder_, name);
+    const std::filesystem::path path = find_beside(folder_, name);
     if (path.empty()) throw FileError("texture '" + name + "' is not there");
     if (!folders_.contain(path))
       throw FileError("texture '" + name + "' is outside of the folders that may be read");

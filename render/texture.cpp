@@ -58,9 +58,13 @@ Image half_size(const Image& image, TextureContent content, const ChannelTable& 
   return half;
 }
 
+GLint wrap_mode(Wrap wrap) {
+  return wrap == Wrap::clamp ? GL_CLAMP_TO_EDGE : wrap == Wrap::mirror ? GL_MIRRORED_REPEAT : GL_REPEAT;
+}
+
 }  // namespace
 
-gl::Texture make_texture(const Image& image, TextureContent content) {
+gl::Texture make_texture(const Image& image, TextureContent content, const TextureMap& map) {
   if (image.width_px < 1 || image.height_px < 1 || std::max(image.width_px, image.height_px) > kMaxSize_px) {
     throw UnavailableError("a texture of " + std::to_string(image.width_px) + "x" +
                            std::to_string(image.height_px) + " pixels cannot be drawn; up to " +
@@ -73,7 +77,13 @@ gl::Texture make_texture(const Image& image, TextureContent content) {
       static_cast<GLsizei>(std::bit_width(static_cast<unsigned>(std::max(image.width_px, image.height_px))));
   glTextureStorage2D(texture, levels, content == TextureContent::color ? GL_SRGB8_ALPHA8 : GL_RGBA8,
                      image.width_px, image.height_px);
-  glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
+  glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER,
+                      map.mip_maps  ? GL_LINEAR_MIPMAP_LINEAR
+                      : map.nearest ? GL_NEAREST
+                                    : GL_LINEAR);
+  glTextureParameteri(texture, GL_TEXTURE_MAG_FILTER, map.nearest ? GL_NEAREST : GL_LINEAR);
+  glTextureParameteri(texture, GL_TEXTURE_WRAP_S, wrap_mode(map.wrap_u));
+  glTextureParameteri(texture, GL_TEXTURE_WRAP_T, wrap_mode(map.wrap_v));
 
   const ChannelTable decode = decode_table(content);
   Image level = image;

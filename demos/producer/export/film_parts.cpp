@@ -187,8 +187,8 @@ class FilmParts::Builder {
 
   void add_material(const render::Material& look, const std::vector<render::Image>& textures) {
     FilmMaterial material{material_names_(look.name, "material"), look, {}};
-    if (look.base_color_texture >= 0)
-      material.texture = textures.at(static_cast<std::size_t>(look.base_color_texture));
+    if (look.base_color_texture.image >= 0)
+      material.texture = textures.at(static_cast<std::size_t>(look.base_color_texture.image));
     parts_.materials.push_back(std::move(material));
   }
 
