@@ -13,6 +13,8 @@ namespace {
 
 constexpr uint64_t kMaxGltfBytes = uint64_t{2} << 30;
 constexpr std::size_t kMaxGltfElements = std::size_t{1} << 28;  // far more than the memory of the reader
+constexpr std::size_t kMaxGltfZeros = std::size_t{1} << 26;     // numbers of an accessor without a buffer view
+constexpr std::size_t kMaxMeshoptRatio = 256;                   // more than the codecs can reach
 constexpr std::size_t kMaxGltfStride = 256;                     // 252 by the specification
 constexpr std::size_t kMaxGltfWarnings = 100;
 constexpr uint32_t kGlbMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
@@ -153,10 +155,7 @@ struct GltfFile::Layout {
 };
 
 bool is_gltf(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  std::ranges::transform(extension, extension.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension == ".gltf" || extension == ".glb";
+  return has_ending(path, ".gltf") || has_ending(path, ".glb");
 }
 
 GltfFile::GltfFile(std::filesystem::path path, const InputFolders& folders)
@@ -306,6 +305,8 @@ std::vector<uint8_t> GltfFile::unpack(const GltfValue& compressed) {
   const std::size_t elements = compressed.size("count", 0), stride = compressed.size("byteStride", 0);
   if (elements > kMaxGltfElements || stride > kMaxGltfStride)
     throw FileError(compressed.place() + ": is too large");
+  if (elements * stride > packed.size() * kMaxMeshoptRatio)
+    throw FileError(compressed.place() + ": is larger than its compressed data can be");
   return unpack_meshopt({.mode = compressed.text("mode"),
                          .filter = compressed.text("filter", "NONE"),
                          .count = elements,
@@ -359,6 +360,12 @@ std::span<const uint8_t> GltfFile::elements(std::size_t index, std::size_t offse
 template <class T>
 std::vector<T> GltfFile::read(const GltfValue& accessor, const Layout& form,
                               T (*convert)(const uint8_t*, std::size_t, bool)) {
+  if (!accessor.has("bufferView") && form.count * form.width > kMaxGltfZeros)
+    throw accessor.wrong("count", "is too large for data that is not there");
+  if (accessor.has("bufferView") && form.count > 0) {  // before memory is taken for it
+    const std::size_t source = *accessor.index("bufferView", count("bufferViews"));
+    if (form.count > view(source).size()) throw FileError(accessor.place() + ": goes beyond its buffer view");
+  }
   std::vector<T> result(form.count * form.width, T{});
   const auto put = [&](std::size_t target, const uint8_t* element) {
     for (std::size_t k = 0; k < form.width; ++k)

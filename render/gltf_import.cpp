@@ -89,6 +89,7 @@ class GltfImporter {
     for (Model::Part& part : model_.parts)  // faces without normals are flat (section 3.7.2.1)
       if (part.mesh.normals.empty() && !part.mesh.indices.empty()) compute_normals(part.mesh, 0);
     warn_of_ignored();
+    model_.unit = "1 m, as the format defines (glTF)";
     model_.warnings = file_.take_warnings();
     const std::vector<std::string> left_out = builder_.left_out();
     model_.warnings.insert(model_.warnings.end(), left_out.begin(), left_out.end());

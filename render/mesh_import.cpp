@@ -50,6 +50,17 @@ double metres_per_unit(const aiScene& scene) {
   return centimetres > 1e-6 && centimetres < 1e6 ? centimetres / 100 : 1;
 }
 
+/// The unit of a file in words, with what was assumed where the format has none.
+std::string unit_of(const aiScene& scene, const std::filesystem::path& path) {
+  if (has_ending(path, ".dae")) return "stated by the file (Collada) and converted to metres";
+  if (has_ending(path, ".fbx")) {
+    char text[64];
+    std::snprintf(text, sizeof text, "%.6g m, as the file states (FBX)", metres_per_unit(scene));
+    return text;
+  }
+  return "none in this format; taken as 1 m";
+}
+
 /// assimp's v increases upwards for every format.
 Vector2f top_down(const aiVector3D& uv) {
   return {static_cast<float>(uv.x), 1 - static_cast<float>(uv.y)};
@@ -163,7 +174,11 @@ Model import_by_assimp(const std::filesystem::path& path, const std::string& nod
   if (!scene) throw FileError("cannot be read as a model: " + reason(importer));
 
   Model model;
-  std::vector<unsigned> uv_sets = import_materials(*scene, path.parent_path(), folders, model);
+  const bool obj = has_ending(path, ".obj");
+  std::vector<unsigned> uv_sets =
+      import_materials(*scene, path.parent_path(), folders,
+                       obj ? read_mtl_of(path, folders) : std::map<std::string, MtlMaterial>{}, model);
+  model.unit = unit_of(*scene, path);
   if (model.materials.empty()) model.materials.emplace_back();
   PartBuilder builder(model);
   AssimpSurfaces surfaces(*scene, std::move(uv_sets), model, builder);

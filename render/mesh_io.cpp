@@ -12,8 +12,8 @@
 #include "render/mesh_import.h"
 
 // With files that any fuzzer finds within minutes, assimp overflows its stack, loops, or allocates the size
-// that a header claims, and the libraries for compressed data may do so. Therefore a confined child imports the model and returns it in a memory file. Only
-// that child can crash, and the caller gets a message.
+// that a header claims, and the libraries for compressed data may do so. Therefore a confined child imports
+// the model and returns it in a memory file. Only that child can crash, and the caller gets a message.
 
 namespace offstage::render {
 namespace {
@@ -69,6 +69,7 @@ void transfer(Archive& archive, Model& model) {
     archive.value(m.sheen_roughness);
   });
   archive.list(model.textures, [&](Image& image) { transfer_image(archive, image); });
+  archive.array(model.unit);
   archive.list(model.warnings, [&](std::string& line) { archive.array(line); });
 }
 

@@ -7,9 +7,11 @@
 
 #include "render/error.h"
 #include "render/file_io.h"
+#include "render/height_map.h"
 #include "render/image_io.h"
 #include "render/mesh_import.h"
 #include "render/model_files.h"
+#include "render/mtl_file.h"
 #include "render/tone_map.h"
 
 namespace offstage::render {
@@ -38,6 +40,23 @@ class MaterialImporter {
   MaterialImporter(const aiScene& scene, const std::filesystem::path& folder, const InputFolders& folders,
                    Model& model)
       : scene_(scene), folder_(folder), folders_(folders), model_(model) {}
+
+  /// Adds what assimp does not read of an MTL file to the material that was appended last.
+  void add_mtl(const MtlMaterial& source) {
+    Material& look = model_.materials.back();
+    if (source.roughness) look.roughness = clamped(*source.roughness);
+    if (source.metallic) look.metallic = clamped(*source.metallic);
+    for (const auto& [key, map] : source.maps) {
+      if (key == "map_kd") lay(map, look.base_color_texture);
+      if (key == "map_ke") add_glow(map, look);
+      if (key == "map_ks" || key == "map_ns" || key == "map_pr" || key == "map_pm" || key == "disp" ||
+          key == "refl")
+        model_.warnings.push_back("material '" + look.name + "': " + key + " is ignored");
+    }
+    if (const auto mask = source.maps.find("map_d"); mask != source.maps.end()) add_mask(mask->second, look);
+    for (const char* key : {"bump", "norm"})
+      if (const auto map = source.maps.find(key); map != source.maps.end()) add_bumps(map->second, look);
+  }
 
   /// Appends the material; returns the number of its set of texture coordinates.
   unsigned add(const aiMaterial& source) {
@@ -128,6 +147,47 @@ class MaterialImporter {
     return linear ? clamped(value) : srgb_decode(clamped(value));
   }
 
+  /// Applies the options of a texture. The coordinates of MTL start at the bottom.
+  static void lay(const MtlMap& map, TextureMap& texture) {
+    texture.rows[0] = {map.scale.x(), 0, map.offset.x()};
+    texture.rows[1] = {0, map.scale.y(), 1 - map.scale.y() - map.offset.y()};
+    if (map.clamp) texture.wrap_u = texture.wrap_v = Wrap::clamp;
+  }
+
+  void add_glow(const MtlMap& map, Material& look) {
+    if (look.emission_texture.image < 0) look.emission_texture.image = load(map.file, true);
+    if (look.emission_texture.image >= 0 && look.emission.isZero()) look.emission = Vector3f::Ones();
+    lay(map, look.emission_texture);
+  }
+
+  /// A mask is often the alpha of the base colour's own picture.
+  void add_mask(const MtlMap& map, Material& look) {
+    const int mask = load(map.file, false);
+    if (mask < 0) return;
+    const auto at = [this](int index) -> const Image& {
+      return model_.textures[static_cast<std::size_t>(index)];
+    };
+    const int base = look.base_color_texture.image;
+    Image combined = with_mask(base >= 0 ? at(base) : Image{}, at(mask));
+    look.alpha_cutoff = is_cut_out(combined) ? 0.5f : 0.0f;
+    if (base < 0) lay(map, look.base_color_texture);
+    look.base_color_texture.image = static_cast<int>(model_.textures.size());
+    model_.textures.push_back(std::move(combined));
+  }
+
+  /// Many programs write normal maps where the format has height maps.
+  void add_bumps(const MtlMap& map, Material& look) {
+    const int picture = load(map.file, true);
+    if (picture < 0) return;
+    look.normal_scale = map.bump;
+    look.normal_texture.image = picture;
+    lay(map, look.normal_texture);
+    const Image& image = model_.textures[static_cast<std::size_t>(picture)];
+    if (is_normal_map(image)) return;
+    look.normal_texture.image = static_cast<int>(model_.textures.size());
+    model_.textures.push_back(normals_of_heights(image));
+  }
+
   /// Index of the first existing texture among `types`, or -1.
   int texture(const aiMaterial& source, std::initializer_list<aiTextureType> types, bool opaque,
               unsigned* uv_set = nullptr) {
@@ -177,10 +237,15 @@ class MaterialImporter {
 }  // namespace
 
 std::vector<unsigned> import_materials(const aiScene& scene, const std::filesystem::path& folder,
-                                       const InputFolders& folders, Model& model) {
+                                       const InputFolders& folders,
+                                       const std::map<std::string, MtlMaterial>& mtl, Model& model) {
   MaterialImporter importer(scene, folder, folders, model);
   std::vector<unsigned> uv_sets;
-  for (unsigned i = 0; i < scene.mNumMaterials; ++i) uv_sets.push_back(importer.add(*scene.mMaterials[i]));
+  for (unsigned i = 0; i < scene.mNumMaterials; ++i) {
+    uv_sets.push_back(importer.add(*scene.mMaterials[i]));
+    const auto found = mtl.find(model.materials.back().name);
+    if (found != mtl.end()) importer.add_mtl(found->second);
+  }
   return uv_sets;
 }
 

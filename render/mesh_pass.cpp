@@ -218,8 +218,8 @@ GpuMaterial make_gpu_material(const Material& material, std::span<const Image> t
     const Image* image = texture_at(textures, map.image);
     if (image == nullptr || (unit > 2 && !result.detailed)) return;
     const bool is_color = unit == 0 || unit == 2 || unit == 6;
-    result.textures[unit] =
-        make_texture(*image, is_color ? TextureContent::color : TextureContent::data, map);
+    result.textures[unit] = make_texture(*image, is_color ? TextureContent::color : TextureContent::data, map,
+                                         unit == 0 && result.detailed ? material.alpha_cutoff : 0.0f);
     result.textured = true;
   });
   const Image* base = texture_at(textures, material.base_color_texture.image);

@@ -165,6 +165,7 @@ struct Model {
   std::vector<Node> nodes;  ///< parents first
   std::vector<Material> materials;
   std::vector<Image> textures;
+  std::string unit;                   ///< unit of length in the file and how it was found, in words
   std::vector<std::string> warnings;  ///< repaired or ignored elements, one line each
 
   Eigen::AlignedBox3f bounds() const;

@@ -86,6 +86,10 @@ class ModelFiles : public Assimp::IOSystem {
 
 }  // namespace
 
+bool has_ending(const std::filesystem::path& path, const std::string& ending) {
+  return equal_ignoring_case(path.extension().string(), ending);
+}
+
 std::filesystem::path find_beside(const std::filesystem::path& folder, std::string name) {
   std::replace(name.begin(), name.end(), '\\', '/');
   if (name.starts_with("file://")) name.erase(0, 7);

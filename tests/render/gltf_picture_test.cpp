@@ -1,9 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "gl_fixture.h"
 #include "gltf_samples.h"
-#include "render/image_io.h"
-#include "render/mesh_io.h"
+#include "model_picture.h"
 #include "scratch.h"
 
 // Each test draws a small file and looks at pixels whose colour follows from the glTF specification.
@@ -11,76 +9,11 @@
 namespace offstage::render {
 namespace {
 
-const Vector3f kPureBlack(0, 0, 0), kPureRed(1, 0, 0), kPureGreen(0, 1, 0), kPureBlue(0, 0, 1),
-    kPureWhite(1, 1, 1);
-
-/// The square of a sample, seen from z = 5, without any light unless it is set.
-class Picture {
+class Picture : public ModelPicture {
  public:
-  explicit Picture(const GltfSample& sample) {
-    const ScratchFolder folder;
-    model_ = read_model(folder.put("a.gltf", sample.text()));
-    darken();
-    for (const Model::Part& part : model_.parts) {
-      const InstanceHandle instance = small_.stage.add_instance(
-          small_.stage.add_mesh(part.mesh),
-          small_.stage.add_material(model_.materials[static_cast<std::size_t>(part.material)],
-                                    model_.textures),
-          false);
-      instances_.push_back(instance);
-    }
-  }
-  void set_sun(const Vector3f& direction, float intensity = 1) {
-    small_.stage.set_sun(
-        {.direction = direction.normalized(), .color = {1, 1, 1}, .intensity = intensity, .shadows = false});
-  }
-  /// A sky and ground of one colour all around.
-  void set_sky(const Vector3f& color) {
-    small_.stage.set_environment(
-        {.zenith = color, .horizon = color, .ground = color, .occlusion_reach = 0, .visible = false});
-  }
-  void look_from(const Vector3f& eye) {
-    camera_.eye = eye;
-    small_.stage.set_camera(camera_);
-  }
-  Stage& stage() { return small_.stage; }
-  const Model& model() const { return model_; }
-  /// Colour and alpha at a point of the square.
-  Vector4f at(float x, float y) {
-    const Vector2f place = project(camera_, {x, y, 0}, 96, 64);
-    return pixel(small_.draw(), static_cast<int>(place.x()), static_cast<int>(place.y()));
-  }
-  Vector3f color_at(float x, float y) { return at(x, y).head<3>(); }
-
- private:
-  void darken() {
-    set_sky(kPureBlack);
-    set_sun({0, 0, 1}, 0);
-  }
-  SmallStage small_;
-  Camera camera_{.eye = {0, 0, 5}, .target = {0, 0, 0}};
-  Model model_;
-  std::vector<InstanceHandle> instances_;
+  explicit Picture(const GltfSample& sample) : ModelPicture(ScratchFolder().put("a.gltf", sample.text())) {}
 };
 
-void expect_color(const Vector3f& color, const Vector3f& expected, float tolerance = 4e-3f) {
-  EXPECT_LT((color - expected).cwiseAbs().maxCoeff(), tolerance)
-      << color.transpose() << " for " << expected.transpose();
-}
-
-/// A PNG of a row or column of colours, RGB in {0, 255}.
-std::vector<uint8_t> png_of(int width, int height, const std::vector<Vector4f>& colors) {
-  Image image{width, height, {}};
-  for (const Vector4f& c : colors)
-    for (int k = 0; k < 4; ++k) image.rgba.push_back(static_cast<uint8_t>(std::lround(c[k] * 255)));
-  image.transparent = true;
-  return encode_png(image);
-}
-Vector4f opaque(const Vector3f& color) {
-  Vector4f result;
-  result << color, 1;
-  return result;
-}
 const Json kNearestTexels = {{"magFilter", 9728}, {"minFilter", 9728}};
 
 Json nearest_with(const char* key, int value) {
@@ -105,7 +38,8 @@ TEST(GltfPicture, AlphaMaskCutsHolesAndIsOpaqueElsewhere) {
   for (const double cutoff : {0.5, 0.2}) {
     GltfSample sample;
     sample.make_unlit();
-    const int texture = sample.texture(png_of(2, 1, {{1, 0, 0, 0.3f}, {0, 1, 0, 0.7f}}), kNearestTexels);
+    const int texture =
+        sample.texture(encoded_texels(2, 1, {{1, 0, 0, 0.3f}, {0, 1, 0, 0.7f}}), kNearestTexels);
     sample.pbr()["baseColorTexture"] = {{"index", texture}};
     sample.material()["alphaMode"] = "MASK";
     sample.material()["alphaCutoff"] = cutoff;
@@ -116,6 +50,29 @@ TEST(GltfPicture, AlphaMaskCutsHolesAndIsOpaqueElsewhere) {
     expect_color(right.head<3>(), kPureGreen);
     if (cutoff == 0.2) expect_color(left.head<3>(), kPureRed);
   }
+}
+
+TEST(GltfPicture, MasksKeepTheirShareAtADistance) {
+  std::vector<Vector4f> leaves(64 * 64, {1, 1, 1, 0});
+  for (std::size_t y = 0; y < 64; ++y)
+    for (std::size_t x = 0; x < 64; ++x)  // irregular, so that reduced levels have all shades
+      if ((x * x + 3 * y * y + 7 * x * y) % 16 < 5) leaves[64 * y + x].w() = 1;
+  const auto opaque_count =
+      static_cast<double>(std::ranges::count_if(leaves, [](const Vector4f& c) { return c.w() == 1; }));
+  GltfSample sample;
+  sample.make_unlit();
+  sample.pbr()["baseColorTexture"] = {{"index", sample.texture(encoded_texels(64, 64, leaves))}};
+  sample.material()["alphaMode"] = "MASK";
+  Picture picture(sample);
+  picture.look_from({0, 0, 9});  // four texels for a pixel
+  const HdrImage image = picture.draw();
+  double covered = 0, all = 0;
+  for (float y = -0.9f; y < 0.95f; y += 0.1f)
+    for (float x = -0.9f; x < 0.95f; x += 0.1f) {
+      covered += picture.at(image, x, y).w() > 0.5f;
+      ++all;
+    }
+  EXPECT_NEAR(covered / all, opaque_count / 4096, 0.12);
 }
 
 TEST(GltfPicture, BlendingUsesTheAlphaOfFactorAndVertices) {
@@ -134,7 +91,8 @@ TEST(GltfPicture, SamplersWrapAndFilter) {
     GltfSample sample;
     sample.make_unlit();
     sample.set("TEXCOORD_0", std::vector<float>{-1, 0.5f, 2, 0.5f, 2, 0.5f, -1, 0.5f}, "VEC2");
-    const int texture = sample.texture(png_of(2, 1, {opaque(kPureRed), opaque(kPureBlue)}), sampler);
+    const int texture =
+        sample.texture(encoded_texels(2, 1, {opaque_texel(kPureRed), opaque_texel(kPureBlue)}), sampler);
     sample.pbr()["baseColorTexture"] = {{"index", texture}};
     Picture picture(sample);
     look(picture);
@@ -163,7 +121,8 @@ TEST(GltfPicture, SamplersWrapAndFilter) {
 TEST(GltfPicture, EachTextureHasItsSetOfCoordinates) {
   GltfSample sample;
   sample.set("TEXCOORD_3", std::vector<float>{0.75f, 0.5f, 0.75f, 0.5f, 0.75f, 0.5f, 0.75f, 0.5f}, "VEC2");
-  const int texture = sample.texture(png_of(2, 1, {opaque(kPureRed), opaque(kPureBlue)}), kNearestTexels);
+  const int texture =
+      sample.texture(encoded_texels(2, 1, {opaque_texel(kPureRed), opaque_texel(kPureBlue)}), kNearestTexels);
   sample.pbr() = {{"baseColorTexture", {{"index", texture}}}};
   sample.material()["emissiveTexture"] = {{"index", texture}, {"texCoord", 3}};
   sample.material()["emissiveFactor"] = {1, 1, 1};
@@ -179,9 +138,10 @@ TEST(GltfPicture, TextureTransformsScaleTurnAndMove) {
   const auto draw = [](const Json& transform) {
     GltfSample sample;
     sample.make_unlit();
-    const int texture = sample.texture(
-        png_of(2, 2, {opaque(kPureRed), opaque(kPureGreen), opaque(kPureBlue), opaque(kPureWhite)}),
-        kNearestTexels);
+    const int texture = sample.texture(encoded_texels(2, 2,
+                                                      {opaque_texel(kPureRed), opaque_texel(kPureGreen),
+                                                       opaque_texel(kPureBlue), opaque_texel(kPureWhite)}),
+                                       kNearestTexels);
     sample.pbr()["baseColorTexture"] = {{"index", texture},
                                         {"extensions", {{"KHR_texture_transform", transform}}}};
     sample.document["extensionsUsed"].push_back("KHR_texture_transform");
@@ -236,7 +196,7 @@ TEST(GltfPicture, NormalMapsShadeLikeTheTiltedSurface) {
       for (const int mode :
            {0, 1, 2}) {  // derived tangents; given ones; mirrored coordinates with given ones
         GltfSample mapped;
-        const int texture = mapped.texture(png_of(1, 1, {opaque(texel)}));
+        const int texture = mapped.texture(encoded_texels(1, 1, {opaque_texel(texel)}));
         mapped.material()["normalTexture"] = {{"index", texture}};
         if (mode == 1)
           mapped.set("TANGENT", std::vector<float>{1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1}, "VEC4");
@@ -255,7 +215,7 @@ TEST(GltfPicture, NormalMapsShadeLikeTheTiltedSurface) {
 
 TEST(GltfPicture, NormalScaleFlattensTheMap) {
   GltfSample sample;
-  const int texture = sample.texture(png_of(1, 1, {{0.854f, 0.5f, 0.854f, 1}}));
+  const int texture = sample.texture(encoded_texels(1, 1, {{0.854f, 0.5f, 0.854f, 1}}));
   sample.material()["normalTexture"] = {{"index", texture}, {"scale", 0}};
   GltfSample plain;
   EXPECT_NEAR(sunlit(sample, {1, 0, 1}).x(), sunlit(plain, {1, 0, 1}).x(), 0.01f);
@@ -266,7 +226,7 @@ TEST(GltfPicture, OcclusionHidesTheSkyByItsStrength) {
   for (const double strength : {0.0, 0.5, 1.0}) {
     GltfSample sample;
     sample.pbr() = {{"metallicFactor", 0}, {"roughnessFactor", 1}, {"baseColorFactor", {0.1, 0.1, 0.1, 1}}};
-    const int texture = sample.texture(png_of(1, 1, {{0, 1, 1, 1}}));
+    const int texture = sample.texture(encoded_texels(1, 1, {{0, 1, 1, 1}}));
     sample.material()["occlusionTexture"] = {{"index", texture}, {"strength", strength}};
     Picture picture(sample);
     picture.set_sky(kPureWhite);
@@ -363,7 +323,7 @@ TEST(GltfPicture, ClearcoatAddsAHighlightAndSheenAGlow) {
 
 TEST(GltfPicture, HolesOfAMaskLetTheSunThrough) {
   GltfSample sample;
-  const int texture = sample.texture(png_of(2, 1, {{1, 1, 1, 0}, {1, 1, 1, 1}}), kNearestTexels);
+  const int texture = sample.texture(encoded_texels(2, 1, {{1, 1, 1, 0}, {1, 1, 1, 1}}), kNearestTexels);
   sample.pbr() = {{"baseColorTexture", {{"index", texture}}}};
   sample.material()["alphaMode"] = "MASK";
   const ScratchFolder folder;

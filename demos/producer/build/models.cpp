@@ -197,6 +197,15 @@ sim::ConvexDecomposition scaled(sim::ConvexDecomposition decomposition, double s
   return decomposition;
 }
 
+Real fitted_scale(Real scale, const std::optional<Vec3>& fit, const render::Model& model) {
+  if (!fit) return scale;
+  const Vec3 size = model.bounds().sizes().cast<Real>();
+  Real factor = std::numeric_limits<Real>::infinity();
+  for (int k = 0; k < 3; ++k)
+    if (size[k] > 1e-9 * size.maxCoeff()) factor = std::min(factor, (*fit)[k] / size[k]);
+  return std::isfinite(factor) ? scale * factor : scale;
+}
+
 sim::TriangleMesh collision_mesh(const render::Model& model, double scale) {
   sim::TriangleMesh mesh;
   mesh.vertices.reserve(model.vertex_count());
