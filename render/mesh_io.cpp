@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <span>
+#include <type_traits>
 
 #include "render/confined_child.h"
 #include "render/error.h"
@@ -56,7 +57,12 @@ void transfer(Archive& archive, Model& model) {
     archive.value(m.transmission);
     archive.value(m.refraction);
     archive.value(m.two_sided);
-    for_each_texture(m, [&](TextureMap& map) { archive.value(map); });
+    for_each_texture(m, [&](TextureMap& map) {
+      for (int* number : {&map.image, &map.uv_set}) archive.value(*number);
+      for (Wrap* wrap : {&map.wrap_u, &map.wrap_v}) archive.value(*wrap);
+      for (bool* flag : {&map.nearest, &map.mip_maps}) archive.value(*flag);
+      for (Vector3f& row : map.rows) archive.value(row);
+    });
     archive.value(m.normal_scale);
     archive.value(m.occlusion_strength);
     archive.value(m.alpha_cutoff);
@@ -99,6 +105,10 @@ class Writer {
   int fd_;
 };
 
+FileError damaged_answer() {
+  return FileError("the model reader gave a damaged answer");
+}
+
 /// Checks all counts, because the child may have been corrupted before it wrote.
 class Reader {
  public:
@@ -106,7 +116,9 @@ class Reader {
 
   template <class T>
   void value(T& value) {
-    std::memcpy(static_cast<void*>(&value), take(sizeof value), sizeof value);
+    const uint8_t* bytes = take(sizeof value);
+    if (std::is_same_v<T, bool> && *bytes > 1) throw damaged_answer();
+    std::memcpy(static_cast<void*>(&value), bytes, sizeof value);
   }
   template <class Container>
   void array(Container& values) {
@@ -117,25 +129,69 @@ class Reader {
   }
   template <class T, class Each>
   void list(std::vector<T>& values, Each each) {
-    values.resize(count(1));
-    for (T& element : values) each(element);
+    // Without reserve(): a wrong count ends with the bytes, before it has taken much memory.
+    for (std::size_t left = count(1); left > 0; --left) each(values.emplace_back());
   }
 
  private:
   std::size_t count(std::size_t element_size) {
     uint64_t n = 0;
     value(n);
-    if (n > rest_.size() / element_size) throw FileError("the model reader gave a damaged answer");
+    if (n > rest_.size() / element_size) throw damaged_answer();
     return n;
   }
   const uint8_t* take(std::size_t size) {
-    if (size > rest_.size()) throw FileError("the model reader gave a damaged answer");
+    if (size > rest_.size()) throw damaged_answer();
     const uint8_t* data = rest_.data();
     rest_ = rest_.subspan(size);
     return data;
   }
   std::span<const uint8_t> rest_;
 };
+
+bool is_whole(const Image& image) {
+  return image.width_px > 0 && image.height_px > 0 && image.rgba.size() == 4 * image.pixel_count();
+}
+
+bool is_whole(const Mesh& mesh) {
+  const std::size_t vertices = mesh.positions.size();
+  const auto fits = [&](std::size_t size) { return size == 0 || size == vertices; };
+  return fits(mesh.normals.size()) && fits(mesh.uvs.size()) && fits(mesh.second_uvs.size()) &&
+         fits(mesh.colors.size()) && fits(mesh.tangents.size()) && mesh.indices.size() % 3 == 0 &&
+         std::ranges::all_of(mesh.indices, [&](uint32_t index) { return index < vertices; }) &&
+         std::ranges::all_of(mesh.positions, [](const Vector3f& p) { return p.allFinite(); });
+}
+
+/// All indices refer to something and all sizes agree. What this accepts can be drawn and simulated safely.
+bool is_whole(const Model& model) {
+  const auto refers = [](int index, std::size_t size) {
+    return index >= 0 && static_cast<std::size_t>(index) < size;
+  };
+  const auto texture = [&](const TextureMap& map) {
+    const auto is_wrap = [](Wrap wrap) {
+      return static_cast<unsigned>(wrap) <= static_cast<unsigned>(Wrap::clamp);
+    };
+    return (map.image == -1 || refers(map.image, model.textures.size())) && is_wrap(map.wrap_u) &&
+           is_wrap(map.wrap_v);
+  };
+  return std::ranges::all_of(model.parts,
+                             [&](const Model::Part& part) {
+                               return refers(part.material, model.materials.size()) && is_whole(part.mesh);
+                             }) &&
+         std::ranges::all_of(model.nodes,
+                             [&](const Model::Node& node) {
+                               const auto own = static_cast<std::size_t>(&node - model.nodes.data());
+                               return (node.parent == -1 || refers(node.parent, own)) &&
+                                      node.position.allFinite() && node.orientation.coeffs().allFinite();
+                             }) &&
+         std::ranges::all_of(model.materials,
+                             [&](const Material& m) {
+                               bool whole = true;
+                               for_each_texture(m, [&](const TextureMap& map) { whole &= texture(map); });
+                               return whole;
+                             }) &&
+         std::ranges::all_of(model.textures, [](const Image& image) { return is_whole(image); });
+}
 
 /// The folders that a child may read: the given ones or, if there are none, that of the file itself.
 InputFolders readable(const std::filesystem::path& path, const InputFolders& folders) {
@@ -180,6 +236,19 @@ ModelPath split_node(const std::filesystem::path& path) {
   return {text.substr(0, mark), text.substr(mark + 1)};
 }
 
+void write_model(Model& model, int fd) {
+  Writer writer(fd);
+  transfer(writer, model);
+}
+
+Model decode_model(std::span<const uint8_t> bytes) {
+  Model model;
+  Reader reader(bytes);
+  transfer(reader, model);
+  if (!is_whole(model)) throw damaged_answer();
+  return model;
+}
+
 Model read_model(const std::filesystem::path& file, const InputFolders& folders, const StopTest& stop) {
   const ModelPath place = split_node(file);
   const std::filesystem::path& path = place.file;
@@ -189,12 +258,9 @@ Model read_model(const std::filesystem::path& file, const InputFolders& folders,
   const ChildAnswer answer = run_confined(
       {.what = path.string(), .file_bytes = size, .folders = &allowed, .stop = stop}, [&](int memory) {
         Model model = import_model(path, place.node, allowed);
-        Writer writer(memory);
-        transfer(writer, model);
+        write_model(model, memory);
       });
-  Model model;
-  Reader reader(answer.bytes());
-  transfer(reader, model);
+  Model model = decode_model(answer.bytes());
   for (Model::Part& part : model.parts) {
     if (part.mesh.normals.empty()) compute_normals(part.mesh);
   }
@@ -214,6 +280,7 @@ Image read_texture(const std::filesystem::path& path, const InputFolders& folder
   Image image;
   Reader reader(answer.bytes());
   transfer_image(reader, image);
+  if (!is_whole(image)) throw damaged_answer();
   return image;
 }
 
