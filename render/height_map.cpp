@@ -37,11 +37,11 @@ bool is_normal_map(const Image& image) {
   return sum[2] / n > 0.65 && std::abs(sum[0] / n - 0.5) < 0.15 && std::abs(sum[1] / n - 0.5) < 0.15;
 }
 
-Image normals_of_heights(const Image& heights) {
+Image normals_of_heights(const Image& heights, float bump) {
   constexpr float kHeight = 0.01f;  // of white, in widths of the picture
   const int w = heights.width_px, h = heights.height_px;
   Image normals{w, h, std::vector<uint8_t>(heights.rgba.size(), 255)};
-  const float slope = 0.5f * kHeight * static_cast<float>(w);
+  const float slope = 0.5f * kHeight * bump * static_cast<float>(w);
   for (int y = 0; y < h; ++y)
     for (int x = 0; x < w; ++x) {
       const float dx = luminance_at(heights, (x + 1) % w, y) - luminance_at(heights, (x + w - 1) % w, y);

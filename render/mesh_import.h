@@ -25,7 +25,8 @@ Model import_model(const std::filesystem::path& path, const std::string& node, c
 
 /// Fills `materials` and `textures`, with a warning for each texture that is not found. Textures are searched
 /// by the name given, then by file name beside the model. `mtl` completes the materials of OBJ files by name.
-/// Returns for each material the number of its set of texture coordinates.
+/// Returns for each material the number of its set of
+/// texture coordinates.
 std::vector<unsigned> import_materials(const aiScene& scene, const std::filesystem::path& folder,
                                        const InputFolders& folders,
                                        const std::map<std::string, MtlMaterial>& mtl, Model& model);

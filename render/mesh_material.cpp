@@ -185,7 +185,9 @@ class MaterialImporter {
     const Image& image = model_.textures[static_cast<std::size_t>(picture)];
     if (is_normal_map(image)) return;
     look.normal_texture.image = static_cast<int>(model_.textures.size());
-    model_.textures.push_back(normals_of_heights(image));
+    look.normal_scale = 1;  // 8 bits are too coarse to scale the slope afterwards
+    Image normals = normals_of_heights(image, map.bump);
+    model_.textures.push_back(std::move(normals));
   }
 
   /// Index of the first existing texture among `types`, or -1.
