@@ -4,6 +4,7 @@
 build_packages="g++ cmake ninja-build pkg-config python3-glad libeigen3-dev libtbb-dev libegl1 libgl1-mesa-dri libassimp-dev libstb-dev
 libdeflate-dev libopenexr-dev libqhull-dev libxxhash-dev libzstd-dev nlohmann-json3-dev libcli11-dev libfmt-dev libcpp-httplib-dev
 libturbojpeg0-dev ffmpeg
+libdraco-dev? libmeshoptimizer-dev? libwebp-dev?
 libosmesa6? mold? ccache?"
 test_packages="libgtest-dev librapidcheck-dev libfcl-dev libccd-dev libbullet-dev libvalijson-dev assimp-testmodels
 chromium|chromium-browser chromium-driver|chromium-chromedriver python3-selenium

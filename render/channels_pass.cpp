@@ -3,6 +3,8 @@
 #include <array>
 #include <limits>
 
+#include "render/texture.h"
+
 namespace offstage::render {
 
 ChannelsPass::ChannelsPass(int width_px, int height_px)
@@ -12,6 +14,7 @@ ChannelsPass::ChannelsPass(int width_px, int height_px)
       motion_depth_(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)),
       depth_(gl::make_target(GL_DEPTH_COMPONENT32F, width_px, height_px, GL_NEAREST)),
       framebuffer_(gl::make_framebuffer(normal_id_, depth_)),
+      white_(make_white_texture()),
       cloth_layout_(gl::make_vertex_array()) {
   glNamedFramebufferTexture(framebuffer_, GL_COLOR_ATTACHMENT1, motion_depth_, 0);
   const std::array<GLenum, 2> both = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
@@ -48,7 +51,9 @@ void ChannelsPass::set_matrices(const Matrix4f& world_from_mesh, const Matrix4f&
 }
 
 void ChannelsPass::draw(const Instance& instance) {
-  mesh_.use();
+  const bool holes = instance.material->cut_out;
+  (holes ? holes_ : mesh_).use();
+  if (holes) bind_material(*instance.material, white_);
   set_matrices(instance.world_from_mesh.matrix(), instance.before.value_or(instance.world_from_mesh).matrix(),
                instance.object);
   (instance.material->two_sided ? glDisable : glEnable)(GL_CULL_FACE);

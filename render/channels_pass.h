@@ -30,7 +30,10 @@ class ChannelsPass {
   gl::Framebuffer framebuffer_;
   Matrix4f clip_from_world_, clip_before_from_world_;
   gl::LazyProgram mesh_{{"channels.vert"}, {"channels.frag"}};
+  gl::LazyProgram holes_{
+      {"channels.vert"}, {"frame.glsl", "material.glsl", "channels.frag"}, {"TEXTURED 1", "DETAILED 1"}};
   gl::LazyProgram cloth_{{"channels.vert"}, {"channels.frag"}, {"CLOTH 1"}};
+  gl::Texture white_;
   gl::VertexArray cloth_layout_;
   gl::StreamBuffer places_before_;
 };

@@ -10,6 +10,7 @@
 
 #include "render/error.h"
 #include "render/file_io.h"
+#include "render/gltf_packed.h"
 #include "render/output_file.h"
 #include "render/png.h"
 
@@ -54,6 +55,7 @@ Image decode_image(std::span<const uint8_t> bytes, const std::string& name, uint
   };
   if (bytes.empty()) throw fail("it is empty");
   if (bytes.size() > kMaxImageBytes) throw fail("it is larger than 1 GiB");
+  if (is_webp(bytes)) return decode_webp(bytes, name, max_pixels);
   const int size = static_cast<int>(bytes.size());
   int width = 0, height = 0, channels = 0;
   if (!stbi_info_from_memory(bytes.data(), size, &width, &height, &channels))

@@ -13,8 +13,9 @@ inline constexpr uint64_t kMaxImagePixels = uint64_t{1} << 28;  ///< limit for a
 inline constexpr uint64_t kMaxTexturePixels = uint64_t{1}
                                               << 26;  ///< limit for textures: 8192 x 8192, 256 MiB of RGBA
 
-/// Reads PNG, JPEG, TGA, BMP, GIF (its first frame), PSD or PNM, of up to 16384 pixels a side; 16-bit samples
-/// are converted to 8 bits. The declared size is checked before decoding. Throws FileError.
+/// Reads PNG, JPEG, TGA, BMP, GIF (its first frame), PSD, PNM or (if built with libwebp) WebP, of up to 16384
+/// pixels a side; 16-bit samples are converted to 8 bits. The declared size is checked before decoding.
+/// Throws FileError.
 Image read_image(const std::filesystem::path& path, uint64_t max_pixels = kMaxImagePixels);
 /// The same from memory (for textures embedded in model files); `name` is used in messages.
 Image decode_image(std::span<const uint8_t> bytes, const std::string& name,

@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <map>
-#include <set>
-#include <tuple>
+#include <optional>
 
 #include <assimp/Importer.hpp>
 #include <assimp/config.h>
@@ -12,7 +11,11 @@
 
 #include "render/error.h"
 #include "render/file_io.h"
+#include "render/gltf_file.h"
+#include "render/gltf_import.h"
 #include "render/model_files.h"
+#include "render/part_builder.h"
+#include "render/tone_map.h"
 
 namespace offstage::render {
 namespace {
@@ -20,33 +23,13 @@ namespace {
 using Eigen::Affine3d;
 using Eigen::Vector3d;
 
-constexpr uint32_t kUnused = 0xffffffff;
-
 constexpr unsigned kSteps = aiProcess_Triangulate | aiProcess_RemoveComponent | aiProcess_GenUVCoords |
                             aiProcess_TransformUVCoords | aiProcess_JoinIdenticalVertices;
 constexpr int kIgnored = aiComponent_ANIMATIONS | aiComponent_BONEWEIGHTS | aiComponent_LIGHTS |
-                         aiComponent_CAMERAS | aiComponent_TANGENTS_AND_BITANGENTS | aiComponent_COLORS;
+                         aiComponent_CAMERAS | aiComponent_TANGENTS_AND_BITANGENTS;
 
-/// Omitted elements, counted over the whole file.
-struct Dropped {
-  std::size_t no_triangle = 0, bad_index = 0, not_finite = 0, no_area = 0, bad_normals = 0;
-
-  std::vector<std::string> describe() const {
-    std::vector<std::string> lines;
-    const auto add = [&lines](std::size_t count, const char* what) {
-      if (count > 0) lines.push_back(std::to_string(count) + what);
-    };
-    add(no_triangle, " points or lines left out");
-    add(bad_index, " faces left out: their indices are out of range");
-    add(not_finite, " faces left out: a vertex is not finite");
-    add(no_area, " faces left out: they have no area");
-    add(bad_normals, " meshes have unusable normals, replaced");
-    return lines;
-  }
-};
-
-Vector3d to_eigen(const aiVector3D& v) {
-  return {v.x, v.y, v.z};
+Vector3f to_eigen(const aiVector3D& v) {
+  return Vector3d(v.x, v.y, v.z).cast<float>();
 }
 
 Affine3d to_eigen(const aiMatrix4x4& m) {
@@ -67,150 +50,82 @@ double metres_per_unit(const aiScene& scene) {
   return centimetres > 1e-6 && centimetres < 1e6 ? centimetres / 100 : 1;
 }
 
-std::vector<Vector3f> transformed_positions(const aiMesh& mesh, const Affine3d& world_from_mesh) {
-  std::vector<Vector3f> positions(mesh.mNumVertices);
-  for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
-    positions[i] = (world_from_mesh * to_eigen(mesh.mVertices[i])).cast<float>();
+/// The unit of a file in words, with what was assumed where the format has none.
+std::string unit_of(const aiScene& scene, const std::filesystem::path& path) {
+  if (has_ending(path, ".dae")) return "stated by the file (Collada) and converted to metres";
+  if (has_ending(path, ".fbx")) {
+    char text[64];
+    std::snprintf(text, sizeof text, "%.6g m, as the file states (FBX)", metres_per_unit(scene));
+    return text;
   }
-  return positions;
+  return "none in this format; taken as 1 m";
 }
 
-/// Transformed normals; empty if the mesh has none, or an invalid one.
-std::vector<Vector3f> transformed_normals(const aiMesh& mesh, const Affine3d& world_from_mesh) {
-  if (!mesh.HasNormals()) return {};
-  const Eigen::Matrix3d linear = world_from_mesh.linear();
-  const double determinant = linear.determinant();
-  // The cofactor matrix is the inverse transpose times the determinant; the sign compensates that of the
-  // determinant for mirrored nodes.
-  Eigen::Matrix3d cofactor;
-  cofactor << linear.col(1).cross(linear.col(2)), linear.col(2).cross(linear.col(0)),
-      linear.col(0).cross(linear.col(1));
-  if (determinant < 0) cofactor = -cofactor;
-  std::vector<Vector3f> normals(mesh.mNumVertices);
-  for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
-    const Vector3d normal = cofactor * to_eigen(mesh.mNormals[i]);
-    const double length = normal.norm();
-    if (!(length > 0) || !std::isfinite(length)) return {};
-    normals[i] = (normal / length).cast<float>();
-  }
-  return normals;
+/// assimp's v increases upwards for every format.
+Vector2f top_down(const aiVector3D& uv) {
+  return {static_cast<float>(uv.x), 1 - static_cast<float>(uv.y)};
 }
 
-bool has_area(const Vector3f& a, const Vector3f& b, const Vector3f& c) {
-  const Vector3d ab = (b - a).cast<double>(), ac = (c - a).cast<double>();
-  return ab.cross(ac).norm() > 1e-10 * std::max(ab.squaredNorm(), ac.squaredNorm());
+/// Colours of classic formats are sRGB.
+Vector4f linear_color(const aiColor4D& c) {
+  const auto decode = [](float value) { return srgb_decode(std::clamp(value, 0.0f, 1.0f)); };
+  return {decode(static_cast<float>(c.r)), decode(static_cast<float>(c.g)), decode(static_cast<float>(c.b)),
+          static_cast<float>(c.a)};
 }
 
-/// Collects the meshes of the scene, transformed by their nodes, in one part per material and kind of vertex.
-class PartBuilder {
+/// Converts the meshes of assimp's scene, each when it is used first.
+class AssimpSurfaces {
  public:
-  PartBuilder(const aiScene& scene, std::vector<unsigned> uv_sets, Model& model)
-      : scene_(scene), uv_sets_(std::move(uv_sets)), model_(model) {}
+  AssimpSurfaces(const aiScene& scene, std::vector<unsigned> uv_sets, Model& model, PartBuilder& builder)
+      : scene_(scene), uv_sets_(std::move(uv_sets)), model_(model), builder_(builder) {}
 
   void add(unsigned mesh_index, const Affine3d& world_from_mesh) {
     if (mesh_index >= scene_.mNumMeshes) return;
     const aiMesh& mesh = *scene_.mMeshes[mesh_index];
     const std::size_t material = std::min<std::size_t>(mesh.mMaterialIndex, model_.materials.size() - 1);
-    const unsigned uv_set =
-        material < uv_sets_.size() && mesh.HasTextureCoords(uv_sets_[material]) ? uv_sets_[material] : 0;
-    const aiVector3D* uvs = mesh.HasTextureCoords(uv_set) ? mesh.mTextureCoords[uv_set] : nullptr;
-
-    const std::vector<Vector3f> positions = transformed_positions(mesh, world_from_mesh);
-    const std::vector<Vector3f> normals = transformed_normals(mesh, world_from_mesh);
-    if (mesh.HasNormals() && normals.empty()) ++dropped_.bad_normals;
-
-    Mesh& out = part(static_cast<int>(material), !normals.empty(), uvs != nullptr);
-    std::vector<uint32_t> new_index(mesh.mNumVertices, kUnused);
-    const auto use = [&](uint32_t v) {
-      if (new_index[v] == kUnused) {
-        new_index[v] = static_cast<uint32_t>(out.positions.size());
-        out.positions.push_back(positions[v]);
-        if (!normals.empty()) out.normals.push_back(normals[v]);
-        if (uvs) out.uvs.push_back(top_down(uvs[v]));
-      }
-      out.indices.push_back(new_index[v]);
-    };
-    const bool mirrored = world_from_mesh.linear().determinant() < 0;
-    for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
-      const aiFace& face = mesh.mFaces[f];
-      if (!accept(face, positions)) continue;
-      use(face.mIndices[0]);
-      use(face.mIndices[mirrored ? 2 : 1]);
-      use(face.mIndices[mirrored ? 1 : 2]);
+    const auto [entry, is_new] = surfaces_.try_emplace(mesh_index);
+    Surface& surface = entry->second;
+    if (is_new) {
+      surface.material = static_cast<int>(material);
+      convert(mesh, material, surface.mesh);
     }
+    builder_.add(surface, world_from_mesh);
+    builder_.leave_out(mesh.mNumFaces - surface.mesh.indices.size() / 3);
   }
-
-  const Dropped& dropped() const { return dropped_; }
 
  private:
-  Mesh& part(int material, bool normals, bool uvs) {
-    const auto [entry, is_new] = parts_.try_emplace({material, normals, uvs}, model_.parts.size());
-    if (is_new) model_.parts.push_back({{}, material});
-    return model_.parts[entry->second].mesh;
-  }
-
-  bool accept(const aiFace& face, const std::vector<Vector3f>& positions) {
-    if (face.mNumIndices != 3) {
-      ++dropped_.no_triangle;
-      return false;
+  void convert(const aiMesh& mesh, std::size_t material, Mesh& out) {
+    const unsigned uv_set =
+        material < uv_sets_.size() && mesh.HasTextureCoords(uv_sets_[material]) ? uv_sets_[material] : 0;
+    const bool has_uvs = mesh.HasTextureCoords(uv_set), has_colors = mesh.HasVertexColors(0);
+    for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
+      out.positions.push_back(to_eigen(mesh.mVertices[i]));
+      if (mesh.HasNormals()) out.normals.push_back(to_eigen(mesh.mNormals[i]));
+      if (has_uvs) out.uvs.push_back(top_down(mesh.mTextureCoords[uv_set][i]));
+      if (has_colors) out.colors.push_back(linear_color(mesh.mColors[0][i]));
     }
-    const unsigned* v = face.mIndices;
-    if (std::max({v[0], v[1], v[2]}) >= positions.size()) {
-      ++dropped_.bad_index;
-      return false;
+    for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
+      const aiFace& face = mesh.mFaces[f];
+      if (face.mNumIndices == 3) out.indices.insert(out.indices.end(), face.mIndices, face.mIndices + 3);
     }
-    const Vector3f &a = positions[v[0]], &b = positions[v[1]], &c = positions[v[2]];
-    if (!a.allFinite() || !b.allFinite() || !c.allFinite()) {
-      ++dropped_.not_finite;
-      return false;
-    }
-    if (!has_area(a, b, c)) {
-      ++dropped_.no_area;
-      return false;
-    }
-    return true;
-  }
-
-  /// assimp's v increases upwards for every format.
-  static Vector2f top_down(const aiVector3D& uv) {
-    const Vector2f result(static_cast<float>(uv.x), 1 - static_cast<float>(uv.y));
-    return result.allFinite() ? result : Vector2f(0, 0);
+    if (!has_colors) return;
+    Material& look = model_.materials[material];
+    look.vertex_colors = true;
+    // The grey of files without materials, such as scans, would darken the colours.
+    if (look.name.empty() || look.name == AI_DEFAULT_MATERIAL_NAME) look.color = Vector4f::Ones();
+    look.vertex_alpha |= std::ranges::any_of(out.colors, [](const Vector4f& c) { return c.w() < 1; });
   }
 
   const aiScene& scene_;
   std::vector<unsigned> uv_sets_;
   Model& model_;
-  std::map<std::tuple<int, bool, bool>, std::size_t> parts_;
-  Dropped dropped_;
+  PartBuilder& builder_;
+  std::map<unsigned, Surface> surfaces_;
 };
-
-/// Makes the names of nodes unique.
-class NodeNames {
- public:
-  std::string next(const aiNode& node) {
-    const std::string name = node.mName.length > 0 ? node.mName.C_Str() : "node";
-    std::string unique = name;
-    for (int& count = counts_[name]; !taken_.insert(unique).second;)
-      unique = name + "_" + std::to_string(++count + 1);
-    return unique;
-  }
-
- private:
-  std::map<std::string, int> counts_;
-  std::set<std::string> taken_;
-};
-
-/// Rotation and translation without the scale, which is applied to the triangles. For a node that is flat or
-/// mirrored, the nearest rotation.
-Affine3d turned_and_moved(const Affine3d& m) {
-  const Eigen::Matrix3d rotation = m.rotation();
-  if (!rotation.allFinite() || !m.translation().allFinite()) return Affine3d::Identity();
-  return Eigen::Translation3d(m.translation()) * rotation;
-}
 
 /// Lists the nodes that have meshes, and adds the meshes of all of them, or of the node `wanted`. Depth first
 /// with an explicit stack, because the depth depends on the file.
-void place_nodes(const aiScene& scene, const std::string& wanted, PartBuilder& builder, Model& model) {
+void place_nodes(const aiScene& scene, const std::string& wanted, AssimpSurfaces& surfaces, Model& model) {
   struct Item {
     const aiNode* node;
     Affine3d world_from_parent;
@@ -226,14 +141,14 @@ void place_nodes(const aiScene& scene, const std::string& wanted, PartBuilder& b
     const Affine3d world_from_node = item.world_from_parent * to_eigen(node.mTransformation);
     if (node.mNumMeshes > 0) {
       const Affine3d rigid = turned_and_moved(world_from_node);
-      model.nodes.push_back({names.next(node), item.parent, rigid.translation().cast<float>(),
-                             Eigen::Quaternionf(rigid.linear().cast<float>()).normalized()});
+      const std::string name = node.mName.length > 0 ? node.mName.C_Str() : "node";
+      model.nodes.push_back(model_node(names.next(name), item.parent, rigid));
       item.parent = static_cast<int>(model.nodes.size() - 1);
       for (unsigned i = 0; i < node.mNumMeshes; ++i) {
         if (wanted.empty())
-          builder.add(node.mMeshes[i], world_from_node);
+          surfaces.add(node.mMeshes[i], world_from_node);
         else if (wanted == model.nodes.back().name)
-          builder.add(node.mMeshes[i], rigid.inverse() * world_from_node);
+          surfaces.add(node.mMeshes[i], rigid.inverse() * world_from_node);
       }
     }
     for (unsigned i = node.mNumChildren; i-- > 0;)
@@ -248,37 +163,54 @@ std::string reason(const Assimp::Importer& importer) {
   return error.empty() ? "no reason given" : error;
 }
 
-}  // namespace
-
-Model import_model(const std::filesystem::path& path, const std::string& node, const InputFolders& folders) {
+Model import_by_assimp(const std::filesystem::path& path, const std::string& node,
+                       const InputFolders& folders) {
   Assimp::Importer importer;
   importer.SetIOHandler(make_model_files(folders).release());  // the importer takes ownership
   importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, kIgnored);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_READ_ANIMATIONS, false);
   const aiScene* scene = importer.ReadFile(path.string(), kSteps);
-  if (!scene) throw FileError(path.string() + ": cannot be read as a model: " + reason(importer));
+  if (!scene) throw FileError("cannot be read as a model: " + reason(importer));
 
   Model model;
-  std::vector<unsigned> uv_sets = import_materials(*scene, path.parent_path(), folders, model);
+  const bool obj = has_ending(path, ".obj");
+  std::vector<unsigned> uv_sets =
+      import_materials(*scene, path.parent_path(), folders,
+                       obj ? read_mtl_of(path, folders) : std::map<std::string, MtlMaterial>{}, model);
+  model.unit = unit_of(*scene, path);
   if (model.materials.empty()) model.materials.emplace_back();
-  PartBuilder builder(*scene, std::move(uv_sets), model);
-  place_nodes(*scene, node, builder, model);
+  PartBuilder builder(model);
+  AssimpSurfaces surfaces(*scene, std::move(uv_sets), model, builder);
+  place_nodes(*scene, node, surfaces, model);
+  const std::vector<std::string> left_out = builder.left_out();
+  model.warnings.insert(model.warnings.end(), left_out.begin(), left_out.end());
+  return model;
+}
+
+}  // namespace
+
+Model import_model(const std::filesystem::path& path, const std::string& node, const InputFolders& folders) {
+  const auto fail = [&path](const std::string& why) { return FileError(path.string() + ": " + why); };
+  Model model;
+  try {
+    std::optional<Model> gltf = is_gltf(path) ? import_gltf(path, node, folders) : std::nullopt;
+    model = gltf ? std::move(*gltf) : import_by_assimp(path, node, folders);
+  } catch (const FileError& error) {
+    throw fail(error.what());
+  }
   if (!node.empty() && std::ranges::find(model.nodes, node, &Model::Node::name) == model.nodes.end()) {
-    std::string why = path.string() + ": has no node '" + node + "' with triangles; known:";
+    std::string why = "has no node '" + node + "' with triangles; known:";
     for (std::size_t i = 0; i < std::min<std::size_t>(model.nodes.size(), 20); ++i)
       why += " '" + model.nodes[i].name + "'";
-    throw FileError(why);
+    throw fail(why);
   }
   std::erase_if(model.parts, [](const Model::Part& part) { return part.mesh.indices.empty(); });
-
-  const std::vector<std::string> dropped = builder.dropped().describe();
   if (model.parts.empty()) {
-    std::string why = path.string() + ": holds no triangle";
-    for (const std::string& line : dropped) why += "; " + line;
-    throw FileError(why);
+    std::string why = "holds no triangle";
+    for (const std::string& line : model.warnings) why += "; " + line;
+    throw fail(why);
   }
-  model.warnings.insert(model.warnings.end(), dropped.begin(), dropped.end());
   return model;
 }
 

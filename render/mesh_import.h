@@ -5,11 +5,14 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "render/input_folders.h"
 #include "render/model.h"
+#include "render/mtl_file.h"
 
 struct aiScene;
 
@@ -21,10 +24,12 @@ namespace offstage::render {
 Model import_model(const std::filesystem::path& path, const std::string& node, const InputFolders& folders);
 
 /// Fills `materials` and `textures`, with a warning for each texture that is not found. Textures are searched
-/// by the name given, then by file name beside the model. Returns for each material the number of its set of
+/// by the name given, then by file name beside the model. `mtl` completes the materials of OBJ files by name.
+/// Returns for each material the number of its set of
 /// texture coordinates.
 std::vector<unsigned> import_materials(const aiScene& scene, const std::filesystem::path& folder,
-                                       const InputFolders& folders, Model& model);
+                                       const InputFolders& folders,
+                                       const std::map<std::string, MtlMaterial>& mtl, Model& model);
 
 /// Writes a model to a file, for decode_model(). `model` is not changed. Throws std::bad_alloc if the file
 /// takes no more.

@@ -8,12 +8,13 @@
 #include "render/confined_child.h"
 #include "render/error.h"
 #include "render/file_io.h"
+#include "render/gltf_packed.h"
 #include "render/image_io.h"
 #include "render/mesh_import.h"
 
 // With files that any fuzzer finds within minutes, assimp overflows its stack, loops, or allocates the size
-// that a header claims. Therefore a confined child imports the model and returns it in a memory file. Only
-// that child can crash, and the caller gets a message.
+// that a header claims, and the libraries for compressed data may do so. Therefore a confined child imports
+// the model and returns it in a memory file. Only that child can crash, and the caller gets a message.
 
 namespace offstage::render {
 namespace {
@@ -36,6 +37,9 @@ void transfer(Archive& archive, Model& model) {
     archive.array(part.mesh.positions);
     archive.array(part.mesh.normals);
     archive.array(part.mesh.uvs);
+    archive.array(part.mesh.second_uvs);
+    archive.array(part.mesh.colors);
+    archive.array(part.mesh.tangents);
     archive.array(part.mesh.indices);
   });
   archive.list(model.nodes, [&](Model::Node& node) {
@@ -50,12 +54,28 @@ void transfer(Archive& archive, Model& model) {
     archive.value(m.metallic);
     archive.value(m.roughness);
     archive.value(m.emission);
+    archive.value(m.transmission);
+    archive.value(m.refraction);
     archive.value(m.two_sided);
-    archive.value(m.base_color_texture);
-    archive.value(m.metallic_roughness_texture);
-    archive.value(m.emission_texture);
+    for_each_texture(m, [&](TextureMap& map) {
+      for (int* number : {&map.image, &map.uv_set}) archive.value(*number);
+      for (Wrap* wrap : {&map.wrap_u, &map.wrap_v}) archive.value(*wrap);
+      for (bool* flag : {&map.nearest, &map.mip_maps}) archive.value(*flag);
+      for (Vector3f& row : map.rows) archive.value(row);
+    });
+    archive.value(m.normal_scale);
+    archive.value(m.occlusion_strength);
+    archive.value(m.alpha_cutoff);
+    for (bool* flag : {&m.unlit, &m.thin, &m.vertex_colors, &m.vertex_alpha}) archive.value(*flag);
+    archive.value(m.specular);
+    archive.value(m.glossiness);
+    archive.value(m.clearcoat);
+    archive.value(m.clearcoat_roughness);
+    archive.value(m.sheen_color);
+    archive.value(m.sheen_roughness);
   });
   archive.list(model.textures, [&](Image& image) { transfer_image(archive, image); });
+  archive.array(model.unit);
   archive.list(model.warnings, [&](std::string& line) { archive.array(line); });
 }
 
@@ -136,7 +156,8 @@ bool is_whole(const Image& image) {
 bool is_whole(const Mesh& mesh) {
   const std::size_t vertices = mesh.positions.size();
   const auto fits = [&](std::size_t size) { return size == 0 || size == vertices; };
-  return fits(mesh.normals.size()) && fits(mesh.uvs.size()) && mesh.indices.size() % 3 == 0 &&
+  return fits(mesh.normals.size()) && fits(mesh.uvs.size()) && fits(mesh.second_uvs.size()) &&
+         fits(mesh.colors.size()) && fits(mesh.tangents.size()) && mesh.indices.size() % 3 == 0 &&
          std::ranges::all_of(mesh.indices, [&](uint32_t index) { return index < vertices; }) &&
          std::ranges::all_of(mesh.positions, [](const Vector3f& p) { return p.allFinite(); });
 }
@@ -146,7 +167,13 @@ bool is_whole(const Model& model) {
   const auto refers = [](int index, std::size_t size) {
     return index >= 0 && static_cast<std::size_t>(index) < size;
   };
-  const auto texture = [&](int index) { return index == -1 || refers(index, model.textures.size()); };
+  const auto texture = [&](const TextureMap& map) {
+    const auto is_wrap = [](Wrap wrap) {
+      return static_cast<unsigned>(wrap) <= static_cast<unsigned>(Wrap::clamp);
+    };
+    return (map.image == -1 || refers(map.image, model.textures.size())) && is_wrap(map.wrap_u) &&
+           is_wrap(map.wrap_v);
+  };
   return std::ranges::all_of(model.parts,
                              [&](const Model::Part& part) {
                                return refers(part.material, model.materials.size()) && is_whole(part.mesh);
@@ -159,8 +186,9 @@ bool is_whole(const Model& model) {
                              }) &&
          std::ranges::all_of(model.materials,
                              [&](const Material& m) {
-                               return texture(m.base_color_texture) &&
-                                      texture(m.metallic_roughness_texture) && texture(m.emission_texture);
+                               bool whole = true;
+                               for_each_texture(m, [&](const TextureMap& map) { whole &= texture(map); });
+                               return whole;
                              }) &&
          std::ranges::all_of(model.textures, [](const Image& image) { return is_whole(image); });
 }
@@ -187,6 +215,14 @@ uint64_t checked_size(const std::filesystem::path& path) {
 }
 
 }  // namespace
+
+std::vector<std::string> missing_model_libraries() {
+  std::vector<std::string> missing;
+  if (!has_draco()) missing.emplace_back("libdraco-dev");
+  if (!has_meshopt()) missing.emplace_back("libmeshoptimizer-dev");
+  if (!has_webp()) missing.emplace_back("libwebp-dev");
+  return missing;
+}
 
 std::string outside_of_folders(const std::filesystem::path& path) {
   return path.string() + ": is outside of the scene's folder; allow its folder with --allow DIR";

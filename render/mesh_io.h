@@ -1,9 +1,12 @@
 #pragma once
-/// Reads model files by assimp (OBJ, PLY, STL, glTF/GLB, Collada, FBX and its other formats) and textures.
+/// Reads model files and textures: glTF 2.0 by a reader of its own (docs/models.md lists its features), OBJ,
+/// PLY, STL, Collada, FBX and others by assimp.
 /// Both are read in a confined child (confined_child.h has its limits of time and memory), because readers
 /// crash or hang on hostile files; the caller then gets a message.
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "render/file_io.h"
 #include "render/input_folders.h"
@@ -20,21 +23,24 @@ ModelPath split_node(const std::filesystem::path& path);
 
 /// Reads a model and its textures, embedded or beside it. Applies the transforms of its nodes, and removes
 /// elements that cannot be drawn (points, lines, faces with bad indices or no area, non-finite vertices) with
-/// a warning. Animation, skins, cameras, lights and vertex colours are ignored. There is one part per
-/// material, with normals (by compute_normals() if the file has none). Texture coordinates start at the
-/// image's top left, with v downwards. Up axis and unit are converted to Y and metres if the format defines
-/// them (FBX, Collada). Colours of classic materials (diffuse, specular, shininess) are treated as sRGB,
-/// those of physically based materials as linear.
-/// For a path that ends in #NODE, only the triangles of that node, in its frame (Model::Node).
-/// The model and all files that it names must be in `folders`; if there are none, in the model's own folder.
-/// Throws FileError with one line for a file that is missing, broken, or without triangles; UnavailableError
-/// if no process can be started; StoppedError after a request by `stop`.
+/// a warning. Animations, cameras and lights are ignored; of glTF files, with a warning. There is one part
+/// per material and kind of vertex, with normals (by compute_normals() if the file has none; flat for glTF).
+/// Texture coordinates start at the image's top left, with v downwards. Up axis and unit are converted to Y
+/// and metres if the format defines them (FBX, Collada). Colours of classic materials (diffuse, specular,
+/// shininess) are treated as sRGB, those of physically based materials as linear. For a path that ends in
+/// #NODE, only the triangles of that node, in its frame (Model::Node). The model and all files that it names
+/// must be in `folders`; if there are none, in the model's own folder. Throws FileError with one line for a
+/// file that is missing, broken, or without triangles; UnavailableError if no process can be started;
+/// StoppedError after a request by `stop`.
 Model read_model(const std::filesystem::path& path, const InputFolders& folders = {},
                  const StopTest& stop = {});
 
 /// Reads an image of up to kMaxTexturePixels. Throws as read_model() does.
 Image read_texture(const std::filesystem::path& path, const InputFolders& folders = {},
                    const StopTest& stop = {});
+
+/// The packages of optional libraries for compressed glTF files without which offstage was built.
+std::vector<std::string> missing_model_libraries();
 
 /// Returns the message for a file outside of the folders that may be read.
 std::string outside_of_folders(const std::filesystem::path& path);

@@ -7,8 +7,11 @@
 
 #include "render/error.h"
 #include "render/file_io.h"
+#include "render/height_map.h"
 #include "render/image_io.h"
 #include "render/mesh_import.h"
+#include "render/model_files.h"
+#include "render/mtl_file.h"
 #include "render/tone_map.h"
 
 namespace offstage::render {
@@ -16,44 +19,6 @@ namespace {
 
 float clamped(float value, float high = 1) {
   return std::isfinite(value) ? std::clamp(value, 0.0f, high) : 0;
-}
-
-bool equal_ignoring_case(const std::string& a, const std::string& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
-}
-
-/// Converts "a%20b" to "a b", as in the URIs of glTF and Collada.
-std::string percent_decoded(const std::string& text) {
-  std::string result;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const bool code = text[i] == '%' && i + 2 < text.size() &&
-                      std::isxdigit(static_cast<unsigned char>(text[i + 1])) &&
-                      std::isxdigit(static_cast<unsigned char>(text[i + 2]));
-    result += code ? static_cast<char>(std::stoi(text.substr(i + 1, 2), nullptr, 16)) : text[i];
-    if (code) i += 2;
-  }
-  return result;
-}
-
-/// Finds a texture: by the name given, then by its file name in the model's folder, then there in any letter
-/// case, for paths from other machines. Empty if there is none.
-std::filesystem::path find_texture(const std::filesystem::path& folder, std::string name) {
-  std::replace(name.begin(), name.end(), '\\', '/');
-  if (name.starts_with("file://")) name.erase(0, 7);
-  std::error_code ignored;
-  for (const std::filesystem::path path : {name, percent_decoded(name)}) {
-    for (const std::filesystem::path& candidate : {folder / path, folder / path.filename()}) {
-      if (std::filesystem::is_regular_file(candidate, ignored)) return candidate;
-    }
-  }
-  const std::string file = std::filesystem::path(name).filename().string();
-  const std::filesystem::path here = folder.empty() ? "." : folder;
-  for (std::filesystem::directory_iterator entry(here, ignored), end; entry != end;
-       entry.increment(ignored)) {
-    if (equal_ignoring_case(entry->path().filename().string(), file)) return entry->path();
-  }
-  return {};
 }
 
 Image decode_embedded(const aiTexture& texture, const std::string& name) {
@@ -76,6 +41,23 @@ class MaterialImporter {
                    Model& model)
       : scene_(scene), folder_(folder), folders_(folders), model_(model) {}
 
+  /// Adds what assimp does not read of an MTL file to the material that was appended last.
+  void add_mtl(const MtlMaterial& source) {
+    Material& look = model_.materials.back();
+    if (source.roughness) look.roughness = clamped(*source.roughness);
+    if (source.metallic) look.metallic = clamped(*source.metallic);
+    for (const auto& [key, map] : source.maps) {
+      if (key == "map_kd") lay(map, look.base_color_texture);
+      if (key == "map_ke") add_glow(map, look);
+      if (key == "map_ks" || key == "map_ns" || key == "map_pr" || key == "map_pm" || key == "disp" ||
+          key == "refl")
+        model_.warnings.push_back("material '" + look.name + "': " + key + " is ignored");
+    }
+    if (const auto mask = source.maps.find("map_d"); mask != source.maps.end()) add_mask(mask->second, look);
+    for (const char* key : {"bump", "norm"})
+      if (const auto map = source.maps.find(key); map != source.maps.end()) add_bumps(map->second, look);
+  }
+
   /// Appends the material; returns the number of its set of texture coordinates.
   unsigned add(const aiMaterial& source) {
     Material material;
@@ -91,12 +73,14 @@ class MaterialImporter {
     if (source.Get(AI_MATKEY_TWOSIDED, two_sided) == aiReturn_SUCCESS) material.two_sided = two_sided != 0;
 
     unsigned uv_set = 0;
-    material.base_color_texture =
+    material.base_color_texture.image =
         texture(source, {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}, opaque, &uv_set);
-    material.emission_texture = texture(source, {aiTextureType_EMISSION_COLOR, aiTextureType_EMISSIVE}, true);
+    material.emission_texture.image =
+        texture(source, {aiTextureType_EMISSION_COLOR, aiTextureType_EMISSIVE}, true);
     // glTF's combined image; formats with two separate images are not supported.
-    if (gltf) material.metallic_roughness_texture = texture(source, {aiTextureType_UNKNOWN}, true);
-    if (material.name.empty() && material.base_color_texture < 0 && material.color == Vector4f::Ones()) {
+    if (gltf) material.metallic_roughness_texture.image = texture(source, {aiTextureType_UNKNOWN}, true);
+    if (material.name.empty() && material.base_color_texture.image < 0 &&
+        material.color == Vector4f::Ones()) {
       give_default_look(material);
     }
     if (!gltf && material.color.w() < 1e-3f) {  // many programs write the transparency here instead
@@ -163,6 +147,49 @@ class MaterialImporter {
     return linear ? clamped(value) : srgb_decode(clamped(value));
   }
 
+  /// Applies the options of a texture. The coordinates of MTL start at the bottom.
+  static void lay(const MtlMap& map, TextureMap& texture) {
+    texture.rows[0] = {map.scale.x(), 0, map.offset.x()};
+    texture.rows[1] = {0, map.scale.y(), 1 - map.scale.y() - map.offset.y()};
+    if (map.clamp) texture.wrap_u = texture.wrap_v = Wrap::clamp;
+  }
+
+  void add_glow(const MtlMap& map, Material& look) {
+    if (look.emission_texture.image < 0) look.emission_texture.image = load(map.file, true);
+    if (look.emission_texture.image >= 0 && look.emission.isZero()) look.emission = Vector3f::Ones();
+    lay(map, look.emission_texture);
+  }
+
+  /// A mask is often the alpha of the base colour's own picture.
+  void add_mask(const MtlMap& map, Material& look) {
+    const int mask = load(map.file, false);
+    if (mask < 0) return;
+    const auto at = [this](int index) -> const Image& {
+      return model_.textures[static_cast<std::size_t>(index)];
+    };
+    const int base = look.base_color_texture.image;
+    Image combined = with_mask(base >= 0 ? at(base) : Image{}, at(mask));
+    look.alpha_cutoff = is_cut_out(combined) ? 0.5f : 0.0f;
+    if (base < 0) lay(map, look.base_color_texture);
+    look.base_color_texture.image = static_cast<int>(model_.textures.size());
+    model_.textures.push_back(std::move(combined));
+  }
+
+  /// Many programs write normal maps where the format has height maps.
+  void add_bumps(const MtlMap& map, Material& look) {
+    const int picture = load(map.file, true);
+    if (picture < 0) return;
+    look.normal_scale = map.bump;
+    look.normal_texture.image = picture;
+    lay(map, look.normal_texture);
+    const Image& image = model_.textures[static_cast<std::size_t>(picture)];
+    if (is_normal_map(image)) return;
+    look.normal_texture.image = static_cast<int>(model_.textures.size());
+    look.normal_scale = 1;  // 8 bits are too coarse to scale the slope afterwards
+    Image normals = normals_of_heights(image, map.bump);
+    model_.textures.push_back(std::move(normals));
+  }
+
   /// Index of the first existing texture among `types`, or -1.
   int texture(const aiMaterial& source, std::initializer_list<aiTextureType> types, bool opaque,
               unsigned* uv_set = nullptr) {
@@ -195,7 +222,7 @@ class MaterialImporter {
     if (const aiTexture* embedded = scene_.GetEmbeddedTexture(name.c_str())) {
       return decode_embedded(*embedded, "embedded texture " + name);
     }
-    const std::filesystem::path path = find_texture(folder_, name);
+    const std::filesystem::path path = find_beside(folder_, name);
     if (path.empty()) throw FileError("texture '" + name + "' is not there");
     if (!folders_.contain(path))
       throw FileError("texture '" + name + "' is outside of the folders that may be read");
@@ -212,10 +239,15 @@ class MaterialImporter {
 }  // namespace
 
 std::vector<unsigned> import_materials(const aiScene& scene, const std::filesystem::path& folder,
-                                       const InputFolders& folders, Model& model) {
+                                       const InputFolders& folders,
+                                       const std::map<std::string, MtlMaterial>& mtl, Model& model) {
   MaterialImporter importer(scene, folder, folders, model);
   std::vector<unsigned> uv_sets;
-  for (unsigned i = 0; i < scene.mNumMaterials; ++i) uv_sets.push_back(importer.add(*scene.mMaterials[i]));
+  for (unsigned i = 0; i < scene.mNumMaterials; ++i) {
+    uv_sets.push_back(importer.add(*scene.mMaterials[i]));
+    const auto found = mtl.find(model.materials.back().name);
+    if (found != mtl.end()) importer.add_mtl(found->second);
+  }
   return uv_sets;
 }
 

@@ -15,8 +15,16 @@ struct Vertex {
 };
 static_assert(sizeof(Vertex) == 32);
 
-constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1;
-constexpr GLuint kMaterialBlock = 1, kFirstTextureUnit = 1;
+/// Data that few meshes have.
+struct VertexDetails {
+  Vector2f second_uv;
+  Vector4f color, tangent;
+};
+
+constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1, kDetailBinding = 2;
+constexpr GLuint kSecondUv = 6, kColor = 7, kTangent = 8;  // attributes
+constexpr GLuint kMaterialBlock = 1;
+constexpr std::array<GLuint, kTextureMaps> kTextureUnits = {1, 2, 3, 14, 15, 16, 17};
 constexpr float kSmooth = 0.3f;        // with less roughness, a surface shows a mirror image of the scene
 constexpr GLsizei kFewIndices = 1200;  // number of indices of a mesh that is cheap to draw again
 constexpr float kMirrorSteps = 14;     // steps along the ray in the search for a mirror image
@@ -98,6 +106,22 @@ bool is_closed(const Mesh& mesh) {
   return edges == reversed;
 }
 
+/// Uploads the second texture coordinates, colours and tangents of a mesh that has any of them.
+void add_details(const Mesh& mesh, GpuMesh& gpu) {
+  if (mesh.second_uvs.empty() && mesh.colors.empty() && mesh.tangents.empty()) return;
+  std::vector<VertexDetails> packed(mesh.positions.size());
+  for (std::size_t i = 0; i < packed.size(); ++i) {
+    packed[i] = {mesh.second_uvs.empty() ? Vector2f(0, 0) : mesh.second_uvs[i],
+                 mesh.colors.empty() ? Vector4f(1, 1, 1, 1) : mesh.colors[i],
+                 mesh.tangents.empty() ? Vector4f(0, 0, 0, 1) : mesh.tangents[i]};
+  }
+  gpu.details = gl::make_buffer(std::span<const VertexDetails>(packed));
+  glVertexArrayVertexBuffer(gpu.vertex_array, kDetailBinding, gpu.details, 0, sizeof(VertexDetails));
+  gl::set_attribute(gpu.vertex_array, kSecondUv, kDetailBinding, 2, offsetof(VertexDetails, second_uv));
+  gl::set_attribute(gpu.vertex_array, kColor, kDetailBinding, 4, offsetof(VertexDetails, color));
+  gl::set_attribute(gpu.vertex_array, kTangent, kDetailBinding, 4, offsetof(VertexDetails, tangent));
+}
+
 }  // namespace
 
 struct MeshPass::Item {
@@ -151,6 +175,15 @@ GpuMesh::GpuMesh(const Mesh& source) : vertex_array(gl::make_vertex_array()) {
     gl::set_attribute(vertex_array, 3 + row, kInstanceBinding, 4, row * sizeof(Vector4f));
   }
   glVertexArrayBindingDivisor(vertex_array, kInstanceBinding, 1);
+  add_details(*mesh, *this);
+}
+
+void bind_material(const GpuMaterial& material, GLuint white) {
+  glBindBufferBase(GL_UNIFORM_BUFFER, kMaterialBlock, material.uniforms);
+  if (!material.textured) return;
+  const std::size_t count = material.detailed ? material.textures.size() : 3;
+  for (std::size_t k = 0; k < count; ++k)
+    glBindTextureUnit(kTextureUnits[k], material.textures[k] != 0 ? GLuint{material.textures[k]} : white);
 }
 
 GpuMaterial make_gpu_material(const Material& material, std::span<const Image> textures) {
@@ -164,24 +197,42 @@ GpuMaterial make_gpu_material(const Material& material, std::span<const Image> t
   uniforms.back << fabric.back_color.value_or(material.color.head<3>()), fabric.translucency;
   uniforms.sheen << fabric.sheen * fabric.sheen_color, fabric.back_color ? 1 : 0;
   uniforms.glass = {material.transmission, 1 / std::max(material.refraction, 1.0f), 0, 0};
+  uniforms.specular << material.specular, material.glossiness;
+  uniforms.coat = {material.clearcoat, material.clearcoat_roughness, material.normal_scale,
+                   material.occlusion_strength};
+  uniforms.velvet << material.sheen_color, material.sheen_roughness;
+  uniforms.options = {material.alpha_cutoff, material.unlit ? 1.0f : 0.0f,
+                      texture_at(textures, material.normal_texture.image) != nullptr ? 1.0f : 0.0f, 0};
+  std::size_t row = 0;
+  for_each_texture(material, [&](const TextureMap& map) {
+    uniforms.uv_rows[row++] << map.rows[0], map.uv_set == 1 ? 1.0f : 0.0f;
+    uniforms.uv_rows[row++] << map.rows[1], 0.0f;
+  });
   result.uniforms = gl::make_buffer(std::span<const MaterialUniforms>(&uniforms, 1));
 
-  const std::array<int, 3> indices = {material.base_color_texture, material.metallic_roughness_texture,
-                                      material.emission_texture};
-  for (std::size_t k = 0; k < indices.size(); ++k) {
-    const Image* image = texture_at(textures, indices[k]);
-    if (image == nullptr) continue;
-    result.textures[k] = make_texture(*image, k == 1 ? TextureContent::data : TextureContent::color);
+  result.detailed = material.is_detailed();
+  result.textured = result.detailed;
+  std::size_t k = 0;
+  for_each_texture(material, [&](const TextureMap& map) {
+    const std::size_t unit = k++;
+    const Image* image = texture_at(textures, map.image);
+    if (image == nullptr || (unit > 2 && !result.detailed)) return;
+    const bool is_color = unit == 0 || unit == 2 || unit == 6;
+    result.textures[unit] = make_texture(*image, is_color ? TextureContent::color : TextureContent::data, map,
+                                         unit == 0 && result.detailed ? material.alpha_cutoff : 0.0f);
     result.textured = true;
-  }
-  const Image* base = texture_at(textures, material.base_color_texture);
+  });
+  const Image* base = texture_at(textures, material.base_color_texture.image);
   result.pattern = material.pattern;
   result.weave = fabric.weave;
   result.two_sided = material.two_sided;
-  result.blended = material.color.w() < 1 || (base != nullptr && has_alpha(*base));
+  result.cut_out = result.detailed && material.alpha_cutoff > 0;
+  result.blended = !result.cut_out &&
+                   (material.color.w() < 1 || material.vertex_alpha || (base != nullptr && has_alpha(*base)));
+  result.thin = material.thin;
   result.casts = material.color.w() > 0;
   result.glass = material.transmission > 0 && !result.blended;
-  result.smooth = !result.glass && !result.blended && material.roughness < kSmooth;
+  result.smooth = !result.glass && !result.blended && !material.unlit && material.roughness < kSmooth;
   result.metal = material.metallic > 0.5f;
   return result;
 }
@@ -205,7 +256,13 @@ MeshPass::MeshPass()
                        {"SHADOW 1"}),
       textured_shadow_({"frame.glsl", "mesh.vert"}, {"frame.glsl", "material.glsl", "mesh_shadow.frag"},
                        {"SHADOW 1", "TEXTURED 1"}),
-      white_(make_white_texture()) {}
+      detailed_shadow_({"frame.glsl", "mesh.vert"}, {"frame.glsl", "material.glsl", "mesh_shadow.frag"},
+                       {"SHADOW 1", "TEXTURED 1", "DETAILED 1"}),
+      white_(make_white_texture()) {
+  // Values for meshes without these attributes.
+  glVertexAttrib4f(kColor, 1, 1, 1, 1);
+  glVertexAttrib4f(kTangent, 0, 0, 0, 1);
+}
 
 void MeshPass::prepare(std::span<const Instance* const> instances, const View& view,
                        const Features& features) {
@@ -263,14 +320,6 @@ void MeshPass::prepare(std::span<const Instance* const> instances, const View& v
   shadow_rows_.write(std::span<const Rows>(shadow_rows));
 }
 
-void MeshPass::bind(const GpuMaterial& material) {
-  glBindBufferBase(GL_UNIFORM_BUFFER, kMaterialBlock, material.uniforms);
-  if (!material.textured) return;
-  for (GLuint k = 0; k < material.textures.size(); ++k) {
-    glBindTextureUnit(kFirstTextureUnit + k, material.textures[k] != 0 ? material.textures[k] : white_);
-  }
-}
-
 void MeshPass::draw(const Batch& batch, const gl::StreamBuffer& rows, Detail detail) {
   const GpuMesh& mesh = *batch.mesh;
   const bool coarse = detail == Detail::coarse && mesh.coarse_count > 0;
@@ -284,8 +333,8 @@ void MeshPass::draw(const Batch& batch, const gl::StreamBuffer& rows, Detail det
 
 gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) {
   const GpuMaterial& material = *batch.material;
-  const auto key = std::make_tuple(material.pattern, material.textured, material.glass, batch.mesh->endless,
-                                   shading, features_);
+  const auto key = std::make_tuple(material.pattern, material.textured, material.detailed, material.glass,
+                                   batch.mesh->endless, shading, features_);
   const auto found = surface_programs_.find(key);
   if (found != surface_programs_.end()) return found->second;
   std::vector<std::string> defines = features_;
@@ -293,6 +342,7 @@ gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) 
   std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "light.glsl", "lamps.glsl",
                                             "material.glsl"};
   if (material.textured) defines.push_back("TEXTURED 1");
+  if (material.detailed) defines.push_back("DETAILED 1");
   if (batch.mesh->endless) defines.push_back("ENDLESS 1");
   if (shading == Shading::unhidden) defines.push_back("UNHIDDEN 1");
   if (shading == Shading::mirror) {
@@ -313,7 +363,8 @@ gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) 
 }
 
 gl::LazyProgram& MeshPass::shadow_program(const GpuMaterial& material) {
-  if (!material.blended && !material.glass) return opaque_shadow_;
+  if (!material.blended && !material.glass && !material.cut_out) return opaque_shadow_;
+  if (material.detailed) return detailed_shadow_;
   return material.textured ? textured_shadow_ : dithered_shadow_;
 }
 
@@ -322,8 +373,9 @@ void MeshPass::draw_shadows(const Matrix4f& shadow_clip_from_world, bool front_o
     shadow_program(*batch.material).use();
     glUniformMatrix4fv(0, 1, GL_FALSE, shadow_clip_from_world.data());
     const GpuMaterial& material = *batch.material;
-    set_facing(batch, !(front_only && batch.mesh->closed && !material.blended && !material.glass));
-    bind(*batch.material);
+    set_facing(batch, !(front_only && batch.mesh->closed && !material.blended && !material.glass &&
+                        !material.cut_out));
+    bind_material(*batch.material, white_);
     draw(batch, shadow_rows_, Detail::coarse);
   }
   glDisable(GL_CULL_FACE);
@@ -336,11 +388,13 @@ void MeshPass::set_facing(const Batch& batch, bool both_sides) {
 }
 
 void MeshPass::draw_depth(const Matrix4f& clip_from_world) {
-  opaque_shadow_.use();
-  glUniformMatrix4fv(0, 1, GL_FALSE, clip_from_world.data());
   for (const Batch& batch : opaque_) {
+    const bool holes = batch.material->cut_out;
+    (holes ? detailed_shadow_ : opaque_shadow_).use();
+    glUniformMatrix4fv(0, 1, GL_FALSE, clip_from_world.data());
+    if (holes) bind_material(*batch.material, white_);
     set_facing(batch, batch.material->two_sided);
-    draw(batch, rows_, Detail::coarse);
+    draw(batch, rows_, holes ? Detail::full : Detail::coarse);
   }
 }
 
@@ -349,7 +403,7 @@ void MeshPass::draw_batch(const Batch& batch, Shading shading) {
   surface_program(batch, shading).use();
   glUniform1f(0, kOpaqueAlpha);
   set_facing(batch, batch.material->two_sided);
-  bind(*batch.material);
+  bind_material(*batch.material, white_);
   draw(batch, rows_);
 }
 
@@ -503,7 +557,7 @@ void MeshPass::draw_mirrors(float reach) {
     glUniform1f(0, 0);
     glUniform2f(2, reach, kMirrorSteps);
     set_facing(*batch, batch->material->two_sided);
-    bind(*batch->material);
+    bind_material(*batch->material, white_);
     glScissor(area.min().x(), area.min().y(), area.sizes().x(), area.sizes().y());
     draw(*batch, rows_);
   }
@@ -515,9 +569,9 @@ void MeshPass::draw_translucent(std::size_t k) {
   const Batch& batch = translucent_[k];
   surface_program(batch).use();
   glUniform1f(0, batch.material->glass ? 0 : kVisibleAlpha);
-  if (batch.material->glass) glUniform1f(1, batch.thickness);
+  if (batch.material->glass) glUniform1f(1, batch.material->thin ? 0 : batch.thickness);
   set_facing(batch, batch.material->two_sided);
-  bind(*batch.material);
+  bind_material(*batch.material, white_);
   draw(batch, rows_);
 }
 

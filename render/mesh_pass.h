@@ -19,7 +19,7 @@ namespace offstage::render {
 
 struct GpuMesh {
   explicit GpuMesh(const Mesh& mesh);
-  gl::Buffer vertices, indices;
+  gl::Buffer vertices, details, indices;
   gl::VertexArray vertex_array;
   GLsizei index_count = 0;
   GLsizei coarse_count = 0;  ///< number of indices of Mesh::coarse_indices, which follow the others
@@ -38,14 +38,19 @@ struct GpuMesh {
 /// The uniform block of shaders/material.glsl.
 struct MaterialUniforms {
   Vector4f color, pattern_color, emission, surface, back, sheen, glass;
+  Vector4f specular, coat, velvet, options;
+  std::array<Vector4f, 2 * kTextureMaps> uv_rows;
 };
 
 struct GpuMaterial {
   gl::Buffer uniforms;
-  std::array<gl::Texture, 3> textures;  ///< base colour; metallic and roughness; emission
+  std::array<gl::Texture, kTextureMaps> textures;  ///< in the order of for_each_texture()
   Pattern pattern = Pattern::none;
   Weave weave = Weave::plain;
   bool textured = false;
+  bool detailed = false;  ///< see Material::is_detailed(); textured then, too
+  bool cut_out = false;   ///< has holes by its alpha, and is opaque elsewhere
+  bool thin = false;
   bool two_sided = false;
   bool blended = false;
   bool casts = true;    ///< false if fully transparent
@@ -56,6 +61,9 @@ struct GpuMaterial {
   /// Whether objects behind the surface are visible through it.
   bool lets_through() const { return blended || glass; }
 };
+
+/// Binds the material's uniforms and textures; `white` stands for missing textures.
+void bind_material(const GpuMaterial& material, GLuint white);
 
 GpuMaterial make_gpu_material(const Material& material, std::span<const Image> textures);
 
@@ -103,6 +111,7 @@ class MeshPass {
   /// The area of the picture where opaque surfaces can hide the sky within `reach` [m]: around all of them
   /// except planes. `others`: boxes around opaque objects in addition to the instances.
   ScreenArea occluded_area(const View& view, float reach, std::span<const Eigen::AlignedBox3f> others) const;
+  GLuint white() const { return white_; }
   /// Translucent instances, in the order of the instances.
   std::span<const Instance* const> translucent() const { return see_through_; }
   /// Finds the surfaces that mirror parts of the scene, and their area in a picture of the given size.
@@ -129,7 +138,6 @@ class MeshPass {
     float thickness;  ///< thickness of its first instance, in the world
   };
   void draw(const Batch& batch, const gl::StreamBuffer& rows, Detail detail = Detail::full);
-  void bind(const GpuMaterial& material);
   enum class Shading { whole, unhidden, mirror };
   gl::LazyProgram& surface_program(const Batch& batch, Shading shading = Shading::whole);
   gl::LazyProgram& shadow_program(const GpuMaterial& material);
@@ -140,9 +148,9 @@ class MeshPass {
   ScreenArea mirrored_area(const Batch& batch, const View& view, float reach,
                            std::span<const Eigen::AlignedBox3f> others) const;
 
-  /// Keyed by textured, glass, endless.
-  std::map<std::tuple<Pattern, bool, bool, bool, Shading, Features>, gl::LazyProgram> surface_programs_;
-  gl::LazyProgram opaque_shadow_, dithered_shadow_, textured_shadow_;
+  /// Keyed by textured, detailed, glass, endless.
+  std::map<std::tuple<Pattern, bool, bool, bool, bool, Shading, Features>, gl::LazyProgram> surface_programs_;
+  gl::LazyProgram opaque_shadow_, dithered_shadow_, textured_shadow_, detailed_shadow_;
   Features features_;
   gl::Texture white_;
   gl::StreamBuffer rows_, shadow_rows_;

@@ -87,6 +87,20 @@ std::size_t Model::vertex_count() const {
   return count;
 }
 
+bool TextureMap::is_plain() const {
+  return uv_set == 0 && rows[0] == Vector3f(1, 0, 0) && rows[1] == Vector3f(0, 1, 0);
+}
+
+bool Material::is_detailed() const {
+  if (pattern != Pattern::none) return false;  // patterns replace these
+  const bool more = normal_texture.image >= 0 || occlusion_texture.image >= 0 ||
+                    transmission_texture.image >= 0 || specular_texture.image >= 0;
+  const bool moved = !base_color_texture.is_plain() || !metallic_roughness_texture.is_plain() ||
+                     !emission_texture.is_plain();
+  return more || moved || alpha_cutoff > 0 || unlit || vertex_colors || clearcoat > 0 ||
+         specular != Vector3f::Constant(0.04f) || sheen_color != Vector3f::Zero();
+}
+
 void compute_normals(Mesh& mesh, float crease_deg) {
   const Fans fans = find_fans(mesh);
   const std::vector<Vector3f> area = area_normals(mesh);
@@ -119,6 +133,9 @@ void compute_normals(Mesh& mesh, float crease_deg) {
       const auto copy = static_cast<uint32_t>(mesh.positions.size());
       mesh.positions.push_back(Vector3f(mesh.positions[first]));
       if (!mesh.uvs.empty()) mesh.uvs.push_back(Vector2f(mesh.uvs[first]));
+      if (!mesh.second_uvs.empty()) mesh.second_uvs.push_back(Vector2f(mesh.second_uvs[first]));
+      if (!mesh.colors.empty()) mesh.colors.push_back(Vector4f(mesh.colors[first]));
+      if (!mesh.tangents.empty()) mesh.tangents.push_back(Vector4f(mesh.tangents[first]));
       mesh.normals.push_back(normal);
       next_copy[vertex] = copy;
       next_copy.push_back(kNone);

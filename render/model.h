@@ -1,6 +1,7 @@
 #pragma once
 /// Drawable data on the CPU: meshes, materials, and models that combine them. All colours are linear.
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -17,16 +18,21 @@ using Eigen::Vector2f;
 using Eigen::Vector3f;
 using Eigen::Vector4f;
 
-/// Indexed triangles. `normals` and `uvs` are empty or as long as `positions`; meshes without normals are
-/// shaded smooth.
+/// Indexed triangles. The lists of vertex data are empty or as long as `positions`; meshes without normals
+/// are shaded smooth.
 struct Mesh {
   std::vector<Vector3f> positions;
   std::vector<Vector3f> normals;
   std::vector<Vector2f> uvs;
+  std::vector<Vector2f> second_uvs = {};  ///< for textures with TextureMap::uv_set 1
+  std::vector<Vector4f> colors = {};      ///< linear, straight alpha; used if Material::vertex_colors
+  /// Direction of increasing u for normal maps; w is 1 or -1, the side of the direction of increasing v.
+  /// Empty: derived from the texture coordinates while drawing.
+  std::vector<Vector4f> tangents = {};
   std::vector<uint32_t> indices;  ///< three per triangle, counter-clockwise seen from outside
   /// A coarser surface with the same vertices, slightly inside the fine one and closed if that is. It is used
   /// for shadows and depth. Empty: none.
-  std::vector<uint32_t> coarse_indices;
+  std::vector<uint32_t> coarse_indices = {};
   /// Marks a mesh that stands for an infinite plane. It fades into the sky near its horizon, where it is seen
   /// at a grazing angle.
   bool endless = false;
@@ -71,7 +77,22 @@ struct Fabric {
   std::optional<Vector3f> back_color = {};  ///< colour of the back; empty: the same as the front
 };
 
-/// Metallic/roughness material.
+enum class Wrap { repeat, mirror, clamp };
+
+/// A texture of a material and how it is laid on the surface.
+struct TextureMap {
+  int image = -1;  ///< index into Model::textures, -1: none
+  int uv_set = 0;  ///< 0: Mesh::uvs, 1: Mesh::second_uvs
+  Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
+  bool nearest = false;  ///< enlarged texels are squares instead of being interpolated
+  bool mip_maps = true;  ///< reduced texels are averaged
+  /// Transform of the texture coordinates by rows: (u, v, 1) to the place in the image, v downwards.
+  std::array<Vector3f, 2> rows = {Vector3f(1, 0, 0), Vector3f(0, 1, 0)};
+
+  bool is_plain() const;  ///< first set, not transformed
+};
+
+/// Metallic/roughness material, with the parameters of glTF 2.0 and some of its extensions.
 struct Material {
   std::string name = {};
   Vector4f color = {0.8f, 0.8f, 0.8f, 1};  ///< base colour; alpha below 1 blends
@@ -84,11 +105,47 @@ struct Material {
   Vector3f pattern_color = {0.4f, 0.4f, 0.4f};  ///< second colour of the pattern
   float pattern_scale = 1;                      ///< size of one cell [m], > 0
   bool two_sided = false;
-  Fabric fabric = {};           ///< used for cloths only
-  int base_color_texture = -1;  ///< index into Model::textures, -1: none
-  int metallic_roughness_texture = -1;
-  int emission_texture = -1;
+  Fabric fabric = {};                          ///< used for cloths only
+  TextureMap base_color_texture = {};          ///< sRGB colour and alpha, times `color`
+  TextureMap metallic_roughness_texture = {};  ///< G: roughness, B: metallic, times the factors
+  TextureMap emission_texture = {};            ///< sRGB, times `emission`
+  TextureMap normal_texture = {};              ///< tangent space, X towards +u, Y towards -v of the image
+  TextureMap occlusion_texture = {};           ///< R: share of the sky that is visible
+  TextureMap transmission_texture = {};        ///< R, times `transmission`
+  TextureMap specular_texture = {};            ///< sRGB, times `specular`; alpha: see `glossiness`
+  float normal_scale = 1;                      ///< factor of the slope of `normal_texture`
+  float occlusion_strength = 1;                ///< in [0, 1]
+  /// Points with less alpha are holes and all others are opaque (an alpha mask). 0: alpha blends.
+  float alpha_cutoff = 0;
+  bool unlit = false;          ///< shows its base colour as it is, without light
+  bool thin = false;           ///< of `transmission`: a sheet that does not refract
+  bool vertex_colors = false;  ///< Mesh::colors multiply the base colour
+  bool vertex_alpha = false;   ///< some vertex colours are translucent
+  /// Reflectance of a dielectric that faces the eye; ((n - 1) / (n + 1))^2 of its index of refraction n.
+  Vector3f specular = {0.04f, 0.04f, 0.04f};
+  /// Alpha of `specular_texture` is the glossiness: roughness = 1 - glossiness * alpha. Negative: not used.
+  float glossiness = -1;
+  float clearcoat = 0;  ///< strength of a layer of lacquer, in [0, 1]
+  float clearcoat_roughness = 0;
+  Vector3f sheen_color = Vector3f::Zero();  ///< light scattered at grazing angles, as of velvet
+  float sheen_roughness = 0;
+
+  /// Whether it needs more than the first three textures in their plain form.
+  bool is_detailed() const;
 };
+
+/// Calls `each` for all textures of a material, in the order of the shader's texture units.
+template <class M, class Each>
+void for_each_texture(M& material, Each each) {
+  each(material.base_color_texture);
+  each(material.metallic_roughness_texture);
+  each(material.emission_texture);
+  each(material.normal_texture);
+  each(material.occlusion_texture);
+  each(material.transmission_texture);
+  each(material.specular_texture);
+}
+inline constexpr int kTextureMaps = 7;  ///< number of calls of for_each_texture()
 
 /// The content of a model file, with the node hierarchy already applied.
 struct Model {
@@ -108,6 +165,7 @@ struct Model {
   std::vector<Node> nodes;  ///< parents first
   std::vector<Material> materials;
   std::vector<Image> textures;
+  std::string unit;                   ///< unit of length in the file and how it was found, in words
   std::vector<std::string> warnings;  ///< repaired or ignored elements, one line each
 
   Eigen::AlignedBox3f bounds() const;

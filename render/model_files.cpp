@@ -43,6 +43,24 @@ class ModelStream : public Assimp::IOStream {
   std::size_t at_ = 0;
 };
 
+bool equal_ignoring_case(const std::string& a, const std::string& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+}
+
+/// Converts "a%20b" to "a b", as in the URIs of glTF and Collada.
+std::string percent_decoded(const std::string& text) {
+  std::string result;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool code = text[i] == '%' && i + 2 < text.size() &&
+                      std::isxdigit(static_cast<unsigned char>(text[i + 1])) &&
+                      std::isxdigit(static_cast<unsigned char>(text[i + 2]));
+    result += code ? static_cast<char>(std::stoi(text.substr(i + 1, 2), nullptr, 16)) : text[i];
+    if (code) i += 2;
+  }
+  return result;
+}
+
 class ModelFiles : public Assimp::IOSystem {
  public:
   explicit ModelFiles(const InputFolders& folders) : folders_(folders) {}
@@ -67,6 +85,28 @@ class ModelFiles : public Assimp::IOSystem {
 };
 
 }  // namespace
+
+bool has_ending(const std::filesystem::path& path, const std::string& ending) {
+  return equal_ignoring_case(path.extension().string(), ending);
+}
+
+std::filesystem::path find_beside(const std::filesystem::path& folder, std::string name) {
+  std::replace(name.begin(), name.end(), '\\', '/');
+  if (name.starts_with("file://")) name.erase(0, 7);
+  std::error_code ignored;
+  for (const std::filesystem::path path : {name, percent_decoded(name)}) {
+    for (const std::filesystem::path& candidate : {folder / path, folder / path.filename()}) {
+      if (std::filesystem::is_regular_file(candidate, ignored)) return candidate;
+    }
+  }
+  const std::string file = std::filesystem::path(name).filename().string();
+  const std::filesystem::path here = folder.empty() ? "." : folder;
+  for (std::filesystem::directory_iterator entry(here, ignored), end; entry != end;
+       entry.increment(ignored)) {
+    if (equal_ignoring_case(entry->path().filename().string(), file)) return entry->path();
+  }
+  return {};
+}
 
 std::unique_ptr<Assimp::IOSystem> make_model_files(const InputFolders& folders) {
   return std::make_unique<ModelFiles>(folders);

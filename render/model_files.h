@@ -1,7 +1,10 @@
 #pragma once
-/// Restricts the files that assimp may open to regular ones in the folders of a model. Private to render.
+/// The files that belong to a model. Those that assimp may open are regular ones in its folders. Private to
+/// render.
 
+#include <filesystem>
 #include <memory>
+#include <string>
 
 #include <assimp/IOSystem.hpp>
 
@@ -11,5 +14,12 @@ namespace offstage::render {
 
 /// `folders` must outlive it. All other files are treated as missing.
 std::unique_ptr<Assimp::IOSystem> make_model_files(const InputFolders& folders);
+
+/// Whether a file name ends in `ending`, in any letter case.
+bool has_ending(const std::filesystem::path& path, const std::string& ending);
+
+/// Finds a file that a model names: by the name given, then by its file name in the model's folder, then
+/// there in any letter case, for paths from other machines. Empty if there is none.
+std::filesystem::path find_beside(const std::filesystem::path& folder, std::string name);
 
 }  // namespace offstage::render

@@ -58,9 +58,40 @@ Image half_size(const Image& image, TextureContent content, const ChannelTable& 
   return half;
 }
 
+/// Share of the pixels whose alpha, times `factor`, reaches the cutoff.
+double coverage_of(const Image& image, float cutoff, float factor) {
+  std::size_t count = 0;
+  for (std::size_t i = 3; i < image.rgba.size(); i += 4)
+    count += static_cast<float>(image.rgba[i]) / 255 * factor >= cutoff;
+  return static_cast<double>(count) / static_cast<double>(std::max<std::size_t>(image.pixel_count(), 1));
+}
+
+/// Scales alpha so that about the share `coverage` of the pixels reaches the cutoff.
+Image with_coverage(const Image& image, float cutoff, double coverage) {
+  float low = 0.1f, high = 16;  // at the lower factor too little is covered, at the higher one too much
+  for (int k = 0; k < 16; ++k) {
+    const float middle = std::sqrt(low * high);
+    (coverage_of(image, cutoff, middle) < coverage ? low : high) = middle;
+  }
+  // A level of few pixels cannot have every share; the nearer of both sides is taken.
+  const double below = coverage - coverage_of(image, cutoff, low),
+               above = coverage_of(image, cutoff, high) - coverage;
+  const float factor = below < above ? low : high;
+  Image result = image;
+  for (std::size_t i = 3; i < result.rgba.size(); i += 4)
+    result.rgba[i] =
+        static_cast<uint8_t>(std::min(static_cast<float>(image.rgba[i]) * factor + 0.5f, 255.0f));
+  return result;
+}
+
+GLint wrap_mode(Wrap wrap) {
+  return wrap == Wrap::clamp ? GL_CLAMP_TO_EDGE : wrap == Wrap::mirror ? GL_MIRRORED_REPEAT : GL_REPEAT;
+}
+
 }  // namespace
 
-gl::Texture make_texture(const Image& image, TextureContent content) {
+gl::Texture make_texture(const Image& image, TextureContent content, const TextureMap& map,
+                         float alpha_cutoff) {
   if (image.width_px < 1 || image.height_px < 1 || std::max(image.width_px, image.height_px) > kMaxSize_px) {
     throw UnavailableError("a texture of " + std::to_string(image.width_px) + "x" +
                            std::to_string(image.height_px) + " pixels cannot be drawn; up to " +
@@ -73,14 +104,27 @@ gl::Texture make_texture(const Image& image, TextureContent content) {
       static_cast<GLsizei>(std::bit_width(static_cast<unsigned>(std::max(image.width_px, image.height_px))));
   glTextureStorage2D(texture, levels, content == TextureContent::color ? GL_SRGB8_ALPHA8 : GL_RGBA8,
                      image.width_px, image.height_px);
-  glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
+  glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER,
+                      map.mip_maps  ? GL_LINEAR_MIPMAP_LINEAR
+                      : map.nearest ? GL_NEAREST
+                                    : GL_LINEAR);
+  glTextureParameteri(texture, GL_TEXTURE_MAG_FILTER, map.nearest ? GL_NEAREST : GL_LINEAR);
+  glTextureParameteri(texture, GL_TEXTURE_WRAP_S, wrap_mode(map.wrap_u));
+  glTextureParameteri(texture, GL_TEXTURE_WRAP_T, wrap_mode(map.wrap_v));
 
   const ChannelTable decode = decode_table(content);
+  const double coverage = alpha_cutoff > 0 ? coverage_of(image, alpha_cutoff, 1) : 0;
   Image level = image;
   for (int k = 0; k < levels; ++k) {
     if (k > 0) level = half_size(level, content, decode);
+    const Image* uploaded = &level;
+    Image scaled;
+    if (k > 0 && alpha_cutoff > 0) {
+      scaled = with_coverage(level, alpha_cutoff, coverage);
+      uploaded = &scaled;
+    }
     glTextureSubImage2D(texture, k, 0, 0, level.width_px, level.height_px, GL_RGBA, GL_UNSIGNED_BYTE,
-                        level.rgba.data());
+                        uploaded->rgba.data());
   }
   return texture;
 }

@@ -4,12 +4,17 @@
 
 #include "render/gl.h"
 #include "render/image.h"
+#include "render/model.h"
 
 namespace offstage::render {
 
 enum class TextureContent { color /**< sRGB */, data /**< linear */ };
 
-gl::Texture make_texture(const Image& image, TextureContent content);
+/// `map`: how the texture is repeated and filtered. `alpha_cutoff` above 0: the share of pixels with at least
+/// this alpha stays the same in reduced levels, so that leaves do not get thin at a distance (I. Castano,
+/// "Computing alpha mipmaps", 2010).
+gl::Texture make_texture(const Image& image, TextureContent content, const TextureMap& map = {},
+                         float alpha_cutoff = 0);
 gl::Texture make_white_texture();
 /// True if any pixel is not opaque.
 bool has_alpha(const Image& image);

@@ -8,7 +8,8 @@ vec3 seen_through(vec3 position, vec3 n, vec3 view) {
   float way = thickness * max(-dot(inside, n), 0.0);
   vec3 far_side = position + way * inside, out_normal = normalize(far_side - (position - 0.5 * thickness * n));
   vec3 leaving = refract(inside, -out_normal, 1.0 / material.glass.y);
-  if (dot(leaving, leaving) < 0.5) leaving = inside;  // total reflection inside
+  if (thickness <= 0.0) leaving = -view;  // a sheet with parallel sides does not turn the ray
+  else if (dot(leaving, leaving) < 0.5) leaving = inside;  // total reflection inside
   vec3 f0 = vec3(pow((1.0 - material.glass.y) / (1.0 + material.glass.y), 2.0));
   vec4 clip = uniforms.clip_from_world * vec4(far_side + thickness * leaving, 1.0);
   vec2 place = 0.5 + 0.5 * clip.xy / clip.w;

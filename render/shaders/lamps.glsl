@@ -71,7 +71,7 @@ float lamp_visibility(Lamp lamp, vec3 position, vec3 normal) {
 
 // Light of the lamp that a surface reflects to the eye. `smooth_normal` excludes the relief.
 vec3 lamp_light(Surface s, vec3 normal, vec3 smooth_normal, vec3 view, vec3 position) {
-  vec3 f0 = mix(vec3(0.04), s.albedo, s.metallic), diffuse = s.albedo * (1.0 - s.metallic), sum = vec3(0.0), l;
+  vec3 f0 = mix(dielectric_f0, s.albedo, s.metallic), diffuse = s.albedo * (1.0 - s.metallic), sum = vec3(0.0), l;
   float nv = max(abs(dot(normal, view)), 1e-3);
   for (int k = 0; k < int(uniforms.air.x); ++k) {
     Lamp lamp = uniforms.lamps[k];

@@ -1,6 +1,13 @@
 // Shadow map, openness to the sky, and shading of opaque surfaces.
 layout(binding = 0) uniform sampler2DShadow shadow_map;
 
+// Reflectance of a dielectric that faces the eye.
+#if defined(DETAILED) && defined(FRAGMENT)
+vec3 dielectric_f0 = vec3(0.04);
+#else
+#define dielectric_f0 vec3(0.04)
+#endif
+
 struct Surface {
   vec3 albedo;
   float roughness;
@@ -144,7 +151,7 @@ vec3 shade(Surface s, vec3 normal, vec3 view, float visibility, float open) {
   float nl = saturate(dot(normal, l)), nv = max(abs(dot(normal, view)), 1e-3);
   float nh = saturate(dot(normal, h)), vh = saturate(dot(view, h));
 
-  vec3 f0 = mix(vec3(0.04), s.albedo, s.metallic);
+  vec3 f0 = mix(dielectric_f0, s.albedo, s.metallic);
   vec3 fresnel = fresnel_at(f0, vh);
   float lobe = sun_lobe(sun_roughness(s.roughness), nl, nv, nh);
   vec3 diffuse = s.albedo * (1.0 - s.metallic);
@@ -160,7 +167,7 @@ vec3 shade(Surface s, vec3 normal, vec3 view, float visibility, float open) {
 // Correction of `shade` where a share w of the mirrored light comes from the `scene` instead of the sky.
 vec3 mirror_gain(Surface s, vec3 normal, vec3 view, float open, vec4 scene) {
   float nv = max(abs(dot(normal, view)), 1e-3);
-  vec3 reflectance = sky_reflectance(mix(vec3(0.04), s.albedo, s.metallic), s.roughness, nv);
+  vec3 reflectance = sky_reflectance(mix(dielectric_f0, s.albedo, s.metallic), s.roughness, nv);
   float mirrored = saturate((nv + open) * (nv + open) - 1.0 + open);
   return (scene.rgb - sky_reflection(reflect(-view, normal), s.roughness) * mirrored) * reflectance * scene.w;
 }

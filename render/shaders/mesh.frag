@@ -1,6 +1,10 @@
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
-#ifdef TEXTURED
+#ifdef DETAILED
+layout(location = 2) in vec4 uv;
+layout(location = 3) in vec4 vertex_color;
+layout(location = 4) in vec4 tangent;
+#elif defined(TEXTURED)
 layout(location = 2) in vec2 uv;
 #endif
 #ifdef PATTERN
@@ -22,6 +26,48 @@ float filtered_roughness(float roughness, vec3 normal) {
   return sqrt(sqrt(saturate(a * a + min(2.0 * variance, 0.18))));
 }
 
+#ifdef DETAILED
+// The normal by the normal map, whose Y axis points against v. Without given tangents, the directions of u and v come
+// from derivatives (M. Mikkelsen, "Bump Mapping Unparametrized Surfaces on the GPU", 2010). The same bumps are seen
+// from the back.
+vec3 mapped_normal(vec3 n) {
+  vec2 place = uv_of(3, uv);
+  vec3 texel = 2.0 * texture(normal_texture, place).xyz - 1.0;
+  texel.xy *= material.coat.z;
+  float facing = gl_FrontFacing ? 1.0 : -1.0;
+  vec3 px = dFdx(position), py = dFdy(position), a = cross(py, n), b = cross(n, px);
+  vec2 ux = dFdx(place), uy = dFdy(place);
+  vec3 along_u = a * ux.x + b * uy.x, against_v = -(a * ux.y + b * uy.y);
+  float size = inversesqrt(max(max(dot(along_u, along_u), dot(against_v, against_v)), 1e-30));
+  along_u *= size;
+  against_v *= size;
+  if (dot(tangent.xyz, tangent.xyz) > 1e-6) {
+    along_u = normalize(tangent.xyz - n * dot(n, tangent.xyz));
+    against_v = cross(facing * n, along_u) * (tangent.w < 0.0 ? -1.0 : 1.0);
+  }
+  return normalize(facing * (texel.x * along_u + texel.y * against_v) + max(texel.z, 0.01) * n);
+}
+
+// A layer of lacquer (KHR_materials_clearcoat) and fibres at grazing angles (KHR_materials_sheen, see fabric.glsl) over
+// the light of a surface.
+vec3 with_layers(vec3 light, vec3 n, vec3 smooth_normal, vec3 view, float visibility, float open) {
+  vec3 l = frame.sun_direction.xyz, h = normalize(l + view);
+  vec3 sun = frame.sun_radiance.rgb * visibility;
+  float nl = saturate(dot(n, l)), nv = max(abs(dot(n, view)), 1e-3), nh = saturate(dot(n, h));
+  vec3 sheen = material.velvet.rgb;
+  float grazing = 1.0 - nv, sheen_sky = 0.03 + 0.45 * grazing * grazing * grazing;
+  float sin2 = 1.0 - nh * nh, sheen_sun = 0.75 * sin2 * sin2 / (nl + nv - nl * nv);
+  light = light * (1.0 - max(sheen.r, max(sheen.g, sheen.b)) * sheen_sky) +
+          sheen * (sun * (nl * sheen_sun) + ambient(n) * (sheen_sky * open));
+  n = smooth_normal;
+  nl = saturate(dot(n, l)), nv = max(abs(dot(n, view)), 1e-3), nh = saturate(dot(n, h));
+  float rough = material.coat.y, through = 1.0 - material.coat.x * fresnel_at(vec3(0.04), nv).r;
+  vec3 coat = sun * (nl * sun_lobe(sun_roughness(rough), nl, nv, nh) * fresnel_at(vec3(0.04), saturate(dot(view, h))).r) +
+              sky_reflection(reflect(-view, n), rough) * sky_reflectance(vec3(0.04), rough, nv) * open;
+  return light * through + material.coat.x * coat;
+}
+#endif
+
 void main() {
   vec3 view = normalize(frame.eye.xyz - position);
   vec3 smooth_normal = normalize(gl_FrontFacing ? normal : -normal), n = smooth_normal;
@@ -33,6 +79,28 @@ void main() {
   s.roughness = saturate(s.roughness * pattern.roughness);
   n = normalize(n - (axis_x * pattern.slope.x + axis_y * pattern.slope.y + axis_z * pattern.slope.z));
 #endif
+#ifdef DETAILED
+  vec4 base = texture(base_color_texture, uv_of(0, uv)) * vertex_color;
+  vec4 metallic_roughness = texture(metallic_roughness_texture, uv_of(1, uv)), specular = texture(specular_texture, uv_of(6, uv));
+  s.albedo *= base.rgb;
+  alpha *= base.a;
+  s.roughness *= metallic_roughness.g;
+  s.metallic *= metallic_roughness.b;
+  s.emission *= texture(emission_texture, uv_of(2, uv)).rgb;
+  dielectric_f0 = material.specular.rgb * specular.rgb;
+  if (material.specular.w >= 0.0) {
+    s.albedo *= 1.0 - max(dielectric_f0.r, max(dielectric_f0.g, dielectric_f0.b));
+    s.roughness = 1.0 - material.specular.w * specular.a;
+  }
+  if (material.options.z > 0.5) n = mapped_normal(smooth_normal);
+  float occlusion = mix(1.0, texture(occlusion_texture, uv_of(4, uv)).r, material.coat.w);
+  float transmitted = material.glass.x * texture(transmission_texture, uv_of(5, uv)).r;
+  if (material.options.x > 0.0) {
+    if (alpha < material.options.x) discard;
+    alpha = 1.0;
+  }
+#else
+  float occlusion = 1.0, transmitted = material.glass.x;
 #ifdef TEXTURED
   vec4 base = texture(base_color_texture, uv);
   vec4 metallic_roughness = texture(metallic_roughness_texture, uv);
@@ -41,6 +109,7 @@ void main() {
   s.roughness *= metallic_roughness.g;
   s.metallic *= metallic_roughness.b;
   s.emission *= texture(emission_texture, uv).rgb;
+#endif
 #endif
   if (alpha < min_alpha) discard;
   if (min_alpha > 0.5) alpha = 1.0;  // the opaque pass leaves no holes
@@ -53,18 +122,23 @@ void main() {
 #ifdef MIRROR
   // Added to the picture drawn so far.
   vec4 scene = seen_in_mirror(position, n, view, s.roughness);
-  color = vec4(mirror_gain(s, n, view, open_sky(1.0 / gl_FragCoord.w), scene) * fog.w, 0.0);
+  color = vec4(mirror_gain(s, n, view, open_sky(1.0 / gl_FragCoord.w) * occlusion, scene) * fog.w, 0.0);
 #else
   vec3 albedo = s.albedo;
 #ifdef GLASS
-  s.albedo *= 1.0 - material.glass.x;
+  s.albedo *= 1.0 - transmitted;
 #endif
-  vec3 radiance = shade(s, n, view, sun_visibility(position, smooth_normal), open_sky(1.0 / gl_FragCoord.w));
+  float visibility = sun_visibility(position, smooth_normal), open = open_sky(1.0 / gl_FragCoord.w) * occlusion;
+  vec3 radiance = shade(s, n, view, visibility, open);
 #ifdef LAMPS
   radiance += lamp_light(s, n, smooth_normal, view, position);
 #endif
 #ifdef GLASS
-  radiance += albedo * (material.glass.x * seen_through(position, n, view));
+  radiance += albedo * (transmitted * seen_through(position, n, view));
+#endif
+#ifdef DETAILED
+  radiance = with_layers(radiance, n, smooth_normal, view, visibility, open);
+  if (material.options.y > 0.5) radiance = albedo;
 #endif
   color = vec4((radiance * fog.w + fog.rgb) * alpha, alpha);
 #endif

@@ -4,6 +4,11 @@ layout(location = 2) in vec2 in_uv;
 layout(location = 3) in vec4 row_x;  // world_from_mesh by rows, one per instance
 layout(location = 4) in vec4 row_y;
 layout(location = 5) in vec4 row_z;
+#ifdef DETAILED
+layout(location = 6) in vec2 in_second_uv;
+layout(location = 7) in vec4 in_color;
+layout(location = 8) in vec4 in_tangent;
+#endif
 
 #ifdef SHADOW
 layout(location = 0) uniform mat4 shadow_clip_from_world;  // or that of the picture, when only depth is drawn
@@ -11,7 +16,11 @@ layout(location = 0) uniform mat4 shadow_clip_from_world;  // or that of the pic
 layout(location = 0) out vec3 position;
 layout(location = 1) out vec3 normal;
 #endif
-#ifdef TEXTURED
+#ifdef DETAILED
+layout(location = 2) out vec4 uv;
+layout(location = 3) out vec4 vertex_color;
+layout(location = 4) out vec4 tangent;
+#elif defined(TEXTURED)
 layout(location = 2) out vec2 uv;
 #endif
 #ifdef PATTERN
@@ -40,7 +49,13 @@ void main() {
 #endif
   gl_Position = uniforms.clip_from_world * vec4(world, 1.0);
 #endif
-#ifdef TEXTURED
+#ifdef DETAILED
+  uv = vec4(in_uv, in_second_uv);
+  vertex_color = in_color;
+  vec3 t = in_tangent.xyz;
+  bool mirrored = dot(row_x.xyz, cross(row_y.xyz, row_z.xyz)) < 0.0;
+  tangent = vec4(dot(row_x.xyz, t), dot(row_y.xyz, t), dot(row_z.xyz, t), mirrored ? -in_tangent.w : in_tangent.w);
+#elif defined(TEXTURED)
   uv = in_uv;
 #endif
 #ifdef PATTERN

@@ -12,7 +12,8 @@ namespace {
 
 Model small_model() {
   Model model;
-  model.materials = {{.name = "red", .base_color_texture = 0}, {.name = "plain", .two_sided = true}};
+  model.materials = {{.name = "red", .base_color_texture = {.image = 0}},
+                     {.name = "plain", .two_sided = true}};
   model.textures = {{.width_px = 2, .height_px = 1, .rgba = {1, 2, 3, 4, 5, 6, 7, 8}}};
   model.nodes = {{.name = "root"}, {.name = "arm", .parent = 0, .position = {1, 2, 3}}};
   model.parts = {
@@ -69,7 +70,10 @@ TEST(ModelAnswer, ThatRefersToWhatIsNotThereIsRefused) {
   EXPECT_TRUE(refused_with([](Model& m) { m.parts[0].mesh.positions[0].x() = NAN; }));
   EXPECT_TRUE(refused_with([](Model& m) { m.nodes[0].parent = 0; })) << "its own parent";
   EXPECT_TRUE(refused_with([](Model& m) { m.nodes[1].parent = -2; }));
-  EXPECT_TRUE(refused_with([](Model& m) { m.materials[0].emission_texture = 1; }));
+  EXPECT_TRUE(refused_with([](Model& m) { m.materials[0].emission_texture.image = 1; }));
+  EXPECT_TRUE(refused_with([](Model& m) { m.materials[1].specular_texture.image = -2; }));
+  EXPECT_TRUE(refused_with([](Model& m) { m.materials[0].normal_texture.wrap_v = static_cast<Wrap>(3); }));
+  EXPECT_TRUE(refused_with([](Model& m) { m.parts[0].mesh.colors.resize(2); }));
   EXPECT_TRUE(refused_with([](Model& m) { m.textures[0].height_px = 2; }));
   EXPECT_TRUE(refused_with([](Model& m) { m.textures[0].width_px = -2; }));
 }

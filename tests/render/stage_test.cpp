@@ -107,7 +107,7 @@ TEST(Stage, BlendedTextureOfAlphaNearOneLeavesNoHoles) {
   for (int i = 0; i < 64; ++i)
     image.rgba.insert(image.rgba.end(), {200, 100, 50, static_cast<uint8_t>(192 + i)});
   Material look{.roughness = 1};
-  look.base_color_texture = 0;
+  look.base_color_texture.image = 0;
   const MaterialHandle material = s.stage.add_material(look, std::array{image});
   Mesh quad = make_box({4, 3, 0.1f});
   for (std::size_t i = 0; i < quad.uvs.size(); ++i)
@@ -452,7 +452,7 @@ TEST(Stage, TextureAlphaCutsOut) {
   // middle of each half.
   Image texture{2, 1, {255, 0, 0, 255, 255, 0, 0, 0}};
   const MaterialHandle material =
-      s.stage.add_material({.color = {1, 1, 1, 1}, .emission = {0, 0, 0}, .base_color_texture = 0},
+      s.stage.add_material({.color = {1, 1, 1, 1}, .emission = {0, 0, 0}, .base_color_texture = {.image = 0}},
                            std::span<const Image>(&texture, 1));
   s.stage.add_instance(s.stage.add_mesh(make_box({2, 2, 0.1f})), material);
   const HdrImage picture = s.draw();

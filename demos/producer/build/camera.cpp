@@ -36,7 +36,7 @@ Vec3 half_extent(const sim::Plane&, const ModelLibrary&) {
 }
 Vec3 half_extent(const MeshFile& s, const ModelLibrary& models) {
   const Eigen::AlignedBox3f box = models.model(s.file).bounds();
-  return s.scale * box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).cast<Real>();
+  return scale_of(s, models) * box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).cast<Real>();
 }
 
 Eigen::AlignedBox3f box_of(const Body& body, const ModelLibrary& models) {

@@ -135,9 +135,10 @@ FlatCloth flat_cloth(const Cloth& cloth, const render::Model* model) {
   if (vertices > kMaxClothVertices)
     throw std::invalid_argument(
         fmt::format("has {} vertices; a cloth has at most {}", vertices, kMaxClothVertices));
-  flat.def =
-      grid ? effects::grid_cloth(grid_size(*grid), pose, fabric)
-           : effects::mesh_cloth(collision_mesh(*model, std::get<MeshFile>(cloth.shape).scale), pose, fabric);
+  const MeshFile file = grid ? MeshFile{} : std::get<MeshFile>(cloth.shape);
+  flat.def = grid ? effects::grid_cloth(grid_size(*grid), pose, fabric)
+                  : effects::mesh_cloth(collision_mesh(*model, fitted_scale(file.scale, file.fit, *model)),
+                                        pose, fabric);
   for (const Vec3& v : flat.def.vertices) flat.places.push_back(pose.point_to_body(v));
   if (grid) {
     for (const Vec3& p : flat.places)

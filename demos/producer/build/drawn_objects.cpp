@@ -66,7 +66,7 @@ render::Material material_of(const Scene& scene, const std::string& name, const 
          .two_sided = it->two_sided};
     if (!it->texture.empty()) {
       textures.push_back(models.texture(it->texture));
-      m.base_color_texture = 0;
+      m.base_color_texture.image = 0;
     }
   }
   return m;

@@ -32,6 +32,13 @@ void add_to(XXH3_state_t* hash, const render::Image& image) {
   add_to(hash, image.rgba);
 }
 
+void add_to(XXH3_state_t* hash, const render::TextureMap& map) {
+  const int choices[] = {map.image,   map.uv_set,  static_cast<int>(map.wrap_u), static_cast<int>(map.wrap_v),
+                         map.nearest, map.mip_maps};
+  XXH3_128bits_update(hash, choices, sizeof choices);
+  for (const Eigen::Vector3f& row : map.rows) XXH3_128bits_update(hash, row.data(), 3 * sizeof(float));
+}
+
 /// Adds all data read from the model's own file and from the files to which it refers (materials, textures)
 /// to the digest.
 void add_to(XXH3_state_t* hash, const render::Model& model) {
@@ -40,6 +47,9 @@ void add_to(XXH3_state_t* hash, const render::Model& model) {
     add_to(hash, part.mesh.positions);
     add_to(hash, part.mesh.normals);
     add_to(hash, part.mesh.uvs);
+    add_to(hash, part.mesh.second_uvs);
+    add_to(hash, part.mesh.colors);
+    add_to(hash, part.mesh.tangents);
     add_to(hash, part.mesh.indices);
   }
   for (const render::Model::Node& node : model.nodes) {
@@ -49,10 +59,14 @@ void add_to(XXH3_state_t* hash, const render::Model& model) {
     XXH3_128bits_update(hash, node.orientation.coeffs().data(), 4 * sizeof(float));
   }
   for (const render::Material& m : model.materials) {
-    const float numbers[] = {m.color.x(), m.color.y(),    m.color.z(),    m.color.w(),   m.metallic,
-                             m.roughness, m.emission.x(), m.emission.y(), m.emission.z()};
-    const int choices[] = {m.two_sided, m.base_color_texture, m.metallic_roughness_texture,
-                           m.emission_texture};
+    const float numbers[] = {
+        m.color.x(),       m.color.y(),       m.color.z(),          m.color.w(),      m.metallic,
+        m.roughness,       m.emission.x(),    m.emission.y(),       m.emission.z(),   m.transmission,
+        m.refraction,      m.normal_scale,    m.occlusion_strength, m.alpha_cutoff,   m.specular.x(),
+        m.specular.y(),    m.specular.z(),    m.glossiness,         m.clearcoat,      m.clearcoat_roughness,
+        m.sheen_color.x(), m.sheen_color.y(), m.sheen_color.z(),    m.sheen_roughness};
+    const int choices[] = {m.two_sided, m.unlit, m.thin, m.vertex_colors};
+    render::for_each_texture(m, [&](const render::TextureMap& map) { add_to(hash, map); });
     XXH3_128bits_update(hash, numbers, sizeof numbers);
     XXH3_128bits_update(hash, choices, sizeof choices);
   }
@@ -181,6 +195,15 @@ sim::ConvexDecomposition scaled(sim::ConvexDecomposition decomposition, double s
     part = {std::move(vertices), faces};
   }
   return decomposition;
+}
+
+Real fitted_scale(Real scale, const std::optional<Vec3>& fit, const render::Model& model) {
+  if (!fit) return scale;
+  const Vec3 size = model.bounds().sizes().cast<Real>();
+  Real factor = std::numeric_limits<Real>::infinity();
+  for (int k = 0; k < 3; ++k)
+    if (size[k] > 1e-9 * size.maxCoeff()) factor = std::min(factor, (*fit)[k] / size[k]);
+  return std::isfinite(factor) ? scale * factor : scale;
 }
 
 sim::TriangleMesh collision_mesh(const render::Model& model, double scale) {

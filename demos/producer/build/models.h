@@ -58,6 +58,13 @@ class ModelLibrary {
   std::string digest_;
 };
 
+/// Scale factor that brings a model to the size of its use: `scale` times the factor that fits its bounding
+/// box into the box `fit`, if there is one. Axes along which the model is flat do not count.
+Real fitted_scale(Real scale, const std::optional<Vec3>& fit, const render::Model& model);
+Real scale_of(const auto& use, const ModelLibrary& models) {
+  return fitted_scale(use.scale, use.fit, models.model(use.file));
+}
+
 /// All triangles of a model as one mesh for the simulation, scaled.
 sim::TriangleMesh collision_mesh(const render::Model& model, double scale);
 /// A model's convex parts as those of its scaled mesh.

@@ -181,7 +181,8 @@ void Picture::add_shape(const Body& body, const ModelLibrary& models, std::vecto
       [&](const auto& shape) {
         using S = std::decay_t<decltype(shape)>;
         if constexpr (std::is_same_v<S, MeshFile>) {
-          add_model(shape.file, affine(Vec3::Zero(), Quat::Identity(), shape.scale), body, models, parts);
+          add_model(shape.file, affine(Vec3::Zero(), Quat::Identity(), scale_of(shape, models)), body, models,
+                    parts);
         } else {
           // A plane is the ground: it receives shadows and casts none.
           const bool casts = body.casts_shadow && !std::is_same_v<S, sim::Plane>;
@@ -195,15 +196,16 @@ void Picture::add_shape(const Body& body, const ModelLibrary& models, std::vecto
 void Picture::add_convex_parts(const MeshFile& mesh, const Body& body, const ModelLibrary& models,
                                std::vector<DrawnPart>& parts) {
   const std::vector<sim::ConvexPolyhedron>& convex = models.parts(mesh.file)->parts;
+  const Real scale = scale_of(mesh, models);
   sim::Aabb box;
   for (const sim::ConvexPolyhedron& part : convex) box.extend(part.box());
   for (std::size_t i = 0; i < convex.size(); ++i) {
     render::Material look{.roughness = 0.45f};
     look.color.head<3>() = distinct_color(i);
-    const Vec3 outwards = mesh.scale * (convex[i].centre() - box.center());
+    const Vec3 outwards = scale * (convex[i].centre() - box.center());
     parts.push_back({stage_.add_instance(stage_.add_mesh(mesh_of(convex[i])), stage_.add_material(look),
                                          body.casts_shadow),
-                     affine(Vec3::Zero(), Quat::Identity(), mesh.scale), outwards.cast<float>()});
+                     affine(Vec3::Zero(), Quat::Identity(), scale), outwards.cast<float>()});
   }
 }
 
@@ -212,8 +214,9 @@ void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t
   if (drawn.overlay)
     add_convex_parts(std::get<MeshFile>(body.shape), body, models, drawn.parts);
   else if (body.visible && body.model)
-    add_model(body.model->file, affine(body.model->position, body.model->orientation, body.model->scale),
-              body, models, drawn.parts);
+    add_model(body.model->file,
+              affine(body.model->position, body.model->orientation, scale_of(*body.model, models)), body,
+              models, drawn.parts);
   else if (body.visible)
     add_shape(body, models, drawn.parts);
 

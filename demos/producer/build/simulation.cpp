@@ -179,7 +179,7 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
       std::visit(
           [&](const auto& shape) {
             if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, MeshFile>) {
-              sim::MeshHandle& mesh = meshes[{shape.file, shape.scale}];
+              sim::MeshHandle& mesh = meshes[{shape.file, scale_of(shape, models)}];
               if (!mesh) mesh = add_mesh(shape, models);
               def.shape = sim::MeshShape{mesh};
             } else {
@@ -199,8 +199,9 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
 
 sim::MeshHandle Simulation::add_mesh(const MeshFile& file, const ModelLibrary& models) {
   const sim::ConvexDecomposition* parts = models.parts(file.file);
-  return world_.add_mesh(collision_mesh(models.model(file.file), file.scale),
-                         parts ? std::optional(scaled(*parts, file.scale)) : std::nullopt);
+  const Real scale = scale_of(file, models);
+  return world_.add_mesh(collision_mesh(models.model(file.file), scale),
+                         parts ? std::optional(scaled(*parts, scale)) : std::nullopt);
 }
 
 void Simulation::add_particle_groups(const Scene& scene) {

@@ -18,6 +18,7 @@
 #include "render/context.h"
 #include "render/error.h"
 #include "render/image_io.h"
+#include "render/mesh_io.h"
 #include "render/primitives.h"
 #include "render/sandbox.h"
 #include "render/sink.h"
@@ -137,6 +138,9 @@ int doctor_command() {
   utsname system{};
   uname(&system);
   json["reader_of_models"] = "confined by " + render::sandbox_support();
+  const std::vector<std::string> missing = render::missing_model_libraries();
+  json["compressed_gltf"] = missing.empty() ? "Draco, meshoptimizer and WebP"
+                                            : fmt::format("built without {}", fmt::join(missing, ", "));
   json["system"] = fmt::format("{} {} {}", system.sysname, system.release, system.machine);
   const std::vector<std::string> encoders = render::available_encoders();
   json["ffmpeg_encoders"] = encoders;

@@ -45,6 +45,19 @@ Json describe(const sim::ConvexDecomposition& decomposition) {
   return json;
 }
 
+/// What to do about a model that has an unlikely size; empty for a likely one.
+std::string size_hint(float largest_side) {
+  constexpr float kHuge = 100, kTiny = 0.005f;  // [m]
+  if (largest_side > kHuge)
+    return fmt::format(
+        "it is {:.4g} m large; if its unit is the centimetre or millimetre, \"scale\": 0.01 or 0.001 "
+        "corrects it, or \"fit\" gives it a size",
+        largest_side);
+  if (largest_side < kTiny)
+    return fmt::format("it is {:.3g} m small; \"scale\" or \"fit\" gives it a size", largest_side);
+  return "";
+}
+
 Json describe_model(const std::filesystem::path& path, const DecompositionCache& cache) {
   const render::Model model = render::read_model(path, {}, interrupt_signal);
   const sim::TriangleMesh mesh = sim::weld(collision_mesh(model, 1));
@@ -59,6 +72,7 @@ Json describe_model(const std::filesystem::path& path, const DecompositionCache&
                {"welded_vertices", mesh.vertices.size()},
                {"materials", model.materials.size()},
                {"textures", model.textures.size()},
+               {"unit", model.unit},
                {"bounds", {json_of(bounds.min()), json_of(bounds.max())}},
                {"closed", topology.defects().closed()},
                {"defects", defects.empty() ? "none" : defects}};
@@ -78,6 +92,7 @@ Json describe_model(const std::filesystem::path& path, const DecompositionCache&
     if (node.parent >= 0) nodes.back()["parent"] = model.nodes[static_cast<std::size_t>(node.parent)].name;
   }
   json["nodes"] = nodes;
+  if (const std::string hint = size_hint(bounds.sizes().maxCoeff()); !hint.empty()) json["hint"] = hint;
   json["warnings"] = model.warnings;
   return json;
 }

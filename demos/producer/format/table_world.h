@@ -190,7 +190,12 @@ struct Table<MeshFile> {
              "model file relative to the scene, or the name of a model that comes with offstage; FILE#NODE "
              "selects one node",
              kRequired},
-            {"scale", &MeshFile::scale, "scale factor of the model", "", kScale}};
+            {"scale", &MeshFile::scale, "scale factor of the model", "", kScale},
+            {"fit", &MeshFile::fit,
+             "edges of a box along the model's axes; the model gets the largest size with which it fits, "
+             "whatever "
+             "its unit; `scale` then multiplies that size",
+             "m", kPositive}};
   }
 };
 template <>
@@ -264,6 +269,11 @@ struct Table<ModelLook> {
   static Fields<ModelLook> fields() {
     return {{"file", &ModelLook::file, "model file", kRequired},
             {"scale", &ModelLook::scale, "scale factor of the model", "", kScale},
+            {"fit", &ModelLook::fit,
+             "edges of a box along the model's axes; the model gets the largest size with which it fits, "
+             "whatever "
+             "its unit; `scale` then multiplies that size",
+             "m", kPositive},
             {"position", &ModelLook::position, "position of the model's origin in the body's frame", "m"},
             {"orientation", &ModelLook::orientation, "orientation of the model in the body's frame"}};
   }

@@ -95,6 +95,7 @@ using Shape =
 struct ModelLook {
   std::string file;
   Real scale = 1;
+  std::optional<Vec3> fit = {};  ///< see MeshFile::fit
   Vec3 position = Vec3::Zero();  ///< in the body's frame
   Quat orientation = Quat::Identity();
 };

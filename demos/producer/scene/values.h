@@ -29,6 +29,7 @@ struct Color {
 struct MeshFile {
   std::string file;
   Real scale = 1;
+  std::optional<Vec3> fit = {};  ///< edges of the box that the model just fits into before `scale` [m]
 };
 
 /// Copies in a row or a ring: copy i is displaced by i * offset and rotated by i * turn_deg about the

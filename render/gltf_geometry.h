@@ -1,0 +1,54 @@
+#pragma once
+/// Private: meshes of glTF files: primitives, morph targets and skins.
+
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "render/gltf_file.h"
+#include "render/gltf_material.h"
+#include "render/part_builder.h"
+
+namespace offstage::render {
+
+/// A primitive as triangles, with what a skin needs.
+struct GltfPrimitive {
+  Surface surface;
+  std::size_t left_out = 0;      ///< points, or ends of lines, that it consists of instead
+  std::vector<uint32_t> joints;  ///< `influences` per vertex, of the skin's list
+  std::vector<float> weights;    ///< as long as `joints`
+  std::size_t influences = 0;    ///< joints per vertex
+};
+
+class GltfGeometry {
+ public:
+  GltfGeometry(GltfFile& file, const GltfMaterials& materials, Model& model)
+      : file_(file), materials_(materials), model_(model) {}
+
+  std::size_t primitive_count(std::size_t mesh) const {
+    return file_.item("meshes", mesh).count("primitives");
+  }
+  /// The primitive before morph targets; read once.
+  const GltfPrimitive& primitive(std::size_t mesh, std::size_t index);
+  /// Adds the morph targets, if any has a weight. `weights` of a node replace those of the mesh.
+  std::optional<Surface> morphed(std::size_t mesh, std::size_t index, const GltfValue& node);
+  /// Poses a surface by the joints' transforms (section 3.7.3.3): positions are then in the scene's frame.
+  Surface posed(const Surface& surface, const GltfPrimitive& source,
+                const std::vector<Eigen::Affine3d>& joints) const;
+
+ private:
+  struct Source;
+  GltfPrimitive read(const GltfValue& source);
+  void read_attributes(const Source& source, GltfPrimitive& result);
+  void read_triangles(const Source& source, GltfPrimitive& result);
+  void read_joints(const Source& source, GltfPrimitive& result);
+  void mark_colors(Surface& surface);
+
+  GltfFile& file_;
+  const GltfMaterials& materials_;
+  Model& model_;
+  std::map<std::pair<std::size_t, std::size_t>, GltfPrimitive> primitives_;
+};
+
+}  // namespace offstage::render

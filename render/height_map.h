@@ -1,0 +1,19 @@
+#pragma once
+/// Private: converts pictures of classic materials to those of physically based ones.
+
+#include "render/image.h"
+
+namespace offstage::render {
+
+/// Whether a picture looks like a normal map: bluish, and neutral in red and green on average.
+bool is_normal_map(const Image& image);
+/// The normal map (X towards +u, Y towards the top) of a height map that repeats: white is one hundredth of
+/// the picture's width above black, times `bump`.
+Image normals_of_heights(const Image& heights, float bump);
+/// `base` with the alpha of a mask: the mask's own alpha if it has any, else its luminance. An empty base is
+/// white and as large as the mask.
+Image with_mask(const Image& base, const Image& mask);
+/// Whether nearly all of the picture is either opaque or fully transparent, so that it cuts holes.
+bool is_cut_out(const Image& image);
+
+}  // namespace offstage::render

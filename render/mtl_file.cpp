@@ -1,0 +1,142 @@
+#include "render/mtl_file.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <string_view>
+
+#include "render/error.h"
+#include "render/file_io.h"
+#include "render/model_files.h"
+
+namespace offstage::render {
+namespace {
+
+constexpr uint64_t kMaxMtlBytes = uint64_t{256} << 20;
+constexpr uint64_t kMaxObjBytes = uint64_t{2} << 30;
+constexpr std::size_t kMaxLibraries = 64;
+
+bool is_blank(char c) {
+  return c == ' ' || c == '\t' || c == '\r';
+}
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+/// Takes the first word off a line.
+std::string_view next_word(std::string_view& line) {
+  line = trimmed(line);
+  const auto end = static_cast<std::size_t>(std::ranges::find_if(line, is_blank) - line.begin());
+  const std::string_view word = line.substr(0, end);
+  line = trimmed(line.substr(end));
+  return word;
+}
+
+std::optional<float> mtl_number(std::string_view word) {
+  float value = 0;
+  if (word.starts_with('+')) word.remove_prefix(1);
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  const bool whole = error == std::errc() && end == word.data() + word.size();
+  return whole && std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
+std::string lower_case(std::string_view text) {
+  std::string result(text);
+  std::ranges::transform(result, result.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return result;
+}
+
+/// One to three numbers; a missing second one is `missing`.
+Eigen::Vector2f next_pair(std::string_view& line, float missing) {
+  Eigen::Vector2f result(missing, missing);
+  for (int k = 0; k < 3; ++k) {
+    std::string_view rest = line;
+    const std::optional<float> value = mtl_number(next_word(rest));
+    if (!value || rest.empty()) break;  // the last word is the file
+    if (k < 2) result[k] = *value;
+    line = rest;
+  }
+  return result;
+}
+
+MtlMap read_map(std::string_view line) {
+  MtlMap map;
+  while (line.starts_with('-')) {
+    const std::string option = lower_case(next_word(line));
+    if (option == "-s") {
+      map.scale = next_pair(line, 1);
+    } else if (option == "-o") {
+      map.offset = next_pair(line, 0);
+    } else if (option == "-t") {
+      next_pair(line, 0);
+    } else if (option == "-bm") {
+      map.bump = mtl_number(next_word(line)).value_or(1);
+    } else if (option == "-clamp") {
+      map.clamp = lower_case(next_word(line)) == "on";
+    } else {
+      if (option == "-mm") next_word(line);
+      next_word(line);
+    }
+  }
+  map.file = std::string(trimmed(line));
+  return map;
+}
+
+template <class Each>
+void for_each_line(std::string_view text, Each each) {
+  while (!text.empty()) {
+    const std::size_t end = text.find('\n');
+    each(text.substr(0, end));
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+  }
+}
+
+}  // namespace
+
+void read_mtl(const std::string& text, std::map<std::string, MtlMaterial>& materials) {
+  MtlMaterial* current = nullptr;
+  for_each_line(text, [&](std::string_view line) {
+    const std::string key = lower_case(next_word(line));
+    if (key == "newmtl") current = &materials[std::string(line)];
+    if (current == nullptr) return;
+    if (key == "pr") current->roughness = mtl_number(next_word(line));
+    if (key == "pm") current->metallic = mtl_number(next_word(line));
+    const bool is_map =
+        key.starts_with("map_") || key == "bump" || key == "norm" || key == "disp" || key == "refl";
+    if (!is_map) return;
+    MtlMap map = read_map(line);
+    if (!map.file.empty())
+      current->maps[key == "map_bump" ? "bump" : key == "map_norm" ? "norm" : key] = std::move(map);
+  });
+}
+
+std::map<std::string, MtlMaterial> read_mtl_of(const std::filesystem::path& obj,
+                                               const InputFolders& folders) {
+  std::map<std::string, MtlMaterial> materials;
+  const std::vector<uint8_t> bytes = read_file(obj, kMaxObjBytes);
+  std::vector<std::string> libraries;
+  for_each_line({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, [&](std::string_view line) {
+    if (!line.starts_with("mtllib")) return;
+    next_word(line);
+    const std::string name(line);
+    if (libraries.size() < kMaxLibraries && std::ranges::find(libraries, name) == libraries.end())
+      libraries.push_back(name);
+  });
+  for (const std::string& name : libraries) {
+    const std::filesystem::path file = find_beside(obj.parent_path(), name);
+    if (file.empty() || !folders.contain(file)) continue;
+    try {
+      const std::vector<uint8_t> text = read_file(file, kMaxMtlBytes);
+      read_mtl({text.begin(), text.end()}, materials);
+    } catch (const FileError&) {
+      continue;  // assimp reads the same file and has the message
+    }
+  }
+  return materials;
+}
+
+}  // namespace offstage::render

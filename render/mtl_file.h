@@ -1,0 +1,36 @@
+#pragma once
+/// Private: what assimp does not read of MTL files (Wavefront's material library format, 1995): options of
+/// textures, masks, bump maps, and the physically based values Pr and Pm.
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "render/input_folders.h"
+
+namespace offstage::render {
+
+/// A texture statement, as "map_Kd -s 2 2 1 wood.png".
+struct MtlMap {
+  std::string file;
+  Eigen::Vector2f scale = {1, 1}, offset = {0, 0};  ///< -s and -o
+  float bump = 1;                                   ///< -bm
+  bool clamp = false;                               ///< -clamp on
+};
+
+struct MtlMaterial {
+  std::map<std::string, MtlMap> maps;  ///< by statement, in lower case: map_kd, map_d, bump, norm, map_ke ...
+  std::optional<float> roughness, metallic;  ///< Pr, Pm
+};
+
+/// Parses the text of one library; unknown statements are skipped.
+void read_mtl(const std::string& text, std::map<std::string, MtlMaterial>& materials);
+
+/// Reads the libraries that an OBJ file names, as far as they exist in `folders`.
+std::map<std::string, MtlMaterial> read_mtl_of(const std::filesystem::path& obj, const InputFolders& folders);
+
+}  // namespace offstage::render

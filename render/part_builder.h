@@ -1,0 +1,57 @@
+#pragma once
+/// Private: collects the surfaces of a model file, transformed by their nodes, in one part per material and
+/// kind of vertex, and leaves out what cannot be drawn.
+
+#include <map>
+#include <set>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "render/model.h"
+
+namespace offstage::render {
+
+/// Triangles as a file has them, in the frame of their node. `mesh.normals` may have any length.
+struct Surface {
+  Mesh mesh;
+  int material = 0;  ///< index into Model::materials
+};
+
+class PartBuilder {
+ public:
+  explicit PartBuilder(Model& model) : model_(model) {}
+
+  void add(const Surface& surface, const Eigen::Affine3d& world_from_mesh);
+  /// Records points, lines or degenerate primitives that are left out.
+  void leave_out(std::size_t count) { no_triangle_ += count; }
+  /// One line for each kind of element that was left out.
+  std::vector<std::string> left_out() const;
+
+ private:
+  Mesh& part(const Surface& surface, bool normals);
+  bool accept(const uint32_t* corners, const std::vector<Vector3f>& positions);
+
+  Model& model_;
+  std::map<std::tuple<int, bool, bool, bool, bool, bool>, std::size_t> parts_;
+  std::size_t no_triangle_ = 0, bad_index_ = 0, not_finite_ = 0, no_area_ = 0, bad_normals_ = 0;
+};
+
+/// Makes the names of nodes unique.
+class NodeNames {
+ public:
+  std::string next(const std::string& name);
+
+ private:
+  std::map<std::string, int> counts_;
+  std::set<std::string> taken_;
+};
+
+/// Rotation and translation without the scale, which is applied to the triangles. For a node that is flat or
+/// mirrored, the nearest rotation.
+Eigen::Affine3d turned_and_moved(const Eigen::Affine3d& m);
+
+/// A node with its rigid pose.
+Model::Node model_node(std::string name, int parent, const Eigen::Affine3d& rigid);
+
+}  // namespace offstage::render

@@ -1,0 +1,357 @@
+#include <gtest/gtest.h>
+
+#include "gltf_samples.h"
+#include "model_picture.h"
+#include "scratch.h"
+
+// Each test draws a small file and looks at pixels whose colour follows from the glTF specification.
+
+namespace offstage::render {
+namespace {
+
+class Picture : public ModelPicture {
+ public:
+  explicit Picture(const GltfSample& sample) : ModelPicture(ScratchFolder().put("a.gltf", sample.text())) {}
+};
+
+const Json kNearestTexels = {{"magFilter", 9728}, {"minFilter", 9728}};
+
+Json nearest_with(const char* key, int value) {
+  Json sampler = kNearestTexels;
+  sampler[key] = value;
+  return sampler;
+}
+
+TEST(GltfPicture, VertexColoursMultiplyTheBaseColour) {
+  GltfSample sample;
+  sample.make_unlit();
+  sample.pbr()["baseColorFactor"] = {0.5, 1, 0.25, 1};
+  sample.set("COLOR_0", std::vector<uint8_t>{255, 0, 0, 255, 0, 0, 255, 255, 0, 0, 255, 255, 255, 0, 0, 255},
+             "VEC4", true);
+  Picture picture(sample);
+  const Vector3f left = picture.color_at(-0.9f, 0), right = picture.color_at(0.9f, 0);
+  expect_color(left, {0.475f, 0, 0.0125f}, 0.02f);  // 95 % red
+  expect_color(right, {0.025f, 0, 0.2375f}, 0.02f);
+}
+
+TEST(GltfPicture, AlphaMaskCutsHolesAndIsOpaqueElsewhere) {
+  for (const double cutoff : {0.5, 0.2}) {
+    GltfSample sample;
+    sample.make_unlit();
+    const int texture =
+        sample.texture(encoded_texels(2, 1, {{1, 0, 0, 0.3f}, {0, 1, 0, 0.7f}}), kNearestTexels);
+    sample.pbr()["baseColorTexture"] = {{"index", texture}};
+    sample.material()["alphaMode"] = "MASK";
+    sample.material()["alphaCutoff"] = cutoff;
+    Picture picture(sample);
+    const Vector4f left = picture.at(-0.5f, 0), right = picture.at(0.5f, 0);
+    EXPECT_EQ(left.w(), cutoff == 0.5 ? 0 : 1) << cutoff;
+    EXPECT_EQ(right.w(), 1);
+    expect_color(right.head<3>(), kPureGreen);
+    if (cutoff == 0.2) expect_color(left.head<3>(), kPureRed);
+  }
+}
+
+TEST(GltfPicture, MasksKeepTheirShareAtADistance) {
+  std::vector<Vector4f> leaves(64 * 64, {1, 1, 1, 0});
+  for (std::size_t y = 0; y < 64; ++y)
+    for (std::size_t x = 0; x < 64; ++x)  // irregular, so that reduced levels have all shades
+      if ((x * x + 3 * y * y + 7 * x * y) % 16 < 5) leaves[64 * y + x].w() = 1;
+  const auto opaque_count =
+      static_cast<double>(std::ranges::count_if(leaves, [](const Vector4f& c) { return c.w() == 1; }));
+  GltfSample sample;
+  sample.make_unlit();
+  sample.pbr()["baseColorTexture"] = {{"index", sample.texture(encoded_texels(64, 64, leaves))}};
+  sample.material()["alphaMode"] = "MASK";
+  Picture picture(sample);
+  picture.look_from({0, 0, 9});  // four texels for a pixel
+  const HdrImage image = picture.draw();
+  double covered = 0, all = 0;
+  for (float y = -0.9f; y < 0.95f; y += 0.1f)
+    for (float x = -0.9f; x < 0.95f; x += 0.1f) {
+      covered += picture.at(image, x, y).w() > 0.5f;
+      ++all;
+    }
+  EXPECT_NEAR(covered / all, opaque_count / 4096, 0.12);
+}
+
+TEST(GltfPicture, BlendingUsesTheAlphaOfFactorAndVertices) {
+  GltfSample sample;
+  sample.make_unlit();
+  sample.material()["alphaMode"] = "BLEND";
+  sample.pbr()["baseColorFactor"] = {1, 1, 1, 0.8};
+  sample.set("COLOR_0", std::vector<float>(16, 0.5f), "VEC4");
+  EXPECT_NEAR(Picture(sample).at(0, 0).w(), 0.4f, 5e-3f);
+  sample.material().erase("alphaMode");
+  EXPECT_EQ(Picture(sample).at(0, 0).w(), 1) << "OPAQUE ignores alpha";
+}
+
+TEST(GltfPicture, SamplersWrapAndFilter) {
+  const auto draw = [](const Json& sampler, const std::function<void(Picture&)>& look) {
+    GltfSample sample;
+    sample.make_unlit();
+    sample.set("TEXCOORD_0", std::vector<float>{-1, 0.5f, 2, 0.5f, 2, 0.5f, -1, 0.5f}, "VEC2");
+    const int texture =
+        sample.texture(encoded_texels(2, 1, {opaque_texel(kPureRed), opaque_texel(kPureBlue)}), sampler);
+    sample.pbr()["baseColorTexture"] = {{"index", texture}};
+    Picture picture(sample);
+    look(picture);
+  };
+  // u = -0.75, -0.25, 0.25, 0.75, 1.25, 1.75 from left to right.
+  const auto expect_row = [](Picture& picture, const std::vector<Vector3f>& colors) {
+    for (std::size_t i = 0; i < colors.size(); ++i)
+      expect_color(picture.color_at(-5 / 6.0f + static_cast<float>(i) / 3, 0), colors[i]);
+  };
+  draw(nearest_with("wrapS", 10497), [&](Picture& p) {
+    expect_row(p, {kPureRed, kPureBlue, kPureRed, kPureBlue, kPureRed, kPureBlue});
+  });
+  draw(nearest_with("wrapS", 33648), [&](Picture& p) {
+    expect_row(p, {kPureBlue, kPureRed, kPureRed, kPureBlue, kPureBlue, kPureRed});
+  });
+  draw(nearest_with("wrapS", 33071), [&](Picture& p) {
+    expect_row(p, {kPureRed, kPureRed, kPureRed, kPureBlue, kPureBlue, kPureBlue});
+  });
+  draw({{"magFilter", 9729}, {"wrapS", 33071}}, [&](Picture& p) {
+    const Vector3f middle = p.color_at(0, 0);  // between the texels
+    EXPECT_NEAR(middle.x(), 0.5f, 0.1f);
+    EXPECT_NEAR(middle.z(), 0.5f, 0.1f);
+  });
+}
+
+TEST(GltfPicture, EachTextureHasItsSetOfCoordinates) {
+  GltfSample sample;
+  sample.set("TEXCOORD_3", std::vector<float>{0.75f, 0.5f, 0.75f, 0.5f, 0.75f, 0.5f, 0.75f, 0.5f}, "VEC2");
+  const int texture =
+      sample.texture(encoded_texels(2, 1, {opaque_texel(kPureRed), opaque_texel(kPureBlue)}), kNearestTexels);
+  sample.pbr() = {{"baseColorTexture", {{"index", texture}}}};
+  sample.material()["emissiveTexture"] = {{"index", texture}, {"texCoord", 3}};
+  sample.material()["emissiveFactor"] = {1, 1, 1};
+  Picture glow(sample);
+  expect_color(glow.color_at(-0.5f, 0), kPureBlue);
+  sample.pbr()["baseColorTexture"]["texCoord"] = 3;
+  sample.material()["emissiveTexture"]["texCoord"] = 0;
+  Picture swapped(sample);
+  expect_color(swapped.color_at(-0.5f, 0), kPureRed);
+}
+
+TEST(GltfPicture, TextureTransformsScaleTurnAndMove) {
+  const auto draw = [](const Json& transform) {
+    GltfSample sample;
+    sample.make_unlit();
+    const int texture = sample.texture(encoded_texels(2, 2,
+                                                      {opaque_texel(kPureRed), opaque_texel(kPureGreen),
+                                                       opaque_texel(kPureBlue), opaque_texel(kPureWhite)}),
+                                       kNearestTexels);
+    sample.pbr()["baseColorTexture"] = {{"index", texture},
+                                        {"extensions", {{"KHR_texture_transform", transform}}}};
+    sample.document["extensionsUsed"].push_back("KHR_texture_transform");
+    Picture picture(sample);
+    return std::vector<Vector3f>{picture.color_at(-0.5f, 0.5f), picture.color_at(0.5f, 0.5f),
+                                 picture.color_at(-0.5f, -0.5f), picture.color_at(0.5f, -0.5f)};
+  };
+  const auto expect_quarters = [](const std::vector<Vector3f>& colors,
+                                  const std::vector<Vector3f>& expected) {
+    for (std::size_t i = 0; i < 4; ++i) expect_color(colors[i], expected[i]);
+  };
+  expect_quarters(draw(Json::object()), {kPureRed, kPureGreen, kPureBlue, kPureWhite});
+  expect_quarters(draw({{"offset", {0.5, 0}}}), {kPureGreen, kPureRed, kPureWhite, kPureBlue});
+  expect_quarters(draw({{"scale", {1, -1}}, {"offset", {0, 1}}}),
+                  {kPureBlue, kPureWhite, kPureRed, kPureGreen});
+  // A quarter turn of the coordinates against the clock turns the image with it: (u, v) -> (v, -u).
+  expect_quarters(draw({{"rotation", 1.5707963267948966}}), {kPureBlue, kPureRed, kPureWhite, kPureGreen});
+}
+
+TEST(GltfPicture, DoubleSidedSurfacesAreSeenFromBehind) {
+  GltfSample sample;
+  sample.make_unlit();
+  Picture single(sample);
+  single.look_from({0, 0, -5});
+  EXPECT_EQ(single.at(0, 0).w(), 0);
+  sample.material()["doubleSided"] = true;
+  Picture both(sample);
+  both.look_from({0, 0, -5});
+  expect_color(both.color_at(0, 0), kPureWhite);
+}
+
+/// Light from the sun on a rough square, by its normals or by its normal map.
+Vector3f sunlit(GltfSample& sample, const Vector3f& sun) {
+  sample.pbr()["metallicFactor"] = 0;
+  sample.pbr()["roughnessFactor"] = 1;
+  Picture picture(sample);
+  picture.set_sun(sun);
+  return picture.color_at(0.1f, 0.1f);
+}
+
+TEST(GltfPicture, NormalMapsShadeLikeTheTiltedSurface) {
+  const float s = std::sqrt(0.5f);
+  // Texel (0.854, 0.5, 0.854) is the normal (s, 0, s); likewise upwards.
+  for (const Vector3f& normal : {Vector3f(s, 0, s), Vector3f(0, s, s), Vector3f(-s, 0, s)}) {
+    GltfSample tilted;
+    std::vector<float> normals;
+    for (int i = 0; i < 4; ++i) normals.insert(normals.end(), normal.data(), normal.data() + 3);
+    tilted.set("NORMAL", normals, "VEC3");
+    const Vector3f texel = (normal.array() * 0.5f + 0.5f).matrix();
+    for (const Vector3f& sun : {Vector3f(1, 0.2f, 1), Vector3f(-0.3f, 1, 1)}) {
+      const Vector3f expected = sunlit(tilted, sun);
+      for (const int mode :
+           {0, 1, 2}) {  // derived tangents; given ones; mirrored coordinates with given ones
+        GltfSample mapped;
+        const int texture = mapped.texture(encoded_texels(1, 1, {opaque_texel(texel)}));
+        mapped.material()["normalTexture"] = {{"index", texture}};
+        if (mode == 1)
+          mapped.set("TANGENT", std::vector<float>{1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1}, "VEC4");
+        if (mode == 2) {  // u to the left: the map's X points to -x
+          mapped.set("TEXCOORD_0", std::vector<float>{1, 1, 0, 1, 0, 0, 1, 0}, "VEC2");
+          mapped.set("TANGENT", std::vector<float>{-1, 0, 0, -1, -1, 0, 0, -1, -1, 0, 0, -1, -1, 0, 0, -1},
+                     "VEC4");
+        }
+        const Vector3f seen = sunlit(mapped, mode == 2 ? Vector3f(-sun.x(), sun.y(), sun.z()) : sun);
+        EXPECT_NEAR(seen.x(), expected.x(), 0.02f * expected.x() + 0.01f)
+            << mode << ": " << normal.transpose();
+      }
+    }
+  }
+}
+
+TEST(GltfPicture, NormalScaleFlattensTheMap) {
+  GltfSample sample;
+  const int texture = sample.texture(encoded_texels(1, 1, {{0.854f, 0.5f, 0.854f, 1}}));
+  sample.material()["normalTexture"] = {{"index", texture}, {"scale", 0}};
+  GltfSample plain;
+  EXPECT_NEAR(sunlit(sample, {1, 0, 1}).x(), sunlit(plain, {1, 0, 1}).x(), 0.01f);
+}
+
+TEST(GltfPicture, OcclusionHidesTheSkyByItsStrength) {
+  std::vector<float> light;
+  for (const double strength : {0.0, 0.5, 1.0}) {
+    GltfSample sample;
+    sample.pbr() = {{"metallicFactor", 0}, {"roughnessFactor", 1}, {"baseColorFactor", {0.1, 0.1, 0.1, 1}}};
+    const int texture = sample.texture(encoded_texels(1, 1, {{0, 1, 1, 1}}));
+    sample.material()["occlusionTexture"] = {{"index", texture}, {"strength", strength}};
+    Picture picture(sample);
+    picture.set_sky(kPureWhite);
+    light.push_back(picture.color_at(0, 0).x());
+  }
+  EXPECT_GT(light[0], 0.08f);
+  EXPECT_LT(light[1], 0.8f * light[0]);
+  EXPECT_GT(light[1], 0.3f * light[0]);
+  EXPECT_LT(light[2], 0.01f);
+}
+
+TEST(GltfPicture, EmissiveStrengthScalesTheGlow) {
+  GltfSample sample;
+  sample.material()["emissiveFactor"] = {0.25, 0.5, 1};
+  sample.extension("KHR_materials_emissive_strength")["emissiveStrength"] = 3;
+  Picture picture(sample);
+  expect_color(picture.color_at(0, 0), {0.75f, 1.5f, 3});
+}
+
+TEST(GltfPicture, TransmissionShowsWhatIsBehind) {
+  GltfSample sample;
+  sample.pbr() = {{"baseColorFactor", {1, 0.5, 1, 1}}, {"metallicFactor", 0}, {"roughnessFactor", 0}};
+  sample.extension("KHR_materials_transmission")["transmissionFactor"] = 1;
+  sample.extension("KHR_materials_ior")["ior"] = 1;
+  Picture picture(sample);
+  Mesh wall = picture.model().parts.at(0).mesh;
+  for (Vector3f& p : wall.positions) p = Vector3f(4 * p.x(), 4 * p.y(), -1);
+  const InstanceHandle behind = picture.stage().add_instance(
+      picture.stage().add_mesh(wall),
+      picture.stage().add_material({.color = {0, 0, 0, 1}, .emission = {0.2f, 0.4f, 0.6f}}), false);
+  (void)behind;
+  expect_color(picture.color_at(0.2f, 0.2f), {0.2f, 0.2f, 0.6f}, 0.02f);
+}
+
+TEST(GltfPicture, IndexOfRefractionAndSpecularSetTheHighlight) {
+  const auto highlight = [](const std::function<void(GltfSample&)>& change) {
+    GltfSample sample;
+    sample.pbr() = {{"baseColorFactor", {0, 0, 0, 1}}, {"metallicFactor", 0}, {"roughnessFactor", 0.5}};
+    change(sample);
+    Picture picture(sample);
+    picture.set_sun({0, 0, 1}, 1);
+    return picture.color_at(0, 0);
+  };
+  const Vector3f usual = highlight([](GltfSample&) {});
+  EXPECT_GT(usual.x(), 0.02f);
+  const Vector3f none = highlight([](GltfSample& s) { s.extension("KHR_materials_ior")["ior"] = 1; });
+  EXPECT_LT(none.x(), 0.1f * usual.x());
+  // ((2 - 1) / (2 + 1))^2 = 1 / 9 against 0.04
+  const Vector3f strong = highlight([](GltfSample& s) { s.extension("KHR_materials_ior")["ior"] = 2; });
+  EXPECT_NEAR(strong.x() / usual.x(), 1 / 0.36f, 0.05f);
+  const Vector3f red = highlight([](GltfSample& s) {
+    s.extension("KHR_materials_specular") = {{"specularFactor", 0.5}, {"specularColorFactor", {1, 0, 0}}};
+  });
+  EXPECT_NEAR(red.x() / usual.x(), 0.5f, 0.02f);
+  EXPECT_LT(red.y(), 0.1f * usual.y());
+}
+
+TEST(GltfPicture, SpecularGlossinessGivesDiffuseAndSpecularColours) {
+  GltfSample diffuse;
+  diffuse.extension("KHR_materials_pbrSpecularGlossiness") = {
+      {"diffuseFactor", {0, 0.5, 0, 1}}, {"specularFactor", {0, 0, 0}}, {"glossinessFactor", 0}};
+  Picture matt(diffuse);
+  matt.set_sun({0, 0, 1}, 1);
+  expect_color(matt.color_at(0, 0), {0, 0.5f, 0}, 0.01f);
+
+  GltfSample mirror;  // black but for a red mirror
+  mirror.extension("KHR_materials_pbrSpecularGlossiness") = {
+      {"diffuseFactor", {0.5, 0.5, 0.5, 1}}, {"specularFactor", {1, 0, 0}}, {"glossinessFactor", 1}};
+  Picture red(mirror);
+  red.set_sky({0.5f, 0.5f, 0.5f});
+  expect_color(red.color_at(0, 0), {0.5f, 0, 0}, 0.03f);
+}
+
+TEST(GltfPicture, ClearcoatAddsAHighlightAndSheenAGlow) {
+  const auto lit = [](const std::function<void(GltfSample&)>& change) {
+    GltfSample sample;
+    sample.pbr() = {{"baseColorFactor", {0, 0, 0, 1}}, {"metallicFactor", 0}, {"roughnessFactor", 1}};
+    change(sample);
+    Picture picture(sample);
+    picture.set_sky({0.5f, 0.5f, 0.5f});
+    picture.look_from({4.5f, 0, 1.2f});
+    return picture.color_at(0, 0);
+  };
+  const Vector3f plain = lit([](GltfSample&) {});
+  const Vector3f coated =
+      lit([](GltfSample& s) { s.extension("KHR_materials_clearcoat")["clearcoatFactor"] = 1; });
+  const Vector3f velvet = lit([](GltfSample& s) {
+    s.extension("KHR_materials_sheen")["sheenColorFactor"] = {1, 0, 0};
+  });
+  EXPECT_GT(coated.x(), plain.x() + 0.05f);
+  EXPECT_GT(velvet.x(), plain.x() + 0.05f);
+  EXPECT_LE(velvet.y(), plain.y() + 1e-4f);
+}
+
+TEST(GltfPicture, HolesOfAMaskLetTheSunThrough) {
+  GltfSample sample;
+  const int texture = sample.texture(encoded_texels(2, 1, {{1, 1, 1, 0}, {1, 1, 1, 1}}), kNearestTexels);
+  sample.pbr() = {{"baseColorTexture", {{"index", texture}}}};
+  sample.material()["alphaMode"] = "MASK";
+  const ScratchFolder folder;
+  const Model model = read_model(folder.put("a.gltf", sample.text()));
+  SmallStage small;
+  small.stage.set_environment({.zenith = kPureBlack,
+                               .horizon = kPureBlack,
+                               .ground = kPureBlack,
+                               .occlusion_reach = 0,
+                               .visible = false});
+  small.stage.set_sun({.direction = {0, 0, 1}, .color = {1, 1, 1}, .intensity = 1, .size_deg = 0.1f});
+  small.stage.add_instance(small.stage.add_mesh(model.parts.at(0).mesh),
+                           small.stage.add_material(model.materials.at(0), model.textures));
+  Mesh wall = model.parts.at(0).mesh;
+  for (Vector3f& p : wall.positions) p = Vector3f(3 * p.x(), 3 * p.y(), -1);
+  small.stage.add_instance(small.stage.add_mesh(wall),
+                           small.stage.add_material({.color = {1, 1, 1, 1}, .roughness = 1}));
+  // Seen from below the square, so that the wall behind its lower edge is in view.
+  const Camera camera{.eye = {0, -6, 3}, .target = {0, 0, -1}};
+  small.stage.set_camera(camera);
+  const HdrImage image = small.draw();
+  const auto wall_at = [&](float x) {
+    const Vector2f place = project(camera, {x, -0.5f, -1}, 96, 64);
+    return pixel(image, static_cast<int>(place.x()), static_cast<int>(place.y())).x();
+  };
+  EXPECT_GT(wall_at(-0.5f), 0.5f) << "behind the hole";
+  EXPECT_LT(wall_at(0.5f), 0.1f) << "behind the opaque half";
+}
+
+}  // namespace
+}  // namespace offstage::render

@@ -1,0 +1,85 @@
+#pragma once
+/// A model file drawn alone, whose pixels follow from its format.
+
+#include <cmath>
+#include <filesystem>
+#include <vector>
+
+#include "gl_fixture.h"
+#include "render/image_io.h"
+#include "render/mesh_io.h"
+
+namespace offstage::render {
+
+inline const Vector3f kPureBlack(0, 0, 0), kPureRed(1, 0, 0), kPureGreen(0, 1, 0), kPureBlue(0, 0, 1),
+    kPureWhite(1, 1, 1);
+
+/// A model, seen from z = 5, without any light unless it is set.
+class ModelPicture {
+ public:
+  explicit ModelPicture(const std::filesystem::path& file) : model_(read_model(file)) {
+    darken();
+    for (const Model::Part& part : model_.parts) {
+      const InstanceHandle instance = small_.stage.add_instance(
+          small_.stage.add_mesh(part.mesh),
+          small_.stage.add_material(model_.materials[static_cast<std::size_t>(part.material)],
+                                    model_.textures),
+          false);
+      instances_.push_back(instance);
+    }
+  }
+  void set_sun(const Vector3f& direction, float intensity = 1) {
+    small_.stage.set_sun(
+        {.direction = direction.normalized(), .color = {1, 1, 1}, .intensity = intensity, .shadows = false});
+  }
+  /// A sky and ground of one colour all around.
+  void set_sky(const Vector3f& color) {
+    small_.stage.set_environment(
+        {.zenith = color, .horizon = color, .ground = color, .occlusion_reach = 0, .visible = false});
+  }
+  void look_from(const Vector3f& eye) {
+    camera_.eye = eye;
+    small_.stage.set_camera(camera_);
+  }
+  Stage& stage() { return small_.stage; }
+  const Model& model() const { return model_; }
+  /// Colour and alpha at a point of the square.
+  Vector4f at(float x, float y) { return at(draw(), x, y); }
+  Vector4f at(const HdrImage& image, float x, float y) const {
+    const Vector2f place = project(camera_, {x, y, 0}, 96, 64);
+    return pixel(image, static_cast<int>(place.x()), static_cast<int>(place.y()));
+  }
+  HdrImage draw() { return small_.draw(); }
+  Vector3f color_at(float x, float y) { return at(x, y).head<3>(); }
+
+ private:
+  void darken() {
+    set_sky(kPureBlack);
+    set_sun({0, 0, 1}, 0);
+  }
+  SmallStage small_;
+  Camera camera_{.eye = {0, 0, 5}, .target = {0, 0, 0}};
+  Model model_;
+  std::vector<InstanceHandle> instances_;
+};
+
+inline void expect_color(const Vector3f& color, const Vector3f& expected, float tolerance = 4e-3f) {
+  EXPECT_LT((color - expected).cwiseAbs().maxCoeff(), tolerance)
+      << color.transpose() << " for " << expected.transpose();
+}
+
+/// A PNG of a row or column of colours, RGB in {0, 255}.
+inline std::vector<uint8_t> encoded_texels(int width, int height, const std::vector<Vector4f>& colors) {
+  Image image{width, height, {}};
+  for (const Vector4f& c : colors)
+    for (int k = 0; k < 4; ++k) image.rgba.push_back(static_cast<uint8_t>(std::lround(c[k] * 255)));
+  image.transparent = true;
+  return encode_png(image);
+}
+inline Vector4f opaque_texel(const Vector3f& color) {
+  Vector4f result;
+  result << color, 1;
+  return result;
+}
+
+}  // namespace offstage::render
