@@ -13,9 +13,9 @@ namespace {
 
 constexpr uint64_t kMaxGltfBytes = uint64_t{2} << 30;
 constexpr std::size_t kMaxGltfElements = std::size_t{1} << 28;  // far more than the memory of the reader
-constexpr std::size_t kMaxGltfZeros = std::size_t{1} << 26;     // numbers of an accessor without a buffer view
-constexpr std::size_t kMaxMeshoptRatio = 256;                   // more than the codecs can reach
-constexpr std::size_t kMaxGltfStride = 256;                     // 252 by the specification
+constexpr std::size_t kMaxGltfZeros = std::size_t{1} << 26;  // numbers of an accessor without a buffer view
+constexpr std::size_t kMaxMeshoptRatio = 256;                // more than the codecs can reach
+constexpr std::size_t kMaxGltfStride = 256;                  // 252 by the specification
 constexpr std::size_t kMaxGltfWarnings = 100;
 constexpr uint32_t kGlbMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
 
@@ -238,8 +238,10 @@ void GltfFile::check_extensions() {
 }
 
 void GltfFile::warn(const std::string& line) {
-  if (warned_.size() <= kMaxGltfWarnings && warned_.insert(line).second)
-    warnings_.push_back(warned_.size() > kMaxGltfWarnings ? "further warnings are left out" : line);
+  constexpr std::size_t kMostCharacters = 300;
+  const std::string text = one_line(line.substr(0, kMostCharacters));
+  if (warned_.size() <= kMaxGltfWarnings && warned_.insert(text).second)
+    warnings_.push_back(warned_.size() > kMaxGltfWarnings ? "further warnings are left out" : text);
 }
 
 std::vector<uint8_t> GltfFile::resource(const std::string& uri, const std::string& what) const {
@@ -389,6 +391,8 @@ std::vector<T> GltfFile::read(const GltfValue& accessor, const Layout& form,
   const std::optional<std::size_t> value_view = values.index("bufferView", count("bufferViews"));
   if (!place_view || !value_view) throw FileError(sparse.place() + ": has no buffer view");
   const std::size_t type = places.size("componentType", 0), bytes = component_bytes(type, places);
+  if (type != kUnsignedByte && type != kUnsignedShort && type != kUnsignedInt)
+    throw places.wrong("componentType", "must be an unsigned integer");
   const auto at = elements(*place_view, places.size("byteOffset", 0), n, bytes, bytes, places.place());
   const auto from =
       elements(*value_view, values.size("byteOffset", 0), n, form.element, form.element, values.place());

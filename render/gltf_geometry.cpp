@@ -32,6 +32,18 @@ std::vector<uint32_t> as_triangles(const std::vector<uint32_t>& indices, std::si
   return result;
 }
 
+/// Scales integers as a normalised accessor asks for (section 3.11).
+void normalize(const GltfValue& accessor, std::vector<float>& values) {
+  if (!accessor.flag("normalized")) return;
+  const std::size_t type = accessor.size("componentType", 0);
+  const float largest = type == 5120   ? 127.0f
+                        : type == 5121 ? 255.0f
+                        : type == 5122 ? 32767.0f
+                        : type == 5123 ? 65535.0f
+                                       : 1.0f;
+  for (float& value : values) value = std::max(value / largest, -1.0f);
+}
+
 }  // namespace
 
 /// Where the attributes of a primitive come from: accessors, or Draco data with some of them.
@@ -49,6 +61,9 @@ struct GltfGeometry::Source {
       if (width > 0 && packed.width != width)
         throw attributes.wrong(name, "has " + std::to_string(packed.width) + " components in its Draco data");
       result = {packed.values.size() / static_cast<std::size_t>(packed.width), packed.width, packed.values};
+      const auto accessor = attributes.index(name.c_str(), file.count("accessors"));
+      // The accessor decides (section 3.6.2.2); encoders do not always set the flag in the data.
+      if (accessor && !packed.normalized) normalize(file.item("accessors", *accessor), result.values);
     } else if (const auto accessor = attributes.index(name.c_str(), file.count("accessors"))) {
       result = file.numbers(*accessor, width);
     }
@@ -62,6 +77,7 @@ struct GltfGeometry::Source {
 const GltfPrimitive& GltfGeometry::primitive(std::size_t mesh, std::size_t index) {
   const auto found = primitives_.find({mesh, index});
   if (found != primitives_.end()) return found->second;
+  primitives_.clear();  // primitives often share one large vertex buffer, of which each has a copy
   return primitives_
       .emplace(std::pair(mesh, index), read(file_.item("meshes", mesh).item("primitives", index)))
       .first->second;
@@ -145,16 +161,22 @@ void GltfGeometry::read_triangles(const Source& source, GltfPrimitive& result) {
 
 void GltfGeometry::read_joints(const Source& source, GltfPrimitive& result) {
   constexpr int kMostSets = 4;
+  constexpr uint32_t kNoJoint = 0xffffffff;  // posed() skips what is not in the skin
   const std::size_t n = result.surface.mesh.positions.size();
   std::vector<GltfNumbers> joints, weights;
   for (int k = 0; k < kMostSets; ++k) {
     const std::string end = "_" + std::to_string(k);
     GltfNumbers joint = source.attribute(file_, "JOINTS" + end, 4),
                 weight = source.attribute(file_, "WEIGHTS" + end, 4);
-    if (joint.count != n || weight.count != n) break;
+    if (joint.count == 0 && weight.count == 0) break;
+    if (joint.count != n || weight.count != n)
+      throw FileError(source.primitive.place() + ": JOINTS" + end + " and WEIGHTS" + end +
+                      " do not fit the vertices");
     joints.push_back(std::move(joint));
     weights.push_back(std::move(weight));
   }
+  if (source.primitive.child("attributes").has("JOINTS_4"))
+    file_.warn(source.primitive.place() + ": only the first sixteen joints of each vertex are used");
   result.influences = 4 * joints.size();
   result.joints.reserve(n * result.influences);
   result.weights.reserve(n * result.influences);
@@ -162,7 +184,7 @@ void GltfGeometry::read_joints(const Source& source, GltfPrimitive& result) {
     for (std::size_t set = 0; set < joints.size(); ++set)
       for (std::size_t k = 0; k < 4; ++k) {
         const float joint = joints[set].at(i)[k], weight = weights[set].at(i)[k];
-        result.joints.push_back(joint >= 0 && joint < 1e6f ? static_cast<uint32_t>(joint) : 0);
+        result.joints.push_back(joint >= 0 && joint < 1e6f ? static_cast<uint32_t>(joint) : kNoJoint);
         result.weights.push_back(weight > 0 && weight < 1e6f ? weight : 0);
       }
 }
@@ -172,7 +194,11 @@ void GltfGeometry::mark_colors(Surface& surface) {
   Material& look = model_.materials[static_cast<std::size_t>(surface.material)];
   look.vertex_colors = true;
   const bool is_default = static_cast<std::size_t>(surface.material) == file_.count("materials");
-  if (is_default) look.color = Vector4f::Ones();
+  const auto states_look = [&] {
+    const GltfValue source = file_.item("materials", static_cast<std::size_t>(surface.material));
+    return source.has("pbrMetallicRoughness") || source.has("extensions");
+  };
+  if (is_default || !states_look()) look.color = Vector4f::Ones();
   const bool blends =
       look.alpha_cutoff == 0 && !is_default &&
       file_.item("materials", static_cast<std::size_t>(surface.material)).text("alphaMode") == "BLEND";
@@ -227,15 +253,17 @@ Surface GltfGeometry::posed(const Surface& surface, const GltfPrimitive& source,
     Eigen::Affine3d pose;
     pose.matrix() = sum / total;
     mesh.positions[i] = (pose * mesh.positions[i].cast<double>()).cast<float>();
+    const Eigen::Matrix3d m = pose.linear();
+    const double sign = m.determinant() < 0 ? -1 : 1;
     if (!mesh.normals.empty()) {
-      const Eigen::Matrix3d m = pose.linear();
       Eigen::Matrix3d cofactor;
       cofactor << m.col(1).cross(m.col(2)), m.col(2).cross(m.col(0)), m.col(0).cross(m.col(1));
-      const double sign = m.determinant() < 0 ? -1 : 1;
       mesh.normals[i] = (sign * (cofactor * mesh.normals[i].cast<double>())).normalized().cast<float>();
     }
-    if (!mesh.tangents.empty())
-      mesh.tangents[i].head<3>() = (pose.linear() * mesh.tangents[i].head<3>().cast<double>()).cast<float>();
+    if (!mesh.tangents.empty()) {
+      mesh.tangents[i].head<3>() = (m * mesh.tangents[i].head<3>().cast<double>()).cast<float>();
+      mesh.tangents[i].w() *= static_cast<float>(sign);
+    }
   }
   return result;
 }

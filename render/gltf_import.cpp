@@ -110,9 +110,11 @@ class GltfImporter {
     }
     const std::size_t index = file_.root().index("scene", file_.count("scenes")).value_or(0);
     const GltfValue scene = file_.item("scenes", index);
+    std::vector<bool> is_listed(nodes_->size(), false);
     for (std::size_t k = 0; k < scene.count("nodes"); ++k) {
       const std::size_t node = scene.index_at("nodes", k, nodes_->size());
-      if (std::ranges::find(result, node) == result.end()) result.push_back(node);
+      if (!is_listed[node]) result.push_back(node);
+      is_listed[node] = true;
     }
     if (file_.count("scenes") > 1)
       file_.warn("only scene " + std::to_string(index) + " of " + std::to_string(file_.count("scenes")) +
@@ -178,6 +180,10 @@ class GltfImporter {
     const GltfNumbers places = numbers("TRANSLATION", 3), turns = numbers("ROTATION", 4),
                       sizes = numbers("SCALE", 3);
     const std::size_t count = std::max({places.count, turns.count, sizes.count});
+    if (count == 0) {
+      file_.warn(instancing.place() + " places no instance; the node is drawn once");
+      return {Affine3d::Identity()};
+    }
     std::vector<Affine3d> result(count, Affine3d::Identity());
     for (const GltfNumbers* list : {&places, &turns, &sizes})
       if (list->count > 0 && list->count != count)

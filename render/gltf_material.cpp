@@ -36,8 +36,14 @@ void give_usual_look(Material& look) {
 
 /// KHR_texture_transform: scale, then rotation (positive turns the image clockwise), then offset.
 void transform_uvs(const GltfValue& transform, TextureMap& map) {
-  const Eigen::Vector2d offset = transform.numbers<2>("offset", Eigen::Vector2d::Zero());
-  const Eigen::Vector2d scale = transform.numbers<2>("scale", Eigen::Vector2d::Ones());
+  constexpr double kMost = 1e6;  // so that the sums of the shader stay finite
+  const auto pair = [&](const char* key, double missing) {
+    return transform.numbers<2>(key, Eigen::Vector2d::Constant(missing))
+        .cwiseMax(-kMost)
+        .cwiseMin(kMost)
+        .eval();
+  };
+  const Eigen::Vector2d offset = pair("offset", 0), scale = pair("scale", 1);
   const double angle = transform.number("rotation", 0), c = std::cos(angle), s = std::sin(angle);
   map.rows[0] = Eigen::Vector3d(c * scale.x(), s * scale.y(), offset.x()).cast<float>();
   map.rows[1] = Eigen::Vector3d(-s * scale.x(), c * scale.y(), offset.y()).cast<float>();
@@ -78,7 +84,7 @@ Material GltfMaterials::material(const GltfValue& source, GltfUvSets& sets) {
   else
     read_metallic(source, look, sets);
   if (source.text("alphaMode", "OPAQUE") != "BLEND" && look.alpha_cutoff == 0) look.color.w() = 1;
-  if (look.name.empty() && look.base_color_texture.image < 0 && look.color == Vector4f::Ones())
+  if (look.name.empty() && !source.has("pbrMetallicRoughness") && !source.has("extensions"))
     give_usual_look(look);
 
   const double strength = source.extension("KHR_materials_emissive_strength").number("emissiveStrength", 1);
@@ -86,7 +92,8 @@ Material GltfMaterials::material(const GltfValue& source, GltfUvSets& sets) {
                   static_cast<float>(std::clamp(strength, 0.0, kBrightestEmission));
   look.emission_texture = map(source, "emissiveTexture", Alpha::drop, sets);
   look.normal_texture = map(source, "normalTexture", Alpha::drop, sets);
-  look.normal_scale = static_cast<float>(source.child("normalTexture").number("scale", 1));
+  look.normal_scale =
+      static_cast<float>(std::clamp(source.child("normalTexture").number("scale", 1), -1e3, 1e3));
   look.occlusion_texture = map(source, "occlusionTexture", Alpha::drop, sets);
   look.occlusion_strength = share(source.child("occlusionTexture").number("strength", 1));
   look.unlit = source.extension("KHR_materials_unlit").exists();
@@ -128,6 +135,7 @@ void GltfMaterials::read_glossiness(const GltfValue& source, Material& look, Glt
   look.metallic = 0;
   look.specular = color_of(pbr, "specularFactor", 1);
   look.glossiness = share(pbr.number("glossinessFactor", 1));
+  look.roughness = 1 - look.glossiness;
   const bool uses_alpha = look.alpha_cutoff > 0 || source.text("alphaMode", "OPAQUE") == "BLEND";
   look.base_color_texture = map(pbr, "diffuseTexture", uses_alpha ? Alpha::keep : Alpha::drop, sets);
   look.specular_texture = map(pbr, "specularGlossinessTexture", Alpha::keep, sets);
@@ -145,6 +153,8 @@ void GltfMaterials::read_transmission(const GltfValue& source, Material& look, G
   }
   look.transmission = share(transmission.number("transmissionFactor", 0));
   if (look.transmission == 0) return;
+  if (source.text("alphaMode") == "BLEND")
+    file_.warn(source.place() + ": transmission is ignored where alphaMode BLEND is translucent");
   look.transmission_texture = map(transmission, "transmissionTexture", Alpha::drop, sets);
   const double thickness = volume.number("thicknessFactor", 0);
   look.thin = thickness <= 0;
@@ -168,7 +178,8 @@ void GltfMaterials::read_layers(const GltfValue& source, Material& look, GltfUvS
   look.clearcoat_roughness = share(coat.number("clearcoatRoughnessFactor", 0));
   warn_of_textures(coat, {"clearcoatTexture", "clearcoatRoughnessTexture", "clearcoatNormalTexture"});
   look.sheen_color = color_of(sheen, "sheenColorFactor", 0);
-  look.sheen_roughness = share(sheen.number("sheenRoughnessFactor", 0));
+  if (sheen.exists() && sheen.number("sheenRoughnessFactor", 0) != 0.5)
+    file_.warn(sheen.place() + ".sheenRoughnessFactor is drawn as 0.5");
   warn_of_textures(sheen, {"sheenColorTexture", "sheenRoughnessTexture"});
   if (!specular.exists() || look.glossiness >= 0) return;
   const Vector3f tint = color_of(specular, "specularColorFactor", 1, 100);

@@ -92,6 +92,7 @@ DracoMesh unpack_draco(std::span<const uint8_t> packed, const std::map<std::stri
       throw FileError(place + ": " + name + " has " + std::to_string(width) + " components");
     DracoMesh::Attribute& out = result.attributes[name];
     out.width = width;
+    out.normalized = attribute->normalized();
     out.values.resize(std::size_t{mesh->num_points()} * static_cast<std::size_t>(width));
     for (uint32_t i = 0; i < mesh->num_points(); ++i) {
       const draco::AttributeValueIndex value = attribute->mapped_index(draco::PointIndex(i));

@@ -29,7 +29,8 @@ std::vector<uint8_t> unpack_meshopt(const MeshoptView& view, std::span<const uin
 /// A mesh of KHR_draco_mesh_compression.
 struct DracoMesh {
   struct Attribute {
-    int width = 0;  ///< numbers per vertex
+    int width = 0;            ///< numbers per vertex
+    bool normalized = false;  ///< integers were scaled to [0, 1] or [-1, 1]
     std::vector<float> values;
   };
   std::vector<uint32_t> indices;

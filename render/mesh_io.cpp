@@ -72,7 +72,6 @@ void transfer(Archive& archive, Model& model) {
     archive.value(m.clearcoat);
     archive.value(m.clearcoat_roughness);
     archive.value(m.sheen_color);
-    archive.value(m.sheen_roughness);
   });
   archive.list(model.textures, [&](Image& image) { transfer_image(archive, image); });
   archive.array(model.unit);

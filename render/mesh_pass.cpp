@@ -200,7 +200,7 @@ GpuMaterial make_gpu_material(const Material& material, std::span<const Image> t
   uniforms.specular << material.specular, material.glossiness;
   uniforms.coat = {material.clearcoat, material.clearcoat_roughness, material.normal_scale,
                    material.occlusion_strength};
-  uniforms.velvet << material.sheen_color, material.sheen_roughness;
+  uniforms.velvet << material.sheen_color, 0;
   uniforms.options = {material.alpha_cutoff, material.unlit ? 1.0f : 0.0f,
                       texture_at(textures, material.normal_texture.image) != nullptr ? 1.0f : 0.0f, 0};
   std::size_t row = 0;

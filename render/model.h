@@ -128,7 +128,6 @@ struct Material {
   float clearcoat = 0;  ///< strength of a layer of lacquer, in [0, 1]
   float clearcoat_roughness = 0;
   Vector3f sheen_color = Vector3f::Zero();  ///< light scattered at grazing angles, as of velvet
-  float sheen_roughness = 0;
 
   /// Whether it needs more than the first three textures in their plain form.
   bool is_detailed() const;

@@ -143,7 +143,7 @@ std::string NodeNames::next(const std::string& name) {
 
 Eigen::Affine3d turned_and_moved(const Eigen::Affine3d& m) {
   const Eigen::Matrix3d rotation = m.rotation();
-  if (!rotation.allFinite() || !m.translation().allFinite()) return Eigen::Affine3d::Identity();
+  if (!rotation.allFinite() || !m.translation().cast<float>().allFinite()) return Eigen::Affine3d::Identity();
   return Eigen::Translation3d(m.translation()) * rotation;
 }
 

@@ -59,12 +59,12 @@ void add_to(XXH3_state_t* hash, const render::Model& model) {
     XXH3_128bits_update(hash, node.orientation.coeffs().data(), 4 * sizeof(float));
   }
   for (const render::Material& m : model.materials) {
-    const float numbers[] = {
-        m.color.x(),       m.color.y(),       m.color.z(),          m.color.w(),      m.metallic,
-        m.roughness,       m.emission.x(),    m.emission.y(),       m.emission.z(),   m.transmission,
-        m.refraction,      m.normal_scale,    m.occlusion_strength, m.alpha_cutoff,   m.specular.x(),
-        m.specular.y(),    m.specular.z(),    m.glossiness,         m.clearcoat,      m.clearcoat_roughness,
-        m.sheen_color.x(), m.sheen_color.y(), m.sheen_color.z(),    m.sheen_roughness};
+    const float numbers[] = {m.color.x(),          m.color.y(),       m.color.z(),      m.color.w(),
+                             m.metallic,           m.roughness,       m.emission.x(),   m.emission.y(),
+                             m.emission.z(),       m.transmission,    m.refraction,     m.normal_scale,
+                             m.occlusion_strength, m.alpha_cutoff,    m.specular.x(),   m.specular.y(),
+                             m.specular.z(),       m.glossiness,      m.clearcoat,      m.clearcoat_roughness,
+                             m.sheen_color.x(),    m.sheen_color.y(), m.sheen_color.z()};
     const int choices[] = {m.two_sided, m.unlit, m.thin, m.vertex_colors};
     render::for_each_texture(m, [&](const render::TextureMap& map) { add_to(hash, map); });
     XXH3_128bits_update(hash, numbers, sizeof numbers);
