@@ -189,7 +189,7 @@ void GltfGeometry::read_joints(const Source& source, GltfPrimitive& result) {
       }
 }
 
-void GltfGeometry::mark_colors(Surface& surface) {
+void GltfGeometry::mark_colors(FileSurface& surface) {
   if (surface.mesh.colors.empty()) return;
   Material& look = model_.materials[static_cast<std::size_t>(surface.material)];
   look.vertex_colors = true;
@@ -208,11 +208,11 @@ void GltfGeometry::mark_colors(Surface& surface) {
   for (Vector4f& color : surface.mesh.colors) color.w() = 1;
 }
 
-std::optional<Surface> GltfGeometry::morphed(std::size_t mesh, std::size_t index, const GltfValue& node) {
+std::optional<FileSurface> GltfGeometry::morphed(std::size_t mesh, std::size_t index, const GltfValue& node) {
   const GltfValue source = file_.item("meshes", mesh), primitive = source.item("primitives", index);
   const GltfValue& owner = node.count("weights") > 0 ? node : source;
   const std::size_t targets = std::min(primitive.count("targets"), owner.count("weights"));
-  std::optional<Surface> result;
+  std::optional<FileSurface> result;
   for (std::size_t t = 0; t < targets; ++t) {
     const auto weight = static_cast<float>(owner.number_at("weights", t));
     if (weight == 0) continue;
@@ -237,9 +237,9 @@ std::optional<Surface> GltfGeometry::morphed(std::size_t mesh, std::size_t index
   return result;
 }
 
-Surface GltfGeometry::posed(const Surface& surface, const GltfPrimitive& source,
-                            const std::vector<Eigen::Affine3d>& joints) const {
-  Surface result = surface;
+FileSurface GltfGeometry::posed(const FileSurface& surface, const GltfPrimitive& source,
+                                const std::vector<Eigen::Affine3d>& joints) const {
+  FileSurface result = surface;
   Mesh& mesh = result.mesh;
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
     Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();

@@ -14,7 +14,7 @@ namespace offstage::render {
 
 /// A primitive as triangles, with what a skin needs.
 struct GltfPrimitive {
-  Surface surface;
+  FileSurface surface;
   std::size_t left_out = 0;      ///< points, or ends of lines, that it consists of instead
   std::vector<uint32_t> joints;  ///< `influences` per vertex, of the skin's list
   std::vector<float> weights;    ///< as long as `joints`
@@ -32,10 +32,10 @@ class GltfGeometry {
   /// The primitive before morph targets; read once.
   const GltfPrimitive& primitive(std::size_t mesh, std::size_t index);
   /// Adds the morph targets, if any has a weight. `weights` of a node replace those of the mesh.
-  std::optional<Surface> morphed(std::size_t mesh, std::size_t index, const GltfValue& node);
+  std::optional<FileSurface> morphed(std::size_t mesh, std::size_t index, const GltfValue& node);
   /// Poses a surface by the joints' transforms (section 3.7.3.3): positions are then in the scene's frame.
-  Surface posed(const Surface& surface, const GltfPrimitive& source,
-                const std::vector<Eigen::Affine3d>& joints) const;
+  FileSurface posed(const FileSurface& surface, const GltfPrimitive& source,
+                    const std::vector<Eigen::Affine3d>& joints) const;
 
  private:
   struct Source;
@@ -43,7 +43,7 @@ class GltfGeometry {
   void read_attributes(const Source& source, GltfPrimitive& result);
   void read_triangles(const Source& source, GltfPrimitive& result);
   void read_joints(const Source& source, GltfPrimitive& result);
-  void mark_colors(Surface& surface);
+  void mark_colors(FileSurface& surface);
 
   GltfFile& file_;
   const GltfMaterials& materials_;

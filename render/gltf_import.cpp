@@ -160,7 +160,7 @@ class GltfImporter {
       const GltfPrimitive& primitive = geometry_->primitive(mesh, k);
       builder_.leave_out(primitive.left_out);
       if (primitive.surface.mesh.indices.empty()) continue;
-      std::optional<Surface> own = geometry_->morphed(mesh, k, node);
+      std::optional<FileSurface> own = geometry_->morphed(mesh, k, node);
       if (skin && primitive.influences > 0)
         own = geometry_->posed(own ? *own : primitive.surface, primitive, joints);
       for (const Affine3d& instance : instances)

@@ -84,7 +84,7 @@ class AssimpSurfaces {
     const aiMesh& mesh = *scene_.mMeshes[mesh_index];
     const std::size_t material = std::min<std::size_t>(mesh.mMaterialIndex, model_.materials.size() - 1);
     const auto [entry, is_new] = surfaces_.try_emplace(mesh_index);
-    Surface& surface = entry->second;
+    FileSurface& surface = entry->second;
     if (is_new) {
       surface.material = static_cast<int>(material);
       convert(mesh, material, surface.mesh);
@@ -120,7 +120,7 @@ class AssimpSurfaces {
   std::vector<unsigned> uv_sets_;
   Model& model_;
   PartBuilder& builder_;
-  std::map<unsigned, Surface> surfaces_;
+  std::map<unsigned, FileSurface> surfaces_;
 };
 
 /// Lists the nodes that have meshes, and adds the meshes of all of them, or of the node `wanted`. Depth first

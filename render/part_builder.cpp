@@ -76,7 +76,7 @@ std::vector<std::string> PartBuilder::left_out() const {
   return lines;
 }
 
-void PartBuilder::add(const Surface& surface, const Eigen::Affine3d& world_from_mesh) {
+void PartBuilder::add(const FileSurface& surface, const Eigen::Affine3d& world_from_mesh) {
   const Mesh& mesh = surface.mesh;
   const std::vector<Vector3f> positions = moved_positions(mesh, world_from_mesh);
   const std::vector<Vector3f> normals = moved_normals(mesh, world_from_mesh);
@@ -107,7 +107,7 @@ void PartBuilder::add(const Surface& surface, const Eigen::Affine3d& world_from_
   }
 }
 
-Mesh& PartBuilder::part(const Surface& surface, bool normals) {
+Mesh& PartBuilder::part(const FileSurface& surface, bool normals) {
   const Mesh& mesh = surface.mesh;
   const auto [entry, is_new] =
       parts_.try_emplace({surface.material, normals, !mesh.uvs.empty(), !mesh.second_uvs.empty(),

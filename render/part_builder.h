@@ -13,7 +13,7 @@
 namespace offstage::render {
 
 /// Triangles as a file has them, in the frame of their node. `mesh.normals` may have any length.
-struct Surface {
+struct FileSurface {
   Mesh mesh;
   int material = 0;  ///< index into Model::materials
 };
@@ -22,14 +22,14 @@ class PartBuilder {
  public:
   explicit PartBuilder(Model& model) : model_(model) {}
 
-  void add(const Surface& surface, const Eigen::Affine3d& world_from_mesh);
+  void add(const FileSurface& surface, const Eigen::Affine3d& world_from_mesh);
   /// Records points, lines or degenerate primitives that are left out.
   void leave_out(std::size_t count) { no_triangle_ += count; }
   /// One line for each kind of element that was left out.
   std::vector<std::string> left_out() const;
 
  private:
-  Mesh& part(const Surface& surface, bool normals);
+  Mesh& part(const FileSurface& surface, bool normals);
   bool accept(const uint32_t* corners, const std::vector<Vector3f>& positions);
 
   Model& model_;

@@ -7,7 +7,7 @@ status=0
 # forbid FOLDERS PATTERN WHY: no file of the folders may include what matches.
 forbid() {
   local rows
-  rows=$(grep -rnE --include=*.h --include=*.cpp "^ *# *include *[<\"]($2)" $1)
+  rows=$(grep -rHnE --include=*.h --include=*.cpp "^ *# *include *[<\"]($2)" $1)
   [ -z "$rows" ] && return
   echo "$3:"
   echo "$rows"
@@ -17,7 +17,9 @@ forbid() {
 json='nlohmann|CLI/|valijson'
 forbid sim "render/|effects/|producer/|$json|assimp|glad|GL/|stb|libdeflate" "sim includes more than std, Eigen, oneTBB, Qhull and xxhash"
 forbid effects "render/|producer/|$json|assimp|glad|GL/|stb|libdeflate" "effects includes more than sim"
-forbid render "sim/|effects/|producer/|$json" "render knows something of physics or JSON"
+forbid render "sim/|effects/|producer/|CLI/|valijson" "render knows something of physics or of scenes"
+# glTF files are JSON; one header of its reader wraps the library.
+forbid "$(find render -name '*.h' -o -name '*.cpp' | grep -v '^render/gltf_json.h$' | tr '\n' ' ')" nlohmann "JSON is read in render/gltf_json.h alone"
 forbid demos/producer "tune/|pybind11" "producer includes what is built on it"
 # Floors: within a library, a folder includes itself and the folders before it in the list.
 # floors FOLDER PREFIX FLOOR...; "." is the folder's own files.
