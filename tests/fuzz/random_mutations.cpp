@@ -1,9 +1,9 @@
 // Runs a fuzz target on random mutations of its corpus, without guidance by coverage: for compilers without
 // libFuzzer, so that every test run has some hundred thousand such inputs in the sanitized build.
 //   usage: TARGET SECONDS CORPUS_FOLDER FAILING_INPUT [SEED]
-// The same seed gives the same inputs. An input that takes over 5 s ends the process with SIGALRM. The input
-// that is running is in the file FAILING_INPUT, which stays there if the process crashes and is removed
-// otherwise.
+// The same seed gives the same inputs. An input that takes over a minute of processor time ends the process
+// with SIGPROF. The input that is running is in the file FAILING_INPUT, which stays there if the process ends
+// early and is removed otherwise.
 
 #include <algorithm>
 #include <chrono>
@@ -20,6 +20,7 @@
 
 #include <fcntl.h>
 #include <sys/mman.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size);
@@ -29,7 +30,7 @@ namespace {
 using Bytes = std::vector<uint8_t>;
 
 constexpr std::size_t kMostBytes = 1 << 16;
-constexpr unsigned kMostSeconds = 25;
+constexpr itimerval kMostTime = {{0, 0}, {60, 0}};
 
 class Mutator {
  public:
@@ -151,9 +152,8 @@ int main(int argc, char** argv) {
   for (; std::chrono::steady_clock::now() < end; ++runs) {
     const Bytes input = mutator.next();
     running.set(input);
-    ::alarm(kMostSeconds);
+    ::setitimer(ITIMER_PROF, &kMostTime, nullptr);
     LLVMFuzzerTestOneInput(input.data(), input.size());
   }
-  ::alarm(0);
   std::printf("%llu inputs\n", static_cast<unsigned long long>(runs));
 }
