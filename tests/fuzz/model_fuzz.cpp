@@ -1,6 +1,6 @@
 // A model as the confined reader answers it, with any bytes changed: refused with a FileError, or a model
 // that is consistent. A hostile file may have taken over the reader, so this is where it would reach the
-// program. The reader itself is not fuzzed here; whatever it does, it does in its sandbox (tests/faults).
+// program. The reader itself is run by reader_fuzz.cpp.
 
 #include <algorithm>
 #include <cstdlib>
