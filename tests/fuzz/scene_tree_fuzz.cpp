@@ -90,7 +90,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   constexpr int kMostMutations = 16;
   for (int i = 0; i < kMostMutations && !choices.empty(); ++i) mutate(scene, choices);
   const std::string text = to_text(scene);
-  // Models would be decomposed into convex parts in each run, which takes seconds; decomposition_fuzz.cpp does that.
+  // Models would be decomposed into convex parts in each run, which takes seconds; decomposition_fuzz.cpp
+  // does that.
   if (text.find("/models/") != std::string::npos) return 0;
   try {
     const LoadedScene loaded =

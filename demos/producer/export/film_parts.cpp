@@ -87,7 +87,8 @@ class FilmParts::Builder {
     }
     if (!body.visible) return;
     if (body.model)
-      add_model(body.model->file, placed(body.model->position, body.model->orientation, scale_of(*body.model, models_)),
+      add_model(body.model->file,
+                placed(body.model->position, body.model->orientation, scale_of(*body.model, models_)),
                 body.material, film);
     else
       std::visit([&](const auto& shape) { add_shape(shape, body.material, film); }, body.shape);
@@ -129,7 +130,8 @@ class FilmParts::Builder {
   template <class S>
   void add_shape(const S& shape, const std::string& material_name, FilmBody& film) {
     if constexpr (std::is_same_v<S, MeshFile>) {
-      add_model(shape.file, placed(Vec3::Zero(), Quat::Identity(), scale_of(shape, models_)), material_name, film);
+      add_model(shape.file, placed(Vec3::Zero(), Quat::Identity(), scale_of(shape, models_)), material_name,
+                film);
     } else if constexpr (std::is_same_v<S, sim::Plane>) {
       film.parts.push_back({mesh(size_key(shape), ground_square), material(material_name)});
     } else {
