@@ -38,10 +38,6 @@ constexpr std::array kGltfExtensions = {"KHR_mesh_quantization",
                                         "KHR_xmp_json_ld",
                                         "KHR_xmp"};
 
-bool is_known_extension(const std::string& name) {
-  return std::ranges::find(kGltfExtensions, name) != kGltfExtensions.end();
-}
-
 /// Extensions that need a library; `built` says whether this program has it.
 struct GltfLibrary {
   const char* extension;
@@ -141,6 +137,10 @@ std::vector<uint8_t> base64_decoded(std::string_view text, const std::string& wh
 }
 
 }  // namespace
+
+bool is_known_extension(const std::string& name) {
+  return std::ranges::find(kGltfExtensions, name) != kGltfExtensions.end();
+}
 
 /// The memory layout of an accessor.
 struct GltfFile::Layout {

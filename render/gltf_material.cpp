@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "render/error.h"
 #include "render/file_io.h"
@@ -49,19 +48,6 @@ void transform_uvs(const GltfValue& transform, TextureMap& map) {
   map.rows[1] = Eigen::Vector3d(-s * scale.x(), c * scale.y(), offset.y()).cast<float>();
 }
 
-const std::set<std::string>& material_extensions() {
-  static const std::set<std::string> names = {"KHR_materials_unlit",
-                                              "KHR_materials_emissive_strength",
-                                              "KHR_materials_transmission",
-                                              "KHR_materials_ior",
-                                              "KHR_materials_volume",
-                                              "KHR_materials_clearcoat",
-                                              "KHR_materials_sheen",
-                                              "KHR_materials_specular",
-                                              "KHR_materials_pbrSpecularGlossiness"};
-  return names;
-}
-
 }  // namespace
 
 void GltfMaterials::read() {
@@ -103,7 +89,7 @@ Material GltfMaterials::material(const GltfValue& source, GltfUvSets& sets) {
   const GltfValue extensions = source.child("extensions");
   if (!extensions.exists()) return look;
   for (const auto& [name, value] : extensions.json()->items())
-    if (!material_extensions().contains(name))
+    if (!is_known_extension(name))
       file_.warn("extension " + one_line(name) + " is not supported and is ignored");
   return look;
 }

@@ -184,7 +184,8 @@ Vector3f sunlit(GltfSample& sample, const Vector3f& sun) {
 
 TEST(GltfPicture, NormalMapsShadeLikeTheTiltedSurface) {
   const float s = std::sqrt(0.5f);
-  // Texel (0.854, 0.5, 0.854) is the normal (s, 0, s); likewise upwards.
+  // A normal map stores (n + 1) / 2, so one texel tilts the whole square. It must be lit like a square whose
+  // vertex normals are tilted by the same 45 degrees: to the right, upwards and to the left.
   for (const Vector3f& normal : {Vector3f(s, 0, s), Vector3f(0, s, s), Vector3f(-s, 0, s)}) {
     GltfSample tilted;
     std::vector<float> normals;
