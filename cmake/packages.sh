@@ -2,7 +2,7 @@
 # "a|b" stands for the first of them that the release has; "a?" is optional and is installed if the release has it.
 
 build_packages="g++ cmake ninja-build pkg-config python3-glad libeigen3-dev libtbb-dev libegl1 libgl1-mesa-dri libassimp-dev libstb-dev
-libdeflate-dev libopenexr-dev libqhull-dev libxxhash-dev libzstd-dev nlohmann-json3-dev libcli11-dev libfmt-dev libcpp-httplib-dev
+libembree-dev libglm-dev libdeflate-dev libopenexr-dev libqhull-dev libxxhash-dev libzstd-dev nlohmann-json3-dev libcli11-dev libfmt-dev libcpp-httplib-dev
 libturbojpeg0-dev ffmpeg
 libdraco-dev? libmeshoptimizer-dev? libwebp-dev?
 libosmesa6? mold? ccache?"

@@ -29,7 +29,11 @@ ClothPass::ClothPass()
     : shadow_({"frame.glsl", "cloth.vert"}, {}, {"SHADOW 1"}),
       sheer_shadow_(make_sheer_shadow({"SHADOW 1", "SHEER 1"})),
       textured_sheer_shadow_(make_sheer_shadow({"SHADOW 1", "SHEER 1", "TEXTURED 1"})),
-      depth_({"frame.glsl", "cloth.vert"}, {}, {}) {}
+      depth_({"frame.glsl", "cloth.vert"}, {}, {}),
+      surface_({"frame.glsl", "cloth.vert"},
+               {"frame.glsl", "sky.glsl", "light.glsl", "material.glsl", "noise.glsl", "surface.glsl",
+                "fabric.glsl", "cloth.frag"},
+               {"FLAT 1", "WEAVE 0", "SURFACE 1"}) {}
 
 void ClothPass::prepare(Cloth& cloth) {
   if (cloth.vertex_array == 0) cloth.vertex_array = make_layout();
@@ -90,6 +94,8 @@ gl::LazyProgram& ClothPass::program(const GpuMaterial& material, const Features&
   if (sheer) {
     defines.push_back("SHEER 1");
     fragment.push_back("sheer.glsl");
+  } else {
+    fragment.push_back("traced.glsl");
   }
   fragment.insert(fragment.end(), {"fabric.glsl", "cloth.frag"});
   const std::vector<std::string_view> vertex = {"frame.glsl", "cloth.vert"};
@@ -98,6 +104,14 @@ gl::LazyProgram& ClothPass::program(const GpuMaterial& material, const Features&
 
 void ClothPass::draw(const Cloth& cloth, const Features& features) {
   program(*cloth.material, features).use();
+  glDisable(GL_CULL_FACE);
+  glFrontFace(GL_CCW);
+  bind(cloth, 0);
+  draw_triangles(cloth);
+}
+
+void ClothPass::draw_surface(const Cloth& cloth) {
+  surface_.use();
   glDisable(GL_CULL_FACE);
   glFrontFace(GL_CCW);
   bind(cloth, 0);

@@ -41,6 +41,8 @@ class ClothPass {
   /// Draws the depth of an opaque cloth into the picture. It is exactly the surface that `draw` shades.
   void draw_depth(const Cloth& cloth);
   void draw(const Cloth& cloth, const Features& features);
+  /// Writes the surface of an opaque cloth for the tracer of light.
+  void draw_surface(const Cloth& cloth);
 
  private:
   static void bind(const Cloth& cloth, GLint texture_from_uv);
@@ -49,7 +51,7 @@ class ClothPass {
 
   std::map<std::tuple<Weave, Pattern, bool, bool, Features>, gl::LazyProgram>
       programs_;  ///< keyed also by textured, sheer
-  gl::LazyProgram shadow_, sheer_shadow_, textured_sheer_shadow_, depth_;
+  gl::LazyProgram shadow_, sheer_shadow_, textured_sheer_shadow_, depth_, surface_;
 };
 
 }  // namespace offstage::render

@@ -18,13 +18,11 @@ using Eigen::Matrix4f;
 
 /// A lamp of a sub-frame, in the layout that shaders/lamps.glsl reads.
 struct LampUniforms {
-  Vector4f position = Vector4f::Zero();   ///< w: radius
-  Vector4f intensity = Vector4f::Zero();  ///< w: 0 no shadow, 1 shadow in a cone, 2 all around
+  Vector4f position = Vector4f::Zero();  ///< w: radius
+  Vector4f intensity = Vector4f::Zero();
   Vector4f direction = Vector4f::Zero();  ///< w: factor of the cosine to this direction
   Vector4f right = Vector4f::Zero();      ///< w: offset; factor * cosine + offset, clamped to [0, 1], is the
                                           ///< share of light in that direction
-  Vector4f up = Vector4f::Zero();         ///< w: tangent of half the angle of a tile of the shadow map
-  Vector4f block = Vector4f::Zero();  ///< first corner in the shadow map, size of a tile, texels of a tile
 };
 
 /// The uniform block of shaders/frame.glsl, in std140 layout. Matrices come first because Eigen aligns them

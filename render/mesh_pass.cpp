@@ -25,17 +25,7 @@ constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1, kDetailBinding = 2;
 constexpr GLuint kSecondUv = 6, kColor = 7, kTangent = 8;  // attributes
 constexpr GLuint kMaterialBlock = 1;
 constexpr std::array<GLuint, kTextureMaps> kTextureUnits = {1, 2, 3, 14, 15, 16, 17};
-constexpr float kSmooth = 0.3f;        // with less roughness, a surface shows a mirror image of the scene
-constexpr GLsizei kFewIndices = 1200;  // number of indices of a mesh that is cheap to draw again
-constexpr float kMirrorSteps = 14;     // steps along the ray in the search for a mirror image
-
-// Number of pixels for which a second, simpler program is worth building.
-constexpr int kManyPixels = 100'000;
-// Number of pixels beyond the occluded area at which occlusion is still read.
-constexpr int kOpennessReach_px = 6;
-// Sine of the sun's height over a plane below which shadows count as endless.
-constexpr float kGrazing = 0.05f;
-
+constexpr float kSmooth = 0.3f;  // with less roughness, a surface shows a mirror image of the scene
 // The first three rows of a transform.
 using Rows = std::array<Vector4f, 3>;
 
@@ -48,35 +38,6 @@ const Image* texture_at(std::span<const Image> textures, int index) {
   return index >= 0 && static_cast<std::size_t>(index) < textures.size()
              ? &textures[static_cast<std::size_t>(index)]
              : nullptr;
-}
-
-Vector3f corner(const Eigen::AlignedBox3f& box, int k) {
-  return box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k));
-}
-
-/// The pixels of an area, enlarged by `reach_px`, within a picture of the given size.
-Eigen::AlignedBox2i around(const ScreenArea& area, int reach_px, int width_px, int height_px) {
-  if (area.empty()) return {};
-  const Eigen::AlignedBox2i pixels = area.pixels(width_px, height_px);
-  return {(pixels.min().array() - reach_px).max(0).matrix(),
-          (pixels.max().array() + reach_px).min(Eigen::Array2i(width_px, height_px)).matrix()};
-}
-
-/// Greatest slope of a surface with this pattern, except at the edges of its stones; none if the slope is too
-/// large for recognizable mirror images.
-std::optional<float> unevenness_of(Pattern pattern) {
-  switch (pattern) {
-    case Pattern::none:
-    case Pattern::checker:
-    case Pattern::grid:
-    case Pattern::stripes:
-    case Pattern::gingham:
-      return 0.0f;
-    case Pattern::paving:
-      return 0.05f;
-    default:
-      return std::nullopt;
-  }
 }
 
 /// Whether each edge is used once in either direction; corners at the same position count as one.
@@ -159,6 +120,7 @@ GpuMesh::GpuMesh(const Mesh& source) : vertex_array(gl::make_vertex_array()) {
     flat_normal = Vector3f::Unit(axis);
   }
 
+  rays = std::make_unique<RayMesh>(*mesh, mesh->normals);
   index_count = static_cast<GLsizei>(mesh->indices.size());
   if (index_count == 0) return;
   vertices = gl::make_buffer(std::span<const Vertex>(packed));
@@ -188,6 +150,7 @@ void bind_material(const GpuMaterial& material, GLuint white) {
 
 GpuMaterial make_gpu_material(const Material& material, std::span<const Image> textures) {
   GpuMaterial result;
+  result.rays = std::make_unique<RayMaterial>(material, textures);
   MaterialUniforms uniforms;
   uniforms.color = material.color;
   uniforms.pattern_color << material.pattern_color, std::max(material.pattern_scale, 1e-4f);
@@ -232,8 +195,7 @@ GpuMaterial make_gpu_material(const Material& material, std::span<const Image> t
   result.thin = material.thin;
   result.casts = material.color.w() > 0;
   result.glass = material.transmission > 0 && !result.blended;
-  result.smooth = !result.glass && !result.blended && !material.unlit && material.roughness < kSmooth;
-  result.metal = material.metallic > 0.5f;
+  result.smooth = material.roughness < kSmooth || material.metallic > 0.5f;
   return result;
 }
 
@@ -333,7 +295,10 @@ void MeshPass::draw(const Batch& batch, const gl::StreamBuffer& rows, Detail det
 
 gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) {
   const GpuMaterial& material = *batch.material;
-  const auto key = std::make_tuple(material.pattern, material.textured, material.detailed, material.glass,
+  // The relief of a pattern is visible only in mirror images; without them its surface is quick to draw.
+  const bool surface = shading == Shading::surface;
+  const Pattern pattern = surface && !material.smooth ? Pattern::none : material.pattern;
+  const auto key = std::make_tuple(pattern, material.textured, material.detailed, material.glass,
                                    batch.mesh->endless, shading, features_);
   const auto found = surface_programs_.find(key);
   if (found != surface_programs_.end()) return found->second;
@@ -341,20 +306,23 @@ gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) 
   defines.push_back("FLAT 1");
   std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "light.glsl", "lamps.glsl",
                                             "material.glsl"};
+  if (surface) {
+    defines.push_back("SURFACE 1");
+    fragment = {"frame.glsl", "sky.glsl", "light.glsl", "material.glsl", "surface.glsl"};
+  }
+  if (shading == Shading::traced) {
+    defines.push_back("TRACED 1");
+    fragment.push_back("traced.glsl");
+  }
   if (material.textured) defines.push_back("TEXTURED 1");
   if (material.detailed) defines.push_back("DETAILED 1");
   if (batch.mesh->endless) defines.push_back("ENDLESS 1");
-  if (shading == Shading::unhidden) defines.push_back("UNHIDDEN 1");
-  if (shading == Shading::mirror) {
-    defines.push_back("MIRROR 1");
-    fragment.push_back("mirror.glsl");
-  }
-  if (material.glass) {
+  if (material.glass && !surface) {
     defines.push_back("GLASS 1");
     fragment.push_back("glass.glsl");
   }
-  if (material.pattern != Pattern::none) {
-    defines.push_back("PATTERN " + std::to_string(static_cast<int>(material.pattern)));
+  if (pattern != Pattern::none) {
+    defines.push_back("PATTERN " + std::to_string(static_cast<int>(pattern)));
     fragment.insert(fragment.end(), {"noise.glsl", "pattern.glsl"});
   }
   fragment.push_back("mesh.frag");
@@ -387,17 +355,6 @@ void MeshPass::set_facing(const Batch& batch, bool both_sides) {
   glFrontFace(batch.mirrored ? GL_CW : GL_CCW);
 }
 
-void MeshPass::draw_depth(const Matrix4f& clip_from_world) {
-  for (const Batch& batch : opaque_) {
-    const bool holes = batch.material->cut_out;
-    (holes ? detailed_shadow_ : opaque_shadow_).use();
-    glUniformMatrix4fv(0, 1, GL_FALSE, clip_from_world.data());
-    if (holes) bind_material(*batch.material, white_);
-    set_facing(batch, batch.material->two_sided);
-    draw(batch, rows_, holes ? Detail::full : Detail::coarse);
-  }
-}
-
 void MeshPass::draw_batch(const Batch& batch, Shading shading) {
   constexpr float kOpaqueAlpha = 0.99f;
   surface_program(batch, shading).use();
@@ -407,167 +364,17 @@ void MeshPass::draw_batch(const Batch& batch, Shading shading) {
   draw(batch, rows_);
 }
 
-void MeshPass::draw_opaque(const View& view, const Occluders& occluders, int width_px, int height_px) {
-  for (const Batch& batch : opaque_) {
-    const Eigen::AlignedBox2i hidden =
-        around(hidden_area(batch, view, occluders), kOpennessReach_px, width_px, height_px);
-    const int inside_px = hidden.isEmpty() ? 0 : hidden.sizes().prod();
-    if (width_px * height_px - inside_px < kManyPixels) {
-      draw_batch(batch, Shading::whole);
-      continue;
-    }
-    glEnable(GL_SCISSOR_TEST);
-    const auto draw_within = [&](int x0, int y0, int x1, int y1, Shading shading) {
-      if (x0 >= x1 || y0 >= y1) return;
-      glScissor(x0, y0, x1 - x0, y1 - y0);
-      draw_batch(batch, shading);
-    };
-    const Eigen::Vector2i low = hidden.isEmpty() ? Eigen::Vector2i(0, 0) : Eigen::Vector2i(hidden.min()),
-                          high = hidden.isEmpty() ? Eigen::Vector2i(0, 0) : Eigen::Vector2i(hidden.max());
-    draw_within(low.x(), low.y(), high.x(), high.y(), Shading::whole);
-    draw_within(0, 0, width_px, low.y(), Shading::unhidden);
-    draw_within(0, low.y(), low.x(), high.y(), Shading::unhidden);
-    draw_within(high.x(), low.y(), width_px, high.y(), Shading::unhidden);
-    draw_within(0, high.y(), width_px, height_px, Shading::unhidden);
-    glDisable(GL_SCISSOR_TEST);
-  }
+void MeshPass::draw_opaque(Shading shading) {
+  for (const Batch& batch : opaque_) draw_batch(batch, shading);
   for (const Batch& batch : translucent_) {
-    if (batch.material->blended && batch.material->textured) draw_batch(batch, Shading::whole);
+    if (batch.material->blended && batch.material->textured) draw_batch(batch, shading);
   }
-}
-
-// Only floors, walls and metal. Curved lacquer mirrors only in a thin region at its outline, which does not
-// justify drawing many triangles.
-bool MeshPass::mirrors(const Batch& batch) {
-  return batch.material->smooth &&
-         (batch.material->metal || batch.mesh->flat || batch.mesh->index_count <= kFewIndices);
-}
-
-ScreenArea MeshPass::occluded_area(const View& view, float reach,
-                                   std::span<const Eigen::AlignedBox3f> others) const {
-  ScreenArea area(view, reach);
-  if (std::ranges::count_if(seen_, [](const Instance* instance) { return instance->mesh->flat; }) > 1)
-    area.add_all();
-  for (const Instance* instance : seen_) {
-    if (instance->mesh->flat) continue;
-    for (int k = 0; k < 8; ++k) area.add(instance->world_from_mesh * corner(instance->mesh->box, k));
-  }
-  for (const Eigen::AlignedBox3f& box : others)
-    for (int k = 0; k < 8; ++k) area.add(corner(box, k));
-  return area;
-}
-
-// For a plane: the part of the picture in which light may be hidden; for other meshes the whole picture.
-ScreenArea MeshPass::hidden_area(const Batch& batch, const View& view, const Occluders& occluders) const {
-  ScreenArea area(view, 0);
-  const auto flat = [](const Instance* instance) { return instance->mesh->flat; };
-  const bool alone = occluders.sky_reach_m <= 0 || std::ranges::count_if(seen_, flat) == 1;
-  const Instance& plane = *seen_[batch.first];
-  const Vector3f normal =
-      (plane.world_from_mesh.linear().inverse().transpose() * batch.mesh->flat_normal).normalized();
-  const Vector3f place = plane.world_from_mesh * batch.mesh->center;
-  const float slant = normal.dot(occluders.to_sun);
-  if (!batch.mesh->flat || batch.count > 1 || !alone ||
-      (occluders.shadow_reach_m > 0 && std::abs(slant) < kGrazing)) {
-    area.add_all();
-    return area;
-  }
-  using Corners = std::array<Vector3f, 8>;
-  const auto height = [&](const Vector3f& p) { return normal.dot(p - place); };
-  const auto add_around = [&](const Corners& corners, const Vector3f& direction, float reach) {
-    const Vector3f u = reach * normal.unitOrthogonal(), v = normal.cross(u);
-    for (const Vector3f& p : corners) {
-      const Vector3f q = p - height(p) / normal.dot(direction) * direction;
-      for (const float side : {-1.0f, 1.0f}) {
-        area.add(q + u + side * v);
-        area.add(q - u + side * v);
-      }
-    }
-  };
-  const auto hide_sky = [&](const Corners& corners) {
-    const auto is_far = [&](float side) {
-      return std::ranges::all_of(corners,
-                                 [&](const Vector3f& p) { return side * height(p) > occluders.sky_reach_m; });
-    };
-    if (!is_far(1) && !is_far(-1)) add_around(corners, normal, occluders.sky_reach_m);
-  };
-  const auto corners_of = [](const Instance& instance) {
-    Corners corners;
-    for (int k = 0; k < 8; ++k)
-      corners[static_cast<std::size_t>(k)] = instance.world_from_mesh * corner(instance.mesh->box, k);
-    return corners;
-  };
-  const auto corners_of_box = [](const Eigen::AlignedBox3f& box) {
-    Corners corners;
-    for (int k = 0; k < 8; ++k) corners[static_cast<std::size_t>(k)] = corner(box, k);
-    return corners;
-  };
-  if (occluders.sky_reach_m > 0) {
-    for (const Instance* instance : seen_)
-      if (instance != &plane) hide_sky(corners_of(*instance));
-    for (const Eigen::AlignedBox3f& box : occluders.solid) hide_sky(corners_of_box(box));
-  }
-  if (occluders.shadow_reach_m > 0) {
-    const float reach = occluders.shadow_reach_m / std::abs(slant);
-    for (const Instance* instance : casting_) add_around(corners_of(*instance), occluders.to_sun, reach);
-    for (const Eigen::AlignedBox3f& box : occluders.casting)
-      add_around(corners_of_box(box), occluders.to_sun, reach);
-  }
-  return area;
-}
-
-ScreenArea MeshPass::mirrored_area(const Batch& batch, const View& view, float reach,
-                                   std::span<const Eigen::AlignedBox3f> others) const {
-  const std::optional<float> unevenness = unevenness_of(batch.material->pattern);
-  // Rays deviate from the mirrored direction by twice the slope, and by the spread of the roughness.
-  ScreenArea area(view, (2 * unevenness.value_or(0) + 0.5f * kSmooth * kSmooth) * reach);
-  if (!batch.mesh->flat || batch.count > 1 || !unevenness) {
-    area.add_all();
-    return area;
-  }
-  const Instance& mirror = *seen_[batch.first];
-  const Vector3f normal =
-      (mirror.world_from_mesh.linear().inverse().transpose() * batch.mesh->flat_normal).normalized();
-  const Vector3f place = mirror.world_from_mesh * batch.mesh->center;
-  const auto add = [&](const Vector3f& p) { area.add(p - 2 * normal.dot(p - place) * normal); };
-  for (const Instance* instance : seen_) {
-    if (instance == &mirror) continue;
-    for (int k = 0; k < 8; ++k) add(instance->world_from_mesh * corner(instance->mesh->box, k));
-  }
-  for (const Eigen::AlignedBox3f& box : others)
-    for (int k = 0; k < 8; ++k) add(corner(box, k));
-  return area;
-}
-
-bool MeshPass::find_mirrors(const View& view, float reach, std::span<const Eigen::AlignedBox3f> others,
-                            int width_px, int height_px) {
-  mirrors_.clear();
-  for (const Batch& batch : opaque_) {
-    if (!mirrors(batch)) continue;
-    const ScreenArea area = mirrored_area(batch, view, reach, others);
-    if (!area.empty()) mirrors_.push_back({&batch, area.pixels(width_px, height_px)});
-  }
-  return !mirrors_.empty();
-}
-
-void MeshPass::draw_mirrors(float reach) {
-  glEnable(GL_SCISSOR_TEST);
-  for (const auto& [batch, area] : mirrors_) {
-    surface_program(*batch, Shading::mirror).use();
-    glUniform1f(0, 0);
-    glUniform2f(2, reach, kMirrorSteps);
-    set_facing(*batch, batch->material->two_sided);
-    bind_material(*batch->material, white_);
-    glScissor(area.min().x(), area.min().y(), area.sizes().x(), area.sizes().y());
-    draw(*batch, rows_);
-  }
-  glDisable(GL_SCISSOR_TEST);
 }
 
 void MeshPass::draw_translucent(std::size_t k) {
   constexpr float kVisibleAlpha = 1.0f / 512;
   const Batch& batch = translucent_[k];
-  surface_program(batch).use();
+  surface_program(batch, Shading::forward).use();
   glUniform1f(0, batch.material->glass ? 0 : kVisibleAlpha);
   if (batch.material->glass) glUniform1f(1, batch.material->thin ? 0 : batch.thickness);
   set_facing(batch, batch.material->two_sided);

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <tuple>
@@ -14,6 +15,7 @@
 #include "render/frame.h"
 #include "render/gl.h"
 #include "render/shadow_map.h"
+#include "render/trace/ray_scene.h"
 
 namespace offstage::render {
 
@@ -32,6 +34,7 @@ struct GpuMesh {
   bool round = false;    ///< fills the ball inscribed in its box
   bool boxy = false;     ///< fills its box, except for a bevel
   Vector3f flat_normal = {0, 0, 0};
+  std::unique_ptr<const RayMesh> rays;  ///< the same for light rays
   bool closed = false;  ///< every edge has two triangles, so the front faces hide the back faces
 };
 
@@ -53,10 +56,10 @@ struct GpuMaterial {
   bool thin = false;
   bool two_sided = false;
   bool blended = false;
-  bool casts = true;    ///< false if fully transparent
-  bool glass = false;   ///< light goes through and is refracted
-  bool smooth = false;  ///< smooth enough to mirror the scene
-  bool metal = false;
+  bool casts = true;                        ///< false if fully transparent
+  bool glass = false;                       ///< light goes through and is refracted
+  bool smooth = false;                      ///< mirrors the scene
+  std::unique_ptr<const RayMaterial> rays;  ///< the same for light rays
 
   /// Whether objects behind the surface are visible through it.
   bool lets_through() const { return blended || glass; }
@@ -84,17 +87,6 @@ struct Instance {
   bool is_ground() const;
 };
 
-/// Objects that can hide light from surfaces, and the distance at which they do; 0 disables the effect.
-struct Occluders {
-  float sky_reach_m = 0;
-  /// Boxes around other objects that hide the sky, in addition to the instances.
-  std::vector<Eigen::AlignedBox3f> solid;
-  Vector3f to_sun = Vector3f::UnitY();
-  float shadow_reach_m = 0;  ///< reach of shadows, measured across the light
-  /// Boxes around other objects that cast shadows, in addition to the instances.
-  std::vector<Eigen::AlignedBox3f> casting;
-};
-
 class MeshPass {
  public:
   MeshPass();
@@ -103,23 +95,16 @@ class MeshPass {
   /// Draws casters into a shadow map. `front_only`: of closed opaque meshes, only the faces that the light
   /// reaches; the matrix must then not mirror.
   void draw_shadows(const Matrix4f& shadow_clip_from_world, bool front_only);
-  /// Draws only the depth of fully opaque instances, so that hidden surfaces are not shaded.
-  void draw_depth(const Matrix4f& clip_from_world);
-  /// Draws the opaque instances. Parts of a plane where nothing can hide light are shaded by a simpler
-  /// program, if they cover enough of a picture of this size.
-  void draw_opaque(const View& view, const Occluders& occluders, int width_px, int height_px);
-  /// The area of the picture where opaque surfaces can hide the sky within `reach` [m]: around all of them
-  /// except planes. `others`: boxes around opaque objects in addition to the instances.
-  ScreenArea occluded_area(const View& view, float reach, std::span<const Eigen::AlignedBox3f> others) const;
+  enum class Shading {
+    surface,  ///< writes surfaces for the tracer of light
+    traced,   ///< in the light that was traced
+    forward   ///< without traced light: translucent bodies
+  };
+  /// Draws the opaque instances, and the opaque parts of blended ones.
+  void draw_opaque(Shading shading);
   GLuint white() const { return white_; }
   /// Translucent instances, in the order of the instances.
   std::span<const Instance* const> translucent() const { return see_through_; }
-  /// Finds the surfaces that mirror parts of the scene, and their area in a picture of the given size.
-  /// Returns false if there are none. `reach`: largest distance of mirrored objects [m]. `others` as above.
-  bool find_mirrors(const View& view, float reach, std::span<const Eigen::AlignedBox3f> others, int width_px,
-                    int height_px);
-  /// Adds the mirrored light to the picture, whose framebuffer and depth are bound.
-  void draw_mirrors(float reach);
   /// Draws one of `translucent`. Glass reads the scene behind it from a copy of the picture that is bound.
   void draw_translucent(std::size_t k);
   /// Draws only the depth of one of `translucent`, by the picture's matrix.
@@ -138,15 +123,10 @@ class MeshPass {
     float thickness;  ///< thickness of its first instance, in the world
   };
   void draw(const Batch& batch, const gl::StreamBuffer& rows, Detail detail = Detail::full);
-  enum class Shading { whole, unhidden, mirror };
-  gl::LazyProgram& surface_program(const Batch& batch, Shading shading = Shading::whole);
+  gl::LazyProgram& surface_program(const Batch& batch, Shading shading);
   gl::LazyProgram& shadow_program(const GpuMaterial& material);
   static void set_facing(const Batch& batch, bool both_sides);
   void draw_batch(const Batch& batch, Shading shading);
-  static bool mirrors(const Batch& batch);
-  ScreenArea hidden_area(const Batch& batch, const View& view, const Occluders& occluders) const;
-  ScreenArea mirrored_area(const Batch& batch, const View& view, float reach,
-                           std::span<const Eigen::AlignedBox3f> others) const;
 
   /// Keyed by textured, detailed, glass, endless.
   std::map<std::tuple<Pattern, bool, bool, bool, bool, Shading, Features>, gl::LazyProgram> surface_programs_;
@@ -158,11 +138,6 @@ class MeshPass {
   std::vector<const Instance*> seen_;         ///< opaque instances, in the order of the rows
   std::vector<const Instance*> see_through_;  ///< instances of translucent_
   std::vector<const Instance*> casting_;      ///< casters, in the order of the rows
-  struct Mirror {
-    const Batch* batch;
-    Eigen::AlignedBox2i area_px;
-  };
-  std::vector<Mirror> mirrors_;
 };
 
 }  // namespace offstage::render

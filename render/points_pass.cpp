@@ -65,7 +65,7 @@ PointsPass::Programs& PointsPass::programs(PointStyle style, const Features& fea
                                                 "points.vert"};
   std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "points_shape.glsl", "points.frag"};
   if (style == PointStyle::sphere)
-    fragment = {"frame.glsl", "sky.glsl", "light.glsl", "lamps.glsl", "sphere.frag"};
+    fragment = {"frame.glsl", "sky.glsl", "light.glsl", "lamps.glsl", "traced.glsl", "sphere.frag"};
   std::vector<std::string> defines = features;
   defines.push_back(define);
   return programs_
@@ -74,7 +74,9 @@ PointsPass::Programs& PointsPass::programs(PointStyle style, const Features& fea
                         {{"frame.glsl", "points.vert"},
                          {"frame.glsl", "points_shape.glsl", "points_shadow.frag"},
                          {define, "SHADOW 1"}},
-                        {vertex, fragment, {define, "DEPTH 1"}}})
+                        {vertex,
+                         {"frame.glsl", "sky.glsl", "light.glsl", "surface.glsl", "sphere.frag"},
+                         {define, "SURFACE 1"}}})
       .first->second;
 }
 
@@ -143,11 +145,6 @@ void PointsPass::draw_shadow(const PointSet& set, const Matrix4f& shadow_clip_fr
   draw(set, 0);
 }
 
-void PointsPass::draw_depth(const PointSet& set) {
-  programs(set.def.style).depth.use();
-  draw(set, set.unseen);
-}
-
 void PointsPass::draw_spheres(const PointSet& set, const Features& features) {
   programs(PointStyle::sphere, features).seen.use();
   glUniform2f(2, set.def.metallic, set.def.roughness);
@@ -161,6 +158,12 @@ void PointsPass::draw_blended(PointStyle style, uint32_t first, uint32_t last, c
   glVertexArrayVertexBuffer(blended_array_, 0, blended_buffer_, offset, sizeof(BlendedPoint));
   glBindVertexArray(blended_array_);
   glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(last - first));
+}
+
+void PointsPass::draw_surfaces(const PointSet& set) {
+  programs(PointStyle::sphere).surface.use();
+  glUniform2f(2, set.def.metallic, set.def.roughness);
+  draw(set, set.unseen);
 }
 
 }  // namespace offstage::render

@@ -4,10 +4,12 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <vector>
 
 #include "render/frame.h"
 #include "render/gl.h"
+#include "render/trace/ray_material.h"
 
 namespace offstage::render {
 
@@ -32,6 +34,7 @@ struct PointSet {
                             ///< visible ones by depth
   std::size_t unseen = 0;   ///< number of balls outside the view
   uint32_t object = 0;      ///< id in Channels
+  std::unique_ptr<const RayMaterial> rays;  ///< of balls, for light rays
 
   void assign(std::span<const Point> values);
   /// Smoke and fire, which PuffsPass draws; StreaksPass draws streaks.
@@ -53,9 +56,9 @@ class PointsPass {
   /// Uploads the sprites and flakes of all sets.
   void prepare_blended(const PaintOrder& order);
   void draw_shadow(const PointSet& set, const Matrix4f& shadow_clip_from_world);
-  /// Draws only the depth of balls.
-  void draw_depth(const PointSet& set);
   void draw_spheres(const PointSet& set, const Features& features);
+  /// Writes the surfaces of balls for the tracer of light.
+  void draw_surfaces(const PointSet& set);
   /// Draws sprites or flakes; `first` and `last` are their keys in the PaintOrder.
   void draw_blended(PointStyle style, uint32_t first, uint32_t last, const Features& features);
   /// Makes the program of channels_ball.frag current, so that its uniforms can be set before the draw.
@@ -66,7 +69,7 @@ class PointsPass {
   void draw(const PointSet& set, std::size_t first);
 
   struct Programs {
-    gl::LazyProgram seen, shadow, depth;
+    gl::LazyProgram seen, shadow, surface;
   };
   Programs& programs(PointStyle style, const Features& features = {});
 

@@ -9,9 +9,9 @@
 #include "render/frame.h"
 #include "render/gl.h"
 #include "render/lamps.h"
+#include "render/light_pass.h"
 #include "render/lines_pass.h"
 #include "render/mesh_pass.h"
-#include "render/occlusion_pass.h"
 #include "render/paint_order.h"
 #include "render/picture_copy.h"
 #include "render/points_pass.h"
@@ -25,9 +25,6 @@ namespace offstage::render {
 namespace {
 
 constexpr GLuint kFrameBlock = 0, kSceneDepthUnit = 4, kBehindUnit = 12;
-constexpr float kMirrorReach = 0.6f;  // greatest distance of mirrored objects, in the same unit
-// Greatest distance of objects that hide the sky, as a share of the distance to the target.
-constexpr float kReach = 0.1f;
 
 /// Colour and depth of the picture.
 struct Picture {
@@ -35,7 +32,6 @@ struct Picture {
   gl::Framebuffer framebuffer;
   PictureCopy depth_copy;  ///< for particles and mirrors
   PictureCopy behind;      ///< for glass and mirrors
-  gl::Framebuffer copies;  ///< for both copies; created when something is drawn only in them
 
   Picture(int width_px, int height_px)
       : color(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)),
@@ -74,6 +70,7 @@ struct Stage::Impl {
   Sun sun;
   Environment environment;
   std::vector<Lamp> lamps;
+  std::vector<Lamp> shining;  ///< lamps and fires of this sub-frame
   float time = 0;
   Features features;  ///< of this sub-frame
 
@@ -86,8 +83,7 @@ struct Stage::Impl {
 
   Picture picture;
   ShadowMap shadow_map;
-  OcclusionPass occlusion_pass;
-  LampPass lamp_pass;
+  LightPass light_pass;
   MeshPass mesh_pass;
   ClothPass cloth_pass;
   PointsPass points_pass;
@@ -107,7 +103,7 @@ struct Stage::Impl {
       : def(stage_def),
         picture(def.width_px, def.height_px),
         shadow_map(def.shadow_map_px),
-        occlusion_pass(def.width_px, def.height_px),
+        light_pass(def.width_px, def.height_px, picture.depth),
         puffs_pass(def.width_px, def.height_px),
         streaks_pass(def.width_px, def.height_px),
         surface_probe(def.width_px, def.height_px),
@@ -124,15 +120,12 @@ struct Stage::Impl {
   std::vector<const Cloth*> prepare_cloths();
   void draw_shadows(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
                     std::span<PointSet* const> sets, const View& view, const SampleOffsets& offsets,
-                    FrameUniforms& frame, Occluders& occluders);
+                    FrameUniforms& frame);
   void prepare_lamps(std::span<PointSet* const> sets, const SampleOffsets& offsets, FrameUniforms& frame);
-  void draw_lamp_shadows(std::span<const Caster> casters, std::span<const Cloth* const> sheets);
-  void draw_mirrors(std::span<const Cloth* const> sheets, const View& view,
-                    std::span<const Eigen::AlignedBox3f> others);
-  void draw_sheer_in_copies(std::span<const Cloth* const> sheets);
-  void draw_depth(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view);
-  void draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets, const View& view,
-                   const Occluders& occluders);
+  void trace_light(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
+                   std::span<PointSet* const> sets, const View& view, const SampleOffsets& offsets);
+  void draw_surfaces(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets);
+  void draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets);
   std::vector<TranslucentBody> find_bodies(std::span<const Cloth* const> sheets, const View& view,
                                            std::vector<Region>& regions);
   void draw_translucent(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets,
@@ -168,7 +161,7 @@ std::vector<const Cloth*> Stage::Impl::prepare_cloths() {
 
 void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
                                std::span<PointSet* const> sets, const View& view,
-                               const SampleOffsets& offsets, FrameUniforms& frame, Occluders& occluders) {
+                               const SampleOffsets& offsets, FrameUniforms& frame) {
   std::vector<Caster> casters;
   for (const Instance* instance : shown) {
     if (instance->visible && instance->casts_shadow && instance->mesh->index_count > 0 &&
@@ -177,7 +170,7 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
     }
   }
   const std::size_t balls = casters.size();
-  std::vector<Eigen::AlignedBox3f>& boxes = occluders.casting;
+  std::vector<Eigen::AlignedBox3f> boxes;
   for (const Cloth* cloth : sheets) {
     if (cloth->casts_shadow) boxes.push_back(cloth->surface.box());
   }
@@ -206,10 +199,7 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
     shadow_map.mark(shadow, std::span(casters).first(balls), boxes);
   }
   upload(frame);
-  draw_lamp_shadows(casters, sheets);
   if (shadow.texel_m == 0) return;
-  occluders.to_sun = frame.sun_direction.head<3>();
-  occluders.shadow_reach_m = search_m(shadow);
 
   shadow_map.begin();
   mesh_pass.draw_shadows(shadow.clip_from_world, true);
@@ -224,99 +214,71 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
 
 void Stage::Impl::prepare_lamps(std::span<PointSet* const> sets, const SampleOffsets& offsets,
                                 FrameUniforms& frame) {
-  std::vector<Lamp> all = lamps;
+  shining = lamps;
   for (const PointSet* set : sets)
-    if (set->def.style == PointStyle::fire) all.push_back(lamp_of_fire(*set));
-  lamp_pass.prepare(all, offsets, frame);
+    if (set->def.style == PointStyle::fire) shining.push_back(lamp_of_fire(*set));
+  prepare_lamp_uniforms(shining, offsets, frame);
   frame.air.y() = time;
   features.clear();
   if (puffs_pass.shades()) features.push_back("SMOKE 1");
   if (frame.air.x() > 0) features.push_back("LAMPS 1");
 }
 
-void Stage::Impl::draw_lamp_shadows(std::span<const Caster> casters, std::span<const Cloth* const> sheets) {
-  if (lamp_pass.tiles().empty()) return;
-  lamp_pass.begin();
-  for (const LampPass::Tile& tile : lamp_pass.tiles()) {
-    if (std::none_of(casters.begin(), casters.end(), [&](const Caster& c) { return tile.sees(c); })) continue;
-    lamp_pass.begin(tile);
-    mesh_pass.draw_shadows(tile.clip_from_world, false);
-    for (const Cloth* cloth : sheets)
-      if (cloth->casts_shadow) cloth_pass.draw_shadow(*cloth, tile.clip_from_world);
-  }
-  lamp_pass.end();
-}
-
-// Mirrors also show sheer cloth, which is not in the picture yet.
-void Stage::Impl::draw_sheer_in_copies(std::span<const Cloth* const> sheets) {
-  if (std::ranges::none_of(sheets, [](const Cloth* cloth) { return cloth->is_translucent(); })) return;
-  if (picture.copies == 0)
-    picture.copies = gl::make_framebuffer(picture.behind.texture(), picture.depth_copy.texture());
-  glBindFramebuffer(GL_FRAMEBUFFER, picture.copies);
-  glEnable(GL_BLEND);
-  glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
-  for (const Cloth* cloth : sheets)
-    if (cloth->is_translucent()) cloth_pass.draw(*cloth, features);
-  glDisable(GL_BLEND);
+// Depth and surfaces of everything opaque. The depth also limits later shading to what is visible.
+void Stage::Impl::draw_surfaces(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets) {
   glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
-  picture.depth_copy.change_all();
-}
-
-void Stage::Impl::draw_mirrors(std::span<const Cloth* const> sheets, const View& view,
-                               std::span<const Eigen::AlignedBox3f> others) {
-  const float reach = kMirrorReach * (camera.target - camera.eye).norm();
-  if (!mesh_pass.find_mirrors(view, reach, others, def.width_px, def.height_px)) return;
-  picture.depth_copy.update_all(picture.depth);
-  picture.behind.update_all(picture.color);
-  draw_sheer_in_copies(sheets);
-  glDepthFunc(GL_GEQUAL);  // over themselves
-  glDepthMask(GL_FALSE);
-  glEnable(GL_BLEND);
-  glBlendFunc(GL_ONE, GL_ONE);
-  mesh_pass.draw_mirrors(reach);
-  glDisable(GL_BLEND);
-  glDepthMask(GL_TRUE);
-  glDepthFunc(GL_GREATER);
-  picture.behind.change_all();
-}
-
-void Stage::Impl::draw_depth(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets,
-                             const View& view) {
-  glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
-  glViewport(0, 0, def.width_px, def.height_px);
-  glEnable(GL_DEPTH_TEST);
-  glDepthMask(GL_TRUE);
-  glDepthFunc(GL_GREATER);
-  glDisable(GL_BLEND);
   const float nothing[4] = {0, 0, 0, 0};
+  glDepthMask(GL_TRUE);
   glClearNamedFramebufferfv(picture.framebuffer, GL_COLOR, 0, nothing);
   glClearNamedFramebufferfv(picture.framebuffer, GL_DEPTH, 0, nothing);
-
-  // The depth is moved back slightly, on steep faces by half of a pixel's depth, so that rounding never hides
-  // a surface from its own shading.
-  glEnable(GL_POLYGON_OFFSET_FILL);
-  glPolygonOffset(-0.5f, -4);
-  glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
-  glDisable(GL_CULL_FACE);
+  light_pass.begin();
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_GREATER);
+  glDisable(GL_BLEND);
   for (const Cloth* cloth : sheets)
-    if (!cloth->is_translucent()) cloth_pass.draw_depth(*cloth);
-  mesh_pass.draw_depth(view.clip_from_world);
+    if (!cloth->is_translucent()) cloth_pass.draw_surface(*cloth);
+  mesh_pass.draw_opaque(MeshPass::Shading::surface);
   glDisable(GL_CULL_FACE);
-  for (const PointSet* set : sets) {
-    if (set->def.style == PointStyle::sphere) points_pass.draw_depth(*set);
-  }
-  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-  glDisable(GL_POLYGON_OFFSET_FILL);
+  for (const PointSet* set : sets)
+    if (set->def.style == PointStyle::sphere) points_pass.draw_surfaces(*set);
 }
 
-void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets,
-                              const View& view, const Occluders& occluders) {
+void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
+                              std::span<PointSet* const> sets, const View& view,
+                              const SampleOffsets& offsets) {
+  RayScene& scene = light_pass.scene();
+  scene.clear();
+  for (const Instance* instance : shown)
+    if (instance->visible)
+      scene.add(*instance->mesh->rays, *instance->material->rays, instance->world_from_mesh,
+                instance->casts_shadow);
+  for (const Cloth* cloth : sheets)
+    scene.add_cloth(cloth->surface.vertices(), cloth->surface.indices(), *cloth->material->rays,
+                    cloth->texture_from_uv, cloth->casts_shadow);
+  for (const PointSet* set : sets) {
+    const GpuPoint& first = set->points.front();
+    if (set->def.style == PointStyle::sphere)
+      scene.add_balls(&first.position, &first.color, sizeof(GpuPoint), set->points.size(), *set->rays,
+                      set->def.casts_shadow);
+    else if (set->def.casts_shadow && !set->is_splatted())
+      scene.add_sprites(&first.position, &first.color, sizeof(GpuPoint), set->points.size(),
+                        set->def.softness);
+  }
+  scene.build();
+  LightSources sources{.sun = sun, .sky = make_sky(sun, environment), .fog = environment.fog};
+  for (const Lamp& lamp : shining) sources.lamps.emplace_back(lamp);
+  if (puffs_pass.shades()) sources.smoke = &puffs_pass.grid();
+  light_pass.trace(sources, view, offsets);
+}
+
+void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets) {
   glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
   glViewport(0, 0, def.width_px, def.height_px);
-  glDepthFunc(GL_GEQUAL);
+  glDepthFunc(GL_GEQUAL);  // over themselves
+  glDepthMask(GL_FALSE);
   for (const Cloth* cloth : sheets)
     if (!cloth->is_translucent()) cloth_pass.draw(*cloth, features);
-  mesh_pass.draw_opaque(view, occluders, def.width_px, def.height_px);
+  mesh_pass.draw_opaque(MeshPass::Shading::traced);
   glDisable(GL_CULL_FACE);
   for (const PointSet* set : sets) {
     if (set->def.style == PointStyle::sphere) points_pass.draw_spheres(*set, features);
@@ -327,10 +289,10 @@ void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<Po
     glBindVertexArray(no_attributes);
     glDrawArrays(GL_TRIANGLES, 0, 3);
   }
+  glDepthMask(GL_TRUE);
   glDepthFunc(GL_GREATER);
   picture.depth_copy.change_all();
   picture.behind.change_all();
-  draw_mirrors(sheets, view, occluders.solid);
 }
 
 std::vector<TranslucentBody> Stage::Impl::find_bodies(std::span<const Cloth* const> sheets, const View& view,
@@ -518,6 +480,11 @@ InstanceHandle Stage::add_instance(MeshHandle mesh, MaterialHandle material, boo
 PointsHandle Stage::add_points(const PointsDef& def) {
   auto set = std::make_unique<PointSet>();
   set->def = def;
+  if (def.style == PointStyle::sphere)
+    set->rays = std::make_unique<RayMaterial>(
+        Material{
+            .color = {1, 1, 1, 1}, .metallic = def.metallic, .roughness = def.roughness, .unlit = !def.lit},
+        std::span<const Image>());
   return impl_->point_sets.add(std::move(set));
 }
 
@@ -653,19 +620,10 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   s.prepare_lamps(sets, offsets, frame);
   s.mesh_pass.prepare(shown, view, s.features);
   const std::vector<const Cloth*> sheets = s.prepare_cloths();
-  Occluders occluders;
-  s.draw_shadows(shown, sheets, sets, view, offsets, frame, occluders);
-  s.draw_depth(sheets, sets, view);
-  for (const Cloth* cloth : sheets)
-    if (!cloth->is_translucent()) occluders.solid.push_back(cloth->surface.box());
-  for (const PointSet* set : sets)
-    if (set->def.style == PointStyle::sphere) occluders.solid.push_back(set->box);
-  occluders.sky_reach_m =
-      s.environment.occlusion_reach.value_or(kReach * (s.camera.target - s.camera.eye).norm());
-  s.occlusion_pass.draw(s.picture.depth, view, occluders.sky_reach_m,
-                        s.mesh_pass.occluded_area(view, occluders.sky_reach_m, occluders.solid),
-                        offsets.count, frame.shadow.w());
-  s.draw_opaque(sheets, sets, view, occluders);
+  s.draw_shadows(shown, sheets, sets, view, offsets, frame);
+  s.draw_surfaces(sheets, sets);
+  s.trace_light(shown, sheets, sets, view, offsets);
+  s.draw_opaque(sheets, sets);
   s.draw_translucent(sheets, sets, view, frame, offsets.index == 0);
   s.draw_lines(view);
 

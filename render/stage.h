@@ -50,9 +50,9 @@ struct Lamp {
   float softness = 0.3f;              ///< share of the cone over which its edge fades
   bool shadows = true;
 };
-inline constexpr std::size_t kMostLamps = 8;  ///< lamps that emit at once; if there are more, the strongest
-/// Number of these that cast shadows, in the order of lamps.
-inline constexpr std::size_t kMostLampShadows = 4;
+/// Number of lamps that light particles and translucent bodies at once: the strongest. Opaque surfaces are lit
+/// by all.
+inline constexpr std::size_t kMostLamps = 8;
 
 /// Sky, ambient light from it, and fog towards its horizon.
 struct Environment {
@@ -65,9 +65,6 @@ struct Environment {
   float clouds = 0;  ///< share of the sky covered by clouds
   /// Density [1/m]; transmittance exp(-fog * distance). 0: nothing fades with distance.
   float fog = 0;
-  /// Greatest distance at which objects hide the sky from each other [m]; 0: no occlusion; empty: a tenth of
-  /// the camera's distance to its target.
-  std::optional<float> occlusion_reach = {};
   bool visible = true;  ///< false: transparent background; it still lights the scene
 };
 

@@ -2,7 +2,9 @@ layout(location = 0) in vec3 position;
 layout(location = 1) in vec4 normal;
 layout(location = 2) in vec3 place;
 layout(location = 0) uniform vec2 texture_from_uv;
+#ifndef SURFACE
 layout(location = 0) out vec4 color;
+#endif
 
 void main() {
   vec3 view = normalize(frame.eye.xyz - position);
@@ -18,6 +20,10 @@ void main() {
   float alpha = alpha_of(cover_of(opacity, dot(n, view)), uv);
   if (alpha == 0.0) discard;
 #endif
+#ifdef SURFACE
+  vec3 middle = position - normal.xyz * normal.w;
+  write_surface(middle, n, cross(dFdx(middle), dFdy(middle)), view, material.surface.y + 4.0);
+#else
   Surface s = Surface(material.color.rgb, material.surface.y, material.surface.x, material.emission.rgb);
   vec2 slope = vec2(0.0);
 #ifdef PATTERN
@@ -42,25 +48,29 @@ void main() {
   mat2x3 along = cloth_frame(position, n, uv);
   vec3 relief = normalize(n - side * (along[0] * slope.x + along[1] * slope.y));
 
+#ifdef SHEER
   // In folds the sky is hidden by the cloth itself, so the light from there has the colour of the cloth.
   float open = exp2(-2.2 * max(side * place.z, 0.0));
-#ifndef SHEER
-  open *= open_sky(1.0 / gl_FragCoord.w);  // for objects seen through it, the sky's openness behind
-#endif
-  vec3 opened = open / (1.0 - s.albedo * (0.8 * (1.0 - open)));
-
   // Only the side that faces the sun can be in shadow.
   float towards_sun = dot(n, frame.sun_direction.xyz) < 0.0 ? -1.0 : 1.0;
   vec3 lit = position + normal.xyz * (abs(normal.w) * towards_sun * side - normal.w);
-  float visibility = sun_visibility(lit, n * towards_sun);
-  vec3 radiance = shade_fabric(s, through, relief, view, visibility, opened);
+  Light light = Light(sun_visibility(lit, n * towards_sun), ambient(relief) * (open / (1.0 - s.albedo * (0.8 * (1.0 - open)))), open, vec4(0.0));
+#else
+  Light light = traced_light(relief, n, 1.0 / gl_FragCoord.w);
+#endif
+  vec3 radiance = shade_fabric(s, through, relief, view, light);
 #ifdef LAMPS
-  radiance += lamp_light(s, relief, n, view, position);
+#ifdef SHEER
+  radiance += lamp_light(s, relief, view, position);
+#else
+  radiance += traced_highlight(mix(vec3(0.04), s.albedo, s.metallic));
+#endif
 #endif
   radiance = apply_fog(radiance, position);
 #ifdef SHEER
   color = vec4(radiance * alpha, alpha);
 #else
   color = vec4(radiance, 1.0);
+#endif
 #endif
 }

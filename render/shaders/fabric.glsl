@@ -45,8 +45,8 @@ mat2x3 cloth_frame(vec3 position, vec3 n, vec2 uv) {
 
 // Cloth: its fibres scatter light through it and, at grazing angles, back (sheen by A. Estevez and C. Kulla,
 // "Production Friendly Microfacet Sheen BRDF", 2017, at roughness 1/4, with the visibility term of D. Neubelt and M.
-// Pettineo, 2013). `open`: share of the sky that folds do not hide.
-vec3 shade_fabric(Surface s, vec3 through, vec3 normal, vec3 view, float visibility, vec3 open) {
+// Pettineo, 2013).
+vec3 shade_fabric(Surface s, vec3 through, vec3 normal, vec3 view, Light light) {
   vec3 l = frame.sun_direction.xyz;
   vec3 h = normalize(l + view);
   float cosine = dot(normal, l);
@@ -70,8 +70,9 @@ vec3 shade_fabric(Surface s, vec3 through, vec3 normal, vec3 view, float visibil
              nl * (lobe * fresnel + sheen * sheen_sun);
 
   vec3 reflectance = sky_reflectance(f0, s.roughness, nv);
-  vec3 above = ambient(normal), below = ambient(-normal);
-  vec3 sky = diffuse * (1.0 - reflectance) * (1.0 - share) * above + through * share * below +
-             sky_reflection(reflect(-view, normal), s.roughness) * reflectance + sheen * sheen_sky * above;
-  return frame.sun_radiance.rgb * visibility * sun + sky * open + s.emission;
+  vec3 above = light.around, below = ambient(-normal) * light.open;
+  vec3 mirrored = mix(sky_reflection(reflect(-view, normal), s.roughness) * light.open, light.mirrored.rgb, light.mirrored.w);
+  vec3 sky = diffuse * (1.0 - reflectance) * (1.0 - share) * above + through * share * below + mirrored * reflectance +
+             sheen * sheen_sky * above;
+  return frame.sun_radiance.rgb * light.sun * sun + sky + s.emission;
 }

@@ -1,11 +1,9 @@
 // Uniforms of a frame that all shaders share; the same fields as FrameUniforms in frame.h.
 struct Lamp {
   vec4 position;   // w: radius
-  vec4 intensity;  // radiance of a white surface at 1 m; w: 0 no shadow, 1 shadow in a cone, 2 all around
+  vec4 intensity;  // radiance of a white surface at 1 m
   vec4 direction;  // w: factor of the cosine to this direction
   vec4 right;  // w: offset; factor * cosine + offset, in [0, 1], is the share of light in that direction
-  vec4 up;         // w: tangent of half the angle of a tile of the shadow map
-  vec4 block;      // first corner in the shadow map; size of a tile there
 };
 
 // Values that shading reads for nearly every pixel. One member a declaration: for lists, NVIDIA's compiler (driver 580)

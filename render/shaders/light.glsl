@@ -83,37 +83,14 @@ float shadow_map_visibility(vec3 position, vec3 normal) {
 layout(binding = 5) uniform sampler3D smoke_depth;
 #endif
 
-// The same including smoke. UNHIDDEN: no solid object is near enough to hide the sun or the sky.
+// The same including smoke.
 float sun_visibility(vec3 position, vec3 normal) {
-#ifdef UNHIDDEN
-  float visibility = 1.0;
-#else
   float visibility = shadow_map_visibility(position, normal);
-#endif
 #ifdef SMOKE
   visibility *= exp(-texture(smoke_depth, (uniforms.smoke_from_world * vec4(position, 1.0)).xyz).r);
 #endif
   return visibility;
 }
-
-#ifdef FRAGMENT
-layout(binding = 8) uniform sampler2D openness;  // half the picture's size; y: the distance for which it was computed
-
-// Share of the sky that near objects leave visible at a pixel, at a distance along the view axis. Of the four texels
-// around it, those at a similar distance are used.
-float open_sky(float distance) {
-#ifdef UNHIDDEN
-  return 1.0;
-#else
-  vec2 p = 0.5 * gl_FragCoord.xy + 0.25, f = fract(p - 0.5);
-  p /= vec2(textureSize(openness, 0));
-  vec4 open = textureGather(openness, p, 0), off = textureGather(openness, p, 1) / distance - 1.0;
-  vec4 weight = vec4((1.0 - f.x) * f.y, f.x * f.y, f.x * (1.0 - f.y), (1.0 - f.x) * (1.0 - f.y)) + 0.002;
-  weight /= 1.0 + 1e4 * off * off;
-  return dot(open, weight) / dot(weight, vec4(1.0));
-#endif
-}
-#endif
 
 // GGX with the visibility term of E. Hammon (2017), times pi.
 float sun_lobe(float a, float nl, float nv, float nh) {
@@ -136,16 +113,16 @@ vec3 sky_reflectance(vec3 f0, float roughness, float nv) {
   return f0 * (-1.04 * t + r.z) + (1.04 * t + r.w);
 }
 
-// Where the sky is hidden, other surfaces reflect some light instead. They are assumed to have this surface's colour
-// (J. Jimenez et al., "Practical Realtime Strategies for Accurate Indirect Occlusion", 2016).
-vec3 with_bounces(float open, vec3 albedo) {
-  vec3 a = 2.0404 * albedo - 0.3324, b = 0.6417 - 4.7951 * albedo, c = 2.7552 * albedo + 0.6903;
-  return max(vec3(open), ((open * a + b) * open + c) * open);
-}
+// Light that arrives at a surface.
+struct Light {
+  float sun;      // share of the sun that is visible
+  vec3 around;    // radiance of a white surface in all other light
+  float open;     // share of the sky's light that arrives
+  vec4 mirrored;  // light from the mirrored direction; w: 1 if known, else the sky is mirrored
+};
 
-// Light of sun and sky that a surface reflects to the eye; `view` points to the eye; `open` is the visible share of the
-// sky.
-vec3 shade(Surface s, vec3 normal, vec3 view, float visibility, float open) {
+// Light of sun and sky that a surface reflects to the eye; `view` points to the eye.
+vec3 shade(Surface s, vec3 normal, vec3 view, Light light) {
   vec3 l = frame.sun_direction.xyz;
   vec3 h = normalize(l + view);
   float nl = saturate(dot(normal, l)), nv = max(abs(dot(normal, view)), 1e-3);
@@ -155,19 +132,9 @@ vec3 shade(Surface s, vec3 normal, vec3 view, float visibility, float open) {
   vec3 fresnel = fresnel_at(f0, vh);
   float lobe = sun_lobe(sun_roughness(s.roughness), nl, nv, nh);
   vec3 diffuse = s.albedo * (1.0 - s.metallic);
-  vec3 sun = frame.sun_radiance.rgb * (nl * visibility) * (diffuse * (1.0 - fresnel) + lobe * fresnel);
+  vec3 sun = frame.sun_radiance.rgb * (nl * light.sun) * (diffuse * (1.0 - fresnel) + lobe * fresnel);
 
   vec3 reflectance = sky_reflectance(f0, s.roughness, nv);
-  float mirrored = saturate((nv + open) * (nv + open) - 1.0 + open);
-  vec3 sky = ambient(normal) * diffuse * (1.0 - reflectance) * with_bounces(open, s.albedo) +
-             sky_reflection(reflect(-view, normal), s.roughness) * reflectance * mirrored;
-  return sun + sky + s.emission;
-}
-
-// Correction of `shade` where a share w of the mirrored light comes from the `scene` instead of the sky.
-vec3 mirror_gain(Surface s, vec3 normal, vec3 view, float open, vec4 scene) {
-  float nv = max(abs(dot(normal, view)), 1e-3);
-  vec3 reflectance = sky_reflectance(mix(dielectric_f0, s.albedo, s.metallic), s.roughness, nv);
-  float mirrored = saturate((nv + open) * (nv + open) - 1.0 + open);
-  return (scene.rgb - sky_reflection(reflect(-view, normal), s.roughness) * mirrored) * reflectance * scene.w;
+  vec3 mirrored = sky_reflection(reflect(-view, normal), s.roughness) * saturate((nv + light.open) * (nv + light.open) - 1.0 + light.open);
+  return sun + light.around * diffuse * (1.0 - reflectance) + mix(mirrored, light.mirrored.rgb, light.mirrored.w) * reflectance + s.emission;
 }

@@ -15,7 +15,9 @@ layout(location = 6) flat in vec3 axis_y;
 layout(location = 7) flat in vec3 axis_z;
 #endif
 layout(location = 0) uniform float min_alpha;  // smallest alpha that this pass draws
+#ifndef SURFACE
 layout(location = 0) out vec4 color;
+#endif
 
 // Roughness, increased where the normal varies within a pixel, so that highlights do not flicker (Kaplanyan and
 // Tokuyoshi, "Stable Geometric Specular Antialiasing", 2019).
@@ -50,21 +52,21 @@ vec3 mapped_normal(vec3 n) {
 
 // A layer of lacquer (KHR_materials_clearcoat) and fibres at grazing angles (KHR_materials_sheen, see fabric.glsl) over
 // the light of a surface.
-vec3 with_layers(vec3 light, vec3 n, vec3 smooth_normal, vec3 view, float visibility, float open) {
+vec3 with_layers(vec3 radiance, vec3 n, vec3 smooth_normal, vec3 view, Light light) {
   vec3 l = frame.sun_direction.xyz, h = normalize(l + view);
-  vec3 sun = frame.sun_radiance.rgb * visibility;
+  vec3 sun = frame.sun_radiance.rgb * light.sun;
   float nl = saturate(dot(n, l)), nv = max(abs(dot(n, view)), 1e-3), nh = saturate(dot(n, h));
   vec3 sheen = material.velvet.rgb;
   float grazing = 1.0 - nv, sheen_sky = 0.03 + 0.45 * grazing * grazing * grazing;
   float sin2 = 1.0 - nh * nh, sheen_sun = 0.75 * sin2 * sin2 / (nl + nv - nl * nv);
-  light = light * (1.0 - max(sheen.r, max(sheen.g, sheen.b)) * sheen_sky) +
-          sheen * (sun * (nl * sheen_sun) + ambient(n) * (sheen_sky * open));
+  radiance = radiance * (1.0 - max(sheen.r, max(sheen.g, sheen.b)) * sheen_sky) +
+             sheen * (sun * (nl * sheen_sun) + light.around * sheen_sky);
   n = smooth_normal;
   nl = saturate(dot(n, l)), nv = max(abs(dot(n, view)), 1e-3), nh = saturate(dot(n, h));
   float rough = material.coat.y, through = 1.0 - material.coat.x * fresnel_at(vec3(0.04), nv).r;
   vec3 coat = sun * (nl * sun_lobe(sun_roughness(rough), nl, nv, nh) * fresnel_at(vec3(0.04), saturate(dot(view, h))).r) +
-              sky_reflection(reflect(-view, n), rough) * sky_reflectance(vec3(0.04), rough, nv) * open;
-  return light * through + material.coat.x * coat;
+              mix(sky_reflection(reflect(-view, n), rough) * light.open, light.mirrored.rgb, light.mirrored.w) * sky_reflectance(vec3(0.04), rough, nv);
+  return radiance * through + material.coat.x * coat;
 }
 #endif
 
@@ -114,30 +116,39 @@ void main() {
   if (alpha < min_alpha) discard;
   if (min_alpha > 0.5) alpha = 1.0;  // the opaque pass leaves no holes
   s.roughness = filtered_roughness(s.roughness, n);
+#ifdef SURFACE
+  float mirror = s.roughness < 0.3 || s.metallic > 0.5 ? 2.0 : 0.0;
+  write_surface(position, n, cross(dFdx(position), dFdy(position)), view, s.roughness + mirror);
+#else
 #ifdef ENDLESS
   vec4 fog = fog_to(position, horizon_haze(smooth_normal, view));
 #else
   vec4 fog = fog_to(position);
 #endif
-#ifdef MIRROR
-  // Added to the picture drawn so far.
-  vec4 scene = seen_in_mirror(position, n, view, s.roughness);
-  color = vec4(mirror_gain(s, n, view, open_sky(1.0 / gl_FragCoord.w) * occlusion, scene) * fog.w, 0.0);
-#else
   vec3 albedo = s.albedo;
 #ifdef GLASS
   s.albedo *= 1.0 - transmitted;
 #endif
-  float visibility = sun_visibility(position, smooth_normal), open = open_sky(1.0 / gl_FragCoord.w) * occlusion;
-  vec3 radiance = shade(s, n, view, visibility, open);
+#ifdef TRACED
+  Light light = traced_light(n, smooth_normal, 1.0 / gl_FragCoord.w);
+#else
+  Light light = Light(sun_visibility(position, smooth_normal), ambient(n), 1.0, vec4(0.0));
+#endif
+  light.around *= occlusion;
+  light.open *= occlusion;
+  vec3 radiance = shade(s, n, view, light);
 #ifdef LAMPS
-  radiance += lamp_light(s, n, smooth_normal, view, position);
+#ifdef TRACED
+  radiance += traced_highlight(mix(dielectric_f0, s.albedo, s.metallic));
+#else
+  radiance += lamp_light(s, n, view, position);
+#endif
 #endif
 #ifdef GLASS
   radiance += albedo * (transmitted * seen_through(position, n, view));
 #endif
 #ifdef DETAILED
-  radiance = with_layers(radiance, n, smooth_normal, view, visibility, open);
+  radiance = with_layers(radiance, n, smooth_normal, view, light);
   if (material.options.y > 0.5) radiance = albedo;
 #endif
   color = vec4((radiance * fog.w + fog.rgb) * alpha, alpha);

@@ -4,7 +4,9 @@ layout(location = 2) flat in vec4 ball;  // centre, radius
 layout(location = 3) in vec3 position;
 layout(location = 1) uniform vec4 style;
 layout(location = 2) uniform vec2 surface;  // metallic, roughness
+#ifndef SURFACE
 layout(location = 0) out vec4 result;
+#endif
 
 void main() {
   vec3 ray = normalize(position - frame.eye.xyz);
@@ -17,17 +19,17 @@ void main() {
   vec3 n = offset / ball.w;
   vec4 clip = uniforms.clip_from_world * vec4(hit, 1.0);
   gl_FragDepth = clip.z / clip.w;
-#ifndef DEPTH
-
+#ifdef SURFACE
+  float mirror = surface.y < 0.3 || surface.x > 0.5 ? 2.0 : 0.0;
+  write_surface(hit, n, n, -ray, surface.y + mirror);
+#else
   vec3 radiance = color.rgb;
   if (style.z != 0.0) {
     Surface s = Surface(color.rgb, surface.y, surface.x, vec3(0.0));
+    radiance = shade(s, n, -ray, traced_light(n, n, clip.w));
 #ifdef LAMPS
-    radiance = lamp_light(s, n, n, -ray, hit);
-#else
-    radiance = vec3(0.0);
+    radiance += traced_highlight(mix(vec3(0.04), s.albedo, s.metallic));
 #endif
-    radiance += shade(s, n, -ray, sun_visibility(hit, n), open_sky(clip.w));
   }
   result = vec4(apply_fog(radiance, hit), 1.0);
 #endif

@@ -34,8 +34,7 @@ class ModelPicture {
   }
   /// A sky and ground of one colour all around.
   void set_sky(const Vector3f& color) {
-    small_.stage.set_environment(
-        {.zenith = color, .horizon = color, .ground = color, .occlusion_reach = 0, .visible = false});
+    small_.stage.set_environment({.zenith = color, .horizon = color, .ground = color, .visible = false});
   }
   void look_from(const Vector3f& eye) {
     camera_.eye = eye;

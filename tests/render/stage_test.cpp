@@ -275,32 +275,6 @@ TEST(Stage, FlatGroundDoesNotShadowItself) {
   EXPECT_GT(low, 0.97f * high);
 }
 
-// In a picture of this size, ground without near objects is shaded in a simpler way. A second plane in view,
-// even an invisible one without a shadow, makes the renderer compute the occlusion of light everywhere.
-TEST(Stage, GroundIsTheSameWithAndWithoutComputedOcclusion) {
-  for (const Vector3f& to_sun :
-       {Vector3f(1, 1.2f, 0.4f), Vector3f(-0.6f, 0.5f, -1), Vector3f(0.4f, 0.12f, 0.2f)}) {
-    std::array<HdrImage, 2> sums;
-    for (const bool everywhere : {false, true}) {
-      SmallStage s(640, 360);
-      s.stage.set_camera({.eye = {1, 2.5f, 9}, .target = {0, 1, 0}});
-      s.stage.set_sun({.direction = to_sun.normalized(), .size_deg = 3});
-      s.add(make_ground(500), {.pattern = Pattern::checker});
-      s.add(make_box({1, 1.5f, 1}, 0.05f), {}, {-1, 0.75f, 0});
-      s.add(make_box({0.6f, 0.6f, 0.6f}, 0.05f), {}, {1.5f, 2.4f, -1});
-      if (everywhere)
-        s.stage.set_transform(
-            s.stage.add_instance(s.stage.add_mesh(make_ground(0.1f)), s.stage.add_material({}), false),
-            Eigen::Affine3f(Eigen::Translation3f(0, -0.5f, 0)));
-      for (int i = 0; i < 4; ++i) s.stage.draw(sample_offsets(i, 4), sums[everywhere ? 1 : 0]);
-    }
-    float most = 0;
-    for (std::size_t i = 0; i < sums[0].rgba.size(); ++i)
-      most = std::max(most, std::abs(sums[0].rgba[i] - sums[1].rgba[i]));
-    EXPECT_LT(most, 1e-4f) << "sun towards " << to_sun.transpose();
-  }
-}
-
 TEST(Stage, TransparentBackgroundHasAlphaZeroAndObjectsHaveAlphaOne) {
   SmallStage s;
   s.add(make_box({1, 1, 1}), Material{});

@@ -88,7 +88,6 @@ render::Environment environment_of(const Scene& scene) {
     environment.ground = e.ground->rgb();
   else
     environment.ground_albedo = ground_albedo(scene);
-  if (e.occlusion) environment.occlusion_reach = to_float(*e.occlusion);
   return environment;
 }
 

@@ -196,10 +196,6 @@ struct Table<EnvironmentSettings> {
              "infinite plane still blends into the sky in the last quarter of a degree below its horizon",
              "1/m", kNotNegative},
             {"clouds", &T::clouds, "share of the sky that is covered by clouds", "", kShare},
-            {"occlusion", &T::occlusion,
-             "distance within which objects block the sky's light from each other; 0: no occlusion; default: "
-             "a tenth of the camera's distance",
-             "m", kNotNegative},
             {"background", &T::background,
              "`sky` draws the sky, and frames have no alpha channel; `transparent` draws none, and all "
              "frames have an alpha channel"}};

@@ -322,8 +322,6 @@ struct EnvironmentSettings {
   Real intensity = 1;
   Real fog = 0;
   Real clouds = 0;
-  /// Greatest distance of objects that hide the sky; default: by the camera's distance.
-  std::optional<Real> occlusion;
   Background background = Background::sky;
 };
 

@@ -1,0 +1,34 @@
+#pragma once
+/// Private: the light of opaque surfaces in a sub-frame. The surfaces are drawn into targets and read back,
+/// their light is traced (render/trace), and the shaders read it from textures (shaders/traced.glsl).
+
+#include <span>
+
+#include "render/gl.h"
+#include "render/trace/light_tracer.h"
+
+namespace offstage::render {
+
+struct View;
+
+class LightPass {
+ public:
+  /// `depth`: the picture's depth, in which the visible surfaces were drawn.
+  LightPass(int width_px, int height_px, const gl::Texture& depth);
+  /// The scene that rays meet, to be filled and built before trace().
+  RayScene& scene() { return scene_; }
+  /// Binds and clears the targets for drawing surfaces.
+  void begin() const;
+  /// Reads the surfaces, traces their light, and binds it for the shaders.
+  void trace(const LightSources& sources, const View& view, const SampleOffsets& offsets);
+
+ private:
+  RayScene scene_;
+  SurfaceBuffer surfaces_;
+  LightBuffer light_;
+  gl::Texture places_, normals_;
+  gl::Framebuffer framebuffer_;
+  gl::Texture direct_, around_, around_normals_, mirrored_, highlights_;
+};
+
+}  // namespace offstage::render

@@ -1,0 +1,13 @@
+#pragma once
+/// Private: the procedural patterns of shaders/pattern.glsl on the CPU, compiled from the same source.
+
+#include "render/model.h"
+
+namespace offstage::render {
+
+/// Colour of a pattern at a point in object space. `footprint`: width of the area that is averaged, in the
+/// object's units. `time`: of animated patterns [s].
+Vector3f pattern_color(Pattern pattern, const Vector3f& position, const Vector3f& normal, float footprint,
+                       const Vector3f& color, const Vector3f& second_color, float scale, float time);
+
+}  // namespace offstage::render

@@ -1,0 +1,349 @@
+#include "render/trace/ray_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "render/error.h"
+#include "render/trace/embree.h"
+
+namespace offstage::render {
+namespace {
+
+// Groups of objects that a ray may leave out.
+constexpr unsigned kOpaqueCaster = 1, kTranslucentCaster = 2, kNoCaster = 4, kAll = 7, kSprite = 8;
+// Number of translucent surfaces and sprites along a ray that are told apart; others are left out.
+constexpr int kMostLayers = 64;
+
+/// The device of the process. The instruction set is fixed, because others round hit distances differently.
+RTCDevice device() {
+  static const RTCDevice made = [] {
+    RTCDevice result = rtcNewDevice("isa=avx2");
+    if (result == nullptr)
+      throw UnavailableError("Embree cannot be used: this processor lacks the AVX2 instructions");
+    return result;
+  }();
+  return made;
+}
+
+RayTree make_tree(RTCBuildQuality quality) {
+  RayTree tree(rtcNewScene(device()));
+  rtcSetSceneFlags(tree.get(), RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneBuildQuality(tree.get(), quality);
+  return tree;
+}
+
+/// Attaches a geometry and gives up its reference.
+unsigned attach_to(RTCScene tree, RTCGeometry geometry) {
+  rtcCommitGeometry(geometry);
+  const unsigned id = rtcAttachGeometry(tree, geometry);
+  rtcReleaseGeometry(geometry);
+  return id;
+}
+
+RTCGeometry make_triangles(const void* positions, std::size_t stride, std::size_t count,
+                           std::span<const uint32_t> indices) {
+  RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, positions, 0, stride,
+                             count);
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, indices.data(), 0,
+                             3 * sizeof(uint32_t), indices.size() / 3);
+  return geometry;
+}
+
+void set_ray(RTCRay& ray, const Vector3f& from, const Vector3f& direction, float length, unsigned mask) {
+  ray.org_x = from.x();
+  ray.org_y = from.y();
+  ray.org_z = from.z();
+  ray.dir_x = direction.x();
+  ray.dir_y = direction.y();
+  ray.dir_z = direction.z();
+  ray.tnear = 0;
+  ray.tfar = length;
+  ray.time = 0;
+  ray.mask = mask;
+  ray.id = 0;
+  ray.flags = 0;
+}
+
+/// Barycentric coordinates of the corners b and c where a ray meets the plane of a triangle, clamped to the
+/// triangle.
+Vector2f barycentric(const Vector3f& from, const Vector3f& direction, const Vector3f& a, const Vector3f& b,
+                     const Vector3f& c) {
+  const Vector3f ab = b - a, ac = c - a, p = direction.cross(ac);
+  const float determinant = ab.dot(p);
+  if (determinant == 0) return {1.0f / 3, 1.0f / 3};
+  const Vector3f s = from - a;
+  float u = std::clamp(s.dot(p) / determinant, 0.0f, 1.0f);
+  float v = std::clamp(direction.dot(s.cross(ab)) / determinant, 0.0f, 1.0f);
+  if (u + v > 1) {
+    const float sum = u + v;
+    u /= sum;
+    v /= sum;
+  }
+  return {u, v};
+}
+
+template <class T>
+T mixed(const T& a, const T& b, const T& c, const Vector2f& uv) {
+  return (1 - uv.x() - uv.y()) * a + uv.x() * b + uv.y() * c;
+}
+
+}  // namespace
+
+void DeleteRayTree::operator()(RTCSceneTy* tree) const {
+  rtcReleaseScene(tree);
+}
+
+std::string ray_library() {
+  const auto version = rtcGetDeviceProperty(device(), RTC_DEVICE_PROPERTY_VERSION);
+  return "Embree " + std::to_string(version / 10000) + "." + std::to_string(version / 100 % 100) + "." +
+         std::to_string(version % 100) + " avx2";
+}
+
+RayMesh::RayMesh(const Mesh& mesh, const std::vector<Vector3f>& mesh_normals)
+    : normals(mesh_normals), uvs(mesh.uvs), colors(mesh.colors), indices(mesh.indices) {
+  positions.reserve(mesh.positions.size());
+  for (const Vector3f& p : mesh.positions) positions.push_back({p.x(), p.y(), p.z(), 0});
+}
+
+RTCSceneTy* RayMesh::tree() const {
+  if (!tree_) {
+    tree_ = make_tree(RTC_BUILD_QUALITY_MEDIUM);
+    attach_to(tree_.get(), make_triangles(positions.data(), sizeof(Vector4f), positions.size(), indices));
+    rtcCommitScene(tree_.get());
+  }
+  return tree_.get();
+}
+
+struct RayScene::Object {
+  const RayMaterial* material = nullptr;
+  const RayMesh* mesh = nullptr;  ///< null: a cloth or balls
+  Eigen::Affine3f world_from_mesh = Eigen::Affine3f::Identity();
+  Eigen::Matrix3f normal_from_mesh = Eigen::Matrix3f::Identity();
+  bool mirrored = false;
+  std::span<const ClothVertex> vertices = {};
+  std::span<const uint32_t> indices = {};
+  Vector2f texture_from_uv = {1, 1};
+  const std::byte* balls = nullptr;
+  const std::byte* colors = nullptr;
+  std::size_t stride = 0;
+  float softness = -1;  ///< of sprites; negative: not sprites
+
+  /// Share of the light that passes a sprite along a ray; `behind`: distance of the far side of its ball.
+  float transmittance(unsigned sprite, const Vector3f& from, const Vector3f& direction, float& behind) const;
+  void describe(unsigned triangle, const Vector3f& from, const Vector3f& direction, Hit& hit) const;
+
+ private:
+  void describe_mesh(unsigned triangle, const Vector3f& from, const Vector3f& direction, Hit& hit) const;
+  void describe_cloth(unsigned triangle, const Vector3f& from, const Vector3f& direction, Hit& hit) const;
+  void describe_ball(unsigned ball, const Vector3f& from, const Vector3f& direction, Hit& hit) const;
+};
+
+RayScene::RayScene() = default;
+RayScene::~RayScene() = default;
+
+void RayScene::clear() {
+  objects_.clear();
+  cloth_trees_.clear();
+  tree_ = make_tree(RTC_BUILD_QUALITY_LOW);
+  has_translucent_ = false;
+}
+
+void RayScene::attach(RTCGeometryTy* geometry, Object object, bool casts_shadow) {
+  const bool solid = object.material->is_opaque();
+  rtcSetGeometryMask(geometry, !casts_shadow ? kNoCaster : solid ? kOpaqueCaster : kTranslucentCaster);
+  has_translucent_ = has_translucent_ || (casts_shadow && !solid);
+  const unsigned id = attach_to(tree_.get(), geometry);
+  if (objects_.size() <= id) objects_.resize(id + 1);
+  objects_[id] = std::move(object);
+}
+
+void RayScene::add(const RayMesh& mesh, const RayMaterial& material, const Eigen::Affine3f& world_from_mesh,
+                   bool casts_shadow) {
+  if (mesh.indices.empty() || !world_from_mesh.matrix().allFinite()) return;
+  const float determinant = world_from_mesh.linear().determinant();
+  if (determinant == 0) return;
+  RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_INSTANCE);
+  rtcSetGeometryInstancedScene(geometry, mesh.tree());
+  rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, world_from_mesh.matrix().data());
+  Object object{.material = &material, .mesh = &mesh, .world_from_mesh = world_from_mesh};
+  object.normal_from_mesh = world_from_mesh.linear().inverse().transpose();
+  object.mirrored = determinant < 0;
+  attach(geometry, std::move(object), casts_shadow);
+}
+
+void RayScene::add_cloth(std::span<const ClothVertex> vertices, std::span<const uint32_t> indices,
+                         const RayMaterial& material, const Vector2f& texture_from_uv, bool casts_shadow) {
+  if (vertices.empty() || indices.empty()) return;
+  RTCGeometry geometry = make_triangles(&vertices[0].position, sizeof(ClothVertex), vertices.size(), indices);
+  attach(
+      geometry,
+      {.material = &material, .vertices = vertices, .indices = indices, .texture_from_uv = texture_from_uv},
+      casts_shadow);
+}
+
+void RayScene::add_balls(const Vector4f* balls, const Vector4f* colors, std::size_t stride, std::size_t count,
+                         const RayMaterial& material, bool casts_shadow) {
+  if (count == 0) return;
+  RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_SPHERE_POINT);
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, balls, 0, stride, count);
+  attach(geometry,
+         {.material = &material,
+          .balls = reinterpret_cast<const std::byte*>(balls),
+          .colors = reinterpret_cast<const std::byte*>(colors),
+          .stride = stride},
+         casts_shadow);
+}
+
+void RayScene::add_sprites(const Vector4f* balls, const Vector4f* colors, std::size_t stride,
+                           std::size_t count, float softness) {
+  if (count == 0) return;
+  RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_SPHERE_POINT);
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, balls, 0, stride, count);
+  rtcSetGeometryMask(geometry, kSprite);
+  has_translucent_ = true;
+  const unsigned id = attach_to(tree_.get(), geometry);
+  if (objects_.size() <= id) objects_.resize(id + 1);
+  objects_[id] = {.balls = reinterpret_cast<const std::byte*>(balls),
+                  .colors = reinterpret_cast<const std::byte*>(colors),
+                  .stride = stride,
+                  .softness = std::clamp(softness, 0.01f, 1.0f)};
+}
+
+void RayScene::build() {
+  rtcCommitScene(tree_.get());
+}
+
+void RayScene::Object::describe(unsigned triangle, const Vector3f& from, const Vector3f& direction,
+                                Hit& hit) const {
+  hit.material = material;
+  if (mesh != nullptr)
+    describe_mesh(triangle, from, direction, hit);
+  else if (balls != nullptr)
+    describe_ball(triangle, from, direction, hit);
+  else
+    describe_cloth(triangle, from, direction, hit);
+  hit.distance = direction.dot(hit.position - from);
+  hit.front = hit.face.dot(direction) <= 0;
+  if (!hit.front) hit.face = -hit.face;
+  // Smooth normals can turn away from the ray at outlines.
+  if (hit.normal.dot(hit.face) < 0) hit.normal = -hit.normal;
+  const float towards = -hit.normal.dot(direction);
+  if (towards < 0.02f) hit.normal = (hit.normal - (0.02f - towards) * direction).normalized();
+}
+
+void RayScene::Object::describe_mesh(unsigned triangle, const Vector3f& from, const Vector3f& direction,
+                                     Hit& hit) const {
+  std::array<std::size_t, 3> k;
+  for (std::size_t i = 0; i < 3; ++i) k[i] = mesh->indices[3 * std::size_t{triangle} + i];
+  std::array<Vector3f, 3> local, p;
+  for (std::size_t i = 0; i < 3; ++i) {
+    local[i] = mesh->positions[k[i]].head<3>();
+    p[i] = world_from_mesh * local[i];
+  }
+  const Vector2f uv = barycentric(from, direction, p[0], p[1], p[2]);
+  hit.position = mixed(p[0], p[1], p[2], uv);
+  hit.face = (p[1] - p[0]).cross(p[2] - p[0]).normalized() * (mirrored ? -1.0f : 1.0f);
+  hit.object_position = mixed(local[0], local[1], local[2], uv);
+  hit.object_normal = mixed(mesh->normals[k[0]], mesh->normals[k[1]], mesh->normals[k[2]], uv);
+  hit.normal = (normal_from_mesh * hit.object_normal).normalized();
+  if (!hit.normal.allFinite()) hit.normal = hit.face;
+  if (!mesh->uvs.empty()) hit.uv = mixed(mesh->uvs[k[0]], mesh->uvs[k[1]], mesh->uvs[k[2]], uv);
+  if (!mesh->colors.empty() && material->vertex_colors)
+    hit.color = mixed(mesh->colors[k[0]], mesh->colors[k[1]], mesh->colors[k[2]], uv);
+}
+
+void RayScene::Object::describe_cloth(unsigned triangle, const Vector3f& from, const Vector3f& direction,
+                                      Hit& hit) const {
+  const std::size_t first = 3 * std::size_t{triangle};
+  const ClothVertex &a = vertices[indices[first]], &b = vertices[indices[first + 1]],
+                    &c = vertices[indices[first + 2]];
+  const Vector2f uv = barycentric(from, direction, a.position, b.position, c.position);
+  hit.position = mixed(a.position, b.position, c.position, uv);
+  hit.face = (b.position - a.position).cross(c.position - a.position).normalized();
+  hit.normal = mixed(a.normal, b.normal, c.normal, uv).normalized();
+  if (!hit.normal.allFinite()) hit.normal = hit.face;
+  const Vector2f along = mixed(a.uv, b.uv, c.uv, uv);
+  hit.object_position = {along.x(), along.y(), 0};
+  hit.object_normal = Vector3f::UnitZ();
+  hit.uv = along.cwiseProduct(texture_from_uv);
+}
+
+void RayScene::Object::describe_ball(unsigned ball, const Vector3f& from, const Vector3f& direction,
+                                     Hit& hit) const {
+  const Vector4f& place = *reinterpret_cast<const Vector4f*>(balls + ball * stride);
+  const Vector3f center = place.head<3>(), to_center = center - from;
+  const float along = to_center.dot(direction);
+  const Vector3f across = to_center - along * direction;
+  const float half = std::sqrt(std::max(place.w() * place.w() - across.squaredNorm(), 0.0f));
+  const float distance = along - half > 0 ? along - half : along + half;
+  hit.face = (from + distance * direction - center).normalized();
+  hit.position = center + place.w() * hit.face;
+  hit.normal = hit.object_normal = hit.face;
+  hit.object_position = hit.position - center;
+  hit.color = *reinterpret_cast<const Vector4f*>(colors + ball * stride);
+  hit.color.w() = 1;
+}
+
+// As in shaders/points_shape.glsl.
+float RayScene::Object::transmittance(unsigned sprite, const Vector3f& from, const Vector3f& direction,
+                                      float& behind) const {
+  const Vector4f& place = *reinterpret_cast<const Vector4f*>(balls + sprite * stride);
+  const float opacity = std::min(reinterpret_cast<const Vector4f*>(colors + sprite * stride)->w(), 1.0f);
+  const Vector3f to_center = place.head<3>() - from;
+  const float along = to_center.dot(direction);
+  const float across = (to_center - along * direction).norm() / place.w();
+  behind = along + place.w() * std::sqrt(std::max(1 - across * across, 0.0f));
+  const float x = std::clamp((across - 1 + softness) / softness, 0.0f, 1.0f);
+  return 1 - opacity * (1 - x * x * (3 - 2 * x));
+}
+
+const RayScene::Object* RayScene::meet(RTCRayHit& ray) const {
+  ray.hit.geomID = ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  embree::intersect(tree_.get(), ray);
+  if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return nullptr;
+  return &objects_[ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? ray.hit.instID[0] : ray.hit.geomID];
+}
+
+bool RayScene::first_hit(const Vector3f& from, const Vector3f& direction, float length, Hit& hit) const {
+  RTCRayHit ray;
+  set_ray(ray.ray, from, direction, length, kAll);
+  const Object* object = meet(ray);
+  if (object == nullptr) return false;
+  hit = {};
+  object->describe(ray.hit.primID, from, direction, hit);
+  return true;
+}
+
+Vector3f RayScene::transmittance(const Vector3f& from, const Vector3f& direction, float length) const {
+  RTCRay ray;
+  set_ray(ray, from, direction, length, kOpaqueCaster);
+  embree::occluded(tree_.get(), ray);
+  if (ray.tfar < 0) return Vector3f::Zero();
+  Vector3f share = Vector3f::Ones(), place = from;
+  for (int layer = 0; has_translucent_ && layer < kMostLayers && length > 0; ++layer) {
+    RTCRayHit hit_ray;
+    set_ray(hit_ray.ray, place, direction, length, kTranslucentCaster | kSprite);
+    const Object* object = meet(hit_ray);
+    if (object == nullptr) break;
+    float way = 0;
+    if (object->softness >= 0) {
+      share *= object->transmittance(hit_ray.hit.primID, place, direction, way);
+      way = std::max(way, 0.0f) + 1e-6f * place.cwiseAbs().maxCoeff() + 1e-7f;
+      place += way * direction;
+    } else {
+      Hit hit;
+      object->describe(hit_ray.hit.primID, place, direction, hit);
+      share = share.cwiseProduct(hit.material->transmittance(hit, direction));
+      way = std::max(hit.distance, 0.0f);
+      place = off_surface(hit.position, -hit.face);
+    }
+    if (share.maxCoeff() < 1e-3f) return Vector3f::Zero();
+    length -= way;
+  }
+  return share;
+}
+
+}  // namespace offstage::render

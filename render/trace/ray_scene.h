@@ -1,0 +1,113 @@
+#pragma once
+/// Private: the scene as light rays see it: triangles and balls with their materials, in bounding volume
+/// hierarchies by Embree. Embree only selects the object and the triangle; the point that is hit is computed
+/// here, so that its bits do not depend on Embree's version.
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "render/cloth_surface.h"
+#include "render/model.h"
+#include "render/trace/ray_material.h"
+
+struct RTCSceneTy;
+struct RTCGeometryTy;
+struct RTCRayHit;
+
+namespace offstage::render {
+
+struct DeleteRayTree {
+  void operator()(RTCSceneTy* tree) const;
+};
+using RayTree = std::unique_ptr<RTCSceneTy, DeleteRayTree>;
+
+/// Version of Embree and its instruction set, for example "Embree 3.13.5 avx2".
+std::string ray_library();
+
+/// A mesh with its hierarchy, which is built on first use.
+class RayMesh {
+ public:
+  /// Copies what rays need. `normals`: as many as positions.
+  RayMesh(const Mesh& mesh, const std::vector<Vector3f>& normals);
+  RTCSceneTy* tree() const;
+
+  std::vector<Vector4f> positions;  ///< w is not used; Embree reads 16 bytes
+  std::vector<Vector3f> normals;
+  std::vector<Vector2f> uvs;     ///< empty: none
+  std::vector<Vector4f> colors;  ///< empty: none
+  std::vector<uint32_t> indices;
+
+ private:
+  mutable RayTree tree_;
+};
+
+/// What a ray meets first.
+struct Hit {
+  float distance = 0;  ///< along the ray [m]
+  Vector3f position = Vector3f::Zero();
+  Vector3f normal = Vector3f::Zero();  ///< smooth, on the side of the ray's origin
+  Vector3f face = Vector3f::Zero();    ///< of the triangle, unit, on the side of the ray's origin
+  bool front = true;
+  const RayMaterial* material = nullptr;
+  Vector3f object_position = Vector3f::Zero();  ///< for patterns
+  Vector3f object_normal = Vector3f::Zero();
+  Vector2f uv = {0, 0};
+  Vector4f color = {1, 1, 1, 1};  ///< of the vertices
+};
+
+class RayScene {
+ public:
+  RayScene();
+  ~RayScene();
+  RayScene(const RayScene&) = delete;
+  RayScene& operator=(const RayScene&) = delete;
+
+  /// Removes all objects.
+  void clear();
+  /// The mesh and the material must stay in memory until clear().
+  void add(const RayMesh& mesh, const RayMaterial& material, const Eigen::Affine3f& world_from_mesh,
+           bool casts_shadow);
+  /// The lists must stay in memory until clear(). Positions must be finite.
+  void add_cloth(std::span<const ClothVertex> vertices, std::span<const uint32_t> indices,
+                 const RayMaterial& material, const Vector2f& texture_from_uv, bool casts_shadow);
+  /// `balls`: position and radius of each, `stride` bytes apart; `colors` likewise.
+  void add_balls(const Vector4f* balls, const Vector4f* colors, std::size_t stride, std::size_t count,
+                 const RayMaterial& material, bool casts_shadow);
+  /// Soft discs that face every ray, and only cast shadows.
+  void add_sprites(const Vector4f* balls, const Vector4f* colors, std::size_t stride, std::size_t count,
+                   float softness);
+  /// Builds the hierarchy over all objects.
+  void build();
+
+  bool empty() const { return objects_.empty(); }
+  /// Share of the light that arrives along a segment: 0 behind an opaque object, and the product of the
+  /// transmittances of translucent ones. `direction` is a unit vector.
+  Vector3f transmittance(const Vector3f& from, const Vector3f& direction, float length) const;
+  /// Returns false if the ray meets nothing within `length` [m].
+  bool first_hit(const Vector3f& from, const Vector3f& direction, float length, Hit& hit) const;
+
+ private:
+  struct Object;
+  const Object* meet(RTCRayHit& ray) const;
+  void attach(RTCGeometryTy* geometry, Object object, bool casts_shadow);
+
+  std::vector<Object> objects_;  ///< by Embree's geometry id
+  std::vector<RayTree> cloth_trees_;
+  RayTree tree_;
+  bool has_translucent_ = false;
+};
+
+/// A point moved off the surface so that a ray from there does not meet the surface itself because of
+/// rounding. `face`: unit normal on the side of the ray.
+inline Vector3f off_surface(const Vector3f& position, const Vector3f& face) {
+  // A point computed in single precision is off by a few units in the last place of its coordinates.
+  constexpr float kUnits = 32 * std::numeric_limits<float>::epsilon();
+  return position + face * (kUnits * position.cwiseAbs().maxCoeff() + 1e-7f);
+}
+
+}  // namespace offstage::render

@@ -1,0 +1,73 @@
+#pragma once
+/// Private: low-discrepancy samples for the pixels of a sub-frame. Pixels are numbered along a Morton curve,
+/// and each takes the next samples of one Sobol sequence, so that those of neighbouring pixels and of all
+/// sub-frames complement each other (A. Ahmed and P. Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo
+/// Sampling Error via Hierarchical Ordering of Pixels", 2020). Order and values are scrambled per dimension
+/// (B. Burley, "Practical Hash-based Owen Scrambling", 2020).
+
+#include <bit>
+#include <cstdint>
+
+#include <Eigen/Core>
+
+namespace offstage::render {
+
+class PixelSampler {
+ public:
+  /// Sample `index` of `count` of the pixel (x, y), both below 65536.
+  PixelSampler(uint32_t x, uint32_t y, int index, int count)
+      : reversed_index_(reversed((spread(x) | spread(y) << 1) * std::bit_ceil(static_cast<uint32_t>(count)) +
+                                 static_cast<uint32_t>(index))) {}
+
+  /// The next two coordinates, each in [0, 1).
+  Eigen::Vector2f next() {
+    const uint32_t salt = mixed(++pairs_);
+    const uint32_t k = reversed(permuted(reversed_index_, salt));
+    // The Sobol points are the reversed bits of k and of pascal(k); scrambling starts from reversed bits.
+    const uint32_t x = reversed(permuted(k, salt * 0x9E3779B1u));
+    const uint32_t y = reversed(permuted(pascal(k), salt * 0x85EBCA77u));
+    return {static_cast<float>(x >> 8) * 0x1p-24f, static_cast<float>(y >> 8) * 0x1p-24f};
+  }
+
+ private:
+  // Inserts a zero bit behind each bit.
+  static uint32_t spread(uint32_t v) {
+    v = (v | v << 8) & 0x00FF00FFu;
+    v = (v | v << 4) & 0x0F0F0F0Fu;
+    v = (v | v << 2) & 0x33333333u;
+    return (v | v << 1) & 0x55555555u;
+  }
+  static uint32_t reversed(uint32_t v) {
+    v = __builtin_bswap32(v);
+    v = (v & 0x0F0F0F0Fu) << 4 | (v >> 4 & 0x0F0F0F0Fu);
+    v = (v & 0x33333333u) << 2 | (v >> 2 & 0x33333333u);
+    return (v & 0x55555555u) << 1 | (v >> 1 & 0x55555555u);
+  }
+  // The second dimension of the Sobol sequence: its matrix is Pascal's triangle modulo 2, which is a
+  // Kronecker power of [1 1; 0 1].
+  static uint32_t pascal(uint32_t v) {
+    v ^= v >> 1 & 0x55555555u;
+    v ^= v >> 2 & 0x33333333u;
+    v ^= v >> 4 & 0x0F0F0F0Fu;
+    v ^= v >> 8 & 0x00FF00FFu;
+    return v ^ (v >> 16);
+  }
+  static uint32_t mixed(uint32_t v) {
+    v = (v ^ v >> 16) * 0x7FEB352Du;
+    v = (v ^ v >> 15) * 0x846CA68Bu;
+    return v ^ v >> 16;
+  }
+  // Each bit is changed by a hash of the lower ones, which permutes the halves of [0, 2^32) recursively if
+  // the bits are reversed before and after.
+  static uint32_t permuted(uint32_t v, uint32_t salt) {
+    v ^= v * 0x3D20ADEAu;
+    v += salt;
+    v *= (salt >> 16) | 1;
+    v ^= v * 0x05526C56u;
+    return v ^ v * 0x53A22864u;
+  }
+
+  uint32_t reversed_index_, pairs_ = 0;
+};
+
+}  // namespace offstage::render

@@ -1,0 +1,217 @@
+// Traced light against closed forms.
+
+#include <cmath>
+#include <numbers>
+
+#include <tbb/task_arena.h>
+
+#include "tests/render/gl_fixture.h"
+
+namespace offstage::render {
+namespace {
+
+const Environment kNoLight{.intensity = 0, .visible = false};
+const Material kPlaster{.color = {1, 1, 1, 1}, .roughness = 1};
+
+Environment even_sky(float radiance) {
+  const Vector3f all = Vector3f::Constant(radiance);
+  return {.zenith = all, .horizon = all, .ground = all};
+}
+
+/// The mean of n sub-frames.
+HdrImage mean_of(SmallStage& s, int n) {
+  HdrImage sum;
+  for (int i = 0; i < n; ++i) s.stage.draw(sample_offsets(i, n), sum);
+  for (float& value : sum.rgba) value /= static_cast<float>(n);
+  return sum;
+}
+
+/// Mean of a square of pixels around a point.
+float mean_around(const HdrImage& picture, const Vector2f& place, int half) {
+  float sum = 0;
+  for (int dy = -half; dy <= half; ++dy)
+    for (int dx = -half; dx <= half; ++dx)
+      sum += pixel(picture, static_cast<int>(place.x()) + dx, static_cast<int>(place.y()) + dy).y();
+  return sum / static_cast<float>((2 * half + 1) * (2 * half + 1));
+}
+
+struct TracedLight : testing::Test {
+  TracedLight() : s(160, 120) {
+    s.stage.set_environment(kNoLight);
+    s.stage.set_sun({.intensity = 0, .shadows = false});
+  }
+  void look(const Camera& value) {
+    camera = value;
+    s.stage.set_camera(value);
+  }
+  Vector2f place_of(const Vector3f& point) const { return project(camera, point, 160, 120); }
+  Camera camera;
+  SmallStage s;
+};
+
+// The furnace: a white ball in an even sky sends as much light to the eye as the sky behind it.
+TEST_F(TracedLight, AWhiteBallVanishesInAnEvenSky) {
+  s.stage.set_environment(even_sky(0.7f));
+  s.add(make_sphere(1), kPlaster);
+  look({.eye = {0, 0, 4}, .target = {0, 0, 0}});
+  const HdrImage picture = mean_of(s, 4);
+  for (int y = 0; y < 120; ++y)
+    for (int x = 0; x < 160; ++x) EXPECT_NEAR(pixel(picture, x, y).y(), 0.7f, 0.007f) << x << ", " << y;
+}
+
+// In a closed room whose walls glow with e and reflect a share r, the radiance is e + r e + r^2 e + ... =
+// e / (1 - r) everywhere. (A rough dielectric reflects a little more than its colour, as in sunlight.)
+TEST_F(TracedLight, InAGlowingRoomIsTheSumOfAllReflections) {
+  for (const float share : {0.2f, 0.5f, 0.8f}) {
+    SmallStage room(96, 64);
+    room.stage.set_environment(kNoLight);
+    room.stage.set_sun({.intensity = 0, .shadows = false});
+    room.stage.set_camera({.eye = {0.2f, 0.1f, 0.4f}, .target = {1, 0.3f, 0}});
+    room.add(make_box({4, 3, 5}), {.color = {share, share, share, 1},
+                                   .roughness = 1,
+                                   .emission = Vector3f::Constant(0.3f),
+                                   .two_sided = true});
+    const HdrImage picture = mean_of(room, 16);
+    EXPECT_NEAR(mean_around(picture, {48, 32}, 25) * (1 - share) / 0.3f, 1, 0.03f) << share;
+  }
+}
+
+// A disc of radius R at height h over a floor: the form factor of the floor below its middle is
+// R^2 / (R^2 + h^2).
+TEST_F(TracedLight, OfAGlowingDiscFollowsItsFormFactor) {
+  const float radius = 1;
+  for (const float height : {0.5f, 1.0f, 3.0f}) {
+    SmallStage scene(160, 120);
+    scene.stage.set_environment(kNoLight);
+    scene.stage.set_sun({.intensity = 0, .shadows = false});
+    const Camera low{.eye = {2.5f, 0.4f * height, 0}, .target = {0, 0, 0}, .fov_deg = 20};
+    scene.stage.set_camera(low);
+    scene.add(make_ground(20), kPlaster);
+    scene.add(make_cylinder(radius, 0.01f, 96),
+              {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {2, 2, 2}}, {0, height + 0.005f, 0});
+    const HdrImage picture = mean_of(scene, 64);
+    const float expected = 2 * radius * radius / (radius * radius + height * height);
+    EXPECT_NEAR(mean_around(picture, project(low, {0, 0, 0}, 160, 120), 3) / expected, 1, 0.05f) << height;
+  }
+}
+
+// A wide screen with a straight edge at height h, and the sun overhead, whose disc has the radius w = h
+// tan(s) on the floor: at distance x from the edge's shadow, a segment of the disc is visible, with the share
+// 1/2 + (u sqrt(1 - u^2) + asin u) / pi, u = x / w.
+TEST_F(TracedLight, PenumbraOfTheSunIsTheVisiblePartOfItsDisc) {
+  const float height = 2, size_deg = 12;
+  const float width = height * std::tan(0.5f * size_deg * std::numbers::pi_v<float> / 180);
+  s.stage.set_sun({.direction = {0, 1, 0}, .color = {1, 1, 1}, .intensity = 1, .size_deg = size_deg});
+  s.add(make_ground(20), {.color = {0.5f, 0.5f, 0.5f, 1}, .roughness = 1});
+  s.add(make_box({4, 0.01f, 8}), {.color = {0, 0, 0, 1}, .roughness = 1}, {-2, height, 0});
+  look({.eye = {0.4f, 1.2f, 0.01f}, .target = {0, 0, 0}, .fov_deg = 50});
+  const HdrImage picture = mean_of(s, 64);
+  const float open = mean_around(picture, place_of({2 * width, 0, 0}), 1);
+  for (const float u : {-0.8f, -0.4f, 0.0f, 0.4f, 0.8f}) {
+    const float visible = 0.5f + (u * std::sqrt(1 - u * u) + std::asin(u)) / std::numbers::pi_v<float>;
+    EXPECT_NEAR(mean_around(picture, place_of({u * width, 0, 0}), 1) / open, visible, 0.03f) << u;
+  }
+}
+
+TEST_F(TracedLight, OfTwelveLampsIsTheSumOfAll) {
+  s.add(make_ground(20), kPlaster);
+  look({.eye = {0, 9, 0.01f}, .target = {0, 0, 0}});
+  std::vector<Lamp> lamps;
+  for (int k = 0; k < 12; ++k) {
+    const float angle = 0.5236f * static_cast<float>(k);
+    lamps.push_back({.position = {2 * std::cos(angle), 1.5f, 2 * std::sin(angle)},
+                     .intensity = {1, 1, 1},
+                     .radius = 0.05f});
+  }
+  s.stage.set_lamps(std::array{lamps[0], lamps[6]});  // opposite each other
+  const float one = 0.5f * mean_around(mean_of(s, 4), place_of({0, 0, 0}), 1);
+  s.stage.set_lamps(lamps);
+  EXPECT_NEAR(mean_around(mean_of(s, 4), place_of({0, 0, 0}), 1) / one, 12, 0.1f);
+}
+
+TEST_F(TracedLight, ABrightWallColoursTheFloorBesideIt) {
+  s.stage.set_environment(even_sky(0.2f));
+  s.stage.set_sun({.direction = Vector3f(1, 1, 0).normalized(), .intensity = 3});
+  s.add(make_ground(20), kPlaster);
+  s.add(make_box({0.2f, 2, 6}), {.color = {0.9f, 0.1f, 0.05f, 1}, .roughness = 1}, {-0.1f, 1, 0});
+  look({.eye = {2, 3, 4}, .target = {0.5f, 0, 0}});
+  const HdrImage picture = mean_of(s, 4);
+  const auto redness = [&](float x) {
+    const Vector2f p = place_of({x, 0, 0});
+    const Vector4f c = pixel(picture, static_cast<int>(p.x()), static_cast<int>(p.y()));
+    return c.x() / c.z();
+  };
+  EXPECT_GT(redness(0.15f), 1.1f * redness(1.9f));
+}
+
+TEST_F(TracedLight, MirrorsShowWhatIsBehindTheCamera) {
+  s.add(make_box({2, 2, 0.1f}), {.color = {0.9f, 0.9f, 0.9f, 1}, .metallic = 1, .roughness = 0.01f});
+  s.add(make_box({3, 3, 0.1f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {1, 0.5f, 0}}, {0, 0, 8});
+  look({.eye = {0, 0, 4}, .target = {0, 0, 0}});
+  const Vector4f seen = center_pixel(s.draw());
+  EXPECT_NEAR(seen.x(), 0.9f, 0.03f);
+  EXPECT_NEAR(seen.y(), 0.45f, 0.02f);
+}
+
+// Two boxes on a floor, with everything 1000 times smaller or larger: rays that start on a surface must not
+// meet it again, nor jump over what touches it.
+TEST_F(TracedLight, DoesNotDependOnTheSizeOfTheScene) {
+  std::vector<HdrImage> pictures;
+  for (const float scale : {1.0f, 0.001f, 1000.0f}) {
+    SmallStage scene(160, 120);
+    scene.stage.set_environment(even_sky(0.5f));
+    scene.stage.set_sun({.direction = Vector3f(1, 2, 1).normalized()});
+    scene.stage.set_camera({.eye = Vector3f(2, 2, 4) * scale,
+                            .target = {0, 0, 0},
+                            .near_m = 0.05f * scale,
+                            .far_m = 1e3f * scale});
+    scene.add(make_box(Vector3f(8, 0.2f, 8) * scale), kPlaster, Vector3f(0, -0.1f, 0) * scale);
+    scene.add(make_box(Vector3f(1, 1, 1) * scale), kPlaster, Vector3f(0, 0.5f, 0) * scale);
+    scene.add(make_box(Vector3f(1, 1, 1) * scale), kPlaster, Vector3f(1.2f, 0.5f, -1) * scale);
+    pictures.push_back(mean_of(scene, 4));
+  }
+  for (const std::size_t k : {1, 2}) {
+    double off = 0;
+    for (std::size_t i = 0; i < pictures[0].rgba.size(); ++i)
+      off += std::abs(pictures[k].rgba[i] - pictures[0].rgba[i]);
+    EXPECT_LT(off / static_cast<double>(pictures[0].rgba.size()), 0.003) << k;
+  }
+}
+
+TEST_F(TracedLight, HasTheSameBitsForAnyNumberOfThreads) {
+  s.stage.set_environment(even_sky(0.5f));
+  s.stage.set_sun({});
+  s.stage.set_lamps(std::array{Lamp{.position = {1, 2, 1}}});
+  s.add(make_ground(20), kPlaster);
+  s.add(make_sphere(0.5f), {.color = {0.9f, 0.7f, 0.3f, 1}, .metallic = 1, .roughness = 0.3f}, {0, 0.5f, 0});
+  look({.eye = {0, 1, 3}, .target = {0, 0.3f, 0}});
+  std::vector<HdrImage> pictures;
+  for (const int threads : {1, 4}) {
+    tbb::task_arena arena(threads);
+    pictures.push_back(arena.execute([&] { return mean_of(s, 2); }));
+  }
+  EXPECT_EQ(pictures[0].rgba, pictures[1].rgba);
+}
+
+// The frames of a still scene must not differ at all, and under a slowly moving camera the light of a surface
+// must not change from frame to frame.
+TEST_F(TracedLight, DoesNotFlicker) {
+  s.stage.set_environment(even_sky(0.5f));
+  s.stage.set_sun({.direction = Vector3f(1, 1, 0.3f).normalized()});
+  s.add(make_ground(20), {.color = {0.5f, 0.5f, 0.5f, 1}, .roughness = 1});
+  s.add(make_box({1, 1, 1}), kPlaster, {0, 0.5f, 0});
+  const Vector3f spot(-0.3f, 0, 0.9f);  // beside the box, in the open
+  std::vector<float> seen;
+  for (int frame = 0; frame < 12; ++frame) {
+    look({.eye = {0.01f * static_cast<float>(frame), 2, 4}, .target = {0, 0.2f, 0}});
+    seen.push_back(mean_around(mean_of(s, 4), place_of(spot), 0));
+  }
+  look({.eye = {0, 2, 4}, .target = {0, 0.2f, 0}});
+  EXPECT_EQ(mean_around(mean_of(s, 4), place_of(spot), 0), seen[0]);
+  float mean = 0;
+  for (const float value : seen) mean += value / static_cast<float>(seen.size());
+  for (const float value : seen) EXPECT_NEAR(value / mean, 1, 0.03f);
+}
+
+}  // namespace
+}  // namespace offstage::render
