@@ -15,6 +15,7 @@
 #include "render/error.h"
 #include "render/gl.h"
 #include "render/gl_platform.h"
+#include "render/trace/ray_scene.h"
 
 namespace offstage::render {
 namespace {
@@ -158,6 +159,7 @@ Context::Context() : impl_(std::make_unique<Impl>()) {
   info.renderer = gl_string(GL_RENDERER);
   info.version = gl_string(GL_VERSION);
   info.glsl = gl_string(GL_SHADING_LANGUAGE_VERSION);
+  info.rays = ray_library();
   check(info);
   impl_->programs.emplace();
 }

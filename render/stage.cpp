@@ -181,9 +181,14 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
     for (int k = 0; k < 8; ++k)
       casters.push_back({box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k)), 1e-3f});
   }
-  // Without a caster the map is empty, which means light everywhere.
+  // Opaque surfaces and balls have traced light; the map is for everything else. Without a caster it is empty,
+  // which means light everywhere.
+  const bool needed =
+      !mesh_pass.translucent().empty() ||
+      std::ranges::any_of(sheets, [](const Cloth* cloth) { return cloth->is_translucent(); }) ||
+      std::ranges::any_of(sets, [](const PointSet* set) { return set->def.style != PointStyle::sphere; });
   ShadowFrame shadow;
-  if (sun.shadows)
+  if (sun.shadows && needed)
     shadow = fit_shadow(casters, view, frame.sun_direction.head<3>(), frame.eye.w(), def.shadow_map_px);
   if (shadow.texel_m > 0) {
     Matrix4f map_from_clip = Matrix4f::Identity();

@@ -74,11 +74,9 @@ TEST(StageLight, SkyLightIsHiddenBesideABlackWall) {
   // / 2 of the cosine-weighted sky. The highlight, 4 % of the light, is not hidden.
   Floor floor({.zenith = {1, 1, 1}, .horizon = {1, 1, 1}, .ground = {0, 0, 0}, .visible = false});
   floor.s.add(make_box({0.1f, 1, 30}), {.color = {0, 0, 0, 1}, .roughness = 1}, {-0.05f, 0.5f, 0});
-  const float open = floor.mean_at(6, 0);
-  for (const float x : {0.5f, 1.0f, 2.0f}) {
-    const float hidden = 0.5f * (1 - x / std::sqrt(x * x + 1));
-    EXPECT_NEAR(floor.mean_at(x, 0) / open, 1 - 0.96f * hidden, 0.025f) << x;
-  }
+  const auto visible = [](float x) { return 1 - 0.96f * 0.5f * (1 - x / std::sqrt(x * x + 1)); };
+  const float open = floor.mean_at(6, 0) / visible(6);
+  for (const float x : {0.5f, 1.0f, 2.0f}) EXPECT_NEAR(floor.mean_at(x, 0) / open, visible(x), 0.03f) << x;
 }
 
 TEST(StageLight, ShadowsAreSharperNearTheirCaster) {

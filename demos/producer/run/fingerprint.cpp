@@ -28,8 +28,8 @@ std::string fingerprint(const render::ContextInfo& context) {
 #else
   const char* compiler = "gcc " __VERSION__;
 #endif
-  return fmt::format("{}; {}; glibc {}; {}; {}", context.renderer, context.version, gnu_get_libc_version(),
-                     cpu_class(), compiler);
+  return fmt::format("{}; {}; {}; glibc {}; {}; {}", context.renderer, context.version, context.rays,
+                     gnu_get_libc_version(), cpu_class(), compiler);
 }
 
 int available_processors() {
