@@ -18,6 +18,7 @@
 #include "render/puffs_pass.h"
 #include "render/shadow_map.h"
 #include "render/slots.h"
+#include "render/sprite_pictures.h"
 #include "render/streaks_pass.h"
 #include "render/surface_probe.h"
 
@@ -500,6 +501,11 @@ MeshHandle Stage::add_mesh(const Mesh& mesh) {
   return handle;
 }
 
+void Stage::set_mesh(MeshHandle handle, const Mesh& mesh) {
+  *impl_->meshes[handle] = GpuMesh(mesh);
+  gl::check_error("uploading a mesh");
+}
+
 MaterialHandle Stage::add_material(const Material& material, std::span<const Image> textures) {
   auto gpu = std::make_unique<GpuMaterial>(make_gpu_material(material, textures));
   gl::check_error("uploading a material");
@@ -515,9 +521,13 @@ InstanceHandle Stage::add_instance(MeshHandle mesh, MaterialHandle material, boo
   return impl_->instances.add(std::move(instance));
 }
 
-PointsHandle Stage::add_points(const PointsDef& def) {
+PointsHandle Stage::add_points(const PointsDef& def, const Image& picture) {
   auto set = std::make_unique<PointSet>();
   set->def = def;
+  if (def.style == PointStyle::sprite && picture.pixel_count() > 0) {
+    set->pictures = make_sprite_pictures(picture, def.sheet.columns, def.sheet.rows);
+    gl::check_error("uploading a sprite's picture");
+  }
   return impl_->point_sets.add(std::move(set));
 }
 

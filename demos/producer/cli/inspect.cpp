@@ -178,6 +178,7 @@ LoadedScene load(const SceneOptions& options, bool quiet, const std::vector<std:
   std::vector<std::string> overrides = options.overrides();
   overrides.insert(overrides.begin(), more_overrides.begin(), more_overrides.end());
   LoadedScene loaded = load_scene(options.file, overrides, options.allow);
+  if (!options.camera.empty()) choose_camera(loaded, options.camera);
   if (!quiet) print_warnings(loaded.warnings);
   return loaded;
 }
