@@ -24,6 +24,17 @@ template <>
 struct Names<effects::RampKind> {
   static constexpr std::array kNames = {"linear", "smooth"};
 };
+/// Numbers of the stage's structs, which are read as all others.
+template <>
+struct Codec<float> {
+  static void read(Reader& in, const Node& node, const Spec& spec, float& out) {
+    Real value = static_cast<Real>(out);
+    Codec<Real>::read(in, node, spec, value);
+    out = static_cast<float>(value);
+  }
+  static Node write(const float& value) { return Codec<Real>::write(static_cast<Real>(value)); }
+  static Description describe(Catalogue& all, const Spec& spec) { return Codec<Real>::describe(all, spec); }
+};
 template <>
 struct Table<render::SpriteSheet> {
   static constexpr const char* kName = "sheet";
