@@ -60,7 +60,7 @@ struct Table<LookMesh> {
   static Fields<LookMesh> fields() {
     using T = LookMesh;
     return {
-        {"shape", &T::shape, "what is drawn; not a plane", kRequired},
+        {"shape", &T::shape, "what is drawn; not a plane"},
         {"material", &T::material, "name of its material; empty: that of the model file, or a default one"},
         {"axis", &T::axis,
          "axis of `angle_deg` and `spin_deg_per_s`, in the mesh's axes; default: a random axis for each "
