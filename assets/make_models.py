@@ -4,9 +4,11 @@ nothing but Python 3 and writes the same bytes every time. CREDITS.md lists size
 
 import math
 import pathlib
+import struct
 import sys
+import zlib
 
-from modelling import (Material, Mesh, Node, add, circle, cross, cylinder, dot, ellipsoid, extrude, fractal_noise,
+from modelling import (GlbWriter, Material, Mesh, Node, add, circle, cross, cylinder, dot, ellipsoid, extrude, fractal_noise,
                        grid_triangles, hashed, icosphere, lathe, mix, mul, noise, open_edges, ring, rod,
                        rounded, shaded, smoothstep, sub, surface_nets, sweep, turn, union, unit, volume,
                        welded, write_glb, write_glb_tree, write_mtl, write_obj, write_ply)
@@ -528,10 +530,95 @@ def tree():
                                     (groups[1], Material("foliage_light", "#6fa63f", 0.8))])
 
 
+# --- tentacle -------------------------------------------------------------------------------------
+
+
+def spotted_png(width, height):
+    """A palette PNG: lighter below, with a row of suckers along the middle and dark spots."""
+    palette = [(96, 42, 92), (152, 74, 128), (232, 176, 190), (58, 24, 64)]
+
+    def entry(x, y):
+        u, v = (x + 0.5) / width, (y + 0.5) / height
+        if abs(u - 0.5) < 0.17:
+            return 2 if abs(u - 0.5) < 0.1 and (v * 12) % 1 < 0.6 else 1
+        return 3 if hashed(7, x // 3, y // 3) > 0.82 else 0
+
+    rows = b"".join(b"\0" + bytes(entry(x, y) for x in range(width)) for y in range(height))
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    colors = b"".join(bytes(color) for color in palette)
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 3, 0, 0, 0)) +
+            chunk(b"PLTE", colors) + chunk(b"IDAT", zlib.compress(rows, 0)) + chunk(b"IEND", b""))
+
+
+def tentacle():
+    """A skinned arm of six bones that sweeps in a loop of 4 s, on a foot whose ring turns."""
+    bones, segment, around, per_bone, period, keys = 6, 0.3, 12, 3, 4.0, 17
+    rings = bones * per_bone
+    mesh = Mesh()
+    joints, weights = [], []
+    for i in range(rings + 1):
+        height = i * segment / per_bone
+        radius = 0.17 * (1 - i / rings)**0.8 + 0.015 if i < rings else 0.0
+        at = i / per_bone - 0.5
+        low = min(max(math.floor(at), 0), bones - 1)
+        share = min(max(at - math.floor(at), 0), 1) if 0 <= at < bones - 1 else 0
+        for k in range(around + 1):
+            angle = 2 * math.pi * k / around
+            outward = (math.sin(angle), 0.12, math.cos(angle))
+            mesh.positions.append((radius * outward[0], height, radius * outward[2]))
+            mesh.normals.append(unit(outward))
+            mesh.uvs.append((k / around, 1 - i / rings))
+            weight = round(255 * share)
+            joints.append((low, min(low + 1, bones - 1), 0, 0))
+            weights.append((255 - weight, weight, 0, 0))
+    width = around + 1
+    for i in range(rings):
+        for k in range(around):
+            a, b = i * width + k, (i + 1) * width + k
+            mesh.triangles.append((a, a + 1, b + 1))
+            if i < rings - 1:
+                mesh.triangles.append((a, b + 1, b))
+    foot = shaded(lathe([(0, 0), (0.34, 0), (0.34, 0.05), (0.24, 0.12), (0, 0.12)], 24))
+    cleat = shaded(Mesh([(0.36 * x, 0.02 + 0.07 * y, 0.05 * z) for x in (0.9, 1.25) for y in (0, 1) for z in (-1, 1)],
+                        [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6),
+                         (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)]))
+    cleats = Mesh().joined(*(cleat.turned("y", 60 * k) for k in range(6)))
+    glb = GlbWriter()
+    skin_mesh = glb.mesh([glb.primitive(mesh, glb.material(Material("skin", "#ffffff", 0.45), spotted_png(24, 48)),
+                                        JOINTS_0=(joints, "4B"), WEIGHTS_0=(weights, "4B"))])
+    metal = glb.material(STEEL)
+    nodes = [{"name": "foot", "mesh": glb.mesh([glb.primitive(foot, metal)]), "children": [1, 2]},
+             {"name": "ring", "mesh": glb.mesh([glb.primitive(cleats, metal)])}]
+    for b in range(bones):
+        nodes.append({"name": f"bone_{b}", "translation": [0, 0.1 if b == 0 else segment, 0],
+                      **({"children": [3 + b]} if b < bones - 1 else {})})
+    nodes.append({"name": "arm", "mesh": skin_mesh, "skin": 0})
+    unbind = [[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -segment * b, 0, 1] for b in range(bones)]
+    times = [period * k / (keys - 1) for k in range(keys)]
+    tracks = []
+    for b in range(bones):
+        turns = []
+        for t in times:
+            phase = 2 * math.pi * t / period - 0.55 * b
+            x, z = 0.28 * math.sin(phase), 0.34 * math.cos(phase)
+            angle = math.hypot(x, z)
+            s = math.sin(angle / 2) / (angle or 1)
+            turns.append((x * s, 0, z * s, math.cos(angle / 2)))
+        tracks.append((2 + b, "rotation", turns))
+    ring_turns = [(0, math.sin(math.pi * k / (keys - 1)), 0, math.cos(math.pi * k / (keys - 1))) for k in range(keys)]
+    tracks.append((1, "rotation", ring_turns))
+    glb.write(MODELS / "tentacle.glb", nodes, [0, 2 + bones], joints=range(2, 2 + bones), unbind=unbind,
+              clip="sweep", times=times, tracks=tracks)
+
+
 ALL = [
     duck, fountain, sprinkler, t_handle, landscape, gears, crank, connecting_rod, piston, flywheel, robot_arm,
     voussoir, top, marble_run, dishes, parachute,
-    hammock, grass_patch, rock, pot, tree
+    hammock, grass_patch, rock, pot, tree,
+    tentacle
 ]
 
 if __name__ == "__main__":

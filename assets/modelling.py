@@ -546,3 +546,73 @@ def write_ply(path, mesh):
     body = b"".join(struct.pack("<6f", *p, *n) for p, n in zip(mesh.positions, mesh.normals))
     body += b"".join(struct.pack("<B3i", 3, *t) for t in mesh.triangles)
     path.write_bytes("\n".join(header).encode() + body)
+
+
+class GlbWriter:
+    """A GLB with textures, a skin and an animation, built piece by piece."""
+
+    def __init__(self):
+        self.blob, self.views, self.accessors = b"", [], []
+        self.materials, self.meshes, self.images = [], [], []
+
+    def view(self, data):
+        self.views.append({"buffer": 0, "byteOffset": len(self.blob), "byteLength": len(data)})
+        self.blob += data + b"\0" * (-len(data) % 4)
+        return len(self.views) - 1
+
+    def accessor(self, rows, code, **more):
+        """`rows`: tuples; `code`: as of struct, such as 3f or 4B."""
+        kind = {"f": 5126, "B": 5121, "H": 5123}[code[-1]]
+        shape = {"1": "SCALAR", "2": "VEC2", "3": "VEC3", "4": "VEC4", "16": "MAT4"}[code[:-1]]
+        data = b"".join(struct.pack("<" + code, *row) for row in rows)
+        self.accessors.append({"bufferView": self.view(data), "componentType": kind, "count": len(rows),
+                               "type": shape, **more})
+        return len(self.accessors) - 1
+
+    def material(self, material, png=None):
+        look = {"baseColorFactor": [round(c, 4) for c in material.linear()] + [1],
+                "metallicFactor": material.metallic, "roughnessFactor": material.roughness}
+        if png:
+            self.images.append({"mimeType": "image/png", "bufferView": self.view(png)})
+            look["baseColorTexture"] = {"index": len(self.images) - 1}
+        self.materials.append({"name": material.name, "pbrMetallicRoughness": look})
+        return len(self.materials) - 1
+
+    def primitive(self, mesh, material, **influences):
+        """`influences`: further attributes as (rows, code); weights are normalised integers."""
+        places = [struct.unpack("<3f", struct.pack("<3f", *p)) for p in mesh.positions]
+        low, high = ([f(p[k] for p in places) for k in range(3)] for f in (min, max))
+        attributes = {"POSITION": self.accessor(places, "3f", min=low, max=high),
+                      "NORMAL": self.accessor(mesh.normals, "3f")}
+        if mesh.uvs:
+            attributes["TEXCOORD_0"] = self.accessor(mesh.uvs, "2f")
+        for name, (rows, code) in influences.items():
+            more = {"normalized": True} if name.startswith("WEIGHTS") else {}
+            attributes[name] = self.accessor(rows, code, **more)
+        indices = self.accessor([(i,) for t in mesh.triangles for i in t], "1H")
+        return {"attributes": attributes, "indices": indices, "material": material}
+
+    def mesh(self, primitives):
+        self.meshes.append({"primitives": primitives})
+        return len(self.meshes) - 1
+
+    def write(self, path, nodes, roots, joints, unbind, clip, times, tracks):
+        """`tracks`: (node, property, values at the times)."""
+        skin = {"joints": list(joints), "inverseBindMatrices": self.accessor(unbind, "16f")}
+        moments = self.accessor([(t,) for t in times], "1f", min=[times[0]], max=[times[-1]])
+        samplers = [{"input": moments, "output": self.accessor(values, f"{len(values[0])}f")} for _, _, values in tracks]
+        channels = [{"sampler": i, "target": {"node": node, "path": what}} for i, (node, what, _) in enumerate(tracks)]
+        document = {"asset": {"version": "2.0", "generator": "offstage assets/make_models.py"},
+                    "scene": 0, "scenes": [{"nodes": roots}], "nodes": nodes, "meshes": self.meshes,
+                    "materials": self.materials, "skins": [skin],
+                    "animations": [{"name": clip, "samplers": samplers, "channels": channels}],
+                    "accessors": self.accessors, "bufferViews": self.views, "buffers": [{"byteLength": len(self.blob)}]}
+        if self.images:
+            document["images"] = self.images
+            document["textures"] = [{"source": i} for i in range(len(self.images))]
+        text = json.dumps(document, separators=(",", ":")).encode()
+        text += b" " * (-len(text) % 4)
+        size = 12 + 8 + len(text) + 8 + len(self.blob)
+        path.write_bytes(
+            struct.pack("<4sII", b"glTF", 2, size) + struct.pack("<I4s", len(text), b"JSON") + text +
+            struct.pack("<I4s", len(self.blob), b"BIN\0") + self.blob)

@@ -7,7 +7,7 @@ set(CONFIG ${CMAKE_INSTALL_LIBDIR}/cmake/offstage)
 
 install(TARGETS offstage RUNTIME COMPONENT program)
 install(DIRECTORY effects/presets/ DESTINATION ${DATA}/presets COMPONENT program FILES_MATCHING PATTERN *.json)
-install(DIRECTORY assets/models DESTINATION ${DATA}/assets COMPONENT program)
+install(DIRECTORY assets/models assets/pictures DESTINATION ${DATA}/assets COMPONENT program)
 install(DIRECTORY demos/scenes DESTINATION ${DATA}/demos COMPONENT program)  # they name models as ../../assets/models/...
 install(FILES LICENSE assets/CREDITS.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)
 

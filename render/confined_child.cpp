@@ -22,11 +22,15 @@ namespace {
 constexpr int kAnswerExit = 40, kMessageExit = 41;  // other codes do not come from this code
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
-ProcessLimits limits_of(uint64_t file_bytes) {
+ProcessLimits limits_of(const ConfinedWork& work) {
+  const uint64_t file_bytes = work.file_bytes;
   constexpr uint64_t kSeconds = 10, kMostSeconds = 60, kMebibytesPerSecond = 5;
   constexpr uint64_t kMemory = 1536 * kMiB, kMostMemory = 4096 * kMiB, kTimesFile = 16;
+  constexpr uint64_t kPicture = 128 * kMiB, kMostPictures = 32;
   return {.cpu_s = std::min(kSeconds + file_bytes / (kMebibytesPerSecond * kMiB), kMostSeconds),
-          .memory_bytes = std::min(kMemory + kTimesFile * file_bytes, kMostMemory)};
+          .memory_bytes =
+              std::min(kMemory + kTimesFile * file_bytes + kPicture * std::min(work.pictures, kMostPictures),
+                       kMostMemory)};
 }
 
 /// Runs in the child: writes an answer or a message to the memory file.
@@ -135,7 +139,7 @@ ChildAnswer::~ChildAnswer() {
 ChildAnswer run_confined(const ConfinedWork& work, const std::function<void(int)>& job) {
   const Descriptor memory(::memfd_create("offstage-answer", MFD_CLOEXEC));
   if (!memory) throw UnavailableError("no memory file for the reader of files: " + system_reason(errno));
-  const ProcessLimits limits = limits_of(work.file_bytes);
+  const ProcessLimits limits = limits_of(work);
   const pid_t child = ::fork();
   if (child < 0) throw UnavailableError("the reader of files cannot be started: " + system_reason(errno));
   if (child == 0) become_child(work, limits, memory.fd(), job);

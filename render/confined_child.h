@@ -18,6 +18,8 @@ struct ConfinedWork {
   /// Size of the file, which determines the limits: 10 s of processor time and 1 s more for each 5 MiB, at
   /// most 60 s; 1.5 GiB of memory and 16 times the size, at most 4 GiB.
   uint64_t file_bytes = 0;
+  /// Number of pictures that the file may refer to: 128 MiB of memory more for each, within the same 4 GiB.
+  uint64_t pictures = 0;
   const InputFolders* folders = nullptr;  ///< folders that may be read
   StopTest stop = {};
   /// A child that gets less than a hundredth of a processor for this long [s] is broken and is killed.

@@ -1,16 +1,22 @@
-// write_exr of channels.h.
+// The EXR files of channels.h and frame_files.h.
 
+#include <algorithm>
 #include <cstring>
+#include <exception>
+#include <vector>
 
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfIO.h>
+#include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfStringAttribute.h>
+#include <half.h>
 
 #include "render/channels.h"
 #include "render/file_io.h"
+#include "render/frame_files.h"
 #include "render/image_io.h"
 
 namespace offstage::render {
@@ -35,7 +41,51 @@ class Buffer : public Imf::OStream {
   std::size_t at_ = 0;
 };
 
+constexpr const char* kSettings = "offstage settings";
+
 }  // namespace
+
+void write_exr(const std::filesystem::path& path, const HdrImage& image, const std::string& settings) {
+  constexpr float kLargest = 65504;  // of a half float
+  const std::size_t channels = image.transparent ? 4 : 3;
+  std::vector<half> values(image.pixel_count() * channels);
+  for (std::size_t i = 0; i < image.pixel_count(); ++i)
+    for (std::size_t c = 0; c < channels; ++c)
+      values[i * channels + c] = half(std::clamp(image.rgba[4 * i + c], -kLargest, kLargest));
+
+  Imf::Header header(image.width_px, image.height_px);
+  header.compression() = Imf::ZIP_COMPRESSION;
+  if (!settings.empty()) header.insert(kSettings, Imf::StringAttribute(settings));
+  Imf::FrameBuffer pixels;
+  const char* names[] = {"R", "G", "B", "A"};
+  for (std::size_t c = 0; c < channels; ++c) {
+    header.channels().insert(names[c], Imf::Channel(Imf::HALF));
+    const std::size_t stride = channels * sizeof(half);
+    pixels.insert(names[c], Imf::Slice(Imf::HALF, reinterpret_cast<char*>(values.data() + c), stride,
+                                       stride * static_cast<std::size_t>(image.width_px)));
+  }
+  Buffer buffer;
+  {
+    constexpr int kNoThreads = 0;
+    Imf::OutputFile file(buffer, header, kNoThreads);
+    file.setFrameBuffer(pixels);
+    file.writePixels(image.height_px);
+  }
+  write_file_atomically(path, buffer.bytes);
+}
+
+std::optional<FrameFile> inspect_exr(const std::filesystem::path& path) {
+  try {
+    const Imf::InputFile file(path.c_str(), 0);
+    if (!file.isComplete()) return {};
+    const Imath::Box2i window = file.header().dataWindow();
+    const auto* settings = file.header().findTypedAttribute<Imf::StringAttribute>(kSettings);
+    return FrameFile{window.max.x - window.min.x + 1, window.max.y - window.min.y + 1,
+                     file.header().channels().findChannel("A") != nullptr, settings ? settings->value() : ""};
+  } catch (const std::exception&) {
+    return {};  // it is no EXR file
+  }
+}
 
 void write_exr(const std::filesystem::path& path, const Channels& channels, const ChannelChoice& choice,
                const ObjectNames& objects) {

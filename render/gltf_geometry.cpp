@@ -123,7 +123,11 @@ void GltfGeometry::read_attributes(const Source& given, GltfPrimitive& result) {
     if (set < 0) return std::vector<Vector2f>{};
     const std::string name = "TEXCOORD_" + std::to_string(set);
     std::vector<Vector2f> found = vectors<2>(source.attribute(file_, name, 2));
-    if (found.empty() && model_.materials[material].base_color_texture.image >= 0)
+    const int which = set == first ? 0 : 1;
+    bool used = false;
+    for_each_texture(model_.materials[material],
+                     [&](const TextureMap& map) { used |= map.image >= 0 && map.uv_set == which; });
+    if (found.empty() && used)
       file_.warn(source.primitive.place() + " has no " + name + " for the textures of its material");
     return found;
   };

@@ -7,6 +7,7 @@
 #include "render/gltf_file.h"
 #include "render/gltf_geometry.h"
 #include "render/gltf_material.h"
+#include "render/gltf_rig.h"
 #include "render/part_builder.h"
 
 namespace offstage::render {
@@ -39,8 +40,9 @@ Affine3d local_transform(const GltfValue& node) {
 /// The tree of nodes with the transforms to the scene's frame.
 class GltfNodes {
  public:
-  explicit GltfNodes(GltfFile& file) : children_(file.count("nodes")), world_(file.count("nodes")) {
-    std::vector<int> parents(children_.size(), -1);
+  explicit GltfNodes(GltfFile& file)
+      : children_(file.count("nodes")), parents_(children_.size(), -1), world_(children_.size()) {
+    std::vector<int>& parents = parents_;
     for (std::size_t i = 0; i < children_.size(); ++i) {
       const GltfValue node = file.item("nodes", i);
       for (std::size_t k = 0; k < node.count("children"); ++k) {
@@ -54,40 +56,51 @@ class GltfNodes {
     std::vector<std::size_t> stack;
     for (std::size_t i = 0; i < parents.size(); ++i)
       if (parents[i] < 0) stack.push_back(i);
-    std::size_t visited = 0;
     while (!stack.empty()) {  // explicit, because the depth depends on the file
       const std::size_t i = stack.back();
       stack.pop_back();
-      ++visited;
+      order_.push_back(i);
       const Affine3d local = local_transform(file.item("nodes", i));
       world_[i] = parents[i] < 0 ? local : world_[static_cast<std::size_t>(parents[i])] * local;
       stack.insert(stack.end(), children_[i].begin(), children_[i].end());
     }
-    if (visited < children_.size()) throw FileError("nodes: the hierarchy is recursive");
+    if (order_.size() < children_.size()) throw FileError("nodes: the hierarchy is recursive");
   }
 
   std::size_t size() const { return children_.size(); }
   const std::vector<std::size_t>& children(std::size_t node) const { return children_[node]; }
   const Affine3d& world(std::size_t node) const { return world_[node]; }
+  const std::vector<int>& parents() const { return parents_; }
+  /// All nodes, parents first.
+  const std::vector<std::size_t>& order() const { return order_; }
 
  private:
   std::vector<std::vector<std::size_t>> children_;
+  std::vector<int> parents_;
   std::vector<Affine3d> world_;
+  std::vector<std::size_t> order_;
 };
 
 class GltfImporter {
  public:
-  GltfImporter(GltfFile& file, std::string wanted)
-      : file_(file), wanted_(std::move(wanted)), materials_(file, model_), builder_(model_) {}
+  GltfImporter(GltfFile& file, std::string wanted, bool with_rig)
+      : file_(file),
+        wanted_(std::move(wanted)),
+        with_rig_(with_rig),
+        materials_(file, model_),
+        builder_(model_) {}
 
   Model import() {
     materials_.read();
     const GltfNodes nodes(file_);
     nodes_ = &nodes;
     geometry_.emplace(file_, materials_, model_);
+    model_.clips = gltf_clips(file_);
+    if (with_rig_ && !model_.clips.empty()) rig_.emplace(file_, *geometry_, nodes.parents(), nodes.order());
     visit(roots());
     for (Model::Part& part : model_.parts)  // faces without normals are flat (section 3.7.2.1)
       if (part.mesh.normals.empty() && !part.mesh.indices.empty()) compute_normals(part.mesh, 0);
+    if (rig_) model_.rig = rig_->finish();
     warn_of_ignored();
     model_.unit = "1 m, as the format defines (glTF)";
     model_.warnings = file_.take_warnings();
@@ -166,6 +179,7 @@ class GltfImporter {
       for (const Affine3d& instance : instances)
         builder_.add(own ? *own : primitive.surface, frame * instance);
     }
+    if (rig_) rig_->add_mesh(index, mesh, instances);
   }
 
   /// EXT_mesh_gpu_instancing; without it, the node itself.
@@ -222,7 +236,9 @@ class GltfImporter {
     const auto warn = [this](std::size_t n, const std::string& what) {
       if (n > 0) file_.warn(std::to_string(n) + " " + what);
     };
-    warn(file_.count("animations"), "animations are ignored: the model is drawn in its rest pose");
+    if (!rig_)
+      warn(file_.count("animations"),
+           "animations are not played: the model is in its rest pose; `animation` of a body plays one");
     warn(file_.count("cameras"), "cameras are ignored: the scene has its own");
     warn(file_.root().extension("KHR_lights_punctual").count("lights"),
          "lights are ignored: the scene has its own");
@@ -238,10 +254,12 @@ class GltfImporter {
 
   GltfFile& file_;
   std::string wanted_;
+  bool with_rig_;
   Model model_;
   GltfMaterials materials_;
   PartBuilder builder_;
   std::optional<GltfGeometry> geometry_;
+  std::optional<GltfRig> rig_;
   const GltfNodes* nodes_ = nullptr;
   NodeNames names_;
 };
@@ -249,12 +267,12 @@ class GltfImporter {
 }  // namespace
 
 std::optional<Model> import_gltf(const std::filesystem::path& path, const std::string& node,
-                                 const InputFolders& folders) {
+                                 const InputFolders& folders, bool with_rig) {
   try {
     GltfFile file(path, folders);
     if (file.is_version_1()) return std::nullopt;
     file.check();
-    return GltfImporter(file, node).import();
+    return GltfImporter(file, node, with_rig).import();
   } catch (const FileError& error) {
     throw FileError("cannot be read as a model: " + one_line(error.what()));
   }

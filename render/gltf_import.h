@@ -15,6 +15,6 @@ namespace offstage::render {
 /// import_model(), but with the reasons of errors only. Empty for a file of version 1, which assimp reads.
 /// Throws FileError.
 std::optional<Model> import_gltf(const std::filesystem::path& path, const std::string& node,
-                                 const InputFolders& folders);
+                                 const InputFolders& folders, bool with_rig);
 
 }  // namespace offstage::render

@@ -24,6 +24,13 @@
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wunused-function"
 #include <stb_image.h>
+#define STB_IMAGE_WRITE_IMPLEMENTATION
+#define STB_IMAGE_WRITE_STATIC
+#define STBI_WRITE_NO_STDIO
+#pragma GCC diagnostic ignored "-Wconversion"
+#pragma GCC diagnostic ignored "-Wshadow"
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+#include <stb_image_write.h>
 #pragma GCC diagnostic pop
 
 namespace offstage::render {
@@ -87,6 +94,30 @@ std::vector<uint8_t> encode_png(const Image& image, const std::string& settings)
                               .channels = image.transparent ? 4 : 3,
                               .samples = image.transparent ? image.rgba : rgb,
                               .settings = settings});
+}
+
+std::vector<uint8_t> encode_jpeg(const Image& image, const std::string& settings) {
+  constexpr int kQuality = 95;
+  std::vector<uint8_t> bytes;
+  const auto append = [](void* context, void* data, int size) {
+    const auto* first = static_cast<const uint8_t*>(data);
+    static_cast<std::vector<uint8_t>*>(context)->insert(static_cast<std::vector<uint8_t>*>(context)->end(),
+                                                        first, first + size);
+  };
+  if (!stbi_write_jpg_to_func(append, &bytes, image.width_px, image.height_px, 3, without_alpha(image).data(),
+                              kQuality))
+    throw std::invalid_argument("a picture of " + std::to_string(image.width_px) + "x" +
+                                std::to_string(image.height_px) + " pixels cannot be a JPEG");
+  if (settings.empty()) return bytes;
+  // The comment follows the first segment, which must be JFIF's.
+  const std::string text = std::string(kJpegSettings) + settings;
+  const std::size_t length = text.size() + 2;
+  std::vector<uint8_t> comment = {0xFF, 0xFE, static_cast<uint8_t>(length >> 8),
+                                  static_cast<uint8_t>(length)};
+  comment.insert(comment.end(), text.begin(), text.end());
+  constexpr std::ptrdiff_t kJfifEnd = 20;
+  bytes.insert(bytes.begin() + kJfifEnd, comment.begin(), comment.end());
+  return bytes;
 }
 
 std::string png_settings(const std::filesystem::path& path) {

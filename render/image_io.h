@@ -1,8 +1,10 @@
 #pragma once
-/// Image files. Reading by stb_image, writing PNG by libdeflate.
+/// Image files. Reading and JPEG by stb, writing PNG by libdeflate.
 
 #include <filesystem>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "render/image.h"
@@ -25,6 +27,11 @@ Image decode_image(std::span<const uint8_t> bytes, const std::string& name,
 /// frames of a film are alike. `settings` identify the settings of the picture (ASCII, at most 256 bytes);
 /// they are stored in the frames of a film.
 std::vector<uint8_t> encode_png(const Image& image, const std::string& settings = {});
+
+/// Start of the comment in which a JPEG stores its settings.
+inline constexpr std::string_view kJpegSettings = "offstage settings ";
+/// Encodes JPEG of quality 95 with colour at full resolution. `settings` as for PNG. Alpha is left out.
+std::vector<uint8_t> encode_jpeg(const Image& image, const std::string& settings = {});
 
 /// Returns the settings stored in a PNG of offstage; empty for other files, and for a file that cannot be
 /// read.

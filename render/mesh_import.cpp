@@ -190,11 +190,12 @@ Model import_by_assimp(const std::filesystem::path& path, const std::string& nod
 
 }  // namespace
 
-Model import_model(const std::filesystem::path& path, const std::string& node, const InputFolders& folders) {
+Model import_model(const std::filesystem::path& path, const std::string& node, const InputFolders& folders,
+                   bool with_rig) {
   const auto fail = [&path](const std::string& why) { return FileError(path.string() + ": " + why); };
   Model model;
   try {
-    std::optional<Model> gltf = is_gltf(path) ? import_gltf(path, node, folders) : std::nullopt;
+    std::optional<Model> gltf = is_gltf(path) ? import_gltf(path, node, folders, with_rig) : std::nullopt;
     model = gltf ? std::move(*gltf) : import_by_assimp(path, node, folders);
   } catch (const FileError& error) {
     throw fail(error.what());

@@ -19,9 +19,10 @@ struct aiScene;
 namespace offstage::render {
 
 /// Imports a model with one part per material; parts whose file has no normals have none. With `node`, only
-/// the triangles of this node, in its frame; empty: all. Files outside of `folders` are treated as missing.
-/// Throws FileError.
-Model import_model(const std::filesystem::path& path, const std::string& node, const InputFolders& folders);
+/// the triangles of this node, in its frame; empty: all. `with_rig`: see read_model(). Files outside of
+/// `folders` are treated as missing. Throws FileError.
+Model import_model(const std::filesystem::path& path, const std::string& node, const InputFolders& folders,
+                   bool with_rig = false);
 
 /// Fills `materials` and `textures`, with a warning for each texture that is not found. Textures are searched
 /// by the name given, then by file name beside the model. `mtl` completes the materials of OBJ files by name.

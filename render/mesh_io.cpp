@@ -1,6 +1,7 @@
 #include "render/mesh_io.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <span>
 #include <type_traits>
@@ -11,6 +12,8 @@
 #include "render/gltf_packed.h"
 #include "render/image_io.h"
 #include "render/mesh_import.h"
+#include "render/model_files.h"
+#include "render/point_cloud.h"
 
 // With files that any fuzzer finds within minutes, assimp overflows its stack, loops, or allocates the size
 // that a header claims, and the libraries for compressed data may do so. Therefore a confined child imports
@@ -29,18 +32,64 @@ void transfer_image(Archive& archive, Image& image) {
   archive.array(image.rgba);
 }
 
+template <class Archive>
+void transfer_mesh(Archive& archive, Mesh& mesh) {
+  archive.array(mesh.positions);
+  archive.array(mesh.normals);
+  archive.array(mesh.uvs);
+  archive.array(mesh.second_uvs);
+  archive.array(mesh.colors);
+  archive.array(mesh.tangents);
+  archive.array(mesh.indices);
+}
+
+template <class Archive>
+void transfer_rig(Archive& archive, ModelRig& rig) {
+  archive.list(rig.nodes, [&](RigNode& node) {
+    archive.array(node.name);
+    archive.value(node.parent);
+    archive.value(node.translation);
+    archive.value(node.rotation.coeffs());
+    archive.value(node.scale);
+    archive.value(node.has_matrix);
+    archive.value(node.matrix);
+    archive.array(node.weights);
+  });
+  archive.list(rig.clips, [&](RigClip& clip) {
+    archive.array(clip.name);
+    archive.value(clip.duration);
+    archive.list(clip.channels, [&](RigChannel& channel) {
+      archive.value(channel.node);
+      archive.value(channel.path);
+      archive.value(channel.interpolation);
+      archive.array(channel.times);
+      archive.array(channel.values);
+    });
+  });
+  archive.list(rig.skins, [&](RigSkin& skin) {
+    archive.array(skin.joints);
+    archive.array(skin.unbind);
+  });
+  archive.list(rig.surfaces, [&](RigSurface& surface) {
+    for (int* number : {&surface.node, &surface.skin, &surface.material}) archive.value(*number);
+    transfer_mesh(archive, surface.mesh);
+    archive.value(surface.flat);
+    archive.value(surface.influences);
+    archive.array(surface.joints);
+    archive.array(surface.weights);
+    archive.list(surface.targets, [&](RigTarget& target) {
+      archive.array(target.positions);
+      archive.array(target.normals);
+    });
+  });
+}
+
 /// Calls `archive` for all members of a model; the same list serves writing and reading.
 template <class Archive>
 void transfer(Archive& archive, Model& model) {
   archive.list(model.parts, [&](Model::Part& part) {
     archive.value(part.material);
-    archive.array(part.mesh.positions);
-    archive.array(part.mesh.normals);
-    archive.array(part.mesh.uvs);
-    archive.array(part.mesh.second_uvs);
-    archive.array(part.mesh.colors);
-    archive.array(part.mesh.tangents);
-    archive.array(part.mesh.indices);
+    transfer_mesh(archive, part.mesh);
   });
   archive.list(model.nodes, [&](Model::Node& node) {
     archive.array(node.name);
@@ -73,6 +122,11 @@ void transfer(Archive& archive, Model& model) {
     archive.value(m.clearcoat_roughness);
     archive.value(m.sheen_color);
   });
+  archive.list(model.clips, [&](Model::Clip& clip) {
+    archive.array(clip.name);
+    archive.value(clip.duration);
+  });
+  transfer_rig(archive, model.rig);
   archive.list(model.textures, [&](Image& image) { transfer_image(archive, image); });
   archive.array(model.unit);
   archive.list(model.warnings, [&](std::string& line) { archive.array(line); });
@@ -189,7 +243,9 @@ bool is_whole(const Model& model) {
                                for_each_texture(m, [&](const TextureMap& map) { whole &= texture(map); });
                                return whole;
                              }) &&
-         std::ranges::all_of(model.textures, [](const Image& image) { return is_whole(image); });
+         std::ranges::all_of(model.textures, [](const Image& image) { return is_whole(image); }) &&
+         std::ranges::all_of(model.clips, [](const Model::Clip& c) { return std::isfinite(c.duration); }) &&
+         is_whole(model.rig, model.materials.size());
 }
 
 /// The folders that a child may read: the given ones or, if there are none, that of the file itself.
@@ -199,6 +255,24 @@ InputFolders readable(const std::filesystem::path& path, const InputFolders& fol
 
 void check_folder(const std::filesystem::path& path, const InputFolders& folders) {
   if (!folders.folders().empty() && !folders.contain(path)) throw FileError(outside_of_folders(path));
+}
+
+/// Number of pictures in the folder of a model and the folders in it, to which the model may refer.
+uint64_t pictures_beside(const std::filesystem::path& model) {
+  constexpr int kMostEntries = 4096, kMostDepth = 2;
+  namespace fs = std::filesystem;
+  std::error_code error;
+  uint64_t pictures = 0;
+  int entries = 0;
+  const fs::path folder = model.has_parent_path() ? model.parent_path() : ".";
+  for (fs::recursive_directory_iterator entry(folder, fs::directory_options::skip_permission_denied, error),
+       end;
+       entry != end && !error && ++entries <= kMostEntries; entry.increment(error)) {
+    if (entry.depth() >= kMostDepth) entry.disable_recursion_pending();
+    for (const char* ending : {".png", ".jpg", ".jpeg", ".webp", ".tga", ".bmp"})
+      if (has_ending(entry->path(), ending)) ++pictures;
+  }
+  return pictures;
 }
 
 uint64_t checked_size(const std::filesystem::path& path) {
@@ -248,22 +322,59 @@ Model decode_model(std::span<const uint8_t> bytes) {
   return model;
 }
 
-Model read_model(const std::filesystem::path& file, const InputFolders& folders, const StopTest& stop) {
+Model read_model(const std::filesystem::path& file, const InputFolders& folders, const StopTest& stop,
+                 bool with_rig) {
   const ModelPath place = split_node(file);
   const std::filesystem::path& path = place.file;
   check_folder(path, folders);
   const uint64_t size = checked_size(path);
   const InputFolders allowed = readable(path, folders);
-  const ChildAnswer answer = run_confined(
-      {.what = path.string(), .file_bytes = size, .folders = &allowed, .stop = stop}, [&](int memory) {
-        Model model = import_model(path, place.node, allowed);
-        write_model(model, memory);
-      });
+  const ChildAnswer answer = run_confined({.what = path.string(),
+                                           .file_bytes = size,
+                                           .pictures = pictures_beside(path),
+                                           .folders = &allowed,
+                                           .stop = stop},
+                                          [&](int memory) {
+                                            Model model = import_model(path, place.node, allowed, with_rig);
+                                            write_model(model, memory);
+                                          });
   Model model = decode_model(answer.bytes());
   for (Model::Part& part : model.parts) {
     if (part.mesh.normals.empty()) compute_normals(part.mesh);
   }
   return model;
+}
+
+PointCloud read_points(const std::filesystem::path& path, const InputFolders& folders, const StopTest& stop) {
+  check_folder(path, folders);
+  const bool is_ply = has_ending(path, ".ply");
+  if (!is_ply && !has_ending(path, ".obj"))
+    throw FileError(path.string() + ": point clouds are PLY or OBJ files");
+  const uint64_t size = checked_size(path);
+  const InputFolders allowed = readable(path, folders);
+  const ChildAnswer answer = run_confined(
+      {.what = path.string(), .file_bytes = size, .folders = &allowed, .stop = stop}, [&](int memory) {
+        const std::vector<uint8_t> bytes = read_file(path, kMaxMeshBytes);
+        PointCloud cloud;
+        try {
+          cloud = is_ply ? parse_ply_points(bytes) : parse_obj_points(bytes);
+        } catch (const FileError& error) {
+          throw FileError(path.string() + ": cannot be read as a point cloud: " + error.what());
+        }
+        Writer writer(memory);
+        writer.array(cloud.positions);
+        writer.array(cloud.colors);
+      });
+  PointCloud cloud;
+  Reader reader(answer.bytes());
+  reader.array(cloud.positions);
+  reader.array(cloud.colors);
+  const bool whole = cloud.colors.empty() || cloud.colors.size() == cloud.positions.size();
+  if (!whole || !std::ranges::all_of(cloud.positions, [](const Vector3f& p) { return p.allFinite(); }) ||
+      !std::ranges::all_of(cloud.colors, [](const Vector4f& c) { return c.allFinite(); }))
+    throw damaged_answer();
+  if (cloud.positions.empty()) throw FileError(path.string() + ": has no points");
+  return cloud;
 }
 
 Image read_texture(const std::filesystem::path& path, const InputFolders& folders, const StopTest& stop) {

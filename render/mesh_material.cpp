@@ -168,11 +168,11 @@ class MaterialImporter {
       return model_.textures[static_cast<std::size_t>(index)];
     };
     const int base = look.base_color_texture.image;
-    Image combined = with_mask(base >= 0 ? at(base) : Image{}, at(mask));
-    look.alpha_cutoff = is_cut_out(combined) ? 0.5f : 0.0f;
+    const auto [entry, is_new] = masked_.try_emplace({base, mask}, static_cast<int>(model_.textures.size()));
+    if (is_new) model_.textures.push_back(with_mask(base >= 0 ? at(base) : Image{}, at(mask)));
+    look.alpha_cutoff = is_cut_out(at(entry->second)) ? 0.5f : 0.0f;
     if (base < 0) lay(map, look.base_color_texture);
-    look.base_color_texture.image = static_cast<int>(model_.textures.size());
-    model_.textures.push_back(std::move(combined));
+    look.base_color_texture.image = entry->second;
   }
 
   /// Many programs write normal maps where the format has height maps.
@@ -184,8 +184,11 @@ class MaterialImporter {
     lay(map, look.normal_texture);
     const Image& image = model_.textures[static_cast<std::size_t>(picture)];
     if (is_normal_map(image)) return;
-    look.normal_texture.image = static_cast<int>(model_.textures.size());
     look.normal_scale = 1;  // 8 bits are too coarse to scale the slope afterwards
+    const auto [entry, is_new] =
+        bumps_.try_emplace({picture, map.bump}, static_cast<int>(model_.textures.size()));
+    look.normal_texture.image = entry->second;
+    if (!is_new) return;
     Image normals = normals_of_heights(image, map.bump);
     model_.textures.push_back(std::move(normals));
   }
@@ -234,6 +237,8 @@ class MaterialImporter {
   const InputFolders& folders_;
   Model& model_;
   std::map<std::pair<std::string, bool>, int> loaded_;
+  std::map<std::pair<int, int>, int> masked_;   ///< by base colour and mask
+  std::map<std::pair<int, float>, int> bumps_;  ///< normal maps by height map and strength
 };
 
 }  // namespace

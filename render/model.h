@@ -11,38 +11,10 @@
 #include <Eigen/Geometry>
 
 #include "render/image.h"
+#include "render/mesh.h"
+#include "render/model_rig.h"
 
 namespace offstage::render {
-
-using Eigen::Vector2f;
-using Eigen::Vector3f;
-using Eigen::Vector4f;
-
-/// Indexed triangles. The lists of vertex data are empty or as long as `positions`; meshes without normals
-/// are shaded smooth.
-struct Mesh {
-  std::vector<Vector3f> positions;
-  std::vector<Vector3f> normals;
-  std::vector<Vector2f> uvs;
-  std::vector<Vector2f> second_uvs = {};  ///< for textures with TextureMap::uv_set 1
-  std::vector<Vector4f> colors = {};      ///< linear, straight alpha; used if Material::vertex_colors
-  /// Direction of increasing u for normal maps; w is 1 or -1, the side of the direction of increasing v.
-  /// Empty: derived from the texture coordinates while drawing.
-  std::vector<Vector4f> tangents = {};
-  std::vector<uint32_t> indices;  ///< three per triangle, counter-clockwise seen from outside
-  /// A coarser surface with the same vertices, slightly inside the fine one and closed if that is. It is used
-  /// for shadows and depth. Empty: none.
-  std::vector<uint32_t> coarse_indices = {};
-  /// Marks a mesh that stands for an infinite plane. It fades into the sky near its horizon, where it is seen
-  /// at a grazing angle.
-  bool endless = false;
-
-  Eigen::AlignedBox3f bounds() const;
-};
-
-/// Fills `normals` with area-weighted means, split at edges sharper than `crease_deg` (vertices are
-/// duplicated there).
-void compute_normals(Mesh& mesh, float crease_deg = 40);
 
 /// Procedural surface patterns. They are evaluated in object space and need no texture coordinates; on cloths
 /// they follow the cloth.
@@ -164,6 +136,13 @@ struct Model {
   std::vector<Node> nodes;  ///< parents first
   std::vector<Material> materials;
   std::vector<Image> textures;
+  /// The animations of the file that can be played.
+  struct Clip {
+    std::string name;
+    float duration = 0;  ///< [s]
+  };
+  std::vector<Clip> clips;
+  ModelRig rig;                       ///< its moving parts, if they were asked for
   std::string unit;                   ///< unit of length in the file and how it was found, in words
   std::vector<std::string> warnings;  ///< repaired or ignored elements, one line each
 

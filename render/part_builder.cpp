@@ -15,8 +15,25 @@ std::vector<Vector3f> moved_positions(const Mesh& mesh, const Eigen::Affine3d& w
   return positions;
 }
 
-/// Transformed normals; empty if the mesh has none, or an invalid one.
-std::vector<Vector3f> moved_normals(const Mesh& mesh, const Eigen::Affine3d& world_from_mesh) {
+/// The mean normal of the faces around each vertex, weighted by their areas; zero where there are none.
+std::vector<Eigen::Vector3d> face_normals(const Mesh& mesh) {
+  std::vector<Eigen::Vector3d> sums(mesh.positions.size(), Eigen::Vector3d::Zero());
+  for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+    const uint32_t* t = mesh.indices.data() + i;
+    if (std::max({t[0], t[1], t[2]}) >= sums.size()) continue;
+    const Eigen::Vector3d a = mesh.positions[t[0]].cast<double>();
+    const Eigen::Vector3d area =
+        (mesh.positions[t[1]].cast<double>() - a).cross(mesh.positions[t[2]].cast<double>() - a);
+    if (!area.allFinite()) continue;
+    for (int k = 0; k < 3; ++k) sums[t[k]] += area;
+  }
+  return sums;
+}
+
+/// Transformed normals; empty if the mesh has none. Those that are no directions are replaced by the mean of
+/// their faces, and counted in `replaced`.
+std::vector<Vector3f> moved_normals(const Mesh& mesh, const Eigen::Affine3d& world_from_mesh,
+                                    std::size_t& replaced) {
   if (mesh.normals.empty() || mesh.normals.size() != mesh.positions.size()) return {};
   const Eigen::Matrix3d linear = world_from_mesh.linear();
   // The cofactor matrix is the inverse transpose times the determinant; the sign compensates that of the
@@ -27,11 +44,17 @@ std::vector<Vector3f> moved_normals(const Mesh& mesh, const Eigen::Affine3d& wor
   if (linear.determinant() < 0) cofactor = -cofactor;
   std::vector<Vector3f> normals;
   normals.reserve(mesh.normals.size());
-  for (const Vector3f& n : mesh.normals) {
-    const Eigen::Vector3d normal = cofactor * n.cast<double>();
-    const double length = normal.norm();
-    if (!(length > 0) || !std::isfinite(length)) return {};
-    normals.push_back((normal / length).cast<float>());
+  const auto is_direction = [](const Eigen::Vector3d& v) { return v.norm() > 0 && std::isfinite(v.norm()); };
+  std::vector<Eigen::Vector3d> faces;
+  for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
+    Eigen::Vector3d normal = cofactor * mesh.normals[i].cast<double>();
+    if (!is_direction(normal)) {
+      if (faces.empty()) faces = face_normals(mesh);
+      ++replaced;
+      normal = cofactor * faces[i];
+      if (!is_direction(normal)) normal = Eigen::Vector3d::UnitY();  // no face with an area uses the vertex
+    }
+    normals.push_back(normal.normalized().cast<float>());
   }
   return normals;
 }
@@ -72,15 +95,14 @@ std::vector<std::string> PartBuilder::left_out() const {
   add(bad_index_, " faces left out: their indices are out of range");
   add(not_finite_, " faces left out: a vertex is not finite");
   add(no_area_, " faces left out: they have no area");
-  add(bad_normals_, " meshes have unusable normals, replaced");
+  add(bad_normals_, " normals are no directions; they are replaced by the mean of their faces");
   return lines;
 }
 
 void PartBuilder::add(const FileSurface& surface, const Eigen::Affine3d& world_from_mesh) {
   const Mesh& mesh = surface.mesh;
   const std::vector<Vector3f> positions = moved_positions(mesh, world_from_mesh);
-  const std::vector<Vector3f> normals = moved_normals(mesh, world_from_mesh);
-  if (!mesh.normals.empty() && normals.empty()) ++bad_normals_;
+  const std::vector<Vector3f> normals = moved_normals(mesh, world_from_mesh, bad_normals_);
 
   Mesh& out = part(surface, !normals.empty());
   const bool mirrored = world_from_mesh.linear().determinant() < 0;

@@ -2,17 +2,36 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "render/paint_order.h"
 
 namespace offstage::render {
 namespace {
 
+constexpr GLuint kPictureUnit = 1;
+constexpr float kCorner = std::numbers::sqrt2_v<float>;  // distance of the corner of a picture, in radii
+
 // The finalizer of splitmix64, mapped to a number in [0, 1).
 float number_of_its_own(uint64_t id) {
   id = (id ^ (id >> 30)) * 0xBF58476D1CE4E5B9ull;
   id = (id ^ (id >> 27)) * 0x94D049BB133111EBull;
   return static_cast<float>((id ^ (id >> 31)) >> 40) * 0x1p-24f;
+}
+
+/// The pictures of a sheet that a particle shows at its age.
+GpuPicture picture_of(const Point& point, const PointsDef& def, float random_number) {
+  const SpriteSheet& sheet = def.sheet;
+  const int count = sheet.columns * sheet.rows;
+  if (count <= 1) return {point.angle, 0, 0, 0};
+  const auto n = static_cast<double>(count);
+  double at = std::max(double{point.age}, 0.0) * sheet.fps;
+  if (sheet.random_start) at += std::floor(random_number * n);
+  at = sheet.loop ? std::fmod(at, n) : std::min(at, n - 1);
+  const double first = std::min(std::floor(at), n - 1);
+  const double second = first + 1 < n ? first + 1 : sheet.loop ? 0 : first;
+  return {point.angle, static_cast<float>(first), static_cast<float>(second),
+          sheet.blend ? static_cast<float>(at - first) : 0};
 }
 
 Vector4f style_of(const PointsDef& def) {
@@ -26,6 +45,7 @@ void PointSet::assign(std::span<const Point> values) {
   points.clear();
   ids.clear();
   ages.clear();
+  turns.clear();
   box.setEmpty();
   std::vector<Point> by_id;
   const auto smaller_id = [](const Point& a, const Point& b) { return a.id < b.id; };
@@ -45,20 +65,21 @@ void PointSet::assign(std::span<const Point> values) {
     points.push_back(point);
     ids.push_back(value.id);
     ages.push_back(value.age);
-    Vector3f reach = Vector3f::Constant(value.radius);
+    if (is_turned()) turns.push_back(picture_of(value, def, point.velocity.w()));
+    Vector3f reach = Vector3f::Constant(pictures ? kCorner * value.radius : value.radius);
     if (is_stretched()) reach += value.velocity.cwiseAbs() * (0.5f * def.stretch_s);
     box.extend(value.position - reach).extend(value.position + reach);
   }
 }
 
 float PointSet::reach(std::size_t i) const {
-  const float radius = points[i].position.w();
+  const float radius = pictures ? kCorner * points[i].position.w() : points[i].position.w();
   const float stretch = is_stretched() ? 0.5f * def.stretch_s * points[i].velocity.head<3>().norm() : 0.f;
   return radius + stretch;
 }
 
-PointsPass::Programs& PointsPass::programs(PointStyle style, const Features& features) {
-  const auto found = programs_.find({style, features});
+PointsPass::Programs& PointsPass::programs(PointStyle style, const Features& features, bool pictures) {
+  const auto found = programs_.find({style, features, pictures});
   if (found != programs_.end()) return found->second;
   const std::string define = "STYLE " + std::to_string(static_cast<int>(style));
   const std::vector<std::string_view> vertex = {"frame.glsl", "sky.glsl", "light.glsl", "lamps.glsl",
@@ -68,12 +89,15 @@ PointsPass::Programs& PointsPass::programs(PointStyle style, const Features& fea
     fragment = {"frame.glsl", "sky.glsl", "light.glsl", "lamps.glsl", "traced.glsl", "sphere.frag"};
   std::vector<std::string> defines = features;
   defines.push_back(define);
+  std::vector<std::string> shadow_defines = {define, "SHADOW 1"};
+  if (pictures)
+    for (std::vector<std::string>* list : {&defines, &shadow_defines}) list->push_back("PICTURES 1");
   return programs_
-      .emplace(std::pair(style, features),
+      .emplace(std::tuple(style, features, pictures),
                Programs{{vertex, fragment, defines},
                         {{"frame.glsl", "points.vert"},
                          {"frame.glsl", "points_shape.glsl", "points_shadow.frag"},
-                         {define, "SHADOW 1"}},
+                         shadow_defines},
                         {vertex,
                          {"frame.glsl", "sky.glsl", "light.glsl", "surface.glsl", "sphere.frag"},
                          {define, "SURFACE 1"}}})
@@ -88,12 +112,18 @@ PointsPass::PointsPass() : vertex_array_(gl::make_vertex_array()), blended_array
     glVertexArrayBindingDivisor(array, 0, 1);
   }
   gl::set_attribute(blended_array_, 3, 0, 4, offsetof(BlendedPoint, style));
+  gl::set_attribute(blended_array_, 4, 0, 4, offsetof(BlendedPoint, picture));
+  gl::set_attribute(vertex_array_, 4, 1, 4, 0);
+  glVertexArrayBindingDivisor(vertex_array_, 1, 1);
 }
 
 void PointsPass::prepare(PointSet& set, const View& view) {
   set.unseen = 0;
   if (set.def.style != PointStyle::sphere) {
-    if (set.def.casts_shadow) set.buffer.write(std::span<const GpuPoint>(set.points));
+    if (set.def.casts_shadow) {
+      set.buffer.write(std::span<const GpuPoint>(set.points));
+      set.turn_buffer.write(std::span<const GpuPicture>(set.turns));
+    }
     return;
   }
   keys_.clear();
@@ -118,11 +148,15 @@ void PointsPass::prepare(PointSet& set, const View& view) {
 
 void PointsPass::prepare_blended(const PaintOrder& order) {
   blended_.clear();
+  picture_runs_.clear();
   const auto append = [&](PaintOrder::Kind kind) {
     const std::span<const uint64_t> keys = order.keys(kind);
     for (std::size_t k = keys.size(); k-- > 0;) {
       const PaintOrder::Place at = order.place(kind, keys[k]);
-      blended_.push_back({at.set->points[at.index], style_of(at.set->def)});
+      const GLuint pictures = at.set->pictures;
+      if (picture_runs_.empty() || picture_runs_.back().pictures != pictures)
+        picture_runs_.push_back({blended_.size(), pictures});
+      blended_.push_back({at.set->points[at.index], style_of(at.set->def), at.set->turns[at.index]});
     }
     return static_cast<uint32_t>(keys.size());
   };
@@ -134,13 +168,17 @@ void PointsPass::prepare_blended(const PaintOrder& order) {
 void PointsPass::draw(const PointSet& set, std::size_t first) {
   const auto offset = static_cast<GLintptr>(first * sizeof(GpuPoint));
   glVertexArrayVertexBuffer(vertex_array_, 0, set.buffer, offset, sizeof(GpuPoint));
+  // The programs of balls do not read it.
+  glVertexArrayVertexBuffer(vertex_array_, 1, set.is_turned() ? set.turn_buffer : set.buffer, 0,
+                            set.is_turned() ? sizeof(GpuPicture) : 0);
   glBindVertexArray(vertex_array_);
   glUniform4fv(1, 1, style_of(set.def).data());
   glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(set.points.size() - first));
 }
 
 void PointsPass::draw_shadow(const PointSet& set, const Matrix4f& shadow_clip_from_world) {
-  programs(set.def.style).shadow.use();
+  programs(set.def.style, {}, set.pictures != 0).shadow.use();
+  if (set.pictures) glBindTextureUnit(kPictureUnit, set.pictures);
   glUniformMatrix4fv(0, 1, GL_FALSE, shadow_clip_from_world.data());
   draw(set, 0);
 }
@@ -152,9 +190,23 @@ void PointsPass::draw_spheres(const PointSet& set, const Features& features) {
 }
 
 void PointsPass::draw_blended(PointStyle style, uint32_t first, uint32_t last, const Features& features) {
-  programs(style, features).seen.use();
   const uint32_t begin = style == PointStyle::flake ? sprites_ + flakes_ - last : sprites_ - last;
-  const auto offset = static_cast<GLintptr>(begin * sizeof(BlendedPoint));
+  const uint32_t end = begin + (last - first);
+  // Neighbours with other pictures are drawn by further calls.
+  auto run = std::upper_bound(picture_runs_.begin(), picture_runs_.end(), std::size_t{begin},
+                              [](std::size_t place, const PictureRun& r) { return place < r.first; });
+  for (std::size_t from = begin; from < end; ++run) {
+    const std::size_t to = run == picture_runs_.end() ? end : std::min<std::size_t>(run->first, end);
+    draw_blended(style, std::prev(run)->pictures, from, to, features);
+    from = to;
+  }
+}
+
+void PointsPass::draw_blended(PointStyle style, GLuint pictures, std::size_t first, std::size_t last,
+                              const Features& features) {
+  programs(style, features, pictures != 0).seen.use();
+  if (pictures) glBindTextureUnit(kPictureUnit, pictures);
+  const auto offset = static_cast<GLintptr>(first * sizeof(BlendedPoint));
   glVertexArrayVertexBuffer(blended_array_, 0, blended_buffer_, offset, sizeof(BlendedPoint));
   glBindVertexArray(blended_array_);
   glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(last - first));

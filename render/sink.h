@@ -17,6 +17,10 @@ class FrameSink {
   virtual ~FrameSink() = default;
   /// Throws FileError, also when the encoder ended early; the message then contains its last output.
   virtual void write(int frame, const Image& image) = 0;
+  /// Whether the sink stores linear light: then write_linear() is called after each write().
+  virtual bool needs_linear() const { return false; }
+  /// Writes the linear light of a frame, exposed; premultiplied alpha.
+  virtual void write_linear(int, const HdrImage&) {}
   /// Completes the output: a video gets its name only now. Without this call the destructor discards partial
   /// output.
   virtual void close() = 0;
@@ -25,10 +29,6 @@ class FrameSink {
 /// Returns the file of a frame: `pattern` has a run of '#' in its file name, which is replaced by the number
 /// with at least as many digits.
 std::filesystem::path frame_path(const std::filesystem::path& pattern, int frame);
-
-/// Creates a sink that writes one PNG per frame with the settings (encode_png).
-std::unique_ptr<FrameSink> make_png_sink(const std::filesystem::path& pattern,
-                                         const std::string& settings = {});
 
 struct VideoDef {
   std::filesystem::path

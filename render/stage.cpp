@@ -18,6 +18,7 @@
 #include "render/puffs_pass.h"
 #include "render/shadow_map.h"
 #include "render/slots.h"
+#include "render/sprite_pictures.h"
 #include "render/streaks_pass.h"
 #include "render/surface_probe.h"
 
@@ -181,12 +182,11 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
     for (int k = 0; k < 8; ++k)
       casters.push_back({box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k)), 1e-3f});
   }
-  // Opaque surfaces and balls have traced light; the map is for everything else. Without a caster it is empty,
-  // which means light everywhere.
-  const bool needed =
-      !mesh_pass.translucent().empty() ||
-      std::ranges::any_of(sheets, [](const Cloth* cloth) { return cloth->is_translucent(); }) ||
-      std::ranges::any_of(sets, [](const PointSet* set) { return set->def.style != PointStyle::sphere; });
+  // Opaque surfaces and balls have traced light; the map is for everything else. Without a caster it is
+  // empty, which means light everywhere.
+  const bool needed = !mesh_pass.translucent().empty() || std::ranges::any_of(sheets, [](const Cloth* cloth) {
+    return cloth->is_translucent();
+  }) || std::ranges::any_of(sets, [](const PointSet* set) { return set->def.style != PointStyle::sphere; });
   ShadowFrame shadow;
   if (sun.shadows && needed)
     shadow = fit_shadow(casters, view, frame.sun_direction.head<3>(), frame.eye.w(), def.shadow_map_px);
@@ -467,6 +467,11 @@ MeshHandle Stage::add_mesh(const Mesh& mesh) {
   return handle;
 }
 
+void Stage::set_mesh(MeshHandle handle, const Mesh& mesh) {
+  *impl_->meshes[handle] = GpuMesh(mesh);
+  gl::check_error("uploading a mesh");
+}
+
 MaterialHandle Stage::add_material(const Material& material, std::span<const Image> textures) {
   auto gpu = std::make_unique<GpuMaterial>(make_gpu_material(material, textures));
   gl::check_error("uploading a material");
@@ -482,7 +487,7 @@ InstanceHandle Stage::add_instance(MeshHandle mesh, MaterialHandle material, boo
   return impl_->instances.add(std::move(instance));
 }
 
-PointsHandle Stage::add_points(const PointsDef& def) {
+PointsHandle Stage::add_points(const PointsDef& def, const Image& picture) {
   auto set = std::make_unique<PointSet>();
   set->def = def;
   if (def.style == PointStyle::sphere)
@@ -490,6 +495,10 @@ PointsHandle Stage::add_points(const PointsDef& def) {
         Material{
             .color = {1, 1, 1, 1}, .metallic = def.metallic, .roughness = def.roughness, .unlit = !def.lit},
         std::span<const Image>());
+  if (def.style == PointStyle::sprite && picture.pixel_count() > 0) {
+    set->pictures = make_sprite_pictures(picture, def.sheet.columns, def.sheet.rows);
+    gl::check_error("uploading a sprite's picture");
+  }
   return impl_->point_sets.add(std::move(set));
 }
 

@@ -75,7 +75,8 @@ struct Point {
   float radius;       ///< [m]
   Vector4f color;     ///< linear, straight alpha
   uint64_t id;        ///< breaks ties when sorting, and selects the shape of a puff
-  float age = 0;      ///< [s], turns puffs slowly
+  float age = 0;      ///< [s], turns puffs slowly, and selects the picture of a sheet
+  float angle = 0;    ///< rotation of a sprite or flake about the line of sight [rad]
 };
 
 enum class PointStyle {
@@ -89,18 +90,28 @@ enum class PointStyle {
   flake,  ///< thin irregular disc, bright against the light: snow, dust
 };
 
+/// Pictures of a flip-book in one image, in rows from the upper left corner.
+struct SpriteSheet {
+  int columns = 1, rows = 1;
+  float fps = 12;             ///< pictures per second of a particle's age, >= 0
+  bool blend = true;          ///< fades from each picture to the next; false: they change at once
+  bool loop = true;           ///< the first picture follows the last; false: the last one stays
+  bool random_start = false;  ///< particles start with different pictures
+};
+inline constexpr int kMostSheetPictures = 1024;
+
 struct PointsDef {
   PointStyle style = PointStyle::sprite;
   bool additive = false;     ///< adds light instead of covering: fire, sparks
   bool lit = true;           ///< lit by sun and sky; false: its colour is its radiance
   bool casts_shadow = true;  ///< casts a shadow on the scene; smoke also on other smoke
   float softness = 0.5f;     ///< width of the fade at the rim, as a share of the radius, in [0, 1]
-  /// Length of streaks is velocity * stretch_s; other styles except balls and sprites are longer by this
-  /// [s].
+  /// Length of streaks is velocity * stretch_s; other styles except balls are longer by this [s].
   float stretch_s = 1.0f / 60;
   /// Share by which a streak fades towards its tail, in [0, 1]: 0 for a drop, 1 for a spark.
   float taper = 0;
   float metallic = 0, roughness = 0.3f;  ///< for spheres
+  SpriteSheet sheet = {};                ///< division of the picture of sprites
 };
 
 /// A line drawn as with a round pen. It faces the eye, is not lit, and casts no shadow. If both ends are
@@ -149,11 +160,16 @@ class Stage {
   Stage(Stage&&) noexcept;
 
   MeshHandle add_mesh(const Mesh& mesh);
+  /// Replaces a mesh, for instance by its next pose; all instances of it change.
+  void set_mesh(MeshHandle handle, const Mesh& mesh);
   /// `textures` are those to which the material's indices refer; each is uploaded once per call, with mip
   /// maps.
   MaterialHandle add_material(const Material& material, std::span<const Image> textures = {});
   InstanceHandle add_instance(MeshHandle mesh, MaterialHandle material, bool casts_shadow = true);
-  PointsHandle add_points(const PointsDef& def);
+  /// `picture`: drawn for each sprite instead of a soft disc; it covers the square around the particle, or a
+  /// part of it if it is not square. Empty: none. Throws std::invalid_argument if the sheet has more than
+  /// kMostSheetPictures pictures, or none.
+  PointsHandle add_points(const PointsDef& def, const Image& picture = {});
   LinesHandle add_lines(const LinesDef& def);
   /// Adds a cloth, which is not visible before set_cloth(). Throws std::invalid_argument for an index out of
   /// range.

@@ -6,6 +6,11 @@ layout(location = 2) in float reach;
 layout(location = 3) flat in vec2 lobe;
 #endif
 layout(location = 4) flat in vec2 rim;  // softness, additive
+#ifdef PICTURES
+layout(location = 5) flat in vec3 picture;  // two layers, share of the second one
+layout(location = 6) in vec3 haze;
+layout(binding = 1) uniform sampler2DArray pictures;  // premultiplied
+#endif
 layout(binding = 4) uniform sampler2D scene_depth;
 layout(location = 0) out vec4 color;
 
@@ -17,6 +22,12 @@ float depth_fade(float radius) {
 
 void main() {
   vec3 radiance = light.rgb;
+#ifdef PICTURES
+  vec4 texel = mix(texture(pictures, vec3(place.xy, picture.x)), texture(pictures, vec3(place.xy, picture.y)), picture.z);
+  float share = light.a * depth_fade(reach);
+  color = vec4((light.rgb * texel.rgb + haze * texel.a) * share, texel.a * share * (1.0 - rim.y));
+}
+#else
 #if STYLE == 5
   // Approximately three blunt corners.
   float c = dot(place.xy, lobe) * inversesqrt(dot(place.xy, place.xy) + 1e-6);
@@ -29,3 +40,4 @@ void main() {
 #endif
   color = vec4(radiance * alpha, alpha * (1.0 - rim.y));
 }
+#endif

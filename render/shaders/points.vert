@@ -2,6 +2,9 @@
 layout(location = 0) in vec4 in_position;  // w: radius
 layout(location = 1) in vec4 in_velocity;  // w: random number in [0, 1)
 layout(location = 2) in vec4 in_color;
+#if STYLE != 2
+layout(location = 4) in vec4 in_picture;   // angle, two layers of the sheet, share of the second one
+#endif
 #ifdef SHADOW
 layout(location = 0) uniform mat4 shadow_clip_from_world;
 #endif
@@ -12,10 +15,15 @@ layout(location = 1) uniform vec4 style;
 layout(location = 3) in vec4 style;
 #endif
 
-// Position on the quad in radii: across, up, and for a flake half the length of its axis, which is vertical.
+// Position on the quad in radii: across, up, and half the length of its axis, which is vertical.
+// With pictures: coordinates on the picture.
 layout(location = 0) out vec3 place;
 #ifdef SHADOW
 layout(location = 1) flat out vec2 dimming;  // alpha, offset of the dither
+#ifdef PICTURES
+layout(location = 5) flat out vec3 picture;  // two layers, share of the second one
+layout(binding = 1) uniform sampler2DArray pictures;
+#endif
 #elif STYLE == 2
 layout(location = 1) flat out vec4 color;
 layout(location = 2) flat out vec4 ball;     // centre, radius
@@ -30,6 +38,11 @@ layout(location = 2) out float reach;        // radius
 layout(location = 3) flat out vec2 lobe;     // direction of a flake's first corner
 #endif
 layout(location = 4) flat out vec2 rim;      // softness, additive
+#ifdef PICTURES
+layout(location = 5) flat out vec3 picture;  // two layers, share of the second one
+layout(location = 6) out vec3 haze;          // fog between eye and particle
+layout(binding = 1) uniform sampler2DArray pictures;
+#endif
 #endif
 
 // Unit vector between viewer and particle, and the width of a pixel or texel there.
@@ -76,30 +89,44 @@ void main() {
   // Particles thinner than a pixel are drawn about one pixel wide and fainter.
   float drawn = STYLE == 2 ? radius : max(radius, 0.6 * viewer.w);
   float thinning = radius / drawn;
-#if STYLE == 5
-  vec3 half_axis = in_velocity.xyz * (0.5 * style.y);
-  vec3 across_view = half_axis - viewer.xyz * dot(half_axis, viewer.xyz);
-  float half_length = length(across_view);
-  vec3 w = half_length > 1e-6 ? across_view / half_length : cross(viewer.xyz, u);
-  u = cross(w, viewer.xyz);
-  alpha *= thinning * thinning;
-  // With its rounded ends its length equals its motion.
-  float straight = max(half_length - drawn, 0.0) / drawn;
-  vec3 at = p + half_axis * (half_length > drawn ? corner.y * (1.0 - drawn / half_length) : 0.0) +
-            drawn * (w * corner.y + u * corner.x);
-  place = vec3(corner.x, corner.y * (straight + 1.0), straight);
-#else
+  place = vec3(corner, 0.0);
+#if STYLE == 2
   vec3 w = cross(viewer.xyz, u);
   float half_side = drawn;
-#if STYLE == 0
-  alpha *= thinning * thinning;
-#elif !defined(SHADOW)
+#if !defined(SHADOW)
   // The silhouette is that of the cone from the eye that touches the ball.
   float sine = radius * frame.eye.w / viewer.w;
   half_side *= inversesqrt(max(1.0 - sine * sine, 0.02));
 #endif
   vec3 at = p + half_side * (u * corner.x + w * corner.y);
-  place = vec3(corner, 0.0);
+#else
+  vec3 half_axis = in_velocity.xyz * (0.5 * style.y);
+  vec3 across_view = half_axis - viewer.xyz * dot(half_axis, viewer.xyz);
+  float half_length = length(across_view);
+  vec3 w = cross(viewer.xyz, u);
+  if (half_length > 1e-6) {
+    w = across_view / half_length;
+    u = cross(w, viewer.xyz);
+  }
+  alpha *= thinning * thinning;
+  // With its rounded ends its length equals its motion.
+  float straight = max(half_length - drawn, 0.0) / drawn;
+  vec3 lengthening = half_axis * (half_length > drawn ? 1.0 - drawn / half_length : 0.0);
+#ifdef PICTURES
+  vec2 size = vec2(textureSize(pictures, 0).xy);
+  vec2 side = size / max(size.x, size.y);
+  float turn_cos = cos(in_picture.x), turn_sin = sin(in_picture.x);
+  vec3 side_u = u * turn_cos + w * turn_sin, side_w = w * turn_cos - u * turn_sin;
+  vec2 from_center = drawn * side * corner;
+  vec3 offset = side_u * from_center.x + side_w * from_center.y;
+  // A picture is stretched along the motion, wherever its own axes point to.
+  vec3 at = p + offset + lengthening * (half_length > drawn ? dot(offset, w) / drawn : 0.0);
+  place = vec3(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y, 0.0);
+  picture = in_picture.yzw;
+#else
+  vec3 at = p + lengthening * corner.y + drawn * (w * corner.y + u * corner.x);
+  place = vec3(corner.x, corner.y * (straight + 1.0), straight);
+#endif
 #endif
 
 #ifdef SHADOW
@@ -108,7 +135,7 @@ void main() {
 #else
   gl_Position = uniforms.clip_from_world * vec4(at, 1.0);
 #if STYLE == 5
-  float turn = 6.2831853 * in_velocity.w;
+  float turn = 6.2831853 * in_velocity.w + in_picture.x;
   lobe = vec2(cos(turn), sin(turn));
 #endif
 #if STYLE == 2
@@ -136,7 +163,12 @@ void main() {
 #endif
     light.rgb *= shine;
   }
+#ifdef PICTURES
+  light.rgb *= fog.w;
+  haze = fog.rgb;
+#else
   light.rgb = light.rgb * fog.w + fog.rgb;
+#endif
 #endif
 #endif
 }

@@ -46,6 +46,37 @@ TEST(Render, SameBytesForAnyNumberOfThreadsAndJobs) {
   }
 }
 
+TEST(Render, SeveralCamerasGetTheFramesOfTheirOwnRuns) {
+  const TemporaryFolder folder;
+  const std::string scene =
+      tiny_scene() + R"( -q --set 'cameras=[{"name":"top","camera":{"type":"static","eye":[0.1,6,0]}}]' )";
+  ASSERT_EQ(offstage("render " + scene + "--camera all -o both/", folder.path()).code, 0);
+  EXPECT_EQ(frames(folder / "both/main"), reference()) << "the scene's own camera draws as always";
+  ASSERT_EQ(offstage("render " + scene + "--camera top -o top/", folder.path()).code, 0);
+  EXPECT_EQ(frames(folder / "both/top"), frames(folder / "top"));
+  EXPECT_NE(frames(folder / "top"), reference());
+  for (const auto& entry : fs::directory_iterator(folder / "both"))
+    EXPECT_FALSE(entry.path().filename().string().starts_with(".")) << entry.path() << " is left over";
+  const Outcome unknown = offstage("render " + scene + "--camera tops -o c/", folder.path());
+  EXPECT_NE(unknown.code, 0);
+  EXPECT_NE(unknown.err.find("did you mean 'top'"), std::string::npos) << unknown.err;
+}
+
+TEST(Render, JpegAndExrFramesAreResumedLikePng) {
+  for (const std::string ending : {"jpg", "exr"}) {
+    const TemporaryFolder folder;
+    const std::string command =
+        "render " + tiny_scene() + " -q --channels depth --channel-format exr -o f/####." + ending;
+    ASSERT_EQ(offstage(command, folder.path()).code, 0);
+    const auto whole = contents(folder / "f");
+    EXPECT_EQ(whole.size(), 25u) << "12 frames, 12 files of channels, and the manifest";
+    fs::remove(folder / ("f/0003." + ending));
+    fs::resize_file(folder / ("f/0005." + ending), 40);
+    ASSERT_EQ(offstage(command + " --resume", folder.path()).code, 0);
+    EXPECT_EQ(contents(folder / "f"), whole) << ending;
+  }
+}
+
 TEST(Render, CacheAndChunksGiveTheSameFrames) {
   const TemporaryFolder folder;
   ASSERT_EQ(offstage("simulate " + tiny_scene() + " --cache cache -q", folder.path()).code, 0);

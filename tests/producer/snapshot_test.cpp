@@ -18,7 +18,9 @@ Snapshot sample() {
   for (uint64_t i = 0; i < 100; ++i) {
     const auto x = static_cast<float>(i);
     s.point_sets[1].points.push_back({{x, -x, 0}, {0, x, 1}, 0.01f * x, {0.1f, 0.2f, 0.3f, 1}, i * i});
+    s.point_sets[1].points.back().angle = 0.1f * x;
     s.point_sets[1].ages.push_back(x / 30);
+    s.point_sets[1].spins.push_back(x - 50);
   }
   s.cloths.resize(2);
   s.cloths[0] = {.points = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}},
@@ -43,6 +45,8 @@ TEST(Snapshot, IsReadBackUnchanged) {
   ASSERT_EQ(back.point_sets.size(), 2u);
   EXPECT_EQ(back.point_sets[1].points[7].id, 49u);
   EXPECT_EQ(back.point_sets[1].points[7].color, sample().point_sets[1].points[7].color);
+  EXPECT_EQ(back.point_sets[1].points[7].angle, 0.7f);
+  EXPECT_EQ(back.point_sets[1].spins, sample().point_sets[1].spins);
   ASSERT_EQ(back.cloths.size(), 2u);
   EXPECT_EQ(back.cloths[0].points, sample().cloths[0].points);
   EXPECT_EQ(back.cloths[0].sources, sample().cloths[0].sources);

@@ -40,6 +40,18 @@ bool is_sound(const Mesh& mesh) {
          std::all_of(mesh.uvs.begin(), mesh.uvs.end(), finite);
 }
 
+/// The poses of all animations, at several times, are finite.
+bool moves_soundly(const ModelRig& rig) {
+  for (std::size_t clip = 0; clip < rig.clips.size(); ++clip)
+    for (const float share : {0.0f, 0.3f, 1.0f}) {
+      const RigPose pose = pose_at(rig, static_cast<int>(clip), share * rig.clips[clip].duration);
+      for (const RigSurface& surface : rig.surfaces)
+        for (const Vector3f& p : deformed(rig, surface, pose).positions)
+          if (!p.allFinite()) return false;
+    }
+  return true;
+}
+
 /// What the files come to; a file's fault is an empty string if there is none.
 struct Tally {
   int loaded = 0, refused = 0;
@@ -49,8 +61,9 @@ struct Tally {
     const auto start = std::chrono::steady_clock::now();
     std::string fault;
     try {
-      const Model model = read_model(path);
+      const Model model = read_model(path, {}, {}, true);
       ++loaded;
+      if (!moves_soundly(model.rig)) fault = "unsound animation";
       const bool sound = std::all_of(model.parts.begin(), model.parts.end(), [&](const Model::Part& part) {
         return is_sound(part.mesh) && part.material >= 0 &&
                part.material < static_cast<int>(model.materials.size());
@@ -88,6 +101,20 @@ TEST(ModelCorpus, EveryFileLoadsOrIsRefusedInOneLine) {
   RecordProperty("refused", tally.refused);
   RecordProperty("slowest_ms", static_cast<int>(1000 * tally.slowest_s));
   EXPECT_GE(tally.loaded, static_cast<int>(files.size()) * 2 / 5);
+  EXPECT_LT(tally.slowest_s, 10);
+}
+
+// The controllers and skinned hands of the npm package @webxr-input-profiles/assets.
+TEST(LongModelCorpus, EveryGltfModelOfTheRegistryLoads) {
+  const char* folder = std::getenv("OFFSTAGE_MESHES");
+  ASSERT_NE(folder, nullptr)
+      << "OFFSTAGE_MESHES must name a folder of models: tests/run.sh --long fetches them";
+  Tally tally;
+  for (const auto& entry : std::filesystem::directory_iterator(std::filesystem::path(folder) / "gltf"))
+    EXPECT_EQ(tally.read(entry.path()), "") << entry.path();
+  EXPECT_GE(tally.loaded, 75);
+  // The others have no triangles.
+  EXPECT_LE(tally.refused, 7);
   EXPECT_LT(tally.slowest_s, 10);
 }
 

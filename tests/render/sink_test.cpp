@@ -3,12 +3,14 @@
 #include <cmath>
 #include <sstream>
 
+#include <ImfRgbaFile.h>
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/stat.h>
 
 #include "render/error.h"
+#include "render/frame_files.h"
 #include "render/image_io.h"
 #include "scratch.h"
 
@@ -71,12 +73,60 @@ TEST(FramePath, PutsTheNumberInTheHashes) {
 
 TEST(PngSink, MakesItsFoldersAndOneFileAFrame) {
   const ScratchFolder folder;
-  const auto sink = make_png_sink(folder / "a/b/f###.png");
+  const auto sink = make_frame_sink(folder / "a/b/f###.png");
   sink->write(1, flat(3, 2, {1, 2, 3, 255}));
   sink->write(12, flat(3, 2, {4, 5, 6, 255}));
   sink->close();
   EXPECT_EQ(read_image(folder / "a/b/f001.png").rgba, flat(3, 2, {1, 2, 3, 255}).rgba);
   EXPECT_EQ(read_image(folder / "a/b/f012.png").rgba, flat(3, 2, {4, 5, 6, 255}).rgba);
+}
+
+/// A picture whose left half is `a` and whose right half is `b`.
+HdrImage two_lights(float a, float b) {
+  HdrImage image{32, 16, {}};
+  for (std::size_t i = 0; i < image.pixel_count(); ++i) {
+    const float value = i % 32 < 16 ? a : b;
+    image.rgba.insert(image.rgba.end(), {value, value / 2, 0, 1});
+  }
+  return image;
+}
+
+TEST(FrameFiles, AJpegIsClosestToItsPictureAndKnowsItsFilm) {
+  const ScratchFolder folder;
+  const auto sink = make_frame_sink(folder / "f#.jpg", "0123abcd");
+  const Image picture = flat(40, 24, {200, 30, 90, 255});
+  sink->write(1, picture);
+  sink->close();
+  const Image read = read_image(folder / "f1.jpg");
+  EXPECT_LE(difference(read, picture).max_delta, 3);
+  const auto file = inspect_frame(folder / "f1.jpg");
+  ASSERT_TRUE(file);
+  EXPECT_EQ(file->width_px, 40);
+  EXPECT_EQ(file->height_px, 24);
+  EXPECT_EQ(file->settings, "0123abcd");
+  std::filesystem::resize_file(folder / "f1.jpg", std::filesystem::file_size(folder / "f1.jpg") - 2);
+  EXPECT_FALSE(inspect_frame(folder / "f1.jpg")) << "it is cut short";
+}
+
+TEST(FrameFiles, AnExrHoldsLightBeyondWhite) {
+  const ScratchFolder folder;
+  const auto sink = make_frame_sink(folder / "f#.exr", "0123abcd");
+  ASSERT_TRUE(sink->needs_linear());
+  sink->write(1, flat(32, 16, {0, 0, 0, 255}));
+  sink->write_linear(1, two_lights(12.5f, 1e9f));
+  sink->close();
+  Imf::RgbaInputFile file((folder / "f1.exr").c_str());
+  std::vector<Imf::Rgba> pixels(32 * 16);
+  file.setFrameBuffer(pixels.data(), 1, 32);
+  file.readPixels(0, 15);
+  EXPECT_FLOAT_EQ(pixels[0].r, 12.5f);
+  EXPECT_FLOAT_EQ(pixels[0].g, 6.25f);
+  EXPECT_FLOAT_EQ(pixels[31].r, 65504) << "the largest half float, not infinity";
+  const auto info = inspect_frame(folder / "f1.exr");
+  ASSERT_TRUE(info);
+  EXPECT_EQ(info->width_px, 32);
+  EXPECT_FALSE(info->alpha);
+  EXPECT_EQ(info->settings, "0123abcd");
 }
 
 class VideoSinkFormat : public testing::TestWithParam<const char*> {};

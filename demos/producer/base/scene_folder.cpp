@@ -20,7 +20,8 @@ std::vector<std::filesystem::path> all_folders(const std::filesystem::path& path
     folders.emplace_back(folder);
   }
   for (const std::filesystem::path& shipped :
-       {shipped_folder("assets/models", "assets/models"), shipped_folder("presets", "effects/presets")})
+       {shipped_folder("assets/models", "assets/models"),
+        shipped_folder("assets/pictures", "assets/pictures"), shipped_folder("presets", "effects/presets")})
     if (!shipped.empty()) folders.push_back(shipped);
   return folders;
 }

@@ -5,10 +5,44 @@
 #include "producer/base/interrupt.h"
 #include "producer/base/shipped_files.h"
 #include "producer/build/articulation_builder.h"
+#include "producer/build/models.h"
 #include "render/error.h"
 #include "render/mesh_io.h"
+#include "render/point_cloud.h"
 
 namespace offstage::producer {
+
+namespace {
+
+void append_cloud(const render::PointCloud& cloud, ParticleGroup& group) {
+  sim::Aabb box;
+  for (const Eigen::Vector3f& p : cloud.positions) box.extend(p.cast<Real>());
+  const Real scale = fitted_scale(group.scale, group.fit, box.sizes());
+  const std::size_t n = cloud.positions.size(),
+                    taken = std::min(n, static_cast<std::size_t>(group.max_points));
+  for (std::size_t k = 0; k < taken; ++k) {
+    const std::size_t i = k * n / taken;  // below 2^53: both are at most 2e7
+    ParticlePlace place;
+    place.position = group.position + group.orientation * (scale * cloud.positions[i].cast<Real>());
+    if (!cloud.colors.empty()) place.color = Color{cloud.colors[i]};
+    group.places.push_back(place);
+  }
+}
+
+}  // namespace
+
+void read_clouds(Scene& scene, const SceneFolder& folder, std::vector<Problem>& errors) {
+  for (ParticleGroup& group : scene.particles) {
+    if (group.file.empty()) continue;
+    try {
+      append_cloud(render::read_points(folder / group.file, folder.inputs(), interrupt_signal), group);
+    } catch (const render::FileError& error) {
+      Where where = group.where;
+      where.path += "/file";
+      errors.push_back({where, error.what()});
+    }
+  }
+}
 
 void read_links(Scene& scene, const SceneFolder& folder, std::vector<Problem>& errors) {
   for (ArticulationTemplate& articulation : scene.articulations) {

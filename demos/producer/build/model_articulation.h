@@ -1,5 +1,5 @@
 #pragma once
-/// Articulations from the node trees of model files.
+/// Articulations from the node trees of model files, and particles from point clouds.
 
 #include <vector>
 
@@ -11,5 +11,8 @@ namespace offstage::producer {
 /// Reads the links of the scene's model trees from their files, relative to `folder`. Errors are added to
 /// `errors`.
 void read_links(Scene& scene, const SceneFolder& folder, std::vector<Problem>& errors);
+
+/// Appends the points of files to the places of their particle groups. Errors are added to `errors`.
+void read_clouds(Scene& scene, const SceneFolder& folder, std::vector<Problem>& errors);
 
 }  // namespace offstage::producer

@@ -9,6 +9,8 @@
 
 #include "producer/base/interrupt.h"
 #include "producer/base/shipped_files.h"
+#include "producer/base/suggest.h"
+#include "producer/build/animated_bodies.h"
 #include "render/error.h"
 #include "render/image_io.h"
 #include "render/mesh_io.h"
@@ -24,6 +26,50 @@ std::string hex(XXH128_hash_t h) {
 template <class T>
 void add_to(XXH3_state_t* hash, const std::vector<T>& values) {
   XXH3_128bits_update(hash, values.data(), values.size() * sizeof(T));
+}
+
+void add_to(XXH3_state_t* hash, const render::Mesh& mesh) {
+  add_to(hash, mesh.positions);
+  add_to(hash, mesh.normals);
+  add_to(hash, mesh.uvs);
+  add_to(hash, mesh.second_uvs);
+  add_to(hash, mesh.colors);
+  add_to(hash, mesh.tangents);
+  add_to(hash, mesh.indices);
+}
+
+void add_to(XXH3_state_t* hash, const render::ModelRig& rig) {
+  for (const render::RigNode& node : rig.nodes) {
+    XXH3_128bits_update(hash, &node.parent, sizeof node.parent);
+    for (const auto* v : {&node.translation, &node.scale})
+      XXH3_128bits_update(hash, v->data(), 3 * sizeof(float));
+    XXH3_128bits_update(hash, node.rotation.coeffs().data(), 4 * sizeof(float));
+    XXH3_128bits_update(hash, node.matrix.data(), 16 * sizeof(float));
+    add_to(hash, node.weights);
+  }
+  for (const render::RigClip& clip : rig.clips)
+    for (const render::RigChannel& channel : clip.channels) {
+      const int choices[] = {channel.node, static_cast<int>(channel.path),
+                             static_cast<int>(channel.interpolation)};
+      XXH3_128bits_update(hash, choices, sizeof choices);
+      add_to(hash, channel.times);
+      add_to(hash, channel.values);
+    }
+  for (const render::RigSkin& skin : rig.skins) {
+    add_to(hash, skin.joints);
+    add_to(hash, skin.unbind);
+  }
+  for (const render::RigSurface& surface : rig.surfaces) {
+    const int choices[] = {surface.node, surface.skin, surface.material, surface.flat};
+    XXH3_128bits_update(hash, choices, sizeof choices);
+    add_to(hash, surface.mesh);
+    add_to(hash, surface.joints);
+    add_to(hash, surface.weights);
+    for (const render::RigTarget& target : surface.targets) {
+      add_to(hash, target.positions);
+      add_to(hash, target.normals);
+    }
+  }
 }
 
 void add_to(XXH3_state_t* hash, const render::Image& image) {
@@ -44,13 +90,7 @@ void add_to(XXH3_state_t* hash, const render::TextureMap& map) {
 void add_to(XXH3_state_t* hash, const render::Model& model) {
   for (const render::Model::Part& part : model.parts) {
     XXH3_128bits_update(hash, &part.material, sizeof part.material);
-    add_to(hash, part.mesh.positions);
-    add_to(hash, part.mesh.normals);
-    add_to(hash, part.mesh.uvs);
-    add_to(hash, part.mesh.second_uvs);
-    add_to(hash, part.mesh.colors);
-    add_to(hash, part.mesh.tangents);
-    add_to(hash, part.mesh.indices);
+    add_to(hash, part.mesh);
   }
   for (const render::Model::Node& node : model.nodes) {
     XXH3_128bits_update(hash, node.name.data(), node.name.size());
@@ -70,12 +110,28 @@ void add_to(XXH3_state_t* hash, const render::Model& model) {
     XXH3_128bits_update(hash, numbers, sizeof numbers);
     XXH3_128bits_update(hash, choices, sizeof choices);
   }
+  add_to(hash, model.rig);
   for (const render::Image& texture : model.textures) add_to(hash, texture);
+}
+
+/// The model file that a look draws, or null.
+const MeshFile* mesh_file(const ParticleLook& look) {
+  return look.style == LookStyle::mesh && look.mesh ? std::get_if<MeshFile>(&look.mesh->shape) : nullptr;
+}
+
+/// Calls visit(look, place) for all looks of a scene.
+template <class Visit>
+void for_each_look(const Scene& scene, Visit visit) {
+  for (const ParticleGroup& group : scene.particles) visit(group.look, group.where);
+  for (const Emitter& emitter : scene.emitters)
+    for_each_source(emitter,
+                    [&](const ParticleSource& source, const auto&...) { visit(source.look, source.where); });
 }
 
 /// All files named by a scene, with the first place that names each.
 struct Files {
   std::map<std::string, Where> models, textures;
+  std::set<std::string> animated;  ///< those of the models that are read with their animations
 };
 
 Files files_of(const Scene& scene) {
@@ -83,12 +139,18 @@ Files files_of(const Scene& scene) {
   for (const Body& body : scene.bodies) {
     if (const auto* mesh = std::get_if<MeshFile>(&body.shape)) files.models.emplace(mesh->file, body.where);
     if (body.model) files.models.emplace(body.model->file, body.where);
+    if (body.animation) files.animated.insert(animated_file(body));
   }
   for (const Cloth& cloth : scene.cloths)
     if (const auto* mesh = std::get_if<MeshFile>(&cloth.shape)) files.models.emplace(mesh->file, cloth.where);
   for (const Emitter& emitter : scene.emitters)
     if (const auto* mesh = std::get_if<MeshSurface>(&emitter.surface))
       files.models.emplace(mesh->file, emitter.where);
+  const auto add_look = [&](const ParticleLook& look, const Where& where) {
+    if (look.style == LookStyle::sprite && !look.texture.empty()) files.textures.emplace(look.texture, where);
+    if (const auto* mesh = mesh_file(look)) files.models.emplace(mesh->file, where);
+  };
+  for_each_look(scene, add_look);
   for (const Material& material : scene.materials)
     if (!material.texture.empty()) files.textures.emplace(material.texture, material.where);
   return files;
@@ -134,7 +196,8 @@ ModelLibrary::ModelLibrary(const Scene& scene, const SceneFolder& folder, const 
     try {
       const render::Model& model =
           models_
-              .emplace(file, render::read_model(model_file(file, folder), folder.inputs(), interrupt_signal))
+              .emplace(file, render::read_model(model_file(file, folder), folder.inputs(), interrupt_signal,
+                                                files.animated.contains(file)))
               .first->second;
       for (const std::string& warning : model.warnings) warnings.push_back({where, file + ": " + warning});
       add_to(hash, model);
@@ -151,10 +214,59 @@ ModelLibrary::ModelLibrary(const Scene& scene, const SceneFolder& folder, const 
       problems.push_back({where, error.what()});
     }
   }
+  for (const ParticleGroup& group : scene.particles)  // the points of its file are not in the scene's text
+    for (const ParticlePlace& place : group.file.empty() ? std::vector<ParticlePlace>{} : group.places) {
+      const Color color = place.color.value_or(Color{});
+      XXH3_128bits_update(hash, place.position.data(), 3 * sizeof(Real));
+      XXH3_128bits_update(hash, color.rgba.data(), 4 * sizeof(float));
+    }
+  check_sheets(scene, problems);
+  if (problems.empty()) read_animations(scene, cache, problems);
   digest_ = hex(XXH3_128bits_digest(hash));
   XXH3_freeState(hash);
   if (!problems.empty()) throw SceneError(std::move(problems));
   decompose_models(scene, cache, warnings, on_step);
+}
+
+std::string ModelLibrary::animation_key(const Body& body) {
+  return animated_file(body) + "\n" + body.animation.value().clip;
+}
+
+void ModelLibrary::read_animations(const Scene& scene, const DecompositionCache& cache,
+                                   std::vector<Problem>& problems) {
+  for (const Body& body : scene.bodies) {
+    if (!body.animation) continue;
+    const std::string& file = animated_file(body);
+    const render::ModelRig& rig = model(file).rig;
+    const int clip = rig.clip(body.animation->clip);
+    Where where = body.where;
+    where.path += "/animation";
+    if (rig.clips.empty()) {
+      problems.push_back(
+          {where, file + ": has no animation that can be played; glTF 2.0 files can have some"});
+    } else if (clip < 0) {
+      std::vector<std::string> names;
+      for (const render::RigClip& known : rig.clips) names.push_back(known.name);
+      problems.push_back({where, fmt::format("{}: has no animation '{}'{}", file, body.animation->clip,
+                                             suggestion(body.animation->clip, names))});
+    } else if (body.has_animated_shape() && !pieces_.contains(animation_key(body))) {
+      pieces_[animation_key(body)] = collision_pieces(rig, clip, cache);
+    }
+  }
+}
+
+void ModelLibrary::check_sheets(const Scene& scene, std::vector<Problem>& problems) const {
+  const auto check = [&](const ParticleLook& look, const Where& where) {
+    const auto image = textures_.find(look.texture);
+    if (look.style != LookStyle::sprite || !look.sheet || image == textures_.end()) return;
+    const int width = image->second.width_px, height = image->second.height_px;
+    if (width % look.sheet->columns == 0 && height % look.sheet->rows == 0) return;
+    problems.push_back(
+        {where, fmt::format("{}: {}x{} pixels cannot be divided into {} columns and {} rows of "
+                            "equal pictures",
+                            look.texture, width, height, look.sheet->columns, look.sheet->rows)});
+  };
+  for_each_look(scene, check);
 }
 
 void ModelLibrary::decompose_models(const Scene& scene, const DecompositionCache& cache,
@@ -164,6 +276,7 @@ void ModelLibrary::decompose_models(const Scene& scene, const DecompositionCache
   for (const Body& body : scene.bodies) {
     const auto* mesh = std::get_if<MeshFile>(&body.shape);
     const auto need = needed.find(body.name);
+    if (body.has_animated_shape()) continue;  // its pieces collide
     if (!mesh || need == needed.end()) continue;
     if (!parts_.contains(mesh->file)) {
       const std::size_t triangles = model(mesh->file).triangle_count();
@@ -197,9 +310,16 @@ sim::ConvexDecomposition scaled(sim::ConvexDecomposition decomposition, double s
   return decomposition;
 }
 
+const std::string& animated_file(const Body& body) {
+  return body.model ? body.model->file : std::get<MeshFile>(body.shape).file;
+}
+
 Real fitted_scale(Real scale, const std::optional<Vec3>& fit, const render::Model& model) {
+  return fit ? fitted_scale(scale, fit, Vec3(model.bounds().sizes().cast<Real>())) : scale;
+}
+
+Real fitted_scale(Real scale, const std::optional<Vec3>& fit, const Vec3& size) {
   if (!fit) return scale;
-  const Vec3 size = model.bounds().sizes().cast<Real>();
   Real factor = std::numeric_limits<Real>::infinity();
   for (int k = 0; k < 3; ++k)
     if (size[k] > 1e-9 * size.maxCoeff()) factor = std::min(factor, (*fit)[k] / size[k]);

@@ -16,6 +16,15 @@
 
 namespace offstage::producer {
 
+/// A part of an animated model that collides on its own: a node with its triangles, or the convex hull of the
+/// skin that follows a bone. Unscaled, in the frame of its node without the node's scale.
+struct AnimatedPiece {
+  std::string name;  ///< of the node
+  int node = 0;      ///< index in the rig
+  sim::TriangleMesh mesh;
+  sim::ConvexDecomposition parts;
+};
+
 class ModelLibrary {
  public:
   ModelLibrary() = default;
@@ -35,6 +44,8 @@ class ModelLibrary {
     const auto it = parts_.find(file);
     return it == parts_.end() ? nullptr : &it->second;
   }
+  /// The colliding pieces of a body with an animated shape.
+  const std::vector<AnimatedPiece>& pieces(const Body& body) const { return pieces_.at(animation_key(body)); }
   const render::Image& texture(const std::string& file) const { return textures_.at(file); }
   /// A model that was decomposed into convex parts, and the time this took (short if they were on disk).
   struct Decomposed {
@@ -48,18 +59,27 @@ class ModelLibrary {
   const std::string& digest() const { return digest_; }
 
  private:
+  /// Adds a problem for each sheet whose pictures would not have whole pixels.
+  void check_sheets(const Scene& scene, std::vector<Problem>& problems) const;
+  static std::string animation_key(const Body& body);
+  void read_animations(const Scene& scene, const DecompositionCache& cache, std::vector<Problem>& problems);
   void decompose_models(const Scene& scene, const DecompositionCache& cache, std::vector<Problem>& warnings,
                         const StepCallback& on_step);
 
   std::map<std::string, render::Model> models_;
   std::map<std::string, render::Image> textures_;
   std::map<std::string, sim::ConvexDecomposition> parts_;
+  std::map<std::string, std::vector<AnimatedPiece>> pieces_;  ///< by animation_key()
   std::vector<Decomposed> decomposed_;
   std::string digest_;
 };
 
+/// The model file whose animation a body plays.
+const std::string& animated_file(const Body& body);
+
 /// Scale factor that brings a model to the size of its use: `scale` times the factor that fits its bounding
 /// box into the box `fit`, if there is one. Axes along which the model is flat do not count.
+Real fitted_scale(Real scale, const std::optional<Vec3>& fit, const Vec3& size);
 Real fitted_scale(Real scale, const std::optional<Vec3>& fit, const render::Model& model);
 Real scale_of(const auto& use, const ModelLibrary& models) {
   return fitted_scale(use.scale, use.fit, models.model(use.file));

@@ -1,6 +1,8 @@
 #include "producer/build/particle_sources.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "effects/blackbody.h"
 #include "producer/build/emitter_defs.h"
@@ -37,6 +39,10 @@ effects::ColorRamp glow_of(const std::vector<std::pair<Real, Real>>& kelvin) {
   return ramp;
 }
 
+bool is_zero(const Varying& v) {
+  return effects::lower_bound(v) == 0 && effects::upper_bound(v) == 0;
+}
+
 /// Runs `add`, and converts the library's exception to a problem at the place in the scene.
 template <class F>
 void at_source(const Where& where, F&& add) {
@@ -53,7 +59,11 @@ LookRamps::LookRamps(const ParticleLook& look, uint64_t seed, const std::string&
     : start_{.mean = look.color.rgba,
              .deviation = look.channel_deviation.cast<float>(),
              .brightness_deviation = static_cast<float>(look.color_deviation)},
-      random_(seed, effects::stream_id(name)) {
+      random_(seed, effects::stream_id(name)),
+      turns_(look.turns() && !(is_zero(look.angle_deg) && is_zero(look.spin_deg_per_s))),
+      angle_deg_(look.angle_deg),
+      spin_deg_per_s_(look.spin_deg_per_s),
+      turn_random_(seed, effects::stream_id(name + "/turn")) {
   effects::ColorRamp colors;
   for (const auto& [age, color] : look.color_over_age) colors.keys.push_back({age, color.rgba});
   if (!colors.keys.empty()) color_.emplace(colors, ramp_kind(look));
@@ -63,8 +73,10 @@ LookRamps::LookRamps(const ParticleLook& look, uint64_t seed, const std::string&
   if (!sizes.keys.empty()) size_.emplace(sizes, ramp_kind(look));
 }
 
-PointSet LookRamps::points(const sim::ParticleArrays& particles,
+PointSet LookRamps::points(const sim::ParticleArrays& particles, Real time,
                            const std::vector<ParticlePlace>* places) const {
+  constexpr uint32_t kAngle = 0, kSpin = 1;
+  constexpr Real kRadians = std::numbers::pi / 180, kTurn_deg = 360;
   const bool varies = start_.brightness_deviation > 0 || !start_.deviation.isZero(0);
   PointSet set;
   set.points.resize(particles.size());
@@ -82,6 +94,12 @@ PointSet LookRamps::points(const sim::ParticleArrays& particles,
     if (color_) p.color = p.color.cwiseProduct(color_->at(age));
     if (glow_) p.color = p.color.cwiseProduct(glow_->at(age));
     if (size_) p.radius *= size_->at(age);
+    if (!turns_) continue;
+    const Real creation = time - particles.age[i];
+    const Real angle = effects::sample(angle_deg_, turn_random_.uniform(p.id, kAngle), creation),
+               spin = effects::sample(spin_deg_per_s_, turn_random_.uniform(p.id, kSpin), creation);
+    p.angle = static_cast<float>(kRadians * std::fmod(angle + spin * particles.age[i], kTurn_deg));
+    set.spins.push_back(static_cast<float>(kRadians * spin));
   }
   return set;
 }
@@ -145,7 +163,7 @@ ParticleSources::Counts ParticleSources::counts() const {
 
 void ParticleSources::add_points(const sim::World& world, std::vector<PointSet>& sets) const {
   for (const System& system : systems_)
-    sets.push_back(system.look.points(world.particles(system.handle), nullptr));
+    sets.push_back(system.look.points(world.particles(system.handle), world.time(), nullptr));
 }
 
 sim::ParticleSystemHandle ParticleSources::system(const std::string& name) const {

@@ -19,19 +19,23 @@
 
 namespace offstage::producer {
 
-/// Colour and size of a look, prepared for many particles.
+/// Colour, size and rotation of a look, prepared for many particles.
 class LookRamps {
  public:
   LookRamps(const ParticleLook& look, uint64_t seed, const std::string& name);
 
-  /// Current look of the particles. `places`: those of a group, which may have individual colours.
-  PointSet points(const sim::ParticleArrays& particles, const std::vector<ParticlePlace>* places) const;
+  /// Look of the particles at `time`. `places`: those of a group, which may have individual colours.
+  PointSet points(const sim::ParticleArrays& particles, Real time,
+                  const std::vector<ParticlePlace>* places) const;
 
  private:
   effects::StartColor start_;
   effects::RandomStream random_;
   std::optional<effects::Ramp<effects::Rgba>> color_, glow_;
   std::optional<effects::Ramp<float>> size_;
+  bool turns_;
+  Varying angle_deg_, spin_deg_per_s_;
+  effects::RandomStream turn_random_;
 };
 
 class ParticleSources {

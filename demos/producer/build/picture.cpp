@@ -99,19 +99,58 @@ Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context
     if (cloths_.back().cloth) stage_.set_object(cloths_.back().cloth, object);
   }
   for (const ParticleLook* look : looks_of(scene)) {
-    points_.push_back(stage_.add_points(points_def(*look)));
-    stage_.set_object(points_.back(), ++object);
-    styles_.push_back(points_def(*look).style);
-    blur_streaks_.push_back(add_blur_streaks(*look));
+    add_points(*look, models, ++object);
   }
   add_overlay_lines();
   stage_.set_sun(sun_of(scene));
   stage_.set_environment(environment_of(scene));
 }
 
+void Picture::add_points(const ParticleLook& look, const ModelLibrary& models, uint32_t object) {
+  const render::PointsDef def = points_def(look);
+  const bool has_picture = look.style == LookStyle::sprite && !look.texture.empty();
+  points_.push_back(stage_.add_points(def, has_picture ? models.texture(look.texture) : render::Image{}));
+  stage_.set_object(points_.back(), object);
+  styles_.push_back(def.style);
+  ages_within_frame_.push_back(has_picture && look.sheet);
+  blur_streaks_.push_back(add_blur_streaks(look));
+  meshes_.emplace_back();
+  if (look.style == LookStyle::mesh) add_particle_mesh(look, models, object);
+}
+
+void Picture::add_particle_mesh(const ParticleLook& look, const ModelLibrary& models, uint32_t object) {
+  DrawnMeshes& drawn = meshes_.back();
+  drawn.look = &look.mesh.value();
+  drawn.casts_shadow = points_def(look).casts_shadow;
+  drawn.object = object;
+  Eigen::AlignedBox3f box;
+  float radius = 0;
+  const auto measure = [&](const render::Mesh& mesh) {
+    for (const Vector3f& p : mesh.positions) radius = std::max(radius, (p - box.center()).norm());
+  };
+  std::visit(
+      [&](const auto& shape) {
+        using S = std::decay_t<decltype(shape)>;
+        if constexpr (std::is_same_v<S, MeshFile>) {
+          const render::Model& model = models.model(shape.file);
+          drawn.parts = model_parts(shape.file, drawn.look->material, models);
+          box = model.bounds();
+          for (const render::Model::Part& part : model.parts) measure(part.mesh);
+        } else {
+          drawn.parts = {{primitive(shape), material(drawn.look->material, models)}};
+          const render::Mesh mesh = mesh_of(shape);
+          box = mesh.bounds();
+          measure(mesh);
+        }
+      },
+      drawn.look->shape);
+  drawn.unit_from_part = Eigen::Scaling(1 / std::max(radius, 1e-9f)) * Eigen::Translation3f(-box.center());
+}
+
 render::PointsHandle Picture::add_blur_streaks(const ParticleLook& look) {
   render::PointsDef def = points_def(look);
-  if (def.style != render::PointStyle::sphere || subframe_time() == 0) return {};
+  if (look.style == LookStyle::mesh || def.style != render::PointStyle::sphere || subframe_time() == 0)
+    return {};
   def.style = render::PointStyle::streak;
   def.stretch_s = subframe_time();
   return stage_.add_points(def);
@@ -153,6 +192,12 @@ void Picture::add_cloth(const Cloth& cloth, const ModelLibrary& models) {
 
 void Picture::add_model(const std::string& file, const Affine3f& body_from_model, const Body& body,
                         const ModelLibrary& models, std::vector<DrawnPart>& parts) {
+  for (const auto& [mesh, look] : model_parts(file, body.material, models))
+    parts.push_back({stage_.add_instance(mesh, look, body.casts_shadow), body_from_model});
+}
+
+std::vector<std::pair<render::MeshHandle, render::MaterialHandle>> Picture::model_parts(
+    const std::string& file, const std::string& name, const ModelLibrary& models) {
   const render::Model& model = models.model(file);
   const auto [it, is_new] = models_.try_emplace(file);
   auto& [meshes, own_materials] = it->second;
@@ -161,12 +206,12 @@ void Picture::add_model(const std::string& file, const Affine3f& body_from_model
     for (const render::Material& m : model.materials)
       own_materials.push_back(stage_.add_material(m, model.textures));
   }
-  for (std::size_t i = 0; i < model.parts.size(); ++i) {
-    const auto look = body.material.empty() && !own_materials.empty()
-                          ? own_materials[static_cast<std::size_t>(model.parts[i].material)]
-                          : material(body.material, models);
-    parts.push_back({stage_.add_instance(meshes[i], look, body.casts_shadow), body_from_model});
-  }
+  std::vector<std::pair<render::MeshHandle, render::MaterialHandle>> parts;
+  for (std::size_t i = 0; i < model.parts.size(); ++i)
+    parts.emplace_back(meshes[i], name.empty() && !own_materials.empty()
+                                      ? own_materials[static_cast<std::size_t>(model.parts[i].material)]
+                                      : material(name, models));
+  return parts;
 }
 
 template <class Primitive>
@@ -210,23 +255,51 @@ void Picture::add_convex_parts(const MeshFile& mesh, const Body& body, const Mod
 }
 
 void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t& slot, uint32_t object) {
-  DrawnBody drawn{{}, affine(body.position, body.orientation), parts_overlay(scene_, body.name), {}};
+  DrawnBody drawn{{}, affine(body.position, body.orientation), parts_overlay(scene_, body.name), {}, {}};
+  const auto add_file = [&](const std::string& file, const Affine3f& body_from_model) {
+    if (body.animation)
+      add_animated(file, body_from_model, body, models, drawn);
+    else
+      add_model(file, body_from_model, body, models, drawn.parts);
+  };
   if (drawn.overlay)
     add_convex_parts(std::get<MeshFile>(body.shape), body, models, drawn.parts);
   else if (body.visible && body.model)
-    add_model(body.model->file,
-              affine(body.model->position, body.model->orientation, scale_of(*body.model, models)), body,
-              models, drawn.parts);
+    add_file(body.model->file,
+             affine(body.model->position, body.model->orientation, scale_of(*body.model, models)));
+  else if (body.visible && body.has_animated_shape())
+    add_file(animated_file(body),
+             affine(Vec3::Zero(), Quat::Identity(), scale_of(std::get<MeshFile>(body.shape), models)));
   else if (body.visible)
     add_shape(body, models, drawn.parts);
 
   for (const DrawnPart& part : drawn.parts) stage_.set_object(part.instance, object);
+  if (drawn.animated)
+    for (const AnimatedLook::Surface& surface : drawn.animated->surfaces)
+      stage_.set_object(surface.instance, object);
   place_body(drawn, drawn.world_from_body, 0);
   if (body.motion == sim::MotionType::static_body)
     places_.add_fixed(body.name, drawn.world_from_body);
   else
     places_.add_moving(body.name, *(drawn.slot = slot++));
-  if (drawn.slot || drawn.overlay) bodies_.push_back(std::move(drawn));
+  if (drawn.slot || drawn.overlay || drawn.animated) bodies_.push_back(std::move(drawn));
+}
+
+void Picture::add_animated(const std::string& file, const Affine3f& body_from_model, const Body& body,
+                           const ModelLibrary& models, DrawnBody& drawn) {
+  const render::Model& model = models.model(file);
+  model_parts(file, body.material, models);  // uploads its materials
+  const std::vector<render::MaterialHandle>& own_materials = models_.at(file).second;
+  AnimatedLook look{
+      &model.rig, &body.animation.value(), model.rig.clip(body.animation->clip), body_from_model, {}};
+  for (const render::RigSurface& surface : model.rig.surfaces) {
+    const render::MeshHandle mesh = stage_.add_mesh(surface.mesh);
+    const render::MaterialHandle own = body.material.empty()
+                                           ? own_materials[static_cast<std::size_t>(surface.material)]
+                                           : material(body.material, models);
+    look.surfaces.push_back({&surface, mesh, stage_.add_instance(mesh, own, body.casts_shadow)});
+  }
+  drawn.animated = std::move(look);
 }
 
 void Picture::add_overlay_lines() {
@@ -248,9 +321,26 @@ float Picture::exposure(double time, float sample_weight) const {
                                                    : factor * render::metered_exposure(sum_, sample_weight);
 }
 
+render::HdrImage Picture::linear() const {
+  render::HdrImage image = sum_;
+  for (std::size_t i = 0; i < image.pixel_count(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c) image.rgba[4 * i + c] *= latest_scale_;
+    image.rgba[4 * i + 3] *= 1 / static_cast<float>(subframes(scene_.render.quality));
+  }
+  return image;
+}
+
 render::Channels Picture::channels(const Snapshot& previous, const Snapshot& current) {
   const double frame_time = &previous == &current ? 0 : scene_.output.fps.seconds(1);
   place(previous, previous, 1, frame_time);
+  // The instances belong to the particles of the current state, which thus have a motion.
+  std::vector<render::Point> before;
+  for (std::size_t set = 0; set < meshes_.size(); ++set) {
+    if (!meshes_[set].look) continue;
+    before.clear();
+    points_at(set, previous, current, 0, frame_time, true, before);
+    place_meshes(meshes_[set], before);
+  }
   stage_.store_previous_transforms();
   place(previous, current, 1, frame_time);
   return stage_.channels(to_float(frame_time));
@@ -272,6 +362,7 @@ render::Image Picture::draw(const Snapshot& previous, const Snapshot& current,
     stage_.draw(render::sample_offsets(i, n), sum_);
   }
   const float weight = 1 / static_cast<float>(n), exposed = exposure(current.time, weight);
+  latest_scale_ = weight * exposed;
   if (scene_.render.bloom > 0)
     render::add_bloom(
         sum_, {.strength = to_float(scene_.render.bloom), .exposure = exposed, .sample_weight = weight});

@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -35,6 +36,8 @@ class Picture {
   /// pixels.
   render::Image draw(const Snapshot& previous, const Snapshot& current,
                      const std::function<bool()>& stop = {});
+  /// Linear light of the latest frame with its exposure and glow, without tone curve and texts.
+  render::HdrImage linear() const;
   /// The camera of the latest picture.
   const render::Camera& camera() const { return latest_camera_; }
 
@@ -48,11 +51,37 @@ class Picture {
     // Displacement by an explosion of 1, in the body's frame.
     Eigen::Vector3f outwards = Eigen::Vector3f::Zero();
   };
+  /// A model that plays an animation.
+  struct AnimatedLook {
+    struct Surface {
+      const render::RigSurface* source;
+      render::MeshHandle mesh;
+      render::InstanceHandle instance;
+    };
+    const render::ModelRig* rig;
+    const ModelAnimation* animation;
+    int clip;
+    Eigen::Affine3f body_from_model;
+    std::vector<Surface> surfaces;
+  };
   struct DrawnBody {
     std::optional<std::size_t> slot;  // in Snapshot::bodies; none: it never moves
     Eigen::Affine3f world_from_body;  // at time 0
     const PartsOverlay* overlay;      // if it is drawn as convex parts; otherwise null
     std::vector<DrawnPart> parts;
+    std::optional<AnimatedLook> animated;  // instead of `parts`
+  };
+
+  /// Particles that are drawn as instances of a mesh. Instance i shows the i-th particle of the current
+  /// state.
+  struct DrawnMeshes {
+    const LookMesh* look = nullptr;  // null: the set is drawn by the stage
+    std::vector<std::pair<render::MeshHandle, render::MaterialHandle>> parts;
+    Eigen::Affine3f unit_from_part;  // brings the mesh into the unit ball
+    bool casts_shadow = true;
+    uint32_t object = 0;
+    std::vector<render::InstanceHandle> instances;  // for each particle, one for each part
+    std::size_t shown = 0;                          // number of visible particles
   };
 
   /// A cloth with its coordinates along the flat cloth, and the version of its triangles in the stage.
@@ -65,8 +94,15 @@ class Picture {
 
   render::MaterialHandle material(const std::string& name, const ModelLibrary& models);
   void add_body(const Body& body, const ModelLibrary& models, std::size_t& slot, uint32_t object);
+  /// The parts of a model with their materials, or all with the material `name` unless it is empty.
+  std::vector<std::pair<render::MeshHandle, render::MaterialHandle>> model_parts(const std::string& file,
+                                                                                 const std::string& name,
+                                                                                 const ModelLibrary& models);
   void add_model(const std::string& file, const Eigen::Affine3f& body_from_model, const Body& body,
                  const ModelLibrary& models, std::vector<DrawnPart>& parts);
+  void add_animated(const std::string& file, const Eigen::Affine3f& body_from_model, const Body& body,
+                    const ModelLibrary& models, DrawnBody& drawn);
+  void place_animated(const AnimatedLook& look, const Eigen::Affine3f& world_from_body, double time);
   void add_shape(const Body& body, const ModelLibrary& models, std::vector<DrawnPart>& parts);
   void add_convex_parts(const MeshFile& mesh, const Body& body, const ModelLibrary& models,
                         std::vector<DrawnPart>& parts);
@@ -80,7 +116,14 @@ class Picture {
   void place(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
   void place_body(const DrawnBody& body, const Eigen::Affine3f& world_from_body, double time);
   void place_rods(const Snapshot& previous, const Snapshot& current, float w);
+  void add_points(const ParticleLook& look, const ModelLibrary& models, uint32_t object);
+  void add_particle_mesh(const ParticleLook& look, const ModelLibrary& models, uint32_t object);
+  /// Appends the particles of a set at share w of the frame to `points`. `all`: also those that do not exist
+  /// yet, where they would have come from.
+  void points_at(std::size_t set, const Snapshot& previous, const Snapshot& current, float w,
+                 double frame_time, bool all, std::vector<render::Point>& points) const;
   void place_points(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
+  void place_meshes(DrawnMeshes& drawn, std::span<const render::Point> points);
   /// Time between two sub-frames; 0 if there is only one [s].
   float subframe_time() const;
   void set_balls(std::size_t set, std::span<const render::Point> balls);
@@ -102,6 +145,8 @@ class Picture {
   std::vector<render::InstanceHandle> rods_;  // null if invisible
   std::vector<render::PointsHandle> points_;
   std::vector<render::PointStyle> styles_;  // of the same
+  std::vector<bool> ages_within_frame_;     // of the same: pictures of a sheet change between sub-frames
+  std::vector<DrawnMeshes> meshes_;         // of the same
   // Motion blur of balls that move too far in a sub-frame; or null.
   std::vector<render::PointsHandle> blur_streaks_;
   std::map<std::string, render::MaterialHandle> fabrics_;  // by fabric and material
@@ -111,6 +156,7 @@ class Picture {
   std::vector<Eigen::Vector3f> scratch_places_;
   std::vector<render::Line> scratch_lines_;
   render::HdrImage sum_;
+  float latest_scale_ = 1;  // brings the sum to exposed light
 };
 
 }  // namespace offstage::producer

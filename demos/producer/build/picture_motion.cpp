@@ -1,10 +1,13 @@
 // The part of picture.h that moves all objects to their states between two snapshots.
 
+#include <cmath>
 #include <numbers>
 #include <unordered_map>
 
 #include "effects/distribution.h"
+#include "effects/random.h"
 #include "producer/base/to_float.h"
+#include "producer/build/animated_bodies.h"
 #include "producer/build/lights.h"
 #include "producer/build/picture.h"
 #include "sim/core/rotation.h"
@@ -51,6 +54,23 @@ Vector3f interpolate(const Vector3f& a, const Vector3f& va, const Vector3f& b, c
   return a + w * step + w * rest * (rest * limited(va) - w * limited(vb));
 }
 
+/// A direction for each number, uniform on the sphere.
+Vector3f direction_of(uint64_t id) {
+  const effects::RandomStream random(0, effects::stream_id("axis of a mesh"));
+  const Real z = 2 * random.uniform(id, 0) - 1, r = std::sqrt(std::max(1 - z * z, 0.0));
+  const effects::SinCos turn = effects::sincos(2 * std::numbers::pi * random.uniform(id, 1));
+  return Vec3(r * turn.cos, r * turn.sin, z).cast<float>();
+}
+
+/// Pose and size of a particle that is drawn as a mesh.
+Affine3f pose_of(const render::Point& point, const LookMesh& look) {
+  const Vector3f axis = look.axis ? Vector3f(look.axis->cast<float>().normalized()) : direction_of(point.id);
+  Eigen::Quaternionf turn(Eigen::AngleAxisf(point.angle, axis));
+  if (look.along_motion && point.velocity.norm() > 1e-6f)
+    turn = sim::rotation_between(Vector3f::UnitY(), point.velocity) * turn;
+  return Eigen::Translation3f(point.position) * turn * Eigen::Scaling(point.radius);
+}
+
 }  // namespace
 
 float Picture::subframe_time() const {
@@ -76,7 +96,23 @@ void Picture::set_balls(std::size_t set, std::span<const render::Point> balls) {
   stage_.set_points(blur_streaks_[set], scratch_blur_streaks_);
 }
 
+void Picture::place_animated(const AnimatedLook& look, const Affine3f& world_from_body, double time) {
+  const double duration = double{look.rig->clips[static_cast<std::size_t>(look.clip)].duration};
+  const render::RigPose pose =
+      render::pose_at(*look.rig, look.clip, to_float(clip_time(*look.animation, duration, time)));
+  const Affine3f world_from_model = world_from_body * look.body_from_model;
+  for (const AnimatedLook::Surface& surface : look.surfaces) {
+    const render::RigSurface& source = *surface.source;
+    if (source.deforms()) stage_.set_mesh(surface.mesh, render::deformed(*look.rig, source, pose));
+    stage_.set_transform(
+        surface.instance,
+        source.skin >= 0 ? world_from_model
+                         : Affine3f(world_from_model * pose.world[static_cast<std::size_t>(source.node)]));
+  }
+}
+
 void Picture::place_body(const DrawnBody& body, const Affine3f& world_from_body, double time) {
+  if (body.animated) place_animated(*body.animated, world_from_body, time);
   const float explode = body.overlay ? to_float(effects::mean(body.overlay->explode, time)) : 0;
   for (const DrawnPart& part : body.parts)
     stage_.set_transform(
@@ -98,34 +134,62 @@ void Picture::place_rods(const Snapshot& previous, const Snapshot& current, floa
 }
 
 void Picture::place_points(const Snapshot& previous, const Snapshot& current, float w, double frame_time) {
-  const auto dt = static_cast<float>(frame_time);
-  const float back = (1 - w) * dt;
   for (std::size_t set = 0; set < points_.size(); ++set) {
-    const PointSet &before = previous.point_sets[set], &now = current.point_sets[set];
     // A streak contains its own motion blur: it stays at its position at the end of the frame, with the
     // length of its style.
-    const auto show = [&](std::span<const render::Point> points) {
-      blur_streaks_[set] ? set_balls(set, points) : stage_.set_points(points_[set], points);
-    };
-    if (w == 1 || styles_[set] == render::PointStyle::streak) {
-      show(now.points);
-      continue;
+    std::span<const render::Point> points = current.point_sets[set].points;
+    if (w != 1 && styles_[set] != render::PointStyle::streak) {
+      scratch_.clear();
+      points_at(set, previous, current, w, frame_time, false, scratch_);
+      points = scratch_;
     }
-    scratch_.clear();
-    std::size_t j = 0;
-    for (std::size_t i = 0; i < now.points.size(); ++i) {
-      render::Point p = now.points[i];
-      while (j < before.points.size() && before.points[j].id < p.id) ++j;
-      if (j < before.points.size() && before.points[j].id == p.id)
-        p.position = interpolate(before.points[j], p, w, dt);
-      else if (now.ages[i] < back)
-        continue;  // not created yet
-      else
-        p.position -= back * p.velocity;
-      scratch_.push_back(p);
-    }
-    show(scratch_);
+    if (meshes_[set].look)
+      place_meshes(meshes_[set], points);
+    else if (blur_streaks_[set])
+      set_balls(set, points);
+    else
+      stage_.set_points(points_[set], points);
   }
+}
+
+void Picture::points_at(std::size_t set, const Snapshot& previous, const Snapshot& current, float w,
+                        double frame_time, bool all, std::vector<render::Point>& points) const {
+  const PointSet &before = previous.point_sets[set], &now = current.point_sets[set];
+  const auto dt = static_cast<float>(frame_time);
+  const float back = (1 - w) * dt;
+  std::size_t j = 0;
+  for (std::size_t i = 0; i < now.points.size(); ++i) {
+    render::Point p = now.points[i];
+    while (j < before.points.size() && before.points[j].id < p.id) ++j;
+    if (j < before.points.size() && before.points[j].id == p.id)
+      p.position = interpolate(before.points[j], p, w, dt);
+    else if (now.ages[i] < back && !all)
+      continue;  // not created yet
+    else
+      p.position -= back * p.velocity;
+    if (!now.spins.empty()) p.angle -= back * now.spins[i];
+    if (ages_within_frame_[set]) p.age -= back;
+    points.push_back(p);
+  }
+}
+
+void Picture::place_meshes(DrawnMeshes& drawn, std::span<const render::Point> points) {
+  const std::size_t parts = drawn.parts.size();
+  while (drawn.instances.size() < points.size() * parts)
+    for (const auto& [mesh, material] : drawn.parts) {
+      drawn.instances.push_back(stage_.add_instance(mesh, material, drawn.casts_shadow));
+      stage_.set_object(drawn.instances.back(), drawn.object);
+    }
+  for (std::size_t i = 0; i < std::max(points.size(), drawn.shown); ++i) {
+    const bool exists = i < points.size();
+    const Affine3f world_from_part =
+        exists ? pose_of(points[i], *drawn.look) * drawn.unit_from_part : Affine3f::Identity();
+    for (std::size_t k = 0; k < parts; ++k) {
+      stage_.set_visible(drawn.instances[i * parts + k], exists && points[i].radius > 0);
+      if (exists) stage_.set_transform(drawn.instances[i * parts + k], world_from_part);
+    }
+  }
+  drawn.shown = points.size();
 }
 
 void Picture::give_mesh(DrawnCloth& drawn, const ClothSample& sample) {

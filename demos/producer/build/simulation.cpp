@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "producer/build/animated_bodies.h"
 #include "producer/build/articulation_defs.h"
 #include "producer/build/cloth_defs.h"
 #include "producer/build/emitter_defs.h"
@@ -152,6 +153,7 @@ Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
 
 void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
   std::map<std::pair<std::string, Real>, sim::MeshHandle> meshes;
+  std::vector<std::pair<const Body*, sim::BodyDef>> animated;
   for (const Body& body : scene.bodies) {
     sim::BodyDef def{.name = body.name,
                      .motion = body.motion,
@@ -175,6 +177,10 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
         def.friction_axis = body.friction_axis;
       }
     }
+    if (body.has_animated_shape() && body.collides) {
+      animated.emplace_back(&body, def);
+      def.collides = false;  // its pieces do
+    }
     const sim::BodyHandle handle = at_place(body.where, [&] {
       std::visit(
           [&](const auto& shape) {
@@ -194,6 +200,26 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
     slot_of_[handle] = moving_.size();
     moving_.push_back({body.name, handle});
     moving_poses_.push_back(world_.body(handle).pose);
+  }
+  for (const auto& [body, def] : animated) add_pieces(*body, def, models);
+}
+
+/// Adds the pieces of an animated shape as kinematic bodies. They are not among the bodies of the scene.
+void Simulation::add_pieces(const Body& body, const sim::BodyDef& whole, const ModelLibrary& models) {
+  const MeshFile& file = std::get<MeshFile>(body.shape);
+  const render::ModelRig& rig = models.model(file.file).rig;
+  const Real scale = scale_of(file, models);
+  const Real end = scene_.output.start + scene_.output.duration;
+  for (const AnimatedPiece& piece : models.pieces(body)) {
+    sim::TriangleMesh mesh = piece.mesh;
+    for (Vec3& vertex : mesh.vertices) vertex *= scale;
+    sim::BodyDef def = whole;
+    def.name = body.name + "/" + piece.name;
+    def.motion = sim::MotionType::kinematic;
+    def.track = piece_track(rig, piece, body.animation.value(), whole.track, whole.pose, scale, end);
+    def.pose = def.track.at(0, whole.pose).pose;
+    def.shape = sim::MeshShape{world_.add_mesh(mesh, scaled(piece.parts, scale))};
+    at_place(body.where, [&] { world_.add_body(def); });
   }
 }
 
@@ -318,7 +344,9 @@ void Simulation::step(double sampling_time) {
     overlays_->record(world_);
     sources_->emit(world_, start, end);
   });
-  for (const sim::MovedBody& moved : world_.moved()) moving_poses_[slot_of_.at(moved.body)] = moved.pose;
+  for (const sim::MovedBody& moved : world_.moved())
+    if (const auto slot = slot_of_.find(moved.body); slot != slot_of_.end())
+      moving_poses_[slot->second] = moved.pose;
   note(report);
 }
 
@@ -416,8 +444,8 @@ Snapshot Simulation::snapshot() const {
   }
 
   for (std::size_t i = 0; i < groups_.size(); ++i)
-    snapshot.point_sets.push_back(
-        group_looks_[i].points(world_.particles(groups_[i].handle), &scene_.particles[i].places));
+    snapshot.point_sets.push_back(group_looks_[i].points(world_.particles(groups_[i].handle), world_.time(),
+                                                         &scene_.particles[i].places));
   sources_->add_points(world_, snapshot.point_sets);
   for (const NamedCloth& cloth : cloths_) snapshot.cloths.push_back(cloth_sample(world_.cloth(cloth.handle)));
   snapshot.overlays = overlays_->lines(world_);

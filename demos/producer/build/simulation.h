@@ -117,6 +117,7 @@ class Simulation {
  private:
   void add_bodies(const Scene& scene, const ModelLibrary& models);
   sim::MeshHandle add_mesh(const MeshFile& file, const ModelLibrary& models);
+  void add_pieces(const Body& body, const sim::BodyDef& whole, const ModelLibrary& models);
   void add_particle_groups(const Scene& scene);
   void add_springs(const Scene& scene);
   void add_joints(const Scene& scene);

@@ -12,11 +12,12 @@ namespace {
 using Eigen::Vector3f;
 using Eigen::Vector4f;
 
-constexpr FileKind kSnapshotKind = {"offsnap", 4, "snapshot"};
+constexpr FileKind kSnapshotKind = {"offsnap", 5, "snapshot"};
 
 constexpr std::size_t kBodyBytes = 7 * sizeof(float);
 constexpr std::size_t kRodBytes = 6 * sizeof(float);
 constexpr std::size_t kPointBytes = 12 * sizeof(float) + sizeof(uint64_t);
+constexpr std::size_t kSpinBytes = 2 * sizeof(float);
 constexpr std::size_t kClothBytes = 4 * sizeof(uint64_t) + sizeof(uint32_t);
 constexpr std::size_t kLineBytes = 12 * sizeof(float) + sizeof(uint64_t);
 
@@ -70,6 +71,8 @@ std::vector<uint8_t> serialize(const Snapshot& snapshot, std::string_view key) {
       out.put(set.ages[i]);
       out.put(p.id);
     }
+    out.put(uint64_t{set.spins.size()});
+    for (std::size_t i = 0; i < set.spins.size(); ++i) out.put(set.points[i].angle), out.put(set.spins[i]);
   }
   out.put(uint64_t{snapshot.cloths.size()});
   for (const ClothSample& cloth : snapshot.cloths) {
@@ -126,6 +129,13 @@ Snapshot deserialize(std::span<const uint8_t> bytes, const std::string& source, 
       p.color = in.take<Vector4f>();
       p.age = set.ages[i] = in.take<float>();
       p.id = in.take<uint64_t>();
+    }
+    set.spins.resize(in.take_count(kSpinBytes));
+    if (!set.spins.empty() && set.spins.size() != set.points.size())
+      throw render::FileError(source + ": is damaged: not all particles of a set turn");
+    for (std::size_t i = 0; i < set.spins.size(); ++i) {
+      set.points[i].angle = in.take<float>();
+      set.spins[i] = in.take<float>();
     }
   }
   snapshot.cloths.resize(in.take_count(kClothBytes));

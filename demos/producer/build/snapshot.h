@@ -30,7 +30,8 @@ struct RodSample {
 /// Particles of one group or emitter. `ids` ascend; `ages` show when a particle was created within the frame.
 struct PointSet {
   std::vector<render::Point> points;
-  std::vector<float> ages;  ///< [s]
+  std::vector<float> ages;   ///< [s]
+  std::vector<float> spins;  ///< rates of Point::angle [rad/s]; empty: none turns
 };
 
 /// A cloth.

@@ -137,14 +137,24 @@ void add_threads(CLI::App& command, int& threads) {
 }
 
 /// `bare`: for a command line without the command, which has no -o.
+void add_camera(CLI::App& command, SceneOptions& scene) {
+  command.add_option("--camera", scene.camera, "Name of a camera of the scene to draw instead of `camera`");
+}
+
 CLI::App* add_render(CLI::App& app, RenderOptions& render, bool bare) {
   CLI::App* command = app.add_subcommand("render", "Simulate a scene and draw it: frames or a video");
   add_scene(*command, render.scene);
   command
-      ->add_option(
-          "-o,--output", render.out,
-          "frames/####.png or a folder; .mp4 .webm .mov .mkv .gif .webp .apng .png; - for standard output")
+      ->add_option("-o,--output", render.out,
+                   "frames/####.png (or .jpg, .exr) or a folder; .mp4 .webm .mov .mkv .gif .webp .apng .png; "
+                   "- for standard "
+                   "output")
       ->required(!bare);
+  command
+      ->add_option("--camera", render.cameras,
+                   "Name of a camera to draw, or `all`; several cameras get files with their names")
+      ->delimiter(',')
+      ->allow_extra_args(false);
   add_picture(*command, render.scene);
   add_timing(*command, render.scene);
   command->add_option("--frames", render.frames,
@@ -237,6 +247,7 @@ CLI::App* add_frame(CLI::App& app, FrameOptions& frame) {
                                      "Number of the frame (negative numbers count from the end)");
   command->add_option("--at", frame.at, "Time of the frame in seconds, instead of its number")
       ->excludes(number);
+  add_camera(*command, frame.scene);
   add_picture(*command, frame.scene);
   add_timing(*command, frame.scene);
   add_threads(*command, frame.threads);
@@ -390,6 +401,7 @@ CLI::App* add_sheet(CLI::App& app, SheetOptions& sheet) {
       ->check(CLI::Range(1, 400))
       ->capture_default_str();
   command->add_option("--columns", sheet.columns, "Pictures in a row")->check(CLI::Range(1, 100));
+  add_camera(*command, sheet.scene);
   add_small_picture(*command, sheet.scene);
   add_timing(*command, sheet.scene);
   add_threads(*command, sheet.threads);

@@ -29,6 +29,7 @@ struct SceneOptions {
   std::optional<uint64_t> seed;
   std::vector<std::string> channels;  ///< depth, normal, id, motion; empty: those of the scene
   std::optional<std::string> channel_format;
+  std::string camera;              ///< name of the camera to draw; empty: the scene's `camera`
   std::vector<std::string> allow;  ///< additional folders for the scene's files
   bool no_cache = false;           ///< convex parts of models are neither read from the disk nor stored
 
@@ -52,8 +53,10 @@ struct RenderOptions {
   std::string frames, chunk;
   std::string format = "rgba";  ///< format of standard output
   std::string cache, stats, report;
-  int threads = 0;  ///< 0: all available
-  int jobs = 0;     ///< 0: chosen by `threads`
+  std::vector<std::string> cameras;  ///< cameras to draw, or kAllCameras; empty: the scene's `camera`
+  std::string keep;                  ///< folder that receives the states, for other cameras; empty: none
+  int threads = 0;                   ///< 0: all available
+  int jobs = 0;                      ///< 0: chosen by `threads`
   bool resume = false, force = false, dry_run = false, watch = false;
   render::GlPlatform gl = render::GlPlatform::automatic;
 };

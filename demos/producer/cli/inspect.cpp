@@ -92,6 +92,10 @@ Json describe_model(const std::filesystem::path& path, const DecompositionCache&
     if (node.parent >= 0) nodes.back()["parent"] = model.nodes[static_cast<std::size_t>(node.parent)].name;
   }
   json["nodes"] = nodes;
+  Json clips = Json::array();
+  for (const render::Model::Clip& clip : model.clips)
+    clips.push_back({{"name", clip.name}, {"duration", clip.duration}});
+  json["animations"] = clips;
   if (const std::string hint = size_hint(bounds.sizes().maxCoeff()); !hint.empty()) json["hint"] = hint;
   json["warnings"] = model.warnings;
   return json;
@@ -178,6 +182,7 @@ LoadedScene load(const SceneOptions& options, bool quiet, const std::vector<std:
   std::vector<std::string> overrides = options.overrides();
   overrides.insert(overrides.begin(), more_overrides.begin(), more_overrides.end());
   LoadedScene loaded = load_scene(options.file, overrides, options.allow);
+  if (!options.camera.empty()) choose_camera(loaded, options.camera);
   if (!quiet) print_warnings(loaded.warnings);
   return loaded;
 }

@@ -9,9 +9,11 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
+#include <unistd.h>
 
 #include "producer/base/interrupt.h"
 #include "producer/base/log.h"
+#include "producer/base/suggest.h"
 #include "producer/cli/command_line.h"
 #include "producer/cli/commands.h"
 #include "producer/cli/run_progress.h"
@@ -23,6 +25,7 @@
 #include "producer/run/run_report.h"
 #include "render/context.h"
 #include "render/error.h"
+#include "render/frame_files.h"
 #include "render/image_io.h"
 #include "render/sink.h"
 
@@ -103,6 +106,21 @@ std::string frame_settings(const LoadedScene& loaded, const ModelLibrary& models
   return settings_key(loaded, models) + (gl == render::GlPlatform::egl_gpu ? "-gpu" : "");
 }
 
+/// Warns of, or refuses, what the format of the frames cannot hold.
+void check_format(const Plan& plan) {
+  if (plan.target.kind != OutputKind::frames) return;
+  const Scene& scene = plan.loaded.scene;
+  const auto format = render::frame_format(plan.frames_pattern);
+  if (format == render::FrameFormat::jpeg && scene.environment.background == Background::transparent)
+    throw OutputError(
+        plan.frames_pattern.string() +
+        ": JPEG has no transparency; write PNG or EXR, or set environment.background to \"sky\"");
+  const bool texts = std::ranges::any_of(
+      scene.overlays, [](const Overlay& overlay) { return std::holds_alternative<TextOverlay>(overlay); });
+  if (format == render::FrameFormat::exr && texts)
+    log("warning: the text overlays are not in the EXR frames, which hold the light of the scene alone\n");
+}
+
 Plan make_plan(const RenderOptions& options, const ModelLibrary& models, LoadedScene loaded) {
   Plan plan{.loaded = std::move(loaded), .target = parse_output(options.out)};
   plan.frames = parse_frames(options.frames, plan.loaded.scene.frame_count());
@@ -118,8 +136,9 @@ Plan make_plan(const RenderOptions& options, const ModelLibrary& models, LoadedS
       plan.through_frames ? fs::path(plan.target.path.string() + ".frames") / "####.png" : plan.target.path;
   const OutputSettings& output = plan.loaded.scene.output;
   plan.channels = {{output.channels, output.channel_format},
-                   plan.target.kind == OutputKind::frames ? fs::path(plan.frames_pattern).replace_extension()
+                   plan.target.kind == OutputKind::frames ? channels_stem(plan.frames_pattern)
                                                           : channels_folder(plan.target.path) / "####"};
+  check_format(plan);
   return plan;
 }
 
@@ -149,6 +168,7 @@ RunStats draw(const Plan& plan, const ModelLibrary& models, const RenderOptions&
   RenderJob job{
       .frames = std::move(frames), .threads = plan.jobs, .cache = {}, .report = !options.report.empty()};
   if (!options.cache.empty()) job.cache = options.cache;
+  if (!options.keep.empty()) job.keep = options.keep;
   job.channels = plan.channels.choice;
   job.channels_stem = plan.channels.stem;
   RunStats stats = render_frames(plan.loaded, models, job, sink, std::ref(progress));
@@ -176,7 +196,7 @@ int render_to_frames(const Plan& plan, const ModelLibrary& models, const RenderO
                                       existing);
   RunStats stats;
   if (!folder.missing.empty()) {
-    auto sink = render::make_png_sink(plan.frames_pattern, plan.settings);
+    auto sink = render::make_frame_sink(plan.frames_pattern, plan.settings);
     stats = draw(plan, models, options, folder.missing, *sink);
   }
   stats.frames_kept = static_cast<int>(plan.frames.size() - folder.missing.size());
@@ -229,6 +249,71 @@ int render_to_pipe(const Plan& plan, const ModelLibrary& models, const RenderOpt
   return stats.interrupted_by ? interrupted(stats, static_cast<int>(plan.frames.size()), "") : kOk;
 }
 
+/// A folder for the states of a run, which is removed at its end.
+class StatesFolder {
+ public:
+  /// Beside an output.
+  explicit StatesFolder(const fs::path& out)
+      : path_(out.parent_path() / fmt::format(".{}.states-{}", out.filename().string(), ::getpid())) {}
+  ~StatesFolder() {
+    std::error_code error;
+    fs::remove_all(path_, error);
+  }
+  StatesFolder(const StatesFolder&) = delete;
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+/// The output of one of several cameras: film-NAME.mp4, or frames/NAME/####.png.
+std::string output_of_camera(const std::string& out, const std::string& camera) {
+  const OutputTarget target = parse_output(out);
+  if (target.kind == OutputKind::pipe)
+    throw OutputError("-: standard output takes the frames of one camera; give a folder or a file");
+  const fs::path& path = target.path;
+  if (target.kind == OutputKind::frames) return (path.parent_path() / camera / path.filename()).string();
+  return (path.parent_path() / (path.stem().string() + "-" + camera + path.extension().string())).string();
+}
+
+std::string file_of_camera(const std::string& file, const std::string& camera) {
+  const fs::path path = file;
+  return file.empty()
+             ? ""
+             : (path.parent_path() / (path.stem().string() + "-" + camera + path.extension().string()))
+                   .string();
+}
+
+/// Draws several cameras one after the other. Only the first one simulates; the states are kept for the
+/// others unless the run is resumed, in which each camera may lack other frames.
+int render_cameras(const RenderOptions& options) {
+  if (options.watch) throw OutputError("--watch draws one camera; name it with --camera");
+  const LoadedScene loaded = load(options.scene, true);
+  const std::vector<std::string> known = camera_names(loaded.scene);
+  std::vector<std::string> names = options.cameras;
+  if (std::ranges::find(names, kAllCameras) != names.end()) names = known;
+  for (const std::string& name : names)
+    if (std::ranges::find(known, name) == known.end())
+      throw std::invalid_argument("there is no camera '" + name + "'" + suggestion(name, known));
+  for (const std::string& name : names) {
+    const OutputTarget target = parse_output(output_of_camera(options.out, name));
+    if (target.kind == OutputKind::video) check_file(target.path.string(), options.force);
+  }
+  const StatesFolder states(parse_output(options.out).path);
+  const bool shares = options.cache.empty() && !options.resume && !options.dry_run && names.size() > 1;
+  for (const std::string& name : names) {
+    RenderOptions one = options;
+    one.cameras = {name};
+    one.out = output_of_camera(options.out, name);
+    one.stats = file_of_camera(options.stats, name);
+    one.report = file_of_camera(options.report, name);
+    if (shares) (name == names.front() ? one.keep : one.cache) = states.path().string();
+    const int code = render_command(one);
+    if (code != kOk) return code;
+  }
+  return kOk;
+}
+
 int checked_frame(const Scene& scene, double wanted) {
   const int count = scene.frame_count();
   if (wanted >= 1 && wanted <= count) return static_cast<int>(wanted);
@@ -274,7 +359,11 @@ std::string default_film(const std::string& scene_file) {
   return fs::path(scene_file).stem().string() + ".mp4";
 }
 
-int render_command(const RenderOptions& options) {
+int render_command(const RenderOptions& given) {
+  if (given.cameras.size() > 1 || (given.cameras.size() == 1 && given.cameras.front() == kAllCameras))
+    return render_cameras(given);
+  RenderOptions options = given;
+  if (options.cameras.size() == 1) options.scene.camera = options.cameras.front();
   LoadedScene loaded = load(options.scene, options.talk.quiet);
   const ModelLibrary models = load_models(loaded, options.scene, options.talk);
   const Plan plan = make_plan(options, models, std::move(loaded));

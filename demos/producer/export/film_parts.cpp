@@ -53,6 +53,18 @@ std::vector<float> size_key(const sim::Plane&) {
   return {5};
 }
 
+/// A mesh whose texture coordinates are those that a texture of its material reads.
+render::Mesh with_coordinates_of(const render::TextureMap& map, const render::Mesh& mesh) {
+  render::Mesh result = mesh;
+  if (map.is_plain()) return result;
+  if (map.uv_set == 1) result.uvs = mesh.second_uvs;
+  for (Vector2f& uv : result.uvs) {
+    const Eigen::Vector3f place(uv.x(), uv.y(), 1);
+    uv = {map.rows[0].dot(place), map.rows[1].dot(place)};
+  }
+  return result;
+}
+
 /// Makes names unique.
 class UniqueNames {
  public:
@@ -142,19 +154,25 @@ class FilmParts::Builder {
   void add_model(const std::string& file, const Affine3f& body_from_model, const std::string& material_name,
                  FilmBody& film) {
     const render::Model& model = models_.model(file);
-    const auto [it, is_new] = models_done_.try_emplace(file);
+    const bool own_look = material_name.empty() && !model.materials.empty();
+    const auto [it, is_new] = models_done_.try_emplace({file, own_look});
     auto& [first_mesh, first_material] = it->second;
     if (is_new) {
       first_mesh = parts_.meshes.size();
-      for (const render::Model::Part& part : model.parts) parts_.meshes.push_back(part.mesh);
+      for (const render::Model::Part& part : model.parts)
+        parts_.meshes.push_back(
+            own_look
+                ? with_coordinates_of(
+                      model.materials[static_cast<std::size_t>(part.material)].base_color_texture, part.mesh)
+                : part.mesh);
       first_material = parts_.materials.size();
-      for (const render::Material& m : model.materials) add_material(m, model.textures);
+      if (own_look)
+        for (const render::Material& m : model.materials) add_material(m, model.textures);
     }
     for (std::size_t i = 0; i < model.parts.size(); ++i)
       film.parts.push_back({first_mesh + i,
-                            material_name.empty() && !model.materials.empty()
-                                ? first_material + static_cast<std::size_t>(model.parts[i].material)
-                                : material(material_name),
+                            own_look ? first_material + static_cast<std::size_t>(model.parts[i].material)
+                                     : material(material_name),
                             body_from_model});
   }
 
@@ -200,7 +218,8 @@ class FilmParts::Builder {
   UniqueNames names_, material_names_;
   std::map<std::vector<float>, std::size_t> meshes_done_;
   std::map<std::string, std::size_t> materials_done_;
-  std::map<std::string, std::pair<std::size_t, std::size_t>> models_done_;
+  /// By file, and whether the parts have the materials of the file.
+  std::map<std::pair<std::string, bool>, std::pair<std::size_t, std::size_t>> models_done_;
   std::size_t slots_ = 0, rods_ = 0;
 };
 

@@ -277,6 +277,16 @@ class GltfExport : public FilmExport {
     return index;
   }
 
+  static Json sampler_of(const render::TextureMap& map) {
+    constexpr int kClamp = 33071, kMirror = 33648, kRepeat = 10497, kNearest = 9728, kLinear = 9729;
+    const auto code = [](render::Wrap wrap) {
+      return wrap == render::Wrap::clamp ? kClamp : wrap == render::Wrap::mirror ? kMirror : kRepeat;
+    };
+    return {{"wrapS", code(map.wrap_u)},
+            {"wrapT", code(map.wrap_v)},
+            {"magFilter", map.nearest ? kNearest : kLinear}};
+  }
+
   void add_materials() {
     for (const FilmMaterial& m : parts_.materials) {
       const render::Material& look = m.look;
@@ -286,7 +296,8 @@ class GltfExport : public FilmExport {
       if (m.texture) {
         const int view = buffer_.add_view(render::encode_png(*m.texture));
         images_.push_back({{"bufferView", view}, {"mimeType", "image/png"}});
-        textures_.push_back({{"source", images_.size() - 1}});
+        texture_samplers_.push_back(sampler_of(look.base_color_texture));
+        textures_.push_back({{"source", images_.size() - 1}, {"sampler", images_.size() - 1}});
         pbr["baseColorTexture"] = {{"index", textures_.size() - 1}};
       }
       Json material = {{"name", m.name}, {"pbrMetallicRoughness", std::move(pbr)}};
@@ -463,6 +474,7 @@ class GltfExport : public FilmExport {
     add("materials", materials_);
     add("textures", textures_);
     add("images", images_);
+    add("samplers", texture_samplers_);
     if (!channels_.empty())
       json["animations"] = Json::array(
           {{{"name", "film"}, {"samplers", std::move(samplers_)}, {"channels", std::move(channels_)}}});
@@ -499,8 +511,9 @@ class GltfExport : public FilmExport {
   float first_fov_deg_ = 40;
   bool zooms_ = false, flickers_ = false;
   Json nodes_ = Json::array(), meshes_ = Json::array(), materials_ = Json::array(), textures_ = Json::array(),
-       images_ = Json::array(), cameras_ = Json::array(), lights_ = Json::array(), samplers_ = Json::array(),
-       channels_ = Json::array(), primitives_ = Json::array();
+       images_ = Json::array(), texture_samplers_ = Json::array(), cameras_ = Json::array(),
+       lights_ = Json::array(), samplers_ = Json::array(), channels_ = Json::array(),
+       primitives_ = Json::array();
   std::vector<int> roots_;
   std::set<std::string> used_;
   std::map<std::pair<std::size_t, std::size_t>, int> meshes_done_;

@@ -85,7 +85,8 @@ class ObjExport : public FilmExport {
       for (char& letter : picture)
         if (letter == '/') letter = '_';
       render::write_png(folder / picture, *m.texture);
-      out += "map_Kd " + picture + "\n";
+      const bool clamped = m.look.base_color_texture.wrap_u == render::Wrap::clamp;
+      out += std::string("map_Kd ") + (clamped ? "-clamp on " : "") + picture + "\n";
     }
     render::write_file_atomically(folder / library_,
                                   {reinterpret_cast<const uint8_t*>(out.data()), out.size()});

@@ -262,6 +262,10 @@ class UsdExport : public FilmExport {
                     parts_.scene.output.fps.per_second(), first_, parts_.scene.output.fps.per_second()));
   }
 
+  static const char* wrap_name(render::Wrap wrap) {
+    return wrap == render::Wrap::clamp ? "clamp" : wrap == render::Wrap::mirror ? "mirror" : "repeat";
+  }
+
   void put_materials() {
     put("def Scope \"Materials\"\n{\n");
     for (std::size_t i = 0; i < parts_.materials.size(); ++i) {
@@ -282,9 +286,10 @@ class UsdExport : public FilmExport {
             "string inputs:varname = \"st\"\nfloat2 outputs:result\n}}\n"
             "def Shader \"Texture\"\n{{\nuniform token info:id = \"UsdUVTexture\"\n"
             "asset inputs:file = @./{}@\nfloat2 inputs:st.connect = <{}/Coordinates.outputs:result>\n"
-            "token inputs:wrapS = \"repeat\"\ntoken inputs:wrapT = \"repeat\"\n"
+            "token inputs:wrapS = \"{}\"\ntoken inputs:wrapT = \"{}\"\n"
             "token inputs:sourceColorSpace = \"sRGB\"\nfloat3 outputs:rgb\n}}\n",
-            picture, path);
+            picture, path, wrap_name(look.base_color_texture.wrap_u),
+            wrap_name(look.base_color_texture.wrap_v));
       }
       put(fmt::format(
           "def Material \"{}\"\n{{\ntoken outputs:surface.connect = <{}/Surface.outputs:surface>\n"

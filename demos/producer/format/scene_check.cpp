@@ -1,6 +1,7 @@
 #include "producer/format/scene_check.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -87,12 +88,7 @@ class Checker {
             if (!o.where.path.empty()) check_overlay(o);
           },
           overlay);
-    std::visit(
-        [&](const auto& camera) {
-          check_camera(camera);
-          check_lens(camera);
-        },
-        scene_.camera);
+    check_cameras();
     check_lights();
     check_film();
     return std::move(findings_);
@@ -158,11 +154,27 @@ class Checker {
     for (const Cloth& cloth : scene_.cloths)
       check_material_name(cloth.where.path + "/material", cloth.material);
     check_materials_of_articulations();
+    for (const ParticleGroup& group : scene_.particles) {
+      check_look(group.where.path + "/look", group.look);
+      check_file(group.where.path + "/file", group.file);
+    }
+    for (const Emitter& emitter : scene_.emitters)
+      for_each_source(emitter, [&](const ParticleSource& source, const auto&...) {
+        check_look(source.where.path + "/look", source.look);
+      });
     for (const Material& material : scene_.materials)
       if (!used_materials_.contains(material.name))
         warn(material.where.path, "the material '" + material.name + "' is not used");
       else
         check_grain(material);
+  }
+  /// Checks the files and the material of a look.
+  void check_look(const std::string& path, const ParticleLook& look) {
+    check_file(path + "/texture", look.texture);
+    if (!look.mesh) return;
+    check_material_name(path + "/mesh/material", look.mesh->material);
+    if (const auto* mesh = std::get_if<MeshFile>(&look.mesh->shape))
+      check_model(path + "/mesh/shape/file", mesh->file);
   }
   /// Friction across an axis needs a material that defines it and a body with a friction_axis.
   void check_grain(const Material& material) {
@@ -211,6 +223,7 @@ class Checker {
     if (const MeshFile* mesh = std::get_if<MeshFile>(&body.shape))
       check_model(path + "/shape/file", mesh->file);
     if (body.model) check_model(path + "/model/file", body.model->file);
+    check_animation(body);
     if (dynamic && std::holds_alternative<sim::Plane>(body.shape))
       fail(path + "/shape", "a plane cannot be dynamic; give the body \"motion\": \"static\"");
     if (!kinematic && !body.keyframes.empty())
@@ -231,6 +244,22 @@ class Checker {
     const Material* material = find_named(scene_.materials, body.material);
     if (has_grain(body) && !(material && material->cross_friction))
       warn(path + "/friction_axis", "has no effect: the body's material has no cross_friction");
+  }
+
+  void check_animation(const Body& body) {
+    if (!body.animation) return;
+    const std::string path = body.where.path + "/animation";
+    const MeshFile* shape = std::get_if<MeshFile>(&body.shape);
+    if (!body.model && !shape)
+      return fail(path, "needs a model file: as the body's `model`, or as its shape");
+    if (!body.model && body.motion == sim::MotionType::dynamic)
+      fail(path,
+           "the parts of a dynamic body cannot be moved by an animation; make the body kinematic, or give it "
+           "a simple "
+           "shape and draw the file as its `model`");
+    const std::string& file = body.model ? body.model->file : shape->file;
+    if (file.find('#') != std::string::npos)
+      fail(path, fmt::format("plays in a whole file; '{}' is one of its nodes", file));
   }
 
   void check_place(const Vec3& position, const std::string& path) {
@@ -462,23 +491,47 @@ class Checker {
   void check_view(const Vec3& eye, const Vec3& target, const std::string& path) {
     if (eye == target) fail(path, "the camera is at the point that it looks at");
   }
-  void check_camera(const StaticCamera& camera) { check_view(camera.eye, camera.target, "/camera"); }
-  void check_camera(const KeyframedCamera& camera) {
-    if (camera.keyframes.empty()) fail("/camera", "needs at least one of \"keyframes\"");
-    check_times(camera.keyframes, "/camera/keyframes");
-    for (std::size_t i = 0; i < camera.keyframes.size(); ++i)
-      check_view(camera.keyframes[i].eye, camera.keyframes[i].target, "/camera/keyframes" + step(i));
+  void check_view(const StaticCamera& camera, const std::string& path) {
+    check_view(camera.eye, camera.target, path);
   }
-  void check_camera(const OrbitCamera&) {}
-  void check_camera(const FollowCamera& camera) {
-    if (!camera.body.empty()) check_body_name("/camera/body", camera.body);
-    check_view(camera.offset, camera.look_offset, "/camera");
+  void check_view(const KeyframedCamera& camera, const std::string& path) {
+    if (camera.keyframes.empty()) fail(path, "needs at least one of \"keyframes\"");
+    check_times(camera.keyframes, path + "/keyframes");
+    for (std::size_t i = 0; i < camera.keyframes.size(); ++i)
+      check_view(camera.keyframes[i].eye, camera.keyframes[i].target, path + "/keyframes" + step(i));
+  }
+  void check_view(const OrbitCamera&, const std::string&) {}
+  void check_view(const FollowCamera& camera, const std::string& path) {
+    if (!camera.body.empty()) check_body_name(path + "/body", camera.body);
+    check_view(camera.offset, camera.look_offset, path);
   }
 
-  void check_lens(const Lens& lens) {
-    if (!lens.focus_on.empty()) check_body_name("/camera/focus_on", lens.focus_on);
-    if (!lens.look_at.empty()) check_body_name("/camera/look_at", lens.look_at);
-    for (std::size_t i = 0; i < lens.fit.size(); ++i) check_body_name("/camera/fit" + step(i), lens.fit[i]);
+  void check_camera(const Camera& camera, const std::string& path) {
+    const auto& lens = std::visit([](const Lens& l) -> const Lens& { return l; }, camera);
+    std::visit([&](const auto& c) { check_view(c, path); }, camera);
+    if (!lens.focus_on.empty()) check_body_name(path + "/focus_on", lens.focus_on);
+    if (!lens.look_at.empty()) check_body_name(path + "/look_at", lens.look_at);
+    for (std::size_t i = 0; i < lens.fit.size(); ++i) check_body_name(path + "/fit" + step(i), lens.fit[i]);
+  }
+  /// Their names become parts of file names.
+  void check_cameras() {
+    constexpr std::size_t kMostLetters = 64;
+    check_camera(scene_.camera, "/camera");
+    check_unique(scene_.cameras);
+    for (const NamedCamera& camera : scene_.cameras) {
+      const std::string& path = camera.where.path;
+      const bool plain = std::ranges::all_of(
+          camera.name, [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; });
+      if (camera.name == kMainCamera || camera.name == kAllCameras)
+        fail(path + "/name", fmt::format("'{}' is the name of {}", camera.name,
+                                         camera.name == kMainCamera ? "`camera`" : "all cameras together"));
+      else if (!plain || camera.name.size() > kMostLetters)
+        fail(path + "/name",
+             fmt::format("'{}': the name of a camera is part of file names; it has at most {} "
+                         "letters, digits, _ and -",
+                         camera.name, kMostLetters));
+      check_camera(camera.camera, path + "/camera");
+    }
   }
 
   void check_light(const SunLight& sun, const std::string& path) {

@@ -89,6 +89,35 @@ class ParticleChecker {
     for (std::size_t i = 1; i < ramp.size(); ++i)
       if (ramp[i].first < ramp[i - 1].first) fail(path + index_step(i), "ages must not decrease");
   }
+  void check_pictures(const ParticleLook& look, const std::string& path) {
+    if (!look.texture.empty() && look.style != LookStyle::sprite)
+      warn(path + "/texture", "has no effect: it is for sprites");
+    if (look.sheet && (look.texture.empty() || look.style != LookStyle::sprite))
+      warn(path + "/sheet", "has no effect: it divides the texture of sprites, and there is none");
+    if (look.sheet && look.sheet->columns * look.sheet->rows > render::kMostSheetPictures)
+      fail(path + "/sheet", fmt::format("has {} pictures, of at most {}",
+                                        look.sheet->columns * look.sheet->rows, render::kMostSheetPictures));
+    const auto moves = [](const Varying& v) {
+      return effects::lower_bound(v) != 0 || effects::upper_bound(v) != 0;
+    };
+    if (!look.turns() && (moves(look.angle_deg) || moves(look.spin_deg_per_s)))
+      warn(path + (moves(look.angle_deg) ? "/angle_deg" : "/spin_deg_per_s"),
+           "has no effect: it turns sprites with a texture, flakes and meshes");
+    if (look.mesh && look.style != LookStyle::mesh)
+      warn(path + "/mesh", "has no effect: it is for the style `mesh`");
+  }
+  void check_mesh(const ParticleLook& look, const std::string& path) {
+    if (!look.mesh) return fail(path + "/mesh", "is missing: the style `mesh` needs an object to draw");
+    if (std::holds_alternative<sim::Plane>(look.mesh->shape))
+      fail(path + "/mesh/shape", "a plane is infinite; use a flat box");
+    const auto* mesh = std::get_if<MeshFile>(&look.mesh->shape);
+    if (mesh && (mesh->fit || mesh->scale != 1))
+      warn(path + "/mesh/shape", "its size has no effect: the mesh gets the size of the particle");
+    if (look.color.rgba != Eigen::Vector4f::Ones() || !look.color_over_age.empty() ||
+        !look.temperature_over_age.empty())
+      warn(path + (look.color_over_age.empty() ? "/color" : "/color_over_age"),
+           "has no effect: a mesh has the colour of its material");
+  }
   void check_look(const ParticleLook& look, const std::string& path) {
     if (look.style == LookStyle::sphere) {
       const bool fades =
@@ -99,6 +128,8 @@ class ParticleChecker {
     } else if (look.metallic || look.roughness) {
       warn(path + (look.metallic ? "/metallic" : "/roughness"), "has no effect: it is for spheres only");
     }
+    check_pictures(look, path);
+    if (look.style == LookStyle::mesh) check_mesh(look, path);
     check_ages(look.color_over_age, path + "/color_over_age");
     check_ages(look.temperature_over_age, path + "/temperature_over_age");
     check_ages(look.size_over_age, path + "/size_over_age");
@@ -107,8 +138,11 @@ class ParticleChecker {
     check_look(group.look, group.where.path + "/look");
     check_drag(group.behaviour, group.mass, group.where.path);
     for (std::size_t i = 0; i < group.places.size(); ++i)
-      if (const auto problem = outside(scene_, group.places[i].position))
+      if (const auto problem = outside(scene_, group.places[i].position)) {
+        // The points of a file have no places in the scene.
+        if (!group.file.empty()) return fail(group.where.path + "/file", "a point " + *problem);
         fail(group.where.path + "/places" + index_step(i) + "/position", *problem);
+      }
   }
 
   // --- Emitters ---

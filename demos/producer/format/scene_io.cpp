@@ -1,7 +1,10 @@
 #include "producer/format/scene_io.h"
 
 #include <algorithm>
+#include <stdexcept>
 #include <tuple>
+
+#include <nlohmann/json.hpp>
 
 #include "producer/base/suggest.h"
 #include "producer/build/model_articulation.h"
@@ -93,8 +96,10 @@ LoadedScene parse_scene(std::string_view text, const std::string& name, const Sc
   name_everything(described, name);
 
   std::vector<Problem> misplaced, crowded;
+  std::string canonical = to_text(write_scene(described));
   read_links(described, folder, misplaced);
-  LoadedScene loaded{expand(described, misplaced, crowded), folder, {}, to_text(write_scene(described))};
+  read_clouds(described, folder, misplaced);
+  LoadedScene loaded{expand(described, misplaced, crowded), folder, {}, std::move(canonical)};
   const Findings findings = check_scene(described, loaded.scene, folder);
   append(errors, misplaced, source);
   append(errors, findings.errors, source);
@@ -113,6 +118,25 @@ LoadedScene load_scene(const std::filesystem::path& file, const std::vector<std:
   if (file == kStandardInput)
     return parse_scene(standard_input(), kStandardInputName, SceneFolder({}, allowed), overrides);
   return parse_scene(read_text(file), file.string(), SceneFolder(file.parent_path(), allowed), overrides);
+}
+
+std::vector<std::string> camera_names(const Scene& scene) {
+  std::vector<std::string> names = {kMainCamera};
+  for (const NamedCamera& camera : scene.cameras) names.push_back(camera.name);
+  return names;
+}
+
+void choose_camera(LoadedScene& loaded, const std::string& name) {
+  if (name == kMainCamera) return;
+  const auto& cameras = loaded.scene.cameras;
+  const auto chosen = std::ranges::find(cameras, name, &NamedCamera::name);
+  if (chosen == cameras.end())
+    throw std::invalid_argument("there is no camera '" + name + "'" +
+                                suggestion(name, camera_names(loaded.scene)));
+  auto json = nlohmann::ordered_json::parse(loaded.canonical);
+  json["camera"] = json["cameras"].at(static_cast<std::size_t>(chosen - cameras.begin()))["camera"];
+  loaded.canonical = json.dump();
+  loaded.scene.camera = chosen->camera;
 }
 
 }  // namespace offstage::producer

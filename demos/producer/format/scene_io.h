@@ -31,6 +31,11 @@ LoadedScene load_scene(const std::filesystem::path& file, const std::vector<std:
 LoadedScene parse_scene(std::string_view text, const std::string& name, const SceneFolder& folder,
                         const std::vector<std::string>& overrides = {});
 
+/// Names of the cameras of a scene: kMainCamera, then those of `cameras`.
+std::vector<std::string> camera_names(const Scene& scene);
+/// Makes a camera of the scene that which is drawn. Throws std::invalid_argument for an unknown name.
+void choose_camera(LoadedScene& loaded, const std::string& name);
+
 /// JSON Schema, draft 07.
 std::string scene_schema();
 

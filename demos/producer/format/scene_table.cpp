@@ -34,6 +34,7 @@ struct Table<Scene> {
         {"forces", &T::forces, "force fields, moving air, hands, explosions, forces between particles"},
         {"overlays", &T::overlays, "lines and text that show how the simulation sees the scene"},
         {"camera", &T::camera, "the camera"},
+        {"cameras", &T::cameras, "further cameras, which are drawn on request"},
         {"lights", &T::lights, "the sun and other lights"},
         {"environment", &T::environment, "sky, ambient light, fog"},
         {"render", &T::render, "the picture"},

@@ -100,6 +100,23 @@ struct Tags<Camera> {
 };
 
 template <>
+struct Table<NamedCamera> {
+  static constexpr const char* kName = "named_camera";
+  static constexpr const char* kHelp =
+      "A further camera. `render --camera NAME` draws it instead of `camera`, `--camera all` draws all of "
+      "them in "
+      "one run.";
+  static Fields<NamedCamera> fields() {
+    return {{"name", &NamedCamera::name,
+             "name of the camera, a part of the names of its files: letters, digits, _ and -; not `main`, "
+             "which is "
+             "the name of `camera`, and not `all`",
+             kRequired},
+            {"camera", &NamedCamera::camera, "the camera"}};
+  }
+};
+
+template <>
 struct Table<SunLight> {
   static constexpr const char* kName = "sun";
   static constexpr const char* kHelp = "Parallel light. A scene has at most one sun.";

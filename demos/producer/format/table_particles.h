@@ -17,12 +17,57 @@ inline constexpr Limits kTemperature = between(500, 15000);
 
 template <>
 struct Names<LookStyle> {
-  static constexpr std::array kNames = {"sprite", "streak", "sphere", "smoke",
-                                        "fire",   "flake",  "drop",   "spark"};
+  static constexpr std::array kNames = {"sprite", "streak", "sphere", "smoke", "fire",
+                                        "flake",  "drop",   "spark",  "mesh"};
 };
 template <>
 struct Names<effects::RampKind> {
   static constexpr std::array kNames = {"linear", "smooth"};
+};
+/// Numbers of the stage's structs, which are read as all others.
+template <>
+struct Codec<float> {
+  static void read(Reader& in, const Node& node, const Spec& spec, float& out) {
+    Real value = static_cast<Real>(out);
+    Codec<Real>::read(in, node, spec, value);
+    out = static_cast<float>(value);
+  }
+  static Node write(const float& value) { return Codec<Real>::write(static_cast<Real>(value)); }
+  static Description describe(Catalogue& all, const Spec& spec) { return Codec<Real>::describe(all, spec); }
+};
+template <>
+struct Table<render::SpriteSheet> {
+  static constexpr const char* kName = "sheet";
+  static constexpr const char* kHelp =
+      "Division of a sprite's texture into the pictures of a flip-book, in rows from the upper left corner.";
+  static Fields<render::SpriteSheet> fields() {
+    using T = render::SpriteSheet;
+    return {
+        {"columns", &T::columns, "number of pictures in a row", "", between(1, render::kMostSheetPictures)},
+        {"rows", &T::rows, "number of rows", "", between(1, render::kMostSheetPictures)},
+        {"fps", &T::fps, "pictures per second of a particle's age", "1/s", kNotNegative},
+        {"blend", &T::blend, "each picture fades to the next; false: they change at once"},
+        {"loop", &T::loop, "the first picture follows the last; false: the last one stays"},
+        {"random_start", &T::random_start, "particles start with different pictures"}};
+  }
+};
+template <>
+struct Table<LookMesh> {
+  static constexpr const char* kName = "look_mesh";
+  static constexpr const char* kHelp =
+      "A shape or a model file that is drawn for each particle. It is scaled so that it just fits into the "
+      "particle's ball, whatever its own size.";
+  static Fields<LookMesh> fields() {
+    using T = LookMesh;
+    return {
+        {"shape", &T::shape, "what is drawn; not a plane"},
+        {"material", &T::material, "name of its material; empty: that of the model file, or a default one"},
+        {"axis", &T::axis,
+         "axis of `angle_deg` and `spin_deg_per_s`, in the mesh's axes; default: a random axis for each "
+         "particle",
+         "", kDirection},
+        {"along_motion", &T::along_motion, "the mesh's +Y axis points along the velocity"}};
+  }
 };
 template <>
 struct Table<ParticleLook> {
@@ -31,7 +76,7 @@ struct Table<ParticleLook> {
       "How particles are drawn. The style gives the default of each key. `sprite`: soft disc; `streak`: lit "
       "line along the motion, with a shadow; `drop`: the same without a shadow; `sphere`: lit ball; `smoke`: "
       "puff that is shadowed by the smoke in front of it; `fire`: glowing flame; `flake`: snow or dust; "
-      "`spark`: glowing point with a tail.";
+      "`spark`: glowing point with a tail; `mesh`: small object.";
   static Fields<ParticleLook> fields() {
     using T = ParticleLook;
     return {
@@ -59,12 +104,24 @@ struct Table<ParticleLook> {
          kShare},
         {"stretch", &T::stretch,
          "a streak is as long as its particle's motion in this time; smoke, fire and flakes are lengthened "
-         "by the same; default: 1/60, for sparks 1/40, for fire 0.1, for smoke 0",
+         "by the same, and sprites, too; default: 1/60, for sparks 1/40, for fire 0.1, for smoke and sprites "
+         "0",
          "s", kNotNegative},
         {"taper", &T::taper, "share by which a streak fades towards its tail; default: 0, for sparks 1", "",
          kShare},
         {"metallic", &T::metallic, "for spheres: 0 is a dielectric, 1 a metal; default: 0", "", kShare},
         {"roughness", &T::roughness, "for spheres: 0 is a mirror, 1 is dull; default: 0.3", "", kShare},
+        {"texture", &T::texture,
+         "image file that is drawn for each sprite, times its colour; empty: a soft disc. The longer side is "
+         "the particle's diameter"},
+        {"sheet", &T::sheet, "the pictures of a flip-book in the texture; default: it is one picture"},
+        {"mesh", &T::mesh, "the object that the style `mesh` draws, with its own material"},
+        {"angle_deg", &T::angle_deg,
+         "rotation of a new particle, counter-clockwise as seen by the camera, or about the axis of the "
+         "mesh; "
+         "for sprites with a texture, flakes and meshes",
+         "degrees"},
+        {"spin_deg_per_s", &T::spin_deg_per_s, "speed of this rotation", "degrees/s"},
     };
   }
 };
@@ -102,12 +159,24 @@ struct Table<ParticlePlace> {
 template <>
 struct Table<ParticleGroup> {
   static constexpr const char* kName = "particle_group";
-  static constexpr const char* kHelp = "Particles placed one by one.";
+  static constexpr const char* kHelp = "Particles placed one by one, or as the points of a file.";
   static Fields<ParticleGroup> fields() {
     using T = ParticleGroup;
     return Fields<T>{
         {"name", &T::name, "unique name; empty: particles_ and its index"},
         {"places", &T::places, "one entry for each particle"},
+        {"file", &T::file,
+         "PLY or OBJ file whose points become particles after those of `places`, with the colours of the "
+         "points; "
+         "empty: none"},
+        {"scale", &T::scale, "scale factor of the file's points", "", kScale},
+        {"fit", &T::fit,
+         "edges of a box; the points get the largest size with which they fit, before `scale`", "m",
+         kPositive},
+        {"position", &T::position, "position of the file's origin", "m"},
+        {"orientation", &T::orientation, "orientation of the file's axes"},
+        {"max_points", &T::max_points, "of a file with more points, so many are taken, evenly", "",
+         between(1, 2e7)},
         {"radius", &T::radius, "radius of each particle", "m", kPositive},
         {"mass", &T::mass, "mass of each particle", "kg", kPositive},
         {"restitution", &T::restitution,

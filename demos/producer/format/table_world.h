@@ -293,6 +293,23 @@ struct Table<BodyKey> {
   }
 };
 template <>
+struct Table<ModelAnimation> {
+  static constexpr const char* kName = "animation";
+  static constexpr const char* kHelp =
+      "An animation of a glTF 2.0 file: nodes, skins and morph targets. Only static and kinematic bodies "
+      "have "
+      "animated shapes. Each node with triangles then collides as they do, and each bone as the convex hull "
+      "of "
+      "the skin around it.";
+  static Fields<ModelAnimation> fields() {
+    using T = ModelAnimation;
+    return {{"clip", &T::clip, "name of the animation, or its number from 0; empty: the first one"},
+            {"speed", &T::speed, "seconds of the animation per second", "", kNotNegative},
+            {"start", &T::start, "time at which it starts; until then its first pose is held", "s"},
+            {"loop", &T::loop, "starts again at its end; false: its last pose is held"}};
+  }
+};
+template <>
 struct Table<Body> {
   static constexpr const char* kName = "body";
   static constexpr const char* kHelp = "A rigid body.";
@@ -305,6 +322,10 @@ struct Table<Body> {
          "are moved by forces"},
         {"shape", &T::shape, "collision shape"},
         {"model", &T::model, "model file drawn instead of the shape"},
+        {"animation", &T::animation,
+         "animation of the model file that is played. If the file is the body's shape, its moving nodes and "
+         "bones "
+         "push other bodies; if it is its `model`, they are only drawn"},
         {"material", &T::material, "name of a material; empty: grey, or the materials of the model file"},
         {"position", &T::position, "position of the body's origin at time 0", "m"},
         {"orientation", &T::orientation, "orientation of the body at time 0"},

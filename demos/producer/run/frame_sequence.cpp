@@ -1,10 +1,7 @@
 #include "producer/run/frame_sequence.h"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
-#include <cstring>
-#include <fstream>
 #include <map>
 #include <optional>
 
@@ -12,6 +9,7 @@
 
 #include "producer/run/output.h"
 #include "render/error.h"
+#include "render/frame_files.h"
 #include "render/sink.h"
 
 namespace offstage::producer {
@@ -30,12 +28,18 @@ std::string pattern_of(const std::string& name) {
   return pattern;
 }
 
-/// The pattern of most PNG files of a folder, for advice in messages.
+/// Whether a video can be made of such a file.
+bool is_displayed(const fs::path& path) {
+  const auto format = render::frame_format(path);
+  return format == render::FrameFormat::png || format == render::FrameFormat::jpeg;
+}
+
+/// The pattern of most pictures of a folder, for advice in messages.
 std::string usual_pattern(const fs::path& folder) {
   std::map<std::string, int> counts;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error))
-    if (entry.path().extension() == ".png")
+    if (is_displayed(entry.path()))
       if (const std::string pattern = pattern_of(entry.path().filename().string()); !pattern.empty())
         ++counts[pattern];
   const auto most = std::ranges::max_element(counts, {}, [](const auto& count) { return count.second; });
@@ -47,8 +51,9 @@ fs::path checked_pattern(const std::string& text) {
     throw OutputError(text + ": write the frame number as #; did you mean '" + meant + "'?");
   if (text.ends_with('/') || fs::is_directory(text)) return fs::path(text) / "####.png";
   const fs::path path = text;
-  if (path.extension() != ".png")
-    throw OutputError(text + ": frames are PNG files; give a pattern such as 'frames/####.png'");
+  if (!is_displayed(path))
+    throw OutputError(text +
+                      ": a video is made of PNG or JPEG files; give a pattern such as 'frames/####.png'");
   const std::string name = path.filename().string();
   if (name.find('#') == std::string::npos) {
     const std::string pattern = name.find('*') != std::string::npos ? "####.png" : pattern_of(name);
@@ -61,28 +66,11 @@ fs::path checked_pattern(const std::string& text) {
   return path;
 }
 
-struct PngHead {
-  int width_px = 0, height_px = 0;
-  bool alpha = false;
-};
-
-/// Size and kind of a PNG file. Throws FileError unless it is complete.
-PngHead read_png_head(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::array<uint8_t, 26> head{};
-  if (!in) throw render::FileError(path.string() + ": cannot be read");
-  in.read(reinterpret_cast<char*>(head.data()), head.size());
-  if (!in || std::memcmp(head.data(), "\x89PNG\r\n\x1a\n", 8) != 0)
-    throw render::FileError(path.string() + ": is not a PNG file");
-  const auto number = [&](std::size_t at) {
-    return (head[at] << 24) | (head[at + 1] << 16) | (head[at + 2] << 8) | head[at + 3];
-  };
-  const int width = number(16), height = number(20);
-  if (!is_whole_png(path, width, height))
-    throw render::FileError(path.string() + ": is not a complete PNG file");
-  constexpr int kPalette = 3;  // may have a table of alpha values
-  const int kind = head[25];
-  return {width, height, (kind & 4) != 0 || kind == kPalette};
+/// Throws FileError unless the file is complete.
+render::FrameFile checked_frame(const fs::path& path) {
+  if (const auto file = render::inspect_frame(path)) return *file;
+  const bool png = render::frame_format(path) == render::FrameFormat::png;
+  throw render::FileError(path.string() + ": is not a complete " + (png ? "PNG" : "JPEG") + " file");
 }
 
 void check_gaps(const FrameSequence& sequence) {
@@ -119,7 +107,7 @@ FrameSequence find_sequence(const std::string& text, bool allow_gaps) {
                       static_cast<int>(sequence.frames.size());
   if (!allow_gaps) check_gaps(sequence);
   for (const SequenceFrame& frame : sequence.frames) {
-    const PngHead head = read_png_head(frame.path);
+    const render::FrameFile head = checked_frame(frame.path);
     if (sequence.width_px == 0) {
       sequence.width_px = head.width_px;
       sequence.height_px = head.height_px;

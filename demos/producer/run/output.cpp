@@ -1,10 +1,7 @@
 #include "producer/run/output.h"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
-#include <cstring>
-#include <fstream>
 #include <regex>
 #include <set>
 
@@ -13,7 +10,7 @@
 
 #include "producer/base/json_file.h"
 #include "render/error.h"
-#include "render/image_io.h"
+#include "render/frame_files.h"
 #include "render/output_file.h"
 
 namespace offstage::producer {
@@ -101,34 +98,23 @@ OutputTarget parse_output(const std::string& out) {
   std::error_code error;
   if (out.ends_with('/') || fs::is_directory(path, error)) return {OutputKind::frames, path / "####.png"};
   const std::string ending = path.extension().string();
-  if (const std::string meant = hash_pattern(out); !meant.empty() && (ending.empty() || ending == ".png"))
+  const bool is_picture = render::frame_format(path).has_value();
+  if (const std::string meant = hash_pattern(out); !meant.empty() && (ending.empty() || is_picture))
     throw OutputError(out + ": write the frame number as #; did you mean '" + meant + "'?");
   if (path.filename().string().find('#') != std::string::npos) {
-    if (ending != ".png")
-      throw OutputError(out + ": frames are PNG files; give a pattern such as frames/####.png");
+    if (!is_picture)
+      throw OutputError(out + ": frames are PNG, JPEG or EXR files; give a pattern such as frames/####.png");
     return {OutputKind::frames, path};
   }
+  if (is_picture && ending != ".png")
+    throw OutputError(out + ": write the frame number as #, such as " +
+                      (path.parent_path() / (path.stem().string() + "_####" + ending)).string());
   if (ending.empty()) return {OutputKind::frames, path / "####.png"};
   if (!is_ending(ending))
     throw OutputError(out +
                       ": unknown kind of output; give a folder, a pattern such as frames/####.png, one of " +
                       fmt::format("{}", fmt::join(endings, " ")) + ", or - for standard output");
   return {OutputKind::video, path};
-}
-
-bool is_whole_png(const fs::path& path, int width_px, int height_px) {
-  std::ifstream in(path, std::ios::binary);
-  std::array<uint8_t, 24> head{};
-  std::array<uint8_t, 12> tail{};
-  if (!in.read(reinterpret_cast<char*>(head.data()), head.size())) return false;
-  if (!in.seekg(-static_cast<int>(tail.size()), std::ios::end)
-           .read(reinterpret_cast<char*>(tail.data()), tail.size()))
-    return false;
-  const auto number = [&](std::size_t at) {
-    return (head[at] << 24) | (head[at + 1] << 16) | (head[at + 2] << 8) | head[at + 3];
-  };
-  return std::memcmp(head.data(), "\x89PNG\r\n\x1a\n", 8) == 0 && number(16) == width_px &&
-         number(20) == height_px && std::memcmp(tail.data() + 4, "IEND", 4) == 0;
 }
 
 std::optional<int> frame_number(const fs::path& pattern, const fs::path& file) {
@@ -151,7 +137,7 @@ std::vector<fs::path> files_of_frames(const fs::path& folder) {
   const fs::path name = fs::path(manifest->text("pattern")).filename();
   if (name.string().find('#') != std::string::npos) {
     const int count = manifest->count("frames", 0, kMostFrames);
-    const fs::path pattern = folder / name, stem = fs::path(pattern).replace_extension();
+    const fs::path pattern = folder / name, stem = channels_stem(pattern);
     std::error_code error;
     for (const auto& entry : fs::directory_iterator(folder.empty() ? "." : folder, error)) {
       if (!fs::is_regular_file(entry.symlink_status(error))) continue;
@@ -185,8 +171,9 @@ enum class Found { nothing, own, other };
 Found look_at(const fs::path& path, const Manifest& manifest) {
   std::error_code error;
   if (!fs::exists(fs::symlink_status(path, error))) return Found::nothing;
-  const bool own = is_whole_png(path, manifest.width_px, manifest.height_px) &&
-                   render::png_settings(path) == manifest.settings;
+  const std::optional<render::FrameFile> file = render::inspect_frame(path);
+  const bool own = file && file->width_px == manifest.width_px && file->height_px == manifest.height_px &&
+                   file->settings == manifest.settings;
   return own ? Found::own : Found::other;
 }
 
@@ -247,6 +234,11 @@ FrameFolder prepare_frames(const fs::path& pattern, const ChannelFiles& channels
       throw OutputError(folder.string() + ": another run has just begun to write here");
   }
   return result;
+}
+
+fs::path channels_stem(const fs::path& pattern) {
+  const bool same_names = render::frame_format(pattern) == render::FrameFormat::exr;
+  return fs::path(pattern).replace_extension(same_names ? ".channels" : "");
 }
 
 fs::path channels_folder(const fs::path& video) {

@@ -23,7 +23,7 @@ class OutputError : public std::runtime_error {
 };
 
 enum class OutputKind {
-  frames,  ///< a pattern with #, or a folder: one PNG per frame
+  frames,  ///< a pattern with #, or a folder: one PNG, JPEG or EXR per frame
   video,   ///< .mp4 .webm .mov .mkv .gif .webp .apng .png
   pipe,    ///< "-": raw frames on standard output
 };
@@ -60,6 +60,9 @@ struct ChannelFiles {
     return render::channel_files(render::frame_path(stem, frame), choice);
   }
 };
+
+/// Start of the names of the channel files beside frames. EXR frames have the plain names for themselves.
+std::filesystem::path channels_stem(const std::filesystem::path& pattern);
 
 /// Files of all channels and formats that a frame may have.
 std::vector<std::filesystem::path> all_channel_files(const std::filesystem::path& stem, int frame);
@@ -99,9 +102,6 @@ void remove_channels(const std::filesystem::path& folder);
 
 /// Creates the folder for the channels of a video. Existing channels are refused or, with `replace`, removed.
 void prepare_channels(const std::filesystem::path& folder, bool replace);
-
-/// Whether a file is a complete PNG of this size.
-bool is_whole_png(const std::filesystem::path& path, int width_px, int height_px);
 
 /// Returns the number in a file name that matches a pattern; nothing for other files.
 std::optional<int> frame_number(const std::filesystem::path& pattern, const std::filesystem::path& file);

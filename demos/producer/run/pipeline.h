@@ -32,6 +32,7 @@ struct RenderedFrame {
   render::Image image;
   double render_ms = 0;
   render::Channels channels;  // empty unless requested
+  render::HdrImage linear;    // empty unless the sink needs it
 };
 
 /// Passes frames to the drawing threads and returns the finished frames in order. At most `window` frames are

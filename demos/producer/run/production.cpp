@@ -140,7 +140,8 @@ bool is_blank(const render::Image& image) {
   return true;
 }
 
-void draw_frames(Pipeline& pipeline, const Scene& scene, const ModelLibrary& models, bool channels) {
+void draw_frames(Pipeline& pipeline, const Scene& scene, const ModelLibrary& models, bool channels,
+                 bool linear) {
   render::Context context;
   Picture picture(scene, models, context);
   while (auto frame_job = pipeline.take_job()) {
@@ -148,7 +149,10 @@ void draw_frames(Pipeline& pipeline, const Scene& scene, const ModelLibrary& mod
     render::Image image = picture.draw(*frame_job->previous, *frame_job->current);
     render::Channels data;
     if (channels) data = picture.channels(*frame_job->previous, *frame_job->current);
-    pipeline.give_rendered({std::move(*frame_job), std::move(image), ms_since(start), std::move(data)});
+    render::HdrImage light;
+    if (linear) light = picture.linear();
+    pipeline.give_rendered(
+        {std::move(*frame_job), std::move(image), ms_since(start), std::move(data), std::move(light)});
   }
 }
 
@@ -179,6 +183,7 @@ void print_frames(Pipeline& pipeline, render::FrameSink& sink, const Scene& scen
   while (auto rendered = pipeline.take_rendered()) {
     const auto encode_start = Clock::now();
     sink.write(rendered->frame_job.frame, rendered->image);
+    if (sink.needs_linear()) sink.write_linear(rendered->frame_job.frame, rendered->linear);
     if (job.channels.any())
       render::write_channels(
           numbered ? render::frame_path(job.channels_stem, rendered->frame_job.frame) : job.channels_stem,
@@ -264,7 +269,8 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
 
   Pipeline pipeline(job.threads + 2);
   const auto draw = [&] {
-    guarded(pipeline, [&] { draw_frames(pipeline, loaded.scene, models, job.channels.any()); });
+    guarded(pipeline,
+            [&] { draw_frames(pipeline, loaded.scene, models, job.channels.any(), sink.needs_linear()); });
   };
   const auto print = [&] {
     guarded(pipeline, [&] { print_frames(pipeline, sink, loaded.scene, job, stats, *meter); });
@@ -401,7 +407,7 @@ RunStats visit_frames(const LoadedScene& loaded, const ModelLibrary& models, con
 
 std::string simulation_key(const LoadedScene& loaded, const ModelLibrary& models) {
   auto scene = nlohmann::ordered_json::parse(loaded.canonical);
-  for (const char* key : {"name", "description", "camera", "lights", "environment", "render"})
+  for (const char* key : {"name", "description", "camera", "cameras", "lights", "environment", "render"})
     scene.erase(key);
   if (scene.contains("output"))
     for (const char* key : {"channels", "channel_format"}) scene["output"].erase(key);
@@ -410,7 +416,8 @@ std::string simulation_key(const LoadedScene& loaded, const ModelLibrary& models
 
 std::string settings_key(const LoadedScene& loaded, const ModelLibrary& models) {
   auto scene = nlohmann::ordered_json::parse(loaded.canonical);
-  for (const char* key : {"name", "description"}) scene.erase(key);  // they are not visible in any frame
+  // They are not visible in any frame. The drawn camera is `camera`.
+  for (const char* key : {"name", "description", "cameras"}) scene.erase(key);
   return text_hash(std::string(version()) + scene.dump() + models.digest());
 }
 

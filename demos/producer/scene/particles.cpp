@@ -12,10 +12,11 @@ render::PointsDef usual_look(LookStyle style) {
   using render::PointStyle;
   switch (style) {
     case LookStyle::sprite:
-      return {.style = PointStyle::sprite};
+      return {.style = PointStyle::sprite, .stretch_s = 0};
     case LookStyle::streak:
       return {.style = PointStyle::streak};
     case LookStyle::sphere:
+    case LookStyle::mesh:  // drawn as instances
       return {.style = PointStyle::sphere};
     case LookStyle::smoke:
       return {.style = PointStyle::smoke, .stretch_s = 0};
@@ -55,7 +56,13 @@ render::PointsDef points_def(const ParticleLook& look) {
   take(look.taper, def.taper);
   take(look.metallic, def.metallic);
   take(look.roughness, def.roughness);
+  if (look.sheet) def.sheet = *look.sheet;
   return def;
+}
+
+bool ParticleLook::turns() const {
+  return (style == LookStyle::sprite && !texture.empty()) || style == LookStyle::flake ||
+         style == LookStyle::mesh;
 }
 
 TrailSource::TrailSource() {

@@ -20,7 +20,15 @@
 
 namespace offstage::producer {
 
-enum class LookStyle { sprite, streak, sphere, smoke, fire, flake, drop, spark };
+enum class LookStyle { sprite, streak, sphere, smoke, fire, flake, drop, spark, mesh };
+
+/// A small object that is drawn for each particle, scaled so that it just fits into the particle's ball.
+struct LookMesh {
+  Shape shape = sim::Box{};
+  std::string material;       ///< name; empty: the default material, or that of the model file
+  std::optional<Vec3> axis;   ///< axis of `angle_deg` and `spin_deg_per_s`; default: random, per particle
+  bool along_motion = false;  ///< the mesh's +Y axis points along the velocity
+};
 
 /// Look of particles. Omitted values are those of the style; see points_def().
 struct ParticleLook {
@@ -35,6 +43,14 @@ struct ParticleLook {
   Eigen::Vector4d channel_deviation = Eigen::Vector4d::Zero();
   std::optional<bool> additive, lit, casts_shadow;
   std::optional<Real> softness, stretch, taper, metallic, roughness;
+  std::string texture;  ///< picture of sprites; empty: a soft disc
+  std::optional<render::SpriteSheet> sheet;
+  std::optional<LookMesh> mesh;  ///< for the style `mesh`, which needs it
+  Varying angle_deg = 0.0;       ///< at creation
+  Varying spin_deg_per_s = 0.0;
+
+  /// Whether the angle of a particle is visible.
+  bool turns() const;
 };
 
 /// The look for the stage, with the defaults of its style.
@@ -58,11 +74,17 @@ struct ParticlePlace {
   std::optional<Color> color;  ///< default: that of the look
 };
 
-/// Particles placed one by one.
+/// Particles placed one by one, or as the points of a file.
 struct ParticleGroup {
   Where where;
   std::string name;
-  std::vector<ParticlePlace> places;
+  std::vector<ParticlePlace> places;  ///< after loading, those of the file follow
+  std::string file;                   ///< PLY or OBJ file; empty: none
+  Real scale = 1;
+  std::optional<Vec3> fit;       ///< see MeshFile::fit
+  Vec3 position = Vec3::Zero();  ///< of the file's origin
+  Quat orientation = Quat::Identity();
+  int64_t max_points = 1'000'000;
   Real radius = 0.05;
   Real mass = 1;
   Real restitution = 0.5;

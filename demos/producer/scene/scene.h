@@ -88,9 +88,6 @@ struct ContactRule {
   std::optional<Real> restitution, friction, static_friction;
 };
 
-using Shape =
-    std::variant<sim::Sphere, sim::Box, sim::Capsule, sim::Cylinder, sim::Cone, sim::Plane, MeshFile>;
-
 /// A model file that is drawn instead of a body's shape.
 struct ModelLook {
   std::string file;
@@ -98,6 +95,14 @@ struct ModelLook {
   std::optional<Vec3> fit = {};  ///< see MeshFile::fit
   Vec3 position = Vec3::Zero();  ///< in the body's frame
   Quat orientation = Quat::Identity();
+};
+
+/// An animation of a body's model file that is played.
+struct ModelAnimation {
+  std::string clip;  ///< name, or number from 0; empty: the first one
+  Real speed = 1;
+  Real start = 0;  ///< time at which it starts; until then its first pose is held
+  bool loop = true;
 };
 
 struct BodyKey {
@@ -113,6 +118,7 @@ struct Body {
   sim::MotionType motion = sim::MotionType::dynamic;  ///< "static", "kinematic", "dynamic"
   Shape shape = sim::Box{};
   std::optional<ModelLook> model;
+  std::optional<ModelAnimation> animation;
   std::string material;  ///< name; empty: the default material, or that of the model file
   Vec3 position = Vec3::Zero();
   Quat orientation = Quat::Identity();
@@ -132,6 +138,9 @@ struct Body {
   bool loop = false;
   Vec3 spin = Vec3::Zero();
   Placement placement;  ///< its three keys are directly in the body
+
+  /// Whether the parts of its shape move by an animation.
+  bool has_animated_shape() const { return animation && !model && std::holds_alternative<MeshFile>(shape); }
 };
 
 /// One end of a spring: a point of the world, a point of a body (in its frame), or one particle of a group.
@@ -282,6 +291,15 @@ struct FollowCamera : Lens {
 };
 using Camera = std::variant<StaticCamera, KeyframedCamera, OrbitCamera, FollowCamera>;
 
+/// A further camera, which is drawn on request.
+struct NamedCamera {
+  Where where;
+  std::string name;
+  Camera camera = StaticCamera{};
+};
+inline constexpr const char* kMainCamera = "main";  ///< name of Scene::camera
+inline constexpr const char* kAllCameras = "all";   ///< all of them
+
 struct SunLight {
   Vec3 direction = {0.45, 0.75, 0.5};  ///< towards the sun
   Color color{{1, 0.95f, 0.87f, 1}};
@@ -374,6 +392,7 @@ struct Scene {
   std::vector<Force> forces;
   std::vector<Overlay> overlays;
   Camera camera = StaticCamera{};
+  std::vector<NamedCamera> cameras;
   std::vector<Light> lights = {SunLight{}};
   EnvironmentSettings environment;
   RenderSettings render;

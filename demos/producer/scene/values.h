@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include <Eigen/Core>
@@ -10,6 +11,7 @@
 #include "effects/distribution.h"
 #include "producer/base/error.h"
 #include "sim/core/types.h"
+#include "sim/geometry/shape.h"
 
 namespace offstage::producer {
 
@@ -31,6 +33,9 @@ struct MeshFile {
   Real scale = 1;
   std::optional<Vec3> fit = {};  ///< edges of the box that the model just fits into before `scale` [m]
 };
+
+using Shape =
+    std::variant<sim::Sphere, sim::Box, sim::Capsule, sim::Cylinder, sim::Cone, sim::Plane, MeshFile>;
 
 /// Copies in a row or a ring: copy i is displaced by i * offset and rotated by i * turn_deg about the
 /// vertical through `pivot`.

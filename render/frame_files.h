@@ -1,0 +1,45 @@
+#pragma once
+/// The files of single frames: PNG and JPEG of the displayed picture, OpenEXR of its linear light.
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "render/sink.h"
+
+namespace offstage::render {
+
+enum class FrameFormat {
+  png,
+  jpeg,  ///< quality 95, colour at full resolution, no transparency
+  exr,   ///< half floats, linear light times the exposure, without tone curve; premultiplied alpha
+};
+
+/// The format of a file by its ending: .png, .jpg, .jpeg or .exr; nothing for others.
+std::optional<FrameFormat> frame_format(const std::filesystem::path& path);
+/// Returns these endings, with their dots.
+const std::vector<std::string>& frame_endings();
+
+/// What a file of a frame says of itself.
+struct FrameFile {
+  int width_px = 0, height_px = 0;
+  bool alpha = false;
+  std::string settings;  ///< those it was written with; empty if offstage did not write it as part of a film
+};
+/// Inspects a file without decoding it. Nothing if it cannot be read, is not of the format of its ending, or
+/// is cut short.
+std::optional<FrameFile> inspect_frame(const std::filesystem::path& path);
+
+/// Writes half floats of linear light: R, G, B, and A if the image is transparent. Throws FileError.
+void write_exr(const std::filesystem::path& path, const HdrImage& image, const std::string& settings = {});
+/// The part of inspect_frame() for EXR files.
+std::optional<FrameFile> inspect_exr(const std::filesystem::path& path);
+
+/// Creates a sink that writes one file per frame, in the format of the pattern's ending, with the settings.
+/// Throws std::invalid_argument for another ending.
+std::unique_ptr<FrameSink> make_frame_sink(const std::filesystem::path& pattern,
+                                           const std::string& settings = {});
+
+}  // namespace offstage::render

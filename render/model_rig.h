@@ -1,0 +1,95 @@
+#pragma once
+/// The moving parts of a model file: nodes with their animations, skins and morph targets, as glTF 2.0
+/// defines them. Section numbers refer to its specification (Khronos Group, 2021). Units: metres, seconds,
+/// radians.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "render/mesh.h"
+
+namespace offstage::render {
+
+struct RigNode {
+  std::string name;
+  int parent = -1;  ///< an earlier node, -1: none
+  /// Local transform in the rest pose: translation * rotation * scale, or `matrix` if the file has one.
+  Vector3f translation = Vector3f::Zero();
+  Eigen::Quaternionf rotation = Eigen::Quaternionf::Identity();
+  Vector3f scale = Vector3f::Ones();
+  bool has_matrix = false;
+  Eigen::Matrix4f matrix = Eigen::Matrix4f::Identity();
+  std::vector<float> weights;  ///< of the morph targets of its mesh
+};
+
+/// One property of one node over time (section 3.11).
+struct RigChannel {
+  enum class Path { translation, rotation, scale, weights };
+  enum class Interpolation { linear, step, cubic };
+  int node = 0;
+  Path path = Path::translation;
+  Interpolation interpolation = Interpolation::linear;
+  std::vector<float> times;   ///< not decreasing
+  std::vector<float> values;  ///< of each key; with `cubic`: tangent in, value, tangent out
+};
+
+struct RigClip {
+  std::string name;
+  float duration = 0;  ///< time of the last key
+  std::vector<RigChannel> channels;
+};
+
+struct RigSkin {
+  std::vector<int> joints;              ///< nodes
+  std::vector<Eigen::Matrix4f> unbind;  ///< inverse bind matrices; as many as joints
+};
+
+struct RigTarget {
+  std::vector<Vector3f> positions, normals;  ///< offsets; empty or as long as the mesh's
+};
+
+/// Triangles that move together.
+struct RigSurface {
+  int node = 0;
+  int skin = -1;                 ///< -1: none; then the triangles are in the node's frame
+  int material = 0;              ///< index into Model::materials
+  Mesh mesh;                     ///< before morph targets and skin
+  bool flat = false;             ///< the file has no normals: each face has its own
+  std::size_t influences = 0;    ///< joints per vertex
+  std::vector<uint32_t> joints;  ///< indices into RigSkin::joints; others are ignored
+  std::vector<float> weights;    ///< as many as `joints`
+  std::vector<RigTarget> targets;
+
+  bool deforms() const { return skin >= 0 || !targets.empty(); }
+};
+
+struct ModelRig {
+  std::vector<RigNode> nodes;
+  std::vector<RigClip> clips;
+  std::vector<RigSkin> skins;
+  std::vector<RigSurface> surfaces;
+
+  /// Index of a clip by its name or by its number from 0; the first one for an empty name, -1 if there is
+  /// none.
+  int clip(const std::string& name) const;
+};
+
+/// The state of all nodes at a time.
+struct RigPose {
+  std::vector<Eigen::Affine3f> world;       ///< of each node, in the model's frame
+  std::vector<std::vector<float>> weights;  ///< of the morph targets of each node
+};
+/// `clip` -1: the rest pose. Before its first and after its last key, each channel keeps its value.
+RigPose pose_at(const ModelRig& rig, int clip, float time);
+
+/// The mesh of a surface with its morph targets and skin (section 3.7.3.3); with a skin in the model's frame,
+/// else in that of its node.
+Mesh deformed(const ModelRig& rig, const RigSurface& surface, const RigPose& pose);
+
+/// Whether all indices refer to something, all sizes agree and all numbers are finite.
+bool is_whole(const ModelRig& rig, std::size_t materials);
+
+}  // namespace offstage::render
