@@ -6,6 +6,15 @@
 namespace offstage::sim {
 namespace {
 
+constexpr Real kAirDensity = 1.2;  // of gas that leaks where there is no air around [kg/m^3]
+
+/// Pressure that the gas inside would have without a loss, at the present volume [Pa]. A volume of less than
+/// a tenth of that at rest counts as a tenth: a cloth that is crushed flat does not burst.
+Real overpressure(const Cloth& cloth) {
+  const Real volume = cloth.gas.volume(cloth.points, cloth.triangles);
+  return cloth.def.pressure * cloth.rest_volume / std::max(volume, 0.1 * cloth.rest_volume);
+}
+
 /// The points of one cloth as their accelerations are made.
 struct Run {
   const Cloth& cloth;
@@ -112,9 +121,7 @@ void push_out(Run& run, Real pressure) {
 void inflate(Run& run) {
   const Cloth& cloth = run.cloth;
   if (cloth.def.pressure == 0) return;
-  const Real volume = enclosed_volume(cloth.points, cloth.triangles);
-  // A volume of less than a tenth counts as that: what is crushed flat does not burst.
-  push_out(run, cloth.def.pressure * cloth.rest_volume / std::max(volume, 0.1 * cloth.rest_volume));
+  push_out(run, cloth.gas.share() * overpressure(cloth));
 }
 
 /// An open cloth that faces the air stops what comes in at its mouth: inside of it the pressure of stagnation
@@ -138,6 +145,13 @@ void catch_air(Run& run, Real h) {
 }
 
 }  // namespace
+
+void leak_gas(Cloth& cloth, Real h) {
+  if (cloth.def.pressure == 0 || cloth.version == 0) return;
+  const Real density = cloth.def.air.density > 0 ? cloth.def.air.density : kAirDensity;
+  cloth.gas.leak(cloth.points, cloth.gas.volume(cloth.points, cloth.triangles), overpressure(cloth), density,
+                 h);
+}
 
 void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather& weather,
                       ClothPoints& points) {

@@ -17,6 +17,9 @@ struct ClothWeather {
   std::span<const ForceDef* const> forces;
 };
 
+/// Lets the gas of a cloth under pressure flow out of its tears for a time h [s].
+void leak_gas(Cloth& cloth, Real h);
+
 /// Sets the accelerations of a cloth's points, which begin at index `first`. The drag of the air is limited
 /// so that it at most brings a triangle to rest relative to the air within h, which keeps the step stable.
 void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather& weather,

@@ -3,6 +3,7 @@
 
 #include "sim/cloth/bending.h"
 #include "sim/cloth/cloth.h"
+#include "sim/cloth/cloth_gas.h"
 
 namespace offstage::sim {
 
@@ -23,6 +24,7 @@ struct Cloth {
   std::vector<ClothPin> pins;        ///< those that hold
   std::vector<Real> seam_lengths;    ///< at the start [m]
   Real rest_volume = 0;              ///< inside of a closed one [m^3]
+  ClothGas gas;                      ///< inside of a closed one under pressure
   Real age = 0;                      ///< [s]
   uint32_t version = 0;
   bool stopped = false;  ///< it became non-finite and is no longer stepped

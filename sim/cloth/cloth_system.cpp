@@ -12,7 +12,7 @@ namespace offstage::sim {
 namespace {
 
 /// Solutions for contacts with bodies and the stretch limit together.
-constexpr int kMaxTurns = 8;
+constexpr int kMaxTurns = 16;
 /// Substeps of cloth in one of the world.
 constexpr Real kMaxParts = 1000;
 /// Stretch is not limited so that cloth could not tear: the limit is at least this much above.
@@ -48,6 +48,7 @@ void ClothSystem::assemble() {
   for (uint32_t c = 0; c < cloths_.size(); ++c) {
     Cloth& cloth = *cloths_[c];
     cloth.assign_bending();
+    if (cloth.def.pressure != 0) cloth.gas.assign(cloth.triangles);
     const auto first = static_cast<uint32_t>(points_.size());
     first_.push_back(first);
     for (std::size_t i = 0; i < cloth.points.size(); ++i) {
@@ -176,6 +177,7 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
     longest = std::min(longest, cloths_[c]->def.substep);
     for (std::size_t i = 0; i < cloths_[c]->points.size(); ++i)  // impacts may have changed them
       points_.velocity[first_[c] + i] = padded(cloths_[c]->velocities[i]);
+    leak_gas(*cloths_[c], weather.h);
     add_outer_forces(*cloths_[c], first_[c], weather, points_);
   }
   find_held(weather.time, bodies);
@@ -233,15 +235,17 @@ void ClothSystem::push_apart(Real dt) {
       cuts_.push_back({i, (1 - 1.0 / span_) * (points_.position[i] - free_[i])});
 }
 
-/// Bodies push cloth out of their way. Where that makes it too long, contacts and springs are solved for
-/// together, and linearised again in each turn.
+/// Bodies push cloth out of their way. Where springs beside a body are too long, contacts and springs are
+/// solved for together, and linearised again in each turn. That includes bodies that cloth does not touch in
+/// this sub-step but soon may: cloth under a body often flies ahead of it for a sub-step.
 void ClothSystem::touch_bodies(Real dt) {
   contacts_.find_runaways(points_);
   corner_contacts_.solve(points_, dt, cuts_);
   contacts_.solve(points_, dt, parts_, cuts_);
-  for (int round = 1; round < kMaxTurns && contacts_.any_dynamic() && limit_.any_too_long(points_); ++round) {
+  for (int round = 1; round < kMaxTurns && limit_.any_too_long(points_); ++round) {
     body_contacts_.clear();
     contacts_.collect(points_, body_contacts_);
+    if (body_contacts_.empty()) break;
     limit_.project_with(body_contacts_, points_, carriers_, dt);
   }
 }

@@ -1,0 +1,50 @@
+#pragma once
+/// Gas inside of a closed cloth under pressure, which leaks through the holes that tears make (physics F8).
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sim/core/types.h"
+#include "sim/geometry/mesh.h"
+
+namespace offstage::sim {
+
+class ClothGas {
+ public:
+  /// Finds the holes of a cloth with these triangles, whose normals point out: its borders. To be called
+  /// after the cloth tore.
+  void assign(std::span<const Triangle> triangles);
+
+  /// Volume inside, with each hole closed by a fan around the centre of its border [m^3].
+  Real volume(std::span<const Vec3> points, std::span<const Triangle> triangles) const;
+  /// Sum of the areas of the holes: of each the length of its area vector [m^2].
+  Real hole_area(std::span<const Vec3> points) const;
+
+  /// Share of its overpressure at a given volume that the gas still has, 0 to 1.
+  Real share() const { return share_; }
+  /// Lets gas flow out for a time h [s]. `pressure` is the overpressure at the volume as it would be without
+  /// a loss [Pa], `density` that of the gas [kg/m^3], > 0. By Bernoulli's equation the gas leaves at the
+  /// speed sqrt(2 p / density) through a share of the holes (kDischarge).
+  void leak(std::span<const Vec3> points, Real volume, Real pressure, Real density, Real h);
+
+  /// Coefficient of discharge of a hole with a sharp edge (Batchelor, An Introduction to Fluid
+  /// Dynamics, 5.12: about 0.6).
+  static constexpr Real kDischarge = 0.6;
+
+ private:
+  struct Edge {
+    uint32_t from, to;  // in the direction of its triangle
+  };
+  /// Edges of one border.
+  struct Hole {
+    std::size_t first, end;
+  };
+  Vec3 centre(const Hole& hole, std::span<const Vec3> points) const;
+
+  std::vector<Edge> edges_;  // by hole
+  std::vector<Hole> holes_;
+  Real share_ = 1;
+};
+
+}  // namespace offstage::sim
