@@ -64,6 +64,6 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME offstage-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
-  "pkg-config, libeigen3-dev, libtbb-dev, libassimp-dev, libdeflate-dev, libopenexr-dev, libqhull-dev, libxxhash-dev, libzstd-dev, \
+  "pkg-config, libeigen3-dev, libtbb-dev, libembree-dev, libassimp-dev, libdeflate-dev, libopenexr-dev, libqhull-dev, libxxhash-dev, libzstd-dev, \
 libfmt-dev, nlohmann-json3-dev, libdraco-dev, libmeshoptimizer-dev, libwebp-dev")
 include(CPack)
