@@ -443,7 +443,7 @@ void LightTracer::trace_around(const SurfaceBuffer& surfaces, const Place& place
   light.around[cell] = value;
   light.around_normals[cell] << point.normal, 0;
   light.around_filter.set(place.x, place.y, point.place, point.normal, size, value,
-                          1 / std::max(met, 2 * size));
+                          1 / std::max(met, 4 * size));
 }
 
 void LightTracer::trace(const SurfaceBuffer& surfaces, const Vector3f& eye, const Vector3f& forward,
@@ -461,7 +461,7 @@ void LightTracer::trace(const SurfaceBuffer& surfaces, const Vector3f& eye, cons
   for_rows(half_width, half_height, [&](const Place& place) { trace_around(surfaces, place, light); });
   light.direct_filter.average(1, sources_.lamps.empty() ? 1 : 4);
   light.around_filter.smooth_reach();
-  const int widest = offsets.count >= 16 ? 2 : offsets.count >= 4 ? 4 : 8;
+  const int widest = offsets.count >= 16 ? 4 : 8;
   for (int step = 1; step <= widest; step *= 2) light.around_filter.average(step, 3);
   for_rows(light.width_px, light.height_px, [&](const Place& place) {
     light.direct[index_of(place.x, place.y, light.width_px)] = light.direct_filter.values(place.x, place.y);
