@@ -13,8 +13,7 @@ constexpr GLuint kDirectUnit = 8, kAroundUnit = 10, kAroundNormalsUnit = 11, kMi
 
 void write_texture(const gl::Texture& texture, GLuint unit, int width_px, int height_px,
                    const std::vector<Vector4f>& values) {
-  if (!values.empty())
-    glTextureSubImage2D(texture, 0, 0, 0, width_px, height_px, GL_RGBA, GL_FLOAT, values.data());
+  glTextureSubImage2D(texture, 0, 0, 0, width_px, height_px, GL_RGBA, GL_FLOAT, values.data());
   glBindTextureUnit(unit, texture);
 }
 
@@ -28,8 +27,7 @@ LightPass::LightPass(int width_px, int height_px, const gl::Texture& depth)
       direct_(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)),
       around_(gl::make_target(GL_RGBA32F, (width_px + 1) / 2, (height_px + 1) / 2, GL_NEAREST)),
       around_normals_(gl::make_target(GL_RGBA32F, (width_px + 1) / 2, (height_px + 1) / 2, GL_NEAREST)),
-      mirrored_(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)),
-      highlights_(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)) {
+      mirrored_(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)) {
   glNamedFramebufferTexture(framebuffer_, GL_COLOR_ATTACHMENT1, normals_, 0);
   const std::array<GLenum, 2> both = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
   glNamedFramebufferDrawBuffers(framebuffer_, 2, both.data());
@@ -60,7 +58,10 @@ void LightPass::trace(const LightSources& sources, const View& view, const Sampl
   LightTracer(scene_, sources).trace(surfaces_, view.eye, view.forward, pixel_m, offsets, light_);
   write_texture(direct_, kDirectUnit, width, height, light_.direct);
   write_texture(mirrored_, kMirroredUnit, width, height, light_.mirrored);
-  write_texture(highlights_, kHighlightsUnit, width, height, light_.highlights);
+  if (!light_.highlights.empty()) {
+    if (highlights_ == 0) highlights_ = gl::make_target(GL_RGBA32F, width, height, GL_NEAREST);
+    write_texture(highlights_, kHighlightsUnit, width, height, light_.highlights);
+  }
   const int half_width = light_.half_width(), half_height = light_.half_height();
   write_texture(around_, kAroundUnit, half_width, half_height, light_.around);
   write_texture(around_normals_, kAroundNormalsUnit, half_width, half_height, light_.around_normals);

@@ -28,7 +28,8 @@ class LightPass {
   LightBuffer light_;
   gl::Texture places_, normals_;
   gl::Framebuffer framebuffer_;
-  gl::Texture direct_, around_, around_normals_, mirrored_, highlights_;
+  gl::Texture direct_, around_, around_normals_, mirrored_;
+  gl::Texture highlights_;  ///< created when there are lamps
 };
 
 }  // namespace offstage::render

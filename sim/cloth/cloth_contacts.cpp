@@ -16,7 +16,7 @@ constexpr std::size_t kChunk = 1024;
 constexpr Real kStabilization = 0.3;
 /// Two normals with a cosine below this face each other: what lies between is pinched.
 constexpr Real kFacing = -0.5;
-constexpr int kStopSweeps = 30;
+constexpr int kStopSweeps = 10;
 /// Share of an overlap that is taken back per sub-step where taut cloth stops a body.
 constexpr Real kTautRecovery = 0.1;
 
@@ -146,6 +146,7 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
   std::fill(active_.begin(), active_.end(), 0);
   near_to_.assign(points.size(), nullptr);
   near_several_.assign(points.size(), 0);
+  any_dynamic_ = false;
   for (std::size_t k = 0; k < near_.size();) {
     touches_.clear();
     const uint32_t point = near_[k].point;
@@ -156,6 +157,7 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
     const std::size_t count = touches_.size();
     if (count == 0) continue;
     active_[points.cloth[point]] += count;
+    any_dynamic_ |= std::ranges::any_of(touches_, [](const Touch& t) { return t.body->is_dynamic(); });
     // What is fixed comes last, so that its surface is kept best.
     std::stable_sort(touches_.begin(), touches_.end(), [](const Touch& a, const Touch& b) {
       return a.body->is_dynamic() > b.body->is_dynamic();
@@ -218,14 +220,11 @@ void ClothContacts::block(Touch& t, ClothBody* holder) {
 }
 
 std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::span<const uint8_t> shortened,
-                                             std::span<const Vec4> kick, std::span<const Vec4> frame_move,
-                                             std::span<const Real> recoil) {
+                                             std::span<const Vec4> kick, std::span<const Real> recoil) {
   struct Stop {
     Touch touch;
-    Real speed;    // along the normal, at which the body may follow the point [m/s]
-    Real share;    // of the body's contacts here, whose impulses are found at the same time
-    Real impulse;  // so far [N s]
-    Real change;   // in this sweep
+    Vec3 velocity;  // of the point
+    Real impulse = 0;
   };
   std::vector<Stop> stops;
   for (Near& near : near_) {
@@ -236,36 +235,25 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
     if (near.distance - (place - near.place).norm() >= thickness) continue;
     const SurfaceDistance s = signed_distance(body.solid(), place);
     if (s.distance >= thickness) continue;
-    const Vec3 normal = body.end().vector_to_world(s.normal);
-    const Vec3 velocity = (p - points.start_at(near.point)) / body.duration() + kick[near.point].head<3>();
-    const Vec3 of_frame = frame_move[near.point].head<3>() / body.duration();
-    stops.push_back({{&near, &body, normal, body.end().point_to_world(place - s.distance * s.normal),
-                      s.distance - thickness},
-                     std::max(normal.dot(velocity), normal.dot(of_frame)),
-                     1,
-                     0,
-                     0});
+    stops.push_back({{&near, &body, body.end().vector_to_world(s.normal),
+                      body.end().point_to_world(place - s.distance * s.normal), s.distance - thickness},
+                     (p - points.start_at(near.point)) / body.duration() + kick[near.point].head<3>()});
   }
-  for (Stop& s : stops)
-    s.share = 1 / static_cast<Real>(std::ranges::count_if(
-                      stops, [&](const Stop& other) { return other.touch.body == s.touch.body; }));
   std::vector<Vec3> taken(recoil.size(), Vec3::Zero());
-  // Projected Jacobi iteration: all contacts stop a body together. One after the other, the first would turn
-  // it aside.
-  for (int sweep = 0; sweep < kStopSweeps; ++sweep) {
+  // Projected Gauss-Seidel: all of them stop a body together, or the first would turn it aside.
+  for (int sweep = 0; sweep < kStopSweeps; ++sweep)
     for (Stop& s : stops) {
       const Touch& t = s.touch;
+      const uint32_t cloth = points.cloth[t.near->point];
       const Real depth = std::min(-t.gap, points.thickness[t.near->point]);
-      const Real approach = t.normal.dot(t.body->velocity(t.on_body)) - s.speed + kStabilization * depth / h_;
-      const Real mobility = t.body->mobility(t.on_body, t.normal) + recoil[points.cloth[t.near->point]];
-      s.change = std::max(-s.impulse, s.share * approach / mobility);
+      const Real approach =
+          t.normal.dot(t.body->velocity(t.on_body) - s.velocity) + kStabilization * depth / h_;
+      const Real impulse =
+          std::max(-s.impulse, approach / (t.body->mobility(t.on_body, t.normal) + recoil[cloth]));
+      s.impulse += impulse;
+      t.body->push(-impulse * t.normal, t.on_body);
+      taken[cloth] += impulse * t.normal;
     }
-    for (Stop& s : stops) {
-      s.impulse += s.change;
-      s.touch.body->push(-s.change * s.touch.normal, s.touch.on_body);
-      taken[points.cloth[s.touch.near->point]] += s.change * s.touch.normal;
-    }
-  }
   return taken;
 }
 

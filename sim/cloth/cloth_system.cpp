@@ -12,7 +12,7 @@ namespace offstage::sim {
 namespace {
 
 /// Solutions for contacts with bodies and the stretch limit together.
-constexpr int kMaxTurns = 16;
+constexpr int kMaxTurns = 8;
 /// Substeps of cloth in one of the world.
 constexpr Real kMaxParts = 1000;
 /// Stretch is not limited so that cloth could not tear: the limit is at least this much above.
@@ -235,17 +235,15 @@ void ClothSystem::push_apart(Real dt) {
       cuts_.push_back({i, (1 - 1.0 / span_) * (points_.position[i] - free_[i])});
 }
 
-/// Bodies push cloth out of their way. Where springs beside a body are too long, contacts and springs are
-/// solved for together, and linearised again in each turn. That includes bodies that cloth does not touch in
-/// this sub-step but soon may: cloth under a body often flies ahead of it for a sub-step.
+/// Bodies push cloth out of their way. Where that makes it too long, contacts and springs are solved for
+/// together, and linearised again in each turn.
 void ClothSystem::touch_bodies(Real dt) {
   contacts_.find_runaways(points_);
   corner_contacts_.solve(points_, dt, cuts_);
   contacts_.solve(points_, dt, parts_, cuts_);
-  for (int round = 1; round < kMaxTurns && limit_.any_too_long(points_); ++round) {
+  for (int round = 1; round < kMaxTurns && contacts_.any_dynamic() && limit_.any_too_long(points_); ++round) {
     body_contacts_.clear();
     contacts_.collect(points_, body_contacts_);
-    if (body_contacts_.empty()) break;
     limit_.project_with(body_contacts_, points_, carriers_, dt);
   }
 }

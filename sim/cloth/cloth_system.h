@@ -128,8 +128,7 @@ class ClothSystem {
   std::vector<VelocityCut> cuts_;
   std::vector<BodyContact> body_contacts_;
   ClothPieces pieces_;
-  std::vector<Vec4> drift_;       // the move of the frame in which each point's move is shortened
-  std::vector<Vec4> frame_move_;  // the same of a sub-step, of what was shortened in pieces
+  std::vector<Vec4> drift_;  // the move of the frame in which each point's move is shortened
   MoveShares shares_;
   std::vector<Frame> frames_;       // of the pieces
   std::vector<uint8_t> shortened_;  // how each point's move was shortened in the sub-step

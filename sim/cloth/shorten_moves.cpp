@@ -101,9 +101,7 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   add_momenta(1, from, dt);
   if (any_drifts) find_doubtful();
   bool any = any_drifts ? shorten_in_pieces() : shorten_doubtful(kInWorld);
-  frame_move_.assign(points_.size(), Vec4::Zero());
   if (any_drifts) {
-    for (std::size_t i = 0; i < points_.size(); ++i) frame_move_[i] = drift_[i] / (self ? span_ : 1);
     self_contacts_.take_crossed();  // in the world's frame nothing has to
     drift_.assign(points_.size(), Vec4::Zero());
     if (any && self) find_doubtful();
@@ -231,7 +229,7 @@ void ClothSystem::shorten_carrier(Carrier& carrier, Real share) {
 /// A cloth that gives no more stops bodies as one with those that it hangs on.
 void ClothSystem::stop_bodies() {
   const std::vector<Real> recoil = recoils();
-  const std::vector<Vec3> taken = contacts_.stop_bodies(points_, shortened_, kick_, frame_move_, recoil);
+  const std::vector<Vec3> taken = contacts_.stop_bodies(points_, shortened_, kick_, recoil);
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     if (!(recoil[c] > 0) || taken[c] == Vec3::Zero()) continue;
     const Vec3 gain = recoil[c] * taken[c];
