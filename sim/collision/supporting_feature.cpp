@@ -263,7 +263,7 @@ struct RoundSide {
 };
 
 RoundSide round_side(const Convex& c, const Vec3& d) {
-  const Real R = c.half.x(), h = c.half.y(), top = c.core == Convex::Core::cone ? 0 : R;
+  const Real R = c.half.x(), h = c.half.y(), top = c.core == Convex::Core::cone ? c.half.z() : R;
   const Vec3 out = outward(d);
   RoundSide side{out * R - h * Vec3::UnitY(), out * top + h * Vec3::UnitY(),
                  (2 * h * out + (R - top) * Vec3::UnitY()).normalized()};
@@ -274,12 +274,17 @@ RoundSide round_side(const Convex& c, const Vec3& d) {
   return side;
 }
 
+/// Radius of the upper or the lower disc.
+Real disc_radius(const Convex& c, bool up) {
+  return up && c.core == Convex::Core::cone ? c.half.z() : c.half.x();
+}
+
 /// Whether more of the flat side than of the round one is within `slack`. Both patches are about equally wide
 /// across the plane through d and the axis, so their lengths in this plane decide.
 bool rests_on_disc(const Convex& c, const RoundSide& side, const Vec3& d, Real slack) {
   const bool up = d.y() > 0;
-  if (up && c.core == Convex::Core::cone) return false;
-  const Real R = c.half.x(), lean = d.dot(outward(d)), length = (side.to - side.from).norm();
+  if (up && c.core == Convex::Core::cone && !(c.half.z() > 0)) return false;
+  const Real R = disc_radius(c, up), lean = d.dot(outward(d)), length = (side.to - side.from).norm();
   const Real disc_within = 2 * R * share_within(slack, 2 * R * lean) * std::abs(d.y()),
              line_within = length * share_within(slack, d.dot(side.from - side.to)) * d.dot(side.normal);
   return disc_within > line_within;
@@ -287,7 +292,8 @@ bool rests_on_disc(const Convex& c, const RoundSide& side, const Vec3& d, Real s
 
 SupportingFeature revolved(const Convex& c, const Vec3& d, Real slack) {
   const RoundSide side = round_side(c, d);
-  if (rests_on_disc(c, side, d, slack)) return disc(c.half.x(), std::copysign(c.half.y(), d.y()), d.y() > 0);
+  if (rests_on_disc(c, side, d, slack))
+    return disc(disc_radius(c, d.y() > 0), std::copysign(c.half.y(), d.y()), d.y() > 0);
   return segment_feature(side.from, side.from_tag, side.to, side.to_tag, d);
 }
 
@@ -301,10 +307,20 @@ SupportingFeature revolved_edge(const Convex& c, const Vec3& d, Real slack, cons
     line.rod = std::max(0.0, outward(d).dot(on_surface)) / side.normal.dot(outward(d));
     return line;
   }
-  const bool apex = c.core == Convex::Core::cone && side.from.y() > 0;
+  const bool apex = c.core == Convex::Core::cone && !(c.half.z() > 0) && side.from.y() > 0;
   if (rests_on_disc(c, side, d, slack)) line.count = 1;
   if (!apex) line.edge = Vec3::UnitY().cross(outward(d));
   return line;
+}
+
+/// The touching point, with the radius of the ball of the same Gaussian curvature there: r_1 r_2 r_3 / |h|^2
+/// with the support h, which is exact for a ball.
+SupportingFeature ellipsoid_point(const Convex& c, const Vec3& d) {
+  uint32_t none = 0;
+  SupportingFeature f = point_feature(c.support(d, none), 0);
+  const Real height = c.half.cwiseProduct(d).norm();
+  f.rod = height > 0 ? c.half.prod() / (height * height) : 0;
+  return f;
 }
 
 }  // namespace
@@ -352,6 +368,8 @@ SupportingFeature supporting_edge(const Convex& c, const Vec3& d, Real slack, co
     case Convex::Core::cylinder:
     case Convex::Core::cone:
       return revolved_edge(c, d, slack, on_surface);
+    case Convex::Core::ellipsoid:
+      return ellipsoid_point(c, d);
     case Convex::Core::polyhedron:
       return polyhedron_edge(*c.polyhedron, d, slack, support_vertex(*c.polyhedron, d, 0));
   }

@@ -4,6 +4,7 @@
 
 #include "effects/distribution.h"
 #include "producer/base/to_float.h"
+#include "producer/build/body_shapes.h"
 #include "producer/build/cloth_defs.h"
 #include "producer/build/drawn_objects.h"
 #include "producer/build/lights.h"
@@ -23,26 +24,6 @@ using Eigen::Vector3f;
 Affine3f affine(const Vec3& position, const Quat& orientation, Real scale = 1) {
   return Eigen::Translation3f(position.cast<float>()) * orientation.cast<float>() *
          Eigen::Scaling(to_float(scale));
-}
-
-/// The numbers that distinguish the mesh of a primitive from others.
-std::vector<float> shape_key(const sim::Sphere& s) {
-  return {0, to_float(s.radius)};
-}
-std::vector<float> shape_key(const sim::Box& s) {
-  return {1, to_float(s.size.x()), to_float(s.size.y()), to_float(s.size.z())};
-}
-std::vector<float> shape_key(const sim::Capsule& s) {
-  return {2, to_float(s.radius), to_float(s.height)};
-}
-std::vector<float> shape_key(const sim::Cylinder& s) {
-  return {3, to_float(s.radius), to_float(s.height)};
-}
-std::vector<float> shape_key(const sim::Cone& s) {
-  return {4, to_float(s.radius), to_float(s.height)};
-}
-std::vector<float> shape_key(const sim::Plane&) {
-  return {5};
 }
 
 /// The parts overlay of a body, or null.
@@ -92,7 +73,7 @@ Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context
   };
   for (const Spring& spring : scene.springs) add_rod(spring);
   for (const Joint& joint : scene.joints)
-    if (joint.behaviour.type == sim::JointType::distance) add_rod(joint);
+    for (int i = 0; i < rod_count(joint); ++i) add_rod(joint);
   for (const Cloth& cloth : scene.cloths) {
     add_cloth(cloth, models);
     ++object;
@@ -134,6 +115,8 @@ render::MaterialHandle Picture::cloth_material(const Cloth& cloth, const ModelLi
 
 void Picture::add_cloth(const Cloth& cloth, const ModelLibrary& models) {
   DrawnCloth drawn;
+  drawn.appear_at = cloth.appear_at;
+  drawn.remove_at = cloth.remove_at;
   if (cloth.visible) {
     const auto* mesh = std::get_if<MeshFile>(&cloth.shape);
     FlatCloth flat = flat_cloth(cloth, mesh ? &models.model(mesh->file) : nullptr);
@@ -183,6 +166,13 @@ void Picture::add_shape(const Body& body, const ModelLibrary& models, std::vecto
         if constexpr (std::is_same_v<S, MeshFile>) {
           add_model(shape.file, affine(Vec3::Zero(), Quat::Identity(), scale_of(shape, models)), body, models,
                     parts);
+        } else if constexpr (std::is_same_v<S, Compound>) {
+          for (const CompoundPart& part : shape.parts) {
+            const auto mesh = std::visit([&](const auto& own) { return primitive(own); }, part.shape);
+            const std::string& look = part.material.empty() ? body.material : part.material;
+            parts.push_back({stage_.add_instance(mesh, material(look, models), body.casts_shadow),
+                             affine(part.position, part.orientation)});
+          }
         } else {
           // A plane is the ground: it receives shadows and casts none.
           const bool casts = body.casts_shadow && !std::is_same_v<S, sim::Plane>;
@@ -210,7 +200,12 @@ void Picture::add_convex_parts(const MeshFile& mesh, const Body& body, const Mod
 }
 
 void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t& slot, uint32_t object) {
-  DrawnBody drawn{{}, affine(body.position, body.orientation), parts_overlay(scene_, body.name), {}};
+  DrawnBody drawn{{},
+                  affine(body.position, body.orientation),
+                  parts_overlay(scene_, body.name),
+                  body.appear_at,
+                  body.remove_at,
+                  {}};
   if (drawn.overlay)
     add_convex_parts(std::get<MeshFile>(body.shape), body, models, drawn.parts);
   else if (body.visible && body.model)
@@ -226,7 +221,8 @@ void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t
     places_.add_fixed(body.name, drawn.world_from_body);
   else
     places_.add_moving(body.name, *(drawn.slot = slot++));
-  if (drawn.slot || drawn.overlay) bodies_.push_back(std::move(drawn));
+  const bool has_lifetime = body.appear_at > 0 || body.remove_at < kForever;
+  if (drawn.slot || drawn.overlay || has_lifetime) bodies_.push_back(std::move(drawn));
 }
 
 void Picture::add_overlay_lines() {

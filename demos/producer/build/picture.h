@@ -52,6 +52,7 @@ class Picture {
     std::optional<std::size_t> slot;  // in Snapshot::bodies; none: it never moves
     Eigen::Affine3f world_from_body;  // at time 0
     const PartsOverlay* overlay;      // if it is drawn as convex parts; otherwise null
+    Real appear_at, remove_at;
     std::vector<DrawnPart> parts;
   };
 
@@ -60,6 +61,7 @@ class Picture {
     render::ClothHandle cloth;  // null if invisible
     std::vector<uint32_t> triangles;
     std::vector<Eigen::Vector2f> uvs;
+    Real appear_at = 0, remove_at = 0;
     uint32_t version = 0;
   };
 

@@ -78,9 +78,12 @@ void Picture::set_balls(std::size_t set, std::span<const render::Point> balls) {
 
 void Picture::place_body(const DrawnBody& body, const Affine3f& world_from_body, double time) {
   const float explode = body.overlay ? to_float(effects::mean(body.overlay->explode, time)) : 0;
-  for (const DrawnPart& part : body.parts)
+  const bool has_lifetime = body.appear_at > 0 || body.remove_at < kForever;
+  for (const DrawnPart& part : body.parts) {
+    if (has_lifetime) stage_.set_visible(part.instance, exists(body.appear_at, body.remove_at, time));
     stage_.set_transform(
         part.instance, world_from_body * Eigen::Translation3f(explode * part.outwards) * part.body_from_part);
+  }
 }
 
 void Picture::place_rods(const Snapshot& previous, const Snapshot& current, float w) {
@@ -142,6 +145,11 @@ void Picture::place_cloths(const Snapshot& previous, const Snapshot& current, fl
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     if (!cloths_[c].cloth) continue;
     const ClothSample &before = previous.cloths[c], &now = current.cloths[c];
+    if (!exists(cloths_[c].appear_at, cloths_[c].remove_at, current.time)) {
+      // A surface of points at one place has no area.
+      stage_.set_cloth(cloths_[c].cloth, std::vector<Vector3f>(now.points.size(), Vector3f::Zero()));
+      continue;
+    }
     give_mesh(cloths_[c], now);
     scratch_places_ = now.points;
     for (std::size_t i = 0; w < 1 && i < now.points.size(); ++i)

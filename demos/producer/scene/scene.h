@@ -42,8 +42,9 @@ struct WorldSettings {
   sim::SolverKind solver = sim::SolverKind::automatic;
   sim::ImpactLaw impact = sim::ImpactLaw::simultaneous;
   Real collision_speed = 0.05;  ///< bodies that approach more slowly do not bounce
-  bool sleep = true;            ///< whether islands at rest are not simulated
-  Real bounds = 1000;           ///< half the edge of the cube that contains all objects
+  sim::CollisionMethods collision;
+  bool sleep = true;   ///< whether islands at rest are not simulated
+  Real bounds = 1000;  ///< half the edge of the cube that contains all objects
   uint64_t seed = 1;
 };
 
@@ -88,8 +89,25 @@ struct ContactRule {
   std::optional<Real> restitution, friction, static_friction;
 };
 
+/// A solid in a compound.
+using PartShape = std::variant<sim::Sphere, sim::Box, sim::Capsule, sim::Cylinder, sim::Cone, sim::Frustum,
+                               sim::Ellipsoid, sim::Torus, sim::Tube, sim::OpenBox>;
+struct CompoundPart {
+  Where where;
+  PartShape shape = sim::Box{};
+  Vec3 position = Vec3::Zero();  ///< in the body's frame
+  Quat orientation = Quat::Identity();
+  std::optional<Real> density;  ///< default: the body's
+  std::string material;         ///< of its look; empty: the body's
+};
+/// Solids that form one body.
+struct Compound {
+  std::vector<CompoundPart> parts;
+};
+
 using Shape =
-    std::variant<sim::Sphere, sim::Box, sim::Capsule, sim::Cylinder, sim::Cone, sim::Plane, MeshFile>;
+    std::variant<sim::Sphere, sim::Box, sim::Capsule, sim::Cylinder, sim::Cone, sim::Plane, MeshFile,
+                 sim::Frustum, sim::Ellipsoid, sim::Torus, sim::Tube, sim::OpenBox, Compound>;
 
 /// A model file that is drawn instead of a body's shape.
 struct ModelLook {
@@ -120,6 +138,9 @@ struct Body {
   Vec3 angular_velocity = Vec3::Zero();
   Real density = 1000;
   Real mass = 0;
+  std::optional<Vec3> centre;   ///< centre of mass, in the body's frame; default: that of the shape
+  std::optional<Vec3> inertia;  ///< moments Ixx, Iyy, Izz about the centre of mass; default: the shape's
+  Vec3 inertia_products = Vec3::Zero();  ///< Ixy, Iyz, Izx of the inertia matrix, with `inertia`
   Real linear_drag = 0;
   Real angular_drag = 0;
   Vec3 friction_axis = Vec3::Zero();     ///< friction axis of the surface, in the body's frame
@@ -131,6 +152,8 @@ struct Body {
   sim::Interpolation interpolation = sim::Interpolation::monotone;
   bool loop = false;
   Vec3 spin = Vec3::Zero();
+  Real appear_at = 0;
+  Real remove_at = 1e30;
   Placement placement;  ///< its three keys are directly in the body
 };
 

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include <Eigen/Core>
@@ -17,6 +18,15 @@ using effects::Varying;
 using sim::Quat;
 using sim::Real;
 using sim::Vec3;
+
+/// A time that never comes: the default of `remove_at` is later [s].
+inline constexpr Real kForever = 1e29;
+
+/// Whether an object with these times exists at a time; a rounding error before does not matter.
+inline bool exists(Real appear_at, Real remove_at, Real time) {
+  constexpr Real kRounding = 1e-9;
+  return time >= appear_at - kRounding && time < remove_at - kRounding;
+}
 
 /// Linear colour with straight alpha. In files "#rrggbb", "#rrggbbaa", "#rgb", "#rgba" (sRGB) or linear [r,
 /// g, b] or [r, g, b, a].
@@ -54,7 +64,26 @@ struct Scatter {
   Varying scale = 1.0;    ///< factor of a body's shape and model
   uint64_t seed = 1;
 };
+struct BoxFill {
+  Vec3 size = Vec3::Ones();
+};
+struct CylinderFill {
+  Real radius = 0.5, height = 1;  ///< about the vertical
+};
+struct SphereFill {
+  Real radius = 0.5;
+};
+enum class Packing { hexagonal, cubic, random };
+/// Places that fill a volume, each at half the spacing or more from its surface.
+struct Fill {
+  std::variant<BoxFill, CylinderFill, SphereFill> shape = BoxFill{};
+  Vec3 position = Vec3::Zero();  ///< centre: relative to the original, or of particles in the world
+  Real spacing = 0;              ///< distance of neighbours; 0: the diameter of the particles
+  Packing packing = Packing::hexagonal;
+  uint64_t seed = 1;  ///< of random places
+};
 struct Placement {
+  std::optional<Fill> fill;
   std::optional<Repeat> repeat;
   std::optional<Grid> grid;
   std::optional<Scatter> scatter;
