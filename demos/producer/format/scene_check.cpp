@@ -158,6 +158,8 @@ class Checker {
       check_material_name(spring.where.path + "/material", spring.material);
     for (const Cloth& cloth : scene_.cloths)
       check_material_name(cloth.where.path + "/material", cloth.material);
+    for (const Joint& joint : scene_.joints)
+      check_material_name(joint.where.path + "/material", joint.material);
     check_materials_of_articulations();
     for (const Material& material : scene_.materials)
       if (!used_materials_.contains(material.name))

@@ -209,7 +209,7 @@ class ParticleChecker {
                                           : "rate, count or lifespan"));
       return true;
     }
-    if (is_emitter && bound.possible.born == 0)
+    if (is_emitter && bound.possible.born == 0 && !(effects::upper_bound(emitter.rate_per_metre) > 0))
       warn(path,
            "releases no particles: rate, count and bursts are zero, or their times are outside the film");
     else if (possible > kTolerance * static_cast<Real>(source.max_alive))
