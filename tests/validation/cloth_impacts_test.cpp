@@ -63,6 +63,32 @@ INSTANTIATE_TEST_SUITE_P(Balls, ClothRebound,
                          testing::Combine(testing::Values("cotton", "denim"), testing::Values(24, 40),
                                           testing::Values(5.5, 12.0)));
 
+/// Fabric, and length over rest length at which it tears.
+class ClothBullet : public testing::TestWithParam<std::tuple<std::string, Real>> {};
+
+TEST_P(ClothBullet, GoesThroughOnlyWhereTheClothTears) {
+  const auto [name, tear] = GetParam();
+  ClothDef def = framed_cloth(effects::find_fabric(name)->fabric, 0.6, 24);
+  def.tear = tear;
+  World world({.gravity = Vec3::Zero()});
+  // Beside a vertex, as it usually comes: 30 g at 200 m/s.
+  const BodyHandle ball = world.add_body(
+      {.shape = Sphere{0.01}, .pose = {Vec3(0.009, 0.1, 0.006)}, .velocity = {0, -200, 0}, .mass = 0.03});
+  const ClothHandle cloth = world.add_cloth(def);
+  uint64_t torn = 0;
+  for (int i = 0; i < 48; ++i) {
+    ASSERT_TRUE(world.step(1.0 / 240).finite);
+    torn += world.cloth_report(cloth).torn;
+    ASSERT_LE(world.body(ball).velocity.norm(), 200 * (1 + 1e-9)) << i;
+  }
+  const bool is_through = world.body(ball).pose.position.y() < -0.5;
+  EXPECT_EQ(is_through, tear > 0);
+  EXPECT_EQ(torn > 0, tear > 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Fabrics, ClothBullet,
+                         testing::Combine(testing::Values("cotton", "denim"), testing::Values(0.0, 1.3)));
+
 TEST(ClothGas, LeavesThroughTheHolesOfATear) {
   // A closed cloth without its last triangle has one hole, of that triangle's area. At a constant volume the
   // overpressure p leaks at the rate kDischarge A sqrt(2 p / rho) / V of itself: 1 / sqrt(share) grows

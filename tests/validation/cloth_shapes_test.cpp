@@ -203,5 +203,74 @@ TEST(ClothBendDamping, EndsVibrationAtTheRateOfItsTime) {
   }
 }
 
+/// A disc of rings around its centre, each with as many vertices as make nearly equilateral triangles.
+TriangleMesh disc_mesh(Real radius, uint32_t rings) {
+  TriangleMesh mesh;
+  mesh.vertices.push_back(Vec3::Zero());
+  for (uint32_t r = 1; r <= rings; ++r)
+    for (uint32_t k = 0; k < 6 * r; ++k) {
+      const Real angle = 2 * std::numbers::pi * k / (6 * r), at = radius * r / rings;
+      mesh.vertices.emplace_back(at * std::cos(angle), 0, -at * std::sin(angle));
+    }
+  const auto first = [](uint32_t r) { return r == 0 ? 0 : 1 + 3 * r * (r - 1); };
+  const auto vertex = [&](uint32_t r, uint32_t k) { return r == 0 ? 0 : first(r) + k % (6 * r); };
+  for (uint32_t r = 1; r <= rings; ++r)
+    for (uint32_t side = 0; side < 6; ++side)
+      for (uint32_t k = 0; k < r; ++k) {
+        const uint32_t outer = side * r + k, inner = side * (r - 1) + k;
+        mesh.triangles.push_back({vertex(r - 1, inner), vertex(r, outer), vertex(r, outer + 1)});
+        if (k + 1 < r)
+          mesh.triangles.push_back({vertex(r - 1, inner), vertex(r, outer + 1), vertex(r - 1, inner + 1)});
+      }
+  return mesh;
+}
+
+/// Area of the shadow of a cloth that is starlike around the y axis [m^2]: by the farthest point in each of
+/// many directions, from its border.
+Real shadow(const ClothView& view, uint32_t border_start) {
+  Real doubled = 0;
+  const auto count = static_cast<uint32_t>(view.points.size());
+  for (uint32_t i = border_start; i < count; ++i) {
+    const Vec3& a = view.points[i];
+    const Vec3& b = view.points[i + 1 < count ? i + 1 : border_start];
+    doubled += a.z() * b.x() - a.x() * b.z();
+  }
+  return std::abs(doubled) / 2;
+}
+
+/// Share of the overhang of a disc of 30 cm over a support of 18 cm that its shadow covers.
+Real drape_coefficient(const effects::Fabric& fabric, Real seconds) {
+  constexpr Real kDisc = 0.15, kSupport = 0.09;
+  constexpr uint32_t kRings = 20;
+  ClothDef def =
+      effects::mesh_cloth(disc_mesh(kDisc, kRings), {Vec3(0, 0.3 + fabric.thickness, 0)}, fabric, true);
+  World world;
+  world.add_body(
+      {.shape = Cylinder{kSupport, 0.3}, .motion = MotionType::static_body, .pose = {Vec3(0, 0.15, 0)}});
+  const ClothHandle cloth = world.add_cloth(def);
+  for (int i = 0; i < 24 * seconds; ++i) world.step(1.0 / 24);
+  const Real area = shadow(world.cloth(cloth), 1 + 3 * kRings * (kRings - 1));
+  const auto disc = [](Real r) { return std::numbers::pi * r * r; };
+  return (area - disc(kSupport)) / (disc(kDisc) - disc(kSupport));
+}
+
+TEST(LongClothDrape, OfTheFabricsIsOrderedAndAsMeasured) {
+  // Ranges of measured drape coefficients, docs/physics.md, F6.
+  struct Range {
+    const char* fabric;
+    Real low, high;
+  };
+  constexpr Range kRanges[] = {
+      {"silk", 0.1, 0.45}, {"cotton", 0.35, 0.7}, {"denim", 0.65, 0.95}, {"leather", 0.8, 1}};
+  Real last = 0;
+  for (const Range& range : kRanges) {
+    const Real share = drape_coefficient(effects::find_fabric(range.fabric)->fabric, 3);
+    EXPECT_GT(share, range.low) << range.fabric;
+    EXPECT_LT(share, range.high) << range.fabric;
+    EXPECT_GT(share, last) << range.fabric;
+    last = share;
+  }
+}
+
 }  // namespace
 }  // namespace offstage::sim
