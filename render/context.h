@@ -31,7 +31,7 @@ struct ContextInfo {
   std::string renderer;  ///< GL_RENDERER, such as "llvmpipe (LLVM 15.0.6, 256 bits)"
   std::string version;   ///< GL_VERSION, such as "4.5 (Core Profile) Mesa 22.3.6"
   std::string glsl;
-  std::string rays;  ///< the library that traces light, such as "Embree 3.13.5 avx2"
+  std::string rays;                          ///< the library that traces light, such as "Embree 3.13.5 avx2"
   GlPlatform platform = GlPlatform::osmesa;  ///< the platform in use, never automatic
 };
 

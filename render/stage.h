@@ -50,8 +50,8 @@ struct Lamp {
   float softness = 0.3f;              ///< share of the cone over which its edge fades
   bool shadows = true;
 };
-/// Number of lamps that light particles and translucent bodies at once: the strongest. Opaque surfaces are lit
-/// by all.
+/// Number of lamps that light particles and translucent bodies at once: the strongest. Opaque surfaces are
+/// lit by all.
 inline constexpr std::size_t kMostLamps = 8;
 
 /// Sky, ambient light from it, and fog towards its horizon.
