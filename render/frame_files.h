@@ -22,7 +22,7 @@ std::optional<FrameFormat> frame_format(const std::filesystem::path& path);
 /// Returns these endings, with their dots.
 const std::vector<std::string>& frame_endings();
 
-/// What a file of a frame says of itself.
+/// Size and settings that are stored in the file of a frame.
 struct FrameFile {
   int width_px = 0, height_px = 0;
   bool alpha = false;

@@ -115,9 +115,7 @@ GpuMesh::GpuMesh(const Mesh& source) : vertex_array(gl::make_vertex_array()) {
   closed = is_closed(*mesh);
   endless = mesh->endless;
   if (!box.isEmpty()) {
-    Eigen::Index axis = 0;
-    flat = box.sizes().minCoeff(&axis) <= 1e-4f * box.sizes().maxCoeff();
-    flat_normal = Vector3f::Unit(axis);
+    flat = box.sizes().minCoeff() <= 1e-4f * box.sizes().maxCoeff();
   }
 
   rays = std::make_unique<RayMesh>(*mesh, mesh->normals);

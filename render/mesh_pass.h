@@ -28,12 +28,11 @@ struct GpuMesh {
   Eigen::AlignedBox3f box;
   Vector3f center;  ///< centre of the bounding ball
   float radius = 0;
-  float thickness = 0;   ///< smallest side of the bounding box
-  bool flat = false;     ///< lies in an axis-aligned plane
-  bool endless = false;  ///< see Mesh::endless
-  bool round = false;    ///< fills the ball inscribed in its box
-  bool boxy = false;     ///< fills its box, except for a bevel
-  Vector3f flat_normal = {0, 0, 0};
+  float thickness = 0;                  ///< smallest side of the bounding box
+  bool flat = false;                    ///< lies in an axis-aligned plane
+  bool endless = false;                 ///< see Mesh::endless
+  bool round = false;                   ///< fills the ball inscribed in its box
+  bool boxy = false;                    ///< fills its box, except for a bevel
   std::unique_ptr<const RayMesh> rays;  ///< the same for light rays
   bool closed = false;  ///< every edge has two triangles, so the front faces hide the back faces
 };

@@ -117,9 +117,9 @@ Vector3f color_by(const glsl::Inputs& inputs, const Vector3f& position, const Ve
 }  // namespace
 
 Vector3f pattern_color(Pattern pattern, const Vector3f& position, const Vector3f& normal, float footprint,
-                       const Vector3f& color, const Vector3f& second_color, float scale, float time) {
+                       const Vector3f& color, const Vector3f& second_color, float scale) {
   const glsl::Inputs inputs{
-      {glsl::vec4(0, time, 0, 0)},
+      {glsl::vec4(0)},
       {glsl::vec4(color.x(), color.y(), color.z(), 1),
        glsl::vec4(second_color.x(), second_color.y(), second_color.z(), scale), glsl::vec4(0, 0.5f, 0, 0)},
       footprint};

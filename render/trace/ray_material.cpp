@@ -55,7 +55,7 @@ RayMaterial::RayMaterial(const Material& material, std::span<const Image> textur
       map_(material.base_color_texture) {
   pattern_color_ = material.pattern_color;
   mean_color_ = pattern_color(pattern_, Vector3f::Zero(), Vector3f::UnitY(), 1e3f * pattern_scale_,
-                              color_.head<3>(), pattern_color_, pattern_scale_, 0);
+                              color_.head<3>(), pattern_color_, pattern_scale_);
   opaque_ = material.color.w() >= 1 && !material.vertex_alpha && transmission <= 0;
   if (map_.image < 0 || static_cast<std::size_t>(map_.image) >= textures.size()) return;
   const Image& image = textures[static_cast<std::size_t>(map_.image)];
@@ -68,7 +68,7 @@ RayMaterial::RayMaterial(const Material& material, std::span<const Image> textur
   opaque_ = opaque_ && mean_texel_.w() >= 1;
 }
 
-Vector4f RayMaterial::texel(Vector2f uv, float) const {
+Vector4f RayMaterial::texel(const Vector2f& uv) const {
   if (!texture_) return {1, 1, 1, 1};
   const Vector3f place(uv.x(), uv.y(), 1);
   const float x = map_.rows[0].dot(place) * static_cast<float>(texture_->width_px) - 0.5f;
@@ -89,9 +89,9 @@ Vector4f RayMaterial::color(const Hit& hit, float footprint) const {
     result.head<3>() = footprint > kMeanCells * pattern_scale_
                            ? mean_color_
                            : pattern_color(pattern_, hit.object_position, hit.object_normal, footprint,
-                                           color_.head<3>(), pattern_color_, pattern_scale_, 0);
+                                           color_.head<3>(), pattern_color_, pattern_scale_);
   result = result.cwiseProduct(hit.color);
-  if (texture_) result = result.cwiseProduct(texel(hit.uv, footprint));
+  if (texture_) result = result.cwiseProduct(texel(hit.uv));
   if (alpha_cutoff_ > 0) result.w() = result.w() < alpha_cutoff_ ? 0.0f : 1.0f;
   return result;
 }

@@ -30,7 +30,7 @@ class RayMaterial {
   Vector3f transmittance(const Hit& hit, const Vector3f& direction) const;
 
  private:
-  Vector4f texel(Vector2f uv, float footprint) const;
+  Vector4f texel(const Vector2f& uv) const;
 
   Vector4f color_;
   Vector3f pattern_color_, mean_color_;

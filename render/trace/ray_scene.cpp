@@ -13,7 +13,8 @@ namespace {
 
 // Groups of objects that a ray may leave out.
 constexpr unsigned kOpaqueCaster = 1, kTranslucentCaster = 2, kNoCaster = 4, kAll = 7, kSprite = 8;
-// Number of translucent surfaces and sprites along a ray that are told apart; others are left out.
+// Largest number of translucent surfaces and sprites that a shadow ray is tested against; light passes the
+// others freely.
 constexpr int kMostLayers = 64;
 
 /// The device of the process. The instruction set is fixed, because others round hit distances differently.

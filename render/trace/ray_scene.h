@@ -75,7 +75,8 @@ class RayScene {
   /// The lists must stay in memory until clear(). Positions must be finite.
   void add_cloth(std::span<const ClothVertex> vertices, std::span<const uint32_t> indices,
                  const RayMaterial& material, const Vector2f& texture_from_uv, bool casts_shadow);
-  /// `balls`: position and radius of each, `stride` bytes apart; `colors` likewise.
+  /// Adds `count` balls. `balls` points to the position and radius of the first one, `colors` to its colour;
+  /// those of the next ball follow after `stride` bytes.
   void add_balls(const Vector4f* balls, const Vector4f* colors, std::size_t stride, std::size_t count,
                  const RayMaterial& material, bool casts_shadow);
   /// Soft discs that face every ray, and only cast shadows.

@@ -153,8 +153,8 @@ TEST_F(TracedLight, MirrorsShowWhatIsBehindTheCamera) {
   EXPECT_NEAR(seen.y(), 0.45f, 0.02f);
 }
 
-// Two boxes on a floor, with everything 1000 times smaller or larger: rays that start on a surface must not
-// meet it again, nor jump over what touches it.
+// Two boxes on a floor, at three sizes. A ray that starts on a surface must not intersect that surface, and
+// must not miss an object that touches it.
 TEST_F(TracedLight, DoesNotDependOnTheSizeOfTheScene) {
   std::vector<HdrImage> pictures;
   for (const float scale : {1.0f, 0.001f, 1000.0f}) {

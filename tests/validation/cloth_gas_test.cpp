@@ -16,8 +16,7 @@ namespace {
 
 TEST(ClothGas, LeavesThroughTheHolesOfATear) {
   // A closed cloth without its last triangle has one hole, of that triangle's area. At a constant volume the
-  // overpressure p leaks at the rate kDischarge A sqrt(2 p / rho) / V of itself: 1 / sqrt(share) grows
-  // linearly.
+  // overpressure p falls by dp/dt = -p kDischarge A sqrt(2 p / rho) / V, so 1 / sqrt(p) grows linearly.
   TriangleMesh mesh = weld(sphere_mesh(0.3, 24, 12));
   const Real closed = enclosed_volume(mesh.vertices, mesh.triangles);
   const Triangle lost = mesh.triangles[200];

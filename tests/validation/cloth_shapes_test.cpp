@@ -198,7 +198,7 @@ TEST(ClothBendDamping, EndsVibrationAtTheRateOfItsTime) {
       if (t > 1.6 * period) later = std::max(later, deflection());
     }
     const Real damped = std::sqrt(1 - ratio * ratio);
-    // Also of itself backward Euler damps at a rate of w^2 h / 2 with its step h.
+    // Backward Euler with the step h adds numerical damping at the rate w^2 h / 2.
     EXPECT_NEAR(std::log(first / later), 4 * std::numbers::pi * ratio / damped, 0.1 + 0.05 * ratio) << ratio;
   }
 }
