@@ -31,6 +31,9 @@ void check(const Fabric& f) {
   check("shear", f.shear, true);
   check("bend", f.bend, true);
   check("damping", f.damping, true);
+  check("stretch_damping", f.stretch_damping.value_or(0), true);
+  check("shear_damping", f.shear_damping.value_or(0), true);
+  check("bend_spring_damping", f.bend_spring_damping.value_or(0), true);
   check("bend_damping", f.bend_damping, true);
 }
 
@@ -59,15 +62,24 @@ void spread_mass(ClothDef& def, Real areal_density) {
   }
 }
 
+/// Share of the critical damping of springs of a kind.
+Real damping_of(const Fabric& f, SpringKind kind) {
+  const std::optional<Real>& own = kind == SpringKind::stretch ? f.stretch_damping
+                                   : kind == SpringKind::shear ? f.shear_damping
+                                                               : f.bend_spring_damping;
+  return own.value_or(f.damping);
+}
+
 /// Adds a spring with its share of the critical damping of its two points, if it has any stiffness.
-void add_spring(ClothDef& def, uint32_t a, uint32_t b, Real stiffness, Real damping, SpringKind kind,
+void add_spring(ClothDef& def, uint32_t a, uint32_t b, Real stiffness, const Fabric& fabric, SpringKind kind,
                 std::array<uint32_t, 2> counterpart = {}) {
   const auto distance = [&](uint32_t i, uint32_t j) { return (def.vertices[i] - def.vertices[j]).norm(); };
   const Real length = distance(a, b);
   if (!(stiffness > 0) || !(length > 0)) return;
   const Real reduced = def.masses[a] * def.masses[b] / (def.masses[a] + def.masses[b]);
-  def.springs.push_back({a, b, length, stiffness, 2 * damping * std::sqrt(stiffness * reduced), kind,
-                         counterpart, distance(counterpart[0], counterpart[1])});
+  const Real damping = 2 * damping_of(fabric, kind) * std::sqrt(stiffness * reduced);
+  def.springs.push_back(
+      {a, b, length, stiffness, damping, kind, counterpart, distance(counterpart[0], counterpart[1])});
 }
 
 /// A spring over two cells of length h that bends by an angle theta gets shorter by h theta^2 / 4, so it
@@ -77,6 +89,51 @@ void add_spring(ClothDef& def, uint32_t a, uint32_t b, Real stiffness, Real damp
 Real bend_stiffness(Real bend, Real w, Real h) {
   constexpr Real kAngle = 0.5;
   return 16 * bend * w / (h * h * h * kAngle * kAngle);
+}
+
+/// With the circumscribed radius 1.
+sim::TriangleMesh icosahedron() {
+  // Corners of three rectangles whose sides are in the golden ratio.
+  const Real golden = (1 + std::sqrt(5.0)) / 2, size = std::sqrt(1 + golden * golden);
+  sim::TriangleMesh mesh;
+  for (int axis = 0; axis < 3; ++axis)
+    for (int k = 0; k < 4; ++k) {
+      Vec3 v = Vec3::Zero();
+      v[axis] = k & 1 ? golden : -golden;
+      v[(axis + 1) % 3] = k & 2 ? 1 : -1;
+      mesh.vertices.push_back(v / size);
+    }
+  const Real edge = 2 / size;
+  const auto joined = [&](uint32_t a, uint32_t b) {
+    return (mesh.vertices[a] - mesh.vertices[b]).norm() < 1.01 * edge;
+  };
+  for (uint32_t a = 0; a < 12; ++a)
+    for (uint32_t b = a + 1; b < 12; ++b)
+      for (uint32_t c = b + 1; c < 12; ++c) {
+        if (!joined(a, b) || !joined(b, c) || !joined(c, a)) continue;
+        const auto &p = mesh.vertices[a], &q = mesh.vertices[b], &r = mesh.vertices[c];
+        const bool outwards = (q - p).cross(r - p).dot(p) > 0;
+        mesh.triangles.push_back(outwards ? Triangle{a, b, c} : Triangle{a, c, b});
+      }
+  return mesh;
+}
+
+/// Divides each triangle of a sphere with the radius 1 into four.
+sim::TriangleMesh divided(const sim::TriangleMesh& mesh) {
+  sim::TriangleMesh finer{mesh.vertices, {}};
+  std::map<std::pair<uint32_t, uint32_t>, uint32_t> middles;
+  const auto middle = [&](uint32_t a, uint32_t b) {
+    const auto [at, is_new] =
+        middles.try_emplace(std::minmax(a, b), static_cast<uint32_t>(finer.vertices.size()));
+    if (is_new) finer.vertices.push_back((mesh.vertices[a] + mesh.vertices[b]).normalized());
+    return at->second;
+  };
+  for (const Triangle& t : mesh.triangles) {
+    const uint32_t ab = middle(t[0], t[1]), bc = middle(t[1], t[2]), ca = middle(t[2], t[0]);
+    finer.triangles.insert(finer.triangles.end(), {Triangle{t[0], ab, ca}, Triangle{ab, t[1], bc},
+                                                   Triangle{ca, bc, t[2]}, Triangle{ab, bc, ca}});
+  }
+  return finer;
 }
 
 }  // namespace
@@ -103,7 +160,6 @@ ClothDef grid_cloth(const GridSize& size, const sim::Pose& pose, const Fabric& f
         def.triangles.insert(def.triangles.end(), {Triangle{a, d, b}, Triangle{b, d, e}});
     }
   spread_mass(def, fabric.areal_density);
-  const Real damping = fabric.damping;
   // Along a thread a spring represents the width between its neighbours, at the border half of it.
   const auto width = [](uint32_t k, uint32_t last, Real step) {
     return k == 0 || k == last ? step / 2 : step;
@@ -112,15 +168,15 @@ ClothDef grid_cloth(const GridSize& size, const sim::Pose& pose, const Fabric& f
     for (uint32_t c = 0; c <= nx; ++c) {
       const Real wz = width(r, nz, dz), wx = width(c, nx, dx);
       if (c < nx)
-        add_spring(def, at(c, r), at(c + 1, r), fabric.stretch * wz / dx, damping, SpringKind::stretch);
+        add_spring(def, at(c, r), at(c + 1, r), fabric.stretch * wz / dx, fabric, SpringKind::stretch);
       if (r < nz)
-        add_spring(def, at(c, r), at(c, r + 1), fabric.stretch * wx / dz, damping, SpringKind::stretch);
+        add_spring(def, at(c, r), at(c, r + 1), fabric.stretch * wx / dz, fabric, SpringKind::stretch);
       if (fabric.bend_model != BendModel::springs) continue;
       if (c + 2 <= nx)
-        add_spring(def, at(c, r), at(c + 2, r), bend_stiffness(fabric.bend, wz, dx), damping,
+        add_spring(def, at(c, r), at(c + 2, r), bend_stiffness(fabric.bend, wz, dx), fabric,
                    SpringKind::bend);
       if (r + 2 <= nz)
-        add_spring(def, at(c, r), at(c, r + 2), bend_stiffness(fabric.bend, wx, dz), damping,
+        add_spring(def, at(c, r), at(c, r + 2), bend_stiffness(fabric.bend, wx, dz), fabric,
                    SpringKind::bend);
     }
   // A shear of gamma changes the diagonals of a cell by gamma dx dz / |d|. The energy of both springs equals
@@ -131,7 +187,7 @@ ClothDef grid_cloth(const GridSize& size, const sim::Pose& pose, const Fabric& f
     for (uint32_t c = 0; c < nx; ++c) {
       const std::array<uint32_t, 2> one = {at(c, r), at(c + 1, r + 1)}, other = {at(c + 1, r), at(c, r + 1)};
       for (const auto& [own, across] : {std::pair(one, other), std::pair(other, one)})
-        add_spring(def, own[0], own[1], shear, damping, SpringKind::shear, across);
+        add_spring(def, own[0], own[1], shear, fabric, SpringKind::shear, across);
     }
   return def;
 }
@@ -166,16 +222,68 @@ ClothDef mesh_cloth(const sim::TriangleMesh& mesh, const sim::Pose& pose, const 
     const Real length = (def.vertices[edge.first] - def.vertices[edge.second]).norm();
     if (!(length > 0)) continue;
     const Real width = 2 * sides.area / (3 * length) * 1.5;
-    add_spring(def, edge.first, edge.second, fabric.stretch * width / length, fabric.damping,
-               SpringKind::stretch);
+    add_spring(def, edge.first, edge.second, fabric.stretch * width / length, fabric, SpringKind::stretch);
     if (fabric.bend_model != BendModel::springs) continue;
     if (sides.opposite.size() != 2 || sides.opposite[0] == sides.opposite[1]) continue;
     const Real across = (def.vertices[sides.opposite[0]] - def.vertices[sides.opposite[1]]).norm();
     if (!(across > 0)) continue;
     add_spring(def, sides.opposite[0], sides.opposite[1], bend_stiffness(fabric.bend, length, across / 2),
-               fabric.damping, SpringKind::bend);
+               fabric, SpringKind::bend);
   }
   return def;
+}
+
+sim::ClothDef sphere_cloth(Real radius, uint32_t divisions, const sim::Pose& pose, const Fabric& fabric) {
+  check("radius", radius, false);
+  if (divisions > 6) refuse("divisions must be 0 to 6");
+  sim::TriangleMesh mesh = icosahedron();
+  for (uint32_t i = 0; i < divisions; ++i) mesh = divided(mesh);
+  for (Vec3& v : mesh.vertices) v *= radius;
+  return mesh_cloth(mesh, pose, fabric, true);
+}
+
+uint32_t add_cord(ClothDef& def, const Cord& cord) {
+  check("length of a cord", cord.length, true);
+  check("stiffness of a cord", cord.stiffness, false);
+  check("mass_per_length of a cord", cord.mass_per_length, false);
+  check("damping of a cord", cord.damping, true);
+  if (cord.segments < 1 || cord.segments > 1000) refuse("segments of a cord must be 1 to 1000");
+  if (cord.vertex >= def.vertices.size()) refuse("a cord begins at a vertex that is not there");
+  const Vec3 start = def.vertices[cord.vertex], across = cord.end - start;
+  const Real distance = across.norm(), length = cord.length > 0 ? cord.length : distance;
+  if (!(length > 0)) refuse("the ends of a cord are at one place, and it has no length");
+  const Real count = cord.segments, rest = length / count, segment_mass = cord.mass_per_length * rest;
+  // Both parts of a slack cord meet at its middle, or beside it if the number of segments is odd.
+  const Real first = std::floor(count / 2) * rest, second = length - first;
+  Real along = 0, down = 0;
+  const Vec3 u = distance > 0 ? Vec3(across / distance) : Vec3(Vec3::UnitX());
+  Vec3 n = -Vec3::UnitY() + u.y() * u;
+  n = n.squaredNorm() > 1e-6 ? n.normalized() : Vec3(Vec3::UnitX());
+  const bool slack = length > distance && cord.segments > 1;
+  if (slack && distance > second - first) {
+    along = (first * first - second * second + distance * distance) / (2 * distance);
+    down = std::sqrt(std::max(first * first - along * along, 0.0));
+  }
+  const Vec3 middle = start + along * u + down * n;
+  uint32_t last = cord.vertex;
+  def.masses[last] += segment_mass / 2;
+  for (uint32_t i = 1; i <= cord.segments; ++i) {
+    const Real s = rest * i;
+    Vec3 place = start + i / count * across;
+    if (slack && down > 0)
+      place = s <= first ? Vec3(start + s / first * (middle - start))
+                         : Vec3(middle + (s - first) / second * (cord.end - middle));
+    const auto next = static_cast<uint32_t>(def.vertices.size());
+    def.vertices.push_back(place);
+    if (!def.rest_vertices.empty()) def.rest_vertices.push_back(place);
+    def.masses.push_back(i < cord.segments ? segment_mass : segment_mass / 2);
+    const Real stiffness = cord.stiffness / rest;
+    const Real reduced = def.masses[last] * def.masses[next] / (def.masses[last] + def.masses[next]);
+    def.springs.push_back(
+        {last, next, rest, stiffness, 2 * cord.damping * std::sqrt(stiffness * reduced), SpringKind::cord});
+    last = next;
+  }
+  return last;
 }
 
 }  // namespace offstage::effects

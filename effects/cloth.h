@@ -10,6 +10,8 @@
 
 namespace offstage::effects {
 
+using sim::Vec3;
+
 struct GridSize {
   Real width = 1, height = 1;        ///< [m], > 0
   uint32_t columns = 20, rows = 20;  ///< number of cells, 1 to 1000 each
@@ -31,5 +33,25 @@ sim::ClothDef grid_cloth(const GridSize& size, const sim::Pose& pose, const Fabr
 /// of vertices do not change.
 sim::ClothDef mesh_cloth(const sim::TriangleMesh& mesh, const sim::Pose& pose, const Fabric& fabric,
                          bool keep_vertices = false);
+
+/// Creates a closed sphere around the pose's origin from an icosahedron whose triangles are divided into four
+/// `divisions` times, 0 to 6: 10 * 4^divisions + 2 vertices. Normals point out.
+sim::ClothDef sphere_cloth(Real radius, uint32_t divisions, const sim::Pose& pose, const Fabric& fabric);
+
+/// A cord between a vertex of a cloth and a point: masses and springs in a row. With one segment it is a
+/// spring, which pushes, too; with more it buckles when pushed.
+struct Cord {
+  uint32_t vertex = 0;           ///< of the cloth
+  Vec3 end = Vec3::Zero();       ///< where the other end is at the start (world) [m]
+  Real length = 0;               ///< at rest [m]; 0: the distance
+  uint32_t segments = 10;        ///< 1 to 1000
+  Real stiffness = 50;           ///< force at a strain of 1 [N], > 0
+  Real mass_per_length = 0.002;  ///< [kg/m], > 0
+  Real damping = 0.1;            ///< share of the critical damping of each spring, >= 0
+};
+/// Adds a cord to a cloth and returns the index of its last vertex, for a pin. A cord that is longer than the
+/// distance of its ends hangs in two straight parts of equal length, in the direction of -Y as far as its
+/// ends let it. Throws std::invalid_argument for a value out of range.
+uint32_t add_cord(sim::ClothDef& def, const Cord& cord);
 
 }  // namespace offstage::effects

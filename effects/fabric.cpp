@@ -11,7 +11,7 @@ namespace {
 // to them). The stiffness along the threads is a tenth to a hundredth of the true one. At these loads the
 // strain is already far below a per cent, and a higher stiffness would only need more steps. The low shear
 // stiffness makes woven cloth drape in folds.
-const std::array<FabricPreset, 5> kPresets = {{
+const std::array<FabricPreset, 6> kPresets = {{
     {"silk",
      "light and flowing, many small folds",
      {.areal_density = 0.06,
@@ -73,6 +73,22 @@ const std::array<FabricPreset, 5> kPresets = {{
       .drag = 1,
       .lift = 0.92,
       .max_stretch = 2}},
+    // A latex balloon of 30 cm weighs 3 g. Here its skin has no stress at a diameter of 20 cm: stretched by
+    // half, it has the tension p R / 2 of a balloon of 30 cm at 2.5 kPa. Drag is that of a sphere, whose
+    // coefficient is 4 (drag - lift) + 4/3 lift = 0.47 (docs/scene-guide.md).
+    {"balloon",
+     "the skin of a balloon of 20 cm that is blown up to 30 cm",
+     {.areal_density = 0.024,
+      .stretch = 250,
+      .shear = 100,
+      .bend = 1e-6,
+      .damping = 0.1,
+      .friction = 0.7,
+      .self_friction = 0.7,
+      .thickness = 0.003,
+      .drag = 0.3525,
+      .lift = 0.3525,
+      .max_stretch = 0}},
 }};
 
 }  // namespace

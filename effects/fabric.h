@@ -2,6 +2,7 @@
 /// Fabrics of cloth. Stiffnesses are per metre of width, so the behaviour of a cloth does not depend on its
 /// resolution.
 
+#include <optional>
 #include <span>
 #include <string>
 
@@ -26,6 +27,9 @@ struct Fabric {
   BendModel bend_model = BendModel::plate;
   /// Share of the critical damping of each spring between its two points, >= 0.
   Real damping = 0.05;
+  /// The same of springs of one kind, >= 0; empty: `damping`. Those that bend are springs only with
+  /// BendModel::springs.
+  std::optional<Real> stretch_damping, shear_damping, bend_spring_damping;
   Real friction = 0.5;       ///< friction on bodies, >= 0
   Real self_friction = 0.3;  ///< friction on itself, >= 0
   /// Distance from other layers and from bodies [m], > 0; larger than that of real cloth.
@@ -42,7 +46,7 @@ struct FabricPreset {
   Fabric fabric;
 };
 
-/// The presets: silk, cotton, denim, leather, rubber.
+/// The presets: silk, cotton, denim, leather, rubber, balloon.
 std::span<const FabricPreset> fabric_presets();
 /// Returns the preset with this name; null if there is none.
 const FabricPreset* find_fabric(const std::string& name);

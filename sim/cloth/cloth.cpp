@@ -79,10 +79,16 @@ std::string number_problem(const ClothDef& def) {
       {"thickness", def.thickness}, {"substep", def.substep}, {"seam_time", def.seam_time}};
   for (const auto& [field, value] : positive)
     if (!is_positive(value)) return std::string(field) + " must be a finite number > 0";
-  const std::pair<const char*, Real> not_negative[] = {
-      {"friction", def.friction}, {"self_friction", def.self_friction}, {"air.drag", def.air.drag},
-      {"air.lift", def.air.lift}, {"air.density", def.air.density},     {"ram_pressure", def.ram_pressure},
-      {"bend", def.bend},         {"bend_damping", def.bend_damping}};
+  const std::pair<const char*, Real> not_negative[] = {{"friction", def.friction},
+                                                       {"self_friction", def.self_friction},
+                                                       {"air.drag", def.air.drag},
+                                                       {"air.lift", def.air.lift},
+                                                       {"air.density", def.air.density},
+                                                       {"ram_pressure", def.ram_pressure},
+                                                       {"bend", def.bend},
+                                                       {"bend_damping", def.bend_damping},
+                                                       {"inflate_time", def.inflate_time},
+                                                       {"gas_density", def.gas_density.value_or(0)}};
   for (const auto& [field, value] : not_negative)
     if (!is_not_negative(value)) return std::string(field) + " must be a finite number >= 0";
   if (!(def.rest_curvature >= 0 && def.rest_curvature <= 1)) return "rest_curvature must be 0 to 1";
@@ -100,6 +106,7 @@ std::string number_problem(const ClothDef& def) {
 std::string problem(const ClothDef& def) {
   for (const auto& check : {vertex_problem, spring_problem, index_problem, number_problem})
     if (std::string wrong = check(def); !wrong.empty()) return wrong;
+  if (def.gas_density && !(def.pressure > 0)) return "gas_density needs a pressure > 0";
   if (def.pressure != 0) {
     const auto& rest = def.rest_vertices.empty() ? def.vertices : def.rest_vertices;
     if (!MeshTopology({rest, def.triangles}).defects().closed()) return "pressure needs a closed surface";

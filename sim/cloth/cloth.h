@@ -26,6 +26,7 @@ enum class SpringKind : uint8_t {
   stretch,  ///< to direct neighbours; these tear
   shear,    ///< across the diagonals of cells
   bend,     ///< to second neighbours, or across an edge
+  cord,     ///< of a cord that hangs on a vertex; it neither tears nor has a limit
 };
 
 /// F = -(k e + c (d'.d)/|d|) d/|d| on vertex a, d from b to a, with the elongation e = |d| - L.
@@ -121,6 +122,13 @@ struct ClothDef {
   /// Overpressure inside a closed cloth at its rest volume V0 [Pa]. At the volume V it is pressure V0 / V, as
   /// in an isothermal gas. 0: none.
   Real pressure = 0;
+  /// Time in which the gas of `pressure` is let in, at a constant rate from 0 [s], >= 0.
+  Real inflate_time = 0;
+  /// Density of the gas inside [kg/m^3], >= 0; empty: that of the air. The gas needs `pressure` > 0 and is
+  /// borne by the cloth: with the weight of the displaced air, it makes the pressure inside, less that
+  /// outside, change with the height at the rate (air.density - gas_density) g. Its inertia, and that of the
+  /// air that moves with the cloth, are neglected.
+  std::optional<Real> gas_density;
   /// For an open cloth such as a parachute: share of the stagnation pressure rho (u.m)^2 / 2 of the air
   /// entering at its mouth that builds up inside, on the side that its normals point away from. 0: none.
   Real ram_pressure = 0;
@@ -187,6 +195,8 @@ struct ClothView {
   std::span<const Triangle> triangles;
   /// For each point, the vertex of the definition that it comes from. Points are added where cloth tears.
   std::span<const uint32_t> sources;
+  /// Those that hold. Springs of the kind `cord` are as many as in the definition, in its order.
+  std::span<const ClothSpring> springs;
   uint32_t version = 0;  ///< grows when triangles or the number of points change
 };
 

@@ -1,18 +1,20 @@
 #include "sim/cloth/cloth_forces.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace offstage::sim {
 namespace {
 
-constexpr Real kAirDensity = 1.2;  // of gas that leaks where there is no air around [kg/m^3]
+constexpr Real kAirDensity = 1.2;  // of leaking gas without a density of its own [kg/m^3]
 
-/// Pressure that the gas inside would have without a loss, at the present volume [Pa]. A volume of less than
-/// a tenth of that at rest counts as a tenth: a cloth that is crushed flat does not burst.
+/// Pressure that the gas let in so far would have without a loss, at the present volume [Pa]. A volume of
+/// less than a tenth of that at rest counts as a tenth: a cloth that is crushed flat does not burst.
 Real overpressure(const Cloth& cloth) {
   const Real volume = cloth.gas.volume(cloth.points, cloth.triangles);
-  return cloth.def.pressure * cloth.rest_volume / std::max(volume, 0.1 * cloth.rest_volume);
+  const Real let_in = cloth.age < cloth.def.inflate_time ? cloth.age / cloth.def.inflate_time : 1;
+  return let_in * cloth.def.pressure * cloth.rest_volume / std::max(volume, 0.1 * cloth.rest_volume);
 }
 
 /// The points of one cloth as their accelerations are made.
@@ -118,10 +120,30 @@ void push_out(Run& run, Real pressure) {
   }
 }
 
-void inflate(Run& run) {
+/// The pressure of a gas at rest grows downwards by its weight, and so does that of the air. The corners of a
+/// triangle get what a pressure that is linear over it gives, so that the force of a closed cloth is that of
+/// Archimedes exactly, and acts at the centre of the volume.
+void lift(Run& run, const Vec3& gravity) {
+  const Cloth& cloth = run.cloth;
+  if (!cloth.def.gas_density) return;
+  const Vec3 slope = cloth.gas.share() * (*cloth.def.gas_density - cloth.def.air.density) * gravity;
+  if (slope.isZero(0)) return;
+  const Vec3 origin = run.at(0);
+  for (const Triangle& t : cloth.triangles) {
+    const Vec3 a = run.at(t[0]), b = run.at(t[1]), c = run.at(t[2]);
+    const Vec3 area = (b - a).cross(c - a) / 2;
+    const std::array<Real, 3> p = {slope.dot(a - origin), slope.dot(b - origin), slope.dot(c - origin)};
+    const Real sum = p[0] + p[1] + p[2];
+    for (std::size_t k = 0; k < 3; ++k)
+      run.points.acceleration[run.first + t[k]] += padded((sum + p[k]) / 12 / cloth.masses[t[k]] * area);
+  }
+}
+
+void inflate(Run& run, const Vec3& gravity) {
   const Cloth& cloth = run.cloth;
   if (cloth.def.pressure == 0) return;
   push_out(run, cloth.gas.share() * overpressure(cloth));
+  lift(run, gravity);
 }
 
 /// An open cloth that faces the air stops what comes in at its mouth: inside of it the pressure of stagnation
@@ -148,7 +170,8 @@ void catch_air(Run& run, Real h) {
 
 void leak_gas(Cloth& cloth, Real h) {
   if (cloth.def.pressure == 0 || cloth.version == 0) return;
-  const Real density = cloth.def.air.density > 0 ? cloth.def.air.density : kAirDensity;
+  Real density = cloth.def.gas_density.value_or(cloth.def.air.density);
+  if (!(density > 0)) density = kAirDensity;
   cloth.gas.leak(cloth.points, cloth.gas.volume(cloth.points, cloth.triangles), overpressure(cloth), density,
                  h);
 }
@@ -164,7 +187,7 @@ void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather&
     if (f->acts_on(cloth.handle) && f->is_on(weather.time))
       std::visit([&](const auto& effect) { add(effect, run); }, f->effect);
   blow_on_triangles(run, weather.h);
-  inflate(run);
+  inflate(run, weather.gravity);
   catch_air(run, weather.h);
 }
 

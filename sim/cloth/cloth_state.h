@@ -11,7 +11,7 @@ struct Cloth {
   /// `def` must have no problem().
   Cloth(ClothHandle cloth, const ClothDef& definition);
 
-  ClothView view() const { return {points, velocities, triangles, sources, version}; }
+  ClothView view() const { return {points, velocities, triangles, sources, springs, version}; }
 
   ClothHandle handle;
   ClothDef def;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include <gtest/gtest.h>
 
@@ -61,6 +62,121 @@ TEST(ClothGas, ABalloonHitByADartTearsAndShrinks) {
   // Its gas has left, and the skin goes back to its volume at rest.
   const Real rest = enclosed_volume(def.vertices, def.triangles);
   EXPECT_LT(volume() - rest, 0.5 * (blown_up - rest));
+}
+
+/// A sphere of the balloon's skin that helium fills.
+ClothDef helium_balloon() {
+  ClothDef def = effects::sphere_cloth(0.1, 2, {}, effects::find_fabric("balloon")->fabric);
+  def.pressure = 8400;
+  def.gas_density = 0.17;
+  return def;
+}
+
+Real mass_of(const ClothDef& def) {
+  return std::accumulate(def.masses.begin(), def.masses.end(), 0.0);
+}
+
+TEST(ClothGas, LiftsAWeightOnACordByArchimedes) {
+  // Whatever the balloon, its cord and the weight do to each other, their momentum grows by the weight of the
+  // displaced air less the weights of all.
+  ClothDef def = helium_balloon();
+  def.air.drag = def.air.lift = 0;
+  const uint32_t last = effects::add_cord(def, {.vertex = 0, .end = {0, -0.8, 0}});
+  constexpr Real kWeight = 0.006, kStep = 1.0 / 240;
+  World world;
+  const BodyHandle weight =
+      world.add_body({.shape = Box{Vec3::Constant(0.02)}, .pose = {Vec3(0, -0.81, 0)}, .mass = kWeight});
+  def.pins.push_back({.vertex = last, .body = weight, .position = Vec3(0, 0.01, 0)});
+  const ClothHandle cloth = world.add_cloth(def);
+  const Real total = mass_of(def) + kWeight, gravity = 9.81;
+  const auto momentum = [&] {
+    Real sum = kWeight * world.body(weight).velocity.y();
+    for (std::size_t i = 0; i < def.masses.size(); ++i)
+      sum += def.masses[i] * world.cloth(cloth).velocities[i].y();
+    return sum;
+  };
+  Real expected = 0;
+  for (int i = 0; i < 240; ++i) {
+    const ClothView view = world.cloth(cloth);
+    expected += kStep * gravity * ((1.2 - 0.17) * enclosed_volume(view.points, view.triangles) - total);
+    world.step(kStep);
+    ASSERT_TRUE(world.cloth_report(cloth).finite);
+  }
+  EXPECT_GT(expected, 0.01 * total);
+  // A pinned point takes part in its body's last change of velocity only in the next sub-step.
+  EXPECT_NEAR(momentum(), expected, 2e-3 * expected);
+  EXPECT_GT(world.body(weight).pose.position.y(), -0.5);
+}
+
+TEST(ClothGas, FillsABalloonInItsTime) {
+  // While it is blown up slowly, the virial of the springs is that of the pressure, 3 p V = 3 p0 V0 t / T.
+  ClothDef def = helium_balloon();
+  def.gas_density.reset();
+  def.inflate_time = 2;
+  def.self_collision = false;
+  World world({.gravity = Vec3::Zero()});
+  const ClothHandle cloth = world.add_cloth(def);
+  const Real filled = 3 * def.pressure * enclosed_volume(def.vertices, def.triangles);
+  for (int i = 1; i <= 60; ++i) {
+    world.step(1.0 / 20);
+    if (i % 15 != 0) continue;
+    const ClothView view = world.cloth(cloth);
+    Real virial = 0;
+    for (const ClothSpring& s : def.springs) {
+      const Real length = (view.points[s.a] - view.points[s.b]).norm();
+      virial += s.stiffness * (length - s.rest_length) * length;
+    }
+    const Real share = std::min(1.0, i / 40.0);
+    EXPECT_NEAR(virial, share * filled, 0.02 * filled) << "after " << i / 20.0 << " s";
+  }
+  // Blown up from 20 to 30 cm, it has the pressure of a balloon.
+  const ClothView view = world.cloth(cloth);
+  const Real volume = enclosed_volume(view.points, view.triangles);
+  EXPECT_NEAR(std::cbrt(volume * 3 / (4 * std::numbers::pi)), 0.15, 0.01);
+  EXPECT_NEAR(filled / 3 / volume, 2500, 400);
+}
+
+/// Number of segments of a cord.
+class ClothCord : public testing::TestWithParam<uint32_t> {};
+
+TEST_P(ClothCord, StretchesByItsStiffness) {
+  // (weight + half its own weight) / stiffness of its length, as any elastic rod.
+  ClothDef def = effects::grid_cloth({0.2, 0.2, 2, 2}, {}, effects::find_fabric("cotton")->fabric);
+  for (uint32_t i = 0; i < def.vertices.size(); ++i)
+    def.pins.push_back({.vertex = i, .position = def.vertices[i]});
+  const effects::Cord cord{
+      .vertex = 4, .end = {0, -0.5, 0}, .segments = GetParam(), .stiffness = 40, .mass_per_length = 0.02};
+  const uint32_t last = effects::add_cord(def, cord);
+  World world;
+  const BodyHandle weight = world.add_body({.shape = Box{Vec3::Constant(0.02)},
+                                            .pose = {Vec3(0, -0.5, 0)},
+                                            .mass = 0.2,
+                                            .linear_drag = 1,
+                                            .collides = false});
+  def.pins.push_back({.vertex = last, .body = weight, .position = Vec3::Zero()});
+  const ClothHandle cloth = world.add_cloth(def);
+  for (int i = 0; i < 240; ++i) world.step(1.0 / 60);
+  const Real expected = (0.2 + 0.02 * 0.5 / 2) * 9.81 / 40 * 0.5;
+  EXPECT_NEAR(-0.5 - world.body(weight).pose.position.y(), expected, 0.01 * expected);
+  EXPECT_EQ(world.cloth_report(cloth).clamped, 0u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Segments, ClothCord, testing::Values(1u, 12u));
+
+TEST(ClothCord, HangsSlackAtItsLength) {
+  ClothDef def = effects::grid_cloth({0.2, 0.2, 2, 2}, {}, effects::find_fabric("cotton")->fabric);
+  const uint32_t first = static_cast<uint32_t>(def.vertices.size());
+  for (const uint32_t segments : {8u, 9u}) {
+    ClothDef with = def;
+    const uint32_t last =
+        effects::add_cord(with, {.vertex = 4, .end = {0.3, 0, 0}, .length = 0.5, .segments = segments});
+    EXPECT_EQ(last + 1, first + segments);
+    EXPECT_LT((with.vertices[last] - Vec3(0.3, 0, 0)).norm(), 1e-12);
+    Real length = 0;
+    for (uint32_t i = first; i <= last; ++i)
+      length += (with.vertices[i] - with.vertices[i == first ? 4 : i - 1]).norm();
+    EXPECT_NEAR(length, 0.5, 1e-12) << segments;
+  }
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ namespace {
 
 using Eigen::Vector2f;
 
-constexpr std::array kSpringKinds = {"stretch", "shear", "bend"};
+constexpr std::array kSpringKinds = {"stretch", "shear", "bend", "cord"};
 
 effects::GridSize grid_size(const GridShape& grid) {
   return {.width = grid.size.x(),
@@ -85,6 +85,20 @@ std::vector<Vector2f> model_uvs(const render::Model& model, const sim::ClothDef&
   return uvs;
 }
 
+void add_cords(const Cloth& cloth, const sim::Pose& pose, FlatCloth& flat) {
+  for (const ClothCord& cord : cloth.cords) {
+    const uint32_t vertex = nearest_vertex(flat.places, cord.from);
+    flat.cord_ends.push_back(effects::add_cord(flat.def, {.vertex = vertex,
+                                                          .end = pose.point_to_world(cord.to),
+                                                          .length = cord.length,
+                                                          .segments = static_cast<uint32_t>(cord.segments),
+                                                          .stiffness = cord.stiffness,
+                                                          .mass_per_length = cord.mass_per_length,
+                                                          .damping = cord.damping}));
+    flat.uvs.resize(flat.def.vertices.size(), flat.uvs[vertex]);
+  }
+}
+
 }  // namespace
 
 std::vector<uint32_t> FlatCloth::triangles() const {
@@ -120,8 +134,22 @@ effects::Fabric fabric_of(const Cloth& cloth) {
   change(c.max_stretch, f.max_stretch);
   change(c.max_shear, f.max_shear);
   change(c.bend_damping, f.bend_damping);
+  const auto set = [](const std::optional<double>& to, std::optional<double>& value) {
+    if (to) value = to;
+  };
+  set(c.stretch_damping, f.stretch_damping);
+  set(c.shear_damping, f.shear_damping);
+  set(c.bend_spring_damping, f.bend_spring_damping);
   f.bend_model = c.bend_model.value_or(f.bend_model);
   return f;
+}
+
+std::size_t vertex_count(const Cloth& cloth, const render::Model* model) {
+  if (const auto* grid = std::get_if<GridShape>(&cloth.shape))
+    return static_cast<std::size_t>(grid->cells.x() + 1) * static_cast<std::size_t>(grid->cells.y() + 1);
+  if (const auto* sphere = std::get_if<SphereCloth>(&cloth.shape))
+    return 10 * (std::size_t{1} << 2 * sphere->divisions) + 2;
+  return model->vertex_count();
 }
 
 FlatCloth flat_cloth(const Cloth& cloth, const render::Model* model) {
@@ -129,25 +157,29 @@ FlatCloth flat_cloth(const Cloth& cloth, const render::Model* model) {
   const sim::Pose pose{cloth.position, cloth.orientation};
   FlatCloth flat;
   const auto* grid = std::get_if<GridShape>(&cloth.shape);
-  const std::size_t vertices =
-      grid ? static_cast<std::size_t>(grid->cells.x() + 1) * static_cast<std::size_t>(grid->cells.y() + 1)
-           : model->vertex_count();
+  const std::size_t vertices = vertex_count(cloth, model);
   if (vertices > kMaxClothVertices)
     throw std::invalid_argument(
         fmt::format("has {} vertices; a cloth has at most {}", vertices, kMaxClothVertices));
-  const MeshFile file = grid ? MeshFile{} : std::get<MeshFile>(cloth.shape);
-  flat.def = grid ? effects::grid_cloth(grid_size(*grid), pose, fabric)
-                  : effects::mesh_cloth(collision_mesh(*model, fitted_scale(file.scale, file.fit, *model)),
-                                        pose, fabric);
+  if (grid) {
+    flat.def = effects::grid_cloth(grid_size(*grid), pose, fabric);
+  } else if (const auto* sphere = std::get_if<SphereCloth>(&cloth.shape)) {
+    flat.def = effects::sphere_cloth(sphere->radius, static_cast<uint32_t>(sphere->divisions), pose, fabric);
+  } else {
+    const MeshFile& file = std::get<MeshFile>(cloth.shape);
+    flat.def =
+        effects::mesh_cloth(collision_mesh(*model, fitted_scale(file.scale, file.fit, *model)), pose, fabric);
+  }
   for (const Vec3& v : flat.def.vertices) flat.places.push_back(pose.point_to_body(v));
   if (grid) {
     for (const Vec3& p : flat.places)
       flat.uvs.emplace_back(static_cast<float>(p.x() + 0.5 * grid->size.x()),
                             static_cast<float>(p.z() + 0.5 * grid->size.y()));
   } else {
-    flat.uvs = model_uvs(*model, flat.def);
+    if (model) flat.uvs = model_uvs(*model, flat.def);
     if (flat.uvs.empty()) flat.uvs = projected(flat.places);
   }
+  add_cords(cloth, pose, flat);
   sim::ClothDef& def = flat.def;
   def.name = cloth.name;
   for (const ClothSeam& seam : cloth.seams)
@@ -158,6 +190,8 @@ FlatCloth flat_cloth(const Cloth& cloth, const render::Model* model) {
   def.self_collision = cloth.self_collision;
   def.tear = cloth.tear;
   def.pressure = cloth.pressure;
+  def.inflate_time = cloth.inflate_time;
+  def.gas_density = cloth.gas_density;
   def.ram_pressure = cloth.ram_pressure;
   def.air.density = cloth.air_density;
   def.integrator = cloth.integrator;
@@ -240,6 +274,10 @@ render::Material fabric_look(const std::string& fabric) {
     m.color = {0.035f, 0.035f, 0.04f, 1};
     m.roughness = 0.38f;
     m.fabric = {.weave = none, .sheen = 0, .translucency = 0};
+  } else if (fabric == "balloon") {
+    m.color = {0.62f, 0.03f, 0.04f, 1};
+    m.roughness = 0.18f;
+    m.fabric = {.weave = none, .sheen = 0, .translucency = 0.25f};
   }
   return m;
 }

@@ -20,15 +20,19 @@ inline constexpr std::size_t kMaxClothVertices = 250'000;
 
 /// A cloth in its own frame, and placed in the world.
 struct FlatCloth {
-  sim::ClothDef def;                 ///< without pins, which need the bodies
-  std::vector<Vec3> places;          ///< positions of its vertices in its own frame [m]
-  std::vector<Eigen::Vector2f> uvs;  ///< coordinates along the cloth [m]
+  sim::ClothDef def;         ///< without pins, which need the bodies
+  std::vector<Vec3> places;  ///< positions of its vertices in its own frame, without those of cords [m]
+  std::vector<Eigen::Vector2f> uvs;  ///< coordinates along the cloth, of all vertices [m]
+  std::vector<uint32_t> cord_ends;   ///< last vertices of its cords
 
   std::vector<uint32_t> triangles() const;  ///< three vertices each
 };
 
 /// `model`: that of a mesh, otherwise null. Throws std::invalid_argument for an impossible shape or fabric.
 FlatCloth flat_cloth(const Cloth& cloth, const render::Model* model);
+
+/// Number of vertices of a cloth, without those of cords. `model` as above.
+std::size_t vertex_count(const Cloth& cloth, const render::Model* model);
 
 /// Returns the fabric of a cloth with its changes. Throws std::invalid_argument for an unknown name.
 effects::Fabric fabric_of(const Cloth& cloth);

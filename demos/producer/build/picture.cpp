@@ -93,6 +93,9 @@ Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context
   for (const Spring& spring : scene.springs) add_rod(spring);
   for (const Joint& joint : scene.joints)
     if (joint.behaviour.type == sim::JointType::distance) add_rod(joint);
+  for (const Cloth& cloth : scene.cloths)
+    for (const ClothCord& cord : cloth.cords)
+      for (int i = 0; i < cord.segments; ++i) add_rod(cord);
   for (const Cloth& cloth : scene.cloths) {
     add_cloth(cloth, models);
     ++object;

@@ -175,8 +175,15 @@ Cloth moved(Cloth cloth, const PlacedCopy& copy) {
   cloth.velocity = copy.motion.vector_to_world(cloth.velocity);
   if (auto* grid = std::get_if<GridShape>(&cloth.shape))
     grid->size *= copy.scale;
+  else if (auto* sphere = std::get_if<SphereCloth>(&cloth.shape))
+    sphere->radius *= copy.scale;
   else
     std::get<MeshFile>(cloth.shape).scale *= copy.scale;
+  for (ClothCord& cord : cloth.cords) {
+    cord.from *= copy.scale;
+    cord.to *= copy.scale;
+    cord.length *= copy.scale;
+  }
   return cloth;
 }
 

@@ -284,19 +284,24 @@ void Simulation::add_cloths(const Scene& scene, const ModelLibrary& models) {
     const auto* mesh = std::get_if<MeshFile>(&cloth.shape);
     FlatCloth flat =
         at_place(cloth.where, [&] { return flat_cloth(cloth, mesh ? &models.model(mesh->file) : nullptr); });
-    for (const ClothPin& pin : cloth.pins) {
-      const PinScope& scope = scope_of(pin);
+    const auto pin = [&](const std::string& name, uint32_t vertex, Real until) {
+      const sim::BodyHandle body = body_named(name);
+      const Vec3& p = flat.def.vertices[vertex];
+      flat.def.pins.push_back({.vertex = vertex,
+                               .body = body,
+                               .position = body ? world_.body(body).pose.point_to_body(p) : p,
+                               .until = until});
+    };
+    for (const ClothPin& selection : cloth.pins) {
+      const PinScope& scope = scope_of(selection);
       const std::vector<uint32_t> held =
-          at_place(scope.where, [&] { return pinned_vertices(pin, cloth, flat); });
+          at_place(scope.where, [&] { return pinned_vertices(selection, cloth, flat); });
       if (held.empty()) throw SceneError(scope.where, "selects no vertex of the cloth");
-      const sim::BodyHandle body = body_named(scope.body);
-      for (const uint32_t vertex : held) {
-        const Vec3& p = flat.def.vertices[vertex];
-        flat.def.pins.push_back({.vertex = vertex,
-                                 .body = body,
-                                 .position = body ? world_.body(body).pose.point_to_body(p) : p,
-                                 .until = scope.until});
-      }
+      for (const uint32_t vertex : held) pin(scope.body, vertex, scope.until);
+    }
+    for (std::size_t i = 0; i < cloth.cords.size(); ++i) {
+      const ClothCord& cord = cloth.cords[i];
+      if (cord.held) pin(cord.body, flat.cord_ends[i], cord.until);
     }
     if (const auto what = too_stiff(scene, flat.def)) throw SceneError(cloth.where, *what);
     at_place(cloth.where, [&] { cloths_.push_back({cloth.name, world_.add_cloth(flat.def)}); });
@@ -441,6 +446,12 @@ Snapshot Simulation::snapshot() const {
     const sim::JointState state = world_.joint(rod);
     const Eigen::Vector3f a = state.anchor_a.cast<float>();
     snapshot.rods.push_back({a, state.broken ? a : Eigen::Vector3f(state.anchor_b.cast<float>())});
+  }
+  for (const NamedCloth& cloth : cloths_) {
+    const sim::ClothView view = world_.cloth(cloth.handle);
+    for (const sim::ClothSpring& s : view.springs)
+      if (s.kind == sim::SpringKind::cord)
+        snapshot.rods.push_back({view.points[s.a].cast<float>(), view.points[s.b].cast<float>()});
   }
 
   for (std::size_t i = 0; i < groups_.size(); ++i)

@@ -22,7 +22,8 @@ struct BodySample {
   Eigen::Quaternionf orientation;
 };
 
-/// Ends of a spring, or of a joint that is a rod or rope; both are equal if it does not exist any more.
+/// Ends of a spring, of a joint that is a rod or rope, or of a segment of a cord; both are equal if it does
+/// not exist any more.
 struct RodSample {
   Eigen::Vector3f a, b;
 };
@@ -51,9 +52,9 @@ struct LineSet {
 
 struct Snapshot {
   int frame = 1;
-  double time = 0;                   ///< [s]
-  std::vector<BodySample> bodies;    ///< moving bodies, in scene order
-  std::vector<RodSample> rods;       ///< springs, then distance joints, in scene order
+  double time = 0;                 ///< [s]
+  std::vector<BodySample> bodies;  ///< moving bodies, in scene order
+  std::vector<RodSample> rods;  ///< springs, distance joints, then segments of cloths' cords, in scene order
   std::vector<PointSet> point_sets;  ///< particle groups, then emitters, in scene order
   std::vector<ClothSample> cloths;   ///< in scene order
   std::vector<LineSet> overlays;     ///< in scene order; empty for those that draw no lines

@@ -111,8 +111,10 @@ class FilmParts::Builder {
   void add_rod(const Rod& rod, const char* kind) {
     const std::size_t index = rods_++;
     if (!rod.visible) return;
+    std::string name;
+    if constexpr (requires { rod.name; }) name = rod.name;
     parts_.rods.push_back(
-        {names_(rod.name, kind), index,
+        {names_(name, kind), index,
          mesh({6, to_float(rod.radius)}, [&] { return render::make_cylinder(to_float(rod.radius), 1); }),
          material(rod.material)});
   }
@@ -229,6 +231,9 @@ FilmParts::FilmParts(const Scene& s, const ModelLibrary& models) : scene(s), cam
   for (const Spring& spring : s.springs) builder.add_rod(spring, "spring");
   for (const Joint& joint : s.joints)
     if (joint.behaviour.type == sim::JointType::distance) builder.add_rod(joint, "rod");
+  for (const Cloth& cloth : s.cloths)
+    for (const ClothCord& cord : cloth.cords)
+      for (int i = 0; i < cord.segments; ++i) builder.add_rod(cord, "cord");
   for (std::size_t i = 0; i < s.cloths.size(); ++i) builder.add_cloth(s.cloths[i], i);
 
   std::vector<std::string> set_names;

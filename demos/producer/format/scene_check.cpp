@@ -153,6 +153,9 @@ class Checker {
       check_material_name(spring.where.path + "/material", spring.material);
     for (const Cloth& cloth : scene_.cloths)
       check_material_name(cloth.where.path + "/material", cloth.material);
+    for (const Cloth& cloth : scene_.cloths)
+      for (const ClothCord& cord : cloth.cords)
+        check_material_name(cord.where.path + "/material", cord.material);
     check_materials_of_articulations();
     for (const ParticleGroup& group : scene_.particles) {
       check_look(group.where.path + "/look", group.look);

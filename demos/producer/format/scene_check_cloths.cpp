@@ -22,14 +22,15 @@ class ClothChecker {
     if (!effects::find_fabric(cloth.fabric))
       return fail(path + "/fabric",
                   "there is no fabric '" + cloth.fabric + "'" + suggestion(cloth.fabric, fabric_names()));
-    for (const ClothPin& pin : cloth.pins) check_body(scope_of(pin));
+    for (const ClothPin& pin : cloth.pins) check_body(scope_of(pin).body, scope_of(pin).where);
+    for (const ClothCord& cord : cloth.cords) check_body(cord.body, cord.where);
     if (const auto* mesh = std::get_if<MeshFile>(&cloth.shape)) {
       const std::string wrong = mesh->file.empty() ? "" : folder_.wrong_file(model_file(mesh->file, folder_));
       if (!wrong.empty()) fail(path + "/shape/file", wrong);
       return;
     }
     try {
-      check_grid(cloth, flat_cloth(cloth, nullptr));
+      check_shape(cloth, flat_cloth(cloth, nullptr));
     } catch (const std::invalid_argument& error) {
       fail(path, error.what());
     }
@@ -40,15 +41,14 @@ class ClothChecker {
     findings_.errors.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
   }
 
-  void check_body(const PinScope& pin) {
-    if (pin.body.empty() || std::ranges::find(flat_.bodies, pin.body, &Body::name) != flat_.bodies.end())
-      return;
+  void check_body(const std::string& body, const Where& where) {
+    if (body.empty() || std::ranges::find(flat_.bodies, body, &Body::name) != flat_.bodies.end()) return;
     std::vector<std::string> names;
-    for (const Body& body : flat_.bodies) names.push_back(body.name);
-    fail(pin.where.path + "/body", "there is no body '" + pin.body + "'" + suggestion(pin.body, names));
+    for (const Body& known : flat_.bodies) names.push_back(known.name);
+    fail(where.path + "/body", "there is no body '" + body + "'" + suggestion(body, names));
   }
 
-  void check_grid(const Cloth& cloth, FlatCloth flat) {
+  void check_shape(const Cloth& cloth, FlatCloth flat) {
     for (const ClothPin& pin : cloth.pins) {
       const PinScope& scope = scope_of(pin);
       if (scope.where.path.empty()) continue;  // its type was invalid, and it was not read

@@ -21,10 +21,22 @@ struct Table<GridShape> {
   }
 };
 template <>
+struct Table<SphereCloth> {
+  static constexpr const char* kName = "cloth_sphere";
+  static constexpr const char* kHelp = "A closed sphere around the origin of the cloth's frame.";
+  static Fields<SphereCloth> fields() {
+    return {{"radius", &SphereCloth::radius, "radius", "m", kPositive},
+            {"divisions", &SphereCloth::divisions,
+             "how often the 20 triangles of an icosahedron are divided into four: 3 gives 642 vertices", "",
+             between(0, 6)}};
+  }
+};
+template <>
 struct Tags<ClothShape> {
   static constexpr const char* kName = "cloth_shape";
-  static constexpr const char* kHelp = "The flat cloth: a rectangle, or the triangles of a model file.";
-  static constexpr std::array kTags = {"grid", "mesh"};
+  static constexpr const char* kHelp =
+      "The cloth at rest: a rectangle, the triangles of a model file, or a sphere.";
+  static constexpr std::array kTags = {"grid", "mesh", "sphere"};
   static constexpr bool kRequired = false;
 };
 template <>
@@ -50,6 +62,13 @@ struct Table<FabricChanges> {
          "springs "
          "between second neighbours, which resist sharp folds but hardly a slight curvature"},
         {"damping", &T::damping, "share of the critical damping of a spring", "", between(0, 10)},
+        {"stretch_damping", &T::stretch_damping,
+         "the same of springs along the threads; default of this and the next two keys: `damping`", "",
+         between(0, 10)},
+        {"shear_damping", &T::shear_damping, "the same of springs across the cells", "", between(0, 10)},
+        {"bend_spring_damping", &T::bend_spring_damping,
+         "the same of springs between second neighbours, with the `bend_model` `springs`", "",
+         between(0, 10)},
         {"friction", &T::friction,
          "coefficient of friction against bodies; of cloth and body the geometric mean is used", "",
          kNotNegative},
@@ -163,6 +182,34 @@ struct Tags<ClothSeam> {
   static constexpr bool kRequired = true;
 };
 
+template <>
+struct Table<ClothCord> {
+  static constexpr const char* kName = "cloth_cord";
+  static constexpr const char* kHelp =
+      "A string or spring that hangs on a vertex of a cloth. With one segment it is a spring, which pushes, "
+      "too; with more it is a string. It has mass and collides with bodies.";
+  static Fields<ClothCord> fields() {
+    using T = ClothCord;
+    return {
+        {"from", &T::from, "it begins at the vertex nearest to this point, in the cloth's frame", "m"},
+        {"to", &T::to, "position of its other end at time 0, in the cloth's frame", "m"},
+        {"held", &T::held, "the other end is held at its place in the world or on `body`; false: it is free"},
+        {"body", &T::body, "name of the body that holds the other end; empty: the world"},
+        {"until", &T::until, "time at which the other end is released", "s", kNotNegative},
+        {"length", &T::length,
+         "length at rest; 0: the distance of its ends at time 0. A cord that is longer hangs down between "
+         "its ends",
+         "m", kNotNegative},
+        {"segments", &T::segments, "number of its segments", "", between(1, 1000)},
+        {"stiffness", &T::stiffness, "force at a strain of 1", "N", kPositive},
+        {"mass_per_length", &T::mass_per_length, "mass per length", "kg/m", kPositive},
+        {"damping", &T::damping, "share of the critical damping of a segment", "", between(0, 10)},
+        {"visible", &T::visible, "is drawn"},
+        {"radius", &T::radius, "radius of the drawn cord", "m", kPositive},
+        {"material", &T::material, "name of a material; empty: the default material"}};
+  }
+};
+
 // --- Cloths ---
 
 template <>
@@ -188,6 +235,7 @@ struct Table<Cloth> {
             {"velocity", &T::velocity, "velocity at time 0", "m/s"},
             {"pins", &T::pins, "vertices that are held"},
             {"seams", &T::seams, "vertices that are sewn together"},
+            {"cords", &T::cords, "strings and springs that hang on vertices"},
             {"seam_time", &T::seam_time, "time in which seams close", "s", kPositive},
             {"collides", &T::collides, "takes part in collisions with bodies and particles"},
             {"self_collision", &T::self_collision,
@@ -196,6 +244,14 @@ struct Table<Cloth> {
              "", kNotNegative},
             {"pressure", &T::pressure,
              "pressure inside a closed cloth above that of the air, at the initial volume", "Pa"},
+            {"inflate_time", &T::inflate_time,
+             "time in which the gas of `pressure` is let in, at a constant rate; 0: it is there from the "
+             "start",
+             "s", kNotNegative},
+            {"gas_density", &T::gas_density,
+             "density of the gas of `pressure`, which causes buoyancy: helium has 0.17, hydrogen 0.084; "
+             "default: `air_density`",
+             "kg/m^3", kNotNegative},
             {"ram_pressure", &T::ram_pressure,
              "share of the stagnation pressure of the air at the mouth of an open cloth that builds up "
              "inside: about 1 for a parachute",

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "producer/base/interrupt.h"
+#include "producer/build/cloth_defs.h"
 #include "producer/build/picture.h"
 #include "producer/format/scene_check_particles.h"
 #include "render/context.h"
@@ -130,12 +131,8 @@ class CostTable {
 
   void add_cloth(const Cloth& cloth) {
     ObjectCost& cost = entry(cloth.where, "cloth", cloth.name);
-    std::size_t vertices = 0;
-    if (const auto* grid = std::get_if<GridShape>(&cloth.shape))
-      vertices =
-          static_cast<std::size_t>(grid->cells.x() + 1) * static_cast<std::size_t>(grid->cells.y() + 1);
-    else
-      vertices = models_.model(std::get<MeshFile>(cloth.shape).file).vertex_count();
+    const auto* mesh = std::get_if<MeshFile>(&cloth.shape);
+    const std::size_t vertices = vertex_count(cloth, mesh ? &models_.model(mesh->file) : nullptr);
     const double step = std::min(cloth.substep, scene_.world.step);
     cost.size = fmt::format("{} vertices, steps of {:.2g} ms", with_spaces(vertices), 1e3 * step);
     cost.simulation_s +=

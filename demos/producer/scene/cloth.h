@@ -20,12 +20,17 @@ struct GridShape {
   Eigen::Vector2d size = {1, 1};
   Eigen::Vector2i cells = {40, 40};
 };
-using ClothShape = std::variant<GridShape, MeshFile>;
+/// A closed sphere around the origin of the cloth's frame.
+struct SphereCloth {
+  Real radius = 0.1;
+  int divisions = 3;  ///< of the triangles of an icosahedron into four
+};
+using ClothShape = std::variant<GridShape, MeshFile, SphereCloth>;
 
 /// Values that replace those of the cloth's fabric.
 struct FabricChanges {
   std::optional<Real> areal_density, stretch, shear, bend, damping, friction, self_friction, thickness, drag,
-      lift, max_stretch, max_shear, bend_damping;
+      lift, max_stretch, max_shear, bend_damping, stretch_damping, shear_damping, bend_spring_damping;
   std::optional<effects::BendModel> bend_model;
 };
 
@@ -68,6 +73,22 @@ struct PointSeam {
 };
 using ClothSeam = std::variant<SideSeam, PointSeam>;
 
+/// A cord that hangs on the vertex nearest to a point. Points are in the cloth's frame.
+struct ClothCord {
+  Where where;
+  Vec3 from = Vec3::Zero();
+  Vec3 to = Vec3(0, -1, 0);  ///< where its other end is at time 0
+  bool held = true;          ///< that end stays there, or at its place on the body
+  std::string body;
+  Real until = 1e30;
+  Real length = 0;
+  int segments = 10;
+  Real stiffness = 50, mass_per_length = 0.002, damping = 0.1;
+  bool visible = true;
+  Real radius = 0.002;  ///< of the drawn cord
+  std::string material;
+};
+
 struct Cloth {
   Where where;
   std::string name;
@@ -80,12 +101,15 @@ struct Cloth {
   Vec3 velocity = Vec3::Zero();
   std::vector<ClothPin> pins;
   std::vector<ClothSeam> seams;
+  std::vector<ClothCord> cords;
   Real seam_time = 1;
   bool collides = true;
   bool self_collision = true;
   Real tear = 0;
   Real pressure = 0, ram_pressure = 0;
+  Real inflate_time = 0;
   Real air_density = 1.2;
+  std::optional<Real> gas_density;
   sim::ClothIntegrator integrator = sim::ClothIntegrator::relaxed;
   Real substep = 1.0 / 960;
   bool soften = false;
