@@ -8,8 +8,7 @@ namespace offstage::render {
 namespace {
 
 // Texture units of shaders/traced.glsl.
-constexpr GLuint kDirectUnit = 8, kAroundUnit = 10, kAroundNormalsUnit = 11, kMirroredUnit = 18,
-                 kHighlightsUnit = 19;
+constexpr GLuint kArrivingUnit = 8, kLampsUnit = 10, kMirroredUnit = 18, kHighlightsUnit = 19;
 
 void write_texture(const gl::Texture& texture, GLuint unit, int width_px, int height_px,
                    const std::vector<Vector4f>& values) {
@@ -24,9 +23,7 @@ LightPass::LightPass(int width_px, int height_px, const gl::Texture& depth)
       places_(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)),
       normals_(gl::make_target(GL_RGBA16, width_px, height_px, GL_NEAREST)),
       framebuffer_(gl::make_framebuffer(places_, depth)),
-      direct_(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)),
-      around_(gl::make_target(GL_RGBA32F, (width_px + 1) / 2, (height_px + 1) / 2, GL_NEAREST)),
-      around_normals_(gl::make_target(GL_RGBA32F, (width_px + 1) / 2, (height_px + 1) / 2, GL_NEAREST)),
+      arriving_(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)),
       mirrored_(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)) {
   glNamedFramebufferTexture(framebuffer_, GL_COLOR_ATTACHMENT1, normals_, 0);
   const std::array<GLenum, 2> both = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
@@ -55,16 +52,22 @@ void LightPass::trace(const LightSources& sources, const View& view, const Sampl
   glReadPixels(0, 0, width, height, GL_RGBA, GL_UNSIGNED_SHORT, surfaces_.normals.data());
   glReadBuffer(GL_COLOR_ATTACHMENT0);
   const float pixel_m = 2 * view.tan_half.y() / static_cast<float>(height);
-  LightTracer(scene_, sources).trace(surfaces_, view.eye, view.forward, pixel_m, offsets, light_);
-  write_texture(direct_, kDirectUnit, width, height, light_.direct);
-  write_texture(mirrored_, kMirroredUnit, width, height, light_.mirrored);
-  if (!light_.highlights.empty()) {
-    if (highlights_ == 0) highlights_ = gl::make_target(GL_RGBA32F, width, height, GL_NEAREST);
-    write_texture(highlights_, kHighlightsUnit, width, height, light_.highlights);
+  LightTracer(scene_, sources).trace(surfaces_, {view.eye, pixel_m, offsets}, light_);
+  write_texture(arriving_, kArrivingUnit, width, height, light_.arriving);
+  if (light_.has_mirrors) {
+    write_texture(mirrored_, kMirroredUnit, width, height, light_.mirrored);
+  } else if (mirrored_is_filled_) {
+    glClearTexImage(mirrored_, 0, GL_RGBA, GL_FLOAT, nullptr);
+    glBindTextureUnit(kMirroredUnit, mirrored_);
   }
-  const int half_width = light_.half_width(), half_height = light_.half_height();
-  write_texture(around_, kAroundUnit, half_width, half_height, light_.around);
-  write_texture(around_normals_, kAroundNormalsUnit, half_width, half_height, light_.around_normals);
+  mirrored_is_filled_ = light_.has_mirrors;
+  if (light_.lamps.empty()) return;
+  if (lamps_ == 0) {
+    lamps_ = gl::make_target(GL_RGBA32F, width, height, GL_NEAREST);
+    highlights_ = gl::make_target(GL_RGBA32F, width, height, GL_NEAREST);
+  }
+  write_texture(lamps_, kLampsUnit, width, height, light_.lamps);
+  write_texture(highlights_, kHighlightsUnit, width, height, light_.highlights);
 }
 
 }  // namespace offstage::render

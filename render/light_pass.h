@@ -28,8 +28,9 @@ class LightPass {
   LightBuffer light_;
   gl::Texture places_, normals_;
   gl::Framebuffer framebuffer_;
-  gl::Texture direct_, around_, around_normals_, mirrored_;
-  gl::Texture highlights_;  ///< created when there are lamps
+  gl::Texture arriving_, mirrored_;
+  bool mirrored_is_filled_ = true;  ///< with anything but zeros
+  gl::Texture lamps_, highlights_;  ///< created when there are lamps
 };
 
 }  // namespace offstage::render

@@ -7,10 +7,11 @@
 
 #include <tbb/parallel_for.h>
 
+#include "render/lanes.h"
+
 namespace offstage::render {
 namespace {
 
-constexpr int kLanes = 8;  // lanes of a vector register
 constexpr int kTileWidth_px = 64, kTileHeight_px = 16;
 constexpr int kTilePixels = kTileWidth_px * kTileHeight_px;
 constexpr float kHidden = 1.0f / 512;  // below this share the background counts as hidden
@@ -36,15 +37,6 @@ TileRange tiles_of(const S& s, int nx, int ny) {
           std::min(tile(s.y + s.half_y, kTileHeight_px, ny) + 1, ny)};
 }
 
-typedef float Lanes __attribute__((vector_size(4 * kLanes)));
-typedef int32_t IntLanes __attribute__((vector_size(4 * kLanes)));
-
-inline Lanes clamped_to(Lanes x, float low, float high) {
-  const Lanes least = Lanes{} + low, most = Lanes{} + high;
-  x = x > least ? x : least;
-  return x < most ? x : most;
-}
-
 inline Lanes byte_of(IntLanes texel, int shift) {
   return __builtin_convertvector((texel >> shift) & 255, Lanes);
 }
@@ -60,10 +52,6 @@ inline IntLanes texels_at(const Splat& s, float dx, float dy) {
   IntLanes texel;
   for (int i = 0; i < kLanes; ++i) texel[i] = static_cast<int32_t>(s.cell.texels[index[i]]);
   return texel;
-}
-
-inline Lanes square_root(Lanes x) {
-  return __builtin_ia32_sqrtps256(x);
 }
 
 inline Lanes& lanes_of(std::array<float, kTilePixels>& plane, std::size_t at) {

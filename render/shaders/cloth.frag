@@ -54,9 +54,9 @@ void main() {
   // Only the side that faces the sun can be in shadow.
   float towards_sun = dot(n, frame.sun_direction.xyz) < 0.0 ? -1.0 : 1.0;
   vec3 lit = position + normal.xyz * (abs(normal.w) * towards_sun * side - normal.w);
-  Light light = Light(sun_visibility(lit, n * towards_sun), ambient(relief) * (open / (1.0 - s.albedo * (0.8 * (1.0 - open)))), open, vec4(0.0));
+  Light light = Light(sun_visibility(lit, n * towards_sun), ambient(relief) * (open / (1.0 - s.albedo * (0.8 * (1.0 - open)))), vec3(0.0), open, vec4(0.0));
 #else
-  Light light = traced_light(relief, n, 1.0 / gl_FragCoord.w);
+  Light light = traced_light(relief, n);
 #endif
   vec3 radiance = shade_fabric(s, through, relief, view, light);
 #ifdef LAMPS

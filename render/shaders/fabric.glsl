@@ -70,8 +70,8 @@ vec3 shade_fabric(Surface s, vec3 through, vec3 normal, vec3 view, Light light) 
              nl * (lobe * fresnel + sheen * sheen_sun);
 
   vec3 reflectance = sky_reflectance(f0, s.roughness, nv);
-  vec3 above = light.around, below = ambient(-normal) * light.open;
-  vec3 mirrored = mix(sky_reflection(reflect(-view, normal), s.roughness) * light.open, light.mirrored.rgb, light.mirrored.w);
+  vec3 above = light.around + light.lamps, below = ambient(-normal) * light.open;
+  vec3 mirrored = reflected_light(view, normal, s.roughness, light);
   vec3 sky = diffuse * (1.0 - reflectance) * (1.0 - share) * above + through * share * below + mirrored * reflectance +
              sheen * sheen_sky * above;
   return frame.sun_radiance.rgb * light.sun * sun + sky + s.emission;

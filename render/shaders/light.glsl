@@ -116,10 +116,19 @@ vec3 sky_reflectance(vec3 f0, float roughness, float nv) {
 // Light that arrives at a surface.
 struct Light {
   float sun;      // share of the sun that is visible
-  vec3 around;    // radiance of a white surface in all other light
+  vec3 around;    // radiance of a white surface in the light of the sky and of other surfaces
+  vec3 lamps;     // radiance of a white surface in the light of lamps
   float open;     // share of the sky's light that arrives
   vec4 mirrored;  // light from the mirrored direction; w: 1 if known, else the sky is mirrored
 };
+
+// Light from the mirrored direction. A rough surface, whose mirror image was not traced, reflects the sky as far as it is
+// open, and the rougher it is, the more of all the light around.
+vec3 reflected_light(vec3 view, vec3 normal, float roughness, Light light) {
+  float nv = max(abs(dot(normal, view)), 1e-3), open = saturate((nv + light.open) * (nv + light.open) - 1.0 + light.open);
+  vec3 sky = mix(sky_reflection(reflect(-view, normal), roughness) * open, light.around, roughness * roughness);
+  return mix(sky, light.mirrored.rgb, light.mirrored.w);
+}
 
 // Light of sun and sky that a surface reflects to the eye; `view` points to the eye.
 vec3 shade(Surface s, vec3 normal, vec3 view, Light light) {
@@ -135,6 +144,6 @@ vec3 shade(Surface s, vec3 normal, vec3 view, Light light) {
   vec3 sun = frame.sun_radiance.rgb * (nl * light.sun) * (diffuse * (1.0 - fresnel) + lobe * fresnel);
 
   vec3 reflectance = sky_reflectance(f0, s.roughness, nv);
-  vec3 mirrored = sky_reflection(reflect(-view, normal), s.roughness) * saturate((nv + light.open) * (nv + light.open) - 1.0 + light.open);
-  return sun + light.around * diffuse * (1.0 - reflectance) + mix(mirrored, light.mirrored.rgb, light.mirrored.w) * reflectance + s.emission;
+  vec3 mirrored = reflected_light(view, normal, s.roughness, light);
+  return sun + (light.around + light.lamps) * diffuse * (1.0 - reflectance) + mirrored * reflectance + s.emission;
 }

@@ -60,12 +60,12 @@ vec3 with_layers(vec3 radiance, vec3 n, vec3 smooth_normal, vec3 view, Light lig
   float grazing = 1.0 - nv, sheen_sky = 0.03 + 0.45 * grazing * grazing * grazing;
   float sin2 = 1.0 - nh * nh, sheen_sun = 0.75 * sin2 * sin2 / (nl + nv - nl * nv);
   radiance = radiance * (1.0 - max(sheen.r, max(sheen.g, sheen.b)) * sheen_sky) +
-             sheen * (sun * (nl * sheen_sun) + light.around * sheen_sky);
+             sheen * (sun * (nl * sheen_sun) + (light.around + light.lamps) * sheen_sky);
   n = smooth_normal;
   nl = saturate(dot(n, l)), nv = max(abs(dot(n, view)), 1e-3), nh = saturate(dot(n, h));
   float rough = material.coat.y, through = 1.0 - material.coat.x * fresnel_at(vec3(0.04), nv).r;
   vec3 coat = sun * (nl * sun_lobe(sun_roughness(rough), nl, nv, nh) * fresnel_at(vec3(0.04), saturate(dot(view, h))).r) +
-              mix(sky_reflection(reflect(-view, n), rough) * light.open, light.mirrored.rgb, light.mirrored.w) * sky_reflectance(vec3(0.04), rough, nv);
+              reflected_light(view, n, rough, light) * sky_reflectance(vec3(0.04), rough, nv);
   return radiance * through + material.coat.x * coat;
 }
 #endif
@@ -117,7 +117,7 @@ void main() {
   if (min_alpha > 0.5) alpha = 1.0;  // the opaque pass leaves no holes
   s.roughness = filtered_roughness(s.roughness, n);
 #ifdef SURFACE
-  float mirror = s.roughness < 0.3 || s.metallic > 0.5 ? 2.0 : 0.0;
+  float mirror = s.metallic > 0.5 ? 10.0 : s.roughness < 0.3 ? 2.0 : 0.0;
   write_surface(position, n, cross(dFdx(position), dFdy(position)), view, s.roughness + mirror);
 #else
 #ifdef ENDLESS
@@ -130,11 +130,12 @@ void main() {
   s.albedo *= 1.0 - transmitted;
 #endif
 #ifdef TRACED
-  Light light = traced_light(n, smooth_normal, 1.0 / gl_FragCoord.w);
+  Light light = traced_light(n, smooth_normal);
 #else
-  Light light = Light(sun_visibility(position, smooth_normal), ambient(n), 1.0, vec4(0.0));
+  Light light = Light(sun_visibility(position, smooth_normal), ambient(n), vec3(0.0), 1.0, vec4(0.0));
 #endif
   light.around *= occlusion;
+  light.lamps *= occlusion;
   light.open *= occlusion;
   vec3 radiance = shade(s, n, view, light);
 #ifdef LAMPS

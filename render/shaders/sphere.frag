@@ -20,13 +20,13 @@ void main() {
   vec4 clip = uniforms.clip_from_world * vec4(hit, 1.0);
   gl_FragDepth = clip.z / clip.w;
 #ifdef SURFACE
-  float mirror = surface.y < 0.3 || surface.x > 0.5 ? 2.0 : 0.0;
+  float mirror = surface.x > 0.5 ? 10.0 : surface.y < 0.3 ? 2.0 : 0.0;
   write_surface(hit, n, n, -ray, surface.y + mirror);
 #else
   vec3 radiance = color.rgb;
   if (style.z != 0.0) {
     Surface s = Surface(color.rgb, surface.y, surface.x, vec3(0.0));
-    radiance = shade(s, n, -ray, traced_light(n, n, clip.w));
+    radiance = shade(s, n, -ray, traced_light(n, n));
 #ifdef LAMPS
     radiance += traced_highlight(mix(vec3(0.04), s.albedo, s.metallic));
 #endif

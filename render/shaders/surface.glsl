@@ -1,5 +1,5 @@
 // Writes a visible surface for the tracer of light, in place of its colour.
-layout(location = 0) out vec4 surface_place;    // position; w: roughness, + 2 if it mirrors, + 4 on cloth
+layout(location = 0) out vec4 surface_place;    // position; w: roughness, + 2 if it mirrors, + 4 on cloth, + 8 if it is metal
 layout(location = 1) out vec4 surface_normals;  // smooth normal, normal of the triangle
 
 vec2 octahedral(vec3 n) {

@@ -1,6 +1,8 @@
 #pragma once
 /// Private: Embree 3 (Debian 12) or 4 (Debian 13, Ubuntu 24.04) behind the same calls.
 
+#include <array>
+
 #if __has_include(<embree4/rtcore.h>)
 #include <embree4/rtcore.h>
 #else
@@ -9,12 +11,21 @@
 
 namespace offstage::render::embree {
 
+using Valid = std::array<int, 8>;  ///< -1 for rays that are traced, aligned to 32 bytes
+
 #if RTC_VERSION_MAJOR >= 4
 inline void intersect(RTCScene scene, RTCRayHit& ray) {
   rtcIntersect1(scene, &ray);
 }
 inline void occluded(RTCScene scene, RTCRay& ray) {
   rtcOccluded1(scene, &ray);
+}
+/// For rays that are close to each other.
+inline void occluded(RTCScene scene, const Valid& valid, RTCRay8& rays) {
+  RTCOccludedArguments arguments;
+  rtcInitOccludedArguments(&arguments);
+  arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+  rtcOccluded8(valid.data(), scene, &rays, &arguments);
 }
 #else
 inline void intersect(RTCScene scene, RTCRayHit& ray) {
@@ -26,6 +37,12 @@ inline void occluded(RTCScene scene, RTCRay& ray) {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcOccluded1(scene, &context, &ray);
+}
+inline void occluded(RTCScene scene, const Valid& valid, RTCRay8& rays) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  rtcOccluded8(valid.data(), scene, &context, &rays);
 }
 #endif
 

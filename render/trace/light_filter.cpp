@@ -14,141 +14,207 @@ constexpr int kRowsPerFilterTask = 16;
 constexpr float kShareOfReach = 0.3f;  // of the mean distance around, over which light is taken as even
 constexpr int kRun = 32;               // pixels that are averaged together
 
+void for_filter_rows(int height_px, const auto& each) {
+  tbb::parallel_for(tbb::blocked_range<int>(0, height_px, kRowsPerFilterTask), [&](const auto& rows) {
+    for (int y = rows.begin(); y < rows.end(); ++y) each(y);
+  });
+}
+
+LaneVectors lanes_of(const auto& planes, int x, int y) {
+  return {planes[0].lanes(x, y), planes[1].lanes(x, y), planes[2].lanes(x, y)};
+}
+
 }  // namespace
 
-LightFilter::LightFilter(int width_px, int height_px)
-    : width_(width_px),
-      height_(height_px),
-      stride_(width_px + 2 * kMargin),
-      runs_((width_px + kRun - 1) / kRun) {
-  run_values_.resize(static_cast<std::size_t>(runs_) * static_cast<std::size_t>(height_));
-  const auto size = static_cast<std::size_t>(stride_) * static_cast<std::size_t>(height_);
-  for (Plane& plane : place_) plane.resize(size);
-  for (Plane& plane : normal_) plane.resize(size);
-  for (Plane* plane : {&filled_, &inverse_size2_, &reach2_, &mean_reach2_}) plane->resize(size);
-  for (Plane& plane : values_) plane.resize(size);
-  for (Plane& plane : next_) plane.resize(size);
+LightGuide::LightGuide(int width, int height)
+    : width_px(width),
+      height_px(height),
+      place{LightPlane(width, height), LightPlane(width, height), LightPlane(width, height)},
+      normal{LightPlane(width, height), LightPlane(width, height), LightPlane(width, height)},
+      filled(width, height),
+      inverse_size2(width, height) {}
+
+void LightGuide::find_reach(const LightPlane& inverse_distance, LightPlane& reach2) const {
+  for_filter_rows(height_px, [&](int y) {
+    for (int x = 0; x < width_px; ++x) {
+      float sum = 0, count = 0;
+      for (int row = std::max(y - 2, 0); row <= std::min(y + 2, height_px - 1); ++row) {
+        const float* inverse = inverse_distance.at(x, row);
+        const float* present = filled.at(x, row);
+        for (int dx = -2; dx <= 2; ++dx) {
+          sum += inverse[dx] * present[dx];
+          count += present[dx];
+        }
+      }
+      const float mean = sum / std::max(count, 1.0f);
+      *reach2.at(x, y) = mean * mean / (kShareOfReach * kShareOfReach);
+    }
+  });
 }
 
-void LightFilter::set(int x, int y, const Eigen::Vector3f& place, const Eigen::Vector3f& normal,
-                      float pixel_size_m, const Eigen::Vector4f& values, float inverse_reach) {
-  const std::size_t k = at(x, y);
-  for (std::size_t i = 0; i < 3; ++i) {
-    place_[i][k] = place[static_cast<int>(i)];
-    normal_[i][k] = normal[static_cast<int>(i)];
+LightValues::LightValues(int width_px, int height_px, std::size_t channels)
+    : values_(channels, LightPlane(width_px, height_px)), next_(channels, LightPlane(width_px, height_px)) {}
+
+/// One step of the filter.
+class LightValues::Averaging {
+ public:
+  Averaging(LightValues& light, const LightGuide& guide, const LightPlane& filled, const LightPlane* reach2,
+            int step)
+      : light_(light),
+        guide_(guide),
+        filled_(filled),
+        reach2_(reach2),
+        step_(step),
+        runs_((guide.width_px + kRun - 1) / kRun),
+        channels_(light.channels().size()) {
+    light_.even_.resize(static_cast<std::size_t>(runs_ * guide.height_px) * channels_);
   }
-  filled_[k] = 1;
-  inverse_size2_[k] = 1 / std::max(pixel_size_m * pixel_size_m, 1e-20f);
-  reach2_[k] = inverse_reach;
-  set_values(x, y, values);
+
+  void find_even_runs(int y);
+  void average_row(int y);
+
+ private:
+  float* even(int run, int y) { return &light_.even_[static_cast<std::size_t>(y * runs_ + run) * channels_]; }
+  bool is_even(int run, int y);
+  void average_run(int x0, int y, int length);
+  template <std::size_t kChannels>
+  void average_lanes(int x, int y);
+
+  LightValues& light_;
+  const LightGuide& guide_;
+  const LightPlane& filled_;
+  const LightPlane* reach2_;
+  int step_, runs_;
+  std::size_t channels_;
+};
+
+void LightValues::Averaging::find_even_runs(int y) {
+  for (int run = 0; run < runs_; ++run) {
+    const auto length = static_cast<std::size_t>(std::min(kRun, guide_.width_px - run * kRun));
+    for (std::size_t i = 0; i < channels_; ++i) {
+      const float* values = light_.values_[i].at(run * kRun, y);
+      std::size_t equal = 0;
+      for (std::size_t x = 0; x < length; ++x) equal += values[x] == values[0] ? 1 : 0;
+      even(run, y)[i] = equal == length ? values[0] : std::numeric_limits<float>::quiet_NaN();
+    }
+  }
 }
 
-void LightFilter::smooth_reach() {
-  tbb::parallel_for(tbb::blocked_range<int>(0, height_, kRowsPerFilterTask), [&](const auto& rows) {
-    for (int y = rows.begin(); y < rows.end(); ++y)
-      for (int x = 0; x < width_; ++x) {
-        float sum = 0, count = 0;
-        for (int dy = -2; dy <= 2; ++dy) {
-          const int row = y + dy;
-          if (row < 0 || row >= height_) continue;
-          const float* reach = &reach2_[at(x, row)];
-          const float* filled = &filled_[at(x, row)];
-          for (int dx = -2; dx <= 2; ++dx) {
-            sum += reach[dx] * filled[dx];
-            count += filled[dx];
-          }
-        }
-        const float inverse = sum / std::max(count, 1.0f);
-        mean_reach2_[at(x, y)] = inverse * inverse / (kShareOfReach * kShareOfReach);
-      }
-  });
-  reach2_.swap(mean_reach2_);
-}
-
-void LightFilter::find_even_runs(std::size_t channels) {
-  tbb::parallel_for(tbb::blocked_range<int>(0, height_, kRowsPerFilterTask), [&](const auto& rows) {
-    for (int y = rows.begin(); y < rows.end(); ++y)
-      for (int run = 0; run < runs_; ++run) {
-        const auto count = static_cast<std::size_t>(std::min(kRun, width_ - run * kRun));
-        Eigen::Vector4f value = Eigen::Vector4f::Zero();
-        for (std::size_t i = 0; i < channels; ++i) {
-          const float* values = &values_[i][at(run * kRun, y)];
-          std::size_t equal = 0;
-          for (std::size_t x = 0; x < count; ++x) equal += values[x] == values[0] ? 1 : 0;
-          value[static_cast<int>(i)] = equal == count ? values[0] : std::numeric_limits<float>::quiet_NaN();
-        }
-        run_values_[static_cast<std::size_t>(y) * static_cast<std::size_t>(runs_) +
-                    static_cast<std::size_t>(run)] = value;
-      }
-  });
-}
-
-bool LightFilter::is_even(int run, int y, int step) const {
-  const auto value = [&](int r, int row) -> const Eigen::Vector4f& {
-    return run_values_[static_cast<std::size_t>(row) * static_cast<std::size_t>(runs_) +
-                       static_cast<std::size_t>(r)];
-  };
-  const Eigen::Vector4f& here = value(run, y);
-  for (int row = std::max(y - step, y % step); row <= std::min(y + step, height_ - 1); row += step)
+bool LightValues::Averaging::is_even(int run, int y) {
+  const float* here = even(run, y);
+  for (int row = std::max(y - step_, y % step_); row <= std::min(y + step_, guide_.height_px - 1);
+       row += step_)
     for (int r = std::max(run - 1, 0); r <= std::min(run + 1, runs_ - 1); ++r)
-      if (value(r, row) != here) return false;  // not a number differs from everything
+      if (!std::equal(here, here + channels_, even(r, row))) return false;  // NaN differs from everything
   return true;
 }
 
-void LightFilter::average_run(int x0, int y, int step, int count, std::size_t channels) {
-  std::array<float, kRun> sum_of_weights{}, weights;
-  std::array<std::array<float, kRun>, 4> sums{};
-  const auto length = static_cast<std::size_t>(count);
-  const std::size_t here = at(x0, y);
-  const float *px = &place_[0][here], *py = &place_[1][here], *pz = &place_[2][here];
-  const float *nx = &normal_[0][here], *ny = &normal_[1][here], *nz = &normal_[2][here];
-  const float *size2 = &inverse_size2_[here], *reach2 = &reach2_[here];
-  for (int dy = -1; dy <= 1; ++dy) {
-    const int row = y + dy * step;
-    if (row < 0 || row >= height_) continue;
-    for (int dx = -1; dx <= 1; ++dx) {
-      const float kernel = (dx == 0 ? 2.0f : 1.0f) * (dy == 0 ? 2.0f : 1.0f);
-      const std::size_t there = at(x0 + dx * step, row);
-      const float *qx = &place_[0][there], *qy = &place_[1][there], *qz = &place_[2][there];
-      const float *mx = &normal_[0][there], *my = &normal_[1][there], *mz = &normal_[2][there];
-      const float* filled = &filled_[there];
-      for (std::size_t x = 0; x < length; ++x) {
-        const float wx = qx[x] - px[x], wy = qy[x] - py[x], wz = qz[x] - pz[x];
-        const float off = wx * nx[x] + wy * ny[x] + wz * nz[x];
-        const float distance2 = wx * wx + wy * wy + wz * wz;
-        const float facing = std::max(nx[x] * mx[x] + ny[x] * my[x] + nz[x] * mz[x], 0.0f);
-        const float f2 = facing * facing, f4 = f2 * f2, f8 = f4 * f4;
-        const float apart = 1 + off * off * size2[x], far = 1 + distance2 * reach2[x];
-        weights[x] = kernel * filled[x] * f8 * f8 / (apart * apart * far * far);
-        sum_of_weights[x] += weights[x];
-      }
-      for (std::size_t i = 0; i < channels; ++i) {
-        const float* values = &values_[i][there];
-        for (std::size_t x = 0; x < length; ++x) sums[i][x] += weights[x] * values[x];
-      }
+// For eight pixels from x on.
+template <std::size_t kChannels>
+void LightValues::Averaging::average_lanes(int x, int y) {
+  const LaneVectors p = lanes_of(guide_.place, x, y), n = lanes_of(guide_.normal, x, y);
+  const Lanes size2 = guide_.inverse_size2.lanes(x, y);
+  const Lanes reach2 = reach2_ ? reach2_->lanes(x, y) : Lanes{};
+  Lanes sum_of_weights{};
+  std::array<Lanes, kChannels> sums{};
+  for (int row = y - step_; row <= y + step_; row += step_) {
+    if (row < 0 || row >= guide_.height_px) continue;
+    for (int there = x - step_; there <= x + step_; there += step_) {
+      const LaneVectors way = lanes_of(guide_.place, there, row) - p;
+      const Lanes off = dot(way, n), facing = larger(dot(n, lanes_of(guide_.normal, there, row)), Lanes{});
+      const Lanes f2 = facing * facing, f4 = f2 * f2, f8 = f4 * f4;
+      const Lanes spread = (1 + off * off * size2) * (1 + dot(way, way) * reach2);
+      const float kernel = (there == x ? 2.0f : 1.0f) * (row == y ? 2.0f : 1.0f);
+      const Lanes weight = kernel * filled_.lanes(there, row) * f8 * f8 / (spread * spread);
+      sum_of_weights += weight;
+      for (std::size_t i = 0; i < kChannels; ++i) sums[i] += weight * light_.values_[i].lanes(there, row);
     }
   }
-  for (std::size_t i = 0; i < channels; ++i) {
-    float* target = &next_[i][here];
-    for (std::size_t x = 0; x < length; ++x) target[x] = sums[i][x] / std::max(sum_of_weights[x], 1e-20f);
+  const IntLanes filled = filled_.lanes(x, y) > 0.0f;
+  const Lanes scale = 1 / larger(sum_of_weights, Lanes{} + 1e-20f);
+  for (std::size_t i = 0; i < kChannels; ++i) {
+    const Lanes mean = sums[i] * scale;
+    light_.next_[i].set_lanes(x, y, filled ? mean : light_.values_[i].lanes(x, y));
   }
 }
 
-void LightFilter::average(int step, std::size_t channels) {
-  find_even_runs(channels);
-  tbb::parallel_for(tbb::blocked_range<int>(0, height_, kRowsPerFilterTask), [&](const auto& rows) {
-    for (int y = rows.begin(); y < rows.end(); ++y)
-      for (int run = 0; run < runs_; ++run) {
-        const int x = run * kRun, count = std::min(kRun, width_ - x);
-        if (!is_even(run, y, step)) {
-          average_run(x, y, step, count, channels);
-          continue;
-        }
-        for (std::size_t i = 0; i < channels; ++i)
-          std::copy_n(&values_[i][at(x, y)], count, &next_[i][at(x, y)]);
+void LightValues::Averaging::average_run(int x0, int y, int length) {
+  for (int x = x0; x < x0 + length; x += kLanes) {
+    if (channels_ == 1)
+      average_lanes<1>(x, y);
+    else if (channels_ == 3)
+      average_lanes<3>(x, y);
+    else
+      average_lanes<4>(x, y);
+  }
+}
+
+void LightValues::Averaging::average_row(int y) {
+  for (int run = 0; run < runs_; ++run) {
+    const int x = run * kRun;
+    const int length = std::min(kRun, guide_.width_px - x);
+    if (!is_even(run, y)) {
+      average_run(x, y, length);
+      continue;
+    }
+    for (std::size_t i = 0; i < channels_; ++i)
+      std::copy_n(light_.values_[i].at(x, y), length, light_.next_[i].at(x, y));
+  }
+}
+
+void LightValues::average(const LightGuide& guide, const LightPlane& filled, const LightPlane* reach2,
+                          int step) {
+  Averaging averaging(*this, guide, filled, reach2, step);
+  for_filter_rows(guide.height_px, [&](int y) { averaging.find_even_runs(y); });
+  for_filter_rows(guide.height_px, [&](int y) { averaging.average_row(y); });
+  values_.swap(next_);
+}
+
+namespace {
+
+/// The pixels 2c and 2c + 1 of 16 pixels, for eight columns c.
+Lanes even_pixels(const float* pixels) {
+  Lanes a, b;
+  __builtin_memcpy(&a, pixels, sizeof(a));
+  __builtin_memcpy(&b, pixels + kLanes, sizeof(b));
+  return __builtin_shufflevector(a, b, 0, 2, 4, 6, 8, 10, 12, 14);
+}
+
+}  // namespace
+
+// A coarse pixel c lies between the fine ones 2c and 2c + 1. For each of the two, eight at a time, the
+// nearest coarse pixels are c and its neighbour on that side.
+void interpolate(const LightGuide& fine, const LightGuide& coarse, int y, const CoarseValues& from,
+                 const LightPlane* fourth, Eigen::Vector4f* row) {
+  const int near_row = y / 2, far_row = std::clamp(near_row + (y % 2 == 0 ? -1 : 1), 0, coarse.height_px - 1);
+  for (int x0 = 0; x0 < fine.width_px; x0 += 2 * kLanes) {
+    for (int side = 0; side < 2; ++side) {
+      LaneVectors p, n;
+      p = {even_pixels(fine.place[0].at(x0 + side, y)), even_pixels(fine.place[1].at(x0 + side, y)),
+           even_pixels(fine.place[2].at(x0 + side, y))};
+      n = {even_pixels(fine.normal[0].at(x0 + side, y)), even_pixels(fine.normal[1].at(x0 + side, y)),
+           even_pixels(fine.normal[2].at(x0 + side, y))};
+      const Lanes size2 = even_pixels(fine.inverse_size2.at(x0 + side, y));
+      Lanes sum_of_weights{};
+      LaneVectors sum{};
+      for (int k = 0; k < 4; ++k) {
+        const int there = x0 / 2 + (k & 1) * (side == 0 ? -1 : 1), q = k < 2 ? near_row : far_row;
+        const float share = ((k & 1) == 0 ? 0.75f : 0.25f) * (k < 2 ? 0.75f : 0.25f) + 0.002f;
+        const LaneVectors way = lanes_of(coarse.place, there, q) - p, m = lanes_of(coarse.normal, there, q);
+        const Lanes off = dot(way, n), facing = larger(dot(n, m), Lanes{});
+        const Lanes f2 = facing * facing, apart = 1 + off * off * size2;
+        const Lanes weight = share * from.filled->lanes(there, q) * (f2 * f2 + 1e-4f) / (apart * apart);
+        sum_of_weights += weight;
+        sum = sum + lanes_of(from.values->channels(), there, q) * weight;
       }
-  });
-  for (std::size_t i = 0; i < channels; ++i) values_[i].swap(next_[i]);
+      sum = sum * (1 / larger(sum_of_weights, Lanes{} + 1e-30f));
+      const Lanes last = fourth               ? even_pixels(fourth->at(x0 + side, y))
+                         : sum_of_weights > 0 ? Lanes{} + 1
+                                              : Lanes{};
+      for (int i = 0; i < kLanes && x0 + 2 * i + side < fine.width_px; ++i)
+        row[x0 + 2 * i + side] = {sum.x[i], sum.y[i], sum.z[i], last[i]};
+    }
+  }
 }
 
 }  // namespace offstage::render

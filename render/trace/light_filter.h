@@ -5,59 +5,87 @@
 /// Diffuse Interreflection", 1988), so that dark corners stay narrow.
 
 #include <array>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "render/lanes.h"
+
 namespace offstage::render {
 
-class LightFilter {
+/// A picture of numbers with empty margins at the sides, so that filters need not check for them.
+class LightPlane {
  public:
-  LightFilter(int width_px, int height_px);
+  static constexpr int kMargin = 16;  ///< pixels; at least the largest step, and a vector
 
-  /// Makes a pixel empty: it has no value, and none is taken from it.
-  void clear(int x, int y) {
-    filled_[at(x, y)] = 0;
-    set_values(x, y, Eigen::Vector4f::Zero());
+  LightPlane() = default;
+  LightPlane(int width_px, int height_px)
+      : stride_(width_px + 2 * kMargin),
+        values_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(height_px)) {}
+  bool empty() const { return values_.empty(); }
+  float* at(int x, int y) { return &values_[index(x, y)]; }
+  const float* at(int x, int y) const { return &values_[index(x, y)]; }
+  /// Eight pixels from x on.
+  Lanes lanes(int x, int y) const {
+    Lanes result;
+    __builtin_memcpy(&result, at(x, y), sizeof(result));
+    return result;
   }
-  void set_values(int x, int y, const Eigen::Vector4f& values) {
-    const std::size_t k = at(x, y);
-    for (std::size_t i = 0; i < 4; ++i) values_[i][k] = values[static_cast<int>(i)];
-  }
-  /// Sets a pixel: position, normal, distance from the eye, and the values to be averaged. `inverse_reach`:
-  /// 1 / distance over which the values may vary; 0: any. Other pixels stay empty.
-  void set(int x, int y, const Eigen::Vector3f& place, const Eigen::Vector3f& normal, float pixel_size_m,
-           const Eigen::Vector4f& values, float inverse_reach);
-  /// Averages over 3x3 pixels that are `step` apart; repeated with 1, 2, 4 ... it has a wide, smooth kernel.
-  /// Where all values around are equal, nothing is computed. Only the first `channels` of the values are
-  /// averaged, the others stay.
-  void average(int step, std::size_t channels = 4);
-  /// Spreads the reach over neighbours, since that of a single ray is noisy. Before average().
-  void smooth_reach();
-  Eigen::Vector4f values(int x, int y) const {
-    const std::size_t k = at(x, y);
-    return {values_[0][k], values_[1][k], values_[2][k], values_[3][k]};
-  }
+  void set_lanes(int x, int y, Lanes value) { __builtin_memcpy(at(x, y), &value, sizeof(value)); }
 
  private:
-  /// Averages a part of a row, `count` pixels from x on.
-  void average_run(int x, int y, int step, int count, std::size_t channels);
-  void find_even_runs(std::size_t channels);
-  bool is_even(int run, int y, int step) const;
-
-  static constexpr int kMargin = 16;  ///< empty pixels at both ends of a row, at least the largest step
-  using Plane = std::vector<float>;
-  std::size_t at(int x, int y) const {
+  std::size_t index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(stride_) +
            static_cast<std::size_t>(x + kMargin);
   }
-
-  int width_, height_, stride_;
-  std::array<Plane, 3> place_, normal_;
-  Plane filled_, inverse_size2_, reach2_, mean_reach2_;
-  std::array<Plane, 4> values_, next_;
-  int runs_;                                 ///< number of runs of pixels in a row that are averaged together
-  std::vector<Eigen::Vector4f> run_values_;  ///< value of each run whose pixels are equal, else not a number
+  int stride_ = 0;
+  std::vector<float> values_;
 };
+
+/// The surfaces in a picture, which say how far light may be averaged.
+struct LightGuide {
+  LightGuide(int width_px, int height_px);
+  /// From 1 / (distance that a ray went) of each pixel, computes 1 / distance^2 over which light may vary. It
+  /// is a mean of the neighbourhood, since a single ray says little.
+  void find_reach(const LightPlane& inverse_distance, LightPlane& reach2) const;
+
+  int width_px, height_px;
+  std::array<LightPlane, 3> place, normal;
+  LightPlane filled;         ///< 1: a surface is visible, 0: not
+  LightPlane inverse_size2;  ///< 1 / (width of a pixel on the surface)^2 [1/m^2]
+};
+
+/// Values of light at the pixels of a guide.
+class LightValues {
+ public:
+  LightValues() = default;
+  /// `channels`: 1, 3 or 4.
+  LightValues(int width_px, int height_px, std::size_t channels);
+  std::span<LightPlane> channels() { return values_; }
+  std::span<const LightPlane> channels() const { return values_; }
+
+  /// Averages over 3x3 pixels that are `step` apart; repeated with 1, 2, 4 ... it has a wide, smooth kernel.
+  /// Only pixels where `filled` is 1 are read and changed. `reach2`: 1 / distance^2 over which the values may
+  /// vary; null: any. Where all values around are equal, nothing is computed.
+  void average(const LightGuide& guide, const LightPlane& filled, const LightPlane* reach2, int step);
+
+ private:
+  class Averaging;
+  std::vector<LightPlane> values_, next_;
+  std::vector<float> even_;  ///< by run of pixels and channel: the value if all are equal, else not a number
+};
+
+/// Values at half the size, and where they are present.
+struct CoarseValues {
+  const LightValues* values;
+  const LightPlane* filled;
+};
+
+/// Writes four values for each of the pixels of row y at full size: three channels, interpolated between
+/// those of four coarse pixels with a similar place and normal, and 1, or four zeros where none is present.
+/// The fourth one is replaced by `fourth` if not null. Rows of the result have no margins.
+void interpolate(const LightGuide& fine, const LightGuide& coarse, int y, const CoarseValues& from,
+                 const LightPlane* fourth, Eigen::Vector4f* row);
 
 }  // namespace offstage::render

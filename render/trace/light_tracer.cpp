@@ -20,70 +20,29 @@ constexpr float kBrightest =
     50;  // of light that arrives after bounces; brighter samples would stay visible as dots
 constexpr float kSmoothMetal = 0.35f;  // with less roughness, a path goes on in the mirrored direction
 
+constexpr float kSharpMirror = 0.12f;  // with more roughness, mirror images are averaged over pixels
+
 std::size_t index_of(int x, int y, int width) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
 }
 
-Vector3f from_octahedral(float x, float y) {
-  Vector3f n(x, 1 - std::abs(x) - std::abs(y), y);
-  if (n.y() < 0) {
-    const float nx = (1 - std::abs(n.z())) * (n.x() < 0 ? -1.0f : 1.0f);
-    n.z() = (1 - std::abs(n.x())) * (n.z() < 0 ? -1.0f : 1.0f);
-    n.x() = nx;
-  }
-  return n.normalized();
+LaneVectors from_octahedral(Lanes x, Lanes z) {
+  const Lanes one = Lanes{} + 1, y = 1 - absolute(x) - absolute(z);
+  const Lanes folded_x = (1 - absolute(z)) * (x < 0.0f ? -one : one);
+  const Lanes folded_z = (1 - absolute(x)) * (z < 0.0f ? -one : one);
+  return normalized(LaneVectors{y < 0.0f ? folded_x : x, y, y < 0.0f ? folded_z : z});
 }
 
-float unpacked(uint16_t v) {
-  return static_cast<float>(v) * (2.0f / 65535) - 1;
+/// Indices of eight pixels of a row; -1 beyond its end.
+IntLanes pixels_of_row(const SurfaceBuffer& surfaces, int x, int y) {
+  const IntLanes columns = IntLanes{0, 1, 2, 3, 4, 5, 6, 7} + x;
+  return columns < surfaces.width_px ? columns + y * surfaces.width_px : IntLanes{} - 1;
 }
 
-/// Any two directions across n (T. Duff et al., "Building an Orthonormal Basis, Revisited", 2017).
-void basis(const Vector3f& n, Vector3f& a, Vector3f& b) {
-  const float sign = std::copysign(1.0f, n.z());
-  const float s = -1 / (sign + n.z()), t = n.x() * n.y() * s;
-  a = {1 + sign * n.x() * n.x() * s, sign * t, -sign * n.x()};
-  b = {t, sign + n.y() * n.y() * s, -n.y()};
-}
-
-/// Maps the unit square to the unit disc with equal areas (Shirley and Chiu, 1997). Sine and cosine of angles
-/// up to pi / 4 are short series, with an error below 4e-6.
-Vector2f disc(const Vector2f& uv) {
-  const float x = 2 * uv.x() - 1, y = 2 * uv.y() - 1;
-  const bool wide = std::abs(x) > std::abs(y);
-  const float radius = wide ? x : y, other = wide ? y : x;
-  if (radius == 0) return Vector2f::Zero();
-  const float angle = 0.25f * std::numbers::pi_v<float> * (other / radius), a2 = angle * angle;
-  const float sine = angle * (1 - a2 / 6 * (1 - a2 / 20 * (1 - a2 / 42)));
-  const float cosine = 1 - a2 / 2 * (1 - a2 / 12 * (1 - a2 / 30));
-  return wide ? Vector2f(radius * cosine, radius * sine) : Vector2f(radius * sine, radius * cosine);
-}
-
-/// A direction around n, with a density in proportion to the cosine.
-Vector3f cosine_direction(const Vector3f& n, const Vector2f& uv) {
-  const Vector2f d = disc(uv);
-  Vector3f a, b;
-  basis(n, a, b);
-  return (d.x() * a + d.y() * b + std::sqrt(std::max(1 - d.squaredNorm(), 0.0f)) * n).normalized();
-}
-
-/// A normal of the microfacets that are visible from `view`, for GGX with a = roughness^2 (J. Dupuy and
-/// A. Benyoub, "Sampling Visible GGX Normals with Spherical Caps", 2023).
-Vector3f visible_facet(const Vector3f& n, const Vector3f& view, float a, const Vector2f& uv) {
-  Vector3f x, y;
-  basis(n, x, y);
-  const Vector3f local(view.dot(x), view.dot(y), std::max(view.dot(n), 1e-3f));
-  const Vector3f stretched = Vector3f(a * local.x(), a * local.y(), local.z()).normalized();
-  const float angle = 2 * std::numbers::pi_v<float> * uv.x();
-  const float z = (1 - uv.y()) * (1 + stretched.z()) - stretched.z();
-  const float r = std::sqrt(std::clamp(1 - z * z, 0.0f, 1.0f));
-  const Vector3f h = Vector3f(r * std::cos(angle), r * std::sin(angle), z) + stretched;
-  const Vector3f facet = Vector3f(a * h.x(), a * h.y(), std::max(h.z(), 1e-6f)).normalized();
-  return facet.x() * x + facet.y() * y + facet.z() * n;
-}
-
-Vector3f reflected(const Vector3f& direction, const Vector3f& n) {
-  return direction - 2 * direction.dot(n) * n;
+void store(std::span<LightPlane> planes, int x, int y, const LaneVectors& value) {
+  planes[0].set_lanes(x, y, value.x);
+  planes[1].set_lanes(x, y, value.y);
+  planes[2].set_lanes(x, y, value.z);
 }
 
 float fresnel_of_glass(float cosine, float ratio) {
@@ -95,10 +54,11 @@ float fresnel_of_glass(float cosine, float ratio) {
   return 0.5f * (s * s + p * p);
 }
 
-float lobe_of(float a, float nl, float nv, float nh) {
-  const float a2 = a * a, d = nh * nh * (a2 - 1) + 1;
-  const float mean = 2 * nl * nv * (1 - a) + (nl + nv) * a;
-  return std::min(a2 / (d * d) * 0.5f / std::max(mean, 1e-6f), 40.0f);
+// GGX as in shaders/light.glsl.
+Lanes lobe_of(Lanes a, Lanes nl, Lanes nv, Lanes nh) {
+  const Lanes a2 = a * a, d = nh * nh * (a2 - 1) + 1;
+  const Lanes mean = 2 * nl * nv * (1 - a) + (nl + nv) * a;
+  return smaller(a2 / (d * d) * 0.5f / larger(mean, Lanes{} + 1e-6f), Lanes{} + 40);
 }
 
 }  // namespace
@@ -106,80 +66,75 @@ float lobe_of(float a, float nl, float nv, float nh) {
 struct LightTracer::Point {
   Vector3f place, normal, face, view;
   float roughness = 0;
-  bool mirrors = false, cloth = false;
+};
 
-  static bool read(const SurfaceBuffer& surfaces, std::size_t pixel, const Vector3f& eye, Point& point) {
-    const Vector4f& place = surfaces.places[pixel];
-    if (place.w() < 0) return false;
-    float rest = place.w();
-    point.cloth = rest >= SurfaceBuffer::kCloth;
-    if (point.cloth) rest -= SurfaceBuffer::kCloth;
-    point.mirrors = rest >= SurfaceBuffer::kMirrors;
-    if (point.mirrors) rest -= SurfaceBuffer::kMirrors;
-    point.roughness = rest;
-    const std::array<uint16_t, 4>& n = surfaces.normals[pixel];
-    point.normal = from_octahedral(unpacked(n[0]), unpacked(n[1]));
-    point.face = from_octahedral(unpacked(n[2]), unpacked(n[3]));
-    point.place = off_surface(place.head<3>(), point.face);
-    point.view = (eye - place.head<3>()).normalized();
-    return true;
+struct LightTracer::Points {
+  LaneVectors place, normal, face;
+  Lanes roughness;
+  IntLanes visible, cloth, mirrors;
+  IntLanes own_mirrors;  ///< so smooth that each pixel needs a mirror image of its own
+
+  /// `at`: indices of eight pixels; negative: none.
+  Points(const SurfaceBuffer& surfaces, IntLanes at) {
+    std::array<Lanes, 4> p, n;
+    p.fill(Lanes{});
+    n.fill(Lanes{});
+    p[3] = Lanes{} - 1;
+    for (int i = 0; i < kLanes; ++i) {
+      if (at[i] < 0) continue;
+      const auto pixel = static_cast<std::size_t>(at[i]);
+      for (std::size_t k = 0; k < 4; ++k) {
+        p[k][i] = surfaces.places[pixel][static_cast<int>(k)];
+        n[k][i] = static_cast<float>(surfaces.normals[pixel][k]);
+      }
+    }
+    for (Lanes& value : n) value = value * (2.0f / 65535) - 1;
+    normal = from_octahedral(n[0], n[1]);
+    face = from_octahedral(n[2], n[3]);
+    place = {p[0], p[1], p[2]};
+    place = place + face * off_surface_m(place);
+    visible = p[3] >= 0.0f;
+    roughness = p[3];
+    const auto flag = [&](float value) {
+      const IntLanes set = roughness >= value;
+      roughness = set ? roughness - value : roughness;
+      return set;
+    };
+    const IntLanes metal = flag(SurfaceBuffer::kMetal);
+    cloth = flag(SurfaceBuffer::kCloth);
+    mirrors = flag(SurfaceBuffer::kMirrors);
+    own_mirrors = metal & (roughness <= kSharpMirror);
+  }
+  Point one(int lane, const Vector3f& eye) const {
+    const auto of = [&](const LaneVectors& v) { return Vector3f(v.x[lane], v.y[lane], v.z[lane]); };
+    const Vector3f from = of(place);
+    return {from, of(normal), of(face), (eye - from).normalized(), roughness[lane]};
+  }
+  static Lanes off_surface_m(const LaneVectors& p) {
+    return kUnitsOffSurface * larger(larger(absolute(p.x), absolute(p.y)), absolute(p.z)) +
+           kLeastOffSurface_m;
   }
 };
 
 LightBuffer::LightBuffer(int width, int height)
-    : width_px(width),
-      height_px(height),
-      direct_filter(width, height),
-      around_filter((width + 1) / 2, (height + 1) / 2) {
-  direct.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-  mirrored.resize(direct.size());
-  around.resize(static_cast<std::size_t>(half_width()) * static_cast<std::size_t>(half_height()));
-  around_normals.resize(around.size());
+    : pixels(width, height),
+      cells((width + 1) / 2, (height + 1) / 2),
+      around(cells.width_px, cells.height_px, 3),
+      mirrors(cells.width_px, cells.height_px, 3),
+      inverse_distance(cells.width_px, cells.height_px),
+      reach2(cells.width_px, cells.height_px),
+      with_mirror(cells.width_px, cells.height_px),
+      with_rough_mirror(cells.width_px, cells.height_px) {
+  arriving.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
 }
 
 LightTracer::LightTracer(const RayScene& scene, const LightSources& sources)
     : scene_(scene), sources_(sources) {
   const float radius = std::tan(0.5f * sources.sun.size_deg * std::numbers::pi_v<float> / 180);
-  basis(sources.sky.sun_direction, sun_across_, sun_along_);
-  sun_across_ *= radius;
-  sun_along_ *= radius;
-}
-
-RayLamp::RayLamp(const Lamp& lamp) : def(lamp) {
-  def.direction.normalize();
-  Vector3f side = def.direction.cross(std::abs(def.direction.y()) < 0.99f ? Vector3f(Vector3f::UnitY())
-                                                                          : Vector3f(Vector3f::UnitX()));
-  right = side.normalized();
-  up = right.cross(def.direction);
-  if (def.cone_deg > 0) {
-    const float half = 0.5f * def.cone_deg * std::numbers::pi_v<float> / 180;
-    const float edge = std::cos(half), full = std::cos(half * (1 - std::clamp(def.softness, 0.02f, 1.0f)));
-    cone_factor = 1 / (full - edge);
-    cone_offset = -edge / (full - edge);
-  }
-}
-
-Vector3f RayLamp::light(const Vector3f& place, const Vector2f& uv, Vector3f& towards, float& distance) const {
-  Vector3f point = def.position;
-  float share = 1, softening = 0;
-  if (def.size.x() > 0) {
-    point += (uv.x() - 0.5f) * def.size.x() * right + (uv.y() - 0.5f) * def.size.y() * up;
-  } else {
-    // The disc that the ball shows to the place.
-    Vector3f a, b;
-    const Vector3f axis = (place - def.position).normalized();
-    basis(axis, a, b);
-    const Vector2f d = disc(uv) * def.radius;
-    point += d.x() * a + d.y() * b;
-    softening = 0.25f * def.radius * def.radius;
-  }
-  const Vector3f way = point - place;
-  distance = way.norm();
-  towards = way / std::max(distance, 1e-12f);
-  const float cosine = -towards.dot(def.direction);
-  if (def.size.x() > 0) share = std::max(cosine, 0.0f);
-  if (def.cone_deg > 0) share = std::clamp(cone_factor * cosine + cone_offset, 0.0f, 1.0f);
-  return def.intensity * (share / (distance * distance + softening + 1e-12f));
+  Three<float> a, b;
+  make_basis(from_eigen(sources.sky.sun_direction), a, b);
+  sun_across_ = radius * to_eigen(a);
+  sun_along_ = radius * to_eigen(b);
 }
 
 // As the sky that the eye sees (shaders/sky.frag), without clouds and the sun's disc.
@@ -191,47 +146,61 @@ Vector3f LightTracer::sky_seen(const Vector3f& direction) const {
   return haze + share * (sources_.sky.ground - haze);
 }
 
-float LightTracer::sun_visibility(const Vector3f& place, const Vector2f& uv) const {
+float LightTracer::sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const {
   const Sun& sun = sources_.sun;
   float share = sources_.smoke != nullptr ? std::exp(-sources_.smoke->depth(place)) : 1.0f;
   if (!sun.shadows) return share;
-  const Vector2f d = disc(uv);
-  const Vector3f direction =
-      (sources_.sky.sun_direction + d.x() * sun_across_ + d.y() * sun_along_).normalized();
+  const SquarePoint<float> d = on_disc(uv);
+  const Vector3f direction = (sources_.sky.sun_direction + d.x * sun_across_ + d.y * sun_along_).normalized();
   return share * scene_.transmittance(place, direction, kFar).mean();
+}
+
+Lanes LightTracer::sun_visibility(const LaneVectors& place, IntLanes active,
+                                  const SquarePoint<Lanes>& uv) const {
+  Lanes share = active ? Lanes{} + 1 : Lanes{};
+  if (sources_.smoke != nullptr) {
+    for (int i = 0; i < kLanes; ++i)
+      if (active[i]) share[i] = std::exp(-sources_.smoke->depth({place.x[i], place.y[i], place.z[i]}));
+  }
+  if (!sources_.sun.shadows) return share;
+  const SquarePoint<Lanes> d = on_disc(uv);
+  const LaneVectors direction = normalized(all_lanes(sources_.sky.sun_direction) +
+                                           all_lanes(sun_across_) * d.x + all_lanes(sun_along_) * d.y);
+  const LaneVectors light = scene_.transmittance(place, direction, Lanes{} + kFar, active);
+  return share * ((light.x + light.y + light.z) * (1.0f / 3));
 }
 
 // One lamp is chosen in proportion to its light without shadows.
 Vector3f LightTracer::lamps_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
                                PixelSampler& sampler) const {
   if (sources_.lamps.empty()) return Vector3f::Zero();
-  const Vector2f choice = sampler.next(), uv = sampler.next();
-  Vector3f kept = Vector3f::Zero(), kept_towards = Vector3f::Zero();
-  float sum = 0, kept_weight = 0, kept_distance = 0, random = choice.x();
-  bool shadows = false;
+  const SquarePoint<float> choice = sampler.next(), uv = sampler.next();
+  const RayLamp* kept = nullptr;
+  LampPoint<float> kept_point{};
+  float sum = 0, kept_share = 0, kept_weight = 0, random = choice.x;
   for (const RayLamp& lamp : sources_.lamps) {
-    Vector3f towards = Vector3f::Zero();
-    float distance = 0;
-    const Vector3f light = lamp.light(place, uv, towards, distance) * std::max(normal.dot(towards), 0.0f);
-    const float weight = light.sum();
+    const LampPoint<float> point = lamp.point(from_eigen(place), uv);
+    const Vector3f towards = to_eigen(point.towards);
+    const float share = point.share * std::max(normal.dot(towards), 0.0f);
+    const float weight = share * lamp.def().intensity.sum();
     if (!(weight > 0) || face.dot(towards) <= 0) continue;
     sum += weight;
-    const float share = weight / sum;
-    if (random < share) {
-      random /= share;
-      kept = light;
+    const float chance = weight / sum;
+    if (random < chance) {
+      random /= chance;
+      kept = &lamp;
+      kept_point = point;
+      kept_share = share;
       kept_weight = weight;
-      kept_towards = towards;
-      kept_distance = distance;
-      shadows = lamp.def.shadows;
     } else {
-      random = (random - share) / (1 - share);
+      random = (random - chance) / (1 - chance);
     }
   }
-  if (kept_weight <= 0) return Vector3f::Zero();
+  if (kept == nullptr) return Vector3f::Zero();
   const Vector3f visible =
-      shadows ? scene_.transmittance(place, kept_towards, kept_distance) : Vector3f(Vector3f::Ones());
-  return kept.cwiseProduct(visible) * (sum / kept_weight);
+      kept->def().shadows ? scene_.transmittance(place, to_eigen(kept_point.towards), kept_point.distance)
+                          : Vector3f(Vector3f::Ones());
+  return kept->def().intensity.cwiseProduct(visible) * (kept_share * sum / kept_weight);
 }
 
 Vector3f LightTracer::radiance(Vector3f from, Vector3f direction, float cone, PixelSampler& sampler,
@@ -253,8 +222,8 @@ Vector3f LightTracer::radiance(Vector3f from, Vector3f direction, float cone, Pi
     }
     const RayMaterial& material = *hit.material;
     const Vector4f color = material.color(hit, travelled * cone);
-    const Vector2f choice = sampler.next();
-    float random = choice.x();
+    const SquarePoint<float> choice = sampler.next();
+    float random = choice.x;
     if (random >= color.w()) {  // through a hole, or a translucent surface
       from = off_surface(hit.position, -hit.face);
       continue;
@@ -267,7 +236,7 @@ Vector3f LightTracer::radiance(Vector3f from, Vector3f direction, float cone, Pi
       const float ratio = hit.front ? 1 / material.refraction : material.refraction;
       const float cosine = std::min(-hit.normal.dot(direction), 1.0f);
       const float mirrored = fresnel_of_glass(cosine, material.thin ? 1 / material.refraction : ratio);
-      if (choice.y() < mirrored) {
+      if (choice.y < mirrored) {
         direction = reflected(direction, hit.normal);
         from = off_surface(hit.position, hit.face);
         if (direction.dot(hit.face) <= 0) direction = reflected(direction, hit.face);
@@ -287,7 +256,7 @@ Vector3f LightTracer::radiance(Vector3f from, Vector3f direction, float cone, Pi
     const float fresnel = 0.04f + 0.96f * m * m * m * m * m;
     const bool metal = material.metallic > 0.5f;
     const bool smooth = material.roughness < kSmoothMetal;
-    if (smooth && (metal || (sharp && choice.y() < fresnel))) {
+    if (smooth && (metal || (sharp && choice.y < fresnel))) {
       const float a = std::max(material.roughness * material.roughness, bounces > 0 ? 0.04f : 1e-4f);
       const Vector3f facet = visible_facet(hit.normal, -direction, a, sampler.next());
       direction = reflected(direction, facet);
@@ -298,7 +267,7 @@ Vector3f LightTracer::radiance(Vector3f from, Vector3f direction, float cone, Pi
     const Vector3f& n = hit.normal;
     Vector3f direct = Vector3f::Zero();
     const float towards_sun = n.dot(sources_.sky.sun_direction);
-    const Vector2f on_sun = sampler.next();
+    const SquarePoint<float> on_sun = sampler.next();
     if (towards_sun > 0 && sources_.sun.intensity > 0)
       direct += sources_.sun.intensity * towards_sun * sun_visibility(from, on_sun) * sources_.sun.color;
     direct += lamps_at(from, n, hit.face, sampler);
@@ -306,8 +275,8 @@ Vector3f LightTracer::radiance(Vector3f from, Vector3f direction, float cone, Pi
     sum += share.cwiseProduct(direct);
     // Paths end at random in proportion to the light that they can still carry.
     const float survives = std::min(share.maxCoeff(), 0.95f);
-    const Vector2f end = sampler.next();
-    if (++bounces >= kMostBounces || end.x() >= survives) return sum;
+    const SquarePoint<float> end = sampler.next();
+    if (++bounces >= kMostBounces || end.x >= survives) return sum;
     share /= survives;
     direction = cosine_direction(n, sampler.next());
     if (direction.dot(hit.face) <= 0) direction = reflected(direction, hit.face);
@@ -317,159 +286,204 @@ Vector3f LightTracer::radiance(Vector3f from, Vector3f direction, float cone, Pi
   return sum;
 }
 
-void LightTracer::trace_direct(const Point& point, PixelSampler& sampler, Vector4f& direct,
-                               Vector4f& highlight) const {
-  const Vector2f on_sun = sampler.next();
-  const float towards_sun = point.normal.dot(sources_.sky.sun_direction);
-  direct.setZero();
-  if (point.cloth) {  // lit through
-    const Vector3f place = towards_sun * point.face.dot(point.normal) < 0
-                               ? off_surface(point.place, -3 * point.face)
-                               : point.place;
-    direct.x() = sun_visibility(place, on_sun);
-  } else if (towards_sun > 0 && sources_.sun.intensity > 0) {
-    direct.x() = sun_visibility(point.place, on_sun);
-  }
-  if (sources_.lamps.empty()) return;
-  const Vector3f& n = point.normal;
-  const float nv = std::max(std::abs(n.dot(point.view)), 1e-3f);
-  Vector3f lobes = Vector3f::Zero();
-  float grazing = 0;
+void LightTracer::trace_lamps(const Points& points, int x, int y, const LightView& view,
+                              Sampler<UintLanes>& sampler, LightBuffer& light) const {
+  const Lanes none{};
+  const LaneVectors& n = points.normal;
+  const LaneVectors to_eye = normalized(all_lanes(view.eye) - points.place);
+  const Lanes nv = larger(absolute(dot(n, to_eye)), none + 1e-3f);
+  const Lanes rough = points.roughness;
+  LaneVectors diffuse{none, none, none}, lobes{none, none, none};
+  Lanes grazing{};
   for (const RayLamp& lamp : sources_.lamps) {
-    Vector3f towards = Vector3f::Zero();
-    float distance = 0;
-    Vector3f light = lamp.light(point.place, sampler.next(), towards, distance);
-    const float nl = n.dot(towards);
-    if (nl <= 0 || !(light.sum() > 0)) continue;
-    if (lamp.def.shadows && point.face.dot(towards) > 0)
-      light = light.cwiseProduct(scene_.transmittance(point.place, towards, distance));
-    light *= nl;
-    direct.tail<3>() += light;
-    const Vector3f h = (towards + point.view).normalized();
-    const float a = std::min(std::max(point.roughness * point.roughness,
-                                      0.5f * lamp.def.radius / std::max(distance, 1e-6f) + 0.002f),
-                             1.0f);
-    const float m = 1 - std::clamp(point.view.dot(h), 0.0f, 1.0f);
-    const Vector3f lobe = light * lobe_of(a, nl, nv, std::clamp(n.dot(h), 0.0f, 1.0f));
-    lobes += lobe;
-    grazing += lobe.sum() * m * m * m * m * m;
+    const LampPoint<Lanes> point = lamp.point(points.place, sampler.next());
+    const Lanes nl = dot(n, point.towards);
+    const IntLanes lit = points.visible & (nl > 0.0f) & (point.share > 0.0f);
+    if (!any(lit)) continue;
+    const Lanes share = lit ? point.share * nl : none;
+    LaneVectors arriving = all_lanes(lamp.def().intensity) * share;
+    if (lamp.def().shadows) {
+      const IntLanes faces = dot(points.face, point.towards) > 0.0f;
+      const LaneVectors seen = scene_.transmittance(points.place, point.towards, point.distance, lit & faces);
+      arriving.x = faces ? arriving.x * seen.x : arriving.x;
+      arriving.y = faces ? arriving.y * seen.y : arriving.y;
+      arriving.z = faces ? arriving.z * seen.z : arriving.z;
+    }
+    diffuse = diffuse + arriving;
+    const LaneVectors h = normalized(point.towards + to_eye);
+    const Lanes wide = 0.5f * lamp.def().radius / larger(point.distance, none + 1e-6f) + 0.002f;
+    const Lanes m = 1 - clamped_to(dot(to_eye, h), 0, 1);
+    const Lanes lobe =
+        lobe_of(smaller(larger(rough * rough, wide), none + 1), nl, nv, clamped_to(dot(n, h), 0, 1));
+    const LaneVectors bright = arriving * (lit ? lobe : none);
+    lobes = lobes + bright;
+    const Lanes m2 = m * m;
+    grazing += (bright.x + bright.y + bright.z) * (m2 * m2 * m);
   }
-  highlight << lobes, grazing / std::max(lobes.sum(), 1e-12f);
+  store(light.direct.channels().subspan(1), x, y, diffuse);
+  const Lanes fresnel = grazing / larger(lobes.x + lobes.y + lobes.z, none + 1e-12f);
+  const int width = light.pixels.width_px;
+  for (int i = 0; i < kLanes && x + i < width; ++i)
+    light.highlights[index_of(x + i, y, width)] = {lobes.x[i], lobes.y[i], lobes.z[i], fresnel[i]};
+}
+
+Vector3f LightTracer::mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler) const {
+  const float a = point.roughness * point.roughness;
+  const Vector3f facet =
+      a < 1e-4f ? point.normal : visible_facet(point.normal, point.view, a, sampler.next());
+  Vector3f way = reflected(-point.view, facet);
+  if (way.dot(point.face) <= 0) way = reflected(way, point.face);
+  return radiance(point.place, way, std::max(a, view.pixel_m), sampler).cwiseMin(kBrightest);
+}
+
+void LightTracer::trace_own_mirrors(const Points& points, int x, int y, const LightView& view,
+                                    LightBuffer& light) const {
+  if (!any(points.own_mirrors)) return;
+  for (int i = 0; i < kLanes; ++i) {
+    if (!points.own_mirrors[i]) continue;
+    PixelSampler sampler(static_cast<uint32_t>(x + i), static_cast<uint32_t>(y), view.offsets.index,
+                         view.offsets.count);
+    sampler.skip(1 + static_cast<uint32_t>(sources_.lamps.size()));
+    light.mirrored[index_of(x + i, y, light.pixels.width_px)]
+        << mirrored_light(points.one(i, view.eye), view, sampler),
+        1;
+  }
+}
+
+// Positions and normals of eight pixels, which guide the filter. `size_px`: width of what a value stands for.
+void LightTracer::set_guide(const Points& points, int x, int y, const LightView& view, float size_px,
+                            LightGuide& guide) {
+  const Lanes none{};
+  const LaneVectors from_eye = points.place - all_lanes(view.eye);
+  const float size_1m = size_px * view.pixel_m;
+  guide.filled.set_lanes(x, y, points.visible ? none + 1 : none);
+  guide.inverse_size2.set_lanes(x, y, 1 / larger(size_1m * size_1m * dot(from_eye, from_eye), none + 1e-20f));
+  store(guide.place, x, y, points.place);
+  store(guide.normal, x, y, points.normal);
+}
+
+// The light of sun and lamps at eight pixels of a row.
+void LightTracer::trace_pixels(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
+                               LightBuffer& light) const {
+  const Points points(surfaces, pixels_of_row(surfaces, x, y));
+  set_guide(points, x, y, view, 1, light.pixels);
+  const UintLanes columns = UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x);
+  Sampler<UintLanes> sampler(columns, UintLanes{} + static_cast<uint32_t>(y), view.offsets.index,
+                             view.offsets.count);
+  const SquarePoint<Lanes> on_sun = sampler.next();
+  const LaneVectors to_sun = all_lanes(sources_.sky.sun_direction);
+  const Lanes towards_sun = dot(points.normal, to_sun);
+  IntLanes sunny = points.visible & (towards_sun > 0.0f);
+  LaneVectors place = points.place;
+  if (any(points.cloth)) {  // lit through
+    sunny = points.visible & (points.cloth | sunny);
+    const IntLanes behind = points.cloth & (towards_sun * dot(points.face, points.normal) < 0.0f);
+    const LaneVectors through = place - points.face * (4 * Points::off_surface_m(place));
+    place.x = behind ? through.x : place.x;
+    place.y = behind ? through.y : place.y;
+    place.z = behind ? through.z : place.z;
+  }
+  if (sources_.sun.intensity <= 0) sunny = IntLanes{};
+  light.direct.channels()[0].set_lanes(x, y, sun_visibility(place, sunny, on_sun));
+  if (!sources_.lamps.empty()) trace_lamps(points, x, y, view, sampler, light);
+}
+
+// The light from around, and mirror images but for those of smooth metals, are computed for one pixel of
+// four, another one in each sub-frame. Eight cells of a row.
+void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
+                              LightBuffer& light) const {
+  const int k = view.offsets.index, count = std::min(kLanes, light.cells.width_px - x);
+  const int py = std::min(2 * y + ((k >> 1 ^ k) & 1), surfaces.height_px - 1);
+  IntLanes at = IntLanes{} - 1;
+  for (int i = 0; i < count; ++i)
+    at[i] = py * surfaces.width_px + std::min(2 * (x + i) + (k & 1), surfaces.width_px - 1);
+  const Points points(surfaces, at);
+  set_guide(points, x, y, view, 2, light.cells);
+  const Lanes none{};
+  const IntLanes mirrors = points.mirrors & ~points.own_mirrors;
+  light.with_mirror.set_lanes(x, y, mirrors ? none + 1 : none);
+  light.with_rough_mirror.set_lanes(x, y, mirrors & (points.roughness > kSharpMirror) ? none + 1 : none);
+  LaneVectors around{none, none, none}, mirrored = around;
+  Lanes inverse_distance{};
+  for (int i = 0; i < count; ++i) {
+    if (!points.visible[i]) continue;
+    const Point point = points.one(i, view.eye);
+    PixelSampler sampler(static_cast<uint32_t>(x + i), static_cast<uint32_t>(y), k, view.offsets.count);
+    Vector3f way = cosine_direction(point.normal, sampler.next());
+    if (way.dot(point.face) <= 0) way = reflected(way, point.face);
+    float met = kFar;
+    const auto set = [i](LaneVectors& lanes, const Vector3f& value) {
+      lanes.x[i] = value.x();
+      lanes.y[i] = value.y();
+      lanes.z[i] = value.z();
+    };
+    set(around, radiance(point.place, way, 0.5f, sampler, &met).cwiseMin(kBrightest));
+    inverse_distance[i] = 1 / std::max(met, 8 * view.pixel_m * (point.place - view.eye).norm());
+    if (mirrors[i]) set(mirrored, mirrored_light(point, view, sampler));
+  }
+  store(light.around.channels(), x, y, around);
+  store(light.mirrors.channels(), x, y, mirrored);
+  light.inverse_distance.set_lanes(x, y, inverse_distance);
 }
 
 namespace {
 
-// Mirror images that the roughness blurs anyway. Pixels of other surfaces are left out.
-void smooth_rough_mirrors(const SurfaceBuffer& surfaces, const auto& for_rows, LightBuffer& light) {
-  constexpr float kRough = 0.12f;
-  const auto roughness = [&](std::size_t pixel) {
-    const float w = surfaces.places[pixel].w();
-    return w - (w >= SurfaceBuffer::kCloth ? SurfaceBuffer::kCloth : 0) - SurfaceBuffer::kMirrors;
-  };
-  const auto is_rough = [&](std::size_t pixel) {
-    return light.mirrored[pixel].w() > 0 && roughness(pixel) > kRough;
-  };
-  bool any = false;
-  for (std::size_t pixel = 0; pixel < light.mirrored.size() && !any; ++pixel) any = is_rough(pixel);
-  if (!any) return;
-  for_rows(light.width_px, light.height_px, [&](const auto& place) {
-    const std::size_t pixel = index_of(place.x, place.y, light.width_px);
-    if (is_rough(pixel))
-      light.direct_filter.set_values(place.x, place.y, light.mirrored[pixel]);
-    else
-      light.direct_filter.clear(place.x, place.y);
-  });
-  for (const int step : {1, 2, 4}) light.direct_filter.average(step, 3);
-  for_rows(light.width_px, light.height_px, [&](const auto& place) {
-    const std::size_t pixel = index_of(place.x, place.y, light.width_px);
-    const Vector4f mean = light.direct_filter.values(place.x, place.y);
-    if (is_rough(pixel)) light.mirrored[pixel].head<3>() = mean.head<3>();
+void for_light_rows(int height, const auto& each) {
+  tbb::parallel_for(tbb::blocked_range<int>(0, height, kRowsPerTask), [&](const auto& rows) {
+    for (int y = rows.begin(); y < rows.end(); ++y) each(y);
   });
 }
 
 }  // namespace
 
-struct LightTracer::Place {
-  int x, y;
-  Vector3f eye, forward;
-  float pixel_m;
-  SampleOffsets offsets;
-};
-
-void LightTracer::trace_pixel(const SurfaceBuffer& surfaces, const Place& place, LightBuffer& light) const {
-  const std::size_t pixel = index_of(place.x, place.y, surfaces.width_px);
-  Vector4f direct = Vector4f::Zero(), highlight = Vector4f::Zero(), mirrored = Vector4f::Zero();
-  Point point;
-  if (Point::read(surfaces, pixel, place.eye, point)) {
-    PixelSampler sampler(static_cast<uint32_t>(place.x), static_cast<uint32_t>(place.y), place.offsets.index,
-                         place.offsets.count);
-    trace_direct(point, sampler, direct, highlight);
-    light.direct_filter.set(place.x, place.y, point.place, point.normal,
-                            place.pixel_m * (point.place - place.eye).norm(), direct, 0);
-    if (point.mirrors) {
-      const float a = point.roughness * point.roughness;
-      const Vector3f facet =
-          a < 1e-4f ? point.normal : visible_facet(point.normal, point.view, a, sampler.next());
-      Vector3f way = reflected(-point.view, facet);
-      if (way.dot(point.face) <= 0) way = reflected(way, point.face);
-      mirrored << radiance(point.place, way, std::max(a, place.pixel_m), sampler).cwiseMin(kBrightest), 1;
-    }
-  } else {
-    light.direct_filter.clear(place.x, place.y);
-  }
-  light.mirrored[pixel] = mirrored;
-  if (!light.highlights.empty()) light.highlights[pixel] = highlight;
-}
-
-// The light around is computed for one pixel of four, another one in each sub-frame.
-void LightTracer::trace_around(const SurfaceBuffer& surfaces, const Place& place, LightBuffer& light) const {
-  const int k = place.offsets.index;
-  const int px = std::min(2 * place.x + (k & 1), surfaces.width_px - 1);
-  const int py = std::min(2 * place.y + ((k >> 1 ^ k) & 1), surfaces.height_px - 1);
-  const std::size_t cell = index_of(place.x, place.y, light.half_width());
-  light.around[cell].setZero();
-  light.around_filter.clear(place.x, place.y);
-  Point point;
-  if (!Point::read(surfaces, index_of(px, py, surfaces.width_px), place.eye, point)) return;
-  PixelSampler sampler(static_cast<uint32_t>(place.x), static_cast<uint32_t>(place.y), place.offsets.index,
-                       place.offsets.count);
-  Vector3f way = cosine_direction(point.normal, sampler.next());
-  if (way.dot(point.face) <= 0) way = reflected(way, point.face);
-  float met = kFar;
-  Vector4f value;
-  value << radiance(point.place, way, 0.5f, sampler, &met).cwiseMin(kBrightest),
-      place.forward.dot(point.place - place.eye);
-  const float size = 2 * place.pixel_m * (point.place - place.eye).norm();
-  light.around[cell] = value;
-  light.around_normals[cell] << point.normal, 0;
-  light.around_filter.set(place.x, place.y, point.place, point.normal, size, value,
-                          1 / std::max(met, 4 * size));
-}
-
-void LightTracer::trace(const SurfaceBuffer& surfaces, const Vector3f& eye, const Vector3f& forward,
-                        float pixel_m, const SampleOffsets& offsets, LightBuffer& light) const {
-  light.highlights.resize(sources_.lamps.empty() ? 0 : light.direct.size());
-  const auto for_rows = [&](int width, int height, const auto& each) {
-    tbb::parallel_for(tbb::blocked_range<int>(0, height, kRowsPerTask), [&, width](const auto& rows) {
-      Place place{0, 0, eye, forward, pixel_m, offsets};
-      for (place.y = rows.begin(); place.y < rows.end(); ++place.y)
-        for (place.x = 0; place.x < width; ++place.x) each(place);
-    });
-  };
-  const int half_width = light.half_width(), half_height = light.half_height();
-  for_rows(light.width_px, light.height_px, [&](const Place& place) { trace_pixel(surfaces, place, light); });
-  for_rows(half_width, half_height, [&](const Place& place) { trace_around(surfaces, place, light); });
-  light.direct_filter.average(1, sources_.lamps.empty() ? 1 : 4);
-  light.around_filter.smooth_reach();
-  const int widest = offsets.count >= 16 ? 4 : 8;
-  for (int step = 1; step <= widest; step *= 2) light.around_filter.average(step, 3);
-  for_rows(light.width_px, light.height_px, [&](const Place& place) {
-    light.direct[index_of(place.x, place.y, light.width_px)] = light.direct_filter.values(place.x, place.y);
+void LightTracer::trace(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const {
+  const int width = surfaces.width_px, height = surfaces.height_px;
+  const std::size_t pixels = light.arriving.size(), with_lamps = sources_.lamps.empty() ? 0 : pixels;
+  const std::size_t channels = sources_.lamps.empty() ? 1 : 4;
+  if (light.direct.channels().size() != channels) light.direct = LightValues(width, height, channels);
+  light.lamps.resize(with_lamps);
+  light.highlights.resize(with_lamps);
+  light.has_mirrors = std::ranges::any_of(surfaces.places,
+                                          [](const Vector4f& p) { return p.w() >= SurfaceBuffer::kMirrors; });
+  if (light.has_mirrors) light.mirrored.resize(pixels);
+  for_light_rows(height, [&](int y) {
+    for (int x = 0; x < width; x += kLanes) trace_pixels(surfaces, x, y, view, light);
   });
-  smooth_rough_mirrors(surfaces, for_rows, light);
-  for_rows(half_width, half_height, [&](const Place& place) {
-    Vector4f& value = light.around[index_of(place.x, place.y, half_width)];
-    value.head<3>() = light.around_filter.values(place.x, place.y).head<3>();
+  for_light_rows(light.cells.height_px, [&](int y) {
+    for (int x = 0; x < light.cells.width_px; x += kLanes) trace_cells(surfaces, x, y, view, light);
+  });
+  filter(view, light);
+  finish(surfaces, view, light);
+}
+
+void LightTracer::filter(const LightView& view, LightBuffer& light) const {
+  light.direct.average(light.pixels, light.pixels.filled, nullptr, 1);
+  light.cells.find_reach(light.inverse_distance, light.reach2);
+  const int widest = view.offsets.count >= 16 ? 4 : 8;
+  for (int step = 1; step <= widest; step *= 2)
+    light.around.average(light.cells, light.cells.filled, &light.reach2, step);
+  // Mirror images that the roughness blurs anyway.
+  if (!light.has_mirrors) return;
+  for (const int step : {1, 2}) light.mirrors.average(light.cells, light.with_rough_mirror, nullptr, step);
+}
+
+void LightTracer::finish(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const {
+  const int width = surfaces.width_px;
+  for_light_rows(surfaces.height_px, [&](int y) {
+    const std::size_t row = index_of(0, y, width);
+    interpolate(light.pixels, light.cells, y, {&light.around, &light.cells.filled},
+                &light.direct.channels()[0], &light.arriving[row]);
+    for (int x = 0; x < width && !light.lamps.empty(); ++x) {
+      Vector4f& lamps = light.lamps[row + static_cast<std::size_t>(x)];
+      for (std::size_t i = 0; i < 3; ++i)
+        lamps[static_cast<int>(i)] = *light.direct.channels()[i + 1].at(x, y);
+      lamps.w() = light.highlights[row + static_cast<std::size_t>(x)].w();
+    }
+    if (!light.has_mirrors) return;
+    interpolate(light.pixels, light.cells, y, {&light.mirrors, &light.with_mirror}, nullptr,
+                &light.mirrored[row]);
+    for (int x = 0; x < width; x += kLanes)
+      trace_own_mirrors(Points(surfaces, pixels_of_row(surfaces, x, y)), x, y, view, light);
   });
 }
 

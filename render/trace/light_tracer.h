@@ -11,6 +11,7 @@
 #include "render/sky.h"
 #include "render/stage.h"
 #include "render/trace/light_filter.h"
+#include "render/trace/ray_lamp.h"
 #include "render/trace/ray_scene.h"
 #include "render/trace/sampler.h"
 
@@ -19,44 +20,34 @@ namespace offstage::render {
 /// The visible opaque surfaces, one value per pixel, rows from the bottom up.
 struct SurfaceBuffer {
   int width_px = 0, height_px = 0;
-  /// Position; w: roughness, plus kMirrors and kCloth; negative: nothing is visible.
+  /// Position; w: roughness, plus the flags below; negative: nothing is visible.
   std::vector<Vector4f> places;
   /// Smooth normal and normal of the triangle, both on the visible side, in octahedral coordinates.
   std::vector<std::array<uint16_t, 4>> normals;
 
-  static constexpr float kMirrors = 2, kCloth = 4;
+  /// Added to the roughness: the surface shows a mirror image; it is cloth; it is metal.
+  static constexpr float kMirrors = 2, kCloth = 4, kMetal = 8;
 };
 
-/// Light at the surfaces, in the units of the shaders: the radiance of a white surface. Rows from the bottom
-/// up.
+/// Light at the surfaces, in the units of the shaders: the radiance of a white surface.
 struct LightBuffer {
   LightBuffer(int width_px, int height_px);
 
-  int width_px, height_px;
-  std::vector<Vector4f> direct;  ///< share of the sun that is visible; yzw: diffuse light of lamps
+  // Results, rows from the bottom up.
   std::vector<Vector4f>
-      highlights;  ///< lobes of lamps, without reflectance; w: Fresnel factor. Empty: no lamps
+      arriving;  ///< light from the sky and other surfaces; w: share of the sun that is visible
   std::vector<Vector4f> mirrored;  ///< light from the mirrored direction; w: 1 where it was computed
-  /// Half the size, rounded up: light from the sky and other surfaces; w: distance along the view axis of the
-  /// pixel for which it was computed; 0: nothing is visible.
-  std::vector<Vector4f> around;
-  std::vector<Vector4f> around_normals;  ///< smooth normal of that pixel
-  int half_width() const { return (width_px + 1) / 2; }
-  int half_height() const { return (height_px + 1) / 2; }
+  bool has_mirrors = false;        ///< if not, `mirrored` is not up to date
+  std::vector<Vector4f>
+      lamps;  ///< diffuse light of lamps; w: Fresnel factor of their highlights. Empty: no lamps
+  std::vector<Vector4f> highlights;  ///< lobes of lamps, without reflectance
 
-  LightFilter direct_filter, around_filter;
-};
-
-/// A lamp with its axes.
-struct RayLamp {
-  explicit RayLamp(const Lamp& lamp);
-  /// Light that a surface at `place` would receive from the point (u, v) of the lamp if it faced it;
-  /// `towards` and `distance` lead there.
-  Vector3f light(const Vector3f& place, const Vector2f& uv, Vector3f& towards, float& distance) const;
-
-  Lamp def;
-  Vector3f right, up;
-  float cone_factor = 0, cone_offset = 1;
+  // In between. Light from around is computed for cells of 2x2 pixels.
+  LightGuide pixels, cells;
+  LightValues direct;           ///< of the pixels: visible share of the sun, then diffuse light of lamps
+  LightValues around, mirrors;  ///< of the cells
+  LightPlane inverse_distance, reach2;        ///< see LightGuide::find_reach
+  LightPlane with_mirror, with_rough_mirror;  ///< cells: 1 or 0
 };
 
 struct LightSources {
@@ -67,14 +58,18 @@ struct LightSources {
   const OpacityGrid* smoke = nullptr;  ///< null: none
 };
 
+/// How a picture of the surfaces was taken.
+struct LightView {
+  Vector3f eye;
+  float pixel_m;  ///< width of a pixel at distance 1
+  SampleOffsets offsets;
+};
+
 class LightTracer {
  public:
   LightTracer(const RayScene& scene, const LightSources& sources);
 
-  /// `eye` and `forward`: of the view in which the surfaces were drawn. `pixel_m`: width of a pixel at
-  /// distance 1.
-  void trace(const SurfaceBuffer& surfaces, const Vector3f& eye, const Vector3f& forward, float pixel_m,
-             const SampleOffsets& offsets, LightBuffer& light) const;
+  void trace(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
 
   /// Radiance that arrives from `direction` at `from`. `cone`: angle that the ray stands for [rad]. `met`, if
   /// not null, gets the distance of what the ray meets first, and is unchanged if it meets nothing.
@@ -82,14 +77,24 @@ class LightTracer {
                     float* met = nullptr) const;
 
  private:
-  struct Point;  ///< a visible surface
+  struct Point;   ///< a visible surface
+  struct Points;  ///< eight of them
   Vector3f lamps_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
                     PixelSampler& sampler) const;
-  float sun_visibility(const Vector3f& place, const Vector2f& uv) const;
-  struct Place;  ///< a pixel of a sub-frame
-  void trace_pixel(const SurfaceBuffer& surfaces, const Place& place, LightBuffer& light) const;
-  void trace_around(const SurfaceBuffer& surfaces, const Place& place, LightBuffer& light) const;
-  void trace_direct(const Point& point, PixelSampler& sampler, Vector4f& direct, Vector4f& highlight) const;
+  float sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const;
+  Lanes sun_visibility(const LaneVectors& place, IntLanes active, const SquarePoint<Lanes>& uv) const;
+  Vector3f mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler) const;
+  void trace_lamps(const Points& points, int x, int y, const LightView& view, Sampler<UintLanes>& sampler,
+                   LightBuffer& light) const;
+  void trace_pixels(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
+                    LightBuffer& light) const;
+  void trace_own_mirrors(const Points& points, int x, int y, const LightView& view, LightBuffer& light) const;
+  static void set_guide(const Points& points, int x, int y, const LightView& view, float size_px,
+                        LightGuide& guide);
+  void trace_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
+                   LightBuffer& light) const;
+  void filter(const LightView& view, LightBuffer& light) const;
+  void finish(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
   Vector3f sky_seen(const Vector3f& direction) const;
 
   const RayScene& scene_;

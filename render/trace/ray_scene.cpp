@@ -1,7 +1,9 @@
 #include "render/trace/ray_scene.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
 #include <stdexcept>
 #include <string>
 
@@ -323,6 +325,48 @@ Vector3f RayScene::transmittance(const Vector3f& from, const Vector3f& direction
   set_ray(ray, from, direction, length, kOpaqueCaster);
   embree::occluded(tree_.get(), ray);
   if (ray.tfar < 0) return Vector3f::Zero();
+  return through_translucent(from, direction, length);
+}
+
+LaneVectors RayScene::transmittance(const LaneVectors& from, const LaneVectors& direction, Lanes length,
+                                    IntLanes active) const {
+  const Lanes none{};
+  LaneVectors share{none, none, none};
+  if (!any(active)) return share;
+  RTCRay8 rays;
+  const auto store = [](auto* target, const auto& lanes) { std::memcpy(target, &lanes, sizeof(lanes)); };
+  store(rays.org_x, from.x);
+  store(rays.org_y, from.y);
+  store(rays.org_z, from.z);
+  store(rays.dir_x, direction.x);
+  store(rays.dir_y, direction.y);
+  store(rays.dir_z, direction.z);
+  store(rays.tnear, none);
+  store(rays.tfar, length);
+  store(rays.time, none);
+  store(rays.mask, UintLanes{} + kOpaqueCaster);
+  store(rays.id, UintLanes{});
+  store(rays.flags, UintLanes{});
+  alignas(32) std::array<int, kLanes> valid;
+  store(valid.data(), active);
+  embree::occluded(tree_.get(), valid, rays);
+  Lanes far;
+  std::memcpy(&far, rays.tfar, sizeof(far));
+  const IntLanes free = active & (far >= 0.0f);
+  share.x = share.y = share.z = free ? none + 1 : none;
+  if (!has_translucent_) return share;
+  for (int i = 0; i < kLanes; ++i) {
+    if (!free[i]) continue;
+    const Vector3f one = through_translucent({from.x[i], from.y[i], from.z[i]},
+                                             {direction.x[i], direction.y[i], direction.z[i]}, length[i]);
+    share.x[i] = one.x();
+    share.y[i] = one.y();
+    share.z[i] = one.z();
+  }
+  return share;
+}
+
+Vector3f RayScene::through_translucent(const Vector3f& from, const Vector3f& direction, float length) const {
   Vector3f share = Vector3f::Ones(), place = from;
   for (int layer = 0; has_translucent_ && layer < kMostLayers && length > 0; ++layer) {
     RTCRayHit hit_ray;

@@ -12,6 +12,7 @@
 #include <Eigen/Geometry>
 
 #include "render/cloth_surface.h"
+#include "render/lanes.h"
 #include "render/model.h"
 #include "render/trace/ray_material.h"
 
@@ -89,12 +90,16 @@ class RayScene {
   /// Share of the light that arrives along a segment: 0 behind an opaque object, and the product of the
   /// transmittances of translucent ones. `direction` is a unit vector.
   Vector3f transmittance(const Vector3f& from, const Vector3f& direction, float length) const;
+  /// The same for the segments whose `active` is -1; the others get 0.
+  LaneVectors transmittance(const LaneVectors& from, const LaneVectors& direction, Lanes length,
+                            IntLanes active) const;
   /// Returns false if the ray meets nothing within `length` [m].
   bool first_hit(const Vector3f& from, const Vector3f& direction, float length, Hit& hit) const;
 
  private:
   struct Object;
   const Object* meet(RTCRayHit& ray) const;
+  Vector3f through_translucent(const Vector3f& from, const Vector3f& direction, float length) const;
   void attach(RTCGeometryTy* geometry, Object object, bool casts_shadow);
 
   std::vector<Object> objects_;  ///< by Embree's geometry id
@@ -103,12 +108,14 @@ class RayScene {
   bool has_translucent_ = false;
 };
 
+// A point computed in single precision is off by a few units in the last place of its coordinates.
+inline constexpr float kUnitsOffSurface = 32 * std::numeric_limits<float>::epsilon();
+inline constexpr float kLeastOffSurface_m = 1e-7f;
+
 /// A point moved off the surface so that a ray from there does not meet the surface itself because of
 /// rounding. `face`: unit normal on the side of the ray.
 inline Vector3f off_surface(const Vector3f& position, const Vector3f& face) {
-  // A point computed in single precision is off by a few units in the last place of its coordinates.
-  constexpr float kUnits = 32 * std::numeric_limits<float>::epsilon();
-  return position + face * (kUnits * position.cwiseAbs().maxCoeff() + 1e-7f);
+  return position + face * (kUnitsOffSurface * position.cwiseAbs().maxCoeff() + kLeastOffSurface_m);
 }
 
 }  // namespace offstage::render

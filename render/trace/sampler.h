@@ -7,45 +7,63 @@
 
 #include <bit>
 #include <cstdint>
+#include <type_traits>
 
-#include <Eigen/Core>
+#include "render/lanes.h"
 
 namespace offstage::render {
 
-class PixelSampler {
+/// A point in the unit square, or eight of them.
+template <class F>
+struct SquarePoint {
+  F x, y;
+};
+
+/// U: uint32_t for one pixel, or UintLanes for eight pixels.
+template <class U>
+class Sampler {
  public:
+  using F = std::conditional_t<std::is_same_v<U, uint32_t>, float, Lanes>;
+
   /// Sample `index` of `count` of the pixel (x, y), both below 65536.
-  PixelSampler(uint32_t x, uint32_t y, int index, int count)
+  Sampler(U x, U y, int index, int count)
       : reversed_index_(reversed((spread(x) | spread(y) << 1) * std::bit_ceil(static_cast<uint32_t>(count)) +
                                  static_cast<uint32_t>(index))) {}
 
   /// The next two coordinates, each in [0, 1).
-  Eigen::Vector2f next() {
+  SquarePoint<F> next() {
     const uint32_t salt = mixed(++pairs_);
-    const uint32_t k = reversed(permuted(reversed_index_, salt));
+    const U k = reversed(permuted(reversed_index_, salt));
     // The Sobol points are the reversed bits of k and of pascal(k); scrambling starts from reversed bits.
-    const uint32_t x = reversed(permuted(k, salt * 0x9E3779B1u));
-    const uint32_t y = reversed(permuted(pascal(k), salt * 0x85EBCA77u));
-    return {static_cast<float>(x >> 8) * 0x1p-24f, static_cast<float>(y >> 8) * 0x1p-24f};
+    return {fraction(reversed(permuted(k, salt * 0x9E3779B1u))),
+            fraction(reversed(permuted(pascal(k), salt * 0x85EBCA77u)))};
   }
+  /// Leaves out coordinates.
+  void skip(uint32_t pairs) { pairs_ += pairs; }
 
  private:
+  static F fraction(U v) {
+    if constexpr (std::is_same_v<U, uint32_t>)
+      return static_cast<float>(v >> 8) * 0x1p-24f;
+    else
+      return __builtin_convertvector(reinterpret_cast<IntLanes>(v >> 8), Lanes) * 0x1p-24f;
+  }
   // Inserts a zero bit behind each bit.
-  static uint32_t spread(uint32_t v) {
+  static U spread(U v) {
     v = (v | v << 8) & 0x00FF00FFu;
     v = (v | v << 4) & 0x0F0F0F0Fu;
     v = (v | v << 2) & 0x33333333u;
     return (v | v << 1) & 0x55555555u;
   }
-  static uint32_t reversed(uint32_t v) {
-    v = __builtin_bswap32(v);
+  static U reversed(U v) {
+    v = v << 24 | (v & 0xFF00u) << 8 | (v >> 8 & 0xFF00u) | v >> 24;
     v = (v & 0x0F0F0F0Fu) << 4 | (v >> 4 & 0x0F0F0F0Fu);
     v = (v & 0x33333333u) << 2 | (v >> 2 & 0x33333333u);
     return (v & 0x55555555u) << 1 | (v >> 1 & 0x55555555u);
   }
   // The second dimension of the Sobol sequence: its matrix is Pascal's triangle modulo 2, which is a
   // Kronecker power of [1 1; 0 1].
-  static uint32_t pascal(uint32_t v) {
+  static U pascal(U v) {
     v ^= v >> 1 & 0x55555555u;
     v ^= v >> 2 & 0x33333333u;
     v ^= v >> 4 & 0x0F0F0F0Fu;
@@ -59,7 +77,7 @@ class PixelSampler {
   }
   // Each bit is changed by a hash of the lower ones, which permutes the halves of [0, 2^32) recursively if
   // the bits are reversed before and after.
-  static uint32_t permuted(uint32_t v, uint32_t salt) {
+  static U permuted(U v, uint32_t salt) {
     v ^= v * 0x3D20ADEAu;
     v += salt;
     v *= (salt >> 16) | 1;
@@ -67,7 +85,10 @@ class PixelSampler {
     return v ^ v * 0x53A22864u;
   }
 
-  uint32_t reversed_index_, pairs_ = 0;
+  U reversed_index_;
+  uint32_t pairs_ = 0;
 };
+
+using PixelSampler = Sampler<uint32_t>;
 
 }  // namespace offstage::render
