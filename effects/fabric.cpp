@@ -73,13 +73,13 @@ const std::array<FabricPreset, 6> kPresets = {{
       .drag = 1,
       .lift = 0.92,
       .max_stretch = 2}},
-    // A latex balloon of 30 cm weighs 3 g. Here its skin has no stress at a diameter of 20 cm: stretched by
-    // half, it has the tension p R / 2 of a balloon of 30 cm at 2.5 kPa. Drag is that of a sphere, whose
-    // coefficient is 4 (drag - lift) + 4/3 lift = 0.47 (docs/scene-guide.md).
+    // A latex balloon of 30 cm weighs 3 g. Here its skin has no stress at a diameter of 20 cm. Stretched by
+    // lambda = 1.5 it has the tension 1.5 stretch (lambda - 1) / lambda = p R / 2 of a pressure of 2.5 kPa.
+    // Drag is that of a sphere, whose coefficient is 4 (drag - lift) + 4/3 lift = 0.47 (docs/scene-guide.md).
     {"balloon",
      "the skin of a balloon of 20 cm that is blown up to 30 cm",
      {.areal_density = 0.024,
-      .stretch = 250,
+      .stretch = 375,
       .shear = 100,
       .bend = 1e-6,
       .damping = 0.1,

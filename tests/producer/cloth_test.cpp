@@ -113,5 +113,46 @@ TEST(Cloths, SnapshotsHoldEveryPointOfAPinnedSheet) {
   EXPECT_LT(cloth.points[24].y(), 1.99f) << "its middle sags";
 }
 
+TEST(Cloths, CordsHangOnVerticesAndBodiesAndAreDrawn) {
+  LoadedScene loaded = parse_scene(
+      R"({"bodies": [{"name": "weight", "shape": {"type": "sphere", "radius": 0.05}, "mass": 0.01, "position": [0, 1, 0]}],
+          "cloths": [{"name": "balloon", "shape": {"type": "sphere", "radius": 0.1, "divisions": 1},
+                      "position": [0, 2, 0], "fabric": "balloon", "pressure": 3000, "gas_density": 0.17,
+                      "cords": [{"from": [0, -0.1, 0], "to": [0, -0.95, 0], "body": "weight", "segments": 5},
+                                {"from": [0.1, 0, 0], "to": [0.5, 0, 0], "held": false, "segments": 2}]}],
+          "output": {"fps": 30, "duration": 1}})",
+      "s", ".");
+  const ModelLibrary models(loaded.scene, loaded.folder, DecompositionCache(), loaded.warnings);
+  Simulation simulation(loaded.scene, models);
+  for (int i = 0; i < 15; ++i) simulation.advance();
+  const Snapshot snapshot = simulation.snapshot();
+  ASSERT_EQ(snapshot.rods.size(), 7u);
+  const std::vector<Eigen::Vector3f>& points = snapshot.cloths.at(0).points;
+  const auto is_vertex = [&](const Eigen::Vector3f& p) {
+    return std::find(points.begin(), points.begin() + 42, p) != points.begin() + 42;
+  };
+  EXPECT_TRUE(is_vertex(snapshot.rods[0].a));
+  EXPECT_TRUE(is_vertex(snapshot.rods[5].a));
+  for (std::size_t i : {0u, 1u, 2u, 3u, 5u}) EXPECT_EQ(snapshot.rods[i].b, snapshot.rods[i + 1].a);
+  // Its end is fastened to the top of the weight.
+  const BodySample& weight = snapshot.bodies.at(0);
+  const Eigen::Vector3f place = weight.position + weight.orientation * Eigen::Vector3f(0, 0.05f, 0);
+  EXPECT_LT((snapshot.rods[4].b - place).norm(), 1e-5f);
+  // The free end has fallen.
+  EXPECT_LT(snapshot.rods[6].b.y(), 1.9f);
+}
+
+TEST(Cloths, CordsAndGasesThatCannotBeAreRefused) {
+  EXPECT_EQ(cloth_errors(R"({"cords": [{"body": "hand"}]})", R"(, "bodies": [{"name": "band"}])"),
+            "/cloths/0/cords/0/body: there is no body 'hand'; did you mean 'band'?\n");
+  EXPECT_EQ(cloth_errors(R"({"shape": {"type": "sphere"}, "gas_density": 0.2})"),
+            "/cloths/0: gas_density needs a pressure > 0\n");
+  EXPECT_EQ(cloth_errors(R"({"pressure": 100})"), "/cloths/0: pressure needs a closed surface\n");
+  EXPECT_EQ(
+      cloth_errors(R"({"shape": {"type": "sphere"}, "cords": [{"from": [0.1, 0, 0], "to": [0.1, 0, 0]}]})")
+          .find("/cloths/0: cloth: the ends of a cord are at one place"),
+      0u);
+}
+
 }  // namespace
 }  // namespace offstage::producer

@@ -223,6 +223,53 @@ INSTANTIATE_TEST_SUITE_P(Shapes, ClothHangs,
                          testing::Values(Shape(Cylinder{0.02, 2}), Shape(Sphere{0.02}),
                                          Shape(Capsule{0.01, 2})));
 
+/// Whether a sheet is sheared, or stretched along its threads.
+class ClothDamping : public testing::TestWithParam<bool> {};
+
+TEST_P(ClothDamping, OfEachKindOfSpringIsItsShareOfTheCriticalOne) {
+  // Vertices of two cells have several masses. Each spring has the share of its kind.
+  const bool sheared = GetParam();
+  constexpr Real kZeta = 0.05, kOther = 0.8;
+  effects::Fabric fabric = effects::find_fabric("cotton")->fabric;
+  fabric.bend_model = effects::BendModel::springs;
+  fabric.stretch_damping = sheared ? kOther : kZeta;
+  fabric.shear_damping = sheared ? kZeta : kOther;
+  fabric.bend_spring_damping = 0.3;
+  const ClothDef def = effects::grid_cloth({0.2, 0.1, 2, 1}, {}, fabric);
+  for (const ClothSpring& s : def.springs) {
+    const Real ma = def.masses[s.a], mb = def.masses[s.b];
+    const Real share = s.kind == SpringKind::bend                 ? 0.3
+                       : (s.kind == SpringKind::shear) == sheared ? kZeta
+                                                                  : kOther;
+    EXPECT_NEAR(s.damping, 2 * share * std::sqrt(s.stiffness * ma * mb / (ma + mb)), 1e-12);
+  }
+  // A pair of them swings as q'' + 2 zeta omega q' + omega^2 q = 0.
+  const ClothSpring& s =
+      *std::ranges::find(def.springs, sheared ? SpringKind::shear : SpringKind::stretch, &ClothSpring::kind);
+  ClothDef pair;
+  pair.rest_vertices = {Vec3::Zero(), Vec3(s.rest_length, 0, 0)};
+  pair.vertices = {Vec3::Zero(), Vec3(1.01 * s.rest_length, 0, 0)};
+  pair.masses = {def.masses[s.a], def.masses[s.b]};
+  pair.springs = {s};
+  pair.springs[0].a = 0;
+  pair.springs[0].b = 1;
+  pair.springs[0].counterpart_rest = 0;
+  pair.integrator = ClothIntegrator::rk4;
+  const Real reduced = pair.masses[0] * pair.masses[1] / (pair.masses[0] + pair.masses[1]);
+  const Real omega = std::sqrt(s.stiffness / reduced), period = 2 * std::numbers::pi / omega;
+  pair.substep = period / 50;
+  World world({.gravity = Vec3::Zero(), .max_step = pair.substep});
+  const ClothHandle cloth = world.add_cloth(pair);
+  for (int i = 0; i < 150; ++i) world.step(pair.substep);
+  const Real left = (world.cloth(cloth).points[1] - world.cloth(cloth).points[0]).norm() - s.rest_length;
+  const Real swings = omega * std::sqrt(1 - kZeta * kZeta) * 150 * pair.substep;
+  const Real expected = 0.01 * s.rest_length * std::exp(-kZeta * omega * 150 * pair.substep) *
+                        (std::cos(swings) + kZeta / std::sqrt(1 - kZeta * kZeta) * std::sin(swings));
+  EXPECT_NEAR(left, expected, 0.01 * expected);
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, ClothDamping, testing::Bool());
+
 TEST(StiffCloth, ThatTouchesItselfStaysBoundedAndFinite) {
   effects::Fabric fabric = effects::find_fabric("cotton")->fabric;
   fabric.areal_density = 0.2;
