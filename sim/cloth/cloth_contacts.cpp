@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include <oneapi/tbb/parallel_for.h>
 
@@ -16,9 +17,7 @@ constexpr std::size_t kChunk = 1024;
 constexpr Real kStabilization = 0.3;
 /// Two normals with a cosine below this face each other: what lies between is pinched.
 constexpr Real kFacing = -0.5;
-constexpr int kStopSweeps = 10;
-/// Share of an overlap that is taken back per sub-step where taut cloth stops a body.
-constexpr Real kTautRecovery = 0.1;
+constexpr int kStopSweeps = 30;
 
 }  // namespace
 
@@ -40,7 +39,7 @@ void ClothContacts::look(const ClothPoints& points, uint32_t i, std::vector<Near
 }
 
 void ClothContacts::find(const ClothPoints& points, std::span<const uint8_t> collides,
-                         std::span<ClothBody> bodies, Real h) {
+                         std::span<ClothBody> bodies, Real h, Real at) {
   bodies_ = bodies;
   collides_ = collides;
   active_.assign(points.cloth.empty() ? 0 : points.cloth.back() + 1, 0);
@@ -48,7 +47,7 @@ void ClothContacts::find(const ClothPoints& points, std::span<const uint8_t> col
   near_.clear();
   boxes_.clear();
   for (ClothBody& body : bodies) {
-    body.begin(0, 0, 0);
+    body.begin(at, at, 0);
     boxes_.push_back(body.way().swept_bounds());
   }
   seen_at_.resize(points.size());
@@ -138,7 +137,12 @@ void ClothContacts::collect(const ClothPoints& points, std::vector<BodyContact>&
     // An overlap of the start is taken back slowly: the correction counts as velocity.
     const Vec3 motion = points.at(near.point) - points.start_at(near.point) - body.surface_motion(t.on_body);
     const Real before = std::min(t.gap - t.normal.dot(motion), 0.0);
-    found.push_back({near.point, &body, t.normal, t.on_body, t.gap - (1 - kTautRecovery) * before});
+    found.push_back({{near.point, near.point, near.point},
+                     {1, 0, 0},
+                     &body,
+                     t.normal,
+                     t.on_body,
+                     t.gap - (1 - kTautRecovery) * before});
   }
 }
 
@@ -146,7 +150,6 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
   std::fill(active_.begin(), active_.end(), 0);
   near_to_.assign(points.size(), nullptr);
   near_several_.assign(points.size(), 0);
-  any_dynamic_ = false;
   for (std::size_t k = 0; k < near_.size();) {
     touches_.clear();
     const uint32_t point = near_[k].point;
@@ -157,7 +160,6 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
     const std::size_t count = touches_.size();
     if (count == 0) continue;
     active_[points.cloth[point]] += count;
-    any_dynamic_ |= std::ranges::any_of(touches_, [](const Touch& t) { return t.body->is_dynamic(); });
     // What is fixed comes last, so that its surface is kept best.
     std::stable_sort(touches_.begin(), touches_.end(), [](const Touch& a, const Touch& b) {
       return a.body->is_dynamic() > b.body->is_dynamic();
@@ -220,13 +222,36 @@ void ClothContacts::block(Touch& t, ClothBody* holder) {
 }
 
 std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::span<const uint8_t> shortened,
-                                             std::span<const Vec4> kick, std::span<const Real> recoil) {
+                                             std::span<const Vec4> kick, std::span<const Real> recoil,
+                                             std::span<const BodyContact> triangles) {
   struct Stop {
-    Touch touch;
-    Vec3 velocity;  // of the point
-    Real impulse = 0;
+    ClothBody* body;
+    Vec3 normal, on_body;
+    Real speed;  // of the cloth there along the normal [m/s]
+    Real depth;  // of the overlap, at most the thickness [m]
+    uint32_t cloth;
+    bool moves = true;  // in this sub-step; a body that holds cloth would take that along beyond its limits
+    Real share = 1;     // of the body's contacts here, whose impulses are found at the same time
+    Real impulse = 0;   // so far [N s]
+    Real change = 0;    // in this sweep
   };
   std::vector<Stop> stops;
+  struct OnBody {
+    Real contacts = 0;
+    bool holds_cloth = false;
+  };
+  std::map<const ClothBody*, OnBody> on_bodies;
+  const auto add = [&](ClothBody& body, const Vec3& normal, const Vec3& on_body, const Vec3& velocity,
+                       Real depth, uint32_t point) {
+    stops.push_back({&body, normal, on_body, normal.dot(velocity), std::min(depth, points.thickness[point]),
+                     points.cloth[point]});
+    const auto [at, is_new] = on_bodies.try_emplace(&body);
+    ++at->second.contacts;
+    if (is_new) at->second.holds_cloth = std::ranges::count(points.holder, &body) > 0;
+  };
+  const auto velocity = [&](uint32_t i, const ClothBody& body) {
+    return Vec3((points.at(i) - points.start_at(i)) / body.duration() + kick[i].head<3>());
+  };
   for (Near& near : near_) {
     ClothBody& body = bodies_[near.body];
     if (!body.is_dynamic() || !shortened[near.point]) continue;
@@ -235,25 +260,37 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
     if (near.distance - (place - near.place).norm() >= thickness) continue;
     const SurfaceDistance s = signed_distance(body.solid(), place);
     if (s.distance >= thickness) continue;
-    stops.push_back({{&near, &body, body.end().vector_to_world(s.normal),
-                      body.end().point_to_world(place - s.distance * s.normal), s.distance - thickness},
-                     (p - points.start_at(near.point)) / body.duration() + kick[near.point].head<3>()});
+    add(body, body.end().vector_to_world(s.normal), body.end().point_to_world(place - s.distance * s.normal),
+        velocity(near.point, body), thickness - s.distance, near.point);
+  }
+  for (const BodyContact& c : triangles) {
+    if (c.gap >= 0 || std::ranges::none_of(c.points, [&](uint32_t i) { return shortened[i] != 0; })) continue;
+    Vec3 mean = Vec3::Zero();
+    for (std::size_t k = 0; k < 3; ++k) mean += c.weights[k] * velocity(c.points[k], *c.body);
+    add(*c.body, c.normal, c.on_body, mean, -c.gap, c.points[0]);
+  }
+  for (Stop& s : stops) {
+    s.share = 1 / on_bodies[s.body].contacts;
+    s.moves = !on_bodies[s.body].holds_cloth;
   }
   std::vector<Vec3> taken(recoil.size(), Vec3::Zero());
-  // Projected Gauss-Seidel: all of them stop a body together, or the first would turn it aside.
-  for (int sweep = 0; sweep < kStopSweeps; ++sweep)
+  // Projected Jacobi iteration: all contacts stop a body together. One after the other, the first would turn
+  // it aside. The body moves by the change of its velocity already in this sub-step: if it went on to the end
+  // of it, a fast one would be behind the cloth.
+  for (int sweep = 0; sweep < kStopSweeps && !stops.empty(); ++sweep) {
     for (Stop& s : stops) {
-      const Touch& t = s.touch;
-      const uint32_t cloth = points.cloth[t.near->point];
-      const Real depth = std::min(-t.gap, points.thickness[t.near->point]);
       const Real approach =
-          t.normal.dot(t.body->velocity(t.on_body) - s.velocity) + kStabilization * depth / h_;
-      const Real impulse =
-          std::max(-s.impulse, approach / (t.body->mobility(t.on_body, t.normal) + recoil[cloth]));
-      s.impulse += impulse;
-      t.body->push(-impulse * t.normal, t.on_body);
-      taken[cloth] += impulse * t.normal;
+          s.normal.dot(s.body->velocity(s.on_body)) - s.speed + kStabilization * s.depth / h_;
+      const Real mobility = s.body->mobility(s.on_body, s.normal) + recoil[s.cloth];
+      s.change = std::max(-s.impulse, s.share * approach / mobility);
     }
+    for (Stop& s : stops) {
+      s.impulse += s.change;
+      const Vec3 impulse = -s.change * s.normal;
+      s.moves ? s.body->pull(impulse, s.on_body, 1) : s.body->push(impulse, s.on_body);
+      taken[s.cloth] += s.change * s.normal;
+    }
+  }
   return taken;
 }
 

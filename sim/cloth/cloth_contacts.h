@@ -25,8 +25,8 @@ class ClothContacts {
  public:
   /// Finds the bodies that points can touch in a sub-step of the world of length h. `collides` tells for each
   /// point whether it collides.
-  void find(const ClothPoints& points, std::span<const uint8_t> collides, std::span<ClothBody> bodies,
-            Real h);
+  void find(const ClothPoints& points, std::span<const uint8_t> collides, std::span<ClothBody> bodies, Real h,
+            Real at = 0);
   /// Greatest speed of points against dynamic bodies that they can touch [m/s].
   Real fastest_approach(const ClothPoints& points) const;
   /// Repeats the search for points that moved farther than predicted.
@@ -38,11 +38,13 @@ class ClothContacts {
   /// that they keep.
   void collect(const ClothPoints& points, std::vector<BodyContact>& found);
   /// Stops bodies that press into cloth whose moves were shortened, which are those of points with a non-zero
-  /// `shortened`. `recoil` is the inverse mass of the piece of cloth of each point: 0 if it is pinned to the
-  /// world; `kick` is the velocity of points besides that of their moves. Returns for each cloth the impulse
-  /// that it absorbs [N s].
+  /// `shortened`, and takes back the part of their moves that goes on against it. `triangles` are their
+  /// contacts with triangles. The result does not depend on the order of the contacts. `recoil` is the
+  /// inverse mass of the piece of cloth of each point: 0 if it is pinned to the world; `kick` is the velocity
+  /// of points besides that of their moves. Returns for each cloth the impulse that it absorbs [N s].
   std::vector<Vec3> stop_bodies(const ClothPoints& points, std::span<const uint8_t> shortened,
-                                std::span<const Vec4> kick, std::span<const Real> recoil);
+                                std::span<const Vec4> kick, std::span<const Real> recoil,
+                                std::span<const BodyContact> triangles);
 
   /// A body to which a point was so close in the last solve() that it may soon touch it, or null; and whether
   /// there were several.
@@ -52,7 +54,6 @@ class ClothContacts {
   bool is_near_several(std::size_t point) const {
     return point < near_several_.size() && near_several_[point];
   }
-  bool any_dynamic() const { return any_dynamic_; }             ///< whether a dynamic body touches cloth
   std::span<const uint64_t> active() const { return active_; }  ///< contacts of the last solve(), by cloth
   /// Raises the greatest penetration of each cloth's points to that at the end of a sub-step [m].
   void measure(const ClothPoints& points, std::span<Real> penetration) const;
@@ -81,7 +82,6 @@ class ClothContacts {
   std::span<ClothBody> bodies_;
   std::span<const uint8_t> collides_;
   Real h_ = 0;
-  bool any_dynamic_ = false;
   std::vector<Near> near_;  // by point
   // For each point, a body that it is near, and whether it is near several.
   std::vector<const ClothBody*> near_to_;

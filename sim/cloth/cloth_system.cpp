@@ -12,7 +12,7 @@ namespace offstage::sim {
 namespace {
 
 /// Solutions for contacts with bodies and the stretch limit together.
-constexpr int kMaxTurns = 8;
+constexpr int kMaxTurns = 16;
 /// Substeps of cloth in one of the world.
 constexpr Real kMaxParts = 1000;
 /// Stretch is not limited so that cloth could not tear: the limit is at least this much above.
@@ -180,11 +180,13 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
     leak_gas(*cloths_[c], weather.h);
     add_outer_forces(*cloths_[c], first_[c], weather, points_);
   }
+  for (Cloth* cloth : cloths_) cloth->before = cloth->points;
   find_held(weather.time, bodies);
   for (const Carrier& carrier : carriers_) carrier.body->fall_along_parabola(weather.gravity);
   contacts_.find(points_, collides_, bodies, weather.h);
   corner_contacts_.find(points_, bodies, weather.h);
-  if (const Real speed = contacts_.fastest_approach(points_); speed > 0)
+  const Real speed = contacts_.fastest_approach(points_);
+  if (speed > 0)
     longest = std::min(longest, std::max(kMostApproach * corner_contacts_.mean_edge() / speed,
                                          std::min(longest, weather.h) / kMostDivision));
   const Real parts = std::clamp(std::ceil(weather.h / longest * (1 - 1e-12)), 1.0, kMaxParts);
@@ -194,9 +196,17 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
   time_ = weather.time + weather.h;
   // Moves of bodies that hang on cloth are shortened within one sub-step.
   const Real span = carriers_.empty() ? std::max(1.0, std::floor(kSpan / dt * (1 + 1e-9))) : 1;
+  Real since_look = 0;  // way of the fastest body [m]
   for (Real k = 0; k < parts; ++k) {
     for (Cloth* cloth : cloths_) cloth->age += dt;
     substep(k / parts, (k + 1) / parts, dt, k + 1 == parts || span_ + 1 >= span);
+    // A body that goes by more than an edge of the cloth in a sub-step of the world must find the holes that
+    // it tears.
+    since_look += speed * dt;
+    if (since_look > corner_contacts_.mean_edge() && k + 1 < parts) {
+      since_look = 0;
+      if (any_tears()) tear_within(weather, (k + 1) / parts);
+    }
   }
   count_penetration();
   write_back();
@@ -235,16 +245,32 @@ void ClothSystem::push_apart(Real dt) {
       cuts_.push_back({i, (1 - 1.0 / span_) * (points_.position[i] - free_[i])});
 }
 
-/// Bodies push cloth out of their way. Where that makes it too long, contacts and springs are solved for
-/// together, and linearised again in each turn.
+/// Bodies push cloth out of their way. Where springs are too long, contacts and springs are solved for
+/// together, and linearised again in each turn. That includes bodies that cloth does not touch in this
+/// sub-step but soon may: cloth under a body often flies ahead of it for a sub-step.
 void ClothSystem::touch_bodies(Real dt) {
   contacts_.find_runaways(points_);
   corner_contacts_.solve(points_, dt, cuts_);
   contacts_.solve(points_, dt, parts_, cuts_);
-  for (int round = 1; round < kMaxTurns && contacts_.any_dynamic() && limit_.any_too_long(points_); ++round) {
+  for (int round = 1; round < kMaxTurns && limit_.any_too_long(points_); ++round) {
     body_contacts_.clear();
     contacts_.collect(points_, body_contacts_);
+    collect_triangles();
+    if (body_contacts_.empty()) break;
     limit_.project_with(body_contacts_, points_, carriers_, dt);
+  }
+}
+
+/// Triangles at dynamic bodies. An overlap of the start is taken back slowly: the correction counts as
+/// velocity.
+void ClothSystem::collect_triangles() {
+  const std::size_t first = body_contacts_.size();
+  corner_contacts_.collect(points_, 1, body_contacts_);
+  for (BodyContact& c : std::span(body_contacts_).subspan(first)) {
+    Vec3 motion = -c.body->surface_motion(c.on_body);
+    for (std::size_t k = 0; k < 3; ++k)
+      motion += c.weights[k] * (points_.at(c.points[k]) - points_.start_at(c.points[k]));
+    c.gap -= (1 - kTautRecovery) * std::min(c.gap - c.normal.dot(motion), 0.0);
   }
 }
 
@@ -372,7 +398,6 @@ void ClothSystem::write_back() {
       stop(cloth, first_[c]);
       continue;
     }
-    cloth.before = cloth.points;
     for (std::size_t i = 0; i < cloth.points.size(); ++i) {
       cloth.points[i] = points_.at(first_[c] + i);
       cloth.velocities[i] = points_.velocity[first_[c] + i].head<3>();
@@ -381,6 +406,36 @@ void ClothSystem::write_back() {
     cloth.report.torn += torn;
     changed_ |= torn > 0;
   }
+}
+
+bool ClothSystem::any_tears() const {
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    const Real tear = cloths_[c]->def.tear;
+    if (tear == 0 || cloths_[c]->stopped) continue;
+    for (const ClothSpring& s : springs_of(c)) {
+      const Real longest = tear * s.rest_length;
+      if (s.kind == SpringKind::stretch &&
+          (points_.position[s.a] - points_.position[s.b]).squaredNorm() > longest * longest)
+        return true;
+    }
+  }
+  return false;
+}
+
+/// Tears cloths after a fraction of the world's sub-step, and begins again with what is left of them.
+void ClothSystem::tear_within(const ClothWeather& weather, Real fraction) {
+  time_ = weather.time + fraction * weather.h;
+  write_back();
+  time_ = weather.time + weather.h;
+  if (!changed_) return;
+  assemble();
+  points_.inverse_mass.resize(points_.size());
+  ClothWeather now = weather;
+  now.time += fraction * weather.h;
+  for (std::size_t c = 0; c < cloths_.size(); ++c) add_outer_forces(*cloths_[c], first_[c], now, points_);
+  find_held(weather.time, bodies_);
+  contacts_.find(points_, collides_, bodies_, weather.h, fraction);
+  corner_contacts_.find(points_, bodies_, weather.h);
 }
 
 /// Tears the threads that are too long, and reports the first tear.

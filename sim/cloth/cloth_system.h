@@ -76,6 +76,7 @@ class ClothSystem {
   void integrate(Real dt);
   void close_seams(Real dt);
   void touch_bodies(Real dt);
+  void collect_triangles();
   // In shorten_moves.cpp:
   void find_frames();
   bool is_near_another(uint32_t point);
@@ -97,6 +98,8 @@ class ClothSystem {
   Real share_at_once(std::size_t cloth, Real dt) const;
   void push_holders(Real dt);
   void write_back();
+  bool any_tears() const;
+  void tear_within(const ClothWeather& weather, Real fraction);
   uint32_t tear_at(std::size_t cloth, Real time);
   void stop(Cloth& cloth, std::size_t first);
   void stop_lost(Real dt);

@@ -52,7 +52,7 @@ bool RoundContacts::concerns(const Solid& solid, Real edge, Real thickness) {
 }
 
 std::optional<TriangleContact> RoundContacts::touch(const Triangle& t, const ClothPoints& points,
-                                                    const ClothBody& body) {
+                                                    const ClothBody& body, Real reach) {
   const std::optional<Rounding> shape = rounding(body.solid());
   if (!shape) return {};
   const Real keeps = kTriangleDistance * points.thickness[t[0]];
@@ -71,12 +71,12 @@ std::optional<TriangleContact> RoundContacts::touch(const Triangle& t, const Clo
     for (std::size_t k = 0; k < 3; ++k) at[k] = from[k] + s * (to[k] - from[k]);
     const TrianglePoint nearest = nearest_to_axis(*shape, at);
     const SurfaceDistance d = signed_distance(body.solid(), nearest.point);
-    if (d.distance >= keeps) continue;
+    if (d.distance >= keeps + reach) continue;
     const auto& w = nearest.weights;
     if (std::max({w[0], w[1], w[2]}) > kWithin) return {};
     const Vec3 end = w[0] * to[0] + w[1] * to[1] + w[2] * to[2];
     const Real gap = d.distance + d.normal.dot(end - nearest.point) - keeps;
-    if (gap >= 0) return {};
+    if (gap >= reach) return {};
     const Vec3 on_body = nearest.point - d.distance * d.normal;
     return TriangleContact{
         {w[0], w[1], w[2]}, body.end().point_to_world(on_body), body.end().vector_to_world(d.normal), gap};
@@ -87,8 +87,20 @@ std::optional<TriangleContact> RoundContacts::touch(const Triangle& t, const Clo
 void RoundContacts::solve(std::span<const Triangle> triangles, ClothPoints& points,
                           std::span<ClothBody> bodies, Real dt, std::vector<VelocityCut>& cuts) const {
   for (const Near& near : near_)
-    if (const auto contact = touch(triangles[near.triangle], points, bodies[near.body]))
+    if (const auto contact = touch(triangles[near.triangle], points, bodies[near.body], 0))
       separate(*contact, triangles[near.triangle], points, bodies[near.body], dt, cuts);
+}
+
+void RoundContacts::collect(std::span<const Triangle> triangles, const ClothPoints& points,
+                            std::span<ClothBody> bodies, Real reach, std::vector<BodyContact>& found) const {
+  for (const Near& near : near_) {
+    ClothBody& body = bodies[near.body];
+    if (!body.is_dynamic()) continue;
+    const Triangle& t = triangles[near.triangle];
+    const auto contact = touch(t, points, body, reach * points.thickness[t[0]]);
+    if (!contact) continue;
+    found.push_back({t, contact->weights, &body, contact->normal, contact->on_body, contact->gap});
+  }
 }
 
 }  // namespace offstage::sim

@@ -25,6 +25,10 @@ class RoundContacts {
   /// Takes triangles out of the bodies in a sub-step of cloth of length dt. Appends to `cuts`.
   void solve(std::span<const Triangle> triangles, ClothPoints& points, std::span<ClothBody> bodies, Real dt,
              std::vector<VelocityCut>& cuts) const;
+  /// Contacts with dynamic bodies as points are now, also of triangles within `reach` thicknesses of the
+  /// cloth more than the distance that they keep.
+  void collect(std::span<const Triangle> triangles, const ClothPoints& points, std::span<ClothBody> bodies,
+               Real reach, std::vector<BodyContact>& found) const;
 
  private:
   struct Near {
@@ -32,7 +36,7 @@ class RoundContacts {
   };
 
   static std::optional<TriangleContact> touch(const Triangle& t, const ClothPoints& points,
-                                              const ClothBody& body);
+                                              const ClothBody& body, Real reach);
 
   std::vector<Near> near_;
 };

@@ -229,7 +229,9 @@ void ClothSystem::shorten_carrier(Carrier& carrier, Real share) {
 /// A cloth that gives no more stops bodies as one with those that it hangs on.
 void ClothSystem::stop_bodies() {
   const std::vector<Real> recoil = recoils();
-  const std::vector<Vec3> taken = contacts_.stop_bodies(points_, shortened_, kick_, recoil);
+  body_contacts_.clear();
+  corner_contacts_.collect(points_, 0, body_contacts_);
+  const std::vector<Vec3> taken = contacts_.stop_bodies(points_, shortened_, kick_, recoil, body_contacts_);
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     if (!(recoil[c] > 0) || taken[c] == Vec3::Zero()) continue;
     const Vec3 gain = recoil[c] * taken[c];

@@ -38,8 +38,25 @@ uint32_t TautSprings::place_of(uint32_t point) {
   return place_[point];
 }
 
+uint32_t TautSprings::mean_place(const BodyContact& contact) {
+  MeanPlace mean{0, {}, contact.weights};
+  for (std::size_t k = 0; k < 3; ++k) mean.corners[k] = place_of(contact.points[k]);
+  mean.place = static_cast<uint32_t>(places_.size());
+  places_.push_back({kNone, kNone, Vec3::Zero()});
+  mean_places_.push_back(mean);
+  return mean.place;
+}
+
 Real TautSprings::compliance_at(uint32_t place, const Vec4& direction) const {
   const Place& at = places_[place];
+  if (at.point == kNone && at.body == kNone) {
+    // Corners on one body count as if they moved it alone: the value only scales and preconditions.
+    const MeanPlace& mean = *std::ranges::find(mean_places_, place, &MeanPlace::place);
+    Real sum = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      sum += mean.weights[k] * mean.weights[k] * compliance_at(mean.corners[k], direction);
+    return sum;
+  }
   if (at.body == kNone) return points_.inverse_mass[at.point];
   const Vec3 u = direction.head<3>();
   const Vec6 push = (Vec6() << u, at.arm.cross(u)).finished();
@@ -74,7 +91,8 @@ void TautSprings::add(const BodyContact& contact) {
   const auto spot = static_cast<uint32_t>(places_.size());
   places_.push_back(
       {kNone, static_cast<uint32_t>(at - bodies_.begin()), contact.on_body - at->body->centre()});
-  add_row(place_of(contact.point), spot, padded(contact.normal), -contact.gap);
+  const uint32_t place = contact.weights[0] == 1 ? place_of(contact.points[0]) : mean_place(contact);
+  add_row(place, spot, padded(contact.normal), -contact.gap);
 }
 
 /// Sums impulses on places and bodies.
@@ -86,6 +104,8 @@ void TautSprings::gather(std::span<const Real> impulses) {
     moves_[rows_[k].first] += impulses[k] * rows_[k].direction;
     moves_[rows_[k].second] -= impulses[k] * rows_[k].direction;
   }
+  for (const MeanPlace& mean : mean_places_)
+    for (std::size_t k = 0; k < 3; ++k) moves_[mean.corners[k]] += mean.weights[k] * moves_[mean.place];
   for (std::size_t k = 0; k < places_.size(); ++k) {
     if (places_[k].body == kNone) continue;
     const Vec3 push = moves_[k].head<3>();
@@ -99,10 +119,15 @@ void TautSprings::multiply(std::span<const Real> x, std::span<Real> y) {
   for (std::size_t b = 0; b < bodies_.size(); ++b) impulses_[b] = bodies_[b].mobility * impulses_[b];
   for (std::size_t k = 0; k < places_.size(); ++k) {
     const Place& at = places_[k];
+    if (at.body == kNone && at.point == kNone) continue;
     if (at.body == kNone)
       moves_[k] *= points_.inverse_mass[at.point];
     else
       moves_[k] = padded(impulses_[at.body].head<3>() + impulses_[at.body].tail<3>().cross(at.arm));
+  }
+  for (const MeanPlace& mean : mean_places_) {
+    moves_[mean.place].setZero();
+    for (std::size_t k = 0; k < 3; ++k) moves_[mean.place] += mean.weights[k] * moves_[mean.corners[k]];
   }
   for (std::size_t k = 0; k < rows_.size(); ++k)
     y[k] = rows_[k].direction.dot(moves_[rows_[k].first] - moves_[rows_[k].second]);
@@ -184,7 +209,7 @@ void TautSprings::apply(ClothPoints& points, Real dt) {
   gather(lambda_);
   for (std::size_t k = 0; k < places_.size(); ++k) {
     const Place& at = places_[k];
-    if (at.body != kNone) continue;
+    if (at.body != kNone || at.point == kNone) continue;
     if (points.inverse_mass[at.point] > 0)
       points.position[at.point] += points.inverse_mass[at.point] * moves_[k];
     else

@@ -27,13 +27,17 @@ struct SpringLimit {
   bool tears = false;  ///< it tears before, between steps of the world, and stops no body
 };
 
-/// A point of cloth at a dynamic body.
+/// A point of cloth, or a place within a triangle, at a dynamic body.
 struct BodyContact {
-  uint32_t point;
+  std::array<uint32_t, 3> points;  ///< a point alone: three times the same
+  std::array<Real, 3> weights;     ///< of them at the place; a point alone: 1, 0, 0
   ClothBody* body;
   Vec3 normal, on_body;  ///< of the body's surface, and on it [m]
-  Real gap;              ///< by which the point may still approach; negative: it has to move away [m]
+  Real gap;              ///< by which the place may still approach; negative: it has to move away [m]
 };
+
+/// Share of an overlap that is taken back per sub-step where taut cloth stops a body.
+inline constexpr Real kTautRecovery = 0.1;
 
 class TautSprings {
  public:
@@ -57,10 +61,16 @@ class TautSprings {
     const Carrier* carrier;  // or null
     Mat6 carried, mobility;
   };
-  /// What a row acts on: a point, which a body may carry, or a spot on a body.
+  /// What a row acts on: a point, which a body may carry, a spot on a body, or a mean place.
   struct Place {
     uint32_t point, body;
     Vec3 arm;  // from the body's centre
+  };
+  /// A place within a triangle: the mean of those of its corners.
+  struct MeanPlace {
+    uint32_t place;
+    std::array<uint32_t, 3> corners;  // places
+    std::array<Real, 3> weights;
   };
   /// Acts on one place along the direction, and on the other against it.
   struct Row {
@@ -72,6 +82,7 @@ class TautSprings {
   };
 
   uint32_t place_of(uint32_t point);
+  uint32_t mean_place(const BodyContact& contact);
   Real compliance_at(uint32_t place, const Vec4& direction) const;
   void add_row(uint32_t first, uint32_t second, const Vec4& direction, Real excess);
   void gather(std::span<const Real> impulses);
@@ -83,7 +94,8 @@ class TautSprings {
   std::vector<MovedBody> bodies_;
   std::vector<Vec6> impulses_;   // on the bodies
   std::vector<uint32_t> place_;  // of each point; kNone: none yet
-  std::vector<Place> places_;
+  std::vector<Place> places_;    // of a mean place: neither point nor body
+  std::vector<MeanPlace> mean_places_;
   std::vector<Vec4> moves_;  // impulses, then moves, of each place
   std::vector<Row> rows_;
   std::vector<Real> lambda_;  // [kg m]

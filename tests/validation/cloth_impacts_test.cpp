@@ -1,0 +1,96 @@
+/// Bodies that hit cloth: rebounds along the axis of a symmetric cloth, and small fast bodies, which go
+/// through only where the cloth tears.
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <tuple>
+
+#include <gtest/gtest.h>
+
+#include "effects/cloth.h"
+#include "sim/world.h"
+
+namespace offstage::sim {
+namespace {
+
+/// A square cloth in the plane y = 0, pinned along its border.
+ClothDef framed_cloth(const effects::Fabric& fabric, Real side, uint32_t cells) {
+  ClothDef def = effects::grid_cloth({side, side, cells, cells}, {}, fabric);
+  for (uint32_t i = 0; i < def.vertices.size(); ++i)
+    if (std::max(std::abs(def.vertices[i].x()), std::abs(def.vertices[i].z())) > 0.499 * side)
+      def.pins.push_back({.vertex = i, .position = def.vertices[i]});
+  return def;
+}
+
+/// Fabric, cells and speed.
+class ClothRebound : public testing::TestWithParam<std::tuple<std::string, uint32_t, Real>> {};
+
+TEST_P(ClothRebound, LeavesAlongTheAxisOnWhichTheBallCame) {
+  // Of a ball on the axis of a symmetric cloth, which reaches its stretch limit. What stops the ball acts on
+  // one side as on the other, but for rounding and the order in which contacts and springs are solved.
+  const auto [name, cells, speed] = GetParam();
+  const bool is_denim = name == "denim";
+  const Real radius = is_denim ? 0.1 : 0.16, mass = is_denim ? 1 : 3.1;
+  effects::Fabric fabric = effects::find_fabric(name)->fabric;
+  if (!is_denim) fabric.thickness = 0.012;
+  World world({.gravity = Vec3::Zero()});
+  const BodyHandle ball = world.add_body({.shape = Sphere{radius},
+                                          .pose = {Vec3(0, radius + 0.05, 0)},
+                                          .velocity = {0, -speed, 0},
+                                          .mass = mass});
+  world.add_cloth(framed_cloth(fabric, 1.2, cells));
+  Real lowest = 0;
+  for (int i = 0; i < 180; ++i) {
+    const StepReport report = world.step(1.0 / 240);
+    const BodyState state = world.body(ball);
+    lowest = std::min(lowest, state.pose.position.y() - radius);
+    ASSERT_LT(report.cloth_penetration, fabric.thickness) << i;
+    ASSERT_LT(std::hypot(state.velocity.x(), state.velocity.z()), 0.05 * speed) << i;
+    // Nothing acts but the cloth, which is at rest at first.
+    ASSERT_LE(state.velocity.norm(), speed * (1 + 1e-9)) << i;
+  }
+  // The cloth gave way nearly as far as its limit lets it, 0.6 sqrt(1.1^2 - 1) = 0.275 m, and threw the ball
+  // back.
+  EXPECT_LT(lowest, -0.15);
+  EXPECT_GT(lowest, -0.28);
+  EXPECT_GT(world.body(ball).velocity.y(), 0.05 * speed);
+}
+
+INSTANTIATE_TEST_SUITE_P(Balls, ClothRebound,
+                         testing::Combine(testing::Values("cotton", "denim"), testing::Values(24, 40),
+                                          testing::Values(5.5, 12.0)));
+
+/// Fabric, length over rest length at which it tears, and where the ball comes [m].
+class ClothBullet : public testing::TestWithParam<std::tuple<std::string, Real, Real>> {};
+
+TEST_P(ClothBullet, GoesThroughOnlyWhereTheClothTears) {
+  // A ball of 30 g and 200 m/s that is smaller than a cell, on a vertex, beside one and on an edge.
+  const auto [name, tear, place] = GetParam();
+  ClothDef def = framed_cloth(effects::find_fabric(name)->fabric, 0.6, 24);
+  def.tear = tear;
+  World world({.gravity = Vec3::Zero()});
+  const BodyHandle ball = world.add_body({.shape = Sphere{0.01},
+                                          .pose = {Vec3(place, 0.1, 0.67 * place)},
+                                          .velocity = {0, -200, 0},
+                                          .mass = 0.03});
+  const ClothHandle cloth = world.add_cloth(def);
+  uint64_t torn = 0;
+  for (int i = 0; i < 48; ++i) {
+    ASSERT_TRUE(world.step(1.0 / 240).finite);
+    torn += world.cloth_report(cloth).torn;
+    ASSERT_LE(world.body(ball).velocity.norm(), 200 * (1 + 1e-9)) << i;
+  }
+  EXPECT_EQ(torn > 0, tear > 0);
+  if (tear > 0) return;
+  // A whole cloth gives way by half its width times sqrt(1.1^2 - 1) = 0.14 m, and throws the ball back.
+  EXPECT_GT(world.body(ball).pose.position.y(), -0.15);
+  EXPECT_GT(world.body(ball).velocity.y(), 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Fabrics, ClothBullet,
+                         testing::Combine(testing::Values("cotton", "denim"), testing::Values(0.0, 1.3),
+                                          testing::Values(0.0, 0.009, 0.0125)));
+
+}  // namespace
+}  // namespace offstage::sim
