@@ -21,9 +21,17 @@ class LightPass {
   void begin() const;
   /// Reads the surfaces, traces their light, and binds it for the shaders.
   void trace(const LightSources& sources, const View& view, const SampleOffsets& offsets);
+  /// After trace(): binds the targets for drawing the surfaces of glass in a part of the picture, and then
+  /// traces their light. `depth`: the picture's, which hides glass behind opaque surfaces.
+  void begin_glass(GLuint depth, const Eigen::AlignedBox2i& area_px);
+  void trace_glass(const LightSources& sources, const View& view, const SampleOffsets& offsets);
 
  private:
+  void read_surfaces(const Eigen::AlignedBox2i& area_px, SurfaceBuffer& surfaces) const;
+  LightView light_view(const View& view, const SampleOffsets& offsets) const;
+
   RayScene scene_;
+  Eigen::AlignedBox2i all_px_;
   SurfaceBuffer surfaces_;
   LightBuffer light_;
   gl::Texture places_, normals_;
@@ -31,6 +39,13 @@ class LightPass {
   gl::Texture arriving_, mirrored_;
   bool mirrored_is_filled_ = true;  ///< with anything but zeros
   gl::Texture lamps_, highlights_;  ///< created when there are lamps
+
+  // Created when there is glass.
+  gl::Texture glass_depth_, through_glass_, mirrored_by_glass_;
+  gl::Framebuffer glass_framebuffer_;
+  Eigen::AlignedBox2i glass_px_;
+  SurfaceBuffer glass_;
+  GlassBuffer glass_light_;
 };
 
 }  // namespace offstage::render

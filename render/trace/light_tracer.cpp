@@ -54,6 +54,34 @@ float fresnel_of_glass(float cosine, float ratio) {
   return 0.5f * (s * s + p * p);
 }
 
+float refraction_ratio(const Hit& hit) {
+  return hit.front || hit.material->thin ? 1 / hit.material->refraction : hit.material->refraction;
+}
+
+/// Share of the light along a ray that a surface of glass mirrors.
+float mirrored_share(const Hit& hit, const Vector3f& direction) {
+  return fresnel_of_glass(std::min(-hit.normal.dot(direction), 1.0f), refraction_ratio(hit));
+}
+
+/// Moves a ray through a surface of glass, which it refracts; returns the share of the light that the colour
+/// leaves. A solid piece takes half of its colour, as a factor, where the ray enters, and half where it
+/// leaves.
+Vector3f enter(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Vector3f& from,
+               Vector3f& direction) {
+  from = off_surface(hit.position, -hit.face);
+  const Vector3f color = albedo.cwiseMax(0);
+  if (hit.material->thin) return color;
+  const float a = hit.material->roughness * hit.material->roughness;
+  const Vector3f n = a < 1e-3f ? hit.normal : visible_facet(hit.normal, -direction, a, sampler.next());
+  const float ratio = refraction_ratio(hit), cosine = std::min(-n.dot(direction), 1.0f);
+  const float sine2 = ratio * ratio * std::max(1 - cosine * cosine, 0.0f);
+  const Vector3f refracted = ratio * direction + (ratio * cosine - std::sqrt(std::max(1 - sine2, 0.0f))) * n;
+  direction = refracted.normalized();
+  if (direction.dot(hit.face) >= 0)
+    direction = reflected(direction, hit.face);  // smooth normals are not exact
+  return color.cwiseSqrt();
+}
+
 // GGX as in shaders/light.glsl.
 Lanes lobe_of(Lanes a, Lanes nl, Lanes nv, Lanes nh) {
   const Lanes a2 = a * a, d = nh * nh * (a2 - 1) + 1;
@@ -231,24 +259,16 @@ Vector3f LightTracer::radiance(Vector3f from, Vector3f direction, float cone, Pi
     random /= color.w();
     const Vector3f albedo = color.head<3>();
     if (material.unlit) return sum + share.cwiseProduct(albedo);
-    sum += share.cwiseProduct(material.emission);
+    // Of glass, as on the screen, only the side towards the eye glows.
+    if (hit.front || material.transmission <= 0) sum += share.cwiseProduct(material.emission);
     if (random < material.transmission) {
-      const float ratio = hit.front ? 1 / material.refraction : material.refraction;
-      const float cosine = std::min(-hit.normal.dot(direction), 1.0f);
-      const float mirrored = fresnel_of_glass(cosine, material.thin ? 1 / material.refraction : ratio);
-      if (choice.y < mirrored) {
+      if (choice.y < mirrored_share(hit, direction)) {
         direction = reflected(direction, hit.normal);
         from = off_surface(hit.position, hit.face);
         if (direction.dot(hit.face) <= 0) direction = reflected(direction, hit.face);
         continue;
       }
-      share = share.cwiseProduct(albedo.cwiseMax(0).cwiseSqrt());
-      if (material.thin) share = share.cwiseProduct(albedo.cwiseMax(0).cwiseSqrt());
-      const float sine2 = ratio * ratio * std::max(1 - cosine * cosine, 0.0f);
-      if (!material.thin)
-        direction = (ratio * direction + (ratio * cosine - std::sqrt(std::max(1 - sine2, 0.0f))) * hit.normal)
-                        .normalized();
-      from = off_surface(hit.position, -hit.face);
+      share = share.cwiseProduct(enter(hit, albedo, sampler, from, direction));
       continue;
     }
     from = off_surface(hit.position, hit.face);
@@ -278,7 +298,7 @@ Vector3f LightTracer::radiance(Vector3f from, Vector3f direction, float cone, Pi
     const SquarePoint<float> end = sampler.next();
     if (++bounces >= kMostBounces || end.x >= survives) return sum;
     share /= survives;
-    direction = cosine_direction(n, sampler.next());
+    direction = to_eigen(cosine_direction(from_eigen(n), sampler.next()));
     if (direction.dot(hit.face) <= 0) direction = reflected(direction, hit.face);
     sharp = false;
     cone = 0.5f;
@@ -403,13 +423,17 @@ void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, const
   const IntLanes mirrors = points.mirrors & ~points.own_mirrors;
   light.with_mirror.set_lanes(x, y, mirrors ? none + 1 : none);
   light.with_rough_mirror.set_lanes(x, y, mirrors & (points.roughness > kSharpMirror) ? none + 1 : none);
+  Sampler<UintLanes> samplers(UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x),
+                              UintLanes{} + static_cast<uint32_t>(y), k, view.offsets.count);
+  const LaneVectors ways = cosine_direction(points.normal, samplers.next());
   LaneVectors around{none, none, none}, mirrored = around;
   Lanes inverse_distance{};
   for (int i = 0; i < count; ++i) {
     if (!points.visible[i]) continue;
     const Point point = points.one(i, view.eye);
     PixelSampler sampler(static_cast<uint32_t>(x + i), static_cast<uint32_t>(y), k, view.offsets.count);
-    Vector3f way = cosine_direction(point.normal, sampler.next());
+    sampler.skip(1);
+    Vector3f way(ways.x[i], ways.y[i], ways.z[i]);
     if (way.dot(point.face) <= 0) way = reflected(way, point.face);
     float met = kFar;
     const auto set = [i](LaneVectors& lanes, const Vector3f& value) {
@@ -454,6 +478,42 @@ void LightTracer::trace(const SurfaceBuffer& surfaces, const LightView& view, Li
   });
   filter(view, light);
   finish(surfaces, view, light);
+}
+
+// The ray from the eye is followed from just before the surface.
+Vector3f LightTracer::light_through(const Point& point, PixelSampler& sampler) const {
+  const Vector3f direction = -point.view;
+  Vector3f from = off_surface(point.place, point.view), way = direction;
+  Hit hit;
+  if (!scene_.first_hit(from, direction, kFar, hit)) return sky_seen(direction);
+  const Vector3f albedo = hit.material->color(hit, 0).head<3>();
+  const float mirrored = mirrored_share(hit, direction);
+  const Vector3f share = (1 - mirrored) * enter(hit, albedo, sampler, from, way);
+  return share.cwiseProduct(radiance(from, way, 1e-3f, sampler)).cwiseMin(kBrightest);
+}
+
+void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, const LightView& view,
+                              GlassBuffer& light) const {
+  light.through.assign(surfaces.places.size(), Vector4f::Zero());
+  light.mirrored.assign(surfaces.places.size(), Vector4f::Zero());
+  const int width = surfaces.width_px;
+  for_light_rows(surfaces.height_px, [&](int y) {
+    for (int x = 0; x < width; x += kLanes) {
+      const Points points(surfaces, pixels_of_row(surfaces, x, y));
+      for (int i = 0; i < kLanes; ++i) {
+        if (!points.visible[i]) continue;
+        const Point point = points.one(i, view.eye);
+        PixelSampler sampler(static_cast<uint32_t>(x0 + x + i), static_cast<uint32_t>(y0 + y),
+                             view.offsets.index, view.offsets.count);
+        const SquarePoint<float> on_sun = sampler.next();
+        const bool sunny = sources_.sun.intensity > 0 && point.normal.dot(sources_.sky.sun_direction) > 0;
+        const std::size_t pixel = index_of(x + i, y, width);
+        light.mirrored[pixel] << mirrored_light(point, view, sampler), 1;
+        light.through[pixel] << light_through(point, sampler),
+            sunny ? sun_visibility(point.place, on_sun) : 0.0f;
+      }
+    }
+  });
 }
 
 void LightTracer::filter(const LightView& view, LightBuffer& light) const {

@@ -50,6 +50,12 @@ struct LightBuffer {
   LightPlane with_mirror, with_rough_mirror;  ///< cells: 1 or 0
 };
 
+/// Light at the glass surfaces in a part of the picture, rows from the bottom up.
+struct GlassBuffer {
+  std::vector<Vector4f> through;  ///< light that comes through the glass; w: share of the sun that is visible
+  std::vector<Vector4f> mirrored;  ///< light from the mirrored direction; w: 1
+};
+
 struct LightSources {
   Sun sun;
   SkyModel sky;
@@ -71,6 +77,10 @@ class LightTracer {
 
   void trace(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
 
+  /// `surfaces`: a part of the picture, with glass only; (x, y) is its first pixel.
+  void trace_glass(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
+                   GlassBuffer& light) const;
+
   /// Radiance that arrives from `direction` at `from`. `cone`: angle that the ray stands for [rad]. `met`, if
   /// not null, gets the distance of what the ray meets first, and is unchanged if it meets nothing.
   Vector3f radiance(Vector3f from, Vector3f direction, float cone, PixelSampler& sampler,
@@ -83,6 +93,7 @@ class LightTracer {
                     PixelSampler& sampler) const;
   float sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const;
   Lanes sun_visibility(const LaneVectors& place, IntLanes active, const SquarePoint<Lanes>& uv) const;
+  Vector3f light_through(const Point& point, PixelSampler& sampler) const;
   Vector3f mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler) const;
   void trace_lamps(const Points& points, int x, int y, const LightView& view, Sampler<UintLanes>& sampler,
                    LightBuffer& light) const;
