@@ -69,7 +69,8 @@ void LightPass::read_surfaces(const Eigen::AlignedBox2i& area_px, SurfaceBuffer&
 }
 
 LightView LightPass::light_view(const View& view, const SampleOffsets& offsets) const {
-  return {view.eye, 2 * view.tan_half.y() / static_cast<float>(all_px_.sizes().y()), offsets};
+  return {view.eye, view.clip_from_world, 2 * view.tan_half.y() / static_cast<float>(all_px_.sizes().y()),
+          offsets};
 }
 
 void LightPass::trace(const LightSources& sources, const View& view, const SampleOffsets& offsets) {
@@ -111,11 +112,16 @@ void LightPass::begin_glass(GLuint depth, const Eigen::AlignedBox2i& area_px) {
   clear_surfaces(glass_framebuffer_);
 }
 
-void LightPass::trace_glass(const LightSources& sources, const View& view, const SampleOffsets& offsets) {
+void LightPass::trace_glass(const LightSources& sources, const View& view, const SampleOffsets& offsets,
+                            GLuint picture_framebuffer) {
   glDisable(GL_SCISSOR_TEST);
   read_surfaces(glass_px_, glass_);
+  picture_.resize(light_.arriving.size());
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, picture_framebuffer);
+  glReadPixels(0, 0, all_px_.sizes().x(), all_px_.sizes().y(), GL_RGBA, GL_FLOAT, picture_.data());
   LightTracer(scene_, sources)
-      .trace_glass(glass_, glass_px_.min().x(), glass_px_.min().y(), light_view(view, offsets), glass_light_);
+      .trace_glass(glass_, glass_px_.min().x(), glass_px_.min().y(), light_view(view, offsets), light_,
+                   picture_, glass_light_);
   write_texture(through_glass_, kThroughGlassUnit, glass_px_, glass_light_.through);
   write_texture(mirrored_by_glass_, kMirroredByGlassUnit, glass_px_, glass_light_.mirrored);
 }

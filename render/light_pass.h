@@ -22,9 +22,11 @@ class LightPass {
   /// Reads the surfaces, traces their light, and binds it for the shaders.
   void trace(const LightSources& sources, const View& view, const SampleOffsets& offsets);
   /// After trace(): binds the targets for drawing the surfaces of glass in a part of the picture, and then
-  /// traces their light. `depth`: the picture's, which hides glass behind opaque surfaces.
+  /// traces their light. `depth`: the picture's, which hides glass behind opaque surfaces. The picture must
+  /// show the opaque objects.
   void begin_glass(GLuint depth, const Eigen::AlignedBox2i& area_px);
-  void trace_glass(const LightSources& sources, const View& view, const SampleOffsets& offsets);
+  void trace_glass(const LightSources& sources, const View& view, const SampleOffsets& offsets,
+                   GLuint picture_framebuffer);
 
  private:
   void read_surfaces(const Eigen::AlignedBox2i& area_px, SurfaceBuffer& surfaces) const;
@@ -46,6 +48,7 @@ class LightPass {
   Eigen::AlignedBox2i glass_px_;
   SurfaceBuffer glass_;
   GlassBuffer glass_light_;
+  std::vector<Vector4f> picture_;
 };
 
 }  // namespace offstage::render

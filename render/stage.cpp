@@ -312,7 +312,7 @@ void Stage::Impl::trace_glass(const View& view, const SampleOffsets& offsets) {
   glDepthMask(GL_TRUE);
   glDepthFunc(GL_GREATER);
   mesh_pass.draw_glass_surfaces();
-  light_pass.trace_glass(light_sources, view, offsets);
+  light_pass.trace_glass(light_sources, view, offsets, picture.framebuffer);
   glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
 }
 
