@@ -20,6 +20,7 @@ constexpr float kBrightest =
     50;  // of light that arrives after bounces; brighter samples would stay visible as dots
 constexpr float kSmoothMetal = 0.35f;  // with less roughness, a path goes on in the mirrored direction
 
+constexpr float kGrazing = 0.02f;      // cosine between light and triangle; with less, it may shadow itself
 constexpr float kSharpMirror = 0.12f;  // with more roughness, mirror images are averaged over pixels
 
 std::size_t index_of(int x, int y, int width) {
@@ -387,6 +388,18 @@ Vector3f LightTracer::radiance(Path path, PixelSampler& sampler, const VisibleLi
   return sum;
 }
 
+// Where a triangle turns away from the light but its smooth normals do not, shadow rays start from the smooth
+// surface, so that the triangle does not shadow itself.
+void LightTracer::lift(const Points& points, IntLanes lanes, const LightView& view,
+                       LaneVectors& place) const {
+  if (!any(lanes)) return;
+  for (int i = 0; i < kLanes; ++i) {
+    if (!lanes[i]) continue;
+    const Point point = points.one(i, view.eye);
+    set_lane(place, i, scene_.smooth_place(view.eye, point.place));
+  }
+}
+
 void LightTracer::trace_lamps(const Points& points, int x, int y, const LightView& view,
                               Sampler<UintLanes>& sampler, LightBuffer& light) const {
   const Lanes none{};
@@ -404,11 +417,10 @@ void LightTracer::trace_lamps(const Points& points, int x, int y, const LightVie
     const Lanes share = lit ? point.share * nl : none;
     LaneVectors arriving = all_lanes(lamp.def().intensity) * share;
     if (lamp.def().shadows) {
-      const IntLanes faces = dot(points.face, point.towards) > 0.0f;
-      const LaneVectors seen = scene_.transmittance(points.place, point.towards, point.distance, lit & faces);
-      arriving.x = faces ? arriving.x * seen.x : arriving.x;
-      arriving.y = faces ? arriving.y * seen.y : arriving.y;
-      arriving.z = faces ? arriving.z * seen.z : arriving.z;
+      LaneVectors place = points.place;
+      lift(points, lit & (dot(points.face, point.towards) < kGrazing), view, place);
+      const LaneVectors seen = scene_.transmittance(place, point.towards, point.distance, lit);
+      arriving = {arriving.x * seen.x, arriving.y * seen.y, arriving.z * seen.z};
     }
     diffuse = diffuse + arriving;
     const LaneVectors h = normalized(point.towards + to_eye);
@@ -473,6 +485,7 @@ void LightTracer::trace_pixels(const SurfaceBuffer& surfaces, int x, int y, cons
     place.z = behind ? through.z : place.z;
   }
   if (sources_.sun.intensity <= 0) sunny = IntLanes{};
+  lift(points, sunny & ~points.cloth & (dot(points.face, to_sun) < kGrazing), view, place);
   light.direct.channels()[0].set_lanes(x, y, sun_visibility(place, sunny, on_sun));
   if (!sources_.lamps.empty()) trace_lamps(points, x, y, view, sampler, light);
 }

@@ -118,6 +118,7 @@ class LightTracer {
   Vector3f light_through(const Point& point, PixelSampler& sampler, const VisibleLight& visible) const;
   Vector3f mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler,
                           const VisibleLight& visible) const;
+  void lift(const Points& points, IntLanes lanes, const LightView& view, LaneVectors& place) const;
   void trace_lamps(const Points& points, int x, int y, const LightView& view, Sampler<UintLanes>& sampler,
                    LightBuffer& light) const;
   void trace_pixels(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
