@@ -76,6 +76,7 @@ LightView LightPass::light_view(const View& view, const SampleOffsets& offsets) 
 void LightPass::trace(const LightSources& sources, const View& view, const SampleOffsets& offsets) {
   read_surfaces(all_px_, surfaces_);
   LightTracer(scene_, sources).trace(surfaces_, light_view(view, offsets), light_);
+  sums_ += light_.sums;
   write_texture(arriving_, kArrivingUnit, all_px_, light_.arriving);
   if (light_.has_mirrors) {
     write_texture(mirrored_, kMirroredUnit, all_px_, light_.mirrored);
@@ -122,6 +123,7 @@ void LightPass::trace_glass(const LightSources& sources, const View& view, const
   LightTracer(scene_, sources)
       .trace_glass(glass_, glass_px_.min().x(), glass_px_.min().y(), light_view(view, offsets), light_,
                    picture_, glass_light_);
+  sums_ += glass_light_.sums;
   write_texture(through_glass_, kThroughGlassUnit, glass_px_, glass_light_.through);
   write_texture(mirrored_by_glass_, kMirroredByGlassUnit, glass_px_, glass_light_.mirrored);
 }

@@ -17,6 +17,8 @@ class LightPass {
   LightPass(int width_px, int height_px, const gl::Texture& depth);
   /// The scene that rays meet, to be filled and built before trace().
   RayScene& scene() { return scene_; }
+  /// Of everything that was traced.
+  const LightSums& sums() const { return sums_; }
   /// Binds and clears the targets for drawing surfaces.
   void begin() const;
   /// Reads the surfaces, traces their light, and binds it for the shaders.
@@ -34,6 +36,7 @@ class LightPass {
 
   RayScene scene_;
   Eigen::AlignedBox2i all_px_;
+  LightSums sums_;
   SurfaceBuffer surfaces_;
   LightBuffer light_;
   gl::Texture places_, normals_;

@@ -663,6 +663,10 @@ Channels Stage::channels(float time) {
   return result;
 }
 
+LightSums Stage::light_sums() const {
+  return impl_->light_pass.sums();
+}
+
 void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   Impl& s = *impl_;
   if (sum.width_px != s.def.width_px || sum.height_px != s.def.height_px ||

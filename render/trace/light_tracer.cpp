@@ -89,6 +89,15 @@ Vector3f enter(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Ve
   return color.cwiseSqrt();
 }
 
+/// Limits a value that a ray found, and adds it to the sums.
+Vector3f limited(const Vector3f& light, LightSums& sums) {
+  const Vector3f kept = light.cwiseMin(kBrightest);
+  const Vector3f luminance(0.2126f, 0.7152f, 0.0722f);
+  sums.arriving += static_cast<double>(luminance.dot(light));
+  sums.removed += static_cast<double>(luminance.dot(light - kept));
+  return kept;
+}
+
 // GGX as in shaders/light.glsl.
 Lanes lobe_of(Lanes a, Lanes nl, Lanes nv, Lanes nh) {
   const Lanes a2 = a * a, d = nh * nh * (a2 - 1) + 1;
@@ -441,14 +450,14 @@ void LightTracer::trace_lamps(const Points& points, int x, int y, const LightVie
 }
 
 Vector3f LightTracer::mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler,
-                                     const VisibleLight& visible) const {
+                                     const VisibleLight& visible, LightSums& sums) const {
   const float a = point.roughness * point.roughness;
   const Vector3f facet =
       a < 1e-4f ? point.normal : visible_facet(point.normal, point.view, a, sampler.next());
   Vector3f way = reflected(-point.view, facet);
   if (way.dot(point.face) <= 0) way = reflected(way, point.face);
   const Path path{.from = point.place, .direction = way, .cone = std::max(a, view.pixel_m), .mirrored = true};
-  return radiance(path, sampler, &visible).cwiseMin(kBrightest);
+  return limited(radiance(path, sampler, &visible), sums);
 }
 
 // Positions and normals of eight pixels, which guide the filter. `size_px`: width of what a value stands for.
@@ -502,7 +511,7 @@ IntLanes LightTracer::pixels_of_cells(const SurfaceBuffer& surfaces, int x, int 
 
 // The light from around at eight cells of a row.
 void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
-                              LightBuffer& light) const {
+                              LightBuffer& light, LightSums& sums) const {
   const int k = view.offsets.index;
   const Points points(surfaces, pixels_of_cells(surfaces, x, y, view));
   set_guide(points, x, y, view, 2, light.cells);
@@ -520,7 +529,7 @@ void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, const
     Vector3f way(ways.x[i], ways.y[i], ways.z[i]);
     if (way.dot(point.face) <= 0) way = reflected(way, point.face);
     float met = kFar;
-    set_lane(around, i, radiance({point.place, way, 0.5f}, sampler, nullptr, &met).cwiseMin(kBrightest));
+    set_lane(around, i, limited(radiance({point.place, way, 0.5f}, sampler, nullptr, &met), sums));
     inverse_distance[i] = 1 / std::max(met, 8 * view.pixel_m * (point.place - view.eye).norm());
   }
   store(light.around.channels(), x, y, around);
@@ -533,6 +542,15 @@ void for_light_rows(int height, const auto& each) {
   tbb::parallel_for(tbb::blocked_range<int>(0, height, kRowsPerTask), [&](const auto& rows) {
     for (int y = rows.begin(); y < rows.end(); ++y) each(y);
   });
+}
+
+/// `each` gets sums of its own for each row, so that the total does not depend on the threads.
+LightSums sum_over_light_rows(int height, const auto& each) {
+  std::vector<LightSums> rows(static_cast<std::size_t>(height));
+  for_light_rows(height, [&](int y) { each(y, rows[static_cast<std::size_t>(y)]); });
+  LightSums total;
+  for (const LightSums& row : rows) total += row;
+  return total;
 }
 
 }  // namespace
@@ -550,8 +568,8 @@ void LightTracer::trace(const SurfaceBuffer& surfaces, const LightView& view, Li
   for_light_rows(height, [&](int y) {
     for (int x = 0; x < width; x += kLanes) trace_pixels(surfaces, x, y, view, light);
   });
-  for_light_rows(light.cells.height_px, [&](int y) {
-    for (int x = 0; x < light.cells.width_px; x += kLanes) trace_cells(surfaces, x, y, view, light);
+  light.sums = sum_over_light_rows(light.cells.height_px, [&](int y, LightSums& sums) {
+    for (int x = 0; x < light.cells.width_px; x += kLanes) trace_cells(surfaces, x, y, view, light, sums);
   });
   light.direct.average(light.pixels, light.pixels.filled, nullptr, 1);
   light.cells.find_reach(light.inverse_distance, light.reach2);
@@ -578,13 +596,13 @@ void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& 
   const int width = surfaces.width_px;
   const VisibleLight visible(light, view);
   const Lanes none{};
-  const auto mirrored = [&](const Points& points, int i, int x, int y) {
+  const auto mirrored = [&](const Points& points, int i, int x, int y, LightSums& sums) {
     PixelSampler sampler(static_cast<uint32_t>(x + i), static_cast<uint32_t>(y), view.offsets.index,
                          view.offsets.count);
     sampler.skip(1 + static_cast<uint32_t>(sources_.lamps.size()));
-    return mirrored_light(points.one(i, view.eye), view, sampler, visible);
+    return mirrored_light(points.one(i, view.eye), view, sampler, visible, sums);
   };
-  for_light_rows(light.cells.height_px, [&](int y) {
+  light.sums += sum_over_light_rows(light.cells.height_px, [&](int y, LightSums& sums) {
     for (int x = 0; x < light.cells.width_px; x += kLanes) {
       const Points points(surfaces, pixels_of_cells(surfaces, x, y, view));
       const IntLanes mirrors = points.mirrors & ~points.own_mirrors;
@@ -592,32 +610,32 @@ void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& 
       light.with_rough_mirror.set_lanes(x, y, mirrors & (points.roughness > kSharpMirror) ? none + 1 : none);
       LaneVectors values{none, none, none};
       for (int i = 0; i < kLanes; ++i)
-        if (mirrors[i]) set_lane(values, i, mirrored(points, i, x, y));
+        if (mirrors[i]) set_lane(values, i, mirrored(points, i, x, y, sums));
       store(light.mirrors.channels(), x, y, values);
     }
   });
   for (const int step : {1, 2}) light.mirrors.average(light.cells, light.with_rough_mirror, nullptr, step);
-  for_light_rows(surfaces.height_px, [&](int y) {
+  light.sums += sum_over_light_rows(surfaces.height_px, [&](int y, LightSums& sums) {
     Vector4f* row = &light.mirrored[index_of(0, y, width)];
     interpolate(light.pixels, light.cells, y, {&light.mirrors, &light.with_mirror}, nullptr, row);
     for (int x = 0; x < width; x += kLanes) {
       const Points points(surfaces, pixels_of_row(surfaces, x, y));
       for (int i = 0; i < kLanes; ++i)
-        if (points.own_mirrors[i]) row[x + i] << mirrored(points, i, x, y), 1;
+        if (points.own_mirrors[i]) row[x + i] << mirrored(points, i, x, y, sums), 1;
     }
   });
 }
 
 // The ray from the eye is followed from just before the surface.
-Vector3f LightTracer::light_through(const Point& point, PixelSampler& sampler,
-                                    const VisibleLight& visible) const {
+Vector3f LightTracer::light_through(const Point& point, PixelSampler& sampler, const VisibleLight& visible,
+                                    LightSums& sums) const {
   Path path{.from = off_surface(point.place, point.view), .direction = -point.view, .cone = 1e-3f};
   Hit hit;
   if (!scene_.first_hit(path.from, path.direction, kFar, hit)) return sky_seen(path.direction);
   const Vector3f albedo = hit.material->color(hit, 0).head<3>();
   path.share *= 1 - mirrored_share(hit, path.direction);
   path.share = path.share.cwiseProduct(enter(hit, albedo, sampler, path.from, path.direction));
-  return radiance(path, sampler, &visible).cwiseMin(kBrightest);
+  return limited(radiance(path, sampler, &visible), sums);
 }
 
 void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, const LightView& view,
@@ -627,7 +645,7 @@ void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, con
   glass.through.assign(surfaces.places.size(), Vector4f::Zero());
   glass.mirrored.assign(surfaces.places.size(), Vector4f::Zero());
   const int width = surfaces.width_px;
-  for_light_rows(surfaces.height_px, [&](int y) {
+  glass.sums = sum_over_light_rows(surfaces.height_px, [&](int y, LightSums& sums) {
     for (int x = 0; x < width; x += kLanes) {
       const Points points(surfaces, pixels_of_row(surfaces, x, y));
       for (int i = 0; i < kLanes; ++i) {
@@ -638,8 +656,8 @@ void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, con
         const SquarePoint<float> on_sun = sampler.next();
         const bool sunny = sources_.sun.intensity > 0 && point.normal.dot(sources_.sky.sun_direction) > 0;
         const std::size_t pixel = index_of(x + i, y, width);
-        glass.mirrored[pixel] << mirrored_light(point, view, sampler, behind), 1;
-        glass.through[pixel] << light_through(point, sampler, behind),
+        glass.mirrored[pixel] << mirrored_light(point, view, sampler, behind, sums), 1;
+        glass.through[pixel] << light_through(point, sampler, behind, sums),
             sunny ? sun_visibility(point.place, on_sun) : 0.0f;
       }
     }

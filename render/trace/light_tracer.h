@@ -41,6 +41,7 @@ struct LightBuffer {
   std::vector<Vector4f>
       lamps;  ///< diffuse light of lamps; w: Fresnel factor of their highlights. Empty: no lamps
   std::vector<Vector4f> highlights;  ///< lobes of lamps, without reflectance
+  LightSums sums;
 
   // In between. Light from around is computed for cells of 2x2 pixels.
   LightGuide pixels, cells;
@@ -54,6 +55,7 @@ struct LightBuffer {
 struct GlassBuffer {
   std::vector<Vector4f> through;  ///< light that comes through the glass; w: share of the sun that is visible
   std::vector<Vector4f> mirrored;  ///< light from the mirrored direction; w: 1
+  LightSums sums;
 };
 
 /// How a picture of the surfaces was taken.
@@ -115,9 +117,10 @@ class LightTracer {
                     PixelSampler& sampler) const;
   float sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const;
   Lanes sun_visibility(const LaneVectors& place, IntLanes active, const SquarePoint<Lanes>& uv) const;
-  Vector3f light_through(const Point& point, PixelSampler& sampler, const VisibleLight& visible) const;
+  Vector3f light_through(const Point& point, PixelSampler& sampler, const VisibleLight& visible,
+                         LightSums& sums) const;
   Vector3f mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler,
-                          const VisibleLight& visible) const;
+                          const VisibleLight& visible, LightSums& sums) const;
   void lift(const Points& points, IntLanes lanes, const LightView& view, LaneVectors& place) const;
   void trace_lamps(const Points& points, int x, int y, const LightView& view, Sampler<UintLanes>& sampler,
                    LightBuffer& light) const;
@@ -127,8 +130,8 @@ class LightTracer {
   void trace_mirrors(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
   static void set_guide(const Points& points, int x, int y, const LightView& view, float size_px,
                         LightGuide& guide);
-  void trace_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
-                   LightBuffer& light) const;
+  void trace_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view, LightBuffer& light,
+                   LightSums& sums) const;
   Vector3f sky_seen(const Vector3f& direction) const;
 
   const RayScene& scene_;

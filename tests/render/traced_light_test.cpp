@@ -213,6 +213,22 @@ TEST_F(TracedLight, OfACoarseSmoothBallFallsEvenlyTowardsItsTerminator) {
   }
 }
 
+TEST_F(TracedLight, SumsCountWhatIsTakenFromRaysThatFindTooMuch) {
+  s.stage.set_environment(even_sky(0.7f));
+  s.add(make_ground(20), kPlaster);
+  look({.eye = {0, 1, 4}, .target = {0, 0, 0}});
+  s.draw();
+  EXPECT_GT(s.stage.light_sums().arriving, 0);
+  EXPECT_EQ(s.stage.light_sums().removed, 0);
+  s.stage.set_environment(kNoLight);
+  s.add(make_sphere(0.3f), {.color = {0, 0, 0, 1}, .emission = Vector3f::Constant(500)}, {0, 1, 0});
+  const LightSums before = s.stage.light_sums();
+  s.draw();
+  const LightSums& after = s.stage.light_sums();
+  // 450 parts of 500 are taken.
+  EXPECT_NEAR((after.removed - before.removed) / (after.arriving - before.arriving), 0.9, 0.02);
+}
+
 // Two boxes on a floor, at three sizes. A ray that starts on a surface must not intersect that surface, and
 // must not miss an object that touches it.
 TEST_F(TracedLight, DoesNotDependOnTheSizeOfTheScene) {
