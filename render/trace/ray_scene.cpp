@@ -361,11 +361,12 @@ Vector3f RayScene::transmittance(const Vector3f& from, const Vector3f& direction
   return through_translucent(from, direction, length);
 }
 
-LaneVectors RayScene::transmittance(const LaneVectors& from, const LaneVectors& direction, Lanes length,
-                                    IntLanes active) const {
-  const Lanes none{};
-  LaneVectors share{none, none, none};
-  if (!any(active)) return share;
+namespace {
+
+/// Which of eight segments meet an object of some group.
+IntLanes blocked(RTCScene tree, const LaneVectors& from, const LaneVectors& direction, Lanes length,
+                 IntLanes active, unsigned mask) {
+  if (!any(active)) return IntLanes{};
   RTCRay8 rays;
   const auto store = [](auto* target, const auto& lanes) { std::memcpy(target, &lanes, sizeof(lanes)); };
   store(rays.org_x, from.x);
@@ -374,22 +375,32 @@ LaneVectors RayScene::transmittance(const LaneVectors& from, const LaneVectors& 
   store(rays.dir_x, direction.x);
   store(rays.dir_y, direction.y);
   store(rays.dir_z, direction.z);
-  store(rays.tnear, none);
+  store(rays.tnear, Lanes{});
   store(rays.tfar, length);
-  store(rays.time, none);
-  store(rays.mask, UintLanes{} + kOpaqueCaster);
+  store(rays.time, Lanes{});
+  store(rays.mask, UintLanes{} + mask);
   store(rays.id, UintLanes{});
   store(rays.flags, UintLanes{});
   alignas(32) std::array<int, kLanes> valid;
   store(valid.data(), active);
-  embree::occluded(tree_.get(), valid, rays);
+  embree::occluded(tree, valid, rays);
   Lanes far;
   std::memcpy(&far, rays.tfar, sizeof(far));
-  const IntLanes free = active & (far >= 0.0f);
-  share.x = share.y = share.z = free ? none + 1 : none;
+  return active & (far < 0.0f);
+}
+
+}  // namespace
+
+LaneVectors RayScene::transmittance(const LaneVectors& from, const LaneVectors& direction, Lanes length,
+                                    IntLanes active) const {
+  const Lanes none{};
+  const IntLanes free = active & ~blocked(tree_.get(), from, direction, length, active, kOpaqueCaster);
+  const Lanes open = free ? none + 1 : none;
+  LaneVectors share{open, open, open};
   if (!has_translucent_) return share;
+  const IntLanes dimmed = blocked(tree_.get(), from, direction, length, free, kTranslucentCaster | kSprite);
   for (int i = 0; i < kLanes; ++i) {
-    if (!free[i]) continue;
+    if (!dimmed[i]) continue;
     const Vector3f one = through_translucent({from.x[i], from.y[i], from.z[i]},
                                              {direction.x[i], direction.y[i], direction.z[i]}, length[i]);
     share.x[i] = one.x();
