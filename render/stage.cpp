@@ -186,17 +186,15 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
       casters.push_back(instance->ball());
     }
   }
-  const std::size_t balls = casters.size();
-  std::vector<Eigen::AlignedBox3f> boxes;
-  for (const Cloth* cloth : sheets) {
-    if (cloth->casts_shadow) boxes.push_back(cloth->surface.box());
-  }
-  for (const PointSet* set : sets) {
-    if (set->def.casts_shadow && !set->is_splatted()) boxes.push_back(set->box);
-  }
-  for (const Eigen::AlignedBox3f& box : boxes) {
+  const auto add_box = [&](const Eigen::AlignedBox3f& box) {
     for (int k = 0; k < 8; ++k)
       casters.push_back({box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k)), 1e-3f});
+  };
+  for (const Cloth* cloth : sheets) {
+    if (cloth->casts_shadow) add_box(cloth->surface.box());
+  }
+  for (const PointSet* set : sets) {
+    if (set->def.casts_shadow && !set->is_splatted()) add_box(set->box);
   }
   // Opaque surfaces, balls and glass have traced light; the map is for everything else. Without a caster it
   // is empty, which means light everywhere.
@@ -219,7 +217,6 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
     frame.shadow.head<3>() << shadow.texel_m, size, 1 / size;
     frame.penumbra = penumbra_of(shadow, sun, size, offsets.count);
     frame.sun_direction.w() = 1;
-    shadow_map.mark(shadow, std::span(casters).first(balls), boxes);
   }
   upload(frame);
   if (shadow.texel_m == 0) return;
