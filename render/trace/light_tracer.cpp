@@ -607,7 +607,8 @@ void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& 
       const Points points(surfaces, pixels_of_cells(surfaces, x, y, view));
       const IntLanes mirrors = points.mirrors & ~points.own_mirrors;
       light.with_mirror.set_lanes(x, y, mirrors ? none + 1 : none);
-      light.with_rough_mirror.set_lanes(x, y, mirrors & (points.roughness > kSharpMirror) ? none + 1 : none);
+      light.with_rough_mirror.set_lanes(x, y,
+                                        (mirrors & (points.roughness > kSharpMirror)) ? none + 1 : none);
       LaneVectors values{none, none, none};
       for (int i = 0; i < kLanes; ++i)
         if (mirrors[i]) set_lane(values, i, mirrored(points, i, x, y, sums));
