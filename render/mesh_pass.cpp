@@ -317,6 +317,7 @@ gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) 
   if (batch.mesh->endless) defines.push_back("ENDLESS 1");
   if (material.glass && !surface) {
     defines.push_back("GLASS 1");
+    if (shading == Shading::forward_with_particles) defines.push_back("PARTICLES 1");
     fragment.push_back("glass.glsl");
   }
   if (pattern != Pattern::none) {
@@ -369,12 +370,23 @@ void MeshPass::draw_opaque(Shading shading) {
   }
 }
 
-void MeshPass::draw_translucent(std::size_t k) {
+void MeshPass::draw_glass_surfaces() {
+  for (const Batch& batch : translucent_) {
+    if (!batch.material->glass) continue;
+    surface_program(batch, Shading::surface).use();
+    glUniform1f(0, 0);
+    set_facing(batch, batch.material->two_sided);
+    bind_material(*batch.material, white_);
+    draw(batch, rows_);
+  }
+}
+
+void MeshPass::draw_translucent(std::size_t k, bool particles) {
   constexpr float kVisibleAlpha = 1.0f / 512;
   const Batch& batch = translucent_[k];
-  surface_program(batch, Shading::forward).use();
+  surface_program(batch, particles ? Shading::forward_with_particles : Shading::forward).use();
   glUniform1f(0, batch.material->glass ? 0 : kVisibleAlpha);
-  if (batch.material->glass) glUniform1f(1, batch.material->thin ? 0 : batch.thickness);
+  if (batch.material->glass && particles) glUniform1f(1, batch.material->thin ? 0 : batch.thickness);
   set_facing(batch, batch.material->two_sided);
   bind_material(*batch.material, white_);
   draw(batch, rows_);

@@ -95,17 +95,21 @@ class MeshPass {
   /// reaches; the matrix must then not mirror.
   void draw_shadows(const Matrix4f& shadow_clip_from_world, bool front_only);
   enum class Shading {
-    surface,  ///< writes surfaces for the tracer of light
-    traced,   ///< in the light that was traced
-    forward   ///< without traced light: translucent bodies
+    surface,                ///< writes surfaces for the tracer of light
+    traced,                 ///< in the light that was traced
+    forward,                ///< translucent bodies: glass in traced light, others without
+    forward_with_particles  ///< the same; glass also shows particles behind it
   };
   /// Draws the opaque instances, and the opaque parts of blended ones.
   void draw_opaque(Shading shading);
   GLuint white() const { return white_; }
   /// Translucent instances, in the order of the instances.
   std::span<const Instance* const> translucent() const { return see_through_; }
-  /// Draws one of `translucent`. Glass reads the scene behind it from a copy of the picture that is bound.
-  void draw_translucent(std::size_t k);
+  /// Writes the surfaces of the glass among `translucent` for the tracer of light.
+  void draw_glass_surfaces();
+  /// Draws one of `translucent`. The light of glass has been traced and is bound. `particles`: whether glass
+  /// shows those behind it, from pictures with and without them that are bound.
+  void draw_translucent(std::size_t k, bool particles);
   /// Draws only the depth of one of `translucent`, by the picture's matrix.
   void draw_translucent_depth(std::size_t k, const Matrix4f& clip_from_world);
 

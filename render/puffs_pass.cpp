@@ -15,7 +15,7 @@ namespace {
 constexpr GLuint kSmokeUnit = 5, kColorUnit = 6, kLowDepthUnit = 7;
 constexpr float kMostOpaque = 0.98f;  // greatest opacity of one puff, so that its optical depth is finite
 constexpr double kHalf_px = 8, kQuarter_px = 64;  // radii from which the picture is reduced
-constexpr float kNearest = 1.2f;      // radius from which a puff fades out, as a share of half the height
+constexpr float kNearestPuff = 1.2f;  // radius from which a puff fades out, as a share of half the height
 constexpr float kTolerance = 0.25f;   // depth in typical radii over which puffs change little
 constexpr float kFlameCover = 0.6f;   // soot: deep flames glow, but do not add up without limit
 constexpr float kFlameWobble = 0.5f;  // [rad]
@@ -145,7 +145,7 @@ void PuffsPass::make_splats(const PaintOrder& order, const View& view, const Puf
 
     // A puff that is near enough to fill the picture fades out before the eye is inside it.
     const float apart = std::clamp(0.5f * s.depth / radius - 1, 0.0f, 1.0f);
-    s.opacity *= std::max(apart, std::clamp(2 - radius_px / (kNearest * half_size.y()), 0.0f, 1.0f));
+    s.opacity *= std::max(apart, std::clamp(2 - radius_px / (kNearestPuff * half_size.y()), 0.0f, 1.0f));
 
     // Axes of the cell on the screen, and the stretch along the motion.
     const Shape shape(point.velocity.w());

@@ -5,8 +5,7 @@
 namespace offstage::render {
 namespace {
 
-constexpr GLuint kSunPlainUnit = 9, kSunNearestUnit = 13;
-constexpr int kCells = 64;  // cells along a side of the coarse grid
+constexpr GLuint kSunPlainUnit = 9;
 
 }  // namespace
 
@@ -69,45 +68,9 @@ ShadowMap::ShadowMap(int size_px)
     : size_px_(size_px),
       depth_(gl::make_target(GL_DEPTH_COMPONENT32F, size_px, size_px, GL_LINEAR)),
       framebuffer_(gl::make_framebuffer(0, depth_)),
-      plain_(gl::make_depth_sampler()),
-      nearest_(kCells * kCells),
-      nearest_texture_(gl::make_target(GL_R32F, kCells, kCells, GL_NEAREST)) {
+      plain_(gl::make_depth_sampler()) {
   glTextureParameteri(depth_, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
   glTextureParameteri(depth_, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
-}
-
-void ShadowMap::mark(const ShadowFrame& frame, std::span<const Caster> balls,
-                     std::span<const Eigen::AlignedBox3f> boxes) {
-  constexpr float kNothing = 2;  // greater than all depths in the map
-  const float reach_m = search_m(frame);
-  const Matrix4f& clip = frame.clip_from_world;
-  const Vector3f per_m(clip.row(0).head<3>().norm(), clip.row(1).head<3>().norm(),
-                       clip.row(2).head<3>().norm());
-  std::ranges::fill(nearest_, kNothing);
-  const auto cell_of = [](float x) {
-    return static_cast<int>(std::clamp(std::floor((0.5f + 0.5f * x) * kCells), -1.f, float{kCells}));
-  };
-  const auto add = [&](const Eigen::AlignedBox3f& box) {
-    const Vector3f low = box.min() - reach_m * per_m, high = box.max() + reach_m * per_m;
-    for (int y = std::max(cell_of(low.y()), 0); y <= std::min(cell_of(high.y()), kCells - 1); ++y)
-      for (int x = std::max(cell_of(low.x()), 0); x <= std::min(cell_of(high.x()), kCells - 1); ++x) {
-        float& nearest = nearest_[static_cast<std::size_t>(y * kCells + x)];
-        nearest = std::min(nearest, low.z());
-      }
-  };
-  const auto place = [&](const Vector3f& p) { return Vector3f((clip * p.homogeneous()).head<3>()); };
-  for (const Caster& ball : balls) {
-    const Vector3f center = place(ball.center), reach = ball.radius * per_m;
-    add({center - reach, center + reach});
-  }
-  for (const Eigen::AlignedBox3f& box : boxes) {
-    Eigen::AlignedBox3f there;
-    for (int k = 0; k < 8; ++k)
-      there.extend(place(box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k))));
-    add(there);
-  }
-  glTextureSubImage2D(nearest_texture_, 0, 0, 0, kCells, kCells, GL_RED, GL_FLOAT, nearest_.data());
-  glBindTextureUnit(kSunNearestUnit, nearest_texture_);
 }
 
 void ShadowMap::begin() const {

@@ -33,20 +33,10 @@ inline constexpr float kWidestPenumbra_px = 24;
 ShadowFrame fit_shadow(std::span<const Caster> casters, const View& view, const Vector3f& sun_direction,
                        float pixel_m, int size_px);
 
-/// Largest distance beside a caster at which its shadow is still found, across the light: the reach of the
-/// search, the four texels of one lookup, and the offset of a point from its surface.
-inline float search_m(const ShadowFrame& frame) {
-  return (kWidestPenumbra_px + 6) * frame.texel_m;
-}
-
 class ShadowMap {
  public:
   explicit ShadowMap(int size_px);
   int size_px() const { return size_px_; }
-  /// Stores where casters are, so that shading searches the map only where one may be in front. Other points
-  /// cost a single lookup.
-  void mark(const ShadowFrame& frame, std::span<const Caster> balls,
-            std::span<const Eigen::AlignedBox3f> boxes);
   /// Binds and clears the map and sets the state for drawing casters into it.
   void begin() const;
   /// Ends drawing and leaves the map bound for shading.
@@ -59,9 +49,6 @@ class ShadowMap {
   gl::Texture depth_;
   gl::Framebuffer framebuffer_;
   gl::Sampler plain_;
-  std::vector<float>
-      nearest_;  ///< smallest depth of the casters around each cell of a coarse grid over the map
-  gl::Texture nearest_texture_;
 };
 
 }  // namespace offstage::render

@@ -25,14 +25,16 @@
 namespace offstage::render {
 namespace {
 
-constexpr GLuint kFrameBlock = 0, kSceneDepthUnit = 4, kBehindUnit = 12;
+constexpr GLuint kFrameBlock = 0, kSceneDepthUnit = 4, kBehindUnit = 12, kBodiesUnit = 22;
 
 /// Colour and depth of the picture.
 struct Picture {
   gl::Texture color, depth;
   gl::Framebuffer framebuffer;
-  PictureCopy depth_copy;  ///< for particles and mirrors
-  PictureCopy behind;      ///< for glass and mirrors
+  PictureCopy depth_copy;  ///< for particles
+  PictureCopy behind;      ///< with particles that are seen through glass
+  gl::Texture bodies;      ///< the picture without particles; created when they may be behind glass
+  gl::Framebuffer bodies_framebuffer;
 
   Picture(int width_px, int height_px)
       : color(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)),
@@ -40,6 +42,17 @@ struct Picture {
         framebuffer(gl::make_framebuffer(color, depth)),
         depth_copy(GL_DEPTH_COMPONENT32F, GL_NEAREST, kSceneDepthUnit, width_px, height_px),
         behind(GL_RGBA32F, GL_LINEAR, kBehindUnit, width_px, height_px) {}
+
+  /// Starts the picture without particles with the opaque objects.
+  void begin_bodies(int width_px, int height_px) {
+    if (bodies == 0) {
+      bodies = gl::make_target(GL_RGBA32F, width_px, height_px, GL_LINEAR);
+      bodies_framebuffer = gl::make_framebuffer(bodies, depth);
+    }
+    glCopyImageSubData(color, GL_TEXTURE_2D, 0, 0, 0, 0, bodies, GL_TEXTURE_2D, 0, 0, 0, 0, width_px,
+                       height_px, 1);
+    glBindTextureUnit(kBodiesUnit, bodies);
+  }
 };
 
 /// A body through which other objects are visible.
@@ -73,7 +86,9 @@ struct Stage::Impl {
   std::vector<Lamp> lamps;
   std::vector<Lamp> shining;  ///< lamps and fires of this sub-frame
   float time = 0;
-  Features features;  ///< of this sub-frame
+  Features features;                    ///< of this sub-frame
+  bool particles_behind_glass = false;  ///< may be in this sub-frame
+  LightSources light_sources;           ///< of this sub-frame
 
   Slots<std::unique_ptr<GpuMesh>, MeshTag> meshes{"mesh"};
   Slots<std::unique_ptr<GpuMaterial>, MaterialTag> materials{"material"};
@@ -125,6 +140,7 @@ struct Stage::Impl {
   void prepare_lamps(std::span<PointSet* const> sets, const SampleOffsets& offsets, FrameUniforms& frame);
   void trace_light(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
                    std::span<PointSet* const> sets, const View& view, const SampleOffsets& offsets);
+  void trace_glass(const View& view, const SampleOffsets& offsets);
   void draw_surfaces(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets);
   void draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets);
   std::vector<TranslucentBody> find_bodies(std::span<const Cloth* const> sheets, const View& view,
@@ -170,23 +186,23 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
       casters.push_back(instance->ball());
     }
   }
-  const std::size_t balls = casters.size();
-  std::vector<Eigen::AlignedBox3f> boxes;
-  for (const Cloth* cloth : sheets) {
-    if (cloth->casts_shadow) boxes.push_back(cloth->surface.box());
-  }
-  for (const PointSet* set : sets) {
-    if (set->def.casts_shadow && !set->is_splatted()) boxes.push_back(set->box);
-  }
-  for (const Eigen::AlignedBox3f& box : boxes) {
+  const auto add_box = [&](const Eigen::AlignedBox3f& box) {
     for (int k = 0; k < 8; ++k)
       casters.push_back({box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k)), 1e-3f});
+  };
+  for (const Cloth* cloth : sheets) {
+    if (cloth->casts_shadow) add_box(cloth->surface.box());
   }
-  // Opaque surfaces and balls have traced light; the map is for everything else. Without a caster it is
-  // empty, which means light everywhere.
-  const bool needed = !mesh_pass.translucent().empty() || std::ranges::any_of(sheets, [](const Cloth* cloth) {
-    return cloth->is_translucent();
-  }) || std::ranges::any_of(sets, [](const PointSet* set) { return set->def.style != PointStyle::sphere; });
+  for (const PointSet* set : sets) {
+    if (set->def.casts_shadow && !set->is_splatted()) add_box(set->box);
+  }
+  // Opaque surfaces, balls and glass have traced light; the map is for everything else. Without a caster it
+  // is empty, which means light everywhere.
+  const bool needed =
+      std::ranges::any_of(mesh_pass.translucent(),
+                          [](const Instance* instance) { return !instance->material->glass; }) ||
+      std::ranges::any_of(sheets, [](const Cloth* cloth) { return cloth->is_translucent(); }) ||
+      std::ranges::any_of(sets, [](const PointSet* set) { return set->def.style != PointStyle::sphere; });
   ShadowFrame shadow;
   if (sun.shadows && needed)
     shadow = fit_shadow(casters, view, frame.sun_direction.head<3>(), frame.eye.w(), def.shadow_map_px);
@@ -201,7 +217,6 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
     frame.shadow.head<3>() << shadow.texel_m, size, 1 / size;
     frame.penumbra = penumbra_of(shadow, sun, size, offsets.count);
     frame.sun_direction.w() = 1;
-    shadow_map.mark(shadow, std::span(casters).first(balls), boxes);
   }
   upload(frame);
   if (shadow.texel_m == 0) return;
@@ -270,10 +285,32 @@ void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<
                         set->def.softness);
   }
   scene.build();
-  LightSources sources{.sun = sun, .sky = make_sky(sun, environment), .fog = environment.fog};
-  for (const Lamp& lamp : shining) sources.lamps.emplace_back(lamp);
-  if (puffs_pass.shades()) sources.smoke = &puffs_pass.grid();
-  light_pass.trace(sources, view, offsets);
+  light_sources = {.sun = sun, .sky = make_sky(sun, environment), .fog = environment.fog};
+  for (const Lamp& lamp : shining) light_sources.lamps.emplace_back(lamp);
+  if (puffs_pass.shades()) light_sources.smoke = &puffs_pass.grid();
+  light_pass.trace(light_sources, view, offsets);
+}
+
+// The light of the nearest surfaces of glass. What is behind them is met by rays.
+void Stage::Impl::trace_glass(const View& view, const SampleOffsets& offsets) {
+  ScreenArea area(view, 0);
+  for (const Instance* instance : mesh_pass.translucent()) {
+    if (!instance->material->glass) continue;
+    const Region region{instance->mesh->box, instance->world_from_mesh, instance->mesh->round, view};
+    for (const Vector3f& corner : region.corners()) area.add(corner);
+  }
+  if (area.empty()) return;
+  Eigen::AlignedBox2i area_px = area.pixels(def.width_px, def.height_px);
+  area_px = Eigen::AlignedBox2i(area_px.min().array() - 1, area_px.max().array() + 1)
+                .intersection(
+                    Eigen::AlignedBox2i(Eigen::Vector2i(0, 0), Eigen::Vector2i(def.width_px, def.height_px)));
+  if (area_px.isEmpty() || area_px.volume() == 0) return;
+  light_pass.begin_glass(picture.depth, area_px);
+  glDepthMask(GL_TRUE);
+  glDepthFunc(GL_GREATER);
+  mesh_pass.draw_glass_surfaces();
+  light_pass.trace_glass(light_sources, view, offsets, picture.framebuffer);
+  glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
 }
 
 void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets) {
@@ -394,16 +431,22 @@ void Stage::Impl::draw_run(const PaintOrder::Run& run, const View& view, const F
 
 void Stage::Impl::draw_body(const TranslucentBody& body, const FrameUniforms& frame) {
   lay_streaks_behind(body.looked_px, frame);
-  if (body.glass) {
-    picture.behind.update(picture.color, body.looked_px);
-    glDisable(GL_BLEND);
+  if (body.glass && particles_behind_glass) picture.behind.update(picture.color, body.looked_px);
+  if (body.glass) glDisable(GL_BLEND);
+  const auto draw = [&](bool particles) {
+    if (body.cloth)
+      cloth_pass.draw(*body.cloth, features);
+    else
+      mesh_pass.draw_translucent(body.instance, particles);
+  };
+  if (particles_behind_glass) {
+    glBindFramebuffer(GL_FRAMEBUFFER, picture.bodies_framebuffer);
+    draw(false);
+    glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
   }
   const bool writes_depth = body.glass || body.cloth;
   if (writes_depth) glDepthMask(GL_TRUE);
-  if (body.cloth)
-    cloth_pass.draw(*body.cloth, features);
-  else
-    mesh_pass.draw_translucent(body.instance);
+  draw(particles_behind_glass);
   if (writes_depth) picture.depth_copy.change(body.area_px);
   picture.behind.change(body.area_px);
   glEnable(GL_BLEND);
@@ -428,6 +471,7 @@ void Stage::Impl::draw_translucent(std::span<const Cloth* const> sheets, std::sp
   glDepthMask(GL_FALSE);
   glDisable(GL_CULL_FACE);
   glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
+  if (particles_behind_glass) picture.begin_bodies(def.width_px, def.height_px);
   for (std::size_t k = 0; k <= bodies.size(); ++k) {
     for (const PaintOrder::Run& run : paint_order.runs_before(k)) draw_run(run, view, frame);
     if (k < bodies.size()) draw_body(bodies[k], frame);
@@ -616,6 +660,10 @@ Channels Stage::channels(float time) {
   return result;
 }
 
+LightSums Stage::light_sums() const {
+  return impl_->light_pass.sums();
+}
+
 void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   Impl& s = *impl_;
   if (sum.width_px != s.def.width_px || sum.height_px != s.def.height_px ||
@@ -631,6 +679,9 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   s.instances.for_each([&](const std::unique_ptr<Instance>& instance) { shown.push_back(instance.get()); });
   const std::vector<PointSet*> sets = s.prepare_points(view);
   s.puffs_pass.prepare(sets, s.sun, frame);
+  s.particles_behind_glass =
+      std::ranges::any_of(shown, [](const Instance* i) { return i->visible && i->material->glass; }) &&
+      std::ranges::any_of(sets, [](const PointSet* set) { return set->def.style != PointStyle::sphere; });
   s.prepare_lamps(sets, offsets, frame);
   s.mesh_pass.prepare(shown, view, s.features);
   const std::vector<const Cloth*> sheets = s.prepare_cloths();
@@ -638,6 +689,7 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   s.draw_surfaces(sheets, sets);
   s.trace_light(shown, sheets, sets, view, offsets);
   s.draw_opaque(sheets, sets);
+  s.trace_glass(view, offsets);
   s.draw_translucent(sheets, sets, view, frame, offsets.index == 0);
   s.draw_lines(view);
 

@@ -147,6 +147,18 @@ struct SampleOffsets {
 /// Offsets of sub-frame i of n: a fixed low-discrepancy set; all zero for n = 1.
 SampleOffsets sample_offsets(int i, int n);
 
+/// Sums over the values that rays found for light from the sky and other surfaces, and for mirror images.
+struct LightSums {
+  double arriving = 0;  ///< their luminance
+  double removed = 0;   ///< what was taken from the brightest of them, which would stay visible as dots
+
+  LightSums& operator+=(const LightSums& other) {
+    arriving += other.arriving;
+    removed += other.removed;
+    return *this;
+  }
+};
+
 struct StageDef {
   int width_px = 1280, height_px = 720;
   int shadow_map_px = 2048;
@@ -202,6 +214,8 @@ class Stage {
   /// Draws one sub-frame and adds it to `sum`, which is sized and cleared first if it does not have the
   /// stage's size. Throws UnavailableError on a GL error.
   void draw(const SampleOffsets& offsets, HdrImage& sum);
+  /// Of all sub-frames drawn so far.
+  LightSums light_sums() const;
 
   /// Sets the object id of an instance in Channels; 0, the default: none.
   void set_object(InstanceHandle instance, uint32_t id);

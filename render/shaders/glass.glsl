@@ -1,20 +1,37 @@
-// Refraction by a solid piece of glass: its far side is approximated by a ball as thick as the piece, and the
-// background is read from the finished picture of the opaque objects.
-layout(location = 1) uniform float thickness;  // [m]
+// Light through a piece of glass, which was traced for this sub-frame (render/trace).
+layout(binding = 20) uniform sampler2D traced_through;  // w: visible share of the sun
+layout(binding = 21) uniform sampler2D traced_by_glass; // mirror image
+#ifdef PARTICLES
+// The tracer does not know sprites, streaks and smoke. Behind glass they are taken from the picture: it is compared with
+// a copy that lacks them, at the place where a ray leaves the glass if its far side is a ball as thick as the piece.
+layout(location = 1) uniform float thickness;  // [m]; 0: a sheet
 layout(binding = 12) uniform sampler2D behind;
+layout(binding = 22) uniform sampler2D behind_without_particles;
 
-vec3 seen_through(vec3 position, vec3 n, vec3 view) {
+vec3 particles_behind(vec3 position, vec3 n, vec3 view) {
   vec3 inside = refract(-view, n, material.glass.y);
   float way = thickness * max(-dot(inside, n), 0.0);
   vec3 far_side = position + way * inside, out_normal = normalize(far_side - (position - 0.5 * thickness * n));
   vec3 leaving = refract(inside, -out_normal, 1.0 / material.glass.y);
   if (thickness <= 0.0) leaving = -view;  // a sheet with parallel sides does not turn the ray
   else if (dot(leaving, leaving) < 0.5) leaving = inside;  // total reflection inside
-  vec3 f0 = vec3(pow((1.0 - material.glass.y) / (1.0 + material.glass.y), 2.0));
   vec4 clip = uniforms.clip_from_world * vec4(far_side + thickness * leaving, 1.0);
-  vec2 place = 0.5 + 0.5 * clip.xy / clip.w;
-  vec2 off = abs(place - 0.5);
+  vec2 place = 0.5 + 0.5 * clip.xy / clip.w, off = abs(place - 0.5);
   float on_screen = clip.w > 0.0 ? 1.0 - smoothstep(0.46, 0.5, max(off.x, off.y)) : 0.0;
-  vec3 light = mix(sky_reflection(leaving, 0.05), texture(behind, clamp(place, 0.0, 1.0)).rgb, on_screen);
-  return light * (1.0 - fresnel_at(f0, max(dot(view, n), 0.0)));
+  place = clamp(place, 0.0, 1.0);
+  return on_screen * (texture(behind, place).rgb - texture(behind_without_particles, place).rgb);
+}
+#endif
+
+vec3 seen_through(vec3 color, vec3 position, vec3 n, vec3 view) {
+  vec3 light = texelFetch(traced_through, ivec2(gl_FragCoord.xy), 0).rgb;
+#ifdef PARTICLES
+  light = max(light + color * particles_behind(position, n, view), 0.0);
+#endif
+  return light;
+}
+
+Light light_on_glass(vec3 normal) {
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  return Light(texelFetch(traced_through, pixel, 0).w, ambient(normal), vec3(0.0), 1.0, texelFetch(traced_by_glass, pixel, 0));
 }

@@ -29,7 +29,6 @@ bool off_shadow_map(vec3 p) { return any(notEqual(p.xy, clamp(p.xy, 0.0, 1.0)));
 
 #ifdef FRAGMENT
 layout(binding = 9) uniform sampler2D shadow_depth;  // the shadow map without comparison
-layout(binding = 13) uniform sampler2D casters;  // depth from which on a caster may be in front
 
 // The softness of a shadow grows with the distance of its caster (R. Fernando, "Percentage-Closer Soft Shadows", 2005):
 // first the mean depth of the casters is computed, then the share of a disc as wide as the penumbra. Where all samples
@@ -48,9 +47,7 @@ float shadow_map_visibility(vec3 position, vec3 normal) {
   slope *= -min(1.0, 4.0 * sqrt(frame.penumbra.z) * steep);
   float beside = min(1.0 / steep, 4.0 * sqrt(frame.penumbra.z)) * frame.shadow.z;
   float search = min(frame.penumbra.x * p.z, frame.penumbra.y) + 1.0, sum = 0.0, blockers = 0.0;
-  // No search where a surface faces away from the sun, or where no caster can be in front of it.
-  float nearest = texelFetch(casters, ivec2(p.xy * vec2(textureSize(casters, 0))), 0).r;
-  int rounds = g.z < 0.0 && p.z > nearest ? 4 : 0;
+  int rounds = g.z < 0.0 ? 4 : 0;  // no search where a surface faces away from the sun
   int k = 0;
   do {
     vec2 offset = a * (0.7 * search * frame.shadow.z);

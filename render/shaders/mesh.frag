@@ -129,8 +129,10 @@ void main() {
 #ifdef GLASS
   s.albedo *= 1.0 - transmitted;
 #endif
-#ifdef TRACED
+#if defined(TRACED)
   Light light = traced_light(n, smooth_normal);
+#elif defined(GLASS)
+  Light light = light_on_glass(n);
 #else
   Light light = Light(sun_visibility(position, smooth_normal), ambient(n), vec3(0.0), 1.0, vec4(0.0));
 #endif
@@ -146,7 +148,7 @@ void main() {
 #endif
 #endif
 #ifdef GLASS
-  radiance += albedo * (transmitted * seen_through(position, n, view));
+  radiance += transmitted * seen_through(albedo, position, n, view);
 #endif
 #ifdef DETAILED
   radiance = with_layers(radiance, n, smooth_normal, view, light);

@@ -47,12 +47,13 @@ inline LaneVectors all_lanes(const Eigen::Vector3f& v) {
 }
 
 /// A direction around the unit vector n, with a density in proportion to the cosine.
-inline Eigen::Vector3f cosine_direction(const Eigen::Vector3f& n, const SquarePoint<float>& uv) {
-  const SquarePoint<float> d = on_disc(uv);
-  Three<float> a, b;
-  make_basis(from_eigen(n), a, b);
-  const float up = std::sqrt(std::max(1 - d.x * d.x - d.y * d.y, 0.0f));
-  return (d.x * to_eigen(a) + d.y * to_eigen(b) + up * n).normalized();
+template <class T>
+Three<T> cosine_direction(const Three<T>& n, const SquarePoint<T>& uv) {
+  const SquarePoint<T> d = on_disc(uv);
+  Three<T> a, b;
+  make_basis(n, a, b);
+  const T up = square_root(larger(1.0f - d.x * d.x - d.y * d.y, T{}));
+  return normalized(a * d.x + b * d.y + n * up);
 }
 
 /// A normal of the microfacets that are visible from `view`, for GGX with a = roughness^2 (J. Dupuy and

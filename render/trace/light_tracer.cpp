@@ -20,6 +20,7 @@ constexpr float kBrightest =
     50;  // of light that arrives after bounces; brighter samples would stay visible as dots
 constexpr float kSmoothMetal = 0.35f;  // with less roughness, a path goes on in the mirrored direction
 
+constexpr float kGrazing = 0.02f;      // cosine between light and triangle; with less, it may shadow itself
 constexpr float kSharpMirror = 0.12f;  // with more roughness, mirror images are averaged over pixels
 
 std::size_t index_of(int x, int y, int width) {
@@ -31,6 +32,12 @@ LaneVectors from_octahedral(Lanes x, Lanes z) {
   const Lanes folded_x = (1 - absolute(z)) * (x < 0.0f ? -one : one);
   const Lanes folded_z = (1 - absolute(x)) * (z < 0.0f ? -one : one);
   return normalized(LaneVectors{y < 0.0f ? folded_x : x, y, y < 0.0f ? folded_z : z});
+}
+
+void set_lane(LaneVectors& lanes, int i, const Vector3f& value) {
+  lanes.x[i] = value.x();
+  lanes.y[i] = value.y();
+  lanes.z[i] = value.z();
 }
 
 /// Indices of eight pixels of a row; -1 beyond its end.
@@ -52,6 +59,43 @@ float fresnel_of_glass(float cosine, float ratio) {
   const float s = (ratio * cosine - t) / (ratio * cosine + t),
               p = (cosine - ratio * t) / (cosine + ratio * t);
   return 0.5f * (s * s + p * p);
+}
+
+float refraction_ratio(const Hit& hit) {
+  return hit.front || hit.material->thin ? 1 / hit.material->refraction : hit.material->refraction;
+}
+
+/// Share of the light along a ray that a surface of glass mirrors.
+float mirrored_share(const Hit& hit, const Vector3f& direction) {
+  return fresnel_of_glass(std::min(-hit.normal.dot(direction), 1.0f), refraction_ratio(hit));
+}
+
+/// Moves a ray through a surface of glass, which it refracts; returns the share of the light that the colour
+/// leaves. A solid piece takes half of its colour, as a factor, where the ray enters, and half where it
+/// leaves.
+Vector3f enter(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Vector3f& from,
+               Vector3f& direction) {
+  from = off_surface(hit.position, -hit.face);
+  const Vector3f color = albedo.cwiseMax(0);
+  if (hit.material->thin) return color;
+  const float a = hit.material->roughness * hit.material->roughness;
+  const Vector3f n = a < 1e-3f ? hit.normal : visible_facet(hit.normal, -direction, a, sampler.next());
+  const float ratio = refraction_ratio(hit), cosine = std::min(-n.dot(direction), 1.0f);
+  const float sine2 = ratio * ratio * std::max(1 - cosine * cosine, 0.0f);
+  const Vector3f refracted = ratio * direction + (ratio * cosine - std::sqrt(std::max(1 - sine2, 0.0f))) * n;
+  direction = refracted.normalized();
+  if (direction.dot(hit.face) >= 0)
+    direction = reflected(direction, hit.face);  // smooth normals are not exact
+  return color.cwiseSqrt();
+}
+
+/// Limits a value that a ray found, and adds it to the sums.
+Vector3f limited(const Vector3f& light, LightSums& sums) {
+  const Vector3f kept = light.cwiseMin(kBrightest);
+  const Vector3f luminance(0.2126f, 0.7152f, 0.0722f);
+  sums.arriving += static_cast<double>(luminance.dot(light));
+  sums.removed += static_cast<double>(luminance.dot(light - kept));
+  return kept;
 }
 
 // GGX as in shaders/light.glsl.
@@ -203,87 +247,166 @@ Vector3f LightTracer::lamps_at(const Vector3f& place, const Vector3f& normal, co
   return kept->def().intensity.cwiseProduct(visible) * (kept_share * sum / kept_weight);
 }
 
-Vector3f LightTracer::radiance(Vector3f from, Vector3f direction, float cone, PixelSampler& sampler,
+int VisibleLight::find(const Hit& hit) const {
+  const LightGuide& guide = light_.pixels;
+  const Vector4f clip = view_.clip_from_world * hit.position.homogeneous();
+  if (!(clip.w() > 0)) return -1;
+  const float x = (0.5f + 0.5f * clip.x() / clip.w()) * static_cast<float>(guide.width_px);
+  const float y = (0.5f + 0.5f * clip.y() / clip.w()) * static_cast<float>(guide.height_px);
+  if (!(x >= 0 && y >= 0 && x < static_cast<float>(guide.width_px) &&
+        y < static_cast<float>(guide.height_px)))
+    return -1;
+  const int column = static_cast<int>(x), row = static_cast<int>(y);
+  if (*guide.filled.at(column, row) == 0) return -1;
+  const auto three = [&](const std::array<LightPlane, 3>& planes) {
+    return Vector3f(*planes[0].at(column, row), *planes[1].at(column, row), *planes[2].at(column, row));
+  };
+  const Vector3f normal = three(guide.normal);
+  const float off = normal.dot(three(guide.place) - hit.position);
+  const bool same = normal.dot(hit.normal) > 0.9f && off * off * *guide.inverse_size2.at(column, row) < 1;
+  return same ? static_cast<int>(index_of(column, row, guide.width_px)) : -1;
+}
+
+Vector4f VisibleLight::arriving(int pixel) const {
+  const auto k = static_cast<std::size_t>(pixel);
+  Vector4f result = light_.arriving[k];
+  if (!light_.lamps.empty()) result.head<3>() += light_.lamps[k].head<3>();
+  return result;
+}
+
+struct LightTracer::Path {
+  Vector3f from, direction;
+  float cone;  ///< angle that the ray stands for [rad]
+  Vector3f share = {1, 1, 1};
+  bool mirrored = false;  ///< so far
+
+  /// Leaves a surface in a mirrored direction.
+  void turn(const Vector3f& way, const Hit& hit) {
+    mirrored = true;
+    direction = way.dot(hit.face) > 0 ? way : reflected(way, hit.face);
+    from = off_surface(hit.position, hit.face);
+  }
+};
+
+// Moves a path through or off a surface of glass, and adds the light that the surface itself sends back. To
+// keep noise low, a mirror image of less than a tenth is not followed: outside of the glass it is that of the
+// sky, and inside its light is counted with the light that leaves.
+bool LightTracer::follow_glass(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Path& path,
+                               Vector3f& sum) const {
+  const RayMaterial& material = *hit.material;
+  if (material.transmission <= 0) return false;
+  if (hit.front && material.transmission < 1) {
+    const Vector3f light = direct_light(hit, off_surface(hit.position, hit.face), sampler) +
+                           sky_radiance(sources_.sky, hit.normal);
+    sum += (1 - material.transmission) * path.share.cwiseProduct(albedo).cwiseProduct(light);
+    path.share *= material.transmission;
+  }
+  const float mirrored = mirrored_share(hit, path.direction);
+  const Vector3f mirrored_way = reflected(path.direction, hit.normal);
+  if (mirrored >= 0.1f && sampler.next().x < mirrored) {
+    path.turn(mirrored_way, hit);
+    return true;
+  }
+  if (mirrored < 0.1f && hit.front) {
+    sum += mirrored * path.share.cwiseProduct(sky_radiance(sources_.sky, mirrored_way));
+    path.share *= 1 - mirrored;
+  }
+  path.share = path.share.cwiseProduct(enter(hit, albedo, sampler, path.from, path.direction));
+  return true;
+}
+
+// Of sun and lamps, on a white surface.
+Vector3f LightTracer::direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler) const {
+  Vector3f result = Vector3f::Zero();
+  const float towards_sun = hit.normal.dot(sources_.sky.sun_direction);
+  const SquarePoint<float> on_sun = sampler.next();
+  if (towards_sun > 0 && sources_.sun.intensity > 0)
+    result = sources_.sun.intensity * towards_sun * sun_visibility(from, on_sun) * sources_.sun.color;
+  return result + lamps_at(from, hit.normal, hit.face, sampler);
+}
+
+// Radiance that arrives along a path. `met`, if not null, gets the distance of what it meets first, and is
+// unchanged if it meets nothing. Mirrors and glass are followed sharply until the first diffuse surface.
+Vector3f LightTracer::radiance(Path path, PixelSampler& sampler, const VisibleLight* visible,
                                float* met) const {
-  Vector3f sum = Vector3f::Zero(), share = Vector3f::Ones();
+  Vector3f sum = Vector3f::Zero();
   float travelled = 0;
-  bool sharp = cone < 0.1f;
+  bool sharp = path.cone < 0.1f;
   int bounces = 0;
   for (int step = 0; step < kMostSteps; ++step) {
     Hit hit;
-    if (!scene_.first_hit(from, direction, kFar, hit))
-      return sum + share.cwiseProduct(sharp ? sky_seen(direction) : sky_radiance(sources_.sky, direction));
+    if (!scene_.first_hit(path.from, path.direction, kFar, hit)) {
+      const Vector3f sky = sharp ? sky_seen(path.direction) : sky_radiance(sources_.sky, path.direction);
+      return sum + path.share.cwiseProduct(sky);
+    }
     if (step == 0 && met != nullptr) *met = hit.distance;
+    const int pixel = visible != nullptr && sharp ? visible->find(hit) : -1;
+    if (pixel >= 0 && visible->has_picture() && !path.mirrored)
+      return sum + path.share.cwiseProduct(visible->color(pixel));
     travelled += hit.distance;
     if (sources_.fog > 0) {
       const float clear = std::exp(-sources_.fog * hit.distance);
-      sum += share.cwiseProduct(sky_seen(direction)) * (1 - clear);
-      share *= clear;
+      sum += path.share.cwiseProduct(sky_seen(path.direction)) * (1 - clear);
+      path.share *= clear;
     }
     const RayMaterial& material = *hit.material;
-    const Vector4f color = material.color(hit, travelled * cone);
-    const SquarePoint<float> choice = sampler.next();
-    float random = choice.x;
-    if (random >= color.w()) {  // through a hole, or a translucent surface
-      from = off_surface(hit.position, -hit.face);
+    const Vector4f color = material.color(hit, travelled * path.cone);
+    if (color.w() < 1 && sampler.next().x >= color.w()) {  // through a hole, or a translucent surface
+      path.from = off_surface(hit.position, -hit.face);
       continue;
     }
-    random /= color.w();
     const Vector3f albedo = color.head<3>();
-    if (material.unlit) return sum + share.cwiseProduct(albedo);
-    sum += share.cwiseProduct(material.emission);
-    if (random < material.transmission) {
-      const float ratio = hit.front ? 1 / material.refraction : material.refraction;
-      const float cosine = std::min(-hit.normal.dot(direction), 1.0f);
-      const float mirrored = fresnel_of_glass(cosine, material.thin ? 1 / material.refraction : ratio);
-      if (choice.y < mirrored) {
-        direction = reflected(direction, hit.normal);
-        from = off_surface(hit.position, hit.face);
-        if (direction.dot(hit.face) <= 0) direction = reflected(direction, hit.face);
-        continue;
-      }
-      share = share.cwiseProduct(albedo.cwiseMax(0).cwiseSqrt());
-      if (material.thin) share = share.cwiseProduct(albedo.cwiseMax(0).cwiseSqrt());
-      const float sine2 = ratio * ratio * std::max(1 - cosine * cosine, 0.0f);
-      if (!material.thin)
-        direction = (ratio * direction + (ratio * cosine - std::sqrt(std::max(1 - sine2, 0.0f))) * hit.normal)
-                        .normalized();
-      from = off_surface(hit.position, -hit.face);
-      continue;
-    }
-    from = off_surface(hit.position, hit.face);
-    const float cosine = std::min(-hit.normal.dot(direction), 1.0f), m = 1 - cosine;
-    const float fresnel = 0.04f + 0.96f * m * m * m * m * m;
-    const bool metal = material.metallic > 0.5f;
+    if (material.unlit) return sum + path.share.cwiseProduct(albedo);
+    // Of glass, as on the screen, only the side towards the eye glows.
+    if (hit.front || material.transmission <= 0) sum += path.share.cwiseProduct(material.emission);
+    if (follow_glass(hit, albedo, sampler, path, sum)) continue;
+    path.from = off_surface(hit.position, hit.face);
     const bool smooth = material.roughness < kSmoothMetal;
-    if (smooth && (metal || (sharp && choice.y < fresnel))) {
+    const float m = 1 - std::min(-hit.normal.dot(path.direction), 1.0f), grazing = m * m * m * m * m;
+    if (smooth && material.metallic > 0.5f) {
       const float a = std::max(material.roughness * material.roughness, bounces > 0 ? 0.04f : 1e-4f);
-      const Vector3f facet = visible_facet(hit.normal, -direction, a, sampler.next());
-      direction = reflected(direction, facet);
-      if (direction.dot(hit.face) <= 0) direction = reflected(direction, hit.face);
-      if (metal) share = share.cwiseProduct(albedo + (Vector3f::Ones() - albedo) * (m * m * m * m * m));
+      path.turn(reflected(path.direction, visible_facet(hit.normal, -path.direction, a, sampler.next())),
+                hit);
+      path.share = path.share.cwiseProduct(albedo + (Vector3f::Ones() - albedo) * grazing);
       continue;
     }
-    const Vector3f& n = hit.normal;
-    Vector3f direct = Vector3f::Zero();
-    const float towards_sun = n.dot(sources_.sky.sun_direction);
-    const SquarePoint<float> on_sun = sampler.next();
-    if (towards_sun > 0 && sources_.sun.intensity > 0)
-      direct += sources_.sun.intensity * towards_sun * sun_visibility(from, on_sun) * sources_.sun.color;
-    direct += lamps_at(from, n, hit.face, sampler);
-    share = share.cwiseProduct(albedo);
-    sum += share.cwiseProduct(direct);
+    if (smooth && sharp) {  // in a mirror image, a varnished surface mirrors the sky alone
+      const float fresnel = 0.04f + 0.96f * grazing;
+      Path sky = path;
+      sky.turn(reflected(path.direction, hit.normal), hit);
+      sum += fresnel * path.share.cwiseProduct(sky_seen(sky.direction))
+                           .cwiseProduct(scene_.transmittance(sky.from, sky.direction, kFar));
+      path.share *= 1 - fresnel;
+    }
+    path.share = path.share.cwiseProduct(albedo);
+    if (pixel >= 0) {
+      const Vector4f light = visible->arriving(pixel);
+      const float sun = sources_.sun.intensity * std::max(hit.normal.dot(sources_.sky.sun_direction), 0.0f);
+      return sum + path.share.cwiseProduct(light.head<3>() + sun * light.w() * sources_.sun.color);
+    }
+    sum += path.share.cwiseProduct(direct_light(hit, path.from, sampler));
     // Paths end at random in proportion to the light that they can still carry.
-    const float survives = std::min(share.maxCoeff(), 0.95f);
-    const SquarePoint<float> end = sampler.next();
-    if (++bounces >= kMostBounces || end.x >= survives) return sum;
-    share /= survives;
-    direction = cosine_direction(n, sampler.next());
-    if (direction.dot(hit.face) <= 0) direction = reflected(direction, hit.face);
+    const float survives = std::min(path.share.maxCoeff(), 0.95f);
+    if (++bounces >= kMostBounces || sampler.next().x >= survives) return sum;
+    path.share /= survives;
+    path.direction = to_eigen(cosine_direction(from_eigen(hit.normal), sampler.next()));
+    if (path.direction.dot(hit.face) <= 0) path.direction = reflected(path.direction, hit.face);
     sharp = false;
-    cone = 0.5f;
+    path.cone = 0.5f;
   }
   return sum;
+}
+
+// Where a triangle turns away from the light but its smooth normals do not, shadow rays start from the smooth
+// surface, so that the triangle does not shadow itself.
+void LightTracer::lift(const Points& points, IntLanes lanes, const LightView& view,
+                       LaneVectors& place) const {
+  if (!any(lanes)) return;
+  for (int i = 0; i < kLanes; ++i) {
+    if (!lanes[i]) continue;
+    const Point point = points.one(i, view.eye);
+    set_lane(place, i, scene_.smooth_place(view.eye, point.place));
+  }
 }
 
 void LightTracer::trace_lamps(const Points& points, int x, int y, const LightView& view,
@@ -303,11 +426,10 @@ void LightTracer::trace_lamps(const Points& points, int x, int y, const LightVie
     const Lanes share = lit ? point.share * nl : none;
     LaneVectors arriving = all_lanes(lamp.def().intensity) * share;
     if (lamp.def().shadows) {
-      const IntLanes faces = dot(points.face, point.towards) > 0.0f;
-      const LaneVectors seen = scene_.transmittance(points.place, point.towards, point.distance, lit & faces);
-      arriving.x = faces ? arriving.x * seen.x : arriving.x;
-      arriving.y = faces ? arriving.y * seen.y : arriving.y;
-      arriving.z = faces ? arriving.z * seen.z : arriving.z;
+      LaneVectors place = points.place;
+      lift(points, lit & (dot(points.face, point.towards) < kGrazing), view, place);
+      const LaneVectors seen = scene_.transmittance(place, point.towards, point.distance, lit);
+      arriving = {arriving.x * seen.x, arriving.y * seen.y, arriving.z * seen.z};
     }
     diffuse = diffuse + arriving;
     const LaneVectors h = normalized(point.towards + to_eye);
@@ -327,27 +449,15 @@ void LightTracer::trace_lamps(const Points& points, int x, int y, const LightVie
     light.highlights[index_of(x + i, y, width)] = {lobes.x[i], lobes.y[i], lobes.z[i], fresnel[i]};
 }
 
-Vector3f LightTracer::mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler) const {
+Vector3f LightTracer::mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler,
+                                     const VisibleLight& visible, LightSums& sums) const {
   const float a = point.roughness * point.roughness;
   const Vector3f facet =
       a < 1e-4f ? point.normal : visible_facet(point.normal, point.view, a, sampler.next());
   Vector3f way = reflected(-point.view, facet);
   if (way.dot(point.face) <= 0) way = reflected(way, point.face);
-  return radiance(point.place, way, std::max(a, view.pixel_m), sampler).cwiseMin(kBrightest);
-}
-
-void LightTracer::trace_own_mirrors(const Points& points, int x, int y, const LightView& view,
-                                    LightBuffer& light) const {
-  if (!any(points.own_mirrors)) return;
-  for (int i = 0; i < kLanes; ++i) {
-    if (!points.own_mirrors[i]) continue;
-    PixelSampler sampler(static_cast<uint32_t>(x + i), static_cast<uint32_t>(y), view.offsets.index,
-                         view.offsets.count);
-    sampler.skip(1 + static_cast<uint32_t>(sources_.lamps.size()));
-    light.mirrored[index_of(x + i, y, light.pixels.width_px)]
-        << mirrored_light(points.one(i, view.eye), view, sampler),
-        1;
-  }
+  const Path path{.from = point.place, .direction = way, .cone = std::max(a, view.pixel_m), .mirrored = true};
+  return limited(radiance(path, sampler, &visible), sums);
 }
 
 // Positions and normals of eight pixels, which guide the filter. `size_px`: width of what a value stands for.
@@ -384,45 +494,45 @@ void LightTracer::trace_pixels(const SurfaceBuffer& surfaces, int x, int y, cons
     place.z = behind ? through.z : place.z;
   }
   if (sources_.sun.intensity <= 0) sunny = IntLanes{};
+  lift(points, sunny & ~points.cloth & (dot(points.face, to_sun) < kGrazing), view, place);
   light.direct.channels()[0].set_lanes(x, y, sun_visibility(place, sunny, on_sun));
   if (!sources_.lamps.empty()) trace_lamps(points, x, y, view, sampler, light);
 }
 
-// The light from around, and mirror images but for those of smooth metals, are computed for one pixel of
-// four, another one in each sub-frame. Eight cells of a row.
-void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
-                              LightBuffer& light) const {
-  const int k = view.offsets.index, count = std::min(kLanes, light.cells.width_px - x);
+// Indices of the pixels of eight cells of a row whose light is computed: another one in each sub-frame.
+IntLanes LightTracer::pixels_of_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view) {
+  const int k = view.offsets.index, columns = (surfaces.width_px + 1) / 2;
   const int py = std::min(2 * y + ((k >> 1 ^ k) & 1), surfaces.height_px - 1);
   IntLanes at = IntLanes{} - 1;
-  for (int i = 0; i < count; ++i)
+  for (int i = 0; i < kLanes && x + i < columns; ++i)
     at[i] = py * surfaces.width_px + std::min(2 * (x + i) + (k & 1), surfaces.width_px - 1);
-  const Points points(surfaces, at);
+  return at;
+}
+
+// The light from around at eight cells of a row.
+void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
+                              LightBuffer& light, LightSums& sums) const {
+  const int k = view.offsets.index;
+  const Points points(surfaces, pixels_of_cells(surfaces, x, y, view));
   set_guide(points, x, y, view, 2, light.cells);
   const Lanes none{};
-  const IntLanes mirrors = points.mirrors & ~points.own_mirrors;
-  light.with_mirror.set_lanes(x, y, mirrors ? none + 1 : none);
-  light.with_rough_mirror.set_lanes(x, y, mirrors & (points.roughness > kSharpMirror) ? none + 1 : none);
-  LaneVectors around{none, none, none}, mirrored = around;
+  Sampler<UintLanes> samplers(UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x),
+                              UintLanes{} + static_cast<uint32_t>(y), k, view.offsets.count);
+  const LaneVectors ways = cosine_direction(points.normal, samplers.next());
+  LaneVectors around{none, none, none};
   Lanes inverse_distance{};
-  for (int i = 0; i < count; ++i) {
+  for (int i = 0; i < kLanes; ++i) {
     if (!points.visible[i]) continue;
     const Point point = points.one(i, view.eye);
     PixelSampler sampler(static_cast<uint32_t>(x + i), static_cast<uint32_t>(y), k, view.offsets.count);
-    Vector3f way = cosine_direction(point.normal, sampler.next());
+    sampler.skip(1);
+    Vector3f way(ways.x[i], ways.y[i], ways.z[i]);
     if (way.dot(point.face) <= 0) way = reflected(way, point.face);
     float met = kFar;
-    const auto set = [i](LaneVectors& lanes, const Vector3f& value) {
-      lanes.x[i] = value.x();
-      lanes.y[i] = value.y();
-      lanes.z[i] = value.z();
-    };
-    set(around, radiance(point.place, way, 0.5f, sampler, &met).cwiseMin(kBrightest));
+    set_lane(around, i, limited(radiance({point.place, way, 0.5f}, sampler, nullptr, &met), sums));
     inverse_distance[i] = 1 / std::max(met, 8 * view.pixel_m * (point.place - view.eye).norm());
-    if (mirrors[i]) set(mirrored, mirrored_light(point, view, sampler));
   }
   store(light.around.channels(), x, y, around);
-  store(light.mirrors.channels(), x, y, mirrored);
   light.inverse_distance.set_lanes(x, y, inverse_distance);
 }
 
@@ -432,6 +542,15 @@ void for_light_rows(int height, const auto& each) {
   tbb::parallel_for(tbb::blocked_range<int>(0, height, kRowsPerTask), [&](const auto& rows) {
     for (int y = rows.begin(); y < rows.end(); ++y) each(y);
   });
+}
+
+/// `each` gets sums of its own for each row, so that the total does not depend on the threads.
+LightSums sum_over_light_rows(int height, const auto& each) {
+  std::vector<LightSums> rows(static_cast<std::size_t>(height));
+  for_light_rows(height, [&](int y) { each(y, rows[static_cast<std::size_t>(y)]); });
+  LightSums total;
+  for (const LightSums& row : rows) total += row;
+  return total;
 }
 
 }  // namespace
@@ -449,27 +568,15 @@ void LightTracer::trace(const SurfaceBuffer& surfaces, const LightView& view, Li
   for_light_rows(height, [&](int y) {
     for (int x = 0; x < width; x += kLanes) trace_pixels(surfaces, x, y, view, light);
   });
-  for_light_rows(light.cells.height_px, [&](int y) {
-    for (int x = 0; x < light.cells.width_px; x += kLanes) trace_cells(surfaces, x, y, view, light);
+  light.sums = sum_over_light_rows(light.cells.height_px, [&](int y, LightSums& sums) {
+    for (int x = 0; x < light.cells.width_px; x += kLanes) trace_cells(surfaces, x, y, view, light, sums);
   });
-  filter(view, light);
-  finish(surfaces, view, light);
-}
-
-void LightTracer::filter(const LightView& view, LightBuffer& light) const {
   light.direct.average(light.pixels, light.pixels.filled, nullptr, 1);
   light.cells.find_reach(light.inverse_distance, light.reach2);
   const int widest = view.offsets.count >= 16 ? 4 : 8;
   for (int step = 1; step <= widest; step *= 2)
     light.around.average(light.cells, light.cells.filled, &light.reach2, step);
-  // Mirror images that the roughness blurs anyway.
-  if (!light.has_mirrors) return;
-  for (const int step : {1, 2}) light.mirrors.average(light.cells, light.with_rough_mirror, nullptr, step);
-}
-
-void LightTracer::finish(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const {
-  const int width = surfaces.width_px;
-  for_light_rows(surfaces.height_px, [&](int y) {
+  for_light_rows(height, [&](int y) {
     const std::size_t row = index_of(0, y, width);
     interpolate(light.pixels, light.cells, y, {&light.around, &light.cells.filled},
                 &light.direct.channels()[0], &light.arriving[row]);
@@ -479,11 +586,82 @@ void LightTracer::finish(const SurfaceBuffer& surfaces, const LightView& view, L
         lamps[static_cast<int>(i)] = *light.direct.channels()[i + 1].at(x, y);
       lamps.w() = light.highlights[row + static_cast<std::size_t>(x)].w();
     }
-    if (!light.has_mirrors) return;
-    interpolate(light.pixels, light.cells, y, {&light.mirrors, &light.with_mirror}, nullptr,
-                &light.mirrored[row]);
-    for (int x = 0; x < width; x += kLanes)
-      trace_own_mirrors(Points(surfaces, pixels_of_row(surfaces, x, y)), x, y, view, light);
+  });
+  if (light.has_mirrors) trace_mirrors(surfaces, view, light);
+}
+
+// Smooth metals have a mirror image in each pixel, other surfaces in each cell.
+void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& view,
+                                LightBuffer& light) const {
+  const int width = surfaces.width_px;
+  const VisibleLight visible(light, view);
+  const Lanes none{};
+  const auto mirrored = [&](const Points& points, int i, int x, int y, LightSums& sums) {
+    PixelSampler sampler(static_cast<uint32_t>(x + i), static_cast<uint32_t>(y), view.offsets.index,
+                         view.offsets.count);
+    sampler.skip(1 + static_cast<uint32_t>(sources_.lamps.size()));
+    return mirrored_light(points.one(i, view.eye), view, sampler, visible, sums);
+  };
+  light.sums += sum_over_light_rows(light.cells.height_px, [&](int y, LightSums& sums) {
+    for (int x = 0; x < light.cells.width_px; x += kLanes) {
+      const Points points(surfaces, pixels_of_cells(surfaces, x, y, view));
+      const IntLanes mirrors = points.mirrors & ~points.own_mirrors;
+      light.with_mirror.set_lanes(x, y, mirrors ? none + 1 : none);
+      light.with_rough_mirror.set_lanes(x, y,
+                                        (mirrors & (points.roughness > kSharpMirror)) ? none + 1 : none);
+      LaneVectors values{none, none, none};
+      for (int i = 0; i < kLanes; ++i)
+        if (mirrors[i]) set_lane(values, i, mirrored(points, i, x, y, sums));
+      store(light.mirrors.channels(), x, y, values);
+    }
+  });
+  for (const int step : {1, 2}) light.mirrors.average(light.cells, light.with_rough_mirror, nullptr, step);
+  light.sums += sum_over_light_rows(surfaces.height_px, [&](int y, LightSums& sums) {
+    Vector4f* row = &light.mirrored[index_of(0, y, width)];
+    interpolate(light.pixels, light.cells, y, {&light.mirrors, &light.with_mirror}, nullptr, row);
+    for (int x = 0; x < width; x += kLanes) {
+      const Points points(surfaces, pixels_of_row(surfaces, x, y));
+      for (int i = 0; i < kLanes; ++i)
+        if (points.own_mirrors[i]) row[x + i] << mirrored(points, i, x, y, sums), 1;
+    }
+  });
+}
+
+// The ray from the eye is followed from just before the surface.
+Vector3f LightTracer::light_through(const Point& point, PixelSampler& sampler, const VisibleLight& visible,
+                                    LightSums& sums) const {
+  Path path{.from = off_surface(point.place, point.view), .direction = -point.view, .cone = 1e-3f};
+  Hit hit;
+  if (!scene_.first_hit(path.from, path.direction, kFar, hit)) return sky_seen(path.direction);
+  const Vector3f albedo = hit.material->color(hit, 0).head<3>();
+  path.share *= 1 - mirrored_share(hit, path.direction);
+  path.share = path.share.cwiseProduct(enter(hit, albedo, sampler, path.from, path.direction));
+  return limited(radiance(path, sampler, &visible), sums);
+}
+
+void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, const LightView& view,
+                              const LightBuffer& light, std::span<const Vector4f> picture,
+                              GlassBuffer& glass) const {
+  const VisibleLight behind(light, view, picture);
+  glass.through.assign(surfaces.places.size(), Vector4f::Zero());
+  glass.mirrored.assign(surfaces.places.size(), Vector4f::Zero());
+  const int width = surfaces.width_px;
+  glass.sums = sum_over_light_rows(surfaces.height_px, [&](int y, LightSums& sums) {
+    for (int x = 0; x < width; x += kLanes) {
+      const Points points(surfaces, pixels_of_row(surfaces, x, y));
+      for (int i = 0; i < kLanes; ++i) {
+        if (!points.visible[i]) continue;
+        const Point point = points.one(i, view.eye);
+        PixelSampler sampler(static_cast<uint32_t>(x0 + x + i), static_cast<uint32_t>(y0 + y),
+                             view.offsets.index, view.offsets.count);
+        const SquarePoint<float> on_sun = sampler.next();
+        const bool sunny = sources_.sun.intensity > 0 && point.normal.dot(sources_.sky.sun_direction) > 0;
+        const std::size_t pixel = index_of(x + i, y, width);
+        glass.mirrored[pixel] << mirrored_light(point, view, sampler, behind, sums), 1;
+        glass.through[pixel] << light_through(point, sampler, behind, sums),
+            sunny ? sun_visibility(point.place, on_sun) : 0.0f;
+      }
+    }
   });
 }
 

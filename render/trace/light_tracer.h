@@ -41,6 +41,7 @@ struct LightBuffer {
   std::vector<Vector4f>
       lamps;  ///< diffuse light of lamps; w: Fresnel factor of their highlights. Empty: no lamps
   std::vector<Vector4f> highlights;  ///< lobes of lamps, without reflectance
+  LightSums sums;
 
   // In between. Light from around is computed for cells of 2x2 pixels.
   LightGuide pixels, cells;
@@ -48,6 +49,40 @@ struct LightBuffer {
   LightValues around, mirrors;  ///< of the cells
   LightPlane inverse_distance, reach2;        ///< see LightGuide::find_reach
   LightPlane with_mirror, with_rough_mirror;  ///< cells: 1 or 0
+};
+
+/// Light at the glass surfaces in a part of the picture, rows from the bottom up.
+struct GlassBuffer {
+  std::vector<Vector4f> through;  ///< light that comes through the glass; w: share of the sun that is visible
+  std::vector<Vector4f> mirrored;  ///< light from the mirrored direction; w: 1
+  LightSums sums;
+};
+
+/// How a picture of the surfaces was taken.
+struct LightView {
+  Vector3f eye;
+  Eigen::Matrix4f clip_from_world;
+  float pixel_m;  ///< width of a pixel at distance 1
+  SampleOffsets offsets;
+};
+
+/// Light of the visible surfaces, for rays that meet them again: it has no noise and costs no further rays.
+class VisibleLight {
+ public:
+  /// `picture`: of the opaque objects, rows from the bottom up; empty: not known.
+  VisibleLight(const LightBuffer& light, const LightView& view, std::span<const Vector4f> picture = {})
+      : light_(light), view_(view), picture_(picture) {}
+  /// Index of the pixel that shows a point; negative if it is not visible.
+  int find(const Hit& hit) const;
+  bool has_picture() const { return !picture_.empty(); }
+  Vector3f color(int pixel) const { return picture_[static_cast<std::size_t>(pixel)].head<3>(); }
+  /// Light from the sky, other surfaces and lamps; w: share of the sun that is visible.
+  Vector4f arriving(int pixel) const;
+
+ private:
+  const LightBuffer& light_;
+  const LightView& view_;
+  std::span<const Vector4f> picture_;
 };
 
 struct LightSources {
@@ -58,43 +93,45 @@ struct LightSources {
   const OpacityGrid* smoke = nullptr;  ///< null: none
 };
 
-/// How a picture of the surfaces was taken.
-struct LightView {
-  Vector3f eye;
-  float pixel_m;  ///< width of a pixel at distance 1
-  SampleOffsets offsets;
-};
-
 class LightTracer {
  public:
   LightTracer(const RayScene& scene, const LightSources& sources);
 
   void trace(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
 
-  /// Radiance that arrives from `direction` at `from`. `cone`: angle that the ray stands for [rad]. `met`, if
-  /// not null, gets the distance of what the ray meets first, and is unchanged if it meets nothing.
-  Vector3f radiance(Vector3f from, Vector3f direction, float cone, PixelSampler& sampler,
-                    float* met = nullptr) const;
+  /// `surfaces`: a part of the picture, with glass only; (x, y) is its first pixel. `picture`: the opaque
+  /// objects, whose light trace() has put into `light`.
+  void trace_glass(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
+                   const LightBuffer& light, std::span<const Vector4f> picture, GlassBuffer& glass) const;
 
  private:
   struct Point;   ///< a visible surface
   struct Points;  ///< eight of them
+  struct Path;    ///< from the eye
+  Vector3f radiance(Path path, PixelSampler& sampler, const VisibleLight* visible = nullptr,
+                    float* met = nullptr) const;
+  bool follow_glass(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Path& path,
+                    Vector3f& sum) const;
+  Vector3f direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler) const;
   Vector3f lamps_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
                     PixelSampler& sampler) const;
   float sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const;
   Lanes sun_visibility(const LaneVectors& place, IntLanes active, const SquarePoint<Lanes>& uv) const;
-  Vector3f mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler) const;
+  Vector3f light_through(const Point& point, PixelSampler& sampler, const VisibleLight& visible,
+                         LightSums& sums) const;
+  Vector3f mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler,
+                          const VisibleLight& visible, LightSums& sums) const;
+  void lift(const Points& points, IntLanes lanes, const LightView& view, LaneVectors& place) const;
   void trace_lamps(const Points& points, int x, int y, const LightView& view, Sampler<UintLanes>& sampler,
                    LightBuffer& light) const;
   void trace_pixels(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
                     LightBuffer& light) const;
-  void trace_own_mirrors(const Points& points, int x, int y, const LightView& view, LightBuffer& light) const;
+  static IntLanes pixels_of_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view);
+  void trace_mirrors(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
   static void set_guide(const Points& points, int x, int y, const LightView& view, float size_px,
                         LightGuide& guide);
-  void trace_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
-                   LightBuffer& light) const;
-  void filter(const LightView& view, LightBuffer& light) const;
-  void finish(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
+  void trace_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view, LightBuffer& light,
+                   LightSums& sums) const;
   Vector3f sky_seen(const Vector3f& direction) const;
 
   const RayScene& scene_;

@@ -17,7 +17,7 @@ namespace {
 constexpr unsigned kOpaqueCaster = 1, kTranslucentCaster = 2, kNoCaster = 4, kAll = 7, kSprite = 8;
 // Largest number of translucent surfaces and sprites that a shadow ray is tested against; light passes the
 // others freely.
-constexpr int kMostLayers = 64;
+constexpr int kMostPassed = 64;
 
 /// The device of the process. The instruction set is fixed, because others round hit distances differently.
 RTCDevice device() {
@@ -136,6 +136,8 @@ struct RayScene::Object {
 
   /// Share of the light that passes a sprite along a ray; `behind`: distance of the far side of its ball.
   float transmittance(unsigned sprite, const Vector3f& from, const Vector3f& direction, float& behind) const;
+  /// Where a ray meets a triangle of a mesh, on the surface that the smooth normals suggest.
+  Vector3f smoothed(unsigned triangle, const Vector3f& from, const Vector3f& direction) const;
   void describe(unsigned triangle, const Vector3f& from, const Vector3f& direction, Hit& hit) const;
 
  private:
@@ -258,6 +260,27 @@ void RayScene::Object::describe_mesh(unsigned triangle, const Vector3f& from, co
     hit.color = mixed(mesh->colors[k[0]], mesh->colors[k[1]], mesh->colors[k[2]], uv);
 }
 
+// The mean of the point's projections onto the planes through the corners, across their normals.
+Vector3f RayScene::Object::smoothed(unsigned triangle, const Vector3f& from,
+                                    const Vector3f& direction) const {
+  std::array<Vector3f, 3> p, n;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t k = mesh->indices[3 * std::size_t{triangle} + i];
+    p[i] = world_from_mesh * mesh->positions[k].head<3>();
+    n[i] = (normal_from_mesh * mesh->normals[k]).normalized();
+  }
+  const Vector2f uv = barycentric(from, direction, p[0], p[1], p[2]);
+  const Vector3f place = mixed(p[0], p[1], p[2], uv);
+  const float side = mixed(n[0], n[1], n[2], uv).dot(direction) > 0 ? -1.0f : 1.0f;
+  for (std::size_t i = 0; i < 3; ++i) {
+    n[i] *= side;
+    p[i] = place - std::min(n[i].dot(place - p[i]), 0.0f) * n[i];
+  }
+  const Vector3f result = mixed(p[0], p[1], p[2], uv);
+  if (!result.allFinite()) return place;
+  return off_surface(result, side * mixed(n[0], n[1], n[2], uv).normalized());
+}
+
 void RayScene::Object::describe_cloth(unsigned triangle, const Vector3f& from, const Vector3f& direction,
                                       Hit& hit) const {
   const std::size_t first = 3 * std::size_t{triangle};
@@ -320,6 +343,16 @@ bool RayScene::first_hit(const Vector3f& from, const Vector3f& direction, float 
   return true;
 }
 
+Vector3f RayScene::smooth_place(const Vector3f& eye, const Vector3f& place) const {
+  const Vector3f way = place - eye;
+  const float length = way.norm();
+  RTCRayHit ray;
+  set_ray(ray.ray, eye, way / length, 1.001f * length, kAll);
+  const Object* object = meet(ray);
+  if (object == nullptr || object->mesh == nullptr || ray.ray.tfar < 0.999f * length) return place;
+  return object->smoothed(ray.hit.primID, eye, way / length);
+}
+
 Vector3f RayScene::transmittance(const Vector3f& from, const Vector3f& direction, float length) const {
   RTCRay ray;
   set_ray(ray, from, direction, length, kOpaqueCaster);
@@ -328,11 +361,12 @@ Vector3f RayScene::transmittance(const Vector3f& from, const Vector3f& direction
   return through_translucent(from, direction, length);
 }
 
-LaneVectors RayScene::transmittance(const LaneVectors& from, const LaneVectors& direction, Lanes length,
-                                    IntLanes active) const {
-  const Lanes none{};
-  LaneVectors share{none, none, none};
-  if (!any(active)) return share;
+namespace {
+
+/// Which of eight segments meet an object of some group.
+IntLanes blocked(RTCScene tree, const LaneVectors& from, const LaneVectors& direction, Lanes length,
+                 IntLanes active, unsigned mask) {
+  if (!any(active)) return IntLanes{};
   RTCRay8 rays;
   const auto store = [](auto* target, const auto& lanes) { std::memcpy(target, &lanes, sizeof(lanes)); };
   store(rays.org_x, from.x);
@@ -341,22 +375,32 @@ LaneVectors RayScene::transmittance(const LaneVectors& from, const LaneVectors& 
   store(rays.dir_x, direction.x);
   store(rays.dir_y, direction.y);
   store(rays.dir_z, direction.z);
-  store(rays.tnear, none);
+  store(rays.tnear, Lanes{});
   store(rays.tfar, length);
-  store(rays.time, none);
-  store(rays.mask, UintLanes{} + kOpaqueCaster);
+  store(rays.time, Lanes{});
+  store(rays.mask, UintLanes{} + mask);
   store(rays.id, UintLanes{});
   store(rays.flags, UintLanes{});
   alignas(32) std::array<int, kLanes> valid;
   store(valid.data(), active);
-  embree::occluded(tree_.get(), valid, rays);
+  embree::occluded(tree, valid, rays);
   Lanes far;
   std::memcpy(&far, rays.tfar, sizeof(far));
-  const IntLanes free = active & (far >= 0.0f);
-  share.x = share.y = share.z = free ? none + 1 : none;
+  return active & (far < 0.0f);
+}
+
+}  // namespace
+
+LaneVectors RayScene::transmittance(const LaneVectors& from, const LaneVectors& direction, Lanes length,
+                                    IntLanes active) const {
+  const Lanes none{};
+  const IntLanes free = active & ~blocked(tree_.get(), from, direction, length, active, kOpaqueCaster);
+  const Lanes open = free ? none + 1 : none;
+  LaneVectors share{open, open, open};
   if (!has_translucent_) return share;
+  const IntLanes dimmed = blocked(tree_.get(), from, direction, length, free, kTranslucentCaster | kSprite);
   for (int i = 0; i < kLanes; ++i) {
-    if (!free[i]) continue;
+    if (!dimmed[i]) continue;
     const Vector3f one = through_translucent({from.x[i], from.y[i], from.z[i]},
                                              {direction.x[i], direction.y[i], direction.z[i]}, length[i]);
     share.x[i] = one.x();
@@ -368,7 +412,7 @@ LaneVectors RayScene::transmittance(const LaneVectors& from, const LaneVectors& 
 
 Vector3f RayScene::through_translucent(const Vector3f& from, const Vector3f& direction, float length) const {
   Vector3f share = Vector3f::Ones(), place = from;
-  for (int layer = 0; has_translucent_ && layer < kMostLayers && length > 0; ++layer) {
+  for (int layer = 0; has_translucent_ && layer < kMostPassed && length > 0; ++layer) {
     RTCRayHit hit_ray;
     set_ray(hit_ray.ray, place, direction, length, kTranslucentCaster | kSprite);
     const Object* object = meet(hit_ray);

@@ -95,6 +95,9 @@ class RayScene {
                             IntLanes active) const;
   /// Returns false if the ray meets nothing within `length` [m].
   bool first_hit(const Vector3f& from, const Vector3f& direction, float length, Hit& hit) const;
+  /// The point `place` of a mesh that is visible from `eye`, moved onto the surface that its smooth normals
+  /// suggest (J. Hanika, "Hacking the Shadow Terminator", 2021). Other points stay.
+  Vector3f smooth_place(const Vector3f& eye, const Vector3f& place) const;
 
  private:
   struct Object;

@@ -61,7 +61,7 @@ TEST(StageLight, LampsCastShadowsWhereGeometryPredicts) {
     // A box of 0.5 m whose top is 1 m high, under a lamp at 3 m: the shadow of its top is 0.75 m wide. The
     // floor beside the shadow, and on the other sides of the lamp, is lit.
     Floor floor;
-    floor.s.add(make_box({0.5f, 0.5f, 0.5f}), kWhite, {1.2f, 0.75f, 0});
+    floor.s.add(make_box({0.5f, 0.5f, 0.5f}), {.color = {0, 0, 0, 1}, .roughness = 1}, {1.2f, 0.75f, 0});
     floor.s.stage.set_lamps(std::array{Lamp{.position = {0, 3, 0},
                                             .intensity = {9, 9, 9},
                                             .radius = 0.01f,

@@ -153,6 +153,82 @@ TEST_F(TracedLight, MirrorsShowWhatIsBehindTheCamera) {
   EXPECT_NEAR(seen.y(), 0.45f, 0.02f);
 }
 
+// In a closed room of metal that glows with e and reflects a share r, the radiance is e / (1 - r). Seen at a
+// right angle, since metal reflects more at grazing angles.
+TEST_F(TracedLight, InAGlowingRoomOfMirrorsIsTheSumOfAllReflections) {
+  for (const float share : {0.3f, 0.6f}) {
+    SmallStage room(96, 64);
+    room.stage.set_environment(kNoLight);
+    room.stage.set_sun({.intensity = 0, .shadows = false});
+    room.stage.set_camera({.eye = {0.2f, 0.1f, 0.4f}, .target = {2, 0.1f, 0.4f}, .fov_deg = 10});
+    room.add(make_box({4, 3, 5}), {.color = {share, share, share, 1},
+                                   .metallic = 1,
+                                   .roughness = 0.01f,
+                                   .emission = Vector3f::Constant(0.3f),
+                                   .two_sided = true});
+    EXPECT_NEAR(mean_around(mean_of(room, 4), {48, 32}, 25) * (1 - share) / 0.3f, 1, 0.02f) << share;
+  }
+}
+
+TEST_F(TracedLight, MirrorsShowWhatALampLights) {
+  s.stage.set_lamps(std::array{Lamp{.position = {0, 2, 3}, .intensity = {4, 4, 4}, .radius = 0.05f}});
+  s.add(make_ground(20), {.color = {0.5f, 0.5f, 0.5f, 1}, .roughness = 1});
+  s.add(make_box({4, 4, 0.1f}), {.color = {1, 1, 1, 1}, .metallic = 1, .roughness = 0.01f}, {0, 2, -0.05f});
+  look({.eye = {0, 1, 4}, .target = {0, 0.3f, 0}});
+  const HdrImage picture = mean_of(s, 8);
+  // A point of the floor and its mirror image, which is seen in the plane z = 0.
+  const float seen = mean_around(picture, place_of({0.3f, 0, 0.8f}), 1);
+  EXPECT_NEAR(mean_around(picture, place_of({0.3f, 0, -0.8f}), 1) / seen, 1, 0.05f);
+}
+
+// A ball of glass with the index of refraction 1.5 shows distant things upside down.
+TEST_F(TracedLight, ABallOfGlassTurnsThePictureUpsideDown) {
+  s.add(make_sphere(1), {.color = {1, 1, 1, 1}, .roughness = 0.01f, .transmission = 1, .refraction = 1.5f});
+  s.add(make_box({30, 15, 0.1f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {1, 0, 0}},
+        {0, 7.5f, -10});
+  s.add(make_box({30, 15, 0.1f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {0, 1, 0}},
+        {0, -7.5f, -10});
+  look({.eye = {0, 0, 5}, .target = {0, 0, 0}});
+  const HdrImage picture = mean_of(s, 4);
+  for (const float y : {0.2f, 0.5f}) {
+    const Vector2f above = place_of({0, y, 0}), below = place_of({0, -y, 0});
+    EXPECT_GT(pixel(picture, 80, static_cast<int>(above.y())).y(), 0.8f) << y;
+    EXPECT_LT(pixel(picture, 80, static_cast<int>(above.y())).x(), 0.1f) << y;
+    EXPECT_GT(pixel(picture, 80, static_cast<int>(below.y())).x(), 0.8f) << y;
+  }
+}
+
+// On a coarse ball with smooth normals, brightness falls towards the terminator as on a true one, although
+// the triangles there turn away from the sun.
+TEST_F(TracedLight, OfACoarseSmoothBallFallsEvenlyTowardsItsTerminator) {
+  const float turn = 10 * std::numbers::pi_v<float> / 180;
+  s.stage.set_sun({.direction = {std::cos(turn), 0, std::sin(turn)}, .intensity = 1, .size_deg = 0.1f});
+  s.add(make_sphere(1, 12), {.color = {1, 1, 1, 1}, .roughness = 1});
+  look({.eye = {0, 0, 4}, .target = {0, 0, 0}, .fov_deg = 35});
+  const HdrImage picture = mean_of(s, 16);
+  for (float angle = 30; angle < 100; angle += 4) {  // from the sun
+    const float a = angle * std::numbers::pi_v<float> / 180 + turn;
+    const Vector2f place = place_of({0.99f * std::cos(a), 0.1f, 0.99f * std::sin(a)});
+    EXPECT_NEAR(mean_around(picture, place, 1), std::max(std::cos(a - turn), 0.0f), 0.08f) << angle;
+  }
+}
+
+TEST_F(TracedLight, SumsCountWhatIsTakenFromRaysThatFindTooMuch) {
+  s.stage.set_environment(even_sky(0.7f));
+  s.add(make_ground(20), kPlaster);
+  look({.eye = {0, 1, 4}, .target = {0, 0, 0}});
+  s.draw();
+  EXPECT_GT(s.stage.light_sums().arriving, 0);
+  EXPECT_EQ(s.stage.light_sums().removed, 0);
+  s.stage.set_environment(kNoLight);
+  s.add(make_sphere(0.3f), {.color = {0, 0, 0, 1}, .emission = Vector3f::Constant(500)}, {0, 1, 0});
+  const LightSums before = s.stage.light_sums();
+  s.draw();
+  const LightSums& after = s.stage.light_sums();
+  // 450 parts of 500 are taken.
+  EXPECT_NEAR((after.removed - before.removed) / (after.arriving - before.arriving), 0.9, 0.02);
+}
+
 // Two boxes on a floor, at three sizes. A ray that starts on a surface must not intersect that surface, and
 // must not miss an object that touches it.
 TEST_F(TracedLight, DoesNotDependOnTheSizeOfTheScene) {

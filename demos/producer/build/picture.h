@@ -38,6 +38,8 @@ class Picture {
                      const std::function<bool()>& stop = {});
   /// Linear light of the latest frame with its exposure and glow, without tone curve and texts.
   render::HdrImage linear() const;
+  /// Sums over all pictures so far.
+  render::LightSums light_sums() const { return stage_.light_sums(); }
   /// The camera of the latest picture.
   const render::Camera& camera() const { return latest_camera_; }
 

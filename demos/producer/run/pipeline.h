@@ -33,6 +33,7 @@ struct RenderedFrame {
   double render_ms = 0;
   render::Channels channels;  // empty unless requested
   render::HdrImage linear;    // empty unless the sink needs it
+  render::LightSums light;    // of this frame
 };
 
 /// Passes frames to the drawing threads and returns the finished frames in order. At most `window` frames are

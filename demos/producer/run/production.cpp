@@ -146,13 +146,17 @@ void draw_frames(Pipeline& pipeline, const Scene& scene, const ModelLibrary& mod
   Picture picture(scene, models, context);
   while (auto frame_job = pipeline.take_job()) {
     const auto start = Clock::now();
+    const render::LightSums before = picture.light_sums();
     render::Image image = picture.draw(*frame_job->previous, *frame_job->current);
     render::Channels data;
     if (channels) data = picture.channels(*frame_job->previous, *frame_job->current);
     render::HdrImage light;
     if (linear) light = picture.linear();
+    render::LightSums sums = picture.light_sums();
+    sums.arriving -= before.arriving;
+    sums.removed -= before.removed;
     pipeline.give_rendered(
-        {std::move(*frame_job), std::move(image), ms_since(start), std::move(data), std::move(light)});
+        {std::move(*frame_job), std::move(image), ms_since(start), std::move(data), std::move(light), sums});
   }
 }
 
@@ -193,6 +197,7 @@ void print_frames(Pipeline& pipeline, render::FrameSink& sink, const Scene& scen
     stats.sim.add(rendered->frame_job.sim_ms);
     stats.render.add(rendered->render_ms);
     stats.encode.add(encode_ms);
+    stats.light += rendered->light;
     const Snapshot& state = *rendered->frame_job.current;
     stats.particles = state.point_count();
     stats.most_particles = std::max(stats.most_particles, stats.particles);
@@ -495,6 +500,7 @@ std::string to_json(const RunStats& stats) {
     json[name] = {{"mean", s.mean}, {"p50", s.p50}, {"p95", s.p95}, {"max", s.max}};
   }
   json["peak_rss_mb"] = peak_rss_mb();
+  json["light_removed"] = stats.light.removed / std::max(stats.light.arriving, 1e-300);
   json["bodies"] = stats.bodies;
   json["particles"] = stats.particles;
   json["most_particles"] = stats.most_particles;

@@ -55,6 +55,7 @@ struct RunStats {
   uint64_t particles = 0;  ///< number at the end
   uint64_t most_particles = 0;
   SimulationTotals totals;
+  render::LightSums light;
   std::optional<sim::Energy> energy_start, energy_end;  ///< empty with a cache
   std::string state_hash;                               ///< after the last frame
   std::map<int, std::string> frame_states;              ///< state hash of every drawn frame
