@@ -85,7 +85,7 @@ void sort_by_rank(std::span<const RankedPair> pairs, std::size_t bodies, std::ve
 
 /// Whether the path is not within the box in the broad phase.
 bool leaves(const Body& body, const Aabb& way) {
-  return body.def.collides && !body.swept.contains(way);
+  return body.collides() && !body.swept.contains(way);
 }
 
 }  // namespace
@@ -95,6 +95,7 @@ PairSurface World::Impl::surface_of(const Body& a, const Body& b) const {
     return d.static_friction < 0 ? d.friction : d.static_friction;
   };
   PairSurface s;
+  if (def.collision.narrow_phase == CollisionMethods::NarrowPhase::vclip) s.method = DistanceMethod::vclip;
   s.restitution = std::max(a.def.restitution, b.def.restitution);
   s.friction = std::sqrt(a.def.friction * b.def.friction);
   s.static_friction = std::sqrt(static_friction(a.def) * static_friction(b.def));

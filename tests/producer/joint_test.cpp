@@ -53,10 +53,10 @@ TEST(SceneJoints, InvalidValuesAreRefusedWithTheAllowedOnes) {
             "/joints/0: has no dynamic body: at least one of \"a\" and \"b\" must be dynamic\n");
   EXPECT_EQ(joint_errors(bodies + R"("joints": [{"type": "revolute", "a": "door", "limits": [-1, 1]},
                                              {"type": "revolute", "a": "door", "limits_deg": [10, 20]}])"),
-            "/joints/0/limits: is for prismatic and distance joints; use \"limits_deg\"\n"
+            "/joints/0/limits: is for prismatic and distance joints and pulleys; use \"limits_deg\"\n"
             "/joints/1/limits_deg: must be a range that contains 0, the position of the joint at time 0\n");
   EXPECT_EQ(joint_errors(bodies + R"("joints": [{"a": "door", "motor": {}}])"),
-            "/joints/0/motor: drives revolute, prismatic and distance joints only\n");
+            "/joints/0/motor: drives revolute, prismatic, screw and distance joints only\n");
   EXPECT_EQ(joint_errors(bodies + R"("articulations": [{"type": "chain", "end": "world"}])"),
             "/articulations/0/sag: must be above 1.0005 if both ends are fixed: a taut chain cannot carry a "
             "sideways load\n");

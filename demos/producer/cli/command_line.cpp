@@ -268,6 +268,9 @@ CLI::App* add_simulate(CLI::App& app, SimulateOptions& simulate) {
                       "CSV of the contact points of bodies, with their forces");
   command->add_option("--cloths", simulate.cloths, "CSV of strain and contacts of cloths");
   command->add_option("--joints", simulate.joints, "CSV of the loads and positions of joints");
+  command->add_option(
+      "--particles", simulate.particles,
+      "Table of all particles, emitted ones included: CSV, or binary if its name ends in .bin");
   command->add_option("--trace-every", simulate.trace_every, "Interval of the CSV rows: frame or step")
       ->check(CLI::IsMember({"frame", "step"}));
   command->add_option("--cache", simulate.cache, "Folder for one snapshot per frame, for `render --cache`");
