@@ -35,7 +35,7 @@ class Text {
   std::string_view rest_;
 };
 
-std::string_view next_word(std::string_view& line) {
+std::string_view next_field(std::string_view& line) {
   constexpr std::string_view kBlanks = " \t";
   line.remove_prefix(std::min(line.find_first_not_of(kBlanks), line.size()));
   const std::string_view word = line.substr(0, line.find_first_of(kBlanks));
@@ -44,7 +44,7 @@ std::string_view next_word(std::string_view& line) {
 }
 
 std::optional<double> next_number(std::string_view& line) {
-  std::string_view word = next_word(line);
+  std::string_view word = next_field(line);
   if (word.starts_with('+')) word.remove_prefix(1);
   double value = 0;
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
@@ -142,20 +142,20 @@ PlyHeader read_ply_header(Text& text) {
     const std::optional<std::string_view> line = text.line();
     if (!line) throw FileError("its header has no end");
     std::string_view words = *line;
-    const std::string_view first = next_word(words);
+    const std::string_view first = next_field(words);
     if (first == "end_header") {
       if (!seen) throw FileError("has no vertices");
       return header;
     }
     if (first == "format") {
-      const std::string_view form = next_word(words);
+      const std::string_view form = next_field(words);
       if (form != "ascii" && form != "binary_little_endian" && form != "binary_big_endian")
         throw FileError("has the unknown format '" + std::string(form) + "'");
       header.form = form == "ascii"                  ? PlyHeader::Form::text
                     : form == "binary_little_endian" ? PlyHeader::Form::little
                                                      : PlyHeader::Form::big;
     } else if (first == "element") {
-      const bool is_vertex = next_word(words) == "vertex";
+      const bool is_vertex = next_field(words) == "vertex";
       if (!is_vertex && !seen) throw FileError("has other elements before its vertices");
       in_vertices = is_vertex && !seen;
       if (!in_vertices) continue;
@@ -166,10 +166,10 @@ PlyHeader read_ply_header(Text& text) {
                         " vertices, or no number of them");
       header.count = static_cast<std::size_t>(*count);
     } else if (first == "property" && in_vertices) {
-      const std::string_view type = next_word(words);
+      const std::string_view type = next_field(words);
       const std::optional<PlyNumber> number = ply_number(type);
       if (!number) throw FileError("a vertex has a property of the type '" + std::string(type) + "'");
-      header.properties.push_back({std::string(next_word(words)), *number});
+      header.properties.push_back({std::string(next_field(words)), *number});
     }
   }
   throw FileError("its header is too long");
@@ -246,7 +246,7 @@ PointCloud parse_obj_points(std::span<const uint8_t> bytes) {
   bool all_colored = true;
   while (const std::optional<std::string_view> line = text.line()) {
     std::string_view words = *line;
-    if (next_word(words) != "v") continue;
+    if (next_field(words) != "v") continue;
     if (cloud.positions.size() >= kMostCloudPoints)
       throw FileError("has more than " + std::to_string(kMostCloudPoints) + " vertices");
     std::array<std::optional<double>, 6> numbers;

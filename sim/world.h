@@ -128,6 +128,8 @@ struct StepReport {
   uint32_t islands = 0;            ///< groups of bodies connected by contacts or joints
   uint32_t contacts = 0;           ///< contact points
   Real penetration = 0;            ///< greatest penetration at the starts of sub-steps and at impacts [m]
+  uint64_t pairs_tested = 0;       ///< pairs of bodies with overlapping boxes, of all sub-steps
+  uint64_t impact_searches = 0;    ///< searches for the time of impact of a pair
   uint64_t collisions = 0;         ///< contacts whose speed of approach exceeded WorldDef::collision_speed
   uint64_t tracebacks = 0;         ///< trace-backs of islands to a time of impact
   uint64_t toi_limit_reached = 0;  ///< pairs that reached the limit of time-of-impact events in a sub-step;

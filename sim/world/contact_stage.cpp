@@ -380,6 +380,7 @@ void World::Impl::count_contacts(StepReport& report) const {
   report.islands = static_cast<uint32_t>(islands.size());
   report.bodies_awake = static_cast<uint32_t>(awake.size());
   report.bodies_asleep = static_cast<uint32_t>(asleep);
+  report.pairs_tested += active_pairs.size();
   report.contacts = 0;
   for (const ContactPair* pair : active_pairs) {
     report.contacts += pair->touching();

@@ -222,6 +222,7 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
     const std::vector<std::size_t> events = indices_where(active_pairs.size(), [&](std::size_t i) {
       return active_pairs[i]->needs_toi && is_wanted(*active_pairs[i]);
     });
+    report.impact_searches += events.size();
     std::vector<std::optional<Real>> times(events.size());
     for_each_index(events.size(),
                    [&](std::size_t i) { times[i] = impact_time(*active_pairs[events[i]], h); });

@@ -167,6 +167,16 @@ TEST(Fills, MakeParticlesAndCopiesOfBodies) {
     EXPECT_LT(std::hypot(body.position.x(), body.position.z()), 0.15);
   EXPECT_EQ(errors_of(R"("bodies": [{"name": "m", "fill": {}}])"),
             "/bodies/0/fill/spacing: is needed: the distance between neighbouring copies\n");
+  const char* no_room = ": has no room for a single place; use a smaller \"spacing\" or a larger volume\n";
+  EXPECT_EQ(errors_of(R"("bodies": [{"name": "m", "fill": {"spacing": 2}}])"),
+            std::string("/bodies/0/fill") + no_room);
+  EXPECT_EQ(errors_of(R"("particles": [{"fill": {"spacing": 2}}])"),
+            std::string("/particles/0/fill") + no_room);
+  // A thin and very long volume, in which few of the places of the box around it are.
+  EXPECT_EQ(
+      errors_of(
+          R"("particles": [{"fill": {"shape": {"type": "cylinder", "radius": 0.06, "height": 1e9}, "spacing": 0.1}}])"),
+      "/particles/0/fill: has more than 5000000 places; use a larger \"spacing\" or a smaller volume\n");
 }
 
 TEST(EmitterFaces, AreThoseOfTheBodyOrOfACube) {

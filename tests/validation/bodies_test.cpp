@@ -64,10 +64,12 @@ TEST_P(ShapesAtRest, LieAtTheirHeights) {
   };
   const Tube pipe{0.3, 0.4, 0.05};
   const OpenBox tray{{0.5, 0.3, 0.4}, 0.04};
+  const Torus ring{0.3, 0.1};
   const std::array bodies = {place(frustum, 0.2, 0), place(ellipsoid, 0.1, 1),
+                             place(hollow(solid_mesh(ring), mass_properties(ring)), 0.1, 2),
                              place(hollow(solid_mesh(pipe), mass_properties(pipe)), 0.2, 3),
                              place(hollow(solid_mesh(tray), mass_properties(tray)), 0.15, 4)};
-  const std::array heights = {0.2, 0.1, 0.2, 0.15};
+  const std::array heights = {0.2, 0.1, 0.1, 0.2, 0.15};
   run(world, 1.0);
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     EXPECT_NEAR(world.body(bodies[i]).pose.position.y(), heights[i], 2e-4) << i;

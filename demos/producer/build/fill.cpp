@@ -33,11 +33,18 @@ bool holds(const SphereFill& s, const Vec3& p, Real r) {
   return p.norm() <= s.radius - r;
 }
 
+Real row_step(Real d, bool cubic) {
+  return cubic ? d : d * std::numbers::sqrt3 / 2;
+}
+Real layer_step(Real d, bool cubic) {
+  return cubic ? d : d * std::sqrt(2.0 / 3);
+}
+
 /// Layers of rows: each row is shifted by half a step from the last one, each layer by a third of the
 /// triangle between rows, which is the closest packing of balls; or a cubic grid.
 template <class Add>
 void lay_lattice(const Vec3& half, Real d, bool cubic, Add&& add) {
-  const Real row = cubic ? d : d * std::numbers::sqrt3 / 2, layer = cubic ? d : d * std::sqrt(2.0 / 3);
+  const Real row = row_step(d, cubic), layer = layer_step(d, cubic);
   constexpr Real kRounding = 1e-9;
   const auto steps = [&](Real length, Real step) {
     return length < 0 ? -1 : static_cast<int64_t>(std::floor(length / step + kRounding));
@@ -94,6 +101,15 @@ void lay_random(const Vec3& half, Real d, uint64_t seed, Add&& add) {
 
 }  // namespace
 
+/// Whether the box around a volume has so many places that the volume has more than `most`, or is much
+/// thinner than the spacing: a box is less than twice as large as a cylinder or ball in it.
+bool exceeds(const Vec3& half, const Fill& fill, Real spacing, std::size_t most) {
+  const bool cubic = fill.packing == Packing::cubic;
+  const Vec3 counts =
+      (2 * half).cwiseQuotient(Vec3(spacing, layer_step(spacing, cubic), row_step(spacing, cubic)));
+  return (counts + Vec3::Ones()).prod() > 8 * static_cast<Real>(most);
+}
+
 std::vector<Vec3> fill_places(const Fill& fill, Real spacing, std::size_t most) {
   std::vector<Vec3> places;
   constexpr Real kRounding = 1e-9;
@@ -107,6 +123,10 @@ std::vector<Vec3> fill_places(const Fill& fill, Real spacing, std::size_t most) 
           return random ? inside : places.size() <= most;
         };
         const Vec3 half = half_size(shape);
+        if (exceeds(half, fill, spacing, most)) {
+          places.assign(most + 1, Vec3::Zero());
+          return;
+        }
         if (fill.packing == Packing::random)
           lay_random(half, spacing, fill.seed, add);
         else

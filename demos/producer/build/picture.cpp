@@ -264,7 +264,13 @@ void Picture::add_convex_parts(const MeshFile& mesh, const Body& body, const Mod
 }
 
 void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t& slot, uint32_t object) {
-  DrawnBody drawn{{}, affine(body.position, body.orientation), parts_overlay(scene_, body.name), body.appear_at, body.remove_at, {}, {}};
+  DrawnBody drawn{{},
+                  affine(body.position, body.orientation),
+                  parts_overlay(scene_, body.name),
+                  body.appear_at,
+                  body.remove_at,
+                  {},
+                  {}};
   const auto add_file = [&](const std::string& file, const Affine3f& body_from_model) {
     if (body.animation)
       add_animated(file, body_from_model, body, models, drawn);

@@ -219,6 +219,9 @@ const Vec3& position_of(const Emitter& emitter) {
   return position_of(emitter.surface);
 }
 
+constexpr const char* kNoRoom =
+    "has no room for a single place; use a smaller \"spacing\" or a larger volume";
+
 template <class T>
 std::vector<T> expand_all(const std::vector<T>& originals, uint64_t seed, std::vector<Problem>& errors,
                           std::vector<Problem>& warnings) {
@@ -238,12 +241,18 @@ std::vector<T> expand_all(const std::vector<T>& originals, uint64_t seed, std::v
       continue;
     }
     if (copy_count(original.placement) > kMaxCopies) {
-      errors.push_back({original.where, "asks for more than " + std::to_string(kMaxCopies) +
-                                            " copies: the counts of repeat, grid and scatter multiply"});
+      errors.push_back(
+          {original.where, "asks for more than " + std::to_string(kMaxCopies) +
+                               " copies: the counts of fill, repeat, grid and scatter multiply"});
       all.push_back(original);
       continue;
     }
     const Copies copies = expand(original.placement, position_of(original), seed, original.name);
+    if (copies.placed.empty() && copies.left_out == 0) {
+      Where where = original.where;
+      where.path += "/fill";
+      errors.push_back({where, kNoRoom});
+    }
     for (const PlacedCopy& copy : copies.placed) all.push_back(moved(original, copy));
     if (copies.left_out > 0) {
       Where where = original.where;
@@ -280,9 +289,10 @@ void resolve_fill(ParticleGroup& group, std::vector<Problem>& errors) {
   constexpr std::size_t kMostPlaces = 5'000'000;
   const Real spacing = group.fill->spacing > 0 ? group.fill->spacing : 2 * group.radius;
   std::vector<Vec3> places = fill_places(*group.fill, spacing, kMostPlaces);
+  Where where = group.where;
+  where.path += "/fill";
+  if (places.empty()) errors.push_back({where, kNoRoom});
   if (places.size() > kMostPlaces) {
-    Where where = group.where;
-    where.path += "/fill";
     errors.push_back({where, "has more than 5000000 places; use a larger \"spacing\" or a smaller volume"});
     places.clear();
   }

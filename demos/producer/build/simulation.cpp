@@ -79,6 +79,8 @@ void SimulationTotals::add(const sim::StepReport& report) {
   bodies_asleep = report.bodies_asleep;
   islands = report.islands;
   penetration = std::max(penetration, report.penetration);
+  pairs_tested += report.pairs_tested;
+  impact_searches += report.impact_searches;
   collisions += report.collisions;
   tracebacks += report.tracebacks;
   toi_limit_reached += report.toi_limit_reached;

@@ -45,6 +45,7 @@ struct SimulationTotals {
   std::size_t contacts = 0;                                   ///< contact points of bodies at the end
   std::size_t most_contacts = 0;                              ///< at the end of a frame
   sim::Real penetration = 0;                                  ///< greatest in the run, and at its end [m]
+  uint64_t pairs_tested = 0, impact_searches = 0;
   uint64_t collisions = 0, tracebacks = 0, toi_limit_reached = 0, restitution_suppressed = 0,
            speculative_contacts = 0;
   uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;

@@ -112,6 +112,16 @@ struct SimulateOptions {
 };
 int simulate_command(const SimulateOptions& options);
 
+struct BenchOptions {
+  SceneOptions scene;
+  std::string csv;
+  int repeat = 1;  ///< runs of each method
+  int threads = 0;
+  bool force = false, quiet = false;
+};
+/// Simulates a scene by each of the algorithms that it can choose from, and prints a table.
+int bench_command(const BenchOptions& options);
+
 struct ExportOptions {
   SceneOptions scene;
   TalkOptions talk;

@@ -180,8 +180,7 @@ class Checker {
     if (!look.mesh) return;
     check_material_name(path + "/mesh/material", look.mesh->material);
     check_part_materials(look.mesh->shape);
-    if (const auto wrong = problem(look.mesh->shape))
-      fail(path + "/mesh/shape" + wrong->key, wrong->what);
+    if (const auto wrong = problem(look.mesh->shape)) fail(path + "/mesh/shape" + wrong->key, wrong->what);
     if (const auto* mesh = std::get_if<MeshFile>(&look.mesh->shape))
       check_model(path + "/mesh/shape/file", mesh->file);
   }

@@ -456,6 +456,8 @@ void add_contact_figures(const SimulationTotals& t, Json& json) {
   json["contacts"] = t.contacts;
   json["most_contacts"] = t.most_contacts;
   json["penetration"] = t.penetration;
+  json["pairs_tested"] = t.pairs_tested;
+  json["impact_searches"] = t.impact_searches;
   json["collisions"] = t.collisions;
   json["tracebacks"] = t.tracebacks;
   json["toi_limit_reached"] = t.toi_limit_reached;

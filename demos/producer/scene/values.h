@@ -12,6 +12,7 @@
 #include "producer/base/error.h"
 #include "sim/core/types.h"
 #include "sim/geometry/shape.h"
+#include "sim/geometry/solid_mesh.h"
 
 namespace offstage::producer {
 

@@ -114,7 +114,9 @@ TEST(SolidDistance, OfRoundSolidsIsExactInsideAndOutside) {
       const SurfaceDistance d = signed_distance(solid, p);
       const Vec3 on_surface = p - d.distance * d.normal;
       EXPECT_NEAR(signed_distance(solid, on_surface).distance, 0, 1e-9);
-      if (d.distance > 0) EXPECT_NEAR(d.normal.dot(on_surface), support(solid, d.normal), 1e-9);
+      if (d.distance > 0) {
+        EXPECT_NEAR(d.normal.dot(on_surface), support(solid, d.normal), 1e-9);
+      }
       // No surface point is nearer: the distance changes by at most the way.
       const Vec3 q = p + in_box(0.05);
       EXPECT_LE(std::abs(signed_distance(solid, q).distance - d.distance), (q - p).norm() * (1 + 1e-9));
