@@ -12,12 +12,12 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kG = 9.81, kPi = std::numbers::pi;
+constexpr Real kWeight = 9.81, kPi = std::numbers::pi;
 
-WorldDef quiet(Real max_step = 1.0 / 240) {
+WorldDef sleepless(Real max_step = 1.0 / 240) {
   return {.max_step = max_step, .sleep = false};
 }
-WorldDef weightless() {
+WorldDef no_gravity() {
   return {.gravity = Vec3::Zero(), .sleep = false};
 }
 
@@ -124,7 +124,7 @@ TEST(Ellipsoids, RockWithTheirPeriod) {
   def.pose.position = {0, support, 0};
   const BodyHandle body = world.add_body(def);
   const Real I = (a * a + b * b) / 5;
-  const Real period = 2 * kPi / std::sqrt(kG * (a * a / b - b) / (I + b * b));
+  const Real period = 2 * kPi / std::sqrt(kWeight * (a * a / b - b) / (I + b * b));
   const auto tilt = [&] {
     const Vec3 up = world.body(body).pose.orientation * Vec3::UnitY();
     return -up.x();
@@ -141,7 +141,7 @@ TEST(Ellipsoids, RockWithTheirPeriod) {
 
 // A compound moves about the centre of mass of its parts, and spins about it with their inertia.
 TEST(Compounds, FlyAboutTheCentreOfTheirParts) {
-  World world(weightless());
+  World world(no_gravity());
   const Pose head{Vec3(0, 0.3, 0), Quat::Identity()};
   const BodyMass mass = sum_of({{mass_properties(Shape(Box{{0.1, 0.05, 0.1}})), head, 8000},
                                 {mass_properties(Shape(Cylinder{0.015, 0.5})), {}, 600}});
@@ -163,7 +163,7 @@ TEST(Compounds, FlyAboutTheCentreOfTheirParts) {
 }
 
 TEST(Compounds, InvalidMassesAreRefused) {
-  World world(quiet());
+  World world(sleepless());
   BodyDef def;
   def.shape = Box{};
   def.inertia = Vec3(1, 1, 3).asDiagonal();
@@ -179,7 +179,7 @@ TEST(Compounds, InvalidMassesAreRefused) {
 // A torque about a principal axis: w = tau t / I. With linear keys the angular momentum is the integral of
 // the curve.
 TEST(AppliedForces, TorquesSpinABodyByTheirIntegral) {
-  World world(weightless());
+  World world(no_gravity());
   const BodyHandle steady = add(world, Box{{1, 2, 3}}, {0, 0, 0}),
                    varying = add(world, Box{{1, 2, 3}}, {5, 0, 0});
   world.add_force({.name = "steady",
@@ -198,7 +198,7 @@ TEST(AppliedForces, TorquesSpinABodyByTheirIntegral) {
 // A force at a point: it accelerates the centre as if it acted there, and turns the body by its moment. In
 // the body's axes it turns with the body: constant thrust across a spinning body goes around in a circle.
 TEST(AppliedForces, ActAtAPointInTheBodysAxes) {
-  World world(weightless());
+  World world(no_gravity());
   const BodyHandle pushed = add(world, Box{{1, 1, 1}}, {0, 0, 0}, 2);
   world.add_force({.name = "push",
                    .bodies = {pushed},
@@ -207,7 +207,7 @@ TEST(AppliedForces, ActAtAPointInTheBodysAxes) {
   EXPECT_NEAR(world.body(pushed).velocity.z(), 1.5e-3, 1e-9);
   EXPECT_NEAR(world.body(pushed).angular_velocity.y(), -1.5 / (2.0 / 6) * 1e-3, 1e-8);
 
-  World other(weightless());
+  World other(no_gravity());
   BodyDef def;
   def.shape = Sphere{0.5};
   def.mass = 2;
@@ -225,7 +225,7 @@ TEST(AppliedForces, ActAtAPointInTheBodysAxes) {
 // --- Lifetimes ---
 
 TEST(Lifetimes, BodiesFallFromWhenTheyAppearAndSupportsVanish) {
-  World world(quiet());
+  World world(sleepless());
   BodyDef def;
   def.shape = Sphere{0.1};
   def.pose.position = {0, 10, 0};
@@ -248,8 +248,8 @@ TEST(Lifetimes, BodiesFallFromWhenTheyAppearAndSupportsVanish) {
   run(world, 1.0);
   EXPECT_TRUE(world.is_present(late));
   EXPECT_FALSE(world.is_present(support));
-  EXPECT_NEAR(world.body(late).pose.position.y(), 10 - kG / 2 * 0.75 * 0.75, 1e-9);
-  EXPECT_NEAR(world.body(resting).pose.position.y(), 0.2 - kG / 2 * 0.25, 1e-3);
+  EXPECT_NEAR(world.body(late).pose.position.y(), 10 - kWeight / 2 * 0.75 * 0.75, 1e-9);
+  EXPECT_NEAR(world.body(resting).pose.position.y(), 0.2 - kWeight / 2 * 0.25, 1e-3);
   run(world, 0.1);
   const StateHash once = world.state_hash();
   EXPECT_FALSE(once.hex().empty());
@@ -257,7 +257,7 @@ TEST(Lifetimes, BodiesFallFromWhenTheyAppearAndSupportsVanish) {
 
 // A sleeping body wakes when its support is removed; particles fall through where a body was.
 TEST(Lifetimes, RemovalWakesWhatRestedOnTheBody) {
-  World world({});
+  World world(WorldDef{});
   BodyDef shelf;
   shelf.shape = Box{{1, 0.2, 1}};
   shelf.motion = MotionType::static_body;
@@ -271,12 +271,12 @@ TEST(Lifetimes, RemovalWakesWhatRestedOnTheBody) {
   run(world, 2.5);
   EXPECT_TRUE(world.is_asleep(body));
   run(world, 1.0);
-  EXPECT_NEAR(world.body(body).pose.position.y(), 0.2 - kG / 2 * 0.25, 2e-3);
+  EXPECT_NEAR(world.body(body).pose.position.y(), 0.2 - kWeight / 2 * 0.25, 2e-3);
 }
 
 // A joint that appears later holds the bodies where they are then; one that is removed lets go.
 TEST(Lifetimes, OfJointsAndSprings) {
-  World world(quiet());
+  World world(sleepless());
   const BodyHandle a = add(world, Sphere{0.1}, {0, 0, 0}), b = add(world, Sphere{0.1}, {3, 0, 0}, 1);
   world.add_joint({.name = "late", .type = JointType::fixed, .a = a, .anchor = {0, 0, 0}, .appear_at = 0.5});
   world.add_joint({.name = "early", .type = JointType::fixed, .a = b, .anchor = {3, 0, 0}, .remove_at = 0.5});
@@ -293,9 +293,9 @@ TEST(Lifetimes, OfJointsAndSprings) {
                     .stiffness = 1e4,
                     .damping = 200});
   run(world, 1.0);
-  EXPECT_NEAR(world.body(a).pose.position.y(), -kG / 2 * 0.25, 1e-6);
-  EXPECT_NEAR(world.body(b).pose.position.y(), -kG / 2 * 0.25, 1e-6);
-  EXPECT_NEAR(world.body(hung).pose.position.y(), -kG / 1e4 - kG / 2 * 0.25, 1e-4);
+  EXPECT_NEAR(world.body(a).pose.position.y(), -kWeight / 2 * 0.25, 1e-6);
+  EXPECT_NEAR(world.body(b).pose.position.y(), -kWeight / 2 * 0.25, 1e-6);
+  EXPECT_NEAR(world.body(hung).pose.position.y(), -kWeight / 1e4 - kWeight / 2 * 0.25, 1e-4);
 }
 
 // --- Joints that couple motions ---
@@ -323,7 +323,7 @@ void twist(World& world, BodyHandle body, const Vec3& torque) {
 // angle_a + r angle_b = 0: w_b = -w_a / r, and the torque accelerates I_a + I_b / r^2. Also about other axes,
 // after many turns.
 TEST(Gears, ShareATorqueByTheirRatio) {
-  World world(weightless());
+  World world(no_gravity());
   const Wheel a = add_wheel(world, 0.2, 3, {0, 0, 0}),
               b = add_wheel(world, 0.5, 2, {0.7, 0, 0}, Vec3::UnitX());
   world.add_joint({.name = "gear",
@@ -345,7 +345,7 @@ TEST(Gears, ShareATorqueByTheirRatio) {
 
 // The torque accelerates I + m R^2.
 TEST(Racks, MoveByTheRadiusOfTheirPinion) {
-  World world(weightless());
+  World world(no_gravity());
   const Wheel pinion = add_wheel(world, 0.2, 3, {0, 0, 0});
   const BodyHandle rack = add(world, Box{{2, 0.1, 0.1}}, {0, -0.25, 0}, 4);
   world.add_joint({.name = "way",
@@ -370,7 +370,7 @@ TEST(Racks, MoveByTheRadiusOfTheirPinion) {
 
 // A nut on a vertical screw falls with a = g / (1 + I / (m p^2)) with the lead 2 pi p.
 TEST(Screws, FallByTheirLead) {
-  World world(quiet());
+  World world(sleepless());
   BodyDef def;
   def.shape = Cylinder{0.2, 0.1};
   def.mass = 2;
@@ -380,7 +380,7 @@ TEST(Screws, FallByTheirLead) {
   const JointHandle screw = world.add_joint(
       {.name = "screw", .type = JointType::screw, .a = nut, .axis = Vec3::UnitY(), .ratio = lead});
   run(world, 3.0);
-  const Real a = kG / (1 + I / (2 * p * p));
+  const Real a = kWeight / (1 + I / (2 * p * p));
   const BodyState state = world.body(nut);
   EXPECT_NEAR(state.velocity.y() / (-a * 3), 1, 1e-5);
   EXPECT_NEAR(state.angular_velocity.y() / (state.velocity.y() / p), 1, 1e-9);
@@ -390,7 +390,7 @@ TEST(Screws, FallByTheirLead) {
 // Atwood: with n strands at b, a_a = (m_a - m_b / n) g / (m_a + m_b / n^2), downwards.
 TEST(Pulleys, AreAtwoodsMachines) {
   for (const Real strands : {1.0, 2.0}) {
-    World world(quiet());
+    World world(sleepless());
     const BodyHandle a = add(world, Sphere{0.1}, {0, 0, 0}, 3), b = add(world, Sphere{0.1}, {1, 0, 0}, 2);
     world.add_joint({.name = "rope",
                      .type = JointType::pulley,
@@ -402,7 +402,7 @@ TEST(Pulleys, AreAtwoodsMachines) {
                      .pulley_a = {0, 5, 0},
                      .pulley_b = {1, 5, 0}});
     run(world, 0.75);
-    const Real down = kG * (3 - 2 / strands) / (3 + 2 / (strands * strands));
+    const Real down = kWeight * (3 - 2 / strands) / (3 + 2 / (strands * strands));
     EXPECT_NEAR(world.body(a).velocity.y() / (-down * 0.75), 1, 1e-3) << strands;
     EXPECT_NEAR(world.body(b).velocity.y() / (down * 0.75 / strands), 1, 1e-3) << strands;
   }
@@ -414,7 +414,7 @@ TEST(Pulleys, AreAtwoodsMachines) {
 // sub-step.
 TEST(JointLimits, HaveARestitution) {
   for (const Real e : {0.5, 0.9}) {
-    World world(quiet());
+    World world(sleepless());
     const BodyHandle slider = add(world, Box{{0.1, 0.1, 0.1}}, {0, 0, 0});
     world.add_joint({.name = "rail",
                      .type = JointType::prismatic,
@@ -437,7 +437,7 @@ TEST(JointLimits, HaveARestitution) {
 
 // A bar on a joint with a stiffness: k theta = m g l / 2 cos(theta) at rest.
 TEST(JointStiffness, HoldsABarUp) {
-  World world(quiet());
+  World world(sleepless());
   const BodyHandle bar = add(world, Box{{1, 0.05, 0.05}}, {0.5, 0, 0}, 2);
   world.add_joint({.name = "root",
                    .type = JointType::spherical,
@@ -448,7 +448,7 @@ TEST(JointStiffness, HoldsABarUp) {
   run(world, 6.0);
   const Vec3 along = world.body(bar).pose.orientation * Vec3::UnitX();
   const Real theta = std::atan2(-along.y(), along.x());
-  EXPECT_NEAR(40 * theta / (2 * kG * 0.5 * std::cos(theta)), 1, 1e-3);
+  EXPECT_NEAR(40 * theta / (2 * kWeight * 0.5 * std::cos(theta)), 1, 1e-3);
 }
 
 // --- Algorithms ---

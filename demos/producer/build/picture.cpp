@@ -118,16 +118,16 @@ void Picture::add_particle_mesh(const ParticleLook& look, const ModelLibrary& mo
   drawn.casts_shadow = points_def(look).casts_shadow;
   drawn.object = object;
   std::vector<std::pair<render::Mesh, Affine3f>> meshes;
-  const auto add = [&](const auto& shape, const std::string& look, const Affine3f& whole_from_part) {
-    drawn.parts.push_back({primitive(shape), material(look, models), whole_from_part});
+  const auto add = [&](const auto& shape, const std::string& name, const Affine3f& whole_from_part) {
+    drawn.parts.push_back({primitive(shape), material(name, models), whole_from_part});
     meshes.emplace_back(mesh_of(shape), whole_from_part);
   };
   const std::string& own = drawn.look->material;
   std::visit(
       [&]<class S>(const S& shape) {
         if constexpr (std::is_same_v<S, MeshFile>) {
-          for (const auto& [mesh, look] : model_parts(shape.file, own, models))
-            drawn.parts.push_back({mesh, look, Affine3f::Identity()});
+          for (const auto& [mesh, handle] : model_parts(shape.file, own, models))
+            drawn.parts.push_back({mesh, handle, Affine3f::Identity()});
           for (const render::Model::Part& part : models.model(shape.file).parts)
             meshes.emplace_back(part.mesh, Affine3f::Identity());
         } else if constexpr (std::is_same_v<S, Compound>) {

@@ -498,12 +498,13 @@ void Simulation::for_each_particle_system(
     const std::function<void(const std::string&, const sim::ParticleArrays&, const PointSet&)>& visit) const {
   for (std::size_t i = 0; i < groups_.size(); ++i) {
     const sim::ParticleArrays& particles = world_.particles(groups_[i].handle);
-    visit(groups_[i].name, particles, group_looks_[i].points(particles, &scene_.particles[i].places));
+    visit(groups_[i].name, particles,
+          group_looks_[i].points(particles, world_.time(), &scene_.particles[i].places));
   }
   sources_->for_each_system(
       [&](const std::string& name, sim::ParticleSystemHandle handle, const LookRamps& look) {
         const sim::ParticleArrays& particles = world_.particles(handle);
-        visit(name, particles, look.points(particles, nullptr));
+        visit(name, particles, look.points(particles, world_.time(), nullptr));
       });
 }
 

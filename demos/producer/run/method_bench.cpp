@@ -25,12 +25,12 @@ void add_others(const std::string& key, E present, std::vector<Method>& methods)
   }
 }
 
-constexpr std::array kHeader = {"method",          "steps/s",     "steps",       "pairs tested",
-                                "impact searches", "collisions",  "iterations",  "fall-backs",
-                                "overlap mm",      "joint error", "deviation m", "fault"};
-using Row = std::array<std::string, kHeader.size()>;
+constexpr std::array kResultHeader = {"method",          "steps/s",     "steps",       "pairs tested",
+                                      "impact searches", "collisions",  "iterations",  "fall-backs",
+                                      "overlap mm",      "joint error", "deviation m", "fault"};
+using ResultRow = std::array<std::string, kResultHeader.size()>;
 
-Row row_of(const MethodResult& r, const MethodResult& first) {
+ResultRow row_of(const MethodResult& r, const MethodResult& first) {
   const SimulationTotals& t = r.totals;
   const std::optional<double> deviation = r.deviation(first);
   return {r.name,
@@ -111,14 +111,14 @@ void merge(MethodResult& result, const MethodResult& again) {
 }
 
 std::string to_text(const std::vector<MethodResult>& results) {
-  std::vector<Row> rows(1);
-  std::ranges::copy(kHeader, rows[0].begin());
+  std::vector<ResultRow> rows(1);
+  std::ranges::copy(kResultHeader, rows[0].begin());
   for (const MethodResult& r : results) rows.push_back(row_of(r, results.front()));
-  std::array<std::size_t, kHeader.size()> width{};
-  for (const Row& row : rows)
+  std::array<std::size_t, kResultHeader.size()> width{};
+  for (const ResultRow& row : rows)
     for (std::size_t i = 0; i < row.size(); ++i) width[i] = std::max(width[i], row[i].size());
   std::string text;
-  for (const Row& row : rows) {
+  for (const ResultRow& row : rows) {
     std::string line;
     for (std::size_t i = 0; i < row.size(); ++i)  // texts to the left, numbers to the right
       line += i == 0 || i + 1 == row.size() ? fmt::format("{:<{}}  ", row[i], width[i])
