@@ -66,11 +66,13 @@ std::vector<Vec3> along_path(const std::vector<Vec3>& path, int steps) {
 
 Parts build(const Chain& chain) {
   ArticulationBuilder make(chain.where, chain.name);
-  const std::vector<Vec3> nodes =
-      chain.path.empty() ? hanging_nodes(chain.from, chain.to, chain.links,
-                                         (chain.to - chain.from).norm() * chain.sag / chain.links)
-                         : along_path(chain.path, chain.links);
-  const auto side = [&](std::size_t k) { return (nodes[k + 1] - nodes[k]).norm(); };
+  const Real hanging_side = (chain.to - chain.from).norm() * chain.sag / chain.links;
+  const std::vector<Vec3> nodes = chain.path.empty()
+                                      ? hanging_nodes(chain.from, chain.to, chain.links, hanging_side)
+                                      : along_path(chain.path, chain.links);
+  const auto side = [&](std::size_t k) {
+    return chain.path.empty() ? hanging_side : (nodes[k + 1] - nodes[k]).norm();
+  };
   const auto link = [](int i) { return "link_" + std::to_string(i); };
   for (int i = 0; i < chain.links; ++i) {
     Body& b = make.body(link(i), chain.material);
