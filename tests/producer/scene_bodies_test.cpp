@@ -18,13 +18,13 @@
 namespace offstage::producer {
 namespace {
 
-LoadedScene parse(const std::string& text) {
+LoadedScene body_scene(const std::string& text) {
   return parse_scene("{" + text + "}", "s", OFFSTAGE_SOURCE_DIR);
 }
 
-std::string errors_of(const std::string& text) {
+std::string body_scene_errors(const std::string& text) {
   try {
-    parse(text);
+    body_scene(text);
   } catch (const SceneError& error) {
     std::string all;
     for (const Problem& problem : error.problems()) all += problem.where.path + ": " + problem.what + "\n";
@@ -40,7 +40,7 @@ const char* kHammer = R"(
       {"shape": {"type": "cylinder", "radius": 0.015, "height": 0.5}}]}}])";
 
 TEST(SceneBodies, ACompoundHasTheMassOfItsParts) {
-  const LoadedScene loaded = parse(kHammer);
+  const LoadedScene loaded = body_scene(kHammer);
   const ModelLibrary models;
   Simulation simulation(loaded.scene, models);
   const sim::BodyState state = simulation.world().body(simulation.moving_bodies()[0].handle);
@@ -50,7 +50,8 @@ TEST(SceneBodies, ACompoundHasTheMassOfItsParts) {
 }
 
 TEST(SceneBodies, OwnMassCentreAndInertiaReplaceThoseOfTheShape) {
-  const LoadedScene loaded = parse(R"("world": {"gravity": [0, 0, 0]}, "output": {"fps": 10, "duration": 0.2},
+  const LoadedScene loaded =
+      body_scene(R"("world": {"gravity": [0, 0, 0]}, "output": {"fps": 10, "duration": 0.2},
     "bodies": [{"name": "top", "mass": 3, "centre": [0.1, 0, 0], "inertia": [1, 2, 2.5], "inertia_products": [0.1, 0, 0],
                 "angular_velocity": [0, 0, 1]}])");
   const ModelLibrary models;
@@ -62,7 +63,7 @@ TEST(SceneBodies, OwnMassCentreAndInertiaReplaceThoseOfTheShape) {
 }
 
 TEST(SceneBodies, WrongShapesAndTimesAreRefused) {
-  EXPECT_EQ(errors_of(R"("bodies": [{"shape": {"type": "torus", "radius": 0.1, "tube_radius": 0.2}},
+  EXPECT_EQ(body_scene_errors(R"("bodies": [{"shape": {"type": "torus", "radius": 0.1, "tube_radius": 0.2}},
                                     {"shape": {"type": "tube", "radius": 0.1, "thickness": 0.1}},
                                     {"shape": {"type": "open_box", "thickness": 0.5}},
                                     {"shape": {"type": "compound", "parts": []}},
@@ -77,7 +78,7 @@ TEST(SceneBodies, WrongShapesAndTimesAreRefused) {
             "/bodies/4/inertia_products: need \"inertia\"\n"
             "/bodies/5/remove_at: must be later than \"appear_at\", 2 s\n");
   EXPECT_EQ(
-      errors_of(
+      body_scene_errors(
           R"("bodies": [{"name": "b"}], "forces": [{"type": "applied", "bodies": ["b"], "torque": [1, 0, 0],
                          "keyframes": [{"time": 1}, {"time": 1}]}])"),
       "/forces/0: has both \"keyframes\" and a \"force\" or \"torque\"; give one of them\n"
@@ -86,22 +87,22 @@ TEST(SceneBodies, WrongShapesAndTimesAreRefused) {
 
 TEST(SceneBodies, InvalidCouplingsAreRefused) {
   const std::string bodies = R"("bodies": [{"name": "a"}, {"name": "b", "position": [3, 0, 0]}], )";
-  EXPECT_EQ(
-      errors_of(bodies + R"("joints": [{"type": "gear", "a": "a"}, {"type": "screw", "a": "a", "ratio": 0},
+  EXPECT_EQ(body_scene_errors(
+                bodies + R"("joints": [{"type": "gear", "a": "a"}, {"type": "screw", "a": "a", "ratio": 0},
       {"type": "pulley", "a": "a", "b": "b", "pulley_a": [0, 3, 0], "pulley_b": [0, 3, 0], "ratio": -1},
       {"type": "distance", "a": "a", "anchor": [0, 1, 0], "length_limits": [0, 0.5]},
       {"type": "revolute", "a": "a", "stiffness": 3}, {"a": "a", "restitution": 0.5}])"),
-      "/joints/0/b: is needed: a gear or rack couples two bodies\n"
-      "/joints/1/ratio: must not be 0\n"
-      "/joints/2/ratio: must be greater than 0 for a pulley\n"
-      "/joints/3/length_limits: must be a range that contains the length at time 0, 1.000000 m\n"
-      "/joints/4/stiffness: is for spherical joints; use a motor with a \"stiffness\"\n"
-      "/joints/5/restitution: is that of impacts at limits, and the joint has none\n");
+            "/joints/0/b: is needed: a gear or rack couples two bodies\n"
+            "/joints/1/ratio: must not be 0\n"
+            "/joints/2/ratio: must be greater than 0 for a pulley\n"
+            "/joints/3/length_limits: must be a range that contains the length at time 0, 1.000000 m\n"
+            "/joints/4/stiffness: is for spherical joints; use a motor with a \"stiffness\"\n"
+            "/joints/5/restitution: is that of impacts at limits, and the joint has none\n");
 }
 
 // The rope of 2 m lets its load fall by 1 m.
 TEST(SceneBodies, LengthLimitsAreLengths) {
-  const LoadedScene loaded = parse(R"("output": {"fps": 30, "duration": 3},
+  const LoadedScene loaded = body_scene(R"("output": {"fps": 30, "duration": 3},
     "bodies": [{"name": "load", "shape": {"type": "sphere", "radius": 0.1}}],
     "joints": [{"type": "distance", "a": "load", "anchor_b": [0, 1, 0], "length_limits": [0, 2]}])");
   const ModelLibrary models;
@@ -113,13 +114,13 @@ TEST(SceneBodies, LengthLimitsAreLengths) {
 // A chain along a path has links of equal arc, and with a stiffness it sags as a cantilever: w L^4 / (8 E I),
 // with the weight w per length, within the error of 20 links.
 TEST(SceneBodies, AChainAlongAPathBendsAsABeam) {
-  const LoadedScene corner = parse(R"("articulations": [
+  const LoadedScene corner = body_scene(R"("articulations": [
     {"type": "chain", "name": "c", "links": 6, "path": [[0, 0, 0], [1, 0, 0], [1, 2, 0]]}])");
   ASSERT_EQ(corner.scene.bodies.size(), 6u);
   EXPECT_LT((corner.scene.joints[2].anchor - Vec3(1, 0, 0)).norm(), 1e-12);
   EXPECT_LT((corner.scene.joints[4].anchor - Vec3(1, 1, 0)).norm(), 1e-12);
 
-  const LoadedScene beam = parse(R"("output": {"fps": 30, "duration": 12},
+  const LoadedScene beam = body_scene(R"("output": {"fps": 30, "duration": 12},
     "articulations": [{"type": "chain", "name": "c", "links": 20, "path": [[0, 0, 0], [2, 0, 0]], "radius": 0.01,
                        "density": 1000, "bend_stiffness": 60, "damping": 2}])");
   const ModelLibrary models;
@@ -156,7 +157,7 @@ TEST(Fills, HoldAllBallsAtTheirDistance) {
 }
 
 TEST(Fills, MakeParticlesAndCopiesOfBodies) {
-  const LoadedScene loaded = parse(R"(
+  const LoadedScene loaded = body_scene(R"(
     "particles": [{"name": "water", "radius": 0.05, "places": [{"position": [9, 0, 0]}],
                    "fill": {"shape": {"type": "box", "size": [0.4, 0.3, 0.2]}, "packing": "cubic", "position": [0, 5, 0]}}],
     "bodies": [{"name": "marble", "shape": {"type": "sphere", "radius": 0.05}, "position": [0, 1, 0],
@@ -165,22 +166,22 @@ TEST(Fills, MakeParticlesAndCopiesOfBodies) {
   EXPECT_GT(loaded.scene.bodies.size(), 15u);
   for (const Body& body : loaded.scene.bodies)
     EXPECT_LT(std::hypot(body.position.x(), body.position.z()), 0.15);
-  EXPECT_EQ(errors_of(R"("bodies": [{"name": "m", "fill": {}}])"),
+  EXPECT_EQ(body_scene_errors(R"("bodies": [{"name": "m", "fill": {}}])"),
             "/bodies/0/fill/spacing: is needed: the distance between neighbouring copies\n");
   const char* no_room = ": has no room for a single place; use a smaller \"spacing\" or a larger volume\n";
-  EXPECT_EQ(errors_of(R"("bodies": [{"name": "m", "fill": {"spacing": 2}}])"),
+  EXPECT_EQ(body_scene_errors(R"("bodies": [{"name": "m", "fill": {"spacing": 2}}])"),
             std::string("/bodies/0/fill") + no_room);
-  EXPECT_EQ(errors_of(R"("particles": [{"fill": {"spacing": 2}}])"),
+  EXPECT_EQ(body_scene_errors(R"("particles": [{"fill": {"spacing": 2}}])"),
             std::string("/particles/0/fill") + no_room);
   // A thin and very long volume, in which few of the places of the box around it are.
   EXPECT_EQ(
-      errors_of(
+      body_scene_errors(
           R"("particles": [{"fill": {"shape": {"type": "cylinder", "radius": 0.06, "height": 1e9}, "spacing": 0.1}}])"),
       "/particles/0/fill: has more than 5000000 places; use a larger \"spacing\" or a smaller volume\n");
 }
 
 TEST(EmitterFaces, AreThoseOfTheBodyOrOfACube) {
-  const LoadedScene loaded = parse(R"(
+  const LoadedScene loaded = body_scene(R"(
     "bodies": [{"name": "box", "shape": {"type": "box", "size": [1, 2, 3]}, "motion": "static"},
                {"name": "can", "shape": {"type": "cylinder", "radius": 0.3, "height": 2}, "motion": "static"}],
     "emitters": [{"body": "box", "surface": {"type": "face", "face": "right"}},
@@ -197,7 +198,7 @@ TEST(EmitterFaces, AreThoseOfTheBodyOrOfACube) {
   EXPECT_EQ(bottom.radius, 0.3);
   EXPECT_LT((std::get<PlaneSurface>(loaded.scene.emitters[2].surface).position - Vec3(5, 0, 2)).norm(),
             1e-12);
-  EXPECT_EQ(errors_of(R"("bodies": [{"name": "ball", "shape": {"type": "sphere"}}],
+  EXPECT_EQ(body_scene_errors(R"("bodies": [{"name": "ball", "shape": {"type": "sphere"}}],
                          "emitters": [{"body": "ball", "surface": {"type": "face"}}])"),
             "/emitters/0/surface/face: the body 'ball' has no such face: boxes have six, cylinders and "
             "frusta have a top "
@@ -205,7 +206,7 @@ TEST(EmitterFaces, AreThoseOfTheBodyOrOfACube) {
 }
 
 TEST(Lifetimes, GroupsAppearAndAreRemoved) {
-  const LoadedScene loaded = parse(R"("output": {"fps": 10, "duration": 3},
+  const LoadedScene loaded = body_scene(R"("output": {"fps": 10, "duration": 3},
     "particles": [{"name": "p", "places": [{"position": [0, 0, 0]}], "appear_at": 0.55, "remove_at": 1.25}])");
   const ModelLibrary models;
   Simulation simulation(loaded.scene, models);
@@ -226,7 +227,7 @@ TEST(Lifetimes, GroupsAppearAndAreRemoved) {
 
 // The table has a row for each particle of each frame, and both forms hold the same numbers.
 TEST(ParticleTables, HoldEveryParticleOfEveryFrame) {
-  const LoadedScene loaded = parse(R"("output": {"fps": 10, "duration": 1},
+  const LoadedScene loaded = body_scene(R"("output": {"fps": 10, "duration": 1},
     "particles": [{"name": "placed", "places": [{"position": [0, 1, 0]}]}],
     "emitters": [{"name": "jet", "rate": 50, "lifespan": 0.5, "surface": {"position": [0, 2, 0]},
                   "trails": [{"name": "wake", "rate": 20}]}])");
