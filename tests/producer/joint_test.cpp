@@ -176,7 +176,9 @@ TEST(ModelTrees, AreTheNodesOfTheirFile) {
                    R"({"node": "hnad"}, {"node": "hand", "type": "distance"}]}])"),
       "/articulations/0/joints/0/node: assets/models/robot_arm.glb has no node 'hnad' with triangles; did "
       "you mean 'hand'?\n"
-      "/articulations/0/joints/1/type: must not be \"distance\": the joint is at the origin of the node\n");
+      "/articulations/0/joints/1/type: must not be \"distance\", \"pulley\", \"gear\" or \"rack\": the joint "
+      "is at "
+      "the origin of the node\n");
   EXPECT_NE(joint_errors(R"("articulations": [{"type": "model", "file": "none.glb"}])")
                 .find("/articulations/0/file: "),
             std::string::npos);

@@ -111,29 +111,13 @@ TEST(SceneBodies, LengthLimitsAreLengths) {
   EXPECT_NEAR(simulation.world().body(simulation.moving_bodies()[0].handle).centre.y(), -1, 1e-3);
 }
 
-// A chain along a path has links of equal arc, and with a stiffness it sags as a cantilever: w L^4 / (8 E I),
-// with the weight w per length, within the error of 20 links.
-TEST(SceneBodies, AChainAlongAPathBendsAsABeam) {
+// A chain along a path has links of equal length along it.
+TEST(SceneBodies, AChainAlongAPathHasLinksOfEqualLength) {
   const LoadedScene corner = body_scene(R"("articulations": [
     {"type": "chain", "name": "c", "links": 6, "path": [[0, 0, 0], [1, 0, 0], [1, 2, 0]]}])");
   ASSERT_EQ(corner.scene.bodies.size(), 6u);
   EXPECT_LT((corner.scene.joints[2].anchor - Vec3(1, 0, 0)).norm(), 1e-12);
   EXPECT_LT((corner.scene.joints[4].anchor - Vec3(1, 1, 0)).norm(), 1e-12);
-
-  const LoadedScene beam = body_scene(R"("output": {"fps": 30, "duration": 12},
-    "articulations": [{"type": "chain", "name": "c", "links": 20, "path": [[0, 0, 0], [2, 0, 0]], "radius": 0.01,
-                       "density": 1000, "bend_stiffness": 60, "damping": 2}])");
-  const ModelLibrary models;
-  Simulation simulation(beam.scene, models);
-  Real mass = 0;
-  for (const auto& [name, handle] : simulation.moving_bodies()) mass += simulation.world().body(handle).mass;
-  for (int i = 0; i < 360; ++i) simulation.advance();
-  const Real sag = mass / 2 * 9.81 * 16 / (8 * 60);
-  const auto& tip = simulation.moving_bodies().back();
-  ASSERT_EQ(tip.name, "c/link_19");
-  const sim::BodyState state = simulation.world().body(tip.handle);
-  const Vec3 end = state.pose.point_to_world(Vec3(0, 0.05, 0));
-  EXPECT_NEAR(end.y() / -sag, 1, 0.03);
 }
 
 TEST(Fills, HoldAllBallsAtTheirDistance) {
@@ -167,7 +151,7 @@ TEST(Fills, MakeParticlesAndCopiesOfBodies) {
   for (const Body& body : loaded.scene.bodies)
     EXPECT_LT(std::hypot(body.position.x(), body.position.z()), 0.15);
   EXPECT_EQ(body_scene_errors(R"("bodies": [{"name": "m", "fill": {}}])"),
-            "/bodies/0/fill/spacing: is needed: the distance between neighbouring copies\n");
+            "/bodies/0/fill: needs a \"spacing\", the distance between neighbouring copies\n");
   const char* no_room = ": has no room for a single place; use a smaller \"spacing\" or a larger volume\n";
   EXPECT_EQ(body_scene_errors(R"("bodies": [{"name": "m", "fill": {"spacing": 2}}])"),
             std::string("/bodies/0/fill") + no_room);

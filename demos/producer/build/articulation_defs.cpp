@@ -37,8 +37,8 @@ void add_copies(const Template& original, uint64_t seed, Scene& flat, std::vecto
                 std::vector<Problem>& warnings) {
   if (needs_spacing(original.placement)) {
     Where where = original.where;
-    where.path += "/fill/spacing";
-    errors.push_back({where, "is needed: the distance between neighbouring copies"});
+    where.path += "/fill";
+    errors.push_back({where, "needs a \"spacing\", the distance between neighbouring copies"});
     return;
   }
   if (copy_count(original.placement) > kMaxCopies) {

@@ -90,10 +90,6 @@ Parts build(const Chain& chain) {
     j.behaviour.friction = chain.friction;
     j.behaviour.damping = chain.damping;
     j.behaviour.max_force = chain.max_force;
-    if (chain.bend_stiffness == 0) return;
-    // A link bends as a beam of its length; half a link bends between its middle and a clamped end.
-    const Real before = i > 0 ? side(k - 1) : 0, after = i < chain.links ? side(k) : 0;
-    j.behaviour.stiffness = 2 * chain.bend_stiffness / (before + after);
   };
   if (const auto start = holder(chain.start)) join(0, make.own(link(0)), *start);
   for (int i = 1; i < chain.links; ++i) join(i, make.own(link(i)), make.own(link(i - 1)));

@@ -235,8 +235,8 @@ std::vector<T> expand_all(const std::vector<T>& originals, uint64_t seed, std::v
     }
     if (needs_spacing(original.placement)) {
       Where where = original.where;
-      where.path += "/fill/spacing";
-      errors.push_back({where, "is needed: the distance between neighbouring copies"});
+      where.path += "/fill";
+      errors.push_back({where, "needs a \"spacing\", the distance between neighbouring copies"});
       all.push_back(original);
       continue;
     }

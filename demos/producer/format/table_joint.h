@@ -174,11 +174,6 @@ struct Table<Chain> {
         {"start", &T::start,
          "name of the body that holds the first link, or `world`; empty: the end is free"},
         {"end", &T::end, "name of the body that holds the last link, or `world`; empty: the end is free"},
-        {"bend_stiffness", &T::bend_stiffness,
-         "flexural rigidity E I: a bend of the curvature 1/r needs the torque E I / r; its shape without "
-         "load is that of "
-         "time 0, and held ends are clamped",
-         "N m^2", kNotNegative},
         {"swing_deg", &T::swing_deg, "largest angle between neighbouring links", "degrees", between(0, 180)},
         {"friction", &T::friction, "dry friction of each joint", "N m", kNotNegative},
         {"damping", &T::damping, "viscous damping of each joint", "N m s", kNotNegative},
