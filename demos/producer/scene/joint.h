@@ -77,8 +77,7 @@ struct Chain {
   Vec3 from = Vec3::Zero(), to = Vec3::UnitX();
   std::vector<Vec3> path;  ///< points of the chain, instead of `from` and `to`
   int links = 10;
-  Real bend_stiffness = 0;  ///< flexural rigidity [N m^2]
-  Real sag = 1;             ///< length of the chain as a multiple of the distance
+  Real sag = 1;  ///< length of the chain as a multiple of the distance
   Real radius = 0.03;
   Real density = 7800;
   std::string material;
